@@ -1,0 +1,168 @@
+//! Clock frequencies as exact ratios, and clock edges computed from their number.
+//!
+//! 384 MHz has a period of 15625/6 ps, which no binary or decimal fraction of a femtosecond
+//! holds. Accumulating a rounded period drifts; computing edge k from k does not, so edge 10¹²
+//! is as exact as edge 1.
+
+use super::Time;
+
+const FS_PER_S: i128 = 1_000_000_000_000_000;
+
+/// An exact clock frequency, a ratio of integers in hertz.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Frequency {
+    numerator: u64,
+    denominator: u64,
+}
+
+/// Why a number is no clock frequency.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum FrequencyError {
+    /// Zero, negative, infinite or NaN.
+    #[error("{0} Hz is no clock frequency: give a positive, finite number of hertz")]
+    NotPositive(f64),
+    /// Outside 1 Hz … 1 THz.
+    #[error("{0} Hz is outside the modelled range of 1 Hz to 1 THz")]
+    OutOfRange(f64),
+}
+
+impl Frequency {
+    /// A whole number of hertz, 1 ≤ `hz` ≤ 10¹².
+    ///
+    /// # Panics
+    /// When `hz` is outside that range.
+    pub const fn from_hz(hz: u64) -> Self {
+        assert!(
+            hz >= 1 && hz <= 1_000_000_000_000,
+            "frequency outside 1 Hz to 1 THz"
+        );
+        Frequency {
+            numerator: hz,
+            denominator: 1,
+        }
+    }
+
+    /// The frequency nearest to `hz` in steps of 1 µHz.
+    ///
+    /// # Errors
+    /// When `hz` is not a number from 1 to 10¹².
+    pub fn from_hz_f64(hz: f64) -> Result<Self, FrequencyError> {
+        if !(hz.is_finite() && hz > 0.0) {
+            return Err(FrequencyError::NotPositive(hz));
+        }
+        if !(1.0..=1e12).contains(&hz) {
+            return Err(FrequencyError::OutOfRange(hz));
+        }
+        Ok(Self::reduced((hz * 1e6).round() as u64, 1_000_000))
+    }
+
+    /// The frequency whose period is exactly `period` (1 ps … 1 s).
+    ///
+    /// # Errors
+    /// When the period is outside that range.
+    pub fn from_period(period: Time) -> Result<Self, FrequencyError> {
+        let fs = period.as_fs();
+        if fs <= 0 {
+            return Err(FrequencyError::NotPositive(1e15 / fs as f64));
+        }
+        if !(1_000..=FS_PER_S as i64).contains(&fs) {
+            return Err(FrequencyError::OutOfRange(1e15 / fs as f64));
+        }
+        Ok(Self::reduced(FS_PER_S as u64, fs as u64))
+    }
+
+    fn reduced(numerator: u64, denominator: u64) -> Self {
+        let (mut a, mut b) = (numerator, denominator);
+        while b != 0 {
+            (a, b) = (b, a % b);
+        }
+        Frequency {
+            numerator: numerator / a,
+            denominator: denominator / a,
+        }
+    }
+
+    /// In hertz.
+    pub fn as_hz(self) -> f64 {
+        self.numerator as f64 / self.denominator as f64
+    }
+
+    /// The period, rounded to the nearest femtosecond. For edges far away use
+    /// [`Frequency::half_periods`], which never accumulates this rounding.
+    pub fn period(self) -> Time {
+        self.half_periods(2)
+    }
+
+    /// The time of `k` half periods, rounded to the nearest femtosecond (halves up).
+    ///
+    /// With a falling edge at `k = 0`, even `k` are falling edges and odd `k` rising ones.
+    #[inline]
+    pub fn half_periods(self, k: i64) -> Time {
+        let numerator = k as i128 * FS_PER_S * self.denominator as i128 + self.numerator as i128;
+        Time::from_fs(numerator.div_euclid(2 * self.numerator as i128) as i64)
+    }
+
+    /// The time of `k` whole periods, rounded as in [`Frequency::half_periods`].
+    #[inline]
+    pub fn periods(self, k: i64) -> Time {
+        self.half_periods(2 * k)
+    }
+
+    /// How many whole half periods lie in `[0, t]`: the largest `k` with `half_periods(k) <= t`.
+    pub fn half_periods_until(self, t: Time) -> i64 {
+        let guess = (t.as_fs() as i128 * 2 * self.numerator as i128)
+            .div_euclid(FS_PER_S * self.denominator as i128) as i64;
+        let mut k = guess - 1;
+        while self.half_periods(k + 1) <= t {
+            k += 1;
+        }
+        k
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn edges_do_not_drift_after_a_million_million_cycles() {
+        let clk = Frequency::from_hz(384_000_000);
+        // 10¹² periods of 15625/6 ps are 2604166666666666.67 ps.
+        let t = clk.periods(1_000_000_000_000);
+        assert_eq!(t.as_fs(), 2_604_166_666_666_666_667);
+        assert_eq!(clk.period(), Time::from_fs(2_604_167));
+    }
+
+    #[test]
+    fn impossible_frequencies_are_refused() {
+        for hz in [0.0, -1.0, f64::NAN, f64::INFINITY, 0.5, 2e12] {
+            assert!(Frequency::from_hz_f64(hz).is_err(), "{hz}");
+        }
+        assert!(Frequency::from_period(Time::ZERO).is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn every_edge_is_within_half_a_femtosecond(hz in 1_000u64..1_000_000_000_000, k in 0i64..1_000_000) {
+            let f = Frequency::from_hz(hz);
+            let exact_times_2hz = k as i128 * FS_PER_S;
+            let got_times_2hz = f.half_periods(k).as_fs() as i128 * 2 * hz as i128;
+            prop_assert!((exact_times_2hz - got_times_2hz).abs() <= hz as i128);
+        }
+
+        #[test]
+        fn half_periods_until_inverts_half_periods(hz in 1e6f64..1e10, k in -1_000_000i64..1_000_000) {
+            let f = Frequency::from_hz_f64(hz).unwrap();
+            let t = f.half_periods(k);
+            prop_assert_eq!(f.half_periods_until(t), k);
+            prop_assert_eq!(f.half_periods_until(t - Time::from_fs(1)), k - 1);
+        }
+
+        #[test]
+        fn a_period_round_trips(fs in 1_000i64..1_000_000_000) {
+            let f = Frequency::from_period(Time::from_fs(fs)).unwrap();
+            prop_assert_eq!(f.period(), Time::from_fs(fs));
+        }
+    }
+}
