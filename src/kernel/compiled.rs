@@ -1,0 +1,217 @@
+//! The netlist compiled for the event loop: fan-out lists, truth tables and delay tables.
+//!
+//! A cell's inputs are packed two bits each into one byte, updated as nets change, so that
+//! evaluating a gate is one table look-up.
+
+use crate::logic::Logic;
+use crate::netlist::{CellKind, Corner, Library, Netlist, next_state};
+
+/// What a change of an input pin means for its cell.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum PinClass {
+    /// Only sampled (a flip-flop's D).
+    Sampled,
+    /// Any change may change the output.
+    Active,
+    /// Only going high (or unknown) may change the output.
+    Clock,
+}
+
+/// One entry of a net's fan-out: cell, class and pin in one word.
+#[derive(Clone, Copy)]
+pub(super) struct Load(u32);
+
+impl Load {
+    const CELL_SHIFT: u32 = 4;
+
+    fn new(cell: usize, class: PinClass, pin: usize) -> Self {
+        Load((cell as u32) << Self::CELL_SHIFT | (class as u32) << 2 | pin as u32)
+    }
+
+    #[inline]
+    pub fn cell(self) -> usize {
+        (self.0 >> Self::CELL_SHIFT) as usize
+    }
+
+    /// Shift of the pin's two bits in the packed inputs.
+    #[inline]
+    pub fn shift(self) -> u32 {
+        (self.0 & 3) * 2
+    }
+
+    #[inline]
+    pub fn class(self) -> PinClass {
+        match self.0 >> 2 & 3 {
+            0 => PinClass::Sampled,
+            1 => PinClass::Active,
+            _ => PinClass::Clock,
+        }
+    }
+}
+
+/// State of one cell.
+#[derive(Clone, Copy)]
+pub(super) struct CellState {
+    /// Input values now, two bits each.
+    pub inputs: u8,
+    /// Input values at the last evaluation.
+    pub evaluated: u8,
+    pub kind: CellKind,
+    /// A flip-flop's state, two bits.
+    pub state: u8,
+    pub is_dirty: bool,
+    /// Output nets, `u32::MAX` where unconnected.
+    pub outputs: [u32; 2],
+}
+
+/// Truth tables of every cell, indexed by packed inputs.
+pub(super) struct Tables {
+    gates: [[u8; 256]; CellKind::ALL.len()],
+    /// Indexed by packed inputs, clock before (2 bits), state (2 bits).
+    flip_flop: Vec<u8>,
+    /// Delay by cell, by mask of changed pins, by new value: the shortest of the arcs concerned.
+    delays_fs: [[[u32; 4]; 16]; CellKind::ALL.len()],
+}
+
+impl Tables {
+    pub fn new(library: &Library, corner: Corner) -> Self {
+        let unpack = |packed: usize| [0, 2, 4, 6].map(|s| Logic::from_bits((packed >> s) as u8));
+        let mut tables = Tables {
+            gates: [[0; 256]; CellKind::ALL.len()],
+            flip_flop: vec![0; 1 << 12],
+            delays_fs: [[[0; 4]; 16]; CellKind::ALL.len()],
+        };
+        for kind in CellKind::ALL {
+            if !kind.is_flip_flop() {
+                for packed in 0..256 {
+                    tables.gates[kind as usize][packed] = kind.output(unpack(packed)).bits();
+                }
+            }
+            for mask in 1..16usize {
+                for to in Logic::ALL {
+                    tables.delays_fs[kind as usize][mask][to as usize] = (0..kind.inputs().len())
+                        .filter(|&pin| mask >> pin & 1 == 1 && kind.triggers(pin))
+                        .map(|pin| library.arcs(kind)[pin].delay_fs(corner, to))
+                        .min()
+                        .unwrap_or(0);
+                }
+            }
+        }
+        for index in 0..1 << 12 {
+            let [data, clock, reset, set] = unpack(index & 0xff);
+            let [before, state, ..] = unpack(index >> 8);
+            tables.flip_flop[index] = next_state(state, data, before, clock, reset, set).bits();
+        }
+        tables
+    }
+
+    #[inline]
+    pub fn gate(&self, kind: CellKind, inputs: u8) -> u8 {
+        self.gates[kind as usize][inputs as usize]
+    }
+
+    #[inline]
+    pub fn flip_flop(&self, inputs: u8, evaluated: u8, state: u8) -> u8 {
+        let clock_before = (evaluated >> 2 & 3) as usize;
+        self.flip_flop[inputs as usize | clock_before << 8 | (state as usize) << 10]
+    }
+
+    /// Delays by new value for the pins in which `inputs` and `evaluated` differ.
+    #[inline]
+    pub fn delays(&self, kind: CellKind, inputs: u8, evaluated: u8) -> &[u32; 4] {
+        let differing = inputs ^ evaluated;
+        let pairs = (differing | differing >> 1) & 0b0101_0101;
+        let mask = (pairs | pairs >> 1) & 0b0011_0011;
+        let mask = (mask | mask >> 2) & 0b0000_1111;
+        &self.delays_fs[kind as usize][mask as usize]
+    }
+}
+
+/// Fan-out lists of all nets, one after the other.
+pub(super) struct FanOut {
+    start: Vec<u32>,
+    loads: Vec<Load>,
+}
+
+impl FanOut {
+    pub fn new(netlist: &Netlist) -> Self {
+        let mut start = vec![0u32; netlist.net_count() + 1];
+        let cells = netlist.cells();
+        assert!(
+            cells.len() < 1 << (32 - Load::CELL_SHIFT),
+            "more cells than a Load can number"
+        );
+        for cell in cells {
+            for net in &cell.inputs[..cell.kind.inputs().len()] {
+                start[net.index() + 1] += 1;
+            }
+        }
+        for i in 1..start.len() {
+            start[i] += start[i - 1];
+        }
+        let mut next = start.clone();
+        let mut loads = vec![Load(0); *start.last().expect("never empty") as usize];
+        for (index, cell) in cells.iter().enumerate() {
+            for (pin, net) in cell.inputs[..cell.kind.inputs().len()].iter().enumerate() {
+                let class = match (cell.kind.is_flip_flop(), pin) {
+                    (true, 0) => PinClass::Sampled,
+                    (true, 1) => PinClass::Clock,
+                    _ => PinClass::Active,
+                };
+                let at = &mut next[net.index()];
+                loads[*at as usize] = Load::new(index, class, pin);
+                *at += 1;
+            }
+        }
+        FanOut { start, loads }
+    }
+
+    #[inline]
+    pub fn of(&self, net: usize) -> &[Load] {
+        &self.loads[self.start[net] as usize..self.start[net + 1] as usize]
+    }
+}
+
+/// Every cell with unknown inputs and state.
+pub(super) fn initial_cells(netlist: &Netlist) -> Vec<CellState> {
+    netlist
+        .cells()
+        .iter()
+        .map(|cell| {
+            let pins = cell.kind.inputs().len() as u32;
+            // Pins a cell does not have read 0: no set, no reset.
+            let inputs = (0b1010_1010u32 & ((1 << (2 * pins)) - 1)) as u8;
+            CellState {
+                inputs,
+                evaluated: inputs,
+                kind: cell.kind,
+                state: Logic::X.bits(),
+                is_dirty: false,
+                outputs: cell.outputs.map(|n| {
+                    if n.is_some() {
+                        n.index() as u32
+                    } else {
+                        u32::MAX
+                    }
+                }),
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_delay_is_that_of_the_pin_that_changed() {
+        let library = Library::default();
+        let tables = Tables::new(&library, Corner::Typ);
+        let mux = CellKind::Mux2;
+        let arc = |pin: usize| library.arcs(mux)[pin].delay_fs(Corner::Typ, Logic::One);
+        let by_pins = |differing: u8| tables.delays(mux, differing, 0)[Logic::One as usize];
+        assert_eq!(by_pins(0b00_00_01), arc(0));
+        assert_eq!(by_pins(0b10_00_00), arc(2));
+        assert_eq!(by_pins(0b11_01_00), arc(1).min(arc(2)));
+    }
+}

@@ -1,0 +1,30 @@
+//! The discrete event kernel: four-valued, integer femtoseconds, inertial delays, total order.
+//!
+//! One instant is simulated in two phases. First every net change due at that femtosecond, from
+//! the stimulus or from a cell, is applied; then every cell that saw a triggering change is
+//! evaluated once, with all inputs new. A cell output that must change is scheduled one arc delay
+//! later; a different value computed in the meantime cancels it (inertial delay), the same value
+//! leaves it where it is. Zero delays make further rounds of the two phases (delta cycles) within
+//! the instant.
+//!
+//! ```text
+//!   Stimulus ──┐              ┌─► Observer (waveforms, recorders)
+//!              ├─► apply ─────┤
+//!   TimeWheel ─┘   changes    └─► dirty cells ─► evaluate ─► schedule ─┐
+//!       ▲                                                             │
+//!       └─────────────────────────────────────────────────────────────┘
+//! ```
+//!
+//! Because each phase is complete before the next begins, results do not depend on the order
+//! of events within an instant. The hot loop neither allocates (buckets keep their memory), nor
+//! hashes, nor touches a string.
+
+mod compiled;
+mod observer;
+mod simulation;
+mod stimulus;
+mod wheel;
+
+pub use observer::{Observer, Recorder};
+pub use simulation::{Kernel, Statistics};
+pub use stimulus::{Drive, Stimulus, clock, merge};

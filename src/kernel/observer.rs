@@ -1,0 +1,82 @@
+//! Who watches the simulation: anything that wants to hear of every value change.
+
+use crate::logic::Logic;
+use crate::netlist::NetId;
+use crate::units::Time;
+
+/// Hears of every net change, in time order.
+pub trait Observer {
+    /// `net` took `value` at `time`.
+    fn change(&mut self, time: Time, net: NetId, value: Logic);
+}
+
+/// Watches nothing, at no cost.
+impl Observer for () {
+    #[inline]
+    fn change(&mut self, _: Time, _: NetId, _: Logic) {}
+}
+
+/// Two observers see the same changes.
+impl<A: Observer, B: Observer> Observer for (A, B) {
+    #[inline]
+    fn change(&mut self, time: Time, net: NetId, value: Logic) {
+        self.0.change(time, net, value);
+        self.1.change(time, net, value);
+    }
+}
+
+impl<O: Observer> Observer for &mut O {
+    #[inline]
+    fn change(&mut self, time: Time, net: NetId, value: Logic) {
+        (**self).change(time, net, value);
+    }
+}
+
+/// Keeps every change of a few nets.
+#[derive(Debug, Clone, Default)]
+pub struct Recorder {
+    nets: Vec<NetId>,
+    changes: Vec<(Time, NetId, Logic)>,
+}
+
+impl Recorder {
+    /// Records these nets.
+    pub fn new(nets: impl IntoIterator<Item = NetId>) -> Self {
+        Recorder {
+            nets: nets.into_iter().collect(),
+            changes: Vec::new(),
+        }
+    }
+
+    /// Everything recorded, in time order.
+    pub fn changes(&self) -> &[(Time, NetId, Logic)] {
+        &self.changes
+    }
+
+    /// Times at which `net` rose to 1.
+    pub fn rising_edges(&self, net: NetId) -> Vec<Time> {
+        self.edges(net, Logic::One)
+    }
+
+    /// Times at which `net` fell to 0.
+    pub fn falling_edges(&self, net: NetId) -> Vec<Time> {
+        self.edges(net, Logic::Zero)
+    }
+
+    fn edges(&self, net: NetId, to: Logic) -> Vec<Time> {
+        self.changes
+            .iter()
+            .filter(|(_, n, v)| *n == net && *v == to)
+            .map(|(t, _, _)| *t)
+            .collect()
+    }
+}
+
+impl Observer for Recorder {
+    #[inline]
+    fn change(&mut self, time: Time, net: NetId, value: Logic) {
+        if self.nets.contains(&net) {
+            self.changes.push((time, net, value));
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! The event loop.
+
+use super::compiled::{CellState, FanOut, PinClass, Tables, initial_cells};
+use super::observer::Observer;
+use super::stimulus::Stimulus;
+use super::wheel::{Event, TimeWheel};
+use crate::logic::Logic;
+use crate::netlist::{Corner, Library, NetId, Netlist};
+use crate::units::Time;
+
+/// No value is pending on a net.
+const NONE: u8 = 4;
+
+/// Rounds of zero-delay changes in one instant after which a loop is assumed to oscillate.
+const MOST_DELTA_CYCLES: u32 = 10_000;
+
+#[derive(Clone, Copy)]
+struct NetState {
+    generation: u32,
+    value: u8,
+    pending: u8,
+}
+
+/// What a simulation did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Statistics {
+    /// Net value changes.
+    pub changes: u64,
+    /// Cell evaluations.
+    pub evaluations: u64,
+}
+
+/// An event-driven simulation of one netlist.
+pub struct Kernel {
+    now_fs: i64,
+    nets: Vec<NetState>,
+    cells: Vec<CellState>,
+    fan_out: FanOut,
+    tables: Tables,
+    wheel: TimeWheel,
+    dirty: Vec<u32>,
+    statistics: Statistics,
+}
+
+impl Kernel {
+    /// Prepares a simulation at time 0 with every net and flip-flop unknown.
+    pub fn new(netlist: &Netlist, library: &Library, corner: Corner) -> Self {
+        let unknown = NetState {
+            generation: 0,
+            value: Logic::X.bits(),
+            pending: NONE,
+        };
+        Kernel {
+            now_fs: 0,
+            nets: vec![unknown; netlist.net_count()],
+            cells: initial_cells(netlist),
+            fan_out: FanOut::new(netlist),
+            tables: Tables::new(library, corner),
+            wheel: TimeWheel::new(),
+            dirty: Vec::new(),
+            statistics: Statistics::default(),
+        }
+    }
+
+    /// The present.
+    pub fn now(&self) -> Time {
+        Time::from_fs(self.now_fs)
+    }
+
+    /// Present value of a net.
+    #[inline]
+    pub fn value(&self, net: NetId) -> Logic {
+        Logic::from_bits(self.nets[net.index()].value)
+    }
+
+    /// Present value of a bus of at most 64 bits, bit 0 first, where all bits are known.
+    pub fn number(&self, nets: &[NetId]) -> Option<u64> {
+        nets.iter().rev().try_fold(0, |number, &net| {
+            Some(number << 1 | self.value(net).to_bool()? as u64)
+        })
+    }
+
+    /// What has been done so far.
+    pub fn statistics(&self) -> Statistics {
+        self.statistics
+    }
+
+    /// Simulates everything up to and including `until`, and leaves the present there.
+    ///
+    /// Drives in the past are a mistake of the caller; they are caught in debug builds and
+    /// applied at once otherwise.
+    ///
+    /// # Panics
+    /// When a loop of zero-delay cells oscillates within one instant.
+    pub fn run<O: Observer>(&mut self, stimulus: &mut Stimulus<'_>, until: Time, observer: &mut O) {
+        let until_fs = until.as_fs();
+        loop {
+            let drive_fs = stimulus.peek().map_or(i64::MAX, |d| d.time.as_fs());
+            let limit_fs = drive_fs.min(until_fs);
+            let time_fs = match self.wheel.next_time(limit_fs) {
+                Some(time_fs) => time_fs,
+                None if drive_fs <= until_fs => drive_fs,
+                None => break,
+            };
+            debug_assert!(time_fs >= self.now_fs, "a drive in the past");
+            self.now_fs = time_fs.max(self.now_fs);
+            self.wheel.advance(self.now_fs);
+            while let Some(drive) = stimulus.next_if(|d| d.time.as_fs() <= self.now_fs) {
+                if self.nets[drive.net.index()].value != drive.value.bits() {
+                    self.apply(drive.net.index(), drive.value.bits(), observer);
+                }
+            }
+            self.settle(observer);
+        }
+        self.now_fs = self.now_fs.max(until_fs);
+        self.wheel.advance(self.now_fs);
+    }
+
+    fn settle<O: Observer>(&mut self, observer: &mut O) {
+        for _ in 0..MOST_DELTA_CYCLES {
+            while let Some(event) = self.wheel.pop_at(self.now_fs) {
+                let net = &mut self.nets[event.net as usize];
+                if net.generation == event.tag >> 2 {
+                    net.pending = NONE;
+                    self.apply(event.net as usize, (event.tag & 3) as u8, observer);
+                }
+            }
+            if self.dirty.is_empty() {
+                return;
+            }
+            let mut dirty = std::mem::take(&mut self.dirty);
+            self.statistics.evaluations += dirty.len() as u64;
+            for &cell in &dirty {
+                self.evaluate(cell as usize);
+            }
+            dirty.clear();
+            self.dirty = dirty;
+        }
+        panic!("zero-delay loop oscillates at {}", self.now());
+    }
+
+    #[inline]
+    fn apply<O: Observer>(&mut self, net: usize, value: u8, observer: &mut O) {
+        self.nets[net].value = value;
+        self.statistics.changes += 1;
+        observer.change(
+            Time::from_fs(self.now_fs),
+            NetId::new(net),
+            Logic::from_bits(value),
+        );
+        for &load in self.fan_out.of(net) {
+            let cell = &mut self.cells[load.cell()];
+            let shift = load.shift();
+            cell.inputs = cell.inputs & !(3 << shift) | value << shift;
+            match load.class() {
+                PinClass::Sampled => {}
+                PinClass::Clock if value == Logic::Zero.bits() => {
+                    cell.evaluated = cell.evaluated & !(3 << shift) | value << shift;
+                }
+                _ => {
+                    if !cell.is_dirty {
+                        cell.is_dirty = true;
+                        self.dirty.push(load.cell() as u32);
+                    }
+                }
+            }
+        }
+    }
+
+    #[inline]
+    fn evaluate(&mut self, index: usize) {
+        let cell = &mut self.cells[index];
+        cell.is_dirty = false;
+        let (inputs, evaluated, kind) = (cell.inputs, cell.evaluated, cell.kind);
+        cell.evaluated = inputs;
+        let outputs = cell.outputs;
+        if kind.is_flip_flop() {
+            let state = self.tables.flip_flop(inputs, evaluated, cell.state);
+            if state == cell.state {
+                return;
+            }
+            cell.state = state;
+            let inverted = Logic::from_bits(state).inverted().bits();
+            let delays = *self.tables.delays(kind, inputs, evaluated);
+            self.schedule(outputs[0], state, &delays);
+            self.schedule(outputs[1], inverted, &delays);
+        } else {
+            let value = self.tables.gate(kind, inputs);
+            let delays = *self.tables.delays(kind, inputs, evaluated);
+            self.schedule(outputs[0], value, &delays);
+        }
+    }
+
+    #[inline]
+    fn schedule(&mut self, net: u32, value: u8, delays_fs: &[u32; 4]) {
+        let Some(state) = self.nets.get_mut(net as usize) else {
+            return;
+        };
+        if state.pending == value {
+            return;
+        }
+        if state.pending != NONE {
+            state.generation = (state.generation + 1) & (u32::MAX >> 2);
+            state.pending = NONE;
+        }
+        if state.value != value {
+            state.pending = value;
+            self.wheel.push(Event {
+                time_fs: self.now_fs + delays_fs[value as usize] as i64,
+                net,
+                tag: state.generation << 2 | value as u32,
+            });
+        }
+    }
+}

@@ -1,0 +1,296 @@
+//! The flat netlist: every cell and net of the elaborated chip in plain arrays.
+//!
+//! Hierarchy survives as a list of [`Scope`]s in depth-first order, each with a map from its
+//! module's local nets to the chip's nets; names are looked up there and stored nowhere else.
+
+use std::sync::Arc;
+
+use super::cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
+use super::module::{Direction, Module, Net};
+
+/// A net of the elaborated chip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct NetId(u32);
+
+impl NetId {
+    /// Marks an unconnected pin.
+    pub const NONE: NetId = NetId(u32::MAX);
+
+    /// From an index.
+    pub const fn new(index: usize) -> Self {
+        NetId(index as u32)
+    }
+
+    /// Index into per-net arrays.
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    /// Whether this is a net at all.
+    pub const fn is_some(self) -> bool {
+        self.0 != u32::MAX
+    }
+}
+
+/// A leaf cell of the elaborated chip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FlatCell {
+    /// Which cell of the library.
+    pub kind: CellKind,
+    /// Input nets in pin order, padded with [`NetId::NONE`].
+    pub inputs: [NetId; MAX_INPUTS],
+    /// Output nets in pin order.
+    pub outputs: [NetId; MAX_OUTPUTS],
+}
+
+/// One instance in the hierarchy.
+#[derive(Debug, Clone)]
+pub struct Scope {
+    /// Instance name.
+    pub name: String,
+    /// What it is an instance of.
+    pub module: Arc<Module>,
+    /// Index of the parent scope (the top is its own parent).
+    pub parent: usize,
+    /// Number of scopes in this subtree, itself included: the next sibling is that far on.
+    pub subtree: usize,
+    first_net: usize,
+    first_cell: usize,
+}
+
+/// An elaborated design.
+#[derive(Debug, Clone)]
+pub struct Netlist {
+    cells: Vec<FlatCell>,
+    net_count: usize,
+    scopes: Vec<Scope>,
+    net_map: Vec<NetId>,
+}
+
+impl Netlist {
+    /// Flattens `top` and everything below it. The top scope is named after its module.
+    pub fn elaborate(top: &Arc<Module>) -> Self {
+        let mut netlist = Netlist {
+            cells: Vec::with_capacity(top.total_cells()),
+            net_count: 0,
+            scopes: Vec::new(),
+            net_map: Vec::new(),
+        };
+        let ports: Vec<NetId> = top
+            .port_signals()
+            .flat_map(|(_, s)| s.nets())
+            .map(|_| netlist.new_net())
+            .collect();
+        netlist.stamp(top, top.name(), 0, &ports);
+        netlist
+    }
+
+    fn new_net(&mut self) -> NetId {
+        self.net_count += 1;
+        assert!(
+            self.net_count < u32::MAX as usize,
+            "more nets than NetId can number"
+        );
+        NetId::new(self.net_count - 1)
+    }
+
+    fn stamp(&mut self, module: &Arc<Module>, name: &str, parent: usize, ports: &[NetId]) {
+        let index = self.scopes.len();
+        let first_net = self.net_map.len();
+        self.net_map
+            .resize(first_net + module.net_count(), NetId::NONE);
+        let port_nets = module.port_signals().flat_map(|(_, s)| s.nets());
+        for (local, &outer) in port_nets.zip(ports) {
+            self.net_map[first_net + local.index()] = outer;
+        }
+        for i in first_net..self.net_map.len() {
+            if !self.net_map[i].is_some() {
+                self.net_map[i] = self.new_net();
+            }
+        }
+        let first_cell = self.cells.len();
+        let global = |net_map: &[NetId], net: Net| {
+            if net.is_some() {
+                net_map[first_net + net.index()]
+            } else {
+                NetId::NONE
+            }
+        };
+        for cell in module.cells() {
+            let flat = FlatCell {
+                kind: cell.kind,
+                inputs: cell.inputs.map(|n| global(&self.net_map, n)),
+                outputs: cell.outputs.map(|n| global(&self.net_map, n)),
+            };
+            self.cells.push(flat);
+        }
+        self.scopes.push(Scope {
+            name: name.to_owned(),
+            module: Arc::clone(module),
+            parent,
+            subtree: 1,
+            first_net,
+            first_cell,
+        });
+        let mut child_ports = Vec::new();
+        for child in module.instances() {
+            child_ports.clear();
+            child_ports.extend(child.connections.iter().map(|&n| global(&self.net_map, n)));
+            self.stamp(&child.module, &child.name, index, &child_ports);
+        }
+        self.scopes[index].subtree = self.scopes.len() - index;
+    }
+
+    /// Every leaf cell.
+    pub fn cells(&self) -> &[FlatCell] {
+        &self.cells
+    }
+
+    /// Number of nets.
+    pub fn net_count(&self) -> usize {
+        self.net_count
+    }
+
+    /// Every instance, depth first, the top at index 0.
+    pub fn scopes(&self) -> &[Scope] {
+        &self.scopes
+    }
+
+    /// The chip's nets of one scope's signal, bit 0 first.
+    pub fn signal_nets(
+        &self,
+        scope: &Scope,
+        signal: &super::module::Signal,
+    ) -> impl ExactSizeIterator<Item = NetId> + DoubleEndedIterator + use<'_> {
+        let first = scope.first_net;
+        signal.nets().map(move |n| self.net_map[first + n.index()])
+    }
+
+    /// Indices of the scopes directly below scope `index`.
+    pub fn children(&self, index: usize) -> impl Iterator<Item = usize> + '_ {
+        let end = index + self.scopes[index].subtree;
+        let mut next = index + 1;
+        std::iter::from_fn(move || {
+            let this = next;
+            (this < end).then(|| {
+                next += self.scopes[this].subtree;
+                this
+            })
+        })
+    }
+
+    /// The scope at a dotted path below the top; the empty path is the top itself.
+    pub fn scope(&self, path: &str) -> Option<usize> {
+        path.split('.')
+            .filter(|part| !part.is_empty())
+            .try_fold(0, |scope, part| {
+                self.children(scope).find(|&c| self.scopes[c].name == part)
+            })
+    }
+
+    /// Nets of the signal at a dotted path below the top, such as `mp_r0_c0.p_counter.COUNT`.
+    pub fn signal(&self, path: &str) -> Option<Vec<NetId>> {
+        let (scope_path, name) = path.rsplit_once('.').unwrap_or(("", path));
+        let scope = &self.scopes[self.scope(scope_path)?];
+        let signal = scope.module.signal(name)?;
+        Some(self.signal_nets(scope, signal).collect())
+    }
+
+    /// The net at a dotted path below the top; one bit of a bus as `path.BUS[3]`.
+    pub fn net(&self, path: &str) -> Option<NetId> {
+        if let Some((bus, index)) = path.strip_suffix(']').and_then(|p| p.rsplit_once('[')) {
+            return self.signal(bus)?.get(index.parse::<usize>().ok()?).copied();
+        }
+        match self.signal(path)?[..] {
+            [net] => Some(net),
+            _ => None,
+        }
+    }
+
+    /// Nets that only the outside can drive, in port order.
+    pub fn inputs(&self) -> Vec<NetId> {
+        let top = &self.scopes[0];
+        top.module
+            .port_signals()
+            .filter(|(direction, _)| *direction == Direction::Input)
+            .flat_map(|(_, signal)| self.signal_nets(top, signal))
+            .collect()
+    }
+
+    /// Dotted path of a scope, top name first.
+    pub fn scope_path(&self, mut index: usize) -> String {
+        let mut parts = vec![self.scopes[index].name.as_str()];
+        while index != 0 {
+            index = self.scopes[index].parent;
+            parts.push(&self.scopes[index].name);
+        }
+        parts.reverse();
+        parts.join(".")
+    }
+
+    /// Dotted path of a leaf cell, top name first.
+    pub fn cell_path(&self, cell: usize) -> String {
+        // Scopes are in stamping order, so their first cells ascend.
+        let scope = self.scopes.partition_point(|s| s.first_cell <= cell) - 1;
+        let s = &self.scopes[scope];
+        let name = &s.module.cells()[cell - s.first_cell].name;
+        format!("{}.{name}", self.scope_path(scope))
+    }
+
+    /// Dotted path of a net in the outermost scope that names it.
+    pub fn net_path(&self, net: NetId) -> Option<String> {
+        self.scopes.iter().enumerate().find_map(|(i, scope)| {
+            let local = &self.net_map[scope.first_net..][..scope.module.net_count()];
+            let position = local.iter().position(|&n| n == net)?;
+            let signal = scope
+                .module
+                .signals()
+                .iter()
+                .find(|s| s.nets().any(|n| n.index() == position))?;
+            let bit = position - signal.nets().next()?.index();
+            let path = format!("{}.{}", self.scope_path(i), signal.name);
+            Some(if signal.is_bus {
+                format!("{path}[{bit}]")
+            } else {
+                path
+            })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::netlist::ModuleBuilder;
+
+    fn two_inverters() -> Arc<Module> {
+        let mut m = ModuleBuilder::new("leaf");
+        let (a, z) = (m.input("A"), m.output("Z"));
+        m.cell("inv", CellKind::Inv, &[a], &[z]);
+        let leaf = m.finish().unwrap();
+        let mut m = ModuleBuilder::new("pair");
+        let (a, z) = (m.input("A"), m.output_bus("Z", 2));
+        m.instance("first", &leaf, &[("A", &[a]), ("Z", &z[..1])]);
+        m.instance("second", &leaf, &[("A", &z[..1]), ("Z", &z[1..])]);
+        m.finish().unwrap()
+    }
+
+    #[test]
+    fn hierarchy_shares_nets_through_ports() {
+        let n = Netlist::elaborate(&two_inverters());
+        assert_eq!(n.net_count(), 3);
+        assert_eq!(n.cells().len(), 2);
+        assert_eq!(n.net("first.Z"), n.net("second.A"));
+        assert_eq!(n.net("second.Z"), n.net("Z[1]"));
+        assert_eq!(n.net("third.Z"), None);
+        assert_eq!(n.inputs(), vec![n.net("A").unwrap()]);
+    }
+
+    #[test]
+    fn names_are_recovered() {
+        let n = Netlist::elaborate(&two_inverters());
+        assert_eq!(n.cell_path(1), "pair.second.inv");
+        assert_eq!(n.net_path(n.net("second.Z").unwrap()).unwrap(), "pair.Z[1]");
+        assert_eq!(n.children(0).count(), 2);
+    }
+}

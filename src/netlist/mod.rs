@@ -1,0 +1,24 @@
+//! The one description of the chip: cells, nets and hierarchy, read by every engine and exporter.
+//!
+//! ```text
+//!   ModuleBuilder ──finish──► Module (hierarchical, shared) ──elaborate──► Netlist (flat)
+//!                                │                                           │
+//!                                └─► Verilog                                 └─► simulation kernels
+//! ```
+//!
+//! A [`Module`] is written once and instantiated many times; [`Netlist::elaborate`] stamps it out
+//! into flat arrays in time linear in the number of cells.
+
+mod cell;
+mod flat;
+mod library;
+mod module;
+mod verilog;
+
+pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS, next_state};
+pub use flat::{FlatCell, NetId, Netlist, Scope};
+pub use library::{Arc, CellArcs, Corner, Delay, Library};
+pub use module::{
+    Cell, Direction, Instance, Module, ModuleBuilder, Net, NetlistError, Port, Signal,
+};
+pub use verilog::{write_cells, write_modules};

@@ -1,0 +1,281 @@
+//! Structural Verilog: the same cells, nets, hierarchy and delays for any other simulator.
+//!
+//! A cell whose inputs all have the same delay becomes a Verilog primitive with `#(rise, fall)`. A
+//! cell with different arcs (multiplexer, flip-flops) becomes a procedural model whose output
+//! passes through a continuous assignment with variable delays: the delay is that of the input that
+//! changed and, when several change in one instant, the shortest. Primitives and continuous
+//! assignments are inertial by IEEE 1364, which is the delay model of the event kernel, so
+//! both see the same glitches. Time unit and precision are one femtosecond.
+
+use std::collections::HashSet;
+use std::io::{self, Write};
+use std::sync::Arc as Shared;
+
+use super::cell::CellKind;
+use super::library::{CellArcs, Corner, Library};
+use super::module::{Direction, Module, Net};
+use crate::logic::Logic;
+
+const TIMESCALE: &str = "`timescale 1fs/1fs\n";
+
+/// Writes the model of every cell with the delays of one corner.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_cells(out: &mut dyn Write, library: &Library, corner: Corner) -> io::Result<()> {
+    write!(out, "{TIMESCALE}")?;
+    for kind in CellKind::ALL {
+        writeln!(out)?;
+        write_cell(out, kind, library.arcs(kind), corner)?;
+    }
+    Ok(())
+}
+
+fn write_cell(
+    out: &mut dyn Write,
+    kind: CellKind,
+    arcs: &CellArcs,
+    corner: Corner,
+) -> io::Result<()> {
+    let (inputs, outputs) = (kind.inputs().join(", "), kind.outputs().join(", "));
+    writeln!(
+        out,
+        "module {}(output {outputs}, input {inputs});",
+        kind.name()
+    )?;
+    let delays = |pin: usize| {
+        let arc = arcs[pin];
+        (
+            arc.delay_fs(corner, Logic::One),
+            arc.delay_fs(corner, Logic::Zero),
+        )
+    };
+    let uniform = (1..kind.inputs().len()).all(|pin| delays(pin) == delays(0));
+    if !kind.is_flip_flop() && uniform && kind != CellKind::Mux2 {
+        let (rise, fall) = delays(0);
+        let primitive = match kind {
+            CellKind::Inv => "not",
+            CellKind::Buf => "buf",
+            CellKind::Nand2 => "nand",
+            CellKind::Nor2 => "nor",
+            CellKind::And2 => "and",
+            CellKind::Or2 => "or",
+            CellKind::Xor2 => "xor",
+            _ => "xnor",
+        };
+        writeln!(out, "  {primitive} #({rise}, {fall}) g(Z, {inputs});")?;
+    } else {
+        write_arc_selecting_cell(out, kind, delays)?;
+    }
+    writeln!(out, "endmodule")
+}
+
+fn write_arc_selecting_cell(
+    out: &mut dyn Write,
+    kind: CellKind,
+    delays: impl Fn(usize) -> (u32, u32),
+) -> io::Result<()> {
+    let pins = kind.inputs();
+    let triggers: Vec<usize> = (0..pins.len()).filter(|&p| kind.triggers(p)).collect();
+    let list = |separator: &str| {
+        let names: Vec<&str> = triggers.iter().map(|&p| pins[p]).collect();
+        names.join(separator)
+    };
+    for &pin in &triggers {
+        writeln!(out, "  reg was_{};", pins[pin])?;
+    }
+    writeln!(out, "  reg value, next;")?;
+    writeln!(out, "  reg [31:0] rise, fall;")?;
+    writeln!(out, "  always @({}) begin", list(" or "))?;
+    writeln!(out, "    rise = 32'hffffffff;")?;
+    writeln!(out, "    fall = 32'hffffffff;")?;
+    for &pin in &triggers {
+        let (rise, fall) = delays(pin);
+        let name = pins[pin];
+        // A clock going low causes nothing.
+        let unless_falling = if name == "CK" { " && CK !== 1'b0" } else { "" };
+        writeln!(out, "    if ({name} !== was_{name}{unless_falling}) begin")?;
+        writeln!(out, "      if (rise > {rise}) rise = {rise};")?;
+        writeln!(out, "      if (fall > {fall}) fall = {fall};")?;
+        writeln!(out, "    end")?;
+    }
+    if kind.is_flip_flop() {
+        writeln!(out, "    next = value;")?;
+        writeln!(
+            out,
+            "    if (was_CK === 1'b0 && CK === 1'b1) next = D | 1'b0;"
+        )?;
+        writeln!(
+            out,
+            "    else if ((was_CK === 1'b0 && CK !== 1'b0) || (was_CK !== 1'b0 && was_CK !== 1'b1 && CK === 1'b1))"
+        )?;
+        writeln!(out, "      if (next !== D) next = 1'bx;")?;
+        if kind == CellKind::Dffsr {
+            writeln!(out, "    if (S === 1'b1) next = 1'b1;")?;
+            writeln!(
+                out,
+                "    else if (S !== 1'b0 && next !== 1'b1) next = 1'bx;"
+            )?;
+        }
+        writeln!(out, "    if (R === 1'b1) next = 1'b0;")?;
+        writeln!(
+            out,
+            "    else if (R !== 1'b0 && next !== 1'b0) next = 1'bx;"
+        )?;
+    } else {
+        let expression = match kind {
+            CellKind::Mux2 => "(S ? B : A) | 1'b0".to_owned(),
+            CellKind::Inv | CellKind::Buf => unreachable!("one input has one arc"),
+            CellKind::Nand2 => "~(A & B)".to_owned(),
+            CellKind::Nor2 => "~(A | B)".to_owned(),
+            CellKind::And2 => "A & B".to_owned(),
+            CellKind::Or2 => "A | B".to_owned(),
+            CellKind::Xor2 => "A ^ B".to_owned(),
+            CellKind::Xnor2 => "~(A ^ B)".to_owned(),
+            CellKind::Dffr | CellKind::Dffsr => unreachable!("handled above"),
+        };
+        writeln!(out, "    next = {expression};")?;
+    }
+    for &pin in &triggers {
+        writeln!(out, "    was_{0} = {0};", pins[pin])?;
+    }
+    writeln!(out, "    value = next;")?;
+    writeln!(out, "  end")?;
+    for (output, inversion) in kind.outputs().iter().zip(["", "~"]) {
+        writeln!(out, "  assign #(rise, fall) {output} = {inversion}value;")?;
+    }
+    Ok(())
+}
+
+/// Writes `top` and every module below it, children first, each once.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_modules(out: &mut dyn Write, top: &Shared<Module>) -> io::Result<()> {
+    write!(out, "{TIMESCALE}")?;
+    write_below(out, top, &mut HashSet::new())
+}
+
+fn write_below(
+    out: &mut dyn Write,
+    module: &Shared<Module>,
+    written: &mut HashSet<String>,
+) -> io::Result<()> {
+    if !written.insert(module.name().to_owned()) {
+        return Ok(());
+    }
+    for instance in module.instances() {
+        write_below(out, &instance.module, written)?;
+    }
+    write_module(out, module)
+}
+
+fn write_module(out: &mut dyn Write, module: &Module) -> io::Result<()> {
+    let range = |is_bus: bool, width: usize| {
+        if is_bus {
+            format!("[{}:0] ", width - 1)
+        } else {
+            String::new()
+        }
+    };
+    let ports: Vec<String> = module
+        .port_signals()
+        .map(|(direction, s)| {
+            let keyword = match direction {
+                Direction::Input => "input",
+                Direction::Output => "output",
+            };
+            format!("  {keyword} {}{}", range(s.is_bus, s.width()), s.name)
+        })
+        .collect();
+    writeln!(
+        out,
+        "\nmodule {}(\n{}\n);",
+        module.name(),
+        ports.join(",\n")
+    )?;
+    for (i, signal) in module.signals().iter().enumerate() {
+        if !module.ports().iter().any(|p| p.signal == i) {
+            writeln!(
+                out,
+                "  wire {}{};",
+                range(signal.is_bus, signal.width()),
+                signal.name
+            )?;
+        }
+    }
+    let names = NetNames::new(module);
+    for cell in module.cells() {
+        let kind = cell.kind;
+        let outputs = kind.outputs().iter().zip(&cell.outputs);
+        let inputs = kind.inputs().iter().zip(&cell.inputs);
+        let pins: Vec<String> = outputs
+            .chain(inputs)
+            .map(|(pin, &net)| format!(".{pin}({})", names.expression(&[net])))
+            .collect();
+        writeln!(out, "  {} {}({});", kind.name(), cell.name, pins.join(", "))?;
+    }
+    for instance in module.instances() {
+        let mut rest = &instance.connections[..];
+        let mut pins = Vec::new();
+        for (_, signal) in instance.module.port_signals() {
+            let (nets, after) = rest.split_at(signal.width());
+            rest = after;
+            pins.push(format!("    .{}({})", signal.name, names.expression(nets)));
+        }
+        let (child, pins) = (instance.module.name(), pins.join(",\n"));
+        writeln!(out, "  {child} {}(\n{pins}\n  );", instance.name)?;
+    }
+    writeln!(out, "endmodule")
+}
+
+/// Names of a module's nets: signal, and bit where the signal is a bus.
+struct NetNames<'a> {
+    module: &'a Module,
+    of_net: Vec<(u32, u32)>,
+}
+
+impl<'a> NetNames<'a> {
+    fn new(module: &'a Module) -> Self {
+        let mut of_net = vec![(0, 0); module.net_count()];
+        for (i, signal) in module.signals().iter().enumerate() {
+            for (bit, net) in signal.nets().enumerate() {
+                of_net[net.index()] = (i as u32, bit as u32);
+            }
+        }
+        NetNames { module, of_net }
+    }
+
+    /// A Verilog expression for `nets` (bit 0 first): a name, a slice, or a concatenation.
+    fn expression(&self, nets: &[Net]) -> String {
+        if nets.iter().all(|n| !n.is_some()) {
+            return String::new();
+        }
+        let mut parts = Vec::new();
+        let mut i = 0;
+        while i < nets.len() {
+            let (signal_index, low) = self.of_net[nets[i].index()];
+            let mut length = 1;
+            while i + length < nets.len()
+                && self.of_net[nets[i + length].index()] == (signal_index, low + length as u32)
+            {
+                length += 1;
+            }
+            let signal = &self.module.signals()[signal_index as usize];
+            parts.push(match (signal.is_bus, length) {
+                (false, _) => signal.name.clone(),
+                (true, n) if n == signal.width() => signal.name.clone(),
+                (true, 1) => format!("{}[{low}]", signal.name),
+                (true, n) => format!("{}[{}:{low}]", signal.name, low as usize + n - 1),
+            });
+            i += length;
+        }
+        match &parts[..] {
+            [one] => one.clone(),
+            many => {
+                let reversed: Vec<&str> = many.iter().rev().map(String::as_str).collect();
+                format!("{{{}}}", reversed.join(", "))
+            }
+        }
+    }
+}
