@@ -108,6 +108,27 @@ impl Frequency {
         self.half_periods(2 * k)
     }
 
+    /// The times of half periods 0, 1, 2, … without end: the same as [`Frequency::half_periods`] of each, by
+    /// addition with an exact remainder.
+    pub fn ticks(self) -> impl Iterator<Item = Time> + Send {
+        let modulus = 2 * self.numerator;
+        let step = FS_PER_S * self.denominator as i128;
+        let quotient = (step / modulus as i128) as i64;
+        let remainder = (step % modulus as i128) as u64;
+        let mut time = Time::ZERO;
+        let mut fraction = self.numerator;
+        std::iter::from_fn(move || {
+            let tick = time;
+            time += Time::from_fs(quotient);
+            fraction += remainder;
+            if fraction >= modulus {
+                fraction -= modulus;
+                time += Time::from_fs(1);
+            }
+            Some(tick)
+        })
+    }
+
     /// How many whole half periods lie in `[0, t]`: the largest `k` with `half_periods(k) <= t`.
     pub fn half_periods_until(self, t: Time) -> i64 {
         let guess = (t.as_fs() as i128 * 2 * self.numerator as i128)
@@ -157,6 +178,14 @@ mod tests {
             let t = f.half_periods(k);
             prop_assert_eq!(f.half_periods_until(t), k);
             prop_assert_eq!(f.half_periods_until(t - Time::from_fs(1)), k - 1);
+        }
+
+        #[test]
+        fn ticks_are_the_half_periods(hz in 1e6f64..2e9) {
+            let f = Frequency::from_hz_f64(hz).unwrap();
+            for (k, tick) in f.ticks().take(10_000).enumerate() {
+                prop_assert_eq!(tick, f.half_periods(k as i64));
+            }
         }
 
         #[test]

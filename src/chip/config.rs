@@ -1,0 +1,292 @@
+//! Sensor configuration: what a user may set of the chip, and what of it is possible.
+//!
+//! The defaults are the guided QuantIC4x4 (thesis 4.2, 4.8, Table 11): 64×64 macropixels, a 9-bit
+//! P-counter, 16 bins of 14 bits, 384 MHz.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::files::{InputError, parse_toml, read_text};
+use crate::netlist::Corner;
+use crate::units::{Frequency, Time};
+
+/// Bits of THRESHOLD: enough for "more than all sixteen SPADs".
+pub const THRESHOLD_BITS: usize = 5;
+
+/// TYPE: how the number of fired SPADs is compared with THRESHOLD.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EventType {
+    /// Fewer SPADs than THRESHOLD. True of an empty pixel in every CLK period.
+    Less,
+    /// Exactly THRESHOLD SPADs.
+    Equal,
+    /// More SPADs than THRESHOLD.
+    Greater,
+}
+
+impl EventType {
+    /// TYPE\<1:0\> as the correlation block decodes it.
+    pub const fn code(self) -> u8 {
+        match self {
+            EventType::Less => 0,
+            EventType::Equal => 1,
+            EventType::Greater => 2,
+        }
+    }
+}
+
+/// What a full histogram bin does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Overflow {
+    /// Stays full.
+    Saturate,
+    /// Starts again from zero.
+    Wrap,
+}
+
+/// Which edge freezes the METDC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mode {
+    /// Each macropixel's own LOCAL_STOP (thesis 4.3).
+    Guided,
+    /// The global STOP: the last CLK periods of the laser cycle (thesis 4.2).
+    Conventional,
+}
+
+/// A sensor, as its TOML file describes it. Keys that are left out take the QuantIC4x4's value.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SensorConfig {
+    /// Macropixel rows, 1…256.
+    pub rows: usize,
+    /// Macropixel columns, 1…256.
+    pub cols: usize,
+    /// Programmable bits of the P-counter, 2…12.
+    pub counter_bits: usize,
+    /// Histogram bins, 1…64.
+    pub bins: usize,
+    /// Bits of each bin, 1…16.
+    pub bin_bits: usize,
+    /// CLK frequency, Hz; its period is one histogram bin.
+    pub clk_hz: f64,
+    /// Rise of STOP after the falling edge of CLK, ps; at most half a CLK period either way.
+    pub stop_phase_ps: f64,
+    /// Deserialiser clock, Hz (thesis 4.7: "a few hundred megahertz").
+    pub load_clk_hz: f64,
+    /// SPAD dead time and width of a SPAD_RAW pulse, ns.
+    pub dead_time_ns: f64,
+    /// TYPE.
+    pub event_type: EventType,
+    /// THRESHOLD, 0…31 SPADs.
+    pub threshold: u8,
+    /// What full bins do.
+    pub overflow: Overflow,
+    /// Which STOP counts.
+    pub mode: Mode,
+    /// Delay corner of the cell library.
+    pub corner: Corner,
+}
+
+impl Default for SensorConfig {
+    fn default() -> Self {
+        SensorConfig {
+            rows: 64,
+            cols: 64,
+            counter_bits: 9,
+            bins: 16,
+            bin_bits: 14,
+            clk_hz: 384e6,
+            stop_phase_ps: 0.0,
+            load_clk_hz: 200e6,
+            dead_time_ns: 8.0,
+            event_type: EventType::Greater,
+            threshold: 0,
+            overflow: Overflow::Saturate,
+            mode: Mode::Guided,
+            corner: Corner::Typ,
+        }
+    }
+}
+
+impl SensorConfig {
+    /// Reads and checks a TOML file.
+    ///
+    /// # Errors
+    /// One sentence naming file, line and cure.
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        Self::parse(path.display(), &read_text(path)?)
+    }
+
+    /// Parses and checks TOML text; `source` names it in complaints.
+    ///
+    /// # Errors
+    /// Unknown keys, wrong types and impossible values, with their line.
+    pub fn parse(source: impl std::fmt::Display, text: &str) -> Result<Self, InputError> {
+        let config: Self = parse_toml(&source, text)?;
+        config.check().map_err(|(key, message)| {
+            let assigns = |line: &str| {
+                line.trim_start()
+                    .strip_prefix(key)
+                    .is_some_and(|rest| rest.trim_start().starts_with('='))
+            };
+            match text.lines().position(assigns) {
+                Some(line) => InputError::at(&source, line + 1, message),
+                None => InputError::new(&source, message),
+            }
+        })?;
+        Ok(config)
+    }
+
+    /// Checks every value; on failure names the key at fault and says what it may be.
+    ///
+    /// # Errors
+    /// The key and a sentence about it.
+    pub fn check(&self) -> Result<(), (&'static str, String)> {
+        let whole = [
+            ("rows", self.rows, 1, 256),
+            ("cols", self.cols, 1, 256),
+            ("counter_bits", self.counter_bits, 2, 12),
+            ("bins", self.bins, 1, 64),
+            ("bin_bits", self.bin_bits, 1, 16),
+            (
+                "threshold",
+                self.threshold as usize,
+                0,
+                (1 << THRESHOLD_BITS) - 1,
+            ),
+        ];
+        for (key, value, least, most) in whole {
+            if !(least..=most).contains(&value) {
+                let message = format!("{key} = {value} is impossible; give {least} to {most}");
+                return Err((key, message));
+            }
+        }
+        for (key, hz, least, most) in [
+            ("clk_hz", self.clk_hz, 1e6, 2e9),
+            ("load_clk_hz", self.load_clk_hz, 1e6, 1e9),
+        ] {
+            if !(least..=most).contains(&hz) {
+                let message = format!("{key} = {hz} is impossible; give {least:e} to {most:e} Hz");
+                return Err((key, message));
+            }
+        }
+        if !(self.dead_time_ns > 0.0 && self.dead_time_ns <= 1e6) {
+            let message = format!(
+                "dead_time_ns = {} is impossible; give a number above 0 and up to 1e6",
+                self.dead_time_ns
+            );
+            return Err(("dead_time_ns", message));
+        }
+        let half_period_ps = 0.5e12 / self.clk_hz;
+        if self.stop_phase_ps.is_nan() || self.stop_phase_ps.abs() > half_period_ps {
+            let message = format!(
+                "stop_phase_ps = {} is impossible; give at most half a CLK period, {half_period_ps:.1}, either way",
+                self.stop_phase_ps
+            );
+            return Err(("stop_phase_ps", message));
+        }
+        Ok(())
+    }
+
+    /// CLK. The configuration must have passed [`SensorConfig::check`].
+    pub fn clock(&self) -> Frequency {
+        Frequency::from_hz_f64(self.clk_hz).expect("checked")
+    }
+
+    /// Deserialiser clock. The configuration must have passed [`SensorConfig::check`].
+    pub fn load_clock(&self) -> Frequency {
+        Frequency::from_hz_f64(self.load_clk_hz).expect("checked")
+    }
+
+    /// Rise of STOP after CLK's fall.
+    pub fn stop_phase(&self) -> Time {
+        Time::from_s(self.stop_phase_ps * 1e-12)
+    }
+
+    /// SPAD dead time.
+    pub fn dead_time(&self) -> Time {
+        Time::from_s(self.dead_time_ns * 1e-9)
+    }
+
+    /// Largest start value, 2ⁿ − 1.
+    pub fn largest_start(&self) -> u16 {
+        ((1u32 << self.counter_bits) - 1) as u16
+    }
+
+    /// Macropixels.
+    pub fn pixels(&self) -> usize {
+        self.rows * self.cols
+    }
+
+    /// Bits of one serial load (thesis 4.7: 36.9 kbit).
+    pub fn load_bits(&self) -> usize {
+        self.pixels() * self.counter_bits
+    }
+
+    /// Time of one serial load.
+    pub fn load_time(&self) -> Time {
+        self.load_clock()
+            .half_periods(2 * self.load_bits() as i64 + 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_default_sensor_loads_in_a_few_hundred_microseconds() {
+        let config = SensorConfig::default();
+        assert_eq!(config.load_bits(), 36_864);
+        let us = config.load_time().as_s() * 1e6;
+        assert!((100.0..400.0).contains(&us), "{us}");
+    }
+
+    #[test]
+    fn impossible_values_are_refused_with_their_line() {
+        for (text, line) in [
+            ("cols = 4\nrows = 0", 2),
+            ("clk_hz = 0", 1),
+            ("clk_hz = nan", 1),
+            ("\n\ndead_time_ns = -1.0", 3),
+            ("stop_phase_ps = 2e3", 1),
+            ("threshold = 32", 1),
+            ("colour = 1", 1),
+            ("rows = -3", 1),
+            ("event_type = \"more\"", 1),
+        ] {
+            let error = SensorConfig::parse("s.toml", text).unwrap_err();
+            assert_eq!(error.line, Some(line), "{text}: {error}");
+            assert!(error.message.contains(';'), "no cure: {error}");
+        }
+    }
+
+    #[test]
+    fn a_printed_configuration_reads_back() {
+        let config = SensorConfig::default();
+        let text = toml::to_string(&config).unwrap();
+        assert_eq!(SensorConfig::parse("default", &text).unwrap(), config);
+    }
+
+    proptest! {
+        #[test]
+        fn garbage_never_panics(text in "\\PC{0,200}") {
+            let _ = SensorConfig::parse("garbage", &text);
+        }
+
+        #[test]
+        fn any_numbers_are_accepted_or_refused(clk: f64, phase: f64, dead: f64, rows: u16) {
+            let text = format!("rows = {rows}\nclk_hz = {clk:e}\nstop_phase_ps = {phase:e}\ndead_time_ns = {dead:e}");
+            if let Ok(config) = SensorConfig::parse("numbers", &text) {
+                config.clock();
+                config.dead_time();
+                config.stop_phase();
+            }
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! Load path: one serial pin to every P-counter's start value (thesis 4.7, Fig. 57).
+//!
+//! ```text
+//!   COUNTER_INITS ─► shift register, cols × bits ───────────────► COUNTER_INIT_ROW
+//!   LOAD_CLK ──────► bit counter ─ last bit ─►[ROW_DONE]─┐
+//!                                                        AND NOT LOAD_CLK ─► WRITE ─ AND ─► MEMORY_LOAD<row>
+//!                                  one-hot row token, moved by ROW_DONE's fall ──────┘
+//! ```
+//!
+//! Bits are shifted in on rising LOAD_CLK edges, row 0 first; within a row the last column first, most
+//! significant bit first. With the last bit of a row ROW_DONE goes high for one period, and in that
+//! period's low half MEMORY_LOAD of the row pulses: half a period after the shift register has
+//! changed and half a period before it changes again. The stream never pauses: rows × cols × bits
+//! LOAD_CLK periods, and half a period more.
+//!
+//! LOAD_RESET (LOAD_ENABLE low, or chip reset) returns to row 0, bit 0.
+
+use std::sync::Arc;
+
+use super::finished;
+use super::p_counter;
+use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
+
+use CellKind::{And2, Dffr, Inv, Nor2, Xor2};
+
+/// Deserialiser: `cols × bits` stages and the counter that knows when they are full.
+///
+/// Ports: COUNTER_INITS, LOAD_CLK, LOAD_RESET → COUNTER_INIT_ROW\<cols × bits\>, ROW_DONE.
+pub fn deserialiser(cols: usize, bits: usize) -> Arc<Module> {
+    let length = cols * bits;
+    let mut m = ModuleBuilder::new("deserialiser");
+    let serial = m.input("COUNTER_INITS");
+    let clk = m.input("LOAD_CLK");
+    let reset = m.input("LOAD_RESET");
+    let row = m.output_bus("COUNTER_INIT_ROW", length);
+    let done = m.output("ROW_DONE");
+    for stage in 0..length {
+        let data = if stage == 0 { serial } else { row[stage - 1] };
+        m.cell(
+            &format!("shift_{stage}"),
+            Dffr,
+            &[data, clk, reset],
+            &[row[stage], Net::NONE],
+        );
+    }
+    let last = bit_counter(&mut m, clk, reset, length);
+    m.cell("row_done", Dffr, &[last, clk, reset], &[done, Net::NONE]);
+    finished(m.finish())
+}
+
+/// A synchronous counter modulo `length`; returns the net that is high at its last count.
+fn bit_counter(m: &mut ModuleBuilder, clk: Net, reset: Net, length: usize) -> Net {
+    let width = (usize::BITS - (length - 1).leading_zeros()).max(1) as usize;
+    let count = m.wire_bus("BIT", width);
+    let count_n = m.wire_bus("BIT_N", width);
+    let matching: Vec<Net> = (0..width)
+        .map(|b| {
+            if (length - 1) >> b & 1 == 1 {
+                count[b]
+            } else {
+                count_n[b]
+            }
+        })
+        .collect();
+    let last = m.tree(And2, &matching);
+    let not_last = m.gate(Inv, &[last]);
+    let mut carry: Option<Net> = None;
+    for b in 0..width {
+        let incremented = match carry {
+            None => count_n[b],
+            Some(carry) => m.gate(Xor2, &[count[b], carry]),
+        };
+        carry = Some(match carry {
+            None => count[b],
+            Some(carry) => m.gate(And2, &[count[b], carry]),
+        });
+        let next = m.gate(And2, &[incremented, not_last]);
+        m.cell(
+            &format!("bit_{b}"),
+            Dffr,
+            &[next, clk, reset],
+            &[count[b], count_n[b]],
+        );
+    }
+    last
+}
+
+/// Row scanner: a token that visits the rows and turns ROW_DONE into one row's MEMORY_LOAD.
+///
+/// Ports: ROW_DONE, LOAD_CLK, LOAD_RESET → MEMORY_LOAD\<rows\>.
+pub fn row_scanner(rows: usize) -> Arc<Module> {
+    let mut m = ModuleBuilder::new("row_scanner");
+    let done = m.input("ROW_DONE");
+    let clk = m.input("LOAD_CLK");
+    let reset = m.input("LOAD_RESET");
+    let load = m.output_bus("MEMORY_LOAD", rows);
+    let select = m.wire_bus("SELECT", rows);
+    let write = m.wire("WRITE");
+    let step = m.gate(Inv, &[done]);
+    m.gate_into(Nor2, &[clk, step], write);
+    // Row 0 keeps its token inverted, so that a reset selects it.
+    let from_last = m.gate(Inv, &[select[rows - 1]]);
+    m.cell(
+        "token_0",
+        Dffr,
+        &[from_last, step, reset],
+        &[Net::NONE, select[0]],
+    );
+    for row in 1..rows {
+        m.cell(
+            &format!("token_{row}"),
+            Dffr,
+            &[select[row - 1], step, reset],
+            &[select[row], Net::NONE],
+        );
+    }
+    for row in 0..rows {
+        m.gate_into(And2, &[write, select[row]], load[row]);
+    }
+    finished(m.finish())
+}
+
+/// The load path with nothing but the P-counters' memories behind it, for loading a whole array at
+/// gate level without its pixels.
+///
+/// Ports: COUNTER_INITS, LOAD_CLK, LOAD_ENABLE, RESETB; instance `memory_r{row}_c{col}` holds MEMORY.
+pub fn with_memories(rows: usize, cols: usize, bits: usize) -> Arc<Module> {
+    let memory = p_counter::memory(bits);
+    let mut m = ModuleBuilder::new("load_path");
+    let serial = m.input("COUNTER_INITS");
+    let clk = m.input("LOAD_CLK");
+    let enable = m.input("LOAD_ENABLE");
+    let resetb = m.input("RESETB");
+    let memory_reset = m.wire("MEMORY_RESET");
+    m.gate_into(Inv, &[resetb], memory_reset);
+    let (row_bits, load) = place(&mut m, rows, cols, bits, [serial, clk, enable, resetb]);
+    for row in 0..rows {
+        for col in 0..cols {
+            m.instance(
+                &format!("memory_r{row}_c{col}"),
+                &memory,
+                &[
+                    ("COUNTER_INIT", &row_bits[col * bits..][..bits]),
+                    ("MEMORY_LOAD", &[load[row]]),
+                    ("MEMORY_RESET", &[memory_reset]),
+                ],
+            );
+        }
+    }
+    finished(m.finish())
+}
+
+/// Places deserialiser and row scanner in a parent; returns its COUNTER_INIT_ROW and MEMORY_LOAD.
+pub(super) fn place(
+    m: &mut ModuleBuilder,
+    rows: usize,
+    cols: usize,
+    bits: usize,
+    [serial, clk, enable, resetb]: [Net; 4],
+) -> (Vec<Net>, Vec<Net>) {
+    let row_bits = m.wire_bus("COUNTER_INIT_ROW", cols * bits);
+    let load = m.wire_bus("MEMORY_LOAD", rows);
+    let done = m.wire("ROW_DONE");
+    let reset = m.wire("LOAD_RESET");
+    m.gate_into(CellKind::Nand2, &[enable, resetb], reset);
+    m.instance(
+        "deserialiser",
+        &deserialiser(cols, bits),
+        &[
+            ("COUNTER_INITS", &[serial]),
+            ("LOAD_CLK", &[clk]),
+            ("LOAD_RESET", &[reset]),
+            ("COUNTER_INIT_ROW", &row_bits),
+            ("ROW_DONE", &[done]),
+        ],
+    );
+    m.instance(
+        "row_scanner",
+        &row_scanner(rows),
+        &[
+            ("ROW_DONE", &[done]),
+            ("LOAD_CLK", &[clk]),
+            ("LOAD_RESET", &[reset]),
+            ("MEMORY_LOAD", &load),
+        ],
+    );
+    (row_bits, load)
+}
+
+/// Reference model: the serial stream that loads `codes` (row-major, `rows × cols`), first bit first.
+pub fn stream(codes: &[u16], cols: usize, bits: usize) -> bitvec::vec::BitVec {
+    debug_assert_eq!(codes.len() % cols, 0);
+    codes
+        .chunks(cols)
+        .flat_map(|row| row.iter().rev())
+        .flat_map(|&code| (0..bits).rev().map(move |b| code >> b & 1 == 1))
+        .collect()
+}
+
+/// Reference model: the codes that a serial stream leaves in the array, row-major.
+pub fn codes(stream: &bitvec::slice::BitSlice, cols: usize, bits: usize) -> Vec<u16> {
+    stream
+        .chunks_exact(cols * bits)
+        .flat_map(|row| {
+            let of_pixel = |pixel: &bitvec::slice::BitSlice| {
+                pixel.iter().fold(0, |code, bit| code << 1 | *bit as u16)
+            };
+            let mut codes: Vec<u16> = row.chunks_exact(bits).map(of_pixel).collect();
+            codes.reverse();
+            codes
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_stream_round_trips(rows in 1usize..6, cols in 1usize..6, bits in 2usize..12, seed: u64) {
+            let codes_in: Vec<u16> = (0..rows * cols)
+                .map(|i| (seed.wrapping_mul(i as u64 * 2 + 1) >> 20) as u16 & ((1 << bits) - 1))
+                .collect();
+            let stream = stream(&codes_in, cols, bits);
+            prop_assert_eq!(stream.len(), rows * cols * bits);
+            prop_assert_eq!(codes(&stream, cols, bits), codes_in);
+        }
+    }
+}
