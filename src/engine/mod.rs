@@ -1,0 +1,50 @@
+//! The ways to run an exposure: from gates and delays to nothing but the window.
+//!
+//! | engine | what it simulates | held to |
+//! |---|---|---|
+//! | [`Gate`] | every net of the netlist, with its delays | Icarus Verilog on the exported netlist |
+//! | [`Cycle`] | every CLK period, through the blocks' reference models | `Gate` |
+//! | [`Window`] | only the CLK periods a start value can see, through the window law | `Cycle` |
+//!
+//! All take the same start value and SPAD pulses and give the same histogram. `Cycle` and `Window` assume what
+//! the window law can promise, and refuse a configuration in which two signals race.
+
+mod cycle;
+mod gate;
+mod stimulus;
+mod window;
+
+pub use cycle::Cycle;
+pub use gate::{Gate, GateSimulation};
+pub use stimulus::{Pins, Schedule, StimulusPlan};
+pub use window::Window;
+
+use crate::photon::SpadEvent;
+
+/// Runs one macropixel through an exposure.
+pub trait Engine: Sync {
+    /// Counts of every bin, bin 0 earliest, for a start value and the rising edges of SPAD_RAW, sorted by
+    /// time from the first STOP edge and thinned by the dead time.
+    ///
+    /// # Errors
+    /// When this engine cannot tell what the circuit does.
+    fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError>;
+}
+
+/// Why an engine has no answer.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum EngineError {
+    /// The window law finds two signals too close to call.
+    #[error("{0}, so only the gate engine can tell what is counted; use --engine gate or change clk_hz, stop_phase_ps or corner")]
+    Race(&'static str),
+    /// A histogram bin of the netlist holds X.
+    #[error("bin {bin} of macropixel ({row}, {col}) is unknown (X) at the end of the exposure")]
+    Unknown {
+        /// Row in the sensor.
+        row: usize,
+        /// Column in the sensor.
+        col: usize,
+        /// First unknown bin.
+        bin: usize,
+    },
+}

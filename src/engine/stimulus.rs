@@ -1,0 +1,260 @@
+//! What a tester drives into the sensor's pins: power-up, serial load, exposure.
+//!
+//! ```text
+//!   RESETB           ▁▁▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔
+//!   HISTOGRAM_CLEAR  ▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁
+//!   LOAD_ENABLE      ▁▁▁▁▔▔▔▔▔▔▔▔▔▔▔▔▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁
+//!   LOAD_CLK         ▁▁▁▁▁▔▁▔▁▔ … ▔▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁  one rising edge per bit of COUNTER_INITS
+//!   ENABLE           ▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▔▔▔▔▔▔▔▔▔▔▔▔▔▔▁▁▁▁▁▁▁▁  sampled by STOP
+//!   STOP             ▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▔▔▁▁▔▔▁▁ … ▔▔▁▁▔▁▁▁  laser cycles + 1 rising edges
+//!   CLK              ▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▁▔▁▔▁▔▁▔▁▔ … ▔▁▔▁▔▁▁  idles high, starts with its falling edge
+//!                                         └ origin: time 0 of the exposure
+//! ```
+//!
+//! The same drives go into the event kernel and into the exported Verilog testbench.
+
+use crate::chip::{Exposure, Mode, SPADS, SensorConfig, THRESHOLD_BITS, load_path};
+use crate::kernel::{Drive, Stimulus, clock, merge};
+use crate::netlist::{NetId, Netlist};
+use crate::photon::SpadEvent;
+use crate::units::Time;
+
+/// When the chip comes out of reset.
+const RESET_END: Time = Time::from_ns(2);
+/// Falling LOAD_CLK edge that precedes the first bit.
+const LOAD_START: Time = Time::from_ns(5);
+/// Quiet time between load and exposure, and for counts to ripple through after it.
+const SETTLING: Time = Time::from_ns(20);
+
+/// The sensor's input nets.
+#[derive(Debug, Clone)]
+pub struct Pins {
+    clk: NetId,
+    stop: NetId,
+    resetb: NetId,
+    enable: NetId,
+    histogram_clear: NetId,
+    conventional: NetId,
+    event_type: Vec<NetId>,
+    threshold: Vec<NetId>,
+    load_clk: NetId,
+    load_enable: NetId,
+    serial: NetId,
+    spad_raw: Vec<NetId>,
+}
+
+impl Pins {
+    /// Finds the pins of an elaborated sensor.
+    ///
+    /// # Panics
+    /// When the netlist is no sensor.
+    pub fn of(netlist: &Netlist) -> Self {
+        let bus = |name| {
+            netlist
+                .signal(name)
+                .unwrap_or_else(|| panic!("the netlist has no pin {name}"))
+        };
+        let pin = |name| bus(name)[0];
+        Pins {
+            clk: pin("CLK"),
+            stop: pin("STOP"),
+            resetb: pin("RESETB"),
+            enable: pin("ENABLE"),
+            histogram_clear: pin("HISTOGRAM_CLEAR"),
+            conventional: pin("CONVENTIONAL"),
+            event_type: bus("TYPE"),
+            threshold: bus("THRESHOLD"),
+            load_clk: pin("LOAD_CLK"),
+            load_enable: pin("LOAD_ENABLE"),
+            serial: pin("COUNTER_INITS"),
+            spad_raw: bus("SPAD_RAW"),
+        }
+    }
+}
+
+/// Where load and exposure lie in simulation time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Schedule {
+    /// Rising edge of LOAD_CLK that takes the first bit.
+    pub first_bit: Time,
+    /// The end of the load.
+    pub load_end: Time,
+    /// First rising edge of STOP: time 0 of the exposure.
+    pub origin: Time,
+    /// When everything has settled.
+    pub end: Time,
+}
+
+/// Everything that is driven into one sensor for one frame.
+pub struct StimulusPlan<'a> {
+    config: &'a SensorConfig,
+    exposure: &'a Exposure,
+    stream: bitvec::vec::BitVec,
+    pulses: Vec<(usize, SpadEvent)>,
+    schedule: Schedule,
+}
+
+impl<'a> StimulusPlan<'a> {
+    /// Plans the load of `starts` (row-major, `cols` to a row) and an exposure with these rising edges of
+    /// SPAD_RAW (one list per macropixel, in the same order, thinned by the dead time).
+    pub fn new(
+        config: &'a SensorConfig,
+        exposure: &'a Exposure,
+        cols: usize,
+        starts: &[u16],
+        pulses: &[&[SpadEvent]],
+    ) -> Self {
+        debug_assert_eq!(starts.len(), pulses.len());
+        let stream = load_path::stream(starts, cols, config.counter_bits);
+        let half = |k| LOAD_START + config.load_clock().half_periods(k);
+        let load_end = half(2 * stream.len() as i64 + 1);
+        // On a whole nanosecond, so that edges are easy to read off.
+        let origin_ns = (load_end + SETTLING + exposure.clock.period()).as_fs() / 1_000_000 + 1;
+        let origin = Time::from_ns(origin_ns);
+        let last_edge = exposure.clock.half_periods(LAST_HALF_PERIODS) + exposure.end();
+        let mut all: Vec<(usize, SpadEvent)> = pulses
+            .iter()
+            .enumerate()
+            .flat_map(|(pixel, list)| list.iter().map(move |p| (pixel, *p)))
+            .collect();
+        all.sort_unstable_by_key(|(pixel, p)| (p.time, *pixel, p.spad));
+        let schedule = Schedule {
+            first_bit: half(1),
+            load_end,
+            origin,
+            end: origin + last_edge + exposure.clock.period() + SETTLING,
+        };
+        StimulusPlan {
+            config,
+            exposure,
+            stream,
+            pulses: all,
+            schedule,
+        }
+    }
+
+    /// Where load and exposure lie in simulation time.
+    pub fn schedule(&self) -> Schedule {
+        self.schedule
+    }
+
+    /// All drives in time order.
+    pub fn stimulus(&'a self, pins: &Pins) -> Stimulus<'a> {
+        merge([
+            boxed(self.control(pins).into_iter()),
+            boxed(self.load(pins)),
+            boxed(self.clk(pins)),
+            boxed(self.stop(pins)),
+            boxed(self.spads(pins)),
+        ])
+    }
+
+    fn control(&self, pins: &Pins) -> Vec<Drive> {
+        let (config, schedule) = (self.config, self.schedule);
+        let mut drives = Vec::new();
+        let mut drive = |time, net, value: bool| drives.push(Drive::new(time, net, value));
+        let start = Time::ZERO;
+        drive(start, pins.resetb, false);
+        drive(start, pins.histogram_clear, true);
+        drive(start, pins.enable, false);
+        drive(start, pins.load_enable, false);
+        drive(start, pins.conventional, config.mode == Mode::Conventional);
+        for (bit, &net) in pins.event_type.iter().enumerate() {
+            drive(start, net, config.event_type.code() >> bit & 1 == 1);
+        }
+        for bit in 0..THRESHOLD_BITS {
+            drive(start, pins.threshold[bit], config.threshold >> bit & 1 == 1);
+        }
+        for &net in &pins.spad_raw {
+            drive(start, net, false);
+        }
+        drive(RESET_END, pins.resetb, true);
+        let load_enable = Time::from_fs((RESET_END + LOAD_START).as_fs() / 2);
+        drive(load_enable, pins.load_enable, true);
+        drive(schedule.load_end, pins.load_enable, false);
+        let before = Time::from_fs((schedule.load_end + schedule.origin).as_fs() / 2);
+        drive(before, pins.histogram_clear, false);
+        drive(before, pins.enable, true);
+        let last_cycle = self.exposure.laser_cycles as i64 - 1;
+        drive(
+            schedule.origin + self.exposure.stop_fall(last_cycle),
+            pins.enable,
+            false,
+        );
+        drives
+    }
+
+    fn load(&'a self, pins: &Pins) -> impl Iterator<Item = Drive> + Send + 'a {
+        let clock = self.config.load_clock();
+        let (clk, serial) = (pins.load_clk, pins.serial);
+        let bits = self.stream.len() as i64;
+        let idle = [
+            Drive::new(Time::ZERO, clk, false),
+            Drive::new(Time::ZERO, serial, false),
+        ];
+        // Data change with falling edges and are taken by rising ones.
+        let edges = (0..=2 * bits).flat_map(move |k| {
+            let time = LOAD_START + clock.half_periods(k);
+            let edge = Drive::new(time, clk, k % 2 == 1);
+            let data = (k % 2 == 0 && k < 2 * bits)
+                .then(|| Drive::new(time, serial, self.stream[k as usize / 2]));
+            std::iter::once(edge).chain(data)
+        });
+        idle.into_iter().chain(edges)
+    }
+
+    fn clk(&self, pins: &Pins) -> impl Iterator<Item = Drive> + Send + 'a {
+        let exposure = self.exposure;
+        let origin = self.schedule.origin - exposure.stop_phase;
+        let periods = exposure.laser_cycles as i64 * exposure.stop_periods as i64;
+        let edges = clock(
+            pins.clk,
+            exposure.clock,
+            origin,
+            0,
+            2 * periods + LAST_HALF_PERIODS + 1,
+        );
+        std::iter::once(Drive::new(Time::ZERO, pins.clk, true)).chain(edges)
+    }
+
+    fn stop(&self, pins: &Pins) -> impl Iterator<Item = Drive> + Send + 'a {
+        let (exposure, origin, stop) = (self.exposure, self.schedule.origin, pins.stop);
+        let last = exposure.laser_cycles as i64;
+        let edges = (0..=last).flat_map(move |cycle| {
+            let fall = if cycle == last {
+                exposure.stop(cycle) + exposure.clock.periods(1)
+            } else {
+                exposure.stop_fall(cycle)
+            };
+            [
+                Drive::new(origin + exposure.stop(cycle), stop, true),
+                Drive::new(origin + fall, stop, false),
+            ]
+        });
+        std::iter::once(Drive::new(Time::ZERO, stop, false)).chain(edges)
+    }
+
+    fn spads(&'a self, pins: &Pins) -> impl Iterator<Item = Drive> + Send + 'a {
+        let (origin, dead_time) = (self.schedule.origin, self.config.dead_time());
+        let nets = pins.spad_raw.clone();
+        let end = self.schedule.end;
+        let edges = move |offset: Time, value: bool| {
+            let nets = nets.clone();
+            let drives = self.pulses.iter().map(move |(pixel, pulse)| {
+                let net = nets[pixel * SPADS + pulse.spad as usize];
+                Drive::new(origin + pulse.time + offset, net, value)
+            });
+            boxed(drives.take_while(move |d| d.time <= end))
+        };
+        merge([edges(Time::ZERO, true), edges(dead_time, false)])
+    }
+}
+
+/// Half CLK periods that CLK goes on after the last STOP edge.
+const LAST_HALF_PERIODS: i64 = 2;
+
+fn boxed<'a>(
+    drives: impl Iterator<Item = Drive> + Send + 'a,
+) -> Box<dyn Iterator<Item = Drive> + Send + 'a> {
+    Box::new(drives)
+}
