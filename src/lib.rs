@@ -1,4 +1,5 @@
 //! A hardware model of a guided direct time-of-flight lidar chip, down to gates and flip-flops.
 
 pub mod files;
+pub mod photon;
 pub mod units;
