@@ -2,4 +2,5 @@
 
 pub mod files;
 pub mod photon;
+pub mod scene;
 pub mod units;
