@@ -3,5 +3,7 @@
 pub mod files;
 pub mod guide;
 pub mod photon;
+pub mod ranging;
+pub mod report;
 pub mod scene;
 pub mod units;
