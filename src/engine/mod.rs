@@ -21,6 +21,8 @@ pub use window::Window;
 
 use crate::photon::SpadEvent;
 
+const _: () = assert!(crate::chip::SPADS == crate::photon::SPADS);
+
 /// Runs one macropixel through an exposure.
 pub trait Engine: Sync {
     /// Counts of every bin, bin 0 earliest, for a start value and the rising edges of SPAD_RAW, sorted by
@@ -35,7 +37,9 @@ pub trait Engine: Sync {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum EngineError {
     /// The window law finds two signals too close to call.
-    #[error("{0}, so only the gate engine can tell what is counted; use --engine gate or change clk_hz, stop_phase_ps or corner")]
+    #[error(
+        "{0}, so only the gate engine can tell what is counted; use --engine gate or change clk_hz, stop_phase_ps or corner"
+    )]
     Race(&'static str),
     /// A histogram bin of the netlist holds X.
     #[error("bin {bin} of macropixel ({row}, {col}) is unknown (X) at the end of the exposure")]

@@ -64,7 +64,7 @@ impl Engine for Window<'_> {
                 }
                 // The pipeline starts empty: nothing before rising edge -1 was ever compared.
                 let missing = -1 - (window.first_edge + bin);
-                (cycles - missing.max(0).div_ceil_by(periods)).max(0)
+                (cycles - (missing.max(0) as u64).div_ceil(periods as u64) as i64).max(0)
             })
             .collect();
         for (edge, spads) in Taken::new(pulses, |p| self.edge_of(p.time)) {
@@ -88,16 +88,6 @@ impl Engine for Window<'_> {
             .iter()
             .map(|&n| histogram::model(n as u64, bits, overflow))
             .collect())
-    }
-}
-
-trait DivCeil {
-    fn div_ceil_by(self, divisor: Self) -> Self;
-}
-
-impl DivCeil for i64 {
-    fn div_ceil_by(self, divisor: i64) -> i64 {
-        (self + divisor - 1).div_euclid(divisor)
     }
 }
 

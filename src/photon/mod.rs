@@ -1,0 +1,12 @@
+//! Light and the SPADs that see it: photon budget (thesis 3.2.1), dead time, and the
+//! random-access photon stream that drives every engine.
+
+mod budget;
+mod random;
+mod spad;
+mod stream;
+
+pub use budget::{Convention, PhotonBudget};
+pub use random::{Poisson, Purpose, normal, random_stream};
+pub use spad::{SPADS, SpadEvent, apply_dead_time};
+pub use stream::{PixelLight, PixelPhotons, PixelStream, StreamConfig, pixel_events};

@@ -1,0 +1,191 @@
+//! Random numbers that are a pure function of what they are for.
+//!
+//! Every draw comes from the counter-based generator Philox4x32-10 (Salmon et al., SC 2011). Its
+//! 64-bit key holds the seed, its 128-bit counter says which number is wanted: a [`Purpose`], an
+//! index (a pixel), a sub-index (a laser cycle) and a block of four words within. Nothing depends
+//! on threads or order, and all functions used here round alike on every platform.
+
+use rand_philox::{Philox, splitmix64};
+
+/// What a random number is used for; different purposes never share numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Purpose {
+    /// Photon times and SPADs.
+    Photons = 0,
+    /// Disparity errors of the stereo camera.
+    Stereo = 1,
+}
+
+/// The stream of random words for (`seed`, `purpose`, `index`, `sub_index`).
+///
+/// It holds 2³² blocks of four words before it would run into the next `sub_index`.
+#[inline]
+pub fn random_stream(seed: u64, purpose: Purpose, index: u32, sub_index: u32) -> Philox {
+    let key = splitmix64(seed);
+    let counter =
+        u128::from(purpose as u32) << 96 | u128::from(index) << 64 | u128::from(sub_index) << 32;
+    Philox::new([key as u32, (key >> 32) as u32], counter)
+}
+
+/// One draw of the standard normal distribution (Box and Muller, the cosine half).
+///
+/// Two words make one draw; its magnitude stays below 6.8.
+#[inline]
+pub fn normal(random: &mut Philox) -> f64 {
+    let radius = libm::sqrt(-2.0 * libm::log(unit(random)));
+    radius * libm::cos(std::f64::consts::TAU * unit(random))
+}
+
+/// A number strictly between 0 and 1.
+#[inline]
+fn unit(random: &mut Philox) -> f64 {
+    rand_philox::u32_to_unit_f64(random.next_u32())
+}
+
+/// Largest mean that one table covers; larger ones are split into equal parts.
+const LARGEST_TABLE_MEAN: f64 = 64.0;
+
+/// A Poisson distribution prepared for many draws by inversion.
+///
+/// The table holds P(N > k) for k = 0, 1, … as 64-bit fixed-point numbers. Complements, not the
+/// cumulative distribution itself, so that small probabilities keep all their digits. A draw
+/// counts how many entries exceed a random 64-bit word; an index on the word's top byte says
+/// where to begin. A sum of Poisson variables is Poisson, which covers large means.
+#[derive(Debug, Clone)]
+pub struct Poisson {
+    exceeds: Vec<u64>,
+    start: Box<[u16; 256]>,
+    parts: u32,
+}
+
+impl Poisson {
+    /// A distribution of finite mean `mean` ≥ 0.
+    pub fn new(mean: f64) -> Self {
+        debug_assert!(mean.is_finite() && mean >= 0.0, "mean {mean}");
+        let parts = (mean / LARGEST_TABLE_MEAN).ceil().max(1.0);
+        let exceeds = exceedance_table(mean / parts);
+        let mut start = Box::new([0u16; 256]);
+        for (top, slot) in start.iter_mut().enumerate() {
+            let largest_word = (top as u64) << 56 | ((1 << 56) - 1);
+            *slot = exceeds.partition_point(|&e| e > largest_word) as u16;
+        }
+        Poisson {
+            exceeds,
+            start,
+            parts: parts as u32,
+        }
+    }
+
+    /// One draw; takes two words of `random` for every part of 64 of the mean.
+    #[inline]
+    pub fn draw(&self, random: &mut Philox) -> u32 {
+        let mut total = 0;
+        for _ in 0..self.parts {
+            let word = random.next_u64();
+            let mut count = usize::from(self.start[(word >> 56) as usize]);
+            while self.exceeds.get(count).is_some_and(|&e| e > word) {
+                count += 1;
+            }
+            total += count as u32;
+        }
+        total
+    }
+}
+
+/// P(N > k)·2⁶⁴ for k = 0, 1, … until it falls below one unit.
+fn exceedance_table(mean: f64) -> Vec<u64> {
+    let mut terms = vec![libm::exp(-mean)];
+    while terms.len() < 2 || terms.len() as f64 <= mean || terms[terms.len() - 1] > 1e-22 {
+        let k = terms.len() as f64;
+        terms.push(terms[terms.len() - 1] * mean / k);
+    }
+    // Summed from the far end, so that small terms add up before they meet large ones.
+    let mut table: Vec<u64> = terms
+        .iter()
+        .skip(1)
+        .rev()
+        .scan(0.0, |tail, term| {
+            *tail += term;
+            Some((*tail * 2f64.powi(64)) as u64)
+        })
+        .collect();
+    table.reverse();
+    table.truncate(table.partition_point(|&e| e > 0));
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moments(draws: impl Iterator<Item = f64>) -> (f64, f64) {
+        let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        for x in draws {
+            n += 1.0;
+            sum += x;
+            squares += x * x;
+        }
+        let mean = sum / n;
+        (mean, squares / n - mean * mean)
+    }
+
+    #[test]
+    fn poisson_mean_and_variance_agree_for_small_and_large_means() {
+        for mean in [1e-3, 0.3, 11.0, 63.9, 64.1, 900.0] {
+            let distribution = Poisson::new(mean);
+            let mut random = random_stream(1, Purpose::Photons, 0, 0);
+            let n = 100_000;
+            let (m, v) = moments((0..n).map(|_| f64::from(distribution.draw(&mut random))));
+            let error = (mean / f64::from(n)).sqrt();
+            assert!((m - mean).abs() < 5.0 * error, "mean {mean}: {m}");
+            let spread = 5.0 * mean * (2.0 / f64::from(n)).sqrt() + 5.0 * error;
+            assert!((v - mean).abs() < spread, "variance {mean}: {v}");
+        }
+    }
+
+    #[test]
+    fn poisson_probabilities_are_those_of_the_formula() {
+        let table = exceedance_table(2.5);
+        let mut probability = libm::exp(-2.5);
+        let mut exceeds = 1.0 - probability;
+        for k in 0..10 {
+            let got = table[k] as f64 / 2f64.powi(64);
+            assert!((got - exceeds).abs() < 1e-15, "{k}: {got} {exceeds}");
+            probability *= 2.5 / (k as f64 + 1.0);
+            exceeds -= probability;
+        }
+    }
+
+    #[test]
+    fn nothing_comes_of_mean_zero_and_tiny_means_are_kept() {
+        let mut random = random_stream(7, Purpose::Photons, 0, 0);
+        let zero = Poisson::new(0.0);
+        assert!((0..1000).all(|_| zero.draw(&mut random) == 0));
+        let tiny = exceedance_table(1e-12);
+        let relative = tiny[0] as f64 / (1e-12 * 2f64.powi(64));
+        assert!((relative - 1.0).abs() < 1e-6, "{relative}");
+    }
+
+    #[test]
+    fn normal_draws_have_mean_zero_and_variance_one() {
+        let mut random = random_stream(3, Purpose::Stereo, 5, 0);
+        let (m, v) = moments((0..200_000).map(|_| normal(&mut random)));
+        assert!(m.abs() < 0.01 && (v - 1.0).abs() < 0.02, "{m} {v}");
+    }
+
+    #[test]
+    fn purposes_indices_and_seeds_do_not_share_words() {
+        let first = |seed, purpose, i, s| random_stream(seed, purpose, i, s).next_u64();
+        let words = [
+            first(0, Purpose::Photons, 0, 0),
+            first(0, Purpose::Photons, 0, 1),
+            first(0, Purpose::Photons, 1, 0),
+            first(0, Purpose::Stereo, 0, 0),
+            first(1, Purpose::Photons, 0, 0),
+        ];
+        for (i, a) in words.iter().enumerate() {
+            assert!(words[i + 1..].iter().all(|b| a != b));
+        }
+    }
+}

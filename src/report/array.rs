@@ -1,0 +1,66 @@
+//! Arrays for NumPy and MATLAB: the NPY format, version 1.0, little endian, C order.
+
+use std::io;
+use std::path::Path;
+
+use npyz::WriterBuilder;
+
+use crate::files::{InputError, OutputFile};
+
+/// Writes `data` as a `uint16` array of `shape`, last axis fastest.
+///
+/// # Errors
+/// When the file cannot be written; no part of it is then left behind.
+///
+/// # Panics
+/// When `shape` does not have as many elements as `data`.
+pub fn write_npy_u16(path: &Path, shape: &[u64], data: &[u16]) -> Result<(), InputError> {
+    let elements: u64 = shape.iter().product();
+    assert_eq!(
+        elements,
+        data.len() as u64,
+        "shape {shape:?} does not fit the data"
+    );
+    OutputFile::write_with(path, |file| {
+        let mut writer = npyz::WriteOptions::new()
+            .default_dtype()
+            .shape(shape)
+            .writer(file)
+            .begin_nd()?;
+        writer.extend(data.iter().copied())?;
+        writer.finish()?;
+        io::Result::Ok(())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_array_comes_back_as_written() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.npy");
+        let data: Vec<u16> = (0..24).map(|i| i * 2_730).collect();
+        write_npy_u16(&path, &[2, 3, 4], &data).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let read = npyz::NpyFile::new(&bytes[..]).unwrap();
+        assert_eq!(read.shape(), [2, 3, 4]);
+        assert_eq!(read.order(), npyz::Order::C);
+        assert_eq!(read.into_vec::<u16>().unwrap(), data);
+    }
+
+    #[test]
+    fn empty_arrays_are_files_too() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("empty.npy");
+        write_npy_u16(&path, &[0, 16], &[]).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        assert_eq!(npyz::NpyFile::new(&bytes[..]).unwrap().shape(), [0, 16]);
+    }
+
+    #[test]
+    fn a_missing_folder_is_an_error() {
+        assert!(write_npy_u16(Path::new("/nonexistent/a.npy"), &[1], &[1]).is_err());
+    }
+}

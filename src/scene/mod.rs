@@ -1,0 +1,19 @@
+//! What the lidar looks at: surfaces, sunlight, the lidar's and the stereo camera's optics, and
+//! the true distance of every macropixel.
+//!
+//! Coordinates in metres: x to the right, y down, z forward, the lidar at the origin.
+
+mod camera;
+mod file;
+mod light;
+mod settings;
+mod shape;
+mod truth;
+mod vector;
+
+pub use camera::PinholeCamera;
+pub use light::SKY_REFLECTIVITY;
+pub use settings::{Lidar, Light, Scene, Stereo};
+pub use shape::{Object, Shape};
+pub use truth::{GroundTruth, Hit};
+pub use vector::{Ray, Vec3};

@@ -1,0 +1,192 @@
+//! A scene as its file describes it: lidar optics, stereo rig, sunlight, objects.
+
+use std::f64::consts::LN_2;
+
+use super::camera::PinholeCamera;
+use super::shape::Object;
+use super::vector::Vec3;
+use crate::photon::{Convention, PhotonBudget};
+use crate::units::Time;
+
+/// A static world and the optics through which it is seen.
+///
+/// Read one with [`Scene::parse`] or [`Scene::load`], or take [`Scene::outdoor`]. After changing
+/// fields call [`Scene::validate`].
+#[derive(Debug, Clone, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Laser, lens and SPADs of the lidar.
+    pub lidar: Lidar,
+    /// The camera pair that guides it; the thesis's rig unless given.
+    #[serde(default)]
+    pub stereo: Stereo,
+    /// Sunlight.
+    pub light: Light,
+    /// What there is to see.
+    #[serde(default, rename = "object")]
+    pub objects: Vec<Object>,
+}
+
+/// The lidar's optics. Rows and columns are the sensor's business, not the scene's.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lidar {
+    /// Horizontal field of view, degrees. Macropixels are square, so the vertical one follows
+    /// from the sensor's shape.
+    pub fov_deg: f64,
+    /// Laser wavelength, nm.
+    pub wavelength_nm: f64,
+    /// Energy of one pulse over the whole field of view, µJ.
+    pub pulse_energy_uj: f64,
+    /// Full width at half maximum of the (Gaussian) pulse, jitter included, ns.
+    pub pulse_fwhm_ns: f64,
+    /// Photon detection efficiency of the SPADs, 0 to 1.
+    pub pde: f64,
+    /// Diameter of the lens aperture, mm.
+    pub lens_diameter_mm: f64,
+    /// Focal length over diameter.
+    pub lens_f_number: f64,
+    /// Transmittance of lens and filter, 0 to 1.
+    #[serde(default = "one")]
+    pub transmittance: f64,
+    /// Solar irradiance within the filter's band at 100 klux, W/m².
+    pub solar_irradiance_w_m2: f64,
+    /// Dark counts of one macropixel, all SPADs together, per second.
+    #[serde(default)]
+    pub dark_count_hz: f64,
+    /// Constant of the photon budget.
+    #[serde(default)]
+    pub convention: Convention,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// The stereo camera rig of thesis 5.2.2 (Table 12), whose values are the default of every field.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Stereo {
+    /// Distance from the principal (left) to the right camera, m.
+    pub baseline_m: f64,
+    /// Focal length of both lenses, mm.
+    pub focal_mm: f64,
+    /// Pixel pitch of both cameras, µm.
+    pub pixel_pitch_um: f64,
+    /// Columns of an image.
+    pub width: u32,
+    /// Rows of an image.
+    pub height: u32,
+    /// Standard deviation of the matched disparity, px; the thesis overlays 1/3 px on its Fig. 68.
+    pub disparity_sigma_px: f64,
+    /// Disparities are multiples of 1/`subpixel_steps` px.
+    pub subpixel_steps: u32,
+    /// Smallest disparity accepted, px. 10 px holds a whole-pixel error below 10 % (5.2.1).
+    pub min_disparity_px: f64,
+    /// Largest disparity searched, px.
+    ///
+    /// 5.2.1 speaks of 128 px as customary, but at 1 m and 12 mm that would end the view at 27 m,
+    /// while the rig is reported to see down to about 15 m. 232 px is the disparity at 15 m.
+    pub max_disparity_px: f64,
+    /// Position of the principal camera, with the lidar at the origin, m.
+    pub position_m: Vec3,
+    /// By how much the right camera has turned outwards since calibration, degrees (Fig. 70).
+    pub yaw_error_deg: f64,
+}
+
+impl Default for Stereo {
+    fn default() -> Self {
+        Stereo {
+            baseline_m: 1.0,
+            focal_mm: 12.0,
+            pixel_pitch_um: 3.45,
+            width: 1440,
+            height: 1080,
+            disparity_sigma_px: 1.0 / 3.0,
+            subpixel_steps: 16,
+            min_disparity_px: 10.0,
+            max_disparity_px: 232.0,
+            position_m: Vec3::default(),
+            yaw_error_deg: 0.0,
+        }
+    }
+}
+
+impl Stereo {
+    /// Either camera, in its own coordinates.
+    pub fn camera(&self) -> PinholeCamera {
+        let focal_px = self.focal_mm * 1e-3 / (self.pixel_pitch_um * 1e-6);
+        PinholeCamera::centred(focal_px, self.width, self.height)
+    }
+}
+
+/// Sunlight on the scene.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Light {
+    /// Illuminance, klux; 100 is full sun.
+    pub illuminance_klux: f64,
+}
+
+impl Scene {
+    /// The lidar as a camera of `rows` × `cols` macropixels.
+    pub fn lidar_camera(&self, rows: u32, cols: u32) -> PinholeCamera {
+        PinholeCamera::with_horizontal_fov(self.lidar.fov_deg, cols, rows)
+    }
+
+    /// The photon budget of one macropixel of a `rows` × `cols` array behind this lens.
+    ///
+    /// The pitch is the one that fits the array into the field of view.
+    pub fn photon_budget(&self, rows: u32, cols: u32) -> PhotonBudget {
+        let lidar = &self.lidar;
+        let lens_diameter_m = lidar.lens_diameter_mm * 1e-3;
+        let lens_focal_m = lens_diameter_m * lidar.lens_f_number;
+        PhotonBudget {
+            pde: lidar.pde,
+            wavelength_nm: lidar.wavelength_nm,
+            transmittance: lidar.transmittance,
+            pulse_energy_j: lidar.pulse_energy_uj * 1e-6,
+            lens_diameter_m,
+            lens_focal_m,
+            pixel_pitch_m: lens_focal_m / self.lidar_camera(rows, cols).focal_px,
+            rows,
+            cols,
+            solar_irradiance_w_m2: lidar.solar_irradiance_w_m2,
+            convention: lidar.convention,
+        }
+    }
+
+    /// Standard deviation of the laser pulse: its width at half maximum over 2·√(2·ln 2).
+    pub fn pulse_sigma(&self) -> Time {
+        Time::from_s(self.lidar.pulse_fwhm_ns * 1e-9 / (8.0 * LN_2).sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_thesis_rig_sees_from_15_to_beyond_200_m() {
+        let stereo = Stereo::default();
+        let focal_times_baseline = stereo.camera().focal_px * stereo.baseline_m;
+        assert!((focal_times_baseline / stereo.max_disparity_px - 15.0).abs() < 0.01);
+        assert!(focal_times_baseline / stereo.min_disparity_px > 200.0);
+    }
+
+    #[test]
+    fn the_array_fills_the_field_of_view() {
+        let scene = Scene::outdoor();
+        let budget = scene.photon_budget(64, 64);
+        let half_width_m = 32.0 * budget.pixel_pitch_m;
+        let fov_deg = 2.0 * (half_width_m / budget.lens_focal_m).atan().to_degrees();
+        assert!((fov_deg - scene.lidar.fov_deg).abs() < 1e-9);
+    }
+
+    #[test]
+    fn pulse_sigma_follows_from_the_width() {
+        let mut scene = Scene::outdoor();
+        scene.lidar.pulse_fwhm_ns = 2.354_820_045;
+        assert!((scene.pulse_sigma().as_ns() - 1.0).abs() < 1e-6);
+    }
+}
