@@ -6,7 +6,7 @@
 //! and is added in one step.
 
 use super::{Engine, EngineError};
-use crate::chip::{Exposure, SensorConfig, WindowLaw, correlation, histogram, window_law};
+use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw, correlation, histogram, window_law};
 use crate::photon::SpadEvent;
 use crate::units::Time;
 
@@ -56,6 +56,12 @@ impl Engine for Window<'_> {
             window_law::Window::Never => return Ok(vec![0; self.config.bins]),
             window_law::Window::Race(why) => return Err(EngineError::Race(why)),
         };
+        // A conventional cycle is latched by the STOP edge that ends it; the exposure's first STOP edge
+        // ends one, too.
+        let first_cycle = match self.config.mode {
+            Mode::Guided => 0,
+            Mode::Conventional => -1,
+        };
         let empty_is_event = self.is_event(0);
         let mut hits: Vec<i64> = (0..bins)
             .map(|bin| {
@@ -63,8 +69,9 @@ impl Engine for Window<'_> {
                     return 0;
                 }
                 // The pipeline starts empty: nothing before rising edge -1 was ever compared.
-                let missing = -1 - (window.first_edge + bin);
-                (cycles - (missing.max(0) as u64).div_ceil(periods as u64) as i64).max(0)
+                let edge = window.first_edge + bin;
+                let first_compared = (-1 - edge + periods - 1).div_euclid(periods);
+                (cycles - first_compared.max(first_cycle)).max(0)
             })
             .collect();
         for (edge, spads) in Taken::new(pulses, |p| self.edge_of(p.time)) {
@@ -75,7 +82,7 @@ impl Engine for Window<'_> {
             let offset = edge - window.first_edge;
             let last_cycle = offset.div_euclid(periods).min(cycles - 1);
             // More than one laser cycle sees an edge only when a cycle is shorter than the window.
-            for cycle in (0..=last_cycle).rev() {
+            for cycle in (first_cycle..=last_cycle).rev() {
                 let bin = offset - cycle * periods;
                 if bin >= bins {
                     break;
