@@ -11,12 +11,15 @@
 
 mod cycle;
 mod gate;
+pub mod recording;
 mod stimulus;
+mod testbench;
 mod window;
 
 pub use cycle::Cycle;
 pub use gate::{Gate, GateSimulation};
 pub use stimulus::{Pins, Schedule, StimulusPlan};
+pub use testbench::export_verilog;
 pub use window::Window;
 
 use crate::photon::SpadEvent;

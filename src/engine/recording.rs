@@ -1,0 +1,334 @@
+//! Recorded stimuli: start values and SPAD events from CSV files.
+//!
+//! * Start values: header `row,col,init`, one line for every macropixel.
+//! * Events: header `time_fs,row,col,spad`, rising edges of SPAD_RAW in any order. Time 0 is the first rising
+//!   edge of STOP. A pulse lasts the dead time; an event within it makes no edge and is dropped, as is
+//!   one at or after the end of the exposure.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use crate::chip::{Exposure, SPADS, SensorConfig};
+use crate::files::{InputError, read_text};
+use crate::photon::{SpadEvent, apply_dead_time};
+use crate::units::Time;
+
+/// Longest exposure, s. GTKWave refuses times beyond 2⁵³ fs, which is 9.007 s.
+const LONGEST_EXPOSURE_S: f64 = 9.0;
+
+/// Checks the length of an exposure given on a command line.
+///
+/// # Errors
+/// When it has no laser cycle, a laser cycle shorter than two CLK periods, or lasts longer than 9 s.
+pub fn check_exposure(
+    config: &SensorConfig,
+    stop_periods: u32,
+    laser_cycles: u32,
+) -> Result<Exposure, InputError> {
+    if stop_periods < 2 {
+        let message = format!("{stop_periods} CLK periods are no laser cycle; give at least 2");
+        return Err(InputError::new("--stop-periods", message));
+    }
+    if laser_cycles == 0 {
+        let message = "an exposure needs a laser cycle; give at least 1";
+        return Err(InputError::new("--laser-cycles", message));
+    }
+    let seconds = stop_periods as f64 * laser_cycles as f64 / config.clk_hz;
+    if seconds > LONGEST_EXPOSURE_S {
+        let message = format!(
+            "{stop_periods} CLK periods times {laser_cycles} laser cycles last {seconds:.1} s; stay below {LONGEST_EXPOSURE_S} s"
+        );
+        return Err(InputError::new("--laser-cycles", message));
+    }
+    Ok(Exposure::new(config, stop_periods, laser_cycles))
+}
+
+/// Start values of an array, row-major.
+///
+/// # Errors
+/// Unreadable files, malformed lines, pixels outside the array, values beyond 2ⁿ − 1, duplicated or
+/// missing macropixels: file, line and cure.
+pub fn read_starts(path: &Path, config: &SensorConfig) -> Result<Vec<u16>, InputError> {
+    parse_starts(&path.display().to_string(), &read_text(path)?, config)
+}
+
+/// As [`read_starts`], from text; `source` names it in complaints.
+///
+/// # Errors
+/// As [`read_starts`].
+pub fn parse_starts(
+    source: &str,
+    text: &str,
+    config: &SensorConfig,
+) -> Result<Vec<u16>, InputError> {
+    let mut starts = vec![None; config.pixels()];
+    let mut first_line = HashMap::new();
+    for row in rows(source, text, ["row", "col", "init"])? {
+        let (line, [r, c, init]) = row?;
+        let pixel = pixel_index(source, line, r, c, config)?;
+        if init < 0 || init > config.largest_start() as i64 {
+            let message = format!(
+                "start value {init} does not fit the {}-bit P-counter; give 0 to {}",
+                config.counter_bits,
+                config.largest_start()
+            );
+            return Err(InputError::at(source, line, message));
+        }
+        if let Some(before) = first_line.insert(pixel, line) {
+            let message = format!(
+                "macropixel ({r}, {c}) already has a start value in line {before}; remove one of them"
+            );
+            return Err(InputError::at(source, line, message));
+        }
+        starts[pixel] = Some(init as u16);
+    }
+    if let Some(pixel) = starts.iter().position(Option::is_none) {
+        let message = format!(
+            "macropixel ({}, {}) has no start value; add a line for it or shrink the array with --rows and --cols",
+            pixel / config.cols,
+            pixel % config.cols
+        );
+        return Err(InputError::new(source, message));
+    }
+    Ok(starts.into_iter().flatten().collect())
+}
+
+/// SPAD pulses of an array as the chip sees them.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Recording {
+    /// Pulses of every macropixel, row-major, sorted by time and thinned by the dead time.
+    pub pulses: Vec<Vec<SpadEvent>>,
+    /// Events read.
+    pub read: u64,
+    /// Events within the pulse of an earlier one.
+    pub lost_to_dead_time: u64,
+    /// Events at or after the end of the exposure.
+    pub after_the_end: u64,
+}
+
+/// Recorded SPAD events of an array.
+///
+/// # Errors
+/// Unreadable files, malformed lines, pixels or SPADs that do not exist, events before time 0: file, line
+/// and cure.
+pub fn read_events(
+    path: &Path,
+    config: &SensorConfig,
+    exposure: &Exposure,
+) -> Result<Recording, InputError> {
+    parse_events(
+        &path.display().to_string(),
+        &read_text(path)?,
+        config,
+        exposure,
+    )
+}
+
+/// As [`read_events`], from text; `source` names it in complaints.
+///
+/// # Errors
+/// As [`read_events`].
+pub fn parse_events(
+    source: &str,
+    text: &str,
+    config: &SensorConfig,
+    exposure: &Exposure,
+) -> Result<Recording, InputError> {
+    let mut recording = Recording {
+        pulses: vec![Vec::new(); config.pixels()],
+        ..Recording::default()
+    };
+    for row in rows(source, text, ["time_fs", "row", "col", "spad"])? {
+        let (line, [time_fs, r, c, spad]) = row?;
+        let pixel = pixel_index(source, line, r, c, config)?;
+        if !(0..SPADS as i64).contains(&spad) {
+            let message = format!("SPAD {spad} does not exist; give 0 to {}", SPADS - 1);
+            return Err(InputError::at(source, line, message));
+        }
+        if time_fs < 0 {
+            let message = format!(
+                "an event at {time_fs} fs is before time 0, the first rising edge of STOP; shift or remove it"
+            );
+            return Err(InputError::at(source, line, message));
+        }
+        recording.read += 1;
+        let time = Time::from_fs(time_fs);
+        if time >= exposure.end() {
+            recording.after_the_end += 1;
+            continue;
+        }
+        let spad = spad as u8;
+        recording.pulses[pixel].push(SpadEvent { time, spad });
+    }
+    for pulses in &mut recording.pulses {
+        pulses.sort_unstable();
+        recording.lost_to_dead_time += apply_dead_time(pulses, config.dead_time());
+    }
+    Ok(recording)
+}
+
+fn pixel_index(
+    source: &str,
+    line: usize,
+    row: i64,
+    col: i64,
+    config: &SensorConfig,
+) -> Result<usize, InputError> {
+    let inside = |at: i64, size: usize| (0..size as i64).contains(&at);
+    if inside(row, config.rows) && inside(col, config.cols) {
+        return Ok(row as usize * config.cols + col as usize);
+    }
+    let message = format!(
+        "macropixel ({row}, {col}) is outside the {}x{} array; give rows 0 to {} and columns 0 to {}",
+        config.rows,
+        config.cols,
+        config.rows - 1,
+        config.cols - 1
+    );
+    Err(InputError::at(source, line, message))
+}
+
+/// Line number and numbers of every record of a CSV text with this header.
+fn rows<'t, const N: usize>(
+    source: &'t str,
+    text: &'t str,
+    header: [&'static str; N],
+) -> Result<impl Iterator<Item = Result<(usize, [i64; N]), InputError>> + 't, InputError> {
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .flexible(true)
+        .has_headers(false)
+        .from_reader(text.as_bytes());
+    let expected = header.join(",");
+    let mut records = reader.records();
+    let line_of = |record: &csv::StringRecord| record.position().map_or(1, |p| p.line() as usize);
+    let unreadable = move |e: csv::Error| {
+        let line = e.position().map_or(1, |p| p.line() as usize);
+        InputError::at(source, line, format!("{e}; write plain numbers"))
+    };
+    match records.next().transpose().map_err(unreadable)? {
+        Some(found) if found.iter().eq(header) => {}
+        Some(found) => {
+            let found_text: Vec<&str> = found.iter().collect();
+            let message = format!(
+                "the header is \"{}\"; it must be \"{expected}\"",
+                found_text.join(",")
+            );
+            return Err(InputError::at(source, line_of(&found), message));
+        }
+        None => {
+            let message = format!("the file is empty; start it with the header \"{expected}\"");
+            return Err(InputError::new(source, message));
+        }
+    }
+    let mut records = reader.into_records();
+    Ok(std::iter::from_fn(move || {
+        let record = match records.next()? {
+            Ok(record) => record,
+            Err(e) => return Some(Err(unreadable(e))),
+        };
+        let line = line_of(&record);
+        if record.len() != N {
+            let message = format!(
+                "{} values where \"{expected}\" needs {N}; complete or remove the line",
+                record.len()
+            );
+            return Some(Err(InputError::at(source, line, message)));
+        }
+        let mut values = [0; N];
+        for ((value, field), name) in values.iter_mut().zip(&record).zip(header) {
+            match field.parse() {
+                Ok(number) => *value = number,
+                Err(_) => {
+                    let message = format!("{name} is \"{field}\"; write a whole number");
+                    return Some(Err(InputError::at(source, line, message)));
+                }
+            }
+        }
+        Some(Ok((line, values)))
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn config() -> SensorConfig {
+        SensorConfig {
+            rows: 2,
+            cols: 2,
+            ..SensorConfig::default()
+        }
+    }
+
+    fn exposure() -> Exposure {
+        check_exposure(&config(), 100, 10).unwrap()
+    }
+
+    const FOUR: &str = "row,col,init\n0,0,1\n0,1,2\n1,0,3\n1,1,4\n";
+
+    #[test]
+    fn start_values_come_row_major() {
+        assert_eq!(parse_starts("i", FOUR, &config()).unwrap(), [1, 2, 3, 4]);
+    }
+
+    #[test]
+    fn bad_start_values_are_named_with_their_line() {
+        for (text, line) in [
+            ("", None),
+            ("row,col\n", Some(1)),
+            ("row,col,init\n0,0,512\n", Some(2)),
+            ("row,col,init\n0,0,1\n\n0,2,1\n", Some(4)),
+            ("row,col,init\n0,0,1\n0,0,2\n", Some(3)),
+            ("row,col,init\n0,0,1\n", None),
+            ("row,col,init\n0,0,x\n", Some(2)),
+            ("row,col,init\n0,0\n", Some(2)),
+            ("row,col,init\n0,0,-1\n", Some(2)),
+        ] {
+            let error = parse_starts("inits.csv", text, &config()).unwrap_err();
+            assert_eq!(error.line, line, "{text:?}: {error}");
+            assert!(error.message.contains(';'), "no cure: {error}");
+        }
+    }
+
+    #[test]
+    fn bad_events_are_named_with_their_line() {
+        for (text, line) in [
+            ("time_fs,row,col,spad\n-1,0,0,0\n", 2),
+            ("time_fs,row,col,spad\n5,0,0,16\n", 2),
+            ("time_fs,row,col,spad\n5,0,0,1\n5,9,0,1\n", 3),
+            ("time_fs,row,col,spad\n99999999999999999999,0,0,1\n", 2),
+            ("time,row,col,spad\n", 1),
+        ] {
+            let error = parse_events("events.csv", text, &config(), &exposure()).unwrap_err();
+            assert_eq!(error.line, Some(line), "{text:?}: {error}");
+        }
+    }
+
+    #[test]
+    fn events_are_sorted_thinned_and_cut() {
+        let text =
+            "time_fs,row,col,spad\n9000000,0,1,3\n500,0,1,3\n600,0,1,3\n9000000000000,0,0,0\n";
+        let recording = parse_events("e", text, &config(), &exposure()).unwrap();
+        let times: Vec<i64> = recording.pulses[1].iter().map(|p| p.time.as_fs()).collect();
+        assert_eq!(times, [500, 9_000_000]);
+        assert_eq!(
+            (
+                recording.read,
+                recording.lost_to_dead_time,
+                recording.after_the_end
+            ),
+            (4, 1, 1)
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn garbage_never_panics(text in "(time_fs,row,col,spad\n|row,col,init\n)?[-0-9,\n\"#x \\PC]{0,120}") {
+            let _ = parse_starts("g", &text, &config());
+            let _ = parse_events("g", &text, &config(), &exposure());
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! The same sensor and stimulus for any Verilog simulator.
+//!
+//! A folder of four files: `cells.v` (cell models with the delays of the corner), `design.v` (the
+//! structural netlist), `stimulus.txt` (every change of every input pin: time in fs, pin, value) and `tb.v`, which
+//! replays the stimulus and writes `histograms.csv` and `local_stops.csv`, and `dut.vcd` when run with `+vcd`.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use super::stimulus::{Pins, StimulusPlan};
+use crate::chip::{SensorConfig, sensor};
+use crate::files::{InputError, OutputFile, create_folder};
+use crate::netlist::{Direction, Library, Module, Netlist, write_cells, write_modules};
+
+/// Writes cells, netlist, stimulus and testbench of the whole array into `folder`.
+///
+/// # Errors
+/// When the folder or a file in it cannot be written.
+pub fn export_verilog(
+    folder: &Path,
+    config: &SensorConfig,
+    plan: &StimulusPlan<'_>,
+) -> Result<(), InputError> {
+    let top = sensor::circuit(config);
+    let netlist = Netlist::elaborate(&top);
+    create_folder(folder)?;
+    let file = |name: &str| folder.join(name);
+    OutputFile::write_with(&file("cells.v"), |out| {
+        write_cells(out, &Library::default(), config.corner)
+    })?;
+    OutputFile::write_with(&file("design.v"), |out| write_modules(out, &top))?;
+    OutputFile::write_with(&file("stimulus.txt"), |out| {
+        write_stimulus(out, &netlist, plan)
+    })?;
+    OutputFile::write_with(&file("tb.v"), |out| {
+        write_testbench(out, &top, config, plan)
+    })
+}
+
+fn write_stimulus(
+    out: &mut dyn Write,
+    netlist: &Netlist,
+    plan: &StimulusPlan<'_>,
+) -> io::Result<()> {
+    let mut pin_of_net = vec![0; netlist.net_count()];
+    for (pin, net) in netlist.inputs().into_iter().enumerate() {
+        pin_of_net[net.index()] = pin;
+    }
+    for drive in plan.stimulus(&Pins::of(netlist)) {
+        let (time_fs, pin) = (drive.time.as_fs(), pin_of_net[drive.net.index()]);
+        writeln!(out, "{time_fs} {pin} {}", drive.value)?;
+    }
+    Ok(())
+}
+
+fn write_testbench(
+    out: &mut dyn Write,
+    top: &Module,
+    config: &SensorConfig,
+    plan: &StimulusPlan<'_>,
+) -> io::Result<()> {
+    let schedule = plan.schedule();
+    let name = top.name();
+    let mut pins = 0;
+    let mut ports = Vec::new();
+    for (direction, signal) in top.port_signals() {
+        let connection = match direction {
+            Direction::Output => "local_stop".to_owned(),
+            Direction::Input => {
+                let low = pins;
+                pins += signal.width();
+                if signal.is_bus {
+                    format!("pins[{}:{low}]", pins - 1)
+                } else {
+                    format!("pins[{low}]")
+                }
+            }
+        };
+        ports.push(format!("    .{}({connection})", signal.name));
+    }
+    let (pixels, cols) = (config.pixels(), config.cols);
+    write!(
+        out,
+        "\
+// iverilog -g2005 -o sim tb.v design.v cells.v && vvp sim +vcd
+`timescale 1fs/1fs
+module tb;
+  reg [{last_pin}:0] pins;
+  wire [{last_pixel}:0] local_stop;
+  reg value;
+  reg [63:0] at;
+  integer stimulus, histograms, stops, pin;
+
+  {name} dut(
+{ports}
+  );
+
+  genvar i;
+  generate
+    for (i = 0; i < {pixels}; i = i + 1) begin : watch
+      // Times count from the first rising edge of STOP.
+      always @(posedge local_stop[i])
+        if ($time >= {origin})
+          $fwrite(stops, \"%0d,%0d,%0d\\n\", i / {cols}, i % {cols}, $time - {origin});
+    end
+  endgenerate
+
+  initial begin
+    stimulus = $fopen(\"stimulus.txt\", \"r\");
+    stops = $fopen(\"local_stops.csv\", \"w\");
+    $fwrite(stops, \"row,col,time_fs\\n\");
+    if ($test$plusargs(\"vcd\")) begin
+      $dumpfile(\"dut.vcd\");
+      $dumpvars(0, dut);
+    end
+    // Lets every process of the design start waiting before the first change.
+    #0;
+    while ($fscanf(stimulus, \"%d %d %b\", at, pin, value) == 3) begin
+      if (at > $time) #(at - $time);
+      pins[pin] = value;
+    end
+    if ({end} > $time) #({end} - $time);
+    histograms = $fopen(\"histograms.csv\", \"w\");
+    $fwrite(histograms, \"row,col,bin,count\\n\");
+",
+        last_pin = pins - 1,
+        last_pixel = pixels - 1,
+        ports = ports.join(",\n"),
+        origin = schedule.origin.as_fs(),
+        end = schedule.end.as_fs(),
+    )?;
+    for pixel in 0..pixels {
+        let (row, col) = (pixel / cols, pixel % cols);
+        let path = sensor::pixel_name(row, col);
+        for bin in 0..config.bins {
+            writeln!(
+                out,
+                "    $fwrite(histograms, \"{row},{col},{bin},%0d\\n\", dut.{path}.histogram.bin_{bin}.COUNT);"
+            )?;
+        }
+    }
+    write!(
+        out,
+        "\
+    $fclose(histograms);
+    $fclose(stops);
+    $finish;
+  end
+endmodule
+"
+    )
+}
