@@ -8,6 +8,10 @@
 //! value and itself discards duplicates for speed, without saying which one it keeps. Here the
 //! one that lands nearest to the macropixel's centre is kept, because that is where the lidar's
 //! range is wanted; of two as near, the one further up, then further left in the camera's image.
+//!
+//! Camera and lidar stand in different places, so the camera may see what an edge hides from the
+//! lidar, and such a point can be the one kept. Guides of macropixels on the rim of near objects
+//! are therefore sometimes those of the background, as in any rig with a parallax.
 
 use rayon::prelude::*;
 

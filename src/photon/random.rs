@@ -149,8 +149,8 @@ mod tests {
         let table = exceedance_table(2.5);
         let mut probability = libm::exp(-2.5);
         let mut exceeds = 1.0 - probability;
-        for k in 0..10 {
-            let got = table[k] as f64 / 2f64.powi(64);
+        for (k, &entry) in table.iter().enumerate().take(10) {
+            let got = entry as f64 / 2f64.powi(64);
             assert!((got - exceeds).abs() < 1e-15, "{k}: {got} {exceeds}");
             probability *= 2.5 / (k as f64 + 1.0);
             exceeds -= probability;

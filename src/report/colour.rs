@@ -1,9 +1,9 @@
 //! The colour scale of depth pictures.
 //!
 //! Near is yellow, far is dark violet. The scale runs through a few hand-picked colours whose
-//! CIE L* lightness falls in even steps, with straight lines between them in linear light's cube
-//! root, so that equal steps of depth look about equally large, also in grey and to the
-//! colour-blind.
+//! CIE L* lightness falls in even steps, so that equal steps of depth look about equally large,
+//! also in grey and to the colour-blind. Between them sRGB values change linearly, which is even
+//! in lightness to within the tested bounds.
 
 /// A colour, sRGB.
 pub type Rgb = [u8; 3];
@@ -28,7 +28,6 @@ pub fn scale_colour(position: f64) -> Rgb {
         along - stop as f64
     };
     std::array::from_fn(|channel| {
-        // sRGB values are close to the cube root of light, so a straight line here is one there.
         let (a, b) = (STOPS[stop][channel], STOPS[stop + 1][channel]);
         (f64::from(a) + share * (f64::from(b) - f64::from(a))).round() as u8
     })

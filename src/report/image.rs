@@ -21,6 +21,9 @@ const MARGIN_PX: usize = 12;
 const BAR_PX: usize = 16;
 /// Longest tick label, such as `-1234.5 m`.
 const LABEL_CHARACTERS: usize = 9;
+const TICK_PX: usize = 3;
+/// From the bar to its labels; wide enough that a tick does not look like a minus sign.
+const LABEL_OFFSET_PX: usize = 10;
 
 /// Writes a depth map as a PNG picture.
 ///
@@ -53,7 +56,7 @@ pub fn depth_png(
     // The bar keeps room for two labels beside maps of a few pixels.
     let bar_height = map_height.max(4 * CHARACTER_PX);
     let bar_left = 2 * MARGIN_PX + map_width;
-    let width = bar_left + BAR_PX + 6 + LABEL_CHARACTERS * CHARACTER_PX + MARGIN_PX;
+    let width = bar_left + BAR_PX + LABEL_OFFSET_PX + LABEL_CHARACTERS * CHARACTER_PX + MARGIN_PX;
     let height = map_top + bar_height + MARGIN_PX;
 
     let mut canvas = Canvas::new(width, height, PAPER);
@@ -83,7 +86,7 @@ fn draw_bar(canvas: &mut Canvas, left: usize, top: usize, height: usize, range_m
         let depth_m = min_m + (max_m - min_m) * y as f64 / (height - 1) as f64;
         canvas.fill(left, top + y, BAR_PX, 1, step(depth_m, range_m));
     }
-    let most = (height / (3 * CHARACTER_PX)).clamp(2, 8);
+    let most = (height / (3 * CHARACTER_PX)).clamp(2, 12);
     let interval_m = round_interval((max_m - min_m) / most as f64);
     let decimals = (-interval_m.log10().floor()).clamp(0.0, 3.0) as usize;
     let first = (min_m / interval_m - 1e-6).ceil();
@@ -94,9 +97,14 @@ fn draw_bar(canvas: &mut Canvas, left: usize, top: usize, height: usize, range_m
             break;
         }
         let y = top + (position * (height - 1) as f64).round() as usize;
-        canvas.fill(left + BAR_PX, y, 4, 1, INK);
+        canvas.fill(left + BAR_PX, y, TICK_PX, 1, INK);
         let label = format!("{depth_m:.decimals$} m");
-        canvas.text(left + BAR_PX + 6, y - CHARACTER_PX / 2, &label, INK);
+        canvas.text(
+            left + BAR_PX + LABEL_OFFSET_PX,
+            y - CHARACTER_PX / 2,
+            &label,
+            INK,
+        );
     }
 }
 

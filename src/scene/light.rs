@@ -10,27 +10,39 @@ use crate::units::Time;
 /// the near infrared; haze is brighter.
 pub const SKY_REFLECTIVITY: f64 = 0.1;
 
+/// Most signal photons per cycle that are modelled. Sixteen SPADs saturate long before, and a
+/// surface right before the lens would ask for 10¹⁰.
+const MOST_SIGNAL_PER_CYCLE: f64 = 1e4;
+
+/// Highest background rate that is modelled, far beyond saturation.
+const MOST_BACKGROUND_HZ: f64 = 1e11;
+
 impl Scene {
     /// The light on every macropixel, in the order of `truth`.
     ///
     /// Background is sunlight from the surface (Eq. 16), or from the sky, plus dark counts.
     /// Signal is Eq. 15; a sky pixel has none. The laser fires with the STOP edge, so an echo
-    /// arrives after its time of flight.
+    /// arrives after its time of flight. Light far beyond saturation is cut at 10⁴ photons per
+    /// pulse and 10¹¹ per second.
     pub fn pixel_light(&self, truth: &GroundTruth) -> Vec<PixelLight> {
         let budget = self.photon_budget(truth.rows, truth.cols);
         let klux = self.light.illuminance_klux;
         let dark_hz = self.lidar.dark_count_hz;
+        let background_hz = |reflectivity| {
+            (budget.background_hz(reflectivity, klux) + dark_hz).min(MOST_BACKGROUND_HZ)
+        };
         (truth.range_m.iter().zip(&truth.reflectivity))
             .map(|(range_m, &reflectivity)| match *range_m {
                 Some(range_m) => PixelLight {
-                    signal_per_cycle: budget.signal_per_pulse(range_m, reflectivity),
+                    signal_per_cycle: (budget.signal_per_pulse(range_m, reflectivity))
+                        .min(MOST_SIGNAL_PER_CYCLE),
                     arrival: Time::of_flight(range_m),
-                    background_hz: budget.background_hz(reflectivity, klux) + dark_hz,
+                    background_hz: background_hz(reflectivity),
                 },
                 None => PixelLight {
                     signal_per_cycle: 0.0,
                     arrival: Time::ZERO,
-                    background_hz: budget.background_hz(SKY_REFLECTIVITY, klux) + dark_hz,
+                    background_hz: background_hz(SKY_REFLECTIVITY),
                 },
             })
             .collect()
@@ -62,6 +74,18 @@ mod tests {
             signal > 5.0 * per_bin.sqrt() * 2.0,
             "{signal} over {per_bin}"
         );
+    }
+
+    #[test]
+    fn a_blinding_surface_is_cut_off_beyond_saturation() {
+        let mut scene = Scene::outdoor();
+        scene.lidar.lens_diameter_mm = 1e200;
+        scene.lidar.pulse_energy_uj = 1e300;
+        let truth = GroundTruth::render(&scene, 4, 4);
+        for light in scene.pixel_light(&truth) {
+            assert!(light.signal_per_cycle <= MOST_SIGNAL_PER_CYCLE);
+            assert!(light.background_hz <= MOST_BACKGROUND_HZ);
+        }
     }
 
     #[test]

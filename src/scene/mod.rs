@@ -6,6 +6,7 @@
 mod camera;
 mod file;
 mod light;
+mod rules;
 mod settings;
 mod shape;
 mod truth;
