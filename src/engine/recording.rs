@@ -188,65 +188,50 @@ fn pixel_index(
     Err(InputError::at(source, line, message))
 }
 
-/// Line number and numbers of every record of a CSV text with this header.
+/// Line number and numbers of every line of a table with this header. Blank lines and lines that start with
+/// `#` are passed over.
 fn rows<'t, const N: usize>(
     source: &'t str,
     text: &'t str,
     header: [&'static str; N],
 ) -> Result<impl Iterator<Item = Result<(usize, [i64; N]), InputError>> + 't, InputError> {
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .flexible(true)
-        .has_headers(false)
-        .from_reader(text.as_bytes());
     let expected = header.join(",");
-    let mut records = reader.records();
-    let line_of = |record: &csv::StringRecord| record.position().map_or(1, |p| p.line() as usize);
-    let unreadable = move |e: csv::Error| {
-        let line = e.position().map_or(1, |p| p.line() as usize);
-        InputError::at(source, line, format!("{e}; write plain numbers"))
-    };
-    match records.next().transpose().map_err(unreadable)? {
-        Some(found) if found.iter().eq(header) => {}
-        Some(found) => {
-            let found_text: Vec<&str> = found.iter().collect();
-            let message = format!(
-                "the header is \"{}\"; it must be \"{expected}\"",
-                found_text.join(",")
-            );
-            return Err(InputError::at(source, line_of(&found), message));
+    let mut lines = text
+        .lines()
+        .enumerate()
+        .map(|(index, line)| (index + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    match lines.next() {
+        Some((_, found)) if found.split(',').map(str::trim).eq(header) => {}
+        Some((line, found)) => {
+            let message = format!("the header is {found:?}; it must be \"{expected}\"");
+            return Err(InputError::at(source, line, message));
         }
         None => {
             let message = format!("the file is empty; start it with the header \"{expected}\"");
             return Err(InputError::new(source, message));
         }
     }
-    let mut records = reader.into_records();
-    Ok(std::iter::from_fn(move || {
-        let record = match records.next()? {
-            Ok(record) => record,
-            Err(e) => return Some(Err(unreadable(e))),
-        };
-        let line = line_of(&record);
-        if record.len() != N {
-            let message = format!(
-                "{} values where \"{expected}\" needs {N}; complete or remove the line",
-                record.len()
-            );
-            return Some(Err(InputError::at(source, line, message)));
-        }
+    Ok(lines.map(move |(line, content)| {
         let mut values = [0; N];
-        for ((value, field), name) in values.iter_mut().zip(&record).zip(header) {
-            match field.parse() {
-                Ok(number) => *value = number,
-                Err(_) => {
-                    let message = format!("{name} is \"{field}\"; write a whole number");
-                    return Some(Err(InputError::at(source, line, message)));
-                }
+        let mut fields = content.split(',').map(str::trim);
+        for (value, name) in values.iter_mut().zip(header) {
+            let Some(field) = fields.next() else {
+                let message = format!("{name} is missing; a line needs \"{expected}\"");
+                return Err(InputError::at(source, line, message));
+            };
+            *value = field.parse().map_err(|_| {
+                let message = format!("{name} is {field:?}; write a whole number");
+                InputError::at(source, line, message)
+            })?;
+        }
+        match fields.next() {
+            None => Ok((line, values)),
+            Some(_) => {
+                let message = format!("too many values; a line needs \"{expected}\"");
+                Err(InputError::at(source, line, message))
             }
         }
-        Some(Ok((line, values)))
     }))
 }
 
