@@ -20,8 +20,9 @@ const WINDOW: (u32, u32) = (1600, 900);
 const NAMES_WIDTH: u32 = 250;
 /// Width of the hierarchy browser, in pixels.
 const TREE_WIDTH: u32 = 220;
-/// Pixels beside the waves that are neither names nor tree: borders, values and scroll bars.
-const BORDERS: u32 = 60;
+/// Pixels beside the waves that are neither names nor tree: borders and a scroll bar, about 80, and
+/// a little more so that the end of the interval is seen under any theme.
+const BORDERS: u32 = 100;
 
 /// How a signal's value is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -112,13 +113,23 @@ impl SaveFile {
     /// will be.
     ///
     /// # Errors
-    /// Those of `out`; a signal that `netlist` has not; a title or file name of several lines.
+    /// Those of `out`; and, before anything is written: a signal that `netlist` has not; a title or file name of several lines.
     pub fn write(&self, out: &mut dyn Write, netlist: &Netlist, vcd_name: &str) -> io::Result<()> {
+        let text = self.text(netlist, vcd_name)?;
+        out.write_all(&text)
+    }
+
+    fn text(&self, netlist: &Netlist, vcd_name: &str) -> io::Result<Vec<u8>> {
         one_line(vcd_name)?;
+        let mut out = Vec::new();
         let version = env!("CARGO_PKG_VERSION");
         writeln!(out, "[*] {} {version}", env!("CARGO_PKG_NAME"))?;
         writeln!(out, "[dumpfile] \"{vcd_name}\"")?;
-        writeln!(out, "[timestart] {}", self.zoom.0.as_fs())?;
+        // GTKWave looks for the dump from its own working folder, unless a name of the save file
+        // (any name) tells it that the dump's is relative to where it found the save file.
+        writeln!(out, "[savefile] \"save.gtkw\"")?;
+        let start = self.zoom.0.max(Time::ZERO);
+        writeln!(out, "[timestart] {}", start.as_fs())?;
         writeln!(out, "[size] {} {}", WINDOW.0, WINDOW.1)?;
         writeln!(out, "[pos] -1 -1")?;
         let marker = self.marker.map_or(-1, Time::as_fs);
@@ -140,7 +151,7 @@ impl SaveFile {
             }
             writeln!(out, "@1000200\n-{}", group.title)?;
         }
-        Ok(())
+        Ok(out)
     }
 
     /// GTKWave's measure of magnification for the interval to fill the window.
@@ -174,9 +185,11 @@ fn full_name(netlist: &Netlist, path: &str) -> io::Result<String> {
         .and_then(|scope| netlist.scopes()[scope].module.signal(name))
         .ok_or_else(|| no_such("signal", path, netlist))?;
     let top = &netlist.scopes()[0].name;
-    Ok(match signal.width() {
-        _ if !signal.is_bus => format!("{top}.{path}"),
-        width => format!("{top}.{path}[{}:0]", width - 1),
+    Ok(match (signal.is_bus, signal.width()) {
+        (false, _) => format!("{top}.{path}"),
+        // GTKWave shortens the range [0:0] when it reads the dump.
+        (true, 1) => format!("{top}.{path}[0]"),
+        (true, width) => format!("{top}.{path}[{}:0]", width - 1),
     })
 }
 
@@ -187,4 +200,89 @@ fn one_line(text: &str) -> io::Result<()> {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::netlist::{CellKind, ModuleBuilder};
+
+    fn netlist() -> Netlist {
+        let mut m = ModuleBuilder::new("leaf");
+        let bits = m.input_bus("BITS", 2);
+        let one = m.output_bus("ONE", 1);
+        m.gate_into(CellKind::And2, &bits, one[0]);
+        let leaf = m.finish().unwrap();
+        let mut m = ModuleBuilder::new("top");
+        let bits = m.input_bus("DATA", 2);
+        let z = m.output("Z");
+        m.instance("inner", &leaf, &[("BITS", &bits), ("ONE", &[z])]);
+        Netlist::elaborate(&m.finish().unwrap())
+    }
+
+    fn save(groups: Vec<Group>) -> io::Result<String> {
+        let file = SaveFile {
+            groups,
+            zoom: (Time::from_ns(1), Time::from_ns(3)),
+            marker: Some(Time::from_ns(2)),
+        };
+        let mut text = Vec::new();
+        file.write(&mut text, &netlist(), "x.vcd")?;
+        Ok(String::from_utf8(text).unwrap())
+    }
+
+    #[test]
+    fn a_save_file_is_exact() {
+        let groups = vec![
+            Group::new("Inputs", [Entry::hex("DATA"), Entry::binary("inner.BITS")]),
+            Group::new("Results", [Entry::decimal("inner.ONE"), Entry::binary("Z")]),
+        ];
+        let expected = format!(
+            "[*] guided-dtof {}\n{}{}\n{}",
+            env!("CARGO_PKG_VERSION"),
+            r#"[dumpfile] "x.vcd"
+[savefile] "save.gtkw"
+[timestart] 1000000
+[size] 1600 900
+[pos] -1 -1
+*-18.566996 2000000"#,
+            " -1".repeat(26),
+            r#"[treeopen] top.
+[treeopen] top.inner.
+[sst_width] 220
+[signals_width] 250
+[sst_expanded] 1
+@800200
+-Inputs
+@22
+top.DATA[1:0]
+@28
+top.inner.BITS[1:0]
+@1000200
+-Inputs
+@800200
+-Results
+@24
+top.inner.ONE[0]
+@28
+top.Z
+@1000200
+-Results
+"#
+        );
+        assert_eq!(save(groups).unwrap(), expected);
+    }
+
+    #[test]
+    fn a_signal_that_is_not_there_is_named() {
+        for path in ["inner.NONE", "outer.BITS", "top.Z", "DATA[1]", ""] {
+            let error = save(vec![Group::new("", [Entry::hex(path)])]).unwrap_err();
+            assert!(error.to_string().contains(&format!("`{path}`")), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_title_is_one_line() {
+        assert!(save(vec![Group::new("two\nlines", [])]).is_err());
+    }
 }
