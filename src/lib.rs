@@ -12,3 +12,4 @@ pub mod ranging;
 pub mod report;
 pub mod scene;
 pub mod units;
+pub mod waves;

@@ -1,0 +1,304 @@
+//! Whatever the simulation did, a reader of its dump sees: same names, times and values.
+//!
+//! Random circuits are driven at random; every change is recorded beside the dump. Two independent
+//! readers, Surfer's and that of the `vcd` crate, must then report for every signal exactly what
+//! the recording says, one value per instant.
+
+use std::collections::{BTreeMap, HashMap};
+use std::io::Cursor;
+use std::sync::Arc;
+
+use guided_dtof::kernel::{Drive, Kernel, Recorder, Stimulus};
+use guided_dtof::logic::Logic;
+use guided_dtof::netlist::{
+    Arc as DelayArc, CellKind, Corner, Delay, Library, Module, ModuleBuilder, NetId, Netlist,
+};
+use guided_dtof::units::Time;
+use guided_dtof::waves::{Selection, VcdWriter};
+use proptest::prelude::*;
+
+/// Times (fs) and values of one signal, first the initial one.
+type Changes = Vec<(u64, String)>;
+
+/// A divide-by-two: D = Q̄.
+fn toggle() -> Arc<Module> {
+    let mut m = ModuleBuilder::new("toggle");
+    let (clk, reset) = (m.input("CLK"), m.input("RESET"));
+    let (q, qn) = (m.output("Q"), m.output("QN"));
+    m.cell("flip", CellKind::Dffr, &[qn, clk, reset], &[q, qn]);
+    m.finish().unwrap()
+}
+
+/// A ripple counter and the parity of its outputs, which glitches while the counter ripples.
+fn counter(stages: usize) -> Arc<Module> {
+    let toggle = toggle();
+    let mut m = ModuleBuilder::new("counter");
+    let (clk, reset) = (m.input("CLK"), m.input("RESET"));
+    let count = m.output_bus("COUNT", stages);
+    let parity = m.output("PARITY");
+    let inverted = m.wire_bus("INVERTED", stages);
+    let mut clock = clk;
+    for i in 0..stages {
+        let ports = [
+            ("CLK", &[clock][..]),
+            ("RESET", &[reset]),
+            ("Q", &count[i..=i]),
+            ("QN", &inverted[i..=i]),
+        ];
+        m.instance(&format!("stage{i}"), &toggle, &ports);
+        clock = inverted[i];
+    }
+    let last = m.tree(CellKind::Xor2, &count);
+    m.gate_into(CellKind::Buf, &[last], parity);
+    m.finish().unwrap()
+}
+
+/// Two counters, probes that see a counter's bus whole, in part and turned round, and a random
+/// network of gates.
+fn chip(stages: usize, gates: &[(u8, u16, u16)]) -> Netlist {
+    let mut m = ModuleBuilder::new("probe");
+    let whole = m.input_bus("WHOLE", stages);
+    let lowest = m.input_bus("LOWEST", 1);
+    let turned = m.input_bus("TURNED", stages);
+    m.gate(CellKind::Xor2, &[whole[0], lowest[0]]);
+    m.gate(CellKind::Inv, &turned[..1]);
+    let probe = m.finish().unwrap();
+
+    let counter = counter(stages);
+    let mut m = ModuleBuilder::new("chip");
+    let (clk, reset) = (m.input("CLK"), m.input("RESET"));
+    let data = m.input_bus("DATA", 3);
+    let mut pool = [&[clk, reset], &data[..]].concat();
+    for (name, clock) in [("a", clk), ("b", data[0])] {
+        let bus = m.wire_bus(&format!("COUNT_{name}"), stages);
+        let parity = m.wire(&format!("PARITY_{name}"));
+        let ports = [
+            ("CLK", &[clock][..]),
+            ("RESET", &[reset]),
+            ("COUNT", &bus),
+            ("PARITY", &[parity]),
+        ];
+        m.instance(name, &counter, &ports);
+        let turned: Vec<_> = bus.iter().rev().copied().collect();
+        let ports = [
+            ("WHOLE", &bus[..]),
+            ("LOWEST", &bus[..1]),
+            ("TURNED", &turned),
+        ];
+        m.instance(&format!("probe_{name}"), &probe, &ports);
+        pool.extend(bus);
+        pool.push(parity);
+    }
+    let kinds = [
+        CellKind::Xor2,
+        CellKind::Nand2,
+        CellKind::Or2,
+        CellKind::Xnor2,
+    ];
+    let outputs = m.output_bus("OUT", gates.len());
+    for (&(kind, a, b), &output) in gates.iter().zip(&outputs) {
+        let inputs = [a, b].map(|i| pool[i as usize % pool.len()]);
+        m.gate_into(kinds[kind as usize % kinds.len()], &inputs, output);
+        pool.push(output);
+    }
+    Netlist::elaborate(&m.finish().unwrap())
+}
+
+/// A reset pulse, then drives at gaps from nothing (several changes in an instant) to longer than
+/// any ripple.
+fn drives(netlist: &Netlist, choices: &[(usize, u8, i64)]) -> Vec<Drive> {
+    let inputs = netlist.inputs();
+    let reset = netlist.net("RESET").unwrap();
+    let mut drives: Vec<Drive> = inputs
+        .iter()
+        .map(|&n| Drive::new(Time::ZERO, n, n == reset))
+        .collect();
+    let mut time = Time::from_ns(1);
+    drives.push(Drive::new(time, reset, false));
+    for &(net, value, gap_fs) in choices {
+        time += Time::from_fs(gap_fs);
+        let net = inputs[net % inputs.len()];
+        drives.push(Drive::new(time, net, Logic::from_bits(value)));
+    }
+    drives
+}
+
+/// Delays of 0 and 1 ps, so that many changes fall into one instant and some are undone in it.
+fn coarse_library() -> Library {
+    let mut library = Library::default();
+    for kind in CellKind::ALL {
+        let fs = if kind.is_flip_flop() { 1_000 } else { 0 };
+        let arc = DelayArc {
+            rise: Delay::fixed(fs),
+            fall: Delay::fixed(fs),
+        };
+        library.set_arcs(kind, [arc; 4]);
+    }
+    library
+}
+
+/// The dump of a simulation, and every change of every net in it.
+fn simulate(netlist: &Netlist, library: &Library, drives: Vec<Drive>) -> (String, Recorder) {
+    let end = drives.last().unwrap().time + Time::from_ns(3);
+    let drives: Box<dyn Iterator<Item = Drive> + Send> = Box::new(drives.into_iter());
+    let mut stimulus: Stimulus = drives.peekable();
+    let mut observers = (
+        Recorder::new((0..netlist.net_count()).map(NetId::new)),
+        VcdWriter::new(Vec::new(), netlist, &Selection::all().with_anonymous()).unwrap(),
+    );
+    let mut kernel = Kernel::new(netlist, library, Corner::Typ);
+    kernel.run(&mut stimulus, end, &mut observers);
+    let (recorder, waves) = observers;
+    let text = String::from_utf8(waves.finish(end).unwrap()).unwrap();
+    assert!(text.ends_with(&format!("\n#{}\n", end.as_fs())));
+    (text, recorder)
+}
+
+/// What a dump should say of `nets` (bit 0 first): one value per instant, and only changes.
+fn expected(recorder: &Recorder, nets: &[NetId]) -> Changes {
+    let mut values: HashMap<NetId, Logic> = nets.iter().map(|&n| (n, Logic::X)).collect();
+    let text = |values: &HashMap<NetId, Logic>| -> String {
+        nets.iter().rev().map(|n| values[n].to_char()).collect()
+    };
+    let mut by_time: BTreeMap<i64, Vec<(NetId, Logic)>> = BTreeMap::new();
+    for &(time, net, value) in recorder.changes() {
+        if values.contains_key(&net) {
+            by_time.entry(time.as_fs()).or_default().push((net, value));
+        }
+    }
+    let mut changes = vec![(0, text(&values))];
+    for (time, instant) in by_time {
+        values.extend(instant);
+        if changes.last().unwrap().1 != text(&values) {
+            changes.push((time as u64, text(&values)));
+        }
+    }
+    changes
+}
+
+/// Only the last of several values at one time, which a viewer settles on.
+fn settled(changes: Changes) -> Changes {
+    let mut settled: Changes = Vec::new();
+    for (time, value) in changes {
+        settled.pop_if(|(last, _)| *last == time);
+        settled.push((time, value));
+    }
+    settled
+}
+
+/// Path, whether it is a bus, and nets of every signal of every scope.
+fn signals(netlist: &Netlist) -> Vec<(Vec<String>, bool, Vec<NetId>)> {
+    let mut signals = Vec::new();
+    for (index, scope) in netlist.scopes().iter().enumerate() {
+        for signal in scope.module.signals() {
+            let path = format!("{}.{}", netlist.scope_path(index), signal.name);
+            let path = path.split('.').map(str::to_owned).collect();
+            let nets = netlist.signal_nets(scope, signal).collect();
+            signals.push((path, signal.is_bus, nets));
+        }
+    }
+    signals
+}
+
+/// Checks the dump with Surfer's reader.
+fn check_with_wellen(text: &str, netlist: &Netlist, recorder: &Recorder) {
+    let mut waves = wellen::simple::read_from_reader(Cursor::new(text.to_owned())).unwrap();
+    let mut signal_of: HashMap<Vec<NetId>, wellen::SignalRef> = HashMap::new();
+    for (path, is_bus, nets) in signals(netlist) {
+        let (name, scopes) = path.split_last().unwrap();
+        let hierarchy = waves.hierarchy();
+        let var = hierarchy.lookup_var(scopes, name.clone());
+        let var = &hierarchy[var.unwrap_or_else(|| panic!("{path:?} is not in the dump"))];
+        assert_eq!(var.length(hierarchy), Some(nets.len() as u32), "{path:?}");
+        let range = var.index().map(|i| (i.msb(), i.lsb()));
+        let wanted = is_bus.then_some((nets.len() as i64 - 1, 0));
+        assert_eq!(range, wanted, "{path:?}");
+        let signal = var.signal_ref();
+        let first = *signal_of.entry(nets.clone()).or_insert(signal);
+        assert_eq!(first, signal, "{path:?} shares its nets but not its code");
+        waves.load_signals(&[signal]);
+        let times = waves.time_table();
+        let changes = waves.get_signal(signal).unwrap().iter_changes();
+        let changes = changes
+            .map(|(time, value)| (times[time as usize], value.to_bit_string().unwrap()))
+            .collect();
+        let wanted = settled(expected(recorder, &nets));
+        assert_eq!(settled(changes), wanted, "{path:?}");
+    }
+    let mut distinct: Vec<_> = signal_of.values().collect();
+    distinct.sort();
+    distinct.dedup();
+    assert_eq!(
+        distinct.len(),
+        signal_of.len(),
+        "different nets share a code"
+    );
+}
+
+/// Checks the dump with the `vcd` crate's reader, which reports every line.
+fn check_with_vcd(text: &str, netlist: &Netlist, recorder: &Recorder) {
+    let mut parser = vcd::Parser::new(text.as_bytes());
+    let header = parser.parse_header().unwrap();
+    assert_eq!(header.timescale, Some((1, vcd::TimescaleUnit::FS)));
+    let mut lines: HashMap<vcd::IdCode, Changes> = HashMap::new();
+    let mut time = None;
+    let mut is_time_used = true;
+    for command in parser {
+        let (code, value) = match command.unwrap() {
+            vcd::Command::Timestamp(next) => {
+                assert!(time.is_none_or(|last| last < next), "time stands still");
+                assert!(is_time_used, "a time without a change");
+                time = Some(next);
+                is_time_used = false;
+                continue;
+            }
+            vcd::Command::ChangeScalar(code, value) => (code, value.to_string()),
+            vcd::Command::ChangeVector(code, value) => (code, value.to_string()),
+            _ => continue,
+        };
+        is_time_used = true;
+        lines.entry(code).or_default().push((time.unwrap(), value));
+    }
+    for (path, _, nets) in signals(netlist) {
+        let var = header.find_var(&path).expect("every signal is declared");
+        // Not settled: no line may repeat what is known.
+        assert_eq!(lines[&var.code], expected(recorder, &nets), "{path:?}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn readers_see_what_happened(
+        stages in 1usize..6,
+        gates in prop::collection::vec(any::<(u8, u16, u16)>(), 1..12),
+        choices in prop::collection::vec(
+            (
+                any::<usize>(),
+                prop_oneof![8 => 0u8..2, 1 => 2u8..4],
+                prop_oneof![Just(0), 0i64..3_000, 0i64..2_000_000],
+            ),
+            0..120,
+        ),
+        is_coarse in any::<bool>(),
+    ) {
+        let netlist = chip(stages, &gates);
+        let library = if is_coarse { coarse_library() } else { Library::default() };
+        let (text, recorder) = simulate(&netlist, &library, drives(&netlist, &choices));
+        check_with_wellen(&text, &netlist, &recorder);
+        check_with_vcd(&text, &netlist, &recorder);
+    }
+}
+
+#[test]
+fn the_same_simulation_writes_the_same_bytes() {
+    let choices: Vec<(usize, u8, i64)> =
+        (0..200).map(|i| (i, (i / 5 % 2) as u8, 400_000)).collect();
+    let run = || {
+        let netlist = chip(4, &[(0, 5, 9), (1, 3, 12)]);
+        let drives = drives(&netlist, &choices);
+        simulate(&netlist, &Library::default(), drives).0
+    };
+    assert_eq!(run(), run());
+}
