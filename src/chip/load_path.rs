@@ -114,16 +114,21 @@ pub fn row_scanner(rows: usize) -> Arc<Module> {
             &[select[row], Net::NONE],
         );
     }
-    for row in 0..rows {
-        m.gate_into(And2, &[write, select[row]], load[row]);
+    for (&selected, &load) in select.iter().zip(&load) {
+        m.gate_into(And2, &[write, selected], load);
     }
     finished(m.finish())
+}
+
+/// The instance name of a macropixel's memory in [`with_memories`].
+pub fn memory_name(row: usize, col: usize) -> String {
+    format!("memory_r{row}_c{col}")
 }
 
 /// The load path with nothing but the P-counters' memories behind it, for loading a whole array at
 /// gate level without its pixels.
 ///
-/// Ports: COUNTER_INITS, LOAD_CLK, LOAD_ENABLE, RESETB; instance `memory_r{row}_c{col}` holds MEMORY.
+/// Ports: COUNTER_INITS, LOAD_CLK, LOAD_ENABLE, RESETB; instances are named by [`memory_name`].
 pub fn with_memories(rows: usize, cols: usize, bits: usize) -> Arc<Module> {
     let memory = p_counter::memory(bits);
     let mut m = ModuleBuilder::new("load_path");
@@ -134,14 +139,14 @@ pub fn with_memories(rows: usize, cols: usize, bits: usize) -> Arc<Module> {
     let memory_reset = m.wire("MEMORY_RESET");
     m.gate_into(Inv, &[resetb], memory_reset);
     let (row_bits, load) = place(&mut m, rows, cols, bits, [serial, clk, enable, resetb]);
-    for row in 0..rows {
+    for (row, &load) in load.iter().enumerate() {
         for col in 0..cols {
             m.instance(
-                &format!("memory_r{row}_c{col}"),
+                &memory_name(row, col),
                 &memory,
                 &[
                     ("COUNTER_INIT", &row_bits[col * bits..][..bits]),
-                    ("MEMORY_LOAD", &[load[row]]),
+                    ("MEMORY_LOAD", &[load]),
                     ("MEMORY_RESET", &[memory_reset]),
                 ],
             );

@@ -11,14 +11,16 @@
 
 mod cycle;
 mod gate;
+pub mod load;
 pub mod recording;
 mod stimulus;
 mod testbench;
+pub mod waveform;
 mod window;
 
 pub use cycle::Cycle;
 pub use gate::{Gate, GateSimulation};
-pub use stimulus::{Pins, Schedule, StimulusPlan};
+pub use stimulus::{LoadPins, Pins, Schedule, StimulusPlan};
 pub use testbench::export_verilog;
 pub use window::Window;
 

@@ -13,11 +13,13 @@
 //!
 //! The same drives go into the event kernel and into the exported Verilog testbench.
 
+use bitvec::slice::BitSlice;
+
 use crate::chip::{Exposure, Mode, SPADS, SensorConfig, THRESHOLD_BITS, load_path};
 use crate::kernel::{Drive, Stimulus, clock, merge};
 use crate::netlist::{NetId, Netlist};
 use crate::photon::SpadEvent;
-use crate::units::Time;
+use crate::units::{Frequency, Time};
 
 /// When the chip comes out of reset.
 const RESET_END: Time = Time::from_ns(2);
@@ -26,20 +28,74 @@ const LOAD_START: Time = Time::from_ns(5);
 /// Quiet time between load and exposure, and for counts to ripple through after it.
 const SETTLING: Time = Time::from_ns(20);
 
+/// The pins that start values come in through.
+#[derive(Debug, Clone, Copy)]
+pub struct LoadPins {
+    resetb: NetId,
+    clk: NetId,
+    enable: NetId,
+    serial: NetId,
+}
+
+impl LoadPins {
+    /// Finds the pins of an elaborated load path or sensor.
+    ///
+    /// # Panics
+    /// When the netlist is neither.
+    pub fn of(netlist: &Netlist) -> Self {
+        let pin = |name| {
+            let net = netlist.net(name);
+            net.unwrap_or_else(|| panic!("the netlist has no pin {name}"))
+        };
+        LoadPins {
+            resetb: pin("RESETB"),
+            clk: pin("LOAD_CLK"),
+            enable: pin("LOAD_ENABLE"),
+            serial: pin("COUNTER_INITS"),
+        }
+    }
+}
+
+/// Power-up and serial load: the bits of `stream` on COUNTER_INITS, and the time at which they are in.
+pub fn load_stimulus<'a>(
+    pins: LoadPins,
+    clock: Frequency,
+    stream: &'a BitSlice,
+) -> (Time, Stimulus<'a>) {
+    let bits = stream.len() as i64;
+    let half = move |k| LOAD_START + clock.half_periods(k);
+    let end = half(2 * bits + 1);
+    let enabled = Time::from_fs((RESET_END + LOAD_START).as_fs() / 2);
+    let control = [
+        Drive::new(Time::ZERO, pins.resetb, false),
+        Drive::new(Time::ZERO, pins.enable, false),
+        Drive::new(Time::ZERO, pins.clk, false),
+        Drive::new(Time::ZERO, pins.serial, false),
+        Drive::new(RESET_END, pins.resetb, true),
+        Drive::new(enabled, pins.enable, true),
+        Drive::new(end, pins.enable, false),
+    ];
+    // Data change with falling edges and are taken by rising ones.
+    let edges = (0..=2 * bits).flat_map(move |k| {
+        let edge = Drive::new(half(k), pins.clk, k % 2 == 1);
+        let data = (k % 2 == 0 && k < 2 * bits)
+            .then(|| Drive::new(half(k), pins.serial, stream[k as usize / 2]));
+        std::iter::once(edge).chain(data)
+    });
+    (end, merge([boxed(control.into_iter()), boxed(edges)]))
+}
+
 /// The sensor's input nets.
 #[derive(Debug, Clone)]
 pub struct Pins {
+    load: LoadPins,
     clk: NetId,
     stop: NetId,
-    resetb: NetId,
     enable: NetId,
     histogram_clear: NetId,
     conventional: NetId,
     event_type: Vec<NetId>,
     threshold: Vec<NetId>,
-    load_clk: NetId,
-    load_enable: NetId,
-    serial: NetId,
     spad_raw: Vec<NetId>,
 }
 
@@ -56,17 +112,14 @@ impl Pins {
         };
         let pin = |name| bus(name)[0];
         Pins {
+            load: LoadPins::of(netlist),
             clk: pin("CLK"),
             stop: pin("STOP"),
-            resetb: pin("RESETB"),
             enable: pin("ENABLE"),
             histogram_clear: pin("HISTOGRAM_CLEAR"),
             conventional: pin("CONVENTIONAL"),
             event_type: bus("TYPE"),
             threshold: bus("THRESHOLD"),
-            load_clk: pin("LOAD_CLK"),
-            load_enable: pin("LOAD_ENABLE"),
-            serial: pin("COUNTER_INITS"),
             spad_raw: bus("SPAD_RAW"),
         }
     }
@@ -142,7 +195,7 @@ impl<'a> StimulusPlan<'a> {
     pub fn stimulus(&'a self, pins: &Pins) -> Stimulus<'a> {
         merge([
             boxed(self.control(pins).into_iter()),
-            boxed(self.load(pins)),
+            boxed(load_stimulus(pins.load, self.config.load_clock(), &self.stream).1),
             boxed(self.clk(pins)),
             boxed(self.stop(pins)),
             boxed(self.spads(pins)),
@@ -154,10 +207,8 @@ impl<'a> StimulusPlan<'a> {
         let mut drives = Vec::new();
         let mut drive = |time, net, value: bool| drives.push(Drive::new(time, net, value));
         let start = Time::ZERO;
-        drive(start, pins.resetb, false);
         drive(start, pins.histogram_clear, true);
         drive(start, pins.enable, false);
-        drive(start, pins.load_enable, false);
         drive(start, pins.conventional, config.mode == Mode::Conventional);
         for (bit, &net) in pins.event_type.iter().enumerate() {
             drive(start, net, config.event_type.code() >> bit & 1 == 1);
@@ -168,10 +219,6 @@ impl<'a> StimulusPlan<'a> {
         for &net in &pins.spad_raw {
             drive(start, net, false);
         }
-        drive(RESET_END, pins.resetb, true);
-        let load_enable = Time::from_fs((RESET_END + LOAD_START).as_fs() / 2);
-        drive(load_enable, pins.load_enable, true);
-        drive(schedule.load_end, pins.load_enable, false);
         let before = Time::from_fs((schedule.load_end + schedule.origin).as_fs() / 2);
         drive(before, pins.histogram_clear, false);
         drive(before, pins.enable, true);
@@ -182,25 +229,6 @@ impl<'a> StimulusPlan<'a> {
             false,
         );
         drives
-    }
-
-    fn load(&'a self, pins: &Pins) -> impl Iterator<Item = Drive> + Send + 'a {
-        let clock = self.config.load_clock();
-        let (clk, serial) = (pins.load_clk, pins.serial);
-        let bits = self.stream.len() as i64;
-        let idle = [
-            Drive::new(Time::ZERO, clk, false),
-            Drive::new(Time::ZERO, serial, false),
-        ];
-        // Data change with falling edges and are taken by rising ones.
-        let edges = (0..=2 * bits).flat_map(move |k| {
-            let time = LOAD_START + clock.half_periods(k);
-            let edge = Drive::new(time, clk, k % 2 == 1);
-            let data = (k % 2 == 0 && k < 2 * bits)
-                .then(|| Drive::new(time, serial, self.stream[k as usize / 2]));
-            std::iter::once(edge).chain(data)
-        });
-        idle.into_iter().chain(edges)
     }
 
     fn clk(&self, pins: &Pins) -> impl Iterator<Item = Drive> + Send + 'a {

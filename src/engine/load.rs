@@ -1,0 +1,59 @@
+//! Loads a whole array at gate level: serial bits into the netlist of deserialiser, row scanner and memories.
+
+use super::stimulus::{LoadPins, load_stimulus};
+use crate::chip::{SensorConfig, load_path};
+use crate::kernel::{Kernel, Observer, Statistics};
+use crate::netlist::{Library, Netlist};
+use crate::units::Time;
+
+/// What the load path did with a set of start values.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Load {
+    /// Start values in the memories, row-major; `None` where a bit is unknown.
+    pub starts: Vec<Option<u16>>,
+    /// From the first rising edge of LOAD_CLK to the end of the load.
+    pub duration: Time,
+    /// What the simulation did.
+    pub statistics: Statistics,
+}
+
+/// Sends `starts` (row-major, one for every macropixel) through the serial pin; `observer` sees the netlist
+/// that `netlist` elaborates.
+pub fn load<O: Observer>(
+    config: &SensorConfig,
+    netlist: &Netlist,
+    starts: &[u16],
+    observer: &mut O,
+) -> Load {
+    debug_assert_eq!(starts.len(), config.pixels());
+    let stream = load_path::stream(starts, config.cols, config.counter_bits);
+    let (end, mut stimulus) = load_stimulus(LoadPins::of(netlist), config.load_clock(), &stream);
+    let mut kernel = Kernel::new(netlist, &Library::default(), config.corner);
+    let settled = end + config.load_clock().periods(1);
+    kernel.run(&mut stimulus, settled, observer);
+    let memory = |row, col| {
+        let path = format!("{}.MEMORY", load_path::memory_name(row, col));
+        let nets = netlist
+            .signal(&path)
+            .expect("every macropixel has a memory");
+        kernel.number(&nets).map(|code| code as u16)
+    };
+    let starts = (0..config.rows)
+        .flat_map(|row| (0..config.cols).map(move |col| (row, col)))
+        .map(|(row, col)| memory(row, col))
+        .collect();
+    Load {
+        starts,
+        duration: config.load_time(),
+        statistics: kernel.statistics(),
+    }
+}
+
+/// The load path of this sensor, elaborated.
+pub fn load_netlist(config: &SensorConfig) -> Netlist {
+    Netlist::elaborate(&load_path::with_memories(
+        config.rows,
+        config.cols,
+        config.counter_bits,
+    ))
+}
