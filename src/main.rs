@@ -1,1 +1,7 @@
-fn main() {}
+//! `gdtof`: the command line of guided-dtof.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    guided_dtof::cli::main()
+}

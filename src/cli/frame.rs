@@ -1,0 +1,325 @@
+//! `gdtof frame`: the main job.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use super::SensorArgs;
+use crate::chip::SensorConfig;
+use crate::engine::recording::check_exposure;
+use crate::files::{InputError, OutputFile, create_folder};
+use crate::guide::GuideMap;
+use crate::ranging::PeakOptions;
+use crate::report::{Table, depth_png, write_npy_u16};
+use crate::scene::Scene;
+use crate::system::{
+    EngineKind, Frame, FrameSettings, PhaseTimes, PixelDepth, Probe, Summary, take_frame,
+};
+
+/// Arguments of `gdtof frame`.
+#[derive(Args)]
+pub struct FrameArgs {
+    #[command(flatten)]
+    sensor: SensorArgs,
+    /// Scene (TOML); without it, a street on a bright day.
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+    /// Folder for the results; it is made if need be.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+    /// CLK periods in a laser cycle.
+    #[arg(long, value_name = "P", default_value_t = 520)]
+    stop_periods: u32,
+    /// Laser cycles of the exposure.
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    laser_cycles: u32,
+    /// Seed of photons and stereo errors.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Engine of the macropixels that are not probed.
+    #[arg(long, value_enum, default_value_t)]
+    engine: EngineKind,
+    /// Macropixel to run at gate level with its waveform, as row,col or `none`; may be repeated. Without
+    /// it, the guided macropixel nearest to the centre.
+    #[arg(long, value_name = "R,C")]
+    probe: Vec<String>,
+    /// Print frame.json instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, unwritable output, and what [`take_frame`] reports.
+pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
+    let sensor = args.sensor.read()?;
+    let scene = match &args.scene {
+        Some(path) => Scene::load(path)?,
+        None => Scene::outdoor(),
+    };
+    let exposure = check_exposure(&sensor, args.stop_periods, args.laser_cycles)?;
+    let chosen = chosen_probes(&args.probe, &sensor)?;
+    create_folder(&args.out)?;
+    let probe_at = |(row, col)| Probe {
+        row,
+        col,
+        vcd: args.out.join(format!("probe_r{row}_c{col}.vcd")),
+    };
+    let settings = FrameSettings {
+        sensor,
+        scene,
+        exposure,
+        seed: args.seed,
+        engine: args.engine,
+        peak: PeakOptions::default(),
+    };
+    let progress = ProgressBar::new(settings.sensor.pixels() as u64).with_style(
+        ProgressStyle::with_template("exposing {bar:40} {pos}/{len} macropixels, {eta} left")?,
+    );
+    let frame = take_frame(
+        &settings,
+        |guide| {
+            progress.finish_and_clear();
+            let pixels = match chosen {
+                Some(pixels) => pixels,
+                None => nearest_guided(guide).into_iter().collect(),
+            };
+            pixels.into_iter().map(probe_at).collect()
+        },
+        || progress.inc(1),
+    )?;
+
+    let report = Report::new(args, &settings.sensor, &frame);
+    write_results(&args.out, &frame, &report)?;
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&report)?);
+    } else {
+        print!("{}", table(args, &frame));
+    }
+    Ok(())
+}
+
+/// `None` where the choice is left to the guide.
+fn chosen_probes(
+    texts: &[String],
+    sensor: &SensorConfig,
+) -> Result<Option<Vec<(usize, usize)>>, InputError> {
+    if texts.is_empty() {
+        return Ok(None);
+    }
+    let mut probes = Vec::new();
+    for text in texts.iter().filter(|text| *text != "none") {
+        let place = text
+            .split_once(',')
+            .and_then(|(row, col)| Some((row.trim().parse().ok()?, col.trim().parse().ok()?)));
+        match place {
+            Some((row, col)) if row < sensor.rows && col < sensor.cols => {
+                if !probes.contains(&(row, col)) {
+                    probes.push((row, col));
+                }
+            }
+            Some((row, col)) => {
+                let message = format!(
+                    "macropixel ({row}, {col}) is outside the {}x{} array; give rows 0 to {} and columns 0 to {}",
+                    sensor.rows,
+                    sensor.cols,
+                    sensor.rows - 1,
+                    sensor.cols - 1
+                );
+                return Err(InputError::new("--probe", message));
+            }
+            None => {
+                let message = format!("{text:?} is no macropixel; give row,col such as 10,20");
+                return Err(InputError::new("--probe", message));
+            }
+        }
+    }
+    Ok(Some(probes))
+}
+
+fn nearest_guided(guide: &GuideMap) -> Option<(usize, usize)> {
+    let cols = guide.cols as usize;
+    let places = guide
+        .range_m
+        .iter()
+        .enumerate()
+        .filter(|(_, r)| r.is_some());
+    places
+        .map(|(pixel, _)| (pixel / cols, pixel % cols))
+        .min_by_key(|&(row, col)| {
+            let off = |at: usize, size: u32| (2 * at as i64 + 1 - size as i64).pow(2);
+            off(row, guide.rows) + off(col, guide.cols)
+        })
+}
+
+/// The contents of frame.json.
+#[derive(Serialize)]
+struct Report<'a> {
+    version: &'static str,
+    scene: String,
+    sensor: &'a SensorConfig,
+    stop_periods: u32,
+    laser_cycles: u32,
+    seed: u64,
+    engine: EngineKind,
+    summary: Summary,
+    photons: u64,
+    photons_lost_to_dead_time: u64,
+    load_bits: usize,
+    load_time_s: f64,
+    exposure_time_s: f64,
+    exposure_run_time_s: f64,
+    run_time_s: f64,
+    run_times: PhaseTimes,
+    probes: &'a [(usize, usize)],
+    histograms_shape: [usize; 3],
+    macropixels: &'a [PixelDepth],
+}
+
+impl<'a> Report<'a> {
+    fn new(args: &FrameArgs, sensor: &'a SensorConfig, frame: &'a Frame) -> Self {
+        Report {
+            version: env!("CARGO_PKG_VERSION"),
+            scene: scene_name(args),
+            sensor,
+            stop_periods: args.stop_periods,
+            laser_cycles: args.laser_cycles,
+            seed: args.seed,
+            engine: args.engine,
+            summary: frame.summary(),
+            photons: frame.photons,
+            photons_lost_to_dead_time: frame.lost_to_dead_time,
+            load_bits: frame.load_bits,
+            load_time_s: frame.load_time.as_s(),
+            exposure_time_s: frame.exposure_time.as_s(),
+            exposure_run_time_s: frame.times.exposure_s,
+            run_time_s: frame.times.total_s(),
+            run_times: frame.times,
+            probes: &frame.probes,
+            histograms_shape: [frame.rows, frame.cols, frame.bins],
+            macropixels: &frame.pixels,
+        }
+    }
+}
+
+fn scene_name(args: &FrameArgs) -> String {
+    match &args.scene {
+        Some(path) => path.display().to_string(),
+        None => "built-in street".to_owned(),
+    }
+}
+
+fn write_results(out: &Path, frame: &Frame, report: &Report<'_>) -> anyhow::Result<()> {
+    let shape = report.histograms_shape.map(|n| n as u64);
+    write_npy_u16(&out.join("histograms.npy"), &shape, &frame.histograms)?;
+    let depth_m = frame.depth_m();
+    let scale = (512 / frame.rows.max(frame.cols)).max(1);
+    depth_png(
+        &out.join("depth.png"),
+        frame.rows,
+        frame.cols,
+        &depth_m,
+        depth_range(&depth_m),
+        &format!("guided dToF depth, {} laser cycles", report.laser_cycles),
+        scale,
+    )?;
+    OutputFile::write_with(&out.join("frame.json"), |w| {
+        serde_json::to_writer(&mut *w, report)?;
+        writeln!(w)
+    })?;
+    Ok(())
+}
+
+/// Shortest and longest depth, a little apart even if all are the same.
+fn depth_range(depth_m: &[Option<f32>]) -> (f32, f32) {
+    let known = || depth_m.iter().flatten().copied();
+    let shortest = known().fold(f32::INFINITY, f32::min);
+    let longest = known().fold(f32::NEG_INFINITY, f32::max);
+    if shortest.is_finite() && longest.is_finite() {
+        (shortest.floor(), longest.ceil().max(shortest.floor() + 1.0))
+    } else {
+        (0.0, 1.0)
+    }
+}
+
+fn table(args: &FrameArgs, frame: &Frame) -> Table {
+    let summary = frame.summary();
+    let metres = |value: Option<f64>| match value {
+        Some(m) => format!("{m:.3} m"),
+        None => "-".to_owned(),
+    };
+    let of = |part: usize, whole: usize| format!("{part} of {whole}");
+    let mut table = Table::new(format!("Frame of {}", scene_name(args)))
+        .row(
+            "macropixels with a target",
+            of(summary.with_target, summary.pixels),
+        )
+        .row("guided", of(summary.guided, summary.pixels))
+        .row("target in window", of(summary.in_window, summary.guided))
+        .row("RMS error, target in window", metres(summary.rms_error_m))
+        .row(
+            "median absolute error",
+            metres(summary.median_absolute_error_m),
+        )
+        .row(
+            "RMS error of the guide there",
+            metres(summary.guide_rms_error_m),
+        );
+    let lost = 100.0 * frame.lost_to_dead_time as f64 / frame.photons.max(1) as f64;
+    table.push("photons", frame.photons);
+    table.push("lost to dead time", format!("{lost:.2} %"));
+    table.push(
+        "serial load",
+        format!("{} bits, {}", frame.load_bits, frame.load_time),
+    );
+    table.push("exposure", frame.exposure_time);
+    for (row, col) in &frame.probes {
+        let agrees = format!("agrees with {:?} engine", args.engine).to_lowercase();
+        table.push(format!("gate level ({row}, {col})"), agrees);
+    }
+    let times = &frame.times;
+    table.push(
+        "run time: load, gate level",
+        format!("{:.2} s", times.load_s),
+    );
+    table.push(
+        "run time: photons and engine",
+        format!("{:.2} s", times.exposure_s),
+    );
+    table.push(
+        "run time: probes, gate level",
+        format!("{:.2} s", times.probes_s),
+    );
+    table.push("run time: all", format!("{:.2} s", times.total_s()));
+    let names = ["depth.png", "histograms.npy", "frame.json"].map(String::from);
+    let waves = frame
+        .probes
+        .iter()
+        .map(|(r, c)| format!("probe_r{r}_c{c}.vcd"));
+    let names: Vec<String> = names.into_iter().chain(waves).collect();
+    table.push(format!("in {}", args.out.display()), names.join(" "));
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn probes_are_checked() {
+        let sensor = SensorConfig::default();
+        let parse = |texts: &[&str]| {
+            let texts: Vec<String> = texts.iter().map(|t| t.to_string()).collect();
+            chosen_probes(&texts, &sensor)
+        };
+        assert_eq!(parse(&[]).unwrap(), None);
+        assert_eq!(parse(&["none"]).unwrap(), Some(vec![]));
+        assert_eq!(parse(&["10,20", "10, 20"]).unwrap(), Some(vec![(10, 20)]));
+        for bad in ["64,0", "0,64", "x", "1", "1,2,3", "-1,0"] {
+            assert!(parse(&[bad]).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! The command line. Bad input ends with one sentence on standard error and exit status 2; anything
+//! else that goes wrong with exit status 1.
+
+mod export;
+mod frame;
+mod replay;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::chip::SensorConfig;
+use crate::engine::EngineError;
+use crate::files::InputError;
+use crate::system::FrameError;
+
+/// A guided direct time-of-flight lidar chip, simulated down to gates and flip-flops.
+#[derive(Parser)]
+#[command(name = "gdtof", version, about)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Take one guided frame of a scene: depth map, histograms, waveform.
+    Frame(frame::FrameArgs),
+    /// Run recorded SPAD events through the chip.
+    Replay(replay::ReplayArgs),
+    /// Write the chip for other tools.
+    #[command(subcommand)]
+    Export(export::ExportCommand),
+}
+
+/// Which sensor.
+#[derive(Args)]
+struct SensorArgs {
+    /// Sensor configuration (TOML); without it, the QuantIC4x4.
+    #[arg(long, value_name = "FILE")]
+    sensor: Option<PathBuf>,
+    /// Macropixel rows, instead of the configuration's.
+    #[arg(long, value_name = "R")]
+    rows: Option<usize>,
+    /// Macropixel columns, instead of the configuration's.
+    #[arg(long, value_name = "C")]
+    cols: Option<usize>,
+}
+
+impl SensorArgs {
+    fn read(&self) -> Result<SensorConfig, InputError> {
+        let mut config = match &self.sensor {
+            Some(path) => SensorConfig::read(path)?,
+            None => SensorConfig::default(),
+        };
+        config.rows = self.rows.unwrap_or(config.rows);
+        config.cols = self.cols.unwrap_or(config.cols);
+        config
+            .check()
+            .map_err(|(key, message)| InputError::new(format!("--{key}"), message))?;
+        Ok(config)
+    }
+}
+
+/// Runs the command line of this process.
+pub fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Frame(args) => frame::run(&args),
+        Command::Replay(args) => replay::run(&args),
+        Command::Export(command) => export::run(&command),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("gdtof: {error:#}");
+            ExitCode::from(if is_bad_input(&error) { 2 } else { 1 })
+        }
+    }
+}
+
+fn is_bad_input(error: &anyhow::Error) -> bool {
+    error.is::<InputError>()
+        || matches!(error.downcast_ref(), Some(EngineError::Race(_)))
+        || matches!(
+            error.downcast_ref(),
+            Some(FrameError::Input(_) | FrameError::Engine(EngineError::Race(_)))
+        )
+}

@@ -1,0 +1,217 @@
+//! `gdtof replay`: recorded SPAD events in, histograms out.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+
+use super::SensorArgs;
+use crate::chip::{Exposure, SensorConfig};
+use crate::engine::recording::{Recording, check_exposure, read_events, read_starts};
+use crate::engine::{EngineError, GateSimulation, waveform};
+use crate::files::{InputError, OutputFile};
+use crate::photon::SpadEvent;
+use crate::report::write_npy_u16;
+use crate::system::EngineKind;
+
+/// What is replayed: shared with `gdtof export verilog`.
+#[derive(Args)]
+pub struct StimulusArgs {
+    #[command(flatten)]
+    sensor: SensorArgs,
+    /// Start values: CSV `row,col,init`, one line for every macropixel.
+    #[arg(long, value_name = "FILE")]
+    inits: PathBuf,
+    /// Rising edges of SPAD_RAW: CSV `time_fs,row,col,spad` from the first rising edge of STOP.
+    #[arg(long, value_name = "FILE")]
+    events: PathBuf,
+    /// CLK periods in a laser cycle.
+    #[arg(long, value_name = "P")]
+    stop_periods: u32,
+    /// Laser cycles of the exposure.
+    #[arg(long, value_name = "N")]
+    laser_cycles: u32,
+}
+
+/// What [`StimulusArgs`] name, read and checked.
+pub struct Stimuli {
+    /// The chip.
+    pub config: SensorConfig,
+    /// Its clocks.
+    pub exposure: Exposure,
+    /// Start values, row-major.
+    pub starts: Vec<u16>,
+    /// SPAD pulses.
+    pub recording: Recording,
+}
+
+impl StimulusArgs {
+    /// Reads and checks everything.
+    ///
+    /// # Errors
+    /// One sentence about the first thing that cannot be.
+    pub fn read(&self) -> Result<Stimuli, InputError> {
+        let config = self.sensor.read()?;
+        let exposure = check_exposure(&config, self.stop_periods, self.laser_cycles)?;
+        let starts = read_starts(&self.inits, &config)?;
+        let recording = read_events(&self.events, &config, &exposure)?;
+        let dropped = [
+            (
+                recording.lost_to_dead_time,
+                "fell into the dead time of their SPAD",
+            ),
+            (
+                recording.after_the_end,
+                "came after the end of the exposure",
+            ),
+        ];
+        for (count, what) in dropped.into_iter().filter(|(count, _)| *count > 0) {
+            eprintln!(
+                "gdtof: {count} of {} events {what} and were not used",
+                recording.read
+            );
+        }
+        Ok(Stimuli {
+            config,
+            exposure,
+            starts,
+            recording,
+        })
+    }
+}
+
+impl Stimuli {
+    /// Pulses of every macropixel, row-major.
+    pub fn pulses(&self) -> Vec<&[SpadEvent]> {
+        self.recording.pulses.iter().map(Vec::as_slice).collect()
+    }
+}
+
+/// Arguments of `gdtof replay`.
+#[derive(Args)]
+pub struct ReplayArgs {
+    #[command(flatten)]
+    stimuli: StimulusArgs,
+    /// Engine that runs the chip.
+    #[arg(long, value_enum, default_value_t)]
+    engine: EngineKind,
+    /// Histograms: `.npy` (uint16, rows × cols × bins) or `.csv` (row,col,bin,count). Without it, CSV on
+    /// standard output.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Waveform of every named net (needs --engine gate); a GTKWave save file goes beside it.
+    #[arg(long, value_name = "FILE")]
+    vcd: Option<PathBuf>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, unwritable output, and configurations that the engine refuses.
+pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
+    let format = match &args.out {
+        None => Format::Csv,
+        Some(path) => Format::of(path)?,
+    };
+    if let (Some(vcd), true) = (&args.vcd, args.engine != EngineKind::Gate) {
+        let message = "only the gate engine has waveforms; add --engine gate or leave --vcd out";
+        return Err(InputError::new(format!("--vcd {}", vcd.display()), message).into());
+    }
+    let stimuli = args.stimuli.read()?;
+    let histograms = match args.engine {
+        EngineKind::Gate => replay_gates(&stimuli, args.vcd.as_deref())?,
+        kind => replay_models(&stimuli, kind)?,
+    };
+    write(&stimuli.config, &histograms, args.out.as_deref(), format)
+}
+
+fn replay_gates(stimuli: &Stimuli, vcd: Option<&Path>) -> anyhow::Result<Vec<Vec<u16>>> {
+    let config = &stimuli.config;
+    let mut simulation = GateSimulation::new(
+        config,
+        &stimuli.exposure,
+        (0, 0),
+        (config.rows, config.cols),
+        &stimuli.starts,
+        &stimuli.pulses(),
+    );
+    match vcd {
+        None => simulation.run(&mut ()),
+        Some(vcd) => {
+            let start = *stimuli.starts.first().expect("a sensor has a macropixel");
+            let view_end = stimuli.exposure.clock.periods(start as i64 + 8);
+            waveform::record(&mut simulation, vcd, &[(0, 0)], view_end)?;
+        }
+    }
+    Ok(simulation.histograms()?)
+}
+
+fn replay_models(stimuli: &Stimuli, kind: EngineKind) -> anyhow::Result<Vec<Vec<u16>>> {
+    let engine = kind.build(&stimuli.config, &stimuli.exposure);
+    let progress = ProgressBar::new(stimuli.starts.len() as u64).with_style(
+        ProgressStyle::with_template("replaying {bar:40} {pos}/{len} macropixels")?,
+    );
+    let histograms: Result<Vec<_>, EngineError> = stimuli
+        .starts
+        .par_iter()
+        .zip(&stimuli.recording.pulses)
+        .map(|(&start, pulses)| {
+            let histogram = engine.histogram(start, pulses);
+            progress.inc(1);
+            histogram
+        })
+        .collect();
+    progress.finish_and_clear();
+    Ok(histograms?)
+}
+
+#[derive(Clone, Copy)]
+enum Format {
+    Npy,
+    Csv,
+}
+
+impl Format {
+    fn of(path: &Path) -> Result<Self, InputError> {
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("npy") => Ok(Format::Npy),
+            Some("csv") => Ok(Format::Csv),
+            _ => {
+                let message = "is neither .npy nor .csv; choose one of the two";
+                Err(InputError::new(
+                    format!("--out {}", path.display()),
+                    message,
+                ))
+            }
+        }
+    }
+}
+
+fn write(
+    config: &SensorConfig,
+    histograms: &[Vec<u16>],
+    out: Option<&Path>,
+    format: Format,
+) -> anyhow::Result<()> {
+    let csv = |w: &mut dyn Write| {
+        writeln!(w, "row,col,bin,count")?;
+        for (pixel, histogram) in histograms.iter().enumerate() {
+            let (row, col) = (pixel / config.cols, pixel % config.cols);
+            for (bin, count) in histogram.iter().enumerate() {
+                writeln!(w, "{row},{col},{bin},{count}")?;
+            }
+        }
+        Ok(())
+    };
+    match (out, format) {
+        (None, _) => csv(&mut std::io::stdout().lock())?,
+        (Some(path), Format::Csv) => OutputFile::write_with(path, csv)?,
+        (Some(path), Format::Npy) => {
+            let shape = [config.rows, config.cols, config.bins].map(|n| n as u64);
+            write_npy_u16(path, &shape, &histograms.concat())?;
+        }
+    }
+    Ok(())
+}

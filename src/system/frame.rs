@@ -1,0 +1,293 @@
+//! One guided frame, from the scene to a depth map (thesis 6.3.3, Fig. 97).
+//!
+//! ```text
+//!   scene ─► ground truth ─► light per macropixel ─► photon stream ─────────┐
+//!     └────► stereo guide ─► start values ─► serial stream ─► load path ─► exposure ─► histograms ─► depth
+//!                                            (gate level)    (any engine, probes also at gate level)
+//! ```
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use super::result::{Frame, PhaseTimes, PixelDepth};
+use crate::chip::{Exposure, SensorConfig, WindowLaw};
+use crate::engine::{Cycle, Engine, EngineError, Gate, GateSimulation, Window, load, waveform};
+use crate::files::InputError;
+use crate::guide::GuideMap;
+use crate::photon::{PixelPhotons, StreamConfig, pixel_events};
+use crate::ranging::{PeakOptions, interpolate};
+use crate::scene::{GroundTruth, Scene};
+use crate::units::Time;
+
+/// Which engine runs the macropixels that are not probed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum EngineKind {
+    /// Event-driven simulation of the netlist with its delays.
+    Gate,
+    /// The blocks' reference models, every CLK period.
+    Cycle,
+    /// The blocks' reference models, only the CLK periods a window can see.
+    #[default]
+    Window,
+}
+
+impl EngineKind {
+    /// The engine, for a sensor and an exposure.
+    pub fn build<'a>(
+        self,
+        config: &'a SensorConfig,
+        exposure: &'a Exposure,
+    ) -> Box<dyn Engine + 'a> {
+        match self {
+            EngineKind::Gate => Box::new(Gate::new(config, exposure)),
+            EngineKind::Cycle => Box::new(Cycle::new(config, exposure)),
+            EngineKind::Window => Box::new(Window::new(config, exposure)),
+        }
+    }
+}
+
+/// A macropixel to run at gate level as well, with its waveform.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Probe {
+    /// Row in the array.
+    pub row: usize,
+    /// Column in the array.
+    pub col: usize,
+    /// Where its VCD goes; the GTKWave save file goes beside it.
+    pub vcd: PathBuf,
+}
+
+/// Everything a frame depends on.
+#[derive(Debug, Clone)]
+pub struct FrameSettings {
+    /// The chip.
+    pub sensor: SensorConfig,
+    /// The world, the optics and the camera pair.
+    pub scene: Scene,
+    /// The exposure of `sensor`.
+    pub exposure: Exposure,
+    /// Seed of photons and stereo errors.
+    pub seed: u64,
+    /// Engine of the macropixels.
+    pub engine: EngineKind,
+    /// Depth from histograms.
+    pub peak: PeakOptions,
+}
+
+/// Why there is no frame.
+#[derive(Debug, thiserror::Error)]
+pub enum FrameError {
+    /// Something the user gave cannot be.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// The engine cannot run this configuration.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    /// The load path left other start values in the array than were sent.
+    #[error(
+        "the load path netlist left {found:?} in macropixel ({row}, {col}) where {sent} was sent"
+    )]
+    Load {
+        /// Row in the array.
+        row: usize,
+        /// Column in the array.
+        col: usize,
+        /// Start value sent.
+        sent: u16,
+        /// Start value found, if known.
+        found: Option<u16>,
+    },
+    /// A probed macropixel counts differently at gate level.
+    #[error(
+        "macropixel ({row}, {col}) counts {gate:?} at gate level and {model:?} on the {engine:?} engine"
+    )]
+    Disagreement {
+        /// Row in the array.
+        row: usize,
+        /// Column in the array.
+        col: usize,
+        /// Engine of the frame.
+        engine: EngineKind,
+        /// Counts at gate level.
+        gate: Vec<u16>,
+        /// Counts of the engine.
+        model: Vec<u16>,
+    },
+}
+
+/// Takes a frame. `probes` chooses the macropixels to run at gate level once the guide is known;
+/// `exposed` is called after every macropixel.
+///
+/// # Errors
+/// Configurations that the engine refuses, waveforms that cannot be written, and disagreement between
+/// netlist and models, which would be a fault of this program.
+pub fn take_frame(
+    settings: &FrameSettings,
+    probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
+    exposed: impl Fn() + Sync,
+) -> Result<Frame, FrameError> {
+    let FrameSettings {
+        sensor,
+        scene,
+        exposure,
+        seed,
+        engine: engine_kind,
+        peak,
+    } = settings;
+    let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
+    let mut clock = Stopwatch::new();
+    let mut times = PhaseTimes::default();
+
+    let truth = GroundTruth::render(scene, rows, cols);
+    times.scene_s = clock.lap();
+    let guide = GuideMap::estimate(scene, rows, cols, *seed);
+    times.guide_s = clock.lap();
+
+    // Macropixels without an estimate, or with one out of the P-counter's reach, look as far as they can.
+    let law = WindowLaw::new(sensor, exposure);
+    let wanted: Vec<Option<u16>> = guide
+        .range_m
+        .par_iter()
+        .map(|range_m| law.start_for(Time::of_flight((*range_m)?)))
+        .collect();
+    let farthest = sensor.largest_start();
+    let starts: Vec<u16> = wanted.iter().map(|s| s.unwrap_or(farthest)).collect();
+    times.windows_s = clock.lap();
+
+    let load_netlist = load::load_netlist(sensor);
+    let load = load::load(sensor, &load_netlist, &starts, &mut ());
+    drop(load_netlist);
+    for (pixel, (&sent, &found)) in starts.iter().zip(&load.starts).enumerate() {
+        if found != Some(sent) {
+            let (row, col) = (pixel / sensor.cols, pixel % sensor.cols);
+            return Err(FrameError::Load {
+                row,
+                col,
+                sent,
+                found,
+            });
+        }
+    }
+    times.load_s = clock.lap();
+
+    let stream = StreamConfig {
+        seed: *seed,
+        clock: exposure.clock,
+        stop_periods: exposure.stop_periods,
+        laser_cycles: exposure.laser_cycles,
+        pulse_sigma: scene.pulse_sigma(),
+        dead_time: sensor.dead_time(),
+    };
+    let light = scene.pixel_light(&truth);
+    let photons = |pixel: usize| pixel_events(&stream, pixel as u32, &light[pixel]);
+    let engine = engine_kind.build(sensor, exposure);
+    let exposures: Vec<(Vec<u16>, u64, u64)> = (0..sensor.pixels())
+        .into_par_iter()
+        .map(|pixel| {
+            let PixelPhotons {
+                events,
+                drawn,
+                lost_to_dead_time,
+            } = photons(pixel);
+            let counts = engine.histogram(starts[pixel], &events)?;
+            exposed();
+            Ok((counts, drawn, lost_to_dead_time))
+        })
+        .collect::<Result<_, EngineError>>()?;
+    times.exposure_s = clock.lap();
+
+    let probes = probes(&guide);
+    probes.par_iter().try_for_each(|probe| {
+        let pixel = probe.row * sensor.cols + probe.col;
+        let events = photons(pixel).events;
+        let gate = run_probe(sensor, exposure, probe, starts[pixel], &events)?;
+        let model = &exposures[pixel].0;
+        if gate == *model {
+            return Ok(());
+        }
+        Err(FrameError::Disagreement {
+            row: probe.row,
+            col: probe.col,
+            engine: *engine_kind,
+            gate,
+            model: model.clone(),
+        })
+    })?;
+    times.probes_s = clock.lap();
+
+    let pixels: Vec<PixelDepth> = (0..sensor.pixels())
+        .map(|pixel| {
+            let window = law.window(starts[pixel]).open();
+            let counts: Vec<u32> = exposures[pixel].0.iter().map(|&n| n.into()).collect();
+            let measured = wanted[pixel].and(window).and_then(|window| {
+                let found = interpolate(&counts, peak)?;
+                Some(law.time_of(&window, found.position_bins).as_range_m())
+            });
+            let true_m = truth.range_m[pixel];
+            let in_window = wanted[pixel].is_some()
+                && window.zip(true_m).is_some_and(|(window, true_m)| {
+                    law.interval(&window).contains(&Time::of_flight(true_m))
+                });
+            PixelDepth {
+                true_m,
+                guide_m: guide.range_m[pixel],
+                start: wanted[pixel],
+                in_window,
+                measured_m: measured,
+            }
+        })
+        .collect();
+    times.ranging_s = clock.lap();
+
+    Ok(Frame {
+        rows: sensor.rows,
+        cols: sensor.cols,
+        bins: sensor.bins,
+        histograms: exposures
+            .iter()
+            .flat_map(|(counts, ..)| counts)
+            .copied()
+            .collect(),
+        pixels,
+        photons: exposures.iter().map(|(_, drawn, _)| drawn).sum(),
+        lost_to_dead_time: exposures.iter().map(|(.., lost)| lost).sum(),
+        load_bits: sensor.load_bits(),
+        load_time: load.duration,
+        exposure_time: exposure.end(),
+        probes: probes.iter().map(|p| (p.row, p.col)).collect(),
+        times,
+    })
+}
+
+fn run_probe(
+    sensor: &SensorConfig,
+    exposure: &Exposure,
+    probe: &Probe,
+    start: u16,
+    events: &[crate::photon::SpadEvent],
+) -> Result<Vec<u16>, FrameError> {
+    let at = (probe.row, probe.col);
+    let mut simulation = GateSimulation::new(sensor, exposure, at, (1, 1), &[start], &[events]);
+    let view_end = exposure.clock.periods(start as i64 + 8);
+    waveform::record(&mut simulation, &probe.vcd, &[at], view_end)?;
+    Ok(simulation.histograms()?.remove(0))
+}
+
+/// Splits elapsed time into laps.
+struct Stopwatch(Instant);
+
+impl Stopwatch {
+    fn new() -> Self {
+        Stopwatch(Instant::now())
+    }
+
+    fn lap(&mut self) -> f64 {
+        let now = Instant::now();
+        let lap = now - self.0;
+        self.0 = now;
+        lap.as_secs_f64()
+    }
+}

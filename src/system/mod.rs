@@ -1,0 +1,7 @@
+//! The guided system as a whole: camera pair, sensor and laser take one frame together.
+
+mod frame;
+mod result;
+
+pub use frame::{EngineKind, FrameError, FrameSettings, Probe, take_frame};
+pub use result::{Frame, PhaseTimes, PixelDepth, Summary};
