@@ -3,7 +3,7 @@
 //! ```text
 //!   COUNTER_INITS ─► shift register, cols × bits ───────────────► COUNTER_INIT_ROW
 //!   LOAD_CLK ──────► bit counter ─ last bit ─►[ROW_DONE]─┐
-//!                                                        AND NOT LOAD_CLK ─► WRITE ─ AND ─► MEMORY_LOAD<row>
+//!                                                        AND NOT LOAD_CLK, NOT LOAD_RESET ─► WRITE ─ AND ─► MEMORY_LOAD<row>
 //!                                  one-hot row token, moved by ROW_DONE's fall ──────┘
 //! ```
 //!
@@ -13,7 +13,8 @@
 //! changed and half a period before it changes again. The stream never pauses: rows × cols × bits
 //! LOAD_CLK periods, and half a period more.
 //!
-//! LOAD_RESET (LOAD_ENABLE low, or chip reset) returns to row 0, bit 0.
+//! LOAD_RESET (LOAD_ENABLE low, or chip reset) returns to row 0, bit 0. It closes WRITE before the token is
+//! back, or row 0 would be written once more with whatever the shift register then holds.
 
 use std::sync::Arc;
 
@@ -21,7 +22,7 @@ use super::finished;
 use super::p_counter;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
-use CellKind::{And2, Dffr, Inv, Nor2, Xor2};
+use CellKind::{And2, Dffr, Inv, Nor2, Or2, Xor2};
 
 /// Deserialiser: `cols × bits` stages and the counter that knows when they are full.
 ///
@@ -97,7 +98,9 @@ pub fn row_scanner(rows: usize) -> Arc<Module> {
     let select = m.wire_bus("SELECT", rows);
     let write = m.wire("WRITE");
     let step = m.gate(Inv, &[done]);
-    m.gate_into(Nor2, &[clk, step], write);
+    let idle = m.gate(Or2, &[clk, step]);
+    // A reset moves the token back to row 0 and must have closed WRITE by then.
+    m.gate_into(Nor2, &[idle, reset], write);
     // Row 0 keeps its token inverted, so that a reset selects it.
     let from_last = m.gate(Inv, &[select[rows - 1]]);
     m.cell(
