@@ -4,13 +4,12 @@
 //! evaluating a gate is one table look-up.
 
 use crate::logic::Logic;
-use crate::netlist::{CellKind, Corner, Library, Netlist, next_state};
+use crate::netlist::{CellKind, Corner, FlatCell, Library, Netlist, next_state};
 
-/// What a change of an input pin means for its cell.
+/// What a change of an input pin means for its cell. A flip-flop's D means nothing until it is sampled, and
+/// is then read from its net: it has no entry in any fan-out.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum PinClass {
-    /// Only sampled (a flip-flop's D).
-    Sampled,
     /// Any change may change the output.
     Active,
     /// Only going high (or unknown) may change the output.
@@ -41,10 +40,10 @@ impl Load {
 
     #[inline]
     pub fn class(self) -> PinClass {
-        match self.0 >> 2 & 3 {
-            0 => PinClass::Sampled,
-            1 => PinClass::Active,
-            _ => PinClass::Clock,
+        if self.0 >> 2 & 1 == 0 {
+            PinClass::Active
+        } else {
+            PinClass::Clock
         }
     }
 }
@@ -60,6 +59,8 @@ pub(super) struct CellState {
     /// A flip-flop's state, two bits.
     pub state: u8,
     pub is_dirty: bool,
+    /// The net on a flip-flop's D.
+    pub data: u32,
     /// Output nets, `u32::MAX` where unconnected.
     pub outputs: [u32; 2],
 }
@@ -141,9 +142,14 @@ impl FanOut {
             cells.len() < 1 << (32 - Load::CELL_SHIFT),
             "more cells than a Load can number"
         );
+        let triggers = |cell: &FlatCell| {
+            let (kind, inputs) = (cell.kind, cell.inputs);
+            let pins = (0..kind.inputs().len()).filter(move |&pin| kind.triggers(pin));
+            pins.map(move |pin| (pin, inputs[pin].index()))
+        };
         for cell in cells {
-            for net in &cell.inputs[..cell.kind.inputs().len()] {
-                start[net.index() + 1] += 1;
+            for (_, net) in triggers(cell) {
+                start[net + 1] += 1;
             }
         }
         for i in 1..start.len() {
@@ -152,13 +158,13 @@ impl FanOut {
         let mut next = start.clone();
         let mut loads = vec![Load(0); *start.last().expect("never empty") as usize];
         for (index, cell) in cells.iter().enumerate() {
-            for (pin, net) in cell.inputs[..cell.kind.inputs().len()].iter().enumerate() {
-                let class = match (cell.kind.is_flip_flop(), pin) {
-                    (true, 0) => PinClass::Sampled,
-                    (true, 1) => PinClass::Clock,
-                    _ => PinClass::Active,
+            for (pin, net) in triggers(cell) {
+                let class = if cell.kind.is_flip_flop() && pin == 1 {
+                    PinClass::Clock
+                } else {
+                    PinClass::Active
                 };
-                let at = &mut next[net.index()];
+                let at = &mut next[net];
                 loads[*at as usize] = Load::new(index, class, pin);
                 *at += 1;
             }
@@ -187,6 +193,7 @@ pub(super) fn initial_cells(netlist: &Netlist) -> Vec<CellState> {
                 kind: cell.kind,
                 state: Logic::X.bits(),
                 is_dirty: false,
+                data: cell.inputs[0].index() as u32,
                 outputs: cell.outputs.map(|n| {
                     if n.is_some() {
                         n.index() as u32

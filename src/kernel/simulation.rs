@@ -153,7 +153,6 @@ impl Kernel {
             let shift = load.shift();
             cell.inputs = cell.inputs & !(3 << shift) | value << shift;
             match load.class() {
-                PinClass::Sampled => {}
                 PinClass::Clock if value == Logic::Zero.bits() => {
                     cell.evaluated = cell.evaluated & !(3 << shift) | value << shift;
                 }
@@ -175,7 +174,10 @@ impl Kernel {
         cell.evaluated = inputs;
         let outputs = cell.outputs;
         if kind.is_flip_flop() {
-            let state = self.tables.flip_flop(inputs, evaluated, cell.state);
+            let data = self.nets[cell.data as usize].value;
+            let state = self
+                .tables
+                .flip_flop(inputs & !3 | data, evaluated, cell.state);
             if state == cell.state {
                 return;
             }
