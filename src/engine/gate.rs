@@ -1,8 +1,10 @@
 //! The gate engine: the netlist itself, event by event.
 
+use std::sync::Arc;
+
 use super::stimulus::{Pins, Schedule, StimulusPlan};
 use super::{Engine, EngineError};
-use crate::chip::{Exposure, SensorConfig, sensor};
+use crate::chip::{Exposure, SensorConfig, histogram, sensor};
 use crate::kernel::{Kernel, Observer, Statistics};
 use crate::netlist::{Library, Netlist};
 use crate::photon::SpadEvent;
@@ -12,7 +14,7 @@ pub struct GateSimulation<'a> {
     config: &'a SensorConfig,
     first: (usize, usize),
     size: (usize, usize),
-    netlist: Netlist,
+    netlist: Arc<Netlist>,
     kernel: Kernel,
     plan: StimulusPlan<'a>,
 }
@@ -28,7 +30,7 @@ impl<'a> GateSimulation<'a> {
         starts: &[u16],
         pulses: &[&[SpadEvent]],
     ) -> Self {
-        let netlist = Netlist::elaborate(&sensor::window(config, first, size));
+        let netlist = Arc::new(Netlist::elaborate(&sensor::window(config, first, size)));
         let kernel = Kernel::new(&netlist, &Library::default(), config.corner);
         GateSimulation {
             config,
@@ -41,7 +43,7 @@ impl<'a> GateSimulation<'a> {
     }
 
     /// The netlist that is simulated.
-    pub fn netlist(&self) -> &Netlist {
+    pub fn netlist(&self) -> &Arc<Netlist> {
         &self.netlist
     }
 
@@ -80,7 +82,7 @@ impl<'a> GateSimulation<'a> {
         let pixels = self.of_pixels(|path| {
             (0..self.config.bins)
                 .map(|bin| {
-                    let count = format!("{path}.histogram.bin_{bin}.COUNT");
+                    let count = format!("{path}.histogram.{}", histogram::bin_name(bin));
                     let count = self.netlist.signal(&count).expect("every bin has a count");
                     self.kernel.number(&count).map(|n| n as u16).ok_or(bin)
                 })
