@@ -6,7 +6,7 @@ use super::stimulus::{Pins, Schedule, StimulusPlan};
 use super::{Engine, EngineError};
 use crate::chip::{Exposure, SensorConfig, histogram, sensor};
 use crate::kernel::{Kernel, Observer, Statistics};
-use crate::netlist::{Library, Netlist};
+use crate::netlist::{Library, Netlist, Timing};
 use crate::photon::SpadEvent;
 
 /// A rectangle of the sensor at gate level, loaded and exposed through its pins.
@@ -31,7 +31,8 @@ impl<'a> GateSimulation<'a> {
         pulses: &[&[SpadEvent]],
     ) -> Self {
         let netlist = Arc::new(Netlist::elaborate(&sensor::window(config, first, size)));
-        let kernel = Kernel::new(&netlist, &Library::default(), config.corner);
+        let timing = Timing::nominal(&netlist, &Library::default(), config.corner);
+        let kernel = Kernel::new(&netlist, &timing);
         GateSimulation {
             config,
             first,
