@@ -6,7 +6,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use guided_dtof::chip::{Exposure, SensorConfig, sensor};
 use guided_dtof::engine::load::{load, load_netlist};
-use guided_dtof::engine::{Cycle, Engine, GateSimulation, Window};
+use guided_dtof::engine::{Cycle, Engine, GateSimulation, LaneSimulation, Window};
 use guided_dtof::netlist::Netlist;
 use guided_dtof::photon::{PixelLight, SpadEvent, StreamConfig, pixel_events};
 use guided_dtof::units::Time;
@@ -51,6 +51,22 @@ fn kernel(c: &mut Criterion) {
             let mut simulation = prepare();
             simulation.run(&mut ());
             black_box(simulation.statistics())
+        });
+    });
+    let lanes: Vec<Vec<SpadEvent>> = (0..64)
+        .map(|pixel| pixel_events(&stream(&config, &exposure), pixel, &LIGHT).events)
+        .collect();
+    let lanes: Vec<&[SpadEvent]> = lanes.iter().map(Vec::as_slice).collect();
+    let starts: Vec<u16> = (0..64).map(|lane| lane * 8).collect();
+    let prepare = || LaneSimulation::new(&config, &exposure, &starts, &lanes);
+    let mut once = prepare();
+    once.run(&mut ());
+    group.throughput(Throughput::Elements(once.kernel().lane_changes()));
+    group.bench_function("64 macropixels in lanes, net changes", |b| {
+        b.iter(|| {
+            let mut simulation = prepare();
+            simulation.run(&mut ());
+            black_box(simulation.kernel().events())
         });
     });
     group.finish();

@@ -100,7 +100,7 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
             };
             pixels.into_iter().map(probe_at).collect()
         },
-        || progress.inc(1),
+        |macropixels| progress.inc(macropixels as u64),
     )?;
 
     let report = Report::new(args, &settings.sensor, &frame);

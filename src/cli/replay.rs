@@ -11,7 +11,7 @@ use super::SensorArgs;
 use crate::chip::{Exposure, SensorConfig};
 use crate::engine::recording::{Recording, check_exposure, read_events, read_starts};
 use crate::engine::waveform::{self, View};
-use crate::engine::{EngineError, GateSimulation};
+use crate::engine::{BATCH, EngineError, GateSimulation};
 use crate::files::{InputError, OutputFile};
 use crate::photon::SpadEvent;
 use crate::report::write_npy_u16;
@@ -121,14 +121,15 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         return Err(InputError::new(format!("--vcd {}", vcd.display()), message).into());
     }
     let stimuli = args.stimuli.read()?;
-    let histograms = match args.engine {
-        EngineKind::Gate => replay_gates(&stimuli, args.vcd.as_deref())?,
-        kind => replay_models(&stimuli, kind)?,
+    let histograms = match &args.vcd {
+        Some(vcd) => replay_with_waveform(&stimuli, vcd)?,
+        None => replay(&stimuli, args.engine)?,
     };
     write(&stimuli.config, &histograms, args.out.as_deref(), format)
 }
 
-fn replay_gates(stimuli: &Stimuli, vcd: Option<&Path>) -> anyhow::Result<Vec<Vec<u16>>> {
+/// The whole array as one netlist, with its waveform.
+fn replay_with_waveform(stimuli: &Stimuli, vcd: &Path) -> anyhow::Result<Vec<Vec<u16>>> {
     let config = &stimuli.config;
     let mut simulation = GateSimulation::new(
         config,
@@ -138,34 +139,29 @@ fn replay_gates(stimuli: &Stimuli, vcd: Option<&Path>) -> anyhow::Result<Vec<Vec
         &stimuli.starts,
         &stimuli.pulses(),
     );
-    match vcd {
-        None => simulation.run(&mut ()),
-        Some(vcd) => {
-            let start = *stimuli.starts.first().expect("a sensor has a macropixel");
-            let view = View::of_window(&[(0, 0)], config, &stimuli.exposure, start);
-            waveform::record(&mut simulation, vcd, &view)?;
-        }
-    }
+    let start = *stimuli.starts.first().expect("a sensor has a macropixel");
+    let view = View::of_window(&[(0, 0)], config, &stimuli.exposure, start);
+    waveform::record(&mut simulation, vcd, &view)?;
     Ok(simulation.histograms()?)
 }
 
-fn replay_models(stimuli: &Stimuli, kind: EngineKind) -> anyhow::Result<Vec<Vec<u16>>> {
+fn replay(stimuli: &Stimuli, kind: EngineKind) -> anyhow::Result<Vec<Vec<u16>>> {
     let engine = kind.build(&stimuli.config, &stimuli.exposure);
     let progress = ProgressBar::new(stimuli.starts.len() as u64).with_style(
         ProgressStyle::with_template("replaying {bar:40} {pos}/{len} macropixels")?,
     );
-    let histograms: Result<Vec<_>, EngineError> = stimuli
+    let batches: Result<Vec<_>, EngineError> = stimuli
         .starts
-        .par_iter()
-        .zip(&stimuli.recording.pulses)
-        .map(|(&start, pulses)| {
-            let histogram = engine.histogram(start, pulses);
-            progress.inc(1);
-            histogram
+        .par_chunks(BATCH)
+        .zip(stimuli.pulses().par_chunks(BATCH))
+        .map(|(starts, pulses)| {
+            let histograms = engine.histograms(starts, pulses);
+            progress.inc(starts.len() as u64);
+            histograms
         })
         .collect();
     progress.finish_and_clear();
-    Ok(histograms?)
+    Ok(batches?.concat())
 }
 
 #[derive(Clone, Copy)]

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
+use super::lanes::LaneSimulation;
 use super::stimulus::{Pins, Schedule, StimulusPlan};
 use super::{Engine, EngineError};
 use crate::chip::{Exposure, SensorConfig, histogram, sensor};
-use crate::kernel::{Kernel, Observer, Statistics};
+use crate::kernel::{Kernel, LANES, Observer, Statistics};
 use crate::netlist::{Library, Netlist, Timing};
 use crate::photon::SpadEvent;
 
@@ -89,15 +90,12 @@ impl<'a> GateSimulation<'a> {
                 })
                 .collect::<Result<Vec<u16>, usize>>()
         });
-        let place = |index: usize| {
-            (
-                self.first.0 + index / self.size.1,
-                self.first.1 + index % self.size.1,
-            )
-        };
         let checked = pixels.into_iter().enumerate().map(|(index, histogram)| {
-            let (row, col) = place(index);
-            histogram.map_err(|bin| EngineError::Unknown { row, col, bin })
+            let (row, col) = (index / self.size.1, index % self.size.1);
+            histogram.map_err(|bin| EngineError::Unknown {
+                macropixel: sensor::pixel_name(self.first.0 + row, self.first.1 + col),
+                bin,
+            })
         });
         checked.collect()
     }
@@ -112,7 +110,7 @@ impl<'a> GateSimulation<'a> {
     }
 }
 
-/// Simulates one macropixel, with a load path of its own, at gate level.
+/// Simulates macropixels at gate level, each with a load path of its own: one alone, several in lanes.
 pub struct Gate<'a> {
     config: &'a SensorConfig,
     exposure: &'a Exposure,
@@ -137,5 +135,20 @@ impl Engine for Gate<'_> {
         );
         simulation.run(&mut ());
         Ok(simulation.histograms()?.remove(0))
+    }
+
+    fn histograms(
+        &self,
+        starts: &[u16],
+        pulses: &[&[SpadEvent]],
+    ) -> Result<Vec<Vec<u16>>, EngineError> {
+        let batches = starts.chunks(LANES).zip(pulses.chunks(LANES));
+        let mut histograms = Vec::with_capacity(starts.len());
+        for (starts, pulses) in batches {
+            let mut lanes = LaneSimulation::new(self.config, self.exposure, starts, pulses);
+            lanes.run(&mut ());
+            histograms.extend(lanes.histograms()?);
+        }
+        Ok(histograms)
     }
 }

@@ -145,9 +145,8 @@ impl<'a> LaneSimulation<'a> {
         let counts = self.lanes(|lane| {
             let count = |(bin, nets): (usize, &Vec<NetId>)| {
                 let number = self.kernel.number(nets, lane).map(|n| n as u16);
-                number.ok_or(EngineError::Unknown {
-                    row: 0,
-                    col: lane,
+                number.ok_or_else(|| EngineError::Unknown {
+                    macropixel: format!("the macropixel in lane {lane}"),
                     bin,
                 })
             };

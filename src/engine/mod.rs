@@ -38,7 +38,26 @@ pub trait Engine: Sync {
     /// # Errors
     /// When this engine cannot tell what the circuit does.
     fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError>;
+
+    /// Histograms of several macropixels, each with its start value and pulses. An engine that gains by
+    /// it runs [`BATCH`] of them together; the results are the same.
+    ///
+    /// # Errors
+    /// As [`Engine::histogram`], of the first macropixel concerned.
+    fn histograms(
+        &self,
+        starts: &[u16],
+        pulses: &[&[SpadEvent]],
+    ) -> Result<Vec<Vec<u16>>, EngineError> {
+        let macropixels = starts.iter().zip(pulses);
+        macropixels
+            .map(|(&start, pulses)| self.histogram(start, pulses))
+            .collect()
+    }
 }
+
+/// How many macropixels are best given to [`Engine::histograms`] at once.
+pub const BATCH: usize = crate::kernel::LANES;
 
 /// Why an engine has no answer.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -49,12 +68,10 @@ pub enum EngineError {
     )]
     Race(&'static str),
     /// A histogram bin of the netlist holds X.
-    #[error("bin {bin} of macropixel ({row}, {col}) is unknown (X) at the end of the exposure")]
+    #[error("bin {bin} of {macropixel} is unknown (X) at the end of the exposure")]
     Unknown {
-        /// Row in the sensor.
-        row: usize,
-        /// Column in the sensor.
-        col: usize,
+        /// Name of the macropixel, or its lane.
+        macropixel: String,
         /// First unknown bin.
         bin: usize,
     },

@@ -14,10 +14,10 @@ use rayon::prelude::*;
 use super::result::{Frame, PhaseTimes, PixelDepth};
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::engine::waveform::{self, View};
-use crate::engine::{Cycle, Engine, EngineError, Gate, GateSimulation, Window, load};
+use crate::engine::{BATCH, Cycle, Engine, EngineError, Gate, GateSimulation, Window, load};
 use crate::files::InputError;
 use crate::guide::GuideMap;
-use crate::photon::{PixelPhotons, StreamConfig, pixel_events};
+use crate::photon::{PixelPhotons, SpadEvent, StreamConfig, pixel_events};
 use crate::ranging::{PeakOptions, interpolate};
 use crate::scene::{GroundTruth, Scene};
 use crate::units::Time;
@@ -122,7 +122,7 @@ pub enum FrameError {
 }
 
 /// Takes a frame. `probes` chooses the macropixels to run at gate level once the guide is known;
-/// `exposed` is called after every macropixel.
+/// `exposed` is told of macropixels as they are done.
 ///
 /// # Errors
 /// Configurations that the engine refuses, waveforms that cannot be written, and disagreement between
@@ -130,7 +130,7 @@ pub enum FrameError {
 pub fn take_frame(
     settings: &FrameSettings,
     probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
-    exposed: impl Fn() + Sync,
+    exposed: impl Fn(usize) + Sync,
 ) -> Result<Frame, FrameError> {
     let FrameSettings {
         sensor,
@@ -187,19 +187,22 @@ pub fn take_frame(
     let light = scene.pixel_light(&truth);
     let photons = |pixel: usize| pixel_events(&stream, pixel as u32, &light[pixel]);
     let engine = engine_kind.build(sensor, exposure);
-    let exposures: Vec<(Vec<u16>, u64, u64)> = (0..sensor.pixels())
-        .into_par_iter()
-        .map(|pixel| {
-            let PixelPhotons {
-                events,
-                drawn,
-                lost_to_dead_time,
-            } = photons(pixel);
-            let counts = engine.histogram(starts[pixel], &events)?;
-            exposed();
-            Ok((counts, drawn, lost_to_dead_time))
+    let batches: Vec<Vec<(Vec<u16>, u64, u64)>> = starts
+        .par_chunks(BATCH)
+        .enumerate()
+        .map(|(batch, starts)| {
+            let pixels = (0..starts.len()).map(|i| batch * BATCH + i);
+            let photons: Vec<PixelPhotons> = pixels.map(photons).collect();
+            let pulses: Vec<&[SpadEvent]> = photons.iter().map(|p| &p.events[..]).collect();
+            let counts = engine.histograms(starts, &pulses)?;
+            exposed(starts.len());
+            let exposed = counts.into_iter().zip(&photons);
+            Ok(exposed
+                .map(|(counts, p)| (counts, p.drawn, p.lost_to_dead_time))
+                .collect())
         })
         .collect::<Result<_, EngineError>>()?;
+    let exposures = batches.concat();
     times.exposure_s = clock.lap();
 
     let probes = probes(&guide);
@@ -270,7 +273,7 @@ fn run_probe(
     exposure: &Exposure,
     probe: &Probe,
     start: u16,
-    events: &[crate::photon::SpadEvent],
+    events: &[SpadEvent],
 ) -> Result<Vec<u16>, FrameError> {
     let at = (probe.row, probe.col);
     let mut simulation = GateSimulation::new(sensor, exposure, at, (1, 1), &[start], &[events]);
