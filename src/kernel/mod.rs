@@ -27,4 +27,4 @@ mod wheel;
 
 pub use observer::{Observer, Recorder};
 pub use simulation::{Kernel, Statistics};
-pub use stimulus::{Drive, Stimulus, clock, merge};
+pub use stimulus::{Drive, Stimulus, clock, in_order, merge};
