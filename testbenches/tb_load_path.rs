@@ -375,31 +375,28 @@ fn whole_sensor(checks: &mut Checks) {
     );
 }
 
-/// The first load: Fig. 57's signals, one line per row and per column.
+/// The first load: Fig. 57's signals, then every row with its macropixels' memories.
 fn view(config: &SensorConfig, (start, end): (Time, Time)) -> SaveFile {
     let memory = |row, col, signal: &str| format!("{}.{signal}", load_path::memory_name(row, col));
-    let pins = [
+    let shared = [
         Entry::binary("RESETB"),
         Entry::binary("LOAD_ENABLE"),
         Entry::binary("LOAD_CLK"),
         Entry::binary("COUNTER_INITS"),
+        Entry::hex("COUNTER_INIT_ROW"),
+        Entry::binary("ROW_DONE"),
     ];
-    let columns = (0..config.cols).map(|col| Entry::decimal(memory(0, col, "COUNTER_INIT")));
-    let rows = (0..config.rows).map(|row| Entry::binary(memory(row, 0, "MEMORY_LOAD")));
-    let deserialiser = [Entry::hex("COUNTER_INIT_ROW")].into_iter().chain(columns);
-    let scanner = [Entry::binary("ROW_DONE"), Entry::binary("MEMORY_LOAD")];
-    let places = (0..config.rows).flat_map(|row| (0..config.cols).map(move |col| (row, col)));
-    let memories = places.map(|(row, col)| Entry::decimal(memory(row, col, "MEMORY")));
+    let mut groups = vec![Group::new("Load path (Fig. 57)", shared)];
+    for row in 0..config.rows {
+        let load = Entry::binary(memory(row, 0, "MEMORY_LOAD"));
+        let memories = (0..config.cols).map(|col| Entry::decimal(memory(row, col, "MEMORY")));
+        groups.push(Group::new(
+            format!("Row {row}, columns 0 to {}", config.cols - 1),
+            [load].into_iter().chain(memories),
+        ));
+    }
     SaveFile {
-        groups: vec![
-            Group::new("Pins (Fig. 57)", pins),
-            Group::new("Deserialiser: a row and its columns", deserialiser),
-            Group::new(
-                "Row scanner: one line per row",
-                scanner.into_iter().chain(rows),
-            ),
-            Group::new("Start values in the macropixels", memories),
-        ],
+        groups,
         zoom: (Time::ZERO, end + PAUSE),
         marker: Some(start),
     }
