@@ -120,12 +120,13 @@ fn figure_48(vcd: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let exposure = Exposure::new(&config, STOP_PERIODS, 6);
     let shift = (STARTS[0] - STARTS[1]) as usize;
     let (law, second) = window(&config, &exposure, STARTS[1]);
+    let photons_of = |bin: i64| (bin * bin * bin + 3 * bin).rem_euclid(11) as u32 / 2;
     // Photons from before the earlier window to after the later one, a different number in every CLK period;
     // no SPAD fires twice within its dead time.
     let (first_bin, last_bin) = (-4, (config.bins + shift) as i64 + 4);
     let mut pulses: Vec<SpadEvent> = (0..exposure.laser_cycles)
         .flat_map(|cycle| (first_bin..last_bin).map(move |bin| (cycle, bin)))
-        .filter(|(cycle, bin)| *cycle as i64 <= (bin * bin + 3 * bin).rem_euclid(7))
+        .filter(|(cycle, bin)| exposure.laser_cycles - cycle <= 1 + photons_of(*bin))
         .map(|(cycle, bin)| SpadEvent {
             time: middle(&law, &second, cycle, bin),
             spad: bin.rem_euclid(SPADS as i64) as u8,
@@ -227,7 +228,10 @@ fn view(config: &SensorConfig, origin: Time, end: Time) -> SaveFile {
         let bins = [0, config.bins / 2, config.bins - 1];
         let bins = bins.map(|bin| Entry::decimal(of(&format!("histogram.bin_{bin}.COUNT"))));
         groups.push(Group::new(
-            format!("Macropixel {}: start value {start} (Fig. 48)", col + 1),
+            format!(
+                "Macropixel {}, start value {start}, bins first, middle, last (Fig. 48)",
+                col + 1
+            ),
             signals.into_iter().chain(bins),
         ));
     }
