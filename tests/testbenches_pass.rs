@@ -18,6 +18,13 @@ fn passes(name: &str, program: &str, signal: &[&str]) {
     assert!(waves.time_table().len() > 100);
     let view = std::fs::read_to_string(out.join(format!("{name}.gtkw"))).unwrap();
     assert!(view.contains(&format!("[dumpfile] \"{name}.vcd\"")));
+    // The views in the repository are those that the testbenches write.
+    let kept = concat!(env!("CARGO_MANIFEST_DIR"), "/waves");
+    let kept = std::fs::read_to_string(format!("{kept}/{name}.gtkw")).unwrap();
+    assert_eq!(
+        view, kept,
+        "{name}: run it in the repository to renew its view"
+    );
 }
 
 #[test]
