@@ -1,4 +1,43 @@
-//! A hardware model of a guided direct time-of-flight lidar chip, down to gates and flip-flops.
+//! A guided direct time-of-flight lidar chip, simulated down to gates and flip-flops.
+//!
+//! 64×64 macropixels each count photons only in the short time window that a stereo camera's depth estimate
+//! programmed into them. The chip is described once, as a netlist; every engine and exporter reads it.
+//!
+//! The folders follow the data's road, and lower ones never import higher ones:
+//!
+//! | module | what lives there |
+//! |---|---|
+//! | [`units`] | integer femtoseconds, exact clock frequencies, constants |
+//! | [`files`] | user's input with line numbers, output whole or not at all |
+//! | [`logic`] | four-valued logic |
+//! | [`netlist`] | cells, hierarchical builder, delays, Verilog |
+//! | [`kernel`] | the discrete event kernel |
+//! | [`waves`] | VCD and GTKWave save files |
+//! | [`chip`] | the circuits beside their reference models, the window law |
+//! | [`photon`] | photon budget, SPADs, the photon stream |
+//! | [`engine`] | the ways to run an exposure |
+//! | [`scene`] | surfaces, optics, sunlight, ground truth |
+//! | [`guide`] | the stereo camera pair and its mapping onto macropixels |
+//! | [`ranging`] | depth from histograms |
+//! | [`report`] | pictures, arrays, tables |
+//! | [`system`] | one guided frame, end to end |
+//! | [`cli`] | the `gdtof` command |
+//!
+//! One macropixel at gate level:
+//!
+//! ```
+//! use guided_dtof::chip::{Exposure, SensorConfig};
+//! use guided_dtof::engine::{Engine, Gate, Window};
+//! use guided_dtof::photon::SpadEvent;
+//! use guided_dtof::units::Time;
+//!
+//! let config = SensorConfig::default();
+//! let exposure = Exposure::new(&config, 60, 3); // 60 CLK periods a laser cycle, 3 cycles
+//! let photon = SpadEvent { time: Time::from_ns(50), spad: 7 };
+//! let counts = Gate::new(&config, &exposure).histogram(25, &[photon]).unwrap();
+//! assert_eq!(counts.iter().sum::<u16>(), 1);
+//! assert_eq!(counts, Window::new(&config, &exposure).histogram(25, &[photon]).unwrap());
+//! ```
 
 pub mod chip;
 pub mod cli;

@@ -18,7 +18,7 @@ use guided_dtof::engine::waveform::{write_vcd, write_view};
 use guided_dtof::files::InputError;
 use guided_dtof::kernel::{Drive, Kernel, Recorder, in_order};
 use guided_dtof::logic::Logic::{One, X, Zero};
-use guided_dtof::netlist::{CellKind, Library, NetId, Netlist};
+use guided_dtof::netlist::{CellKind, Library, NetId, Netlist, Timing};
 use guided_dtof::report::Checks;
 use guided_dtof::units::{Frequency, Time};
 use guided_dtof::waves::{Entry, Group, SaveFile};
@@ -186,11 +186,14 @@ fn small_array(vcd: &Path, checks: &mut Checks) -> Result<(), InputError> {
         start = end + PAUSE;
     }
 
-    let mut kernel = Kernel::new(&bench.netlist, &Library::default(), config.corner);
+    let mut kernel = Kernel::new(
+        &bench.netlist,
+        &Timing::nominal(&bench.netlist, &Library::default(), config.corner),
+    );
     let mut stimulus = in_order(std::mem::take(&mut bench.drives));
     let mut recorder = Recorder::new((0..bench.netlist.net_count()).map(NetId::new));
     let mut found = Vec::new();
-    write_vcd(vcd, bench.netlist.clone(), |waves| {
+    write_vcd(vcd, &bench.netlist, Time::MAX, |waves| {
         let mut observers = (&mut recorder, waves);
         for &(_, end) in &spans {
             kernel.run(

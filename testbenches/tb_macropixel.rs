@@ -11,6 +11,7 @@
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use guided_dtof::chip::window_law::OpenWindow;
 use guided_dtof::chip::{
@@ -136,11 +137,11 @@ fn figure_48(vcd: &Path, checks: &mut Checks) -> Result<(), InputError> {
 
     let lists = [&pulses[..], &pulses[..]];
     let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 2), &STARTS, &lists);
-    let netlist = gate.netlist().clone();
+    let netlist = Arc::clone(gate.netlist());
     let local_stop = netlist.signal("LOCAL_STOP").expect("a port of the sensor");
     let mut recorder = Recorder::new(local_stop.iter().copied());
     let origin = gate.schedule().origin;
-    write_vcd(vcd, netlist.clone(), |waves| {
+    write_vcd(vcd, &netlist, Time::MAX, |waves| {
         gate.run(&mut (&mut recorder, waves));
         gate.schedule().end
     })?;
@@ -227,7 +228,8 @@ fn view(config: &SensorConfig, origin: Time, end: Time) -> SaveFile {
         ];
         // The first, the middle and the last bin; GTKWave widens its column of names for a longer title.
         let bins = [0, config.bins / 2, config.bins - 1];
-        let bins = bins.map(|bin| Entry::decimal(of(&format!("histogram.bin_{bin}.COUNT"))));
+        let bins =
+            bins.map(|bin| Entry::decimal(of(&format!("histogram.{}", histogram::bin_name(bin)))));
         groups.push(Group::new(
             format!("Macropixel {}: {start} (Fig. 48)", col + 1),
             signals.into_iter().chain(bins),

@@ -18,7 +18,7 @@ use guided_dtof::engine::waveform::{write_vcd, write_view};
 use guided_dtof::files::InputError;
 use guided_dtof::kernel::{Drive, Kernel, Observer, Recorder, clock, in_order};
 use guided_dtof::logic::Logic;
-use guided_dtof::netlist::{CellKind, Library, ModuleBuilder, NetId, Netlist};
+use guided_dtof::netlist::{CellKind, Library, ModuleBuilder, NetId, Netlist, Timing};
 use guided_dtof::report::Checks;
 use guided_dtof::units::Time;
 use guided_dtof::waves::{Entry, Group, SaveFile};
@@ -95,7 +95,10 @@ impl Bench {
     }
 
     fn kernel(&self) -> Kernel {
-        Kernel::new(&self.netlist, &Library::default(), self.config.corner)
+        Kernel::new(
+            &self.netlist,
+            &Timing::nominal(&self.netlist, &Library::default(), self.config.corner),
+        )
     }
 
     /// Power-up: everything low but CLK, and RESETB released at [`RESET_END`].
@@ -207,7 +210,7 @@ fn figure_54(bench: &Bench, vcd: &Path, checks: &mut Checks) -> Result<(), Input
     let mut recorder = Recorder::new((0..bench.netlist.net_count()).map(NetId::new));
     let mut unknowns = Unknowns::default();
     let mut unknown_at_release = 0;
-    write_vcd(vcd, bench.netlist.clone(), |waves| {
+    write_vcd(vcd, &bench.netlist, Time::MAX, |waves| {
         kernel.run(&mut stimulus, RESET_END, &mut (&mut recorder, &mut *waves));
         let nets = (0..bench.netlist.net_count()).map(NetId::new);
         unknown_at_release = nets.filter(|&net| kernel.value(net) == Logic::X).count();

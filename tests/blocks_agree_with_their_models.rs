@@ -9,7 +9,9 @@ use guided_dtof::chip::{
 };
 use guided_dtof::kernel::{Drive, Kernel, Recorder, Stimulus, in_order};
 use guided_dtof::logic::Logic;
-use guided_dtof::netlist::{CellKind, Corner, Library, Module, NetId, Netlist, longest_path};
+use guided_dtof::netlist::{
+    CellKind, Corner, Library, Module, NetId, Netlist, Timing, longest_path,
+};
 use guided_dtof::units::Time;
 use proptest::prelude::*;
 
@@ -75,7 +77,10 @@ impl Bench {
         let nets = watched.iter().flat_map(|path| self.bus(path));
         Run {
             recorder: Recorder::new(nets),
-            kernel: Kernel::new(&self.netlist, &Library::default(), self.config.corner),
+            kernel: Kernel::new(
+                &self.netlist,
+                &Timing::nominal(&self.netlist, &Library::default(), self.config.corner),
+            ),
             stimulus: in_order(std::mem::take(&mut self.drives)),
         }
     }

@@ -12,6 +12,7 @@ use guided_dtof::kernel::{Drive, Kernel, Recorder, Stimulus};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{
     Arc as DelayArc, CellKind, Corner, Delay, Library, Module, ModuleBuilder, NetId, Netlist,
+    Timing,
 };
 use guided_dtof::units::Time;
 use guided_dtof::waves::{Selection, VcdWriter};
@@ -146,7 +147,7 @@ fn simulate(netlist: &Netlist, library: &Library, drives: Vec<Drive>) -> (String
         Recorder::new((0..netlist.net_count()).map(NetId::new)),
         VcdWriter::new(Vec::new(), netlist, &Selection::all().with_anonymous()).unwrap(),
     );
-    let mut kernel = Kernel::new(netlist, library, Corner::Typ);
+    let mut kernel = Kernel::new(netlist, &Timing::nominal(netlist, library, Corner::Typ));
     kernel.run(&mut stimulus, end, &mut observers);
     let (recorder, waves) = observers;
     let text = String::from_utf8(waves.finish(end).unwrap()).unwrap();

@@ -45,19 +45,29 @@ pub fn bin_counter(bits: usize, overflow: Overflow) -> Arc<Module> {
     finished(m.finish())
 }
 
-/// The histogram of a macropixel: instances `bin_0` (earliest) upwards.
+/// The name of a bin's count in the histogram.
+pub fn bin_name(bin: usize) -> String {
+    format!("BIN_{bin}")
+}
+
+/// The histogram of a macropixel: bin 0 is the earliest CLK period.
 ///
-/// Ports: HIT\<bins\>, PIXEL_CLEAR; the counts are read inside the instances.
+/// Ports: HIT\<bins\>, PIXEL_CLEAR; the counts are its buses BIN_0, BIN_1, … ([`bin_name`]).
 pub fn circuit(bins: usize, bits: usize, overflow: Overflow) -> Arc<Module> {
     let counter = bin_counter(bits, overflow);
     let mut m = ModuleBuilder::new("histogram");
     let hit = m.input_bus("HIT", bins);
     let clear = m.input("PIXEL_CLEAR");
     for bin in 0..bins {
+        let count = m.wire_bus(&bin_name(bin), bits);
         m.instance(
             &format!("bin_{bin}"),
             &counter,
-            &[("HIT", &hit[bin..=bin]), ("PIXEL_CLEAR", &[clear])],
+            &[
+                ("HIT", &hit[bin..=bin]),
+                ("PIXEL_CLEAR", &[clear]),
+                ("COUNT", &count),
+            ],
         );
     }
     finished(m.finish())

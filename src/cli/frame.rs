@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::SensorArgs;
 use crate::chip::SensorConfig;
+use crate::chip::window_law::{Window, WindowLaw};
 use crate::engine::recording::check_exposure;
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::guide::GuideMap;
@@ -45,6 +46,9 @@ pub struct FrameArgs {
     /// it, the guided macropixel nearest to the centre.
     #[arg(long, value_name = "R,C")]
     probe: Vec<String>,
+    /// Keep only the first N laser cycles in the waveforms of probes.
+    #[arg(long, value_name = "N")]
+    wave_cycles: Option<u32>,
     /// Print frame.json instead of the table.
     #[arg(long)]
     json: bool,
@@ -62,11 +66,18 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
     };
     let exposure = check_exposure(&sensor, args.stop_periods, args.laser_cycles)?;
     let chosen = chosen_probes(&args.probe, &sensor)?;
+    if let Window::Race(why) = WindowLaw::new(&sensor, &exposure).window(0) {
+        let message = format!(
+            "{why}, so the guide cannot aim time windows; change clk_hz, stop_phase_ps or corner"
+        );
+        return Err(InputError::new("--sensor", message).into());
+    }
     create_folder(&args.out)?;
     let probe_at = |(row, col)| Probe {
         row,
         col,
         vcd: args.out.join(format!("probe_r{row}_c{col}.vcd")),
+        wave_cycles: args.wave_cycles,
     };
     let settings = FrameSettings {
         sensor,

@@ -10,7 +10,8 @@ use rayon::prelude::*;
 use super::SensorArgs;
 use crate::chip::{Exposure, SensorConfig};
 use crate::engine::recording::{Recording, check_exposure, read_events, read_starts};
-use crate::engine::{EngineError, GateSimulation, waveform};
+use crate::engine::waveform::{self, View};
+use crate::engine::{EngineError, GateSimulation};
 use crate::files::{InputError, OutputFile};
 use crate::photon::SpadEvent;
 use crate::report::write_npy_u16;
@@ -141,8 +142,8 @@ fn replay_gates(stimuli: &Stimuli, vcd: Option<&Path>) -> anyhow::Result<Vec<Vec
         None => simulation.run(&mut ()),
         Some(vcd) => {
             let start = *stimuli.starts.first().expect("a sensor has a macropixel");
-            let view_end = stimuli.exposure.clock.periods(start as i64 + 8);
-            waveform::record(&mut simulation, vcd, &[(0, 0)], view_end)?;
+            let view = View::of_window(&[(0, 0)], config, &stimuli.exposure, start);
+            waveform::record(&mut simulation, vcd, &view)?;
         }
     }
     Ok(simulation.histograms()?)

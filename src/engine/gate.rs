@@ -1,10 +1,12 @@
 //! The gate engine: the netlist itself, event by event.
 
+use std::sync::Arc;
+
 use super::stimulus::{Pins, Schedule, StimulusPlan};
 use super::{Engine, EngineError};
-use crate::chip::{Exposure, SensorConfig, sensor};
+use crate::chip::{Exposure, SensorConfig, histogram, sensor};
 use crate::kernel::{Kernel, Observer, Statistics};
-use crate::netlist::{Library, Netlist};
+use crate::netlist::{Library, Netlist, Timing};
 use crate::photon::SpadEvent;
 
 /// A rectangle of the sensor at gate level, loaded and exposed through its pins.
@@ -12,7 +14,7 @@ pub struct GateSimulation<'a> {
     config: &'a SensorConfig,
     first: (usize, usize),
     size: (usize, usize),
-    netlist: Netlist,
+    netlist: Arc<Netlist>,
     kernel: Kernel,
     plan: StimulusPlan<'a>,
 }
@@ -28,8 +30,9 @@ impl<'a> GateSimulation<'a> {
         starts: &[u16],
         pulses: &[&[SpadEvent]],
     ) -> Self {
-        let netlist = Netlist::elaborate(&sensor::window(config, first, size));
-        let kernel = Kernel::new(&netlist, &Library::default(), config.corner);
+        let netlist = Arc::new(Netlist::elaborate(&sensor::window(config, first, size)));
+        let timing = Timing::nominal(&netlist, &Library::default(), config.corner);
+        let kernel = Kernel::new(&netlist, &timing);
         GateSimulation {
             config,
             first,
@@ -41,7 +44,7 @@ impl<'a> GateSimulation<'a> {
     }
 
     /// The netlist that is simulated.
-    pub fn netlist(&self) -> &Netlist {
+    pub fn netlist(&self) -> &Arc<Netlist> {
         &self.netlist
     }
 
@@ -80,7 +83,7 @@ impl<'a> GateSimulation<'a> {
         let pixels = self.of_pixels(|path| {
             (0..self.config.bins)
                 .map(|bin| {
-                    let count = format!("{path}.histogram.bin_{bin}.COUNT");
+                    let count = format!("{path}.histogram.{}", histogram::bin_name(bin));
                     let count = self.netlist.signal(&count).expect("every bin has a count");
                     self.kernel.number(&count).map(|n| n as u16).ok_or(bin)
                 })

@@ -3,7 +3,7 @@
 use super::stimulus::{LoadPins, load_stimulus};
 use crate::chip::{SensorConfig, load_path};
 use crate::kernel::{Kernel, Observer, Statistics};
-use crate::netlist::{Library, Netlist};
+use crate::netlist::{Library, Netlist, Timing};
 use crate::units::Time;
 
 /// What the load path did with a set of start values.
@@ -28,7 +28,8 @@ pub fn load<O: Observer>(
     debug_assert_eq!(starts.len(), config.pixels());
     let stream = load_path::stream(starts, config.cols, config.counter_bits);
     let (end, mut stimulus) = load_stimulus(LoadPins::of(netlist), config.load_clock(), &stream);
-    let mut kernel = Kernel::new(netlist, &Library::default(), config.corner);
+    let timing = Timing::nominal(netlist, &Library::default(), config.corner);
+    let mut kernel = Kernel::new(netlist, &timing);
     let settled = end + config.load_clock().periods(1);
     kernel.run(&mut stimulus, settled, observer);
     let memory = |row, col| {

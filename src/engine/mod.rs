@@ -11,6 +11,7 @@
 
 mod cycle;
 mod gate;
+mod lanes;
 pub mod load;
 pub mod recording;
 mod stimulus;
@@ -20,6 +21,7 @@ mod window;
 
 pub use cycle::Cycle;
 pub use gate::{Gate, GateSimulation};
+pub use lanes::LaneSimulation;
 pub use stimulus::{LoadPins, Pins, Schedule, StimulusPlan};
 pub use testbench::export_verilog;
 pub use window::Window;

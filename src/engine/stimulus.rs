@@ -125,6 +125,18 @@ impl Pins {
     }
 }
 
+impl Pins {
+    /// COUNTER_INITS.
+    pub(super) fn serial(&self) -> NetId {
+        self.load.serial
+    }
+
+    /// SPAD_RAW, 16 nets for every macropixel, row-major.
+    pub(super) fn spad_raw(&self) -> &[NetId] {
+        &self.spad_raw
+    }
+}
+
 /// Where load and exposure lie in simulation time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Schedule {

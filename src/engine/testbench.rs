@@ -8,7 +8,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use super::stimulus::{Pins, StimulusPlan};
-use crate::chip::{SensorConfig, sensor};
+use crate::chip::{SensorConfig, histogram, sensor};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::netlist::{Direction, Library, Module, Netlist, write_cells, write_modules};
 
@@ -133,9 +133,10 @@ module tb;
         let (row, col) = (pixel / cols, pixel % cols);
         let path = sensor::pixel_name(row, col);
         for bin in 0..config.bins {
+            let count = histogram::bin_name(bin);
             writeln!(
                 out,
-                "    $fwrite(histograms, \"{row},{col},{bin},%0d\\n\", dut.{path}.histogram.bin_{bin}.COUNT);"
+                "    $fwrite(histograms, \"{row},{col},{bin},%0d\\n\", dut.{path}.histogram.{count});"
             )?;
         }
     }

@@ -1,46 +1,88 @@
 //! Waveforms of the sensor: a VCD of every named net, and beside it a GTKWave save file that groups the
 //! signals as the thesis's timing diagrams do (Fig. 47, 54, 57).
 
+use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 use super::gate::GateSimulation;
-use crate::chip::sensor;
+use crate::chip::window_law::{Window, WindowLaw};
+use crate::chip::{Exposure, SensorConfig, histogram, sensor};
 use crate::files::{InputError, OutputFile};
 use crate::netlist::Netlist;
 use crate::units::Time;
 use crate::waves::{Entry, Group, SaveFile, Selection, VcdWriter};
 
-/// Runs `simulation` to its end with every named net in `vcd`, and writes the save file beside it, showing
-/// these macropixels (row, col) and the first laser cycle.
+/// What a waveform shows.
+#[derive(Debug, Clone)]
+pub struct View<'p> {
+    /// Macropixels (row, col) whose signals are grouped.
+    pub pixels: &'p [(usize, usize)],
+    /// Where the viewer looks first, from the first rising edge of STOP.
+    pub focus: Range<Time>,
+    /// Where the marker stands, from the first rising edge of STOP.
+    pub marker: Time,
+    /// Changes after this time, from the first rising edge of STOP, are left out of the file.
+    pub limit: Option<Time>,
+}
+
+impl<'p> View<'p> {
+    /// Looks at how the first laser cycle's window of `start` closes: the last counts, LOCAL_STOP (with the
+    /// marker) and what the histogram makes of it.
+    pub fn of_window(
+        pixels: &'p [(usize, usize)],
+        config: &SensorConfig,
+        exposure: &Exposure,
+        start: u16,
+    ) -> Self {
+        let marker = match WindowLaw::new(config, exposure).window(start) {
+            Window::Open(open) => open.strobe_cause,
+            Window::Never | Window::Race(_) => Time::ZERO,
+        };
+        let periods = |k| exposure.clock.periods(k);
+        View {
+            pixels,
+            focus: marker - periods(18)..marker + periods(4),
+            marker,
+            limit: None,
+        }
+    }
+}
+
+/// Runs `simulation` to its end with every named net in `vcd`, and writes a save file for `view` beside it.
 ///
 /// # Errors
 /// When a file cannot be written.
 pub fn record(
     simulation: &mut GateSimulation<'_>,
     vcd: &Path,
-    pixels: &[(usize, usize)],
-    view_end: Time,
+    view: &View<'_>,
 ) -> Result<(), InputError> {
-    let origin = simulation.schedule().origin;
-    let view = SaveFile {
-        groups: groups(simulation.netlist(), pixels),
-        zoom: (origin - Time::from_ns(10), origin + view_end),
-        marker: Some(origin),
+    let schedule = simulation.schedule();
+    let origin = schedule.origin;
+    let save_file = SaveFile {
+        groups: groups(simulation.netlist(), view.pixels),
+        zoom: (origin + view.focus.start, origin + view.focus.end),
+        marker: Some(origin + view.marker),
     };
-    write_vcd(vcd, simulation.netlist().clone(), |observer| {
+    let netlist = Arc::clone(simulation.netlist());
+    let limit = view.limit.map_or(schedule.end, |limit| origin + limit);
+    write_vcd(vcd, &netlist, limit, |observer| {
         simulation.run(observer);
-        simulation.schedule().end
+        schedule.end
     })?;
-    write_view(vcd, simulation.netlist(), &view)
+    write_view(vcd, &netlist, &save_file)
 }
 
-/// Writes what `run` lets the observer see of `netlist` to `vcd`; `run` returns the end of the simulation.
+/// Writes what `run` lets the observer see of `netlist` to `vcd`, changes after `limit` left out; `run` returns
+/// the end of the simulation.
 ///
 /// # Errors
 /// When the file cannot be written; it is then not there at all.
 pub fn write_vcd(
     vcd: &Path,
-    netlist: Netlist,
+    netlist: &Netlist,
+    limit: Time,
     run: impl FnOnce(&mut VcdWriter<OutputFile>) -> Time,
 ) -> Result<(), InputError> {
     let failed = |e: std::io::Error| {
@@ -50,7 +92,9 @@ pub fn write_vcd(
         )
     };
     let file = OutputFile::create(vcd)?;
-    let mut writer = VcdWriter::new(file, &netlist, &Selection::all()).map_err(failed)?;
+    let mut writer = VcdWriter::new(file, netlist, &Selection::all())
+        .map_err(failed)?
+        .limit(limit);
     let end = run(&mut writer);
     writer.finish(end).map_err(failed)?.commit()
 }
@@ -85,7 +129,7 @@ fn groups(netlist: &Netlist, pixels: &[(usize, usize)]) -> Vec<Group> {
         ];
         groups.push(Group::new(format!("P-counter {pixel} (Fig. 54)"), counter));
         let bins = (0..)
-            .map(|bin| of(&format!("histogram.bin_{bin}.COUNT")))
+            .map(|bin| of(&format!("histogram.{}", histogram::bin_name(bin))))
             .take_while(|path| netlist.signal(path).is_some())
             .map(Entry::decimal);
         let histogram = [

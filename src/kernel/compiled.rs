@@ -4,7 +4,7 @@
 //! evaluating a gate is one table look-up.
 
 use crate::logic::Logic;
-use crate::netlist::{CellKind, Corner, FlatCell, Library, Netlist, next_state};
+use crate::netlist::{ArcDelay, CellKind, FlatCell, MAX_INPUTS, Netlist, Timing, next_state};
 
 /// What a change of an input pin means for its cell. A flip-flop's D means nothing until it is sampled, and
 /// is then read from its net: it has no entry in any fan-out.
@@ -61,6 +61,8 @@ pub(super) struct CellState {
     pub is_dirty: bool,
     /// The net on a flip-flop's D.
     pub data: u32,
+    /// Index of its delays.
+    pub delays: u32,
     /// Output nets, `u32::MAX` where unconnected.
     pub outputs: [u32; 2],
 }
@@ -70,31 +72,19 @@ pub(super) struct Tables {
     gates: [[u8; 256]; CellKind::ALL.len()],
     /// Indexed by packed inputs, clock before (2 bits), state (2 bits).
     flip_flop: Vec<u8>,
-    /// Delay by cell, by mask of changed pins, by new value: the shortest of the arcs concerned.
-    delays_fs: [[[u32; 4]; 16]; CellKind::ALL.len()],
 }
 
 impl Tables {
-    pub fn new(library: &Library, corner: Corner) -> Self {
+    pub fn new() -> Self {
         let unpack = |packed: usize| [0, 2, 4, 6].map(|s| Logic::from_bits((packed >> s) as u8));
         let mut tables = Tables {
             gates: [[0; 256]; CellKind::ALL.len()],
             flip_flop: vec![0; 1 << 12],
-            delays_fs: [[[0; 4]; 16]; CellKind::ALL.len()],
         };
         for kind in CellKind::ALL {
             if !kind.is_flip_flop() {
                 for packed in 0..256 {
                     tables.gates[kind as usize][packed] = kind.output(unpack(packed)).bits();
-                }
-            }
-            for mask in 1..16usize {
-                for to in Logic::ALL {
-                    tables.delays_fs[kind as usize][mask][to as usize] = (0..kind.inputs().len())
-                        .filter(|&pin| mask >> pin & 1 == 1 && kind.triggers(pin))
-                        .map(|pin| library.arcs(kind)[pin].delay_fs(corner, to))
-                        .min()
-                        .unwrap_or(0);
                 }
             }
         }
@@ -116,15 +106,36 @@ impl Tables {
         let clock_before = (evaluated >> 2 & 3) as usize;
         self.flip_flop[inputs as usize | clock_before << 8 | (state as usize) << 10]
     }
+}
 
-    /// Delays by new value for the pins in which `inputs` and `evaluated` differ.
+/// Delays of one set by new value, and by pin.
+#[derive(Clone, Copy)]
+pub(super) struct DelaySet([[u32; 4]; MAX_INPUTS]);
+
+impl DelaySet {
+    /// The sets of `timing`, in its order.
+    pub fn all(timing: &Timing) -> Vec<Self> {
+        let by_value = |arc: &ArcDelay| Logic::ALL.map(|to| arc.to(to));
+        let sets = timing.sets().iter();
+        sets.map(|set| DelaySet(set.each_ref().map(by_value)))
+            .collect()
+    }
+
+    /// Delays by new value for the pins in which `inputs` and `evaluated` differ: the shortest of the arcs
+    /// concerned. A flip-flop's D is no cause; `inputs` and `evaluated` must agree on it.
     #[inline]
-    pub fn delays(&self, kind: CellKind, inputs: u8, evaluated: u8) -> &[u32; 4] {
+    pub fn after(&self, inputs: u8, evaluated: u8) -> [u32; 4] {
         let differing = inputs ^ evaluated;
-        let pairs = (differing | differing >> 1) & 0b0101_0101;
-        let mask = (pairs | pairs >> 1) & 0b0011_0011;
-        let mask = (mask | mask >> 2) & 0b0000_1111;
-        &self.delays_fs[kind as usize][mask as usize]
+        let mut pairs = (differing | differing >> 1) & 0b0101_0101;
+        debug_assert!(pairs != 0, "evaluated without a cause");
+        let mut delays = self.0[pairs.trailing_zeros() as usize / 2];
+        pairs &= pairs - 1;
+        while pairs != 0 {
+            let others = self.0[pairs.trailing_zeros() as usize / 2];
+            delays = std::array::from_fn(|to| delays[to].min(others[to]));
+            pairs &= pairs - 1;
+        }
+        delays
     }
 }
 
@@ -179,11 +190,12 @@ impl FanOut {
 }
 
 /// Every cell with unknown inputs and state.
-pub(super) fn initial_cells(netlist: &Netlist) -> Vec<CellState> {
+pub(super) fn initial_cells(netlist: &Netlist, timing: &Timing) -> Vec<CellState> {
     netlist
         .cells()
         .iter()
-        .map(|cell| {
+        .enumerate()
+        .map(|(index, cell)| {
             let pins = cell.kind.inputs().len() as u32;
             // Pins a cell does not have read 0: no set, no reset.
             let inputs = (0b1010_1010u32 & ((1 << (2 * pins)) - 1)) as u8;
@@ -194,6 +206,7 @@ pub(super) fn initial_cells(netlist: &Netlist) -> Vec<CellState> {
                 state: Logic::X.bits(),
                 is_dirty: false,
                 data: cell.inputs[0].index() as u32,
+                delays: timing.set_of(index),
                 outputs: cell.outputs.map(|n| {
                     if n.is_some() {
                         n.index() as u32
@@ -209,14 +222,19 @@ pub(super) fn initial_cells(netlist: &Netlist) -> Vec<CellState> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::netlist::{Corner, Library, ModuleBuilder};
 
     #[test]
     fn the_delay_is_that_of_the_pin_that_changed() {
         let library = Library::default();
-        let tables = Tables::new(&library, Corner::Typ);
-        let mux = CellKind::Mux2;
-        let arc = |pin: usize| library.arcs(mux)[pin].delay_fs(Corner::Typ, Logic::One);
-        let by_pins = |differing: u8| tables.delays(mux, differing, 0)[Logic::One as usize];
+        let mut m = ModuleBuilder::new("m");
+        let (a, b, s) = (m.input("A"), m.input("B"), m.input("S"));
+        m.gate(CellKind::Mux2, &[a, b, s]);
+        let netlist = Netlist::elaborate(&m.finish().unwrap());
+        let timing = Timing::nominal(&netlist, &library, Corner::Typ);
+        let set = DelaySet::all(&timing)[timing.set_of(0) as usize];
+        let arc = |pin: usize| library.arcs(CellKind::Mux2)[pin].delay_fs(Corner::Typ, Logic::One);
+        let by_pins = |differing: u8| set.after(differing, 0)[Logic::One as usize];
         assert_eq!(by_pins(0b00_00_01), arc(0));
         assert_eq!(by_pins(0b10_00_00), arc(2));
         assert_eq!(by_pins(0b11_01_00), arc(1).min(arc(2)));

@@ -20,11 +20,13 @@
 //! hashes, nor touches a string.
 
 mod compiled;
+mod lanes;
 mod observer;
 mod simulation;
 mod stimulus;
 mod wheel;
 
+pub use lanes::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
 pub use observer::{Observer, Recorder};
 pub use simulation::{Kernel, Statistics};
 pub use stimulus::{Drive, Stimulus, clock, in_order, merge};

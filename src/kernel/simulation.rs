@@ -1,11 +1,11 @@
 //! The event loop.
 
-use super::compiled::{CellState, FanOut, PinClass, Tables, initial_cells};
+use super::compiled::{CellState, DelaySet, FanOut, PinClass, Tables, initial_cells};
 use super::observer::Observer;
 use super::stimulus::Stimulus;
 use super::wheel::{Event, TimeWheel};
 use crate::logic::Logic;
-use crate::netlist::{Corner, Library, NetId, Netlist};
+use crate::netlist::{NetId, Netlist, Timing};
 use crate::units::Time;
 
 /// No value is pending on a net.
@@ -37,6 +37,7 @@ pub struct Kernel {
     cells: Vec<CellState>,
     fan_out: FanOut,
     tables: Tables,
+    delays: Vec<DelaySet>,
     wheel: TimeWheel,
     dirty: Vec<u32>,
     statistics: Statistics,
@@ -44,7 +45,7 @@ pub struct Kernel {
 
 impl Kernel {
     /// Prepares a simulation at time 0 with every net and flip-flop unknown.
-    pub fn new(netlist: &Netlist, library: &Library, corner: Corner) -> Self {
+    pub fn new(netlist: &Netlist, timing: &Timing) -> Self {
         let unknown = NetState {
             generation: 0,
             value: Logic::X.bits(),
@@ -53,9 +54,10 @@ impl Kernel {
         Kernel {
             now_fs: 0,
             nets: vec![unknown; netlist.net_count()],
-            cells: initial_cells(netlist),
+            cells: initial_cells(netlist, timing),
+            delays: DelaySet::all(timing),
             fan_out: FanOut::new(netlist),
-            tables: Tables::new(library, corner),
+            tables: Tables::new(),
             wheel: TimeWheel::new(),
             dirty: Vec::new(),
             statistics: Statistics::default(),
@@ -170,9 +172,13 @@ impl Kernel {
     fn evaluate(&mut self, index: usize) {
         let cell = &mut self.cells[index];
         cell.is_dirty = false;
+        // An input that changed and changed back within the instant did nothing.
+        if cell.inputs == cell.evaluated {
+            return;
+        }
         let (inputs, evaluated, kind) = (cell.inputs, cell.evaluated, cell.kind);
         cell.evaluated = inputs;
-        let outputs = cell.outputs;
+        let (outputs, set) = (cell.outputs, cell.delays);
         if kind.is_flip_flop() {
             let data = self.nets[cell.data as usize].value;
             let state = self
@@ -183,12 +189,12 @@ impl Kernel {
             }
             cell.state = state;
             let inverted = Logic::from_bits(state).inverted().bits();
-            let delays = *self.tables.delays(kind, inputs, evaluated);
+            let delays = self.delays[set as usize].after(inputs, evaluated);
             self.schedule(outputs[0], state, &delays);
             self.schedule(outputs[1], inverted, &delays);
         } else {
             let value = self.tables.gate(kind, inputs);
-            let delays = *self.tables.delays(kind, inputs, evaluated);
+            let delays = self.delays[set as usize].after(inputs, evaluated);
             self.schedule(outputs[0], value, &delays);
         }
     }

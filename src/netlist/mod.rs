@@ -14,6 +14,7 @@ mod flat;
 mod library;
 mod longest;
 mod module;
+mod timing;
 mod verilog;
 
 pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS, next_state};
@@ -23,4 +24,5 @@ pub use longest::longest_path;
 pub use module::{
     Cell, Direction, Instance, Module, ModuleBuilder, Net, NetlistError, Port, Signal,
 };
+pub use timing::{ArcDelay, CellDelays, Timing};
 pub use verilog::{write_cells, write_modules};

@@ -13,7 +13,8 @@ use rayon::prelude::*;
 
 use super::result::{Frame, PhaseTimes, PixelDepth};
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
-use crate::engine::{Cycle, Engine, EngineError, Gate, GateSimulation, Window, load, waveform};
+use crate::engine::waveform::{self, View};
+use crate::engine::{Cycle, Engine, EngineError, Gate, GateSimulation, Window, load};
 use crate::files::InputError;
 use crate::guide::GuideMap;
 use crate::photon::{PixelPhotons, StreamConfig, pixel_events};
@@ -58,6 +59,8 @@ pub struct Probe {
     pub col: usize,
     /// Where its VCD goes; the GTKWave save file goes beside it.
     pub vcd: PathBuf,
+    /// Laser cycles in the waveform; `None` for all.
+    pub wave_cycles: Option<u32>,
 }
 
 /// Everything a frame depends on.
@@ -271,8 +274,12 @@ fn run_probe(
 ) -> Result<Vec<u16>, FrameError> {
     let at = (probe.row, probe.col);
     let mut simulation = GateSimulation::new(sensor, exposure, at, (1, 1), &[start], &[events]);
-    let view_end = exposure.clock.periods(start as i64 + 8);
-    waveform::record(&mut simulation, &probe.vcd, &[at], view_end)?;
+    let pixels = [at];
+    let view = View {
+        limit: probe.wave_cycles.map(|n| exposure.stop(n as i64)),
+        ..View::of_window(&pixels, sensor, exposure, start)
+    };
+    waveform::record(&mut simulation, &probe.vcd, &view)?;
     Ok(simulation.histograms()?.remove(0))
 }
 

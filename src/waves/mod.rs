@@ -10,7 +10,7 @@
 //!
 //! ```
 //! use guided_dtof::kernel::{Drive, Kernel};
-//! use guided_dtof::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist};
+//! use guided_dtof::netlist::{CellKind, Corner, Library, ModuleBuilder, Netlist, Timing};
 //! use guided_dtof::units::Time;
 //! use guided_dtof::waves::{Selection, VcdWriter};
 //!
@@ -20,7 +20,8 @@
 //! let netlist = Netlist::elaborate(&m.finish().unwrap());
 //!
 //! let mut waves = VcdWriter::new(Vec::new(), &netlist, &Selection::all())?;
-//! let mut kernel = Kernel::new(&netlist, &Library::default(), Corner::Typ);
+//! let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+//! let mut kernel = Kernel::new(&netlist, &timing);
 //! let drives = [Drive::new(Time::from_ns(1), netlist.net("A").unwrap(), true)];
 //! let mut stimulus = guided_dtof::kernel::merge([Box::new(drives.into_iter()) as Box<_>]);
 //! kernel.run(&mut stimulus, Time::from_ns(2), &mut waves);

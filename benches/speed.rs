@@ -1,0 +1,99 @@
+//! How fast things run: the event kernel on one macropixel (net changes per second), elaboration and load of the
+//! whole array, and the engines on one macropixel of an outdoor frame.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use guided_dtof::chip::{Exposure, SensorConfig, sensor};
+use guided_dtof::engine::load::{load, load_netlist};
+use guided_dtof::engine::{Cycle, Engine, GateSimulation, Window};
+use guided_dtof::netlist::Netlist;
+use guided_dtof::photon::{PixelLight, SpadEvent, StreamConfig, pixel_events};
+use guided_dtof::units::Time;
+
+const STOP_PERIODS: u32 = 520;
+const LASER_CYCLES: u32 = 100;
+const START: u16 = 300;
+
+fn stream(config: &SensorConfig, exposure: &Exposure) -> StreamConfig {
+    StreamConfig {
+        seed: 1,
+        clock: exposure.clock,
+        stop_periods: STOP_PERIODS,
+        laser_cycles: LASER_CYCLES,
+        pulse_sigma: Time::from_ps(1_900),
+        dead_time: config.dead_time(),
+    }
+}
+
+const LIGHT: PixelLight = PixelLight {
+    signal_per_cycle: 1.0,
+    arrival: Time::from_ns(765),
+    background_hz: 10e6,
+};
+
+fn photons(config: &SensorConfig, exposure: &Exposure) -> Vec<SpadEvent> {
+    pixel_events(&stream(config, exposure), 0, &LIGHT).events
+}
+
+fn kernel(c: &mut Criterion) {
+    let config = SensorConfig::default();
+    let exposure = Exposure::new(&config, STOP_PERIODS, LASER_CYCLES);
+    let pulses = photons(&config, &exposure);
+    let prepare = || GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[START], &[&pulses]);
+    let mut once = prepare();
+    once.run(&mut ());
+    let mut group = c.benchmark_group("kernel");
+    group.sample_size(10);
+    group.throughput(Throughput::Elements(once.statistics().changes));
+    group.bench_function("one macropixel, net changes", |b| {
+        b.iter(|| {
+            let mut simulation = prepare();
+            simulation.run(&mut ());
+            black_box(simulation.statistics())
+        });
+    });
+    group.finish();
+}
+
+fn array(c: &mut Criterion) {
+    let config = SensorConfig::default();
+    let starts: Vec<u16> = (0..config.pixels()).map(|i| i as u16 & 511).collect();
+    let mut group = c.benchmark_group("64x64 array");
+    group.sample_size(10);
+    group.bench_function("elaborate", |b| {
+        b.iter(|| black_box(Netlist::elaborate(&sensor::circuit(&config))).net_count());
+    });
+    let netlist = load_netlist(&config);
+    group.bench_function("load at gate level", |b| {
+        b.iter(|| black_box(load(&config, &netlist, &starts, &mut ())).statistics);
+    });
+    group.finish();
+}
+
+fn engines(c: &mut Criterion) {
+    let config = SensorConfig::default();
+    let exposure = Exposure::new(&config, STOP_PERIODS, LASER_CYCLES);
+    let pulses = photons(&config, &exposure);
+    let clk_periods = u64::from(STOP_PERIODS) * u64::from(LASER_CYCLES);
+    let mut group = c.benchmark_group("macropixel-CLK");
+    group.throughput(Throughput::Elements(clk_periods));
+    let (cycle, window) = (
+        Cycle::new(&config, &exposure),
+        Window::new(&config, &exposure),
+    );
+    group.bench_function("cycle", |b| {
+        b.iter(|| cycle.histogram(START, black_box(&pulses)))
+    });
+    group.bench_function("window", |b| {
+        b.iter(|| window.histogram(START, black_box(&pulses)))
+    });
+    let stream = stream(&config, &exposure);
+    group.bench_function("photon stream", |b| {
+        b.iter(|| pixel_events(&stream, 0, black_box(&LIGHT)).drawn);
+    });
+    group.finish();
+}
+
+criterion_group!(benches, kernel, array, engines);
+criterion_main!(benches);

@@ -1,0 +1,168 @@
+//! The gate engine for many macropixels at once: 64 of them in one lane-parallel event queue.
+//!
+//! Each lane is a macropixel with a load path of its own, as in [`Gate`](super::Gate); they share clocks and
+//! control pins and differ in the serial bits and the photons.
+
+use bitvec::vec::BitVec;
+
+use super::EngineError;
+use super::stimulus::{Pins, Schedule, StimulusPlan};
+use crate::chip::{Exposure, SPADS, SensorConfig, histogram, load_path, sensor};
+use crate::kernel::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
+use crate::netlist::{Library, NetId, Netlist, Timing};
+use crate::photon::SpadEvent;
+use crate::units::Time;
+
+/// Up to 64 macropixels at gate level, loaded and exposed together.
+pub struct LaneSimulation<'a> {
+    config: &'a SensorConfig,
+    netlist: Netlist,
+    kernel: LaneKernel,
+    shared: StimulusPlan<'a>,
+    serial: Vec<BitVec>,
+    pulses: Vec<(usize, SpadEvent)>,
+}
+
+impl<'a> LaneSimulation<'a> {
+    /// Prepares one lane for each start value and its pulses.
+    ///
+    /// # Panics
+    /// When there are more than [`LANES`], or lists of different lengths.
+    pub fn new(
+        config: &'a SensorConfig,
+        exposure: &'a Exposure,
+        starts: &[u16],
+        pulses: &[&[SpadEvent]],
+    ) -> Self {
+        assert!(starts.len() <= LANES && starts.len() == pulses.len());
+        let netlist = Netlist::elaborate(&sensor::window(config, (0, 0), (1, 1)));
+        let timing = Timing::nominal(&netlist, &Library::default(), config.corner);
+        let kernel = LaneKernel::new(&netlist, &timing);
+        let end = exposure.end();
+        let mut all: Vec<(usize, SpadEvent)> = pulses
+            .iter()
+            .enumerate()
+            .flat_map(|(lane, list)| list.iter().map(move |&pulse| (lane, pulse)))
+            .filter(|(_, pulse)| pulse.time < end)
+            .collect();
+        all.sort_unstable_by_key(|(lane, pulse)| (pulse.time, *lane, pulse.spad));
+        LaneSimulation {
+            config,
+            netlist,
+            kernel,
+            shared: StimulusPlan::new(config, exposure, 1, &[0], &[&[]]),
+            serial: starts
+                .iter()
+                .map(|&start| load_path::stream(&[start], 1, config.counter_bits))
+                .collect(),
+            pulses: all,
+        }
+    }
+
+    /// The netlist of every lane.
+    pub fn netlist(&self) -> &Netlist {
+        &self.netlist
+    }
+
+    /// Where load and exposure lie in simulation time.
+    pub fn schedule(&self) -> Schedule {
+        self.shared.schedule()
+    }
+
+    /// The kernel, for what it counted.
+    pub fn kernel(&self) -> &LaneKernel {
+        &self.kernel
+    }
+
+    /// Simulates load and exposure to the end.
+    pub fn run<O: LaneObserver>(&mut self, observer: &mut O) {
+        let pins = Pins::of(&self.netlist);
+        let end = self.schedule().end;
+        let mut stimulus = self.stimulus(&pins).peekable();
+        self.kernel.run(&mut stimulus, end, observer);
+    }
+
+    fn stimulus(&self, pins: &Pins) -> impl Iterator<Item = LaneDrive> + use<> {
+        let serial = pins.serial();
+        let everyone = |time, net, values| LaneDrive {
+            time,
+            net,
+            mask: u64::MAX,
+            values,
+        };
+        let mut drives: Vec<LaneDrive> = Vec::new();
+        let mut bit = 0;
+        for drive in self.shared.stimulus(pins) {
+            if drive.net != serial {
+                drives.push(everyone(drive.time, drive.net, Lanes::all(drive.value)));
+            } else if drive.time == Time::ZERO {
+                drives.push(everyone(drive.time, serial, Lanes::all(drive.value)));
+            } else {
+                let bits = self.serial.iter().enumerate();
+                let word = bits.fold(0, |word, (lane, bits)| word | u64::from(bits[bit]) << lane);
+                drives.push(everyone(drive.time, serial, Lanes::known(word)));
+                bit += 1;
+            }
+        }
+        let (origin, dead_time) = (self.schedule().origin, self.config.dead_time());
+        let spad_raw: [NetId; SPADS] = std::array::from_fn(|spad| pins.spad_raw()[spad]);
+        for &(lane, pulse) in &self.pulses {
+            let net = spad_raw[usize::from(pulse.spad)];
+            let time = origin + pulse.time;
+            let mask = 1 << lane;
+            let (rise, fall) = (Lanes::known(u64::MAX), Lanes::known(0));
+            drives.push(LaneDrive {
+                time,
+                net,
+                mask,
+                values: rise,
+            });
+            drives.push(LaneDrive {
+                time: time + dead_time,
+                net,
+                mask,
+                values: fall,
+            });
+        }
+        drives.sort_by_key(|d| d.time);
+        drives.into_iter()
+    }
+
+    /// Start value in the P-counter's memory of each lane; `None` where a bit is unknown.
+    pub fn loaded(&self) -> Vec<Option<u16>> {
+        let memory = self.signal("p_counter.MEMORY");
+        self.lanes(|lane| self.kernel.number(&memory, lane).map(|code| code as u16))
+    }
+
+    /// Counts of each lane, bin 0 earliest.
+    ///
+    /// # Errors
+    /// When a bit of a count is unknown; the lane stands for the column.
+    pub fn histograms(&self) -> Result<Vec<Vec<u16>>, EngineError> {
+        let bins: Vec<Vec<NetId>> = (0..self.config.bins)
+            .map(|bin| self.signal(&format!("histogram.{}", histogram::bin_name(bin))))
+            .collect();
+        let counts = self.lanes(|lane| {
+            let count = |(bin, nets): (usize, &Vec<NetId>)| {
+                let number = self.kernel.number(nets, lane).map(|n| n as u16);
+                number.ok_or(EngineError::Unknown {
+                    row: 0,
+                    col: lane,
+                    bin,
+                })
+            };
+            bins.iter().enumerate().map(count).collect()
+        });
+        counts.into_iter().collect()
+    }
+
+    fn signal(&self, name: &str) -> Vec<NetId> {
+        let path = format!("{}.{name}", sensor::pixel_name(0, 0));
+        let nets = self.netlist.signal(&path);
+        nets.expect("every macropixel has it")
+    }
+
+    fn lanes<T>(&self, f: impl Fn(usize) -> T) -> Vec<T> {
+        (0..self.serial.len()).map(f).collect()
+    }
+}

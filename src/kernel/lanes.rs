@@ -1,0 +1,533 @@
+//! Lane-parallel events: up to 64 copies of one netlist, each with its own stimulus, in one event queue.
+//!
+//! The macropixels of an array share netlist, delays and clocks, and differ in start values and photons. Most of
+//! their activity therefore falls into the same instants. Here a net holds one value for each of 64 lanes, an
+//! event carries the lanes it is for, and a cell evaluates all lanes with a few word operations.
+//!
+//! ```text
+//!   value of a net:     one  = ...0110   lanes that are 1        lanes in neither are X
+//!                       zero = ...1001   lanes that are 0
+//!   pending on a net:   groups (time, lanes, values); cancelling a lane takes its bit out of its group
+//! ```
+//!
+//! Every lane sees exactly the value changes that [`Kernel`](super::Kernel) would give it alone: the same two
+//! phases, the same inertial rule, and the delay of the pin that changed in *that* lane. Two differences of
+//! input only: Z is driven as X, and a clock must not be driven up and down again within one instant.
+
+use super::compiled::{DelaySet, FanOut, PinClass};
+use super::wheel::{Event, TimeWheel};
+use crate::logic::Logic;
+use crate::netlist::{CellKind, MAX_INPUTS, NetId, Netlist, Timing};
+use crate::units::Time;
+
+/// Lanes of one simulation.
+pub const LANES: usize = 64;
+
+/// A value in every lane.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Lanes {
+    /// Lanes that are 1.
+    pub one: u64,
+    /// Lanes that are 0. Lanes that are neither are X.
+    pub zero: u64,
+}
+
+impl Lanes {
+    /// The same value in every lane.
+    pub const fn all(value: Logic) -> Self {
+        match value {
+            Logic::One => Lanes {
+                one: u64::MAX,
+                zero: 0,
+            },
+            Logic::Zero => Lanes {
+                one: 0,
+                zero: u64::MAX,
+            },
+            Logic::X | Logic::Z => Lanes { one: 0, zero: 0 },
+        }
+    }
+
+    /// Known values, one bit a lane.
+    pub const fn known(bits: u64) -> Self {
+        Lanes {
+            one: bits,
+            zero: !bits,
+        }
+    }
+
+    /// The value of one lane.
+    pub const fn lane(self, lane: usize) -> Logic {
+        match (self.one >> lane & 1, self.zero >> lane & 1) {
+            (1, _) => Logic::One,
+            (_, 1) => Logic::Zero,
+            _ => Logic::X,
+        }
+    }
+
+    const fn unknown(self) -> u64 {
+        !(self.one | self.zero)
+    }
+
+    const fn not(self) -> Self {
+        Lanes {
+            one: self.zero,
+            zero: self.one,
+        }
+    }
+
+    const fn and(self, other: Self) -> Self {
+        Lanes {
+            one: self.one & other.one,
+            zero: self.zero | other.zero,
+        }
+    }
+
+    const fn or(self, other: Self) -> Self {
+        Lanes {
+            one: self.one | other.one,
+            zero: self.zero & other.zero,
+        }
+    }
+
+    const fn xor(self, other: Self) -> Self {
+        Lanes {
+            one: self.one & other.zero | self.zero & other.one,
+            zero: self.one & other.one | self.zero & other.zero,
+        }
+    }
+
+    const fn mux(a: Self, b: Self, select: Self) -> Self {
+        Lanes {
+            one: select.zero & a.one | select.one & b.one | a.one & b.one,
+            zero: select.zero & a.zero | select.one & b.zero | a.zero & b.zero,
+        }
+    }
+
+    /// `other` in the lanes of `mask`, itself elsewhere.
+    const fn replaced(self, mask: u64, other: Self) -> Self {
+        Lanes {
+            one: self.one & !mask | other.one & mask,
+            zero: self.zero & !mask | other.zero & mask,
+        }
+    }
+
+    /// X in the lanes of `mask` where the two differ, itself elsewhere.
+    const fn blurred(self, mask: u64, other: Self) -> Self {
+        Lanes {
+            one: self.one & (!mask | other.one),
+            zero: self.zero & (!mask | other.zero),
+        }
+    }
+
+    const fn differs(self, other: Self) -> u64 {
+        (self.one ^ other.one) | (self.zero ^ other.zero)
+    }
+}
+
+/// Some lanes of one input take a value at one time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LaneDrive {
+    /// When.
+    pub time: Time,
+    /// Which input.
+    pub net: NetId,
+    /// Which lanes.
+    pub mask: u64,
+    /// To what, in those lanes.
+    pub values: Lanes,
+}
+
+/// Hears of every net change, in time order.
+pub trait LaneObserver {
+    /// The lanes in `mask` of `net` took `values` at `time`.
+    fn change(&mut self, time: Time, net: NetId, mask: u64, values: Lanes);
+}
+
+impl LaneObserver for () {
+    #[inline]
+    fn change(&mut self, _: Time, _: NetId, _: u64, _: Lanes) {}
+}
+
+/// No group.
+const NONE: u32 = u32::MAX;
+
+#[derive(Clone, Copy)]
+struct NetState {
+    value: Lanes,
+    /// Lanes with a change on its way, and to what.
+    pending: u64,
+    pending_value: Lanes,
+    /// First of the net's groups.
+    groups: u32,
+}
+
+/// Changes on their way to one net at one time.
+#[derive(Clone, Copy)]
+struct Group {
+    time_fs: i64,
+    mask: u64,
+    next: u32,
+}
+
+#[derive(Clone, Copy)]
+struct CellState {
+    kind: CellKind,
+    is_dirty: bool,
+    inputs: [u32; MAX_INPUTS],
+    outputs: [u32; 2],
+    delays: u32,
+    /// Lanes in which each pin changed since the last evaluation.
+    changed: [u64; MAX_INPUTS],
+    /// Lanes in which the clock rose, and in which it may have risen.
+    rose: u64,
+    may_have_risen: u64,
+    state: Lanes,
+}
+
+/// An event-driven simulation of up to 64 copies of one netlist.
+pub struct LaneKernel {
+    now_fs: i64,
+    nets: Vec<NetState>,
+    cells: Vec<CellState>,
+    fan_out: FanOut,
+    delays: Vec<DelaySet>,
+    wheel: TimeWheel,
+    groups: Vec<Group>,
+    free_group: u32,
+    dirty: Vec<u32>,
+    events: u64,
+    lane_changes: u64,
+}
+
+impl LaneKernel {
+    /// Prepares a simulation at time 0 with every net and flip-flop of every lane unknown.
+    pub fn new(netlist: &Netlist, timing: &Timing) -> Self {
+        let unknown = Lanes::all(Logic::X);
+        let net = NetState {
+            value: unknown,
+            pending: 0,
+            pending_value: unknown,
+            groups: NONE,
+        };
+        let index = |n: NetId| if n.is_some() { n.index() as u32 } else { NONE };
+        let cells = netlist
+            .cells()
+            .iter()
+            .enumerate()
+            .map(|(i, cell)| CellState {
+                kind: cell.kind,
+                is_dirty: false,
+                inputs: cell.inputs.map(index),
+                outputs: cell.outputs.map(index),
+                delays: timing.set_of(i),
+                changed: [0; MAX_INPUTS],
+                rose: 0,
+                may_have_risen: 0,
+                state: unknown,
+            });
+        LaneKernel {
+            now_fs: 0,
+            nets: vec![net; netlist.net_count()],
+            cells: cells.collect(),
+            fan_out: FanOut::new(netlist),
+            delays: DelaySet::all(timing),
+            wheel: TimeWheel::new(),
+            groups: Vec::new(),
+            free_group: NONE,
+            dirty: Vec::new(),
+            events: 0,
+            lane_changes: 0,
+        }
+    }
+
+    /// Present value of a net in every lane.
+    pub fn value(&self, net: NetId) -> Lanes {
+        self.nets[net.index()].value
+    }
+
+    /// Present value of a bus of at most 64 bits in one lane, bit 0 first, where all bits are known.
+    pub fn number(&self, nets: &[NetId], lane: usize) -> Option<u64> {
+        nets.iter().rev().try_fold(0, |number, &net| {
+            Some(number << 1 | self.value(net).lane(lane).to_bool()? as u64)
+        })
+    }
+
+    /// Net changes so far, a change in several lanes counted once.
+    pub fn events(&self) -> u64 {
+        self.events
+    }
+
+    /// Net changes so far, summed over the lanes.
+    pub fn lane_changes(&self) -> u64 {
+        self.lane_changes
+    }
+
+    /// Simulates everything up to and including `until`. `stimulus` must be in time order.
+    pub fn run<O: LaneObserver>(
+        &mut self,
+        stimulus: &mut std::iter::Peekable<impl Iterator<Item = LaneDrive>>,
+        until: Time,
+        observer: &mut O,
+    ) {
+        let until_fs = until.as_fs();
+        loop {
+            let drive_fs = stimulus.peek().map_or(i64::MAX, |d| d.time.as_fs());
+            let time_fs = match self.wheel.next_time(drive_fs.min(until_fs)) {
+                Some(time_fs) => time_fs,
+                None if drive_fs <= until_fs => drive_fs,
+                None => break,
+            };
+            debug_assert!(time_fs >= self.now_fs, "a drive in the past");
+            self.now_fs = time_fs;
+            self.wheel.advance(time_fs);
+            while let Some(drive) = stimulus.next_if(|d| d.time.as_fs() <= time_fs) {
+                let net = drive.net.index();
+                let mask = drive.mask & self.nets[net].value.differs(drive.values);
+                if mask != 0 {
+                    self.apply(net, mask, drive.values, observer);
+                }
+            }
+            self.settle(observer);
+        }
+        self.now_fs = self.now_fs.max(until_fs);
+        self.wheel.advance(self.now_fs);
+    }
+
+    fn settle<O: LaneObserver>(&mut self, observer: &mut O) {
+        loop {
+            while let Some(event) = self.wheel.pop_at(self.now_fs) {
+                let net = event.net as usize;
+                let mask = self.take_group(net);
+                if mask != 0 {
+                    let values = self.nets[net].pending_value;
+                    self.nets[net].pending &= !mask;
+                    self.apply(net, mask, values, observer);
+                }
+            }
+            if self.dirty.is_empty() {
+                return;
+            }
+            let mut dirty = std::mem::take(&mut self.dirty);
+            for &cell in &dirty {
+                self.evaluate(cell as usize);
+            }
+            dirty.clear();
+            self.dirty = dirty;
+        }
+    }
+
+    /// Unlinks the group of `net` that is due now; returns its lanes.
+    fn take_group(&mut self, net: usize) -> u64 {
+        let mut previous = NONE;
+        let mut index = self.nets[net].groups;
+        while index != NONE {
+            let group = self.groups[index as usize];
+            if group.time_fs == self.now_fs {
+                match previous {
+                    NONE => self.nets[net].groups = group.next,
+                    p => self.groups[p as usize].next = group.next,
+                }
+                self.groups[index as usize].next = self.free_group;
+                self.free_group = index;
+                return group.mask;
+            }
+            (previous, index) = (index, group.next);
+        }
+        0
+    }
+
+    fn apply<O: LaneObserver>(&mut self, net: usize, mask: u64, values: Lanes, observer: &mut O) {
+        let before = self.nets[net].value;
+        let after = before.replaced(mask, values);
+        self.nets[net].value = after;
+        self.events += 1;
+        self.lane_changes += u64::from(mask.count_ones());
+        observer.change(Time::from_fs(self.now_fs), NetId::new(net), mask, after);
+        let rose = mask & before.zero & after.one;
+        let may_have_risen = mask & (before.zero & after.unknown() | before.unknown() & after.one);
+        for &load in self.fan_out.of(net) {
+            let cell = &mut self.cells[load.cell()];
+            let pin = load.shift() as usize / 2;
+            if load.class() == PinClass::Clock {
+                // A clock going low causes nothing.
+                let caused = mask & !after.zero;
+                cell.changed[pin] |= caused;
+                cell.rose |= rose;
+                cell.may_have_risen |= may_have_risen;
+                if caused == 0 {
+                    continue;
+                }
+            } else {
+                cell.changed[pin] |= mask;
+            }
+            if !cell.is_dirty {
+                cell.is_dirty = true;
+                self.dirty.push(load.cell() as u32);
+            }
+        }
+    }
+
+    fn evaluate(&mut self, index: usize) {
+        let cell = &mut self.cells[index];
+        cell.is_dirty = false;
+        let nets = &self.nets;
+        let input = |pin: usize| nets[cell.inputs[pin] as usize].value;
+        let value = match cell.kind {
+            CellKind::Inv => input(0).not(),
+            CellKind::Buf => input(0),
+            CellKind::Nand2 => input(0).and(input(1)).not(),
+            CellKind::Nor2 => input(0).or(input(1)).not(),
+            CellKind::And2 => input(0).and(input(1)),
+            CellKind::Or2 => input(0).or(input(1)),
+            CellKind::Xor2 => input(0).xor(input(1)),
+            CellKind::Xnor2 => input(0).xor(input(1)).not(),
+            CellKind::Mux2 => Lanes::mux(input(0), input(1), input(2)),
+            CellKind::Dffr | CellKind::Dffsr => {
+                let data = input(0);
+                let clocked = cell
+                    .state
+                    .replaced(cell.rose, data)
+                    .blurred(cell.may_have_risen, data);
+                let set = match cell.kind {
+                    CellKind::Dffsr => input(3),
+                    _ => Lanes::all(Logic::Zero),
+                };
+                let one = Lanes::all(Logic::One);
+                let zero = Lanes::all(Logic::Zero);
+                let after_set = clocked.replaced(set.one, one).blurred(set.unknown(), one);
+                let reset = input(2);
+                let next = after_set
+                    .replaced(reset.one, zero)
+                    .blurred(reset.unknown(), zero);
+                (cell.rose, cell.may_have_risen) = (0, 0);
+                cell.state = next;
+                next
+            }
+        };
+        let (outputs, set) = (cell.outputs, cell.delays as usize);
+        let changed = std::mem::take(&mut cell.changed);
+        self.schedule(outputs[0], value, set, &changed);
+        if outputs[1] != NONE {
+            self.schedule(outputs[1], value.not(), set, &changed);
+        }
+    }
+
+    fn schedule(&mut self, net: u32, value: Lanes, set: usize, changed: &[u64; MAX_INPUTS]) {
+        let Some(state) = self.nets.get_mut(net as usize) else {
+            return;
+        };
+        let target = state.value.replaced(state.pending, state.pending_value);
+        let moved = target.differs(value);
+        if moved == 0 {
+            return;
+        }
+        let cancelled = moved & state.pending;
+        if cancelled != 0 {
+            state.pending &= !cancelled;
+            let mut index = state.groups;
+            while index != NONE {
+                let group = &mut self.groups[index as usize];
+                group.mask &= !cancelled;
+                index = group.next;
+            }
+        }
+        let state = &mut self.nets[net as usize];
+        let mut left = moved & state.value.differs(value);
+        state.pending |= left;
+        state.pending_value = state.pending_value.replaced(left, value);
+        // Lanes with the same pins changed have the same delays.
+        while left != 0 {
+            let lane = left.trailing_zeros();
+            let mut alike = left;
+            let mut pins = 0u8;
+            for (pin, lanes) in changed.iter().enumerate() {
+                if lanes >> lane & 1 == 1 {
+                    alike &= lanes;
+                    pins |= 1 << (2 * pin);
+                } else {
+                    alike &= !lanes;
+                }
+            }
+            left &= !alike;
+            debug_assert!(pins != 0, "an output moved without a cause");
+            let delays_fs = self.delays[set].after(pins, 0);
+            for (mask, to) in [
+                (value.one, Logic::One),
+                (value.zero, Logic::Zero),
+                (value.unknown(), Logic::X),
+            ] {
+                let mask = mask & alike;
+                if mask != 0 {
+                    let time_fs = self.now_fs + i64::from(delays_fs[to as usize]);
+                    self.add(net, time_fs, mask);
+                }
+            }
+        }
+    }
+
+    /// Adds lanes to the group of `net` at `time_fs`, making it where there is none.
+    fn add(&mut self, net: u32, time_fs: i64, mask: u64) {
+        let mut index = self.nets[net as usize].groups;
+        while index != NONE {
+            let group = &mut self.groups[index as usize];
+            if group.time_fs == time_fs {
+                group.mask |= mask;
+                return;
+            }
+            index = group.next;
+        }
+        let group = Group {
+            time_fs,
+            mask,
+            next: self.nets[net as usize].groups,
+        };
+        let index = match self.free_group {
+            NONE => {
+                self.groups.push(group);
+                self.groups.len() as u32 - 1
+            }
+            free => {
+                self.free_group = self.groups[free as usize].next;
+                self.groups[free as usize] = group;
+                free
+            }
+        };
+        self.nets[net as usize].groups = index;
+        self.wheel.push(Event {
+            time_fs,
+            net,
+            tag: 0,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn word_operations_are_the_truth_tables() {
+        let values = [Logic::Zero, Logic::One, Logic::X];
+        let lanes = |f: &dyn Fn(usize) -> Logic| {
+            (0..27).fold(Lanes::default(), |mut word, lane| {
+                match f(lane) {
+                    Logic::One => word.one |= 1 << lane,
+                    Logic::Zero => word.zero |= 1 << lane,
+                    _ => {}
+                }
+                word
+            })
+        };
+        let pick = |digit: u32| move |lane: usize| values[lane / 3usize.pow(digit) % 3];
+        let (a, b, s) = (lanes(&pick(0)), lanes(&pick(1)), lanes(&pick(2)));
+        for lane in 0..27 {
+            let (x, y, z) = (pick(0)(lane), pick(1)(lane), pick(2)(lane));
+            assert_eq!(a.and(b).lane(lane), x.and(y));
+            assert_eq!(a.or(b).lane(lane), x.or(y));
+            assert_eq!(a.xor(b).lane(lane), x.xor(y));
+            assert_eq!(a.not().lane(lane), !x);
+            assert_eq!(Lanes::mux(a, b, s).lane(lane), Logic::mux(x, y, z));
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! The delays of an elaborated design in one corner: those of the library, or of each instance by itself.
+//!
+//! Nominal designs share one set of delays per kind of cell. A cell whose delays are changed (mismatch,
+//! back-annotation) gets a set of its own.
+
+use super::cell::{CellKind, MAX_INPUTS};
+use super::flat::Netlist;
+use super::library::{Corner, Library};
+use crate::logic::Logic;
+
+/// Delays from one input pin to an output, fs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ArcDelay {
+    /// To a rising output.
+    pub rise_fs: u32,
+    /// To a falling output.
+    pub fall_fs: u32,
+}
+
+impl ArcDelay {
+    /// Delay of an output change to `to`, fs; a change to X takes the shorter one.
+    #[inline]
+    pub fn to(self, to: Logic) -> u32 {
+        match to {
+            Logic::One => self.rise_fs,
+            Logic::Zero => self.fall_fs,
+            Logic::X | Logic::Z => self.rise_fs.min(self.fall_fs),
+        }
+    }
+}
+
+/// Delays of one cell by input pin.
+pub type CellDelays = [ArcDelay; MAX_INPUTS];
+
+/// Delays of every cell of a netlist.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Timing {
+    sets: Vec<CellDelays>,
+    of_cell: Vec<u32>,
+}
+
+impl Timing {
+    /// Every cell as the library has it in this corner.
+    pub fn nominal(netlist: &Netlist, library: &Library, corner: Corner) -> Self {
+        let arc = |kind: CellKind, pin: usize| ArcDelay {
+            rise_fs: library.arcs(kind)[pin].delay_fs(corner, Logic::One),
+            fall_fs: library.arcs(kind)[pin].delay_fs(corner, Logic::Zero),
+        };
+        Timing {
+            sets: CellKind::ALL
+                .iter()
+                .map(|&kind| std::array::from_fn(|pin| arc(kind, pin)))
+                .collect(),
+            of_cell: netlist.cells().iter().map(|c| c.kind as u32).collect(),
+        }
+    }
+
+    /// Delays of one cell.
+    #[inline]
+    pub fn of(&self, cell: usize) -> &CellDelays {
+        &self.sets[self.of_cell[cell] as usize]
+    }
+
+    /// Gives one cell delays of its own.
+    pub fn set(&mut self, cell: usize, delays: CellDelays) {
+        let shared = self.of_cell[cell] < CellKind::ALL.len() as u32;
+        if shared {
+            self.of_cell[cell] = self.sets.len() as u32;
+            self.sets.push(delays);
+        } else {
+            self.sets[self.of_cell[cell] as usize] = delays;
+        }
+    }
+
+    /// Distinct sets of delays.
+    pub(crate) fn sets(&self) -> &[CellDelays] {
+        &self.sets
+    }
+
+    /// Index into [`Timing::sets`] by cell.
+    pub(crate) fn set_of(&self, cell: usize) -> u32 {
+        self.of_cell[cell]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::netlist::ModuleBuilder;
+
+    #[test]
+    fn a_changed_cell_leaves_its_siblings_alone() {
+        let mut m = ModuleBuilder::new("pair");
+        let a = m.input("A");
+        let b = m.gate(CellKind::Inv, &[a]);
+        m.gate(CellKind::Inv, &[b]);
+        let netlist = Netlist::elaborate(&m.finish().unwrap());
+        let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let nominal = *timing.of(0);
+        let slow = [ArcDelay {
+            rise_fs: 9,
+            fall_fs: 8,
+        }; MAX_INPUTS];
+        timing.set(1, slow);
+        timing.set(1, slow);
+        assert_eq!(*timing.of(0), nominal);
+        assert_eq!(*timing.of(1), slow);
+        assert_eq!(timing.of(1)[0].to(Logic::X), 8);
+    }
+}
