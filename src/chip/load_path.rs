@@ -220,6 +220,87 @@ pub fn codes(stream: &bitvec::slice::BitSlice, cols: usize, bits: usize) -> Vec<
         .collect()
 }
 
+/// Reference model of the deserialiser, one LOAD_CLK edge at a time.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Deserialiser {
+    row: bitvec::vec::BitVec,
+    bit: usize,
+    done: bool,
+}
+
+impl Deserialiser {
+    /// A deserialiser that has been reset.
+    pub fn new(cols: usize, bits: usize) -> Self {
+        Deserialiser {
+            row: bitvec::bitvec![0; cols * bits],
+            bit: 0,
+            done: false,
+        }
+    }
+
+    /// LOAD_RESET.
+    pub fn reset(&mut self) {
+        self.row.fill(false);
+        self.bit = 0;
+        self.done = false;
+    }
+
+    /// A rising edge of LOAD_CLK with this COUNTER_INITS.
+    pub fn clock(&mut self, serial: bool) {
+        self.row.shift_end(1);
+        self.row.set(0, serial);
+        self.done = self.bit + 1 == self.row.len();
+        self.bit = (self.bit + 1) % self.row.len();
+    }
+
+    /// COUNTER_INIT_ROW, bit 0 first.
+    pub fn row(&self) -> &bitvec::slice::BitSlice {
+        &self.row
+    }
+
+    /// ROW_DONE.
+    pub fn row_done(&self) -> bool {
+        self.done
+    }
+}
+
+/// Reference model of the row scanner: the row that holds the token.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RowScanner {
+    rows: usize,
+    token: usize,
+    done: bool,
+}
+
+impl RowScanner {
+    /// A row scanner that has been reset.
+    pub fn new(rows: usize) -> Self {
+        RowScanner {
+            rows,
+            token: 0,
+            done: false,
+        }
+    }
+
+    /// LOAD_RESET.
+    pub fn reset(&mut self) {
+        *self = RowScanner::new(self.rows);
+    }
+
+    /// ROW_DONE takes this value. Its fall hands the token on.
+    pub fn row_done(&mut self, done: bool) {
+        if self.done && !done {
+            self.token = (self.token + 1) % self.rows;
+        }
+        self.done = done;
+    }
+
+    /// The row whose MEMORY_LOAD is high in this half of the LOAD_CLK period, if any.
+    pub fn memory_load(&self, load_clk: bool) -> Option<usize> {
+        (self.done && !load_clk).then_some(self.token)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -234,6 +315,26 @@ mod tests {
             let stream = stream(&codes_in, cols, bits);
             prop_assert_eq!(stream.len(), rows * cols * bits);
             prop_assert_eq!(codes(&stream, cols, bits), codes_in);
+        }
+
+        #[test]
+        fn the_models_step_by_step_leave_the_codes(rows in 1usize..6, cols in 1usize..6, bits in 2usize..12, seed: u64) {
+            let stream: bitvec::vec::BitVec = (0..rows * cols * bits)
+                .map(|i| seed.wrapping_mul(i as u64 * 2 + 1) >> 20 & 1 == 1)
+                .collect();
+            let mut deserialiser = Deserialiser::new(cols, bits);
+            let mut scanner = RowScanner::new(rows);
+            let mut found = vec![0; rows * cols];
+            for bit in stream.iter().by_vals() {
+                deserialiser.clock(bit);
+                scanner.row_done(deserialiser.row_done());
+                if let Some(row) = scanner.memory_load(false) {
+                    for (col, code) in deserialiser.row().chunks(bits).enumerate() {
+                        found[row * cols + col] = code.iter_ones().map(|b| 1u16 << b).sum();
+                    }
+                }
+            }
+            prop_assert_eq!(found, codes(&stream, cols, bits));
         }
     }
 }

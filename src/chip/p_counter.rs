@@ -139,6 +139,11 @@ impl Model {
         self.local_stop
     }
 
+    /// COUNTER_OUT of `bits` stages; all ones once the counter has rolled over.
+    pub fn counter_out(&self, bits: usize) -> u64 {
+        self.value as u64 & ((1 << bits) - 1)
+    }
+
     /// LOCAL_STOP.
     pub fn local_stop(&self) -> bool {
         self.local_stop

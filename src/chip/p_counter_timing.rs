@@ -21,10 +21,13 @@
 //! Timing: at a STOP edge the falling LOCAL_STOP unblocks COUNTER_CLK, which rises if CLK is low. That
 //! edge must still meet an active reset, hence the length of the chain.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::finished;
+use super::window_law::ChipTiming;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
+use crate::units::Time;
 
 /// Buffers in the delay chain that sets the width of COUNTER_RESET.
 pub const DELAY_CHAIN: usize = 6;
@@ -62,4 +65,64 @@ pub fn circuit() -> Arc<Module> {
     m.gate_into(CellKind::Or2, &[disabled, local_stop], block);
     m.gate_into(CellKind::Nor2, &[clk, block], counter_clk);
     finished(m.finish())
+}
+
+/// Reference model: the block's inputs, and what it makes of them when everything has settled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Model {
+    /// CLK.
+    pub clk: bool,
+    /// RESETB.
+    pub resetb: bool,
+    /// ENABLE.
+    pub enable: bool,
+    /// LOCAL_STOP.
+    pub local_stop: bool,
+}
+
+impl Model {
+    /// COUNTER_CLK: NOT CLK, while enabled and before LOCAL_STOP.
+    pub fn counter_clk(&self) -> bool {
+        !self.clk && self.enable && !self.local_stop
+    }
+
+    /// MEMORY_RESET.
+    pub fn memory_reset(&self) -> bool {
+        !self.resetb
+    }
+
+    /// COUNTER_RESET apart from its pulses: held in reset and while disabled.
+    pub fn counter_reset(&self) -> bool {
+        !self.resetb || !self.enable
+    }
+
+    /// The pulse of COUNTER_RESET that a rising edge of STOP at `stop` makes.
+    pub fn reset_pulse(timing: &ChipTiming, stop: Time) -> Range<Time> {
+        stop + timing.stop_to_reset..stop + timing.stop_to_reset_release
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn local_stop_and_enable_block_the_clock_and_only_enable_resets() {
+        let running = Model {
+            resetb: true,
+            enable: true,
+            ..Model::default()
+        };
+        assert!(running.counter_clk() && !running.counter_reset());
+        let stopped = Model {
+            local_stop: true,
+            ..running
+        };
+        assert!(!stopped.counter_clk() && !stopped.counter_reset());
+        let disabled = Model {
+            enable: false,
+            ..running
+        };
+        assert!(!disabled.counter_clk() && disabled.counter_reset());
+    }
 }

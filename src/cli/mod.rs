@@ -4,6 +4,9 @@
 mod export;
 mod frame;
 mod replay;
+mod testbench;
+
+pub use testbench::testbench;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -78,7 +78,7 @@ impl<'a> LaneSimulation<'a> {
     pub fn run<O: LaneObserver>(&mut self, observer: &mut O) {
         let pins = Pins::of(&self.netlist);
         let end = self.schedule().end;
-        let mut stimulus = self.stimulus(&pins).into_iter().peekable();
+        let mut stimulus = self.stimulus(&pins).peekable();
         self.kernel.run(&mut stimulus, end, observer);
     }
 

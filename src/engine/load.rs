@@ -11,7 +11,7 @@ use crate::units::Time;
 pub struct Load {
     /// Start values in the memories, row-major; `None` where a bit is unknown.
     pub starts: Vec<Option<u16>>,
-    /// From the first rising edge of LOAD_CLK to the end of the load.
+    /// From the falling edge of LOAD_CLK that brings the first bit to the end of the load.
     pub duration: Time,
     /// What the simulation did.
     pub statistics: Statistics,

@@ -29,4 +29,4 @@ mod wheel;
 pub use lanes::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
 pub use observer::{Observer, Recorder};
 pub use simulation::{Kernel, Statistics};
-pub use stimulus::{Drive, Stimulus, clock, merge};
+pub use stimulus::{Drive, Stimulus, clock, in_order, merge};

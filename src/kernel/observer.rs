@@ -63,6 +63,20 @@ impl Recorder {
         self.edges(net, Logic::Zero)
     }
 
+    /// The value of a recorded net at `time`, changes at that instant included; X before its first change.
+    pub fn value_at(&self, net: NetId, time: Time) -> Logic {
+        let until = self.changes.partition_point(|(t, _, _)| *t <= time);
+        let last = self.changes[..until].iter().rev().find(|c| c.1 == net);
+        last.map_or(Logic::X, |&(_, _, value)| value)
+    }
+
+    /// The number on a recorded bus (bit 0 first, at most 64 bits) at `time`, where all bits are known.
+    pub fn number_at(&self, nets: &[NetId], time: Time) -> Option<u64> {
+        nets.iter().rev().try_fold(0, |number, &net| {
+            Some(number << 1 | self.value_at(net, time).to_bool()? as u64)
+        })
+    }
+
     fn edges(&self, net: NetId, to: Logic) -> Vec<Time> {
         self.changes
             .iter()

@@ -50,6 +50,12 @@ pub fn merge<'a>(
     (Box::new(merged) as Box<dyn Iterator<Item = Drive> + Send + 'a>).peekable()
 }
 
+/// Makes a [`Stimulus`] of drives in any order; of drives at the same time, the first given comes first.
+pub fn in_order(mut drives: Vec<Drive>) -> Stimulus<'static> {
+    drives.sort_by_key(|drive| drive.time);
+    (Box::new(drives.into_iter()) as Box<dyn Iterator<Item = Drive> + Send>).peekable()
+}
+
 /// A clock's edges for half periods `first..end` counted from `origin`: even ones fall, odd ones
 /// rise, each computed from its number.
 pub fn clock(

@@ -1,0 +1,388 @@
+//! Testbench of the macropixel: two of them in a sensor, as in Fig. 48, and what a photon becomes on its way to
+//! a bin (thesis 4.2, 4.3, Fig. 47, 48).
+//!
+//! ```text
+//!   SPAD_RAW ─► mp_r0_c0, start value 52 ─► LOCAL_STOP ─► histogram
+//!          └──► mp_r0_c1, start value 49 ─► LOCAL_STOP, 3 CLK periods earlier ─► the same histogram, 3 bins on
+//! ```
+//!
+//! Everything goes through the sensor's pins: serial load, CLK, STOP and the SPADs' pulses.
+
+use std::fmt::Debug;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use guided_dtof::chip::window_law::OpenWindow;
+use guided_dtof::chip::{
+    EventType, Exposure, Overflow, SPADS, SensorConfig, WindowLaw, correlation, histogram, sensor,
+};
+use guided_dtof::cli::testbench;
+use guided_dtof::engine::GateSimulation;
+use guided_dtof::engine::waveform::{write_vcd, write_view};
+use guided_dtof::files::InputError;
+use guided_dtof::kernel::Recorder;
+use guided_dtof::photon::SpadEvent;
+use guided_dtof::report::Checks;
+use guided_dtof::units::Time;
+use guided_dtof::waves::{Entry, Group, SaveFile};
+
+/// Start values of Fig. 48's two macropixels.
+const STARTS: [u16; 2] = [52, 49];
+/// CLK periods between two STOP edges.
+const STOP_PERIODS: u32 = 64;
+
+fn main() -> ExitCode {
+    testbench(
+        "tb_macropixel",
+        "Macropixels: Fig. 48's two windows, and which photon is counted where",
+        run,
+    )
+}
+
+fn run(out: &Path, checks: &mut Checks) -> Result<PathBuf, InputError> {
+    let vcd = out.join("tb_macropixel.vcd");
+    figure_48(&vcd, checks)?;
+    bin_edge(checks);
+    full_bins(checks);
+    coincidences(checks);
+    cancelling_pulses(checks);
+    Ok(vcd)
+}
+
+/// A sensor of one macropixel.
+fn config() -> SensorConfig {
+    SensorConfig {
+        rows: 1,
+        cols: 1,
+        ..SensorConfig::default()
+    }
+}
+
+/// The law of an exposure, and the window that it gives a start value.
+fn window(config: &SensorConfig, exposure: &Exposure, start: u16) -> (WindowLaw, OpenWindow) {
+    let law = WindowLaw::new(config, exposure);
+    let window = law
+        .window(start)
+        .open()
+        .expect("a start value within the laser cycle");
+    (law, window)
+}
+
+/// The middle of a bin in one laser cycle.
+fn middle(law: &WindowLaw, window: &OpenWindow, cycle: u32, bin: i64) -> Time {
+    let bin = law.bin_interval(window, cycle as i64, bin);
+    Time::from_fs((bin.start + bin.end).as_fs() / 2)
+}
+
+/// What the gates count with one start value; `None` where a bin is unknown.
+fn counted(
+    config: &SensorConfig,
+    exposure: &Exposure,
+    start: u16,
+    pulses: &mut [SpadEvent],
+) -> Option<Vec<u16>> {
+    pulses.sort_unstable();
+    let size = (1, 1);
+    let mut gate = GateSimulation::new(config, exposure, (0, 0), size, &[start], &[pulses]);
+    gate.run(&mut ());
+    Some(gate.histograms().ok()?.remove(0))
+}
+
+/// What the window law says is counted of pulses that come alone in their CLK period.
+fn by_law(
+    config: &SensorConfig,
+    exposure: &Exposure,
+    start: u16,
+    pulses: &[SpadEvent],
+) -> Vec<u16> {
+    let (law, window) = window(config, exposure, start);
+    let in_bin = |bin: i64, pulse: &&SpadEvent| {
+        let mut cycles = 0..exposure.laser_cycles as i64;
+        cycles.any(|cycle| law.bin_interval(&window, cycle, bin).contains(&pulse.time))
+    };
+    let bins = 0..config.bins as i64;
+    bins.map(|bin| pulses.iter().filter(|p| in_bin(bin, p)).count() as u16)
+        .collect()
+}
+
+/// Histograms and other lists, or that there is none.
+fn shown<T: Debug>(counts: &Option<T>) -> String {
+    counts
+        .as_ref()
+        .map_or("unknown".to_owned(), |c| format!("{c:?}"))
+}
+
+fn figure_48(vcd: &Path, checks: &mut Checks) -> Result<(), InputError> {
+    let config = SensorConfig {
+        cols: 2,
+        ..config()
+    };
+    let exposure = Exposure::new(&config, STOP_PERIODS, 6);
+    let shift = (STARTS[0] - STARTS[1]) as usize;
+    let (law, second) = window(&config, &exposure, STARTS[1]);
+    let photons_of = |bin: i64| (bin * bin * bin + 3 * bin).rem_euclid(11) as u32 / 2;
+    // Photons from before the earlier window to after the later one, a different number in every CLK period;
+    // no SPAD fires twice within its dead time.
+    let (first_bin, last_bin) = (-4, (config.bins + shift) as i64 + 4);
+    let mut pulses: Vec<SpadEvent> = (0..exposure.laser_cycles)
+        .flat_map(|cycle| (first_bin..last_bin).map(move |bin| (cycle, bin)))
+        .filter(|(cycle, bin)| (cycle + 3) % exposure.laser_cycles <= photons_of(*bin))
+        .map(|(cycle, bin)| SpadEvent {
+            time: middle(&law, &second, cycle, bin),
+            spad: bin.rem_euclid(SPADS as i64) as u8,
+        })
+        .collect();
+    pulses.sort_unstable();
+
+    let lists = [&pulses[..], &pulses[..]];
+    let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 2), &STARTS, &lists);
+    let netlist = Arc::clone(gate.netlist());
+    let local_stop = netlist.signal("LOCAL_STOP").expect("a port of the sensor");
+    let mut recorder = Recorder::new(local_stop.iter().copied());
+    let origin = gate.schedule().origin;
+    write_vcd(vcd, &netlist, Time::MAX, |waves| {
+        gate.run(&mut (&mut recorder, waves));
+        gate.schedule().end
+    })?;
+    let view = view(&config, origin, origin + exposure.stop(1));
+    write_view(vcd, &netlist, &view)?;
+
+    checks.equal(
+        "start values loaded",
+        shown(&Some(STARTS)),
+        shown(&gate.loaded().into_iter().collect::<Option<Vec<u16>>>()),
+    );
+    let histograms = gate.histograms().ok();
+    for (pixel, &start) in STARTS.iter().enumerate() {
+        let found = histograms.as_ref().map(|h| &h[pixel]);
+        checks.equal(
+            format!("start value {start}: histogram, against the window law"),
+            shown(&Some(by_law(&config, &exposure, start, &pulses))),
+            shown(&found),
+        );
+    }
+    let (later, earlier) = match &histograms {
+        Some(h) => (&h[0][..config.bins - shift], &h[1][shift..]),
+        None => (&[][..], &[][..]),
+    };
+    let is_telling = later.iter().any(|&n| n != later[0]);
+    checks.that(
+        format!(
+            "bins 0 up of {} are bins {shift} up of {}",
+            STARTS[0], STARTS[1]
+        ),
+        format!("{earlier:?}"),
+        format!("{later:?}"),
+        is_telling && later == earlier,
+    );
+    let rises = local_stop
+        .iter()
+        .map(|&net| recorder.rising_edges(net))
+        .collect::<Vec<_>>();
+    for (cycle, (later, earlier)) in rises[0].iter().zip(&rises[1]).enumerate() {
+        // Each edge of CLK is rounded to a femtosecond.
+        let expected = exposure.clock.periods(shift as i64);
+        let found = *later - *earlier;
+        checks.that(
+            format!(
+                "laser cycle {cycle}: LOCAL_STOP {} before that of {}",
+                STARTS[1], STARTS[0]
+            ),
+            format!("{shift} periods, {expected}"),
+            found,
+            (found - expected).as_fs().abs() <= 1,
+        );
+    }
+    for (rises, start) in rises.iter().zip(STARTS) {
+        let what = format!("start value {start}: LOCAL_STOPs");
+        checks.equal(what, exposure.laser_cycles as usize, rises.len());
+        let (_, window) = window(&config, &exposure, start);
+        let found: Vec<Time> = rises.iter().take(1).map(|&t| t - origin).collect();
+        let what = format!("start value {start}: first LOCAL_STOP after STOP, by the law");
+        checks.times(what, window.strobe_cause, &found);
+    }
+    Ok(())
+}
+
+fn view(config: &SensorConfig, origin: Time, end: Time) -> SaveFile {
+    let mut groups = vec![Group::new(
+        "Global signals",
+        [
+            Entry::binary("CLK"),
+            Entry::binary("STOP"),
+            Entry::binary("ENABLE"),
+        ],
+    )];
+    for (col, start) in STARTS.into_iter().enumerate() {
+        let pixel = sensor::pixel_name(0, col);
+        let of = |name: &str| format!("{pixel}.{name}");
+        let signals = [
+            Entry::hex(of("SPAD_RAW")),
+            Entry::hex(of("SPAD_TIMED")),
+            Entry::binary(of("SPAD_EVENT")),
+            Entry::decimal(of("p_counter.COUNTER_OUT")),
+            Entry::binary(of("LOCAL_STOP")),
+            Entry::binary(of("metdc.SHIFT")),
+            Entry::binary(of("HIT")),
+        ];
+        // The first, the middle and the last bin; GTKWave widens its column of names for a longer title.
+        let bins = [0, config.bins / 2, config.bins - 1];
+        let bins =
+            bins.map(|bin| Entry::decimal(of(&format!("histogram.{}", histogram::bin_name(bin)))));
+        groups.push(Group::new(
+            format!("Macropixel {}: {start} (Fig. 48)", col + 1),
+            signals.into_iter().chain(bins),
+        ));
+    }
+    SaveFile {
+        groups,
+        zoom: (origin - Time::from_ns(5), end + Time::from_ns(5)),
+        marker: Some(origin),
+    }
+}
+
+/// One photon, femtosecond by femtosecond across the edge between two bins.
+fn bin_edge(checks: &mut Checks) {
+    let (config, start, bin) = (config(), 20, 8);
+    let exposure = Exposure::new(&config, STOP_PERIODS, 1);
+    let (law, window) = window(&config, &exposure, start);
+    let edge = law.bin_interval(&window, 0, bin).start;
+    for offset_fs in -2..=2 {
+        let time = edge + Time::from_fs(offset_fs);
+        let mut pulse = [SpadEvent { time, spad: 7 }];
+        let found = counted(&config, &exposure, start, &mut pulse);
+        let bins = |counts: &[u16]| -> Vec<usize> {
+            (0..counts.len()).filter(|&b| counts[b] > 0).collect()
+        };
+        checks.equal(
+            format!(
+                "photon {offset_fs:+} fs from the edge of bins {} and {bin}: bin",
+                bin - 1
+            ),
+            shown(&Some([if offset_fs < 0 { bin - 1 } else { bin }])),
+            shown(&found.map(|counts| bins(&counts))),
+        );
+    }
+}
+
+/// More photons than a small bin can count.
+fn full_bins(checks: &mut Checks) {
+    for overflow in [Overflow::Saturate, Overflow::Wrap] {
+        let config = SensorConfig {
+            bin_bits: 3,
+            overflow,
+            ..config()
+        };
+        let (start, bin) = (20, 5);
+        let exposure = Exposure::new(&config, 32, 12);
+        let (law, window) = window(&config, &exposure, start);
+        let mut pulses: Vec<SpadEvent> = (0..exposure.laser_cycles)
+            .map(|cycle| SpadEvent {
+                time: middle(&law, &window, cycle, bin),
+                spad: cycle as u8,
+            })
+            .collect();
+        let hits = pulses.len() as u64;
+        let found = counted(&config, &exposure, start, &mut pulses);
+        checks.equal(
+            format!(
+                "{hits} photons in a bin of {} bits, overflow = {overflow:?}",
+                config.bin_bits
+            ),
+            shown(&Some(histogram::model(
+                hits,
+                config.bin_bits as u32,
+                overflow,
+            ))),
+            shown(&found.map(|counts| counts[bin as usize])),
+        );
+    }
+}
+
+/// Bin b gets b coincident photons, and TYPE and THRESHOLD pick the bins.
+fn coincidences(checks: &mut Checks) {
+    let start = 20;
+    let cases = [
+        (EventType::Greater, 0),
+        (EventType::Greater, 3),
+        (EventType::Equal, 2),
+        (EventType::Less, 4),
+        (EventType::Greater, SPADS as u8),
+    ];
+    for (event_type, threshold) in cases {
+        let config = SensorConfig {
+            bins: 6,
+            event_type,
+            threshold,
+            dead_time_ns: 1.0,
+            ..config()
+        };
+        let exposure = Exposure::new(&config, 32, 1);
+        let (law, window) = window(&config, &exposure, start);
+        let spads = |bin: usize| (1u32 << bin) - 1;
+        let mut pulses = Vec::new();
+        for bin in 0..config.bins {
+            let time = middle(&law, &window, 0, bin as i64);
+            pulses.extend((0..bin as u8).map(|spad| SpadEvent { time, spad }));
+        }
+        let expected: Vec<u16> = (0..config.bins)
+            .map(|bin| correlation::model(spads(bin) as u16, event_type, threshold) as u16)
+            .collect();
+        let found = counted(&config, &exposure, start, &mut pulses);
+        checks.equal(
+            format!(
+                "0 to {} coincident photons, TYPE = {event_type:?} than {threshold}",
+                config.bins - 1
+            )
+            .replace("Equal than", "Equal to"),
+            shown(&Some(expected)),
+            shown(&found),
+        );
+    }
+}
+
+/// A toggle front end loses two pulses of one SPAD within one CLK period.
+fn cancelling_pulses(checks: &mut Checks) {
+    let config = SensorConfig {
+        dead_time_ns: 0.5,
+        ..config()
+    };
+    let (start, bin) = (20, 6);
+    let exposure = Exposure::new(&config, 32, 1);
+    let (law, window) = window(&config, &exposure, start);
+    let centre = middle(&law, &window, 0, bin);
+    let apart = Time::from_ps(500);
+    let at = |time, spad| SpadEvent { time, spad };
+    let bin_start = law.bin_interval(&window, 0, bin).start;
+    let cases = [
+        ("one pulse of a SPAD", vec![at(centre, 3)], 0, 1),
+        (
+            "two pulses of one SPAD within one CLK period cancel",
+            vec![at(centre - apart, 3), at(centre + apart, 3)],
+            0,
+            0,
+        ),
+        (
+            "pulses of two SPADs within one CLK period are one event",
+            vec![at(centre - apart, 3), at(centre + apart, 4)],
+            0,
+            1,
+        ),
+        (
+            "two pulses of one SPAD on either side of a bin's edge",
+            vec![at(bin_start - apart, 3), at(bin_start + apart, 3)],
+            1,
+            1,
+        ),
+    ];
+    for (what, mut pulses, before, within) in cases {
+        let found = counted(&config, &exposure, start, &mut pulses);
+        let bin = bin as usize;
+        checks.equal(
+            format!("{what}: bins {} and {bin}", bin - 1),
+            shown(&Some([before, within])),
+            shown(&found.map(|counts| [counts[bin - 1], counts[bin]])),
+        );
+    }
+}

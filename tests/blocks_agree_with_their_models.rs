@@ -1,0 +1,597 @@
+//! Every circuit, elaborated alone and driven at random, does what the plain-Rust model beside it says, at the
+//! times that the chip's timing says.
+
+use std::sync::Arc;
+
+use guided_dtof::chip::{
+    ChipTiming, EventType, Overflow, SPADS, SensorConfig, correlation, front_end, histogram,
+    load_path, metdc, p_counter, p_counter_timing,
+};
+use guided_dtof::kernel::{Drive, Kernel, Recorder, Stimulus, in_order};
+use guided_dtof::logic::Logic;
+use guided_dtof::netlist::{
+    CellKind, Corner, Library, Module, NetId, Netlist, Timing, longest_path,
+};
+use guided_dtof::units::Time;
+use proptest::prelude::*;
+
+/// Longer than anything takes to settle in the slow corner.
+const SETTLING: Time = Time::from_ns(5);
+
+/// A circuit on its own, what is to be driven into it, and what it did.
+struct Bench {
+    config: SensorConfig,
+    netlist: Netlist,
+    drives: Vec<Drive>,
+}
+
+impl Bench {
+    /// The circuit with all inputs low from time 0 on.
+    fn new(module: &Arc<Module>, corner: Corner) -> Self {
+        let netlist = Netlist::elaborate(module);
+        let low = |net| Drive::new(Time::ZERO, net, false);
+        Bench {
+            drives: netlist.inputs().into_iter().map(low).collect(),
+            config: SensorConfig {
+                corner,
+                ..SensorConfig::default()
+            },
+            netlist,
+        }
+    }
+
+    fn timing(&self) -> ChipTiming {
+        ChipTiming::of(&self.config)
+    }
+
+    fn delay(&self, kind: CellKind, pin: usize, to: Logic) -> Time {
+        Library::default().delay(kind, pin, to, self.config.corner)
+    }
+
+    fn net(&self, path: &str) -> NetId {
+        self.netlist.net(path).unwrap()
+    }
+
+    fn bus(&self, path: &str) -> Vec<NetId> {
+        self.netlist.signal(path).unwrap()
+    }
+
+    fn drive(&mut self, time: Time, path: &str, value: bool) {
+        self.drives.push(Drive::new(time, self.net(path), value));
+    }
+
+    fn pulse(&mut self, time: Time, width: Time, path: &str) {
+        self.drive(time, path, true);
+        self.drive(time + width, path, false);
+    }
+
+    fn number(&mut self, time: Time, path: &str, value: u64) {
+        for (bit, net) in self.bus(path).into_iter().enumerate() {
+            self.drives
+                .push(Drive::new(time, net, value >> bit & 1 == 1));
+        }
+    }
+
+    /// Starts the simulation of everything driven so far, from time 0.
+    fn start(&mut self, watched: &[&str]) -> Run {
+        let nets = watched.iter().flat_map(|path| self.bus(path));
+        Run {
+            recorder: Recorder::new(nets),
+            kernel: Kernel::new(
+                &self.netlist,
+                &Timing::nominal(&self.netlist, &Library::default(), self.config.corner),
+            ),
+            stimulus: in_order(std::mem::take(&mut self.drives)),
+        }
+    }
+}
+
+struct Run {
+    kernel: Kernel,
+    stimulus: Stimulus<'static>,
+    recorder: Recorder,
+}
+
+impl Run {
+    fn until(&mut self, time: Time) {
+        self.kernel
+            .run(&mut self.stimulus, time, &mut self.recorder);
+    }
+
+    /// The number on a bus at `time`, which must not be in the past.
+    fn number_at(&mut self, time: Time, nets: &[NetId]) -> Option<u64> {
+        self.until(time);
+        self.kernel.number(nets)
+    }
+
+    fn is_high_at(&mut self, time: Time, net: NetId) -> Option<bool> {
+        self.number_at(time, &[net]).map(|n| n == 1)
+    }
+}
+
+fn corners() -> impl Strategy<Value = Corner> {
+    prop::sample::select(Corner::ALL.to_vec())
+}
+
+/// What is done to a P-counter.
+#[derive(Debug, Clone)]
+enum Action {
+    /// A new start value, with COUNTER_RESET held as the timing block holds it.
+    Load(u64),
+    /// A COUNTER_RESET pulse.
+    Reset,
+    /// Edges of COUNTER_CLK this many ps apart.
+    Clocks(u16, i64),
+}
+
+fn actions() -> impl Strategy<Value = Vec<Action>> {
+    let action = prop_oneof![
+        1 => any::<u64>().prop_map(Action::Load),
+        2 => Just(Action::Reset),
+        4 => (0u16..40, 300i64..3_000).prop_map(|(n, gap)| Action::Clocks(n, gap)),
+        1 => (0u16..3_000, 300i64..600).prop_map(|(n, gap)| Action::Clocks(n, gap)),
+    ];
+    prop::collection::vec(action, 1..12)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 150, ..ProptestConfig::default() })]
+
+    /// Clock edges are closer together than the ripple is long, and resets come while it is under way: the pauses
+    /// before them are often shorter than it, too.
+    #[test]
+    fn a_p_counter_counts_down_and_stops_once(
+        bits in 1usize..13,
+        corner in corners(),
+        first in any::<u64>(),
+        actions in actions(),
+        pauses in prop::collection::vec(1i64..2_500, 12),
+    ) {
+        let mut bench = Bench::new(&p_counter::circuit(bits), corner);
+        bench.config.counter_bits = bits;
+        let timing = bench.timing();
+        let pulse = timing.stop_to_reset_release - timing.stop_to_reset;
+        let mask = (1u64 << bits) - 1;
+        bench.drive(Time::ZERO, "MEMORY_RESET", true);
+        bench.drive(Time::ZERO, "COUNTER_RESET", true);
+        bench.drive(SETTLING, "MEMORY_RESET", false);
+        let mut now = SETTLING * 2;
+        let mut model = p_counter::Model::new(0);
+        // When LOCAL_STOP is to rise; a reset before that keeps it low.
+        let mut rises: Vec<Time> = Vec::new();
+        let reset_before = |rises: &mut Vec<Time>, time: Time| rises.retain(|&rise| rise < time);
+        for (action, pause) in std::iter::once(&Action::Load(first)).chain(&actions).zip(std::iter::once(&1).chain(&pauses)) {
+            match action {
+                Action::Load(value) => {
+                    reset_before(&mut rises, now);
+                    bench.drive(now, "COUNTER_RESET", true);
+                    bench.number(now, "COUNTER_INIT", value & mask);
+                    bench.pulse(now + SETTLING, SETTLING, "MEMORY_LOAD");
+                    now += SETTLING * 3;
+                    bench.drive(now, "COUNTER_RESET", false);
+                    model = p_counter::Model::new((value & mask) as u32);
+                }
+                Action::Reset => {
+                    reset_before(&mut rises, now);
+                    bench.pulse(now, pulse, "COUNTER_RESET");
+                    now += pulse;
+                    model.reset();
+                }
+                Action::Clocks(edges, gap_ps) => {
+                    for _ in 0..*edges {
+                        // The timing block lets no edge through after LOCAL_STOP.
+                        if model.local_stop() {
+                            break;
+                        }
+                        if model.clock() {
+                            rises.push(now + timing.counter_clk_to_local_stop);
+                        }
+                        bench.pulse(now, Time::from_ps(gap_ps / 2), "COUNTER_CLK");
+                        now += Time::from_ps(*gap_ps);
+                    }
+                }
+            }
+            now += Time::from_ps(*pause);
+        }
+        let (out, local_stop) = (bench.bus("COUNTER_OUT"), bench.net("LOCAL_STOP"));
+        let mut run = bench.start(&["LOCAL_STOP"]);
+        let found = run.number_at(now + SETTLING, &out);
+        prop_assert_eq!(found, Some(model.counter_out(bits)));
+        prop_assert_eq!(run.is_high_at(now + SETTLING, local_stop), Some(model.local_stop()));
+        prop_assert_eq!(run.recorder.rising_edges(local_stop), rises);
+    }
+
+    #[test]
+    fn the_timing_block_gates_the_clock_and_pulses_the_reset(
+        corner in corners(),
+        steps in prop::collection::vec((0usize..5, 800i64..3_000), 1..80),
+    ) {
+        let mut bench = Bench::new(&p_counter_timing::circuit(), corner);
+        let timing = bench.timing();
+        let names = ["CLK", "STOP", "RESETB", "ENABLE", "LOCAL_STOP"];
+        let mut values = [false; 5];
+        let mut expected = Vec::new();
+        let mut clk_to_counter_clk = Vec::new();
+        let mut pulses = Vec::new();
+        let mut now = SETTLING;
+        for (pin, gap_ps) in steps {
+            values[pin] = !values[pin];
+            bench.drive(now, names[pin], values[pin]);
+            let [clk, stop, resetb, enable, local_stop] = values;
+            let model = p_counter_timing::Model { clk, resetb, enable, local_stop };
+            if names[pin] == "CLK" && model.counter_clk() {
+                clk_to_counter_clk.push(now + timing.clk_to_counter_clk);
+            }
+            if names[pin] == "STOP" && stop && !model.counter_reset() {
+                pulses.push(p_counter_timing::Model::reset_pulse(&timing, now));
+            }
+            now += Time::from_ps(gap_ps);
+            expected.push((now - Time::from_fs(1), model));
+        }
+        let outputs = ["COUNTER_CLK", "MEMORY_RESET", "COUNTER_RESET"];
+        let [counter_clk, memory_reset, counter_reset] = outputs.map(|name| bench.net(name));
+        let mut run = bench.start(&outputs);
+        for (time, model) in expected {
+            prop_assert_eq!(run.is_high_at(time, counter_clk), Some(model.counter_clk()));
+            prop_assert_eq!(run.is_high_at(time, memory_reset), Some(model.memory_reset()));
+            prop_assert_eq!(run.is_high_at(time, counter_reset), Some(model.counter_reset()));
+        }
+        let rises = run.recorder.rising_edges(counter_clk);
+        prop_assert!(clk_to_counter_clk.iter().all(|t| rises.contains(t)));
+        let rises = run.recorder.rising_edges(counter_reset);
+        let falls = run.recorder.falling_edges(counter_reset);
+        for pulse in pulses {
+            prop_assert!(rises.contains(&pulse.start) && falls.contains(&pulse.end), "{:?}", pulse);
+            let within = |t: &&Time| pulse.contains(*t) && **t != pulse.start;
+            prop_assert_eq!(rises.iter().chain(&falls).filter(within).count(), 0);
+        }
+    }
+
+    #[test]
+    fn the_front_end_gives_each_pulse_one_period(
+        corner in corners(),
+        period_ps in 600i64..5_000,
+        pulses in prop::collection::vec((0u8..16, 0i64..60, 0i64..1_000_000, any::<bool>()), 0..100),
+    ) {
+        let mut bench = Bench::new(&front_end::circuit(), corner);
+        let timing = bench.timing();
+        let width = Time::from_ps(100);
+        let rise = |k: i64| SETTLING * 2 + Time::from_ps(period_ps) * k;
+        // Some so that the toggle changes with CLK or a femtosecond on either side of it.
+        let mut pulses: Vec<(Time, u8)> = pulses
+            .into_iter()
+            .map(|(spad, k, within, is_close)| {
+                let offset = if is_close { within % 3 - 1 } else { within * period_ps / 1_000 };
+                (rise(k) - timing.spad_to_toggle + Time::from_fs(offset), spad)
+            })
+            .collect();
+        pulses.sort_unstable();
+        let mut free_from = [Time::ZERO; SPADS];
+        pulses.retain(|&(time, spad)| {
+            let is_free = time > free_from[spad as usize];
+            if is_free {
+                free_from[spad as usize] = time + width * 2;
+            }
+            is_free
+        });
+        bench.pulse(Time::ZERO, SETTLING, "PIXEL_CLEAR");
+        for &(time, spad) in &pulses {
+            bench.pulse(time, width, &format!("SPAD_RAW[{spad}]"));
+        }
+        for k in 0..63 {
+            bench.pulse(rise(k), Time::from_ps(period_ps / 2), "CLK");
+        }
+        let timed = bench.bus("SPAD_TIMED");
+        let mut run = bench.start(&[]);
+        let mut model = front_end::Model::default();
+        let mut pulses = pulses.into_iter().peekable();
+        for k in 0..63 {
+            while let Some((_, spad)) = pulses.next_if(|(t, _)| *t + timing.spad_to_toggle <= rise(k)) {
+                model.pulse(spad);
+            }
+            model.clock();
+            let found = run.number_at(rise(k + 1) - Time::from_fs(1), &timed);
+            prop_assert_eq!(found, Some(model.spad_timed() as u64), "after edge {}", k);
+        }
+    }
+
+    #[test]
+    fn the_metdc_latches_the_last_periods_and_returns_to_zero(
+        corner in corners(),
+        bins in 1usize..33,
+        conventional: bool,
+        period_ps in 2_000i64..4_000,
+        cycles in prop::collection::vec((8i64..60, 0i64..1_000_000, any::<u64>()), 1..8),
+    ) {
+        let mut bench = Bench::new(&metdc::circuit(bins), corner);
+        let timing = bench.timing();
+        let chain = timing.stop_to_strobe - timing.local_stop_to_strobe;
+        let rise = |k: i64| SETTLING * 2 + Time::from_ps(period_ps) * k;
+        bench.pulse(Time::ZERO, SETTLING, "PIXEL_CLEAR");
+        bench.drive(Time::ZERO, "COUNTER_RESET", true);
+        bench.drive(Time::ZERO, "CONVENTIONAL", conventional);
+        let mut events = Vec::new();
+        let mut strobes = Vec::new();
+        let mut zeros = Vec::new();
+        let last = cycles.len() - 1;
+        for (cycle, (periods, at, pattern)) in cycles.into_iter().enumerate() {
+            // STOP a femtosecond off a whole number of picoseconds, on no edge of CLK.
+            let first = events.len() as i64;
+            let stop = rise(first) + Time::from_ps(period_ps / 2) + Time::from_fs(1);
+            let end = rise(first + periods);
+            let third = Time::from_fs((end - stop).as_fs() / 3);
+            let local_stop = stop + third + Time::from_fs(third.as_fs() / 1_000_000 * at);
+            bench.pulse(stop, third * 2, "STOP");
+            bench.pulse(stop + chain, third * 2, "STOP_D");
+            if cycle == 0 {
+                bench.drive(stop + timing.stop_to_reset_release, "COUNTER_RESET", false);
+            } else {
+                let width = timing.stop_to_reset_release - timing.stop_to_reset;
+                bench.pulse(stop + timing.stop_to_reset, width, "COUNTER_RESET");
+                bench.drive(stop + timing.stop_to_reset * 2, "LOCAL_STOP", false);
+            }
+            bench.drive(local_stop, "LOCAL_STOP", true);
+            if conventional {
+                strobes.push(stop + timing.stop_to_strobe);
+                // STOP is low again until the next laser cycle.
+                zeros.push(stop + third * 2 + Time::from_ps(600));
+            } else {
+                strobes.push(local_stop + timing.local_stop_to_strobe);
+                zeros.push(stop + timing.stop_to_reset_release + timing.clk_to_shift);
+            }
+            events.extend((0..periods).map(|k| pattern.rotate_left(k as u32) & 1 == 1));
+            if cycle == last {
+                events.extend([false; 2]);
+            }
+        }
+        for (k, &event) in events.iter().enumerate() {
+            let k = k as i64;
+            // Takes its value well before the edge that shifts it in.
+            bench.drive(rise(k) - Time::from_ps(period_ps / 4), "SPAD_EVENT", event);
+            bench.pulse(rise(k), Time::from_ps(period_ps / 2), "CLK");
+        }
+        let expected: Vec<u64> = strobes
+            .iter()
+            .map(|&strobe| {
+                let mut model = metdc::Model::new(bins as u32);
+                let shifted = |&k: &usize| rise(k as i64) + timing.clk_to_shift <= strobe;
+                (0..events.len()).take_while(shifted).for_each(|k| model.clock(events[k]));
+                model.hits()
+            })
+            .collect();
+        let hit = bench.bus("HIT");
+        let mut run = bench.start(&["HIT"]);
+        run.until(rise(events.len() as i64));
+        for ((&strobe, hits), &zero) in strobes.iter().zip(&expected).zip(&zeros) {
+            let latched = strobe + timing.strobe_to_hit;
+            prop_assert_eq!(run.recorder.number_at(&hit, latched), Some(*hits));
+            prop_assert_eq!(run.recorder.number_at(&hit, zero), Some(0));
+        }
+        for (bin, &net) in hit.iter().enumerate() {
+            let counts = expected.iter().filter(|&hits| hits >> bin & 1 == 1).count();
+            prop_assert_eq!(run.recorder.rising_edges(net).len(), counts);
+        }
+    }
+
+    #[test]
+    fn a_bin_counts_and_then_saturates_or_wraps(
+        corner in corners(),
+        bits in 1usize..11,
+        saturates: bool,
+        share in 0.0f64..2.5,
+        width_ps in 200i64..2_000,
+        again in 0u64..40,
+    ) {
+        let overflow = if saturates { Overflow::Saturate } else { Overflow::Wrap };
+        let mut bench = Bench::new(&histogram::bin_counter(bits, overflow), corner);
+        // Full bins must have stopped their clock before the next hit.
+        let gap = Time::from_ps(width_ps) + SETTLING;
+        let mut now = SETTLING * 2;
+        let mut read = Vec::new();
+        bench.pulse(Time::ZERO, SETTLING, "PIXEL_CLEAR");
+        for hits in [(share * (1u64 << bits) as f64) as u64, again] {
+            for _ in 0..hits {
+                bench.pulse(now, Time::from_ps(width_ps), "HIT");
+                now += gap;
+            }
+            now += SETTLING;
+            read.push((now, histogram::model(hits, bits as u32, overflow)));
+            bench.pulse(now + SETTLING, SETTLING, "PIXEL_CLEAR");
+            now += SETTLING * 3;
+        }
+        let count = bench.bus("COUNT");
+        let mut run = bench.start(&[]);
+        for (time, expected) in read {
+            prop_assert_eq!(run.number_at(time, &count), Some(expected as u64));
+        }
+    }
+
+    #[test]
+    fn the_deserialiser_follows_its_model_edge_by_edge(
+        corner in corners(),
+        cols in 1usize..6,
+        bits in 2usize..12,
+        steps in prop::collection::vec(prop_oneof![30 => any::<bool>().prop_map(Some), 1 => Just(None)], 1..300),
+    ) {
+        let mut bench = Bench::new(&load_path::deserialiser(cols, bits), corner);
+        bench.pulse(Time::ZERO, SETTLING, "LOAD_RESET");
+        let mut model = load_path::Deserialiser::new(cols, bits);
+        let mut expected = Vec::new();
+        let half = Time::from_ps(1_250);
+        let mut now = SETTLING * 2;
+        for step in steps {
+            match step {
+                Some(bit) => {
+                    bench.drive(now - half, "COUNTER_INITS", bit);
+                    bench.pulse(now, half, "LOAD_CLK");
+                    model.clock(bit);
+                }
+                None => {
+                    bench.pulse(now, half, "LOAD_RESET");
+                    model.reset();
+                }
+            }
+            now += half * 2;
+            let row: Vec<bool> = model.row().iter().by_vals().collect();
+            expected.push((now - half, row, model.row_done()));
+        }
+        let (row, done) = (bench.bus("COUNTER_INIT_ROW"), bench.net("ROW_DONE"));
+        let mut run = bench.start(&[]);
+        for (time, bits, is_done) in expected {
+            prop_assert_eq!(run.is_high_at(time, done), Some(is_done));
+            let found: Vec<Option<bool>> = row.iter().map(|&net| run.kernel.value(net).to_bool()).collect();
+            prop_assert_eq!(found, bits.into_iter().map(Some).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn the_row_scanner_loads_one_row_at_a_time(
+        corner in corners(),
+        rows in 1usize..9,
+        steps in prop::collection::vec(prop_oneof![20 => any::<bool>().prop_map(Some), 1 => Just(None)], 1..120),
+    ) {
+        let mut bench = Bench::new(&load_path::row_scanner(rows), corner);
+        bench.pulse(Time::ZERO, SETTLING, "LOAD_RESET");
+        let mut model = load_path::RowScanner::new(rows);
+        let mut expected = Vec::new();
+        let mut loads = 0;
+        let half = Time::from_ps(1_250);
+        // ROW_DONE changes clk-to-Q after a rise of LOAD_CLK.
+        let after = bench.delay(CellKind::Dffr, 1, Logic::One);
+        let mut now = SETTLING * 2;
+        let mut done_before = false;
+        for step in steps {
+            let done = step.unwrap_or(false);
+            if step.is_none() {
+                bench.pulse(now, half, "LOAD_RESET");
+                model.reset();
+            } else {
+                bench.pulse(now, half, "LOAD_CLK");
+                model.row_done(done);
+            }
+            if done != done_before {
+                bench.drive(now + after, "ROW_DONE", done);
+                done_before = done;
+            }
+            if step.is_some() {
+                expected.push((now + half - Time::from_fs(1), model.memory_load(true)));
+            }
+            expected.push((now + half * 2 - Time::from_fs(1), model.memory_load(false)));
+            loads += done as usize;
+            now += half * 2;
+        }
+        let load = bench.bus("MEMORY_LOAD");
+        let mut run = bench.start(&["MEMORY_LOAD"]);
+        for (time, row) in expected {
+            let one_hot = row.map_or(0, |row| 1u64 << row);
+            prop_assert_eq!(run.number_at(time, &load), Some(one_hot));
+        }
+        let rises: usize = load.iter().map(|&net| run.recorder.rising_edges(net).len()).sum();
+        prop_assert_eq!(rises, loads, "a pulse that no row asked for");
+    }
+
+    /// Any number of loads, each full or cut off after any bit: the memories hold what the whole rows of each
+    /// have left in them.
+    #[test]
+    fn loads_cut_off_anywhere_leave_whole_rows(
+        corner in corners(),
+        rows in 1usize..5,
+        cols in 1usize..4,
+        bits in 2usize..10,
+        loads in prop::collection::vec((prop::collection::vec(any::<bool>(), 160), 0.0f64..1.5), 1..5),
+    ) {
+        let mut bench = Bench::new(&load_path::with_memories(rows, cols, bits), corner);
+        let half = Time::from_ps(2_500);
+        bench.drive(SETTLING, "RESETB", true);
+        let mut now = SETTLING * 2;
+        let mut expected = vec![0u16; rows * cols];
+        for (bits_in, share) in &loads {
+            let whole = rows * cols * bits;
+            let length = ((share * whole as f64) as usize).min(whole);
+            let stream: bitvec::vec::BitVec = (0..length).map(|i| bits_in[i]).collect();
+            bench.drive(now, "LOAD_ENABLE", true);
+            for bit in stream.iter().by_vals() {
+                bench.drive(now, "COUNTER_INITS", bit);
+                bench.pulse(now + half, half, "LOAD_CLK");
+                now += half * 2;
+            }
+            now += half;
+            bench.drive(now, "LOAD_ENABLE", false);
+            now += SETTLING;
+            let arrived = load_path::codes(&stream, cols, bits);
+            expected[..arrived.len()].copy_from_slice(&arrived);
+        }
+        let places = (0..rows).flat_map(|row| (0..cols).map(move |col| (row, col)));
+        let memories: Vec<Vec<NetId>> = places
+            .map(|(row, col)| bench.bus(&format!("{}.MEMORY", load_path::memory_name(row, col))))
+            .collect();
+        let mut run = bench.start(&[]);
+        run.until(now + SETTLING);
+        let found: Vec<Option<u64>> = memories.iter().map(|nets| run.kernel.number(nets)).collect();
+        let expected: Vec<Option<u64>> = expected.into_iter().map(|code| Some(code as u64)).collect();
+        prop_assert_eq!(found, expected);
+    }
+}
+
+/// TYPE as the circuit decodes it, all four codes.
+const TYPES: [EventType; 4] = [
+    EventType::Less,
+    EventType::Equal,
+    EventType::Greater,
+    EventType::Greater,
+];
+
+/// Drives one condition after the other and returns the longest time that SPAD_EVENT took to settle.
+fn correlate(corner: Corner, conditions: impl Iterator<Item = (u16, u8, u8)>) -> Time {
+    let mut bench = Bench::new(&correlation::circuit(), corner);
+    let timing = bench.timing();
+    let step = timing.clk_to_event;
+    let conditions: Vec<_> = conditions.collect();
+    let at = |k: usize| SETTLING + step * k as i64;
+    for (k, &(timed, code, threshold)) in conditions.iter().enumerate() {
+        bench.number(at(k), "SPAD_TIMED", timed as u64);
+        bench.number(at(k), "TYPE", code as u64);
+        bench.number(at(k), "THRESHOLD", threshold as u64);
+    }
+    let event = bench.net("SPAD_EVENT");
+    let mut run = bench.start(&["SPAD_EVENT"]);
+    for (k, &(timed, code, threshold)) in conditions.iter().enumerate() {
+        let expected = correlation::model(timed, TYPES[code as usize], threshold);
+        let found = run.is_high_at(at(k + 1) - Time::from_fs(1), event);
+        assert_eq!(found, Some(expected), "{timed:#06x} {code} {threshold}");
+    }
+    let taken = |&(time, ..): &(Time, NetId, Logic)| {
+        let since = (time - SETTLING).as_fs().max(0);
+        Time::from_fs(since % step.as_fs())
+    };
+    let slowest = run.recorder.changes().iter().map(taken).max();
+    let longest = longest_path(&correlation::circuit(), &Library::default(), corner);
+    let slowest = slowest.unwrap_or(Time::ZERO);
+    assert!(
+        slowest <= longest && longest < step,
+        "{slowest} {longest} {step}"
+    );
+    slowest
+}
+
+#[test]
+fn the_correlation_block_counts_every_pattern_of_spads() {
+    // Neighbours in this order differ in about half their bits; type and threshold go through all pairs.
+    let conditions = (0..1u32 << SPADS).map(|i| {
+        let timed = i.wrapping_mul(0x9e37) as u16;
+        (timed, (i % 4) as u8, (i / 4 % 32) as u8)
+    });
+    let slowest = correlate(Corner::Typ, conditions);
+    assert!(slowest > Time::ZERO);
+}
+
+#[test]
+fn the_correlation_block_compares_every_count_with_every_threshold() {
+    for corner in Corner::ALL {
+        let conditions = (0..=SPADS as u32).flat_map(|count| {
+            let timed = ((1u32 << count) - 1) as u16;
+            (0..128u8).map(move |c| (timed.rotate_left(c as u32), c % 4, c / 4))
+        });
+        correlate(corner, conditions);
+    }
+}
