@@ -15,7 +15,7 @@ use guided_dtof::netlist::{
 };
 use guided_dtof::units::Time;
 use proptest::prelude::*;
-use rand::{RngExt, SeedableRng, rngs::StdRng};
+use rand::{RngExt, SeedableRng, rngs::StdRng, seq::SliceRandom};
 
 /// Most inputs a module has.
 const MOST_INPUTS: usize = 6;
@@ -153,6 +153,16 @@ impl Case {
 
     /// The circuit's top module.
     pub fn circuit(&self) -> Arc<Module> {
+        self.build(None)
+    }
+
+    /// The same circuit with nets and cells declared in another order, which is the order in which
+    /// a simulator comes upon them within an instant.
+    pub fn shuffled_circuit(&self, random: &mut StdRng) -> Arc<Module> {
+        self.build(Some(random))
+    }
+
+    fn build(&self, mut shuffle: Option<&mut StdRng>) -> Arc<Module> {
         let mut modules: Vec<Arc<Module>> = Vec::new();
         for (level, recipe) in self.modules.iter().enumerate() {
             let is_top = level + 1 == self.modules.len();
@@ -161,7 +171,14 @@ impl Case {
             } else {
                 format!("level{level}")
             };
-            let module = Placement::new(&name, recipe, &modules, self.has_gate_loops).finish();
+            let module = Placement::new(
+                &name,
+                recipe,
+                &modules,
+                self.has_gate_loops,
+                shuffle.as_deref_mut(),
+            )
+            .finish();
             modules.push(module);
         }
         modules.pop().expect("there is a top")
@@ -226,10 +243,18 @@ impl Case {
     }
 }
 
+/// A cell or an instance with its connections, still to be placed.
+enum Pending<'a> {
+    Cell(CellKind, Vec<Net>, Vec<Net>),
+    Instance(&'a Arc<Module>, Vec<(String, Vec<Net>)>),
+}
+
 /// A module being built from its recipe.
 struct Placement<'a> {
     builder: ModuleBuilder,
     recipe: &'a Recipe,
+    /// Items in the order in which they are placed and their wires declared.
+    order: Vec<usize>,
     children: &'a [Arc<Module>],
     inputs: Vec<Net>,
     /// Nets that may be chosen from.
@@ -252,10 +277,16 @@ impl<'a> Placement<'a> {
         recipe: &'a Recipe,
         children: &'a [Arc<Module>],
         has_gate_loops: bool,
+        shuffle: Option<&mut StdRng>,
     ) -> Self {
+        let mut order: Vec<usize> = (0..recipe.items.len()).collect();
+        if let Some(random) = shuffle {
+            order.shuffle(random);
+        }
         let mut placement = Placement {
             builder: ModuleBuilder::new(name),
             recipe,
+            order,
             children,
             inputs: Vec::new(),
             pool: Vec::new(),
@@ -290,20 +321,35 @@ impl<'a> Placement<'a> {
         for (nets, _) in outputs.iter().zip(&early).filter(|(_, early)| **early) {
             self.pool.extend(known(nets));
         }
-        // Gates take what is upstream of them; flip-flops, placed last, take anything.
+        // Gates take what is upstream of them; flip-flops, considered last, take anything.
+        let mut pending: Vec<Option<Pending>> = recipe.items.iter().map(|_| None).collect();
         for is_flip_flop in [false, true] {
             for (index, item) in recipe.items.iter().enumerate() {
                 let kind = self.kind(item);
                 if kind.is_some_and(|k| k.is_flip_flop()) != is_flip_flop {
                     continue;
                 }
-                let name = format!("u{index}");
-                match kind {
-                    Some(kind) => self.cell(&name, kind, item, &outputs[index]),
-                    None => self.instance(&name, item, &outputs[index]),
-                }
+                pending[index] = Some(match kind {
+                    Some(kind) => self.cell(kind, item, &outputs[index]),
+                    None => self.instance(item, &outputs[index]),
+                });
                 if !early[index] {
                     self.pool.extend(known(&outputs[index]));
+                }
+            }
+        }
+        for &index in &self.order {
+            let name = format!("u{index}");
+            match pending[index].take().expect("every item is considered") {
+                Pending::Cell(kind, inputs, outputs) => {
+                    self.builder.cell(&name, kind, &inputs, &outputs);
+                }
+                Pending::Instance(module, connections) => {
+                    let connections: Vec<(&str, &[Net])> = connections
+                        .iter()
+                        .map(|(name, nets)| (name.as_str(), nets.as_slice()))
+                        .collect();
+                    self.builder.instance(&name, module, &connections);
                 }
             }
         }
@@ -330,7 +376,7 @@ impl<'a> Placement<'a> {
         }
     }
 
-    /// What each output bit of an item becomes. A port is left open as a whole.
+    /// What each output bit of an item becomes.
     fn output_places(&self, item: &Item) -> Vec<Output> {
         let widths = self.output_widths(item);
         let mut places = Vec::new();
@@ -338,6 +384,7 @@ impl<'a> Placement<'a> {
             for bit in 0..width {
                 places.push(match item.outputs >> port & 7 {
                     0 if widths.len() > 1 => Output::Open,
+                    1 if bit % 2 == 1 => Output::Open,
                     0 | 1 => Output::Wire,
                     2 => Output::Port,
                     3 | 4 => Output::WireBus,
@@ -370,21 +417,25 @@ impl<'a> Placement<'a> {
             port_bus = builder.output_bus("OUTS", ports);
         }
         let (mut wire_bus, mut port_bus) = (wire_bus.into_iter(), port_bus.into_iter());
-        let mut number = 0;
-        let mut net = |place: &Output| {
-            number += 1;
-            match place {
-                Output::Wire => builder.wire(&format!("W{number}")),
-                Output::Port => builder.output(&format!("O{number}")),
+        let mut nets: Vec<Vec<Net>> = Vec::new();
+        for (index, places) in places.iter().enumerate() {
+            let net = |(bit, place): (usize, &Output)| match place {
+                Output::Port => builder.output(&format!("O{index}_{bit}")),
                 Output::WireBus => wire_bus.next().expect("counted"),
                 Output::PortBus => port_bus.next().expect("counted"),
-                Output::Open => Net::NONE,
+                Output::Wire | Output::Open => Net::NONE,
+            };
+            nets.push(places.iter().enumerate().map(net).collect());
+        }
+        // Ports have their order, but single wires may come in any.
+        for &index in &self.order {
+            for (bit, place) in places[index].iter().enumerate() {
+                if *place == Output::Wire {
+                    nets[index][bit] = builder.wire(&format!("W{index}_{bit}"));
+                }
             }
-        };
-        places
-            .iter()
-            .map(|p| p.iter().map(&mut net).collect())
-            .collect()
+        }
+        nets
     }
 
     /// One of the nets to choose from, often a recent one.
@@ -398,8 +449,8 @@ impl<'a> Placement<'a> {
         }
     }
 
-    fn cell(&mut self, name: &str, kind: CellKind, item: &Item, outputs: &[Net]) {
-        let inputs: Vec<Net> = (0..kind.inputs().len())
+    fn cell(&self, kind: CellKind, item: &Item, outputs: &[Net]) -> Pending<'a> {
+        let inputs = (0..kind.inputs().len())
             .map(|pin| {
                 let choice = item.pins[pin];
                 // A flip-flop of whose clock, set and reset nothing is known stays unknown.
@@ -410,10 +461,10 @@ impl<'a> Placement<'a> {
                 }
             })
             .collect();
-        self.builder.cell(name, kind, &inputs, outputs);
+        Pending::Cell(kind, inputs, outputs.to_vec())
     }
 
-    fn instance(&mut self, name: &str, item: &Item, outputs: &[Net]) {
+    fn instance(&self, item: &Item, outputs: &[Net]) -> Pending<'a> {
         let child = self.child(item);
         let mut connections: Vec<(String, Vec<Net>)> = Vec::new();
         for (port, (name, width)) in ports(child, Direction::Input).enumerate() {
@@ -431,11 +482,7 @@ impl<'a> Placement<'a> {
             rest = after;
             connections.push((name.to_owned(), nets.to_vec()));
         }
-        let connections: Vec<(&str, &[Net])> = connections
-            .iter()
-            .map(|(name, nets)| (name.as_str(), nets.as_slice()))
-            .collect();
-        self.builder.instance(name, child, &connections);
+        Pending::Instance(child, connections)
     }
 }
 
