@@ -47,7 +47,7 @@ use rand::{SeedableRng, rngs::StdRng, seq::SliceRandom};
 
 /// Whose waves are compared.
 const NAMES: [&str; 2] = ["the kernel", "Icarus"];
-/// Random sensors compared.
+/// How many random sensors are compared.
 const SENSORS: u64 = 12;
 /// How long the circuits go on after the last drive.
 const SETTLING: Time = Time::from_ns(2);
@@ -142,6 +142,7 @@ fn cases() -> u32 {
     u32::div_ceil(total, 2)
 }
 
+/// How proptest goes about it. Shrinking is cut short: every step runs Icarus.
 fn config(cases: u32) -> Config {
     let beside_this_file = FileFailurePersistence::WithSource("proptest-regressions");
     Config {
@@ -153,6 +154,7 @@ fn config(cases: u32) -> Config {
     }
 }
 
+/// Compares random cases until one differs, and then prints the smallest like it, as Verilog.
 fn compare_all(what: &str, strategy: impl Strategy<Value = Case>) {
     if !icarus::is_here() {
         return;

@@ -8,7 +8,9 @@ use rand::{RngExt, rngs::StdRng};
 
 /// A sensor and everything that happens to it.
 pub struct Scenario {
+    /// The chip.
     pub config: SensorConfig,
+    /// Its clocks.
     pub exposure: Exposure,
     /// Start values, row-major.
     pub starts: Vec<u16>,
@@ -17,6 +19,7 @@ pub struct Scenario {
 }
 
 impl Scenario {
+    /// Anything that the chip allows.
     pub fn random(random: &mut StdRng, rows: usize, cols: usize) -> Self {
         let config = random_sensor(random, rows, cols);
         let exposure = Exposure::new(
