@@ -113,8 +113,6 @@ module tb;
       $dumpfile(\"dut.vcd\");
       $dumpvars(0, dut);
     end
-    // Lets every process of the design start waiting before the first change.
-    #0;
     while ($fscanf(stimulus, \"%d %d %b\", at, pin, value) == 3) begin
       if (at > $time) #(at - $time);
       pins[pin] = value;

@@ -16,8 +16,9 @@
 //! ```
 //!
 //! Because each phase is complete before the next begins, results do not depend on the order
-//! of events within an instant. The hot loop neither allocates (buckets keep their memory), nor
-//! hashes, nor touches a string.
+//! of events within an instant. The exported Verilog cells keep the same two phases, so that other
+//! simulators agree with this one, ties included. The hot loop neither allocates (buckets keep
+//! their memory), nor hashes, nor touches a string.
 
 mod compiled;
 mod lanes;

@@ -401,10 +401,14 @@ impl ModuleBuilder {
 
     /// Places a gate and returns its new, unnamed output net.
     pub fn gate(&mut self, kind: CellKind, inputs: &[Net]) -> Net {
-        let name = format!("n{}", self.module.net_count);
-        let output = self.declare(name, 1, false, false)[0];
+        let output = self.unnamed();
         self.gate_into(kind, inputs, output);
         output
+    }
+
+    fn unnamed(&mut self) -> Net {
+        let name = format!("n{}", self.module.net_count);
+        self.declare(name, 1, false, false)[0]
     }
 
     /// Combines any number of nets with a balanced tree of 2-input gates of one kind.
@@ -426,7 +430,8 @@ impl ModuleBuilder {
         level[0]
     }
 
-    /// Instantiates `module`, connecting ports by name. Outputs may be left out.
+    /// Instantiates `module`, connecting ports by name. Outputs may be left out,
+    /// and bits of them may be [`Net::NONE`].
     pub fn instance(&mut self, name: &str, module: &Arc<Module>, ports: &[(&str, &[Net])]) {
         let mut connections = Vec::new();
         let problem = |port: &str, problem| NetlistError::PortMismatch {
@@ -446,9 +451,16 @@ impl ModuleBuilder {
                 Some((_, nets)) => {
                     let what = || format!("port {} of instance {name}", signal.name);
                     if self.check_width(what, signal.width(), nets.len()) {
-                        connections.extend_from_slice(nets);
-                        if direction == Direction::Output {
-                            for &net in nets.iter().filter(|n| n.is_some()) {
+                        let is_open = !nets.iter().any(|n| n.is_some());
+                        for &net in *nets {
+                            // Verilog can leave open a port as a whole, but no bit of it.
+                            let net = if net.is_some() || is_open {
+                                net
+                            } else {
+                                self.unnamed()
+                            };
+                            connections.push(net);
+                            if direction == Direction::Output && net.is_some() {
                                 self.drive(net, || format!("instance {name}"));
                             }
                         }

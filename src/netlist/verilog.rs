@@ -1,11 +1,20 @@
 //! Structural Verilog: the same cells, nets, hierarchy and delays for any other simulator.
 //!
-//! A cell whose inputs all have the same delay becomes a Verilog primitive with `#(rise, fall)`. A
-//! cell with different arcs (multiplexer, flip-flops) becomes a procedural model whose output
-//! passes through a continuous assignment with variable delays: the delay is that of the input that
-//! changed and, when several change in one instant, the shortest. Primitives and continuous
-//! assignments are inertial by IEEE 1364, which is the delay model of the event kernel, so
-//! both see the same glitches. Time unit and precision are one femtosecond.
+//! A cell's output passes through a continuous assignment with delays: inertial by IEEE 1364, which
+//! is the delay model of the event kernel, so both see the same glitches. A gate whose inputs all
+//! have the same delay is a Verilog primitive before it. A cell with different arcs (multiplexer,
+//! flip-flops) is a procedural model with variable delays: the delay is that of the input that
+//! changed and, when several change in one instant, the shortest.
+//!
+//! What happens within one instant is left to the simulator by IEEE 1364, except for one thing:
+//! `#0` waits until no other event of the instant is left. Every cell waits so, from time 0 on,
+//! before it looks at its inputs, and only then schedules its output. It therefore never sees half
+//! of the changes of an instant, such as a bus of which one bit was passed on earlier than
+//! another, and an output due in this very instant has come before a new value could cancel it.
+//! That is the order of the event kernel, too. A testbench needs no precautions, as long as it
+//! drives pins in the active region (by `=`, not after a `#0` of its own or by `<=`).
+//!
+//! Time unit and precision are one femtosecond.
 
 use std::collections::HashSet;
 use std::io::{self, Write};
@@ -63,7 +72,15 @@ fn write_cell(
             CellKind::Xor2 => "xor",
             _ => "xnor",
         };
-        writeln!(out, "  {primitive} #({rise}, {fall}) g(Z, {inputs});")?;
+        writeln!(out, "  wire now;")?;
+        writeln!(out, "  reg value;")?;
+        writeln!(out, "  {primitive} g(now, {inputs});")?;
+        writeln!(out, "  always begin")?;
+        writeln!(out, "    #0;")?;
+        writeln!(out, "    value = now;")?;
+        writeln!(out, "    @(now);")?;
+        writeln!(out, "  end")?;
+        writeln!(out, "  assign #({rise}, {fall}) Z = value;")?;
     } else {
         write_arc_selecting_cell(out, kind, delays)?;
     }
@@ -77,16 +94,14 @@ fn write_arc_selecting_cell(
 ) -> io::Result<()> {
     let pins = kind.inputs();
     let triggers: Vec<usize> = (0..pins.len()).filter(|&p| kind.triggers(p)).collect();
-    let list = |separator: &str| {
-        let names: Vec<&str> = triggers.iter().map(|&p| pins[p]).collect();
-        names.join(separator)
-    };
+    let events: Vec<&str> = triggers.iter().map(|&p| pins[p]).collect();
     for &pin in &triggers {
         writeln!(out, "  reg was_{};", pins[pin])?;
     }
     writeln!(out, "  reg value, next;")?;
     writeln!(out, "  reg [31:0] rise, fall;")?;
-    writeln!(out, "  always @({}) begin", list(" or "))?;
+    writeln!(out, "  always begin")?;
+    writeln!(out, "    #0;")?;
     writeln!(out, "    rise = 32'hffffffff;")?;
     writeln!(out, "    fall = 32'hffffffff;")?;
     for &pin in &triggers {
@@ -140,6 +155,7 @@ fn write_arc_selecting_cell(
         writeln!(out, "    was_{0} = {0};", pins[pin])?;
     }
     writeln!(out, "    value = next;")?;
+    writeln!(out, "    @({});", events.join(" or "))?;
     writeln!(out, "  end")?;
     for (output, inversion) in kind.outputs().iter().zip(["", "~"]) {
         writeln!(out, "  assign #(rise, fall) {output} = {inversion}value;")?;

@@ -1,0 +1,262 @@
+//! Every value change of every net, at the same femtosecond and to the same value, in our kernel
+//! and in Icarus Verilog. Skipped, loudly, where Icarus is absent.
+//!
+//! ```text
+//!   random circuit, delays, drives ─┬─► Kernel ─► VcdWriter ──────► wellen ─┐
+//!                                   └─► write_cells, write_modules,         ├─► the same?
+//!                                       testbench ─► Icarus ─► wellen ──────┘
+//! ```
+//!
+//! What is compared is the value that a net has at the end of each instant: what happens within
+//! one takes no time, and no waveform viewer shows it. The last instant is left out, because
+//! `$finish` may come before its changes.
+//!
+//! Ties are not avoided. Two cases in five live on a coarse grid of times, on which inputs and
+//! outputs of a cell change together, pulses are exactly as wide as the delay they meet, and data
+//! change with the clock. IEEE 1364 leaves the order of such events to the simulator, but the
+//! exported cells wait with `#0` until all of them have happened, which it does define; so no case
+//! is discarded. What remains outside are delays of zero: the library has none, and none are drawn.
+//!
+//! `GDTOF_CASES=10000 cargo test --test every_edge_agrees_with_icarus -- --nocapture` runs more
+//! random circuits than the usual 500 and shows how much was compared.
+
+mod icarus;
+
+mod every_edge {
+    pub mod circuit;
+    pub mod waves;
+}
+
+use std::cell::Cell;
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::{BufReader, Cursor};
+use std::time::Instant;
+
+use every_edge::circuit::{self, Case};
+use every_edge::waves::{Figures, Waves};
+use guided_dtof::engine::{GateSimulation, StimulusPlan, export_verilog};
+use guided_dtof::kernel::{Drive, Kernel, merge};
+use guided_dtof::netlist::{Direction, Module, Netlist, write_cells, write_modules};
+use guided_dtof::units::Time;
+use guided_dtof::waves::{Selection, VcdWriter};
+use icarus::sensor::Scenario;
+use proptest::prelude::*;
+use proptest::test_runner::{Config, FileFailurePersistence, TestCaseError, TestError, TestRunner};
+use rand::{SeedableRng, rngs::StdRng, seq::SliceRandom};
+
+/// Whose waves are compared.
+const NAMES: [&str; 2] = ["the kernel", "Icarus"];
+/// How many random sensors are compared.
+const SENSORS: u64 = 12;
+/// How long the circuits go on after the last drive.
+const SETTLING: Time = Time::from_ns(2);
+
+/// A testbench that replays `drives` into `top` and dumps everything below it until `end`.
+fn testbench(top: &Module, netlist: &Netlist, drives: &[Drive], end: Time) -> String {
+    let mut text = "module tb;\n".to_owned();
+    let mut ports = Vec::new();
+    let mut pins = Vec::new();
+    for (direction, signal) in top.port_signals() {
+        let name = &signal.name;
+        if direction == Direction::Output {
+            ports.push(format!(".{name}()"));
+            continue;
+        }
+        ports.push(format!(".{name}({name})"));
+        let width = signal.width();
+        if signal.is_bus {
+            writeln!(text, "  reg [{}:0] {name};", width - 1).unwrap();
+            pins.extend((0..width).map(|bit| format!("{name}[{bit}]")));
+        } else {
+            writeln!(text, "  reg {name};").unwrap();
+            pins.push(name.clone());
+        }
+    }
+    writeln!(text, "  {} dut({});", top.name(), ports.join(", ")).unwrap();
+    writeln!(text, "  initial begin").unwrap();
+    writeln!(text, "    $dumpfile(\"icarus.vcd\");").unwrap();
+    writeln!(text, "    $dumpvars(0, dut);").unwrap();
+    let inputs = netlist.inputs();
+    let mut now = Time::ZERO;
+    for drive in drives {
+        if drive.time > now {
+            writeln!(text, "    #{};", (drive.time - now).as_fs()).unwrap();
+            now = drive.time;
+        }
+        let pin = inputs.iter().position(|&net| net == drive.net).unwrap();
+        writeln!(text, "    {} = 1'b{};", pins[pin], drive.value).unwrap();
+    }
+    writeln!(text, "    #{} $finish;", (end - now).as_fs()).unwrap();
+    writeln!(text, "  end\nendmodule").unwrap();
+    text
+}
+
+/// What our kernel makes of `drives`, in the selected signals.
+fn simulate(
+    case: &Case,
+    netlist: &Netlist,
+    drives: Vec<Drive>,
+    end: Time,
+    selection: &Selection,
+) -> Waves {
+    let mut writer = VcdWriter::new(Vec::new(), netlist, selection).unwrap();
+    let mut kernel = Kernel::new(netlist, &case.library(), case.corner());
+    let mut stimulus = merge([Box::new(drives.into_iter()) as Box<_>]);
+    kernel.run(&mut stimulus, end, &mut writer);
+    let top = &netlist.scopes()[0].name;
+    Waves::read(Cursor::new(writer.finish(end).unwrap()), top)
+}
+
+/// Runs one case in both simulators.
+fn compare(case: &Case) -> Result<Figures, TestCaseError> {
+    let top = case.circuit();
+    let netlist = Netlist::elaborate(&top);
+    let drives = case.drives(&netlist);
+    let end = drives.last().map_or(Time::ZERO, |d| d.time) + SETTLING;
+
+    let mut design = Vec::new();
+    write_modules(&mut design, &top).unwrap();
+    let design = String::from_utf8(design).unwrap();
+    let mut cells = Vec::new();
+    write_cells(&mut cells, &case.library(), case.corner()).unwrap();
+    let bench = testbench(&top, &netlist, &drives, end);
+    let folder = tempfile::tempdir().unwrap();
+    let all = [&cells[..], design.as_bytes(), bench.as_bytes()].concat();
+    std::fs::write(folder.path().join("case.v"), all).unwrap();
+    icarus::simulate(folder.path(), &["case.v"], &[]);
+    let dump = File::open(folder.path().join("icarus.vcd")).unwrap();
+    let theirs = Waves::read(BufReader::new(dump), "tb.dut");
+
+    let selection = Selection::all().with_anonymous();
+    let ours = simulate(case, &netlist, drives, end, &selection);
+    ours.compare(&theirs, NAMES, end.as_fs() as u64)
+        .map_err(|difference| TestCaseError::fail(format!("{difference}\n{design}\n{bench}")))
+}
+
+/// Cases to run in each of the two tests with random netlists.
+fn cases() -> u32 {
+    let total = std::env::var("GDTOF_CASES").map_or(500, |cases| {
+        cases.parse().expect("GDTOF_CASES is a number of cases")
+    });
+    u32::div_ceil(total, 2)
+}
+
+/// How proptest goes about it. Shrinking is cut short: every step runs Icarus.
+fn config(cases: u32) -> Config {
+    let beside_this_file = FileFailurePersistence::WithSource("proptest-regressions");
+    Config {
+        cases,
+        source_file: Some(file!()),
+        failure_persistence: Some(Box::new(beside_this_file)),
+        max_shrink_iters: 2_000,
+        ..Config::default()
+    }
+}
+
+/// Compares random cases until one differs, and then prints the smallest like it, as Verilog.
+fn compare_all(what: &str, strategy: impl Strategy<Value = Case>) {
+    if !icarus::is_here() {
+        return;
+    }
+    let start = Instant::now();
+    let all = Cell::new(Figures::default());
+    let result = TestRunner::new(config(cases())).run(&strategy, |case| {
+        all.set(all.get() + compare(&case)?);
+        Ok(())
+    });
+    match result {
+        Ok(()) => {}
+        Err(TestError::Fail(reason, case)) => panic!("{reason}\n{case:#?}"),
+        Err(TestError::Abort(reason)) => panic!("{reason}"),
+    }
+    all.get().print(what, cases() as u64, start);
+}
+
+/// Runs one random macropixel, with its load path, in both simulators.
+fn compare_sensor(seed: u64) -> Figures {
+    let scenario = Scenario::random(&mut StdRng::seed_from_u64(seed), 1, 1);
+    let Scenario {
+        config,
+        exposure,
+        starts,
+        ..
+    } = &scenario;
+    let pulses = scenario.pulses();
+    let folder = tempfile::tempdir().unwrap();
+    let plan = StimulusPlan::new(config, exposure, 1, starts, &pulses);
+    export_verilog(folder.path(), config, &plan).unwrap();
+    icarus::simulate(folder.path(), &["tb.v", "design.v", "cells.v"], &["+vcd"]);
+    let dump = File::open(folder.path().join("dut.vcd")).unwrap();
+    let theirs = Waves::read(BufReader::new(dump), "tb.dut");
+
+    let mut gate = GateSimulation::new(config, exposure, (0, 0), (1, 1), starts, &pulses);
+    let selection = Selection::all().with_anonymous();
+    let mut writer = VcdWriter::new(Vec::new(), gate.netlist(), &selection).unwrap();
+    gate.run(&mut writer);
+    let end = gate.schedule().end;
+    let top = gate.netlist().scopes()[0].name.clone();
+    let ours = Waves::read(Cursor::new(writer.finish(end).unwrap()), &top);
+    ours.compare(&theirs, NAMES, end.as_fs() as u64)
+        .unwrap_or_else(|difference| panic!("{difference}\n{config:?}"))
+}
+
+#[test]
+fn random_macropixels() {
+    if !icarus::is_here() {
+        return;
+    }
+    let start = Instant::now();
+    let mut all = Figures::default();
+    for seed in 0..SENSORS {
+        all = all + compare_sensor(seed);
+    }
+    all.print("macropixels", SENSORS, start);
+}
+
+#[test]
+fn random_flat_circuits() {
+    compare_all("flat circuits", circuit::flat());
+}
+
+#[test]
+fn random_hierarchies() {
+    compare_all("hierarchies", circuit::hierarchical());
+}
+
+/// Runs one case as it is, and with nets, cells and the drives of each instant in another order.
+fn compare_shuffled(case: &Case, seed: u64) -> Result<Figures, TestCaseError> {
+    let random = &mut StdRng::seed_from_u64(seed);
+    let netlists = [case.circuit(), case.shuffled_circuit(random)].map(|m| Netlist::elaborate(&m));
+    let drives = case.drives(&netlists[0]);
+    let end = drives.last().map_or(Time::ZERO, |d| d.time) + SETTLING;
+    let inputs = netlists.each_ref().map(Netlist::inputs);
+    let mut shuffled: Vec<Drive> = drives
+        .iter()
+        .map(|drive| {
+            let pin = inputs[0].iter().position(|&net| net == drive.net).unwrap();
+            Drive::new(drive.time, inputs[1][pin], drive.value)
+        })
+        .collect();
+    shuffled.shuffle(random);
+    shuffled.sort_by_key(|drive| drive.time);
+    // Numbers of unnamed nets depend on the order, too.
+    let named = Selection::all();
+    let waves = simulate(case, &netlists[0], drives, end, &named);
+    let shuffled = simulate(case, &netlists[1], shuffled, end, &named);
+    waves
+        .compare(&shuffled, ["the circuit", "its shuffle"], u64::MAX)
+        .map_err(TestCaseError::fail)
+}
+
+proptest! {
+    #![proptest_config(config(1_000))]
+
+    #[test]
+    fn no_result_depends_on_the_order_within_an_instant(
+        case in prop_oneof![circuit::flat(), circuit::hierarchical()],
+        seed in any::<u64>(),
+    ) {
+        compare_shuffled(&case, seed)?;
+    }
+}

@@ -1,0 +1,82 @@
+//! Random sensors with random start values, exposures and SPAD pulses.
+
+use guided_dtof::chip::{EventType, Exposure, Mode, SensorConfig};
+use guided_dtof::netlist::Corner;
+use guided_dtof::photon::{SpadEvent, apply_dead_time};
+use guided_dtof::units::Time;
+use rand::{RngExt, rngs::StdRng};
+
+/// A sensor and everything that happens to it.
+pub struct Scenario {
+    /// The chip.
+    pub config: SensorConfig,
+    /// Its clocks.
+    pub exposure: Exposure,
+    /// Start values, row-major.
+    pub starts: Vec<u16>,
+    /// Rising edges of SPAD_RAW per macropixel, row-major.
+    pub pulses: Vec<Vec<SpadEvent>>,
+}
+
+impl Scenario {
+    /// Anything that the chip allows.
+    pub fn random(random: &mut StdRng, rows: usize, cols: usize) -> Self {
+        let config = random_sensor(random, rows, cols);
+        let exposure = Exposure::new(
+            &config,
+            random.random_range(20..80),
+            random.random_range(1..8),
+        );
+        let most = config.largest_start().min(exposure.stop_periods as u16);
+        let pixels = config.pixels();
+        let starts = (0..pixels).map(|_| random.random_range(0..=most)).collect();
+        let pulses = (0..pixels)
+            .map(|_| {
+                let mut pulses: Vec<SpadEvent> = (0..random.random_range(0..200))
+                    .map(|_| SpadEvent {
+                        time: Time::from_fs(random.random_range(0..exposure.end().as_fs())),
+                        spad: random.random_range(0..16),
+                    })
+                    .collect();
+                pulses.sort_unstable();
+                apply_dead_time(&mut pulses, config.dead_time());
+                pulses
+            })
+            .collect();
+        Scenario {
+            config,
+            exposure,
+            starts,
+            pulses,
+        }
+    }
+
+    /// The pulses as the engines take them.
+    pub fn pulses(&self) -> Vec<&[SpadEvent]> {
+        self.pulses.iter().map(Vec::as_slice).collect()
+    }
+}
+
+fn random_sensor(random: &mut StdRng, rows: usize, cols: usize) -> SensorConfig {
+    let clk_hz = random.random_range(100e6..500e6);
+    SensorConfig {
+        rows,
+        cols,
+        clk_hz,
+        stop_phase_ps: random.random_range(-0.45..0.45) * 1e12 / clk_hz,
+        counter_bits: random.random_range(3..10),
+        bins: random.random_range(2..17),
+        bin_bits: random.random_range(2..15),
+        dead_time_ns: random.random_range(3.0..12.0),
+        threshold: random.random_range(0..3),
+        event_type: [EventType::Greater, EventType::Equal, EventType::Less]
+            [random.random_range(0..3)],
+        mode: if random.random_bool(0.2) {
+            Mode::Conventional
+        } else {
+            Mode::Guided
+        },
+        corner: Corner::ALL[random.random_range(0..3)],
+        ..SensorConfig::default()
+    }
+}
