@@ -4,6 +4,7 @@
 mod export;
 mod frame;
 mod replay;
+mod sdf;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

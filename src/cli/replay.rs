@@ -8,6 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use super::SensorArgs;
+use super::sdf::annotated_timing;
 use crate::chip::{Exposure, SensorConfig};
 use crate::engine::recording::{Recording, check_exposure, read_events, read_starts};
 use crate::engine::waveform::{self, View};
@@ -105,6 +106,9 @@ pub struct ReplayArgs {
     /// Waveform of every named net (needs --engine gate); a GTKWave save file goes beside it.
     #[arg(long, value_name = "FILE")]
     vcd: Option<PathBuf>,
+    /// Delays that replace the library's (SDF, in the sensor's corner; needs --engine gate).
+    #[arg(long, value_name = "FILE")]
+    sdf: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -120,15 +124,24 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         let message = "only the gate engine has waveforms; add --engine gate or leave --vcd out";
         return Err(InputError::new(format!("--vcd {}", vcd.display()), message).into());
     }
+    if let (Some(sdf), true) = (&args.sdf, args.engine != EngineKind::Gate) {
+        let message =
+            "only the gate engine has delays of single cells; add --engine gate or leave --sdf out";
+        return Err(InputError::new(format!("--sdf {}", sdf.display()), message).into());
+    }
     let stimuli = args.stimuli.read()?;
     let histograms = match args.engine {
-        EngineKind::Gate => replay_gates(&stimuli, args.vcd.as_deref())?,
+        EngineKind::Gate => replay_gates(&stimuli, args.vcd.as_deref(), args.sdf.as_deref())?,
         kind => replay_models(&stimuli, kind)?,
     };
     write(&stimuli.config, &histograms, args.out.as_deref(), format)
 }
 
-fn replay_gates(stimuli: &Stimuli, vcd: Option<&Path>) -> anyhow::Result<Vec<Vec<u16>>> {
+fn replay_gates(
+    stimuli: &Stimuli,
+    vcd: Option<&Path>,
+    sdf: Option<&Path>,
+) -> anyhow::Result<Vec<Vec<u16>>> {
     let config = &stimuli.config;
     let mut simulation = GateSimulation::new(
         config,
@@ -138,6 +151,10 @@ fn replay_gates(stimuli: &Stimuli, vcd: Option<&Path>) -> anyhow::Result<Vec<Vec
         &stimuli.starts,
         &stimuli.pulses(),
     );
+    if let Some(sdf) = sdf {
+        let timing = annotated_timing(sdf, simulation.netlist(), config)?;
+        simulation = simulation.with_timing(&timing);
+    }
     match vcd {
         None => simulation.run(&mut ()),
         Some(vcd) => {
