@@ -37,7 +37,7 @@ use every_edge::circuit::{self, Case};
 use every_edge::waves::{Figures, Waves};
 use guided_dtof::engine::{GateSimulation, StimulusPlan, export_verilog};
 use guided_dtof::kernel::{Drive, Kernel, merge};
-use guided_dtof::netlist::{Direction, Module, Netlist, write_cells, write_modules};
+use guided_dtof::netlist::{Direction, Module, Netlist, Timing, write_cells, write_modules};
 use guided_dtof::units::Time;
 use guided_dtof::waves::{Selection, VcdWriter};
 use icarus::sensor::Scenario;
@@ -101,7 +101,8 @@ fn simulate(
     selection: &Selection,
 ) -> Waves {
     let mut writer = VcdWriter::new(Vec::new(), netlist, selection).unwrap();
-    let mut kernel = Kernel::new(netlist, &case.library(), case.corner());
+    let timing = Timing::nominal(netlist, &case.library(), case.corner());
+    let mut kernel = Kernel::new(netlist, &timing);
     let mut stimulus = merge([Box::new(drives.into_iter()) as Box<_>]);
     kernel.run(&mut stimulus, end, &mut writer);
     let top = &netlist.scopes()[0].name;

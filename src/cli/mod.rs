@@ -4,6 +4,7 @@
 mod export;
 mod frame;
 mod replay;
+mod sdf;
 mod testbench;
 
 pub use testbench::testbench;

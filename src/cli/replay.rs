@@ -8,6 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use super::SensorArgs;
+use super::sdf::annotated_timing;
 use crate::chip::{Exposure, SensorConfig};
 use crate::engine::recording::{Recording, check_exposure, read_events, read_starts};
 use crate::engine::waveform::{self, View};
@@ -105,6 +106,9 @@ pub struct ReplayArgs {
     /// Waveform of every named net (needs --engine gate); a GTKWave save file goes beside it.
     #[arg(long, value_name = "FILE")]
     vcd: Option<PathBuf>,
+    /// Delays that replace the library's (SDF, in the sensor's corner; needs --engine gate).
+    #[arg(long, value_name = "FILE")]
+    sdf: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -120,16 +124,26 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         let message = "only the gate engine has waveforms; add --engine gate or leave --vcd out";
         return Err(InputError::new(format!("--vcd {}", vcd.display()), message).into());
     }
+    if let (Some(sdf), true) = (&args.sdf, args.engine != EngineKind::Gate) {
+        let message =
+            "only the gate engine has delays of single cells; add --engine gate or leave --sdf out";
+        return Err(InputError::new(format!("--sdf {}", sdf.display()), message).into());
+    }
     let stimuli = args.stimuli.read()?;
-    let histograms = match &args.vcd {
-        Some(vcd) => replay_with_waveform(&stimuli, vcd)?,
-        None => replay(&stimuli, args.engine)?,
+    let histograms = if args.vcd.is_some() || args.sdf.is_some() {
+        replay_array(&stimuli, args.vcd.as_deref(), args.sdf.as_deref())?
+    } else {
+        replay(&stimuli, args.engine)?
     };
     write(&stimuli.config, &histograms, args.out.as_deref(), format)
 }
 
-/// The whole array as one netlist, with its waveform.
-fn replay_with_waveform(stimuli: &Stimuli, vcd: &Path) -> anyhow::Result<Vec<Vec<u16>>> {
+/// The whole array as one netlist, with its waveform and annotated delays.
+fn replay_array(
+    stimuli: &Stimuli,
+    vcd: Option<&Path>,
+    sdf: Option<&Path>,
+) -> anyhow::Result<Vec<Vec<u16>>> {
     let config = &stimuli.config;
     let mut simulation = GateSimulation::new(
         config,
@@ -139,9 +153,18 @@ fn replay_with_waveform(stimuli: &Stimuli, vcd: &Path) -> anyhow::Result<Vec<Vec
         &stimuli.starts,
         &stimuli.pulses(),
     );
-    let start = *stimuli.starts.first().expect("a sensor has a macropixel");
-    let view = View::of_window(&[(0, 0)], config, &stimuli.exposure, start);
-    waveform::record(&mut simulation, vcd, &view)?;
+    if let Some(sdf) = sdf {
+        let timing = annotated_timing(sdf, simulation.netlist(), config)?;
+        simulation = simulation.with_timing(&timing);
+    }
+    match vcd {
+        None => simulation.run(&mut ()),
+        Some(vcd) => {
+            let start = *stimuli.starts.first().expect("a sensor has a macropixel");
+            let view = View::of_window(&[(0, 0)], config, &stimuli.exposure, start);
+            waveform::record(&mut simulation, vcd, &view)?;
+        }
+    }
     Ok(simulation.histograms()?)
 }
 

@@ -44,6 +44,13 @@ impl<'a> GateSimulation<'a> {
         }
     }
 
+    /// The same simulation with other delays than the library's: annotated, mismatched. Call it before
+    /// [`GateSimulation::run`]; `timing` must be of the same netlist.
+    pub fn with_timing(mut self, timing: &Timing) -> Self {
+        self.kernel = Kernel::new(&self.netlist, timing);
+        self
+    }
+
     /// The netlist that is simulated.
     pub fn netlist(&self) -> &Arc<Netlist> {
         &self.netlist

@@ -23,7 +23,7 @@ pub use cycle::Cycle;
 pub use gate::{Gate, GateSimulation};
 pub use lanes::LaneSimulation;
 pub use stimulus::{LoadPins, Pins, Schedule, StimulusPlan};
-pub use testbench::export_verilog;
+pub use testbench::{export_annotated_verilog, export_verilog};
 pub use window::Window;
 
 use crate::photon::SpadEvent;

@@ -2,7 +2,7 @@
 //!
 //! A folder of four files: `cells.v` (cell models with the delays of the corner), `design.v` (the
 //! structural netlist), `stimulus.txt` (every change of every input pin: time in fs, pin, value) and `tb.v`, which
-//! replays the stimulus and writes `histograms.csv` and `local_stops.csv`, and `dut.vcd` when run with `+vcd`.
+//! replays the stimulus (and, where cells have delays of their own, includes `delays.v`) and writes `histograms.csv` and `local_stops.csv`, and `dut.vcd` when run with `+vcd`.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -10,7 +10,10 @@ use std::path::Path;
 use super::stimulus::{Pins, StimulusPlan};
 use crate::chip::{SensorConfig, histogram, sensor};
 use crate::files::{InputError, OutputFile, create_folder};
-use crate::netlist::{Direction, Library, Module, Netlist, write_cells, write_modules};
+use crate::netlist::{
+    Direction, Library, Module, Netlist, Timing, write_cells, write_delays, write_modules,
+    write_parametric_cells,
+};
 
 /// Writes cells, netlist, stimulus and testbench of the whole array into `folder`.
 ///
@@ -21,19 +24,52 @@ pub fn export_verilog(
     config: &SensorConfig,
     plan: &StimulusPlan<'_>,
 ) -> Result<(), InputError> {
+    export(folder, config, plan, None)
+}
+
+/// As [`export_verilog`], with the delays of `timing`, which is that of [`sensor::circuit`]: cells take
+/// delays as parameters, and a fifth file, `delays.v`, sets those that differ from the library.
+///
+/// # Errors
+/// As [`export_verilog`].
+pub fn export_annotated_verilog(
+    folder: &Path,
+    config: &SensorConfig,
+    plan: &StimulusPlan<'_>,
+    timing: &Timing,
+) -> Result<(), InputError> {
+    export(folder, config, plan, Some(timing))
+}
+
+fn export(
+    folder: &Path,
+    config: &SensorConfig,
+    plan: &StimulusPlan<'_>,
+    timing: Option<&Timing>,
+) -> Result<(), InputError> {
     let top = sensor::circuit(config);
     let netlist = Netlist::elaborate(&top);
     create_folder(folder)?;
     let file = |name: &str| folder.join(name);
     OutputFile::write_with(&file("cells.v"), |out| {
-        write_cells(out, &Library::default(), config.corner)
+        let library = Library::default();
+        match timing {
+            None => write_cells(out, &library, config.corner),
+            Some(_) => write_parametric_cells(out, &library, config.corner),
+        }
     })?;
+    if let Some(timing) = timing {
+        OutputFile::write_with(&file("delays.v"), |out| {
+            let library = Timing::nominal(&netlist, &Library::default(), config.corner);
+            write_delays(out, "dut", &netlist, timing, &library)
+        })?;
+    }
     OutputFile::write_with(&file("design.v"), |out| write_modules(out, &top))?;
     OutputFile::write_with(&file("stimulus.txt"), |out| {
         write_stimulus(out, &netlist, plan)
     })?;
     OutputFile::write_with(&file("tb.v"), |out| {
-        write_testbench(out, &top, config, plan)
+        write_testbench(out, &top, config, plan, timing.is_some())
     })
 }
 
@@ -58,7 +94,13 @@ fn write_testbench(
     top: &Module,
     config: &SensorConfig,
     plan: &StimulusPlan<'_>,
+    is_annotated: bool,
 ) -> io::Result<()> {
+    let include = if is_annotated {
+        "  `include \"delays.v\"\n"
+    } else {
+        ""
+    };
     let schedule = plan.schedule();
     let name = top.name();
     let mut pins = 0;
@@ -94,7 +136,7 @@ module tb;
   {name} dut(
 {ports}
   );
-
+{include}
   genvar i;
   generate
     for (i = 0; i < {pixels}; i = i + 1) begin : watch

@@ -146,6 +146,12 @@ impl Netlist {
         &self.cells
     }
 
+    /// Indices of the leaf cells directly in scope `index`, in the order of its module.
+    pub fn cells_of(&self, index: usize) -> std::ops::Range<usize> {
+        let scope = &self.scopes[index];
+        scope.first_cell..scope.first_cell + scope.module.cells().len()
+    }
+
     /// Number of nets.
     pub fn net_count(&self) -> usize {
         self.net_count

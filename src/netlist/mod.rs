@@ -14,6 +14,7 @@ mod flat;
 mod library;
 mod longest;
 mod module;
+pub mod sdf;
 mod timing;
 mod verilog;
 
@@ -25,4 +26,4 @@ pub use module::{
     Cell, Direction, Instance, Module, ModuleBuilder, Net, NetlistError, Port, Signal,
 };
 pub use timing::{ArcDelay, CellDelays, Timing};
-pub use verilog::{write_cells, write_modules};
+pub use verilog::{write_cells, write_delays, write_modules, write_parametric_cells};

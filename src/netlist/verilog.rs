@@ -14,15 +14,19 @@
 //! That is the order of the event kernel, too. A testbench needs no precautions, as long as it
 //! drives pins in the active region (by `=`, not after a `#0` of its own or by `<=`).
 //!
-//! Time unit and precision are one femtosecond.
+//! Where instances have delays of their own, every cell is a procedural model with delays that are parameters
+//! ([`write_parametric_cells`]), and `defparam`s set those that differ ([`write_delays`]). Time unit and
+//! precision are one femtosecond.
 
 use std::collections::HashSet;
 use std::io::{self, Write};
 use std::sync::Arc as Shared;
 
 use super::cell::CellKind;
+use super::flat::Netlist;
 use super::library::{CellArcs, Corner, Library};
 use super::module::{Direction, Module, Net};
+use super::timing::Timing;
 use crate::logic::Logic;
 
 const TIMESCALE: &str = "`timescale 1fs/1fs\n";
@@ -36,6 +40,74 @@ pub fn write_cells(out: &mut dyn Write, library: &Library, corner: Corner) -> io
     for kind in CellKind::ALL {
         writeln!(out)?;
         write_cell(out, kind, library.arcs(kind), corner)?;
+    }
+    Ok(())
+}
+
+/// As [`write_cells`], with parameters `RISE_<pin>` and `FALL_<pin>` (fs) for the delays of every arc.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_parametric_cells(
+    out: &mut dyn Write,
+    library: &Library,
+    corner: Corner,
+) -> io::Result<()> {
+    write!(out, "{TIMESCALE}")?;
+    for kind in CellKind::ALL {
+        let (inputs, outputs) = (kind.inputs().join(", "), kind.outputs().join(", "));
+        writeln!(
+            out,
+            "\nmodule {}(output {outputs}, input {inputs});",
+            kind.name()
+        )?;
+        for (pin, name) in kind.inputs().iter().enumerate() {
+            if kind.triggers(pin) {
+                let arc = library.arcs(kind)[pin];
+                let (rise, fall) = (arc.rise.at(corner), arc.fall.at(corner));
+                writeln!(out, "  parameter [31:0] RISE_{name} = {rise};")?;
+                writeln!(out, "  parameter [31:0] FALL_{name} = {fall};")?;
+            }
+        }
+        write_arc_selecting_cell(out, kind, |pin| {
+            let name = kind.inputs()[pin];
+            (format!("RISE_{name}"), format!("FALL_{name}"))
+        })?;
+        writeln!(out, "endmodule")?;
+    }
+    Ok(())
+}
+
+/// Writes a `defparam` for every delay of `timing` that differs from `library`, the delays that the cells were
+/// written with; `instance` is the name that the top has where the file is included.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_delays(
+    out: &mut dyn Write,
+    instance: &str,
+    netlist: &Netlist,
+    timing: &Timing,
+    library: &Timing,
+) -> io::Result<()> {
+    let top = netlist.scopes()[0].name.len();
+    for (index, scope) in netlist.scopes().iter().enumerate() {
+        let path = format!("{instance}{}", &netlist.scope_path(index)[top..]);
+        for (cell, leaf) in netlist.cells_of(index).zip(scope.module.cells()) {
+            for (pin, name) in leaf.kind.inputs().iter().enumerate() {
+                let (arc, nominal) = (timing.of(cell)[pin], library.of(cell)[pin]);
+                let values = [
+                    ("RISE", arc.rise_fs, nominal.rise_fs),
+                    ("FALL", arc.fall_fs, nominal.fall_fs),
+                ];
+                for (direction, fs, nominal) in values {
+                    if fs != nominal && leaf.kind.triggers(pin) {
+                        let cell = &leaf.name;
+                        writeln!(out, "  defparam {path}.{cell}.{direction}_{name} = {fs};")?;
+                    }
+                }
+            }
+        }
     }
     Ok(())
 }
@@ -87,10 +159,10 @@ fn write_cell(
     writeln!(out, "endmodule")
 }
 
-fn write_arc_selecting_cell(
+fn write_arc_selecting_cell<D: std::fmt::Display>(
     out: &mut dyn Write,
     kind: CellKind,
-    delays: impl Fn(usize) -> (u32, u32),
+    delays: impl Fn(usize) -> (D, D),
 ) -> io::Result<()> {
     let pins = kind.inputs();
     let triggers: Vec<usize> = (0..pins.len()).filter(|&p| kind.triggers(p)).collect();
@@ -140,7 +212,8 @@ fn write_arc_selecting_cell(
     } else {
         let expression = match kind {
             CellKind::Mux2 => "(S ? B : A) | 1'b0".to_owned(),
-            CellKind::Inv | CellKind::Buf => unreachable!("one input has one arc"),
+            CellKind::Inv => "~A".to_owned(),
+            CellKind::Buf => "A | 1'b0".to_owned(),
             CellKind::Nand2 => "~(A & B)".to_owned(),
             CellKind::Nor2 => "~(A | B)".to_owned(),
             CellKind::And2 => "A & B".to_owned(),

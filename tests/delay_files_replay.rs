@@ -1,0 +1,93 @@
+//! `gdtof export sdf` and `--sdf`: nominal delays change nothing, others do, bad files are refused.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+const ARRAY: [&str; 4] = ["--rows", "1", "--cols", "2"];
+const REPLAY: [&str; 9] = [
+    "replay",
+    "--inits",
+    "inits.csv",
+    "--events",
+    "events.csv",
+    "--stop-periods",
+    "60",
+    "--laser-cycles",
+    "4",
+];
+
+fn gdtof(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gdtof"));
+    command.args(arguments).args(ARRAY).current_dir(folder);
+    command.output().unwrap()
+}
+
+fn replay(folder: &Path, more: &[&str]) -> Output {
+    gdtof(folder, &[&REPLAY[..], more].concat())
+}
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut events = "time_fs,row,col,spad\n".to_owned();
+    for i in 0..200i64 {
+        events += &format!("{},0,{},{}\n", 1_000_000 + i * 2_777_777, i % 2, i % 16);
+    }
+    std::fs::write(folder.path().join("events.csv"), events).unwrap();
+    let inits = "row,col,init\n0,0,20\n0,1,30\n";
+    std::fs::write(folder.path().join("inits.csv"), inits).unwrap();
+    folder
+}
+
+#[test]
+fn an_exported_file_changes_nothing_and_a_slower_one_does() {
+    let folder = folder();
+    let here = folder.path();
+    for (divider, timescale) in [("dot", "fs"), ("slash", "ps")] {
+        let export = ["export", "sdf", "--out", "d.sdf", "--divider", divider];
+        let written = gdtof(here, &[&export[..], &["--timescale", timescale]].concat());
+        assert!(written.status.success(), "{written:?}");
+        let plain = replay(here, &["--engine", "gate"]);
+        let same = replay(here, &["--engine", "gate", "--sdf", "d.sdf"]);
+        assert!(plain.status.success() && same.status.success(), "{same:?}");
+        assert_eq!(plain.stdout, same.stdout);
+        assert!(String::from_utf8_lossy(&same.stderr).contains("0 wires annotated"));
+        let slower = "(DELAYFILE (TIMESCALE 1ps) (CELL (CELLTYPE \"DFFR\") (INSTANCE *)
+            (DELAY (INCREMENT (IOPATH (posedge CK) Q (300))))))";
+        std::fs::write(here.join("slower.sdf"), slower).unwrap();
+        let slow = replay(here, &["--engine", "gate", "--sdf", "slower.sdf"]);
+        assert_ne!(plain.stdout, slow.stdout, "{slow:?}");
+    }
+}
+
+#[test]
+fn bad_delay_files_are_refused_in_one_sentence() {
+    let folder = folder();
+    let here = folder.path();
+    std::fs::write(
+        here.join("bad.sdf"),
+        "(DELAYFILE\n(CELL (CELLTYPE \"INV\") (INSTANCE nobody)))",
+    )
+    .unwrap();
+    for (more, says) in [
+        (
+            &["--engine", "gate", "--sdf", "bad.sdf"][..],
+            "bad.sdf:2: the chip has no instance nobody",
+        ),
+        (
+            &["--engine", "gate", "--sdf", "none.sdf"],
+            "none.sdf: cannot be read",
+        ),
+        (&["--engine", "window", "--sdf", "bad.sdf"], "--engine gate"),
+    ] {
+        let output = replay(here, more);
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        assert!(
+            error.contains(says) && error.trim_end().lines().count() == 1,
+            "{error}"
+        );
+    }
+    let missing = gdtof(here, &["export", "sdf", "--out", "no/d.sdf"]);
+    assert_eq!(missing.status.code(), Some(2));
+    assert!(!here.join("no").exists());
+}
