@@ -12,17 +12,17 @@
 mod cell;
 mod flat;
 mod library;
-mod longest;
 mod module;
+mod static_timing;
 mod timing;
 mod verilog;
 
 pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS, next_state};
 pub use flat::{FlatCell, NetId, Netlist, Scope};
 pub use library::{Arc, CellArcs, Corner, Delay, Library};
-pub use longest::longest_path;
 pub use module::{
     Cell, Direction, Instance, Module, ModuleBuilder, Net, NetlistError, Port, Signal,
 };
+pub use static_timing::{Arrivals, Bound, Edge, Path, StaticTiming, Step, TimingLoop, setup_time};
 pub use timing::{ArcDelay, CellDelays, Timing};
 pub use verilog::{write_cells, write_modules};
