@@ -43,6 +43,12 @@ impl<'a> GateSimulation<'a> {
         }
     }
 
+    /// Takes other delays than the library's: `timing` makes them for the netlist.
+    pub fn with_timing(mut self, timing: impl FnOnce(&Netlist) -> Timing) -> Self {
+        self.kernel = Kernel::new(&self.netlist, &timing(&self.netlist));
+        self
+    }
+
     /// The netlist that is simulated.
     pub fn netlist(&self) -> &Arc<Netlist> {
         &self.netlist

@@ -15,6 +15,7 @@ mod library;
 mod module;
 mod static_timing;
 mod timing;
+mod variation;
 mod verilog;
 
 pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS, next_state};
@@ -25,4 +26,5 @@ pub use module::{
 };
 pub use static_timing::{Arrivals, Bound, Edge, Path, StaticTiming, Step, TimingLoop, setup_time};
 pub use timing::{ArcDelay, CellDelays, Timing};
+pub use variation::{Conditions, Mismatch, Process, varied};
 pub use verilog::{write_cells, write_modules};
