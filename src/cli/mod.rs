@@ -4,6 +4,7 @@
 mod export;
 mod frame;
 mod replay;
+mod timing;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -29,6 +30,8 @@ enum Command {
     Frame(frame::FrameArgs),
     /// Run recorded SPAD events through the chip.
     Replay(replay::ReplayArgs),
+    /// How fast the chip can be clocked: ripple, periods, margins.
+    Timing(timing::TimingArgs),
     /// Write the chip for other tools.
     #[command(subcommand)]
     Export(export::ExportCommand),
@@ -68,6 +71,7 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Frame(args) => frame::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::Timing(args) => timing::run(&args),
         Command::Export(command) => export::run(&command),
     };
     match result {
