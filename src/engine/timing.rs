@@ -13,7 +13,7 @@
 //! forbidden at every phase.
 
 use super::gate::GateSimulation;
-use crate::chip::{Exposure, SensorConfig, macropixel, p_counter};
+use crate::chip::{Exposure, SensorConfig, p_counter, sensor};
 use crate::kernel::{Drive, Kernel, Recorder, merge};
 use crate::netlist::{
     Bound, CellKind, Edge, NetId, Netlist, Path, StaticTiming, Timing, setup_time,
@@ -50,23 +50,30 @@ pub struct MacropixelTiming {
 impl MacropixelTiming {
     /// Analyses a macropixel of this sensor.
     pub fn of(config: &SensorConfig, delays: Delays<'_>) -> Self {
-        let netlist = Netlist::elaborate(&macropixel::circuit(config));
+        // The very netlist that the gate engine simulates, so that a cell's mismatch is the same in both.
+        let netlist = Netlist::elaborate(&sensor::window(config, (0, 0), (1, 1)));
+        let pixel = sensor::pixel_name(0, 0);
         let timing = delays(&netlist);
         let analysis = StaticTiming::new(&netlist, &timing);
-        let net = |name: &str| netlist.net(name).expect("a net of the macropixel");
+        let bus = |name: &str| {
+            let nets = netlist.signal(&format!("{pixel}.{name}"));
+            nets.expect("a signal of the macropixel")
+        };
+        let net = |name: &str| bus(name)[0];
         // LOCAL_STOP blocks COUNTER_CLK, and FULL blocks a bin's clock: both loops are cut, as is the reset.
         let after = |from: &str, edge, cuts: &[NetId]| {
             let arrivals = analysis.arrivals(&[(net(from), edge)], cuts);
             arrivals.expect("every loop is cut")
         };
         let block = net("p_counter_timing.BLOCK");
-        let hits = netlist.signal("HIT").expect("a bus of the macropixel");
-        let cuts: Vec<NetId> = hits.into_iter().chain([block]).collect();
+        let hits = bus("HIT");
+        // ENABLE changes with STOP, but only before the first and after the last laser cycle.
+        let cuts: Vec<NetId> = hits.into_iter().chain([block, net("ENABLE")]).collect();
         let fall = after("CLK", Edge::Fall, &cuts);
         let rise = after("CLK", Edge::Rise, &cuts);
         let stop = after("STOP", Edge::Rise, &cuts);
         let whole = "the macropixel connects these";
-        let counter_out = netlist.signal("p_counter.COUNTER_OUT").expect(whole);
+        let counter_out = bus("p_counter.COUNTER_OUT");
         // Each stage's own reset path: what arrives at a stage output goes no further.
         let cuts: Vec<NetId> = cuts
             .into_iter()
@@ -89,7 +96,11 @@ impl MacropixelTiming {
             Edge::Fall,
             &[net("COUNTER_CLK"), net("metdc.STROBE")],
         );
-        let shift = netlist.signal("metdc.SHIFT").expect(whole)[0];
+        let shift = bus("metdc.SHIFT");
+        let shift = shift
+            .iter()
+            .filter_map(|&bit| rise.window(bit))
+            .map(|w| w.0);
         MacropixelTiming {
             ripple: fall
                 .path(net("LOCAL_STOP"), Edge::Rise, Bound::Longest)
@@ -98,7 +109,7 @@ impl MacropixelTiming {
                 .edge_window(net("metdc.STROBE"), Edge::Rise)
                 .expect(whole)
                 .1,
-            shift: rise.window(shift).expect(whole).0,
+            shift: shift.min().expect(whole),
             event: rise
                 .path_to(net("SPAD_EVENT"), Bound::Longest)
                 .expect(whole),
