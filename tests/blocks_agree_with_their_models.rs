@@ -10,7 +10,7 @@ use guided_dtof::chip::{
 use guided_dtof::kernel::{Drive, Kernel, Recorder, Stimulus, in_order};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{
-    CellKind, Corner, Library, Module, NetId, Netlist, Timing, longest_path,
+    CellKind, Corner, Edge, Library, Module, NetId, Netlist, StaticTiming, Timing,
 };
 use guided_dtof::units::Time;
 use proptest::prelude::*;
@@ -565,7 +565,16 @@ fn correlate(corner: Corner, conditions: impl Iterator<Item = (u16, u8, u8)>) ->
         Time::from_fs(since % step.as_fs())
     };
     let slowest = run.recorder.changes().iter().map(taken).max();
-    let longest = longest_path(&correlation::circuit(), &Library::default(), corner);
+    let netlist = Netlist::elaborate(&correlation::circuit());
+    let starts = netlist.inputs().into_iter();
+    let starts: Vec<_> = starts
+        .flat_map(|net| Edge::BOTH.map(|edge| (net, edge)))
+        .collect();
+    let timing = Timing::nominal(&netlist, &Library::default(), corner);
+    let arrivals = StaticTiming::new(&netlist, &timing)
+        .arrivals(&starts, &[])
+        .unwrap();
+    let (_, longest) = arrivals.window(netlist.net("SPAD_EVENT").unwrap()).unwrap();
     let slowest = slowest.unwrap_or(Time::ZERO);
     assert!(
         slowest <= longest && longest < step,

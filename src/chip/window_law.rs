@@ -22,7 +22,7 @@ use super::config::{Mode, SensorConfig};
 use super::exposure::Exposure;
 use super::{correlation, p_counter_timing};
 use crate::logic::Logic::{One, Zero};
-use crate::netlist::{CellKind, Library, longest_path};
+use crate::netlist::{CellKind, Corner, Edge, Library, Netlist, StaticTiming, Timing};
 use crate::units::Time;
 
 /// Delays of the paths that decide where a window lies.
@@ -64,7 +64,7 @@ impl ChipTiming {
         let or_rise = delay(CellKind::Or2, 0, One);
         let chain = buffer_rise * p_counter_timing::DELAY_CHAIN as i64;
         let stop_to_reset = delay(CellKind::And2, 0, One) + or_rise;
-        let correlation = longest_path(&correlation::circuit(), &library, corner);
+        let correlation = longest_correlation(&library, corner);
         let xor = delay(CellKind::Xor2, 0, One).max(delay(CellKind::Xor2, 0, Zero));
         ChipTiming {
             spad_to_toggle: clock_to_q,
@@ -89,6 +89,24 @@ impl ChipTiming {
     pub fn ripple(&self) -> Time {
         self.clk_to_counter_clk + self.counter_clk_to_local_stop
     }
+}
+
+/// The longest path from SPAD_TIMED to SPAD_EVENT.
+fn longest_correlation(library: &Library, corner: Corner) -> Time {
+    let netlist = Netlist::elaborate(&correlation::circuit());
+    let timing = Timing::nominal(&netlist, library, corner);
+    let nets = |name| netlist.signal(name).expect("a port of the block");
+    let starts: Vec<_> = nets("SPAD_TIMED")
+        .into_iter()
+        .flat_map(|net| Edge::BOTH.map(|edge| (net, edge)))
+        .collect();
+    let arrivals = StaticTiming::new(&netlist, &timing)
+        .arrivals(&starts, &[])
+        .expect("the block is combinational");
+    let (_, longest) = arrivals
+        .window(nets("SPAD_EVENT")[0])
+        .expect("SPAD_EVENT depends on SPAD_TIMED");
+    longest
 }
 
 /// How far a strobe must stay from a change of the shift register, and a count from a reset, for the law

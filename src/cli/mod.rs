@@ -6,6 +6,7 @@ mod frame;
 mod replay;
 mod sdf;
 mod testbench;
+mod timing;
 
 pub use testbench::testbench;
 
@@ -33,6 +34,8 @@ enum Command {
     Frame(frame::FrameArgs),
     /// Run recorded SPAD events through the chip.
     Replay(replay::ReplayArgs),
+    /// How fast the chip can be clocked: ripple, periods, margins.
+    Timing(timing::TimingArgs),
     /// Write the chip for other tools.
     #[command(subcommand)]
     Export(export::ExportCommand),
@@ -72,6 +75,7 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Frame(args) => frame::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::Timing(args) => timing::run(&args),
         Command::Export(command) => export::run(&command),
     };
     match result {

@@ -16,6 +16,7 @@ pub mod load;
 pub mod recording;
 mod stimulus;
 mod testbench;
+pub mod timing;
 pub mod waveform;
 mod window;
 

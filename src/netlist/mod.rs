@@ -12,18 +12,20 @@
 mod cell;
 mod flat;
 mod library;
-mod longest;
 mod module;
 pub mod sdf;
+mod static_timing;
 mod timing;
+mod variation;
 mod verilog;
 
 pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS, next_state};
 pub use flat::{FlatCell, NetId, Netlist, Scope};
 pub use library::{Arc, CellArcs, Corner, Delay, Library};
-pub use longest::longest_path;
 pub use module::{
     Cell, Direction, Instance, Module, ModuleBuilder, Net, NetlistError, Port, Signal,
 };
+pub use static_timing::{Arrivals, Bound, Edge, Path, StaticTiming, Step, TimingLoop, setup_time};
 pub use timing::{ArcDelay, CellDelays, Timing};
+pub use variation::{Conditions, Mismatch, Process, varied};
 pub use verilog::{write_cells, write_delays, write_modules, write_parametric_cells};

@@ -1,0 +1,196 @@
+//! How delays vary: with process, supply voltage and temperature, and at random from cell to cell.
+//!
+//! Delay follows the alpha-power law (Sakurai and Newton, IEEE JSSC 25, 1990):
+//!
+//! ```text
+//!   delay ∝ V / (μ(T) · (V − Vth(T))^α)      μ ∝ T^−1.5 (lattice scattering),   Vth falls linearly with T
+//! ```
+//!
+//! α = 1.3 is Sakurai and Newton's figure for a short-channel transistor. The threshold (0.40 V at 50 °C), its
+//! temperature coefficient (−0.8 mV/K) and the process spread (±30 mV of threshold, ±8 % of drive) are round
+//! figures assumed for a 40 nm low-power process: no foundry's numbers are public. Every delay of the chip
+//! scales by one factor, exactly 1 at 1.1 V, 50 °C, typical, where the library is characterised.
+//!
+//! Mismatch is Gaussian, with a standard deviation that falls with the square root of a cell's area (Pelgrom
+//! et al., IEEE JSSC 24, 1989), its transistor count standing for the area. A cell's draw depends on nothing
+//! but the seed and the cell's index.
+
+use rand_philox::{Philox, splitmix64, u32_to_unit_f64};
+
+use super::flat::Netlist;
+use super::timing::Timing;
+
+/// Speed of the silicon.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Process {
+    /// High threshold, weak drive.
+    Slow,
+    /// As characterised.
+    #[default]
+    Typ,
+    /// Low threshold, strong drive.
+    Fast,
+}
+
+/// Where the chip is operated, and what it is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conditions {
+    /// Silicon.
+    pub process: Process,
+    /// Supply, V.
+    pub voltage_v: f64,
+    /// Junction temperature, °C.
+    pub temperature_c: f64,
+}
+
+impl Default for Conditions {
+    /// Where the library is characterised: typical, 1.1 V, 50 °C (thesis 4.6).
+    fn default() -> Self {
+        Conditions {
+            process: Process::Typ,
+            voltage_v: 1.1,
+            temperature_c: 50.0,
+        }
+    }
+}
+
+const ALPHA: f64 = 1.3;
+const MOBILITY_EXPONENT: f64 = 1.5;
+const THRESHOLD_V: f64 = 0.40;
+const THRESHOLD_V_PER_K: f64 = -0.8e-3;
+const ZERO_CELSIUS_K: f64 = 273.15;
+
+impl Conditions {
+    /// Factor on every delay of the typical library, or `None` outside what the model can say: below 0.2 V of
+    /// overdrive, above 2 V, or not from −55 to 150 °C.
+    pub fn delay_factor(&self) -> Option<f64> {
+        let reference = Conditions::default().raw_delay()?;
+        Some(self.raw_delay()? / reference)
+    }
+
+    /// Delay in arbitrary units.
+    fn raw_delay(&self) -> Option<f64> {
+        let in_range =
+            (0.0..=2.0).contains(&self.voltage_v) && (-55.0..=150.0).contains(&self.temperature_c);
+        let (shift_v, drive) = match self.process {
+            Process::Slow => (0.03, 0.92),
+            Process::Typ => (0.0, 1.0),
+            Process::Fast => (-0.03, 1.08),
+        };
+        let reference_c = 50.0;
+        let threshold =
+            THRESHOLD_V + shift_v + THRESHOLD_V_PER_K * (self.temperature_c - reference_c);
+        let overdrive = self.voltage_v - threshold;
+        let mobility = libm::pow(
+            (self.temperature_c + ZERO_CELSIUS_K) / (reference_c + ZERO_CELSIUS_K),
+            -MOBILITY_EXPONENT,
+        );
+        (in_range && overdrive >= 0.2)
+            .then(|| self.voltage_v / (drive * mobility * libm::pow(overdrive, ALPHA)))
+    }
+}
+
+/// Random differences between cells that should be equal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mismatch {
+    /// Standard deviation of an inverter's delay, relative to its mean.
+    pub sigma: f64,
+    /// Which chip.
+    pub seed: u64,
+}
+
+impl Mismatch {
+    /// Factor on the delays of the cell with this index and this many transistors; never below 0.1, so that
+    /// causes stay before their effects.
+    pub fn factor(&self, cell: usize, transistors: u32) -> f64 {
+        const INVERTER: f64 = 2.0;
+        let key = splitmix64(self.seed);
+        let mut random = Philox::new([key as u32, (key >> 32) as u32], (cell as u128) << 64);
+        // Box and Muller.
+        let radius = libm::sqrt(-2.0 * libm::log(u32_to_unit_f64(random.next_u32())));
+        let angle = std::f64::consts::TAU * u32_to_unit_f64(random.next_u32());
+        let sigma = self.sigma * libm::sqrt(INVERTER / transistors as f64);
+        (1.0 + sigma * radius * libm::cos(angle)).max(0.1)
+    }
+}
+
+/// `nominal` with every delay times `factor` and, if asked for, every cell's own mismatch; rounded to whole
+/// femtoseconds.
+pub fn varied(
+    netlist: &Netlist,
+    nominal: &Timing,
+    factor: f64,
+    mismatch: Option<Mismatch>,
+) -> Timing {
+    let mut timing = nominal.clone();
+    if factor == 1.0 && mismatch.is_none() {
+        return timing;
+    }
+    for (index, cell) in netlist.cells().iter().enumerate() {
+        let own = mismatch.map_or(1.0, |m| m.factor(index, cell.kind.transistors()));
+        let scale = |fs: u32| (fs as f64 * factor * own).round() as u32;
+        let delays = nominal.of(index).map(|mut arc| {
+            arc.rise_fs = scale(arc.rise_fs);
+            arc.fall_fs = scale(arc.fall_fs);
+            arc
+        });
+        timing.set(index, delays);
+    }
+    timing
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn factor(process: Process, voltage_v: f64, temperature_c: f64) -> f64 {
+        let conditions = Conditions {
+            process,
+            voltage_v,
+            temperature_c,
+        };
+        conditions.delay_factor().unwrap()
+    }
+
+    #[test]
+    fn the_reference_is_exactly_one() {
+        assert_eq!(Conditions::default().delay_factor(), Some(1.0));
+    }
+
+    #[test]
+    fn low_voltage_heat_and_slow_silicon_are_slow() {
+        assert!(factor(Process::Typ, 1.0, 50.0) > 1.0);
+        assert!(factor(Process::Typ, 1.1, 100.0) > 1.0);
+        assert!(factor(Process::Slow, 1.1, 50.0) > 1.0);
+        assert!(factor(Process::Fast, 1.1, 50.0) < 1.0);
+        assert!(factor(Process::Typ, 1.2, 0.0) < 1.0);
+    }
+
+    #[test]
+    fn impossible_conditions_have_no_factor() {
+        for (voltage_v, temperature_c) in [(0.4, 50.0), (3.0, 50.0), (1.1, 200.0), (f64::NAN, 50.0)]
+        {
+            let conditions = Conditions {
+                voltage_v,
+                temperature_c,
+                ..Conditions::default()
+            };
+            assert_eq!(conditions.delay_factor(), None);
+        }
+    }
+
+    #[test]
+    fn mismatch_has_the_spread_of_its_area() {
+        let mismatch = Mismatch {
+            sigma: 0.08,
+            seed: 3,
+        };
+        let draws: Vec<f64> = (0..20_000).map(|cell| mismatch.factor(cell, 8)).collect();
+        let mean = draws.iter().sum::<f64>() / draws.len() as f64;
+        let variance = draws.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>();
+        let sigma = (variance / draws.len() as f64).sqrt();
+        assert!((mean - 1.0).abs() < 0.001, "{mean}");
+        assert!((sigma - 0.04).abs() < 0.001, "{sigma}");
+        assert_eq!(draws[7], mismatch.factor(7, 8));
+    }
+}
