@@ -13,6 +13,7 @@ use crate::engine::recording::{Recording, check_exposure, read_events, read_star
 use crate::engine::waveform::{self, View};
 use crate::engine::{EngineError, GateSimulation};
 use crate::files::{InputError, OutputFile};
+use crate::kernel::{Observer, Policy};
 use crate::photon::SpadEvent;
 use crate::report::write_npy_u16;
 use crate::system::EngineKind;
@@ -105,6 +106,31 @@ pub struct ReplayArgs {
     /// Waveform of every named net (needs --engine gate); a GTKWave save file goes beside it.
     #[arg(long, value_name = "FILE")]
     vcd: Option<PathBuf>,
+    /// Check setup, hold, recovery, removal and pulse widths of every flip-flop (needs --engine gate): a summary
+    /// on standard error.
+    #[arg(long, value_enum, value_name = "POLICY")]
+    checks: Option<Checks>,
+    /// The timing checks' violations, summary and slack histograms as JSON (needs --checks).
+    #[arg(long, value_name = "FILE")]
+    checks_json: Option<PathBuf>,
+}
+
+/// What a timing violation does.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Checks {
+    /// It is reported.
+    Report,
+    /// It is reported, and the flip-flop's state becomes X.
+    X,
+}
+
+impl From<Checks> for Policy {
+    fn from(checks: Checks) -> Self {
+        match checks {
+            Checks::Report => Policy::ReportOnly,
+            Checks::X => Policy::XOnViolation,
+        }
+    }
 }
 
 /// Runs the command.
@@ -120,15 +146,24 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         let message = "only the gate engine has waveforms; add --engine gate or leave --vcd out";
         return Err(InputError::new(format!("--vcd {}", vcd.display()), message).into());
     }
+    if args.checks.is_some() && args.engine != EngineKind::Gate {
+        let message =
+            "only the gate engine has timing checks; add --engine gate or leave --checks out";
+        return Err(InputError::new("--checks", message).into());
+    }
+    if let (Some(json), None) = (&args.checks_json, args.checks) {
+        let message = "there are no timing checks to write; add --checks report";
+        return Err(InputError::new(format!("--checks-json {}", json.display()), message).into());
+    }
     let stimuli = args.stimuli.read()?;
     let histograms = match args.engine {
-        EngineKind::Gate => replay_gates(&stimuli, args.vcd.as_deref())?,
+        EngineKind::Gate => replay_gates(&stimuli, args)?,
         kind => replay_models(&stimuli, kind)?,
     };
     write(&stimuli.config, &histograms, args.out.as_deref(), format)
 }
 
-fn replay_gates(stimuli: &Stimuli, vcd: Option<&Path>) -> anyhow::Result<Vec<Vec<u16>>> {
+fn replay_gates(stimuli: &Stimuli, args: &ReplayArgs) -> anyhow::Result<Vec<Vec<u16>>> {
     let config = &stimuli.config;
     let mut simulation = GateSimulation::new(
         config,
@@ -138,15 +173,36 @@ fn replay_gates(stimuli: &Stimuli, vcd: Option<&Path>) -> anyhow::Result<Vec<Vec
         &stimuli.starts,
         &stimuli.pulses(),
     );
-    match vcd {
-        None => simulation.run(&mut ()),
-        Some(vcd) => {
-            let start = *stimuli.starts.first().expect("a sensor has a macropixel");
-            let view = View::of_window(&[(0, 0)], config, &stimuli.exposure, start);
-            waveform::record(&mut simulation, vcd, &view)?;
+    let vcd = args.vcd.as_deref();
+    match args.checks {
+        None => watch(&mut simulation, stimuli, vcd, &mut ())?,
+        Some(policy) => {
+            let mut checks = simulation.timing_checks(policy.into());
+            watch(&mut simulation, stimuli, vcd, &mut checks)?;
+            let report = checks.report(simulation.netlist());
+            eprint!("{report}");
+            // Before the histograms, which unknown states may have spoilt: this says why.
+            if let Some(path) = &args.checks_json {
+                OutputFile::write_with(path, |w| Ok(serde_json::to_writer_pretty(w, &report)?))?;
+            }
         }
     }
     Ok(simulation.histograms()?)
+}
+
+fn watch<O: Observer>(
+    simulation: &mut GateSimulation<'_>,
+    stimuli: &Stimuli,
+    vcd: Option<&Path>,
+    observer: &mut O,
+) -> Result<(), InputError> {
+    let Some(vcd) = vcd else {
+        simulation.run(observer);
+        return Ok(());
+    };
+    let start = *stimuli.starts.first().expect("a sensor has a macropixel");
+    let view = View::of_window(&[(0, 0)], &stimuli.config, &stimuli.exposure, start);
+    waveform::record(simulation, vcd, &view, observer)
 }
 
 fn replay_models(stimuli: &Stimuli, kind: EngineKind) -> anyhow::Result<Vec<Vec<u16>>> {

@@ -9,7 +9,7 @@
 //!
 //! ```text
 //!   Stimulus ──┐              ┌─► Observer (waveforms, recorders)
-//!              ├─► apply ─────┤
+//!              ├─► apply ─────┤    timing checks)
 //!   TimeWheel ─┘   changes    └─► dirty cells ─► evaluate ─► schedule ─┐
 //!       ▲                                                             │
 //!       └─────────────────────────────────────────────────────────────┘
@@ -19,12 +19,18 @@
 //! of events within an instant. The hot loop neither allocates (buckets keep their memory), nor
 //! hashes, nor touches a string.
 
+mod check_report;
+mod checks;
 mod compiled;
 mod observer;
 mod simulation;
 mod stimulus;
 mod wheel;
 
+pub use check_report::{
+    BIN_FS, BINS, CheckReport, CheckSummary, FIRST_BIN_FS, Place, Policy, Violation,
+};
+pub use checks::TimingChecks;
 pub use observer::{Observer, Recorder};
 pub use simulation::{Kernel, Statistics};
 pub use stimulus::{Drive, Stimulus, clock, merge};
