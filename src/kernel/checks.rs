@@ -18,6 +18,8 @@
 //!
 //! * *Instants.* What counts is a net's value before and after an instant. A net that changes and changes
 //!   back within one (zero-delay glitches) had no event. Results do not depend on the order within an instant.
+//!   (Making a flip-flop unknown comes after an instant; with a clock-to-output delay of zero, which no library cell
+//!   has, its outputs would make a second instant of the same time.)
 //! * *Unknown values.* Z is seen as X. Every change from or to X is a possible edge of both directions it could
 //!   have been part of: 0→X and X→1 are rises, 1→X and X→0 falls, as the standard's `posedge` and
 //!   `negedge` have it. This errs towards reporting.
