@@ -122,7 +122,7 @@ impl DelaySet {
     }
 
     /// Delays by new value from one pin.
-    pub fn from_pin(&self, pin: usize) -> &[u32; 4] {
+    pub fn after_pin(&self, pin: usize) -> &[u32; 4] {
         &self.0[pin]
     }
 

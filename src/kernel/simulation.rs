@@ -139,7 +139,7 @@ impl Kernel {
         let (outputs, set) = (cell.outputs, cell.delays as usize);
         let inverted = Logic::from_bits(state).inverted().bits();
         const CLOCK: usize = 1;
-        let delays = *self.delays[set].from_pin(CLOCK);
+        let delays = *self.delays[set].after_pin(CLOCK);
         self.schedule(outputs[0], state, &delays);
         self.schedule(outputs[1], inverted, &delays);
     }
