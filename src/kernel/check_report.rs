@@ -34,6 +34,9 @@ pub enum Policy {
     ReportOnly,
     /// It is reported, and if it relates two pins (setup, hold, recovery, removal), the flip-flop's state becomes
     /// X; its outputs follow one clock-to-output delay after the instant that completed the violation.
+    ///
+    /// An X that reaches a clock pin is one possible edge, when it arrives; the edges that the clock would have made
+    /// later do not happen. Known values at the end do not prove that nothing was spoilt: the violations do.
     XOnViolation,
 }
 
