@@ -126,6 +126,8 @@ impl Kernel {
     ///
     /// # Panics
     /// When there is no such cell.
+    #[cold]
+    #[inline(never)]
     pub fn corrupt(&mut self, cell: usize) {
         let cell = &mut self.cells[cell];
         debug_assert!(cell.kind.is_flip_flop(), "only a flip-flop has a state");
