@@ -171,6 +171,18 @@ fn every_kind_of_bad_input_is_one_sentence_and_status_2() {
             "no/x.vcd: cannot be written",
         ),
         (
+            replay(&["--checks", "report"]),
+            "--checks: only the gate engine has timing checks",
+        ),
+        (
+            replay(&["--engine", "gate", "--checks-json", "c.json"]),
+            "--checks-json c.json: there are no timing checks",
+        ),
+        (
+            replay(&["--checks-json", "c.json"]),
+            "--checks-json c.json: there are no timing checks",
+        ),
+        (
             vec!["frame", "--scene", "scene_key.toml"],
             "scene_key.toml:3: unknown field `shade`",
         ),

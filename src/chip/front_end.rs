@@ -70,6 +70,17 @@ pub fn circuit() -> Arc<Module> {
     finished(m.finish())
 }
 
+/// Whether the cell at this dotted path is a front end's first sampling flip-flop. Its D follows SPADs, not CLK, so that
+/// it breaks setup and hold by design; the second one gives it a period to make up its mind.
+pub fn is_asynchronous_sampler(cell_path: &str) -> bool {
+    let mut parts = cell_path.rsplit('.');
+    parts.next() == Some("first")
+        && parts
+            .next()
+            .is_some_and(|retiming| retiming.starts_with("spad_"))
+        && parts.next() == Some("front_end")
+}
+
 /// Reference model: one bit per SPAD.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Model {

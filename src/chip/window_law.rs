@@ -22,7 +22,7 @@ use super::config::{Mode, SensorConfig};
 use super::exposure::Exposure;
 use super::{correlation, p_counter_timing};
 use crate::logic::Logic::{One, Zero};
-use crate::netlist::{CellKind, Corner, Edge, Library, Netlist, StaticTiming, Timing};
+use crate::netlist::{CellKind, Corner, Delay, Edge, Library, Netlist, StaticTiming, Timing};
 use crate::units::Time;
 
 /// Delays of the paths that decide where a window lies.
@@ -50,6 +50,14 @@ pub struct ChipTiming {
     pub stop_to_hit_reset: Time,
     /// CLK rising to SPAD_EVENT settled, longest path.
     pub clk_to_event: Time,
+    /// How long before its clock a flip-flop's data must be stable.
+    pub setup: Time,
+    /// How long after its clock a flip-flop's data must be stable.
+    pub hold: Time,
+    /// How long before a clock edge that counts a reset must be released.
+    pub recovery: Time,
+    /// How long after a clock edge that must not count a reset must still hold.
+    pub removal: Time,
 }
 
 impl ChipTiming {
@@ -58,6 +66,8 @@ impl ChipTiming {
         let library = Library::default();
         let corner = config.corner;
         let delay = |kind, pin, to| library.delay(kind, pin, to, corner);
+        let limits = library.checks(CellKind::Dffr);
+        let limit = |limit: Delay| Time::from_fs(limit.at(corner) as i64);
         let clock_to_q = delay(CellKind::Dffr, 1, One);
         let mux_rise = delay(CellKind::Mux2, 0, One);
         let buffer_rise = delay(CellKind::Buf, 0, One);
@@ -82,6 +92,10 @@ impl ChipTiming {
                 + delay(CellKind::Or2, 0, Zero),
             stop_to_hit_reset: stop_to_reset + mux_rise,
             clk_to_event: clock_to_q + xor + correlation,
+            setup: limit(limits.setup),
+            hold: limit(limits.hold),
+            recovery: limit(limits.recovery),
+            removal: limit(limits.removal),
         }
     }
 
@@ -109,8 +123,7 @@ fn longest_correlation(library: &Library, corner: Corner) -> Time {
     longest
 }
 
-/// How far a strobe must stay from a change of the shift register, and a count from a reset, for the law
-/// to call a window certain: one femtosecond of rounding on either edge.
+/// What the law adds to the flip-flops' limits: one femtosecond of rounding on either edge.
 const ROUNDING: Time = Time::from_fs(2);
 
 /// What becomes of a start value.
@@ -120,7 +133,8 @@ pub enum Window {
     Open(OpenWindow),
     /// LOCAL_STOP does not come within the laser cycle: nothing is ever counted.
     Never,
-    /// Two signals race within a femtosecond or so; only the gate-level engine can tell.
+    /// Two signals come closer than a flip-flop's setup, hold, recovery or removal time allows: the circuit
+    /// promises nothing, and only the gate-level engine shows what its model makes of it.
     Race(&'static str),
 }
 
@@ -141,8 +155,8 @@ pub struct OpenWindow {
     pub first_edge: i64,
     /// Rise of LOCAL_STOP (guided) or STOP (conventional) after the laser cycle's STOP edge.
     pub strobe_cause: Time,
-    /// The smaller of the strobe's distances to the shift register's changes before and after it: the
-    /// margin that a shorter CLK period or a slower ripple eats up.
+    /// What the strobe has left of setup after one change of the shift register, and of hold before the next,
+    /// whichever is smaller: the margin that a shorter CLK period or a slower ripple eats up.
     pub slack: Time,
 }
 
@@ -177,7 +191,7 @@ impl WindowLaw {
     pub fn window(&self, start: u16) -> Window {
         let (exposure, timing) = (&self.exposure, &self.timing);
         let end = exposure.clock.periods(exposure.stop_periods as i64);
-        if exposure.clock.period() <= timing.clk_to_event + ROUNDING {
+        if exposure.clock.period() <= timing.clk_to_event + timing.setup + ROUNDING {
             return Window::Race("the correlation block is slower than a CLK period");
         }
         let (cause, arrival) = match self.mode {
@@ -191,7 +205,7 @@ impl WindowLaw {
                 }
                 let near = |k| {
                     let distance = exposure.falling(k) - counts_from;
-                    -ROUNDING <= distance && distance <= ROUNDING
+                    -timing.removal - ROUNDING <= distance && distance <= timing.recovery + ROUNDING
                 };
                 if near(first) || near(first - 1) {
                     return Window::Race("a CLK edge meets the end of the reset pulse");
@@ -212,7 +226,7 @@ impl WindowLaw {
         let last = exposure.rising_until(arrival - timing.clk_to_shift);
         let after = arrival - (exposure.rising(last) + timing.clk_to_shift);
         let before = exposure.rising(last + 1) + timing.clk_to_shift - arrival;
-        let slack = after.min(before);
+        let slack = (after - timing.setup).min(before - timing.hold);
         if slack <= ROUNDING {
             return Window::Race("the strobe meets a change of the shift register");
         }

@@ -14,6 +14,7 @@ use crate::engine::recording::{Recording, check_exposure, read_events, read_star
 use crate::engine::waveform::{self, View};
 use crate::engine::{BATCH, EngineError, GateSimulation};
 use crate::files::{InputError, OutputFile};
+use crate::kernel::{Observer, Policy};
 use crate::photon::SpadEvent;
 use crate::report::write_npy_u16;
 use crate::system::EngineKind;
@@ -109,6 +110,31 @@ pub struct ReplayArgs {
     /// Delays that replace the library's (SDF, in the sensor's corner; needs --engine gate).
     #[arg(long, value_name = "FILE")]
     sdf: Option<PathBuf>,
+    /// Check setup, hold, recovery, removal and pulse widths of every flip-flop (needs --engine gate): a summary
+    /// on standard error.
+    #[arg(long, value_enum, value_name = "POLICY")]
+    checks: Option<Checks>,
+    /// The timing checks' violations, summary and slack histograms as JSON (needs --checks).
+    #[arg(long, value_name = "FILE")]
+    checks_json: Option<PathBuf>,
+}
+
+/// What a timing violation does.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Checks {
+    /// It is reported.
+    Report,
+    /// It is reported, and the flip-flop's state becomes X.
+    X,
+}
+
+impl From<Checks> for Policy {
+    fn from(checks: Checks) -> Self {
+        match checks {
+            Checks::Report => Policy::ReportOnly,
+            Checks::X => Policy::XOnViolation,
+        }
+    }
 }
 
 /// Runs the command.
@@ -129,21 +155,27 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
             "only the gate engine has delays of single cells; add --engine gate or leave --sdf out";
         return Err(InputError::new(format!("--sdf {}", sdf.display()), message).into());
     }
+    if args.checks.is_some() && args.engine != EngineKind::Gate {
+        let message =
+            "only the gate engine has timing checks; add --engine gate or leave --checks out";
+        return Err(InputError::new("--checks", message).into());
+    }
+    if let (Some(json), None) = (&args.checks_json, args.checks) {
+        let message = "there are no timing checks to write; add --checks report";
+        return Err(InputError::new(format!("--checks-json {}", json.display()), message).into());
+    }
     let stimuli = args.stimuli.read()?;
-    let histograms = if args.vcd.is_some() || args.sdf.is_some() {
-        replay_array(&stimuli, args.vcd.as_deref(), args.sdf.as_deref())?
+    let needs_array = args.vcd.is_some() || args.sdf.is_some() || args.checks.is_some();
+    let histograms = if needs_array {
+        replay_array(&stimuli, args)?
     } else {
         replay(&stimuli, args.engine)?
     };
     write(&stimuli.config, &histograms, args.out.as_deref(), format)
 }
 
-/// The whole array as one netlist, with its waveform and annotated delays.
-fn replay_array(
-    stimuli: &Stimuli,
-    vcd: Option<&Path>,
-    sdf: Option<&Path>,
-) -> anyhow::Result<Vec<Vec<u16>>> {
+/// The whole array as one netlist, with its waveform, annotated delays and timing checks.
+fn replay_array(stimuli: &Stimuli, args: &ReplayArgs) -> anyhow::Result<Vec<Vec<u16>>> {
     let config = &stimuli.config;
     let mut simulation = GateSimulation::new(
         config,
@@ -153,19 +185,40 @@ fn replay_array(
         &stimuli.starts,
         &stimuli.pulses(),
     );
-    if let Some(sdf) = sdf {
+    if let Some(sdf) = &args.sdf {
         let timing = annotated_timing(sdf, simulation.netlist(), config)?;
         simulation = simulation.with_timing(&timing);
     }
-    match vcd {
-        None => simulation.run(&mut ()),
-        Some(vcd) => {
-            let start = *stimuli.starts.first().expect("a sensor has a macropixel");
-            let view = View::of_window(&[(0, 0)], config, &stimuli.exposure, start);
-            waveform::record(&mut simulation, vcd, &view)?;
+    let vcd = args.vcd.as_deref();
+    match args.checks {
+        None => watch(&mut simulation, stimuli, vcd, &mut ())?,
+        Some(policy) => {
+            let mut checks = simulation.timing_checks(policy.into());
+            watch(&mut simulation, stimuli, vcd, &mut checks)?;
+            let report = checks.report(simulation.netlist());
+            eprint!("{report}");
+            // Before the histograms, which unknown states may have spoilt: this says why.
+            if let Some(path) = &args.checks_json {
+                OutputFile::write_with(path, |w| Ok(serde_json::to_writer_pretty(w, &report)?))?;
+            }
         }
     }
     Ok(simulation.histograms()?)
+}
+
+fn watch<O: Observer>(
+    simulation: &mut GateSimulation<'_>,
+    stimuli: &Stimuli,
+    vcd: Option<&Path>,
+    observer: &mut O,
+) -> Result<(), InputError> {
+    let Some(vcd) = vcd else {
+        simulation.run(observer);
+        return Ok(());
+    };
+    let start = *stimuli.starts.first().expect("a sensor has a macropixel");
+    let view = View::of_window(&[(0, 0)], &stimuli.config, &stimuli.exposure, start);
+    waveform::record(simulation, vcd, &view, observer)
 }
 
 fn replay(stimuli: &Stimuli, kind: EngineKind) -> anyhow::Result<Vec<Vec<u16>>> {

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::lanes::LaneSimulation;
 use super::stimulus::{Pins, Schedule, StimulusPlan};
 use super::{Engine, EngineError};
-use crate::chip::{Exposure, SensorConfig, histogram, sensor};
-use crate::kernel::{Kernel, LANES, Observer, Statistics};
+use crate::chip::{Exposure, SensorConfig, front_end, histogram, sensor};
+use crate::kernel::{Kernel, LANES, Observer, Policy, Statistics, TimingChecks};
 use crate::netlist::{Library, Netlist, Timing};
 use crate::photon::SpadEvent;
 
@@ -59,6 +59,15 @@ impl<'a> GateSimulation<'a> {
     /// Where load and exposure lie in simulation time.
     pub fn schedule(&self) -> Schedule {
         self.plan.schedule()
+    }
+
+    /// Timing checks of this netlist in the sensor's corner, from the end of the power-up reset on, to run it with. The
+    /// front ends' first samplers count as asynchronous.
+    pub fn timing_checks(&self, policy: Policy) -> TimingChecks {
+        TimingChecks::new(&self.netlist, &Library::default(), self.config.corner)
+            .policy(policy)
+            .not_before(self.schedule().reset_end)
+            .asynchronous(&self.netlist, front_end::is_asynchronous_sampler)
     }
 
     /// Simulates load and exposure to the end.

@@ -140,6 +140,8 @@ impl Pins {
 /// Where load and exposure lie in simulation time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Schedule {
+    /// Rise of RESETB: the chip comes out of its power-up reset.
+    pub reset_end: Time,
     /// Rising edge of LOAD_CLK that takes the first bit.
     pub first_bit: Time,
     /// The end of the load.
@@ -184,6 +186,7 @@ impl<'a> StimulusPlan<'a> {
             .collect();
         all.sort_unstable_by_key(|(pixel, p)| (p.time, *pixel, p.spad));
         let schedule = Schedule {
+            reset_end: RESET_END,
             first_bit: half(1),
             load_end,
             origin,

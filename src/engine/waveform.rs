@@ -9,6 +9,7 @@ use super::gate::GateSimulation;
 use crate::chip::window_law::{Window, WindowLaw};
 use crate::chip::{Exposure, SensorConfig, histogram, sensor};
 use crate::files::{InputError, OutputFile};
+use crate::kernel::Observer;
 use crate::netlist::Netlist;
 use crate::units::Time;
 use crate::waves::{Entry, Group, SaveFile, Selection, VcdWriter};
@@ -49,14 +50,16 @@ impl<'p> View<'p> {
     }
 }
 
-/// Runs `simulation` to its end with every named net in `vcd`, and writes a save file for `view` beside it.
+/// Runs `simulation` to its end with every named net in `vcd` (and `observer` watching, too), and writes a save file
+/// for `view` beside it.
 ///
 /// # Errors
 /// When a file cannot be written.
-pub fn record(
+pub fn record<O: Observer>(
     simulation: &mut GateSimulation<'_>,
     vcd: &Path,
     view: &View<'_>,
+    observer: &mut O,
 ) -> Result<(), InputError> {
     let schedule = simulation.schedule();
     let origin = schedule.origin;
@@ -67,8 +70,8 @@ pub fn record(
     };
     let netlist = Arc::clone(simulation.netlist());
     let limit = view.limit.map_or(schedule.end, |limit| origin + limit);
-    write_vcd(vcd, &netlist, limit, |observer| {
-        simulation.run(observer);
+    write_vcd(vcd, &netlist, limit, |writer| {
+        simulation.run(&mut (writer, observer));
         schedule.end
     })?;
     write_view(vcd, &netlist, &save_file)

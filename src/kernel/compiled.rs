@@ -121,6 +121,11 @@ impl DelaySet {
             .collect()
     }
 
+    /// Delays by new value from one pin.
+    pub fn after_pin(&self, pin: usize) -> &[u32; 4] {
+        &self.0[pin]
+    }
+
     /// Delays by new value for the pins in which `inputs` and `evaluated` differ: the shortest of the arcs
     /// concerned. A flip-flop's D is no cause; `inputs` and `evaluated` must agree on it.
     #[inline]

@@ -9,7 +9,7 @@
 //!
 //! ```text
 //!   Stimulus ──┐              ┌─► Observer (waveforms, recorders)
-//!              ├─► apply ─────┤
+//!              ├─► apply ─────┤    timing checks)
 //!   TimeWheel ─┘   changes    └─► dirty cells ─► evaluate ─► schedule ─┐
 //!       ▲                                                             │
 //!       └─────────────────────────────────────────────────────────────┘
@@ -20,6 +20,8 @@
 //! simulators agree with this one, ties included. The hot loop neither allocates (buckets keep
 //! their memory), nor hashes, nor touches a string.
 
+mod check_report;
+mod checks;
 mod compiled;
 mod lanes;
 mod observer;
@@ -27,6 +29,10 @@ mod simulation;
 mod stimulus;
 mod wheel;
 
+pub use check_report::{
+    BIN_FS, BINS, CheckReport, CheckSummary, FIRST_BIN_FS, Place, Policy, Violation,
+};
+pub use checks::TimingChecks;
 pub use lanes::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
 pub use observer::{Observer, Recorder};
 pub use simulation::{Kernel, Statistics};

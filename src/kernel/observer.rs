@@ -8,6 +8,13 @@ use crate::units::Time;
 pub trait Observer {
     /// `net` took `value` at `time`.
     fn change(&mut self, time: Time, net: NetId, value: Logic);
+
+    /// A flip-flop (index of its cell) whose state is in doubt. The kernel asks after every instant, and makes
+    /// the state unknown, until there is none. An observer that only watches leaves this as it is, at no cost.
+    #[inline]
+    fn doubtful(&mut self) -> Option<usize> {
+        None
+    }
 }
 
 /// Watches nothing, at no cost.
@@ -23,12 +30,22 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
         self.0.change(time, net, value);
         self.1.change(time, net, value);
     }
+
+    #[inline]
+    fn doubtful(&mut self) -> Option<usize> {
+        self.0.doubtful().or_else(|| self.1.doubtful())
+    }
 }
 
 impl<O: Observer> Observer for &mut O {
     #[inline]
     fn change(&mut self, time: Time, net: NetId, value: Logic) {
         (**self).change(time, net, value);
+    }
+
+    #[inline]
+    fn doubtful(&mut self) -> Option<usize> {
+        (**self).doubtful()
     }
 }
 

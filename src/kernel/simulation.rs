@@ -113,9 +113,37 @@ impl Kernel {
                 }
             }
             self.settle(observer);
+            while let Some(cell) = observer.doubtful() {
+                self.corrupt(cell);
+            }
         }
         self.now_fs = self.now_fs.max(until_fs);
         self.wheel.advance(self.now_fs);
+    }
+
+    /// Makes the state of flip-flop `cell` unknown, as far as its reset and set leave it open; its outputs
+    /// follow one clock-to-output delay from now.
+    ///
+    /// # Panics
+    /// When there is no such cell.
+    #[cold]
+    #[inline(never)]
+    pub fn corrupt(&mut self, cell: usize) {
+        let cell = &mut self.cells[cell];
+        debug_assert!(cell.kind.is_flip_flop(), "only a flip-flop has a state");
+        // No pin changes: what is left is what reset and set make of an unknown state.
+        let unknown = Logic::X.bits();
+        let state = self.tables.flip_flop(cell.inputs, cell.inputs, unknown);
+        if state == cell.state {
+            return;
+        }
+        cell.state = state;
+        let (outputs, set) = (cell.outputs, cell.delays as usize);
+        let inverted = Logic::from_bits(state).inverted().bits();
+        const CLOCK: usize = 1;
+        let delays = *self.delays[set].after_pin(CLOCK);
+        self.schedule(outputs[0], state, &delays);
+        self.schedule(outputs[1], inverted, &delays);
     }
 
     fn settle<O: Observer>(&mut self, observer: &mut O) {

@@ -11,6 +11,7 @@
 //! that two different paths almost never end in the same femtosecond.
 
 use super::cell::{CellKind, MAX_INPUTS};
+use super::checks::CheckLimits;
 use crate::logic::Logic;
 use crate::units::Time;
 
@@ -107,10 +108,11 @@ impl Arc {
 /// Arcs of one cell, indexed by input pin. The D pin of a flip-flop has none (all zero).
 pub type CellArcs = [Arc; MAX_INPUTS];
 
-/// The delays of every cell.
+/// The delays of every cell, and the limits of every flip-flop.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Library {
     cells: [CellArcs; CellKind::ALL.len()],
+    checks: [CheckLimits; CellKind::ALL.len()],
 }
 
 impl Default for Library {
@@ -142,7 +144,8 @@ impl Default for Library {
                 [NONE, SLOWER_CLOCK, SLOWER_CLEAR, SLOWER_CLEAR]
             }
         });
-        Library { cells }
+        let checks = CellKind::ALL.map(CheckLimits::of);
+        Library { cells, checks }
     }
 }
 
@@ -155,6 +158,16 @@ impl Library {
     /// Replaces the arcs of one cell.
     pub fn set_arcs(&mut self, kind: CellKind, arcs: CellArcs) {
         self.cells[kind as usize] = arcs;
+    }
+
+    /// Limits of one flip-flop's inputs; all zero for a gate.
+    pub fn checks(&self, kind: CellKind) -> &CheckLimits {
+        &self.checks[kind as usize]
+    }
+
+    /// Replaces the limits of one cell.
+    pub fn set_checks(&mut self, kind: CellKind, limits: CheckLimits) {
+        self.checks[kind as usize] = limits;
     }
 
     /// Delay from input `pin` to an output changing to `to`.

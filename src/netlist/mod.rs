@@ -10,6 +10,7 @@
 //! into flat arrays in time linear in the number of cells.
 
 mod cell;
+mod checks;
 mod flat;
 mod library;
 mod module;
@@ -20,6 +21,7 @@ mod variation;
 mod verilog;
 
 pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS, next_state};
+pub use checks::{CheckKind, CheckLimits};
 pub use flat::{FlatCell, NetId, Netlist, Scope};
 pub use library::{Arc, CellArcs, Corner, Delay, Library};
 pub use module::{

@@ -282,7 +282,7 @@ fn run_probe(
         limit: probe.wave_cycles.map(|n| exposure.stop(n as i64)),
         ..View::of_window(&pixels, sensor, exposure, start)
     };
-    waveform::record(&mut simulation, &probe.vcd, &view)?;
+    waveform::record(&mut simulation, &probe.vcd, &view, &mut ())?;
     Ok(simulation.histograms()?.remove(0))
 }
 

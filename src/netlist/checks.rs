@@ -1,0 +1,179 @@
+//! The limits that a flip-flop's inputs must keep: setup, hold, recovery, removal, pulse widths.
+//!
+//! ```text
+//!            setup  hold                    recovery                removal
+//!   D   ▔▔▔▔▔╳◄───►│◄──►╳▔▔▔     R  ▔▔▔▔▔╲◄─────────►│     R  ▔▔▔▔▔▔▔▔│◄───────►╲▁▁▁▁
+//!   CK  ▁▁▁▁▁▁▁▁▁▁▁╱▔▔▔▔▔▔▔▔     CK ▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁╱▔    CK ▁▁▁▁▁▁▁▁╱▔▔▔▔▔▔▔▔▔▔▔▔▔
+//! ```
+//!
+//! The numbers are chosen, not measured: no characterisation of the custom cell is published. They are
+//! what a 40 nm master-slave flip-flop with the delays of [`Library`](super::Library) would plausibly have.
+//! Setup is about the two inverters and the transmission gate of the master latch, hold a third of it,
+//! recovery and removal are those of the reset gates, and no pulse may be shorter than the time to turn
+//! a latch over. Corners scale as the delays do.
+
+use super::cell::CellKind;
+use super::library::{Corner, Delay};
+
+/// Limits of one flip-flop cell; zero means that the check always passes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct CheckLimits {
+    /// D stable before a rising CK.
+    pub setup: Delay,
+    /// D stable after a rising CK.
+    pub hold: Delay,
+    /// Release of R or S before a rising CK that is to count.
+    pub recovery: Delay,
+    /// Release of R or S after a rising CK that is not to count.
+    pub removal: Delay,
+    /// Shortest high pulse of CK.
+    pub clock_high: Delay,
+    /// Shortest low pulse of CK.
+    pub clock_low: Delay,
+    /// Shortest high pulse of R or S.
+    pub control_high: Delay,
+}
+
+/// A check on a flip-flop's inputs.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum CheckKind {
+    /// D before CK.
+    Setup,
+    /// D after CK.
+    Hold,
+    /// R or S released before CK.
+    Recovery,
+    /// R or S released after CK.
+    Removal,
+    /// CK's high pulse.
+    ClockHigh,
+    /// CK's low pulse.
+    ClockLow,
+    /// High pulse of R or S.
+    ControlHigh,
+}
+
+impl CheckKind {
+    /// Every check.
+    pub const ALL: [CheckKind; 7] = [
+        CheckKind::Setup,
+        CheckKind::Hold,
+        CheckKind::Recovery,
+        CheckKind::Removal,
+        CheckKind::ClockHigh,
+        CheckKind::ClockLow,
+        CheckKind::ControlHigh,
+    ];
+
+    /// Name in tables and JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            CheckKind::Setup => "setup",
+            CheckKind::Hold => "hold",
+            CheckKind::Recovery => "recovery",
+            CheckKind::Removal => "removal",
+            CheckKind::ClockHigh => "clock_high",
+            CheckKind::ClockLow => "clock_low",
+            CheckKind::ControlHigh => "control_high",
+        }
+    }
+
+    /// Whether breaking it leaves the flip-flop's state in doubt: the checks that relate two pins do.
+    pub const fn spoils_state(self) -> bool {
+        matches!(
+            self,
+            CheckKind::Setup | CheckKind::Hold | CheckKind::Recovery | CheckKind::Removal
+        )
+    }
+
+    /// Whether it watches D, which an asynchronous sampler cannot keep still.
+    pub const fn concerns_data(self) -> bool {
+        matches!(self, CheckKind::Setup | CheckKind::Hold)
+    }
+}
+
+impl CheckLimits {
+    /// The library's limits of one cell (all zero for gates).
+    pub const fn of(kind: CellKind) -> Self {
+        match kind {
+            CellKind::Dffr => CheckLimits {
+                setup: Delay::scaled(35_023),
+                hold: Delay::scaled(12_037),
+                recovery: Delay::scaled(40_009),
+                removal: Delay::scaled(25_031),
+                clock_high: Delay::scaled(60_013),
+                clock_low: Delay::scaled(62_017),
+                control_high: Delay::scaled(61_027),
+            },
+            CellKind::Dffsr => CheckLimits {
+                setup: Delay::scaled(44_017),
+                hold: Delay::scaled(15_013),
+                recovery: Delay::scaled(51_031),
+                removal: Delay::scaled(32_009),
+                clock_high: Delay::scaled(77_017),
+                clock_low: Delay::scaled(79_031),
+                control_high: Delay::scaled(78_007),
+            },
+            _ => {
+                const NONE: Delay = Delay::fixed(0);
+                CheckLimits {
+                    setup: NONE,
+                    hold: NONE,
+                    recovery: NONE,
+                    removal: NONE,
+                    clock_high: NONE,
+                    clock_low: NONE,
+                    control_high: NONE,
+                }
+            }
+        }
+    }
+
+    /// The limit of one check in one corner, fs.
+    pub const fn at(&self, check: CheckKind, corner: Corner) -> u32 {
+        let limit = match check {
+            CheckKind::Setup => self.setup,
+            CheckKind::Hold => self.hold,
+            CheckKind::Recovery => self.recovery,
+            CheckKind::Removal => self.removal,
+            CheckKind::ClockHigh => self.clock_high,
+            CheckKind::ClockLow => self.clock_low,
+            CheckKind::ControlHigh => self.control_high,
+        };
+        limit.at(corner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::logic::Logic;
+    use crate::netlist::Library;
+
+    #[test]
+    fn limits_are_ordered_by_corner_and_gates_have_none() {
+        for kind in CellKind::ALL {
+            for check in CheckKind::ALL {
+                let [min, typ, max] = Corner::ALL.map(|c| CheckLimits::of(kind).at(check, c));
+                assert!(min <= typ && typ <= max);
+                assert_eq!(typ != 0, kind.is_flip_flop());
+            }
+        }
+    }
+
+    /// A flip-flop that drives its own D (a toggle) or its neighbour's (a shift register) holds by construction.
+    #[test]
+    fn hold_is_shorter_than_clock_to_q_in_every_corner() {
+        let library = Library::default();
+        for kind in CellKind::ALL.into_iter().filter(|k| k.is_flip_flop()) {
+            for corner in Corner::ALL {
+                let clock_to_q = library.delay(kind, 1, Logic::One, corner).as_fs();
+                let hold = library.checks(kind).at(CheckKind::Hold, corner);
+                assert!(i64::from(hold) < clock_to_q);
+            }
+        }
+    }
+}

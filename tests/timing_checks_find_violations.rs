@@ -1,0 +1,453 @@
+//! Timing checks find every violation with its exact slack and nothing else: hand-made ones at the limit's very
+//! femtosecond, random ones against a reference that derives them from a full trace, and the whole chip.
+
+use guided_dtof::chip::{Exposure, SensorConfig};
+use guided_dtof::engine::GateSimulation;
+use guided_dtof::kernel::{CheckReport, Drive, Kernel, Policy, Recorder, TimingChecks, merge};
+use guided_dtof::logic::Logic;
+use guided_dtof::netlist::{
+    Arc, CellKind, CheckKind, CheckLimits, Corner, Delay, Library, ModuleBuilder, NetId, Netlist,
+    Timing,
+};
+use guided_dtof::photon::{SpadEvent, apply_dead_time};
+use guided_dtof::units::Time;
+use proptest::prelude::*;
+
+/// The clock edge, or whatever a test measures from.
+const EDGE: i64 = 10_000_000;
+
+/// (time, pin, value) of the inputs D, CK, R, S.
+type Script = Vec<(i64, &'static str, Logic)>;
+
+/// Two flip-flops of one kind in a row, `first` and `second`, with nets Q1 and Q2.
+fn pair(kind: CellKind) -> Netlist {
+    let mut m = ModuleBuilder::new("pair");
+    let pins: Vec<_> = kind.inputs().iter().map(|pin| m.input(pin)).collect();
+    let (q1, q2) = (m.output("Q1"), m.output("Q2"));
+    let unused = guided_dtof::netlist::Net::NONE;
+    m.cell("first", kind, &pins, &[q1, unused]);
+    let mut second = pins;
+    second[0] = q1;
+    m.cell("second", kind, &second, &[q2, unused]);
+    Netlist::elaborate(&m.finish().unwrap())
+}
+
+fn simulate(
+    netlist: &Netlist,
+    library: &Library,
+    corner: Corner,
+    policy: Policy,
+    script: &Script,
+) -> (CheckReport, Recorder, Kernel) {
+    let mut checks = TimingChecks::new(netlist, library, corner).policy(policy);
+    let mut trace = Recorder::new((0..netlist.net_count()).map(NetId::new));
+    let mut kernel = Kernel::new(netlist, &Timing::nominal(netlist, library, corner));
+    let mut script = script.clone();
+    script.sort_by_key(|step| step.0);
+    let drives = script.into_iter().map(|(fs, pin, value)| {
+        let net = netlist.net(pin).unwrap();
+        Drive::new(Time::from_fs(fs), net, value)
+    });
+    let stream: Box<dyn Iterator<Item = Drive> + Send> = Box::new(drives);
+    let end = Time::from_fs(4 * EDGE);
+    kernel.run(&mut merge([stream]), end, &mut (&mut trace, &mut checks));
+    (checks.report(netlist), trace, kernel)
+}
+
+use Logic::{One, X, Zero};
+
+/// Out of reset by 1 ns, everything low, then `steps`.
+fn after_reset(kind: CellKind, steps: &[(i64, &'static str, Logic)]) -> Script {
+    let mut script = vec![
+        (0, "D", Zero),
+        (0, "CK", Zero),
+        (0, "R", One),
+        (1_000_000, "R", Zero),
+    ];
+    if kind == CellKind::Dffsr {
+        script.push((0, "S", Zero));
+    }
+    script.extend_from_slice(steps);
+    script
+}
+
+/// Stimuli that complete `check` exactly `distance` after (or before) what it is measured from.
+fn script(kind: CellKind, check: CheckKind, control: &'static str, distance: i64) -> Script {
+    let before = EDGE - 1_000_000;
+    let steps = match check {
+        CheckKind::Setup => vec![(EDGE - distance, "D", One), (EDGE, "CK", One)],
+        CheckKind::Hold => vec![(EDGE, "CK", One), (EDGE + distance, "D", One)],
+        CheckKind::Recovery => vec![
+            (before, control, One),
+            (EDGE - distance, control, Zero),
+            (EDGE, "CK", One),
+        ],
+        CheckKind::Removal => vec![
+            (before, control, One),
+            (EDGE, "CK", One),
+            (EDGE + distance, control, Zero),
+        ],
+        CheckKind::ClockHigh => vec![(EDGE, "CK", One), (EDGE + distance, "CK", Zero)],
+        CheckKind::ClockLow => vec![
+            (before, "CK", One),
+            (EDGE, "CK", Zero),
+            (EDGE + distance, "CK", One),
+        ],
+        CheckKind::ControlHigh => vec![(EDGE, control, One), (EDGE + distance, control, Zero)],
+    };
+    after_reset(kind, &steps)
+}
+
+#[test]
+fn every_check_is_exact_to_the_femtosecond() {
+    let library = Library::default();
+    for kind in [CellKind::Dffr, CellKind::Dffsr] {
+        let netlist = pair(kind);
+        for check in CheckKind::ALL {
+            for corner in Corner::ALL {
+                let limit = i64::from(library.checks(kind).at(check, corner));
+                for control in kind.inputs()[2..].iter().copied() {
+                    for slack in [1 - limit, -5_000, -1, 0, 1, 5_000] {
+                        let steps = script(kind, check, control, limit + slack);
+                        let policy = Policy::ReportOnly;
+                        let (report, ..) = simulate(&netlist, &library, corner, policy, &steps);
+                        let found: Vec<_> = report
+                            .violations
+                            .iter()
+                            .filter(|v| v.kind == check && v.cell == "pair.first")
+                            .map(|v| v.slack_fs)
+                            .collect();
+                        let expected = if slack < 0 { vec![slack] } else { vec![] };
+                        let case = format!("{} {check:?} {corner:?} {control}", kind.name());
+                        assert_eq!(found, expected, "{case}");
+                        let others = report.violations.iter().filter(|v| v.kind != check);
+                        assert_eq!(others.count(), 0, "{case} {slack}: {report}");
+                        if slack < 0 {
+                            let worst = report.summary(check).worst.clone().unwrap();
+                            assert_eq!(worst.slack_fs, slack, "{case}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn kinds(steps: &[(i64, &'static str, Logic)]) -> Vec<(CheckKind, i64)> {
+    let (library, kind) = (Library::default(), CellKind::Dffr);
+    let steps = after_reset(kind, steps);
+    let policy = Policy::ReportOnly;
+    let (report, ..) = simulate(&pair(kind), &library, Corner::Typ, policy, &steps);
+    let of_first = report.violations.iter().filter(|v| v.cell == "pair.first");
+    of_first.map(|v| (v.kind, v.slack_fs)).collect()
+}
+
+fn limit(check: CheckKind) -> i64 {
+    let library = Library::default();
+    let limits = library.checks(CellKind::Dffr);
+    limits.at(check, Corner::Typ).into()
+}
+
+#[test]
+fn changes_at_once_break_hold_and_recovery_but_not_setup_and_removal() {
+    assert_eq!(
+        kinds(&[(EDGE, "D", One), (EDGE, "CK", One)]),
+        [(CheckKind::Hold, -limit(CheckKind::Hold))]
+    );
+    assert_eq!(
+        kinds(&[(5_000_000, "R", One), (EDGE, "CK", One), (EDGE, "R", Zero)]),
+        [(CheckKind::Recovery, -limit(CheckKind::Recovery))]
+    );
+}
+
+#[test]
+fn possible_edges_count_and_glitches_within_an_instant_do_not() {
+    let setup = (CheckKind::Setup, 7 - limit(CheckKind::Setup));
+    assert_eq!(kinds(&[(EDGE - 7, "D", X), (EDGE, "CK", One)]), [setup]);
+    assert_eq!(kinds(&[(EDGE - 7, "D", One), (EDGE, "CK", X)]), [setup]);
+    // Undriven reads as unknown: going from one to the other is no event.
+    assert_eq!(
+        kinds(&[
+            (5_000_000, "D", X),
+            (EDGE - 7, "D", Logic::Z),
+            (EDGE, "CK", One)
+        ]),
+        []
+    );
+    assert_eq!(
+        kinds(&[
+            (EDGE - 7, "D", One),
+            (EDGE - 7, "D", Zero),
+            (EDGE, "CK", One)
+        ]),
+        []
+    );
+}
+
+#[test]
+fn a_held_flip_flop_is_not_judged() {
+    let held = [
+        (5_000_000, "R", One),
+        (EDGE, "CK", One),
+        (EDGE + 3, "D", One),
+        (EDGE + 9, "CK", Zero),
+    ];
+    assert_eq!(kinds(&held), []);
+}
+
+#[test]
+fn nothing_is_judged_before_its_time_but_earlier_events_are_remembered() {
+    let (library, netlist) = (Library::default(), pair(CellKind::Dffr));
+    let run = |not_before: i64| {
+        let mut checks = TimingChecks::new(&netlist, &library, Corner::Typ)
+            .not_before(Time::from_fs(not_before));
+        let timing = Timing::nominal(&netlist, &library, Corner::Typ);
+        let script = script(CellKind::Dffr, CheckKind::Setup, "R", 100);
+        let mut drives = script;
+        drives.sort_by_key(|step| step.0);
+        let drives = drives.into_iter().map(|(fs, pin, value)| {
+            Drive::new(Time::from_fs(fs), netlist.net(pin).unwrap(), value)
+        });
+        let stream: Box<dyn Iterator<Item = Drive> + Send> = Box::new(drives);
+        let mut kernel = Kernel::new(&netlist, &timing);
+        kernel.run(&mut merge([stream]), Time::from_fs(2 * EDGE), &mut checks);
+        checks.report(&netlist).violated()
+    };
+    assert_eq!(run(EDGE), 1);
+    assert_eq!(run(EDGE + 1), 0);
+}
+
+#[test]
+fn a_violation_makes_the_state_unknown_downstream_until_a_reset() {
+    let (library, kind) = (Library::default(), CellKind::Dffr);
+    let netlist = pair(kind);
+    let steps = after_reset(
+        kind,
+        &[
+            (EDGE, "CK", One),
+            (EDGE + 5_000, "D", One),
+            (EDGE + 1_000_000, "CK", Zero),
+            (EDGE + 2_000_000, "CK", One),
+            (EDGE + 4_000_000, "R", One),
+        ],
+    );
+    let [q1, q2] = ["Q1", "Q2"].map(|name| netlist.net(name).unwrap());
+    let run = |policy| simulate(&netlist, &library, Corner::Typ, policy, &steps);
+    let unknowns = |trace: &Recorder| {
+        let after_start = |t: &Time| *t > Time::from_ns(2);
+        let changes = trace.changes().iter();
+        let x = changes.filter(|(t, _, v)| after_start(t) && *v == X);
+        x.map(|(t, n, _)| (t.as_fs(), *n)).collect::<Vec<_>>()
+    };
+    let (report, trace, kernel) = run(Policy::XOnViolation);
+    let clock_to_q = library.delay(kind, 1, One, Corner::Typ).as_fs();
+    // The violation is complete when D changes; the next edge takes the unknown bit on.
+    assert_eq!(
+        unknowns(&trace),
+        [
+            (EDGE + 5_000 + clock_to_q, q1),
+            (EDGE + 2_000_000 + clock_to_q, q2)
+        ]
+    );
+    assert_eq!(report.violated(), 1);
+    assert_eq!(
+        [kernel.value(q1), kernel.value(q2)],
+        [Zero, Zero],
+        "after the reset"
+    );
+    let (report, trace, _) = run(Policy::ReportOnly);
+    assert_eq!(unknowns(&trace), []);
+    assert_eq!(report.violated(), 1);
+}
+
+/// A report survives JSON.
+#[test]
+fn a_report_round_trips_through_json() {
+    let steps = script(CellKind::Dffr, CheckKind::Hold, "R", 4);
+    let library = Library::default();
+    let policy = Policy::ReportOnly;
+    let (report, ..) = simulate(&pair(CellKind::Dffr), &library, Corner::Max, policy, &steps);
+    let text = serde_json::to_string(&report).unwrap();
+    assert_eq!(serde_json::from_str::<CheckReport>(&text).unwrap(), report);
+}
+
+/// Events (time, before, after) of one net, instants with no net effect left out; Z is X.
+fn events(trace: &Recorder, net: NetId) -> Vec<(i64, Logic, Logic)> {
+    let mut values: Vec<(i64, Logic)> = vec![(i64::MIN, X)];
+    for (time, _, value) in trace.changes().iter().filter(|(_, n, _)| *n == net) {
+        match values.last_mut() {
+            Some(last) if last.0 == time.as_fs() => last.1 = value.seen(),
+            _ => values.push((time.as_fs(), value.seen())),
+        }
+    }
+    let pairs = values.windows(2);
+    let steps = pairs.map(|w| (w[1].0, w[0].1, w[1].1));
+    steps.filter(|(_, before, after)| before != after).collect()
+}
+
+/// Every violation of one flip-flop, straight from the definitions: (kind, pin, time, slack).
+fn reference(
+    trace: &Recorder,
+    kind: CellKind,
+    inputs: &[NetId],
+    limits: &CheckLimits,
+) -> Vec<(CheckKind, String, i64, i64)> {
+    let pin = |name: &str| {
+        let index = kind.inputs().iter().position(|pin| *pin == name).unwrap();
+        events(trace, inputs[index])
+    };
+    let rises = |list: &[(i64, Logic, Logic)]| -> Vec<i64> {
+        let up = list
+            .iter()
+            .filter(|(_, before, after)| *after == One || *before == Zero);
+        up.map(|e| e.0).collect()
+    };
+    let falls = |list: &[(i64, Logic, Logic)]| -> Vec<i64> {
+        let down = list
+            .iter()
+            .filter(|(_, before, after)| *after == Zero || *before == One);
+        down.map(|e| e.0).collect()
+    };
+    let all = |list: &[(i64, Logic, Logic)]| -> Vec<i64> { list.iter().map(|e| e.0).collect() };
+    let value_at = |list: &[(i64, Logic, Logic)], time: i64| {
+        list.iter().rfind(|e| e.0 <= time).map_or(X, |e| e.2)
+    };
+    let (data, clock) = (pin("D"), pin("CK"));
+    let controls = &kind.inputs()[2..];
+    let is_held = |time| controls.iter().any(|c| value_at(&pin(c), time) == One);
+    let mut found = Vec::new();
+    let mut check = |which: CheckKind, name: &str, completing: &[i64], since: &[i64]| {
+        let limit = i64::from(limits.at(which, Corner::Typ));
+        for &time in completing.iter().filter(|t| !is_held(**t)) {
+            let Some(&from) = since.iter().rfind(|s| **s <= time) else {
+                continue;
+            };
+            let at_once_is_legal = matches!(which, CheckKind::Setup | CheckKind::Removal);
+            if time - from < limit && !(at_once_is_legal && from == time) {
+                found.push((which, name.to_owned(), time, time - from - limit));
+            }
+        }
+    };
+    let (up, down) = (rises(&clock), falls(&clock));
+    check(CheckKind::Setup, "D", &up, &all(&data));
+    check(CheckKind::Hold, "D", &all(&data), &up);
+    check(CheckKind::ClockHigh, "CK", &down, &up);
+    check(CheckKind::ClockLow, "CK", &up, &down);
+    for name in controls {
+        let control = pin(name);
+        check(CheckKind::Recovery, name, &up, &falls(&control));
+        check(CheckKind::Removal, name, &falls(&control), &up);
+        check(
+            CheckKind::ControlHigh,
+            name,
+            &falls(&control),
+            &rises(&control),
+        );
+    }
+    found.sort();
+    found
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, ..ProptestConfig::default() })]
+
+    /// Limits and delays of a few femtoseconds and stimuli at every femtosecond: coincidences, boundaries and unknown
+    /// values are the rule.
+    #[test]
+    fn random_stimuli_give_the_violations_of_the_definitions(
+        steps in prop::collection::vec((0i64..150, 0usize..4, 0usize..4), 1..120),
+        limits in prop::array::uniform7(0u32..8),
+        delays in prop::array::uniform2(1u32..5),
+        has_set: bool,
+        spreads_x: bool,
+    ) {
+        let kind = if has_set { CellKind::Dffsr } else { CellKind::Dffr };
+        let policy = if spreads_x { Policy::XOnViolation } else { Policy::ReportOnly };
+        let mut library = Library::default();
+        let [setup, hold, recovery, removal, clock_high, clock_low, control_high] = limits.map(Delay::fixed);
+        let limits = CheckLimits { setup, hold, recovery, removal, clock_high, clock_low, control_high };
+        library.set_checks(kind, limits);
+        let arc = |fs| Arc { rise: Delay::fixed(fs), fall: Delay::fixed(fs) };
+        library.set_arcs(kind, [arc(0), arc(delays[0]), arc(delays[1]), arc(delays[1])]);
+        let netlist = pair(kind);
+        let pins = kind.inputs();
+        let script: Script = steps
+            .into_iter()
+            .map(|(time, pin, value)| (time, pins[pin % pins.len()], Logic::ALL[value]))
+            .collect();
+        let (report, trace, _) = simulate(&netlist, &library, Corner::Typ, policy, &script);
+        for (index, cell) in netlist.cells().iter().enumerate() {
+            let path = netlist.cell_path(index);
+            let mut found: Vec<_> = report.violations.iter()
+                .filter(|v| v.cell == path)
+                .map(|v| (v.kind, v.pin.clone(), v.time_fs, v.slack_fs))
+                .collect();
+            found.sort();
+            prop_assert_eq!(found, reference(&trace, kind, &cell.inputs, &limits), "{}", path);
+        }
+        let violated: u64 = report.summaries.iter().map(|s| s.violated).sum();
+        prop_assert_eq!(violated, report.violations.len() as u64);
+        for summary in &report.summaries {
+            prop_assert_eq!(summary.histogram.iter().sum::<u64>(), summary.checked);
+        }
+    }
+}
+
+/// Pulses at scattered times on every SPAD.
+fn pulses(config: &SensorConfig, exposure: &Exposure, count: i64) -> Vec<SpadEvent> {
+    let mut pulses: Vec<SpadEvent> = (0..count)
+        .map(|i| SpadEvent {
+            // Multiples of the golden section spread evenly over the exposure.
+            time: Time::from_fs(
+                (exposure.end().as_fs() as f64 * (i as f64 * 0.618_033_988_7).fract()) as i64,
+            ),
+            spad: (i % 16) as u8,
+        })
+        .collect();
+    pulses.sort_unstable();
+    apply_dead_time(&mut pulses, config.dead_time());
+    pulses
+}
+
+fn sensor_report(config: &SensorConfig, policy: Policy) -> (CheckReport, Option<Vec<Vec<u16>>>) {
+    let exposure = Exposure::new(config, 60, 40);
+    let pulses = pulses(config, &exposure, 1_500);
+    let start = [20];
+    let mut gate = GateSimulation::new(config, &exposure, (0, 0), (1, 1), &start, &[&pulses]);
+    let mut checks = gate.timing_checks(policy);
+    gate.run(&mut checks);
+    let report = checks.report(gate.netlist());
+    (report, gate.histograms().ok())
+}
+
+#[test]
+fn the_default_sensor_breaks_nothing_but_its_asynchronous_samplers() {
+    for corner in [Corner::Min, Corner::Typ] {
+        let config = SensorConfig {
+            rows: 1,
+            cols: 1,
+            corner,
+            ..SensorConfig::default()
+        };
+        let (report, histograms) = sensor_report(&config, Policy::ReportOnly);
+        println!("{corner:?} {report}");
+        let real = report.violations.iter().filter(|v| !v.is_asynchronous);
+        let real: Vec<_> = real.take(20).collect();
+        assert!(real.is_empty(), "{real:#?}\n{report}");
+        assert_eq!(report.asynchronous_flip_flops, 16);
+        let hold = report.summary(CheckKind::Hold);
+        assert!(
+            hold.asynchronous_violated > 0,
+            "photons ignore CLK: {report}"
+        );
+        for kind in CheckKind::ALL {
+            assert!(
+                report.summary(kind).checked > 0,
+                "{kind:?} was never judged"
+            );
+        }
+        // With no violation that acts, X has nothing to spread from.
+        let (_, with_x) = sensor_report(&config, Policy::XOnViolation);
+        assert!(histograms.is_some() && histograms == with_x);
+    }
+}
