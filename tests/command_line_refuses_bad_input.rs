@@ -275,3 +275,24 @@ proptest! {
         }
     }
 }
+
+/// A reader that stops early, such as `head`, ends the command quietly.
+#[test]
+fn a_closed_pipe_is_no_crash() {
+    let folder = folder();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_gdtof"))
+        .args(replay(&[]))
+        .current_dir(folder.path())
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert!(
+        output.stderr.is_empty(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    assert!(output.status.success());
+}

@@ -21,6 +21,7 @@
 //! random circuits than the usual 500 and shows how much was compared.
 
 mod icarus;
+mod scenario;
 
 mod every_edge {
     pub mod circuit;
@@ -40,10 +41,10 @@ use guided_dtof::kernel::{Drive, Kernel, merge};
 use guided_dtof::netlist::{Direction, Module, Netlist, Timing, write_cells, write_modules};
 use guided_dtof::units::Time;
 use guided_dtof::waves::{Selection, VcdWriter};
-use icarus::sensor::Scenario;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, FileFailurePersistence, TestCaseError, TestError, TestRunner};
 use rand::{SeedableRng, rngs::StdRng, seq::SliceRandom};
+use scenario::Scenario;
 
 /// Whose waves are compared.
 const NAMES: [&str; 2] = ["the kernel", "Icarus"];

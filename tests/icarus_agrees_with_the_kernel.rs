@@ -2,13 +2,14 @@
 //! femtosecond and the same histogram counts as our kernel. Skipped, loudly, where Icarus is absent.
 
 mod icarus;
+mod scenario;
 
 use std::path::Path;
 
 use guided_dtof::engine::{GateSimulation, StimulusPlan, export_verilog};
 use guided_dtof::kernel::Recorder;
-use icarus::sensor::Scenario;
 use rand::{SeedableRng, rngs::StdRng};
+use scenario::Scenario;
 
 fn table(path: &Path) -> Vec<Vec<i64>> {
     let text = std::fs::read_to_string(path).unwrap();

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::replay::StimulusArgs;
-use super::sdf;
+use super::{say, sdf};
 use crate::chip::sensor;
 use crate::engine::{StimulusPlan, export_annotated_verilog, export_verilog};
 use crate::netlist::Netlist;
@@ -60,9 +60,9 @@ fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
             export_annotated_verilog(&args.out, &stimuli.config, &plan, &timing)?;
         }
     }
-    println!(
-        "cd {} && iverilog -g2005 -o sim tb.v design.v cells.v && vvp sim",
+    say(format_args!(
+        "cd {} && iverilog -g2005 -o sim tb.v design.v cells.v && vvp sim\n",
         args.out.display()
-    );
+    ))?;
     Ok(())
 }

@@ -6,7 +6,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::SensorArgs;
+use super::{SensorArgs, say};
 use crate::chip::SensorConfig;
 use crate::chip::window_law::{Window, WindowLaw};
 use crate::engine::recording::check_exposure;
@@ -106,9 +106,9 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
     let report = Report::new(args, &settings.sensor, &frame);
     write_results(&args.out, &frame, &report)?;
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&report)?);
+        say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
     } else {
-        print!("{}", table(args, &frame));
+        say(table(args, &frame))?;
     }
     Ok(())
 }

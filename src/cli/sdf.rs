@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use super::SensorArgs;
+use super::{SensorArgs, say};
 use crate::chip::{SensorConfig, sensor};
 use crate::files::{InputError, OutputFile, read_text};
 use crate::netlist::sdf::{
@@ -66,7 +66,11 @@ pub fn run(args: &SdfArgs) -> anyhow::Result<()> {
     OutputFile::write_with(&args.out, |out| {
         write_sdf(out, &netlist, [&min, &typ, &max], &no_checks, options)
     })?;
-    println!("{} cells in {}", netlist.cells().len(), args.out.display());
+    say(format_args!(
+        "{} cells in {}\n",
+        netlist.cells().len(),
+        args.out.display()
+    ))?;
     Ok(())
 }
 

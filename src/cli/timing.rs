@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 
-use super::SensorArgs;
+use super::{SensorArgs, say};
 use crate::engine::timing::{MacropixelTiming, gate_works, phases, ripple, shortest_period};
 use crate::files::InputError;
 use crate::netlist::{Conditions, Library, Mismatch, Netlist, Process, Timing, varied};
@@ -21,7 +21,7 @@ enum Silicon {
 pub struct TimingArgs {
     #[command(flatten)]
     sensor: SensorArgs,
-    /// Silicon.
+    /// Silicon; like voltage and temperature it scales the delays of the sensor's corner.
     #[arg(long, value_enum, default_value = "typ")]
     process: Silicon,
     /// Supply, V.
@@ -125,7 +125,8 @@ pub fn run(args: &TimingArgs) -> anyhow::Result<()> {
         (
             "best STOP phase, beyond the crossing",
             shortest_period(below, |p| any_phase(&by_paths, p)),
-            shortest_period(below, |p| any_phase(&by_gates, p)),
+            // No pattern of photons is known to excite the longest correlation path, which rules here.
+            None,
         ),
         ("correlation path", Some(pixel.correlation_period()), None),
     ];
@@ -146,24 +147,24 @@ pub fn run(args: &TimingArgs) -> anyhow::Result<()> {
             "ripples_ps": ripples.iter().map(|(stages, a, b)| serde_json::json!({
                 "stages": stages, "static": ps(*a), "event_driven": ps(*b)})).collect::<Vec<_>>(),
         });
-        println!("{document:#}");
+        say(format_args!("{document:#}\n"))?;
         return Ok(());
     }
     let mut table = Table::new("Paths of a macropixel").row(rows[0].0, format!("{factor:.4}"));
     for (name, time, _) in &rows[1..] {
         table.push(*name, time);
     }
-    println!("{table}");
+    say(format_args!("{table}\n"))?;
     let show = |time: Option<Time>| time.map_or("-".to_owned(), |t| t.to_string());
     let mut table = Table::new("Shortest CLK period: static, event-driven");
     for (name, paths, gates) in periods {
         table.push(name, format!("{}  {:>9}", show(paths), show(gates)));
     }
-    println!("{table}");
+    say(format_args!("{table}\n"))?;
     let mut table = Table::new("Ripple COUNTER_CLK to LOCAL_STOP by stages: static, event-driven");
     for (bits, longest, simulated) in ripples {
         table.push(bits.to_string(), format!("{longest}  {simulated}"));
     }
-    print!("{table}");
+    say(table)?;
     Ok(())
 }

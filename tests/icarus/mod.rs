@@ -1,6 +1,4 @@
-//! What the comparisons with Icarus Verilog share: running it, and random sensors to run.
-
-pub mod sensor;
+//! What the comparisons with Icarus Verilog share: running it.
 
 use std::path::Path;
 use std::process::Command;
