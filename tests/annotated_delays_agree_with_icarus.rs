@@ -1,9 +1,10 @@
 //! A macropixel with random delays of every cell, annotated from SDF, in Icarus Verilog: the same LOCAL_STOP
 //! times to the femtosecond and the same histograms as our kernel. Skipped, loudly, where Icarus is absent.
 
+mod icarus;
+
 use std::collections::HashSet;
 use std::path::Path;
-use std::process::Command;
 
 use guided_dtof::chip::{Exposure, SensorConfig, sensor};
 use guided_dtof::engine::{GateSimulation, StimulusPlan, export_annotated_verilog};
@@ -13,28 +14,6 @@ use guided_dtof::netlist::{Corner, Library, Netlist, Timing};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
 use guided_dtof::units::Time;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
-
-fn icarus_is_here() -> bool {
-    if Command::new("iverilog").arg("-V").output().is_ok() {
-        return true;
-    }
-    eprintln!("SKIPPED: iverilog is not installed, so annotated delays were not compared with it");
-    assert!(std::env::var_os("CI").is_none(), "CI must have iverilog");
-    false
-}
-
-fn run(folder: &Path, program: &str, arguments: &[&str]) {
-    let output = Command::new(program)
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap();
-    let text = String::from_utf8_lossy(&output.stderr);
-    assert!(
-        output.status.success() && text.is_empty(),
-        "{program}: {text}"
-    );
-}
 
 fn lines(path: &Path) -> Vec<String> {
     let text = std::fs::read_to_string(path).unwrap();
@@ -99,9 +78,7 @@ fn compare(seed: u64) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     let plan = StimulusPlan::new(&config, &exposure, 1, &starts, &pulses);
     export_annotated_verilog(folder.path(), &config, &plan, &timing).unwrap();
-    let files = ["-g2005", "-o", "sim", "tb.v", "design.v", "cells.v"];
-    run(folder.path(), "iverilog", &files);
-    run(folder.path(), "vvp", &["sim"]);
+    icarus::simulate(folder.path(), &["tb.v", "design.v", "cells.v"], &[]);
 
     let gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &starts, &pulses);
     let mut gate = gate.with_timing(&timing);
@@ -134,7 +111,7 @@ fn compare(seed: u64) -> Vec<String> {
 
 #[test]
 fn macropixels_with_random_delays() {
-    if icarus_is_here() {
+    if icarus::is_here() {
         let all: Vec<Vec<String>> = (0..12).map(compare).collect();
         assert!(all.iter().all(|stops| !stops.is_empty()), "{all:?}");
         let different: HashSet<_> = all.iter().collect();

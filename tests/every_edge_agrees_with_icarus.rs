@@ -102,7 +102,7 @@ fn simulate(
     selection: &Selection,
 ) -> Waves {
     let mut writer = VcdWriter::new(Vec::new(), netlist, selection).unwrap();
-    let timing = Timing::nominal(netlist, &case.library(), case.corner());
+    let timing = Timing::nominal(netlist, &case.cell_library(), case.corner());
     let mut kernel = Kernel::new(netlist, &timing);
     let mut stimulus = merge([Box::new(drives.into_iter()) as Box<_>]);
     kernel.run(&mut stimulus, end, &mut writer);
@@ -121,7 +121,7 @@ fn compare(case: &Case) -> Result<Figures, TestCaseError> {
     write_modules(&mut design, &top).unwrap();
     let design = String::from_utf8(design).unwrap();
     let mut cells = Vec::new();
-    write_cells(&mut cells, &case.library(), case.corner()).unwrap();
+    write_cells(&mut cells, &case.cell_library(), case.corner()).unwrap();
     let bench = testbench(&top, &netlist, &drives, end);
     let folder = tempfile::tempdir().unwrap();
     let all = [&cells[..], design.as_bytes(), bench.as_bytes()].concat();

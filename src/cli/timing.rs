@@ -156,7 +156,8 @@ pub fn run(args: &TimingArgs) -> anyhow::Result<()> {
     }
     say(format_args!("{table}\n"))?;
     let show = |time: Option<Time>| time.map_or("-".to_owned(), |t| t.to_string());
-    let mut table = Table::new("Shortest CLK period: static, event-driven");
+    let mut table =
+        Table::new("Shortest CLK period, setup and hold not counted: static, event-driven");
     for (name, paths, gates) in periods {
         table.push(name, format!("{}  {:>9}", show(paths), show(gates)));
     }

@@ -15,9 +15,7 @@
 use super::gate::GateSimulation;
 use crate::chip::{Exposure, SensorConfig, p_counter, sensor};
 use crate::kernel::{Drive, Kernel, Recorder, merge};
-use crate::netlist::{
-    Bound, CellKind, Edge, NetId, Netlist, Path, StaticTiming, Timing, setup_time,
-};
+use crate::netlist::{Bound, Edge, NetId, Netlist, Path, StaticTiming, Timing};
 use crate::photon::SpadEvent;
 use crate::units::{Frequency, Time};
 
@@ -139,14 +137,15 @@ impl MacropixelTiming {
         self.release.0 - self.reset.1
     }
 
-    /// Shortest CLK period of the path CLK → SPAD_EVENT → shift register.
+    /// Shortest CLK period of the path CLK → SPAD_EVENT → shift register, setup not counted.
     pub fn correlation_period(&self) -> Time {
-        self.event.delay() + setup_time(CellKind::Dffr)
+        self.event.delay()
     }
 
-    /// Shortest CLK period with STOP on CLK's falling edge: the strobe must precede the shift register's change.
+    /// Shortest CLK period with STOP on CLK's falling edge: the strobe must precede the shift register's change,
+    /// setup and hold not counted: the kernel samples D in the instant of the clock edge.
     pub fn strobe_period(&self) -> Time {
-        (self.strobe + setup_time(CellKind::Dffr) - self.shift) * 2
+        (self.strobe - self.shift) * 2
     }
 
     /// Whether a start value selects the CLK periods it selects at a slow clock, STOP `phase` after CLK's fall.

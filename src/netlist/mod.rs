@@ -27,7 +27,7 @@ pub use library::{Arc, CellArcs, Corner, Delay, Library};
 pub use module::{
     Cell, Direction, Instance, Module, ModuleBuilder, Net, NetlistError, Port, Signal,
 };
-pub use static_timing::{Arrivals, Bound, Edge, Path, StaticTiming, Step, TimingLoop, setup_time};
+pub use static_timing::{Arrivals, Bound, Edge, Path, StaticTiming, Step, TimingLoop};
 pub use timing::{ArcDelay, CellDelays, Timing};
 pub use variation::{Conditions, Mismatch, Process, varied};
 pub use verilog::{write_cells, write_delays, write_modules, write_parametric_cells};

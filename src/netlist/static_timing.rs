@@ -62,12 +62,6 @@ impl Edge {
     }
 }
 
-/// Time for which a flip-flop's D must be stable before its clock rises. The library characterises no
-/// checks, and the kernel samples D in the instant of the clock edge: zero.
-pub fn setup_time(_: CellKind) -> Time {
-    Time::ZERO
-}
-
 /// Which of the two bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bound {

@@ -189,7 +189,7 @@ impl Case {
     }
 
     /// Random delays of every arc in every corner.
-    pub fn library(&self) -> Library {
+    pub fn cell_library(&self) -> Library {
         let mut random = StdRng::seed_from_u64(self.delay_seed);
         let mut fs = || self.on_grid(random.random_range(DELAYS_FS));
         let mut delay = || Delay {
