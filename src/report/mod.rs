@@ -1,13 +1,17 @@
-//! What comes out: pictures, arrays, tables and the verdicts of testbenches.
+//! What comes out: pictures, charts, arrays, tables and the verdicts of testbenches.
 
 mod array;
 mod canvas;
+mod chart;
 mod checks;
 mod colour;
+mod grid;
 mod image;
 mod table;
 
 pub use array::write_npy_u16;
+pub use chart::{Axis, Chart, Scale, Series, Style};
 pub use checks::Checks;
+pub use grid::Grid;
 pub use image::depth_png;
 pub use table::Table;

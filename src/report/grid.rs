@@ -1,0 +1,116 @@
+//! Tables of several columns: aligned for a terminal, as Markdown and as CSV.
+
+use std::fmt;
+use std::io::Write;
+
+use super::chart::quoted;
+
+/// Rows of cells under headings. The first column aligns left, all others right.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Grid {
+    headings: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Grid {
+    /// An empty table with these headings.
+    pub fn new<S: Into<String>>(headings: impl IntoIterator<Item = S>) -> Self {
+        Grid {
+            headings: headings.into_iter().map(Into::into).collect(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Adds a row, which must have a cell for every heading.
+    pub fn push<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
+        let row: Vec<String> = cells.into_iter().map(Into::into).collect();
+        debug_assert_eq!(row.len(), self.headings.len(), "a cell for every heading");
+        self.rows.push(row);
+    }
+
+    /// The table in GitHub's Markdown.
+    pub fn markdown(&self) -> String {
+        let line = |cells: &[String]| {
+            let cells: Vec<String> = cells.iter().map(|c| c.replace('|', "\\|")).collect();
+            format!("| {} |\n", cells.join(" | "))
+        };
+        let marks: Vec<String> = (0..self.headings.len())
+            .map(|column| if column == 0 { "---" } else { "---:" }.to_owned())
+            .collect();
+        let rows = self.rows.iter().map(|row| line(row));
+        line(&self.headings) + &line(&marks) + &rows.collect::<String>()
+    }
+
+    /// Writes the table as CSV, headings first.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn write_csv(&self, out: &mut dyn Write) -> std::io::Result<()> {
+        for row in std::iter::once(&self.headings).chain(&self.rows) {
+            let cells: Vec<String> = row.iter().map(|cell| quoted(cell)).collect();
+            writeln!(out, "{}", cells.join(","))?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Grid {
+    /// One line per row, columns two spaces apart, each line ending in a line feed.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let all = || std::iter::once(&self.headings).chain(&self.rows);
+        let widths: Vec<usize> = (0..self.headings.len())
+            .map(|column| {
+                all()
+                    .map(|row| row[column].chars().count())
+                    .max()
+                    .unwrap_or(0)
+            })
+            .collect();
+        for row in all() {
+            let mut line = String::new();
+            for (column, (cell, &width)) in row.iter().zip(&widths).enumerate() {
+                if column == 0 {
+                    line += &format!("{cell:<width$}");
+                } else {
+                    line += &format!("  {cell:>width$}");
+                }
+            }
+            writeln!(f, "{}", line.trim_end())?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid() -> Grid {
+        let mut grid = Grid::new(["engine", "time (ms)"]);
+        grid.push(["window", "142"]);
+        grid.push(["a|b, c", "7"]);
+        grid
+    }
+
+    #[test]
+    fn columns_line_up() {
+        assert_eq!(
+            grid().to_string(),
+            "engine  time (ms)\nwindow        142\na|b, c          7\n"
+        );
+    }
+
+    #[test]
+    fn markdown_and_csv_escape_what_separates_cells() {
+        assert_eq!(
+            grid().markdown(),
+            "| engine | time (ms) |\n| --- | ---: |\n| window | 142 |\n| a\\|b, c | 7 |\n"
+        );
+        let mut csv = Vec::new();
+        grid().write_csv(&mut csv).unwrap();
+        assert_eq!(
+            String::from_utf8(csv).unwrap(),
+            "engine,time (ms)\nwindow,142\n\"a|b, c\",7\n"
+        );
+    }
+}
