@@ -5,3 +5,7 @@ set -euo pipefail
 cd "$(dirname "$0")/replay"
 cargo run --release --quiet -- replay --sensor sensor.toml --inits inits.csv --events events.csv \
     --stop-periods 80 --laser-cycles 40 --engine gate --out histograms.csv
+
+# High-precision references of the theory (mpmath, some minutes).
+cd ../theory
+python3 detection.py
