@@ -4,5 +4,8 @@ mod counts;
 mod cycles;
 pub mod detection;
 mod gaussian;
+pub mod precision;
+mod pulse;
 
 pub use counts::{Counts, Tails};
+pub use pulse::{LnBin, MeasuredPulse, Pulse, PulseError};
