@@ -23,6 +23,7 @@
 mod check_report;
 mod checks;
 mod compiled;
+mod lane_word;
 mod lanes;
 mod observer;
 mod simulation;
@@ -33,7 +34,8 @@ pub use check_report::{
     BIN_FS, BINS, CheckReport, CheckSummary, FIRST_BIN_FS, Place, Policy, Violation,
 };
 pub use checks::TimingChecks;
-pub use lanes::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
+pub use lane_word::{LANES, Lanes};
+pub use lanes::{LaneDrive, LaneKernel, LaneObserver};
 pub use observer::{Observer, Recorder};
 pub use simulation::{Kernel, Statistics};
 pub use stimulus::{Drive, Stimulus, clock, in_order, merge};
