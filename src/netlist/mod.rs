@@ -23,7 +23,7 @@ mod verilog;
 
 pub use builder::{ModuleBuilder, NetlistError};
 pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS, next_state};
-pub use checks::{CheckKind, CheckLimits};
+pub use checks::{CheckKind, CheckLimits, DataLimit};
 pub use flat::{FlatCell, NetId, Netlist, Scope};
 pub use library::{Arc, CellArcs, Corner, Delay, Library};
 pub use module::{Cell, Direction, Instance, Module, Net, Port, Signal};

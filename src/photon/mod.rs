@@ -9,4 +9,4 @@ mod stream;
 pub use budget::{Convention, PhotonBudget};
 pub use random::{Poisson, Purpose, normal, random_stream};
 pub use spad::{SPADS, SpadEvent, apply_dead_time};
-pub use stream::{PixelLight, PixelPhotons, PixelStream, StreamConfig, pixel_events};
+pub use stream::{PhotonStream, PixelLight, PixelPhotons, PixelStream, StreamConfig};
