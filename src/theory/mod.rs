@@ -3,6 +3,7 @@
 mod counts;
 mod cycles;
 pub mod detection;
+pub mod estimators;
 mod gaussian;
 pub mod precision;
 mod pulse;
