@@ -5,10 +5,12 @@
 //! | [`Gate`] | every net of the netlist, with its delays | Icarus Verilog on the exported netlist |
 //! | [`Cycle`] | every CLK period, through the blocks' reference models | `Gate` |
 //! | [`Window`] | only the CLK periods a start value can see, through the window law | `Cycle` |
+//! | [`Cohort`] | no photons: laser cycles in the same state move together | `Window`, in distribution |
 //!
-//! All take the same start value and SPAD pulses and give the same histogram. `Cycle` and `Window` assume what
+//! The first three take the same start value and SPAD pulses and give the same histogram. `Cycle` and `Window` assume what
 //! the window law can promise, and refuse a configuration in which two signals race.
 
+mod cohort;
 mod cycle;
 mod gate;
 mod lanes;
@@ -21,6 +23,7 @@ pub mod timing;
 pub mod waveform;
 mod window;
 
+pub use cohort::{Cohort, CohortOptions, DeadTimeLaw};
 pub use cycle::Cycle;
 pub use gate::{Gate, GateSimulation};
 pub use lanes::LaneSimulation;
@@ -76,7 +79,7 @@ pub trait Engine: Sync {
 }
 
 /// Why an engine has no answer.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EngineError {
     /// The window law finds two signals too close to call.
     #[error(
@@ -88,6 +91,16 @@ pub enum EngineError {
         "the {0} engine knows no single photons and cannot replay recorded ones; use --engine window"
     )]
     NoPhotons(&'static str),
+    /// A SPAD could fire twice in a CLK period, and its pulses cancel.
+    #[error(
+        "the cohort engine needs a dead time of at least one CLK period; use --engine window or raise dead_time_ns"
+    )]
+    ShortDeadTime,
+    /// Laser cycles depend on each other: a bound on the probability, over a macropixel's exposure.
+    #[error(
+        "SPADs may stay busy from one laser cycle's window to the next (probability up to {0:.1e}), which the cohort engine cannot follow; use --engine window, a longer laser cycle or less light"
+    )]
+    Memory(f64),
     /// A histogram bin of the netlist holds X.
     #[error("bin {bin} of {macropixel} is unknown (X) at the end of the exposure")]
     Unknown {
@@ -96,4 +109,11 @@ pub enum EngineError {
         /// First unknown bin.
         bin: usize,
     },
+}
+
+impl EngineError {
+    /// Whether the user asked for what this engine cannot do, and another can.
+    pub fn is_refusal(&self) -> bool {
+        !matches!(self, EngineError::Unknown { .. })
+    }
 }

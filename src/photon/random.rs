@@ -15,6 +15,8 @@ pub enum Purpose {
     Photons = 0,
     /// Disparity errors of the stereo camera.
     Stereo = 1,
+    /// Splits of cohorts of laser cycles.
+    Cohort = 2,
 }
 
 /// The stream of random words for (`seed`, `purpose`, `index`, `sub_index`).
