@@ -3,8 +3,10 @@
 //!
 //! `COHORT_SEEDS=n` sets the number of seeds; the more, the smaller the difference that shows.
 
-use guided_dtof::chip::{EventType, Exposure, Mode, SensorConfig};
-use guided_dtof::engine::{Cohort, CohortOptions, Engine, LitPixel, Window, stream_config};
+use guided_dtof::chip::{EventType, Exposure, Mode, Overflow, SensorConfig};
+use guided_dtof::engine::{
+    Cohort, CohortOptions, DeadTimeLaw, Engine, LitPixel, Window, stream_config,
+};
 use guided_dtof::photon::{PhotonStream, PixelLight, StreamConfig};
 use guided_dtof::units::Time;
 use rayon::prelude::*;
@@ -71,8 +73,8 @@ impl Moments {
     }
 }
 
-struct Case {
-    name: &'static str,
+struct Case<'n> {
+    name: &'n str,
     sensor: SensorConfig,
     stop_periods: u32,
     laser_cycles: u32,
@@ -81,7 +83,7 @@ struct Case {
     options: CohortOptions,
 }
 
-fn case() -> Case {
+fn case() -> Case<'static> {
     Case {
         name: "",
         sensor: SensorConfig::default(),
@@ -104,7 +106,7 @@ fn seeds() -> u64 {
         .unwrap_or(4_000)
 }
 
-impl Case {
+impl Case<'_> {
     fn stream(&self, seed: u64) -> StreamConfig {
         let exposure = Exposure::new(&self.sensor, self.stop_periods, self.laser_cycles);
         stream_config(&self.sensor, &exposure, seed, Time::from_ps(1_900))
@@ -172,25 +174,345 @@ impl Case {
     }
 }
 
+fn options(neglect: f64) -> CohortOptions {
+    CohortOptions {
+        neglect,
+        ..CohortOptions::default()
+    }
+}
+
 #[test]
-fn little_light_pooled() {
+fn the_pool_of_spads() {
+    let light = PixelLight {
+        background_hz: 15e6,
+        signal_per_cycle: 0.3,
+        ..case().light
+    };
+    let name = "pool, 15 Mcounts/s";
     Case {
-        name: "little light",
+        name,
+        light,
+        options: options(1.0),
         ..case()
     }
     .agrees();
 }
 
 #[test]
-fn little_light_in_the_joint_state() {
-    let options = CohortOptions {
-        neglect: 0.0,
-        ..CohortOptions::default()
-    };
+fn the_joint_state() {
+    let name = "joint state, 40 Mcounts/s";
     Case {
-        name: "little light, joint",
-        options,
+        name,
+        options: options(0.0),
         ..case()
     }
     .agrees();
+}
+
+#[test]
+fn much_light_in_finer_steps() {
+    let light = PixelLight {
+        background_hz: 400e6,
+        signal_per_cycle: 10.0,
+        ..case().light
+    };
+    let options = CohortOptions {
+        sub_bins: 4,
+        ..options(0.0)
+    };
+    let name = "joint state, 400 Mcounts/s";
+    Case {
+        name,
+        light,
+        options,
+        stop_periods: 200,
+        laser_cycles: 30,
+        ..case()
+    }
+    .agrees();
+}
+
+#[test]
+fn coincidences_of_each_type() {
+    let light = PixelLight {
+        background_hz: 150e6,
+        signal_per_cycle: 4.0,
+        ..case().light
+    };
+    for (event_type, threshold, neglect) in [
+        (EventType::Greater, 1, 0.0),
+        (EventType::Greater, 1, 1.0),
+        (EventType::Equal, 1, 0.0),
+        (EventType::Less, 2, 0.0),
+        (EventType::Less, 1, 1.0),
+    ] {
+        let sensor = SensorConfig {
+            event_type,
+            threshold,
+            ..SensorConfig::default()
+        };
+        let name = format!("{event_type:?} {threshold}, neglect {neglect}");
+        let options = options(neglect);
+        Case {
+            name: &name,
+            sensor,
+            light,
+            options,
+            stop_periods: 120,
+            laser_cycles: 30,
+            ..case()
+        }
+        .agrees();
+    }
+}
+
+#[test]
+fn windows_at_both_ends_and_in_the_conventional_mode() {
+    let light = PixelLight {
+        arrival: Time::from_ns(4),
+        ..case().light
+    };
+    let conventional = SensorConfig {
+        mode: Mode::Conventional,
+        event_type: EventType::Less,
+        threshold: 1,
+        ..SensorConfig::default()
+    };
+    for (name, start, arrival, sensor) in [
+        (
+            "first window",
+            0,
+            Time::from_ns(160),
+            SensorConfig::default(),
+        ),
+        (
+            "window across STOP",
+            9,
+            Time::from_ns(4),
+            SensorConfig::default(),
+        ),
+        (
+            "window after an echo",
+            22,
+            Time::from_ns(9),
+            SensorConfig::default(),
+        ),
+        (
+            "last window",
+            62,
+            Time::from_ns(160),
+            SensorConfig::default(),
+        ),
+        ("conventional", 0, Time::from_ns(140), conventional),
+    ] {
+        let light = PixelLight { arrival, ..light };
+        Case {
+            name,
+            start,
+            light,
+            sensor,
+            laser_cycles: 12,
+            ..case()
+        }
+        .agrees();
+    }
+}
+
+#[test]
+fn counters_saturate_and_wrap_alike() {
+    for overflow in [Overflow::Saturate, Overflow::Wrap] {
+        let sensor = SensorConfig {
+            bin_bits: 3,
+            overflow,
+            ..SensorConfig::default()
+        };
+        let name = format!("{overflow:?}");
+        Case {
+            name: &name,
+            sensor,
+            ..case()
+        }
+        .agrees();
+    }
+}
+
+#[test]
+fn finer_steps_come_nearer_to_the_window_engine() {
+    let light = PixelLight {
+        background_hz: 600e6,
+        signal_per_cycle: 0.0,
+        ..case().light
+    };
+    let (sensor, seeds) = (SensorConfig::default(), seeds() / 8);
+    let exposure = Exposure::new(&sensor, 400, 30);
+    let stream = |seed| stream_config(&sensor, &exposure, seed, Time::from_ps(1_900));
+    let window = Window::new(&sensor, &exposure);
+    let pixel = LitPixel {
+        number: 0,
+        start: 380,
+        light: Some(light),
+    };
+    // The light is even, so all bins share one mean.
+    let counts: u64 = (0..seeds)
+        .into_par_iter()
+        .map(|seed| {
+            let stream = PhotonStream::new(&stream(seed));
+            let exposed = window.expose(&stream, &[pixel]).unwrap();
+            exposed.histograms[0]
+                .iter()
+                .map(|&n| u64::from(n))
+                .sum::<u64>()
+        })
+        .sum();
+    let trials = seeds as f64 * 30.0 * 16.0;
+    let by_photons = counts as f64 / trials;
+    let error = (by_photons * (1.0 - by_photons) / trials).sqrt();
+    let off = |sub_bins| {
+        let options = CohortOptions {
+            sub_bins,
+            ..CohortOptions::default()
+        };
+        let expected = Cohort::new(&sensor, &exposure, options).expected(&stream(0), 380, &light);
+        expected.unwrap()[8] / 30.0 - by_photons
+    };
+    let offs = [1, 2, 4, 8, 16].map(off);
+    println!(
+        "probability of an event: {by_photons:.6} ± {error:.6}; steps 1, 2, 4, 8, 16 off by {offs:.6?}"
+    );
+    assert!(offs[4].abs() < 5.0 * error, "{offs:?} against {error}");
+    assert!(offs[0].abs() > offs[2].abs() + offs[4].abs(), "{offs:?}");
+}
+
+#[test]
+fn paralysable_spads_follow_their_closed_form() {
+    // Even light r on a SPAD: it fires at r·exp(−r·dead) per second.
+    let sensor = SensorConfig::default();
+    let exposure = Exposure::new(&sensor, 520, 1_000_000_000);
+    let stream = stream_config(&sensor, &exposure, 1, Time::from_ps(1_900));
+    let light = PixelLight {
+        background_hz: 200e6,
+        signal_per_cycle: 0.0,
+        ..case().light
+    };
+    let options = CohortOptions {
+        sub_bins: 32,
+        dead_time_law: DeadTimeLaw::Paralysable,
+        ..options(0.0)
+    };
+    let expected = Cohort::new(&sensor, &exposure, options)
+        .expected(&stream, 300, &light)
+        .unwrap();
+    let rate: f64 = 200e6 / 16.0;
+    let period_s = 1.0 / exposure.clock.as_hz();
+    let pulse = rate * (-rate * 8e-9).exp() * period_s;
+    let event = 1.0 - (1.0 - pulse).powi(16);
+    let off = expected[7] / 1e9 / event - 1.0;
+    assert!(off.abs() < 2e-4, "{off}");
+}
+
+#[test]
+fn draws_have_the_computed_means_for_a_billion_cycles_and_every_law() {
+    let sensor = SensorConfig {
+        bin_bits: 16,
+        ..SensorConfig::default()
+    };
+    for cycles in [1, 100, 1_000_000_000] {
+        let exposure = Exposure::new(&sensor, 520, cycles);
+        for (law, background_hz, signal_per_cycle) in [
+            (DeadTimeLaw::NonParalysable, 8e6, 0.1),
+            (DeadTimeLaw::Paralysable, 8e6, 0.1),
+            (DeadTimeLaw::NonParalysable, 1e-3, 1e-12),
+            (DeadTimeLaw::Paralysable, 100e6, 500.0),
+            (DeadTimeLaw::NonParalysable, 100e6, 500.0),
+        ] {
+            let options = CohortOptions {
+                dead_time_law: law,
+                ..CohortOptions::default()
+            };
+            let cohort = Cohort::new(&sensor, &exposure, options);
+            let light = PixelLight {
+                signal_per_cycle,
+                arrival: Time::from_ns(760),
+                background_hz,
+            };
+            let stream = |seed| stream_config(&sensor, &exposure, seed, Time::from_ps(1_900));
+            let expected = cohort.expected(&stream(0), 300, &light).unwrap();
+            let seeds = 20u64;
+            let mut sums = vec![0.0; expected.len()];
+            for seed in 0..seeds {
+                let hits = cohort.hits(&stream(seed), 3, 300, &light).unwrap();
+                sums.iter_mut()
+                    .zip(&hits)
+                    .for_each(|(sum, &n)| *sum += n as f64);
+            }
+            for (bin, (sum, mean)) in sums.iter().zip(&expected).enumerate() {
+                let p = mean / f64::from(cycles);
+                let (sum_mean, variance) = (mean * seeds as f64, mean * (1.0 - p) * seeds as f64);
+                let off = (sum - sum_mean).abs();
+                assert!(
+                    off <= 5.0 * variance.sqrt() + 5.0,
+                    "{cycles} {law:?} {light:?} bin {bin}: {sum} {sum_mean}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn what_cohorts_cannot_follow_is_refused() {
+    let short = SensorConfig {
+        dead_time_ns: 2.0,
+        ..SensorConfig::default()
+    };
+    let case = case();
+    for (sensor, light, expected) in [
+        (short, case.light, "dead time"),
+        (
+            SensorConfig::default(),
+            PixelLight {
+                background_hz: 1e12,
+                ..case.light
+            },
+            "busy",
+        ),
+        (
+            SensorConfig {
+                dead_time_ns: 500.0,
+                ..SensorConfig::default()
+            },
+            case.light,
+            "busy",
+        ),
+    ] {
+        let exposure = Exposure::new(&sensor, 64, 10);
+        let stream = stream_config(&sensor, &exposure, 1, Time::from_ps(1_900));
+        let cohort = Cohort::new(&sensor, &exposure, CohortOptions::default());
+        let error = cohort.draw(&stream, 0, 40, &light).unwrap_err().to_string();
+        assert!(
+            error.contains(expected) && error.contains("--engine window"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn histograms_depend_on_seed_and_pixel_alone() {
+    let case = case();
+    let exposure = Exposure::new(&case.sensor, case.stop_periods, case.laser_cycles);
+    let cohort = Cohort::new(&case.sensor, &exposure, case.options);
+    let draw = |seed, pixel| {
+        cohort
+            .draw(&case.stream(seed), pixel, case.start, &case.light)
+            .unwrap()
+    };
+    let stream = PhotonStream::new(&case.stream(7));
+    let pixels = [3, 9, 2].map(|number| LitPixel {
+        number,
+        start: case.start,
+        light: Some(case.light),
+    });
+    let exposed = cohort.expose(&stream, &pixels).unwrap().histograms;
+    assert_eq!(exposed, [draw(7, 3), draw(7, 9), draw(7, 2)]);
+    assert_ne!(draw(7, 3), draw(8, 3));
+    assert_ne!(draw(7, 3), draw(7, 9));
 }

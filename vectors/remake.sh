@@ -5,3 +5,5 @@ set -euo pipefail
 cd "$(dirname "$0")/replay"
 cargo run --release --quiet -- replay --sensor sensor.toml --inits inits.csv --events events.csv \
     --stop-periods 80 --laser-cycles 40 --engine gate --out histograms.csv
+# References of `gdtof pareto --stability`; needs Python with mpmath.
+python3 ../stability/make.py

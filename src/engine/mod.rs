@@ -10,7 +10,7 @@
 //! The first three take the same start value and SPAD pulses and give the same histogram. `Cycle` and `Window` assume what
 //! the window law can promise, and refuse a configuration in which two signals race.
 
-mod cohort;
+pub mod cohort;
 mod cycle;
 mod gate;
 mod lanes;

@@ -79,6 +79,13 @@ impl Poisson {
         }
     }
 
+    /// Probability of more than `count`, for a mean of up to 64 that fits one table. Absolute error below 10⁻¹⁵.
+    pub fn exceedance(&self, count: usize) -> f64 {
+        debug_assert_eq!(self.parts, 1, "one table");
+        let entry = self.exceeds.get(count).copied().unwrap_or(0);
+        entry as f64 * 0.5f64.powi(64)
+    }
+
     /// One draw; takes two words of `random` for every part of 64 of the mean.
     #[inline]
     pub fn draw(&self, random: &mut Philox) -> u32 {

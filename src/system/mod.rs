@@ -2,6 +2,7 @@
 
 mod frame;
 mod result;
+pub mod stability;
 
 pub use frame::{EngineKind, FrameError, FrameSettings, Probe, take_frame};
 pub use result::{Frame, PhaseTimes, PixelDepth, Summary};

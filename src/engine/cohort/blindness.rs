@@ -64,6 +64,23 @@ impl Blindness {
     }
 }
 
+/// One SPAD with its dead time, in even light.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BlindSpad(Blindness);
+
+impl BlindSpad {
+    /// A SPAD with a dead time of `steps` ≥ 1.
+    pub fn new(law: DeadTimeLaw, steps: f64) -> Self {
+        BlindSpad(Blindness::new(law, steps))
+    }
+
+    /// Mean pulses a step in the steady state under `mean` photons a step. Relative error below 10⁻¹¹ from
+    /// 10⁻¹⁵ to 10³ photons, for dead times to a thousand steps.
+    pub fn steady_pulse(&self, mean: f64) -> f64 {
+        Ages::steady(&self.0, mean).pulse(&self.0, mean)
+    }
+}
+
 /// Probability of each age of one SPAD at the start of a step. For the paralysable law an age counts from the last
 /// avalanche, seen or not.
 #[derive(Debug, Clone, PartialEq)]

@@ -28,9 +28,11 @@ mod joint;
 mod light;
 mod pooled;
 
-pub use self::blindness::DeadTimeLaw;
 use self::blindness::{Ages, Blindness};
+pub use self::blindness::{BlindSpad, DeadTimeLaw};
+pub use self::draw::none_of;
 use self::hits::Hits;
+pub use self::hits::at_least_hit;
 use self::light::SpadLight;
 use super::{Engine, EngineError, Exposed, LitPixel, Work};
 use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw, correlation, histogram, window_law};
