@@ -12,11 +12,14 @@ const INVERSION_MEAN: f64 = 10.0;
 /// `rand_distr`, whose 1 − p keeps few digits of a small p: at p = 10⁻¹⁵ and n = 10⁹ its mean is 11 % off.
 pub fn binomial(n: u64, p: f64, q: f64, random: &mut Philox) -> u64 {
     debug_assert!(
-        (0.0..=1.0).contains(&p) && (p + q - 1.0).abs() < 1e-12,
+        p >= 0.0 && q >= 0.0 && (p + q - 1.0).abs() < 1e-12,
         "{p} + {q}"
     );
     if n == 0 || p <= 0.0 {
         return 0;
+    }
+    if q <= 0.0 {
+        return n;
     }
     if p > q {
         return n - binomial(n, q, p, random);
