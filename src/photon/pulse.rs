@@ -258,7 +258,10 @@ mod tests {
             let got = mass / GAUSSIAN_CELLS as f64;
             // Every threshold is rounded down to a multiple of 2⁻³².
             let rounding = 2f64.powi(-32);
-            assert!((got - expected).abs() < rounding, "{cell}: {got} {expected}");
+            assert!(
+                (got - expected).abs() < rounding,
+                "{cell}: {got} {expected}"
+            );
         }
     }
 

@@ -172,12 +172,6 @@ impl PhotonStream {
         }
     }
 
-    /// Turns photons of macropixel `pixel`, sorted by (time, SPAD) after a time of certain darkness, into rising edges;
-    /// returns how many avalanches met a blind SPAD.
-    pub fn detect(&self, pixel: u32, events: &mut Vec<SpadEvent>) -> u64 {
-        self.config.spads.detect(self.key, pixel, events)
-    }
-
     /// All avalanches of macropixel number `pixel` under `light` in the exposure.
     pub fn pixel_events(&self, pixel: u32, light: &PixelLight) -> PixelPhotons {
         let stream = self.pixel(pixel, light);
@@ -201,7 +195,7 @@ impl PhotonStream {
             }
         }
         let drawn = events.len() as u64;
-        let lost_to_dead_time = self.detect(pixel, &mut events);
+        let lost_to_dead_time = stream.detect(&mut events);
         let end = self.config.cycle_start(self.config.laser_cycles);
         events.truncate(events.partition_point(|event| event.time < end));
         PixelPhotons {
@@ -227,14 +221,19 @@ pub struct PixelStream<'a> {
 }
 
 impl PixelStream<'_> {
+    /// Turns photons of this macropixel, sorted by (time, SPAD) and complete since a time when every SPAD was ready, into
+    /// rising edges; returns how many avalanches met a blind SPAD.
+    pub fn detect(&self, events: &mut Vec<SpadEvent>) -> u64 {
+        let spads = &self.stream.config.spads;
+        spads.detect(self.stream.key, self.pixel, events)
+    }
+
     /// Draws all photons of group `group` in these slots.
     pub fn draw(&self, group: u32, slots: std::ops::Range<u32>, draw: &mut Draw) {
         let (key, cycle_fs) = (self.stream.key, self.stream.cycle_fs);
         let numbered = |purpose: Purpose| purpose as u32 | group << 8;
         draw.cycle_fs = cycle_fs;
-        draw.runs.clear();
-        draw.background.clear();
-        draw.signal.clear();
+        draw.clear();
 
         let from_fs = i64::from(slots.start) << SLOT_BITS;
         let until_fs = (i64::from(slots.end) << SLOT_BITS).min(cycle_fs);
@@ -331,6 +330,12 @@ pub struct Run {
 }
 
 impl Run {
+    /// When the slot begins after the start of its cycle.
+    #[inline]
+    pub fn start_fs(&self) -> i64 {
+        i64::from(self.slot) << SLOT_BITS
+    }
+
     /// Blocks whose words 0 and 1, and whose words 2 and 3, make photons.
     #[inline]
     pub fn blocks(&self) -> [std::ops::Range<usize>; 2] {
@@ -365,6 +370,30 @@ pub struct Draw {
 }
 
 impl Draw {
+    /// Forgets all photons.
+    pub fn clear(&mut self) {
+        self.runs.clear();
+        self.background.clear();
+        self.signal.clear();
+    }
+
+    /// How many photons were drawn, those that outlast the cycle among them.
+    pub fn len(&self) -> usize {
+        let background = self.runs.iter().map(|run| run.photons as usize);
+        background.sum::<usize>() + self.signal.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The run of a block.
+    pub fn run_of(&self, block: usize) -> &Run {
+        let runs = &self.runs;
+        &runs[runs.partition_point(|run| run.first_block as usize <= block) - 1]
+    }
+
     /// Background photons by slot.
     pub fn runs(&self) -> &[Run] {
         &self.runs
@@ -386,7 +415,7 @@ impl Draw {
     pub fn photons(&self) -> impl Iterator<Item = (Place, i64)> + '_ {
         let words = self.words();
         let background = self.runs.iter().flat_map(move |run| {
-            let start_fs = i64::from(run.slot) << SLOT_BITS;
+            let start_fs = run.start_fs();
             run.blocks()
                 .into_iter()
                 .zip(words)
