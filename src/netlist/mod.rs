@@ -30,6 +30,6 @@ pub use library::{Arc, CellArcs, Corner, Delay, Library};
 pub use module::{Cell, Direction, Instance, Module, Net, Port, Signal};
 pub use requirements::{Requirement, Requirements};
 pub use static_timing::{Arrivals, Bound, Edge, Path, StaticTiming, Step, TimingLoop};
-pub use timing::{ArcDelay, CellDelays, Timing};
+pub use timing::{ArcDelay, CellDelays, DelayModel, Timing};
 pub use variation::{Conditions, Mismatch, Process, derated_limits, varied};
 pub use verilog::{write_cells, write_delays, write_modules, write_parametric_cells};
