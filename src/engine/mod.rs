@@ -23,7 +23,7 @@ pub mod timing;
 pub mod waveform;
 mod window;
 
-pub use cohort::{Cohort, CohortOptions, DeadTimeLaw};
+pub use cohort::{Cohort, CohortOptions};
 pub use cycle::Cycle;
 pub use gate::{Gate, GateSimulation};
 pub use lanes::LaneSimulation;
@@ -91,11 +91,9 @@ pub enum EngineError {
         "the {0} engine knows no single photons and cannot replay recorded ones; use --engine window"
     )]
     NoPhotons(&'static str),
-    /// A SPAD could fire twice in a CLK period, and its pulses cancel.
-    #[error(
-        "the cohort engine needs a dead time of at least one CLK period; use --engine window or raise dead_time_ns"
-    )]
-    ShortDeadTime,
+    /// The cohort engine's model of light and SPADs leaves this out.
+    #[error("the cohort engine cannot follow {0}; use --engine window")]
+    NotInCohorts(&'static str),
     /// Laser cycles depend on each other: a bound on the probability, over a macropixel's exposure.
     #[error(
         "SPADs may stay busy from one laser cycle's window to the next (probability up to {0:.1e}), which the cohort engine cannot follow; use --engine window, a longer laser cycle or less light"

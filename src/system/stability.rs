@@ -5,8 +5,8 @@
 //! its documentation promises; a function joins by a file there and a line here.
 
 use crate::chip::{Exposure, Overflow, SensorConfig, WindowLaw, histogram};
-use crate::engine::cohort::{BlindSpad, DeadTimeLaw, at_least_hit, none_of};
-use crate::photon::{Poisson, pulse_share};
+use crate::engine::cohort::{BlindSpad, at_least_hit, none_of};
+use crate::photon::{DeadTimeLaw, Poisson, pulse_share};
 use crate::ranging::{PeakOptions, interpolate};
 use crate::report::Grid;
 use crate::units::{Frequency, Time};

@@ -12,15 +12,7 @@
 //! blind with the probability drawn above: the exact one for even light, to first order in the photons per step.
 //! What is left is of second order, and of the light's unevenness within a step; more steps a period make both smaller.
 
-/// What avalanches do to a blind SPAD.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum DeadTimeLaw {
-    /// Nothing: the SPAD is quenched until it recovers.
-    #[default]
-    NonParalysable,
-    /// Each starts the dead time anew.
-    Paralysable,
-}
+use crate::photon::DeadTimeLaw;
 
 /// Blindness of one SPAD by the steps since the avalanche that blinded it.
 #[derive(Debug, Clone, PartialEq)]

@@ -16,11 +16,11 @@
 
 use rand_philox::Philox;
 
-use super::blindness::{Ages, Blindness, DeadTimeLaw};
+use super::blindness::{Ages, Blindness};
 use super::draw::binomial;
 use super::hits::Hits;
 use super::{EventTable, Steps};
-use crate::photon::SPADS;
+use crate::photon::{DeadTimeLaw, SPADS};
 
 /// Counts of every bin after `cycles` laser cycles that begin in the state `ages`.
 pub fn run(

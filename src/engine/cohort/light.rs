@@ -84,6 +84,7 @@ impl SpadLight {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::photon::SpadModel;
     use crate::units::{Frequency, Time};
 
     fn config() -> StreamConfig {
@@ -93,7 +94,8 @@ mod tests {
             stop_periods: 100,
             laser_cycles: 1,
             pulse_sigma: Time::from_ns(2),
-            dead_time: Time::from_ns(30),
+            pulse_shape: None,
+            spads: SpadModel::with_dead_time(Time::from_ns(30)),
         }
     }
 

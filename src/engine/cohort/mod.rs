@@ -19,7 +19,8 @@
 //!   next: without a dead time's length free of photons it cannot be told whether it has recovered.
 //!   The probability of that, over all SPADs and cycles, is bounded; beyond [`CohortOptions::memory`]
 //!   the engine refuses. Cycles so early that the first STOP edge is still remembered are run one by one from rest.
-//! * A SPAD is to fire at most once in a CLK period: the dead time must not be shorter.
+//! * A SPAD is to fire at most once in a CLK period: a shorter dead time is refused. So are afterpulses, crosstalk and
+//!   measured laser pulses.
 
 mod blindness;
 mod draw;
@@ -28,8 +29,8 @@ mod joint;
 mod light;
 mod pooled;
 
+pub use self::blindness::BlindSpad;
 use self::blindness::{Ages, Blindness};
-pub use self::blindness::{BlindSpad, DeadTimeLaw};
 pub use self::draw::none_of;
 use self::hits::Hits;
 pub use self::hits::at_least_hit;
@@ -57,8 +58,6 @@ struct Steps {
 pub struct CohortOptions {
     /// Steps to a CLK period, at least 1. More make the dead time's end finer and cost more.
     pub sub_bins: usize,
-    /// What becomes of avalanches in a blind SPAD.
-    pub dead_time_law: DeadTimeLaw,
     /// Largest correlation between two bins that may be neglected to save time; 0 never neglects any.
     pub neglect: f64,
     /// Largest probability, for a whole exposure of a macropixel, that laser cycles depend on each other.
@@ -69,7 +68,6 @@ impl Default for CohortOptions {
     fn default() -> Self {
         CohortOptions {
             sub_bins: 1,
-            dead_time_law: DeadTimeLaw::default(),
             neglect: 1e-4,
             memory: 1e-6,
         }
@@ -204,14 +202,19 @@ impl<'a> Cohort<'a> {
             window_law::Window::Race(why) => return Err(EngineError::Race(why)),
         };
         let period_fs = 1e15 / stream.clock.as_hz();
-        let dead_fs = stream.dead_time.as_fs() as f64;
-        if dead_fs < period_fs {
-            return Err(EngineError::ShortDeadTime);
+        let dead_fs = stream.spads.dead_time.as_fs() as f64;
+        let refusals = [
+            (dead_fs < period_fs, "a dead time shorter than a CLK period"),
+            (stream.spads.has_secondaries(), "afterpulses and crosstalk"),
+            (stream.pulse_shape.is_some(), "a measured laser pulse"),
+        ];
+        if let Some((_, what)) = refusals.into_iter().find(|(refuses, _)| *refuses) {
+            return Err(EngineError::NotInCohorts(what));
         }
         let dead_steps = dead_fs / period_fs * self.options.sub_bins as f64;
         let scene = Scene {
             light: SpadLight::new(stream, light),
-            blindness: Blindness::new(self.options.dead_time_law, dead_steps),
+            blindness: Blindness::new(stream.spads.law, dead_steps),
             step_fs: period_fs / self.options.sub_bins as f64,
             dead_fs,
             from_fs: self.law.interval(&window).start.as_fs() as f64,

@@ -15,11 +15,11 @@
 
 use rand_philox::Philox;
 
-use super::blindness::{Ages, Blindness, DeadTimeLaw};
+use super::blindness::{Ages, Blindness};
 use super::draw::{below, binomial, overlap, uniform};
 use super::hits::Hits;
 use super::{EventTable, Steps};
-use crate::photon::SPADS;
+use crate::photon::{DeadTimeLaw, SPADS};
 
 /// Bound on the correlation between two bins that [`run`] leaves out.
 pub fn neglected(steps: &Steps) -> f64 {
