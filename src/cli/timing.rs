@@ -3,6 +3,7 @@
 use clap::{Args, ValueEnum};
 
 use super::{SensorArgs, say};
+use crate::chip::SensorConfig;
 use crate::engine::timing::{MacropixelTiming, gate_works, phases, ripple, shortest_period};
 use crate::files::InputError;
 use crate::netlist::{Conditions, Library, Mismatch, Netlist, Process, Timing, varied};
@@ -130,9 +131,13 @@ pub fn run(args: &TimingArgs) -> anyhow::Result<()> {
         ),
         ("correlation path", Some(pixel.correlation_period()), None),
     ];
-    let ripples: Vec<(usize, Time, Time)> = (1..=12)
+    let ripples: Vec<(usize, Time, Time)> = (2..=12)
         .map(|bits| {
-            let (longest, simulated) = ripple(bits, &delays);
+            let config = SensorConfig {
+                counter_bits: bits,
+                ..config.clone()
+            };
+            let (longest, simulated) = ripple(&config, &delays);
             (bits, longest, simulated)
         })
         .collect();

@@ -13,7 +13,8 @@
 //! forbidden at every phase.
 
 use super::gate::GateSimulation;
-use crate::chip::{Exposure, SensorConfig, p_counter, sensor};
+use crate::chip::p_counter::Rises;
+use crate::chip::{Exposure, PCounter, SensorConfig, WindowLaw, p_counter, sensor};
 use crate::kernel::{Drive, Kernel, Recorder, merge};
 use crate::netlist::{Bound, Edge, NetId, Netlist, Path, StaticTiming, Timing};
 use crate::photon::SpadEvent;
@@ -39,6 +40,10 @@ pub struct MacropixelTiming {
     pub reset: (Time, Time),
     /// STOP rises → COUNTER_RESET falls, shortest and longest.
     pub release: (Time, Time),
+    /// COUNTER_CLK rises → what the next count samples has settled, longest.
+    pub count: Time,
+    /// Whether the first count is the first one that ENABLE lets through, and not the first after a reset.
+    counts_at_once: bool,
     /// COUNTER_RESET rises → the last edge it can send into a stage's clock, longest.
     pub reset_to_stage_clock: Time,
     /// COUNTER_RESET rises → LOCAL_STOP falls → COUNTER_CLK rises, longest.
@@ -72,6 +77,11 @@ impl MacropixelTiming {
         let stop = after("STOP", Edge::Rise, &cuts);
         let whole = "the macropixel connects these";
         let counter_out = bus("p_counter.COUNTER_OUT");
+        let counter_clk = net("COUNTER_CLK");
+        let counted = after("COUNTER_CLK", Edge::Rise, &cuts);
+        let sampled = netlist.cells().iter();
+        let sampled = sampled.filter(|c| c.kind.is_flip_flop() && c.inputs[1] == counter_clk);
+        let settled = sampled.filter_map(|c| counted.window(c.inputs[0]));
         // Each stage's own reset path: what arrives at a stage output goes no further.
         let cuts: Vec<NetId> = cuts
             .into_iter()
@@ -84,11 +94,9 @@ impl MacropixelTiming {
                 .map(|w| w.1)
                 .max()
         };
-        let clear = last(&counter_out).expect(whole);
-        let local_stop_falls = reset
-            .edge_window(net("LOCAL_STOP"), Edge::Fall)
-            .expect(whole)
-            .1;
+        // A counter without memory is not reset, and one that wraps is not blocked.
+        let clear = last(&counter_out).unwrap_or(Time::ZERO);
+        let local_stop_falls = reset.edge_window(net("LOCAL_STOP"), Edge::Fall);
         let unblocks = after(
             "LOCAL_STOP",
             Edge::Fall,
@@ -111,10 +119,9 @@ impl MacropixelTiming {
             event: rise
                 .path_to(net("SPAD_EVENT"), Bound::Longest)
                 .expect(whole),
-            counter_clk: fall
-                .edge_window(net("COUNTER_CLK"), Edge::Rise)
-                .expect(whole)
-                .0,
+            count: settled.map(|w| w.1).max().expect(whole),
+            counts_at_once: config.p_counter == PCounter::Memoryless,
+            counter_clk: fall.edge_window(counter_clk, Edge::Rise).expect(whole).0,
             reset: stop
                 .edge_window(net("COUNTER_RESET"), Edge::Rise)
                 .expect(whole),
@@ -123,10 +130,8 @@ impl MacropixelTiming {
                 .expect(whole),
             reset_to_stage_clock: clear,
             reset_to_counter_clk: local_stop_falls
-                + unblocks
-                    .edge_window(net("COUNTER_CLK"), Edge::Rise)
-                    .expect(whole)
-                    .1,
+                .zip(unblocks.edge_window(net("COUNTER_CLK"), Edge::Rise))
+                .map_or(Time::ZERO, |(falls, unblocks)| falls.1 + unblocks.1),
         }
     }
 }
@@ -152,12 +157,15 @@ impl MacropixelTiming {
     pub fn works(&self, period: Time, phase: Time) -> bool {
         let fs = Time::as_fs;
         let counts_from = fs(self.release.1 - self.counter_clk + phase);
-        let first =
-            counts_from.div_euclid(fs(period)) + (counts_from.rem_euclid(fs(period)) > 0) as i64;
+        let first = if self.counts_at_once {
+            1
+        } else {
+            counts_from.div_euclid(fs(period)) + (counts_from.rem_euclid(fs(period)) > 0) as i64
+        };
         // Twice the time from the rising edge after the fall that is counted as number 0.
         let late = 2 * fs(self.strobe - self.shift) - fs(period);
         let edges = late.div_euclid(2 * fs(period)) + 1;
-        first.max(0) + edges == 1 && period >= self.correlation_period()
+        first.max(0) + edges == 1 && period >= self.correlation_period().max(self.count)
     }
 }
 
@@ -185,18 +193,32 @@ pub fn shortest_period(limit: Time, works: impl Fn(Time) -> bool) -> Option<Time
     Some(Time::from_ps(good))
 }
 
+/// A clock at which every delay is short.
+const SLOW_HZ: f64 = 20e6;
+
 /// Whether a gate-level macropixel counts a pattern of photons into the bins of a slow clock.
 pub fn gate_works(config: &SensorConfig, delays: Delays<'_>, period: Time, phase: Time) -> bool {
     let Ok(clock) = Frequency::from_period(period) else {
         return false;
     };
-    let start = config.largest_start().min(2 * config.bins as u16);
+    let start = (config.largest_start() / 2).min(2 * config.bins as u16);
+    let rises = Rises::of(config, start).expect("LOCAL_STOP is low at first");
     let exposure = Exposure {
         clock,
         stop_phase: phase,
-        stop_periods: start as u32 + 12,
+        stop_periods: match (config.p_counter, rises.every) {
+            (PCounter::Memoryless, Some(every)) => every as u32,
+            _ => start as u32 + 12,
+        },
         laser_cycles: 1,
     };
+    let slow = Exposure {
+        clock: Frequency::from_hz_f64(SLOW_HZ).expect("a frequency"),
+        stop_phase: Time::ZERO,
+        ..exposure
+    };
+    let window = WindowLaw::new(config, &slow).window(start).open();
+    let first_edge = window.expect("nothing races at a slow clock").first_edge;
     let mut config = config.clone();
     config.clk_hz = clock.as_hz();
     // A pattern that no shift maps to itself; one SPAD per photon, so that dead time plays no part.
@@ -204,7 +226,7 @@ pub fn gate_works(config: &SensorConfig, delays: Delays<'_>, period: Time, phase
     let mut pulses = Vec::new();
     let mut expected = vec![0; config.bins];
     for bin in 0..config.bins as i64 {
-        let edge = start as i64 - config.bins as i64 + bin;
+        let edge = first_edge + bin;
         if has_photon(bin) && edge > 1 {
             expected[bin as usize] = 1;
             pulses.push(SpadEvent {
@@ -223,10 +245,9 @@ pub fn gate_works(config: &SensorConfig, delays: Delays<'_>, period: Time, phase
         .is_ok_and(|found| found[0] == expected)
 }
 
-/// COUNTER_CLK rises → LOCAL_STOP rises for a P-counter of `bits` stages: longest path, and as simulated from
-/// start value 0.
-pub fn ripple(bits: usize, delays: Delays<'_>) -> (Time, Time) {
-    let netlist = Netlist::elaborate(&p_counter::circuit(bits));
+/// COUNTER_CLK rises → LOCAL_STOP rises for the sensor's P-counter: longest path, and as simulated from start value 0.
+pub fn ripple(config: &SensorConfig, delays: Delays<'_>) -> (Time, Time) {
+    let netlist = Netlist::elaborate(&p_counter::circuit(config));
     let timing = delays(&netlist);
     let net = |name: &str| netlist.net(name).expect("a pin of the P-counter");
     let (clk, stop) = (net("COUNTER_CLK"), net("LOCAL_STOP"));
