@@ -7,7 +7,7 @@ use super::config::SensorConfig;
 use super::p_counter::CounterTiming;
 use super::{correlation, p_counter_timing};
 use crate::logic::Logic::{One, Zero};
-use crate::netlist::{CellKind, Corner, Delay, Edge, Library, Netlist, StaticTiming, Timing};
+use crate::netlist::{CellKind, CheckKind, Corner, Edge, Library, Netlist, StaticTiming, Timing};
 use crate::units::Time;
 
 /// Delays of the paths that decide where a window lies.
@@ -56,7 +56,7 @@ impl ChipTiming {
         let corner = config.corner;
         let delay = |kind, pin, to| library.delay(kind, pin, to, corner);
         let limits = library.checks(CellKind::Dffr);
-        let limit = |limit: Delay| Time::from_fs(limit.at(corner) as i64);
+        let limit = |check| Time::from_fs(limits.at(check, corner) as i64);
         let clock_to_q = delay(CellKind::Dffr, 1, One);
         let mux_rise = delay(CellKind::Mux2, 0, One);
         let buffer_rise = delay(CellKind::Buf, 0, One);
@@ -82,10 +82,10 @@ impl ChipTiming {
             stop_to_hit_release: stop_to_reset_release + delay(CellKind::Mux2, 0, Zero),
             stop_to_enabled: clock_to_q + inverter_fall,
             clk_to_event: clock_to_q + xor + correlation,
-            setup: limit(limits.setup),
-            hold: limit(limits.hold),
-            recovery: limit(limits.recovery),
-            removal: limit(limits.removal),
+            setup: limit(CheckKind::Setup),
+            hold: limit(CheckKind::Hold),
+            recovery: limit(CheckKind::Recovery),
+            removal: limit(CheckKind::Removal),
         }
     }
 

@@ -36,7 +36,6 @@
 
 mod annotate;
 mod entries;
-mod index;
 mod parser;
 #[cfg(test)]
 mod tests;
