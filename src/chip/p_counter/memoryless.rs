@@ -49,15 +49,15 @@ pub fn circuit(bits: usize, tap: Tap) -> Arc<Module> {
     // Later than CLEAR, so that it is the last to go.
     let preset = m.gate(CellKind::Buf, &[pulse]);
     let mut clock = pins.clk;
-    for bit in 0..bits {
-        let set = m.gate(CellKind::And2, &[preset, pins.init[bit]]);
+    for (bit, (&out, &init)) in out.iter().zip(&pins.init).enumerate() {
+        let set = m.gate(CellKind::And2, &[preset, init]);
         m.cell(
             &format!("counter_{bit}"),
             CellKind::Dffsr,
-            &[out[bit], clock, set, clear],
-            &[Net::NONE, out[bit]],
+            &[out, clock, set, clear],
+            &[Net::NONE, out],
         );
-        clock = out[bit];
+        clock = out;
     }
     pins.ripple_tap(&mut m, tap, clock, clear);
     finished(m.finish())
