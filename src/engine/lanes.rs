@@ -59,6 +59,13 @@ impl<'a> LaneSimulation<'a> {
         }
     }
 
+    /// The same simulation with other delays than the library's, those of every lane. Call it before
+    /// [`LaneSimulation::run`]; `timing` must be of the same netlist.
+    pub fn with_timing(mut self, timing: &Timing) -> Self {
+        self.kernel = LaneKernel::new(&self.netlist, timing);
+        self
+    }
+
     /// The netlist of every lane.
     pub fn netlist(&self) -> &Netlist {
         &self.netlist

@@ -3,9 +3,11 @@
 use guided_dtof::chip::{
     AfterBorrow, PCounter, SensorConfig, Tap, macropixel, p_counter, p_counter_timing,
 };
-use guided_dtof::engine::timing::{MacropixelTiming, gate_works, ripple, shortest_period};
+use guided_dtof::engine::timing::{
+    Limits, MacropixelTiming, Silicon, gate_works, ripple, shortest_period,
+};
 use guided_dtof::kernel::{Drive, Kernel, Recorder, in_order};
-use guided_dtof::netlist::{CellKind, Edge, Library, NetId, Netlist, StaticTiming, Timing};
+use guided_dtof::netlist::{CellKind, Corner, Edge, NetId, Netlist, StaticTiming};
 use guided_dtof::report::{Checks, Grid};
 use guided_dtof::units::Time;
 
@@ -28,9 +30,8 @@ pub fn sensor(p_counter: PCounter) -> SensorConfig {
     }
 }
 
-fn nominal(netlist: &Netlist) -> Timing {
-    Timing::nominal(netlist, &Library::default(), SensorConfig::default().corner)
-}
+/// Delays as the library has them.
+const TYPICAL: Silicon = Silicon::nominal(Corner::Typ);
 
 /// Compares the variants.
 pub fn compare(checks: &mut Checks) -> Grid {
@@ -116,25 +117,27 @@ impl Row {
         let transistors: u64 = blocks.iter().map(|b| b.transistors()).sum();
         let area: u64 = blocks.iter().map(|b| b.area()).sum();
         let netlist = Netlist::elaborate(&blocks[0]);
-        let timing = nominal(&netlist);
+        let timing = TYPICAL.timing(&netlist);
         let clk = netlist.net("COUNTER_CLK").expect("a pin");
         let arrivals = StaticTiming::new(&netlist, &timing).arrivals(&[(clk, Edge::Rise)], &[]);
         let arrivals = arrivals.expect("a P-counter has no loop");
         let nets = (0..netlist.net_count()).map(NetId::new);
         let settled = nets.filter_map(|net| arrivals.window(net)).map(|w| w.1);
         let activity = Activity::of(&config, &netlist);
-        let by_paths = MacropixelTiming::of(&config, &nominal);
+        let by_paths = MacropixelTiming::of(&config, &TYPICAL, Limits::Ignored, (0, 0));
         Row {
             stage: stage(&config),
             transistors,
             share: transistors as f64 / macropixel.transistors() as f64,
             area_share: area as f64 / macropixel.area() as f64,
-            local_stop: ripple(&config, &nominal),
+            local_stop: ripple(&config, &TYPICAL),
             settled: (settled.max().unwrap_or(Time::ZERO), activity.settled),
             activity,
             period: (
                 shortest_period(SLOW, |p| by_paths.works(p, Time::ZERO)),
-                shortest_period(SLOW, |p| gate_works(&config, &nominal, p, Time::ZERO)),
+                shortest_period(SLOW, |p| {
+                    gate_works(&config, &TYPICAL, Limits::Ignored, p, Time::ZERO)
+                }),
             ),
         }
     }
@@ -251,7 +254,7 @@ impl Activity {
             drives.push(Drive::new(fall, pin("COUNTER_CLK"), false));
         }
         let mut recorder = Recorder::new((0..netlist.net_count()).map(NetId::new));
-        let mut kernel = Kernel::new(netlist, &nominal(netlist));
+        let mut kernel = Kernel::new(netlist, &TYPICAL.timing(netlist));
         kernel.run(&mut in_order(drives), edge(counts), &mut recorder);
 
         let (local_stop, equal) = (pin("LOCAL_STOP"), netlist.net("EQUAL"));
