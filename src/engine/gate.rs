@@ -94,11 +94,10 @@ impl<'a> GateSimulation<'a> {
         self.kernel.statistics()
     }
 
-    /// Start values in the P-counters' memories, row-major; `None` where a bit is unknown.
+    /// Start values in the P-counters' memories, row-major; `None` where a bit is unknown, and without memory.
     pub fn loaded(&self) -> Vec<Option<u16>> {
         self.of_pixels(|path| {
-            let memory = self.netlist.signal(&format!("{path}.p_counter.MEMORY"));
-            let memory = memory.expect("every macropixel has a memory");
+            let memory = self.netlist.signal(&format!("{path}.p_counter.MEMORY"))?;
             self.kernel.number(&memory).map(|code| code as u16)
         })
     }
