@@ -11,6 +11,7 @@
 
 mod cycle;
 mod gate;
+mod hardware_events;
 mod lanes;
 mod light;
 pub mod load;
@@ -23,6 +24,7 @@ mod window;
 
 pub use cycle::Cycle;
 pub use gate::{Gate, GateSimulation};
+pub use hardware_events::{HardwareEvent, HardwareEventKind, HardwareEventReport, HardwareEvents};
 pub use lanes::LaneSimulation;
 pub use light::{
     Exposed, LitPixel, Work, expose, expose_without_skipping, full_stream, stream_config,
