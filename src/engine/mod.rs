@@ -7,7 +7,8 @@
 //! | [`Window`] | only the CLK periods a start value can see, through the window law | `Cycle` |
 //!
 //! All take the same start value and SPAD pulses and give the same histogram. `Cycle` and `Window` assume what
-//! the window law can promise, and refuse a configuration in which two signals race.
+//! the window law can promise, and refuse a configuration in which two signals race. `Window` also refuses a
+//! P-counter that raises LOCAL_STOP more than once in a laser cycle.
 
 mod cycle;
 mod gate;
@@ -85,6 +86,9 @@ pub enum EngineError {
         "{0}, so only the gate engine can tell what is counted; use --engine gate or change clk_hz, stop_phase_ps or corner"
     )]
     Race(&'static str),
+    /// The window law has no single window for this start value.
+    #[error("{0}, so the window engine cannot tell what is counted; use --engine cycle or gate")]
+    Irregular(&'static str),
     /// The engine works without photons.
     #[error(
         "the {0} engine knows no single photons and cannot replay recorded ones; use --engine window"
