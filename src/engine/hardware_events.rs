@@ -246,7 +246,7 @@ impl HardwareEvents {
                 if is_change && !p.is_cleared {
                     let changes = &mut p.toggled[spad as usize];
                     *changes = changes.saturating_add(1);
-                    if *changes % 2 == 0 {
+                    if changes.is_multiple_of(2) {
                         let instance = format!(".front_end.spad_{spad}");
                         found = Some((HardwareEventKind::PulsesCancelled, time, instance));
                     }
