@@ -12,6 +12,7 @@
 
 mod cycle;
 mod gate;
+mod hardware_events;
 mod lanes;
 mod light;
 pub mod load;
@@ -24,6 +25,7 @@ mod window;
 
 pub use cycle::Cycle;
 pub use gate::{Gate, GateSimulation};
+pub use hardware_events::{HardwareEvent, HardwareEventKind, HardwareEventReport, HardwareEvents};
 pub use lanes::LaneSimulation;
 pub use light::{
     Exposed, LitPixel, Work, expose, expose_without_skipping, full_stream, stream_config,
