@@ -199,6 +199,7 @@ impl<'a> Cohort<'a> {
         let window = match self.law.window(start) {
             window_law::Window::Open(window) => window,
             window_law::Window::Never => return Ok(Vec::new()),
+            window_law::Window::Irregular(why) => return Err(EngineError::Irregular(why)),
             window_law::Window::Race(why) => return Err(EngineError::Race(why)),
         };
         let period_fs = 1e15 / stream.clock.as_hz();

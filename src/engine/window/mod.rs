@@ -16,6 +16,7 @@ mod sight;
 
 use super::light::full_stream;
 use super::{Engine, EngineError, Exposed, LitPixel, Work};
+use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw, correlation, histogram, window_law};
 use crate::photon::{PhotonStream, SpadEvent};
 use crate::units::Time;
@@ -38,6 +39,16 @@ impl<'a> Window<'a> {
             exposure,
             law: WindowLaw::new(config, exposure),
             period_fs: 1e15 / exposure.clock.as_hz(),
+        }
+    }
+
+    /// The window of a start value, if it opens.
+    fn window(&self, start: u16) -> Result<Option<OpenWindow>, EngineError> {
+        match self.law.window(start) {
+            window_law::Window::Open(window) => Ok(Some(window)),
+            window_law::Window::Never => Ok(None),
+            window_law::Window::Irregular(why) => Err(EngineError::Irregular(why)),
+            window_law::Window::Race(why) => Err(EngineError::Race(why)),
         }
     }
 
@@ -100,10 +111,8 @@ impl Engine for Window<'_> {
         let bins = self.config.bins as i64;
         let periods = self.exposure.stop_periods as i64;
         let cycles = self.exposure.laser_cycles as i64;
-        let window = match self.law.window(start) {
-            window_law::Window::Open(window) => window,
-            window_law::Window::Never => return Ok(vec![0; self.config.bins]),
-            window_law::Window::Race(why) => return Err(EngineError::Race(why)),
+        let Some(window) = self.window(start)? else {
+            return Ok(vec![0; self.config.bins]);
         };
         let mut hits = self.dark_hits(window.first_edge);
         for (edge, spads) in taken(pulses, |p| self.edge_of(p.time)) {
@@ -136,14 +145,10 @@ impl Engine for Window<'_> {
                 exposed.work.skipped_dark += 1;
                 continue;
             };
-            let window = match self.law.window(pixel.start) {
-                window_law::Window::Open(window) => window,
-                window_law::Window::Never => {
-                    exposed.histograms.push(vec![0; self.config.bins]);
-                    exposed.work.skipped_closed += 1;
-                    continue;
-                }
-                window_law::Window::Race(why) => return Err(EngineError::Race(why)),
+            let Some(window) = self.window(pixel.start)? else {
+                exposed.histograms.push(vec![0; self.config.bins]);
+                exposed.work.skipped_closed += 1;
+                continue;
             };
             let sight = Sight::new(&self.law, &window, stream);
             if let Some(sight) = sight.filter(|sight| sight.suits(stream, light)) {
