@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::hardware_events::HardwareEvents;
 use super::lanes::LaneSimulation;
 use super::stimulus::{Pins, Schedule, StimulusPlan};
 use super::{Engine, EngineError};
@@ -81,6 +82,12 @@ impl<'a> GateSimulation<'a> {
             .asynchronous(&self.netlist, front_end::is_asynchronous_sampler)
     }
 
+    /// A watch for hardware events in every macropixel, from the end of the power-up reset on, to run it with.
+    pub fn hardware_events(&self) -> HardwareEvents {
+        let paths = self.of_pixels(str::to_owned);
+        HardwareEvents::new(&self.netlist, &paths, self.schedule().reset_end)
+    }
+
     /// Simulates load and exposure to the end.
     pub fn run<O: Observer>(&mut self, observer: &mut O) {
         let pins = Pins::of(&self.netlist);
@@ -94,11 +101,10 @@ impl<'a> GateSimulation<'a> {
         self.kernel.statistics()
     }
 
-    /// Start values in the P-counters' memories, row-major; `None` where a bit is unknown.
+    /// Start values in the P-counters' memories, row-major; `None` where a bit is unknown, and without memory.
     pub fn loaded(&self) -> Vec<Option<u16>> {
         self.of_pixels(|path| {
-            let memory = self.netlist.signal(&format!("{path}.p_counter.MEMORY"));
-            let memory = memory.expect("every macropixel has a memory");
+            let memory = self.netlist.signal(&format!("{path}.p_counter.MEMORY"))?;
             self.kernel.number(&memory).map(|code| code as u16)
         })
     }

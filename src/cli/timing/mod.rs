@@ -106,7 +106,7 @@ pub fn run(args: &TimingArgs) -> anyhow::Result<()> {
         tables::forbidden(&subject),
         tables::load_clk(&subject, &load),
         tables::flip_flops(&subject, &load),
-        tables::ripples(&silicon),
+        tables::ripples(&config, &silicon),
         tables::corners(&config, &silicon),
     ];
     if args.paths {

@@ -229,12 +229,16 @@ pub fn flip_flops(subject: &Subject<'_>, load: &LoadTiming) -> Section {
 }
 
 /// Ripple by number of stages.
-pub fn ripples(silicon: &Silicon) -> Section {
+pub fn ripples(config: &SensorConfig, silicon: &Silicon) -> Section {
     let title = "Ripple COUNTER_CLK to LOCAL_STOP";
     let mut section = Section::new("ripples", title, &["stages", "static", "event-driven"]);
-    for bits in 1..=12 {
-        let (paths, gates) = ripple(bits, silicon);
-        section.push([bits.to_string().into(), paths.into(), gates.into()]);
+    for counter_bits in 2..=12 {
+        let config = SensorConfig {
+            counter_bits,
+            ..config.clone()
+        };
+        let (paths, gates) = ripple(&config, silicon);
+        section.push([counter_bits.to_string().into(), paths.into(), gates.into()]);
     }
     section
 }

@@ -1,13 +1,16 @@
 //! The event kernel's answers to the questions of static timing.
 
 use super::{Limits, Silicon};
-use crate::chip::{Exposure, SensorConfig, front_end, p_counter, sensor};
+use crate::chip::p_counter::Rises;
+use crate::chip::{Exposure, PCounter, SensorConfig, WindowLaw, front_end, p_counter, sensor};
 use crate::engine::GateSimulation;
 use crate::kernel::{Drive, Kernel, Policy, Recorder, TimingChecks, in_order};
 use crate::netlist::{Edge, Netlist, StaticTiming};
 use crate::photon::SpadEvent;
 use crate::units::{Frequency, Time};
 
+/// A clock at which every delay is short.
+const SLOW_HZ: f64 = 20e6;
 /// When a load is sure to be out of its power-up reset.
 pub(super) const RESET_RELEASED: Time = Time::from_ns(4);
 
@@ -46,12 +49,25 @@ pub fn gate_works(
     let Ok(clock) = Frequency::from_period(period) else {
         return false;
     };
-    let start = config.largest_start().min(2 * config.bins as u16);
+    let start = (config.largest_start() / 2).min(2 * config.bins as u16);
+    let every = Rises::of(config, start).and_then(|rises| rises.every);
     let exposure = Exposure {
         clock,
         stop_phase: phase,
-        stop_periods: start as u32 + 12,
+        stop_periods: match (config.p_counter, every) {
+            (PCounter::Memoryless, Some(every)) => every as u32,
+            _ => start as u32 + 12,
+        },
         laser_cycles: 1,
+    };
+    let slow = Exposure {
+        clock: Frequency::from_hz_f64(SLOW_HZ).expect("a frequency"),
+        stop_phase: Time::ZERO,
+        ..exposure
+    };
+    // A counter of few bits that wraps has no window at any clock.
+    let Some(window) = WindowLaw::new(config, &slow).window(start).open() else {
+        return false;
     };
     let mut config = config.clone();
     config.clk_hz = clock.as_hz();
@@ -60,7 +76,7 @@ pub fn gate_works(
     let mut pulses = Vec::new();
     let mut expected = vec![0; config.bins];
     for bin in 0..config.bins as i64 {
-        let edge = start as i64 - config.bins as i64 + bin;
+        let edge = window.first_edge + bin;
         if has_photon(bin) && edge > 1 {
             expected[bin as usize] = 1;
             pulses.push(SpadEvent {
@@ -86,10 +102,9 @@ pub fn gate_works(
     violated == 0 && counted.is_ok_and(|found| found[0] == expected)
 }
 
-/// COUNTER_CLK rises → LOCAL_STOP rises for a P-counter of `bits` stages: longest path, and as simulated from
-/// start value 0.
-pub fn ripple(bits: usize, silicon: &Silicon) -> (Time, Time) {
-    let netlist = Netlist::elaborate(&p_counter::circuit(bits));
+/// COUNTER_CLK rises → LOCAL_STOP rises for the sensor's P-counter: longest path, and as simulated from start value 0.
+pub fn ripple(config: &SensorConfig, silicon: &Silicon) -> (Time, Time) {
+    let netlist = Netlist::elaborate(&p_counter::circuit(config));
     let timing = silicon.timing(&netlist);
     let net = |name: &str| netlist.net(name).expect("a pin of the P-counter");
     let (clk, stop) = (net("COUNTER_CLK"), net("LOCAL_STOP"));

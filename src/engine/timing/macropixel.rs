@@ -10,7 +10,7 @@
 //! design, the sixteen that sample SPADs. The histogram's counters run on HIT, once in a laser cycle.
 
 use super::{Limits, Silicon};
-use crate::chip::{SensorConfig, front_end, histogram, sensor};
+use crate::chip::{PCounter, SensorConfig, front_end, histogram, sensor};
 use crate::netlist::{
     Bound, CellKind, CheckKind, Edge, NetId, Netlist, Path, Requirement, Requirements, StaticTiming,
 };
@@ -45,6 +45,8 @@ pub struct MacropixelTiming {
     pub clk: Vec<Requirement>,
     /// Strobe to the METDC's HIT flip-flops: setup after one change of SHIFT, hold before the next.
     pub hits: Vec<Requirement>,
+    /// Whether the first count is the first that ENABLE lets through, and not the first after a reset.
+    counts_at_once: bool,
     recovery: Time,
     removal: Time,
     control_high: Time,
@@ -92,7 +94,8 @@ impl MacropixelTiming {
             .iter()
             .filter_map(|&n| reset.edge_window(n, Edge::Rise));
         let local_stop = net("LOCAL_STOP");
-        let local_stop_falls = reset.edge_window(local_stop, Edge::Fall).expect(whole).1;
+        // A counter without memory is not reset, and one that wraps is not blocked.
+        let local_stop_falls = reset.edge_window(local_stop, Edge::Fall);
         let unblocks = after(
             "LOCAL_STOP",
             Edge::Fall,
@@ -133,8 +136,11 @@ impl MacropixelTiming {
             release: stop
                 .edge_window(net("COUNTER_RESET"), Edge::Fall)
                 .expect(whole),
-            reset_to_stage_clock: clears.map(|w| w.1).max().expect(whole),
-            reset_to_counter_clk: local_stop_falls + unblocked.expect(whole).1,
+            reset_to_stage_clock: clears.map(|w| w.1).max().unwrap_or(Time::ZERO),
+            reset_to_counter_clk: local_stop_falls
+                .zip(unblocked)
+                .map_or(Time::ZERO, |(falls, unblocked)| falls.1 + unblocked.1),
+            counts_at_once: config.p_counter == PCounter::Memoryless,
             hits,
             clk: clk_rest
                 .into_iter()
@@ -208,6 +214,11 @@ impl MacropixelTiming {
         let ignored_until = fs(self.release.0 - self.counter_clk.1 - self.removal + phase);
         let first = (-(-counts_from).div_euclid(t)).max(0);
         let is_ambiguous = first > 0 && (first - 1) * t > ignored_until;
+        let (first, is_ambiguous) = if self.counts_at_once {
+            (1, false)
+        } else {
+            (first, is_ambiguous)
+        };
         // A slow clock counts from edge 1 on and strobes before the next rising edge.
         let edges = 1 - first;
         // The rising edge after the strobe; its forerunner is a period before.
