@@ -6,7 +6,7 @@ use super::*;
 use crate::netlist::{CellKind, Library, MAX_INPUTS, ModuleBuilder, Netlist, Timing};
 
 /// An inverter and a module of one cell of every kind, twice.
-fn design() -> Netlist {
+pub(super) fn design() -> Netlist {
     let mut m = ModuleBuilder::new("leaf");
     let inputs: Vec<_> = ["A", "B", "C", "D"].map(|n| m.input(n)).into();
     for (i, kind) in CellKind::ALL.into_iter().enumerate() {
@@ -31,7 +31,7 @@ fn design() -> Netlist {
     Netlist::elaborate(&m.finish().unwrap())
 }
 
-fn nominal(netlist: &Netlist, corner: Corner) -> Timing {
+pub(super) fn nominal(netlist: &Netlist, corner: Corner) -> Timing {
     Timing::nominal(netlist, &Library::default(), corner)
 }
 
@@ -43,9 +43,9 @@ fn same(netlist: &Netlist, a: &Timing, b: &Timing) -> bool {
     })
 }
 
-fn export(netlist: &Netlist, corners: [&Timing; 3], options: SdfOptions) -> String {
+pub(super) fn export(netlist: &Netlist, corners: [&Timing; 3], options: SdfOptions) -> String {
     let mut out = Vec::new();
-    write_sdf(&mut out, netlist, corners, &no_checks, options).unwrap();
+    write_sdf(&mut out, netlist, corners, options).unwrap();
     String::from_utf8(out).unwrap()
 }
 
@@ -54,7 +54,9 @@ fn file(body: &str) -> String {
 }
 
 /// `body` annotated in the typical corner, and delays (rise, fall; fs) of one pin of a cell.
-fn annotated(body: &str) -> Result<(Netlist, Timing, Annotation), crate::files::InputError> {
+pub(super) fn annotated(
+    body: &str,
+) -> Result<(Netlist, Timing, Annotation), crate::files::InputError> {
     let netlist = design();
     let mut timing = nominal(&netlist, Corner::Typ);
     let text = file(body);
@@ -172,51 +174,6 @@ fn what_is_not_modelled_is_counted() {
 }
 
 #[test]
-fn checks_written_are_read_back() {
-    let netlist = design();
-    let typ = nominal(&netlist, Corner::Typ);
-    let pin = |edge, pin: &'static str| PinEdge {
-        edge,
-        pin: pin.into(),
-    };
-    let check = |kind: CheckKind| SdfCheck {
-        line: 0,
-        kind,
-        pin: pin(None, "D"),
-        reference: (kind != CheckKind::Width).then(|| pin(Some(Edge::Rising), "CK")),
-        limits: std::array::from_fn(|i| {
-            let given = i < kind.limits();
-            Triple(if given {
-                [Some(-7), None, Some(1_234)]
-            } else {
-                [None; 3]
-            })
-        }),
-    };
-    let checks = |cell: usize| match netlist.cells()[cell].kind {
-        CellKind::Dffr => CheckKind::ALL.map(check).into(),
-        _ => Vec::new(),
-    };
-    let mut out = Vec::new();
-    write_sdf(
-        &mut out,
-        &netlist,
-        [&typ; 3],
-        &checks,
-        SdfOptions::default(),
-    )
-    .unwrap();
-    let text = String::from_utf8(out).unwrap();
-    let sdf = Sdf::parse("a.sdf", &text).unwrap();
-    let read = sdf.cells.iter().flat_map(|c| &c.checks).cloned();
-    let read: Vec<_> = read.map(|c| SdfCheck { line: 0, ..c }).collect();
-    assert_eq!(
-        read,
-        [CheckKind::ALL.map(check), CheckKind::ALL.map(check)].concat()
-    );
-}
-
-#[test]
 fn mistakes_are_named_with_line_and_cure() {
     let cell = |body: &str| file(&inv(body));
     for (text, line, says) in [
@@ -242,6 +199,16 @@ fn mistakes_are_named_with_line_and_cure() {
             "no wires inside",
         ),
         (cell("").replace("u1", "u9"), 3, "no instance u9"),
+        (
+            file("(CELL (CELLTYPE \"INV\") (INSTANCE first) (TIMINGCHECK\n(WIDTH A (1))))"),
+            4,
+            "INV has no timing checks",
+        ),
+        (
+            file("(CELL (CELLTYPE \"DFFR\") (INSTANCE *) (TIMINGCHECK\n(SETUP E CK (1))))"),
+            4,
+            "no input pin E",
+        ),
         (cell("").replace("INV", "BUF"), 3, "no BUF"),
         (
             cell("").replace("u1/inv", "*").replace("INV", "FOO"),
