@@ -54,6 +54,14 @@ impl Blindness {
             DeadTimeLaw::Paralysable => p,
         }
     }
+
+    /// The complement of [`Blindness::renews`]; `q` is 1 − `p`.
+    fn keeps(&self, age: usize, p: f64, q: f64) -> f64 {
+        match self.law {
+            DeadTimeLaw::NonParalysable => q + p * (1.0 - self.able(age)),
+            DeadTimeLaw::Paralysable => q,
+        }
+    }
 }
 
 /// One SPAD with its dead time, in even light.
@@ -94,13 +102,13 @@ impl Ages {
 
     /// The steady state under `mean` photons a step.
     pub fn steady(blindness: &Blindness, mean: f64) -> Self {
-        let p = -libm::expm1(-mean);
+        let (p, q) = (-libm::expm1(-mean), libm::exp(-mean));
         let mut aged = Vec::with_capacity(blindness.memory());
         let (mut survives, mut sum) = (1.0, 0.0);
         for age in 1..=blindness.memory() {
             aged.push(survives);
             sum += survives;
-            survives *= 1.0 - blindness.renews(age, p);
+            survives *= blindness.keeps(age, p, q);
         }
         // What leaves the free state, p · free, is what returns to it, renewals · survives.
         let renewals = p / (p * sum + survives);
@@ -113,13 +121,12 @@ impl Ages {
 
     /// One step with `mean` photons.
     pub fn step(&mut self, blindness: &Blindness, mean: f64) {
-        let p = -libm::expm1(-mean);
+        let (p, q) = (-libm::expm1(-mean), libm::exp(-mean));
         let mut renewed = p * self.free;
-        self.free -= renewed;
+        self.free *= q;
         for (index, age) in self.aged.iter_mut().enumerate() {
-            let renews = *age * blindness.renews(index + 1, p);
-            *age -= renews;
-            renewed += renews;
+            renewed += *age * blindness.renews(index + 1, p);
+            *age *= blindness.keeps(index + 1, p, q);
         }
         match self.aged.pop() {
             Some(oldest) => {
