@@ -16,7 +16,7 @@ use serde::Serialize;
 
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::engine::{
-    Cohort, CohortOptions, Cycle, Engine, EngineError, Exposed, Gate, LitPixel, Window, expose,
+    Cohort, CohortOptions, Cycle, EngineError, Exposed, Gate, LitPixel, Window, expose,
     expose_without_skipping, stream_config,
 };
 use crate::photon::{PhotonStream, PixelLight};
@@ -193,7 +193,7 @@ impl ParetoSettings {
     fn stream(&self, laser_cycles: u32, seed: u64) -> PhotonStream {
         let exposure = self.exposure(laser_cycles);
         let sigma = self.scene.pulse_sigma();
-        PhotonStream::new(stream_config(&self.sensor, &exposure, seed, sigma))
+        PhotonStream::new(&stream_config(&self.sensor, &exposure, seed, sigma))
     }
 
     fn run(&self, method: Method, cell: &Cell) -> Result<Exposed, EngineError> {
@@ -218,7 +218,12 @@ impl ParetoSettings {
                     sub_bins,
                     ..CohortOptions::default()
                 };
-                expose(&Cohort::new(sensor, &exposure, options), &stream, pixels, silent)
+                expose(
+                    &Cohort::new(sensor, &exposure, options),
+                    &stream,
+                    pixels,
+                    silent,
+                )
             }
         }
     }
@@ -333,7 +338,11 @@ fn errors(
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
     };
     Errors {
-        mismatch: if counts > 0.0 { differences / counts } else { 0.0 },
+        mismatch: if counts > 0.0 {
+            differences / counts
+        } else {
+            0.0
+        },
         mean_shift: f64::sqrt(shifts.sum::<f64>() / bins.max(1) as f64),
         depth_rms_m: mean(&mut depths.iter().map(|d| d * d)).map(f64::sqrt),
         depth_mean_m: mean(&mut depths.iter().copied()),
@@ -377,7 +386,8 @@ pub fn summarise(methods: &[Method], points: &[Point]) -> Vec<Summary> {
     let summaries = methods.iter().filter_map(|&method| {
         let points: Vec<&Point> = points.iter().filter(|p| p.method == method).collect();
         let n = points.len() as f64;
-        let of = |value: fn(&Point) -> f64| -> Vec<f64> { points.iter().map(|p| value(p)).collect() };
+        let of =
+            |value: fn(&Point) -> f64| -> Vec<f64> { points.iter().map(|p| value(p)).collect() };
         let rms = |values: &[f64]| {
             let squares: f64 = values.iter().map(|v| v * v).sum();
             (!values.is_empty()).then(|| f64::sqrt(squares / values.len() as f64))

@@ -14,9 +14,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
-use crate::engine::{
-    Cohort, CohortOptions, EngineError, Exposed, LitPixel, Window, Work, expose,
-};
+use crate::engine::{Cohort, CohortOptions, EngineError, Exposed, LitPixel, Window, Work, expose};
 use crate::photon::{PhotonStream, StreamConfig};
 use crate::ranging::{PeakOptions, interpolate};
 
@@ -50,72 +48,85 @@ pub struct Kept {
     pub on_cohort: [usize; STEPS.len()],
 }
 
-/// Exposes `pixels`, each on the cheapest engine that keeps its depth within `tolerance_m` of the exact one's on average;
-/// those in `exactly` on the window engine in any case. `done` is told of macropixels as they are finished.
-///
-/// # Errors
-/// Configurations that the window engine refuses.
-#[allow(clippy::too_many_arguments)]
-pub fn expose_within(
-    tolerance_m: f64,
-    config: &SensorConfig,
-    exposure: &Exposure,
-    peak: &PeakOptions,
-    stream: &PhotonStream,
-    pixels: &[LitPixel],
-    exactly: &[usize],
-    done: impl Fn(usize) + Sync,
-) -> Result<(Exposed, Kept), EngineError> {
-    let cohorts = STEPS.map(|sub_bins| {
-        let options = CohortOptions {
-            sub_bins,
-            ..CohortOptions::default()
-        };
-        Cohort::new(config, exposure, options)
-    });
-    let law = WindowLaw::new(config, exposure);
-    let planner = Planner {
-        cohorts: &cohorts,
-        law: &law,
-        peak,
-        stream: stream.config(),
-        bins: config.bins,
-    };
-    let mut plan: Vec<(Choice, f64)> = pixels
-        .par_iter()
-        .map(|pixel| planner.choose(pixel, tolerance_m))
-        .collect();
-    for &pixel in exactly {
-        plan[pixel] = (Choice::Window, 0.0);
-    }
+/// A frame's chip and clocks, and the depth error that it may have.
+#[derive(Debug, Clone, Copy)]
+pub struct Tolerance<'a> {
+    /// Depth error that the choice of engine may add on average, m.
+    pub tolerance_m: f64,
+    /// The chip.
+    pub config: &'a SensorConfig,
+    /// Its exposure.
+    pub exposure: &'a Exposure,
+    /// Depth from histograms.
+    pub peak: &'a PeakOptions,
+}
 
-    let mut kept = Kept {
-        tolerance_m,
-        bound_m: plan.iter().map(|(_, bound_m)| *bound_m).fold(0.0, f64::max),
-        ..Kept::default()
-    };
-    let mut histograms = vec![Vec::new(); pixels.len()];
-    let mut work = Work::default();
-    let choices = (0..STEPS.len()).map(Choice::Cohort);
-    for choice in std::iter::once(Choice::Window).chain(choices) {
-        let members: Vec<usize> = (0..pixels.len()).filter(|&i| plan[i].0 == choice).collect();
-        let chosen: Vec<LitPixel> = members.iter().map(|&i| pixels[i]).collect();
-        let exposed = match choice {
-            Choice::Window => {
-                kept.on_window = members.len();
-                expose(&Window::new(config, exposure), stream, &chosen, &done)?
-            }
-            Choice::Cohort(steps) => {
-                kept.on_cohort[steps] = members.len();
-                expose(&cohorts[steps], stream, &chosen, &done)?
-            }
+impl Tolerance<'_> {
+    /// Exposes `pixels`, each on the cheapest engine that keeps its depth within the tolerance of the exact one's on average.
+    /// `done` is told of macropixels as they are finished.
+    ///
+    /// # Errors
+    /// Configurations that the window engine refuses.
+    pub fn expose(
+        &self,
+        stream: &PhotonStream,
+        pixels: &[LitPixel],
+        done: impl Fn(usize) + Sync,
+    ) -> Result<(Exposed, Kept), EngineError> {
+        let Tolerance {
+            tolerance_m,
+            config,
+            exposure,
+            peak,
+        } = *self;
+        let cohorts = STEPS.map(|sub_bins| {
+            let options = CohortOptions {
+                sub_bins,
+                ..CohortOptions::default()
+            };
+            Cohort::new(config, exposure, options)
+        });
+        let law = WindowLaw::new(config, exposure);
+        let planner = Planner {
+            cohorts: &cohorts,
+            law: &law,
+            peak,
+            stream: stream.config(),
+            bins: config.bins,
         };
-        work += exposed.work;
-        for (pixel, counts) in members.into_iter().zip(exposed.histograms) {
-            histograms[pixel] = counts;
+        let plan: Vec<(Choice, f64)> = pixels
+            .par_iter()
+            .map(|pixel| planner.choose(pixel, tolerance_m))
+            .collect();
+
+        let mut kept = Kept {
+            tolerance_m,
+            bound_m: plan.iter().map(|(_, bound_m)| *bound_m).fold(0.0, f64::max),
+            ..Kept::default()
+        };
+        let mut histograms = vec![Vec::new(); pixels.len()];
+        let mut work = Work::default();
+        let choices = (0..STEPS.len()).map(Choice::Cohort);
+        for choice in std::iter::once(Choice::Window).chain(choices) {
+            let members: Vec<usize> = (0..pixels.len()).filter(|&i| plan[i].0 == choice).collect();
+            let chosen: Vec<LitPixel> = members.iter().map(|&i| pixels[i]).collect();
+            let exposed = match choice {
+                Choice::Window => {
+                    kept.on_window = members.len();
+                    expose(&Window::new(config, exposure), stream, &chosen, &done)?
+                }
+                Choice::Cohort(steps) => {
+                    kept.on_cohort[steps] = members.len();
+                    expose(&cohorts[steps], stream, &chosen, &done)?
+                }
+            };
+            work += exposed.work;
+            for (pixel, counts) in members.into_iter().zip(exposed.histograms) {
+                histograms[pixel] = counts;
+            }
         }
+        Ok((Exposed { histograms, work }, kept))
     }
-    Ok((Exposed { histograms, work }, kept))
 }
 
 struct Planner<'a> {
@@ -159,9 +170,14 @@ impl Planner<'_> {
     fn depth_m(&self, steps: usize, pixel: &LitPixel) -> Option<f64> {
         let window = self.law.window(pixel.start).open()?;
         let cohort = &self.cohorts[steps];
-        let means = cohort.expected(self.stream, pixel.start, &pixel.light?).ok()?;
+        let means = cohort
+            .expected(self.stream, pixel.start, &pixel.light?)
+            .ok()?;
         let scale = WHOLE_COUNTS / means.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        let counts: Vec<u32> = means.iter().map(|mean| (mean * scale).round() as u32).collect();
+        let counts: Vec<u32> = means
+            .iter()
+            .map(|mean| (mean * scale).round() as u32)
+            .collect();
         let found = interpolate(&counts, self.peak)?;
         Some(self.law.time_of(&window, found.position_bins).as_range_m())
     }
