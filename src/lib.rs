@@ -52,5 +52,6 @@ pub mod ranging;
 pub mod report;
 pub mod scene;
 pub mod system;
+pub mod theory;
 pub mod units;
 pub mod waves;
