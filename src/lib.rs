@@ -20,7 +20,9 @@
 //! | [`guide`] | the stereo camera pair and its mapping onto macropixels |
 //! | [`ranging`] | depth from histograms |
 //! | [`report`] | pictures, arrays, tables |
+//! | [`theory`] | chapter 3 in formulas, and what follows for a design |
 //! | [`system`] | one guided frame, end to end |
+//! | [`reproduce`] | the thesis's figures, published beside computed |
 //! | [`cli`] | the `gdtof` command |
 //!
 //! One macropixel at gate level:
@@ -50,6 +52,7 @@ pub mod netlist;
 pub mod photon;
 pub mod ranging;
 pub mod report;
+pub mod reproduce;
 pub mod scene;
 pub mod system;
 pub mod theory;

@@ -5,3 +5,11 @@ set -euo pipefail
 cd "$(dirname "$0")/replay"
 cargo run --release --quiet -- replay --sensor sensor.toml --inits inits.csv --events events.csv \
     --stop-periods 80 --laser-cycles 40 --engine gate --out histograms.csv
+
+# Verdicts of the published figures.
+cd ../reproduce
+cargo run --release --quiet -- reproduce --json | python3 -c '
+import json, sys
+for claim in json.load(sys.stdin)["claims"]:
+    for row in claim["rows"]:
+        print(claim["claim"], row["quantity"], row["verdict"], sep=" | ")' > verdicts.txt

@@ -4,6 +4,7 @@
 mod export;
 mod frame;
 mod replay;
+mod reproduce;
 mod sdf;
 mod testbench;
 mod timing;
@@ -35,6 +36,8 @@ enum Command {
     Frame(frame::FrameArgs),
     /// Run recorded SPAD events through the chip.
     Replay(replay::ReplayArgs),
+    /// Print the thesis's figures, published beside computed.
+    Reproduce(reproduce::ReproduceArgs),
     /// How fast the chip can be clocked: ripple, periods, margins.
     Timing(timing::TimingArgs),
     /// Write the chip for other tools.
@@ -76,6 +79,7 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Frame(args) => frame::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::Reproduce(args) => reproduce::run(&args),
         Command::Timing(args) => timing::run(&args),
         Command::Export(command) => export::run(&command),
     };
