@@ -8,6 +8,7 @@
 //! | module | what lives there |
 //! |---|---|
 //! | [`units`] | integer femtoseconds, exact clock frequencies, constants |
+//! | [`numerics`] | quadrature, special functions |
 //! | [`files`] | user's input with line numbers, output whole or not at all |
 //! | [`logic`] | four-valued logic |
 //! | [`netlist`] | cells, hierarchical builder, delays, Verilog |
@@ -19,8 +20,8 @@
 //! | [`scene`] | surfaces, optics, sunlight, ground truth |
 //! | [`guide`] | the stereo camera pair and its mapping onto macropixels |
 //! | [`ranging`] | depth from histograms |
+//! | [`theory`] | detection probability, precision, partial histograms, design |
 //! | [`report`] | pictures, arrays, tables |
-//! | [`theory`] | chapter 3 in formulas, and what follows for a design |
 //! | [`system`] | one guided frame, end to end |
 //! | [`reproduce`] | the thesis's figures, published beside computed |
 //! | [`cli`] | the `gdtof` command |
@@ -49,6 +50,7 @@ pub mod guide;
 pub mod kernel;
 pub mod logic;
 pub mod netlist;
+pub mod numerics;
 pub mod photon;
 pub mod ranging;
 pub mod report;

@@ -13,3 +13,7 @@ import json, sys
 for claim in json.load(sys.stdin)["claims"]:
     for row in claim["rows"]:
         print(claim["claim"], row["quantity"], row["verdict"], sep=" | ")' > verdicts.txt
+
+# High-precision references of the theory (mpmath, some minutes).
+cd ../theory
+python3 detection.py

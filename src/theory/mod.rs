@@ -1,4 +1,11 @@
-//! Chapter 3 of the thesis in formulas, and what follows from it for a design.
+//! Chapter 3 of the thesis: how often the echo is found, how precisely, with how many bins, and what follows for a
+//! design.
 
 pub mod capacity;
+mod counts;
+mod cycles;
 pub mod design;
+pub mod detection;
+mod gaussian;
+
+pub use counts::{Counts, Tails};
