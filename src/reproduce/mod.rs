@@ -12,10 +12,17 @@
 
 mod chip;
 mod claim;
+mod delay_line;
 mod design;
+mod light;
 mod page;
+mod penalty;
+mod precision;
 mod registry;
+mod sensors;
+mod silicon;
 mod stereo;
+mod system;
 
 pub use claim::{Claim, Published, Row, Verdict};
 pub use page::{grid, html, markdown, tally};

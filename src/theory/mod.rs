@@ -7,5 +7,9 @@ mod cycles;
 pub mod design;
 pub mod detection;
 mod gaussian;
+pub mod partial;
+pub mod precision;
+mod pulse;
 
 pub use counts::{Counts, Tails};
+pub use pulse::{LnBin, MeasuredPulse, Pulse, PulseError};
