@@ -6,24 +6,17 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use guided_dtof::chip::{Exposure, SensorConfig, sensor};
 use guided_dtof::engine::load::{load, load_netlist};
-use guided_dtof::engine::{Cycle, Engine, GateSimulation, LaneSimulation, Window};
+use guided_dtof::engine::{Cycle, Engine, GateSimulation, LaneSimulation, Window, stream_config};
 use guided_dtof::netlist::Netlist;
-use guided_dtof::photon::{PixelLight, SpadEvent, StreamConfig, pixel_events};
+use guided_dtof::photon::{PhotonStream, PixelLight, SpadEvent};
 use guided_dtof::units::Time;
 
 const STOP_PERIODS: u32 = 520;
 const LASER_CYCLES: u32 = 100;
 const START: u16 = 300;
 
-fn stream(config: &SensorConfig, exposure: &Exposure) -> StreamConfig {
-    StreamConfig {
-        seed: 1,
-        clock: exposure.clock,
-        stop_periods: STOP_PERIODS,
-        laser_cycles: LASER_CYCLES,
-        pulse_sigma: Time::from_ps(1_900),
-        dead_time: config.dead_time(),
-    }
+fn stream(config: &SensorConfig, exposure: &Exposure) -> PhotonStream {
+    PhotonStream::new(&stream_config(config, exposure, 1, Time::from_ps(1_900)))
 }
 
 const LIGHT: PixelLight = PixelLight {
@@ -33,7 +26,7 @@ const LIGHT: PixelLight = PixelLight {
 };
 
 fn photons(config: &SensorConfig, exposure: &Exposure) -> Vec<SpadEvent> {
-    pixel_events(&stream(config, exposure), 0, &LIGHT).events
+    stream(config, exposure).pixel_events(0, &LIGHT).events
 }
 
 fn kernel(c: &mut Criterion) {
@@ -54,7 +47,11 @@ fn kernel(c: &mut Criterion) {
         });
     });
     let lanes: Vec<Vec<SpadEvent>> = (0..64)
-        .map(|pixel| pixel_events(&stream(&config, &exposure), pixel, &LIGHT).events)
+        .map(|pixel| {
+            stream(&config, &exposure)
+                .pixel_events(pixel, &LIGHT)
+                .events
+        })
         .collect();
     let lanes: Vec<&[SpadEvent]> = lanes.iter().map(Vec::as_slice).collect();
     let starts: Vec<u16> = (0..64).map(|lane| lane * 8).collect();
@@ -106,7 +103,7 @@ fn engines(c: &mut Criterion) {
     });
     let stream = stream(&config, &exposure);
     group.bench_function("photon stream", |b| {
-        b.iter(|| pixel_events(&stream, 0, black_box(&LIGHT)).drawn);
+        b.iter(|| stream.pixel_events(0, black_box(&LIGHT)).drawn);
     });
     group.finish();
 }

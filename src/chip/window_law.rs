@@ -22,7 +22,7 @@ use super::config::{Mode, SensorConfig};
 use super::exposure::Exposure;
 use super::{correlation, p_counter_timing};
 use crate::logic::Logic::{One, Zero};
-use crate::netlist::{CellKind, Corner, Delay, Edge, Library, Netlist, StaticTiming, Timing};
+use crate::netlist::{CellKind, CheckKind, Corner, Edge, Library, Netlist, StaticTiming, Timing};
 use crate::units::Time;
 
 /// Delays of the paths that decide where a window lies.
@@ -67,7 +67,7 @@ impl ChipTiming {
         let corner = config.corner;
         let delay = |kind, pin, to| library.delay(kind, pin, to, corner);
         let limits = library.checks(CellKind::Dffr);
-        let limit = |limit: Delay| Time::from_fs(limit.at(corner) as i64);
+        let limit = |check| Time::from_fs(limits.at(check, corner) as i64);
         let clock_to_q = delay(CellKind::Dffr, 1, One);
         let mux_rise = delay(CellKind::Mux2, 0, One);
         let buffer_rise = delay(CellKind::Buf, 0, One);
@@ -92,10 +92,10 @@ impl ChipTiming {
                 + delay(CellKind::Or2, 0, Zero),
             stop_to_hit_reset: stop_to_reset + mux_rise,
             clk_to_event: clock_to_q + xor + correlation,
-            setup: limit(limits.setup),
-            hold: limit(limits.hold),
-            recovery: limit(limits.recovery),
-            removal: limit(limits.removal),
+            setup: limit(CheckKind::Setup),
+            hold: limit(CheckKind::Hold),
+            recovery: limit(CheckKind::Recovery),
+            removal: limit(CheckKind::Removal),
         }
     }
 

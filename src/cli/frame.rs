@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::{SensorArgs, say};
 use crate::chip::SensorConfig;
 use crate::chip::window_law::{Window, WindowLaw};
+use crate::engine::Work;
 use crate::engine::recording::check_exposure;
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::guide::GuideMap;
@@ -49,6 +50,9 @@ pub struct FrameArgs {
     /// Keep only the first N laser cycles in the waveforms of probes.
     #[arg(long, value_name = "N")]
     wave_cycles: Option<u32>,
+    /// Draw and run everything, also what the engine could leave out: same histograms, more work.
+    #[arg(long)]
+    no_skip: bool,
     /// Print frame.json instead of the table.
     #[arg(long)]
     json: bool,
@@ -85,6 +89,7 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
         exposure,
         seed: args.seed,
         engine: args.engine,
+        skip: !args.no_skip,
         peak: PeakOptions::default(),
     };
     let progress = ProgressBar::new(settings.sensor.pixels() as u64).with_style(
@@ -177,8 +182,8 @@ struct Report<'a> {
     seed: u64,
     engine: EngineKind,
     summary: Summary,
-    photons: u64,
-    photons_lost_to_dead_time: u64,
+    photons_expected: f64,
+    work: Work,
     load_bits: usize,
     load_time_s: f64,
     exposure_time_s: f64,
@@ -201,8 +206,8 @@ impl<'a> Report<'a> {
             seed: args.seed,
             engine: args.engine,
             summary: frame.summary(),
-            photons: frame.photons,
-            photons_lost_to_dead_time: frame.lost_to_dead_time,
+            photons_expected: frame.photons_expected,
+            work: frame.work,
             load_bits: frame.load_bits,
             load_time_s: frame.load_time.as_s(),
             exposure_time_s: frame.exposure_time.as_s(),
@@ -279,9 +284,30 @@ fn table(args: &FrameArgs, frame: &Frame) -> Table {
             "RMS error of the guide there",
             metres(summary.guide_rms_error_m),
         );
-    let lost = 100.0 * frame.lost_to_dead_time as f64 / frame.photons.max(1) as f64;
-    table.push("photons", frame.photons);
-    table.push("lost to dead time", format!("{lost:.2} %"));
+    let work = &frame.work;
+    let percent = |part: f64, whole: f64| format!("{:.2} %", 100.0 * part / whole.max(1.0));
+    table.push(
+        "photons on the array",
+        format!("{:.0}", frame.photons_expected),
+    );
+    table.push(
+        "simulated: photons",
+        percent(work.photons_drawn as f64, frame.photons_expected),
+    );
+    table.push(
+        "simulated: CLK periods",
+        percent(work.clk_periods_visited as f64, work.clk_periods as f64),
+    );
+    let skipped = work.skipped_dark + work.skipped_closed;
+    table.push(
+        "simulated: macropixels",
+        of((work.macropixels - skipped) as usize, summary.pixels),
+    );
+    let lost = work.lost_to_dead_time as f64;
+    table.push(
+        "lost to dead time",
+        percent(lost, work.pulses as f64 + lost),
+    );
     table.push(
         "serial load",
         format!("{} bits, {}", frame.load_bits, frame.load_time),

@@ -3,6 +3,7 @@
 
 mod export;
 mod frame;
+mod range;
 mod replay;
 mod reproduce;
 mod sdf;
@@ -38,6 +39,8 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Print the thesis's figures, published beside computed.
     Reproduce(reproduce::ReproduceArgs),
+    /// Depths from a real sensor's histograms, beside its own.
+    Range(range::RangeArgs),
     /// How fast the chip can be clocked: ripple, periods, margins.
     Timing(timing::TimingArgs),
     /// Write the chip for other tools.
@@ -80,6 +83,7 @@ pub fn main() -> ExitCode {
         Command::Frame(args) => frame::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Reproduce(args) => reproduce::run(&args),
+        Command::Range(args) => range::run(&args),
         Command::Timing(args) => timing::run(&args),
         Command::Export(command) => export::run(&command),
     };

@@ -12,7 +12,7 @@ use super::sdf::annotated_timing;
 use crate::chip::{Exposure, SensorConfig};
 use crate::engine::recording::{Recording, check_exposure, read_events, read_starts};
 use crate::engine::waveform::{self, View};
-use crate::engine::{BATCH, EngineError, GateSimulation};
+use crate::engine::{EngineError, GateSimulation};
 use crate::files::{InputError, OutputFile};
 use crate::kernel::{Observer, Policy};
 use crate::photon::SpadEvent;
@@ -228,8 +228,8 @@ fn replay(stimuli: &Stimuli, kind: EngineKind) -> anyhow::Result<Vec<Vec<u16>>> 
     );
     let batches: Result<Vec<_>, EngineError> = stimuli
         .starts
-        .par_chunks(BATCH)
-        .zip(stimuli.pulses().par_chunks(BATCH))
+        .par_chunks(engine.batch())
+        .zip(stimuli.pulses().par_chunks(engine.batch()))
         .map(|(starts, pulses)| {
             let histograms = engine.histograms(starts, pulses);
             progress.inc(starts.len() as u64);

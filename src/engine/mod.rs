@@ -12,6 +12,7 @@
 mod cycle;
 mod gate;
 mod lanes;
+mod light;
 pub mod load;
 pub mod recording;
 mod stimulus;
@@ -23,15 +24,18 @@ mod window;
 pub use cycle::Cycle;
 pub use gate::{Gate, GateSimulation};
 pub use lanes::LaneSimulation;
+pub use light::{
+    Exposed, LitPixel, Work, expose, expose_without_skipping, full_stream, stream_config,
+};
 pub use stimulus::{LoadPins, Pins, Schedule, StimulusPlan};
 pub use testbench::{export_annotated_verilog, export_verilog};
 pub use window::Window;
 
-use crate::photon::SpadEvent;
+use crate::photon::{PhotonStream, SpadEvent};
 
 const _: () = assert!(crate::chip::SPADS == crate::photon::SPADS);
 
-/// Runs one macropixel through an exposure.
+/// Runs macropixels through an exposure: one that was recorded, or one to light.
 pub trait Engine: Sync {
     /// Counts of every bin, bin 0 earliest, for a start value and the rising edges of SPAD_RAW, sorted by
     /// time from the first STOP edge and thinned by the dead time.
@@ -41,7 +45,7 @@ pub trait Engine: Sync {
     fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError>;
 
     /// Histograms of several macropixels, each with its start value and pulses. An engine that gains by
-    /// it runs [`BATCH`] of them together; the results are the same.
+    /// it runs [`Engine::batch`] of them together; the results are the same.
     ///
     /// # Errors
     /// As [`Engine::histogram`], of the first macropixel concerned.
@@ -55,10 +59,21 @@ pub trait Engine: Sync {
             .map(|(&start, pulses)| self.histogram(start, pulses))
             .collect()
     }
-}
 
-/// How many macropixels are best given to [`Engine::histograms`] at once.
-pub const BATCH: usize = crate::kernel::LANES;
+    /// Histograms of macropixels in the light of `stream`, in the order of `pixels`. For the same stream they are
+    /// those of [`full_stream`], which draws every photon; an engine that needs fewer may leave the others out.
+    ///
+    /// # Errors
+    /// As [`Engine::histograms`].
+    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+        full_stream(self, stream, pixels)
+    }
+
+    /// How many macropixels are best given to this engine at once.
+    fn batch(&self) -> usize {
+        crate::kernel::LANES
+    }
+}
 
 /// Why an engine has no answer.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -68,6 +83,11 @@ pub enum EngineError {
         "{0}, so only the gate engine can tell what is counted; use --engine gate or change clk_hz, stop_phase_ps or corner"
     )]
     Race(&'static str),
+    /// The engine works without photons.
+    #[error(
+        "the {0} engine knows no single photons and cannot replay recorded ones; use --engine window"
+    )]
+    NoPhotons(&'static str),
     /// A histogram bin of the netlist holds X.
     #[error("bin {bin} of {macropixel} is unknown (X) at the end of the exposure")]
     Unknown {

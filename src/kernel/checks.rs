@@ -13,6 +13,9 @@
 //! | clock high, low | CK falls, rises | CK rose, fell | distance < limit |
 //! | control high | R or S falls | it rose | distance < limit |
 //!
+//! Setup and hold have a limit of their own for each direction of D. Each direction's last change counts, so that a
+//! pulse on D before CK is judged at both its edges; the smaller slack is the one reported.
+//!
 //! Slack is distance − limit; exactly the limit is legal. When two pins change at once, `$setuphold` and `$recrem`
 //! of the standard report a hold and a recovery violation, and so does this.
 //!
@@ -32,7 +35,7 @@
 use super::check_report::{CheckReport, CheckSummary, Place, Policy, Violation, slack_bin};
 use super::observer::Observer;
 use crate::logic::Logic;
-use crate::netlist::{CellKind, CheckKind, Corner, Library, NetId, Netlist};
+use crate::netlist::{CellKind, CheckKind, Corner, Edge, Library, NetId, Netlist};
 use crate::units::Time;
 
 /// Violations that are kept one by one; further ones are only counted.
@@ -61,8 +64,20 @@ struct History {
 }
 
 impl History {
-    fn changed_fs(&self) -> i64 {
-        self.rose_fs.max(self.fell_fs)
+    /// The last possible change in one direction.
+    fn last(&self, edge: Edge) -> i64 {
+        match edge {
+            Edge::Rise => self.rose_fs,
+            Edge::Fall => self.fell_fs,
+        }
+    }
+
+    /// Direction of the last change.
+    fn last_edge(&self) -> Edge {
+        match self.rose_fs > self.fell_fs {
+            true => Edge::Rise,
+            false => Edge::Fall,
+        }
     }
 }
 
@@ -83,6 +98,7 @@ struct Found {
     flip_flop: u32,
     kind: CheckKind,
     pin: u8,
+    edge: Edge,
     is_asynchronous: bool,
 }
 
@@ -91,8 +107,8 @@ pub struct TimingChecks {
     policy: Policy,
     corner: Corner,
     not_before_fs: i64,
-    /// Limits by "has a set" and check, fs.
-    limits: [[i64; CheckKind::ALL.len()]; 2],
+    /// Limits by "has a set", check and direction of D, fs.
+    limits: [[[i64; 2]; CheckKind::ALL.len()]; 2],
     nets: Vec<History>,
     /// Where each net's checked pins begin in `loads`.
     start: Vec<u32>,
@@ -142,7 +158,10 @@ impl TimingChecks {
             .collect();
         let (start, loads) = checked_pins(&flip_flops, netlist.net_count());
         let limits = [CellKind::Dffr, CellKind::Dffsr]
-            .map(|kind| CheckKind::ALL.map(|c| library.checks(kind).at(c, corner).into()));
+            .map(|kind| library.checks(kind))
+            .map(|limits| {
+                CheckKind::ALL.map(|c| Edge::BOTH.map(|edge| limits.toward(c, edge, corner).into()))
+            });
         let unknown = History {
             rose_fs: NEVER,
             fell_fs: NEVER,
@@ -236,6 +255,7 @@ impl TimingChecks {
             kind: found.kind,
             cell: path(found),
             pin: PINS[found.pin as usize].to_owned(),
+            edge: found.edge,
             time_fs: found.time_fs,
             slack_fs: found.slack_fs,
             is_asynchronous: found.is_asynchronous,
@@ -287,20 +307,29 @@ impl TimingChecks {
         }
         let clock = *of(CLOCK);
         match pin {
-            DATA => self.measure(index, CheckKind::Hold, DATA, now_fs, clock.rose_fs),
+            DATA => {
+                let edge = of(DATA).last_edge();
+                self.measure(index, CheckKind::Hold, DATA, edge, clock.rose_fs);
+            }
             CLOCK if clock.rose_fs == now_fs => {
                 let (data, reset) = (*of(DATA), *of(RESET));
                 let set = flip_flop.has_set.then(|| *of(SET));
-                if data.changed_fs() != now_fs {
-                    self.measure(index, CheckKind::Setup, DATA, now_fs, data.changed_fs());
+                if let Some(edge) = self.edge_nearest_setup(index, data) {
+                    self.measure(index, CheckKind::Setup, DATA, edge, data.last(edge));
                 }
-                self.measure(index, CheckKind::Recovery, RESET, now_fs, reset.fell_fs);
+                self.measure(index, CheckKind::Recovery, RESET, Edge::Fall, reset.fell_fs);
                 if let Some(set) = set {
-                    self.measure(index, CheckKind::Recovery, SET, now_fs, set.fell_fs);
+                    self.measure(index, CheckKind::Recovery, SET, Edge::Fall, set.fell_fs);
                 }
-                self.measure(index, CheckKind::ClockLow, CLOCK, now_fs, clock.fell_fs);
+                self.measure(index, CheckKind::ClockLow, CLOCK, Edge::Rise, clock.fell_fs);
             }
-            CLOCK => self.measure(index, CheckKind::ClockHigh, CLOCK, now_fs, clock.rose_fs),
+            CLOCK => self.measure(
+                index,
+                CheckKind::ClockHigh,
+                CLOCK,
+                Edge::Fall,
+                clock.rose_fs,
+            ),
             _ => {
                 let control = *of(pin);
                 // A rise to X completes nothing.
@@ -308,29 +337,47 @@ impl TimingChecks {
                     return;
                 }
                 if clock.rose_fs != now_fs {
-                    self.measure(index, CheckKind::Removal, pin, now_fs, clock.rose_fs);
+                    self.measure(index, CheckKind::Removal, pin, Edge::Fall, clock.rose_fs);
                 }
-                self.measure(index, CheckKind::ControlHigh, pin, now_fs, control.rose_fs);
+                self.measure(
+                    index,
+                    CheckKind::ControlHigh,
+                    pin,
+                    Edge::Fall,
+                    control.rose_fs,
+                );
             }
         }
     }
 
+    /// Which of the last rise and fall of D before this instant comes nearer to its setup limit.
     #[inline]
-    fn measure(&mut self, index: u32, kind: CheckKind, pin: usize, now_fs: i64, since_fs: i64) {
+    fn edge_nearest_setup(&self, index: u32, data: History) -> Option<Edge> {
+        let has_set = self.flip_flops[index as usize].has_set;
+        let limits = &self.limits[has_set as usize][CheckKind::Setup as usize];
+        let before = |edge: &Edge| ![NEVER, self.now_fs].contains(&data.last(*edge));
+        let edges = Edge::BOTH.into_iter().filter(before);
+        edges.max_by_key(|&edge| data.last(edge) + limits[edge as usize])
+    }
+
+    /// Judges one distance: from `since_fs` to now, where `pin` changes or has changed in the direction of `edge`.
+    #[inline]
+    fn measure(&mut self, index: u32, kind: CheckKind, pin: usize, edge: Edge, since_fs: i64) {
         if since_fs == NEVER {
             return;
         }
         let flip_flop = self.flip_flops[index as usize];
-        let limit_fs = self.limits[flip_flop.has_set as usize][kind as usize];
-        let slack_fs = now_fs - since_fs - limit_fs;
+        let limits = &self.limits[flip_flop.has_set as usize];
+        let slack_fs = self.now_fs - since_fs - limits[kind as usize][edge as usize];
         let is_asynchronous = flip_flop.is_asynchronous && kind.concerns_data();
         let tally = &mut self.summaries[kind as usize];
         let found = Found {
-            time_fs: now_fs,
+            time_fs: self.now_fs,
             slack_fs,
             flip_flop: index,
             kind,
             pin: pin as u8,
+            edge,
             is_asynchronous,
         };
         if is_asynchronous {

@@ -7,123 +7,22 @@
 //! ```text
 //!   value of a net:     one  = ...0110   lanes that are 1        lanes in neither are X
 //!                       zero = ...1001   lanes that are 0
-//!   pending on a net:   groups (time, lanes, values); cancelling a lane takes its bit out of its group
+//!   pending on a net:   groups (time, lanes, values), earliest first; cancelling a lane takes its bit out
 //! ```
 //!
 //! Every lane sees exactly the value changes that [`Kernel`](super::Kernel) would give it alone: the same two
-//! phases, the same inertial rule, and the delay of the pin that changed in *that* lane. Two differences of
+//! phases, the same inertial and transport rules, and the delay of the pin that changed in *that* lane. Two differences of
 //! input only: Z is driven as X, and a clock must not be driven up and down again within one instant.
+//!
+//! All lanes have the delays of one [`Timing`]: nominal, or annotated, or the mismatch of one macropixel. Delays
+//! that differ from lane to lane would give each lane events of its own, and nothing would be left to share.
 
 use super::compiled::{DelaySet, FanOut, PinClass};
+use super::lane_word::Lanes;
 use super::wheel::{Event, TimeWheel};
 use crate::logic::Logic;
-use crate::netlist::{CellKind, MAX_INPUTS, NetId, Netlist, Timing};
+use crate::netlist::{CellKind, DelayModel, MAX_INPUTS, NetId, Netlist, Timing};
 use crate::units::Time;
-
-/// Lanes of one simulation.
-pub const LANES: usize = 64;
-
-/// A value in every lane.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Lanes {
-    /// Lanes that are 1.
-    pub one: u64,
-    /// Lanes that are 0. Lanes that are neither are X.
-    pub zero: u64,
-}
-
-impl Lanes {
-    /// The same value in every lane.
-    pub const fn all(value: Logic) -> Self {
-        match value {
-            Logic::One => Lanes {
-                one: u64::MAX,
-                zero: 0,
-            },
-            Logic::Zero => Lanes {
-                one: 0,
-                zero: u64::MAX,
-            },
-            Logic::X | Logic::Z => Lanes { one: 0, zero: 0 },
-        }
-    }
-
-    /// Known values, one bit a lane.
-    pub const fn known(bits: u64) -> Self {
-        Lanes {
-            one: bits,
-            zero: !bits,
-        }
-    }
-
-    /// The value of one lane.
-    pub const fn lane(self, lane: usize) -> Logic {
-        match (self.one >> lane & 1, self.zero >> lane & 1) {
-            (1, _) => Logic::One,
-            (_, 1) => Logic::Zero,
-            _ => Logic::X,
-        }
-    }
-
-    const fn unknown(self) -> u64 {
-        !(self.one | self.zero)
-    }
-
-    const fn not(self) -> Self {
-        Lanes {
-            one: self.zero,
-            zero: self.one,
-        }
-    }
-
-    const fn and(self, other: Self) -> Self {
-        Lanes {
-            one: self.one & other.one,
-            zero: self.zero | other.zero,
-        }
-    }
-
-    const fn or(self, other: Self) -> Self {
-        Lanes {
-            one: self.one | other.one,
-            zero: self.zero & other.zero,
-        }
-    }
-
-    const fn xor(self, other: Self) -> Self {
-        Lanes {
-            one: self.one & other.zero | self.zero & other.one,
-            zero: self.one & other.one | self.zero & other.zero,
-        }
-    }
-
-    const fn mux(a: Self, b: Self, select: Self) -> Self {
-        Lanes {
-            one: select.zero & a.one | select.one & b.one | a.one & b.one,
-            zero: select.zero & a.zero | select.one & b.zero | a.zero & b.zero,
-        }
-    }
-
-    /// `other` in the lanes of `mask`, itself elsewhere.
-    const fn replaced(self, mask: u64, other: Self) -> Self {
-        Lanes {
-            one: self.one & !mask | other.one & mask,
-            zero: self.zero & !mask | other.zero & mask,
-        }
-    }
-
-    /// X in the lanes of `mask` where the two differ, itself elsewhere.
-    const fn blurred(self, mask: u64, other: Self) -> Self {
-        Lanes {
-            one: self.one & (!mask | other.one),
-            zero: self.zero & (!mask | other.zero),
-        }
-    }
-
-    const fn differs(self, other: Self) -> u64 {
-        (self.one ^ other.one) | (self.zero ^ other.zero)
-    }
-}
 
 /// Some lanes of one input take a value at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -155,10 +54,9 @@ const NONE: u32 = u32::MAX;
 #[derive(Clone, Copy)]
 struct NetState {
     value: Lanes,
-    /// Lanes with a change on its way, and to what.
-    pending: u64,
-    pending_value: Lanes,
-    /// First of the net's groups.
+    /// What its driver computed last: its value, once everything on its way has arrived.
+    target: Lanes,
+    /// First of the net's groups, which are in order of time.
     groups: u32,
 }
 
@@ -167,6 +65,7 @@ struct NetState {
 struct Group {
     time_fs: i64,
     mask: u64,
+    values: Lanes,
     next: u32,
 }
 
@@ -174,6 +73,7 @@ struct Group {
 struct CellState {
     kind: CellKind,
     is_dirty: bool,
+    model: DelayModel,
     inputs: [u32; MAX_INPUTS],
     outputs: [u32; 2],
     delays: u32,
@@ -206,8 +106,7 @@ impl LaneKernel {
         let unknown = Lanes::all(Logic::X);
         let net = NetState {
             value: unknown,
-            pending: 0,
-            pending_value: unknown,
+            target: unknown,
             groups: NONE,
         };
         let index = |n: NetId| if n.is_some() { n.index() as u32 } else { NONE };
@@ -218,6 +117,7 @@ impl LaneKernel {
             .map(|(i, cell)| CellState {
                 kind: cell.kind,
                 is_dirty: false,
+                model: timing.model(i),
                 inputs: cell.inputs.map(index),
                 outputs: cell.outputs.map(index),
                 delays: timing.set_of(i),
@@ -298,10 +198,8 @@ impl LaneKernel {
         loop {
             while let Some(event) = self.wheel.pop_at(self.now_fs) {
                 let net = event.net as usize;
-                let mask = self.take_group(net);
+                let (mask, values) = self.take_group(net);
                 if mask != 0 {
-                    let values = self.nets[net].pending_value;
-                    self.nets[net].pending &= !mask;
                     self.apply(net, mask, values, observer);
                 }
             }
@@ -317,24 +215,18 @@ impl LaneKernel {
         }
     }
 
-    /// Unlinks the group of `net` that is due now; returns its lanes.
-    fn take_group(&mut self, net: usize) -> u64 {
-        let mut previous = NONE;
-        let mut index = self.nets[net].groups;
-        while index != NONE {
-            let group = self.groups[index as usize];
-            if group.time_fs == self.now_fs {
-                match previous {
-                    NONE => self.nets[net].groups = group.next,
-                    p => self.groups[p as usize].next = group.next,
-                }
+    /// Unlinks the group of `net` that is due now; returns its lanes and their values.
+    fn take_group(&mut self, net: usize) -> (u64, Lanes) {
+        let index = self.nets[net].groups;
+        match self.groups.get(index as usize) {
+            Some(&group) if group.time_fs == self.now_fs => {
+                self.nets[net].groups = group.next;
                 self.groups[index as usize].next = self.free_group;
                 self.free_group = index;
-                return group.mask;
+                (group.mask, group.values)
             }
-            (previous, index) = (index, group.next);
+            _ => (0, Lanes::default()),
         }
-        0
     }
 
     fn apply<O: LaneObserver>(&mut self, net: usize, mask: u64, values: Lanes, observer: &mut O) {
@@ -405,37 +297,37 @@ impl LaneKernel {
                 next
             }
         };
-        let (outputs, set) = (cell.outputs, cell.delays as usize);
+        let (outputs, delays) = (cell.outputs, (cell.model, cell.delays as usize));
         let changed = std::mem::take(&mut cell.changed);
-        self.schedule(outputs[0], value, set, &changed);
+        self.schedule(outputs[0], value, delays, &changed);
         if outputs[1] != NONE {
-            self.schedule(outputs[1], value.not(), set, &changed);
+            self.schedule(outputs[1], value.not(), delays, &changed);
         }
     }
 
-    fn schedule(&mut self, net: u32, value: Lanes, set: usize, changed: &[u64; MAX_INPUTS]) {
+    fn schedule(
+        &mut self,
+        net: u32,
+        value: Lanes,
+        (model, set): (DelayModel, usize),
+        changed: &[u64; MAX_INPUTS],
+    ) {
         let Some(state) = self.nets.get_mut(net as usize) else {
             return;
         };
-        let target = state.value.replaced(state.pending, state.pending_value);
-        let moved = target.differs(value);
-        if moved == 0 {
+        let mut left = state.target.differs(value);
+        if left == 0 {
             return;
         }
-        let cancelled = moved & state.pending;
-        if cancelled != 0 {
-            state.pending &= !cancelled;
-            let mut index = state.groups;
-            while index != NONE {
-                let group = &mut self.groups[index as usize];
-                group.mask &= !cancelled;
-                index = group.next;
+        let pending = left & state.target.differs(state.value);
+        state.target = value;
+        if model == DelayModel::Inertial {
+            let differs = state.value.differs(value);
+            if pending != 0 {
+                self.overtake(net, pending, i64::MIN);
             }
+            left &= differs;
         }
-        let state = &mut self.nets[net as usize];
-        let mut left = moved & state.value.differs(value);
-        state.pending |= left;
-        state.pending_value = state.pending_value.replaced(left, value);
         // Lanes with the same pins changed have the same delays.
         while left != 0 {
             let lane = left.trailing_zeros();
@@ -457,32 +349,58 @@ impl LaneKernel {
                 (value.zero, Logic::Zero),
                 (value.unknown(), Logic::X),
             ] {
-                let mask = mask & alike;
+                let mut mask = mask & alike;
+                if mask == 0 {
+                    continue;
+                }
+                let time_fs = self.now_fs + i64::from(delays_fs[to as usize]);
+                if model == DelayModel::Transport {
+                    mask &= self.overtake(net, mask, time_fs).differs(value);
+                }
                 if mask != 0 {
-                    let time_fs = self.now_fs + i64::from(delays_fs[to as usize]);
-                    self.add(net, time_fs, mask);
+                    self.add(net, time_fs, mask, value);
                 }
             }
         }
     }
 
-    /// Adds lanes to the group of `net` at `time_fs`, making it where there is none.
-    fn add(&mut self, net: u32, time_fs: i64, mask: u64) {
-        let mut index = self.nets[net as usize].groups;
-        while index != NONE {
-            let group = &mut self.groups[index as usize];
-            if group.time_fs == time_fs {
-                group.mask |= mask;
-                return;
+    /// Cancels what is to arrive on `net` in the lanes of `mask` at `time_fs` or later; returns the values that are
+    /// left after everything earlier.
+    fn overtake(&mut self, net: u32, mask: u64, time_fs: i64) -> Lanes {
+        let state = &self.nets[net as usize];
+        let (mut index, mut last) = (state.groups, state.value);
+        while let Some(group) = self.groups.get_mut(index as usize) {
+            if group.time_fs >= time_fs {
+                group.mask &= !mask;
+            } else {
+                last = last.replaced(group.mask, group.values);
             }
             index = group.next;
+        }
+        last
+    }
+
+    /// Adds lanes to the group of `net` at `time_fs`, making it where there is none.
+    fn add(&mut self, net: u32, time_fs: i64, mask: u64, values: Lanes) {
+        let (mut before, mut index) = (NONE, self.nets[net as usize].groups);
+        while let Some(group) = self.groups.get_mut(index as usize) {
+            if group.time_fs == time_fs {
+                group.mask |= mask;
+                group.values = group.values.replaced(mask, values);
+                return;
+            }
+            if group.time_fs > time_fs {
+                break;
+            }
+            (before, index) = (index, group.next);
         }
         let group = Group {
             time_fs,
             mask,
-            next: self.nets[net as usize].groups,
+            values,
+            next: index,
         };
-        let index = match self.free_group {
+        let new = match self.free_group {
             NONE => {
                 self.groups.push(group);
                 self.groups.len() as u32 - 1
@@ -493,41 +411,14 @@ impl LaneKernel {
                 free
             }
         };
-        self.nets[net as usize].groups = index;
+        match before {
+            NONE => self.nets[net as usize].groups = new,
+            before => self.groups[before as usize].next = new,
+        }
         self.wheel.push(Event {
             time_fs,
             net,
             tag: 0,
         });
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn word_operations_are_the_truth_tables() {
-        let values = [Logic::Zero, Logic::One, Logic::X];
-        let lanes = |f: &dyn Fn(usize) -> Logic| {
-            (0..27).fold(Lanes::default(), |mut word, lane| {
-                match f(lane) {
-                    Logic::One => word.one |= 1 << lane,
-                    Logic::Zero => word.zero |= 1 << lane,
-                    _ => {}
-                }
-                word
-            })
-        };
-        let pick = |digit: u32| move |lane: usize| values[lane / 3usize.pow(digit) % 3];
-        let (a, b, s) = (lanes(&pick(0)), lanes(&pick(1)), lanes(&pick(2)));
-        for lane in 0..27 {
-            let (x, y, z) = (pick(0)(lane), pick(1)(lane), pick(2)(lane));
-            assert_eq!(a.and(b).lane(lane), x.and(y));
-            assert_eq!(a.or(b).lane(lane), x.or(y));
-            assert_eq!(a.xor(b).lane(lane), x.xor(y));
-            assert_eq!(a.not().lane(lane), !x);
-            assert_eq!(Lanes::mux(a, b, s).lane(lane), Logic::mux(x, y, z));
-        }
     }
 }

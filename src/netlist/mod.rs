@@ -9,6 +9,7 @@
 //! A [`Module`] is written once and instantiated many times; [`Netlist::elaborate`] stamps it out
 //! into flat arrays in time linear in the number of cells.
 
+mod builder;
 mod cell;
 mod checks;
 mod flat;
@@ -20,14 +21,13 @@ mod timing;
 mod variation;
 mod verilog;
 
+pub use builder::{ModuleBuilder, NetlistError};
 pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS, next_state};
-pub use checks::{CheckKind, CheckLimits};
+pub use checks::{CheckKind, CheckLimits, DataLimit};
 pub use flat::{FlatCell, NetId, Netlist, Scope};
 pub use library::{Arc, CellArcs, Corner, Delay, Library};
-pub use module::{
-    Cell, Direction, Instance, Module, ModuleBuilder, Net, NetlistError, Port, Signal,
-};
+pub use module::{Cell, Direction, Instance, Module, Net, Port, Signal};
 pub use static_timing::{Arrivals, Bound, Edge, Path, StaticTiming, Step, TimingLoop};
-pub use timing::{ArcDelay, CellDelays, Timing};
+pub use timing::{ArcDelay, CellDelays, DelayModel, Timing};
 pub use variation::{Conditions, Mismatch, Process, varied};
 pub use verilog::{write_cells, write_delays, write_modules, write_parametric_cells};

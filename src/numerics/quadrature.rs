@@ -66,8 +66,10 @@ fn refine(
     let middle = 0.5 * (from + to);
     let left = gauss_legendre(f, from, middle);
     let right = gauss_legendre(f, middle, to);
-    if depth == 0 || (left + right - whole).abs() <= error.max(1e-14 * whole.abs()) {
-        return left + right;
+    let both = left + right;
+    let settled = (both - whole).abs() <= error.max(1e-14 * whole.abs());
+    if settled || depth == 0 || !both.is_finite() {
+        return both;
     }
     refine(f, (from, middle), left, error, depth - 1)
         + refine(f, (middle, to), right, error, depth - 1)

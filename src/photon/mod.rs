@@ -12,4 +12,4 @@ pub use budget::{Convention, PhotonBudget, Spot};
 pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
 pub use random::{Poisson, Purpose, normal, random_stream};
 pub use spad::{SPADS, SpadEvent, apply_dead_time};
-pub use stream::{PixelLight, PixelPhotons, PixelStream, StreamConfig, pixel_events};
+pub use stream::{PhotonStream, PixelLight, PixelPhotons, PixelStream, StreamConfig};

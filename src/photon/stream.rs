@@ -65,6 +65,13 @@ pub struct PixelLight {
     pub background_hz: f64,
 }
 
+impl PixelLight {
+    /// Mean number of photons and dark counts in a laser cycle of `config`.
+    pub fn photons_per_cycle(&self, config: &StreamConfig) -> f64 {
+        self.signal_per_cycle + self.background_hz * config.cycle_s()
+    }
+}
+
 /// The avalanches of one macropixel in one exposure.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct PixelPhotons {
@@ -153,22 +160,40 @@ fn uniform_photon(random: &mut Philox, length_fs: i64) -> u64 {
     (time_fs as u64) << SPAD_BITS | word & (SPADS as u64 - 1)
 }
 
-/// All avalanches of pixel number `pixel` in an exposure, dead time applied.
-pub fn pixel_events(config: &StreamConfig, pixel: u32, light: &PixelLight) -> PixelPhotons {
-    let mut stream = PixelStream::new(config, pixel, light);
-    let per_cycle = light.signal_per_cycle + light.background_hz * config.cycle_s();
-    let expected = per_cycle * f64::from(config.laser_cycles);
-    // Five standard deviations of room; the cap keeps a huge request from failing up front.
-    let room = (expected + 5.0 * expected.sqrt() + 16.0).min(1e7);
-    let mut events = Vec::with_capacity(room as usize);
-    let drawn = (0..config.laser_cycles)
-        .map(|cycle| stream.append_cycle(cycle, &mut events) as u64)
-        .sum();
-    let lost_to_dead_time = apply_dead_time(&mut events, config.dead_time);
-    PixelPhotons {
-        events,
-        drawn,
-        lost_to_dead_time,
+/// The photons of a whole array in an exposure.
+#[derive(Debug, Clone)]
+pub struct PhotonStream {
+    config: StreamConfig,
+}
+
+impl PhotonStream {
+    /// Prepares the stream.
+    pub fn new(config: &StreamConfig) -> Self {
+        PhotonStream { config: *config }
+    }
+
+    /// What it was made of.
+    pub fn config(&self) -> &StreamConfig {
+        &self.config
+    }
+
+    /// All avalanches of macropixel number `pixel` under `light` in the exposure, dead time applied.
+    pub fn pixel_events(&self, pixel: u32, light: &PixelLight) -> PixelPhotons {
+        let config = &self.config;
+        let mut stream = PixelStream::new(config, pixel, light);
+        let expected = light.photons_per_cycle(config) * f64::from(config.laser_cycles);
+        // Five standard deviations of room; the cap keeps a huge request from failing up front.
+        let room = (expected + 5.0 * expected.sqrt() + 16.0).min(1e7);
+        let mut events = Vec::with_capacity(room as usize);
+        let drawn = (0..config.laser_cycles)
+            .map(|cycle| stream.append_cycle(cycle, &mut events) as u64)
+            .sum();
+        let lost_to_dead_time = apply_dead_time(&mut events, config.dead_time);
+        PixelPhotons {
+            events,
+            drawn,
+            lost_to_dead_time,
+        }
     }
 }
 
@@ -203,8 +228,7 @@ mod tests {
     fn rates_are_as_asked() {
         let config = config();
         let cycles = f64::from(config.laser_cycles);
-        let background = pixel_events(
-            &config,
+        let background = PhotonStream::new(&config).pixel_events(
             3,
             &PixelLight {
                 signal_per_cycle: 0.0,
@@ -217,8 +241,7 @@ mod tests {
             "{} {mean}",
             background.drawn
         );
-        let signal = pixel_events(
-            &config,
+        let signal = PhotonStream::new(&config).pixel_events(
             3,
             &PixelLight {
                 background_hz: 0.0,
@@ -239,7 +262,7 @@ mod tests {
             signal_per_cycle: 0.0,
             ..LIGHT
         };
-        let photons = pixel_events(&config, 0, &light);
+        let photons = PhotonStream::new(&config).pixel_events(0, &light);
         let mut by_spad = [0u64; SPADS];
         let mut by_eighth = [0u64; 8];
         let period_fs = config.clock.period().as_fs();
@@ -288,7 +311,7 @@ mod tests {
     #[test]
     fn any_cycle_can_be_drawn_alone() {
         let config = config();
-        let whole = pixel_events(&config, 5, &LIGHT);
+        let whole = PhotonStream::new(&config).pixel_events(5, &LIGHT);
         let mut backwards = Vec::new();
         for cycle in (0..config.laser_cycles).rev() {
             PixelStream::new(&config, 5, &LIGHT).append_cycle(cycle, &mut backwards);
@@ -342,7 +365,7 @@ mod tests {
             arrival: Time::ZERO,
             background_hz: 1e9,
         };
-        let photons = pixel_events(&config, 0, &light);
+        let photons = PhotonStream::new(&config).pixel_events(0, &light);
         let per_spad_hz = light.background_hz / SPADS as f64;
         let seen = 1.0 / (1.0 + per_spad_hz * 100e-9);
         let fraction = photons.events.len() as f64 / photons.drawn as f64;
@@ -375,7 +398,7 @@ mod tests {
                 arrival: Time::from_ns(arrival_ns),
                 background_hz,
             };
-            let photons = pixel_events(&config, pixel, &light);
+            let photons = PhotonStream::new(&config).pixel_events( pixel, &light);
             prop_assert_eq!(photons.events.len() as u64 + photons.lost_to_dead_time, photons.drawn);
             prop_assert!(photons.events.is_sorted());
             prop_assert!(photons.events.iter().all(|e| e.time >= Time::ZERO

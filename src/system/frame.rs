@@ -14,10 +14,13 @@ use rayon::prelude::*;
 use super::result::{Frame, PhaseTimes, PixelDepth};
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::engine::waveform::{self, View};
-use crate::engine::{BATCH, Cycle, Engine, EngineError, Gate, GateSimulation, Window, load};
+use crate::engine::{
+    Cycle, Engine, EngineError, Gate, GateSimulation, LitPixel, Window, expose,
+    expose_without_skipping, load, stream_config,
+};
 use crate::files::InputError;
 use crate::guide::GuideMap;
-use crate::photon::{PixelPhotons, SpadEvent, StreamConfig, pixel_events};
+use crate::photon::{PhotonStream, SpadEvent};
 use crate::ranging::{PeakOptions, interpolate};
 use crate::scene::{GroundTruth, Scene};
 use crate::units::Time;
@@ -76,6 +79,8 @@ pub struct FrameSettings {
     pub seed: u64,
     /// Engine of the macropixels.
     pub engine: EngineKind,
+    /// Leave out what the engine can do without; `false` draws and runs everything, for the same histograms.
+    pub skip: bool,
     /// Depth from histograms.
     pub peak: PeakOptions,
 }
@@ -138,6 +143,7 @@ pub fn take_frame(
         exposure,
         seed,
         engine: engine_kind,
+        skip,
         peak,
     } = settings;
     let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
@@ -149,7 +155,8 @@ pub fn take_frame(
     let guide = GuideMap::estimate(scene, rows, cols, *seed);
     times.guide_s = clock.lap();
 
-    // Macropixels without an estimate, or with one out of the P-counter's reach, look as far as they can.
+    // Macropixels without an estimate, or with one out of the P-counter's reach, look as far as they can with their
+    // SPADs switched off.
     let law = WindowLaw::new(sensor, exposure);
     let wanted: Vec<Option<u16>> = guide
         .range_m
@@ -176,41 +183,42 @@ pub fn take_frame(
     }
     times.load_s = clock.lap();
 
-    let stream = StreamConfig {
-        seed: *seed,
-        clock: exposure.clock,
-        stop_periods: exposure.stop_periods,
-        laser_cycles: exposure.laser_cycles,
-        pulse_sigma: scene.pulse_sigma(),
-        dead_time: sensor.dead_time(),
-    };
+    let stream = stream_config(sensor, exposure, *seed, scene.pulse_sigma());
+    let stream = PhotonStream::new(&stream);
     let light = scene.pixel_light(&truth);
-    let photons = |pixel: usize| pixel_events(&stream, pixel as u32, &light[pixel]);
-    let engine = engine_kind.build(sensor, exposure);
-    let batches: Vec<Vec<(Vec<u16>, u64, u64)>> = starts
-        .par_chunks(BATCH)
-        .enumerate()
-        .map(|(batch, starts)| {
-            let pixels = (0..starts.len()).map(|i| batch * BATCH + i);
-            let photons: Vec<PixelPhotons> = pixels.map(photons).collect();
-            let pulses: Vec<&[SpadEvent]> = photons.iter().map(|p| &p.events[..]).collect();
-            let counts = engine.histograms(starts, &pulses)?;
-            exposed(starts.len());
-            let exposed = counts.into_iter().zip(&photons);
-            Ok(exposed
-                .map(|(counts, p)| (counts, p.drawn, p.lost_to_dead_time))
-                .collect())
+    let pixels: Vec<LitPixel> = (0..sensor.pixels())
+        .map(|pixel| LitPixel {
+            number: pixel as u32,
+            start: starts[pixel],
+            light: wanted[pixel].map(|_| light[pixel]),
         })
-        .collect::<Result<_, EngineError>>()?;
-    let exposures = batches.concat();
+        .collect();
+    let photons_expected = light
+        .iter()
+        .map(|light| light.photons_per_cycle(stream.config()) * f64::from(exposure.laser_cycles))
+        .sum();
+    times.light_s = clock.lap();
+
+    let engine = engine_kind.build(sensor, exposure);
+    let exposed = if *skip {
+        expose(&*engine, &stream, &pixels, exposed)?
+    } else {
+        expose_without_skipping(&*engine, &stream, &pixels, exposed)?
+    };
     times.exposure_s = clock.lap();
 
     let probes = probes(&guide);
     probes.par_iter().try_for_each(|probe| {
         let pixel = probe.row * sensor.cols + probe.col;
-        let events = photons(pixel).events;
-        let gate = run_probe(sensor, exposure, probe, starts[pixel], &events)?;
-        let model = &exposures[pixel].0;
+        let LitPixel {
+            number,
+            start,
+            light,
+        } = pixels[pixel];
+        let photons = light.map(|light| stream.pixel_events(number, &light));
+        let events = photons.unwrap_or_default().events;
+        let gate = run_probe(sensor, exposure, probe, start, &events)?;
+        let model = &exposed.histograms[pixel];
         if gate == *model {
             return Ok(());
         }
@@ -224,10 +232,13 @@ pub fn take_frame(
     })?;
     times.probes_s = clock.lap();
 
-    let pixels: Vec<PixelDepth> = (0..sensor.pixels())
+    let depths: Vec<PixelDepth> = (0..sensor.pixels())
         .map(|pixel| {
             let window = law.window(starts[pixel]).open();
-            let counts: Vec<u32> = exposures[pixel].0.iter().map(|&n| n.into()).collect();
+            let counts: Vec<u32> = exposed.histograms[pixel]
+                .iter()
+                .map(|&n| n.into())
+                .collect();
             let measured = wanted[pixel].and(window).and_then(|window| {
                 let found = interpolate(&counts, peak)?;
                 Some(law.time_of(&window, found.position_bins).as_range_m())
@@ -252,14 +263,10 @@ pub fn take_frame(
         rows: sensor.rows,
         cols: sensor.cols,
         bins: sensor.bins,
-        histograms: exposures
-            .iter()
-            .flat_map(|(counts, ..)| counts)
-            .copied()
-            .collect(),
-        pixels,
-        photons: exposures.iter().map(|(_, drawn, _)| drawn).sum(),
-        lost_to_dead_time: exposures.iter().map(|(.., lost)| lost).sum(),
+        histograms: exposed.histograms.concat(),
+        pixels: depths,
+        photons_expected,
+        work: exposed.work,
         load_bits: sensor.load_bits(),
         load_time: load.duration,
         exposure_time: exposure.end(),

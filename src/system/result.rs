@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::engine::Work;
 use crate::units::Time;
 
 /// One macropixel of a frame. Distances are radial, in metres.
@@ -37,6 +38,8 @@ pub struct PhaseTimes {
     pub windows_s: f64,
     /// Serial load at gate level, elaboration included.
     pub load_s: f64,
+    /// Light on every macropixel.
+    pub light_s: f64,
     /// Photon stream and engine.
     pub exposure_s: f64,
     /// Probed macropixels at gate level, waveforms included.
@@ -52,6 +55,7 @@ impl PhaseTimes {
             + self.guide_s
             + self.windows_s
             + self.load_s
+            + self.light_s
             + self.exposure_s
             + self.probes_s
             + self.ranging_s
@@ -71,10 +75,10 @@ pub struct Frame {
     pub histograms: Vec<u16>,
     /// Macropixels, row-major.
     pub pixels: Vec<PixelDepth>,
-    /// Photons that reached a SPAD and would have fired it.
-    pub photons: u64,
-    /// Those that met a SPAD in its dead time.
-    pub lost_to_dead_time: u64,
+    /// Photons and dark counts that the light makes of the whole array on average.
+    pub photons_expected: f64,
+    /// What the engine did, and did not have to do.
+    pub work: Work,
     /// Bits of the serial load.
     pub load_bits: usize,
     /// Time the chip needs for the load.
@@ -184,8 +188,8 @@ mod tests {
                     ..pixel(None, None, false)
                 },
             ],
-            photons: 0,
-            lost_to_dead_time: 0,
+            photons_expected: 0.0,
+            work: Work::default(),
             load_bits: 36,
             load_time: Time::ZERO,
             exposure_time: Time::ZERO,

@@ -66,7 +66,7 @@ impl Counts {
     pub fn ln_probability(&self, k: u64) -> f64 {
         let x = k as f64;
         match *self {
-            Counts::Poisson { mean, .. } if mean == 0.0 => certain(k == 0),
+            Counts::Poisson { mean: 0.0, .. } => certain(k == 0),
             Counts::Poisson { mean, rest } if k == 0 => -mean - rest,
             Counts::Poisson { mean, rest } => {
                 let shift = rest * (x - mean) / mean;

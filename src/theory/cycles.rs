@@ -13,7 +13,7 @@ const MOST_COUNTS: f64 = 1e10;
 /// answer: ties lost for certain need more cycles; ties won for certain, and the Gaussians, promise too much
 /// where counts are few, so the search walks down, in steps of a sixteenth, to the last failure.
 pub fn laser_cycles_for(target: f64, light: &PerCycle, model: Model) -> Option<u64> {
-    if !(target < 1.0) {
+    if target >= 1.0 || target.is_nan() {
         return None;
     }
     let fair = match model {

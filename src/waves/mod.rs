@@ -33,6 +33,7 @@
 mod gtkw;
 mod selection;
 mod vcd;
+mod vcd_header;
 
 pub use gtkw::{Entry, Group, Radix, SaveFile};
 pub use selection::Selection;

@@ -1,14 +1,13 @@
 //! The delays of a file put into a design.
 
 use std::collections::HashMap;
-use std::sync::Arc as Shared;
 
+use super::wires::Wire;
 use super::{DelayPath, Edge, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance, Skipped};
 use crate::files::InputError;
 use crate::netlist::cell::{CellKind, MAX_INPUTS};
-use crate::netlist::flat::{NetId, Netlist};
+use crate::netlist::flat::Netlist;
 use crate::netlist::library::Corner;
-use crate::netlist::module::{Direction, Module};
 use crate::netlist::timing::Timing;
 
 /// What an annotation did.
@@ -24,10 +23,7 @@ pub struct Annotation {
     pub longest_wire_to_d_fs: i64,
 }
 
-const WIRE_TO_D: &str = "wires to D of a flip-flop";
-const WIRE_TO_OUTPUT: &str = "wires to outputs of the chip";
 const LONGEST_ARC: &str = "arcs with several delays, of which the longest is used";
-const UNEQUAL_WIRE: &str = "wires that rise and fall differently into a non-unate arc";
 
 /// Puts the delays of `sdf` in one corner into `timing`: first all arcs in file order, then the wires on top of
 /// them. Wires of an earlier annotation count as part of the arcs.
@@ -42,8 +38,8 @@ pub fn annotate(
     corner: Corner,
 ) -> Result<Annotation, InputError> {
     let mut annotator = Annotator {
-        index: Index::new(netlist),
         netlist,
+        of_kind: cells_by_kind(netlist),
         sdf,
         corner,
         wires: HashMap::new(),
@@ -56,91 +52,36 @@ pub fn annotate(
     Ok(annotator.result)
 }
 
-/// Finds cells by path: scopes by their path, cells within a module by name.
-struct Index<'n> {
-    netlist: &'n Netlist,
-    scopes: HashMap<String, usize>,
-    cells: HashMap<*const Module, HashMap<&'n str, usize>>,
-    of_kind: HashMap<&'static str, Vec<usize>>,
-}
-
-impl<'n> Index<'n> {
-    fn new(netlist: &'n Netlist) -> Self {
-        let mut paths: Vec<String> = Vec::with_capacity(netlist.scopes().len());
-        let mut cells = HashMap::new();
-        for (index, scope) in netlist.scopes().iter().enumerate() {
-            // A parent comes before its children.
-            paths.push(match index {
-                0 => String::new(),
-                _ => join(&paths[scope.parent], &scope.name),
-            });
-            let of_module = || {
-                let names = scope.module.cells().iter().enumerate();
-                names.map(|(i, c)| (c.name.as_str(), i)).collect()
-            };
-            cells
-                .entry(Shared::as_ptr(&scope.module))
-                .or_insert_with(of_module);
-        }
-        let mut of_kind: HashMap<&'static str, Vec<usize>> = HashMap::new();
-        for (index, cell) in netlist.cells().iter().enumerate() {
-            of_kind.entry(cell.kind.name()).or_default().push(index);
-        }
-        let scopes = paths.into_iter().enumerate().map(|(i, p)| (p, i)).collect();
-        Index {
-            netlist,
-            scopes,
-            cells,
-            of_kind,
-        }
+fn cells_by_kind(netlist: &Netlist) -> HashMap<CellKind, Vec<usize>> {
+    let mut cells: HashMap<CellKind, Vec<usize>> = HashMap::new();
+    for (index, cell) in netlist.cells().iter().enumerate() {
+        cells.entry(cell.kind).or_default().push(index);
     }
-
-    fn scope(&self, path: &str) -> Option<usize> {
-        self.scopes.get(path).copied()
-    }
-
-    fn cell(&self, path: &str) -> Option<usize> {
-        let (scope, name) = path.rsplit_once('.').unwrap_or(("", path));
-        let scope = self.scope(scope)?;
-        let module = Shared::as_ptr(&self.netlist.scopes()[scope].module);
-        let local = *self.cells.get(&module)?.get(name)?;
-        Some(self.netlist.cells_of(scope).start + local)
-    }
-}
-
-fn join(path: &str, name: &str) -> String {
-    if path.is_empty() {
-        name.to_owned()
-    } else {
-        format!("{path}.{name}")
-    }
+    cells
 }
 
 /// Delays of one arc by output, by edge of the input, by direction of the output, as far as given.
 type ArcSlots = [[[Option<i64>; 2]; 2]; 2];
 
-/// The wire to one input pin.
-struct Wire {
-    line: usize,
-    rise_fs: i64,
-    fall_fs: i64,
-}
-
-struct Annotator<'n, 's, 'a> {
-    netlist: &'n Netlist,
-    index: Index<'n>,
+pub(super) struct Annotator<'n, 's, 'a> {
+    pub(super) netlist: &'n Netlist,
+    of_kind: HashMap<CellKind, Vec<usize>>,
     sdf: &'s Sdf<'a>,
-    corner: Corner,
-    wires: HashMap<(usize, usize), Wire>,
-    result: Annotation,
+    pub(super) corner: Corner,
+    pub(super) wires: HashMap<(usize, usize), Wire>,
+    pub(super) result: Annotation,
 }
 
 impl Annotator<'_, '_, '_> {
-    fn error<T>(&self, line: usize, message: impl Into<String>) -> Result<T, InputError> {
+    pub(super) fn error<T>(
+        &self,
+        line: usize,
+        message: impl Into<String>,
+    ) -> Result<T, InputError> {
         Err(InputError::at(&self.sdf.source, line, message))
     }
 
-    fn note(&mut self, what: &'static str, line: usize) {
+    pub(super) fn note(&mut self, what: &'static str, line: usize) {
         Skipped::count(&mut self.result.notes, what, line);
     }
 
@@ -157,20 +98,20 @@ impl Annotator<'_, '_, '_> {
                 ),
             ),
             (SdfInstance::Every, Some(kind)) => {
-                let cells = self.index.of_kind.get(kind.name()).cloned();
+                let cells = self.of_kind.get(&kind).cloned();
                 for cell in cells.unwrap_or_default() {
                     self.leaf(timing, entry, cell)?;
                 }
                 Ok(())
             }
             (SdfInstance::Path(path), _) => {
-                let (name, wanted) = if let Some(cell) = self.index.cell(path) {
+                let (name, wanted) = if let Some(cell) = self.netlist.cell(path) {
                     let name = self.netlist.cells()[cell].kind.name();
                     if name == entry.cell_type {
                         return self.leaf(timing, entry, cell);
                     }
                     (path.as_ref(), name)
-                } else if let Some(scope) = self.index.scope(path) {
+                } else if let Some(scope) = self.netlist.scope(path) {
                     let name = self.netlist.scopes()[scope].module.name();
                     if name == entry.cell_type {
                         return self.module(entry, path);
@@ -316,11 +257,21 @@ impl Annotator<'_, '_, '_> {
         }
     }
 
-    fn input(&self, kind: CellKind, name: &str, line: usize) -> Result<usize, InputError> {
+    pub(super) fn input(
+        &self,
+        kind: CellKind,
+        name: &str,
+        line: usize,
+    ) -> Result<usize, InputError> {
         self.pin(kind, kind.inputs(), "input", name, line)
     }
 
-    fn output(&self, kind: CellKind, name: &str, line: usize) -> Result<usize, InputError> {
+    pub(super) fn output(
+        &self,
+        kind: CellKind,
+        name: &str,
+        line: usize,
+    ) -> Result<usize, InputError> {
         self.pin(kind, kind.outputs(), "output", name, line)
     }
 
@@ -373,124 +324,7 @@ impl Annotator<'_, '_, '_> {
         self.error(line, message + "; remove this IOPATH")
     }
 
-    fn interconnect(
-        &mut self,
-        scope: &str,
-        delay: &SdfDelay<'_>,
-        from: &str,
-        to: &str,
-    ) -> Result<(), InputError> {
-        let source = self.net_of(scope, from, delay.line, Direction::Input)?;
-        let target = join(scope, to);
-        if let Some((instance, name)) = target.rsplit_once('.')
-            && let Some(cell) = self.index.cell(instance)
-        {
-            let flat = self.netlist.cells()[cell];
-            let pin = self.input(flat.kind, name, delay.line)?;
-            if flat.inputs[pin] != source {
-                let message = format!("{from} and {to} are not connected; correct one of the two");
-                return self.error(delay.line, message);
-            }
-            self.wire(cell, pin, delay);
-            return Ok(());
-        }
-        self.net_of(scope, to, delay.line, Direction::Output)?;
-        self.note(WIRE_TO_OUTPUT, delay.line);
-        Ok(())
-    }
-
-    /// The net of a cell's output pin, or of a port of the top with this direction.
-    fn net_of(
-        &self,
-        scope: &str,
-        path: &str,
-        line: usize,
-        port: Direction,
-    ) -> Result<NetId, InputError> {
-        let full = join(scope, path);
-        if let Some((instance, name)) = full.rsplit_once('.')
-            && let Some(cell) = self.index.cell(instance)
-        {
-            let flat = self.netlist.cells()[cell];
-            let output = self.output(flat.kind, name, line)?;
-            return Ok(flat.outputs[output]);
-        }
-        let signal = full.split('[').next().unwrap_or("");
-        let top = &self.netlist.scopes()[0].module;
-        let is_port = top
-            .port_signals()
-            .any(|(direction, s)| direction == port && s.name == signal);
-        match self.netlist.net(&full) {
-            Some(net) if is_port => Ok(net),
-            _ => self.error(
-                line,
-                format!(
-                    "{path} is neither a pin of a cell nor a port of the chip that a wire could have here; correct it"
-                ),
-            ),
-        }
-    }
-
-    fn wire(&mut self, cell: usize, pin: usize, delay: &SdfDelay<'_>) {
-        let kind = self.netlist.cells()[cell].kind;
-        let values = [delay.rise, delay.fall].map(|triple| triple.at(self.corner));
-        if !kind.triggers(pin) {
-            let longest = values.into_iter().flatten().max().unwrap_or(0);
-            self.result.longest_wire_to_d_fs = self.result.longest_wire_to_d_fs.max(longest);
-            self.note(WIRE_TO_D, delay.line);
-            return;
-        }
-        let wire = self.wires.entry((cell, pin)).or_insert(Wire {
-            line: delay.line,
-            rise_fs: 0,
-            fall_fs: 0,
-        });
-        wire.line = delay.line;
-        for (member, value) in [&mut wire.rise_fs, &mut wire.fall_fs]
-            .into_iter()
-            .zip(values)
-        {
-            if let Some(fs) = value {
-                *member = fs + if delay.increment { *member } else { 0 };
-            }
-        }
-    }
-
-    fn add_wires(&mut self, timing: &mut Timing) -> Result<(), InputError> {
-        let mut wires: Vec<_> = std::mem::take(&mut self.wires).into_iter().collect();
-        // In the order of the file, so that the first mistake is the one reported.
-        wires.sort_unstable_by_key(|((cell, pin), wire)| (wire.line, *cell, *pin));
-        for ((cell, pin), wire) in wires {
-            let kind = self.netlist.cells()[cell].kind;
-            let mut delays = *timing.of(cell);
-            let arc = &mut delays[pin];
-            let mut unequal = false;
-            for (delay, rises) in [(&mut arc.rise_fs, true), (&mut arc.fall_fs, false)] {
-                let by_edge = [(Edge::Rising, wire.rise_fs), (Edge::Falling, wire.fall_fs)];
-                let causes = by_edge
-                    .iter()
-                    .filter(|(edge, _)| causes(kind, pin, *edge, rises))
-                    .map(|(_, fs)| *fs);
-                let Some(longest) = causes.clone().max() else {
-                    continue;
-                };
-                unequal |= causes.clone().any(|fs| fs != longest);
-                let sum = *delay as i64 + longest;
-                let Ok(fs) = u32::try_from(sum) else {
-                    return self.out_of_range(wire.line, sum);
-                };
-                *delay = fs;
-            }
-            if unequal {
-                self.note(UNEQUAL_WIRE, wire.line);
-            }
-            self.result.wires += 1;
-            timing.set(cell, delays);
-        }
-        Ok(())
-    }
-
-    fn out_of_range<T>(&self, line: usize, fs: i64) -> Result<T, InputError> {
+    pub(super) fn out_of_range<T>(&self, line: usize, fs: i64) -> Result<T, InputError> {
         let message =
             format!("the delay becomes {fs} fs; keep what is added up between 0 and 4.29 µs");
         self.error(line, message)
@@ -499,7 +333,7 @@ impl Annotator<'_, '_, '_> {
 
 /// Whether an edge of an input pin can make an output of the cell rise (or fall). A flip-flop has one delay for
 /// Q and Q̄, so that each of its edges causes both.
-fn causes(kind: CellKind, pin: usize, edge: Edge, output_rises: bool) -> bool {
+pub(super) fn causes(kind: CellKind, pin: usize, edge: Edge, output_rises: bool) -> bool {
     let rises = edge == Edge::Rising;
     match (kind, pin) {
         (CellKind::Inv | CellKind::Nand2 | CellKind::Nor2, _) => rises != output_rises,

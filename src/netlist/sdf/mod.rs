@@ -35,10 +35,12 @@
 //!   for the output but samples D when CK's net rises, not one wire delay later.
 
 mod annotate;
+mod entries;
 mod parser;
 #[cfg(test)]
 mod tests;
 mod tokens;
+mod wires;
 mod writer;
 
 pub use annotate::{Annotation, annotate};

@@ -1,0 +1,182 @@
+//! Exposing macropixels to light: what every engine is asked for, and what it tells of its work.
+//!
+//! An engine takes macropixels with their start values and the light on them and gives histograms. How it comes by
+//! photons is its own business: [`full_stream`] draws every photon of the exposure and hands the pulses to the engine;
+//! an engine that needs fewer photons, or none, overrides [`Engine::expose`].
+
+use std::iter::Sum;
+use std::ops::AddAssign;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{Engine, EngineError};
+use crate::chip::{Exposure, SensorConfig};
+use crate::photon::{PhotonStream, PixelLight, PixelPhotons, SpadEvent, StreamConfig};
+use crate::units::Time;
+
+/// A macropixel and the light on it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LitPixel {
+    /// Its number in the array, row-major: the key of its photons.
+    pub number: u32,
+    /// The start value in its P-counter.
+    pub start: u16,
+    /// What shines on it; `None` where its SPADs are switched off, as they are without a guide.
+    pub light: Option<PixelLight>,
+}
+
+/// Histograms, and what they took.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Exposed {
+    /// Counts of every macropixel and bin, bin 0 earliest.
+    pub histograms: Vec<Vec<u16>>,
+    /// What was simulated.
+    pub work: Work,
+}
+
+/// What an engine did, and what it had no need to do. Sums over macropixels.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Work {
+    /// Macropixels asked for.
+    pub macropixels: u64,
+    /// Those not simulated because their SPADs are switched off.
+    pub skipped_dark: u64,
+    /// Those not simulated because their window never opens.
+    pub skipped_closed: u64,
+    /// Photons and dark counts drawn.
+    pub photons_drawn: u64,
+    /// SPAD pulses that the engine looked at.
+    pub pulses: u64,
+    /// Drawn photons that would have been such pulses, had they not met a blind SPAD.
+    pub lost_to_dead_time: u64,
+    /// CLK periods of the exposure, over all macropixels.
+    pub clk_periods: u64,
+    /// Those that were simulated, one by one or because a photon fell into them.
+    pub clk_periods_visited: u64,
+}
+
+impl AddAssign for Work {
+    fn add_assign(&mut self, other: Self) {
+        self.macropixels += other.macropixels;
+        self.skipped_dark += other.skipped_dark;
+        self.skipped_closed += other.skipped_closed;
+        self.photons_drawn += other.photons_drawn;
+        self.pulses += other.pulses;
+        self.lost_to_dead_time += other.lost_to_dead_time;
+        self.clk_periods += other.clk_periods;
+        self.clk_periods_visited += other.clk_periods_visited;
+    }
+}
+
+impl Sum for Work {
+    fn sum<I: Iterator<Item = Self>>(iter: I) -> Self {
+        iter.fold(Work::default(), |mut sum, work| {
+            sum += work;
+            sum
+        })
+    }
+}
+
+/// The stream of light for a sensor in an exposure. `pulse_sigma` is that of the laser pulse with all jitter.
+pub fn stream_config(
+    config: &SensorConfig,
+    exposure: &Exposure,
+    seed: u64,
+    pulse_sigma: Time,
+) -> StreamConfig {
+    StreamConfig {
+        seed,
+        clock: exposure.clock,
+        stop_periods: exposure.stop_periods,
+        laser_cycles: exposure.laser_cycles,
+        pulse_sigma,
+        dead_time: config.dead_time(),
+    }
+}
+
+/// Exposes `pixels` on as many threads as rayon has, in batches of the engine's liking; `done` is told of
+/// macropixels as they are finished. Neither threads nor batches change the histograms.
+///
+/// # Errors
+/// As [`Engine::expose`].
+pub fn expose<E: Engine + ?Sized>(
+    engine: &E,
+    stream: &PhotonStream,
+    pixels: &[LitPixel],
+    done: impl Fn(usize) + Sync,
+) -> Result<Exposed, EngineError> {
+    in_batches(engine, pixels, done, |batch| engine.expose(stream, batch))
+}
+
+/// As [`expose`], but draws every photon of every macropixel and lets the engine run them all. The histograms are the
+/// same; what it took is not.
+///
+/// # Errors
+/// As [`Engine::histograms`].
+pub fn expose_without_skipping<E: Engine + ?Sized>(
+    engine: &E,
+    stream: &PhotonStream,
+    pixels: &[LitPixel],
+    done: impl Fn(usize) + Sync,
+) -> Result<Exposed, EngineError> {
+    in_batches(engine, pixels, done, |batch| {
+        full_stream(engine, stream, batch)
+    })
+}
+
+fn in_batches<E: Engine + ?Sized>(
+    engine: &E,
+    pixels: &[LitPixel],
+    done: impl Fn(usize) + Sync,
+    expose: impl Fn(&[LitPixel]) -> Result<Exposed, EngineError> + Sync,
+) -> Result<Exposed, EngineError> {
+    let batches: Vec<Exposed> = pixels
+        .par_chunks(engine.batch())
+        .map(|batch| {
+            let exposed = expose(batch)?;
+            done(batch.len());
+            Ok(exposed)
+        })
+        .collect::<Result<_, EngineError>>()?;
+    let work = batches.iter().map(|batch| batch.work).sum();
+    let histograms = batches.into_iter().flat_map(|batch| batch.histograms);
+    Ok(Exposed {
+        histograms: histograms.collect(),
+        work,
+    })
+}
+
+/// Draws every photon of the exposure and gives the pulses to [`Engine::histograms`].
+///
+/// # Errors
+/// As [`Engine::histograms`].
+pub fn full_stream<E: Engine + ?Sized>(
+    engine: &E,
+    stream: &PhotonStream,
+    pixels: &[LitPixel],
+) -> Result<Exposed, EngineError> {
+    let photons: Vec<PixelPhotons> = pixels
+        .iter()
+        .map(|pixel| match &pixel.light {
+            Some(light) => stream.pixel_events(pixel.number, light),
+            None => PixelPhotons::default(),
+        })
+        .collect();
+    let starts: Vec<u16> = pixels.iter().map(|pixel| pixel.start).collect();
+    let pulses: Vec<&[SpadEvent]> = photons.iter().map(|p| &p.events[..]).collect();
+    let histograms = engine.histograms(&starts, &pulses)?;
+    let config = stream.config();
+    let clk_periods =
+        pixels.len() as u64 * u64::from(config.stop_periods) * u64::from(config.laser_cycles);
+    let work = Work {
+        macropixels: pixels.len() as u64,
+        photons_drawn: photons.iter().map(|p| p.drawn).sum(),
+        pulses: photons.iter().map(|p| p.events.len() as u64).sum(),
+        lost_to_dead_time: photons.iter().map(|p| p.lost_to_dead_time).sum(),
+        clk_periods,
+        clk_periods_visited: clk_periods,
+        ..Work::default()
+    };
+    Ok(Exposed { histograms, work })
+}
