@@ -3,8 +3,9 @@
 use super::claim::{Published::*, Row};
 use super::design::{ROUNDED_LIGHT_M_PER_S, TABLE_6_BACKGROUND_HZ, TABLE_6_BIN_M, TABLE_6_BIN_S};
 use crate::report::{Axis, Chart, Grid, Style};
+use crate::theory::capacity::full_bins;
 use crate::theory::detection::{Model, Ties};
-use crate::theory::partial::{Cost, Goal, Link, Models, System};
+use crate::theory::partial::{Cost, Goal, Link, Models, Purpose, System};
 use crate::theory::precision;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
@@ -211,31 +212,97 @@ pub fn demonstrator_rows() -> Vec<Row> {
     ]
 }
 
-/// Ranges of a curve, m.
-fn ranges_m(to_m: u32) -> impl Iterator<Item = f64> {
-    (1..=2 * to_m).map(|i| f64::from(i) * 0.5)
+/// Laser cycles of a system's schemes against range. What zooming detects and which windows sliding visits changes
+/// only from window to window, so that is computed once a window.
+struct Curves {
+    system: System,
+    to_m: u32,
+    /// Detection cycles of zooming, by the target's window.
+    detecting: Vec<f64>,
+    /// Cycles of sliding, by the target's window.
+    sliding: Vec<f64>,
 }
 
-fn curve(to_m: u32, cost: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
-    ranges_m(to_m).map(|z_m| (z_m, cost(z_m))).collect()
+/// Points (x, y).
+type Points = Vec<(f64, f64)>;
+
+impl Curves {
+    fn of(system: System, to_m: u32) -> Self {
+        let windows = full_bins(f64::from(to_m), system.window_m);
+        let window_end_m = |window: u32| f64::from(window) * system.window_m;
+        let detecting = (1..=windows).map(|window| {
+            let steps = system.zooming(window_end_m(window)).steps;
+            let detections = steps.iter().filter(|step| step.purpose != Purpose::Measure);
+            detections.map(|step| step.laser_cycles).sum()
+        });
+        let mut sum = 0.0;
+        let sliding = system.sliding(window_end_m(windows), 0).steps;
+        let sliding = sliding.iter().map(|step| {
+            sum += step.laser_cycles;
+            sum
+        });
+        Curves {
+            system,
+            to_m,
+            detecting: detecting.collect(),
+            sliding: sliding.collect(),
+        }
+    }
+
+    /// `cost` of the measurement's cycles and the target's window (from 0), every metre.
+    fn points(&self, cost: impl Fn(f64, usize) -> f64) -> Points {
+        let ranges = (1..=self.to_m).map(f64::from);
+        ranges
+            .map(|z_m| {
+                let window = full_bins(z_m, self.system.window_m) as usize - 1;
+                (z_m, cost(self.system.measure(z_m).laser_cycles, window))
+            })
+            .collect()
+    }
+
+    fn full(&self) -> Points {
+        self.points(|measuring, _| measuring)
+    }
+
+    fn detecting(&self) -> Points {
+        let mut points = self.points(|_, window| self.detecting[window]);
+        points.retain(|p| p.1 > 0.0);
+        points
+    }
+
+    fn zooming(&self) -> Points {
+        self.points(|measuring, window| self.detecting[window] + measuring)
+    }
+
+    fn sliding(&self) -> Points {
+        self.points(|_, window| self.sliding[window])
+    }
+
+    fn penalty_of_zooming(&self) -> Points {
+        self.points(|measuring, window| 1.0 + self.detecting[window] / measuring)
+    }
+
+    fn penalty_of_sliding(&self) -> Points {
+        self.points(|measuring, window| self.sliding[window] / measuring)
+    }
 }
 
 /// Fig. 35: laser cycles of a full histogram.
 pub fn figure_35() -> Vec<Chart> {
-    let system = long_range();
     let fits = |z_m: f64| SPEED_OF_LIGHT_M_PER_S / (2.0 * z_m * 30.0);
+    let needed = Curves::of(long_range(), 200).full();
     vec![
         Chart::new(
             "Laser cycles for 0.1 m (Table 6, 5 ns bins), and what a frame at 30 fps holds",
             Axis::linear("distance (m)").between(0.0, 205.0),
             Axis::log("laser cycles").between(1.0, 1e6),
         )
+        .with("needed, Cramér-Rao", Style::Line, needed)
         .with(
-            "needed, Cramér-Rao",
+            "that fit a frame",
             Style::Line,
-            curve(200, |z| system.measure(z).laser_cycles),
+            (5..=200).map(|z| (f64::from(z), fits(f64::from(z)))),
         )
-        .with("that fit a frame", Style::Line, curve(200, fits))
         .with(
             "published, both at 200 m",
             Style::Points,
@@ -246,14 +313,7 @@ pub fn figure_35() -> Vec<Chart> {
 
 /// Fig. 42: laser cycles of the detection step.
 pub fn figure_42() -> Vec<Chart> {
-    let detection = |system: System| {
-        curve(200, move |z| {
-            let cost = system.zooming(z);
-            cost.laser_cycles() - system.measure(z).laser_cycles
-        })
-        .into_iter()
-        .filter(|p| p.1 > 0.0)
-    };
+    let detecting = |system: System| Curves::of(system, 200).detecting();
     vec![
         Chart::new(
             "Laser cycles of zooming's detection step (16 bins of 12.5 m, P_D 99.7 %)",
@@ -263,12 +323,12 @@ pub fn figure_42() -> Vec<Chart> {
         .with(
             "every photon counts (thesis)",
             Style::Line,
-            detection(long_range()),
+            detecting(long_range()),
         )
         .with(
             "one hit per bin and cycle (this chip)",
             Style::Dashed,
-            detection(one_hit(long_range())),
+            detecting(one_hit(long_range())),
         ),
     ]
 }
@@ -276,60 +336,54 @@ pub fn figure_42() -> Vec<Chart> {
 /// Fig. 43: laser cycles of each window of sliding.
 pub fn figure_43() -> Vec<Chart> {
     let steps = long_range().sliding(200.0, 0).steps;
-    let each = steps.iter().map(|step| (step.range_m, step.laser_cycles));
+    let each: Points = steps
+        .iter()
+        .map(|step| (step.range_m, step.laser_cycles))
+        .collect();
     let mut sum = 0.0;
-    let total = steps.iter().map(|step| {
-        sum += step.laser_cycles;
-        (step.range_m, sum)
+    let total = each.iter().map(|&(end_m, cycles)| {
+        sum += cycles;
+        (end_m, sum)
     });
+    let total: Points = total.collect();
     vec![
         Chart::new(
             "Sliding: laser cycles of each window, and of all up to it",
             Axis::linear("end of the window (m)"),
             Axis::linear("laser cycles"),
         )
-        .with("all windows so far", Style::Line, total.collect::<Vec<_>>())
+        .with("all windows so far", Style::Line, total)
         .with("this window", Style::Bars, each),
     ]
 }
 
 fn schemes(title: &str, system: System, to_m: u32) -> Chart {
-    let cost =
-        |scheme: fn(&System, f64) -> Cost| curve(to_m, move |z| scheme(&system, z).laser_cycles());
+    let curves = Curves::of(system, to_m);
     Chart::new(
         title,
         Axis::linear("distance (m)"),
         Axis::log("laser cycles"),
     )
-    .with("full and guided", Style::Line, cost(System::full))
-    .with("zooming", Style::Line, cost(System::zooming))
-    .with(
-        "sliding",
-        Style::Line,
-        cost(|system, z| system.sliding(z, 0)),
-    )
+    .with("full and guided", Style::Line, curves.full())
+    .with("zooming", Style::Line, curves.zooming())
+    .with("sliding", Style::Line, curves.sliding())
 }
 
 fn penalties(title: &str, system: System, to_m: u32) -> Chart {
-    let ratio = |system: System, scheme: fn(&System, f64) -> Cost| {
-        curve(to_m, move |z| penalty(&scheme(&system, z), &system.full(z)))
-    };
+    let curves = Curves::of(system, to_m);
+    let chip = Curves::of(one_hit(system), to_m);
     Chart::new(
         title,
         Axis::linear("distance (m)"),
         Axis::log("penalty (×)"),
     )
-    .with("guided", Style::Line, ratio(system, System::full))
-    .with("zooming", Style::Line, ratio(system, System::zooming))
-    .with(
-        "sliding",
-        Style::Line,
-        ratio(system, |system, z| system.sliding(z, 0)),
-    )
+    .with("guided", Style::Line, [(1.0, 1.0), (f64::from(to_m), 1.0)])
+    .with("zooming", Style::Line, curves.penalty_of_zooming())
+    .with("sliding", Style::Line, curves.penalty_of_sliding())
     .with(
         "zooming, one hit per bin and cycle",
         Style::Dashed,
-        ratio(one_hit(system), System::zooming),
+        chip.penalty_of_zooming(),
     )
 }
 

@@ -7,6 +7,7 @@ use crate::chip::SensorConfig;
 use crate::photon::Atmosphere;
 use crate::report::{Axis, Chart, Style};
 use crate::theory::detection::{self, Model, PerCycle, Ties};
+use crate::theory::precision::cramer_rao;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Laser cycles of the demonstrator's exposure: 80 kHz for 200 ms.
@@ -26,8 +27,9 @@ fn metres(time_s: f64) -> f64 {
 fn bound_m(range_m: f64, klux: f64) -> f64 {
     let mut system = demonstrator();
     system.link.background_hz = demonstrator_light(klux);
+    system.models.precision = cramer_rao;
     let one_frame = LASER_HZ * EXPOSURE_S;
-    // The cycles that one metre of precision takes tell what these many give.
+    // The cycles that a millimetre takes tell what these many give.
     system.goal.precision_m = 1e-3;
     (system.measure(range_m).laser_cycles / one_frame).sqrt() * 1e-3
 }
