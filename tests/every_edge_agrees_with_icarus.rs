@@ -51,8 +51,6 @@ use scenario::Scenario;
 
 /// Whose waves are compared.
 const NAMES: [&str; 2] = ["the kernel", "Icarus"];
-/// How many random sensors are compared.
-const SENSORS: u64 = 12;
 /// How long the circuits go on after the last drive.
 const SETTLING: Time = Time::from_ns(2);
 
@@ -193,15 +191,14 @@ fn compare_all(what: &str, strategy: impl Strategy<Value = Case>) {
     all.get().print(what, cases() as u64, start);
 }
 
-/// Runs one random macropixel, with its load path, in both simulators.
-fn compare_sensor(seed: u64) -> Figures {
-    let scenario = Scenario::random(&mut StdRng::seed_from_u64(seed), 1, 1);
+/// Runs one macropixel, with its load path, in both simulators.
+fn compare_sensor(scenario: &Scenario) -> Figures {
     let Scenario {
         config,
         exposure,
         starts,
         ..
-    } = &scenario;
+    } = scenario;
     let pulses = scenario.pulses();
     let folder = tempfile::tempdir().unwrap();
     let plan = StimulusPlan::new(config, exposure, 1, starts, &pulses);
@@ -228,10 +225,21 @@ fn random_macropixels() {
     }
     let start = Instant::now();
     let mut all = Figures::default();
-    for seed in 0..SENSORS {
-        all = all + compare_sensor(seed);
+    // One with every P-counter there is.
+    let mut wanted = scenario::p_counters();
+    let sensors = wanted.len() as u64;
+    let mut seeds = 0..10_000;
+    while !wanted.is_empty() {
+        let seed = seeds.next().expect("every P-counter is drawn now and then");
+        let scenario = Scenario::random(&mut StdRng::seed_from_u64(seed), 1, 1);
+        let config = &scenario.config;
+        let p_counter = (config.p_counter, config.tap, config.after_borrow);
+        if let Some(index) = wanted.iter().position(|&wanted| wanted == p_counter) {
+            wanted.swap_remove(index);
+            all = all + compare_sensor(&scenario);
+        }
     }
-    all.print("macropixels", SENSORS, start);
+    all.print("macropixels", sensors, start);
 }
 
 #[test]

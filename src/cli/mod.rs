@@ -112,9 +112,15 @@ fn is_closed_pipe(error: &anyhow::Error) -> bool {
 
 fn is_bad_input(error: &anyhow::Error) -> bool {
     error.is::<InputError>()
-        || matches!(error.downcast_ref(), Some(EngineError::Race(_)))
         || matches!(
             error.downcast_ref(),
-            Some(FrameError::Input(_) | FrameError::Engine(EngineError::Race(_)))
+            Some(EngineError::Race(_) | EngineError::Irregular(_))
+        )
+        || matches!(
+            error.downcast_ref(),
+            Some(
+                FrameError::Input(_)
+                    | FrameError::Engine(EngineError::Race(_) | EngineError::Irregular(_))
+            )
         )
 }

@@ -7,10 +7,12 @@
 //! | [`Window`] | only the CLK periods a start value can see, through the window law | `Cycle` |
 //!
 //! All take the same start value and SPAD pulses and give the same histogram. `Cycle` and `Window` assume what
-//! the window law can promise, and refuse a configuration in which two signals race.
+//! the window law can promise, and refuse a configuration in which two signals race. `Window` also refuses a
+//! P-counter that raises LOCAL_STOP more than once in a laser cycle.
 
 mod cycle;
 mod gate;
+mod hardware_events;
 mod lanes;
 mod light;
 pub mod load;
@@ -23,6 +25,7 @@ mod window;
 
 pub use cycle::Cycle;
 pub use gate::{Gate, GateSimulation};
+pub use hardware_events::{HardwareEvent, HardwareEventKind, HardwareEventReport, HardwareEvents};
 pub use lanes::LaneSimulation;
 pub use light::{
     Exposed, LitPixel, Work, expose, expose_without_skipping, full_stream, stream_config,
@@ -83,6 +86,9 @@ pub enum EngineError {
         "{0}, so only the gate engine can tell what is counted; use --engine gate or change clk_hz, stop_phase_ps or corner"
     )]
     Race(&'static str),
+    /// The window law has no single window for this start value.
+    #[error("{0}, so the window engine cannot tell what is counted; use --engine cycle or gate")]
+    Irregular(&'static str),
     /// The engine works without photons.
     #[error(
         "the {0} engine knows no single photons and cannot replay recorded ones; use --engine window"

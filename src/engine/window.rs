@@ -54,6 +54,7 @@ impl Engine for Window<'_> {
         let window = match self.law.window(start) {
             window_law::Window::Open(window) => window,
             window_law::Window::Never => return Ok(vec![0; self.config.bins]),
+            window_law::Window::Irregular(why) => return Err(EngineError::Irregular(why)),
             window_law::Window::Race(why) => return Err(EngineError::Race(why)),
         };
         // A conventional cycle is latched by the STOP edge that ends it; the exposure's first STOP edge

@@ -20,6 +20,7 @@
 //! simulators agree with this one, ties included. The hot loop neither allocates (buckets keep
 //! their memory), nor hashes, nor touches a string.
 
+mod check_banks;
 mod check_report;
 mod checks;
 mod compiled;
@@ -28,6 +29,7 @@ mod lanes;
 mod observer;
 mod simulation;
 mod stimulus;
+mod trace_hash;
 mod transport;
 mod wheel;
 
@@ -40,3 +42,4 @@ pub use lanes::{LaneDrive, LaneKernel, LaneObserver};
 pub use observer::{Observer, Recorder};
 pub use simulation::{Kernel, Statistics};
 pub use stimulus::{Drive, Stimulus, clock, in_order, merge};
+pub use trace_hash::TraceHash;

@@ -169,6 +169,24 @@ impl CheckLimits {
         }
     }
 
+    /// Every limit times `factor`, rounded to whole femtoseconds.
+    pub fn scaled(&self, factor: f64) -> Self {
+        let delay = |limit: Delay| limit.times(factor);
+        let data = |limit: DataLimit| DataLimit {
+            rise: delay(limit.rise),
+            fall: delay(limit.fall),
+        };
+        CheckLimits {
+            setup: data(self.setup),
+            hold: data(self.hold),
+            recovery: delay(self.recovery),
+            removal: delay(self.removal),
+            clock_high: delay(self.clock_high),
+            clock_low: delay(self.clock_low),
+            control_high: delay(self.control_high),
+        }
+    }
+
     /// The limit of one check in one corner, fs; that of setup and hold for D changing in the direction of `edge`,
     /// which the other checks ignore.
     pub const fn toward(&self, check: CheckKind, edge: Edge, corner: Corner) -> u32 {

@@ -203,6 +203,13 @@ impl Module {
         own + below
     }
 
+    /// Layout area of this module and everything below it, as [`CellKind::area`] counts it.
+    pub fn area(&self) -> u64 {
+        let own: u64 = self.cells.iter().map(|c| c.kind.area() as u64).sum();
+        let below: u64 = self.instances.iter().map(|i| i.module.area()).sum();
+        own + below
+    }
+
     /// Leaf cells in this module and everything below it.
     pub fn total_cells(&self) -> usize {
         self.cells.len()

@@ -57,7 +57,7 @@ impl Edge {
         }
     }
 
-    const fn opposite(self) -> Self {
+    pub(super) const fn opposite(self) -> Self {
         match self {
             Edge::Rise => Edge::Fall,
             Edge::Fall => Edge::Rise,

@@ -1,10 +1,13 @@
-//! The delays of an elaborated design in one corner: those of the library, or of each instance by itself.
+//! The delays and limits of an elaborated design in one corner: those of the library, or of each instance by itself.
 //!
 //! Nominal designs share one set of delays per kind of cell. A cell whose delays are changed (mismatch,
 //! back-annotation) gets a set of its own. So does one that delays as a wire does ([`DelayModel`]).
 
+use std::collections::BTreeMap;
+
 use super::cell::{CellKind, MAX_INPUTS};
 use super::flat::Netlist;
+use super::instance_limits::InstanceLimits;
 use super::library::{Corner, Library};
 use crate::logic::Logic;
 
@@ -43,13 +46,16 @@ impl ArcDelay {
 /// Delays of one cell by input pin.
 pub type CellDelays = [ArcDelay; MAX_INPUTS];
 
-/// Delays of every cell of a netlist.
+/// Delays of every cell of a netlist, and limits of every flip-flop.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Timing {
     sets: Vec<CellDelays>,
     /// By index into `sets`.
     models: Vec<DelayModel>,
     of_cell: Vec<u32>,
+    /// The library's limits by kind of cell, and those of single cells.
+    limits: Vec<InstanceLimits>,
+    own_limits: BTreeMap<usize, InstanceLimits>,
 }
 
 impl Timing {
@@ -66,6 +72,10 @@ impl Timing {
                 .collect(),
             models: vec![DelayModel::Inertial; CellKind::ALL.len()],
             of_cell: netlist.cells().iter().map(|c| c.kind as u32).collect(),
+            limits: CellKind::ALL
+                .map(|kind| InstanceLimits::of(library.checks(kind), corner))
+                .into(),
+            own_limits: BTreeMap::new(),
         }
     }
 
@@ -91,6 +101,17 @@ impl Timing {
     pub fn set_model(&mut self, cell: usize, model: DelayModel) {
         let own = self.own_set(cell);
         self.models[own] = model;
+    }
+
+    /// Limits of one cell, which is of this kind.
+    pub fn limits(&self, cell: usize, kind: CellKind) -> &InstanceLimits {
+        let own = self.own_limits.get(&cell);
+        own.unwrap_or(&self.limits[kind as usize])
+    }
+
+    /// Gives one cell limits of its own.
+    pub fn set_limits(&mut self, cell: usize, limits: InstanceLimits) {
+        self.own_limits.insert(cell, limits);
     }
 
     /// Index of a set that is this cell's alone.

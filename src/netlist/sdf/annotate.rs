@@ -1,4 +1,4 @@
-//! The delays of a file put into a design.
+//! The delays and limits of a file put into a design.
 
 use std::collections::HashMap;
 
@@ -17,7 +17,9 @@ pub struct Annotation {
     pub arcs: usize,
     /// Input pins that a wire delay was added to.
     pub wires: usize,
-    /// Delays that could not be taken over as they are.
+    /// Timing checks of single instances whose limits were taken over.
+    pub checks: usize,
+    /// Delays and limits that could not be taken over as they are.
     pub notes: Vec<Skipped>,
     /// Longest wire delay left out because it ends at a flip-flop's D, fs.
     pub longest_wire_to_d_fs: i64,
@@ -25,7 +27,7 @@ pub struct Annotation {
 
 const LONGEST_ARC: &str = "arcs with several delays, of which the longest is used";
 
-/// Puts the delays of `sdf` in one corner into `timing`: first all arcs in file order, then the wires on top of
+/// Puts delays and limits of `sdf` in one corner into `timing`: first all arcs in file order, then the wires on top of
 /// them. Wires of an earlier annotation count as part of the arcs.
 ///
 /// # Errors
@@ -158,6 +160,7 @@ impl Annotator<'_, '_, '_> {
         entry: &SdfCell<'_>,
         cell: usize,
     ) -> Result<(), InputError> {
+        self.limits(timing, entry, cell)?;
         let kind = self.netlist.cells()[cell].kind;
         let mut slots: [ArcSlots; MAX_INPUTS] = Default::default();
         let mut last_line = [entry.line; MAX_INPUTS];
