@@ -1,11 +1,15 @@
 //! Claims 2 to 6: what the thesis says of the chip, measured on its netlist.
 
 use super::claim::{Published::*, Row};
-use crate::chip::{Exposure, SensorConfig, load_path, p_counter, sensor};
-use crate::engine::timing::{MacropixelTiming, gate_works, phases, ripple, shortest_period};
+use crate::chip::{
+    Exposure, PCounter, SensorConfig, load_path, p_counter, p_counter_timing, sensor,
+};
+use crate::engine::timing::{
+    Limits, MacropixelTiming, Silicon, gate_works, phases, ripple, shortest_period,
+};
 use crate::engine::{GateSimulation, load};
 use crate::kernel::Recorder;
-use crate::netlist::{CellKind, Library, Netlist, Timing};
+use crate::netlist::{CellKind, Corner};
 use crate::photon::SpadEvent;
 use crate::report::{Axis, Chart, Style};
 use crate::units::Time;
@@ -13,9 +17,8 @@ use crate::units::Time;
 /// CLK periods in a laser cycle of the gate-level runs.
 const STOP_PERIODS: u32 = 64;
 
-fn nominal(netlist: &Netlist) -> Timing {
-    Timing::nominal(netlist, &Library::default(), SensorConfig::default().corner)
-}
+/// Typical corner, 50 °C.
+const NOMINAL: Silicon = Silicon::nominal(Corner::Typ);
 
 /// Edges of one macropixel during its second laser cycle at gate level.
 struct Edges {
@@ -87,7 +90,7 @@ impl Edges {
 /// Claim 2: the ripple, and the CLK period it allows.
 pub fn ripple_rows() -> Vec<Row> {
     let config = SensorConfig::default();
-    let timing = MacropixelTiming::of(&config, &nominal);
+    let timing = MacropixelTiming::of(&config, &NOMINAL, Limits::Ignored, (0, 0));
     let starts = [0, 1, 5, 21, 31, 42, 52, 60];
     let simulated = starts
         .map(|start| Edges::of(start).ripple_ns())
@@ -95,9 +98,11 @@ pub fn ripple_rows() -> Vec<Row> {
         .fold(f64::NEG_INFINITY, f64::max);
     let slow = Time::from_ns(20);
     let ns = |time: Option<Time>| time.map_or(f64::NAN, Time::as_ns);
-    let by_gates = shortest_period(slow, |p| gate_works(&config, &nominal, p, Time::ZERO));
+    let by_gates = shortest_period(slow, |p| {
+        gate_works(&config, &NOMINAL, Limits::Ignored, p, Time::ZERO)
+    });
     let by_paths = shortest_period(slow, |p| timing.works(p, Time::ZERO));
-    let below = timing.strobe_period() - Time::from_ps(20);
+    let below = timing.forbidden(0).0 - Time::from_ps(2);
     let any_phase = shortest_period(below, |p| phases(p).any(|phase| timing.works(p, phase)));
     vec![
         Row::holds("worst ripple, longest path", "ns", Exactly("1.2"), timing.ripple.delay().as_ns())
@@ -118,7 +123,7 @@ pub fn ripple_rows() -> Vec<Row> {
 pub fn figure_56() -> Vec<Chart> {
     let delays: Vec<(usize, Time, Time)> = (1..=12)
         .map(|bits| {
-            let (longest, simulated) = ripple(bits, &nominal);
+            let (longest, simulated) = ripple(&counter_of(bits), &NOMINAL);
             (bits, longest, simulated)
         })
         .collect();
@@ -261,23 +266,48 @@ pub fn load_rows() -> Vec<Row> {
     ]
 }
 
+/// A P-counter of `bits` stages.
+fn counter_of(bits: usize) -> SensorConfig {
+    SensorConfig {
+        counter_bits: bits,
+        ..SensorConfig::default()
+    }
+}
+
+/// Transistors that one more stage of a P-counter takes.
+fn stage_transistors(p_counter: PCounter) -> f64 {
+    let of = |bits| {
+        let config = SensorConfig {
+            p_counter,
+            ..counter_of(bits)
+        };
+        p_counter::circuit(&config).transistors() as f64
+    };
+    of(9) - of(8)
+}
+
 /// Claim 6: transistors.
 pub fn area_rows() -> Vec<Row> {
     let flip_flop = f64::from(CellKind::Dffr.transistors());
-    let stage = (p_counter::circuit(9).transistors() - p_counter::circuit(8).transistors()) as f64;
+    let stage = stage_transistors(PCounter::Ripple);
     let config = SensorConfig {
         rows: 1,
         cols: 1,
         ..SensorConfig::default()
     };
     let macropixel = crate::chip::macropixel::circuit(&config).transistors() as f64;
-    let counter = p_counter::circuit(config.counter_bits).transistors() as f64;
-    let timing = crate::chip::p_counter_timing::circuit().transistors() as f64;
+    let counter = p_counter::circuit(&config).transistors() as f64;
+    let timing = p_counter_timing::circuit(config.after_borrow).transistors() as f64;
     let library = f64::from(CellKind::Dffsr.transistors());
     vec![
         Row::holds("transistors of a stage beyond its two flip-flops", "", Exactly("4"), stage - 2.0 * flip_flop)
             .remark("The difference between P-counters of nine and eight stages."),
         Row::holds("transistors of an OR gate that the mux replaces", "", Exactly("6"), f64::from(CellKind::Or2.transistors())),
+        Row::ours("transistors of a stage", "", stage),
+        Row::ours("transistors of a stage of set/reset flip-flops", "", stage_transistors(PCounter::SetReset))
+            .remark("Fig. 51b, the HSLIDAR's."),
+        Row::ours("transistors of a synchronous stage", "", stage_transistors(PCounter::Synchronous)),
+        Row::ours("transistors of a stage with a comparator", "", stage_transistors(PCounter::Comparator)),
         Row::holds("library flip-flop over the custom one", "", Within("3", 0.5), library / flip_flop)
             .differs("The published ratio is one of layout areas (Fig. 52); in transistors it is 36 to 24, and the model has no layout."),
         Row::holds("P-counter and its timing, share of the macropixel", "%", AtMost("5"), 100.0 * (counter + timing) / macropixel)

@@ -160,8 +160,14 @@ pub fn detection_rows() -> Vec<Row> {
             .remark("σ = √mean. \"Closely matches\" from there on."),
         Row::holds("largest deviation from N = 100 on, Gaussian as printed", "", Within("0", 0.02), printed)
             .differs("Eq. 18 and 19 print the mean where σ = √mean is meant; with that the formula cannot match the Monte Carlo beside it."),
-        Row::holds("P_D after one laser cycle, M = 8", "", Within("0.125", 0.02), formula(8, 1, lot))
-            .remark("\"Converges to 1/M\"."),
+        Row::holds(
+            "P_D in the limit of no counts, M = 8",
+            "",
+            Exactly("0.125"),
+            detection::poisson(1e-9, 1e-9, 8, Ties::Random).probability,
+        )
+        .remark("\"Converges to 1/M\": with ties by lot."),
+        Row::ours("P_D after one laser cycle, M = 8", "", formula(8, 1, lot)),
         Row::ours("the same, ties lost (as the text says)", "", formula(8, 1, Model::Poisson(Ties::Strict))),
         Row::ours("the same, ties won (as Eq. 17 is printed)", "", formula(8, 1, Model::Poisson(Ties::Loose))),
         Row::ours("P_D at N = 1000, M = 2", "", formula(2, 1000, lot)),

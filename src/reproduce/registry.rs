@@ -219,7 +219,7 @@ pub const TABLES: [Table; 4] = [
     ),
     table(
         16,
-        "published sensors (Tables 5 and 16) in one light",
+        "published sensors (Tables 5 and 16) in the demonstrator's light, to a precision of one bin",
         sensors::table,
     ),
     table(

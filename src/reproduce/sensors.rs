@@ -313,7 +313,7 @@ pub fn figure_28() -> Vec<Chart> {
     vec![
         Chart::new(
             "Histogram bins per ToF pixel of published sensors",
-            Axis::linear("year").between(2018.5, 2023.5),
+            Axis::linear("year").between(2018.0, 2024.0),
             Axis::linear("bins").between(0.0, 64.0),
         )
         .with("stacked", Style::Points, bins(true))
