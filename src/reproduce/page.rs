@@ -287,10 +287,14 @@ fn gauge(row: &Row) -> String {
     };
     let x = 60.0 + 20.0 * position.clamp(-2.8, 2.8);
     format!(
-        "<svg class=gauge viewBox='0 0 120 14' width=120 height=14><rect class=track x=0 y=6 width=120 height=2 />\
-         <rect class=band x={left} y=3 width={} height=8 /><circle class={} cx={x:.1} cy=7 r=4 /></svg>",
+        "<svg class=gauge viewBox='0 0 120 14' width=120 height=14><rect x=0 y=6 width=120 height=2 fill=#ddd />\
+         <rect x={left} y=3 width={} height=8 fill=#bfe3cf /><circle cx={x:.1} cy=7 r=4 fill={} /></svg>",
         right - left,
-        class(row.verdict())
+        match row.verdict() {
+            Verdict::Agrees => "#0b7a45",
+            Verdict::Fails => "#c01818",
+            _ => "#d98200",
+        }
     )
 }
 
@@ -346,6 +350,5 @@ table{border-collapse:collapse;width:100%;font-size:.92em}
 th,td{padding:3px 8px;text-align:right;border-bottom:1px solid #e6e6e6}
 th:first-child,td:first-child{text-align:left}th{color:#666;font-weight:600}
 tr.note td{text-align:left;color:#666;font-size:.9em;border-bottom:1px solid #e6e6e6;padding:0 8px 5px 20px}
-.gauge .track{fill:#ddd}.gauge .band{fill:#bfe3cf}.gauge .agrees{fill:#0b7a45}.gauge .differs{fill:#d98200}.gauge .fails{fill:#c01818}
 figure{margin:.5em 0}svg.chart{width:100%;height:auto}
 ";
