@@ -3,6 +3,8 @@
 
 mod budget;
 mod optics;
+mod philox;
+mod pulse;
 mod random;
 pub mod solar;
 mod spad;
@@ -10,6 +12,12 @@ mod stream;
 
 pub use budget::{Convention, PhotonBudget, Spot};
 pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
-pub use random::{Poisson, Purpose, normal, random_stream};
-pub use spad::{SPADS, SpadEvent, apply_dead_time};
-pub use stream::{PhotonStream, PixelLight, PixelPhotons, PixelStream, StreamConfig};
+pub use pulse::{PulseError, PulseShape};
+pub use random::{Poisson, Purpose, normal, philox_key, random_stream};
+pub use spad::{
+    AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, SPADS, SpadEvent, SpadModel, apply_dead_time,
+};
+pub use stream::{
+    Draw, GROUP, PLACE_BITS, PhotonStream, PixelLight, PixelPhotons, PixelStream, Place, Run, SLOT,
+    SignalPhoton, StreamConfig, place, time_in_slot_fs,
+};
