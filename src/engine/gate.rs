@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::hardware_events::HardwareEvents;
 use super::lanes::LaneSimulation;
 use super::stimulus::{Pins, Schedule, StimulusPlan};
 use super::{Engine, EngineError};
@@ -79,6 +80,17 @@ impl<'a> GateSimulation<'a> {
             .policy(policy)
             .not_before(self.schedule().reset_end)
             .asynchronous(&self.netlist, front_end::is_asynchronous_sampler)
+    }
+
+    /// A watch for hardware events in every macropixel, from the end of the power-up reset on, to run it with.
+    pub fn hardware_events(&self) -> HardwareEvents {
+        let paths = self.of_pixels(str::to_owned);
+        HardwareEvents::new(
+            &self.netlist,
+            self.config,
+            &paths,
+            self.schedule().reset_end,
+        )
     }
 
     /// Simulates load and exposure to the end.

@@ -1,12 +1,25 @@
-//! Light and the SPADs that see it: photon budget (thesis 3.2.1), dead time, and the
-//! random-access photon stream that drives every engine.
+//! Light and the SPADs that see it: photon budget (thesis 3.2.1), sunlight, lens and filter, dead time,
+//! and the random-access photon stream that drives every engine.
 
 mod budget;
+mod gaussian;
+mod optics;
+mod philox;
+mod pulse;
 mod random;
+pub mod solar;
 mod spad;
 mod stream;
 
-pub use budget::{Convention, PhotonBudget};
-pub use random::{Poisson, Purpose, normal, random_stream};
-pub use spad::{SPADS, SpadEvent, apply_dead_time};
-pub use stream::{PhotonStream, PixelLight, PixelPhotons, PixelStream, StreamConfig};
+pub use budget::{Convention, PhotonBudget, Spot};
+pub use gaussian::{PulseEdge, pulse_share};
+pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
+pub use pulse::{PulseError, PulseShape};
+pub use random::{Poisson, Purpose, normal, philox_key, random_stream};
+pub use spad::{
+    AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, SPADS, SpadEvent, SpadModel, apply_dead_time,
+};
+pub use stream::{
+    Draw, GROUP, PLACE_BITS, PhotonStream, PixelLight, PixelPhotons, PixelStream, Place, Run, SLOT,
+    SignalPhoton, StreamConfig, place, time_in_slot_fs,
+};

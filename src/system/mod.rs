@@ -2,6 +2,9 @@
 
 mod frame;
 mod result;
+mod speed;
+pub mod stability;
 
 pub use frame::{EngineKind, FrameError, FrameSettings, Probe, take_frame};
 pub use result::{Frame, PhaseTimes, PixelDepth, Summary};
+pub use speed::{SPEED_LASER_CYCLES, SpeedFrame};
