@@ -52,13 +52,12 @@ fn thompson_is_equation_20() {
     let by_hand =
         ((2.25 + 1.0 / 12.0) / 1e3 + 4.0 * 1.7724538509055159 * 3.375 * 100.0 / 1e6f64).sqrt();
     assert!((thompson(1.0, 1.5, 100.0, 1e3) / by_hand - 1.0).abs() < 1e-15);
-    // With much signal the two models agree (Fig. 33), with little they part.
+    // With much signal the two models agree (Fig. 33), with less Thompson promises up to a tenth too much.
     let ratio = |signal| cramer_rao(1.0, 1.5, 100.0, signal) / thompson(1.0, 1.5, 100.0, signal);
+    let (strong, weak) = (ratio(1e5), ratio(1e3));
     assert!(
-        (ratio(1e5) - 1.0).abs() < 0.05 && (ratio(100.0) - 1.0).abs() > 0.05,
-        "{} {}",
-        ratio(1e5),
-        ratio(100.0)
+        (1.0..1.02).contains(&strong) && (1.09..1.10).contains(&weak),
+        "{strong} {weak}"
     );
 }
 

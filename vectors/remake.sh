@@ -17,6 +17,8 @@ for claim in json.load(sys.stdin)["claims"]:
     for row in claim["rows"]:
         print(claim["claim"], row["quantity"], row["verdict"], sep=" | ")' > verdicts.txt
 
-# High-precision references of the theory (mpmath, some minutes).
+# References of `gdtof pareto --stability` and, some minutes, of the theory; need Python with mpmath.
+python3 ../stability/make.py
 cd ../theory
 python3 detection.py
+python3 precision.py

@@ -6,8 +6,8 @@ use std::sync::OnceLock;
 /// Points of the rule; it is exact for polynomials up to degree 31.
 const POINTS: usize = 16;
 
-/// Panels are halved at most this often; beyond it they are narrower than rounding.
-const DEEPEST: u32 = 48;
+/// Panels are halved at most this often.
+const DEEPEST: u32 = 24;
 
 /// Nodes in (−1, 1) and weights of the rule.
 fn rule() -> &'static [(f64, f64); POINTS] {
@@ -42,37 +42,47 @@ pub fn gauss_legendre(f: impl Fn(f64) -> f64, from: f64, to: f64) -> f64 {
     half * sum
 }
 
-/// ∫ f from the first to the last of `breaks` (ascending), to about `tolerance` of its size per panel, at
-/// best 10⁻¹⁴.
+/// ∫ f from the first to the last of `breaks` (ascending), to about `tolerance` of its size per panel.
 ///
-/// Put a break at every kink and near every narrow peak; between two of them `f` should be smooth.
+/// A panel is also good when its own halves agree with it to ten times `tolerance`; that must not be less than
+/// the rounding noise of `f`, or every panel is halved for nothing. Put a break at every kink and near every narrow peak; between two of them `f` should be smooth.
 pub fn integrate(f: impl Fn(f64) -> f64, breaks: &[f64], tolerance: f64) -> f64 {
     let panels = || breaks.windows(2).map(|p| (p[0], p[1]));
     let whole: Vec<f64> = panels().map(|(a, b)| gauss_legendre(&f, a, b)).collect();
     let size: f64 = whole.iter().map(|s| s.abs()).sum();
+    let enough = Enough {
+        absolute: tolerance * size,
+        relative: 10.0 * tolerance,
+    };
     panels()
         .zip(whole)
-        .map(|((a, b), s)| refine(&f, (a, b), s, tolerance * size, DEEPEST))
+        .map(|((a, b), s)| refine(&f, (a, b), s, &enough, DEEPEST))
         .sum()
+}
+
+/// How closely a panel and its halves have to agree.
+struct Enough {
+    absolute: f64,
+    relative: f64,
 }
 
 fn refine(
     f: &impl Fn(f64) -> f64,
     (from, to): (f64, f64),
     whole: f64,
-    error: f64,
+    enough: &Enough,
     depth: u32,
 ) -> f64 {
     let middle = 0.5 * (from + to);
     let left = gauss_legendre(f, from, middle);
     let right = gauss_legendre(f, middle, to);
     let both = left + right;
-    let settled = (both - whole).abs() <= error.max(1e-14 * whole.abs());
+    let settled = (both - whole).abs() <= enough.absolute.max(enough.relative * whole.abs());
     if settled || depth == 0 || !both.is_finite() {
         return both;
     }
-    refine(f, (from, middle), left, error, depth - 1)
-        + refine(f, (middle, to), right, error, depth - 1)
+    refine(f, (from, middle), left, enough, depth - 1)
+        + refine(f, (middle, to), right, enough, depth - 1)
 }
 
 #[cfg(test)]

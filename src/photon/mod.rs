@@ -2,6 +2,7 @@
 //! and the random-access photon stream that drives every engine.
 
 mod budget;
+mod gaussian;
 mod optics;
 mod philox;
 mod pulse;
@@ -11,6 +12,7 @@ mod spad;
 mod stream;
 
 pub use budget::{Convention, PhotonBudget, Spot};
+pub use gaussian::{PulseEdge, pulse_share};
 pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
 pub use pulse::{PulseError, PulseShape};
 pub use random::{Poisson, Purpose, normal, philox_key, random_stream};

@@ -6,6 +6,7 @@ mod counts;
 mod cycles;
 pub mod design;
 pub mod detection;
+pub mod estimators;
 mod gaussian;
 pub mod partial;
 pub mod precision;

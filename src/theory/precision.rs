@@ -168,7 +168,9 @@ fn ln_root_mean(ln_information: impl Fn(f64) -> f64, breaks: &[f64]) -> f64 {
         return f64::INFINITY;
     }
     let span = breaks[breaks.len() - 1] - breaks[0];
-    let mean = integrate(|t| (least - ln_information(t)).exp(), breaks, 1e-15) / span;
+    // Logarithms are rounded in proportion to their size, which no quadrature gets below.
+    let tolerance = 1e-15 * (1.0 + least.abs());
+    let mean = integrate(|t| (least - ln_information(t)).exp(), breaks, tolerance) / span;
     0.5 * (mean.ln() - least)
 }
 
