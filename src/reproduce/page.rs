@@ -95,7 +95,7 @@ pub fn markdown(report: &Report) -> String {
         ]);
     }
     if !report.claims.is_empty() {
-        let _ = write!(out, "{}\n", glance.markdown());
+        let _ = writeln!(out, "{}", glance.markdown());
     }
     for result in &report.claims {
         let claim = &result.claim;
@@ -104,7 +104,7 @@ pub fn markdown(report: &Report) -> String {
             "## Claim {}: {}\n\n{}\n\n",
             claim.number, claim.title, claim.source
         );
-        let _ = write!(out, "{}\n", grid(&result.rows).markdown());
+        let _ = writeln!(out, "{}", grid(&result.rows).markdown());
         for row in result.rows.iter().filter(|row| !row.notes().is_empty()) {
             let _ = writeln!(out, "* {}: {}", row.what, row.notes());
         }
@@ -116,7 +116,7 @@ pub fn markdown(report: &Report) -> String {
         grid,
     } in &report.tables
     {
-        let _ = write!(out, "## Table {number}: {title}\n\n{}\n", grid.markdown());
+        let _ = writeln!(out, "## Table {number}: {title}\n\n{}", grid.markdown());
     }
     for result in &report.figures {
         let _ = write!(out, "## Fig. {}: {}\n\n", result.number, result.title);
@@ -130,9 +130,9 @@ pub fn markdown(report: &Report) -> String {
 /// The report in one HTML file.
 pub fn html(report: &Report) -> String {
     let mut body = String::new();
-    let _ = write!(
+    let _ = writeln!(
         body,
-        "<h1>Published and computed</h1>\n<p class=lead>{}</p>\n<p class=tally>{}</p>\n",
+        "<h1>Published and computed</h1>\n<p class=lead>{}</p>\n<p class=tally>{}</p>",
         escaped(INTRODUCTION),
         tallies(report)
     );
@@ -141,9 +141,9 @@ pub fn html(report: &Report) -> String {
     }
     for result in &report.claims {
         let claim = &result.claim;
-        let _ = write!(
+        let _ = writeln!(
             body,
-            "<section id=c{0}><h2><span class='badge {2}'>{3}</span> {0}. {1}</h2>\n<p class=source>{4}</p>\n",
+            "<section id=c{0}><h2><span class='badge {2}'>{3}</span> {0}. {1}</h2>\n<p class=source>{4}</p>",
             claim.number,
             escaped(claim.title),
             class(overall(&result.rows)),
@@ -159,9 +159,9 @@ pub fn html(report: &Report) -> String {
         grid,
     } in &report.tables
     {
-        let _ = write!(
+        let _ = writeln!(
             body,
-            "<section id=t{number}><h2>Table {number}: {}</h2>\n{}</section>\n",
+            "<section id=t{number}><h2>Table {number}: {}</h2>\n{}</section>",
             escaped(title),
             grid_html(grid)
         );
@@ -172,13 +172,13 @@ pub fn html(report: &Report) -> String {
         charts,
     } in &report.figures
     {
-        let _ = write!(
+        let _ = writeln!(
             body,
-            "<section id=f{number}><h2>Fig. {number}: {}</h2>\n",
+            "<section id=f{number}><h2>Fig. {number}: {}</h2>",
             escaped(title)
         );
         charts.iter().for_each(|chart| {
-            let _ = write!(body, "<figure>{}</figure>\n", scalable(&chart.svg()));
+            let _ = writeln!(body, "<figure>{}</figure>", scalable(&chart.svg()));
         });
         body += "</section>\n";
     }
@@ -203,9 +203,9 @@ fn glance(report: &Report) -> String {
             .iter()
             .filter(|r| r.published != Published::Nothing)
             .count();
-        let _ = write!(
+        let _ = writeln!(
             out,
-            "<a class='{}' href='#c{}'><b>{}</b> {}<i>{agree} of {compared} agree</i></a>\n",
+            "<a class='{}' href='#c{}'><b>{}</b> {}<i>{agree} of {compared} agree</i></a>",
             class(verdict),
             result.claim.number,
             result.claim.number,
@@ -249,18 +249,18 @@ fn claim_table(rows: &[Row]) -> String {
         for cell in &cells[..6] {
             let _ = write!(out, "<td>{}</td>", escaped(cell));
         }
-        let _ = write!(
+        let _ = writeln!(
             out,
-            "<td>{}</td><td><span class='badge {}'>{}</span></td></tr>\n",
+            "<td>{}</td><td><span class='badge {}'>{}</span></td></tr>",
             gauge(row),
             class(verdict),
             verdict.text()
         );
         let notes = row.notes();
         if !notes.is_empty() {
-            let _ = write!(
+            let _ = writeln!(
                 out,
-                "<tr class=note><td colspan=8>{}</td></tr>\n",
+                "<tr class=note><td colspan=8>{}</td></tr>",
                 escaped(&notes)
             );
         }

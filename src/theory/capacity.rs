@@ -107,7 +107,7 @@ pub fn full_bins(range: f64, bin: f64) -> u32 {
 
 /// Bits of a counter that holds `count`; at least one.
 pub fn bits_for(count: f64) -> u32 {
-    debug_assert!(count >= 0.0 && count < 1e18);
+    debug_assert!((0.0..1e18).contains(&count));
     (count.ceil() as u64).max(1).ilog2() + 1
 }
 

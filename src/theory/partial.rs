@@ -307,7 +307,7 @@ mod tests {
             });
             detects.collect()
         };
-        assert_eq!(candidates(3.0), []);
+        assert!(candidates(3.0).is_empty());
         assert_eq!(candidates(3.2), [2]);
         assert_eq!(candidates(24.9), [8]);
         assert_eq!(candidates(25.0), [2, 8]);
