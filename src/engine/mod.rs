@@ -3,11 +3,12 @@
 //! | engine | what it simulates | held to |
 //! |---|---|---|
 //! | [`Gate`] | every net of the netlist, with its delays | Icarus Verilog on the exported netlist |
-//! | [`Cycle`] | every CLK period, through the blocks' reference models | `Gate` |
+//! | [`Cycle`] | every CLK period of the levelised netlist, 512 macropixels to a word | `Gate` |
 //! | [`Window`] | only the CLK periods a start value can see, through the window law | `Cycle` |
 //!
 //! All take the same start value and SPAD pulses and give the same histogram. `Cycle` and `Window` assume what
-//! the window law can promise, and refuse a configuration in which two signals race.
+//! the window law can promise, and refuse a configuration in which two signals race. The macropixel's
+//! plain-Rust reference model ([`crate::chip::macropixel::Model`]) is the tests' slow judge of all of them.
 
 mod cycle;
 mod gate;
@@ -21,7 +22,7 @@ pub mod timing;
 pub mod waveform;
 mod window;
 
-pub use cycle::Cycle;
+pub use cycle::{Cycle, PackedPulses, Unlevelled};
 pub use gate::{Gate, GateSimulation};
 pub use lanes::LaneSimulation;
 pub use light::{

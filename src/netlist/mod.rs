@@ -27,6 +27,7 @@ pub use checks::{CheckKind, CheckLimits};
 pub use flat::{FlatCell, NetId, Netlist, Scope};
 pub use library::{Arc, CellArcs, Corner, Delay, Library};
 pub use module::{Cell, Direction, Instance, Module, Net, Port, Signal};
+pub(crate) use static_timing::caused;
 pub use static_timing::{Arrivals, Bound, Edge, Path, StaticTiming, Step, TimingLoop};
 pub use timing::{ArcDelay, CellDelays, Timing};
 pub use variation::{Conditions, Mismatch, Process, varied};
