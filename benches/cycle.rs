@@ -7,7 +7,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use guided_dtof::chip::{Exposure, SensorConfig};
 use guided_dtof::engine::{Cycle, stream_config};
-use guided_dtof::photon::{PixelLight, SpadEvent, pixel_events};
+use guided_dtof::photon::{PhotonStream, PixelLight, SpadEvent};
 use guided_dtof::units::Time;
 
 const STOP_PERIODS: u32 = 520;
@@ -29,14 +29,14 @@ fn cycle(c: &mut Criterion) {
             ..SensorConfig::default()
         };
         let exposure = Exposure::new(&config, STOP_PERIODS, laser_cycles);
-        let stream = stream_config(&config, &exposure, Time::from_ps(1_900), 1);
+        let stream = PhotonStream::new(&stream_config(&config, &exposure, 1, Time::from_ps(1_900)));
         let light = PixelLight {
             signal_per_cycle: 1.0,
             arrival: Time::from_ns(765),
             background_hz: 10e6,
         };
         let pulses: Vec<Vec<SpadEvent>> = (0..config.pixels())
-            .map(|pixel| pixel_events(&stream, pixel as u64, &light).events)
+            .map(|pixel| stream.pixel_events(pixel as u32, &light).events)
             .collect();
         let pulses: Vec<&[SpadEvent]> = pulses.iter().map(Vec::as_slice).collect();
         let starts: Vec<u16> = (0..config.pixels())

@@ -73,7 +73,7 @@ struct Bench {
 impl Bench {
     fn new() -> Self {
         let config = SensorConfig::default();
-        let netlist = circuit(config.counter_bits);
+        let netlist = circuit(&config);
         let net = |path| netlist.net(path).expect("a net of the circuit");
         let bus = |path| netlist.signal(path).expect("a bus of the circuit");
         Bench {
@@ -124,13 +124,13 @@ impl Bench {
 }
 
 /// P-counter and timing block, connected as in a macropixel.
-fn circuit(bits: usize) -> Netlist {
+fn circuit(config: &SensorConfig) -> Netlist {
     let mut m = ModuleBuilder::new("tb_p_counter");
     let clk = [m.input("CLK")];
     let stop = [m.input("STOP")];
     let resetb = [m.input("RESETB")];
     let enable = [m.input("ENABLE")];
-    let init = m.input_bus("COUNTER_INIT", bits);
+    let init = m.input_bus("COUNTER_INIT", config.counter_bits);
     let load = [m.input("MEMORY_LOAD")];
     let local_stop = [m.output("LOCAL_STOP")];
     let counter_clk = [m.wire("COUNTER_CLK")];
@@ -138,7 +138,7 @@ fn circuit(bits: usize) -> Netlist {
     let memory_reset = [m.wire("MEMORY_RESET")];
     m.instance(
         "p_counter_timing",
-        &p_counter_timing::circuit(),
+        &p_counter_timing::circuit(config.after_borrow),
         &[
             ("CLK", &clk),
             ("STOP", &stop),
@@ -152,7 +152,7 @@ fn circuit(bits: usize) -> Netlist {
     );
     m.instance(
         "p_counter",
-        &p_counter::circuit(bits),
+        &p_counter::circuit(config),
         &[
             ("COUNTER_INIT", &init),
             ("MEMORY_LOAD", &load),
@@ -262,11 +262,11 @@ fn figure_54(bench: &Bench, vcd: &Path, checks: &mut Checks) -> Result<(), Input
         checks.equal(what, shown(Some(start)), shown(found));
 
         // Every count is read half a period after its edge, when the ripple is over.
-        let mut model = p_counter::Model::new(start as u32);
+        let mut model = p_counter::Model::new(&bench.config, start as u16);
         let expected = std::iter::from_fn(|| {
             (!model.local_stop()).then(|| {
                 model.clock();
-                model.counter_out(bench.config.counter_bits)
+                model.counter_out()
             })
         });
         let edges = clocked.iter().filter(within).filter(|t| **t > in_reset);

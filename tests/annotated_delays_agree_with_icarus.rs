@@ -9,7 +9,7 @@ use std::path::Path;
 use guided_dtof::chip::{Exposure, SensorConfig, sensor};
 use guided_dtof::engine::{GateSimulation, StimulusPlan, export_annotated_verilog};
 use guided_dtof::kernel::Recorder;
-use guided_dtof::netlist::sdf::{Sdf, SdfOptions, annotate, no_checks, write_sdf};
+use guided_dtof::netlist::sdf::{Sdf, SdfOptions, annotate, write_sdf};
 use guided_dtof::netlist::{Corner, Library, Netlist, Timing};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
 use guided_dtof::units::Time;
@@ -62,14 +62,7 @@ fn compare(seed: u64) -> Vec<String> {
     let nominal = Timing::nominal(&netlist, &Library::default(), config.corner);
     let drawn = random_delays(&netlist, &nominal, random);
     let mut text = Vec::new();
-    write_sdf(
-        &mut text,
-        &netlist,
-        [&drawn; 3],
-        &no_checks,
-        SdfOptions::default(),
-    )
-    .unwrap();
+    write_sdf(&mut text, &netlist, [&drawn; 3], SdfOptions::default()).unwrap();
     let text = String::from_utf8(text).unwrap();
     let sdf = Sdf::parse("drawn.sdf", &text).unwrap();
     let mut timing = nominal;

@@ -5,7 +5,7 @@ mod bench;
 
 use bench::{Bench, SETTLING, corners};
 use guided_dtof::chip::{
-    EventType, Overflow, SPADS, correlation, front_end, histogram, metdc, p_counter,
+    AfterBorrow, EventType, Overflow, SPADS, correlation, front_end, histogram, metdc,
     p_counter_timing,
 };
 use guided_dtof::logic::Logic;
@@ -13,100 +13,17 @@ use guided_dtof::netlist::{Corner, Edge, Library, NetId, Netlist, StaticTiming, 
 use guided_dtof::units::Time;
 use proptest::prelude::*;
 
-/// What is done to a P-counter.
-#[derive(Debug, Clone)]
-enum Action {
-    /// A new start value, with COUNTER_RESET held as the timing block holds it.
-    Load(u64),
-    /// A COUNTER_RESET pulse.
-    Reset,
-    /// Edges of COUNTER_CLK this many ps apart.
-    Clocks(u16, i64),
-}
-
-fn actions() -> impl Strategy<Value = Vec<Action>> {
-    let action = prop_oneof![
-        1 => any::<u64>().prop_map(Action::Load),
-        2 => Just(Action::Reset),
-        4 => (0u16..40, 300i64..3_000).prop_map(|(n, gap)| Action::Clocks(n, gap)),
-        1 => (0u16..3_000, 300i64..600).prop_map(|(n, gap)| Action::Clocks(n, gap)),
-    ];
-    prop::collection::vec(action, 1..12)
-}
-
 proptest! {
     #![proptest_config(ProptestConfig { cases: 150, ..ProptestConfig::default() })]
-
-    /// Clock edges are closer together than the ripple is long, and resets come while it is under way: the pauses
-    /// before them are often shorter than it, too.
-    #[test]
-    fn a_p_counter_counts_down_and_stops_once(
-        bits in 1usize..13,
-        corner in corners(),
-        first in any::<u64>(),
-        actions in actions(),
-        pauses in prop::collection::vec(1i64..2_500, 12),
-    ) {
-        let mut bench = Bench::new(&p_counter::circuit(bits), corner);
-        bench.config.counter_bits = bits;
-        let timing = bench.timing();
-        let pulse = timing.stop_to_reset_release - timing.stop_to_reset;
-        let mask = (1u64 << bits) - 1;
-        bench.drive(Time::ZERO, "MEMORY_RESET", true);
-        bench.drive(Time::ZERO, "COUNTER_RESET", true);
-        bench.drive(SETTLING, "MEMORY_RESET", false);
-        let mut now = SETTLING * 2;
-        let mut model = p_counter::Model::new(0);
-        // When LOCAL_STOP is to rise; a reset before that keeps it low.
-        let mut rises: Vec<Time> = Vec::new();
-        let reset_before = |rises: &mut Vec<Time>, time: Time| rises.retain(|&rise| rise < time);
-        for (action, pause) in std::iter::once(&Action::Load(first)).chain(&actions).zip(std::iter::once(&1).chain(&pauses)) {
-            match action {
-                Action::Load(value) => {
-                    reset_before(&mut rises, now);
-                    bench.drive(now, "COUNTER_RESET", true);
-                    bench.number(now, "COUNTER_INIT", value & mask);
-                    bench.pulse(now + SETTLING, SETTLING, "MEMORY_LOAD");
-                    now += SETTLING * 3;
-                    bench.drive(now, "COUNTER_RESET", false);
-                    model = p_counter::Model::new((value & mask) as u32);
-                }
-                Action::Reset => {
-                    reset_before(&mut rises, now);
-                    bench.pulse(now, pulse, "COUNTER_RESET");
-                    now += pulse;
-                    model.reset();
-                }
-                Action::Clocks(edges, gap_ps) => {
-                    for _ in 0..*edges {
-                        // The timing block lets no edge through after LOCAL_STOP.
-                        if model.local_stop() {
-                            break;
-                        }
-                        if model.clock() {
-                            rises.push(now + timing.counter_clk_to_local_stop);
-                        }
-                        bench.pulse(now, Time::from_ps(gap_ps / 2), "COUNTER_CLK");
-                        now += Time::from_ps(*gap_ps);
-                    }
-                }
-            }
-            now += Time::from_ps(*pause);
-        }
-        let (out, local_stop) = (bench.bus("COUNTER_OUT"), bench.net("LOCAL_STOP"));
-        let mut run = bench.start(&["LOCAL_STOP"]);
-        let found = run.number_at(now + SETTLING, &out);
-        prop_assert_eq!(found, Some(model.counter_out(bits)));
-        prop_assert_eq!(run.is_high_at(now + SETTLING, local_stop), Some(model.local_stop()));
-        prop_assert_eq!(run.recorder.rising_edges(local_stop), rises);
-    }
 
     #[test]
     fn the_timing_block_gates_the_clock_and_pulses_the_reset(
         corner in corners(),
+        wraps: bool,
         steps in prop::collection::vec((0usize..5, 800i64..3_000), 1..80),
     ) {
-        let mut bench = Bench::new(&p_counter_timing::circuit(), corner);
+        let after_borrow = if wraps { AfterBorrow::Wrap } else { AfterBorrow::Hold };
+        let mut bench = Bench::new(&p_counter_timing::circuit(after_borrow), corner);
         let timing = bench.timing();
         let names = ["CLK", "STOP", "RESETB", "ENABLE", "LOCAL_STOP"];
         let mut values = [false; 5];
@@ -118,7 +35,7 @@ proptest! {
             values[pin] = !values[pin];
             bench.drive(now, names[pin], values[pin]);
             let [clk, stop, resetb, enable, local_stop] = values;
-            let model = p_counter_timing::Model { clk, resetb, enable, local_stop };
+            let model = p_counter_timing::Model { after_borrow, clk, resetb, enable, local_stop };
             if names[pin] == "CLK" && model.counter_clk() {
                 clk_to_counter_clk.push(now + timing.clk_to_counter_clk);
             }

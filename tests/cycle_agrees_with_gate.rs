@@ -3,6 +3,7 @@
 
 mod scenario;
 
+use guided_dtof::chip::PCounter;
 use guided_dtof::chip::macropixel::Model;
 use guided_dtof::chip::window_law::{Window, WindowLaw};
 use guided_dtof::engine::{Cycle, Engine, Gate};
@@ -34,6 +35,11 @@ fn compare(
         {
             continue;
         }
+        // Set/reset flip-flops are left to the gates.
+        if matches!(config.p_counter, PCounter::SetReset | PCounter::Memoryless) {
+            assert!(Cycle::new(config, exposure).unlevelled().is_some());
+            continue;
+        }
         ran += 1;
         let cycle = Cycle::new(config, exposure);
         // Without the gate engine to fall back on.
@@ -60,7 +66,7 @@ fn as_the_gates_count() {
             .expect("known counts")
     };
     let (ran, unlevelled) = compare(0..60, 64, gates);
-    assert!(ran > 40 && unlevelled * 20 <= ran, "{unlevelled} of {ran}");
+    assert!(ran > 20 && unlevelled * 20 <= ran, "{unlevelled} of {ran}");
 }
 
 #[test]
@@ -83,5 +89,5 @@ fn as_the_reference_model_counts_in_larger_numbers() {
             .collect()
     };
     let (ran, unlevelled) = compare(1_000..1_060, 1_200, model);
-    assert!(ran > 40 && unlevelled * 20 <= ran, "{unlevelled} of {ran}");
+    assert!(ran > 20 && unlevelled * 20 <= ran, "{unlevelled} of {ran}");
 }

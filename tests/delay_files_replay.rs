@@ -50,13 +50,50 @@ fn an_exported_file_changes_nothing_and_a_slower_one_does() {
         let same = replay(here, &["--engine", "gate", "--sdf", "d.sdf"]);
         assert!(plain.status.success() && same.status.success(), "{same:?}");
         assert_eq!(plain.stdout, same.stdout);
-        assert!(String::from_utf8_lossy(&same.stderr).contains("0 wires annotated"));
+        assert!(String::from_utf8_lossy(&same.stderr).contains("0 wires and"));
         let slower = "(DELAYFILE (TIMESCALE 1ps) (CELL (CELLTYPE \"DFFR\") (INSTANCE *)
             (DELAY (INCREMENT (IOPATH (posedge CK) Q (300))))))";
         std::fs::write(here.join("slower.sdf"), slower).unwrap();
         let slow = replay(here, &["--engine", "gate", "--sdf", "slower.sdf"]);
         assert_ne!(plain.stdout, slow.stdout, "{slow:?}");
     }
+}
+
+/// Paths of the flip-flops that break a limit, as the JSON of the checks has them.
+fn violating(here: &Path, sdf: &[&str]) -> Vec<String> {
+    let checks = ["--checks", "report", "--checks-json", "c.json"];
+    let arguments = [&["--engine", "gate"][..], sdf, &checks].concat();
+    let output = replay(here, &arguments);
+    assert!(output.status.success(), "{output:?}");
+    let text = std::fs::read_to_string(here.join("c.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let violations = report["violations"].as_array().unwrap().iter();
+    let by_fault = violations.filter(|v| v["is_asynchronous"] == false);
+    by_fault
+        .map(|v| {
+            format!(
+                "{} {}",
+                v["kind"].as_str().unwrap(),
+                v["cell"].as_str().unwrap()
+            )
+        })
+        .collect()
+}
+
+#[test]
+fn a_setup_tightened_on_one_instance_makes_that_one_violate() {
+    let folder = folder();
+    let here = folder.path();
+    assert_eq!(violating(here, &[]), [""; 0]);
+    let cell = "mp_r0_c1.metdc.shift_3";
+    let tight = format!(
+        "(DELAYFILE (TIMESCALE 1ps) (CELL (CELLTYPE \"DFFR\") (INSTANCE {cell})
+            (TIMINGCHECK (SETUP D (posedge CK) (2800)))))"
+    );
+    std::fs::write(here.join("tight.sdf"), tight).unwrap();
+    let found = violating(here, &["--sdf", "tight.sdf"]);
+    let is_it = |v: &String| v.starts_with("setup ") && v.ends_with(&format!(".{cell}"));
+    assert!(!found.is_empty() && found.iter().all(is_it), "{found:?}");
 }
 
 #[test]

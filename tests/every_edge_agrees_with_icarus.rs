@@ -38,7 +38,10 @@ use every_edge::circuit::{self, Case};
 use every_edge::waves::{Figures, Waves};
 use guided_dtof::engine::{GateSimulation, StimulusPlan, export_verilog};
 use guided_dtof::kernel::{Drive, Kernel, merge};
-use guided_dtof::netlist::{Direction, Module, Netlist, Timing, write_cells, write_modules};
+use guided_dtof::netlist::{
+    Direction, Module, Netlist, Timing, write_cells, write_delays, write_modules,
+    write_parametric_cells,
+};
 use guided_dtof::units::Time;
 use guided_dtof::waves::{Selection, VcdWriter};
 use proptest::prelude::*;
@@ -48,14 +51,18 @@ use scenario::Scenario;
 
 /// Whose waves are compared.
 const NAMES: [&str; 2] = ["the kernel", "Icarus"];
-/// How many random sensors are compared.
-const SENSORS: u64 = 12;
 /// How long the circuits go on after the last drive.
 const SETTLING: Time = Time::from_ns(2);
 
 /// A testbench that replays `drives` into `top` and dumps everything below it until `end`.
-fn testbench(top: &Module, netlist: &Netlist, drives: &[Drive], end: Time) -> String {
-    let mut text = "module tb;\n".to_owned();
+fn testbench(
+    top: &Module,
+    netlist: &Netlist,
+    drives: &[Drive],
+    end: Time,
+    parameters: &str,
+) -> String {
+    let mut text = format!("module tb;\n{parameters}");
     let mut ports = Vec::new();
     let mut pins = Vec::new();
     for (direction, signal) in top.port_signals() {
@@ -102,8 +109,7 @@ fn simulate(
     selection: &Selection,
 ) -> Waves {
     let mut writer = VcdWriter::new(Vec::new(), netlist, selection).unwrap();
-    let timing = Timing::nominal(netlist, &case.cell_library(), case.corner());
-    let mut kernel = Kernel::new(netlist, &timing);
+    let mut kernel = Kernel::new(netlist, &case.timing(netlist));
     let mut stimulus = merge([Box::new(drives.into_iter()) as Box<_>]);
     kernel.run(&mut stimulus, end, &mut writer);
     let top = &netlist.scopes()[0].name;
@@ -121,8 +127,18 @@ fn compare(case: &Case) -> Result<Figures, TestCaseError> {
     write_modules(&mut design, &top).unwrap();
     let design = String::from_utf8(design).unwrap();
     let mut cells = Vec::new();
-    write_cells(&mut cells, &case.cell_library(), case.corner()).unwrap();
-    let bench = testbench(&top, &netlist, &drives, end);
+    let mut parameters = Vec::new();
+    let (library, corner) = (case.cell_library(), case.corner());
+    if case.has_transport() {
+        let nominal = Timing::nominal(&netlist, &library, corner);
+        let timing = case.timing(&netlist);
+        write_parametric_cells(&mut cells, &library, corner).unwrap();
+        write_delays(&mut parameters, "dut", &netlist, &timing, &nominal).unwrap();
+    } else {
+        write_cells(&mut cells, &library, corner).unwrap();
+    }
+    let parameters = String::from_utf8(parameters).unwrap();
+    let bench = testbench(&top, &netlist, &drives, end, &parameters);
     let folder = tempfile::tempdir().unwrap();
     let all = [&cells[..], design.as_bytes(), bench.as_bytes()].concat();
     std::fs::write(folder.path().join("case.v"), all).unwrap();
@@ -175,15 +191,14 @@ fn compare_all(what: &str, strategy: impl Strategy<Value = Case>) {
     all.get().print(what, cases() as u64, start);
 }
 
-/// Runs one random macropixel, with its load path, in both simulators.
-fn compare_sensor(seed: u64) -> Figures {
-    let scenario = Scenario::random(&mut StdRng::seed_from_u64(seed), 1, 1);
+/// Runs one macropixel, with its load path, in both simulators.
+fn compare_sensor(scenario: &Scenario) -> Figures {
     let Scenario {
         config,
         exposure,
         starts,
         ..
-    } = &scenario;
+    } = scenario;
     let pulses = scenario.pulses();
     let folder = tempfile::tempdir().unwrap();
     let plan = StimulusPlan::new(config, exposure, 1, starts, &pulses);
@@ -210,10 +225,21 @@ fn random_macropixels() {
     }
     let start = Instant::now();
     let mut all = Figures::default();
-    for seed in 0..SENSORS {
-        all = all + compare_sensor(seed);
+    // One with every P-counter there is.
+    let mut wanted = scenario::p_counters();
+    let sensors = wanted.len() as u64;
+    let mut seeds = 0..10_000;
+    while !wanted.is_empty() {
+        let seed = seeds.next().expect("every P-counter is drawn now and then");
+        let scenario = Scenario::random(&mut StdRng::seed_from_u64(seed), 1, 1);
+        let config = &scenario.config;
+        let p_counter = (config.p_counter, config.tap, config.after_borrow);
+        if let Some(index) = wanted.iter().position(|&wanted| wanted == p_counter) {
+            wanted.swap_remove(index);
+            all = all + compare_sensor(&scenario);
+        }
     }
-    all.print("macropixels", SENSORS, start);
+    all.print("macropixels", sensors, start);
 }
 
 #[test]

@@ -38,8 +38,7 @@ fn compare(random: &mut StdRng, rows: usize, cols: usize) {
     let local_stops = gate.netlist().signal("LOCAL_STOP").unwrap();
     let mut recorder = Recorder::new(local_stops.clone());
     gate.run(&mut recorder);
-    let loaded: Vec<Option<u16>> = starts.iter().map(|&start| Some(start)).collect();
-    assert_eq!(gate.loaded(), loaded);
+    assert_eq!(gate.loaded(), scenario.loaded());
     let ours: Vec<Vec<i64>> = gate
         .histograms()
         .unwrap()

@@ -1,13 +1,23 @@
 //! 64 macropixels in one lane-parallel simulation: every value change of every net of every lane comes at the
 //! time, and with the value, that it has when the macropixel is simulated alone.
 
+#[allow(dead_code)]
+mod every_edge {
+    pub mod circuit;
+}
 mod scenario;
 
-use guided_dtof::engine::{GateSimulation, LaneSimulation};
-use guided_dtof::kernel::{LaneObserver, Lanes, Observer};
+use std::collections::BTreeMap;
+
+use every_edge::circuit::{self, Case};
+use guided_dtof::engine::{Gate, GateSimulation, LaneSimulation};
+use guided_dtof::kernel::{
+    Drive, Kernel, LANES, LaneDrive, LaneKernel, LaneObserver, Lanes, Observer, in_order,
+};
 use guided_dtof::logic::Logic;
-use guided_dtof::netlist::NetId;
+use guided_dtof::netlist::{Mismatch, NetId, Netlist, Timing, varied};
 use guided_dtof::units::Time;
+use proptest::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use scenario::Scenario;
 
@@ -78,6 +88,96 @@ fn change_by_change() {
                 "seed {seed}, lane {lane}"
             );
             assert_eq!(alone.loaded()[0], together.loaded()[lane]);
+        }
+    }
+}
+
+/// Random circuits with inertial and transport delays: in each lane another part of the stimulus is left out.
+fn compare_circuit(case: &Case, seed: u64) -> Result<(), TestCaseError> {
+    let netlist = Netlist::elaborate(&case.circuit());
+    let timing = case.timing(&netlist);
+    // Lanes know no Z, and no input that is driven twice in one instant.
+    let known = |value| if value == Logic::Z { Logic::X } else { value };
+    let drives: BTreeMap<(Time, NetId), Logic> = case
+        .drives(&netlist)
+        .into_iter()
+        .map(|drive| ((drive.time, drive.net), known(drive.value)))
+        .collect();
+    let random = &mut StdRng::seed_from_u64(seed);
+    let drives: Vec<(u64, Drive)> = drives
+        .into_iter()
+        .map(|((time, net), value)| {
+            let mask = random.random::<u64>() | random.random::<u64>();
+            (mask, Drive::new(time, net, value))
+        })
+        .collect();
+    let end = drives.last().map_or(Time::ZERO, |(_, d)| d.time) + Time::from_ns(2);
+
+    let mut traces = LaneTraces(vec![Vec::new(); LANES]);
+    let together = drives.iter().map(|&(mask, drive)| LaneDrive {
+        time: drive.time,
+        net: drive.net,
+        mask,
+        values: Lanes::all(drive.value),
+    });
+    LaneKernel::new(&netlist, &timing).run(&mut together.peekable(), end, &mut traces);
+    for (lane, mut found) in traces.0.into_iter().enumerate() {
+        let mine = drives.iter().filter(|(mask, _)| mask >> lane & 1 == 1);
+        let mut trace = Trace::default();
+        let mut stimulus = in_order(mine.map(|(_, drive)| *drive).collect());
+        Kernel::new(&netlist, &timing).run(&mut stimulus, end, &mut trace);
+        trace.0.sort_by_key(|(time, net, _)| (*time, *net));
+        found.sort_by_key(|(time, net, _)| (*time, *net));
+        prop_assert_eq!(found, trace.0, "lane {}", lane);
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 150, ..ProptestConfig::default() })]
+
+    #[test]
+    fn in_random_circuits(
+        case in prop_oneof![circuit::flat(), circuit::hierarchical()],
+        seed in any::<u64>(),
+    ) {
+        compare_circuit(&case, seed)?;
+    }
+}
+
+/// Macropixels of which some share their delays and others have their own: lanes take the former, the latter run
+/// alone, and nothing shows which did.
+#[test]
+fn where_macropixels_have_delays_of_their_own() {
+    for seed in 0..4 {
+        let random = &mut StdRng::seed_from_u64(seed);
+        let pixels = random.random_range(2..40);
+        let scenario = Scenario::random(random, 1, pixels);
+        let (config, exposure) = (&scenario.config, &scenario.exposure);
+        let (starts, pulses) = (&scenario.starts, scenario.pulses());
+        let gate = Gate::new(config, exposure);
+        let nominal = gate.nominal_timing();
+        let silicon: Vec<Timing> = (0..3)
+            .map(|seed| {
+                let mismatch = Mismatch { sigma: 0.02, seed };
+                varied(&gate.netlist(), &nominal, 1.0, Some(mismatch))
+            })
+            .chain([nominal.clone()])
+            .collect();
+        let timings: Vec<&Timing> = (0..pixels)
+            .map(|_| &silicon[random.random_range(0..4)])
+            .collect();
+        let found = gate.histograms_with(&timings, starts, &pulses).unwrap();
+        for pixel in 0..pixels {
+            let (start, pulses) = (&starts[pixel..=pixel], &pulses[pixel..=pixel]);
+            let alone = GateSimulation::new(config, exposure, (0, 0), (1, 1), start, pulses);
+            let mut alone = alone.with_timing(timings[pixel]);
+            alone.run(&mut ());
+            assert_eq!(
+                alone.histograms().unwrap()[0],
+                found[pixel],
+                "{seed}, {pixel}"
+            );
         }
     }
 }

@@ -3,7 +3,10 @@
 
 use std::sync::Arc;
 
-use guided_dtof::chip::{Overflow, correlation, front_end, histogram, load_path, metdc, p_counter};
+use guided_dtof::chip::{
+    Overflow, PCounter, SensorConfig, correlation, front_end, histogram, load_path, metdc,
+    p_counter,
+};
 use guided_dtof::kernel::{Drive, Kernel, Observer, merge};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{
@@ -74,6 +77,15 @@ fn check(
     Ok(())
 }
 
+/// A sensor with this P-counter.
+fn sensor(p_counter: PCounter, counter_bits: usize) -> SensorConfig {
+    SensorConfig {
+        p_counter,
+        counter_bits,
+        ..SensorConfig::default()
+    }
+}
+
 /// A random circuit: every cell reads inputs or earlier cells; flip-flops may also read their own Q̄.
 fn random_circuit(choices: &[(usize, [usize; 4], bool)]) -> Arc<Module> {
     let mut m = ModuleBuilder::new("random");
@@ -126,18 +138,18 @@ proptest! {
 
     #[test]
     fn the_chips_blocks_stay_within_their_bounds(
-        block in 0usize..7,
+        block in 0usize..11,
         words in prop::collection::vec(any::<u64>(), 1..12),
     ) {
         let circuit = match block {
             0 => correlation::circuit(),
-            1 => p_counter::circuit(9),
-            2 => front_end::circuit(),
-            3 => metdc::circuit(16),
+            1 => front_end::circuit(),
+            2 => metdc::circuit(16),
             // A saturating bin's FULL gates its own clock: a loop.
-            4 => histogram::circuit(2, 5, Overflow::Wrap),
-            5 => load_path::deserialiser(3, 3),
-            _ => load_path::row_scanner(5),
+            3 => histogram::circuit(2, 5, Overflow::Wrap),
+            4 => load_path::deserialiser(3, 3),
+            5 => load_path::row_scanner(5),
+            _ => p_counter::circuit(&sensor(PCounter::ALL[block % 5], 9)),
         };
         let netlist = Netlist::elaborate(&circuit);
         let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
@@ -145,8 +157,8 @@ proptest! {
     }
 
     #[test]
-    fn the_longest_ripple_is_reached_from_any_start_value(bits in 1usize..=12, start: u16) {
-        let netlist = Netlist::elaborate(&p_counter::circuit(bits));
+    fn the_longest_ripple_is_reached_from_any_start_value(bits in 2usize..=12, start: u16) {
+        let netlist = Netlist::elaborate(&p_counter::circuit(&sensor(PCounter::Ripple, bits)));
         let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
         let net = |name| netlist.net(name).unwrap();
         let (clk, stop) = (net("COUNTER_CLK"), net("LOCAL_STOP"));

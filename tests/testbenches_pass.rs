@@ -50,6 +50,16 @@ fn the_macropixel() {
 }
 
 #[test]
+fn the_ripple_hazard() {
+    let signal = ["quantic4x4", "mp_r0_c1", "LOCAL_STOP"];
+    passes(
+        "tb_ripple_hazard",
+        env!("CARGO_BIN_EXE_tb_ripple_hazard"),
+        &signal,
+    );
+}
+
+#[test]
 fn a_folder_that_cannot_be_made_is_one_sentence_and_exit_status_2() {
     let file = tempfile::NamedTempFile::new().unwrap();
     let program = env!("CARGO_BIN_EXE_tb_macropixel");

@@ -2,6 +2,9 @@
 # Remakes the golden results in this folder at gate level. Run it only after a deliberate change of the
 # chip, and read the difference before committing it.
 set -euo pipefail
-cd "$(dirname "$0")/replay"
+cd "$(dirname "$0")/.."
+mkdir -p vectors/traces
+GDTOF_REMAKE=1 cargo test --release --quiet --test traces_are_deterministic golden
+cd vectors/replay
 cargo run --release --quiet -- replay --sensor sensor.toml --inits inits.csv --events events.csv \
     --stop-periods 80 --laser-cycles 40 --engine gate --out histograms.csv

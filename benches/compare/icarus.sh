@@ -1,15 +1,19 @@
 #!/usr/bin/env bash
 # The same netlist, stimulus and machine: Icarus Verilog against our gate engine, alone and in lanes, in one run.
 # Icarus runs the exported cells, which are exact edge for edge, and cells written for its speed; ratios are
-# against the latter. Histograms must agree. Whole processes are timed, start and files included. Needs iverilog.
+# against the latter. Histograms must agree. Whole processes are timed, start and files included: processor time,
+# the best of three, which neighbours on the machine disturb least. Needs iverilog and GNU time.
 #
 #   benches/compare/icarus.sh [LASER_CYCLES]
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 cycles=${1:-20}
 periods=520
-command -v iverilog >/dev/null || { echo "iverilog is not installed: nothing to compare with" >&2; exit 2; }
+for tool in iverilog /usr/bin/time; do
+    command -v $tool >/dev/null || { echo "$tool is not installed: nothing to compare with" >&2; exit 2; }
+done
 cargo build --release --quiet
+figures=$(cargo bench --quiet --bench figures)
 gdtof=$PWD/target/release/gdtof
 lean=$PWD/benches/compare/lean_cells.v
 work=$(mktemp -d)
@@ -31,32 +35,56 @@ stimulus() {
         }
     }'
 }
-seconds() {
-    local start end
-    start=$(date +%s.%N); "$@" >/dev/null 2>&1; end=$(date +%s.%N)
-    awk -v a="$start" -v b="$end" 'BEGIN { print b - a }'
+# Runs a command three times; prints the least processor time (s) and the peak memory (MB).
+measure() {
+    for _ in 1 2 3; do
+        /usr/bin/time -a -o times -f "%U %S %M" "$@" >/dev/null 2>&1
+    done
+    awk '{ s = $1 + $2; if (NR == 1 || s < least) least = s; if ($3 > peak) peak = $3 }
+         END { printf "%.3f %.1f", least, peak / 1024 }' times
+    rm times
 }
-run() { # columns -> prints seconds of ours
-    seconds "$gdtof" replay --rows 1 --cols "$1" --inits inits.csv --events events.csv \
-        --stop-periods $periods --laser-cycles "$cycles" --engine gate --out ours.csv
+ours() { # columns, more arguments
+    local cols=$1; shift
+    measure "$gdtof" replay --rows 1 --cols "$cols" --inits inits.csv --events events.csv \
+        --stop-periods $periods --laser-cycles "$cycles" --engine gate --out ours.csv "$@"
 }
 
 stimulus 1
 "$gdtof" export verilog --rows 1 --cols 1 --inits inits.csv --events events.csv \
     --stop-periods $periods --laser-cycles "$cycles" --out verilog >/dev/null 2>&1
 (cd verilog && iverilog -g2005 -o sim tb.v design.v cells.v && iverilog -g2005 -o lean tb.v design.v "$lean")
-ours=$(run 1)
-exact=$(cd verilog && seconds vvp sim)
+one=$(ours 1)
+one_vcd=$(ours 1 --vcd ours.vcd)
+exact=$(cd verilog && measure vvp -n sim)
 cmp ours.csv verilog/histograms.csv
-theirs=$(cd verilog && seconds vvp lean)
+exact_vcd=$(cd verilog && measure vvp -n sim +vcd)
+theirs=$(cd verilog && measure vvp -n lean)
 cmp ours.csv verilog/histograms.csv
+theirs_vcd=$(cd verilog && measure vvp -n lean +vcd)
 stimulus 64
-lanes=$(run 64)
-awk -v e="$exact" -v t="$theirs" -v o="$ours" -v l="$lanes" -v k="$((cycles * periods))" 'BEGIN {
-    row = "%-42s %9.3f %18.3g %9.1f\n"
-    printf "%-42s %9s %18s %9s\n", "", "seconds", "macropixel-CLK/s", "ratio"
-    printf row, "Icarus Verilog, exported cells", e, k / e, t / e
-    printf row, "Icarus Verilog, cells written for speed", t, k / t, 1
-    printf row, "gate engine, one macropixel", o, k / o, t / o
-    printf row, "gate engine, 64 macropixels in lanes", l, 64 * k / l, 64 * t / l
-}'
+lanes=$(ours 64)
+{
+    printf '%s\n' "$figures"
+    echo "one $one"; echo "one_vcd $one_vcd"; echo "lanes $lanes"
+    echo "exact $exact"; echo "exact_vcd $exact_vcd"; echo "lean $theirs"; echo "lean_vcd $theirs_vcd"
+} | awk -v k="$((cycles * periods))" '
+    { v[$1] = $2; m[$1] = $3 }
+    function row(name, key, pixels) {
+        printf "%-42s %9.3f %18.3g %9.1f %9.1f %9.2f\n", name, v[key], pixels * k / v[key], \
+            pixels * v["lean"] / v[key], m[key], (key "_vcd" in v) ? v[key "_vcd"] / v[key] : 0
+    }
+    END {
+        printf "%-42s %9s %18s %9s %9s %9s\n", "", "CPU s", "macropixel-CLK/s", "x Icarus", "peak MB", "VCD on/off"
+        row("Icarus Verilog, exported cells", "exact", 1)
+        row("Icarus Verilog, cells written for speed", "lean", 1)
+        row("gate engine, one macropixel", "one", 1)
+        row("gate engine, 64 macropixels in lanes", "lanes", 64)
+        print ""
+        printf "net changes per second and core: %.1f M scalar, %.1f M in lanes\n", \
+            v["scalar_changes_per_s"] / 1e6, v["lane_changes_per_s"] / 1e6
+        printf "timing checks on/off: %.2f\n", v["checks_ratio"]
+        for (side = 16; side <= 64; side *= 2)
+            printf "elaboration of %dx%d: %.3f s, %.1f ns a cell\n", side, side, v["elaborate_" side "_s"], \
+                1e9 * v["elaborate_" side "_s"] / v["cells_" side]
+    }'

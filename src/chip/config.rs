@@ -57,6 +57,66 @@ pub enum Mode {
     Conventional,
 }
 
+/// How the P-counter is built (thesis 4.4). All have the same pins and, but for the last, the same time windows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PCounter {
+    /// Ripple down counter of reset-only flip-flops, Q or Q̄ chosen by the memory bit (Fig. 51c, 53).
+    Ripple,
+    /// Ripple down counter of set/reset flip-flops and a delayed reset (Fig. 51b), the HSLIDAR's (4.9.2).
+    SetReset,
+    /// Synchronous down counter (Fig. 50a).
+    Synchronous,
+    /// Up counter from zero and a comparator (Fig. 49a).
+    Comparator,
+    /// Ripple down counter without memory, loaded once, never reset: it comes round with STOP (4.4.3).
+    Memoryless,
+}
+
+impl PCounter {
+    /// Every variant, the sensor's own first.
+    pub const ALL: [PCounter; 5] = [
+        PCounter::Ripple,
+        PCounter::SetReset,
+        PCounter::Synchronous,
+        PCounter::Comparator,
+        PCounter::Memoryless,
+    ];
+
+    /// Name in sensor files and tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            PCounter::Ripple => "ripple",
+            PCounter::SetReset => "set_reset",
+            PCounter::Synchronous => "synchronous",
+            PCounter::Comparator => "comparator",
+            PCounter::Memoryless => "memoryless",
+        }
+    }
+}
+
+/// Where the P-counter's LOCAL_STOP comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Tap {
+    /// One stage more than is programmed: it rises when the counter rolls over past zero.
+    Borrow,
+    /// The most significant programmed bit, as the thesis has it (4.5). It is high from the reset on for start
+    /// values of 2ⁿ⁻¹ and more.
+    Msb,
+}
+
+/// What the P-counter does once LOCAL_STOP has risen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AfterBorrow {
+    /// Waits for the next reset: LOCAL_STOP blocks COUNTER_CLK.
+    #[default]
+    Hold,
+    /// Counts on, and raises LOCAL_STOP again whenever it comes round.
+    Wrap,
+}
+
 /// A sensor, as its TOML file describes it. Keys that are left out take the QuantIC4x4's value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -67,6 +127,12 @@ pub struct SensorConfig {
     pub cols: usize,
     /// Programmable bits of the P-counter, 2…12.
     pub counter_bits: usize,
+    /// How the P-counter is built: ripple, set_reset, synchronous, comparator or memoryless.
+    pub p_counter: PCounter,
+    /// Where LOCAL_STOP comes from, borrow or msb; the comparator has no msb.
+    pub tap: Tap,
+    /// What the P-counter does after LOCAL_STOP, hold or wrap; without memory it must wrap.
+    pub after_borrow: AfterBorrow,
     /// Histogram bins, 1…64.
     pub bins: usize,
     /// Bits of each bin, 1…16.
@@ -97,6 +163,9 @@ impl Default for SensorConfig {
             rows: 64,
             cols: 64,
             counter_bits: 9,
+            p_counter: PCounter::Ripple,
+            tap: Tap::Borrow,
+            after_borrow: AfterBorrow::Hold,
             bins: 16,
             bin_bits: 14,
             clk_hz: 384e6,
@@ -164,6 +233,15 @@ impl SensorConfig {
                 let message = format!("{key} = {value} is impossible; give {least} to {most}");
                 return Err((key, message));
             }
+        }
+        if self.p_counter == PCounter::Comparator && self.tap == Tap::Msb {
+            let message = "tap = \"msb\" is impossible with p_counter = \"comparator\", which counts up; give tap = \"borrow\"";
+            return Err(("tap", message.to_owned()));
+        }
+        if self.p_counter == PCounter::Memoryless && self.after_borrow == AfterBorrow::Hold {
+            let message = "after_borrow = \"hold\" is impossible with p_counter = \"memoryless\", which keeps its start value by coming round; give after_borrow = \"wrap\"";
+            let key = "p_counter";
+            return Err((key, message.to_owned()));
         }
         for (key, hz, least, most) in [
             ("clk_hz", self.clk_hz, 1e6, 2e9),
@@ -259,6 +337,9 @@ mod tests {
             ("colour = 1", 1),
             ("rows = -3", 1),
             ("event_type = \"more\"", 1),
+            ("p_counter = \"grey\"", 1),
+            ("p_counter = \"comparator\"\ntap = \"msb\"", 2),
+            ("\np_counter = \"memoryless\"", 2),
         ] {
             let error = SensorConfig::parse("s.toml", text).unwrap_err();
             assert_eq!(error.line, Some(line), "{text}: {error}");

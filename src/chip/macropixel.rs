@@ -11,11 +11,12 @@
 //! [`Model`] is the same circuit in plain Rust, stepped edge by edge through its blocks' models; only
 //! the arrival of the strobe, of the reset and of the SPAD pulses is timed ([`ChipTiming`]).
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::config::{Mode, SensorConfig, THRESHOLD_BITS};
+use super::config::{Mode, PCounter, SensorConfig, THRESHOLD_BITS};
 use super::exposure::Exposure;
-use super::window_law::ChipTiming;
+use super::timing::ChipTiming;
 use super::{
     SPADS, correlation, finished, front_end, histogram, metdc, p_counter, p_counter_timing,
 };
@@ -51,7 +52,7 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
 
     m.instance(
         "p_counter_timing",
-        &p_counter_timing::circuit(),
+        &p_counter_timing::circuit(config.after_borrow),
         &[
             ("CLK", &clk),
             ("STOP", &stop),
@@ -66,7 +67,7 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     );
     m.instance(
         "p_counter",
-        &p_counter::circuit(config.counter_bits),
+        &p_counter::circuit(config),
         &[
             ("COUNTER_INIT", &init),
             ("MEMORY_LOAD", &load),
@@ -153,7 +154,7 @@ impl<'a> Model<'a> {
     }
 
     /// Runs the exposure; `strobe` is told the time of every strobe (LOCAL_STOP's rise in the guided
-    /// mode) and the HIT bits that it latched.
+    /// mode) and the HIT bits that rise with it.
     pub fn run(
         &self,
         start: u16,
@@ -164,11 +165,23 @@ impl<'a> Model<'a> {
         let periods = exposure.stop_periods as i64;
         let cycles = exposure.laser_cycles as i64;
         let guided = config.mode == Mode::Guided;
+        let has_memory = config.p_counter != PCounter::Memoryless;
         let mut pulses = pulses.into_iter().peekable();
-        let mut counter = p_counter::Model::new(start as u32);
+        let mut counter = p_counter::Model::new(config, start);
         let mut front_end = front_end::Model::default();
         let mut metdc = metdc::Model::new(config.bins as u32);
-        let mut pending: Option<Strobe> = None;
+        let mut hit = Hit::new(self);
+        let mut pending: VecDeque<Strobe> = VecDeque::new();
+        let by_local_stop = |local_stop, deadline| Strobe {
+            cause: local_stop,
+            arrival: local_stop + timing.local_stop_to_strobe,
+            deadline,
+        };
+        let by_reset = |stop| {
+            let reset_to_local_stop = timing.counter.reset_to_local_stop;
+            let delay = reset_to_local_stop.expect("no other counter rises at its reset");
+            by_local_stop(stop + timing.stop_to_reset + delay, Time::MAX)
+        };
         // STOP edge number `cycle` is the next whose reset has not been released yet.
         let mut cycle = 0;
         let mut stop = exposure.stop(0);
@@ -182,23 +195,30 @@ impl<'a> Model<'a> {
             if guided {
                 let counter_clk = fall + timing.clk_to_counter_clk;
                 while cycle <= cycles && stop + timing.stop_to_reset_release <= counter_clk {
-                    counter.reset();
+                    if counter.reset() {
+                        pending.push_back(by_reset(stop));
+                    }
                     cycle += 1;
                     stop = exposure.stop(cycle);
                 }
-                let is_reset =
-                    cycle == 0 || cycle > cycles || stop + timing.stop_to_reset < counter_clk;
-                if !is_reset && counter.clock() {
-                    let local_stop = counter_clk + timing.counter_clk_to_local_stop;
-                    pending = Some(Strobe {
-                        cause: local_stop,
-                        arrival: local_stop + timing.local_stop_to_strobe,
-                        deadline: stop + timing.stop_to_hit_reset - timing.strobe_to_hit,
-                    });
+                let counts = if has_memory {
+                    cycle > 0 && cycle <= cycles && stop + timing.stop_to_reset >= counter_clk
+                } else {
+                    rise > timing.stop_to_enabled && edge < cycles * periods
+                };
+                if counts && counter.clock() {
+                    let local_stop = counter_clk + timing.counter.clk_to_local_stop;
+                    // The next reset takes back what still ripples.
+                    let deadline = if has_memory {
+                        stop + timing.stop_to_hit_reset - timing.strobe_to_hit
+                    } else {
+                        Time::MAX
+                    };
+                    pending.push_back(by_local_stop(local_stop, deadline));
                 }
             } else if edge % periods == 0 {
                 let stop = exposure.stop(edge / periods);
-                pending = Some(Strobe {
+                pending.push_back(Strobe {
                     cause: stop,
                     arrival: stop + timing.stop_to_strobe,
                     deadline: Time::MAX,
@@ -206,10 +226,11 @@ impl<'a> Model<'a> {
             }
 
             // A strobe that comes before the shift register changes sees it as it was.
-            if let Some(s) = pending.take_if(|s| s.arrival < rise + timing.clk_to_shift)
-                && s.arrival <= s.deadline
+            while let Some(&s) = pending.front()
+                && s.arrival < rise + timing.clk_to_shift
             {
-                strobe(s.cause, metdc.hits());
+                hit.latch(s, metdc.hits(), &mut strobe);
+                pending.pop_front();
             }
             let timed = front_end.spad_timed();
             metdc.clock(correlation::model(
@@ -223,8 +244,11 @@ impl<'a> Model<'a> {
             }
             front_end.clock();
         }
-        if let Some(s) = pending.filter(|s| s.arrival <= s.deadline) {
-            strobe(s.cause, metdc.hits());
+        if guided && cycle <= cycles && counter.reset() {
+            pending.push_back(by_reset(stop));
+        }
+        for s in pending {
+            hit.latch(s, metdc.hits(), &mut strobe);
         }
     }
 }
@@ -236,6 +260,54 @@ struct Strobe {
     cause: Time,
     /// When it clocks HIT.
     arrival: Time,
-    /// The last arrival whose hit comes out before the next cycle's reset.
+    /// The last arrival that a reset of the P-counter does not forestall.
     deadline: Time,
+}
+
+/// The HIT flip-flops, which a laser cycle's first strobe finds at zero and a second one does not.
+struct Hit<'m> {
+    model: &'m Model<'m>,
+    held: u64,
+    /// STOP edge whose reset of HIT comes next.
+    next_stop: i64,
+}
+
+impl<'m> Hit<'m> {
+    fn new(model: &'m Model<'m>) -> Self {
+        Hit {
+            model,
+            held: 0,
+            next_stop: 0,
+        }
+    }
+
+    /// Latches `hits`, unless HIT is in reset, and tells `strobe` which bits rise.
+    fn latch(&mut self, s: Strobe, hits: u64, strobe: &mut impl FnMut(Time, u64)) {
+        let Model {
+            config,
+            exposure,
+            timing,
+        } = self.model;
+        if config.mode == Mode::Conventional {
+            // NOT STOP has cleared HIT.
+            strobe(s.cause, hits);
+            return;
+        }
+        if s.arrival > s.deadline {
+            return;
+        }
+        let cycles = i64::from(exposure.laser_cycles);
+        let resets_at = |stop| exposure.stop(stop) + timing.stop_to_hit_reset;
+        while self.next_stop <= cycles && resets_at(self.next_stop) <= s.arrival {
+            self.next_stop += 1;
+            self.held = 0;
+        }
+        let last_release = exposure.stop(self.next_stop - 1) + timing.stop_to_hit_release;
+        if self.next_stop == 0 || self.next_stop > cycles || s.arrival < last_release {
+            strobe(s.cause, 0);
+        } else if s.arrival <= resets_at(self.next_stop) - timing.strobe_to_hit {
+            strobe(s.cause, hits & !self.held);
+            self.held = hits;
+        }
+    }
 }

@@ -23,11 +23,15 @@ pub mod metdc;
 pub mod p_counter;
 pub mod p_counter_timing;
 pub mod sensor;
+pub mod timing;
 pub mod window_law;
 
-pub use config::{EventType, Mode, Overflow, SensorConfig, THRESHOLD_BITS};
+pub use config::{
+    AfterBorrow, EventType, Mode, Overflow, PCounter, SensorConfig, THRESHOLD_BITS, Tap,
+};
 pub use exposure::Exposure;
-pub use window_law::{ChipTiming, Window, WindowLaw};
+pub use timing::ChipTiming;
+pub use window_law::{Window, WindowLaw};
 
 /// SPADs of one macropixel, 4×4 (thesis 4.2).
 pub const SPADS: usize = 16;

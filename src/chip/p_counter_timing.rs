@@ -16,7 +16,8 @@
 //!   and loading a new start value (whose changing bits flip their multiplexers, an edge for the next
 //!   stage) can clock nothing.
 //! * COUNTER_CLK is NOT CLK, so that LOCAL_STOP rises after CLK's falling edge. ENABLE gates it, and
-//!   LOCAL_STOP blocks it until the next reset: a counter that has rolled over waits.
+//!   LOCAL_STOP blocks it until the next reset: a counter that has rolled over waits. One that is to wrap
+//!   ([`AfterBorrow`]) goes without that: BLOCK is NOT ENABLE.
 //!
 //! Timing: at a STOP edge the falling LOCAL_STOP unblocks COUNTER_CLK, which rises if CLK is low. That
 //! edge must still meet an active reset, hence the length of the chain.
@@ -24,8 +25,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::config::AfterBorrow;
 use super::finished;
-use super::window_law::ChipTiming;
+use super::timing::ChipTiming;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 use crate::units::Time;
 
@@ -35,7 +37,7 @@ pub const DELAY_CHAIN: usize = 6;
 /// The timing block.
 ///
 /// Ports: CLK, STOP, RESETB, ENABLE, LOCAL_STOP → COUNTER_CLK, COUNTER_RESET, MEMORY_RESET, STOP_D.
-pub fn circuit() -> Arc<Module> {
+pub fn circuit(after_borrow: AfterBorrow) -> Arc<Module> {
     let mut m = ModuleBuilder::new("p_counter_timing");
     let clk = m.input("CLK");
     let stop = m.input("STOP");
@@ -50,7 +52,13 @@ pub fn circuit() -> Arc<Module> {
     let block = m.wire("BLOCK");
 
     m.gate_into(CellKind::Inv, &[resetb], memory_reset);
-    let disabled = m.gate(CellKind::Inv, &[enable]);
+    let disabled = match after_borrow {
+        AfterBorrow::Hold => m.gate(CellKind::Inv, &[enable]),
+        AfterBorrow::Wrap => {
+            m.gate_into(CellKind::Inv, &[enable], block);
+            block
+        }
+    };
 
     let mut delayed: Net = stop;
     for _ in 1..DELAY_CHAIN {
@@ -62,7 +70,9 @@ pub fn circuit() -> Arc<Module> {
     let clear = m.gate(CellKind::Or2, &[disabled, memory_reset]);
     m.gate_into(CellKind::Or2, &[pulse, clear], counter_reset);
 
-    m.gate_into(CellKind::Or2, &[disabled, local_stop], block);
+    if after_borrow == AfterBorrow::Hold {
+        m.gate_into(CellKind::Or2, &[disabled, local_stop], block);
+    }
     m.gate_into(CellKind::Nor2, &[clk, block], counter_clk);
     finished(m.finish())
 }
@@ -70,6 +80,8 @@ pub fn circuit() -> Arc<Module> {
 /// Reference model: the block's inputs, and what it makes of them when everything has settled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Model {
+    /// Whether LOCAL_STOP blocks COUNTER_CLK.
+    pub after_borrow: AfterBorrow,
     /// CLK.
     pub clk: bool,
     /// RESETB.
@@ -81,9 +93,10 @@ pub struct Model {
 }
 
 impl Model {
-    /// COUNTER_CLK: NOT CLK, while enabled and before LOCAL_STOP.
+    /// COUNTER_CLK: NOT CLK, while enabled and, if the counter is to hold, before LOCAL_STOP.
     pub fn counter_clk(&self) -> bool {
-        !self.clk && self.enable && !self.local_stop
+        let is_held = self.local_stop && self.after_borrow == AfterBorrow::Hold;
+        !self.clk && self.enable && !is_held
     }
 
     /// MEMORY_RESET.
@@ -119,6 +132,11 @@ mod tests {
             ..running
         };
         assert!(!stopped.counter_clk() && !stopped.counter_reset());
+        let wrapping = Model {
+            after_borrow: AfterBorrow::Wrap,
+            ..stopped
+        };
+        assert!(wrapping.counter_clk());
         let disabled = Model {
             enable: false,
             ..running

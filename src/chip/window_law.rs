@@ -14,114 +14,19 @@
 //! STOP to the end of the window, less one and a half. Windows of small start values begin before the STOP
 //! edge, in the tail of the previous laser cycle.
 //!
+//! So it is with the sensor's own P-counter and the variants that are reset as it is. One without memory counts from
+//! the first falling edge that ENABLE lets through. One that wraps may raise LOCAL_STOP again in the same laser
+//! cycle, where HIT still holds what it latched before: no single window describes that, and the law says so.
+//!
 //! [`ChipTiming`] adds up the cell delays on the paths concerned; tests hold both against the netlist.
 
 use std::ops::Range;
 
-use super::config::{Mode, SensorConfig};
+use super::config::{Mode, PCounter, SensorConfig};
 use super::exposure::Exposure;
-use super::{correlation, p_counter_timing};
-use crate::logic::Logic::{One, Zero};
-use crate::netlist::{CellKind, Corner, Delay, Edge, Library, Netlist, StaticTiming, Timing};
+use super::p_counter::{Rises, starts_high};
+use super::timing::ChipTiming;
 use crate::units::Time;
-
-/// Delays of the paths that decide where a window lies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ChipTiming {
-    /// SPAD_RAW rising to the toggle flip-flop's output: the front-end latency.
-    pub spad_to_toggle: Time,
-    /// CLK falling to COUNTER_CLK rising.
-    pub clk_to_counter_clk: Time,
-    /// COUNTER_CLK rising to LOCAL_STOP rising: the ripple through every stage.
-    pub counter_clk_to_local_stop: Time,
-    /// LOCAL_STOP rising to the clock of the HIT flip-flops.
-    pub local_stop_to_strobe: Time,
-    /// STOP rising to the clock of the HIT flip-flops, conventional mode.
-    pub stop_to_strobe: Time,
-    /// Clock of the HIT flip-flops to HIT.
-    pub strobe_to_hit: Time,
-    /// CLK rising to a change of the METDC's shift register.
-    pub clk_to_shift: Time,
-    /// STOP rising to COUNTER_RESET rising.
-    pub stop_to_reset: Time,
-    /// STOP rising to COUNTER_RESET falling.
-    pub stop_to_reset_release: Time,
-    /// STOP rising to the reset of the HIT flip-flops, guided mode.
-    pub stop_to_hit_reset: Time,
-    /// CLK rising to SPAD_EVENT settled, longest path.
-    pub clk_to_event: Time,
-    /// How long before its clock a flip-flop's data must be stable.
-    pub setup: Time,
-    /// How long after its clock a flip-flop's data must be stable.
-    pub hold: Time,
-    /// How long before a clock edge that counts a reset must be released.
-    pub recovery: Time,
-    /// How long after a clock edge that must not count a reset must still hold.
-    pub removal: Time,
-}
-
-impl ChipTiming {
-    /// The timing of a sensor built from the default cell library, in its corner.
-    pub fn of(config: &SensorConfig) -> Self {
-        let library = Library::default();
-        let corner = config.corner;
-        let delay = |kind, pin, to| library.delay(kind, pin, to, corner);
-        let limits = library.checks(CellKind::Dffr);
-        let limit = |limit: Delay| Time::from_fs(limit.at(corner) as i64);
-        let clock_to_q = delay(CellKind::Dffr, 1, One);
-        let mux_rise = delay(CellKind::Mux2, 0, One);
-        let buffer_rise = delay(CellKind::Buf, 0, One);
-        let or_rise = delay(CellKind::Or2, 0, One);
-        let chain = buffer_rise * p_counter_timing::DELAY_CHAIN as i64;
-        let stop_to_reset = delay(CellKind::And2, 0, One) + or_rise;
-        let correlation = longest_correlation(&library, corner);
-        let xor = delay(CellKind::Xor2, 0, One).max(delay(CellKind::Xor2, 0, Zero));
-        ChipTiming {
-            spad_to_toggle: clock_to_q,
-            clk_to_counter_clk: delay(CellKind::Nor2, 0, One),
-            counter_clk_to_local_stop: (clock_to_q + mux_rise) * config.counter_bits as i64
-                + clock_to_q,
-            local_stop_to_strobe: mux_rise + buffer_rise,
-            stop_to_strobe: chain + mux_rise + buffer_rise,
-            strobe_to_hit: clock_to_q,
-            clk_to_shift: clock_to_q,
-            stop_to_reset,
-            stop_to_reset_release: chain
-                + delay(CellKind::Inv, 0, Zero)
-                + delay(CellKind::And2, 0, Zero)
-                + delay(CellKind::Or2, 0, Zero),
-            stop_to_hit_reset: stop_to_reset + mux_rise,
-            clk_to_event: clock_to_q + xor + correlation,
-            setup: limit(limits.setup),
-            hold: limit(limits.hold),
-            recovery: limit(limits.recovery),
-            removal: limit(limits.removal),
-        }
-    }
-
-    /// CLK falling to LOCAL_STOP rising: what the thesis calls the ripple delay (4.6, Fig. 56).
-    pub fn ripple(&self) -> Time {
-        self.clk_to_counter_clk + self.counter_clk_to_local_stop
-    }
-}
-
-/// The longest path from SPAD_TIMED to SPAD_EVENT.
-fn longest_correlation(library: &Library, corner: Corner) -> Time {
-    let netlist = Netlist::elaborate(&correlation::circuit());
-    let timing = Timing::nominal(&netlist, library, corner);
-    let nets = |name| netlist.signal(name).expect("a port of the block");
-    let starts: Vec<_> = nets("SPAD_TIMED")
-        .into_iter()
-        .flat_map(|net| Edge::BOTH.map(|edge| (net, edge)))
-        .collect();
-    let arrivals = StaticTiming::new(&netlist, &timing)
-        .arrivals(&starts, &[])
-        .expect("the block is combinational");
-    let (_, longest) = arrivals
-        .window(nets("SPAD_EVENT")[0])
-        .expect("SPAD_EVENT depends on SPAD_TIMED");
-    longest
-}
 
 /// What the law adds to the flip-flops' limits: one femtosecond of rounding on either edge.
 const ROUNDING: Time = Time::from_fs(2);
@@ -133,6 +38,9 @@ pub enum Window {
     Open(OpenWindow),
     /// LOCAL_STOP does not come within the laser cycle: nothing is ever counted.
     Never,
+    /// The histogram is latched several times in a laser cycle, or not in the same CLK period of every one. What is
+    /// counted then depends on what HIT still holds, and only an engine that goes through every CLK period can tell.
+    Irregular(&'static str),
     /// Two signals come closer than a flip-flop's setup, hold, recovery or removal time allows: the circuit
     /// promises nothing, and only the gate-level engine shows what its model makes of it.
     Race(&'static str),
@@ -143,7 +51,7 @@ impl Window {
     pub fn open(self) -> Option<OpenWindow> {
         match self {
             Window::Open(window) => Some(window),
-            Window::Never | Window::Race(_) => None,
+            Window::Never | Window::Irregular(_) | Window::Race(_) => None,
         }
     }
 }
@@ -160,25 +68,31 @@ pub struct OpenWindow {
     pub slack: Time,
 }
 
+/// Where LOCAL_STOP rises first.
+struct LocalStop {
+    /// After its laser cycle's STOP edge.
+    time: Time,
+    /// What keeps it from rising once in every laser cycle at this place, if anything.
+    irregular: Option<&'static str>,
+}
+
 /// The law for one sensor and exposure.
 #[derive(Debug, Clone)]
 pub struct WindowLaw {
+    config: SensorConfig,
     exposure: Exposure,
     timing: ChipTiming,
-    mode: Mode,
     bins: i64,
-    largest_start: u16,
 }
 
 impl WindowLaw {
     /// The law for this sensor in this exposure.
     pub fn new(config: &SensorConfig, exposure: &Exposure) -> Self {
         WindowLaw {
+            config: config.clone(),
             exposure: *exposure,
             timing: ChipTiming::of(config),
-            mode: config.mode,
             bins: config.bins as i64,
-            largest_start: config.largest_start(),
         }
     }
 
@@ -194,35 +108,24 @@ impl WindowLaw {
         if exposure.clock.period() <= timing.clk_to_event + timing.setup + ROUNDING {
             return Window::Race("the correlation block is slower than a CLK period");
         }
-        let (cause, arrival) = match self.mode {
+        let (cause, arrival, irregular) = match self.config.mode {
             // A laser cycle is counted by the STOP edge that ends it.
-            Mode::Conventional => (end, end + timing.stop_to_strobe),
+            Mode::Conventional => (end, end + timing.stop_to_strobe, None),
             Mode::Guided => {
-                let counts_from = timing.stop_to_reset_release - timing.clk_to_counter_clk;
-                let mut first = 0;
-                while exposure.falling(first) < counts_from {
-                    first += 1;
-                }
-                let near = |k| {
-                    let distance = exposure.falling(k) - counts_from;
-                    -timing.removal - ROUNDING <= distance && distance <= timing.recovery + ROUNDING
+                let is_reset = self.config.p_counter != PCounter::Memoryless;
+                let found = if is_reset {
+                    self.with_reset(start)
+                } else {
+                    self.coming_round(start)
                 };
-                if near(first) || near(first - 1) {
-                    return Window::Race("a CLK edge meets the end of the reset pulse");
+                match found {
+                    Ok(LocalStop { time, irregular }) => {
+                        (time, time + timing.local_stop_to_strobe, irregular)
+                    }
+                    Err(window) => return window,
                 }
-                let local_stop = exposure.falling(first + start as i64) + timing.ripple();
-                (local_stop, local_stop + timing.local_stop_to_strobe)
             }
         };
-        if self.mode == Mode::Guided {
-            let margin = end + timing.stop_to_hit_reset - timing.strobe_to_hit - arrival;
-            if margin < -ROUNDING {
-                return Window::Never;
-            }
-            if margin <= ROUNDING {
-                return Window::Race("the strobe meets the next laser cycle's reset");
-            }
-        }
         let last = exposure.rising_until(arrival - timing.clk_to_shift);
         let after = arrival - (exposure.rising(last) + timing.clk_to_shift);
         let before = exposure.rising(last + 1) + timing.clk_to_shift - arrival;
@@ -230,11 +133,130 @@ impl WindowLaw {
         if slack <= ROUNDING {
             return Window::Race("the strobe meets a change of the shift register");
         }
+        if let Some(why) = irregular {
+            return Window::Irregular(why);
+        }
         Window::Open(OpenWindow {
             first_edge: last - self.bins,
             strobe_cause: cause,
             slack,
         })
+    }
+
+    /// LOCAL_STOP of a counter that each STOP resets.
+    fn with_reset(&self, start: u16) -> Result<LocalStop, Window> {
+        let (exposure, timing) = (&self.exposure, &self.timing);
+        let counter = &timing.counter;
+        if exposure.clock.period() <= counter.period + ROUNDING {
+            return Err(Window::Race("the P-counter is slower than a CLK period"));
+        }
+        let Some(rises) = Rises::of(&self.config, start) else {
+            return Err(Window::Never);
+        };
+        let released = timing.stop_to_reset_release + counter.release + counter.recovery;
+        let in_doubt = timing.stop_to_reset_release - counter.removal - ROUNDING
+            ..=released.max(timing.stop_to_reset + counter.settle) + ROUNDING;
+        let counter_clk = |edge| exposure.falling(edge) + timing.clk_to_counter_clk;
+        let mut first = 0;
+        while counter_clk(first) <= *in_doubt.end() {
+            first += 1;
+        }
+        if in_doubt.contains(&counter_clk(first - 1)) {
+            return Err(Window::Race("a CLK edge meets the end of the reset pulse"));
+        }
+
+        // Later than the counts that the next reset forestalls.
+        let end = exposure.clock.periods(exposure.stop_periods as i64);
+        let edges = (0..).map(|n| first + rises.first + n * rises.every.unwrap_or(i64::MAX / 2));
+        let edges = edges.take_while(|&edge| counter_clk(edge) < end + timing.stop_to_reset);
+        let edges: Vec<i64> = edges
+            .take(if rises.every.is_some() { usize::MAX } else { 1 })
+            .collect();
+        let (Some(&edge), Some(&last)) = (edges.first(), edges.last()) else {
+            return Err(Window::Never);
+        };
+        let deadline = end + timing.stop_to_hit_reset - timing.strobe_to_hit;
+        let margin =
+            deadline - (exposure.falling(last) + timing.ripple() + timing.local_stop_to_strobe);
+        if margin < -ROUNDING && rises.every.is_none() {
+            return Err(Window::Never);
+        }
+        if margin <= ROUNDING {
+            return Err(Window::Race(
+                "the strobe meets the next laser cycle's reset",
+            ));
+        }
+        if rises.every.is_some() && starts_high(&self.config, start) {
+            let delay = counter
+                .reset_to_local_stop
+                .expect("the tap msb rises at a reset");
+            let arrival = timing.stop_to_reset + delay + timing.local_stop_to_strobe;
+            if arrival + timing.removal + ROUNDING >= timing.stop_to_hit_release {
+                let why = "the strobe that the reset makes meets the end of HIT's reset";
+                return Err(Window::Race(why));
+            }
+        }
+        Ok(LocalStop {
+            time: exposure.falling(edge) + timing.ripple(),
+            irregular: (edges.len() > 1)
+                .then_some("LOCAL_STOP rises more than once in a laser cycle"),
+        })
+    }
+
+    /// LOCAL_STOP of a counter that nothing resets.
+    fn coming_round(&self, start: u16) -> Result<LocalStop, Window> {
+        let (exposure, timing) = (&self.exposure, &self.timing);
+        let counter = &timing.counter;
+        let enabled = timing.stop_to_enabled;
+        let first = exposure.rising_until(enabled) + 1;
+        let low_for = |edge| exposure.rising(edge) - enabled;
+        let shortest = counter.clock_high + timing.clk_to_counter_clk + ROUNDING;
+        if low_for(first) <= shortest || low_for(first - 1) >= -ROUNDING {
+            return Err(Window::Race("CLK rises as ENABLE lets it through"));
+        }
+        let rises = Rises::of(&self.config, start).expect("a counter without memory wraps");
+        let every = rises.every.expect("a counter without memory wraps");
+        let periods = exposure.stop_periods as i64;
+        let last = periods * exposure.laser_cycles as i64;
+        let edge = first + rises.first;
+        let is_first_count = rises.first == 0 && exposure.falling(first) <= enabled + ROUNDING;
+        if is_first_count || (last >= edge && (last - edge) % every == 0) {
+            return Err(Window::Race("ENABLE changes as LOCAL_STOP is to rise"));
+        }
+        // STOP also resets HIT.
+        let end = exposure.clock.periods(periods);
+        let in_doubt = timing.stop_to_hit_reset - timing.strobe_to_hit - ROUNDING
+            ..=timing.stop_to_hit_release + timing.recovery + ROUNDING;
+        let meets_reset = |edge: i64| {
+            let place = exposure.falling(edge.rem_euclid(periods));
+            let arrival = place + timing.ripple() + timing.local_stop_to_strobe;
+            in_doubt.contains(&arrival) || in_doubt.contains(&(arrival - end))
+        };
+        let mut edges = (edge..last).step_by(every as usize).take(periods as usize);
+        if edges.any(meets_reset) {
+            return Err(Window::Race("the strobe meets a laser cycle's reset"));
+        }
+        Ok(LocalStop {
+            time: exposure.falling(edge) + timing.ripple(),
+            irregular: (periods != every)
+                .then_some("STOP does not come once in each round of the P-counter without memory"),
+        })
+    }
+
+    /// Why no window can be aimed, if so: the reason for which start values do not open one.
+    pub fn refusal(&self) -> Option<&'static str> {
+        let reason = |start| match self.window(start) {
+            Window::Race(why) | Window::Irregular(why) => Some(why),
+            Window::Open(_) | Window::Never => None,
+        };
+        let mut reasons = self.samples().into_iter().map(reason);
+        reasons.try_fold(None, |_, why| why.map(Some))?
+    }
+
+    /// A few start values, one of which opens a window if most do.
+    fn samples(&self) -> [u16; 4] {
+        let largest = self.config.largest_start();
+        [0, 1, 16.min(largest), largest / 2]
     }
 
     /// Photon times that `bin` of `window` collects in laser cycle `cycle`, half open, from the exposure's
@@ -268,11 +290,14 @@ impl WindowLaw {
             Some((centre - time).as_fs().abs())
         };
         let period_s = 1.0 / self.exposure.clock.as_hz();
-        let centre = self.interval(&self.window(0).open()?);
+        let opens = |start| Some((start, self.window(start).open()?));
+        let (sample, window) = self.samples().into_iter().find_map(opens)?;
+        let centre = self.interval(&window);
         let centre_s = (centre.start.as_s() + centre.end.as_s()) / 2.0;
-        let guess = ((time.as_s() - centre_s) / period_s).round();
-        let guess = guess.clamp(0.0, self.largest_start as f64) as u16;
-        let candidates = guess.saturating_sub(1)..=(guess + 1).min(self.largest_start);
+        let guess = sample as f64 + ((time.as_s() - centre_s) / period_s).round();
+        let largest = self.config.largest_start();
+        let guess = guess.clamp(0.0, largest as f64) as u16;
+        let candidates = guess.saturating_sub(1)..=(guess + 1).min(largest);
         let best = candidates
             .filter_map(|start| Some((distance(start)?, start)))
             .min()?

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::{SensorArgs, say};
 use crate::chip::SensorConfig;
-use crate::chip::window_law::{Window, WindowLaw};
+use crate::chip::WindowLaw;
 use crate::engine::Work;
 use crate::engine::recording::check_exposure;
 use crate::files::{InputError, OutputFile, create_folder};
@@ -70,9 +70,9 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
     };
     let exposure = check_exposure(&sensor, args.stop_periods, args.laser_cycles)?;
     let chosen = chosen_probes(&args.probe, &sensor)?;
-    if let Window::Race(why) = WindowLaw::new(&sensor, &exposure).window(0) {
+    if let Some(why) = WindowLaw::new(&sensor, &exposure).refusal() {
         let message = format!(
-            "{why}, so the guide cannot aim time windows; change clk_hz, stop_phase_ps or corner"
+            "{why}, so the guide cannot aim time windows; change clk_hz, stop_phase_ps or corner, or --stop-periods and after_borrow"
         );
         return Err(InputError::new("--sensor", message).into());
     }

@@ -3,6 +3,7 @@
 
 mod export;
 mod frame;
+mod range;
 mod replay;
 mod sdf;
 mod testbench;
@@ -35,6 +36,8 @@ enum Command {
     Frame(frame::FrameArgs),
     /// Run recorded SPAD events through the chip.
     Replay(replay::ReplayArgs),
+    /// Depths from a real sensor's histograms, beside its own.
+    Range(range::RangeArgs),
     /// How fast the chip can be clocked: ripple, periods, margins.
     Timing(timing::TimingArgs),
     /// Write the chip for other tools.
@@ -76,6 +79,7 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Frame(args) => frame::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::Range(args) => range::run(&args),
         Command::Timing(args) => timing::run(&args),
         Command::Export(command) => export::run(&command),
     };
@@ -104,9 +108,15 @@ fn is_closed_pipe(error: &anyhow::Error) -> bool {
 
 fn is_bad_input(error: &anyhow::Error) -> bool {
     error.is::<InputError>()
-        || matches!(error.downcast_ref(), Some(EngineError::Race(_)))
         || matches!(
             error.downcast_ref(),
-            Some(FrameError::Input(_) | FrameError::Engine(EngineError::Race(_)))
+            Some(EngineError::Race(_) | EngineError::Irregular(_))
+        )
+        || matches!(
+            error.downcast_ref(),
+            Some(
+                FrameError::Input(_)
+                    | FrameError::Engine(EngineError::Race(_) | EngineError::Irregular(_))
+            )
         )
 }

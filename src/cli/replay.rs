@@ -12,9 +12,9 @@ use super::sdf::annotated_timing;
 use crate::chip::{Exposure, SensorConfig};
 use crate::engine::recording::{Recording, check_exposure, read_events, read_starts};
 use crate::engine::waveform::{self, View};
-use crate::engine::{EngineError, GateSimulation};
+use crate::engine::{EngineError, GateSimulation, HardwareEventReport};
 use crate::files::{InputError, OutputFile};
-use crate::kernel::{Observer, Policy};
+use crate::kernel::{CheckReport, Observer, Policy};
 use crate::photon::SpadEvent;
 use crate::report::write_npy_u16;
 use crate::system::EngineKind;
@@ -110,11 +110,11 @@ pub struct ReplayArgs {
     /// Delays that replace the library's (SDF, in the sensor's corner; needs --engine gate).
     #[arg(long, value_name = "FILE")]
     sdf: Option<PathBuf>,
-    /// Check setup, hold, recovery, removal and pulse widths of every flip-flop (needs --engine gate): a summary
-    /// on standard error.
+    /// Check setup, hold, recovery, removal and pulse widths of every flip-flop, and watch for hardware events (needs
+    /// --engine gate): a summary on standard error.
     #[arg(long, value_enum, value_name = "POLICY")]
     checks: Option<Checks>,
-    /// The timing checks' violations, summary and slack histograms as JSON (needs --checks).
+    /// The timing checks' violations, summary and slack histograms, and the hardware events, as JSON (needs --checks).
     #[arg(long, value_name = "FILE")]
     checks_json: Option<PathBuf>,
 }
@@ -194,9 +194,18 @@ fn replay_array(stimuli: &Stimuli, args: &ReplayArgs) -> anyhow::Result<Vec<Vec<
         None => watch(&mut simulation, stimuli, vcd, &mut ())?,
         Some(policy) => {
             let mut checks = simulation.timing_checks(policy.into());
-            watch(&mut simulation, stimuli, vcd, &mut checks)?;
-            let report = checks.report(simulation.netlist());
-            eprint!("{report}");
+            let mut events = simulation.hardware_events();
+            watch(
+                &mut simulation,
+                stimuli,
+                vcd,
+                &mut (&mut checks, &mut events),
+            )?;
+            let report = Report {
+                checks: checks.report(simulation.netlist()),
+                events: events.report(),
+            };
+            eprint!("{}{}", report.checks, report.events);
             // Before the histograms, which unknown states may have spoilt: this says why.
             if let Some(path) = &args.checks_json {
                 OutputFile::write_with(path, |w| Ok(serde_json::to_writer_pretty(w, &report)?))?;
@@ -204,6 +213,15 @@ fn replay_array(stimuli: &Stimuli, args: &ReplayArgs) -> anyhow::Result<Vec<Vec<
         }
     }
     Ok(simulation.histograms()?)
+}
+
+/// What `--checks-json` writes.
+#[derive(serde::Serialize)]
+struct Report<'a> {
+    #[serde(flatten)]
+    checks: CheckReport,
+    #[serde(flatten)]
+    events: &'a HardwareEventReport,
 }
 
 fn watch<O: Observer>(

@@ -8,7 +8,7 @@ use super::{SensorArgs, say};
 use crate::chip::{SensorConfig, sensor};
 use crate::files::{InputError, OutputFile, read_text};
 use crate::netlist::sdf::{
-    Sdf, SdfDivider, SdfOptions, SdfTimescale, Skipped, annotate, no_checks, write_sdf,
+    Sdf, SdfDivider, SdfOptions, SdfTimescale, Skipped, annotate, write_sdf,
 };
 use crate::netlist::{Corner, Library, Netlist, Timing};
 
@@ -64,7 +64,7 @@ pub fn run(args: &SdfArgs) -> anyhow::Result<()> {
         },
     };
     OutputFile::write_with(&args.out, |out| {
-        write_sdf(out, &netlist, [&min, &typ, &max], &no_checks, options)
+        write_sdf(out, &netlist, [&min, &typ, &max], options)
     })?;
     say(format_args!(
         "{} cells in {}\n",
@@ -103,16 +103,9 @@ pub fn annotated_timing(
             result.longest_wire_to_d_fs
         );
     }
-    let checks: usize = sdf.cells.iter().map(|c| c.checks.len()).sum();
-    if checks > 0 {
-        eprintln!(
-            "gdtof: {checks} timing checks of {} are not applied",
-            sdf.source
-        );
-    }
     eprintln!(
-        "gdtof: {}: {} arcs and {} wires annotated",
-        sdf.source, result.arcs, result.wires
+        "gdtof: {}: {} arcs, {} wires and {} timing checks annotated",
+        sdf.source, result.arcs, result.wires, result.checks
     );
     Ok(timing)
 }

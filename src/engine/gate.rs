@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::hardware_events::HardwareEvents;
 use super::lanes::LaneSimulation;
 use super::stimulus::{Pins, Schedule, StimulusPlan};
 use super::{Engine, EngineError};
@@ -16,6 +17,7 @@ pub struct GateSimulation<'a> {
     first: (usize, usize),
     size: (usize, usize),
     netlist: Arc<Netlist>,
+    timing: Timing,
     kernel: Kernel,
     plan: StimulusPlan<'a>,
 }
@@ -39,15 +41,24 @@ impl<'a> GateSimulation<'a> {
             first,
             size,
             netlist,
+            timing,
             kernel,
             plan: StimulusPlan::new(config, exposure, size.1, starts, pulses),
         }
     }
 
-    /// The same simulation with other delays than the library's: annotated, mismatched. Call it before
+    /// The same simulation with other delays and limits than the library's: annotated, mismatched. Call it before
     /// [`GateSimulation::run`]; `timing` must be of the same netlist.
     pub fn with_timing(mut self, timing: &Timing) -> Self {
         self.kernel = Kernel::new(&self.netlist, timing);
+        self.timing = timing.clone();
+        self
+    }
+
+    /// The same simulation with the events of each instant in a random order, which changes no result. Call it
+    /// after [`GateSimulation::with_timing`].
+    pub fn shuffled(mut self, seed: u64) -> Self {
+        self.kernel = self.kernel.shuffled(seed);
         self
     }
 
@@ -65,9 +76,16 @@ impl<'a> GateSimulation<'a> {
     /// front ends' first samplers count as asynchronous.
     pub fn timing_checks(&self, policy: Policy) -> TimingChecks {
         TimingChecks::new(&self.netlist, &Library::default(), self.config.corner)
+            .limits(&self.netlist, &self.timing)
             .policy(policy)
             .not_before(self.schedule().reset_end)
             .asynchronous(&self.netlist, front_end::is_asynchronous_sampler)
+    }
+
+    /// A watch for hardware events in every macropixel, from the end of the power-up reset on, to run it with.
+    pub fn hardware_events(&self) -> HardwareEvents {
+        let paths = self.of_pixels(str::to_owned);
+        HardwareEvents::new(&self.netlist, &paths, self.schedule().reset_end)
     }
 
     /// Simulates load and exposure to the end.
@@ -83,11 +101,10 @@ impl<'a> GateSimulation<'a> {
         self.kernel.statistics()
     }
 
-    /// Start values in the P-counters' memories, row-major; `None` where a bit is unknown.
+    /// Start values in the P-counters' memories, row-major; `None` where a bit is unknown, and without memory.
     pub fn loaded(&self) -> Vec<Option<u16>> {
         self.of_pixels(|path| {
-            let memory = self.netlist.signal(&format!("{path}.p_counter.MEMORY"));
-            let memory = memory.expect("every macropixel has a memory");
+            let memory = self.netlist.signal(&format!("{path}.p_counter.MEMORY"))?;
             self.kernel.number(&memory).map(|code| code as u16)
         })
     }
@@ -137,20 +154,71 @@ impl<'a> Gate<'a> {
     pub fn new(config: &'a SensorConfig, exposure: &'a Exposure) -> Self {
         Gate { config, exposure }
     }
+
+    /// The netlist of each macropixel with its load path.
+    pub fn netlist(&self) -> Netlist {
+        Netlist::elaborate(&sensor::window(self.config, (0, 0), (1, 1)))
+    }
+
+    /// The library's delays of that netlist in the sensor's corner.
+    pub fn nominal_timing(&self) -> Timing {
+        Timing::nominal(&self.netlist(), &Library::default(), self.config.corner)
+    }
+
+    /// Histograms of macropixels with delays of their own, such as the mismatch of each. Neighbours in the list
+    /// that have the same [`Timing`] share lanes; one whose neighbours have others runs alone, because events that
+    /// each have their own time leave nothing to share.
+    ///
+    /// # Errors
+    /// When a bit of a count is unknown.
+    ///
+    /// # Panics
+    /// When the lists have different lengths.
+    pub fn histograms_with(
+        &self,
+        timings: &[&Timing],
+        starts: &[u16],
+        pulses: &[&[SpadEvent]],
+    ) -> Result<Vec<Vec<u16>>, EngineError> {
+        assert!(timings.len() == starts.len() && starts.len() == pulses.len());
+        let mut histograms = Vec::with_capacity(starts.len());
+        for alike in timings.chunk_by(|a, b| std::ptr::eq(*a, *b)) {
+            let (from, to) = (histograms.len(), histograms.len() + alike.len());
+            let batches = starts[from..to].chunks(LANES);
+            for (starts, pulses) in batches.zip(pulses[from..to].chunks(LANES)) {
+                histograms.extend(self.batch(alike[0], starts, pulses)?);
+            }
+        }
+        Ok(histograms)
+    }
+
+    /// At most [`LANES`] macropixels with the same delays.
+    fn batch(
+        &self,
+        timing: &Timing,
+        starts: &[u16],
+        pulses: &[&[SpadEvent]],
+    ) -> Result<Vec<Vec<u16>>, EngineError> {
+        // One alone is quicker without lanes.
+        if starts.len() == 1 {
+            let (first, size) = ((0, 0), (1, 1));
+            let alone =
+                GateSimulation::new(self.config, self.exposure, first, size, starts, pulses);
+            let mut alone = alone.with_timing(timing);
+            alone.run(&mut ());
+            return alone.histograms();
+        }
+        let lanes = LaneSimulation::new(self.config, self.exposure, starts, pulses);
+        let mut lanes = lanes.with_timing(timing);
+        lanes.run(&mut ());
+        lanes.histograms()
+    }
 }
 
 impl Engine for Gate<'_> {
     fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
-        let mut simulation = GateSimulation::new(
-            self.config,
-            self.exposure,
-            (0, 0),
-            (1, 1),
-            &[start],
-            &[pulses],
-        );
-        simulation.run(&mut ());
-        Ok(simulation.histograms()?.remove(0))
+        let mut histograms = self.histograms(&[start], &[pulses])?;
+        Ok(histograms.remove(0))
     }
 
     fn histograms(
@@ -158,18 +226,7 @@ impl Engine for Gate<'_> {
         starts: &[u16],
         pulses: &[&[SpadEvent]],
     ) -> Result<Vec<Vec<u16>>, EngineError> {
-        let batches = starts.chunks(LANES).zip(pulses.chunks(LANES));
-        let mut histograms = Vec::with_capacity(starts.len());
-        for (starts, pulses) in batches {
-            // One alone is quicker without lanes.
-            if let ([start], [pulses]) = (starts, pulses) {
-                histograms.push(self.histogram(*start, pulses)?);
-                continue;
-            }
-            let mut lanes = LaneSimulation::new(self.config, self.exposure, starts, pulses);
-            lanes.run(&mut ());
-            histograms.extend(lanes.histograms()?);
-        }
-        Ok(histograms)
+        let nominal = self.nominal_timing();
+        self.histograms_with(&vec![&nominal; starts.len()], starts, pulses)
     }
 }

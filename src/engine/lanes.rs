@@ -7,7 +7,7 @@ use bitvec::vec::BitVec;
 
 use super::EngineError;
 use super::stimulus::{Pins, Schedule, StimulusPlan};
-use crate::chip::{Exposure, SPADS, SensorConfig, histogram, load_path, sensor};
+use crate::chip::{Exposure, PCounter, SPADS, SensorConfig, histogram, load_path, sensor};
 use crate::kernel::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
 use crate::netlist::{Library, NetId, Netlist, Timing};
 use crate::photon::SpadEvent;
@@ -57,6 +57,13 @@ impl<'a> LaneSimulation<'a> {
                 .collect(),
             pulses: all,
         }
+    }
+
+    /// The same simulation with other delays than the library's, those of every lane. Call it before
+    /// [`LaneSimulation::run`]; `timing` must be of the same netlist.
+    pub fn with_timing(mut self, timing: &Timing) -> Self {
+        self.kernel = LaneKernel::new(&self.netlist, timing);
+        self
     }
 
     /// The netlist of every lane.
@@ -132,8 +139,11 @@ impl<'a> LaneSimulation<'a> {
         drives.into_iter()
     }
 
-    /// Start value in the P-counter's memory of each lane; `None` where a bit is unknown.
+    /// Start value in the P-counter's memory of each lane; `None` where a bit is unknown, and without memory.
     pub fn loaded(&self) -> Vec<Option<u16>> {
+        if self.config.p_counter == PCounter::Memoryless {
+            return self.lanes(|_| None);
+        }
         let memory = self.signal("p_counter.MEMORY");
         self.lanes(|lane| self.kernel.number(&memory, lane).map(|code| code as u16))
     }

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::{Engine, EngineError};
 use crate::chip::{Exposure, SensorConfig};
-use crate::photon::{PhotonStream, PixelLight, PixelPhotons, SpadEvent, StreamConfig};
+use crate::photon::{PhotonStream, PixelLight, PixelPhotons, SpadEvent, SpadModel, StreamConfig};
 use crate::units::Time;
 
 /// A macropixel and the light on it.
@@ -91,7 +91,8 @@ pub fn stream_config(
         stop_periods: exposure.stop_periods,
         laser_cycles: exposure.laser_cycles,
         pulse_sigma,
-        dead_time: config.dead_time(),
+        pulse_shape: None,
+        spads: SpadModel::with_dead_time(config.dead_time()),
     }
 }
 

@@ -8,10 +8,12 @@
 //!
 //! All take the same start value and SPAD pulses and give the same histogram. `Cycle` and `Window` assume what
 //! the window law can promise, and refuse a configuration in which two signals race. The macropixel's
-//! plain-Rust reference model ([`crate::chip::macropixel::Model`]) is the tests' slow judge of all of them.
+//! plain-Rust reference model ([`crate::chip::macropixel::Model`]) is the tests' slow judge of all of them. `Window`
+//! also refuses a P-counter that raises LOCAL_STOP more than once in a laser cycle.
 
 mod cycle;
 mod gate;
+mod hardware_events;
 mod lanes;
 mod light;
 pub mod load;
@@ -24,6 +26,7 @@ mod window;
 
 pub use cycle::{Cycle, PackedPulses, Unlevelled};
 pub use gate::{Gate, GateSimulation};
+pub use hardware_events::{HardwareEvent, HardwareEventKind, HardwareEventReport, HardwareEvents};
 pub use lanes::LaneSimulation;
 pub use light::{
     Exposed, LitPixel, Work, expose, expose_without_skipping, full_stream, stream_config,
@@ -84,6 +87,9 @@ pub enum EngineError {
         "{0}, so only the gate engine can tell what is counted; use --engine gate or change clk_hz, stop_phase_ps or corner"
     )]
     Race(&'static str),
+    /// The window law has no single window for this start value.
+    #[error("{0}, so the window engine cannot tell what is counted; use --engine cycle or gate")]
+    Irregular(&'static str),
     /// The engine works without photons.
     #[error(
         "the {0} engine knows no single photons and cannot replay recorded ones; use --engine window"

@@ -38,7 +38,7 @@ impl<'p> View<'p> {
     ) -> Self {
         let marker = match WindowLaw::new(config, exposure).window(start) {
             Window::Open(open) => open.strobe_cause,
-            Window::Never | Window::Race(_) => Time::ZERO,
+            Window::Never | Window::Irregular(_) | Window::Race(_) => Time::ZERO,
         };
         let periods = |k| exposure.clock.periods(k);
         View {
@@ -118,22 +118,26 @@ fn groups(netlist: &Netlist, pixels: &[(usize, usize)]) -> Vec<Group> {
     for &(row, col) in pixels {
         let pixel = sensor::pixel_name(row, col);
         let of = |name: &str| format!("{pixel}.{name}");
-        let counter = [
+        let has_signal = |path: &String| netlist.signal(path).is_some();
+        let memory = Some(of("p_counter.MEMORY")).filter(has_signal);
+        let mut counter = vec![
             Entry::binary("CLK"),
             Entry::binary("STOP"),
             Entry::binary(of("ENABLE")),
             Entry::binary(of("MEMORY_LOAD")),
             Entry::decimal(of("COUNTER_INIT")),
-            Entry::decimal(of("p_counter.MEMORY")),
+        ];
+        counter.extend(memory.map(Entry::decimal));
+        counter.extend([
             Entry::binary(of("COUNTER_RESET")),
             Entry::binary(of("COUNTER_CLK")),
             Entry::decimal(of("p_counter.COUNTER_OUT")),
             Entry::binary(of("LOCAL_STOP")),
-        ];
+        ]);
         groups.push(Group::new(format!("P-counter {pixel} (Fig. 54)"), counter));
         let bins = (0..)
             .map(|bin| of(&format!("histogram.{}", histogram::bin_name(bin))))
-            .take_while(|path| netlist.signal(path).is_some())
+            .take_while(has_signal)
             .map(Entry::decimal);
         let histogram = [
             Entry::hex(of("SPAD_RAW")),

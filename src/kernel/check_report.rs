@@ -8,7 +8,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::netlist::{CheckKind, Corner};
+use crate::netlist::{CheckKind, Corner, Edge};
 use crate::units::Time;
 
 /// Width of a slack bin, fs.
@@ -49,6 +49,9 @@ pub struct Violation {
     pub cell: String,
     /// The pin measured against CK, or whose pulse it is.
     pub pin: String,
+    /// Direction in which that pin changed: D's for setup and hold, the release for recovery and removal, the
+    /// end of the pulse for widths.
+    pub edge: Edge,
     /// The event that completed it, fs.
     pub time_fs: i64,
     /// Distance less limit, fs; negative.

@@ -1,8 +1,8 @@
 //! Timing checks: every flip-flop's setup, hold, recovery, removal and pulse widths, judged as the simulation runs.
 //!
 //! [`TimingChecks`] is an [`Observer`]. It keeps two times per net, the last possible rise and the last possible
-//! fall, and nothing per flip-flop that changes: every check is the distance between the event that completes
-//! it and one of those times.
+//! fall: every check is the distance between the event that completes it and one of those times. Flip-flops for which
+//! that is the same are judged together.
 //!
 //! | check | completed by | since | violated (IEEE 1364, 15.2 and 15.3) |
 //! |---|---|---|---|
@@ -12,6 +12,9 @@
 //! | removal | R or S released | CK rose | 0 < distance < limit |
 //! | clock high, low | CK falls, rises | CK rose, fell | distance < limit |
 //! | control high | R or S falls | it rose | distance < limit |
+//!
+//! Setup and hold have a limit of their own for each direction of D. Each direction's last change counts, so that a
+//! pulse on D before CK is judged at both its edges; the smaller slack is the one reported.
 //!
 //! Slack is distance − limit; exactly the limit is legal. When two pins change at once, `$setuphold` and `$recrem`
 //! of the standard report a hold and a recovery violation, and so does this.
@@ -29,10 +32,17 @@
 //! * *Asynchronous samplers.* A flip-flop that samples an asynchronous signal breaks setup and hold by design. Those
 //!   that [`TimingChecks::asynchronous`] names are judged and counted apart, and never made unknown.
 
-use super::check_report::{CheckReport, CheckSummary, Place, Policy, Violation, slack_bin};
+use std::collections::HashMap;
+
+use super::check_banks::{
+    Bank, CLOCK, CheckedPins, DATA, Data, FlipFlop, RESET, SET, banks, flip_flops,
+};
+use super::check_report::{BINS, CheckReport, CheckSummary, Place, Policy, Violation, slack_bin};
 use super::observer::Observer;
 use crate::logic::Logic;
-use crate::netlist::{CellKind, CheckKind, Corner, Library, NetId, Netlist};
+use crate::netlist::{
+    CellKind, CheckKind, Control, Corner, Edge, InstanceLimits, Library, NetId, Netlist, Timing,
+};
 use crate::units::Time;
 
 /// Violations that are kept one by one; further ones are only counted.
@@ -41,15 +51,8 @@ const MOST_VIOLATIONS: usize = 100_000;
 /// No such event yet.
 const NEVER: i64 = i64::MIN;
 
-const NO_NET: u32 = u32::MAX;
-
 /// Pins of a flip-flop, in the library's order.
 const PINS: [&str; 4] = ["D", "CK", "R", "S"];
-const DATA: usize = 0;
-const CLOCK: usize = 1;
-const RESET: usize = 2;
-const SET: usize = 3;
-
 /// What is known of one net.
 #[derive(Clone, Copy)]
 struct History {
@@ -61,19 +64,21 @@ struct History {
 }
 
 impl History {
-    fn changed_fs(&self) -> i64 {
-        self.rose_fs.max(self.fell_fs)
+    /// The last possible change in one direction.
+    fn last(&self, edge: Edge) -> i64 {
+        match edge {
+            Edge::Rise => self.rose_fs,
+            Edge::Fall => self.fell_fs,
+        }
     }
-}
 
-/// What is fixed of one flip-flop.
-#[derive(Clone, Copy)]
-struct FlipFlop {
-    cell: u32,
-    /// D, CK, R, S; [`NO_NET`] where the cell has no such pin.
-    nets: [u32; 4],
-    has_set: bool,
-    is_asynchronous: bool,
+    /// Direction of the last change.
+    fn last_edge(&self) -> Edge {
+        match self.rose_fs > self.fell_fs {
+            true => Edge::Rise,
+            false => Edge::Fall,
+        }
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -83,6 +88,7 @@ struct Found {
     flip_flop: u32,
     kind: CheckKind,
     pin: u8,
+    edge: Edge,
     is_asynchronous: bool,
 }
 
@@ -91,14 +97,12 @@ pub struct TimingChecks {
     policy: Policy,
     corner: Corner,
     not_before_fs: i64,
-    /// Limits by "has a set" and check, fs.
-    limits: [[i64; CheckKind::ALL.len()]; 2],
+    /// Limits that occur: the library's of each kind, and those of single instances.
+    limits: Vec<InstanceLimits>,
     nets: Vec<History>,
-    /// Where each net's checked pins begin in `loads`.
-    start: Vec<u32>,
-    /// Flip-flop and pin.
-    loads: Vec<(u32, u8)>,
     flip_flops: Vec<FlipFlop>,
+    banks: Vec<Bank>,
+    pins: CheckedPins,
     now_fs: i64,
     /// Nets that changed in this instant.
     touched: Vec<u32>,
@@ -116,33 +120,16 @@ struct Tally {
     asynchronous: u64,
     asynchronous_violated: u64,
     worst: Option<Found>,
-    histogram: [u64; super::check_report::BINS],
+    histogram: [u64; BINS],
 }
 
 impl TimingChecks {
     /// Checks of every flip-flop from the start of time on, reported only, none excluded.
     pub fn new(netlist: &Netlist, library: &Library, corner: Corner) -> Self {
-        let flip_flops: Vec<FlipFlop> = netlist
-            .cells()
-            .iter()
-            .enumerate()
-            .filter(|(_, cell)| cell.kind.is_flip_flop())
-            .map(|(index, cell)| FlipFlop {
-                cell: index as u32,
-                nets: cell.inputs.map(|net| {
-                    if net.is_some() {
-                        net.index() as u32
-                    } else {
-                        NO_NET
-                    }
-                }),
-                has_set: cell.kind == CellKind::Dffsr,
-                is_asynchronous: false,
-            })
-            .collect();
-        let (start, loads) = checked_pins(&flip_flops, netlist.net_count());
+        let mut flip_flops = flip_flops(netlist);
+        let banks = banks(&mut flip_flops);
         let limits = [CellKind::Dffr, CellKind::Dffsr]
-            .map(|kind| CheckKind::ALL.map(|c| library.checks(kind).at(c, corner).into()));
+            .map(|kind| InstanceLimits::of(library.checks(kind), corner));
         let unknown = History {
             rose_fs: NEVER,
             fell_fs: NEVER,
@@ -155,17 +142,17 @@ impl TimingChecks {
             asynchronous: 0,
             asynchronous_violated: 0,
             worst: None,
-            histogram: [0; super::check_report::BINS],
+            histogram: [0; BINS],
         };
         TimingChecks {
             policy: Policy::ReportOnly,
             corner,
             not_before_fs: NEVER,
-            limits,
+            limits: limits.into(),
             nets: vec![unknown; netlist.net_count()],
-            start,
-            loads,
+            pins: CheckedPins::new(&flip_flops, &banks, netlist.net_count()),
             flip_flops,
+            banks,
             now_fs: NEVER,
             touched: Vec::new(),
             doubtful: Vec::new(),
@@ -179,6 +166,30 @@ impl TimingChecks {
     #[must_use]
     pub fn policy(mut self, policy: Policy) -> Self {
         self.policy = policy;
+        self
+    }
+
+    /// Limits of each instance, as annotated.
+    #[must_use]
+    pub fn limits(mut self, netlist: &Netlist, timing: &Timing) -> Self {
+        let mut index_of: HashMap<InstanceLimits, u32> = HashMap::new();
+        self.limits.clear();
+        for flip_flop in &mut self.flip_flops {
+            let cell = flip_flop.cell as usize;
+            let limits = *timing.limits(cell, netlist.cells()[cell].kind);
+            flip_flop.limits = *index_of.entry(limits).or_insert_with(|| {
+                self.limits.push(limits);
+                self.limits.len() as u32 - 1
+            });
+        }
+        self.grouped()
+    }
+
+    /// Groups the flip-flops anew, before anything was observed.
+    fn grouped(mut self) -> Self {
+        debug_assert!(self.now_fs == NEVER, "limits change while checks are made");
+        self.banks = banks(&mut self.flip_flops);
+        self.pins = CheckedPins::new(&self.flip_flops, &self.banks, self.nets.len());
         self
     }
 
@@ -197,15 +208,17 @@ impl TimingChecks {
         for flip_flop in &mut self.flip_flops {
             flip_flop.is_asynchronous = is(&netlist.cell_path(flip_flop.cell as usize));
         }
-        self
+        self.grouped()
     }
 
     /// Memory of the tables, bytes; kept violations come on top.
     pub fn memory_bytes(&self) -> usize {
-        fn bytes<T>(items: &[T]) -> usize {
-            std::mem::size_of_val(items)
-        }
-        bytes(&self.nets) + bytes(&self.start) + bytes(&self.loads) + bytes(&self.flip_flops)
+        let members: usize = self.banks.iter().map(|b| size_of_val(&b.members[..])).sum();
+        size_of_val(&self.nets[..])
+            + size_of_val(&self.flip_flops[..])
+            + size_of_val(&self.banks[..])
+            + members
+            + self.pins.memory_bytes()
     }
 
     /// What was found so far; `netlist` is the one that is checked.
@@ -232,10 +245,18 @@ impl TimingChecks {
                 histogram: tally.histogram.to_vec(),
             }
         });
+        // Within an instant in the order of the netlist.
+        self.found
+            .sort_by_key(|f| (f.time_fs, f.flip_flop, f.kind, f.pin));
+        let path = |found: &Found| {
+            let cell = self.flip_flops[found.flip_flop as usize].cell;
+            netlist.cell_path(cell as usize)
+        };
         let violations = self.found.iter().map(|found| Violation {
             kind: found.kind,
             cell: path(found),
             pin: PINS[found.pin as usize].to_owned(),
+            edge: found.edge,
             time_fs: found.time_fs,
             slack_fs: found.slack_fs,
             is_asynchronous: found.is_asynchronous,
@@ -262,12 +283,21 @@ impl TimingChecks {
         let mut touched = std::mem::take(&mut self.touched);
         // All histories first, so that the judgement sees the whole instant.
         touched.retain(|&net| self.nets[net as usize].advance(self.now_fs));
+        for &net in &touched {
+            for position in self.pins.of(net as usize) {
+                let (index, pin) = self.pins.at(position);
+                if pin == DATA {
+                    self.unsettle(index);
+                }
+            }
+        }
         if self.now_fs >= self.not_before_fs {
             for &net in &touched {
-                let net = net as usize;
-                for at in self.start[net]..self.start[net + 1] {
-                    let (flip_flop, pin) = self.loads[at as usize];
-                    self.judge(flip_flop, pin as usize);
+                for position in self.pins.of(net as usize) {
+                    match self.pins.at(position) {
+                        (flip_flop, DATA) => self.judge_data(flip_flop),
+                        (bank, pin) => self.judge_bank(bank as usize, pin),
+                    }
                 }
             }
         }
@@ -275,81 +305,193 @@ impl TimingChecks {
         self.touched = touched;
     }
 
-    /// Judges what the change of one pin has completed.
+    /// Puts a flip-flop whose D has changed on the list of those whose setup is judged.
     #[inline]
-    fn judge(&mut self, index: u32, pin: usize) {
-        let now_fs = self.now_fs;
+    fn unsettle(&mut self, index: u32) {
+        let flip_flop = &mut self.flip_flops[index as usize];
+        let bank = &mut self.banks[flip_flop.bank as usize];
+        match flip_flop.data {
+            Data::Recent => return,
+            Data::Settled => bank.settled -= 1,
+            Data::Still => {}
+        }
+        flip_flop.data = Data::Recent;
+        bank.recent.push(index);
+    }
+
+    /// Whether R or S holds the flip-flops of a bank.
+    #[inline]
+    fn is_held(&self, bank: &Bank) -> bool {
+        let is_high = |pin: usize| {
+            let net = self.nets.get(bank.nets[pin] as usize);
+            net.is_some_and(|net| net.now == Logic::One)
+        };
+        is_high(RESET) || is_high(SET)
+    }
+
+    /// Judges what a change of D has completed.
+    #[inline]
+    fn judge_data(&mut self, index: u32) {
         let flip_flop = &self.flip_flops[index as usize];
-        let nets = flip_flop.nets;
-        let of = |pin: usize| &self.nets[nets[pin] as usize];
-        if of(RESET).now == Logic::One || flip_flop.has_set && of(SET).now == Logic::One {
+        let bank = flip_flop.bank as usize;
+        if self.is_held(&self.banks[bank]) {
             return;
         }
-        let clock = *of(CLOCK);
-        match pin {
-            DATA => self.measure(index, CheckKind::Hold, DATA, now_fs, clock.rose_fs),
-            CLOCK if clock.rose_fs == now_fs => {
-                let (data, reset) = (*of(DATA), *of(RESET));
-                let set = flip_flop.has_set.then(|| *of(SET));
-                if data.changed_fs() != now_fs {
-                    self.measure(index, CheckKind::Setup, DATA, now_fs, data.changed_fs());
-                }
-                self.measure(index, CheckKind::Recovery, RESET, now_fs, reset.fell_fs);
-                if let Some(set) = set {
-                    self.measure(index, CheckKind::Recovery, SET, now_fs, set.fell_fs);
-                }
-                self.measure(index, CheckKind::ClockLow, CLOCK, now_fs, clock.fell_fs);
+        let edge = self.nets[flip_flop.nets[DATA] as usize].last_edge();
+        let clock = &self.nets[flip_flop.nets[CLOCK] as usize];
+        let since_fs = clock.rose_fs;
+        self.measure(bank, &[index], CheckKind::Hold, DATA, edge, since_fs);
+    }
+
+    /// Judges what the change of one pin other than D has completed.
+    #[inline]
+    fn judge_bank(&mut self, index: usize, pin: usize) {
+        let now_fs = self.now_fs;
+        if self.is_held(&self.banks[index]) {
+            return;
+        }
+        let nets = self.banks[index].nets;
+        let clock = self.nets[nets[CLOCK] as usize];
+        if pin != CLOCK {
+            let control = self.nets[nets[pin] as usize];
+            // A rise to X completes nothing.
+            if control.fell_fs != now_fs {
+                return;
             }
-            CLOCK => self.measure(index, CheckKind::ClockHigh, CLOCK, now_fs, clock.rose_fs),
-            _ => {
-                let control = *of(pin);
-                // A rise to X completes nothing.
-                if control.fell_fs != now_fs {
-                    return;
-                }
-                if clock.rose_fs != now_fs {
-                    self.measure(index, CheckKind::Removal, pin, now_fs, clock.rose_fs);
-                }
-                self.measure(index, CheckKind::ControlHigh, pin, now_fs, control.rose_fs);
+            if clock.rose_fs != now_fs {
+                self.measure_all(index, CheckKind::Removal, pin, Edge::Fall, clock.rose_fs);
             }
+            let rose_fs = control.rose_fs;
+            self.measure_all(index, CheckKind::ControlHigh, pin, Edge::Fall, rose_fs);
+        } else if clock.rose_fs == now_fs {
+            self.judge_setup(index);
+            for control in [RESET, SET] {
+                if let Some(net) = self.nets.get(nets[control] as usize) {
+                    let fell_fs = net.fell_fs;
+                    self.measure_all(index, CheckKind::Recovery, control, Edge::Fall, fell_fs);
+                }
+            }
+            self.measure_all(index, CheckKind::ClockLow, CLOCK, Edge::Rise, clock.fell_fs);
+        } else {
+            self.measure_all(
+                index,
+                CheckKind::ClockHigh,
+                CLOCK,
+                Edge::Fall,
+                clock.rose_fs,
+            );
         }
     }
 
+    /// Judges the setup of a bank whose clock has risen.
     #[inline]
-    fn measure(&mut self, index: u32, kind: CheckKind, pin: usize, now_fs: i64, since_fs: i64) {
-        if since_fs == NEVER {
+    fn judge_setup(&mut self, index: usize) {
+        let bank = &mut self.banks[index];
+        let (settled, is_asynchronous) = (bank.settled, bank.is_asynchronous);
+        let tally = &mut self.summaries[CheckKind::Setup as usize];
+        if is_asynchronous {
+            tally.asynchronous += settled;
+        } else {
+            tally.checked += settled;
+            tally.histogram[BINS - 1] += settled;
+        }
+        if bank.recent.is_empty() {
             return;
         }
-        let flip_flop = self.flip_flops[index as usize];
-        let limit_fs = self.limits[flip_flop.has_set as usize][kind as usize];
-        let slack_fs = now_fs - since_fs - limit_fs;
-        let is_asynchronous = flip_flop.is_asynchronous && kind.concerns_data();
+        let mut recent = std::mem::take(&mut bank.recent);
+        recent.retain(|&flip_flop| {
+            let data = self.nets[self.flip_flops[flip_flop as usize].nets[DATA] as usize];
+            let Some(edge) = self.edge_nearest_setup(flip_flop, data) else {
+                return true;
+            };
+            let since_fs = data.last(edge);
+            let of_one = &[flip_flop];
+            let slack_fs = self.measure(index, of_one, CheckKind::Setup, DATA, edge, since_fs);
+            let changes_now = data.last(data.last_edge()) == self.now_fs;
+            let is_recent = changes_now || slack_bin(slack_fs) < BINS - 1;
+            if !is_recent {
+                self.flip_flops[flip_flop as usize].data = Data::Settled;
+                self.banks[index].settled += 1;
+            }
+            is_recent
+        });
+        self.banks[index].recent = recent;
+    }
+
+    /// Which of the last rise and fall of D before this instant comes nearer to its setup limit.
+    #[inline]
+    fn edge_nearest_setup(&self, index: u32, data: History) -> Option<Edge> {
+        let limits = &self.limits[self.flip_flops[index as usize].limits as usize];
+        let limit = |edge| limits.at(Control::Reset, CheckKind::Setup, edge);
+        let before = |edge: &Edge| ![NEVER, self.now_fs].contains(&data.last(*edge));
+        let edges = Edge::BOTH.into_iter().filter(before);
+        edges.max_by_key(|&edge| data.last(edge) + i64::from(limit(edge)))
+    }
+
+    /// Judges one distance of every flip-flop of a bank.
+    #[inline]
+    fn measure_all(&mut self, bank: usize, kind: CheckKind, pin: usize, edge: Edge, since_fs: i64) {
+        let members = std::mem::take(&mut self.banks[bank].members);
+        self.measure(bank, &members, kind, pin, edge, since_fs);
+        self.banks[bank].members = members;
+    }
+
+    /// Judges one distance for some flip-flops of a bank: from `since_fs` to now, where `pin` changes or has changed
+    /// in the direction of `edge`. Returns its slack, fs.
+    #[inline]
+    fn measure(
+        &mut self,
+        bank: usize,
+        members: &[u32],
+        kind: CheckKind,
+        pin: usize,
+        edge: Edge,
+        since_fs: i64,
+    ) -> i64 {
+        if since_fs == NEVER {
+            return i64::MAX;
+        }
+        let bank = &self.banks[bank];
+        let control = match pin {
+            SET => Control::Set,
+            _ => Control::Reset,
+        };
+        let limit_fs = self.limits[bank.limits as usize].at(control, kind, edge);
+        let slack_fs = self.now_fs - since_fs - i64::from(limit_fs);
+        let is_asynchronous = bank.is_asynchronous && kind.concerns_data();
         let tally = &mut self.summaries[kind as usize];
+        let count = members.len() as u64;
         let found = Found {
-            time_fs: now_fs,
+            time_fs: self.now_fs,
             slack_fs,
-            flip_flop: index,
+            flip_flop: members[0],
             kind,
             pin: pin as u8,
+            edge,
             is_asynchronous,
         };
         if is_asynchronous {
-            tally.asynchronous += 1;
-            tally.asynchronous_violated += u64::from(slack_fs < 0);
+            tally.asynchronous += count;
+            tally.asynchronous_violated += count * u64::from(slack_fs < 0);
         } else {
-            tally.checked += 1;
-            tally.histogram[slack_bin(slack_fs)] += 1;
-            if tally.worst.is_none_or(|worst| slack_fs < worst.slack_fs) {
+            tally.checked += count;
+            tally.histogram[slack_bin(slack_fs)] += count;
+            // The first smallest; of one instant, the first in the netlist.
+            let rank = |f: &Found| (f.slack_fs, f.time_fs, f.flip_flop);
+            if tally.worst.is_none_or(|worst| rank(&found) < rank(&worst)) {
                 tally.worst = Some(found);
             }
         }
         if slack_fs < 0 {
-            self.violated(found, flip_flop.cell);
+            for &flip_flop in members {
+                self.violated(Found { flip_flop, ..found });
+            }
         }
+        slack_fs
     }
 
     #[cold]
-    fn violated(&mut self, found: Found, cell: u32) {
+    fn violated(&mut self, found: Found) {
         if self.found.len() < MOST_VIOLATIONS {
             self.found.push(found);
         } else {
@@ -360,6 +502,7 @@ impl TimingChecks {
         }
         self.summaries[found.kind as usize].violated += 1;
         if self.policy == Policy::XOnViolation && found.kind.spoils_state() {
+            let cell = self.flip_flops[found.flip_flop as usize].cell;
             self.doubtful.push(cell);
         }
     }
@@ -393,7 +536,7 @@ impl Observer for TimingChecks {
             self.now_fs = time.as_fs();
         }
         let index = net.index();
-        if self.start[index] != self.start[index + 1] {
+        if self.pins.has_any(index) {
             self.nets[index].now = value.seen();
             self.touched.push(index as u32);
         }
@@ -407,29 +550,4 @@ impl Observer for TimingChecks {
         self.complete();
         self.doubtful.pop().map(|cell| cell as usize)
     }
-}
-
-/// Fan-out of every net to the pins that are checked: where each begins, and one list of them all.
-fn checked_pins(flip_flops: &[FlipFlop], net_count: usize) -> (Vec<u32>, Vec<(u32, u8)>) {
-    let pins = || {
-        let indexed = flip_flops.iter().enumerate();
-        indexed
-            .flat_map(|(index, f)| (0..4).map(move |pin| (index as u32, pin, f.nets[pin as usize])))
-            .filter(|&(_, _, net)| net != NO_NET)
-    };
-    let mut start = vec![0u32; net_count + 1];
-    for (_, _, net) in pins() {
-        start[net as usize + 1] += 1;
-    }
-    for i in 1..start.len() {
-        start[i] += start[i - 1];
-    }
-    let mut next = start.clone();
-    let mut loads = vec![(0, 0); start[net_count] as usize];
-    for (index, pin, net) in pins() {
-        let at = &mut next[net as usize];
-        loads[*at as usize] = (index, pin);
-        *at += 1;
-    }
-    (start, loads)
 }

@@ -7,18 +7,21 @@
 //! ```text
 //!   value of a net:     one  = ...0110   lanes that are 1        lanes in neither are X
 //!                       zero = ...1001   lanes that are 0
-//!   pending on a net:   groups (time, lanes, values); cancelling a lane takes its bit out of its group
+//!   pending on a net:   groups (time, lanes, values), earliest first; cancelling a lane takes its bit out
 //! ```
 //!
 //! Every lane sees exactly the value changes that [`Kernel`](super::Kernel) would give it alone: the same two
-//! phases, the same inertial rule, and the delay of the pin that changed in *that* lane. Two differences of
+//! phases, the same inertial and transport rules, and the delay of the pin that changed in *that* lane. Two differences of
 //! input only: Z is driven as X, and a clock must not be driven up and down again within one instant.
+//!
+//! All lanes have the delays of one [`Timing`]: nominal, or annotated, or the mismatch of one macropixel. Delays
+//! that differ from lane to lane would give each lane events of its own, and nothing would be left to share.
 
 use super::compiled::{DelaySet, FanOut, PinClass};
 use super::lane_word::Lanes;
 use super::wheel::{Event, TimeWheel};
 use crate::logic::Logic;
-use crate::netlist::{CellKind, MAX_INPUTS, NetId, Netlist, Timing};
+use crate::netlist::{CellKind, DelayModel, MAX_INPUTS, NetId, Netlist, Timing};
 use crate::units::Time;
 
 /// Some lanes of one input take a value at one time.
@@ -51,10 +54,9 @@ const NONE: u32 = u32::MAX;
 #[derive(Clone, Copy)]
 struct NetState {
     value: Lanes,
-    /// Lanes with a change on its way, and to what.
-    pending: u64,
-    pending_value: Lanes,
-    /// First of the net's groups.
+    /// What its driver computed last: its value, once everything on its way has arrived.
+    target: Lanes,
+    /// First of the net's groups, which are in order of time.
     groups: u32,
 }
 
@@ -63,6 +65,7 @@ struct NetState {
 struct Group {
     time_fs: i64,
     mask: u64,
+    values: Lanes,
     next: u32,
 }
 
@@ -70,6 +73,7 @@ struct Group {
 struct CellState {
     kind: CellKind,
     is_dirty: bool,
+    model: DelayModel,
     inputs: [u32; MAX_INPUTS],
     outputs: [u32; 2],
     delays: u32,
@@ -102,8 +106,7 @@ impl LaneKernel {
         let unknown = Lanes::all(Logic::X);
         let net = NetState {
             value: unknown,
-            pending: 0,
-            pending_value: unknown,
+            target: unknown,
             groups: NONE,
         };
         let index = |n: NetId| if n.is_some() { n.index() as u32 } else { NONE };
@@ -114,6 +117,7 @@ impl LaneKernel {
             .map(|(i, cell)| CellState {
                 kind: cell.kind,
                 is_dirty: false,
+                model: timing.model(i),
                 inputs: cell.inputs.map(index),
                 outputs: cell.outputs.map(index),
                 delays: timing.set_of(i),
@@ -194,10 +198,8 @@ impl LaneKernel {
         loop {
             while let Some(event) = self.wheel.pop_at(self.now_fs) {
                 let net = event.net as usize;
-                let mask = self.take_group(net);
+                let (mask, values) = self.take_group(net);
                 if mask != 0 {
-                    let values = self.nets[net].pending_value;
-                    self.nets[net].pending &= !mask;
                     self.apply(net, mask, values, observer);
                 }
             }
@@ -213,24 +215,18 @@ impl LaneKernel {
         }
     }
 
-    /// Unlinks the group of `net` that is due now; returns its lanes.
-    fn take_group(&mut self, net: usize) -> u64 {
-        let mut previous = NONE;
-        let mut index = self.nets[net].groups;
-        while index != NONE {
-            let group = self.groups[index as usize];
-            if group.time_fs == self.now_fs {
-                match previous {
-                    NONE => self.nets[net].groups = group.next,
-                    p => self.groups[p as usize].next = group.next,
-                }
+    /// Unlinks the group of `net` that is due now; returns its lanes and their values.
+    fn take_group(&mut self, net: usize) -> (u64, Lanes) {
+        let index = self.nets[net].groups;
+        match self.groups.get(index as usize) {
+            Some(&group) if group.time_fs == self.now_fs => {
+                self.nets[net].groups = group.next;
                 self.groups[index as usize].next = self.free_group;
                 self.free_group = index;
-                return group.mask;
+                (group.mask, group.values)
             }
-            (previous, index) = (index, group.next);
+            _ => (0, Lanes::default()),
         }
-        0
     }
 
     fn apply<O: LaneObserver>(&mut self, net: usize, mask: u64, values: Lanes, observer: &mut O) {
@@ -301,37 +297,37 @@ impl LaneKernel {
                 next
             }
         };
-        let (outputs, set) = (cell.outputs, cell.delays as usize);
+        let (outputs, delays) = (cell.outputs, (cell.model, cell.delays as usize));
         let changed = std::mem::take(&mut cell.changed);
-        self.schedule(outputs[0], value, set, &changed);
+        self.schedule(outputs[0], value, delays, &changed);
         if outputs[1] != NONE {
-            self.schedule(outputs[1], value.not(), set, &changed);
+            self.schedule(outputs[1], value.not(), delays, &changed);
         }
     }
 
-    fn schedule(&mut self, net: u32, value: Lanes, set: usize, changed: &[u64; MAX_INPUTS]) {
+    fn schedule(
+        &mut self,
+        net: u32,
+        value: Lanes,
+        (model, set): (DelayModel, usize),
+        changed: &[u64; MAX_INPUTS],
+    ) {
         let Some(state) = self.nets.get_mut(net as usize) else {
             return;
         };
-        let target = state.value.replaced(state.pending, state.pending_value);
-        let moved = target.differs(value);
-        if moved == 0 {
+        let mut left = state.target.differs(value);
+        if left == 0 {
             return;
         }
-        let cancelled = moved & state.pending;
-        if cancelled != 0 {
-            state.pending &= !cancelled;
-            let mut index = state.groups;
-            while index != NONE {
-                let group = &mut self.groups[index as usize];
-                group.mask &= !cancelled;
-                index = group.next;
+        let pending = left & state.target.differs(state.value);
+        state.target = value;
+        if model == DelayModel::Inertial {
+            let differs = state.value.differs(value);
+            if pending != 0 {
+                self.overtake(net, pending, i64::MIN);
             }
+            left &= differs;
         }
-        let state = &mut self.nets[net as usize];
-        let mut left = moved & state.value.differs(value);
-        state.pending |= left;
-        state.pending_value = state.pending_value.replaced(left, value);
         // Lanes with the same pins changed have the same delays.
         while left != 0 {
             let lane = left.trailing_zeros();
@@ -353,32 +349,58 @@ impl LaneKernel {
                 (value.zero, Logic::Zero),
                 (value.unknown(), Logic::X),
             ] {
-                let mask = mask & alike;
+                let mut mask = mask & alike;
+                if mask == 0 {
+                    continue;
+                }
+                let time_fs = self.now_fs + i64::from(delays_fs[to as usize]);
+                if model == DelayModel::Transport {
+                    mask &= self.overtake(net, mask, time_fs).differs(value);
+                }
                 if mask != 0 {
-                    let time_fs = self.now_fs + i64::from(delays_fs[to as usize]);
-                    self.add(net, time_fs, mask);
+                    self.add(net, time_fs, mask, value);
                 }
             }
         }
     }
 
-    /// Adds lanes to the group of `net` at `time_fs`, making it where there is none.
-    fn add(&mut self, net: u32, time_fs: i64, mask: u64) {
-        let mut index = self.nets[net as usize].groups;
-        while index != NONE {
-            let group = &mut self.groups[index as usize];
-            if group.time_fs == time_fs {
-                group.mask |= mask;
-                return;
+    /// Cancels what is to arrive on `net` in the lanes of `mask` at `time_fs` or later; returns the values that are
+    /// left after everything earlier.
+    fn overtake(&mut self, net: u32, mask: u64, time_fs: i64) -> Lanes {
+        let state = &self.nets[net as usize];
+        let (mut index, mut last) = (state.groups, state.value);
+        while let Some(group) = self.groups.get_mut(index as usize) {
+            if group.time_fs >= time_fs {
+                group.mask &= !mask;
+            } else {
+                last = last.replaced(group.mask, group.values);
             }
             index = group.next;
+        }
+        last
+    }
+
+    /// Adds lanes to the group of `net` at `time_fs`, making it where there is none.
+    fn add(&mut self, net: u32, time_fs: i64, mask: u64, values: Lanes) {
+        let (mut before, mut index) = (NONE, self.nets[net as usize].groups);
+        while let Some(group) = self.groups.get_mut(index as usize) {
+            if group.time_fs == time_fs {
+                group.mask |= mask;
+                group.values = group.values.replaced(mask, values);
+                return;
+            }
+            if group.time_fs > time_fs {
+                break;
+            }
+            (before, index) = (index, group.next);
         }
         let group = Group {
             time_fs,
             mask,
-            next: self.nets[net as usize].groups,
+            values,
+            next: index,
         };
-        let index = match self.free_group {
+        let new = match self.free_group {
             NONE => {
                 self.groups.push(group);
                 self.groups.len() as u32 - 1
@@ -389,7 +411,10 @@ impl LaneKernel {
                 free
             }
         };
-        self.nets[net as usize].groups = index;
+        match before {
+            NONE => self.nets[net as usize].groups = new,
+            before => self.groups[before as usize].next = new,
+        }
         self.wheel.push(Event {
             time_fs,
             net,

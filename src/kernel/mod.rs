@@ -1,10 +1,10 @@
-//! The discrete event kernel: four-valued, integer femtoseconds, inertial delays, total order.
+//! The discrete event kernel: four-valued, integer femtoseconds, inertial or transport delays, total order.
 //!
 //! One instant is simulated in two phases. First every net change due at that femtosecond, from
 //! the stimulus or from a cell, is applied; then every cell that saw a triggering change is
 //! evaluated once, with all inputs new. A cell output that must change is scheduled one arc delay
 //! later; a different value computed in the meantime cancels it (inertial delay), the same value
-//! leaves it where it is. Zero delays make further rounds of the two phases (delta cycles) within
+//! leaves it where it is. Cells can be given transport delays instead. Zero delays make further rounds of the two phases (delta cycles) within
 //! the instant.
 //!
 //! ```text
@@ -20,6 +20,7 @@
 //! simulators agree with this one, ties included. The hot loop neither allocates (buckets keep
 //! their memory), nor hashes, nor touches a string.
 
+mod check_banks;
 mod check_report;
 mod checks;
 mod compiled;
@@ -28,6 +29,8 @@ mod lanes;
 mod observer;
 mod simulation;
 mod stimulus;
+mod trace_hash;
+mod transport;
 mod wheel;
 
 pub use check_report::{
@@ -39,3 +42,4 @@ pub use lanes::{LaneDrive, LaneKernel, LaneObserver};
 pub use observer::{Observer, Recorder};
 pub use simulation::{Kernel, Statistics};
 pub use stimulus::{Drive, Stimulus, clock, in_order, merge};
+pub use trace_hash::TraceHash;

@@ -1,8 +1,11 @@
 //! The event loop.
 
+use rand_philox::splitmix64;
+
 use super::compiled::{CellState, DelaySet, FanOut, PinClass, Tables, initial_cells};
 use super::observer::Observer;
 use super::stimulus::Stimulus;
+use super::transport::TransportQueues;
 use super::wheel::{Event, TimeWheel};
 use crate::logic::Logic;
 use crate::netlist::{NetId, Netlist, Timing};
@@ -10,6 +13,12 @@ use crate::units::Time;
 
 /// No value is pending on a net.
 const NONE: u8 = 4;
+
+/// The net's driver has transport delays: what is pending is in its queue.
+const QUEUED: u8 = 5;
+
+/// Generation of a queued change; nets with a queue stay at 0.
+const QUEUED_GENERATION: u32 = 1;
 
 /// Rounds of zero-delay changes in one instant after which a loop is assumed to oscillate.
 const MOST_DELTA_CYCLES: u32 = 10_000;
@@ -40,6 +49,8 @@ pub struct Kernel {
     delays: Vec<DelaySet>,
     wheel: TimeWheel,
     dirty: Vec<u32>,
+    transport: TransportQueues,
+    shuffle: Option<Shuffle>,
     statistics: Statistics,
 }
 
@@ -51,17 +62,34 @@ impl Kernel {
             value: Logic::X.bits(),
             pending: NONE,
         };
+        let transport = TransportQueues::new(netlist, timing);
+        let mut nets = vec![unknown; netlist.net_count()];
+        for net in transport.nets() {
+            nets[net].pending = QUEUED;
+        }
         Kernel {
             now_fs: 0,
-            nets: vec![unknown; netlist.net_count()],
+            nets,
             cells: initial_cells(netlist, timing),
             delays: DelaySet::all(timing),
             fan_out: FanOut::new(netlist),
             tables: Tables::new(),
             wheel: TimeWheel::new(),
             dirty: Vec::new(),
+            transport,
+            shuffle: None,
             statistics: Statistics::default(),
         }
+    }
+
+    /// Handles what happens in one instant in a random order from now on, to show that no result depends on it.
+    #[must_use]
+    pub fn shuffled(mut self, seed: u64) -> Self {
+        self.shuffle = Some(Shuffle {
+            state: seed,
+            events: Vec::new(),
+        });
+        self
     }
 
     /// The present.
@@ -148,17 +176,20 @@ impl Kernel {
 
     fn settle<O: Observer>(&mut self, observer: &mut O) {
         for _ in 0..MOST_DELTA_CYCLES {
-            while let Some(event) = self.wheel.pop_at(self.now_fs) {
-                let net = &mut self.nets[event.net as usize];
-                if net.generation == event.tag >> 2 {
-                    net.pending = NONE;
-                    self.apply(event.net as usize, (event.tag & 3) as u8, observer);
+            if self.shuffle.is_some() {
+                self.arrive_shuffled(observer);
+            } else {
+                while let Some(event) = self.wheel.pop_at(self.now_fs) {
+                    self.arrive(event, observer);
                 }
             }
             if self.dirty.is_empty() {
                 return;
             }
             let mut dirty = std::mem::take(&mut self.dirty);
+            if let Some(shuffle) = &mut self.shuffle {
+                shuffle.permute(&mut dirty);
+            }
             self.statistics.evaluations += dirty.len() as u64;
             for &cell in &dirty {
                 self.evaluate(cell as usize);
@@ -167,6 +198,36 @@ impl Kernel {
             self.dirty = dirty;
         }
         panic!("zero-delay loop oscillates at {}", self.now());
+    }
+
+    #[inline]
+    fn arrive<O: Observer>(&mut self, event: Event, observer: &mut O) {
+        let index = event.net as usize;
+        let net = &mut self.nets[index];
+        if net.generation == event.tag >> 2 {
+            net.pending = NONE;
+            self.apply(index, (event.tag & 3) as u8, observer);
+        } else if net.pending == QUEUED
+            && let Some(value) = self.transport.arriving(index, self.now_fs)
+        {
+            self.apply(index, value, observer);
+        }
+    }
+
+    #[cold]
+    fn arrive_shuffled<O: Observer>(&mut self, observer: &mut O) {
+        let Some(mut shuffle) = self.shuffle.take() else {
+            return;
+        };
+        let due = std::iter::from_fn(|| self.wheel.pop_at(self.now_fs));
+        shuffle.events.extend(due);
+        let mut events = std::mem::take(&mut shuffle.events);
+        shuffle.permute(&mut events);
+        for event in events.drain(..) {
+            self.arrive(event, observer);
+        }
+        shuffle.events = events;
+        self.shuffle = Some(shuffle);
     }
 
     #[inline]
@@ -236,6 +297,9 @@ impl Kernel {
             return;
         }
         if state.pending != NONE {
+            if state.pending == QUEUED {
+                return self.send(net, value, self.now_fs + delays_fs[value as usize] as i64);
+            }
             state.generation = (state.generation + 1) & (u32::MAX >> 2);
             state.pending = NONE;
         }
@@ -246,6 +310,37 @@ impl Kernel {
                 net,
                 tag: state.generation << 2 | value as u32,
             });
+        }
+    }
+
+    /// [`Kernel::schedule`] with a transport delay.
+    #[inline(never)]
+    fn send(&mut self, net: u32, value: u8, time_fs: i64) {
+        let present = self.nets[net as usize].value;
+        if self.transport.send(net as usize, present, value, time_fs) {
+            self.wheel.push(Event {
+                time_fs,
+                net,
+                tag: QUEUED_GENERATION << 2,
+            });
+        }
+    }
+}
+
+/// A random order of what happens in one instant.
+struct Shuffle {
+    state: u64,
+    /// Kept for its memory.
+    events: Vec<Event>,
+}
+
+impl Shuffle {
+    /// Fisher and Yates.
+    fn permute<T>(&mut self, items: &mut [T]) {
+        for last in (1..items.len()).rev() {
+            self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let other = splitmix64(self.state) % (last as u64 + 1);
+            items.swap(last, other as usize);
         }
     }
 }

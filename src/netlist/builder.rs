@@ -16,7 +16,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
-use super::module::{Cell, Direction, Instance, Module, Net, Port, Signal};
+use super::module::{Cell, Direction, Instance, Module, Names, Net, Port, Signal};
 
 /// What is wrong with a circuit description.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -103,6 +103,7 @@ impl ModuleBuilder {
                 net_count: 0,
                 cells: Vec::new(),
                 instances: Vec::new(),
+                names: Names::default(),
             },
             drivers: Vec::new(),
             error: None,
@@ -344,7 +345,10 @@ impl ModuleBuilder {
         self.check_names();
         match self.error {
             Some(error) => Err(error),
-            None => Ok(Arc::new(self.module)),
+            None => {
+                self.module.names = Names::of(&self.module);
+                Ok(Arc::new(self.module))
+            }
         }
     }
 

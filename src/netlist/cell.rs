@@ -6,8 +6,7 @@
 //! Transistor counts are those of static CMOS, with transmission gates where the thesis says so: a
 //! 4-transistor multiplexer and a 6-transistor OR gate (4.4.4). The custom flip-flop with reset is
 //! a 24-transistor master-slave pair. The library flip-flop with set and reset has 36 transistors,
-//! but occupies about three times the custom cell's layout (Fig. 52), which counts of transistors
-//! do not show.
+//! but occupies about three times the custom cell's layout (Fig. 52): [`CellKind::area`] says so.
 
 use crate::logic::Logic;
 
@@ -107,6 +106,15 @@ impl CellKind {
             Xor2 | Xnor2 => 8,
             Dffr => 24,
             Dffsr => 36,
+        }
+    }
+
+    /// Layout area in transistors of the custom flip-flop's density: the cell's transistors, and for the
+    /// library's flip-flop three times the custom one (thesis 4.4.4, Fig. 52).
+    pub const fn area(self) -> u32 {
+        match self {
+            Dffsr => 3 * Dffr.transistors(),
+            _ => self.transistors(),
         }
     }
 

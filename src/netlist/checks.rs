@@ -10,18 +10,55 @@
 //! what a 40 nm master-slave flip-flop with the delays of [`Library`](super::Library) would plausibly have.
 //! Setup is about the two inverters and the transmission gate of the master latch, hold a third of it,
 //! recovery and removal are those of the reset gates, and no pulse may be shorter than the time to turn
-//! a latch over. Corners scale as the delays do.
+//! a latch over. Setup and hold differ between a rising and a falling D, as the latch's two inverters do. Corners
+//! scale as the delays do.
 
 use super::cell::CellKind;
 use super::library::{Corner, Delay};
+use super::static_timing::Edge;
+
+/// A limit on D, by the direction in which it changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct DataLimit {
+    /// D rises.
+    pub rise: Delay,
+    /// D falls.
+    pub fall: Delay,
+}
+
+impl DataLimit {
+    /// Corners scaled from the typical limits, fs.
+    pub const fn scaled(rise_fs: u32, fall_fs: u32) -> Self {
+        DataLimit {
+            rise: Delay::scaled(rise_fs),
+            fall: Delay::scaled(fall_fs),
+        }
+    }
+
+    /// The same limit for both directions.
+    pub const fn both(limit: Delay) -> Self {
+        DataLimit {
+            rise: limit,
+            fall: limit,
+        }
+    }
+
+    /// The limit of one direction.
+    pub const fn of(self, edge: Edge) -> Delay {
+        match edge {
+            Edge::Rise => self.rise,
+            Edge::Fall => self.fall,
+        }
+    }
+}
 
 /// Limits of one flip-flop cell; zero means that the check always passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CheckLimits {
     /// D stable before a rising CK.
-    pub setup: Delay,
+    pub setup: DataLimit,
     /// D stable after a rising CK.
-    pub hold: Delay,
+    pub hold: DataLimit,
     /// Release of R or S before a rising CK that is to count.
     pub recovery: Delay,
     /// Release of R or S after a rising CK that is not to count.
@@ -100,8 +137,8 @@ impl CheckLimits {
     pub const fn of(kind: CellKind) -> Self {
         match kind {
             CellKind::Dffr => CheckLimits {
-                setup: Delay::scaled(35_023),
-                hold: Delay::scaled(12_037),
+                setup: DataLimit::scaled(31_019, 35_023),
+                hold: DataLimit::scaled(12_037, 10_009),
                 recovery: Delay::scaled(40_009),
                 removal: Delay::scaled(25_031),
                 clock_high: Delay::scaled(60_013),
@@ -109,8 +146,8 @@ impl CheckLimits {
                 control_high: Delay::scaled(61_027),
             },
             CellKind::Dffsr => CheckLimits {
-                setup: Delay::scaled(44_017),
-                hold: Delay::scaled(15_013),
+                setup: DataLimit::scaled(39_023, 44_017),
+                hold: DataLimit::scaled(15_013, 12_511),
                 recovery: Delay::scaled(51_031),
                 removal: Delay::scaled(32_009),
                 clock_high: Delay::scaled(77_017),
@@ -120,8 +157,8 @@ impl CheckLimits {
             _ => {
                 const NONE: Delay = Delay::fixed(0);
                 CheckLimits {
-                    setup: NONE,
-                    hold: NONE,
+                    setup: DataLimit::both(NONE),
+                    hold: DataLimit::both(NONE),
                     recovery: NONE,
                     removal: NONE,
                     clock_high: NONE,
@@ -132,11 +169,30 @@ impl CheckLimits {
         }
     }
 
-    /// The limit of one check in one corner, fs.
-    pub const fn at(&self, check: CheckKind, corner: Corner) -> u32 {
+    /// Every limit times `factor`, rounded to whole femtoseconds.
+    pub fn scaled(&self, factor: f64) -> Self {
+        let delay = |limit: Delay| limit.times(factor);
+        let data = |limit: DataLimit| DataLimit {
+            rise: delay(limit.rise),
+            fall: delay(limit.fall),
+        };
+        CheckLimits {
+            setup: data(self.setup),
+            hold: data(self.hold),
+            recovery: delay(self.recovery),
+            removal: delay(self.removal),
+            clock_high: delay(self.clock_high),
+            clock_low: delay(self.clock_low),
+            control_high: delay(self.control_high),
+        }
+    }
+
+    /// The limit of one check in one corner, fs; that of setup and hold for D changing in the direction of `edge`,
+    /// which the other checks ignore.
+    pub const fn toward(&self, check: CheckKind, edge: Edge, corner: Corner) -> u32 {
         let limit = match check {
-            CheckKind::Setup => self.setup,
-            CheckKind::Hold => self.hold,
+            CheckKind::Setup => self.setup.of(edge),
+            CheckKind::Hold => self.hold.of(edge),
             CheckKind::Recovery => self.recovery,
             CheckKind::Removal => self.removal,
             CheckKind::ClockHigh => self.clock_high,
@@ -144,6 +200,13 @@ impl CheckLimits {
             CheckKind::ControlHigh => self.control_high,
         };
         limit.at(corner)
+    }
+
+    /// The limit of one check in one corner, fs; the larger one where D's directions differ.
+    pub const fn at(&self, check: CheckKind, corner: Corner) -> u32 {
+        let rise = self.toward(check, Edge::Rise, corner);
+        let fall = self.toward(check, Edge::Fall, corner);
+        if rise > fall { rise } else { fall }
     }
 }
 

@@ -1,7 +1,8 @@
 //! The flat netlist: every cell and net of the elaborated chip in plain arrays.
 //!
 //! Hierarchy survives as a list of [`Scope`]s in depth-first order, each with a map from its
-//! module's local nets to the chip's nets; names are looked up there and stored nowhere else.
+//! module's local nets to the chip's nets. Names are stored in the modules alone: a path is followed from module to
+//! module, one hash look-up for each name in it.
 
 use std::sync::Arc;
 
@@ -56,6 +57,8 @@ pub struct Scope {
     pub subtree: usize,
     first_net: usize,
     first_cell: usize,
+    /// The first of the nets that this scope is the outermost to name; they are numbered in the scopes' order.
+    first_own_net: usize,
 }
 
 /// An elaborated design.
@@ -103,6 +106,7 @@ impl Netlist {
         for (local, &outer) in port_nets.zip(ports) {
             self.net_map[first_net + local.index()] = outer;
         }
+        let first_own_net = self.net_count;
         for i in first_net..self.net_map.len() {
             if !self.net_map[i].is_some() {
                 self.net_map[i] = self.new_net();
@@ -131,6 +135,7 @@ impl Netlist {
             subtree: 1,
             first_net,
             first_cell,
+            first_own_net: if index == 0 { 0 } else { first_own_net },
         });
         let mut child_ports = Vec::new();
         for child in module.instances() {
@@ -190,8 +195,15 @@ impl Netlist {
         path.split('.')
             .filter(|part| !part.is_empty())
             .try_fold(0, |scope, part| {
-                self.children(scope).find(|&c| self.scopes[c].name == part)
+                Some(scope + self.scopes[scope].module.scope_offset(part)?)
             })
+    }
+
+    /// The leaf cell at a dotted path below the top.
+    pub fn cell(&self, path: &str) -> Option<usize> {
+        let (scope_path, name) = path.rsplit_once('.').unwrap_or(("", path));
+        let scope = &self.scopes[self.scope(scope_path)?];
+        Some(scope.first_cell + scope.module.cell(name)?)
     }
 
     /// Nets of the signal at a dotted path below the top, such as `mp_r0_c0.p_counter.COUNT`.
@@ -245,21 +257,19 @@ impl Netlist {
 
     /// Dotted path of a net in the outermost scope that names it.
     pub fn net_path(&self, net: NetId) -> Option<String> {
-        self.scopes.iter().enumerate().find_map(|(i, scope)| {
-            let local = &self.net_map[scope.first_net..][..scope.module.net_count()];
-            let position = local.iter().position(|&n| n == net)?;
-            let signal = scope
-                .module
-                .signals()
-                .iter()
-                .find(|s| s.nets().any(|n| n.index() == position))?;
-            let bit = position - signal.nets().next()?.index();
-            let path = format!("{}.{}", self.scope_path(i), signal.name);
-            Some(if signal.is_bus {
-                format!("{path}[{bit}]")
-            } else {
-                path
-            })
+        let after = |scope: &Scope| scope.first_own_net <= net.index();
+        let index = self.scopes.partition_point(after).checked_sub(1)?;
+        let scope = &self.scopes[index];
+        let local = &self.net_map[scope.first_net..][..scope.module.net_count()];
+        let position = local.iter().position(|&n| n == net)?;
+        let mut signals = scope.module.signals().iter();
+        let signal = signals.find(|s| s.nets().any(|n| n.index() == position))?;
+        let bit = position - signal.nets().next()?.index();
+        let path = format!("{}.{}", self.scope_path(index), signal.name);
+        Some(if signal.is_bus {
+            format!("{path}[{bit}]")
+        } else {
+            path
         })
     }
 }
@@ -296,7 +306,29 @@ mod tests {
     fn names_are_recovered() {
         let n = Netlist::elaborate(&two_inverters());
         assert_eq!(n.cell_path(1), "pair.second.inv");
+        assert_eq!(n.cell("second.inv"), Some(1));
+        assert_eq!((n.cell("inv"), n.cell("second.INV")), (None, None));
         assert_eq!(n.net_path(n.net("second.Z").unwrap()).unwrap(), "pair.Z[1]");
         assert_eq!(n.children(0).count(), 2);
+    }
+
+    #[test]
+    fn every_scope_and_net_is_found_by_its_path() {
+        let mut m = ModuleBuilder::new("top");
+        let (a, z) = (m.input("A"), m.output_bus("Z", 4));
+        let pair = two_inverters();
+        m.instance("x", &pair, &[("A", &[a]), ("Z", &z[..2])]);
+        m.instance("y", &pair, &[("A", &z[1..2]), ("Z", &z[2..])]);
+        m.instance("z", &pair, &[("A", &[a])]);
+        let n = Netlist::elaborate(&m.finish().unwrap());
+        let below_top = |path: String| path.split_once('.').map(|(_, p)| p.to_owned());
+        for index in 1..n.scopes().len() {
+            let path = below_top(n.scope_path(index)).unwrap();
+            assert_eq!(n.scope(&path), Some(index), "{path}");
+        }
+        for net in (0..n.net_count()).map(NetId::new) {
+            let path = below_top(n.net_path(net).unwrap()).unwrap();
+            assert_eq!(n.net(&path), Some(net), "{path}");
+        }
     }
 }

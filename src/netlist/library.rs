@@ -65,6 +65,16 @@ impl Delay {
         }
     }
 
+    /// Every corner times `factor`, rounded to whole femtoseconds.
+    pub fn times(self, factor: f64) -> Self {
+        let scale = |fs: u32| (fs as f64 * factor).round() as u32;
+        Delay {
+            min_fs: scale(self.min_fs),
+            typ_fs: scale(self.typ_fs),
+            max_fs: scale(self.max_fs),
+        }
+    }
+
     /// The delay of one corner, fs.
     pub const fn at(self, corner: Corner) -> u32 {
         match corner {

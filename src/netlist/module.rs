@@ -2,6 +2,7 @@
 //!
 //! A [`Module`] is made by a [`ModuleBuilder`](super::ModuleBuilder), which checks it, and never changes again.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
@@ -101,6 +102,37 @@ pub struct Module {
     pub(super) net_count: u32,
     pub(super) cells: Vec<Cell>,
     pub(super) instances: Vec<Instance>,
+    pub(super) names: Names,
+}
+
+/// Where what has a name is, so that nothing is searched for: a module is described once, however often it is
+/// instantiated, and so are its names.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Names {
+    signals: HashMap<String, u32>,
+    cells: HashMap<String, u32>,
+    /// How many scopes after its parent's each instance's scope comes, in depth-first order.
+    instances: HashMap<String, u32>,
+}
+
+impl Names {
+    /// The names of a complete module.
+    pub(super) fn of(module: &Module) -> Self {
+        let index = |i: usize| i as u32;
+        let mut scopes = 1;
+        let mut instances = HashMap::with_capacity(module.instances.len());
+        for instance in &module.instances {
+            instances.insert(instance.name.clone(), index(scopes));
+            scopes += instance.module.total_scopes();
+        }
+        let signals = module.signals.iter().enumerate();
+        let cells = module.cells.iter().enumerate();
+        Names {
+            signals: signals.map(|(i, s)| (s.name.clone(), index(i))).collect(),
+            cells: cells.map(|(i, c)| (c.name.clone(), index(i))).collect(),
+            instances,
+        }
+    }
 }
 
 impl Module {
@@ -143,13 +175,38 @@ impl Module {
 
     /// The signal of this name.
     pub fn signal(&self, name: &str) -> Option<&Signal> {
-        self.signals.iter().find(|s| s.name == name)
+        let index = *self.names.signals.get(name)?;
+        Some(&self.signals[index as usize])
+    }
+
+    /// Index of the leaf cell of this name directly in this module.
+    pub fn cell(&self, name: &str) -> Option<usize> {
+        self.names.cells.get(name).map(|&index| index as usize)
+    }
+
+    /// How many scopes after this module's the one of its instance `name` comes in an elaborated design.
+    pub(super) fn scope_offset(&self, name: &str) -> Option<usize> {
+        let offset = self.names.instances.get(name)?;
+        Some(*offset as usize)
+    }
+
+    /// This module and every instance below it.
+    pub fn total_scopes(&self) -> usize {
+        let below = self.instances.iter().map(|i| i.module.total_scopes());
+        1 + below.sum::<usize>()
     }
 
     /// Transistors in this module and everything below it.
     pub fn transistors(&self) -> u64 {
         let own: u64 = self.cells.iter().map(|c| c.kind.transistors() as u64).sum();
         let below: u64 = self.instances.iter().map(|i| i.module.transistors()).sum();
+        own + below
+    }
+
+    /// Layout area of this module and everything below it, as [`CellKind::area`] counts it.
+    pub fn area(&self) -> u64 {
+        let own: u64 = self.cells.iter().map(|c| c.kind.area() as u64).sum();
+        let below: u64 = self.instances.iter().map(|i| i.module.area()).sum();
         own + below
     }
 

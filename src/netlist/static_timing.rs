@@ -25,7 +25,10 @@ use crate::logic::Logic;
 use crate::units::Time;
 
 /// Direction of a change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "snake_case")]
 pub enum Edge {
     /// To 1.
     Rise,
@@ -54,7 +57,7 @@ impl Edge {
         }
     }
 
-    const fn opposite(self) -> Self {
+    pub(super) const fn opposite(self) -> Self {
         match self {
             Edge::Rise => Edge::Fall,
             Edge::Fall => Edge::Rise,

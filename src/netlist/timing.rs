@@ -1,12 +1,26 @@
-//! The delays of an elaborated design in one corner: those of the library, or of each instance by itself.
+//! The delays and limits of an elaborated design in one corner: those of the library, or of each instance by itself.
 //!
 //! Nominal designs share one set of delays per kind of cell. A cell whose delays are changed (mismatch,
-//! back-annotation) gets a set of its own.
+//! back-annotation) gets a set of its own. So does one that delays as a wire does ([`DelayModel`]).
+
+use std::collections::BTreeMap;
 
 use super::cell::{CellKind, MAX_INPUTS};
 use super::flat::Netlist;
+use super::instance_limits::InstanceLimits;
 use super::library::{Corner, Library};
 use crate::logic::Logic;
+
+/// What becomes of a pulse that is shorter than the delay it meets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum DelayModel {
+    /// It is swallowed, as by a gate that has to charge its load: a new value cancels the one on its way.
+    #[default]
+    Inertial,
+    /// It comes through, as on a wire: every change arrives, except that one whose delay is so much shorter that
+    /// it overtakes earlier ones cancels those it overtakes (VHDL's `transport`; IEEE 1364, 14.6.4.3).
+    Transport,
+}
 
 /// Delays from one input pin to an output, fs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -32,11 +46,16 @@ impl ArcDelay {
 /// Delays of one cell by input pin.
 pub type CellDelays = [ArcDelay; MAX_INPUTS];
 
-/// Delays of every cell of a netlist.
+/// Delays of every cell of a netlist, and limits of every flip-flop.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Timing {
     sets: Vec<CellDelays>,
+    /// By index into `sets`.
+    models: Vec<DelayModel>,
     of_cell: Vec<u32>,
+    /// The library's limits by kind of cell, and those of single cells.
+    limits: Vec<InstanceLimits>,
+    own_limits: BTreeMap<usize, InstanceLimits>,
 }
 
 impl Timing {
@@ -51,7 +70,12 @@ impl Timing {
                 .iter()
                 .map(|&kind| std::array::from_fn(|pin| arc(kind, pin)))
                 .collect(),
+            models: vec![DelayModel::Inertial; CellKind::ALL.len()],
             of_cell: netlist.cells().iter().map(|c| c.kind as u32).collect(),
+            limits: CellKind::ALL
+                .map(|kind| InstanceLimits::of(library.checks(kind), corner))
+                .into(),
+            own_limits: BTreeMap::new(),
         }
     }
 
@@ -63,13 +87,43 @@ impl Timing {
 
     /// Gives one cell delays of its own.
     pub fn set(&mut self, cell: usize, delays: CellDelays) {
-        let shared = self.of_cell[cell] < CellKind::ALL.len() as u32;
-        if shared {
-            self.of_cell[cell] = self.sets.len() as u32;
-            self.sets.push(delays);
-        } else {
-            self.sets[self.of_cell[cell] as usize] = delays;
+        let own = self.own_set(cell);
+        self.sets[own] = delays;
+    }
+
+    /// How one cell delays: all its arcs alike, because a change of its output cancels one from any arc.
+    #[inline]
+    pub fn model(&self, cell: usize) -> DelayModel {
+        self.models[self.of_cell[cell] as usize]
+    }
+
+    /// Makes one cell delay in this way.
+    pub fn set_model(&mut self, cell: usize, model: DelayModel) {
+        let own = self.own_set(cell);
+        self.models[own] = model;
+    }
+
+    /// Limits of one cell, which is of this kind.
+    pub fn limits(&self, cell: usize, kind: CellKind) -> &InstanceLimits {
+        let own = self.own_limits.get(&cell);
+        own.unwrap_or(&self.limits[kind as usize])
+    }
+
+    /// Gives one cell limits of its own.
+    pub fn set_limits(&mut self, cell: usize, limits: InstanceLimits) {
+        self.own_limits.insert(cell, limits);
+    }
+
+    /// Index of a set that is this cell's alone.
+    fn own_set(&mut self, cell: usize) -> usize {
+        let set = self.of_cell[cell] as usize;
+        if set >= CellKind::ALL.len() {
+            return set;
         }
+        self.of_cell[cell] = self.sets.len() as u32;
+        self.sets.push(self.sets[set]);
+        self.models.push(self.models[set]);
+        self.sets.len() - 1
     }
 
     /// Distinct sets of delays.
@@ -102,7 +156,10 @@ mod tests {
             fall_fs: 8,
         }; MAX_INPUTS];
         timing.set(1, slow);
+        timing.set_model(1, DelayModel::Transport);
         timing.set(1, slow);
+        assert_eq!(timing.model(0), DelayModel::Inertial);
+        assert_eq!(timing.model(1), DelayModel::Transport);
         assert_eq!(*timing.of(0), nominal);
         assert_eq!(*timing.of(1), slow);
         assert_eq!(timing.of(1)[0].to(Logic::X), 8);

@@ -13,11 +13,15 @@
 //!
 //! Mismatch is Gaussian, with a standard deviation that falls with the square root of a cell's area (Pelgrom
 //! et al., IEEE JSSC 24, 1989), its transistor count standing for the area. A cell's draw depends on nothing
-//! but the seed and the cell's index.
+//! but the seed and the cell's path, so that a macropixel is the same alone and within its array.
+//!
+//! A flip-flop's limits scale with its conditions as delays do; mismatch leaves them alone.
 
 use rand_philox::{Philox, splitmix64, u32_to_unit_f64};
 
+use super::cell::CellKind;
 use super::flat::Netlist;
+use super::library::Library;
 use super::timing::Timing;
 
 /// Speed of the silicon.
@@ -100,18 +104,35 @@ pub struct Mismatch {
 }
 
 impl Mismatch {
-    /// Factor on the delays of the cell with this index and this many transistors; never below 0.1, so that
+    /// Factor on the delays of the cell at this dotted path with this many transistors; never below 0.1, so that
     /// causes stay before their effects.
-    pub fn factor(&self, cell: usize, transistors: u32) -> f64 {
+    pub fn factor(&self, path: &str, transistors: u32) -> f64 {
         const INVERTER: f64 = 2.0;
         let key = splitmix64(self.seed);
-        let mut random = Philox::new([key as u32, (key >> 32) as u32], (cell as u128) << 64);
+        let block = (hash(path) as u128) << 64;
+        let mut random = Philox::new([key as u32, (key >> 32) as u32], block);
         // Box and Muller.
         let radius = libm::sqrt(-2.0 * libm::log(u32_to_unit_f64(random.next_u32())));
         let angle = std::f64::consts::TAU * u32_to_unit_f64(random.next_u32());
         let sigma = self.sigma * libm::sqrt(INVERTER / transistors as f64);
         (1.0 + sigma * radius * libm::cos(angle)).max(0.1)
     }
+}
+
+/// FNV-1a (Fowler, Noll and Vo), 64 bits: the same on every machine and in every version.
+fn hash(path: &str) -> u64 {
+    path.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ byte as u64).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}
+
+/// The limits of `library` times `factor`, as conditions scale them; delays are left alone.
+pub fn derated_limits(library: &Library, factor: f64) -> Library {
+    let mut derated = library.clone();
+    for kind in CellKind::ALL {
+        derated.set_checks(kind, library.checks(kind).scaled(factor));
+    }
+    derated
 }
 
 /// `nominal` with every delay times `factor` and, if asked for, every cell's own mismatch; rounded to whole
@@ -127,7 +148,9 @@ pub fn varied(
         return timing;
     }
     for (index, cell) in netlist.cells().iter().enumerate() {
-        let own = mismatch.map_or(1.0, |m| m.factor(index, cell.kind.transistors()));
+        let own = mismatch.map_or(1.0, |m| {
+            m.factor(&netlist.cell_path(index), cell.kind.transistors())
+        });
         let scale = |fs: u32| (fs as f64 * factor * own).round() as u32;
         let delays = nominal.of(index).map(|mut arc| {
             arc.rise_fs = scale(arc.rise_fs);
@@ -185,12 +208,14 @@ mod tests {
             sigma: 0.08,
             seed: 3,
         };
-        let draws: Vec<f64> = (0..20_000).map(|cell| mismatch.factor(cell, 8)).collect();
+        let draws: Vec<f64> = (0..20_000)
+            .map(|cell| mismatch.factor(&format!("chip.cell_{cell}"), 8))
+            .collect();
         let mean = draws.iter().sum::<f64>() / draws.len() as f64;
         let variance = draws.iter().map(|d| (d - mean) * (d - mean)).sum::<f64>();
         let sigma = (variance / draws.len() as f64).sqrt();
         assert!((mean - 1.0).abs() < 0.001, "{mean}");
         assert!((sigma - 0.04).abs() < 0.001, "{sigma}");
-        assert_eq!(draws[7], mismatch.factor(7, 8));
+        assert_eq!(draws[7], mismatch.factor("chip.cell_7", 8));
     }
 }

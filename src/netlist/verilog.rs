@@ -15,8 +15,10 @@
 //! drives pins in the active region (by `=`, not after a `#0` of its own or by `<=`).
 //!
 //! Where instances have delays of their own, every cell is a procedural model with delays that are parameters
-//! ([`write_parametric_cells`]), and `defparam`s set those that differ ([`write_delays`]). Time unit and
-//! precision are one femtosecond.
+//! ([`write_parametric_cells`]), and `defparam`s set those that differ ([`write_delays`]); one more parameter
+//! makes them transport delays. Verilog has none of its own that keep to the active region and let a change
+//! cancel those it overtakes: a module with a queue of changes does that. Time unit and precision are one
+//! femtosecond.
 
 use std::collections::HashSet;
 use std::io::{self, Write};
@@ -26,10 +28,49 @@ use super::cell::CellKind;
 use super::flat::Netlist;
 use super::library::{CellArcs, Corner, Library};
 use super::module::{Direction, Module, Net};
-use super::timing::Timing;
+use super::timing::{DelayModel, Timing};
 use crate::logic::Logic;
 
 const TIMESCALE: &str = "`timescale 1fs/1fs\n";
+
+/// Lets every change of `value` arrive after its delay. One that overtakes others cancels them.
+const TRANSPORT_PATH: &str = "
+module TRANSPORT_PATH(output reg out, input value, input [31:0] rise, input [31:0] fall);
+  reg [63:0] due [0:255];
+  reg to [0:255];
+  reg [7:0] head, tail;
+  reg [63:0] at;
+  reg last;
+  initial begin
+    head = 0;
+    tail = 0;
+    forever begin : deliver
+      if (head == tail) @(tail);
+      else if (due[head] > $time) #(due[head] - $time);
+      else begin
+        out = to[head];
+        head = head + 8'd1;
+      end
+    end
+  end
+  always @(value) begin
+    at = $time + (value === 1'b1 ? rise : value === 1'b0 ? fall : rise < fall ? rise : fall);
+    while (head != tail && due[tail - 8'd1] >= at) tail = tail - 8'd1;
+    last = out;
+    if (head != tail) last = to[tail - 8'd1];
+    if (value !== last) begin
+      due[tail] = at;
+      to[tail] = value;
+      tail = tail + 8'd1;
+      if (head == tail) begin
+        $display(\"%m: more than 255 changes on their way\");
+        $finish;
+      end
+    end
+    disable deliver;
+  end
+endmodule
+";
 
 /// Writes the model of every cell with the delays of one corner.
 ///
@@ -44,7 +85,8 @@ pub fn write_cells(out: &mut dyn Write, library: &Library, corner: Corner) -> io
     Ok(())
 }
 
-/// As [`write_cells`], with parameters `RISE_<pin>` and `FALL_<pin>` (fs) for the delays of every arc.
+/// As [`write_cells`], with parameters `RISE_<pin>` and `FALL_<pin>` (fs) for the delays of every arc, and
+/// `TRANSPORT`, 1 for transport delays.
 ///
 /// # Errors
 /// Those of the writer.
@@ -53,7 +95,7 @@ pub fn write_parametric_cells(
     library: &Library,
     corner: Corner,
 ) -> io::Result<()> {
-    write!(out, "{TIMESCALE}")?;
+    write!(out, "{TIMESCALE}{TRANSPORT_PATH}")?;
     for kind in CellKind::ALL {
         let (inputs, outputs) = (kind.inputs().join(", "), kind.outputs().join(", "));
         writeln!(
@@ -73,13 +115,26 @@ pub fn write_parametric_cells(
             let name = kind.inputs()[pin];
             (format!("RISE_{name}"), format!("FALL_{name}"))
         })?;
+        writeln!(out, "  parameter TRANSPORT = 0;")?;
+        writeln!(out, "  generate if (TRANSPORT) begin : transport")?;
+        for (output, value) in outputs_of(kind) {
+            writeln!(
+                out,
+                "    TRANSPORT_PATH to_{output}({output}, {value}, rise, fall);"
+            )?;
+        }
+        writeln!(out, "  end else begin : inertial")?;
+        for (output, value) in outputs_of(kind) {
+            writeln!(out, "    assign #(rise, fall) {output} = {value};")?;
+        }
+        writeln!(out, "  end endgenerate")?;
         writeln!(out, "endmodule")?;
     }
     Ok(())
 }
 
 /// Writes a `defparam` for every delay of `timing` that differs from `library`, the delays that the cells were
-/// written with; `instance` is the name that the top has where the file is included.
+/// written with, and for every cell with transport delays; `instance` is the name that the top has where the file is included.
 ///
 /// # Errors
 /// Those of the writer.
@@ -94,6 +149,9 @@ pub fn write_delays(
     for (index, scope) in netlist.scopes().iter().enumerate() {
         let path = format!("{instance}{}", &netlist.scope_path(index)[top..]);
         for (cell, leaf) in netlist.cells_of(index).zip(scope.module.cells()) {
+            if timing.model(cell) == DelayModel::Transport {
+                writeln!(out, "  defparam {path}.{}.TRANSPORT = 1;", leaf.name)?;
+            }
             for (pin, name) in leaf.kind.inputs().iter().enumerate() {
                 let (arc, nominal) = (timing.of(cell)[pin], library.of(cell)[pin]);
                 let values = [
@@ -155,10 +213,14 @@ fn write_cell(
         writeln!(out, "  assign #({rise}, {fall}) Z = value;")?;
     } else {
         write_arc_selecting_cell(out, kind, delays)?;
+        for (output, value) in outputs_of(kind) {
+            writeln!(out, "  assign #(rise, fall) {output} = {value};")?;
+        }
     }
     writeln!(out, "endmodule")
 }
 
+/// The body of a cell that picks its delays, all but the assignment of its outputs.
 fn write_arc_selecting_cell<D: std::fmt::Display>(
     out: &mut dyn Write,
     kind: CellKind,
@@ -230,10 +292,13 @@ fn write_arc_selecting_cell<D: std::fmt::Display>(
     writeln!(out, "    value = next;")?;
     writeln!(out, "    @({});", events.join(" or "))?;
     writeln!(out, "  end")?;
-    for (output, inversion) in kind.outputs().iter().zip(["", "~"]) {
-        writeln!(out, "  assign #(rise, fall) {output} = {inversion}value;")?;
-    }
     Ok(())
+}
+
+/// Output pins of a cell, and what each shows of the `value` that [`write_arc_selecting_cell`] computes.
+fn outputs_of(kind: CellKind) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let pins = kind.outputs().iter().copied();
+    pins.zip(["value", "~value"])
 }
 
 /// Writes `top` and every module below it, children first, each once.

@@ -2,11 +2,19 @@
 //! random-access photon stream that drives every engine.
 
 mod budget;
+mod philox;
+mod pulse;
 mod random;
 mod spad;
 mod stream;
 
 pub use budget::{Convention, PhotonBudget};
-pub use random::{Poisson, Purpose, normal, random_stream};
-pub use spad::{SPADS, SpadEvent, apply_dead_time};
-pub use stream::{PhotonStream, PixelLight, PixelPhotons, PixelStream, StreamConfig};
+pub use pulse::{PulseError, PulseShape};
+pub use random::{Poisson, Purpose, normal, philox_key, random_stream};
+pub use spad::{
+    AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, SPADS, SpadEvent, SpadModel, apply_dead_time,
+};
+pub use stream::{
+    Draw, GROUP, PLACE_BITS, PhotonStream, PixelLight, PixelPhotons, PixelStream, Place, Run, SLOT,
+    SignalPhoton, StreamConfig, place, time_in_slot_fs,
+};

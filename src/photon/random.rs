@@ -11,10 +11,16 @@ use rand_philox::{Philox, splitmix64};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Purpose {
-    /// Photon times and SPADs.
+    /// Cycles, times and SPADs of background photons.
     Photons = 0,
     /// Disparity errors of the stereo camera.
     Stereo = 1,
+    /// How many photons there are.
+    PhotonCounts = 2,
+    /// Cycles, times and SPADs of signal photons.
+    Signal = 3,
+    /// Afterpulses and crosstalk.
+    Avalanches = 4,
 }
 
 /// The stream of random words for (`seed`, `purpose`, `index`, `sub_index`).
@@ -22,10 +28,15 @@ pub enum Purpose {
 /// It holds 2³² blocks of four words before it would run into the next `sub_index`.
 #[inline]
 pub fn random_stream(seed: u64, purpose: Purpose, index: u32, sub_index: u32) -> Philox {
-    let key = splitmix64(seed);
     let counter =
         u128::from(purpose as u32) << 96 | u128::from(index) << 64 | u128::from(sub_index) << 32;
-    Philox::new([key as u32, (key >> 32) as u32], counter)
+    Philox::new(philox_key(seed), counter)
+}
+
+/// The key of the generator for a seed.
+pub fn philox_key(seed: u64) -> [u32; 2] {
+    let key = splitmix64(seed);
+    [key as u32, (key >> 32) as u32]
 }
 
 /// One draw of the standard normal distribution (Box and Muller, the cosine half).
@@ -66,9 +77,13 @@ impl Poisson {
         let parts = (mean / LARGEST_TABLE_MEAN).ceil().max(1.0);
         let exceeds = exceedance_table(mean / parts);
         let mut start = Box::new([0u16; 256]);
+        let mut above = exceeds.len();
         for (top, slot) in start.iter_mut().enumerate() {
             let largest_word = (top as u64) << 56 | ((1 << 56) - 1);
-            *slot = exceeds.partition_point(|&e| e > largest_word) as u16;
+            while above > 0 && exceeds[above - 1] <= largest_word {
+                above -= 1;
+            }
+            *slot = above as u16;
         }
         Poisson {
             exceeds,
@@ -77,19 +92,31 @@ impl Poisson {
         }
     }
 
-    /// One draw; takes two words of `random` for every part of 64 of the mean.
+    /// Whether every draw is zero.
+    pub fn is_zero(&self) -> bool {
+        self.exceeds.is_empty()
+    }
+
+    /// How many random words make one draw: one for every part of 64 of the mean.
+    #[inline]
+    pub fn words(&self) -> u32 {
+        self.parts
+    }
+
+    /// What one random word adds to a draw.
+    #[inline]
+    pub fn part(&self, word: u64) -> u32 {
+        let mut count = usize::from(self.start[(word >> 56) as usize]);
+        while self.exceeds.get(count).is_some_and(|&e| e > word) {
+            count += 1;
+        }
+        count as u32
+    }
+
+    /// One draw.
     #[inline]
     pub fn draw(&self, random: &mut Philox) -> u32 {
-        let mut total = 0;
-        for _ in 0..self.parts {
-            let word = random.next_u64();
-            let mut count = usize::from(self.start[(word >> 56) as usize]);
-            while self.exceeds.get(count).is_some_and(|&e| e > word) {
-                count += 1;
-            }
-            total += count as u32;
-        }
-        total
+        (0..self.parts).map(|_| self.part(random.next_u64())).sum()
     }
 }
 

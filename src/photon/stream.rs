@@ -1,43 +1,67 @@
-//! The photon stream: every avalanche of a pixel in an exposure, drawn in any order.
+//! The photon stream: every avalanche of a macropixel in an exposure, drawn in any order.
 //!
-//! An exposure is a row of laser cycles. Cycle n spans the half-open time from
-//! `clock.periods(n · stop_periods)` to the start of cycle n + 1; the laser fires at its start,
-//! with the rising edge of STOP. In each cycle a pixel detects
+//! An exposure is a row of laser cycles. Cycle n spans the half-open time from `clock.periods(n · stop_periods)` to the
+//! start of cycle n + 1; the laser fires at its start, with the rising edge of STOP. In each cycle a macropixel detects
 //!
-//! * a Poisson number of signal photons, Gaussian in time around the arrival of the echo,
+//! * a Poisson number of signal photons, spread around the arrival of the echo by the laser pulse and all jitter,
 //! * a Poisson number of background photons and dark counts, uniform over the cycle,
 //!
 //! each on one of the 16 SPADs with equal chance. Photons outside their cycle are discarded.
-//! One cycle's photons are a pure function of (seed, pixel, cycle), so engines may draw any cycle
-//! of any pixel on any thread and see the same light. Only the dead time ties cycles together;
-//! it is applied afterwards, over the whole exposure.
 //!
-//! Limits of the model: rates are detection rates and constant within an exposure; no
-//! afterpulses, no crosstalk, no spread of dead time or dark counts between SPADs; an echo that
-//! outlasts its cycle is cut off and not carried into the next one; timing jitter of SPADs and
-//! electronics belongs into the pulse width.
+//! ```text
+//!                 slot 0   slot 1   slot 2   …            a slot is 2²³ fs = 8.4 ns after the start of its cycle
+//!   cycle 0     ┌────────┬────────┬────────┬──
+//!   cycle 1     │ one    │        │        │             a group is 512 laser cycles
+//!     …         │ draw   │        │        │
+//!   cycle 511   ├────────┼────────┼────────┼──           background: one key per (macropixel, slot, group)
+//!   cycle 512   │        │        │        │             signal:     one key per (macropixel, group)
+//! ```
+//!
+//! The photons under one key are a pure function of (seed, macropixel, slot, group): their Poisson number is drawn
+//! first, then each takes 64 random bits (a signal photon 128) for its cycle, SPAD and time. So any part can be drawn
+//! on any thread in any order, and all see the same light. Only dead time, afterpulses and crosstalk tie slots and
+//! cycles together; they are applied afterwards ([`SpadModel::detect`]).
+//!
+//! Timing jitter of a SPAD displaces the points of a Poisson process, which leaves it one: jitter of background changes
+//! nothing, and that of the signal is part of the pulse.
+//!
+//! Limits of the model: rates are detection rates and constant within an exposure; no spread of dead time or dark counts
+//! between SPADs; an echo that outlasts its cycle is cut off and not carried into the next one. Where a cycle is no
+//! whole number of femtoseconds, its odd last one gets no photon.
 
-use rand_philox::Philox;
-
-use super::random::{Poisson, Purpose, normal, random_stream};
-use super::spad::{SPADS, SpadEvent, apply_dead_time};
+use super::philox::Blocks;
+use super::pulse::{PulseSampler, PulseShape};
+use super::random::{Poisson, Purpose, philox_key};
+use super::spad::{SPADS, SpadEvent, SpadModel};
 use crate::units::{Frequency, Time};
 
-/// What all pixels of an exposure share.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Length of a time slot.
+pub const SLOT: Time = Time::from_fs(1 << SLOT_BITS);
+const SLOT_BITS: u32 = 23;
+
+/// Laser cycles of a group.
+pub const GROUP: u32 = 1 << GROUP_BITS;
+const GROUP_BITS: u32 = 9;
+
+const SPAD_BITS: u32 = SPADS.trailing_zeros();
+
+/// What all macropixels of an exposure share.
+#[derive(Debug, Clone, PartialEq)]
 pub struct StreamConfig {
     /// Equal seeds give equal photons.
     pub seed: u64,
     /// The chip's CLK.
     pub clock: Frequency,
-    /// CLK periods from one STOP edge to the next, at least 1; a cycle stays below 2⁵⁹ fs (576 s).
+    /// CLK periods from one STOP edge to the next, at least 1.
     pub stop_periods: u32,
     /// Laser cycles of the exposure.
     pub laser_cycles: u32,
-    /// Standard deviation of a signal photon's time: laser pulse and all jitter.
+    /// Standard deviation of a signal photon's time: a Gaussian laser pulse and all jitter.
     pub pulse_sigma: Time,
-    /// How long a SPAD stays blind after an avalanche.
-    pub dead_time: Time,
+    /// A measured laser pulse, whose times add to those of the Gaussian; its time 0 comes at the echo's arrival.
+    pub pulse_shape: Option<PulseShape>,
+    /// How the SPADs answer.
+    pub spads: SpadModel,
 }
 
 impl StreamConfig {
@@ -59,7 +83,7 @@ impl StreamConfig {
 pub struct PixelLight {
     /// Mean number of detected signal photons per laser cycle, finite and ≥ 0.
     pub signal_per_cycle: f64,
-    /// Centre of the echo after the start of its cycle.
+    /// Centre of the echo (of a Gaussian pulse) after the start of its cycle.
     pub arrival: Time,
     /// Mean rate of detected background photons and dark counts of all SPADs, finite and ≥ 0.
     pub background_hz: f64,
@@ -79,97 +103,31 @@ pub struct PixelPhotons {
     pub events: Vec<SpadEvent>,
     /// Photons and dark counts that fell into the exposure, seen or not.
     pub drawn: u64,
-    /// How many of them met a blind SPAD: `drawn - events.len()`.
+    /// Avalanches, afterpulses and crosstalk among them, that met a blind SPAD.
     pub lost_to_dead_time: u64,
-}
-
-/// The photons of one pixel before dead time, by laser cycle.
-///
-/// Holds what does not change between cycles, so that a cycle costs little more than its photons.
-#[derive(Debug, Clone)]
-pub struct PixelStream {
-    config: StreamConfig,
-    pixel: u32,
-    arrival_fs: i64,
-    sigma_fs: f64,
-    signal: Poisson,
-    background: Poisson,
-    /// One cycle's photons as `time after its start in fs << SPAD_BITS | SPAD`, which sort fast.
-    photons: Vec<u64>,
-}
-
-const SPAD_BITS: u32 = SPADS.trailing_zeros();
-const TIME_BITS: u32 = 64 - SPAD_BITS;
-
-impl PixelStream {
-    /// Prepares pixel number `pixel` under `light`.
-    pub fn new(config: &StreamConfig, pixel: u32, light: &PixelLight) -> Self {
-        debug_assert!(config.stop_periods > 0, "a cycle needs a length");
-        PixelStream {
-            config: *config,
-            pixel,
-            arrival_fs: light.arrival.as_fs(),
-            sigma_fs: config.pulse_sigma.as_fs() as f64,
-            signal: Poisson::new(light.signal_per_cycle),
-            background: Poisson::new(light.background_hz * config.cycle_s()),
-            photons: Vec::new(),
-        }
-    }
-
-    /// Appends the photons of laser cycle `cycle` to `events`, sorted by (time, SPAD); two
-    /// photons may agree in both. Returns how many.
-    pub fn append_cycle(&mut self, cycle: u32, events: &mut Vec<SpadEvent>) -> usize {
-        let start = self.config.cycle_start(cycle);
-        let length_fs = (self.config.cycle_start(cycle + 1) - start).as_fs();
-        debug_assert!(length_fs < 1 << (TIME_BITS - 1), "cycle of {length_fs} fs");
-        self.draw(cycle, length_fs);
-        self.photons.sort_unstable();
-        events.extend(self.photons.iter().map(|&photon| SpadEvent {
-            time: start + Time::from_fs((photon >> SPAD_BITS) as i64),
-            spad: (photon & (SPADS as u64 - 1)) as u8,
-        }));
-        self.photons.len()
-    }
-
-    fn draw(&mut self, cycle: u32, length_fs: i64) {
-        let mut random = random_stream(self.config.seed, Purpose::Photons, self.pixel, cycle);
-        let background = self.background.draw(&mut random);
-        let signal = self.signal.draw(&mut random);
-        self.photons.clear();
-        for _ in 0..background {
-            self.photons.push(uniform_photon(&mut random, length_fs));
-        }
-        for _ in 0..signal {
-            let deviation_fs = (self.sigma_fs * normal(&mut random)).round() as i64;
-            let spad = u64::from(random.next_u32() >> (32 - SPAD_BITS));
-            let time_fs = self.arrival_fs.saturating_add(deviation_fs);
-            if (0..length_fs).contains(&time_fs) {
-                self.photons.push((time_fs as u64) << SPAD_BITS | spad);
-            }
-        }
-    }
-}
-
-/// A photon uniform over the cycle and the SPADs: the word's low bits choose the SPAD, the others
-/// the time.
-#[inline]
-fn uniform_photon(random: &mut Philox, length_fs: i64) -> u64 {
-    let word = random.next_u64();
-    let fraction = word >> SPAD_BITS;
-    let time_fs = (u128::from(fraction) * length_fs as u128) >> TIME_BITS;
-    (time_fs as u64) << SPAD_BITS | word & (SPADS as u64 - 1)
 }
 
 /// The photons of a whole array in an exposure.
 #[derive(Debug, Clone)]
 pub struct PhotonStream {
     config: StreamConfig,
+    key: [u32; 2],
+    cycle_fs: i64,
+    gaussian: PulseSampler,
+    shape: Option<PulseSampler>,
 }
 
 impl PhotonStream {
     /// Prepares the stream.
     pub fn new(config: &StreamConfig) -> Self {
-        PhotonStream { config: *config }
+        debug_assert!(config.stop_periods > 0, "a cycle needs a length");
+        PhotonStream {
+            key: philox_key(config.seed),
+            cycle_fs: config.clock.whole_fs(i64::from(config.stop_periods)),
+            gaussian: PulseSampler::gaussian(config.pulse_sigma),
+            shape: config.pulse_shape.as_ref().map(PulseSampler::measured),
+            config: config.clone(),
+        }
     }
 
     /// What it was made of.
@@ -177,18 +135,69 @@ impl PhotonStream {
         &self.config
     }
 
-    /// All avalanches of macropixel number `pixel` under `light` in the exposure, dead time applied.
+    /// The whole femtoseconds of a laser cycle: photons come before that.
+    pub fn cycle_fs(&self) -> i64 {
+        self.cycle_fs
+    }
+
+    /// Slots of a laser cycle; the last one may outlast it.
+    pub fn slots(&self) -> u32 {
+        (self.cycle_fs as u64).div_ceil(SLOT.as_fs() as u64) as u32
+    }
+
+    /// Groups of the exposure; the last one may outlast it.
+    pub fn groups(&self) -> u32 {
+        self.config.laser_cycles.div_ceil(GROUP)
+    }
+
+    /// Macropixel number `pixel` under `light`.
+    pub fn pixel(&self, pixel: u32, light: &PixelLight) -> PixelStream<'_> {
+        let (mut first_fs, mut last_fs) = self.gaussian.range_fs();
+        if let Some(shape) = &self.shape {
+            first_fs += shape.range_fs().0;
+            last_fs += shape.range_fs().1;
+        }
+        let arrival_fs = light.arrival.as_fs();
+        let slot_s = SLOT.as_s() * f64::from(GROUP);
+        PixelStream {
+            stream: self,
+            pixel,
+            arrival_fs,
+            echo_fs: (
+                arrival_fs.saturating_add(first_fs.floor() as i64),
+                arrival_fs.saturating_add(last_fs.ceil() as i64),
+            ),
+            background: Poisson::new(light.background_hz * slot_s),
+            signal: Poisson::new(light.signal_per_cycle * f64::from(GROUP)),
+        }
+    }
+
+    /// All avalanches of macropixel number `pixel` under `light` in the exposure.
     pub fn pixel_events(&self, pixel: u32, light: &PixelLight) -> PixelPhotons {
-        let config = &self.config;
-        let mut stream = PixelStream::new(config, pixel, light);
-        let expected = light.photons_per_cycle(config) * f64::from(config.laser_cycles);
+        let stream = self.pixel(pixel, light);
+        let expected = light.photons_per_cycle(&self.config) * f64::from(self.config.laser_cycles);
         // Five standard deviations of room; the cap keeps a huge request from failing up front.
         let room = (expected + 5.0 * expected.sqrt() + 16.0).min(1e7);
         let mut events = Vec::with_capacity(room as usize);
-        let drawn = (0..config.laser_cycles)
-            .map(|cycle| stream.append_cycle(cycle, &mut events) as u64)
-            .sum();
-        let lost_to_dead_time = apply_dead_time(&mut events, config.dead_time);
+        let mut draw = Draw::default();
+        let mut by_cycle = ByCycle::default();
+        for group in 0..self.groups() {
+            stream.draw(group, 0..self.slots(), &mut draw);
+            by_cycle.sort(&draw);
+            let first = group * GROUP;
+            let cycles = (self.config.laser_cycles - first).min(GROUP);
+            for cycle in 0..cycles {
+                let start = self.config.cycle_start(first + cycle);
+                events.extend(by_cycle.of(cycle).iter().map(|&photon| SpadEvent {
+                    time: start + Time::from_fs((photon >> SPAD_BITS) as i64),
+                    spad: (photon & (SPADS as u64 - 1)) as u8,
+                }));
+            }
+        }
+        let drawn = events.len() as u64;
+        let lost_to_dead_time = stream.detect(&mut events);
+        let end = self.config.cycle_start(self.config.laser_cycles);
+        events.truncate(events.partition_point(|event| event.time < end));
         PixelPhotons {
             events,
             drawn,
@@ -197,217 +206,293 @@ impl PhotonStream {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
+/// The photons of one macropixel, before dead time.
+#[derive(Debug, Clone)]
+pub struct PixelStream<'a> {
+    stream: &'a PhotonStream,
+    pixel: u32,
+    arrival_fs: i64,
+    /// Earliest and latest time of a signal photon in its cycle.
+    echo_fs: (i64, i64),
+    /// Photons in a slot of a group.
+    background: Poisson,
+    /// Photons in a group.
+    signal: Poisson,
+}
 
-    fn config() -> StreamConfig {
-        StreamConfig {
-            seed: 1,
-            clock: Frequency::from_hz(384_000_000),
-            stop_periods: 512,
-            laser_cycles: 2000,
-            pulse_sigma: Time::from_ps(1_700),
-            dead_time: Time::ZERO,
+impl PixelStream<'_> {
+    /// Turns photons of this macropixel, sorted by (time, SPAD) and complete since a time when every SPAD was ready, into
+    /// rising edges; returns how many avalanches met a blind SPAD.
+    pub fn detect(&self, events: &mut Vec<SpadEvent>) -> u64 {
+        let spads = &self.stream.config.spads;
+        spads.detect(self.stream.key, self.pixel, events)
+    }
+
+    /// Draws all photons of group `group` in these slots.
+    pub fn draw(&self, group: u32, slots: std::ops::Range<u32>, draw: &mut Draw) {
+        let (key, cycle_fs) = (self.stream.key, self.stream.cycle_fs);
+        let numbered = |purpose: Purpose| purpose as u32 | group << 8;
+        draw.cycle_fs = cycle_fs;
+        draw.clear();
+
+        let from_fs = i64::from(slots.start) << SLOT_BITS;
+        let until_fs = (i64::from(slots.end) << SLOT_BITS).min(cycle_fs);
+        let has_echo =
+            !self.signal.is_zero() && self.echo_fs.0 < until_fs && self.echo_fs.1 >= from_fs;
+        draw.counts.clear();
+        if has_echo {
+            draw.counts
+                .push_run(SIGNAL_RUN, self.signal.words().div_ceil(2));
         }
-    }
-
-    const LIGHT: PixelLight = PixelLight {
-        signal_per_cycle: 0.5,
-        arrival: Time::from_ns(400),
-        background_hz: 8e6,
-    };
-
-    /// Is a Poisson count within five standard deviations of its mean?
-    fn plausible(count: u64, mean: f64) -> bool {
-        (count as f64 - mean).abs() < 5.0 * mean.sqrt()
-    }
-
-    #[test]
-    fn rates_are_as_asked() {
-        let config = config();
-        let cycles = f64::from(config.laser_cycles);
-        let background = PhotonStream::new(&config).pixel_events(
-            3,
-            &PixelLight {
-                signal_per_cycle: 0.0,
-                ..LIGHT
-            },
-        );
-        let mean = LIGHT.background_hz * config.cycle_s() * cycles;
-        assert!(
-            plausible(background.drawn, mean),
-            "{} {mean}",
-            background.drawn
-        );
-        let signal = PhotonStream::new(&config).pixel_events(
-            3,
-            &PixelLight {
-                background_hz: 0.0,
-                ..LIGHT
-            },
-        );
-        assert!(
-            plausible(signal.drawn, 0.5 * cycles),
-            "{} signal photons",
-            signal.drawn
-        );
-    }
-
-    #[test]
-    fn background_is_even_over_spads_and_time() {
-        let config = config();
-        let light = PixelLight {
-            signal_per_cycle: 0.0,
-            ..LIGHT
-        };
-        let photons = PhotonStream::new(&config).pixel_events(0, &light);
-        let mut by_spad = [0u64; SPADS];
-        let mut by_eighth = [0u64; 8];
-        let period_fs = config.clock.period().as_fs();
-        for e in &photons.events {
-            by_spad[usize::from(e.spad)] += 1;
-            let in_cycle = (e.time.as_fs() / period_fs) as usize % 512;
-            by_eighth[in_cycle / 64] += 1;
-        }
-        let n = photons.events.len() as f64;
-        assert!(
-            by_spad.iter().all(|&c| plausible(c, n / 16.0)),
-            "{by_spad:?}"
-        );
-        assert!(
-            by_eighth.iter().all(|&c| plausible(c, n / 8.0)),
-            "{by_eighth:?}"
-        );
-    }
-
-    #[test]
-    fn the_echo_has_its_centre_and_width() {
-        let config = config();
-        let light = PixelLight {
-            signal_per_cycle: 5.0,
-            background_hz: 0.0,
-            ..LIGHT
-        };
-        let mut stream = PixelStream::new(&config, 9, &light);
-        let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
-        for cycle in 0..config.laser_cycles {
-            let mut events = Vec::new();
-            stream.append_cycle(cycle, &mut events);
-            for e in events {
-                let x = (e.time - config.cycle_start(cycle) - light.arrival).as_ns();
-                n += 1.0;
-                sum += x;
-                squares += x * x;
+        let blocks = self.background.words().div_ceil(2);
+        if !self.background.is_zero() {
+            for slot in slots.clone() {
+                draw.counts.push_run(slot, blocks);
             }
         }
-        let mean = sum / n;
-        let sigma = (squares / n - mean * mean).sqrt();
-        assert!(mean.abs() < 5.0 * 1.7 / f64::sqrt(n), "mean {mean} ns");
-        assert!((sigma / 1.7 - 1.0).abs() < 0.03, "sigma {sigma} ns");
-    }
+        draw.counts
+            .generate(key, self.pixel, numbered(Purpose::PhotonCounts));
 
-    #[test]
-    fn any_cycle_can_be_drawn_alone() {
-        let config = config();
-        let whole = PhotonStream::new(&config).pixel_events(5, &LIGHT);
-        let mut backwards = Vec::new();
-        for cycle in (0..config.laser_cycles).rev() {
-            PixelStream::new(&config, 5, &LIGHT).append_cycle(cycle, &mut backwards);
+        let mut at = 0;
+        if has_echo {
+            let photons = draw.count(&self.signal, &mut at);
+            draw.echo.clear();
+            draw.echo.push_run(0, photons);
+            draw.echo
+                .generate(key, self.pixel, numbered(Purpose::Signal));
+            self.place_signal(from_fs..until_fs, draw);
         }
-        backwards.sort();
-        assert_eq!(
-            apply_dead_time(&mut backwards, config.dead_time),
-            whole.lost_to_dead_time
-        );
-        assert_eq!(backwards, whole.events);
-    }
-
-    #[test]
-    fn neighbours_in_pixel_cycle_and_seed_are_independent() {
-        let config = StreamConfig {
-            laser_cycles: 1000,
-            ..config()
-        };
-        let counts = |seed: u64, pixel: u32| -> Vec<f64> {
-            let mut stream = PixelStream::new(&StreamConfig { seed, ..config }, pixel, &LIGHT);
-            (0..=config.laser_cycles)
-                .map(|cycle| stream.append_cycle(cycle, &mut Vec::new()) as f64)
-                .collect()
-        };
-        let here = counts(1, 100);
-        let correlation = |other: &[f64]| {
-            let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-            let (a, b) = (mean(&here), mean(other));
-            let dot = |u: &[f64], ub: f64, v: &[f64], vb: f64| -> f64 {
-                u.iter().zip(v).map(|(x, y)| (x - ub) * (y - vb)).sum()
-            };
-            dot(&here, a, other, b) / (dot(&here, a, &here, a) * dot(other, b, other, b)).sqrt()
-        };
-        for other in [&counts(1, 101)[..], &counts(2, 100)[..], &here[1..]] {
-            let r = correlation(other);
-            assert!(r.abs() < 5.0 / 1000f64.sqrt(), "correlation {r}");
+        if !self.background.is_zero() {
+            for slot in slots {
+                let photons = draw.count(&self.background, &mut at);
+                draw.runs.push(Run {
+                    slot,
+                    first_block: draw.background.len() as u32,
+                    photons,
+                });
+                draw.background.push_run(slot, photons.div_ceil(2));
+            }
+            draw.background
+                .generate(key, self.pixel, numbered(Purpose::Photons));
         }
     }
 
-    #[test]
-    fn dead_time_carries_over_from_cycle_to_cycle() {
-        // 20 ns cycles, one avalanche blinds a SPAD for five of them.
-        let config = StreamConfig {
-            clock: Frequency::from_hz(100_000_000),
-            stop_periods: 2,
-            dead_time: Time::from_ns(100),
-            ..config()
-        };
-        let light = PixelLight {
-            signal_per_cycle: 0.0,
-            arrival: Time::ZERO,
-            background_hz: 1e9,
-        };
-        let photons = PhotonStream::new(&config).pixel_events(0, &light);
-        let per_spad_hz = light.background_hz / SPADS as f64;
-        let seen = 1.0 / (1.0 + per_spad_hz * 100e-9);
-        let fraction = photons.events.len() as f64 / photons.drawn as f64;
-        assert!((fraction / seen - 1.0).abs() < 0.05, "{fraction} {seen}");
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(64))]
-        #[test]
-        fn events_are_sorted_inside_the_exposure_and_heed_the_dead_time(
-            seed: u64,
-            pixel: u32,
-            hz in 50_000_000u64..1_000_000_000,
-            stop_periods in 1u32..600,
-            signal_per_cycle in 0.0f64..20.0,
-            arrival_ns in -10i64..3000,
-            background_hz in 0.0f64..1e8,
-            dead_ns in 0i64..200,
-        ) {
-            let config = StreamConfig {
-                seed,
-                clock: Frequency::from_hz(hz),
-                stop_periods,
-                laser_cycles: 50,
-                pulse_sigma: Time::from_ns(2),
-                dead_time: Time::from_ns(dead_ns),
-            };
-            let light = PixelLight {
-                signal_per_cycle,
-                arrival: Time::from_ns(arrival_ns),
-                background_hz,
-            };
-            let photons = PhotonStream::new(&config).pixel_events( pixel, &light);
-            prop_assert_eq!(photons.events.len() as u64 + photons.lost_to_dead_time, photons.drawn);
-            prop_assert!(photons.events.is_sorted());
-            prop_assert!(photons.events.iter().all(|e| e.time >= Time::ZERO
-                && e.time < config.cycle_start(config.laser_cycles)));
-            for spad in 0..SPADS as u8 {
-                let times: Vec<_> =
-                    photons.events.iter().filter(|e| e.spad == spad).map(|e| e.time).collect();
-                prop_assert!(times.windows(2).all(|w| w[1] > w[0] + config.dead_time));
+    fn place_signal(&self, within_fs: std::ops::Range<i64>, draw: &mut Draw) {
+        let words: [&[u32]; 4] = std::array::from_fn(|word| draw.echo.words(word));
+        for (((&w0, &w1), &w2), &w3) in words[0].iter().zip(words[1]).zip(words[2]).zip(words[3]) {
+            let mut after_fs = self.stream.gaussian.draw(w3, w2);
+            if let Some(shape) = &self.stream.shape {
+                // The low bits of word 1 are independent of the place in its high ones.
+                after_fs += shape.draw(w0, w1 << PLACE_BITS);
+            }
+            let time_fs = self.arrival_fs.saturating_add(after_fs.round() as i64);
+            if within_fs.contains(&time_fs) {
+                draw.signal.push(SignalPhoton {
+                    place: place(w1),
+                    time_fs,
+                });
             }
         }
     }
 }
+
+/// Where in its group a photon falls: cycle within the group and SPAD, as `cycle << 4 | SPAD`.
+pub type Place = u16;
+
+/// Bits of a [`Place`].
+pub const PLACE_BITS: u32 = GROUP_BITS + SPAD_BITS;
+
+/// The place that a random word gives.
+#[inline]
+pub fn place(word: u32) -> Place {
+    (word >> (32 - PLACE_BITS)) as Place
+}
+
+/// The time within its slot that a random word gives, fs.
+#[inline]
+pub fn time_in_slot_fs(word: u32) -> u32 {
+    word >> (32 - SLOT_BITS)
+}
+
+/// Second counter word of the number of signal photons; slots are below it.
+const SIGNAL_RUN: u32 = u32::MAX;
+
+/// Background photons of one slot. Each block of random words makes two: first those of words 0 and 1 of its blocks,
+/// then those of words 2 and 3.
+#[derive(Debug, Clone, Copy)]
+pub struct Run {
+    /// The slot.
+    pub slot: u32,
+    /// Its first block.
+    pub first_block: u32,
+    /// Its photons; if odd, the last block makes only one.
+    pub photons: u32,
+}
+
+impl Run {
+    /// When the slot begins after the start of its cycle.
+    #[inline]
+    pub fn start_fs(&self) -> i64 {
+        i64::from(self.slot) << SLOT_BITS
+    }
+
+    /// Blocks whose words 0 and 1, and whose words 2 and 3, make photons.
+    #[inline]
+    pub fn blocks(&self) -> [std::ops::Range<usize>; 2] {
+        let first = self.first_block as usize;
+        let photons = self.photons as usize;
+        [
+            first..first + photons.div_ceil(2),
+            first..first + photons / 2,
+        ]
+    }
+}
+
+/// A photon of the echo.
+#[derive(Debug, Clone, Copy)]
+pub struct SignalPhoton {
+    /// Cycle and SPAD.
+    pub place: Place,
+    /// After the start of its cycle.
+    pub time_fs: i64,
+}
+
+/// Photons of one macropixel, in some slots of one group. Background photons stay random words until somebody wants
+/// them; those of the last slot that outlast the cycle are no photons.
+#[derive(Debug, Clone, Default)]
+pub struct Draw {
+    counts: Blocks,
+    background: Blocks,
+    echo: Blocks,
+    runs: Vec<Run>,
+    signal: Vec<SignalPhoton>,
+    cycle_fs: i64,
+}
+
+impl Draw {
+    /// Forgets all photons.
+    pub fn clear(&mut self) {
+        self.runs.clear();
+        self.background.clear();
+        self.signal.clear();
+    }
+
+    /// How many photons were drawn, those that outlast the cycle among them.
+    pub fn len(&self) -> usize {
+        let background = self.runs.iter().map(|run| run.photons as usize);
+        background.sum::<usize>() + self.signal.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The run of a block.
+    pub fn run_of(&self, block: usize) -> &Run {
+        let runs = &self.runs;
+        &runs[runs.partition_point(|run| run.first_block as usize <= block) - 1]
+    }
+
+    /// Background photons by slot.
+    pub fn runs(&self) -> &[Run] {
+        &self.runs
+    }
+
+    /// The random words of background photons: [`time_in_slot_fs`] of the first and [`place`] of the second of
+    /// each pair.
+    pub fn words(&self) -> [[&[u32]; 2]; 2] {
+        let words = |word| self.background.words(word);
+        [[words(0), words(1)], [words(2), words(3)]]
+    }
+
+    /// Signal photons.
+    pub fn signal(&self) -> &[SignalPhoton] {
+        &self.signal
+    }
+
+    /// Every photon, as place and time after the start of its cycle in fs, in no particular order.
+    pub fn photons(&self) -> impl Iterator<Item = (Place, i64)> + '_ {
+        let words = self.words();
+        let background = self.runs.iter().flat_map(move |run| {
+            let start_fs = run.start_fs();
+            run.blocks()
+                .into_iter()
+                .zip(words)
+                .flat_map(move |(blocks, [times, places])| {
+                    let photons = times[blocks.clone()].iter().zip(&places[blocks]);
+                    photons.map(move |(&time, &word)| {
+                        (place(word), start_fs + i64::from(time_in_slot_fs(time)))
+                    })
+                })
+        });
+        let signal = self
+            .signal
+            .iter()
+            .map(|photon| (photon.place, photon.time_fs));
+        background
+            .filter(|&(_, time_fs)| time_fs < self.cycle_fs)
+            .chain(signal)
+    }
+
+    /// A Poisson number from the next words of `counts`.
+    #[inline]
+    fn count(&self, poisson: &Poisson, at: &mut usize) -> u32 {
+        let mut total = 0;
+        for part in 0..poisson.words() {
+            let block = *at + (part / 2) as usize;
+            let half = (part % 2) as usize * 2;
+            let word = |word: usize| u64::from(self.counts.words(word)[block]);
+            total += poisson.part(word(half) << 32 | word(half + 1));
+        }
+        *at += poisson.words().div_ceil(2) as usize;
+        total
+    }
+}
+
+/// Photons of a group sorted by cycle, then time, then SPAD.
+#[derive(Debug, Clone, Default)]
+struct ByCycle {
+    /// Time after the start of the cycle in fs and SPAD, as `time << 4 | SPAD`.
+    photons: Vec<u64>,
+    /// Where each cycle's photons end.
+    ends: Vec<usize>,
+}
+
+impl ByCycle {
+    fn sort(&mut self, draw: &Draw) {
+        self.ends.clear();
+        self.ends.resize(GROUP as usize, 0);
+        let cycle_of = |place: Place| usize::from(place >> SPAD_BITS);
+        for (place, _) in draw.photons() {
+            self.ends[cycle_of(place)] += 1;
+        }
+        let mut total = 0;
+        for end in &mut self.ends {
+            // Where the cycle begins, until its photons have moved it to where it ends.
+            total += std::mem::replace(end, total);
+        }
+        self.photons.clear();
+        self.photons.resize(total, 0);
+        for (place, time_fs) in draw.photons() {
+            let end = &mut self.ends[cycle_of(place)];
+            let spad = u64::from(place) & (SPADS as u64 - 1);
+            self.photons[*end] = (time_fs as u64) << SPAD_BITS | spad;
+            *end += 1;
+        }
+        let mut start = 0;
+        for &end in &self.ends {
+            self.photons[start..end].sort_unstable();
+            start = end;
+        }
+    }
+
+    fn of(&self, cycle: u32) -> &[u64] {
+        let cycle = cycle as usize;
+        let start = cycle.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.photons[start..self.ends[cycle]]
+    }
+}
+
+#[cfg(test)]
+mod tests;

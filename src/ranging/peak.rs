@@ -80,7 +80,7 @@ pub fn interpolate(counts: &[u32], options: &PeakOptions) -> Option<Peak> {
 }
 
 /// The median, between the middle two of an even number of values; 0 of none.
-fn median<'a>(values: impl Iterator<Item = &'a u32>) -> f64 {
+pub(super) fn median<'a>(values: impl Iterator<Item = &'a u32>) -> f64 {
     let mut sorted: Vec<u32> = values.copied().collect();
     sorted.sort_unstable();
     let n = sorted.len();

@@ -2,6 +2,8 @@
 
 mod frame;
 mod result;
+mod speed;
 
 pub use frame::{EngineKind, FrameError, FrameSettings, Probe, take_frame};
 pub use result::{Frame, PhaseTimes, PixelDepth, Summary};
+pub use speed::{SPEED_LASER_CYCLES, SpeedFrame};

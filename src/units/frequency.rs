@@ -108,6 +108,12 @@ impl Frequency {
         self.half_periods(2 * k)
     }
 
+    /// How many whole femtoseconds `k` periods last: the shortest distance of two edges `k` periods apart.
+    pub fn whole_fs(self, k: i64) -> i64 {
+        let numerator = k as i128 * FS_PER_S * self.denominator as i128;
+        numerator.div_euclid(self.numerator as i128) as i64
+    }
+
     /// The times of half periods 0, 1, 2, … without end: the same as [`Frequency::half_periods`] of each, by
     /// addition with an exact remainder.
     pub fn ticks(self) -> impl Iterator<Item = Time> + Send {
@@ -178,6 +184,13 @@ mod tests {
             let t = f.half_periods(k);
             prop_assert_eq!(f.half_periods_until(t), k);
             prop_assert_eq!(f.half_periods_until(t - Time::from_fs(1)), k - 1);
+        }
+
+        #[test]
+        fn no_two_edges_are_closer_than_the_whole_femtoseconds(hz in 1e6f64..1e10, k in 1i64..10_000, from in 0i64..1_000_000) {
+            let f = Frequency::from_hz_f64(hz).unwrap();
+            let apart = (f.periods(from + k) - f.periods(from)).as_fs();
+            prop_assert!((0..=1).contains(&(apart - f.whole_fs(k))));
         }
 
         #[test]

@@ -5,13 +5,14 @@
 //! any shorter list is one, too.
 
 use std::collections::BTreeMap;
+use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use guided_dtof::kernel::Drive;
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{
-    Arc as DelayArc, CellArcs, CellKind, Corner, Delay, Direction, Library, MAX_INPUTS, Module,
-    ModuleBuilder, Net, Netlist,
+    Arc as DelayArc, CellArcs, CellKind, Corner, Delay, DelayModel, Direction, Library, MAX_INPUTS,
+    Module, ModuleBuilder, Net, Netlist, Timing,
 };
 use guided_dtof::units::Time;
 use proptest::prelude::*;
@@ -64,6 +65,8 @@ pub struct Case {
     /// A bit for each cell that rises as fast as it falls.
     symmetric: u16,
     corner: Corner,
+    /// How many cells in four have transport delays.
+    transport: u8,
     /// Whether all inputs get a known value at time 0.
     starts_known: bool,
     stimulus: Vec<Instant>,
@@ -117,7 +120,10 @@ fn case(modules: impl Strategy<Value = Vec<Recipe>>) -> impl Strategy<Value = Ca
         any::<u64>().no_shrink(),
         prop_oneof![3 => Just(1u32), 1 => Just(1_000), 1 => Just(25_000)],
         any::<(u16, u16)>(),
-        prop::sample::select(&Corner::ALL[..]),
+        (
+            prop::sample::select(&Corner::ALL[..]),
+            prop_oneof![2 => Just(0u8), 2 => Just(1), 1 => Just(3), 1 => Just(4)],
+        ),
         prop::bool::weighted(0.7),
         prop::collection::vec(instant(), 1..=100),
     )
@@ -128,7 +134,7 @@ fn case(modules: impl Strategy<Value = Vec<Recipe>>) -> impl Strategy<Value = Ca
                 delay_seed,
                 grid_fs,
                 (uniform, symmetric),
-                corner,
+                (corner, transport),
                 starts_known,
                 stimulus,
             )| Case {
@@ -139,6 +145,7 @@ fn case(modules: impl Strategy<Value = Vec<Recipe>>) -> impl Strategy<Value = Ca
                 uniform,
                 symmetric,
                 corner,
+                transport,
                 starts_known,
                 stimulus,
             },
@@ -149,6 +156,24 @@ impl Case {
     /// The corner to simulate.
     pub fn corner(&self) -> Corner {
         self.corner
+    }
+
+    /// Delays of the library, some cells' as transport delays: the same ones however the cells are ordered.
+    pub fn timing(&self, netlist: &Netlist) -> Timing {
+        let mut timing = Timing::nominal(netlist, &self.cell_library(), self.corner);
+        for cell in 0..netlist.cells().len() {
+            let mut hash = std::hash::DefaultHasher::new();
+            (self.delay_seed, netlist.cell_path(cell)).hash(&mut hash);
+            if hash.finish() % 4 < u64::from(self.transport) {
+                timing.set_model(cell, DelayModel::Transport);
+            }
+        }
+        timing
+    }
+
+    /// Whether any cell may have transport delays.
+    pub fn has_transport(&self) -> bool {
+        self.transport > 0
     }
 
     /// The circuit's top module.

@@ -1,6 +1,6 @@
 //! Random sensors with random start values, exposures and SPAD pulses.
 
-use guided_dtof::chip::{EventType, Exposure, Mode, SensorConfig};
+use guided_dtof::chip::{AfterBorrow, EventType, Exposure, Mode, PCounter, SensorConfig, Tap};
 use guided_dtof::netlist::Corner;
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
 use guided_dtof::units::Time;
@@ -22,11 +22,14 @@ impl Scenario {
     /// Anything that the chip allows.
     pub fn random(random: &mut StdRng, rows: usize, cols: usize) -> Self {
         let config = random_sensor(random, rows, cols);
-        let exposure = Exposure::new(
-            &config,
-            random.random_range(20..80),
-            random.random_range(1..8),
-        );
+        // Without memory a counter must come round with STOP, or no two laser cycles are alike.
+        let wider = usize::from(config.tap == Tap::Borrow);
+        let round = 1 << (config.counter_bits + wider);
+        let stop_periods = match config.p_counter {
+            PCounter::Memoryless if round <= 128 => round,
+            _ => random.random_range(20..80),
+        };
+        let exposure = Exposure::new(&config, stop_periods, random.random_range(1..8));
         let most = config.largest_start().min(exposure.stop_periods as u16);
         let pixels = config.pixels();
         let starts = (0..pixels).map(|_| random.random_range(0..=most)).collect();
@@ -51,15 +54,52 @@ impl Scenario {
         }
     }
 
+    /// What the P-counters' memories hold after the load, if they have any.
+    #[allow(dead_code)]
+    pub fn loaded(&self) -> Vec<Option<u16>> {
+        let has_memory = self.config.p_counter != PCounter::Memoryless;
+        self.starts
+            .iter()
+            .map(|&start| has_memory.then_some(start))
+            .collect()
+    }
+
     /// The pulses as the engines take them.
     pub fn pulses(&self) -> Vec<&[SpadEvent]> {
         self.pulses.iter().map(Vec::as_slice).collect()
     }
 }
 
+/// Every P-counter that a sensor may have.
+pub fn p_counters() -> Vec<(PCounter, Tap, AfterBorrow)> {
+    let mut all = Vec::new();
+    for p_counter in PCounter::ALL {
+        for tap in [Tap::Borrow, Tap::Msb] {
+            for after_borrow in [AfterBorrow::Hold, AfterBorrow::Wrap] {
+                let config = SensorConfig {
+                    p_counter,
+                    tap,
+                    after_borrow,
+                    ..SensorConfig::default()
+                };
+                if config.check().is_ok() {
+                    all.push((p_counter, tap, after_borrow));
+                }
+            }
+        }
+    }
+    all
+}
+
 fn random_sensor(random: &mut StdRng, rows: usize, cols: usize) -> SensorConfig {
     let clk_hz = random.random_range(100e6..500e6);
+    let mut p_counters = p_counters();
+    let (p_counter, tap, after_borrow) =
+        p_counters.remove(random.random_range(0..p_counters.len()));
     SensorConfig {
+        p_counter,
+        tap,
+        after_borrow,
         rows,
         cols,
         clk_hz,

@@ -25,7 +25,7 @@ use super::survey::{Class, Survey, UniformEdge, output};
 use super::tape::{Action, Code, PassTape, SINK, ZERO};
 use super::word::inversion;
 use crate::chip::{Exposure, SensorConfig};
-use crate::netlist::{CellKind, Edge, FlatCell, Library, NetId, caused};
+use crate::netlist::{CellKind, DataLimit, Edge, FlatCell, Library, NetId, caused};
 use crate::units::Time;
 
 /// A net and the direction of its change.
@@ -224,6 +224,10 @@ impl Leveliser<'_> {
                         continue;
                     }
                     let cell = &survey.netlist.cells()[index];
+                    // A set that differs from lane to lane has no static order against the clock.
+                    if cell.kind == CellKind::Dffsr {
+                        return Err(Unlevelled::Structure(survey.netlist.cell_path(index)));
+                    }
                     let relevant = survey.relevant(cell);
                     for pin in (0..cell.kind.inputs().len()).filter(|&pin| relevant[pin]) {
                         let input = cell.inputs[pin];
@@ -596,8 +600,13 @@ impl Leveliser<'_> {
         let edges = after_change.div_euclid(self.period_fs);
         let after = after_change.rem_euclid(self.period_fs);
         let limits = self.library.checks(cell.kind);
-        let limit =
-            |delay: crate::netlist::Delay| i64::from(delay.at(self.config.corner)) + ROUNDING_FS;
+        let limit = |limit: DataLimit| {
+            let longest = limit
+                .rise
+                .at(self.config.corner)
+                .max(limit.fall.at(self.config.corner));
+            i64::from(longest) + ROUNDING_FS
+        };
         let is_race = after <= limit(limits.setup) || self.period_fs - after <= limit(limits.hold);
         let tap = self
             .sampled

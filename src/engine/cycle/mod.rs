@@ -14,7 +14,7 @@
 //!
 //! Macropixels go into blocks by the low bits of their start values, so that a block's counters carry, and roll
 //! over, in the same CLK periods, and rest in the others. A netlist, or a configuration, for which no tape can
-//! be made is run by the gate engine.
+//! be made is run by the gate engine: the P-counters of set/reset flip-flops, so far.
 
 mod expression;
 mod levelise;

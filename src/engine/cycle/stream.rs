@@ -288,7 +288,7 @@ impl Layout {
     }
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn run(ops: &[Op], words: &mut [Word]) {
     let words = Cell::from_mut(words).as_slice_of_cells();
     for op in ops {

@@ -125,7 +125,7 @@ pub struct Passes<'a> {
 }
 
 /// Runs some passes of one block.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub fn run(tape: &PassTape, block: &mut Block, stream: &[Word], passes: &Passes<'_>) {
     let Block {
         words,

@@ -1,8 +1,7 @@
-//! The delays of a file put into a design.
+//! The delays and limits of a file put into a design.
 
 use std::collections::HashMap;
 
-use super::index::Index;
 use super::wires::Wire;
 use super::{DelayPath, Edge, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance, Skipped};
 use crate::files::InputError;
@@ -18,7 +17,9 @@ pub struct Annotation {
     pub arcs: usize,
     /// Input pins that a wire delay was added to.
     pub wires: usize,
-    /// Delays that could not be taken over as they are.
+    /// Timing checks of single instances whose limits were taken over.
+    pub checks: usize,
+    /// Delays and limits that could not be taken over as they are.
     pub notes: Vec<Skipped>,
     /// Longest wire delay left out because it ends at a flip-flop's D, fs.
     pub longest_wire_to_d_fs: i64,
@@ -26,7 +27,7 @@ pub struct Annotation {
 
 const LONGEST_ARC: &str = "arcs with several delays, of which the longest is used";
 
-/// Puts the delays of `sdf` in one corner into `timing`: first all arcs in file order, then the wires on top of
+/// Puts delays and limits of `sdf` in one corner into `timing`: first all arcs in file order, then the wires on top of
 /// them. Wires of an earlier annotation count as part of the arcs.
 ///
 /// # Errors
@@ -39,8 +40,8 @@ pub fn annotate(
     corner: Corner,
 ) -> Result<Annotation, InputError> {
     let mut annotator = Annotator {
-        index: Index::new(netlist),
         netlist,
+        of_kind: cells_by_kind(netlist),
         sdf,
         corner,
         wires: HashMap::new(),
@@ -53,12 +54,20 @@ pub fn annotate(
     Ok(annotator.result)
 }
 
+fn cells_by_kind(netlist: &Netlist) -> HashMap<CellKind, Vec<usize>> {
+    let mut cells: HashMap<CellKind, Vec<usize>> = HashMap::new();
+    for (index, cell) in netlist.cells().iter().enumerate() {
+        cells.entry(cell.kind).or_default().push(index);
+    }
+    cells
+}
+
 /// Delays of one arc by output, by edge of the input, by direction of the output, as far as given.
 type ArcSlots = [[[Option<i64>; 2]; 2]; 2];
 
 pub(super) struct Annotator<'n, 's, 'a> {
     pub(super) netlist: &'n Netlist,
-    pub(super) index: Index<'n>,
+    of_kind: HashMap<CellKind, Vec<usize>>,
     sdf: &'s Sdf<'a>,
     pub(super) corner: Corner,
     pub(super) wires: HashMap<(usize, usize), Wire>,
@@ -91,20 +100,20 @@ impl Annotator<'_, '_, '_> {
                 ),
             ),
             (SdfInstance::Every, Some(kind)) => {
-                let cells = self.index.of_kind.get(kind.name()).cloned();
+                let cells = self.of_kind.get(&kind).cloned();
                 for cell in cells.unwrap_or_default() {
                     self.leaf(timing, entry, cell)?;
                 }
                 Ok(())
             }
             (SdfInstance::Path(path), _) => {
-                let (name, wanted) = if let Some(cell) = self.index.cell(path) {
+                let (name, wanted) = if let Some(cell) = self.netlist.cell(path) {
                     let name = self.netlist.cells()[cell].kind.name();
                     if name == entry.cell_type {
                         return self.leaf(timing, entry, cell);
                     }
                     (path.as_ref(), name)
-                } else if let Some(scope) = self.index.scope(path) {
+                } else if let Some(scope) = self.netlist.scope(path) {
                     let name = self.netlist.scopes()[scope].module.name();
                     if name == entry.cell_type {
                         return self.module(entry, path);
@@ -151,6 +160,7 @@ impl Annotator<'_, '_, '_> {
         entry: &SdfCell<'_>,
         cell: usize,
     ) -> Result<(), InputError> {
+        self.limits(timing, entry, cell)?;
         let kind = self.netlist.cells()[cell].kind;
         let mut slots: [ArcSlots; MAX_INPUTS] = Default::default();
         let mut last_line = [entry.line; MAX_INPUTS];

@@ -8,7 +8,7 @@
 //!
 //! # What is taken over
 //! IOPATH, DEVICE, PORT and INTERCONNECT, each ABSOLUTE or INCREMENT; timing checks SETUP, HOLD, SETUPHOLD,
-//! RECOVERY, REMOVAL, RECREM and WIDTH are read into [`SdfCell::checks`]. Instances are named exactly, or `*`
+//! RECOVERY, REMOVAL, RECREM and WIDTH become the limits of the instance. Instances are named exactly, or `*`
 //! for every instance of a cell type. A member missing from min:typ:max leaves its corner alone.
 //!
 //! # What is left out, counted and reported ([`Sdf::skipped`], [`Annotation::notes`])
@@ -33,10 +33,11 @@
 //!   earlier; the model samples the net as it is at the clock edge. Such delays are left out and counted with
 //!   the longest: they matter only where D changes within that time before the edge. A wire to CK is exact
 //!   for the output but samples D when CK's net rises, not one wire delay later.
+//! * Timing checks are judged at nets, where wires to D and to CK begin, with the limits of the pins.
 
 mod annotate;
 mod entries;
-mod index;
+mod limits;
 mod parser;
 #[cfg(test)]
 mod tests;
@@ -45,7 +46,7 @@ mod wires;
 mod writer;
 
 pub use annotate::{Annotation, annotate};
-pub use writer::{SdfDivider, SdfOptions, SdfTimescale, no_checks, write_sdf};
+pub use writer::{SdfDivider, SdfOptions, SdfTimescale, write_sdf};
 
 use std::borrow::Cow;
 

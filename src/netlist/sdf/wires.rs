@@ -1,7 +1,6 @@
 //! Wire delays: where INTERCONNECT and PORT end, and how they are added to the arcs of that pin.
 
 use super::annotate::{Annotator, causes};
-use super::index::join;
 use super::{Edge, SdfDelay};
 use crate::files::InputError;
 use crate::netlist::flat::NetId;
@@ -11,6 +10,14 @@ use crate::netlist::timing::Timing;
 const WIRE_TO_D: &str = "wires to D of a flip-flop";
 const WIRE_TO_OUTPUT: &str = "wires to outputs of the chip";
 const UNEQUAL_WIRE: &str = "wires that rise and fall differently into a non-unate arc";
+
+fn join(path: &str, name: &str) -> String {
+    if path.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{path}.{name}")
+    }
+}
 
 /// The wire to one input pin.
 pub(super) struct Wire {
@@ -30,7 +37,7 @@ impl Annotator<'_, '_, '_> {
         let source = self.net_of(scope, from, delay.line, Direction::Input)?;
         let target = join(scope, to);
         if let Some((instance, name)) = target.rsplit_once('.')
-            && let Some(cell) = self.index.cell(instance)
+            && let Some(cell) = self.netlist.cell(instance)
         {
             let flat = self.netlist.cells()[cell];
             let pin = self.input(flat.kind, name, delay.line)?;
@@ -56,7 +63,7 @@ impl Annotator<'_, '_, '_> {
     ) -> Result<NetId, InputError> {
         let full = join(scope, path);
         if let Some((instance, name)) = full.rsplit_once('.')
-            && let Some(cell) = self.index.cell(instance)
+            && let Some(cell) = self.netlist.cell(instance)
         {
             let flat = self.netlist.cells()[cell];
             let output = self.output(flat.kind, name, line)?;

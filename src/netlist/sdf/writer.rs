@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use super::limits::checks_of;
 use super::{Edge, PinEdge, SdfCheck, Triple};
 use crate::netlist::flat::Netlist;
 use crate::netlist::timing::Timing;
@@ -35,13 +36,7 @@ pub struct SdfOptions {
     pub timescale: SdfTimescale,
 }
 
-/// The timing checks of a design that has none.
-pub fn no_checks(_cell: usize) -> Vec<SdfCheck<'static>> {
-    Vec::new()
-}
-
-/// Writes every cell of `netlist` with its delays in the three corners (fast, typical, slow) and with the
-/// timing checks that `checks` gives for its index.
+/// Writes every cell of `netlist` with its delays and timing checks in the three corners (fast, typical, slow).
 ///
 /// # Errors
 /// Those of the writer.
@@ -49,7 +44,6 @@ pub fn write_sdf(
     out: &mut dyn Write,
     netlist: &Netlist,
     corners: [&Timing; 3],
-    checks: &dyn Fn(usize) -> Vec<SdfCheck<'static>>,
     options: SdfOptions,
 ) -> io::Result<()> {
     let divider = match options.divider {
@@ -106,8 +100,8 @@ pub fn write_sdf(
                 }
             }
             write!(out, "    ))")?;
-            let checks = checks(cell);
-            if !checks.is_empty() {
+            if kind.is_flip_flop() {
+                let checks = checks_of(kind, corners.map(|timing| timing.limits(cell, kind)));
                 write!(out, "\n    (TIMINGCHECK\n")?;
                 for check in &checks {
                     write!(out, "      ")?;

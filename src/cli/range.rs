@@ -1,0 +1,305 @@
+//! `gdtof range`: depths from a real sensor's histograms, beside those it computed itself.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::say;
+use crate::files::{InputError, OutputFile, read_text};
+use crate::ranging::tmf8820::{self, Capture};
+use crate::ranging::{ArrivalOptions, Calibration, Echo, arrival};
+use crate::report::Grid;
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Format {
+    /// JSON captures of an ams TMF8820.
+    Tmf8820,
+}
+
+/// Captures that a calibration is fitted on; the others are reported.
+#[derive(Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+enum Fit {
+    /// Every second capture, from the first.
+    Even,
+    /// Every second capture, from the second.
+    Odd,
+    /// The nearer half.
+    Near,
+    /// The farther half.
+    Far,
+}
+
+/// Arguments of `gdtof range`.
+#[derive(Args)]
+pub struct RangeArgs {
+    /// File of histograms.
+    #[arg(long, value_name = "FILE")]
+    histograms: PathBuf,
+    /// What the file is.
+    #[arg(long, value_enum)]
+    format: Format,
+    /// Captures to calibrate on, by their true distances; depths and errors are those of the others.
+    #[arg(
+        long,
+        value_enum,
+        default_value = "even",
+        conflicts_with = "calibration"
+    )]
+    fit: Fit,
+    /// Use the calibration in this file instead, on all captures.
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+    /// Keep the calibration (JSON).
+    #[arg(long, value_name = "FILE", conflicts_with = "calibration")]
+    save_calibration: Option<PathBuf>,
+    /// Depths as CSV: capture,zone,true_m,depth_m,sensor_m.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// JSON instead of tables.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Fewest counts above background that are taken for a pulse.
+const LEAST_SIGNAL: f64 = 100.0;
+
+/// One zone of one capture that sees the plane.
+struct Sighting {
+    capture: usize,
+    echo: Echo,
+    true_m: f64,
+    sensor_m: f64,
+}
+
+/// Every zone that sees the plane: the sensor reports a target there, and there is a pulse. Both criteria are
+/// about the same zones, so that the two depths are compared on equal terms.
+fn sightings(captures: &[Capture]) -> Vec<Sighting> {
+    let options = ArrivalOptions::default();
+    let mut found = Vec::new();
+    for (index, capture) in captures.iter().enumerate() {
+        let Some(reference) = arrival(&capture.reference_hist, &options) else {
+            continue;
+        };
+        for (zone, counts) in capture.hists.iter().enumerate() {
+            let sensor_m = capture.on_chip_depths_mm[zone] * 1e-3;
+            let pulse = arrival(counts, &options).filter(|p| p.signal_counts >= LEAST_SIGNAL);
+            if let (Some(pulse), true) = (pulse, sensor_m > 0.0) {
+                found.push(Sighting {
+                    capture: index,
+                    echo: Echo {
+                        zone,
+                        arrival_bins: pulse.position_bins - reference.position_bins,
+                        signal_counts: pulse.signal_counts,
+                    },
+                    true_m: capture.dist_to_plane_m,
+                    sensor_m,
+                });
+            }
+        }
+    }
+    found
+}
+
+/// Is each capture one to fit on?
+fn fitted_on(captures: &[Capture], fit: Fit) -> Vec<bool> {
+    let mut order: Vec<usize> = (0..captures.len()).collect();
+    order.sort_by(|&a, &b| {
+        let distance = |i: usize| captures[i].dist_to_plane_m;
+        distance(a).total_cmp(&distance(b))
+    });
+    let mut fitted = vec![false; captures.len()];
+    for (rank, &index) in order.iter().enumerate() {
+        fitted[index] = match fit {
+            Fit::Even => index % 2 == 0,
+            Fit::Odd => index % 2 == 1,
+            Fit::Near => 2 * rank < captures.len(),
+            Fit::Far => 2 * rank >= captures.len(),
+        };
+    }
+    fitted
+}
+
+fn calibrate(args: &RangeArgs, zones: usize, of: &[&Sighting]) -> Result<Calibration, InputError> {
+    let known: Vec<(Echo, f64)> = of.iter().map(|s| (s.echo, s.true_m)).collect();
+    Calibration::fit(zones, &known).map_err(|error| {
+        let message = format!("{error}; calibrate on other or more captures (--fit)");
+        InputError::new(args.histograms.display(), message)
+    })
+}
+
+fn read_calibration(path: &std::path::Path, zones: usize) -> Result<Calibration, InputError> {
+    let calibration: Calibration = serde_json::from_str(&read_text(path)?).map_err(|e| {
+        let message = format!("{e}; give a file made by --save-calibration");
+        InputError::at(path.display(), e.line(), message)
+    })?;
+    if calibration.zones.len() == zones {
+        return Ok(calibration);
+    }
+    let message = format!(
+        "is for {} zones, not {zones}; give the calibration of this sensor",
+        calibration.zones.len()
+    );
+    Err(InputError::new(path.display(), message))
+}
+
+/// Errors of one set of depths.
+#[derive(Serialize)]
+struct Errors {
+    rms_mm: f64,
+    mean_mm: f64,
+    largest_mm: f64,
+}
+
+impl Errors {
+    fn of(errors_m: impl Iterator<Item = f64>) -> Self {
+        let (mut n, mut sum, mut squares, mut largest) = (0.0, 0.0, 0.0, 0f64);
+        for error in errors_m {
+            n += 1.0;
+            sum += error;
+            squares += error * error;
+            largest = largest.max(error.abs());
+        }
+        Errors {
+            rms_mm: 1e3 * f64::sqrt(squares / n),
+            mean_mm: 1e3 * sum / n,
+            largest_mm: 1e3 * largest,
+        }
+    }
+
+    fn row(&self, name: &str) -> [String; 4] {
+        let mm = |value: f64| format!("{value:.2}");
+        [
+            name.into(),
+            mm(self.rms_mm),
+            mm(self.mean_mm),
+            mm(self.largest_mm),
+        ]
+    }
+}
+
+/// What is printed.
+#[derive(Serialize)]
+struct Report {
+    captures: usize,
+    zones: usize,
+    /// Zones that see the plane, in all captures.
+    sightings: usize,
+    /// Those that errors are about.
+    reported: usize,
+    fit: Option<Fit>,
+    calibration: Calibration,
+    depths: Errors,
+    /// The sensor's own depths as it gives them.
+    sensor: Errors,
+    /// The sensor's own depths after a straight line for every zone, fitted on the same captures as ours.
+    sensor_refitted: Option<Errors>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, files that cannot be written.
+pub fn run(args: &RangeArgs) -> anyhow::Result<()> {
+    let captures = match args.format {
+        Format::Tmf8820 => tmf8820::read(&args.histograms)?,
+    };
+    let zones = captures[0].hists.len();
+    let sightings = sightings(&captures);
+    let on = match args.calibration {
+        Some(_) => vec![false; captures.len()],
+        None => fitted_on(&captures, args.fit),
+    };
+    let (fitted, reported): (Vec<_>, Vec<_>) = sightings.iter().partition(|s| on[s.capture]);
+    if reported.is_empty() {
+        let message = "no zone of the captures to report on sees the plane; give more captures";
+        return Err(InputError::new(args.histograms.display(), message).into());
+    }
+    let calibration = match &args.calibration {
+        Some(path) => read_calibration(path, zones)?,
+        None => calibrate(args, zones, &fitted)?,
+    };
+    let sensor_refitted = match args.calibration {
+        Some(_) => None,
+        None => {
+            // Counts left out: the sensor has had them, and says nothing of a walk that is left.
+            let own = |s: &Sighting| Echo {
+                zone: s.echo.zone,
+                arrival_bins: s.sensor_m,
+                signal_counts: 0.0,
+            };
+            let known: Vec<(Echo, f64)> = fitted.iter().map(|s| (own(s), s.true_m)).collect();
+            let line = Calibration::fit(zones, &known).ok();
+            line.map(|line| Errors::of(reported.iter().map(|s| line.depth_m(&own(s)) - s.true_m)))
+        }
+    };
+    let depth = |s: &Sighting| calibration.depth_m(&s.echo);
+    if let Some(path) = &args.save_calibration {
+        OutputFile::write_with(path, |out| {
+            serde_json::to_writer_pretty(&mut *out, &calibration)?;
+            writeln!(out)
+        })?;
+    }
+    if let Some(path) = &args.out {
+        OutputFile::write_with(path, |out| {
+            writeln!(out, "capture,zone,true_m,depth_m,sensor_m")?;
+            for s in &reported {
+                let (capture, zone) = (captures[s.capture].capture, s.echo.zone);
+                let (true_m, depth_m, sensor_m) = (s.true_m, depth(s), s.sensor_m);
+                writeln!(
+                    out,
+                    "{capture},{zone},{true_m:.6},{depth_m:.6},{sensor_m:.6}"
+                )?;
+            }
+            Ok(())
+        })?;
+    }
+    let report = Report {
+        captures: captures.len(),
+        zones,
+        sightings: sightings.len(),
+        reported: reported.len(),
+        fit: args.calibration.is_none().then_some(args.fit),
+        depths: Errors::of(reported.iter().map(|s| depth(s) - s.true_m)),
+        sensor: Errors::of(reported.iter().map(|s| s.sensor_m - s.true_m)),
+        sensor_refitted,
+        calibration,
+    };
+    if args.json {
+        say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
+        return Ok(());
+    }
+    say(table(&report))?;
+    Ok(())
+}
+
+fn table(report: &Report) -> String {
+    let mut errors = Grid::new([
+        "depth to the plane",
+        "RMS (mm)",
+        "mean (mm)",
+        "largest (mm)",
+    ]);
+    errors.push(report.depths.row("gdtof"));
+    errors.push(report.sensor.row("the sensor's own"));
+    if let Some(refitted) = &report.sensor_refitted {
+        errors.push(refitted.row("the sensor's own, a line fitted to each zone"));
+    }
+    let mut lines = Grid::new(["zone", "mm a bin", "offset (mm)"]);
+    for (zone, line) in report.calibration.zones.iter().enumerate() {
+        lines.push([
+            zone.to_string(),
+            format!("{:.3}", 1e3 * line.scale_m),
+            format!("{:.2}", 1e3 * line.offset_m),
+        ]);
+    }
+    format!(
+        "{} captures of {} zones; {} times a zone sees the plane, {} of them reported here\n\n{errors}\n{lines}walk {:.3} mm for a million counts\n",
+        report.captures,
+        report.zones,
+        report.sightings,
+        report.reported,
+        1e9 * report.calibration.walk_m_per_count,
+    )
+}

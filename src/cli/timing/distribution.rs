@@ -1,0 +1,99 @@
+//! The ripple of every macropixel of a mismatched array: table and plot.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::section::{Cell, Section};
+use crate::chip::SensorConfig;
+use crate::engine::timing::{Silicon, Spread, spread};
+use crate::files::InputError;
+use crate::report::{Axis, Chart, Style};
+
+/// Bars of the plot.
+const BARS: usize = 48;
+
+/// Analyses all macropixels, with a bar on a terminal.
+pub fn analyse(config: &SensorConfig, silicon: &Silicon) -> anyhow::Result<Spread> {
+    let style = ProgressStyle::with_template("analysing {bar:40} {pos}/{len} macropixels")?;
+    let progress = ProgressBar::new(config.pixels() as u64).with_style(style);
+    let found = spread(config, silicon, || progress.inc(1));
+    progress.finish_and_clear();
+    Ok(found)
+}
+
+/// Statistics and how many macropixels fail.
+pub fn table(config: &SensorConfig, found: &Spread) -> Section {
+    let title = format!(
+        "Mismatch: ripple CLK fall to LOCAL_STOP of {} macropixels at {} MHz",
+        found.pixels.len(),
+        config.clk_hz * 1e-6
+    );
+    let mut section = Section::new("spread", title, &["", "value"]);
+    let ps = |seconds: f64| Cell::Number(Some(seconds * 1e12), 3);
+    let count = |number: usize| Cell::Number(Some(number as f64), 0);
+    let (slowest, tightest) = (found.slowest(), found.tightest());
+    let fails = |works: fn(&crate::engine::timing::PixelTiming) -> bool| {
+        count(found.pixels.iter().filter(|p| !works(p)).count())
+    };
+    section.push(["mean ripple (ps)".into(), ps(found.mean_s)]);
+    section.push(["standard deviation (ps)".into(), ps(found.sigma_s)]);
+    let name = format!(
+        "longest ripple (ps), row {} column {}",
+        slowest.row, slowest.col
+    );
+    section.push([name.into(), ps(slowest.ripple.as_s())]);
+    let name = format!(
+        "least slack (ps), row {} column {}",
+        tightest.row, tightest.col
+    );
+    section.push([name.into(), ps(tightest.slack.as_s())]);
+    section.push([
+        "macropixels that break a limit".into(),
+        fails(|p| p.keeps_limits),
+    ]);
+    section.push([
+        "macropixels that count into the wrong bins".into(),
+        fails(|p| p.counts_right),
+    ]);
+    section
+}
+
+/// Writes the distribution with the normal curve of its mean and deviation.
+pub fn plot(config: &SensorConfig, found: &Spread, path: &Path) -> Result<(), InputError> {
+    let ripples: Vec<f64> = found
+        .pixels
+        .iter()
+        .map(|p| p.ripple.as_s() * 1e12)
+        .collect();
+    let least = ripples.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = ripples.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let width = ((most - least) / BARS as f64).max(1e-3);
+    let mut counts = [0.0; BARS];
+    for ripple in &ripples {
+        counts[(((ripple - least) / width) as usize).min(BARS - 1)] += 1.0;
+    }
+    let centre = |bar: usize| least + (bar as f64 + 0.5) * width;
+    let (mean, sigma) = (found.mean_s * 1e12, (found.sigma_s * 1e12).max(1e-9));
+    let normal = |x: f64| {
+        let deviation = (x - mean) / sigma;
+        ripples.len() as f64 * width / (sigma * TAU.sqrt()) * (-0.5 * deviation * deviation).exp()
+    };
+    let curve = (0..=4 * BARS).map(|i| least + i as f64 * width / 4.0);
+    let title = format!(
+        "Ripple of {} macropixels: mean {mean:.1} ps, sigma {sigma:.2} ps; {} MHz fails in {}",
+        ripples.len(),
+        config.clk_hz * 1e-6,
+        found.pixels.iter().filter(|p| !p.keeps_limits).count()
+    );
+    let x = Axis::linear("CLK fall to LOCAL_STOP (ps)");
+    Chart::new(title, x, Axis::linear("macropixels"))
+        .with(
+            "macropixels",
+            Style::Bars,
+            (0..BARS).map(|bar| (centre(bar), counts[bar])),
+        )
+        .with("normal", Style::Line, curve.map(|x| (x, normal(x))))
+        .write(path)
+}

@@ -1,0 +1,111 @@
+//! A table that prints for people and for programs: the same rows as text and as JSON.
+
+use serde_json::{Map, Value, json};
+
+use crate::report::Grid;
+use crate::units::Time;
+
+/// One value of a table.
+pub enum Cell {
+    /// A name.
+    Text(String),
+    /// A time; in JSON, picoseconds.
+    Time(Option<Time>),
+    /// A number, with the decimals that are printed.
+    Number(Option<f64>, usize),
+}
+
+impl Cell {
+    fn text(&self) -> String {
+        match self {
+            Cell::Text(text) => text.clone(),
+            Cell::Time(time) => time.map_or("-".to_owned(), |t| t.to_string()),
+            Cell::Number(number, decimals) => {
+                number.map_or("-".to_owned(), |n| format!("{n:.decimals$}"))
+            }
+        }
+    }
+
+    fn json(&self) -> Value {
+        match self {
+            Cell::Text(text) => json!(text),
+            Cell::Time(time) => json!(time.map(|t| t.as_fs() as f64 * 1e-3)),
+            Cell::Number(number, _) => json!(number),
+        }
+    }
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Cell::Text(text.to_owned())
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Cell::Text(text)
+    }
+}
+
+impl From<Time> for Cell {
+    fn from(time: Time) -> Self {
+        Cell::Time(Some(time))
+    }
+}
+
+impl From<Option<Time>> for Cell {
+    fn from(time: Option<Time>) -> Self {
+        Cell::Time(time)
+    }
+}
+
+/// A titled table.
+pub struct Section {
+    key: &'static str,
+    title: String,
+    headings: &'static [&'static str],
+    rows: Vec<Vec<Cell>>,
+}
+
+impl Section {
+    /// An empty table; `key` is its name in JSON, where headings name the columns.
+    pub fn new(
+        key: &'static str,
+        title: impl Into<String>,
+        headings: &'static [&'static str],
+    ) -> Self {
+        Section {
+            key,
+            title: title.into(),
+            headings,
+            rows: Vec::new(),
+        }
+    }
+
+    /// Adds a row, which must have a cell for every heading.
+    pub fn push(&mut self, cells: impl IntoIterator<Item = Cell>) {
+        let row: Vec<Cell> = cells.into_iter().collect();
+        debug_assert_eq!(row.len(), self.headings.len());
+        self.rows.push(row);
+    }
+
+    /// The table for a terminal, title first and an empty line last.
+    pub fn text(&self) -> String {
+        let mut grid = Grid::new(self.headings.iter().copied());
+        for row in &self.rows {
+            grid.push(row.iter().map(Cell::text));
+        }
+        format!("{}\n{grid}\n", self.title)
+    }
+
+    /// Adds the table to a document: a list of objects.
+    pub fn add_to(&self, document: &mut Map<String, Value>) {
+        let object = |row: &Vec<Cell>| -> Value {
+            let keys = self.headings.iter().map(|h| h.replace([' ', '-'], "_"));
+            keys.zip(row.iter().map(Cell::json))
+                .collect::<Map<_, _>>()
+                .into()
+        };
+        document.insert(self.key.to_owned(), self.rows.iter().map(object).collect());
+    }
+}

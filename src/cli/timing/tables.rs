@@ -1,0 +1,318 @@
+//! The tables of `gdtof timing`, one function each.
+
+use super::section::{Cell, Section};
+use crate::chip::SensorConfig;
+use crate::engine::timing::{
+    CorrelationTiming, Limits, LoadTiming, LocalClocks, MacropixelTiming, Silicon, corner_limits,
+    critical_factor, gate_works, load_works, longest, phases, reset, ripple, shortest_period,
+};
+use crate::netlist::{CheckKind, Netlist, Path, Requirement};
+use crate::units::Time;
+
+/// Longest period that is tried.
+const SLOW: Time = Time::from_ns(20);
+
+/// What is analysed: the sensor, its silicon, and its macropixel with limits kept and ignored.
+pub struct Subject<'a> {
+    pub config: &'a SensorConfig,
+    pub silicon: &'a Silicon,
+    pub kept: MacropixelTiming,
+    pub ignored: MacropixelTiming,
+}
+
+impl<'a> Subject<'a> {
+    pub fn new(config: &'a SensorConfig, silicon: &'a Silicon) -> Self {
+        let pixel = |limits| MacropixelTiming::of(config, silicon, limits, (0, 0));
+        Subject {
+            config,
+            silicon,
+            kept: pixel(Limits::Kept),
+            ignored: pixel(Limits::Ignored),
+        }
+    }
+
+    fn of(&self, limits: Limits) -> &MacropixelTiming {
+        match limits {
+            Limits::Kept => &self.kept,
+            Limits::Ignored => &self.ignored,
+        }
+    }
+}
+
+/// Earliest and latest changes.
+pub fn windows(subject: &Subject<'_>) -> Section {
+    let pixel = &subject.kept;
+    let title = "Windows of a macropixel";
+    let mut section = Section::new("windows", title, &["from, to", "shortest", "longest"]);
+    let only = |path: &Path| (None, path.delay());
+    let both = |window: (Time, Time)| (Some(window.0), window.1);
+    for (name, (shortest, longest)) in [
+        ("CLK fall to LOCAL_STOP rise (ripple)", only(&pixel.ripple)),
+        ("CLK fall to COUNTER_CLK rise", both(pixel.counter_clk)),
+        ("CLK fall to STROBE rise", both(pixel.strobe)),
+        ("CLK rise to SHIFT change", both(pixel.shift)),
+        ("CLK rise to SPAD_EVENT", only(&pixel.event)),
+        ("STOP rise to COUNTER_RESET rise", both(pixel.reset)),
+        ("STOP rise to COUNTER_RESET fall", both(pixel.release)),
+    ] {
+        section.push([name.into(), shortest.into(), longest.into()]);
+    }
+    section
+}
+
+/// The reset pulse and what it must outlast.
+pub fn reset_pulse(subject: &Subject<'_>) -> Section {
+    let (pixel, simulated) = (&subject.kept, reset(subject.config, subject.silicon));
+    let title = "Reset pulse, and what it must outlast";
+    let mut section = Section::new("reset", title, &["", "static", "event-driven"]);
+    let need = simulated.to_stage_clock.max(simulated.to_counter_clk);
+    let limits = pixel.reset_need() - pixel.reset_to_stage_clock.max(pixel.reset_to_counter_clk);
+    for (name, paths, gates) in [
+        ("width", pixel.reset_width(), simulated.width),
+        (
+            "to the next stage's clock",
+            pixel.reset_to_stage_clock,
+            simulated.to_stage_clock,
+        ),
+        (
+            "to the COUNTER_CLK that LOCAL_STOP lets through",
+            pixel.reset_to_counter_clk,
+            simulated.to_counter_clk,
+        ),
+        (
+            "left over, removal kept",
+            pixel.reset_width() - pixel.reset_need(),
+            simulated.width - need - limits,
+        ),
+    ] {
+        section.push([name.into(), paths.into(), gates.into()]);
+    }
+    section
+}
+
+/// Shortest CLK periods.
+pub fn periods(subject: &Subject<'_>) -> Section {
+    let Subject {
+        config, silicon, ..
+    } = subject;
+    let title = "Shortest CLK period";
+    let headings = &["limited by", "static", "event-driven", "static (MHz)"];
+    let mut section = Section::new("periods", title, headings);
+    let mut push = |name: &str, paths: Option<Time>, gates: Option<Time>| {
+        let mhz = paths.map(|t| 1e-6 / t.as_s());
+        section.push([
+            name.into(),
+            paths.into(),
+            gates.into(),
+            Cell::Number(mhz, 1),
+        ]);
+    };
+    push(
+        "twice the ripple (thesis 4.6)",
+        Some(subject.kept.ripple.delay() * 2),
+        None,
+    );
+    for (limits, suffix) in [
+        (Limits::Ignored, "what is captured"),
+        (Limits::Kept, "setup, hold, widths"),
+    ] {
+        let pixel = subject.of(limits);
+        let gates = |period, phase| gate_works(config, silicon, limits, period, phase);
+        let correlation = CorrelationTiming::of(config, silicon, limits);
+        push(
+            &format!("STOP on CLK's fall: {suffix}"),
+            shortest_period(SLOW, |p| pixel.works(p, Time::ZERO)),
+            shortest_period(SLOW, |p| gates(p, Time::ZERO)),
+        );
+        // Below the band in which the strobe meets the shift register a STOP phase helps again.
+        let below = pixel.forbidden(0).0 - Time::from_ps(2);
+        let simulated = shortest_period(below, |p| phases(p).any(|phase| gates(p, phase)));
+        push(
+            &format!("best STOP phase: {suffix}"),
+            shortest_period(below, |p| phases(p).any(|phase| pixel.works(p, phase))),
+            simulated.zip(correlation.period).map(|(a, b)| a.max(b)),
+        );
+        push(
+            &format!("correlation path: {suffix}"),
+            pixel.correlation_period(),
+            correlation.period,
+        );
+    }
+    section
+}
+
+/// CLK periods at which no STOP phase helps.
+pub fn forbidden(subject: &Subject<'_>) -> Section {
+    let title = "CLK periods at which the strobe breaks setup or hold, whatever STOP's phase";
+    let headings = &["rising CLK edge after the counted fall", "from", "to"];
+    let mut section = Section::new("forbidden", title, headings);
+    for edge in 0..2 {
+        let (from, to) = subject.kept.forbidden(edge);
+        section.push([(edge + 1).to_string().into(), from.into(), to.into()]);
+    }
+    section
+}
+
+/// How fast start values can be loaded.
+pub fn load_clk(subject: &Subject<'_>, load: &LoadTiming) -> Section {
+    let Subject {
+        config, silicon, ..
+    } = subject;
+    let title = "Shortest LOAD_CLK period";
+    let headings = &["limited by", "static", "event-driven", "static (MHz)"];
+    let mut section = Section::new("load_clk", title, headings);
+    let ignored = LoadTiming::of(config, silicon, Limits::Ignored).period();
+    for (name, limits, paths) in [
+        ("what is loaded", Limits::Ignored, ignored),
+        ("setup, hold, widths", Limits::Kept, load.period()),
+    ] {
+        let gates = shortest_period(SLOW, |p| load_works(config, silicon, limits, p));
+        let mhz = Cell::Number(paths.map(|t| 1e-6 / t.as_s()), 1);
+        section.push([name.into(), paths.into(), gates.into(), mhz]);
+    }
+    section
+}
+
+/// The tightest flip-flop of every clock and check.
+pub fn flip_flops(subject: &Subject<'_>, load: &LoadTiming) -> Section {
+    let config = subject.config;
+    let headings = &[
+        "clock",
+        "check",
+        "flip-flops",
+        "tightest",
+        "shortest period",
+        "slack",
+    ];
+    let title = "Tightest flip-flops; slack at the configured CLK, LOAD_CLK and dead time";
+    let mut section = Section::new("flip_flops", title, headings);
+    let local = LocalClocks::of(config, subject.silicon);
+    let pixel = &subject.kept;
+    let clk: Vec<Requirement> = pixel.clk.iter().chain(&pixel.hits).copied().collect();
+    let clocks: [(&str, &Netlist, &[Requirement], Option<Time>); 4] = [
+        ("CLK", &pixel.netlist, &clk, Some(config.clock().period())),
+        ("HIT", &pixel.netlist, &local.counts, None),
+        (
+            "SPAD_RAW",
+            &pixel.netlist,
+            &local.toggles,
+            Some(config.dead_time()),
+        ),
+        (
+            "LOAD_CLK",
+            &load.netlist,
+            &load.load_clk,
+            Some(config.load_clock().period()),
+        ),
+    ];
+    for (clock, netlist, all, period) in clocks {
+        for kind in CheckKind::ALL {
+            let of_kind: Vec<&Requirement> = all.iter().filter(|r| r.kind == kind).collect();
+            let Some(limiting) = of_kind.iter().max_by_key(|r| (r.period(), r.need)) else {
+                continue;
+            };
+            let slacks = |period| of_kind.iter().map(move |r| r.slack(period)).min();
+            let mut cells: Vec<usize> = of_kind.iter().map(|r| r.cell).collect();
+            cells.sort_unstable();
+            cells.dedup();
+            section.push([
+                clock.into(),
+                kind.name().into(),
+                cells.len().to_string().into(),
+                netlist.cell_path(limiting.cell).into(),
+                longest(of_kind.iter().copied()).into(),
+                period.and_then(slacks).into(),
+            ]);
+        }
+    }
+    section
+}
+
+/// Ripple by number of stages.
+pub fn ripples(config: &SensorConfig, silicon: &Silicon) -> Section {
+    let title = "Ripple COUNTER_CLK to LOCAL_STOP";
+    let mut section = Section::new("ripples", title, &["stages", "static", "event-driven"]);
+    for counter_bits in 2..=12 {
+        let config = SensorConfig {
+            counter_bits,
+            ..config.clone()
+        };
+        let (paths, gates) = ripple(&config, silicon);
+        section.push([counter_bits.to_string().into(), paths.into(), gates.into()]);
+    }
+    section
+}
+
+/// Where the sensor's CLK fails: the largest factor on all delays, and the conditions that exceed it.
+pub fn corners(config: &SensorConfig, silicon: &Silicon) -> Section {
+    let headings = &[
+        "process",
+        "at 1.1 V, 50 C",
+        "fails from (V) down",
+        "fails from (C) up",
+    ];
+    let critical = critical_factor(config, silicon, Limits::Kept);
+    let gates = critical.map(|factor| {
+        let works = |factor: f64| {
+            let (period, phase) = (config.clock().period(), config.stop_phase());
+            gate_works(config, &silicon.at(factor), Limits::Kept, period, phase)
+        };
+        match (works(factor), works(factor + 2e-5)) {
+            (true, false) => "simulation agrees",
+            (true, true) => "simulation still works there",
+            (false, _) => "SIMULATION FAILS ALREADY",
+        }
+    });
+    let mhz = config.clk_hz * 1e-6;
+    let title = match critical.zip(gates) {
+        None => format!("Where {mhz} MHz fails: everywhere"),
+        Some((factor, gates)) => {
+            format!("Where {mhz} MHz fails: delays {factor:.5} times the library's ({gates})")
+        }
+    };
+    let mut section = Section::new("corners", title, headings);
+    for limit in corner_limits(critical.unwrap_or(0.0)) {
+        let verdict = if limit.works_at_reference {
+            "works"
+        } else {
+            "fails"
+        };
+        section.push([
+            format!("{:?}", limit.process).to_lowercase().into(),
+            verdict.into(),
+            Cell::Number(limit.fails_below_v, 3),
+            Cell::Number(limit.fails_above_c, 1),
+        ]);
+    }
+    section
+}
+
+/// Every step of the longest and shortest paths.
+pub fn paths(subject: &Subject<'_>, load: &LoadTiming) -> Section {
+    let headings = &["path", "cell, input", "net", "edge", "time"];
+    let mut section = Section::new("paths", "Longest and shortest paths", headings);
+    let pixel = &subject.kept;
+    for (name, netlist, path) in [
+        ("CLK to LOCAL_STOP, longest", &pixel.netlist, &pixel.ripple),
+        ("CLK to SPAD_EVENT, longest", &pixel.netlist, &pixel.event),
+        ("CLK to D, shortest", &pixel.netlist, &pixel.shortest),
+        ("LOAD_CLK to D, longest", &load.netlist, &load.longest),
+        ("LOAD_CLK to D, shortest", &load.netlist, &load.shortest),
+    ] {
+        for step in &path.steps {
+            section.push([
+                name.into(),
+                step.arc.as_deref().unwrap_or("-").into(),
+                netlist.net_path(step.net).unwrap_or_default().into(),
+                if step.edge == crate::netlist::Edge::Rise {
+                    "rise"
+                } else {
+                    "fall"
+                }
+                .into(),
+                step.time.into(),
+            ]);
+        }
+    }
+    section
+}

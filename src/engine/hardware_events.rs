@@ -1,0 +1,280 @@
+//! Hardware events: what a real chip would do silently, reported with its name, instance and time.
+//!
+//! | event | what happens in the chip |
+//! |---|---|
+//! | `memory_written_while_counting` | a memory bit that changes flips its multiplexer: an edge for the next stage, though nothing was counted |
+//! | `reset_too_short` | COUNTER_RESET ends before the stage outputs are back at the memory's value, whose rising edges then count |
+//! | `pulses_cancelled` | a SPAD fires twice between two CLK edges: its toggle flip-flop is back where it was, both photons are lost |
+//!
+//! [`HardwareEvents`] is an observer, as timing checks are. A STOP edge that releases the reset too near a CLK edge is
+//! a violation of recovery or removal, and found by those.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::chip::SPADS;
+use crate::kernel::Observer;
+use crate::logic::Logic;
+use crate::netlist::{NetId, Netlist};
+use crate::units::Time;
+
+/// Events that are kept one by one; further ones are only counted.
+const MOST_EVENTS: usize = 10_000;
+
+/// What happened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HardwareEventKind {
+    /// A start value changed while its counter was not held in reset.
+    MemoryWrittenWhileCounting,
+    /// The counter began to count from another value than its start value.
+    ResetTooShort,
+    /// Two pulses of one SPAD fell between the same two CLK edges.
+    PulsesCancelled,
+}
+
+impl HardwareEventKind {
+    /// Every kind.
+    pub const ALL: [HardwareEventKind; 3] = [
+        HardwareEventKind::MemoryWrittenWhileCounting,
+        HardwareEventKind::ResetTooShort,
+        HardwareEventKind::PulsesCancelled,
+    ];
+
+    /// Name in tables and JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            HardwareEventKind::MemoryWrittenWhileCounting => "memory_written_while_counting",
+            HardwareEventKind::ResetTooShort => "reset_too_short",
+            HardwareEventKind::PulsesCancelled => "pulses_cancelled",
+        }
+    }
+}
+
+/// One of them.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HardwareEvent {
+    /// What happened.
+    pub kind: HardwareEventKind,
+    /// Dotted path of the macropixel, or of what it happened to within it.
+    pub instance: String,
+    /// When, fs.
+    pub time_fs: i64,
+}
+
+/// Everything that was seen.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct HardwareEventReport {
+    /// By time.
+    pub hardware_events: Vec<HardwareEvent>,
+    /// Events that were counted but not kept.
+    pub hardware_events_left_out: u64,
+}
+
+impl fmt::Display for HardwareEventReport {
+    /// One line for each kind that occurred: how often, and where first.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.hardware_events.is_empty() {
+            return writeln!(f, "Hardware events: none");
+        }
+        writeln!(f, "Hardware events, first of each kind")?;
+        for kind in HardwareEventKind::ALL {
+            let mut of_kind = self.hardware_events.iter().filter(|e| e.kind == kind);
+            let Some(first) = of_kind.next() else {
+                continue;
+            };
+            let (count, time) = (1 + of_kind.count(), Time::from_fs(first.time_fs));
+            let name = kind.name();
+            writeln!(f, "  {name:<30}{count:>8}  {} at {time}", first.instance)?;
+        }
+        if self.hardware_events_left_out > 0 {
+            writeln!(f, "  {} more were not kept", self.hardware_events_left_out)?;
+        }
+        Ok(())
+    }
+}
+
+/// What a net is to its macropixel.
+#[derive(Debug, Clone, Copy)]
+enum Role {
+    Clk,
+    PixelClear,
+    CounterReset,
+    CounterClk,
+    LocalStop,
+    Memory(u8),
+    CounterOut(u8),
+    Toggle(u8),
+}
+
+/// A number whose bits are learnt one by one.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Bits {
+    ones: u32,
+    known: u32,
+}
+
+impl Bits {
+    fn set(&mut self, bit: u8, value: Logic) {
+        let mask = 1 << bit;
+        self.ones = self.ones & !mask | if value == Logic::One { mask } else { 0 };
+        let is_known = value.to_bool().is_some();
+        self.known = self.known & !mask | if is_known { mask } else { 0 };
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Macropixel {
+    path: String,
+    reset: Logic,
+    local_stop: Logic,
+    memory: Bits,
+    out: Bits,
+    /// When the reset was released, until the first count after it.
+    released: Option<Time>,
+    /// PIXEL_CLEAR, which also moves toggles.
+    is_cleared: bool,
+    toggle: Bits,
+    /// Changes of each SPAD's toggle since CLK last rose.
+    toggled: [u8; SPADS],
+}
+
+/// Watches macropixels of a netlist.
+pub struct HardwareEvents {
+    /// Macropixels and roles of every net; most have none.
+    roles: Vec<Vec<(u32, Role)>>,
+    pixels: Vec<Macropixel>,
+    not_before: Time,
+    report: HardwareEventReport,
+}
+
+impl HardwareEvents {
+    /// Watches the macropixels at these paths below the top (an empty path: the top is one); nothing before
+    /// `not_before` is judged.
+    ///
+    /// # Panics
+    /// When one of them is no macropixel.
+    pub fn new<S: AsRef<str>>(netlist: &Netlist, macropixels: &[S], not_before: Time) -> Self {
+        let mut roles = vec![Vec::new(); netlist.net_count()];
+        let mut pixels = Vec::new();
+        for (index, path) in macropixels.iter().enumerate() {
+            let path = path.as_ref();
+            let nets = |name: &str| -> Vec<NetId> {
+                let full = if path.is_empty() {
+                    name.to_owned()
+                } else {
+                    format!("{path}.{name}")
+                };
+                let nets = netlist.signal(&full);
+                nets.unwrap_or_else(|| panic!("{path} has no {name}"))
+            };
+            let mut watch = |net: NetId, role| roles[net.index()].push((index as u32, role));
+            watch(nets("CLK")[0], Role::Clk);
+            watch(nets("PIXEL_CLEAR")[0], Role::PixelClear);
+            watch(nets("COUNTER_RESET")[0], Role::CounterReset);
+            watch(nets("COUNTER_CLK")[0], Role::CounterClk);
+            watch(nets("LOCAL_STOP")[0], Role::LocalStop);
+            for (bit, &net) in nets("p_counter.MEMORY").iter().enumerate() {
+                watch(net, Role::Memory(bit as u8));
+            }
+            for (bit, &net) in nets("p_counter.COUNTER_OUT").iter().enumerate() {
+                watch(net, Role::CounterOut(bit as u8));
+            }
+            for spad in 0..SPADS {
+                let toggle = nets(&format!("front_end.spad_{spad}.TOGGLE"))[0];
+                watch(toggle, Role::Toggle(spad as u8));
+            }
+            pixels.push(Macropixel {
+                path: path.to_owned(),
+                reset: Logic::X,
+                local_stop: Logic::X,
+                memory: Bits::default(),
+                out: Bits::default(),
+                released: None,
+                is_cleared: true,
+                toggle: Bits::default(),
+                toggled: [0; SPADS],
+            });
+        }
+        HardwareEvents {
+            roles,
+            pixels,
+            not_before,
+            report: HardwareEventReport::default(),
+        }
+    }
+
+    /// What was seen so far.
+    pub fn report(&self) -> &HardwareEventReport {
+        &self.report
+    }
+
+    fn watched(&mut self, time: Time, pixel: usize, role: Role, value: Logic) {
+        let p = &mut self.pixels[pixel];
+        let mut found = None;
+        match role {
+            Role::Clk if value == Logic::One => p.toggled = [0; SPADS],
+            Role::Clk => {}
+            Role::PixelClear => p.is_cleared = value != Logic::Zero,
+            Role::CounterReset => {
+                p.released = (value == Logic::Zero).then_some(time);
+                p.reset = value;
+            }
+            Role::LocalStop => p.local_stop = value,
+            Role::CounterClk if value == Logic::One && p.reset == Logic::Zero => {
+                let starts_right = p.out == p.memory && p.local_stop == Logic::Zero;
+                if let (Some(released), false) = (p.released.take(), starts_right) {
+                    found = Some((HardwareEventKind::ResetTooShort, released, String::new()));
+                }
+            }
+            Role::CounterClk => {}
+            Role::CounterOut(bit) => p.out.set(bit, value),
+            Role::Memory(bit) => {
+                let before = p.memory;
+                p.memory.set(bit, value);
+                let was_known = before.known >> bit & 1 == 1;
+                if was_known && before != p.memory && p.reset == Logic::Zero {
+                    let kind = HardwareEventKind::MemoryWrittenWhileCounting;
+                    found = Some((kind, time, format!(".p_counter.MEMORY[{bit}]")));
+                }
+            }
+            Role::Toggle(spad) => {
+                let before = p.toggle;
+                p.toggle.set(spad, value);
+                let is_change = before.known == p.toggle.known && before != p.toggle;
+                if is_change && !p.is_cleared {
+                    let changes = &mut p.toggled[spad as usize];
+                    *changes = changes.saturating_add(1);
+                    if changes.is_multiple_of(2) {
+                        let instance = format!(".front_end.spad_{spad}");
+                        found = Some((HardwareEventKind::PulsesCancelled, time, instance));
+                    }
+                }
+            }
+        }
+        if let Some((kind, when, part)) = found.filter(|_| time >= self.not_before) {
+            if self.report.hardware_events.len() == MOST_EVENTS {
+                self.report.hardware_events_left_out += 1;
+                return;
+            }
+            let instance = format!("{}{part}", p.path);
+            let instance = instance.trim_start_matches('.').to_owned();
+            self.report.hardware_events.push(HardwareEvent {
+                kind,
+                instance,
+                time_fs: when.as_fs(),
+            });
+        }
+    }
+}
+
+impl Observer for HardwareEvents {
+    #[inline]
+    fn change(&mut self, time: Time, net: NetId, value: Logic) {
+        for at in 0..self.roles[net.index()].len() {
+            let (pixel, role) = self.roles[net.index()][at];
+            self.watched(time, pixel as usize, role, value);
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! The event kernel's answers to the questions of static timing.
+
+use super::{Limits, Silicon};
+use crate::chip::p_counter::Rises;
+use crate::chip::{Exposure, PCounter, SensorConfig, WindowLaw, front_end, p_counter, sensor};
+use crate::engine::GateSimulation;
+use crate::kernel::{Drive, Kernel, Policy, Recorder, TimingChecks, in_order};
+use crate::netlist::{Edge, Netlist, StaticTiming};
+use crate::photon::SpadEvent;
+use crate::units::{Frequency, Time};
+
+/// A clock at which every delay is short.
+const SLOW_HZ: f64 = 20e6;
+/// When a load is sure to be out of its power-up reset.
+pub(super) const RESET_RELEASED: Time = Time::from_ns(4);
+
+/// A macropixel of this silicon, ready to run.
+pub(super) fn simulation<'a>(
+    config: &'a SensorConfig,
+    silicon: &Silicon,
+    exposure: &'a Exposure,
+    start: u16,
+    pulses: &[SpadEvent],
+) -> GateSimulation<'a> {
+    let one = (1, 1);
+    let gate = GateSimulation::new(config, exposure, (0, 0), one, &[start], &[pulses]);
+    let timing = silicon.timing(gate.netlist());
+    gate.with_timing(&timing)
+}
+
+/// Timing checks with this silicon's limits, SPAD samplers excepted.
+pub(super) fn checks(silicon: &Silicon, gate: &GateSimulation<'_>) -> TimingChecks {
+    let library = silicon.limits(Limits::Kept);
+    TimingChecks::new(gate.netlist(), &library, silicon.corner)
+        .policy(Policy::ReportOnly)
+        .not_before(gate.schedule().reset_end)
+        .asynchronous(gate.netlist(), front_end::is_asynchronous_sampler)
+}
+
+/// Whether a gate-level macropixel counts a pattern of photons into the bins of a slow clock and, if limits are
+/// to be kept, breaks none.
+pub fn gate_works(
+    config: &SensorConfig,
+    silicon: &Silicon,
+    limits: Limits,
+    period: Time,
+    phase: Time,
+) -> bool {
+    let Ok(clock) = Frequency::from_period(period) else {
+        return false;
+    };
+    let start = (config.largest_start() / 2).min(2 * config.bins as u16);
+    let every = Rises::of(config, start).and_then(|rises| rises.every);
+    let exposure = Exposure {
+        clock,
+        stop_phase: phase,
+        stop_periods: match (config.p_counter, every) {
+            (PCounter::Memoryless, Some(every)) => every as u32,
+            _ => start as u32 + 12,
+        },
+        laser_cycles: 1,
+    };
+    let slow = Exposure {
+        clock: Frequency::from_hz_f64(SLOW_HZ).expect("a frequency"),
+        stop_phase: Time::ZERO,
+        ..exposure
+    };
+    // A counter of few bits that wraps has no window at any clock.
+    let Some(window) = WindowLaw::new(config, &slow).window(start).open() else {
+        return false;
+    };
+    let mut config = config.clone();
+    config.clk_hz = clock.as_hz();
+    // A pattern that no shift maps to itself; one SPAD per photon, so that dead time plays no part.
+    let has_photon = |bin: i64| [0, 1, 3, 4, 8, 13, 15].contains(&(bin % 16));
+    let mut pulses = Vec::new();
+    let mut expected = vec![0; config.bins];
+    for bin in 0..config.bins as i64 {
+        let edge = window.first_edge + bin;
+        if has_photon(bin) && edge > 1 {
+            expected[bin as usize] = 1;
+            pulses.push(SpadEvent {
+                time: exposure.rising(edge) - Time::from_fs(period.as_fs() / 2),
+                spad: (bin % 16) as u8,
+            });
+        }
+    }
+    pulses.sort_unstable();
+    let mut gate = simulation(&config, silicon, &exposure, start, &pulses);
+    let violated = match limits {
+        Limits::Ignored => {
+            gate.run(&mut ());
+            0
+        }
+        Limits::Kept => {
+            let mut checks = checks(silicon, &gate);
+            gate.run(&mut checks);
+            checks.report(gate.netlist()).violated()
+        }
+    };
+    let counted = gate.histograms();
+    violated == 0 && counted.is_ok_and(|found| found[0] == expected)
+}
+
+/// COUNTER_CLK rises → LOCAL_STOP rises for the sensor's P-counter: longest path, and as simulated from start value 0.
+pub fn ripple(config: &SensorConfig, silicon: &Silicon) -> (Time, Time) {
+    let netlist = Netlist::elaborate(&p_counter::circuit(config));
+    let timing = silicon.timing(&netlist);
+    let net = |name: &str| netlist.net(name).expect("a pin of the P-counter");
+    let (clk, stop) = (net("COUNTER_CLK"), net("LOCAL_STOP"));
+    let analysis = StaticTiming::new(&netlist, &timing);
+    let arrivals = analysis
+        .arrivals(&[(clk, Edge::Rise)], &[])
+        .expect("a P-counter has no loop");
+    let (_, longest) = arrivals.edge_window(stop, Edge::Rise).expect("the ripple");
+    let resets = [net("MEMORY_RESET"), net("COUNTER_RESET")];
+    let edge = Time::from_ns(200);
+    let inputs = netlist.inputs().into_iter();
+    let power_up = inputs.map(|n| Drive::new(Time::ZERO, n, resets.contains(&n)));
+    let release = resets.map(|n| Drive::new(Time::from_ns(100), n, false));
+    let drives = power_up.chain(release).chain([Drive::new(edge, clk, true)]);
+    let mut recorder = Recorder::new([stop]);
+    let mut stimulus = in_order(drives.collect());
+    Kernel::new(&netlist, &timing).run(&mut stimulus, edge * 2, &mut recorder);
+    let rises = recorder.rising_edges(stop);
+    (longest, rises.first().map_or(Time::MAX, |&t| t - edge))
+}
+
+/// What a simulated reset pulse is, and what it meets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ResetTiming {
+    /// Width of COUNTER_RESET.
+    pub width: Time,
+    /// COUNTER_RESET rises → the last rise of a stage output, which clocks the next stage, from a counter that
+    /// was interrupted on its way down.
+    pub to_stage_clock: Time,
+    /// COUNTER_RESET rises → COUNTER_CLK rises, let through by LOCAL_STOP's fall.
+    pub to_counter_clk: Time,
+}
+
+/// Simulates the reset of the second laser cycle, of an interrupted count and after LOCAL_STOP.
+pub fn reset(config: &SensorConfig, silicon: &Silicon) -> ResetTiming {
+    const PERIODS: u32 = 40;
+    // All ones on the way down: interrupted, about every second stage has to rise again.
+    let interrupted = after_reset(config, silicon, config.largest_start(), PERIODS);
+    let stopped = after_reset(config, silicon, 1, PERIODS);
+    ResetTiming {
+        width: interrupted.width,
+        to_stage_clock: interrupted.last_stage_rise,
+        to_counter_clk: stopped.counter_clk,
+    }
+}
+
+struct AfterReset {
+    width: Time,
+    last_stage_rise: Time,
+    counter_clk: Time,
+}
+
+fn after_reset(config: &SensorConfig, silicon: &Silicon, start: u16, periods: u32) -> AfterReset {
+    let mut config = config.clone();
+    config.stop_phase_ps = 0.0;
+    let exposure = Exposure::new(&config, periods, 2);
+    let mut gate = simulation(&config, silicon, &exposure, start, &[]);
+    let signal = |name: &str| {
+        let path = format!("{}.{name}", sensor::pixel_name(0, 0));
+        gate.netlist()
+            .signal(&path)
+            .expect("a signal of the macropixel")
+    };
+    let (reset, clk) = (signal("COUNTER_RESET")[0], signal("COUNTER_CLK")[0]);
+    let stages = signal("p_counter.COUNTER_OUT");
+    let mut recorder = Recorder::new(stages.iter().copied().chain([reset, clk]));
+    let stop = gate.schedule().origin + exposure.stop(1);
+    gate.run(&mut recorder);
+    let first_after =
+        |times: Vec<Time>, from: Time| times.into_iter().find(|t| *t >= from).unwrap_or(Time::MAX);
+    let rise = first_after(recorder.rising_edges(reset), stop);
+    let fall = first_after(recorder.falling_edges(reset), rise);
+    let within = |t: &Time| (rise..fall).contains(t);
+    let stage_rises = stages.iter().flat_map(|&net| recorder.rising_edges(net));
+    AfterReset {
+        width: fall - rise,
+        last_stage_rise: stage_rises
+            .filter(within)
+            .max()
+            .map_or(Time::ZERO, |t| t - rise),
+        counter_clk: first_after(recorder.rising_edges(clk), rise) - rise,
+    }
+}

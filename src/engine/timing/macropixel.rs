@@ -1,0 +1,293 @@
+//! Static timing of one macropixel, and the CLK periods that it allows.
+//!
+//! A period *works* when the histogram is the one of a slow clock: bin b holds the photons taken by rising
+//! CLK edge start − bins + b. The counter counts falling CLK edges, so a STOP phase does not move the strobe
+//! against CLK. It can only make the counter start one edge earlier, once STOP leads CLK's fall by more than
+//! the reset pulse lasts, and so undo a shift by one whole bin: a period near the crossing itself stays
+//! forbidden at every phase.
+//!
+//! All flip-flops of the macropixel count, with setup, hold, recovery, removal and pulse widths. Left out are, by
+//! design, the sixteen that sample SPADs. The histogram's counters run on HIT, once in a laser cycle.
+
+use super::{Limits, Silicon};
+use crate::chip::{PCounter, SensorConfig, front_end, histogram, sensor};
+use crate::netlist::{
+    Bound, CellKind, CheckKind, Edge, NetId, Netlist, Path, Requirement, Requirements, StaticTiming,
+};
+use crate::units::Time;
+
+/// Static windows of one macropixel, all from the edge named first: (earliest, latest) or a path.
+#[derive(Debug, Clone)]
+pub struct MacropixelTiming {
+    /// The netlist that is analysed, which names the nets of the paths.
+    pub netlist: Netlist,
+    /// CLK falls → LOCAL_STOP rises: the ripple delay of the thesis (4.6, Fig. 56).
+    pub ripple: Path,
+    /// CLK falls → STROBE rises.
+    pub strobe: (Time, Time),
+    /// CLK rises → SHIFT changes, all stages together.
+    pub shift: (Time, Time),
+    /// CLK rises → SPAD_EVENT settled.
+    pub event: Path,
+    /// The shortest path from CLK to the data of a flip-flop on the same edge, by its hold.
+    pub shortest: Path,
+    /// CLK falls → COUNTER_CLK rises.
+    pub counter_clk: (Time, Time),
+    /// STOP rises → COUNTER_RESET rises.
+    pub reset: (Time, Time),
+    /// STOP rises → COUNTER_RESET falls.
+    pub release: (Time, Time),
+    /// COUNTER_RESET rises → the last edge it can send into a stage's clock, latest.
+    pub reset_to_stage_clock: Time,
+    /// COUNTER_RESET rises → LOCAL_STOP falls → COUNTER_CLK rises, latest.
+    pub reset_to_counter_clk: Time,
+    /// What the flip-flops behind CLK ask of its period, those that catch the strobe left out.
+    pub clk: Vec<Requirement>,
+    /// Strobe to the METDC's HIT flip-flops: setup after one change of SHIFT, hold before the next.
+    pub hits: Vec<Requirement>,
+    /// Whether the first count is the first that ENABLE lets through, and not the first after a reset.
+    counts_at_once: bool,
+    recovery: Time,
+    removal: Time,
+    control_high: Time,
+}
+
+impl MacropixelTiming {
+    /// Analyses the macropixel at `position` (row, column) of this sensor: mismatch differs from one to the next.
+    pub fn of(
+        config: &SensorConfig,
+        silicon: &Silicon,
+        limits: Limits,
+        position: (usize, usize),
+    ) -> Self {
+        // The very netlist that the gate engine simulates, so that a cell's mismatch is the same in both.
+        let netlist = Netlist::elaborate(&sensor::window(config, position, (1, 1)));
+        let pixel = sensor::pixel_name(position.0, position.1);
+        let timing = silicon.timing(&netlist);
+        let library = silicon.limits(limits);
+        let analysis = StaticTiming::new(&netlist, &timing);
+        let bus = |name: &str| {
+            let nets = netlist.signal(&format!("{pixel}.{name}"));
+            nets.expect("a signal of the macropixel")
+        };
+        let net = |name: &str| bus(name)[0];
+        // LOCAL_STOP blocks COUNTER_CLK, and FULL blocks a bin's clock: both loops are cut, as is the reset.
+        let after = |from: &str, edge, cuts: &[NetId]| {
+            let arrivals = analysis.arrivals(&[(net(from), edge)], cuts);
+            arrivals.expect("every loop is cut")
+        };
+        let whole = "the macropixel connects these";
+        let block = net("p_counter_timing.BLOCK");
+        let hit = bus("HIT");
+        // ENABLE changes with STOP, but only before the first and after the last laser cycle.
+        let cuts: Vec<NetId> = hit.iter().copied().chain([block, net("ENABLE")]).collect();
+        let (clock, corner) = (net("CLK"), silicon.corner);
+        let clk = Requirements::of(&netlist, &analysis, clock, &cuts, &library, corner);
+        let clk = clk.expect("every loop is cut");
+        let (rise, fall) = (clk.arrivals(Edge::Rise), clk.arrivals(Edge::Fall));
+        let stop = after("STOP", Edge::Rise, &cuts);
+        let counter_out = bus("p_counter.COUNTER_OUT");
+        // Each stage's own reset path: what arrives at a stage output goes no further.
+        let reset_cuts: Vec<NetId> = cuts.iter().chain(&counter_out).copied().collect();
+        let reset = after("COUNTER_RESET", Edge::Rise, &reset_cuts);
+        let clears = counter_out
+            .iter()
+            .filter_map(|&n| reset.edge_window(n, Edge::Rise));
+        let local_stop = net("LOCAL_STOP");
+        // A counter without memory is not reset, and one that wraps is not blocked.
+        let local_stop_falls = reset.edge_window(local_stop, Edge::Fall);
+        let unblocks = after(
+            "LOCAL_STOP",
+            Edge::Fall,
+            &[net("COUNTER_CLK"), net("metdc.STROBE")],
+        );
+        let unblocked = unblocks.edge_window(net("COUNTER_CLK"), Edge::Rise);
+        let shift = bus("metdc.SHIFT");
+        let shift = shift.iter().filter_map(|&bit| rise.window(bit));
+        let shift = shift.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+
+        let is_hit = |r: &Requirement| netlist.cell_path(r.cell).contains(".metdc.hit_");
+        let of_first_sampler = |r: &Requirement| {
+            r.kind.concerns_data() && front_end::is_asynchronous_sampler(&netlist.cell_path(r.cell))
+        };
+        let (hits, clk_rest): (Vec<_>, Vec<_>) = clk.all().iter().copied().partition(is_hit);
+        let limit = |kind: CheckKind| {
+            let limits = library.checks(CellKind::Dffr);
+            Time::from_fs(limits.at(kind, silicon.corner).into())
+        };
+        MacropixelTiming {
+            ripple: fall
+                .path(local_stop, Edge::Rise, Bound::Longest)
+                .expect(whole),
+            strobe: fall
+                .edge_window(net("metdc.STROBE"), Edge::Rise)
+                .expect(whole),
+            shift: shift.expect(whole),
+            event: rise
+                .path_to(net("SPAD_EVENT"), Bound::Longest)
+                .expect(whole),
+            shortest: worst_path(&clk, clk_rest.iter(), CheckKind::Hold).expect(whole),
+            counter_clk: fall
+                .edge_window(net("COUNTER_CLK"), Edge::Rise)
+                .expect(whole),
+            reset: stop
+                .edge_window(net("COUNTER_RESET"), Edge::Rise)
+                .expect(whole),
+            release: stop
+                .edge_window(net("COUNTER_RESET"), Edge::Fall)
+                .expect(whole),
+            reset_to_stage_clock: clears.map(|w| w.1).max().unwrap_or(Time::ZERO),
+            reset_to_counter_clk: local_stop_falls
+                .zip(unblocked)
+                .map_or(Time::ZERO, |(falls, unblocked)| falls.1 + unblocked.1),
+            counts_at_once: config.p_counter == PCounter::Memoryless,
+            hits,
+            clk: clk_rest
+                .into_iter()
+                .filter(|r| !of_first_sampler(r))
+                .collect(),
+            recovery: limit(CheckKind::Recovery),
+            removal: limit(CheckKind::Removal),
+            control_high: limit(CheckKind::ControlHigh),
+            netlist,
+        }
+    }
+
+    /// Width of the reset pulse, at its shortest.
+    pub fn reset_width(&self) -> Time {
+        self.release.0 - self.reset.1
+    }
+
+    /// What the reset pulse must outlast: stage outputs that return to their memory value, the COUNTER_CLK edge that
+    /// LOCAL_STOP's fall lets through, and the flip-flops' own shortest reset.
+    pub fn reset_need(&self) -> Time {
+        let edges = self.reset_to_stage_clock.max(self.reset_to_counter_clk);
+        (edges + self.removal).max(self.control_high)
+    }
+
+    /// Latest strobe with its hold time, from CLK's fall, less the earliest change of the bit it captures.
+    fn hit_hold(&self) -> Time {
+        worst(&self.hits, CheckKind::Hold)
+    }
+
+    /// Latest change of SHIFT with the setup time less the earliest strobe.
+    fn hit_setup(&self) -> Time {
+        worst(&self.hits, CheckKind::Setup)
+    }
+
+    /// Shortest CLK period of the path CLK → SPAD_EVENT → shift register.
+    pub fn correlation_period(&self) -> Option<Time> {
+        let first = |r: &&Requirement| self.netlist.cell_path(r.cell).ends_with(".metdc.shift_0");
+        let setups = self.clk.iter().filter(|r| r.kind == CheckKind::Setup);
+        longest(setups.filter(first))
+    }
+
+    /// Shortest CLK period of everything but the strobe.
+    pub fn clk_period(&self) -> Option<Time> {
+        longest(self.clk.iter())
+    }
+
+    /// CLK periods at which the strobe meets the change of the shift register `edges` rising CLK edges late: no
+    /// STOP phase helps there.
+    pub fn forbidden(&self, edges: i64) -> (Time, Time) {
+        let period = |need: Time| Time::from_fs(2 * need.as_fs() / (2 * edges + 1));
+        (period(-self.hit_setup()), period(self.hit_hold()))
+    }
+
+    /// Shortest CLK period with STOP on CLK's falling edge as far as the strobe goes: it must precede the shift
+    /// register's change.
+    pub fn strobe_period(&self) -> Time {
+        self.forbidden(0).1
+    }
+
+    /// What a period leaves over: of the strobe before the shift register's change, and of every other flip-flop.
+    pub fn slack(&self, period: Time) -> Time {
+        let all = self.clk.iter().chain(&self.hits);
+        all.map(|r| r.slack(period)).min().unwrap_or(Time::MAX)
+    }
+
+    /// Whether a start value selects the CLK periods it selects at a slow clock, STOP `phase` after CLK's fall.
+    pub fn works(&self, period: Time, phase: Time) -> bool {
+        let (t, fs) = (period.as_fs(), Time::as_fs);
+        // Falling edge k, at k T, counts if it comes after the release, and does not if before.
+        let counts_from = fs(self.release.1 - self.counter_clk.0 + self.recovery + phase);
+        let ignored_until = fs(self.release.0 - self.counter_clk.1 - self.removal + phase);
+        let first = (-(-counts_from).div_euclid(t)).max(0);
+        let is_ambiguous = first > 0 && (first - 1) * t > ignored_until;
+        let (first, is_ambiguous) = if self.counts_at_once {
+            (1, false)
+        } else {
+            (first, is_ambiguous)
+        };
+        // A slow clock counts from edge 1 on and strobes before the next rising edge.
+        let edges = 1 - first;
+        // The rising edge after the strobe; its forerunner is a period before.
+        let next = t / 2 + edges * t;
+        !is_ambiguous
+            && edges >= 0
+            && fs(self.hit_hold()) < next
+            && fs(self.hit_setup()) <= t - next
+            && self.clk_period().is_some_and(|shortest| shortest <= period)
+    }
+}
+
+/// What the flip-flops of a macropixel ask that have clocks of their own.
+#[derive(Debug, Clone)]
+pub struct LocalClocks {
+    /// Histogram counters, of the time between two rises of HIT: the laser cycle.
+    pub counts: Vec<Requirement>,
+    /// Toggle flip-flops, of the time between two pulses of one SPAD.
+    pub toggles: Vec<Requirement>,
+}
+
+impl LocalClocks {
+    /// Analyses macropixel (0, 0), limits kept.
+    pub fn of(config: &SensorConfig, silicon: &Silicon) -> Self {
+        let netlist = Netlist::elaborate(&sensor::window(config, (0, 0), (1, 1)));
+        let timing = silicon.timing(&netlist);
+        let library = silicon.limits(Limits::Kept);
+        let analysis = StaticTiming::new(&netlist, &timing);
+        let bus = |name: &str| {
+            let nets = netlist.signal(&format!("{}.{name}", sensor::pixel_name(0, 0)));
+            nets.expect("a signal of the macropixel")
+        };
+        let requirements = |clock: NetId, cuts: &[NetId]| {
+            let corner = silicon.corner;
+            let found = Requirements::of(&netlist, &analysis, clock, cuts, &library, corner);
+            found.expect("every loop is cut").all().to_vec()
+        };
+        // A count's Q only tells whether the bin is full.
+        let count = |bin| bus(&format!("histogram.{}", histogram::bin_name(bin)));
+        let hits = bus("HIT").into_iter().enumerate();
+        LocalClocks {
+            counts: hits
+                .flat_map(|(bin, hit)| requirements(hit, &count(bin)))
+                .collect(),
+            toggles: bus("SPAD_RAW")
+                .into_iter()
+                .flat_map(|raw| requirements(raw, &[]))
+                .filter(|r| !netlist.cell_path(r.cell).ends_with(".first"))
+                .collect(),
+        }
+    }
+}
+
+fn worst(requirements: &[Requirement], kind: CheckKind) -> Time {
+    let of_kind = requirements.iter().filter(|r| r.kind == kind);
+    of_kind.map(|r| r.need).max().expect("a METDC has bins")
+}
+
+/// The data path of the requirement of one kind with the largest need.
+pub(super) fn worst_path<'r>(
+    behind: &Requirements<'_>,
+    requirements: impl Iterator<Item = &'r Requirement>,
+    kind: CheckKind,
+) -> Option<Path> {
+    let of_kind = requirements.filter(|r| r.kind == kind);
+    Some(behind.paths(of_kind.max_by_key(|r| r.need)?)?.0)
+}
+
+/// Shortest period that keeps all of them; none if no period does.
+pub fn longest<'r>(mut requirements: impl Iterator<Item = &'r Requirement>) -> Option<Time> {
+    requirements.try_fold(Time::ZERO, |longest, r| Some(longest.max(r.period()?)))
+}

@@ -1,0 +1,192 @@
+//! The window engine: only what a start value can see.
+//!
+//! The window law gives the rising CLK edges whose photons reach a bin. Each pulse is taken by one edge;
+//! the pulses of one edge that lies in the window of some laser cycle are summed, compared and counted.
+//! CLK periods without photons are never visited: what an empty period does is the same for all of them
+//! and is added in one step.
+//!
+//! In the light of a photon stream it draws only the slots that a window can see and those before it that may have
+//! blinded a SPAD ([`sight`]), and counts them a group of laser cycles at a time ([`counting`]). Macropixels whose
+//! SPADs are off or whose window never opens are left out.
+
+mod binning;
+mod counting;
+mod history;
+mod sight;
+
+use super::light::full_stream;
+use super::{Engine, EngineError, Exposed, LitPixel, Work};
+use crate::chip::window_law::OpenWindow;
+use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw, correlation, histogram, window_law};
+use crate::photon::{PhotonStream, SpadEvent};
+use crate::units::Time;
+use counting::Counting;
+use sight::Sight;
+
+/// Counts through the window law.
+pub struct Window<'a> {
+    config: &'a SensorConfig,
+    exposure: &'a Exposure,
+    law: WindowLaw,
+    period_fs: f64,
+}
+
+impl<'a> Window<'a> {
+    /// An engine for this sensor and exposure.
+    pub fn new(config: &'a SensorConfig, exposure: &'a Exposure) -> Self {
+        Window {
+            config,
+            exposure,
+            law: WindowLaw::new(config, exposure),
+            period_fs: 1e15 / exposure.clock.as_hz(),
+        }
+    }
+
+    /// The window of a start value, if it opens.
+    fn window(&self, start: u16) -> Result<Option<OpenWindow>, EngineError> {
+        match self.law.window(start) {
+            window_law::Window::Open(window) => Ok(Some(window)),
+            window_law::Window::Never => Ok(None),
+            window_law::Window::Irregular(why) => Err(EngineError::Irregular(why)),
+            window_law::Window::Race(why) => Err(EngineError::Race(why)),
+        }
+    }
+
+    /// The rising CLK edge that takes a pulse at `time`.
+    fn edge_of(&self, time: Time) -> i64 {
+        let sampled = time + self.law.timing().spad_to_toggle;
+        let periods = (sampled + self.exposure.stop_phase).as_fs() as f64 / self.period_fs - 0.5;
+        let edge = periods.ceil();
+        // Exact arithmetic only where rounding could decide.
+        if (edge - periods - 0.5).abs() < 0.499 {
+            return edge as i64;
+        }
+        self.exposure.rising_until(sampled - Time::from_fs(1)) + 1
+    }
+
+    fn is_event(&self, spads: u16) -> bool {
+        correlation::model(spads, self.config.event_type, self.config.threshold)
+    }
+
+    /// Hits of every bin in the dark. A conventional cycle is latched by the STOP edge that ends it; the exposure's first
+    /// STOP edge ends one, too.
+    fn dark_hits(&self, first_edge: i64) -> Vec<i64> {
+        let bins = self.config.bins as i64;
+        if !self.is_event(0) {
+            return vec![0; self.config.bins];
+        }
+        let periods = self.exposure.stop_periods as i64;
+        let cycles = self.exposure.laser_cycles as i64;
+        (0..bins)
+            .map(|bin| {
+                // The pipeline starts empty: nothing before rising edge -1 was ever compared.
+                let first_compared = (-1 - first_edge - bin + periods - 1).div_euclid(periods);
+                (cycles - first_compared.max(self.first_cycle())).max(0)
+            })
+            .collect()
+    }
+
+    fn first_cycle(&self) -> i64 {
+        match self.config.mode {
+            Mode::Guided => 0,
+            Mode::Conventional => -1,
+        }
+    }
+
+    /// What a CLK period with light adds to the hits of its bin, beyond those in the dark.
+    fn adds(&self, spads: u16) -> i64 {
+        i64::from(self.is_event(spads)) - i64::from(self.is_event(0))
+    }
+
+    fn counts(&self, hits: &[i64]) -> Vec<u16> {
+        let (bits, overflow) = (self.config.bin_bits as u32, self.config.overflow);
+        hits.iter()
+            .map(|&n| histogram::model(n as u64, bits, overflow))
+            .collect()
+    }
+}
+
+impl Engine for Window<'_> {
+    fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
+        let bins = self.config.bins as i64;
+        let periods = self.exposure.stop_periods as i64;
+        let cycles = self.exposure.laser_cycles as i64;
+        let Some(window) = self.window(start)? else {
+            return Ok(vec![0; self.config.bins]);
+        };
+        let mut hits = self.dark_hits(window.first_edge);
+        for (edge, spads) in taken(pulses, |p| self.edge_of(p.time)) {
+            let adds = self.adds(spads);
+            if adds == 0 {
+                continue;
+            }
+            let offset = edge - window.first_edge;
+            let last_cycle = offset.div_euclid(periods).min(cycles - 1);
+            // More than one laser cycle sees an edge only when a cycle is shorter than the window.
+            for cycle in (self.first_cycle()..=last_cycle).rev() {
+                let bin = offset - cycle * periods;
+                if bin >= bins {
+                    break;
+                }
+                hits[bin as usize] += adds;
+            }
+        }
+        Ok(self.counts(&hits))
+    }
+
+    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+        let mut counting = Counting::new(self, stream);
+        let mut exposed = Exposed::default();
+        let clk_periods =
+            u64::from(self.exposure.stop_periods) * u64::from(self.exposure.laser_cycles);
+        for pixel in pixels {
+            let Some(light) = &pixel.light else {
+                exposed.histograms.push(self.histogram(pixel.start, &[])?);
+                exposed.work.skipped_dark += 1;
+                continue;
+            };
+            let Some(window) = self.window(pixel.start)? else {
+                exposed.histograms.push(vec![0; self.config.bins]);
+                exposed.work.skipped_closed += 1;
+                continue;
+            };
+            let sight = Sight::new(&self.law, &window, stream);
+            if let Some(sight) = sight.filter(|sight| sight.suits(stream, light)) {
+                let light = stream.pixel(pixel.number, light);
+                let (hits, work) = counting.expose(&sight, &light);
+                exposed.histograms.push(self.counts(&hits));
+                exposed.work += work;
+            } else {
+                let Exposed { histograms, work } = full_stream(self, stream, &[*pixel])?;
+                exposed.histograms.extend(histograms);
+                exposed.work += Work {
+                    macropixels: 0,
+                    clk_periods: 0,
+                    ..work
+                };
+            }
+        }
+        exposed.work.macropixels += pixels.len() as u64;
+        exposed.work.clk_periods += pixels.len() as u64 * clk_periods;
+        Ok(exposed)
+    }
+}
+
+/// Pulses grouped by the edge that takes them: (edge, SPADs with an odd number of pulses).
+fn taken<'p>(
+    pulses: &'p [SpadEvent],
+    edge_of: impl Fn(&SpadEvent) -> i64 + 'p,
+) -> impl Iterator<Item = (i64, u16)> + 'p {
+    let mut pulses = pulses
+        .iter()
+        .map(move |pulse| (edge_of(pulse), pulse.spad))
+        .peekable();
+    std::iter::from_fn(move || {
+        let (edge, spad) = pulses.next()?;
+        let mut spads = 1 << spad;
+        while let Some((_, spad)) = pulses.next_if(|&(e, _)| e == edge) {
+            spads ^= 1 << spad;
+        }
+        Some((edge, spads))
+    })
+}

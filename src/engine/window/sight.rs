@@ -1,0 +1,107 @@
+//! What a start value can see of the photon stream, and from when on photons matter to it.
+//!
+//! ```text
+//!   laser cycle n    │STOP                                                                        │STOP
+//!   slots            ├──────┬──────┬──────┬──────┬──────┬──────┬──────┬──────┬──────┬──────┬──────┤
+//!   window                              ├ bin 0 │ bin 1 │ … ┤
+//!   memory of SPADs             ├───────┤
+//!   drawn            ·      ·   ╰──────┴──────┴──────┴──────┴──────╯      ·      ·      ·      ·
+//! ```
+//!
+//! Windows of small start values begin in the cycle before, so that slots of two cycles are drawn.
+
+use std::ops::Range;
+
+use super::history::Past;
+use crate::chip::window_law::{OpenWindow, WindowLaw};
+use crate::photon::{GROUP, PhotonStream, PixelLight, SLOT, SPADS};
+
+/// By how much times relative to a cycle differ from cycle to cycle, fs: STOP and CLK edges are rounded to whole
+/// femtoseconds, and so is the cycle before.
+pub const ROUNDING_FS: i64 = 4;
+
+/// Most photons within the memory of the SPADs on average; a gap comes once in e³ photons.
+const MOST_BLIND: f64 = 3.0;
+
+/// Most photons of a group on average.
+const MOST_PHOTONS: f64 = 5e4;
+
+/// The part of every laser cycle that decides a histogram. Times are in fs after the start of the cycle, within
+/// [`ROUNDING_FS`].
+#[derive(Debug, Clone)]
+pub struct Sight {
+    /// The rising CLK edge that takes the photons of bin 0, counted in the window's cycle.
+    pub first_edge: i64,
+    /// Where bin 0 begins.
+    pub first_fs: i64,
+    /// Slots of the window's own cycle.
+    pub own: Range<u32>,
+    /// Slots of the cycle before.
+    pub previous: Range<u32>,
+    /// From when on every photon is in these slots.
+    pub drawn_from_fs: i64,
+}
+
+impl Sight {
+    /// The sight of a window; `None` where it and what the SPADs remember do not fit into a laser cycle and the one
+    /// before, so that most photons matter anyway.
+    pub fn new(law: &WindowLaw, window: &OpenWindow, stream: &PhotonStream) -> Option<Self> {
+        let interval = law.interval(window);
+        let (first_fs, end_fs) = (interval.start.as_fs(), interval.end.as_fs());
+        let (cycle_fs, slot_fs) = (stream.cycle_fs(), SLOT.as_fs());
+        let memory_fs = stream.config().spads.memory().as_fs();
+        let from_fs = first_fs - memory_fs - ROUNDING_FS;
+        let until_fs = end_fs + ROUNDING_FS;
+        if from_fs <= -cycle_fs || until_fs >= cycle_fs {
+            return None;
+        }
+        let slots = |from_fs: i64, until_fs: i64| {
+            let until = until_fs.max(0) as u64;
+            (from_fs.max(0) / slot_fs) as u32..until.div_ceil(slot_fs as u64) as u32
+        };
+        let own = if until_fs > 0 {
+            slots(from_fs, until_fs)
+        } else {
+            0..0
+        };
+        let previous = if from_fs < 0 {
+            slots(cycle_fs + from_fs, (cycle_fs + until_fs).min(cycle_fs))
+        } else {
+            0..0
+        };
+        let drawn_from_fs = if previous.is_empty() {
+            i64::from(own.start) * slot_fs
+        } else {
+            i64::from(previous.start) * slot_fs - cycle_fs
+        };
+        Some(Sight {
+            first_edge: window.first_edge,
+            first_fs,
+            own,
+            previous,
+            drawn_from_fs,
+        })
+    }
+
+    /// What came before the drawn slots of the window of `laser_cycle`.
+    pub fn past<'a>(&self, stream: &'a PhotonStream, laser_cycle: u32) -> Past<'a> {
+        if self.previous.is_empty() {
+            Past::new(stream, laser_cycle, self.own.start)
+        } else if let Some(before) = laser_cycle.checked_sub(1) {
+            Past::new(stream, before, self.previous.start)
+        } else {
+            Past::new(stream, 0, 0)
+        }
+    }
+
+    /// Whether it pays to draw only these slots: not where gaps longer than the memory of the SPADs are so rare, or
+    /// photons so many, that the whole stream is as quick.
+    pub fn suits(&self, stream: &PhotonStream, light: &PixelLight) -> bool {
+        let spads = &stream.config().spads;
+        let tied = if spads.has_secondaries() { 1 } else { SPADS };
+        let blind = light.background_hz / tied as f64 * spads.memory().as_s();
+        let slots = (self.own.len() + self.previous.len()) as f64;
+        let per_cycle = light.background_hz * SLOT.as_s() * slots + light.signal_per_cycle;
+        blind < MOST_BLIND && per_cycle * f64::from(GROUP) < MOST_PHOTONS
+    }
+}

@@ -1,0 +1,123 @@
+//! Changes on their way through cells with transport delays: several at once on one net.
+//!
+//! ```text
+//!   earliest ─► (t1, 1) (t2, 0) (t3, 1) ◄─ last computed; times strictly rise
+//! ```
+//!
+//! A change that would arrive at or before an earlier one cancels it; if that leaves the net with the value it
+//! would have anyway, nothing is on its way at all. What the event queue still holds of a cancelled change finds
+//! nothing due, and is ignored.
+
+use std::collections::VecDeque;
+
+use crate::netlist::{DelayModel, Netlist, Timing};
+
+/// No queue.
+const NONE: u32 = u32::MAX;
+
+/// The nets that cells with transport delays drive.
+#[derive(Default)]
+pub(super) struct TransportQueues {
+    /// Index into `queues` by net; empty where there are none.
+    of_net: Vec<u32>,
+    /// Time (fs) and value of each change.
+    queues: Vec<VecDeque<(i64, u8)>>,
+}
+
+impl TransportQueues {
+    /// One queue for each net that a cell of this kind drives.
+    pub fn new(netlist: &Netlist, timing: &Timing) -> Self {
+        let mut queues = TransportQueues::default();
+        for net in transport_nets(netlist, timing) {
+            queues.of_net.resize(netlist.net_count(), NONE);
+            queues.of_net[net] = queues.queues.len() as u32;
+            queues.queues.push(VecDeque::new());
+        }
+        queues
+    }
+
+    /// Nets with a queue.
+    pub fn nets(&self) -> impl Iterator<Item = usize> {
+        let of_net = self.of_net.iter().enumerate();
+        of_net.filter(|(_, q)| **q != NONE).map(|(net, _)| net)
+    }
+
+    /// Sends `net`, which now is `present`, to `value` at the time that `due_fs` has for it. Whether a change is
+    /// to arrive then: none does where the value is on its way already.
+    pub fn send(&mut self, net: usize, present: u8, value: u8, due_fs: i64) -> bool {
+        let queue = &mut self.queues[self.of_net[net] as usize];
+        let last = |queue: &VecDeque<(i64, u8)>| queue.back().map_or(present, |&(_, v)| v);
+        if last(queue) == value {
+            return false;
+        }
+        while queue.back().is_some_and(|&(time_fs, _)| time_fs >= due_fs) {
+            queue.pop_back();
+        }
+        if last(queue) == value {
+            return false;
+        }
+        queue.push_back((due_fs, value));
+        true
+    }
+
+    /// The value that arrives on `net` now, if any does.
+    pub fn arriving(&mut self, net: usize, now_fs: i64) -> Option<u8> {
+        let queue = &mut self.queues[self.of_net[net] as usize];
+        let &(time_fs, value) = queue.front()?;
+        (time_fs == now_fs).then(|| {
+            queue.pop_front();
+            value
+        })
+    }
+}
+
+/// Nets driven by cells with transport delays.
+pub(super) fn transport_nets(netlist: &Netlist, timing: &Timing) -> impl Iterator<Item = usize> {
+    let cells = netlist.cells().iter().enumerate();
+    cells
+        .filter(|(index, _)| timing.model(*index) == DelayModel::Transport)
+        .flat_map(|(_, cell)| cell.outputs)
+        .filter(|net| net.is_some())
+        .map(|net| net.index())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::netlist::{CellKind, Corner, Library, ModuleBuilder};
+
+    fn one_net() -> (TransportQueues, usize) {
+        let mut m = ModuleBuilder::new("m");
+        let a = m.input("A");
+        m.gate(CellKind::Buf, &[a]);
+        let netlist = Netlist::elaborate(&m.finish().unwrap());
+        let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        timing.set_model(0, DelayModel::Transport);
+        let queues = TransportQueues::new(&netlist, &timing);
+        let net = queues.nets().next().unwrap();
+        (queues, net)
+    }
+
+    #[test]
+    fn short_pulses_come_through() {
+        let (mut queues, net) = one_net();
+        assert!(queues.send(net, 0, 1, 100));
+        assert!(queues.send(net, 0, 0, 103));
+        assert!(!queues.send(net, 0, 0, 107), "on its way already");
+        assert_eq!(queues.arriving(net, 99), None);
+        assert_eq!(queues.arriving(net, 100), Some(1));
+        assert_eq!(queues.arriving(net, 103), Some(0));
+    }
+
+    #[test]
+    fn what_is_overtaken_never_arrives() {
+        let (mut queues, net) = one_net();
+        assert!(queues.send(net, 0, 1, 100));
+        assert!(!queues.send(net, 0, 0, 100), "back to where it was");
+        assert_eq!(queues.arriving(net, 100), None);
+        assert!(queues.send(net, 0, 1, 200));
+        assert!(queues.send(net, 0, 2, 150));
+        assert_eq!(queues.arriving(net, 150), Some(2));
+        assert_eq!(queues.arriving(net, 200), None);
+    }
+}

@@ -1,0 +1,291 @@
+//! Every variant of the P-counter in one table: transistors, delays, glitches and the shortest CLK period.
+
+use guided_dtof::chip::{
+    AfterBorrow, PCounter, SensorConfig, Tap, macropixel, p_counter, p_counter_timing,
+};
+use guided_dtof::engine::timing::{
+    Limits, MacropixelTiming, Silicon, gate_works, ripple, shortest_period,
+};
+use guided_dtof::kernel::{Drive, Kernel, Recorder, in_order};
+use guided_dtof::netlist::{CellKind, Corner, Edge, NetId, Netlist, StaticTiming};
+use guided_dtof::report::{Checks, Grid};
+use guided_dtof::units::Time;
+
+/// Longest CLK period that is tried.
+const SLOW: Time = Time::from_ns(20);
+
+/// A sensor of one macropixel with this P-counter, LOCAL_STOP taken where it suits.
+pub fn sensor(p_counter: PCounter) -> SensorConfig {
+    let (tap, after_borrow) = match p_counter {
+        PCounter::Memoryless => (Tap::Msb, AfterBorrow::Wrap),
+        _ => (Tap::Borrow, AfterBorrow::Hold),
+    };
+    SensorConfig {
+        rows: 1,
+        cols: 1,
+        p_counter,
+        tap,
+        after_borrow,
+        ..SensorConfig::default()
+    }
+}
+
+/// Delays as the library has them.
+const TYPICAL: Silicon = Silicon::nominal(Corner::Typ);
+
+/// Compares the variants.
+pub fn compare(checks: &mut Checks) -> Grid {
+    let mut grid = Grid::new([
+        "P-counter",
+        "T/stage",
+        "T, with timing",
+        "share",
+        "by area",
+        "LOCAL_STOP static",
+        "event",
+        "settled static",
+        "event",
+        "changes/count",
+        "glitches/count",
+        "LOCAL_STOP's",
+        "CLK period static",
+        "event",
+    ]);
+    let custom = CellKind::Dffr;
+    let stage = |p_counter| stage(&sensor(p_counter));
+    checks.equal(
+        "ripple: transistors a stage, 2 flip-flops + 4 (thesis 4.5)",
+        u64::from(2 * custom.transistors() + 4),
+        stage(PCounter::Ripple),
+    );
+    checks.equal(
+        "set_reset against ripple: a 6-transistor gate instead of 4 (4.4.4), and the larger flip-flop",
+        u64::from(6 - 4 + CellKind::Dffsr.transistors() - custom.transistors()),
+        stage(PCounter::SetReset) - stage(PCounter::Ripple),
+    );
+    checks.equal(
+        "set/reset flip-flop's layout over the custom one's (Fig. 52)",
+        3,
+        CellKind::Dffsr.area() / custom.area(),
+    );
+    let mut periods = Vec::new();
+    for p_counter in PCounter::ALL {
+        let row = Row::of(p_counter);
+        row.check(p_counter.name(), checks);
+        grid.push(row.cells(p_counter.name()));
+        periods.push(row.period.0);
+    }
+    let synchronous = periods[PCounter::Synchronous as usize];
+    checks.that(
+        "a synchronous counter avoids the ripple's limit (4.6): shortest CLK period",
+        format!("below {}, ripple's", shown(periods[0])),
+        shown(synchronous),
+        synchronous < periods[0],
+    );
+    grid
+}
+
+/// Transistors that one more bit costs.
+fn stage(config: &SensorConfig) -> u64 {
+    let shorter = SensorConfig {
+        counter_bits: config.counter_bits - 1,
+        ..config.clone()
+    };
+    p_counter::circuit(config).transistors() - p_counter::circuit(&shorter).transistors()
+}
+
+/// One variant's figures; pairs are by static timing and as simulated.
+struct Row {
+    stage: u64,
+    transistors: u64,
+    share: f64,
+    area_share: f64,
+    local_stop: (Time, Time),
+    settled: (Time, Time),
+    activity: Activity,
+    period: (Option<Time>, Option<Time>),
+}
+
+impl Row {
+    fn of(p_counter: PCounter) -> Self {
+        let config = sensor(p_counter);
+        let blocks = [
+            p_counter::circuit(&config),
+            p_counter_timing::circuit(config.after_borrow),
+        ];
+        let macropixel = macropixel::circuit(&config);
+        let transistors: u64 = blocks.iter().map(|b| b.transistors()).sum();
+        let area: u64 = blocks.iter().map(|b| b.area()).sum();
+        let netlist = Netlist::elaborate(&blocks[0]);
+        let timing = TYPICAL.timing(&netlist);
+        let clk = netlist.net("COUNTER_CLK").expect("a pin");
+        let arrivals = StaticTiming::new(&netlist, &timing).arrivals(&[(clk, Edge::Rise)], &[]);
+        let arrivals = arrivals.expect("a P-counter has no loop");
+        let nets = (0..netlist.net_count()).map(NetId::new);
+        let settled = nets.filter_map(|net| arrivals.window(net)).map(|w| w.1);
+        let activity = Activity::of(&config, &netlist);
+        let by_paths = MacropixelTiming::of(&config, &TYPICAL, Limits::Ignored, (0, 0));
+        Row {
+            stage: stage(&config),
+            transistors,
+            share: transistors as f64 / macropixel.transistors() as f64,
+            area_share: area as f64 / macropixel.area() as f64,
+            local_stop: ripple(&config, &TYPICAL),
+            settled: (settled.max().unwrap_or(Time::ZERO), activity.settled),
+            activity,
+            period: (
+                shortest_period(SLOW, |p| by_paths.works(p, Time::ZERO)),
+                shortest_period(SLOW, |p| {
+                    gate_works(&config, &TYPICAL, Limits::Ignored, p, Time::ZERO)
+                }),
+            ),
+        }
+    }
+
+    fn cells(&self, name: &str) -> Vec<String> {
+        let percent = |share: f64| format!("{:.1} %", share * 100.0);
+        let ps = |time: Time| format!("{:.0} ps", time.as_fs() as f64 * 1e-3);
+        let per_count = |n: usize| format!("{:.2}", n as f64 / self.activity.counts as f64);
+        vec![
+            name.to_owned(),
+            self.stage.to_string(),
+            self.transistors.to_string(),
+            percent(self.share),
+            percent(self.area_share),
+            ps(self.local_stop.0),
+            ps(self.local_stop.1),
+            ps(self.settled.0),
+            ps(self.settled.1),
+            per_count(self.activity.changes),
+            per_count(self.activity.glitches),
+            self.activity.on_local_stop.to_string(),
+            shown(self.period.0),
+            shown(self.period.1),
+        ]
+    }
+
+    fn check(&self, name: &str, checks: &mut Checks) {
+        let (by_paths, simulated) = self.local_stop;
+        checks.time(
+            format!("{name}: COUNTER_CLK to LOCAL_STOP"),
+            by_paths,
+            simulated,
+        );
+        let (by_paths, simulated) = self.settled;
+        checks.that(
+            format!("{name}: everything settled after a count, all counts"),
+            format!("at most {by_paths}, the longest path"),
+            simulated,
+            simulated <= by_paths && simulated > Time::ZERO,
+        );
+        let what = format!(
+            "{name}: glitches on LOCAL_STOP in {} counts",
+            self.activity.counts
+        );
+        checks.equal(what, 0, self.activity.on_local_stop);
+        if let Some(on_equal) = self.activity.on_equal {
+            checks.that(
+                format!(
+                    "{name}: changes of EQUAL that are no match, which its flip-flop must keep out"
+                ),
+                "some",
+                on_equal,
+                on_equal > 0,
+            );
+        }
+        let (by_paths, simulated) = self.period;
+        checks.that(
+            format!("{name}: shortest CLK period of the gates"),
+            format!("at most {}, by static timing", shown(by_paths)),
+            shown(simulated),
+            by_paths.is_some() && simulated.is_some() && simulated <= by_paths,
+        );
+    }
+}
+
+fn shown(period: Option<Time>) -> String {
+    period.map_or("-".to_owned(), |p| p.to_string())
+}
+
+/// What the nets inside a P-counter do while it counts through its whole range.
+struct Activity {
+    counts: usize,
+    /// Changes of all nets but the pins.
+    changes: usize,
+    /// Changes beyond the one that a net which ends elsewhere needs.
+    glitches: usize,
+    on_local_stop: usize,
+    /// On the comparator's output, where there is one.
+    on_equal: Option<usize>,
+    /// Latest change after its COUNTER_CLK edge.
+    settled: Time,
+}
+
+impl Activity {
+    /// Counts slowly from the largest start value until the count has come round.
+    fn of(config: &SensorConfig, netlist: &Netlist) -> Self {
+        const GAP: Time = Time::from_ns(10);
+        let pin = |name| netlist.net(name).expect("a pin of the P-counter");
+        let counts = usize::from(config.largest_start()) + 3;
+        let pulses = [
+            ("MEMORY_RESET", 0, 1),
+            ("COUNTER_RESET", 0, 5),
+            ("MEMORY_LOAD", 3, 4),
+        ];
+        let inputs = netlist.inputs();
+        let mut drives: Vec<Drive> = inputs
+            .iter()
+            .map(|&net| Drive::new(Time::ZERO, net, false))
+            .collect();
+        for &net in &netlist
+            .signal("COUNTER_INIT")
+            .expect("a bus of the P-counter")
+        {
+            drives.push(Drive::new(GAP * 2, net, true));
+        }
+        for (name, rise, fall) in pulses {
+            drives.push(Drive::new(GAP * rise, pin(name), true));
+            drives.push(Drive::new(GAP * fall, pin(name), false));
+        }
+        let edge = |count: usize| GAP * (count as i64 + 10);
+        for count in 0..counts {
+            drives.push(Drive::new(edge(count), pin("COUNTER_CLK"), true));
+            let fall = edge(count) + Time::from_ns(5);
+            drives.push(Drive::new(fall, pin("COUNTER_CLK"), false));
+        }
+        let mut recorder = Recorder::new((0..netlist.net_count()).map(NetId::new));
+        let mut kernel = Kernel::new(netlist, &TYPICAL.timing(netlist));
+        kernel.run(&mut in_order(drives), edge(counts), &mut recorder);
+
+        let (local_stop, equal) = (pin("LOCAL_STOP"), netlist.net("EQUAL"));
+        let mut of = Activity {
+            counts,
+            changes: 0,
+            glitches: 0,
+            on_local_stop: 0,
+            on_equal: equal.map(|_| 0),
+            settled: Time::ZERO,
+        };
+        for count in 0..counts {
+            let within = edge(count)..edge(count + 1);
+            let all = recorder.changes();
+            let from = all.partition_point(|c| c.0 < within.start);
+            let until = all.partition_point(|c| c.0 < within.end);
+            let mut changes = vec![0usize; netlist.net_count()];
+            for &(time, net, _) in all[from..until].iter().filter(|c| !inputs.contains(&c.1)) {
+                changes[net.index()] += 1;
+                of.settled = of.settled.max(time - within.start);
+            }
+            let extra = |net: NetId| changes[net.index()] / 2 * 2;
+            of.changes += changes.iter().sum::<usize>();
+            of.glitches += (0..changes.len())
+                .map(|net| extra(NetId::new(net)))
+                .sum::<usize>();
+            of.on_local_stop += extra(local_stop);
+            if let (Some(on_equal), Some(equal)) = (&mut of.on_equal, equal) {
+                *on_equal += extra(equal);
+            }
+        }
+        of
+    }
+}

@@ -1,0 +1,551 @@
+//! Testbench of the P-counter's variants: what each costs, and what the literal reading of the thesis does (4.4, 4.5).
+//!
+//! ```text
+//!   CLK, STOP, ENABLE ─► p_counter_timing ─► p_counter ─ LOCAL_STOP ─┬► metdc, HIT cleared by COUNTER_RESET: the sensor's
+//!   COUNTER_INIT, MEMORY_LOAD ─────────────────►                     └► metdc_early, HIT cleared before STOP
+//!
+//!   four channels:  borrow_hold (the default)   borrow_wrap   msb_wrap (the literal reading)   msb_hold
+//! ```
+//!
+//! The waveform has two scenes. First a start value beyond 255, whose most significant bit is high from the reset
+//! on: with the tap `msb` LOCAL_STOP rises at STOP, too, and a METDC that is ready by then counts the tail of the
+//! laser cycle before. Then a laser rate of 80 kHz, at which a counter that runs on comes round four times in each
+//! laser cycle.
+
+mod comparison;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use guided_dtof::chip::window_law::Window;
+use guided_dtof::chip::{
+    AfterBorrow, ChipTiming, Exposure, PCounter, SensorConfig, Tap, WindowLaw, metdc, p_counter,
+    p_counter_timing,
+};
+use guided_dtof::cli::testbench;
+use guided_dtof::engine::GateSimulation;
+use guided_dtof::engine::waveform::{write_vcd, write_view};
+use guided_dtof::files::{InputError, OutputFile};
+use guided_dtof::kernel::{Drive, Kernel, Recorder, clock, in_order};
+use guided_dtof::netlist::{Library, Module, ModuleBuilder, NetId, Netlist, Timing};
+use guided_dtof::report::Checks;
+use guided_dtof::units::Time;
+use guided_dtof::waves::{Entry, Group, SaveFile};
+
+/// First STOP edge.
+const ORIGIN: Time = Time::from_ns(60);
+/// When the chip comes out of reset.
+const RESET_END: Time = Time::from_ns(2);
+/// The first scene: a start value with its most significant bit high, in laser cycles of so many CLK periods.
+const HIGH: Scene = Scene {
+    from: 0,
+    start: 300,
+    stop_periods: 600,
+    cycles: 3,
+};
+/// The second scene: Fig. 48's start value at a laser rate of 80 kHz, 4800 periods of 384 MHz.
+const SLOW_LASER: Scene = Scene {
+    from: 1820,
+    start: 52,
+    stop_periods: 4800,
+    cycles: 1,
+};
+/// An event in the tail of each laser cycle of the first scene: CLK edges before STOP.
+const TAIL: i64 = 5;
+/// An event in each window: CLK edges before the last that it sees.
+const BEFORE_END: i64 = 10;
+
+fn main() -> ExitCode {
+    testbench(
+        "tb_p_counter_variants",
+        "P-counter variants: cost and speed, the tap msb's false capture, the wrapping counter's repeated one",
+        run,
+    )
+}
+
+fn run(out: &Path, checks: &mut Checks) -> Result<PathBuf, InputError> {
+    let grid = comparison::compare(checks);
+    println!("{grid}");
+    println!(
+        "T: transistors. Shares are of the macropixel's; the published one is below 5 % of its area, SPADs' wiring included."
+    );
+    println!(
+        "settled: every net after a count. CLK period: STOP on CLK's fall, setup and hold not counted.\n"
+    );
+    let table = out.join("tb_p_counter_variants.csv");
+    OutputFile::write_with(&table, |out| grid.write_csv(out))?;
+
+    let vcd = out.join("tb_p_counter_variants.vcd");
+    let bench = Bench::new();
+    let seen = bench.simulate(&vcd)?;
+    false_capture(&bench, &seen, checks);
+    repeated_capture(&bench, &seen, checks);
+    coming_round(checks);
+    Ok(vcd)
+}
+
+/// Some laser cycles with one start value.
+struct Scene {
+    /// CLK period of the first STOP edge.
+    from: i64,
+    start: i64,
+    stop_periods: i64,
+    cycles: i64,
+}
+
+impl Scene {
+    fn stop(&self, cycle: i64) -> i64 {
+        self.from + cycle * self.stop_periods
+    }
+
+    fn end(&self) -> i64 {
+        self.stop(self.cycles)
+    }
+}
+
+/// The four P-counters that are shown.
+const CHANNELS: [(&str, Tap, AfterBorrow); 4] = [
+    ("borrow_hold", Tap::Borrow, AfterBorrow::Hold),
+    ("borrow_wrap", Tap::Borrow, AfterBorrow::Wrap),
+    ("msb_wrap", Tap::Msb, AfterBorrow::Wrap),
+    ("msb_hold", Tap::Msb, AfterBorrow::Hold),
+];
+
+fn config(tap: Tap, after_borrow: AfterBorrow) -> SensorConfig {
+    SensorConfig {
+        tap,
+        after_borrow,
+        ..SensorConfig::default()
+    }
+}
+
+/// Pins that all channels share, in order of declaration.
+const PINS: [&str; 9] = [
+    "CLK",
+    "STOP",
+    "RESETB",
+    "ENABLE",
+    "MEMORY_LOAD",
+    "SPAD_EVENT",
+    "CONVENTIONAL",
+    "PIXEL_CLEAR",
+    "HIT_CLEAR",
+];
+
+/// P-counter, timing block and the two METDCs.
+fn channel(name: &str, config: &SensorConfig) -> Arc<Module> {
+    let mut m = ModuleBuilder::new(name);
+    let pins = PINS.map(|name| m.input(name));
+    let [
+        clk,
+        stop,
+        resetb,
+        enable,
+        load,
+        event,
+        conventional,
+        clear,
+        early_clear,
+    ] = pins.map(|net| [net]);
+    let init = m.input_bus("COUNTER_INIT", config.counter_bits);
+    let wire = |m: &mut ModuleBuilder, name| [m.wire(name)];
+    let local_stop = wire(&mut m, "LOCAL_STOP");
+    let counter_clk = wire(&mut m, "COUNTER_CLK");
+    let counter_reset = wire(&mut m, "COUNTER_RESET");
+    let memory_reset = wire(&mut m, "MEMORY_RESET");
+    let stop_d = wire(&mut m, "STOP_D");
+    m.instance(
+        "p_counter_timing",
+        &p_counter_timing::circuit(config.after_borrow),
+        &[
+            ("CLK", &clk),
+            ("STOP", &stop),
+            ("RESETB", &resetb),
+            ("ENABLE", &enable),
+            ("LOCAL_STOP", &local_stop),
+            ("COUNTER_CLK", &counter_clk),
+            ("COUNTER_RESET", &counter_reset),
+            ("MEMORY_RESET", &memory_reset),
+            ("STOP_D", &stop_d),
+        ],
+    );
+    m.instance(
+        "p_counter",
+        &p_counter::circuit(config),
+        &[
+            ("COUNTER_INIT", &init),
+            ("MEMORY_LOAD", &load),
+            ("MEMORY_RESET", &memory_reset),
+            ("COUNTER_CLK", &counter_clk),
+            ("COUNTER_RESET", &counter_reset),
+            ("LOCAL_STOP", &local_stop),
+        ],
+    );
+    for (name, hit_clear) in [("metdc", &counter_reset), ("metdc_early", &early_clear)] {
+        m.instance(
+            name,
+            &metdc::circuit(config.bins),
+            &[
+                ("CLK", &clk),
+                ("SPAD_EVENT", &event),
+                ("LOCAL_STOP", &local_stop),
+                ("STOP", &stop),
+                ("STOP_D", &stop_d),
+                ("COUNTER_RESET", hit_clear),
+                ("CONVENTIONAL", &conventional),
+                ("PIXEL_CLEAR", &clear),
+            ],
+        );
+    }
+    m.finish().expect("the channel is whole")
+}
+
+/// The four channels side by side, and their clocks.
+struct Bench {
+    netlist: Netlist,
+    exposure: Exposure,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let bits = SensorConfig::default().counter_bits;
+        let mut m = ModuleBuilder::new("tb_p_counter_variants");
+        let pins = PINS.map(|name| [m.input(name)]);
+        let init = m.input_bus("COUNTER_INIT", bits);
+        for (name, tap, after_borrow) in CHANNELS {
+            let mut ports: Vec<(&str, &[_])> = vec![("COUNTER_INIT", &init)];
+            ports.extend(PINS.iter().zip(&pins).map(|(&name, net)| (name, &net[..])));
+            m.instance(name, &channel(name, &config(tap, after_borrow)), &ports);
+        }
+        Bench {
+            netlist: Netlist::elaborate(&m.finish().expect("the testbench's circuit is whole")),
+            exposure: Exposure::new(&SensorConfig::default(), 2, 1),
+        }
+    }
+
+    fn pin(&self, name: &str) -> NetId {
+        self.netlist.net(name).expect("a pin of the testbench")
+    }
+
+    fn bus(&self, path: &str) -> Vec<NetId> {
+        self.netlist
+            .signal(path)
+            .expect("a signal of the testbench")
+    }
+
+    /// Falling CLK edge `period`, with which STOP rises.
+    fn at(&self, period: i64) -> Time {
+        ORIGIN + self.exposure.falling(period)
+    }
+
+    fn drives(&self) -> Vec<Drive> {
+        let inputs = self.netlist.inputs().into_iter();
+        let mut drives: Vec<Drive> = inputs.map(|n| Drive::new(Time::ZERO, n, false)).collect();
+        let mut edges = vec![
+            (Time::ZERO, "CLK", true),
+            (Time::ZERO, "PIXEL_CLEAR", true),
+            (RESET_END, "RESETB", true),
+            (RESET_END, "PIXEL_CLEAR", false),
+        ];
+        for scene in [&HIGH, &SLOW_LASER] {
+            let load = self.at(scene.from) - Time::from_ns(15);
+            for (bit, &net) in self.bus("COUNTER_INIT").iter().enumerate() {
+                drives.push(Drive::new(load, net, scene.start >> bit & 1 == 1));
+            }
+            edges.push((load + Time::from_ns(2), "MEMORY_LOAD", true));
+            edges.push((load + Time::from_ns(4), "MEMORY_LOAD", false));
+            edges.push((self.at(scene.from), "ENABLE", true));
+            edges.push((self.at(scene.end()), "ENABLE", false));
+            for cycle in 0..=scene.cycles {
+                let stop = scene.stop(cycle);
+                edges.push((self.at(stop), "STOP", true));
+                edges.push((self.at(stop + 10), "STOP", false));
+                edges.push((self.at(stop - 10), "HIT_CLEAR", true));
+                edges.push((self.at(stop - 9), "HIT_CLEAR", false));
+            }
+            for edge in events(scene) {
+                edges.push((self.at(edge), "SPAD_EVENT", true));
+                edges.push((self.at(edge + 1), "SPAD_EVENT", false));
+            }
+        }
+        let edges = edges.into_iter();
+        drives.extend(edges.map(|(time, name, value)| Drive::new(time, self.pin(name), value)));
+        let half_periods = 2 * (SLOW_LASER.end() + 40);
+        let clk = self.pin("CLK");
+        drives.extend(clock(clk, self.exposure.clock, ORIGIN, 0, half_periods));
+        drives
+    }
+
+    /// Runs both scenes into `vcd`.
+    fn simulate(&self, vcd: &Path) -> Result<Recorder, InputError> {
+        let nets = CHANNELS.iter().flat_map(|(name, ..)| {
+            let paths = ["LOCAL_STOP", "metdc.HIT", "metdc_early.HIT"];
+            paths.map(|path| self.bus(&format!("{name}.{path}")))
+        });
+        let mut recorder = Recorder::new(nets.flatten());
+        let corner = SensorConfig::default().corner;
+        let timing = Timing::nominal(&self.netlist, &Library::default(), corner);
+        let mut kernel = Kernel::new(&self.netlist, &timing);
+        let end = self.at(SLOW_LASER.end() + 40);
+        write_vcd(vcd, &self.netlist, Time::MAX, |waves| {
+            kernel.run(
+                &mut in_order(self.drives()),
+                end,
+                &mut (&mut recorder, waves),
+            );
+            end
+        })?;
+        write_view(vcd, &self.netlist, &self.view())?;
+        Ok(recorder)
+    }
+
+    fn view(&self) -> SaveFile {
+        let shared = ["CLK", "STOP", "ENABLE", "SPAD_EVENT", "HIT_CLEAR"].map(Entry::binary);
+        let mut groups = vec![Group::new("Global signals", shared)];
+        for (name, tap, _) in CHANNELS {
+            let of = |signal: &str| format!("{name}.{signal}");
+            let mut signals = vec![
+                Entry::binary(of("COUNTER_RESET")),
+                Entry::binary(of("COUNTER_CLK")),
+                Entry::decimal(of("p_counter.COUNTER_OUT")),
+                Entry::binary(of("LOCAL_STOP")),
+                Entry::hex(of("metdc.HIT")),
+            ];
+            if tap == Tap::Msb {
+                signals.push(Entry::hex(of("metdc_early.HIT")));
+            }
+            groups.push(Group::new(format!("P-counter {name}"), signals));
+        }
+        SaveFile {
+            groups,
+            zoom: (Time::ZERO, self.at(HIGH.end() + 10)),
+            marker: Some(self.at(HIGH.stop(1))),
+        }
+    }
+
+    /// Rises of LOCAL_STOP in a scene, from its first STOP edge; the load's own are left out.
+    fn rises(&self, seen: &Recorder, channel: &str, scene: &Scene) -> Vec<Time> {
+        let from = self.at(scene.from);
+        let rises = seen.rising_edges(self.bus(&format!("{channel}.LOCAL_STOP"))[0]);
+        let within = rises
+            .into_iter()
+            .filter(|&t| t > from && t < self.at(scene.end() + 10));
+        within.map(|t| t - from).collect()
+    }
+
+    /// Counts that the histogram of a METDC would have after a scene, bin by bin.
+    fn counts(&self, seen: &Recorder, metdc: &str, scene: &Scene) -> Vec<usize> {
+        let within = |t: &Time| (self.at(scene.from)..self.at(scene.end() + 10)).contains(t);
+        let hit = self.bus(&format!("{metdc}.HIT"));
+        let rises = hit.iter().map(|&net| seen.rising_edges(net));
+        rises
+            .map(|times| times.iter().filter(|t| within(t)).count())
+            .collect()
+    }
+}
+
+/// CLK edges that take an event.
+fn events(scene: &Scene) -> Vec<i64> {
+    let mut edges = Vec::new();
+    for cycle in 0..scene.cycles {
+        let window = scene.stop(cycle) + scene.start - BEFORE_END;
+        if scene.from == HIGH.from {
+            edges.extend([window, scene.stop(cycle + 1) - TAIL]);
+        } else {
+            // One in every round, each a bin later than the one before, so that HIT changes.
+            let rounds = (0..).map(|round| window + round * (ROUND + 1));
+            edges.extend(rounds.take_while(|&edge| edge < scene.end()));
+        }
+    }
+    edges
+}
+
+/// Counts after which a counter of nine bits and a borrow comes round.
+const ROUND: i64 = 1024;
+
+/// A start value whose most significant bit is high.
+fn false_capture(bench: &Bench, seen: &Recorder, checks: &mut Checks) {
+    let scene = &HIGH;
+    let ripple = |tap| {
+        let timing = ChipTiming::of(&config(tap, AfterBorrow::Wrap));
+        (timing.ripple(), timing)
+    };
+    let true_rises = |tap| -> Vec<Time> {
+        let edges = (0..scene.cycles).map(|cycle| scene.stop(cycle) + scene.start + 1);
+        edges
+            .map(|edge| bench.exposure.falling(edge) + ripple(tap).0)
+            .collect()
+    };
+    let (_, timing) = ripple(Tap::Msb);
+    let at_reset = timing.stop_to_reset
+        + timing
+            .counter
+            .reset_to_local_stop
+            .expect("the tap msb rises at a reset");
+    let false_rises =
+        (1..=scene.cycles).map(|cycle| bench.exposure.falling(scene.stop(cycle)) + at_reset);
+    let mut both = true_rises(Tap::Msb);
+    both.extend(false_rises);
+    both.sort_unstable();
+    let mut last_bin = vec![0; 16];
+    last_bin[(15 - BEFORE_END) as usize] = scene.cycles as usize;
+    // Strobed at STOP, the newest event is the one before it; HIT is clear again by the next true strobe.
+    let mut with_tail = last_bin.clone();
+    with_tail[(16 - TAIL) as usize] = scene.cycles as usize;
+    let nothing = vec![0; 16];
+    let start = scene.start;
+    for (channel, rises, counts, early) in [
+        ("borrow_hold", true_rises(Tap::Borrow), &last_bin, &last_bin),
+        ("borrow_wrap", true_rises(Tap::Borrow), &last_bin, &last_bin),
+        ("msb_wrap", both, &last_bin, &with_tail),
+        ("msb_hold", vec![], &nothing, &nothing),
+    ] {
+        let what = format!(
+            "{channel}, start {start}, {} laser cycles: LOCAL_STOP rises (ns)",
+            scene.cycles
+        );
+        checks.equal(
+            what,
+            listed(&rises),
+            listed(&bench.rises(seen, channel, scene)),
+        );
+        let found = bench.counts(seen, &format!("{channel}.metdc"), scene);
+        checks.equal(
+            format!("{channel}, start {start}: counted, bin by bin"),
+            numbers(counts),
+            numbers(&found),
+        );
+        let found = bench.counts(seen, &format!("{channel}.metdc_early"), scene);
+        let what = format!("{channel}, start {start}: counted where HIT is not in reset at STOP");
+        checks.equal(what, numbers(early), numbers(&found));
+    }
+    let arrival = at_reset + timing.local_stop_to_strobe;
+    checks.that(
+        "the false strobe comes while the sensor's HIT is still in reset, after STOP",
+        format!("before {}", timing.stop_to_hit_release),
+        arrival,
+        arrival + timing.removal < timing.stop_to_hit_release,
+    );
+}
+
+/// A laser cycle of 4800 CLK periods.
+fn repeated_capture(bench: &Bench, seen: &Recorder, checks: &mut Checks) {
+    let scene = &SLOW_LASER;
+    for (channel, tap, after_borrow) in CHANNELS {
+        let config = config(tap, after_borrow);
+        let timing = ChipTiming::of(&config);
+        let every = match (after_borrow, tap) {
+            (AfterBorrow::Hold, _) => i64::MAX,
+            (AfterBorrow::Wrap, Tap::Borrow) => ROUND,
+            (AfterBorrow::Wrap, Tap::Msb) => ROUND / 2,
+        };
+        let edges = (scene.start + 1..scene.stop_periods).step_by(every as usize);
+        let expected: Vec<Time> = edges
+            .map(|edge| bench.exposure.falling(edge) + timing.ripple())
+            .collect();
+        let found = bench.rises(seen, channel, scene);
+        let what = format!(
+            "{channel} at 80 kHz, start {}: LOCAL_STOP rises in a laser cycle (ns)",
+            scene.start
+        );
+        checks.equal(what, listed(&expected), listed(&found));
+        let counted = bench.counts(seen, &format!("{channel}.metdc"), scene);
+        let what = format!(
+            "{channel} at 80 kHz: counted of {} events, 1 of them in the window",
+            events(scene).len()
+        );
+        let expected = if after_borrow == AfterBorrow::Hold {
+            1
+        } else {
+            events(scene).len()
+        };
+        checks.equal(what, expected, counted.iter().sum());
+        let exposure = Exposure::new(&config, scene.stop_periods as u32, 1);
+        let law = match WindowLaw::new(&config, &exposure).window(scene.start as u16) {
+            Window::Open(_) => "one window".to_owned(),
+            Window::Irregular(why) => why.to_owned(),
+            other => format!("{other:?}"),
+        };
+        let expected = match after_borrow {
+            AfterBorrow::Hold => "one window",
+            AfterBorrow::Wrap => "LOCAL_STOP rises more than once in a laser cycle",
+        };
+        checks.equal(
+            format!("{channel} at 80 kHz: the window law says"),
+            expected,
+            &law,
+        );
+    }
+}
+
+/// The P-counter without memory: STOP every 512 CLK periods, and eight too many.
+fn coming_round(checks: &mut Checks) {
+    const CYCLES: u32 = 5;
+    let config = comparison::sensor(PCounter::Memoryless);
+    let round = u32::from(config.largest_start()) + 1;
+    for (stop_periods, starts) in [(round, [5u16, 300]), (round + 8, [5, 300])] {
+        let exposure = Exposure::new(&config, stop_periods, CYCLES);
+        for start in starts {
+            let mut gate =
+                GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[start], &[&[]]);
+            let pixel = "mp_r0_c0.p_counter";
+            let net = gate
+                .netlist()
+                .net(&format!("{pixel}.LOCAL_STOP"))
+                .expect("LOCAL_STOP");
+            let count = gate
+                .netlist()
+                .signal(&format!("{pixel}.COUNTER_OUT"))
+                .expect("COUNTER_OUT");
+            let mut recorder = Recorder::new(count.iter().copied().chain([net]));
+            gate.run(&mut recorder);
+            let origin = gate.schedule().origin;
+            let rises = recorder
+                .rising_edges(net)
+                .into_iter()
+                .filter(|&t| t > origin);
+            let ripple = ChipTiming::of(&config).ripple();
+            // CLK edge of its own laser cycle with which each came.
+            let edge = |t: Time| {
+                let edge = (0..)
+                    .find(|&k| exposure.falling(k) + ripple >= t - origin)
+                    .expect("endless");
+                edge % i64::from(stop_periods)
+            };
+            let found: Vec<usize> = rises.map(|t| edge(t) as usize).collect();
+            let falls =
+                (usize::from(start)..(CYCLES * stop_periods) as usize).step_by(round as usize);
+            let expected: Vec<usize> = falls.map(|fall| fall % stop_periods as usize).collect();
+            let what = format!(
+                "memoryless, STOP every {stop_periods}, start {start}: CLK fall of each LOCAL_STOP"
+            );
+            checks.equal(what, numbers(&expected), numbers(&found));
+            if stop_periods == round {
+                let last = recorder.number_at(&count, gate.schedule().end);
+                let what = format!(
+                    "memoryless, start {start}: count after the exposure, one step too many"
+                );
+                checks.equal(what, u64::from(start) - 1, last.unwrap_or(u64::MAX));
+            }
+        }
+    }
+}
+
+/// Times in nanoseconds, to the picosecond.
+fn listed(times: &[Time]) -> String {
+    let times: Vec<String> = times.iter().map(|t| format!("{:.3}", t.as_ns())).collect();
+    if times.is_empty() {
+        "none".to_owned()
+    } else {
+        times.join(" ")
+    }
+}
+
+fn numbers(numbers: &[usize]) -> String {
+    numbers
+        .iter()
+        .map(usize::to_string)
+        .collect::<Vec<_>>()
+        .join(" ")
+}

@@ -1,0 +1,178 @@
+//! Every variant of the P-counter, elaborated alone and driven at random, counts as its plain-Rust model does and
+//! raises LOCAL_STOP at the femtosecond that static timing says.
+
+mod bench;
+
+use bench::{Bench, SETTLING, corners};
+use guided_dtof::chip::p_counter::{self, starts_high};
+use guided_dtof::chip::{AfterBorrow, PCounter, SensorConfig, Tap};
+use guided_dtof::netlist::Corner;
+use guided_dtof::units::Time;
+use proptest::prelude::*;
+
+/// What is done to a P-counter.
+#[derive(Debug, Clone)]
+enum Action {
+    /// A new start value, with COUNTER_RESET held as the timing block holds it.
+    Load(u16),
+    /// A COUNTER_RESET pulse.
+    Reset,
+    /// Edges of COUNTER_CLK this many ps apart.
+    Clocks(u16, i64),
+}
+
+fn actions() -> impl Strategy<Value = Vec<Action>> {
+    let action = prop_oneof![
+        1 => any::<u16>().prop_map(Action::Load),
+        2 => Just(Action::Reset),
+        4 => (0u16..40, 300i64..3_000).prop_map(|(n, gap)| Action::Clocks(n, gap)),
+        1 => (0u16..3_000, 300i64..600).prop_map(|(n, gap)| Action::Clocks(n, gap)),
+    ];
+    prop::collection::vec(action, 1..12)
+}
+
+fn sensors() -> impl Strategy<Value = SensorConfig> {
+    let p_counter = prop::sample::select(PCounter::ALL.to_vec());
+    let tap = prop::sample::select(vec![Tap::Borrow, Tap::Msb]);
+    let after_borrow = prop::sample::select(vec![AfterBorrow::Hold, AfterBorrow::Wrap]);
+    let sensor = |(p_counter, tap, after_borrow, counter_bits, corner)| SensorConfig {
+        p_counter,
+        tap,
+        after_borrow,
+        counter_bits,
+        corner,
+        ..SensorConfig::default()
+    };
+    (p_counter, tap, after_borrow, 2usize..13, corners())
+        .prop_map(sensor)
+        .prop_filter("possible", |sensor| sensor.check().is_ok())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
+
+    /// Clock edges are closer together than the ripple is long, and resets come while it is under way: the pauses
+    /// before them are often shorter than it, too.
+    #[test]
+    fn count_by_count(
+        config in sensors(),
+        first in any::<u16>(),
+        actions in actions(),
+        pauses in prop::collection::vec(1i64..2_500, 12),
+    ) {
+        let mut bench = Bench::new(&p_counter::circuit(&config), config.corner);
+        bench.config = config.clone();
+        let timing = bench.timing();
+        let counter = timing.counter;
+        let pulse = timing.stop_to_reset_release - timing.stop_to_reset;
+        let has_memory = config.p_counter != PCounter::Memoryless;
+        // After a reset, how long until a count may come.
+        let ready = (counter.release + counter.recovery).max(counter.settle - pulse);
+        bench.drive(Time::ZERO, "MEMORY_RESET", true);
+        bench.drive(Time::ZERO, "COUNTER_RESET", true);
+        bench.drive(SETTLING, "MEMORY_RESET", false);
+        let mut now = SETTLING * 2;
+        let mut start = 0;
+        let mut model = p_counter::Model::new(&config, start);
+        // When LOCAL_STOP is to rise; a reset before that keeps it low.
+        let mut rises: Vec<Time> = Vec::new();
+        // A load may raise it in passing.
+        let mut loads = vec![Time::ZERO..now];
+        let reset_at = |rises: &mut Vec<Time>, time: Time| rises.retain(|&rise| rise < time || !has_memory);
+        for (action, pause) in std::iter::once(&Action::Load(first)).chain(&actions).zip(std::iter::once(&1).chain(&pauses)) {
+            match action {
+                Action::Load(value) => {
+                    start = value & config.largest_start();
+                    reset_at(&mut rises, now);
+                    bench.drive(now, "COUNTER_RESET", true);
+                    bench.number(now, "COUNTER_INIT", u64::from(start));
+                    bench.pulse(now + SETTLING, SETTLING, "MEMORY_LOAD");
+                    loads.push(now..now + SETTLING * 3);
+                    now += SETTLING * 3;
+                    bench.drive(now, "COUNTER_RESET", false);
+                    now += ready;
+                    model = p_counter::Model::new(&config, start);
+                }
+                Action::Reset => {
+                    // Where the reset itself may raise LOCAL_STOP, it must have settled.
+                    if starts_high(&config, start) {
+                        now += SETTLING;
+                    }
+                    reset_at(&mut rises, now);
+                    bench.pulse(now, pulse, "COUNTER_RESET");
+                    if model.reset() {
+                        rises.push(now + counter.reset_to_local_stop.unwrap());
+                    }
+                    now += pulse + ready;
+                }
+                Action::Clocks(edges, gap_ps) => {
+                    let gap = Time::from_ps(*gap_ps).max(counter.period);
+                    for _ in 0..*edges {
+                        // The timing block lets no edge through.
+                        if config.after_borrow == AfterBorrow::Hold && model.local_stop() {
+                            break;
+                        }
+                        if model.clock() {
+                            rises.push(now + counter.clk_to_local_stop);
+                        }
+                        bench.pulse(now, Time::from_fs(gap.as_fs() / 2), "COUNTER_CLK");
+                        now += gap;
+                    }
+                }
+            }
+            now += Time::from_ps(*pause);
+        }
+        let (out, local_stop) = (bench.bus("COUNTER_OUT"), bench.net("LOCAL_STOP"));
+        let mut run = bench.start(&["LOCAL_STOP"]);
+        let found = run.number_at(now + SETTLING, &out);
+        prop_assert_eq!(found, Some(model.counter_out()));
+        prop_assert_eq!(run.is_high_at(now + SETTLING, local_stop), Some(model.local_stop()));
+        let in_load = |t: &Time| loads.iter().any(|load| load.contains(t));
+        rises.retain(|t| !in_load(t));
+        let mut found = run.recorder.rising_edges(local_stop);
+        found.retain(|t| !in_load(t));
+        prop_assert_eq!(found, rises);
+    }
+}
+
+/// The sum of cell delays that the ripple is, beside what static timing finds on the netlist.
+#[test]
+fn the_ripple_is_the_sum_of_its_stages() {
+    use guided_dtof::logic::Logic::One;
+    use guided_dtof::netlist::{CellKind, Library};
+    for corner in Corner::ALL {
+        let library = Library::default();
+        let delay = |kind, pin| library.delay(kind, pin, One, corner);
+        let (custom, library_cell) = (delay(CellKind::Dffr, 1), delay(CellKind::Dffsr, 1));
+        let (mux, buffer) = (delay(CellKind::Mux2, 0), delay(CellKind::Buf, 0));
+        for (p_counter, borrow, msb) in [
+            (
+                PCounter::Ripple,
+                (custom + mux) * 9 + custom,
+                (custom + mux) * 9 + buffer,
+            ),
+            (
+                PCounter::SetReset,
+                library_cell * 9 + custom,
+                library_cell * 9 + buffer,
+            ),
+            (PCounter::Synchronous, custom, custom + mux + buffer),
+            (
+                PCounter::Memoryless,
+                library_cell * 9 + custom,
+                library_cell * 9 + buffer,
+            ),
+        ] {
+            for (tap, expected) in [(Tap::Borrow, borrow), (Tap::Msb, msb)] {
+                let config = SensorConfig {
+                    p_counter,
+                    tap,
+                    corner,
+                    ..SensorConfig::default()
+                };
+                let timing = p_counter::CounterTiming::of(&config, &library);
+                assert_eq!(timing.clk_to_local_stop, expected, "{p_counter:?} {tap:?}");
+            }
+        }
+    }
+}

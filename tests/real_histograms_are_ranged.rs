@@ -1,0 +1,165 @@
+//! `gdtof range` on histograms of a real sensor, and on made ones whose depths are known.
+//!
+//! The real captures are not part of the project. They are looked for in the folder that GDTOF_DATA names, or in
+//! `shared/data` beside the checkout; without them that test says so and is skipped.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn range(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_gdtof"))
+        .args(["range", "--format", "tmf8820"])
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+fn report(folder: &Path, arguments: &[&str]) -> serde_json::Value {
+    let output = range(folder, &[arguments, &["--json"]].concat());
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {error}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn rms_mm(report: &serde_json::Value, of: &str) -> f64 {
+    report[of]["rms_mm"].as_f64().unwrap()
+}
+
+/// Captures of a plane from 0.1 m to 0.5 m by two zones with 15 mm bins, a triangular pulse four bins
+/// wide that pile-up makes earlier by one bin for a million counts, and a sensor that is 20 mm short.
+fn made_captures() -> String {
+    let pulse = |at: f64, counts: f64| -> Vec<u32> {
+        let cdf = |x: f64| {
+            let x = (x / 4.0).clamp(0.0, 1.0);
+            if x < 0.5 {
+                2.0 * x * x
+            } else {
+                1.0 - 2.0 * (1.0 - x) * (1.0 - x)
+            }
+        };
+        let in_bin = |bin: usize| cdf(bin as f64 + 1.0 - at) - cdf(bin as f64 - at);
+        (0..64)
+            .map(|bin| (50.0 + counts * in_bin(bin)).round() as u32)
+            .collect()
+    };
+    let captures: Vec<serde_json::Value> = (0..41)
+        .map(|i| {
+            let depth_m = 0.1 + 0.01 * f64::from(i);
+            let reference = 5.0 + 0.003 * f64::from(i);
+            let zones = [1.0, 1.1].map(|stretch| {
+                let counts = 2e4 * stretch / (depth_m * depth_m);
+                pulse(
+                    reference + stretch * depth_m / 0.015 - counts * 1e-6,
+                    counts,
+                )
+            });
+            serde_json::json!({
+                "capture": i, "dist_to_plane_m": depth_m,
+                "reference_hist": pulse(reference, 1e5),
+                "hists": zones,
+                "on_chip_depths_mm": [1e3 * depth_m - 20.0, 1e3 * depth_m - 20.0],
+            })
+        })
+        .collect();
+    serde_json::to_string(&captures).unwrap()
+}
+
+#[test]
+fn made_histograms_give_their_depths_back() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("made.json"), made_captures()).unwrap();
+    for fit in ["even", "odd"] {
+        let report = report(folder.path(), &["--histograms", "made.json", "--fit", fit]);
+        assert!((rms_mm(&report, "sensor") - 20.0).abs() < 1e-6);
+        assert!(rms_mm(&report, "sensor_refitted") < 1e-6);
+        // Counts are taken as even within a bin, which a triangle's are not: some hundredths of 15 mm.
+        assert!(rms_mm(&report, "depths") < 0.5, "{fit}: {report:#}");
+    }
+}
+
+#[test]
+fn a_kept_calibration_gives_the_same_depths_and_foreign_ones_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    std::fs::write(file("made.json"), made_captures()).unwrap();
+    let made = ["--histograms", "made.json"];
+    let first = report(
+        folder.path(),
+        &[
+            &made[..],
+            &["--save-calibration", "cal.json", "--out", "odd.csv"],
+        ]
+        .concat(),
+    );
+    let again = report(
+        folder.path(),
+        &[
+            &made[..],
+            &["--calibration", "cal.json", "--out", "all.csv"],
+        ]
+        .concat(),
+    );
+    assert_eq!(first["calibration"], again["calibration"]);
+    let lines = |name| -> Vec<String> {
+        let text = std::fs::read_to_string(file(name)).unwrap();
+        text.lines().map(String::from).collect()
+    };
+    let all = lines("all.csv");
+    assert_eq!(all.len(), 1 + 41 * 2);
+    assert!(lines("odd.csv").iter().all(|line| all.contains(line)));
+
+    let refused = |arguments: &[&str], says: &str| {
+        let output = range(folder.path(), arguments);
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        assert!(
+            error.contains(says) && error.trim_end().lines().count() == 1,
+            "{error}"
+        );
+    };
+    let kept = std::fs::read_to_string(file("cal.json")).unwrap();
+    let mut calibration: serde_json::Value = serde_json::from_str(&kept).unwrap();
+    calibration["zones"].as_array_mut().unwrap().pop();
+    std::fs::write(file("one.json"), calibration.to_string()).unwrap();
+    refused(
+        &[&made[..], &["--calibration", "one.json"]].concat(),
+        "is for 1 zones, not 2",
+    );
+    refused(
+        &[&made[..], &["--calibration", "made.json"]].concat(),
+        "made.json:1",
+    );
+    refused(&["--histograms", "missing.json"], "missing.json");
+    refused(&["--histograms", "cal.json"], "cal.json:1");
+    std::fs::write(file("few.json"), "[]").unwrap();
+    refused(&["--histograms", "few.json"], "at least one");
+}
+
+#[test]
+fn depths_of_a_real_sensor_beat_its_own() {
+    let folder = std::env::var_os("GDTOF_DATA").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        PathBuf::from,
+    );
+    let captures = folder.join("tmf8820_even.json");
+    if !captures.exists() {
+        eprintln!(
+            "SKIPPED: {} is not there; set GDTOF_DATA",
+            captures.display()
+        );
+        return;
+    }
+    let here = tempfile::tempdir().unwrap();
+    for fit in ["even", "odd", "near", "far"] {
+        let captures = captures.to_str().unwrap();
+        let report = report(here.path(), &["--histograms", captures, "--fit", fit]);
+        let ours = rms_mm(&report, "depths");
+        assert!(report["reported"].as_u64().unwrap() > 300, "{report:#}");
+        assert!(ours < rms_mm(&report, "sensor"), "{fit}: {report:#}");
+        assert!(
+            ours < rms_mm(&report, "sensor_refitted"),
+            "{fit}: {report:#}"
+        );
+    }
+}

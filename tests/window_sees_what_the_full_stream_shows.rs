@@ -1,0 +1,288 @@
+//! The window engine draws only what a start value can see, and counts exactly what the whole photon stream gives: the
+//! same as its own pulse-driven side, and as the cycle engine.
+
+use guided_dtof::chip::window_law::{Window as LawWindow, WindowLaw};
+use guided_dtof::chip::{EventType, Exposure, Mode, Overflow, SensorConfig};
+use guided_dtof::engine::{
+    Cycle, Engine, LitPixel, Window, expose, expose_without_skipping, full_stream, stream_config,
+};
+use guided_dtof::photon::{
+    DeadTimeLaw, PhotonStream, PixelLight, PulseShape, SpadModel, StreamConfig,
+};
+use guided_dtof::ranging::PeakOptions;
+use guided_dtof::scene::Scene;
+use guided_dtof::system::{EngineKind, FrameSettings, take_frame};
+use guided_dtof::units::Time;
+use proptest::prelude::*;
+
+#[derive(Debug, Clone)]
+struct Case {
+    config: SensorConfig,
+    exposure: Exposure,
+    stream: StreamConfig,
+    pixel: LitPixel,
+}
+
+fn sensors() -> impl Strategy<Value = SensorConfig> {
+    let event_type = prop_oneof![
+        4 => Just((EventType::Greater, 0u8)),
+        1 => (1u8..4).prop_map(|t| (EventType::Greater, t)),
+        1 => (0u8..4).prop_map(|t| (EventType::Equal, t)),
+        1 => (0u8..4).prop_map(|t| (EventType::Less, t)),
+    ];
+    let mode = prop_oneof![4 => Just(Mode::Guided), 1 => Just(Mode::Conventional)];
+    (
+        (4usize..10, 1usize..33, 80f64..420.0),
+        (-0.9f64..0.9, event_type, mode),
+    )
+        .prop_map(
+            |((counter_bits, bins, clk_mhz), (phase, event, mode))| SensorConfig {
+                rows: 1,
+                cols: 1,
+                counter_bits,
+                bins,
+                clk_hz: clk_mhz * 1e6,
+                stop_phase_ps: phase * 0.5e6 / clk_mhz,
+                event_type: event.0,
+                threshold: event.1,
+                overflow: Overflow::Wrap,
+                mode,
+                ..SensorConfig::default()
+            },
+        )
+}
+
+fn spads() -> impl Strategy<Value = SpadModel> {
+    // From none at all to many windows.
+    let dead_time_fs = prop_oneof![
+        1 => Just(0i64),
+        2 => 1i64..3_000_000,
+        4 => 3_000_000i64..30_000_000,
+        1 => 30_000_000i64..400_000_000,
+    ];
+    let law =
+        prop_oneof![2 => Just(DeadTimeLaw::NonParalysable), 1 => Just(DeadTimeLaw::Paralysable)];
+    let secondaries = prop_oneof![
+        3 => Just((0.0, 0.0)),
+        1 => (0.0f64..0.5, Just(0.0)),
+        1 => (0.0f64..0.5, 0.0f64..0.5),
+    ];
+    (dead_time_fs, law, secondaries, 1i64..8_000_000).prop_map(
+        |(dead_time_fs, law, (afterpulse, crosstalk), time_fs)| SpadModel {
+            dead_time: Time::from_fs(dead_time_fs),
+            law,
+            afterpulse_probability: afterpulse,
+            afterpulse_time: Time::from_fs(time_fs),
+            crosstalk_probability: crosstalk,
+        },
+    )
+}
+
+/// `most_periods`: longest laser cycle, in CLK periods.
+fn cases(most_periods: u32) -> impl Strategy<Value = Case> {
+    let cycles = prop_oneof![3 => 1u32..40, 1 => 500u32..1100];
+    let rate_hz = prop_oneof![1 => Just(0.0), 3 => 1e5f64..2e7, 2 => 2e7f64..5e8];
+    let signal = prop_oneof![1 => Just(0.0), 3 => 0.01f64..3.0, 1 => 3.0f64..40.0];
+    (
+        (sensors(), spads()),
+        (2..most_periods, cycles),
+        (any::<u64>(), any::<u32>()),
+        (rate_hz, signal, -4f64..20.0),
+        (any::<u16>(), 0u8..4, any::<bool>()),
+    )
+        .prop_map(
+            |(
+                (config, spads),
+                (stop_periods, laser_cycles),
+                (seed, number),
+                (background_hz, signal_per_cycle, bins_off),
+                (start, choice, measured),
+            )| {
+                let exposure = Exposure::new(&config, stop_periods, laser_cycles);
+                // Small start values reach into the cycle before; large ones to its end.
+                let last = config.largest_start().min(stop_periods as u16 - 2);
+                let start = match choice {
+                    0 => start % 24,
+                    1 => last.saturating_sub(start % 4),
+                    _ => start % (last + 1),
+                };
+                let start = start.min(config.largest_start());
+                let clk_fs = 1e9 / config.clk_hz * 1e6;
+                // Mostly in the window.
+                let arrival_fs = (f64::from(start) - bins_off) * clk_fs;
+                let shape = PulseShape::new(Time::from_ps(700), &[0.0, 2.0, 1.0, 0.0]);
+                let stream = StreamConfig {
+                    spads,
+                    pulse_shape: measured.then(|| shape.unwrap()),
+                    ..stream_config(&config, &exposure, seed, Time::from_ps(1_500))
+                };
+                let light = Some(PixelLight {
+                    signal_per_cycle,
+                    arrival: Time::from_fs(arrival_fs as i64),
+                    background_hz,
+                });
+                let pixel = LitPixel {
+                    number,
+                    start,
+                    light,
+                };
+                Case {
+                    config,
+                    exposure,
+                    stream,
+                    pixel,
+                }
+            },
+        )
+}
+
+/// The histogram of the window engine, after comparing it with the whole stream on both fast engines.
+fn agreed(case: &Case) -> Option<Vec<u16>> {
+    let Case {
+        config,
+        exposure,
+        stream,
+        pixel,
+    } = case;
+    if let LawWindow::Race(_) = WindowLaw::new(config, exposure).window(pixel.start) {
+        return None;
+    }
+    let stream = PhotonStream::new(stream);
+    let window = Window::new(config, exposure);
+    let seen = window.expose(&stream, &[*pixel]).unwrap();
+    let all = full_stream(&window, &stream, &[*pixel]).unwrap();
+    assert_eq!(seen.histograms, all.histograms);
+    let cycle = full_stream(&Cycle::new(config, exposure), &stream, &[*pixel]).unwrap();
+    assert_eq!(seen.histograms, cycle.histograms);
+    Some(seen.histograms[0].clone())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 250, ..ProptestConfig::default() })]
+
+    #[test]
+    fn in_long_cycles(case in cases(700)) {
+        agreed(&case);
+    }
+
+    #[test]
+    fn in_cycles_as_short_as_the_window(case in cases(60)) {
+        agreed(&case);
+    }
+}
+
+fn frame() -> (SensorConfig, Exposure, PhotonStream, Vec<LitPixel>) {
+    let config = SensorConfig {
+        rows: 8,
+        cols: 8,
+        ..SensorConfig::default()
+    };
+    let exposure = Exposure::new(&config, 520, 1200);
+    let stream = PhotonStream::new(&stream_config(&config, &exposure, 3, Time::from_ps(1_900)));
+    let pixels = (0..64u16)
+        .map(|number| LitPixel {
+            number: u32::from(number),
+            start: number * 8,
+            light: (number % 7 != 0).then_some(PixelLight {
+                signal_per_cycle: 0.1,
+                arrival: config.clock().periods(i64::from(number) * 8 - 8),
+                background_hz: 8e6,
+            }),
+        })
+        .collect();
+    (config, exposure, stream, pixels)
+}
+
+#[test]
+fn threads_order_and_neighbours_change_nothing() {
+    let (config, exposure, stream, pixels) = frame();
+    let engine = Window::new(&config, &exposure);
+    let on = |threads: usize, pixels: &[LitPixel]| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| expose(&engine, &stream, pixels, |_| ()).unwrap())
+    };
+    let one = on(1, &pixels);
+    assert_eq!(one, on(4, &pixels));
+    let mut backwards = pixels.clone();
+    backwards.reverse();
+    let mut reversed = on(3, &backwards);
+    reversed.histograms.reverse();
+    assert_eq!(one, reversed);
+    let alone: Vec<_> = pixels
+        .iter()
+        .map(|pixel| on(1, &[*pixel]).histograms.remove(0))
+        .collect();
+    assert_eq!(one.histograms, alone);
+    let all = expose_without_skipping(&engine, &stream, &pixels, |_| ()).unwrap();
+    assert_eq!(one.histograms, all.histograms);
+}
+
+#[test]
+fn what_is_left_out_is_told() {
+    let (config, exposure, stream, mut pixels) = frame();
+    let short = Exposure {
+        stop_periods: 100,
+        ..exposure
+    };
+    let engine = Window::new(&config, &exposure);
+    let all = expose_without_skipping(&engine, &stream, &pixels, |_| ())
+        .unwrap()
+        .work;
+    let seen = expose(&engine, &stream, &pixels, |_| ()).unwrap().work;
+    assert_eq!((all.skipped_dark, seen.skipped_dark), (0, 10));
+    assert_eq!(all.clk_periods, 64 * 520 * 1200);
+    assert_eq!(all.clk_periods_visited, all.clk_periods);
+    assert_eq!(seen.clk_periods, all.clk_periods);
+    assert!(seen.clk_periods_visited * 50 < seen.clk_periods, "{seen:?}");
+    assert!(
+        seen.photons_drawn * 10 < all.photons_drawn,
+        "{seen:?} {all:?}"
+    );
+    assert!(seen.clk_periods_visited <= seen.pulses && seen.pulses < seen.photons_drawn);
+
+    // Start values beyond the laser cycle never open.
+    pixels.truncate(14);
+    let stream = PhotonStream::new(&stream_config(&config, &short, 3, Time::from_ps(1_900)));
+    let engine = Window::new(&config, &short);
+    let seen = expose(&engine, &stream, &pixels, |_| ()).unwrap();
+    assert_eq!((seen.work.skipped_dark, seen.work.skipped_closed), (2, 1));
+    assert!(seen.histograms[13].iter().all(|&n| n == 0));
+}
+
+#[test]
+fn a_frame_without_skipping_is_the_same_frame() {
+    let sensor = SensorConfig {
+        rows: 8,
+        cols: 8,
+        ..SensorConfig::default()
+    };
+    let take = |engine, skip| {
+        let settings = FrameSettings {
+            exposure: Exposure::new(&sensor, 520, 100),
+            sensor: sensor.clone(),
+            scene: Scene::outdoor(),
+            seed: 5,
+            engine,
+            skip,
+            peak: PeakOptions::default(),
+        };
+        take_frame(&settings, |_| Vec::new(), |_| ()).unwrap()
+    };
+    let frame = take(EngineKind::Window, true);
+    let skipped = frame
+        .pixels
+        .iter()
+        .filter(|pixel| pixel.start.is_none())
+        .count();
+    assert!(skipped > 0, "every macropixel has a guide");
+    assert_eq!(frame.work.skipped_dark, skipped as u64);
+    for (engine, skip) in [(EngineKind::Window, false), (EngineKind::Cycle, true)] {
+        let full = take(engine, skip);
+        assert_eq!(full.histograms, frame.histograms);
+        assert_eq!(full.pixels, frame.pixels);
+        assert!(full.work.photons_drawn > 5 * frame.work.photons_drawn);
+    }
+}
