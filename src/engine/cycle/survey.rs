@@ -202,12 +202,9 @@ impl Survey {
             (0..cell.kind.inputs().len())
                 .any(|pin| cell.kind.triggers(pin) && moves[cell.inputs[pin].index()])
         });
-        for net in 0..moves.len() {
-            if !moves[net] {
-                self.class[net] = self
-                    .shared_initial(NetId::new(net))
-                    .map_or(Class::Static, Class::Constant);
-            }
+        for (net, _) in moves.iter().enumerate().filter(|(_, moves)| !**moves) {
+            let shared = self.shared_initial(NetId::new(net));
+            self.class[net] = shared.map_or(Class::Static, Class::Constant);
         }
 
         // What constants make of gates, in as many rounds as it takes.
@@ -234,10 +231,7 @@ impl Survey {
         // What differs between macropixels: whatever the photons or a static net can make a difference to.
         let relevant: HashMap<FlatCellKey, [bool; MAX_INPUTS]> =
             cells.iter().map(|c| (key(c), self.relevant(c))).collect();
-        let mut differs = vec![false; moves.len()];
-        for net in 0..moves.len() {
-            differs[net] = self.class[net] == Class::Static;
-        }
+        let mut differs: Vec<bool> = self.class.iter().map(|&c| c == Class::Static).collect();
         for net in &spads {
             differs[net.index()] = true;
         }

@@ -160,16 +160,14 @@ pub fn run(tape: &PassTape, block: &mut Block, stream: &[Word], passes: &Passes<
                     trapped.get_or_insert(index);
                 }
                 let changed = step(action, words, &tape.taps, stream, period);
-                for direction in 0..2 {
-                    if changed[direction] {
-                        let ends =
-                            action.wakes[direction] as usize..action.wakes[direction + 1] as usize;
-                        for &next in &tape.wakes[ends] {
-                            pending[usize::from(next >> 6)] |= 1 << (next & 63);
-                        }
-                        if action.traps[direction] {
-                            trapped.get_or_insert(index);
-                        }
+                for (direction, _) in changed.iter().enumerate().filter(|(_, moved)| **moved) {
+                    let ends =
+                        action.wakes[direction] as usize..action.wakes[direction + 1] as usize;
+                    for &next in &tape.wakes[ends] {
+                        pending[usize::from(next >> 6)] |= 1 << (next & 63);
+                    }
+                    if action.traps[direction] {
+                        trapped.get_or_insert(index);
                     }
                 }
             }
