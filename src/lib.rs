@@ -8,6 +8,7 @@
 //! | module | what lives there |
 //! |---|---|
 //! | [`units`] | integer femtoseconds, exact clock frequencies, constants |
+//! | [`numerics`] | quadrature, special functions |
 //! | [`files`] | user's input with line numbers, output whole or not at all |
 //! | [`logic`] | four-valued logic |
 //! | [`netlist`] | cells, hierarchical builder, delays, Verilog |
@@ -19,6 +20,7 @@
 //! | [`scene`] | surfaces, optics, sunlight, ground truth |
 //! | [`guide`] | the stereo camera pair and its mapping onto macropixels |
 //! | [`ranging`] | depth from histograms |
+//! | [`theory`] | detection probability, precision |
 //! | [`report`] | pictures, arrays, tables |
 //! | [`system`] | one guided frame, end to end |
 //! | [`cli`] | the `gdtof` command |
@@ -47,10 +49,12 @@ pub mod guide;
 pub mod kernel;
 pub mod logic;
 pub mod netlist;
+pub mod numerics;
 pub mod photon;
 pub mod ranging;
 pub mod report;
 pub mod scene;
 pub mod system;
+pub mod theory;
 pub mod units;
 pub mod waves;

@@ -12,7 +12,7 @@ periods=520
 for tool in iverilog /usr/bin/time; do
     command -v $tool >/dev/null || { echo "$tool is not installed: nothing to compare with" >&2; exit 2; }
 done
-cargo build --release --quiet
+cargo build --release --quiet --bin gdtof
 figures=$(cargo bench --quiet --bench figures)
 gdtof=$PWD/target/release/gdtof
 lean=$PWD/benches/compare/lean_cells.v

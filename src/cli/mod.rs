@@ -3,6 +3,7 @@
 
 mod export;
 mod frame;
+mod pareto;
 mod range;
 mod replay;
 mod sdf;
@@ -40,6 +41,8 @@ enum Command {
     Range(range::RangeArgs),
     /// How fast the chip can be clocked: ripple, periods, margins.
     Timing(timing::TimingArgs),
+    /// Run time against error.
+    Pareto(pareto::ParetoArgs),
     /// Write the chip for other tools.
     #[command(subcommand)]
     Export(export::ExportCommand),
@@ -81,6 +84,7 @@ pub fn main() -> ExitCode {
         Command::Replay(args) => replay::run(&args),
         Command::Range(args) => range::run(&args),
         Command::Timing(args) => timing::run(&args),
+        Command::Pareto(args) => pareto::run(&args),
         Command::Export(command) => export::run(&command),
     };
     match result {
@@ -108,15 +112,10 @@ fn is_closed_pipe(error: &anyhow::Error) -> bool {
 
 fn is_bad_input(error: &anyhow::Error) -> bool {
     error.is::<InputError>()
-        || matches!(
-            error.downcast_ref(),
-            Some(EngineError::Race(_) | EngineError::Irregular(_))
-        )
-        || matches!(
-            error.downcast_ref(),
-            Some(
-                FrameError::Input(_)
-                    | FrameError::Engine(EngineError::Race(_) | EngineError::Irregular(_))
-            )
-        )
+        || matches!(error.downcast_ref::<EngineError>(), Some(e) if e.is_refusal())
+        || match error.downcast_ref() {
+            Some(FrameError::Input(_)) => true,
+            Some(FrameError::Engine(error)) => error.is_refusal(),
+            _ => false,
+        }
 }
