@@ -66,7 +66,7 @@ impl Bench {
         let mut kernel = Kernel::new(&netlist, &Timing::nominal(&netlist, &library, Corner::Typ));
         let local_stop = nets("LOCAL_STOP")[0];
         let mut recorder = Recorder::new([local_stop]);
-        let mut events = HardwareEvents::new(&netlist, &[""], ns(3));
+        let mut events = HardwareEvents::new(&netlist, &config, &[""], ns(3));
         let mut checks = TimingChecks::new(&netlist, &library, Corner::Typ)
             .policy(Policy::ReportOnly)
             .not_before(ns(20));

@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::{SensorArgs, say};
 use crate::chip::SensorConfig;
 use crate::chip::WindowLaw;
-use crate::engine::Work;
 use crate::engine::recording::check_exposure;
+use crate::engine::{CohortOptions, Work};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::guide::GuideMap;
 use crate::ranging::PeakOptions;
@@ -50,6 +50,9 @@ pub struct FrameArgs {
     /// Keep only the first N laser cycles in the waveforms of probes.
     #[arg(long, value_name = "N")]
     wave_cycles: Option<u32>,
+    /// Steps to a CLK period in which the cohort engine follows the dead time: more are finer and slower.
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=64))]
+    sub_bins: u8,
     /// Draw and run everything, also what the engine could leave out: same histograms, more work.
     #[arg(long)]
     no_skip: bool,
@@ -89,6 +92,10 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
         exposure,
         seed: args.seed,
         engine: args.engine,
+        cohort: CohortOptions {
+            sub_bins: args.sub_bins.into(),
+            ..CohortOptions::default()
+        },
         skip: !args.no_skip,
         peak: PeakOptions::default(),
     };

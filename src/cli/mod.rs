@@ -3,8 +3,10 @@
 
 mod export;
 mod frame;
+mod pareto;
 mod range;
 mod replay;
+mod reproduce;
 mod sdf;
 mod testbench;
 mod timing;
@@ -36,10 +38,14 @@ enum Command {
     Frame(frame::FrameArgs),
     /// Run recorded SPAD events through the chip.
     Replay(replay::ReplayArgs),
+    /// Print the thesis's figures, published beside computed.
+    Reproduce(reproduce::ReproduceArgs),
     /// Depths from a real sensor's histograms, beside its own.
     Range(range::RangeArgs),
     /// How fast the chip can be clocked: ripple, periods, margins.
     Timing(timing::TimingArgs),
+    /// Run time against error.
+    Pareto(pareto::ParetoArgs),
     /// Write the chip for other tools.
     #[command(subcommand)]
     Export(export::ExportCommand),
@@ -79,8 +85,10 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Frame(args) => frame::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::Reproduce(args) => reproduce::run(&args),
         Command::Range(args) => range::run(&args),
         Command::Timing(args) => timing::run(&args),
+        Command::Pareto(args) => pareto::run(&args),
         Command::Export(command) => export::run(&command),
     };
     match result {
@@ -108,15 +116,10 @@ fn is_closed_pipe(error: &anyhow::Error) -> bool {
 
 fn is_bad_input(error: &anyhow::Error) -> bool {
     error.is::<InputError>()
-        || matches!(
-            error.downcast_ref(),
-            Some(EngineError::Race(_) | EngineError::Irregular(_))
-        )
-        || matches!(
-            error.downcast_ref(),
-            Some(
-                FrameError::Input(_)
-                    | FrameError::Engine(EngineError::Race(_) | EngineError::Irregular(_))
-            )
-        )
+        || matches!(error.downcast_ref::<EngineError>(), Some(e) if e.is_refusal())
+        || match error.downcast_ref() {
+            Some(FrameError::Input(_)) => true,
+            Some(FrameError::Engine(error)) => error.is_refusal(),
+            _ => false,
+        }
 }

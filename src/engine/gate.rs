@@ -85,7 +85,12 @@ impl<'a> GateSimulation<'a> {
     /// A watch for hardware events in every macropixel, from the end of the power-up reset on, to run it with.
     pub fn hardware_events(&self) -> HardwareEvents {
         let paths = self.of_pixels(str::to_owned);
-        HardwareEvents::new(&self.netlist, &paths, self.schedule().reset_end)
+        HardwareEvents::new(
+            &self.netlist,
+            self.config,
+            &paths,
+            self.schedule().reset_end,
+        )
     }
 
     /// Simulates load and exposure to the end.

@@ -7,13 +7,14 @@
 //! | `pulses_cancelled` | a SPAD fires twice between two CLK edges: its toggle flip-flop is back where it was, both photons are lost |
 //!
 //! [`HardwareEvents`] is an observer, as timing checks are. A STOP edge that releases the reset too near a CLK edge is
-//! a violation of recovery or removal, and found by those.
+//! a violation of recovery or removal, and found by those. The first two are those of the default P-counter; other
+//! variants do other things, and are not judged.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::chip::SPADS;
+use crate::chip::{Mode, PCounter, SPADS, SensorConfig, Tap};
 use crate::kernel::Observer;
 use crate::logic::Logic;
 use crate::netlist::{NetId, Netlist};
@@ -150,12 +151,20 @@ pub struct HardwareEvents {
 }
 
 impl HardwareEvents {
-    /// Watches the macropixels at these paths below the top (an empty path: the top is one); nothing before
-    /// `not_before` is judged.
+    /// Watches the macropixels at these paths below the top (an empty path: the top is one) of a sensor with this
+    /// configuration; nothing before `not_before` is judged.
     ///
     /// # Panics
     /// When one of them is no macropixel.
-    pub fn new<S: AsRef<str>>(netlist: &Netlist, macropixels: &[S], not_before: Time) -> Self {
+    pub fn new<S: AsRef<str>>(
+        netlist: &Netlist,
+        config: &SensorConfig,
+        macropixels: &[S],
+        not_before: Time,
+    ) -> Self {
+        let judges_counts = config.p_counter == PCounter::Ripple
+            && config.tap == Tap::Borrow
+            && config.mode == Mode::Guided;
         let mut roles = vec![Vec::new(); netlist.net_count()];
         let mut pixels = Vec::new();
         for (index, path) in macropixels.iter().enumerate() {
@@ -172,14 +181,16 @@ impl HardwareEvents {
             let mut watch = |net: NetId, role| roles[net.index()].push((index as u32, role));
             watch(nets("CLK")[0], Role::Clk);
             watch(nets("PIXEL_CLEAR")[0], Role::PixelClear);
-            watch(nets("COUNTER_RESET")[0], Role::CounterReset);
-            watch(nets("COUNTER_CLK")[0], Role::CounterClk);
-            watch(nets("LOCAL_STOP")[0], Role::LocalStop);
-            for (bit, &net) in nets("p_counter.MEMORY").iter().enumerate() {
-                watch(net, Role::Memory(bit as u8));
-            }
-            for (bit, &net) in nets("p_counter.COUNTER_OUT").iter().enumerate() {
-                watch(net, Role::CounterOut(bit as u8));
+            if judges_counts {
+                watch(nets("COUNTER_RESET")[0], Role::CounterReset);
+                watch(nets("COUNTER_CLK")[0], Role::CounterClk);
+                watch(nets("LOCAL_STOP")[0], Role::LocalStop);
+                for (bit, &net) in nets("p_counter.MEMORY").iter().enumerate() {
+                    watch(net, Role::Memory(bit as u8));
+                }
+                for (bit, &net) in nets("p_counter.COUNTER_OUT").iter().enumerate() {
+                    watch(net, Role::CounterOut(bit as u8));
+                }
             }
             for spad in 0..SPADS {
                 let toggle = nets(&format!("front_end.spad_{spad}.TOGGLE"))[0];

@@ -34,38 +34,34 @@
 
 use std::collections::HashMap;
 
-use super::check_banks::{
-    Bank, CLOCK, CheckedPins, DATA, Data, FlipFlop, RESET, SET, banks, flip_flops,
-};
-use super::check_report::{BINS, CheckReport, CheckSummary, Place, Policy, Violation, slack_bin};
+use super::check_banks::{Bank, CheckedPins, FlipFlop, banks, flip_flops};
+use super::check_report::{BINS, CheckReport, CheckSummary, Place, Policy, Violation};
 use super::observer::Observer;
 use crate::logic::Logic;
 use crate::netlist::{
-    CellKind, CheckKind, Control, Corner, Edge, InstanceLimits, Library, NetId, Netlist, Timing,
+    CellKind, CheckKind, Corner, Edge, InstanceLimits, Library, NetId, Netlist, Timing,
 };
 use crate::units::Time;
 
-/// Violations that are kept one by one; further ones are only counted.
-const MOST_VIOLATIONS: usize = 100_000;
-
 /// No such event yet.
-const NEVER: i64 = i64::MIN;
+pub(super) const NEVER: i64 = i64::MIN;
 
 /// Pins of a flip-flop, in the library's order.
 const PINS: [&str; 4] = ["D", "CK", "R", "S"];
+
 /// What is known of one net.
 #[derive(Clone, Copy)]
-struct History {
-    rose_fs: i64,
-    fell_fs: i64,
+pub(super) struct History {
+    pub rose_fs: i64,
+    pub fell_fs: i64,
     /// Value before this instant and now, as a pin sees it.
-    settled: Logic,
-    now: Logic,
+    pub settled: Logic,
+    pub now: Logic,
 }
 
 impl History {
     /// The last possible change in one direction.
-    fn last(&self, edge: Edge) -> i64 {
+    pub(super) fn last(&self, edge: Edge) -> i64 {
         match edge {
             Edge::Rise => self.rose_fs,
             Edge::Fall => self.fell_fs,
@@ -73,7 +69,7 @@ impl History {
     }
 
     /// Direction of the last change.
-    fn last_edge(&self) -> Edge {
+    pub(super) fn last_edge(&self) -> Edge {
         match self.rose_fs > self.fell_fs {
             true => Edge::Rise,
             false => Edge::Fall,
@@ -82,45 +78,45 @@ impl History {
 }
 
 #[derive(Clone, Copy)]
-struct Found {
-    time_fs: i64,
-    slack_fs: i64,
-    flip_flop: u32,
-    kind: CheckKind,
-    pin: u8,
-    edge: Edge,
-    is_asynchronous: bool,
+pub(super) struct Found {
+    pub time_fs: i64,
+    pub slack_fs: i64,
+    pub flip_flop: u32,
+    pub kind: CheckKind,
+    pub pin: u8,
+    pub edge: Edge,
+    pub is_asynchronous: bool,
 }
 
 /// Judges every flip-flop of a netlist.
 pub struct TimingChecks {
-    policy: Policy,
-    corner: Corner,
-    not_before_fs: i64,
+    pub(super) policy: Policy,
+    pub(super) corner: Corner,
+    pub(super) not_before_fs: i64,
     /// Limits that occur: the library's of each kind, and those of single instances.
-    limits: Vec<InstanceLimits>,
-    nets: Vec<History>,
-    flip_flops: Vec<FlipFlop>,
-    banks: Vec<Bank>,
-    pins: CheckedPins,
-    now_fs: i64,
+    pub(super) limits: Vec<InstanceLimits>,
+    pub(super) nets: Vec<History>,
+    pub(super) flip_flops: Vec<FlipFlop>,
+    pub(super) banks: Vec<Bank>,
+    pub(super) pins: CheckedPins,
+    pub(super) now_fs: i64,
     /// Nets that changed in this instant.
-    touched: Vec<u32>,
+    pub(super) touched: Vec<u32>,
     /// Cells to be made unknown.
-    doubtful: Vec<u32>,
-    summaries: [Tally; CheckKind::ALL.len()],
-    found: Vec<Found>,
-    left_out: u64,
+    pub(super) doubtful: Vec<u32>,
+    pub(super) summaries: [Tally; CheckKind::ALL.len()],
+    pub(super) found: Vec<Found>,
+    pub(super) left_out: u64,
 }
 
 #[derive(Clone, Copy)]
-struct Tally {
-    checked: u64,
-    violated: u64,
-    asynchronous: u64,
-    asynchronous_violated: u64,
-    worst: Option<Found>,
-    histogram: [u64; BINS],
+pub(super) struct Tally {
+    pub checked: u64,
+    pub violated: u64,
+    pub asynchronous: u64,
+    pub asynchronous_violated: u64,
+    pub worst: Option<Found>,
+    pub histogram: [u64; BINS],
 }
 
 impl TimingChecks {
@@ -224,6 +220,9 @@ impl TimingChecks {
     /// What was found so far; `netlist` is the one that is checked.
     pub fn report(&mut self, netlist: &Netlist) -> CheckReport {
         self.complete();
+        // Within an instant in the order of the netlist.
+        self.found
+            .sort_by_key(|f| (f.time_fs, f.flip_flop, f.kind, f.pin));
         let path = |found: &Found| {
             let cell = self.flip_flops[found.flip_flop as usize].cell;
             netlist.cell_path(cell as usize)
@@ -245,13 +244,6 @@ impl TimingChecks {
                 histogram: tally.histogram.to_vec(),
             }
         });
-        // Within an instant in the order of the netlist.
-        self.found
-            .sort_by_key(|f| (f.time_fs, f.flip_flop, f.kind, f.pin));
-        let path = |found: &Found| {
-            let cell = self.flip_flops[found.flip_flop as usize].cell;
-            netlist.cell_path(cell as usize)
-        };
         let violations = self.found.iter().map(|found| Violation {
             kind: found.kind,
             cell: path(found),
@@ -274,243 +266,11 @@ impl TimingChecks {
             violations_left_out: self.left_out,
         }
     }
-
-    /// Judges the instant that has just ended.
-    fn complete(&mut self) {
-        if self.touched.is_empty() {
-            return;
-        }
-        let mut touched = std::mem::take(&mut self.touched);
-        // All histories first, so that the judgement sees the whole instant.
-        touched.retain(|&net| self.nets[net as usize].advance(self.now_fs));
-        for &net in &touched {
-            for position in self.pins.of(net as usize) {
-                let (index, pin) = self.pins.at(position);
-                if pin == DATA {
-                    self.unsettle(index);
-                }
-            }
-        }
-        if self.now_fs >= self.not_before_fs {
-            for &net in &touched {
-                for position in self.pins.of(net as usize) {
-                    match self.pins.at(position) {
-                        (flip_flop, DATA) => self.judge_data(flip_flop),
-                        (bank, pin) => self.judge_bank(bank as usize, pin),
-                    }
-                }
-            }
-        }
-        touched.clear();
-        self.touched = touched;
-    }
-
-    /// Puts a flip-flop whose D has changed on the list of those whose setup is judged.
-    #[inline]
-    fn unsettle(&mut self, index: u32) {
-        let flip_flop = &mut self.flip_flops[index as usize];
-        let bank = &mut self.banks[flip_flop.bank as usize];
-        match flip_flop.data {
-            Data::Recent => return,
-            Data::Settled => bank.settled -= 1,
-            Data::Still => {}
-        }
-        flip_flop.data = Data::Recent;
-        bank.recent.push(index);
-    }
-
-    /// Whether R or S holds the flip-flops of a bank.
-    #[inline]
-    fn is_held(&self, bank: &Bank) -> bool {
-        let is_high = |pin: usize| {
-            let net = self.nets.get(bank.nets[pin] as usize);
-            net.is_some_and(|net| net.now == Logic::One)
-        };
-        is_high(RESET) || is_high(SET)
-    }
-
-    /// Judges what a change of D has completed.
-    #[inline]
-    fn judge_data(&mut self, index: u32) {
-        let flip_flop = &self.flip_flops[index as usize];
-        let bank = flip_flop.bank as usize;
-        if self.is_held(&self.banks[bank]) {
-            return;
-        }
-        let edge = self.nets[flip_flop.nets[DATA] as usize].last_edge();
-        let clock = &self.nets[flip_flop.nets[CLOCK] as usize];
-        let since_fs = clock.rose_fs;
-        self.measure(bank, &[index], CheckKind::Hold, DATA, edge, since_fs);
-    }
-
-    /// Judges what the change of one pin other than D has completed.
-    #[inline]
-    fn judge_bank(&mut self, index: usize, pin: usize) {
-        let now_fs = self.now_fs;
-        if self.is_held(&self.banks[index]) {
-            return;
-        }
-        let nets = self.banks[index].nets;
-        let clock = self.nets[nets[CLOCK] as usize];
-        if pin != CLOCK {
-            let control = self.nets[nets[pin] as usize];
-            // A rise to X completes nothing.
-            if control.fell_fs != now_fs {
-                return;
-            }
-            if clock.rose_fs != now_fs {
-                self.measure_all(index, CheckKind::Removal, pin, Edge::Fall, clock.rose_fs);
-            }
-            let rose_fs = control.rose_fs;
-            self.measure_all(index, CheckKind::ControlHigh, pin, Edge::Fall, rose_fs);
-        } else if clock.rose_fs == now_fs {
-            self.judge_setup(index);
-            for control in [RESET, SET] {
-                if let Some(net) = self.nets.get(nets[control] as usize) {
-                    let fell_fs = net.fell_fs;
-                    self.measure_all(index, CheckKind::Recovery, control, Edge::Fall, fell_fs);
-                }
-            }
-            self.measure_all(index, CheckKind::ClockLow, CLOCK, Edge::Rise, clock.fell_fs);
-        } else {
-            self.measure_all(
-                index,
-                CheckKind::ClockHigh,
-                CLOCK,
-                Edge::Fall,
-                clock.rose_fs,
-            );
-        }
-    }
-
-    /// Judges the setup of a bank whose clock has risen.
-    #[inline]
-    fn judge_setup(&mut self, index: usize) {
-        let bank = &mut self.banks[index];
-        let (settled, is_asynchronous) = (bank.settled, bank.is_asynchronous);
-        let tally = &mut self.summaries[CheckKind::Setup as usize];
-        if is_asynchronous {
-            tally.asynchronous += settled;
-        } else {
-            tally.checked += settled;
-            tally.histogram[BINS - 1] += settled;
-        }
-        if bank.recent.is_empty() {
-            return;
-        }
-        let mut recent = std::mem::take(&mut bank.recent);
-        recent.retain(|&flip_flop| {
-            let data = self.nets[self.flip_flops[flip_flop as usize].nets[DATA] as usize];
-            let Some(edge) = self.edge_nearest_setup(flip_flop, data) else {
-                return true;
-            };
-            let since_fs = data.last(edge);
-            let of_one = &[flip_flop];
-            let slack_fs = self.measure(index, of_one, CheckKind::Setup, DATA, edge, since_fs);
-            let changes_now = data.last(data.last_edge()) == self.now_fs;
-            let is_recent = changes_now || slack_bin(slack_fs) < BINS - 1;
-            if !is_recent {
-                self.flip_flops[flip_flop as usize].data = Data::Settled;
-                self.banks[index].settled += 1;
-            }
-            is_recent
-        });
-        self.banks[index].recent = recent;
-    }
-
-    /// Which of the last rise and fall of D before this instant comes nearer to its setup limit.
-    #[inline]
-    fn edge_nearest_setup(&self, index: u32, data: History) -> Option<Edge> {
-        let limits = &self.limits[self.flip_flops[index as usize].limits as usize];
-        let limit = |edge| limits.at(Control::Reset, CheckKind::Setup, edge);
-        let before = |edge: &Edge| ![NEVER, self.now_fs].contains(&data.last(*edge));
-        let edges = Edge::BOTH.into_iter().filter(before);
-        edges.max_by_key(|&edge| data.last(edge) + i64::from(limit(edge)))
-    }
-
-    /// Judges one distance of every flip-flop of a bank.
-    #[inline]
-    fn measure_all(&mut self, bank: usize, kind: CheckKind, pin: usize, edge: Edge, since_fs: i64) {
-        let members = std::mem::take(&mut self.banks[bank].members);
-        self.measure(bank, &members, kind, pin, edge, since_fs);
-        self.banks[bank].members = members;
-    }
-
-    /// Judges one distance for some flip-flops of a bank: from `since_fs` to now, where `pin` changes or has changed
-    /// in the direction of `edge`. Returns its slack, fs.
-    #[inline]
-    fn measure(
-        &mut self,
-        bank: usize,
-        members: &[u32],
-        kind: CheckKind,
-        pin: usize,
-        edge: Edge,
-        since_fs: i64,
-    ) -> i64 {
-        if since_fs == NEVER {
-            return i64::MAX;
-        }
-        let bank = &self.banks[bank];
-        let control = match pin {
-            SET => Control::Set,
-            _ => Control::Reset,
-        };
-        let limit_fs = self.limits[bank.limits as usize].at(control, kind, edge);
-        let slack_fs = self.now_fs - since_fs - i64::from(limit_fs);
-        let is_asynchronous = bank.is_asynchronous && kind.concerns_data();
-        let tally = &mut self.summaries[kind as usize];
-        let count = members.len() as u64;
-        let found = Found {
-            time_fs: self.now_fs,
-            slack_fs,
-            flip_flop: members[0],
-            kind,
-            pin: pin as u8,
-            edge,
-            is_asynchronous,
-        };
-        if is_asynchronous {
-            tally.asynchronous += count;
-            tally.asynchronous_violated += count * u64::from(slack_fs < 0);
-        } else {
-            tally.checked += count;
-            tally.histogram[slack_bin(slack_fs)] += count;
-            // The first smallest; of one instant, the first in the netlist.
-            let rank = |f: &Found| (f.slack_fs, f.time_fs, f.flip_flop);
-            if tally.worst.is_none_or(|worst| rank(&found) < rank(&worst)) {
-                tally.worst = Some(found);
-            }
-        }
-        if slack_fs < 0 {
-            for &flip_flop in members {
-                self.violated(Found { flip_flop, ..found });
-            }
-        }
-        slack_fs
-    }
-
-    #[cold]
-    fn violated(&mut self, found: Found) {
-        if self.found.len() < MOST_VIOLATIONS {
-            self.found.push(found);
-        } else {
-            self.left_out += 1;
-        }
-        if found.is_asynchronous {
-            return;
-        }
-        self.summaries[found.kind as usize].violated += 1;
-        if self.policy == Policy::XOnViolation && found.kind.spoils_state() {
-            let cell = self.flip_flops[found.flip_flop as usize].cell;
-            self.doubtful.push(cell);
-        }
-    }
 }
 
 impl History {
     /// Ends an instant; returns whether the net has changed in it.
-    fn advance(&mut self, now_fs: i64) -> bool {
+    pub(super) fn advance(&mut self, now_fs: i64) -> bool {
         let (before, now) = (self.settled, self.now);
         self.settled = now;
         // Rank 0 < X < 1: every step up is a possible rise, every step down a possible fall.

@@ -3,6 +3,7 @@
 mod frame;
 mod result;
 mod speed;
+pub mod stability;
 
 pub use frame::{EngineKind, FrameError, FrameSettings, Probe, take_frame};
 pub use result::{Frame, PhaseTimes, PixelDepth, Summary};

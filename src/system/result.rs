@@ -85,7 +85,8 @@ pub struct Frame {
     pub load_time: Time,
     /// Time the chip exposes.
     pub exposure_time: Time,
-    /// Macropixels that were also run at gate level and agreed to the count.
+    /// Macropixels that were also run at gate level and agreed to the count, with the `window` engine on the same
+    /// photons where the frame's engine is `cohort`, which has none.
     pub probes: Vec<(usize, usize)>,
     /// What the simulation took.
     pub times: PhaseTimes,

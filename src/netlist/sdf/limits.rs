@@ -183,3 +183,169 @@ pub(super) fn checks_of(kind: CellKind, corners: [&InstanceLimits; 3]) -> Vec<Sd
     }
     checks
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{annotated, design, export, nominal};
+    use super::super::{Annotation, Sdf, SdfOptions, annotate};
+    use super::*;
+    use crate::netlist::Corner;
+
+    fn limits_of(body: &str, path: &str) -> (InstanceLimits, Annotation) {
+        let (netlist, timing, result) = annotated(body).unwrap();
+        let cell = netlist.cell(path).unwrap();
+        let kind = netlist.cells()[cell].kind;
+        (*timing.limits(cell, kind), result)
+    }
+
+    #[test]
+    fn limits_reach_the_instance_the_check_and_the_edge_they_are_for() {
+        use crate::netlist::CheckKind as Check;
+        let nominal = *nominal(&design(), Corner::Typ).limits(0, CellKind::Dffsr);
+        let body = |checks: &str| {
+            format!("(CELL (CELLTYPE \"DFFSR\") (INSTANCE u1/dffsr) (TIMINGCHECK {checks}))")
+        };
+        let given = [
+            (
+                "(SETUP D (posedge CK) (1:2:3))",
+                Check::Setup,
+                Control::Reset,
+                [2_000; 2],
+            ),
+            (
+                "(SETUP (negedge D) CK (7))",
+                Check::Setup,
+                Control::Reset,
+                [39_023, 7_000],
+            ),
+            (
+                "(HOLD (posedge D) (posedge CK) (7))",
+                Check::Hold,
+                Control::Reset,
+                [7_000, 12_511],
+            ),
+            (
+                "(SETUPHOLD D (posedge CK) () (4))",
+                Check::Hold,
+                Control::Reset,
+                [4_000; 2],
+            ),
+            (
+                "(SETUPHOLD D (posedge CK) (4) (-4))",
+                Check::Hold,
+                Control::Reset,
+                [0; 2],
+            ),
+            (
+                "(RECOVERY (negedge S) (posedge CK) (5))",
+                Check::Recovery,
+                Control::Set,
+                [5_000; 2],
+            ),
+            (
+                "(REMOVAL R (posedge CK) (6))",
+                Check::Removal,
+                Control::Reset,
+                [6_000; 2],
+            ),
+            (
+                "(RECREM S CK (6) (9))",
+                Check::Removal,
+                Control::Set,
+                [9_000; 2],
+            ),
+            (
+                "(WIDTH (posedge CK) (8))",
+                Check::ClockHigh,
+                Control::Reset,
+                [8_000; 2],
+            ),
+            (
+                "(WIDTH (negedge CK) (8))",
+                Check::ClockLow,
+                Control::Reset,
+                [8_000; 2],
+            ),
+            (
+                "(WIDTH S (8))",
+                Check::ControlHigh,
+                Control::Set,
+                [8_000; 2],
+            ),
+        ];
+        for (text, check, control, wanted) in given {
+            let (limits, result) = limits_of(&body(text), "u1.dffsr");
+            let found = Edge::BOTH.map(|edge| limits.at(control, check, edge));
+            assert_eq!((found, result.checks), (wanted, 1), "{text}");
+            assert_eq!(limits_of(&body(text), "u2.dffsr").0, nominal, "{text}");
+            let differing = [Control::Reset, Control::Set].iter().flat_map(|&control| {
+                let all = Check::ALL.iter().map(move |&check| (control, check));
+                all.filter(|&(control, check)| {
+                    let at = |limits: &InstanceLimits| {
+                        limits.at(control, check, Edge::Rise)
+                            ^ limits.at(control, check, Edge::Fall) << 16
+                    };
+                    at(&limits) != at(&nominal)
+                })
+            });
+            let alone = !text.contains("RECREM") && !text.contains("SETUPHOLD");
+            assert!(
+                !alone || differing.count() == 1,
+                "{text} changed other checks"
+            );
+        }
+        for text in [
+            "(SETUP D (negedge CK) (1))",
+            "(SETUP R (posedge CK) (1))",
+            "(RECOVERY (posedge R) (posedge CK) (1))",
+            "(WIDTH (negedge R) (1))",
+            "(WIDTH D (1))",
+        ] {
+            let (limits, result) = limits_of(&body(text), "u1.dffsr");
+            assert_eq!(
+                (limits, result.checks, result.notes.len()),
+                (nominal, 0, 1),
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn limits_written_are_read_back() {
+        let netlist = design();
+        let corners = Corner::ALL.map(|corner| {
+            let mut timing = nominal(&netlist, corner);
+            let cell = netlist.cell("u2.dffr").unwrap();
+            let mut limits = *timing.limits(cell, CellKind::Dffr);
+            for (i, check) in CheckKind::ALL.into_iter().enumerate() {
+                for edge in Edge::BOTH {
+                    // Only D's limits tell directions apart.
+                    let edge_fs = edge as u32 * u32::from(check.concerns_data());
+                    let fs = 1_000 * (i as u32 + 1) + 10 * corner as u32 + edge_fs;
+                    for control in [Control::Reset, Control::Set] {
+                        limits.set(control, check, edge, fs);
+                    }
+                }
+            }
+            timing.set_limits(cell, limits);
+            timing
+        });
+        let text = export(&netlist, corners.each_ref(), SdfOptions::default());
+        let sdf = Sdf::parse("a.sdf", &text).unwrap();
+        for (corner, wanted) in Corner::ALL.into_iter().zip(&corners) {
+            let mut timing = nominal(&netlist, Corner::Typ);
+            annotate(&mut timing, &netlist, &sdf, corner).unwrap();
+            for (cell, flat) in netlist.cells().iter().enumerate() {
+                if flat.kind.is_flip_flop() {
+                    let [found, wanted] = [&timing, wanted].map(|t| exported(t, cell, flat.kind));
+                    assert_eq!(found, wanted, "{}", netlist.cell_path(cell));
+                }
+            }
+        }
+    }
+
+    /// What a file says of a flip-flop: nothing of S where it has none.
+    fn exported(timing: &Timing, cell: usize, kind: CellKind) -> Vec<SdfCheck<'static>> {
+        checks_of(kind, [timing.limits(cell, kind); 3])
+    }
+}
