@@ -268,6 +268,7 @@ fn a_frame_without_skipping_is_the_same_frame() {
             engine,
             skip,
             peak: PeakOptions::default(),
+            cohort: Default::default(),
         };
         take_frame(&settings, |_| Vec::new(), |_| ()).unwrap()
     };
