@@ -148,8 +148,8 @@ impl Planner<'_> {
         let photons = (light.background_hz * window_s + light.signal_per_cycle)
             * f64::from(self.stream.laser_cycles);
         let mut coarse = self.depth_m(0, pixel);
-        for steps in 0..STEPS.len() - 1 {
-            let step_cost = (self.bins * STEPS[steps]) as f64 * PHOTONS_PER_STEP;
+        for (steps, per_period) in STEPS.iter().enumerate().take(STEPS.len() - 1) {
+            let step_cost = (self.bins * per_period) as f64 * PHOTONS_PER_STEP;
             if step_cost >= photons {
                 return exact;
             }
