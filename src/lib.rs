@@ -20,9 +20,10 @@
 //! | [`scene`] | surfaces, optics, sunlight, ground truth |
 //! | [`guide`] | the stereo camera pair and its mapping onto macropixels |
 //! | [`ranging`] | depth from histograms |
-//! | [`theory`] | detection probability, precision |
+//! | [`theory`] | detection probability, precision, partial histograms, design |
 //! | [`report`] | pictures, arrays, tables |
 //! | [`system`] | one guided frame, end to end |
+//! | [`reproduce`] | the thesis's figures, published beside computed |
 //! | [`cli`] | the `gdtof` command |
 //!
 //! One macropixel at gate level:
@@ -53,6 +54,7 @@ pub mod numerics;
 pub mod photon;
 pub mod ranging;
 pub mod report;
+pub mod reproduce;
 pub mod scene;
 pub mod system;
 pub mod theory;

@@ -148,23 +148,22 @@ impl Case<'_> {
                 },
             )
             .reduce(|| empty.clone(), Moments::merge);
-        let bins = expected.len();
         let saturates = expected
             .iter()
             .any(|mean| mean + 6.0 * mean.sqrt() > (1u32 << self.sensor.bin_bits).into());
         let (mut worst, mut relative) = (0.0f64, 0.0f64);
-        for i in 0..bins {
+        for (i, &expected) in expected.iter().enumerate() {
             let variance = by_photons.covariance(i, i);
             let exact = variance == 0.0 && by_photons.mean(i) == drawn.mean(i);
             let error = (variance / by_photons.n + drawn.covariance(i, i) / drawn.n).sqrt();
             let difference = drawn.mean(i) - by_photons.mean(i);
             let z = if exact { 0.0 } else { difference / error };
-            let own = (drawn.mean(i) - expected[i]) / (drawn.covariance(i, i) / drawn.n).sqrt();
+            let own = (drawn.mean(i) - expected) / (drawn.covariance(i, i) / drawn.n).sqrt();
             worst = worst.max(z.abs());
             if !saturates && !exact {
                 worst = worst.max(own.abs());
             }
-            relative = relative.max((by_photons.mean(i) / expected[i] - 1.0).abs());
+            relative = relative.max((by_photons.mean(i) / expected - 1.0).abs());
             for j in 0..=i {
                 let (a, b) = (by_photons.covariance(i, j), drawn.covariance(i, j));
                 // Of nearly Gaussian counts.

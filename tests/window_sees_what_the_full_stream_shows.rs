@@ -266,8 +266,10 @@ fn a_frame_without_skipping_is_the_same_frame() {
             scene: Scene::outdoor(),
             seed: 5,
             engine,
+            tolerance_m: None,
             skip,
             peak: PeakOptions::default(),
+            cohort: Default::default(),
         };
         take_frame(&settings, |_| Vec::new(), |_| ()).unwrap()
     };

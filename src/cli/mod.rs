@@ -6,6 +6,7 @@ mod frame;
 mod pareto;
 mod range;
 mod replay;
+mod reproduce;
 mod sdf;
 mod testbench;
 mod timing;
@@ -37,6 +38,8 @@ enum Command {
     Frame(frame::FrameArgs),
     /// Run recorded SPAD events through the chip.
     Replay(replay::ReplayArgs),
+    /// Print the thesis's figures, published beside computed.
+    Reproduce(reproduce::ReproduceArgs),
     /// Depths from a real sensor's histograms, beside its own.
     Range(range::RangeArgs),
     /// How fast the chip can be clocked: ripple, periods, margins.
@@ -82,6 +85,7 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Frame(args) => frame::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::Reproduce(args) => reproduce::run(&args),
         Command::Range(args) => range::run(&args),
         Command::Timing(args) => timing::run(&args),
         Command::Pareto(args) => pareto::run(&args),

@@ -3,13 +3,14 @@
 //! | engine | what it simulates | held to |
 //! |---|---|---|
 //! | [`Gate`] | every net of the netlist, with its delays | Icarus Verilog on the exported netlist |
-//! | [`Cycle`] | every CLK period, through the blocks' reference models | `Gate` |
+//! | [`Cycle`] | every CLK period of the levelised netlist, 512 macropixels to a word | `Gate` |
 //! | [`Window`] | only the CLK periods a start value can see, through the window law | `Cycle` |
 //! | [`Cohort`] | no photons: laser cycles in the same state move together | `Window`, in distribution |
 //!
 //! The first three take the same start value and SPAD pulses and give the same histogram. `Cycle` and `Window` assume what
-//! the window law can promise, and refuse a configuration in which two signals race. `Window` also refuses a
-//! P-counter that raises LOCAL_STOP more than once in a laser cycle.
+//! the window law can promise, and refuse a configuration in which two signals race. The macropixel's
+//! plain-Rust reference model ([`crate::chip::macropixel::Model`]) is the tests' slow judge of all of them. `Window`
+//! also refuses a P-counter that raises LOCAL_STOP more than once in a laser cycle.
 
 pub mod cohort;
 mod cycle;
@@ -26,7 +27,7 @@ pub mod waveform;
 mod window;
 
 pub use cohort::{Cohort, CohortOptions};
-pub use cycle::Cycle;
+pub use cycle::{Cycle, PackedPulses, Unlevelled};
 pub use gate::{Gate, GateSimulation};
 pub use hardware_events::{HardwareEvent, HardwareEventKind, HardwareEventReport, HardwareEvents};
 pub use lanes::LaneSimulation;

@@ -12,6 +12,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::result::{Frame, PhaseTimes, PixelDepth};
+use super::tolerance::Tolerance;
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::engine::waveform::{self, View};
 use crate::engine::{
@@ -84,6 +85,9 @@ pub struct FrameSettings {
     pub engine: EngineKind,
     /// Knobs of the cohort engine.
     pub cohort: CohortOptions,
+    /// Depth error that a cheaper engine may add on average, m: each macropixel gets the cheapest that keeps it, whatever
+    /// `engine` says.
+    pub tolerance_m: Option<f64>,
     /// Leave out what the engine can do without; `false` draws and runs everything, for the same histograms.
     pub skip: bool,
     /// Depth from histograms.
@@ -149,6 +153,7 @@ pub fn take_frame(
         seed,
         engine: engine_kind,
         cohort,
+        tolerance_m,
         skip,
         peak,
     } = settings;
@@ -209,10 +214,22 @@ pub fn take_frame(
         EngineKind::Cohort => Box::new(Cohort::new(sensor, exposure, *cohort)),
         kind => kind.build(sensor, exposure),
     };
-    let exposed = if *skip {
-        expose(&*engine, &stream, &pixels, exposed)?
-    } else {
-        expose_without_skipping(&*engine, &stream, &pixels, exposed)?
+    let (exposed, kept) = match (tolerance_m, skip) {
+        (&Some(tolerance_m), _) => {
+            let tolerance = Tolerance {
+                tolerance_m,
+                config: sensor,
+                exposure,
+                peak,
+            };
+            let (exposed, kept) = tolerance.expose(&stream, &pixels, exposed)?;
+            (exposed, Some(kept))
+        }
+        (None, true) => (expose(&*engine, &stream, &pixels, exposed)?, None),
+        (None, false) => {
+            let exposed = expose_without_skipping(&*engine, &stream, &pixels, exposed)?;
+            (exposed, None)
+        }
     };
     times.exposure_s = clock.lap();
 
@@ -229,7 +246,7 @@ pub fn take_frame(
         let gate = run_probe(sensor, exposure, probe, start, &events)?;
         // The cohort engine has no photons to agree on: the probe compares with the engine that it follows.
         let (engine, model) = match engine_kind {
-            EngineKind::Cohort => {
+            kind if kept.is_some() || *kind == EngineKind::Cohort => {
                 let model = Window::new(sensor, exposure).histogram(start, &events)?;
                 (EngineKind::Window, model)
             }
@@ -283,6 +300,7 @@ pub fn take_frame(
         pixels: depths,
         photons_expected,
         work: exposed.work,
+        kept,
         load_bits: sensor.load_bits(),
         load_time: load.duration,
         exposure_time: exposure.end(),

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::tolerance::Kept;
 use crate::engine::Work;
 use crate::units::Time;
 
@@ -79,6 +80,8 @@ pub struct Frame {
     pub photons_expected: f64,
     /// What the engine did, and did not have to do.
     pub work: Work,
+    /// Engines chosen by a depth tolerance, and the bound they keep.
+    pub kept: Option<Kept>,
     /// Bits of the serial load.
     pub load_bits: usize,
     /// Time the chip needs for the load.
@@ -191,6 +194,7 @@ mod tests {
             ],
             photons_expected: 0.0,
             work: Work::default(),
+            kept: None,
             load_bits: 36,
             load_time: Time::ZERO,
             exposure_time: Time::ZERO,

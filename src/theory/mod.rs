@@ -1,10 +1,14 @@
-//! Chapter 3 of the thesis: how often the echo is found, and how precisely.
+//! Chapter 3 of the thesis: how often the echo is found, how precisely, with how many bins, and what follows for a
+//! design.
 
+pub mod capacity;
 mod counts;
 mod cycles;
+pub mod design;
 pub mod detection;
 pub mod estimators;
 mod gaussian;
+pub mod partial;
 pub mod precision;
 mod pulse;
 
