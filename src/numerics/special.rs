@@ -9,7 +9,16 @@ pub fn normal_density(z: f64) -> f64 {
 
 /// P(Z > z) of the standard normal distribution, with relative accuracy in the upper tail.
 pub fn normal_above(z: f64) -> f64 {
-    0.5 * libm::erfc(z * FRAC_1_SQRT_2)
+    if z < 1.0 {
+        return 0.5 * libm::erfc(z * FRAC_1_SQRT_2);
+    }
+    if z > 40.0 {
+        return 0.0; // below the smallest number
+    }
+    // erfc alone would magnify the rounding of z/√2 by z².
+    let square = z * z;
+    let lost = z.mul_add(z, -square);
+    0.5 * (-0.5 * square).exp() * (1.0 - 0.5 * lost) * erfcx(z * FRAC_1_SQRT_2)
 }
 
 /// ln P(Z < z), with relative accuracy where the probability is near 1 and where it is near 0.
@@ -139,6 +148,7 @@ mod tests {
         near(erfcx(1e6), 5.641_895_835_474_742e-7);
         near(ln_normal_below(-40.0), -804.608_442_013_753_8);
         near(ln_normal_below(9.0), -1.128_588_405_953_840_6e-19);
+        assert_eq!(normal_above(1e300), 0.0);
     }
 
     #[test]
