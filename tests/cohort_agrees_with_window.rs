@@ -346,7 +346,7 @@ fn windows_at_both_ends_and_in_the_conventional_mode() {
 fn counters_saturate_and_wrap_alike() {
     for overflow in [Overflow::Saturate, Overflow::Wrap] {
         let sensor = SensorConfig {
-            bin_bits: 3,
+            bin_bits: 4,
             overflow,
             ..SensorConfig::default()
         };

@@ -228,10 +228,13 @@ impl Survey {
             }
         }
 
-        // What differs between macropixels: whatever the photons or a static net can make a difference to.
+        // What differs between macropixels: whatever starts differently, and whatever photons or such a net can make a
+        // difference to.
         let relevant: HashMap<FlatCellKey, [bool; MAX_INPUTS]> =
             cells.iter().map(|c| (key(c), self.relevant(c))).collect();
-        let mut differs: Vec<bool> = self.class.iter().map(|&c| c == Class::Static).collect();
+        let mut differs: Vec<bool> = (0..moves.len())
+            .map(|net| self.shared_initial(NetId::new(net)).is_none())
+            .collect();
         for net in &spads {
             differs[net.index()] = true;
         }
