@@ -8,6 +8,7 @@ mod range;
 mod replay;
 mod reproduce;
 mod sdf;
+mod speed;
 mod testbench;
 mod timing;
 
@@ -42,6 +43,8 @@ enum Command {
     Reproduce(reproduce::ReproduceArgs),
     /// Depths from a real sensor's histograms, beside its own.
     Range(range::RangeArgs),
+    /// How fast the fast engines are, by size of the array and threads, and the memory they take.
+    Speed(speed::SpeedArgs),
     /// How fast the chip can be clocked: ripple, periods, margins.
     Timing(timing::TimingArgs),
     /// Run time against error.
@@ -87,6 +90,7 @@ pub fn main() -> ExitCode {
         Command::Replay(args) => replay::run(&args),
         Command::Reproduce(args) => reproduce::run(&args),
         Command::Range(args) => range::run(&args),
+        Command::Speed(args) => speed::run(&args),
         Command::Timing(args) => timing::run(&args),
         Command::Pareto(args) => pareto::run(&args),
         Command::Export(command) => export::run(&command),

@@ -56,8 +56,7 @@ impl Tap {
     /// Its value just before rising edge `period` of the chunk.
     #[inline(always)]
     pub fn read(&self, words: &[Word], period: isize) -> Word {
-        let invert = self.invert;
-        words[self.place.wrapping_add_signed(period)].map(|bits| bits ^ invert)
+        words[self.place.wrapping_add_signed(period)] ^ self.invert
     }
 }
 
@@ -295,56 +294,32 @@ fn run(ops: &[Op], words: &mut [Word]) {
         let [a, b, c] = op.inputs.map(|place| &words[place as usize..][..PERIODS]);
         let [out, carry] = op.out.map(|place| &words[place as usize..][..PERIODS]);
         let [ia, ib, ic] = op.invert;
-        match op.kind {
-            Kind::And => {
-                for t in 0..PERIODS {
-                    out[t].set(a[t].get().map2(b[t].get(), |a, b| (a ^ ia) & (b ^ ib)));
+        for t in 0..PERIODS {
+            let (a, b) = (a[t].get(), b[t].get());
+            match op.kind {
+                Kind::And => out[t].set((a ^ ia) & (b ^ ib)),
+                Kind::Xor => out[t].set(a ^ b),
+                Kind::HalfAdder => {
+                    out[t].set(a ^ b);
+                    carry[t].set(a & b);
                 }
-            }
-            Kind::Xor => {
-                for t in 0..PERIODS {
-                    out[t].set(a[t].get().map2(b[t].get(), |a, b| a ^ b));
+                Kind::Xor3 => out[t].set(a ^ b ^ c[t].get()),
+                Kind::Majority => {
+                    let (a, b, c) = (a ^ ia, b ^ ib, c[t].get() ^ ic);
+                    out[t].set((a & b) | (a & c) | (b & c));
                 }
-            }
-            Kind::HalfAdder => {
-                for t in 0..PERIODS {
-                    let (a, b) = (a[t].get(), b[t].get());
-                    out[t].set(a.map2(b, |a, b| a ^ b));
-                    carry[t].set(a.map2(b, |a, b| a & b));
+                Kind::FullAdder => {
+                    let c = c[t].get();
+                    out[t].set(a ^ b ^ c);
+                    carry[t].set((a & b) | (a & c) | (b & c));
                 }
-            }
-            Kind::Xor3 => {
-                for t in 0..PERIODS {
-                    out[t].set(a[t].get().map3(b[t].get(), c[t].get(), |a, b, c| a ^ b ^ c));
+                Kind::Mux => {
+                    let select = c[t].get();
+                    out[t].set(((a ^ ia) & !select) | ((b ^ ib) & select));
                 }
-            }
-            Kind::Majority => {
-                for t in 0..PERIODS {
-                    let majority = |a: u64, b: u64, c: u64| {
-                        let (a, b, c) = (a ^ ia, b ^ ib, c ^ ic);
-                        a & b | a & c | b & c
-                    };
-                    out[t].set(a[t].get().map3(b[t].get(), c[t].get(), majority));
-                }
-            }
-            Kind::FullAdder => {
-                for t in 0..PERIODS {
-                    let (a, b, c) = (a[t].get(), b[t].get(), c[t].get());
-                    out[t].set(a.map3(b, c, |a, b, c| a ^ b ^ c));
-                    carry[t].set(a.map3(b, c, |a, b, c| a & b | a & c | b & c));
-                }
-            }
-            Kind::Mux => {
-                for t in 0..PERIODS {
-                    let choose = |a: u64, b: u64, s: u64| (a ^ ia) & !s | (b ^ ib) & s;
-                    out[t].set(a[t].get().map3(b[t].get(), c[t].get(), choose));
-                }
-            }
-            Kind::Toggle => {
-                let mut state = words[op.out[0] as usize - 1].get();
-                for t in 0..PERIODS {
-                    state = state.map2(a[t].get(), |state, pulse| state ^ pulse);
-                    out[t].set(state);
+                Kind::Toggle => {
+                    let state = words[op.out[0] as usize + t - 1].get();
+                    out[t].set(state ^ a);
                 }
             }
         }

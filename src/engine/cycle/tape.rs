@@ -189,35 +189,29 @@ fn step(
     let old = words[usize::from(action.out)];
     let new = match action.code {
         Code::Set(value) => Word::all(value),
-        Code::And => words[a].map2(words[b], |a, b| ((a ^ ia) & (b ^ ib)) ^ io),
-        Code::Xor => words[a].map2(words[b], |a, b| a ^ b ^ io),
-        Code::Mux => words[a].map3(words[b], words[c], |a, b, s| {
-            let s = s ^ ic;
-            (((a ^ ia) & !s) | ((b ^ ib) & s)) ^ io
-        }),
-        Code::Toggle => old.map3(words[b], words[c], |q, edge, reset| {
-            q ^ edge & !(reset ^ ic)
-        }),
-        Code::Async => old.map3(words[c], words[d], |q, reset, set| {
-            (q | (set ^ id)) & !(reset ^ ic)
-        }),
+        Code::And => ((words[a] ^ ia) & (words[b] ^ ib)) ^ io,
+        Code::Xor => words[a] ^ words[b] ^ io,
+        Code::Mux => {
+            let select = words[c] ^ ic;
+            (((words[a] ^ ia) & !select) | ((words[b] ^ ib) & select)) ^ io
+        }
+        Code::Toggle => old ^ (words[b] & !(words[c] ^ ic)),
+        Code::Async => (old | (words[d] ^ id)) & !(words[c] ^ ic),
         Code::FlipFlop | Code::Sampler { .. } => {
             let data = match action.code {
                 Code::Sampler { tap, offset } => {
                     taps[usize::from(tap)].read(stream, period + isize::from(offset))
                 }
-                _ => words[a].map(|bits| bits ^ ia),
+                _ => words[a] ^ ia,
             };
-            let edge = words[b].map3(words[c], words[d], |edge, reset, set| {
-                edge & !(reset ^ ic) & !(set ^ id)
-            });
-            old.map3(edge, data, |q, edge, data| q & !edge | data & edge)
+            let edge = words[b] & !(words[c] ^ ic) & !(words[d] ^ id);
+            (old & !edge) | (data & edge)
         }
     };
     let [rising, falling] = action.directions;
-    let rise = new.map2(old, |new, old| new & !old & rising);
-    let fall = new.map2(old, |new, old| !new & old & falling);
-    words[usize::from(action.out)] = old.map3(rise, fall, |old, rise, fall| (old | rise) & !fall);
+    let rise = new & !old & rising;
+    let fall = !new & old & falling;
+    words[usize::from(action.out)] = (old | rise) & !fall;
     words[usize::from(action.masks[0])] = rise;
     words[usize::from(action.masks[1])] = fall;
     [rise.any(), fall.any()]
@@ -228,6 +222,5 @@ fn step(
 fn counts(action: &Action, words: &[Word]) -> bool {
     let [_, edge, reset, _] = action.inputs.map(|place| words[usize::from(place)]);
     let inverted = action.invert[2];
-    edge.map2(reset, |edge, reset| edge & !(reset ^ inverted))
-        .any()
+    (edge & !(reset ^ inverted)).any()
 }

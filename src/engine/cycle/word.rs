@@ -1,7 +1,11 @@
 //! One bit of 512 macropixels.
 //!
 //! Plain arrays and loops that the compiler turns into the widest vectors it may use; the tapes' inner loops are
-//! compiled once for each vector extension and chosen when the program runs.
+//! compiled once for each vector extension and chosen when the program runs. Operators and not functions of
+//! closures: a closure belongs to the vector extension of the loop it is written in, and cannot be inlined
+//! into a function that does not.
+
+use std::ops::{BitAnd, BitOr, BitXor, Not};
 
 /// Macropixels in a word, and in a block of them.
 pub const WORD_LANES: usize = 512;
@@ -19,24 +23,6 @@ impl Word {
     /// The same value in every lane.
     pub const fn all(value: bool) -> Self {
         Word([if value { u64::MAX } else { 0 }; PARTS])
-    }
-
-    /// Applies a bitwise function.
-    #[inline(always)]
-    pub fn map(self, f: impl Fn(u64) -> u64) -> Self {
-        Word(std::array::from_fn(|i| f(self.0[i])))
-    }
-
-    /// Applies a bitwise function of two.
-    #[inline(always)]
-    pub fn map2(self, b: Self, f: impl Fn(u64, u64) -> u64) -> Self {
-        Word(std::array::from_fn(|i| f(self.0[i], b.0[i])))
-    }
-
-    /// Applies a bitwise function of three.
-    #[inline(always)]
-    pub fn map3(self, b: Self, c: Self, f: impl Fn(u64, u64, u64) -> u64) -> Self {
-        Word(std::array::from_fn(|i| f(self.0[i], b.0[i], c.0[i])))
     }
 
     /// Whether any lane is 1.
@@ -59,6 +45,76 @@ impl Word {
     #[inline(always)]
     pub fn flip(&mut self, lane: usize) {
         self.0[lane / 64] ^= 1 << (lane % 64);
+    }
+}
+
+impl BitAnd for Word {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitand(mut self, other: Self) -> Self {
+        for i in 0..PARTS {
+            self.0[i] &= other.0[i];
+        }
+        self
+    }
+}
+
+impl BitOr for Word {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitor(mut self, other: Self) -> Self {
+        for i in 0..PARTS {
+            self.0[i] |= other.0[i];
+        }
+        self
+    }
+}
+
+impl BitXor for Word {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitxor(mut self, other: Self) -> Self {
+        for i in 0..PARTS {
+            self.0[i] ^= other.0[i];
+        }
+        self
+    }
+}
+
+/// With the same 64 bits for every 64 lanes: an [`inversion`].
+impl BitXor<u64> for Word {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitxor(mut self, inversion: u64) -> Self {
+        for i in 0..PARTS {
+            self.0[i] ^= inversion;
+        }
+        self
+    }
+}
+
+impl BitAnd<u64> for Word {
+    type Output = Self;
+
+    #[inline(always)]
+    fn bitand(mut self, mask: u64) -> Self {
+        for i in 0..PARTS {
+            self.0[i] &= mask;
+        }
+        self
+    }
+}
+
+impl Not for Word {
+    type Output = Self;
+
+    #[inline(always)]
+    fn not(self) -> Self {
+        self ^ u64::MAX
     }
 }
 
