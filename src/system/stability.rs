@@ -109,7 +109,7 @@ pub fn functions() -> Vec<Function> {
             references: references!("poisson_exceedance"),
             compute: |a| Value::Real(Poisson::new(a[0]).exceedance(a[1] as usize)),
             measure: Measure::Absolute,
-            promise: 2e-14,
+            promise: 1e-15,
         },
         Function {
             name: "clock edges",
