@@ -34,7 +34,7 @@ pub struct ParetoArgs {
     #[arg(long, value_name = "R", default_value_t = 0.3)]
     reflectivity: f64,
     /// Macropixels that see a wall.
-    #[arg(long, value_name = "N", default_value_t = 64)]
+    #[arg(long, value_name = "N", default_value_t = 512)]
     macropixels: usize,
     /// CLK periods in a laser cycle.
     #[arg(long, value_name = "P", default_value_t = 520)]

@@ -45,7 +45,7 @@ pub enum Method {
 }
 
 /// Laser cycles that are run at gate level at most.
-pub const GATE_CYCLES: u32 = 100;
+pub const GATE_CYCLES: u32 = 20;
 
 impl Method {
     /// Every method of the comparison, slowest first.
