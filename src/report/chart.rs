@@ -134,8 +134,8 @@ pub struct Chart {
 /// Size of a picture, pixels.
 const SIZE: (u32, u32) = (900, 560);
 
-/// Colours of the series in turn (Okabe and Ito: distinguishable by the colour-blind).
-const COLOURS: [RGBColor; 8] = [
+/// Colours of the series in turn; the first eight after Okabe and Ito, who chose them for the colour-blind.
+const COLOURS: [RGBColor; 12] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -144,6 +144,10 @@ const COLOURS: [RGBColor; 8] = [
     RGBColor(230, 159, 0),
     RGBColor(90, 90, 90),
     RGBColor(150, 120, 40),
+    RGBColor(160, 0, 60),
+    RGBColor(0, 0, 0),
+    RGBColor(110, 170, 40),
+    RGBColor(100, 60, 180),
 ];
 
 impl Chart {
