@@ -8,6 +8,7 @@
 //! | module | what lives there |
 //! |---|---|
 //! | [`units`] | integer femtoseconds, exact clock frequencies, constants |
+//! | [`numerics`] | quadrature, special functions |
 //! | [`files`] | user's input with line numbers, output whole or not at all |
 //! | [`logic`] | four-valued logic |
 //! | [`netlist`] | cells, hierarchical builder, delays, Verilog |
@@ -19,8 +20,10 @@
 //! | [`scene`] | surfaces, optics, sunlight, ground truth |
 //! | [`guide`] | the stereo camera pair and its mapping onto macropixels |
 //! | [`ranging`] | depth from histograms |
+//! | [`theory`] | detection probability, precision, partial histograms, design |
 //! | [`report`] | pictures, arrays, tables |
 //! | [`system`] | one guided frame, end to end |
+//! | [`reproduce`] | the thesis's figures, published beside computed |
 //! | [`cli`] | the `gdtof` command |
 //!
 //! One macropixel at gate level:
@@ -47,10 +50,13 @@ pub mod guide;
 pub mod kernel;
 pub mod logic;
 pub mod netlist;
+pub mod numerics;
 pub mod photon;
 pub mod ranging;
 pub mod report;
+pub mod reproduce;
 pub mod scene;
 pub mod system;
+pub mod theory;
 pub mod units;
 pub mod waves;

@@ -142,6 +142,9 @@ proptest! {
 
         let by_cycles = Cycle::new(config, &exposure).histogram(*start, &case.pulses).unwrap();
         prop_assert_eq!(&by_gates, &by_cycles);
+        let pulses = case.pulses.iter().map(|p| (p.time, p.spad));
+        let by_model = Model::new(config, &exposure).histogram(*start, pulses);
+        prop_assert_eq!(&by_gates, &by_model);
         let by_window = Window::new(config, &exposure).histogram(*start, &case.pulses);
         match window {
             LawWindow::Irregular(_) => prop_assert!(matches!(by_window, Err(EngineError::Irregular(_)))),

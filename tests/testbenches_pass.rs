@@ -34,6 +34,21 @@ fn the_p_counter_and_its_timing_block() {
 }
 
 #[test]
+fn the_variants_of_the_p_counter() {
+    let signal = [
+        "tb_p_counter_variants",
+        "msb_wrap",
+        "p_counter",
+        "COUNTER_OUT",
+    ];
+    passes(
+        "tb_p_counter_variants",
+        env!("CARGO_BIN_EXE_tb_p_counter_variants"),
+        &signal,
+    );
+}
+
+#[test]
 fn the_load_path() {
     let signal = ["load_path", "row_scanner", "MEMORY_LOAD"];
     passes("tb_load_path", env!("CARGO_BIN_EXE_tb_load_path"), &signal);

@@ -8,3 +8,17 @@ GDTOF_REMAKE=1 cargo test --release --quiet --test traces_are_deterministic gold
 cd vectors/replay
 cargo run --release --quiet -- replay --sensor sensor.toml --inits inits.csv --events events.csv \
     --stop-periods 80 --laser-cycles 40 --engine gate --out histograms.csv
+
+# Verdicts of the published figures.
+cd ../reproduce
+cargo run --release --quiet -- reproduce --json | python3 -c '
+import json, sys
+for claim in json.load(sys.stdin)["claims"]:
+    for row in claim["rows"]:
+        print(claim["claim"], row["quantity"], row["verdict"], sep=" | ")' > verdicts.txt
+
+# References of `gdtof pareto --stability` and, some minutes, of the theory; need Python with mpmath.
+python3 ../stability/make.py
+cd ../theory
+python3 detection.py
+python3 precision.py

@@ -2,12 +2,12 @@
 # The same netlist, stimulus and machine: Icarus Verilog against our gate engine, alone and in lanes, in one run.
 # Icarus runs the exported cells, which are exact edge for edge, and cells written for its speed; ratios are
 # against the latter. Histograms must agree. Whole processes are timed, start and files included: processor time,
-# the best of three, which neighbours on the machine disturb least. Needs iverilog and GNU time.
+# the best of three (of one for the exported cells, which are slow). Needs iverilog and GNU time.
 #
 #   benches/compare/icarus.sh [LASER_CYCLES]
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-cycles=${1:-20}
+cycles=${1:-100}
 periods=520
 for tool in iverilog /usr/bin/time; do
     command -v $tool >/dev/null || { echo "$tool is not installed: nothing to compare with" >&2; exit 2; }
@@ -35,9 +35,10 @@ stimulus() {
         }
     }'
 }
-# Runs a command three times; prints the least processor time (s) and the peak memory (MB).
+# Runs a command so many times; prints the least processor time (s) and the peak memory (MB).
 measure() {
-    for _ in 1 2 3; do
+    local runs=$1; shift
+    for _ in $(seq "$runs"); do
         /usr/bin/time -a -o times -f "%U %S %M" "$@" >/dev/null 2>&1
     done
     awk '{ s = $1 + $2; if (NR == 1 || s < least) least = s; if ($3 > peak) peak = $3 }
@@ -46,7 +47,7 @@ measure() {
 }
 ours() { # columns, more arguments
     local cols=$1; shift
-    measure "$gdtof" replay --rows 1 --cols "$cols" --inits inits.csv --events events.csv \
+    measure 3 "$gdtof" replay --rows 1 --cols "$cols" --inits inits.csv --events events.csv \
         --stop-periods $periods --laser-cycles "$cycles" --engine gate --out ours.csv "$@"
 }
 
@@ -56,12 +57,12 @@ stimulus 1
 (cd verilog && iverilog -g2005 -o sim tb.v design.v cells.v && iverilog -g2005 -o lean tb.v design.v "$lean")
 one=$(ours 1)
 one_vcd=$(ours 1 --vcd ours.vcd)
-exact=$(cd verilog && measure vvp -n sim)
+exact=$(cd verilog && measure 1 vvp -n sim)
 cmp ours.csv verilog/histograms.csv
-exact_vcd=$(cd verilog && measure vvp -n sim +vcd)
-theirs=$(cd verilog && measure vvp -n lean)
+exact_vcd=$(cd verilog && measure 1 vvp -n sim +vcd)
+theirs=$(cd verilog && measure 3 vvp -n lean)
 cmp ours.csv verilog/histograms.csv
-theirs_vcd=$(cd verilog && measure vvp -n lean +vcd)
+theirs_vcd=$(cd verilog && measure 3 vvp -n lean +vcd)
 stimulus 64
 lanes=$(ours 64)
 {
@@ -70,12 +71,13 @@ lanes=$(ours 64)
     echo "exact $exact"; echo "exact_vcd $exact_vcd"; echo "lean $theirs"; echo "lean_vcd $theirs_vcd"
 } | awk -v k="$((cycles * periods))" '
     { v[$1] = $2; m[$1] = $3 }
-    function row(name, key, pixels) {
-        printf "%-42s %9.3f %18.3g %9.1f %9.1f %9.2f\n", name, v[key], pixels * k / v[key], \
-            pixels * v["lean"] / v[key], m[key], (key "_vcd" in v) ? v[key "_vcd"] / v[key] : 0
+    function row(name, key, pixels,   on) {
+        on = key "_vcd"
+        printf "%-42s %9.3f %18.3g %9.1f %9.1f %10s\n", name, v[key], pixels * k / v[key], \
+            pixels * v["lean"] / v[key], m[key], (on in v) ? sprintf("%.2f", v[on] / v[key]) : "-"
     }
     END {
-        printf "%-42s %9s %18s %9s %9s %9s\n", "", "CPU s", "macropixel-CLK/s", "x Icarus", "peak MB", "VCD on/off"
+        printf "%-42s %9s %18s %9s %9s %10s\n", "", "CPU s", "macropixel-CLK/s", "x Icarus", "peak MB", "VCD on/off"
         row("Icarus Verilog, exported cells", "exact", 1)
         row("Icarus Verilog, cells written for speed", "lean", 1)
         row("gate engine, one macropixel", "one", 1)

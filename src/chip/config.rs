@@ -145,6 +145,14 @@ pub struct SensorConfig {
     pub load_clk_hz: f64,
     /// SPAD dead time and width of a SPAD_RAW pulse, ns.
     pub dead_time_ns: f64,
+    /// Whether a photon during the dead time begins it anew.
+    pub paralysable: bool,
+    /// Chance that an avalanche has an afterpulse, 0…1.
+    pub afterpulse_probability: f64,
+    /// Time constant of afterpulses after the dead time, ns.
+    pub afterpulse_time_ns: f64,
+    /// Chance that an avalanche fires one of its SPAD's four neighbours, 0…1.
+    pub crosstalk_probability: f64,
     /// TYPE.
     pub event_type: EventType,
     /// THRESHOLD, 0…31 SPADs.
@@ -172,6 +180,10 @@ impl Default for SensorConfig {
             stop_phase_ps: 0.0,
             load_clk_hz: 200e6,
             dead_time_ns: 8.0,
+            paralysable: false,
+            afterpulse_probability: 0.0,
+            afterpulse_time_ns: 5.0,
+            crosstalk_probability: 0.0,
             event_type: EventType::Greater,
             threshold: 0,
             overflow: Overflow::Saturate,
@@ -259,6 +271,16 @@ impl SensorConfig {
             );
             return Err(("dead_time_ns", message));
         }
+        for (key, value, most) in [
+            ("afterpulse_probability", self.afterpulse_probability, 1.0),
+            ("afterpulse_time_ns", self.afterpulse_time_ns, 1e6),
+            ("crosstalk_probability", self.crosstalk_probability, 1.0),
+        ] {
+            if !(0.0..=most).contains(&value) {
+                let message = format!("{key} = {value} is impossible; give 0 to {most}");
+                return Err((key, message));
+            }
+        }
         let half_period_ps = 0.5e12 / self.clk_hz;
         if self.stop_phase_ps.is_nan() || self.stop_phase_ps.abs() > half_period_ps {
             let message = format!(
@@ -336,6 +358,9 @@ mod tests {
             ("threshold = 32", 1),
             ("colour = 1", 1),
             ("rows = -3", 1),
+            ("afterpulse_probability = 1.1", 1),
+            ("crosstalk_probability = -0.1", 1),
+            ("afterpulse_time_ns = inf", 1),
             ("event_type = \"more\"", 1),
             ("p_counter = \"grey\"", 1),
             ("p_counter = \"comparator\"\ntap = \"msb\"", 2),

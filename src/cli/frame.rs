@@ -9,15 +9,15 @@ use serde::Serialize;
 use super::{SensorArgs, say};
 use crate::chip::SensorConfig;
 use crate::chip::WindowLaw;
-use crate::engine::Work;
 use crate::engine::recording::check_exposure;
+use crate::engine::{CohortOptions, Work};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::guide::GuideMap;
 use crate::ranging::PeakOptions;
 use crate::report::{Table, depth_png, write_npy_u16};
 use crate::scene::Scene;
 use crate::system::{
-    EngineKind, Frame, FrameSettings, PhaseTimes, PixelDepth, Probe, Summary, take_frame,
+    EngineKind, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Probe, Summary, take_frame,
 };
 
 /// Arguments of `gdtof frame`.
@@ -50,6 +50,12 @@ pub struct FrameArgs {
     /// Keep only the first N laser cycles in the waveforms of probes.
     #[arg(long, value_name = "N")]
     wave_cycles: Option<u32>,
+    /// Steps to a CLK period in which the cohort engine follows the dead time: more are finer and slower.
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=64))]
+    sub_bins: u8,
+    /// Let every macropixel have the cheapest engine that adds at most M metres of depth error on average.
+    #[arg(long, value_name = "M", conflicts_with_all = ["engine", "sub_bins", "no_skip"])]
+    tolerance: Option<f64>,
     /// Draw and run everything, also what the engine could leave out: same histograms, more work.
     #[arg(long)]
     no_skip: bool,
@@ -76,6 +82,10 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
         );
         return Err(InputError::new("--sensor", message).into());
     }
+    if let Some(metres) = args.tolerance.filter(|m| !(m.is_finite() && *m >= 0.0)) {
+        let message = format!("{metres} is no depth error; give metres, 0 or more");
+        return Err(InputError::new("--tolerance", message).into());
+    }
     create_folder(&args.out)?;
     let probe_at = |(row, col)| Probe {
         row,
@@ -89,6 +99,11 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
         exposure,
         seed: args.seed,
         engine: args.engine,
+        cohort: CohortOptions {
+            sub_bins: args.sub_bins.into(),
+            ..CohortOptions::default()
+        },
+        tolerance_m: args.tolerance,
         skip: !args.no_skip,
         peak: PeakOptions::default(),
     };
@@ -184,6 +199,7 @@ struct Report<'a> {
     summary: Summary,
     photons_expected: f64,
     work: Work,
+    tolerance: Option<Kept>,
     load_bits: usize,
     load_time_s: f64,
     exposure_time_s: f64,
@@ -208,6 +224,7 @@ impl<'a> Report<'a> {
             summary: frame.summary(),
             photons_expected: frame.photons_expected,
             work: frame.work,
+            tolerance: frame.kept,
             load_bits: frame.load_bits,
             load_time_s: frame.load_time.as_s(),
             exposure_time_s: frame.exposure_time.as_s(),
@@ -303,6 +320,17 @@ fn table(args: &FrameArgs, frame: &Frame) -> Table {
         "simulated: macropixels",
         of((work.macropixels - skipped) as usize, summary.pixels),
     );
+    if let Some(kept) = &frame.kept {
+        table.push(
+            "depth error added, bound",
+            format!("{:.1e} m of {:.1e} m", kept.bound_m, kept.tolerance_m),
+        );
+        let cohort: usize = kept.on_cohort.iter().sum();
+        table.push(
+            "macropixels on window, cohort",
+            format!("{}, {cohort}", kept.on_window),
+        );
+    }
     let lost = work.lost_to_dead_time as f64;
     table.push(
         "lost to dead time",
@@ -314,7 +342,11 @@ fn table(args: &FrameArgs, frame: &Frame) -> Table {
     );
     table.push("exposure", frame.exposure_time);
     for (row, col) in &frame.probes {
-        let agrees = format!("agrees with {:?} engine", args.engine).to_lowercase();
+        let engine = match frame.kept {
+            Some(_) => EngineKind::Window,
+            None => args.engine,
+        };
+        let agrees = format!("agrees with {engine:?} engine").to_lowercase();
         table.push(format!("gate level ({row}, {col})"), agrees);
     }
     let times = &frame.times;

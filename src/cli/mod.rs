@@ -3,9 +3,12 @@
 
 mod export;
 mod frame;
+mod pareto;
 mod range;
 mod replay;
+mod reproduce;
 mod sdf;
+mod speed;
 mod testbench;
 mod timing;
 
@@ -36,10 +39,16 @@ enum Command {
     Frame(frame::FrameArgs),
     /// Run recorded SPAD events through the chip.
     Replay(replay::ReplayArgs),
+    /// Print the thesis's figures, published beside computed.
+    Reproduce(reproduce::ReproduceArgs),
     /// Depths from a real sensor's histograms, beside its own.
     Range(range::RangeArgs),
+    /// How fast the fast engines are, by size of the array and threads, and the memory they take.
+    Speed(speed::SpeedArgs),
     /// How fast the chip can be clocked: ripple, periods, margins.
     Timing(timing::TimingArgs),
+    /// Run time against error.
+    Pareto(pareto::ParetoArgs),
     /// Write the chip for other tools.
     #[command(subcommand)]
     Export(export::ExportCommand),
@@ -79,8 +88,11 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Frame(args) => frame::run(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::Reproduce(args) => reproduce::run(&args),
         Command::Range(args) => range::run(&args),
+        Command::Speed(args) => speed::run(&args),
         Command::Timing(args) => timing::run(&args),
+        Command::Pareto(args) => pareto::run(&args),
         Command::Export(command) => export::run(&command),
     };
     match result {
@@ -108,15 +120,10 @@ fn is_closed_pipe(error: &anyhow::Error) -> bool {
 
 fn is_bad_input(error: &anyhow::Error) -> bool {
     error.is::<InputError>()
-        || matches!(
-            error.downcast_ref(),
-            Some(EngineError::Race(_) | EngineError::Irregular(_))
-        )
-        || matches!(
-            error.downcast_ref(),
-            Some(
-                FrameError::Input(_)
-                    | FrameError::Engine(EngineError::Race(_) | EngineError::Irregular(_))
-            )
-        )
+        || matches!(error.downcast_ref::<EngineError>(), Some(e) if e.is_refusal())
+        || match error.downcast_ref() {
+            Some(FrameError::Input(_)) => true,
+            Some(FrameError::Engine(error)) => error.is_refusal(),
+            _ => false,
+        }
 }

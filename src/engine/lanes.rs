@@ -83,8 +83,12 @@ impl<'a> LaneSimulation<'a> {
 
     /// Simulates load and exposure to the end.
     pub fn run<O: LaneObserver>(&mut self, observer: &mut O) {
+        self.run_until(self.schedule().end, observer);
+    }
+
+    /// Simulates from power-up to `end`, in simulation time.
+    pub(super) fn run_until<O: LaneObserver>(&mut self, end: Time, observer: &mut O) {
         let pins = Pins::of(&self.netlist);
-        let end = self.schedule().end;
         let mut stimulus = self.stimulus(&pins).peekable();
         self.kernel.run(&mut stimulus, end, observer);
     }

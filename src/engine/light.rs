@@ -12,7 +12,9 @@ use serde::Serialize;
 
 use super::{Engine, EngineError};
 use crate::chip::{Exposure, SensorConfig};
-use crate::photon::{PhotonStream, PixelLight, PixelPhotons, SpadEvent, SpadModel, StreamConfig};
+use crate::photon::{
+    DeadTimeLaw, PhotonStream, PixelLight, PixelPhotons, SpadEvent, SpadModel, StreamConfig,
+};
 use crate::units::Time;
 
 /// A macropixel and the light on it.
@@ -92,7 +94,16 @@ pub fn stream_config(
         laser_cycles: exposure.laser_cycles,
         pulse_sigma,
         pulse_shape: None,
-        spads: SpadModel::with_dead_time(config.dead_time()),
+        spads: SpadModel {
+            dead_time: config.dead_time(),
+            law: match config.paralysable {
+                false => DeadTimeLaw::NonParalysable,
+                true => DeadTimeLaw::Paralysable,
+            },
+            afterpulse_probability: config.afterpulse_probability,
+            afterpulse_time: Time::from_s(config.afterpulse_time_ns * 1e-9),
+            crosstalk_probability: config.crosstalk_probability,
+        },
     }
 }
 

@@ -3,13 +3,16 @@
 //! | engine | what it simulates | held to |
 //! |---|---|---|
 //! | [`Gate`] | every net of the netlist, with its delays | Icarus Verilog on the exported netlist |
-//! | [`Cycle`] | every CLK period, through the blocks' reference models | `Gate` |
+//! | [`Cycle`] | every CLK period of the levelised netlist, 512 macropixels to a word | `Gate` |
 //! | [`Window`] | only the CLK periods a start value can see, through the window law | `Cycle` |
+//! | [`Cohort`] | no photons: laser cycles in the same state move together | `Window`, in distribution |
 //!
-//! All take the same start value and SPAD pulses and give the same histogram. `Cycle` and `Window` assume what
-//! the window law can promise, and refuse a configuration in which two signals race. `Window` also refuses a
-//! P-counter that raises LOCAL_STOP more than once in a laser cycle.
+//! The first three take the same start value and SPAD pulses and give the same histogram. `Cycle` and `Window` assume what
+//! the window law can promise, and refuse a configuration in which two signals race. The macropixel's
+//! plain-Rust reference model ([`crate::chip::macropixel::Model`]) is the tests' slow judge of all of them. `Window`
+//! also refuses a P-counter that raises LOCAL_STOP more than once in a laser cycle.
 
+pub mod cohort;
 mod cycle;
 mod gate;
 mod hardware_events;
@@ -23,7 +26,8 @@ pub mod timing;
 pub mod waveform;
 mod window;
 
-pub use cycle::Cycle;
+pub use cohort::{Cohort, CohortOptions};
+pub use cycle::{Cycle, PackedPulses, Unlevelled};
 pub use gate::{Gate, GateSimulation};
 pub use hardware_events::{HardwareEvent, HardwareEventKind, HardwareEventReport, HardwareEvents};
 pub use lanes::LaneSimulation;
@@ -79,7 +83,7 @@ pub trait Engine: Sync {
 }
 
 /// Why an engine has no answer.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EngineError {
     /// The window law finds two signals too close to call.
     #[error(
@@ -94,6 +98,14 @@ pub enum EngineError {
         "the {0} engine knows no single photons and cannot replay recorded ones; use --engine window"
     )]
     NoPhotons(&'static str),
+    /// The cohort engine's model of light and SPADs leaves this out.
+    #[error("the cohort engine cannot follow {0}; use --engine window")]
+    NotInCohorts(&'static str),
+    /// Laser cycles depend on each other: a bound on the probability, over a macropixel's exposure.
+    #[error(
+        "SPADs may stay busy from one laser cycle's window to the next (probability up to {0:.1e}), which the cohort engine cannot follow; use --engine window, a longer laser cycle or less light"
+    )]
+    Memory(f64),
     /// A histogram bin of the netlist holds X.
     #[error("bin {bin} of {macropixel} is unknown (X) at the end of the exposure")]
     Unknown {
@@ -102,4 +114,11 @@ pub enum EngineError {
         /// First unknown bin.
         bin: usize,
     },
+}
+
+impl EngineError {
+    /// Whether the user asked for what this engine cannot do, and another can.
+    pub fn is_refusal(&self) -> bool {
+        !matches!(self, EngineError::Unknown { .. })
+    }
 }

@@ -31,6 +31,7 @@ pub use instance_limits::{Control, InstanceLimits};
 pub use library::{Arc, CellArcs, Corner, Delay, Library};
 pub use module::{Cell, Direction, Instance, Module, Net, Port, Signal};
 pub use requirements::{Requirement, Requirements};
+pub(crate) use static_timing::caused;
 pub use static_timing::{Arrivals, Bound, Edge, Path, StaticTiming, Step, TimingLoop};
 pub use timing::{ArcDelay, CellDelays, DelayModel, Timing};
 pub use variation::{Conditions, Mismatch, Process, derated_limits, varied};

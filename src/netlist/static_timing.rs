@@ -90,7 +90,7 @@ fn edge_of(node: Node) -> Edge {
 }
 
 /// Directions of a cell's output `output` that an `edge` on input `pin` can cause.
-fn caused(kind: CellKind, pin: usize, edge: Edge, output: usize) -> &'static [Edge] {
+pub(crate) fn caused(kind: CellKind, pin: usize, edge: Edge, output: usize) -> &'static [Edge] {
     use CellKind::*;
     const NONE: &[Edge] = &[];
     let one = |edge| match edge {

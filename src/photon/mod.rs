@@ -1,14 +1,19 @@
-//! Light and the SPADs that see it: photon budget (thesis 3.2.1), dead time, and the
-//! random-access photon stream that drives every engine.
+//! Light and the SPADs that see it: photon budget (thesis 3.2.1), sunlight, lens and filter, dead time,
+//! and the random-access photon stream that drives every engine.
 
 mod budget;
+mod gaussian;
+mod optics;
 mod philox;
 mod pulse;
 mod random;
+pub mod solar;
 mod spad;
 mod stream;
 
-pub use budget::{Convention, PhotonBudget};
+pub use budget::{Convention, PhotonBudget, Spot};
+pub use gaussian::{PulseEdge, pulse_share};
+pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
 pub use pulse::{PulseError, PulseShape};
 pub use random::{Poisson, Purpose, normal, philox_key, random_stream};
 pub use spad::{

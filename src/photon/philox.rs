@@ -6,9 +6,10 @@
 use multiversion::multiversion;
 
 /// Counters that go through the rounds together.
-const LANES: usize = 16;
+const LANES: usize = 8;
 
-const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
+const MULTIPLIERS: [u64; 2] = [0xD251_1F53, 0xCD9E_8D57];
+const LOW: u64 = 0xFFFF_FFFF;
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 
 /// Random blocks in runs: a run is a row of blocks with successive first counter words from 0 on and one second
@@ -67,11 +68,8 @@ impl Blocks {
     }
 }
 
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1"
-))]
+/// Words live in the low halves of 64-bit lanes, where vector units multiply them; high halves hold what is left over.
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
 fn generate(
     key: [u32; 2],
     [third, fourth]: [u32; 2],
@@ -83,24 +81,33 @@ fn generate(
     let counters = (first.as_chunks::<LANES>().0.iter()).zip(second.as_chunks::<LANES>().0);
     let out = out0.iter_mut().zip(out1).zip(out2.iter_mut().zip(out3));
     for ((first, second), ((out0, out1), (out2, out3))) in counters.zip(out) {
-        let mut c0 = *first;
-        let mut c1 = *second;
-        let mut c2 = [third; LANES];
-        let mut c3 = [fourth; LANES];
+        let mut c0 = [0; LANES];
+        let mut c1 = [0; LANES];
+        for lane in 0..LANES {
+            c0[lane] = u64::from(first[lane]);
+            c1[lane] = u64::from(second[lane]);
+        }
+        let mut c2 = [u64::from(third); LANES];
+        let mut c3 = [u64::from(fourth); LANES];
         let [mut key0, mut key1] = key;
         for _ in 0..10 {
             for lane in 0..LANES {
-                let product0 = u64::from(MULTIPLIERS[0]) * u64::from(c0[lane]);
-                let product1 = u64::from(MULTIPLIERS[1]) * u64::from(c2[lane]);
-                c0[lane] = (product1 >> 32) as u32 ^ c1[lane] ^ key0;
-                c1[lane] = product1 as u32;
-                c2[lane] = (product0 >> 32) as u32 ^ c3[lane] ^ key1;
-                c3[lane] = product0 as u32;
+                let product0 = MULTIPLIERS[0] * (c0[lane] & LOW);
+                let product1 = MULTIPLIERS[1] * (c2[lane] & LOW);
+                c0[lane] = (product1 >> 32) ^ c1[lane] ^ u64::from(key0);
+                c1[lane] = product1;
+                c2[lane] = (product0 >> 32) ^ c3[lane] ^ u64::from(key1);
+                c3[lane] = product0;
             }
             key0 = key0.wrapping_add(WEYL[0]);
             key1 = key1.wrapping_add(WEYL[1]);
         }
-        (*out0, *out1, *out2, *out3) = (c0, c1, c2, c3);
+        for lane in 0..LANES {
+            out0[lane] = c0[lane] as u32;
+            out1[lane] = c1[lane] as u32;
+            out2[lane] = c2[lane] as u32;
+            out3[lane] = c3[lane] as u32;
+        }
     }
 }
 

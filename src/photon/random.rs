@@ -21,6 +21,8 @@ pub enum Purpose {
     Signal = 3,
     /// Afterpulses and crosstalk.
     Avalanches = 4,
+    /// Splits of cohorts of laser cycles.
+    Cohort = 5,
 }
 
 /// The stream of random words for (`seed`, `purpose`, `index`, `sub_index`).
@@ -90,6 +92,13 @@ impl Poisson {
             start,
             parts: parts as u32,
         }
+    }
+
+    /// Probability of more than `count`, for a mean of up to 64 that fits one table. Absolute error below 10⁻¹⁵.
+    pub fn exceedance(&self, count: usize) -> f64 {
+        debug_assert_eq!(self.parts, 1, "one table");
+        let entry = self.exceeds.get(count).copied().unwrap_or(0);
+        entry as f64 * 0.5f64.powi(64)
     }
 
     /// Whether every draw is zero.

@@ -45,6 +45,9 @@ const GROUP_BITS: u32 = 9;
 
 const SPAD_BITS: u32 = SPADS.trailing_zeros();
 
+/// Adding it leaves no fraction to numbers up to ±2⁵¹.
+const ROUNDER: f64 = 6_755_399_441_055_744.0;
+
 /// What all macropixels of an exposure share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StreamConfig {
@@ -285,7 +288,9 @@ impl PixelStream<'_> {
                 // The low bits of word 1 are independent of the place in its high ones.
                 after_fs += shape.draw(w0, w1 << PLACE_BITS);
             }
-            let time_fs = self.arrival_fs.saturating_add(after_fs.round() as i64);
+            // Rounds to the nearest femtosecond without a call.
+            let rounded = (after_fs + ROUNDER) - ROUNDER;
+            let time_fs = self.arrival_fs.saturating_add(rounded as i64);
             if within_fs.contains(&time_fs) {
                 draw.signal.push(SignalPhoton {
                     place: place(w1),

@@ -65,6 +65,14 @@ impl Axis {
                 .is_none_or(|(least, greatest)| (least..=greatest).contains(&value))
     }
 
+    /// Where in `range` a value lies, 0 to 1.
+    fn share(&self, value: f64, range: &Range<f64>) -> f64 {
+        match self.scale {
+            Scale::Linear => (value - range.start) / (range.end - range.start),
+            Scale::Log => (value / range.start).ln() / (range.end / range.start).ln(),
+        }
+    }
+
     fn range_over(&self, values: impl Iterator<Item = f64>) -> Range<f64> {
         if let Some((least, greatest)) = self.range {
             return least..greatest;
@@ -172,11 +180,12 @@ impl Chart {
         let xs = self.series.iter().flat_map(|s| &s.points).map(|p| p.0);
         let ys = self.series.iter().flat_map(|s| &s.points).map(|p| p.1);
         let (x, y) = (self.x.range_over(xs), self.y.range_over(ys));
+        let legend = self.emptiest_corner(&x, &y);
         let drawn = match (self.x.scale, self.y.scale) {
-            (Scale::Linear, Scale::Linear) => self.draw(&area, x, y),
-            (Scale::Linear, Scale::Log) => self.draw(&area, x, y.log_scale()),
-            (Scale::Log, Scale::Linear) => self.draw(&area, x.log_scale(), y),
-            (Scale::Log, Scale::Log) => self.draw(&area, x.log_scale(), y.log_scale()),
+            (Scale::Linear, Scale::Linear) => self.draw(&area, x, y, legend),
+            (Scale::Linear, Scale::Log) => self.draw(&area, x, y.log_scale(), legend),
+            (Scale::Log, Scale::Linear) => self.draw(&area, x.log_scale(), y, legend),
+            (Scale::Log, Scale::Log) => self.draw(&area, x.log_scale(), y.log_scale(), legend),
         };
         drawn.expect("a string takes every drawing");
         drop(area);
@@ -184,11 +193,34 @@ impl Chart {
         text
     }
 
+    /// Where a legend of this many lines hides the fewest points; the upper right corner if all hide alike.
+    fn emptiest_corner(&self, x: &Range<f64>, y: &Range<f64>) -> SeriesLabelPosition {
+        use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
+        let height = 0.06 * (self.series.len() + 1) as f64;
+        let hidden = |right: bool, upper: bool| {
+            let points = self.series.iter().flat_map(|s| &s.points);
+            let share = points.filter(|p| self.x.shows(p.0) && self.y.shows(p.1));
+            share
+                .map(|p| (self.x.share(p.0, x), self.y.share(p.1, y)))
+                .filter(|&(u, v)| if right { u > 0.6 } else { u < 0.4 } && (if upper { 1.0 - v } else { v }) < height)
+                .count()
+        };
+        let corners = [
+            (UpperRight, hidden(true, true)),
+            (UpperLeft, hidden(false, true)),
+            (LowerRight, hidden(true, false)),
+            (LowerLeft, hidden(false, false)),
+        ];
+        let best = corners.into_iter().min_by_key(|c| c.1);
+        best.map_or(UpperRight, |c| c.0)
+    }
+
     fn draw<'a, X, Y>(
         &self,
         area: &DrawingArea<SVGBackend<'a>, Shift>,
         x: X,
         y: Y,
+        legend: SeriesLabelPosition,
     ) -> Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>
     where
         X: AsRangedCoord<Value = f64>,
@@ -251,7 +283,7 @@ impl Chart {
         if self.series.iter().any(|s| !s.name.is_empty()) {
             chart
                 .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
+                .position(legend)
                 .background_style(WHITE.mix(0.85))
                 .border_style(RGBColor(180, 180, 180))
                 .label_font(("sans-serif", 14))

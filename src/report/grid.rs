@@ -28,6 +28,13 @@ impl Grid {
         self.rows.push(row);
     }
 
+    /// The headings, then every row.
+    pub fn lines(&self) -> impl Iterator<Item = &[String]> {
+        std::iter::once(&self.headings)
+            .chain(&self.rows)
+            .map(Vec::as_slice)
+    }
+
     /// The table in GitHub's Markdown.
     pub fn markdown(&self) -> String {
         let line = |cells: &[String]| {

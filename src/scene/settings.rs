@@ -5,7 +5,7 @@ use std::f64::consts::LN_2;
 use super::camera::PinholeCamera;
 use super::shape::Object;
 use super::vector::Vec3;
-use crate::photon::{Convention, PhotonBudget};
+use crate::photon::{Atmosphere, Convention, PhotonBudget, Spot};
 use crate::units::Time;
 
 /// A static world and the optics through which it is seen.
@@ -54,6 +54,9 @@ pub struct Lidar {
     /// Dark counts of one macropixel, all SPADs together, per second.
     #[serde(default)]
     pub dark_count_hz: f64,
+    /// What the laser lights up: the field of view, or the circle around it.
+    #[serde(default)]
+    pub spot: Spot,
     /// Constant of the photon budget.
     #[serde(default)]
     pub convention: Convention,
@@ -152,6 +155,8 @@ impl Scene {
             rows,
             cols,
             solar_irradiance_w_m2: lidar.solar_irradiance_w_m2,
+            spot: lidar.spot,
+            atmosphere: Atmosphere::CLEAR,
             convention: lidar.convention,
         }
     }

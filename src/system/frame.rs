@@ -12,11 +12,12 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::result::{Frame, PhaseTimes, PixelDepth};
+use super::tolerance::Tolerance;
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::engine::waveform::{self, View};
 use crate::engine::{
-    Cycle, Engine, EngineError, Gate, GateSimulation, LitPixel, Window, expose,
-    expose_without_skipping, load, stream_config,
+    Cohort, CohortOptions, Cycle, Engine, EngineError, Gate, GateSimulation, LitPixel, Window,
+    expose, expose_without_skipping, load, stream_config,
 };
 use crate::files::InputError;
 use crate::guide::GuideMap;
@@ -36,6 +37,8 @@ pub enum EngineKind {
     /// The blocks' reference models, only the CLK periods a window can see.
     #[default]
     Window,
+    /// No photons: histograms from their distribution, laser cycles in the same state together.
+    Cohort,
 }
 
 impl EngineKind {
@@ -49,6 +52,7 @@ impl EngineKind {
             EngineKind::Gate => Box::new(Gate::new(config, exposure)),
             EngineKind::Cycle => Box::new(Cycle::new(config, exposure)),
             EngineKind::Window => Box::new(Window::new(config, exposure)),
+            EngineKind::Cohort => Box::new(Cohort::new(config, exposure, CohortOptions::default())),
         }
     }
 }
@@ -79,6 +83,11 @@ pub struct FrameSettings {
     pub seed: u64,
     /// Engine of the macropixels.
     pub engine: EngineKind,
+    /// Knobs of the cohort engine.
+    pub cohort: CohortOptions,
+    /// Depth error that a cheaper engine may add on average, m: each macropixel gets the cheapest that keeps it, whatever
+    /// `engine` says.
+    pub tolerance_m: Option<f64>,
     /// Leave out what the engine can do without; `false` draws and runs everything, for the same histograms.
     pub skip: bool,
     /// Depth from histograms.
@@ -143,6 +152,8 @@ pub fn take_frame(
         exposure,
         seed,
         engine: engine_kind,
+        cohort,
+        tolerance_m,
         skip,
         peak,
     } = settings;
@@ -199,11 +210,26 @@ pub fn take_frame(
         .sum();
     times.light_s = clock.lap();
 
-    let engine = engine_kind.build(sensor, exposure);
-    let exposed = if *skip {
-        expose(&*engine, &stream, &pixels, exposed)?
-    } else {
-        expose_without_skipping(&*engine, &stream, &pixels, exposed)?
+    let engine: Box<dyn Engine> = match engine_kind {
+        EngineKind::Cohort => Box::new(Cohort::new(sensor, exposure, *cohort)),
+        kind => kind.build(sensor, exposure),
+    };
+    let (exposed, kept) = match (tolerance_m, skip) {
+        (&Some(tolerance_m), _) => {
+            let tolerance = Tolerance {
+                tolerance_m,
+                config: sensor,
+                exposure,
+                peak,
+            };
+            let (exposed, kept) = tolerance.expose(&stream, &pixels, exposed)?;
+            (exposed, Some(kept))
+        }
+        (None, true) => (expose(&*engine, &stream, &pixels, exposed)?, None),
+        (None, false) => {
+            let exposed = expose_without_skipping(&*engine, &stream, &pixels, exposed)?;
+            (exposed, None)
+        }
     };
     times.exposure_s = clock.lap();
 
@@ -218,16 +244,23 @@ pub fn take_frame(
         let photons = light.map(|light| stream.pixel_events(number, &light));
         let events = photons.unwrap_or_default().events;
         let gate = run_probe(sensor, exposure, probe, start, &events)?;
-        let model = &exposed.histograms[pixel];
-        if gate == *model {
+        // The cohort engine has no photons to agree on: the probe compares with the engine that it follows.
+        let (engine, model) = match engine_kind {
+            kind if kept.is_some() || *kind == EngineKind::Cohort => {
+                let model = Window::new(sensor, exposure).histogram(start, &events)?;
+                (EngineKind::Window, model)
+            }
+            &kind => (kind, exposed.histograms[pixel].clone()),
+        };
+        if gate == model {
             return Ok(());
         }
         Err(FrameError::Disagreement {
             row: probe.row,
             col: probe.col,
-            engine: *engine_kind,
+            engine,
             gate,
-            model: model.clone(),
+            model,
         })
     })?;
     times.probes_s = clock.lap();
@@ -267,6 +300,7 @@ pub fn take_frame(
         pixels: depths,
         photons_expected,
         work: exposed.work,
+        kept,
         load_bits: sensor.load_bits(),
         load_time: load.duration,
         exposure_time: exposure.end(),

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::tolerance::Kept;
 use crate::engine::Work;
 use crate::units::Time;
 
@@ -79,13 +80,16 @@ pub struct Frame {
     pub photons_expected: f64,
     /// What the engine did, and did not have to do.
     pub work: Work,
+    /// Engines chosen by a depth tolerance, and the bound they keep.
+    pub kept: Option<Kept>,
     /// Bits of the serial load.
     pub load_bits: usize,
     /// Time the chip needs for the load.
     pub load_time: Time,
     /// Time the chip exposes.
     pub exposure_time: Time,
-    /// Macropixels that were also run at gate level and agreed to the count.
+    /// Macropixels that were also run at gate level and agreed to the count, with the `window` engine on the same
+    /// photons where the frame's engine is `cohort`, which has none.
     pub probes: Vec<(usize, usize)>,
     /// What the simulation took.
     pub times: PhaseTimes,
@@ -190,6 +194,7 @@ mod tests {
             ],
             photons_expected: 0.0,
             work: Work::default(),
+            kept: None,
             load_bits: 36,
             load_time: Time::ZERO,
             exposure_time: Time::ZERO,

@@ -222,7 +222,8 @@ struct Activity {
 }
 
 impl Activity {
-    /// Counts slowly from the largest start value until the count has come round.
+    /// Counts slowly from start value 0, which a rippling up counter passes through at every power of two, until the
+    /// count has come round.
     fn of(config: &SensorConfig, netlist: &Netlist) -> Self {
         const GAP: Time = Time::from_ns(10);
         let pin = |name| netlist.net(name).expect("a pin of the P-counter");
@@ -237,12 +238,6 @@ impl Activity {
             .iter()
             .map(|&net| Drive::new(Time::ZERO, net, false))
             .collect();
-        for &net in &netlist
-            .signal("COUNTER_INIT")
-            .expect("a bus of the P-counter")
-        {
-            drives.push(Drive::new(GAP * 2, net, true));
-        }
         for (name, rise, fall) in pulses {
             drives.push(Drive::new(GAP * rise, pin(name), true));
             drives.push(Drive::new(GAP * fall, pin(name), false));

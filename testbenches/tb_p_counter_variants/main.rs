@@ -9,10 +9,11 @@
 //!
 //! The waveform has two scenes. First a start value beyond 255, whose most significant bit is high from the reset
 //! on: with the tap `msb` LOCAL_STOP rises at STOP, too, and a METDC that is ready by then counts the tail of the
-//! laser cycle before. Then a laser rate of 80 kHz, at which a counter that runs on comes round four times in each
+//! laser cycle before. Then a laser rate of 80 kHz, at which a counter that runs on comes round again and again in each
 //! laser cycle.
 
 mod comparison;
+mod memoryless;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -20,11 +21,10 @@ use std::sync::Arc;
 
 use guided_dtof::chip::window_law::Window;
 use guided_dtof::chip::{
-    AfterBorrow, ChipTiming, Exposure, PCounter, SensorConfig, Tap, WindowLaw, metdc, p_counter,
+    AfterBorrow, ChipTiming, Exposure, SensorConfig, Tap, WindowLaw, metdc, p_counter,
     p_counter_timing,
 };
 use guided_dtof::cli::testbench;
-use guided_dtof::engine::GateSimulation;
 use guided_dtof::engine::waveform::{write_vcd, write_view};
 use guided_dtof::files::{InputError, OutputFile};
 use guided_dtof::kernel::{Drive, Kernel, Recorder, clock, in_order};
@@ -68,7 +68,7 @@ fn run(out: &Path, checks: &mut Checks) -> Result<PathBuf, InputError> {
     let grid = comparison::compare(checks);
     println!("{grid}");
     println!(
-        "T: transistors. Shares are of the macropixel's; the published one is below 5 % of its area, SPADs' wiring included."
+        "T: transistors. Shares are of the macropixel's transistors, and of their area; the thesis's, below 5 %, is of the layout."
     );
     println!(
         "settled: every net after a count. CLK period: STOP on CLK's fall, setup and hold not counted.\n"
@@ -81,7 +81,7 @@ fn run(out: &Path, checks: &mut Checks) -> Result<PathBuf, InputError> {
     let seen = bench.simulate(&vcd)?;
     false_capture(&bench, &seen, checks);
     repeated_capture(&bench, &seen, checks);
-    coming_round(checks);
+    memoryless::coming_round(checks);
     Ok(vcd)
 }
 
@@ -476,59 +476,6 @@ fn repeated_capture(bench: &Bench, seen: &Recorder, checks: &mut Checks) {
             expected,
             &law,
         );
-    }
-}
-
-/// The P-counter without memory: STOP every 512 CLK periods, and eight too many.
-fn coming_round(checks: &mut Checks) {
-    const CYCLES: u32 = 5;
-    let config = comparison::sensor(PCounter::Memoryless);
-    let round = u32::from(config.largest_start()) + 1;
-    for (stop_periods, starts) in [(round, [5u16, 300]), (round + 8, [5, 300])] {
-        let exposure = Exposure::new(&config, stop_periods, CYCLES);
-        for start in starts {
-            let mut gate =
-                GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[start], &[&[]]);
-            let pixel = "mp_r0_c0.p_counter";
-            let net = gate
-                .netlist()
-                .net(&format!("{pixel}.LOCAL_STOP"))
-                .expect("LOCAL_STOP");
-            let count = gate
-                .netlist()
-                .signal(&format!("{pixel}.COUNTER_OUT"))
-                .expect("COUNTER_OUT");
-            let mut recorder = Recorder::new(count.iter().copied().chain([net]));
-            gate.run(&mut recorder);
-            let origin = gate.schedule().origin;
-            let rises = recorder
-                .rising_edges(net)
-                .into_iter()
-                .filter(|&t| t > origin);
-            let ripple = ChipTiming::of(&config).ripple();
-            // CLK edge of its own laser cycle with which each came.
-            let edge = |t: Time| {
-                let edge = (0..)
-                    .find(|&k| exposure.falling(k) + ripple >= t - origin)
-                    .expect("endless");
-                edge % i64::from(stop_periods)
-            };
-            let found: Vec<usize> = rises.map(|t| edge(t) as usize).collect();
-            let falls =
-                (usize::from(start)..(CYCLES * stop_periods) as usize).step_by(round as usize);
-            let expected: Vec<usize> = falls.map(|fall| fall % stop_periods as usize).collect();
-            let what = format!(
-                "memoryless, STOP every {stop_periods}, start {start}: CLK fall of each LOCAL_STOP"
-            );
-            checks.equal(what, numbers(&expected), numbers(&found));
-            if stop_periods == round {
-                let last = recorder.number_at(&count, gate.schedule().end);
-                let what = format!(
-                    "memoryless, start {start}: count after the exposure, one step too many"
-                );
-                checks.equal(what, u64::from(start) - 1, last.unwrap_or(u64::MAX));
-            }
-        }
     }
 }
 

@@ -139,11 +139,7 @@ impl Binning {
     }
 }
 
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1"
-))]
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
 fn encode(binning: &Binning, times: &[u32], places: &[u32], bases: &[u32], codes: &mut [Code]) {
     let words = times.iter().zip(places).zip(bases);
     for (((&time, &place), &base), code) in words.zip(codes) {
@@ -165,11 +161,7 @@ pub struct Tally {
 }
 
 /// Tallies numbers of SPADs (0 to 16 each), at most [`ROW`] of them.
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1"
-))]
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
 pub fn tally(cells: &[u8], least: u8, most: u8) -> Tally {
     const LANES: usize = 64;
     // Eight times sixteen at most: a byte holds it.

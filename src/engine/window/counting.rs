@@ -15,14 +15,16 @@
 //!
 //! [`SpadModel::detect`]: crate::photon::SpadModel::detect
 
-use super::binning::{Binning, Code, ROW, Tally, tally};
+use std::ops::Range;
+
+use super::binning::{Binning, Code, ROW};
 use super::history::{Photon, certain_from, split};
 use super::sight::{ROUNDING_FS, Sight};
+use super::tables::{MOST_PHOTONS, Tables};
 use super::{Window, Work, taken};
 use crate::chip::EventType;
 use crate::photon::{
-    Draw, GROUP, PLACE_BITS, PhotonStream, PixelStream, Place, SLOT, SPADS, SpadEvent,
-    time_in_slot_fs,
+    Draw, GROUP, PhotonStream, PixelStream, Place, SLOT, SPADS, SpadEvent, time_in_slot_fs,
 };
 use crate::units::Time;
 
@@ -38,9 +40,6 @@ enum Part {
 }
 
 const PARTS: [Part; 3] = [Part::Own, Part::Previous, Part::Carried];
-
-/// No photon.
-const NONE: u16 = u16::MAX;
 
 const LAST_CYCLE: usize = GROUP as usize - 1;
 
@@ -71,13 +70,7 @@ pub struct Counting<'a> {
     codes: Vec<Code>,
     /// Where each part's codes begin.
     first_code: [usize; 3],
-    cells: Vec<u8>,
-    /// Last photon by place.
-    last: Vec<u16>,
-    /// The photon before it at the same place, by photon.
-    before: Vec<u16>,
-    /// Photons that need a closer look.
-    special: Vec<u16>,
+    tables: Tables,
     photons: Vec<Photon>,
     /// Photons by cycle, for those that are sorted.
     sorted: Vec<(usize, Photon)>,
@@ -118,10 +111,7 @@ impl<'a> Counting<'a> {
             bases: Vec::new(),
             codes: Vec::new(),
             first_code: [0; 3],
-            cells: vec![0; binning.rows() * ROW],
-            last: vec![NONE; 1 << PLACE_BITS],
-            before: Vec::new(),
-            special: Vec::new(),
+            tables: Tables::new(binning.rows()),
             photons: Vec::new(),
             sorted: Vec::new(),
             events: Vec::new(),
@@ -138,7 +128,7 @@ impl<'a> Counting<'a> {
         };
         for group in 0..self.stream.groups() {
             self.draw(&mut pixel, group);
-            let is_dense = self.codes.len() >= usize::from(NONE);
+            let is_dense = self.codes.len() >= MOST_PHOTONS;
             if is_dense || self.stream.config().spads.has_secondaries() {
                 self.count_sorted(&mut pixel, group);
             } else {
@@ -198,57 +188,43 @@ impl<'a> Counting<'a> {
     }
 
     fn count_cells(&mut self, pixel: &mut Pixel<'_>, group: u32) {
-        self.cells.fill(0);
-        self.last.fill(NONE);
-        self.special.clear();
-        // Only what is placed below is read later.
-        let photons = self.codes.len().max(self.before.len());
-        self.before.resize(photons, NONE);
+        self.tables.clear();
         for (index, part) in PARTS.into_iter().enumerate() {
             self.place(index, part);
         }
         let cycles = self.cycles_of(group);
-        for index in 0..self.special.len() {
-            let photon = usize::from(self.special[index]);
+        let mut index = 0;
+        while let Some(photon) = self.tables.special(index) {
             let (cycle, spad) = split(self.codes[photon].place() as Place);
             if cycle < cycles {
                 self.settle(pixel, group, cycle, spad);
             }
+            index += 1;
         }
-        for (row, hits) in self.cells[ROW..].chunks_exact(ROW).zip(&mut pixel.hits) {
-            let Tally {
-                within,
-                occupied,
-                spads,
-            } = tally(&row[..cycles], self.counted.0, self.counted.1);
-            *hits += self.adds * within as i64;
-            pixel.work.clk_periods_visited += occupied;
-            pixel.work.pulses += spads;
+        let tallies = self.tables.tallies(cycles, self.counted);
+        for (tally, hits) in tallies.zip(&mut pixel.hits) {
+            *hits += self.adds * tally.within as i64;
+            pixel.work.clk_periods_visited += tally.occupied;
+            pixel.work.pulses += tally.spads;
         }
     }
 
-    /// Puts the photons of one draw into their cells, and notes those that are not alone.
+    /// Puts the photons of one draw into their cells.
     fn place(&mut self, index: usize, part: Part) {
         let draw = &self.draws[index];
         let first = self.first_code[index];
         let blocks = draw.words()[0][0].len();
-        let codes = &mut self.codes;
-        let mut put = |photon: usize| {
-            let code = &mut codes[photon];
-            if part != Part::Own {
-                let (cycle, _) = split(code.place() as Place);
-                let Some(window_cycle) = part.window_cycle(cycle) else {
-                    return;
-                };
-                *code = code.in_cycle(window_cycle);
-            }
-            let cell = &mut self.cells[code.cell()];
-            *cell = cell.wrapping_add(1);
-            let last = &mut self.last[code.place()];
-            let before = std::mem::replace(last, photon as u16);
-            self.before[photon] = before;
-            if before != NONE || code.is_doubtful() {
-                self.special.push(photon as u16);
+        let (codes, tables) = (&mut self.codes, &mut self.tables);
+        let mut put = |photons: Range<usize>| {
+            for (code, photon) in codes[photons.clone()].iter_mut().zip(photons) {
+                if part != Part::Own {
+                    let (cycle, _) = split(code.place() as Place);
+                    let Some(window_cycle) = part.window_cycle(cycle) else {
+                        continue;
+                    };
+                    *code = code.in_cycle(window_cycle);
+                }
+                tables.put(*code, photon);
             }
         };
         for run in draw.runs() {
@@ -256,28 +232,24 @@ impl<'a> Counting<'a> {
             for (half, range) in run.blocks().into_iter().enumerate() {
                 let first = first + half * blocks;
                 if left_fs >= SLOT.as_fs() {
-                    range.for_each(|block| put(first + block));
-                } else {
-                    // The slot outlasts the cycle.
-                    let times = draw.words()[half][0];
-                    range
-                        .filter(|&block| i64::from(time_in_slot_fs(times[block])) < left_fs)
-                        .for_each(|block| put(first + block));
+                    put(first + range.start..first + range.end);
+                    continue;
                 }
+                // The slot outlasts the cycle.
+                let times = draw.words()[half][0];
+                range
+                    .filter(|&block| i64::from(time_in_slot_fs(times[block])) < left_fs)
+                    .for_each(|block| put(first + block..first + block + 1));
             }
         }
         let signal = first + 2 * blocks;
-        (signal..signal + draw.signal().len()).for_each(put);
+        put(signal..signal + draw.signal().len());
     }
 
     /// Settles all photons of one SPAD in the window of one cycle.
     fn settle(&mut self, pixel: &mut Pixel<'_>, group: u32, cycle: usize, spad: u8) {
         let place = cycle * SPADS + usize::from(spad);
-        let mut photon = std::mem::replace(&mut self.last[place], NONE);
-        // Another special photon may have brought us here before.
-        if photon == NONE {
-            return;
-        }
+        let mut next = self.tables.take_last(place);
         let laser_cycle = group * GROUP + cycle as u32;
         let window = Placed {
             engine: self.engine,
@@ -287,15 +259,14 @@ impl<'a> Counting<'a> {
         };
         self.photons.clear();
         let mut seen = 0;
-        while photon != NONE {
-            let index = usize::from(photon);
-            let cell = &mut self.cells[self.codes[index].cell()];
-            *cell = cell.wrapping_sub(1);
-            let time = self.time_of(index, laser_cycle);
+        while let Some(photon) = next {
+            self.tables.remove(self.codes[photon].cell());
+            let time = self.time_of(photon, laser_cycle);
             seen += u64::from(window.row_of(time).is_some());
             self.photons.push((time, spad));
-            photon = self.before[index];
+            next = self.tables.before(photon);
         }
+        // None is in the window, or another special photon has brought us here before.
         if seen == 0 {
             return;
         }
@@ -307,14 +278,13 @@ impl<'a> Counting<'a> {
                 continue;
             };
             seen -= 1;
-            let cell = &mut self.cells[row * ROW + cycle];
             // Two pulses within one CLK period cancel.
             if last == Some(row) {
-                *cell = cell.wrapping_sub(1);
+                self.tables.remove(row * ROW + cycle);
                 last = None;
                 pixel.work.pulses += 2;
             } else {
-                *cell = cell.wrapping_add(1);
+                self.tables.add(row * ROW + cycle);
                 last = Some(row);
             }
         }

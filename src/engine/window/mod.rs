@@ -13,6 +13,7 @@ mod binning;
 mod counting;
 mod history;
 mod sight;
+mod tables;
 
 use super::light::full_stream;
 use super::{Engine, EngineError, Exposed, LitPixel, Work};

@@ -1,0 +1,144 @@
+//! `gdtof reproduce`: the thesis's figures, published beside computed.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::say;
+use crate::files::{InputError, OutputFile, create_folder};
+use crate::reproduce::{self, Report, Selection};
+
+/// Arguments of `gdtof reproduce`.
+#[derive(Args)]
+pub struct ReproduceArgs {
+    /// Only this claim of the list; may be repeated. Without any choice, everything.
+    #[arg(long, value_name = "N")]
+    claim: Vec<u32>,
+    /// Only this figure of the thesis; may be repeated.
+    #[arg(long, value_name = "N")]
+    figure: Vec<u32>,
+    /// Only this table of the thesis; may be repeated.
+    #[arg(long, value_name = "N")]
+    table: Vec<u32>,
+    /// Folder for the page (report.md, report.html, report.json), the figures as SVG and their numbers as CSV; made
+    /// if it is not there.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// JSON instead of tables.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Numbers that do not exist, unwritable output, and claims that leave their tolerance.
+pub fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
+    let chosen = Selection {
+        claims: args.claim.clone(),
+        figures: args.figure.clone(),
+        tables: args.table.clone(),
+    };
+    let selection = if chosen.is_empty() {
+        Selection::all()
+    } else {
+        chosen
+    };
+    selection
+        .check()
+        .map_err(|(option, message)| InputError::new(option, message))?;
+    if let Some(folder) = &args.out {
+        create_folder(folder)?;
+    }
+    let parts = selection.claims.len() + selection.figures.len() + selection.tables.len();
+    let bar = ProgressBar::new(parts as u64).with_style(
+        ProgressStyle::with_template("{bar:30} {pos}/{len} claims, tables and figures")
+            .expect("a template that indicatif knows"),
+    );
+    let report = reproduce::reproduce(&selection, || bar.inc(1));
+    bar.finish_and_clear();
+    if let Some(folder) = &args.out {
+        write(&report, folder)?;
+    }
+    if args.json {
+        say(format_args!("{:#}\n", report.json()))?;
+    } else {
+        print(&report, args.out.as_deref())?;
+    }
+    let failures = report.failures();
+    if let Some((claim, row)) = failures.first() {
+        anyhow::bail!(
+            "{} published figures are left, the first in claim {claim}: {}",
+            failures.len(),
+            row.what
+        );
+    }
+    Ok(())
+}
+
+/// Tables on the terminal.
+fn print(report: &Report, folder: Option<&Path>) -> std::io::Result<()> {
+    for result in &report.claims {
+        let claim = &result.claim;
+        say(format_args!(
+            "Claim {}: {} ({})\n{}",
+            claim.number,
+            claim.title,
+            claim.source,
+            reproduce::grid(&result.rows)
+        ))?;
+        for row in result.rows.iter().filter(|row| !row.notes().is_empty()) {
+            say(format_args!("  {}: {}\n", row.what, row.notes()))?;
+        }
+        say("\n")?;
+    }
+    for table in &report.tables {
+        say(format_args!(
+            "Table {}: {}\n{}\n",
+            table.number, table.title, table.grid
+        ))?;
+    }
+    for figure in &report.figures {
+        say(format_args!("Fig. {}: {}\n", figure.number, figure.title))?;
+        if folder.is_none() {
+            say("  give --out DIR for the picture and its numbers\n")?;
+        }
+    }
+    if !report.claims.is_empty() {
+        say(format_args!("{}.\n", reproduce::tally(report)))?;
+    }
+    if let Some(folder) = folder {
+        say(format_args!(
+            "page: {}\n",
+            folder.join("report.html").display()
+        ))?;
+    }
+    Ok(())
+}
+
+/// The page, the figures and the tables as files.
+fn write(report: &Report, folder: &Path) -> Result<(), InputError> {
+    for figure in &report.figures {
+        for (name, chart) in figure.files() {
+            chart.write(&folder.join(format!("{name}.svg")))?;
+        }
+    }
+    for table in &report.tables {
+        let path = folder.join(format!("table_{:03}.csv", table.number));
+        OutputFile::write_with(&path, |out| table.grid.write_csv(out))?;
+    }
+    let json = format!("{:#}\n", report.json());
+    let pages = [
+        ("report.md", reproduce::markdown(report)),
+        ("report.html", reproduce::html(report)),
+        ("report.json", json),
+    ];
+    for (name, text) in pages {
+        OutputFile::write_with(&folder.join(name), |out: &mut dyn Write| {
+            out.write_all(text.as_bytes())
+        })?;
+    }
+    Ok(())
+}

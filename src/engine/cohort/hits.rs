@@ -1,0 +1,101 @@
+//! How many of some SPADs a photon hits in one step: the binomial tails that split a cohort.
+
+use rand_philox::Philox;
+
+use super::draw::binomial;
+use crate::photon::SPADS;
+
+/// Probabilities that at least 0, 1, 2, … of some SPADs are hit, and their complements.
+#[derive(Debug, Clone, Copy)]
+pub struct Hits {
+    spads: usize,
+    at_least: [f64; SPADS + 2],
+    exactly: [f64; SPADS + 1],
+}
+
+impl Hits {
+    /// Each of `spads` SPADs is hit with probability `p`; `q` is 1 − `p`.
+    pub fn new(spads: usize, p: f64, q: f64) -> Self {
+        debug_assert!(spads <= SPADS);
+        let mut exactly = [0.0; SPADS + 1];
+        let mut at_least = [0.0; SPADS + 2];
+        if q > 0.0 {
+            exactly[0] = q.powi(spads as i32);
+            for hit in 0..spads {
+                let ways = (spads - hit) as f64 / (hit + 1) as f64;
+                exactly[hit + 1] = exactly[hit] * ways * (p / q);
+            }
+        }
+        if exactly[0] < 1e-200 {
+            // Nearly all are hit: count down from there, before digits are lost to underflow.
+            exactly[spads] = p.powi(spads as i32);
+            for hit in (0..spads).rev() {
+                let ways = (hit + 1) as f64 / (spads - hit) as f64;
+                exactly[hit] = exactly[hit + 1] * ways * (q / p);
+            }
+        }
+        for hit in (0..=spads).rev() {
+            at_least[hit] = at_least[hit + 1] + exactly[hit];
+        }
+        Hits {
+            spads,
+            at_least,
+            exactly,
+        }
+    }
+
+    /// How many SPADs there are.
+    pub fn spads(&self) -> usize {
+        self.spads
+    }
+
+    /// Probability that any is hit.
+    pub fn any(&self) -> f64 {
+        self.at_least[1]
+    }
+
+    /// Probability that none is hit.
+    pub fn none(&self) -> f64 {
+        self.exactly[0]
+    }
+
+    /// Probability that exactly `hit` are hit.
+    pub fn exactly(&self, hit: usize) -> f64 {
+        self.exactly[hit]
+    }
+
+    /// Of `cycles` laser cycles in each of which at least `least` SPADs are hit, those with one more at least.
+    pub fn more(&self, cycles: u64, least: usize, random: &mut Philox) -> u64 {
+        if cycles == 0 || least >= self.spads || self.at_least[least] == 0.0 {
+            return 0;
+        }
+        let of = self.at_least[least];
+        let (p, q) = (self.at_least[least + 1] / of, self.exactly[least] / of);
+        binomial(cycles, p.min(1.0), q.min(1.0), random)
+    }
+}
+
+/// Probability that at least `k` of a macropixel's SPADs are hit, with `mean` photons on each. Relative error below
+/// 10⁻¹³ down to 10⁻²⁹⁰.
+pub fn at_least_hit(k: usize, mean: f64) -> f64 {
+    Hits::new(SPADS, -libm::expm1(-mean), libm::exp(-mean)).at_least[k]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn tails_add_up(spads in 0usize..=16, mean in 1e-12f64..400.0) {
+            let (p, q) = (-libm::expm1(-mean), libm::exp(-mean));
+            let hits = Hits::new(spads, p, q);
+            prop_assert!((hits.at_least[0] - 1.0).abs() < 1e-12);
+            let any = -libm::expm1(-mean * spads as f64);
+            prop_assert!((hits.any() - any).abs() <= 1e-13 * any, "{} {any}", hits.any());
+            let mean: f64 = hits.at_least[1..].iter().sum();
+            prop_assert!((mean - p * spads as f64).abs() <= 1e-13 * mean);
+        }
+    }
+}

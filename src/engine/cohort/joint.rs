@@ -1,0 +1,441 @@
+//! The joint state of a macropixel's SPADs, cohort by cohort.
+//!
+//! Laser cycles whose SPADs fired at the same steps form a cohort; which SPAD is which does not matter. Cohorts are the
+//! nodes of a tree: the way from the root tells the avalanches that still matter, newest first.
+//!
+//! ```text
+//!   root: all SPADs rested ── n cycles
+//!    ├─ 7 ── one SPAD fired in step 7
+//!    │  └─ 5 ── one in step 7, one in step 5
+//!    └─ 5 ── one SPAD fired in step 5
+//! ```
+//!
+//! In each step a binomial draw takes the cycles of a node in which something happens out of it, and further ones tell
+//! what. When an avalanche is forgotten, its nodes are leaves, and fold into their parents. Only nodes with cycles
+//! in them cost anything; nothing is rounded or merged that differs.
+
+use rand_philox::Philox;
+
+use super::blindness::{Ages, Blindness};
+use super::draw::binomial;
+use super::hits::Hits;
+use super::{EventTable, Steps};
+use crate::photon::{DeadTimeLaw, SPADS};
+
+/// Counts of every bin after `cycles` laser cycles that begin in the state `ages`.
+pub fn run(
+    blindness: &Blindness,
+    ages: &Ages,
+    steps: &Steps,
+    is_event: &EventTable,
+    cycles: u64,
+    random: &mut Philox,
+) -> Vec<u64> {
+    let mut tree = Tree::new(blindness, cycles);
+    tree.age(ages, random);
+    let periods = steps.means.chunks(steps.per_period);
+    periods
+        .map(|period| {
+            tree.period = tree.step;
+            for &mean in period {
+                tree.advance(mean, random);
+            }
+            let count = tree.count(is_event);
+            tree.forget();
+            count
+        })
+        .collect()
+}
+
+/// An avalanche on the way to a node: its step, and whether it made a pulse.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Avalanche {
+    step: u32,
+    pulse: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    /// Cycles in this state.
+    cycles: u64,
+    /// The node without the oldest avalanche.
+    parent: u32,
+    oldest: Avalanche,
+    /// SPADs with an avalanche that matters.
+    depth: u8,
+    first_child: u32,
+    next_sibling: u32,
+}
+
+const ROOT: u32 = 0;
+const NONE: u32 = u32::MAX;
+
+struct Tree<'a> {
+    blindness: &'a Blindness,
+    nodes: Vec<Node>,
+    unused: Vec<u32>,
+    /// Nodes by the step of their oldest avalanche, parents before children.
+    by_step: Vec<Vec<u32>>,
+    /// First step that is not forgotten.
+    remembered: u32,
+    /// The step to come, and the first one of its CLK period.
+    step: u32,
+    period: u32,
+}
+
+/// SPADs that behave alike in a step: those that are free, or those with one and the same avalanche.
+#[derive(Debug, Clone, Copy)]
+struct Group {
+    avalanche: Option<Avalanche>,
+    hits: Hits,
+    /// Probability that a hit makes a pulse.
+    able: f64,
+    /// Probability that anything happens in this group or one after it, and its complement.
+    any_from_here: f64,
+    none_from_here: f64,
+}
+
+impl Group {
+    /// A group without avalanches, the last one.
+    fn free(hits: Hits, able: f64) -> Self {
+        Group {
+            avalanche: None,
+            hits,
+            able,
+            any_from_here: hits.any(),
+            none_from_here: hits.none(),
+        }
+    }
+}
+
+/// What became of a node's SPADs in a step.
+#[derive(Debug, Clone, Default)]
+struct Outcome {
+    /// Avalanches that newer ones replaced, oldest first.
+    replaced: Vec<Avalanche>,
+    pulses: usize,
+    silent: usize,
+    /// Pulses of this CLK period whose SPAD was hit again without a pulse.
+    kept: usize,
+}
+
+impl<'a> Tree<'a> {
+    fn new(blindness: &'a Blindness, cycles: u64) -> Self {
+        let root = Node {
+            cycles,
+            parent: NONE,
+            oldest: Avalanche {
+                step: 0,
+                pulse: false,
+            },
+            depth: 0,
+            first_child: NONE,
+            next_sibling: NONE,
+        };
+        Tree {
+            blindness,
+            nodes: vec![root],
+            unused: Vec::new(),
+            by_step: Vec::new(),
+            remembered: 0,
+            step: 0,
+            period: 0,
+        }
+    }
+
+    /// Draws the state at the start: independent SPADs, each with the probabilities `ages`.
+    fn age(&mut self, ages: &Ages, random: &mut Philox) {
+        let mut younger: f64 = 1.0;
+        for &share in ages.aged.iter().rev() {
+            let p = if share > 0.0 {
+                (share / younger).min(1.0)
+            } else {
+                0.0
+            };
+            younger -= share;
+            let mut free: [Option<Hits>; SPADS + 1] = [None; SPADS + 1];
+            self.each_node(|tree, node| {
+                let spads = SPADS - usize::from(tree.nodes[node as usize].depth);
+                let hits = *free[spads].get_or_insert_with(|| Hits::new(spads, p, 1.0 - p));
+                let group = Group::free(hits, 0.0);
+                let taken = tree.take(node, &group, random);
+                tree.spread(node, taken, &[group], true, &Outcome::default(), random);
+            });
+            self.step += 1;
+        }
+    }
+
+    /// One step with `mean` photons on each SPAD.
+    fn advance(&mut self, mean: f64, random: &mut Philox) {
+        let (p, q) = (-libm::expm1(-mean), libm::exp(-mean));
+        if p > 0.0 {
+            let mut free: [Option<Hits>; SPADS + 1] = [None; SPADS + 1];
+            let mut groups: Vec<Group> = Vec::new();
+            self.each_node(|tree, node| {
+                let spads = SPADS - usize::from(tree.nodes[node as usize].depth);
+                let hits = *free[spads].get_or_insert_with(|| Hits::new(spads, p, q));
+                groups.clear();
+                groups.push(Group::free(hits, 1.0));
+                tree.add_aged(node, p, q, &mut groups);
+                let taken = tree.take(node, &groups[0], random);
+                if taken > 0 {
+                    tree.spread(node, taken, &groups, true, &Outcome::default(), random);
+                }
+            });
+        }
+        self.step += 1;
+    }
+
+    /// Calls `visit` for the nodes that hold cycles now.
+    fn each_node(&mut self, mut visit: impl FnMut(&mut Self, u32)) {
+        let now: Vec<u32> = (0..self.nodes.len() as u32)
+            .filter(|&node| self.nodes[node as usize].cycles > 0)
+            .collect();
+        for node in now {
+            visit(self, node);
+        }
+    }
+
+    /// Takes those cycles out of `node` in which something happens from group `first` on.
+    fn take(&mut self, node: u32, first: &Group, random: &mut Philox) -> u64 {
+        let node = &mut self.nodes[node as usize];
+        let (any, none) = (first.any_from_here, first.none_from_here);
+        let taken = binomial(node.cycles, any.min(1.0), none, random);
+        node.cycles -= taken;
+        taken
+    }
+
+    /// Adds the groups of `node`'s SPADs with an avalanche that a photon may do something to.
+    fn add_aged(&self, node: u32, p: f64, q: f64, groups: &mut Vec<Group>) {
+        let mut at = node;
+        while at != ROOT {
+            let Node { parent, oldest, .. } = self.nodes[at as usize];
+            let able = self.blindness.able((self.step - oldest.step) as usize);
+            let (p, q, able) = match self.blindness.law {
+                DeadTimeLaw::NonParalysable => (p * able, q + p * (1.0 - able), 1.0),
+                DeadTimeLaw::Paralysable => (p, q, able),
+            };
+            if p == 0.0 {
+                break; // newer ones are as blind
+            }
+            let same = groups.pop_if(|group| group.avalanche == Some(oldest));
+            let spads = same.map_or(0, |group| group.hits.spads()) + 1;
+            groups.push(Group {
+                avalanche: Some(oldest),
+                ..Group::free(Hits::new(spads, p, q), able)
+            });
+            at = parent;
+        }
+        for i in (0..groups.len() - 1).rev() {
+            let (any, none) = (groups[i + 1].any_from_here, groups[i + 1].none_from_here);
+            let group = &mut groups[i];
+            group.any_from_here += group.none_from_here * any;
+            group.none_from_here *= none;
+        }
+    }
+
+    /// Puts `cycles`, taken out of `node`, where the avalanches in `groups` lead them. While `waiting`, nothing has
+    /// happened yet, but something must.
+    fn spread(
+        &mut self,
+        node: u32,
+        cycles: u64,
+        groups: &[Group],
+        waiting: bool,
+        outcome: &Outcome,
+        random: &mut Philox,
+    ) {
+        if cycles == 0 {
+            return;
+        }
+        let Some((group, rest)) = groups.split_first() else {
+            debug_assert!(!waiting, "something happened");
+            let to = self.destination(node, outcome);
+            self.nodes[to as usize].cycles += cycles;
+            return;
+        };
+        let hit = match waiting {
+            true if rest.is_empty() => cycles,
+            true => {
+                let p = group.hits.any() / group.any_from_here;
+                let q = group.hits.none() * rest[0].any_from_here / group.any_from_here;
+                binomial(cycles, p.min(1.0), q.min(1.0), random)
+            }
+            false => binomial(cycles, group.hits.any(), group.hits.none(), random),
+        };
+        self.spread(node, cycles - hit, rest, waiting, outcome, random);
+        let mut at_least = hit;
+        for count in 1..=group.hits.spads() {
+            let more = group.hits.more(at_least, count, random);
+            self.renew(node, at_least - more, groups, count, outcome, random);
+            at_least = more;
+            if more == 0 {
+                break;
+            }
+        }
+    }
+
+    /// `count` SPADs of the first of `groups` are hit in `cycles`: some make pulses, some do not.
+    fn renew(
+        &mut self,
+        node: u32,
+        cycles: u64,
+        groups: &[Group],
+        count: usize,
+        outcome: &Outcome,
+        random: &mut Philox,
+    ) {
+        if cycles == 0 {
+            return;
+        }
+        let (group, rest) = groups.split_first().expect("the group that is hit");
+        let pulses = Hits::new(count, group.able, 1.0 - group.able);
+        let mut at_least = cycles;
+        for pulsing in 0..=count {
+            let more = pulses.more(at_least, pulsing, random);
+            let these = at_least - more;
+            if these > 0 {
+                let mut outcome = outcome.clone();
+                let silent = count - pulsing;
+                outcome.pulses += pulsing;
+                match group.avalanche {
+                    Some(old) => {
+                        outcome.replaced.extend(std::iter::repeat_n(old, count));
+                        let kept = old.pulse && old.step >= self.period;
+                        *(if kept {
+                            &mut outcome.kept
+                        } else {
+                            &mut outcome.silent
+                        }) += silent;
+                    }
+                    None => outcome.silent += silent,
+                }
+                self.spread(node, these, rest, false, &outcome, random);
+            }
+            at_least = more;
+            if more == 0 {
+                break;
+            }
+        }
+    }
+
+    /// The node that `node` becomes, made if need be.
+    fn destination(&mut self, node: u32, outcome: &Outcome) -> u32 {
+        let mut way = [Avalanche {
+            step: 0,
+            pulse: false,
+        }; SPADS];
+        let mut length = 0;
+        let mut at = node;
+        let mut replaced = outcome.replaced.iter().peekable();
+        while at != ROOT {
+            let Node { parent, oldest, .. } = self.nodes[at as usize];
+            if replaced.next_if(|&&old| old == oldest).is_none() {
+                way[length] = oldest;
+                length += 1;
+            }
+            at = parent;
+        }
+        debug_assert!(replaced.next().is_none(), "what is replaced was there");
+        let mut at = ROOT;
+        for (count, pulse) in [
+            (outcome.pulses + outcome.kept, true),
+            (outcome.silent, false),
+        ] {
+            let step = self.step;
+            for _ in 0..count {
+                at = self.child(at, Avalanche { step, pulse });
+            }
+        }
+        for &avalanche in way[..length].iter().rev() {
+            at = self.child(at, avalanche);
+        }
+        at
+    }
+
+    /// The child of `parent` with one avalanche more, an older one.
+    fn child(&mut self, parent: u32, oldest: Avalanche) -> u32 {
+        let mut child = self.nodes[parent as usize].first_child;
+        while child != NONE {
+            let node = &self.nodes[child as usize];
+            if node.oldest == oldest {
+                return child;
+            }
+            child = node.next_sibling;
+        }
+        let node = Node {
+            cycles: 0,
+            parent,
+            oldest,
+            depth: self.nodes[parent as usize].depth + 1,
+            first_child: NONE,
+            next_sibling: self.nodes[parent as usize].first_child,
+        };
+        let child = match self.unused.pop() {
+            Some(index) => {
+                self.nodes[index as usize] = node;
+                index
+            }
+            None => {
+                self.nodes.push(node);
+                self.nodes.len() as u32 - 1
+            }
+        };
+        self.nodes[parent as usize].first_child = child;
+        let step = oldest.step as usize;
+        if self.by_step.len() <= step {
+            self.by_step.resize_with(step + 1, Vec::new);
+        }
+        self.by_step[step].push(child);
+        child
+    }
+
+    /// Cycles whose pulses in this CLK period make an event.
+    fn count(&self, is_event: &EventTable) -> u64 {
+        let live = self.nodes.iter().filter(|node| node.cycles > 0);
+        let counted = live.filter(|node| {
+            let mut pulses = 0;
+            let mut at = *node;
+            while at.parent != NONE {
+                pulses += usize::from(at.oldest.pulse && at.oldest.step >= self.period);
+                at = &self.nodes[at.parent as usize];
+            }
+            is_event[pulses]
+        });
+        counted.map(|node| node.cycles).sum()
+    }
+
+    /// Folds avalanches that no longer matter in the step to come into the nodes without them.
+    fn forget(&mut self) {
+        let memory = self.blindness.memory() as u32;
+        while self.remembered + memory < self.step {
+            let Some(leaves) = self.by_step.get_mut(self.remembered as usize) else {
+                self.remembered += 1;
+                continue;
+            };
+            for leaf in std::mem::take(leaves).into_iter().rev() {
+                let Node {
+                    cycles,
+                    parent,
+                    next_sibling,
+                    first_child,
+                    ..
+                } = self.nodes[leaf as usize];
+                debug_assert_eq!(first_child, NONE, "nothing is older than the oldest");
+                self.nodes[parent as usize].cycles += cycles;
+                self.nodes[leaf as usize].cycles = 0;
+                let mut link = self.nodes[parent as usize].first_child;
+                if link == leaf {
+                    self.nodes[parent as usize].first_child = next_sibling;
+                } else {
+                    while self.nodes[link as usize].next_sibling != leaf {
+                        link = self.nodes[link as usize].next_sibling;
+                    }
+                    self.nodes[link as usize].next_sibling = next_sibling;
+                }
+                self.unused.push(leaf);
+            }
+            self.remembered += 1;
+        }
+    }
+}

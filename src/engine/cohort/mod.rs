@@ -1,0 +1,381 @@
+//! The cohort engine: histograms without photons, at a cost that does not grow with the laser cycles.
+//!
+//! Laser cycles whose SPADs are in the same state move together: a binomial draw says how many of them see what in the
+//! next step. Two ways of keeping that state share one model of light and dead time:
+//!
+//! | way | state | exact | cost of a bin |
+//! |---|---|---|---|
+//! | [`pooled`] | how many SPADs fired 1, 2, … CLK periods ago | every bin; two bins' correlation up to [`CohortOptions::neglect`] | a few draws |
+//! | [`joint`] | how many cycles have which of these on one macropixel | all of it | a draw for every state that occurs |
+//!
+//! What both share, and what it costs in exactness:
+//!
+//! * **Dead time in steps** ([`blindness`]): [`CohortOptions::sub_bins`] steps to a CLK period, the error knob. The
+//!   probability of being blind is exact to first order in the photons on one SPAD in a step.
+//! * **Start.** A window begins with every SPAD in the state that the light before it leaves behind: the steady state
+//!   of the background, carried step by step through an echo where one comes before the window. It is a
+//!   probability for each age of one SPAD, computed, not drawn.
+//! * **Memory.** Laser cycles are taken to be independent. They are unless a SPAD stays busy from one window to the
+//!   next: without a dead time's length free of photons it cannot be told whether it has recovered.
+//!   The probability of that, over all SPADs and cycles, is bounded; beyond [`CohortOptions::memory`]
+//!   the engine refuses. Cycles so early that the first STOP edge is still remembered are run one by one from rest.
+//! * A SPAD is to fire at most once in a CLK period: a shorter dead time is refused. So are afterpulses, crosstalk and
+//!   measured laser pulses.
+
+mod blindness;
+mod draw;
+mod hits;
+mod joint;
+mod light;
+mod pooled;
+
+pub use self::blindness::BlindSpad;
+use self::blindness::{Ages, Blindness};
+pub use self::draw::none_of;
+use self::hits::Hits;
+pub use self::hits::at_least_hit;
+use self::light::SpadLight;
+use super::{Engine, EngineError, Exposed, LitPixel, Work};
+use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw, correlation, histogram, window_law};
+use crate::photon::{
+    PhotonStream, PixelLight, Purpose, SPADS, SpadEvent, StreamConfig, random_stream,
+};
+
+/// Whether 0, 1, 2, … SPADs that fire in a CLK period make an event.
+type EventTable = [bool; SPADS + 1];
+
+/// Light on one SPAD over a window.
+#[derive(Debug, Clone)]
+struct Steps {
+    /// Mean photons of each step.
+    means: Vec<f64>,
+    /// Steps to a CLK period.
+    per_period: usize,
+}
+
+/// The engine's knobs: what may be left out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CohortOptions {
+    /// Steps to a CLK period, at least 1. More make the dead time's end finer and cost more.
+    pub sub_bins: usize,
+    /// Largest correlation between two bins that may be neglected to save time; 0 never neglects any.
+    pub neglect: f64,
+    /// Largest probability, for a whole exposure of a macropixel, that laser cycles depend on each other.
+    pub memory: f64,
+}
+
+impl Default for CohortOptions {
+    fn default() -> Self {
+        CohortOptions {
+            sub_bins: 1,
+            neglect: 1e-4,
+            memory: 1e-6,
+        }
+    }
+}
+
+/// Photons that are worth looking at one by one before [`joint`] is the cheaper way.
+const WORTH_LOOKING_AT: f64 = 200.0;
+
+/// What is left of a state that counts as forgotten.
+const FORGOTTEN: f64 = 1e-15;
+
+/// Draws histograms from their distribution.
+pub struct Cohort<'a> {
+    config: &'a SensorConfig,
+    exposure: &'a Exposure,
+    law: WindowLaw,
+    options: CohortOptions,
+    is_event: EventTable,
+}
+
+impl<'a> Cohort<'a> {
+    /// An engine for this sensor and exposure.
+    pub fn new(config: &'a SensorConfig, exposure: &'a Exposure, options: CohortOptions) -> Self {
+        debug_assert!(options.sub_bins >= 1, "a period has a step");
+        let is_event = std::array::from_fn(|fired| {
+            let spads = ((1u32 << fired) - 1) as u16;
+            correlation::model(spads, config.event_type, config.threshold)
+        });
+        Cohort {
+            config,
+            exposure,
+            law: WindowLaw::new(config, exposure),
+            options,
+            is_event,
+        }
+    }
+
+    /// A histogram of macropixel `pixel` under `light`, bin 0 earliest: a pure function of the stream's seed and
+    /// everything given.
+    ///
+    /// # Errors
+    /// Races of the window law, a dead time below a CLK period, and laser cycles that depend on each other.
+    pub fn draw(
+        &self,
+        stream: &StreamConfig,
+        pixel: u32,
+        start: u16,
+        light: &PixelLight,
+    ) -> Result<Vec<u16>, EngineError> {
+        let (bits, overflow) = (self.config.bin_bits as u32, self.config.overflow);
+        let hits = self.hits(stream, pixel, start, light)?;
+        let counts = hits.iter().map(|&n| histogram::model(n, bits, overflow));
+        Ok(counts.collect())
+    }
+
+    /// As [`Cohort::draw`], before counters saturate or wrap.
+    ///
+    /// # Errors
+    /// As [`Cohort::draw`].
+    pub fn hits(
+        &self,
+        stream: &StreamConfig,
+        pixel: u32,
+        start: u16,
+        light: &PixelLight,
+    ) -> Result<Vec<u64>, EngineError> {
+        let mut hits = vec![0; self.config.bins];
+        let random = &mut random_stream(stream.seed, Purpose::Cohort, pixel, 0);
+        for cohort in self.cohorts(stream, start, light)? {
+            let (steps, cycles) = (&cohort.steps, cohort.cycles);
+            let pools = steps.per_period == 1
+                && cycles > 1
+                && pooled::neglected(steps) <= self.options.neglect
+                && pooled::looked_at(&cohort.blindness, steps, cycles) <= WORTH_LOOKING_AT;
+            let run = if pools { pooled::run } else { joint::run };
+            let counts = run(
+                &cohort.blindness,
+                &cohort.ages,
+                steps,
+                &self.is_event,
+                cycles,
+                random,
+            );
+            let compared = hits.iter_mut().zip(counts).skip(cohort.not_compared);
+            compared.for_each(|(sum, count)| *sum += count);
+        }
+        Ok(hits)
+    }
+
+    /// Mean of every bin of [`Cohort::hits`], computed.
+    ///
+    /// # Errors
+    /// As [`Cohort::draw`].
+    pub fn expected(
+        &self,
+        stream: &StreamConfig,
+        start: u16,
+        light: &PixelLight,
+    ) -> Result<Vec<f64>, EngineError> {
+        let mut means = vec![0.0; self.config.bins];
+        for mut cohort in self.cohorts(stream, start, light)? {
+            let periods = cohort.steps.means.chunks(cohort.steps.per_period);
+            for (bin, (sum, period)) in means.iter_mut().zip(periods).enumerate() {
+                let mut pulse = 0.0;
+                for &mean in period {
+                    pulse += cohort.ages.pulse(&cohort.blindness, mean);
+                    cohort.ages.step(&cohort.blindness, mean);
+                }
+                let fired = Hits::new(SPADS, pulse, 1.0 - pulse);
+                let events = (0..=SPADS).filter(|&spads| self.is_event[spads]);
+                let event: f64 = events.map(|spads| fired.exactly(spads)).sum();
+                if bin >= cohort.not_compared {
+                    *sum += cohort.cycles as f64 * event;
+                }
+            }
+        }
+        Ok(means)
+    }
+
+    /// The laser cycles of an exposure by what they have in common: the settled ones together, early ones alone.
+    fn cohorts(
+        &self,
+        stream: &StreamConfig,
+        start: u16,
+        light: &PixelLight,
+    ) -> Result<Vec<LikeCycles>, EngineError> {
+        let bins = self.config.bins;
+        let window = match self.law.window(start) {
+            window_law::Window::Open(window) => window,
+            window_law::Window::Never => return Ok(Vec::new()),
+            window_law::Window::Irregular(why) => return Err(EngineError::Irregular(why)),
+            window_law::Window::Race(why) => return Err(EngineError::Race(why)),
+        };
+        let period_fs = 1e15 / stream.clock.as_hz();
+        let dead_fs = stream.spads.dead_time.as_fs() as f64;
+        let refusals = [
+            (dead_fs < period_fs, "a dead time shorter than a CLK period"),
+            (stream.spads.has_secondaries(), "afterpulses and crosstalk"),
+            (stream.pulse_shape.is_some(), "a measured laser pulse"),
+        ];
+        if let Some((_, what)) = refusals.into_iter().find(|(refuses, _)| *refuses) {
+            return Err(EngineError::NotInCohorts(what));
+        }
+        let dead_steps = dead_fs / period_fs * self.options.sub_bins as f64;
+        let scene = Scene {
+            light: SpadLight::new(stream, light),
+            blindness: Blindness::new(stream.spads.law, dead_steps),
+            step_fs: period_fs / self.options.sub_bins as f64,
+            dead_fs,
+            from_fs: self.law.interval(&window).start.as_fs() as f64,
+            cycle_fs: period_fs * f64::from(stream.stop_periods),
+        };
+        let cycles = i64::from(self.exposure.laser_cycles);
+        let between_fs = scene.cycle_fs - bins as f64 * period_fs;
+        let memory = scene.remembers(between_fs) * SPADS as f64 * cycles as f64;
+        if cycles > 1 && memory > self.options.memory {
+            return Err(EngineError::Memory(memory));
+        }
+
+        // A conventional cycle is latched by the STOP edge that ends it; the exposure's first one ends one, too.
+        let first_cycle = match self.config.mode {
+            Mode::Guided => 0,
+            Mode::Conventional => -1,
+        };
+        let settled = |cycle: i64| {
+            let since_fs = cycle as f64 * scene.cycle_fs + scene.from_fs;
+            scene.remembers(since_fs) * SPADS as f64 <= self.options.memory
+        };
+        let early = (first_cycle..cycles)
+            .take_while(|&cycle| !settled(cycle))
+            .map(|cycle| {
+                let dark_until_fs = -(cycle as f64) * scene.cycle_fs;
+                // The pipeline starts empty: nothing before rising edge -1 was ever compared.
+                let first_edge = cycle * i64::from(self.exposure.stop_periods) + window.first_edge;
+                LikeCycles {
+                    cycles: 1,
+                    blindness: scene.blindness.clone(),
+                    ages: scene.rested_start(dark_until_fs),
+                    steps: self.steps(&scene, dark_until_fs),
+                    not_compared: (-1 - first_edge).clamp(0, bins as i64) as usize,
+                }
+            });
+        let mut cohorts: Vec<LikeCycles> = early.collect();
+        cohorts.push(LikeCycles {
+            cycles: (cycles - first_cycle) as u64 - cohorts.len() as u64,
+            ages: scene.steady_start(),
+            steps: self.steps(&scene, f64::NEG_INFINITY),
+            blindness: scene.blindness,
+            not_compared: 0,
+        });
+        Ok(cohorts)
+    }
+
+    fn steps(&self, scene: &Scene, dark_until_fs: f64) -> Steps {
+        let per_period = self.options.sub_bins;
+        let count = self.config.bins * per_period;
+        Steps {
+            means: scene
+                .light
+                .steps(scene.from_fs, scene.step_fs, count, dark_until_fs),
+            per_period,
+        }
+    }
+}
+
+impl Engine for Cohort<'_> {
+    fn histogram(&self, _: u16, _: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
+        Err(EngineError::NoPhotons("cohort"))
+    }
+
+    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+        let dark = PixelLight {
+            signal_per_cycle: 0.0,
+            arrival: crate::units::Time::ZERO,
+            background_hz: 0.0,
+        };
+        let config = stream.config();
+        let mut exposed = Exposed::default();
+        for pixel in pixels {
+            let light = pixel.light.unwrap_or(dark);
+            let counts = self.draw(config, pixel.number, pixel.start, &light)?;
+            exposed.histograms.push(counts);
+            let closed = self.law.window(pixel.start).open().is_none();
+            let periods = u64::from(config.stop_periods) * u64::from(config.laser_cycles);
+            exposed.work += Work {
+                macropixels: 1,
+                skipped_closed: u64::from(closed),
+                clk_periods: periods,
+                clk_periods_visited: if closed { 0 } else { self.config.bins as u64 },
+                ..Work::default()
+            };
+        }
+        Ok(exposed)
+    }
+}
+
+/// Laser cycles with the same light and the same state at the start of the window.
+struct LikeCycles {
+    cycles: u64,
+    blindness: Blindness,
+    ages: Ages,
+    steps: Steps,
+    /// First bins that the pipeline has not reached yet.
+    not_compared: usize,
+}
+
+/// Light and dead time around one macropixel's window. Times in femtoseconds from its laser cycle's STOP edge.
+struct Scene {
+    light: SpadLight,
+    blindness: Blindness,
+    step_fs: f64,
+    dead_fs: f64,
+    from_fs: f64,
+    cycle_fs: f64,
+}
+
+impl Scene {
+    /// Bound on the probability that a SPAD has no dead time's length without photons in `duration_fs`, one echo in it
+    /// included: that it cannot be told whether it has recovered.
+    fn remembers(&self, duration_fs: f64) -> f64 {
+        let echo = self.light.echo(0.0);
+        let (echo_fs, cuts) = echo.map_or((0.0, 0.0), |echo| (echo.end - echo.start, 1.0));
+        let stretches = ((duration_fs - echo_fs) / self.dead_fs - cuts).floor();
+        let busy = -libm::expm1(-self.light.background(self.dead_fs));
+        if stretches >= 1.0 {
+            busy.powf(stretches)
+        } else {
+            1.0
+        }
+    }
+
+    /// The state at the start of the window in a settled laser cycle.
+    fn steady_start(&self) -> Ages {
+        let background = self.light.background(self.step_fs);
+        let steady = Ages::steady(&self.blindness, background);
+        let busy = -libm::expm1(-self.light.background(self.dead_fs));
+        let stretches = (libm::log(FORGOTTEN) / libm::log(busy)).ceil().max(1.0);
+        let remembered_from = self.from_fs - stretches * self.dead_fs;
+        let own_cycle = (self.from_fs / self.cycle_fs).floor();
+        let echoes = [own_cycle - 1.0, own_cycle].map(|cycle| self.light.echo(cycle));
+        let earliest = echoes
+            .into_iter()
+            .flatten()
+            .filter(|echo| echo.start < self.from_fs && echo.end > remembered_from)
+            .map(|echo| echo.start)
+            .reduce(f64::min);
+        match earliest {
+            Some(since) => self.carried(steady, since, f64::NEG_INFINITY),
+            None => steady,
+        }
+    }
+
+    /// The state at the start of a window after rest until `since_fs`.
+    fn rested_start(&self, since_fs: f64) -> Ages {
+        self.carried(Ages::rested(&self.blindness), since_fs, since_fs)
+    }
+
+    /// The state at the start of the window, when it was `ages` at `since_fs`.
+    fn carried(&self, mut ages: Ages, since_fs: f64, dark_until_fs: f64) -> Ages {
+        let count = ((self.from_fs - since_fs) / self.step_fs).ceil().max(0.0);
+        let from_fs = self.from_fs - count * self.step_fs;
+        for mean in self
+            .light
+            .steps(from_fs, self.step_fs, count as usize, dark_until_fs)
+        {
+            ages.step(&self.blindness, mean);
+        }
+        ages
+    }
+}

@@ -1,0 +1,277 @@
+//! What an arriving edge does: the action of a gate or flip-flop, before it has its place on the tape.
+
+use super::*;
+
+impl Leveliser<'_> {
+    pub(super) fn draft(&mut self, position_fs: i64, arrival_fs: i64, action: Action) -> usize {
+        self.drafts.push(Draft {
+            position_fs: (position_fs + arrival_fs).rem_euclid(self.period_fs),
+            arrival_fs,
+            action,
+            wakes: Default::default(),
+        });
+        self.drafts.len() - 1
+    }
+
+    /// The clock mask that a flip-flop uses: where its reset is released between the clock's edge and the change of Q,
+    /// a mask of its own, gated in the instant of the edge by an action of its own.
+    pub(super) fn sampled_reset(
+        &mut self,
+        cause: Cause,
+        arc: &Arc,
+        mask: u16,
+        arrival_fs: i64,
+        instant_fs: i64,
+    ) -> Result<(u16, Option<usize>), Unlevelled> {
+        let reset = self.survey.netlist.cells()[arc.cell].inputs[2];
+        let clock_to_q = self.delay(arc, Edge::Rise);
+        let is_between = |release: &Cause| {
+            let after = release.position_fs - cause.position_fs - arrival_fs;
+            release.net == reset && !release.value && after.rem_euclid(self.period_fs) <= clock_to_q
+        };
+        if !self.causes.iter().any(is_between) {
+            return Ok((mask, None));
+        }
+        let (place, inverted) = self.bit(reset)?;
+        let gated = self.new_place();
+        let action = Action {
+            code: Code::And,
+            inputs: [mask, place, ZERO, ZERO],
+            invert: [0, inversion(!inverted), 0, 0, 0],
+            out: gated,
+            directions: [u64::MAX; 2],
+            masks: [SINK; 2],
+            wakes: [0; 3],
+            traps: [false; 2],
+            is_doubtful: false,
+        };
+        Ok((
+            gated,
+            Some(self.draft(cause.position_fs, instant_fs, action)),
+        ))
+    }
+
+    pub(super) fn flip_flop(
+        &mut self,
+        cause: Cause,
+        index: usize,
+        mask: Option<u16>,
+        arrival_fs: i64,
+    ) -> Result<usize, Unlevelled> {
+        let cell = self.survey.netlist.cells()[index];
+        let [d, _, r, s] = cell.inputs;
+        let q = if cell.outputs[0].is_some() {
+            cell.outputs[0]
+        } else {
+            cell.outputs[1]
+        };
+        let (out, _) = self.bit(q)?;
+        let mut bit = |net: NetId| {
+            if net.is_some() {
+                self.bit(net)
+            } else {
+                Ok((ZERO, false))
+            }
+        };
+        let (reset, set) = (bit(r)?, bit(s)?);
+        let mut is_doubtful = false;
+        let (code, data) = if mask.is_none() {
+            (Code::Async, (ZERO, false))
+        } else if self.survey.class(d) == Class::Stream {
+            let (code, is_race) = self.sampler(cause, &cell, index, arrival_fs)?;
+            is_doubtful = is_race;
+            (code, (ZERO, false))
+        } else {
+            let data = self.bit(d)?;
+            let toggles = data == (out, true) && set == (ZERO, false);
+            (
+                if toggles {
+                    Code::Toggle
+                } else {
+                    Code::FlipFlop
+                },
+                data,
+            )
+        };
+        let action = Action {
+            code,
+            inputs: [data.0, mask.unwrap_or(ZERO), reset.0, set.0],
+            invert: [
+                inversion(data.1),
+                0,
+                inversion(reset.1),
+                inversion(set.1),
+                0,
+            ],
+            out,
+            directions: [u64::MAX; 2],
+            masks: [SINK; 2],
+            wakes: [0; 3],
+            traps: [false; 2],
+            is_doubtful,
+        };
+        Ok(self.draft(cause.position_fs, arrival_fs, action))
+    }
+
+    /// A flip-flop that samples the stream `arrival_fs − clk-to-Q` after its cause, and whether that is within setup
+    /// and hold of a change.
+    pub(super) fn sampler(
+        &self,
+        cause: Cause,
+        cell: &FlatCell,
+        index: usize,
+        arrival_fs: i64,
+    ) -> Result<(Code, bool), Unlevelled> {
+        let survey = self.survey;
+        let data = cell.inputs[0];
+        let (register, _) = survey.driver[data.index()].expect("a stream net has a driver");
+        if !survey.netlist.cells()[register].kind.is_flip_flop() {
+            return Err(Unlevelled::Structure(survey.name(data)));
+        }
+        let clock_to_q = |cell: usize| i64::from(survey.timing.of(cell)[1].rise_fs);
+        let due = (cause.position_fs + arrival_fs).rem_euclid(self.period_fs);
+        let after_change = due - clock_to_q(index) - self.period_fs / 2 - clock_to_q(register);
+        let edges = after_change.div_euclid(self.period_fs);
+        let after = after_change.rem_euclid(self.period_fs);
+        let limits = self.library.checks(cell.kind);
+        let limit = |limit: DataLimit| {
+            let longest = limit
+                .rise
+                .at(self.config.corner)
+                .max(limit.fall.at(self.config.corner));
+            i64::from(longest) + ROUNDING_FS
+        };
+        let is_race = after <= limit(limits.setup) || self.period_fs - after <= limit(limits.hold);
+        let tap = self
+            .sampled
+            .iter()
+            .position(|&net| net == data)
+            .expect("noted before");
+        let offset = edges as i8 + 1;
+        Ok((
+            Code::Sampler {
+                tap: tap as u16,
+                offset,
+            },
+            is_race,
+        ))
+    }
+
+    /// The action of a gate for one change of its output, or for both where nothing comes between them.
+    pub(super) fn gate(
+        &mut self,
+        cause: Cause,
+        index: usize,
+        to: Node,
+        arrival: &HashMap<Node, (i64, i64)>,
+        gates: &mut HashMap<Node, usize>,
+    ) -> Result<usize, Unlevelled> {
+        let cell = self.survey.netlist.cells()[index];
+        let times = Edge::BOTH.map(|edge| arrival.get(&(to.0, edge)).map(|window| window.1));
+        let is_quiet = |from: i64, until: i64| {
+            let inputs = cell
+                .inputs
+                .iter()
+                .flat_map(|&net| Edge::BOTH.map(|edge| (net, edge)));
+            let mut times = inputs.filter_map(|node| arrival.get(&node));
+            !times.any(|window| window.1 >= from && window.0 < until)
+        };
+        let both = match times {
+            [Some(rise), Some(fall)] => {
+                let (first, last) = (rise.min(fall), rise.max(fall));
+                (last - first < self.fastest_fs && is_quiet(first, last)).then_some(last)
+            }
+            _ => None,
+        };
+        let own = arrival[&to].1;
+        let directions = match (both, to.1) {
+            (Some(_), _) => [u64::MAX; 2],
+            (None, Edge::Rise) => [u64::MAX, 0],
+            (None, Edge::Fall) => [0, u64::MAX],
+        };
+        let (code, inputs, invert) = self.function(&cell)?;
+        let action = Action {
+            code,
+            inputs,
+            invert,
+            out: self.bit(to.0)?.0,
+            directions,
+            masks: [SINK; 2],
+            wakes: [0; 3],
+            traps: [false; 2],
+            is_doubtful: false,
+        };
+        let draft = self.draft(cause.position_fs, both.unwrap_or(own), action);
+        gates.insert(to, draft);
+        if both.is_some() {
+            for edge in Edge::BOTH {
+                gates.insert((to.0, edge), draft);
+            }
+        }
+        Ok(draft)
+    }
+
+    /// A gate with its constants folded in.
+    pub(super) fn function(
+        &mut self,
+        cell: &FlatCell,
+    ) -> Result<(Code, [u16; 4], [u64; 5]), Unlevelled> {
+        let relevant = self.survey.relevant(cell);
+        let pins: Vec<usize> = (0..cell.kind.inputs().len())
+            .filter(|&p| relevant[p])
+            .collect();
+        let mut fixed = 0u8;
+        for pin in 0..cell.kind.inputs().len() {
+            if self.survey.class(cell.inputs[pin]) == Class::Constant(true) {
+                fixed |= 1 << pin;
+            }
+        }
+        let bits: Result<Vec<Bit>, _> =
+            pins.iter().map(|&pin| self.bit(cell.inputs[pin])).collect();
+        let bits = bits?;
+        let value = |on: u8| {
+            let set = pins.iter().enumerate().filter(|(i, _)| on >> i & 1 == 1);
+            output(cell.kind, set.fold(fixed, |word, (_, pin)| word | 1 << pin))
+        };
+        let action = |code, places: &[u16], flags: &[bool], inverted: bool| {
+            let mut inputs = [ZERO; 4];
+            let mut invert = [0; 5];
+            inputs[..places.len()].copy_from_slice(places);
+            for (mask, &flag) in invert.iter_mut().zip(flags) {
+                *mask = inversion(flag);
+            }
+            invert[4] = inversion(inverted);
+            (code, inputs, invert)
+        };
+        Ok(match bits[..] {
+            [(a, ia)] => action(Code::Xor, &[a, ZERO], &[], ia ^ value(0)),
+            [(a, ia), (b, ib)] => {
+                let table = [0, 1, 2, 3].map(value);
+                let ones = table.iter().filter(|&&v| v).count();
+                if ones == 2 {
+                    action(Code::Xor, &[a, b], &[], ia ^ ib ^ table[0])
+                } else {
+                    // The one combination of inputs that differs from the others.
+                    let odd = (0..4)
+                        .find(|&i| table[i] == (ones == 1))
+                        .expect("a gate of two inputs");
+                    let (wants_a, wants_b) = (odd & 1 == 1, odd & 2 == 2);
+                    action(
+                        Code::And,
+                        &[a, b],
+                        &[ia ^ !wants_a, ib ^ !wants_b],
+                        ones == 3,
+                    )
+                }
+            }
+            // A multiplexer between a flip-flop's outputs.
+            [(a, ia), (b, ib), (s, is)] if a == b && ia != ib => {
+                action(Code::Xor, &[a, s], &[], ia ^ is)
+            }
+            [(a, ia), (b, ib), (s, is)] if cell.kind == CellKind::Mux2 => {
+                action(Code::Mux, &[a, b, s], &[ia, ib, is], false)
+            }
+            _ => return Err(Unlevelled::Structure(self.survey.name(cell.outputs[0]))),
+        })
+    }
+}

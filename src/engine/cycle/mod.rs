@@ -1,0 +1,347 @@
+//! The cycle engine: the netlist itself, levelised into tapes of word operations, 512 macropixels to a word.
+//!
+//! ```text
+//!                 ┌ survey ──► expression ──► stream   photons to SPAD_EVENT, 16 CLK periods at a time
+//!   netlist ──────┤
+//!                 └ levelise ───────────────► tape     counters, strobe, histogram, pass by pass
+//!
+//!   SPAD pulses ──► packing ──► stream ──► tape ──► counts          (a block of 512 macropixels, a thread each)
+//! ```
+//!
+//! Every CLK period of the exposure is stepped. Time enters twice, exactly: in which CLK edge takes a pulse, and in
+//! the order in which the edges of one period arrive. Otherwise there is no delay and, after the reset that the
+//! event kernel simulates, no X. Nothing here knows what a macropixel is: what the netlist says is what is run.
+//!
+//! Macropixels go into blocks by the low bits of their start values, so that a block's counters carry, and roll
+//! over, in the same CLK periods, and rest in the others. A netlist, or a configuration, for which no tape can
+//! be made is run by the gate engine: the P-counters of set/reset flip-flops, so far.
+
+mod expression;
+mod levelise;
+mod packing;
+mod stream;
+mod survey;
+mod tape;
+mod word;
+
+use std::sync::OnceLock;
+
+use rayon::prelude::*;
+
+use super::{Engine, EngineError, Gate};
+use crate::chip::window_law::{Window, WindowLaw};
+use crate::chip::{Exposure, SensorConfig};
+use crate::photon::SpadEvent;
+use levelise::Levelised;
+use packing::{Packed, Sampling};
+use stream::PERIODS;
+use survey::Survey;
+use tape::{Block, Passes};
+use word::{WORD_LANES, Word};
+
+/// Why a netlist has no tape.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Unlevelled {
+    /// A net is X when the exposure starts.
+    #[error("{0} is unknown when the exposure starts")]
+    Unknown(String),
+    /// A register of the stream starts with a value that its neighbours rule out.
+    #[error("{0} does not start at 0")]
+    Start(String),
+    /// An edge arrives by paths of different length.
+    #[error("edges reach {net} after {shortest_fs} to {longest_fs} fs")]
+    Ambiguous {
+        /// Where.
+        net: String,
+        /// Shortest path.
+        shortest_fs: i64,
+        /// Longest path.
+        longest_fs: i64,
+    },
+    /// A lane did what the tape cannot tell the outcome of: two edges too close to call, or one round a loop.
+    #[error("the next change of {0} is too close to call")]
+    Trapped(String),
+    /// A reset ends before what it clears has settled.
+    #[error("the reset of {0} ends before its clock has settled")]
+    Clear(String),
+    /// Something the tapes have no operation for.
+    #[error("{0} has no place on a tape")]
+    Structure(String),
+}
+
+/// A netlist that can be run.
+struct Machine {
+    survey: Survey,
+    levelised: Levelised,
+}
+
+/// Runs the levelised netlist.
+pub struct Cycle<'a> {
+    config: &'a SensorConfig,
+    exposure: &'a Exposure,
+    law: WindowLaw,
+    machine: OnceLock<Result<Machine, Unlevelled>>,
+}
+
+/// Pulses, sorted for [`Cycle::run`].
+pub struct PackedPulses {
+    /// Macropixels of each block, by their index in the caller's order.
+    blocks: Vec<(Vec<usize>, Packed)>,
+}
+
+impl<'a> Cycle<'a> {
+    /// An engine for this sensor and exposure. The netlist is levelised when it is first needed.
+    pub fn new(config: &'a SensorConfig, exposure: &'a Exposure) -> Self {
+        Cycle {
+            config,
+            exposure,
+            law: WindowLaw::new(config, exposure),
+            machine: OnceLock::new(),
+        }
+    }
+
+    fn machine(&self) -> Result<&Machine, &Unlevelled> {
+        let machine = self.machine.get_or_init(|| {
+            let survey = Survey::new(self.config, self.exposure);
+            let levelised = Levelised::new(&survey, self.config, self.exposure)?;
+            Ok(Machine { survey, levelised })
+        });
+        machine.as_ref()
+    }
+
+    /// Why this sensor's macropixels cannot be levelised and are left to the gate engine, if so.
+    pub fn unlevelled(&self) -> Option<&Unlevelled> {
+        self.machine().err()
+    }
+
+    /// CLK periods with clock edges, as the stimulus of the gate engine has them.
+    fn clocked(&self) -> usize {
+        self.exposure.stop_periods as usize * self.exposure.laser_cycles as usize + 2
+    }
+
+    fn chunks(&self) -> usize {
+        self.clocked().div_ceil(PERIODS)
+    }
+
+    /// Sorts pulses (one list per macropixel, by time) for [`Cycle::run`].
+    pub fn pack(&self, starts: &[u16], pulses: &[&[SpadEvent]]) -> PackedPulses {
+        let mut order: Vec<usize> = (0..starts.len()).collect();
+        // Counters whose low bits agree carry together.
+        order.sort_by_key(|&pixel| (starts[pixel].reverse_bits(), pixel));
+        let sampling = Sampling::new(self.exposure, self.law.timing().spad_to_toggle);
+        let chunks = self.chunks();
+        let blocks = order.par_chunks(WORD_LANES).map(|pixels| {
+            let lanes = pixels.iter().map(|&pixel| pulses[pixel]);
+            (pixels.to_vec(), Packed::new(sampling, chunks, lanes))
+        });
+        PackedPulses {
+            blocks: blocks.collect(),
+        }
+    }
+
+    /// Histograms of packed macropixels, in the caller's order: the logic alone.
+    ///
+    /// # Errors
+    /// As [`Cycle::unlevelled`], or when an edge goes where the tape has no place for it.
+    pub fn run(&self, starts: &[u16], packed: &PackedPulses) -> Result<Vec<Vec<u16>>, Unlevelled> {
+        let machine = self.machine().map_err(Unlevelled::clone)?;
+        let blocks: Result<Vec<_>, Unlevelled> = packed
+            .blocks
+            .par_iter()
+            .map(|(pixels, pulses)| {
+                let starts: Vec<u16> = pixels.iter().map(|&pixel| starts[pixel]).collect();
+                machine.run(
+                    self.exposure,
+                    self.clocked(),
+                    self.chunks(),
+                    &starts,
+                    pulses,
+                )
+            })
+            .collect();
+        let mut histograms = vec![Vec::new(); starts.len()];
+        for ((pixels, _), block) in packed.blocks.iter().zip(blocks?) {
+            for (&pixel, histogram) in pixels.iter().zip(block) {
+                histograms[pixel] = histogram;
+            }
+        }
+        Ok(histograms)
+    }
+}
+
+impl Machine {
+    /// Histograms of one block.
+    fn run(
+        &self,
+        exposure: &Exposure,
+        clocked: usize,
+        chunks: usize,
+        starts: &[u16],
+        pulses: &Packed,
+    ) -> Result<Vec<Vec<u16>>, Unlevelled> {
+        let Levelised {
+            stream,
+            passes: tape,
+            ..
+        } = &self.levelised;
+        let mut block = Block::new(tape, self.start(starts)?);
+        let mut words = stream.start();
+        let mut causes = self.causes(exposure).peekable();
+        let mut due = Vec::new();
+        let mut until = |end: i64, first: i64| {
+            due.clear();
+            while let Some((pass, action)) = causes.next_if(|(pass, _)| *pass < end) {
+                due.push(((pass - first) as usize, action));
+            }
+            std::mem::take(&mut due)
+        };
+        // STOP may rise before the first falling CLK edge.
+        let early = until(0, -1);
+        tape::run(
+            tape,
+            &mut block,
+            &words,
+            &Passes {
+                first: -1,
+                count: 1,
+                clocked: 0,
+                causes: &early,
+            },
+        );
+        for chunk in 0..chunks {
+            let first = chunk * PERIODS;
+            if chunk > 0 {
+                stream.pass_on(&mut words);
+            }
+            stream.compute(&mut words, pulses.chunk(chunk));
+            let causes = until((first + PERIODS) as i64, first as i64);
+            let clocked = clocked.saturating_sub(first).min(PERIODS);
+            tape::run(
+                tape,
+                &mut block,
+                &words,
+                &Passes {
+                    first: 0,
+                    count: PERIODS,
+                    clocked,
+                    causes: &causes,
+                },
+            );
+        }
+        // Counts that are still rippling.
+        for _ in 0..SETTLING_CHUNKS {
+            if block.is_settled() {
+                break;
+            }
+            stream.pass_on(&mut words);
+            stream.compute(&mut words, &[]);
+            tape::run(
+                tape,
+                &mut block,
+                &words,
+                &Passes {
+                    first: 0,
+                    count: PERIODS,
+                    clocked: 0,
+                    causes: &[],
+                },
+            );
+        }
+        if let Some(action) = block.trapped {
+            return Err(Unlevelled::Trapped(self.name(tape.actions[action].out)));
+        }
+        if !block.is_settled() {
+            return Err(Unlevelled::Trapped("a net that does not settle".to_owned()));
+        }
+        Ok(self.counts(&block, starts.len()))
+    }
+
+    /// Every place of a block when the exposure starts. Lanes that are left over repeat the last start value.
+    fn start(&self, starts: &[u16]) -> Result<Vec<Word>, Unlevelled> {
+        let mut words = vec![Word::ZERO; self.levelised.places];
+        let last = *starts.last().expect("a block has a macropixel");
+        for &(place, net, inverted) in &self.levelised.initial {
+            let word = &mut words[usize::from(place)];
+            if let Some(value) = self.survey.shared_initial(net) {
+                *word = Word::all(value ^ inverted);
+                continue;
+            }
+            for lane in 0..WORD_LANES {
+                let start = starts.get(lane).copied().unwrap_or(last);
+                word.set(lane, self.survey.initial(net, start)? ^ inverted);
+            }
+        }
+        Ok(words)
+    }
+
+    /// Causes other than CLK in order: (pass, action).
+    fn causes(&self, exposure: &Exposure) -> impl Iterator<Item = (i64, u16)> + '_ {
+        let groups = &self.levelised.causes;
+        let cycles = i64::from(exposure.laser_cycles);
+        let periods = i64::from(exposure.stop_periods);
+        let last = groups.len() - 1;
+        (0..=cycles).flat_map(move |cycle| {
+            let group = match cycle {
+                0 => 0,
+                c if c == cycles => last,
+                c if c + 1 == cycles => last - 1,
+                _ => 1,
+            };
+            groups[group]
+                .iter()
+                .map(move |&(pass, action)| (cycle * periods + pass, action))
+        })
+    }
+
+    /// The net at a place.
+    fn name(&self, place: u16) -> String {
+        let net = self.levelised.initial.iter().find(|(p, ..)| *p == place);
+        net.map_or_else(String::new, |&(_, net, _)| self.survey.name(net))
+    }
+
+    fn counts(&self, block: &Block, lanes: usize) -> Vec<Vec<u16>> {
+        let value = |&(place, inverted): &(u16, bool), lane: usize| {
+            block.words[usize::from(place)].lane(lane) ^ inverted
+        };
+        let count = |bits: &Vec<(u16, bool)>, lane: usize| {
+            bits.iter()
+                .rev()
+                .fold(0, |n, bit| n << 1 | u16::from(value(bit, lane)))
+        };
+        let bins = &self.levelised.bins;
+        (0..lanes)
+            .map(|lane| bins.iter().map(|bits| count(bits, lane)).collect())
+            .collect()
+    }
+}
+
+/// Chunks after the last CLK edge within which every count has rippled through.
+const SETTLING_CHUNKS: usize = 16;
+
+impl Engine for Cycle<'_> {
+    fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
+        Ok(self.histograms(&[start], &[pulses])?.remove(0))
+    }
+
+    fn histograms(
+        &self,
+        starts: &[u16],
+        pulses: &[&[SpadEvent]],
+    ) -> Result<Vec<Vec<u16>>, EngineError> {
+        for &start in starts {
+            if let Window::Race(why) = self.law.window(start) {
+                return Err(EngineError::Race(why));
+            }
+        }
+        if self.unlevelled().is_none()
+            && let Ok(histograms) = self.run(starts, &self.pack(starts, pulses))
+        {
+            return Ok(histograms);
+        }
+        Gate::new(self.config, self.exposure).histograms(starts, pulses)
+    }
+
+    fn batch(&self) -> usize {
+        8 * WORD_LANES
+    }
+}

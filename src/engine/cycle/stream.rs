@@ -1,0 +1,327 @@
+//! The stream part as a straight tape: word operations over a chunk of CLK periods at a time.
+//!
+//! ```text
+//!   photons of the chunk ─► inputs[SPAD][period] ─► operations, each over all periods ─► rings that the passes read
+//!                                                                                       [history | this chunk]
+//! ```
+//!
+//! Operations are those of [`Expressions`], a sum and a carry of the same three bits fused into one. What is
+//! only used within a chunk lives in few, reused places, so that a block's working set stays in the first-level
+//! cache.
+
+use std::cell::Cell;
+
+use multiversion::multiversion;
+
+use super::Unlevelled;
+use super::expression::{Expressions, Literal, Node};
+use super::packing::Pulse;
+use super::word::{Word, inversion};
+use crate::netlist::NetId;
+
+/// CLK periods in a chunk.
+pub const PERIODS: usize = 16;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    And,
+    Xor,
+    HalfAdder,
+    Xor3,
+    Majority,
+    FullAdder,
+    Mux,
+    Toggle,
+}
+
+/// One operation over a chunk: places are word indices of its first period.
+#[derive(Debug, Clone, Copy)]
+struct Op {
+    kind: Kind,
+    inputs: [u32; 3],
+    invert: [u64; 3],
+    /// The result, and the carry of an adder.
+    out: [u32; 2],
+}
+
+/// A sequence as the passes read it.
+#[derive(Debug, Clone, Copy)]
+pub struct Tap {
+    /// Place of the chunk's first period, delay included.
+    place: usize,
+    invert: u64,
+}
+
+impl Tap {
+    /// Its value just before rising edge `period` of the chunk.
+    #[inline(always)]
+    pub fn read(&self, words: &[Word], period: isize) -> Word {
+        words[self.place.wrapping_add_signed(period)] ^ self.invert
+    }
+}
+
+/// A node that is remembered from chunk to chunk.
+#[derive(Debug, Clone)]
+struct Ring {
+    start: usize,
+    /// Oldest first.
+    history: Vec<bool>,
+}
+
+/// The tape.
+#[derive(Debug, Clone, Default)]
+pub struct StreamTape {
+    ops: Vec<Op>,
+    rings: Vec<Ring>,
+    /// Place of each SPAD's input, if it is used.
+    inputs: Vec<Option<u32>>,
+    words: usize,
+}
+
+impl StreamTape {
+    /// A tape for these nets, and where each of them is found.
+    ///
+    /// # Errors
+    /// When the registers start with values that they cannot have.
+    pub fn new(
+        expressions: &mut Expressions<'_>,
+        spads: usize,
+        nets: &[NetId],
+    ) -> Result<(Self, Vec<Tap>), Unlevelled> {
+        let roots: Result<Vec<Literal>, _> = nets.iter().map(|&n| expressions.of_net(n)).collect();
+        let roots = roots?;
+        let mut layout = Layout::new(expressions, &roots);
+        let mut tape = StreamTape::default();
+        for node in 0..expressions.nodes().len() {
+            layout.place(expressions, node, &mut tape);
+        }
+        tape.words = layout.end;
+        tape.inputs = (1..=spads)
+            .map(|n| layout.places[n].map(|p| p as u32))
+            .collect();
+        let tap = |root: &Literal| Tap {
+            place: layout.places[root.node].expect("a root is placed") - root.delay,
+            invert: inversion(root.inverted),
+        };
+        let taps = roots.iter().map(tap).collect();
+        Ok((tape, taps))
+    }
+
+    /// Words of a block, as they are before the first chunk.
+    pub fn start(&self) -> Vec<Word> {
+        let mut words = vec![Word::ZERO; self.words];
+        for ring in &self.rings {
+            for (word, &value) in words[ring.start..].iter_mut().zip(&ring.history) {
+                *word = Word::all(value);
+            }
+        }
+        words
+    }
+
+    /// Makes the last chunk the past.
+    pub fn pass_on(&self, words: &mut [Word]) {
+        for ring in &self.rings {
+            let from = ring.start + PERIODS;
+            words.copy_within(from..from + ring.history.len(), ring.start);
+        }
+    }
+
+    /// Computes a chunk with these pulses in it.
+    pub fn compute(&self, words: &mut [Word], pulses: &[Pulse]) {
+        for &place in self.inputs.iter().flatten() {
+            words[place as usize..][..PERIODS].fill(Word::ZERO);
+        }
+        for &pulse in pulses {
+            if let Some(place) = self.inputs[pulse.spad()] {
+                words[place as usize + pulse.period()].flip(pulse.lane());
+            }
+        }
+        run(&self.ops, words);
+    }
+}
+
+/// Where everything goes.
+struct Layout {
+    /// How far back each node is read; `None` if it is not.
+    reach: Vec<Option<usize>>,
+    /// Nodes that have yet to read it.
+    readers: Vec<usize>,
+    places: Vec<Option<usize>>,
+    free: Vec<usize>,
+    end: usize,
+}
+
+/// A pass reads up to two periods before the period that it is in.
+const READ_BACK: usize = 2;
+
+impl Layout {
+    fn new(expressions: &Expressions<'_>, roots: &[Literal]) -> Self {
+        let nodes = expressions.nodes();
+        let mut reach: Vec<Option<usize>> = vec![None; nodes.len()];
+        let mut readers = vec![0; nodes.len()];
+        let read = |reach: &mut Vec<Option<usize>>, literal: &Literal, back: usize| {
+            let least = reach[literal.node].unwrap_or(0);
+            reach[literal.node] = Some(least.max(literal.delay + back));
+        };
+        for root in roots {
+            read(&mut reach, root, READ_BACK);
+        }
+        for node in (0..nodes.len()).rev().filter(|&n| n > 0) {
+            if reach[node].is_some() {
+                for input in nodes[node].inputs() {
+                    read(&mut reach, &input, 0);
+                    readers[input.node] += 1;
+                }
+                if let Node::Toggle(_) = nodes[node] {
+                    reach[node] = reach[node].max(Some(1));
+                }
+            }
+        }
+        Layout {
+            reach,
+            readers,
+            places: vec![None; nodes.len()],
+            free: Vec::new(),
+            end: 0,
+        }
+    }
+
+    fn allocate(
+        &mut self,
+        expressions: &Expressions<'_>,
+        node: usize,
+        tape: &mut StreamTape,
+    ) -> u32 {
+        let reach = self.reach[node].unwrap_or(0);
+        let place = match self.free.pop_if(|_| reach == 0) {
+            Some(place) => place,
+            None => {
+                let start = self.end;
+                self.end += reach + PERIODS;
+                start + reach
+            }
+        };
+        if reach > 0 {
+            let history = (1..=reach)
+                .rev()
+                .map(|delay| expressions.history(node, delay))
+                .collect();
+            tape.rings.push(Ring {
+                start: place - reach,
+                history,
+            });
+        }
+        self.places[node] = Some(place);
+        place as u32
+    }
+
+    fn place(&mut self, expressions: &Expressions<'_>, node: usize, tape: &mut StreamTape) {
+        let nodes = expressions.nodes();
+        if self.reach[node].is_none() || self.places[node].is_some() {
+            return;
+        }
+        let partner = |wanted: Node| {
+            let index = nodes.iter().position(|&n| n == wanted);
+            index.filter(|&n| self.reach[n].is_some() && self.places[n].is_none())
+        };
+        use Node as N;
+        let (kind, partner) = match nodes[node] {
+            N::Zero | N::Input(_) => {
+                self.allocate(expressions, node, tape);
+                return;
+            }
+            N::Toggle(_) => (Kind::Toggle, None),
+            N::Mux(..) => (Kind::Mux, None),
+            N::And(a, b) => match partner(N::Xor(a, b)) {
+                Some(sum) => (Kind::HalfAdder, Some(sum)),
+                None => (Kind::And, None),
+            },
+            N::Xor(a, b) => match partner(N::And(a, b)) {
+                Some(carry) => (Kind::HalfAdder, Some(carry)),
+                None => (Kind::Xor, None),
+            },
+            N::Majority(a, b, c) => match partner(N::Xor3(a, b, c)) {
+                Some(sum) => (Kind::FullAdder, Some(sum)),
+                None => (Kind::Majority, None),
+            },
+            N::Xor3(a, b, c) => match partner(N::Majority(a, b, c)) {
+                Some(carry) => (Kind::FullAdder, Some(carry)),
+                None => (Kind::Xor3, None),
+            },
+        };
+        let literals = nodes[node].inputs();
+        let mut op = Op {
+            kind,
+            inputs: [0; 3],
+            invert: [0; 3],
+            out: [0; 2],
+        };
+        for (pin, literal) in literals.iter().enumerate() {
+            let place = self.places[literal.node].expect("inputs come first");
+            op.inputs[pin] = (place - literal.delay) as u32;
+            op.invert[pin] = inversion(literal.inverted);
+        }
+        let sum_first = matches!(nodes[node], N::Xor(..) | N::Xor3(..));
+        let own = self.allocate(expressions, node, tape);
+        op.out = match partner {
+            None => [own, own],
+            Some(other) => {
+                let theirs = self.allocate(expressions, other, tape);
+                if sum_first {
+                    [own, theirs]
+                } else {
+                    [theirs, own]
+                }
+            }
+        };
+        tape.ops.push(op);
+        // An adder reads its inputs for two nodes.
+        let reads = if partner.is_some() { 2 } else { 1 };
+        for literal in literals {
+            self.readers[literal.node] -= reads;
+            let is_free = self.readers[literal.node] == 0 && self.reach[literal.node] == Some(0);
+            if is_free && !matches!(nodes[literal.node], N::Input(_)) {
+                self.free.push(self.places[literal.node].expect("placed"));
+            }
+        }
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn run(ops: &[Op], words: &mut [Word]) {
+    let words = Cell::from_mut(words).as_slice_of_cells();
+    for op in ops {
+        let [a, b, c] = op.inputs.map(|place| &words[place as usize..][..PERIODS]);
+        let [out, carry] = op.out.map(|place| &words[place as usize..][..PERIODS]);
+        let [ia, ib, ic] = op.invert;
+        for t in 0..PERIODS {
+            let (a, b) = (a[t].get(), b[t].get());
+            match op.kind {
+                Kind::And => out[t].set((a ^ ia) & (b ^ ib)),
+                Kind::Xor => out[t].set(a ^ b),
+                Kind::HalfAdder => {
+                    out[t].set(a ^ b);
+                    carry[t].set(a & b);
+                }
+                Kind::Xor3 => out[t].set(a ^ b ^ c[t].get()),
+                Kind::Majority => {
+                    let (a, b, c) = (a ^ ia, b ^ ib, c[t].get() ^ ic);
+                    out[t].set((a & b) | (a & c) | (b & c));
+                }
+                Kind::FullAdder => {
+                    let c = c[t].get();
+                    out[t].set(a ^ b ^ c);
+                    carry[t].set((a & b) | (a & c) | (b & c));
+                }
+                Kind::Mux => {
+                    let select = c[t].get();
+                    out[t].set(((a ^ ia) & !select) | ((b ^ ib) & select));
+                }
+                Kind::Toggle => {
+                    let state = words[op.out[0] as usize + t - 1].get();
+                    out[t].set(state ^ a);
+                }
+            }
+        }
+    }
+}

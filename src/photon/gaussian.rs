@@ -1,0 +1,94 @@
+//! The share of a Gaussian pulse that a stretch of time receives.
+//!
+//! Differences of the distribution function lose their digits in two places: far from the pulse, where both values are
+//! near 0 or 1, and in stretches much shorter than the pulse. The first is avoided by keeping the smaller tail of
+//! each edge, the second by expanding the density about the middle of the stretch.
+
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
+
+/// An edge of a stretch of time, with the tail of the pulse on its far side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PulseEdge {
+    /// Standard deviations after the pulse's centre; infinite for a pulse without width.
+    z: f64,
+    /// Share of the pulse beyond the edge, seen from the centre.
+    tail: f64,
+}
+
+impl PulseEdge {
+    /// An edge `time` after the centre of a pulse of standard deviation `sigma` ≥ 0, both in the same unit.
+    pub fn new(time: f64, sigma: f64) -> Self {
+        if sigma == 0.0 {
+            // A pulse at the very edge belongs to what follows it.
+            let z = if time > 0.0 {
+                f64::INFINITY
+            } else {
+                f64::NEG_INFINITY
+            };
+            return PulseEdge { z, tail: 0.0 };
+        }
+        let z = time / sigma;
+        let tail = 0.5 * libm::erfc(z.abs() * FRAC_1_SQRT_2);
+        PulseEdge { z, tail }
+    }
+
+    /// Share of the pulse between this edge and a `later` one.
+    pub fn share_until(&self, later: &PulseEdge) -> f64 {
+        let share = match (self.z > 0.0, later.z > 0.0) {
+            (true, _) => self.tail - later.tail,
+            (false, true) => 1.0 - self.tail - later.tail,
+            (false, false) => later.tail - self.tail,
+        };
+        share.max(0.0)
+    }
+}
+
+/// Below this product of width and distance (both in standard deviations) the density is expanded.
+const NARROW: f64 = 0.1;
+
+/// Share of a Gaussian pulse of standard deviation `sigma` ≥ 0 that falls into `[from, to)`, times counted from its
+/// centre in the unit of `sigma`. Relative error below 10⁻¹², also in the far tail and in the narrowest stretch.
+pub fn pulse_share(from: f64, to: f64, sigma: f64) -> f64 {
+    debug_assert!(from <= to && sigma >= 0.0, "{from} to {to}, sigma {sigma}");
+    let width = (to - from) / sigma;
+    let z = (0.5 * from + 0.5 * to) / sigma;
+    if sigma > 0.0 && width * z.abs().max(1.0) < NARROW {
+        // Derivatives of the density are Hermite polynomials; odd ones cancel about the middle.
+        let (z2, w2) = (z * z, width * width);
+        let he2 = z2 - 1.0;
+        let he4 = (z2 - 6.0) * z2 + 3.0;
+        let he6 = ((z2 - 15.0) * z2 + 45.0) * z2 - 15.0;
+        let series = 1.0 + w2 / 24.0 * (he2 + w2 / 80.0 * (he4 + w2 / 168.0 * he6));
+        return width * libm::exp(-0.5 * z2) / (2.0 * PI).sqrt() * series;
+    }
+    PulseEdge::new(from, sigma).share_until(&PulseEdge::new(to, sigma))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_pulse_without_width_is_in_one_stretch() {
+        assert_eq!(pulse_share(0.0, 1.0, 0.0), 1.0);
+        assert_eq!(pulse_share(-1.0, 0.0, 0.0), 0.0);
+        assert_eq!(pulse_share(-1.0, 1.0, 0.0), 1.0);
+        assert_eq!(pulse_share(2.0, 3.0, 0.0), 0.0);
+    }
+
+    #[test]
+    fn one_standard_deviation_either_way_holds_68_percent() {
+        let share = pulse_share(-2.0, 2.0, 2.0);
+        assert!((share - 0.682_689_492_137_085_9).abs() < 1e-15, "{share}");
+    }
+
+    proptest! {
+        #[test]
+        fn stretches_add_up(from in -8.0f64..8.0, a in 1e-6f64..3.0, b in 1e-6f64..3.0, sigma in 0.1f64..5.0) {
+            let parts = pulse_share(from, from + a, sigma) + pulse_share(from + a, from + a + b, sigma);
+            let whole = pulse_share(from, from + a + b, sigma);
+            prop_assert!((parts / whole - 1.0).abs() < 1e-9 || whole < 1e-200, "{parts} {whole}");
+        }
+    }
+}

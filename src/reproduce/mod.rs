@@ -1,0 +1,307 @@
+//! The thesis's published figures beside ours: claims with verdicts, tables, figures, and the page that shows them.
+//!
+//! ```text
+//!   CLAIMS ─► rows: published, computed, verdict ─┐
+//!   TABLES ─► grids ──────────────────────────────┼─► terminal, JSON, Markdown, HTML, SVG and CSV
+//!   FIGURES ─► charts ────────────────────────────┘
+//! ```
+//!
+//! A claim that the model must meet and does not is a fault, and `gdtof reproduce` fails. One that no honest
+//! convention meets says so and why; it is never bent. Where the thesis's convention and the physically right one
+//! part, both are shown.
+
+mod chip;
+mod claim;
+mod delay_line;
+mod design;
+mod light;
+mod page;
+mod penalty;
+mod precision;
+mod registry;
+mod sensors;
+mod silicon;
+mod stereo;
+mod system;
+
+pub use claim::{Claim, Published, Row, Verdict};
+pub use page::{grid, html, markdown, tally};
+pub use registry::{CLAIMS, FIGURES, Figure, TABLES, Table};
+
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+use crate::report::{Chart, Grid};
+
+/// Which numbers to reproduce: claims of the list, figures and tables of the thesis.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Selection {
+    /// Numbers of claims.
+    pub claims: Vec<u32>,
+    /// Numbers of figures.
+    pub figures: Vec<u32>,
+    /// Numbers of tables.
+    pub tables: Vec<u32>,
+}
+
+impl Selection {
+    /// Everything there is.
+    pub fn all() -> Self {
+        Selection {
+            claims: CLAIMS.iter().map(|c| c.number).collect(),
+            figures: FIGURES.iter().map(|f| f.number).collect(),
+            tables: TABLES.iter().map(|t| t.number).collect(),
+        }
+    }
+
+    /// Whether nothing is chosen.
+    pub fn is_empty(&self) -> bool {
+        self.claims.is_empty() && self.figures.is_empty() && self.tables.is_empty()
+    }
+
+    /// What is chosen that does not exist, in words.
+    ///
+    /// # Errors
+    /// The kind, the number, and which numbers there are.
+    pub fn check(&self) -> Result<(), (&'static str, String)> {
+        let known = Selection::all();
+        let kinds = [
+            ("--claim", &self.claims, &known.claims),
+            ("--figure", &self.figures, &known.figures),
+            ("--table", &self.tables, &known.tables),
+        ];
+        for (option, chosen, known) in kinds {
+            if let Some(number) = chosen.iter().find(|n| !known.contains(n)) {
+                let known: Vec<String> = known.iter().map(u32::to_string).collect();
+                let message = format!(
+                    "there is no {} {number} to reproduce; choose from {}",
+                    &option[2..],
+                    known.join(", ")
+                );
+                return Err((option, message));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A claim and its rows.
+pub struct ClaimResult {
+    /// The claim.
+    pub claim: Claim,
+    /// Its comparisons.
+    pub rows: Vec<Row>,
+}
+
+/// A table of the thesis, computed.
+pub struct TableResult {
+    /// Its number in the thesis.
+    pub number: u32,
+    /// What it shows.
+    pub title: &'static str,
+    /// The computed table.
+    pub grid: Grid,
+}
+
+/// A figure of the thesis, computed.
+pub struct FigureResult {
+    /// Its number in the thesis.
+    pub number: u32,
+    /// What it shows.
+    pub title: &'static str,
+    /// Its charts.
+    pub charts: Vec<Chart>,
+}
+
+impl FigureResult {
+    /// File names without extension, each with its chart.
+    pub fn files(&self) -> impl Iterator<Item = (String, &Chart)> {
+        let several = self.charts.len() > 1;
+        self.charts.iter().zip('a'..).map(move |(chart, letter)| {
+            let letter = if several {
+                letter.to_string()
+            } else {
+                String::new()
+            };
+            (format!("fig_{:03}{letter}", self.number), chart)
+        })
+    }
+}
+
+/// Everything that was reproduced, in the thesis's order.
+#[derive(Default)]
+pub struct Report {
+    /// Claims.
+    pub claims: Vec<ClaimResult>,
+    /// Tables.
+    pub tables: Vec<TableResult>,
+    /// Figures.
+    pub figures: Vec<FigureResult>,
+}
+
+/// One thing to compute, so that all of them share the threads.
+enum Job {
+    Claim(Claim),
+    Table(Table),
+    Figure(Figure),
+}
+
+/// What it gives.
+enum Done {
+    Claim(ClaimResult),
+    Table(TableResult),
+    Figure(FigureResult),
+}
+
+impl Job {
+    fn run(self) -> Done {
+        match self {
+            Job::Claim(claim) => Done::Claim(ClaimResult {
+                claim,
+                rows: (claim.compute)(),
+            }),
+            Job::Table(table) => Done::Table(TableResult {
+                number: table.number,
+                title: table.title,
+                grid: (table.make)(),
+            }),
+            Job::Figure(figure) => Done::Figure(FigureResult {
+                number: figure.number,
+                title: figure.title,
+                charts: (figure.draw)(),
+            }),
+        }
+    }
+}
+
+/// Computes what is chosen, on all threads; `done` is told of each claim, table and figure as it is finished.
+pub fn reproduce(selection: &Selection, done: impl Fn() + Sync) -> Report {
+    let claims = CLAIMS
+        .iter()
+        .filter(|c| selection.claims.contains(&c.number));
+    let tables = TABLES
+        .iter()
+        .filter(|t| selection.tables.contains(&t.number));
+    let figures = FIGURES
+        .iter()
+        .filter(|f| selection.figures.contains(&f.number));
+    let jobs: Vec<Job> = claims
+        .map(|&c| Job::Claim(c))
+        .chain(tables.map(|&t| Job::Table(t)))
+        .chain(figures.map(|&f| Job::Figure(f)))
+        .collect();
+    let results: Vec<Done> = jobs
+        .into_par_iter()
+        .with_max_len(1)
+        .map(|job| {
+            let result = job.run();
+            done();
+            result
+        })
+        .collect();
+    let mut report = Report::default();
+    for result in results {
+        match result {
+            Done::Claim(claim) => report.claims.push(claim),
+            Done::Table(table) => report.tables.push(table),
+            Done::Figure(figure) => report.figures.push(figure),
+        }
+    }
+    report
+}
+
+impl Report {
+    /// The rows of all claims.
+    pub fn rows(&self) -> impl Iterator<Item = &Row> {
+        self.claims.iter().flat_map(|result| &result.rows)
+    }
+
+    /// Rows that leave their tolerance although they are expected to hold, with the number of their claim.
+    pub fn failures(&self) -> Vec<(u32, &Row)> {
+        let rows = self
+            .claims
+            .iter()
+            .flat_map(|result| result.rows.iter().map(|row| (result.claim.number, row)));
+        rows.filter(|(_, row)| row.verdict() == Verdict::Fails)
+            .collect()
+    }
+
+    /// Everything for a machine to read. Numbers that are not finite become null.
+    pub fn json(&self) -> Value {
+        let row = |row: &Row| {
+            let range = row.published.range();
+            json!({
+                "quantity": row.what,
+                "unit": row.unit,
+                "published": row.published.text(),
+                "least": range.map(|r| r.0),
+                "greatest": range.map(|r| r.1),
+                "computed": row.computed,
+                "difference": row.difference().map(|d| d.0),
+                "verdict": row.verdict(),
+                "notes": row.notes(),
+            })
+        };
+        let claim = |result: &ClaimResult| {
+            json!({
+                "claim": result.claim.number,
+                "title": result.claim.title,
+                "source": result.claim.source,
+                "rows": result.rows.iter().map(row).collect::<Vec<_>>(),
+            })
+        };
+        let table = |table: &TableResult| json!({"table": table.number, "title": table.title, "rows": table.grid.lines().collect::<Vec<_>>()});
+        let series = |chart: &Chart| {
+            let series = chart.series.iter();
+            series
+                .map(|s| json!({"name": s.name, "points": s.points}))
+                .collect::<Vec<_>>()
+        };
+        let figure = |figure: &FigureResult| {
+            let charts = figure.charts.iter().map(|chart| {
+                json!({"title": chart.title, "x": chart.x.label, "y": chart.y.label, "series": series(chart)})
+            });
+            json!({"figure": figure.number, "title": figure.title, "charts": charts.collect::<Vec<_>>()})
+        };
+        json!({
+            "claims": self.claims.iter().map(claim).collect::<Vec<_>>(),
+            "tables": self.tables.iter().map(table).collect::<Vec<_>>(),
+            "figures": self.figures.iter().map(figure).collect::<Vec<_>>(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_unique_and_in_order() {
+        let all = Selection::all();
+        for numbers in [all.claims, all.figures, all.tables] {
+            assert!(
+                numbers.windows(2).all(|pair| pair[0] < pair[1]),
+                "{numbers:?}"
+            );
+        }
+        assert_eq!(
+            CLAIMS.map(|c| c.number).to_vec(),
+            (1..=28).collect::<Vec<_>>()
+        );
+    }
+
+    #[test]
+    fn what_does_not_exist_is_named() {
+        let selection = Selection {
+            figures: vec![35, 999],
+            ..Selection::default()
+        };
+        let (option, message) = selection.check().unwrap_err();
+        assert_eq!(option, "--figure");
+        assert!(
+            message.contains("no figure 999") && message.contains("35"),
+            "{message}"
+        );
+        assert!(Selection::all().check().is_ok());
+    }
+}

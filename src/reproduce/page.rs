@@ -1,0 +1,354 @@
+//! The page that shows published against computed: Markdown, and HTML with its figures inside.
+
+use std::fmt::Write;
+
+use super::claim::{Published, Row, Verdict, figure, overall};
+use super::{FigureResult, Report, TableResult};
+use crate::report::Grid;
+
+/// The headings of a claim's table.
+const HEADINGS: [&str; 7] = [
+    "quantity",
+    "published",
+    "tolerance",
+    "computed",
+    "difference",
+    "unit",
+    "verdict",
+];
+
+/// A row as text, by [`HEADINGS`].
+fn cells(row: &Row) -> [String; 7] {
+    let difference = row
+        .difference()
+        .map_or(String::new(), |(absolute, relative)| {
+            if row.published == Published::Nothing || !absolute.is_finite() {
+                String::new()
+            } else if absolute == 0.0 {
+                "0".into()
+            } else {
+                format!("{:+.1} %", 100.0 * relative)
+            }
+        });
+    [
+        row.what.clone(),
+        row.published.text(),
+        row.published.tolerance_text(),
+        row.computed.map_or(String::new(), figure),
+        difference,
+        row.unit.to_owned(),
+        row.verdict().text().to_owned(),
+    ]
+}
+
+/// A claim's rows as a table.
+pub fn grid(rows: &[Row]) -> Grid {
+    let mut grid = Grid::new(HEADINGS);
+    rows.iter().for_each(|row| grid.push(cells(row)));
+    grid
+}
+
+/// How many rows of the report have each verdict, for example "80 agree, 5 differ".
+pub fn tally(report: &Report) -> String {
+    let count = |verdict| report.rows().filter(|row| row.verdict() == verdict).count();
+    let words = Verdict::ALL.map(|verdict| format!("{} {}", count(verdict), plural(verdict)));
+    words.join(", ")
+}
+
+fn plural(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Agrees => "agree",
+        Verdict::Differs => "differ, known and explained",
+        Verdict::Fails => "FAIL",
+        Verdict::Ours => "ours alone",
+        Verdict::NotModelled => "not modelled",
+    }
+}
+
+const INTRODUCTION: &str = "Every published figure of the thesis that the model is held to, beside what the model \
+gives. A row agrees when the computed value lies within the tolerance of what is printed (half a unit of the last \
+digit, unless another is named), and differs when it does not and the reason is known. Rows that are ours alone \
+show another convention, or what the thesis left out.";
+
+/// The report in Markdown; figures are linked as the files beside it.
+pub fn markdown(report: &Report) -> String {
+    let mut out = format!(
+        "# Published and computed\n\n{INTRODUCTION}\n\n{}.\n\n",
+        tally(report)
+    );
+    let mut glance = Grid::new(["claim", "rows that agree", "verdict"]);
+    for result in &report.claims {
+        let agree = result
+            .rows
+            .iter()
+            .filter(|r| r.verdict() == Verdict::Agrees)
+            .count();
+        let compared = result
+            .rows
+            .iter()
+            .filter(|r| r.published != Published::Nothing)
+            .count();
+        glance.push([
+            format!("{}. {}", result.claim.number, result.claim.title),
+            format!("{agree} of {compared}"),
+            overall(&result.rows).text().to_owned(),
+        ]);
+    }
+    if !report.claims.is_empty() {
+        let _ = writeln!(out, "{}", glance.markdown());
+    }
+    for result in &report.claims {
+        let claim = &result.claim;
+        let _ = write!(
+            out,
+            "## Claim {}: {}\n\n{}\n\n",
+            claim.number, claim.title, claim.source
+        );
+        let _ = writeln!(out, "{}", grid(&result.rows).markdown());
+        for row in result.rows.iter().filter(|row| !row.notes().is_empty()) {
+            let _ = writeln!(out, "* {}: {}", row.what, row.notes());
+        }
+        out.push('\n');
+    }
+    for TableResult {
+        number,
+        title,
+        grid,
+    } in &report.tables
+    {
+        let _ = writeln!(out, "## Table {number}: {title}\n\n{}", grid.markdown());
+    }
+    for result in &report.figures {
+        let _ = write!(out, "## Fig. {}: {}\n\n", result.number, result.title);
+        for (file, chart) in result.files() {
+            let _ = write!(out, "![{}]({file}.svg)\n\n", chart.title);
+        }
+    }
+    out
+}
+
+/// The report in one HTML file.
+pub fn html(report: &Report) -> String {
+    let mut body = String::new();
+    let _ = writeln!(
+        body,
+        "<h1>Published and computed</h1>\n<p class=lead>{}</p>\n<p class=tally>{}</p>",
+        escaped(INTRODUCTION),
+        tallies(report)
+    );
+    if !report.claims.is_empty() {
+        body += &glance(report);
+    }
+    for result in &report.claims {
+        let claim = &result.claim;
+        let _ = writeln!(
+            body,
+            "<section id=c{0}><h2><span class='badge {2}'>{3}</span> {0}. {1}</h2>\n<p class=source>{4}</p>",
+            claim.number,
+            escaped(claim.title),
+            class(overall(&result.rows)),
+            overall(&result.rows).text(),
+            escaped(claim.source),
+        );
+        body += &claim_table(&result.rows);
+        body += "</section>\n";
+    }
+    for TableResult {
+        number,
+        title,
+        grid,
+    } in &report.tables
+    {
+        let _ = writeln!(
+            body,
+            "<section id=t{number}><h2>Table {number}: {}</h2>\n{}</section>",
+            escaped(title),
+            grid_html(grid)
+        );
+    }
+    for FigureResult {
+        number,
+        title,
+        charts,
+    } in &report.figures
+    {
+        let _ = writeln!(
+            body,
+            "<section id=f{number}><h2>Fig. {number}: {}</h2>",
+            escaped(title)
+        );
+        charts.iter().for_each(|chart| {
+            let _ = writeln!(body, "<figure>{}</figure>", scalable(&chart.svg()));
+        });
+        body += "</section>\n";
+    }
+    format!(
+        "<!DOCTYPE html>\n<html lang=en>\n<head>\n<meta charset=utf-8>\n<meta name=viewport content='width=device-width'>\n\
+         <title>Published and computed</title>\n<style>{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
+    )
+}
+
+/// One coloured cell for every claim, and links to tables and figures.
+fn glance(report: &Report) -> String {
+    let mut out = String::from("<div class=glance>\n");
+    for result in &report.claims {
+        let verdict = overall(&result.rows);
+        let agree = result
+            .rows
+            .iter()
+            .filter(|r| r.verdict() == Verdict::Agrees)
+            .count();
+        let compared = result
+            .rows
+            .iter()
+            .filter(|r| r.published != Published::Nothing)
+            .count();
+        let _ = writeln!(
+            out,
+            "<a class='{}' href='#c{}'><b>{}</b> {}<i>{agree} of {compared} agree</i></a>",
+            class(verdict),
+            result.claim.number,
+            result.claim.number,
+            escaped(result.claim.title),
+        );
+    }
+    out += "</div>\n<p class=links>";
+    for table in &report.tables {
+        let _ = write!(out, "<a href='#t{0}'>Table {0}</a> ", table.number);
+    }
+    for figure in &report.figures {
+        let _ = write!(out, "<a href='#f{0}'>Fig. {0}</a> ", figure.number);
+    }
+    out + "</p>\n"
+}
+
+fn tallies(report: &Report) -> String {
+    let count = |verdict| report.rows().filter(|row| row.verdict() == verdict).count();
+    Verdict::ALL
+        .map(|verdict| {
+            format!(
+                "<span class='badge {}'>{} {}</span> ",
+                class(verdict),
+                count(verdict),
+                plural(verdict)
+            )
+        })
+        .concat()
+}
+
+fn claim_table(rows: &[Row]) -> String {
+    let mut out = String::from("<table>\n<tr>");
+    for heading in HEADINGS.iter().take(6) {
+        let _ = write!(out, "<th>{heading}</th>");
+    }
+    out += "<th>within tolerance</th><th>verdict</th></tr>\n";
+    for row in rows {
+        let verdict = row.verdict();
+        let cells = cells(row);
+        let _ = write!(out, "<tr class={}>", class(verdict));
+        for cell in &cells[..6] {
+            let _ = write!(out, "<td>{}</td>", escaped(cell));
+        }
+        let _ = writeln!(
+            out,
+            "<td>{}</td><td><span class='badge {}'>{}</span></td></tr>",
+            gauge(row),
+            class(verdict),
+            verdict.text()
+        );
+        let notes = row.notes();
+        if !notes.is_empty() {
+            let _ = writeln!(
+                out,
+                "<tr class=note><td colspan=8>{}</td></tr>",
+                escaped(&notes)
+            );
+        }
+    }
+    out + "</table>\n"
+}
+
+/// Where the computed value lies in the published range: a band for the tolerance, a dot for ours. The picture spans
+/// three tolerances either way; what is farther off is drawn at its edge.
+fn gauge(row: &Row) -> String {
+    let (Some(computed), Some((low, high))) = (row.computed, row.published.range()) else {
+        return String::new();
+    };
+    // A bound has one end: the dot lies as far inside or outside as its relative distance.
+    let position = match (low.is_finite(), high.is_finite()) {
+        (true, true) => (computed - 0.5 * (low + high)) / (0.5 * (high - low)),
+        (true, false) => 2.0 * (computed / low - 1.0) - 1.0,
+        _ => 2.0 * (computed / high - 1.0) + 1.0,
+    };
+    let (left, right) = match (low.is_finite(), high.is_finite()) {
+        (true, true) => (40.0, 80.0),
+        (true, false) => (40.0, 120.0),
+        _ => (0.0, 80.0),
+    };
+    let x = 60.0 + 20.0 * position.clamp(-2.8, 2.8);
+    format!(
+        "<svg class=gauge viewBox='0 0 120 14' width=120 height=14><rect x=0 y=6 width=120 height=2 fill=#ddd />\
+         <rect x={left} y=3 width={} height=8 fill=#bfe3cf /><circle cx={x:.1} cy=7 r=4 fill={} /></svg>",
+        right - left,
+        match row.verdict() {
+            Verdict::Agrees => "#0b7a45",
+            Verdict::Fails => "#c01818",
+            _ => "#d98200",
+        }
+    )
+}
+
+fn grid_html(grid: &Grid) -> String {
+    let mut out = String::from("<table class=plain>\n");
+    for (index, row) in grid.lines().enumerate() {
+        let cell = if index == 0 { "th" } else { "td" };
+        out += "<tr>";
+        for text in row {
+            let _ = write!(out, "<{cell}>{}</{cell}>", escaped(text));
+        }
+        out += "</tr>\n";
+    }
+    out + "</table>\n"
+}
+
+/// An SVG that fits its container.
+fn scalable(svg: &str) -> String {
+    svg.replacen("width=\"900\" height=\"560\"", "class=\"chart\"", 1)
+}
+
+fn class(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Agrees => "agrees",
+        Verdict::Differs => "differs",
+        Verdict::Fails => "fails",
+        Verdict::Ours => "ours",
+        Verdict::NotModelled => "none",
+    }
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+}
+
+const STYLE: &str = "
+body{font:15px/1.45 system-ui,sans-serif;color:#222;max-width:1080px;margin:2em auto;padding:0 1em}
+h1{margin-bottom:.2em}h2{margin:2em 0 .2em;font-size:1.15em}
+.lead{max-width:48em}.source{margin:.1em 0 .6em;color:#666}
+.badge{display:inline-block;border-radius:.7em;padding:0 .7em;font-size:.85em;font-weight:600;white-space:nowrap}
+.badge.agrees,.glance .agrees{background:#d3efdf;color:#0b5d36}
+.badge.differs,.glance .differs{background:#ffe7c2;color:#7a4a00}
+.badge.fails,.glance .fails{background:#f7c6c6;color:#8c0d0d}
+.badge.ours,.glance .ours{background:#dde9f7;color:#1d4777}
+.badge.none,.glance .none{background:#e8e8e8;color:#555}
+.glance{display:grid;grid-template-columns:repeat(auto-fill,minmax(200px,1fr));gap:6px;margin:1.2em 0}
+.glance a{border-radius:6px;padding:6px 9px;text-decoration:none;font-size:.9em}
+.glance i{display:block;font-style:normal;font-size:.82em;opacity:.8}
+.links a{margin-right:.5em;white-space:nowrap}
+table{border-collapse:collapse;width:100%;font-size:.92em}
+th,td{padding:3px 8px;text-align:right;border-bottom:1px solid #e6e6e6}
+th:first-child,td:first-child{text-align:left}th{color:#666;font-weight:600}
+tr.note td{text-align:left;color:#666;font-size:.9em;border-bottom:1px solid #e6e6e6;padding:0 8px 5px 20px}
+figure{margin:.5em 0}svg.chart{width:100%;height:auto}
+";

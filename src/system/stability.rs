@@ -1,0 +1,283 @@
+//! Numerical stability: how far functions are from references of many digits, at extreme arguments.
+//!
+//! `vectors/stability/make.py` computes the references with mpmath at 60 digits and keeps them in files beside it:
+//! arguments as exact doubles, reference last. [`functions`] lists the functions concerned, each with the error that
+//! its documentation promises; a function joins by a file there and a line here.
+
+use crate::chip::{Exposure, Overflow, SensorConfig, WindowLaw, histogram};
+use crate::engine::cohort::{BlindSpad, at_least_hit, none_of};
+use crate::photon::{DeadTimeLaw, Poisson, pulse_share};
+use crate::ranging::{PeakOptions, interpolate};
+use crate::report::Grid;
+use crate::units::{Frequency, Time};
+
+/// A result to compare.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Value {
+    /// A number of whole units: femtoseconds, counts.
+    Whole(i64),
+    /// A real number; NaN stands for "no result".
+    Real(f64),
+}
+
+/// What an error is measured against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measure {
+    /// The reference. Where that is 0, any difference counts as infinite.
+    Relative,
+    /// One: for probabilities that are kept as fixed-point numbers, and for positions.
+    Absolute,
+}
+
+/// A function and its references.
+#[derive(Debug, Clone, Copy)]
+pub struct Function {
+    /// Its name in tables.
+    pub name: &'static str,
+    /// What range the references cover.
+    pub range: &'static str,
+    /// CSV with a header: arguments, then the reference.
+    pub references: &'static str,
+    /// The function of one line's arguments.
+    pub compute: fn(&[f64]) -> Value,
+    /// How its error is measured.
+    pub measure: Measure,
+    /// The largest error it promises.
+    pub promise: f64,
+}
+
+/// The worst of a function's errors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Worst {
+    /// References compared.
+    pub cases: usize,
+    /// Largest error.
+    pub error: f64,
+    /// Where it occurs, as `name = value` pairs; empty if there is no error at all.
+    pub at: String,
+}
+
+/// Every function in the table.
+pub fn functions() -> Vec<Function> {
+    macro_rules! references {
+        ($name:literal) => {
+            include_str!(concat!("../../vectors/stability/", $name, ".csv"))
+        };
+    }
+    vec![
+        Function {
+            name: "share of a Gaussian pulse",
+            range: "edges to 30 sigma, widths 1e-9 to 1e3 sigma, sigma << bin",
+            references: references!("pulse_share"),
+            compute: |a| Value::Real(pulse_share(a[0], a[1], a[2])),
+            measure: Measure::Relative,
+            promise: 1e-12,
+        },
+        Function {
+            name: "at least k of 16 SPADs hit",
+            range: "1e-15 to 34.5 photons: p within 1e-15 of 0 and 1",
+            references: references!("hit_tails"),
+            compute: |a| Value::Real(at_least_hit(a[0] as usize, a[1])),
+            measure: Measure::Relative,
+            promise: 1e-13,
+        },
+        Function {
+            name: "none of n cycles hit",
+            range: "n to 1e9, p from 1e-15 to 0.5",
+            references: references!("none_hit"),
+            compute: |a| Value::Real(none_of(a[0] as u64, a[1], 1.0 - a[1])),
+            measure: Measure::Relative,
+            promise: 1e-12,
+        },
+        Function {
+            name: "pulses of a SPAD in even light",
+            range: "both dead-time laws, 1e-15 to 1e3 photons a step, dead time 1 to 1000 steps",
+            references: references!("steady_pulse"),
+            compute: |a| {
+                let law = match a[0] {
+                    0.0 => DeadTimeLaw::NonParalysable,
+                    _ => DeadTimeLaw::Paralysable,
+                };
+                Value::Real(BlindSpad::new(law, a[1]).steady_pulse(a[2]))
+            },
+            measure: Measure::Relative,
+            promise: 1e-11,
+        },
+        Function {
+            name: "Poisson exceedance table",
+            range: "means 1e-15 to 64, counts to 150",
+            references: references!("poisson_exceedance"),
+            compute: |a| Value::Real(Poisson::new(a[0]).exceedance(a[1] as usize)),
+            measure: Measure::Absolute,
+            promise: 1e-15,
+        },
+        Function {
+            name: "clock edges",
+            range: "1 Hz to 1 THz, to half period 2e12",
+            references: references!("clock_edges"),
+            compute: |a| {
+                let edge = Frequency::from_hz(a[0] as u64).half_periods(a[1] as i64);
+                Value::Whole(edge.as_fs())
+            },
+            measure: Measure::Relative,
+            promise: 0.0,
+        },
+        Function {
+            name: "window law: edge of a bin",
+            range: "start values 0 to 511, laser cycles to 1e9",
+            references: references!("window_edges"),
+            compute: |a| {
+                let config = SensorConfig::default();
+                let law = WindowLaw::new(&config, &Exposure::new(&config, 520, u32::MAX));
+                let window = law.window(a[0] as u16).open();
+                Value::Whole(window.map_or(i64::MIN, |window| {
+                    let photons = law.bin_interval(&window, a[1] as i64, a[2] as i64);
+                    let edge = photons.end + law.timing().spad_to_toggle - Time::from_fs(1);
+                    edge.as_fs()
+                }))
+            },
+            measure: Measure::Relative,
+            promise: 0.0,
+        },
+        Function {
+            name: "counters",
+            range: "1 to 16 bits at the boundary, to 1e9 hits, saturating and wrapping",
+            references: references!("counters"),
+            compute: |a| {
+                let overflow = match a[1] {
+                    0.0 => Overflow::Saturate,
+                    _ => Overflow::Wrap,
+                };
+                Value::Whole(histogram::model(a[2] as u64, a[0] as u32, overflow).into())
+            },
+            measure: Measure::Relative,
+            promise: 0.0,
+        },
+        Function {
+            name: "peak position, bins",
+            range: "no counts, even counts, one count, counts to 2^32 - 1",
+            references: references!("peak_positions"),
+            compute: |a| {
+                let counts: Vec<u32> = a.iter().map(|&count| count as u32).collect();
+                let peak = interpolate(&counts, &PeakOptions::default());
+                Value::Real(peak.map_or(f64::NAN, |peak| peak.position_bins))
+            },
+            measure: Measure::Absolute,
+            promise: 1e-14,
+        },
+    ]
+}
+
+impl Function {
+    /// Compares the function with all its references.
+    ///
+    /// # Panics
+    /// When the references are no table of numbers: they come with the program.
+    pub fn worst(&self) -> Worst {
+        let mut lines = self.references.lines();
+        let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+        let mut worst = Worst {
+            cases: 0,
+            error: 0.0,
+            at: String::new(),
+        };
+        for line in lines {
+            let (arguments, reference) = line.rsplit_once(',').expect("arguments and a reference");
+            let arguments: Vec<f64> = arguments
+                .split(',')
+                .map(|number| number.parse().expect("a number"))
+                .collect();
+            let error = self.error((self.compute)(&arguments), reference);
+            worst.cases += 1;
+            if error > worst.error {
+                worst.error = error;
+                let pairs = header.iter().zip(&arguments);
+                let pairs: Vec<String> = pairs.map(|(name, x)| format!("{name} = {x:e}")).collect();
+                worst.at = pairs.join(", ");
+            }
+        }
+        worst
+    }
+
+    fn error(&self, value: Value, reference: &str) -> f64 {
+        let (difference, size) = match value {
+            Value::Whole(value) => {
+                let reference: i64 = reference.parse().expect("a whole number");
+                (value.abs_diff(reference) as f64, reference as f64)
+            }
+            Value::Real(value) => {
+                let reference: f64 = reference.parse().expect("a number");
+                if value.is_nan() || reference.is_nan() {
+                    let agree = value.is_nan() && reference.is_nan();
+                    return if agree { 0.0 } else { f64::INFINITY };
+                }
+                ((value - reference).abs(), reference)
+            }
+        };
+        match self.measure {
+            _ if difference == 0.0 => 0.0,
+            Measure::Absolute => difference,
+            Measure::Relative => difference / size.abs(),
+        }
+    }
+}
+
+/// The table of all functions, and whether every one keeps its promise.
+pub fn table() -> (Grid, bool) {
+    let mut grid = Grid::new([
+        "function", "range", "cases", "error", "worst", "promised", "at",
+    ]);
+    let mut kept = true;
+    for function in functions() {
+        let worst = function.worst();
+        kept &= worst.error <= function.promise;
+        let measure = match function.measure {
+            Measure::Relative => "relative",
+            Measure::Absolute => "absolute",
+        };
+        grid.push([
+            function.name.to_owned(),
+            function.range.to_owned(),
+            worst.cases.to_string(),
+            measure.to_owned(),
+            format!("{:.1e}", worst.error),
+            format!("{:.0e}", function.promise),
+            worst.at,
+        ]);
+    }
+    (grid, kept)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_function_keeps_its_promise() {
+        let (table, kept) = table();
+        assert!(kept, "{table}");
+    }
+
+    #[test]
+    fn a_wrong_function_is_found_out() {
+        let functions = functions();
+        for function in functions.iter().filter(|f| f.promise > 0.0) {
+            let function = Function {
+                compute: |_| Value::Real(1.5),
+                ..*function
+            };
+            assert!(
+                function.worst().error > function.promise,
+                "{}",
+                function.name
+            );
+        }
+        for function in functions.iter().filter(|f| f.promise == 0.0) {
+            let function = Function {
+                compute: |_| Value::Whole(7),
+                ..*function
+            };
+            assert!(function.worst().error > 0.0, "{}", function.name);
+        }
+    }
+}

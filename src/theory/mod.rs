@@ -1,0 +1,16 @@
+//! Chapter 3 of the thesis: how often the echo is found, how precisely, with how many bins, and what follows for a
+//! design.
+
+pub mod capacity;
+mod counts;
+mod cycles;
+pub mod design;
+pub mod detection;
+pub mod estimators;
+mod gaussian;
+pub mod partial;
+pub mod precision;
+mod pulse;
+
+pub use counts::{Counts, Tails};
+pub use pulse::{LnBin, MeasuredPulse, Pulse, PulseError};

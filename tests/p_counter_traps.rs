@@ -1,0 +1,434 @@
+//! What goes wrong with a P-counter when it is loaded, reset, enabled or aimed carelessly, and what keeps the sensor
+//! from it. Each trap is shown to be one: a test here fails if the circuit stops falling into it.
+
+mod bench;
+
+use bench::{Bench, SETTLING};
+use guided_dtof::chip::window_law::Window as LawWindow;
+use guided_dtof::chip::{
+    AfterBorrow, Exposure, PCounter, SensorConfig, Tap, WindowLaw, macropixel, p_counter,
+    p_counter_timing,
+};
+use guided_dtof::engine::{Cycle, Engine, GateSimulation, Window};
+use guided_dtof::kernel::Recorder;
+use guided_dtof::logic::Logic::One;
+use guided_dtof::netlist::{CellKind, Corner, ModuleBuilder};
+use guided_dtof::photon::SpadEvent;
+use guided_dtof::units::Time;
+
+/// Half of [`SETTLING`].
+const HALF: Time = Time::from_ps(2500);
+
+fn sensor(p_counter: PCounter) -> SensorConfig {
+    let (tap, after_borrow) = match p_counter {
+        PCounter::Memoryless => (Tap::Msb, AfterBorrow::Wrap),
+        _ => (Tap::Borrow, AfterBorrow::Hold),
+    };
+    SensorConfig {
+        rows: 1,
+        cols: 1,
+        p_counter,
+        tap,
+        after_borrow,
+        ..SensorConfig::default()
+    }
+}
+
+/// A P-counter alone, out of reset with start value 0 at `SETTLING * 2`.
+fn counter(config: &SensorConfig) -> Bench {
+    let mut bench = Bench::new(&p_counter::circuit(config), Corner::Typ);
+    bench.pulse(Time::ZERO, SETTLING, "MEMORY_RESET");
+    bench.pulse(Time::ZERO, SETTLING * 2, "COUNTER_RESET");
+    bench
+}
+
+/// Of random loads one after the other, how many leave another count than the start value, and how many raise
+/// LOCAL_STOP.
+fn loads(p_counter: PCounter, holds_reset: bool) -> (usize, usize) {
+    const LOADS: u64 = 200;
+    let mut bench = counter(&sensor(p_counter));
+    let start = |load: u64| load.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 55;
+    let at = |load: u64| SETTLING * (3 + 4 * load as i64);
+    for load in 0..LOADS {
+        bench.number(at(load), "COUNTER_INIT", start(load));
+        bench.pulse(at(load) + SETTLING, SETTLING, "MEMORY_LOAD");
+        let reset = if holds_reset {
+            (at(load), SETTLING * 3)
+        } else {
+            (at(load), Time::from_ns(1))
+        };
+        bench.pulse(reset.0, reset.1, "COUNTER_RESET");
+    }
+    let (out, local_stop) = (bench.bus("COUNTER_OUT"), bench.net("LOCAL_STOP"));
+    let mut run = bench.start(&["LOCAL_STOP"]);
+    let wrong = (0..LOADS)
+        .filter(|&load| run.number_at(at(load + 1) - Time::from_fs(1), &out) != Some(start(load)))
+        .count();
+    (wrong, run.recorder.rising_edges(local_stop).len())
+}
+
+#[test]
+fn a_memory_bit_that_changes_clocks_the_next_stage_unless_the_reset_is_held() {
+    assert_eq!(loads(PCounter::Ripple, true), (0, 0));
+    let (wrong, local_stops) = loads(PCounter::Ripple, false);
+    assert!(wrong > 150 && local_stops > 50, "{wrong} {local_stops}");
+    // Nothing ripples in a synchronous counter: only its own bits are taken for others.
+    assert_eq!(loads(PCounter::Synchronous, false).1, 0);
+    // Set/reset flip-flops take the memory at the reset only, and so does the memory's absence.
+    for holds_reset in [false, true] {
+        assert_eq!(loads(PCounter::SetReset, holds_reset).1, 0);
+        assert_eq!(loads(PCounter::Memoryless, holds_reset).0, 0);
+    }
+}
+
+#[test]
+fn a_counter_is_unknown_until_its_first_reset() {
+    for p_counter in PCounter::ALL {
+        let mut bench = Bench::new(&p_counter::circuit(&sensor(p_counter)), Corner::Typ);
+        for edge in 0..20 {
+            bench.pulse(SETTLING * (1 + edge), HALF, "COUNTER_CLK");
+        }
+        let (out, local_stop) = (bench.bus("COUNTER_OUT"), bench.net("LOCAL_STOP"));
+        bench.pulse(SETTLING * 30, SETTLING, "MEMORY_RESET");
+        bench.pulse(SETTLING * 30, SETTLING, "COUNTER_RESET");
+        let mut run = bench.start(&[]);
+        assert_eq!(run.number_at(SETTLING * 25, &out), None, "{p_counter:?}");
+        assert_eq!(
+            run.is_high_at(SETTLING * 25, local_stop),
+            None,
+            "{p_counter:?}"
+        );
+        assert_eq!(run.number_at(SETTLING * 35, &out), Some(0), "{p_counter:?}");
+    }
+}
+
+/// Timing block and P-counter, with the pins of both.
+fn timed_counter(config: &SensorConfig) -> Bench {
+    let mut m = ModuleBuilder::new("timed_counter");
+    let pins = ["CLK", "STOP", "RESETB", "ENABLE", "MEMORY_LOAD"].map(|name| [m.input(name)]);
+    let [clk, stop, resetb, enable, load] = &pins;
+    let init = m.input_bus("COUNTER_INIT", config.counter_bits);
+    let wires =
+        ["LOCAL_STOP", "COUNTER_CLK", "COUNTER_RESET", "MEMORY_RESET"].map(|name| [m.wire(name)]);
+    let [local_stop, counter_clk, counter_reset, memory_reset] = &wires;
+    m.instance(
+        "p_counter_timing",
+        &p_counter_timing::circuit(config.after_borrow),
+        &[
+            ("CLK", clk),
+            ("STOP", stop),
+            ("RESETB", resetb),
+            ("ENABLE", enable),
+            ("LOCAL_STOP", local_stop),
+            ("COUNTER_CLK", counter_clk),
+            ("COUNTER_RESET", counter_reset),
+            ("MEMORY_RESET", memory_reset),
+        ],
+    );
+    m.instance(
+        "p_counter",
+        &p_counter::circuit(config),
+        &[
+            ("COUNTER_INIT", &init),
+            ("MEMORY_LOAD", load),
+            ("MEMORY_RESET", memory_reset),
+            ("COUNTER_CLK", counter_clk),
+            ("COUNTER_RESET", counter_reset),
+            ("LOCAL_STOP", local_stop),
+        ],
+    );
+    Bench::new(&m.finish().unwrap(), Corner::Typ)
+}
+
+#[test]
+fn releasing_the_chips_reset_while_enabled_gives_one_false_local_stop() {
+    for p_counter in [
+        PCounter::Ripple,
+        PCounter::SetReset,
+        PCounter::Synchronous,
+        PCounter::Comparator,
+    ] {
+        for enabled in [false, true] {
+            let mut bench = timed_counter(&sensor(p_counter));
+            bench.drive(Time::ZERO, "ENABLE", enabled);
+            bench.drive(SETTLING * 4 + Time::from_ns(1), "RESETB", true);
+            for edge in 0..40 {
+                bench.pulse(SETTLING * (1 + edge), HALF, "CLK");
+            }
+            let local_stop = bench.net("LOCAL_STOP");
+            let mut run = bench.start(&["LOCAL_STOP"]);
+            run.until(SETTLING * 45);
+            let rises = run.recorder.rising_edges(local_stop).len();
+            assert_eq!(rises, usize::from(enabled), "{p_counter:?}");
+        }
+    }
+    // The sensor's RUN flip-flop is reset with the chip and waits for STOP.
+    let config = sensor(PCounter::Ripple);
+    let exposure = Exposure::new(&config, 40, 1);
+    let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[0], &[&[]]);
+    let local_stop = gate.netlist().net("LOCAL_STOP[0]").unwrap();
+    let mut recorder = Recorder::new([local_stop]);
+    gate.run(&mut recorder);
+    let rises = recorder.rising_edges(local_stop);
+    assert!(
+        rises.len() == 1 && rises[0] > gate.schedule().origin,
+        "{rises:?}"
+    );
+}
+
+/// Whether a COUNTER_RESET pulse of this width brings every count of a small ripple counter back to every start value.
+fn pulse_resets(config: &SensorConfig, width: Time) -> bool {
+    let all = 1 << config.counter_bits;
+    (0..all).all(|start| {
+        let mut bench = counter(config);
+        let mut now = SETTLING * 3;
+        bench.pulse(now, SETTLING * 4, "COUNTER_RESET");
+        bench.number(now, "COUNTER_INIT", start);
+        bench.pulse(now + SETTLING, SETTLING, "MEMORY_LOAD");
+        now += SETTLING * 5;
+        let mut ends = Vec::new();
+        for counts in 0..=2 * all {
+            for _ in 0..counts {
+                bench.pulse(now, HALF, "COUNTER_CLK");
+                now += SETTLING;
+            }
+            bench.pulse(now, width, "COUNTER_RESET");
+            now += SETTLING;
+            ends.push(now - Time::from_fs(1));
+            // The next try starts from a good reset.
+            bench.pulse(now, SETTLING, "COUNTER_RESET");
+            now += SETTLING * 2;
+        }
+        let (out, local_stop) = (bench.bus("COUNTER_OUT"), bench.net("LOCAL_STOP"));
+        let mut run = bench.start(&[]);
+        ends.into_iter().all(|end| {
+            run.number_at(end, &out) == Some(start)
+                && run.is_high_at(end, local_stop) == Some(false)
+        })
+    })
+}
+
+#[test]
+fn the_reset_pulse_must_outlast_the_way_to_the_next_stages_clock() {
+    let config = SensorConfig {
+        counter_bits: 3,
+        ..sensor(PCounter::Ripple)
+    };
+    let bench = counter(&config);
+    let way = bench.delay(CellKind::Dffr, 2, One) + bench.delay(CellKind::Mux2, 0, One);
+    assert!((way.as_ns() - 0.126).abs() < 0.001, "{way}");
+    let ps = Time::from_ps(1);
+    assert!(!pulse_resets(&config, way - ps));
+    assert!(pulse_resets(&config, way + ps));
+    let timing = bench.timing();
+    assert!(timing.stop_to_reset_release - timing.stop_to_reset > way * 2);
+}
+
+fn local_stops(config: &SensorConfig, exposure: &Exposure, start: u16) -> Vec<Time> {
+    let mut gate = GateSimulation::new(config, exposure, (0, 0), (1, 1), &[start], &[&[]]);
+    let local_stop = gate.netlist().net("LOCAL_STOP[0]").unwrap();
+    let mut recorder = Recorder::new([local_stop]);
+    gate.run(&mut recorder);
+    let origin = gate.schedule().origin;
+    let rises = recorder.rising_edges(local_stop).into_iter();
+    rises
+        .map(|t| t - origin)
+        .filter(|&t| t > Time::ZERO)
+        .collect()
+}
+
+#[test]
+fn a_start_value_beyond_the_laser_cycle_never_stops() {
+    for p_counter in [
+        PCounter::Ripple,
+        PCounter::SetReset,
+        PCounter::Synchronous,
+        PCounter::Comparator,
+    ] {
+        let config = sensor(p_counter);
+        let exposure = Exposure::new(&config, 60, 3);
+        let law = WindowLaw::new(&config, &exposure);
+        for (start, rises) in [(57, 3), (60, 0), (511, 0)] {
+            assert_eq!(
+                local_stops(&config, &exposure, start).len(),
+                rises,
+                "{p_counter:?} {start}"
+            );
+            assert_eq!(
+                law.window(start).open().is_some(),
+                rises > 0,
+                "{p_counter:?} {start}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_counter_that_wraps_stops_again_and_again() {
+    for (p_counter, tap, every) in [
+        (PCounter::Ripple, Tap::Borrow, 32),
+        (PCounter::Ripple, Tap::Msb, 16),
+        (PCounter::SetReset, Tap::Borrow, 32),
+        (PCounter::Synchronous, Tap::Msb, 16),
+        (PCounter::Comparator, Tap::Borrow, 16),
+    ] {
+        let config = SensorConfig {
+            tap,
+            after_borrow: AfterBorrow::Wrap,
+            counter_bits: 4,
+            ..sensor(p_counter)
+        };
+        let exposure = Exposure::new(&config, 98, 1);
+        let law = WindowLaw::new(&config, &exposure);
+        let expected: Vec<Time> = (4..98)
+            .step_by(every)
+            .map(|edge| exposure.falling(edge) + law.timing().ripple())
+            .collect();
+        assert_eq!(
+            local_stops(&config, &exposure, 3),
+            expected,
+            "{p_counter:?} {tap:?}"
+        );
+        assert!(matches!(law.window(3), LawWindow::Irregular(_)));
+        assert!(Window::new(&config, &exposure).histogram(3, &[]).is_err());
+        assert_eq!(
+            Cycle::new(&config, &exposure).histogram(3, &[]),
+            Ok(vec![0; 16])
+        );
+    }
+}
+
+/// Enabled in CLK's low phase, a counter that no reset holds takes that for an edge.
+#[test]
+fn enabling_while_clk_is_low_counts_one_step_too_many() {
+    for enabled_low in [false, true] {
+        let mut bench = timed_counter(&sensor(PCounter::Memoryless));
+        bench.drive(SETTLING, "RESETB", true);
+        bench.number(SETTLING, "COUNTER_INIT", 100);
+        bench.pulse(SETTLING * 2, SETTLING, "MEMORY_LOAD");
+        for edge in 0..10 {
+            bench.pulse(SETTLING * (10 + 2 * edge), SETTLING, "CLK");
+        }
+        // CLK falls at 11, 13, 15 and 17 SETTLING.
+        let enable = SETTLING * if enabled_low { 11 } else { 10 } + HALF;
+        bench.drive(enable, "ENABLE", true);
+        let falls = if enabled_low { 3 } else { 4 };
+        let out = bench.bus("p_counter.COUNTER_OUT");
+        let mut run = bench.start(&[]);
+        let found = run.number_at(SETTLING * 18, &out);
+        assert_eq!(found, Some(100 - falls - u64::from(enabled_low)));
+    }
+}
+
+#[test]
+fn small_start_values_reach_into_the_laser_cycle_before() {
+    let config = sensor(PCounter::Ripple);
+    let exposure = Exposure::new(&config, 60, 2);
+    let law = WindowLaw::new(&config, &exposure);
+    for start in 0..30 {
+        let window = law.window(start).open().unwrap();
+        assert_eq!(
+            law.interval(&window).start < Time::ZERO,
+            start < 17,
+            "{start}"
+        );
+    }
+    // The first bins of the second laser cycle's window lie before its STOP.
+    let window = law.window(5).open().unwrap();
+    let bin = law.bin_interval(&window, 1, 2);
+    assert!(bin.end < exposure.stop(1));
+    let pulse = SpadEvent {
+        time: bin.start + Time::from_ps(100),
+        spad: 0,
+    };
+    let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[5], &[&[pulse]]);
+    gate.run(&mut ());
+    let mut expected = vec![0; 16];
+    expected[2] = 1;
+    assert_eq!(gate.histograms().unwrap(), [expected]);
+}
+
+#[test]
+fn the_msb_tap_with_hold_is_dead_for_the_upper_half() {
+    let config = SensorConfig {
+        tap: Tap::Msb,
+        counter_bits: 5,
+        ..sensor(PCounter::Ripple)
+    };
+    let exposure = Exposure::new(&config, 60, 2);
+    for start in 0..32 {
+        let rises = local_stops(&config, &exposure, start).len();
+        assert_eq!(rises, if start < 16 { 2 } else { 0 }, "{start}");
+        let opens = WindowLaw::new(&config, &exposure)
+            .window(start)
+            .open()
+            .is_some();
+        assert_eq!(opens, start < 16, "{start}");
+    }
+}
+
+/// The tap's false rise at STOP finds HIT in reset, in every corner. (With set/reset flip-flops by less than a removal
+/// time, so that the window law does not rely on it.)
+#[test]
+fn the_msb_taps_rise_at_stop_is_not_counted() {
+    for p_counter in [PCounter::Ripple, PCounter::SetReset, PCounter::Synchronous] {
+        for corner in Corner::ALL {
+            let config = SensorConfig {
+                tap: Tap::Msb,
+                after_borrow: AfterBorrow::Wrap,
+                counter_bits: 5,
+                corner,
+                clk_hz: 200e6,
+                ..sensor(p_counter)
+            };
+            let exposure = Exposure::new(&config, 38, 4);
+            // From 20, CLK fall 21 raises LOCAL_STOP; it falls 16 counts later, one before STOP.
+            let start = 20;
+            let rises = local_stops(&config, &exposure, start);
+            assert_eq!(rises.len(), 8, "{p_counter:?} {corner:?}: {rises:?}");
+            let pulses: Vec<SpadEvent> = (0..4 * 38 * 5)
+                .filter(|ns| ns % 9 == 0)
+                .map(|ns| SpadEvent {
+                    time: Time::from_ns(ns),
+                    spad: (ns % 16) as u8,
+                })
+                .collect();
+            let mut gate =
+                GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[start], &[&pulses]);
+            gate.run(&mut ());
+            let counted = gate.histograms().unwrap().remove(0);
+            assert!(counted.iter().map(|&n| u32::from(n)).sum::<u32>() > 10);
+            let hold = SensorConfig {
+                tap: Tap::Borrow,
+                after_borrow: AfterBorrow::Hold,
+                ..config
+            };
+            let true_windows = Cycle::new(&hold, &exposure)
+                .histogram(start, &pulses)
+                .unwrap();
+            assert_eq!(counted, true_windows, "{p_counter:?} {corner:?}");
+        }
+    }
+}
+
+/// In the macropixel, too, the held reset keeps a load from being counted.
+#[test]
+fn the_sensor_holds_the_reset_while_it_loads() {
+    let config = sensor(PCounter::Ripple);
+    let mut bench = Bench::new(&macropixel::circuit(&config), Corner::Typ);
+    bench.pulse(Time::ZERO, SETTLING, "PIXEL_CLEAR");
+    bench.drive(SETTLING, "RESETB", true);
+    for load in 0..50u64 {
+        let at = SETTLING * (2 + 3 * load as i64);
+        bench.number(
+            at,
+            "COUNTER_INIT",
+            load.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 55,
+        );
+        bench.pulse(at + SETTLING, SETTLING, "MEMORY_LOAD");
+    }
+    let local_stop = bench.net("LOCAL_STOP");
+    let mut run = bench.start(&["LOCAL_STOP"]);
+    run.until(SETTLING * 160);
+    assert_eq!(run.recorder.rising_edges(local_stop), []);
+}
