@@ -3,7 +3,7 @@
 //! | event | what happens in the chip |
 //! |---|---|
 //! | `memory_written_while_counting` | a memory bit that changes flips its multiplexer: an edge for the next stage, though nothing was counted |
-//! | `reset_too_short` | COUNTER_RESET ends before the stage outputs are back at the memory's value, whose rising edges then count |
+//! | `reset_too_short` | COUNTER_RESET is missing, or ends before the stage outputs are back at the memory's value (their rising edges then count), or before the COUNTER_CLK edge that LOCAL_STOP's fall lets through (it then counts) |
 //! | `pulses_cancelled` | a SPAD fires twice between two CLK edges: its toggle flip-flop is back where it was, both photons are lost |
 //!
 //! [`HardwareEvents`] is an observer, as timing checks are. A STOP edge that releases the reset too near a CLK edge is
@@ -29,7 +29,8 @@ const MOST_EVENTS: usize = 10_000;
 pub enum HardwareEventKind {
     /// A start value changed while its counter was not held in reset.
     MemoryWrittenWhileCounting,
-    /// The counter began to count from another value than its start value.
+    /// The counter was not reset, or began to count from another value than its start value, or at an edge that is
+    /// not CLK's.
     ResetTooShort,
     /// Two pulses of one SPAD fell between the same two CLK edges.
     PulsesCancelled,
@@ -100,6 +101,7 @@ impl fmt::Display for HardwareEventReport {
 #[derive(Debug, Clone, Copy)]
 enum Role {
     Clk,
+    Stop,
     PixelClear,
     CounterReset,
     CounterClk,
@@ -134,6 +136,10 @@ struct Macropixel {
     out: Bits,
     /// When the reset was released, until the first count after it.
     released: Option<Time>,
+    reset_rose: Time,
+    clk_fell: Time,
+    /// The last rise of STOP, if the counter was free and had to be reset by it.
+    awaits_reset: Option<Time>,
     /// PIXEL_CLEAR, which also moves toggles.
     is_cleared: bool,
     toggle: Bits,
@@ -182,6 +188,7 @@ impl HardwareEvents {
             watch(nets("CLK")[0], Role::Clk);
             watch(nets("PIXEL_CLEAR")[0], Role::PixelClear);
             if judges_counts {
+                watch(nets("STOP")[0], Role::Stop);
                 watch(nets("COUNTER_RESET")[0], Role::CounterReset);
                 watch(nets("COUNTER_CLK")[0], Role::CounterClk);
                 watch(nets("LOCAL_STOP")[0], Role::LocalStop);
@@ -203,6 +210,9 @@ impl HardwareEvents {
                 memory: Bits::default(),
                 out: Bits::default(),
                 released: None,
+                reset_rose: Time::ZERO,
+                clk_fell: Time::ZERO,
+                awaits_reset: None,
                 is_cleared: true,
                 toggle: Bits::default(),
                 toggled: [0; SPADS],
@@ -226,15 +236,27 @@ impl HardwareEvents {
         let mut found = None;
         match role {
             Role::Clk if value == Logic::One => p.toggled = [0; SPADS],
-            Role::Clk => {}
+            Role::Clk => p.clk_fell = time,
+            Role::Stop if value == Logic::One => {
+                let is_free = p.reset == Logic::Zero;
+                let missed = std::mem::replace(&mut p.awaits_reset, is_free.then_some(time));
+                found = missed.map(|stop| (HardwareEventKind::ResetTooShort, stop, String::new()));
+            }
+            Role::Stop => {}
             Role::PixelClear => p.is_cleared = value != Logic::Zero,
             Role::CounterReset => {
                 p.released = (value == Logic::Zero).then_some(time);
+                if value == Logic::One {
+                    p.reset_rose = time;
+                    p.awaits_reset = None;
+                }
                 p.reset = value;
             }
             Role::LocalStop => p.local_stop = value,
             Role::CounterClk if value == Logic::One && p.reset == Logic::Zero => {
-                let starts_right = p.out == p.memory && p.local_stop == Logic::Zero;
+                // A CLK edge that counts is one that fell after the reset began.
+                let starts_right =
+                    p.out == p.memory && p.local_stop == Logic::Zero && p.clk_fell >= p.reset_rose;
                 if let (Some(released), false) = (p.released.take(), starts_right) {
                     found = Some((HardwareEventKind::ResetTooShort, released, String::new()));
                 }
