@@ -164,9 +164,10 @@ impl Case<'_> {
                 worst = worst.max(own.abs());
             }
             relative = relative.max((by_photons.mean(i) / expected - 1.0).abs());
-            for j in 0..=i {
+            // The spread of a covariance is known for nearly Gaussian counts, not for those that stop at a limit.
+            let others = if saturates { 0..0 } else { 0..i + 1 };
+            for j in others {
                 let (a, b) = (by_photons.covariance(i, j), drawn.covariance(i, j));
-                // Of nearly Gaussian counts.
                 let spread = by_photons.covariance(i, i) * by_photons.covariance(j, j) + a * a;
                 let z = (a - b) / (spread * (1.0 / by_photons.n + 1.0 / drawn.n)).sqrt();
                 worst = worst.max(if spread == 0.0 { 0.0 } else { z.abs() });
