@@ -21,8 +21,9 @@ use crate::ranging::{PeakOptions, interpolate};
 /// Steps to a CLK period that the cohort engine may take, cheapest first.
 const STEPS: [usize; 4] = [1, 2, 4, 8];
 
-/// Photons that the window engine handles in the time of one bin and step of the cohort engine, about.
-const PHOTONS_PER_STEP: f64 = 12.0;
+/// Photons that the window engine handles in the time of one bin and step of the cohort engine, by [`STEPS`]: one
+/// step is mostly done in pools, more are followed in joint states, which cost ten times as much.
+const PHOTONS_PER_STEP: [f64; STEPS.len()] = [80.0, 900.0, 900.0, 900.0];
 
 /// Totals to which mean counts are scaled before they are rounded to whole ones: a depth keeps nine digits.
 const WHOLE_COUNTS: f64 = 1e9;
@@ -141,7 +142,7 @@ impl Planner<'_> {
     /// The cheapest way to expose `pixel` and the bound on its depth error, m.
     fn choose(&self, pixel: &LitPixel, tolerance_m: f64) -> (Choice, f64) {
         let exact = (Choice::Window, 0.0);
-        let Some(light) = &pixel.light else {
+        let Some(light) = pixel.light.as_ref().filter(|_| tolerance_m > 0.0) else {
             return exact;
         };
         let window_s = self.bins as f64 / self.stream.clock.as_hz();
@@ -149,7 +150,7 @@ impl Planner<'_> {
             * f64::from(self.stream.laser_cycles);
         let mut coarse = self.depth_m(0, pixel);
         for (steps, per_period) in STEPS.iter().enumerate().take(STEPS.len() - 1) {
-            let step_cost = (self.bins * per_period) as f64 * PHOTONS_PER_STEP;
+            let step_cost = (self.bins * per_period) as f64 * PHOTONS_PER_STEP[steps];
             if step_cost >= photons {
                 return exact;
             }
