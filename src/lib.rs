@@ -8,7 +8,7 @@
 //! | module | what lives there |
 //! |---|---|
 //! | [`units`] | integer femtoseconds, exact clock frequencies, constants |
-//! | [`numerics`] | quadrature, special functions |
+//! | [`numerics`] | quadrature, special functions, confidence intervals |
 //! | [`files`] | user's input with line numbers, output whole or not at all |
 //! | [`logic`] | four-valued logic |
 //! | [`netlist`] | cells, hierarchical builder, delays, Verilog |

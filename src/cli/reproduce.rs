@@ -22,6 +22,13 @@ pub struct ReproduceArgs {
     /// Only this table of the thesis; may be repeated.
     #[arg(long, value_name = "N")]
     table: Vec<u32>,
+    /// Only this measurement of the chip against its theory: 1 probability of detection, 2 precision, 3 penalty; may be
+    /// repeated.
+    #[arg(long, value_name = "N")]
+    measurement: Vec<u32>,
+    /// Frames behind each measured number, at least 100; without it 1000.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
+    frames: Option<u32>,
     /// Folder for the page (report.md, report.html, report.json), the figures as SVG and their numbers as CSV; made
     /// if it is not there.
     #[arg(long, value_name = "DIR")]
@@ -40,9 +47,14 @@ pub fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
         claims: args.claim.clone(),
         figures: args.figure.clone(),
         tables: args.table.clone(),
+        measurements: args.measurement.clone(),
+        frames: args.frames.map(|frames| frames as usize),
     };
     let selection = if chosen.is_empty() {
-        Selection::all()
+        Selection {
+            frames: chosen.frames,
+            ..Selection::all()
+        }
     } else {
         chosen
     };
@@ -52,9 +64,8 @@ pub fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
     if let Some(folder) = &args.out {
         create_folder(folder)?;
     }
-    let parts = selection.claims.len() + selection.figures.len() + selection.tables.len();
-    let bar = ProgressBar::new(parts as u64).with_style(
-        ProgressStyle::with_template("{bar:30} {pos}/{len} claims, tables and figures")
+    let bar = ProgressBar::new(selection.parts() as u64).with_style(
+        ProgressStyle::with_template("{bar:30} {pos}/{len} claims, tables, figures, measurements")
             .expect("a template that indicatif knows"),
     );
     let report = reproduce::reproduce(&selection, || bar.inc(1));
@@ -106,6 +117,16 @@ fn print(report: &Report, folder: Option<&Path>) -> std::io::Result<()> {
             say("  give --out DIR for the picture and its numbers\n")?;
         }
     }
+    for result in &report.measurements {
+        say(format_args!("{}\n", reproduce::heading(result)))?;
+        for note in &result.found.notes {
+            say(format_args!("  {note}\n"))?;
+        }
+        for (_, title, grid) in result.tables() {
+            say(format_args!("\n{title}\n{grid}"))?;
+        }
+        say("\n")?;
+    }
     if !report.claims.is_empty() {
         say(format_args!("{}.\n", reproduce::tally(report)))?;
     }
@@ -128,6 +149,15 @@ fn write(report: &Report, folder: &Path) -> Result<(), InputError> {
     for table in &report.tables {
         let path = folder.join(format!("table_{:03}.csv", table.number));
         OutputFile::write_with(&path, |out| table.grid.write_csv(out))?;
+    }
+    for result in &report.measurements {
+        for (name, _, grid) in result.tables() {
+            let path = folder.join(format!("{name}.csv"));
+            OutputFile::write_with(&path, |out| grid.write_csv(out))?;
+        }
+        for (name, chart) in result.files() {
+            chart.write(&folder.join(format!("{name}.svg")))?;
+        }
     }
     let json = format!("{:#}\n", report.json());
     let pages = [

@@ -1,5 +1,8 @@
-//! Numerical tools that no circuit needs but every formula does: quadrature and special functions.
+//! Numerical tools that no circuit needs but every formula does: quadrature, special functions, confidence intervals,
+//! regression.
 
+pub mod intervals;
+pub mod probit;
 mod quadrature;
 mod special;
 

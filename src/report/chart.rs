@@ -10,6 +10,7 @@ use plotters::coord::Shift;
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 
+use super::legend::{self, looks};
 use crate::files::{InputError, OutputFile};
 
 /// How an axis is divided.
@@ -65,14 +66,6 @@ impl Axis {
                 .is_none_or(|(least, greatest)| (least..=greatest).contains(&value))
     }
 
-    /// Where in `range` a value lies, 0 to 1.
-    fn share(&self, value: f64, range: &Range<f64>) -> f64 {
-        match self.scale {
-            Scale::Linear => (value - range.start) / (range.end - range.start),
-            Scale::Log => (value / range.start).ln() / (range.end / range.start).ln(),
-        }
-    }
-
     fn range_over(&self, values: impl Iterator<Item = f64>) -> Range<f64> {
         if let Some((least, greatest)) = self.range {
             return least..greatest;
@@ -103,6 +96,8 @@ pub enum Style {
     Dashed,
     /// A dot at each point.
     Points,
+    /// A stroke between every two points, for intervals; in the colour of the series before.
+    Whiskers,
     /// A bar from zero (or the axis' least value) to each point, as wide as the spacing of the first two.
     Bars,
 }
@@ -133,22 +128,6 @@ pub struct Chart {
 
 /// Size of a picture, pixels.
 const SIZE: (u32, u32) = (900, 560);
-
-/// Colours of the series in turn; the first eight after Okabe and Ito, who chose them for the colour-blind.
-const COLOURS: [RGBColor; 12] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(230, 159, 0),
-    RGBColor(90, 90, 90),
-    RGBColor(150, 120, 40),
-    RGBColor(160, 0, 60),
-    RGBColor(0, 0, 0),
-    RGBColor(110, 170, 40),
-    RGBColor(100, 60, 180),
-];
 
 impl Chart {
     /// An empty chart.
@@ -184,12 +163,11 @@ impl Chart {
         let xs = self.series.iter().flat_map(|s| &s.points).map(|p| p.0);
         let ys = self.series.iter().flat_map(|s| &s.points).map(|p| p.1);
         let (x, y) = (self.x.range_over(xs), self.y.range_over(ys));
-        let legend = self.emptiest_corner(&x, &y);
         let drawn = match (self.x.scale, self.y.scale) {
-            (Scale::Linear, Scale::Linear) => self.draw(&area, x, y, legend),
-            (Scale::Linear, Scale::Log) => self.draw(&area, x, y.log_scale(), legend),
-            (Scale::Log, Scale::Linear) => self.draw(&area, x.log_scale(), y, legend),
-            (Scale::Log, Scale::Log) => self.draw(&area, x.log_scale(), y.log_scale(), legend),
+            (Scale::Linear, Scale::Linear) => self.draw(&area, x, y),
+            (Scale::Linear, Scale::Log) => self.draw(&area, x, y.log_scale()),
+            (Scale::Log, Scale::Linear) => self.draw(&area, x.log_scale(), y),
+            (Scale::Log, Scale::Log) => self.draw(&area, x.log_scale(), y.log_scale()),
         };
         drawn.expect("a string takes every drawing");
         drop(area);
@@ -197,34 +175,11 @@ impl Chart {
         text
     }
 
-    /// Where a legend of this many lines hides the fewest points; the upper right corner if all hide alike.
-    fn emptiest_corner(&self, x: &Range<f64>, y: &Range<f64>) -> SeriesLabelPosition {
-        use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
-        let height = 0.06 * (self.series.len() + 1) as f64;
-        let hidden = |right: bool, upper: bool| {
-            let points = self.series.iter().flat_map(|s| &s.points);
-            let share = points.filter(|p| self.x.shows(p.0) && self.y.shows(p.1));
-            share
-                .map(|p| (self.x.share(p.0, x), self.y.share(p.1, y)))
-                .filter(|&(u, v)| if right { u > 0.6 } else { u < 0.4 } && (if upper { 1.0 - v } else { v }) < height)
-                .count()
-        };
-        let corners = [
-            (UpperRight, hidden(true, true)),
-            (UpperLeft, hidden(false, true)),
-            (LowerRight, hidden(true, false)),
-            (LowerLeft, hidden(false, false)),
-        ];
-        let best = corners.into_iter().min_by_key(|c| c.1);
-        best.map_or(UpperRight, |c| c.0)
-    }
-
     fn draw<'a, X, Y>(
         &self,
         area: &DrawingArea<SVGBackend<'a>, Shift>,
         x: X,
         y: Y,
-        legend: SeriesLabelPosition,
     ) -> Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>
     where
         X: AsRangedCoord<Value = f64>,
@@ -233,7 +188,9 @@ impl Chart {
         Y::CoordDescType: ValueFormatter<f64>,
     {
         area.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(area)
+        let legend = legend::Legend::of(&self.series);
+        let (plot, below) = area.split_vertically(SIZE.1 - legend.height());
+        let mut chart = ChartBuilder::on(&plot)
             .caption(&self.title, ("sans-serif", 19))
             .margin(14)
             .x_label_area_size(46)
@@ -252,7 +209,8 @@ impl Chart {
             Scale::Linear => 0.0,
             Scale::Log => f64::MIN_POSITIVE,
         });
-        for (series, &colour) in self.series.iter().zip(COLOURS.iter().cycle()) {
+        for (series, look) in self.series.iter().zip(looks(&self.series)) {
+            let colour = look.colour;
             let points: Vec<(f64, f64)> = series
                 .points
                 .iter()
@@ -260,13 +218,16 @@ impl Chart {
                 .filter(|p| self.x.shows(p.0) && self.y.shows(p.1))
                 .collect();
             let stroke = colour.stroke_width(2);
-            let drawn = match series.style {
+            match series.style {
                 Style::Line => chart.draw_series(LineSeries::new(points, stroke))?,
                 Style::Dashed => chart.draw_series(DashedLineSeries::new(points, 7, 5, stroke))?,
-                Style::Points => chart.draw_series(
+                Style::Points => chart.draw_series(points.into_iter().map(|p| {
+                    EmptyElement::at(p) + Polygon::new(look.outline(), colour.filled())
+                }))?,
+                Style::Whiskers => chart.draw_series(
                     points
-                        .into_iter()
-                        .map(|p| Circle::new(p, 3, colour.filled())),
+                        .chunks_exact(2)
+                        .map(|ends| PathElement::new(ends, colour.stroke_width(1))),
                 )?,
                 Style::Bars => {
                     let half = match points[..] {
@@ -278,21 +239,8 @@ impl Chart {
                     }))?
                 }
             };
-            if !series.name.is_empty() {
-                drawn.label(&series.name).legend(move |(x, y)| {
-                    PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(3))
-                });
-            }
         }
-        if self.series.iter().any(|s| !s.name.is_empty()) {
-            chart
-                .configure_series_labels()
-                .position(legend)
-                .background_style(WHITE.mix(0.85))
-                .border_style(RGBColor(180, 180, 180))
-                .label_font(("sans-serif", 14))
-                .draw()?;
-        }
+        legend.draw(&below)?;
         area.present()
     }
 

@@ -7,6 +7,7 @@ mod checks;
 mod colour;
 mod grid;
 mod image;
+mod legend;
 mod table;
 
 pub use array::write_npy_u16;

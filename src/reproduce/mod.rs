@@ -3,7 +3,8 @@
 //! ```text
 //!   CLAIMS ─► rows: published, computed, verdict ─┐
 //!   TABLES ─► grids ──────────────────────────────┼─► terminal, JSON, Markdown, HTML, SVG and CSV
-//!   FIGURES ─► charts ────────────────────────────┘
+//!   FIGURES ─► charts ────────────────────────────┤
+//!   MEASUREMENTS ─► the chip against its theory ──┘
 //! ```
 //!
 //! A claim that the model must meet and does not is a fault, and `gdtof reproduce` fails. One that no honest
@@ -15,6 +16,7 @@ mod claim;
 mod delay_line;
 mod design;
 mod light;
+pub mod measured;
 mod page;
 mod penalty;
 mod precision;
@@ -25,8 +27,8 @@ mod stereo;
 mod system;
 
 pub use claim::{Claim, Published, Row, Verdict};
-pub use page::{grid, html, markdown, tally};
-pub use registry::{CLAIMS, FIGURES, Figure, TABLES, Table};
+pub use page::{grid, heading, html, markdown, tally};
+pub use registry::{CLAIMS, FIGURES, Figure, MEASUREMENTS, Measurement, TABLES, Table};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -42,6 +44,10 @@ pub struct Selection {
     pub figures: Vec<u32>,
     /// Numbers of tables.
     pub tables: Vec<u32>,
+    /// Numbers of measurements of the chip against its theory.
+    pub measurements: Vec<u32>,
+    /// Frames behind each measured number; [`measured::FRAMES`] where none is given.
+    pub frames: Option<usize>,
 }
 
 impl Selection {
@@ -51,12 +57,31 @@ impl Selection {
             claims: CLAIMS.iter().map(|c| c.number).collect(),
             figures: FIGURES.iter().map(|f| f.number).collect(),
             tables: TABLES.iter().map(|t| t.number).collect(),
+            measurements: MEASUREMENTS.iter().map(|m| m.number).collect(),
+            frames: None,
         }
     }
 
     /// Whether nothing is chosen.
     pub fn is_empty(&self) -> bool {
-        self.claims.is_empty() && self.figures.is_empty() && self.tables.is_empty()
+        let chosen = [
+            &self.claims,
+            &self.figures,
+            &self.tables,
+            &self.measurements,
+        ];
+        chosen.into_iter().all(Vec::is_empty)
+    }
+
+    /// How many parts are chosen.
+    pub fn parts(&self) -> usize {
+        let chosen = [
+            &self.claims,
+            &self.figures,
+            &self.tables,
+            &self.measurements,
+        ];
+        chosen.into_iter().map(Vec::len).sum()
     }
 
     /// What is chosen that does not exist, in words.
@@ -69,6 +94,7 @@ impl Selection {
             ("--claim", &self.claims, &known.claims),
             ("--figure", &self.figures, &known.figures),
             ("--table", &self.tables, &known.tables),
+            ("--measurement", &self.measurements, &known.measurements),
         ];
         for (option, chosen, known) in kinds {
             if let Some(number) = chosen.iter().find(|n| !known.contains(n)) {
@@ -128,6 +154,32 @@ impl FigureResult {
     }
 }
 
+/// The chip, measured against its theory.
+pub struct MeasurementResult {
+    /// Its number.
+    pub number: u32,
+    /// What it shows.
+    pub title: &'static str,
+    /// What was found.
+    pub found: measured::Study,
+}
+
+impl MeasurementResult {
+    /// File names without extension, each with its table.
+    pub fn tables(&self) -> impl Iterator<Item = (String, &'static str, &Grid)> {
+        let lettered = self.found.grids.iter().zip('a'..);
+        lettered.map(|((title, grid), letter)| {
+            (format!("measured_{}{letter}", self.number), *title, grid)
+        })
+    }
+
+    /// File names without extension, each with its chart.
+    pub fn files(&self) -> impl Iterator<Item = (String, &Chart)> {
+        let charts = self.found.charts.iter().zip('a'..);
+        charts.map(|(chart, letter)| (format!("measured_{}{letter}_chart", self.number), chart))
+    }
+}
+
 /// Everything that was reproduced, in the thesis's order.
 #[derive(Default)]
 pub struct Report {
@@ -137,6 +189,8 @@ pub struct Report {
     pub tables: Vec<TableResult>,
     /// Figures.
     pub figures: Vec<FigureResult>,
+    /// Measurements of the chip.
+    pub measurements: Vec<MeasurementResult>,
 }
 
 /// One thing to compute, so that all of them share the threads.
@@ -144,6 +198,7 @@ enum Job {
     Claim(Claim),
     Table(Table),
     Figure(Figure),
+    Measurement(Measurement, usize),
 }
 
 /// What it gives.
@@ -151,6 +206,7 @@ enum Done {
     Claim(ClaimResult),
     Table(TableResult),
     Figure(FigureResult),
+    Measurement(MeasurementResult),
 }
 
 impl Job {
@@ -170,6 +226,11 @@ impl Job {
                 title: figure.title,
                 charts: (figure.draw)(),
             }),
+            Job::Measurement(measurement, frames) => Done::Measurement(MeasurementResult {
+                number: measurement.number,
+                title: measurement.title,
+                found: (measurement.measure)(frames).expect("configurations that the engines run"),
+            }),
         }
     }
 }
@@ -185,10 +246,15 @@ pub fn reproduce(selection: &Selection, done: impl Fn() + Sync) -> Report {
     let figures = FIGURES
         .iter()
         .filter(|f| selection.figures.contains(&f.number));
+    let measurements = MEASUREMENTS
+        .iter()
+        .filter(|m| selection.measurements.contains(&m.number));
+    let frames = selection.frames.unwrap_or(measured::FRAMES);
     let jobs: Vec<Job> = claims
         .map(|&c| Job::Claim(c))
         .chain(tables.map(|&t| Job::Table(t)))
         .chain(figures.map(|&f| Job::Figure(f)))
+        .chain(measurements.map(|&m| Job::Measurement(m, frames)))
         .collect();
     let results: Vec<Done> = jobs
         .into_par_iter()
@@ -205,6 +271,7 @@ pub fn reproduce(selection: &Selection, done: impl Fn() + Sync) -> Report {
             Done::Claim(claim) => report.claims.push(claim),
             Done::Table(table) => report.tables.push(table),
             Done::Figure(figure) => report.figures.push(figure),
+            Done::Measurement(measurement) => report.measurements.push(measurement),
         }
     }
     report
@@ -263,10 +330,22 @@ impl Report {
             });
             json!({"figure": figure.number, "title": figure.title, "charts": charts.collect::<Vec<_>>()})
         };
+        let measurement = |result: &MeasurementResult| {
+            let tables = result.tables().map(|(_, title, grid)| {
+                json!({"title": title, "rows": grid.lines().collect::<Vec<_>>()})
+            });
+            json!({
+                "measurement": result.number,
+                "title": result.title,
+                "notes": result.found.notes,
+                "tables": tables.collect::<Vec<_>>(),
+            })
+        };
         json!({
             "claims": self.claims.iter().map(claim).collect::<Vec<_>>(),
             "tables": self.tables.iter().map(table).collect::<Vec<_>>(),
             "figures": self.figures.iter().map(figure).collect::<Vec<_>>(),
+            "measurements": self.measurements.iter().map(measurement).collect::<Vec<_>>(),
         })
     }
 }
@@ -278,7 +357,7 @@ mod tests {
     #[test]
     fn numbers_are_unique_and_in_order() {
         let all = Selection::all();
-        for numbers in [all.claims, all.figures, all.tables] {
+        for numbers in [all.claims, all.figures, all.tables, all.measurements] {
             assert!(
                 numbers.windows(2).all(|pair| pair[0] < pair[1]),
                 "{numbers:?}"

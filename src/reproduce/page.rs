@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::claim::{Published, Row, Verdict, figure, overall};
-use super::{FigureResult, Report, TableResult};
+use super::{FigureResult, MeasurementResult, Report, TableResult};
 use crate::report::Grid;
 
 /// The headings of a claim's table.
@@ -124,7 +124,27 @@ pub fn markdown(report: &Report) -> String {
             let _ = write!(out, "![{}]({file}.svg)\n\n", chart.title);
         }
     }
+    for result in &report.measurements {
+        let _ = write!(out, "## {}\n\n", heading(result));
+        for note in &result.found.notes {
+            let _ = writeln!(out, "* {note}");
+        }
+        for (_, title, grid) in result.tables() {
+            let _ = writeln!(out, "\n### {title}\n\n{}", grid.markdown());
+        }
+        for (file, chart) in result.files() {
+            let _ = write!(out, "![{}]({file}.svg)\n\n", chart.title);
+        }
+    }
     out
+}
+
+/// What stands above a measurement.
+pub fn heading(result: &MeasurementResult) -> String {
+    format!(
+        "The chip against its theory {}: {}",
+        result.number, result.title
+    )
 }
 
 /// The report in one HTML file.
@@ -182,6 +202,30 @@ pub fn html(report: &Report) -> String {
         });
         body += "</section>\n";
     }
+    for result in &report.measurements {
+        let _ = writeln!(
+            body,
+            "<section id=m{}><h2>{}</h2>\n<ul class=source>",
+            result.number,
+            escaped(&heading(result))
+        );
+        for note in &result.found.notes {
+            let _ = writeln!(body, "<li>{}</li>", escaped(note));
+        }
+        body += "</ul>\n";
+        for (_, title, grid) in result.tables() {
+            let _ = writeln!(
+                body,
+                "<h3>{}</h3>\n<div class=wide>{}</div>",
+                escaped(title),
+                grid_html(grid)
+            );
+        }
+        for (_, chart) in result.files() {
+            let _ = writeln!(body, "<figure>{}</figure>", scalable(&chart.svg()));
+        }
+        body += "</section>\n";
+    }
     format!(
         "<!DOCTYPE html>\n<html lang=en>\n<head>\n<meta charset=utf-8>\n<meta name=viewport content='width=device-width'>\n\
          <title>Published and computed</title>\n<style>{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
@@ -218,6 +262,9 @@ fn glance(report: &Report) -> String {
     }
     for figure in &report.figures {
         let _ = write!(out, "<a href='#f{0}'>Fig. {0}</a> ", figure.number);
+    }
+    for result in &report.measurements {
+        let _ = write!(out, "<a href='#m{0}'>Measured {0}</a> ", result.number);
     }
     out + "</p>\n"
 }
@@ -350,5 +397,6 @@ table{border-collapse:collapse;width:100%;font-size:.92em}
 th,td{padding:3px 8px;text-align:right;border-bottom:1px solid #e6e6e6}
 th:first-child,td:first-child{text-align:left}th{color:#666;font-weight:600}
 tr.note td{text-align:left;color:#666;font-size:.9em;border-bottom:1px solid #e6e6e6;padding:0 8px 5px 20px}
+h3{font-size:1em;margin:1em 0 .2em}.wide{overflow-x:auto}
 figure{margin:.5em 0}svg.chart{width:100%;height:auto}
 ";

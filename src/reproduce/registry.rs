@@ -1,9 +1,10 @@
-//! The lists: claims by number, tables and figures by their number in the thesis.
+//! The lists: claims by number, tables and figures by their number in the thesis, measurements of the chip.
 
 use super::claim::Claim;
 use super::{
-    chip, delay_line, design, light, penalty, precision, sensors, silicon, stereo, system,
+    chip, delay_line, design, light, measured, penalty, precision, sensors, silicon, stereo, system,
 };
+use crate::engine::EngineError;
 use crate::report::{Chart, Grid};
 
 /// A figure of the thesis that can be computed.
@@ -26,6 +27,17 @@ pub struct Table {
     pub title: &'static str,
     /// Makes it.
     pub make: fn() -> Grid,
+}
+
+/// A measurement of the chip against its theory.
+#[derive(Clone, Copy)]
+pub struct Measurement {
+    /// Its number.
+    pub number: u32,
+    /// What it shows.
+    pub title: &'static str,
+    /// Makes it, with so many frames behind each number.
+    pub measure: fn(usize) -> Result<measured::Study, EngineError>,
 }
 
 const fn claim(
@@ -287,4 +299,23 @@ pub const FIGURES: [Figure; 28] = [
         "penalty of the demonstrator's schemes",
         penalty::figure_109,
     ),
+];
+
+/// Every measurement, by number.
+pub const MEASUREMENTS: [Measurement; 3] = [
+    Measurement {
+        number: 1,
+        title: "probability of detection (3.2.2, Eq. 17)",
+        measure: measured::detection::study,
+    },
+    Measurement {
+        number: 2,
+        title: "precision (3.2.3, Eq. 20)",
+        measure: measured::precision::study,
+    },
+    Measurement {
+        number: 3,
+        title: "penalty of partial histograms (3.4)",
+        measure: measured::penalty::study,
+    },
 ];

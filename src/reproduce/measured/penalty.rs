@@ -1,0 +1,322 @@
+//! The penalty of partial histograms (3.4) against the chip: laser cycles that it takes to find and to measure an echo.
+//!
+//! The chip zooms as it can: a slow CLK makes its bins coarse, and the conventional mode shows the last CLK periods
+//! before STOP. The cycles of a step are found where the measured P_D crosses the wanted one (probit regression
+//! on √cycles), those of a measurement by scaling the measured spread, which falls with √cycles.
+
+use super::detection::detected;
+use super::precision::{Estimator, by_formula, scatter};
+use super::trial::Trial;
+use super::{Study, interval_text};
+use crate::chip::Mode;
+use crate::engine::EngineError;
+use crate::numerics::intervals::Estimate;
+use crate::numerics::probit::{Point, crossing};
+use crate::report::Grid;
+use crate::reproduce::penalty::long_range;
+use crate::theory::detection::{Model, Ties, laser_cycles_for};
+use crate::theory::partial::{Purpose, System};
+use crate::units::SPEED_OF_LIGHT_M_PER_S;
+
+/// Exposures around the crossing, relative to where it is first seen.
+const LADDER: [f64; 6] = [0.4, 0.55, 0.7, 0.85, 1.0, 1.2];
+
+/// Laser cycles at which the chip's P_D crosses `wanted`; `None` when more and more cycles do not bring it there.
+///
+/// # Errors
+/// Configurations that no engine can run.
+pub fn cycles_to_detect(
+    trial: &Trial,
+    wanted: f64,
+    frames: usize,
+    seed: u64,
+) -> Result<Option<Estimate>, EngineError> {
+    let with = |cycles: u32| Trial {
+        cycles,
+        ties_by_lot: true,
+        ..trial.clone()
+    };
+    let at = |cycles: u32, share_of_frames: usize| {
+        let trial = with(cycles);
+        let wanted_frames = frames / share_of_frames;
+        let frames = trial.affordable(wanted_frames);
+        let found = detected(&trial, wanted_frames, seed + u64::from(cycles))?;
+        Ok((found.value, frames as f64))
+    };
+    let formula = laser_cycles_for(wanted, &trial.per_cycle(), Model::Poisson(Ties::Random));
+    let Some(formula) = formula else {
+        return Ok(None);
+    };
+    let mut first = (formula as u32).max(1);
+    // A few frames say where to look: beyond 16 times the formula nobody waits.
+    while at(first, 4)?.0 < wanted {
+        if u64::from(first) > 16 * formula {
+            return Ok(None);
+        }
+        first = (f64::from(first) * 1.25).ceil() as u32;
+    }
+    let mut points = Vec::new();
+    for step in LADDER {
+        let cycles = (f64::from(first) * step).round().max(1.0) as u32;
+        let (share, frames) = at(cycles, 1)?;
+        points.push(Point {
+            x: f64::from(cycles).sqrt(),
+            trials: frames,
+            successes: share * frames,
+        });
+    }
+    points.dedup_by_key(|point| point.x);
+    Ok(crossing(&points, wanted).map(|root| root.map(|r| r * r)))
+}
+
+/// Laser cycles for a spread of `wanted_ns`, from the spread at `trial`'s own.
+fn cycles_to_measure(
+    trial: &Trial,
+    wanted_ns: f64,
+    frames: usize,
+    seed: u64,
+) -> Result<Estimate, EngineError> {
+    let spread = scatter(trial, frames, seed, Estimator::Likelihood)?.spread;
+    Ok(spread.map(|s| f64::from(trial.cycles) * (s / wanted_ns).powi(2)))
+}
+
+/// The chip with bins of `bin_m`, showing an echo at the end of `system`'s range in the conventional mode.
+fn coarse(system: &System, bin_m: f64, candidates: u32, range_m: f64) -> Trial {
+    let base = Trial::new(
+        system.link.signal / (range_m * range_m),
+        system.link.background_hz,
+        1,
+    );
+    let mut trial = Trial {
+        stop_periods: candidates + 4,
+        echo_bins: f64::from(candidates) - 1.0,
+        sigma_ns: 1e9 * system.link.pulse_sigma_s,
+        ..base
+    };
+    trial.sensor.mode = Mode::Conventional;
+    trial.sensor.bins = candidates as usize;
+    trial.sensor.clk_hz = SPEED_OF_LIGHT_M_PER_S / (2.0 * bin_m);
+    trial
+}
+
+/// The guided chip with bins of the system's measurement, an echo of `range_m` in mid-window.
+fn fine(system: &System, range_m: f64, cycles: u32) -> Trial {
+    let base = Trial::new(
+        system.link.signal / (range_m * range_m),
+        system.link.background_hz,
+        cycles,
+    );
+    let mut trial = Trial {
+        sigma_ns: 1e9 * system.link.pulse_sigma_s,
+        ..base
+    };
+    trial.sensor.clk_hz = 1.0 / system.bin_s;
+    trial
+}
+
+/// One range: what the three schemes take by formula and on the chip.
+struct Schemes {
+    range_m: f64,
+    /// Formula and chip of zooming's coarse steps together.
+    detecting: (f64, Option<Estimate>),
+    /// Formula and chip of the measurement, which is all that a guided histogram takes.
+    measuring: (f64, Estimate),
+    /// Formula and chip of all windows of sliding.
+    sliding: (f64, Estimate),
+}
+
+impl Schemes {
+    fn measure(system: &System, range_m: f64, frames: usize) -> Result<Self, EngineError> {
+        let seed = 1_000_000 * range_m as u64;
+        let wanted_ns = 2e9 * system.goal.precision_m / SPEED_OF_LIGHT_M_PER_S;
+        let zooming = system.zooming(range_m);
+        let (mut by_formula_detecting, mut on_chip) = (0.0, Some(exactly(0.0)));
+        for step in &zooming.steps {
+            if let Purpose::Detect { candidates, bin_m } = step.purpose {
+                let trial = coarse(system, bin_m, candidates, step.range_m);
+                let found = cycles_to_detect(&trial, system.goal.detection, frames, seed)?;
+                by_formula_detecting += step.laser_cycles;
+                on_chip = on_chip.zip(found).map(|(a, b)| sum(&a, &b));
+            }
+        }
+        let on_chip_measuring = |range_m: f64| {
+            let formula = system.measure(range_m).laser_cycles;
+            let trial = fine(system, range_m, (formula as u32).max(20));
+            debug_assert!(by_formula(&trial).1.is_finite());
+            Ok((
+                formula,
+                cycles_to_measure(&trial, wanted_ns, frames, seed + 1)?,
+            ))
+        };
+        let mut sliding = (0.0, exactly(0.0));
+        for step in &system.sliding(range_m, 0).steps {
+            let (formula, chip) = on_chip_measuring(step.range_m)?;
+            sliding = (sliding.0 + formula, sum(&sliding.1, &chip));
+        }
+        Ok(Schemes {
+            range_m,
+            detecting: (by_formula_detecting, on_chip),
+            measuring: on_chip_measuring(range_m)?,
+            sliding,
+        })
+    }
+}
+
+fn exactly(value: f64) -> Estimate {
+    Estimate {
+        value,
+        low: value,
+        high: value,
+    }
+}
+
+/// Independent errors add in squares.
+fn sum(a: &Estimate, b: &Estimate) -> Estimate {
+    let value = a.value + b.value;
+    let down = (a.value - a.low).hypot(b.value - b.low);
+    let up = (a.high - a.value).hypot(b.high - b.value);
+    Estimate {
+        value,
+        low: value - down,
+        high: value + up,
+    }
+}
+
+/// a/b with relative errors in squares.
+fn ratio(a: &Estimate, b: &Estimate) -> Estimate {
+    let value = a.value / b.value;
+    let down = (1.0 - a.low / a.value).hypot(b.high / b.value - 1.0);
+    let up = (a.high / a.value - 1.0).hypot(1.0 - b.low / b.value);
+    Estimate {
+        value,
+        low: value * (1.0 - down),
+        high: value * (1.0 + up),
+    }
+}
+
+/// Ranges of the table, m.
+const RANGES_M: [f64; 3] = [50.0, 100.0, 200.0];
+
+fn schemes(frames: usize) -> Result<Grid, EngineError> {
+    let mut grid = Grid::new([
+        "range and scheme",
+        "cycles by formula",
+        "cycles of the chip",
+        "95 % interval",
+        "penalty by formula",
+        "penalty of the chip",
+        "95 % interval",
+    ]);
+    let system = long_range();
+    for range_m in RANGES_M {
+        let schemes = Schemes::measure(&system, range_m, frames)?;
+        let (guided_formula, guided) = schemes.measuring;
+        let zooming = schemes.detecting.1.map(|d| sum(&d, &guided));
+        let lines = [
+            ("guided", guided_formula, Some(guided)),
+            ("zooming", guided_formula + schemes.detecting.0, zooming),
+            ("sliding", schemes.sliding.0, Some(schemes.sliding.1)),
+        ];
+        for (name, formula, chip) in lines {
+            let mut cells = vec![
+                format!("{} m, {name}", schemes.range_m),
+                format!("{formula:.0}"),
+            ];
+            let penalty = chip.map(|chip| match name {
+                "guided" => exactly(1.0),
+                _ => ratio(&chip, &guided),
+            });
+            let texts = |estimate: Option<Estimate>, decimals: usize| match estimate {
+                Some(e) => [
+                    format!("{:.decimals$}", e.value),
+                    interval_text(&e, decimals),
+                ],
+                None => ["never".to_owned(), String::new()],
+            };
+            cells.extend(texts(chip, 0));
+            cells.push(format!("{:.2}", formula / guided_formula));
+            cells.extend(texts(penalty, 2));
+            grid.push(cells);
+        }
+    }
+    Ok(grid)
+}
+
+/// Cycles to a P_D of 99.7 % of a few detections.
+fn detections(frames: usize) -> Result<Grid, EngineError> {
+    let mut grid = Grid::new([
+        "detection",
+        "P_D",
+        "Eq. 17",
+        "one hit a bin and cycle",
+        "chip",
+        "95 % interval",
+        "chip / Eq. 17",
+    ]);
+    let system = long_range();
+    let cases = [
+        ("guided window, daylight", Trial::new(0.05, 20e6, 1)),
+        ("guided window, 15 x daylight", Trial::new(0.3, 300e6, 1)),
+        (
+            "zooming, 4 bins of 12.5 m at 50 m",
+            coarse(&system, 12.5, 4, 50.0),
+        ),
+        (
+            "zooming, 8 bins of 12.5 m at 100 m",
+            coarse(&system, 12.5, 8, 100.0),
+        ),
+        (
+            "zooming, 16 bins of 12.5 m at 200 m",
+            coarse(&system, 12.5, 16, 200.0),
+        ),
+    ];
+    for (number, (name, trial)) in cases.into_iter().enumerate() {
+        let wanted = system.goal.detection;
+        let by = |model| {
+            laser_cycles_for(wanted, &trial.per_cycle(), model).map_or(f64::INFINITY, |n| n as f64)
+        };
+        let (every, one) = (
+            by(Model::Poisson(Ties::Random)),
+            by(Model::Bernoulli(Ties::Random)),
+        );
+        let chip = cycles_to_detect(&trial, wanted, frames, 500 + number as u64)?;
+        let mut cells = vec![
+            name.to_owned(),
+            format!("{wanted}"),
+            format!("{every:.0}"),
+            format!("{one:.0}"),
+        ];
+        cells.extend(match chip {
+            Some(e) => [
+                format!("{:.0}", e.value),
+                interval_text(&e, 0),
+                format!("{:.3}", e.value / every),
+            ],
+            None => ["never".to_owned(), String::new(), String::new()],
+        });
+        grid.push(cells);
+    }
+    Ok(grid)
+}
+
+/// The study.
+///
+/// # Errors
+/// Configurations that no engine can run.
+pub fn study(frames: usize) -> Result<Study, EngineError> {
+    Ok(Study {
+        notes: vec![
+            format!("{frames} frames for each number, fewer where an exposure is long; intervals at 95 %."),
+            "Table 6's light and Table 7's schemes: bins of 5 ns for the measurement to 0.1 m, detection to 99.7 % in bins of 12.5 m. \
+             Zooming's coarse bins are the same chip on a CLK of 12 MHz in the conventional mode, where a SPAD fires several times in a CLK period and the toggle front end loses pairs."
+                .into(),
+            "Formulas: Eq. 17 with every photon counted, Cramér-Rao. On the chip the P_D must cross 99.7 %, and the maximum-likelihood time must scatter by no more than 0.1 m."
+                .into(),
+        ],
+        grids: vec![
+            ("laser cycles for a detection", detections(frames)?),
+            ("laser cycles and penalty of the schemes", schemes(frames)?),
+        ],
+        charts: Vec::new(),
+    })
+}

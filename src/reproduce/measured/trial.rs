@@ -1,0 +1,323 @@
+//! One macropixel of the modelled chip before one echo, in as many frames as are wanted.
+//!
+//! ```text
+//!   light ─► 16 SPADs, dead time ─► how many fired in a CLK period ─► TYPE, THRESHOLD ─► bin counter ─► peak
+//!              DeadTime                          OneHit                  Threshold         Overflow     Ties
+//! ```
+//!
+//! Every assumption of the formulas that the chip breaks can be taken out of the chip alone ([`Effect`]), so that what
+//! it costs is measured. Two of them take a trick:
+//!
+//! * *Every pulse counted.* A bin of the chip adds one when more SPADs fired than THRESHOLD. The sum of exposures of the
+//!   very same photons with THRESHOLD 0, 1, 2, … adds one for each SPAD instead.
+//! * *Thin light.* The same photons in 256 times as many laser cycles meet neither dead time nor each other: this chip
+//!   is the one that the formulas describe, and the control of everything here.
+//!
+//! Histograms come from the window engine, photon by photon, or from the cohort engine where that is quicker; both are
+//! held to the gates elsewhere. A frame is a macropixel number: equal seeds, equal frames.
+
+use rayon::prelude::*;
+
+use crate::chip::{EventType, Exposure, SensorConfig, WindowLaw, histogram};
+use crate::engine::{Cohort, CohortOptions, Engine, EngineError, LitPixel, Window, stream_config};
+use crate::photon::{PhotonStream, PixelLight, SPADS};
+use crate::theory::detection::PerCycle;
+use crate::units::Time;
+
+/// What the formulas leave out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effect {
+    /// The echo spreads over several bins.
+    Spread,
+    /// Of equal bins the peak finder takes the earliest.
+    Ties,
+    /// SPADs are blind after an avalanche.
+    DeadTime,
+    /// A bin adds at most one in a laser cycle.
+    OneHit,
+    /// More than one SPAD must fire together.
+    Threshold,
+    /// Counters saturate or wrap.
+    Overflow,
+}
+
+impl Effect {
+    /// Every effect.
+    pub const ALL: [Effect; 6] = [
+        Effect::Spread,
+        Effect::Ties,
+        Effect::DeadTime,
+        Effect::OneHit,
+        Effect::Threshold,
+        Effect::Overflow,
+    ];
+
+    /// As a column's heading, taken out.
+    pub fn absent(self) -> &'static str {
+        match self {
+            Effect::Spread => "narrow echo",
+            Effect::Ties => "ties by lot",
+            Effect::DeadTime => "no dead time",
+            Effect::OneHit => "every pulse counts",
+            Effect::Threshold => "threshold 1 SPAD",
+            Effect::Overflow => "wide counters",
+        }
+    }
+}
+
+/// A macropixel, its light and its exposure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trial {
+    /// The chip.
+    pub sensor: SensorConfig,
+    /// CLK periods in a laser cycle.
+    pub stop_periods: u32,
+    /// Start value of the P-counter.
+    pub start: u16,
+    /// Where the echo's centre lies: bin b's centre is b.
+    pub echo_bins: f64,
+    /// Standard deviation of the echo, ns.
+    pub sigma_ns: f64,
+    /// Signal photons per laser cycle.
+    pub signal: f64,
+    /// Background, counts/s on the whole macropixel.
+    pub background_hz: f64,
+    /// Laser cycles.
+    pub cycles: u32,
+    /// Count every SPAD that fired beyond THRESHOLD, not only the first.
+    pub every_pulse: bool,
+    /// Counters that never overflow.
+    pub wide_counters: bool,
+    /// Ties of the fullest bins are decided by lot.
+    pub ties_by_lot: bool,
+}
+
+/// By how much thin light is thinner.
+const THINNING: u32 = 256;
+
+/// Photons of a frame that the window engine draws rather than leave them to the cohort engine.
+const WORTH_DRAWING: f64 = 40_000.0;
+
+/// Photons within the dead time up to which the window engine finds where SPADs are certain to be ready.
+const NOT_BLINDING: f64 = 3.0;
+
+/// Photons on one SPAD in a CLK period below which laser cycles are pooled, at next to no cost.
+const DIM: f64 = 0.01;
+
+/// Photons on one SPAD in a step of the cohort engine, at most: the dead time's end is true to the first order in them.
+const A_STEP: f64 = 0.07;
+
+/// Microseconds that a frame may take; longer ones are fewer, down to a least number.
+const AFFORDABLE_US: f64 = 400.0;
+const FEWEST: usize = 200;
+
+/// What a photon takes in the window engine, and in the cohort engine's joint states a step, µs.
+const DRAWN_US: f64 = 0.05;
+const JOINT_US: f64 = 1.0;
+
+/// Frames that a thread exposes in one go.
+const CHUNK: usize = 64;
+
+/// Which engine makes the histograms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Maker {
+    Window,
+    /// With so many steps to a CLK period.
+    Cohort(usize),
+}
+
+impl Trial {
+    /// The sensor as delivered, its window at about 36 m, and a narrow echo in the middle of its ninth bin. No
+    /// formula asks where the window lies.
+    pub fn new(signal: f64, background_hz: f64, cycles: u32) -> Self {
+        Trial {
+            sensor: SensorConfig::default(),
+            stop_periods: 520,
+            start: 100,
+            echo_bins: 8.0,
+            sigma_ns: 0.0,
+            signal,
+            background_hz,
+            cycles,
+            every_pulse: false,
+            wide_counters: false,
+            ties_by_lot: false,
+        }
+    }
+
+    /// Bin interval, ns.
+    pub fn bin_ns(&self) -> f64 {
+        1e9 / self.sensor.clk_hz
+    }
+
+    /// Background photons in a bin and laser cycle.
+    pub fn background(&self) -> f64 {
+        self.background_hz / self.sensor.clk_hz
+    }
+
+    /// The light as Eq. 17 knows it: the whole echo in one bin.
+    pub fn per_cycle(&self) -> PerCycle {
+        PerCycle {
+            signal: self.signal,
+            background: self.background(),
+            bins: self.sensor.bins as u32,
+        }
+    }
+
+    /// The same without `effect`; `None` where it plays no part.
+    pub fn without(&self, effect: Effect) -> Option<Self> {
+        let mut trial = self.clone();
+        match effect {
+            Effect::Spread => {
+                trial.sigma_ns = 0.0;
+                trial.echo_bins = self.echo_bins.round();
+            }
+            Effect::Ties => trial.ties_by_lot = true,
+            // The shortest there is.
+            Effect::DeadTime => trial.sensor.dead_time_ns = 1e-6,
+            Effect::OneHit => trial.every_pulse = true,
+            Effect::Threshold => {
+                trial.sensor.event_type = EventType::Greater;
+                trial.sensor.threshold = 0;
+            }
+            Effect::Overflow => {
+                trial.wide_counters = true;
+                if u64::from(self.cycles) < 1 << self.sensor.bin_bits {
+                    return None;
+                }
+            }
+        }
+        (trial != *self).then_some(trial)
+    }
+
+    /// The same photons in so many more laser cycles that they never meet, on counters that hold them.
+    pub fn in_thin_light(&self) -> Self {
+        let thin = self.without(Effect::Threshold);
+        Trial {
+            signal: self.signal / f64::from(THINNING),
+            background_hz: self.background_hz / f64::from(THINNING),
+            cycles: self.cycles * THINNING,
+            wide_counters: true,
+            ties_by_lot: true,
+            ..thin.unwrap_or_else(|| self.clone())
+        }
+    }
+
+    /// The engine that is the quickest and true enough.
+    fn maker(&self) -> Maker {
+        let sensor = &self.sensor;
+        let on_spad = (self.signal + self.background()) / SPADS as f64;
+        let blinding = self.background_hz * 1e-9 * sensor.dead_time_ns > NOT_BLINDING;
+        if sensor.dead_time() < sensor.clock().period() {
+            Maker::Window
+        } else if on_spad < DIM {
+            Maker::Cohort(1)
+        } else if !blinding && self.photons() <= WORTH_DRAWING {
+            Maker::Window
+        } else {
+            Maker::Cohort((on_spad / A_STEP).ceil() as usize)
+        }
+    }
+
+    /// How many of `frames` frames to afford: fewer where an exposure takes very many photons.
+    pub fn affordable(&self, frames: usize) -> usize {
+        let on_spad = (self.signal + self.background()) / SPADS as f64;
+        let cost_us = match self.maker() {
+            Maker::Window => DRAWN_US * self.photons(),
+            Maker::Cohort(_) if on_spad < DIM => 0.0,
+            Maker::Cohort(steps) => JOINT_US * steps as f64 * self.photons(),
+        };
+        let share = (AFFORDABLE_US / cost_us).min(1.0);
+        ((share * frames as f64) as usize).max(FEWEST.min(frames))
+    }
+
+    /// Photons that fall into the window.
+    fn photons(&self) -> f64 {
+        (self.signal + self.background() * self.sensor.bins as f64) * f64::from(self.cycles)
+    }
+
+    /// Histograms of `frames` frames, their echoes `shift(frame)` bins after [`Trial::echo_bins`].
+    ///
+    /// # Errors
+    /// Configurations that no engine can run.
+    pub fn histograms(
+        &self,
+        frames: usize,
+        seed: u64,
+        shift: impl Fn(usize) -> f64 + Sync,
+    ) -> Result<Vec<Vec<u32>>, EngineError> {
+        let mut hits = self.hits(frames, seed, &shift, self.sensor.threshold)?;
+        if self.every_pulse {
+            for threshold in self.sensor.threshold + 1..SPADS as u8 {
+                let more = self.hits(frames, seed, &shift, threshold)?;
+                if more.iter().flatten().all(|&n| n == 0) {
+                    break;
+                }
+                let counts = hits.iter_mut().flatten().zip(more.iter().flatten());
+                counts.for_each(|(sum, n)| *sum += n);
+            }
+        }
+        let (bits, overflow) = (self.sensor.bin_bits as u32, self.sensor.overflow);
+        let held = |n: u64| match self.wide_counters {
+            true => n as u32,
+            false => histogram::model(n, bits, overflow).into(),
+        };
+        let histograms = hits.into_iter();
+        Ok(histograms
+            .map(|bins| bins.into_iter().map(held).collect())
+            .collect())
+    }
+
+    /// Events of every bin before counters overflow.
+    fn hits(
+        &self,
+        frames: usize,
+        seed: u64,
+        shift: &(impl Fn(usize) -> f64 + Sync),
+        threshold: u8,
+    ) -> Result<Vec<Vec<u64>>, EngineError> {
+        let sensor = SensorConfig {
+            threshold,
+            bin_bits: 16,
+            ..self.sensor.clone()
+        };
+        let exposure = Exposure::new(&sensor, self.stop_periods, self.cycles);
+        let sigma = Time::from_s(1e-9 * self.sigma_ns);
+        let config = stream_config(&sensor, &exposure, seed, sigma);
+        let law = WindowLaw::new(&sensor, &exposure);
+        let window = law.window(self.start).open();
+        let window = window.expect("a start value whose window opens");
+        let pixel = |frame: usize| LitPixel {
+            number: frame as u32,
+            start: self.start,
+            light: Some(PixelLight {
+                signal_per_cycle: self.signal,
+                arrival: law.time_of(&window, self.echo_bins + shift(frame)),
+                background_hz: self.background_hz,
+            }),
+        };
+        let numbers: Vec<usize> = (0..frames).collect();
+        let Maker::Cohort(sub_bins) = self.maker() else {
+            let engine = Window::new(&sensor, &exposure);
+            let stream = PhotonStream::new(&config);
+            let chunks = numbers.par_chunks(CHUNK).map(|chunk| {
+                let pixels: Vec<LitPixel> = chunk.iter().map(|&frame| pixel(frame)).collect();
+                Ok(engine.expose(&stream, &pixels)?.histograms)
+            });
+            let chunks: Vec<Vec<Vec<u16>>> = chunks.collect::<Result<_, EngineError>>()?;
+            let widen = |bins: Vec<u16>| bins.into_iter().map(u64::from).collect();
+            return Ok(chunks.into_iter().flatten().map(widen).collect());
+        };
+        let options = CohortOptions {
+            sub_bins,
+            ..CohortOptions::default()
+        };
+        let engine = Cohort::new(&sensor, &exposure, options);
+        let histograms = numbers.par_iter().map(|&frame| {
+            let pixel = pixel(frame);
+            let light = pixel.light.expect("lit above");
+            engine.hits(&config, pixel.number, self.start, &light)
+        });
+        histograms.collect()
+    }
+}
