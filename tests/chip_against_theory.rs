@@ -67,7 +67,7 @@ fn is_below(a: &Estimate, b: &Estimate) -> bool {
 /// Each case of the table, in a few frames: its chip against Eq. 17, and what mends it.
 #[test]
 fn what_breaks_eq_17_breaks_it_on_the_known_side() {
-    let cases = attributions(400).unwrap();
+    let cases = attributions(300).unwrap();
     let case = |name: &str| {
         let found = cases.iter().find(|case| case.name.contains(name));
         found.unwrap_or_else(|| panic!("no case {name}"))
@@ -95,9 +95,12 @@ fn what_breaks_eq_17_breaks_it_on_the_known_side() {
             "{found:?}"
         );
     }
-    for found in cases.iter().filter(|case| case.trial.cycles < 16_384) {
-        // Eleven intervals or fewer at 95 %: three times their width has all of them.
-        let width = 3.0 * (found.control.high - found.control.low);
+    // In strong light it is dead time that helps: it takes more of the background than of the echo.
+    let blind = absent("60 x daylight", Effect::DeadTime);
+    assert!(blind.value < case("60 x daylight").chip.value, "{blind:?}");
+    for found in &cases {
+        // A width of an interval is 3.9 standard errors: ten of them stay within it.
+        let width = found.control.high - found.control.low;
         let off = (found.control.value - found.formula).abs();
         assert!(off < width, "{found:?}");
     }

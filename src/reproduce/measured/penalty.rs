@@ -14,14 +14,14 @@ use crate::numerics::intervals::Estimate;
 use crate::numerics::probit::{Point, crossing};
 use crate::report::Grid;
 use crate::reproduce::penalty::long_range;
-use crate::theory::detection::{Model, Ties, laser_cycles_for};
+use crate::theory::detection::{Model, PerCycle, Ties, laser_cycles_for};
 use crate::theory::partial::{Purpose, System};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
-/// Exposures around the crossing, relative to where it is first seen.
-const LADDER: [f64; 6] = [0.4, 0.55, 0.7, 0.85, 1.0, 1.2];
+/// Exposures around the crossing, relative to where the formula that counts one hit a bin and cycle puts it.
+const LADDER: [f64; 5] = [0.4, 0.55, 0.7, 0.85, 1.05];
 
-/// Laser cycles at which the chip's P_D crosses `wanted`; `None` when more and more cycles do not bring it there.
+/// Laser cycles at which the chip's P_D crosses `wanted`; `None` when no number is enough.
 ///
 /// # Errors
 /// Configurations that no engine can run.
@@ -31,38 +31,23 @@ pub fn cycles_to_detect(
     frames: usize,
     seed: u64,
 ) -> Result<Option<Estimate>, EngineError> {
-    let with = |cycles: u32| Trial {
-        cycles,
-        ties_by_lot: true,
-        ..trial.clone()
-    };
-    let at = |cycles: u32, share_of_frames: usize| {
-        let trial = with(cycles);
-        let wanted_frames = frames / share_of_frames;
-        let frames = trial.affordable(wanted_frames);
-        let found = detected(&trial, wanted_frames, seed + u64::from(cycles))?;
-        Ok((found.value, frames as f64))
-    };
-    let formula = laser_cycles_for(wanted, &trial.per_cycle(), Model::Poisson(Ties::Random));
-    let Some(formula) = formula else {
+    let Some(formula) = laser_cycles_for(wanted, &trial.per_cycle(), ONE_HIT) else {
         return Ok(None);
     };
-    let mut first = (formula as u32).max(1);
-    // A few frames say where to look: beyond 16 times the formula nobody waits.
-    while at(first, 4)?.0 < wanted {
-        if u64::from(first) > 16 * formula {
-            return Ok(None);
-        }
-        first = (f64::from(first) * 1.25).ceil() as u32;
-    }
     let mut points = Vec::new();
     for step in LADDER {
-        let cycles = (f64::from(first) * step).round().max(1.0) as u32;
-        let (share, frames) = at(cycles, 1)?;
+        let cycles = (formula as f64 * step).round().max(1.0) as u32;
+        let trial = Trial {
+            cycles,
+            ties_by_lot: true,
+            ..trial.clone()
+        };
+        let trials = trial.affordable(frames) as f64;
+        let share = detected(&trial, frames, seed + u64::from(cycles))?.value;
         points.push(Point {
             x: f64::from(cycles).sqrt(),
-            trials: frames,
-            successes: share * frames,
+            trials,
+            successes: share * trials,
         });
     }
     points.dedup_by_key(|point| point.x);
@@ -114,11 +99,25 @@ fn fine(system: &System, range_m: f64, cycles: u32) -> Trial {
     trial
 }
 
+/// Eq. 17 with every photon counted, ties by lot.
+const EQ_17: Model = Model::Poisson(Ties::Random);
+/// The same with one hit per bin and cycle.
+const ONE_HIT: Model = Model::Bernoulli(Ties::Random);
+
+/// A detection, by formula and on the chip.
+struct Detection {
+    name: String,
+    light: PerCycle,
+    chip: Option<Estimate>,
+}
+
 /// One range: what the three schemes take by formula and on the chip.
 struct Schemes {
     range_m: f64,
-    /// Formula and chip of zooming's coarse steps together.
-    detecting: (f64, Option<Estimate>),
+    /// Zooming's coarse steps.
+    coarse: Vec<Detection>,
+    /// Formula of all of them together.
+    detecting: f64,
     /// Formula and chip of the measurement, which is all that a guided histogram takes.
     measuring: (f64, Estimate),
     /// Formula and chip of all windows of sliding.
@@ -130,13 +129,16 @@ impl Schemes {
         let seed = 1_000_000 * range_m as u64;
         let wanted_ns = 2e9 * system.goal.precision_m / SPEED_OF_LIGHT_M_PER_S;
         let zooming = system.zooming(range_m);
-        let (mut by_formula_detecting, mut on_chip) = (0.0, Some(exactly(0.0)));
+        let (mut coarse_steps, mut detecting) = (Vec::new(), 0.0);
         for step in &zooming.steps {
             if let Purpose::Detect { candidates, bin_m } = step.purpose {
                 let trial = coarse(system, bin_m, candidates, step.range_m);
-                let found = cycles_to_detect(&trial, system.goal.detection, frames, seed)?;
-                by_formula_detecting += step.laser_cycles;
-                on_chip = on_chip.zip(found).map(|(a, b)| sum(&a, &b));
+                coarse_steps.push(Detection {
+                    name: format!("zooming, {candidates} bins of {bin_m} m at {range_m} m"),
+                    light: trial.per_cycle(),
+                    chip: cycles_to_detect(&trial, system.goal.detection, frames, seed)?,
+                });
+                detecting += step.laser_cycles;
             }
         }
         let on_chip_measuring = |range_m: f64| {
@@ -155,7 +157,8 @@ impl Schemes {
         }
         Ok(Schemes {
             range_m,
-            detecting: (by_formula_detecting, on_chip),
+            coarse: coarse_steps,
+            detecting,
             measuring: on_chip_measuring(range_m)?,
             sliding,
         })
@@ -197,7 +200,7 @@ fn ratio(a: &Estimate, b: &Estimate) -> Estimate {
 /// Ranges of the table, m.
 const RANGES_M: [f64; 3] = [50.0, 100.0, 200.0];
 
-fn schemes(frames: usize) -> Result<Grid, EngineError> {
+fn schemes(measured: &[Schemes]) -> Grid {
     let mut grid = Grid::new([
         "range and scheme",
         "cycles by formula",
@@ -207,14 +210,14 @@ fn schemes(frames: usize) -> Result<Grid, EngineError> {
         "penalty of the chip",
         "95 % interval",
     ]);
-    let system = long_range();
-    for range_m in RANGES_M {
-        let schemes = Schemes::measure(&system, range_m, frames)?;
+    for schemes in measured {
         let (guided_formula, guided) = schemes.measuring;
-        let zooming = schemes.detecting.1.map(|d| sum(&d, &guided));
+        let zooming = schemes.coarse.iter().try_fold(guided, |all, step| {
+            step.chip.as_ref().map(|cycles| sum(&all, cycles))
+        });
         let lines = [
             ("guided", guided_formula, Some(guided)),
-            ("zooming", guided_formula + schemes.detecting.0, zooming),
+            ("zooming", guided_formula + schemes.detecting, zooming),
             ("sliding", schemes.sliding.0, Some(schemes.sliding.1)),
         ];
         for (name, formula, chip) in lines {
@@ -239,11 +242,27 @@ fn schemes(frames: usize) -> Result<Grid, EngineError> {
             grid.push(cells);
         }
     }
-    Ok(grid)
+    grid
 }
 
-/// Cycles to a P_D of 99.7 % of a few detections.
-fn detections(frames: usize) -> Result<Grid, EngineError> {
+/// Detections in a guided window.
+fn guided(wanted: f64, frames: usize) -> Result<Vec<Detection>, EngineError> {
+    let cases = [
+        ("guided window, daylight", Trial::new(0.05, 20e6, 1)),
+        ("guided window, 15 x daylight", Trial::new(0.3, 300e6, 1)),
+    ];
+    let measure = |(name, trial): (&str, Trial)| {
+        Ok(Detection {
+            name: name.to_owned(),
+            light: trial.per_cycle(),
+            chip: cycles_to_detect(&trial, wanted, frames, 500)?,
+        })
+    };
+    cases.into_iter().map(measure).collect()
+}
+
+/// Laser cycles to the wanted P_D.
+fn detections<'a>(wanted: f64, all: impl Iterator<Item = &'a Detection>) -> Grid {
     let mut grid = Grid::new([
         "detection",
         "P_D",
@@ -253,50 +272,30 @@ fn detections(frames: usize) -> Result<Grid, EngineError> {
         "95 % interval",
         "chip / Eq. 17",
     ]);
-    let system = long_range();
-    let cases = [
-        ("guided window, daylight", Trial::new(0.05, 20e6, 1)),
-        ("guided window, 15 x daylight", Trial::new(0.3, 300e6, 1)),
-        (
-            "zooming, 4 bins of 12.5 m at 50 m",
-            coarse(&system, 12.5, 4, 50.0),
-        ),
-        (
-            "zooming, 8 bins of 12.5 m at 100 m",
-            coarse(&system, 12.5, 8, 100.0),
-        ),
-        (
-            "zooming, 16 bins of 12.5 m at 200 m",
-            coarse(&system, 12.5, 16, 200.0),
-        ),
-    ];
-    for (number, (name, trial)) in cases.into_iter().enumerate() {
-        let wanted = system.goal.detection;
+    for Detection { name, light, chip } in all {
         let by = |model| {
-            laser_cycles_for(wanted, &trial.per_cycle(), model).map_or(f64::INFINITY, |n| n as f64)
+            laser_cycles_for(wanted, light, model).map_or(f64::INFINITY, |cycles| cycles as f64)
         };
-        let (every, one) = (
-            by(Model::Poisson(Ties::Random)),
-            by(Model::Bernoulli(Ties::Random)),
-        );
-        let chip = cycles_to_detect(&trial, wanted, frames, 500 + number as u64)?;
-        let mut cells = vec![
-            name.to_owned(),
-            format!("{wanted}"),
-            format!("{every:.0}"),
-            format!("{one:.0}"),
-        ];
-        cells.extend(match chip {
+        let every = by(EQ_17);
+        let [chip, interval, ratio] = match chip {
             Some(e) => [
                 format!("{:.0}", e.value),
-                interval_text(&e, 0),
+                interval_text(e, 0),
                 format!("{:.3}", e.value / every),
             ],
             None => ["never".to_owned(), String::new(), String::new()],
-        });
-        grid.push(cells);
+        };
+        grid.push([
+            name.clone(),
+            wanted.to_string(),
+            format!("{every:.0}"),
+            format!("{:.0}", by(ONE_HIT)),
+            chip,
+            interval,
+            ratio,
+        ]);
     }
-    Ok(grid)
+    grid
 }
 
 /// The study.
@@ -304,6 +303,16 @@ fn detections(frames: usize) -> Result<Grid, EngineError> {
 /// # Errors
 /// Configurations that no engine can run.
 pub fn study(frames: usize) -> Result<Study, EngineError> {
+    let system = long_range();
+    let wanted = system.goal.detection;
+    let measure = |range_m: f64| Schemes::measure(&system, range_m, frames);
+    let measured: Vec<Schemes> = RANGES_M
+        .into_iter()
+        .map(measure)
+        .collect::<Result<_, _>>()?;
+    let guided = guided(wanted, frames)?;
+    let zooming = measured.iter().flat_map(|schemes| &schemes.coarse);
+    let detections = detections(wanted, guided.iter().chain(zooming));
     Ok(Study {
         notes: vec![
             format!("{frames} frames for each number, fewer where an exposure is long; intervals at 95 %."),
@@ -314,8 +323,8 @@ pub fn study(frames: usize) -> Result<Study, EngineError> {
                 .into(),
         ],
         grids: vec![
-            ("laser cycles for a detection", detections(frames)?),
-            ("laser cycles and penalty of the schemes", schemes(frames)?),
+            ("laser cycles for a detection", detections),
+            ("laser cycles and penalty of the schemes", schemes(&measured)),
         ],
         charts: Vec::new(),
     })

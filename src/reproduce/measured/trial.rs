@@ -108,8 +108,8 @@ const DIM: f64 = 0.01;
 const A_STEP: f64 = 0.07;
 
 /// Microseconds that a frame may take; longer ones are fewer, down to a least number.
-const AFFORDABLE_US: f64 = 400.0;
-const FEWEST: usize = 200;
+const AFFORDABLE_US: f64 = 150.0;
+const FEWEST: usize = 60;
 
 /// What a photon takes in the window engine, and in the cohort engine's joint states a step, µs.
 const DRAWN_US: f64 = 0.05;
