@@ -67,7 +67,7 @@ fn is_below(a: &Estimate, b: &Estimate) -> bool {
 /// Each case of the table, in a few frames: its chip against Eq. 17, and what mends it.
 #[test]
 fn what_breaks_eq_17_breaks_it_on_the_known_side() {
-    let cases = attributions(300).unwrap();
+    let cases = attributions(250).unwrap();
     let case = |name: &str| {
         let found = cases.iter().find(|case| case.name.contains(name));
         found.unwrap_or_else(|| panic!("no case {name}"))

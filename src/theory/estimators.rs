@@ -64,10 +64,9 @@ impl Expected {
         let step = 0.5 * self.bin_ns.min(self.pulse.sigma_ns());
         let steps = (counts.len() as f64 * self.bin_ns / step).ceil() as usize;
         let value = |t: f64| self.ln_likelihood(counts, t);
-        let best = (0..=steps)
-            .map(|k| k as f64 * step)
-            .max_by(|a, b| value(*a).total_cmp(&value(*b)))
-            .unwrap_or(0.0);
+        let scan = (0..=steps).map(|k| (k as f64 * step, value(k as f64 * step)));
+        let best = scan.max_by(|a, b| a.1.total_cmp(&b.1));
+        let best = best.map_or(0.0, |(t, _)| t);
         maximum_within(value, best - step, best + step)
     }
 

@@ -197,8 +197,8 @@ fn ratio(a: &Estimate, b: &Estimate) -> Estimate {
     }
 }
 
-/// Ranges of the table, m.
-const RANGES_M: [f64; 3] = [50.0, 100.0, 200.0];
+/// Ranges of the table, m. Farther, zooming's detection takes more photons than are worth drawing.
+const RANGES_M: [f64; 3] = [50.0, 75.0, 100.0];
 
 fn schemes(measured: &[Schemes]) -> Grid {
     let mut grid = Grid::new([

@@ -15,7 +15,7 @@ use crate::theory::precision::{cramer_rao, thompson};
 /// How a histogram becomes a time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Estimator {
-    /// Maximum likelihood of the formulas' own histogram.
+    /// Maximum likelihood under the formulas' kind of histogram: Gaussian pulse, flat background, Poisson counts.
     Likelihood,
     /// Eq. 28 around the fullest bin, as the chip's host does it.
     Peak,
@@ -44,14 +44,14 @@ pub fn scatter(
     // The same places for every frame count, each as often, in an order that has nothing to do with the frame's light.
     let shift = |frame: usize| (frame as f64 + 0.5) / frames as f64 - 0.5;
     let histograms = trial.histograms(frames, seed, shift)?;
-    let cycles = f64::from(trial.cycles);
+    let (background, signal) = levels(trial, &histograms);
     let expected = Expected {
         pulse: Pulse::Gaussian {
             sigma_ns: trial.sigma_ns,
         },
         bin_ns: trial.bin_ns(),
-        background: cycles * trial.background(),
-        signal: cycles * trial.signal,
+        background,
+        signal,
     };
     let errors = histograms.par_iter().enumerate().map(|(frame, counts)| {
         let truth_bins = trial.echo_bins + shift(frame);
@@ -67,6 +67,29 @@ pub fn scatter(
         spread: deviation(&errors),
         bias: mean(&errors),
     })
+}
+
+/// Mean counts of a bin without echo, and of the whole echo, over all histograms: what a host knows after some frames.
+/// Told the formulas' own counts instead, a likelihood takes the background that single hits swallow for an echo beyond
+/// the window's edge.
+fn levels(trial: &Trial, histograms: &[Vec<u32>]) -> (f64, f64) {
+    let reach = 4.0 * trial.sigma_ns / trial.bin_ns() + 1.0;
+    let is_dark = |bin: usize| (bin as f64 - trial.echo_bins).abs() > reach;
+    let (mut dark, mut dark_bins, mut all) = (0.0, 0.0, 0.0);
+    for (bin, &count) in histograms
+        .iter()
+        .flat_map(|counts| counts.iter().enumerate())
+    {
+        all += f64::from(count);
+        if is_dark(bin) {
+            dark += f64::from(count);
+            dark_bins += 1.0;
+        }
+    }
+    let frames = histograms.len() as f64;
+    let background = dark / f64::max(dark_bins, 1.0);
+    let signal = all / frames - trial.sensor.bins as f64 * background;
+    (background, signal.max(1.0))
 }
 
 /// Laser cycles of the exposures.
@@ -234,8 +257,7 @@ pub fn study(frames: usize) -> Result<Study, EngineError> {
     Ok(Study {
         notes: vec![
             format!("{frames} frames for each number, echoes evenly over their bin; intervals of a spread are chi-square's at 95 %, their degrees of freedom from the sample's fourth moment."),
-            "Likelihood: the maximum-likelihood time under the formulas' own histogram (Gaussian pulse, flat background, Poisson counts), which is to reach the bound. Eq. 28: the centre of mass two bins either side of the fullest, the median of the rest taken off.".into(),
-            "The likelihood is told the formulas' counts. Where dead time and single hits take much of the background, it does not know its histogram again, and its times are worthless.".into(),
+            "Likelihood: the maximum-likelihood time under the formulas' histogram (Gaussian pulse, flat background, Poisson counts, their means as measured), which is to reach the bound. Eq. 28: the centre of mass two bins either side of the fullest, the median of the rest taken off.".into(),
             "A spread says nothing of the bias beside it: photons that others hide are the late ones, and the echo seems early.".into(),
         ],
         grids: vec![
