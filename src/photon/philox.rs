@@ -5,8 +5,8 @@
 
 use multiversion::multiversion;
 
-/// Counters that go through the rounds together.
-const LANES: usize = 8;
+/// Counters that go through the rounds together, and of which rows of blocks are filled up to a multiple.
+pub const LANES: usize = 16;
 
 const MULTIPLIERS: [u64; 2] = [0xD251_1F53, 0xCD9E_8D57];
 const LOW: u64 = 0xFFFF_FFFF;
@@ -16,6 +16,8 @@ const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 /// counter word.
 #[derive(Debug, Clone, Default)]
 pub struct Blocks {
+    blocks: usize,
+    /// Longer than needed, so that runs are written [`LANES`] at a time.
     first: Vec<u32>,
     second: Vec<u32>,
     words: [Vec<u32>; 4],
@@ -24,52 +26,74 @@ pub struct Blocks {
 impl Blocks {
     /// Forgets all runs.
     pub fn clear(&mut self) {
-        self.first.clear();
-        self.second.clear();
+        self.blocks = 0;
     }
 
     /// Asks for a run of `blocks` blocks with this second counter word.
     #[inline]
     pub fn push_run(&mut self, second: u32, blocks: u32) {
-        self.first.extend(0..blocks);
-        self.second
-            .resize(self.second.len() + blocks as usize, second);
+        let start = self.blocks;
+        self.blocks += blocks as usize;
+        let room = self.blocks + LANES;
+        if room > self.first.len() {
+            self.first.resize(2 * room, 0);
+            self.second.resize(2 * room, 0);
+        }
+        let firsts = self.first[start..room].chunks_exact_mut(LANES);
+        let seconds = self.second[start..room].chunks_exact_mut(LANES);
+        for (chunk, (firsts, seconds)) in firsts.zip(seconds).enumerate() {
+            for lane in 0..LANES {
+                firsts[lane] = (chunk * LANES + lane) as u32;
+            }
+            seconds.fill(second);
+        }
     }
 
     /// Blocks asked for.
     pub fn len(&self) -> usize {
-        self.first.len()
+        self.blocks
+    }
+
+    fn filled_up(&self) -> usize {
+        self.blocks.next_multiple_of(LANES)
     }
 
     /// Generates all blocks with this key, third and fourth counter word.
     pub fn generate(&mut self, key: [u32; 2], third: u32, fourth: u32) {
-        let padded = self.len().next_multiple_of(LANES);
+        let filled_up = self.filled_up();
+        let room = self.first.len();
         for words in &mut self.words {
-            words.resize(padded.max(words.len()), 0);
+            words.resize(room, 0);
         }
-        let blocks = self.len();
-        self.first.resize(padded, 0);
-        self.second.resize(padded, 0);
         generate(
             key,
             [third, fourth],
-            &self.first,
-            &self.second,
-            self.words.each_mut().map(|words| &mut words[..padded]),
+            &self.first[..filled_up],
+            &self.second[..filled_up],
+            self.words.each_mut().map(|words| &mut words[..filled_up]),
         );
-        self.first.truncate(blocks);
-        self.second.truncate(blocks);
     }
 
-    /// Word `word` (0 to 3) of every block.
+    /// The four words of every block, and of others that fill the rows up to a multiple of [`LANES`].
     #[inline]
-    pub fn words(&self, word: usize) -> &[u32] {
-        &self.words[word][..self.len()]
+    pub fn rows(&self) -> [&[u32]; 4] {
+        let filled_up = self.filled_up();
+        self.words.each_ref().map(|words| &words[..filled_up])
+    }
+
+    /// The second counter word of every block, filled up alike.
+    #[inline]
+    pub fn seconds(&self) -> &[u32] {
+        &self.second[..self.filled_up()]
     }
 }
 
 /// Words live in the low halves of 64-bit lanes, where vector units multiply them; high halves hold what is left over.
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1"
+))]
 fn generate(
     key: [u32; 2],
     [third, fourth]: [u32; 2],
@@ -140,7 +164,7 @@ mod tests {
             prop_assert_eq!(blocks.len(), counters.len());
             for (at, counter) in counters.into_iter().enumerate() {
                 let expected = rand_philox::philox4x32_10(counter, key);
-                let got: [u32; 4] = std::array::from_fn(|word| blocks.words(word)[at]);
+                let got: [u32; 4] = std::array::from_fn(|word| blocks.rows()[word][at]);
                 prop_assert_eq!(got, expected);
             }
         }
