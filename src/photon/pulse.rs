@@ -178,21 +178,20 @@ impl PulseSampler {
         let product = u64::from(choice) * self.columns.len() as u64;
         let own = (product >> 32) as usize;
         let column = &self.columns[own];
-        let cell = if (product as u32) < column.threshold {
-            own
+        let cell = match (product as u32) < column.threshold {
+            true => own,
+            false => column.alias as usize,
+        };
+        let column = &self.columns[cell];
+        let (earlier, later) = (place.min(other), place.max(other));
+        let triangle = if column.rises { later } else { earlier };
+        let place = if tilt < column.steepness {
+            triangle
         } else {
-            column.alias as usize
+            place
         };
-        let Column {
-            steepness, rises, ..
-        } = self.columns[cell];
-        let triangle = match rises {
-            true => place.max(other),
-            false => place.min(other),
-        };
-        let place = if tilt < steepness { triangle } else { place };
-        let x = (f64::from(place) + 0.5) * 2f64.powi(-32);
-        self.first_fs + self.cell_fs * (cell as f64 + x)
+        let cells = (cell as i64) << 32 | i64::from(place);
+        self.first_fs + self.cell_fs * 2f64.powi(-32) * (cells as f64 + 0.5)
     }
 
     /// Earliest and latest time, fs.

@@ -39,7 +39,7 @@ use super::spad::{SPADS, SpadEvent, SpadModel};
 use crate::units::{Frequency, Time};
 use draw::{ByCycle, SLOT_BITS};
 pub use draw::{Draw, Place, Run, SLOT, SignalPhoton, time_in_slot_fs};
-use group::LENGTHS;
+use group::FIRST;
 pub use group::{GROUP, Group, PLACE_BITS};
 
 mod draw;
@@ -47,7 +47,7 @@ mod group;
 
 const SPAD_BITS: u32 = SPADS.trailing_zeros();
 
-/// Adding it leaves no fraction to numbers up to ±2⁵¹.
+/// Adding it to numbers up to ±2⁵¹ leaves no fraction, and the number in the low bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 /// Second counter word of the number of signal photons; slots are below it.
@@ -225,25 +225,32 @@ pub struct PixelStream<'a> {
     signal: Numbers,
 }
 
-/// Numbers of photons in groups of any length; a distribution is made when it is first wanted.
+/// Numbers of photons in groups of any length.
 #[derive(Debug, Clone)]
 struct Numbers {
     per_cycle: f64,
-    by_length: [OnceCell<Poisson>; LENGTHS],
+    /// In one of the shortest groups, and in one of the longest. Made when first wanted.
+    short: OnceCell<Poisson>,
+    long: OnceCell<Poisson>,
 }
 
 impl Numbers {
     fn new(per_cycle: f64) -> Self {
         Numbers {
             per_cycle,
-            by_length: Default::default(),
+            short: OnceCell::new(),
+            long: OnceCell::new(),
         }
     }
 
-    /// The distribution of the number in this group.
-    fn of(&self, group: Group) -> &Poisson {
-        self.by_length[group.length()]
-            .get_or_init(|| Poisson::new(self.per_cycle * f64::from(group.cycles())))
+    /// A distribution, and how many draws of it make the number in this group.
+    fn of(&self, group: Group) -> (&Poisson, u32) {
+        let (cell, cycles) = match group.cycles() {
+            GROUP => (&self.long, GROUP),
+            _ => (&self.short, FIRST),
+        };
+        let poisson = cell.get_or_init(|| Poisson::new(self.per_cycle * f64::from(cycles)));
+        (poisson, group.cycles() / cycles)
     }
 }
 
@@ -263,15 +270,17 @@ impl PixelStream<'_> {
 
         let from_fs = i64::from(slots.start) << SLOT_BITS;
         let until_fs = (i64::from(slots.end) << SLOT_BITS).min(cycle_fs);
-        let (background, signal) = (self.background.of(group), self.signal.of(group));
+        let (background, parts) = self.background.of(group);
+        let (signal, signal_parts) = self.signal.of(group);
         let has_echo = !signal.is_zero() && self.echo_fs.0 < until_fs && self.echo_fs.1 >= from_fs;
         if has_echo {
-            draw.counts.push_run(SIGNAL_RUN, signal.words().div_ceil(2));
+            let words = signal.words() * signal_parts;
+            draw.counts.push_run(SIGNAL_RUN, words.div_ceil(2));
         }
-        let blocks = background.words().div_ceil(2);
+        let words = background.words() * parts;
         if !background.is_zero() {
             for slot in slots.clone() {
-                draw.counts.push_run(slot, blocks);
+                draw.counts.push_run(slot, words.div_ceil(2));
             }
         }
         draw.counts
@@ -279,7 +288,7 @@ impl PixelStream<'_> {
 
         let mut at = 0;
         if has_echo {
-            let photons = draw.count(signal, &mut at);
+            let photons = draw.count(signal, signal_parts, &mut at);
             draw.echo.push_run(0, photons);
             if self.stream.shape.is_some() {
                 draw.echo.push_run(1, photons);
@@ -290,7 +299,7 @@ impl PixelStream<'_> {
         }
         if !background.is_zero() {
             for slot in slots {
-                let photons = draw.count(background, &mut at);
+                let photons = draw.count(background, parts, &mut at);
                 draw.push_run(slot, photons);
             }
             draw.background
@@ -300,28 +309,44 @@ impl PixelStream<'_> {
 
     /// Places the photons of the echo; those of a measured pulse have a second row of random words.
     fn place_signal(&self, photons: usize, within_fs: Range<i64>, draw: &mut Draw) {
-        let words = draw.echo.rows();
-        let of = |at: usize| words.map(|row| row[at]);
+        let [low, high] = draw.echo.rows();
+        draw.signal.resize(photons, SignalPhoton::default());
+        let mut kept = 0;
         for photon in 0..photons {
-            let own = of(photon);
-            let mut after_fs =
-                self.stream
-                    .gaussian
-                    .draw([own[0], own[1] << PLACE_BITS, own[2], own[3]]);
+            let own = words(low[photon], high[photon]);
+            let own = [own[0], own[1] << PLACE_BITS, own[2], own[3]];
+            let mut after_fs = self.stream.gaussian.draw(own);
             if let Some(shape) = &self.stream.shape {
-                after_fs += shape.draw(of(photons + photon));
+                let second = photons + photon;
+                after_fs += shape.draw(words(low[second], high[second]));
             }
-            // Rounds to the nearest femtosecond without a call.
-            let rounded = (after_fs + ROUNDER) - ROUNDER;
-            let time_fs = self.arrival_fs.saturating_add(rounded as i64);
-            if within_fs.contains(&time_fs) {
-                draw.signal.push(SignalPhoton {
-                    place: draw.group.place(own[1]),
-                    time_fs,
-                });
-            }
+            let time_fs = self.arrival_fs.saturating_add(nearest(after_fs));
+            // Written always, kept if within: no branch to mispredict.
+            draw.signal[kept] = SignalPhoton {
+                place: draw.group.place(low[photon]),
+                time_fs,
+            };
+            kept += usize::from(within_fs.contains(&time_fs));
         }
+        draw.signal.truncate(kept);
     }
+}
+
+/// The nearest whole number, without a call; `value` is within ±2⁵¹.
+#[inline]
+fn nearest(value: f64) -> i64 {
+    ((value + ROUNDER).to_bits() as i64) - ROUNDER.to_bits() as i64
+}
+
+/// The four words of a block.
+#[inline]
+fn words(low: u64, high: u64) -> [u32; 4] {
+    [
+        low as u32,
+        (low >> 32) as u32,
+        high as u32,
+        (high >> 32) as u32,
+    ]
 }
 
 #[cfg(test)]

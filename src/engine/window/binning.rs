@@ -83,14 +83,6 @@ pub struct Wanted {
     pub origin_fs: i64,
 }
 
-impl Wanted {
-    /// The wanted photon's place in its window's cycle.
-    #[inline(always)]
-    fn place(&self, place: u32) -> Option<u32> {
-        (place < self.cycles << SPAD_BITS).then_some(place + (self.later << SPAD_BITS))
-    }
-}
-
 /// Bins of one window. Times are relative to the start of bin 0.
 #[derive(Debug, Clone, Copy)]
 pub struct Binning {
@@ -123,18 +115,27 @@ impl Binning {
     }
 
     /// Appends the codes of a draw, those of its background photons (by halves, as [`Draw::words`] has them) before those
-    /// of its signal.
-    pub fn encode(&self, draw: &Draw, wanted: &Wanted, codes: &mut Vec<Code>) {
+    /// of its signal. `bases` is for intermediate results.
+    pub fn encode(
+        &self,
+        draw: &Draw,
+        wanted: &Wanted,
+        bases: &mut Vec<u32>,
+        codes: &mut Vec<Code>,
+    ) {
         let first = codes.len();
         let filled_up = draw.slots().len();
         codes.resize(first + 2 * filled_up, Code::NONE);
-        let halves = codes[first..].split_at_mut(filled_up);
-        let halves = [halves.0, halves.1];
+        let (low, high) = codes[first..].split_at_mut(filled_up);
         let shift = draw.group().place_shift();
-        for ([times, places], codes) in draw.words().into_iter().zip(halves) {
-            encode(self, wanted, shift, times, places, draw.slots(), codes);
-            codes[draw.blocks()..].fill(Code::NONE);
+        bases.resize(filled_up.max(bases.len()), 0);
+        let bases = &mut bases[..filled_up];
+        find_bases(self, wanted.origin_fs, draw.slots(), bases);
+        for (words, codes) in draw.words().into_iter().zip([&mut *low, &mut *high]) {
+            encode(self, wanted, shift, words, bases, codes);
         }
+        low[draw.blocks()..].fill(Code::NONE);
+        high[draw.blocks()..].fill(Code::NONE);
         for run in draw.runs() {
             let [_, second] = run.blocks();
             if run.photons % 2 == 1 {
@@ -144,13 +145,12 @@ impl Binning {
         for (half, block) in draw.outlasting() {
             codes[first + half * filled_up + block] = Code::NONE;
         }
-        let signal = draw.signal().iter();
-        codes.extend(signal.map(|photon| {
-            wanted
-                .place(u32::from(photon.place))
-                .map_or(Code::NONE, |place| {
-                    self.code(self.position(photon.time_fs - wanted.origin_fs), place)
-                })
+        let (end, later) = (wanted.cycles << SPAD_BITS, wanted.later << SPAD_BITS);
+        codes.extend(draw.signal().iter().map(|photon| {
+            let place = u32::from(photon.place);
+            let position = self.position(photon.time_fs - wanted.origin_fs);
+            let wanted = self.code(position, place + later);
+            if place < end { wanted } else { Code::NONE }
         }));
     }
 
@@ -176,37 +176,38 @@ impl Binning {
     }
 }
 
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
-    "x86_64+avx2",
-    "x86_64+sse4.1"
-))]
-fn encode(
-    binning: &Binning,
-    wanted: &Wanted,
-    place_shift: u32,
-    times: &[u32],
-    places: &[u32],
-    slots: &[u32],
-    codes: &mut [Code],
-) {
+/// The positions at which slots begin.
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+fn find_bases(binning: &Binning, origin_fs: i64, slots: &[u32], bases: &mut [u32]) {
     let one = f64::from(FRACTION + 1);
-    let origin = wanted.origin_fs as f64 * binning.periods_per_fs;
+    let origin = origin_fs as f64 * binning.periods_per_fs;
     let last = f64::from(binning.bins) + 1.0;
-    let words = times.iter().zip(places).zip(slots);
-    for (((&time, &word), &slot), code) in words.zip(codes) {
+    for (&slot, base) in slots.iter().zip(bases) {
         let periods = f64::from(slot) * binning.periods_per_slot - origin;
         // No slot is as long.
         let periods = if periods > -16.0 { periods } else { -16.0 };
         let periods = if periods < last { periods } else { last };
-        let base = ((periods + f64::from(BIAS)) * one + INTEGER).to_bits() as u32;
-        let offset = (u64::from(time) * u64::from(binning.scale)) >> 32;
+        *base = ((periods + f64::from(BIAS)) * one + INTEGER).to_bits() as u32;
+    }
+}
+
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+fn encode(
+    binning: &Binning,
+    wanted: &Wanted,
+    place_shift: u32,
+    words: &[u64],
+    bases: &[u32],
+    codes: &mut [Code],
+) {
+    let (binning, wanted) = (*binning, *wanted);
+    let (end, later) = (wanted.cycles << SPAD_BITS, wanted.later << SPAD_BITS);
+    for ((&word, &base), code) in words.iter().zip(bases).zip(codes) {
+        let offset = ((word & 0xFFFF_FFFF) * u64::from(binning.scale)) >> 32;
         let position = base.wrapping_add(offset as u32);
-        let place = wanted.place(word >> place_shift);
-        *code = match place {
-            Some(place) => binning.code(position, place),
-            None => Code::NONE,
-        };
+        let place = (word >> place_shift) as u32;
+        let wanted = binning.code(position, place + later);
+        *code = if place < end { wanted } else { Code::NONE };
     }
 }
 
@@ -233,7 +234,7 @@ mod tests {
             aimed: bool,
         ) {
             let binning = Binning::new(bins, 1e15 / period_fs as f64);
-            let in_slot_fs = i64::from(time_in_slot_fs(word));
+            let in_slot_fs = i64::from(time_in_slot_fs(u64::from(word)));
             // Half of the photons come close to an edge.
             let start_fs = if aimed { near * period_fs + off - in_slot_fs } else { start_fs };
             let time_fs = start_fs + in_slot_fs;
@@ -242,9 +243,11 @@ mod tests {
             let off_edge = time_fs.rem_euclid(period_fs).min(period_fs - time_fs.rem_euclid(period_fs));
             let wanted = Wanted { cycles, later, origin_fs };
             let shift = Group::of_cycle(GROUP).place_shift();
-            let mut codes = [Code::NONE];
-            encode(&binning, &wanted, shift, &[word], &[place], &[slot], &mut codes);
-            let place = place >> shift;
+            let photon = u64::from(place) << 32 | u64::from(word);
+            let (mut base, mut codes) = ([0], [Code::NONE]);
+            find_bases(&binning, origin_fs, &[slot], &mut base);
+            encode(&binning, &wanted, shift, &[photon], &base, &mut codes);
+            let place = (photon >> shift) as u32;
             if place / 16 >= cycles {
                 prop_assert_eq!(codes[0], Code::NONE);
                 return Ok(());

@@ -15,7 +15,7 @@
 //!
 //! [`SpadModel::detect`]: crate::photon::SpadModel::detect
 
-use super::binning::{Binning, Code, Wanted};
+use super::binning::{Binning, Code, ROWS, Wanted};
 use super::history::{Photon, certain_from, split};
 use super::sight::{ROUNDING_FS, Sight};
 use super::tables::{MOST_PHOTONS, Tables};
@@ -37,6 +37,7 @@ pub struct Counting<'a> {
     /// Photons of the last cycle of the group before, for the window of the first cycle; all in cycle 0.
     carried: Vec<SignalPhoton>,
     extra: Draw,
+    bases: Vec<u32>,
     /// Codes of all photons drawn for the group. Photons are known by their index here.
     codes: Vec<Code>,
     /// Where the codes of `previous` and `carried` begin.
@@ -45,7 +46,7 @@ pub struct Counting<'a> {
     /// Photons of one cycle: index, row and SPAD.
     together: Vec<(usize, Code)>,
     /// SPADs that fired by row, in one cycle.
-    fired: [u8; 128],
+    fired: [u8; ROWS],
     photons: Vec<Photon>,
     /// Photons by cycle, for those that are sorted.
     sorted: Vec<(u32, Photon)>,
@@ -73,11 +74,12 @@ impl<'a> Counting<'a> {
             previous: Draw::default(),
             carried: Vec::new(),
             extra: Draw::default(),
+            bases: Vec::new(),
             codes: Vec::new(),
             first_code: [0; 2],
             tables: Tables::new(bins),
             together: Vec::new(),
-            fired: [0; 128],
+            fired: [0; ROWS],
             photons: Vec::new(),
             sorted: Vec::new(),
             events: Vec::new(),
@@ -128,7 +130,8 @@ impl<'a> Counting<'a> {
             later: 0,
             origin_fs: sight.first_fs,
         };
-        self.binning.encode(&self.own, &wanted, &mut self.codes);
+        self.binning
+            .encode(&self.own, &wanted, &mut self.bases, &mut self.codes);
         self.first_code[0] = self.codes.len();
         let wanted = Wanted {
             cycles: cycles - 1,
@@ -136,7 +139,7 @@ impl<'a> Counting<'a> {
             origin_fs: sight.first_fs + self.stream.cycle_fs(),
         };
         self.binning
-            .encode(&self.previous, &wanted, &mut self.codes);
+            .encode(&self.previous, &wanted, &mut self.bases, &mut self.codes);
         self.first_code[1] = self.codes.len();
         let carried = self.carried.iter();
         self.codes.extend(carried.map(|photon| {
@@ -148,6 +151,9 @@ impl<'a> Counting<'a> {
     /// Keeps what the first window of the next group may see.
     fn carry(&mut self, group: Group) {
         self.carried.clear();
+        if self.previous.is_empty() {
+            return;
+        }
         let photons = self.previous.photons().filter_map(|(place, time_fs)| {
             let (cycle, spad) = split(place);
             (cycle + 1 == group.cycles()).then_some(SignalPhoton {
@@ -172,7 +178,7 @@ impl<'a> Counting<'a> {
     /// Settles all photons in the window of one cycle of the group, `laser_cycle` of the exposure.
     fn settle(&mut self, pixel: &mut Pixel<'_>, cycle: usize, laser_cycle: u32) {
         self.together.clear();
-        let (mut once, mut several) = (0u16, 0u16);
+        let (mut once, mut several, mut is_doubtful) = (0u16, 0u16, false);
         let mut next = self.tables.take_last(cycle);
         while let Some(photon) = next {
             let code = self.codes[photon];
@@ -181,33 +187,79 @@ impl<'a> Counting<'a> {
             several |= once & spad;
             if code.is_doubtful() {
                 several |= spad;
+                is_doubtful = true;
             }
             once |= spad;
             self.together.push((photon, code));
             next = self.tables.before(photon);
         }
-        let bins = pixel.hits.len();
         for (_, code) in &self.together {
-            let row = code.row();
-            if several >> code.spad() & 1 == 0 && (1..=bins).contains(&row) {
-                self.fired[row] += 1;
-                pixel.work.pulses += 1;
-            }
+            let alone = several >> code.spad() & 1 == 0;
+            self.fired[code.row()] += u8::from(alone);
         }
         while several != 0 {
             let spad = several.trailing_zeros() as u8;
             several &= several - 1;
-            self.settle_spad(pixel, laser_cycle, spad);
-        }
-        let rows = self.together.iter().map(|(_, code)| code.row());
-        // A doubtful photon may belong to the row before or after.
-        for row in rows.flat_map(|row| row.saturating_sub(1)..=row + 1) {
-            let spads = std::mem::take(&mut self.fired[row % 128]);
-            if spads > 0 {
-                pixel.hits[row - 1] += self.adds[usize::from(spads)];
-                pixel.work.clk_periods_visited += 1;
+            if is_doubtful || !self.settle_pair(pixel, spad) {
+                self.settle_spad(pixel, laser_cycle, spad);
             }
         }
+        for index in 0..self.together.len() {
+            let row = self.together[index].1.row();
+            self.tell(pixel, row);
+            if is_doubtful {
+                self.tell(pixel, row.saturating_sub(1));
+                self.tell(pixel, row + 1);
+            }
+        }
+    }
+
+    /// Adds what fired in a CLK period to its bin.
+    fn tell(&mut self, pixel: &mut Pixel<'_>, row: usize) {
+        let spads = std::mem::take(&mut self.fired[row]);
+        let Some(hits) = row.checked_sub(1).and_then(|bin| pixel.hits.get_mut(bin)) else {
+            return;
+        };
+        *hits += self.adds[usize::from(spads)];
+        pixel.work.clk_periods_visited += u64::from(spads > 0);
+        pixel.work.pulses += u64::from(spads);
+    }
+
+    /// Settles the photons of one SPAD if they are just two and what was before them does not matter, as it mostly is;
+    /// neither is doubtful. Returns whether it did.
+    fn settle_pair(&mut self, pixel: &mut Pixel<'_>, spad: u8) -> bool {
+        let mut photons = self.together.iter().filter(|(_, code)| code.spad() == spad);
+        let (Some(&a), Some(&b), None) = (photons.next(), photons.next(), photons.next()) else {
+            return false;
+        };
+        let own = self.first_code[0];
+        if a.0 >= own || b.0 >= own {
+            return false;
+        }
+        let time_fs = |(photon, _): (usize, Code)| in_draw(&self.own, photon);
+        let (mut first, mut second) = ((time_fs(a), a.1.row()), (time_fs(b), b.1.row()));
+        if first > second {
+            std::mem::swap(&mut first, &mut second);
+        }
+        let memory_fs = self.stream.config().spads.memory().as_fs();
+        let blinds = second.0 - first.0 <= memory_fs;
+        // A photon in the window has been preceded by all the memory, in which there was none.
+        let is_certain = first.1 > 0 || first.0 - pixel.sight.drawn_from_fs > memory_fs;
+        if second.1 > 0 && blinds && !is_certain {
+            return false;
+        }
+        let is_seen = (1..=pixel.hits.len()).contains(&second.1);
+        if blinds {
+            self.fired[first.1] += 1;
+            pixel.work.lost_to_dead_time += u64::from(is_seen);
+        } else if first.1 != second.1 {
+            self.fired[first.1] += 1;
+            self.fired[second.1] += 1;
+        } else if is_seen {
+            // Two pulses within one CLK period cancel.
+            pixel.work.pulses += 2;
+        }
+        true
     }
 
     /// Settles the photons of one SPAD among those `together`.
@@ -238,10 +290,10 @@ impl<'a> Counting<'a> {
                 continue;
             };
             seen -= 1;
-            pixel.work.pulses += 1;
             // Two pulses within one CLK period cancel.
             if last == Some(row) {
                 self.fired[row] -= 1;
+                pixel.work.pulses += 2;
                 last = None;
             } else {
                 self.fired[row] += 1;
@@ -293,17 +345,10 @@ impl<'a> Counting<'a> {
 
     /// When a photon came, relative to the start of the laser cycle of its window.
     fn time_of(&self, photon: usize, laser_cycle: u32) -> Time {
-        let of = |draw: &Draw, at: usize| {
-            let filled_up = draw.slots().len();
-            match at.checked_sub(2 * filled_up) {
-                Some(signal) => draw.signal()[signal].time_fs,
-                None => draw.time_fs(at / filled_up, at % filled_up),
-            }
-        };
         let time_fs = if photon < self.first_code[0] {
-            return Time::from_fs(of(&self.own, photon));
+            return Time::from_fs(in_draw(&self.own, photon));
         } else if photon < self.first_code[1] {
-            of(&self.previous, photon - self.first_code[0])
+            in_draw(&self.previous, photon - self.first_code[0])
         } else {
             self.carried[photon - self.first_code[1]].time_fs
         };
@@ -364,6 +409,18 @@ impl<'a> Counting<'a> {
             pixel.work.lost_to_dead_time += seen.saturating_sub(pulses);
         }
         self.sorted = sorted;
+    }
+}
+
+/// When the photon of the `at`-th code of a draw came after the start of its cycle, fs.
+fn in_draw(draw: &Draw, at: usize) -> i64 {
+    let filled_up = draw.slots().len();
+    match at.checked_sub(2 * filled_up) {
+        Some(signal) => draw.signal()[signal].time_fs,
+        None => {
+            let half = usize::from(at >= filled_up);
+            draw.time_fs(half, at - half * filled_up)
+        }
     }
 }
 

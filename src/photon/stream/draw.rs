@@ -14,14 +14,14 @@ pub(super) const SLOT_BITS: u32 = 21;
 /// Where in its group a photon falls: cycle within the group and SPAD, as `cycle << 4 | SPAD`.
 pub type Place = u16;
 
-/// The time within its slot that a random word gives, fs.
+/// The time within its slot that the random word of a photon gives, fs.
 #[inline]
-pub fn time_in_slot_fs(word: u32) -> u32 {
-    word >> (32 - SLOT_BITS)
+pub fn time_in_slot_fs(word: u64) -> u32 {
+    word as u32 >> (32 - SLOT_BITS)
 }
 
-/// Background photons of one slot. Each block of random words makes two: first those of words 0 and 1 of its blocks,
-/// then those of words 2 and 3.
+/// Background photons of one slot. Each block of random words makes two: first those of its blocks' low
+/// halves, then those of the high halves.
 #[derive(Debug, Clone, Copy)]
 pub struct Run {
     /// The slot.
@@ -39,7 +39,7 @@ impl Run {
         i64::from(self.slot) << SLOT_BITS
     }
 
-    /// Blocks whose words 0 and 1, and whose words 2 and 3, make photons.
+    /// Blocks whose low and whose high halves make photons.
     #[inline]
     pub fn blocks(&self) -> [std::ops::Range<usize>; 2] {
         let first = self.first_block as usize;
@@ -52,7 +52,7 @@ impl Run {
 }
 
 /// A photon of the echo.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct SignalPhoton {
     /// Cycle and SPAD.
     pub place: Place,
@@ -129,13 +129,10 @@ impl Draw {
         self.background.len()
     }
 
-    /// The random words of background photons: [`time_in_slot_fs`] of the first and [`Group::place`] of the second of
-    /// each pair. Behind those of the last block comes what fills the rows up to a multiple of [`LANES`].
-    ///
-    /// [`LANES`]: super::LANES
-    pub fn words(&self) -> [[&[u32]; 2]; 2] {
-        let [times, places, more_times, more_places] = self.background.rows();
-        [[times, places], [more_times, more_places]]
+    /// A random word for every background photon, by halves of their blocks: [`time_in_slot_fs`] in the low 32 bits and
+    /// [`Group::place`] in the high ones. Behind those of the last block comes what fills the rows up.
+    pub fn words(&self) -> [&[u64]; 2] {
+        self.background.rows()
     }
 
     /// The slot of every block, filled up like the words.
@@ -151,12 +148,12 @@ impl Draw {
             .filter(cut)
             .into_iter()
             .flat_map(move |run| {
-                let late = move |time: u32| {
-                    run.start_fs() + i64::from(time_in_slot_fs(time)) >= self.cycle_fs
+                let late = move |word: u64| {
+                    run.start_fs() + i64::from(time_in_slot_fs(word)) >= self.cycle_fs
                 };
                 let halves = run.blocks().into_iter().zip(self.words()).enumerate();
-                halves.flat_map(move |(half, (blocks, [times, _]))| {
-                    let photons = blocks.filter(move |&block| late(times[block]));
+                halves.flat_map(move |(half, (blocks, words))| {
+                    let photons = blocks.filter(move |&block| late(words[block]));
                     photons.map(move |block| (half, block))
                 })
             })
@@ -165,7 +162,7 @@ impl Draw {
     /// When a background photon comes after the start of its cycle, fs.
     #[inline]
     pub fn time_fs(&self, half: usize, block: usize) -> i64 {
-        let in_slot_fs = time_in_slot_fs(self.words()[half][0][block]);
+        let in_slot_fs = time_in_slot_fs(self.words()[half][block]);
         (i64::from(self.slots()[block]) << SLOT_BITS) + i64::from(in_slot_fs)
     }
 
@@ -182,10 +179,9 @@ impl Draw {
             run.blocks()
                 .into_iter()
                 .zip(words)
-                .flat_map(move |(blocks, [times, places])| {
-                    let photons = times[blocks.clone()].iter().zip(&places[blocks]);
-                    photons.map(move |(&time, &word)| {
-                        let time_fs = start_fs + i64::from(time_in_slot_fs(time));
+                .flat_map(move |(blocks, words)| {
+                    words[blocks].iter().map(move |&word| {
+                        let time_fs = start_fs + i64::from(time_in_slot_fs(word));
                         (self.group.place(word), time_fs)
                     })
                 })
@@ -199,18 +195,14 @@ impl Draw {
             .chain(signal)
     }
 
-    /// A Poisson number from the next words of `counts`.
+    /// The sum of `draws` Poisson numbers from the next blocks of `counts`.
     #[inline]
-    pub(super) fn count(&self, poisson: &Poisson, at: &mut usize) -> u32 {
+    pub(super) fn count(&self, poisson: &Poisson, draws: u32, at: &mut usize) -> u32 {
         let words = self.counts.rows();
-        let mut total = 0;
-        for part in 0..poisson.words() {
-            let block = *at + (part / 2) as usize;
-            let half = (part % 2) as usize * 2;
-            let word = |word: usize| u64::from(words[word][block]);
-            total += poisson.part(word(half) << 32 | word(half + 1));
-        }
-        *at += poisson.words().div_ceil(2) as usize;
+        let parts = (poisson.words() * draws) as usize;
+        let part = |part: usize| poisson.part(words[part % 2][*at + part / 2]);
+        let total = (0..parts).map(part).sum();
+        *at += parts.div_ceil(2);
         total
     }
 }

@@ -17,11 +17,9 @@ use super::draw::Place;
 pub const GROUP: u32 = 1 << GROUP_BITS;
 const GROUP_BITS: u32 = 10;
 
-/// The first group has 2 to this power.
+/// Laser cycles of the shortest groups.
+pub const FIRST: u32 = 1 << FIRST_BITS;
 const FIRST_BITS: u32 = 7;
-
-/// Different lengths of groups.
-pub const LENGTHS: usize = (GROUP_BITS - FIRST_BITS + 1) as usize;
 
 /// Most bits of a [`Place`].
 pub const PLACE_BITS: u32 = GROUP_BITS + SPAD_BITS;
@@ -88,20 +86,15 @@ impl Group {
             .min(self.cycles())
     }
 
-    /// Which of the [`LENGTHS`] it has, from the shortest on.
-    pub fn length(self) -> usize {
-        (self.bits - FIRST_BITS) as usize
-    }
-
-    /// By how much a random word is shifted to give a place.
+    /// By how much the random word of a photon is shifted to give its place.
     #[inline]
     pub fn place_shift(self) -> u32 {
-        32 - SPAD_BITS - self.bits
+        64 - SPAD_BITS - self.bits
     }
 
-    /// The place that a random word gives.
+    /// The place of a photon.
     #[inline]
-    pub fn place(self, word: u32) -> Place {
+    pub fn place(self, word: u64) -> Place {
         (word >> self.place_shift()) as Place
     }
 }
@@ -140,10 +133,10 @@ mod tests {
             if let Some(next) = last.checked_add(1) {
                 prop_assert_eq!(Group::of_cycle(next).number(), group.number() + 1);
             }
-            prop_assert_eq!(group.cycles(), 128 << group.length());
+            prop_assert!([128, 256, 512, 1024].contains(&group.cycles()));
             prop_assert!(group.number() < 1 << 24, "the counter has 24 bits for it");
             let last_place = (group.cycles() << SPAD_BITS) - 1;
-            prop_assert_eq!(u32::from(group.place(u32::MAX)), last_place);
+            prop_assert_eq!(u32::from(group.place(u64::MAX)), last_place);
         }
     }
 }

@@ -272,6 +272,8 @@ fn seen(law: DeadTimeLaw, per_spad_hz: f64) -> f64 {
     let config = StreamConfig {
         clock: Frequency::from_hz(100_000_000),
         stop_periods: 2,
+        // Few photons survive a paralysable dead time.
+        laser_cycles: 20_000,
         spads: SpadModel {
             law,
             ..SpadModel::with_dead_time(Time::from_ns(100))
