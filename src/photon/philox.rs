@@ -22,6 +22,8 @@ pub struct Blocks {
     first: Vec<u32>,
     second: Vec<u32>,
     words: [Vec<u64>; 2],
+    /// Words 1 and 3 on their own.
+    odd: [Vec<u64>; 2],
 }
 
 impl Blocks {
@@ -63,7 +65,7 @@ impl Blocks {
     pub fn generate(&mut self, key: [u32; 2], third: u32, fourth: u32) {
         let filled_up = self.filled_up();
         let room = self.first.len();
-        for words in &mut self.words {
+        for words in self.words.iter_mut().chain(&mut self.odd) {
             words.resize(room, 0);
         }
         generate(
@@ -72,7 +74,11 @@ impl Blocks {
             &self.first[..filled_up],
             &self.second[..filled_up],
             self.words.each_mut().map(|words| &mut words[..filled_up]),
+            self.odd.each_mut().map(|words| &mut words[..filled_up]),
         );
+        for (words, odd) in self.words.iter_mut().zip(&self.odd) {
+            join(&mut words[..filled_up], &odd[..filled_up]);
+        }
     }
 
     /// Words 0 and 1, and words 2 and 3, of every block, the first in the low half; and of others that fill the rows up
@@ -97,7 +103,8 @@ fn generate(
     [third, fourth]: [u32; 2],
     first: &[u32],
     second: &[u32],
-    out: [&mut [u64]; 2],
+    even: [&mut [u64]; 2],
+    odd: [&mut [u64]; 2],
 ) {
     let mut keys = [[0; 2]; ROUNDS];
     for round in &mut keys {
@@ -105,9 +112,10 @@ fn generate(
         key = [key[0].wrapping_add(WEYL[0]), key[1].wrapping_add(WEYL[1])];
     }
     let counters = (first.as_chunks::<LANES>().0.iter()).zip(second.as_chunks::<LANES>().0);
-    let [out01, out23] = out;
-    let out = (out01.as_chunks_mut::<LANES>().0.iter_mut()).zip(out23.as_chunks_mut::<LANES>().0);
-    for ((first, second), (out01, out23)) in counters.zip(out) {
+    let [out0, out2] = even.map(|words| words.as_chunks_mut::<LANES>().0.iter_mut());
+    let [out1, out3] = odd.map(|words| words.as_chunks_mut::<LANES>().0.iter_mut());
+    let out = out0.zip(out1).zip(out2.zip(out3));
+    for ((first, second), ((out0, out1), (out2, out3))) in counters.zip(out) {
         let mut c0 = [0; LANES];
         let mut c1 = [0; LANES];
         for lane in 0..LANES {
@@ -126,10 +134,18 @@ fn generate(
                 c3[lane] = product0;
             }
         }
-        for lane in 0..LANES {
-            out01[lane] = (c0[lane] & LOW) | c1[lane] << 32;
-            out23[lane] = (c2[lane] & LOW) | c3[lane] << 32;
-        }
+        *out0 = c0;
+        *out1 = c1;
+        *out2 = c2;
+        *out3 = c3;
+    }
+}
+
+/// Puts the low halves of `odd` above those of `words`.
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+fn join(words: &mut [u64], odd: &[u64]) {
+    for (word, &odd) in words.iter_mut().zip(odd) {
+        *word = (*word & LOW) | odd << 32;
     }
 }
 

@@ -3,6 +3,7 @@
 use multiversion::multiversion;
 
 use super::binning::{CYCLES, Code, ROWS};
+use crate::photon::GROUP;
 
 /// Most photons of a group, and one that is none.
 pub const MOST_PHOTONS: usize = u16::MAX as usize;
@@ -66,7 +67,8 @@ impl Tables {
     /// Counts the photons of a group, at most [`MOST_PHOTONS`].
     pub fn put(&mut self, codes: &[Code]) {
         debug_assert!(codes.len() <= MOST_PHOTONS);
-        self.cycles.fill(EMPTY);
+        // What is no photon may share its cycle with those of other groups.
+        self.cycles[..GROUP as usize].fill(EMPTY);
         self.specials = put(self, codes);
     }
 
