@@ -45,8 +45,8 @@ impl Blocks {
         let firsts = self.first[start..room].chunks_exact_mut(LANES);
         let seconds = self.second[start..room].chunks_exact_mut(LANES);
         for (chunk, (firsts, seconds)) in firsts.zip(seconds).enumerate() {
-            for lane in 0..LANES {
-                firsts[lane] = (chunk * LANES + lane) as u32;
+            for (first, block) in firsts.iter_mut().zip((chunk * LANES) as u32..) {
+                *first = block;
             }
             seconds.fill(second);
         }
