@@ -11,8 +11,8 @@
 //! ```text
 //!                  slot 0   slot 1   slot 2   …            a slot is 2²¹ fs = 2.1 ns after the start of its cycle
 //!   cycle 0      ┌────────┬────────┬────────┬──
-//!   cycle 1      │ one    │        │        │             a group is 1024 laser cycles; the first are shorter, so
-//!     …          │ draw   │        │        │             that a short exposure draws no long group: 128, 128, 256, 512
+//!   cycle 1      │ one    │        │        │             a group is 2048 laser cycles; the first are shorter, so
+//!     …          │ draw   │        │        │             that a short exposure draws no long group: 128, 128, 256 …
 //!   cycle 127    ├────────┼────────┼────────┼──
 //!   cycle 128    │        │        │        │             background: one key per (macropixel, slot, group)
 //!     …          │        │        │        │             signal:     one key per (macropixel, group)
@@ -312,9 +312,10 @@ impl PixelStream<'_> {
         let [low, high] = draw.echo.rows();
         draw.signal.resize(photons, SignalPhoton::default());
         let mut kept = 0;
-        for photon in 0..photons {
-            let own = words(low[photon], high[photon]);
-            let own = [own[0], own[1] << PLACE_BITS, own[2], own[3]];
+        let own = low[..photons].iter().zip(&high[..photons]);
+        for (photon, (&low_word, &high_word)) in own.enumerate() {
+            let mut own = words(low_word, high_word);
+            own[1] <<= PLACE_BITS;
             let mut after_fs = self.stream.gaussian.draw(own);
             if let Some(shape) = &self.stream.shape {
                 let second = photons + photon;
@@ -323,7 +324,7 @@ impl PixelStream<'_> {
             let time_fs = self.arrival_fs.saturating_add(nearest(after_fs));
             // Written always, kept if within: no branch to mispredict.
             draw.signal[kept] = SignalPhoton {
-                place: draw.group.place(low[photon]),
+                place: draw.group.place(low_word),
                 time_fs,
             };
             kept += usize::from(within_fs.contains(&time_fs));

@@ -164,8 +164,10 @@ impl Binning {
     fn position(&self, time_fs: i64) -> u32 {
         let periods = time_fs as f64 * self.periods_per_fs;
         // Far outside, a position between two edges will do.
-        let periods = periods.clamp(-1.5, f64::from(self.bins) + 1.5);
-        ((periods + f64::from(BIAS)) * f64::from(FRACTION + 1)) as u32
+        let (first, last) = (-1.5, f64::from(self.bins) + 1.5);
+        let periods = if periods > first { periods } else { first };
+        let periods = if periods < last { periods } else { last };
+        ((periods + f64::from(BIAS)) * f64::from(FRACTION + 1) + INTEGER).to_bits() as u32
     }
 
     #[inline(always)]

@@ -67,8 +67,6 @@ impl Tables {
     /// Counts the photons of a group, at most [`MOST_PHOTONS`].
     pub fn put(&mut self, codes: &[Code]) {
         debug_assert!(codes.len() <= MOST_PHOTONS);
-        // What is no photon may share its cycle with those of other groups.
-        self.cycles[..GROUP as usize].fill(EMPTY);
         self.specials = put(self, codes);
     }
 
@@ -99,8 +97,10 @@ fn known(photon: u16) -> Option<usize> {
     (photon != NONE).then_some(usize::from(photon))
 }
 
-#[multiversion(targets("x86_64+bmi1+bmi2"))]
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2"))]
 fn put(tables: &mut Tables, codes: &[Code]) -> usize {
+    // The cycle of what is no photon need not be empty.
+    tables.cycles[..GROUP as usize].fill(EMPTY);
     let mut specials = 0;
     for (photon, &code) in codes.iter().enumerate() {
         let bits = 1 << code.spad() | tables.row_bit[code.row()];

@@ -1,9 +1,9 @@
 //! Groups of laser cycles: what is drawn at once.
 //!
 //! ```text
-//!   number     0     1     2       3           4                       5
-//!           ├─────┼─────┼─────┼───────────┼───────────────────────┼───────────────────────┼──
-//!   cycle   0    128   256   512         1024                    2048
+//!   number     0     1     2       3           4          5       6
+//!           ├─────┼─────┼─────┼───────────┼────────── … ──┼─── … ─┼─── … ─┼──
+//!   cycle   0    128   256   512         1024            2048    4096    6144
 //! ```
 //!
 //! Long groups take less time per photon, but an exposure draws its last one whole, whatever it needs of it. So groups
@@ -15,7 +15,7 @@ use super::draw::Place;
 
 /// Laser cycles of the longest groups.
 pub const GROUP: u32 = 1 << GROUP_BITS;
-const GROUP_BITS: u32 = 10;
+const GROUP_BITS: u32 = 11;
 
 /// Laser cycles of the shortest groups.
 pub const FIRST: u32 = 1 << FIRST_BITS;
@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn lengths_double_up_to_the_longest() {
-        let groups: Vec<_> = Group::until(3000)
+        let groups: Vec<_> = Group::until(4097)
             .map(|group| (group.first_cycle(), group.cycles()))
             .collect();
         let expected = [
@@ -115,7 +115,8 @@ mod tests {
             (256, 256),
             (512, 512),
             (1024, 1024),
-            (2048, 1024),
+            (2048, 2048),
+            (4096, 2048),
         ];
         assert_eq!(groups, expected);
         assert_eq!(Group::until(0).count(), 0);
@@ -133,7 +134,7 @@ mod tests {
             if let Some(next) = last.checked_add(1) {
                 prop_assert_eq!(Group::of_cycle(next).number(), group.number() + 1);
             }
-            prop_assert!([128, 256, 512, 1024].contains(&group.cycles()));
+            prop_assert!([128, 256, 512, 1024, 2048].contains(&group.cycles()));
             prop_assert!(group.number() < 1 << 24, "the counter has 24 bits for it");
             let last_place = (group.cycles() << SPAD_BITS) - 1;
             prop_assert_eq!(u32::from(group.place(u64::MAX)), last_place);
