@@ -83,6 +83,7 @@ pub struct WindowLaw {
     exposure: Exposure,
     timing: ChipTiming,
     bins: i64,
+    period_fs: f64,
 }
 
 impl WindowLaw {
@@ -93,6 +94,7 @@ impl WindowLaw {
             exposure: *exposure,
             timing: ChipTiming::of(config),
             bins: config.bins as i64,
+            period_fs: 1e15 / exposure.clock.as_hz(),
         }
     }
 
@@ -257,6 +259,20 @@ impl WindowLaw {
     fn samples(&self) -> [u16; 4] {
         let largest = self.config.largest_start();
         [0, 1, 16.min(largest), largest / 2]
+    }
+
+    /// The rising CLK edge that takes a SPAD pulse at `pulse` after the exposure's first STOP edge: the first one at or
+    /// after the pulse has toggled its flip-flop.
+    #[inline]
+    pub fn edge_of(&self, pulse: Time) -> i64 {
+        let sampled = pulse + self.timing.spad_to_toggle;
+        let periods = (sampled + self.exposure.stop_phase).as_fs() as f64 / self.period_fs - 0.5;
+        let edge = periods.ceil();
+        // Exact arithmetic only where rounding could decide.
+        if (edge - periods - 0.5).abs() < 0.499 {
+            return edge as i64;
+        }
+        self.exposure.rising_until(sampled - Time::from_fs(1)) + 1
     }
 
     /// Photon times that `bin` of `window` collects in laser cycle `cycle`, half open, from the exposure's

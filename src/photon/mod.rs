@@ -20,6 +20,6 @@ pub use spad::{
     AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, SPADS, SpadEvent, SpadModel, apply_dead_time,
 };
 pub use stream::{
-    Draw, GROUP, PLACE_BITS, PhotonStream, PixelLight, PixelPhotons, PixelStream, Place, Run, SLOT,
-    SignalPhoton, StreamConfig, place, time_in_slot_fs,
+    Draw, GROUP, Group, PLACE_BITS, PhotonStream, PixelLight, PixelPhotons, PixelStream, Place,
+    Run, SLOT, SignalPhoton, StreamConfig, time_in_slot_fs,
 };

@@ -5,10 +5,11 @@
 
 use multiversion::multiversion;
 
-/// Counters that go through the rounds together.
-const LANES: usize = 8;
+/// Counters that go through the rounds together, and of which rows of blocks are filled up to a multiple.
+pub const LANES: usize = 8;
 
 const MULTIPLIERS: [u64; 2] = [0xD251_1F53, 0xCD9E_8D57];
+const ROUNDS: usize = 10;
 const LOW: u64 = 0xFFFF_FFFF;
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 
@@ -16,70 +17,104 @@ const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 /// counter word.
 #[derive(Debug, Clone, Default)]
 pub struct Blocks {
+    blocks: usize,
+    /// Longer than needed, so that runs are written [`LANES`] at a time.
     first: Vec<u32>,
     second: Vec<u32>,
-    words: [Vec<u32>; 4],
+    words: [Vec<u64>; 2],
+    /// Words 1 and 3 on their own.
+    odd: [Vec<u64>; 2],
 }
 
 impl Blocks {
     /// Forgets all runs.
     pub fn clear(&mut self) {
-        self.first.clear();
-        self.second.clear();
+        self.blocks = 0;
     }
 
     /// Asks for a run of `blocks` blocks with this second counter word.
     #[inline]
     pub fn push_run(&mut self, second: u32, blocks: u32) {
-        self.first.extend(0..blocks);
-        self.second
-            .resize(self.second.len() + blocks as usize, second);
+        let start = self.blocks;
+        self.blocks += blocks as usize;
+        let room = self.blocks + LANES;
+        if room > self.first.len() {
+            self.first.resize(2 * room, 0);
+            self.second.resize(2 * room, 0);
+        }
+        let firsts = self.first[start..room].chunks_exact_mut(LANES);
+        let seconds = self.second[start..room].chunks_exact_mut(LANES);
+        for (chunk, (firsts, seconds)) in firsts.zip(seconds).enumerate() {
+            for (first, block) in firsts.iter_mut().zip((chunk * LANES) as u32..) {
+                *first = block;
+            }
+            seconds.fill(second);
+        }
     }
 
     /// Blocks asked for.
     pub fn len(&self) -> usize {
-        self.first.len()
+        self.blocks
+    }
+
+    fn filled_up(&self) -> usize {
+        self.blocks.next_multiple_of(LANES)
     }
 
     /// Generates all blocks with this key, third and fourth counter word.
     pub fn generate(&mut self, key: [u32; 2], third: u32, fourth: u32) {
-        let padded = self.len().next_multiple_of(LANES);
-        for words in &mut self.words {
-            words.resize(padded.max(words.len()), 0);
+        let filled_up = self.filled_up();
+        let room = self.first.len();
+        for words in self.words.iter_mut().chain(&mut self.odd) {
+            words.resize(room, 0);
         }
-        let blocks = self.len();
-        self.first.resize(padded, 0);
-        self.second.resize(padded, 0);
         generate(
             key,
             [third, fourth],
-            &self.first,
-            &self.second,
-            self.words.each_mut().map(|words| &mut words[..padded]),
+            &self.first[..filled_up],
+            &self.second[..filled_up],
+            self.words.each_mut().map(|words| &mut words[..filled_up]),
+            self.odd.each_mut().map(|words| &mut words[..filled_up]),
         );
-        self.first.truncate(blocks);
-        self.second.truncate(blocks);
+        for (words, odd) in self.words.iter_mut().zip(&self.odd) {
+            join(&mut words[..filled_up], &odd[..filled_up]);
+        }
     }
 
-    /// Word `word` (0 to 3) of every block.
+    /// Words 0 and 1, and words 2 and 3, of every block, the first in the low half; and of others that fill the rows up
+    /// to a multiple of [`LANES`].
     #[inline]
-    pub fn words(&self, word: usize) -> &[u32] {
-        &self.words[word][..self.len()]
+    pub fn rows(&self) -> [&[u64]; 2] {
+        let filled_up = self.filled_up();
+        self.words.each_ref().map(|words| &words[..filled_up])
+    }
+
+    /// The second counter word of every block, filled up alike.
+    #[inline]
+    pub fn seconds(&self) -> &[u32] {
+        &self.second[..self.filled_up()]
     }
 }
 
 /// Words live in the low halves of 64-bit lanes, where vector units multiply them; high halves hold what is left over.
 #[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
 fn generate(
-    key: [u32; 2],
+    mut key: [u32; 2],
     [third, fourth]: [u32; 2],
     first: &[u32],
     second: &[u32],
-    out: [&mut [u32]; 4],
+    even: [&mut [u64]; 2],
+    odd: [&mut [u64]; 2],
 ) {
-    let [out0, out1, out2, out3] = out.map(|words| words.as_chunks_mut::<LANES>().0);
+    let mut keys = [[0; 2]; ROUNDS];
+    for round in &mut keys {
+        *round = key.map(u64::from);
+        key = [key[0].wrapping_add(WEYL[0]), key[1].wrapping_add(WEYL[1])];
+    }
     let counters = (first.as_chunks::<LANES>().0.iter()).zip(second.as_chunks::<LANES>().0);
-    let out = out0.iter_mut().zip(out1).zip(out2.iter_mut().zip(out3));
+    let [out0, out2] = even.map(|words| words.as_chunks_mut::<LANES>().0.iter_mut());
+    let [out1, out3] = odd.map(|words| words.as_chunks_mut::<LANES>().0.iter_mut());
+    let out = out0.zip(out1).zip(out2.zip(out3));
     for ((first, second), ((out0, out1), (out2, out3))) in counters.zip(out) {
         let mut c0 = [0; LANES];
         let mut c1 = [0; LANES];
@@ -89,25 +124,28 @@ fn generate(
         }
         let mut c2 = [u64::from(third); LANES];
         let mut c3 = [u64::from(fourth); LANES];
-        let [mut key0, mut key1] = key;
-        for _ in 0..10 {
+        for [key0, key1] in keys {
             for lane in 0..LANES {
                 let product0 = MULTIPLIERS[0] * (c0[lane] & LOW);
                 let product1 = MULTIPLIERS[1] * (c2[lane] & LOW);
-                c0[lane] = (product1 >> 32) ^ c1[lane] ^ u64::from(key0);
+                c0[lane] = (product1 >> 32) ^ c1[lane] ^ key0;
                 c1[lane] = product1;
-                c2[lane] = (product0 >> 32) ^ c3[lane] ^ u64::from(key1);
+                c2[lane] = (product0 >> 32) ^ c3[lane] ^ key1;
                 c3[lane] = product0;
             }
-            key0 = key0.wrapping_add(WEYL[0]);
-            key1 = key1.wrapping_add(WEYL[1]);
         }
-        for lane in 0..LANES {
-            out0[lane] = c0[lane] as u32;
-            out1[lane] = c1[lane] as u32;
-            out2[lane] = c2[lane] as u32;
-            out3[lane] = c3[lane] as u32;
-        }
+        *out0 = c0;
+        *out1 = c1;
+        *out2 = c2;
+        *out3 = c3;
+    }
+}
+
+/// Puts the low halves of `odd` above those of `words`.
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+fn join(words: &mut [u64], odd: &[u64]) {
+    for (word, &odd) in words.iter_mut().zip(odd) {
+        *word = (*word & LOW) | odd << 32;
     }
 }
 
@@ -140,7 +178,8 @@ mod tests {
             prop_assert_eq!(blocks.len(), counters.len());
             for (at, counter) in counters.into_iter().enumerate() {
                 let expected = rand_philox::philox4x32_10(counter, key);
-                let got: [u32; 4] = std::array::from_fn(|word| blocks.words(word)[at]);
+                let word = |word: usize| (blocks.rows()[word / 2][at] >> (word % 2 * 32)) as u32;
+                let got: [u32; 4] = std::array::from_fn(word);
                 prop_assert_eq!(got, expected);
             }
         }

@@ -131,7 +131,8 @@ impl Poisson {
 
 /// P(N > k)·2⁶⁴ for k = 0, 1, … until it falls below one unit.
 fn exceedance_table(mean: f64) -> Vec<u64> {
-    let mut terms = vec![libm::exp(-mean)];
+    let mut terms = Vec::with_capacity(2 * mean as usize + 64);
+    terms.push(libm::exp(-mean));
     while terms.len() < 2 || terms.len() as f64 <= mean || terms[terms.len() - 1] > 1e-22 {
         let k = terms.len() as f64;
         terms.push(terms[terms.len() - 1] * mean / k);

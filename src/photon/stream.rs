@@ -9,18 +9,19 @@
 //! each on one of the 16 SPADs with equal chance. Photons outside their cycle are discarded.
 //!
 //! ```text
-//!                 slot 0   slot 1   slot 2   …            a slot is 2²³ fs = 8.4 ns after the start of its cycle
-//!   cycle 0     ┌────────┬────────┬────────┬──
-//!   cycle 1     │ one    │        │        │             a group is 512 laser cycles
-//!     …         │ draw   │        │        │
-//!   cycle 511   ├────────┼────────┼────────┼──           background: one key per (macropixel, slot, group)
-//!   cycle 512   │        │        │        │             signal:     one key per (macropixel, group)
+//!                  slot 0   slot 1   slot 2   …            a slot is 2²¹ fs = 2.1 ns after the start of its cycle
+//!   cycle 0      ┌────────┬────────┬────────┬──
+//!   cycle 1      │ one    │        │        │             a group is 2048 laser cycles; the first are shorter, so
+//!     …          │ draw   │        │        │             that a short exposure draws no long group: 128, 128, 256 …
+//!   cycle 127    ├────────┼────────┼────────┼──
+//!   cycle 128    │        │        │        │             background: one key per (macropixel, slot, group)
+//!     …          │        │        │        │             signal:     one key per (macropixel, group)
 //! ```
 //!
 //! The photons under one key are a pure function of (seed, macropixel, slot, group): their Poisson number is drawn
-//! first, then each takes 64 random bits (a signal photon 128) for its cycle, SPAD and time. So any part can be drawn
-//! on any thread in any order, and all see the same light. Only dead time, afterpulses and crosstalk tie slots and
-//! cycles together; they are applied afterwards ([`SpadModel::detect`]).
+//! first, then each takes 64 random bits for its cycle, SPAD and time (a signal photon 128, and as many again for a
+//! measured pulse). So any part can be drawn on any thread in any order, and all see the same light. Only dead time,
+//! afterpulses and crosstalk tie slots and cycles together; they are applied afterwards ([`SpadModel::detect`]).
 //!
 //! Timing jitter of a SPAD displaces the points of a Poisson process, which leaves it one: jitter of background changes
 //! nothing, and that of the signal is part of the pulse.
@@ -29,24 +30,28 @@
 //! between SPADs; an echo that outlasts its cycle is cut off and not carried into the next one. Where a cycle is no
 //! whole number of femtoseconds, its odd last one gets no photon.
 
-use super::philox::Blocks;
+use std::cell::OnceCell;
+use std::ops::Range;
+
 use super::pulse::{PulseSampler, PulseShape};
 use super::random::{Poisson, Purpose, philox_key};
 use super::spad::{SPADS, SpadEvent, SpadModel};
 use crate::units::{Frequency, Time};
+use draw::{ByCycle, SLOT_BITS};
+pub use draw::{Draw, Place, Run, SLOT, SignalPhoton, time_in_slot_fs};
+use group::FIRST;
+pub use group::{GROUP, Group, PLACE_BITS};
 
-/// Length of a time slot.
-pub const SLOT: Time = Time::from_fs(1 << SLOT_BITS);
-const SLOT_BITS: u32 = 23;
-
-/// Laser cycles of a group.
-pub const GROUP: u32 = 1 << GROUP_BITS;
-const GROUP_BITS: u32 = 9;
+mod draw;
+mod group;
 
 const SPAD_BITS: u32 = SPADS.trailing_zeros();
 
-/// Adding it leaves no fraction to numbers up to ±2⁵¹.
+/// Adding it to numbers up to ±2⁵¹ leaves no fraction, and the number in the low bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
+
+/// Second counter word of the number of signal photons; slots are below it.
+const SIGNAL_RUN: u32 = u32::MAX;
 
 /// What all macropixels of an exposure share.
 #[derive(Debug, Clone, PartialEq)]
@@ -149,8 +154,8 @@ impl PhotonStream {
     }
 
     /// Groups of the exposure; the last one may outlast it.
-    pub fn groups(&self) -> u32 {
-        self.config.laser_cycles.div_ceil(GROUP)
+    pub fn groups(&self) -> impl Iterator<Item = Group> + use<> {
+        Group::until(self.config.laser_cycles)
     }
 
     /// Macropixel number `pixel` under `light`.
@@ -161,7 +166,6 @@ impl PhotonStream {
             last_fs += shape.range_fs().1;
         }
         let arrival_fs = light.arrival.as_fs();
-        let slot_s = SLOT.as_s() * f64::from(GROUP);
         PixelStream {
             stream: self,
             pixel,
@@ -170,8 +174,8 @@ impl PhotonStream {
                 arrival_fs.saturating_add(first_fs.floor() as i64),
                 arrival_fs.saturating_add(last_fs.ceil() as i64),
             ),
-            background: Poisson::new(light.background_hz * slot_s),
-            signal: Poisson::new(light.signal_per_cycle * f64::from(GROUP)),
+            background: Numbers::new(light.background_hz * SLOT.as_s()),
+            signal: Numbers::new(light.signal_per_cycle),
         }
     }
 
@@ -184,13 +188,11 @@ impl PhotonStream {
         let mut events = Vec::with_capacity(room as usize);
         let mut draw = Draw::default();
         let mut by_cycle = ByCycle::default();
-        for group in 0..self.groups() {
+        for group in self.groups() {
             stream.draw(group, 0..self.slots(), &mut draw);
             by_cycle.sort(&draw);
-            let first = group * GROUP;
-            let cycles = (self.config.laser_cycles - first).min(GROUP);
-            for cycle in 0..cycles {
-                let start = self.config.cycle_start(first + cycle);
+            for cycle in 0..group.cycles_in(self.config.laser_cycles) {
+                let start = self.config.cycle_start(group.first_cycle() + cycle);
                 events.extend(by_cycle.of(cycle).iter().map(|&photon| SpadEvent {
                     time: start + Time::from_fs((photon >> SPAD_BITS) as i64),
                     spad: (photon & (SPADS as u64 - 1)) as u8,
@@ -217,10 +219,39 @@ pub struct PixelStream<'a> {
     arrival_fs: i64,
     /// Earliest and latest time of a signal photon in its cycle.
     echo_fs: (i64, i64),
-    /// Photons in a slot of a group.
-    background: Poisson,
-    /// Photons in a group.
-    signal: Poisson,
+    /// Photons in a slot.
+    background: Numbers,
+    /// Photons in all slots.
+    signal: Numbers,
+}
+
+/// Numbers of photons in groups of any length.
+#[derive(Debug, Clone)]
+struct Numbers {
+    per_cycle: f64,
+    /// In one of the shortest groups, and in one of the longest. Made when first wanted.
+    short: OnceCell<Poisson>,
+    long: OnceCell<Poisson>,
+}
+
+impl Numbers {
+    fn new(per_cycle: f64) -> Self {
+        Numbers {
+            per_cycle,
+            short: OnceCell::new(),
+            long: OnceCell::new(),
+        }
+    }
+
+    /// A distribution, and how many draws of it make the number in this group.
+    fn of(&self, group: Group) -> (&Poisson, u32) {
+        let (cell, cycles) = match group.cycles() {
+            GROUP => (&self.long, GROUP),
+            _ => (&self.short, FIRST),
+        };
+        let poisson = cell.get_or_init(|| Poisson::new(self.per_cycle * f64::from(cycles)));
+        (poisson, group.cycles() / cycles)
+    }
 }
 
 impl PixelStream<'_> {
@@ -231,26 +262,25 @@ impl PixelStream<'_> {
         spads.detect(self.stream.key, self.pixel, events)
     }
 
-    /// Draws all photons of group `group` in these slots.
-    pub fn draw(&self, group: u32, slots: std::ops::Range<u32>, draw: &mut Draw) {
+    /// Draws all photons of `group` in these slots.
+    pub fn draw(&self, group: Group, slots: Range<u32>, draw: &mut Draw) {
         let (key, cycle_fs) = (self.stream.key, self.stream.cycle_fs);
-        let numbered = |purpose: Purpose| purpose as u32 | group << 8;
-        draw.cycle_fs = cycle_fs;
-        draw.clear();
+        let numbered = |purpose: Purpose| purpose as u32 | group.number() << 8;
+        draw.begin(group, cycle_fs);
 
         let from_fs = i64::from(slots.start) << SLOT_BITS;
         let until_fs = (i64::from(slots.end) << SLOT_BITS).min(cycle_fs);
-        let has_echo =
-            !self.signal.is_zero() && self.echo_fs.0 < until_fs && self.echo_fs.1 >= from_fs;
-        draw.counts.clear();
+        let (background, parts) = self.background.of(group);
+        let (signal, signal_parts) = self.signal.of(group);
+        let has_echo = !signal.is_zero() && self.echo_fs.0 < until_fs && self.echo_fs.1 >= from_fs;
         if has_echo {
-            draw.counts
-                .push_run(SIGNAL_RUN, self.signal.words().div_ceil(2));
+            let words = signal.words() * signal_parts;
+            draw.counts.push_run(SIGNAL_RUN, words.div_ceil(2));
         }
-        let blocks = self.background.words().div_ceil(2);
-        if !self.background.is_zero() {
+        let words = background.words() * parts;
+        if !background.is_zero() {
             for slot in slots.clone() {
-                draw.counts.push_run(slot, blocks);
+                draw.counts.push_run(slot, words.div_ceil(2));
             }
         }
         draw.counts
@@ -258,245 +288,66 @@ impl PixelStream<'_> {
 
         let mut at = 0;
         if has_echo {
-            let photons = draw.count(&self.signal, &mut at);
-            draw.echo.clear();
+            let photons = draw.count(signal, signal_parts, &mut at);
             draw.echo.push_run(0, photons);
+            if self.stream.shape.is_some() {
+                draw.echo.push_run(1, photons);
+            }
             draw.echo
                 .generate(key, self.pixel, numbered(Purpose::Signal));
-            self.place_signal(from_fs..until_fs, draw);
+            self.place_signal(photons as usize, from_fs..until_fs, draw);
         }
-        if !self.background.is_zero() {
+        if !background.is_zero() {
             for slot in slots {
-                let photons = draw.count(&self.background, &mut at);
-                draw.runs.push(Run {
-                    slot,
-                    first_block: draw.background.len() as u32,
-                    photons,
-                });
-                draw.background.push_run(slot, photons.div_ceil(2));
+                let photons = draw.count(background, parts, &mut at);
+                draw.push_run(slot, photons);
             }
             draw.background
                 .generate(key, self.pixel, numbered(Purpose::Photons));
         }
     }
 
-    fn place_signal(&self, within_fs: std::ops::Range<i64>, draw: &mut Draw) {
-        let words: [&[u32]; 4] = std::array::from_fn(|word| draw.echo.words(word));
-        for (((&w0, &w1), &w2), &w3) in words[0].iter().zip(words[1]).zip(words[2]).zip(words[3]) {
-            let mut after_fs = self.stream.gaussian.draw(w3, w2);
+    /// Places the photons of the echo; those of a measured pulse have a second row of random words.
+    fn place_signal(&self, photons: usize, within_fs: Range<i64>, draw: &mut Draw) {
+        let [low, high] = draw.echo.rows();
+        draw.signal.resize(photons, SignalPhoton::default());
+        let mut kept = 0;
+        let own = low[..photons].iter().zip(&high[..photons]);
+        for (photon, (&low_word, &high_word)) in own.enumerate() {
+            let mut own = words(low_word, high_word);
+            own[1] <<= PLACE_BITS;
+            let mut after_fs = self.stream.gaussian.draw(own);
             if let Some(shape) = &self.stream.shape {
-                // The low bits of word 1 are independent of the place in its high ones.
-                after_fs += shape.draw(w0, w1 << PLACE_BITS);
+                let second = photons + photon;
+                after_fs += shape.draw(words(low[second], high[second]));
             }
-            // Rounds to the nearest femtosecond without a call.
-            let rounded = (after_fs + ROUNDER) - ROUNDER;
-            let time_fs = self.arrival_fs.saturating_add(rounded as i64);
-            if within_fs.contains(&time_fs) {
-                draw.signal.push(SignalPhoton {
-                    place: place(w1),
-                    time_fs,
-                });
-            }
+            let time_fs = self.arrival_fs.saturating_add(nearest(after_fs));
+            // Written always, kept if within: no branch to mispredict.
+            draw.signal[kept] = SignalPhoton {
+                place: draw.group.place(low_word),
+                time_fs,
+            };
+            kept += usize::from(within_fs.contains(&time_fs));
         }
+        draw.signal.truncate(kept);
     }
 }
 
-/// Where in its group a photon falls: cycle within the group and SPAD, as `cycle << 4 | SPAD`.
-pub type Place = u16;
-
-/// Bits of a [`Place`].
-pub const PLACE_BITS: u32 = GROUP_BITS + SPAD_BITS;
-
-/// The place that a random word gives.
+/// The nearest whole number, without a call; `value` is within ±2⁵¹.
 #[inline]
-pub fn place(word: u32) -> Place {
-    (word >> (32 - PLACE_BITS)) as Place
+fn nearest(value: f64) -> i64 {
+    ((value + ROUNDER).to_bits() as i64) - ROUNDER.to_bits() as i64
 }
 
-/// The time within its slot that a random word gives, fs.
+/// The four words of a block.
 #[inline]
-pub fn time_in_slot_fs(word: u32) -> u32 {
-    word >> (32 - SLOT_BITS)
-}
-
-/// Second counter word of the number of signal photons; slots are below it.
-const SIGNAL_RUN: u32 = u32::MAX;
-
-/// Background photons of one slot. Each block of random words makes two: first those of words 0 and 1 of its blocks,
-/// then those of words 2 and 3.
-#[derive(Debug, Clone, Copy)]
-pub struct Run {
-    /// The slot.
-    pub slot: u32,
-    /// Its first block.
-    pub first_block: u32,
-    /// Its photons; if odd, the last block makes only one.
-    pub photons: u32,
-}
-
-impl Run {
-    /// When the slot begins after the start of its cycle.
-    #[inline]
-    pub fn start_fs(&self) -> i64 {
-        i64::from(self.slot) << SLOT_BITS
-    }
-
-    /// Blocks whose words 0 and 1, and whose words 2 and 3, make photons.
-    #[inline]
-    pub fn blocks(&self) -> [std::ops::Range<usize>; 2] {
-        let first = self.first_block as usize;
-        let photons = self.photons as usize;
-        [
-            first..first + photons.div_ceil(2),
-            first..first + photons / 2,
-        ]
-    }
-}
-
-/// A photon of the echo.
-#[derive(Debug, Clone, Copy)]
-pub struct SignalPhoton {
-    /// Cycle and SPAD.
-    pub place: Place,
-    /// After the start of its cycle.
-    pub time_fs: i64,
-}
-
-/// Photons of one macropixel, in some slots of one group. Background photons stay random words until somebody wants
-/// them; those of the last slot that outlast the cycle are no photons.
-#[derive(Debug, Clone, Default)]
-pub struct Draw {
-    counts: Blocks,
-    background: Blocks,
-    echo: Blocks,
-    runs: Vec<Run>,
-    signal: Vec<SignalPhoton>,
-    cycle_fs: i64,
-}
-
-impl Draw {
-    /// Forgets all photons.
-    pub fn clear(&mut self) {
-        self.runs.clear();
-        self.background.clear();
-        self.signal.clear();
-    }
-
-    /// How many photons were drawn, those that outlast the cycle among them.
-    pub fn len(&self) -> usize {
-        let background = self.runs.iter().map(|run| run.photons as usize);
-        background.sum::<usize>() + self.signal.len()
-    }
-
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The run of a block.
-    pub fn run_of(&self, block: usize) -> &Run {
-        let runs = &self.runs;
-        &runs[runs.partition_point(|run| run.first_block as usize <= block) - 1]
-    }
-
-    /// Background photons by slot.
-    pub fn runs(&self) -> &[Run] {
-        &self.runs
-    }
-
-    /// The random words of background photons: [`time_in_slot_fs`] of the first and [`place`] of the second of
-    /// each pair.
-    pub fn words(&self) -> [[&[u32]; 2]; 2] {
-        let words = |word| self.background.words(word);
-        [[words(0), words(1)], [words(2), words(3)]]
-    }
-
-    /// Signal photons.
-    pub fn signal(&self) -> &[SignalPhoton] {
-        &self.signal
-    }
-
-    /// Every photon, as place and time after the start of its cycle in fs, in no particular order.
-    pub fn photons(&self) -> impl Iterator<Item = (Place, i64)> + '_ {
-        let words = self.words();
-        let background = self.runs.iter().flat_map(move |run| {
-            let start_fs = run.start_fs();
-            run.blocks()
-                .into_iter()
-                .zip(words)
-                .flat_map(move |(blocks, [times, places])| {
-                    let photons = times[blocks.clone()].iter().zip(&places[blocks]);
-                    photons.map(move |(&time, &word)| {
-                        (place(word), start_fs + i64::from(time_in_slot_fs(time)))
-                    })
-                })
-        });
-        let signal = self
-            .signal
-            .iter()
-            .map(|photon| (photon.place, photon.time_fs));
-        background
-            .filter(|&(_, time_fs)| time_fs < self.cycle_fs)
-            .chain(signal)
-    }
-
-    /// A Poisson number from the next words of `counts`.
-    #[inline]
-    fn count(&self, poisson: &Poisson, at: &mut usize) -> u32 {
-        let mut total = 0;
-        for part in 0..poisson.words() {
-            let block = *at + (part / 2) as usize;
-            let half = (part % 2) as usize * 2;
-            let word = |word: usize| u64::from(self.counts.words(word)[block]);
-            total += poisson.part(word(half) << 32 | word(half + 1));
-        }
-        *at += poisson.words().div_ceil(2) as usize;
-        total
-    }
-}
-
-/// Photons of a group sorted by cycle, then time, then SPAD.
-#[derive(Debug, Clone, Default)]
-struct ByCycle {
-    /// Time after the start of the cycle in fs and SPAD, as `time << 4 | SPAD`.
-    photons: Vec<u64>,
-    /// Where each cycle's photons end.
-    ends: Vec<usize>,
-}
-
-impl ByCycle {
-    fn sort(&mut self, draw: &Draw) {
-        self.ends.clear();
-        self.ends.resize(GROUP as usize, 0);
-        let cycle_of = |place: Place| usize::from(place >> SPAD_BITS);
-        for (place, _) in draw.photons() {
-            self.ends[cycle_of(place)] += 1;
-        }
-        let mut total = 0;
-        for end in &mut self.ends {
-            // Where the cycle begins, until its photons have moved it to where it ends.
-            total += std::mem::replace(end, total);
-        }
-        self.photons.clear();
-        self.photons.resize(total, 0);
-        for (place, time_fs) in draw.photons() {
-            let end = &mut self.ends[cycle_of(place)];
-            let spad = u64::from(place) & (SPADS as u64 - 1);
-            self.photons[*end] = (time_fs as u64) << SPAD_BITS | spad;
-            *end += 1;
-        }
-        let mut start = 0;
-        for &end in &self.ends {
-            self.photons[start..end].sort_unstable();
-            start = end;
-        }
-    }
-
-    fn of(&self, cycle: u32) -> &[u64] {
-        let cycle = cycle as usize;
-        let start = cycle.checked_sub(1).map_or(0, |before| self.ends[before]);
-        &self.photons[start..self.ends[cycle]]
-    }
+fn words(low: u64, high: u64) -> [u32; 4] {
+    [
+        low as u32,
+        (low >> 32) as u32,
+        high as u32,
+        (high >> 32) as u32,
+    ]
 }
 
 #[cfg(test)]

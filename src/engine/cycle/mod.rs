@@ -33,7 +33,7 @@ use crate::chip::window_law::{Window, WindowLaw};
 use crate::chip::{Exposure, SensorConfig};
 use crate::photon::SpadEvent;
 use levelise::Levelised;
-use packing::{Packed, Sampling};
+use packing::Packed;
 use stream::PERIODS;
 use survey::Survey;
 use tape::{Block, Passes};
@@ -128,11 +128,10 @@ impl<'a> Cycle<'a> {
         let mut order: Vec<usize> = (0..starts.len()).collect();
         // Counters whose low bits agree carry together.
         order.sort_by_key(|&pixel| (starts[pixel].reverse_bits(), pixel));
-        let sampling = Sampling::new(self.exposure, self.law.timing().spad_to_toggle);
         let chunks = self.chunks();
         let blocks = order.par_chunks(WORD_LANES).map(|pixels| {
             let lanes = pixels.iter().map(|&pixel| pulses[pixel]);
-            (pixels.to_vec(), Packed::new(sampling, chunks, lanes))
+            (pixels.to_vec(), Packed::new(&self.law, chunks, lanes))
         });
         PackedPulses {
             blocks: blocks.collect(),

@@ -1,14 +1,12 @@
 //! Pulses of a block's macropixels, sorted into the chunks of CLK periods that take them.
 //!
-//! A pulse is taken by the first rising CLK edge at or after pulse + clk-to-Q of the flip-flop that it toggles, to
-//! the femtosecond. This is the one place where photons cost anything by themselves: everything after it works
-//! on whole words.
+//! Which CLK edge takes a pulse is the window law's to say ([`WindowLaw::edge_of`]). This is the
+//! one place where photons cost anything by themselves: everything after it works on whole words.
 
 use super::stream::PERIODS;
 use super::word::WORD_LANES;
-use crate::chip::{Exposure, SPADS};
+use crate::chip::{SPADS, WindowLaw};
 use crate::photon::SpadEvent;
-use crate::units::Time;
 
 /// One pulse in a chunk: its period there, its SPAD and its lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,41 +38,6 @@ impl Pulse {
     }
 }
 
-/// Which rising CLK edge takes a pulse.
-#[derive(Debug, Clone, Copy)]
-pub struct Sampling<'a> {
-    exposure: &'a Exposure,
-    /// SPAD_RAW rising to the toggle flip-flop's output.
-    latency: Time,
-    period_fs: f64,
-}
-
-impl<'a> Sampling<'a> {
-    /// For a front end with this latency.
-    pub fn new(exposure: &'a Exposure, latency: Time) -> Self {
-        Sampling {
-            exposure,
-            latency,
-            period_fs: 1e15 / exposure.clock.as_hz(),
-        }
-    }
-
-    /// The first rising CLK edge of the exposure at or after the pulse has toggled its flip-flop.
-    #[inline]
-    pub fn edge(&self, pulse: Time) -> usize {
-        let sampled = pulse + self.latency;
-        let periods = (sampled + self.exposure.stop_phase).as_fs() as f64 / self.period_fs - 0.5;
-        let edge = periods.ceil();
-        // Exact arithmetic only where rounding could decide.
-        let edge = if (edge - periods - 0.5).abs() < 0.499 {
-            edge as i64
-        } else {
-            self.exposure.rising_until(sampled - Time::from_fs(1)) + 1
-        };
-        edge.max(0) as usize
-    }
-}
-
 /// The pulses of a block.
 #[derive(Debug, Default)]
 pub struct Packed {
@@ -86,7 +49,7 @@ pub struct Packed {
 impl Packed {
     /// Sorts one list of pulses per lane into `chunks` chunks; later pulses are left out.
     pub fn new<'p>(
-        sampling: Sampling<'_>,
+        law: &WindowLaw,
         chunks: usize,
         lanes: impl Iterator<Item = &'p [SpadEvent]> + Clone,
     ) -> Self {
@@ -94,7 +57,7 @@ impl Packed {
         let taken = |events: &'p [SpadEvent]| {
             let edges_of = events
                 .iter()
-                .map(move |event| (sampling.edge(event.time), event.spad));
+                .map(move |event| (law.edge_of(event.time).max(0) as usize, event.spad));
             edges_of.take_while(move |&(edge, _)| edge < edges)
         };
         let mut ends = vec![0u32; chunks + 1];

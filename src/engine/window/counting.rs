@@ -1,79 +1,55 @@
 //! Counting a macropixel's photons, a group of laser cycles at a time.
 //!
 //! ```text
-//!   photon ──► cells: SPADs by row (bin) and cycle          ──► tally: events per bin
-//!         └──► last photon by cycle and SPAD ── a second one? ──► history: dead time, one SPAD at a time
+//!   photon ──► counts by row (bin)                             ──► hits
+//!         └──► SPADs and rows by cycle ── one of them twice? ──► history: the cycle's photons, dead time
 //! ```
 //!
-//! Nearly every photon is alone with its SPAD from the SPADs' memory before the window to its end: it makes a pulse
-//! and adds one to its cell. Where a SPAD has several in one cycle, or a photon comes too close to an edge, its photons
-//! are taken out again, and what the dead time leaves of them is put back. In the end each cell holds how many SPADs fired
-//! in that CLK period.
+//! Nearly every photon is alone in its cycle with its SPAD, from the SPADs' memory before the window to its end, and with
+//! its bin: it makes a pulse, and its CLK period has one. Where two photons of a cycle share a SPAD or a bin, or one comes
+//! too close to an edge, the cycle's photons are taken out again, and what the dead time leaves of them is counted
+//! bin by bin.
 //!
 //! Where secondaries tie SPADs together, or photons are many, cycles are sorted and go through [`SpadModel::detect`]
 //! one by one ([`Counting::count_sorted`]).
 //!
 //! [`SpadModel::detect`]: crate::photon::SpadModel::detect
 
-use std::ops::Range;
-
-use super::binning::{Binning, Code, ROW};
+use super::binning::{Binning, Code, ROWS, Wanted};
 use super::history::{Photon, certain_from, split};
 use super::sight::{ROUNDING_FS, Sight};
 use super::tables::{MOST_PHOTONS, Tables};
 use super::{Window, Work, taken};
-use crate::chip::EventType;
-use crate::photon::{
-    Draw, GROUP, PhotonStream, PixelStream, Place, SLOT, SPADS, SpadEvent, time_in_slot_fs,
-};
+use crate::photon::{Draw, Group, PhotonStream, PixelStream, SPADS, SignalPhoton, SpadEvent};
 use crate::units::Time;
-
-/// Which cycle's windows a draw is for, and from which cycle its photons are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Part {
-    /// Photons of the window's own cycle.
-    Own,
-    /// Photons of the cycle before, in the same group.
-    Previous,
-    /// Photons of the last cycle of the group before, for the first cycle of this one.
-    Carried,
-}
-
-const PARTS: [Part; 3] = [Part::Own, Part::Previous, Part::Carried];
-
-const LAST_CYCLE: usize = GROUP as usize - 1;
-
-impl Part {
-    /// The cycle of the group whose window a photon of this part belongs to, if any.
-    #[inline]
-    fn window_cycle(self, cycle: usize) -> Option<usize> {
-        match self {
-            Part::Own => Some(cycle),
-            Part::Previous => (cycle < LAST_CYCLE).then_some(cycle + 1),
-            Part::Carried => (cycle == LAST_CYCLE).then_some(0),
-        }
-    }
-}
 
 /// Counts macropixels; keeps its tables from one to the next.
 pub struct Counting<'a> {
     engine: &'a Window<'a>,
     stream: &'a PhotonStream,
     binning: Binning,
-    /// What sizes of cells add to a bin, and how much.
-    counted: (u8, u8),
-    adds: i64,
-    draws: [Draw; 3],
+    /// What a CLK period with so many SPADs adds to its bin.
+    adds: [i64; SPADS + 1],
+    /// Photons of the windows' own cycles.
+    own: Draw,
+    /// Photons of the group's cycles for the windows of the next cycles.
+    previous: Draw,
+    /// Photons of the last cycle of the group before, for the window of the first cycle; all in cycle 0.
+    carried: Vec<SignalPhoton>,
     extra: Draw,
     bases: Vec<u32>,
     /// Codes of all photons drawn for the group. Photons are known by their index here.
     codes: Vec<Code>,
-    /// Where each part's codes begin.
-    first_code: [usize; 3],
+    /// Where the codes of `previous` and `carried` begin.
+    first_code: [usize; 2],
     tables: Tables,
+    /// Photons of one cycle: index, row and SPAD.
+    together: Vec<(usize, Code)>,
+    /// SPADs that fired by row, in one cycle.
+    fired: [u8; ROWS],
     photons: Vec<Photon>,
     /// Photons by cycle, for those that are sorted.
-    sorted: Vec<(usize, Photon)>,
+    sorted: Vec<(u32, Photon)>,
     events: Vec<SpadEvent>,
 }
 
@@ -88,30 +64,22 @@ struct Pixel<'p> {
 impl<'a> Counting<'a> {
     /// For macropixels of `engine` in the light of `stream`.
     pub fn new(engine: &'a Window<'a>, stream: &'a PhotonStream) -> Self {
-        let binning = Binning::new(engine.config.bins, engine.exposure.clock.as_hz());
-        let threshold = engine.config.threshold;
-        // Sizes of a cell, 1 to 16, that differ from the dark in what they add.
-        let counted = match (engine.config.event_type, threshold) {
-            (EventType::Greater, _) => (threshold + 1, u8::MAX),
-            (EventType::Equal, 0) => (1, u8::MAX),
-            (EventType::Equal, _) => (threshold, threshold),
-            // Nothing is less than none; 17 SPADs there never are.
-            (EventType::Less, 0) => (u8::MAX, u8::MAX),
-            (EventType::Less, _) => (threshold, u8::MAX),
-        };
-        let adds = if engine.is_event(0) { -1 } else { 1 };
+        let bins = engine.config.bins;
         Counting {
             engine,
             stream,
-            binning,
-            counted,
-            adds,
-            draws: Default::default(),
+            binning: Binning::new(bins, engine.exposure.clock.as_hz()),
+            adds: std::array::from_fn(|spads| engine.adds(((1u32 << spads) - 1) as u16)),
+            own: Draw::default(),
+            previous: Draw::default(),
+            carried: Vec::new(),
             extra: Draw::default(),
             bases: Vec::new(),
             codes: Vec::new(),
-            first_code: [0; 3],
-            tables: Tables::new(binning.rows()),
+            first_code: [0; 2],
+            tables: Tables::new(bins),
+            together: Vec::new(),
+            fired: [0; ROWS],
             photons: Vec::new(),
             sorted: Vec::new(),
             events: Vec::new(),
@@ -126,131 +94,176 @@ impl<'a> Counting<'a> {
             hits: self.engine.dark_hits(sight.first_edge),
             work: Work::default(),
         };
-        for group in 0..self.stream.groups() {
-            self.draw(&mut pixel, group);
-            let is_dense = self.codes.len() >= MOST_PHOTONS;
-            if is_dense || self.stream.config().spads.has_secondaries() {
-                self.count_sorted(&mut pixel, group);
+        self.carried.clear();
+        self.tables.clear_counts();
+        for group in self.stream.groups() {
+            let cycles = group.cycles_in(self.stream.config().laser_cycles);
+            light.draw(group, sight.own.clone(), &mut self.own);
+            light.draw(group, sight.previous.clone(), &mut self.previous);
+            pixel.work.photons_drawn += (self.own.len() + self.previous.len()) as u64;
+            if self.stream.config().spads.has_secondaries() {
+                self.count_sorted(&mut pixel, group, cycles);
             } else {
-                self.count_cells(&mut pixel, group);
+                self.encode(sight, cycles);
+                if self.codes.len() < MOST_PHOTONS {
+                    self.count_cells(&mut pixel, group, cycles);
+                } else {
+                    self.count_sorted(&mut pixel, group, cycles);
+                }
             }
+            self.carry(group);
+        }
+        for (row, &photons) in (1..).zip(self.tables.counts()[1..].iter().take(pixel.hits.len())) {
+            let photons = u64::from(photons);
+            pixel.hits[row - 1] += self.adds[1] * photons as i64;
+            pixel.work.clk_periods_visited += photons;
+            pixel.work.pulses += photons;
         }
         (pixel.hits, pixel.work)
     }
 
-    /// Cycles of a group that belong to the exposure.
-    fn cycles_of(&self, group: u32) -> usize {
-        (self.stream.config().laser_cycles - group * GROUP).min(GROUP) as usize
-    }
-
-    /// Draws and encodes all photons that the windows of a group may see.
-    fn draw(&mut self, pixel: &mut Pixel<'_>, group: u32) {
+    /// Encodes all photons that the windows of a group may see.
+    fn encode(&mut self, sight: &Sight, cycles: u32) {
         self.codes.clear();
-        for (index, part) in PARTS.into_iter().enumerate() {
-            let draw = &mut self.draws[index];
-            let (slots, from_group, start_fs) = match part {
-                Part::Own => (&pixel.sight.own, Some(group), 0),
-                Part::Previous => (&pixel.sight.previous, Some(group), self.stream.cycle_fs()),
-                Part::Carried => (
-                    &pixel.sight.previous,
-                    group.checked_sub(1),
-                    self.stream.cycle_fs(),
-                ),
-            };
-            self.first_code[index] = self.codes.len();
-            match from_group {
-                Some(group) if !slots.is_empty() => pixel.light.draw(group, slots.clone(), draw),
-                _ => {
-                    draw.clear();
-                    continue;
-                }
-            }
-            let shift_fs = start_fs + pixel.sight.first_fs;
-            self.bases.clear();
-            for run in draw.runs() {
-                let base = self.binning.base(run.start_fs() - shift_fs);
-                let blocks = run.blocks()[0].len();
-                self.bases.resize(self.bases.len() + blocks, base);
-                pixel.work.photons_drawn += u64::from(run.photons);
-            }
-            for [times, places] in draw.words() {
-                self.binning
-                    .encode(times, places, &self.bases, &mut self.codes);
-            }
-            pixel.work.photons_drawn += draw.signal().len() as u64;
-            for photon in draw.signal() {
-                let code = self
-                    .binning
-                    .encode_one(photon.time_fs - shift_fs, photon.place);
-                self.codes.push(code);
-            }
-        }
+        let wanted = Wanted {
+            cycles,
+            later: 0,
+            origin_fs: sight.first_fs,
+        };
+        self.binning
+            .encode(&self.own, &wanted, &mut self.bases, &mut self.codes);
+        self.first_code[0] = self.codes.len();
+        let wanted = Wanted {
+            cycles: cycles - 1,
+            later: 1,
+            origin_fs: sight.first_fs + self.stream.cycle_fs(),
+        };
+        self.binning
+            .encode(&self.previous, &wanted, &mut self.bases, &mut self.codes);
+        self.first_code[1] = self.codes.len();
+        let carried = self.carried.iter();
+        self.codes.extend(carried.map(|photon| {
+            self.binning
+                .encode_one(photon.time_fs - wanted.origin_fs, photon.place)
+        }));
     }
 
-    fn count_cells(&mut self, pixel: &mut Pixel<'_>, group: u32) {
-        self.tables.clear();
-        for (index, part) in PARTS.into_iter().enumerate() {
-            self.place(index, part);
+    /// Keeps what the first window of the next group may see.
+    fn carry(&mut self, group: Group) {
+        self.carried.clear();
+        if self.previous.is_empty() {
+            return;
         }
-        let cycles = self.cycles_of(group);
+        let photons = self.previous.photons().filter_map(|(place, time_fs)| {
+            let (cycle, spad) = split(place);
+            (cycle + 1 == group.cycles()).then_some(SignalPhoton {
+                place: u16::from(spad),
+                time_fs,
+            })
+        });
+        self.carried.extend(photons);
+    }
+
+    fn count_cells(&mut self, pixel: &mut Pixel<'_>, group: Group, cycles: u32) {
+        self.tables.put(&self.codes);
         let mut index = 0;
-        while let Some(photon) = self.tables.special(index) {
-            let (cycle, spad) = split(self.codes[photon].place() as Place);
-            if cycle < cycles {
-                self.settle(pixel, group, cycle, spad);
+        while let Some(cycle) = self.tables.special(index) {
+            if cycle < cycles as usize {
+                self.settle(pixel, cycle, group.first_cycle() + cycle as u32);
             }
             index += 1;
         }
-        let tallies = self.tables.tallies(cycles, self.counted);
-        for (tally, hits) in tallies.zip(&mut pixel.hits) {
-            *hits += self.adds * tally.within as i64;
-            pixel.work.clk_periods_visited += tally.occupied;
-            pixel.work.pulses += tally.spads;
+    }
+
+    /// Settles all photons in the window of one cycle of the group, `laser_cycle` of the exposure.
+    fn settle(&mut self, pixel: &mut Pixel<'_>, cycle: usize, laser_cycle: u32) {
+        self.together.clear();
+        let (mut once, mut several, mut is_doubtful) = (0u16, 0u16, false);
+        let mut next = self.tables.take_last(cycle);
+        while let Some(photon) = next {
+            let code = self.codes[photon];
+            self.tables.remove(code.row());
+            let spad = 1 << code.spad();
+            several |= once & spad;
+            if code.is_doubtful() {
+                several |= spad;
+                is_doubtful = true;
+            }
+            once |= spad;
+            self.together.push((photon, code));
+            next = self.tables.before(photon);
+        }
+        for (_, code) in &self.together {
+            let alone = several >> code.spad() & 1 == 0;
+            self.fired[code.row()] += u8::from(alone);
+        }
+        while several != 0 {
+            let spad = several.trailing_zeros() as u8;
+            several &= several - 1;
+            if is_doubtful || !self.settle_pair(pixel, spad) {
+                self.settle_spad(pixel, laser_cycle, spad);
+            }
+        }
+        for index in 0..self.together.len() {
+            let row = self.together[index].1.row();
+            self.tell(pixel, row);
+            if is_doubtful {
+                self.tell(pixel, row.saturating_sub(1));
+                self.tell(pixel, row + 1);
+            }
         }
     }
 
-    /// Puts the photons of one draw into their cells.
-    fn place(&mut self, index: usize, part: Part) {
-        let draw = &self.draws[index];
-        let first = self.first_code[index];
-        let blocks = draw.words()[0][0].len();
-        let (codes, tables) = (&mut self.codes, &mut self.tables);
-        let mut put = |photons: Range<usize>| {
-            for (code, photon) in codes[photons.clone()].iter_mut().zip(photons) {
-                if part != Part::Own {
-                    let (cycle, _) = split(code.place() as Place);
-                    let Some(window_cycle) = part.window_cycle(cycle) else {
-                        continue;
-                    };
-                    *code = code.in_cycle(window_cycle);
-                }
-                tables.put(*code, photon);
-            }
+    /// Adds what fired in a CLK period to its bin.
+    fn tell(&mut self, pixel: &mut Pixel<'_>, row: usize) {
+        let spads = std::mem::take(&mut self.fired[row]);
+        let Some(hits) = row.checked_sub(1).and_then(|bin| pixel.hits.get_mut(bin)) else {
+            return;
         };
-        for run in draw.runs() {
-            let left_fs = self.stream.cycle_fs() - run.start_fs();
-            for (half, range) in run.blocks().into_iter().enumerate() {
-                let first = first + half * blocks;
-                if left_fs >= SLOT.as_fs() {
-                    put(first + range.start..first + range.end);
-                    continue;
-                }
-                // The slot outlasts the cycle.
-                let times = draw.words()[half][0];
-                range
-                    .filter(|&block| i64::from(time_in_slot_fs(times[block])) < left_fs)
-                    .for_each(|block| put(first + block..first + block + 1));
-            }
-        }
-        let signal = first + 2 * blocks;
-        put(signal..signal + draw.signal().len());
+        *hits += self.adds[usize::from(spads)];
+        pixel.work.clk_periods_visited += u64::from(spads > 0);
+        pixel.work.pulses += u64::from(spads);
     }
 
-    /// Settles all photons of one SPAD in the window of one cycle.
-    fn settle(&mut self, pixel: &mut Pixel<'_>, group: u32, cycle: usize, spad: u8) {
-        let place = cycle * SPADS + usize::from(spad);
-        let mut next = self.tables.take_last(place);
-        let laser_cycle = group * GROUP + cycle as u32;
+    /// Settles the photons of one SPAD if they are just two and what was before them does not matter, as it mostly is;
+    /// neither is doubtful. Returns whether it did.
+    fn settle_pair(&mut self, pixel: &mut Pixel<'_>, spad: u8) -> bool {
+        let mut photons = self.together.iter().filter(|(_, code)| code.spad() == spad);
+        let (Some(&a), Some(&b), None) = (photons.next(), photons.next(), photons.next()) else {
+            return false;
+        };
+        let own = self.first_code[0];
+        if a.0 >= own || b.0 >= own {
+            return false;
+        }
+        let time_fs = |(photon, _): (usize, Code)| in_draw(&self.own, photon);
+        let (mut first, mut second) = ((time_fs(a), a.1.row()), (time_fs(b), b.1.row()));
+        if first > second {
+            std::mem::swap(&mut first, &mut second);
+        }
+        let memory_fs = self.stream.config().spads.memory().as_fs();
+        let blinds = second.0 - first.0 <= memory_fs;
+        // A photon in the window has been preceded by all the memory, in which there was none.
+        let is_certain = first.1 > 0 || first.0 - pixel.sight.drawn_from_fs > memory_fs;
+        if second.1 > 0 && blinds && !is_certain {
+            return false;
+        }
+        let is_seen = (1..=pixel.hits.len()).contains(&second.1);
+        if blinds {
+            self.fired[first.1] += 1;
+            pixel.work.lost_to_dead_time += u64::from(is_seen);
+        } else if first.1 != second.1 {
+            self.fired[first.1] += 1;
+            self.fired[second.1] += 1;
+        } else if is_seen {
+            // Two pulses within one CLK period cancel.
+            pixel.work.pulses += 2;
+        }
+        true
+    }
+
+    /// Settles the photons of one SPAD among those `together`.
+    fn settle_spad(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spad: u8) {
         let window = Placed {
             engine: self.engine,
             binning: self.binning,
@@ -259,14 +272,13 @@ impl<'a> Counting<'a> {
         };
         self.photons.clear();
         let mut seen = 0;
-        while let Some(photon) = next {
-            self.tables.remove(self.codes[photon].cell());
-            let time = self.time_of(photon, laser_cycle);
-            seen += u64::from(window.row_of(time).is_some());
-            self.photons.push((time, spad));
-            next = self.tables.before(photon);
+        for &(photon, code) in &self.together {
+            if code.spad() == spad {
+                let time = self.time_of(photon, laser_cycle);
+                seen += u64::from(window.row_of(time).is_some());
+                self.photons.push((time, spad));
+            }
         }
-        // None is in the window, or another special photon has brought us here before.
         if seen == 0 {
             return;
         }
@@ -280,11 +292,11 @@ impl<'a> Counting<'a> {
             seen -= 1;
             // Two pulses within one CLK period cancel.
             if last == Some(row) {
-                self.tables.remove(row * ROW + cycle);
-                last = None;
+                self.fired[row] -= 1;
                 pixel.work.pulses += 2;
+                last = None;
             } else {
-                self.tables.add(row * ROW + cycle);
+                self.fired[row] += 1;
                 last = Some(row);
             }
         }
@@ -333,49 +345,45 @@ impl<'a> Counting<'a> {
 
     /// When a photon came, relative to the start of the laser cycle of its window.
     fn time_of(&self, photon: usize, laser_cycle: u32) -> Time {
-        let index = self.first_code.partition_point(|&first| first <= photon) - 1;
-        let draw = &self.draws[index];
-        let blocks = draw.words()[0][0].len();
-        let at = photon - self.first_code[index];
-        let time_fs = match at.checked_sub(2 * blocks) {
-            Some(signal) => draw.signal()[signal].time_fs,
-            None => {
-                let (half, block) = (at / blocks, at % blocks);
-                let run = draw.run_of(block);
-                run.start_fs() + i64::from(time_in_slot_fs(draw.words()[half][0][block]))
-            }
+        let time_fs = if photon < self.first_code[0] {
+            return Time::from_fs(in_draw(&self.own, photon));
+        } else if photon < self.first_code[1] {
+            in_draw(&self.previous, photon - self.first_code[0])
+        } else {
+            self.carried[photon - self.first_code[1]].time_fs
         };
-        let time = Time::from_fs(time_fs);
-        match PARTS[index] {
-            Part::Own => time,
-            Part::Previous | Part::Carried => {
-                let start = |cycle| self.stream.config().cycle_start(cycle);
-                time + start(laser_cycle - 1) - start(laser_cycle)
-            }
-        }
+        Time::from_fs(time_fs) - self.before(laser_cycle)
+    }
+
+    /// How long before a laser cycle the one before it starts.
+    fn before(&self, laser_cycle: u32) -> Time {
+        let start = |cycle| self.stream.config().cycle_start(cycle);
+        start(laser_cycle) - start(laser_cycle - 1)
     }
 
     /// Counts cycle by cycle what all SPADs make of the photons together.
-    fn count_sorted(&mut self, pixel: &mut Pixel<'_>, group: u32) {
-        let cycles = self.cycles_of(group);
+    fn count_sorted(&mut self, pixel: &mut Pixel<'_>, group: Group, cycles: u32) {
         let mut sorted = std::mem::take(&mut self.sorted);
         sorted.clear();
-        for (part, draw) in PARTS.into_iter().zip(&self.draws) {
-            let start = |cycle: u32| self.stream.config().cycle_start(cycle);
-            sorted.extend(draw.photons().filter_map(|(place, time_fs)| {
-                let (cycle, spad) = split(place);
-                let cycle = part.window_cycle(cycle).filter(|&cycle| cycle < cycles)?;
-                let mut time = Time::from_fs(time_fs);
-                if part != Part::Own {
-                    let laser_cycle = group * GROUP + cycle as u32;
-                    time += start(laser_cycle - 1) - start(laser_cycle);
-                }
-                Some((cycle, (time, spad)))
-            }));
-        }
+        let own = self.own.photons().map(|(place, time_fs)| {
+            let (cycle, spad) = split(place);
+            (cycle, (Time::from_fs(time_fs), spad))
+        });
+        sorted.extend(own.filter(|&(cycle, _)| cycle < cycles));
+        let earlier = |cycle: u32, time_fs: i64| {
+            Time::from_fs(time_fs) - self.before(group.first_cycle() + cycle)
+        };
+        let previous = self.previous.photons().filter_map(|(place, time_fs)| {
+            let (cycle, spad) = split(place);
+            let cycle = Some(cycle + 1).filter(|&cycle| cycle < cycles)?;
+            Some((cycle, (earlier(cycle, time_fs), spad)))
+        });
+        sorted.extend(previous);
+        let carried = self.carried.iter();
+        sorted.extend(carried.map(|photon| (0, (earlier(0, photon.time_fs), photon.place as u8))));
         sorted.sort_unstable();
         for photons in sorted.chunk_by(|a, b| a.0 == b.0) {
-            let laser_cycle = group * GROUP + photons[0].0 as u32;
+            let laser_cycle = group.first_cycle() + photons[0].0;
             let window = Placed {
                 engine: self.engine,
                 binning: self.binning,
@@ -404,6 +412,18 @@ impl<'a> Counting<'a> {
     }
 }
 
+/// When the photon of the `at`-th code of a draw came after the start of its cycle, fs.
+fn in_draw(draw: &Draw, at: usize) -> i64 {
+    let filled_up = draw.slots().len();
+    match at.checked_sub(2 * filled_up) {
+        Some(signal) => draw.signal()[signal].time_fs,
+        None => {
+            let half = usize::from(at >= filled_up);
+            draw.time_fs(half, at - half * filled_up)
+        }
+    }
+}
+
 /// The window of one laser cycle.
 struct Placed<'w> {
     engine: &'w Window<'w>,
@@ -424,7 +444,7 @@ impl Placed<'_> {
         }
         let exposure = self.engine.exposure;
         let cycle = i64::from(self.laser_cycle);
-        let edge = self.engine.edge_of(exposure.stop(cycle) + time);
+        let edge = self.engine.law.edge_of(exposure.stop(cycle) + time);
         let first_edge = self.sight.first_edge + cycle * i64::from(exposure.stop_periods);
         let bin = usize::try_from(edge - first_edge).ok()?;
         (bin < bins).then_some(bin + 1)

@@ -10,7 +10,7 @@
 //! such gap among the photons drawn so far, the slot before them is drawn as well, and so on, over cycles and groups, at
 //! the worst to the beginning of the exposure.
 
-use crate::photon::{Draw, GROUP, PhotonStream, PixelStream, Place, SLOT, SPADS};
+use crate::photon::{Draw, Group, PhotonStream, PixelStream, Place, SLOT, SPADS};
 use crate::units::Time;
 
 /// One photon on the way back: time from the first STOP edge, and SPAD.
@@ -59,9 +59,10 @@ impl<'a> Past<'a> {
             self.cycle -= 1;
             self.slot = self.stream.slots() - 1;
         }
-        pixel.draw(self.cycle / GROUP, self.slot..self.slot + 1, draw);
+        let group = Group::of_cycle(self.cycle);
+        pixel.draw(group, self.slot..self.slot + 1, draw);
         let start = self.stream.config().cycle_start(self.cycle);
-        let wanted = (self.cycle % GROUP) as usize;
+        let wanted = self.cycle - group.first_cycle();
         draw.photons().filter_map(move |(place, time_fs)| {
             let (cycle, spad) = split(place);
             (cycle == wanted && spads >> spad & 1 != 0)
@@ -71,9 +72,9 @@ impl<'a> Past<'a> {
 }
 
 /// Cycle within the group, and SPAD.
-pub fn split(place: Place) -> (usize, u8) {
-    let place = usize::from(place);
-    (place / SPADS, (place % SPADS) as u8)
+pub fn split(place: Place) -> (u32, u8) {
+    let place = u32::from(place);
+    (place / SPADS as u32, (place % SPADS as u32) as u8)
 }
 
 /// The first of `photons` (sorted by time) from which on everything is certain that matters from `seen_from` on; the

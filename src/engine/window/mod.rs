@@ -20,7 +20,6 @@ use super::{Engine, EngineError, Exposed, LitPixel, Work};
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw, correlation, histogram, window_law};
 use crate::photon::{PhotonStream, SpadEvent};
-use crate::units::Time;
 use counting::Counting;
 use sight::Sight;
 
@@ -29,7 +28,6 @@ pub struct Window<'a> {
     config: &'a SensorConfig,
     exposure: &'a Exposure,
     law: WindowLaw,
-    period_fs: f64,
 }
 
 impl<'a> Window<'a> {
@@ -39,7 +37,6 @@ impl<'a> Window<'a> {
             config,
             exposure,
             law: WindowLaw::new(config, exposure),
-            period_fs: 1e15 / exposure.clock.as_hz(),
         }
     }
 
@@ -51,18 +48,6 @@ impl<'a> Window<'a> {
             window_law::Window::Irregular(why) => Err(EngineError::Irregular(why)),
             window_law::Window::Race(why) => Err(EngineError::Race(why)),
         }
-    }
-
-    /// The rising CLK edge that takes a pulse at `time`.
-    fn edge_of(&self, time: Time) -> i64 {
-        let sampled = time + self.law.timing().spad_to_toggle;
-        let periods = (sampled + self.exposure.stop_phase).as_fs() as f64 / self.period_fs - 0.5;
-        let edge = periods.ceil();
-        // Exact arithmetic only where rounding could decide.
-        if (edge - periods - 0.5).abs() < 0.499 {
-            return edge as i64;
-        }
-        self.exposure.rising_until(sampled - Time::from_fs(1)) + 1
     }
 
     fn is_event(&self, spads: u16) -> bool {
@@ -116,7 +101,7 @@ impl Engine for Window<'_> {
             return Ok(vec![0; self.config.bins]);
         };
         let mut hits = self.dark_hits(window.first_edge);
-        for (edge, spads) in taken(pulses, |p| self.edge_of(p.time)) {
+        for (edge, spads) in taken(pulses, |p| self.law.edge_of(p.time)) {
             let adds = self.adds(spads);
             if adds == 0 {
                 continue;

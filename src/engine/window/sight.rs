@@ -20,12 +20,6 @@ use crate::photon::{GROUP, PhotonStream, PixelLight, SLOT, SPADS};
 /// femtoseconds, and so is the cycle before.
 pub const ROUNDING_FS: i64 = 4;
 
-/// Most photons within the memory of the SPADs on average; a gap comes once in e³ photons.
-const MOST_BLIND: f64 = 3.0;
-
-/// Most photons of a group on average.
-const MOST_PHOTONS: f64 = 5e4;
-
 /// The part of every laser cycle that decides a histogram. Times are in fs after the start of the cycle, within
 /// [`ROUNDING_FS`].
 #[derive(Debug, Clone)]
@@ -94,14 +88,26 @@ impl Sight {
         }
     }
 
-    /// Whether it pays to draw only these slots: not where gaps longer than the memory of the SPADs are so rare, or
-    /// photons so many, that the whole stream is as quick.
+    /// Whether it pays to draw only these slots. Where light blinds, most cycles have a SPAD whose state at the window is
+    /// not known, and looking back for a gap draws a slot of a whole group each time.
     pub fn suits(&self, stream: &PhotonStream, light: &PixelLight) -> bool {
         let spads = &stream.config().spads;
         let tied = if spads.has_secondaries() { 1 } else { SPADS };
-        let blind = light.background_hz / tied as f64 * spads.memory().as_s();
+        let memory_s = spads.memory().as_s();
+        let tied_hz = light.background_hz / tied as f64;
+        let blind = tied_hz * memory_s;
+        // A photon within the memory before the window, and another one soon after it.
+        let uncertain = tied as f64 * libm::expm1(-blind) * libm::expm1(-blind);
+        // How long one waits for a gap; without any photon, as long as the memory itself.
+        let wait_s = match blind > 0.0 {
+            true => memory_s * libm::expm1(blind) / blind,
+            false => memory_s,
+        };
+        let group = f64::from(stream.config().laser_cycles.min(GROUP));
+        let slot = light.background_hz * SLOT.as_s();
+        let looked_back = uncertain * (wait_s / SLOT.as_s() + 1.0) * slot * group;
         let slots = (self.own.len() + self.previous.len()) as f64;
-        let per_cycle = light.background_hz * SLOT.as_s() * slots + light.signal_per_cycle;
-        blind < MOST_BLIND && per_cycle * f64::from(GROUP) < MOST_PHOTONS
+        let seen = slot * slots + light.signal_per_cycle;
+        seen + looked_back < light.photons_per_cycle(stream.config())
     }
 }

@@ -1,24 +1,31 @@
 //! The tables in which photons of a group are counted. Their lengths are powers of two, so that an index needs no check.
 
-use super::binning::{Code, ROW, Tally, tally};
-use crate::photon::PLACE_BITS;
+use multiversion::multiversion;
 
-/// Rows of up to 64 bins, one before and one after them, by cycles.
-const CELLS: usize = 128 * ROW;
-const PLACES: usize = 1 << PLACE_BITS;
+use super::binning::{CYCLES, Code, ROWS};
+use crate::photon::GROUP;
+
 /// Most photons of a group, and one that is none.
 pub const MOST_PHOTONS: usize = u16::MAX as usize;
 const NONE: u16 = u16::MAX;
 
-/// How many SPADs fired by row and cycle, and which photons share cycle and SPAD.
+/// SPADs and rows of a cycle, below its last photon.
+const LAST_BITS: u32 = 48;
+const ROW_BITS: u32 = 16;
+/// Rows share bits where there are more of them.
+const ROWS_APART: usize = (LAST_BITS - ROW_BITS) as usize;
+const EMPTY: u64 = (NONE as u64) << LAST_BITS;
+
+/// How many photons came by row, which SPADs and rows have one by cycle, and all photons by cycle.
 pub struct Tables {
-    rows: usize,
-    cells: Box<[u8; CELLS]>,
-    /// Last photon by place.
-    last: Box<[u16; PLACES]>,
-    /// The photon before it at the same place, by photon.
+    counts: [u32; ROWS],
+    /// A bit for every row of a bin.
+    row_bit: [u64; ROWS],
+    /// By cycle: its last photon, rows and SPADs.
+    cycles: Box<[u64; CYCLES]>,
+    /// The photon before it in the same cycle, by photon.
     before: Box<[u16; MOST_PHOTONS + 1]>,
-    /// Photons that need a closer look.
+    /// Cycles that need a closer look.
     special: Box<[u16; MOST_PHOTONS + 1]>,
     specials: usize,
 }
@@ -31,72 +38,81 @@ fn table<T: Copy, const N: usize>(value: T) -> Box<[T; N]> {
 }
 
 impl Tables {
-    /// Tables with this many rows.
-    pub fn new(rows: usize) -> Self {
+    /// Tables for windows of `bins` bins.
+    pub fn new(bins: usize) -> Self {
+        let bit = |row: usize| 1 << (ROW_BITS as usize + row % ROWS_APART);
         Tables {
-            rows,
-            cells: table(0),
-            last: table(NONE),
-            before: table(0),
+            counts: [0; ROWS],
+            row_bit: std::array::from_fn(|row| match (1..=bins).contains(&row) {
+                true => bit(row),
+                false => 0,
+            }),
+            cycles: table(EMPTY),
+            before: table(NONE),
             special: table(0),
             specials: 0,
         }
     }
 
-    /// Empties the tables.
-    pub fn clear(&mut self) {
-        self.cells[..self.rows * ROW].fill(0);
-        self.last.fill(NONE);
-        self.specials = 0;
+    /// Begins a macropixel.
+    pub fn clear_counts(&mut self) {
+        self.counts.fill(0);
     }
 
-    /// Puts photon number `photon` (below [`MOST_PHOTONS`], each once) into its cell.
-    #[inline(always)]
-    pub fn put(&mut self, code: Code, photon: usize) {
-        let cell = &mut self.cells[code.cell() % CELLS];
-        *cell = cell.wrapping_add(1);
-        let last = &mut self.last[code.place() % PLACES];
-        let before = *last;
-        *last = photon as u16;
-        self.before[photon % (MOST_PHOTONS + 1)] = before;
-        // Written always, kept if special: no branch to mispredict.
-        self.special[self.specials % (MOST_PHOTONS + 1)] = photon as u16;
-        self.specials += usize::from(before != NONE || code.is_doubtful());
+    /// Photons by row, without those that were taken out.
+    pub fn counts(&self) -> &[u32; ROWS] {
+        &self.counts
     }
 
-    /// The `index`-th photon that shares its cycle and SPAD with an earlier one or is doubtful.
+    /// Counts the photons of a group, at most [`MOST_PHOTONS`].
+    pub fn put(&mut self, codes: &[Code]) {
+        debug_assert!(codes.len() <= MOST_PHOTONS);
+        self.specials = put(self, codes);
+    }
+
+    /// The `index`-th cycle that has two photons in one SPAD or one bin, or a doubtful one. A cycle may come several
+    /// times.
     pub fn special(&self, index: usize) -> Option<usize> {
         (index < self.specials).then(|| usize::from(self.special[index]))
     }
 
-    /// The last photon of a place; the place is empty afterwards.
-    pub fn take_last(&mut self, place: usize) -> Option<usize> {
-        let last = std::mem::replace(&mut self.last[place], NONE);
-        (last != NONE).then_some(usize::from(last))
+    /// The last photon of a cycle, which is empty afterwards.
+    pub fn take_last(&mut self, cycle: usize) -> Option<usize> {
+        let word = std::mem::replace(&mut self.cycles[cycle], EMPTY);
+        known((word >> LAST_BITS) as u16)
     }
 
-    /// The photon of the same place before this one.
+    /// The photon of the same cycle before this one.
     pub fn before(&self, photon: usize) -> Option<usize> {
-        let before = self.before[photon];
-        (before != NONE).then_some(usize::from(before))
+        known(self.before[photon])
     }
 
-    /// One more SPAD in a cell.
-    pub fn add(&mut self, cell: usize) {
-        self.cells[cell] = self.cells[cell].wrapping_add(1);
+    /// One photon less in a row.
+    pub fn remove(&mut self, row: usize) {
+        self.counts[row] -= 1;
     }
+}
 
-    /// One SPAD less in a cell.
-    pub fn remove(&mut self, cell: usize) {
-        self.cells[cell] = self.cells[cell].wrapping_sub(1);
-    }
+fn known(photon: u16) -> Option<usize> {
+    (photon != NONE).then_some(usize::from(photon))
+}
 
-    /// Tallies the first `cycles` cells of every bin.
-    pub fn tallies(
-        &self,
-        cycles: usize,
-        (least, most): (u8, u8),
-    ) -> impl Iterator<Item = Tally> + '_ {
-        (1..self.rows - 1).map(move |row| tally(&self.cells[row * ROW..][..cycles], least, most))
+#[multiversion(targets("x86_64+avx2+bmi1+bmi2"))]
+fn put(tables: &mut Tables, codes: &[Code]) -> usize {
+    // The cycle of what is no photon need not be empty.
+    tables.cycles[..GROUP as usize].fill(EMPTY);
+    let mut specials = 0;
+    for (photon, &code) in codes.iter().enumerate() {
+        let bits = 1 << code.spad() | tables.row_bit[code.row()];
+        let cycle = &mut tables.cycles[code.cycle()];
+        let word = *cycle;
+        let others = word & !(u64::from(NONE) << LAST_BITS);
+        *cycle = others | bits | (photon as u64) << LAST_BITS;
+        tables.before[photon % (MOST_PHOTONS + 1)] = (word >> LAST_BITS) as u16;
+        // Written always, kept if special: no branch to mispredict.
+        tables.special[specials % (MOST_PHOTONS + 1)] = code.cycle() as u16;
+        specials += usize::from(word & bits != 0 || code.is_doubtful());
+        tables.counts[code.row()] += 1;
     }
+    specials
 }

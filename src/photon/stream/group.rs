@@ -1,0 +1,143 @@
+//! Groups of laser cycles: what is drawn at once.
+//!
+//! ```text
+//!   number     0     1     2       3           4          5       6
+//!           ├─────┼─────┼─────┼───────────┼────────── … ──┼─── … ─┼─── … ─┼──
+//!   cycle   0    128   256   512         1024            2048    4096    6144
+//! ```
+//!
+//! Long groups take less time per photon, but an exposure draws its last one whole, whatever it needs of it. So groups
+//! begin short and double until they have [`GROUP`] cycles: less than half of what is drawn comes after the exposure, and
+//! a longer exposure begins with the same photons.
+
+use super::SPAD_BITS;
+use super::draw::Place;
+
+/// Laser cycles of the longest groups.
+pub const GROUP: u32 = 1 << GROUP_BITS;
+const GROUP_BITS: u32 = 11;
+
+/// Laser cycles of the shortest groups.
+pub const FIRST: u32 = 1 << FIRST_BITS;
+const FIRST_BITS: u32 = 7;
+
+/// Most bits of a [`Place`].
+pub const PLACE_BITS: u32 = GROUP_BITS + SPAD_BITS;
+
+/// A group of laser cycles, 2ᵏ of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Group {
+    number: u32,
+    first_cycle: u32,
+    bits: u32,
+}
+
+impl Default for Group {
+    fn default() -> Self {
+        Group::of_cycle(0)
+    }
+}
+
+impl Group {
+    /// The group of a laser cycle.
+    pub fn of_cycle(cycle: u32) -> Self {
+        let bits = cycle.max(1).ilog2().clamp(FIRST_BITS, GROUP_BITS);
+        let first_cycle = cycle >> bits << bits;
+        let shorter = match first_cycle {
+            0 => 0,
+            _ => bits - FIRST_BITS,
+        };
+        Group {
+            number: shorter + (first_cycle >> bits),
+            first_cycle,
+            bits,
+        }
+    }
+
+    /// All groups that begin before laser cycle `end`.
+    pub fn until(end: u32) -> impl Iterator<Item = Self> {
+        let mut next = Some(0);
+        std::iter::from_fn(move || {
+            let group = Group::of_cycle(next.filter(|&first| first < end)?);
+            next = group.first_cycle.checked_add(group.cycles());
+            Some(group)
+        })
+    }
+
+    /// Groups before it.
+    pub fn number(self) -> u32 {
+        self.number
+    }
+
+    /// Its first laser cycle.
+    pub fn first_cycle(self) -> u32 {
+        self.first_cycle
+    }
+
+    /// Its laser cycles.
+    pub fn cycles(self) -> u32 {
+        1 << self.bits
+    }
+
+    /// Those of them that belong to an exposure of `laser_cycles`.
+    pub fn cycles_in(self, laser_cycles: u32) -> u32 {
+        laser_cycles
+            .saturating_sub(self.first_cycle)
+            .min(self.cycles())
+    }
+
+    /// By how much the random word of a photon is shifted to give its place.
+    #[inline]
+    pub fn place_shift(self) -> u32 {
+        64 - SPAD_BITS - self.bits
+    }
+
+    /// The place of a photon.
+    #[inline]
+    pub fn place(self, word: u64) -> Place {
+        (word >> self.place_shift()) as Place
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn lengths_double_up_to_the_longest() {
+        let groups: Vec<_> = Group::until(4097)
+            .map(|group| (group.first_cycle(), group.cycles()))
+            .collect();
+        let expected = [
+            (0, 128),
+            (128, 128),
+            (256, 256),
+            (512, 512),
+            (1024, 1024),
+            (2048, 2048),
+            (4096, 2048),
+        ];
+        assert_eq!(groups, expected);
+        assert_eq!(Group::until(0).count(), 0);
+        assert_eq!(Group::until(129).count(), 2);
+    }
+
+    proptest! {
+        #[test]
+        fn every_cycle_is_in_the_group_of_its_number(cycle in prop_oneof![0u32..5000, any::<u32>()]) {
+            let group = Group::of_cycle(cycle);
+            prop_assert!(cycle - group.first_cycle() < group.cycles());
+            prop_assert_eq!(Group::of_cycle(group.first_cycle()), group);
+            let last = group.first_cycle() + (group.cycles() - 1);
+            prop_assert_eq!(Group::of_cycle(last), group);
+            if let Some(next) = last.checked_add(1) {
+                prop_assert_eq!(Group::of_cycle(next).number(), group.number() + 1);
+            }
+            prop_assert!([128, 256, 512, 1024, 2048].contains(&group.cycles()));
+            prop_assert!(group.number() < 1 << 24, "the counter has 24 bits for it");
+            let last_place = (group.cycles() << SPAD_BITS) - 1;
+            prop_assert_eq!(u32::from(group.place(u64::MAX)), last_place);
+        }
+    }
+}
