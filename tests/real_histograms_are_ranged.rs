@@ -3,6 +3,7 @@
 //! The real captures are not part of the project. They are looked for in the folder that GDTOF_DATA names, or in
 //! `shared/data` beside the checkout; without them that test says so and is skipped.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -144,7 +145,9 @@ fn depths_of_a_real_sensor_beat_its_own() {
     );
     let captures = folder.join("tmf8820_even.json");
     if !captures.exists() {
-        eprintln!(
+        // Not eprintln, which cargo hides where a test passes.
+        let _ = writeln!(
+            std::io::stderr(),
             "SKIPPED: {} is not there; set GDTOF_DATA",
             captures.display()
         );

@@ -24,7 +24,7 @@ const STOP_PERIODS: u32 = 4800;
 const CYCLE_STOP_PERIODS: u32 = 520;
 
 /// Laser cycles of the cycle engine's exposure.
-const CYCLE_LASER_CYCLES: u32 = 50;
+const CYCLE_LASER_CYCLES: u32 = 200;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]

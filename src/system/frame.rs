@@ -32,9 +32,9 @@ use crate::units::Time;
 pub enum EngineKind {
     /// Event-driven simulation of the netlist with its delays.
     Gate,
-    /// The blocks' reference models, every CLK period.
+    /// The levelised netlist, every CLK period.
     Cycle,
-    /// The blocks' reference models, only the CLK periods a window can see.
+    /// The window law: only the CLK periods a window can see.
     #[default]
     Window,
     /// No photons: histograms from their distribution, laser cycles in the same state together.

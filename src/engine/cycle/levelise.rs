@@ -23,6 +23,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::Unlevelled;
 use super::expression::Expressions;
+use super::parts::Parts;
 use super::stream::StreamTape;
 use super::survey::{Class, Survey, UniformEdge, output};
 use super::tape::{Action, Code, PassTape, SINK, ZERO};
@@ -43,6 +44,8 @@ pub struct Levelised {
     pub stream: StreamTape,
     /// Everything else.
     pub passes: PassTape,
+    /// What of it depends on photons.
+    pub parts: Parts,
     /// Counter bits of every bin, bit 0 first.
     pub bins: Vec<Vec<Bit>>,
     /// What each place holds when the exposure starts: (place, net, inverted).
@@ -197,12 +200,14 @@ impl Levelised {
                 .map(|(pass, cause)| (*pass, position(first_action[cause])))
                 .collect()
         });
+        let places = usize::from(leveliser.next_place);
         Ok(Levelised {
             stream,
+            parts: Parts::new(&passes, places),
             passes,
             bins,
             causes: causes.collect(),
-            places: usize::from(leveliser.next_place),
+            places,
             initial: leveliser.initial,
         })
     }
@@ -341,6 +346,9 @@ impl Leveliser<'_> {
             }
             tape.actions.push(action);
         }
+        // A wait is shorter than a period.
+        let arrivals = self.drafts.iter().map(|draft| draft.arrival_fs);
+        tape.settling = arrivals.max().unwrap_or(0) / self.period_fs + 2;
         tape
     }
 }

@@ -12,13 +12,16 @@
 //! the order in which the edges of one period arrive. Otherwise there is no delay and, after the reset that the
 //! event kernel simulates, no X. Nothing here knows what a macropixel is: what the netlist says is what is run.
 //!
-//! Macropixels go into blocks by the low bits of their start values, so that a block's counters carry, and roll
-//! over, in the same CLK periods, and rest in the others. A netlist, or a configuration, for which no tape can
+//! Macropixels go into blocks by their start values, so that a block's windows are open in the same CLK periods, and
+//! its counters at rest in the others, which are skipped where nothing would change. A netlist, or a configuration, for which no tape can
 //! be made is run by the gate engine: the P-counters of set/reset flip-flops, so far.
 
 mod expression;
 mod levelise;
 mod packing;
+mod parts;
+mod passes;
+mod schedule;
 mod stream;
 mod survey;
 mod tape;
@@ -34,10 +37,11 @@ use crate::chip::{Exposure, SensorConfig};
 use crate::photon::SpadEvent;
 use levelise::Levelised;
 use packing::Packed;
-use stream::PERIODS;
+use schedule::Schedule;
+use stream::{Flow, PERIODS};
 use survey::Survey;
-use tape::{Block, Passes};
-use word::{WORD_LANES, Word};
+use tape::Block;
+use word::{WORD_LANES, Word, inversion};
 
 /// Why a netlist has no tape.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -126,8 +130,8 @@ impl<'a> Cycle<'a> {
     /// Sorts pulses (one list per macropixel, by time) for [`Cycle::run`].
     pub fn pack(&self, starts: &[u16], pulses: &[&[SpadEvent]]) -> PackedPulses {
         let mut order: Vec<usize> = (0..starts.len()).collect();
-        // Counters whose low bits agree carry together.
-        order.sort_by_key(|&pixel| (starts[pixel].reverse_bits(), pixel));
+        // Counters that start alike open their windows, and come to rest, together.
+        order.sort_by_key(|&pixel| (starts[pixel], pixel));
         let chunks = self.chunks();
         let blocks = order.par_chunks(WORD_LANES).map(|pixels| {
             let lanes = pixels.iter().map(|&pixel| pulses[pixel]);
@@ -149,13 +153,7 @@ impl<'a> Cycle<'a> {
             .par_iter()
             .map(|(pixels, pulses)| {
                 let starts: Vec<u16> = pixels.iter().map(|&pixel| starts[pixel]).collect();
-                machine.run(
-                    self.exposure,
-                    self.clocked(),
-                    self.chunks(),
-                    &starts,
-                    pulses,
-                )
+                machine.run(self.exposure, self.clocked(), &starts, pulses)
             })
             .collect();
         let mut histograms = vec![Vec::new(); starts.len()];
@@ -174,80 +172,22 @@ impl Machine {
         &self,
         exposure: &Exposure,
         clocked: usize,
-        chunks: usize,
         starts: &[u16],
         pulses: &Packed,
     ) -> Result<Vec<Vec<u16>>, Unlevelled> {
         let Levelised {
             stream,
             passes: tape,
+            parts,
+            causes,
             ..
         } = &self.levelised;
         let mut block = Block::new(tape, self.start(starts)?);
-        let mut words = stream.start();
-        let mut causes = self.causes(exposure).peekable();
-        let mut due = Vec::new();
-        let mut until = |end: i64, first: i64| {
-            due.clear();
-            while let Some((pass, action)) = causes.next_if(|(pass, _)| *pass < end) {
-                due.push(((pass - first) as usize, action));
-            }
-            std::mem::take(&mut due)
-        };
-        // STOP may rise before the first falling CLK edge.
-        let early = until(0, -1);
-        tape::run(
-            tape,
-            &mut block,
-            &words,
-            &Passes {
-                first: -1,
-                count: 1,
-                clocked: 0,
-                causes: &early,
-            },
-        );
-        for chunk in 0..chunks {
-            let first = chunk * PERIODS;
-            if chunk > 0 {
-                stream.pass_on(&mut words);
-            }
-            stream.compute(&mut words, pulses.chunk(chunk));
-            let causes = until((first + PERIODS) as i64, first as i64);
-            let clocked = clocked.saturating_sub(first).min(PERIODS);
-            tape::run(
-                tape,
-                &mut block,
-                &words,
-                &Passes {
-                    first: 0,
-                    count: PERIODS,
-                    clocked,
-                    causes: &causes,
-                },
-            );
-        }
-        // Counts that are still rippling.
-        for _ in 0..SETTLING_CHUNKS {
-            if block.is_settled() {
-                break;
-            }
-            stream.pass_on(&mut words);
-            stream.compute(&mut words, &[]);
-            tape::run(
-                tape,
-                &mut block,
-                &words,
-                &Passes {
-                    first: 0,
-                    count: PERIODS,
-                    clocked: 0,
-                    causes: &[],
-                },
-            );
-        }
-        if let Some(action) = block.trapped {
-            return Err(Unlevelled::Trapped(self.name(tape.actions[action].out)));
+        let mut flow = Flow::new(stream, pulses);
+        let schedule = Schedule::new(causes, exposure, clocked);
+        passes::run(tape, parts, &mut block, &mut flow, schedule);
+        if let Some(place) = block.trapped {
+            return Err(Unlevelled::Trapped(self.name(place)));
         }
         if !block.is_settled() {
             return Err(Unlevelled::Trapped("a net that does not settle".to_owned()));
@@ -273,25 +213,6 @@ impl Machine {
         Ok(words)
     }
 
-    /// Causes other than CLK in order: (pass, action).
-    fn causes(&self, exposure: &Exposure) -> impl Iterator<Item = (i64, u16)> + '_ {
-        let groups = &self.levelised.causes;
-        let cycles = i64::from(exposure.laser_cycles);
-        let periods = i64::from(exposure.stop_periods);
-        let last = groups.len() - 1;
-        (0..=cycles).flat_map(move |cycle| {
-            let group = match cycle {
-                0 => 0,
-                c if c == cycles => last,
-                c if c + 1 == cycles => last - 1,
-                _ => 1,
-            };
-            groups[group]
-                .iter()
-                .map(move |&(pass, action)| (cycle * periods + pass, action))
-        })
-    }
-
     /// The net at a place.
     fn name(&self, place: u16) -> String {
         let net = self.levelised.initial.iter().find(|(p, ..)| *p == place);
@@ -299,23 +220,19 @@ impl Machine {
     }
 
     fn counts(&self, block: &Block, lanes: usize) -> Vec<Vec<u16>> {
-        let value = |&(place, inverted): &(u16, bool), lane: usize| {
-            block.words[usize::from(place)].lane(lane) ^ inverted
-        };
-        let count = |bits: &Vec<(u16, bool)>, lane: usize| {
-            bits.iter()
-                .rev()
-                .fold(0, |n, bit| n << 1 | u16::from(value(bit, lane)))
-        };
         let bins = &self.levelised.bins;
-        (0..lanes)
-            .map(|lane| bins.iter().map(|bits| count(bits, lane)).collect())
-            .collect()
+        let mut counts = vec![vec![0; bins.len()]; lanes];
+        for (bin, bits) in bins.iter().enumerate() {
+            for (weight, &(place, inverted)) in bits.iter().enumerate() {
+                let word = block.words[usize::from(place)] ^ inversion(inverted);
+                for (lane, counts) in counts.iter_mut().enumerate() {
+                    counts[bin] |= u16::from(word.lane(lane)) << weight;
+                }
+            }
+        }
+        counts
     }
 }
-
-/// Chunks after the last CLK edge within which every count has rippled through.
-const SETTLING_CHUNKS: usize = 16;
 
 impl Engine for Cycle<'_> {
     fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {

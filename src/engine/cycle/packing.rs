@@ -84,8 +84,11 @@ impl Packed {
         }
     }
 
-    /// The pulses of one chunk.
+    /// The pulses of one chunk; none after the last.
     pub fn chunk(&self, chunk: usize) -> &[Pulse] {
-        &self.pulses[self.chunks[chunk] as usize..self.chunks[chunk + 1] as usize]
+        match self.chunks[chunk.min(self.chunks.len() - 1)..] {
+            [first, end, ..] => &self.pulses[first as usize..end as usize],
+            _ => &[],
+        }
     }
 }

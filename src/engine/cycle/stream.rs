@@ -15,7 +15,7 @@ use multiversion::multiversion;
 
 use super::Unlevelled;
 use super::expression::{Expressions, Literal, Node};
-use super::packing::Pulse;
+use super::packing::{Packed, Pulse};
 use super::word::{Word, inversion};
 use crate::netlist::NetId;
 
@@ -52,14 +52,6 @@ pub struct Tap {
     invert: u64,
 }
 
-impl Tap {
-    /// Its value just before rising edge `period` of the chunk.
-    #[inline(always)]
-    pub fn read(&self, words: &[Word], period: isize) -> Word {
-        words[self.place.wrapping_add_signed(period)] ^ self.invert
-    }
-}
-
 /// A node that is remembered from chunk to chunk.
 #[derive(Debug, Clone)]
 struct Ring {
@@ -76,6 +68,8 @@ pub struct StreamTape {
     /// Place of each SPAD's input, if it is used.
     inputs: Vec<Option<u32>>,
     words: usize,
+    /// For how many chunks after its own a photon can make a difference; `None` is for ever: its parity is read.
+    memory: Option<usize>,
 }
 
 impl StreamTape {
@@ -96,6 +90,7 @@ impl StreamTape {
             layout.place(expressions, node, &mut tape);
         }
         tape.words = layout.end;
+        tape.memory = layout.memory(expressions, &roots);
         tape.inputs = (1..=spads)
             .map(|n| layout.places[n].map(|p| p as u32))
             .collect();
@@ -108,7 +103,7 @@ impl StreamTape {
     }
 
     /// Words of a block, as they are before the first chunk.
-    pub fn start(&self) -> Vec<Word> {
+    fn start(&self) -> Vec<Word> {
         let mut words = vec![Word::ZERO; self.words];
         for ring in &self.rings {
             for (word, &value) in words[ring.start..].iter_mut().zip(&ring.history) {
@@ -119,7 +114,7 @@ impl StreamTape {
     }
 
     /// Makes the last chunk the past.
-    pub fn pass_on(&self, words: &mut [Word]) {
+    fn pass_on(&self, words: &mut [Word]) {
         for ring in &self.rings {
             let from = ring.start + PERIODS;
             words.copy_within(from..from + ring.history.len(), ring.start);
@@ -127,7 +122,7 @@ impl StreamTape {
     }
 
     /// Computes a chunk with these pulses in it.
-    pub fn compute(&self, words: &mut [Word], pulses: &[Pulse]) {
+    fn compute(&self, words: &mut [Word], pulses: &[Pulse]) {
         for &place in self.inputs.iter().flatten() {
             words[place as usize..][..PERIODS].fill(Word::ZERO);
         }
@@ -137,6 +132,82 @@ impl StreamTape {
             }
         }
         run(&self.ops, words);
+    }
+}
+
+/// The stream of one block: chunks are computed when something first reads them, and those that nobody reads are
+/// not, nor are their photons looked at.
+pub struct Flow<'a> {
+    tape: &'a StreamTape,
+    pulses: &'a Packed,
+    words: Vec<Word>,
+    /// The chunk that `words` hold.
+    chunk: Option<usize>,
+}
+
+impl Tap {
+    /// The same sequence, so many periods later.
+    pub fn at(self, offset: i8) -> Self {
+        Tap {
+            place: self.place.wrapping_add_signed(offset.into()),
+            ..self
+        }
+    }
+}
+
+impl<'a> Flow<'a> {
+    /// A block with these pulses.
+    pub fn new(tape: &'a StreamTape, pulses: &'a Packed) -> Self {
+        Flow {
+            tape,
+            pulses,
+            words: tape.start(),
+            chunk: None,
+        }
+    }
+
+    /// A sequence just before rising edge `pass`.
+    #[inline(always)]
+    pub fn read(&mut self, tap: Tap, pass: i64) -> Word {
+        let period = self.seek(pass);
+        self.words[tap.place.wrapping_add_signed(period)] ^ tap.invert
+    }
+
+    /// Adds to `sums` what sequences are in some lanes just before rising edge `pass`.
+    #[inline(always)]
+    pub fn gather(&mut self, taps: &[Tap], pass: i64, lanes: Word, sums: &mut [Word]) {
+        let period = self.seek(pass);
+        for (tap, sum) in taps.iter().zip(sums) {
+            let value = self.words[tap.place.wrapping_add_signed(period)] ^ tap.invert;
+            *sum = *sum | (value & lanes);
+        }
+    }
+
+    /// Computes the chunk that a pass is in, if it is not yet; the period there. Passes never go back.
+    #[inline(always)]
+    fn seek(&mut self, pass: i64) -> isize {
+        let chunk = pass.max(0) as usize / PERIODS;
+        if self.chunk != Some(chunk) {
+            self.compute(chunk);
+        }
+        pass as isize - (chunk * PERIODS) as isize
+    }
+
+    /// Computes a chunk, and those before it whose photons it can still feel.
+    #[inline(never)]
+    fn compute(&mut self, chunk: usize) {
+        let next = self.chunk.map_or(0, |last| last + 1);
+        let felt = self
+            .tape
+            .memory
+            .map_or(0, |memory| chunk.saturating_sub(memory));
+        for chunk in next.max(felt)..=chunk {
+            if chunk > 0 {
+                self.tape.pass_on(&mut self.words);
+            }
+            self.tape.compute(&mut self.words, self.pulses.chunk(chunk));
+        }
+        self.chunk = Some(chunk);
     }
 }
 
@@ -184,6 +255,21 @@ impl Layout {
             free: Vec::new(),
             end: 0,
         }
+    }
+
+    /// Chunks before its own that a read of `roots` can depend on, if that ends.
+    fn memory(&self, expressions: &Expressions<'_>, roots: &[Literal]) -> Option<usize> {
+        let mut periods: Vec<usize> = Vec::new();
+        for (node, kind) in expressions.nodes().iter().enumerate() {
+            if self.reach[node].is_some() && matches!(kind, Node::Toggle(_)) {
+                return None;
+            }
+            let inputs = kind.inputs();
+            let back = inputs.iter().map(|l| l.delay + periods[l.node]);
+            periods.push(back.max().unwrap_or(0));
+        }
+        let back = roots.iter().map(|l| READ_BACK + l.delay + periods[l.node]);
+        Some(back.max().unwrap_or(0).div_ceil(PERIODS))
     }
 
     fn allocate(
@@ -287,12 +373,20 @@ impl Layout {
     }
 }
 
+/// The periods of a chunk that begins at `place`.
+#[inline(always)]
+fn chunk(words: &[Cell<Word>], place: u32) -> &[Cell<Word>] {
+    &words[place as usize..][..PERIODS]
+}
+
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn run(ops: &[Op], words: &mut [Word]) {
     let words = Cell::from_mut(words).as_slice_of_cells();
     for op in ops {
-        let [a, b, c] = op.inputs.map(|place| &words[place as usize..][..PERIODS]);
-        let [out, carry] = op.out.map(|place| &words[place as usize..][..PERIODS]);
+        let [a, b, c] = op.inputs;
+        let [out, carry] = op.out;
+        let (a, b, c) = (chunk(words, a), chunk(words, b), chunk(words, c));
+        let (out, carry) = (chunk(words, out), chunk(words, carry));
         let [ia, ib, ic] = op.invert;
         for t in 0..PERIODS {
             let (a, b) = (a[t].get(), b[t].get());

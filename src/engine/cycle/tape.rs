@@ -12,9 +12,9 @@
 //! cost nothing. An action that another one wakes lies behind it on the tape, or in front of it if it is due
 //! only after the next falling edge: then it waits for the next pass.
 
-use multiversion::multiversion;
+use std::ops::Range;
 
-use super::stream::Tap;
+use super::stream::{Flow, Tap};
 use super::word::Word;
 
 /// Place of a word that is always 0.
@@ -83,6 +83,84 @@ pub struct PassTape {
     pub clock: Vec<u16>,
     /// What the flip-flops sample of the stream.
     pub taps: Vec<Tap>,
+    /// Passes within which all that follows a sample is over.
+    pub settling: i64,
+}
+
+impl PassTape {
+    /// What a change of an action's result wakes.
+    #[inline(always)]
+    pub fn woken(&self, action: &Action, direction: usize) -> &[u16] {
+        &self.wakes[action.wakes[direction] as usize..action.wakes[direction + 1] as usize]
+    }
+}
+
+/// A set of actions.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Bits(pub Vec<u64>);
+
+impl Bits {
+    /// Without any of `count` actions.
+    pub fn new(count: usize) -> Self {
+        Bits(vec![0; count.div_ceil(64)])
+    }
+
+    /// Adds one; whether it was new.
+    #[inline(always)]
+    pub fn insert(&mut self, index: u16) -> bool {
+        let word = &mut self.0[usize::from(index >> 6)];
+        let old = *word;
+        *word |= 1 << (index & 63);
+        *word != old
+    }
+
+    /// Takes one out.
+    #[inline(always)]
+    pub fn remove(&mut self, index: u16) {
+        self.0[usize::from(index >> 6)] &= !(1 << (index & 63));
+    }
+
+    /// Takes out a range of them, if all are in the set; whether they were.
+    #[inline(always)]
+    pub fn take(&mut self, range: &Range<u16>) -> bool {
+        for index in range.start..range.end {
+            if !self.contains(index) {
+                return false;
+            }
+        }
+        for index in range.start..range.end {
+            self.remove(index);
+        }
+        true
+    }
+
+    /// Whether it is in the set.
+    #[inline(always)]
+    pub fn contains(&self, index: u16) -> bool {
+        self.0[usize::from(index >> 6)] >> (index & 63) & 1 == 1
+    }
+
+    /// Whether none is.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        let mut any = 0;
+        for word in &self.0 {
+            any |= word;
+        }
+        any == 0
+    }
+
+    /// The first one from `from` on that is also in `among`.
+    #[inline(always)]
+    pub fn next_among(&self, among: &Bits, from: u16) -> Option<u16> {
+        let mut group = usize::from(from >> 6);
+        let mut bits = self.0.get(group)? & among.0[group] & u64::MAX << (from & 63);
+        while bits == 0 {
+            group += 1;
+            bits = self.0.get(group)? & among.0[group];
+        }
+        Some((group * 64) as u16 + bits.trailing_zeros() as u16)
+    }
 }
 
 /// One block of macropixels.
@@ -91,9 +169,9 @@ pub struct Block {
     /// Values of nets and masks of lanes.
     pub words: Vec<Word>,
     /// Actions to run, a bit each.
-    pending: Vec<u64>,
-    /// The first action whose effect the tape has no place for.
-    pub trapped: Option<usize>,
+    pub pending: Bits,
+    /// Where the first effect goes that the tape has no place for.
+    pub trapped: Option<u16>,
 }
 
 impl Block {
@@ -101,90 +179,39 @@ impl Block {
     pub fn new(tape: &PassTape, words: Vec<Word>) -> Self {
         Block {
             words,
-            pending: vec![0; tape.actions.len().div_ceil(64)],
+            pending: Bits::new(tape.actions.len()),
             trapped: None,
         }
     }
 
+    /// Notes that an action's effect is not known.
+    #[cold]
+    pub fn doubt(&mut self, action: &Action) {
+        self.trapped.get_or_insert(action.out);
+    }
+
     /// Whether nothing is on its way.
     pub fn is_settled(&self) -> bool {
-        self.pending.iter().all(|&word| word == 0)
-    }
-}
-
-/// Passes to run: those of one chunk, or a few at the ends.
-pub struct Passes<'a> {
-    /// First pass, from the first of the chunk that the stream is in.
-    pub first: isize,
-    /// How many.
-    pub count: usize,
-    /// How many of them have CLK edges.
-    pub clocked: usize,
-    /// Other causes (pass, action) in order of passes, counted from `first`.
-    pub causes: &'a [(usize, u16)],
-}
-
-/// Runs some passes of one block.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub fn run(tape: &PassTape, block: &mut Block, stream: &[Word], passes: &Passes<'_>) {
-    let Block {
-        words,
-        pending,
-        trapped,
-    } = block;
-    let mut causes = passes.causes.iter().peekable();
-    for pass in 0..passes.count {
-        if pass < passes.clocked {
-            for &action in &tape.clock {
-                pending[usize::from(action >> 6)] |= 1 << (action & 63);
-            }
-        }
-        while let Some((_, action)) = causes.next_if(|(due, _)| *due == pass) {
-            pending[usize::from(action >> 6)] |= 1 << (action & 63);
-        }
-        let period = passes.first + pass as isize;
-        for group in 0..pending.len() {
-            // Actions that have had their turn in this pass wait for the next one.
-            let mut ahead = u64::MAX;
-            loop {
-                let bits = pending[group] & ahead;
-                if bits == 0 {
-                    break;
-                }
-                let bit = bits.trailing_zeros();
-                pending[group] &= !(1 << bit);
-                ahead = u64::MAX << 1 << bit;
-                let index = group * 64 + bit as usize;
-                let action = &tape.actions[index];
-                if action.is_doubtful && counts(action, words) {
-                    trapped.get_or_insert(index);
-                }
-                let changed = step(action, words, &tape.taps, stream, period);
-                for (direction, _) in changed.iter().enumerate().filter(|(_, moved)| **moved) {
-                    let ends =
-                        action.wakes[direction] as usize..action.wakes[direction + 1] as usize;
-                    for &next in &tape.wakes[ends] {
-                        pending[usize::from(next >> 6)] |= 1 << (next & 63);
-                    }
-                    if action.traps[direction] {
-                        trapped.get_or_insert(index);
-                    }
-                }
-            }
-        }
+        self.pending.is_empty()
     }
 }
 
 /// Runs one action; whether any lane rose, and fell.
 #[inline(always)]
-fn step(
+pub fn step(
     action: &Action,
     words: &mut [Word],
     taps: &[Tap],
-    stream: &[Word],
-    period: isize,
+    flow: &mut Flow<'_>,
+    pass: i64,
 ) -> [bool; 2] {
-    let [a, b, c, d] = action.inputs.map(usize::from);
+    let [a, b, c, d] = action.inputs;
+    let (a, b, c, d) = (
+        usize::from(a),
+        usize::from(b),
+        usize::from(c),
+        usize::from(d),
+    );
     let [ia, ib, ic, id, io] = action.invert;
     let old = words[usize::from(action.out)];
     let new = match action.code {
@@ -197,17 +224,19 @@ fn step(
         }
         Code::Toggle => old ^ (words[b] & !(words[c] ^ ic)),
         Code::Async => (old | (words[d] ^ id)) & !(words[c] ^ ic),
-        Code::FlipFlop | Code::Sampler { .. } => {
-            let data = match action.code {
-                Code::Sampler { tap, offset } => {
-                    taps[usize::from(tap)].read(stream, period + isize::from(offset))
-                }
-                _ => words[a] ^ ia,
-            };
-            let edge = words[b] & !(words[c] ^ ic) & !(words[d] ^ id);
-            (old & !edge) | (data & edge)
+        Code::FlipFlop => {
+            let edge = clocked(action, words);
+            (old & !edge) | ((words[a] ^ ia) & edge)
         }
+        Code::Sampler { .. } => sampled(action, words, taps, flow, pass),
     };
+    change(action, words, new)
+}
+
+/// Gives an action its result; whether any lane rose, and fell.
+#[inline(always)]
+pub fn change(action: &Action, words: &mut [Word], new: Word) -> [bool; 2] {
+    let old = words[usize::from(action.out)];
     let [rising, falling] = action.directions;
     let rise = new & !old & rising;
     let fall = !new & old & falling;
@@ -217,9 +246,30 @@ fn step(
     [rise.any(), fall.any()]
 }
 
+/// Lanes in which a flip-flop's clock has risen, and neither reset nor set holds it.
+#[inline(always)]
+pub fn clocked(action: &Action, words: &[Word]) -> Word {
+    let [_, edge, reset, set] = action.inputs;
+    let [_, _, ireset, iset, _] = action.invert;
+    words[usize::from(edge)]
+        & !(words[usize::from(reset)] ^ ireset)
+        & !(words[usize::from(set)] ^ iset)
+}
+
+/// What a sampler holds when it has sampled.
+#[inline(always)]
+fn sampled(action: &Action, words: &[Word], taps: &[Tap], flow: &mut Flow<'_>, pass: i64) -> Word {
+    let Code::Sampler { tap, offset } = action.code else {
+        unreachable!("a sampler")
+    };
+    let edge = clocked(action, words);
+    let data = flow.read(taps[usize::from(tap)].at(offset), pass);
+    (words[usize::from(action.out)] & !edge) | (data & edge)
+}
+
 /// Whether a flip-flop's clock has risen in a lane that is not reset.
 #[cold]
-fn counts(action: &Action, words: &[Word]) -> bool {
+pub fn counts(action: &Action, words: &[Word]) -> bool {
     let [_, edge, reset, _] = action.inputs.map(|place| words[usize::from(place)]);
     let inverted = action.invert[2];
     (edge & !(reset ^ inverted)).any()

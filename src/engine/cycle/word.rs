@@ -28,7 +28,11 @@ impl Word {
     /// Whether any lane is 1.
     #[inline(always)]
     pub fn any(self) -> bool {
-        self.0.iter().fold(0, |all, part| all | part) != 0
+        let mut any = 0;
+        for i in 0..PARTS {
+            any |= self.0[i];
+        }
+        any != 0
     }
 
     /// One lane.

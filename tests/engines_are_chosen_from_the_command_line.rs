@@ -1,0 +1,105 @@
+//! `gdtof frame` on every engine, `--tolerance`, and the commands that measure the engines: `speed` and `pareto`.
+
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+fn gdtof(folder: &Path, arguments: &[&str]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_gdtof"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {error}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Histograms and frame.json of a small frame.
+fn frame(arguments: &[&str]) -> (Vec<u16>, Value) {
+    let here = tempfile::tempdir().unwrap();
+    let small = ["frame", "--rows", "4", "--cols", "4", "--probe", "none"];
+    let said = gdtof(here.path(), &[&small, arguments, &["--json"]].concat());
+    let file = std::fs::File::open(here.path().join("out/histograms.npy")).unwrap();
+    let counts = npyz::NpyFile::new(file).unwrap().into_vec().unwrap();
+    (counts, serde_json::from_str(&said).unwrap())
+}
+
+#[test]
+fn engines_with_the_same_photons_make_the_same_histograms() {
+    let of = |engine: &[&str]| frame(&[&["--laser-cycles", "2", "--engine"], engine].concat());
+    let (gates, report) = of(&["gate"]);
+    assert_eq!(report["engine"], "gate");
+    assert!(gates.iter().any(|&count| count > 0));
+    for engine in [&["cycle"][..], &["window"], &["window", "--no-skip"]] {
+        assert_eq!(of(engine).0, gates, "{engine:?}");
+    }
+}
+
+#[test]
+fn histograms_without_photons_have_as_many_counts() {
+    let total = |engine: &[&str]| {
+        let (counts, _) = frame(&[&["--engine"], engine].concat());
+        counts.into_iter().map(f64::from).sum::<f64>()
+    };
+    let drawn = total(&["window"]);
+    let spread = (2.0 * drawn).sqrt();
+    for sub_bins in ["1", "4"] {
+        let cohort = total(&["cohort", "--sub-bins", sub_bins]);
+        let off = (cohort - drawn) / spread;
+        assert!(off.abs() < 5.0, "{sub_bins}: {cohort} for {drawn}");
+    }
+}
+
+#[test]
+fn a_tolerance_is_kept_and_its_bound_reported() {
+    let at = |tolerance: &str| frame(&["--tolerance", tolerance]).1["tolerance"].clone();
+    for tolerance in ["0", "0.001", "0.1"] {
+        let report = at(tolerance);
+        let bound = report["bound_m"].as_f64().unwrap();
+        assert!(bound <= tolerance.parse().unwrap(), "{report}");
+    }
+    let on_window = |report: Value| report["on_window"].as_u64().unwrap();
+    assert!(on_window(at("0")) > on_window(at("0.1")));
+}
+
+#[test]
+fn speed_is_measured_for_every_engine_and_size() {
+    let here = tempfile::tempdir().unwrap();
+    let said = gdtof(
+        here.path(),
+        &["speed", "--runs", "1", "--largest", "4", "--json"],
+    );
+    let figures: Vec<Value> = serde_json::from_str(&said).unwrap();
+    for engine in ["cycle", "window", "cohort"] {
+        for side in [1, 4] {
+            let is_it = |f: &&Value| f["engine"] == engine && f["side"] == side;
+            let figure = figures.iter().find(is_it).expect("a figure");
+            assert!(figure["median_s"].as_f64().unwrap() > 0.0, "{figure}");
+        }
+    }
+    let table = gdtof(here.path(), &["speed", "--runs", "1", "--largest", "1"]);
+    assert!(table.contains("cohort"), "{table}");
+}
+
+#[test]
+fn run_time_against_error_comes_as_table_csv_and_picture() {
+    let here = tempfile::tempdir().unwrap();
+    let small =
+        "pareto --no-gate --ranges 20 --klux 1 --macropixels 8 --laser-cycles 40 --repeats 1";
+    let said = gdtof(here.path(), &small.split(' ').collect::<Vec<_>>());
+    assert!(said.contains("window, no skipping"), "{said}");
+    let csv = std::fs::read_to_string(here.path().join("out/pareto.csv")).unwrap();
+    assert!(csv.lines().count() > 5, "{csv}");
+    let picture = std::fs::read_to_string(here.path().join("out/pareto.svg")).unwrap();
+    assert!(picture.starts_with("<svg"), "{picture}");
+    assert!(here.path().join("out/pareto_cells.csv").exists());
+}
+
+#[test]
+fn stability_is_promised_and_kept() {
+    let here = tempfile::tempdir().unwrap();
+    let said = gdtof(here.path(), &["pareto", "--stability"]);
+    assert!(said.lines().count() > 5, "{said}");
+}
