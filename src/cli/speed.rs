@@ -20,11 +20,14 @@ use crate::system::{SPEED_LASER_CYCLES, SpeedFrame};
 /// CLK periods in a laser cycle at 80 kHz and 384 MHz (thesis 6.4).
 const STOP_PERIODS: u32 = 4800;
 
-/// Those of the cycle engine's exposure, which steps them all: the reach of the P-counter.
+/// Those of the cycle engine's exposure: the reach of the P-counter, without the rest that it would skip.
 const CYCLE_STOP_PERIODS: u32 = 520;
 
-/// Laser cycles of the cycle engine's exposure.
-const CYCLE_LASER_CYCLES: u32 = 200;
+/// Laser cycles of the cycle engine's exposure, whose photons are drawn beforehand and kept: 350 MB of them.
+fn cycle_laser_cycles(side: u16) -> u32 {
+    let macropixels = u32::from(side).pow(2);
+    (500 * 64 * 64 / macropixels).clamp(1, 500)
+}
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
@@ -149,7 +152,7 @@ fn measure(engine: SpeedEngine, side: u16, threads: usize, runs: u16) -> anyhow:
         .num_threads(threads)
         .build()?;
     let (stop_periods, laser_cycles) = match engine {
-        SpeedEngine::Cycle => (CYCLE_STOP_PERIODS, CYCLE_LASER_CYCLES),
+        SpeedEngine::Cycle => (CYCLE_STOP_PERIODS, cycle_laser_cycles(side)),
         SpeedEngine::Window | SpeedEngine::Cohort => (STOP_PERIODS, SPEED_LASER_CYCLES),
     };
     let frame = SpeedFrame::new(side.into(), stop_periods, laser_cycles);
