@@ -270,6 +270,8 @@ impl Passes<'_, '_> {
                         }
                         (written, woken) = (effect.written, effect.woken);
                         next_effect += 1;
+                        // What it has woken behind itself is for the next pass.
+                        from = effect.action + 1;
                     } else if let Some(next) = next {
                         from = next + 1;
                         let waits = self.may_wait(next, due)
