@@ -26,7 +26,7 @@ pub struct ReproduceArgs {
     /// repeated.
     #[arg(long, value_name = "N")]
     measurement: Vec<u32>,
-    /// Frames behind each measured number, at least 100; without it 500.
+    /// Frames behind each measured number, at least 100; without it 300.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
     frames: Option<u32>,
     /// Folder for the page (report.md, report.html, report.json), the figures as SVG and their numbers as CSV; made

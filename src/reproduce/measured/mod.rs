@@ -18,7 +18,7 @@ use crate::numerics::intervals::Estimate;
 use crate::report::{Chart, Grid};
 
 /// Frames behind each number, unless another count is wanted.
-pub const FRAMES: usize = 500;
+pub const FRAMES: usize = 300;
 
 /// What a study found.
 #[derive(Debug, Clone, Default)]
