@@ -82,7 +82,7 @@ struct Arc {
 
 struct Leveliser<'s> {
     survey: &'s Survey,
-    library: Library,
+    cell_library: Library,
     config: &'s SensorConfig,
     period_fs: i64,
     /// No cell is faster.
@@ -113,7 +113,7 @@ impl Levelised {
     ) -> Result<Self, Unlevelled> {
         let mut leveliser = Leveliser {
             survey,
-            library: Library::default(),
+            cell_library: Library::default(),
             config,
             period_fs: exposure.clock.period().as_fs(),
             fastest_fs: fastest_cell_fs(survey),

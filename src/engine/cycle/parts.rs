@@ -55,7 +55,7 @@ fn is_sampler(action: &Action) -> bool {
 }
 
 /// Places that an action writes.
-pub fn written(action: &Action) -> impl Iterator<Item = u16> {
+fn written(action: &Action) -> impl Iterator<Item = u16> {
     let [rise, fall] = action.masks;
     [action.out, rise, fall].into_iter().filter(|&p| p != SINK)
 }

@@ -133,7 +133,7 @@ impl Leveliser<'_> {
         let after_change = due - clock_to_q(index) - self.period_fs / 2 - clock_to_q(register);
         let edges = after_change.div_euclid(self.period_fs);
         let after = after_change.rem_euclid(self.period_fs);
-        let limits = self.library.checks(cell.kind);
+        let limits = self.cell_library.checks(cell.kind);
         let limit = |limit: DataLimit| {
             let longest = limit
                 .rise

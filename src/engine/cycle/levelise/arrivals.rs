@@ -178,7 +178,7 @@ impl Leveliser<'_> {
             let loads = self.loads.get(&net).map_or(&[][..], Vec::as_slice);
             for &(cell, pin) in loads.iter().filter(|_| edge == Edge::Rise) {
                 let removal = self
-                    .library
+                    .cell_library
                     .checks(cells[cell].kind)
                     .removal
                     .at(self.config.corner);
