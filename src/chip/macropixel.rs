@@ -185,7 +185,7 @@ impl<'a> Model<'a> {
         // STOP edge number `cycle` is the next whose reset has not been released yet.
         let mut cycle = 0;
         let mut stop = exposure.stop(0);
-        let mut ticks = exposure.clock.ticks().map(|t| t - exposure.stop_phase);
+        let mut ticks = exposure.clock.ticks(0).map(|t| t - exposure.stop_phase);
 
         for edge in 0..=cycles * periods {
             let (fall, rise) = (

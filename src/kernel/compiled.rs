@@ -6,25 +6,15 @@
 use crate::logic::Logic;
 use crate::netlist::{ArcDelay, CellKind, FlatCell, MAX_INPUTS, Netlist, Timing, next_state};
 
-/// What a change of an input pin means for its cell. A flip-flop's D means nothing until it is sampled, and
-/// is then read from its net: it has no entry in any fan-out.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum PinClass {
-    /// Any change may change the output.
-    Active,
-    /// Only going high (or unknown) may change the output.
-    Clock,
-}
-
-/// One entry of a net's fan-out: cell, class and pin in one word.
+/// One entry of a net's fan-out: cell and pin in one word.
 #[derive(Clone, Copy)]
 pub(super) struct Load(u32);
 
 impl Load {
-    const CELL_SHIFT: u32 = 4;
+    const CELL_SHIFT: u32 = 2;
 
-    fn new(cell: usize, class: PinClass, pin: usize) -> Self {
-        Load((cell as u32) << Self::CELL_SHIFT | (class as u32) << 2 | pin as u32)
+    fn new(cell: usize, pin: usize) -> Self {
+        Load((cell as u32) << Self::CELL_SHIFT | pin as u32)
     }
 
     #[inline]
@@ -32,26 +22,17 @@ impl Load {
         (self.0 >> Self::CELL_SHIFT) as usize
     }
 
-    /// Shift of the pin's two bits in the packed inputs.
     #[inline]
-    pub fn shift(self) -> u32 {
-        (self.0 & 3) * 2
-    }
-
-    #[inline]
-    pub fn class(self) -> PinClass {
-        if self.0 >> 2 & 1 == 0 {
-            PinClass::Active
-        } else {
-            PinClass::Clock
-        }
+    pub fn pin(self) -> usize {
+        (self.0 & 3) as usize
     }
 }
 
 /// State of one cell.
 #[derive(Clone, Copy)]
 pub(super) struct CellState {
-    /// Input values now, two bits each.
+    /// Input values now, two bits each. A flip-flop's D and clock are not among them: they are read from their
+    /// nets, so that a clock edge writes nothing into the flip-flops it means nothing to.
     pub inputs: u8,
     /// Input values at the last evaluation.
     pub evaluated: u8,
@@ -59,8 +40,9 @@ pub(super) struct CellState {
     /// A flip-flop's state, two bits.
     pub state: u8,
     pub is_dirty: bool,
-    /// The net on a flip-flop's D.
+    /// The nets on a flip-flop's D and clock.
     pub data: u32,
+    pub clock: u32,
     /// Index of its delays.
     pub delays: u32,
     /// Output nets, `u32::MAX` where unconnected.
@@ -101,10 +83,11 @@ impl Tables {
         self.gates[kind as usize][inputs as usize]
     }
 
+    /// `inputs` with D and clock among them, and the clock before.
     #[inline]
-    pub fn flip_flop(&self, inputs: u8, evaluated: u8, state: u8) -> u8 {
-        let clock_before = (evaluated >> 2 & 3) as usize;
-        self.flip_flop[inputs as usize | clock_before << 8 | (state as usize) << 10]
+    pub fn flip_flop(&self, inputs: u8, clock_before: u8, state: u8) -> u8 {
+        let before_and_state = (clock_before | state << 2) as usize;
+        self.flip_flop[inputs as usize | before_and_state << 8]
     }
 }
 
@@ -144,27 +127,52 @@ impl DelaySet {
     }
 }
 
-/// Fan-out lists of all nets, one after the other.
+/// Pin of a flip-flop's clock.
+pub(super) const CLOCK: usize = 1;
+
+/// What hangs on each net. A flip-flop's D means nothing until it is sampled: it is in no list.
 pub(super) struct FanOut {
-    start: Vec<u32>,
-    loads: Vec<Load>,
+    /// Pins any change of which may change the output.
+    pub active: Loads,
+    /// Clocks: only going high (or unknown) may change the output.
+    pub clocks: Loads,
 }
 
 impl FanOut {
     pub fn new(netlist: &Netlist) -> Self {
+        let is_clock = |cell: &FlatCell, pin| cell.kind.is_flip_flop() && pin == CLOCK;
+        FanOut {
+            active: Loads::new(netlist, |cell, pin| {
+                cell.kind.triggers(pin) && !is_clock(cell, pin)
+            }),
+            clocks: Loads::new(netlist, is_clock),
+        }
+    }
+}
+
+/// Lists of pins for all nets, one after the other.
+pub(super) struct Loads {
+    start: Vec<u32>,
+    loads: Vec<Load>,
+}
+
+impl Loads {
+    /// The pins that `counts`.
+    fn new(netlist: &Netlist, counts: impl Fn(&FlatCell, usize) -> bool) -> Self {
         let mut start = vec![0u32; netlist.net_count() + 1];
         let cells = netlist.cells();
         assert!(
             cells.len() < 1 << (32 - Load::CELL_SHIFT),
             "more cells than a Load can number"
         );
-        let triggers = |cell: &FlatCell| {
-            let (kind, inputs) = (cell.kind, cell.inputs);
-            let pins = (0..kind.inputs().len()).filter(move |&pin| kind.triggers(pin));
-            pins.map(move |pin| (pin, inputs[pin].index()))
+        let counts = &counts;
+        let pins = |cell: &FlatCell| {
+            let cell = *cell;
+            let pins = (0..cell.kind.inputs().len()).filter(move |&pin| counts(&cell, pin));
+            pins.map(move |pin| (pin, cell.inputs[pin].index()))
         };
         for cell in cells {
-            for (_, net) in triggers(cell) {
+            for (_, net) in pins(cell) {
                 start[net + 1] += 1;
             }
         }
@@ -174,18 +182,13 @@ impl FanOut {
         let mut next = start.clone();
         let mut loads = vec![Load(0); *start.last().expect("never empty") as usize];
         for (index, cell) in cells.iter().enumerate() {
-            for (pin, net) in triggers(cell) {
-                let class = if cell.kind.is_flip_flop() && pin == 1 {
-                    PinClass::Clock
-                } else {
-                    PinClass::Active
-                };
+            for (pin, net) in pins(cell) {
                 let at = &mut next[net];
-                loads[*at as usize] = Load::new(index, class, pin);
+                loads[*at as usize] = Load::new(index, pin);
                 *at += 1;
             }
         }
-        FanOut { start, loads }
+        Loads { start, loads }
     }
 
     #[inline]
@@ -203,7 +206,10 @@ pub(super) fn initial_cells(netlist: &Netlist, timing: &Timing) -> Vec<CellState
         .map(|(index, cell)| {
             let pins = cell.kind.inputs().len() as u32;
             // Pins a cell does not have read 0: no set, no reset.
-            let inputs = (0b1010_1010u32 & ((1 << (2 * pins)) - 1)) as u8;
+            let mut inputs = (0b1010_1010u32 & ((1 << (2 * pins)) - 1)) as u8;
+            if cell.kind.is_flip_flop() {
+                inputs &= 0b1111_0000;
+            }
             CellState {
                 inputs,
                 evaluated: inputs,
@@ -211,6 +217,7 @@ pub(super) fn initial_cells(netlist: &Netlist, timing: &Timing) -> Vec<CellState
                 state: Logic::X.bits(),
                 is_dirty: false,
                 data: cell.inputs[0].index() as u32,
+                clock: cell.inputs[CLOCK].index() as u32,
                 delays: timing.set_of(index),
                 outputs: cell.outputs.map(|n| {
                     if n.is_some() {

@@ -17,7 +17,7 @@
 //! All lanes have the delays of one [`Timing`]: nominal, or annotated, or the mismatch of one macropixel. Delays
 //! that differ from lane to lane would give each lane events of its own, and nothing would be left to share.
 
-use super::compiled::{DelaySet, FanOut, PinClass};
+use super::compiled::{CLOCK, DelaySet, FanOut};
 use super::lane_word::Lanes;
 use super::wheel::{Event, TimeWheel};
 use crate::logic::Logic;
@@ -238,21 +238,24 @@ impl LaneKernel {
         observer.change(Time::from_fs(self.now_fs), NetId::new(net), mask, after);
         let rose = mask & before.zero & after.one;
         let may_have_risen = mask & (before.zero & after.unknown() | before.unknown() & after.one);
-        for &load in self.fan_out.of(net) {
+        for &load in self.fan_out.active.of(net) {
             let cell = &mut self.cells[load.cell()];
-            let pin = load.shift() as usize / 2;
-            if load.class() == PinClass::Clock {
-                // A clock going low causes nothing.
-                let caused = mask & !after.zero;
-                cell.changed[pin] |= caused;
-                cell.rose |= rose;
-                cell.may_have_risen |= may_have_risen;
-                if caused == 0 {
-                    continue;
-                }
-            } else {
-                cell.changed[pin] |= mask;
+            cell.changed[load.pin()] |= mask;
+            if !cell.is_dirty {
+                cell.is_dirty = true;
+                self.dirty.push(load.cell() as u32);
             }
+        }
+        // A clock going low causes nothing.
+        let caused = mask & !after.zero;
+        if caused == 0 {
+            return;
+        }
+        for &load in self.fan_out.clocks.of(net) {
+            let cell = &mut self.cells[load.cell()];
+            cell.changed[CLOCK] |= caused;
+            cell.rose |= rose;
+            cell.may_have_risen |= may_have_risen;
             if !cell.is_dirty {
                 cell.is_dirty = true;
                 self.dirty.push(load.cell() as u32);

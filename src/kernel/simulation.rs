@@ -2,7 +2,7 @@
 
 use rand_philox::splitmix64;
 
-use super::compiled::{CellState, DelaySet, FanOut, PinClass, Tables, initial_cells};
+use super::compiled::{CLOCK, CellState, DelaySet, FanOut, Tables, initial_cells};
 use super::observer::Observer;
 use super::stimulus::Stimulus;
 use super::transport::TransportQueues;
@@ -23,11 +23,18 @@ const QUEUED_GENERATION: u32 = 1;
 /// Rounds of zero-delay changes in one instant after which a loop is assumed to oscillate.
 const MOST_DELTA_CYCLES: u32 = 10_000;
 
+/// Bits of a flip-flop's reset and set in its packed inputs.
+const RESET_AND_SET: u8 = 0b1111_0000;
+
 #[derive(Clone, Copy)]
 struct NetState {
     generation: u32,
     value: u8,
     pending: u8,
+    /// As a clock: its value when the flip-flops on it last looked, or 0 where it has fallen since.
+    clock_before: u8,
+    /// In the list of clocks that have risen.
+    has_risen: bool,
 }
 
 /// What a simulation did.
@@ -48,7 +55,11 @@ pub struct Kernel {
     tables: Tables,
     delays: Vec<DelaySet>,
     wheel: TimeWheel,
+    /// Cells to evaluate in this round, and nets whose flip-flops are to look at D.
     dirty: Vec<u32>,
+    risen: Vec<u32>,
+    /// Flip-flops that may change with the present clock edge.
+    woken: Vec<usize>,
     transport: TransportQueues,
     shuffle: Option<Shuffle>,
     statistics: Statistics,
@@ -61,6 +72,8 @@ impl Kernel {
             generation: 0,
             value: Logic::X.bits(),
             pending: NONE,
+            clock_before: Logic::X.bits(),
+            has_risen: false,
         };
         let transport = TransportQueues::new(netlist, timing);
         let mut nets = vec![unknown; netlist.net_count()];
@@ -76,6 +89,8 @@ impl Kernel {
             tables: Tables::new(),
             wheel: TimeWheel::new(),
             dirty: Vec::new(),
+            risen: Vec::new(),
+            woken: Vec::new(),
             transport,
             shuffle: None,
             statistics: Statistics::default(),
@@ -161,14 +176,14 @@ impl Kernel {
         debug_assert!(cell.kind.is_flip_flop(), "only a flip-flop has a state");
         // No pin changes: what is left is what reset and set make of an unknown state.
         let unknown = Logic::X.bits();
-        let state = self.tables.flip_flop(cell.inputs, cell.inputs, unknown);
+        let (no_edge, before) = (cell.inputs, 0);
+        let state = self.tables.flip_flop(no_edge, before, unknown);
         if state == cell.state {
             return;
         }
         cell.state = state;
         let (outputs, set) = (cell.outputs, cell.delays as usize);
         let inverted = Logic::from_bits(state).inverted().bits();
-        const CLOCK: usize = 1;
         let delays = *self.delays[set].after_pin(CLOCK);
         self.schedule(outputs[0], state, &delays);
         self.schedule(outputs[1], inverted, &delays);
@@ -183,12 +198,13 @@ impl Kernel {
                     self.arrive(event, observer);
                 }
             }
-            if self.dirty.is_empty() {
+            if self.dirty.is_empty() && self.risen.is_empty() {
                 return;
             }
             let mut dirty = std::mem::take(&mut self.dirty);
             if let Some(shuffle) = &mut self.shuffle {
                 shuffle.permute(&mut dirty);
+                shuffle.permute(&mut self.risen);
             }
             self.statistics.evaluations += dirty.len() as u64;
             for &cell in &dirty {
@@ -196,6 +212,10 @@ impl Kernel {
             }
             dirty.clear();
             self.dirty = dirty;
+            // After the others: a flip-flop whose reset changed, too, has seen both by now, and this changes nothing.
+            while let Some(net) = self.risen.pop() {
+                self.clock(net as usize);
+            }
         }
         panic!("zero-delay loop oscillates at {}", self.now());
     }
@@ -239,22 +259,42 @@ impl Kernel {
             NetId::new(net),
             Logic::from_bits(value),
         );
-        for &load in self.fan_out.of(net) {
+        let state = &mut self.nets[net];
+        if value == Logic::Zero.bits() {
+            state.clock_before = value;
+        } else if !state.has_risen && !self.fan_out.clocks.of(net).is_empty() {
+            state.has_risen = true;
+            self.risen.push(net as u32);
+        }
+        for &load in self.fan_out.active.of(net) {
             let cell = &mut self.cells[load.cell()];
-            let shift = load.shift();
+            let shift = 2 * load.pin();
             cell.inputs = cell.inputs & !(3 << shift) | value << shift;
-            match load.class() {
-                PinClass::Clock if value == Logic::Zero.bits() => {
-                    cell.evaluated = cell.evaluated & !(3 << shift) | value << shift;
-                }
-                _ => {
-                    if !cell.is_dirty {
-                        cell.is_dirty = true;
-                        self.dirty.push(load.cell() as u32);
-                    }
-                }
+            if !cell.is_dirty {
+                cell.is_dirty = true;
+                self.dirty.push(load.cell() as u32);
             }
         }
+    }
+
+    /// The flip-flops on a clock that has risen look at D.
+    #[inline]
+    fn clock(&mut self, net: usize) {
+        let loads = self.fan_out.clocks.of(net);
+        self.statistics.evaluations += loads.len() as u64;
+        let (cells, nets) = (&self.cells[..], &self.nets[..]);
+        // Most hold already what they would take.
+        self.woken
+            .extend(loads.iter().map(|load| load.cell()).filter(|&cell| {
+                let cell = &cells[cell];
+                cell.inputs & RESET_AND_SET != 0 || nets[cell.data as usize].value != cell.state
+            }));
+        while let Some(cell) = self.woken.pop() {
+            self.evaluate_flip_flop(cell, self.cells[cell].inputs);
+        }
+        let state = &mut self.nets[net];
+        state.has_risen = false;
+        state.clock_before = state.value;
     }
 
     #[inline]
@@ -267,25 +307,36 @@ impl Kernel {
         }
         let (inputs, evaluated, kind) = (cell.inputs, cell.evaluated, cell.kind);
         cell.evaluated = inputs;
-        let (outputs, set) = (cell.outputs, cell.delays);
         if kind.is_flip_flop() {
-            let data = self.nets[cell.data as usize].value;
-            let state = self
-                .tables
-                .flip_flop(inputs & !3 | data, evaluated, cell.state);
-            if state == cell.state {
-                return;
-            }
-            cell.state = state;
-            let inverted = Logic::from_bits(state).inverted().bits();
-            let delays = self.delays[set as usize].after(inputs, evaluated);
-            self.schedule(outputs[0], state, &delays);
-            self.schedule(outputs[1], inverted, &delays);
+            self.evaluate_flip_flop(index, evaluated);
         } else {
+            let (output, set) = (cell.outputs[0], cell.delays);
             let value = self.tables.gate(kind, inputs);
             let delays = self.delays[set as usize].after(inputs, evaluated);
-            self.schedule(outputs[0], value, &delays);
+            self.schedule(output, value, &delays);
         }
+    }
+
+    /// With its reset and set before.
+    #[inline]
+    fn evaluate_flip_flop(&mut self, index: usize, evaluated: u8) {
+        let cell = &mut self.cells[index];
+        let clock = &self.nets[cell.clock as usize];
+        let data = self.nets[cell.data as usize].value;
+        let inputs = cell.inputs | clock.value << (2 * CLOCK);
+        let before = evaluated | clock.clock_before << (2 * CLOCK);
+        let state = self
+            .tables
+            .flip_flop(inputs | data, clock.clock_before, cell.state);
+        if state == cell.state {
+            return;
+        }
+        cell.state = state;
+        let (outputs, set) = (cell.outputs, cell.delays);
+        let inverted = Logic::from_bits(state).inverted().bits();
+        let delays = self.delays[set as usize].after(inputs, before);
+        self.schedule(outputs[0], state, &delays);
+        self.schedule(outputs[1], inverted, &delays);
     }
 
     #[inline]

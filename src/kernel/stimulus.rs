@@ -57,7 +57,7 @@ pub fn in_order(mut drives: Vec<Drive>) -> Stimulus<'static> {
 }
 
 /// A clock's edges for half periods `first..end` counted from `origin`: even ones fall, odd ones
-/// rise, each computed from its number.
+/// rise, none with an error that adds up.
 pub fn clock(
     net: NetId,
     frequency: Frequency,
@@ -65,13 +65,9 @@ pub fn clock(
     first: i64,
     end: i64,
 ) -> impl Iterator<Item = Drive> + Send {
-    (first..end).map(move |k| {
-        Drive::new(
-            origin + frequency.half_periods(k),
-            net,
-            k.rem_euclid(2) == 1,
-        )
-    })
+    (first..end)
+        .zip(frequency.ticks(first))
+        .map(move |(k, tick)| Drive::new(origin + tick, net, k.rem_euclid(2) == 1))
 }
 
 #[cfg(test)]

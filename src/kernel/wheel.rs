@@ -5,6 +5,13 @@
 //! one 8.2 ps slot are sorted by (time, net) when the slot is opened. At most one *valid* event per
 //! net exists, so that order is total; cancelled events stay queued and are recognised by their
 //! generation.
+//!
+//! ```text
+//!   first[slot] ──► node ──► node ──► NONE        free ──► node ──► NONE
+//! ```
+//!
+//! The slots are linked lists in one pool whose nodes are taken again last freed first: few events are on their
+//! way at once, so what the wheel touches stays in the nearest cache, wherever in the wheel they lie.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -22,10 +29,23 @@ pub(super) struct Event {
     pub tag: u32,
 }
 
+/// No node.
+const NONE: u32 = u32::MAX;
+
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    event: Event,
+    next: u32,
+}
+
 /// Events in time order. Time never runs backwards: pushes must not precede [`TimeWheel::advance`].
 #[derive(Debug, Clone)]
 pub(super) struct TimeWheel {
-    slots: Vec<Vec<Event>>,
+    /// First node of each slot's list.
+    first: Box<[u32; SLOTS]>,
+    nodes: Vec<Node>,
+    /// First node that is not in use.
+    free: u32,
     occupied: [u64; WORDS],
     /// Bit w is set when `occupied[w]` is not zero.
     summary: u32,
@@ -39,7 +59,9 @@ pub(super) struct TimeWheel {
 impl TimeWheel {
     pub fn new() -> Self {
         TimeWheel {
-            slots: vec![Vec::new(); SLOTS],
+            first: Box::new([NONE; SLOTS]),
+            nodes: Vec::new(),
+            free: NONE,
             occupied: [0; WORDS],
             summary: 0,
             far: BinaryHeap::new(),
@@ -68,7 +90,15 @@ impl TimeWheel {
     #[inline]
     fn put(&mut self, slot: i64, event: Event) {
         let index = slot as usize % SLOTS;
-        self.slots[index].push(event);
+        let next = std::mem::replace(&mut self.first[index], self.free);
+        let node = Node { event, next };
+        match self.nodes.get_mut(self.free as usize) {
+            Some(unused) => self.free = std::mem::replace(unused, node).next,
+            None => {
+                self.first[index] = self.nodes.len() as u32;
+                self.nodes.push(node);
+            }
+        }
         self.occupied[index / 64] |= 1 << (index % 64);
         self.summary |= 1 << (index / 64);
     }
@@ -117,7 +147,13 @@ impl TimeWheel {
         self.position = 0;
         self.open_slot = slot;
         let index = slot as usize % SLOTS;
-        std::mem::swap(&mut self.open, &mut self.slots[index]);
+        let mut at = std::mem::replace(&mut self.first[index], NONE);
+        while let Some(node) = self.nodes.get_mut(at as usize) {
+            self.open.push(node.event);
+            let next = std::mem::replace(&mut node.next, self.free);
+            self.free = at;
+            at = next;
+        }
         self.occupied[index / 64] &= !(1 << (index % 64));
         if self.occupied[index / 64] == 0 {
             self.summary &= !(1 << (index / 64));

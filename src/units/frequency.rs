@@ -114,15 +114,16 @@ impl Frequency {
         numerator.div_euclid(self.numerator as i128) as i64
     }
 
-    /// The times of half periods 0, 1, 2, … without end: the same as [`Frequency::half_periods`] of each, by
-    /// addition with an exact remainder.
-    pub fn ticks(self) -> impl Iterator<Item = Time> + Send {
+    /// The times of half periods `first`, `first` + 1, … without end: the same as [`Frequency::half_periods`] of
+    /// each, by addition with an exact remainder.
+    pub fn ticks(self, first: i64) -> impl Iterator<Item = Time> + Send {
         let modulus = 2 * self.numerator;
         let step = FS_PER_S * self.denominator as i128;
         let quotient = (step / modulus as i128) as i64;
         let remainder = (step % modulus as i128) as u64;
-        let mut time = Time::ZERO;
-        let mut fraction = self.numerator;
+        let mut time = self.half_periods(first);
+        let start = first as i128 * step + self.numerator as i128;
+        let mut fraction = start.rem_euclid(modulus as i128) as u64;
         std::iter::from_fn(move || {
             let tick = time;
             time += Time::from_fs(quotient);
@@ -194,10 +195,10 @@ mod tests {
         }
 
         #[test]
-        fn ticks_are_the_half_periods(hz in 1e6f64..2e9) {
+        fn ticks_are_the_half_periods(hz in 1e6f64..2e9, first in -1_000_000_000i64..1_000_000_000) {
             let f = Frequency::from_hz_f64(hz).unwrap();
-            for (k, tick) in f.ticks().take(10_000).enumerate() {
-                prop_assert_eq!(tick, f.half_periods(k as i64));
+            for (k, tick) in (first..).zip(f.ticks(first).take(10_000)) {
+                prop_assert_eq!(tick, f.half_periods(k));
             }
         }
 
