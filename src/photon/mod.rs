@@ -4,7 +4,7 @@
 mod budget;
 mod gaussian;
 mod optics;
-mod philox;
+pub(crate) mod philox;
 mod pulse;
 mod random;
 pub mod solar;

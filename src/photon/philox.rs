@@ -96,6 +96,27 @@ impl Blocks {
     }
 }
 
+/// Words 0 and 1, and words 2 and 3, of twice [`LANES`] blocks with first counter words from `first` on and these other
+/// ones, as [`Blocks::rows`] gives them.
+pub fn blocks_from(first: u32, others: [u32; 3], key: [u32; 2]) -> [[u64; 2 * LANES]; 2] {
+    let [second, third, fourth] = others;
+    let firsts: [u32; 2 * LANES] = std::array::from_fn(|block| first.wrapping_add(block as u32));
+    let mut words = [[0; 2 * LANES]; 2];
+    let mut odd = words;
+    generate(
+        key,
+        [third, fourth],
+        &firsts,
+        &[second; 2 * LANES],
+        words.each_mut().map(|words| &mut words[..]),
+        odd.each_mut().map(|words| &mut words[..]),
+    );
+    for (words, odd) in words.iter_mut().zip(&odd) {
+        join(words, odd);
+    }
+    words
+}
+
 /// Words live in the low halves of 64-bit lanes, where vector units multiply them; high halves hold what is left over.
 #[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
 fn generate(
@@ -175,6 +196,12 @@ mod tests {
                 .iter()
                 .flat_map(|&(second, count)| (0..count).map(move |first| [first, second, third, fourth]))
                 .collect();
+            let alone = blocks_from(5, [6, third, fourth], key);
+            for block in 0..2 * LANES {
+                let words = rand_philox::philox4x32_10([5 + block as u32, 6, third, fourth], key);
+                let word = |word: usize| (alone[word / 2][block] >> (word % 2 * 32)) as u32;
+                prop_assert_eq!(words, std::array::from_fn(word));
+            }
             prop_assert_eq!(blocks.len(), counters.len());
             for (at, counter) in counters.into_iter().enumerate() {
                 let expected = rand_philox::philox4x32_10(counter, key);

@@ -1,8 +1,7 @@
 //! How many of some SPADs a photon hits in one step: the binomial tails that split a cohort.
 
-use rand_philox::Philox;
-
 use super::draw::binomial;
+use super::words::RandomWords;
 use crate::photon::SPADS;
 
 /// Probabilities that at least 0, 1, 2, … of some SPADs are hit, and their complements.
@@ -65,7 +64,7 @@ impl Hits {
     }
 
     /// Of `cycles` laser cycles in each of which at least `least` SPADs are hit, those with one more at least.
-    pub fn more(&self, cycles: u64, least: usize, random: &mut Philox) -> u64 {
+    pub fn more(&self, cycles: u64, least: usize, random: &mut RandomWords) -> u64 {
         if cycles == 0 || least >= self.spads || self.at_least[least] == 0.0 {
             return 0;
         }

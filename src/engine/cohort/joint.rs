@@ -14,11 +14,10 @@
 //! what. When an avalanche is forgotten, its nodes are leaves, and fold into their parents. Only nodes with cycles
 //! in them cost anything; nothing is rounded or merged that differs.
 
-use rand_philox::Philox;
-
 use super::blindness::{Ages, Blindness};
 use super::draw::binomial;
 use super::hits::Hits;
+use super::words::RandomWords;
 use super::{EventTable, Steps};
 use crate::photon::{DeadTimeLaw, SPADS};
 
@@ -29,7 +28,7 @@ pub fn run(
     steps: &Steps,
     is_event: &EventTable,
     cycles: u64,
-    random: &mut Philox,
+    random: &mut RandomWords,
 ) -> Vec<u64> {
     let mut tree = Tree::new(blindness, cycles);
     tree.age(ages, random);
@@ -144,7 +143,7 @@ impl<'a> Tree<'a> {
     }
 
     /// Draws the state at the start: independent SPADs, each with the probabilities `ages`.
-    fn age(&mut self, ages: &Ages, random: &mut Philox) {
+    fn age(&mut self, ages: &Ages, random: &mut RandomWords) {
         let mut younger: f64 = 1.0;
         for &share in ages.aged.iter().rev() {
             let p = if share > 0.0 {
@@ -166,7 +165,7 @@ impl<'a> Tree<'a> {
     }
 
     /// One step with `mean` photons on each SPAD.
-    fn advance(&mut self, mean: f64, random: &mut Philox) {
+    fn advance(&mut self, mean: f64, random: &mut RandomWords) {
         let (p, q) = (-libm::expm1(-mean), libm::exp(-mean));
         if p > 0.0 {
             let mut free: [Option<Hits>; SPADS + 1] = [None; SPADS + 1];
@@ -197,7 +196,7 @@ impl<'a> Tree<'a> {
     }
 
     /// Takes those cycles out of `node` in which something happens from group `first` on.
-    fn take(&mut self, node: u32, first: &Group, random: &mut Philox) -> u64 {
+    fn take(&mut self, node: u32, first: &Group, random: &mut RandomWords) -> u64 {
         let node = &mut self.nodes[node as usize];
         let (any, none) = (first.any_from_here, first.none_from_here);
         let taken = binomial(node.cycles, any.min(1.0), none, random);
@@ -243,7 +242,7 @@ impl<'a> Tree<'a> {
         groups: &[Group],
         waiting: bool,
         outcome: &Outcome,
-        random: &mut Philox,
+        random: &mut RandomWords,
     ) {
         if cycles == 0 {
             return;
@@ -283,7 +282,7 @@ impl<'a> Tree<'a> {
         groups: &[Group],
         count: usize,
         outcome: &Outcome,
-        random: &mut Philox,
+        random: &mut RandomWords,
     ) {
         if cycles == 0 {
             return;

@@ -28,6 +28,10 @@ mod hits;
 mod joint;
 mod light;
 mod pooled;
+mod words;
+
+use std::ops::Range;
+use std::sync::OnceLock;
 
 pub use self::blindness::BlindSpad;
 use self::blindness::{Ages, Blindness};
@@ -35,11 +39,10 @@ pub use self::draw::none_of;
 use self::hits::Hits;
 pub use self::hits::at_least_hit;
 use self::light::SpadLight;
+use self::words::RandomWords;
 use super::{Engine, EngineError, Exposed, LitPixel, Work};
 use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw, correlation, histogram, window_law};
-use crate::photon::{
-    PhotonStream, PixelLight, Purpose, SPADS, SpadEvent, StreamConfig, random_stream,
-};
+use crate::photon::{PhotonStream, PixelLight, SPADS, SpadEvent, StreamConfig};
 
 /// Whether 0, 1, 2, … SPADs that fire in a CLK period make an event.
 type EventTable = [bool; SPADS + 1];
@@ -85,8 +88,17 @@ pub struct Cohort<'a> {
     config: &'a SensorConfig,
     exposure: &'a Exposure,
     law: WindowLaw,
+    /// What the law says of each start value, once it has been asked.
+    windows: Vec<OnceLock<Opening>>,
     options: CohortOptions,
     is_event: EventTable,
+}
+
+/// A start value's window, and the beginning of the photon times it collects, in femtoseconds after STOP.
+#[derive(Debug, Clone, Copy)]
+struct Opening {
+    window: window_law::Window,
+    from_fs: f64,
 }
 
 impl<'a> Cohort<'a> {
@@ -101,9 +113,21 @@ impl<'a> Cohort<'a> {
             config,
             exposure,
             law: WindowLaw::new(config, exposure),
+            windows: vec![OnceLock::new(); usize::from(config.largest_start()) + 1],
             options,
             is_event,
         }
+    }
+
+    fn opening(&self, start: u16) -> Opening {
+        let of_law = || {
+            let window = self.law.window(start);
+            let from_fs = window.open().map_or(0.0, |window| {
+                self.law.interval(&window).start.as_fs() as f64
+            });
+            Opening { window, from_fs }
+        };
+        *self.windows[usize::from(start)].get_or_init(of_law)
     }
 
     /// A histogram of macropixel `pixel` under `light`, bin 0 earliest: a pure function of the stream's seed and
@@ -136,7 +160,7 @@ impl<'a> Cohort<'a> {
         light: &PixelLight,
     ) -> Result<Vec<u64>, EngineError> {
         let mut hits = vec![0; self.config.bins];
-        let random = &mut random_stream(stream.seed, Purpose::Cohort, pixel, 0);
+        let random = &mut RandomWords::new(stream.seed, pixel);
         for cohort in self.cohorts(stream, start, light)? {
             let (steps, cycles) = (&cohort.steps, cohort.cycles);
             let pools = steps.per_period == 1
@@ -196,7 +220,8 @@ impl<'a> Cohort<'a> {
         light: &PixelLight,
     ) -> Result<Vec<LikeCycles>, EngineError> {
         let bins = self.config.bins;
-        let window = match self.law.window(start) {
+        let Opening { window, from_fs } = self.opening(start);
+        let window = match window {
             window_law::Window::Open(window) => window,
             window_law::Window::Never => return Ok(Vec::new()),
             window_law::Window::Irregular(why) => return Err(EngineError::Irregular(why)),
@@ -213,12 +238,14 @@ impl<'a> Cohort<'a> {
             return Err(EngineError::NotInCohorts(what));
         }
         let dead_steps = dead_fs / period_fs * self.options.sub_bins as f64;
+        let light = SpadLight::new(stream, light);
         let scene = Scene {
-            light: SpadLight::new(stream, light),
+            light,
+            busy: -libm::expm1(-light.background(dead_fs)),
             blindness: Blindness::new(stream.spads.law, dead_steps),
             step_fs: period_fs / self.options.sub_bins as f64,
             dead_fs,
-            from_fs: self.law.interval(&window).start.as_fs() as f64,
+            from_fs,
             cycle_fs: period_fs * f64::from(stream.stop_periods),
         };
         let cycles = i64::from(self.exposure.laser_cycles);
@@ -291,7 +318,7 @@ impl Engine for Cohort<'_> {
             let light = pixel.light.unwrap_or(dark);
             let counts = self.draw(config, pixel.number, pixel.start, &light)?;
             exposed.histograms.push(counts);
-            let closed = self.law.window(pixel.start).open().is_none();
+            let closed = self.opening(pixel.start).window.open().is_none();
             let periods = u64::from(config.stop_periods) * u64::from(config.laser_cycles);
             exposed.work += Work {
                 macropixels: 1,
@@ -323,6 +350,8 @@ struct Scene {
     dead_fs: f64,
     from_fs: f64,
     cycle_fs: f64,
+    /// Probability of a background photon on a SPAD within a dead time.
+    busy: f64,
 }
 
 impl Scene {
@@ -332,27 +361,23 @@ impl Scene {
         let echo = self.light.echo(0.0);
         let (echo_fs, cuts) = echo.map_or((0.0, 0.0), |echo| (echo.end - echo.start, 1.0));
         let stretches = ((duration_fs - echo_fs) / self.dead_fs - cuts).floor();
-        let busy = -libm::expm1(-self.light.background(self.dead_fs));
-        if stretches >= 1.0 {
-            busy.powf(stretches)
-        } else {
-            1.0
-        }
+        self.busy.powi(stretches.clamp(0.0, 1e9) as i32)
     }
 
     /// The state at the start of the window in a settled laser cycle.
     fn steady_start(&self) -> Ages {
         let background = self.light.background(self.step_fs);
         let steady = Ages::steady(&self.blindness, background);
-        let busy = -libm::expm1(-self.light.background(self.dead_fs));
-        let stretches = (libm::log(FORGOTTEN) / libm::log(busy)).ceil().max(1.0);
-        let remembered_from = self.from_fs - stretches * self.dead_fs;
+        let is_remembered = |echo: &Range<f64>| {
+            let stretches = ((self.from_fs - echo.end) / self.dead_fs).clamp(0.0, 1e9);
+            self.busy.powi(stretches as i32) > FORGOTTEN
+        };
         let own_cycle = (self.from_fs / self.cycle_fs).floor();
         let echoes = [own_cycle - 1.0, own_cycle].map(|cycle| self.light.echo(cycle));
         let earliest = echoes
             .into_iter()
             .flatten()
-            .filter(|echo| echo.start < self.from_fs && echo.end > remembered_from)
+            .filter(|echo| echo.start < self.from_fs && is_remembered(echo))
             .map(|echo| echo.start)
             .reduce(f64::min);
         match earliest {

@@ -13,11 +13,9 @@
 //! bins' counts then lose the part of their correlation that passes through coincidences within a cycle: at most
 //! ρ² of their variance, where ρ = p/(1 − p) for p photons on a SPAD in a period. [`neglected`] gives it.
 
-use rand_philox::Philox;
-
 use super::blindness::{Ages, Blindness};
-use super::draw::{below, binomial, overlap, uniform};
-use super::hits::Hits;
+use super::draw::{Draws, binomial};
+use super::words::RandomWords;
 use super::{EventTable, Steps};
 use crate::photon::{DeadTimeLaw, SPADS};
 
@@ -40,25 +38,63 @@ pub fn run(
     steps: &Steps,
     is_event: &EventTable,
     cycles: u64,
-    random: &mut Philox,
+    random: &mut RandomWords,
 ) -> Vec<u64> {
     debug_assert_eq!(steps.per_period, 1);
     let mut pool = Pool::new(blindness, ages, cycles, random);
-    let mut last: Option<(f64, Hits)> = None;
-    steps
-        .means
-        .iter()
-        .map(|&mean| {
-            let hits = match last {
-                Some((before, hits)) if before == mean => hits,
-                _ => Hits::new(SPADS, -libm::expm1(-mean), libm::exp(-mean)),
-            };
-            last = Some((mean, hits));
-            let with = pool.period(&hits, random);
+    let mut counts = Vec::with_capacity(steps.means.len());
+    for means in steps.means.chunks(TOGETHER) {
+        let further = Further::of(means);
+        counts.extend((0..means.len()).map(|period| {
+            let with = pool.period(&further, period, random);
             let counted = with.iter().zip(is_event).filter(|(_, event)| **event);
-            counted.map(|(cycles, _)| cycles).sum()
-        })
-        .collect()
+            counted.map(|(cycles, _)| cycles).sum::<u64>()
+        }));
+    }
+    counts
+}
+
+/// CLK periods whose probabilities are computed side by side.
+const TOGETHER: usize = 8;
+
+/// Probabilities that a laser cycle in which 0, 1, 2, … SPADs are hit at least has one more, in every one of several
+/// CLK periods.
+///
+/// With o = p/(1 − p), what is known to be k or more is k with probability 1/tₖ, where
+/// tₖ = 1 + (16 − k)/(k + 1) · o · tₖ₊₁ and t₁₆ = 1: every term is positive, so no digits are lost.
+struct Further {
+    /// tₖ − 1.
+    more: [[f64; TOGETHER]; SPADS],
+}
+
+impl Further {
+    /// For `means` photons on a SPAD.
+    fn of(means: &[f64]) -> Self {
+        let mut odds = [0.0; TOGETHER];
+        for (odds, &mean) in odds.iter_mut().zip(means) {
+            // p/(1 − p) for 1 − p = exp(−mean).
+            *odds = libm::expm1(mean);
+        }
+        let mut more = [[0.0; TOGETHER]; SPADS];
+        let mut t = [1.0; TOGETHER];
+        for (hit, more) in more.iter_mut().enumerate().rev() {
+            let ways = (SPADS - hit) as f64 / (hit + 1) as f64;
+            for period in 0..TOGETHER {
+                more[period] = ways * odds[period] * t[period];
+                t[period] = 1.0 + more[period];
+            }
+        }
+        Further { more }
+    }
+
+    /// Of `cycles` in each of which at least `least` SPADs are hit in a period, those with one more at least.
+    fn more(&self, cycles: u64, least: usize, period: usize, random: &mut RandomWords) -> u64 {
+        let Some(more) = self.more.get(least) else {
+            return 0;
+        };
+        let exactly = 1.0 / (1.0 + more[period]);
+        binomial(cycles, more[period] * exactly, exactly, random)
+    }
 }
 
 struct Pool<'a> {
@@ -71,7 +107,7 @@ struct Pool<'a> {
 }
 
 impl<'a> Pool<'a> {
-    fn new(blindness: &'a Blindness, ages: &Ages, cycles: u64, random: &mut Philox) -> Self {
+    fn new(blindness: &'a Blindness, ages: &Ages, cycles: u64, random: &mut RandomWords) -> Self {
         let (mut left, mut share_left) = (SPADS as u64 * cycles, 1.0);
         let counts = ages.aged.iter().map(|&share| {
             let p = if share > 0.0 {
@@ -93,12 +129,17 @@ impl<'a> Pool<'a> {
     }
 
     /// One CLK period: how many cycles have pulses of exactly 0, 1, 2, … SPADs.
-    fn period(&mut self, hits: &Hits, random: &mut Philox) -> [u64; SPADS + 1] {
+    fn period(
+        &mut self,
+        further: &Further,
+        period: usize,
+        random: &mut RandomWords,
+    ) -> [u64; SPADS + 1] {
         let mut with = [0; SPADS + 1];
         let mut at_least = self.cycles;
         let mut hit = 0;
         for (least, exactly) in with.iter_mut().enumerate() {
-            let more = hits.more(at_least, least, random);
+            let more = further.more(at_least, least, period, random);
             *exactly = at_least - more;
             hit += more;
             at_least = more;
@@ -106,58 +147,74 @@ impl<'a> Pool<'a> {
                 break;
             }
         }
-        let blind = self.meet_blind(hit, random);
-        drop_hits(&mut with, hit, blind, random);
-        let renewed = match self.blindness.law {
-            DeadTimeLaw::NonParalysable => hit - blind,
-            DeadTimeLaw::Paralysable => hit,
-        };
-        if self.aged.pop().is_some() {
-            self.aged.insert(0, renewed);
-        }
+        self.go_blind(hit, &mut with, random);
         with
     }
 
-    /// Of `hit` SPADs, how many are too blind for a pulse. Those that the hit renews leave their age.
-    fn meet_blind(&mut self, hit: u64, random: &mut Philox) -> u64 {
-        let mut left: u64 = self.aged.iter().sum();
-        let met = overlap(SPADS as u64 * self.cycles, left, hit, random);
-        let mut blind = 0;
-        for _ in 0..met {
-            let mut place = below(left, random);
-            let mut age = 0;
-            while place >= self.aged[age] {
-                place -= self.aged[age];
-                age += 1;
+    /// Of `hit` SPADs, of which `with` cycles have 0, 1, 2, …, takes those too blind for a pulse off the cycles they
+    /// fell into.
+    fn go_blind(&mut self, hit: u64, with: &mut [u64; SPADS + 1], random: &mut RandomWords) {
+        let mut marked: u64 = self.aged.iter().sum();
+        let draws = Draws {
+            total: SPADS as u64 * self.cycles,
+            marked,
+            draws: hit,
+        };
+        let mut pulses = hit;
+        draws.meet(random, |random| {
+            let age = self.meet(marked, random);
+            marked -= 1;
+            let able = self.blindness.able(age + 1);
+            if able > 0.0 && random.coarse() < able {
+                return;
             }
-            left -= 1;
-            self.aged[age] -= 1;
-            if uniform(random) < self.blindness.able(age + 1) {
-                continue;
-            }
-            blind += 1;
             if self.blindness.law == DeadTimeLaw::NonParalysable {
                 // It keeps its age, but is not hit a second time.
                 self.blind.push(age);
             }
-        }
+            take_off(with, pulses, random);
+            pulses -= 1;
+        });
         for age in self.blind.drain(..) {
             self.aged[age] += 1;
         }
-        blind
+        let renewed = match self.blindness.law {
+            DeadTimeLaw::NonParalysable => pulses,
+            DeadTimeLaw::Paralysable => hit,
+        };
+        grow_older(&mut self.aged, renewed);
+    }
+
+    /// Takes one of the `marked` SPADs that fired lately out of its age.
+    fn meet(&mut self, marked: u64, random: &mut RandomWords) -> usize {
+        let place = random.below(marked);
+        let (mut age, mut younger) = (0, 0);
+        // All ages are looked at: which one it is cannot be foreseen.
+        for count in &self.aged {
+            younger += count;
+            age += usize::from(place >= younger);
+        }
+        self.aged[age] -= 1;
+        age
     }
 }
 
-/// Takes `blind` of `hit` hits off the cycles they fell into, `with[f]` of which have f of them.
-fn drop_hits(with: &mut [u64; SPADS + 1], hit: u64, blind: u64, random: &mut Philox) {
-    for dropped in 0..blind {
-        let mut place = below(hit - dropped, random);
-        let mut hits = 1;
-        while place >= hits as u64 * with[hits] {
-            place -= hits as u64 * with[hits];
-            hits += 1;
-        }
-        with[hits] -= 1;
-        with[hits - 1] += 1;
+/// SPADs that fired one, two, … periods ago become a period older, and `renewed` ones join them.
+fn grow_older(aged: &mut [u64], renewed: u64) {
+    if let Some(older) = aged.len().checked_sub(1) {
+        aged.copy_within(..older, 1);
+        aged[0] = renewed;
     }
+}
+
+/// Takes one of `hits` off the cycle it fell into, `with[f]` of which have f of them.
+fn take_off(with: &mut [u64; SPADS + 1], hits: u64, random: &mut RandomWords) {
+    let mut place = random.below(hits);
+    let mut of = 1;
+    while place >= of as u64 * with[of] {
+        place -= of as u64 * with[of];
+        of += 1;
+    }
+    with[of] -= 1;
+    with[of - 1] += 1;
 }
