@@ -58,7 +58,7 @@ pub struct ParetoArgs {
     /// JSON instead of the table.
     #[arg(long)]
     json: bool,
-    /// Instead of all that: worst error of each function against references of 25 digits, at extreme arguments.
+    /// Instead of all that: worst error of each function against references of many digits, at extreme arguments.
     #[arg(long)]
     stability: bool,
     /// The table of --stability as Markdown.

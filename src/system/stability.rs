@@ -1,14 +1,17 @@
 //! Numerical stability: how far functions are from references of many digits, at extreme arguments.
 //!
-//! `vectors/stability/make.py` computes the references with mpmath at 60 digits and keeps them in files beside it:
-//! arguments as exact doubles, reference last. [`functions`] lists the functions concerned, each with the error that
-//! its documentation promises; a function joins by a file there and a line here.
+//! `vectors/stability/make.py` and the scripts in `vectors/theory` compute the references with mpmath at 34 to 360
+//! digits and keep them in files beside them: arguments as exact doubles, references last. [`functions`] lists the
+//! functions concerned, each with the error that its documentation promises; a function joins by a file there and a
+//! line here.
 
 use crate::chip::{Exposure, Overflow, SensorConfig, WindowLaw, histogram};
 use crate::engine::cohort::{BlindSpad, at_least_hit, none_of};
 use crate::photon::{DeadTimeLaw, Poisson, pulse_share};
 use crate::ranging::{PeakOptions, interpolate};
 use crate::report::Grid;
+use crate::theory::detection::{self, Detection, Model, PerCycle, Ties};
+use crate::theory::precision::{cramer_rao, thompson};
 use crate::units::{Frequency, Time};
 
 /// A result to compare.
@@ -29,6 +32,16 @@ pub enum Measure {
     Absolute,
 }
 
+/// A table of references: CSV with a header, one case a line.
+#[derive(Debug, Clone, Copy)]
+pub struct References {
+    csv: &'static str,
+    /// Its last columns hold the references of so many functions; those before are arguments.
+    functions: usize,
+    /// Which of them is meant.
+    function: usize,
+}
+
 /// A function and its references.
 #[derive(Debug, Clone, Copy)]
 pub struct Function {
@@ -36,8 +49,8 @@ pub struct Function {
     pub name: &'static str,
     /// What range the references cover.
     pub range: &'static str,
-    /// CSV with a header: arguments, then the reference.
-    pub references: &'static str,
+    /// What it is compared with.
+    pub references: References,
     /// The function of one line's arguments.
     pub compute: fn(&[f64]) -> Value,
     /// How its error is measured.
@@ -61,14 +74,21 @@ pub struct Worst {
 pub fn functions() -> Vec<Function> {
     macro_rules! references {
         ($name:literal) => {
-            include_str!(concat!("../../vectors/stability/", $name, ".csv"))
+            references!($name, 0 of 1)
+        };
+        ($name:literal, $function:literal of $functions:literal) => {
+            References {
+                csv: include_str!(concat!("../../vectors/", $name, ".csv")),
+                functions: $functions,
+                function: $function,
+            }
         };
     }
     vec![
         Function {
             name: "share of a Gaussian pulse",
             range: "edges to 30 sigma, widths 1e-9 to 1e3 sigma, sigma << bin",
-            references: references!("pulse_share"),
+            references: references!("stability/pulse_share"),
             compute: |a| Value::Real(pulse_share(a[0], a[1], a[2])),
             measure: Measure::Relative,
             promise: 1e-12,
@@ -76,7 +96,7 @@ pub fn functions() -> Vec<Function> {
         Function {
             name: "at least k of 16 SPADs hit",
             range: "1e-15 to 34.5 photons: p within 1e-15 of 0 and 1",
-            references: references!("hit_tails"),
+            references: references!("stability/hit_tails"),
             compute: |a| Value::Real(at_least_hit(a[0] as usize, a[1])),
             measure: Measure::Relative,
             promise: 1e-13,
@@ -84,7 +104,7 @@ pub fn functions() -> Vec<Function> {
         Function {
             name: "none of n cycles hit",
             range: "n to 1e9, p from 1e-15 to 0.5",
-            references: references!("none_hit"),
+            references: references!("stability/none_hit"),
             compute: |a| Value::Real(none_of(a[0] as u64, a[1], 1.0 - a[1])),
             measure: Measure::Relative,
             promise: 1e-12,
@@ -92,7 +112,7 @@ pub fn functions() -> Vec<Function> {
         Function {
             name: "pulses of a SPAD in even light",
             range: "both dead-time laws, 1e-15 to 1e3 photons a step, dead time 1 to 1000 steps",
-            references: references!("steady_pulse"),
+            references: references!("stability/steady_pulse"),
             compute: |a| {
                 let law = match a[0] {
                     0.0 => DeadTimeLaw::NonParalysable,
@@ -106,7 +126,7 @@ pub fn functions() -> Vec<Function> {
         Function {
             name: "Poisson exceedance table",
             range: "means 1e-15 to 64, counts to 150",
-            references: references!("poisson_exceedance"),
+            references: references!("stability/poisson_exceedance"),
             compute: |a| Value::Real(Poisson::new(a[0]).exceedance(a[1] as usize)),
             measure: Measure::Absolute,
             promise: 1e-15,
@@ -114,7 +134,7 @@ pub fn functions() -> Vec<Function> {
         Function {
             name: "clock edges",
             range: "1 Hz to 1 THz, to half period 2e12",
-            references: references!("clock_edges"),
+            references: references!("stability/clock_edges"),
             compute: |a| {
                 let edge = Frequency::from_hz(a[0] as u64).half_periods(a[1] as i64);
                 Value::Whole(edge.as_fs())
@@ -125,7 +145,7 @@ pub fn functions() -> Vec<Function> {
         Function {
             name: "window law: edge of a bin",
             range: "start values 0 to 511, laser cycles to 1e9",
-            references: references!("window_edges"),
+            references: references!("stability/window_edges"),
             compute: |a| {
                 let config = SensorConfig::default();
                 let law = WindowLaw::new(&config, &Exposure::new(&config, 520, u32::MAX));
@@ -142,7 +162,7 @@ pub fn functions() -> Vec<Function> {
         Function {
             name: "counters",
             range: "1 to 16 bits at the boundary, to 1e9 hits, saturating and wrapping",
-            references: references!("counters"),
+            references: references!("stability/counters"),
             compute: |a| {
                 let overflow = match a[1] {
                     0.0 => Overflow::Saturate,
@@ -156,7 +176,7 @@ pub fn functions() -> Vec<Function> {
         Function {
             name: "peak position, bins",
             range: "no counts, even counts, one count, counts to 2^32 - 1",
-            references: references!("peak_positions"),
+            references: references!("stability/peak_positions"),
             compute: |a| {
                 let counts: Vec<u32> = a.iter().map(|&count| count as u32).collect();
                 let peak = interpolate(&counts, &PeakOptions::default());
@@ -165,7 +185,83 @@ pub fn functions() -> Vec<Function> {
             measure: Measure::Absolute,
             promise: 1e-14,
         },
+        Function {
+            name: "probability of detection (Eq. 17)",
+            range: "1e-6 to 1e9 counts a bin, to 1e6 cycles of one hit each, 2 to 4096 bins, every rule of ties",
+            references: references!("theory/detection", 0 of 2),
+            compute: |a| Value::Real(detection(a).probability),
+            measure: Measure::Relative,
+            promise: 1e-12,
+        },
+        Function {
+            name: "probability of a miss, its complement",
+            range: "the same, down to 1e-290",
+            references: references!("theory/detection", 1 of 2),
+            compute: |a| Value::Real(detection(a).miss),
+            measure: Measure::Relative,
+            promise: 1e-12,
+        },
+        Function {
+            name: "the same with Gaussian counts (Eq. 18-19)",
+            range: "1e-6 to 1e9 counts a bin, as meant and as printed",
+            references: references!("theory/gaussian"),
+            compute: |a| {
+                let light = PerCycle {
+                    signal: a[1],
+                    background: a[2],
+                    bins: a[3] as u32,
+                };
+                let model = match a[0] {
+                    0.0 => Model::Gaussian,
+                    _ => Model::GaussianAsPrinted,
+                };
+                Value::Real(detection::probability(&light, 1, model).probability)
+            },
+            measure: Measure::Relative,
+            promise: 1e-12,
+        },
+        Function {
+            name: "precision after Thompson (Eq. 20)",
+            range: "sigma 1e-6 to 1e6 bins, background 0 to 1e9, signal 1e-12 to 1e9",
+            references: references!("stability/thompson"),
+            compute: |a| Value::Real(thompson(a[0], a[1], a[2], a[3])),
+            measure: Measure::Relative,
+            promise: 1e-14,
+        },
+        Function {
+            name: "Cramer-Rao bound (Eq. 22)",
+            range: "sigma 0.02 to 40 bins, background 0 to 1e9, signal 1e-3 to 1e9",
+            references: references!("theory/precision"),
+            compute: |a| Value::Real(cramer_rao(a[0], a[1], a[2], a[3])),
+            measure: Measure::Relative,
+            promise: 1e-12,
+        },
     ]
+}
+
+/// Of a line of `theory/detection.csv`: law, cycles, signal, background, bins and rule of ties.
+fn detection(a: &[f64]) -> Detection {
+    let ties = [Ties::Strict, Ties::Random, Ties::Loose][a[5] as usize];
+    let light = PerCycle {
+        signal: a[2],
+        background: a[3],
+        bins: a[4] as u32,
+    };
+    let (model, cycles) = match a[0] {
+        0.0 => (Model::Poisson(ties), 1),
+        _ => (Model::Bernoulli(ties), a[1] as u64),
+    };
+    detection::probability(&light, cycles, model)
+}
+
+/// A number, or which of its like a word is; nothing counts as 0.
+fn argument(text: &str) -> f64 {
+    match text {
+        "" | "poisson" | "strict" | "meant" => 0.0,
+        "bernoulli" | "random" | "printed" => 1.0,
+        "loose" => 2.0,
+        number => number.parse().expect("a number"),
+    }
 }
 
 impl Function {
@@ -174,7 +270,12 @@ impl Function {
     /// # Panics
     /// When the references are no table of numbers: they come with the program.
     pub fn worst(&self) -> Worst {
-        let mut lines = self.references.lines();
+        let References {
+            csv,
+            functions,
+            function,
+        } = self.references;
+        let mut lines = csv.lines();
         let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
         let mut worst = Worst {
             cases: 0,
@@ -182,17 +283,21 @@ impl Function {
             at: String::new(),
         };
         for line in lines {
-            let (arguments, reference) = line.rsplit_once(',').expect("arguments and a reference");
-            let arguments: Vec<f64> = arguments
-                .split(',')
-                .map(|number| number.parse().expect("a number"))
-                .collect();
-            let error = self.error((self.compute)(&arguments), reference);
+            let fields: Vec<&str> = line.split(',').collect();
+            let (texts, references) = fields.split_at(fields.len() - functions);
+            let arguments: Vec<f64> = texts.iter().map(|text| argument(text)).collect();
+            let error = self.error((self.compute)(&arguments), references[function]);
             worst.cases += 1;
             if error > worst.error {
                 worst.error = error;
-                let pairs = header.iter().zip(&arguments);
-                let pairs: Vec<String> = pairs.map(|(name, x)| format!("{name} = {x:e}")).collect();
+                let pairs = header.iter().zip(texts.iter().zip(&arguments));
+                let pairs: Vec<String> = pairs
+                    .filter(|(_, (text, _))| !text.is_empty())
+                    .map(|(name, (text, x))| match text.parse::<f64>() {
+                        Ok(_) => format!("{name} = {x:e}"),
+                        Err(_) => format!("{name} = {text}"),
+                    })
+                    .collect();
                 worst.at = pairs.join(", ");
             }
         }

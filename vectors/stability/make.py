@@ -170,6 +170,18 @@ def peak_positions():
         yield *counts, mpf(position.numerator) / position.denominator
 
 
+def thompson():
+    """Eq. 20: (sigma^2 + a^2/12) / N + 4 sqrt(pi) sigma^3 b / (a N^2), under the root."""
+    for bin_ns in [1e-3, 1.0, 2.6, 1e3]:
+        for ratio in [1e-6, 1e-3, 0.3, 1.5, 40.0, 1e6]:
+            sigma = ratio * bin_ns
+            for background in [0.0, 1e-12, 1e-3, 1.0, 300.0, 1e9]:
+                for signal in [1e-12, 1e-3, 1.0, 250.0, 1e9]:
+                    a, s, b, n = (mpf(x) for x in (bin_ns, sigma, background, signal))
+                    variance = (s**2 + a**2 / 12) / n + 4 * mp.sqrt(mp.pi) * s**3 * b / (a * n**2)
+                    yield bin_ns, sigma, background, signal, mp.sqrt(variance)
+
+
 write("pulse_share", ["from", "to", "sigma"], pulse_share())
 write("hit_tails", ["k", "mean"], hit_tails())
 write("none_hit", ["n", "p"], none_hit())
@@ -179,3 +191,4 @@ write("clock_edges", ["hz", "k"], clock_edges())
 write("counters", ["bits", "overflow", "hits"], counters())
 write("window_edges", ["start", "cycle", "bin"], window_edges())
 write("peak_positions", [f"bin_{i}" for i in range(16)], peak_positions())
+write("thompson", ["bin_ns", "sigma_ns", "background", "signal"], thompson())
