@@ -235,6 +235,26 @@ fn paralysable_spads_in_both_ways() {
 }
 
 #[test]
+fn the_pool_in_finer_steps() {
+    for (name, law) in [
+        ("pool in 4 steps", DeadTimeLaw::NonParalysable),
+        ("paralysable, pool in 4 steps", DeadTimeLaw::Paralysable),
+    ] {
+        let options = CohortOptions {
+            sub_bins: 4,
+            ..options(1.0)
+        };
+        Case {
+            name,
+            law,
+            options,
+            ..case()
+        }
+        .agrees();
+    }
+}
+
+#[test]
 fn much_light_in_finer_steps() {
     let light = PixelLight {
         background_hz: 400e6,

@@ -5,7 +5,7 @@
 //!
 //! | way | state | exact | cost of a bin |
 //! |---|---|---|---|
-//! | [`pooled`] | how many SPADs fired 1, 2, … CLK periods ago | every bin; two bins' correlation up to [`CohortOptions::neglect`] | a few draws |
+//! | [`pooled`] | how many SPADs fired 1, 2, … steps ago | every bin; two bins' correlation up to [`CohortOptions::neglect`] | a few draws |
 //! | [`joint`] | how many cycles have which of these on one macropixel | all of it | a draw for every state that occurs |
 //!
 //! What both share, and what it costs in exactness:
@@ -27,6 +27,7 @@ mod draw;
 mod hits;
 mod joint;
 mod light;
+mod period;
 mod pooled;
 mod words;
 
@@ -163,8 +164,7 @@ impl<'a> Cohort<'a> {
         let random = &mut RandomWords::new(stream.seed, pixel);
         for cohort in self.cohorts(stream, start, light)? {
             let (steps, cycles) = (&cohort.steps, cohort.cycles);
-            let pools = steps.per_period == 1
-                && cycles > 1
+            let pools = cycles > 1
                 && pooled::neglected(steps) <= self.options.neglect
                 && pooled::looked_at(&cohort.blindness, steps, cycles) <= WORTH_LOOKING_AT;
             let run = if pools { pooled::run } else { joint::run };

@@ -1,11 +1,13 @@
 //! All SPADs of all laser cycles in one pool: the fast way in little light.
 //!
 //! ```text
-//!   pool: 16 N SPADs ──┬─ fired 1, 2, … CLK periods ago: so many of each
+//!   pool: 16 N SPADs ──┬─ fired 1, 2, … steps ago: so many of each
 //!                      └─ free
 //!   one CLK period: W₁ of N cycles see a photon at all, W₂ of those on a second SPAD, …     (binomial)
-//!                   K of those photons meet SPADs that fired lately                          (hypergeometric)
-//!                   blind ones are taken off the cycles they fell into
+//!                   K of the SPADs that do are ones that fired lately                        (hypergeometric)
+//!                   these are followed one by one, step by step; those without a pulse are taken off the
+//!                   cycles they fell into
+//!                   the others are split by the step in which they fire                      (binomial)
 //! ```
 //!
 //! SPADs are independent of each other, so the pool's counts are exact, and so is each bin's distribution: which SPADs
@@ -15,23 +17,30 @@
 
 use super::blindness::{Ages, Blindness};
 use super::draw::{Draws, binomial};
+use super::period::{Period, Photons};
 use super::words::RandomWords;
 use super::{EventTable, Steps};
-use crate::photon::{DeadTimeLaw, SPADS};
+use crate::photon::SPADS;
+
+/// Most photons on a SPAD in a CLK period.
+fn largest(steps: &Steps) -> f64 {
+    let periods = steps.means.chunks(steps.per_period);
+    let means = periods.map(|period| period.iter().sum());
+    means.fold(0.0, f64::max)
+}
 
 /// Bound on the correlation between two bins that [`run`] leaves out.
 pub fn neglected(steps: &Steps) -> f64 {
-    let largest = steps.means.iter().fold(0.0, |a: f64, &b| a.max(b));
-    libm::expm1(largest).powi(2)
+    libm::expm1(largest(steps)).powi(2)
 }
 
-/// Mean number of photons in a period that [`run`] has to look at one by one.
+/// Mean number of SPADs in a period that [`run`] has to follow one by one.
 pub fn looked_at(blindness: &Blindness, steps: &Steps, cycles: u64) -> f64 {
-    let largest = steps.means.iter().fold(0.0, |a: f64, &b| a.max(b));
-    (SPADS as u64 * cycles) as f64 * blindness.memory() as f64 * largest * largest
+    let periods = blindness.memory() as f64 / steps.per_period as f64;
+    (SPADS as u64 * cycles) as f64 * periods * largest(steps).powi(2)
 }
 
-/// Counts of every bin after `cycles` laser cycles that begin in the state `ages`; one step is a CLK period.
+/// Counts of every bin after `cycles` laser cycles that begin in the state `ages`.
 pub fn run(
     blindness: &Blindness,
     ages: &Ages,
@@ -40,13 +49,14 @@ pub fn run(
     cycles: u64,
     random: &mut RandomWords,
 ) -> Vec<u64> {
-    debug_assert_eq!(steps.per_period, 1);
     let mut pool = Pool::new(blindness, ages, cycles, random);
-    let mut counts = Vec::with_capacity(steps.means.len());
-    for means in steps.means.chunks(TOGETHER) {
-        let further = Further::of(means);
-        counts.extend((0..means.len()).map(|period| {
-            let with = pool.period(&further, period, random);
+    let photons = Photons::new(steps);
+    let periods: Vec<Period> = photons.periods().collect();
+    let mut counts = Vec::with_capacity(periods.len());
+    for periods in periods.chunks(TOGETHER) {
+        let further = Further::of(periods);
+        counts.extend(periods.iter().enumerate().map(|(number, period)| {
+            let with = pool.period(&further, number, period, random);
             let counted = with.iter().zip(is_event).filter(|(_, event)| **event);
             counted.map(|(cycles, _)| cycles).sum::<u64>()
         }));
@@ -68,12 +78,10 @@ struct Further {
 }
 
 impl Further {
-    /// For `means` photons on a SPAD.
-    fn of(means: &[f64]) -> Self {
+    fn of(periods: &[Period]) -> Self {
         let mut odds = [0.0; TOGETHER];
-        for (odds, &mean) in odds.iter_mut().zip(means) {
-            // p/(1 − p) for 1 − p = exp(−mean).
-            *odds = libm::expm1(mean);
+        for (odds, period) in odds.iter_mut().zip(periods) {
+            *odds = period.odds();
         }
         let mut more = [[0.0; TOGETHER]; SPADS];
         let mut t = [1.0; TOGETHER];
@@ -100,8 +108,10 @@ impl Further {
 struct Pool<'a> {
     blindness: &'a Blindness,
     cycles: u64,
-    /// SPADs that fired one, two, … periods ago.
+    /// SPADs that fired one, two, … steps ago.
     aged: Vec<u64>,
+    /// SPADs that are blind from each step of this period on.
+    renewed: Vec<u64>,
     /// Ages of blind SPADs that were hit in this period.
     blind: Vec<usize>,
 }
@@ -124,6 +134,7 @@ impl<'a> Pool<'a> {
             blindness,
             cycles,
             aged: counts.collect(),
+            renewed: Vec::new(),
             blind: Vec::new(),
         }
     }
@@ -132,14 +143,15 @@ impl<'a> Pool<'a> {
     fn period(
         &mut self,
         further: &Further,
-        period: usize,
+        number: usize,
+        period: &Period,
         random: &mut RandomWords,
     ) -> [u64; SPADS + 1] {
         let mut with = [0; SPADS + 1];
         let mut at_least = self.cycles;
         let mut hit = 0;
         for (least, exactly) in with.iter_mut().enumerate() {
-            let more = further.more(at_least, least, period, random);
+            let more = further.more(at_least, least, number, random);
             *exactly = at_least - more;
             hit += more;
             at_least = more;
@@ -147,42 +159,56 @@ impl<'a> Pool<'a> {
                 break;
             }
         }
-        self.go_blind(hit, &mut with, random);
+        self.go_blind(hit, &mut with, period, random);
         with
     }
 
     /// Of `hit` SPADs, of which `with` cycles have 0, 1, 2, …, takes those too blind for a pulse off the cycles they
-    /// fell into.
-    fn go_blind(&mut self, hit: u64, with: &mut [u64; SPADS + 1], random: &mut RandomWords) {
+    /// fell into, and lets all grow a period older.
+    fn go_blind(
+        &mut self,
+        hit: u64,
+        with: &mut [u64; SPADS + 1],
+        period: &Period,
+        random: &mut RandomWords,
+    ) {
+        self.renewed.clear();
+        self.renewed.resize(period.steps(), 0);
         let mut marked: u64 = self.aged.iter().sum();
+        let (mut met, mut pulses) = (0, hit);
         let draws = Draws {
             total: SPADS as u64 * self.cycles,
             marked,
             draws: hit,
         };
-        let mut pulses = hit;
         draws.meet(random, |random| {
             let age = self.meet(marked, random);
             marked -= 1;
-            let able = self.blindness.able(age + 1);
-            if able > 0.0 && random.coarse() < able {
-                return;
+            met += 1;
+            let meeting = period.meet(age + 1, self.blindness, random);
+            match meeting.renewed {
+                Some(step) => self.renewed[step] += 1,
+                // It keeps its age, but is not met a second time.
+                None => self.blind.push(age),
             }
-            if self.blindness.law == DeadTimeLaw::NonParalysable {
-                // It keeps its age, but is not hit a second time.
-                self.blind.push(age);
+            if !meeting.pulses {
+                take_off(with, pulses, random);
+                pulses -= 1;
             }
-            take_off(with, pulses, random);
-            pulses -= 1;
         });
         for age in self.blind.drain(..) {
             self.aged[age] += 1;
         }
-        let renewed = match self.blindness.law {
-            DeadTimeLaw::NonParalysable => pulses,
-            DeadTimeLaw::Paralysable => hit,
-        };
-        grow_older(&mut self.aged, renewed);
+        let renewed = &mut self.renewed;
+        period.split(hit - met, self.blindness.law, random, |step, spads| {
+            renewed[step] += spads;
+        });
+        let younger = self.renewed.len().min(self.aged.len());
+        let older = self.aged.len() - younger;
+        self.aged.copy_within(..older, younger);
+        for (aged, renewed) in self.aged.iter_mut().zip(self.renewed.iter().rev()) {
+            *aged = *renewed;
+        }
     }
 
     /// Takes one of the `marked` SPADs that fired lately out of its age.
@@ -196,14 +222,6 @@ impl<'a> Pool<'a> {
         }
         self.aged[age] -= 1;
         age
-    }
-}
-
-/// SPADs that fired one, two, … periods ago become a period older, and `renewed` ones join them.
-fn grow_older(aged: &mut [u64], renewed: u64) {
-    if let Some(older) = aged.len().checked_sub(1) {
-        aged.copy_within(..older, 1);
-        aged[0] = renewed;
     }
 }
 
