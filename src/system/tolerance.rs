@@ -21,9 +21,9 @@ use crate::ranging::{PeakOptions, interpolate};
 /// Steps to a CLK period that the cohort engine may take, cheapest first.
 const STEPS: [usize; 4] = [1, 2, 4, 8];
 
-/// Photons that the window engine handles in the time of one bin and step of the cohort engine, by [`STEPS`]: one
-/// step is mostly done in pools, more are followed in joint states, which cost ten times as much.
-const PHOTONS_PER_STEP: [f64; STEPS.len()] = [80.0, 900.0, 900.0, 900.0];
+/// Photons that the window engine handles in the time of one bin and step of the cohort engine, where it pools laser
+/// cycles and where it follows their joint state.
+const PHOTONS_PER_STEP: [f64; 2] = [35.0, 900.0];
 
 /// Totals to which mean counts are scaled before they are rounded to whole ones: a depth keeps nine digits.
 const WHOLE_COUNTS: f64 = 1e9;
@@ -150,8 +150,9 @@ impl Planner<'_> {
             * f64::from(self.stream.laser_cycles);
         let mut coarse = self.depth_m(0, pixel);
         for (steps, per_period) in STEPS.iter().enumerate().take(STEPS.len() - 1) {
-            let step_cost = (self.bins * per_period) as f64 * PHOTONS_PER_STEP[steps];
-            if step_cost >= photons {
+            let pools = self.cohorts[steps].pools(self.stream, pixel.start, light);
+            let per_step = PHOTONS_PER_STEP[usize::from(!pools.unwrap_or(false))];
+            if (self.bins * per_period) as f64 * per_step >= photons {
                 return exact;
             }
             let fine = self.depth_m(steps + 1, pixel);
