@@ -25,70 +25,65 @@ pub struct Meeting {
 /// Photons on one SPAD in every CLK period of a window.
 #[derive(Debug, Clone)]
 pub struct Photons {
+    steps: Vec<Step>,
     per_period: usize,
-    /// Probability of a photon in each step.
-    photon: Vec<f64>,
-    /// Probabilities of any photon in a period from each step on, and up to each step.
-    from: Vec<f64>,
-    until: Vec<f64>,
+}
+
+/// Probabilities of a photon in one step, and of any in its period from it on and up to it.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    photon: f64,
+    from: f64,
+    until: f64,
 }
 
 impl Photons {
     /// Of the mean photons of all steps.
     pub fn new(steps: &Steps) -> Self {
         let per_period = steps.per_period;
-        let photon: Vec<f64> = steps.means.iter().map(|&mean| absorbed(mean)).collect();
-        let (mut from, mut until) = (photon.clone(), photon.clone());
-        for first in (0..photon.len()).step_by(per_period) {
-            for step in first + 1..first + per_period {
-                until[step] += (1.0 - photon[step]) * until[step - 1];
-                let step = 2 * first + per_period - 1 - step;
-                from[step] += (1.0 - photon[step]) * from[step + 1];
+        let alone = |&mean: &f64| {
+            let photon = absorbed(mean);
+            Step {
+                photon,
+                from: photon,
+                until: photon,
+            }
+        };
+        let mut steps: Vec<Step> = steps.means.iter().map(alone).collect();
+        for period in steps.chunks_mut(per_period) {
+            for step in 1..per_period {
+                period[step].until += (1.0 - period[step].photon) * period[step - 1].until;
+                let step = per_period - 1 - step;
+                period[step].from += (1.0 - period[step].photon) * period[step + 1].from;
             }
         }
-        Photons {
-            per_period,
-            photon,
-            from,
-            until,
-        }
+        Photons { steps, per_period }
     }
 
     /// The period of each bin.
-    pub fn periods(&self) -> impl Iterator<Item = Period<'_>> {
-        let first = (0..self.photon.len()).step_by(self.per_period);
-        first.map(|first| {
-            let steps = first..first + self.per_period;
-            Period {
-                photon: &self.photon[steps.clone()],
-                from: &self.from[steps.clone()],
-                until: &self.until[steps],
-            }
-        })
+    pub fn periods(&self) -> impl Iterator<Item = Period<'_>> + Clone {
+        self.steps.chunks(self.per_period).map(Period)
     }
 }
 
 /// Photons on one SPAD in one CLK period.
 #[derive(Debug, Clone, Copy)]
-pub struct Period<'p> {
-    photon: &'p [f64],
-    from: &'p [f64],
-    until: &'p [f64],
-}
+pub struct Period<'p>(&'p [Step]);
 
 impl Period<'_> {
     /// Its steps.
     pub fn steps(&self) -> usize {
-        self.photon.len()
+        self.0.len()
     }
 
     /// p/(1 − p) for the probability p of a photon.
     pub fn odds(&self) -> f64 {
-        self.from[0] / (1.0 - self.from[0])
+        self.0[0].from / (1.0 - self.0[0].from)
     }
 
     /// Splits `hit` SPADs that were ready, and get a photon in this period, by the step from which on they are blind:
     /// that of the first photon, or for paralysable ones that of the last. Calls `blind` with steps and SPADs.
+    #[inline]
     pub fn split(
         &self,
         hit: u64,
@@ -96,38 +91,42 @@ impl Period<'_> {
         random: &mut RandomWords,
         mut blind: impl FnMut(usize, u64),
     ) {
-        let steps = self.photon.len();
+        let steps = self.steps();
         let mut left = hit;
         for count in 1..=steps {
             // Steps are gone through from the end whose photon decides.
-            let (step, any) = match law {
-                DeadTimeLaw::NonParalysable => (count - 1, self.from),
-                DeadTimeLaw::Paralysable => (steps - count, self.until),
+            let number = match law {
+                DeadTimeLaw::NonParalysable => count - 1,
+                DeadTimeLaw::Paralysable => steps - count,
+            };
+            let step = &self.0[number];
+            let any = match law {
+                DeadTimeLaw::NonParalysable => step.from,
+                DeadTimeLaw::Paralysable => step.until,
             };
             let here = if count == steps {
                 left
             } else {
-                let p = (self.photon[step] / any[step]).min(1.0);
+                let p = (step.photon / any).min(1.0);
                 binomial(left, p, 1.0 - p, random)
             };
-            blind(step, here);
+            blind(number, here);
             left -= here;
         }
     }
 
     /// What becomes of a SPAD that fired `age` ≥ 1 steps before this period and gets a photon in it.
+    #[inline]
     pub fn meet(&self, age: usize, blindness: &Blindness, random: &mut RandomWords) -> Meeting {
         let mut meeting = Meeting {
             pulses: false,
             renewed: None,
         };
-        let steps = self.photon.len();
         let mut is_hit = false;
-        for step in 0..steps {
-            let photon = self.photon[step];
+        for (step, &Step { photon, from, .. }) in self.0.iter().enumerate() {
             let comes = match is_hit {
                 true => random.coarse() < photon,
-                false => step + 1 == steps || random.coarse() * self.from[step] < photon,
+                false => step + 1 == self.steps() || random.coarse() * from < photon,
             };
             if !comes {
                 continue;
@@ -181,7 +180,7 @@ mod tests {
                 let from = -libm::expm1(-means[step..].iter().sum::<f64>());
                 let until = -libm::expm1(-means[..=step].iter().sum::<f64>());
                 let photon = -libm::expm1(-means[step]);
-                for (got, want) in [(period.from[step], from), (period.until[step], until), (period.photon[step], photon)] {
+                for (got, want) in [(period.0[step].from, from), (period.0[step].until, until), (period.0[step].photon, photon)] {
                     prop_assert!((got / want - 1.0).abs() < 1e-14, "{got} {want}");
                 }
             }

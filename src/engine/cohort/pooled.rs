@@ -51,17 +51,21 @@ pub fn run(
 ) -> Vec<u64> {
     let mut pool = Pool::new(blindness, ages, cycles, random);
     let photons = Photons::new(steps);
-    let periods: Vec<Period> = photons.periods().collect();
-    let mut counts = Vec::with_capacity(periods.len());
-    for periods in periods.chunks(TOGETHER) {
-        let further = Further::of(periods);
-        counts.extend(periods.iter().enumerate().map(|(number, period)| {
-            let with = pool.period(&further, number, period, random);
+    let mut further = Further::default();
+    let mut ahead = photons.periods();
+    photons
+        .periods()
+        .enumerate()
+        .map(|(number, period)| {
+            let number = number % TOGETHER;
+            if number == 0 {
+                further = Further::of(ahead.by_ref().take(TOGETHER));
+            }
+            let with = pool.period(&further, number, &period, random);
             let counted = with.iter().zip(is_event).filter(|(_, event)| **event);
             counted.map(|(cycles, _)| cycles).sum::<u64>()
-        }));
-    }
-    counts
+        })
+        .collect()
 }
 
 /// CLK periods whose probabilities are computed side by side.
@@ -72,13 +76,14 @@ const TOGETHER: usize = 8;
 ///
 /// With o = p/(1 − p), what is known to be k or more is k with probability 1/tₖ, where
 /// tₖ = 1 + (16 − k)/(k + 1) · o · tₖ₊₁ and t₁₆ = 1: every term is positive, so no digits are lost.
+#[derive(Default)]
 struct Further {
     /// tₖ − 1.
     more: [[f64; TOGETHER]; SPADS],
 }
 
 impl Further {
-    fn of(periods: &[Period]) -> Self {
+    fn of<'p>(periods: impl Iterator<Item = Period<'p>>) -> Self {
         let mut odds = [0.0; TOGETHER];
         for (odds, period) in odds.iter_mut().zip(periods) {
             *odds = period.odds();
