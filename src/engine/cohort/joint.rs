@@ -73,6 +73,9 @@ struct Tree<'a> {
     blindness: &'a Blindness,
     nodes: Vec<Node>,
     unused: Vec<u32>,
+    laws: Laws,
+    /// Nodes that hold cycles in the present step.
+    live: Vec<u32>,
     /// Nodes by the step of their oldest avalanche, parents before children.
     by_step: Vec<Vec<u32>>,
     /// First step that is not forgotten.
@@ -86,7 +89,8 @@ struct Tree<'a> {
 #[derive(Debug, Clone, Copy)]
 struct Group {
     avalanche: Option<Avalanche>,
-    hits: Hits,
+    /// Of [`Laws`].
+    hits: usize,
     /// Probability that a hit makes a pulse.
     able: f64,
     /// Probability that anything happens in this group or one after it, and its complement.
@@ -96,16 +100,47 @@ struct Group {
 
 impl Group {
     /// A group without avalanches, the last one.
-    fn free(hits: Hits, able: f64) -> Self {
+    fn free(number: usize, hits: &Hits, able: f64) -> Self {
         Group {
             avalanche: None,
-            hits,
+            hits: number,
             able,
             any_from_here: hits.any(),
             none_from_here: hits.none(),
         }
     }
 }
+
+/// How many of so many SPADs are hit in the present step. There are few different laws, and many nodes.
+#[derive(Debug, Clone, Default)]
+struct Laws {
+    laws: Vec<Hits>,
+    /// Which of them is that of so many SPADs, plus 1, by the class of SPADs.
+    numbers: Vec<[u16; SPADS + 1]>,
+}
+
+impl Laws {
+    fn forget(&mut self) {
+        self.laws.clear();
+        self.numbers.clear();
+    }
+
+    /// The law of `spads` SPADs, each of which is hit with `p`; `q` is 1 − `p`. Both are the same for all of a class.
+    fn number(&mut self, class: usize, spads: usize, p: f64, q: f64) -> usize {
+        if self.numbers.len() <= class {
+            self.numbers.resize(class + 1, [0; SPADS + 1]);
+        }
+        let known = &mut self.numbers[class][spads];
+        if *known == 0 {
+            self.laws.push(Hits::new(spads, p, q));
+            *known = self.laws.len() as u16;
+        }
+        usize::from(*known) - 1
+    }
+}
+
+/// The class of SPADs that are free, and of all where every photon counts.
+const FREE: usize = 0;
 
 /// What became of a node's SPADs in a step.
 #[derive(Debug, Clone, Default)]
@@ -135,6 +170,8 @@ impl<'a> Tree<'a> {
             blindness,
             nodes: vec![root],
             unused: Vec::new(),
+            laws: Laws::default(),
+            live: Vec::new(),
             by_step: Vec::new(),
             remembered: 0,
             step: 0,
@@ -152,11 +189,9 @@ impl<'a> Tree<'a> {
                 0.0
             };
             younger -= share;
-            let mut free: [Option<Hits>; SPADS + 1] = [None; SPADS + 1];
+            self.laws.forget();
             self.each_node(|tree, node| {
-                let spads = SPADS - usize::from(tree.nodes[node as usize].depth);
-                let hits = *free[spads].get_or_insert_with(|| Hits::new(spads, p, 1.0 - p));
-                let group = Group::free(hits, 0.0);
+                let group = tree.free(node, p, 1.0 - p, 0.0);
                 let taken = tree.take(node, &group, random);
                 tree.spread(node, taken, &[group], true, &Outcome::default(), random);
             });
@@ -168,13 +203,11 @@ impl<'a> Tree<'a> {
     fn advance(&mut self, mean: f64, random: &mut RandomWords) {
         let (p, q) = (-libm::expm1(-mean), libm::exp(-mean));
         if p > 0.0 {
-            let mut free: [Option<Hits>; SPADS + 1] = [None; SPADS + 1];
+            self.laws.forget();
             let mut groups: Vec<Group> = Vec::new();
             self.each_node(|tree, node| {
-                let spads = SPADS - usize::from(tree.nodes[node as usize].depth);
-                let hits = *free[spads].get_or_insert_with(|| Hits::new(spads, p, q));
                 groups.clear();
-                groups.push(Group::free(hits, 1.0));
+                groups.push(tree.free(node, p, q, 1.0));
                 tree.add_aged(node, p, q, &mut groups);
                 let taken = tree.take(node, &groups[0], random);
                 if taken > 0 {
@@ -187,12 +220,20 @@ impl<'a> Tree<'a> {
 
     /// Calls `visit` for the nodes that hold cycles now.
     fn each_node(&mut self, mut visit: impl FnMut(&mut Self, u32)) {
-        let now: Vec<u32> = (0..self.nodes.len() as u32)
-            .filter(|&node| self.nodes[node as usize].cycles > 0)
-            .collect();
-        for node in now {
+        let mut live = std::mem::take(&mut self.live);
+        let nodes = (0..).zip(&self.nodes);
+        live.extend(nodes.filter(|(_, node)| node.cycles > 0).map(|(at, _)| at));
+        for node in live.drain(..) {
             visit(self, node);
         }
+        self.live = live;
+    }
+
+    /// The free SPADs of `node`.
+    fn free(&mut self, node: u32, p: f64, q: f64, able: f64) -> Group {
+        let spads = SPADS - usize::from(self.nodes[node as usize].depth);
+        let number = self.laws.number(FREE, spads, p, q);
+        Group::free(number, &self.laws.laws[number], able)
     }
 
     /// Takes those cycles out of `node` in which something happens from group `first` on.
@@ -205,23 +246,25 @@ impl<'a> Tree<'a> {
     }
 
     /// Adds the groups of `node`'s SPADs with an avalanche that a photon may do something to.
-    fn add_aged(&self, node: u32, p: f64, q: f64, groups: &mut Vec<Group>) {
+    fn add_aged(&mut self, node: u32, p: f64, q: f64, groups: &mut Vec<Group>) {
         let mut at = node;
         while at != ROOT {
             let Node { parent, oldest, .. } = self.nodes[at as usize];
-            let able = self.blindness.able((self.step - oldest.step) as usize);
-            let (p, q, able) = match self.blindness.law {
-                DeadTimeLaw::NonParalysable => (p * able, q + p * (1.0 - able), 1.0),
-                DeadTimeLaw::Paralysable => (p, q, able),
+            let age = (self.step - oldest.step) as usize;
+            let able = self.blindness.able(age);
+            let (class, p, q, able) = match self.blindness.law {
+                DeadTimeLaw::NonParalysable => (age, p * able, q + p * (1.0 - able), 1.0),
+                DeadTimeLaw::Paralysable => (FREE, p, q, able),
             };
             if p == 0.0 {
                 break; // newer ones are as blind
             }
             let same = groups.pop_if(|group| group.avalanche == Some(oldest));
-            let spads = same.map_or(0, |group| group.hits.spads()) + 1;
+            let spads = same.map_or(0, |group| self.laws.laws[group.hits].spads()) + 1;
+            let number = self.laws.number(class, spads, p, q);
             groups.push(Group {
                 avalanche: Some(oldest),
-                ..Group::free(Hits::new(spads, p, q), able)
+                ..Group::free(number, &self.laws.laws[number], able)
             });
             at = parent;
         }
@@ -253,19 +296,21 @@ impl<'a> Tree<'a> {
             self.nodes[to as usize].cycles += cycles;
             return;
         };
+        let law = &self.laws.laws[group.hits];
+        let spads = law.spads();
         let hit = match waiting {
             true if rest.is_empty() => cycles,
             true => {
-                let p = group.hits.any() / group.any_from_here;
-                let q = group.hits.none() * rest[0].any_from_here / group.any_from_here;
+                let p = law.any() / group.any_from_here;
+                let q = law.none() * rest[0].any_from_here / group.any_from_here;
                 binomial(cycles, p.min(1.0), q.min(1.0), random)
             }
-            false => binomial(cycles, group.hits.any(), group.hits.none(), random),
+            false => binomial(cycles, law.any(), law.none(), random),
         };
         self.spread(node, cycles - hit, rest, waiting, outcome, random);
         let mut at_least = hit;
-        for count in 1..=group.hits.spads() {
-            let more = group.hits.more(at_least, count, random);
+        for count in 1..=spads {
+            let more = self.laws.laws[group.hits].more(at_least, count, random);
             self.renew(node, at_least - more, groups, count, outcome, random);
             at_least = more;
             if more == 0 {
