@@ -1,6 +1,7 @@
 //! Draws that split cohorts: exact at any size, and also where probabilities are tiny.
 
 use super::words::RandomWords;
+use crate::numerics::stirling_error;
 
 /// Above this, logarithms are quicker than factors.
 const MOST_FACTORS: u64 = 4096;
@@ -96,35 +97,15 @@ fn mode(n: f64, p: f64) -> f64 {
 fn log_likelihood_to_mode(k: f64, n: f64, p: f64, q: f64) -> f64 {
     let mode = mode(n, p);
     let odds = p / q;
+    // Stirling's formula is in powers of k + 1 here, which 0! suits, too.
+    let left_out = |k: f64| stirling_error(k as u64 + 1);
     (mode + 0.5) * libm::log((mode + 1.0) / (odds * (n - mode + 1.0)))
         + (n + 1.0) * libm::log((n - mode + 1.0) / (n - k + 1.0))
         + (k + 0.5) * libm::log(odds * (n - k + 1.0) / (k + 1.0))
-        + stirling(mode)
-        + stirling(n - mode)
-        - stirling(k)
-        - stirling(n - k)
-}
-
-/// What Stirling's formula for ln k!, in powers of k + 1, leaves out.
-fn stirling(k: f64) -> f64 {
-    const SMALL: [f64; 10] = [
-        0.081_061_466_795_327_26,
-        0.041_340_695_955_409_29,
-        0.027_677_925_684_998_34,
-        0.020_790_672_103_765_09,
-        0.016_644_691_189_821_19,
-        0.013_876_128_823_070_75,
-        0.011_896_709_945_891_77,
-        0.010_411_265_261_972_096,
-        0.009_255_462_182_712_733,
-        0.008_330_563_433_362_87,
-    ];
-    if let Some(&small) = SMALL.get(k as usize) {
-        return small;
-    }
-    let next = 1.0 / (k + 1.0);
-    let squared = next * next;
-    (1.0 / 12.0 - squared * (1.0 / 360.0 - squared * (1.0 / 1260.0))) * next
+        + left_out(mode)
+        + left_out(n - mode)
+        - left_out(k)
+        - left_out(n - k)
 }
 
 /// Largest result of an inversion: 10 + 110 is 35 standard deviations above the largest mean.
