@@ -6,6 +6,7 @@ mod gaussian;
 mod optics;
 pub(crate) mod philox;
 mod pulse;
+mod quantile;
 mod random;
 pub mod solar;
 mod spad;
@@ -20,6 +21,6 @@ pub use spad::{
     AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, SPADS, SpadEvent, SpadModel, apply_dead_time,
 };
 pub use stream::{
-    Draw, GROUP, Group, PLACE_BITS, PhotonStream, PixelLight, PixelPhotons, PixelStream, Place,
-    Run, SLOT, SignalPhoton, StreamConfig, time_in_slot_fs,
+    Draw, GROUP, Group, PER_BLOCK, PLACE_BITS, PhotonStream, PixelLight, PixelPhotons, PixelStream,
+    Place, Run, Slots, StreamConfig, TIME_BITS, signal_rank,
 };

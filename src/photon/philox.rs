@@ -21,9 +21,7 @@ pub struct Blocks {
     /// Longer than needed, so that runs are written [`LANES`] at a time.
     first: Vec<u32>,
     second: Vec<u32>,
-    words: [Vec<u64>; 2],
-    /// Words 1 and 3 on their own.
-    odd: [Vec<u64>; 2],
+    words: [Vec<u32>; 4],
 }
 
 impl Blocks {
@@ -65,7 +63,7 @@ impl Blocks {
     pub fn generate(&mut self, key: [u32; 2], third: u32, fourth: u32) {
         let filled_up = self.filled_up();
         let room = self.first.len();
-        for words in self.words.iter_mut().chain(&mut self.odd) {
+        for words in &mut self.words {
             words.resize(room, 0);
         }
         generate(
@@ -74,17 +72,12 @@ impl Blocks {
             &self.first[..filled_up],
             &self.second[..filled_up],
             self.words.each_mut().map(|words| &mut words[..filled_up]),
-            self.odd.each_mut().map(|words| &mut words[..filled_up]),
         );
-        for (words, odd) in self.words.iter_mut().zip(&self.odd) {
-            join(&mut words[..filled_up], &odd[..filled_up]);
-        }
     }
 
-    /// Words 0 and 1, and words 2 and 3, of every block, the first in the low half; and of others that fill the rows up
-    /// to a multiple of [`LANES`].
+    /// The four words of every block, a row for each; and of others that fill the rows up to a multiple of [`LANES`].
     #[inline]
-    pub fn rows(&self) -> [&[u64]; 2] {
+    pub fn rows(&self) -> [&[u32]; 4] {
         let filled_up = self.filled_up();
         self.words.each_ref().map(|words| &words[..filled_up])
     }
@@ -96,24 +89,18 @@ impl Blocks {
     }
 }
 
-/// Words 0 and 1, and words 2 and 3, of twice [`LANES`] blocks with first counter words from `first` on and these other
-/// ones, as [`Blocks::rows`] gives them.
-pub fn blocks_from(first: u32, others: [u32; 3], key: [u32; 2]) -> [[u64; 2 * LANES]; 2] {
+/// The words, by rows, of twice [`LANES`] blocks with first counter words from `first` on and these other ones.
+pub fn blocks_from(first: u32, others: [u32; 3], key: [u32; 2]) -> [[u32; 2 * LANES]; 4] {
     let [second, third, fourth] = others;
     let firsts: [u32; 2 * LANES] = std::array::from_fn(|block| first.wrapping_add(block as u32));
-    let mut words = [[0; 2 * LANES]; 2];
-    let mut odd = words;
+    let mut words = [[0; 2 * LANES]; 4];
     generate(
         key,
         [third, fourth],
         &firsts,
         &[second; 2 * LANES],
         words.each_mut().map(|words| &mut words[..]),
-        odd.each_mut().map(|words| &mut words[..]),
     );
-    for (words, odd) in words.iter_mut().zip(&odd) {
-        join(words, odd);
-    }
     words
 }
 
@@ -124,8 +111,7 @@ fn generate(
     [third, fourth]: [u32; 2],
     first: &[u32],
     second: &[u32],
-    even: [&mut [u64]; 2],
-    odd: [&mut [u64]; 2],
+    words: [&mut [u32]; 4],
 ) {
     let mut keys = [[0; 2]; ROUNDS];
     for round in &mut keys {
@@ -133,8 +119,7 @@ fn generate(
         key = [key[0].wrapping_add(WEYL[0]), key[1].wrapping_add(WEYL[1])];
     }
     let counters = (first.as_chunks::<LANES>().0.iter()).zip(second.as_chunks::<LANES>().0);
-    let [out0, out2] = even.map(|words| words.as_chunks_mut::<LANES>().0.iter_mut());
-    let [out1, out3] = odd.map(|words| words.as_chunks_mut::<LANES>().0.iter_mut());
+    let [out0, out1, out2, out3] = words.map(|words| words.as_chunks_mut::<LANES>().0.iter_mut());
     let out = out0.zip(out1).zip(out2.zip(out3));
     for ((first, second), ((out0, out1), (out2, out3))) in counters.zip(out) {
         let mut c0 = [0; LANES];
@@ -155,18 +140,12 @@ fn generate(
                 c3[lane] = product0;
             }
         }
-        *out0 = c0;
-        *out1 = c1;
-        *out2 = c2;
-        *out3 = c3;
-    }
-}
-
-/// Puts the low halves of `odd` above those of `words`.
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
-fn join(words: &mut [u64], odd: &[u64]) {
-    for (word, &odd) in words.iter_mut().zip(odd) {
-        *word = (*word & LOW) | odd << 32;
+        for lane in 0..LANES {
+            out0[lane] = c0[lane] as u32;
+            out1[lane] = c1[lane] as u32;
+            out2[lane] = c2[lane] as u32;
+            out3[lane] = c3[lane] as u32;
+        }
     }
 }
 
@@ -196,17 +175,15 @@ mod tests {
                 .iter()
                 .flat_map(|&(second, count)| (0..count).map(move |first| [first, second, third, fourth]))
                 .collect();
-            let [low, high] = blocks_from(5, [6, third, fourth], key);
-            for (first, (low, high)) in (5..).zip(low.into_iter().zip(high)) {
-                let [a, b, c, d] = rand_philox::philox4x32_10([first, 6, third, fourth], key).map(u64::from);
-                prop_assert_eq!([low, high], [a | b << 32, c | d << 32]);
+            let rows = blocks_from(5, [6, third, fourth], key);
+            for (at, first) in (5..5 + 2 * LANES as u32).enumerate() {
+                let expected = rand_philox::philox4x32_10([first, 6, third, fourth], key);
+                prop_assert_eq!(rows.map(|row| row[at]), expected);
             }
             prop_assert_eq!(blocks.len(), counters.len());
             for (at, counter) in counters.into_iter().enumerate() {
                 let expected = rand_philox::philox4x32_10(counter, key);
-                let word = |word: usize| (blocks.rows()[word / 2][at] >> (word % 2 * 32)) as u32;
-                let got: [u32; 4] = std::array::from_fn(word);
-                prop_assert_eq!(got, expected);
+                prop_assert_eq!(blocks.rows().map(|row| row[at]), expected);
             }
         }
     }

@@ -5,18 +5,12 @@
 //! and a triangle, and the later (or earlier) of two even draws falls into a triangle. Only comparisons and products are
 //! involved, which round alike on every platform.
 //!
-//! A measured pulse, linear between its samples, is drawn exactly. A Gaussian has 512 cells over ±8 σ that
-//! hold its exact masses; its distribution function is then off by less than 10⁻⁷ within cells, which moves a photon of
-//! a 2 ns pulse by less than a femtosecond near its middle. What lies beyond ±8 σ, 10⁻¹⁵, is left out.
+//! So a measured pulse, linear between its samples, is drawn exactly. Gaussian ones have a shorter way
+//! ([`NormalSampler`](super::quantile::NormalSampler)).
 
-use std::f64::consts::SQRT_2;
 use std::sync::Arc;
 
 use crate::units::Time;
-
-/// Cells of a Gaussian, and half its width in σ.
-const GAUSSIAN_CELLS: usize = 512;
-const GAUSSIAN_REACH: f64 = 8.0;
 
 /// A measured laser pulse.
 #[derive(Debug, Clone, PartialEq)]
@@ -114,23 +108,6 @@ pub struct PulseSampler {
 }
 
 impl PulseSampler {
-    /// A Gaussian around time 0.
-    pub fn gaussian(sigma: Time) -> Self {
-        let width = 2.0 * GAUSSIAN_REACH / GAUSSIAN_CELLS as f64;
-        let at = |cell: usize| cell as f64 * width - GAUSSIAN_REACH;
-        let density = |x: f64| libm::exp(-x * x / 2.0);
-        // By symmetry from the tail inwards, so that small masses keep their digits.
-        let below = |x: f64| libm::erfc(-x / SQRT_2) / 2.0;
-        let cells = (0..GAUSSIAN_CELLS).map(|cell| {
-            let mirrored = cell.min(GAUSSIAN_CELLS - 1 - cell);
-            let mass = below(at(mirrored + 1)) - below(at(mirrored));
-            let (_, slope) = mass_and_slope(&[density(at(cell)), density(at(cell + 1))]);
-            (mass, slope)
-        });
-        let sigma_fs = sigma.as_fs() as f64;
-        Self::new(cells, -GAUSSIAN_REACH * sigma_fs, width * sigma_fs)
-    }
-
     /// A measured pulse.
     pub fn measured(shape: &PulseShape) -> Self {
         let cells = shape.samples.windows(2).map(mass_and_slope);
@@ -228,15 +205,6 @@ mod tests {
     const LIMIT: f64 = 1.95;
 
     #[test]
-    fn gaussian_draws_follow_the_error_function() {
-        let sigma = Time::from_ps(1_700);
-        let sampler = PulseSampler::gaussian(sigma);
-        let sigma_fs = sigma.as_fs() as f64;
-        let d = kolmogorov(&sampler, |x| libm::erfc(-x / sigma_fs / SQRT_2) / 2.0);
-        assert!(d < LIMIT, "{d}");
-    }
-
-    #[test]
     fn measured_pulses_are_drawn_as_they_are() {
         let samples = [0.0, 5.0, 3.0, 0.0, 0.0, 1.0, 0.5, 0.0];
         let shape = PulseShape::new(Time::from_ps(900), &samples).unwrap();
@@ -251,19 +219,20 @@ mod tests {
 
     #[test]
     fn every_column_s_probability_ends_up_in_its_cells() {
-        let sampler = PulseSampler::gaussian(Time::from_ns(1));
-        let mut mass = vec![0.0; GAUSSIAN_CELLS];
+        let samples: Vec<f64> = (0..500).map(|i| f64::from((i * 37) % 101)).collect();
+        let shape = PulseShape::new(Time::from_ps(100), &samples).unwrap();
+        let sampler = PulseSampler::measured(&shape);
+        let cells = sampler.columns.len();
+        let mut mass = vec![0.0; cells];
         for (own, column) in sampler.columns.iter().enumerate() {
             let kept = f64::from(column.threshold) / 2f64.powi(32);
             mass[own] += kept;
             mass[column.alias as usize] += 1.0 - kept;
         }
-        let width = 1.0 / 32.0;
-        for (cell, mass) in mass.iter().enumerate() {
-            let below = |x: f64| libm::erfc(-x / SQRT_2) / 2.0;
-            let x = cell as f64 * width - 8.0;
-            let expected = below(x + width) - below(x);
-            let got = mass / GAUSSIAN_CELLS as f64;
+        let whole: f64 = samples.windows(2).map(|ends| mass_and_slope(ends).0).sum();
+        for (cell, (mass, ends)) in mass.iter().zip(samples.windows(2)).enumerate() {
+            let expected = mass_and_slope(ends).0 / whole;
+            let got = mass / cells as f64;
             // Every threshold is rounded down to a multiple of 2⁻³².
             let rounding = 2f64.powi(-32);
             assert!(
@@ -271,13 +240,6 @@ mod tests {
                 "{cell}: {got} {expected}"
             );
         }
-    }
-
-    #[test]
-    fn no_width_is_no_spread() {
-        let sampler = PulseSampler::gaussian(Time::ZERO);
-        assert_eq!(sampler.draw([5, 9, 77, 123 << 20]), 0.0);
-        assert_eq!(sampler.range_fs(), (0.0, 0.0));
     }
 
     #[test]

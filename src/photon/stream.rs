@@ -9,7 +9,7 @@
 //! each on one of the 16 SPADs with equal chance. Photons outside their cycle are discarded.
 //!
 //! ```text
-//!                  slot 0   slot 1   slot 2   …            a slot is 2²¹ fs = 2.1 ns after the start of its cycle
+//!                  slot 0   slot 1   slot 2   …            a slot is a CLK period, or a 2ᵏ-th of a long one
 //!   cycle 0      ┌────────┬────────┬────────┬──
 //!   cycle 1      │ one    │        │        │             a group is 2048 laser cycles; the first are shorter, so
 //!     …          │ draw   │        │        │             that a short exposure draws no long group: 128, 128, 256 …
@@ -19,36 +19,44 @@
 //! ```
 //!
 //! The photons under one key are a pure function of (seed, macropixel, slot, group): their Poisson number is drawn
-//! first, then each takes 64 random bits for its cycle, SPAD and time (a signal photon 128, and as many again for a
-//! measured pulse). So any part can be drawn on any thread in any order, and all see the same light. Only dead time,
+//! first, then each takes 32 random bits for its cycle, SPAD and time (a signal photon 64, and 128 more for a measured
+//! pulse). So any part can be drawn on any thread in any order, and all see the same light. Only dead time,
 //! afterpulses and crosstalk tie slots and cycles together; they are applied afterwards ([`SpadModel::detect`]).
 //!
 //! Timing jitter of a SPAD displaces the points of a Poisson process, which leaves it one: jitter of background changes
 //! nothing, and that of the signal is part of the pulse.
 //!
 //! Limits of the model: rates are detection rates and constant within an exposure; no spread of dead time or dark counts
-//! between SPADs; an echo that outlasts its cycle is cut off and not carried into the next one. Where a cycle is no
-//! whole number of femtoseconds, its odd last one gets no photon.
+//! between SPADs; an echo that outlasts its cycle is cut off and not carried into the next one; background photons come at
+//! multiples of some 20 fs ([`Slots`]).
 
 use std::cell::OnceCell;
 use std::ops::Range;
 
 use super::pulse::{PulseSampler, PulseShape};
+use super::quantile::{NORMAL_BITS, NormalSampler};
 use super::random::{Poisson, Purpose, philox_key};
 use super::spad::{SPADS, SpadEvent, SpadModel};
 use crate::units::{Frequency, Time};
-use draw::{ByCycle, SLOT_BITS};
-pub use draw::{Draw, Place, Run, SLOT, SignalPhoton, time_in_slot_fs};
+use draw::ByCycle;
+pub use draw::{Draw, PER_BLOCK, Place, Run};
 use group::FIRST;
 pub use group::{GROUP, Group, PLACE_BITS};
+pub use slot::{Slots, TIME_BITS};
 
 mod draw;
 mod group;
+mod slot;
 
 const SPAD_BITS: u32 = SPADS.trailing_zeros();
 
 /// Adding it to numbers up to ±2⁵¹ leaves no fraction, and the number in the low bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
+
+/// Farther away than any photon comes in its cycle, fs.
+const FAR_FS: i64 = 1 << 60;
+
+const _: () = assert!(PLACE_BITS + NORMAL_BITS <= u64::BITS);
 
 /// Second counter word of the number of signal photons; slots are below it.
 const SIGNAL_RUN: u32 = u32::MAX;
@@ -121,7 +129,8 @@ pub struct PhotonStream {
     config: StreamConfig,
     key: [u32; 2],
     cycle_fs: i64,
-    gaussian: PulseSampler,
+    slots: Slots,
+    gaussian: NormalSampler,
     shape: Option<PulseSampler>,
 }
 
@@ -132,7 +141,8 @@ impl PhotonStream {
         PhotonStream {
             key: philox_key(config.seed),
             cycle_fs: config.clock.whole_fs(i64::from(config.stop_periods)),
-            gaussian: PulseSampler::gaussian(config.pulse_sigma),
+            slots: Slots::new(config.clock, config.stop_periods),
+            gaussian: NormalSampler::new(config.pulse_sigma.as_fs() as f64),
             shape: config.pulse_shape.as_ref().map(PulseSampler::measured),
             config: config.clone(),
         }
@@ -148,9 +158,18 @@ impl PhotonStream {
         self.cycle_fs
     }
 
-    /// Slots of a laser cycle; the last one may outlast it.
-    pub fn slots(&self) -> u32 {
-        (self.cycle_fs as u64).div_ceil(SLOT.as_fs() as u64) as u32
+    /// Slots of a laser cycle.
+    pub fn slots(&self) -> Slots {
+        self.slots
+    }
+
+    /// From when until when these slots last, fs after the start of their cycle.
+    pub fn span_fs(&self, slots: &Range<u32>) -> Range<i64> {
+        let until_fs = match slots.end == self.slots.count() {
+            true => self.cycle_fs,
+            false => self.slots.start_fs(slots.end),
+        };
+        self.slots.start_fs(slots.start)..until_fs
     }
 
     /// Groups of the exposure; the last one may outlast it.
@@ -160,21 +179,23 @@ impl PhotonStream {
 
     /// Macropixel number `pixel` under `light`.
     pub fn pixel(&self, pixel: u32, light: &PixelLight) -> PixelStream<'_> {
-        let (mut first_fs, mut last_fs) = self.gaussian.range_fs();
+        let reach_fs = self.gaussian.reach();
+        let (mut first_fs, mut last_fs) = (-reach_fs, reach_fs);
         if let Some(shape) = &self.shape {
             first_fs += shape.range_fs().0;
             last_fs += shape.range_fs().1;
         }
-        let arrival_fs = light.arrival.as_fs();
+        // What is so far away is in no cycle, and may be displaced without overflow.
+        let arrival_fs = light.arrival.as_fs().clamp(-FAR_FS, FAR_FS);
         PixelStream {
             stream: self,
             pixel,
             arrival_fs,
             echo_fs: (
-                arrival_fs.saturating_add(first_fs.floor() as i64),
-                arrival_fs.saturating_add(last_fs.ceil() as i64),
+                arrival_fs + first_fs.floor() as i64,
+                arrival_fs + last_fs.ceil() as i64,
             ),
-            background: Numbers::new(light.background_hz * SLOT.as_s()),
+            background: Numbers::new(light.background_hz * self.slots.length_s()),
             signal: Numbers::new(light.signal_per_cycle),
         }
     }
@@ -189,8 +210,8 @@ impl PhotonStream {
         let mut draw = Draw::default();
         let mut by_cycle = ByCycle::default();
         for group in self.groups() {
-            stream.draw(group, 0..self.slots(), &mut draw);
-            by_cycle.sort(&draw);
+            stream.draw(group, 0..self.slots.count(), &mut draw);
+            by_cycle.sort(&draw, &stream);
             for cycle in 0..group.cycles_in(self.config.laser_cycles) {
                 let start = self.config.cycle_start(group.first_cycle() + cycle);
                 events.extend(by_cycle.of(cycle).iter().map(|&photon| SpadEvent {
@@ -264,15 +285,16 @@ impl PixelStream<'_> {
 
     /// Draws all photons of `group` in these slots.
     pub fn draw(&self, group: Group, slots: Range<u32>, draw: &mut Draw) {
-        let (key, cycle_fs) = (self.stream.key, self.stream.cycle_fs);
+        let key = self.stream.key;
         let numbered = |purpose: Purpose| purpose as u32 | group.number() << 8;
-        draw.begin(group, cycle_fs);
+        draw.begin(group);
 
-        let from_fs = i64::from(slots.start) << SLOT_BITS;
-        let until_fs = (i64::from(slots.end) << SLOT_BITS).min(cycle_fs);
+        draw.within_fs = self.stream.span_fs(&slots);
         let (background, parts) = self.background.of(group);
         let (signal, signal_parts) = self.signal.of(group);
-        let has_echo = !signal.is_zero() && self.echo_fs.0 < until_fs && self.echo_fs.1 >= from_fs;
+        let has_echo = !signal.is_zero()
+            && self.echo_fs.0 < draw.within_fs.end
+            && self.echo_fs.1 >= draw.within_fs.start;
         if has_echo {
             let words = signal.words() * signal_parts;
             draw.counts.push_run(SIGNAL_RUN, words.div_ceil(2));
@@ -289,13 +311,9 @@ impl PixelStream<'_> {
         let mut at = 0;
         if has_echo {
             let photons = draw.count(signal, signal_parts, &mut at);
-            draw.echo.push_run(0, photons);
-            if self.stream.shape.is_some() {
-                draw.echo.push_run(1, photons);
-            }
+            draw.push_echo(photons, self.stream.shape.is_some());
             draw.echo
                 .generate(key, self.pixel, numbered(Purpose::Signal));
-            self.place_signal(photons as usize, from_fs..until_fs, draw);
         }
         if !background.is_zero() {
             for slot in slots {
@@ -307,47 +325,44 @@ impl PixelStream<'_> {
         }
     }
 
-    /// Places the photons of the echo; those of a measured pulse have a second row of random words.
-    fn place_signal(&self, photons: usize, within_fs: Range<i64>, draw: &mut Draw) {
-        let [low, high] = draw.echo.rows();
-        draw.signal.resize(photons, SignalPhoton::default());
-        let mut kept = 0;
-        let own = low[..photons].iter().zip(&high[..photons]);
-        for (photon, (&low_word, &high_word)) in own.enumerate() {
-            let mut own = words(low_word, high_word);
-            own[1] <<= PLACE_BITS;
-            let mut after_fs = self.stream.gaussian.draw(own);
-            if let Some(shape) = &self.stream.shape {
-                let second = photons + photon;
-                after_fs += shape.draw(words(low[second], high[second]));
-            }
-            let time_fs = self.arrival_fs.saturating_add(nearest(after_fs));
-            // Written always, kept if within: no branch to mispredict.
-            draw.signal[kept] = SignalPhoton {
-                place: draw.group.place(low_word),
-                time_fs,
-            };
-            kept += usize::from(within_fs.contains(&time_fs));
-        }
-        draw.signal.truncate(kept);
+    /// The slots of the stream.
+    pub fn slots(&self) -> Slots {
+        self.stream.slots
     }
+
+    /// Place of a photon of the echo in `draw`, and its time after the start of its cycle, fs.
+    #[inline]
+    pub fn signal_photon(&self, draw: &Draw, photon: usize) -> (Place, i64) {
+        let word = draw.echo_word(photon);
+        let mut after_fs = self.stream.gaussian.draw(word);
+        if let Some(shape) = &self.stream.shape {
+            after_fs += shape.draw(draw.echo_words(photon));
+        }
+        let place = draw.group.place((word >> 32) as u32);
+        (place, self.arrival_fs + nearest(after_fs))
+    }
+
+    /// The first rank ([`signal_rank`]) of signal photons that may come within `tolerance_fs` of `time_fs` or later, and
+    /// the first of those that come later for certain; `None` if the pulse is no Gaussian.
+    pub fn signal_ranks_at(&self, time_fs: f64, tolerance_fs: f64) -> Option<[i16; 2]> {
+        let after_fs = time_fs - self.arrival_fs as f64;
+        // Times are rounded.
+        let tolerance_fs = tolerance_fs + 1.0;
+        let gaussian = &self.stream.gaussian;
+        (self.stream.shape.is_none()).then(|| gaussian.ranks_at(after_fs, tolerance_fs))
+    }
+}
+
+/// Bits of a signal photon's words that rise with its time, if the pulse is a Gaussian.
+#[inline]
+pub fn signal_rank(low: u32, high: u32) -> i16 {
+    NormalSampler::rank(low, high)
 }
 
 /// The nearest whole number, without a call; `value` is within ±2⁵¹.
 #[inline]
 fn nearest(value: f64) -> i64 {
     ((value + ROUNDER).to_bits() as i64) - ROUNDER.to_bits() as i64
-}
-
-/// The four words of a block.
-#[inline]
-fn words(low: u64, high: u64) -> [u32; 4] {
-    [
-        low as u32,
-        (low >> 32) as u32,
-        high as u32,
-        (high >> 32) as u32,
-    ]
 }
 
 #[cfg(test)]

@@ -114,6 +114,17 @@ impl Frequency {
         numerator.div_euclid(self.numerator as i128) as i64
     }
 
+    /// The length of one of 2^`bits` equal parts of a period, for `bits` up to 30: whole femtoseconds, and what is left over in
+    /// units of 2⁻⁶⁴ fs, rounded down.
+    pub fn part_fs(self, bits: u32) -> (u64, u64) {
+        let step = FS_PER_S as u128 * u128::from(self.denominator);
+        let parts = u128::from(self.numerator) << bits;
+        let (whole, rest) = (step / parts, step % parts);
+        let (high, rest) = ((rest << 32) / parts, (rest << 32) % parts);
+        let low = (rest << 32) / parts;
+        (whole as u64, (high << 32 | low) as u64)
+    }
+
     /// The times of half periods `first`, `first` + 1, … without end: the same as [`Frequency::half_periods`] of
     /// each, by addition with an exact remainder.
     pub fn ticks(self, first: i64) -> impl Iterator<Item = Time> + Send {

@@ -7,12 +7,12 @@ pub struct RandomWords {
     key: [u32; 2],
     pixel: u32,
     next_block: u32,
-    words: [u64; READY],
-    /// Half words taken of `words`.
+    words: [u32; READY],
+    /// How many of `words` are taken.
     taken: usize,
 }
 
-const READY: usize = 4 * philox::LANES;
+const READY: usize = 8 * philox::LANES;
 
 impl RandomWords {
     /// The words of one macropixel.
@@ -22,25 +22,25 @@ impl RandomWords {
             pixel,
             next_block: 0,
             words: [0; READY],
-            taken: 2 * READY,
+            taken: READY,
         }
     }
 
     #[inline]
     fn next_u32(&mut self) -> u32 {
-        if self.taken == 2 * READY {
+        if self.taken == READY {
             self.refill();
         }
-        let word = self.words[self.taken / 2] >> (self.taken % 2 * 32);
+        let word = self.words[self.taken];
         self.taken += 1;
-        word as u32
+        word
     }
 
     fn refill(&mut self) {
         let others = [0, self.pixel, Purpose::Cohort as u32];
         let rows = philox::blocks_from(self.next_block, others, self.key);
         self.words.copy_from_slice(rows.as_flattened());
-        self.next_block += READY as u32 / 2;
+        self.next_block += READY as u32 / 4;
         self.taken = 0;
     }
 

@@ -6,30 +6,32 @@
 //! matter at all.
 //!
 //! ```text
-//!   code    31        23         15           4        0
-//!          ┌──────────┬──────────┬────────────┬────────┐
-//!          │ doubtful │ row      │ cycle      │ SPAD   │
-//!          └──────────┴──────────┴────────────┴────────┘
+//!   code    31        19     15         8 7      0         marks   31     15     0
+//!          ┌─────────┬──────┬──┬─────────┬────────┐                ┌──────┬──────┐
+//!          │ cycle   │ SPAD │  │doubtful │ row    │                │ bins │ SPADs│
+//!          └─────────┴──────┴──┴─────────┴────────┘                └──────┴──────┘
 //! ```
 
 use multiversion::multiversion;
 
+use super::echo::EchoRows;
 use super::sight::ROUNDING_FS;
-use crate::photon::{Draw, GROUP, Place, SLOT, SPADS};
+use crate::photon::{Draw, GROUP, PER_BLOCK, PixelStream, Place, SPADS, Slots, TIME_BITS};
 
 /// Binary places of a position in CLK periods.
 const FRACTION_BITS: u32 = 24;
 const FRACTION: u32 = (1 << FRACTION_BITS) - 1;
 
-/// Whole CLK periods added to positions, so that a slot that reaches into the window starts above 0.
+/// Whole CLK periods added to positions, so that all that matter are above 0.
 const BIAS: u32 = 32;
 
 /// Adding it to a number below 2³² leaves its nearest integer in the low half.
 const INTEGER: f64 = (1u64 << 52) as f64;
 
-const DOUBTFUL: u32 = 1 << 31;
-const ROW_BITS: u32 = 16;
+const DOUBTFUL: u32 = 1 << 8;
+const PLACE_SHIFT: u32 = 16;
 const SPAD_BITS: u32 = SPADS.trailing_zeros();
+const CYCLE_SHIFT: u32 = PLACE_SHIFT + SPAD_BITS;
 
 /// Rows that a code can name.
 pub const ROWS: usize = 256;
@@ -37,7 +39,7 @@ pub const ROWS: usize = 256;
 /// Cycles that a code can name: those of a group, and more for photons that are none.
 pub const CYCLES: usize = 2 * GROUP as usize;
 
-const _: () = assert!(CYCLES << SPAD_BITS <= 1 << ROW_BITS);
+const _: () = assert!(CYCLES << CYCLE_SHIFT == 1 << u32::BITS);
 
 /// A photon's row, cycle and SPAD.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,30 +47,101 @@ pub struct Code(u32);
 
 impl Code {
     /// No photon. It has a row and a cycle that nobody looks at.
-    pub const NONE: Code = Code((ROWS as u32 - 1) << ROW_BITS | GROUP << SPAD_BITS);
+    pub const NONE: Code = Code(GROUP << CYCLE_SHIFT | (ROWS as u32 - 1));
+
+    /// Of a photon at `place`, in one of `bins` bins, and its mark.
+    #[inline(always)]
+    pub fn new(place: u32, row: u32, is_doubtful: bool, bins: u32) -> (Code, u32) {
+        let is_in_bin = row.wrapping_sub(1) < bins;
+        let bin_mark = u32::from(is_in_bin) << (SPADS as u32 + row % SPADS as u32);
+        let code = place << PLACE_SHIFT | u32::from(is_doubtful) * DOUBTFUL | row;
+        (Code(code), bin_mark | 1 << (place % SPADS as u32))
+    }
 
     /// Cycle within the group.
     #[inline]
     pub fn cycle(self) -> usize {
-        (self.0 >> SPAD_BITS) as usize % CYCLES
+        (self.0 >> CYCLE_SHIFT) as usize
     }
 
     /// SPAD.
     #[inline]
     pub fn spad(self) -> u8 {
-        (self.0 % SPADS as u32) as u8
+        (self.0 >> PLACE_SHIFT) as u8 % SPADS as u8
     }
 
     /// Bin + 1; 0 before the window.
     #[inline]
     pub fn row(self) -> usize {
-        (self.0 >> ROW_BITS) as usize % ROWS
+        self.0 as usize % ROWS
     }
 
     /// Whether the photon is too close to an edge.
     #[inline]
     pub fn is_doubtful(self) -> bool {
         self.0 & DOUBTFUL != 0
+    }
+}
+
+/// The codes of photons, and what to look for in a cycle's other photons: a bit for the SPAD and one for the bin. More
+/// than 16 bins share bits.
+#[derive(Debug, Default)]
+pub struct Codes {
+    len: usize,
+    /// Longer than needed, so that what was there before need not be cleared.
+    codes: Vec<Code>,
+    marks: Vec<u32>,
+}
+
+impl Codes {
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// How many there are, those that are no photons among them.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// The codes.
+    pub fn codes(&self) -> &[Code] {
+        &self.codes[..self.len]
+    }
+
+    /// Their marks.
+    pub fn marks(&self) -> &[u32] {
+        &self.marks[..self.len]
+    }
+
+    /// Codes of photons that are too close to an edge.
+    pub fn doubtful(&self) -> impl Iterator<Item = Code> {
+        // They are rare: most groups have none, which is quickly seen.
+        let (chunks, rest) = self.codes().as_chunks::<64>();
+        let chunks = chunks.iter().map(|chunk| &chunk[..]).chain([rest]);
+        chunks
+            .filter(|chunk| chunk.iter().fold(0, |any, code| any | code.0) & DOUBTFUL != 0)
+            .flatten()
+            .copied()
+            .filter(|code| code.is_doubtful())
+    }
+
+    /// Appends what is no photon until their number is a multiple of `multiple`.
+    pub fn fill_up(&mut self, multiple: usize) {
+        let missing = self.len.next_multiple_of(multiple) - self.len;
+        self.append(missing).0.fill(Code::NONE);
+    }
+
+    /// Room for more of them, to be written.
+    fn append(&mut self, more: usize) -> (&mut [Code], &mut [u32]) {
+        let first = self.len;
+        self.len += more;
+        if self.len > self.codes.len() {
+            self.codes.resize(2 * self.len, Code::NONE);
+            self.marks.resize(2 * self.len, 0);
+        }
+        let new = first..self.len;
+        (&mut self.codes[new.clone()], &mut self.marks[new])
     }
 }
 
@@ -83,81 +156,99 @@ pub struct Wanted {
     pub origin_fs: i64,
 }
 
+impl Wanted {
+    /// The code and mark of a photon by the place of its window, or none.
+    #[inline(always)]
+    pub fn code(&self, place: u32, code: impl Fn(u32) -> (Code, u32)) -> (Code, u32) {
+        let (own, mark) = code(place + (self.later << SPAD_BITS));
+        let is_wanted = place < self.cycles << SPAD_BITS;
+        (if is_wanted { own } else { Code::NONE }, mark)
+    }
+}
+
 /// Bins of one window. Times are relative to the start of bin 0.
 #[derive(Debug, Clone, Copy)]
 pub struct Binning {
     bins: u32,
     /// CLK periods of a femtosecond.
     periods_per_fs: f64,
-    /// CLK periods of a slot.
-    periods_per_slot: f64,
-    /// What makes a position out of a random word for the time in a slot.
-    scale: u32,
+    /// Binary places of a position in slots.
+    slot_bits: u32,
     /// Distance from an edge that leaves a position in doubt.
     doubt: u32,
 }
 
 impl Binning {
-    /// For `bins` bins (1 to 64) of a CLK of at most 2 GHz.
-    pub fn new(bins: usize, clk_hz: f64) -> Self {
+    /// For `bins` bins (1 to 64) of a CLK of at most 2 GHz with these slots.
+    pub fn new(bins: usize, clk_hz: f64, slots: Slots) -> Self {
         let periods_per_fs = clk_hz * 1e-15;
         let one = f64::from(FRACTION + 1);
-        let periods_per_slot = SLOT.as_fs() as f64 * periods_per_fs;
-        // One more femtosecond for the bits of the word beyond whole femtoseconds, a little for the arithmetic.
-        let doubt_fs = (ROUNDING_FS + 1) as f64;
+        // Slots start and photons come at whole femtoseconds; a little more is for the arithmetic.
+        let doubt_fs = (ROUNDING_FS + 3) as f64;
         Binning {
             bins: bins as u32,
             periods_per_fs,
-            periods_per_slot,
-            scale: (periods_per_slot * one).round() as u32,
+            slot_bits: FRACTION_BITS.saturating_sub(slots.per_period_bits()),
             doubt: (doubt_fs * periods_per_fs * one).ceil() as u32 + 3,
         }
     }
 
-    /// Appends the codes of a draw, those of its background photons (by halves, as [`Draw::words`] has them) before those
-    /// of its signal. `bases` is for intermediate results.
+    /// Appends the codes of a draw, those of its background photons (by rows, as [`Draw::words`] has them) before those
+    /// of its signal.
     pub fn encode(
         &self,
+        light: &PixelStream<'_>,
         draw: &Draw,
         wanted: &Wanted,
-        bases: &mut Vec<u32>,
-        codes: &mut Vec<Code>,
+        echo: Option<&mut EchoRows>,
+        codes: &mut Codes,
     ) {
-        let first = codes.len();
-        let filled_up = draw.slots().len();
-        codes.resize(first + 2 * filled_up, Code::NONE);
-        let (low, high) = codes[first..].split_at_mut(filled_up);
+        let blocks = draw.slots().len();
         let shift = draw.group().place_shift();
-        bases.resize(filled_up.max(bases.len()), 0);
-        let bases = &mut bases[..filled_up];
-        find_bases(self, wanted.origin_fs, draw.slots(), bases);
-        for (words, codes) in draw.words().into_iter().zip([&mut *low, &mut *high]) {
-            encode(self, wanted, shift, words, bases, codes);
-        }
-        low[draw.blocks()..].fill(Code::NONE);
-        high[draw.blocks()..].fill(Code::NONE);
-        for run in draw.runs() {
-            let [_, second] = run.blocks();
-            if run.photons % 2 == 1 {
-                codes[first + filled_up + second.end] = Code::NONE;
+        let (background, marks) = codes.append(PER_BLOCK * blocks);
+        if blocks > 0 {
+            let rows = background.chunks_exact_mut(blocks);
+            let rows = rows.zip(marks.chunks_exact_mut(blocks));
+            for (words, row) in draw.words().into_iter().zip(rows) {
+                encode(self, wanted, shift, (words, draw.slots()), row);
             }
         }
-        for (half, block) in draw.outlasting() {
-            codes[first + half * filled_up + block] = Code::NONE;
+        for unused in draw.unused() {
+            background[unused] = Code::NONE;
         }
-        let (end, later) = (wanted.cycles << SPAD_BITS, wanted.later << SPAD_BITS);
-        codes.extend(draw.signal().iter().map(|photon| {
-            let place = u32::from(photon.place);
-            let position = self.position(photon.time_fs - wanted.origin_fs);
-            let wanted = self.code(position, place + later);
-            if place < end { wanted } else { Code::NONE }
-        }));
+        match echo {
+            Some(rows) => {
+                for words in draw.echo() {
+                    let out = codes.append(words[0].len());
+                    rows.encode(wanted, shift, words, out);
+                }
+            }
+            None => {
+                for photon in 0..draw.echo_photons() {
+                    let (place, time_fs) = light.signal_photon(draw, photon);
+                    let is_drawn = draw.within_fs().contains(&time_fs);
+                    self.push(wanted, is_drawn.then_some((place, time_fs)), codes);
+                }
+            }
+        }
+    }
+
+    /// Appends the code of one photon, as place and time after the start of its cycle.
+    pub fn push(&self, wanted: &Wanted, photon: Option<(Place, i64)>, codes: &mut Codes) {
+        let (code, mark) = codes.append(1);
+        (code[0], mark[0]) = match photon {
+            Some((place, time_fs)) => {
+                let position = self.position(time_fs - wanted.origin_fs);
+                wanted.code(u32::from(place), |place| self.code(position, place))
+            }
+            None => (Code::NONE, 0),
+        };
     }
 
     /// The code of one photon at `time_fs`.
     #[inline]
     pub fn encode_one(&self, time_fs: i64, place: Place) -> Code {
-        self.code(self.position(time_fs), u32::from(place))
+        self.code(self.position(time_fs), u32::from(place)).0
     }
 
     #[inline(always)]
@@ -171,25 +262,26 @@ impl Binning {
     }
 
     #[inline(always)]
-    fn code(&self, position: u32, place: u32) -> Code {
+    fn code(&self, position: u32, place: u32) -> (Code, u32) {
         let is_doubtful = position.wrapping_add(self.doubt) & FRACTION < 2 * self.doubt;
         let row = (position >> FRACTION_BITS).clamp(BIAS - 1, BIAS + self.bins) - (BIAS - 1);
-        Code(u32::from(is_doubtful) << 31 | row << ROW_BITS | place)
+        Code::new(place, row, is_doubtful, self.bins)
     }
-}
 
-/// The positions at which slots begin.
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
-fn find_bases(binning: &Binning, origin_fs: i64, slots: &[u32], bases: &mut [u32]) {
-    let one = f64::from(FRACTION + 1);
-    let origin = origin_fs as f64 * binning.periods_per_fs;
-    let last = f64::from(binning.bins) + 1.0;
-    for (&slot, base) in slots.iter().zip(bases) {
-        let periods = f64::from(slot) * binning.periods_per_slot - origin;
-        // No slot is as long.
-        let periods = if periods > -16.0 { periods } else { -16.0 };
-        let periods = if periods < last { periods } else { last };
-        *base = ((periods + f64::from(BIAS)) * one + INTEGER).to_bits() as u32;
+    /// What turns slots into positions: the first and the last slot to tell apart, and what is added.
+    fn slot_positions(&self, origin_fs: i64) -> (u32, u32, u32) {
+        let one = f64::from(FRACTION + 1);
+        let origin = origin_fs as f64 * self.periods_per_fs;
+        let per_period = f64::from(1u32 << (FRACTION_BITS - self.slot_bits));
+        // Far outside, a slot between two edges will do.
+        let slot = |periods: f64| (periods.floor() * per_period).max(0.0) as u32;
+        let (first, last) = (
+            slot(origin - 16.0),
+            slot(origin + f64::from(self.bins) + 2.0),
+        );
+        let half_step = f64::from(1u32 << self.slot_bits) / f64::from(2u32 << TIME_BITS);
+        let added = (f64::from(BIAS) - origin) * one + half_step;
+        (first, last, added.round() as i64 as u32)
     }
 }
 
@@ -198,72 +290,97 @@ fn encode(
     binning: &Binning,
     wanted: &Wanted,
     place_shift: u32,
-    words: &[u64],
-    bases: &[u32],
-    codes: &mut [Code],
+    (words, slots): (&[u32], &[u32]),
+    (codes, marks): (&mut [Code], &mut [u32]),
 ) {
     let (binning, wanted) = (*binning, *wanted);
-    let (end, later) = (wanted.cycles << SPAD_BITS, wanted.later << SPAD_BITS);
-    for ((&word, &base), code) in words.iter().zip(bases).zip(codes) {
-        let offset = ((word & 0xFFFF_FFFF) * u64::from(binning.scale)) >> 32;
-        let position = base.wrapping_add(offset as u32);
-        let place = (word >> place_shift) as u32;
-        let wanted = binning.code(position, place + later);
-        *code = if place < end { wanted } else { Code::NONE };
+    let (first, last, added) = binning.slot_positions(wanted.origin_fs);
+    let out = codes.iter_mut().zip(marks);
+    for ((&word, &slot), (code, mark)) in words.iter().zip(slots).zip(out) {
+        let in_slot = word << (u32::BITS - TIME_BITS) >> (u32::BITS - binning.slot_bits);
+        let slot = slot.max(first).min(last) << binning.slot_bits;
+        let position = slot.wrapping_add(added).wrapping_add(in_slot);
+        let own = |place| binning.code(position, place);
+        (*code, *mark) = wanted.code(word >> place_shift, own);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photon::{Group, time_in_slot_fs};
+    use crate::photon::{Group, PhotonStream, SpadModel, StreamConfig};
+    use crate::units::{Frequency, Time};
     use proptest::prelude::*;
+
+    fn dark() -> StreamConfig {
+        StreamConfig {
+            seed: 1,
+            clock: Frequency::from_hz(1),
+            stop_periods: 1,
+            laser_cycles: 1,
+            pulse_sigma: Time::ZERO,
+            pulse_shape: None,
+            spads: SpadModel::default(),
+        }
+    }
 
     proptest! {
         /// Whatever is not in doubt is in the bin that whole numbers say.
         #[test]
         fn codes_are_those_of_whole_numbers(
             bins in 1usize..=64,
-            period_fs in 500_000i64..1_000_000_000,
-            slot in 0u32..6000,
-            start_fs in -2_000_000_000i64..2_000_000_000,
+            hz in prop_oneof![80_000u64..2_000_000, 2_000_000u64..2_000_000_000],
+            slot: u32,
             near in 0i64..65,
-            off in -20i64..20,
+            off in -30i64..30,
+            start in -2f64..70.0,
             word: u32,
-            place: u32,
             cycles in 1u32..=GROUP,
             later in 0u32..2,
             aimed: bool,
         ) {
-            let binning = Binning::new(bins, 1e15 / period_fs as f64);
-            let in_slot_fs = i64::from(time_in_slot_fs(u64::from(word)));
+            let clock = Frequency::from_hz(hz);
+            let config = StreamConfig { clock, stop_periods: 600, ..dark() };
+            let slots = PhotonStream::new(&config).slots();
+            let slot = slot % slots.count();
+            let binning = Binning::new(bins, hz as f64, slots);
+            let time_fs = slots.time_fs(slot, word);
+            let period_fs = 1e15 / hz as f64;
             // Half of the photons come close to an edge.
-            let start_fs = if aimed { near * period_fs + off - in_slot_fs } else { start_fs };
-            let time_fs = start_fs + in_slot_fs;
-            let origin_fs = i64::from(slot) * SLOT.as_fs() - start_fs;
-            let row = (time_fs.div_euclid(period_fs) + 1).clamp(0, bins as i64 + 1) as usize;
-            let off_edge = time_fs.rem_euclid(period_fs).min(period_fs - time_fs.rem_euclid(period_fs));
+            let origin_fs = match aimed {
+                true => time_fs - clock.periods(near).as_fs() - off,
+                false => time_fs - (start * period_fs) as i64,
+            };
+            let periods = (time_fs - origin_fs) as f64 / period_fs;
+            let row = (periods.floor() + 1.0).clamp(0.0, bins as f64 + 1.0) as usize;
+            let off_edge_fs = (periods - periods.round()).abs() * period_fs;
             let wanted = Wanted { cycles, later, origin_fs };
-            let shift = Group::of_cycle(GROUP).place_shift();
-            let photon = u64::from(place) << 32 | u64::from(word);
-            let (mut base, mut codes) = ([0], [Code::NONE]);
-            find_bases(&binning, origin_fs, &[slot], &mut base);
-            encode(&binning, &wanted, shift, &[photon], &base, &mut codes);
-            let place = (photon >> shift) as u32;
+            let group = Group::of_cycle(GROUP);
+            let mut codes = [Code::NONE; 2];
+            let mut marks = [0; 2];
+            encode(&binning, &wanted, group.place_shift(), (&[word], &[slot]), (&mut codes[..1], &mut marks[..1]));
+            let place = group.place(word);
+            let mut one = Codes::default();
+            binning.push(&wanted, Some((place, time_fs)), &mut one);
+            (codes[1], marks[1]) = (one.codes()[0], one.marks()[0]);
+            let place = u32::from(place);
             if place / 16 >= cycles {
-                prop_assert_eq!(codes[0], Code::NONE);
+                prop_assert_eq!(codes, [Code::NONE; 2]);
                 return Ok(());
             }
             let place = place + 16 * later;
-            for code in [codes[0], binning.encode_one(time_fs, place as Place)] {
+            for (code, mark) in codes.into_iter().zip(marks) {
                 prop_assert_eq!(code.cycle() as u32, place / 16);
                 prop_assert_eq!(u32::from(code.spad()), place % 16);
+                prop_assert_eq!(mark & 0xFFFF, 1 << (place % 16));
+                let is_in_bin = (1..=bins).contains(&code.row());
+                prop_assert_eq!(mark >> 16, u32::from(is_in_bin) << (code.row() % 16));
                 if code.is_doubtful() {
-                    let resolution = period_fs >> 22;
-                    prop_assert!(off_edge <= 8 + resolution || !(1..=bins).contains(&row), "{off_edge}");
+                    let resolution_fs = period_fs / 2f64.powi(22);
+                    prop_assert!(off_edge_fs <= 10.0 + resolution_fs || !(1..=bins).contains(&row), "{off_edge_fs}");
                 } else {
                     prop_assert_eq!(code.row(), row);
-                    prop_assert!(off_edge > ROUNDING_FS || row == 0 || row > bins);
+                    prop_assert!(off_edge_fs > ROUNDING_FS as f64 || row == 0 || row > bins);
                 }
             }
         }

@@ -15,12 +15,15 @@
 //!
 //! [`SpadModel::detect`]: crate::photon::SpadModel::detect
 
-use super::binning::{Binning, Code, ROWS, Wanted};
+use std::ops::Range;
+
+use super::binning::{Binning, Code, Codes, ROWS, Wanted};
+use super::echo::EchoRows;
 use super::history::{Photon, certain_from, split};
 use super::sight::{ROUNDING_FS, Sight};
-use super::tables::{MOST_PHOTONS, Tables};
+use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Tables};
 use super::{Window, Work, taken};
-use crate::photon::{Draw, Group, PhotonStream, PixelStream, SPADS, SignalPhoton, SpadEvent};
+use crate::photon::{Draw, Group, PER_BLOCK, PhotonStream, PixelStream, Place, SPADS, SpadEvent};
 use crate::units::Time;
 
 /// Counts macropixels; keeps its tables from one to the next.
@@ -35,11 +38,10 @@ pub struct Counting<'a> {
     /// Photons of the group's cycles for the windows of the next cycles.
     previous: Draw,
     /// Photons of the last cycle of the group before, for the window of the first cycle; all in cycle 0.
-    carried: Vec<SignalPhoton>,
+    carried: Vec<(Place, i64)>,
     extra: Draw,
-    bases: Vec<u32>,
     /// Codes of all photons drawn for the group. Photons are known by their index here.
-    codes: Vec<Code>,
+    codes: Codes,
     /// Where the codes of `previous` and `carried` begin.
     first_code: [usize; 2],
     tables: Tables,
@@ -57,6 +59,9 @@ pub struct Counting<'a> {
 struct Pixel<'p> {
     sight: &'p Sight,
     light: &'p PixelStream<'p>,
+    /// Photons of `own` and `previous`.
+    wanted: [Wanted; 2],
+    echo: [Option<EchoRows>; 2],
     hits: Vec<i64>,
     work: Work,
 }
@@ -68,16 +73,15 @@ impl<'a> Counting<'a> {
         Counting {
             engine,
             stream,
-            binning: Binning::new(bins, engine.exposure.clock.as_hz()),
+            binning: Binning::new(bins, engine.exposure.clock.as_hz(), stream.slots()),
             adds: std::array::from_fn(|spads| engine.adds(((1u32 << spads) - 1) as u16)),
             own: Draw::default(),
             previous: Draw::default(),
             carried: Vec::new(),
             extra: Draw::default(),
-            bases: Vec::new(),
-            codes: Vec::new(),
+            codes: Codes::default(),
             first_code: [0; 2],
-            tables: Tables::new(bins),
+            tables: Tables::default(),
             together: Vec::new(),
             fired: [0; ROWS],
             photons: Vec::new(),
@@ -88,9 +92,27 @@ impl<'a> Counting<'a> {
 
     /// Hits of every bin of a macropixel, and what they took.
     pub fn expose(&mut self, sight: &Sight, light: &PixelStream<'_>) -> (Vec<i64>, Work) {
+        let origins_fs = [sight.first_fs, sight.first_fs + self.stream.cycle_fs()];
+        let wanted = [0, 1].map(|later| Wanted {
+            cycles: 0,
+            later,
+            origin_fs: origins_fs[later as usize],
+        });
+        let echo = |slots: &Range<u32>, origin_fs| {
+            let (bins, clk_hz) = (self.engine.config.bins, self.engine.exposure.clock.as_hz());
+            let within_fs = self.stream.span_fs(slots);
+            (!slots.is_empty())
+                .then(|| EchoRows::new(light, bins, 1e15 / clk_hz, origin_fs, within_fs))
+                .flatten()
+        };
         let mut pixel = Pixel {
             sight,
             light,
+            wanted,
+            echo: [
+                echo(&sight.own, origins_fs[0]),
+                echo(&sight.previous, origins_fs[1]),
+            ],
             hits: self.engine.dark_hits(sight.first_edge),
             work: Work::default(),
         };
@@ -104,18 +126,18 @@ impl<'a> Counting<'a> {
             if self.stream.config().spads.has_secondaries() {
                 self.count_sorted(&mut pixel, group, cycles);
             } else {
-                self.encode(sight, cycles);
-                if self.codes.len() < MOST_PHOTONS {
+                self.encode(&mut pixel, cycles);
+                if self.codes.len() <= MOST_PHOTONS {
                     self.count_cells(&mut pixel, group, cycles);
                 } else {
                     self.count_sorted(&mut pixel, group, cycles);
                 }
             }
-            self.carry(group);
+            self.carry(light, group);
         }
-        for (row, &photons) in (1..).zip(self.tables.counts()[1..].iter().take(pixel.hits.len())) {
-            let photons = u64::from(photons);
-            pixel.hits[row - 1] += self.adds[1] * photons as i64;
+        for (row, hits) in (1..).zip(&mut pixel.hits) {
+            let photons = u64::from(self.tables.count(row));
+            *hits += self.adds[1] * photons as i64;
             pixel.work.clk_periods_visited += photons;
             pixel.work.pulses += photons;
         }
@@ -123,43 +145,38 @@ impl<'a> Counting<'a> {
     }
 
     /// Encodes all photons that the windows of a group may see.
-    fn encode(&mut self, sight: &Sight, cycles: u32) {
+    fn encode(&mut self, pixel: &mut Pixel<'_>, cycles: u32) {
         self.codes.clear();
-        let wanted = Wanted {
-            cycles,
-            later: 0,
-            origin_fs: sight.first_fs,
-        };
-        self.binning
-            .encode(&self.own, &wanted, &mut self.bases, &mut self.codes);
-        self.first_code[0] = self.codes.len();
-        let wanted = Wanted {
-            cycles: cycles - 1,
-            later: 1,
-            origin_fs: sight.first_fs + self.stream.cycle_fs(),
-        };
-        self.binning
-            .encode(&self.previous, &wanted, &mut self.bases, &mut self.codes);
-        self.first_code[1] = self.codes.len();
-        let carried = self.carried.iter();
-        self.codes.extend(carried.map(|photon| {
+        let [own, previous] = &mut pixel.wanted;
+        own.cycles = cycles;
+        previous.cycles = cycles - 1;
+        let draws = [&self.own, &self.previous];
+        for (part, draw) in draws.into_iter().enumerate() {
+            let (wanted, echo) = (&pixel.wanted[part], pixel.echo[part].as_mut());
             self.binning
-                .encode_one(photon.time_fs - wanted.origin_fs, photon.place)
-        }));
+                .encode(pixel.light, draw, wanted, echo, &mut self.codes);
+            self.first_code[part] = self.codes.len();
+        }
+        let wanted = Wanted {
+            cycles: 1,
+            later: 0,
+            ..pixel.wanted[1]
+        };
+        for &photon in &self.carried {
+            self.binning.push(&wanted, Some(photon), &mut self.codes);
+        }
+        self.codes.fill_up(SIDE_BY_SIDE);
     }
 
     /// Keeps what the first window of the next group may see.
-    fn carry(&mut self, group: Group) {
+    fn carry(&mut self, light: &PixelStream<'_>, group: Group) {
         self.carried.clear();
         if self.previous.is_empty() {
             return;
         }
-        let photons = self.previous.photons().filter_map(|(place, time_fs)| {
+        let photons = self.previous.photons(light).filter_map(|(place, time_fs)| {
             let (cycle, spad) = split(place);
-            (cycle + 1 == group.cycles()).then_some(SignalPhoton {
-                place: u16::from(spad),
-                time_fs,
-            })
+            (cycle + 1 == group.cycles()).then_some((Place::from(spad), time_fs))
         });
         self.carried.extend(photons);
     }
@@ -181,7 +198,7 @@ impl<'a> Counting<'a> {
         let (mut once, mut several, mut is_doubtful) = (0u16, 0u16, false);
         let mut next = self.tables.take_last(cycle);
         while let Some(photon) = next {
-            let code = self.codes[photon];
+            let code = self.codes.codes()[photon];
             self.tables.remove(code.row());
             let spad = 1 << code.spad();
             several |= once & spad;
@@ -204,13 +221,14 @@ impl<'a> Counting<'a> {
                 self.settle_spad(pixel, laser_cycle, spad);
             }
         }
+        if is_doubtful {
+            for row in 0..=pixel.hits.len() {
+                self.tell(pixel, row);
+            }
+        }
         for index in 0..self.together.len() {
             let row = self.together[index].1.row();
             self.tell(pixel, row);
-            if is_doubtful {
-                self.tell(pixel, row.saturating_sub(1));
-                self.tell(pixel, row + 1);
-            }
         }
     }
 
@@ -236,7 +254,7 @@ impl<'a> Counting<'a> {
         if a.0 >= own || b.0 >= own {
             return false;
         }
-        let time_fs = |(photon, _): (usize, Code)| in_draw(&self.own, photon);
+        let time_fs = |(photon, _): (usize, Code)| in_draw(pixel.light, &self.own, photon);
         let (mut first, mut second) = ((time_fs(a), a.1.row()), (time_fs(b), b.1.row()));
         if first > second {
             std::mem::swap(&mut first, &mut second);
@@ -273,8 +291,8 @@ impl<'a> Counting<'a> {
         self.photons.clear();
         let mut seen = 0;
         for &(photon, code) in &self.together {
-            if code.spad() == spad {
-                let time = self.time_of(photon, laser_cycle);
+            if code.spad() == spad && self.is_drawn(pixel.light, photon) {
+                let time = self.time_of(pixel.light, photon, laser_cycle);
                 seen += u64::from(window.row_of(time).is_some());
                 self.photons.push((time, spad));
             }
@@ -344,15 +362,25 @@ impl<'a> Counting<'a> {
     }
 
     /// When a photon came, relative to the start of the laser cycle of its window.
-    fn time_of(&self, photon: usize, laser_cycle: u32) -> Time {
+    fn time_of(&self, light: &PixelStream<'_>, photon: usize, laser_cycle: u32) -> Time {
         let time_fs = if photon < self.first_code[0] {
-            return Time::from_fs(in_draw(&self.own, photon));
+            return Time::from_fs(in_draw(light, &self.own, photon));
         } else if photon < self.first_code[1] {
-            in_draw(&self.previous, photon - self.first_code[0])
+            in_draw(light, &self.previous, photon - self.first_code[0])
         } else {
-            self.carried[photon - self.first_code[1]].time_fs
+            self.carried[photon - self.first_code[1]].1
         };
         Time::from_fs(time_fs) - self.before(laser_cycle)
+    }
+
+    /// Whether a photon, perhaps of the echo, is one of the drawn slots.
+    fn is_drawn(&self, light: &PixelStream<'_>, photon: usize) -> bool {
+        let (draw, at) = match photon {
+            _ if photon < self.first_code[0] => (&self.own, photon),
+            _ if photon < self.first_code[1] => (&self.previous, photon - self.first_code[0]),
+            _ => return true,
+        };
+        draw.within_fs().contains(&in_draw(light, draw, at))
     }
 
     /// How long before a laser cycle the one before it starts.
@@ -365,7 +393,7 @@ impl<'a> Counting<'a> {
     fn count_sorted(&mut self, pixel: &mut Pixel<'_>, group: Group, cycles: u32) {
         let mut sorted = std::mem::take(&mut self.sorted);
         sorted.clear();
-        let own = self.own.photons().map(|(place, time_fs)| {
+        let own = self.own.photons(pixel.light).map(|(place, time_fs)| {
             let (cycle, spad) = split(place);
             (cycle, (Time::from_fs(time_fs), spad))
         });
@@ -373,14 +401,17 @@ impl<'a> Counting<'a> {
         let earlier = |cycle: u32, time_fs: i64| {
             Time::from_fs(time_fs) - self.before(group.first_cycle() + cycle)
         };
-        let previous = self.previous.photons().filter_map(|(place, time_fs)| {
-            let (cycle, spad) = split(place);
-            let cycle = Some(cycle + 1).filter(|&cycle| cycle < cycles)?;
-            Some((cycle, (earlier(cycle, time_fs), spad)))
-        });
+        let previous = self
+            .previous
+            .photons(pixel.light)
+            .filter_map(|(place, time_fs)| {
+                let (cycle, spad) = split(place);
+                let cycle = Some(cycle + 1).filter(|&cycle| cycle < cycles)?;
+                Some((cycle, (earlier(cycle, time_fs), spad)))
+            });
         sorted.extend(previous);
         let carried = self.carried.iter();
-        sorted.extend(carried.map(|photon| (0, (earlier(0, photon.time_fs), photon.place as u8))));
+        sorted.extend(carried.map(|&(spad, time_fs)| (0, (earlier(0, time_fs), spad as u8))));
         sorted.sort_unstable();
         for photons in sorted.chunk_by(|a, b| a.0 == b.0) {
             let laser_cycle = group.first_cycle() + photons[0].0;
@@ -413,13 +444,14 @@ impl<'a> Counting<'a> {
 }
 
 /// When the photon of the `at`-th code of a draw came after the start of its cycle, fs.
-fn in_draw(draw: &Draw, at: usize) -> i64 {
-    let filled_up = draw.slots().len();
-    match at.checked_sub(2 * filled_up) {
-        Some(signal) => draw.signal()[signal].time_fs,
+fn in_draw(light: &PixelStream<'_>, draw: &Draw, at: usize) -> i64 {
+    let blocks = draw.slots().len();
+    match at.checked_sub(PER_BLOCK * blocks) {
+        Some(signal) => light.signal_photon(draw, signal).1,
         None => {
-            let half = usize::from(at >= filled_up);
-            draw.time_fs(half, at - half * filled_up)
+            let (row, block) = (at / blocks, at % blocks);
+            let word = draw.words()[row][block];
+            light.slots().time_fs(draw.slots()[block], word)
         }
     }
 }

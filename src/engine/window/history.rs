@@ -10,7 +10,7 @@
 //! such gap among the photons drawn so far, the slot before them is drawn as well, and so on, over cycles and groups, at
 //! the worst to the beginning of the exposure.
 
-use crate::photon::{Draw, Group, PhotonStream, PixelStream, Place, SLOT, SPADS};
+use crate::photon::{Draw, Group, PhotonStream, PixelStream, Place, SPADS};
 use crate::units::Time;
 
 /// One photon on the way back: time from the first STOP edge, and SPAD.
@@ -42,7 +42,8 @@ impl<'a> Past<'a> {
     /// From when on all photons are known; `None` if that is the whole exposure.
     pub fn known_from(&self) -> Option<Time> {
         let start = || self.stream.config().cycle_start(self.cycle);
-        (!self.is_everything()).then(|| start() + SLOT * i64::from(self.slot))
+        let slot_fs = self.stream.slots().start_fs(self.slot);
+        (!self.is_everything()).then(|| start() + Time::from_fs(slot_fs))
     }
 
     /// Draws one more slot, and gives its photons that fall on SPADs of the set `spads`, in no particular order.
@@ -57,13 +58,13 @@ impl<'a> Past<'a> {
         } else {
             debug_assert!(self.cycle > 0, "nothing is before the exposure");
             self.cycle -= 1;
-            self.slot = self.stream.slots() - 1;
+            self.slot = self.stream.slots().count() - 1;
         }
         let group = Group::of_cycle(self.cycle);
         pixel.draw(group, self.slot..self.slot + 1, draw);
         let start = self.stream.config().cycle_start(self.cycle);
         let wanted = self.cycle - group.first_cycle();
-        draw.photons().filter_map(move |(place, time_fs)| {
+        draw.photons(pixel).filter_map(move |(place, time_fs)| {
             let (cycle, spad) = split(place);
             (cycle == wanted && spads >> spad & 1 != 0)
                 .then(|| (start + Time::from_fs(time_fs), spad))

@@ -11,6 +11,7 @@
 
 mod binning;
 mod counting;
+mod echo;
 mod history;
 mod sight;
 mod tables;

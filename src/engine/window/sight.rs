@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use super::history::Past;
 use crate::chip::window_law::{OpenWindow, WindowLaw};
-use crate::photon::{GROUP, PhotonStream, PixelLight, SLOT, SPADS};
+use crate::photon::{GROUP, PhotonStream, PixelLight, SPADS};
 
 /// By how much times relative to a cycle differ from cycle to cycle, fs: STOP and CLK edges are rounded to whole
 /// femtoseconds, and so is the cycle before.
@@ -42,7 +42,7 @@ impl Sight {
     pub fn new(law: &WindowLaw, window: &OpenWindow, stream: &PhotonStream) -> Option<Self> {
         let interval = law.interval(window);
         let (first_fs, end_fs) = (interval.start.as_fs(), interval.end.as_fs());
-        let (cycle_fs, slot_fs) = (stream.cycle_fs(), SLOT.as_fs());
+        let (cycle_fs, all) = (stream.cycle_fs(), stream.slots());
         let memory_fs = stream.config().spads.memory().as_fs();
         let from_fs = first_fs - memory_fs - ROUNDING_FS;
         let until_fs = end_fs + ROUNDING_FS;
@@ -50,8 +50,8 @@ impl Sight {
             return None;
         }
         let slots = |from_fs: i64, until_fs: i64| {
-            let until = until_fs.max(0) as u64;
-            (from_fs.max(0) / slot_fs) as u32..until.div_ceil(slot_fs as u64) as u32
+            let last = all.at(until_fs - 1).min(all.count() - 1);
+            all.at(from_fs.max(0)).min(last)..last + 1
         };
         let own = if until_fs > 0 {
             slots(from_fs, until_fs)
@@ -59,14 +59,14 @@ impl Sight {
             0..0
         };
         let previous = if from_fs < 0 {
-            slots(cycle_fs + from_fs, (cycle_fs + until_fs).min(cycle_fs))
+            slots(cycle_fs + from_fs, cycle_fs + until_fs.min(0))
         } else {
             0..0
         };
         let drawn_from_fs = if previous.is_empty() {
-            i64::from(own.start) * slot_fs
+            all.start_fs(own.start)
         } else {
-            i64::from(previous.start) * slot_fs - cycle_fs
+            all.start_fs(previous.start) - cycle_fs
         };
         Some(Sight {
             first_edge: window.first_edge,
@@ -104,8 +104,9 @@ impl Sight {
             false => memory_s,
         };
         let group = f64::from(stream.config().laser_cycles.min(GROUP));
-        let slot = light.background_hz * SLOT.as_s();
-        let looked_back = uncertain * (wait_s / SLOT.as_s() + 1.0) * slot * group;
+        let slot_s = stream.slots().length_s();
+        let slot = light.background_hz * slot_s;
+        let looked_back = uncertain * (wait_s / slot_s + 1.0) * slot * group;
         let slots = (self.own.len() + self.previous.len()) as f64;
         let seen = slot * slots + light.signal_per_cycle;
         seen + looked_back < light.photons_per_cycle(stream.config())

@@ -2,72 +2,73 @@
 
 use multiversion::multiversion;
 
-use super::binning::{CYCLES, Code, ROWS};
+use super::binning::{CYCLES, Code, Codes, ROWS};
 use crate::photon::GROUP;
 
-/// Most photons of a group, and one that is none.
-pub const MOST_PHOTONS: usize = u16::MAX as usize;
-const NONE: u16 = u16::MAX;
+/// Most photons of a group.
+pub const MOST_PHOTONS: usize = PHOTONS - 1;
+const PHOTONS: usize = 1 << 16;
 
-/// SPADs and rows of a cycle, below its last photon.
-const LAST_BITS: u32 = 48;
-const ROW_BITS: u32 = 16;
-/// Rows share bits where there are more of them.
-const ROWS_APART: usize = (LAST_BITS - ROW_BITS) as usize;
-const EMPTY: u64 = (NONE as u64) << LAST_BITS;
+/// Every photon may meet another one, and may be in doubt as well.
+const SPECIALS: usize = 2 * PHOTONS;
 
-/// How many photons came by row, which SPADs and rows have one by cycle, and all photons by cycle.
+/// Photons that are counted in different tables, so that none waits for the count of the one before.
+pub const SIDE_BY_SIDE: usize = 4;
+
+/// How many photons came by row, which SPADs and rows have one by cycle, and all photons by cycle. Photons are kept by
+/// their index + 1; 0 is none.
 pub struct Tables {
-    counts: [u32; ROWS],
-    /// A bit for every row of a bin.
-    row_bit: [u64; ROWS],
-    /// By cycle: its last photon, rows and SPADs.
+    counts: [[u32; ROWS]; SIDE_BY_SIDE],
+    /// By cycle: its last photon in the high half, marks of SPADs and bins in the low one.
     cycles: Box<[u64; CYCLES]>,
-    /// The photon before it in the same cycle, by photon.
-    before: Box<[u16; MOST_PHOTONS + 1]>,
+    /// The photon before it in the same cycle, by index.
+    before: Box<[u16; PHOTONS]>,
     /// Cycles that need a closer look.
-    special: Box<[u16; MOST_PHOTONS + 1]>,
+    special: Box<[u16; SPECIALS]>,
     specials: usize,
 }
 
-fn table<T: Copy, const N: usize>(value: T) -> Box<[T; N]> {
-    match vec![value; N].into_boxed_slice().try_into() {
+fn table<T: Copy + Default, const N: usize>() -> Box<[T; N]> {
+    match vec![T::default(); N].into_boxed_slice().try_into() {
         Ok(table) => table,
         Err(_) => unreachable!("a vector of N elements has N elements"),
     }
 }
 
-impl Tables {
-    /// Tables for windows of `bins` bins.
-    pub fn new(bins: usize) -> Self {
-        let bit = |row: usize| 1 << (ROW_BITS as usize + row % ROWS_APART);
+impl Default for Tables {
+    fn default() -> Self {
         Tables {
-            counts: [0; ROWS],
-            row_bit: std::array::from_fn(|row| match (1..=bins).contains(&row) {
-                true => bit(row),
-                false => 0,
-            }),
-            cycles: table(EMPTY),
-            before: table(NONE),
-            special: table(0),
+            counts: [[0; ROWS]; SIDE_BY_SIDE],
+            cycles: table(),
+            before: table(),
+            special: table(),
             specials: 0,
         }
     }
+}
 
+impl Tables {
     /// Begins a macropixel.
     pub fn clear_counts(&mut self) {
-        self.counts.fill(0);
+        self.counts = [[0; ROWS]; SIDE_BY_SIDE];
     }
 
-    /// Photons by row, without those that were taken out.
-    pub fn counts(&self) -> &[u32; ROWS] {
-        &self.counts
+    /// Photons of a row, without those that were taken out.
+    pub fn count(&self, row: usize) -> u32 {
+        let parts = self.counts.iter().map(|counts| counts[row]);
+        parts.fold(0, u32::wrapping_add)
     }
 
-    /// Counts the photons of a group, at most [`MOST_PHOTONS`].
-    pub fn put(&mut self, codes: &[Code]) {
-        debug_assert!(codes.len() <= MOST_PHOTONS);
+    /// Counts the photons of a group, at most [`MOST_PHOTONS`], filled up to a multiple of [`SIDE_BY_SIDE`].
+    pub fn put(&mut self, codes: &Codes) {
+        debug_assert!(codes.len() <= MOST_PHOTONS && codes.len().is_multiple_of(SIDE_BY_SIDE));
+        // The cycle of what is no photon need not be empty.
+        self.cycles[..GROUP as usize].fill(0);
         self.specials = put(self, codes);
+        for code in codes.doubtful() {
+            self.special[self.specials] = code.cycle() as u16;
+            self.specials += 1;
+        }
     }
 
     /// The `index`-th cycle that has two photons in one SPAD or one bin, or a doubtful one. A cycle may come several
@@ -78,41 +79,46 @@ impl Tables {
 
     /// The last photon of a cycle, which is empty afterwards.
     pub fn take_last(&mut self, cycle: usize) -> Option<usize> {
-        let word = std::mem::replace(&mut self.cycles[cycle], EMPTY);
-        known((word >> LAST_BITS) as u16)
+        let word = std::mem::take(&mut self.cycles[cycle]);
+        ((word >> 32) as usize).checked_sub(1)
     }
 
     /// The photon of the same cycle before this one.
     pub fn before(&self, photon: usize) -> Option<usize> {
-        known(self.before[photon])
+        usize::from(self.before[photon]).checked_sub(1)
     }
 
     /// One photon less in a row.
     pub fn remove(&mut self, row: usize) {
-        self.counts[row] -= 1;
+        // Which of the tables counted it does not matter to their sum.
+        let count = &mut self.counts[0][row];
+        *count = count.wrapping_sub(1);
     }
 }
 
-fn known(photon: u16) -> Option<usize> {
-    (photon != NONE).then_some(usize::from(photon))
-}
-
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2"))]
-fn put(tables: &mut Tables, codes: &[Code]) -> usize {
-    // The cycle of what is no photon need not be empty.
-    tables.cycles[..GROUP as usize].fill(EMPTY);
+fn put(tables: &mut Tables, codes: &Codes) -> usize {
+    let (code_rows, _) = codes.codes().as_chunks::<SIDE_BY_SIDE>();
+    let (mark_rows, _) = codes.marks().as_chunks::<SIDE_BY_SIDE>();
+    let (before_rows, _) = tables.before.as_chunks_mut::<SIDE_BY_SIDE>();
     let mut specials = 0;
-    for (photon, &code) in codes.iter().enumerate() {
-        let bits = 1 << code.spad() | tables.row_bit[code.row()];
+    let mut number = 0;
+    let mut one = |code: Code, marks: u32, counts: &mut [u32; ROWS]| {
         let cycle = &mut tables.cycles[code.cycle()];
         let word = *cycle;
-        let others = word & !(u64::from(NONE) << LAST_BITS);
-        *cycle = others | bits | (photon as u64) << LAST_BITS;
-        tables.before[photon % (MOST_PHOTONS + 1)] = (word >> LAST_BITS) as u16;
+        let others = word as u32;
+        number += 1;
+        *cycle = number << 32 | u64::from(others | marks);
         // Written always, kept if special: no branch to mispredict.
-        tables.special[specials % (MOST_PHOTONS + 1)] = code.cycle() as u16;
-        specials += usize::from(word & bits != 0 || code.is_doubtful());
-        tables.counts[code.row()] += 1;
+        tables.special[specials % SPECIALS] = code.cycle() as u16;
+        specials += usize::from(others & marks != 0);
+        counts[code.row()] += 1;
+        (word >> 32) as u16
+    };
+    for ((codes, marks), before) in code_rows.iter().zip(mark_rows).zip(before_rows) {
+        for (side, counts) in tables.counts.iter_mut().enumerate() {
+            before[side] = one(codes[side], marks[side], counts);
+        }
     }
     specials
 }

@@ -1,95 +1,76 @@
 //! Photons of one macropixel in some slots of one group, as random words and sorted.
 
-use super::SPAD_BITS;
+use std::ops::Range;
+
 use super::group::{GROUP, Group};
+use super::{PixelStream, SPAD_BITS};
 use crate::photon::philox::Blocks;
 use crate::photon::random::Poisson;
 use crate::photon::spad::SPADS;
-use crate::units::Time;
-
-/// Length of a time slot.
-pub const SLOT: Time = Time::from_fs(1 << SLOT_BITS);
-pub(super) const SLOT_BITS: u32 = 21;
 
 /// Where in its group a photon falls: cycle within the group and SPAD, as `cycle << 4 | SPAD`.
 pub type Place = u16;
 
-/// The time within its slot that the random word of a photon gives, fs.
-#[inline]
-pub fn time_in_slot_fs(word: u64) -> u32 {
-    word as u32 >> (32 - SLOT_BITS)
-}
+/// Photons that one block of random words makes.
+pub const PER_BLOCK: usize = 4;
 
-/// Background photons of one slot. Each block of random words makes two: first those of its blocks' low
-/// halves, then those of the high halves.
+/// Background photons of one slot: first those of its blocks' first words, then those of their second ones, and so on.
 #[derive(Debug, Clone, Copy)]
 pub struct Run {
     /// The slot.
     pub slot: u32,
     /// Its first block.
     pub first_block: u32,
-    /// Its photons; if odd, the last block makes only one.
+    /// Its photons; the last block may make fewer than others.
     pub photons: u32,
 }
 
 impl Run {
-    /// When the slot begins after the start of its cycle.
+    /// Blocks whose first, second, third and fourth words make photons.
     #[inline]
-    pub fn start_fs(&self) -> i64 {
-        i64::from(self.slot) << SLOT_BITS
-    }
-
-    /// Blocks whose low and whose high halves make photons.
-    #[inline]
-    pub fn blocks(&self) -> [std::ops::Range<usize>; 2] {
+    pub fn blocks(&self) -> [Range<usize>; PER_BLOCK] {
         let first = self.first_block as usize;
         let photons = self.photons as usize;
-        [
-            first..first + photons.div_ceil(2),
-            first..first + photons / 2,
-        ]
+        std::array::from_fn(|row| first..first + (photons + PER_BLOCK - 1 - row) / PER_BLOCK)
     }
-}
-
-/// A photon of the echo.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct SignalPhoton {
-    /// Cycle and SPAD.
-    pub place: Place,
-    /// After the start of its cycle.
-    pub time_fs: i64,
 }
 
 /// Photons of one macropixel, in some slots of one group. Background photons stay random words until somebody wants
-/// them; those of the last slot that outlast the cycle are no photons.
+/// them.
 #[derive(Debug, Clone, Default)]
 pub struct Draw {
     pub(super) counts: Blocks,
     pub(super) background: Blocks,
     pub(super) echo: Blocks,
     runs: Vec<Run>,
-    pub(super) signal: Vec<SignalPhoton>,
+    /// Photons of the whole echo.
+    echo_photons: usize,
+    /// What the drawn slots are, fs after the start of the cycle.
+    pub(super) within_fs: Range<i64>,
     pub(super) group: Group,
-    cycle_fs: i64,
     photons: usize,
 }
 
 impl Draw {
-    /// Forgets all photons.
-    pub fn clear(&mut self) {
+    /// Forgets all photons, and makes room for those of a group.
+    pub(super) fn begin(&mut self, group: Group) {
         self.runs.clear();
         self.counts.clear();
         self.background.clear();
         self.echo.clear();
-        self.signal.clear();
+        self.echo_photons = 0;
         self.photons = 0;
+        self.group = group;
     }
 
-    /// Makes room for photons of a group, whose cycles have `cycle_fs`.
-    pub(super) fn begin(&mut self, group: Group, cycle_fs: i64) {
-        self.clear();
-        self.group = group;
-        self.cycle_fs = cycle_fs;
+    /// Asks for the photons of the echo. Two share a block: first come those of their blocks' first two words, then those
+    /// of the other two. With a measured pulse they have another block each.
+    pub(super) fn push_echo(&mut self, photons: u32, is_measured: bool) {
+        self.echo_photons = photons as usize;
+        self.echo.push_run(0, photons.div_ceil(2));
+        if is_measured {
+            self.echo.push_run(1, photons);
+        }
     }
 
     /// Asks for background photons of a slot.
@@ -101,12 +82,13 @@ impl Draw {
             photons,
         });
         self.photons += photons as usize;
-        self.background.push_run(slot, photons.div_ceil(2));
+        self.background
+            .push_run(slot, photons.div_ceil(PER_BLOCK as u32));
     }
 
-    /// How many photons were drawn, those that outlast the cycle among them.
+    /// How many photons were drawn.
     pub fn len(&self) -> usize {
-        self.photons + self.signal.len()
+        self.photons + self.echo_photons
     }
 
     /// Whether there is none.
@@ -119,19 +101,27 @@ impl Draw {
         self.group
     }
 
-    /// Background photons by slot.
-    pub fn runs(&self) -> &[Run] {
-        &self.runs
+    /// Which of the words are no photons, counted through all rows.
+    pub fn unused(&self) -> impl Iterator<Item = usize> {
+        let (row, blocks) = (self.slots().len(), self.background.len());
+        let last_of_runs = self.runs.iter().flat_map(move |run| {
+            let [longest, rest @ ..] = run.blocks();
+            let ends = (1..)
+                .zip(rest)
+                .map(move |(at, blocks)| (at * row, blocks.end));
+            ends.filter(move |&(_, end)| end < longest.end)
+                .map(|(row, end)| row + end)
+        });
+        let behind = (0..PER_BLOCK).flat_map(move |at| at * row + blocks..(at + 1) * row);
+        last_of_runs.chain(behind)
     }
 
-    /// Blocks of random words of background photons.
-    pub fn blocks(&self) -> usize {
-        self.background.len()
-    }
-
-    /// A random word for every background photon, by halves of their blocks: [`time_in_slot_fs`] in the low 32 bits and
-    /// [`Group::place`] in the high ones. Behind those of the last block comes what fills the rows up.
-    pub fn words(&self) -> [&[u64]; 2] {
+    /// A random word for every background photon, by rows of their blocks' first, second, … words: [`Slots::time_fs`] of
+    /// the slot's number and the word, and [`Group::place`] of the word. Behind those of the last block comes what
+    /// fills the rows up.
+    ///
+    /// [`Slots::time_fs`]: super::Slots::time_fs
+    pub fn words(&self) -> [&[u32]; PER_BLOCK] {
         self.background.rows()
     }
 
@@ -140,59 +130,59 @@ impl Draw {
         self.background.seconds()
     }
 
-    /// Background photons that outlast the cycle: half of the words and block.
-    pub fn outlasting(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let cut = |run: &&Run| run.start_fs() + SLOT.as_fs() > self.cycle_fs;
-        self.runs
-            .last()
-            .filter(cut)
-            .into_iter()
-            .flat_map(move |run| {
-                let late = move |word: u64| {
-                    run.start_fs() + i64::from(time_in_slot_fs(word)) >= self.cycle_fs
-                };
-                let halves = run.blocks().into_iter().zip(self.words()).enumerate();
-                halves.flat_map(move |(half, (blocks, words))| {
-                    let photons = blocks.filter(move |&block| late(words[block]));
-                    photons.map(move |block| (half, block))
-                })
-            })
+    /// The random words of the echo's photons, low and high, by halves: [`Group::place`] of the high word, and
+    /// [`PixelStream::signal_time_fs`]. Some may come outside [`Draw::within_fs`], and are no photons of these slots.
+    pub fn echo(&self) -> [[&[u32]; 2]; 2] {
+        let [a, b, c, d] = self.echo.rows();
+        let (first, second) = (self.echo_photons.div_ceil(2), self.echo_photons / 2);
+        [[&a[..first], &b[..first]], [&c[..second], &d[..second]]]
     }
 
-    /// When a background photon comes after the start of its cycle, fs.
+    /// Photons of the whole echo.
+    pub fn echo_photons(&self) -> usize {
+        self.echo_photons
+    }
+
+    /// The random word of a photon of the echo.
     #[inline]
-    pub fn time_fs(&self, half: usize, block: usize) -> i64 {
-        let in_slot_fs = time_in_slot_fs(self.words()[half][block]);
-        (i64::from(self.slots()[block]) << SLOT_BITS) + i64::from(in_slot_fs)
+    pub(super) fn echo_word(&self, photon: usize) -> u64 {
+        let first = self.echo_photons.div_ceil(2);
+        let (half, at) = match photon < first {
+            true => (0, photon),
+            false => (1, photon - first),
+        };
+        let [low, high] = self.echo()[half];
+        u64::from(low[at]) | u64::from(high[at]) << 32
     }
 
-    /// Signal photons.
-    pub fn signal(&self) -> &[SignalPhoton] {
-        &self.signal
+    /// The other random words of a photon of the echo of a measured pulse.
+    pub(super) fn echo_words(&self, photon: usize) -> [u32; 4] {
+        let block = self.echo_photons.div_ceil(2) + photon;
+        self.echo.rows().map(|row| row[block])
     }
 
-    /// Every photon, as place and time after the start of its cycle in fs, in no particular order.
-    pub fn photons(&self) -> impl Iterator<Item = (Place, i64)> + '_ {
+    /// From when until when the drawn slots last, fs after the start of their cycle.
+    pub fn within_fs(&self) -> Range<i64> {
+        self.within_fs.clone()
+    }
+
+    /// Every photon, as place and time after the start of its cycle in fs, in no particular order. `pixel` is whose they
+    /// are.
+    pub fn photons(&self, pixel: &PixelStream<'_>) -> impl Iterator<Item = (Place, i64)> {
         let words = self.words();
+        let slots = pixel.slots();
         let background = self.runs.iter().flat_map(move |run| {
-            let start_fs = run.start_fs();
-            run.blocks()
-                .into_iter()
-                .zip(words)
-                .flat_map(move |(blocks, words)| {
-                    words[blocks].iter().map(move |&word| {
-                        let time_fs = start_fs + i64::from(time_in_slot_fs(word));
-                        (self.group.place(word), time_fs)
-                    })
-                })
+            let rows = run.blocks().into_iter().zip(words);
+            rows.flat_map(move |(blocks, words)| {
+                let photon =
+                    move |&word: &u32| (self.group.place(word), slots.time_fs(run.slot, word));
+                words[blocks].iter().map(photon)
+            })
         });
-        let signal = self
-            .signal
-            .iter()
-            .map(|photon| (photon.place, photon.time_fs));
-        background
-            .filter(|&(_, time_fs)| time_fs < self.cycle_fs)
-            .chain(signal)
+        let signal = (0..self.echo_photons)
+            .map(|photon| pixel.signal_photon(self, photon))
+            .filter(|(_, time_fs)| self.within_fs.contains(time_fs));
+        background.chain(signal)
     }
 
     /// The sum of `draws` Poisson numbers from the next blocks of `counts`.
@@ -200,7 +190,10 @@ impl Draw {
     pub(super) fn count(&self, poisson: &Poisson, draws: u32, at: &mut usize) -> u32 {
         let words = self.counts.rows();
         let parts = (poisson.words() * draws) as usize;
-        let part = |part: usize| poisson.part(words[part % 2][*at + part / 2]);
+        let part = |part: usize| {
+            let word = |row: usize| u64::from(words[part % 2 * 2 + row][*at + part / 2]);
+            poisson.part(word(0) | word(1) << 32)
+        };
         let total = (0..parts).map(part).sum();
         *at += parts.div_ceil(2);
         total
@@ -217,11 +210,11 @@ pub(super) struct ByCycle {
 }
 
 impl ByCycle {
-    pub(super) fn sort(&mut self, draw: &Draw) {
+    pub(super) fn sort(&mut self, draw: &Draw, pixel: &PixelStream<'_>) {
         self.ends.clear();
         self.ends.resize(GROUP as usize, 0);
         let cycle_of = |place: Place| usize::from(place >> SPAD_BITS);
-        for (place, _) in draw.photons() {
+        for (place, _) in draw.photons(pixel) {
             self.ends[cycle_of(place)] += 1;
         }
         let mut total = 0;
@@ -231,7 +224,7 @@ impl ByCycle {
         }
         self.photons.clear();
         self.photons.resize(total, 0);
-        for (place, time_fs) in draw.photons() {
+        for (place, time_fs) in draw.photons(pixel) {
             let end = &mut self.ends[cycle_of(place)];
             let spad = u64::from(place) & (SPADS as u64 - 1);
             self.photons[*end] = (time_fs as u64) << SPAD_BITS | spad;

@@ -12,6 +12,7 @@
 
 use super::SPAD_BITS;
 use super::draw::Place;
+use super::slot::TIME_BITS;
 
 /// Laser cycles of the longest groups.
 pub const GROUP: u32 = 1 << GROUP_BITS;
@@ -21,8 +22,10 @@ const GROUP_BITS: u32 = 11;
 pub const FIRST: u32 = 1 << FIRST_BITS;
 const FIRST_BITS: u32 = 7;
 
-/// Most bits of a [`Place`].
+/// Most bits of a [`Place`], the highest ones of a random word.
 pub const PLACE_BITS: u32 = GROUP_BITS + SPAD_BITS;
+
+const _: () = assert!(PLACE_BITS + TIME_BITS <= u32::BITS);
 
 /// A group of laser cycles, 2ᵏ of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,12 +92,12 @@ impl Group {
     /// By how much the random word of a photon is shifted to give its place.
     #[inline]
     pub fn place_shift(self) -> u32 {
-        64 - SPAD_BITS - self.bits
+        u32::BITS - SPAD_BITS - self.bits
     }
 
     /// The place of a photon.
     #[inline]
-    pub fn place(self, word: u64) -> Place {
+    pub fn place(self, word: u32) -> Place {
         (word >> self.place_shift()) as Place
     }
 }
@@ -137,7 +140,7 @@ mod tests {
             prop_assert!([128, 256, 512, 1024, 2048].contains(&group.cycles()));
             prop_assert!(group.number() < 1 << 24, "the counter has 24 bits for it");
             let last_place = (group.cycles() << SPAD_BITS) - 1;
-            prop_assert_eq!(u32::from(group.place(u64::MAX)), last_place);
+            prop_assert_eq!(u32::from(group.place(u32::MAX)), last_place);
         }
     }
 }

@@ -1,0 +1,129 @@
+//! The rows of an echo's photons by their ranks, without their times.
+//!
+//! Ranks rise with time ([`signal_rank`]), so edges in time become numbers to compare ranks with, two for each: between
+//! them a photon may be on either side, and is marked as doubtful.
+//!
+//! ```text
+//!   rank    ──────┬──╫──┬─────────────┬──╫──┬─────────────┬──╫──┬──────►
+//!   row       0   ┊ ?  ┊       1      ┊ ?  ┊       2      ┊ ?  ┊   …
+//! ```
+
+use std::ops::Range;
+
+use multiversion::multiversion;
+
+use super::binning::{Code, Wanted};
+use super::sight::ROUNDING_FS;
+use crate::photon::{PixelStream, signal_rank};
+
+/// Edges of rows, as ranks: the first that may be, and the first that is for certain, at the edge or after it.
+#[derive(Debug, Clone)]
+pub struct EchoRows {
+    bins: u32,
+    /// Beginning and end of the drawn slots.
+    ends: [[i16; 2]; 2],
+    /// Edges of bins.
+    edges: Vec<[i16; 2]>,
+    /// The row of photons before all of them.
+    first_row: i16,
+    passed: Passed,
+}
+
+/// What is found out about photons.
+#[derive(Debug, Clone, Default)]
+struct Passed {
+    ranks: Vec<i16>,
+    /// How many edges they have passed for certain.
+    rows: Vec<i16>,
+    /// How many they may have passed.
+    possible: Vec<i16>,
+}
+
+impl EchoRows {
+    /// For `bins` bins of `period_fs` from `origin_fs` on, of what is drawn `within_fs`; all times after the start of the
+    /// cycle. `None` where the pulse has no ranks.
+    pub fn new(
+        light: &PixelStream<'_>,
+        bins: usize,
+        period_fs: f64,
+        origin_fs: i64,
+        within_fs: Range<i64>,
+    ) -> Option<Self> {
+        let edge = |bin: usize| {
+            let time_fs = origin_fs as f64 + bin as f64 * period_fs;
+            light.signal_ranks_at(time_fs, (ROUNDING_FS + 1) as f64)
+        };
+        let mut edges: Vec<[i16; 2]> = (0..=bins).map(edge).collect::<Option<_>>()?;
+        // The echo is shorter than most windows.
+        let passed_by_all = edges.iter().filter(|edge| edge[1] == i16::MIN).count();
+        edges.retain(|edge| edge[1] != i16::MIN && edge[0] != i16::MAX);
+        Some(EchoRows {
+            bins: bins as u32,
+            ends: [
+                light.signal_ranks_at(within_fs.start as f64, 0.0)?,
+                light.signal_ranks_at(within_fs.end as f64, 0.0)?,
+            ],
+            edges,
+            first_row: passed_by_all as i16,
+            passed: Passed::default(),
+        })
+    }
+
+    /// Codes and marks of photons with these random words, low and high.
+    pub fn encode(
+        &mut self,
+        wanted: &Wanted,
+        place_shift: u32,
+        [low, high]: [&[u32]; 2],
+        (codes, marks): (&mut [Code], &mut [u32]),
+    ) {
+        let passed = &mut self.passed;
+        passed.ranks.resize(low.len(), 0);
+        passed.rows.clear();
+        passed.rows.resize(low.len(), self.first_row);
+        passed.possible.clear();
+        passed.possible.resize(low.len(), self.first_row);
+        compare(passed, &self.edges, [low, high]);
+        encode(self, wanted, place_shift, high, codes, marks);
+    }
+}
+
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+fn compare(passed: &mut Passed, edges: &[[i16; 2]], [low, high]: [&[u32]; 2]) {
+    for ((rank, &low), &high) in passed.ranks.iter_mut().zip(low).zip(high) {
+        *rank = signal_rank(low, high);
+    }
+    for &[may, must] in edges {
+        let out = passed.rows.iter_mut().zip(&mut passed.possible);
+        for (&rank, (row, possible)) in passed.ranks.iter().zip(out) {
+            *row += i16::from(rank >= must);
+            *possible += i16::from(rank >= may);
+        }
+    }
+}
+
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+fn encode(
+    rows: &EchoRows,
+    wanted: &Wanted,
+    place_shift: u32,
+    high: &[u32],
+    codes: &mut [Code],
+    marks: &mut [u32],
+) {
+    let (bins, [from, until], wanted) = (rows.bins, rows.ends, *wanted);
+    let passed = &rows.passed;
+    let photons = high.iter().zip(&passed.ranks);
+    let found = passed.rows.iter().zip(&passed.possible);
+    let out = codes.iter_mut().zip(marks);
+    for (((&high, &rank), (&row, &possible)), (code, mark)) in photons.zip(found).zip(out) {
+        let after = |edge: i16| i16::from(rank >= edge);
+        let [begun, surely_begun] = from.map(after);
+        let [over, surely_over] = until.map(after);
+        let doubts = (possible - row) + (begun - surely_begun) + (over - surely_over);
+        let own = |place| Code::new(place, row as u32, doubts != 0, bins);
+        let (own, own_mark) = wanted.code(high >> place_shift, own);
+        *code = if begun > surely_over { own } else { Code::NONE };
+        *mark = own_mark;
+    }
+}
