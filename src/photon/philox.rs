@@ -21,6 +21,8 @@ pub struct Blocks {
     /// Longer than needed, so that runs are written [`LANES`] at a time.
     first: Vec<u32>,
     second: Vec<u32>,
+    /// Room for words before they are narrowed.
+    wide: [Vec<u64>; 4],
     words: [Vec<u32>; 4],
 }
 
@@ -63,7 +65,8 @@ impl Blocks {
     pub fn generate(&mut self, key: [u32; 2], third: u32, fourth: u32) {
         let filled_up = self.filled_up();
         let room = self.first.len();
-        for words in &mut self.words {
+        for (wide, words) in self.wide.iter_mut().zip(&mut self.words) {
+            wide.resize(room, 0);
             words.resize(room, 0);
         }
         generate(
@@ -71,8 +74,11 @@ impl Blocks {
             [third, fourth],
             &self.first[..filled_up],
             &self.second[..filled_up],
-            self.words.each_mut().map(|words| &mut words[..filled_up]),
+            self.wide.each_mut().map(|wide| &mut wide[..filled_up]),
         );
+        for (words, wide) in self.words.iter_mut().zip(&self.wide) {
+            narrow(&mut words[..filled_up], &wide[..filled_up]);
+        }
     }
 
     /// The four words of every block, a row for each; and of others that fill the rows up to a multiple of [`LANES`].
@@ -93,25 +99,29 @@ impl Blocks {
 pub fn blocks_from(first: u32, others: [u32; 3], key: [u32; 2]) -> [[u32; 2 * LANES]; 4] {
     let [second, third, fourth] = others;
     let firsts: [u32; 2 * LANES] = std::array::from_fn(|block| first.wrapping_add(block as u32));
-    let mut words = [[0; 2 * LANES]; 4];
+    let mut wide = [[0; 2 * LANES]; 4];
     generate(
         key,
         [third, fourth],
         &firsts,
         &[second; 2 * LANES],
-        words.each_mut().map(|words| &mut words[..]),
+        wide.each_mut().map(|wide| &mut wide[..]),
     );
+    let mut words = [[0; 2 * LANES]; 4];
+    for (words, wide) in words.iter_mut().zip(&wide) {
+        narrow(words, wide);
+    }
     words
 }
 
 /// Words live in the low halves of 64-bit lanes, where vector units multiply them; high halves hold what is left over.
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2", "x86_64+sse4.1"))]
 fn generate(
     mut key: [u32; 2],
     [third, fourth]: [u32; 2],
     first: &[u32],
     second: &[u32],
-    words: [&mut [u32]; 4],
+    words: [&mut [u64]; 4],
 ) {
     let mut keys = [[0; 2]; ROUNDS];
     for round in &mut keys {
@@ -130,7 +140,7 @@ fn generate(
         }
         let mut c2 = [u64::from(third); LANES];
         let mut c3 = [u64::from(fourth); LANES];
-        for [key0, key1] in keys {
+        for &[key0, key1] in &keys {
             for lane in 0..LANES {
                 let product0 = MULTIPLIERS[0] * (c0[lane] & LOW);
                 let product1 = MULTIPLIERS[1] * (c2[lane] & LOW);
@@ -140,12 +150,18 @@ fn generate(
                 c3[lane] = product0;
             }
         }
-        for lane in 0..LANES {
-            out0[lane] = c0[lane] as u32;
-            out1[lane] = c1[lane] as u32;
-            out2[lane] = c2[lane] as u32;
-            out3[lane] = c3[lane] as u32;
-        }
+        *out0 = c0;
+        *out1 = c1;
+        *out2 = c2;
+        *out3 = c3;
+    }
+}
+
+/// The low halves of `wide`. On its own, as compilers make vectors of it only then.
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+fn narrow(words: &mut [u32], wide: &[u64]) {
+    for (word, &wide) in words.iter_mut().zip(wide) {
+        *word = wide as u32;
     }
 }
 

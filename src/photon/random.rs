@@ -59,16 +59,33 @@ fn unit(random: &mut Philox) -> f64 {
 /// Largest mean that one table covers; larger ones are split into equal parts.
 const LARGEST_TABLE_MEAN: f64 = 64.0;
 
+/// Entries of a table that would be no probabilities: beyond them less than 2⁻⁶⁴ is left for the largest mean.
+const LONGEST_TABLE: usize = 192;
+
+/// 1/k.
+const RECIPROCALS: [f64; LONGEST_TABLE + 1] = {
+    let mut reciprocals = [0.0; LONGEST_TABLE + 1];
+    let mut k = 1;
+    while k <= LONGEST_TABLE {
+        reciprocals[k] = 1.0 / k as f64;
+        k += 1;
+    }
+    reciprocals
+};
+
+/// Top bits of a word that say where to begin.
+const START_BITS: u32 = 6;
+
 /// A Poisson distribution prepared for many draws by inversion.
 ///
 /// The table holds P(N > k) for k = 0, 1, … as 64-bit fixed-point numbers. Complements, not the
 /// cumulative distribution itself, so that small probabilities keep all their digits. A draw
-/// counts how many entries exceed a random 64-bit word; an index on the word's top byte says
+/// counts how many entries exceed a random 64-bit word; an index on the word's top bits says
 /// where to begin. A sum of Poisson variables is Poisson, which covers large means.
 #[derive(Debug, Clone)]
 pub struct Poisson {
     exceeds: Vec<u64>,
-    start: Box<[u16; 256]>,
+    start: [u8; 1 << START_BITS],
     parts: u32,
 }
 
@@ -78,14 +95,16 @@ impl Poisson {
         debug_assert!(mean.is_finite() && mean >= 0.0, "mean {mean}");
         let parts = (mean / LARGEST_TABLE_MEAN).ceil().max(1.0);
         let exceeds = exceedance_table(mean / parts);
-        let mut start = Box::new([0u16; 256]);
+        let mut start = [0; 1 << START_BITS];
         let mut above = exceeds.len();
-        for (top, slot) in start.iter_mut().enumerate() {
-            let largest_word = (top as u64) << 56 | ((1 << 56) - 1);
+        for (top, slot) in (0u64..).zip(&mut start) {
+            let largest_word = (top + 1)
+                .wrapping_shl(u64::BITS - START_BITS)
+                .wrapping_sub(1);
             while above > 0 && exceeds[above - 1] <= largest_word {
                 above -= 1;
             }
-            *slot = above as u16;
+            *slot = above as u8;
         }
         Poisson {
             exceeds,
@@ -115,7 +134,7 @@ impl Poisson {
     /// What one random word adds to a draw.
     #[inline]
     pub fn part(&self, word: u64) -> u32 {
-        let mut count = usize::from(self.start[(word >> 56) as usize]);
+        let mut count = usize::from(self.start[(word >> (u64::BITS - START_BITS)) as usize]);
         while self.exceeds.get(count).is_some_and(|&e| e > word) {
             count += 1;
         }
@@ -129,26 +148,28 @@ impl Poisson {
     }
 }
 
-/// P(N > k)·2⁶⁴ for k = 0, 1, … until it falls below one unit.
+/// P(N > k)·2⁶⁴ for k = 0, 1, … until it falls below one unit, for a mean of up to [`LARGEST_TABLE_MEAN`].
 fn exceedance_table(mean: f64) -> Vec<u64> {
-    let mut terms = Vec::with_capacity(2 * mean as usize + 64);
-    terms.push(libm::exp(-mean));
-    while terms.len() < 2 || terms.len() as f64 <= mean || terms[terms.len() - 1] > 1e-22 {
-        let k = terms.len() as f64;
-        terms.push(terms[terms.len() - 1] * mean / k);
+    let mut terms = [0.0; LONGEST_TABLE];
+    let mut term = libm::exp(-mean);
+    let mut used = 0;
+    for (slot, reciprocal) in terms.iter_mut().zip(&RECIPROCALS[1..]) {
+        term *= mean * reciprocal;
+        *slot = term;
+        used += 1;
+        if term <= 1e-22 && used as f64 > mean {
+            break;
+        }
     }
     // Summed from the far end, so that small terms add up before they meet large ones.
-    let mut table: Vec<u64> = terms
-        .iter()
-        .skip(1)
-        .rev()
-        .scan(0.0, |tail, term| {
-            *tail += term;
-            Some((*tail * 2f64.powi(64)) as u64)
-        })
-        .collect();
-    table.reverse();
-    table.truncate(table.partition_point(|&e| e > 0));
+    let mut table = vec![0; used];
+    let mut tail = 0.0;
+    for (entry, term) in table.iter_mut().zip(&terms).rev() {
+        tail += term;
+        *entry = (tail * 2f64.powi(64)) as u64;
+    }
+    let zeros = table.iter().rev().take_while(|&&entry| entry == 0).count();
+    table.truncate(used - zeros);
     table
 }
 

@@ -14,7 +14,7 @@
 
 use multiversion::multiversion;
 
-use super::echo::EchoRows;
+use super::echo::{EchoRows, Passed};
 use super::sight::ROUNDING_FS;
 use crate::photon::{Draw, GROUP, PER_BLOCK, PixelStream, Place, SPADS, Slots, TIME_BITS};
 
@@ -46,7 +46,7 @@ const _: () = assert!(CYCLES << CYCLE_SHIFT == 1 << u32::BITS);
 pub struct Code(u32);
 
 impl Code {
-    /// No photon. It has a row and a cycle that nobody looks at.
+    /// No photon, without marks. It has a row and a cycle that nobody looks at.
     pub const NONE: Code = Code(GROUP << CYCLE_SHIFT | (ROWS as u32 - 1));
 
     /// Of a photon at `place`, in one of `bins` bins, and its mark.
@@ -91,6 +91,7 @@ pub struct Codes {
     /// Longer than needed, so that what was there before need not be cleared.
     codes: Vec<Code>,
     marks: Vec<u32>,
+    passed: Passed,
 }
 
 impl Codes {
@@ -129,7 +130,9 @@ impl Codes {
     /// Appends what is no photon until their number is a multiple of `multiple`.
     pub fn fill_up(&mut self, multiple: usize) {
         let missing = self.len.next_multiple_of(multiple) - self.len;
-        self.append(missing).0.fill(Code::NONE);
+        let (codes, marks) = self.append(missing);
+        codes.fill(Code::NONE);
+        marks.fill(0);
     }
 
     /// Room for more of them, to be written.
@@ -162,7 +165,11 @@ impl Wanted {
     pub fn code(&self, place: u32, code: impl Fn(u32) -> (Code, u32)) -> (Code, u32) {
         let (own, mark) = code(place + (self.later << SPAD_BITS));
         let is_wanted = place < self.cycles << SPAD_BITS;
-        (if is_wanted { own } else { Code::NONE }, mark)
+        if is_wanted {
+            (own, mark)
+        } else {
+            (Code::NONE, 0)
+        }
     }
 }
 
@@ -200,7 +207,7 @@ impl Binning {
         light: &PixelStream<'_>,
         draw: &Draw,
         wanted: &Wanted,
-        echo: Option<&mut EchoRows>,
+        echo: Option<&EchoRows>,
         codes: &mut Codes,
     ) {
         let blocks = draw.slots().len();
@@ -213,15 +220,24 @@ impl Binning {
                 encode(self, wanted, shift, (words, draw.slots()), row);
             }
         }
-        for unused in draw.unused() {
-            background[unused] = Code::NONE;
+        let mut forget = |at: usize| (background[at], marks[at]) = (Code::NONE, 0);
+        for run in draw.runs() {
+            let [longest, ..] = run.blocks();
+            for row in run.last_rows().unwrap_or(PER_BLOCK)..PER_BLOCK {
+                forget(row * blocks + longest.end - 1);
+            }
+        }
+        for row in 0..PER_BLOCK {
+            (draw.blocks()..blocks).for_each(|block| forget(row * blocks + block));
         }
         match echo {
             Some(rows) => {
+                let mut passed = std::mem::take(&mut codes.passed);
                 for words in draw.echo() {
                     let out = codes.append(words[0].len());
-                    rows.encode(wanted, shift, words, out);
+                    rows.encode(wanted, shift, words, &mut passed, out);
                 }
+                codes.passed = passed;
             }
             None => {
                 for photon in 0..draw.echo_photons() {

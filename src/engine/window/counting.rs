@@ -33,6 +33,8 @@ pub struct Counting<'a> {
     binning: Binning,
     /// What a CLK period with so many SPADs adds to its bin.
     adds: [i64; SPADS + 1],
+    /// Photons whose rows differ by more are farther apart than the SPADs' memory.
+    rows_of_memory: usize,
     /// Photons of the windows' own cycles.
     own: Draw,
     /// Photons of the group's cycles for the windows of the next cycles.
@@ -70,10 +72,12 @@ impl<'a> Counting<'a> {
     /// For macropixels of `engine` in the light of `stream`.
     pub fn new(engine: &'a Window<'a>, stream: &'a PhotonStream) -> Self {
         let bins = engine.config.bins;
+        let memory_s = stream.config().spads.memory().as_s();
         Counting {
             engine,
             stream,
             binning: Binning::new(bins, engine.exposure.clock.as_hz(), stream.slots()),
+            rows_of_memory: (memory_s * engine.exposure.clock.as_hz()) as usize + 2,
             adds: std::array::from_fn(|spads| engine.adds(((1u32 << spads) - 1) as u16)),
             own: Draw::default(),
             previous: Draw::default(),
@@ -152,7 +156,7 @@ impl<'a> Counting<'a> {
         previous.cycles = cycles - 1;
         let draws = [&self.own, &self.previous];
         for (part, draw) in draws.into_iter().enumerate() {
-            let (wanted, echo) = (&pixel.wanted[part], pixel.echo[part].as_mut());
+            let (wanted, echo) = (&pixel.wanted[part], pixel.echo[part].as_ref());
             self.binning
                 .encode(pixel.light, draw, wanted, echo, &mut self.codes);
             self.first_code[part] = self.codes.len();
@@ -202,13 +206,32 @@ impl<'a> Counting<'a> {
             self.tables.remove(code.row());
             let spad = 1 << code.spad();
             several |= once & spad;
-            if code.is_doubtful() {
-                several |= spad;
-                is_doubtful = true;
-            }
             once |= spad;
+            is_doubtful |= code.is_doubtful();
             self.together.push((photon, code));
             next = self.tables.before(photon);
+        }
+        if let [a, b] = self.together[..]
+            && !is_doubtful
+        {
+            // Two photons alone, as it mostly is: of one SPAD, or of one bin.
+            let fired = match several {
+                0 => Some([1; 2]),
+                _ => self.pair(pixel, [a, b]),
+            };
+            if let Some([first, second]) = fired {
+                let (rows, spads) = ([a.1.row(), b.1.row()], [first, second]);
+                if rows[0] == rows[1] {
+                    self.fire(pixel, rows[0], first + second);
+                } else {
+                    self.fire(pixel, rows[0], first);
+                    self.fire(pixel, rows[1], second);
+                }
+                return;
+            }
+        }
+        for (_, code) in &self.together {
+            several |= u16::from(code.is_doubtful()) << code.spad();
         }
         for (_, code) in &self.together {
             let alone = several >> code.spad() & 1 == 0;
@@ -235,49 +258,70 @@ impl<'a> Counting<'a> {
     /// Adds what fired in a CLK period to its bin.
     fn tell(&mut self, pixel: &mut Pixel<'_>, row: usize) {
         let spads = std::mem::take(&mut self.fired[row]);
-        let Some(hits) = row.checked_sub(1).and_then(|bin| pixel.hits.get_mut(bin)) else {
-            return;
-        };
-        *hits += self.adds[usize::from(spads)];
-        pixel.work.clk_periods_visited += u64::from(spads > 0);
-        pixel.work.pulses += u64::from(spads);
+        self.fire(pixel, row, spads);
     }
 
-    /// Settles the photons of one SPAD if they are just two and what was before them does not matter, as it mostly is;
-    /// neither is doubtful. Returns whether it did.
+    /// Adds a CLK period in which so many SPADs fired to its bin.
+    #[inline]
+    fn fire(&self, pixel: &mut Pixel<'_>, row: usize, spads: u8) {
+        if let Some(hits) = pixel.hits.get_mut(row.wrapping_sub(1)) {
+            *hits += self.adds[usize::from(spads)];
+            pixel.work.clk_periods_visited += u64::from(spads > 0);
+            pixel.work.pulses += u64::from(spads);
+        }
+    }
+
+    /// Settles the photons of one SPAD if they are just two; neither is doubtful. Returns whether it did.
     fn settle_pair(&mut self, pixel: &mut Pixel<'_>, spad: u8) -> bool {
         let mut photons = self.together.iter().filter(|(_, code)| code.spad() == spad);
         let (Some(&a), Some(&b), None) = (photons.next(), photons.next(), photons.next()) else {
             return false;
         };
-        let own = self.first_code[0];
-        if a.0 >= own || b.0 >= own {
+        let Some(fired) = self.pair(pixel, [a, b]) else {
             return false;
-        }
-        let time_fs = |(photon, _): (usize, Code)| in_draw(pixel.light, &self.own, photon);
-        let (mut first, mut second) = ((time_fs(a), a.1.row()), (time_fs(b), b.1.row()));
-        if first > second {
-            std::mem::swap(&mut first, &mut second);
-        }
-        let memory_fs = self.stream.config().spads.memory().as_fs();
-        let blinds = second.0 - first.0 <= memory_fs;
-        // A photon in the window has been preceded by all the memory, in which there was none.
-        let is_certain = first.1 > 0 || first.0 - pixel.sight.drawn_from_fs > memory_fs;
-        if second.1 > 0 && blinds && !is_certain {
-            return false;
-        }
-        let is_seen = (1..=pixel.hits.len()).contains(&second.1);
-        if blinds {
-            self.fired[first.1] += 1;
-            pixel.work.lost_to_dead_time += u64::from(is_seen);
-        } else if first.1 != second.1 {
-            self.fired[first.1] += 1;
-            self.fired[second.1] += 1;
-        } else if is_seen {
-            // Two pulses within one CLK period cancel.
-            pixel.work.pulses += 2;
+        };
+        for ((_, code), fired) in [a, b].into_iter().zip(fired) {
+            self.fired[code.row()] += fired;
         }
         true
+    }
+
+    /// Which of a SPAD's only two photons make pulses that are counted, if what was before them does not matter, as it
+    /// mostly is; neither is doubtful.
+    #[inline]
+    fn pair(&self, pixel: &mut Pixel<'_>, photons: [(usize, Code); 2]) -> Option<[u8; 2]> {
+        let rows = photons.map(|(_, code)| code.row());
+        let bins = pixel.hits.len();
+        let (first, second) = (rows[0].min(rows[1]), rows[0].max(rows[1]));
+        // Nothing is counted outside the window; apart by more rows than the memory has, photons do not meet.
+        if second == 0 || first > bins || first > 0 && second - first > self.rows_of_memory {
+            return Some([1; 2]);
+        }
+        if photons
+            .iter()
+            .any(|&(photon, _)| photon >= self.first_code[0])
+        {
+            return None;
+        }
+        let times_fs = photons.map(|(photon, _)| in_draw(pixel.light, &self.own, photon));
+        let memory_fs = self.stream.config().spads.memory().as_fs();
+        let is_blind = (times_fs[0] - times_fs[1]).abs() <= memory_fs;
+        let is_seen = u64::from((1..=bins).contains(&second));
+        if is_blind {
+            // A photon in the window has been preceded by all the memory, in which there was none.
+            let first_fs = times_fs[0].min(times_fs[1]);
+            if first == 0 && first_fs - pixel.sight.drawn_from_fs <= memory_fs {
+                return None;
+            }
+            pixel.work.lost_to_dead_time += is_seen;
+            let is_first = u8::from(times_fs[0] <= times_fs[1]);
+            return Some([is_first, 1 - is_first]);
+        } else if first == second {
+            // Two pulses within one CLK period cancel.
+            pixel.work.pulses += 2 * is_seen;
+            return Some([0; 2]);
+        }
+        Some([1; 2])
     }
 
     /// Settles the photons of one SPAD among those `together`.
@@ -449,7 +493,8 @@ fn in_draw(light: &PixelStream<'_>, draw: &Draw, at: usize) -> i64 {
     match at.checked_sub(PER_BLOCK * blocks) {
         Some(signal) => light.signal_photon(draw, signal).1,
         None => {
-            let (row, block) = (at / blocks, at % blocks);
+            let row = (1..PER_BLOCK).filter(|row| at >= row * blocks).count();
+            let block = at - row * blocks;
             let word = draw.words()[row][block];
             light.slots().time_fs(draw.slots()[block], word)
         }

@@ -26,12 +26,11 @@ pub struct EchoRows {
     edges: Vec<[i16; 2]>,
     /// The row of photons before all of them.
     first_row: i16,
-    passed: Passed,
 }
 
-/// What is found out about photons.
+/// Room for what is found out about photons.
 #[derive(Debug, Clone, Default)]
-struct Passed {
+pub struct Passed {
     ranks: Vec<i16>,
     /// How many edges they have passed for certain.
     rows: Vec<i16>,
@@ -65,26 +64,25 @@ impl EchoRows {
             ],
             edges,
             first_row: passed_by_all as i16,
-            passed: Passed::default(),
         })
     }
 
     /// Codes and marks of photons with these random words, low and high.
     pub fn encode(
-        &mut self,
+        &self,
         wanted: &Wanted,
         place_shift: u32,
         [low, high]: [&[u32]; 2],
+        passed: &mut Passed,
         (codes, marks): (&mut [Code], &mut [u32]),
     ) {
-        let passed = &mut self.passed;
         passed.ranks.resize(low.len(), 0);
         passed.rows.clear();
         passed.rows.resize(low.len(), self.first_row);
         passed.possible.clear();
         passed.possible.resize(low.len(), self.first_row);
         compare(passed, &self.edges, [low, high]);
-        encode(self, wanted, place_shift, high, codes, marks);
+        encode(self, wanted, place_shift, high, passed, codes, marks);
     }
 }
 
@@ -108,11 +106,11 @@ fn encode(
     wanted: &Wanted,
     place_shift: u32,
     high: &[u32],
+    passed: &Passed,
     codes: &mut [Code],
     marks: &mut [u32],
 ) {
     let (bins, [from, until], wanted) = (rows.bins, rows.ends, *wanted);
-    let passed = &rows.passed;
     let photons = high.iter().zip(&passed.ranks);
     let found = passed.rows.iter().zip(&passed.possible);
     let out = codes.iter_mut().zip(marks);
@@ -123,7 +121,8 @@ fn encode(
         let doubts = (possible - row) + (begun - surely_begun) + (over - surely_over);
         let own = |place| Code::new(place, row as u32, doubts != 0, bins);
         let (own, own_mark) = wanted.code(high >> place_shift, own);
-        *code = if begun > surely_over { own } else { Code::NONE };
-        *mark = own_mark;
+        let is_drawn = begun > surely_over;
+        *code = if is_drawn { own } else { Code::NONE };
+        *mark = if is_drawn { own_mark } else { 0 };
     }
 }

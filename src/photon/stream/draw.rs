@@ -26,6 +26,13 @@ pub struct Run {
 }
 
 impl Run {
+    /// How many rows of the last block make photons, if not all.
+    #[inline]
+    pub fn last_rows(&self) -> Option<usize> {
+        let rows = self.photons as usize % PER_BLOCK;
+        (rows > 0).then_some(rows)
+    }
+
     /// Blocks whose first, second, third and fourth words make photons.
     #[inline]
     pub fn blocks(&self) -> [Range<usize>; PER_BLOCK] {
@@ -101,19 +108,14 @@ impl Draw {
         self.group
     }
 
-    /// Which of the words are no photons, counted through all rows.
-    pub fn unused(&self) -> impl Iterator<Item = usize> {
-        let (row, blocks) = (self.slots().len(), self.background.len());
-        let last_of_runs = self.runs.iter().flat_map(move |run| {
-            let [longest, rest @ ..] = run.blocks();
-            let ends = (1..)
-                .zip(rest)
-                .map(move |(at, blocks)| (at * row, blocks.end));
-            ends.filter(move |&(_, end)| end < longest.end)
-                .map(|(row, end)| row + end)
-        });
-        let behind = (0..PER_BLOCK).flat_map(move |at| at * row + blocks..(at + 1) * row);
-        last_of_runs.chain(behind)
+    /// Background photons by slot.
+    pub fn runs(&self) -> &[Run] {
+        &self.runs
+    }
+
+    /// Blocks of random words of background photons.
+    pub fn blocks(&self) -> usize {
+        self.background.len()
     }
 
     /// A random word for every background photon, by rows of their blocks' first, second, … words: [`Slots::time_fs`] of
