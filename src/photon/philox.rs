@@ -39,17 +39,22 @@ impl Blocks {
         self.blocks += blocks as usize;
         let room = self.blocks + LANES;
         if room > self.first.len() {
-            self.first.resize(2 * room, 0);
-            self.second.resize(2 * room, 0);
+            self.grow(room);
         }
-        let firsts = self.first[start..room].chunks_exact_mut(LANES);
-        let seconds = self.second[start..room].chunks_exact_mut(LANES);
-        for (chunk, (firsts, seconds)) in firsts.zip(seconds).enumerate() {
-            for (first, block) in firsts.iter_mut().zip((chunk * LANES) as u32..) {
-                *first = block;
-            }
-            seconds.fill(second);
+        let mut block = 0;
+        while block < blocks {
+            let chunk = start + block as usize..start + block as usize + LANES;
+            let firsts: [u32; LANES] = std::array::from_fn(|lane| block + lane as u32);
+            self.first[chunk.clone()].copy_from_slice(&firsts);
+            self.second[chunk].copy_from_slice(&[second; LANES]);
+            block += LANES as u32;
         }
+    }
+
+    #[cold]
+    fn grow(&mut self, room: usize) {
+        self.first.resize(2 * room, 0);
+        self.second.resize(2 * room, 0);
     }
 
     /// Blocks asked for.

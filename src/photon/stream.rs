@@ -33,6 +33,7 @@
 use std::cell::OnceCell;
 use std::ops::Range;
 
+use super::philox::Blocks;
 use super::pulse::{PulseSampler, PulseShape};
 use super::quantile::{NORMAL_BITS, NormalSampler};
 use super::random::{Poisson, Purpose, philox_key};
@@ -275,6 +276,37 @@ impl Numbers {
     }
 }
 
+/// Numbers of photons from blocks of random words.
+struct Counts<'a> {
+    /// First and second word of the next number, as rows of blocks; and of the one after it, from the same block.
+    rows: [[&'a [u32]; 2]; 2],
+    block: usize,
+}
+
+impl<'a> Counts<'a> {
+    fn new(blocks: &'a Blocks) -> Self {
+        let [a, b, c, d] = blocks.rows();
+        Counts {
+            rows: [[a, b], [c, d]],
+            block: 0,
+        }
+    }
+
+    /// The sum of `draws` Poisson numbers from the next blocks.
+    #[inline]
+    fn next(&mut self, poisson: &Poisson, draws: u32) -> u32 {
+        let parts = poisson.words() * draws;
+        let mut total = 0;
+        for part in 0..parts {
+            let [low, high] = self.rows[part as usize % 2];
+            let word = u64::from(low[self.block]) | u64::from(high[self.block]) << 32;
+            total += poisson.part(word);
+            self.block += usize::from(part % 2 == 1 || part + 1 == parts);
+        }
+        total
+    }
+}
+
 impl PixelStream<'_> {
     /// Turns photons of this macropixel, sorted by (time, SPAD) and complete since a time when every SPAD was ready, into
     /// rising edges; returns how many avalanches met a blind SPAD.
@@ -305,24 +337,25 @@ impl PixelStream<'_> {
                 draw.counts.push_run(slot, words.div_ceil(2));
             }
         }
-        draw.counts
-            .generate(key, self.pixel, numbered(Purpose::PhotonCounts));
+        let mut numbers = std::mem::take(&mut draw.counts);
+        numbers.generate(key, self.pixel, numbered(Purpose::PhotonCounts));
 
-        let mut at = 0;
+        let mut counts = Counts::new(&numbers);
         if has_echo {
-            let photons = draw.count(signal, signal_parts, &mut at);
+            let photons = counts.next(signal, signal_parts);
             draw.push_echo(photons, self.stream.shape.is_some());
             draw.echo
                 .generate(key, self.pixel, numbered(Purpose::Signal));
         }
         if !background.is_zero() {
             for slot in slots {
-                let photons = draw.count(background, parts, &mut at);
+                let photons = counts.next(background, parts);
                 draw.push_run(slot, photons);
             }
             draw.background
                 .generate(key, self.pixel, numbered(Purpose::Photons));
         }
+        draw.counts = numbers;
     }
 
     /// The slots of the stream.

@@ -220,15 +220,25 @@ impl Binning {
                 encode(self, wanted, shift, (words, draw.slots()), row);
             }
         }
-        let mut forget = |at: usize| (background[at], marks[at]) = (Code::NONE, 0);
-        for run in draw.runs() {
-            let [longest, ..] = run.blocks();
-            for row in run.last_rows().unwrap_or(PER_BLOCK)..PER_BLOCK {
-                forget(row * blocks + longest.end - 1);
+        // What the last blocks of runs and of all have too much. Written always: no branch to mispredict.
+        let mut keep_if = |is_photon: bool, at: usize| {
+            background[at] = if is_photon {
+                background[at]
+            } else {
+                Code::NONE
+            };
+            marks[at] = if is_photon { marks[at] } else { 0 };
+        };
+        for run in draw.runs().iter().filter(|run| run.photons > 0) {
+            let (block, words) = run.last_block();
+            for row in 1..PER_BLOCK {
+                keep_if(row < words, row * blocks + block);
             }
         }
         for row in 0..PER_BLOCK {
-            (draw.blocks()..blocks).for_each(|block| forget(row * blocks + block));
+            for block in draw.blocks()..blocks {
+                keep_if(false, row * blocks + block);
+            }
         }
         match echo {
             Some(rows) => {

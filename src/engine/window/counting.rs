@@ -186,7 +186,7 @@ impl<'a> Counting<'a> {
     }
 
     fn count_cells(&mut self, pixel: &mut Pixel<'_>, group: Group, cycles: u32) {
-        self.tables.put(&self.codes);
+        self.tables.put(&self.codes, group.cycles() as usize);
         let mut index = 0;
         while let Some(cycle) = self.tables.special(index) {
             if cycle < cycles as usize {
@@ -198,40 +198,65 @@ impl<'a> Counting<'a> {
 
     /// Settles all photons in the window of one cycle of the group, `laser_cycle` of the exposure.
     fn settle(&mut self, pixel: &mut Pixel<'_>, cycle: usize, laser_cycle: u32) {
+        let Some(last) = self.tables.take_last(cycle) else {
+            return;
+        };
+        let only = |photon| self.tables.before(photon).is_none();
+        if let Some(first) = self.tables.before(last).filter(|&photon| only(photon)) {
+            let photons = [first, last].map(|photon| (photon, self.codes.codes()[photon]));
+            if self.settle_two(pixel, photons) {
+                return;
+            }
+        }
+        self.settle_all(pixel, last, laser_cycle);
+    }
+
+    /// Settles two photons that are alone in their cycle, if what was before them does not matter, as it mostly is.
+    /// Returns whether it did.
+    #[inline]
+    fn settle_two(&mut self, pixel: &mut Pixel<'_>, photons: [(usize, Code); 2]) -> bool {
+        let [a, b] = photons.map(|(_, code)| code);
+        if a.is_doubtful() || b.is_doubtful() {
+            return false;
+        }
+        let fired = match a.spad() == b.spad() {
+            true => self.pair(pixel, photons),
+            false => Some([1; 2]),
+        };
+        let Some(fired) = fired else {
+            return false;
+        };
+        if a.row() == b.row() {
+            self.tables.remove(a.row());
+            self.tables.remove(a.row());
+            self.fire(pixel, a.row(), fired[0] + fired[1]);
+            return true;
+        }
+        for (code, fired) in [a, b].into_iter().zip(fired) {
+            if fired == 0 {
+                self.tables.remove(code.row());
+            }
+        }
+        true
+    }
+
+    /// Settles the `last` photon of a cycle and those before it.
+    fn settle_all(&mut self, pixel: &mut Pixel<'_>, last: usize, laser_cycle: u32) {
         self.together.clear();
         let (mut once, mut several, mut is_doubtful) = (0u16, 0u16, false);
-        let mut next = self.tables.take_last(cycle);
+        let mut next = Some(last);
         while let Some(photon) = next {
             let code = self.codes.codes()[photon];
             self.tables.remove(code.row());
             let spad = 1 << code.spad();
             several |= once & spad;
+            if code.is_doubtful() {
+                several |= spad;
+                is_doubtful = true;
+            }
             once |= spad;
-            is_doubtful |= code.is_doubtful();
             self.together.push((photon, code));
             next = self.tables.before(photon);
-        }
-        if let [a, b] = self.together[..]
-            && !is_doubtful
-        {
-            // Two photons alone, as it mostly is: of one SPAD, or of one bin.
-            let fired = match several {
-                0 => Some([1; 2]),
-                _ => self.pair(pixel, [a, b]),
-            };
-            if let Some([first, second]) = fired {
-                let (rows, spads) = ([a.1.row(), b.1.row()], [first, second]);
-                if rows[0] == rows[1] {
-                    self.fire(pixel, rows[0], first + second);
-                } else {
-                    self.fire(pixel, rows[0], first);
-                    self.fire(pixel, rows[1], second);
-                }
-                return;
-            }
-        }
-        for (_, code) in &self.together {
-            several |= u16::from(code.is_doubtful()) << code.spad();
         }
         for (_, code) in &self.together {
             let alone = several >> code.spad() & 1 == 0;

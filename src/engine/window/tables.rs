@@ -3,7 +3,6 @@
 use multiversion::multiversion;
 
 use super::binning::{CYCLES, Code, Codes, ROWS};
-use crate::photon::GROUP;
 
 /// Most photons of a group.
 pub const MOST_PHOTONS: usize = PHOTONS - 1;
@@ -59,11 +58,11 @@ impl Tables {
         parts.fold(0, u32::wrapping_add)
     }
 
-    /// Counts the photons of a group, at most [`MOST_PHOTONS`], filled up to a multiple of [`SIDE_BY_SIDE`].
-    pub fn put(&mut self, codes: &Codes) {
+    /// Counts the photons of a group of `cycles` laser cycles, at most [`MOST_PHOTONS`], filled up to a multiple of [`SIDE_BY_SIDE`].
+    pub fn put(&mut self, codes: &Codes, cycles: usize) {
         debug_assert!(codes.len() <= MOST_PHOTONS && codes.len().is_multiple_of(SIDE_BY_SIDE));
         // The cycle of what is no photon need not be empty.
-        self.cycles[..GROUP as usize].fill(0);
+        self.cycles[..cycles].fill(0);
         self.specials = put(self, codes);
         for code in codes.doubtful() {
             self.special[self.specials] = code.cycle() as u16;

@@ -5,7 +5,6 @@ use std::ops::Range;
 use super::group::{GROUP, Group};
 use super::{PixelStream, SPAD_BITS};
 use crate::photon::philox::Blocks;
-use crate::photon::random::Poisson;
 use crate::photon::spad::SPADS;
 
 /// Where in its group a photon falls: cycle within the group and SPAD, as `cycle << 4 | SPAD`.
@@ -26,11 +25,12 @@ pub struct Run {
 }
 
 impl Run {
-    /// How many rows of the last block make photons, if not all.
+    /// Its last block, and how many words of that make photons; any if there is no photon.
     #[inline]
-    pub fn last_rows(&self) -> Option<usize> {
-        let rows = self.photons as usize % PER_BLOCK;
-        (rows > 0).then_some(rows)
+    pub fn last_block(&self) -> (usize, usize) {
+        let before_last = self.photons.saturating_sub(1);
+        let block = self.first_block as usize + before_last as usize / PER_BLOCK;
+        (block, 1 + before_last as usize % PER_BLOCK)
     }
 
     /// Blocks whose first, second, third and fourth words make photons.
@@ -185,20 +185,6 @@ impl Draw {
             .map(|photon| pixel.signal_photon(self, photon))
             .filter(|(_, time_fs)| self.within_fs.contains(time_fs));
         background.chain(signal)
-    }
-
-    /// The sum of `draws` Poisson numbers from the next blocks of `counts`.
-    #[inline]
-    pub(super) fn count(&self, poisson: &Poisson, draws: u32, at: &mut usize) -> u32 {
-        let words = self.counts.rows();
-        let parts = (poisson.words() * draws) as usize;
-        let part = |part: usize| {
-            let word = |row: usize| u64::from(words[part % 2 * 2 + row][*at + part / 2]);
-            poisson.part(word(0) | word(1) << 32)
-        };
-        let total = (0..parts).map(part).sum();
-        *at += parts.div_ceil(2);
-        total
     }
 }
 
