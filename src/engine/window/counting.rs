@@ -132,7 +132,7 @@ impl<'a> Counting<'a> {
             } else {
                 self.encode(&mut pixel, cycles);
                 if self.codes.len() <= MOST_PHOTONS {
-                    self.count_cells(&mut pixel, group, cycles);
+                    self.count_cells(&mut pixel, group);
                 } else {
                     self.count_sorted(&mut pixel, group, cycles);
                 }
@@ -185,14 +185,13 @@ impl<'a> Counting<'a> {
         self.carried.extend(photons);
     }
 
-    fn count_cells(&mut self, pixel: &mut Pixel<'_>, group: Group, cycles: u32) {
+    fn count_cells(&mut self, pixel: &mut Pixel<'_>, group: Group) {
         self.tables.put(&self.codes, group.cycles() as usize);
-        let mut index = 0;
-        while let Some(cycle) = self.tables.special(index) {
-            if cycle < cycles as usize {
-                self.settle(pixel, cycle, group.first_cycle() + cycle as u32);
-            }
-            index += 1;
+        for index in 0.. {
+            let Some(cycle) = self.tables.special(index) else {
+                break;
+            };
+            self.settle(pixel, cycle, group.first_cycle() + cycle as u32);
         }
     }
 

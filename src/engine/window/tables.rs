@@ -17,6 +17,7 @@ pub const SIDE_BY_SIDE: usize = 4;
 /// How many photons came by row, which SPADs and rows have one by cycle, and all photons by cycle. Photons are kept by
 /// their index + 1; 0 is none.
 pub struct Tables {
+    /// What is taken out is taken out of the first one, which may fall below 0 and wrap; their sum is right.
     counts: [[u32; ROWS]; SIDE_BY_SIDE],
     /// By cycle: its last photon in the high half, marks of SPADs and bins in the low one.
     cycles: Box<[u64; CYCLES]>,
@@ -58,7 +59,8 @@ impl Tables {
         parts.fold(0, u32::wrapping_add)
     }
 
-    /// Counts the photons of a group of `cycles` laser cycles, at most [`MOST_PHOTONS`], filled up to a multiple of [`SIDE_BY_SIDE`].
+    /// Counts the photons of a group of `cycles` laser cycles, at most [`MOST_PHOTONS`], filled up to a multiple of
+    /// [`SIDE_BY_SIDE`].
     pub fn put(&mut self, codes: &Codes, cycles: usize) {
         debug_assert!(codes.len() <= MOST_PHOTONS && codes.len().is_multiple_of(SIDE_BY_SIDE));
         // The cycle of what is no photon need not be empty.
@@ -89,7 +91,6 @@ impl Tables {
 
     /// One photon less in a row.
     pub fn remove(&mut self, row: usize) {
-        // Which of the tables counted it does not matter to their sum.
         let count = &mut self.counts[0][row];
         *count = count.wrapping_sub(1);
     }
@@ -111,7 +112,8 @@ fn put(tables: &mut Tables, codes: &Codes) -> usize {
         // Written always, kept if special: no branch to mispredict.
         tables.special[specials % SPECIALS] = code.cycle() as u16;
         specials += usize::from(others & marks != 0);
-        counts[code.row()] += 1;
+        let count = &mut counts[code.row()];
+        *count = count.wrapping_add(1);
         (word >> 32) as u16
     };
     for ((codes, marks), before) in code_rows.iter().zip(mark_rows).zip(before_rows) {
