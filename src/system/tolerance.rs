@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::engine::{Cohort, CohortOptions, EngineError, Exposed, LitPixel, Window, Work, expose};
-use crate::photon::{PhotonStream, StreamConfig};
+use crate::photon::{PhotonStream, SPADS};
 use crate::ranging::{PeakOptions, interpolate};
 
 /// Steps to a CLK period that the cohort engine may take, cheapest first.
@@ -28,6 +28,9 @@ const PHOTONS_PER_POOL: f64 = 60.0;
 /// The same where it follows their joint state: with every SPAD ready, and for each one that is blind on average, times
 /// the square root of the steps. Fitted to macropixels of 16 000 laser cycles under 8 and 50 Mcounts/s.
 const PHOTONS_PER_JOINT: [f64; 2] = [300.0, 3000.0];
+
+/// The same in the time of one photon where blinding light makes the window engine draw whole laser cycles and sort them.
+const PHOTONS_PER_SORTED: f64 = 15.0;
 
 /// Totals to which mean counts are scaled before they are rounded to whole ones: a depth keeps nine digits.
 const WHOLE_COUNTS: f64 = 1e9;
@@ -92,11 +95,13 @@ impl Tolerance<'_> {
             Cohort::new(config, exposure, options)
         });
         let law = WindowLaw::new(config, exposure);
+        let window = Window::new(config, exposure);
         let planner = Planner {
             cohorts: &cohorts,
             law: &law,
             peak,
-            stream: stream.config(),
+            window: &window,
+            stream,
             bins: config.bins,
         };
         let plan: Vec<(Choice, f64)> = pixels
@@ -118,7 +123,7 @@ impl Tolerance<'_> {
             let exposed = match choice {
                 Choice::Window => {
                     kept.on_window = members.len();
-                    expose(&Window::new(config, exposure), stream, &chosen, &done)?
+                    expose(&window, stream, &chosen, &done)?
                 }
                 Choice::Cohort(steps) => {
                     kept.on_cohort[steps] = members.len();
@@ -138,7 +143,8 @@ struct Planner<'a> {
     cohorts: &'a [Cohort<'a>; STEPS.len()],
     law: &'a WindowLaw,
     peak: &'a PeakOptions,
-    stream: &'a StreamConfig,
+    window: &'a Window<'a>,
+    stream: &'a PhotonStream,
     bins: usize,
 }
 
@@ -149,13 +155,19 @@ impl Planner<'_> {
         let Some(light) = pixel.light.as_ref().filter(|_| tolerance_m > 0.0) else {
             return exact;
         };
-        let window_s = self.bins as f64 / self.stream.clock.as_hz();
+        let stream = self.stream.config();
+        let window_s = self.bins as f64 / stream.clock.as_hz();
         let per_cycle = light.background_hz * window_s + light.signal_per_cycle;
-        let photons = per_cycle * f64::from(self.stream.laser_cycles);
-        let blind = per_cycle / window_s * self.stream.spads.dead_time.as_s();
+        let handled = match self.window.draws_whole_cycles(self.stream, pixel) {
+            true => PHOTONS_PER_SORTED * light.photons_per_cycle(stream),
+            false => per_cycle,
+        };
+        let photons = handled * f64::from(stream.laser_cycles);
+        let per_dead_time = per_cycle / window_s * stream.spads.dead_time.as_s();
+        let blind = per_dead_time / (1.0 + per_dead_time / SPADS as f64);
         let mut coarse = self.depth_m(0, pixel);
         for (steps, per_period) in STEPS.iter().enumerate().take(STEPS.len() - 1) {
-            let pools = self.cohorts[steps].pools(self.stream, pixel.start, light);
+            let pools = self.cohorts[steps].pools(stream, pixel.start, light);
             let [ready, more] = PHOTONS_PER_JOINT;
             let per_step = match pools {
                 Ok(true) => PHOTONS_PER_POOL,
@@ -182,7 +194,7 @@ impl Planner<'_> {
         let window = self.law.window(pixel.start).open()?;
         let cohort = &self.cohorts[steps];
         let means = cohort
-            .expected(self.stream, pixel.start, &pixel.light?)
+            .expected(self.stream.config(), pixel.start, &pixel.light?)
             .ok()?;
         let scale = WHOLE_COUNTS / means.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let counts: Vec<u32> = means

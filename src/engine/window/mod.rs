@@ -51,6 +51,16 @@ impl<'a> Window<'a> {
         }
     }
 
+    /// Whether a macropixel's light blinds so much that all of its photons are drawn, and not only those that its
+    /// window may see.
+    pub fn draws_whole_cycles(&self, stream: &PhotonStream, pixel: &LitPixel) -> bool {
+        let window = self.law.window(pixel.start).open();
+        window.zip(pixel.light).is_some_and(|(window, light)| {
+            let sight = Sight::new(&self.law, &window, stream);
+            sight.is_none_or(|sight| !sight.suits(stream, &light))
+        })
+    }
+
     fn is_event(&self, spads: u16) -> bool {
         correlation::model(spads, self.config.event_type, self.config.threshold)
     }
