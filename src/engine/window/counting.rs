@@ -7,8 +7,8 @@
 //!
 //! Nearly every photon is alone in its cycle with its SPAD, from the SPADs' memory before the window to its end, and with
 //! its bin: it makes a pulse, and its CLK period has one. Where two photons of a cycle share a SPAD or a bin, or one comes
-//! too close to an edge, the cycle's photons are taken out again, and what the dead time leaves of them is counted
-//! bin by bin.
+//! too close to an edge, photons are taken out again, and what the dead time leaves of them is counted bin by bin. The
+//! times of photons are worked out only there.
 //!
 //! Where secondaries tie SPADs together, or photons are many, cycles are sorted and go through [`SpadModel::detect`]
 //! one by one ([`Counting::count_sorted`]).
