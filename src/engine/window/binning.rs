@@ -54,7 +54,8 @@ impl Code {
     pub fn new(place: u32, row: u32, is_doubtful: bool, bins: u32) -> (Code, u32) {
         let is_in_bin = row.wrapping_sub(1) < bins;
         let bin_mark = u32::from(is_in_bin) << (SPADS as u32 + row % SPADS as u32);
-        let code = place << PLACE_SHIFT | u32::from(is_doubtful) * DOUBTFUL | row;
+        let doubtful = u32::from(is_doubtful) << DOUBTFUL.trailing_zeros();
+        let code = place << PLACE_SHIFT | doubtful | row;
         (Code(code), bin_mark | 1 << (place % SPADS as u32))
     }
 
