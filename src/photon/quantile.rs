@@ -88,7 +88,8 @@ impl NormalSampler {
         }
     }
 
-    /// A draw from the lowest [`NORMAL_BITS`] of `word`.
+    /// A draw from the lowest 49 bits of `word`: the highest is its sign, the others are the tail beyond it in steps of
+    /// 2⁻⁴⁹.
     #[inline]
     pub fn draw(&self, word: u64) -> f64 {
         let half_steps = (word & ((1 << TAIL_BITS) - 1)) << 1 | 1;
@@ -102,7 +103,7 @@ impl NormalSampler {
         f64::from_bits((z * self.sigma).to_bits() ^ sign)
     }
 
-    /// [`RANK_BITS`] bits of a word, given by halves, that rise with its draw.
+    /// 14 bits of a word, given by halves, that rise with its draw.
     #[inline]
     pub fn rank(low: u32, high: u32) -> i16 {
         const IN_HIGH: u32 = NORMAL_BITS - u32::BITS;

@@ -7,7 +7,7 @@
 
 use crate::chip::{Exposure, Overflow, SensorConfig, WindowLaw, histogram};
 use crate::engine::cohort::{BlindSpad, at_least_hit, none_of};
-use crate::photon::{DeadTimeLaw, Poisson, pulse_share};
+use crate::photon::{DeadTimeLaw, NormalSampler, Poisson, pulse_share};
 use crate::ranging::{PeakOptions, interpolate};
 use crate::report::Grid;
 use crate::theory::detection::{self, Detection, Model, PerCycle, Ties};
@@ -92,6 +92,14 @@ pub fn functions() -> Vec<Function> {
             compute: |a| Value::Real(pulse_share(a[0], a[1], a[2])),
             measure: Measure::Relative,
             promise: 1e-12,
+        },
+        Function {
+            name: "normal draws of the photon stream",
+            range: "tails from 1/2 to 2^-48, in standard deviations",
+            references: references!("stability/normal_draws"),
+            compute: |a| Value::Real(NormalSampler::new(1.0).draw(a[0] as u64)),
+            measure: Measure::Absolute,
+            promise: 1e-7,
         },
         Function {
             name: "at least k of 16 SPADs hit",

@@ -47,6 +47,16 @@ def pulse_share():
         yield start, end, 1e-6, mpf(share)
 
 
+def normal_draws():
+    """Quantiles of the standard normal distribution for 49-bit words: the sign, then the tail beyond in steps of 2^-49."""
+    for power in range(48):
+        for steps in sorted({1 << power, (1 << power) + (1 << power) // 3, (2 << power) - 1}):
+            tail = (mpf(steps) + mpf(1) / 2) / 2**49
+            z = mp.sqrt(2) * mp.erfinv(2 * tail - 1)
+            yield steps, z
+            yield steps + 2**48, -z
+
+
 RATES = [1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 0.02, 0.1, 0.5, 1.0, 3.0, 10.0, 34.5, 100.0, 1e3]
 
 
@@ -183,6 +193,7 @@ def thompson():
 
 
 write("pulse_share", ["from", "to", "sigma"], pulse_share())
+write("normal_draws", ["word"], normal_draws())
 write("hit_tails", ["k", "mean"], hit_tails())
 write("none_hit", ["n", "p"], none_hit())
 write("steady_pulse", ["law", "steps", "mean"], steady_pulse())
