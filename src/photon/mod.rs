@@ -16,7 +16,7 @@ pub use budget::{Convention, PhotonBudget, Spot};
 pub use gaussian::{PulseEdge, pulse_share};
 pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
 pub use pulse::{PulseError, PulseShape};
-pub use quantile::NormalSampler;
+pub use quantile::{NormalSampler, RANKS};
 pub use random::{Poisson, Purpose, normal, philox_key, random_stream};
 pub use spad::{
     AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, SPADS, SpadEvent, SpadModel, apply_dead_time,

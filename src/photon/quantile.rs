@@ -17,7 +17,10 @@ pub const NORMAL_BITS: u32 = 1 + TAIL_BITS;
 const TAIL_BITS: u32 = 48;
 
 /// Bits of a rank. Few, so that many fit into a vector, with room for edges above all ranks.
-pub const RANK_BITS: u32 = 14;
+const RANK_BITS: u32 = 14;
+
+/// Ranks are below that.
+pub const RANKS: i16 = 1 << RANK_BITS;
 
 /// Pieces for every power of two.
 const PIECE_BITS: u32 = 4;
@@ -125,7 +128,7 @@ impl NormalSampler {
             return [i16::MAX; 2];
         }
         let below = |z: f64| 0.5 * libm::erfc(-z / self.sigma * FRAC_1_SQRT_2);
-        let ranks = f64::from(1 << RANK_BITS);
+        let ranks = f64::from(RANKS);
         // A rank stands for all probabilities up to the next one.
         let (first, last) = ((below(first) * ranks).floor(), (below(last) * ranks).ceil());
         [first as i16 - 1, last as i16 + 1]

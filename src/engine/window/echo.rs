@@ -14,7 +14,7 @@ use multiversion::multiversion;
 
 use super::binning::{Code, Wanted};
 use super::sight::ROUNDING_FS;
-use crate::photon::{PixelStream, signal_rank};
+use crate::photon::{PixelStream, RANKS, signal_rank};
 
 /// Edges of rows, as ranks: the first that may be, and the first that is for certain, at the edge or after it.
 #[derive(Debug, Clone)]
@@ -53,9 +53,12 @@ impl EchoRows {
             light.signal_ranks_at(time_fs, (ROUNDING_FS + 1) as f64)
         };
         let mut edges: Vec<[i16; 2]> = (0..=bins).map(edge).collect::<Option<_>>()?;
-        // The echo is shorter than most windows.
-        let passed_by_all = edges.iter().filter(|edge| edge[1] == i16::MIN).count();
-        edges.retain(|edge| edge[1] != i16::MIN && edge[0] != i16::MAX);
+        // The echo is shorter than most windows. Of the edges in either tail, the nearest one puts in doubt whatever
+        // may be on the wrong side of the others.
+        let before = edges.partition_point(|edge| edge[0] < 0).saturating_sub(1);
+        let after = edges.partition_point(|edge| edge[1] < RANKS);
+        edges.truncate(after + 1);
+        edges.drain(..before);
         Some(EchoRows {
             bins: bins as u32,
             ends: [
@@ -63,7 +66,7 @@ impl EchoRows {
                 light.signal_ranks_at(within_fs.end as f64, 0.0)?,
             ],
             edges,
-            first_row: passed_by_all as i16,
+            first_row: before as i16,
         })
     }
 
