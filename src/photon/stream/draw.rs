@@ -133,7 +133,7 @@ impl Draw {
     }
 
     /// The random words of the echo's photons, low and high, by halves: [`Group::place`] of the high word, and
-    /// [`PixelStream::signal_time_fs`]. Some may come outside [`Draw::within_fs`], and are no photons of these slots.
+    /// [`PixelStream::signal_photon`]. Some may come outside [`Draw::within_fs`], and are no photons of these slots.
     pub fn echo(&self) -> [[&[u32]; 2]; 2] {
         let [a, b, c, d] = self.echo.rows();
         let (first, second) = (self.echo_photons.div_ceil(2), self.echo_photons / 2);
