@@ -5,12 +5,12 @@
 //!
 //! | way | state | exact | cost of a bin |
 //! |---|---|---|---|
-//! | [`pooled`] | how many SPADs fired 1, 2, … steps ago | every bin; two bins' correlation up to [`CohortOptions::neglect`] | a few draws |
-//! | [`joint`] | how many cycles have which of these on one macropixel | all of it | a draw for every state that occurs |
+//! | `pooled.rs` | how many SPADs fired 1, 2, … steps ago | every bin; two bins' correlation up to [`CohortOptions::neglect`] | a few draws |
+//! | `joint.rs` | how many cycles have which of these on one macropixel | all of it | a draw for every state that occurs |
 //!
 //! What both share, and what it costs in exactness:
 //!
-//! * **Dead time in steps** ([`blindness`]): [`CohortOptions::sub_bins`] steps to a CLK period, the error knob. The
+//! * **Dead time in steps** (`blindness.rs`): [`CohortOptions::sub_bins`] steps to a CLK period, the error knob. The
 //!   probability of being blind is exact to first order in the photons on one SPAD in a step. Twice the steps leave
 //!   a quarter of the error: at one signal photon a laser cycle and 8 Mcounts/s, 4·10⁻³ of the mean of the worst bin
 //!   in one step, 2·10⁻⁴ in four.
