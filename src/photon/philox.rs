@@ -120,7 +120,7 @@ pub fn blocks_from(first: u32, others: [u32; 3], key: [u32; 2]) -> [[u32; 2 * LA
 }
 
 /// Words live in the low halves of 64-bit lanes, where vector units multiply them; high halves hold what is left over.
-#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2", "x86_64+sse4.1"))]
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
 fn generate(
     mut key: [u32; 2],
     [third, fourth]: [u32; 2],

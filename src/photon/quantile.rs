@@ -64,12 +64,17 @@ fn density(z: f64) -> f64 {
     libm::exp(-0.5 * z * z) / libm::sqrt(2.0 * PI)
 }
 
+/// The lower tail up to `z`.
+fn below(z: f64) -> f64 {
+    0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
+}
+
 /// Where the lower tail is `p`; `near` is on the right side of it. Newton's method on the logarithm of the tail, which is
 /// concave.
 fn quantile(p: f64, near: f64) -> f64 {
     let mut z = near;
     for _ in 0..8 {
-        let tail = 0.5 * libm::erfc(-z * FRAC_1_SQRT_2);
+        let tail = below(z);
         z -= libm::log(tail / p) * tail / density(z);
     }
     z
@@ -127,11 +132,9 @@ impl NormalSampler {
         } else if first > self.reach() {
             return [i16::MAX; 2];
         }
-        let below = |z: f64| 0.5 * libm::erfc(-z / self.sigma * FRAC_1_SQRT_2);
-        let ranks = f64::from(RANKS);
+        let rank = |z: f64| below(z / self.sigma) * f64::from(RANKS);
         // A rank stands for all probabilities up to the next one.
-        let (first, last) = ((below(first) * ranks).floor(), (below(last) * ranks).ceil());
-        [first as i16 - 1, last as i16 + 1]
+        [rank(first).floor() as i16 - 1, rank(last).ceil() as i16 + 1]
     }
 
     /// No draw is farther from 0.
@@ -185,7 +188,7 @@ mod tests {
             prop_assert_eq!(z.is_sign_positive(), upper);
             prop_assert!(z.abs() <= NormalSampler::new(1.0).reach());
             let expected = (tail_word as f64 + 0.5) * 0.5f64.powi(TAIL_BITS as i32 + 1);
-            let tail = 0.5 * libm::erfc(z.abs() * FRAC_1_SQRT_2);
+            let tail = below(-z.abs());
             // In standard deviations: the tail's error over the density.
             let error = (tail - expected).abs() / density(z);
             prop_assert!(error < 1e-7, "{error}");

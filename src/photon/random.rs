@@ -59,7 +59,7 @@ fn unit(random: &mut Philox) -> f64 {
 /// Largest mean that one table covers; larger ones are split into equal parts.
 const LARGEST_TABLE_MEAN: f64 = 64.0;
 
-/// Entries of a table that would be no probabilities: beyond them less than 2⁻⁶⁴ is left for the largest mean.
+/// Most entries of a table: more than the largest mean has above 2⁻⁶⁴.
 const LONGEST_TABLE: usize = 192;
 
 /// 1/k.

@@ -114,8 +114,8 @@ impl Frequency {
         numerator.div_euclid(self.numerator as i128) as i64
     }
 
-    /// The length of one of 2^`bits` equal parts of a period, for `bits` up to 30: whole femtoseconds, and what is left over in
-    /// units of 2⁻⁶⁴ fs, rounded down.
+    /// The length of one of 2^`bits` equal parts of a period, for `bits` up to 30: whole femtoseconds, and what is left
+    /// over in units of 2⁻⁶⁴ fs, rounded down.
     pub fn part_fs(self, bits: u32) -> (u64, u64) {
         let step = FS_PER_S as u128 * u128::from(self.denominator);
         let parts = u128::from(self.numerator) << bits;

@@ -187,7 +187,7 @@ pub struct Binning {
 }
 
 impl Binning {
-    /// For `bins` bins (1 to 64) of a CLK of at most 2 GHz with these slots.
+    /// For `bins` bins (1 to 64) of a CLK of at most 2 GHz with these slots, fewer than 2²⁴ to a period.
     pub fn new(bins: usize, clk_hz: f64, slots: Slots) -> Self {
         let periods_per_fs = clk_hz * 1e-15;
         let one = f64::from(FRACTION + 1);
@@ -196,7 +196,7 @@ impl Binning {
         Binning {
             bins: bins as u32,
             periods_per_fs,
-            slot_bits: FRACTION_BITS.saturating_sub(slots.per_period_bits()),
+            slot_bits: FRACTION_BITS - slots.per_period_bits(),
             doubt: (doubt_fs * periods_per_fs * one).ceil() as u32 + 3,
         }
     }

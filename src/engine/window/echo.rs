@@ -24,7 +24,7 @@ pub struct EchoRows {
     ends: [[i16; 2]; 2],
     /// Edges of bins.
     edges: Vec<[i16; 2]>,
-    /// The row of photons before all of them.
+    /// How many edges come before those: a photon is after them or in doubt.
     first_row: i16,
 }
 

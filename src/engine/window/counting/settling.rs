@@ -1,0 +1,207 @@
+//! Settling the few laser cycles in which counting every photon is wrong.
+//!
+//! ```text
+//!   two photons  ── different SPADs, one bin          ──► the bin's CLK period has two SPADs
+//!        │       ── one SPAD, farther apart than the memory ──► both count, or cancel within one CLK period
+//!        │       ── one SPAD, closer                  ──► the second is lost, if the first was seen for certain
+//!        ╰─ else, more photons, or one near an edge   ──► SPAD by SPAD, with as much of the past as it takes
+//! ```
+
+use super::{Counting, Pixel, Placed, in_draw};
+use crate::engine::window::binning::Code;
+
+impl Counting<'_> {
+    /// Settles all photons in the window of one cycle of the group, `laser_cycle` of the exposure.
+    pub(super) fn settle(&mut self, pixel: &mut Pixel<'_>, cycle: usize, laser_cycle: u32) {
+        let Some(last) = self.tables.take_last(cycle) else {
+            return;
+        };
+        let only = |photon| self.tables.before(photon).is_none();
+        if let Some(first) = self.tables.before(last).filter(|&photon| only(photon)) {
+            let photons = [first, last].map(|photon| (photon, self.codes.codes()[photon]));
+            if self.settle_two(pixel, photons) {
+                return;
+            }
+        }
+        self.settle_all(pixel, last, laser_cycle);
+    }
+
+    /// Settles two photons that are alone in their cycle, if what was before them does not matter, as it mostly is.
+    /// Returns whether it did.
+    #[inline]
+    fn settle_two(&mut self, pixel: &mut Pixel<'_>, photons: [(usize, Code); 2]) -> bool {
+        let [a, b] = photons.map(|(_, code)| code);
+        if a.is_doubtful() || b.is_doubtful() {
+            return false;
+        }
+        let fired = match a.spad() == b.spad() {
+            true => self.pair(pixel, photons),
+            false => Some([1; 2]),
+        };
+        let Some(fired) = fired else {
+            return false;
+        };
+        if a.row() == b.row() {
+            self.tables.remove(a.row());
+            self.tables.remove(a.row());
+            self.fire(pixel, a.row(), fired[0] + fired[1]);
+            return true;
+        }
+        for (code, fired) in [a, b].into_iter().zip(fired) {
+            if fired == 0 {
+                self.tables.remove(code.row());
+            }
+        }
+        true
+    }
+
+    /// Settles the `last` photon of a cycle and those before it.
+    fn settle_all(&mut self, pixel: &mut Pixel<'_>, last: usize, laser_cycle: u32) {
+        self.together.clear();
+        let (mut once, mut several, mut is_doubtful) = (0u16, 0u16, false);
+        let mut next = Some(last);
+        while let Some(photon) = next {
+            let code = self.codes.codes()[photon];
+            self.tables.remove(code.row());
+            let spad = 1 << code.spad();
+            several |= once & spad;
+            if code.is_doubtful() {
+                several |= spad;
+                is_doubtful = true;
+            }
+            once |= spad;
+            self.together.push((photon, code));
+            next = self.tables.before(photon);
+        }
+        for (_, code) in &self.together {
+            let alone = several >> code.spad() & 1 == 0;
+            self.fired[code.row()] += u8::from(alone);
+        }
+        while several != 0 {
+            let spad = several.trailing_zeros() as u8;
+            several &= several - 1;
+            if is_doubtful || !self.settle_pair(pixel, spad) {
+                self.settle_spad(pixel, laser_cycle, spad);
+            }
+        }
+        if is_doubtful {
+            for row in 0..=pixel.hits.len() {
+                self.tell(pixel, row);
+            }
+        }
+        for index in 0..self.together.len() {
+            let row = self.together[index].1.row();
+            self.tell(pixel, row);
+        }
+    }
+
+    /// Adds what fired in a CLK period to its bin.
+    fn tell(&mut self, pixel: &mut Pixel<'_>, row: usize) {
+        let spads = std::mem::take(&mut self.fired[row]);
+        self.fire(pixel, row, spads);
+    }
+
+    /// Adds a CLK period in which so many SPADs fired to its bin.
+    #[inline]
+    fn fire(&self, pixel: &mut Pixel<'_>, row: usize, spads: u8) {
+        if let Some(hits) = pixel.hits.get_mut(row.wrapping_sub(1)) {
+            *hits += self.adds[usize::from(spads)];
+            pixel.work.clk_periods_visited += u64::from(spads > 0);
+            pixel.work.pulses += u64::from(spads);
+        }
+    }
+
+    /// Settles the photons of one SPAD if they are just two; neither is doubtful. Returns whether it did.
+    fn settle_pair(&mut self, pixel: &mut Pixel<'_>, spad: u8) -> bool {
+        let mut photons = self.together.iter().filter(|(_, code)| code.spad() == spad);
+        let (Some(&a), Some(&b), None) = (photons.next(), photons.next(), photons.next()) else {
+            return false;
+        };
+        let Some(fired) = self.pair(pixel, [a, b]) else {
+            return false;
+        };
+        for ((_, code), fired) in [a, b].into_iter().zip(fired) {
+            self.fired[code.row()] += fired;
+        }
+        true
+    }
+
+    /// Which of a SPAD's only two photons make pulses that are counted, if what was before them does not matter, as it
+    /// mostly is; neither is doubtful.
+    #[inline]
+    fn pair(&self, pixel: &mut Pixel<'_>, photons: [(usize, Code); 2]) -> Option<[u8; 2]> {
+        let rows = photons.map(|(_, code)| code.row());
+        let bins = pixel.hits.len();
+        let (first, second) = (rows[0].min(rows[1]), rows[0].max(rows[1]));
+        // Nothing is counted outside the window; apart by more rows than the memory has, photons do not meet.
+        if second == 0 || first > bins || first > 0 && second - first > self.rows_of_memory {
+            return Some([1; 2]);
+        }
+        if photons
+            .iter()
+            .any(|&(photon, _)| photon >= self.first_code[0])
+        {
+            return None;
+        }
+        let times_fs = photons.map(|(photon, _)| in_draw(pixel.light, &self.own, photon));
+        let memory_fs = self.stream.config().spads.memory().as_fs();
+        let is_blind = (times_fs[0] - times_fs[1]).abs() <= memory_fs;
+        let is_seen = u64::from((1..=bins).contains(&second));
+        if is_blind {
+            // A photon in the window has been preceded by all the memory, in which there was none.
+            let first_fs = times_fs[0].min(times_fs[1]);
+            if first == 0 && first_fs - pixel.sight.drawn_from_fs <= memory_fs {
+                return None;
+            }
+            pixel.work.lost_to_dead_time += is_seen;
+            let is_first = u8::from(times_fs[0] <= times_fs[1]);
+            return Some([is_first, 1 - is_first]);
+        } else if first == second {
+            // Two pulses within one CLK period cancel.
+            pixel.work.pulses += 2 * is_seen;
+            return Some([0; 2]);
+        }
+        Some([1; 2])
+    }
+
+    /// Settles the photons of one SPAD among those `together`.
+    fn settle_spad(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spad: u8) {
+        let window = Placed {
+            engine: self.engine,
+            binning: self.binning,
+            sight: pixel.sight,
+            laser_cycle,
+        };
+        self.photons.clear();
+        let mut seen = 0;
+        for &(photon, code) in &self.together {
+            if code.spad() == spad && self.is_drawn(pixel.light, photon) {
+                let time = self.time_of(pixel.light, photon, laser_cycle);
+                seen += u64::from(window.row_of(time).is_some());
+                self.photons.push((time, spad));
+            }
+        }
+        if seen == 0 {
+            return;
+        }
+        self.photons.sort_unstable();
+        self.detect(pixel, laser_cycle, 1 << spad);
+        let mut last = None;
+        for event in &self.events {
+            let Some(row) = window.row_of(event.time) else {
+                continue;
+            };
+            seen -= 1;
+            // Two pulses within one CLK period cancel.
+            if last == Some(row) {
+                self.fired[row] -= 1;
+                pixel.work.pulses += 2;
+                last = None;
+            } else {
+                self.fired[row] += 1;
+                last = Some(row);
+            }
+        }
+        pixel.work.lost_to_dead_time += seen;
+    }
+}
