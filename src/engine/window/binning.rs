@@ -31,6 +31,12 @@ const INTEGER: f64 = (1u64 << 52) as f64;
 const DOUBTFUL: u32 = 1 << 8;
 const PLACE_SHIFT: u32 = 16;
 const SPAD_BITS: u32 = SPADS.trailing_zeros();
+
+/// The marks of SPADs.
+pub const SPAD_MARKS: u32 = (1 << SPADS) - 1;
+
+/// Bins that have a mark of their own.
+pub const MARKED_BINS: usize = u32::BITS as usize - SPADS;
 const CYCLE_SHIFT: u32 = PLACE_SHIFT + SPAD_BITS;
 
 /// Rows that a code can name.
@@ -53,7 +59,7 @@ impl Code {
     #[inline(always)]
     pub fn new(place: u32, row: u32, is_doubtful: bool, bins: u32) -> (Code, u32) {
         let is_in_bin = row.wrapping_sub(1) < bins;
-        let bin_mark = u32::from(is_in_bin) << (SPADS as u32 + row % SPADS as u32);
+        let bin_mark = u32::from(is_in_bin) << (SPADS as u32 + row % MARKED_BINS as u32);
         let doubtful = u32::from(is_doubtful) << DOUBTFUL.trailing_zeros();
         let code = place << PLACE_SHIFT | doubtful | row;
         (Code(code), bin_mark | 1 << (place % SPADS as u32))
@@ -116,16 +122,15 @@ impl Codes {
         &self.marks[..self.len]
     }
 
-    /// Codes of photons that are too close to an edge.
-    pub fn doubtful(&self) -> impl Iterator<Item = Code> {
+    /// Photons that are too close to an edge.
+    pub fn doubtful(&self) -> impl Iterator<Item = usize> {
         // They are rare: most groups have none, which is quickly seen.
-        let (chunks, rest) = self.codes().as_chunks::<64>();
-        let chunks = chunks.iter().map(|chunk| &chunk[..]).chain([rest]);
+        const TOGETHER: usize = 64;
+        let chunks = self.codes().chunks(TOGETHER).enumerate();
         chunks
-            .filter(|chunk| chunk.iter().fold(0, |any, code| any | code.0) & DOUBTFUL != 0)
-            .flatten()
-            .copied()
-            .filter(|code| code.is_doubtful())
+            .filter(|(_, chunk)| chunk.iter().fold(0, |any, code| any | code.0) & DOUBTFUL != 0)
+            .flat_map(|(at, chunk)| (TOGETHER * at..).zip(chunk))
+            .filter_map(|(photon, code)| code.is_doubtful().then_some(photon))
     }
 
     /// Appends what is no photon until their number is a multiple of `multiple`.

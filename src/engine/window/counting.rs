@@ -189,11 +189,10 @@ impl<'a> Counting<'a> {
 
     fn count_cells(&mut self, pixel: &mut Pixel<'_>, group: Group) {
         self.tables.put(&self.codes, group.cycles() as usize);
-        for index in 0.. {
-            let Some(cycle) = self.tables.special(index) else {
-                break;
-            };
-            self.settle(pixel, cycle, group.first_cycle() + cycle as u32);
+        let mut index = 0;
+        while let Some(special) = self.tables.special(index, &self.codes) {
+            self.settle(pixel, special, group);
+            index += 1;
         }
     }
 

@@ -19,13 +19,28 @@ pub const SIDE_BY_SIDE: usize = 4;
 pub struct Tables {
     /// What is taken out is taken out of the first one, which may fall below 0 and wrap; their sum is right.
     counts: [[u32; ROWS]; SIDE_BY_SIDE],
-    /// By cycle: its last photon in the high half, marks of SPADs and bins in the low one.
+    /// By cycle: its last photon in the high half, marks of SPADs and bins in the low one, and its specials above both.
     cycles: Box<[u64; CYCLES]>,
     /// The photon before it in the same cycle, by index.
     before: Box<[u16; PHOTONS]>,
-    /// Cycles that need a closer look.
-    special: Box<[u16; SPECIALS]>,
+    /// Photons that need a closer look in the high half, why in the low one.
+    special: Box<[u64; SPECIALS]>,
     specials: usize,
+}
+
+/// A special photon as `special` has it, and one more special of a cycle.
+const PHOTON_SHIFT: u32 = 32;
+const ONE_SPECIAL: u64 = 1 << 48;
+
+/// A photon that needs a closer look.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Special {
+    /// Which.
+    pub photon: usize,
+    /// Marks that earlier photons of its cycle have, too; all if it is doubtful.
+    pub shared: u32,
+    /// Whether it is the only one of its cycle.
+    pub is_only: bool,
 }
 
 fn table<T: Copy + Default, const N: usize>() -> Box<[T; N]> {
@@ -66,22 +81,33 @@ impl Tables {
         // The cycle of what is no photon need not be empty.
         self.cycles[..cycles].fill(0);
         self.specials = put(self, codes);
-        for code in codes.doubtful() {
-            self.special[self.specials] = code.cycle() as u16;
+        for photon in codes.doubtful() {
+            self.special[self.specials] = (photon as u64 + 1) << PHOTON_SHIFT | u64::from(u32::MAX);
             self.specials += 1;
+        }
+        for special in &self.special[..self.specials] {
+            let photon = (special >> PHOTON_SHIFT) as usize - 1;
+            self.cycles[codes.codes()[photon].cycle()] += ONE_SPECIAL;
         }
     }
 
-    /// The `index`-th cycle that has two photons in one SPAD or one bin, or a doubtful one. A cycle may come several
-    /// times.
-    pub fn special(&self, index: usize) -> Option<usize> {
-        (index < self.specials).then(|| usize::from(self.special[index]))
+    /// The `index`-th photon that has its SPAD or its bin in common with an earlier one of its cycle, or is doubtful. A
+    /// photon may come twice.
+    pub fn special(&self, index: usize, codes: &Codes) -> Option<Special> {
+        let special = *self.special[..self.specials].get(index)?;
+        let photon = (special >> PHOTON_SHIFT) as usize - 1;
+        let cycle = self.cycles[codes.codes()[photon].cycle()];
+        Some(Special {
+            photon,
+            shared: special as u32,
+            is_only: cycle / ONE_SPECIAL == 1,
+        })
     }
 
     /// The last photon of a cycle, which is empty afterwards.
     pub fn take_last(&mut self, cycle: usize) -> Option<usize> {
         let word = std::mem::take(&mut self.cycles[cycle]);
-        ((word >> 32) as usize).checked_sub(1)
+        ((word % ONE_SPECIAL >> PHOTON_SHIFT) as usize).checked_sub(1)
     }
 
     /// The photon of the same cycle before this one.
@@ -107,14 +133,15 @@ fn put(tables: &mut Tables, codes: &Codes) -> usize {
         let cycle = &mut tables.cycles[code.cycle()];
         let word = *cycle;
         let others = word as u32;
-        number += 1;
-        *cycle = number << 32 | u64::from(others | marks);
+        let shared = others & marks;
+        number += 1 << PHOTON_SHIFT;
+        *cycle = number | u64::from(others | marks);
         // Written always, kept if special: no branch to mispredict.
-        tables.special[specials % SPECIALS] = code.cycle() as u16;
-        specials += usize::from(others & marks != 0);
+        tables.special[specials % SPECIALS] = number | u64::from(shared);
+        specials += usize::from(shared != 0);
         let count = &mut counts[code.row()];
         *count = count.wrapping_add(1);
-        (word >> 32) as u16
+        (word >> PHOTON_SHIFT) as u16
     };
     for ((codes, marks), before) in code_rows.iter().zip(mark_rows).zip(before_rows) {
         for (side, counts) in tables.counts.iter_mut().enumerate() {

@@ -1,58 +1,81 @@
 //! Settling the few laser cycles in which counting every photon is wrong.
 //!
 //! ```text
-//!   two photons  ── different SPADs, one bin          ──► the bin's CLK period has two SPADs
-//!        │       ── one SPAD, farther apart than the memory ──► both count, or cancel within one CLK period
-//!        │       ── one SPAD, closer                  ──► the second is lost, if the first was seen for certain
-//!        ╰─ else, more photons, or one near an edge   ──► SPAD by SPAD, with as much of the past as it takes
+//!   one special photon  ── shares its bin               ──► the bin's CLK period has two SPADs
+//!        │              ── shares its SPAD, farther apart than the memory ──► both count
+//!        │              ── shares its SPAD, closer      ──► the second is lost, if the first was seen for certain
+//!        ╰─ else, more of them, or one near an edge     ──► SPAD by SPAD, with as much of the past as it takes
 //! ```
+//!
+//! What other photons the cycle has does not matter in the first three cases: whoever shared a SPAD or a bin with
+//! them, too, would be special as well.
 
 use super::{Counting, Pixel, Placed, in_draw};
-use crate::engine::window::binning::Code;
+use crate::engine::window::binning::{Code, MARKED_BINS, SPAD_MARKS};
+use crate::engine::window::tables::Special;
+use crate::photon::Group;
 
 impl Counting<'_> {
-    /// Settles all photons in the window of one cycle of the group, `laser_cycle` of the exposure.
-    pub(super) fn settle(&mut self, pixel: &mut Pixel<'_>, cycle: usize, laser_cycle: u32) {
-        let Some(last) = self.tables.take_last(cycle) else {
+    /// Settles the cycle of a special photon.
+    pub(super) fn settle(&mut self, pixel: &mut Pixel<'_>, special: Special, group: Group) {
+        let Special { photon, shared, .. } = special;
+        let code = self.codes.codes()[photon];
+        let is_settled = special.is_only
+            && match (shared & SPAD_MARKS != 0, shared & !SPAD_MARKS != 0) {
+                (false, _) => self.settle_bin(pixel, photon, code),
+                (true, false) => self.settle_partner(pixel, photon, code),
+                (true, true) => false,
+            };
+        if is_settled {
             return;
-        };
-        let only = |photon| self.tables.before(photon).is_none();
-        if let Some(first) = self.tables.before(last).filter(|&photon| only(photon)) {
-            let photons = [first, last].map(|photon| (photon, self.codes.codes()[photon]));
-            if self.settle_two(pixel, photons) {
-                return;
-            }
         }
-        self.settle_all(pixel, last, laser_cycle);
+        if let Some(last) = self.tables.take_last(code.cycle()) {
+            self.settle_all(pixel, last, group.first_cycle() + code.cycle() as u32);
+        }
     }
 
-    /// Settles two photons that are alone in their cycle, if what was before them does not matter, as it mostly is.
-    /// Returns whether it did.
-    #[inline]
-    fn settle_two(&mut self, pixel: &mut Pixel<'_>, photons: [(usize, Code); 2]) -> bool {
-        let [a, b] = photons.map(|(_, code)| code);
-        if a.is_doubtful() || b.is_doubtful() {
-            return false;
+    /// Settles a photon that shares its bin with one of another SPAD. Returns whether it did: always.
+    fn settle_bin(&mut self, pixel: &mut Pixel<'_>, photon: usize, code: Code) -> bool {
+        let row = code.row();
+        if pixel.hits.len() <= MARKED_BINS
+            || self
+                .find_before(photon, |other| other.row() == row)
+                .is_some()
+        {
+            self.tables.remove(row);
+            self.tables.remove(row);
+            self.fire(pixel, row, 2);
         }
-        let fired = match a.spad() == b.spad() {
-            true => self.pair(pixel, photons),
-            false => Some([1; 2]),
-        };
-        let Some(fired) = fired else {
+        true
+    }
+
+    /// Settles a photon that shares its SPAD with one of another bin, if what was before them does not matter, as it
+    /// mostly does not. Returns whether it did.
+    fn settle_partner(&mut self, pixel: &mut Pixel<'_>, photon: usize, code: Code) -> bool {
+        let Some(partner) = self.find_before(photon, |other| other.spad() == code.spad()) else {
+            debug_assert!(false, "a photon that shares its SPAD has a partner");
             return false;
         };
-        if a.row() == b.row() {
-            self.tables.remove(a.row());
-            self.tables.remove(a.row());
-            self.fire(pixel, a.row(), fired[0] + fired[1]);
-            return true;
-        }
-        for (code, fired) in [a, b].into_iter().zip(fired) {
+        let photons = [partner, (photon, code)];
+        let Some(fired) = self.pair(pixel, photons) else {
+            return false;
+        };
+        for ((_, code), fired) in photons.into_iter().zip(fired) {
             if fired == 0 {
                 self.tables.remove(code.row());
             }
         }
         true
+    }
+
+    /// The last photon of the same cycle before this one that is like that.
+    fn find_before(&self, photon: usize, is_like: impl Fn(Code) -> bool) -> Option<(usize, Code)> {
+        let before = std::iter::successors(self.tables.before(photon), |&photon| {
+            self.tables.before(photon)
+        });
+        before
+            .map(|photon| (photon, self.codes.codes()[photon]))
+            .find(|&(_, code)| is_like(code))
     }
 
     /// Settles the `last` photon of a cycle and those before it.
