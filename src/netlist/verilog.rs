@@ -33,12 +33,13 @@ use crate::logic::Logic;
 
 const TIMESCALE: &str = "`timescale 1fs/1fs\n";
 
-/// Lets every change of `value` arrive after its delay. One that overtakes others cancels them.
+/// Lets every change of `value` arrive after its delay. One that overtakes others cancels them. The queue's last place
+/// has a variable, as an index that is a difference need not wrap at 8 bits.
 const TRANSPORT_PATH: &str = "
 module TRANSPORT_PATH(output reg out, input value, input [31:0] rise, input [31:0] fall);
   reg [63:0] due [0:255];
   reg to [0:255];
-  reg [7:0] head, tail;
+  reg [7:0] head, tail, newest;
   reg [63:0] at;
   reg last;
   initial begin
@@ -55,9 +56,13 @@ module TRANSPORT_PATH(output reg out, input value, input [31:0] rise, input [31:
   end
   always @(value) begin
     at = $time + (value === 1'b1 ? rise : value === 1'b0 ? fall : rise < fall ? rise : fall);
-    while (head != tail && due[tail - 8'd1] >= at) tail = tail - 8'd1;
+    newest = tail - 8'd1;
+    while (head != tail && due[newest] >= at) begin
+      tail = newest;
+      newest = tail - 8'd1;
+    end
     last = out;
-    if (head != tail) last = to[tail - 8'd1];
+    if (head != tail) last = to[newest];
     if (value !== last) begin
       due[tail] = at;
       to[tail] = value;
