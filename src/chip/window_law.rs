@@ -278,10 +278,18 @@ impl WindowLaw {
     /// Photon times that `bin` of `window` collects in laser cycle `cycle`, half open, from the exposure's
     /// first STOP edge.
     pub fn bin_interval(&self, window: &OpenWindow, cycle: i64, bin: i64) -> Range<Time> {
-        let one = Time::from_fs(1);
         let edge = cycle * self.exposure.stop_periods as i64 + window.first_edge + bin;
-        let taken_until = |edge| self.exposure.rising(edge) - self.timing.spad_to_toggle + one;
-        taken_until(edge - 1)..taken_until(edge)
+        self.taken_until(edge - 1)..self.taken_until(edge)
+    }
+
+    /// Until when a rising CLK edge takes pulses.
+    fn taken_until(&self, edge: i64) -> Time {
+        self.exposure.rising(edge) - self.timing.spad_to_toggle + Time::from_fs(1)
+    }
+
+    /// How long before the exposure's first STOP edge the pulses begin that are taken together with one at that edge.
+    pub fn lead(&self) -> Time {
+        Time::ZERO - self.taken_until(self.edge_of(Time::ZERO) - 1)
     }
 
     /// Photon times that the whole window collects, relative to its laser cycle's STOP edge.

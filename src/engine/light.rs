@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{Engine, EngineError};
-use crate::chip::{Exposure, SensorConfig};
+use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::photon::{
     DeadTimeLaw, PhotonStream, PixelLight, PixelPhotons, SpadEvent, SpadModel, StreamConfig,
 };
@@ -80,7 +80,8 @@ impl Sum for Work {
     }
 }
 
-/// The stream of light for a sensor in an exposure. `pulse_sigma` is that of the laser pulse with all jitter.
+/// The stream of light for a sensor in an exposure, with its slots where the sensor's bins are. `pulse_sigma` is that of
+/// the laser pulse with all jitter.
 pub fn stream_config(
     config: &SensorConfig,
     exposure: &Exposure,
@@ -92,6 +93,7 @@ pub fn stream_config(
         clock: exposure.clock,
         stop_periods: exposure.stop_periods,
         laser_cycles: exposure.laser_cycles,
+        lead: WindowLaw::new(config, exposure).lead(),
         pulse_sigma,
         pulse_shape: None,
         spads: SpadModel {

@@ -15,6 +15,7 @@ mod stream;
 pub use budget::{Convention, PhotonBudget, Spot};
 pub use gaussian::{PulseEdge, pulse_share};
 pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
+pub use philox::LANES;
 pub use pulse::{PulseError, PulseShape};
 pub use quantile::{NormalSampler, RANKS};
 pub use random::{Poisson, Purpose, normal, philox_key, random_stream};
@@ -23,5 +24,5 @@ pub use spad::{
 };
 pub use stream::{
     Draw, GROUP, Group, PER_BLOCK, PLACE_BITS, PhotonStream, PixelLight, PixelPhotons, PixelStream,
-    Place, Run, Slots, StreamConfig, TIME_BITS, signal_rank,
+    Place, Run, Slots, Span, StreamConfig, TIME_BITS, signal_rank,
 };

@@ -21,8 +21,6 @@ pub struct Blocks {
     /// Longer than needed, so that runs are written [`LANES`] at a time.
     first: Vec<u32>,
     second: Vec<u32>,
-    /// Room for words before they are narrowed.
-    wide: [Vec<u64>; 4],
     words: [Vec<u32>; 4],
 }
 
@@ -70,20 +68,17 @@ impl Blocks {
     pub fn generate(&mut self, key: [u32; 2], third: u32, fourth: u32) {
         let filled_up = self.filled_up();
         let room = self.first.len();
-        for (wide, words) in self.wide.iter_mut().zip(&mut self.words) {
-            wide.resize(room, 0);
+        for words in &mut self.words {
             words.resize(room, 0);
         }
+        let words = self.words.each_mut().map(|words| &mut words[..filled_up]);
         generate(
             key,
             [third, fourth],
             &self.first[..filled_up],
             &self.second[..filled_up],
-            self.wide.each_mut().map(|wide| &mut wide[..filled_up]),
+            words,
         );
-        for (words, wide) in self.words.iter_mut().zip(&self.wide) {
-            narrow(&mut words[..filled_up], &wide[..filled_up]);
-        }
     }
 
     /// The four words of every block, a row for each; and of others that fill the rows up to a multiple of [`LANES`].
@@ -104,18 +99,14 @@ impl Blocks {
 pub fn blocks_from(first: u32, others: [u32; 3], key: [u32; 2]) -> [[u32; 2 * LANES]; 4] {
     let [second, third, fourth] = others;
     let firsts: [u32; 2 * LANES] = std::array::from_fn(|block| first.wrapping_add(block as u32));
-    let mut wide = [[0; 2 * LANES]; 4];
+    let mut words = [[0; 2 * LANES]; 4];
     generate(
         key,
         [third, fourth],
         &firsts,
         &[second; 2 * LANES],
-        wide.each_mut().map(|wide| &mut wide[..]),
+        words.each_mut().map(|words| &mut words[..]),
     );
-    let mut words = [[0; 2 * LANES]; 4];
-    for (words, wide) in words.iter_mut().zip(&wide) {
-        narrow(words, wide);
-    }
     words
 }
 
@@ -126,7 +117,7 @@ fn generate(
     [third, fourth]: [u32; 2],
     first: &[u32],
     second: &[u32],
-    words: [&mut [u64]; 4],
+    words: [&mut [u32]; 4],
 ) {
     let mut keys = [[0; 2]; ROUNDS];
     for round in &mut keys {
@@ -155,18 +146,9 @@ fn generate(
                 c3[lane] = product0;
             }
         }
-        *out0 = c0;
-        *out1 = c1;
-        *out2 = c2;
-        *out3 = c3;
-    }
-}
-
-/// The low halves of `wide`. On its own, as compilers make vectors of it only then.
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
-fn narrow(words: &mut [u32], wide: &[u64]) {
-    for (word, &wide) in words.iter_mut().zip(wide) {
-        *word = wide as u32;
+        for (out, c) in [out0, out1, out2, out3].into_iter().zip([c0, c1, c2, c3]) {
+            *out = c.map(|word| word as u32);
+        }
     }
 }
 

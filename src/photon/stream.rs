@@ -18,6 +18,9 @@
 //!     …          │        │        │        │             signal:     one key per (macropixel, group)
 //! ```
 //!
+//! The photons of a cycle may begin a little before it ([`StreamConfig::lead`]), and then end as much before the next one;
+//! none comes before the exposure.
+//!
 //! The photons under one key are a pure function of (seed, macropixel, slot, group): their Poisson number is drawn
 //! first, then each takes 32 random bits for its cycle, SPAD and time (a signal photon 64, and 128 more for a measured
 //! pulse). So any part can be drawn on any thread in any order, and all see the same light. Only dead time,
@@ -62,6 +65,15 @@ const _: () = assert!(PLACE_BITS + NORMAL_BITS <= u64::BITS);
 /// Second counter word of the number of signal photons; slots are below it.
 const SIGNAL_RUN: u32 = u32::MAX;
 
+/// A part of every laser cycle.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Span {
+    /// Whose background photons belong to it.
+    pub slots: Range<u32>,
+    /// When signal photons belong to it, fs after the start of the cycle: mostly as long as the slots last.
+    pub within_fs: Range<i64>,
+}
+
 /// What all macropixels of an exposure share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StreamConfig {
@@ -73,6 +85,9 @@ pub struct StreamConfig {
     pub stop_periods: u32,
     /// Laser cycles of the exposure.
     pub laser_cycles: u32,
+    /// How much before their laser cycle the photons of a cycle begin, at least 0 and less than a CLK period. Where it
+    /// puts slots on a chip's bins, those are counted fastest.
+    pub lead: Time,
     /// Standard deviation of a signal photon's time: a Gaussian laser pulse and all jitter.
     pub pulse_sigma: Time,
     /// A measured laser pulse, whose times add to those of the Gaussian; its time 0 comes at the echo's arrival.
@@ -142,7 +157,7 @@ impl PhotonStream {
         PhotonStream {
             key: philox_key(config.seed),
             cycle_fs: config.clock.whole_fs(i64::from(config.stop_periods)),
-            slots: Slots::new(config.clock, config.stop_periods),
+            slots: Slots::new(config.clock, config.stop_periods, config.lead),
             gaussian: NormalSampler::new(config.pulse_sigma.as_fs() as f64),
             shape: config.pulse_shape.as_ref().map(PulseSampler::measured),
             config: config.clone(),
@@ -154,7 +169,7 @@ impl PhotonStream {
         &self.config
     }
 
-    /// The whole femtoseconds of a laser cycle: photons come before that.
+    /// The whole femtoseconds of a laser cycle.
     pub fn cycle_fs(&self) -> i64 {
         self.cycle_fs
     }
@@ -164,13 +179,21 @@ impl PhotonStream {
         self.slots
     }
 
-    /// From when until when these slots last, fs after the start of their cycle.
-    pub fn span_fs(&self, slots: &Range<u32>) -> Range<i64> {
+    /// When the photons of a cycle begin and end, fs after its start.
+    pub fn ends_fs(&self) -> Range<i64> {
+        -self.slots.lead_fs()..self.cycle_fs - self.slots.lead_fs()
+    }
+
+    /// What these slots are.
+    pub fn span(&self, slots: Range<u32>) -> Span {
         let until_fs = match slots.end == self.slots.count() {
-            true => self.cycle_fs,
+            true => self.ends_fs().end,
             false => self.slots.start_fs(slots.end),
         };
-        self.slots.start_fs(slots.start)..until_fs
+        Span {
+            within_fs: self.slots.start_fs(slots.start)..until_fs,
+            slots,
+        }
     }
 
     /// Groups of the exposure; the last one may outlast it.
@@ -210,14 +233,15 @@ impl PhotonStream {
         let mut events = Vec::with_capacity(room as usize);
         let mut draw = Draw::default();
         let mut by_cycle = ByCycle::default();
+        let all = self.span(0..self.slots.count());
         for group in self.groups() {
-            stream.draw(group, 0..self.slots.count(), &mut draw);
+            stream.draw(group, &all, &mut draw);
             by_cycle.sort(&draw, &stream);
             for cycle in 0..group.cycles_in(self.config.laser_cycles) {
                 let start = self.config.cycle_start(group.first_cycle() + cycle);
                 events.extend(by_cycle.of(cycle).iter().map(|&photon| SpadEvent {
-                    time: start + Time::from_fs((photon >> SPAD_BITS) as i64),
-                    spad: (photon & (SPADS as u64 - 1)) as u8,
+                    time: start + Time::from_fs(photon >> SPAD_BITS),
+                    spad: (photon & (SPADS as i64 - 1)) as u8,
                 }));
             }
         }
@@ -315,13 +339,13 @@ impl PixelStream<'_> {
         spads.detect(self.stream.key, self.pixel, events)
     }
 
-    /// Draws all photons of `group` in these slots.
-    pub fn draw(&self, group: Group, slots: Range<u32>, draw: &mut Draw) {
+    /// Draws all photons of `group` in a part of its cycles.
+    pub fn draw(&self, group: Group, span: &Span, draw: &mut Draw) {
         let key = self.stream.key;
         let numbered = |purpose: Purpose| purpose as u32 | group.number() << 8;
         draw.begin(group);
 
-        draw.within_fs = self.stream.span_fs(&slots);
+        draw.within_fs = span.within_fs.clone();
         let (background, parts) = self.background.of(group);
         let (signal, signal_parts) = self.signal.of(group);
         let has_echo = !signal.is_zero()
@@ -333,7 +357,7 @@ impl PixelStream<'_> {
         }
         let words = background.words() * parts;
         if !background.is_zero() {
-            for slot in slots.clone() {
+            for slot in span.slots.clone() {
                 draw.counts.push_run(slot, words.div_ceil(2));
             }
         }
@@ -348,7 +372,7 @@ impl PixelStream<'_> {
                 .generate(key, self.pixel, numbered(Purpose::Signal));
         }
         if !background.is_zero() {
-            for slot in slots {
+            for slot in span.slots.clone() {
                 let photons = counts.next(background, parts);
                 draw.push_run(slot, photons);
             }
@@ -363,13 +387,13 @@ impl PixelStream<'_> {
         self.stream.slots
     }
 
-    /// Place of a photon of the echo in `draw`, and its time after the start of its cycle, fs.
+    /// Place of an echo's photon of this number in `draw` ([`Draw::half_an_echo`]), and its time after the start of its cycle, fs.
     #[inline]
-    pub fn signal_photon(&self, draw: &Draw, photon: usize) -> (Place, i64) {
-        let word = draw.echo_word(photon);
+    pub fn signal_photon(&self, draw: &Draw, number: usize) -> (Place, i64) {
+        let word = draw.echo_word(number);
         let mut after_fs = self.stream.gaussian.draw(word);
         if let Some(shape) = &self.stream.shape {
-            after_fs += shape.draw(draw.echo_words(photon));
+            after_fs += shape.draw(draw.echo_words(number));
         }
         let place = draw.group.place((word >> 32) as u32);
         (place, self.arrival_fs + nearest(after_fs))

@@ -93,6 +93,7 @@ mod tests {
             clock: Frequency::from_hz(100_000_000),
             stop_periods: 100,
             laser_cycles: 1,
+            lead: Time::ZERO,
             pulse_sigma: Time::from_ns(2),
             pulse_shape: None,
             spads: SpadModel::with_dead_time(Time::from_ns(30)),

@@ -1,7 +1,8 @@
 //! From random words to histogram bins, many photons at a time.
 //!
-//! A photon's place in the window is a number of CLK periods with 24 binary places, which decides its bin unless
-//! it comes within a few femtoseconds of an edge; such photons are marked and settled exactly, one by one.
+//! A background photon's bin is that of its slot. A single photon's place in the window is a number of CLK periods with
+//! 24 binary places. Either decides, unless the photon comes within a few femtoseconds of an edge; such photons are
+//! marked and settled exactly, one by one.
 //! Bins have a row before them for photons that matter only as blinders, and one after them for those that do not
 //! matter at all.
 //!
@@ -25,8 +26,8 @@ const FRACTION: u32 = (1 << FRACTION_BITS) - 1;
 /// Whole CLK periods added to positions, so that all that matter are above 0.
 const BIAS: u32 = 32;
 
-/// Adding it to a number below 2³² leaves its nearest integer in the low half.
-const INTEGER: f64 = (1u64 << 52) as f64;
+/// Slots that begin no farther from bins are bins, fs: three times are rounded to whole ones.
+const ALIGNED_FS: i64 = 2;
 
 const DOUBTFUL: u32 = 1 << 8;
 const PLACE_SHIFT: u32 = 16;
@@ -58,11 +59,9 @@ impl Code {
     /// Of a photon at `place`, in one of `bins` bins, and its mark.
     #[inline(always)]
     pub fn new(place: u32, row: u32, is_doubtful: bool, bins: u32) -> (Code, u32) {
-        let is_in_bin = row.wrapping_sub(1) < bins;
-        let bin_mark = u32::from(is_in_bin) << (SPADS as u32 + row % MARKED_BINS as u32);
         let doubtful = u32::from(is_doubtful) << DOUBTFUL.trailing_zeros();
         let code = place << PLACE_SHIFT | doubtful | row;
-        (Code(code), bin_mark | 1 << (place % SPADS as u32))
+        (Code(code), spad_mark(place) | bin_mark(row, bins))
     }
 
     /// Cycle within the group.
@@ -90,6 +89,17 @@ impl Code {
     }
 }
 
+#[inline(always)]
+fn spad_mark(place: u32) -> u32 {
+    1 << (place % SPADS as u32)
+}
+
+#[inline(always)]
+fn bin_mark(row: u32, bins: u32) -> u32 {
+    let is_in_bin = row.wrapping_sub(1) < bins;
+    u32::from(is_in_bin) << (SPADS as u32 + row % MARKED_BINS as u32)
+}
+
 /// The codes of photons, and what to look for in a cycle's other photons: a bit for the SPAD and one for the bin. More
 /// than 16 bins share bits.
 #[derive(Debug, Default)]
@@ -98,6 +108,13 @@ pub struct Codes {
     /// Longer than needed, so that what was there before need not be cleared.
     codes: Vec<Code>,
     marks: Vec<u32>,
+}
+
+/// Room for what is found out on the way.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    slot_codes: Vec<Code>,
+    slot_marks: Vec<u32>,
     passed: Passed,
 }
 
@@ -141,6 +158,17 @@ impl Codes {
         marks.fill(0);
     }
 
+    /// Makes none of those from the `first` one on whose place is `end` or more.
+    fn drop_from(&mut self, first: usize, end: u32) {
+        let new = first..self.len;
+        let marks = &mut self.marks[new.clone()];
+        for (code, mark) in self.codes[new].iter_mut().zip(marks) {
+            let is_wanted = code.0 >> PLACE_SHIFT < end;
+            *code = if is_wanted { *code } else { Code::NONE };
+            *mark = if is_wanted { *mark } else { 0 };
+        }
+    }
+
     /// Room for more of them, to be written.
     fn append(&mut self, more: usize) -> (&mut [Code], &mut [u32]) {
         let first = self.len;
@@ -163,19 +191,15 @@ pub struct Wanted {
     pub later: u32,
     /// When bin 0 begins, counted from the start of their own cycle, fs.
     pub origin_fs: i64,
+    /// The slot that begins with bin 0. It need not exist.
+    pub origin_slot: i32,
 }
 
 impl Wanted {
-    /// The code and mark of a photon by the place of its window, or none.
+    /// The place of a photon's window.
     #[inline(always)]
-    pub fn code(&self, place: u32, code: impl Fn(u32) -> (Code, u32)) -> (Code, u32) {
-        let (own, mark) = code(place + (self.later << SPAD_BITS));
-        let is_wanted = place < self.cycles << SPAD_BITS;
-        if is_wanted {
-            (own, mark)
-        } else {
-            (Code::NONE, 0)
-        }
+    pub fn place(&self, place: u32) -> u32 {
+        place + (self.later << SPAD_BITS)
     }
 }
 
@@ -183,12 +207,13 @@ impl Wanted {
 #[derive(Debug, Clone, Copy)]
 pub struct Binning {
     bins: u32,
+    slots: Slots,
     /// CLK periods of a femtosecond.
     periods_per_fs: f64,
-    /// Binary places of a position in slots.
-    slot_bits: u32,
     /// Distance from an edge that leaves a position in doubt.
     doubt: u32,
+    /// Steps at the beginning and the end of a slot that an edge may come to.
+    doubtful_steps: u32,
 }
 
 impl Binning {
@@ -198,12 +223,29 @@ impl Binning {
         let one = f64::from(FRACTION + 1);
         // Slots start and photons come at whole femtoseconds; a little more is for the arithmetic.
         let doubt_fs = (ROUNDING_FS + 3) as f64;
+        let steps =
+            (doubt_fs + ALIGNED_FS as f64) * f64::from(1 << TIME_BITS) / slots.length_fs() as f64;
         Binning {
             bins: bins as u32,
+            slots,
             periods_per_fs,
-            slot_bits: FRACTION_BITS - slots.per_period_bits(),
             doubt: (doubt_fs * periods_per_fs * one).ceil() as u32 + 3,
+            doubtful_steps: (steps + 0.5).floor() as u32,
         }
+    }
+
+    /// The slot that begins at `origin_fs`, the start of bin 0; `None` if none does, so that bins are not slots.
+    pub fn slot_of(&self, origin_fs: i64) -> Option<i32> {
+        let length_fs = self.slots.length_s() * 1e15;
+        let slot = ((origin_fs + self.slots.lead_fs()) as f64 / length_fs).round();
+        let off_fs = (origin_fs + self.slots.lead_fs()) as f64 - slot * length_fs;
+        (off_fs.abs() <= ALIGNED_FS as f64).then_some(slot as i32)
+    }
+
+    /// The row of a slot.
+    pub fn row_of(&self, wanted: &Wanted, slot: u32) -> usize {
+        let k = self.slots.per_period_bits();
+        row_of(slot, wanted.origin_slot, k, self.bins) as usize
     }
 
     /// Appends the codes of a draw, those of its background photons (by rows, as [`Draw::words`] has them) before those
@@ -214,54 +256,63 @@ impl Binning {
         draw: &Draw,
         wanted: &Wanted,
         echo: Option<&EchoRows>,
+        scratch: &mut Scratch,
         codes: &mut Codes,
     ) {
+        let first = codes.len();
         let blocks = draw.slots().len();
         let shift = draw.group().place_shift();
         let (background, marks) = codes.append(PER_BLOCK * blocks);
         if blocks > 0 {
+            let Scratch {
+                slot_codes,
+                slot_marks,
+                ..
+            } = scratch;
+            slot_codes.resize(blocks, Code::NONE);
+            slot_marks.resize(blocks, 0);
+            encode_slots(self, wanted, draw.slots(), (slot_codes, slot_marks));
             let rows = background.chunks_exact_mut(blocks);
             let rows = rows.zip(marks.chunks_exact_mut(blocks));
-            for (words, row) in draw.words().into_iter().zip(rows) {
-                encode(self, wanted, shift, (words, draw.slots()), row);
+            for (words, (codes, marks)) in draw.words().into_iter().zip(rows) {
+                encode(shift, words, (slot_codes, slot_marks), (codes, marks));
+                if self.doubtful_steps > 0 {
+                    doubt(self.doubtful_steps, words, codes);
+                }
             }
         }
-        // What the last blocks of runs and of all have too much. Written always: no branch to mispredict.
-        let mut keep_if = |is_photon: bool, at: usize| {
-            background[at] = if is_photon {
-                background[at]
-            } else {
-                Code::NONE
-            };
-            marks[at] = if is_photon { marks[at] } else { 0 };
-        };
         for run in draw.runs().iter().filter(|run| run.photons > 0) {
-            let (block, words) = run.last_block();
-            for row in 1..PER_BLOCK {
-                keep_if(row < words, row * blocks + block);
-            }
+            keep_words(blocks, run.last_block(), background, marks);
         }
         for row in 0..PER_BLOCK {
-            for block in draw.blocks()..blocks {
-                keep_if(false, row * blocks + block);
-            }
+            let filler = row * blocks + draw.blocks()..(row + 1) * blocks;
+            background[filler.clone()].fill(Code::NONE);
+            marks[filler].fill(0);
         }
         match echo {
             Some(rows) => {
-                let mut passed = std::mem::take(&mut codes.passed);
-                for words in draw.echo() {
-                    let out = codes.append(words[0].len());
-                    rows.encode(wanted, shift, words, &mut passed, out);
+                for (words, photons) in draw.echo().into_iter().zip(draw.echo_photons()) {
+                    let (out, marks) = codes.append(words[0].len());
+                    let passed = &mut scratch.passed;
+                    rows.encode(wanted, shift, words, passed, (&mut *out, &mut *marks));
+                    out[photons..].fill(Code::NONE);
+                    marks[photons..].fill(0);
                 }
-                codes.passed = passed;
             }
             None => {
-                for photon in 0..draw.echo_photons() {
-                    let (place, time_fs) = light.signal_photon(draw, photon);
-                    let is_drawn = draw.within_fs().contains(&time_fs);
-                    self.push(wanted, is_drawn.then_some((place, time_fs)), codes);
+                let half = draw.half_an_echo();
+                for (first, photons) in [0, half].into_iter().zip(draw.echo_photons()) {
+                    for number in first..first + half {
+                        let photon = (number < first + photons)
+                            .then(|| light.signal_photon(draw, number))
+                            .filter(|(_, time_fs)| draw.within_fs().contains(time_fs));
+                        self.push(wanted, photon, codes);
+                    }
                 }
             }
+        }
+        if wanted.cycles < draw.group().cycles() {
+            codes.drop_from(first, wanted.place(wanted.cycles << SPAD_BITS));
         }
     }
 
@@ -270,8 +321,8 @@ impl Binning {
         let (code, mark) = codes.append(1);
         (code[0], mark[0]) = match photon {
             Some((place, time_fs)) => {
-                let position = self.position(time_fs - wanted.origin_fs);
-                wanted.code(u32::from(place), |place| self.code(position, place))
+                let place = wanted.place(u32::from(place));
+                self.code(time_fs - wanted.origin_fs, place)
             }
             None => (Code::NONE, 0),
         };
@@ -279,61 +330,88 @@ impl Binning {
 
     /// The code of one photon at `time_fs`.
     #[inline]
-    pub fn encode_one(&self, time_fs: i64, place: Place) -> Code {
-        self.code(self.position(time_fs), u32::from(place)).0
+    pub fn encode_one(&self, time_fs: i64) -> Code {
+        self.code(time_fs, 0).0
     }
 
-    #[inline(always)]
-    fn position(&self, time_fs: i64) -> u32 {
+    #[inline]
+    fn code(&self, time_fs: i64, place: u32) -> (Code, u32) {
         let periods = time_fs as f64 * self.periods_per_fs;
         // Far outside, a position between two edges will do.
-        let (first, last) = (-1.5, f64::from(self.bins) + 1.5);
-        let periods = if periods > first { periods } else { first };
-        let periods = if periods < last { periods } else { last };
-        ((periods + f64::from(BIAS)) * f64::from(FRACTION + 1) + INTEGER).to_bits() as u32
-    }
-
-    #[inline(always)]
-    fn code(&self, position: u32, place: u32) -> (Code, u32) {
+        let periods = periods.clamp(-1.5, f64::from(self.bins) + 1.5);
+        let position = ((periods + f64::from(BIAS)) * f64::from(FRACTION + 1)).round() as u32;
         let is_doubtful = position.wrapping_add(self.doubt) & FRACTION < 2 * self.doubt;
         let row = (position >> FRACTION_BITS).clamp(BIAS - 1, BIAS + self.bins) - (BIAS - 1);
         Code::new(place, row, is_doubtful, self.bins)
     }
+}
 
-    /// What turns slots into positions: the first and the last slot to tell apart, and what is added.
-    fn slot_positions(&self, origin_fs: i64) -> (u32, u32, u32) {
-        let one = f64::from(FRACTION + 1);
-        let origin = origin_fs as f64 * self.periods_per_fs;
-        let per_period = f64::from(1u32 << (FRACTION_BITS - self.slot_bits));
-        // Far outside, a slot between two edges will do.
-        let slot = |periods: f64| (periods.floor() * per_period).max(0.0) as u32;
-        let (first, last) = (
-            slot(origin - 16.0),
-            slot(origin + f64::from(self.bins) + 2.0),
-        );
-        let half_step = f64::from(1u32 << self.slot_bits) / f64::from(2u32 << TIME_BITS);
-        let added = (f64::from(BIAS) - origin) * one + half_step;
-        (first, last, added.round() as i64 as u32)
+/// Makes none of what the last block of a run has too much, by rows of `blocks`. Something is written for every word but
+/// the first, perhaps the last one again: no branch to mispredict.
+#[inline]
+fn keep_words(
+    blocks: usize,
+    (block, words): (usize, usize),
+    codes: &mut [Code],
+    marks: &mut [u32],
+) {
+    let last = (PER_BLOCK - 1) * blocks + block;
+    let (code, mark) = match words < PER_BLOCK {
+        true => (Code::NONE, 0),
+        false => (codes[last], marks[last]),
+    };
+    (codes[last], marks[last]) = (code, mark);
+    for row in 1..PER_BLOCK - 1 {
+        let at = if row < words {
+            last
+        } else {
+            row * blocks + block
+        };
+        (codes[at], marks[at]) = (code, mark);
+    }
+}
+
+/// The row of a slot, 2ᵏ to a bin.
+#[inline(always)]
+fn row_of(slot: u32, origin_slot: i32, k: u32, bins: u32) -> u32 {
+    (((slot as i32 - origin_slot) >> k) + 1).clamp(0, bins as i32 + 1) as u32
+}
+
+/// The codes and marks of a photon in each slot, but for its place.
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+fn encode_slots(binning: &Binning, wanted: &Wanted, slots: &[u32], out: (&mut [Code], &mut [u32])) {
+    let (bins, k) = (binning.bins, binning.slots.per_period_bits());
+    let (origin_slot, later) = (wanted.origin_slot, wanted.place(0));
+    for ((&slot, code), mark) in slots.iter().zip(out.0).zip(out.1) {
+        let row = row_of(slot, origin_slot, k, bins);
+        *code = Code(later << PLACE_SHIFT | row);
+        *mark = bin_mark(row, bins);
     }
 }
 
 #[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
 fn encode(
-    binning: &Binning,
-    wanted: &Wanted,
     place_shift: u32,
-    (words, slots): (&[u32], &[u32]),
+    words: &[u32],
+    (slot_codes, slot_marks): (&[Code], &[u32]),
     (codes, marks): (&mut [Code], &mut [u32]),
 ) {
-    let (binning, wanted) = (*binning, *wanted);
-    let (first, last, added) = binning.slot_positions(wanted.origin_fs);
-    let out = codes.iter_mut().zip(marks);
-    for ((&word, &slot), (code, mark)) in words.iter().zip(slots).zip(out) {
-        let in_slot = word << (u32::BITS - TIME_BITS) >> (u32::BITS - binning.slot_bits);
-        let slot = slot.max(first).min(last) << binning.slot_bits;
-        let position = slot.wrapping_add(added).wrapping_add(in_slot);
-        let own = |place| binning.code(position, place);
-        (*code, *mark) = wanted.code(word >> place_shift, own);
+    let slots = slot_codes.iter().zip(slot_marks);
+    for (((&word, (in_slot, in_bin)), code), mark) in words.iter().zip(slots).zip(codes).zip(marks)
+    {
+        let place = word >> place_shift;
+        // The cycle may carry.
+        *code = Code((place << PLACE_SHIFT) + in_slot.0);
+        *mark = spad_mark(place) | in_bin;
+    }
+}
+
+/// Marks photons that come in the first or last steps of their slot.
+fn doubt(steps: u32, words: &[u32], codes: &mut [Code]) {
+    for (&word, code) in words.iter().zip(codes) {
+        let step = word % (1 << TIME_BITS);
+        let is_doubtful = (step + steps) % (1 << TIME_BITS) < 2 * steps;
+        code.0 |= u32::from(is_doubtful) * DOUBTFUL;
     }
 }
 
@@ -344,16 +422,18 @@ mod tests {
     use crate::units::{Frequency, Time};
     use proptest::prelude::*;
 
-    fn dark() -> StreamConfig {
-        StreamConfig {
+    fn slots(clock: Frequency, lead: Time) -> Slots {
+        let config = StreamConfig {
             seed: 1,
-            clock: Frequency::from_hz(1),
-            stop_periods: 1,
+            clock,
+            stop_periods: 600,
             laser_cycles: 1,
+            lead,
             pulse_sigma: Time::ZERO,
             pulse_shape: None,
             spads: SpadModel::default(),
-        }
+        };
+        PhotonStream::new(&config).slots()
     }
 
     proptest! {
@@ -362,46 +442,48 @@ mod tests {
         fn codes_are_those_of_whole_numbers(
             bins in 1usize..=64,
             hz in prop_oneof![80_000u64..2_000_000, 2_000_000u64..2_000_000_000],
+            lead in 0f64..1.0,
             slot: u32,
-            near in 0i64..65,
-            off in -30i64..30,
-            start in -2f64..70.0,
-            word: u32,
+            start in -2i64..70,
+            off in -1i64..=0,
+            steps in prop_oneof![0u32..4, (1u32 << TIME_BITS) - 4..1 << TIME_BITS, any::<u32>()],
+            place: u32,
             cycles in 1u32..=GROUP,
             later in 0u32..2,
-            aimed: bool,
         ) {
             let clock = Frequency::from_hz(hz);
-            let config = StreamConfig { clock, stop_periods: 600, ..dark() };
-            let slots = PhotonStream::new(&config).slots();
+            let period_fs = 1e15 / hz as f64;
+            let slots = slots(clock, Time::from_fs((lead * period_fs) as i64));
             let slot = slot % slots.count();
             let binning = Binning::new(bins, hz as f64, slots);
+            let word = place << TIME_BITS | steps;
             let time_fs = slots.time_fs(slot, word);
-            let period_fs = 1e15 / hz as f64;
-            // Half of the photons come close to an edge.
-            let origin_fs = match aimed {
-                true => time_fs - clock.periods(near).as_fs() - off,
-                false => time_fs - (start * period_fs) as i64,
-            };
+            // Bins begin where slots of the same CLK period do, but for rounding.
+            let in_period = slot % (1 << slots.per_period_bits());
+            let origin_fs = slots.start_fs(slot - in_period) - clock.periods(start).as_fs() - off;
+            let origin_slot = binning.slot_of(origin_fs).unwrap();
             let periods = (time_fs - origin_fs) as f64 / period_fs;
             let row = (periods.floor() + 1.0).clamp(0.0, bins as f64 + 1.0) as usize;
             let off_edge_fs = (periods - periods.round()).abs() * period_fs;
-            let wanted = Wanted { cycles, later, origin_fs };
+            let wanted = Wanted { cycles, later, origin_fs, origin_slot };
             let group = Group::of_cycle(GROUP);
-            let mut codes = [Code::NONE; 2];
-            let mut marks = [0; 2];
-            encode(&binning, &wanted, group.place_shift(), (&[word], &[slot]), (&mut codes[..1], &mut marks[..1]));
+            let mut codes = Codes::default();
+            let mut in_slot = (vec![Code::NONE], vec![0]);
+            encode_slots(&binning, &wanted, &[slot], (&mut in_slot.0, &mut in_slot.1));
+            let (out, marks) = codes.append(1);
+            encode(group.place_shift(), &[word], (&in_slot.0, &in_slot.1), (&mut out[..], marks));
+            doubt(binning.doubtful_steps, &[word], out);
             let place = group.place(word);
-            let mut one = Codes::default();
-            binning.push(&wanted, Some((place, time_fs)), &mut one);
-            (codes[1], marks[1]) = (one.codes()[0], one.marks()[0]);
+            binning.push(&wanted, Some((place, time_fs)), &mut codes);
+            codes.drop_from(0, wanted.place(cycles << SPAD_BITS));
             let place = u32::from(place);
             if place / 16 >= cycles {
-                prop_assert_eq!(codes, [Code::NONE; 2]);
+                prop_assert_eq!(codes.codes(), [Code::NONE; 2]);
+                prop_assert_eq!(codes.marks(), [0; 2]);
                 return Ok(());
             }
             let place = place + 16 * later;
-            for (code, mark) in codes.into_iter().zip(marks) {
+            for (code, mark) in codes.codes().iter().zip(codes.marks()) {
                 prop_assert_eq!(code.cycle() as u32, place / 16);
                 prop_assert_eq!(u32::from(code.spad()), place % 16);
                 prop_assert_eq!(mark & 0xFFFF, 1 << (place % 16));
@@ -409,13 +491,24 @@ mod tests {
                 prop_assert_eq!(mark >> 16, u32::from(is_in_bin) << (code.row() % 16));
                 if code.is_doubtful() {
                     let resolution_fs = period_fs / 2f64.powi(22);
-                    prop_assert!(off_edge_fs <= 10.0 + resolution_fs || !(1..=bins).contains(&row), "{off_edge_fs}");
+                    let is_part = slots.per_period_bits() > 0;
+                    prop_assert!(is_part || off_edge_fs <= 12.0 + resolution_fs || !(1..=bins).contains(&row), "{off_edge_fs}");
                 } else {
                     prop_assert_eq!(code.row(), row);
                     prop_assert!(off_edge_fs > ROUNDING_FS as f64 || row == 0 || row > bins);
                 }
             }
         }
+    }
+
+    #[test]
+    fn slots_elsewhere_are_no_bins() {
+        let clock = Frequency::from_hz(384_000_000);
+        let binning = Binning::new(16, 384e6, slots(clock, Time::from_ps(300)));
+        let begins_fs = |slot: i64| clock.periods(slot).as_fs() - 300_000;
+        assert_eq!(binning.slot_of(begins_fs(5)), Some(5));
+        assert_eq!(binning.slot_of(begins_fs(-7) + 1), Some(-7));
+        assert_eq!(binning.slot_of(begins_fs(5) + 20), None);
     }
 
     #[test]

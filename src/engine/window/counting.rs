@@ -15,15 +15,15 @@
 //!
 //! [`SpadModel::detect`]: crate::photon::SpadModel::detect
 
-use std::ops::Range;
-
-use super::binning::{Binning, Code, Codes, ROWS, Wanted};
+use super::binning::{Binning, Code, Codes, ROWS, Scratch, Wanted};
 use super::echo::EchoRows;
 use super::history::{Photon, certain_from, split};
 use super::sight::{ROUNDING_FS, Sight};
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Tables};
 use super::{Window, Work, taken};
-use crate::photon::{Draw, Group, PER_BLOCK, PhotonStream, PixelStream, Place, SPADS, SpadEvent};
+use crate::photon::{
+    Draw, Group, PER_BLOCK, PhotonStream, PixelStream, Place, SPADS, SpadEvent, Span,
+};
 use crate::units::Time;
 
 mod settling;
@@ -46,6 +46,7 @@ pub struct Counting<'a> {
     extra: Draw,
     /// Codes of all photons drawn for the group. Photons are known by their index here.
     codes: Codes,
+    scratch: Scratch,
     /// Where the codes of `previous` and `carried` begin.
     first_code: [usize; 2],
     tables: Tables,
@@ -86,6 +87,7 @@ impl<'a> Counting<'a> {
             carried: Vec::new(),
             extra: Draw::default(),
             codes: Codes::default(),
+            scratch: Scratch::default(),
             first_code: [0; 2],
             tables: Tables::default(),
             together: Vec::new(),
@@ -99,15 +101,18 @@ impl<'a> Counting<'a> {
     /// Hits of every bin of a macropixel, and what they took.
     pub fn expose(&mut self, sight: &Sight, light: &PixelStream<'_>) -> (Vec<i64>, Work) {
         let origins_fs = [sight.first_fs, sight.first_fs + self.stream.cycle_fs()];
+        let origin_slots = origins_fs.map(|origin_fs| self.binning.slot_of(origin_fs));
+        let has_slots_for_bins = origin_slots.iter().all(Option::is_some);
         let wanted = [0, 1].map(|later| Wanted {
             cycles: 0,
             later,
             origin_fs: origins_fs[later as usize],
+            origin_slot: origin_slots[later as usize].unwrap_or(0),
         });
-        let echo = |slots: &Range<u32>, origin_fs| {
+        let echo = |span: &Span, origin_fs| {
             let (bins, clk_hz) = (self.engine.config.bins, self.engine.exposure.clock.as_hz());
-            let within_fs = self.stream.span_fs(slots);
-            (!slots.is_empty())
+            let within_fs = span.within_fs.clone();
+            (!within_fs.is_empty())
                 .then(|| EchoRows::new(light, bins, 1e15 / clk_hz, origin_fs, within_fs))
                 .flatten()
         };
@@ -126,18 +131,20 @@ impl<'a> Counting<'a> {
         self.tables.clear_counts();
         for group in self.stream.groups() {
             let cycles = group.cycles_in(self.stream.config().laser_cycles);
-            light.draw(group, sight.own.clone(), &mut self.own);
-            light.draw(group, sight.previous.clone(), &mut self.previous);
+            light.draw(group, &sight.own, &mut self.own);
+            light.draw(group, &sight.previous, &mut self.previous);
             pixel.work.photons_drawn += (self.own.len() + self.previous.len()) as u64;
-            if self.stream.config().spads.has_secondaries() {
-                self.count_sorted(&mut pixel, group, cycles);
-            } else {
+            // Photons that come before the exposure are left out there.
+            let is_first = group.first_cycle() == 0 && sight.sees_the_beginning();
+            if has_slots_for_bins && !is_first && !self.stream.config().spads.has_secondaries() {
                 self.encode(&mut pixel, cycles);
                 if self.codes.len() <= MOST_PHOTONS {
                     self.count_cells(&mut pixel, group);
                 } else {
                     self.count_sorted(&mut pixel, group, cycles);
                 }
+            } else {
+                self.count_sorted(&mut pixel, group, cycles);
             }
             self.carry(light, group);
         }
@@ -159,8 +166,9 @@ impl<'a> Counting<'a> {
         let draws = [&self.own, &self.previous];
         for (part, draw) in draws.into_iter().enumerate() {
             let (wanted, echo) = (&pixel.wanted[part], pixel.echo[part].as_ref());
+            let scratch = &mut self.scratch;
             self.binning
-                .encode(pixel.light, draw, wanted, echo, &mut self.codes);
+                .encode(pixel.light, draw, wanted, echo, scratch, &mut self.codes);
             self.first_code[part] = self.codes.len();
         }
         let wanted = Wanted {
@@ -188,7 +196,18 @@ impl<'a> Counting<'a> {
     }
 
     fn count_cells(&mut self, pixel: &mut Pixel<'_>, group: Group) {
-        self.tables.put(&self.codes, group.cycles() as usize);
+        let own = &pixel.wanted[0];
+        // Where all background photons of the cycles are wanted, their slots tell how many there are in each bin.
+        let mut counted = 0;
+        if own.cycles == group.cycles() {
+            counted = self.own.words()[0].len() * PER_BLOCK;
+            for run in self.own.runs() {
+                let row = self.binning.row_of(own, run.slot);
+                self.tables.add(row, run.photons);
+            }
+        }
+        self.tables
+            .put(&self.codes, group.cycles() as usize, counted);
         let mut index = 0;
         while let Some(special) = self.tables.special(index, &self.codes) {
             self.settle(pixel, special, group);
@@ -343,9 +362,7 @@ struct Placed<'w> {
 impl Placed<'_> {
     /// Bin + 1 of a time relative to the start of the laser cycle, if it is within the window.
     fn row_of(&self, time: Time) -> Option<usize> {
-        let code = self
-            .binning
-            .encode_one(time.as_fs() - self.sight.first_fs, 0);
+        let code = self.binning.encode_one(time.as_fs() - self.sight.first_fs);
         let bins = self.engine.config.bins;
         if !code.is_doubtful() {
             return Some(code.row()).filter(|row| (1..=bins).contains(row));

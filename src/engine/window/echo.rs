@@ -14,7 +14,7 @@ use multiversion::multiversion;
 
 use super::binning::{Code, Wanted};
 use super::sight::ROUNDING_FS;
-use crate::photon::{PixelStream, RANKS, signal_rank};
+use crate::photon::{LANES, PixelStream, RANKS, signal_rank};
 
 /// Edges of rows, as ranks: the first that may be, and the first that is for certain, at the edge or after it.
 #[derive(Debug, Clone)]
@@ -27,6 +27,9 @@ pub struct EchoRows {
     /// How many edges come before those: a photon is after them or in doubt.
     first_row: i16,
 }
+
+/// Photons that are compared at once: no loop has a rest.
+const TOGETHER: usize = 2 * LANES;
 
 /// Room for what is found out about photons.
 #[derive(Debug, Clone, Default)]
@@ -70,7 +73,7 @@ impl EchoRows {
         })
     }
 
-    /// Codes and marks of photons with these random words, low and high.
+    /// Codes and marks of photons with these random words, low and high, a multiple of [`LANES`].
     pub fn encode(
         &self,
         wanted: &Wanted,
@@ -79,11 +82,12 @@ impl EchoRows {
         passed: &mut Passed,
         (codes, marks): (&mut [Code], &mut [u32]),
     ) {
-        passed.ranks.resize(low.len(), 0);
+        let filled_up = low.len().next_multiple_of(TOGETHER);
+        passed.ranks.resize(filled_up, 0);
         passed.rows.clear();
-        passed.rows.resize(low.len(), self.first_row);
+        passed.rows.resize(filled_up, self.first_row);
         passed.possible.clear();
-        passed.possible.resize(low.len(), self.first_row);
+        passed.possible.resize(filled_up, self.first_row);
         compare(passed, &self.edges, [low, high]);
         encode(self, wanted, place_shift, high, passed, codes, marks);
     }
@@ -123,7 +127,7 @@ fn encode(
         let [over, surely_over] = until.map(after);
         let doubts = (possible - row) + (begun - surely_begun) + (over - surely_over);
         let own = |place| Code::new(place, row as u32, doubts != 0, bins);
-        let (own, own_mark) = wanted.code(high >> place_shift, own);
+        let (own, own_mark) = own(wanted.place(high >> place_shift));
         let is_drawn = begun > surely_over;
         *code = if is_drawn { own } else { Code::NONE };
         *mark = if is_drawn { own_mark } else { 0 };

@@ -61,7 +61,8 @@ impl<'a> Past<'a> {
             self.slot = self.stream.slots().count() - 1;
         }
         let group = Group::of_cycle(self.cycle);
-        pixel.draw(group, self.slot..self.slot + 1, draw);
+        let span = self.stream.span(self.slot..self.slot + 1);
+        pixel.draw(group, &span, draw);
         let start = self.stream.config().cycle_start(self.cycle);
         let wanted = self.cycle - group.first_cycle();
         draw.photons(pixel).filter_map(move |(place, time_fs)| {

@@ -8,13 +8,12 @@
 //!   drawn            ·      ·   ╰──────┴──────┴──────┴──────┴──────╯      ·      ·      ·      ·
 //! ```
 //!
-//! Windows of small start values begin in the cycle before, so that slots of two cycles are drawn.
-
-use std::ops::Range;
+//! Windows of small start values begin in the cycle before, so that slots of two cycles are drawn. Where slots are bins,
+//! the last of both end together but for the rounding of CLK edges: that much longer signal photons belong to it.
 
 use super::history::Past;
 use crate::chip::window_law::{OpenWindow, WindowLaw};
-use crate::photon::{GROUP, PhotonStream, PixelLight, SPADS};
+use crate::photon::{GROUP, PhotonStream, PixelLight, SPADS, Span};
 
 /// By how much times relative to a cycle differ from cycle to cycle, fs: STOP and CLK edges are rounded to whole
 /// femtoseconds, and so is the cycle before.
@@ -28,11 +27,11 @@ pub struct Sight {
     pub first_edge: i64,
     /// Where bin 0 begins.
     pub first_fs: i64,
-    /// Slots of the window's own cycle.
-    pub own: Range<u32>,
-    /// Slots of the cycle before.
-    pub previous: Range<u32>,
-    /// From when on every photon is in these slots.
+    /// What is drawn of the window's own cycle.
+    pub own: Span,
+    /// What is drawn of the cycle before.
+    pub previous: Span,
+    /// From when on every photon is in these.
     pub drawn_from_fs: i64,
 }
 
@@ -42,31 +41,29 @@ impl Sight {
     pub fn new(law: &WindowLaw, window: &OpenWindow, stream: &PhotonStream) -> Option<Self> {
         let interval = law.interval(window);
         let (first_fs, end_fs) = (interval.start.as_fs(), interval.end.as_fs());
-        let (cycle_fs, all) = (stream.cycle_fs(), stream.slots());
+        let (cycle_fs, all, ends) = (stream.cycle_fs(), stream.slots(), stream.ends_fs());
         let memory_fs = stream.config().spads.memory().as_fs();
         let from_fs = first_fs - memory_fs - ROUNDING_FS;
         let until_fs = end_fs + ROUNDING_FS;
-        if from_fs <= -cycle_fs || until_fs >= cycle_fs {
+        if from_fs <= ends.start - cycle_fs || until_fs >= ends.end {
             return None;
         }
-        let slots = |from_fs: i64, until_fs: i64| {
-            let last = all.at(until_fs - 1).min(all.count() - 1);
-            all.at(from_fs.max(0)).min(last)..last + 1
+        let span = |from_fs: i64, until_fs: i64| {
+            if until_fs <= ends.start || from_fs >= ends.end {
+                return Span::default();
+            }
+            let background_until_fs = (until_fs - all.margin_fs()).max(ends.start + 1);
+            let last = all.at(background_until_fs - 1).min(all.count() - 1);
+            let first = all.at(from_fs.max(ends.start)).min(last);
+            let mut span = stream.span(first..last + 1);
+            span.within_fs.end = span.within_fs.end.max(until_fs).min(ends.end);
+            span
         };
-        let own = if until_fs > 0 {
-            slots(from_fs, until_fs)
-        } else {
-            0..0
-        };
-        let previous = if from_fs < 0 {
-            slots(cycle_fs + from_fs, cycle_fs + until_fs.min(0))
-        } else {
-            0..0
-        };
-        let drawn_from_fs = if previous.is_empty() {
-            all.start_fs(own.start)
-        } else {
-            all.start_fs(previous.start) - cycle_fs
+        let own = span(from_fs, until_fs);
+        let previous = span(cycle_fs + from_fs, cycle_fs + until_fs);
+        let drawn_from_fs = match previous.slots.is_empty() {
+            true => own.within_fs.start,
+            false => previous.within_fs.start - cycle_fs,
         };
         Some(Sight {
             first_edge: window.first_edge,
@@ -77,12 +74,17 @@ impl Sight {
         })
     }
 
+    /// Whether the window of the first cycle that has photons may see one that comes before the exposure.
+    pub fn sees_the_beginning(&self) -> bool {
+        self.own.slots.contains(&0) || self.previous.slots.contains(&0)
+    }
+
     /// What came before the drawn slots of the window of `laser_cycle`.
     pub fn past<'a>(&self, stream: &'a PhotonStream, laser_cycle: u32) -> Past<'a> {
-        if self.previous.is_empty() {
-            Past::new(stream, laser_cycle, self.own.start)
+        if self.previous.slots.is_empty() {
+            Past::new(stream, laser_cycle, self.own.slots.start)
         } else if let Some(before) = laser_cycle.checked_sub(1) {
-            Past::new(stream, before, self.previous.start)
+            Past::new(stream, before, self.previous.slots.start)
         } else {
             Past::new(stream, 0, 0)
         }
@@ -107,7 +109,7 @@ impl Sight {
         let slot_s = stream.slots().length_s();
         let slot = light.background_hz * slot_s;
         let looked_back = uncertain * (wait_s / slot_s + 1.0) * slot * group;
-        let slots = (self.own.len() + self.previous.len()) as f64;
+        let slots = (self.own.slots.len() + self.previous.slots.len()) as f64;
         let seen = slot * slots + light.signal_per_cycle;
         seen + looked_back < light.photons_per_cycle(stream.config())
     }

@@ -74,13 +74,24 @@ impl Tables {
         parts.fold(0, u32::wrapping_add)
     }
 
-    /// Counts the photons of a group of `cycles` laser cycles, at most [`MOST_PHOTONS`], filled up to a multiple of
-    /// [`SIDE_BY_SIDE`].
-    pub fn put(&mut self, codes: &Codes, cycles: usize) {
+    /// More photons of a row.
+    pub fn add(&mut self, row: usize, photons: u32) {
+        let count = &mut self.counts[0][row];
+        *count = count.wrapping_add(photons);
+    }
+
+    /// Puts the photons of a group of `cycles` laser cycles, at most [`MOST_PHOTONS`], filled up to a multiple of
+    /// [`SIDE_BY_SIDE`]. The first ones have been counted by row ([`Tables::add`]), the rest from `counted` on, a
+    /// multiple as well, are counted here.
+    pub fn put(&mut self, codes: &Codes, cycles: usize, counted: usize) {
         debug_assert!(codes.len() <= MOST_PHOTONS && codes.len().is_multiple_of(SIDE_BY_SIDE));
+        debug_assert!(counted.is_multiple_of(SIDE_BY_SIDE));
         // The cycle of what is no photon need not be empty.
         self.cycles[..cycles].fill(0);
-        self.specials = put(self, codes);
+        let (first_codes, codes_to_count) = codes.codes().split_at(counted);
+        let (first_marks, marks_to_count) = codes.marks().split_at(counted);
+        let specials = put::<false>(self, (first_codes, first_marks), 0, 0);
+        self.specials = put::<true>(self, (codes_to_count, marks_to_count), counted, specials);
         for photon in codes.doubtful() {
             self.special[self.specials] = (photon as u64 + 1) << PHOTON_SHIFT | u64::from(u32::MAX);
             self.specials += 1;
@@ -122,13 +133,17 @@ impl Tables {
     }
 }
 
+/// Puts photons numbered from `number` + 1 on; counts them by row or not. Returns how many specials there are then.
 #[multiversion(targets("x86_64+avx2+bmi1+bmi2"))]
-fn put(tables: &mut Tables, codes: &Codes) -> usize {
-    let (code_rows, _) = codes.codes().as_chunks::<SIDE_BY_SIDE>();
-    let (mark_rows, _) = codes.marks().as_chunks::<SIDE_BY_SIDE>();
-    let (before_rows, _) = tables.before.as_chunks_mut::<SIDE_BY_SIDE>();
-    let mut specials = 0;
-    let mut number = 0;
+fn put<const COUNTED: bool>(
+    tables: &mut Tables,
+    (codes, marks): (&[Code], &[u32]),
+    number: usize,
+    specials: usize,
+) -> usize {
+    let before = &mut tables.before[number..];
+    let mut specials = specials;
+    let mut number = (number as u64) << PHOTON_SHIFT;
     let mut one = |code: Code, marks: u32, counts: &mut [u32; ROWS]| {
         let cycle = &mut tables.cycles[code.cycle()];
         let word = *cycle;
@@ -139,10 +154,15 @@ fn put(tables: &mut Tables, codes: &Codes) -> usize {
         // Written always, kept if special: no branch to mispredict.
         tables.special[specials % SPECIALS] = number | u64::from(shared);
         specials += usize::from(shared != 0);
-        let count = &mut counts[code.row()];
-        *count = count.wrapping_add(1);
+        if COUNTED {
+            let count = &mut counts[code.row()];
+            *count = count.wrapping_add(1);
+        }
         (word >> PHOTON_SHIFT) as u16
     };
+    let (code_rows, _) = codes.as_chunks::<SIDE_BY_SIDE>();
+    let (mark_rows, _) = marks.as_chunks::<SIDE_BY_SIDE>();
+    let (before_rows, _) = before.as_chunks_mut::<SIDE_BY_SIDE>();
     for ((codes, marks), before) in code_rows.iter().zip(mark_rows).zip(before_rows) {
         for (side, counts) in tables.counts.iter_mut().enumerate() {
             before[side] = one(codes[side], marks[side], counts);

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::group::{GROUP, Group};
 use super::{PixelStream, SPAD_BITS};
-use crate::photon::philox::Blocks;
+use crate::photon::philox::{Blocks, LANES};
 use crate::photon::spad::SPADS;
 
 /// Where in its group a photon falls: cycle within the group and SPAD, as `cycle << 4 | SPAD`.
@@ -133,33 +133,54 @@ impl Draw {
     }
 
     /// The random words of the echo's photons, low and high, by halves: [`Group::place`] of the high word, and
-    /// [`PixelStream::signal_photon`]. Some may come outside [`Draw::within_fs`], and are no photons of these slots.
+    /// [`PixelStream::signal_photon`]. Some may come outside [`Draw::within_fs`], and are no photons of these slots. Behind
+    /// [`Draw::echo_photons`] of either half comes what fills it up to a multiple of [`LANES`].
     pub fn echo(&self) -> [[&[u32]; 2]; 2] {
-        let [a, b, c, d] = self.echo.rows();
-        let (first, second) = (self.echo_photons.div_ceil(2), self.echo_photons / 2);
-        [[&a[..first], &b[..first]], [&c[..second], &d[..second]]]
+        let filled_up = self.half_an_echo();
+        let [a, b, c, d] = self.echo.rows().map(|row| &row[..filled_up]);
+        [[a, b], [c, d]]
     }
 
-    /// Photons of the whole echo.
-    pub fn echo_photons(&self) -> usize {
-        self.echo_photons
+    /// Photons of the whole echo, by halves.
+    pub fn echo_photons(&self) -> [usize; 2] {
+        [self.echo_photons.div_ceil(2), self.echo_photons / 2]
+    }
+
+    /// Words of half an echo. Its photons are known by numbers: those of the second half begin with this one.
+    pub fn half_an_echo(&self) -> usize {
+        self.echo_photons.div_ceil(2).next_multiple_of(LANES)
+    }
+
+    /// Numbers of the echo's photons.
+    fn echo_numbers(&self) -> impl Iterator<Item = usize> {
+        let [first, second] = self.echo_photons();
+        let half = self.half_an_echo();
+        (0..first).chain(half..half + second)
+    }
+
+    /// The half that an echo's photon belongs to, and its place there.
+    #[inline]
+    fn in_echo(&self, number: usize) -> (usize, usize) {
+        let half = self.half_an_echo();
+        match number < half {
+            true => (0, number),
+            false => (1, number - half),
+        }
     }
 
     /// The random word of a photon of the echo.
     #[inline]
-    pub(super) fn echo_word(&self, photon: usize) -> u64 {
-        let first = self.echo_photons.div_ceil(2);
-        let (half, at) = match photon < first {
-            true => (0, photon),
-            false => (1, photon - first),
-        };
+    pub(super) fn echo_word(&self, number: usize) -> u64 {
+        let (half, at) = self.in_echo(number);
         let [low, high] = self.echo()[half];
         u64::from(low[at]) | u64::from(high[at]) << 32
     }
 
     /// The other random words of a photon of the echo of a measured pulse.
-    pub(super) fn echo_words(&self, photon: usize) -> [u32; 4] {
-        let block = self.echo_photons.div_ceil(2) + photon;
+    pub(super) fn echo_words(&self, number: usize) -> [u32; 4] {
+        let [first, _] = self.echo_photons();
+        let (half, at) = self.in_echo(number);
+        let block = first * (1 + half) + at;
         self.echo.rows().map(|row| row[block])
     }
 
@@ -169,7 +190,7 @@ impl Draw {
     }
 
     /// Every photon, as place and time after the start of its cycle in fs, in no particular order. `pixel` is whose they
-    /// are.
+    /// are. None comes before the exposure.
     pub fn photons(&self, pixel: &PixelStream<'_>) -> impl Iterator<Item = (Place, i64)> {
         let words = self.words();
         let slots = pixel.slots();
@@ -181,10 +202,14 @@ impl Draw {
                 words[blocks].iter().map(photon)
             })
         });
-        let signal = (0..self.echo_photons)
+        let signal = self
+            .echo_numbers()
             .map(|photon| pixel.signal_photon(self, photon))
             .filter(|(_, time_fs)| self.within_fs.contains(time_fs));
-        background.chain(signal)
+        let is_first_group = self.group.first_cycle() == 0;
+        background.chain(signal).filter(move |&(place, time_fs)| {
+            !is_first_group || time_fs >= 0 || place >> SPAD_BITS > 0
+        })
     }
 }
 
@@ -192,7 +217,7 @@ impl Draw {
 #[derive(Debug, Clone, Default)]
 pub(super) struct ByCycle {
     /// Time after the start of the cycle in fs and SPAD, as `time << 4 | SPAD`.
-    photons: Vec<u64>,
+    photons: Vec<i64>,
     /// Where each cycle's photons end.
     ends: Vec<usize>,
 }
@@ -214,8 +239,8 @@ impl ByCycle {
         self.photons.resize(total, 0);
         for (place, time_fs) in draw.photons(pixel) {
             let end = &mut self.ends[cycle_of(place)];
-            let spad = u64::from(place) & (SPADS as u64 - 1);
-            self.photons[*end] = (time_fs as u64) << SPAD_BITS | spad;
+            let spad = i64::from(place) & (SPADS as i64 - 1);
+            self.photons[*end] = time_fs << SPAD_BITS | spad;
             *end += 1;
         }
         let mut start = 0;
@@ -225,7 +250,7 @@ impl ByCycle {
         }
     }
 
-    pub(super) fn of(&self, cycle: u32) -> &[u64] {
+    pub(super) fn of(&self, cycle: u32) -> &[i64] {
         let cycle = cycle as usize;
         let start = cycle.checked_sub(1).map_or(0, |before| self.ends[before]);
         &self.photons[start..self.ends[cycle]]

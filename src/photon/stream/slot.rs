@@ -1,16 +1,17 @@
 //! Slots: equal parts of a laser cycle that are drawn by themselves.
 //!
-//! A slot is a CLK period or, where that is longer than [`LONGEST_FS`], one of 2ᵏ equal parts of it. Whoever counts by
-//! CLK periods then meets at most one edge in a slot, always at the same place. Photons come in the middles of 2¹⁷ equal
-//! steps of a slot: 20 fs at 384 MHz, at most 32 fs.
+//! A slot is a CLK period or, where that is longer than [`LONGEST_FS`], one of 2ᵏ equal parts of it. The first one leads
+//! the laser cycle by less than a CLK period, so that slots can be what a chip's bins are. Photons come in the middles of
+//! 2¹⁷ equal steps of a slot: 20 fs at 384 MHz, at most 32 fs.
 //!
 //! ```text
-//!   slot           0               1               2                     start of slot n: ⌊n · length⌋ fs
+//!   laser cycle          ├─────────────────────────────────────────── …
+//!   slot           0               1               2                     start of slot n: ⌊n · length⌋ − lead, fs
 //!          ├───────────────┼───────────────┼───────────────┼── …
 //!   step    ·   ·   ·   ·   ·   ·   ·   ·
 //! ```
 
-use crate::units::Frequency;
+use crate::units::{Frequency, Time};
 
 /// Slots are no longer than that, fs.
 pub const LONGEST_FS: i64 = 1 << 22;
@@ -23,6 +24,7 @@ const TIME: u32 = (1 << TIME_BITS) - 1;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slots {
     count: u32,
+    lead_fs: i64,
     per_period_bits: u32,
     whole_fs: u64,
     /// In 2⁻⁶⁴ fs.
@@ -31,8 +33,8 @@ pub struct Slots {
 }
 
 impl Slots {
-    /// Those of a cycle of `periods` periods of `clock`.
-    pub(super) fn new(clock: Frequency, periods: u32) -> Self {
+    /// Those of a cycle of `periods` periods of `clock`, which they lead.
+    pub(super) fn new(clock: Frequency, periods: u32, lead: Time) -> Self {
         let mut per_period_bits = 0;
         while clock.part_fs(per_period_bits).0 >= LONGEST_FS as u64 {
             per_period_bits += 1;
@@ -40,6 +42,7 @@ impl Slots {
         let (whole_fs, fraction) = clock.part_fs(per_period_bits);
         Slots {
             count: periods << per_period_bits,
+            lead_fs: lead.as_fs(),
             per_period_bits,
             whole_fs,
             fraction,
@@ -67,18 +70,29 @@ impl Slots {
         self.whole_fs as i64
     }
 
+    /// How much before its cycle the first one begins, fs.
+    pub fn lead_fs(&self) -> i64 {
+        self.lead_fs
+    }
+
+    /// Background photons come no closer to the beginning or end of their slot, fs.
+    pub fn margin_fs(&self) -> i64 {
+        (self.whole_fs >> (TIME_BITS + 1)) as i64
+    }
+
     /// When a slot begins, fs after the start of its cycle.
     #[inline]
     pub fn start_fs(&self, slot: u32) -> i64 {
         let fraction = (u128::from(self.fraction) * u128::from(slot)) >> 64;
-        (self.whole_fs * u64::from(slot) + fraction as u64) as i64
+        (self.whole_fs * u64::from(slot) + fraction as u64) as i64 - self.lead_fs
     }
 
-    /// The slot that is running at `time_fs` ≥ 0 after the start of its cycle.
+    /// The slot that is running `time_fs` after the start of its cycle, no earlier than the first one begins.
     pub fn at(&self, time_fs: i64) -> u32 {
-        debug_assert!(time_fs >= 0);
+        let into_fs = time_fs + self.lead_fs;
+        debug_assert!(into_fs >= 0);
         let length = u128::from(self.whole_fs) << 32 | u128::from(self.fraction >> 32);
-        let mut slot = (((time_fs as u128) << 32) / length) as u32;
+        let mut slot = (((into_fs as u128) << 32) / length) as u32;
         while self.start_fs(slot) > time_fs {
             slot -= 1;
         }
@@ -106,25 +120,28 @@ mod tests {
         fn slots_fill_the_cycle(
             hz in prop_oneof![1_000u64..1_000_000, 1_000_000u64..2_000_000_000],
             periods in 1u32..600,
+            lead in 0.0f64..1.0,
             slot: u32,
             word: u32,
         ) {
             let clock = Frequency::from_hz(hz);
-            let slots = Slots::new(clock, periods);
+            let lead = Time::from_s(lead / clock.as_hz());
+            let slots = Slots::new(clock, periods, lead);
             prop_assert!(slots.length_fs() < LONGEST_FS);
             prop_assert_eq!(slots.count(), periods << slots.per_period_bits());
             let slot = slot % slots.count();
             let (start, end) = (slots.start_fs(slot), slots.start_fs(slot + 1));
             prop_assert!((slots.length_fs()..=slots.length_fs() + 1).contains(&(end - start)));
-            prop_assert!(slots.start_fs(slots.count()) <= clock.whole_fs(i64::from(periods)));
+            prop_assert!(slots.start_fs(slots.count()) <= clock.whole_fs(i64::from(periods)) - lead.as_fs());
             if slots.per_period_bits() == 0 {
-                let edge = clock.whole_fs(i64::from(slot));
+                let edge = clock.whole_fs(i64::from(slot)) - lead.as_fs();
                 prop_assert!((edge - 1..=edge).contains(&start));
             }
             prop_assert_eq!(slots.at(start), slot);
             prop_assert_eq!(slots.at(end - 1), slot);
             let time = slots.time_fs(slot, word);
-            prop_assert!((start..end).contains(&time));
+            let margin = slots.margin_fs();
+            prop_assert!((start + margin..end - margin).contains(&time));
             prop_assert_eq!(slots.at(time), slot);
         }
     }

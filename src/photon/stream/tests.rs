@@ -11,6 +11,7 @@ fn config() -> StreamConfig {
         clock: Frequency::from_hz(384_000_000),
         stop_periods: 500,
         laser_cycles: 2000,
+        lead: Time::from_ps(1_100),
         pulse_sigma: Time::from_ps(1_700),
         pulse_shape: None,
         spads: SpadModel::default(),
@@ -197,7 +198,7 @@ fn any_part_can_be_drawn_alone() {
     let groups: Vec<_> = stream.groups().collect();
     for group in groups.into_iter().rev() {
         for cut in cuts.windows(2).rev() {
-            pixel.draw(group, cut[0]..cut[1], &mut draw);
+            pixel.draw(group, &stream.span(cut[0]..cut[1]), &mut draw);
             parts.extend(draw.photons(&pixel).filter_map(|(place, time_fs)| {
                 let cycle = group.first_cycle() + u32::from(place >> SPAD_BITS);
                 let time = stream.config().cycle_start(cycle) + Time::from_fs(time_fs);
@@ -238,7 +239,11 @@ fn neighbours_in_pixel_slot_group_and_seed_are_independent() {
         };
         let mut draw = Draw::default();
         let pixel = stream.pixel(pixel, &light);
-        pixel.draw(Group::of_cycle(group * GROUP), slot..slot + 1, &mut draw);
+        pixel.draw(
+            Group::of_cycle(group * GROUP),
+            &stream.span(slot..slot + 1),
+            &mut draw,
+        );
         let mut counts = vec![0.0; GROUP as usize];
         for (place, _) in draw.photons(&pixel) {
             counts[usize::from(place >> SPAD_BITS)] += 1.0;
@@ -348,6 +353,7 @@ proptest! {
             clock: Frequency::from_hz(hz),
             stop_periods,
             laser_cycles: 50,
+            lead: Time::ZERO,
             pulse_sigma: Time::from_ns(2),
             pulse_shape: None,
             spads: SpadModel {
