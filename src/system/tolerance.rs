@@ -70,8 +70,8 @@ pub struct Tolerance<'a> {
 }
 
 impl Tolerance<'_> {
-    /// Exposes `pixels`, each on the cheapest engine that keeps its depth within the tolerance of the exact one's on average.
-    /// `done` is told of macropixels as they are finished.
+    /// Exposes `pixels`, each on the cheapest engine that keeps its depth within the tolerance of the exact one's on
+    /// average. `done` is told of macropixels as they are finished.
     ///
     /// # Errors
     /// Configurations that the window engine refuses.

@@ -199,7 +199,11 @@ mod tests {
         }
 
         #[test]
-        fn no_two_edges_are_closer_than_the_whole_femtoseconds(hz in 1e6f64..1e10, k in 1i64..10_000, from in 0i64..1_000_000) {
+        fn no_two_edges_are_closer_than_the_whole_femtoseconds(
+            hz in 1e6f64..1e10,
+            k in 1i64..10_000,
+            from in 0i64..1_000_000,
+        ) {
             let f = Frequency::from_hz_f64(hz).unwrap();
             let apart = (f.periods(from + k) - f.periods(from)).as_fs();
             prop_assert!((0..=1).contains(&(apart - f.whole_fs(k))));

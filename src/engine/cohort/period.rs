@@ -180,7 +180,8 @@ mod tests {
                 let from = -libm::expm1(-means[step..].iter().sum::<f64>());
                 let until = -libm::expm1(-means[..=step].iter().sum::<f64>());
                 let photon = -libm::expm1(-means[step]);
-                for (got, want) in [(period.0[step].from, from), (period.0[step].until, until), (period.0[step].photon, photon)] {
+                let found = &period.0[step];
+                for (got, want) in [(found.from, from), (found.until, until), (found.photon, photon)] {
                     prop_assert!((got / want - 1.0).abs() < 1e-14, "{got} {want}");
                 }
             }

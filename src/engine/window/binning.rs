@@ -3,21 +3,19 @@
 //! A background photon's bin is that of its slot. A single photon's place in the window is a number of CLK periods with
 //! 24 binary places. Either decides, unless the photon comes within a few femtoseconds of an edge; such photons are
 //! marked and settled exactly, one by one.
-//! Bins have a row before them for photons that matter only as blinders, and one after them for those that do not
-//! matter at all.
 //!
 //! ```text
-//!   code    31        19     15         8 7      0         marks   31     15     0
-//!          ┌─────────┬──────┬──┬─────────┬────────┐                ┌──────┬──────┐
-//!          │ cycle   │ SPAD │  │doubtful │ row    │                │ bins │ SPADs│
-//!          └─────────┴──────┴──┴─────────┴────────┘                └──────┴──────┘
+//!   slot       │ 17 │ 18 │ 19 │ 20 │ 21 │ …            a slot is a bin, or a 2ᵏ-th of one
+//!   row        │  0 │  0 │  1 │  2 │  3 │ …
+//!   word       cycle, SPAD │ time in the slot: in doubt in its first and last steps only
 //! ```
 
 use multiversion::multiversion;
 
+use super::codes::{Code, Codes, SPAD_BITS, bin_mark, spad_mark};
 use super::echo::{EchoRows, Passed};
 use super::sight::ROUNDING_FS;
-use crate::photon::{Draw, GROUP, PER_BLOCK, PixelStream, Place, SPADS, Slots, TIME_BITS};
+use crate::photon::{Draw, PER_BLOCK, PixelStream, Place, Slots, TIME_BITS};
 
 /// Binary places of a position in CLK periods.
 const FRACTION_BITS: u32 = 24;
@@ -29,157 +27,12 @@ const BIAS: u32 = 32;
 /// Slots that begin no farther from bins are bins, fs: three times are rounded to whole ones.
 const ALIGNED_FS: i64 = 2;
 
-const DOUBTFUL: u32 = 1 << 8;
-const PLACE_SHIFT: u32 = 16;
-const SPAD_BITS: u32 = SPADS.trailing_zeros();
-
-/// The marks of SPADs.
-pub const SPAD_MARKS: u32 = (1 << SPADS) - 1;
-
-/// Bins that have a mark of their own.
-pub const MARKED_BINS: usize = u32::BITS as usize - SPADS;
-const CYCLE_SHIFT: u32 = PLACE_SHIFT + SPAD_BITS;
-
-/// Rows that a code can name.
-pub const ROWS: usize = 256;
-
-/// Cycles that a code can name: those of a group, and more for photons that are none.
-pub const CYCLES: usize = 2 * GROUP as usize;
-
-const _: () = assert!(CYCLES << CYCLE_SHIFT == 1 << u32::BITS);
-
-/// A photon's row, cycle and SPAD.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Code(u32);
-
-impl Code {
-    /// No photon, without marks. It has a row and a cycle that nobody looks at.
-    pub const NONE: Code = Code(GROUP << CYCLE_SHIFT | (ROWS as u32 - 1));
-
-    /// Of a photon at `place`, in one of `bins` bins, and its mark.
-    #[inline(always)]
-    pub fn new(place: u32, row: u32, is_doubtful: bool, bins: u32) -> (Code, u32) {
-        let doubtful = u32::from(is_doubtful) << DOUBTFUL.trailing_zeros();
-        let code = place << PLACE_SHIFT | doubtful | row;
-        (Code(code), spad_mark(place) | bin_mark(row, bins))
-    }
-
-    /// Cycle within the group.
-    #[inline]
-    pub fn cycle(self) -> usize {
-        (self.0 >> CYCLE_SHIFT) as usize
-    }
-
-    /// SPAD.
-    #[inline]
-    pub fn spad(self) -> u8 {
-        (self.0 >> PLACE_SHIFT) as u8 % SPADS as u8
-    }
-
-    /// Bin + 1; 0 before the window.
-    #[inline]
-    pub fn row(self) -> usize {
-        self.0 as usize % ROWS
-    }
-
-    /// Whether the photon is too close to an edge.
-    #[inline]
-    pub fn is_doubtful(self) -> bool {
-        self.0 & DOUBTFUL != 0
-    }
-}
-
-#[inline(always)]
-fn spad_mark(place: u32) -> u32 {
-    1 << (place % SPADS as u32)
-}
-
-#[inline(always)]
-fn bin_mark(row: u32, bins: u32) -> u32 {
-    let is_in_bin = row.wrapping_sub(1) < bins;
-    u32::from(is_in_bin) << (SPADS as u32 + row % MARKED_BINS as u32)
-}
-
-/// The codes of photons, and what to look for in a cycle's other photons: a bit for the SPAD and one for the bin. More
-/// than 16 bins share bits.
-#[derive(Debug, Default)]
-pub struct Codes {
-    len: usize,
-    /// Longer than needed, so that what was there before need not be cleared.
-    codes: Vec<Code>,
-    marks: Vec<u32>,
-}
-
 /// Room for what is found out on the way.
 #[derive(Debug, Default)]
 pub struct Scratch {
     slot_codes: Vec<Code>,
     slot_marks: Vec<u32>,
     passed: Passed,
-}
-
-impl Codes {
-    /// Forgets all.
-    pub fn clear(&mut self) {
-        self.len = 0;
-    }
-
-    /// How many there are, those that are no photons among them.
-    pub fn len(&self) -> usize {
-        self.len
-    }
-
-    /// The codes.
-    pub fn codes(&self) -> &[Code] {
-        &self.codes[..self.len]
-    }
-
-    /// Their marks.
-    pub fn marks(&self) -> &[u32] {
-        &self.marks[..self.len]
-    }
-
-    /// Photons that are too close to an edge.
-    pub fn doubtful(&self) -> impl Iterator<Item = usize> {
-        // They are rare: most groups have none, which is quickly seen.
-        const TOGETHER: usize = 64;
-        let chunks = self.codes().chunks(TOGETHER).enumerate();
-        chunks
-            .filter(|(_, chunk)| chunk.iter().fold(0, |any, code| any | code.0) & DOUBTFUL != 0)
-            .flat_map(|(at, chunk)| (TOGETHER * at..).zip(chunk))
-            .filter_map(|(photon, code)| code.is_doubtful().then_some(photon))
-    }
-
-    /// Appends what is no photon until their number is a multiple of `multiple`.
-    pub fn fill_up(&mut self, multiple: usize) {
-        let missing = self.len.next_multiple_of(multiple) - self.len;
-        let (codes, marks) = self.append(missing);
-        codes.fill(Code::NONE);
-        marks.fill(0);
-    }
-
-    /// Makes none of those from the `first` one on whose place is `end` or more.
-    fn drop_from(&mut self, first: usize, end: u32) {
-        let new = first..self.len;
-        let marks = &mut self.marks[new.clone()];
-        for (code, mark) in self.codes[new].iter_mut().zip(marks) {
-            let is_wanted = code.0 >> PLACE_SHIFT < end;
-            *code = if is_wanted { *code } else { Code::NONE };
-            *mark = if is_wanted { *mark } else { 0 };
-        }
-    }
-
-    /// Room for more of them, to be written.
-    fn append(&mut self, more: usize) -> (&mut [Code], &mut [u32]) {
-        let first = self.len;
-        self.len += more;
-        if self.len > self.codes.len() {
-            self.codes.resize(2 * self.len, Code::NONE);
-            self.marks.resize(2 * self.len, 0);
-        }
-        let new = first..self.len;
-        (&mut self.codes[new.clone()], &mut self.marks[new])
-    }
 }
 
 /// Which photons of a draw are wanted, and what for.
@@ -384,7 +237,7 @@ fn encode_slots(binning: &Binning, wanted: &Wanted, slots: &[u32], out: (&mut [C
     let (origin_slot, later) = (wanted.origin_slot, wanted.place(0));
     for ((&slot, code), mark) in slots.iter().zip(out.0).zip(out.1) {
         let row = row_of(slot, origin_slot, k, bins);
-        *code = Code(later << PLACE_SHIFT | row);
+        (*code, _) = Code::new(later, row, false, bins);
         *mark = bin_mark(row, bins);
     }
 }
@@ -400,8 +253,7 @@ fn encode(
     for (((&word, (in_slot, in_bin)), code), mark) in words.iter().zip(slots).zip(codes).zip(marks)
     {
         let place = word >> place_shift;
-        // The cycle may carry.
-        *code = Code((place << PLACE_SHIFT) + in_slot.0);
+        *code = in_slot.moved_by(place);
         *mark = spad_mark(place) | in_bin;
     }
 }
@@ -411,14 +263,14 @@ fn doubt(steps: u32, words: &[u32], codes: &mut [Code]) {
     for (&word, code) in words.iter().zip(codes) {
         let step = word % (1 << TIME_BITS);
         let is_doubtful = (step + steps) % (1 << TIME_BITS) < 2 * steps;
-        code.0 |= u32::from(is_doubtful) * DOUBTFUL;
+        *code = code.doubtful_if(is_doubtful);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photon::{Group, PhotonStream, SpadModel, StreamConfig};
+    use crate::photon::{GROUP, Group, PhotonStream, SpadModel, StreamConfig};
     use crate::units::{Frequency, Time};
     use proptest::prelude::*;
 
@@ -509,11 +361,5 @@ mod tests {
         assert_eq!(binning.slot_of(begins_fs(5)), Some(5));
         assert_eq!(binning.slot_of(begins_fs(-7) + 1), Some(-7));
         assert_eq!(binning.slot_of(begins_fs(5) + 20), None);
-    }
-
-    #[test]
-    fn nobody_looks_at_what_is_no_photon() {
-        assert_eq!(Code::NONE.cycle(), GROUP as usize);
-        assert!(Code::NONE.row() > 64 + 1 && !Code::NONE.is_doubtful());
     }
 }

@@ -15,7 +15,8 @@
 //!
 //! [`SpadModel::detect`]: crate::photon::SpadModel::detect
 
-use super::binning::{Binning, Code, Codes, ROWS, Scratch, Wanted};
+use super::binning::{Binning, Scratch, Wanted};
+use super::codes::{Code, Codes, ROWS};
 use super::echo::EchoRows;
 use super::history::{Photon, certain_from, split};
 use super::sight::{ROUNDING_FS, Sight};

@@ -12,7 +12,8 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::binning::{Code, Wanted};
+use super::binning::Wanted;
+use super::codes::Code;
 use super::sight::ROUNDING_FS;
 use crate::photon::{LANES, PixelStream, RANKS, signal_rank};
 

@@ -10,6 +10,7 @@
 //! SPADs are off or whose window never opens are left out.
 
 mod binning;
+mod codes;
 mod counting;
 mod echo;
 mod history;

@@ -2,7 +2,7 @@
 
 use multiversion::multiversion;
 
-use super::binning::{CYCLES, Code, Codes, ROWS};
+use super::codes::{CYCLES, Code, Codes, ROWS};
 
 /// Most photons of a group.
 pub const MOST_PHOTONS: usize = PHOTONS - 1;

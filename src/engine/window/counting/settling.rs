@@ -11,7 +11,7 @@
 //! them, too, would be special as well.
 
 use super::{Counting, Pixel, Placed, in_draw};
-use crate::engine::window::binning::{Code, MARKED_BINS, SPAD_MARKS};
+use crate::engine::window::codes::{Code, MARKED_BINS, SPAD_MARKS};
 use crate::engine::window::tables::Special;
 use crate::photon::Group;
 
