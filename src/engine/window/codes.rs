@@ -57,7 +57,7 @@ impl Code {
     /// Also doubtful, if so.
     #[inline(always)]
     pub fn doubtful_if(self, is_doubtful: bool) -> Code {
-        Code(self.0 | u32::from(is_doubtful) * DOUBTFUL)
+        Code(self.0 | (u32::from(is_doubtful) * DOUBTFUL))
     }
 
     /// Cycle within the group.

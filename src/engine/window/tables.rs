@@ -118,7 +118,7 @@ impl Tables {
     /// The last photon of a cycle, which is empty afterwards.
     pub fn take_last(&mut self, cycle: usize) -> Option<usize> {
         let word = std::mem::take(&mut self.cycles[cycle]);
-        ((word % ONE_SPECIAL >> PHOTON_SHIFT) as usize).checked_sub(1)
+        (((word % ONE_SPECIAL) >> PHOTON_SHIFT) as usize).checked_sub(1)
     }
 
     /// The photon of the same cycle before this one.
