@@ -38,6 +38,8 @@ pub struct Counting<'a> {
     adds: [i64; SPADS + 1],
     /// Photons whose rows differ by more are farther apart than the SPADs' memory.
     rows_of_memory: usize,
+    /// Photons in bins whose rows differ by less are closer than it.
+    blind_rows: usize,
     /// Photons of the windows' own cycles.
     own: Draw,
     /// Photons of the group's cycles for the windows of the next cycles.
@@ -77,11 +79,13 @@ impl<'a> Counting<'a> {
     pub fn new(engine: &'a Window<'a>, stream: &'a PhotonStream) -> Self {
         let bins = engine.config.bins;
         let memory_s = stream.config().spads.memory().as_s();
+        let memory_rows = (memory_s * engine.exposure.clock.as_hz()) as usize;
         Counting {
             engine,
             stream,
             binning: Binning::new(bins, engine.exposure.clock.as_hz(), stream.slots()),
-            rows_of_memory: (memory_s * engine.exposure.clock.as_hz()) as usize + 2,
+            rows_of_memory: memory_rows + 2,
+            blind_rows: memory_rows,
             adds: std::array::from_fn(|spads| engine.adds(((1u32 << spads) - 1) as u16)),
             own: Draw::default(),
             previous: Draw::default(),

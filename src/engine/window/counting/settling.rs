@@ -153,20 +153,24 @@ impl Counting<'_> {
     /// mostly is; neither is doubtful.
     #[inline]
     fn pair(&self, pixel: &mut Pixel<'_>, photons: [(usize, Code); 2]) -> Option<[u8; 2]> {
-        let rows = photons.map(|(_, code)| code.row());
+        let [(photon, code), (other, other_code)] = photons;
+        let (row, other_row) = (code.row(), other_code.row());
         let bins = pixel.hits.len();
-        let (first, second) = (rows[0].min(rows[1]), rows[0].max(rows[1]));
+        let (first, second) = (row.min(other_row), row.max(other_row));
         // Nothing is counted outside the window; apart by more rows than the memory has, photons do not meet.
         if second == 0 || first > bins || first > 0 && second - first > self.rows_of_memory {
             return Some([1; 2]);
         }
-        if photons
-            .iter()
-            .any(|&(photon, _)| photon >= self.first_code[0])
-        {
+        if first > 0 && first != second && second <= bins && second - first < self.blind_rows {
+            pixel.work.lost_to_dead_time += 1;
+            let is_first = u8::from(row < other_row);
+            return Some([is_first, 1 - is_first]);
+        }
+        if photon.max(other) >= self.first_code[0] {
             return None;
         }
-        let times_fs = photons.map(|(photon, _)| in_draw(pixel.light, &self.own, photon));
+        let time_fs = |photon| in_draw(pixel.light, &self.own, photon);
+        let times_fs = [time_fs(photon), time_fs(other)];
         let memory_fs = self.stream.config().spads.memory().as_fs();
         let is_blind = (times_fs[0] - times_fs[1]).abs() <= memory_fs;
         let is_seen = u64::from((1..=bins).contains(&second));
