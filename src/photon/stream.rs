@@ -387,7 +387,8 @@ impl PixelStream<'_> {
         self.stream.slots
     }
 
-    /// Place of an echo's photon of this number in `draw` ([`Draw::half_an_echo`]), and its time after the start of its cycle, fs.
+    /// Place of an echo's photon of this number in `draw` ([`Draw::half_an_echo`]), and its time after the start of its
+    /// cycle, fs.
     #[inline]
     pub fn signal_photon(&self, draw: &Draw, number: usize) -> (Place, i64) {
         let word = draw.echo_word(number);

@@ -22,7 +22,10 @@ impl Counting<'_> {
         let code = self.codes.codes()[photon];
         let is_settled = special.is_only
             && match (shared & SPAD_MARKS != 0, shared & !SPAD_MARKS != 0) {
-                (false, _) => self.settle_bin(pixel, photon, code),
+                (false, _) => {
+                    self.settle_bin(pixel, photon, code);
+                    true
+                }
                 (true, false) => self.settle_partner(pixel, photon, code),
                 (true, true) => false,
             };
@@ -34,8 +37,8 @@ impl Counting<'_> {
         }
     }
 
-    /// Settles a photon that shares its bin with one of another SPAD. Returns whether it did: always.
-    fn settle_bin(&mut self, pixel: &mut Pixel<'_>, photon: usize, code: Code) -> bool {
+    /// Settles a photon that shares its bin, or if there are many bins its bin's mark, with one of another SPAD.
+    fn settle_bin(&mut self, pixel: &mut Pixel<'_>, photon: usize, code: Code) {
         let row = code.row();
         if pixel.hits.len() <= MARKED_BINS
             || self
@@ -46,7 +49,6 @@ impl Counting<'_> {
             self.tables.remove(row);
             self.fire(pixel, row, 2);
         }
-        true
     }
 
     /// Settles a photon that shares its SPAD with one of another bin, if what was before them does not matter, as it
