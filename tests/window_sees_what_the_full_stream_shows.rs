@@ -169,6 +169,13 @@ proptest! {
     }
 
     #[test]
+    fn in_a_stream_whose_slots_are_no_bins(case in cases(700, 80.0), part in 0.0f64..1.0) {
+        let lead = Time::from_s(part / case.config.clk_hz);
+        let stream = StreamConfig { lead, ..case.stream.clone() };
+        agreed(&Case { stream, ..case });
+    }
+
+    #[test]
     fn in_cycles_as_short_as_the_window(case in cases(60, 4.0)) {
         agreed(&case);
     }

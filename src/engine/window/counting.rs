@@ -282,6 +282,19 @@ impl<'a> Counting<'a> {
         draw.within_fs().contains(&in_draw(light, draw, at))
     }
 
+    /// The window of a laser cycle.
+    fn window<'w>(&self, sight: &'w Sight, laser_cycle: u32) -> Placed<'w>
+    where
+        'a: 'w,
+    {
+        Placed {
+            engine: self.engine,
+            binning: self.binning,
+            sight,
+            laser_cycle,
+        }
+    }
+
     /// How long before a laser cycle the one before it starts.
     fn before(&self, laser_cycle: u32) -> Time {
         let start = |cycle| self.stream.config().cycle_start(cycle);
@@ -314,12 +327,7 @@ impl<'a> Counting<'a> {
         sorted.sort_unstable();
         for photons in sorted.chunk_by(|a, b| a.0 == b.0) {
             let laser_cycle = group.first_cycle() + photons[0].0;
-            let window = Placed {
-                engine: self.engine,
-                binning: self.binning,
-                sight: pixel.sight,
-                laser_cycle,
-            };
+            let window = self.window(pixel.sight, laser_cycle);
             self.photons.clear();
             self.photons
                 .extend(photons.iter().map(|&(_, photon)| photon));

@@ -32,6 +32,8 @@ pub struct Tables {
 const PHOTON_SHIFT: u32 = 32;
 const ONE_SPECIAL: u64 = 1 << 48;
 
+const _: () = assert!(PHOTONS as u64 == ONE_SPECIAL >> PHOTON_SHIFT);
+
 /// A photon that needs a closer look.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Special {

@@ -10,7 +10,7 @@
 //! What other photons the cycle has does not matter in the first three cases: whoever shared a SPAD or a bin with
 //! them, too, would be special as well.
 
-use super::{Counting, Pixel, Placed, in_draw};
+use super::{Counting, Pixel, in_draw};
 use crate::engine::window::codes::{Code, MARKED_BINS, SPAD_MARKS};
 use crate::engine::window::tables::Special;
 use crate::photon::Group;
@@ -195,12 +195,7 @@ impl Counting<'_> {
 
     /// Settles the photons of one SPAD among those `together`.
     fn settle_spad(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spad: u8) {
-        let window = Placed {
-            engine: self.engine,
-            binning: self.binning,
-            sight: pixel.sight,
-            laser_cycle,
-        };
+        let window = self.window(pixel.sight, laser_cycle);
         self.photons.clear();
         let mut seen = 0;
         for &(photon, code) in &self.together {
