@@ -1,6 +1,7 @@
 //! Numerical tools that no circuit needs but every formula does: quadrature, special functions, confidence intervals,
 //! regression.
 
+pub mod branchless;
 pub mod intervals;
 pub mod probit;
 mod quadrature;
@@ -9,5 +10,5 @@ mod special;
 pub use quadrature::{gauss_legendre, integrate};
 pub use special::{
     erfcx, ln_exprel_neg, ln_normal_below, ln_sum_exp, normal_above, normal_density,
-    poisson_deviance, stirling_error,
+    poisson_deviance, stirling_error, stirling_series,
 };

@@ -86,8 +86,12 @@ pub fn stirling_error(n: u64) -> f64 {
         let n = n as f64;
         return factorial.ln() - (n * n.ln() - n + 0.5 * (2.0 * PI * n).ln());
     }
-    let n = n as f64;
-    let square = n * n;
+    stirling_series(n as f64)
+}
+
+/// As [`stirling_error`], for n ≥ 11, without a branch.
+#[inline(always)]
+pub fn stirling_series(n: f64) -> f64 {
     const COEFFICIENTS: [f64; 6] = [
         1.0 / 12.0,
         -1.0 / 360.0,
@@ -96,11 +100,10 @@ pub fn stirling_error(n: u64) -> f64 {
         1.0 / 1_188.0,
         -691.0 / 360_360.0,
     ];
-    COEFFICIENTS
-        .iter()
-        .rev()
-        .fold(0.0, |sum, c| sum / square + c)
-        / n
+    let inverse = 1.0 / n;
+    let square = inverse * inverse;
+    let series = COEFFICIENTS.iter().rev();
+    inverse * series.fold(0.0, |sum, c| sum * square + c)
 }
 
 /// x ln(x/µ) + µ − x for x ≥ 0, µ > 0, without cancellation where x is near µ.

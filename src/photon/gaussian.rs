@@ -6,6 +6,11 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
+use multiversion::multiversion;
+use smallvec::SmallVec;
+
+use crate::numerics::branchless;
+
 /// An edge of a stretch of time, with the tail of the pulse on its far side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PulseEdge {
@@ -18,18 +23,19 @@ pub struct PulseEdge {
 impl PulseEdge {
     /// An edge `time` after the centre of a pulse of standard deviation `sigma` ≥ 0, both in the same unit.
     pub fn new(time: f64, sigma: f64) -> Self {
-        if sigma == 0.0 {
-            // A pulse at the very edge belongs to what follows it.
-            let z = if time > 0.0 {
-                f64::INFINITY
-            } else {
-                f64::NEG_INFINITY
-            };
-            return PulseEdge { z, tail: 0.0 };
-        }
-        let z = time / sigma;
+        let z = deviations(time, sigma);
         let tail = 0.5 * libm::erfc(z.abs() * FRAC_1_SQRT_2);
         PulseEdge { z, tail }
+    }
+
+    /// Edges at all these times, side by side; relative error of tails below 10⁻¹³.
+    pub fn row(times: impl Iterator<Item = f64>, sigma: f64) -> SmallVec<[Self; FEW]> {
+        let distances: SmallVec<[f64; FEW]> = times.map(|time| deviations(time, sigma)).collect();
+        let mut tails = distances.clone();
+        tails.resize(tails.len().next_multiple_of(VECTOR), 0.0);
+        beyond(&mut tails);
+        let edges = distances.iter().zip(&tails);
+        edges.map(|(&z, &tail)| PulseEdge { z, tail }).collect()
     }
 
     /// Share of the pulse between this edge and a `later` one.
@@ -40,6 +46,29 @@ impl PulseEdge {
             (false, false) => later.tail - self.tail,
         };
         share.max(0.0)
+    }
+}
+
+/// Edges of a row that need no memory of their own.
+const FEW: usize = 20;
+
+/// Edges that fill a vector.
+const VECTOR: usize = 4;
+
+fn deviations(time: f64, sigma: f64) -> f64 {
+    match sigma {
+        // A pulse at the very edge belongs to what follows it.
+        0.0 if time > 0.0 => f64::INFINITY,
+        0.0 => f64::NEG_INFINITY,
+        _ => time / sigma,
+    }
+}
+
+/// Replaces distances by the tails beyond them.
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+fn beyond(distances: &mut [f64]) {
+    for z in distances {
+        *z = branchless::normal_above(z.abs());
     }
 }
 
@@ -84,6 +113,22 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn a_row_has_the_edges_that_single_ones_are(
+            times in prop::collection::vec(-30.0f64..30.0, 0..40),
+            sigma in prop_oneof![Just(0.0), 0.5f64..5.0],
+        ) {
+            let row = PulseEdge::row(times.iter().copied(), sigma);
+            prop_assert_eq!(row.len(), times.len());
+            for (found, &time) in row.iter().zip(&times) {
+                let alone = PulseEdge::new(time, sigma);
+                prop_assert_eq!(found.z, alone.z);
+                // erfc loses as many digits as z has above 1.
+                let error = 1e-15 * (1.0 + alone.z * alone.z) * alone.tail;
+                prop_assert!(alone.tail < 1e-300 || (found.tail - alone.tail).abs() <= error, "{found:?} {alone:?}");
+            }
+        }
+
         #[test]
         fn stretches_add_up(from in -8.0f64..8.0, a in 1e-6f64..3.0, b in 1e-6f64..3.0, sigma in 0.1f64..5.0) {
             let parts = pulse_share(from, from + a, sigma) + pulse_share(from + a, from + a + b, sigma);

@@ -95,19 +95,18 @@ impl Blocks {
     }
 }
 
-/// The words, by rows, of twice [`LANES`] blocks with first counter words from `first` on and these other ones.
-pub fn blocks_from(first: u32, others: [u32; 3], key: [u32; 2]) -> [[u32; 2 * LANES]; 4] {
+/// Writes the words, by rows, of twice [`LANES`] blocks with first counter words from `first` on and these other ones.
+pub fn blocks_from(first: u32, others: [u32; 3], key: [u32; 2], words: &mut [[u32; 2 * LANES]; 4]) {
     let [second, third, fourth] = others;
     let firsts: [u32; 2 * LANES] = std::array::from_fn(|block| first.wrapping_add(block as u32));
-    let mut words = [[0; 2 * LANES]; 4];
+    let [row0, row1, row2, row3] = words;
     generate(
         key,
         [third, fourth],
         &firsts,
         &[second; 2 * LANES],
-        words.each_mut().map(|words| &mut words[..]),
+        [row0, row1, row2, row3],
     );
-    words
 }
 
 /// Words live in the low halves of 64-bit lanes, where vector units multiply them; high halves hold what is left over.
@@ -178,7 +177,8 @@ mod tests {
                 .iter()
                 .flat_map(|&(second, count)| (0..count).map(move |first| [first, second, third, fourth]))
                 .collect();
-            let rows = blocks_from(5, [6, third, fourth], key);
+            let mut rows = [[0; 2 * LANES]; 4];
+            blocks_from(5, [6, third, fourth], key, &mut rows);
             for (at, first) in (5..5 + 2 * LANES as u32).enumerate() {
                 let expected = rand_philox::philox4x32_10([first, 6, third, fourth], key);
                 prop_assert_eq!(rows.map(|row| row[at]), expected);

@@ -12,14 +12,20 @@
 //! blind with the probability drawn above: the exact one for even light, to first order in the photons per step.
 //! What is left is of second order, and of the light's unevenness within a step; more steps a period make both smaller.
 
+use smallvec::{SmallVec, smallvec};
+
+use super::light::{DIM, absorbed};
 use crate::photon::DeadTimeLaw;
+
+/// Steps of dead time that need no memory of their own.
+const FEW: usize = 8;
 
 /// Blindness of one SPAD by the steps since the avalanche that blinded it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Blindness {
     pub law: DeadTimeLaw,
     /// Probability of being able to fire one, two, … steps after; certain beyond.
-    able: Vec<f64>,
+    able: SmallVec<[f64; FEW]>,
 }
 
 impl Blindness {
@@ -28,7 +34,7 @@ impl Blindness {
         debug_assert!(steps >= 1.0, "{steps} steps");
         let whole = steps.floor();
         let rest = steps - whole;
-        let mut able = vec![0.0; whole as usize - 1];
+        let mut able = smallvec![0.0; whole as usize - 1];
         able.push(0.5 * (1.0 - rest) * (1.0 - rest));
         able.push(1.0 - 0.5 * rest * rest);
         while able.last().is_some_and(|&able| able == 1.0) {
@@ -40,6 +46,11 @@ impl Blindness {
     /// Steps after which an avalanche is forgotten.
     pub fn memory(&self) -> usize {
         self.able.len()
+    }
+
+    /// Steps after an avalanche in which no photon makes a pulse.
+    pub fn certain(&self) -> usize {
+        self.able.iter().take_while(|&&able| able == 0.0).count()
     }
 
     /// Probability of being able to fire `age` ≥ 1 steps after the last avalanche.
@@ -64,6 +75,16 @@ impl Blindness {
     }
 }
 
+/// Probabilities of a photon and of none where `mean` are expected.
+fn photon_or_none(mean: f64) -> (f64, f64) {
+    let p = absorbed(mean);
+    let q = match mean < DIM {
+        true => 1.0 - p,
+        false => libm::exp(-mean),
+    };
+    (p, q)
+}
+
 /// One SPAD with its dead time, in even light.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlindSpad(Blindness);
@@ -86,7 +107,7 @@ impl BlindSpad {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ages {
     /// Entry a: last avalanche a + 1 steps ago.
-    pub aged: Vec<f64>,
+    pub aged: SmallVec<[f64; FEW]>,
     /// No avalanche that still matters.
     free: f64,
 }
@@ -95,15 +116,15 @@ impl Ages {
     /// A SPAD that has seen nothing yet.
     pub fn rested(blindness: &Blindness) -> Self {
         Ages {
-            aged: vec![0.0; blindness.memory()],
+            aged: smallvec![0.0; blindness.memory()],
             free: 1.0,
         }
     }
 
     /// The steady state under `mean` photons a step.
     pub fn steady(blindness: &Blindness, mean: f64) -> Self {
-        let (p, q) = (-libm::expm1(-mean), libm::exp(-mean));
-        let mut aged = Vec::with_capacity(blindness.memory());
+        let (p, q) = photon_or_none(mean);
+        let mut aged = SmallVec::with_capacity(blindness.memory());
         let (mut survives, mut sum) = (1.0, 0.0);
         for age in 1..=blindness.memory() {
             aged.push(survives);
@@ -121,17 +142,17 @@ impl Ages {
 
     /// One step with `mean` photons.
     pub fn step(&mut self, blindness: &Blindness, mean: f64) {
-        let (p, q) = (-libm::expm1(-mean), libm::exp(-mean));
+        let (p, q) = photon_or_none(mean);
         let mut renewed = p * self.free;
         self.free *= q;
         for (index, age) in self.aged.iter_mut().enumerate() {
             renewed += *age * blindness.renews(index + 1, p);
             *age *= blindness.keeps(index + 1, p, q);
         }
-        match self.aged.pop() {
+        match self.aged.last_mut() {
             Some(oldest) => {
-                self.free += oldest;
-                self.aged.insert(0, renewed);
+                self.free += std::mem::replace(oldest, renewed);
+                self.aged.rotate_right(1);
             }
             None => self.free += renewed,
         }
@@ -143,7 +164,7 @@ impl Ages {
         let able: f64 = aged
             .map(|(index, age)| age * blindness.able(index + 1))
             .sum();
-        -libm::expm1(-mean) * (self.free + able)
+        absorbed(mean) * (self.free + able)
     }
 }
 
@@ -185,6 +206,7 @@ mod tests {
             for law in LAWS {
                 let mut able = vec![0.0; whole - 1];
                 able.truncate(whole - 1);
+                let able = able.into();
                 let blindness = Blindness { law, able };
                 let mut ages = Ages::rested(&blindness);
                 let mut pulses: Vec<f64> = Vec::new();

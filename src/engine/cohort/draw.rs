@@ -1,10 +1,10 @@
 //! Draws that split cohorts: exact at any size, and also where probabilities are tiny.
 
+use super::rejection::Rejection;
 use super::words::RandomWords;
-use crate::numerics::stirling_error;
 
 /// Above this, logarithms are quicker than factors.
-const MOST_FACTORS: u64 = 4096;
+pub const MOST_FACTORS: u64 = 4096;
 
 /// `base` to the `exponent`, by squaring, without a branch that depends on its digits.
 fn power(mut base: f64, mut exponent: u64) -> f64 {
@@ -18,7 +18,7 @@ fn power(mut base: f64, mut exponent: u64) -> f64 {
 }
 
 /// Means from which rejection is the faster way; it may not begin any earlier.
-const INVERSION_MEAN: f64 = 10.0;
+pub const INVERSION_MEAN: f64 = 10.0;
 
 /// How many of `n` trials succeed, each with probability `p`; `q` is 1 − `p`.
 ///
@@ -41,78 +41,14 @@ pub fn binomial(n: u64, p: f64, q: f64, random: &mut RandomWords) -> u64 {
     if n as f64 * p < INVERSION_MEAN {
         return invert(n, p, q, random);
     }
-    reject(n, p, q, random)
-}
-
-/// Rejection from a transformed uniform number with a squeeze: Hörmann's BTRS, *The generation of binomial random
-/// variates*, J. Stat. Comput. Simul. 46 (1993). `n` `p` is at least 10, `p` at most a half.
-fn reject(n: u64, p: f64, q: f64, random: &mut RandomWords) -> u64 {
-    let trials = n as f64;
-    let variance = trials * p * q;
-    let deviation = variance.sqrt();
-    let b = 1.15 + 2.53 * deviation;
-    let a = -0.0873 + 0.0248 * b + 0.01 * p;
-    let centre = trials * p + 0.5;
-    let inside = 0.92 - 4.2 / b;
-    loop {
-        let u = random.uniform() - 0.5;
-        let v = random.coarse();
-        let us = 0.5 - u.abs();
-        let place = (2.0 * a / us + b) * u + centre;
-        // Seven draws of eight end here.
-        if us >= 0.07 && v <= inside {
-            return place as u64;
-        }
-        if !(place >= 0.0 && place < trials + 1.0) {
-            continue;
-        }
-        let k = (place as u64) as f64;
-        let alpha = (2.83 + 5.1 / b) * deviation;
-        let height = libm::log(v * alpha / (a / (us * us) + b));
-        let from_mode = (k - mode(trials, p)).abs();
-        if from_mode < 0.5 * variance - 1.0 {
-            // Bounds about the normal law settle nearly all that is left.
-            let normal = -from_mode * from_mode / (2.0 * variance);
-            let margin = from_mode / variance
-                * (((from_mode / 3.0 + 0.625) * from_mode + 1.0 / 6.0) / variance + 0.5);
-            if height <= normal - margin {
-                return k as u64;
-            }
-            if height > normal + margin {
-                continue;
-            }
-        }
-        if height <= log_likelihood_to_mode(k, trials, p, q) {
-            return k as u64;
-        }
-    }
-}
-
-/// The most likely of the numbers of successes.
-fn mode(n: f64, p: f64) -> f64 {
-    (((n + 1.0) * p) as u64) as f64
-}
-
-/// ln of the probability of `k` successes, less that of the most likely number.
-fn log_likelihood_to_mode(k: f64, n: f64, p: f64, q: f64) -> f64 {
-    let mode = mode(n, p);
-    let odds = p / q;
-    // Stirling's formula is in powers of k + 1 here, which 0! suits, too.
-    let left_out = |k: f64| stirling_error(k as u64 + 1);
-    (mode + 0.5) * libm::log((mode + 1.0) / (odds * (n - mode + 1.0)))
-        + (n + 1.0) * libm::log((n - mode + 1.0) / (n - k + 1.0))
-        + (k + 0.5) * libm::log(odds * (n - k + 1.0) / (k + 1.0))
-        + left_out(mode)
-        + left_out(n - mode)
-        - left_out(k)
-        - left_out(n - k)
+    Rejection::new(n as f64, p, q).draw(random)
 }
 
 /// Largest result of an inversion: 10 + 110 is 35 standard deviations above the largest mean.
-const INVERSION_LIMIT: u64 = 120;
+pub const INVERSION_LIMIT: u64 = 120;
 
 /// 1/k, so that the sum waits for no division.
-const RECIPROCALS: [f64; INVERSION_LIMIT as usize + 1] = {
+pub const RECIPROCALS: [f64; INVERSION_LIMIT as usize + 1] = {
     let mut reciprocals = [f64::INFINITY; INVERSION_LIMIT as usize + 1];
     let mut k = 1;
     while k < reciprocals.len() {
@@ -152,77 +88,6 @@ pub fn none_of(n: u64, p: f64, q: f64) -> f64 {
         false => libm::log1p(-p),
     };
     libm::exp(n as f64 * ln_q)
-}
-
-/// So many `draws` of things, taken without putting back from `total` of which `marked` are marked.
-#[derive(Debug, Clone, Copy)]
-pub struct Draws {
-    pub total: u64,
-    pub marked: u64,
-    pub draws: u64,
-}
-
-impl Draws {
-    /// Calls `meet` for every marked one drawn.
-    ///
-    /// Draw i is marked with probability (marked − seen) / (total − i). Candidates come at the largest value that may
-    /// take and are thinned to it, so that the cost goes with the result. Where among the draws they stand
-    /// matters only to the few that lie between the probabilities of the first draw and the last.
-    #[inline]
-    pub fn meet(self, random: &mut RandomWords, mut meet: impl FnMut(&mut RandomWords)) {
-        let Draws {
-            total,
-            marked,
-            draws,
-        } = self;
-        debug_assert!(marked <= total && draws <= total, "{self:?}");
-        if marked == 0 || draws == 0 {
-            return;
-        }
-        let mut left = marked;
-        let last = (total - draws + 1) as f64;
-        let largest = marked as f64 / last;
-        if largest > 0.5 {
-            for i in 0..draws {
-                if random.below(total - i) < left {
-                    left -= 1;
-                    meet(random);
-                }
-            }
-            return;
-        }
-        let candidates = binomial(draws, largest, 1.0 - largest, random);
-        let mut places: Option<Vec<u64>> = None;
-        for candidate in 0..candidates {
-            let height = random.coarse() * largest;
-            let unseen = left as f64;
-            let is_marked = if height * (total as f64) < unseen {
-                true
-            } else if height * last >= unseen {
-                false
-            } else {
-                let places = places.get_or_insert_with(|| some_of(draws, candidates, random));
-                height * ((total - places[candidate as usize]) as f64) < unseen
-            };
-            if is_marked {
-                left -= 1;
-                meet(random);
-            }
-        }
-    }
-}
-
-/// `count` different numbers below `n`, in order.
-#[cold]
-fn some_of(n: u64, count: u64, random: &mut RandomWords) -> Vec<u64> {
-    let mut some: Vec<u64> = Vec::with_capacity(count as usize);
-    while (some.len() as u64) < count {
-        let one = random.below(n);
-        if let Err(place) = some.binary_search(&one) {
-            some.insert(place, one);
-        }
-    }
-    some
 }
 
 #[cfg(test)]
@@ -304,37 +169,5 @@ mod tests {
             (missing - 3.0).abs() < 5.0 * (3.0f64 / 40_000.0).sqrt(),
             "{missing}"
         );
-    }
-
-    #[test]
-    fn overlaps_follow_the_hypergeometric_law() {
-        let mut random = RandomWords::new(13, 0);
-        for (total, marked, draws) in [(40, 6, 9), (256_000, 1000, 333), (10, 6, 4)] {
-            let trials = 50_000;
-            let mut seen = vec![0u32; draws.min(marked) as usize + 1];
-            for _ in 0..trials {
-                let mut met = 0;
-                let of = Draws {
-                    total,
-                    marked,
-                    draws,
-                };
-                of.meet(&mut random, |_| met += 1);
-                seen[met] += 1;
-            }
-            let none = |i| 1.0 - marked as f64 / (total - i) as f64;
-            let mut law: f64 = (0..draws).map(none).product();
-            for (k, &count) in seen.iter().enumerate() {
-                let expected = law * f64::from(trials);
-                let unmarked = (total - marked - draws) as f64 + k as f64 + 1.0;
-                let ways = (marked - k as u64) as f64 * (draws - k as u64) as f64;
-                law *= ways / ((k + 1) as f64 * unmarked);
-                let error = 5.0 * (expected + 1.0).sqrt();
-                assert!(
-                    (f64::from(count) - expected).abs() < error,
-                    "{total}, {marked}, {draws}, {k}: {count} {expected}"
-                );
-            }
-        }
     }
 }

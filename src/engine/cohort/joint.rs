@@ -18,7 +18,7 @@ use super::blindness::{Ages, Blindness};
 use super::draw::binomial;
 use super::hits::Hits;
 use super::words::RandomWords;
-use super::{EventTable, Steps};
+use super::{Counts, EventTable, Steps};
 use crate::photon::{DeadTimeLaw, SPADS};
 
 /// Counts of every bin after `cycles` laser cycles that begin in the state `ages`.
@@ -29,7 +29,7 @@ pub fn run(
     is_event: &EventTable,
     cycles: u64,
     random: &mut RandomWords,
-) -> Vec<u64> {
+) -> Counts {
     let mut tree = Tree::new(blindness, cycles);
     tree.age(ages, random);
     let periods = steps.means.chunks(steps.per_period);

@@ -24,24 +24,30 @@
 //! * A SPAD is to fire at most once in a CLK period: a shorter dead time is refused. So are afterpulses, crosstalk and
 //!   measured laser pulses.
 
+mod abreast;
+mod alone;
 mod blindness;
 mod draw;
 mod hits;
 mod joint;
 mod light;
+mod overlap;
 mod period;
 mod pooled;
+mod rejection;
 mod words;
 
 use std::ops::Range;
 use std::sync::OnceLock;
+
+use smallvec::{SmallVec, smallvec};
 
 pub use self::blindness::BlindSpad;
 use self::blindness::{Ages, Blindness};
 pub use self::draw::none_of;
 use self::hits::Hits;
 pub use self::hits::at_least_hit;
-use self::light::SpadLight;
+use self::light::{SpadLight, absorbed};
 use self::words::RandomWords;
 use super::{Engine, EngineError, Exposed, LitPixel, Work};
 use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw, correlation, histogram, window_law};
@@ -50,11 +56,17 @@ use crate::photon::{PhotonStream, PixelLight, SPADS, SpadEvent, StreamConfig};
 /// Whether 0, 1, 2, … SPADs that fire in a CLK period make an event.
 type EventTable = [bool; SPADS + 1];
 
+/// Steps of a window that need no memory of their own.
+const FEW_STEPS: usize = 16;
+
+/// Laser cycles with an event, for every bin of a window.
+type Counts = SmallVec<[u64; FEW_STEPS]>;
+
 /// Light on one SPAD over a window.
 #[derive(Debug, Clone)]
 struct Steps {
     /// Mean photons of each step.
-    means: Vec<f64>,
+    means: SmallVec<[f64; FEW_STEPS]>,
     /// Steps to a CLK period.
     per_period: usize,
 }
@@ -147,8 +159,8 @@ impl<'a> Cohort<'a> {
         light: &PixelLight,
     ) -> Result<Vec<u16>, EngineError> {
         let (bits, overflow) = (self.config.bin_bits as u32, self.config.overflow);
-        let hits = self.hits(stream, pixel, start, light)?;
-        let counts = hits.iter().map(|&n| histogram::model(n, bits, overflow));
+        let sums = self.sums(stream, pixel, start, light)?;
+        let counts = sums.iter().map(|&n| histogram::model(n, bits, overflow));
         Ok(counts.collect())
     }
 
@@ -163,34 +175,46 @@ impl<'a> Cohort<'a> {
         start: u16,
         light: &PixelLight,
     ) -> Result<Vec<u64>, EngineError> {
-        let mut hits = vec![0; self.config.bins];
-        let random = &mut RandomWords::new(stream.seed, pixel);
-        for cohort in self.cohorts(stream, start, light)? {
-            let (steps, cycles) = (&cohort.steps, cohort.cycles);
-            let run = if self.is_pooled(&cohort) {
-                pooled::run
-            } else {
-                joint::run
-            };
-            let counts = run(
-                &cohort.blindness,
-                &cohort.ages,
-                steps,
-                &self.is_event,
-                cycles,
-                random,
-            );
-            let compared = hits.iter_mut().zip(counts).skip(cohort.not_compared);
-            compared.for_each(|(sum, count)| *sum += count);
-        }
-        Ok(hits)
+        Ok(self.sums(stream, pixel, start, light)?.to_vec())
     }
 
-    fn is_pooled(&self, cohort: &LikeCycles) -> bool {
-        let (steps, cycles) = (&cohort.steps, cohort.cycles);
-        cycles > 1
-            && pooled::neglected(steps) <= self.options.neglect
-            && pooled::looked_at(&cohort.blindness, steps, cycles)
+    fn sums(
+        &self,
+        stream: &StreamConfig,
+        pixel: u32,
+        start: u16,
+        light: &PixelLight,
+    ) -> Result<Counts, EngineError> {
+        let mut sums: Counts = smallvec![0; self.config.bins];
+        let Some(cohorts) = self.cohorts(stream, start, light)? else {
+            return Ok(sums);
+        };
+        let random = &mut RandomWords::new(stream.seed, pixel);
+        let (blindness, is_event) = (&cohorts.blindness, &self.is_event);
+        for LikeCycles {
+            cycles,
+            ages,
+            steps,
+            not_compared,
+        } in cohorts.iter()
+        {
+            let counts = match cycles {
+                0 => continue,
+                1 => alone::run(blindness, ages, steps, is_event, random),
+                _ if self.is_pooled(blindness, steps, *cycles) => {
+                    pooled::run(blindness, ages, steps, is_event, *cycles, random)
+                }
+                _ => joint::run(blindness, ages, steps, is_event, *cycles, random),
+            };
+            let compared = sums.iter_mut().zip(counts).skip(*not_compared);
+            compared.for_each(|(sum, count)| *sum += count);
+        }
+        Ok(sums)
+    }
+
+    fn is_pooled(&self, blindness: &Blindness, steps: &Steps, cycles: u64) -> bool {
+        pooled::neglected(steps) <= self.options.neglect
+            && pooled::looked_at(blindness, steps, cycles)
                 <= WORTH_LOOKING_AT * steps.per_period as f64
     }
 
@@ -206,7 +230,11 @@ impl<'a> Cohort<'a> {
         light: &PixelLight,
     ) -> Result<bool, EngineError> {
         let cohorts = self.cohorts(stream, start, light)?;
-        Ok(cohorts.last().is_none_or(|settled| self.is_pooled(settled)))
+        Ok(cohorts.is_none_or(
+            |Cohorts {
+                 blindness, settled, ..
+             }| { self.is_pooled(&blindness, &settled.steps, settled.cycles) },
+        ))
     }
 
     /// Mean of every bin of [`Cohort::hits`], computed.
@@ -220,13 +248,17 @@ impl<'a> Cohort<'a> {
         light: &PixelLight,
     ) -> Result<Vec<f64>, EngineError> {
         let mut means = vec![0.0; self.config.bins];
-        for mut cohort in self.cohorts(stream, start, light)? {
+        let Some(cohorts) = self.cohorts(stream, start, light)? else {
+            return Ok(means);
+        };
+        for cohort in cohorts.iter() {
+            let mut ages = cohort.ages.clone();
             let periods = cohort.steps.means.chunks(cohort.steps.per_period);
             for (bin, (sum, period)) in means.iter_mut().zip(periods).enumerate() {
                 let mut pulse = 0.0;
                 for &mean in period {
-                    pulse += cohort.ages.pulse(&cohort.blindness, mean);
-                    cohort.ages.step(&cohort.blindness, mean);
+                    pulse += ages.pulse(&cohorts.blindness, mean);
+                    ages.step(&cohorts.blindness, mean);
                 }
                 let fired = Hits::new(SPADS, pulse, 1.0 - pulse);
                 let events = (0..=SPADS).filter(|&spads| self.is_event[spads]);
@@ -239,18 +271,18 @@ impl<'a> Cohort<'a> {
         Ok(means)
     }
 
-    /// The laser cycles of an exposure by what they have in common: the settled ones together, early ones alone.
+    /// The laser cycles of an exposure by what they have in common; `None` where no window opens.
     fn cohorts(
         &self,
         stream: &StreamConfig,
         start: u16,
         light: &PixelLight,
-    ) -> Result<Vec<LikeCycles>, EngineError> {
+    ) -> Result<Option<Cohorts>, EngineError> {
         let bins = self.config.bins;
         let Opening { window, from_fs } = self.opening(start);
         let window = match window {
             window_law::Window::Open(window) => window,
-            window_law::Window::Never => return Ok(Vec::new()),
+            window_law::Window::Never => return Ok(None),
             window_law::Window::Irregular(why) => return Err(EngineError::Irregular(why)),
             window_law::Window::Race(why) => return Err(EngineError::Race(why)),
         };
@@ -268,7 +300,7 @@ impl<'a> Cohort<'a> {
         let light = SpadLight::new(stream, light);
         let scene = Scene {
             light,
-            busy: -libm::expm1(-light.background(dead_fs)),
+            busy: absorbed(light.background(dead_fs)),
             blindness: Blindness::new(stream.spads.law, dead_steps),
             step_fs: period_fs / self.options.sub_bins as f64,
             dead_fs,
@@ -299,21 +331,23 @@ impl<'a> Cohort<'a> {
                 let first_edge = cycle * i64::from(self.exposure.stop_periods) + window.first_edge;
                 LikeCycles {
                     cycles: 1,
-                    blindness: scene.blindness.clone(),
                     ages: scene.rested_start(dark_until_fs),
                     steps: self.steps(&scene, dark_until_fs),
                     not_compared: (-1 - first_edge).clamp(0, bins as i64) as usize,
                 }
             });
-        let mut cohorts: Vec<LikeCycles> = early.collect();
-        cohorts.push(LikeCycles {
-            cycles: (cycles - first_cycle) as u64 - cohorts.len() as u64,
+        let early: Vec<LikeCycles> = early.collect();
+        let settled = LikeCycles {
+            cycles: (cycles - first_cycle) as u64 - early.len() as u64,
             ages: scene.steady_start(),
             steps: self.steps(&scene, f64::NEG_INFINITY),
-            blindness: scene.blindness,
             not_compared: 0,
-        });
-        Ok(cohorts)
+        };
+        Ok(Some(Cohorts {
+            blindness: scene.blindness,
+            early,
+            settled,
+        }))
     }
 
     fn steps(&self, scene: &Scene, dark_until_fs: f64) -> Steps {
@@ -359,10 +393,23 @@ impl Engine for Cohort<'_> {
     }
 }
 
+/// A macropixel's laser cycles.
+struct Cohorts {
+    blindness: Blindness,
+    /// Those that may remember the first STOP edge, one by one.
+    early: Vec<LikeCycles>,
+    settled: LikeCycles,
+}
+
+impl Cohorts {
+    fn iter(&self) -> impl Iterator<Item = &LikeCycles> {
+        self.early.iter().chain([&self.settled])
+    }
+}
+
 /// Laser cycles with the same light and the same state at the start of the window.
 struct LikeCycles {
     cycles: u64,
-    blindness: Blindness,
     ages: Ages,
     steps: Steps,
     /// First bins that the pipeline has not reached yet.

@@ -7,10 +7,13 @@
 //!   first one      p₀    q₀ p₁      …    q₀ q₁ … pₛ₋₁         of those that get any
 //! ```
 
-use super::Steps;
+use smallvec::SmallVec;
+
 use super::blindness::Blindness;
 use super::draw::binomial;
+use super::light::{DIM, absorbed, absorbed_dim};
 use super::words::RandomWords;
+use super::{FEW_STEPS, Steps};
 use crate::photon::DeadTimeLaw;
 
 /// What happens to a SPAD that fired lately and is hit in this period.
@@ -25,7 +28,7 @@ pub struct Meeting {
 /// Photons on one SPAD in every CLK period of a window.
 #[derive(Debug, Clone)]
 pub struct Photons {
-    steps: Vec<Step>,
+    steps: SmallVec<[Step; FEW_STEPS]>,
     per_period: usize,
 }
 
@@ -39,17 +42,24 @@ struct Step {
 
 impl Photons {
     /// Of the mean photons of all steps.
+    #[inline(always)]
     pub fn new(steps: &Steps) -> Self {
         let per_period = steps.per_period;
-        let alone = |&mean: &f64| {
-            let photon = absorbed(mean);
-            Step {
-                photon,
-                from: photon,
-                until: photon,
+        let mut photons = steps.means.clone();
+        for (photon, &mean) in photons.iter_mut().zip(&steps.means) {
+            *photon = absorbed_dim(mean);
+        }
+        if steps.means.iter().any(|&mean| mean >= DIM) {
+            for (photon, &mean) in photons.iter_mut().zip(&steps.means) {
+                *photon = absorbed(mean);
             }
+        }
+        let alone = |&photon: &f64| Step {
+            photon,
+            from: photon,
+            until: photon,
         };
-        let mut steps: Vec<Step> = steps.means.iter().map(alone).collect();
+        let mut steps: SmallVec<[Step; FEW_STEPS]> = photons.iter().map(alone).collect();
         for period in steps.chunks_mut(per_period) {
             for step in 1..per_period {
                 period[step].until += (1.0 - period[step].photon) * period[step - 1].until;
@@ -60,9 +70,13 @@ impl Photons {
         Photons { steps, per_period }
     }
 
-    /// The period of each bin.
-    pub fn periods(&self) -> impl Iterator<Item = Period<'_>> + Clone {
-        self.steps.chunks(self.per_period).map(Period)
+    /// The period of each bin, in rows of `width`.
+    pub fn rows(
+        &self,
+        width: usize,
+    ) -> impl Iterator<Item = impl Iterator<Item = Period<'_>> + Clone> {
+        let rows = self.steps.chunks(self.per_period * width);
+        rows.map(|row| row.chunks(self.per_period).map(Period))
     }
 }
 
@@ -83,7 +97,7 @@ impl Period<'_> {
 
     /// Splits `hit` SPADs that were ready, and get a photon in this period, by the step from which on they are blind:
     /// that of the first photon, or for paralysable ones that of the last. Calls `blind` with steps and SPADs.
-    #[inline]
+    #[inline(always)]
     pub fn split(
         &self,
         hit: u64,
@@ -115,8 +129,17 @@ impl Period<'_> {
         }
     }
 
+    /// How many of the ages 1, 2, … before this period leave a SPAD alone in it, whatever photons come: no pulse, and no
+    /// new age.
+    pub fn surely_blind(&self, blindness: &Blindness) -> usize {
+        match blindness.law {
+            DeadTimeLaw::NonParalysable => (blindness.certain() + 1).saturating_sub(self.steps()),
+            DeadTimeLaw::Paralysable => 0,
+        }
+    }
+
     /// What becomes of a SPAD that fired `age` ≥ 1 steps before this period and gets a photon in it.
-    #[inline]
+    #[inline(always)]
     pub fn meet(&self, age: usize, blindness: &Blindness, random: &mut RandomWords) -> Meeting {
         let mut meeting = Meeting {
             pulses: false,
@@ -144,17 +167,6 @@ impl Period<'_> {
     }
 }
 
-/// Probability of a photon where `mean` are expected.
-fn absorbed(mean: f64) -> f64 {
-    if mean >= 0.015 {
-        return -libm::expm1(-mean);
-    }
-    // Seven terms of the series are all there is to it.
-    let series = 1.0 - mean / 6.0 * (1.0 - mean / 7.0);
-    mean * (1.0
-        - mean / 2.0 * (1.0 - mean / 3.0 * (1.0 - mean / 4.0 * (1.0 - mean / 5.0 * series))))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -162,7 +174,7 @@ mod tests {
 
     fn photons(means: &[f64]) -> Photons {
         Photons::new(&Steps {
-            means: means.to_vec(),
+            means: means.into(),
             per_period: means.len(),
         })
     }
@@ -172,8 +184,8 @@ mod tests {
         fn probabilities_are_those_of_the_means(means in prop::collection::vec(1e-9f64..0.5, 1..9)) {
             // In the second of two periods.
             let both: Vec<f64> = means.iter().map(|mean| 0.5 * mean).chain(means.iter().copied()).collect();
-            let photons = Photons::new(&Steps { means: both, per_period: means.len() });
-            let period = photons.periods().last().unwrap();
+            let photons = Photons::new(&Steps { means: both.into(), per_period: means.len() });
+            let period = photons.rows(1).last().unwrap().next().unwrap();
             let odds = libm::expm1(means.iter().sum());
             prop_assert!((period.odds() / odds - 1.0).abs() < 1e-13);
             for step in 0..means.len() {
@@ -191,7 +203,7 @@ mod tests {
     #[test]
     fn spads_are_split_by_their_first_or_their_last_photon() {
         let photons = photons(&[0.3, 0.1, 0.6]);
-        let period = photons.periods().next().unwrap();
+        let period = photons.rows(1).next().unwrap().next().unwrap();
         let p = [0.3f64, 0.1, 0.6].map(|mean| -libm::expm1(-mean));
         let mut random = RandomWords::new(3, 0);
         for law in [DeadTimeLaw::NonParalysable, DeadTimeLaw::Paralysable] {
@@ -220,7 +232,7 @@ mod tests {
     fn a_spad_that_fired_lately_does_as_its_photons_say() {
         let means = [0.4, 0.2, 0.5, 0.3];
         let photons = photons(&means);
-        let period = photons.periods().next().unwrap();
+        let period = photons.rows(1).next().unwrap().next().unwrap();
         let p = means.map(|mean: f64| -libm::expm1(-mean));
         let mut random = RandomWords::new(4, 0);
         const TRIALS: u32 = 400_000;

@@ -10,16 +10,24 @@
 //!                   the others are split by the step in which they fire                      (binomial)
 //! ```
 //!
+//! What need not wait for the period before is drawn for many periods at once: all W, and the candidates for K.
+//!
 //! SPADs are independent of each other, so the pool's counts are exact, and so is each bin's distribution: which SPADs
 //! of the pool fire in a period is a uniform choice. What the pool does not keep is which of them share a cycle. Two
 //! bins' counts then lose the part of their correlation that passes through coincidences within a cycle: at most
 //! ρ² of their variance, where ρ = p/(1 − p) for p photons on a SPAD in a period. [`neglected`] gives it.
 
+use multiversion::multiversion;
+use smallvec::{SmallVec, smallvec};
+
+use super::abreast::{LANES, binomials};
 use super::blindness::{Ages, Blindness};
-use super::draw::{Draws, binomial};
+use super::draw::binomial;
+use super::overlap::Overlap;
 use super::period::{Period, Photons};
 use super::words::RandomWords;
-use super::{EventTable, Steps};
+use super::{Counts, EventTable, Steps};
+use crate::numerics::branchless::{count, floor, real};
 use crate::photon::SPADS;
 
 /// Most photons on a SPAD in a CLK period.
@@ -41,6 +49,7 @@ pub fn looked_at(blindness: &Blindness, steps: &Steps, cycles: u64) -> f64 {
 }
 
 /// Counts of every bin after `cycles` laser cycles that begin in the state `ages`.
+#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
 pub fn run(
     blindness: &Blindness,
     ages: &Ages,
@@ -48,83 +57,169 @@ pub fn run(
     is_event: &EventTable,
     cycles: u64,
     random: &mut RandomWords,
-) -> Vec<u64> {
-    let mut pool = Pool::new(blindness, ages, cycles, random);
+) -> Counts {
     let photons = Photons::new(steps);
-    let mut further = Further::default();
-    let mut ahead = photons.periods();
-    photons
-        .periods()
-        .enumerate()
-        .map(|(number, period)| {
-            let number = number % TOGETHER;
-            if number == 0 {
-                further = Further::of(ahead.by_ref().take(TOGETHER));
-            }
-            let with = pool.period(&further, number, &period, random);
-            let counted = with.iter().zip(is_event).filter(|(_, event)| **event);
-            counted.map(|(cycles, _)| cycles).sum::<u64>()
-        })
-        .collect()
+    let mut pool = Pool::new(blindness, ages, steps, cycles, random);
+    let mut counts = Counts::new();
+    for periods in photons.rows(LANES) {
+        let mut seen = see(periods.clone(), cycles, random);
+        let sums = seen.hits();
+        let (overlaps, candidates) = pool.candidates(&sums, random);
+        let mut number = 0;
+        for (lane, period) in periods.enumerate() {
+            let mut pulses = Pulses {
+                seen: &mut seen,
+                lane,
+                sum: sums[lane],
+            };
+            pool.go_blind(
+                &overlaps[lane],
+                candidates[lane],
+                sums[lane],
+                &mut pulses,
+                &period,
+                random,
+            );
+            number += 1;
+        }
+        counts.extend_from_slice(&seen.events(is_event)[..number]);
+    }
+    counts
 }
 
-/// CLK periods whose probabilities are computed side by side.
-const TOGETHER: usize = 8;
+/// Rows of [`Seen`] that need no memory of their own.
+const FEW_ROWS: usize = 5;
 
-/// Probabilities that a laser cycle in which 0, 1, 2, … SPADs are hit at least has one more, in every one of several
-/// CLK periods.
-///
-/// With o = p/(1 − p), what is known to be k or more is k with probability 1/tₖ, where
+/// Cycles in which 0, 1, 2, … SPADs are hit at least, for each of several CLK periods, down to the first row of zeros.
+struct Seen(SmallVec<[[u64; LANES]; FEW_ROWS]>);
+
+impl Seen {
+    /// SPADs that are hit.
+    #[inline(always)]
+    fn hits(&self) -> [u64; LANES] {
+        let mut hits = [0; LANES];
+        for row in &self.0[1..] {
+            for lane in 0..LANES {
+                hits[lane] += row[lane];
+            }
+        }
+        hits
+    }
+
+    /// Cycles in which so many are hit that it makes an event.
+    #[inline(always)]
+    fn events(&self, is_event: &EventTable) -> [u64; LANES] {
+        let mut events = [0; LANES];
+        let none = [0; LANES];
+        let beyond = self.0[1..].iter().chain([&none]);
+        for ((row, next), &is_event) in self.0.iter().zip(beyond).zip(is_event) {
+            let counts = if is_event { u64::MAX } else { 0 };
+            for lane in 0..LANES {
+                events[lane] += (row[lane] - next[lane]) & counts;
+            }
+        }
+        events
+    }
+}
+
+/// With o = p/(1 − p), of cycles in which k or more SPADs are hit it is k with probability 1/tₖ, where
 /// tₖ = 1 + (16 − k)/(k + 1) · o · tₖ₊₁ and t₁₆ = 1: every term is positive, so no digits are lost.
-#[derive(Default)]
-struct Further {
-    /// tₖ − 1.
-    more: [[f64; TOGETHER]; SPADS],
+#[inline(always)]
+fn see<'p>(
+    periods: impl Iterator<Item = Period<'p>>,
+    cycles: u64,
+    random: &mut RandomWords,
+) -> Seen {
+    let mut odds = [0.0; LANES];
+    for (odds, period) in odds.iter_mut().zip(periods) {
+        *odds = period.odds();
+    }
+    // tₖ − 1
+    let mut more = [[0.0; LANES]; SPADS];
+    let mut t = [1.0; LANES];
+    for (hit, more) in more.iter_mut().enumerate().rev() {
+        let ways = (SPADS - hit) as f64 / (hit + 1) as f64;
+        for lane in 0..LANES {
+            more[lane] = ways * odds[lane] * t[lane];
+            t[lane] = 1.0 + more[lane];
+        }
+    }
+    let mut at_least = [cycles; LANES];
+    let mut seen = SmallVec::new();
+    for more in &more {
+        seen.push(at_least);
+        let (mut p, mut exactly) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            exactly[lane] = 1.0 / (1.0 + more[lane]);
+            p[lane] = more[lane] * exactly[lane];
+        }
+        at_least = binomials(&at_least, &p, &exactly, random);
+        if at_least == [0; LANES] {
+            break;
+        }
+    }
+    seen.push(at_least);
+    Seen(seen)
 }
 
-impl Further {
-    fn of<'p>(periods: impl Iterator<Item = Period<'p>>) -> Self {
-        let mut odds = [0.0; TOGETHER];
-        for (odds, period) in odds.iter_mut().zip(periods) {
-            *odds = period.odds();
-        }
-        let mut more = [[0.0; TOGETHER]; SPADS];
-        let mut t = [1.0; TOGETHER];
-        for (hit, more) in more.iter_mut().enumerate().rev() {
-            let ways = (SPADS - hit) as f64 / (hit + 1) as f64;
-            for period in 0..TOGETHER {
-                more[period] = ways * odds[period] * t[period];
-                t[period] = 1.0 + more[period];
+/// SPADs with a pulse in one CLK period: at first all that are hit.
+struct Pulses<'s> {
+    seen: &'s mut Seen,
+    lane: usize,
+    sum: u64,
+}
+
+impl Pulses<'_> {
+    /// Takes one off the cycle it fell into.
+    #[inline(always)]
+    fn take_off(&mut self, random: &mut RandomWords) {
+        let mut place = count(floor(random.coarse() * real(self.sum)));
+        let rows = &mut self.seen.0[1..];
+        let (mut row, mut with) = (0, 1);
+        loop {
+            let more = rows.get(row + 1).map_or(0, |row| row[self.lane]);
+            let spads = with * (rows[row][self.lane] - more);
+            if place < spads {
+                break;
             }
+            place -= spads;
+            row += 1;
+            with += 1;
         }
-        Further { more }
-    }
-
-    /// Of `cycles` in each of which at least `least` SPADs are hit in a period, those with one more at least.
-    fn more(&self, cycles: u64, least: usize, period: usize, random: &mut RandomWords) -> u64 {
-        let Some(more) = self.more.get(least) else {
-            return 0;
-        };
-        let exactly = 1.0 / (1.0 + more[period]);
-        binomial(cycles, more[period] * exactly, exactly, random)
+        rows[row][self.lane] -= 1;
+        self.sum -= 1;
     }
 }
+
+/// Steps that need no memory of their own.
+const FEW: usize = 2 * LANES;
 
 struct Pool<'a> {
     blindness: &'a Blindness,
-    cycles: u64,
-    /// SPADs that fired one, two, … steps ago.
-    aged: Vec<u64>,
-    /// SPADs that are blind from each step of this period on.
-    renewed: Vec<u64>,
-    /// Ages of blind SPADs that were hit in this period.
-    blind: Vec<usize>,
+    per_period: usize,
+    spads: u64,
+    /// SPADs that fired last in each step, from a dead time before the window on.
+    fired: SmallVec<[u64; FEW]>,
+    /// The step to come among them.
+    now: usize,
+    /// SPADs hit in every period; in those before the window, SPADs that fired last then.
+    hits: SmallVec<[u64; FEW]>,
+    /// Blind SPADs that were hit in this period, in the order of those that may fire.
+    kept: SmallVec<[u64; 8]>,
 }
 
 impl<'a> Pool<'a> {
-    fn new(blindness: &'a Blindness, ages: &Ages, cycles: u64, random: &mut RandomWords) -> Self {
-        let (mut left, mut share_left) = (SPADS as u64 * cycles, 1.0);
-        let counts = ages.aged.iter().map(|&share| {
+    fn new(
+        blindness: &'a Blindness,
+        ages: &Ages,
+        steps: &Steps,
+        cycles: u64,
+        random: &mut RandomWords,
+    ) -> Self {
+        let per_period = steps.per_period;
+        let spads = SPADS as u64 * cycles;
+        let (mut left, mut share_left) = (spads, 1.0);
+        let aged = ages.aged.iter().map(|&share| {
             let p = if share > 0.0 {
                 (share / share_left).min(1.0)
             } else {
@@ -135,109 +230,110 @@ impl<'a> Pool<'a> {
             share_left -= share;
             count
         });
+        let mut fired: SmallVec<[u64; FEW]> = aged.collect();
+        let hits = fired.chunks(per_period).rev();
+        let hits = hits.map(|period| period.iter().sum()).collect();
+        fired.reverse();
+        let now = fired.len();
+        fired.resize(now + steps.means.len(), 0);
         Pool {
             blindness,
-            cycles,
-            aged: counts.collect(),
-            renewed: Vec::new(),
-            blind: Vec::new(),
+            per_period,
+            spads,
+            fired,
+            now,
+            hits,
+            kept: smallvec![0; ages.aged.len()],
         }
     }
 
-    /// One CLK period: how many cycles have pulses of exactly 0, 1, 2, … SPADs.
-    fn period(
+    /// How many of the SPADs hit in the next periods are candidates for having fired lately.
+    #[inline(always)]
+    fn candidates(
         &mut self,
-        further: &Further,
-        number: usize,
-        period: &Period,
+        hits: &[u64; LANES],
         random: &mut RandomWords,
-    ) -> [u64; SPADS + 1] {
-        let mut with = [0; SPADS + 1];
-        let mut at_least = self.cycles;
-        let mut hit = 0;
-        for (least, exactly) in with.iter_mut().enumerate() {
-            let more = further.more(at_least, least, number, random);
-            *exactly = at_least - more;
-            hit += more;
-            at_least = more;
-            if more == 0 {
-                break;
-            }
+    ) -> ([Overlap; LANES], [u64; LANES]) {
+        let now = self.hits.len();
+        self.hits.extend_from_slice(hits);
+        let memory = self.blindness.memory().div_ceil(self.per_period);
+        // Who still is blind was hit within the memory.
+        let mut bound: u64 = self.hits[now - memory..now].iter().sum();
+        let overlaps = std::array::from_fn(|lane| {
+            let overlap = Overlap::new(self.spads, hits[lane], bound);
+            bound = bound + hits[lane] - self.hits[now + lane - memory];
+            overlap
+        });
+        let (mut p, mut q) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            p[lane] = overlaps[lane].candidate;
+            q[lane] = 1.0 - p[lane];
         }
-        self.go_blind(hit, &mut with, period, random);
-        with
+        let candidates = binomials(hits, &p, &q, random);
+        (overlaps, candidates)
     }
 
-    /// Of `hit` SPADs, of which `with` cycles have 0, 1, 2, …, takes those too blind for a pulse off the cycles they
-    /// fell into, and lets all grow a period older.
+    /// Takes those of the SPADs `hit` in a period that are too blind for a pulse off its `pulses`, and lets all SPADs
+    /// grow a period older.
+    #[inline(always)]
     fn go_blind(
         &mut self,
+        overlap: &Overlap,
+        candidates: u64,
         hit: u64,
-        with: &mut [u64; SPADS + 1],
+        pulses: &mut Pulses,
         period: &Period,
         random: &mut RandomWords,
     ) {
-        self.renewed.clear();
-        self.renewed.resize(period.steps(), 0);
-        let mut marked: u64 = self.aged.iter().sum();
-        let (mut met, mut pulses) = (0, hit);
-        let draws = Draws {
-            total: SPADS as u64 * self.cycles,
-            marked,
-            draws: hit,
-        };
-        draws.meet(random, |random| {
-            let age = self.meet(marked, random);
-            marked -= 1;
+        let blindness = self.blindness;
+        let (fired, renewed) = self.fired.split_at_mut(self.now);
+        let matters = &mut fired[self.now - blindness.memory()..];
+        self.now += self.per_period;
+        let marked: u64 = matters.iter().sum();
+        let may_fire = matters.len() - period.surely_blind(blindness);
+        let (may_fire, surely_blind) = matters.split_at_mut(may_fire);
+        let mut idle: u64 = surely_blind.iter().sum();
+        let kept = &mut self.kept[..may_fire.len()];
+        kept.fill(0);
+        let mut met = 0;
+        let mut all_met = overlap.met(candidates, marked);
+        while let Some(place) = all_met.next(random) {
             met += 1;
-            let meeting = period.meet(age + 1, self.blindness, random);
+            if place < idle {
+                idle -= 1;
+                pulses.take_off(random);
+                continue;
+            }
+            let (step, age) = take(may_fire, place - idle, blindness.memory());
+            let meeting = period.meet(age, blindness, random);
             match meeting.renewed {
-                Some(step) => self.renewed[step] += 1,
+                Some(step) => renewed[step] += 1,
                 // It keeps its age, but is not met a second time.
-                None => self.blind.push(age),
+                None => kept[step] += 1,
             }
             if !meeting.pulses {
-                take_off(with, pulses, random);
-                pulses -= 1;
+                pulses.take_off(random);
             }
+        }
+        for (fired, kept) in may_fire.iter_mut().zip(kept) {
+            *fired += *kept;
+        }
+        period.split(hit - met, blindness.law, random, |step, spads| {
+            renewed[step] += spads
         });
-        for age in self.blind.drain(..) {
-            self.aged[age] += 1;
-        }
-        let renewed = &mut self.renewed;
-        period.split(hit - met, self.blindness.law, random, |step, spads| {
-            renewed[step] += spads;
-        });
-        let younger = self.renewed.len().min(self.aged.len());
-        let older = self.aged.len() - younger;
-        self.aged.copy_within(..older, younger);
-        for (aged, renewed) in self.aged.iter_mut().zip(self.renewed.iter().rev()) {
-            *aged = *renewed;
-        }
-    }
-
-    /// Takes one of the `marked` SPADs that fired lately out of its age.
-    fn meet(&mut self, marked: u64, random: &mut RandomWords) -> usize {
-        let place = random.below(marked);
-        let (mut age, mut younger) = (0, 0);
-        // All ages are looked at: which one it is cannot be foreseen.
-        for count in &self.aged {
-            younger += count;
-            age += usize::from(place >= younger);
-        }
-        self.aged[age] -= 1;
-        age
     }
 }
 
-/// Takes one of `hits` off the cycle it fell into, `with[f]` of which have f of them.
-fn take_off(with: &mut [u64; SPADS + 1], hits: u64, random: &mut RandomWords) {
-    let mut place = random.below(hits);
-    let mut of = 1;
-    while place >= of as u64 * with[of] {
-        place -= of as u64 * with[of];
-        of += 1;
+/// Takes the SPAD at `place` of all out of the step it fired in, the first of which is the `oldest` age. Gives step and
+/// age.
+#[inline(always)]
+fn take(fired: &mut [u64], place: u64, oldest: usize) -> (usize, usize) {
+    let (mut step, mut before) = (0, 0);
+    // All steps are looked at: which one it is cannot be foreseen.
+    for count in fired.iter() {
+        before += count;
+        step += usize::from(place >= before);
     }
-    with[of] -= 1;
-    with[of - 1] += 1;
+    fired[step] -= 1;
+    (step, oldest - step)
 }

@@ -7,7 +7,7 @@ pub struct RandomWords {
     key: [u32; 2],
     pixel: u32,
     next_block: u32,
-    words: [u32; READY],
+    words: [[u32; 2 * philox::LANES]; 4],
     /// How many of `words` are taken.
     taken: usize,
 }
@@ -21,46 +21,77 @@ impl RandomWords {
             key: philox_key(seed),
             pixel,
             next_block: 0,
-            words: [0; READY],
+            words: [[0; 2 * philox::LANES]; 4],
             taken: READY,
         }
     }
 
-    #[inline]
-    fn next_u32(&mut self) -> u32 {
-        if self.taken == READY {
-            self.refill();
+    /// The next `N` ≤ [`READY`] words.
+    #[inline(always)]
+    fn take<const N: usize>(&mut self) -> [u32; N] {
+        let mut words = [0; N];
+        let ready = &self.words.as_flattened()[self.taken..];
+        match ready.first_chunk() {
+            Some(chunk) => {
+                words = *chunk;
+                self.taken += N;
+            }
+            None => {
+                let (now, later) = words.split_at_mut(ready.len());
+                now.copy_from_slice(ready);
+                self.refill();
+                self.taken = later.len();
+                later.copy_from_slice(&self.words.as_flattened()[..self.taken]);
+            }
         }
-        let word = self.words[self.taken];
-        self.taken += 1;
-        word
+        words
     }
 
+    #[cold]
     fn refill(&mut self) {
         let others = [0, self.pixel, Purpose::Cohort as u32];
-        let rows = philox::blocks_from(self.next_block, others, self.key);
-        self.words.copy_from_slice(rows.as_flattened());
+        philox::blocks_from(self.next_block, others, self.key, &mut self.words);
         self.next_block += READY as u32 / 4;
-        self.taken = 0;
     }
 
-    /// A number in [0, 1) with 53 random bits.
-    #[inline]
+    /// A number in [0, 1) with 52 random bits.
+    #[inline(always)]
     pub fn uniform(&mut self) -> f64 {
-        let [low, high] = [self.next_u32(), self.next_u32()].map(u64::from);
-        ((low | high << 32) >> 11) as f64 * (0.5f64).powi(53)
+        unit(self.take())
     }
 
-    /// A number in [0, 1) with 32 random bits: enough to be compared with one of no great consequence.
-    #[inline]
+    /// As many numbers in [0, 1), with 52 random bits each.
+    #[inline(always)]
+    pub fn uniforms<const N: usize>(&mut self) -> [f64; N] {
+        let (low, high) = (self.take::<N>(), self.take::<N>());
+        std::array::from_fn(|i| unit([low[i], high[i]]))
+    }
+
+    /// A number in [0, 1) with 32 random bits: enough where 2⁻³² of a draw is of no consequence.
+    #[inline(always)]
     pub fn coarse(&mut self) -> f64 {
-        f64::from(self.next_u32()) * (0.5f64).powi(32)
+        let [coarse] = self.coarses();
+        coarse
+    }
+
+    /// As many of these.
+    #[inline(always)]
+    pub fn coarses<const N: usize>(&mut self) -> [f64; N] {
+        self.take::<N>()
+            .map(|word| f64::from(word) * (0.5f64).powi(32))
     }
 
     /// A whole number below `n` > 0; uneven by less than n/2⁶⁴.
-    #[inline]
+    #[inline(always)]
     pub fn below(&mut self, n: u64) -> u64 {
-        let wide = u128::from(self.next_u32()) << 32 | u128::from(self.next_u32());
-        ((wide * u128::from(n)) >> 64) as u64
+        let [high, low] = self.take().map(u128::from);
+        (((high << 32 | low) * u128::from(n)) >> 64) as u64
     }
+}
+
+#[inline(always)]
+fn unit(words: [u32; 2]) -> f64 {
+    const ONE: u64 = 1f64.to_bits();
+    let [low, high] = words.map(u64::from);
+    f64::from_bits(ONE | (low | high << 32) >> 12) - 1.0
 }
