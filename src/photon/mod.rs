@@ -13,7 +13,7 @@ mod spad;
 mod stream;
 
 pub use budget::{Convention, PhotonBudget, Spot};
-pub use gaussian::{PulseEdge, pulse_share};
+pub use gaussian::{pulse_share, pulse_shares};
 pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
 pub use philox::LANES;
 pub use pulse::{PulseError, PulseShape};

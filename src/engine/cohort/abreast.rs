@@ -20,18 +20,25 @@ pub type Lanes = [f64; LANES];
 pub fn binomials(n: &[u64; LANES], p: &Lanes, q: &Lanes, random: &mut RandomWords) -> [u64; LANES] {
     // Counted are the rarer ones of successes and failures.
     let (mut trials, mut rarer, mut other) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-    let (mut few, mut many) = (0, 0);
+    let (mut few, mut many) = (0, 0u64);
     for lane in 0..LANES {
         trials[lane] = real(n[lane]);
         rarer[lane] = p[lane].min(q[lane]);
         other[lane] = p[lane].max(q[lane]);
         let mean = trials[lane] * rarer[lane];
         few |= u64::from((mean > 0.0) & (mean < INVERSION_MEAN));
-        many |= u64::from(mean >= INVERSION_MEAN);
+        many += u64::from(mean >= INVERSION_MEAN);
     }
     let mut drawn = [0.0; LANES];
-    if many != 0 {
+    if many > WORTH_A_ROW {
         reject(&trials, &rarer, &other, &mut drawn, random);
+    } else if many > 0 {
+        for lane in 0..LANES {
+            if trials[lane] * rarer[lane] >= INVERSION_MEAN {
+                let rejection = Rejection::new(trials[lane], rarer[lane], other[lane]);
+                drawn[lane] = real(rejection.draw(random));
+            }
+        }
     }
     if few != 0 {
         invert(n, &trials, &rarer, &other, &mut drawn, random);
@@ -43,6 +50,9 @@ pub fn binomials(n: &[u64; LANES], p: &Lanes, q: &Lanes, random: &mut RandomWord
     }
     successes
 }
+
+/// Lanes of many successes that are sooner done one by one.
+const WORTH_A_ROW: u64 = 5;
 
 /// Lanes of many successes, by rejection.
 #[inline(always)]

@@ -48,9 +48,14 @@ impl Blindness {
         self.able.len()
     }
 
-    /// Steps after an avalanche in which no photon makes a pulse.
-    pub fn certain(&self) -> usize {
-        self.able.iter().take_while(|&&able| able == 0.0).count()
+    /// How many of the ages 1, 2, … leave a SPAD alone for so many `steps`, whatever photons come: no pulse, and no new
+    /// age.
+    pub fn surely_blind(&self, steps: usize) -> usize {
+        let certain = self.able.iter().take_while(|&&able| able == 0.0);
+        match self.law {
+            DeadTimeLaw::NonParalysable => (certain.count() + 1).saturating_sub(steps),
+            DeadTimeLaw::Paralysable => 0,
+        }
     }
 
     /// Probability of being able to fire `age` ≥ 1 steps after the last avalanche.

@@ -24,24 +24,23 @@ pub const INVERSION_MEAN: f64 = 10.0;
 ///
 /// Both are given because neither follows from the other when it is tiny. A generator that takes only p keeps few
 /// digits of a small one: at p = 10⁻¹⁵ and n = 10⁹, 1 − p alone puts the mean 11 % off.
+#[inline]
 pub fn binomial(n: u64, p: f64, q: f64, random: &mut RandomWords) -> u64 {
     debug_assert!(
         p >= 0.0 && q >= 0.0 && (p + q - 1.0).abs() < 1e-12,
         "{p} + {q}"
     );
-    if n == 0 || p <= 0.0 {
-        return 0;
-    }
-    if q <= 0.0 {
-        return n;
-    }
-    if p > q {
-        return n - binomial(n, q, p, random);
-    }
-    if n as f64 * p < INVERSION_MEAN {
-        return invert(n, p, q, random);
-    }
-    Rejection::new(n as f64, p, q).draw(random)
+    // Counted are the rarer ones of successes and failures.
+    let (rarer, other) = if p > q { (q, p) } else { (p, q) };
+    let mean = n as f64 * rarer;
+    let drawn = if mean >= INVERSION_MEAN {
+        Rejection::new(n as f64, rarer, other).draw(random)
+    } else if mean > 0.0 {
+        invert(n, rarer, other, random)
+    } else {
+        0
+    };
+    if p > q { n - drawn } else { drawn }
 }
 
 /// Largest result of an inversion: 10 + 110 is 35 standard deviations above the largest mean.

@@ -9,7 +9,7 @@ use std::ops::Range;
 use smallvec::{SmallVec, smallvec};
 
 use super::FEW_STEPS;
-use crate::photon::{PixelLight, PulseEdge, SPADS, StreamConfig};
+use crate::photon::{PixelLight, SPADS, StreamConfig, pulse_shares};
 
 /// Standard deviations within which the echo lies: 2·10⁻¹⁹ of it is outside.
 const ECHO_REACH: f64 = 9.0;
@@ -109,13 +109,14 @@ impl SpadLight {
                 .clamp(0.0, count as f64) as usize;
             let bounds = echo.start.max(dark_until_fs)..echo.end;
             let first = bounds.start.min(bounds.end);
-            let time = |i: usize| edge(i).clamp(first, bounds.end) - centre;
             if from_step >= to_step {
                 continue;
             }
-            let edges = PulseEdge::row((from_step..=to_step).map(time), self.sigma_fs);
-            for (mean, edges) in means[from_step..to_step].iter_mut().zip(edges.windows(2)) {
-                *mean += self.signal * edges[0].share_until(&edges[1]);
+            let time = |i: usize| edge(from_step + i).clamp(first, bounds.end) - centre;
+            let mut shares: SmallVec<[f64; FEW_STEPS]> = smallvec![0.0; to_step - from_step];
+            pulse_shares(time, self.sigma_fs, &mut shares);
+            for (mean, share) in means[from_step..to_step].iter_mut().zip(shares) {
+                *mean += self.signal * share;
             }
         }
         means

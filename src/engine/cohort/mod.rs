@@ -1,14 +1,15 @@
 //! The cohort engine: histograms without photons, at a cost that does not grow with the laser cycles.
 //!
 //! Laser cycles whose SPADs are in the same state move together: a binomial draw says how many of them see what in the
-//! next step. Two ways of keeping that state share one model of light and dead time:
+//! next step. Three ways of keeping that state share one model of light and dead time:
 //!
 //! | way | state | exact | cost of a bin |
 //! |---|---|---|---|
 //! | `pooled.rs` | how many SPADs fired 1, 2, … steps ago | every bin; two bins' correlation up to [`CohortOptions::neglect`] | a few draws |
 //! | `joint.rs` | how many cycles have which of these on one macropixel | all of it | a draw for every state that occurs |
+//! | `alone.rs` | one cycle, its SPADs one by one | all of it | a random number, more if a SPAD is hit |
 //!
-//! What both share, and what it costs in exactness:
+//! What they share, and what it costs in exactness:
 //!
 //! * **Dead time in steps** (`blindness.rs`): [`CohortOptions::sub_bins`] steps to a CLK period, the error knob. The
 //!   probability of being blind is exact to first order in the photons on one SPAD in a step. Twice the steps leave
@@ -107,6 +108,8 @@ pub struct Cohort<'a> {
     /// What the law says of each start value, once it has been asked.
     windows: Vec<OnceLock<Opening>>,
     options: CohortOptions,
+    /// Photons on a SPAD in a CLK period up to which cycles may be pooled.
+    most_photons: f64,
     is_event: EventTable,
 }
 
@@ -131,6 +134,7 @@ impl<'a> Cohort<'a> {
             law: WindowLaw::new(config, exposure),
             windows: vec![OnceLock::new(); usize::from(config.largest_start()) + 1],
             options,
+            most_photons: pooled::most_photons(options.neglect),
             is_event,
         }
     }
@@ -213,8 +217,9 @@ impl<'a> Cohort<'a> {
     }
 
     fn is_pooled(&self, blindness: &Blindness, steps: &Steps, cycles: u64) -> bool {
-        pooled::neglected(steps) <= self.options.neglect
-            && pooled::looked_at(blindness, steps, cycles)
+        let photons = pooled::largest(steps);
+        photons <= self.most_photons
+            && pooled::looked_at(blindness, steps, photons, cycles)
                 <= WORTH_LOOKING_AT * steps.per_period as f64
     }
 

@@ -6,7 +6,10 @@
 //! probabilities of the first draw and the last.
 
 use super::words::RandomWords;
-use crate::numerics::branchless::{count, floor, real};
+use crate::numerics::branchless::real;
+
+/// Groups that fill a vector.
+pub const VECTOR: usize = 4;
 
 /// So many draws from a total of which a number is marked.
 #[derive(Debug, Clone, Copy)]
@@ -32,59 +35,34 @@ impl Overlap {
         }
     }
 
-    /// The marked ones drawn, when so many draws are `candidates` and `marked` are marked.
+    /// Takes the marked ones drawn, when so many draws are `candidates`, out of their groups. `marked` holds the sizes of
+    /// all groups up to each, the last one for all; it is filled up with copies of that.
     #[inline(always)]
-    pub fn met(&self, candidates: u64, marked: u64) -> Met<'_> {
+    pub fn meet(&self, candidates: u64, marked: &mut [[f64; VECTOR]], random: &mut RandomWords) {
         debug_assert!(candidates <= self.draws, "{candidates} of {self:?}");
-        Met {
-            overlap: self,
-            candidates,
-            seen: 0,
-            left: real(marked),
-            places: None,
-        }
-    }
-}
-
-/// Marked ones, one after the other.
-pub struct Met<'o> {
-    overlap: &'o Overlap,
-    candidates: u64,
-    /// Candidates up to now.
-    seen: u64,
-    /// Marked ones not met yet.
-    left: f64,
-    /// Where among the draws the candidates stand, once asked.
-    places: Option<Vec<u64>>,
-}
-
-impl Met<'_> {
-    /// The next one's place among those that are left.
-    #[inline(always)]
-    pub fn next(&mut self, random: &mut RandomWords) -> Option<u64> {
-        let &mut Met { overlap, left, .. } = self;
-        while self.seen < self.candidates {
-            self.seen += 1;
-            let height = random.coarse() * overlap.candidate;
-            let mut place = height * overlap.total;
+        let mut places: Option<Vec<u64>> = None;
+        for candidate in 0..candidates {
+            let height = random.coarse() * self.candidate;
+            let mut place = height * self.total;
+            let left = marked.as_flattened().last().map_or(0.0, |left| *left);
             if place >= left {
-                if height * overlap.last >= left || height * self.before_last(random) >= left {
+                if height * self.last >= left {
+                    continue;
+                }
+                let places = places.get_or_insert_with(|| some_of(self.draws, candidates, random));
+                let before = real(places[candidate as usize]);
+                if height * (self.total - before) >= left {
                     continue;
                 }
                 place = random.uniform() * left;
             }
-            self.left -= 1.0;
-            return Some(count(floor(place)));
+            // No branch: which group it is cannot be foreseen.
+            for groups in marked.iter_mut() {
+                for up_to in groups {
+                    *up_to -= if place < *up_to { 1.0 } else { 0.0 };
+                }
+            }
         }
-        None
-    }
-
-    /// What was left of the total when the last candidate was drawn.
-    #[cold]
-    fn before_last(&mut self, random: &mut RandomWords) -> f64 {
-        let some = || some_of(self.overlap.draws, self.candidates, random);
-        let places = self.places.get_or_insert_with(some);
-        self.overlap.total - real(places[self.seen as usize - 1])
     }
 }
 
@@ -119,28 +97,28 @@ mod tests {
         ] {
             let trials = 50_000;
             let mut seen = vec![0u32; draws.min(marked) as usize + 1];
-            let mut first_half = 0;
+            let mut in_first = 0.0;
             let of = Overlap::new(total, draws, bound);
             for _ in 0..trials {
                 let candidates = binomial(draws, of.candidate, 1.0 - of.candidate, &mut random);
-                let mut met = 0;
-                let mut all = of.met(candidates, marked);
-                while let Some(place) = all.next(&mut random) {
-                    assert!(place < marked - met);
-                    if met == 0 && 2 * place < marked {
-                        first_half += 1;
-                    }
-                    met += 1;
-                }
+                let half = (marked / 2) as f64;
+                let mut groups = [[half, marked as f64, marked as f64, marked as f64]];
+                of.meet(candidates, &mut groups, &mut random);
+                let [[first, all, ..]] = groups;
+                let met = marked - all as u64;
+                in_first += half - first;
                 seen[met as usize] += 1;
             }
             let none = |i| (1.0 - marked as f64 / (total - i) as f64).max(0.0);
             let mut law: f64 = (0..draws).map(none).product();
-            let any = f64::from(trials) * (1.0 - law);
-            let even = 0.5 * any;
+            // Half of those met are of the first half.
+            let met: f64 = (0..)
+                .zip(&seen)
+                .map(|(k, &n)| f64::from(k) * f64::from(n))
+                .sum();
             assert!(
-                (f64::from(first_half) - even).abs() < 5.0 * (0.25 * any).sqrt(),
-                "{of:?}, {marked}: {first_half} {even}"
+                (in_first - 0.5 * met).abs() < 5.0 * (0.25 * met).sqrt(),
+                "{in_first} of {met}"
             );
             if law == 0.0 {
                 let mean: f64 = (0..)

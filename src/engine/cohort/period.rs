@@ -129,15 +129,6 @@ impl Period<'_> {
         }
     }
 
-    /// How many of the ages 1, 2, … before this period leave a SPAD alone in it, whatever photons come: no pulse, and no
-    /// new age.
-    pub fn surely_blind(&self, blindness: &Blindness) -> usize {
-        match blindness.law {
-            DeadTimeLaw::NonParalysable => (blindness.certain() + 1).saturating_sub(self.steps()),
-            DeadTimeLaw::Paralysable => 0,
-        }
-    }
-
     /// What becomes of a SPAD that fired `age` ≥ 1 steps before this period and gets a photon in it.
     #[inline(always)]
     pub fn meet(&self, age: usize, blindness: &Blindness, random: &mut RandomWords) -> Meeting {

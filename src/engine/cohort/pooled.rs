@@ -15,7 +15,7 @@
 //! SPADs are independent of each other, so the pool's counts are exact, and so is each bin's distribution: which SPADs
 //! of the pool fire in a period is a uniform choice. What the pool does not keep is which of them share a cycle. Two
 //! bins' counts then lose the part of their correlation that passes through coincidences within a cycle: at most
-//! ρ² of their variance, where ρ = p/(1 − p) for p photons on a SPAD in a period. [`neglected`] gives it.
+//! ρ² of their variance, where ρ = p/(1 − p) for the probability p of a photon on a SPAD in a period.
 
 use multiversion::multiversion;
 use smallvec::{SmallVec, smallvec};
@@ -23,29 +23,30 @@ use smallvec::{SmallVec, smallvec};
 use super::abreast::{LANES, binomials};
 use super::blindness::{Ages, Blindness};
 use super::draw::binomial;
-use super::overlap::Overlap;
+use super::overlap::{Overlap, VECTOR};
 use super::period::{Period, Photons};
 use super::words::RandomWords;
 use super::{Counts, EventTable, Steps};
-use crate::numerics::branchless::{count, floor, real};
+use crate::numerics::branchless::{count, real};
 use crate::photon::SPADS;
 
 /// Most photons on a SPAD in a CLK period.
-fn largest(steps: &Steps) -> f64 {
+pub fn largest(steps: &Steps) -> f64 {
     let periods = steps.means.chunks(steps.per_period);
     let means = periods.map(|period| period.iter().sum());
     means.fold(0.0, f64::max)
 }
 
-/// Bound on the correlation between two bins that [`run`] leaves out.
-pub fn neglected(steps: &Steps) -> f64 {
-    libm::expm1(largest(steps)).powi(2)
+/// Most photons on a SPAD in a CLK period with which [`run`] leaves out no larger correlations between two bins than this
+/// `neglect`: ρ for it is eᵐ − 1 with m photons.
+pub fn most_photons(neglect: f64) -> f64 {
+    libm::log1p(neglect.sqrt())
 }
 
-/// Mean number of SPADs in a period that [`run`] has to follow one by one.
-pub fn looked_at(blindness: &Blindness, steps: &Steps, cycles: u64) -> f64 {
+/// Mean number of SPADs in a period that [`run`] has to follow one by one, with `photons` on a SPAD in it at most.
+pub fn looked_at(blindness: &Blindness, steps: &Steps, photons: f64, cycles: u64) -> f64 {
     let periods = blindness.memory() as f64 / steps.per_period as f64;
-    (SPADS as u64 * cycles) as f64 * periods * largest(steps).powi(2)
+    (SPADS as u64 * cycles) as f64 * periods * photons * photons
 }
 
 /// Counts of every bin after `cycles` laser cycles that begin in the state `ages`.
@@ -59,7 +60,10 @@ pub fn run(
     random: &mut RandomWords,
 ) -> Counts {
     let photons = Photons::new(steps);
-    let mut pool = Pool::new(blindness, ages, steps, cycles, random);
+    let spads = SPADS as u64 * cycles;
+    let mut fired = fired_before(ages, spads, random);
+    fired.resize(fired.len() + steps.means.len(), 0);
+    let mut pool = Pool::new(blindness, steps.per_period, spads, &mut fired);
     let mut counts = Counts::new();
     for periods in photons.rows(LANES) {
         let mut seen = see(periods.clone(), cycles, random);
@@ -67,19 +71,9 @@ pub fn run(
         let (overlaps, candidates) = pool.candidates(&sums, random);
         let mut number = 0;
         for (lane, period) in periods.enumerate() {
-            let mut pulses = Pulses {
-                seen: &mut seen,
-                lane,
-                sum: sums[lane],
-            };
-            pool.go_blind(
-                &overlaps[lane],
-                candidates[lane],
-                sums[lane],
-                &mut pulses,
-                &period,
-                random,
-            );
+            let hit = sums[lane];
+            let blind = pool.go_blind(&overlaps[lane], candidates[lane], hit, &period, random);
+            take_off(blind, &mut seen.0, lane, hit, random);
             number += 1;
         }
         counts.extend_from_slice(&seen.events(is_event)[..number]);
@@ -162,88 +156,106 @@ fn see<'p>(
     Seen(seen)
 }
 
-/// SPADs with a pulse in one CLK period: at first all that are hit.
-struct Pulses<'s> {
-    seen: &'s mut Seen,
+/// Takes `count` of the `hits` SPADs with a pulse in the period of this lane off the cycles they fell into.
+#[inline(always)]
+fn take_off(
+    count: u64,
+    seen: &mut [[u64; LANES]],
     lane: usize,
-    sum: u64,
+    hits: u64,
+    random: &mut RandomWords,
+) {
+    if count == 0 {
+        return;
+    }
+    let mut left = real(hits);
+    // Most cycles have one pulse.
+    let mut alone = real(seen[1][lane] - seen[2][lane]);
+    let mut emptied = 0;
+    for _ in 0..count {
+        let place = random.coarse() * left;
+        if place < alone {
+            alone -= 1.0;
+            emptied += 1;
+        } else {
+            let with = take_off_others(place - alone, seen, lane);
+            alone += if with == 2 { 1.0 } else { 0.0 };
+        }
+        left -= 1.0;
+    }
+    seen[1][lane] -= emptied;
 }
 
-impl Pulses<'_> {
-    /// Takes one off the cycle it fell into.
-    #[inline(always)]
-    fn take_off(&mut self, random: &mut RandomWords) {
-        let mut place = count(floor(random.coarse() * real(self.sum)));
-        let rows = &mut self.seen.0[1..];
-        let (mut row, mut with) = (0, 1);
-        loop {
-            let more = rows.get(row + 1).map_or(0, |row| row[self.lane]);
-            let spads = with * (rows[row][self.lane] - more);
-            if place < spads {
-                break;
-            }
-            place -= spads;
-            row += 1;
-            with += 1;
+/// Takes the pulse at `place`, of those in cycles with two and more, off its cycle, and says how many that had.
+#[cold]
+fn take_off_others(mut place: f64, seen: &mut [[u64; LANES]], lane: usize) -> usize {
+    let mut with = 2;
+    loop {
+        let more = seen.get(with + 1).map_or(0, |row| row[lane]);
+        let pulses = real(with as u64 * (seen[with][lane] - more));
+        if place < pulses {
+            break;
         }
-        rows[row][self.lane] -= 1;
-        self.sum -= 1;
+        place -= pulses;
+        with += 1;
     }
+    seen[with][lane] -= 1;
+    with
 }
 
 /// Steps that need no memory of their own.
 const FEW: usize = 2 * LANES;
+
+/// How many of all SPADs fired last in each step of a dead time before the window, the earliest first.
+#[inline(always)]
+fn fired_before(ages: &Ages, spads: u64, random: &mut RandomWords) -> SmallVec<[u64; FEW]> {
+    let (mut left, mut share_left) = (spads, 1.0);
+    let aged = ages.aged.iter().map(|&share| {
+        let p = if share > 0.0 {
+            (share / share_left).min(1.0)
+        } else {
+            0.0
+        };
+        let count = binomial(left, p, 1.0 - p, random);
+        left -= count;
+        share_left -= share;
+        count
+    });
+    let mut fired: SmallVec<_> = aged.collect();
+    fired.reverse();
+    fired
+}
 
 struct Pool<'a> {
     blindness: &'a Blindness,
     per_period: usize,
     spads: u64,
     /// SPADs that fired last in each step, from a dead time before the window on.
-    fired: SmallVec<[u64; FEW]>,
+    fired: &'a mut [u64],
     /// The step to come among them.
     now: usize,
+    /// How many of the last ages before a period are surely blind in it, and how many SPADs are of these ages now.
+    surely_blind: usize,
+    idle: u64,
     /// SPADs hit in every period; in those before the window, SPADs that fired last then.
     hits: SmallVec<[u64; FEW]>,
-    /// Blind SPADs that were hit in this period, in the order of those that may fire.
-    kept: SmallVec<[u64; 8]>,
 }
 
 impl<'a> Pool<'a> {
-    fn new(
-        blindness: &'a Blindness,
-        ages: &Ages,
-        steps: &Steps,
-        cycles: u64,
-        random: &mut RandomWords,
-    ) -> Self {
-        let per_period = steps.per_period;
-        let spads = SPADS as u64 * cycles;
-        let (mut left, mut share_left) = (spads, 1.0);
-        let aged = ages.aged.iter().map(|&share| {
-            let p = if share > 0.0 {
-                (share / share_left).min(1.0)
-            } else {
-                0.0
-            };
-            let count = binomial(left, p, 1.0 - p, random);
-            left -= count;
-            share_left -= share;
-            count
-        });
-        let mut fired: SmallVec<[u64; FEW]> = aged.collect();
-        let hits = fired.chunks(per_period).rev();
-        let hits = hits.map(|period| period.iter().sum()).collect();
-        fired.reverse();
-        let now = fired.len();
-        fired.resize(now + steps.means.len(), 0);
+    /// `fired` has room for the window.
+    fn new(blindness: &'a Blindness, per_period: usize, spads: u64, fired: &'a mut [u64]) -> Self {
+        let before = &fired[..blindness.memory()];
+        let surely_blind = blindness.surely_blind(per_period);
+        let hits = before.rchunks(per_period).rev();
         Pool {
             blindness,
             per_period,
             spads,
+            now: before.len(),
+            surely_blind,
+            idle: before[before.len() - surely_blind..].iter().sum(),
+            hits: hits.map(|period| period.iter().sum()).collect(),
             fired,
-            now,
-            hits,
-            kept: smallvec![0; ages.aged.len()],
         }
     }
 
@@ -273,67 +285,76 @@ impl<'a> Pool<'a> {
         (overlaps, candidates)
     }
 
-    /// Takes those of the SPADs `hit` in a period that are too blind for a pulse off its `pulses`, and lets all SPADs
-    /// grow a period older.
+    /// How many of the SPADs `hit` in a period are too blind for a pulse. All SPADs grow a period older.
     #[inline(always)]
     fn go_blind(
         &mut self,
         overlap: &Overlap,
         candidates: u64,
         hit: u64,
-        pulses: &mut Pulses,
         period: &Period,
         random: &mut RandomWords,
-    ) {
-        let blindness = self.blindness;
+    ) -> u64 {
+        let (blindness, memory) = (self.blindness, self.blindness.memory());
+        let groups = 1 + memory - self.surely_blind;
+        // One vector is the common case, and stays in registers.
+        let (mut few, mut many): ([_; 1], SmallVec<[[f64; VECTOR]; 4]>);
+        let missed = match groups <= VECTOR {
+            true => {
+                few = [[0.0; VECTOR]];
+                self.meet(overlap, candidates, &mut few, random);
+                few.as_flattened()
+            }
+            false => {
+                many = smallvec![[0.0; VECTOR]; groups.div_ceil(VECTOR)];
+                self.meet(overlap, candidates, &mut many, random);
+                many.as_flattened()
+            }
+        };
+        let mut without_pulse = self.idle - count(missed[0]);
+        let mut others = hit - without_pulse;
         let (fired, renewed) = self.fired.split_at_mut(self.now);
-        let matters = &mut fired[self.now - blindness.memory()..];
-        self.now += self.per_period;
-        let marked: u64 = matters.iter().sum();
-        let may_fire = matters.len() - period.surely_blind(blindness);
-        let (may_fire, surely_blind) = matters.split_at_mut(may_fire);
-        let mut idle: u64 = surely_blind.iter().sum();
-        let kept = &mut self.kept[..may_fire.len()];
-        kept.fill(0);
-        let mut met = 0;
-        let mut all_met = overlap.met(candidates, marked);
-        while let Some(place) = all_met.next(random) {
-            met += 1;
-            if place < idle {
-                idle -= 1;
-                pulses.take_off(random);
-                continue;
-            }
-            let (step, age) = take(may_fire, place - idle, blindness.memory());
-            let meeting = period.meet(age, blindness, random);
-            match meeting.renewed {
-                Some(step) => renewed[step] += 1,
-                // It keeps its age, but is not met a second time.
-                None => kept[step] += 1,
-            }
-            if !meeting.pulses {
-                pulses.take_off(random);
+        let may_fire = &mut fired[self.now - memory..self.now - self.surely_blind];
+        for (step, (fired, missed)) in may_fire.iter_mut().zip(missed.windows(2)).enumerate() {
+            let met = *fired - count(missed[1] - missed[0]);
+            others -= met;
+            for _ in 0..met {
+                let meeting = period.meet(memory - step, blindness, random);
+                if let Some(step) = meeting.renewed {
+                    renewed[step] += 1;
+                    *fired -= 1;
+                }
+                without_pulse += u64::from(!meeting.pulses);
             }
         }
-        for (fired, kept) in may_fire.iter_mut().zip(kept) {
-            *fired += *kept;
-        }
-        period.split(hit - met, blindness.law, random, |step, spads| {
+        period.split(others, blindness.law, random, |step, spads| {
             renewed[step] += spads
         });
+        for _ in 0..self.per_period {
+            self.idle += self.fired[self.now];
+            self.idle -= self.fired[self.now - self.surely_blind];
+            self.now += 1;
+        }
+        without_pulse
     }
-}
 
-/// Takes the SPAD at `place` of all out of the step it fired in, the first of which is the `oldest` age. Gives step and
-/// age.
-#[inline(always)]
-fn take(fired: &mut [u64], place: u64, oldest: usize) -> (usize, usize) {
-    let (mut step, mut before) = (0, 0);
-    // All steps are looked at: which one it is cannot be foreseen.
-    for count in fired.iter() {
-        before += count;
-        step += usize::from(place >= before);
+    /// Sets `missed` to how many SPADs are not met in this period: the surely blind ones, and added to them those of each
+    /// other age.
+    #[inline(always)]
+    fn meet(
+        &self,
+        overlap: &Overlap,
+        candidates: u64,
+        missed: &mut [[f64; VECTOR]],
+        random: &mut RandomWords,
+    ) {
+        let may_fire = self.now - self.blindness.memory()..self.now - self.surely_blind;
+        let mut fired = self.fired[may_fire].iter();
+        let mut up_to = self.idle;
+        for group in missed.iter_mut().flatten() {
+            *group = real(up_to);
+            up_to += fired.next().unwrap_or(&0);
+        }
+        overlap.meet(candidates, missed, random);
     }
-    fired[step] -= 1;
-    (step, oldest - step)
 }

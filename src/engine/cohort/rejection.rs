@@ -73,6 +73,7 @@ impl Rejection {
     }
 
     /// Draws on until a proposal passes.
+    #[inline]
     pub fn draw(&self, random: &mut RandomWords) -> u64 {
         loop {
             let proposal = self.propose(random.uniform(), random.coarse());
