@@ -27,10 +27,7 @@ pub struct Meeting {
 
 /// Photons on one SPAD in every CLK period of a window.
 #[derive(Debug, Clone)]
-pub struct Photons {
-    steps: SmallVec<[Step; FEW_STEPS]>,
-    per_period: usize,
-}
+pub struct Photons(SmallVec<[Step; FEW_STEPS]>);
 
 /// Probabilities of a photon in one step, and of any in its period from it on and up to it.
 #[derive(Debug, Clone, Copy)]
@@ -67,16 +64,18 @@ impl Photons {
                 period[step].from += (1.0 - period[step].photon) * period[step + 1].from;
             }
         }
-        Photons { steps, per_period }
+        Photons(steps)
     }
 
-    /// The period of each bin, in rows of `width`.
+    /// The period of each bin, which has `per_period` steps, in rows of `width`.
+    #[inline(always)]
     pub fn rows(
         &self,
+        per_period: usize,
         width: usize,
     ) -> impl Iterator<Item = impl Iterator<Item = Period<'_>> + Clone> {
-        let rows = self.steps.chunks(self.per_period * width);
-        rows.map(|row| row.chunks(self.per_period).map(Period))
+        let rows = self.0.chunks(per_period * width);
+        rows.map(move |row| row.chunks_exact(per_period).map(Period))
     }
 }
 
@@ -176,7 +175,7 @@ mod tests {
             // In the second of two periods.
             let both: Vec<f64> = means.iter().map(|mean| 0.5 * mean).chain(means.iter().copied()).collect();
             let photons = Photons::new(&Steps { means: both.into(), per_period: means.len() });
-            let period = photons.rows(1).last().unwrap().next().unwrap();
+            let period = photons.rows(means.len(), 1).last().unwrap().next().unwrap();
             let odds = libm::expm1(means.iter().sum());
             prop_assert!((period.odds() / odds - 1.0).abs() < 1e-13);
             for step in 0..means.len() {
@@ -194,7 +193,7 @@ mod tests {
     #[test]
     fn spads_are_split_by_their_first_or_their_last_photon() {
         let photons = photons(&[0.3, 0.1, 0.6]);
-        let period = photons.rows(1).next().unwrap().next().unwrap();
+        let period = photons.rows(3, 1).next().unwrap().next().unwrap();
         let p = [0.3f64, 0.1, 0.6].map(|mean| -libm::expm1(-mean));
         let mut random = RandomWords::new(3, 0);
         for law in [DeadTimeLaw::NonParalysable, DeadTimeLaw::Paralysable] {
@@ -223,7 +222,7 @@ mod tests {
     fn a_spad_that_fired_lately_does_as_its_photons_say() {
         let means = [0.4, 0.2, 0.5, 0.3];
         let photons = photons(&means);
-        let period = photons.rows(1).next().unwrap().next().unwrap();
+        let period = photons.rows(means.len(), 1).next().unwrap().next().unwrap();
         let p = means.map(|mean: f64| -libm::expm1(-mean));
         let mut random = RandomWords::new(4, 0);
         const TRIALS: u32 = 400_000;

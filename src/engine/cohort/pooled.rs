@@ -63,9 +63,25 @@ pub fn run(
     let spads = SPADS as u64 * cycles;
     let mut fired = fired_before(ages, spads, random);
     fired.resize(fired.len() + steps.means.len(), 0);
-    let mut pool = Pool::new(blindness, steps.per_period, spads, &mut fired);
+    let pool = Pool::new(blindness, steps.per_period, spads, &mut fired);
+    match steps.per_period {
+        // The same, for the compiler to unroll.
+        1 => follow(1, &photons, pool, is_event, cycles, random),
+        any => follow(any, &photons, pool, is_event, cycles, random),
+    }
+}
+
+#[inline(always)]
+fn follow(
+    per_period: usize,
+    photons: &Photons,
+    mut pool: Pool,
+    is_event: &EventTable,
+    cycles: u64,
+    random: &mut RandomWords,
+) -> Counts {
     let mut counts = Counts::new();
-    for periods in photons.rows(LANES) {
+    for periods in photons.rows(per_period, LANES) {
         let mut seen = see(periods.clone(), cycles, random);
         let sums = seen.hits();
         let (overlaps, candidates) = pool.candidates(&sums, random);
@@ -314,6 +330,7 @@ impl<'a> Pool<'a> {
         let mut without_pulse = self.idle - count(missed[0]);
         let mut others = hit - without_pulse;
         let (fired, renewed) = self.fired.split_at_mut(self.now);
+        let renewed = &mut renewed[..period.steps()];
         let may_fire = &mut fired[self.now - memory..self.now - self.surely_blind];
         for (step, (fired, missed)) in may_fire.iter_mut().zip(missed.windows(2)).enumerate() {
             let met = *fired - count(missed[1] - missed[0]);
@@ -330,7 +347,7 @@ impl<'a> Pool<'a> {
         period.split(others, blindness.law, random, |step, spads| {
             renewed[step] += spads
         });
-        for _ in 0..self.per_period {
+        for _ in 0..period.steps() {
             self.idle += self.fired[self.now];
             self.idle -= self.fired[self.now - self.surely_blind];
             self.now += 1;
