@@ -23,7 +23,7 @@ const STEPS: [usize; 4] = [1, 2, 4, 8];
 
 /// Photons that the window engine handles in the time of one bin and step of the cohort engine, where it pools laser
 /// cycles.
-const PHOTONS_PER_POOL: f64 = 60.0;
+const PHOTONS_PER_POOL: f64 = 30.0;
 
 /// The same where it follows their joint state: with every SPAD ready, and for each one that is blind on average, times
 /// the square root of the steps. Fitted to macropixels of 16 000 laser cycles under 8 and 50 Mcounts/s.

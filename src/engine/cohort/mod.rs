@@ -223,7 +223,7 @@ impl<'a> Cohort<'a> {
                 <= WORTH_LOOKING_AT * steps.per_period as f64
     }
 
-    /// Whether a macropixel's settled laser cycles are pooled, which is some twenty times as fast as following their
+    /// Whether a macropixel's settled laser cycles are pooled, which is some thirty times as fast as following their
     /// joint state.
     ///
     /// # Errors
