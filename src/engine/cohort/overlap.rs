@@ -35,8 +35,8 @@ impl Overlap {
         }
     }
 
-    /// Takes the marked ones drawn, when so many draws are `candidates`, out of their groups. `marked` holds the sizes of
-    /// all groups up to each, the last one for all; it is filled up with copies of that.
+    /// Takes the marked ones drawn, when so many draws are `candidates`, out of their groups. Entry i of `marked` counts
+    /// those of the groups 0 to i; entries after the last group repeat its count.
     #[inline(always)]
     pub fn meet(&self, candidates: u64, marked: &mut [[f64; VECTOR]], random: &mut RandomWords) {
         debug_assert!(candidates <= self.draws, "{candidates} of {self:?}");

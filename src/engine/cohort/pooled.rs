@@ -355,8 +355,8 @@ impl<'a> Pool<'a> {
         without_pulse
     }
 
-    /// Sets `missed` to how many SPADs are not met in this period: the surely blind ones, and added to them those of each
-    /// other age.
+    /// Sets `missed` to how many SPADs are not met in this period: first the surely blind ones, then those and the oldest
+    /// of the others, and so on to the youngest.
     #[inline(always)]
     fn meet(
         &self,
