@@ -53,6 +53,22 @@ fn histograms_without_photons_have_as_many_counts() {
 }
 
 #[test]
+fn a_probe_names_the_engine_it_is_compared_with() {
+    let choices = [
+        (["--engine", "cycle"], "cycle"),
+        (["--engine", "cohort"], "window"),
+        (["--tolerance", "0.01"], "window"),
+    ];
+    for (choice, compared_with) in choices {
+        let here = tempfile::tempdir().unwrap();
+        let small = ["frame", "--rows", "4", "--cols", "4", "--laser-cycles", "2"];
+        let table = gdtof(here.path(), &[&small[..], &choice].concat());
+        let said = format!("agrees with {compared_with} engine");
+        assert!(table.contains(&said), "{choice:?}: {table}");
+    }
+}
+
+#[test]
 fn a_tolerance_is_kept_and_its_bound_reported() {
     let at = |tolerance: &str| frame(&["--tolerance", tolerance]).1["tolerance"].clone();
     for tolerance in ["0", "0.001", "0.1"] {

@@ -344,7 +344,7 @@ fn table(args: &FrameArgs, frame: &Frame) -> Table {
     for (row, col) in &frame.probes {
         let engine = match frame.kept {
             Some(_) => EngineKind::Window,
-            None => args.engine,
+            None => args.engine.with_photons(),
         };
         let agrees = format!("agrees with {engine:?} engine").to_lowercase();
         table.push(format!("gate level ({row}, {col})"), agrees);

@@ -42,6 +42,14 @@ pub enum EngineKind {
 }
 
 impl EngineKind {
+    /// The engine that follows photons in this one's place: probes at gate level are compared with it.
+    pub fn with_photons(self) -> Self {
+        match self {
+            EngineKind::Cohort => EngineKind::Window,
+            kind => kind,
+        }
+    }
+
     /// The engine, for a sensor and an exposure.
     pub fn build<'a>(
         self,
@@ -244,13 +252,13 @@ pub fn take_frame(
         let photons = light.map(|light| stream.pixel_events(number, &light));
         let events = photons.unwrap_or_default().events;
         let gate = run_probe(sensor, exposure, probe, start, &events)?;
-        // The cohort engine has no photons to agree on: the probe compares with the engine that it follows.
-        let (engine, model) = match engine_kind {
-            kind if kept.is_some() || *kind == EngineKind::Cohort => {
-                let model = Window::new(sensor, exposure).histogram(start, &events)?;
-                (EngineKind::Window, model)
-            }
-            &kind => (kind, exposed.histograms[pixel].clone()),
+        let engine = match kept {
+            Some(_) => EngineKind::Window,
+            None => engine_kind.with_photons(),
+        };
+        let model = match kept.is_some() || engine != *engine_kind {
+            true => Window::new(sensor, exposure).histogram(start, &events)?,
+            false => exposed.histograms[pixel].clone(),
         };
         if gate == model {
             return Ok(());
