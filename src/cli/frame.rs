@@ -342,10 +342,7 @@ fn table(args: &FrameArgs, frame: &Frame) -> Table {
     );
     table.push("exposure", frame.exposure_time);
     for (row, col) in &frame.probes {
-        let engine = match frame.kept {
-            Some(_) => EngineKind::Window,
-            None => args.engine.with_photons(),
-        };
+        let engine = args.engine.of_probes(frame.kept.is_some());
         let agrees = format!("agrees with {engine:?} engine").to_lowercase();
         table.push(format!("gate level ({row}, {col})"), agrees);
     }

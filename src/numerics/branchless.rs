@@ -3,6 +3,9 @@
 //! They use plain arithmetic only, so that they round alike on every machine. Each is good to a few units in the last
 //! place in the range that it states, and harmless elsewhere.
 
+/// Numbers that fill a vector; rows of so many, or a multiple, leave no scalar rest.
+pub const VECTOR: usize = 4;
+
 /// Added to a number below 2⁵¹ in magnitude, it leaves the nearest whole number in the lowest bits.
 const ROUNDER: f64 = 1.5 * (1u64 << 52) as f64;
 

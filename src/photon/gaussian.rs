@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use multiversion::multiversion;
 
-use crate::numerics::branchless;
+use crate::numerics::branchless::{self, VECTOR};
 
 /// An edge of a stretch of time, with the tail of the pulse on its far side.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,9 +40,6 @@ impl PulseEdge {
 
 /// Stretches that go side by side.
 const ROW: usize = 16;
-
-/// Edges that fill a vector.
-const VECTOR: usize = 4;
 
 /// Edges of a row, filled up to whole vectors.
 const EDGES: usize = (ROW + 1).next_multiple_of(VECTOR);

@@ -42,10 +42,12 @@ pub enum EngineKind {
 }
 
 impl EngineKind {
-    /// The engine that follows photons in this one's place: probes at gate level are compared with it.
-    pub fn with_photons(self) -> Self {
+    /// The engine that probes at gate level are compared with when this one is asked for: `window` in the place of
+    /// `cohort`, which has no photons, and of what a tolerance chooses.
+    pub fn of_probes(self, has_tolerance: bool) -> Self {
         match self {
             EngineKind::Cohort => EngineKind::Window,
+            _ if has_tolerance => EngineKind::Window,
             kind => kind,
         }
     }
@@ -252,10 +254,7 @@ pub fn take_frame(
         let photons = light.map(|light| stream.pixel_events(number, &light));
         let events = photons.unwrap_or_default().events;
         let gate = run_probe(sensor, exposure, probe, start, &events)?;
-        let engine = match kept {
-            Some(_) => EngineKind::Window,
-            None => engine_kind.with_photons(),
-        };
+        let engine = engine_kind.of_probes(kept.is_some());
         let model = match kept.is_some() || engine != *engine_kind {
             true => Window::new(sensor, exposure).histogram(start, &events)?,
             false => exposed.histograms[pixel].clone(),

@@ -7,7 +7,7 @@
 use super::draw::{INVERSION_LIMIT, INVERSION_MEAN, MOST_FACTORS, RECIPROCALS, none_of};
 use super::rejection::Rejection;
 use super::words::RandomWords;
-use crate::numerics::branchless::{count, floor, real};
+use crate::numerics::branchless::{VECTOR, count, floor, real};
 
 /// Bins that go abreast.
 pub const LANES: usize = 16;
@@ -103,9 +103,6 @@ fn reject(trials: &Lanes, p: &Lanes, q: &Lanes, drawn: &mut Lanes, random: &mut 
 /// A mark on proposals that are not weighed in a row.
 const AT_AN_END: u64 = 2;
 
-/// Lanes that fill a vector.
-const VECTOR: usize = 4;
-
 /// Lanes of few successes: how many of the probabilities of 0, 1, 2, … a uniform number exceeds the sum of.
 #[inline(always)]
 fn invert(
@@ -177,6 +174,7 @@ fn powers(bases: &Lanes, exponents: &[u64; LANES]) -> Lanes {
 
 #[cfg(test)]
 mod tests {
+    use super::super::draw::tests::assert_moments;
     use super::*;
     use statrs::distribution::{Binomial, Discrete};
 
@@ -220,18 +218,8 @@ mod tests {
         }
         let trials = f64::from(TRIALS);
         for (lane, &(n, p)) in LAWS.iter().enumerate() {
-            let variance = n as f64 * p * (1.0 - p);
-            let [mean, square] = moments[lane].map(|sum| sum / trials);
-            assert!(
-                mean.abs() <= 5.0 * (variance / trials).sqrt(),
-                "{n}, {p}: {mean}"
-            );
-            // The fourth moment of a binomial is below v + 3v².
-            let error = 5.0 * ((variance + 2.0 * variance * variance) / trials).sqrt();
-            assert!(
-                (square - variance).abs() <= error,
-                "{n}, {p}: {square} {variance}"
-            );
+            let [from_mean, square] = moments[lane].map(|sum| sum / trials);
+            assert_moments(n, p, TRIALS, from_mean, square);
             if n < 64 {
                 let law = Binomial::new(p, n).unwrap();
                 for (k, &count) in (0..).zip(&seen[lane]) {

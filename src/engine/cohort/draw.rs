@@ -90,8 +90,20 @@ pub fn none_of(n: u64, p: f64, q: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+
+    /// Holds the mean of so many `trials`, from the binomial's own, and their `variance` to its law.
+    pub fn assert_moments(n: u64, p: f64, trials: u32, from_mean: f64, variance: f64) {
+        let (v, trials) = (n as f64 * p * (1.0 - p), f64::from(trials));
+        assert!(
+            from_mean.abs() <= 5.0 * (v / trials).sqrt(),
+            "{n}, {p}: {from_mean}"
+        );
+        // The fourth moment of a binomial is below v + 3v².
+        let error = 5.0 * ((v + 2.0 * v * v) / trials).sqrt();
+        assert!((variance - v).abs() <= error, "{n}, {p}: {variance} {v}");
+    }
 
     fn mean_and_variance(n: u32, draw: impl FnMut() -> u64) -> (f64, f64) {
         let draws: Vec<f64> = std::iter::repeat_with(draw)
@@ -119,15 +131,7 @@ mod tests {
         ] {
             let (mean, variance) =
                 mean_and_variance(trials, || binomial(n, p, 1.0 - p, &mut random));
-            let (m, v) = (n as f64 * p, n as f64 * p * (1.0 - p));
-            let error = 5.0 * (v / f64::from(trials)).sqrt();
-            assert!((mean - m).abs() <= error, "n {n}, p {p}: {mean} {m}");
-            // The fourth moment of a binomial is below v + 3v².
-            let error = 5.0 * ((v + 2.0 * v * v) / f64::from(trials)).sqrt();
-            assert!(
-                (variance - v).abs() <= error,
-                "n {n}, p {p}: {variance} {v}"
-            );
+            assert_moments(n, p, trials, mean - n as f64 * p, variance);
         }
     }
 

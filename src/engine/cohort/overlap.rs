@@ -6,10 +6,7 @@
 //! probabilities of the first draw and the last.
 
 use super::words::RandomWords;
-use crate::numerics::branchless::real;
-
-/// Groups that fill a vector.
-pub const VECTOR: usize = 4;
+use crate::numerics::branchless::{VECTOR, real};
 
 /// So many draws from a total of which a number is marked.
 #[derive(Debug, Clone, Copy)]

@@ -43,12 +43,13 @@ impl Photons {
     pub fn new(steps: &Steps) -> Self {
         let per_period = steps.per_period;
         let mut photons = steps.means.clone();
-        for (photon, &mean) in photons.iter_mut().zip(&steps.means) {
-            *photon = absorbed_dim(mean);
-        }
-        if steps.means.iter().any(|&mean| mean >= DIM) {
-            for (photon, &mean) in photons.iter_mut().zip(&steps.means) {
-                *photon = absorbed(mean);
+        if photons.iter().all(|&mean| mean < DIM) {
+            for photon in &mut photons {
+                *photon = absorbed_dim(*photon);
+            }
+        } else {
+            for photon in &mut photons {
+                *photon = absorbed(*photon);
             }
         }
         let alone = |&photon: &f64| Step {

@@ -23,11 +23,11 @@ use smallvec::{SmallVec, smallvec};
 use super::abreast::{LANES, binomials};
 use super::blindness::{Ages, Blindness};
 use super::draw::binomial;
-use super::overlap::{Overlap, VECTOR};
+use super::overlap::Overlap;
 use super::period::{Period, Photons};
 use super::words::RandomWords;
 use super::{Counts, EventTable, Steps};
-use crate::numerics::branchless::{count, real};
+use crate::numerics::branchless::{VECTOR, count, real};
 use crate::photon::SPADS;
 
 /// Most photons on a SPAD in a CLK period.

@@ -8,7 +8,7 @@ use crate::numerics::{branchless, stirling_error, stirling_series};
 
 /// The number of successes in so many `trials`, each with probability `p` = 1 − `q` up to a half; the mean is at least
 /// 10.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct Rejection {
     trials: f64,
     p: f64,
@@ -19,7 +19,7 @@ pub struct Rejection {
 }
 
 /// Two uniform numbers, and the place that the first leads to.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct Proposal {
     /// How far from the ends of its interval the first number is.
     us: f64,
