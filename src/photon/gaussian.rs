@@ -66,7 +66,11 @@ pub fn pulse_shares(edge: impl Fn(usize) -> f64, sigma: f64, shares: &mut [f64])
 }
 
 /// Replaces distances from the centre by the tails beyond them.
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1"
+))]
 fn tails_beyond(distances: &mut [f64]) {
     for z in distances {
         *z = branchless::normal_above(z.abs());

@@ -73,7 +73,7 @@ impl Blocks {
         }
         let words = self.words.each_mut().map(|words| &mut words[..filled_up]);
         generate(
-            key,
+            &round_keys(key),
             [third, fourth],
             &self.first[..filled_up],
             &self.second[..filled_up],
@@ -101,7 +101,7 @@ pub fn blocks_from(first: u32, others: [u32; 3], key: [u32; 2], words: &mut [[u3
     let firsts: [u32; 2 * LANES] = std::array::from_fn(|block| first.wrapping_add(block as u32));
     let [row0, row1, row2, row3] = words;
     generate(
-        key,
+        &round_keys(key),
         [third, fourth],
         &firsts,
         &[second; 2 * LANES],
@@ -109,20 +109,28 @@ pub fn blocks_from(first: u32, others: [u32; 3], key: [u32; 2], words: &mut [[u3
     );
 }
 
+/// The key of every round.
+fn round_keys(mut key: [u32; 2]) -> [[u64; 2]; ROUNDS] {
+    std::array::from_fn(|_| {
+        let round = key.map(u64::from);
+        key = [key[0].wrapping_add(WEYL[0]), key[1].wrapping_add(WEYL[1])];
+        round
+    })
+}
+
 /// Words live in the low halves of 64-bit lanes, where vector units multiply them; high halves hold what is left over.
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1"
+))]
 fn generate(
-    mut key: [u32; 2],
+    keys: &[[u64; 2]; ROUNDS],
     [third, fourth]: [u32; 2],
     first: &[u32],
     second: &[u32],
     words: [&mut [u32]; 4],
 ) {
-    let mut keys = [[0; 2]; ROUNDS];
-    for round in &mut keys {
-        *round = key.map(u64::from);
-        key = [key[0].wrapping_add(WEYL[0]), key[1].wrapping_add(WEYL[1])];
-    }
     let counters = (first.as_chunks::<LANES>().0.iter()).zip(second.as_chunks::<LANES>().0);
     let [out0, out1, out2, out3] = words.map(|words| words.as_chunks_mut::<LANES>().0.iter_mut());
     let out = out0.zip(out1).zip(out2.zip(out3));
@@ -135,7 +143,7 @@ fn generate(
         }
         let mut c2 = [u64::from(third); LANES];
         let mut c3 = [u64::from(fourth); LANES];
-        for &[key0, key1] in &keys {
+        for &[key0, key1] in keys {
             for lane in 0..LANES {
                 let product0 = MULTIPLIERS[0] * (c0[lane] & LOW);
                 let product1 = MULTIPLIERS[1] * (c2[lane] & LOW);

@@ -50,7 +50,11 @@ pub fn looked_at(blindness: &Blindness, steps: &Steps, photons: f64, cycles: u64
 }
 
 /// Counts of every bin after `cycles` laser cycles that begin in the state `ages`.
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1"
+))]
 pub fn run(
     blindness: &Blindness,
     ages: &Ages,

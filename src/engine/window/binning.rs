@@ -231,7 +231,11 @@ fn row_of(slot: u32, origin_slot: i32, k: u32, bins: u32) -> u32 {
 }
 
 /// The codes and marks of a photon in each slot, but for its place.
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1"
+))]
 fn encode_slots(binning: &Binning, wanted: &Wanted, slots: &[u32], out: (&mut [Code], &mut [u32])) {
     let (bins, k) = (binning.bins, binning.slots.per_period_bits());
     let (origin_slot, later) = (wanted.origin_slot, wanted.place(0));
@@ -242,7 +246,11 @@ fn encode_slots(binning: &Binning, wanted: &Wanted, slots: &[u32], out: (&mut [C
     }
 }
 
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1"
+))]
 fn encode(
     place_shift: u32,
     words: &[u32],

@@ -10,6 +10,8 @@
 //!          └─────────┴──────┴──┴─────────┴────────┘                └──────┴──────┘
 //! ```
 
+use multiversion::multiversion;
+
 use crate::photon::{GROUP, SPADS};
 
 const DOUBTFUL: u32 = 1 << 8;
@@ -151,12 +153,7 @@ impl Codes {
     /// Makes none of those from the `first` one on whose place is `end` or more.
     pub fn drop_from(&mut self, first: usize, end: u32) {
         let new = first..self.len;
-        let marks = &mut self.marks[new.clone()];
-        for (code, mark) in self.codes[new].iter_mut().zip(marks) {
-            let is_wanted = code.0 >> PLACE_SHIFT < end;
-            *code = if is_wanted { *code } else { Code::NONE };
-            *mark = if is_wanted { *mark } else { 0 };
-        }
+        drop_from(&mut self.codes[new.clone()], &mut self.marks[new], end);
     }
 
     /// Room for more of them, to be written.
@@ -169,6 +166,19 @@ impl Codes {
         }
         let new = first..self.len;
         (&mut self.codes[new.clone()], &mut self.marks[new])
+    }
+}
+
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1"
+))]
+fn drop_from(codes: &mut [Code], marks: &mut [u32], end: u32) {
+    for (code, mark) in codes.iter_mut().zip(marks) {
+        let is_wanted = code.0 >> PLACE_SHIFT < end;
+        *code = if is_wanted { *code } else { Code::NONE };
+        *mark = if is_wanted { *mark } else { 0 };
     }
 }
 

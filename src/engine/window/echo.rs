@@ -94,7 +94,11 @@ impl EchoRows {
     }
 }
 
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1"
+))]
 fn compare(passed: &mut Passed, edges: &[[i16; 2]], [low, high]: [&[u32]; 2]) {
     for ((rank, &low), &high) in passed.ranks.iter_mut().zip(low).zip(high) {
         *rank = signal_rank(low, high);
@@ -108,7 +112,11 @@ fn compare(passed: &mut Passed, edges: &[[i16; 2]], [low, high]: [&[u32]; 2]) {
     }
 }
 
-#[multiversion(targets("x86_64+avx2", "x86_64+sse4.1"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "x86_64+sse4.1"
+))]
 fn encode(
     rows: &EchoRows,
     wanted: &Wanted,
