@@ -20,7 +20,7 @@ use super::codes::{Code, Codes, ROWS};
 use super::echo::EchoRows;
 use super::history::{Photon, certain_from, split};
 use super::sight::{ROUNDING_FS, Sight};
-use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Tables};
+use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Spacing, Tables};
 use super::{Window, Work, taken};
 use crate::photon::{
     Draw, Group, PER_BLOCK, PhotonStream, PixelStream, Place, SPADS, SpadEvent, Span,
@@ -36,10 +36,7 @@ pub struct Counting<'a> {
     binning: Binning,
     /// What a CLK period with so many SPADs adds to its bin.
     adds: [i64; SPADS + 1],
-    /// Photons whose rows differ by more are farther apart than the SPADs' memory.
-    rows_of_memory: usize,
-    /// Photons in bins whose rows differ by less are closer than it.
-    blind_rows: usize,
+    spacing: Spacing,
     /// Photons of the windows' own cycles.
     own: Draw,
     /// Photons of the group's cycles for the windows of the next cycles.
@@ -84,8 +81,11 @@ impl<'a> Counting<'a> {
             engine,
             stream,
             binning: Binning::new(bins, engine.exposure.clock.as_hz(), stream.slots()),
-            rows_of_memory: memory_rows + 2,
-            blind_rows: memory_rows,
+            spacing: Spacing {
+                bins,
+                far: memory_rows + 2,
+                blind: memory_rows,
+            },
             adds: std::array::from_fn(|spads| engine.adds(((1u32 << spads) - 1) as u16)),
             own: Draw::default(),
             previous: Draw::default(),
@@ -155,9 +155,10 @@ impl<'a> Counting<'a> {
         }
         for (row, hits) in (1..).zip(&mut pixel.hits) {
             let photons = u64::from(self.tables.count(row));
-            *hits += self.adds[1] * photons as i64;
-            pixel.work.clk_periods_visited += photons;
-            pixel.work.pulses += photons;
+            let pairs = u64::from(self.tables.pairs(row));
+            *hits += self.adds[1] * photons as i64 + self.adds[2] * pairs as i64;
+            pixel.work.clk_periods_visited += photons + pairs;
+            pixel.work.pulses += photons + 2 * pairs;
         }
         (pixel.hits, pixel.work)
     }
@@ -213,6 +214,7 @@ impl<'a> Counting<'a> {
         }
         self.tables
             .put(&self.codes, group.cycles() as usize, counted);
+        pixel.work.lost_to_dead_time += self.tables.settle_by_rows(&self.codes, &self.spacing);
         let mut index = 0;
         while let Some(special) = self.tables.special(index, &self.codes) {
             self.settle(pixel, special, group);

@@ -2,7 +2,7 @@
 
 use multiversion::multiversion;
 
-use super::codes::{CYCLES, Code, Codes, ROWS};
+use super::codes::{CYCLES, Code, Codes, MARKED_BINS, ROWS, SPAD_MARKS};
 
 /// Most photons of a group.
 pub const MOST_PHOTONS: usize = PHOTONS - 1;
@@ -19,6 +19,8 @@ pub const SIDE_BY_SIDE: usize = 4;
 pub struct Tables {
     /// What is taken out is taken out of the first one, which may fall below 0 and wrap; their sum is right.
     counts: [[u32; ROWS]; SIDE_BY_SIDE],
+    /// By row, how often two SPADs fired in the same CLK period, as [`Tables::settle_by_rows`] found.
+    pairs: [u32; ROWS],
     /// By cycle: its last photon in the high half, marks of SPADs and bins in the low one, and its specials above both.
     cycles: Box<[u64; CYCLES]>,
     /// The photon before it in the same cycle, by index.
@@ -45,6 +47,17 @@ pub struct Special {
     pub is_only: bool,
 }
 
+/// What the distance of two photons of one SPAD tells, in rows.
+#[derive(Debug, Clone, Copy)]
+pub struct Spacing {
+    /// Rows of bins, 1 to this.
+    pub bins: usize,
+    /// Farther apart than the SPADs' memory, if by more.
+    pub far: usize,
+    /// Closer than it, if by less and both in bins.
+    pub blind: usize,
+}
+
 fn table<T: Copy + Default, const N: usize>() -> Box<[T; N]> {
     match vec![T::default(); N].into_boxed_slice().try_into() {
         Ok(table) => table,
@@ -56,6 +69,7 @@ impl Default for Tables {
     fn default() -> Self {
         Tables {
             counts: [[0; ROWS]; SIDE_BY_SIDE],
+            pairs: [0; ROWS],
             cycles: table(),
             before: table(),
             special: table(),
@@ -68,12 +82,18 @@ impl Tables {
     /// Begins a macropixel.
     pub fn clear_counts(&mut self) {
         self.counts = [[0; ROWS]; SIDE_BY_SIDE];
+        self.pairs = [0; ROWS];
     }
 
     /// Photons of a row, without those that were taken out.
     pub fn count(&self, row: usize) -> u32 {
         let parts = self.counts.iter().map(|counts| counts[row]);
         parts.fold(0, u32::wrapping_add)
+    }
+
+    /// CLK periods of a row in which two SPADs fired. Their photons were taken out.
+    pub fn pairs(&self, row: usize) -> u32 {
+        self.pairs[row]
     }
 
     /// More photons of a row.
@@ -102,6 +122,44 @@ impl Tables {
             let photon = (special >> PHOTON_SHIFT) as usize - 1;
             self.cycles[codes.codes()[photon].cycle()] += ONE_SPECIAL;
         }
+    }
+
+    /// Settles photons that are the only special ones of their cycle, where rows tell what becomes of them; the others stay
+    /// special. Returns how many met a blind SPAD. What happens is as random as the light, so nothing branches on it.
+    pub fn settle_by_rows(&mut self, codes: &Codes, spacing: &Spacing) -> u64 {
+        let &Spacing { bins, far, blind } = spacing;
+        let (mut kept, mut lost) = (0, 0);
+        let (codes, marks_tell_bins) = (codes.codes(), bins <= MARKED_BINS);
+        for index in 0..self.specials {
+            let special = self.special[index];
+            let photon = (special >> PHOTON_SHIFT) as usize - 1;
+            let code = codes[photon];
+            let is_only = self.cycles[code.cycle()] / ONE_SPECIAL == 1;
+            let shares_spad = special as u32 & SPAD_MARKS != 0;
+            let shares_bin = special as u32 & !SPAD_MARKS != 0;
+            let before = codes[usize::from(self.before[photon]).saturating_sub(1)];
+            // One that shares neither with the photon before it, but with an earlier one, takes longer.
+            let is_partner = (self.before[photon] > 0) & (before.spad() == code.spad());
+            let (row, other) = (code.row(), before.row());
+            let (first, second) = (row.min(other), row.max(other));
+            let apart = second - first;
+
+            let two_fire = is_only & !shares_spad & marks_tell_bins;
+            let meets = is_only & shares_spad & !shares_bin & is_partner;
+            let unseen = (second == 0) | (first > bins);
+            let both_fire = meets & (unseen | ((first > 0) & (apart > far)));
+            let one_fires = meets & (first > 0) & (second <= bins) & (apart > 0) & (apart < blind);
+
+            let counts = &mut self.counts[0];
+            counts[row] = counts[row].wrapping_sub(2 * u32::from(two_fire));
+            self.pairs[row] += u32::from(two_fire);
+            counts[second] = counts[second].wrapping_sub(u32::from(one_fires));
+            lost += u64::from(one_fires);
+            self.special[kept] = special;
+            kept += usize::from(!(two_fire | both_fire | one_fires));
+        }
+        self.specials = kept;
+        lost
     }
 
     /// The `index`-th photon that has its SPAD or its bin in common with an earlier one of its cycle, or is doubtful. A

@@ -160,10 +160,10 @@ impl Counting<'_> {
         let bins = pixel.hits.len();
         let (first, second) = (row.min(other_row), row.max(other_row));
         // Nothing is counted outside the window; apart by more rows than the memory has, photons do not meet.
-        if second == 0 || first > bins || first > 0 && second - first > self.rows_of_memory {
+        if second == 0 || first > bins || first > 0 && second - first > self.spacing.far {
             return Some([1; 2]);
         }
-        if first > 0 && first != second && second <= bins && second - first < self.blind_rows {
+        if first > 0 && first != second && second <= bins && second - first < self.spacing.blind {
             pixel.work.lost_to_dead_time += 1;
             let is_first = u8::from(row < other_row);
             return Some([is_first, 1 - is_first]);
