@@ -25,6 +25,7 @@ mod scenario;
 
 mod every_edge {
     pub mod circuit;
+    mod placement;
     pub mod waves;
 }
 

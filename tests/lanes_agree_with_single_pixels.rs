@@ -4,6 +4,7 @@
 #[allow(dead_code)]
 mod every_edge {
     pub mod circuit;
+    mod placement;
 }
 mod scenario;
 
