@@ -22,6 +22,7 @@ pub mod load;
 pub mod recording;
 mod stimulus;
 mod testbench;
+mod timed;
 pub mod timing;
 pub mod waveform;
 mod window;
@@ -36,6 +37,7 @@ pub use light::{
 };
 pub use stimulus::{LoadPins, Pins, Schedule, StimulusPlan};
 pub use testbench::{export_annotated_verilog, export_verilog};
+pub use timed::{Runner, TimeKeeping, Timed, Timekept};
 pub use window::Window;
 
 use crate::photon::{PhotonStream, SpadEvent};
