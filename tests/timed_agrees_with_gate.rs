@@ -65,7 +65,7 @@ fn scenario(random: &mut StdRng, clock: Clock) -> (Scenario, Silicon) {
         let edge = strobe.as_s().max(timing.clk_to_event.as_s() / 2.0) * silicon.factor;
         let half = match clock {
             Clock::Slow => edge * random.random_range(2.0..4.0),
-            _ => edge * random.random_range(0.95..1.1),
+            _ => edge * random.random_range(0.97..1.05),
         };
         config.clk_hz = 0.5 / half;
         config.stop_phase_ps = random.random_range(-0.3..0.3) * 1e12 * half;

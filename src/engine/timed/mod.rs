@@ -72,6 +72,12 @@ enum Judged {
     InDoubt(Doubt),
 }
 
+impl Judged {
+    fn is_counted(&self) -> bool {
+        matches!(self, Judged::Counted(_))
+    }
+}
+
 impl<'a> Timed<'a> {
     /// An engine for this sensor and exposure; `silicon` says what its macropixels are made of.
     pub fn new(config: &'a SensorConfig, exposure: &'a Exposure, silicon: &Silicon) -> Self {
@@ -138,7 +144,7 @@ impl<'a> Timed<'a> {
             .into_par_iter()
             .map(|pixel| {
                 let judged = judge(pixel)?;
-                done(usize::from(matches!(judged, Judged::Counted(_))));
+                done(usize::from(judged.is_counted()));
                 Ok(judged)
             })
             .collect();
@@ -194,8 +200,8 @@ impl<'a> Timed<'a> {
                     true => self.confirmed(counts, &self.timing(pixel)),
                     false => Judged::Counted(counts),
                 };
+                done(usize::from(judged[pixel].is_counted()));
             }
-            done(numbers.len());
         }
         Ok(())
     }
