@@ -5,7 +5,7 @@ mod scenario;
 
 use std::collections::BTreeMap;
 
-use guided_dtof::chip::{ChipTiming, PCounter, SensorConfig, sensor};
+use guided_dtof::chip::{ChipTiming, Mode, PCounter, SensorConfig, Tap, sensor};
 use guided_dtof::engine::timing::Silicon;
 use guided_dtof::engine::{Gate, Runner, Timed};
 use guided_dtof::netlist::{Mismatch, Netlist, Timing};
@@ -60,6 +60,12 @@ fn scenario(random: &mut StdRng, clock: Clock) -> (Scenario, Silicon) {
     let Scenario { mut config, .. } = Scenario::random(random, rows, cols);
     let silicon = silicon(random, &config);
     if clock != Clock::Any {
+        if clock == Clock::NearLimit {
+            config.counter_bits = random.random_range(8..13);
+            config.p_counter = PCounter::Ripple;
+            config.tap = Tap::Borrow;
+            config.mode = Mode::Guided;
+        }
         let timing = ChipTiming::of(&config);
         let strobe = timing.ripple() + timing.local_stop_to_strobe - timing.clk_to_shift;
         let edge = strobe.as_s().max(timing.clk_to_event.as_s() / 2.0) * silicon.factor;
@@ -159,4 +165,13 @@ fn near_the_limit_some_keep_time_and_some_are_replayed() {
     let sum = compare_all(Clock::NearLimit, 2_000..2_060);
     let races = sum.replayed["the strobe meets a change of the shift register"];
     assert!(races > 10 && sum.kept > 40, "{races} {}", sum.kept);
+}
+
+/// Some minutes: `cargo test --release --test timed_agrees_with_gate -- --ignored --nocapture`.
+#[test]
+#[ignore = "thousands of macropixels"]
+fn over_thousands_of_macropixels() {
+    for clock in [Clock::Any, Clock::Slow, Clock::NearLimit] {
+        compare_all(clock, 10_000..11_500);
+    }
 }

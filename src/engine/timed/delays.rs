@@ -12,7 +12,7 @@
 
 use crate::chip::{Mode, SPADS, SensorConfig, sensor};
 use crate::logic::Logic::{One, Zero};
-use crate::netlist::{Arrivals, Edge, FlatCell, NetId, Netlist, StaticTiming, Timing};
+use crate::netlist::{Arrivals, CellKind, Edge, FlatCell, NetId, Netlist, StaticTiming, Timing};
 use crate::units::Time;
 
 /// Earliest and latest.
@@ -27,6 +27,8 @@ pub fn spread(span: Span) -> Time {
 pub struct Anatomy {
     /// A macropixel with its load path, as the gate engine has it. Only names depend on its position.
     pub netlist: Netlist,
+    /// Path of each cell before and, where the macropixel is in it, after its name.
+    paths: Vec<(String, Option<String>)>,
     mode: Mode,
     clk: NetId,
     stop: NetId,
@@ -61,6 +63,10 @@ pub struct Delays {
     pub hit_release: Span,
     /// The slowest arc of any cell.
     pub slowest: Time,
+    /// The slowest arc of an AND.
+    pub slowest_and: Time,
+    /// The fastest arc of a flip-flop.
+    pub fastest_flip_flop: Time,
     /// What the guided mode needs.
     pub counter: Option<CounterDelays>,
 }
@@ -117,7 +123,16 @@ impl Anatomy {
         let toggles = std::array::from_fn(|spad| netlist.cell(&toggle(spad)).expect("a SPAD"));
         let p_counter = netlist.scope(&path("p_counter")).expect("a P-counter");
         let is_flip_flop = |&cell: &usize| netlist.cells()[cell].kind.is_flip_flop();
+        let pixel = sensor::pixel_name(0, 0);
+        let paths = (0..netlist.cells().len()).map(|cell| {
+            let path = netlist.cell_path(cell);
+            match path.split_once(&pixel) {
+                Some((before, after)) => (before.to_owned(), Some(after.to_owned())),
+                None => (path, None),
+            }
+        });
         Anatomy {
+            paths: paths.collect(),
             mode: config.mode,
             clk: net("CLK"),
             stop: net("STOP"),
@@ -135,6 +150,14 @@ impl Anatomy {
             toggles,
             counting: netlist.cells_of(p_counter).filter(is_flip_flop).collect(),
             netlist,
+        }
+    }
+
+    /// Path of a cell where the macropixel has another name.
+    pub fn cell_path(&self, cell: usize, pixel: &str) -> String {
+        match &self.paths[cell] {
+            (path, None) => path.clone(),
+            (before, Some(after)) => [before, pixel, after].concat(),
         }
     }
 
@@ -161,7 +184,9 @@ impl Anatomy {
             shift: shift.reduce(hull).expect("a METDC has stages"),
             strobe: edge(&stop, self.strobe, Edge::Rise),
             hit_release: edge(&stop, self.hit_reset, Edge::Fall),
-            slowest: self.slowest(timing),
+            slowest: latest(self.arcs(timing, |_| true)),
+            slowest_and: latest(self.arcs(timing, |kind| kind == CellKind::And2)),
+            fastest_flip_flop: earliest(self.arcs(timing, CellKind::is_flip_flop)),
             counter: None,
         };
         if self.mode == Mode::Conventional {
@@ -228,10 +253,23 @@ impl Anatomy {
         self.netlist.cells()[cell].inputs[pin]
     }
 
-    fn slowest(&self, timing: &Timing) -> Time {
-        let arcs = (0..self.netlist.cells().len()).flat_map(|cell| timing.of(cell));
-        let slowest = arcs.map(|arc| arc.rise_fs.max(arc.fall_fs)).max();
-        Time::from_fs(slowest.expect("a macropixel has cells").into())
+    /// Fastest and slowest arc of every cell of some kinds.
+    fn arcs(
+        &self,
+        timing: &Timing,
+        is: impl Fn(CellKind) -> bool,
+    ) -> impl Iterator<Item = Option<Span>> {
+        let cells = self.netlist.cells().iter().enumerate();
+        cells
+            .filter(move |(_, leaf)| is(leaf.kind))
+            .map(|(cell, leaf)| {
+                let pins = 0..leaf.kind.inputs().len();
+                let arcs = pins.filter(|&pin| leaf.kind.triggers(pin)).flat_map(|pin| {
+                    let arc = timing.of(cell)[pin];
+                    [arc.rise_fs, arc.fall_fs].map(|fs| Time::from_fs(fs.into()))
+                });
+                arcs.map(|delay| (delay, delay)).reduce(hull)
+            })
     }
 }
 
@@ -251,4 +289,9 @@ fn hull(a: Span, b: Span) -> Span {
 fn latest(windows: impl Iterator<Item = Option<Span>>) -> Time {
     let ends = windows.flatten().map(|window| window.1);
     ends.max().unwrap_or(Time::ZERO)
+}
+
+fn earliest(windows: impl Iterator<Item = Option<Span>>) -> Time {
+    let begins = windows.flatten().map(|window| window.0);
+    begins.min().unwrap_or(Time::ZERO)
 }

@@ -11,7 +11,6 @@
 //! with an order in doubt are simulated. Histograms are those of [`Gate::histograms_with`], bit for bit.
 
 mod delays;
-mod full;
 mod orders;
 
 use std::borrow::Cow;
@@ -24,7 +23,7 @@ use super::timing::Silicon;
 use super::{Cycle, Engine, EngineError, Gate, LaneSimulation, Window};
 use crate::chip::{ChipTiming, Exposure, Mode, PCounter, SensorConfig, WindowLaw, sensor};
 use crate::kernel::LANES;
-use crate::netlist::{Netlist, Timing};
+use crate::netlist::Timing;
 use crate::photon::SpadEvent;
 use delays::Anatomy;
 use orders::{Doubt, Orders, Setting};
@@ -70,12 +69,6 @@ enum Judged {
     Counted(Vec<u16>),
     ForCycle(Vec<SpadEvent>),
     InDoubt(Doubt),
-}
-
-impl Judged {
-    fn is_counted(&self) -> bool {
-        matches!(self, Judged::Counted(_))
-    }
 }
 
 impl<'a> Timed<'a> {
@@ -138,13 +131,13 @@ impl<'a> Timed<'a> {
             let law = orders.law();
             let engine = Window::with_law(self.setting.config, self.setting.exposure, law.clone());
             let counts = engine.histogram(start, &orders.shifted(law, pulses))?;
-            Ok(self.confirmed(counts, &timing))
+            Ok(Judged::Counted(counts))
         };
         let judged: Result<Vec<Judged>, EngineError> = (0..pixels)
             .into_par_iter()
             .map(|pixel| {
                 let judged = judge(pixel)?;
-                done(usize::from(judged.is_counted()));
+                done(usize::from(matches!(judged, Judged::Counted(_))));
                 Ok(judged)
             })
             .collect();
@@ -196,12 +189,9 @@ impl<'a> Timed<'a> {
         {
             let counts = cycle.histograms(starts, pulses)?;
             for (&pixel, counts) in numbers.iter().zip(counts) {
-                judged[pixel] = match full::matters(self.setting.config, &counts) {
-                    true => self.confirmed(counts, &self.timing(pixel)),
-                    false => Judged::Counted(counts),
-                };
-                done(usize::from(judged[pixel].is_counted()));
+                judged[pixel] = Judged::Counted(counts);
             }
+            done(numbers.len());
         }
         Ok(())
     }
@@ -276,15 +266,6 @@ impl<'a> Timed<'a> {
         }
     }
 
-    /// `counts`, unless they went where the bins' own delays may matter and do.
-    fn confirmed(&self, counts: Vec<u16>, timing: &Timing) -> Judged {
-        let config = self.setting.config;
-        if full::matters(config, &counts) && !full::is_safe(config, &self.anatomy, timing) {
-            return Judged::InDoubt("a bin may seem full for a moment");
-        }
-        Judged::Counted(counts)
-    }
-
     /// Start values that the load does not bring into the P-counters. Its delays are the same for every macropixel.
     fn spoilt_starts(&self, starts: &[u16]) -> BTreeSet<u16> {
         let Setting {
@@ -324,10 +305,10 @@ impl<'a> Timed<'a> {
         if let Some((timing, _)) = &self.alike {
             return Cow::Borrowed(timing);
         }
-        let config = self.setting.config;
-        let position = (pixel / config.cols, pixel % config.cols);
-        let netlist = Netlist::elaborate(&sensor::window(config, position, (1, 1)));
-        Cow::Owned(self.silicon.timing(&netlist))
+        let cols = self.setting.config.cols;
+        let name = sensor::pixel_name(pixel / cols, pixel % cols);
+        let path = |cell| self.anatomy.cell_path(cell, &name);
+        Cow::Owned(self.silicon.timing_as(&self.anatomy.netlist, path))
     }
 
     fn orders(&self, timing: &Timing) -> Orders {

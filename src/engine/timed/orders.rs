@@ -15,7 +15,9 @@
 use super::delays::{CounterDelays, Delays, spread};
 use crate::chip::p_counter::{CounterTiming, Rises, starts_high};
 use crate::chip::window_law::{Window, WindowLaw};
-use crate::chip::{AfterBorrow, ChipTiming, Exposure, Mode, PCounter, SPADS, SensorConfig};
+use crate::chip::{
+    AfterBorrow, ChipTiming, Exposure, Mode, Overflow, PCounter, SPADS, SensorConfig,
+};
 use crate::engine::Schedule;
 use crate::photon::SpadEvent;
 use crate::units::Time;
@@ -79,9 +81,11 @@ impl Orders {
             return self.doubt;
         }
         let (config, exposure) = (setting.config, setting.exposure);
-        let is_guided = config.mode == Mode::Guided;
-        if is_guided && starts_high(config, start) {
-            return Some("LOCAL_STOP is high from the reset on");
+        // Otherwise a LOCAL_STOP that starts high stays so, and the counter at rest.
+        let is_stirred =
+            config.after_borrow == AfterBorrow::Wrap || config.p_counter == PCounter::SetReset;
+        if config.mode == Mode::Guided && starts_high(config, start) && is_stirred {
+            return Some("a reset raises LOCAL_STOP");
         }
         match self.law.window(start) {
             Window::Race(why) | Window::Irregular(why) => Some(why),
@@ -192,6 +196,12 @@ fn always(setting: &Setting<'_>, delays: &Delays) -> Option<Doubt> {
         (
             settling < laser_cycle && delays.strobe.1 + settling < after_the_end,
             "a bin has no time to count",
+        ),
+        (
+            // A carry passes 2ⁿ bits of a bin before it comes to those beside them in the tree that tells when the bin is
+            // full, n gates deep: the tree has seen them fall by then, and is never high on the way.
+            delays.slowest_and < delays.fastest_flip_flop * 2 || config.overflow == Overflow::Wrap,
+            "a bin may seem full for a moment",
         ),
     ];
     let unmet = |orders: &[(bool, Doubt)]| orders.iter().find(|(holds, _)| !holds).map(|o| o.1);
