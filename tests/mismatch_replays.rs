@@ -21,7 +21,12 @@ fn folder() -> tempfile::TempDir {
     );
     for row in 0..SIDE {
         for col in 0..SIDE {
-            inits += &format!("{row},{col},{}\n", random.random_range(10..40));
+            // The first one's LOCAL_STOP is cut off by the next laser cycle's reset.
+            let start = match (row, col) {
+                (0, 0) => 59,
+                _ => random.random_range(10..58),
+            };
+            inits += &format!("{row},{col},{start}\n");
             for _ in 0..300 {
                 let time_fs = random.random_range(0..1_000_000_000);
                 events += &format!("{time_fs},{row},{col},{}\n", random.random_range(0..16));
@@ -73,9 +78,13 @@ fn engines_agree_under_mismatch_and_tell_what_was_replayed() {
             let kept = number(&said, "in closed form");
             let replayed = number(&said, "replayed at gate level");
             assert_eq!(kept + replayed, (SIDE * SIDE) as usize, "{said}");
-            assert!(kept * 2 > replayed, "{said}");
-            let is_at_limit = more.contains("limit.toml");
-            assert_eq!(replayed > 0, is_at_limit, "{more}: {said}");
+            // Only start values at the end of the laser cycle.
+            assert!(kept > 30, "{said}");
+            assert_eq!(
+                number(&said, "next laser cycle's reset"),
+                replayed,
+                "{said}"
+            );
         }
     }
 }

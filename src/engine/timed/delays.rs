@@ -55,8 +55,8 @@ pub struct Delays {
     pub latency: [(Time, Time); SPADS],
     /// CLK rises → SPAD_EVENT settled, latest.
     pub event: Time,
-    /// CLK rises → SHIFT changes, all stages together.
-    pub shift: Span,
+    /// CLK rises → the stage of SHIFT changes that each bin's HIT takes, bin 0 first.
+    pub shift: Vec<Span>,
     /// CLK falls (guided) or STOP rises (conventional) → STROBE rises.
     pub strobe: Span,
     /// COUNTER_RESET falls (guided) or STOP rises (conventional) → HIT's reset ends.
@@ -172,7 +172,8 @@ impl Anatomy {
         let rise = after(self.clk, &[Edge::Rise], &cuts(&[self.counter_clk]));
         let ends = [self.run, self.counter_reset, self.strobe, self.hit_reset];
         let stop = after(self.stop, &[Edge::Rise], &cuts(&ends));
-        let shift = self.shift.iter().map(|&bit| changes(&rise, bit));
+        // The newest event is in the first stage and goes into the last bin.
+        let shift = self.shift.iter().rev().map(|&bit| changes(&rise, bit));
         let both = |cell: usize| {
             let clock = timing.of(cell)[1];
             let [rise, fall] = [One, Zero].map(|to| Time::from_fs(clock.to(to).into()));
@@ -181,7 +182,7 @@ impl Anatomy {
         let mut delays = Delays {
             latency: self.toggles.map(both),
             event: changes(&rise, self.event).1,
-            shift: shift.reduce(hull).expect("a METDC has stages"),
+            shift: shift.collect(),
             strobe: edge(&stop, self.strobe, Edge::Rise),
             hit_release: edge(&stop, self.hit_reset, Edge::Fall),
             slowest: latest(self.arcs(timing, |_| true)),
@@ -282,7 +283,8 @@ fn changes(arrivals: &Arrivals<'_>, net: NetId) -> Span {
     arrivals.window(net).expect("the macropixel connects these")
 }
 
-fn hull(a: Span, b: Span) -> Span {
+/// The span from the earlier beginning to the later end.
+pub fn hull(a: Span, b: Span) -> Span {
     (a.0.min(b.0), a.1.max(b.1))
 }
 

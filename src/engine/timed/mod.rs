@@ -26,7 +26,7 @@ use crate::kernel::LANES;
 use crate::netlist::Timing;
 use crate::photon::SpadEvent;
 use delays::Anatomy;
-use orders::{Doubt, Orders, Setting};
+use orders::{Doubt, Orders, Part, Setting};
 
 /// What runs the macropixels whose orders are decided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -120,17 +120,24 @@ impl<'a> Timed<'a> {
             }
             let timing = self.timing(pixel);
             let orders = self.orders_of(&timing);
-            if let Some(doubt) = orders.doubt(&self.setting, start) {
-                return Ok(Judged::InDoubt(doubt));
-            }
-            let edge = |law: &WindowLaw| law.window(start).open().map(|window| window.first_edge);
-            let own = edge(orders.law());
-            if is_levelled && own.is_some() && own == edge(&common) {
+            let parts = match orders.parts(&self.setting, start) {
+                Ok(parts) => parts,
+                Err(doubt) => return Ok(Judged::InDoubt(doubt)),
+            };
+            let window = common.window(start).open();
+            let is_common = |part: &Part| part.first_edge == window.map(|w| w.first_edge);
+            if is_levelled && window.is_some() && parts.iter().all(is_common) {
                 return Ok(Judged::ForCycle(orders.shifted(&common, pulses)));
             }
-            let law = orders.law();
-            let engine = Window::with_law(self.setting.config, self.setting.exposure, law.clone());
-            let counts = engine.histogram(start, &orders.shifted(law, pulses))?;
+            let mut counts = vec![0; self.setting.config.bins];
+            for Part { law, bins, .. } in parts {
+                let pulses = orders.shifted(&law, pulses);
+                let engine = Window::with_law(self.setting.config, self.setting.exposure, law);
+                let histogram = engine.histogram(start, &pulses)?;
+                for bin in bins {
+                    counts[bin] = histogram[bin];
+                }
+            }
             Ok(Judged::Counted(counts))
         };
         let judged: Result<Vec<Judged>, EngineError> = (0..pixels)

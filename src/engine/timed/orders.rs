@@ -12,7 +12,7 @@
 //! the arrival is uncertain: its *race* is then two spans that overlap. Orders that hold in any silicon scaled as a whole,
 //! but perhaps not in one whose cells differ, are asked for here. Whatever is not proven is in doubt.
 
-use super::delays::{CounterDelays, Delays, spread};
+use super::delays::{CounterDelays, Delays, Span, hull, spread};
 use crate::chip::p_counter::{CounterTiming, Rises, starts_high};
 use crate::chip::window_law::{Window, WindowLaw};
 use crate::chip::{
@@ -32,6 +32,8 @@ pub type Doubt = &'static str;
 #[derive(Clone)]
 pub struct Orders {
     law: WindowLaw,
+    /// CLK rises → what each bin takes changes.
+    shift: Vec<Span>,
     latency: [Time; SPADS],
     /// What is in doubt for every start value.
     doubt: Option<Doubt>,
@@ -39,6 +41,16 @@ pub struct Orders {
     counter_clk: Time,
     /// STOP rises → COUNTER_RESET rises, latest.
     reset: Time,
+}
+
+/// Bins that follow one law.
+pub struct Part {
+    /// The law.
+    pub law: WindowLaw,
+    /// The rising CLK edge that takes the photons of bin 0; `None` where the window never opens.
+    pub first_edge: Option<i64>,
+    /// Which bins.
+    pub bins: Vec<usize>,
 }
 
 /// What all macropixels of an array share.
@@ -63,6 +75,7 @@ impl Orders {
         };
         Orders {
             law: WindowLaw::with_timing(setting.config, setting.exposure, timing),
+            shift: delays.shift.clone(),
             latency: delays.latency.map(|(rise, _)| rise),
             doubt: always(setting, delays),
             counter_clk: counter.map_or(Time::ZERO, |c| c.counter_clk.0),
@@ -70,34 +83,70 @@ impl Orders {
         }
     }
 
-    /// The window law with this macropixel's delays.
-    pub fn law(&self) -> &WindowLaw {
-        &self.law
-    }
-
-    /// What is in doubt for this start value, if anything.
-    pub fn doubt(&self, setting: &Setting<'_>, start: u16) -> Option<Doubt> {
-        if self.doubt.is_some() {
-            return self.doubt;
+    /// The laws that the bins follow with this start value: one for all, or two where the strobe comes between the changes
+    /// of their stages.
+    ///
+    /// # Errors
+    /// What is in doubt.
+    pub fn parts(&self, setting: &Setting<'_>, start: u16) -> Result<Vec<Part>, Doubt> {
+        if let Some(doubt) = self.doubt {
+            return Err(doubt);
         }
         let (config, exposure) = (setting.config, setting.exposure);
         // Otherwise a LOCAL_STOP that starts high stays so, and the counter at rest.
         let is_stirred =
             config.after_borrow == AfterBorrow::Wrap || config.p_counter == PCounter::SetReset;
         if config.mode == Mode::Guided && starts_high(config, start) && is_stirred {
-            return Some("a reset raises LOCAL_STOP");
+            return Err("a reset raises LOCAL_STOP");
         }
+        let whole = |first_edge| Part {
+            law: self.law.clone(),
+            first_edge,
+            bins: (0..config.bins).collect(),
+        };
         match self.law.window(start) {
-            Window::Race(why) | Window::Irregular(why) => Some(why),
-            Window::Open(_) => None,
+            Window::Open(window) => Ok(vec![whole(Some(window.first_edge))]),
+            Window::Irregular(why) => Err(why),
+            Window::Race(_) => self.bin_by_bin(setting, start),
             Window::Never => {
-                let rises = Rises::of(config, start)?;
                 // No count is earlier than the one of CLK's first falling edge.
-                let count = exposure.falling(rises.first) + self.counter_clk;
-                let is_reset_first = count > exposure.stop(1) + self.reset + MARGIN;
-                (!is_reset_first).then_some("the strobe meets the next laser cycle's reset")
+                let is_reset_first = Rises::of(config, start).is_none_or(|rises| {
+                    let count = exposure.falling(rises.first) + self.counter_clk;
+                    count > exposure.stop(1) + self.reset + MARGIN
+                });
+                match is_reset_first {
+                    true => Ok(vec![whole(None)]),
+                    false => Err("the strobe meets the next laser cycle's reset"),
+                }
             }
         }
+    }
+
+    /// The same where not all bins see the shift register after the same change. Bins know nothing of each other.
+    fn bin_by_bin(&self, setting: &Setting<'_>, start: u16) -> Result<Vec<Part>, Doubt> {
+        let mut parts: Vec<Part> = Vec::new();
+        for (bin, &shift) in self.shift.iter().enumerate() {
+            let timing = ChipTiming {
+                clk_to_shift: shift.1,
+                hold: spread(shift),
+                ..*self.law.timing()
+            };
+            let law = WindowLaw::with_timing(setting.config, setting.exposure, timing);
+            let first_edge = match law.window(start) {
+                Window::Open(window) => Some(window.first_edge),
+                Window::Race(why) | Window::Irregular(why) => return Err(why),
+                Window::Never => unreachable!("bins do not stop a counter"),
+            };
+            match parts.iter_mut().find(|part| part.first_edge == first_edge) {
+                Some(part) => part.bins.push(bin),
+                None => parts.push(Part {
+                    law,
+                    first_edge,
+                    bins: vec![bin],
+                }),
+            }
+        }
+        Ok(parts)
     }
 
     /// `pulses` as a macropixel must see them whose front end is that of `law`, to take them at the same CLK edges.
@@ -115,14 +164,17 @@ impl Orders {
 
 /// What the law asks for in either mode.
 fn common(setting: &Setting<'_>, delays: &Delays) -> ChipTiming {
+    let shift = delays.shift.iter().copied().reduce(hull);
+    let shift = shift.expect("a sensor has bins");
     ChipTiming {
         spad_to_toggle: delays.latency[0].0,
-        clk_to_shift: delays.shift.1,
-        clk_to_event: delays.event.max(delays.shift.1),
+        clk_to_shift: shift.1,
+        clk_to_event: delays.event.max(shift.1),
         // Until the bin has taken the hit: HIT, the gate of its clock, and one to spare.
         strobe_to_hit: delays.slowest * 3,
-        setup: spread(delays.strobe) + MARGIN,
-        hold: spread(delays.shift) + MARGIN,
+        // The law adds the rounding of clock edges.
+        setup: spread(delays.strobe),
+        hold: spread(shift),
         recovery: MARGIN,
         removal: MARGIN,
         ..setting.nominal
