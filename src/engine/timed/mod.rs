@@ -7,8 +7,9 @@
 //!
 //! The gate engine's flip-flops take what is there: a histogram depends on delays only through the order in which events
 //! arrive. Static timing of a macropixel's own netlist bounds every arrival ([`delays`]); where the bounds decide every
-//! order that counts ([`orders`]), [`WindowLaw`] with its own delays says which CLK edges its bins see. Only macropixels
-//! with an order in doubt are simulated. Histograms are those of [`Gate::histograms_with`], bit for bit.
+//! order that counts ([`orders`]), [`WindowLaw`] with its own delays says which CLK edges its bins see, each by itself where
+//! they differ. Only macropixels with an order in doubt are simulated. Histograms are those of
+//! [`Gate::histograms_with`], bit for bit.
 
 mod delays;
 mod orders;
