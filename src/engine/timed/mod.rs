@@ -130,16 +130,9 @@ impl<'a> Timed<'a> {
             if is_levelled && window.is_some() && parts.iter().all(is_common) {
                 return Ok(Judged::ForCycle(orders.shifted(&common, pulses)));
             }
-            let mut counts = vec![0; self.setting.config.bins];
-            for Part { law, bins, .. } in parts {
-                let pulses = orders.shifted(&law, pulses);
-                let engine = Window::with_law(self.setting.config, self.setting.exposure, law);
-                let histogram = engine.histogram(start, &pulses)?;
-                for bin in bins {
-                    counts[bin] = histogram[bin];
-                }
-            }
-            Ok(Judged::Counted(counts))
+            Ok(Judged::Counted(
+                self.by_laws(&orders, parts, start, pulses)?,
+            ))
         };
         let judged: Result<Vec<Judged>, EngineError> = (0..pixels)
             .into_par_iter()
@@ -170,6 +163,26 @@ impl<'a> Timed<'a> {
         assert!(starts.len() == self.setting.config.pixels() && pulses.len() == starts.len());
         let all: Vec<usize> = (0..starts.len()).collect();
         self.replay(&all, starts, pulses, &done)
+    }
+
+    /// Counts of one macropixel whose bins follow these laws.
+    fn by_laws(
+        &self,
+        orders: &Orders,
+        parts: Vec<Part>,
+        start: u16,
+        pulses: &[SpadEvent],
+    ) -> Result<Vec<u16>, EngineError> {
+        let mut counts = vec![0; self.setting.config.bins];
+        for Part { law, bins, .. } in parts {
+            let pulses = orders.shifted(&law, pulses);
+            let engine = Window::with_law(self.setting.config, self.setting.exposure, law);
+            let histogram = engine.histogram(start, &pulses)?;
+            for bin in bins {
+                counts[bin] = histogram[bin];
+            }
+        }
+        Ok(counts)
     }
 
     /// Counts the macropixels that were left to the cycle engine.
