@@ -183,6 +183,26 @@ fn every_kind_of_bad_input_is_one_sentence_and_status_2() {
             "--checks-json c.json: there are no timing checks",
         ),
         (
+            replay(&["--mismatch", "0.7"]),
+            "--mismatch: 0.7 is no relative spread",
+        ),
+        (
+            replay(&["--voltage", "0.3"]),
+            "--voltage, --temperature: no delays are known there",
+        ),
+        (
+            replay(&["--mismatch", "0.1", "--engine", "cohort"]),
+            "the cohort engine knows no single photons",
+        ),
+        (
+            replay(&["--mismatch", "0.1", "--engine", "gate", "--checks", "x"]),
+            "--checks: takes delays and limits from elsewhere",
+        ),
+        (
+            replay(&["--process", "slow", "--engine", "gate", "--sdf", "d.sdf"]),
+            "--sdf: takes delays and limits from elsewhere",
+        ),
+        (
             vec!["frame", "--scene", "scene_key.toml"],
             "scene_key.toml:3: unknown field `shade`",
         ),

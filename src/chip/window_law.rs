@@ -89,10 +89,16 @@ pub struct WindowLaw {
 impl WindowLaw {
     /// The law for this sensor in this exposure.
     pub fn new(config: &SensorConfig, exposure: &Exposure) -> Self {
+        Self::with_timing(config, exposure, ChipTiming::of(config))
+    }
+
+    /// The law for a macropixel with delays of its own. Where they are known between bounds only, `timing` has the
+    /// latest, and limits that are wider by the distance of the bounds.
+    pub fn with_timing(config: &SensorConfig, exposure: &Exposure, timing: ChipTiming) -> Self {
         WindowLaw {
             config: config.clone(),
             exposure: *exposure,
-            timing: ChipTiming::of(config),
+            timing,
             bins: config.bins as i64,
             period_fs: 1e15 / exposure.clock.as_hz(),
         }

@@ -8,6 +8,7 @@ mod range;
 mod replay;
 mod reproduce;
 mod sdf;
+mod silicon;
 mod speed;
 mod testbench;
 mod timing;

@@ -9,14 +9,16 @@ use rayon::prelude::*;
 
 use super::SensorArgs;
 use super::sdf::annotated_timing;
+use super::silicon::SiliconArgs;
 use crate::chip::{Exposure, SensorConfig};
 use crate::engine::recording::{Recording, check_exposure, read_events, read_starts};
+use crate::engine::timing::Silicon;
 use crate::engine::waveform::{self, View};
-use crate::engine::{EngineError, GateSimulation, HardwareEventReport};
+use crate::engine::{EngineError, GateSimulation, HardwareEventReport, Runner, TimeKeeping, Timed};
 use crate::files::{InputError, OutputFile};
 use crate::kernel::{CheckReport, Observer, Policy};
 use crate::photon::SpadEvent;
-use crate::report::write_npy_u16;
+use crate::report::{Table, write_npy_u16};
 use crate::system::EngineKind;
 
 /// What is replayed: shared with `gdtof export verilog`.
@@ -100,6 +102,8 @@ pub struct ReplayArgs {
     /// Engine that runs the chip.
     #[arg(long, value_enum, default_value_t)]
     engine: EngineKind,
+    #[command(flatten)]
+    silicon: SiliconArgs,
     /// Histograms: `.npy` (uint16, rows × cols × bins) or `.csv` (row,col,bin,count). Without it, CSV on
     /// standard output.
     #[arg(long, value_name = "FILE")]
@@ -165,17 +169,33 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         return Err(InputError::new(format!("--checks-json {}", json.display()), message).into());
     }
     let stimuli = args.stimuli.read()?;
+    let silicon = args.silicon.read(stimuli.config.corner)?;
+    let silicon = (silicon != Silicon::nominal(silicon.corner)).then_some(silicon);
+    let clash = [
+        (args.sdf.is_some(), "--sdf"),
+        (args.checks.is_some(), "--checks"),
+    ];
+    if let (Some(_), Some((_, option))) = (silicon, clash.iter().find(|(given, _)| *given)) {
+        let message = format!(
+            "takes delays and limits from elsewhere; leave out either {option} or process, voltage, temperature and mismatch"
+        );
+        return Err(InputError::new(*option, message).into());
+    }
     let needs_array = args.vcd.is_some() || args.sdf.is_some() || args.checks.is_some();
-    let histograms = if needs_array {
-        replay_array(&stimuli, args)?
-    } else {
-        replay(&stimuli, args.engine)?
+    let histograms = match silicon {
+        _ if needs_array => replay_array(&stimuli, args, silicon)?,
+        Some(silicon) => replay_timed(&stimuli, args.engine, &silicon)?,
+        None => replay(&stimuli, args.engine)?,
     };
     write(&stimuli.config, &histograms, args.out.as_deref(), format)
 }
 
 /// The whole array as one netlist, with its waveform, annotated delays and timing checks.
-fn replay_array(stimuli: &Stimuli, args: &ReplayArgs) -> anyhow::Result<Vec<Vec<u16>>> {
+fn replay_array(
+    stimuli: &Stimuli,
+    args: &ReplayArgs,
+    silicon: Option<Silicon>,
+) -> anyhow::Result<Vec<Vec<u16>>> {
     let config = &stimuli.config;
     let mut simulation = GateSimulation::new(
         config,
@@ -187,6 +207,10 @@ fn replay_array(stimuli: &Stimuli, args: &ReplayArgs) -> anyhow::Result<Vec<Vec<
     );
     if let Some(sdf) = &args.sdf {
         let timing = annotated_timing(sdf, simulation.netlist(), config)?;
+        simulation = simulation.with_timing(&timing);
+    }
+    if let Some(silicon) = silicon {
+        let timing = silicon.timing(simulation.netlist());
         simulation = simulation.with_timing(&timing);
     }
     let vcd = args.vcd.as_deref();
@@ -239,11 +263,61 @@ fn watch<O: Observer>(
     waveform::record(simulation, vcd, &view, observer)
 }
 
+/// Macropixels with delays that are not the library's.
+fn replay_timed(
+    stimuli: &Stimuli,
+    kind: EngineKind,
+    silicon: &Silicon,
+) -> anyhow::Result<Vec<Vec<u16>>> {
+    let Stimuli {
+        config,
+        exposure,
+        starts,
+        ..
+    } = stimuli;
+    let pulses = stimuli.pulses();
+    let progress = progress(stimuli)?;
+    let done = |macropixels| progress.inc(macropixels as u64);
+    let runner = match kind {
+        EngineKind::Gate => None,
+        EngineKind::Cycle => Some(Runner::Cycle),
+        EngineKind::Window => Some(Runner::Window),
+        EngineKind::Cohort => return Err(EngineError::NoPhotons("cohort").into()),
+    };
+    let timed = Timed::new(config, exposure, silicon);
+    let Some(runner) = runner else {
+        let histograms = timed.by_gates(starts, &pulses, done)?;
+        progress.finish_and_clear();
+        return Ok(histograms);
+    };
+    let found = timed.histograms(runner, starts, &pulses, done)?;
+    progress.finish_and_clear();
+    eprint!("{}", table(&found.keeping));
+    Ok(found.histograms)
+}
+
+/// Which macropixels kept time, and why the others did not.
+fn table(keeping: &TimeKeeping) -> Table {
+    let mut table = Table::new("Time keeping")
+        .row("macropixels in closed form", keeping.kept)
+        .row(
+            "macropixels replayed at gate level",
+            keeping.replayed.values().sum::<usize>(),
+        );
+    for (why, macropixels) in &keeping.replayed {
+        table.push(format!("  {why}"), macropixels);
+    }
+    table
+}
+
+fn progress(stimuli: &Stimuli) -> anyhow::Result<ProgressBar> {
+    let style = ProgressStyle::with_template("replaying {bar:40} {pos}/{len} macropixels")?;
+    Ok(ProgressBar::new(stimuli.starts.len() as u64).with_style(style))
+}
+
 fn replay(stimuli: &Stimuli, kind: EngineKind) -> anyhow::Result<Vec<Vec<u16>>> {
     let engine = kind.build(&stimuli.config, &stimuli.exposure);
-    let progress = ProgressBar::new(stimuli.starts.len() as u64).with_style(
-        ProgressStyle::with_template("replaying {bar:40} {pos}/{len} macropixels")?,
-    );
+    let progress = progress(stimuli)?;
     let batches: Result<Vec<_>, EngineError> = stimuli
         .starts
         .par_chunks(engine.batch())

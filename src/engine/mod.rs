@@ -6,6 +6,7 @@
 //! | [`Cycle`] | every CLK period of the levelised netlist, 512 macropixels to a word | `Gate` |
 //! | [`Window`] | only the CLK periods a start value can see, through the window law | `Cycle` |
 //! | [`Cohort`] | no photons: laser cycles in the same state move together | `Window`, in distribution |
+//! | [`Timed`] | `Window` or `Cycle` with each macropixel's own delays, `Gate` where these leave an order in doubt | `Gate` with the same delays |
 //!
 //! The first three take the same start value and SPAD pulses and give the same histogram. `Cycle` and `Window` assume what
 //! the window law can promise, and refuse a configuration in which two signals race. The macropixel's
@@ -22,6 +23,7 @@ pub mod load;
 pub mod recording;
 mod stimulus;
 mod testbench;
+mod timed;
 pub mod timing;
 pub mod waveform;
 mod window;
@@ -36,6 +38,7 @@ pub use light::{
 };
 pub use stimulus::{LoadPins, Pins, Schedule, StimulusPlan};
 pub use testbench::{export_annotated_verilog, export_verilog};
+pub use timed::{Runner, TimeKeeping, Timed, Timekept};
 pub use window::Window;
 
 use crate::photon::{PhotonStream, SpadEvent};

@@ -19,7 +19,7 @@
 //! arrive at but do not leave. Time in whole femtoseconds; work is linear in the arcs reached.
 
 use super::cell::CellKind;
-use super::flat::{NetId, Netlist};
+use super::flat::{FlatCell, NetId, Netlist};
 use super::timing::Timing;
 use crate::logic::Logic;
 use crate::units::Time;
@@ -124,8 +124,10 @@ pub struct TimingLoop {
 pub struct StaticTiming<'n> {
     netlist: &'n Netlist,
     timing: &'n Timing,
-    /// Loads (cell, pin) of every net.
-    loads: Vec<Vec<(u32, u8)>>,
+    /// Loads (cell, pin), by net.
+    loads: Vec<(u32, u8)>,
+    /// First load of every net, and the end.
+    first_load: Vec<u32>,
 }
 
 /// One arc of the graph.
@@ -138,23 +140,40 @@ struct ArcTo {
 impl<'n> StaticTiming<'n> {
     /// Prepares the graph of arcs.
     pub fn new(netlist: &'n Netlist, timing: &'n Timing) -> Self {
-        let mut loads = vec![Vec::new(); netlist.net_count()];
-        for (index, cell) in netlist.cells().iter().enumerate() {
-            for pin in (0..cell.kind.inputs().len()).filter(|&pin| cell.kind.triggers(pin)) {
-                loads[cell.inputs[pin].index()].push((index as u32, pin as u8));
-            }
+        let triggers = |cell: &FlatCell| {
+            let kind = cell.kind;
+            (0..kind.inputs().len()).filter(move |&pin| kind.triggers(pin))
+        };
+        let pins = || {
+            let cells = (0u32..).zip(netlist.cells());
+            cells.flat_map(|(index, cell)| {
+                triggers(cell).map(move |pin| (cell.inputs[pin].index(), (index, pin as u8)))
+            })
+        };
+        let mut first_load = vec![0; netlist.net_count() + 1];
+        pins().for_each(|(net, _)| first_load[net + 1] += 1);
+        for net in 0..netlist.net_count() {
+            first_load[net + 1] += first_load[net];
+        }
+        let mut next = first_load.clone();
+        let mut loads = vec![(0, 0); first_load[netlist.net_count()] as usize];
+        for (net, load) in pins() {
+            loads[next[net] as usize] = load;
+            next[net] += 1;
         }
         StaticTiming {
             netlist,
             timing,
             loads,
+            first_load,
         }
     }
 
     fn arcs_from(&self, from: Node) -> impl Iterator<Item = ArcTo> + '_ {
         let edge = edge_of(from);
-        let loads = self.loads[net_of(from).index()].iter();
-        loads.flat_map(move |&(cell, pin)| {
+        let net = net_of(from).index();
+        let loads = self.first_load[net] as usize..self.first_load[net + 1] as usize;
+        self.loads[loads].iter().flat_map(move |&(cell, pin)| {
             let (cell, pin) = (cell as usize, pin as usize);
             let leaf = &self.netlist.cells()[cell];
             let outputs = leaf.outputs.iter().enumerate();

@@ -143,14 +143,25 @@ pub fn varied(
     factor: f64,
     mismatch: Option<Mismatch>,
 ) -> Timing {
+    varied_as(netlist, nominal, factor, mismatch, |cell| {
+        netlist.cell_path(cell)
+    })
+}
+
+/// The same where each cell is the one at `path` of its index: a netlist may stand for another that differs in names.
+pub fn varied_as(
+    netlist: &Netlist,
+    nominal: &Timing,
+    factor: f64,
+    mismatch: Option<Mismatch>,
+    path: impl Fn(usize) -> String,
+) -> Timing {
     let mut timing = nominal.clone();
     if factor == 1.0 && mismatch.is_none() {
         return timing;
     }
     for (index, cell) in netlist.cells().iter().enumerate() {
-        let own = mismatch.map_or(1.0, |m| {
-            m.factor(&netlist.cell_path(index), cell.kind.transistors())
-        });
+        let own = mismatch.map_or(1.0, |m| m.factor(&path(index), cell.kind.transistors()));
         let scale = |fs: u32| (fs as f64 * factor * own).round() as u32;
         let delays = nominal.of(index).map(|mut arc| {
             arc.rise_fs = scale(arc.rise_fs);

@@ -22,6 +22,11 @@ impl Scenario {
     /// Anything that the chip allows.
     pub fn random(random: &mut StdRng, rows: usize, cols: usize) -> Self {
         let config = random_sensor(random, rows, cols);
+        Self::of(random, config)
+    }
+
+    /// Anything that may happen to this sensor.
+    pub fn of(random: &mut StdRng, config: SensorConfig) -> Self {
         // Without memory a counter must come round with STOP, or no two laser cycles are alike.
         let wider = usize::from(config.tap == Tap::Borrow);
         let round = 1 << (config.counter_bits + wider);

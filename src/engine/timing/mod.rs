@@ -30,7 +30,9 @@ pub use load::{LoadTiming, load_works};
 pub use macropixel::{LocalClocks, MacropixelTiming, longest};
 pub use spread::{PixelTiming, Spread, spread};
 
-use crate::netlist::{Corner, Library, Mismatch, Netlist, Timing, derated_limits, varied};
+use crate::netlist::{
+    Corner, Library, Mismatch, Netlist, Timing, derated_limits, varied, varied_as,
+};
 use crate::units::Time;
 
 /// What the analysed chip is made of.
@@ -74,6 +76,12 @@ impl Silicon {
     pub fn timing(&self, netlist: &Netlist) -> Timing {
         let nominal = Timing::nominal(netlist, &Library::default(), self.corner);
         varied(netlist, &nominal, self.factor, self.mismatch)
+    }
+
+    /// Delays of another netlist that differs from this one in names only: there each cell is at `path` of its index.
+    pub fn timing_as(&self, netlist: &Netlist, path: impl Fn(usize) -> String) -> Timing {
+        let nominal = Timing::nominal(netlist, &Library::default(), self.corner);
+        varied_as(netlist, &nominal, self.factor, self.mismatch, path)
     }
 
     /// The library with this silicon's limits (and nominal delays).

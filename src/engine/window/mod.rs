@@ -35,10 +35,19 @@ pub struct Window<'a> {
 impl<'a> Window<'a> {
     /// An engine for this sensor and exposure.
     pub fn new(config: &'a SensorConfig, exposure: &'a Exposure) -> Self {
+        Self::with_law(config, exposure, WindowLaw::new(config, exposure))
+    }
+
+    /// An engine for macropixels with delays of their own, which `law` is made of.
+    pub(super) fn with_law(
+        config: &'a SensorConfig,
+        exposure: &'a Exposure,
+        law: WindowLaw,
+    ) -> Self {
         Window {
             config,
             exposure,
-            law: WindowLaw::new(config, exposure),
+            law,
         }
     }
 

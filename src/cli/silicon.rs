@@ -1,0 +1,89 @@
+//! What the chip is made of and where it is operated: `--process`, `--voltage`, `--temperature`, `--mismatch`.
+//!
+//! ```text
+//!   process, voltage, temperature ─► factor on every delay ─┐
+//!   mismatch, its seed ─────────────► factor on each cell's ┴─► Silicon
+//! ```
+
+use clap::{Args, ValueEnum};
+
+use crate::engine::timing::Silicon;
+use crate::files::InputError;
+use crate::netlist::{Conditions, Corner, Mismatch, Process};
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Speed {
+    Slow,
+    Typ,
+    Fast,
+}
+
+/// Silicon and its conditions.
+#[derive(Args)]
+pub struct SiliconArgs {
+    /// Silicon; like voltage and temperature it scales the delays of the sensor's corner.
+    #[arg(long, value_enum, default_value = "typ")]
+    process: Speed,
+    /// Supply, V.
+    #[arg(long, value_name = "V", default_value_t = 1.1)]
+    voltage: f64,
+    /// Junction temperature, °C.
+    #[arg(
+        long,
+        value_name = "C",
+        default_value_t = 50.0,
+        allow_negative_numbers = true
+    )]
+    temperature: f64,
+    /// Random mismatch: standard deviation of an inverter's delay, relative.
+    #[arg(long, value_name = "SIGMA", default_value_t = 0.0)]
+    mismatch: f64,
+    /// Seed of the mismatch.
+    #[arg(long, value_name = "S", visible_alias = "seed", default_value_t = 1)]
+    mismatch_seed: u64,
+}
+
+impl SiliconArgs {
+    /// The silicon, in this corner of the library.
+    ///
+    /// # Errors
+    /// Conditions and mismatch for which no delays are known.
+    pub fn read(&self, corner: Corner) -> Result<Silicon, InputError> {
+        let factor = self.conditions().delay_factor().ok_or_else(|| {
+            let message = "no delays are known there; give -55 to 150 °C and a supply up to 2 V at least 0.2 V above the threshold of about 0.4 V";
+            InputError::new("--voltage, --temperature", message)
+        })?;
+        if !(0.0..=0.5).contains(&self.mismatch) {
+            let message = format!("{} is no relative spread; give 0 to 0.5", self.mismatch);
+            return Err(InputError::new("--mismatch", message));
+        }
+        let mismatch = (self.mismatch > 0.0).then_some(Mismatch {
+            sigma: self.mismatch,
+            seed: self.mismatch_seed,
+        });
+        Ok(Silicon {
+            corner,
+            factor,
+            mismatch,
+        })
+    }
+
+    /// Process, supply and temperature.
+    pub fn conditions(&self) -> Conditions {
+        Conditions {
+            process: match self.process {
+                Speed::Slow => Process::Slow,
+                Speed::Typ => Process::Typ,
+                Speed::Fast => Process::Fast,
+            },
+            voltage_v: self.voltage,
+            temperature_c: self.temperature,
+        }
+    }
+
+    /// The process as it is given on the command line.
+    pub fn process_name(&self) -> String {
+        let value = self.process.to_possible_value();
+        value.map_or(String::new(), |value| value.get_name().to_owned())
+    }
+}

@@ -1,0 +1,197 @@
+//! Fast engines that keep time count what the gates count with the same delays: random sensors, clocks near and far from
+//! their limits, STOP phases, corners, conditions, mismatch, start values and pulses.
+
+mod scenario;
+
+use std::collections::BTreeMap;
+
+use guided_dtof::chip::{ChipTiming, Mode, PCounter, SensorConfig, Tap, sensor};
+use guided_dtof::engine::timing::Silicon;
+use guided_dtof::engine::{Gate, Runner, Timed};
+use guided_dtof::netlist::{Corner, Mismatch, Netlist, Timing};
+use rand::{RngExt, SeedableRng, rngs::StdRng};
+use scenario::Scenario;
+
+/// Macropixels that kept time, and those that did not by reason.
+#[derive(Default)]
+struct Tally {
+    kept: usize,
+    replayed: BTreeMap<&'static str, usize>,
+}
+
+impl Tally {
+    fn macropixels(&self) -> usize {
+        self.kept + self.replayed.values().sum::<usize>()
+    }
+
+    fn add(&mut self, other: Tally) {
+        self.kept += other.kept;
+        for (why, count) in other.replayed {
+            *self.replayed.entry(why).or_default() += count;
+        }
+    }
+}
+
+/// How a random chip is clocked.
+#[derive(Clone, Copy, PartialEq)]
+enum Clock {
+    /// Anything.
+    Any,
+    /// With slack everywhere.
+    Slow,
+    /// About where the strobe meets the next change of the shift register.
+    NearLimit,
+}
+
+fn silicon(random: &mut StdRng, config: &SensorConfig) -> Silicon {
+    let sigma = random.random_range(0.0..0.3);
+    Silicon {
+        corner: config.corner,
+        factor: [1.0, random.random_range(0.7..1.5)][random.random_range(0..2)],
+        mismatch: random.random_bool(0.8).then(|| Mismatch {
+            sigma,
+            seed: random.random(),
+        }),
+    }
+}
+
+fn scenario(random: &mut StdRng, clock: Clock) -> (Scenario, Silicon) {
+    let (rows, cols) = (random.random_range(1..3), random.random_range(1..5));
+    let Scenario { mut config, .. } = Scenario::random(random, rows, cols);
+    let silicon = silicon(random, &config);
+    if clock != Clock::Any {
+        if clock == Clock::NearLimit {
+            config.counter_bits = random.random_range(8..13);
+            config.p_counter = PCounter::Ripple;
+            config.tap = Tap::Borrow;
+            config.mode = Mode::Guided;
+        }
+        let timing = ChipTiming::of(&config);
+        let strobe = timing.ripple() + timing.local_stop_to_strobe - timing.clk_to_shift;
+        let edge = strobe.as_s().max(timing.clk_to_event.as_s() / 2.0) * silicon.factor;
+        let half = match clock {
+            Clock::Slow => edge * random.random_range(2.0..4.0),
+            _ => edge * random.random_range(0.97..1.05),
+        };
+        config.clk_hz = 0.5 / half;
+        config.stop_phase_ps = random.random_range(-0.3..0.3) * 1e12 * half;
+        if clock == Clock::Slow {
+            config.stop_phase_ps = 0.0;
+            config.p_counter = PCounter::Ripple;
+        }
+        config.check().expect("a sensor");
+    }
+    (Scenario::of(random, config), silicon)
+}
+
+fn compare(seed: u64, scenario: &Scenario, silicon: &Silicon) -> Tally {
+    let Scenario {
+        config,
+        exposure,
+        starts,
+        ..
+    } = scenario;
+    let pulses = scenario.pulses();
+    let timing = |pixel: usize| {
+        let position = (pixel / config.cols, pixel % config.cols);
+        silicon.timing(&Netlist::elaborate(&sensor::window(
+            config,
+            position,
+            (1, 1),
+        )))
+    };
+    let timings: Vec<Timing> = (0..config.pixels()).map(timing).collect();
+    let timings: Vec<&Timing> = timings.iter().collect();
+    let gates = Gate::new(config, exposure).histograms_with(&timings, starts, &pulses);
+    let timed = Timed::new(config, exposure, silicon);
+    let mut tally = Tally::default();
+    for runner in [Runner::Window, Runner::Cycle] {
+        let found = timed.histograms(runner, starts, &pulses, |_| ());
+        let Ok(gates) = &gates else {
+            assert!(
+                found.is_err(),
+                "seed {seed}: {config:?} {exposure:?} {silicon:?}"
+            );
+            continue;
+        };
+        let found = found.unwrap();
+        for (pixel, (counts, gate)) in found.histograms.iter().zip(gates).enumerate() {
+            let start = starts[pixel];
+            assert_eq!(
+                counts, gate,
+                "seed {seed}, {runner:?}, macropixel {pixel} with start {start}: {config:?} {exposure:?} {silicon:?} {:?}",
+                found.keeping
+            );
+        }
+        tally = Tally {
+            kept: found.keeping.kept,
+            replayed: found.keeping.replayed,
+        };
+        assert_eq!(tally.macropixels(), config.pixels());
+    }
+    tally
+}
+
+fn compare_all(clock: Clock, seeds: std::ops::Range<u64>) -> Tally {
+    let mut sum = Tally::default();
+    for seed in seeds {
+        let random = &mut StdRng::seed_from_u64(seed);
+        let (scenario, silicon) = scenario(random, clock);
+        sum.add(compare(seed, &scenario, &silicon));
+    }
+    println!(
+        "{} of {} macropixels kept time, {:?}",
+        sum.kept,
+        sum.macropixels(),
+        sum.replayed
+    );
+    sum
+}
+
+#[test]
+fn at_any_clock() {
+    let sum = compare_all(Clock::Any, 0..60);
+    assert!(sum.kept * 3 > sum.macropixels());
+}
+
+#[test]
+fn with_slack_almost_all_keep_time() {
+    let sum = compare_all(Clock::Slow, 1_000..1_050);
+    assert!(sum.kept * 10 > sum.macropixels() * 8);
+}
+
+#[test]
+fn near_the_limit_most_keep_time_and_some_are_replayed() {
+    let sum = compare_all(Clock::NearLimit, 2_000..2_060);
+    let replayed = sum.macropixels() - sum.kept;
+    assert!(sum.kept * 10 > sum.macropixels() * 8 && replayed > 0);
+}
+
+/// The strobe in the very femtosecond of the shift register's change, and a picosecond to either side.
+#[test]
+fn at_the_limit_the_gates_are_asked() {
+    for (off_fs, is_replayed) in [(-1_000, false), (0, true), (1_000, false)] {
+        let random = &mut StdRng::seed_from_u64(1);
+        let mut config = SensorConfig {
+            rows: 2,
+            cols: 2,
+            ..SensorConfig::default()
+        };
+        let timing = ChipTiming::of(&config);
+        let strobe = timing.ripple() + timing.local_stop_to_strobe - timing.clk_to_shift;
+        config.clk_hz = 1e15 / (2 * strobe.as_fs() + 2 * off_fs) as f64;
+        let mut scenario = Scenario::of(random, config);
+        scenario.starts = vec![5, 8, 12, 15];
+        let tally = compare(0, &scenario, &Silicon::nominal(Corner::Typ));
+        assert_eq!(tally.kept, if is_replayed { 0 } else { 4 }, "{off_fs}");
+    }
+}
+
+/// Some minutes: `cargo test --release --test timed_agrees_with_gate -- --ignored --nocapture`.
+#[test]
+#[ignore = "thousands of macropixels"]
+fn over_thousands_of_macropixels() {
+    for clock in [Clock::Any, Clock::Slow, Clock::NearLimit] {
+        compare_all(clock, 10_000..11_500);
+    }
+}
