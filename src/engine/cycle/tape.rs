@@ -38,7 +38,9 @@ pub enum Code {
     Toggle,
     /// Clock of a flip-flop: D, clock edge, reset, set.
     FlipFlop,
-    /// Reset and set of a flip-flop: (), (), reset, set.
+    /// Clock edges of flip-flops that are not held: (), clock edge, reset, set.
+    Clock,
+    /// Reset and set of a flip-flop: (), (), reset, set. Reset wins.
     Async,
     /// Clock of a flip-flop whose D is a stream.
     Sampler {
@@ -223,6 +225,7 @@ pub fn step(
             (((words[a] ^ ia) & !select) | ((words[b] ^ ib) & select)) ^ io
         }
         Code::Toggle => old ^ (words[b] & !(words[c] ^ ic)),
+        Code::Clock => clocked(action, words),
         Code::Async => (old | (words[d] ^ id)) & !(words[c] ^ ic),
         Code::FlipFlop => {
             let edge = clocked(action, words);
@@ -267,10 +270,8 @@ fn sampled(action: &Action, words: &[Word], taps: &[Tap], flow: &mut Flow<'_>, p
     (words[usize::from(action.out)] & !edge) | (data & edge)
 }
 
-/// Whether a flip-flop's clock has risen in a lane that is not reset.
+/// Whether a flip-flop's clock has risen in a lane that neither reset nor set holds.
 #[cold]
 pub fn counts(action: &Action, words: &[Word]) -> bool {
-    let [_, edge, reset, _] = action.inputs.map(|place| words[usize::from(place)]);
-    let inverted = action.invert[2];
-    (edge & !(reset ^ inverted)).any()
+    clocked(action, words).any()
 }
