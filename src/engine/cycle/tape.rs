@@ -38,8 +38,6 @@ pub enum Code {
     Toggle,
     /// Clock of a flip-flop: D, clock edge, reset, set.
     FlipFlop,
-    /// Clock edges of flip-flops that are not held: (), clock edge, reset, set.
-    Clock,
     /// Reset and set of a flip-flop: (), (), reset, set. Reset wins.
     Async,
     /// Clock of a flip-flop whose D is a stream.
@@ -225,7 +223,6 @@ pub fn step(
             (((words[a] ^ ia) & !select) | ((words[b] ^ ib) & select)) ^ io
         }
         Code::Toggle => old ^ (words[b] & !(words[c] ^ ic)),
-        Code::Clock => clocked(action, words),
         Code::Async => (old | (words[d] ^ id)) & !(words[c] ^ ic),
         Code::FlipFlop => {
             let edge = clocked(action, words);

@@ -18,29 +18,35 @@ impl Leveliser<'_> {
         Ok([self.bit(cell.inputs[2])?, self.bit(cell.inputs[3])?])
     }
 
-    /// Lanes of a clock mask in which the flip-flop is not held in the instant of the edge: the action that finds them,
-    /// and the place of their mask.
+    /// Lanes of a clock mask in which the flip-flop is not held in the instant of the edge: the place of their mask, and
+    /// the actions that find them.
     pub(super) fn unheld(
         &mut self,
         cause: Cause,
         cell: &FlatCell,
         mask: u16,
         instant_fs: i64,
-    ) -> Result<(usize, u16), Unlevelled> {
-        let [reset, set] = self.control_bits(cell)?;
-        let unheld = self.new_place();
-        let action = Action {
-            code: Code::Clock,
-            inputs: [ZERO, mask, reset.0, set.0],
-            invert: [0, 0, inversion(reset.1), inversion(set.1), 0],
-            out: unheld,
-            directions: [u64::MAX; 2],
-            masks: [SINK; 2],
-            wakes: [0; 3],
-            traps: [false; 2],
-            is_doubtful: false,
-        };
-        Ok((self.draft(cause.position_fs, instant_fs, action), unheld))
+    ) -> Result<(u16, Vec<usize>), Unlevelled> {
+        let (mut lanes, mut drafts) = (mask, Vec::new());
+        for (control, after_fs) in self.control_bits(cell)?.into_iter().zip(0..) {
+            if control == (ZERO, false) {
+                continue;
+            }
+            let action = Action {
+                code: Code::And,
+                inputs: [lanes, control.0, ZERO, ZERO],
+                invert: [0, inversion(!control.1), 0, 0, 0],
+                out: self.new_place(),
+                directions: [u64::MAX; 2],
+                masks: [SINK; 2],
+                wakes: [0; 3],
+                traps: [false; 2],
+                is_doubtful: false,
+            };
+            lanes = action.out;
+            drafts.push(self.draft(cause.position_fs, instant_fs + after_fs, action));
+        }
+        Ok((lanes, drafts))
     }
 
     pub(super) fn flip_flop(

@@ -197,8 +197,8 @@ impl Leveliser<'_> {
                 _ if !is_released => all,
                 Some(&unheld) => unheld,
                 None => {
-                    let (draft, unheld) = self.unheld(reach.cause, &cell, all, instant_fs)?;
-                    clock.drafts.push(draft);
+                    let (unheld, drafts) = self.unheld(reach.cause, &cell, all, instant_fs)?;
+                    clock.drafts.extend(drafts);
                     clock.unheld.insert((reset, set), unheld);
                     unheld
                 }

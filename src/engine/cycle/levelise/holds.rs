@@ -11,7 +11,7 @@
 //! a shared net does not hold for certain is on the tape, and finds its flip-flop held or not.
 //!
 //! A flip-flop looks at reset and set in the instant of its clock's edge, but the tape changes it clk-to-Q later. Where
-//! it may have been released by then, the instant has an action of its own ([`Code::Clock`]).
+//! it may have been released by then, the instant has actions of its own ([`Leveliser::unheld`]).
 
 use super::arrivals::Reach;
 use super::*;
