@@ -11,13 +11,18 @@
 //! that the event kernel gave. The order of two effects, such as a strobe and the change of the shift register,
 //! or a count and a reset, is therefore the order of their nominal arrival, whatever the STOP phase.
 //!
-//! A netlist is refused when that order is not certain: when paths of different length reach a flip-flop's
-//! clock or reset from one cause, when data change within setup and hold, or when a clear is slower than the reset
-//! that it belongs to. A loop (LOCAL_STOP blocks COUNTER_CLK; FULL blocks a bin's clock) is cut where it closes,
-//! and the cut is watched: should a lane's edge ever go through it, the block is the gate engine's.
+//! Resets and sets are edges like any other, and may differ from lane to lane. Who is held when is known where a net
+//! that all macropixels share does it ([`holds`]), and otherwise seen as the tape runs.
+//!
+//! A netlist is refused when an order is not certain: when paths of different length reach a flip-flop's reset or set
+//! from one cause, or when a reset or set ends before what it does is done. Where it takes a lane's edge to matter, the
+//! tape is made and the lanes are watched: clock edges by paths of different length, data that change within setup and
+//! hold, and loops (LOCAL_STOP blocks COUNTER_CLK; FULL blocks a bin's clock), which are cut where they close. Should a
+//! lane's edge ever go there, the block is the gate engine's.
 
 mod actions;
 mod arrivals;
+mod holds;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -25,12 +30,13 @@ use super::Unlevelled;
 use super::expression::Expressions;
 use super::parts::Parts;
 use super::stream::StreamTape;
-use super::survey::{Class, Survey, UniformEdge, output};
+use super::survey::{Class, Survey, output};
 use super::tape::{Action, Code, PassTape, SINK, ZERO};
 use super::word::inversion;
 use crate::chip::{Exposure, SensorConfig};
 use crate::netlist::{CellKind, DataLimit, Edge, FlatCell, Library, NetId, caused};
 use crate::units::Time;
+use arrivals::Reach;
 
 /// A net and the direction of its change.
 type Node = (NetId, Edge);
@@ -65,6 +71,12 @@ struct Cause {
     value: bool,
 }
 
+impl Cause {
+    fn node(self) -> Node {
+        (self.net, if self.value { Edge::Rise } else { Edge::Fall })
+    }
+}
+
 /// An action before it has its place on the tape.
 struct Draft {
     position_fs: i64,
@@ -87,10 +99,10 @@ struct Leveliser<'s> {
     period_fs: i64,
     /// No cell is faster.
     fastest_fs: i64,
-    /// Shortest high pulse of each shared net that has any.
-    pulse_fs: HashMap<NetId, i64>,
-    /// Every cause.
-    causes: BTreeSet<Cause>,
+    /// For how long after each cause a shared net that resets or sets stays high, at least; 0 where it may be low.
+    holds_fs: BTreeMap<(Cause, NetId), i64>,
+    /// When in a pass a net that resets or sets may fall.
+    releases_fs: HashMap<NetId, Vec<i64>>,
     /// Relevant, triggering pins (cell, pin) of live cells, by net.
     loads: HashMap<NetId, Vec<(usize, usize)>>,
     shared: BTreeSet<NetId>,
@@ -117,8 +129,8 @@ impl Levelised {
             config,
             period_fs: exposure.clock.period().as_fs(),
             fastest_fs: fastest_cell_fs(survey),
-            pulse_fs: HashMap::new(),
-            causes: BTreeSet::new(),
+            holds_fs: BTreeMap::new(),
+            releases_fs: HashMap::new(),
             loads: HashMap::new(),
             shared: BTreeSet::new(),
             sampled: Vec::new(),
@@ -139,7 +151,6 @@ impl Levelised {
             .filter(|&net| net != survey.clk)
             .collect();
         let groups = survey.uniform_edges(config, exposure, &others);
-        leveliser.pulse_fs = shortest_pulses(&groups);
         let at = |time: Time| {
             let k = (exposure
                 .clock
@@ -179,9 +190,17 @@ impl Levelised {
             .map(|c| c.1)
             .chain(clock.iter().copied())
             .collect();
-        leveliser.causes.clone_from(&all);
-        for &cause in &all {
-            first_action.insert(cause, leveliser.follow(cause)?);
+        let edges = (0..).zip(groups.iter().zip(&causes));
+        let edges = edges.flat_map(|(cycle, (group, causes))| {
+            let times = group.iter().map(move |e| exposure.stop(cycle) + e.time);
+            times.zip(causes.iter().map(|&(_, cause)| cause))
+        });
+        leveliser.find_holds(&edges.collect::<Vec<_>>());
+        let reaches: Result<Vec<Reach>, _> = all.iter().map(|&c| leveliser.reach(c)).collect();
+        let reaches = reaches?;
+        leveliser.find_releases(&reaches)?;
+        for reach in &reaches {
+            first_action.insert(reach.cause, leveliser.follow(reach)?);
         }
         let order = leveliser.order()?;
         let position = |draft: usize| order[draft] as u16;
@@ -232,10 +251,6 @@ impl Leveliser<'_> {
                         continue;
                     }
                     let cell = &survey.netlist.cells()[index];
-                    // A set that differs from lane to lane has no static order against the clock.
-                    if cell.kind == CellKind::Dffsr {
-                        return Err(Unlevelled::Structure(survey.netlist.cell_path(index)));
-                    }
                     let relevant = survey.relevant(cell);
                     for pin in (0..cell.kind.inputs().len()).filter(|&pin| relevant[pin]) {
                         let input = cell.inputs[pin];
@@ -365,45 +380,8 @@ fn fastest_cell_fs(survey: &Survey) -> i64 {
         .unwrap_or(0)
 }
 
-fn shortest_pulses(groups: &[Vec<UniformEdge>]) -> HashMap<NetId, i64> {
-    let mut shortest: HashMap<NetId, i64> = HashMap::new();
-    for group in groups {
-        let mut rose = HashMap::new();
-        for edge in group {
-            if edge.value {
-                rose.insert(edge.net, edge.time);
-            } else if let Some(rise) = rose.remove(&edge.net) {
-                let width = (edge.time - rise).as_fs();
-                shortest
-                    .entry(edge.net)
-                    .and_modify(|w| *w = width.min(*w))
-                    .or_insert(width);
-            }
-        }
-    }
-    shortest
-}
+/// Pin of a flip-flop's clock.
+const CLOCK: usize = 1;
 
 /// What rounding of clock edges to whole femtoseconds can do to a distance between two of them.
 const ROUNDING_FS: i64 = 2;
-
-/// Depth first, so that reversed it is an order in which causes precede effects, loops apart.
-#[derive(Default)]
-struct Search {
-    order: Vec<Node>,
-    seen: BTreeSet<(NetId, bool)>,
-}
-
-impl Search {
-    fn visit(&mut self, leveliser: &Leveliser<'_>, cause: Cause, node: Node) {
-        if !self.seen.insert((node.0, node.1 == Edge::Rise)) {
-            return;
-        }
-        for arc in leveliser.arcs(cause, node) {
-            for to in arc.to {
-                self.visit(leveliser, cause, to);
-            }
-        }
-        self.order.push(node);
-    }
-}

@@ -13,8 +13,8 @@
 //! event kernel simulates, no X. Nothing here knows what a macropixel is: what the netlist says is what is run.
 //!
 //! Macropixels go into blocks by their start values, so that a block's windows are open in the same CLK periods, and
-//! its counters at rest in the others, which are skipped where nothing would change. A netlist, or a configuration, for which no tape can
-//! be made is run by the gate engine: the P-counters of set/reset flip-flops, so far.
+//! its counters at rest in the others, which are skipped where nothing would change. A netlist, or a configuration, for
+//! which no tape can be made is run by the gate engine, and so is a block in which a lane does what a tape cannot follow.
 
 mod expression;
 mod levelise;
@@ -65,8 +65,8 @@ pub enum Unlevelled {
     /// A lane did what the tape cannot tell the outcome of: two edges too close to call, or one round a loop.
     #[error("the next change of {0} is too close to call")]
     Trapped(String),
-    /// A reset ends before what it clears has settled.
-    #[error("the reset of {0} ends before its clock has settled")]
+    /// A reset or set ends before what it does is done.
+    #[error("the reset or set of {0} ends before what it does has settled")]
     Clear(String),
     /// Something the tapes have no operation for.
     #[error("{0} has no place on a tape")]

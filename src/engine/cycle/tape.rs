@@ -38,7 +38,7 @@ pub enum Code {
     Toggle,
     /// Clock of a flip-flop: D, clock edge, reset, set.
     FlipFlop,
-    /// Reset and set of a flip-flop: (), (), reset, set.
+    /// Reset and set of a flip-flop: (), (), reset, set. Reset wins.
     Async,
     /// Clock of a flip-flop whose D is a stream.
     Sampler {
@@ -267,10 +267,8 @@ fn sampled(action: &Action, words: &[Word], taps: &[Tap], flow: &mut Flow<'_>, p
     (words[usize::from(action.out)] & !edge) | (data & edge)
 }
 
-/// Whether a flip-flop's clock has risen in a lane that is not reset.
+/// Whether a flip-flop's clock has risen in a lane that neither reset nor set holds.
 #[cold]
 pub fn counts(action: &Action, words: &[Word]) -> bool {
-    let [_, edge, reset, _] = action.inputs.map(|place| words[usize::from(place)]);
-    let inverted = action.invert[2];
-    (edge & !(reset ^ inverted)).any()
+    clocked(action, words).any()
 }

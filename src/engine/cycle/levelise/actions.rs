@@ -13,42 +13,40 @@ impl Leveliser<'_> {
         self.drafts.len() - 1
     }
 
-    /// The clock mask that a flip-flop uses: where its reset is released between the clock's edge and the change of Q,
-    /// a mask of its own, gated in the instant of the edge by an action of its own.
-    pub(super) fn sampled_reset(
+    /// Where a flip-flop's reset and set are found.
+    fn control_bits(&mut self, cell: &FlatCell) -> Result<[Bit; 2], Unlevelled> {
+        Ok([self.bit(cell.inputs[2])?, self.bit(cell.inputs[3])?])
+    }
+
+    /// Lanes of a clock mask in which the flip-flop is not held in the instant of the edge: the place of their mask, and
+    /// the actions that find them.
+    pub(super) fn unheld(
         &mut self,
         cause: Cause,
-        arc: &Arc,
+        cell: &FlatCell,
         mask: u16,
-        arrival_fs: i64,
         instant_fs: i64,
-    ) -> Result<(u16, Option<usize>), Unlevelled> {
-        let reset = self.survey.netlist.cells()[arc.cell].inputs[2];
-        let clock_to_q = self.delay(arc, Edge::Rise);
-        let is_between = |release: &Cause| {
-            let after = release.position_fs - cause.position_fs - arrival_fs;
-            release.net == reset && !release.value && after.rem_euclid(self.period_fs) <= clock_to_q
-        };
-        if !self.causes.iter().any(is_between) {
-            return Ok((mask, None));
+    ) -> Result<(u16, Vec<usize>), Unlevelled> {
+        let (mut lanes, mut drafts) = (mask, Vec::new());
+        for (control, after_fs) in self.control_bits(cell)?.into_iter().zip(0..) {
+            if control == (ZERO, false) {
+                continue;
+            }
+            let action = Action {
+                code: Code::And,
+                inputs: [lanes, control.0, ZERO, ZERO],
+                invert: [0, inversion(!control.1), 0, 0, 0],
+                out: self.new_place(),
+                directions: [u64::MAX; 2],
+                masks: [SINK; 2],
+                wakes: [0; 3],
+                traps: [false; 2],
+                is_doubtful: false,
+            };
+            lanes = action.out;
+            drafts.push(self.draft(cause.position_fs, instant_fs + after_fs, action));
         }
-        let (place, inverted) = self.bit(reset)?;
-        let gated = self.new_place();
-        let action = Action {
-            code: Code::And,
-            inputs: [mask, place, ZERO, ZERO],
-            invert: [0, inversion(!inverted), 0, 0, 0],
-            out: gated,
-            directions: [u64::MAX; 2],
-            masks: [SINK; 2],
-            wakes: [0; 3],
-            traps: [false; 2],
-            is_doubtful: false,
-        };
-        Ok((
-            gated,
-            Some(self.draft(cause.position_fs, instant_fs, action)),
-        ))
+        Ok((lanes, drafts))
     }
 
     pub(super) fn flip_flop(
@@ -59,21 +57,14 @@ impl Leveliser<'_> {
         arrival_fs: i64,
     ) -> Result<usize, Unlevelled> {
         let cell = self.survey.netlist.cells()[index];
-        let [d, _, r, s] = cell.inputs;
+        let d = cell.inputs[0];
         let q = if cell.outputs[0].is_some() {
             cell.outputs[0]
         } else {
             cell.outputs[1]
         };
         let (out, _) = self.bit(q)?;
-        let mut bit = |net: NetId| {
-            if net.is_some() {
-                self.bit(net)
-            } else {
-                Ok((ZERO, false))
-            }
-        };
-        let (reset, set) = (bit(r)?, bit(s)?);
+        let [reset, set] = self.control_bits(&cell)?;
         let mut is_doubtful = false;
         let (code, data) = if mask.is_none() {
             (Code::Async, (ZERO, false))

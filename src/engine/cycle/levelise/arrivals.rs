@@ -2,14 +2,59 @@
 
 use super::*;
 
+/// Where a cause goes.
+pub(super) struct Reach {
+    pub cause: Cause,
+    /// Changes, causes before effects, loops apart.
+    pub order: Vec<Node>,
+    /// Place of each change in the order.
+    rank: HashMap<Node, usize>,
+    /// Earliest and latest arrival of each.
+    pub arrival: HashMap<Node, (i64, i64)>,
+    /// Flip-flops whose clock means nothing, as they are held.
+    pub held: BTreeSet<usize>,
+}
+
+/// Lanes in which a clock rises.
+#[derive(Default)]
+struct ClockMasks {
+    /// Their mask.
+    all: Option<u16>,
+    /// Those of them in which a reset and set do not hold, where that has to be found out at once.
+    unheld: HashMap<(NetId, NetId), u16>,
+    /// Drafts that find it out.
+    drafts: Vec<usize>,
+}
+
+/// Depth first, so that reversed it is an order in which causes precede effects, loops apart.
+#[derive(Default)]
+struct Search {
+    order: Vec<Node>,
+    seen: BTreeSet<(NetId, bool)>,
+}
+
+impl Search {
+    fn visit(&mut self, leveliser: &Leveliser<'_>, held: &BTreeSet<usize>, node: Node) {
+        if !self.seen.insert((node.0, node.1 == Edge::Rise)) {
+            return;
+        }
+        for arc in leveliser.arcs(held, node) {
+            for to in arc.to {
+                self.visit(leveliser, held, to);
+            }
+        }
+        self.order.push(node);
+    }
+}
+
 impl Leveliser<'_> {
-    /// What a change causes: by cell and pin, the changes of its outputs.
-    pub(super) fn arcs(&self, cause: Cause, from: Node) -> Vec<Arc> {
+    /// What a change causes: by cell and pin, the changes of its outputs. Flip-flops that are held ignore their clock.
+    fn arcs(&self, held: &BTreeSet<usize>, from: Node) -> Vec<Arc> {
         let cells = self.survey.netlist.cells();
         let loads = self.loads.get(&from.0).map_or(&[][..], Vec::as_slice);
         let arcs = loads
             .iter()
-            .filter(|&&(cell, pin)| !self.is_held(cause, &cells[cell], pin));
+            .filter(|&&(cell, pin)| !(pin == CLOCK && held.contains(&cell)));
         arcs.map(|&(cell, pin)| {
             let leaf = &cells[cell];
             let outputs = leaf
@@ -32,32 +77,22 @@ impl Leveliser<'_> {
         .collect()
     }
 
-    /// Whether this pin clocks a flip-flop that the cause itself resets: it ignores its clock.
-    pub(super) fn is_held(&self, cause: Cause, cell: &FlatCell, pin: usize) -> bool {
-        cell.kind.is_flip_flop() && pin == 1 && cause.value && cell.inputs[2] == cause.net
-    }
-
     pub(super) fn delay(&self, arc: &Arc, edge: Edge) -> i64 {
         i64::from(self.survey.timing.of(arc.cell)[arc.pin].to(edge.level()))
     }
 
-    /// Drafts the actions of one cause; the first of them sets the shared net.
-    pub(super) fn follow(&mut self, cause: Cause) -> Result<usize, Unlevelled> {
-        let edge = if cause.value { Edge::Rise } else { Edge::Fall };
-        let start = (cause.net, edge);
+    /// The changes that a cause brings while these flip-flops are held.
+    pub(super) fn spread(&self, cause: Cause, held: BTreeSet<usize>) -> Reach {
+        let start = cause.node();
         let mut search = Search::default();
-        search.visit(self, cause, start);
+        search.visit(self, &held, start);
         search.order.reverse();
-        let rank: HashMap<Node, usize> = search
-            .order
-            .iter()
-            .enumerate()
-            .map(|(i, &n)| (n, i))
-            .collect();
+        let order = search.order;
+        let rank: HashMap<Node, usize> = order.iter().enumerate().map(|(i, &n)| (n, i)).collect();
         let mut arrival: HashMap<Node, (i64, i64)> = HashMap::from([(start, (0, 0))]);
-        for from in &search.order {
+        for from in &order {
             let (early, late) = arrival[from];
-            for arc in self.arcs(cause, *from) {
+            for arc in self.arcs(&held, *from) {
                 for to in arc.to.iter().filter(|to| rank[*to] > rank[from]) {
                     let delay = self.delay(&arc, to.1);
                     let window = arrival.entry(*to).or_insert((i64::MAX, i64::MIN));
@@ -65,8 +100,18 @@ impl Leveliser<'_> {
                 }
             }
         }
-        self.check_clears(cause, &arrival)?;
+        Reach {
+            cause,
+            order,
+            rank,
+            arrival,
+            held,
+        }
+    }
 
+    /// Drafts the actions of one cause; the first of them sets the shared net.
+    pub(super) fn follow(&mut self, reach: &Reach) -> Result<usize, Unlevelled> {
+        let cause = reach.cause;
         let (place, _) = self.bit(cause.net)?;
         let set = Action {
             code: Code::Set(cause.value),
@@ -80,113 +125,97 @@ impl Leveliser<'_> {
             is_doubtful: false,
         };
         let first = self.draft(cause.position_fs, 0, set);
-        // Which drafts make a node, and which evaluate a cell because of one.
-        let mut makers: HashMap<Node, Vec<usize>> = HashMap::from([(start, vec![first])]);
+        // Which drafts make a node, and which evaluate a gate because of one.
+        let mut makers: HashMap<Node, Vec<usize>> = HashMap::from([(cause.node(), vec![first])]);
         let mut gates: HashMap<Node, usize> = HashMap::new();
-        let mut flip_flops: HashMap<(usize, usize), usize> = HashMap::new();
-        let mut masks: HashMap<NetId, u16> = HashMap::new();
-        for &node in &search.order {
-            for arc in self.arcs(cause, node) {
-                let kind = self.survey.netlist.cells()[arc.cell].kind;
+        for &node in &reach.order {
+            let mut clock = ClockMasks::default();
+            let mut targets = Vec::new();
+            let mut is_lost = false;
+            for arc in self.arcs(&reach.held, node) {
+                let is_flip_flop = self.survey.netlist.cells()[arc.cell].kind.is_flip_flop();
                 let ahead: Vec<Node> = arc
                     .to
                     .iter()
                     .copied()
-                    .filter(|to| rank[to] > rank[&node])
+                    .filter(|to| reach.rank[to] > reach.rank[&node])
                     .collect();
-                let is_cut = ahead.len() < arc.to.len();
-                let mut targets = Vec::new();
-                if kind.is_flip_flop() && !ahead.is_empty() {
-                    let (early, late) = arrival[&node];
-                    if early != late && arc.pin != 1 {
-                        return Err(Unlevelled::Ambiguous {
-                            net: self.survey.name(node.0),
-                            shortest_fs: early,
-                            longest_fs: late,
-                        });
-                    }
-                    let draft = match flip_flops.get(&(arc.cell, arc.pin)) {
-                        Some(&draft) => draft,
-                        None => {
-                            let time = late + self.delay(&arc, Edge::Rise);
-                            let made = makers[&node].iter().map(|&m| self.drafts[m].arrival_fs);
-                            let instant = made.max().expect("a node has a maker") + 1;
-                            let mask = (arc.pin == 1).then(|| {
-                                *masks.entry(node.0).or_insert_with(|| {
-                                    self.next_place += 1;
-                                    self.next_place - 1
-                                })
-                            });
-                            let mask = match mask {
-                                Some(mask) => {
-                                    let (mask, gate) =
-                                        self.sampled_reset(cause, &arc, mask, late, instant)?;
-                                    targets.extend(gate);
-                                    Some(mask)
-                                }
-                                None => None,
-                            };
-                            let draft = self.flip_flop(cause, arc.cell, mask, time)?;
-                            self.drafts[draft].action.is_doubtful |= early != late;
-                            flip_flops.insert((arc.cell, arc.pin), draft);
-                            draft
-                        }
-                    };
-                    for to in &ahead {
-                        let made = makers.entry(*to).or_default();
-                        if !made.contains(&draft) {
-                            made.push(draft);
-                        }
+                is_lost |= ahead.len() < arc.to.len();
+                // Of two drafts that make a clock, one would overwrite the other's edges.
+                is_lost |= is_flip_flop && arc.pin == CLOCK && makers[&node].len() > 1;
+                if is_flip_flop && !ahead.is_empty() {
+                    let made = makers[&node].iter().map(|&m| self.drafts[m].arrival_fs);
+                    let instant = made.max().expect("a node has a maker") + 1;
+                    let draft = self.arrive(reach, node, &arc, &mut clock, instant)?;
+                    for to in ahead {
+                        makers.entry(to).or_default().push(draft);
                     }
                     targets.push(draft);
                 } else {
                     for to in &ahead {
                         let draft = match gates.get(to) {
                             Some(&draft) => draft,
-                            None => self.gate(cause, arc.cell, *to, &arrival, &mut gates)?,
+                            None => self.gate(cause, arc.cell, *to, &reach.arrival, &mut gates)?,
                         };
                         makers.insert(*to, vec![draft]);
                         targets.push(draft);
                     }
                 }
-                let (_, is_inverted) = self.bit(node.0)?;
-                let direction = usize::from((node.1 == Edge::Fall) ^ is_inverted);
-                for &maker in &makers[&node] {
-                    let draft = &mut self.drafts[maker];
-                    draft.wakes[direction].extend(&targets);
-                    draft.action.traps[direction] |= is_cut;
-                    if let (Some(&mask), Edge::Rise) = (masks.get(&node.0), node.1) {
-                        draft.action.masks[direction] = mask;
-                    }
+            }
+            targets.extend(clock.drafts);
+            let (_, is_inverted) = self.bit(node.0)?;
+            let direction = usize::from((node.1 == Edge::Fall) ^ is_inverted);
+            for &maker in &makers[&node] {
+                let draft = &mut self.drafts[maker];
+                draft.wakes[direction].extend(&targets);
+                draft.action.traps[direction] |= is_lost;
+                if let Some(mask) = clock.all {
+                    draft.action.masks[direction] = mask;
                 }
             }
         }
         Ok(first)
     }
 
-    /// A reset must outlast whatever its own clearing clocks.
-    pub(super) fn check_clears(
-        &self,
-        cause: Cause,
-        arrival: &HashMap<Node, (i64, i64)>,
-    ) -> Result<(), Unlevelled> {
-        let Some(&width) = self.pulse_fs.get(&cause.net) else {
-            return Ok(());
-        };
-        let cells = self.survey.netlist.cells();
-        for (&(net, edge), &(_, late)) in arrival {
-            let loads = self.loads.get(&net).map_or(&[][..], Vec::as_slice);
-            for &(cell, pin) in loads.iter().filter(|_| edge == Edge::Rise) {
-                let removal = self
-                    .cell_library
-                    .checks(cells[cell].kind)
-                    .removal
-                    .at(self.config.corner);
-                if self.is_held(cause, &cells[cell], pin) && late + i64::from(removal) >= width {
-                    return Err(Unlevelled::Clear(self.survey.netlist.cell_path(cell)));
+    /// Drafts what an edge does that arrives at a flip-flop.
+    fn arrive(
+        &mut self,
+        reach: &Reach,
+        node: Node,
+        arc: &Arc,
+        clock: &mut ClockMasks,
+        instant_fs: i64,
+    ) -> Result<usize, Unlevelled> {
+        let cell = self.survey.netlist.cells()[arc.cell];
+        let (early, late) = reach.arrival[&node];
+        let delay = self.delay(arc, Edge::Rise);
+        let is_released = self.may_be_released(reach.cause, &cell, late, delay);
+        let mask = if arc.pin == CLOCK {
+            let all = *clock.all.get_or_insert_with(|| self.new_place());
+            let [_, _, reset, set] = cell.inputs;
+            Some(match clock.unheld.get(&(reset, set)) {
+                _ if !is_released => all,
+                Some(&unheld) => unheld,
+                None => {
+                    let (unheld, drafts) = self.unheld(reach.cause, &cell, all, instant_fs)?;
+                    clock.drafts.extend(drafts);
+                    clock.unheld.insert((reset, set), unheld);
+                    unheld
                 }
-            }
-        }
-        Ok(())
+            })
+        } else if early != late {
+            return Err(self.ambiguous(node.0, (early, late)));
+        } else if is_released {
+            return Err(Unlevelled::Clear(self.survey.netlist.cell_path(arc.cell)));
+        } else {
+            None
+        };
+        let draft = self.flip_flop(reach.cause, arc.cell, mask, late + delay)?;
+        let action = &mut self.drafts[draft].action;
+        action.is_doubtful |= early != late;
+        // A reset and a set on their way to Q both: each brings, and wakes, only what is its own.
+        let own = caused(cell.kind, arc.pin, node.1, 0);
+        action.directions = Edge::BOTH.map(|edge| inversion(own.contains(&edge)));
+        Ok(draft)
     }
 }
