@@ -47,7 +47,7 @@ pub struct Special {
     pub is_only: bool,
 }
 
-/// What the distance of two photons of one SPAD tells, in rows.
+/// What the rows of a SPAD's only two photons tell, neither of which is doubtful.
 #[derive(Debug, Clone, Copy)]
 pub struct Spacing {
     /// Rows of bins, 1 to this.
@@ -56,6 +56,22 @@ pub struct Spacing {
     pub far: usize,
     /// Closer than it, if by less and both in bins.
     pub blind: usize,
+}
+
+impl Spacing {
+    /// Whether both make pulses as far as anybody can see: nothing is counted outside the window, and photons far apart do
+    /// not meet. `first` is the lower row.
+    #[inline(always)]
+    pub fn both_fire(&self, first: usize, second: usize) -> bool {
+        (second == 0) | (first > self.bins) | ((first > 0) & (second - first > self.far))
+    }
+
+    /// Whether the photon in the `second` row meets the blindness that the `first` one leaves, the lower row.
+    #[inline(always)]
+    pub fn one_fires(&self, first: usize, second: usize) -> bool {
+        let apart = second - first;
+        (first > 0) & (second <= self.bins) & (apart > 0) & (apart < self.blind)
+    }
 }
 
 fn table<T: Copy + Default, const N: usize>() -> Box<[T; N]> {
@@ -127,28 +143,28 @@ impl Tables {
     /// Settles photons that are the only special ones of their cycle, where rows tell what becomes of them; the others stay
     /// special. Returns how many met a blind SPAD. What happens is as random as the light, so nothing branches on it.
     pub fn settle_by_rows(&mut self, codes: &Codes, spacing: &Spacing) -> u64 {
-        let &Spacing { bins, far, blind } = spacing;
         let (mut kept, mut lost) = (0, 0);
-        let (codes, marks_tell_bins) = (codes.codes(), bins <= MARKED_BINS);
+        let (codes, marks_tell_bins) = (codes.codes(), spacing.bins <= MARKED_BINS);
         for index in 0..self.specials {
             let special = self.special[index];
-            let photon = (special >> PHOTON_SHIFT) as usize - 1;
+            let Special {
+                photon,
+                shared,
+                is_only,
+            } = self.unpacked(special, codes);
             let code = codes[photon];
-            let is_only = self.cycles[code.cycle()] / ONE_SPECIAL == 1;
-            let shares_spad = special as u32 & SPAD_MARKS != 0;
-            let shares_bin = special as u32 & !SPAD_MARKS != 0;
+            let shares_spad = shared & SPAD_MARKS != 0;
+            let shares_bin = shared & !SPAD_MARKS != 0;
             let before = codes[usize::from(self.before[photon]).saturating_sub(1)];
             // One that shares neither with the photon before it, but with an earlier one, takes longer.
             let is_partner = (self.before[photon] > 0) & (before.spad() == code.spad());
             let (row, other) = (code.row(), before.row());
             let (first, second) = (row.min(other), row.max(other));
-            let apart = second - first;
 
             let two_fire = is_only & !shares_spad & marks_tell_bins;
             let meets = is_only & shares_spad & !shares_bin & is_partner;
-            let unseen = (second == 0) | (first > bins);
-            let both_fire = meets & (unseen | ((first > 0) & (apart > far)));
-            let one_fires = meets & (first > 0) & (second <= bins) & (apart > 0) & (apart < blind);
+            let both_fire = meets & spacing.both_fire(first, second);
+            let one_fires = meets & spacing.one_fires(first, second);
 
             let counts = &mut self.counts[0];
             counts[row] = counts[row].wrapping_sub(2 * u32::from(two_fire));
@@ -166,13 +182,18 @@ impl Tables {
     /// photon may come twice.
     pub fn special(&self, index: usize, codes: &Codes) -> Option<Special> {
         let special = *self.special[..self.specials].get(index)?;
+        Some(self.unpacked(special, codes.codes()))
+    }
+
+    #[inline(always)]
+    fn unpacked(&self, special: u64, codes: &[Code]) -> Special {
         let photon = (special >> PHOTON_SHIFT) as usize - 1;
-        let cycle = self.cycles[codes.codes()[photon].cycle()];
-        Some(Special {
+        let cycle = self.cycles[codes[photon].cycle()];
+        Special {
             photon,
             shared: special as u32,
             is_only: cycle / ONE_SPECIAL == 1,
-        })
+        }
     }
 
     /// The last photon of a cycle, which is empty afterwards.

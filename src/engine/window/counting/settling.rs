@@ -8,10 +8,11 @@
 //! ```
 //!
 //! What other photons the cycle has does not matter in the first three cases: whoever shared a SPAD or a bin with
-//! them, too, would be special as well.
+//! them, too, would be special as well. Those that rows alone decide have been settled when this begins
+//! ([`Tables::settle_by_rows`](super::Tables::settle_by_rows)).
 
 use super::{Counting, Pixel, in_draw};
-use crate::engine::window::codes::{Code, MARKED_BINS, SPAD_MARKS};
+use crate::engine::window::codes::{Code, SPAD_MARKS};
 use crate::engine::window::tables::Special;
 use crate::photon::Group;
 
@@ -37,13 +38,13 @@ impl Counting<'_> {
         }
     }
 
-    /// Settles a photon that shares its bin, or if there are many bins its bin's mark, with one of another SPAD.
+    /// Settles a photon that shares its bin's mark, and where several bins have one mark perhaps its bin, with one of
+    /// another SPAD.
     fn settle_bin(&mut self, pixel: &mut Pixel<'_>, photon: usize, code: Code) {
         let row = code.row();
-        if pixel.hits.len() <= MARKED_BINS
-            || self
-                .find_before(photon, |other| other.row() == row)
-                .is_some()
+        if self
+            .find_before(photon, |other| other.row() == row)
+            .is_some()
         {
             self.tables.remove(row);
             self.tables.remove(row);
@@ -159,11 +160,10 @@ impl Counting<'_> {
         let (row, other_row) = (code.row(), other_code.row());
         let bins = pixel.hits.len();
         let (first, second) = (row.min(other_row), row.max(other_row));
-        // Nothing is counted outside the window; apart by more rows than the memory has, photons do not meet.
-        if second == 0 || first > bins || first > 0 && second - first > self.spacing.far {
+        if self.spacing.both_fire(first, second) {
             return Some([1; 2]);
         }
-        if first > 0 && first != second && second <= bins && second - first < self.spacing.blind {
+        if self.spacing.one_fires(first, second) {
             pixel.work.lost_to_dead_time += 1;
             let is_first = u8::from(row < other_row);
             return Some([is_first, 1 - is_first]);
