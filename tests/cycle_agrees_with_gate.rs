@@ -109,7 +109,7 @@ fn as_the_gates_of_hslidar_count() {
             let exposure = Exposure::new(&config, 140, 12);
             let mut scenario = Scenario {
                 starts: (0..128).collect(),
-                ..Scenario::of(random, config, exposure)
+                ..Scenario::exposed(random, config, exposure)
             };
             leave_out_races(&mut scenario);
             let Scenario { config, starts, .. } = &scenario;

@@ -35,11 +35,11 @@ impl Scenario {
             _ => random.random_range(20..80),
         };
         let exposure = Exposure::new(&config, stop_periods, random.random_range(1..8));
-        Self::of(random, config, exposure)
+        Self::exposed(random, config, exposure)
     }
 
     /// Any start values and pulses.
-    pub fn of(random: &mut StdRng, config: SensorConfig, exposure: Exposure) -> Self {
+    pub fn exposed(random: &mut StdRng, config: SensorConfig, exposure: Exposure) -> Self {
         let most = config.largest_start().min(exposure.stop_periods as u16);
         let pixels = config.pixels();
         let starts = (0..pixels).map(|_| random.random_range(0..=most)).collect();
