@@ -208,13 +208,21 @@ fn the_pool_of_spads() {
 
 #[test]
 fn the_joint_state() {
-    let name = "joint state, 40 Mcounts/s";
-    Case {
-        name,
-        options: options(0.0),
-        ..case()
+    for (name, sub_bins) in [
+        ("joint state, 40 Mcounts/s", 1),
+        ("joint state in 4 steps", 4),
+    ] {
+        let options = CohortOptions {
+            sub_bins,
+            ..options(0.0)
+        };
+        Case {
+            name,
+            options,
+            ..case()
+        }
+        .agrees();
     }
-    .agrees();
 }
 
 #[test]

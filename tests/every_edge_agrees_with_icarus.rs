@@ -155,10 +155,7 @@ fn compare(case: &Case) -> Result<Figures, TestCaseError> {
 
 /// Cases to run in each of the two tests with random netlists.
 fn cases() -> u32 {
-    let total = std::env::var("GDTOF_CASES").map_or(500, |cases| {
-        cases.parse().expect("GDTOF_CASES is a number of cases")
-    });
-    u32::div_ceil(total, 2)
+    scenario::cases(500).div_ceil(2)
 }
 
 /// How proptest goes about it. Shrinking is cut short: every step runs Icarus.
