@@ -251,8 +251,12 @@ fn table(
             metres(summary.depth_mean_m),
         ]);
     }
+    let gate = match args.no_gate {
+        true => String::new(),
+        false => format!(" (gate level: {})", settings.laser_cycles.min(GATE_CYCLES)),
+    };
     format!(
-        "{cells} walls, {} macropixels each, {} laser cycles of {} CLK periods (gate level: {})\n\n{grid}\n\
+        "{cells} walls, {} macropixels each, {} laser cycles of {} CLK periods{gate}\n\n{grid}\n\
          Errors are against the cycle engine, which steps every CLK period; medians over the walls.\n\
          Engines that draw photons of their own differ from it as another seed does: compare with that row.\n\
          A mean shift of {:.3} is what chance gives two exact engines.\n\
@@ -260,7 +264,6 @@ fn table(
         settings.macropixels,
         settings.laser_cycles,
         settings.stop_periods,
-        settings.laser_cycles.min(GATE_CYCLES),
         f64::sqrt(2.0 / settings.macropixels as f64),
         args.out.display(),
     )
