@@ -72,6 +72,23 @@ pub struct Action {
     pub is_doubtful: bool,
 }
 
+impl Action {
+    /// An action for both directions that reads nothing and wakes nobody yet.
+    pub fn new(code: Code, out: u16) -> Self {
+        Action {
+            code,
+            inputs: [ZERO; 4],
+            invert: [0; 5],
+            out,
+            directions: [u64::MAX; 2],
+            masks: [SINK; 2],
+            wakes: [0; 3],
+            traps: [false; 2],
+            is_doubtful: false,
+        }
+    }
+}
+
 /// The tape.
 #[derive(Debug, Clone, Default)]
 pub struct PassTape {

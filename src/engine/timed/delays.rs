@@ -106,7 +106,8 @@ impl Anatomy {
     /// Finds the nets of this sensor's macropixels.
     pub fn new(config: &SensorConfig) -> Self {
         let netlist = Netlist::elaborate(&sensor::window(config, (0, 0), (1, 1)));
-        let path = |name: &str| format!("{}.{name}", sensor::pixel_name(0, 0));
+        let pixel = sensor::pixel_name(0, 0);
+        let path = |name: &str| format!("{pixel}.{name}");
         let bus = |name: &str| {
             netlist
                 .signal(&path(name))
@@ -123,7 +124,6 @@ impl Anatomy {
         let toggles = std::array::from_fn(|spad| netlist.cell(&toggle(spad)).expect("a SPAD"));
         let p_counter = netlist.scope(&path("p_counter")).expect("a P-counter");
         let is_flip_flop = |&cell: &usize| netlist.cells()[cell].kind.is_flip_flop();
-        let pixel = sensor::pixel_name(0, 0);
         let paths = (0..netlist.cells().len()).map(|cell| {
             let path = netlist.cell_path(cell);
             match path.split_once(&pixel) {

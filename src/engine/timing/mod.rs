@@ -30,9 +30,7 @@ pub use load::{LoadTiming, load_works};
 pub use macropixel::{LocalClocks, MacropixelTiming, longest};
 pub use spread::{PixelTiming, Spread, spread};
 
-use crate::netlist::{
-    Corner, Library, Mismatch, Netlist, Timing, derated_limits, varied, varied_as,
-};
+use crate::netlist::{Corner, Library, Mismatch, Netlist, Timing, derated_limits, varied_as};
 use crate::units::Time;
 
 /// What the analysed chip is made of.
@@ -74,8 +72,7 @@ impl Silicon {
 
     /// Delays of a netlist.
     pub fn timing(&self, netlist: &Netlist) -> Timing {
-        let nominal = Timing::nominal(netlist, &Library::default(), self.corner);
-        varied(netlist, &nominal, self.factor, self.mismatch)
+        self.timing_as(netlist, |cell| netlist.cell_path(cell))
     }
 
     /// Delays of another netlist that differs from this one in names only: there each cell is at `path` of its index.

@@ -33,15 +33,9 @@ impl Leveliser<'_> {
                 continue;
             }
             let action = Action {
-                code: Code::And,
                 inputs: [lanes, control.0, ZERO, ZERO],
                 invert: [0, inversion(!control.1), 0, 0, 0],
-                out: self.new_place(),
-                directions: [u64::MAX; 2],
-                masks: [SINK; 2],
-                wakes: [0; 3],
-                traps: [false; 2],
-                is_doubtful: false,
+                ..Action::new(Code::And, self.new_place())
             };
             lanes = action.out;
             drafts.push(self.draft(cause.position_fs, instant_fs + after_fs, action));
@@ -85,7 +79,6 @@ impl Leveliser<'_> {
             )
         };
         let action = Action {
-            code,
             inputs: [data.0, mask.unwrap_or(ZERO), reset.0, set.0],
             invert: [
                 inversion(data.1),
@@ -94,12 +87,8 @@ impl Leveliser<'_> {
                 inversion(set.1),
                 0,
             ],
-            out,
-            directions: [u64::MAX; 2],
-            masks: [SINK; 2],
-            wakes: [0; 3],
-            traps: [false; 2],
             is_doubtful,
+            ..Action::new(code, out)
         };
         Ok(self.draft(cause.position_fs, arrival_fs, action))
     }
@@ -182,15 +171,10 @@ impl Leveliser<'_> {
         };
         let (code, inputs, invert) = self.function(&cell)?;
         let action = Action {
-            code,
             inputs,
             invert,
-            out: self.bit(to.0)?.0,
             directions,
-            masks: [SINK; 2],
-            wakes: [0; 3],
-            traps: [false; 2],
-            is_doubtful: false,
+            ..Action::new(code, self.bit(to.0)?.0)
         };
         let draft = self.draft(cause.position_fs, both.unwrap_or(own), action);
         gates.insert(to, draft);

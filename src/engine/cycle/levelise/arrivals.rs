@@ -113,17 +113,7 @@ impl Leveliser<'_> {
     pub(super) fn follow(&mut self, reach: &Reach) -> Result<usize, Unlevelled> {
         let cause = reach.cause;
         let (place, _) = self.bit(cause.net)?;
-        let set = Action {
-            code: Code::Set(cause.value),
-            inputs: [ZERO; 4],
-            invert: [0; 5],
-            out: place,
-            directions: [u64::MAX; 2],
-            masks: [SINK; 2],
-            wakes: [0; 3],
-            traps: [false; 2],
-            is_doubtful: false,
-        };
+        let set = Action::new(Code::Set(cause.value), place);
         let first = self.draft(cause.position_fs, 0, set);
         // Which drafts make a node, and which evaluate a gate because of one.
         let mut makers: HashMap<Node, Vec<usize>> = HashMap::from([(cause.node(), vec![first])]);
