@@ -2,6 +2,7 @@
 //! and the random-access photon stream that drives every engine.
 
 mod budget;
+mod echo;
 mod gaussian;
 mod optics;
 pub(crate) mod philox;
@@ -13,6 +14,7 @@ mod spad;
 mod stream;
 
 pub use budget::{Convention, PhotonBudget, Spot};
+pub use echo::{ECHO_REACH, EchoLaw};
 pub use gaussian::{pulse_share, pulse_shares};
 pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
 pub use philox::LANES;
