@@ -157,6 +157,8 @@ fn agreed(case: &Case) -> Option<Vec<u16>> {
     assert_eq!(seen.histograms, all.histograms);
     let cycle = full_stream(&Cycle::new(config, exposure), &stream, &[*pixel]).unwrap();
     assert_eq!(seen.histograms, cycle.histograms);
+    assert_eq!(seen.work.cancelled, all.work.cancelled);
+    assert_eq!(seen.work.cancelled, cycle.work.cancelled);
     Some(seen.histograms[0].clone())
 }
 
@@ -228,6 +230,30 @@ fn threads_order_and_neighbours_change_nothing() {
     assert_eq!(one.histograms, alone);
     let all = expose_without_skipping(&engine, &stream, &pixels, |_| ()).unwrap();
     assert_eq!(one.histograms, all.histograms);
+}
+
+#[test]
+fn photons_that_cancel_are_told_of_by_every_engine() {
+    let (config, exposure, _, mut pixels) = frame();
+    pixels.truncate(3);
+    let told = |dead_time: Time| {
+        let stream = stream_config(&config, &exposure, 3, Time::from_ps(1_900));
+        let spads = SpadModel {
+            dead_time,
+            ..stream.spads.clone()
+        };
+        let stream = PhotonStream::new(&StreamConfig { spads, ..stream });
+        let window = Window::new(&config, &exposure);
+        let seen = window.expose(&stream, &pixels).unwrap().work;
+        let all = full_stream(&window, &stream, &pixels).unwrap().work;
+        assert_eq!(seen.cancelled, all.cancelled);
+        seen
+    };
+    let none = told(config.clock().period() + Time::from_fs(1));
+    assert_eq!(none.cancelled, 0);
+    let short = told(Time::from_ps(500));
+    assert!(short.cancelled > 0 && short.cancelled.is_multiple_of(2));
+    assert!(short.cancelled < short.pulses);
 }
 
 #[test]

@@ -281,6 +281,20 @@ impl WindowLaw {
         self.exposure.rising_until(sampled - Time::from_fs(1)) + 1
     }
 
+    /// Whether a rising CLK edge, counted from the exposure's first STOP edge, takes photons for `window` in any laser
+    /// cycle.
+    pub fn collects(&self, window: &OpenWindow, edge: i64) -> bool {
+        let (cycles, periods) = (self.exposure.laser_cycles, self.exposure.stop_periods);
+        // A conventional cycle is latched by the STOP edge that ends it; the exposure's first one ends one, too.
+        let first_cycle = match self.config.mode {
+            Mode::Guided => 0,
+            Mode::Conventional => -1,
+        };
+        let offset = edge - window.first_edge;
+        let cycle = offset.div_euclid(periods.into()).min(i64::from(cycles) - 1);
+        cycle >= first_cycle && offset - cycle * i64::from(periods) < self.bins
+    }
+
     /// Photon times that `bin` of `window` collects in laser cycle `cycle`, half open, from the exposure's
     /// first STOP edge.
     pub fn bin_interval(&self, window: &OpenWindow, cycle: i64, bin: i64) -> Range<Time> {

@@ -6,7 +6,7 @@ use super::hardware_events::HardwareEvents;
 use super::lanes::LaneSimulation;
 use super::stimulus::{Pins, Schedule, StimulusPlan};
 use super::{Engine, EngineError};
-use crate::chip::{Exposure, SensorConfig, front_end, histogram, sensor};
+use crate::chip::{Exposure, SensorConfig, WindowLaw, front_end, histogram, sensor};
 use crate::kernel::{Kernel, LANES, Observer, Policy, Statistics, TimingChecks};
 use crate::netlist::{Library, Netlist, Timing};
 use crate::photon::SpadEvent;
@@ -221,6 +221,10 @@ impl<'a> Gate<'a> {
 }
 
 impl Engine for Gate<'_> {
+    fn law(&self) -> WindowLaw {
+        WindowLaw::new(self.config, self.exposure)
+    }
+
     fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
         let mut histograms = self.histograms(&[start], &[pulses])?;
         Ok(histograms.remove(0))

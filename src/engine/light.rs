@@ -10,7 +10,7 @@ use std::ops::AddAssign;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Engine, EngineError};
+use super::{Cancelling, Engine, EngineError};
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::photon::{
     DeadTimeLaw, PhotonStream, PixelLight, PixelPhotons, SpadEvent, SpadModel, StreamConfig,
@@ -52,6 +52,8 @@ pub struct Work {
     pub pulses: u64,
     /// Drawn photons that would have been such pulses, had they not met a blind SPAD.
     pub lost_to_dead_time: u64,
+    /// Those pulses in time windows that cancel in their SPAD's flip-flop, two at a time ([`Cancelling`]).
+    pub cancelled: u64,
     /// CLK periods of the exposure, over all macropixels.
     pub clk_periods: u64,
     /// Those that were simulated, one by one or because a photon fell into them.
@@ -66,6 +68,7 @@ impl AddAssign for Work {
         self.photons_drawn += other.photons_drawn;
         self.pulses += other.pulses;
         self.lost_to_dead_time += other.lost_to_dead_time;
+        self.cancelled += other.cancelled;
         self.clk_periods += other.clk_periods;
         self.clk_periods_visited += other.clk_periods_visited;
     }
@@ -181,6 +184,13 @@ pub fn full_stream<E: Engine + ?Sized>(
     let pulses: Vec<&[SpadEvent]> = photons.iter().map(|p| &p.events[..]).collect();
     let histograms = engine.histograms(&starts, &pulses)?;
     let config = stream.config();
+    let cancelling = Cancelling::of(config.spads.dead_time, config.clock, || engine.law());
+    let cancelled = cancelling.map_or(0, |cancelling| {
+        let macropixels = starts.iter().zip(&pulses);
+        macropixels
+            .map(|(&start, pulses)| cancelling.seen(start, pulses))
+            .sum()
+    });
     let clk_periods =
         pixels.len() as u64 * u64::from(config.stop_periods) * u64::from(config.laser_cycles);
     let work = Work {
@@ -188,6 +198,7 @@ pub fn full_stream<E: Engine + ?Sized>(
         photons_drawn: photons.iter().map(|p| p.drawn).sum(),
         pulses: photons.iter().map(|p| p.events.len() as u64).sum(),
         lost_to_dead_time: photons.iter().map(|p| p.lost_to_dead_time).sum(),
+        cancelled,
         clk_periods,
         clk_periods_visited: clk_periods,
         ..Work::default()

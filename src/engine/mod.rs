@@ -13,6 +13,7 @@
 //! plain-Rust reference model ([`crate::chip::macropixel::Model`]) is the tests' slow judge of all of them. `Window`
 //! also refuses a P-counter that raises LOCAL_STOP more than once in a laser cycle.
 
+mod cancelling;
 pub mod cohort;
 mod cycle;
 mod gate;
@@ -28,6 +29,7 @@ pub mod timing;
 pub mod waveform;
 mod window;
 
+pub use cancelling::Cancelling;
 pub use cohort::{Cohort, CohortOptions};
 pub use cycle::{Cycle, PackedPulses, Unlevelled};
 pub use gate::{Gate, GateSimulation};
@@ -41,6 +43,7 @@ pub use testbench::{export_annotated_verilog, export_verilog};
 pub use timed::{Runner, TimeKeeping, Timed, Timekept};
 pub use window::Window;
 
+use crate::chip::WindowLaw;
 use crate::photon::{PhotonStream, SpadEvent};
 
 const _: () = assert!(crate::chip::SPADS == crate::photon::SPADS);
@@ -78,6 +81,9 @@ pub trait Engine: Sync {
     fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
         full_stream(self, stream, pixels)
     }
+
+    /// The window law of its sensor and exposure.
+    fn law(&self) -> WindowLaw;
 
     /// How many macropixels are best given to this engine at once.
     fn batch(&self) -> usize {

@@ -368,6 +368,10 @@ impl<'a> Cohort<'a> {
 }
 
 impl Engine for Cohort<'_> {
+    fn law(&self) -> WindowLaw {
+        self.law.clone()
+    }
+
     fn histogram(&self, _: u16, _: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
         Err(EngineError::NoPhotons("cohort"))
     }

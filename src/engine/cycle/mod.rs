@@ -235,6 +235,10 @@ impl Machine {
 }
 
 impl Engine for Cycle<'_> {
+    fn law(&self) -> WindowLaw {
+        self.law.clone()
+    }
+
     fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
         Ok(self.histograms(&[start], &[pulses])?.remove(0))
     }

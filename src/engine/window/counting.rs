@@ -339,13 +339,15 @@ impl<'a> Counting<'a> {
                 .count() as u64;
             self.detect(pixel, laser_cycle, u16::MAX);
             let row_of = |event: &SpadEvent| window.row_of(event.time).unwrap_or(0) as i64;
-            let mut pulses = 0;
+            let mut alone = 0;
             for (row, spads) in taken(&self.events, row_of).filter(|(row, _)| *row > 0) {
+                alone += u64::from(spads.count_ones());
                 pixel.hits[row as usize - 1] += self.engine.adds(spads);
                 pixel.work.clk_periods_visited += 1;
             }
-            pulses += self.events.iter().filter(|event| row_of(event) > 0).count() as u64;
+            let pulses = self.events.iter().filter(|event| row_of(event) > 0).count() as u64;
             pixel.work.pulses += pulses;
+            pixel.work.cancelled += pulses - alone;
             pixel.work.lost_to_dead_time += seen.saturating_sub(pulses);
         }
         self.sorted = sorted;

@@ -114,6 +114,10 @@ impl<'a> Window<'a> {
 }
 
 impl Engine for Window<'_> {
+    fn law(&self) -> WindowLaw {
+        self.law.clone()
+    }
+
     fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
         let bins = self.config.bins as i64;
         let periods = self.exposure.stop_periods as i64;

@@ -188,6 +188,7 @@ impl Counting<'_> {
         } else if first == second {
             // Two pulses within one CLK period cancel.
             pixel.work.pulses += 2 * is_seen;
+            pixel.work.cancelled += 2 * is_seen;
             return Some([0; 2]);
         }
         Some([1; 2])
@@ -220,6 +221,7 @@ impl Counting<'_> {
             if last == Some(row) {
                 self.fired[row] -= 1;
                 pixel.work.pulses += 2;
+                pixel.work.cancelled += 2;
                 last = None;
             } else {
                 self.fired[row] += 1;
