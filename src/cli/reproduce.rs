@@ -94,10 +94,11 @@ fn print(report: &Report, folder: Option<&Path>) -> std::io::Result<()> {
     for result in &report.claims {
         let claim = &result.claim;
         say(format_args!(
-            "Claim {}: {} ({})\n{}",
+            "Claim {}: {} ({}): {}\n{}",
             claim.number,
             claim.title,
             claim.source,
+            reproduce::overall(&result.rows).text(),
             reproduce::grid(&result.rows)
         ))?;
         for row in result.rows.iter().filter(|row| !row.notes().is_empty()) {
@@ -127,8 +128,18 @@ fn print(report: &Report, folder: Option<&Path>) -> std::io::Result<()> {
         }
         say("\n")?;
     }
+    if !report.slips.is_empty() {
+        say(format_args!("{}\n", reproduce::SLIPS_TITLE))?;
+        for slip in &report.slips {
+            say(format_args!(
+                "  {}: {}; but {}. Model: {}.\n",
+                slip.place, slip.printed, slip.against, slip.model
+            ))?;
+        }
+        say("\n")?;
+    }
     if !report.claims.is_empty() {
-        say(format_args!("{}.\n", reproduce::tally(report)))?;
+        say(format_args!("{}\n", reproduce::tally(report)))?;
     }
     if let Some(folder) = folder {
         say(format_args!(

@@ -106,12 +106,15 @@ pub fn ripple_rows() -> Vec<Row> {
     let any_phase = shortest_period(below, |p| phases(p).any(|phase| timing.works(p, phase)));
     vec![
         Row::holds("worst ripple, longest path", "ns", Exactly("1.2"), timing.ripple.delay().as_ns())
-            .remark("CLK falling to LOCAL_STOP, typical, 50 °C. The library's delays are chosen to meet it."),
+            .given("The library's delays are chosen to meet it.")
+            .remark("CLK falling to LOCAL_STOP, typical, 50 °C."),
         Row::holds("worst ripple, gate level", "ns", Exactly("1.2"), simulated)
+            .given("The same delays, simulated.")
             .remark("The worst of eight start values; rolling over toggles every stage of each."),
-        Row::holds("twice the ripple", "ns", Exactly("2.4"), 2.0 * timing.ripple.delay().as_ns()),
+        Row::holds("twice the ripple", "ns", Exactly("2.4"), 2.0 * timing.ripple.delay().as_ns())
+            .given("As the ripple."),
         Row::holds("shortest CLK period, static", "ns", Within("2.4", 0.2), ns(by_paths))
-            .remark("STOP on CLK's falling edge; \"around 2.4 ns (~400 MHz)\". The shift register's own delay gives some of the ripple back."),
+            .remark("STOP on CLK's falling edge; \"around 2.4 ns (~400 MHz)\". The ripple is put in; that a period takes twice as long is the circuit's own."),
         Row::holds("shortest CLK period, gate level", "ns", Within("2.4", 0.2), ns(by_gates))
             .remark("The shortest period from which on every pattern is counted as at a slow clock."),
         Row::ours("shortest CLK period at the best STOP phase", "ns", ns(any_phase))
@@ -158,9 +161,9 @@ pub fn fig_54_rows() -> Vec<Row> {
         .first()
         .map_or(f64::NAN, |&t| (t - edges.stop).as_ns());
     vec![
-        Row::holds("COUNTER_CLK edges from STOP to LOCAL_STOP, start value 5", "", Exactly("6"), edges.edges_to_local_stop())
+        Row::holds("COUNTER_CLK edges from STOP to LOCAL_STOP, start value 5", "", Says("the next edge after 0", 6.0, 6.0), edges.edges_to_local_stop())
             .remark("The text: zero after five edges, LOCAL_STOP on the next. The figure's caption says \"after every 5 × CLK\"."),
-        Row::holds("rises of LOCAL_STOP in a laser cycle", "", Exactly("1"), edges.local_stop.len() as f64),
+        Row::holds("rises of LOCAL_STOP in a laser cycle", "", Says("until the next STOP", 1.0, 1.0), edges.local_stop.len() as f64),
         Row::ours("first COUNTER_CLK edge that counts, after STOP", "ns", after_stop)
             .remark("COUNTER_CLK is NOT CLK: the edge that comes together with STOP is swallowed by the reset."),
     ]
@@ -240,24 +243,19 @@ pub fn load_rows() -> Vec<Row> {
     let histogram_bits = (config.pixels() * config.bins * config.bin_bits) as f64;
     vec![
         Row::holds("bits of a load", "kbit", Exactly("36.9"), bits / 1e3),
-        Row::holds(
-            "start values that arrive, of 4096",
-            "",
-            Exactly("4096"),
-            right as f64,
-        )
-        .remark("Through deserialiser, row scanner and memories at gate level."),
+        Row::ours("start values that arrive, of 4096", "", right as f64)
+            .remark("Through deserialiser, row scanner and memories at gate level."),
         Row::holds(
             "time of a load at 200 MHz",
             "µs",
-            Between("100", "999"),
+            Says("a few hundred microseconds", 100.0, 999.0),
             loaded.duration.as_s() * 1e6,
         )
-        .remark("\"A few hundred microseconds\" at \"a few hundred megahertz\"."),
+        .remark("At \"a few hundred megahertz\", of which 200 is our choice."),
         Row::holds(
             "load bits over histogram bits",
             "",
-            AtMost("1"),
+            Says("unlikely to ever exceed", 0.0, 1.0),
             bits / histogram_bits,
         )
         .remark(
@@ -301,8 +299,10 @@ pub fn area_rows() -> Vec<Row> {
     let library = f64::from(CellKind::Dffsr.transistors());
     vec![
         Row::holds("transistors of a stage beyond its two flip-flops", "", Exactly("4"), stage - 2.0 * flip_flop)
-            .remark("The difference between P-counters of nine and eight stages."),
-        Row::holds("transistors of an OR gate that the mux replaces", "", Exactly("6"), f64::from(CellKind::Or2.transistors())),
+            .given("The library's mux has 4 transistors.")
+            .remark("The difference between P-counters of nine and eight stages: nothing but the mux comes on top."),
+        Row::holds("transistors of an OR gate that the mux replaces", "", Exactly("6"), f64::from(CellKind::Or2.transistors()))
+            .given("A number of the library's table."),
         Row::ours("transistors of a stage", "", stage),
         Row::ours("transistors of a stage of set/reset flip-flops", "", stage_transistors(PCounter::SetReset))
             .remark("Fig. 51b, the HSLIDAR's."),

@@ -16,6 +16,8 @@ pub enum Published {
     AtMost(&'static str),
     /// A range.
     Between(&'static str, &'static str),
+    /// No number but words, with the range that we read in them: an infinite end is open.
+    Says(&'static str, f64, f64),
     /// Nothing: a curve without numbers, or another convention of a number that is printed elsewhere.
     Nothing,
 }
@@ -34,6 +36,7 @@ impl Published {
             Published::AtLeast(text) => Some((number(text), f64::INFINITY)),
             Published::AtMost(text) => Some((f64::NEG_INFINITY, number(text))),
             Published::Between(low, high) => Some((number(low), number(high))),
+            Published::Says(_, low, high) => Some((low, high)),
             Published::Nothing => None,
         }
     }
@@ -64,6 +67,7 @@ impl Published {
             Published::AtLeast(text) => format!("≥ {text}"),
             Published::AtMost(text) => format!("≤ {text}"),
             Published::Between(low, high) => format!("{low} to {high}"),
+            Published::Says(words, ..) => format!("“{words}”"),
             Published::Nothing => String::new(),
         }
     }
@@ -74,6 +78,10 @@ impl Published {
             Published::Exactly(text) => format!("±{}", 0.5 * last_digit(text)),
             Published::Within(_, tolerance) => format!("±{tolerance}"),
             Published::AtLeast(_) | Published::AtMost(_) | Published::Between(..) => "bound".into(),
+            Published::Says(_, low, f64::INFINITY) => format!("read as ≥ {low}"),
+            Published::Says(_, f64::NEG_INFINITY, high) => format!("read as ≤ {high}"),
+            Published::Says(_, low, high) if low == high => format!("read as {low}"),
+            Published::Says(_, low, high) => format!("read as {low} to {high}"),
             Published::Nothing => String::new(),
         }
     }
@@ -111,6 +119,9 @@ pub fn figure(value: f64) -> String {
 }
 
 /// What became of a comparison.
+///
+/// *Agrees* is kept for numbers that could have come out otherwise. A number that was put into the model, or takes nothing
+/// but what was put in, is *given*: that it comes out again says only that nothing was lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -118,6 +129,8 @@ pub enum Verdict {
     Agrees,
     /// Ours is not, which is known and explained.
     Differs,
+    /// An input that comes out again.
+    Given,
     /// Ours is not, although it is expected to be: a fault.
     Fails,
     /// Ours alone: nothing is published to compare it with.
@@ -128,9 +141,10 @@ pub enum Verdict {
 
 impl Verdict {
     /// Every verdict.
-    pub const ALL: [Verdict; 5] = [
+    pub const ALL: [Verdict; 6] = [
         Verdict::Agrees,
         Verdict::Differs,
+        Verdict::Given,
         Verdict::Fails,
         Verdict::Ours,
         Verdict::NotModelled,
@@ -141,6 +155,7 @@ impl Verdict {
         match self {
             Verdict::Agrees => "agrees",
             Verdict::Differs => "differs",
+            Verdict::Given => "given",
             Verdict::Fails => "FAILS",
             Verdict::Ours => "ours alone",
             Verdict::NotModelled => "not modelled",
@@ -161,6 +176,10 @@ pub struct Row {
     pub computed: Option<f64>,
     /// Why the two are known to differ; `None` where they must agree.
     pub known_difference: Option<String>,
+    /// How the published number went into the model; `None` where it did not.
+    pub input: Option<String>,
+    /// Whether the claim can be met without it.
+    pub is_aside: bool,
     /// Convention, or what to think of.
     pub remark: String,
 }
@@ -179,6 +198,8 @@ impl Row {
             published,
             computed: Some(computed),
             known_difference: None,
+            input: None,
+            is_aside: false,
             remark: String::new(),
         }
     }
@@ -209,6 +230,20 @@ impl Row {
         self
     }
 
+    /// Says that the published number was put into the model, and how: coming out again, it is *given*.
+    #[must_use]
+    pub fn given(mut self, how: impl Into<String>) -> Self {
+        self.input = Some(how.into());
+        self
+    }
+
+    /// Says that the claim is about something else: the row's verdict, unless it fails, is not the claim's.
+    #[must_use]
+    pub fn aside(mut self) -> Self {
+        self.is_aside = true;
+        self
+    }
+
     /// Adds a remark.
     #[must_use]
     pub fn remark(mut self, remark: impl Into<String>) -> Self {
@@ -223,26 +258,33 @@ impl Row {
         };
         match self.published.agrees(computed) {
             None => Verdict::Ours,
+            Some(true) if self.input.is_some() => Verdict::Given,
             Some(true) => Verdict::Agrees,
             Some(false) if self.known_difference.is_some() => Verdict::Differs,
             Some(false) => Verdict::Fails,
         }
     }
 
-    /// Computed less published, in the row's unit and relative to what is published.
-    pub fn difference(&self) -> Option<(f64, f64)> {
+    /// Computed less published, in the row's unit and, where that is a number other than zero, relative to it.
+    pub fn difference(&self) -> Option<(f64, Option<f64>)> {
         let computed = self.computed?;
         let difference = self.published.difference(computed)?;
-        Some((difference, difference / (computed - difference).abs()))
+        let published = computed - difference;
+        let is_number = published != 0.0 && !matches!(self.published, Published::Says(..));
+        let relative = is_number.then(|| difference / published.abs());
+        Some((difference, relative))
     }
 
     /// Everything there is to say about it.
     pub fn notes(&self) -> String {
-        match (&self.known_difference, self.verdict()) {
-            (Some(why), Verdict::Differs) if self.remark.is_empty() => why.clone(),
-            (Some(why), Verdict::Differs) => format!("{why} {}", self.remark),
-            _ => self.remark.clone(),
-        }
+        let why = match self.verdict() {
+            Verdict::Differs => self.known_difference.as_deref(),
+            Verdict::Given => self.input.as_deref(),
+            _ => None,
+        };
+        let parts = why.into_iter().chain([self.remark.as_str()]);
+        let parts: Vec<&str> = parts.filter(|part| !part.is_empty()).collect();
+        parts.join(" ")
     }
 }
 
@@ -259,14 +301,21 @@ pub struct Claim {
     pub compute: fn() -> Vec<Row>,
 }
 
-/// The worst verdict of some rows, for a glance: a fault before a difference before agreement.
+/// The verdict on a claim: the worst of its published rows. One headline that is not modelled, that differs or that was
+/// put in keeps the claim from being met, however many other rows agree.
 pub fn overall(rows: &[Row]) -> Verdict {
-    let has = |verdict| rows.iter().any(|row| row.verdict() == verdict);
+    let has = |verdict| {
+        let mut counting = rows
+            .iter()
+            .filter(|row| !row.is_aside || verdict == Verdict::Fails);
+        counting.any(|row| row.verdict() == verdict)
+    };
     let order = [
         Verdict::Fails,
-        Verdict::Differs,
-        Verdict::Agrees,
         Verdict::NotModelled,
+        Verdict::Differs,
+        Verdict::Given,
+        Verdict::Agrees,
     ];
     order.into_iter().find(|&v| has(v)).unwrap_or(Verdict::Ours)
 }
@@ -310,6 +359,22 @@ mod tests {
         assert_eq!(row(AtMost("6"), 5.9).verdict(), Verdict::Agrees);
         assert_eq!(row(Between("1", "2"), 1.0).verdict(), Verdict::Agrees);
         assert_eq!(row(Nothing, 1.0).verdict(), Verdict::Ours);
+        assert_eq!(
+            row(Says("about half", 0.4, 0.6), 0.5).verdict(),
+            Verdict::Agrees
+        );
+        assert_eq!(
+            row(Says("seamless", 1.0, f64::INFINITY), 0.9).verdict(),
+            Verdict::Fails
+        );
+        let input = |computed| row(Exactly("1.2"), computed).given("chosen");
+        assert_eq!(input(1.2).verdict(), Verdict::Given);
+        assert_eq!(
+            input(1.3).verdict(),
+            Verdict::Fails,
+            "an input that is lost on the way"
+        );
+        assert_eq!(input(1.2).notes(), "chosen");
         let none = Row::not_modelled("x", "m", Exactly("1"), "why");
         assert_eq!(none.verdict(), Verdict::NotModelled);
         assert_eq!(none.difference(), None);
@@ -331,12 +396,31 @@ mod tests {
     }
 
     #[test]
-    fn the_worst_verdict_is_seen_first() {
+    fn what_is_published_as_zero_has_no_relative_difference() {
+        let row = |published, computed| Row::holds("x", "m", published, computed).difference();
+        assert_eq!(row(Published::Within("0", 0.02), 0.01), Some((0.01, None)));
+        assert_eq!(row(Published::Exactly("2"), 1.0), Some((-1.0, Some(-0.5))));
+    }
+
+    #[test]
+    fn a_claim_is_met_only_if_all_its_headlines_are() {
         let agrees = Row::holds("a", "", Published::Exactly("1"), 1.0);
         let differs = Row::holds("b", "", Published::Exactly("1"), 2.0).differs("why");
+        let given = agrees.clone().given("how");
         let ours = Row::ours("c", "", 1.0);
-        assert_eq!(overall(&[agrees.clone(), ours.clone()]), Verdict::Agrees);
-        assert_eq!(overall(&[agrees, differs]), Verdict::Differs);
-        assert_eq!(overall(&[ours]), Verdict::Ours);
+        let gap = Row::not_modelled("d", "", Published::Exactly("1"), "why");
+        let fails = Row::holds("e", "", Published::Exactly("1"), 2.0);
+        for (rows, verdict) in [
+            (vec![&agrees, &ours], Verdict::Agrees),
+            (vec![&agrees, &given], Verdict::Given),
+            (vec![&agrees, &given.clone().aside()], Verdict::Agrees),
+            (vec![&agrees, &given, &differs], Verdict::Differs),
+            (vec![&agrees, &differs, &gap], Verdict::NotModelled),
+            (vec![&agrees, &gap, &fails.aside()], Verdict::Fails),
+            (vec![&ours], Verdict::Ours),
+        ] {
+            let rows: Vec<Row> = rows.into_iter().cloned().collect();
+            assert_eq!(overall(&rows), verdict, "{rows:?}");
+        }
     }
 }

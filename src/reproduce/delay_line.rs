@@ -149,13 +149,14 @@ pub fn rows() -> Vec<Row> {
             Exactly("2.6"),
             mean_ns,
         )
-        .remark("Put in, and found again by the sweep: 16 384 bins."),
+        .given("The elements' mean is put in; the sweep finds it again in 16 384 bins."),
         Row::holds(
             "spread of the bin intervals",
             "ns",
             Exactly("0.4"),
             spread_ns,
-        ),
+        )
+        .given("Put in as well."),
         Row::holds(
             "spread of a plane at 2.5 m before calibration",
             "m",

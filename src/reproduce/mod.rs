@@ -23,12 +23,15 @@ mod precision;
 mod registry;
 mod sensors;
 mod silicon;
+mod slips;
 mod stereo;
 mod system;
 
-pub use claim::{Claim, Published, Row, Verdict};
-pub use page::{grid, heading, html, markdown, tally};
+pub use claim::{Claim, Published, Row, Verdict, overall};
+pub use page::{SLIPS_TITLE, grid, heading, html, markdown, slips as slips_grid, tally};
 pub use registry::{CLAIMS, FIGURES, Figure, MEASUREMENTS, Measurement, TABLES, Table};
+
+pub use slips::{SLIPS, Slip};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -185,6 +188,8 @@ impl MeasurementResult {
 pub struct Report {
     /// Claims.
     pub claims: Vec<ClaimResult>,
+    /// The thesis's slips, where every claim is chosen.
+    pub slips: Vec<Slip>,
     /// Tables.
     pub tables: Vec<TableResult>,
     /// Figures.
@@ -266,6 +271,9 @@ pub fn reproduce(selection: &Selection, done: impl Fn() + Sync) -> Report {
         })
         .collect();
     let mut report = Report::default();
+    if CLAIMS.iter().all(|c| selection.claims.contains(&c.number)) {
+        report.slips = SLIPS.to_vec();
+    }
     for result in results {
         match result {
             Done::Claim(claim) => report.claims.push(claim),
@@ -306,6 +314,7 @@ impl Report {
                 "computed": row.computed,
                 "difference": row.difference().map(|d| d.0),
                 "verdict": row.verdict(),
+                "aside": row.is_aside,
                 "notes": row.notes(),
             })
         };
@@ -314,6 +323,7 @@ impl Report {
                 "claim": result.claim.number,
                 "title": result.claim.title,
                 "source": result.claim.source,
+                "verdict": overall(&result.rows),
                 "rows": result.rows.iter().map(row).collect::<Vec<_>>(),
             })
         };
@@ -343,6 +353,7 @@ impl Report {
         };
         json!({
             "claims": self.claims.iter().map(claim).collect::<Vec<_>>(),
+            "slips": self.slips,
             "tables": self.tables.iter().map(table).collect::<Vec<_>>(),
             "figures": self.figures.iter().map(figure).collect::<Vec<_>>(),
             "measurements": self.measurements.iter().map(measurement).collect::<Vec<_>>(),

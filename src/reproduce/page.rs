@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use super::claim::{Published, Row, Verdict, figure, overall};
-use super::{FigureResult, MeasurementResult, Report, TableResult};
+use super::claim::{Row, Verdict, figure, overall};
+use super::{FigureResult, MeasurementResult, Report, Slip, TableResult};
 use crate::report::Grid;
 
 /// The headings of a claim's table.
@@ -19,17 +19,14 @@ const HEADINGS: [&str; 7] = [
 
 /// A row as text, by [`HEADINGS`].
 fn cells(row: &Row) -> [String; 7] {
-    let difference = row
-        .difference()
-        .map_or(String::new(), |(absolute, relative)| {
-            if row.published == Published::Nothing || !absolute.is_finite() {
-                String::new()
-            } else if absolute == 0.0 {
-                "0".into()
-            } else {
-                format!("{:+.1} %", 100.0 * relative)
-            }
-        });
+    let difference = match row.difference() {
+        Some((0.0, _)) => "0".into(),
+        Some((absolute, _)) if !absolute.is_finite() => String::new(),
+        Some((_, Some(relative))) => format!("{:+.1} %", 100.0 * relative),
+        Some((absolute, None)) if absolute < 0.0 => figure(absolute),
+        Some((absolute, None)) => format!("+{}", figure(absolute)),
+        None => String::new(),
+    };
     [
         row.what.clone(),
         row.published.text(),
@@ -48,17 +45,39 @@ pub fn grid(rows: &[Row]) -> Grid {
     grid
 }
 
-/// How many rows of the report have each verdict, for example "80 agree, 5 differ".
+/// How many rows of the report have each verdict, and how many claims.
 pub fn tally(report: &Report) -> String {
-    let count = |verdict| report.rows().filter(|row| row.verdict() == verdict).count();
-    let words = Verdict::ALL.map(|verdict| format!("{} {}", count(verdict), plural(verdict)));
-    words.join(", ")
+    let row_verdicts: Vec<Verdict> = report.rows().map(Row::verdict).collect();
+    let claim_verdicts: Vec<Verdict> = report.claims.iter().map(|c| overall(&c.rows)).collect();
+    format!(
+        "Of {} claims: {}.\nOf {} rows: {}.",
+        claim_verdicts.len(),
+        counted(&claim_verdicts).join(", "),
+        row_verdicts.len(),
+        counted(&row_verdicts).join(", "),
+    )
+}
+
+/// "80 agree", "5 differ" and so on, of every verdict.
+fn counted(verdicts: &[Verdict]) -> [String; Verdict::ALL.len()] {
+    Verdict::ALL.map(|verdict| {
+        let count = verdicts.iter().filter(|&&v| v == verdict).count();
+        format!("{count} {}", plural(verdict))
+    })
+}
+
+/// How many of a claim's published rows agree, for example "3 of 5".
+fn agreeing(rows: &[Row]) -> String {
+    let published = rows.iter().filter(|r| r.verdict() != Verdict::Ours);
+    let agree = rows.iter().filter(|r| r.verdict() == Verdict::Agrees);
+    format!("{} of {}", agree.count(), published.count())
 }
 
 fn plural(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Agrees => "agree",
-        Verdict::Differs => "differ, known and explained",
+        Verdict::Differs => "differ",
+        Verdict::Given => "given",
         Verdict::Fails => "FAIL",
         Verdict::Ours => "ours alone",
         Verdict::NotModelled => "not modelled",
@@ -67,30 +86,25 @@ fn plural(verdict: Verdict) -> &'static str {
 
 const INTRODUCTION: &str = "Every published figure of the thesis that the model is held to, beside what the model \
 gives. A row agrees when the computed value lies within the tolerance of what is printed (half a unit of the last \
-digit, unless another is named), and differs when it does not and the reason is known. Rows that are ours alone \
-show another convention, or what the thesis left out.";
+digit, unless another is named; of words, the range that we read in them), and differs when it does not and the reason \
+is known. A number that was put into the model and comes out again is given, and shows nothing. Rows that are ours \
+alone show another convention, or what the thesis left out. A claim's verdict is the worst of its published rows, \
+asides left out: it counts as met only where all of them agree.";
+
+/// What stands above the thesis's slips.
+pub const SLIPS_TITLE: &str = "Slips of the thesis";
 
 /// The report in Markdown; figures are linked as the files beside it.
 pub fn markdown(report: &Report) -> String {
     let mut out = format!(
-        "# Published and computed\n\n{INTRODUCTION}\n\n{}.\n\n",
-        tally(report)
+        "# Published and computed\n\n{INTRODUCTION}\n\n{}\n\n",
+        tally(report).replace('\n', "\n\n")
     );
     let mut glance = Grid::new(["claim", "rows that agree", "verdict"]);
     for result in &report.claims {
-        let agree = result
-            .rows
-            .iter()
-            .filter(|r| r.verdict() == Verdict::Agrees)
-            .count();
-        let compared = result
-            .rows
-            .iter()
-            .filter(|r| r.published != Published::Nothing)
-            .count();
         glance.push([
             format!("{}. {}", result.claim.number, result.claim.title),
-            format!("{agree} of {compared}"),
+            agreeing(&result.rows),
             overall(&result.rows).text().to_owned(),
         ]);
     }
@@ -109,6 +123,10 @@ pub fn markdown(report: &Report) -> String {
             let _ = writeln!(out, "* {}: {}", row.what, row.notes());
         }
         out.push('\n');
+    }
+    if !report.slips.is_empty() {
+        let slips = slips(&report.slips).markdown();
+        let _ = writeln!(out, "## {SLIPS_TITLE}\n\n{slips}");
     }
     for TableResult {
         number,
@@ -137,6 +155,15 @@ pub fn markdown(report: &Report) -> String {
         }
     }
     out
+}
+
+/// The thesis's slips as a table.
+pub fn slips(slips: &[Slip]) -> Grid {
+    let mut grid = Grid::new(["where", "what is printed", "against", "what the model does"]);
+    for slip in slips {
+        grid.push([slip.place, slip.printed, slip.against, slip.model]);
+    }
+    grid
 }
 
 /// What stands above a measurement.
@@ -172,6 +199,13 @@ pub fn html(report: &Report) -> String {
         );
         body += &claim_table(&result.rows);
         body += "</section>\n";
+    }
+    if !report.slips.is_empty() {
+        let _ = writeln!(
+            body,
+            "<section id=slips><h2>{SLIPS_TITLE}</h2>\n<div class=words>{}</div></section>",
+            grid_html(&slips(&report.slips))
+        );
     }
     for TableResult {
         number,
@@ -237,23 +271,15 @@ fn glance(report: &Report) -> String {
     let mut out = String::from("<div class=glance>\n");
     for result in &report.claims {
         let verdict = overall(&result.rows);
-        let agree = result
-            .rows
-            .iter()
-            .filter(|r| r.verdict() == Verdict::Agrees)
-            .count();
-        let compared = result
-            .rows
-            .iter()
-            .filter(|r| r.published != Published::Nothing)
-            .count();
         let _ = writeln!(
             out,
-            "<a class='{}' href='#c{}'><b>{}</b> {}<i>{agree} of {compared} agree</i></a>",
+            "<a class='{}' href='#c{}'><b>{}</b> {}<i>{}; {} rows agree</i></a>",
             class(verdict),
             result.claim.number,
             result.claim.number,
             escaped(result.claim.title),
+            verdict.text(),
+            agreeing(&result.rows),
         );
     }
     out += "</div>\n<p class=links>";
@@ -270,17 +296,21 @@ fn glance(report: &Report) -> String {
 }
 
 fn tallies(report: &Report) -> String {
-    let count = |verdict| report.rows().filter(|row| row.verdict() == verdict).count();
-    Verdict::ALL
-        .map(|verdict| {
-            format!(
-                "<span class='badge {}'>{} {}</span> ",
-                class(verdict),
-                count(verdict),
-                plural(verdict)
-            )
-        })
-        .concat()
+    let claims: Vec<Verdict> = report.claims.iter().map(|c| overall(&c.rows)).collect();
+    let rows: Vec<Verdict> = report.rows().map(Row::verdict).collect();
+    let badges = |verdicts: &[Verdict]| {
+        let badges = counted(verdicts).into_iter().zip(Verdict::ALL);
+        let badges =
+            badges.map(|(text, v)| format!("<span class='badge {}'>{text}</span> ", class(v)));
+        badges.collect::<String>()
+    };
+    format!(
+        "{} claims: {}<br>{} rows: {}",
+        claims.len(),
+        badges(&claims),
+        rows.len(),
+        badges(&rows)
+    )
 }
 
 fn claim_table(rows: &[Row]) -> String {
@@ -323,6 +353,7 @@ fn gauge(row: &Row) -> String {
     };
     // A bound has one end: the dot lies as far inside or outside as its relative distance.
     let position = match (low.is_finite(), high.is_finite()) {
+        (true, true) if low == high => 3.0 * (computed - low).signum() * f64::from(computed != low),
         (true, true) => (computed - 0.5 * (low + high)) / (0.5 * (high - low)),
         (true, false) => 2.0 * (computed / low - 1.0) - 1.0,
         _ => 2.0 * (computed / high - 1.0) + 1.0,
@@ -340,6 +371,7 @@ fn gauge(row: &Row) -> String {
         match row.verdict() {
             Verdict::Agrees => "#0b7a45",
             Verdict::Fails => "#c01818",
+            Verdict::Given => "#8a8a8a",
             _ => "#d98200",
         }
     )
@@ -367,6 +399,7 @@ fn class(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Agrees => "agrees",
         Verdict::Differs => "differs",
+        Verdict::Given => "given",
         Verdict::Fails => "fails",
         Verdict::Ours => "ours",
         Verdict::NotModelled => "none",
@@ -386,6 +419,7 @@ h1{margin-bottom:.2em}h2{margin:2em 0 .2em;font-size:1.15em}
 .badge{display:inline-block;border-radius:.7em;padding:0 .7em;font-size:.85em;font-weight:600;white-space:nowrap}
 .badge.agrees,.glance .agrees{background:#d3efdf;color:#0b5d36}
 .badge.differs,.glance .differs{background:#ffe7c2;color:#7a4a00}
+.badge.given,.glance .given{background:#efe6f5;color:#553a6e}
 .badge.fails,.glance .fails{background:#f7c6c6;color:#8c0d0d}
 .badge.ours,.glance .ours{background:#dde9f7;color:#1d4777}
 .badge.none,.glance .none{background:#e8e8e8;color:#555}
@@ -397,6 +431,7 @@ table{border-collapse:collapse;width:100%;font-size:.92em}
 th,td{padding:3px 8px;text-align:right;border-bottom:1px solid #e6e6e6}
 th:first-child,td:first-child{text-align:left}th{color:#666;font-weight:600}
 tr.note td{text-align:left;color:#666;font-size:.9em;border-bottom:1px solid #e6e6e6;padding:0 8px 5px 20px}
+div.words td{text-align:left;vertical-align:top}
 h3{font-size:1em;margin:1em 0 .2em}.wide{overflow-x:auto}
 figure{margin:.5em 0}svg.chart{width:100%;height:auto}
 ";

@@ -137,15 +137,19 @@ pub fn long_range_rows() -> Vec<Row> {
     let full = system.full(200.0);
     let (zooming, sliding) = (system.zooming(200.0), system.sliding(200.0, 0));
     let chip = one_hit(system).zooming(200.0);
-    let approaching = "\"Approaching 4×\" is read as 3 to 4.";
+    let approaching = Says("approaching 4×", 3.0, 4.0);
     vec![
-        Row::holds("penalty of sliding", "×", Between("3", "4"), penalty(&sliding, &full)).remark(approaching),
-        Row::holds("penalty of zooming", "×", Between("3", "4"), penalty(&zooming, &full))
-            .remark(format!("{approaching} σ = FWHM/2.355, Cramér-Rao, exact Poisson P_D, ties by lot.")),
-        Row::holds("zooming over sliding at 200 m", "", AtMost("1"), penalty(&zooming, &sliding))
-            .remark("\"Zooming is preferred over sliding at longer distances\": holds with Cramér-Rao, not with Thompson."),
-        Row::holds("windows of sliding", "", Exactly("16"), sliding.steps.len() as f64),
-        Row::holds("steps of zooming", "", Exactly("2"), zooming.steps.len() as f64),
+        Row::holds("penalty of sliding", "×", approaching, penalty(&sliding, &full)),
+        Row::holds("penalty of zooming", "×", approaching, penalty(&zooming, &full))
+            .remark("σ = FWHM/2.355, Cramér-Rao, exact Poisson P_D, ties by lot."),
+        Row::holds("zooming over sliding at 200 m", "", Says("zooming is preferred", 0.0, 1.0), penalty(&zooming, &sliding))
+            .remark("\"At longer distances\": holds with Cramér-Rao, not with Thompson."),
+        Row::holds("windows of sliding", "", Exactly("16"), sliding.steps.len() as f64)
+            .given("Table 7's 12.5 m windows and 200 m are put in.")
+            .aside(),
+        Row::holds("steps of zooming", "", Exactly("2"), zooming.steps.len() as f64)
+            .given("As the windows: 16 bins of 12.5 m reach 200 m.")
+            .aside(),
         Row::ours("penalty of zooming, one hit per bin and cycle", "×", penalty(&chip, &full))
             .remark("83 ns bins hold 1.7 background photons a cycle, of which such a chip counts one: its coarse bins lose the echo."),
         Row::ours("exposures of zooming, 14-bit bins", "", zooming.exposures(14))
@@ -158,40 +162,61 @@ pub fn long_range_rows() -> Vec<Row> {
     ]
 }
 
+/// The least range at which zooming takes so many steps, m.
+fn zooming_takes(system: &System, steps: usize) -> f64 {
+    let (mut low, mut high) = (1.0, 150.0);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if system.zooming(middle).steps.len() < steps {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    high
+}
+
 /// Claim 15: penalties of the demonstrator at 75 m.
 pub fn demonstrator_rows() -> Vec<Row> {
     let system = demonstrator();
     let full = system.full(75.0);
     let (zooming, sliding) = (system.zooming(75.0), system.sliding(75.0, 0));
     let least = penalty(&zooming, &full).min(penalty(&sliding, &full));
+    let nearer = system.full(74.0);
     let chip = one_hit(system).zooming(75.0);
     let last_end_m = sliding.steps.last().map_or(f64::NAN, |step| step.range_m);
+    let coarse_m = f64::from(system.bins) * system.window_m;
+    let coarse_ns = 2e9 * coarse_m / SPEED_OF_LIGHT_M_PER_S;
     vec![
         Row::holds(
             "penalty of the better partial histogram",
             "×",
             AtLeast("6"),
             least,
-        ),
+        )
+        .remark("Sliding, here and at 74 m."),
         Row::ours("penalty of sliding", "×", penalty(&sliding, &full)).remark(format!(
-            "{} windows of 3.12 m, the last to {last_end_m:.1} m.",
-            sliding.steps.len()
+            "{} windows of {:.2} m, the last to {last_end_m:.1} m.",
+            sliding.steps.len(),
+            system.window_m,
         )),
-        Row::ours("penalty of zooming", "×", penalty(&zooming, &full))
-            .remark("Detection among 4 bins of 24.9 m, then among 8 of 3.12 m."),
-        Row::holds("second zoom step from", "m", Exactly("3"), system.window_m),
-        Row::holds(
-            "third zoom step from",
-            "m",
-            Exactly("25"),
-            8.0 * system.window_m,
-        ),
+        Row::ours("the same at 74 m", "×", penalty(&system.sliding(74.0, 0), &nearer)),
+        Row::ours("penalty of zooming", "×", penalty(&zooming, &full)).remark(format!(
+            "Just beyond a step: detection among 4 bins of {coarse_m:.2} m, of which three end at {:.2} m.",
+            3.0 * coarse_m
+        )),
+        Row::ours("the same at 74 m", "×", penalty(&system.zooming(74.0), &nearer))
+            .remark("Just before it: among 3 bins, and with an echo no farther than their end."),
+        Row::holds("second zoom step from", "m", Exactly("3"), zooming_takes(&system, 2)).aside(),
+        Row::holds("third zoom step from", "m", Exactly("25"), zooming_takes(&system, 3)).aside(),
         Row::holds(
             "bin interval of the third zoom step",
             "ns",
             Exactly("166"),
-            64.0 * 2.6,
-        ),
+            coarse_ns,
+        )
+        .given("8 × 8 bins of the 2.6 ns that are put in.")
+        .aside(),
         Row::ours(
             "laser cycles of a full or guided histogram",
             "",

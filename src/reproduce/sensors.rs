@@ -251,7 +251,7 @@ pub fn rows() -> Vec<Row> {
         Row::holds(
             "bins that Park's 4 steps of 4 and Kim's 8 of 2 stand for",
             "",
-            Exactly("1"),
+            Says("equivalent", 1.0, 1.0),
             4.0 * inverse(4, 4) / (2.0 * inverse(2, 8)),
         )
         .remark("Their ratio: halving the steps by doubling the bins changes nothing."),
@@ -265,7 +265,9 @@ pub fn rows() -> Vec<Row> {
             "",
             AtMost("8"),
             widest(false),
-        ),
+        )
+        .given("Read from the same Table 5.")
+        .aside(),
         Row::ours("most bins of a stacked sensor", "", widest(true)),
     ]
 }

@@ -83,6 +83,7 @@ pub fn error_rows() -> Vec<Row> {
         / errors.len() as f64;
     vec![
         Row::holds("exponent of the error's growth, modelled rig", "", Within("2", 0.05), exponent(&errors))
+            .given("The pair's disparity error is the same at all distances by choice, and with it the exponent.")
             .remark("RMS error of the simulated pair at eight distances from 20 to 195 m, 6400 pixels each."),
         Row::ours("modelled rig over the ⅓-pixel line of Fig. 68", "", ratio)
             .remark("The model's disparity error is ⅓ px by choice, rounding to 1/16 px added."),
@@ -294,19 +295,22 @@ pub fn motion_rows() -> Vec<Row> {
             "m",
             Exactly("10"),
             per_frame_m,
-        ),
-        Row::holds("depth window", "m", Exactly("3"), window_m),
+        )
+        .given("65 mph over 3 fps, both published."),
+        Row::holds("depth window", "m", Exactly("3"), window_m)
+            .given("8 bins of 2.6 ns, both published."),
         Row::holds(
             "way over half the window",
             "",
-            AtLeast("1"),
+            Says("exceeding", 1.0, f64::INFINITY),
             per_frame_m / (0.5 * window_m),
         )
+        .given("The two lines above; no target moves in the model.")
         .remark("Above 1 the car has left a window that was centred on it."),
         Row::holds(
             "error of a 0.1° slip at 40 m over half the window",
             "",
-            AtLeast("1"),
+            Says("incorrect depth window", 1.0, f64::INFINITY),
             slip_m / (0.5 * window_m),
         )
         .remark("The pedestrian of Fig. 107 disappears."),
