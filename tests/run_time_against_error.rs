@@ -1,13 +1,15 @@
 //! The comparison of engines finds exact engines exact and the others as far off as they are, and a frame with a
 //! depth tolerance keeps it.
 
+use std::process::Command;
+
 use guided_dtof::chip::{Exposure, SensorConfig, WindowLaw};
 use guided_dtof::engine::{LitPixel, Window, expose, stream_config};
 use guided_dtof::photon::{PhotonStream, PixelLight};
 use guided_dtof::ranging::PeakOptions;
 use guided_dtof::scene::Scene;
 use guided_dtof::system::Tolerance;
-use guided_dtof::system::pareto::{Method, ParetoSettings, Point, summarise};
+use guided_dtof::system::pareto::{Done, Method, ParetoSettings, Point, summarise};
 use guided_dtof::units::Time;
 
 fn compare(methods: &[Method]) -> Vec<Point> {
@@ -28,11 +30,16 @@ fn compare(methods: &[Method]) -> Vec<Point> {
         repeats: 1,
         seed: 3,
     };
-    let mut runs = 0;
-    let points = settings.compare(methods, || runs += 1).unwrap();
+    let (mut walls, mut rows) = (0, Vec::new());
+    let told = |done: Done<'_>| match done {
+        Done::Wall => walls += 1,
+        Done::Method(points) => rows.extend_from_slice(points),
+    };
+    let points = settings.compare(methods, told).unwrap();
     assert_eq!(settings.cell_count(), 2);
     assert_eq!(points.len(), 2 * methods.len());
-    assert_eq!(runs, points.len());
+    assert_eq!(walls, settings.run_count(methods));
+    assert_eq!(rows, points, "rows are told of as they are finished");
     points
 }
 
@@ -57,10 +64,66 @@ fn engines_that_share_photons_do_not_differ_and_others_do() {
         assert!(errors.mean_shift < 1.0, "{point:?}");
         assert!(point.run_time_ns > 0.0 && point.speed_up.is_finite());
     }
-    let summaries = summarise(&methods, &points);
-    assert_eq!(summaries.len(), methods.len());
-    assert_eq!(summaries[3].depth_rms_m, Some(0.0));
-    assert!(summaries[5].depth_rms_m.unwrap() > 0.0);
+    for (method, points) in methods.iter().zip(points.chunks(2)) {
+        let summary = summarise(points).unwrap();
+        assert_eq!(summary.method, *method);
+        let rms: Vec<f64> = points.iter().filter_map(|p| p.errors.depth_rms_m).collect();
+        let largest = rms.iter().copied().reduce(f64::max);
+        assert_eq!(summary.worst.depth_rms_m, largest);
+        assert!(summary.depth_rms_m <= largest && summary.speed_up >= summary.worst.speed_up);
+        let worst = points.iter().find(|p| p.errors.depth_rms_m == largest);
+        if largest > Some(0.0) {
+            assert_eq!(
+                summary.worst.illuminance_klux,
+                worst.map(|p| p.illuminance_klux)
+            );
+        } else {
+            assert_eq!(summary.worst.range_m, None);
+        }
+    }
+    assert_eq!(summarise(&points[6..8]).unwrap().depth_rms_m, Some(0.0));
+    assert!(summarise(&points[10..12]).unwrap().depth_rms_m.unwrap() > 0.0);
+}
+
+/// Rows come out one after the other, and what each one's difference is stands in it; messages are lines, no bar.
+#[test]
+fn a_piped_comparison_says_how_far_it_is_and_what_differs() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_gdtof"))
+        .args([
+            "pareto",
+            "--no-gate",
+            "--ranges",
+            "20",
+            "--klux",
+            "0,50",
+            "--macropixels",
+            "16",
+        ])
+        .args(["--laser-cycles", "40", "--repeats", "1", "--out", "out"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let table = String::from_utf8(output.stdout).unwrap();
+    for (row, against) in [
+        ("cycle ", "the reference"),
+        ("window ", "same photons"),
+        ("window, another seed", "another seed"),
+        ("window, 1/8 of the laser cycles", "1/8 of the photons"),
+        ("cohort, 4 steps a bin", "own draws, 4 steps"),
+    ] {
+        let line = table.lines().find(|line| line.starts_with(row));
+        let line = line.unwrap_or_else(|| panic!("no row {row}: {table}"));
+        assert!(line.contains(against) && line.contains(" / "), "{line}");
+    }
+    assert!(!table.lines().any(|line| line.starts_with("gate")));
+    let messages = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        messages.starts_with("1 of 20 engines and walls"),
+        "{messages}"
+    );
+    assert!(!messages.contains('\x1b'), "{messages}");
 }
 
 /// A row of macropixels at 384 MHz in ever brighter light, echo in the middle of each window.

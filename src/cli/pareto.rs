@@ -1,7 +1,10 @@
 //! `gdtof pareto`: run time against error, for each engine and knob; and the numerical stability of the functions
 //! that everything rests on.
 
+use std::cell::Cell;
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use anyhow::bail;
 use clap::Args;
@@ -13,7 +16,7 @@ use crate::engine::recording::check_exposure;
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::report::{Axis, Chart, Grid, Style};
 use crate::scene::Scene;
-use crate::system::pareto::{GATE_CYCLES, Method, ParetoSettings, Point, Summary, summarise};
+use crate::system::pareto::{Done, GATE_CYCLES, Method, ParetoSettings, Point, Summary, summarise};
 use crate::system::stability;
 
 /// Arguments of `gdtof pareto`.
@@ -94,13 +97,25 @@ pub fn run(args: &ParetoArgs) -> anyhow::Result<()> {
         let message = "all are out of the sensor's reach; give nearer ones";
         return Err(InputError::new("--ranges", message).into());
     }
-    let progress =
-        ProgressBar::new((methods.len() * cells) as u64).with_style(ProgressStyle::with_template(
-            "comparing {bar:40} {pos}/{len} engines and scenes, {eta} left",
-        )?);
-    let points = settings.compare(&methods, || progress.inc(1))?;
-    progress.finish_and_clear();
-    let summaries = summarise(&methods, &points);
+    let progress = Progress::new(settings.run_count(&methods));
+    let rows = (!args.json).then(|| Rows::new(&methods));
+    if let Some(rows) = &rows {
+        progress.around(|| say(head(args, &settings, cells) + &rows.headings()))?;
+    }
+    let mut summaries = Vec::new();
+    let mut said = Ok(());
+    let points = settings.compare(&methods, |done| match done {
+        Done::Wall => progress.step(),
+        Done::Method(points) => {
+            let summary = summarise(points).expect("there is a wall");
+            if let (Some(rows), Ok(())) = (&rows, &said) {
+                said = progress.around(|| say(rows.row(&summary)));
+            }
+            summaries.push(summary);
+        }
+    })?;
+    progress.finish();
+    said?;
 
     write_cells(&args.out.join("pareto_cells.csv"), &points)?;
     chart(&settings, &summaries).write(&args.out.join("pareto.svg"))?;
@@ -114,7 +129,7 @@ pub fn run(args: &ParetoArgs) -> anyhow::Result<()> {
         };
         say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
     } else {
-        say(table(args, &settings, cells, &summaries))?;
+        say(foot(args, &settings))?;
     }
     Ok(())
 }
@@ -177,6 +192,7 @@ fn write_cells(path: &Path, points: &[Point]) -> Result<(), InputError> {
     OutputFile::write_with(path, |out| {
         let mut cells = Grid::new([
             "method",
+            "against_cycle",
             "range_m",
             "illuminance_klux",
             "run_time_ns",
@@ -191,6 +207,7 @@ fn write_cells(path: &Path, points: &[Point]) -> Result<(), InputError> {
             let errors = &point.errors;
             cells.push([
                 point.method.name(),
+                point.method.against_cycle(),
                 point.range_m.to_string(),
                 point.illuminance_klux.to_string(),
                 point.run_time_ns.to_string(),
@@ -214,7 +231,7 @@ fn chart(settings: &ParetoSettings, summaries: &[Summary]) -> Chart {
         settings.laser_cycles
     );
     let time = Axis::log("run time for a macropixel and laser cycle (ns)");
-    let error = Axis::log("RMS difference of depth from the cycle engine (m)");
+    let error = Axis::log("RMS difference of depth from the cycle engine, median wall (m)");
     summaries
         .iter()
         .fold(Chart::new(title, time, error), |chart, summary| {
@@ -224,47 +241,160 @@ fn chart(settings: &ParetoSettings, summaries: &[Summary]) -> Chart {
         })
 }
 
-fn table(
-    args: &ParetoArgs,
-    settings: &ParetoSettings,
-    cells: usize,
-    summaries: &[Summary],
-) -> String {
-    let mut grid = Grid::new([
-        "engine and knob",
-        "ns a pixel-cycle",
-        "speed-up",
-        "mismatch",
-        "mean shift (σ)",
-        "depth RMS (m)",
-        "depth mean (m)",
-    ]);
-    for summary in summaries {
-        let metres = |value: Option<f64>| value.map_or("-".into(), |m| format!("{m:.4}"));
-        grid.push([
-            summary.method.name(),
-            format!("{:.3}", summary.run_time_ns),
-            format!("{:.3}", summary.speed_up),
-            format!("{:.4}", summary.mismatch),
-            format!("{:.3}", summary.mean_shift),
-            metres(summary.depth_rms_m),
-            metres(summary.depth_mean_m),
-        ]);
-    }
+/// What stands above the table.
+fn head(args: &ParetoArgs, settings: &ParetoSettings, cells: usize) -> String {
     let gate = match args.no_gate {
         true => String::new(),
         false => format!(" (gate level: {})", settings.laser_cycles.min(GATE_CYCLES)),
     };
     format!(
-        "{cells} walls, {} macropixels each, {} laser cycles of {} CLK periods{gate}\n\n{grid}\n\
-         Errors are against the cycle engine, which steps every CLK period; medians over the walls.\n\
-         Engines that draw photons of their own differ from it as another seed does: compare with that row.\n\
-         A mean shift of {:.3} is what chance gives two exact engines.\n\
+        "{cells} walls, {} macropixels each, {} laser cycles of {} CLK periods{gate}; median / worst wall\n\n",
+        settings.macropixels, settings.laser_cycles, settings.stop_periods,
+    )
+}
+
+/// What stands below it.
+fn foot(args: &ParetoArgs, settings: &ParetoSettings) -> String {
+    format!(
+        "\nErrors are differences from the cycle engine, which steps every CLK period, on the same wall. With the same\n\
+         photons any at all would be a fault. Another seed shows what chance makes of two exact engines: {:.3} of mean\n\
+         shift, and the depths' own noise. Own draws differ by as much; only what they differ more is their discretisation.\n\
+         The worst wall is that of the largest depth RMS: an echo too faint to be found is ranged at random.\n\
          In {}: pareto.svg pareto.csv pareto_cells.csv\n",
-        settings.macropixels,
-        settings.laser_cycles,
-        settings.stop_periods,
         f64::sqrt(2.0 / settings.macropixels as f64),
         args.out.display(),
     )
+}
+
+/// The table's rows, which are printed as they are finished, so that their widths must be known before.
+struct Rows {
+    widths: [usize; 8],
+}
+
+const HEADINGS: [&str; 8] = [
+    "engine and knob",
+    "against cycle",
+    "ns a pixel-cycle",
+    "speed-up",
+    "mismatch",
+    "mean shift (σ)",
+    "depth RMS (m)",
+    "worst wall",
+];
+
+impl Rows {
+    fn new(methods: &[Method]) -> Self {
+        let widest = |text: fn(Method) -> String| {
+            let lengths = methods.iter().map(|&m| text(m).chars().count());
+            lengths.max().unwrap_or(0)
+        };
+        let mut widths = [0; 8];
+        let least = [
+            widest(Method::name),
+            widest(Method::against_cycle),
+            19,
+            15,
+            15,
+            15,
+            15,
+            15,
+        ];
+        for ((width, heading), least) in widths.iter_mut().zip(HEADINGS).zip(least) {
+            *width = least.max(heading.chars().count());
+        }
+        Rows { widths }
+    }
+
+    fn line(&self, cells: [String; 8]) -> String {
+        let [first, rest @ ..] = &cells;
+        let rest = rest.iter().zip(&self.widths[1..]);
+        let rest: String = rest
+            .map(|(cell, &width)| format!("  {cell:>width$}"))
+            .collect();
+        format!("{first:<width$}{rest}\n", width = self.widths[0])
+    }
+
+    fn headings(&self) -> String {
+        self.line(HEADINGS.map(str::to_owned))
+    }
+
+    fn row(&self, summary: &Summary) -> String {
+        let worst = &summary.worst;
+        let pair = |median: f64, worst: f64, decimals: usize| {
+            format!("{median:.decimals$} / {worst:.decimals$}")
+        };
+        let depth = match (summary.depth_rms_m, worst.depth_rms_m) {
+            (Some(median_m), Some(worst_m)) => pair(median_m, worst_m, 4),
+            _ => "-".into(),
+        };
+        let wall = match (worst.range_m, worst.illuminance_klux) {
+            (Some(range_m), Some(klux)) => format!("{range_m} m, {klux} klux"),
+            _ => "-".into(),
+        };
+        self.line([
+            summary.method.name(),
+            summary.method.against_cycle(),
+            pair(summary.run_time_ns, worst.run_time_ns, 3),
+            pair(summary.speed_up, worst.speed_up, 3),
+            pair(summary.mismatch, worst.mismatch, 4),
+            pair(summary.mean_shift, worst.mean_shift, 3),
+            depth,
+            wall,
+        ])
+    }
+}
+
+/// A bar on a terminal; lines where the messages are kept, a few a minute: this command takes minutes.
+struct Progress {
+    bar: ProgressBar,
+    is_piped: bool,
+    total: usize,
+    begin: Instant,
+    /// Walls that are done, and when that was said last.
+    state: Cell<(usize, Option<Instant>)>,
+}
+
+/// Between two lines.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+
+impl Progress {
+    fn new(total: usize) -> Self {
+        let template = "comparing {bar:40} {pos}/{len} engines and walls, {eta} left";
+        let style =
+            ProgressStyle::with_template(template).expect("a template that indicatif knows");
+        let begin = Instant::now();
+        Progress {
+            bar: ProgressBar::new(total as u64).with_style(style),
+            is_piped: !std::io::stderr().is_terminal(),
+            total,
+            begin,
+            state: Cell::new((0, None)),
+        }
+    }
+
+    fn step(&self) {
+        self.bar.inc(1);
+        let (done, said) = self.state.get();
+        let now = Instant::now();
+        let is_due = self.is_piped && said.is_none_or(|said| now - said >= LINE_EVERY);
+        self.state
+            .set((done + 1, if is_due { Some(now) } else { said }));
+        if is_due {
+            let seconds = (now - self.begin).as_secs();
+            eprintln!(
+                "{} of {} engines and walls after {seconds} s",
+                done + 1,
+                self.total
+            );
+        }
+    }
+
+    /// Writes while the bar is away.
+    fn around<T>(&self, write: impl FnOnce() -> T) -> T {
+        self.bar.suspend(write)
+    }
+
+    fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
 }

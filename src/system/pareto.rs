@@ -3,12 +3,13 @@
 //! A *cell* of the experiment is a wall at one range under one light, seen by a row of macropixels whose ranges differ
 //! by fractions of a bin. Every *method* exposes the same cells with the same seed; the [`Method::Cycle`] engine, which
 //! steps the netlist through every CLK period, is what the others are held against. Run times are wall-clock
-//! medians of one run, methods in turn, so that only their ratios should be quoted.
+//! medians of some runs on all threads, method after method, so that only their ratios should be quoted.
 //!
-//! Two kinds of method want two kinds of error. One that simulates the same photons is right or wrong count by count
-//! ([`Errors::mismatch`]). One that draws histograms of its own is right if its histograms have the same distribution:
-//! its means must agree ([`Errors::mean_shift`]), while count by count it differs as much as the exact engine
-//! with another seed does, which is why [`Method::AnotherSeed`] is among them.
+//! What a difference from `cycle` means depends on what the method was given ([`Method::against_cycle`]). One that
+//! simulates the same photons is right or wrong count by count ([`Errors::mismatch`]). One that has photons of its own, or
+//! none, is right if its histograms have the same distribution: its means must agree ([`Errors::mean_shift`]), while
+//! count by count it differs as much as the exact engine with another seed does, which is why [`Method::AnotherSeed`]
+//! is among them. What is left of the mean shift beyond chance is its discretisation.
 
 use std::time::Instant;
 
@@ -48,9 +49,8 @@ pub enum Method {
 pub const GATE_CYCLES: u32 = 20;
 
 impl Method {
-    /// Every method of the comparison, slowest first.
+    /// Every method of the comparison: the one that the others are held against, and last the one that takes longest.
     pub const ALL: [Method; 11] = [
-        Method::Gate,
         Method::Cycle,
         Method::WindowWithoutSkipping,
         Method::Window,
@@ -61,6 +61,7 @@ impl Method {
         Method::Cohort(8),
         Method::Cohort(4),
         Method::Cohort(1),
+        Method::Gate,
     ];
 
     /// Engine and knob, as tables name them.
@@ -76,6 +77,29 @@ impl Method {
             Method::Cohort(n) => format!("cohort, {n} steps a bin"),
         }
     }
+}
+
+impl Method {
+    /// What makes its counts differ from those of the `cycle` engine, in a few words.
+    pub fn against_cycle(self) -> String {
+        match self {
+            Method::Cycle => "the reference".into(),
+            Method::Gate | Method::WindowWithoutSkipping | Method::Window => "same photons".into(),
+            Method::AnotherSeed => "another seed".into(),
+            Method::FewerCycles(n) => format!("1/{n} of the photons"),
+            Method::Cohort(1) => "own draws, 1 step".into(),
+            Method::Cohort(n) => format!("own draws, {n} steps"),
+        }
+    }
+}
+
+/// What [`ParetoSettings::compare`] has done.
+#[derive(Debug, Clone, Copy)]
+pub enum Done<'p> {
+    /// All runs of a method on one wall.
+    Wall,
+    /// A method on every wall.
+    Method(&'p [Point]),
 }
 
 /// What to compare.
@@ -132,6 +156,13 @@ pub struct Point {
     pub speed_up: f64,
     /// Error against it.
     pub errors: Errors,
+}
+
+/// A method's histograms of a wall.
+struct Run {
+    exposed: Exposed,
+    /// Median wall-clock time for a macropixel and laser cycle.
+    time_ns: f64,
 }
 
 /// A wall, as a row of macropixels sees it.
@@ -236,70 +267,96 @@ impl ParetoSettings {
         }
     }
 
-    /// Runs every method on every cell; `done` is told of each pair.
+    /// How often [`Done::Wall`] is told: once for each method and wall, the reference included.
+    pub fn run_count(&self, methods: &[Method]) -> usize {
+        let others = methods.iter().filter(|&&m| m != Method::Cycle).count();
+        self.cell_count() * (others + 1)
+    }
+
+    /// Runs every method on every cell, method after method; `done` is told of each wall and each method.
     ///
     /// # Errors
     /// Configurations that an engine refuses.
     pub fn compare(
         &self,
         methods: &[Method],
-        mut done: impl FnMut(),
+        mut done: impl FnMut(Done<'_>),
     ) -> Result<Vec<Point>, EngineError> {
-        let law = WindowLaw::new(&self.sensor, &self.exposure(1));
+        let cells = self.cells();
+        let mut references = Vec::new();
+        for cell in &cells {
+            references.push(self.timed(Method::Cycle, cell)?);
+            done(Done::Wall);
+        }
         let mut points = Vec::new();
-        for cell in &self.cells() {
-            let exact = self.run(Method::Cycle, cell)?;
-            let mut times = vec![Vec::new(); methods.len()];
-            let mut results = Vec::new();
-            for repeat in 0..self.repeats.max(1) {
-                for (&method, times) in methods.iter().zip(&mut times) {
-                    let begin = Instant::now();
-                    let exposed = self.run(method, cell)?;
-                    let work = self.macropixels as f64 * f64::from(self.cycles_of(method));
-                    times.push(begin.elapsed().as_secs_f64() * 1e9 / work);
-                    if repeat == 0 {
-                        results.push(exposed);
-                        done();
-                    }
+        for &method in methods {
+            let first = points.len();
+            for (cell, reference) in cells.iter().zip(&references) {
+                if method == Method::Cycle {
+                    points.push(self.point(method, cell, reference, reference)?);
+                } else {
+                    let run = self.timed(method, cell)?;
+                    points.push(self.point(method, cell, &run, reference)?);
+                    done(Done::Wall);
                 }
             }
-            let time = |of: usize| median(&times[of]);
-            let cycle_ns = methods.iter().position(|&m| m == Method::Cycle).map(time);
-            for (i, (&method, exposed)) in methods.iter().zip(&results).enumerate() {
-                let short;
-                let reference = if method == Method::Gate {
-                    short = self.cycle_for_gate(cell)?;
-                    &short
-                } else {
-                    &exact
-                };
-                let scale = match method {
-                    Method::FewerCycles(_) => {
-                        f64::from(self.laser_cycles) / f64::from(self.cycles_of(method))
-                    }
-                    _ => 1.0,
-                };
-                // Fewer laser cycles take less time for the same exposure.
-                let run_time_ns = time(i) / scale;
-                points.push(Point {
-                    method,
-                    range_m: cell.range_m,
-                    illuminance_klux: cell.illuminance_klux,
-                    run_time_ns,
-                    speed_up: cycle_ns.map_or(f64::NAN, |ns| ns / run_time_ns),
-                    errors: errors(&law, &cell.pixels, exposed, reference, scale),
-                });
-            }
+            done(Done::Method(&points[first..]));
         }
         Ok(points)
     }
 
-    fn cycle_for_gate(&self, cell: &Cell) -> Result<Exposed, EngineError> {
-        let shorter = ParetoSettings {
-            laser_cycles: self.cycles_of(Method::Gate),
-            ..self.clone()
+    /// A method on a wall, as often as it is to be timed.
+    fn timed(&self, method: Method, cell: &Cell) -> Result<Run, EngineError> {
+        let work = self.macropixels as f64 * f64::from(self.cycles_of(method));
+        let mut times_ns = Vec::new();
+        loop {
+            let begin = Instant::now();
+            let exposed = self.run(method, cell)?;
+            times_ns.push(begin.elapsed().as_secs_f64() * 1e9 / work);
+            if times_ns.len() >= self.repeats {
+                let time_ns = median(&times_ns);
+                return Ok(Run { exposed, time_ns });
+            }
+        }
+    }
+
+    fn point(
+        &self,
+        method: Method,
+        cell: &Cell,
+        run: &Run,
+        reference: &Run,
+    ) -> Result<Point, EngineError> {
+        let law = WindowLaw::new(&self.sensor, &self.exposure(1));
+        let shorter;
+        let exact = match method {
+            Method::Gate => {
+                let laser_cycles = self.cycles_of(method);
+                let settings = ParetoSettings {
+                    laser_cycles,
+                    ..self.clone()
+                };
+                shorter = settings.run(Method::Cycle, cell)?;
+                &shorter
+            }
+            _ => &reference.exposed,
         };
-        shorter.run(Method::Cycle, cell)
+        let scale = match method {
+            Method::FewerCycles(_) => {
+                f64::from(self.laser_cycles) / f64::from(self.cycles_of(method))
+            }
+            _ => 1.0,
+        };
+        // Fewer laser cycles take less time for the same exposure.
+        let run_time_ns = run.time_ns / scale;
+        Ok(Point {
+            method,
+            range_m: cell.range_m,
+            illuminance_klux: cell.illuminance_klux,
+            run_time_ns,
+            speed_up: reference.time_ns / run_time_ns,
+            errors: errors(&law, &cell.pixels, &run.exposed, exact, scale),
+        })
     }
 }
 
@@ -362,49 +419,92 @@ fn median(values: &[f64]) -> f64 {
     sorted[sorted.len() / 2]
 }
 
-/// One method over all cells.
+/// One method over all cells: medians, and the worst cell.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Summary {
     /// Engine and knob.
     pub method: Method,
-    /// Median over the cells of the run time for a macropixel and laser cycle, ns.
+    /// Run time for a macropixel and laser cycle, ns.
     pub run_time_ns: f64,
-    /// Median over the cells of the speed-up over the `cycle` engine.
+    /// Speed-up over the `cycle` engine.
     pub speed_up: f64,
-    /// Mean over the cells.
+    /// See [`Errors::mismatch`].
     pub mismatch: f64,
-    /// Root mean square over the cells.
+    /// See [`Errors::mean_shift`].
     pub mean_shift: f64,
-    /// Median over the cells of the root mean square difference of depths, m.
+    /// See [`Errors::depth_rms_m`].
     pub depth_rms_m: Option<f64>,
-    /// Median over the cells of the mean difference of depths, either way, m.
+    /// Mean difference of depths, either way, m.
     pub depth_mean_m: Option<f64>,
+    /// Each of these where it is worst.
+    pub worst: Worst,
 }
 
-/// Sums up each method over the cells, in the methods' order.
-pub fn summarise(methods: &[Method], points: &[Point]) -> Vec<Summary> {
-    let summaries = methods.iter().filter_map(|&method| {
-        let points: Vec<&Point> = points.iter().filter(|p| p.method == method).collect();
-        let n = points.len() as f64;
-        let of =
-            |value: fn(&Point) -> f64| -> Vec<f64> { points.iter().map(|p| value(p)).collect() };
-        let rms = |values: &[f64]| {
-            let squares: f64 = values.iter().map(|v| v * v).sum();
-            (!values.is_empty()).then(|| f64::sqrt(squares / values.len() as f64))
-        };
-        let typical = |value: fn(&Point) -> Option<f64>| {
-            let values: Vec<f64> = points.iter().filter_map(|p| value(p)).collect();
-            (!values.is_empty()).then(|| median(&values))
-        };
-        (n > 0.0).then(|| Summary {
-            method,
-            run_time_ns: median(&of(|p| p.run_time_ns)),
-            speed_up: median(&of(|p| p.speed_up)),
-            mismatch: of(|p| p.errors.mismatch).iter().sum::<f64>() / n,
-            mean_shift: rms(&of(|p| p.errors.mean_shift)).unwrap_or(0.0),
-            depth_rms_m: typical(|p| p.errors.depth_rms_m),
-            depth_mean_m: typical(|p| p.errors.depth_mean_m.map(f64::abs)),
-        })
-    });
-    summaries.collect()
+/// The worst of each figure over all cells.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Worst {
+    /// Longest run time, ns.
+    pub run_time_ns: f64,
+    /// Least speed-up.
+    pub speed_up: f64,
+    /// Largest mismatch.
+    pub mismatch: f64,
+    /// Largest mean shift.
+    pub mean_shift: f64,
+    /// Largest, m.
+    pub depth_rms_m: Option<f64>,
+    /// Largest, m.
+    pub depth_mean_m: Option<f64>,
+    /// Range of the wall with the largest RMS difference of depths, m; `None` where there is none at all.
+    pub range_m: Option<f64>,
+    /// Sunlight on it, klux.
+    pub illuminance_klux: Option<f64>,
+}
+
+/// Sums up one method over the cells; `None` without a point.
+pub fn summarise(points: &[Point]) -> Option<Summary> {
+    let method = points.first()?.method;
+    debug_assert!(points.iter().all(|point| point.method == method));
+    // Each figure's values in ascending order: the median is in the middle, the worst at an end.
+    let sorted = |value: &dyn Fn(&Point) -> Option<f64>| {
+        let mut values: Vec<f64> = points.iter().filter_map(value).collect();
+        values.sort_by(f64::total_cmp);
+        values
+    };
+    let middle = |values: &[f64]| values.get(values.len() / 2).copied();
+    let most = |values: &[f64]| values.last().copied();
+    let run_time = sorted(&|p| Some(p.run_time_ns));
+    let speed_up = sorted(&|p| Some(p.speed_up));
+    let mismatch = sorted(&|p| Some(p.errors.mismatch));
+    let mean_shift = sorted(&|p| Some(p.errors.mean_shift));
+    let depth_rms = sorted(&|p| p.errors.depth_rms_m);
+    let depth_mean = sorted(&|p| p.errors.depth_mean_m.map(f64::abs));
+    let farthest = points
+        .iter()
+        .filter(|p| p.errors.depth_rms_m > Some(0.0))
+        .max_by(|a, b| {
+            a.errors
+                .depth_rms_m
+                .partial_cmp(&b.errors.depth_rms_m)
+                .expect("no NaN")
+        });
+    Some(Summary {
+        method,
+        run_time_ns: middle(&run_time)?,
+        speed_up: middle(&speed_up)?,
+        mismatch: middle(&mismatch)?,
+        mean_shift: middle(&mean_shift)?,
+        depth_rms_m: middle(&depth_rms),
+        depth_mean_m: middle(&depth_mean),
+        worst: Worst {
+            run_time_ns: most(&run_time)?,
+            speed_up: speed_up.first().copied()?,
+            mismatch: most(&mismatch)?,
+            mean_shift: most(&mean_shift)?,
+            depth_rms_m: most(&depth_rms),
+            depth_mean_m: most(&depth_mean),
+            range_m: farthest.map(|p| p.range_m),
+            illuminance_klux: farthest.map(|p| p.illuminance_klux),
+        },
+    })
 }
