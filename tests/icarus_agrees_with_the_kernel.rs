@@ -4,20 +4,10 @@
 mod icarus;
 mod scenario;
 
-use std::path::Path;
-
 use guided_dtof::engine::{GateSimulation, StimulusPlan, export_verilog};
-use guided_dtof::kernel::Recorder;
+use icarus::Seen;
 use rand::{SeedableRng, rngs::StdRng};
 use scenario::Scenario;
-
-fn table(path: &Path) -> Vec<Vec<i64>> {
-    let text = std::fs::read_to_string(path).unwrap();
-    text.lines()
-        .skip(1)
-        .map(|line| line.split(',').map(|n| n.parse().unwrap_or(-1)).collect())
-        .collect()
-}
 
 fn compare(random: &mut StdRng, rows: usize, cols: usize) {
     let scenario = Scenario::random(random, rows, cols);
@@ -35,54 +25,9 @@ fn compare(random: &mut StdRng, rows: usize, cols: usize) {
     icarus::simulate(folder.path(), &["tb.v", "design.v", "cells.v"], &[]);
 
     let mut gate = GateSimulation::new(config, exposure, (0, 0), (rows, cols), starts, &pulses);
-    let local_stops = gate.netlist().signal("LOCAL_STOP").unwrap();
-    let mut recorder = Recorder::new(local_stops.clone());
-    gate.run(&mut recorder);
+    let ours = Seen::by_kernel(&mut gate, cols);
     assert_eq!(gate.loaded(), scenario.loaded());
-    let ours: Vec<Vec<i64>> = gate
-        .histograms()
-        .unwrap()
-        .iter()
-        .enumerate()
-        .flat_map(|(pixel, counts)| {
-            counts.iter().enumerate().map(move |(bin, &count)| {
-                vec![
-                    (pixel / cols) as i64,
-                    (pixel % cols) as i64,
-                    bin as i64,
-                    count as i64,
-                ]
-            })
-        })
-        .collect();
-    assert_eq!(
-        table(&folder.path().join("histograms.csv")),
-        ours,
-        "{config:?}"
-    );
-
-    let origin = gate.schedule().origin;
-    let mut ours: Vec<Vec<i64>> = local_stops
-        .iter()
-        .enumerate()
-        .flat_map(|(pixel, &net)| {
-            let rises = recorder
-                .rising_edges(net)
-                .into_iter()
-                .filter(|&t| t >= origin);
-            rises.map(move |t| {
-                vec![
-                    (pixel / cols) as i64,
-                    (pixel % cols) as i64,
-                    (t - origin).as_fs(),
-                ]
-            })
-        })
-        .collect();
-    let mut theirs = table(&folder.path().join("local_stops.csv"));
-    ours.sort();
-    theirs.sort();
-    assert_eq!(theirs, ours, "{config:?}");
+    assert_eq!(Seen::by_testbench(folder.path()), ours, "{config:?}");
 }
 
 #[test]

@@ -4,16 +4,16 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::replay::StimulusArgs;
-use super::{say, sdf};
+use super::replay::Stimuli;
+use super::{SensorArgs, say, sdf};
 use crate::chip::sensor;
-use crate::engine::{StimulusPlan, export_annotated_verilog, export_verilog};
+use crate::engine::{StimulusPlan, export_annotated_verilog, export_netlist, export_verilog};
 use crate::netlist::Netlist;
 
 /// What to export.
 #[derive(Subcommand)]
 pub enum ExportCommand {
-    /// Structural Verilog with cell models, delays, and a testbench that replays the same stimulus.
+    /// Structural Verilog with two sets of cell models and, for a stimulus, a testbench that replays it.
     Verilog(VerilogArgs),
     /// The delay of every cell, min:typ:max, as SDF (IEEE 1497).
     Sdf(sdf::SdfArgs),
@@ -23,12 +23,25 @@ pub enum ExportCommand {
 #[derive(Args)]
 pub struct VerilogArgs {
     #[command(flatten)]
-    stimuli: StimulusArgs,
-    /// Folder for cells.v, design.v, stimulus.txt and tb.v; it is made if need be.
+    sensor: SensorArgs,
+    /// For a testbench: start values, CSV `row,col,init`, one line for every macropixel.
+    #[arg(long, value_name = "FILE", requires_all = ["events", "stop_periods", "laser_cycles"])]
+    inits: Option<PathBuf>,
+    /// Rising edges of SPAD_RAW: CSV `time_fs,row,col,spad` from the first rising edge of STOP.
+    #[arg(long, value_name = "FILE", requires = "inits")]
+    events: Option<PathBuf>,
+    /// CLK periods in a laser cycle.
+    #[arg(long, value_name = "P", requires = "inits")]
+    stop_periods: Option<u32>,
+    /// Laser cycles of the exposure.
+    #[arg(long, value_name = "N", requires = "inits")]
+    laser_cycles: Option<u32>,
+    /// Folder for design.v, cells.v, cells_specify.v and, with a stimulus, stimulus.txt and tb.v; it is made if need
+    /// be.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Delays that replace the library's (SDF); they go into delays.v.
-    #[arg(long, value_name = "FILE")]
+    /// Delays that replace the library's (SDF); they go into delays.v, which tb.v includes.
+    #[arg(long, value_name = "FILE", requires = "inits")]
     sdf: Option<PathBuf>,
 }
 
@@ -44,7 +57,21 @@ pub fn run(command: &ExportCommand) -> anyhow::Result<()> {
 }
 
 fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
-    let stimuli = args.stimuli.read()?;
+    let config = args.sensor.read()?;
+    let folder = args.out.display();
+    let (Some(inits), Some(events), Some(stop_periods), Some(laser_cycles)) = (
+        &args.inits,
+        &args.events,
+        args.stop_periods,
+        args.laser_cycles,
+    ) else {
+        export_netlist(&args.out, &config)?;
+        say(format_args!(
+            "design.v, cells.v and cells_specify.v in {folder}; for a testbench, add --inits, --events, --stop-periods and --laser-cycles\n"
+        ))?;
+        return Ok(());
+    };
+    let stimuli = Stimuli::read(config, inits, events, (stop_periods, laser_cycles))?;
     let plan = StimulusPlan::new(
         &stimuli.config,
         &stimuli.exposure,
@@ -61,8 +88,7 @@ fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
         }
     }
     say(format_args!(
-        "cd {} && iverilog -g2005 -o sim tb.v design.v cells.v && vvp sim\n",
-        args.out.display()
+        "cd {folder} && iverilog -g2005 -o sim tb.v design.v cells.v && vvp sim\n"
     ))?;
     Ok(())
 }

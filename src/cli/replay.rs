@@ -21,7 +21,7 @@ use crate::photon::SpadEvent;
 use crate::report::{Table, write_npy_u16};
 use crate::system::EngineKind;
 
-/// What is replayed: shared with `gdtof export verilog`.
+/// What is replayed.
 #[derive(Args)]
 pub struct StimulusArgs {
     #[command(flatten)]
@@ -40,7 +40,7 @@ pub struct StimulusArgs {
     laser_cycles: u32,
 }
 
-/// What [`StimulusArgs`] name, read and checked.
+/// What is replayed, read and checked: shared with `gdtof export verilog`.
 pub struct Stimuli {
     /// The chip.
     pub config: SensorConfig,
@@ -58,10 +58,25 @@ impl StimulusArgs {
     /// # Errors
     /// One sentence about the first thing that cannot be.
     pub fn read(&self) -> Result<Stimuli, InputError> {
-        let config = self.sensor.read()?;
-        let exposure = check_exposure(&config, self.stop_periods, self.laser_cycles)?;
-        let starts = read_starts(&self.inits, &config)?;
-        let recording = read_events(&self.events, &config, &exposure)?;
+        let periods = (self.stop_periods, self.laser_cycles);
+        Stimuli::read(self.sensor.read()?, &self.inits, &self.events, periods)
+    }
+}
+
+impl Stimuli {
+    /// Reads start values and events of a sensor; `periods` are CLK periods in a laser cycle and laser cycles.
+    ///
+    /// # Errors
+    /// One sentence about the first thing that cannot be.
+    pub fn read(
+        config: SensorConfig,
+        inits: &Path,
+        events: &Path,
+        (stop_periods, laser_cycles): (u32, u32),
+    ) -> Result<Self, InputError> {
+        let exposure = check_exposure(&config, stop_periods, laser_cycles)?;
+        let starts = read_starts(inits, &config)?;
+        let recording = read_events(events, &config, &exposure)?;
         let dropped = [
             (
                 recording.lost_to_dead_time,
@@ -85,9 +100,7 @@ impl StimulusArgs {
             recording,
         })
     }
-}
 
-impl Stimuli {
     /// Pulses of every macropixel, row-major.
     pub fn pulses(&self) -> Vec<&[SpadEvent]> {
         self.recording.pulses.iter().map(Vec::as_slice).collect()

@@ -1,8 +1,10 @@
 //! `gdtof export sdf`, and delay files as input of other commands.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use indicatif::{DecimalBytes, ProgressBar, ProgressStyle};
 
 use super::{SensorArgs, say};
 use crate::chip::{SensorConfig, sensor};
@@ -22,11 +24,15 @@ enum Divider {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Timescale {
-    /// Whole femtoseconds.
+    /// Whole femtoseconds. Icarus Verilog takes them for picoseconds (steveicarus/iverilog#947).
     Fs,
     /// Picoseconds with three decimals.
     Ps,
 }
+
+/// Largest file that is written without --rows and --cols, bytes: some 280 macropixels, more than anybody reads or a
+/// simulator annotates without having planned to. All 4096 of the QuantIC4x4 take 1.5 GB.
+const LARGEST_UNASKED: u64 = 100_000_000;
 
 /// Arguments of `gdtof export sdf`.
 #[derive(Args)]
@@ -50,9 +56,6 @@ pub struct SdfArgs {
 /// Bad input and unwritable output.
 pub fn run(args: &SdfArgs) -> anyhow::Result<()> {
     let config = args.sensor.read()?;
-    let netlist = Netlist::elaborate(&sensor::circuit(&config));
-    let library = Library::default();
-    let [min, typ, max] = Corner::ALL.map(|c| Timing::nominal(&netlist, &library, c));
     let options = SdfOptions {
         divider: match args.divider {
             Divider::Dot => SdfDivider::Dot,
@@ -63,15 +66,52 @@ pub fn run(args: &SdfArgs) -> anyhow::Result<()> {
             Timescale::Ps => SdfTimescale::Ps,
         },
     };
+    let bytes = size(&config, options)?;
+    let SensorConfig { rows, cols, .. } = config;
+    if bytes > LARGEST_UNASKED && (args.sensor.rows.is_none() || args.sensor.cols.is_none()) {
+        let message = format!(
+            "the delays of {rows} × {cols} macropixels take about {}; choose how many with --rows and --cols, as for export verilog (--rows {rows} --cols {cols} writes all)",
+            DecimalBytes(bytes)
+        );
+        return Err(InputError::new(format!("--out {}", args.out.display()), message).into());
+    }
+    let style = ProgressStyle::with_template(
+        "writing {bar:40} {decimal_bytes} of about {decimal_total_bytes}",
+    )?;
+    let progress = ProgressBar::new(bytes).with_style(style);
+    let mut cells = 0;
     OutputFile::write_with(&args.out, |out| {
-        write_sdf(out, &netlist, [&min, &typ, &max], options)
+        cells = write_library(&mut progress.wrap_write(out), &config, options)?;
+        Ok(())
     })?;
-    say(format_args!(
-        "{} cells in {}\n",
-        netlist.cells().len(),
-        args.out.display()
-    ))?;
+    progress.finish_and_clear();
+    say(format_args!("{cells} cells in {}\n", args.out.display()))?;
     Ok(())
+}
+
+/// Writes the library's delays of the whole array; gives the number of cells.
+fn write_library(
+    out: &mut dyn Write,
+    config: &SensorConfig,
+    options: SdfOptions,
+) -> std::io::Result<usize> {
+    let netlist = Netlist::elaborate(&sensor::circuit(config));
+    let library = Library::default();
+    let [min, typ, max] = Corner::ALL.map(|c| Timing::nominal(&netlist, &library, c));
+    write_sdf(out, &netlist, [&min, &typ, &max], options)?;
+    Ok(netlist.cells().len())
+}
+
+/// About how many bytes the file will have. Nearly all cells are in macropixels, so it grows with their number.
+fn size(config: &SensorConfig, options: SdfOptions) -> std::io::Result<u64> {
+    let one = SensorConfig {
+        rows: 1,
+        cols: 1,
+        ..config.clone()
+    };
+    let mut text = Vec::new();
+    write_library(&mut text, &one, options)?;
+    Ok((text.len() * config.pixels()) as u64)
 }
 
 /// The delays of `netlist` in the corner of `config`, those of the file where it gives any. What could not be

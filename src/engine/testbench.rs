@@ -1,8 +1,17 @@
-//! The same sensor and stimulus for any Verilog simulator.
+//! The same sensor and stimulus for Verilog tools.
 //!
-//! A folder of four files: `cells.v` (cell models with the delays of the corner), `design.v` (the
-//! structural netlist), `stimulus.txt` (every change of every input pin: time in fs, pin, value) and `tb.v`, which
-//! replays the stimulus (and, where cells have delays of their own, includes `delays.v`) and writes `histograms.csv` and `local_stops.csv`, and `dut.vcd` when run with `+vcd`.
+//! A folder of three files, whatever is done with it:
+//!
+//! | file | what it is |
+//! |---|---|
+//! | `design.v` | the structural netlist |
+//! | `cells.v` | cells that agree with our kernel to the femtosecond, in the sensor's corner: Icarus Verilog |
+//! | `cells_specify.v` | cells with `specify` blocks in three corners, which take SDF: any tool |
+//!
+//! For a stimulus there are `stimulus.txt` (every change of every input pin: time in fs, pin, value) and `tb.v`, which
+//! replays it on either cells, and writes `histograms.csv` and `local_stops.csv`, and `dut.vcd` when run with `+vcd`.
+//! Compiled with the macro `SDF`, the name of a delay file in quotes, it annotates that onto `cells_specify.v`. Where
+//! cells have delays of their own without it, it includes `delays.v`, which sets the parameters of `cells.v`.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -11,65 +20,83 @@ use super::stimulus::{Pins, StimulusPlan};
 use crate::chip::{SensorConfig, histogram, sensor};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::netlist::{
-    Direction, Library, Module, Netlist, Timing, write_cells, write_delays, write_modules,
-    write_parametric_cells,
+    Corner, Direction, Library, Module, Netlist, Timing, write_cells, write_delays, write_modules,
+    write_parametric_cells, write_standard_cells,
 };
 
-/// Writes cells, netlist, stimulus and testbench of the whole array into `folder`.
+/// Writes cells and netlist of the whole array into `folder`.
 ///
 /// # Errors
 /// When the folder or a file in it cannot be written.
+pub fn export_netlist(folder: &Path, config: &SensorConfig) -> Result<(), InputError> {
+    let (library, corner) = (Library::default(), config.corner);
+    write_netlist(folder, config, &|out| write_cells(out, &library, corner))
+}
+
+/// As [`export_netlist`], with stimulus and testbench.
+///
+/// # Errors
+/// As [`export_netlist`].
 pub fn export_verilog(
     folder: &Path,
     config: &SensorConfig,
     plan: &StimulusPlan<'_>,
 ) -> Result<(), InputError> {
-    export(folder, config, plan, None)
+    export_netlist(folder, config)?;
+    write_replay(folder, config, plan, false)
 }
 
-/// As [`export_verilog`], with the delays of `timing`, which is that of [`sensor::circuit`]: cells take
-/// delays as parameters, and a fifth file, `delays.v`, sets those that differ from the library.
+/// As [`export_verilog`], with the delays of `timing`, which is that of [`sensor::circuit`]: the cells of `cells.v` take
+/// delays as parameters, and one more file, `delays.v`, sets those that differ from the library.
 ///
 /// # Errors
-/// As [`export_verilog`].
+/// As [`export_netlist`].
 pub fn export_annotated_verilog(
     folder: &Path,
     config: &SensorConfig,
     plan: &StimulusPlan<'_>,
     timing: &Timing,
 ) -> Result<(), InputError> {
-    export(folder, config, plan, Some(timing))
+    let (library, corner) = (Library::default(), config.corner);
+    write_netlist(folder, config, &|out| {
+        write_parametric_cells(out, &library, corner)
+    })?;
+    let netlist = Netlist::elaborate(&sensor::circuit(config));
+    let nominal = Timing::nominal(&netlist, &library, corner);
+    OutputFile::write_with(&folder.join("delays.v"), |out| {
+        write_delays(out, "dut", &netlist, timing, &nominal)
+    })?;
+    write_replay(folder, config, plan, true)
 }
 
-fn export(
+fn write_netlist(
+    folder: &Path,
+    config: &SensorConfig,
+    exact_cells: &dyn Fn(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), InputError> {
+    create_folder(folder)?;
+    let file = |name: &str| folder.join(name);
+    OutputFile::write_with(&file("cells.v"), exact_cells)?;
+    OutputFile::write_with(&file("cells_specify.v"), |out| {
+        write_standard_cells(out, &Library::default())
+    })?;
+    OutputFile::write_with(&file("design.v"), |out| {
+        write_modules(out, &sensor::circuit(config))
+    })
+}
+
+fn write_replay(
     folder: &Path,
     config: &SensorConfig,
     plan: &StimulusPlan<'_>,
-    timing: Option<&Timing>,
+    is_annotated: bool,
 ) -> Result<(), InputError> {
     let top = sensor::circuit(config);
-    let netlist = Netlist::elaborate(&top);
-    create_folder(folder)?;
-    let file = |name: &str| folder.join(name);
-    OutputFile::write_with(&file("cells.v"), |out| {
-        let library = Library::default();
-        match timing {
-            None => write_cells(out, &library, config.corner),
-            Some(_) => write_parametric_cells(out, &library, config.corner),
-        }
+    OutputFile::write_with(&folder.join("stimulus.txt"), |out| {
+        write_stimulus(out, &Netlist::elaborate(&top), plan)
     })?;
-    if let Some(timing) = timing {
-        OutputFile::write_with(&file("delays.v"), |out| {
-            let library = Timing::nominal(&netlist, &Library::default(), config.corner);
-            write_delays(out, "dut", &netlist, timing, &library)
-        })?;
-    }
-    OutputFile::write_with(&file("design.v"), |out| write_modules(out, &top))?;
-    OutputFile::write_with(&file("stimulus.txt"), |out| {
-        write_stimulus(out, &netlist, plan)
-    })?;
-    OutputFile::write_with(&file("tb.v"), |out| {
-        write_testbench(out, &top, config, plan, timing.is_some())
+    OutputFile::write_with(&folder.join("tb.v"), |out| {
+        write_testbench(out, &top, config, plan, is_annotated)
     })
 }
 
@@ -97,7 +124,7 @@ fn write_testbench(
     is_annotated: bool,
 ) -> io::Result<()> {
     let include = if is_annotated {
-        "  `include \"delays.v\"\n"
+        "`ifndef SDF\n  `include \"delays.v\"\n`endif\n"
     } else {
         ""
     };
@@ -125,6 +152,7 @@ fn write_testbench(
         out,
         "\
 // iverilog -g2005 -o sim tb.v design.v cells.v && vvp sim +vcd
+// iverilog -g2005 -gspecify -T{delays} -DSDF='\"chip.sdf\"' -o sim tb.v design.v cells_specify.v && vvp sim
 `timescale 1fs/1fs
 module tb;
   reg [{last_pin}:0] pins;
@@ -148,6 +176,9 @@ module tb;
   endgenerate
 
   initial begin
+`ifdef SDF
+    $sdf_annotate(`SDF, dut);
+`endif
     stimulus = $fopen(\"stimulus.txt\", \"r\");
     stops = $fopen(\"local_stops.csv\", \"w\");
     $fwrite(stops, \"row,col,time_fs\\n\");
@@ -163,6 +194,11 @@ module tb;
     histograms = $fopen(\"histograms.csv\", \"w\");
     $fwrite(histograms, \"row,col,bin,count\\n\");
 ",
+        delays = match config.corner {
+            Corner::Min => "min",
+            Corner::Typ => "typ",
+            Corner::Max => "max",
+        },
         last_pin = pins - 1,
         last_pixel = pixels - 1,
         ports = ports.join(",\n"),

@@ -139,7 +139,10 @@ fn enter(limits: &mut InstanceLimits, (check, control, edge): Slot, fs: u32) {
 }
 
 /// The checks of a flip-flop with these limits in the three corners.
-pub(super) fn checks_of(kind: CellKind, corners: [&InstanceLimits; 3]) -> Vec<SdfCheck<'static>> {
+pub(in crate::netlist) fn checks_of(
+    kind: CellKind,
+    corners: [&InstanceLimits; 3],
+) -> Vec<SdfCheck<'static>> {
     let limit = |control, check, edge| {
         Triple(corners.map(|limits| Some(limits.at(control, check, edge).into())))
     };

@@ -46,6 +46,7 @@ mod wires;
 mod writer;
 
 pub use annotate::{Annotation, annotate};
+pub(super) use limits::checks_of;
 pub use writer::{SdfDivider, SdfOptions, SdfTimescale, write_sdf};
 
 use std::borrow::Cow;

@@ -1,4 +1,4 @@
-//! Structural Verilog: the same cells, nets, hierarchy and delays for any other simulator.
+//! Cells that agree with the event kernel edge for edge, for differential tests in Icarus Verilog.
 //!
 //! A cell's output passes through a continuous assignment with delays: inertial by IEEE 1364, which
 //! is the delay model of the event kernel, so both see the same glitches. A gate whose inputs all
@@ -17,21 +17,16 @@
 //! Where instances have delays of their own, every cell is a procedural model with delays that are parameters
 //! ([`write_parametric_cells`]), and `defparam`s set those that differ ([`write_delays`]); one more parameter
 //! makes them transport delays. Verilog has none of its own that keep to the active region and let a change
-//! cancel those it overtakes: a module with a queue of changes does that. Time unit and precision are one
-//! femtosecond.
+//! cancel those it overtakes: a module with a queue of changes does that.
 
-use std::collections::HashSet;
 use std::io::{self, Write};
-use std::sync::Arc as Shared;
 
-use super::cell::CellKind;
-use super::flat::Netlist;
-use super::library::{CellArcs, Corner, Library};
-use super::module::{Direction, Module, Net};
-use super::timing::{DelayModel, Timing};
+use super::{TIMESCALE, primitive};
 use crate::logic::Logic;
-
-const TIMESCALE: &str = "`timescale 1fs/1fs\n";
+use crate::netlist::cell::CellKind;
+use crate::netlist::flat::Netlist;
+use crate::netlist::library::{CellArcs, Corner, Library};
+use crate::netlist::timing::{DelayModel, Timing};
 
 /// Lets every change of `value` arrive after its delay. One that overtakes others cancels them. The queue's last place
 /// has a variable, as an index that is a difference need not wrap at 8 bits.
@@ -195,18 +190,8 @@ fn write_cell(
         )
     };
     let uniform = (1..kind.inputs().len()).all(|pin| delays(pin) == delays(0));
-    if !kind.is_flip_flop() && uniform && kind != CellKind::Mux2 {
+    if let (Some(primitive), true) = (primitive(kind), uniform) {
         let (rise, fall) = delays(0);
-        let primitive = match kind {
-            CellKind::Inv => "not",
-            CellKind::Buf => "buf",
-            CellKind::Nand2 => "nand",
-            CellKind::Nor2 => "nor",
-            CellKind::And2 => "and",
-            CellKind::Or2 => "or",
-            CellKind::Xor2 => "xor",
-            _ => "xnor",
-        };
         writeln!(out, "  wire now;")?;
         writeln!(out, "  reg value;")?;
         writeln!(out, "  {primitive} g(now, {inputs});")?;
@@ -304,137 +289,4 @@ fn write_arc_selecting_cell<D: std::fmt::Display>(
 fn outputs_of(kind: CellKind) -> impl Iterator<Item = (&'static str, &'static str)> {
     let pins = kind.outputs().iter().copied();
     pins.zip(["value", "~value"])
-}
-
-/// Writes `top` and every module below it, children first, each once.
-///
-/// # Errors
-/// Those of the writer.
-pub fn write_modules(out: &mut dyn Write, top: &Shared<Module>) -> io::Result<()> {
-    write!(out, "{TIMESCALE}")?;
-    write_below(out, top, &mut HashSet::new())
-}
-
-fn write_below(
-    out: &mut dyn Write,
-    module: &Shared<Module>,
-    written: &mut HashSet<String>,
-) -> io::Result<()> {
-    if !written.insert(module.name().to_owned()) {
-        return Ok(());
-    }
-    for instance in module.instances() {
-        write_below(out, &instance.module, written)?;
-    }
-    write_module(out, module)
-}
-
-fn write_module(out: &mut dyn Write, module: &Module) -> io::Result<()> {
-    let range = |is_bus: bool, width: usize| {
-        if is_bus {
-            format!("[{}:0] ", width - 1)
-        } else {
-            String::new()
-        }
-    };
-    let ports: Vec<String> = module
-        .port_signals()
-        .map(|(direction, s)| {
-            let keyword = match direction {
-                Direction::Input => "input",
-                Direction::Output => "output",
-            };
-            format!("  {keyword} {}{}", range(s.is_bus, s.width()), s.name)
-        })
-        .collect();
-    writeln!(
-        out,
-        "\nmodule {}(\n{}\n);",
-        module.name(),
-        ports.join(",\n")
-    )?;
-    for (i, signal) in module.signals().iter().enumerate() {
-        if !module.ports().iter().any(|p| p.signal == i) {
-            writeln!(
-                out,
-                "  wire {}{};",
-                range(signal.is_bus, signal.width()),
-                signal.name
-            )?;
-        }
-    }
-    let names = NetNames::new(module);
-    for cell in module.cells() {
-        let kind = cell.kind;
-        let outputs = kind.outputs().iter().zip(&cell.outputs);
-        let inputs = kind.inputs().iter().zip(&cell.inputs);
-        let pins: Vec<String> = outputs
-            .chain(inputs)
-            .map(|(pin, &net)| format!(".{pin}({})", names.expression(&[net])))
-            .collect();
-        writeln!(out, "  {} {}({});", kind.name(), cell.name, pins.join(", "))?;
-    }
-    for instance in module.instances() {
-        let mut rest = &instance.connections[..];
-        let mut pins = Vec::new();
-        for (_, signal) in instance.module.port_signals() {
-            let (nets, after) = rest.split_at(signal.width());
-            rest = after;
-            pins.push(format!("    .{}({})", signal.name, names.expression(nets)));
-        }
-        let (child, pins) = (instance.module.name(), pins.join(",\n"));
-        writeln!(out, "  {child} {}(\n{pins}\n  );", instance.name)?;
-    }
-    writeln!(out, "endmodule")
-}
-
-/// Names of a module's nets: signal, and bit where the signal is a bus.
-struct NetNames<'a> {
-    module: &'a Module,
-    of_net: Vec<(u32, u32)>,
-}
-
-impl<'a> NetNames<'a> {
-    fn new(module: &'a Module) -> Self {
-        let mut of_net = vec![(0, 0); module.net_count()];
-        for (i, signal) in module.signals().iter().enumerate() {
-            for (bit, net) in signal.nets().enumerate() {
-                of_net[net.index()] = (i as u32, bit as u32);
-            }
-        }
-        NetNames { module, of_net }
-    }
-
-    /// A Verilog expression for `nets` (bit 0 first): a name, a slice, or a concatenation.
-    fn expression(&self, nets: &[Net]) -> String {
-        if nets.iter().all(|n| !n.is_some()) {
-            return String::new();
-        }
-        let mut parts = Vec::new();
-        let mut i = 0;
-        while i < nets.len() {
-            let (signal_index, low) = self.of_net[nets[i].index()];
-            let mut length = 1;
-            while i + length < nets.len()
-                && self.of_net[nets[i + length].index()] == (signal_index, low + length as u32)
-            {
-                length += 1;
-            }
-            let signal = &self.module.signals()[signal_index as usize];
-            parts.push(match (signal.is_bus, length) {
-                (false, _) => signal.name.clone(),
-                (true, n) if n == signal.width() => signal.name.clone(),
-                (true, 1) => format!("{}[{low}]", signal.name),
-                (true, n) => format!("{}[{}:{low}]", signal.name, low as usize + n - 1),
-            });
-            i += length;
-        }
-        match &parts[..] {
-            [one] => one.clone(),
-            many => {
-                let reversed: Vec<&str> = many.iter().rev().map(String::as_str).collect();
-                format!("{{{}}}", reversed.join(", "))
-            }
-        }
-    }
 }

@@ -1,0 +1,289 @@
+//! The exported netlist with its standard cells in other tools: exported SDF annotates onto it in Icarus Verilog without
+//! a warning, cells do what those of our kernel do, Verilator and Yosys read it all. A tool that is absent is skipped,
+//! loudly.
+
+mod icarus;
+mod scenario;
+
+use std::fmt::Write as _;
+use std::fs;
+use std::io::Write as _;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use guided_dtof::chip::SensorConfig;
+use guided_dtof::engine::{GateSimulation, StimulusPlan, export_netlist, export_verilog};
+use guided_dtof::netlist::{CellKind, Corner, Library, write_cells, write_standard_cells};
+use icarus::Seen;
+use rand::{SeedableRng, rngs::StdRng};
+use scenario::Scenario;
+
+fn gdtof(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gdtof"));
+    command
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+/// Names of a folder's files, sorted.
+fn files(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let names = entries.map(|e| e.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    names
+}
+
+/// Compares an array whose library delays come from the file that `export sdf` writes.
+fn compare(seed: u64, rows: usize, cols: usize) {
+    let scenario = Scenario::random(&mut StdRng::seed_from_u64(seed), rows, cols);
+    let Scenario {
+        config,
+        exposure,
+        starts,
+        ..
+    } = &scenario;
+    let pulses = scenario.pulses();
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let plan = StimulusPlan::new(config, exposure, cols, starts, &pulses);
+    export_verilog(here, config, &plan).unwrap();
+    fs::write(here.join("chip.toml"), toml::to_string(config).unwrap()).unwrap();
+    let exported = gdtof(
+        here,
+        &[
+            "export",
+            "sdf",
+            "--sensor",
+            "chip.toml",
+            "--out",
+            "chip.sdf",
+        ],
+    );
+    assert!(exported.status.success(), "{exported:?}");
+    let said = icarus::simulate(here, &icarus::standard_cells(config.corner), &["-sdf-warn"]);
+    assert_eq!(said, "", "every entry finds its path");
+    let mut gate = GateSimulation::new(config, exposure, (0, 0), (rows, cols), starts, &pulses);
+    let ours = Seen::by_kernel(&mut gate, cols);
+    assert_eq!(Seen::by_testbench(here), ours, "seed {seed}: {config:?}");
+}
+
+#[test]
+fn macropixels_annotated_in_icarus_agree_with_our_kernel() {
+    if icarus::is_here() {
+        for seed in 0..scenario::cases(20).into() {
+            compare(seed, 1, 1);
+        }
+        compare(1000, 2, 3);
+    }
+}
+
+/// A testbench that changes one pin of every cell at a time, in both models, to one of `levels` (0, 1, x), and prints
+/// where their outputs differ.
+fn walk(levels: usize) -> String {
+    let mut cells = String::new();
+    let mut comparisons = String::new();
+    for kind in CellKind::ALL {
+        let (name, width) = (kind.name(), kind.outputs().len());
+        let inputs = kind.inputs().iter().enumerate();
+        let inputs: Vec<_> = inputs
+            .map(|(i, pin)| format!(".{pin}(pins[{i}])"))
+            .collect();
+        for model in ["", "EXACT_"] {
+            let outputs = kind.outputs().iter().enumerate();
+            let outputs = outputs.map(|(i, pin)| format!(".{pin}({model}{name}_out[{i}])"));
+            let pins = inputs.iter().cloned().chain(outputs).collect::<Vec<_>>();
+            writeln!(cells, "  wire [{}:0] {model}{name}_out;", width - 1).unwrap();
+            let pins = pins.join(", ");
+            writeln!(cells, "  {model}{name} {model}{name}_under_test({pins});").unwrap();
+        }
+        writeln!(
+            comparisons,
+            "      if ({name}_out !== EXACT_{name}_out) $display(\"{name} %b -> %b: %b, not %b\", before, pins, {name}_out, EXACT_{name}_out);"
+        )
+        .unwrap();
+    }
+    format!(
+        "`timescale 1fs/1fs
+module tb;
+  reg [3:0] pins, before;
+  integer step, pin, level;
+{cells}  initial begin
+    pins = 0;
+    #1000000;
+    for (step = 0; step < 20000; step = step + 1) begin
+      before = pins;
+      pin = $urandom % 4;
+      level = $urandom % {levels};
+      pins[pin] = level == 2 ? 1'bx : level == 1;
+      #1000000;
+{comparisons}    end
+  end
+endmodule
+"
+    )
+}
+
+/// Both models of every cell in the typical corner: files standard.v and exact.v.
+fn write_both_models(folder: &Path) {
+    let library = Library::default();
+    let mut text = Vec::new();
+    write_standard_cells(&mut text, &library).unwrap();
+    fs::write(folder.join("standard.v"), &text).unwrap();
+    text.clear();
+    write_cells(&mut text, &library, Corner::Typ).unwrap();
+    let text = String::from_utf8(text).unwrap();
+    let text = text.replace("\nmodule ", "\nmodule EXACT_");
+    fs::write(folder.join("exact.v"), text).unwrap();
+}
+
+#[test]
+fn standard_cells_do_what_exact_ones_do() {
+    if !icarus::is_here() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write_both_models(folder.path());
+    // Unknown levels are for the models with tables; processes know 0 and 1.
+    for (levels, define) in [(3, "-DTABLES"), (2, "-DFUNCTIONAL")] {
+        fs::write(folder.path().join("walk.v"), walk(levels)).unwrap();
+        let sources = [
+            "-gspecify",
+            "-Ttyp",
+            define,
+            "walk.v",
+            "standard.v",
+            "exact.v",
+        ];
+        let said = icarus::simulate(folder.path(), &sources, &[]);
+        assert_eq!(said, "", "{define}");
+    }
+}
+
+/// Icarus evaluates no timing checks, so the notifier is moved by hand.
+#[test]
+fn a_notifier_makes_the_state_unknown_until_the_next_edge() {
+    if !icarus::is_here() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write_both_models(folder.path());
+    let bench = "`timescale 1ns/1ns
+module tb;
+  reg d, ck, r;
+  wire [1:0] dffr, dffsr;
+  DFFR a(dffr[0], dffr[1], d, ck, r);
+  DFFSR b(dffsr[0], dffsr[1], d, ck, r, 1'b0);
+  task see; #1 $display(\"%b %b\", dffr, dffsr); endtask
+  initial begin
+    d = 1; ck = 0; r = 1; see;
+    r = 0; ck = 1; see;
+    a.notifier = 0; b.notifier = 0; see;
+    ck = 0; see;
+    ck = 1; see;
+    a.notifier = 1; b.notifier = 1; see;
+    r = 1; see;
+  end
+endmodule
+";
+    fs::write(folder.path().join("bench.v"), bench).unwrap();
+    let sources = ["-gspecify", "-Ttyp", "bench.v", "standard.v"];
+    let said = icarus::simulate(folder.path(), &sources, &[]);
+    let states: Vec<&str> = said.lines().collect();
+    let (zero, one, unknown) = ("10 10", "01 01", "xx xx");
+    assert_eq!(states, [zero, one, unknown, unknown, one, unknown, zero]);
+}
+
+/// Runs `program` in `folder` where it is installed, and wants its silence but for what is `known`; says so loudly where
+/// it is not.
+fn is_silent(folder: &Path, program: &str, arguments: &[&str], known: &str) {
+    let Ok(output) = Command::new(program)
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+    else {
+        // Not eprintln, which cargo hides where a test passes.
+        let _ = writeln!(
+            std::io::stderr(),
+            "SKIPPED: {program} is not installed, so it has not read the exported netlist (apt-get install {program})"
+        );
+        return;
+    };
+    let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    let is_silent = text.lines().all(|line| line.is_empty() || line == known);
+    assert!(output.status.success() && is_silent, "{text}");
+}
+
+/// The netlists of a macropixel with every P-counter.
+fn with_every_p_counter(mut check: impl FnMut(&Path)) {
+    for (p_counter, tap, after_borrow) in scenario::p_counters() {
+        let config = SensorConfig {
+            p_counter,
+            tap,
+            after_borrow,
+            rows: 1,
+            cols: 1,
+            ..SensorConfig::default()
+        };
+        let folder = tempfile::tempdir().unwrap();
+        export_netlist(folder.path(), &config).unwrap();
+        check(folder.path());
+    }
+}
+
+#[test]
+fn verilator_has_nothing_to_say() {
+    with_every_p_counter(|folder| {
+        let lint = ["--lint-only", "-Wall", "design.v", "cells_specify.v"];
+        is_silent(folder, "verilator", &lint, "");
+    });
+}
+
+/// What Yosys says of any flip-flop with both set and reset.
+const DFFSR: &str = "Warning: Complex async reset for dff `\\state'.";
+
+/// With no loops, no net without a driver or with two, and every flip-flop a flip-flop.
+#[test]
+fn yosys_reads_it() {
+    with_every_p_counter(|folder| {
+        for option in ["", "-specify"] {
+            let script = format!(
+                "read_verilog {option} design.v cells_specify.v; hierarchy -check -top quantic4x4; proc; \
+                 check -assert; flatten; check -assert; select -assert-none t:$dlatch t:$sr"
+            );
+            is_silent(folder, "yosys", &["-q", "-p", &script], DFFSR);
+        }
+    });
+}
+
+#[test]
+fn without_a_stimulus_the_netlist_comes_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let incomplete = gdtof(
+        here,
+        &["export", "verilog", "--inits", "i.csv", "--out", "v"],
+    );
+    assert_eq!(incomplete.status.code(), Some(2));
+    assert_eq!(files(here), [""; 0]);
+    let exported = gdtof(here, &["export", "verilog", "--out", "v"]);
+    assert!(exported.status.success(), "{exported:?}");
+    let names = ["cells.v", "cells_specify.v", "design.v"];
+    assert_eq!(files(&here.join("v")), names);
+}
+
+#[test]
+fn delays_of_the_whole_chip_are_written_only_when_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let refused = gdtof(here, &["export", "sdf", "--out", "chip.sdf"]);
+    let error = String::from_utf8(refused.stderr).unwrap();
+    assert_eq!(refused.status.code(), Some(2), "{error}");
+    let says = "64 × 64 macropixels take about 1.48 GB";
+    let cure = "--rows 64 --cols 64";
+    assert!(error.contains(says) && error.contains(cure), "{error}");
+    assert_eq!(error.trim_end().lines().count(), 1, "{error}");
+    assert_eq!(files(here), [""; 0]);
+}
