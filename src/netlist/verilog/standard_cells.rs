@@ -9,10 +9,10 @@
 //! The time unit is the picosecond, as in an exported SDF file: Icarus Verilog (at least to version 12) reads
 //! delays in the unit of the cell, whatever TIMESCALE the file has.
 //!
-//! IEEE 1364 (14.6) makes path delays inertial, as the event kernel's are, but Icarus Verilog 11 lets a pulse shorter
-//! than the delay pass where three changes of a cell fall within it. In a macropixel annotated with the library's
-//! delays, 1 % of all value changes on nets differ at 200 photons in 240 CLK periods, and 8 % at 2000, all of them
-//! glitches; histograms and LOCAL_STOP times (to the femtosecond) were the same in 300 random macropixels.
+//! IEEE 1364 (14.6) makes path delays inertial, as the event kernel's are. Icarus Verilog 11 does so for one pulse, but
+//! of three changes within one delay it passes on what the cell shows when the first is due. In a macropixel annotated
+//! with the library's delays, 1 % of the value changes of nets differ so at 200 photons in 240 CLK periods, and 8 % at
+//! 2000; histograms and LOCAL_STOP times (to the femtosecond) were the same in 300 random macropixels.
 //!
 //! Tools without UDPs (Verilator, Yosys) take the macro `FUNCTIONAL` for granted: a flip-flop is a process there. The
 //! set of DFFSR is masked by its reset in that process, so that a set still high when the reset goes is seen. Paths
