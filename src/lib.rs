@@ -19,8 +19,8 @@
 //! | [`engine`] | the ways to run an exposure |
 //! | [`scene`] | surfaces, optics, sunlight, ground truth |
 //! | [`guide`] | the stereo camera pair and its mapping onto macropixels |
+//! | [`theory`] | detection probability, precision, partial histograms, design, significance |
 //! | [`ranging`] | depth from histograms |
-//! | [`theory`] | detection probability, precision, partial histograms, design |
 //! | [`report`] | pictures, arrays, tables |
 //! | [`system`] | one guided frame, end to end |
 //! | [`reproduce`] | the thesis's figures, published beside computed |

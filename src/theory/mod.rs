@@ -1,5 +1,5 @@
-//! Chapter 3 of the thesis: how often the echo is found, how precisely, with how many bins, and what follows for a
-//! design.
+//! Chapter 3 of the thesis: how often the echo is found, how precisely, with how many bins, what follows for a
+//! design, and when a peak is chance.
 
 pub mod capacity;
 mod counts;
@@ -11,6 +11,7 @@ mod gaussian;
 pub mod partial;
 pub mod precision;
 mod pulse;
+pub mod significance;
 
 pub use counts::{Counts, Tails};
 pub use pulse::{LnBin, MeasuredPulse, Pulse, PulseError};
