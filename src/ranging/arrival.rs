@@ -40,8 +40,9 @@ pub fn arrival(counts: &[u32], options: &ArrivalOptions) -> Option<Peak> {
     let peak_bin = (0..counts.len()).rev().max_by_key(|&bin| counts[bin])?;
     let first = peak_bin.saturating_sub(options.before);
     let end = (peak_bin + options.after + 1).min(counts.len());
+    let counts: Vec<f64> = counts.iter().map(|&n| f64::from(n)).collect();
     let background_per_bin = median(counts[..first].iter().chain(&counts[end..]));
-    let signal = |bin: usize| (f64::from(counts[bin]) - background_per_bin).max(0.0);
+    let signal = |bin: usize| (counts[bin] - background_per_bin).max(0.0);
     let signal_counts: f64 = (first..end).map(signal).sum();
     if signal_counts <= 0.0 {
         return None;

@@ -1,10 +1,19 @@
-//! From histograms to time and depth: finding the peak, interpolating it, calibrating it.
+//! From histograms to time and depth: finding the peak, judging and interpolating it, taking range walk out, calibrating.
 
 mod arrival;
 mod calibration;
+mod expected;
+mod finder;
 mod peak;
 pub mod tmf8820;
+mod walk;
 
 pub use arrival::{ArrivalOptions, arrival};
 pub use calibration::{Calibration, CalibrationError, Echo, ZoneCalibration};
+pub use expected::{EchoLight, Response};
+pub use finder::{DepthOptions, EchoFinder, Sighting};
 pub use peak::{Background, Peak, PeakOptions, interpolate};
+pub use walk::{Corrected, WalkCorrection};
+
+#[cfg(test)]
+mod tests;

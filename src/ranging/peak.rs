@@ -7,6 +7,8 @@
 //! Background pulls a centre of mass towards the middle of the bins summed. [`Background::Median`]
 //! subtracts an estimate of it first; [`Background::None`] is the equation as printed.
 
+use std::ops::Range;
+
 /// What to take off the counts before interpolating.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Background {
@@ -36,6 +38,14 @@ impl Default for PeakOptions {
     }
 }
 
+impl PeakOptions {
+    /// The peak region about `peak_bin` of a histogram of `bins` bins; at an edge it is cut off, not shifted.
+    pub fn region(&self, peak_bin: usize, bins: usize) -> Range<usize> {
+        let end = peak_bin.saturating_add(self.half_width).saturating_add(1);
+        peak_bin.saturating_sub(self.half_width)..end.min(bins)
+    }
+}
+
 /// A peak found in a histogram.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
@@ -51,23 +61,25 @@ pub struct Peak {
 
 /// Finds and interpolates the peak of `counts`, one entry per bin, earliest first.
 ///
-/// At an edge of the histogram the peak region is cut off, not shifted. `None` if no count of the
+/// `None` if no count of the
 /// peak region exceeds the background, as with an empty histogram.
 pub fn interpolate(counts: &[u32], options: &PeakOptions) -> Option<Peak> {
     let peak_bin = (0..counts.len()).rev().max_by_key(|&bin| counts[bin])?;
-    let first = peak_bin.saturating_sub(options.half_width);
-    let end = peak_bin
-        .saturating_add(options.half_width)
-        .saturating_add(1)
-        .min(counts.len());
+    let counts: Vec<f64> = counts.iter().map(|&n| f64::from(n)).collect();
+    interpolate_at(&counts, peak_bin, options)
+}
+
+/// As [`interpolate`], about a given bin of `counts` and with counts that need not be whole, such as mean ones.
+pub fn interpolate_at(counts: &[f64], peak_bin: usize, options: &PeakOptions) -> Option<Peak> {
+    let region = options.region(peak_bin, counts.len());
     let background_per_bin = match options.background {
         Background::None => 0.0,
-        Background::Median => median(counts[..first].iter().chain(&counts[end..])),
+        Background::Median => median(counts[..region.start].iter().chain(&counts[region.end..])),
     };
     let (mut signal_counts, mut moment) = (0.0, 0.0);
     // Moments about the fullest bin keep their digits in a long histogram.
-    for (bin, &count) in counts.iter().enumerate().take(end).skip(first) {
-        let signal = (f64::from(count) - background_per_bin).max(0.0);
+    for bin in region {
+        let signal = (counts[bin] - background_per_bin).max(0.0);
         signal_counts += signal;
         moment += signal * (bin as f64 - peak_bin as f64);
     }
@@ -80,13 +92,13 @@ pub fn interpolate(counts: &[u32], options: &PeakOptions) -> Option<Peak> {
 }
 
 /// The median, between the middle two of an even number of values; 0 of none.
-pub(super) fn median<'a>(values: impl Iterator<Item = &'a u32>) -> f64 {
-    let mut sorted: Vec<u32> = values.copied().collect();
-    sorted.sort_unstable();
+pub(super) fn median<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.copied().collect();
+    sorted.sort_unstable_by(f64::total_cmp);
     let n = sorted.len();
     match n {
         0 => 0.0,
-        _ => (f64::from(sorted[(n - 1) / 2]) + f64::from(sorted[n / 2])) / 2.0,
+        _ => (sorted[(n - 1) / 2] + sorted[n / 2]) / 2.0,
     }
 }
 

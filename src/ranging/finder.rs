@@ -1,0 +1,133 @@
+//! What a histogram says of distance: where its peak is, how sure that is, and where the echo must lie.
+//!
+//! ```text
+//!   counts ─► fullest stretch ─► chance of it without an echo ─► confidence, significant or not
+//!                   └──► peak: centre of mass about its fullest bin ─► range walk taken out ─► position
+//! ```
+//!
+//! The *confidence* is −log₁₀ of the chance that light without an echo makes as full a stretch anywhere in the histogram
+//! ([`theory::significance`](crate::theory::significance)): 0 says nothing, 3 is wrong once in a thousand dark windows. A peak
+//! is significant where that chance is at most the false-alarm rate.
+
+use super::expected::{EchoLight, Response};
+use super::peak::{Peak, PeakOptions, interpolate_at};
+use super::walk::WalkCorrection;
+use crate::chip::{EventType, Exposure, Overflow, SensorConfig};
+use crate::theory::significance::Scan;
+use crate::units::Time;
+
+/// How depths are found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthOptions {
+    /// Peaks.
+    pub peak: PeakOptions,
+    /// Share of macropixels without an echo that may be given a depth, above 0 and at most 1, which takes every peak.
+    pub false_alarm_rate: f64,
+    /// Whether range walk is taken out.
+    pub correct_walk: bool,
+}
+
+impl Default for DepthOptions {
+    fn default() -> Self {
+        DepthOptions {
+            peak: PeakOptions::default(),
+            false_alarm_rate: 1e-3,
+            correct_walk: true,
+        }
+    }
+}
+
+/// The peak of a histogram, judged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sighting {
+    /// As the counts have it.
+    pub peak: Peak,
+    /// Where the echo must lie, bins: the peak's position without range walk, if that is taken out.
+    pub position_bins: f64,
+    /// The light that explains the peak, if range walk is taken out.
+    pub light: Option<EchoLight>,
+    /// −log₁₀ of the chance that light without an echo makes such a peak, at least 0.
+    pub confidence: f64,
+    /// Whether that chance is at most the false-alarm rate.
+    pub is_significant: bool,
+    /// Whether a bin of the peak is full, so that neither its height nor its centre is known.
+    pub is_saturated: bool,
+}
+
+/// Finds echoes in the histograms of one sensor and exposure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EchoFinder {
+    peak: PeakOptions,
+    ln_false_alarm: f64,
+    scan: Scan,
+    /// Counts at which bins stop counting, where they can be reached. One that wraps shows nothing.
+    full: Option<u32>,
+    walk: Option<WalkCorrection>,
+}
+
+impl EchoFinder {
+    /// For Gaussian pulses of standard deviation `pulse_sigma`, all jitter included.
+    ///
+    /// Range walk is taken out where brighter light gives more counts (TYPE greater, and THRESHOLD below the number of
+    /// SPADs) and the SPADs have recovered from one echo before the next window opens.
+    pub fn new(
+        config: &SensorConfig,
+        exposure: &Exposure,
+        pulse_sigma: Time,
+        options: &DepthOptions,
+    ) -> Self {
+        let laser_cycles = exposure.laser_cycles;
+        let response = Response::new(config, pulse_sigma);
+        let recovers =
+            response.dead_time_bins() + config.bins as f64 <= f64::from(exposure.stop_periods);
+        let brighter_is_more = config.event_type == EventType::Greater;
+        let capacity = (1u32 << config.bin_bits) - 1;
+        EchoFinder {
+            peak: options.peak,
+            ln_false_alarm: options.false_alarm_rate.ln(),
+            scan: Scan::matched(response.pulse_sigma_bins(), config.bins, laser_cycles),
+            full: (config.overflow == Overflow::Saturate && capacity < laser_cycles)
+                .then_some(capacity),
+            walk: (options.correct_walk && recovers && brighter_is_more).then_some(
+                WalkCorrection {
+                    response,
+                    laser_cycles,
+                    peak: options.peak,
+                },
+            ),
+        }
+    }
+
+    /// The echo in `counts`, one entry per bin, earliest first; `None` if no bin stands out at all.
+    pub fn find(&self, counts: &[u32]) -> Option<Sighting> {
+        let stretch = self.scan.fullest(counts);
+        let bins = stretch.first..stretch.first + self.scan.width;
+        let peak_bin = bins.rev().max_by_key(|&bin| counts[bin])?;
+        let real: Vec<f64> = counts.iter().map(|&n| f64::from(n)).collect();
+        let peak = interpolate_at(&real, peak_bin, &self.peak);
+        let region = self.peak.region(peak_bin, counts.len());
+        let is_saturated = counts[region].iter().any(|&n| Some(n) == self.full);
+        // Full bins all over leave no peak, but are something to tell.
+        let peak = peak.or(is_saturated.then_some(Peak {
+            position_bins: peak_bin as f64,
+            peak_bin,
+            signal_counts: 0.0,
+            background_per_bin: real[peak_bin],
+        }))?;
+        let is_significant = stretch.ln_false_alarm <= self.ln_false_alarm;
+        // Where there is no depth anyway, nothing is known of the light either.
+        let corrects = is_significant && !is_saturated;
+        let corrected = self
+            .walk
+            .filter(|_| corrects)
+            .and_then(|walk| walk.correct(&peak));
+        Some(Sighting {
+            position_bins: corrected.map_or(peak.position_bins, |c| c.position_bins),
+            light: corrected.map(|c| c.light),
+            peak,
+            confidence: -stretch.ln_false_alarm / std::f64::consts::LN_10,
+            is_significant,
+            is_saturated,
+        })
+    }
+}
