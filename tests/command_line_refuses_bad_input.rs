@@ -223,6 +223,10 @@ fn every_kind_of_bad_input_is_one_sentence_and_status_2() {
             "inits.csv/x: cannot be written",
         ),
         (vec!["frame", "--laser-cycles", "0"], "--laser-cycles"),
+        (
+            vec!["frame", "--false-alarm-rate", "0"],
+            "give a number above 0, up to 1",
+        ),
     ] {
         refused(dir, &arguments, says);
     }

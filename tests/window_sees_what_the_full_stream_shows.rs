@@ -9,7 +9,7 @@ use guided_dtof::engine::{
 use guided_dtof::photon::{
     DeadTimeLaw, PhotonStream, PixelLight, PulseShape, SpadModel, StreamConfig,
 };
-use guided_dtof::ranging::PeakOptions;
+use guided_dtof::ranging::DepthOptions;
 use guided_dtof::scene::Scene;
 use guided_dtof::system::{EngineKind, FrameSettings, take_frame};
 use guided_dtof::units::Time;
@@ -308,7 +308,7 @@ fn a_frame_without_skipping_is_the_same_frame() {
             engine,
             tolerance_m: None,
             skip,
-            peak: PeakOptions::default(),
+            depth: DepthOptions::default(),
             cohort: Default::default(),
         };
         take_frame(&settings, |_| Vec::new(), |_| ()).unwrap()

@@ -9,6 +9,13 @@ cd vectors/replay
 cargo run --release --quiet -- replay --sensor sensor.toml --inits inits.csv --events events.csv \
     --stop-periods 80 --laser-cycles 40 --engine gate --out histograms.csv
 
+# The README's picture; look at it.
+cd ../scenes
+frame=$(mktemp -d)
+cargo run --release --quiet -- frame --scene outdoor.toml --probe none --out "$frame"
+cp "$frame/depth.png" outdoor_depth.png
+rm -r "$frame"
+
 # Verdicts of the published figures.
 cd ../reproduce
 cargo run --release --quiet -- reproduce --json | python3 -c '

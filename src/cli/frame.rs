@@ -1,5 +1,7 @@
 //! `gdtof frame`: the main job.
 
+mod quality;
+
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -13,8 +15,8 @@ use crate::engine::recording::check_exposure;
 use crate::engine::{CohortOptions, Work};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::guide::GuideMap;
-use crate::ranging::PeakOptions;
-use crate::report::{Table, depth_png, write_npy_u16};
+use crate::ranging::DepthOptions;
+use crate::report::{Table, write_npy_u16};
 use crate::scene::Scene;
 use crate::system::{
     EngineKind, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Probe, Summary, take_frame,
@@ -59,6 +61,12 @@ pub struct FrameArgs {
     /// Draw and run everything, also what the engine could leave out: same histograms, more work.
     #[arg(long)]
     no_skip: bool,
+    /// Share of macropixels without an echo that may be given a depth; 1 takes every peak for one.
+    #[arg(long, value_name = "P", default_value_t = 1e-3)]
+    false_alarm_rate: f64,
+    /// Leave the range walk of strong echoes in the depths.
+    #[arg(long)]
+    no_walk_correction: bool,
     /// Print frame.json instead of the table.
     #[arg(long)]
     json: bool,
@@ -86,6 +94,11 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
         let message = format!("{metres} is no depth error; give metres, 0 or more");
         return Err(InputError::new("--tolerance", message).into());
     }
+    let rate = args.false_alarm_rate;
+    if !(rate > 0.0 && rate <= 1.0) {
+        let message = format!("{rate} is no share of macropixels; give a number above 0, up to 1");
+        return Err(InputError::new("--false-alarm-rate", message).into());
+    }
     create_folder(&args.out)?;
     let probe_at = |(row, col)| Probe {
         row,
@@ -105,7 +118,11 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
         },
         tolerance_m: args.tolerance,
         skip: !args.no_skip,
-        peak: PeakOptions::default(),
+        depth: DepthOptions {
+            false_alarm_rate: rate,
+            correct_walk: !args.no_walk_correction,
+            ..DepthOptions::default()
+        },
     };
     let progress = ProgressBar::new(settings.sensor.pixels() as u64).with_style(
         ProgressStyle::with_template("exposing {bar:40} {pos}/{len} macropixels, {eta} left")?,
@@ -129,6 +146,9 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
         say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
     } else {
         say(table(args, &frame))?;
+        if let Some(remark) = &frame.remark {
+            say(format_args!("\n{remark}\n"))?;
+        }
     }
     Ok(())
 }
@@ -196,7 +216,10 @@ struct Report<'a> {
     laser_cycles: u32,
     seed: u64,
     engine: EngineKind,
+    false_alarm_rate: f64,
+    walk_correction: bool,
     summary: Summary,
+    remark: Option<&'a str>,
     photons_expected: f64,
     work: Work,
     tolerance: Option<Kept>,
@@ -221,7 +244,10 @@ impl<'a> Report<'a> {
             laser_cycles: args.laser_cycles,
             seed: args.seed,
             engine: args.engine,
+            false_alarm_rate: args.false_alarm_rate,
+            walk_correction: !args.no_walk_correction,
             summary: frame.summary(),
+            remark: frame.remark.as_deref(),
             photons_expected: frame.photons_expected,
             work: frame.work,
             tolerance: frame.kept,
@@ -248,17 +274,7 @@ fn scene_name(args: &FrameArgs) -> String {
 fn write_results(out: &Path, frame: &Frame, report: &Report<'_>) -> anyhow::Result<()> {
     let shape = report.histograms_shape.map(|n| n as u64);
     write_npy_u16(&out.join("histograms.npy"), &shape, &frame.histograms)?;
-    let depth_m = frame.depth_m();
-    let scale = (512 / frame.rows.max(frame.cols)).max(1);
-    depth_png(
-        &out.join("depth.png"),
-        frame.rows,
-        frame.cols,
-        &depth_m,
-        depth_range(&depth_m),
-        &format!("guided dToF depth, {} laser cycles", report.laser_cycles),
-        scale,
-    )?;
+    quality::depth_map(out, frame, report.laser_cycles)?;
     OutputFile::write_with(&out.join("frame.json"), |w| {
         serde_json::to_writer(&mut *w, report)?;
         writeln!(w)
@@ -266,41 +282,17 @@ fn write_results(out: &Path, frame: &Frame, report: &Report<'_>) -> anyhow::Resu
     Ok(())
 }
 
-/// Shortest and longest depth, a little apart even if all are the same.
-fn depth_range(depth_m: &[Option<f32>]) -> (f32, f32) {
-    let known = || depth_m.iter().flatten().copied();
-    let shortest = known().fold(f32::INFINITY, f32::min);
-    let longest = known().fold(f32::NEG_INFINITY, f32::max);
-    if shortest.is_finite() && longest.is_finite() {
-        (shortest.floor(), longest.ceil().max(shortest.floor() + 1.0))
-    } else {
-        (0.0, 1.0)
-    }
-}
-
 fn table(args: &FrameArgs, frame: &Frame) -> Table {
     let summary = frame.summary();
-    let metres = |value: Option<f64>| match value {
-        Some(m) => format!("{m:.3} m"),
-        None => "-".to_owned(),
-    };
     let of = |part: usize, whole: usize| format!("{part} of {whole}");
     let mut table = Table::new(format!("Frame of {}", scene_name(args)))
         .row(
-            "macropixels with a target",
+            "macropixels that see a surface",
             of(summary.with_target, summary.pixels),
         )
         .row("guided", of(summary.guided, summary.pixels))
-        .row("target in window", of(summary.in_window, summary.guided))
-        .row("RMS error, target in window", metres(summary.rms_error_m))
-        .row(
-            "median absolute error",
-            metres(summary.median_absolute_error_m),
-        )
-        .row(
-            "RMS error of the guide there",
-            metres(summary.guide_rms_error_m),
-        );
+        .row("surface in window", of(summary.in_window, summary.guided));
+    quality::rows(&mut table, args, &summary);
     let work = &frame.work;
     let percent = |part: f64, whole: f64| format!("{:.2} %", 100.0 * part / whole.max(1.0));
     table.push(

@@ -1,9 +1,15 @@
-//! A small picture of palette indices, with rectangles and text.
+//! A small picture of palette indices, with rectangles and text in Noto Sans Mono.
 
-use font8x8::legacy::BASIC_LEGACY;
+use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
-/// Width and height of a character, px.
-pub const CHARACTER_PX: usize = 8;
+const WEIGHT: FontWeight = FontWeight::Regular;
+const SIZE: RasterHeight = RasterHeight::Size16;
+
+/// Width of a character, px.
+pub const CHARACTER_WIDTH_PX: usize = get_raster_width(WEIGHT, SIZE);
+
+/// Height of a line of text, px.
+pub const LINE_PX: usize = SIZE.val();
 
 /// Pixels as indices into a palette, row by row from the top left.
 #[derive(Debug, Clone)]
@@ -50,17 +56,23 @@ impl Canvas {
     }
 
     /// Writes text from its top left corner; a character outside printable ASCII becomes `?`.
-    pub fn text(&mut self, left: usize, top: usize, text: &str, colour: u8) {
+    ///
+    /// `shades` are the palette's colours from paper to ink; the first leaves what is there.
+    pub fn text(&mut self, left: usize, top: usize, text: &str, shades: &[u8]) {
+        debug_assert!(shades.len() > 1, "no ink");
         for (i, character) in text.chars().enumerate() {
-            let printable = (' '..='~').contains(&character);
-            let glyph = BASIC_LEGACY[if printable {
-                character as usize
-            } else {
-                '?' as usize
-            }];
-            for (y, bits) in glyph.into_iter().enumerate() {
-                for x in (0..CHARACTER_PX).filter(|x| bits >> x & 1 == 1) {
-                    self.fill(left + i * CHARACTER_PX + x, top + y, 1, 1, colour);
+            let is_printable = (' '..='~').contains(&character);
+            let character = if is_printable { character } else { '?' };
+            let Some(glyph) = get_raster(character, WEIGHT, SIZE) else {
+                continue;
+            };
+            for (y, row) in glyph.rows().enumerate() {
+                for (x, &ink) in row.iter().enumerate() {
+                    let shade = (usize::from(ink) * (shades.len() - 1) + 127) / 255;
+                    if shade > 0 {
+                        let x = left + i * CHARACTER_WIDTH_PX + x;
+                        self.fill(x, top + y, 1, 1, shades[shade]);
+                    }
                 }
             }
         }
@@ -77,20 +89,19 @@ mod tests {
         canvas.fill(2, 1, 100, 100, 5);
         canvas.fill(9, 9, 1, 1, 7);
         assert_eq!(canvas.pixels(), [0, 0, 0, 0, 0, 0, 5, 5, 0, 0, 5, 5]);
-        canvas.text(0, 0, "W\u{1F600}", 1);
+        canvas.text(0, 0, "W\u{1F600}", &[0, 1]);
     }
 
     #[test]
-    fn letters_leave_ink() {
-        let mut canvas = Canvas::new(16, 8, 0);
-        canvas.text(0, 0, "L ", 1);
-        let ink = |from: usize| {
-            let in_cell = |i: &usize| (from..from + 8).contains(&(i % 16));
-            (0..canvas.pixels().len())
-                .filter(|i| in_cell(i) && canvas.pixels()[*i] == 1)
-                .count()
-        };
-        assert!(ink(0) > 10);
-        assert_eq!(ink(8), 0);
+    fn letters_leave_smooth_ink() {
+        let (width, shades) = (2 * CHARACTER_WIDTH_PX, [0, 1, 2, 3]);
+        let mut canvas = Canvas::new(width, LINE_PX, 9);
+        canvas.text(0, 0, "S ", &shades);
+        let (letter, space): (Vec<_>, Vec<_>) =
+            (canvas.pixels().iter().enumerate()).partition(|(i, _)| i % width < CHARACTER_WIDTH_PX);
+        for shade in [1, 2, 3, 9] {
+            assert!(letter.iter().any(|&(_, &s)| s == shade), "no {shade}");
+        }
+        assert!(space.iter().all(|&(_, &s)| s == 9));
     }
 }

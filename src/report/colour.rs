@@ -1,4 +1,4 @@
-//! The colour scale of depth pictures.
+//! The colours of depth pictures: a scale for depths, and colours that are none of its own for the rest.
 //!
 //! Near is yellow, far is dark violet. The scale runs through a few hand-picked colours whose
 //! CIE L* lightness falls in even steps, so that equal steps of depth look about equally large,
@@ -16,6 +16,17 @@ const STOPS: [Rgb; 6] = [
     [45, 118, 145],
     [68, 68, 132],
     [66, 10, 86],
+];
+
+/// What has no depth: greys for what was not looked at, reds for what was looked at in vain. Neighbours differ in lightness.
+pub const CATEGORY_COLOURS: [Rgb; 7] = [
+    [226, 226, 226],
+    [160, 160, 160],
+    [100, 100, 100],
+    [24, 24, 24],
+    [246, 146, 200],
+    [190, 20, 60],
+    [255, 120, 60],
 ];
 
 /// The colour at `position` of the scale, 0 (nearest) to 1 (farthest); clamped, NaN is nearest.

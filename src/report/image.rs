@@ -1,80 +1,170 @@
-//! Depth maps as PNG pictures with a colour bar.
+//! Depth maps as PNG pictures, with a colour bar for the depths and a legend for what has none.
 //!
-//! Indexed colours: 240 steps of the depth scale and a few for the rest, which keeps the file
-//! small and every macropixel a clean square.
+//! ```text
+//!   title
+//!   ┌────────────┐ █ 20 m
+//!   │    map     │ █ 40 m
+//!   └────────────┘ █
+//!   ■ 972 no surface   ■ 60 no guide   …      as many to a row as fit
+//! ```
+//!
+//! Indexed colours keep the file small and every macropixel a clean square.
 
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::canvas::{CHARACTER_PX, Canvas};
-use super::colour::{Rgb, scale_colour};
+use super::canvas::{CHARACTER_WIDTH_PX, Canvas, LINE_PX};
+use super::colour::{CATEGORY_COLOURS, Rgb, scale_colour};
 use crate::files::{InputError, OutputFile};
 
-/// Palette: depth colours 0 to `STEPS - 1`, then these.
-const STEPS: u8 = 240;
-const PAPER: u8 = STEPS;
-const INK: u8 = STEPS + 1;
-const NO_DEPTH: u8 = STEPS + 2;
-const OTHERS: [Rgb; 3] = [[255, 255, 255], [20, 20, 20], [64, 64, 64]];
+/// Palette: depth colours 0 to `STEPS - 1`, shades from paper to ink, then categories.
+const STEPS: u8 = 224;
+const SHADES: [u8; 16] = {
+    let mut shades = [0; 16];
+    let mut i = 0;
+    while i < 16 {
+        shades[i] = STEPS + i as u8;
+        i += 1;
+    }
+    shades
+};
+const PAPER: u8 = SHADES[0];
+const INK: u8 = SHADES[15];
+const CATEGORIES: u8 = INK + 1;
+const PAPER_GREY: f64 = 255.0;
+const INK_GREY: f64 = 20.0;
 
 const MARGIN_PX: usize = 12;
-const BAR_PX: usize = 16;
+const BAR_PX: usize = 18;
 /// Longest tick label, such as `-1234.5 m`.
 const LABEL_CHARACTERS: usize = 9;
-const TICK_PX: usize = 3;
+const TICK_PX: usize = 4;
 /// From the bar to its labels; wide enough that a tick does not look like a minus sign.
 const LABEL_OFFSET_PX: usize = 10;
+/// Side of a category's sample, and from there to its name.
+const SAMPLE_PX: usize = 14;
+const SAMPLE_OFFSET_PX: usize = 6;
+const LEGEND_LINE_PX: usize = LINE_PX + 6;
 
-/// Writes a depth map as a PNG picture.
-///
-/// `depth_m` holds `rows` × `cols` depths in metres, row by row from the top left; `None` (and
-/// NaN) are drawn dark grey. Each becomes a square of `scale` ≥ 1 screen pixels. Colours run from
-/// yellow at `min_m` to violet at `max_m`, and depths beyond take the end's colour. The title
-/// stands above the picture in ASCII, cut off where the picture ends.
-///
-/// # Errors
-/// When the file cannot be written, or a picture of this size cannot be made.
-///
-/// # Panics
-/// When `depth_m` does not have rows·cols entries, one of these or `scale` is zero, or
-/// `min_m < max_m` does not hold.
-pub fn depth_png(
-    path: &Path,
-    rows: usize,
-    cols: usize,
-    depth_m: &[Option<f32>],
-    (min_m, max_m): (f32, f32),
-    title: &str,
-    scale: usize,
-) -> Result<(), InputError> {
-    assert!(rows > 0 && cols > 0 && scale > 0, "an empty picture");
-    assert_eq!(depth_m.len(), rows * cols, "depths do not fit the array");
-    assert!(min_m < max_m, "depth range {min_m} to {max_m} m");
-    let range_m = (f64::from(min_m), f64::from(max_m));
-    let (map_width, map_height) = (cols * scale, rows * scale);
-    let map_top = 2 * MARGIN_PX + CHARACTER_PX;
-    // The bar keeps room for two labels beside maps of a few pixels.
-    let bar_height = map_height.max(4 * CHARACTER_PX);
-    let bar_left = 2 * MARGIN_PX + map_width;
-    let width = bar_left + BAR_PX + LABEL_OFFSET_PX + LABEL_CHARACTERS * CHARACTER_PX + MARGIN_PX;
-    let height = map_top + bar_height + MARGIN_PX;
+/// What a square of the map shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Cell {
+    /// A depth, m.
+    Depth(f32),
+    /// No depth, for the reason of this number among [`DepthMap::categories`].
+    Category(usize),
+}
 
-    let mut canvas = Canvas::new(width, height, PAPER);
-    canvas.text(MARGIN_PX, MARGIN_PX, title, INK);
-    for (i, depth) in depth_m.iter().enumerate() {
-        let (left, top) = (MARGIN_PX + i % cols * scale, map_top + i / cols * scale);
-        let colour = depth.map_or(NO_DEPTH, |d| step(f64::from(d), range_m));
-        canvas.fill(left, top, scale, scale, colour);
+/// A depth map to be drawn.
+#[derive(Debug, Clone)]
+pub struct DepthMap<'a> {
+    /// Above the picture, in ASCII; cut off where the picture ends.
+    pub title: &'a str,
+    /// Squares in a row.
+    pub cols: usize,
+    /// Squares, row by row from the top left.
+    pub cells: &'a [Cell],
+    /// Ends of the depth scale, m: yellow, violet. Depths beyond take the end's colour.
+    pub range_m: (f32, f32),
+    /// Names of categories, at most as many as [`CATEGORY_COLOURS`]; those that occur stand in the legend with
+    /// their numbers.
+    pub categories: &'a [&'a str],
+    /// Screen pixels of a square's side.
+    pub scale: usize,
+}
+
+impl DepthMap<'_> {
+    /// Writes the map as a PNG picture.
+    ///
+    /// # Errors
+    /// When the file cannot be written, or a picture of this size cannot be made.
+    ///
+    /// # Panics
+    /// When the cells do not fill rows of `cols`, there are none, `scale` is zero, a category has no name or colour, or the range does
+    /// not rise.
+    pub fn write_png(&self, path: &Path) -> Result<(), InputError> {
+        let canvas = self.draw();
+        OutputFile::write_with(path, |file| encode(file, &canvas))
     }
-    draw_bar(&mut canvas, bar_left, map_top, bar_height, range_m);
-    OutputFile::write_with(path, |file| encode(file, &canvas))
+
+    fn draw(&self) -> Canvas {
+        let &DepthMap {
+            cols, cells, scale, ..
+        } = self;
+        let (min_m, max_m) = self.range_m;
+        assert!(
+            !cells.is_empty() && cols > 0 && scale > 0,
+            "an empty picture"
+        );
+        assert_eq!(cells.len() % cols, 0, "cells do not fill rows of {cols}");
+        assert!(min_m < max_m, "depth range {min_m} to {max_m} m");
+        assert!(self.categories.len() <= CATEGORY_COLOURS.len(), "no colour");
+        let range_m = (f64::from(min_m), f64::from(max_m));
+        let (map_width, map_height) = (cols * scale, cells.len() / cols * scale);
+        let map_top = 2 * MARGIN_PX + LINE_PX;
+        // The bar keeps room for two labels beside maps of a few pixels.
+        let bar_height = map_height.max(4 * LINE_PX);
+        let bar_left = 2 * MARGIN_PX + map_width;
+        let labels_px = LABEL_OFFSET_PX + LABEL_CHARACTERS * CHARACTER_WIDTH_PX;
+        let width = bar_left + BAR_PX + labels_px + MARGIN_PX;
+        let legend_top = map_top + bar_height + MARGIN_PX;
+        let (entries, legend_height) = self.legend(width);
+        let height = legend_top + legend_height;
+
+        let mut canvas = Canvas::new(width, height, PAPER);
+        canvas.text(MARGIN_PX, MARGIN_PX, self.title, &SHADES);
+        for (i, cell) in cells.iter().enumerate() {
+            let (left, top) = (MARGIN_PX + i % cols * scale, map_top + i / cols * scale);
+            let colour = match *cell {
+                Cell::Depth(depth_m) => step(f64::from(depth_m), range_m),
+                Cell::Category(category) => CATEGORIES + category as u8,
+            };
+            canvas.fill(left, top, scale, scale, colour);
+        }
+        draw_bar(&mut canvas, bar_left, map_top, bar_height, range_m);
+        for (category, text, left, top) in entries {
+            let (top, colour) = (legend_top + top, CATEGORIES + category as u8);
+            let sample_top = top + (LINE_PX - SAMPLE_PX) / 2;
+            canvas.fill(left, sample_top, SAMPLE_PX, SAMPLE_PX, INK);
+            canvas.fill(
+                left + 1,
+                sample_top + 1,
+                SAMPLE_PX - 2,
+                SAMPLE_PX - 2,
+                colour,
+            );
+            canvas.text(left + SAMPLE_PX + SAMPLE_OFFSET_PX, top, &text, &SHADES);
+        }
+        canvas
+    }
+
+    /// Categories that occur, each with its text, left and top; and the height of all.
+    fn legend(&self, width: usize) -> (Vec<(usize, String, usize, usize)>, usize) {
+        let (mut left, mut top) = (MARGIN_PX, 0);
+        let mut entries = Vec::new();
+        for (category, name) in self.categories.iter().enumerate() {
+            let is_this = |cell: &&Cell| **cell == Cell::Category(category);
+            let count = self.cells.iter().filter(is_this).count();
+            if count == 0 {
+                continue;
+            }
+            let text = format!("{name} {count}");
+            let entry_px = SAMPLE_PX + SAMPLE_OFFSET_PX + text.chars().count() * CHARACTER_WIDTH_PX;
+            if left > MARGIN_PX && left + entry_px + MARGIN_PX > width {
+                (left, top) = (MARGIN_PX, top + LEGEND_LINE_PX);
+            }
+            entries.push((category, text, left, top));
+            left += entry_px + 2 * MARGIN_PX;
+        }
+        match entries.is_empty() {
+            true => (entries, 0),
+            false => (entries, top + LEGEND_LINE_PX + MARGIN_PX / 2),
+        }
+    }
 }
 
 /// The palette index of a depth.
 fn step(depth_m: f64, (min_m, max_m): (f64, f64)) -> u8 {
-    if depth_m.is_nan() {
-        return NO_DEPTH;
-    }
     let position = ((depth_m - min_m) / (max_m - min_m)).clamp(0.0, 1.0);
     (position * f64::from(STEPS - 1)).round() as u8
 }
@@ -86,7 +176,7 @@ fn draw_bar(canvas: &mut Canvas, left: usize, top: usize, height: usize, range_m
         let depth_m = min_m + (max_m - min_m) * y as f64 / (height - 1) as f64;
         canvas.fill(left, top + y, BAR_PX, 1, step(depth_m, range_m));
     }
-    let most = (height / (3 * CHARACTER_PX)).clamp(2, 12);
+    let most = (height / (2 * LINE_PX)).clamp(2, 12);
     let interval_m = round_interval((max_m - min_m) / most as f64);
     let decimals = (-interval_m.log10().floor()).clamp(0.0, 3.0) as usize;
     let first = (min_m / interval_m - 1e-6).ceil();
@@ -101,9 +191,9 @@ fn draw_bar(canvas: &mut Canvas, left: usize, top: usize, height: usize, range_m
         let label = format!("{depth_m:.decimals$} m");
         canvas.text(
             left + BAR_PX + LABEL_OFFSET_PX,
-            y - CHARACTER_PX / 2,
+            y - LINE_PX / 2,
             &label,
-            INK,
+            &SHADES,
         );
     }
 }
@@ -118,13 +208,20 @@ fn round_interval(at_least: f64) -> f64 {
         .unwrap_or(10.0 * decade)
 }
 
+/// A shade between paper and ink.
+fn shade(i: usize) -> Rgb {
+    let share = i as f64 / (SHADES.len() - 1) as f64;
+    [(PAPER_GREY + share * (INK_GREY - PAPER_GREY)).round() as u8; 3]
+}
+
 fn encode(file: &mut dyn Write, canvas: &Canvas) -> io::Result<()> {
     let too_large = |_| io::Error::other("the picture is too large");
     let width = u32::try_from(canvas.width()).map_err(too_large)?;
     let height = u32::try_from(canvas.height()).map_err(too_large)?;
     let palette: Vec<u8> = (0..STEPS)
         .map(|i| scale_colour(f64::from(i) / f64::from(STEPS - 1)))
-        .chain(OTHERS)
+        .chain((0..SHADES.len()).map(shade))
+        .chain(CATEGORY_COLOURS)
         .flatten()
         .collect();
     let mut encoder = png::Encoder::new(file, width, height);
@@ -155,49 +252,58 @@ mod tests {
     }
 
     #[test]
-    fn colours_are_where_the_depths_are() {
+    fn colours_are_where_the_depths_and_reasons_are() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("d.png");
-        let depths = [
-            Some(10.0),
-            None,
-            Some(f32::NAN),
-            Some(90.0),
-            Some(1e9),
-            Some(-5.0),
+        let cells = [
+            Cell::Depth(10.0),
+            Cell::Category(0),
+            Cell::Category(2),
+            Cell::Depth(90.0),
+            Cell::Depth(1e9),
+            Cell::Depth(-5.0),
         ];
-        depth_png(&path, 2, 3, &depths, (10.0, 90.0), "two by three", 8).unwrap();
+        let map = DepthMap {
+            title: "two by three",
+            cols: 3,
+            cells: &cells,
+            range_m: (10.0, 90.0),
+            categories: &["sky", "dark", "lost"],
+            scale: 8,
+        };
+        map.write_png(&path).unwrap();
         let (width, _, pixels) = decode(&path);
-        let map_top = 2 * MARGIN_PX + CHARACTER_PX;
+        let map_top = 2 * MARGIN_PX + LINE_PX;
         let at = |row: usize, col: usize| {
             pixels[(map_top + row * 8 + 4) * width + MARGIN_PX + col * 8 + 4]
         };
-        let (near, far, none) = (scale_colour(0.0), scale_colour(1.0), OTHERS[2]);
-        assert_eq!([at(0, 0), at(0, 1), at(0, 2)], [near, none, none]);
+        let (near, far) = (scale_colour(0.0), scale_colour(1.0));
+        let [sky, dark, lost] = [0, 1, 2].map(|i| CATEGORY_COLOURS[i]);
+        assert_eq!([at(0, 0), at(0, 1), at(0, 2)], [near, sky, lost]);
         assert_eq!([at(1, 0), at(1, 1), at(1, 2)], [far, far, near]);
+        // The legend shows what occurs, and nothing else.
+        let legend = &pixels[(map_top + 4 * LINE_PX) * width..];
+        assert!(legend.contains(&sky) && legend.contains(&lost) && !legend.contains(&dark));
     }
 
     #[test]
     fn a_full_frame_is_a_small_file() {
         let dir = tempfile::tempdir().unwrap();
-        // Set to keep the picture for a look at it.
-        let path = match std::env::var_os("GDTOF_TEST_PICTURE") {
-            Some(path) => path.into(),
-            None => dir.path().join("frame.png"),
-        };
+        let path = dir.path().join("frame.png");
         let scene = crate::scene::Scene::outdoor();
         let guide = crate::guide::GuideMap::estimate(&scene, 64, 64, 1);
-        let depths: Vec<_> = guide.range_m.iter().map(|r| r.map(|r| r as f32)).collect();
-        depth_png(
-            &path,
-            64,
-            64,
-            &depths,
-            (10.0, 200.0),
-            "Guide: stereo range, outdoor",
-            8,
-        )
-        .unwrap();
+        let cells: Vec<Cell> = (guide.range_m.iter())
+            .map(|range_m| range_m.map_or(Cell::Category(0), |m| Cell::Depth(m as f32)))
+            .collect();
+        let map = DepthMap {
+            title: "Guide: stereo range, outdoor",
+            cols: 64,
+            cells: &cells,
+            range_m: (10.0, 200.0),
+            categories: &["no guide"],
+            scale: 8,
+        };
+        map.write_png(&path).unwrap();
         assert!(std::fs::metadata(&path).unwrap().len() < 100_000);
         let (width, height, _) = decode(&path);
         assert!(width > 512 && height > 512);
@@ -212,12 +318,28 @@ mod tests {
     }
 
     #[test]
-    fn the_smallest_picture_and_the_longest_title_work() {
+    fn the_smallest_picture_and_the_longest_texts_work() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("d.png");
         let title = "a title that is far too long for this picture ".repeat(9);
-        depth_png(&path, 1, 1, &[Some(0.5)], (0.0, 1e-3), &title, 1).unwrap();
-        depth_png(&path, 1, 1, &[None], (-2e6, 3e6), "", 1).unwrap();
+        let long = "a name that is far too long".repeat(9);
+        let map = DepthMap {
+            title: &title,
+            cols: 1,
+            cells: &[Cell::Depth(0.5)],
+            range_m: (0.0, 1e-3),
+            categories: &[],
+            scale: 1,
+        };
+        map.write_png(&path).unwrap();
+        decode(&path);
+        let map = DepthMap {
+            cells: &[Cell::Category(0)],
+            range_m: (-2e6, 3e6),
+            categories: &[&long],
+            ..map
+        };
+        map.write_png(&path).unwrap();
         decode(&path);
     }
 }

@@ -14,5 +14,5 @@ pub use array::write_npy_u16;
 pub use chart::{Axis, Chart, Scale, Series, Style};
 pub use checks::Checks;
 pub use grid::Grid;
-pub use image::depth_png;
+pub use image::{Cell, DepthMap};
 pub use table::Table;

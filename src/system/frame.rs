@@ -11,7 +11,9 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::result::{Frame, PhaseTimes, PixelDepth};
+use super::pixel::{NoDepth, PixelDepth};
+use super::remark::Circumstances;
+use super::result::{Frame, PhaseTimes};
 use super::tolerance::Tolerance;
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::engine::waveform::{self, View};
@@ -22,7 +24,7 @@ use crate::engine::{
 use crate::files::InputError;
 use crate::guide::GuideMap;
 use crate::photon::{PhotonStream, SpadEvent};
-use crate::ranging::{PeakOptions, interpolate};
+use crate::ranging::{DepthOptions, EchoFinder};
 use crate::scene::{GroundTruth, Scene};
 use crate::units::Time;
 
@@ -101,7 +103,7 @@ pub struct FrameSettings {
     /// Leave out what the engine can do without; `false` draws and runs everything, for the same histograms.
     pub skip: bool,
     /// Depth from histograms.
-    pub peak: PeakOptions,
+    pub depth: DepthOptions,
 }
 
 /// Why there is no frame.
@@ -165,7 +167,7 @@ pub fn take_frame(
         cohort,
         tolerance_m,
         skip,
-        peak,
+        depth,
     } = settings;
     let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
     let mut clock = Stopwatch::new();
@@ -230,7 +232,7 @@ pub fn take_frame(
                 tolerance_m,
                 config: sensor,
                 exposure,
-                peak,
+                peak: &depth.peak,
             };
             let (exposed, kept) = tolerance.expose(&stream, &pixels, exposed)?;
             (exposed, Some(kept))
@@ -272,39 +274,63 @@ pub fn take_frame(
     })?;
     times.probes_s = clock.lap();
 
+    let finder = EchoFinder::new(sensor, exposure, scene.pulse_sigma(), depth);
+    let spads_fire = scene.lidar.pde > 0.0 || scene.lidar.dark_count_hz > 0.0;
     let depths: Vec<PixelDepth> = (0..sensor.pixels())
+        .into_par_iter()
         .map(|pixel| {
-            let window = law.window(starts[pixel]).open();
-            let counts: Vec<u32> = exposed.histograms[pixel]
-                .iter()
+            let (true_m, guide_m) = (truth.range_m[pixel], guide.range_m[pixel]);
+            let start = wanted[pixel];
+            let window = start.and_then(|start| law.window(start).open());
+            let in_window = window.zip(true_m).is_some_and(|(window, true_m)| {
+                law.interval(&window).contains(&Time::of_flight(true_m))
+            });
+            let counts: Vec<u32> = (exposed.histograms[pixel].iter())
                 .map(|&n| n.into())
                 .collect();
-            let measured = wanted[pixel].and(window).and_then(|window| {
-                let found = interpolate(&counts, peak)?;
-                Some(law.time_of(&window, found.position_bins).as_range_m())
-            });
-            let true_m = truth.range_m[pixel];
-            let in_window = wanted[pixel].is_some()
-                && window.zip(true_m).is_some_and(|(window, true_m)| {
-                    law.interval(&window).contains(&Time::of_flight(true_m))
-                });
+            let sighting = window.and_then(|_| finder.find(&counts));
+            let found = sighting.filter(|s| s.is_significant && !s.is_saturated);
+            let range_m = |bins: f64| window.map(|window| law.time_of(&window, bins).as_range_m());
+            let no_depth = match found {
+                Some(_) => None,
+                None if true_m.is_none() => Some(NoDepth::NoSurface),
+                None if guide_m.is_none() => Some(NoDepth::NoGuide),
+                None if start.is_none() => Some(NoDepth::OutOfReach),
+                None if !spads_fire => Some(NoDepth::SpadsOff),
+                None if sighting.is_some_and(|s| s.is_saturated) => Some(NoDepth::Saturated),
+                None if !in_window => Some(NoDepth::OutsideWindow),
+                None => Some(NoDepth::NoSignificantPeak),
+            };
             PixelDepth {
                 true_m,
-                guide_m: guide.range_m[pixel],
-                start: wanted[pixel],
+                guide_m,
+                start,
                 in_window,
-                measured_m: measured,
+                measured_m: found.and_then(|s| range_m(s.position_bins)),
+                no_depth,
+                peak_m: sighting.and_then(|s| range_m(s.peak.position_bins)),
+                confidence: sighting.map(|s| s.confidence),
             }
         })
         .collect();
+    let circumstances = Circumstances {
+        sensor,
+        exposure,
+        scene,
+        light: &light,
+        pixels: &depths,
+    };
+    let remark = circumstances.remark();
     times.ranging_s = clock.lap();
 
     Ok(Frame {
         rows: sensor.rows,
         cols: sensor.cols,
         bins: sensor.bins,
+        bin_m: exposure.clock.period().as_range_m(),
         histograms: exposed.histograms.concat(),
         pixels: depths,
+        remark,
         photons_expected,
         work: exposed.work,
         kept,

@@ -2,12 +2,17 @@
 
 mod frame;
 pub mod pareto;
+mod pixel;
+mod remark;
 mod result;
 mod speed;
 pub mod stability;
+mod summary;
 mod tolerance;
 
 pub use frame::{EngineKind, FrameError, FrameSettings, Probe, take_frame};
-pub use result::{Frame, PhaseTimes, PixelDepth, Summary};
+pub use pixel::{NoDepth, PixelDepth};
+pub use result::{Frame, PhaseTimes};
 pub use speed::{SPEED_LASER_CYCLES, SpeedFrame};
+pub use summary::Summary;
 pub use tolerance::{Kept, Tolerance};

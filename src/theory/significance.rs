@@ -66,13 +66,15 @@ impl Scan {
         }
     }
 
-    /// The fullest stretch of `counts`, at least [`width`](Self::width) bins, none above the laser cycles.
+    /// The fullest stretch of `counts`, at least [`width`](Self::width) bins. Should a bin hold more counts than there were
+    /// laser cycles, as many cycles are assumed.
     pub fn fullest(&self, counts: &[u32]) -> Stretch {
         debug_assert!((1..=counts.len()).contains(&self.width));
         let sum = |counts: &[u32]| counts.iter().map(|&n| u64::from(n)).sum::<u64>();
         let stretches = counts.windows(self.width).map(sum).enumerate();
         let (first, fullest) = stretches.rev().max_by_key(|&(_, k)| k).unwrap_or_default();
-        let cells = |bins: usize| bins as u64 * u64::from(self.laser_cycles);
+        let cycles = counts.iter().copied().fold(self.laser_cycles, u32::max);
+        let cells = |bins: usize| bins as u64 * u64::from(cycles);
         let ln_one =
             ln_hypergeometric_tail(fullest, sum(counts), cells(self.width), cells(counts.len()));
         let positions = (counts.len() - self.width + 1) as f64;

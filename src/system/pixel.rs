@@ -1,0 +1,86 @@
+//! One macropixel of a frame: its depth and how sure that is, or the one reason why it has none.
+
+use serde::Serialize;
+
+/// Why a macropixel has no depth: the first of these that holds, in this order.
+///
+/// Two are known to the simulation alone, not to the chip: that there is no surface, and that a surface lies outside the
+/// window. Both only say why no peak stood out. A window without its surface whose peak is significant all the same gets a
+/// depth, as it would from the real chip, and counts as an outlier.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoDepth {
+    /// The macropixel sees the sky.
+    NoSurface,
+    /// The guide has no estimate; the SPADs are switched off.
+    NoGuide,
+    /// No start value opens a window on the guide's estimate; the SPADs are switched off.
+    OutOfReach,
+    /// No SPAD can fire: they detect no photons and make no dark counts.
+    SpadsOff,
+    /// A bin of the peak is full.
+    Saturated,
+    /// The surface lies outside the window, and no peak is significant.
+    OutsideWindow,
+    /// The surface lies in the window, and no peak is significant.
+    NoSignificantPeak,
+}
+
+impl NoDepth {
+    /// Every reason, in their order.
+    pub const ALL: [NoDepth; 7] = [
+        NoDepth::NoSurface,
+        NoDepth::NoGuide,
+        NoDepth::OutOfReach,
+        NoDepth::SpadsOff,
+        NoDepth::Saturated,
+        NoDepth::OutsideWindow,
+        NoDepth::NoSignificantPeak,
+    ];
+
+    /// In tables and legends.
+    pub const fn name(self) -> &'static str {
+        match self {
+            NoDepth::NoSurface => "no surface",
+            NoDepth::NoGuide => "no guide",
+            NoDepth::OutOfReach => "out of reach",
+            NoDepth::SpadsOff => "SPADs off",
+            NoDepth::Saturated => "saturated",
+            NoDepth::OutsideWindow => "target outside window",
+            NoDepth::NoSignificantPeak => "no significant peak",
+        }
+    }
+}
+
+/// One macropixel of a frame. Distances are radial, in metres.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PixelDepth {
+    /// Ground truth; `None` for the sky.
+    pub true_m: Option<f64>,
+    /// The guide's estimate.
+    pub guide_m: Option<f64>,
+    /// Start value, where the guide gave one within reach.
+    pub start: Option<u16>,
+    /// Whether the echo's centre lies in the time window.
+    pub in_window: bool,
+    /// Depth from the histogram, where its peak is significant and not saturated.
+    pub measured_m: Option<f64>,
+    /// Why there is no depth; `None` exactly where there is one.
+    pub no_depth: Option<NoDepth>,
+    /// Distance of the histogram's peak with its range walk, significant or not.
+    pub peak_m: Option<f64>,
+    /// −log₁₀ of the chance that light without an echo makes such a peak; `None` where there is no peak.
+    pub confidence: Option<f64>,
+}
+
+impl PixelDepth {
+    /// Measured less true distance, m.
+    pub fn error_m(&self) -> Option<f64> {
+        Some(self.measured_m? - self.true_m?)
+    }
+
+    /// The peak's less the true distance, m: the error with range walk, and before peaks are judged.
+    pub fn peak_error_m(&self) -> Option<f64> {
+        Some(self.peak_m? - self.true_m?)
+    }
+}

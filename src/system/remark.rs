@@ -1,0 +1,294 @@
+//! One sentence on why a frame has so few depths: the commonest reason, with the numbers behind it and what would help.
+
+use super::pixel::{NoDepth, PixelDepth};
+use crate::chip::{EventType, Exposure, Mode, SensorConfig, WindowLaw};
+use crate::photon::{PixelLight, SPADS};
+use crate::ranging::{EchoLight, Response};
+use crate::scene::Scene;
+
+/// A frame's circumstances.
+pub struct Circumstances<'a> {
+    /// The chip.
+    pub sensor: &'a SensorConfig,
+    /// Its clocks.
+    pub exposure: &'a Exposure,
+    /// The world.
+    pub scene: &'a Scene,
+    /// The light on every macropixel.
+    pub light: &'a [PixelLight],
+    /// What became of every macropixel.
+    pub pixels: &'a [PixelDepth],
+}
+
+impl Circumstances<'_> {
+    /// The sentence, if fewer than half of the macropixels that see a surface have a depth.
+    pub fn remark(&self) -> Option<String> {
+        let seeing = || self.pixels.iter().filter(|p| p.true_m.is_some());
+        let surfaces = seeing().count();
+        if surfaces == 0 {
+            return Some("no depths, because no macropixel sees a surface".to_owned());
+        }
+        let without = |reason| seeing().filter(|p| p.no_depth == Some(reason)).count();
+        let missing: usize = NoDepth::ALL.into_iter().map(without).sum();
+        if 2 * missing <= surfaces {
+            return None;
+        }
+        // Of equally common reasons the one that comes first holds first.
+        let commonest = NoDepth::ALL.into_iter().rev().max_by_key(|&r| without(r))?;
+        let why = match commonest {
+            NoDepth::NoSurface => return None,
+            NoDepth::NoGuide => self.no_guide(),
+            NoDepth::OutOfReach => self.out_of_reach(),
+            NoDepth::SpadsOff => {
+                "with pde = 0 and dark_count_hz = 0 no SPAD ever fires; give pde above 0".to_owned()
+            }
+            NoDepth::Saturated => self.saturated(),
+            NoDepth::OutsideWindow => self.outside_window(),
+            NoDepth::NoSignificantPeak => self.no_significant_peak(),
+        };
+        let (name, count) = (commonest.name(), without(commonest));
+        Some(format!(
+            "{missing} of {surfaces} surfaces have no depth, {count} of them for the reason {name:?}: {why}"
+        ))
+    }
+
+    /// Nearest and farthest of what macropixels without a depth for this reason have of `distance`.
+    fn span_m(&self, reason: NoDepth, distance: fn(&PixelDepth) -> Option<f64>) -> String {
+        let with_reason = self.pixels.iter().filter(|p| p.no_depth == Some(reason));
+        let metres: Vec<f64> = with_reason.filter_map(distance).collect();
+        span(&metres)
+    }
+
+    fn no_guide(&self) -> String {
+        let stereo = &self.scene.stereo;
+        let metre_pixels = stereo.camera().focal_px * stereo.baseline_m;
+        let surfaces = self.span_m(NoDepth::NoGuide, |p| p.true_m);
+        format!(
+            "the surfaces are {surfaces} away, and the camera pair measures from {:.1} m to {:.1} m, where both cameras see the same",
+            metre_pixels / stereo.max_disparity_px,
+            metre_pixels / stereo.min_disparity_px,
+        )
+    }
+
+    fn out_of_reach(&self) -> String {
+        let law = WindowLaw::new(self.sensor, self.exposure);
+        let open = (0..=self.sensor.largest_start()).filter_map(|start| law.window(start).open());
+        let ends: Vec<f64> = open
+            .map(|window| law.interval(&window))
+            .flat_map(|within| [within.start, within.end])
+            .map(|time| time.as_range_m().max(0.0))
+            .collect();
+        let wanted = self.span_m(NoDepth::OutOfReach, |p| p.guide_m);
+        let (bits, periods) = (self.sensor.counter_bits, self.exposure.stop_periods);
+        match (ends.is_empty(), self.sensor.mode) {
+            (true, _) => "no start value opens a window".to_owned(),
+            (false, Mode::Conventional) => format!(
+                "mode = \"conventional\" opens every window at the STOP that ends the laser cycle, {} away, and the guide asks for {wanted}; give a STOP period that ends there, or mode = \"guided\"",
+                span(&ends)
+            ),
+            (false, Mode::Guided) => format!(
+                "start values of {bits} bits (counter_bits) and a STOP every {periods} CLK periods open windows {} away, and the guide asks for {wanted}; give more of the one or the other",
+                span(&ends)
+            ),
+        }
+    }
+
+    fn saturated(&self) -> String {
+        let full = (1u32 << self.sensor.bin_bits) - 1;
+        let cycles = self.exposure.laser_cycles;
+        let most = self.greatest_chance(NoDepth::Saturated);
+        // Three standard deviations of counts that a full bin would hold.
+        let fitting = (f64::from(full) - 3.0 * f64::from(full).sqrt()).max(1.0) / most;
+        format!(
+            "bins are full at {full} counts (bin_bits = {}), and {cycles} laser cycles bring up to {:.0}; give more bits, or about {fitting:.0} laser cycles",
+            self.sensor.bin_bits,
+            most * f64::from(cycles),
+        )
+    }
+
+    fn outside_window(&self) -> String {
+        let errors = self.pixels.iter().filter(|p| p.start.is_some());
+        let errors: Vec<f64> = errors
+            .filter_map(|p| Some((p.guide_m? - p.true_m?).abs()))
+            .collect();
+        let largest = errors.iter().fold(0.0, |a: f64, &b| a.max(b));
+        let window_m = self.bin_m() * self.sensor.bins as f64;
+        format!(
+            "a window is {window_m:.1} m long, and the guide is wrong by up to {largest:.1} m; give more bins, a slower CLK or a better guide"
+        )
+    }
+
+    fn no_significant_peak(&self) -> String {
+        let SensorConfig {
+            threshold,
+            event_type,
+            ..
+        } = self.sensor;
+        let wanted = match event_type {
+            EventType::Less => "fewer than",
+            EventType::Equal => "exactly",
+            EventType::Greater => "more than",
+        };
+        let chance = self.greatest_chance(NoDepth::NoSignificantPeak);
+        let cycles = self.exposure.laser_cycles;
+        if (*event_type, *threshold) != (EventType::Greater, 0) {
+            let asked = format!(
+                "threshold = {threshold} asks for {wanted} {threshold} SPADs in one CLK period, which"
+            );
+            return match chance > 0.0 {
+                true => format!(
+                    "{asked} a bin of the brightest echo has with a probability of {chance:.1e} in each of {cycles} laser cycles; give event_type = \"greater\" and a lower threshold"
+                ),
+                false => format!(
+                    "{asked} the {SPADS} of a macropixel never have; give event_type = \"greater\" and a lower threshold"
+                ),
+            };
+        }
+        let brightest = self.brightest(NoDepth::NoSignificantPeak);
+        let (signal, background) = brightest.map_or((0.0, 0.0), |light| {
+            (
+                light.signal_per_cycle,
+                light.background_hz / self.sensor.clk_hz,
+            )
+        });
+        format!(
+            "the brightest of these echoes brings {signal:.2e} photons a laser cycle to a background of {background:.2e} a bin, for {cycles} laser cycles; give more of them, or more light"
+        )
+    }
+
+    fn bin_m(&self) -> f64 {
+        self.exposure.clock.period().as_range_m()
+    }
+
+    /// The light of the brightest echo without a depth for this reason.
+    fn brightest(&self, reason: NoDepth) -> Option<&PixelLight> {
+        let with_reason = self.pixels.iter().zip(self.light);
+        with_reason
+            .filter(|(pixel, _)| pixel.no_depth == Some(reason) && pixel.true_m.is_some())
+            .map(|(_, light)| light)
+            .max_by(|a, b| a.signal_per_cycle.total_cmp(&b.signal_per_cycle))
+    }
+
+    /// The chance that the fullest bin of that echo counts in a laser cycle.
+    fn greatest_chance(&self, reason: NoDepth) -> f64 {
+        let Some(light) = self.brightest(reason) else {
+            return 0.0;
+        };
+        let chances = Response::new(self.sensor, self.scene.pulse_sigma()).chances(&EchoLight {
+            position_bins: (self.sensor.bins / 2) as f64,
+            signal: light.signal_per_cycle,
+            background_per_bin: light.background_hz / self.sensor.clk_hz,
+        });
+        chances.into_iter().fold(0.0, f64::max)
+    }
+}
+
+/// "from 3.0 m to 7.0 m" of the least and the greatest.
+fn span(metres: &[f64]) -> String {
+    let least = metres.iter().copied().fold(f64::INFINITY, f64::min);
+    let greatest = metres.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    format!("from {least:.1} m to {greatest:.1} m")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::CohortOptions;
+    use crate::ranging::DepthOptions;
+    use crate::system::{EngineKind, Frame, FrameSettings, take_frame};
+
+    /// A small frame of the street.
+    fn frame(sensor: &str, change: impl Fn(&mut Scene)) -> Frame {
+        let text = format!("rows = 16\ncols = 16\n{sensor}");
+        let sensor = SensorConfig::parse("test", &text).unwrap();
+        let mut scene = Scene::outdoor();
+        change(&mut scene);
+        let settings = FrameSettings {
+            exposure: Exposure::new(&sensor, 520, 1000),
+            sensor,
+            scene,
+            seed: 1,
+            engine: EngineKind::Window,
+            cohort: CohortOptions::default(),
+            tolerance_m: None,
+            skip: true,
+            depth: DepthOptions::default(),
+        };
+        let frame = take_frame(&settings, |_| Vec::new(), |_| {}).unwrap();
+        for pixel in &frame.pixels {
+            assert_eq!(pixel.measured_m.is_some(), pixel.no_depth.is_none());
+        }
+        frame
+    }
+
+    #[test]
+    fn empty_frames_say_why() {
+        for (sensor, reason, words) in [
+            (
+                "counter_bits = 5",
+                NoDepth::OutOfReach,
+                "start values of 5 bits",
+            ),
+            (
+                "mode = \"conventional\"",
+                NoDepth::OutOfReach,
+                "the STOP that ends the laser cycle, from 196.",
+            ),
+            ("threshold = 16", NoDepth::NoSignificantPeak, "never have"),
+            (
+                "threshold = 10",
+                NoDepth::NoSignificantPeak,
+                "has with a probability of",
+            ),
+            ("bin_bits = 3", NoDepth::Saturated, "full at 7 counts"),
+        ] {
+            let frame = frame(sensor, |_| {});
+            let remark = frame.remark.as_deref().unwrap_or("nothing");
+            assert!(remark.contains(words), "{sensor}: {remark}");
+            assert!(remark.contains(reason.name()), "{sensor}: {remark}");
+            let summary = frame.summary();
+            let most = summary
+                .no_depth
+                .iter()
+                .filter(|(r, _)| **r != NoDepth::NoSurface);
+            assert_eq!(
+                most.max_by_key(|(_, n)| **n).unwrap().0,
+                &reason,
+                "{sensor}"
+            );
+        }
+    }
+
+    #[test]
+    fn dark_spads_and_empty_scenes_are_told_apart() {
+        let off = frame("", |scene| {
+            scene.lidar.pde = 0.0;
+            scene.lidar.dark_count_hz = 0.0;
+        });
+        assert!(off.remark.unwrap().contains("no SPAD ever fires"));
+        let empty = frame("", |scene| scene.objects.clear());
+        assert!(
+            empty
+                .remark
+                .unwrap()
+                .contains("no macropixel sees a surface")
+        );
+        assert_eq!(empty.pixels[0].no_depth, Some(NoDepth::NoSurface));
+    }
+
+    #[test]
+    fn a_window_that_misses_gives_a_depth_only_by_false_alarm() {
+        let frame = frame("", |scene| scene.stereo.disparity_sigma_px = 1.0);
+        assert_eq!(frame.remark, None);
+        let summary = frame.summary();
+        let missed = frame
+            .pixels
+            .iter()
+            .filter(|p| p.start.is_some() && !p.in_window);
+        let painted = missed.clone().filter(|p| p.measured_m.is_some()).count();
+        // Echoes just outside leave a significant tail in the window.
+        assert!(missed.count() > 20 && painted <= 3, "{painted}");
+        assert!(summary.rms_error_of_every_peak_m > summary.rms_error_m);
+        assert!(summary.outliers <= painted);
+    }
+}
