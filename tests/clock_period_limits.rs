@@ -1,13 +1,17 @@
 //! What static timing allows is what the gates can do: CLK and LOAD_CLK periods, the reset pulse, the correlation
 //! path; nominal, derated and with mismatch.
 
-use guided_dtof::chip::SensorConfig;
+use guided_dtof::chip::{Exposure, SensorConfig, Window, WindowLaw};
+use guided_dtof::engine::GateSimulation;
 use guided_dtof::engine::timing::{
-    CorrelationTiming, Limits, LoadTiming, LocalClocks, MacropixelTiming, Silicon, corner_limits,
-    critical_factor, gate_works, load_works, phases, reset, ripple, shortest_period, spread,
+    CorrelationTiming, Limits, LoadTiming, LocalClocks, MacropixelTiming, Silicon, TimingVerdict,
+    corner_limits, factor_range, gate_works, load_works, phases, reset, ripple, shortest_period,
+    spread,
 };
+use guided_dtof::kernel::{CheckReport, Policy};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{CellKind, Corner, Library, Mismatch};
+use guided_dtof::photon::SpadEvent;
 use guided_dtof::units::Time;
 
 const SLOW: Time = Time::from_ns(20);
@@ -30,7 +34,7 @@ fn limits(silicon: &Silicon, limits: Limits) -> (Time, Time) {
     let paths = pixel(silicon, limits);
     let by_paths = shortest_period(SLOW, |p| paths.works(p, Time::ZERO));
     let by_gates = shortest_period(SLOW, |p| {
-        gate_works(&config, silicon, limits, p, Time::ZERO)
+        gate_works(&config, silicon, limits, (p, Time::ZERO), 0)
     });
     (by_paths.unwrap(), by_gates.unwrap())
 }
@@ -58,7 +62,7 @@ fn the_typical_corner_has_the_published_ripple_and_period() {
 
 #[test]
 fn derated_silicon_scales_every_limit() {
-    for (corner, factor) in [(Corner::Max, 1.0), (Corner::Typ, 1.3)] {
+    for (corner, factor) in [(Corner::Slow, 1.0), (Corner::Typ, 1.3)] {
         let silicon = Silicon {
             corner,
             ..TYPICAL.at(factor)
@@ -87,7 +91,7 @@ fn a_stop_phase_buys_a_shorter_period_below_the_forbidden_band() {
     let (from, to) = paths.forbidden(0);
     let any = |p: Time| phases(p).any(|phase| paths.works(p, phase));
     let any_by_gates =
-        |p: Time| phases(p).any(|phase| gate_works(&config, &TYPICAL, Limits::Kept, p, phase));
+        |p: Time| phases(p).any(|phase| gate_works(&config, &TYPICAL, Limits::Kept, (p, phase), 0));
     let ps = Time::from_ps(1);
     for (period, works) in [
         (from - ps, true),
@@ -105,7 +109,7 @@ fn a_stop_phase_buys_a_shorter_period_below_the_forbidden_band() {
     for step in 0..8 {
         let period = Time::from_ps(1_250 + 140 * step);
         for phase in phases(period).filter(|&phase| paths.works(period, phase)) {
-            let works = gate_works(&config, &TYPICAL, Limits::Kept, period, phase);
+            let works = gate_works(&config, &TYPICAL, Limits::Kept, (period, phase), 0);
             assert!(works, "{period} {phase}");
         }
     }
@@ -244,17 +248,148 @@ fn every_flip_flop_of_the_chip_is_asked() {
 fn the_corner_at_which_384_mhz_fails_is_that_of_the_gates() {
     let config = SensorConfig::default();
     for kept in [Limits::Ignored, Limits::Kept] {
-        let critical = critical_factor(&config, &TYPICAL, kept).unwrap();
-        let period = config.clock().period();
-        let works = |factor| gate_works(&config, &TYPICAL.at(factor), kept, period, Time::ZERO);
-        assert!(
-            works(critical - 1e-5) && !works(critical + 3e-5),
-            "{critical}"
-        );
+        let range = factor_range(&config, &TYPICAL, kept).unwrap();
+        assert_eq!((range.fastest, range.moved), (None, 0));
+        let at = (config.clock().period(), Time::ZERO);
+        let works = |factor| gate_works(&config, &TYPICAL.at(factor), kept, at, 0);
+        let slowest = range.slowest;
+        assert!(works(slowest - 1e-5) && !works(slowest + 3e-5), "{slowest}");
     }
-    let critical = critical_factor(&config, &TYPICAL, Limits::Kept).unwrap();
-    let [slow, typical, fast] = corner_limits(critical);
+    let range = factor_range(&config, &TYPICAL, Limits::Kept);
+    let [slow, typical, fast] = corner_limits(range);
     assert!(!slow.works_at_reference && typical.works_at_reference && fast.works_at_reference);
+}
+
+/// Where the strobe passes a rising CLK edge, silicon may be too fast as well.
+#[test]
+fn a_clock_above_the_forbidden_band_fails_with_faster_silicon_as_the_gates_do() {
+    let config = at_mhz(500.0);
+    let range = factor_range(&config, &TYPICAL, Limits::Kept).unwrap();
+    assert_eq!(range.moved, 1);
+    let at = (config.clock().period(), Time::ZERO);
+    let works = |factor| gate_works(&config, &TYPICAL.at(factor), Limits::Kept, at, 1);
+    let fastest = range.fastest.unwrap();
+    assert!(works(fastest + 1e-5) && !works(fastest - 3e-5), "{fastest}");
+    // The correlation path limits the other end: the gates have its false edges to spare.
+    assert!(
+        range.slowest > 1.5 && works(range.slowest - 1e-5),
+        "{}",
+        range.slowest
+    );
+    let [_, typical, fast] = corner_limits(Some(range));
+    assert!(typical.works_at_reference && typical.fails_above_v > Some(1.1));
+    assert!(fast.fails_above_v.is_some() && fast.fails_above_v < typical.fails_above_v);
+}
+
+fn at_mhz(mhz: f64) -> SensorConfig {
+    SensorConfig {
+        rows: 1,
+        cols: 1,
+        clk_hz: mhz * 1e6,
+        ..SensorConfig::default()
+    }
+}
+
+/// Violations of all limits, SPAD samplers excepted, while two SPADs in turn fire in every other CLK period around the
+/// windows of three laser cycles.
+fn violations(config: &SensorConfig) -> CheckReport {
+    let exposure = Exposure::new(config, 80, 3);
+    let pulses: Vec<SpadEvent> = (0..230)
+        .map(|edge| SpadEvent {
+            time: exposure.rising(edge) - Time::from_fs(exposure.clock.period().as_fs() * 2 / 5),
+            spad: (edge % 16) as u8,
+        })
+        .filter(|pulse| pulse.time >= Time::ZERO && pulse.spad % 3 != 0)
+        .collect();
+    let mut gate = GateSimulation::new(config, &exposure, (0, 0), (1, 1), &[40], &[&pulses]);
+    let mut checks = gate.timing_checks(Policy::ReportOnly);
+    gate.run(&mut checks);
+    checks.report(gate.netlist())
+}
+
+/// Static verdict, window law and the timing checks of the gates say the same about a clock.
+#[test]
+fn one_verdict_on_every_clock() {
+    for mhz in [
+        100.0, 300.0, 384.0, 406.0, 408.0, 415.0, 422.0, 425.0, 500.0, 700.0, 860.0,
+    ] {
+        let config = at_mhz(mhz);
+        let verdict = TimingVerdict::of(&config, &TYPICAL, (0, 0));
+        let law = WindowLaw::new(&config, &Exposure::new(&config, 80, 3));
+        let is_race = matches!(law.window(40), Window::Race(_));
+        assert_eq!(verdict.is_met(), !is_race, "{mhz} MHz: {verdict}");
+        let found = violations(&config);
+        assert_eq!(
+            verdict.is_met(),
+            found.violated() == 0,
+            "{mhz} MHz: {verdict}\n{found}"
+        );
+        let said = verdict.to_string();
+        if is_race {
+            assert!(
+                said.contains("the strobe meets a change of the shift register"),
+                "{said}"
+            );
+            assert!(
+                said.contains("give clk_hz of at most 407.1 MHz, or of at least 423.4 MHz"),
+                "{said}"
+            );
+            assert!(said.contains("metdc.hit_"), "{said}");
+            assert!(
+                found
+                    .violations
+                    .iter()
+                    .all(|v| v.cell.contains(".metdc.hit_")),
+                "{found}"
+            );
+        }
+        // Past the change of the shift register, a bin later.
+        let is_late = verdict
+            .notes
+            .iter()
+            .any(|note| note.contains("the strobe comes after 1 rising"));
+        assert_eq!(is_late, mhz > 423.0, "{mhz} MHz: {:?}", verdict.notes);
+    }
+    let slow = Silicon {
+        factor: 1.3,
+        ..TYPICAL
+    };
+    assert!(TimingVerdict::of(&at_mhz(300.0), &slow, (0, 0)).is_met());
+    assert!(!TimingVerdict::of(&at_mhz(384.0), &slow, (0, 0)).is_met());
+    // The library strobes after the change, this silicon before it: right by itself, and not where the law aims.
+    let fast = Silicon {
+        factor: 0.75,
+        ..TYPICAL
+    };
+    let verdict = TimingVerdict::of(&at_mhz(500.0), &fast, (0, 0));
+    assert!(
+        !verdict.is_met() && verdict.worst().check == "strobe setup",
+        "{verdict}"
+    );
+}
+
+#[test]
+fn a_verdict_notes_photons_that_cancel_and_fails_where_the_front_end_does_not_follow() {
+    let short = SensorConfig {
+        dead_time_ns: 0.12,
+        ..at_mhz(300.0)
+    };
+    let verdict = TimingVerdict::of(&short, &TYPICAL, (0, 0));
+    assert!(
+        verdict.is_met() && verdict.worst().check == "SPAD_RAW setup",
+        "{verdict}"
+    );
+    assert!(verdict.notes[0].contains("cancel"), "{:?}", verdict.notes);
+    let slow = Silicon {
+        factor: 1.1,
+        ..TYPICAL
+    };
+    let said = TimingVerdict::of(&short, &slow, (0, 0)).to_string();
+    assert!(
+        said.contains("dead_time_ns = 0.12 is shorter than the front end follows"),
+        "{said}"
+    );
+    assert!(said.contains("give at least 0.1214"), "{said}");
 }
 
 #[test]

@@ -119,3 +119,84 @@ fn stability_is_promised_and_kept() {
     let said = gdtof(here.path(), &["pareto", "--stability"]);
     assert!(said.lines().count() > 5, "{said}");
 }
+
+/// Recorded pulses of a sensor with one macropixel on one engine: its output.
+fn replayed(sensor: &str, events: &str, engine: &str, more: &[&str]) -> std::process::Output {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("sensor.toml", sensor);
+    write("inits.csv", "row,col,init\n0,0,20\n");
+    write("events.csv", &format!("time_fs,row,col,spad\n{events}"));
+    let arguments = "replay --sensor sensor.toml --rows 1 --cols 1 --inits inits.csv --events events.csv \
+        --stop-periods 100 --laser-cycles 1 --out counts.csv --engine";
+    Command::new(env!("CARGO_BIN_EXE_gdtof"))
+        .args(
+            arguments
+                .split_whitespace()
+                .chain([engine])
+                .chain(more.iter().copied()),
+        )
+        .current_dir(folder.path())
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn photons_that_cancel_are_told_of_on_every_engine() {
+    let sensor = "clk_hz = 100e6\ndead_time_ns = 1.0\n";
+    for engine in ["gate", "cycle", "window"] {
+        let output = replayed(
+            sensor,
+            "101000000,0,0,3\n103000000,0,0,3\n",
+            engine,
+            &["--json"],
+        );
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{engine}: {said}");
+        assert!(said.contains("2 photons cancel"), "{engine}: {said}");
+        let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(summary["photons_that_cancel"], 2, "{engine}");
+        let apart = replayed(
+            sensor,
+            "101000000,0,0,3\n113000000,0,0,3\n",
+            engine,
+            &["--json"],
+        );
+        let summary: Value = serde_json::from_slice(&apart.stdout).unwrap();
+        assert_eq!(summary["photons_that_cancel"], 0, "{engine}");
+        assert!(apart.stderr.is_empty(), "{engine}");
+    }
+}
+
+#[test]
+fn a_dead_time_that_the_front_end_cannot_follow_is_refused_by_all_in_the_same_words() {
+    for (dead_time, meant) in [
+        ("8e-9", "did you mean 8 (ns)?"),
+        ("0.06", "give at least 0.1104"),
+    ] {
+        let sensor = format!("dead_time_ns = {dead_time}\n");
+        let mut words = std::collections::BTreeSet::new();
+        for engine in ["gate", "cycle", "window", "cohort"] {
+            let output = replayed(&sensor, "30000000,0,0,3\n30060001,0,0,3\n", engine, &[]);
+            assert_eq!(output.status.code(), Some(2), "{engine}");
+            words.insert(String::from_utf8(output.stderr).unwrap());
+        }
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("sensor.toml"), &sensor).unwrap();
+        for command in ["timing", "frame"] {
+            let mut run = Command::new(env!("CARGO_BIN_EXE_gdtof"));
+            let output = run
+                .args([command, "--sensor", "sensor.toml"])
+                .current_dir(folder.path());
+            let output = output.output().unwrap();
+            assert_eq!(output.status.code(), Some(2), "{command}");
+            words.insert(String::from_utf8(output.stderr).unwrap());
+        }
+        assert_eq!(words.len(), 1, "{words:?}");
+        let said = words.pop_first().unwrap();
+        assert!(
+            said.contains("sensor.toml:1: dead_time_ns") && said.contains(meant),
+            "{said}"
+        );
+    }
+}

@@ -2,10 +2,13 @@
 //! anywhere in the CLK period, a reset pulse too short, two pulses of a SPAD within a period.
 
 use guided_dtof::chip::{Exposure, SensorConfig, Window, WindowLaw, macropixel};
-use guided_dtof::engine::{GateSimulation, HardwareEventKind, HardwareEvents};
+use guided_dtof::engine::{
+    self as fast, Cancelling, Cycle, Engine, Gate, GateSimulation, HardwareEventKind,
+    HardwareEvents,
+};
 use guided_dtof::kernel::{Drive, Kernel, Policy, Recorder, TimingChecks, clock, in_order};
 use guided_dtof::netlist::{CellKind, Corner, Library, NetId, Netlist, Timing};
-use guided_dtof::photon::SpadEvent;
+use guided_dtof::photon::{SpadEvent, apply_dead_time};
 use guided_dtof::units::{Frequency, Time};
 use proptest::prelude::*;
 
@@ -303,5 +306,73 @@ fn two_pulses_of_a_spad_within_a_clk_period_are_reported() {
         }
         let counted = gate.histograms().unwrap()[0].iter().sum::<u16>();
         assert_eq!(counted as usize, if expected.is_empty() { 2 } else { 0 });
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
+
+    /// What is told of photons that cancel without simulating is what the gates do.
+    #[test]
+    fn photons_that_cancel_are_those_that_the_gates_report(
+        times in prop::collection::vec((0i64..400_000_000, 0u8..3), 1..120),
+        clk_mhz in 60f64..300.0,
+        phase in -0.9f64..0.9,
+    ) {
+        let config = SensorConfig {
+            rows: 1,
+            cols: 1,
+            clk_hz: clk_mhz * 1e6,
+            stop_phase_ps: phase * 0.5e6 / clk_mhz,
+            dead_time_ns: 1.0,
+            ..SensorConfig::default()
+        };
+        let exposure = Exposure::new(&config, 40, 3);
+        let events = times.iter().map(|&(fs, spad)| SpadEvent { time: Time::from_fs(fs), spad });
+        let mut pulses: Vec<SpadEvent> = events.filter(|e| e.time < exposure.end()).collect();
+        pulses.sort_unstable();
+        apply_dead_time(&mut pulses, config.dead_time());
+
+        let law = WindowLaw::new(&config, &exposure);
+        let latency = law.timing().spad_to_toggle;
+        let cancelling = Cancelling::of(config.dead_time(), exposure.clock, || law).unwrap();
+        let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[20], &[&pulses]);
+        let toggled = gate.schedule().origin + latency;
+        let told: Vec<(i64, String)> = cancelling
+            .pairs(&pulses)
+            .map(|(_, p)| ((toggled + p.time).as_fs(), format!("mp_r0_c0.front_end.spad_{}", p.spad)))
+            .collect();
+        let mut events = gate.hardware_events();
+        gate.run(&mut events);
+        let of_kind = events.report().hardware_events.iter();
+        let of_kind = of_kind.filter(|e| e.kind == HardwareEventKind::PulsesCancelled);
+        let seen: Vec<_> = of_kind.map(|e| (e.time_fs, e.instance.clone())).collect();
+        prop_assert_eq!(events.count(HardwareEventKind::PulsesCancelled), seen.len() as u64);
+        prop_assert_eq!(told, seen);
+    }
+}
+
+#[test]
+fn pulses_that_the_front_end_cannot_follow_are_refused_by_every_engine() {
+    // One SPAD twice within clk-to-Q.
+    let times = [30_000_000, 30_060_001].map(Time::from_fs);
+    let pulses = times.map(|time| SpadEvent { time, spad: 3 });
+    let config = SensorConfig {
+        dead_time_ns: 0.06,
+        ..SensorConfig::default()
+    };
+    let exposure = Exposure::new(&config, 100, 1);
+    let engines: [&dyn Engine; 3] = [
+        &Gate::new(&config, &exposure),
+        &Cycle::new(&config, &exposure),
+        &fast::Window::new(&config, &exposure),
+    ];
+    let refusal = engines[0].histogram(20, &pulses).unwrap_err();
+    assert!(
+        refusal.is_refusal() && refusal.to_string().contains("110.334 ps"),
+        "{refusal}"
+    );
+    for engine in engines {
+        assert_eq!(engine.histogram(20, &pulses), Err(refusal.clone()));
     }
 }

@@ -9,7 +9,7 @@ use guided_dtof::chip::{
     AfterBorrow, Exposure, PCounter, SensorConfig, Tap, WindowLaw, macropixel, p_counter,
     p_counter_timing,
 };
-use guided_dtof::engine::{Cycle, Engine, GateSimulation, Window};
+use guided_dtof::engine::{Cycle, Engine, EngineError, Gate, GateSimulation, Window};
 use guided_dtof::kernel::Recorder;
 use guided_dtof::logic::Logic::One;
 use guided_dtof::netlist::{CellKind, Corner, ModuleBuilder};
@@ -296,6 +296,42 @@ fn a_counter_that_wraps_stops_again_and_again() {
             Ok(vec![0; 16])
         );
     }
+}
+
+/// A comparator that wraps comes round after 2ⁿ counts, a down counter with its borrow after 2ⁿ⁺¹: in laser cycles between
+/// the two it has several windows, where the other has one.
+#[test]
+fn a_comparator_that_wraps_has_more_windows_than_a_down_counter() {
+    let exposure = Exposure::new(&sensor(PCounter::Ripple), 28, 6);
+    // A photon every third CLK period, of one SPAD after the other.
+    let pulses: Vec<SpadEvent> = (2..160)
+        .step_by(3)
+        .map(|edge| SpadEvent {
+            time: exposure.rising(edge) - Time::from_ps(1_250),
+            spad: (edge % 16) as u8,
+        })
+        .collect();
+    let counts = |p_counter| {
+        let config = SensorConfig {
+            after_borrow: AfterBorrow::Wrap,
+            counter_bits: 4,
+            bins: 6,
+            ..sensor(p_counter)
+        };
+        let law = WindowLaw::new(&config, &exposure).window(7);
+        let gate = Gate::new(&config, &exposure).histogram(7, &pulses).unwrap();
+        let cycle = Cycle::new(&config, &exposure).histogram(7, &pulses);
+        assert_eq!(cycle.as_ref(), Ok(&gate));
+        let window = Window::new(&config, &exposure).histogram(7, &pulses);
+        (law, gate, window)
+    };
+    let (law, one, window) = counts(PCounter::Ripple);
+    assert!(matches!(law, LawWindow::Open(_)));
+    assert_eq!(window, Ok(one.clone()));
+    let (law, several, window) = counts(PCounter::Comparator);
+    assert!(matches!(law, LawWindow::Irregular(_)));
+    assert!(matches!(window, Err(EngineError::Irregular(_))));
+    assert_ne!(one, several);
 }
 
 /// Enabled in CLK's low phase, a counter that no reset holds takes that for an edge.

@@ -7,6 +7,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::front_end::PulseLimits;
 use crate::files::{InputError, parse_toml, read_text};
 use crate::netlist::Corner;
 use crate::units::{Frequency, Time};
@@ -57,7 +58,9 @@ pub enum Mode {
     Conventional,
 }
 
-/// How the P-counter is built (thesis 4.4). All have the same pins and, but for the last, the same time windows.
+/// How the P-counter is built (thesis 4.4). All have the same pins. All but the last open the same time windows where the
+/// counter holds after LOCAL_STOP. Where it wraps, LOCAL_STOP comes again after 2ⁿ⁺¹ counts of a counter of n bits with
+/// its borrow, and after 2ⁿ of one without: of the comparator, and of all with the tap `msb`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PCounter {
@@ -143,7 +146,8 @@ pub struct SensorConfig {
     pub stop_phase_ps: f64,
     /// Deserialiser clock, Hz (thesis 4.7: "a few hundred megahertz").
     pub load_clk_hz: f64,
-    /// SPAD dead time and width of a SPAD_RAW pulse, ns.
+    /// SPAD dead time and width of a SPAD_RAW pulse, ns; no shorter than the front end follows, and longer than a CLK
+    /// period if no photons are to cancel.
     pub dead_time_ns: f64,
     /// Whether a photon during the dead time begins it anew.
     pub paralysable: bool,
@@ -161,7 +165,7 @@ pub struct SensorConfig {
     pub overflow: Overflow,
     /// Which STOP counts.
     pub mode: Mode,
-    /// Delay corner of the cell library.
+    /// Delay corner of the cell library: slow, typ or fast.
     pub corner: Corner,
 }
 
@@ -271,6 +275,9 @@ impl SensorConfig {
             );
             return Err(("dead_time_ns", message));
         }
+        if let Some(message) = PulseLimits::of(self.corner).complaint(self.dead_time_ns) {
+            return Err(("dead_time_ns", message));
+        }
         for (key, value, most) in [
             ("afterpulse_probability", self.afterpulse_probability, 1.0),
             ("afterpulse_time_ns", self.afterpulse_time_ns, 1e6),
@@ -354,6 +361,8 @@ mod tests {
             ("clk_hz = 0", 1),
             ("clk_hz = nan", 1),
             ("\n\ndead_time_ns = -1.0", 3),
+            ("\n\ndead_time_ns = 8e-9", 3),
+            ("corner = \"slow\"\ndead_time_ns = 0.15", 2),
             ("stop_phase_ps = 2e3", 1),
             ("threshold = 32", 1),
             ("colour = 1", 1),
@@ -369,6 +378,38 @@ mod tests {
             let error = SensorConfig::parse("s.toml", text).unwrap_err();
             assert_eq!(error.line, Some(line), "{text}: {error}");
             assert!(error.message.contains(';'), "no cure: {error}");
+        }
+    }
+
+    #[test]
+    fn a_dead_time_below_what_the_front_end_follows_is_refused_with_what_was_meant() {
+        for (text, says) in [
+            ("dead_time_ns = 8e-9", "did you mean 8 (ns)?"),
+            ("dead_time_ns = 0.01", "did you mean 10 (ns)?"),
+            (
+                "dead_time_ns = 0.11",
+                "give at least 0.1104; did you mean 110 (ns)?",
+            ),
+        ] {
+            let error = SensorConfig::parse("s.toml", text).unwrap_err();
+            assert!(error.message.contains(says), "{error}");
+        }
+        assert!(SensorConfig::parse("s.toml", "dead_time_ns = 0.1104").is_ok());
+    }
+
+    #[test]
+    fn delay_files_names_of_corners_are_understood() {
+        for (name, corner) in [
+            ("min", Corner::Fast),
+            ("typ", Corner::Typ),
+            ("max", Corner::Slow),
+        ] {
+            let config = SensorConfig::parse("s.toml", &format!("corner = {name:?}")).unwrap();
+            assert_eq!(config.corner, corner);
+            assert_eq!(name.parse(), Ok(corner));
+            let again = format!("corner = {:?}", corner.name());
+            assert_eq!(SensorConfig::parse("s.toml", &again).unwrap(), config);
+            assert!(toml::to_string(&config).unwrap().contains(&again));
         }
     }
 

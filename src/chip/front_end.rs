@@ -14,12 +14,61 @@
 //! exactly one period after each pulse. Two pulses of one SPAD within a period cancel, so the dead
 //! time must exceed the CLK period. PIXEL_CLEAR forgets everything.
 //!
-//! Timing: a pulse is taken by the first rising CLK edge at or after pulse + clk-to-Q.
+//! Timing: a pulse is taken by the first rising CLK edge at or after pulse + clk-to-Q. A pulse lasts the dead time, which
+//! must not be shorter than the toggle flip-flop can follow ([`PulseLimits`]).
 
 use std::sync::Arc;
 
 use super::{SPADS, finished};
-use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
+use crate::logic::Logic::{One, Zero};
+use crate::netlist::{CellKind, CheckKind, Corner, Library, Module, ModuleBuilder, Net};
+use crate::units::Time;
+
+/// What the toggle flip-flops ask of SPAD_RAW. What lies between the end of one pulse and the next one is chance, and left
+/// to the timing checks of the gate engine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PulseLimits {
+    /// Shortest pulse.
+    pub width: Time,
+    /// Shortest time from one rise to the next: clk-to-Q and setup.
+    pub apart: Time,
+}
+
+impl PulseLimits {
+    /// Those of the cell library in one corner.
+    pub fn of(corner: Corner) -> Self {
+        let library = Library::default();
+        let limit = |check| Time::from_fs(library.checks(CellKind::Dffr).at(check, corner).into());
+        let clock_to_q = |to| library.delay(CellKind::Dffr, 1, to, corner);
+        PulseLimits {
+            width: limit(CheckKind::ClockHigh),
+            apart: clock_to_q(One).max(clock_to_q(Zero)) + limit(CheckKind::Setup),
+        }
+    }
+
+    /// The shortest dead time that keeps both.
+    pub fn shortest(&self) -> Time {
+        self.width.max(self.apart)
+    }
+
+    /// What is wrong with a dead time, given in nanoseconds, and the cure.
+    pub fn complaint(&self, dead_time_ns: f64) -> Option<String> {
+        let shortest = self.shortest();
+        if dead_time_ns >= shortest.as_ns() {
+            return None;
+        }
+        // Dead times of SPADs are some nanoseconds: what becomes so in another unit was probably meant in it.
+        let meant = [1e3, 1e6, 1e9].map(|factor| (dead_time_ns * factor * 1e6).round() * 1e-6);
+        let meant = meant.into_iter().find(|ns| (0.5..500.0).contains(ns));
+        let meant = meant.map_or(String::new(), |ns| format!("; did you mean {ns} (ns)?"));
+        Some(format!(
+            "dead_time_ns = {dead_time_ns} is shorter than the front end follows, whose toggle flip-flop takes pulses of at least {} and no two closer than {} (clk-to-Q and setup); give at least {:.4}{meant}",
+            self.width,
+            self.apart,
+            (shortest.as_ns() * 1e4).ceil() * 1e-4
+        ))
+    }
+}
 
 /// Retiming of one SPAD. Ports: SPAD_RAW, CLK, PIXEL_CLEAR → SPAD_TIMED.
 fn retiming() -> Arc<Module> {

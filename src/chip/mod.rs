@@ -22,6 +22,7 @@ pub mod macropixel;
 pub mod metdc;
 pub mod p_counter;
 pub mod p_counter_timing;
+pub mod race;
 pub mod sensor;
 pub mod timing;
 pub mod window_law;
@@ -30,6 +31,7 @@ pub use config::{
     AfterBorrow, EventType, Mode, Overflow, PCounter, SensorConfig, THRESHOLD_BITS, Tap,
 };
 pub use exposure::Exposure;
+pub use race::{Cure, Race};
 pub use timing::ChipTiming;
 pub use window_law::{Window, WindowLaw};
 

@@ -4,6 +4,7 @@
 //! against the netlist.
 
 use super::config::SensorConfig;
+use super::front_end::PulseLimits;
 use super::p_counter::CounterTiming;
 use super::{correlation, p_counter_timing};
 use crate::logic::Logic::{One, Zero};
@@ -15,6 +16,8 @@ use crate::units::Time;
 pub struct ChipTiming {
     /// SPAD_RAW rising to the toggle flip-flop's output: the front-end latency.
     pub spad_to_toggle: Time,
+    /// What the toggle flip-flops ask of SPAD_RAW.
+    pub pulses: PulseLimits,
     /// CLK falling to COUNTER_CLK rising.
     pub clk_to_counter_clk: Time,
     /// The P-counter's own delays and limits.
@@ -70,6 +73,7 @@ impl ChipTiming {
         let xor = delay(CellKind::Xor2, 0, One).max(delay(CellKind::Xor2, 0, Zero));
         ChipTiming {
             spad_to_toggle: clock_to_q,
+            pulses: PulseLimits::of(corner),
             clk_to_counter_clk: delay(CellKind::Nor2, 0, One),
             counter: CounterTiming::of(config, &library),
             local_stop_to_strobe: mux_rise + buffer_rise,

@@ -25,6 +25,7 @@ use std::ops::Range;
 use super::config::{Mode, PCounter, SensorConfig};
 use super::exposure::Exposure;
 use super::p_counter::{Rises, starts_high};
+use super::race::{Cure, Race};
 use super::timing::ChipTiming;
 use crate::units::Time;
 
@@ -43,7 +44,7 @@ pub enum Window {
     Irregular(&'static str),
     /// Two signals come closer than a flip-flop's setup, hold, recovery or removal time allows: the circuit
     /// promises nothing, and only the gate-level engine shows what its model makes of it.
-    Race(&'static str),
+    Race(Race),
 }
 
 impl Window {
@@ -113,8 +114,11 @@ impl WindowLaw {
     pub fn window(&self, start: u16) -> Window {
         let (exposure, timing) = (&self.exposure, &self.timing);
         let end = exposure.clock.periods(exposure.stop_periods as i64);
-        if exposure.clock.period() <= timing.clk_to_event + timing.setup + ROUNDING {
-            return Window::Race("the correlation block is slower than a CLK period");
+        let period = exposure.clock.period();
+        let to_shift = timing.clk_to_event + timing.setup + ROUNDING;
+        if period <= to_shift {
+            let what = "the correlation block is slower than a CLK period";
+            return Window::Race(Race::too_slow(what, to_shift, period));
         }
         let (cause, arrival, irregular) = match self.config.mode {
             // A laser cycle is counted by the STOP edge that ends it.
@@ -139,7 +143,12 @@ impl WindowLaw {
         let before = exposure.rising(last + 1) + timing.clk_to_shift - arrival;
         let slack = (after - timing.setup).min(before - timing.hold);
         if slack <= ROUNDING {
-            return Window::Race("the strobe meets a change of the shift register");
+            let change = if after < before {
+                arrival - after
+            } else {
+                arrival + before
+            };
+            return Window::Race(self.strobe_race(cause, arrival, change));
         }
         if let Some(why) = irregular {
             return Window::Irregular(why);
@@ -151,12 +160,39 @@ impl WindowLaw {
         })
     }
 
+    /// A strobe at `arrival`, for this `cause`, too near a `change` of the shift register.
+    fn strobe_race(&self, cause: Time, arrival: Time, change: Time) -> Race {
+        let (exposure, timing) = (&self.exposure, &self.timing);
+        let period = exposure.clock.period();
+        let (setup, hold) = (timing.setup + ROUNDING, timing.hold + ROUNDING);
+        match self.config.mode {
+            Mode::Guided => {
+                let strobe = timing.ripple() + timing.local_stop_to_strobe;
+                let edge = exposure.rising_until(change - timing.clk_to_shift);
+                let fall = exposure.rising_until(arrival - strobe) + 1;
+                let shortest = timing.clk_to_event.max(timing.counter.period) + setup;
+                let signals = (strobe, timing.clk_to_shift);
+                Race::strobe_at_shift(period, edge - fall, signals, (setup, hold), shortest)
+            }
+            // The shift register comes earlier after STOP where STOP comes later.
+            Mode::Conventional => {
+                let what = "a change of the shift register meets the strobe";
+                let strobe = arrival - cause;
+                let forbidden = (strobe - setup, strobe + hold);
+                Race::with_stop(what, change - cause, forbidden, exposure.stop_phase, period)
+            }
+        }
+    }
+
     /// LOCAL_STOP of a counter that each STOP resets.
     fn with_reset(&self, start: u16) -> Result<LocalStop, Window> {
         let (exposure, timing) = (&self.exposure, &self.timing);
         let counter = &timing.counter;
-        if exposure.clock.period() <= counter.period + ROUNDING {
-            return Err(Window::Race("the P-counter is slower than a CLK period"));
+        let (period, phase) = (exposure.clock.period(), exposure.stop_phase);
+        let count = counter.period + ROUNDING;
+        if period <= count {
+            let what = "the P-counter is slower than a CLK period";
+            return Err(Window::Race(Race::too_slow(what, count, period)));
         }
         let Some(rises) = Rises::of(&self.config, start) else {
             return Err(Window::Never);
@@ -169,8 +205,11 @@ impl WindowLaw {
         while counter_clk(first) <= *in_doubt.end() {
             first += 1;
         }
-        if in_doubt.contains(&counter_clk(first - 1)) {
-            return Err(Window::Race("a CLK edge meets the end of the reset pulse"));
+        let edge = counter_clk(first - 1);
+        if in_doubt.contains(&edge) {
+            let what = "a CLK edge meets the end of the reset pulse";
+            let race = Race::with_stop(what, edge, in_doubt.into_inner(), phase, period);
+            return Err(Window::Race(race));
         }
 
         // Later than the counts that the next reset forestalls.
@@ -184,24 +223,36 @@ impl WindowLaw {
             return Err(Window::Never);
         };
         let deadline = end + timing.stop_to_hit_reset - timing.strobe_to_hit;
-        let margin =
-            deadline - (exposure.falling(last) + timing.ripple() + timing.local_stop_to_strobe);
+        let strobe = exposure.falling(last) + timing.ripple() + timing.local_stop_to_strobe;
+        let margin = deadline - strobe;
         if margin < -ROUNDING && rises.every.is_none() {
             return Err(Window::Never);
         }
         if margin <= ROUNDING {
-            return Err(Window::Race(
-                "the strobe meets the next laser cycle's reset",
-            ));
+            return Err(Window::Race(Race {
+                what: "the strobe meets the next laser cycle's reset",
+                after: "STOP rises",
+                comes: strobe,
+                from: deadline - ROUNDING,
+                to: rises.every.is_none().then_some(deadline + ROUNDING),
+                cure: Cure::LaserCycle,
+            }));
         }
         if rises.every.is_some() && starts_high(&self.config, start) {
             let delay = counter
                 .reset_to_local_stop
                 .expect("the tap msb rises at a reset");
             let arrival = timing.stop_to_reset + delay + timing.local_stop_to_strobe;
-            if arrival + timing.removal + ROUNDING >= timing.stop_to_hit_release {
-                let why = "the strobe that the reset makes meets the end of HIT's reset";
-                return Err(Window::Race(why));
+            let until = timing.stop_to_hit_release - timing.removal - ROUNDING;
+            if arrival >= until {
+                return Err(Window::Race(Race {
+                    what: "the strobe that the reset makes meets the end of HIT's reset",
+                    after: "STOP rises",
+                    comes: arrival,
+                    from: until,
+                    to: None,
+                    cure: Cure::Tap,
+                }));
             }
         }
         Ok(LocalStop {
@@ -217,10 +268,17 @@ impl WindowLaw {
         let counter = &timing.counter;
         let enabled = timing.stop_to_enabled;
         let first = exposure.rising_until(enabled) + 1;
-        let low_for = |edge| exposure.rising(edge) - enabled;
         let shortest = counter.clock_high + timing.clk_to_counter_clk + ROUNDING;
-        if low_for(first) <= shortest || low_for(first - 1) >= -ROUNDING {
-            return Err(Window::Race("CLK rises as ENABLE lets it through"));
+        let in_doubt = (enabled - ROUNDING, enabled + shortest);
+        let meets = [first, first - 1].map(|edge| exposure.rising(edge));
+        let meets = meets
+            .into_iter()
+            .find(|t| (in_doubt.0..=in_doubt.1).contains(t));
+        if let Some(edge) = meets {
+            let what = "CLK rises as ENABLE lets it through";
+            let (phase, period) = (exposure.stop_phase, exposure.clock.period());
+            let race = Race::with_stop(what, edge, in_doubt, phase, period);
+            return Err(Window::Race(race));
         }
         let rises = Rises::of(&self.config, start).expect("a counter without memory wraps");
         let every = rises.every.expect("a counter without memory wraps");
@@ -229,7 +287,19 @@ impl WindowLaw {
         let edge = first + rises.first;
         let is_first_count = rises.first == 0 && exposure.falling(first) <= enabled + ROUNDING;
         if is_first_count || (last >= edge && (last - edge) % every == 0) {
-            return Err(Window::Race("ENABLE changes as LOCAL_STOP is to rise"));
+            let comes = exposure.falling(if is_first_count { first } else { last });
+            return Err(Window::Race(Race {
+                what: "LOCAL_STOP rises as ENABLE changes",
+                after: "the first STOP edge",
+                comes,
+                from: comes.min(enabled),
+                to: Some(comes.max(if is_first_count {
+                    enabled
+                } else {
+                    exposure.end() + enabled
+                })),
+                cure: Cure::LaserCycle,
+            }));
         }
         // STOP also resets HIT.
         let end = exposure.clock.periods(periods);
@@ -238,11 +308,20 @@ impl WindowLaw {
         let meets_reset = |edge: i64| {
             let place = exposure.falling(edge.rem_euclid(periods));
             let arrival = place + timing.ripple() + timing.local_stop_to_strobe;
-            in_doubt.contains(&arrival) || in_doubt.contains(&(arrival - end))
+            [arrival, arrival - end]
+                .into_iter()
+                .find(|t| in_doubt.contains(t))
         };
         let mut edges = (edge..last).step_by(every as usize).take(periods as usize);
-        if edges.any(meets_reset) {
-            return Err(Window::Race("the strobe meets a laser cycle's reset"));
+        if let Some(strobe) = edges.find_map(meets_reset) {
+            return Err(Window::Race(Race {
+                what: "the strobe meets a laser cycle's reset",
+                after: "STOP rises",
+                comes: strobe,
+                from: *in_doubt.start(),
+                to: Some(*in_doubt.end()),
+                cure: Cure::LaserCycle,
+            }));
         }
         Ok(LocalStop {
             time: exposure.falling(edge) + timing.ripple(),
@@ -251,10 +330,14 @@ impl WindowLaw {
         })
     }
 
-    /// Why no window can be aimed, if so: the reason for which start values do not open one.
-    pub fn refusal(&self) -> Option<&'static str> {
+    /// Why no window can be aimed, if so, and the cure: the reason for which start values do not open one.
+    pub fn refusal(&self) -> Option<(String, String)> {
         let reason = |start| match self.window(start) {
-            Window::Race(why) | Window::Irregular(why) => Some(why),
+            Window::Race(race) => Some((race.to_string(), race.cure.to_string())),
+            Window::Irregular(why) => {
+                let cure = "give after_borrow = \"hold\", or other --stop-periods";
+                Some((why.to_owned(), cure.to_owned()))
+            }
             Window::Open(_) | Window::Never => None,
         };
         let mut reasons = self.samples().into_iter().map(reason);
@@ -354,6 +437,8 @@ impl WindowLaw {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chip::AfterBorrow;
+    use crate::netlist::Corner;
     use proptest::prelude::*;
 
     fn law(config: &SensorConfig) -> WindowLaw {
@@ -387,6 +472,59 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn a_cure_keeps_the_two_signals_apart(
+            clk_mhz in 150f64..900.0,
+            phase in -1f64..1.0,
+            corner in prop::sample::select(Corner::ALL.to_vec()),
+            mode in prop::sample::select(vec![Mode::Guided, Mode::Conventional]),
+            p_counter in prop::sample::select(PCounter::ALL.to_vec()),
+        ) {
+            let after_borrow = match p_counter {
+                PCounter::Memoryless => AfterBorrow::Wrap,
+                _ => AfterBorrow::Hold,
+            };
+            let config = SensorConfig {
+                clk_hz: clk_mhz * 1e6,
+                stop_phase_ps: phase * 0.5e6 / clk_mhz,
+                corner,
+                mode,
+                p_counter,
+                after_borrow,
+                ..SensorConfig::default()
+            };
+            let window = |config: &SensorConfig| {
+                WindowLaw::new(config, &Exposure::new(config, 1024, 1)).window(100)
+            };
+            if let Window::Race(race) = window(&config) {
+                prop_assert!(race.slack() <= ROUNDING, "{race}");
+                let mut cured = Vec::new();
+                let mut push = |change: &dyn Fn(&mut SensorConfig)| {
+                    let mut config = config.clone();
+                    change(&mut config);
+                    cured.push(config);
+                };
+                match race.cure {
+                    Cure::Period { at_least, at_most } => {
+                        for period in [Some(at_least), at_most].into_iter().flatten() {
+                            push(&|config| config.clk_hz = 1.0 / period.as_s());
+                        }
+                    }
+                    Cure::Phase { at_most, at_least } => {
+                        for phase in [at_most, at_least].into_iter().flatten() {
+                            push(&|config| config.stop_phase_ps = phase.as_ns() * 1e3);
+                        }
+                    }
+                    Cure::LaserCycle | Cure::Tap => {}
+                }
+                for config in cured {
+                    let again = window(&config);
+                    let is_same = matches!(again, Window::Race(r) if r.what == race.what);
+                    prop_assert!(!is_same, "{race}; {}: {again:?}", race.cure);
+                }
+            }
+        }
+
         #[test]
         fn bins_tile_time(start in 0u16..512, cycle in 0i64..1000, clk_mhz in 100f64..420.0) {
             let config = SensorConfig { clk_hz: clk_mhz * 1e6, ..SensorConfig::default() };

@@ -12,6 +12,7 @@ use super::{SensorArgs, say};
 use crate::chip::SensorConfig;
 use crate::chip::WindowLaw;
 use crate::engine::recording::check_exposure;
+use crate::engine::timing::{Silicon, TimingVerdict, VerdictReport};
 use crate::engine::{CohortOptions, Work};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::guide::GuideMap;
@@ -21,6 +22,7 @@ use crate::scene::Scene;
 use crate::system::{
     EngineKind, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Probe, Summary, take_frame,
 };
+use crate::units::Time;
 
 /// Arguments of `gdtof frame`.
 #[derive(Args)]
@@ -84,12 +86,12 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
     };
     let exposure = check_exposure(&sensor, args.stop_periods, args.laser_cycles)?;
     let chosen = chosen_probes(&args.probe, &sensor)?;
-    if let Some(why) = WindowLaw::new(&sensor, &exposure).refusal() {
-        let message = format!(
-            "{why}, so the guide cannot aim time windows; change clk_hz, stop_phase_ps or corner, or --stop-periods and after_borrow"
-        );
+    if let Some((why, cure)) = WindowLaw::new(&sensor, &exposure).refusal() {
+        let message = format!("{why}, so the guide cannot aim time windows; {cure}");
         return Err(InputError::new("--sensor", message).into());
     }
+    let silicon = Silicon::nominal(sensor.corner);
+    let timing = TimingVerdict::of(&sensor, &silicon, (0, 0)).report();
     if let Some(metres) = args.tolerance.filter(|m| !(m.is_finite() && *m >= 0.0)) {
         let message = format!("{metres} is no depth error; give metres, 0 or more");
         return Err(InputError::new("--tolerance", message).into());
@@ -140,14 +142,20 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
         |macropixels| progress.inc(macropixels as u64),
     )?;
 
-    let report = Report::new(args, &settings.sensor, &frame);
+    let report = Report::new(args, &settings.sensor, &timing, &frame);
     write_results(&args.out, &frame, &report)?;
     if args.json {
         say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
     } else {
-        say(table(args, &frame))?;
+        say(table(args, &timing, &frame))?;
         if let Some(remark) = &frame.remark {
             say(format_args!("\n{remark}\n"))?;
+        }
+        if !timing.met {
+            say(format_args!("\nTiming {}\n", timing.verdict))?;
+        }
+        for note in &timing.notes {
+            say(format_args!("\nNote on timing: {note}\n"))?;
         }
     }
     Ok(())
@@ -222,6 +230,7 @@ struct Report<'a> {
     remark: Option<&'a str>,
     photons_expected: f64,
     work: Work,
+    timing: &'a VerdictReport,
     tolerance: Option<Kept>,
     load_bits: usize,
     load_time_s: f64,
@@ -235,7 +244,12 @@ struct Report<'a> {
 }
 
 impl<'a> Report<'a> {
-    fn new(args: &FrameArgs, sensor: &'a SensorConfig, frame: &'a Frame) -> Self {
+    fn new(
+        args: &FrameArgs,
+        sensor: &'a SensorConfig,
+        timing: &'a VerdictReport,
+        frame: &'a Frame,
+    ) -> Self {
         Report {
             version: env!("CARGO_PKG_VERSION"),
             scene: scene_name(args),
@@ -250,6 +264,7 @@ impl<'a> Report<'a> {
             remark: frame.remark.as_deref(),
             photons_expected: frame.photons_expected,
             work: frame.work,
+            timing,
             tolerance: frame.kept,
             load_bits: frame.load_bits,
             load_time_s: frame.load_time.as_s(),
@@ -282,7 +297,7 @@ fn write_results(out: &Path, frame: &Frame, report: &Report<'_>) -> anyhow::Resu
     Ok(())
 }
 
-fn table(args: &FrameArgs, frame: &Frame) -> Table {
+fn table(args: &FrameArgs, timing: &VerdictReport, frame: &Frame) -> Table {
     let summary = frame.summary();
     let of = |part: usize, whole: usize| format!("{part} of {whole}");
     let mut table = Table::new(format!("Frame of {}", scene_name(args)))
@@ -328,11 +343,22 @@ fn table(args: &FrameArgs, frame: &Frame) -> Table {
         "lost to dead time",
         percent(lost, work.pulses as f64 + lost),
     );
+    if work.cancelled > 0 {
+        let share = percent(work.cancelled as f64, work.pulses as f64);
+        table.push(
+            "photons that cancel",
+            format!("{}, {share}", work.cancelled),
+        );
+    }
     table.push(
         "serial load",
         format!("{} bits, {}", frame.load_bits, frame.load_time),
     );
     table.push("exposure", frame.exposure_time);
+    let left_over = Time::from_s(timing.slack_ps * 1e-12);
+    let met = if timing.met { "met" } else { "FAILS" };
+    table.push("timing, slack", format!("{met}, {left_over}"));
+    table.push("timing, tightest", &timing.check);
     for (row, col) in &frame.probes {
         let engine = args.engine.of_probes(frame.kept.is_some());
         let agrees = format!("agrees with {engine:?} engine").to_lowercase();

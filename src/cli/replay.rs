@@ -7,14 +7,17 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
-use super::SensorArgs;
 use super::sdf::annotated_timing;
 use super::silicon::SiliconArgs;
-use crate::chip::{Exposure, SensorConfig};
+use super::{SensorArgs, say};
+use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::engine::recording::{Recording, check_exposure, read_events, read_starts};
-use crate::engine::timing::Silicon;
+use crate::engine::timing::{Silicon, TimingVerdict, VerdictReport};
 use crate::engine::waveform::{self, View};
-use crate::engine::{EngineError, GateSimulation, HardwareEventReport, Runner, TimeKeeping, Timed};
+use crate::engine::{
+    Cancelling, EngineError, GateSimulation, HardwareEventKind, HardwareEventReport, Runner,
+    TimeKeeping, Timed,
+};
 use crate::files::{InputError, OutputFile};
 use crate::kernel::{CheckReport, Observer, Policy};
 use crate::photon::SpadEvent;
@@ -134,6 +137,9 @@ pub struct ReplayArgs {
     /// The timing checks' violations, summary and slack histograms, and the hardware events, as JSON (needs --checks).
     #[arg(long, value_name = "FILE")]
     checks_json: Option<PathBuf>,
+    /// Print as JSON what became of the events, on any engine, with the timing verdict (needs --out).
+    #[arg(long, requires = "out")]
+    json: bool,
 }
 
 /// What a timing violation does.
@@ -183,6 +189,9 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     }
     let stimuli = args.stimuli.read()?;
     let silicon = args.silicon.read(stimuli.config.corner)?;
+    // Delays of a file are the gates' to judge, and mismatched macropixels each their own (`gdtof timing --mismatch`).
+    let timing = (args.sdf.is_none() && silicon.mismatch.is_none())
+        .then(|| TimingVerdict::of(&stimuli.config, &silicon, (0, 0)).report());
     let silicon = (silicon != Silicon::nominal(silicon.corner)).then_some(silicon);
     let clash = [
         (args.sdf.is_some(), "--sdf"),
@@ -195,12 +204,86 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         return Err(InputError::new(*option, message).into());
     }
     let needs_array = args.vcd.is_some() || args.sdf.is_some() || args.checks.is_some();
-    let histograms = match silicon {
+    let replayed = match silicon {
         _ if needs_array => replay_array(&stimuli, args, silicon)?,
         Some(silicon) => replay_timed(&stimuli, args.engine, &silicon)?,
         None => replay(&stimuli, args.engine)?,
     };
-    write(&stimuli.config, &histograms, args.out.as_deref(), format)
+    let recording = &stimuli.recording;
+    let summary = Summary {
+        engine: args.engine,
+        events: recording.read,
+        lost_to_dead_time: recording.lost_to_dead_time,
+        after_the_end: recording.after_the_end,
+        photons_that_cancel: replayed.cancelled,
+        timing,
+        time_keeping: replayed.keeping,
+    };
+    summary.tell(&stimuli.config);
+    let out = args.out.as_deref();
+    write(&stimuli.config, &replayed.histograms, out, format)?;
+    if args.json {
+        say(format_args!(
+            "{}\n",
+            serde_json::to_string_pretty(&summary)?
+        ))?;
+    }
+    Ok(())
+}
+
+/// Histograms of the array, and what else a replay finds.
+struct Replayed {
+    histograms: Vec<Vec<u16>>,
+    cancelled: u64,
+    keeping: Option<TimeKeeping>,
+}
+
+/// What became of the events.
+#[derive(serde::Serialize)]
+struct Summary {
+    engine: EngineKind,
+    events: u64,
+    lost_to_dead_time: u64,
+    after_the_end: u64,
+    photons_that_cancel: u64,
+    timing: Option<VerdictReport>,
+    time_keeping: Option<TimeKeeping>,
+}
+
+impl Summary {
+    /// Says on standard error what the chip loses without a word.
+    fn tell(&self, config: &SensorConfig) {
+        if let Some(keeping) = &self.time_keeping {
+            eprint!("{}", table(keeping));
+        }
+        if let Some(timing) = self.timing.as_ref().filter(|timing| !timing.met) {
+            eprintln!("gdtof: timing {}", timing.verdict);
+        }
+        if self.photons_that_cancel > 0 {
+            eprintln!(
+                "gdtof: {} photons cancel: two of one SPAD within a CLK period ({}) undo each other in the front end; a dead time ({}) no shorter than the period prevents it",
+                self.photons_that_cancel,
+                config.clock().period(),
+                config.dead_time(),
+            );
+        }
+    }
+}
+
+/// How many photons of the recording cancel, two to a pair, with the library's delays.
+fn cancelled(stimuli: &Stimuli) -> u64 {
+    let Stimuli {
+        config, exposure, ..
+    } = stimuli;
+    let law = || WindowLaw::new(config, exposure);
+    let cancelling = Cancelling::of(config.dead_time(), exposure.clock, law);
+    cancelling.map_or(0, |cancelling| {
+        let pulses = stimuli.pulses();
+        pulses
+            .iter()
+            .map(|pulses| 2 * cancelling.pairs(pulses).count() as u64)
+            .sum()
+    })
 }
 
 /// The whole array as one netlist, with its waveform, annotated delays and timing checks.
@@ -208,7 +291,7 @@ fn replay_array(
     stimuli: &Stimuli,
     args: &ReplayArgs,
     silicon: Option<Silicon>,
-) -> anyhow::Result<Vec<Vec<u16>>> {
+) -> anyhow::Result<Replayed> {
     let config = &stimuli.config;
     let mut simulation = GateSimulation::new(
         config,
@@ -227,11 +310,13 @@ fn replay_array(
         simulation = simulation.with_timing(&timing);
     }
     let vcd = args.vcd.as_deref();
+    let mut events = simulation.hardware_events();
     match args.checks {
+        // Pulses reach flip-flops whose delays only the gates know.
+        None if args.sdf.is_some() => watch(&mut simulation, stimuli, vcd, &mut events)?,
         None => watch(&mut simulation, stimuli, vcd, &mut ())?,
         Some(policy) => {
             let mut checks = simulation.timing_checks(policy.into());
-            let mut events = simulation.hardware_events();
             watch(
                 &mut simulation,
                 stimuli,
@@ -249,7 +334,18 @@ fn replay_array(
             }
         }
     }
-    Ok(simulation.histograms()?)
+    let cancelled = match silicon {
+        _ if args.sdf.is_some() => 2 * events.count(HardwareEventKind::PulsesCancelled),
+        Some(silicon) => {
+            Timed::new(config, &stimuli.exposure, &silicon).cancelled(&stimuli.pulses())
+        }
+        None => cancelled(stimuli),
+    };
+    Ok(Replayed {
+        histograms: simulation.histograms()?,
+        cancelled,
+        keeping: None,
+    })
 }
 
 /// What `--checks-json` writes.
@@ -281,7 +377,7 @@ fn replay_timed(
     stimuli: &Stimuli,
     kind: EngineKind,
     silicon: &Silicon,
-) -> anyhow::Result<Vec<Vec<u16>>> {
+) -> anyhow::Result<Replayed> {
     let Stimuli {
         config,
         exposure,
@@ -298,15 +394,19 @@ fn replay_timed(
         EngineKind::Cohort => return Err(EngineError::NoPhotons("cohort").into()),
     };
     let timed = Timed::new(config, exposure, silicon);
-    let Some(runner) = runner else {
-        let histograms = timed.by_gates(starts, &pulses, done)?;
-        progress.finish_and_clear();
-        return Ok(histograms);
+    let (histograms, keeping) = match runner {
+        None => (timed.by_gates(starts, &pulses, done)?, None),
+        Some(runner) => {
+            let found = timed.histograms(runner, starts, &pulses, done)?;
+            (found.histograms, Some(found.keeping))
+        }
     };
-    let found = timed.histograms(runner, starts, &pulses, done)?;
     progress.finish_and_clear();
-    eprint!("{}", table(&found.keeping));
-    Ok(found.histograms)
+    Ok(Replayed {
+        histograms,
+        cancelled: timed.cancelled(&pulses),
+        keeping,
+    })
 }
 
 /// Which macropixels kept time, and why the others did not.
@@ -328,7 +428,7 @@ fn progress(stimuli: &Stimuli) -> anyhow::Result<ProgressBar> {
     Ok(ProgressBar::new(stimuli.starts.len() as u64).with_style(style))
 }
 
-fn replay(stimuli: &Stimuli, kind: EngineKind) -> anyhow::Result<Vec<Vec<u16>>> {
+fn replay(stimuli: &Stimuli, kind: EngineKind) -> anyhow::Result<Replayed> {
     let engine = kind.build(&stimuli.config, &stimuli.exposure);
     let progress = progress(stimuli)?;
     let batches: Result<Vec<_>, EngineError> = stimuli
@@ -342,7 +442,11 @@ fn replay(stimuli: &Stimuli, kind: EngineKind) -> anyhow::Result<Vec<Vec<u16>>> 
         })
         .collect();
     progress.finish_and_clear();
-    Ok(batches?.concat())
+    Ok(Replayed {
+        histograms: batches?.concat(),
+        cancelled: cancelled(stimuli),
+        keeping: None,
+    })
 }
 
 #[derive(Clone, Copy)]

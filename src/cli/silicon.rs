@@ -5,25 +5,18 @@
 //!   mismatch, its seed ─────────────► factor on each cell's ┴─► Silicon
 //! ```
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use crate::engine::timing::Silicon;
 use crate::files::InputError;
-use crate::netlist::{Conditions, Corner, Mismatch, Process};
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Speed {
-    Slow,
-    Typ,
-    Fast,
-}
+use crate::netlist::{Conditions, Corner, Mismatch};
 
 /// Silicon and its conditions.
 #[derive(Args)]
 pub struct SiliconArgs {
-    /// Silicon; like voltage and temperature it scales the delays of the sensor's corner.
-    #[arg(long, value_enum, default_value = "typ")]
-    process: Speed,
+    /// Silicon, slow, typ or fast: like voltage and temperature it scales the delays of the sensor's corner.
+    #[arg(long, value_name = "SPEED", default_value = "typ")]
+    process: Corner,
     /// Supply, V.
     #[arg(long, value_name = "V", default_value_t = 1.1)]
     voltage: f64,
@@ -71,19 +64,9 @@ impl SiliconArgs {
     /// Process, supply and temperature.
     pub fn conditions(&self) -> Conditions {
         Conditions {
-            process: match self.process {
-                Speed::Slow => Process::Slow,
-                Speed::Typ => Process::Typ,
-                Speed::Fast => Process::Fast,
-            },
+            process: self.process,
             voltage_v: self.voltage,
             temperature_c: self.temperature,
         }
-    }
-
-    /// The process as it is given on the command line.
-    pub fn process_name(&self) -> String {
-        let value = self.process.to_possible_value();
-        value.map_or(String::new(), |value| value.get_name().to_owned())
     }
 }

@@ -26,6 +26,11 @@ impl Cancelling {
         (dead_time <= clock.period()).then(|| Cancelling { law: law() })
     }
 
+    /// The law that says which CLK edge takes a pulse.
+    pub fn law(&self) -> &WindowLaw {
+        &self.law
+    }
+
     /// Second pulses of the pairs among the pulses of a macropixel, with the CLK edge that would have taken them, counted
     /// from the exposure's first STOP edge; `pulses` are sorted by time.
     pub fn pairs<'p>(

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use super::hardware_events::HardwareEvents;
 use super::lanes::LaneSimulation;
 use super::stimulus::{Pins, Schedule, StimulusPlan};
-use super::{Engine, EngineError};
+use super::{Engine, EngineError, follows};
+use crate::chip::front_end::PulseLimits;
 use crate::chip::{Exposure, SensorConfig, WindowLaw, front_end, histogram, sensor};
 use crate::kernel::{Kernel, LANES, Observer, Policy, Statistics, TimingChecks};
 use crate::netlist::{Library, Netlist, Timing};
@@ -175,7 +176,7 @@ impl<'a> Gate<'a> {
     /// each have their own time leave nothing to share.
     ///
     /// # Errors
-    /// When a bit of a count is unknown.
+    /// When a bit of a count is unknown, and where the front end cannot follow the SPADs.
     ///
     /// # Panics
     /// When the lists have different lengths.
@@ -186,6 +187,7 @@ impl<'a> Gate<'a> {
         pulses: &[&[SpadEvent]],
     ) -> Result<Vec<Vec<u16>>, EngineError> {
         assert!(timings.len() == starts.len() && starts.len() == pulses.len());
+        follows(self.config, &PulseLimits::of(self.config.corner))?;
         let mut histograms = Vec::with_capacity(starts.len());
         for alike in timings.chunk_by(|a, b| std::ptr::eq(*a, *b)) {
             let (from, to) = (histograms.len(), histograms.len() + alike.len());

@@ -154,6 +154,8 @@ pub struct HardwareEvents {
     pixels: Vec<Macropixel>,
     not_before: Time,
     report: HardwareEventReport,
+    /// By kind, those that were not kept among them.
+    counts: [u64; HardwareEventKind::ALL.len()],
 }
 
 impl HardwareEvents {
@@ -223,12 +225,18 @@ impl HardwareEvents {
             pixels,
             not_before,
             report: HardwareEventReport::default(),
+            counts: [0; HardwareEventKind::ALL.len()],
         }
     }
 
     /// What was seen so far.
     pub fn report(&self) -> &HardwareEventReport {
         &self.report
+    }
+
+    /// How often one kind was seen so far, kept or not.
+    pub fn count(&self, kind: HardwareEventKind) -> u64 {
+        self.counts[kind as usize]
     }
 
     fn watched(&mut self, time: Time, pixel: usize, role: Role, value: Logic) {
@@ -287,6 +295,7 @@ impl HardwareEvents {
             }
         }
         if let Some((kind, when, part)) = found.filter(|_| time >= self.not_before) {
+            self.counts[kind as usize] += 1;
             if self.report.hardware_events.len() == MOST_EVENTS {
                 self.report.hardware_events_left_out += 1;
                 return;

@@ -43,7 +43,8 @@ pub use testbench::{export_annotated_verilog, export_netlist, export_verilog};
 pub use timed::{Runner, TimeKeeping, Timed, Timekept};
 pub use window::Window;
 
-use crate::chip::WindowLaw;
+use crate::chip::front_end::PulseLimits;
+use crate::chip::{Race, SensorConfig, WindowLaw};
 use crate::photon::{PhotonStream, SpadEvent};
 
 const _: () = assert!(crate::chip::SPADS == crate::photon::SPADS);
@@ -91,17 +92,24 @@ pub trait Engine: Sync {
     }
 }
 
+/// Whether the front end, with these limits, follows the pulses of this sensor's SPADs.
+fn follows(config: &SensorConfig, limits: &PulseLimits) -> Result<(), EngineError> {
+    let complaint = limits.complaint(config.dead_time_ns);
+    complaint.map_or(Ok(()), |complaint| Err(EngineError::FrontEnd(complaint)))
+}
+
 /// Why an engine has no answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EngineError {
     /// The window law finds two signals too close to call.
-    #[error(
-        "{0}, so only the gate engine can tell what is counted; use --engine gate or change clk_hz, stop_phase_ps or corner"
-    )]
-    Race(&'static str),
+    #[error("{0}, so only the gate engine can tell what is counted; use --engine gate, or {cure}", cure = .0.cure)]
+    Race(Race),
     /// The window law has no single window for this start value.
     #[error("{0}, so the window engine cannot tell what is counted; use --engine cycle or gate")]
     Irregular(&'static str),
+    /// Pulses are shorter, or follow each other faster, than the front end's flip-flops.
+    #[error("{0}")]
+    FrontEnd(String),
     /// The engine works without photons.
     #[error(
         "the {0} engine knows no single photons and cannot replay recorded ones; use --engine window"

@@ -195,9 +195,9 @@ module tb;
     $fwrite(histograms, \"row,col,bin,count\\n\");
 ",
         delays = match config.corner {
-            Corner::Min => "min",
+            Corner::Fast => "min",
             Corner::Typ => "typ",
-            Corner::Max => "max",
+            Corner::Slow => "max",
         },
         last_pin = pins - 1,
         last_pixel = pixels - 1,

@@ -15,24 +15,52 @@ use super::checks::CheckLimits;
 use crate::logic::Logic;
 use crate::units::Time;
 
-/// Which of the three characterised delays applies.
+/// Which of the three characterised delays applies: of slow, typical or fast silicon. SDF calls the delays max, typ and
+/// min, and configurations may, too.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize,
 )]
 #[serde(rename_all = "lowercase")]
 pub enum Corner {
-    /// Fastest silicon, highest voltage.
-    Min,
+    /// Fastest silicon, highest voltage: shortest delays.
+    #[serde(alias = "min")]
+    Fast,
     /// Typical silicon, 50 °C.
     #[default]
     Typ,
-    /// Slowest silicon, lowest voltage.
-    Max,
+    /// Slowest silicon, lowest voltage: longest delays.
+    #[serde(alias = "max")]
+    Slow,
 }
 
 impl Corner {
     /// All corners, fastest first.
-    pub const ALL: [Corner; 3] = [Corner::Min, Corner::Typ, Corner::Max];
+    pub const ALL: [Corner; 3] = [Corner::Fast, Corner::Typ, Corner::Slow];
+
+    /// Name in files, tables and JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Corner::Fast => "fast",
+            Corner::Typ => "typ",
+            Corner::Slow => "slow",
+        }
+    }
+}
+
+impl std::str::FromStr for Corner {
+    type Err = String;
+
+    /// A name, or SDF's.
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "fast" | "min" => Ok(Corner::Fast),
+            "typ" => Ok(Corner::Typ),
+            "slow" | "max" => Ok(Corner::Slow),
+            _ => Err(format!(
+                "{text:?} is no speed of silicon; give slow, typ or fast"
+            )),
+        }
+    }
 }
 
 /// Minimum, typical and maximum of one delay.
@@ -78,9 +106,9 @@ impl Delay {
     /// The delay of one corner, fs.
     pub const fn at(self, corner: Corner) -> u32 {
         match corner {
-            Corner::Min => self.min_fs,
+            Corner::Fast => self.min_fs,
             Corner::Typ => self.typ_fs,
-            Corner::Max => self.max_fs,
+            Corner::Slow => self.max_fs,
         }
     }
 }

@@ -34,7 +34,7 @@ pub use requirements::{Requirement, Requirements};
 pub(crate) use static_timing::caused;
 pub use static_timing::{Arrivals, Bound, Edge, Path, StaticTiming, Step, TimingLoop};
 pub use timing::{ArcDelay, CellDelays, DelayModel, Timing};
-pub use variation::{Conditions, Mismatch, Process, derated_limits, varied, varied_as};
+pub use variation::{Conditions, Mismatch, derated_limits, varied, varied_as};
 pub use verilog::{
     write_cells, write_delays, write_modules, write_parametric_cells, write_standard_cells,
 };

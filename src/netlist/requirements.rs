@@ -46,6 +46,26 @@ impl Requirement {
         Time::from_fs(period.as_fs() * self.halves / 2) - self.need
     }
 
+    /// The ends of its path in words: the clock's edge that launches, the flip-flop, the edge that captures.
+    pub fn ends(&self, netlist: &Netlist, clock: &str) -> String {
+        let name = |edge| match edge {
+            Edge::Rise => "rise",
+            Edge::Fall => "fall",
+        };
+        let (from, cell, to) = (
+            name(self.launch),
+            netlist.cell_path(self.cell),
+            name(self.capture),
+        );
+        match self.kind.concerns_data() {
+            true => format!(
+                "{clock} {from} to {cell} D {}, against {clock} {to}",
+                name(self.edge)
+            ),
+            false => format!("{clock} {from} to {to} at {cell}"),
+        }
+    }
+
     /// The shortest period that keeps the limit; none if no period does.
     pub fn period(&self) -> Option<Time> {
         match self.halves {

@@ -21,26 +21,14 @@ use rand_philox::{Philox, splitmix64, u32_to_unit_f64};
 
 use super::cell::CellKind;
 use super::flat::Netlist;
-use super::library::Library;
+use super::library::{Corner, Library};
 use super::timing::Timing;
-
-/// Speed of the silicon.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Process {
-    /// High threshold, weak drive.
-    Slow,
-    /// As characterised.
-    #[default]
-    Typ,
-    /// Low threshold, strong drive.
-    Fast,
-}
 
 /// Where the chip is operated, and what it is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conditions {
-    /// Silicon.
-    pub process: Process,
+    /// Silicon, at a voltage and temperature that are the same for all: faster by its transistors alone.
+    pub process: Corner,
     /// Supply, V.
     pub voltage_v: f64,
     /// Junction temperature, °C.
@@ -51,7 +39,7 @@ impl Default for Conditions {
     /// Where the library is characterised: typical, 1.1 V, 50 °C (thesis 4.6).
     fn default() -> Self {
         Conditions {
-            process: Process::Typ,
+            process: Corner::Typ,
             voltage_v: 1.1,
             temperature_c: 50.0,
         }
@@ -77,9 +65,10 @@ impl Conditions {
         let in_range =
             (0.0..=2.0).contains(&self.voltage_v) && (-55.0..=150.0).contains(&self.temperature_c);
         let (shift_v, drive) = match self.process {
-            Process::Slow => (0.03, 0.92),
-            Process::Typ => (0.0, 1.0),
-            Process::Fast => (-0.03, 1.08),
+            // High threshold and weak drive; low threshold and strong drive.
+            Corner::Slow => (0.03, 0.92),
+            Corner::Typ => (0.0, 1.0),
+            Corner::Fast => (-0.03, 1.08),
         };
         let reference_c = 50.0;
         let threshold =
@@ -177,7 +166,7 @@ pub fn varied_as(
 mod tests {
     use super::*;
 
-    fn factor(process: Process, voltage_v: f64, temperature_c: f64) -> f64 {
+    fn factor(process: Corner, voltage_v: f64, temperature_c: f64) -> f64 {
         let conditions = Conditions {
             process,
             voltage_v,
@@ -193,11 +182,11 @@ mod tests {
 
     #[test]
     fn low_voltage_heat_and_slow_silicon_are_slow() {
-        assert!(factor(Process::Typ, 1.0, 50.0) > 1.0);
-        assert!(factor(Process::Typ, 1.1, 100.0) > 1.0);
-        assert!(factor(Process::Slow, 1.1, 50.0) > 1.0);
-        assert!(factor(Process::Fast, 1.1, 50.0) < 1.0);
-        assert!(factor(Process::Typ, 1.2, 0.0) < 1.0);
+        assert!(factor(Corner::Typ, 1.0, 50.0) > 1.0);
+        assert!(factor(Corner::Typ, 1.1, 100.0) > 1.0);
+        assert!(factor(Corner::Slow, 1.1, 50.0) > 1.0);
+        assert!(factor(Corner::Fast, 1.1, 50.0) < 1.0);
+        assert!(factor(Corner::Typ, 1.2, 0.0) < 1.0);
     }
 
     #[test]

@@ -99,7 +99,7 @@ pub fn ripple_rows() -> Vec<Row> {
     let slow = Time::from_ns(20);
     let ns = |time: Option<Time>| time.map_or(f64::NAN, Time::as_ns);
     let by_gates = shortest_period(slow, |p| {
-        gate_works(&config, &NOMINAL, Limits::Ignored, p, Time::ZERO)
+        gate_works(&config, &NOMINAL, Limits::Ignored, (p, Time::ZERO), 0)
     });
     let by_paths = shortest_period(slow, |p| timing.works(p, Time::ZERO));
     let below = timing.forbidden(0).0 - Time::from_ps(2);

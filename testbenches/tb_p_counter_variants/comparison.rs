@@ -136,7 +136,7 @@ impl Row {
             period: (
                 shortest_period(SLOW, |p| by_paths.works(p, Time::ZERO)),
                 shortest_period(SLOW, |p| {
-                    gate_works(&config, &TYPICAL, Limits::Ignored, p, Time::ZERO)
+                    gate_works(&config, &TYPICAL, Limits::Ignored, (p, Time::ZERO), 0)
                 }),
             ),
         }

@@ -54,9 +54,9 @@ fn run(folder: &Path, program: &str, arguments: &[&str]) -> String {
 #[allow(dead_code)]
 pub fn standard_cells(corner: Corner) -> [&'static str; 6] {
     let delays = match corner {
-        Corner::Min => "-Tmin",
+        Corner::Fast => "-Tmin",
         Corner::Typ => "-Ttyp",
-        Corner::Max => "-Tmax",
+        Corner::Slow => "-Tmax",
     };
     let sdf = "-DSDF=\"chip.sdf\"";
     [

@@ -13,7 +13,7 @@ use self::section::{Cell, Section};
 use self::tables::Subject;
 use super::silicon::SiliconArgs;
 use super::{SensorArgs, say};
-use crate::engine::timing::{Limits, LoadTiming};
+use crate::engine::timing::{Limits, LoadTiming, Silicon, TimingVerdict};
 use crate::files::InputError;
 
 /// Arguments of `gdtof timing`.
@@ -48,8 +48,18 @@ pub fn run(args: &TimingArgs) -> anyhow::Result<()> {
     }
     let subject = Subject::new(&config, &silicon);
     let load = LoadTiming::of(&config, &silicon, Limits::Kept);
+    let spread = match silicon.mismatch {
+        Some(_) => Some(distribution::analyse(&config, &silicon)?),
+        None => None,
+    };
+    let position = spread.as_ref().map_or((0, 0), |spread| {
+        let tightest = spread.tightest();
+        (tightest.row, tightest.col)
+    });
+    let verdict = TimingVerdict::of(&config, &silicon, position);
     let mut sections = vec![
-        condition_table(&args.silicon, silicon.factor),
+        condition_table(&args.silicon, &silicon),
+        tables::verdict(&verdict),
         tables::windows(&subject),
         tables::reset_pulse(&subject),
         tables::periods(&subject),
@@ -62,15 +72,15 @@ pub fn run(args: &TimingArgs) -> anyhow::Result<()> {
     if args.paths {
         sections.push(tables::paths(&subject, &load));
     }
-    if silicon.mismatch.is_some() {
-        let found = distribution::analyse(&config, &silicon)?;
-        sections.push(distribution::table(&config, &found));
+    if let Some(found) = &spread {
+        sections.push(distribution::table(&config, found));
         if let Some(path) = &args.plot {
-            distribution::plot(&config, &found, path)?;
+            distribution::plot(&config, found, path)?;
         }
     }
     if args.json {
         let mut document = serde_json::Map::new();
+        document.insert("timing".to_owned(), serde_json::to_value(verdict.report())?);
         for section in &sections {
             section.add_to(&mut document);
         }
@@ -84,15 +94,22 @@ pub fn run(args: &TimingArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn condition_table(args: &SiliconArgs, factor: f64) -> Section {
+fn condition_table(args: &SiliconArgs, silicon: &Silicon) -> Section {
     let conditions = args.conditions();
-    let headings = &["process", "voltage (V)", "temperature (C)", "delay factor"];
+    let headings = &[
+        "corner",
+        "process",
+        "voltage (V)",
+        "temperature (C)",
+        "delay factor",
+    ];
     let mut section = Section::new("conditions", "Conditions", headings);
     section.push([
-        args.process_name().into(),
+        silicon.corner.name().into(),
+        conditions.process.name().into(),
         Cell::Number(Some(conditions.voltage_v), 3),
         Cell::Number(Some(conditions.temperature_c), 1),
-        Cell::Number(Some(factor), 4),
+        Cell::Number(Some(silicon.factor), 4),
     ]);
     section
 }

@@ -3,8 +3,9 @@
 use super::section::{Cell, Section};
 use crate::chip::SensorConfig;
 use crate::engine::timing::{
-    CorrelationTiming, Limits, LoadTiming, LocalClocks, MacropixelTiming, Silicon, corner_limits,
-    critical_factor, gate_works, load_works, longest, phases, reset, ripple, shortest_period,
+    CorrelationTiming, Limits, LoadTiming, LocalClocks, MacropixelTiming, Silicon, TimingVerdict,
+    corner_limits, factor_range, gate_works, load_works, longest, phases, reset, ripple,
+    shortest_period,
 };
 use crate::netlist::{CheckKind, Netlist, Path, Requirement};
 use crate::units::Time;
@@ -37,6 +38,22 @@ impl<'a> Subject<'a> {
             Limits::Ignored => &self.ignored,
         }
     }
+}
+
+/// The verdict, and what should be known beside it.
+pub fn verdict(verdict: &TimingVerdict) -> Section {
+    let title = format!("Timing: {verdict}");
+    let notes = verdict.notes.iter().map(|note| format!("\n  note: {note}"));
+    let title = title + &notes.collect::<String>();
+    let mut section = Section::new("margins", title, &["check", "slack", "path"]);
+    for margin in &verdict.margins {
+        section.push([
+            margin.check.as_str().into(),
+            margin.slack.into(),
+            margin.path.as_str().into(),
+        ]);
+    }
+    section
 }
 
 /// Earliest and latest changes.
@@ -117,7 +134,7 @@ pub fn periods(subject: &Subject<'_>) -> Section {
         (Limits::Kept, "setup, hold, widths"),
     ] {
         let pixel = subject.of(limits);
-        let gates = |period, phase| gate_works(config, silicon, limits, period, phase);
+        let gates = |period, phase| gate_works(config, silicon, limits, (period, phase), 0);
         let correlation = CorrelationTiming::of(config, silicon, limits);
         push(
             &format!("STOP on CLK's fall: {suffix}"),
@@ -188,30 +205,32 @@ pub fn flip_flops(subject: &Subject<'_>, load: &LoadTiming) -> Section {
     let mut section = Section::new("flip_flops", title, headings);
     let local = LocalClocks::of(config, subject.silicon);
     let pixel = &subject.kept;
-    let clk: Vec<Requirement> = pixel.clk.iter().chain(&pixel.hits).copied().collect();
-    let clocks: [(&str, &Netlist, &[Requirement], Option<Time>); 4] = [
-        ("CLK", &pixel.netlist, &clk, Some(config.clock().period())),
-        ("HIT", &pixel.netlist, &local.counts, None),
-        (
-            "SPAD_RAW",
-            &pixel.netlist,
-            &local.toggles,
-            Some(config.dead_time()),
-        ),
-        (
-            "LOAD_CLK",
-            &load.netlist,
-            &load.load_clk,
-            Some(config.load_clock().period()),
-        ),
+    let period = config.clock().period();
+    let aim = pixel.aim(period, config.stop_phase());
+    let load_period = config.load_clock().period();
+    type Slack<'s> = &'s dyn Fn(&Requirement) -> Option<Time>;
+    let clocks: [(&str, &Netlist, &[Requirement], Slack<'_>); 5] = [
+        ("CLK", &pixel.netlist, &pixel.clk, &|r| {
+            Some(r.slack(period))
+        }),
+        ("STROBE", &pixel.netlist, &pixel.hits, &|r| {
+            Some(pixel.strobe_slack(r, period, aim))
+        }),
+        ("HIT", &local.netlist, &local.counts, &|_| None),
+        ("SPAD_RAW", &local.netlist, &local.toggles, &|r| {
+            local.toggle_slack(r, config.dead_time())
+        }),
+        ("LOAD_CLK", &load.netlist, &load.load_clk, &|r| {
+            Some(r.slack(load_period))
+        }),
     ];
-    for (clock, netlist, all, period) in clocks {
+    for (clock, netlist, all, slack) in clocks {
         for kind in CheckKind::ALL {
             let of_kind: Vec<&Requirement> = all.iter().filter(|r| r.kind == kind).collect();
             let Some(limiting) = of_kind.iter().max_by_key(|r| (r.period(), r.need)) else {
                 continue;
             };
-            let slacks = |period| of_kind.iter().map(move |r| r.slack(period)).min();
+            let slacks = of_kind.iter().filter_map(|r| slack(r));
             let mut cells: Vec<usize> = of_kind.iter().map(|r| r.cell).collect();
             cells.sort_unstable();
             cells.dedup();
@@ -221,7 +240,7 @@ pub fn flip_flops(subject: &Subject<'_>, load: &LoadTiming) -> Section {
                 cells.len().to_string().into(),
                 netlist.cell_path(limiting.cell).into(),
                 longest(of_kind.iter().copied()).into(),
-                period.and_then(slacks).into(),
+                slacks.min().into(),
             ]);
         }
     }
@@ -243,45 +262,56 @@ pub fn ripples(config: &SensorConfig, silicon: &Silicon) -> Section {
     section
 }
 
-/// Where the sensor's CLK fails: the largest factor on all delays, and the conditions that exceed it.
+/// Where the sensor's CLK fails: the factors on all delays beyond which it does, and the conditions that have them.
 pub fn corners(config: &SensorConfig, silicon: &Silicon) -> Section {
     let headings = &[
         "process",
         "at 1.1 V, 50 C",
-        "fails from (V) down",
-        "fails from (C) up",
+        "too slow from (V) down",
+        "too slow from (C) up",
+        "too fast from (V) up",
+        "too fast from (C) down",
     ];
-    let critical = critical_factor(config, silicon, Limits::Kept);
-    let gates = critical.map(|factor| {
-        let works = |factor: f64| {
-            let (period, phase) = (config.clock().period(), config.stop_phase());
-            gate_works(config, &silicon.at(factor), Limits::Kept, period, phase)
-        };
-        match (works(factor), works(factor + 2e-5)) {
-            (true, false) => "simulation agrees",
-            (true, true) => "simulation still works there",
-            (false, _) => "SIMULATION FAILS ALREADY",
-        }
-    });
+    let range = factor_range(config, silicon, Limits::Kept);
     let mhz = config.clk_hz * 1e-6;
-    let title = match critical.zip(gates) {
+    let title = match range {
         None => format!("Where {mhz} MHz fails: everywhere"),
-        Some((factor, gates)) => {
-            format!("Where {mhz} MHz fails: delays {factor:.5} times the library's ({gates})")
+        Some(range) => {
+            let at = (config.clock().period(), config.stop_phase());
+            let works = |factor: f64| {
+                let silicon = silicon.at(factor);
+                gate_works(config, &silicon, Limits::Kept, at, range.moved)
+            };
+            let gates = |works_at: f64, fails_at: f64| match (works(works_at), works(fails_at)) {
+                (true, false) => "simulation agrees",
+                (true, true) => "simulation still works there",
+                (false, _) => "SIMULATION FAILS ALREADY",
+            };
+            let slowest = range.slowest;
+            let agrees = gates(slowest, slowest + 2e-5);
+            let faster = range.fastest.map_or(String::new(), |fastest| {
+                let agrees = gates(fastest, fastest - 2e-5);
+                format!(", and less than {fastest:.5} times ({agrees})")
+            });
+            format!(
+                "Where {mhz} MHz fails: delays more than {slowest:.5} times the library's ({agrees}){faster}"
+            )
         }
     };
     let mut section = Section::new("corners", title, headings);
-    for limit in corner_limits(critical.unwrap_or(0.0)) {
+    for limit in corner_limits(range) {
         let verdict = if limit.works_at_reference {
             "works"
         } else {
             "fails"
         };
         section.push([
-            format!("{:?}", limit.process).to_lowercase().into(),
+            limit.process.name().into(),
             verdict.into(),
             Cell::Number(limit.fails_below_v, 3),
             Cell::Number(limit.fails_above_c, 1),
+            Cell::Number(limit.fails_above_v, 3),
+            Cell::Number(limit.fails_below_c, 1),
         ]);
     }
     section

@@ -50,7 +50,7 @@ use self::hits::Hits;
 pub use self::hits::at_least_hit;
 use self::light::{SpadLight, absorbed};
 use self::words::RandomWords;
-use super::{Engine, EngineError, Exposed, LitPixel, Work};
+use super::{Engine, EngineError, Exposed, LitPixel, Work, follows};
 use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw, correlation, histogram, window_law};
 use crate::photon::{PhotonStream, PixelLight, SPADS, SpadEvent, StreamConfig};
 
@@ -284,6 +284,7 @@ impl<'a> Cohort<'a> {
         light: &PixelLight,
     ) -> Result<Option<Cohorts>, EngineError> {
         let bins = self.config.bins;
+        follows(self.config, &self.law.timing().pulses)?;
         let Opening { window, from_fs } = self.opening(start);
         let window = match window {
             window_law::Window::Open(window) => window,

@@ -31,7 +31,7 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use super::{Engine, EngineError, Gate};
+use super::{Engine, EngineError, Gate, follows};
 use crate::chip::window_law::{Window, WindowLaw};
 use crate::chip::{Exposure, SensorConfig};
 use crate::photon::SpadEvent;
@@ -248,6 +248,7 @@ impl Engine for Cycle<'_> {
         starts: &[u16],
         pulses: &[&[SpadEvent]],
     ) -> Result<Vec<Vec<u16>>, EngineError> {
+        follows(self.config, &self.law.timing().pulses)?;
         for &start in starts {
             if let Window::Race(why) = self.law.window(start) {
                 return Err(EngineError::Race(why));

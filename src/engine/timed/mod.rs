@@ -21,7 +21,7 @@ use rayon::prelude::*;
 
 use super::stimulus::StimulusPlan;
 use super::timing::Silicon;
-use super::{Cycle, Engine, EngineError, Gate, LaneSimulation, Window};
+use super::{Cancelling, Cycle, Engine, EngineError, Gate, LaneSimulation, Window};
 use crate::chip::{ChipTiming, Exposure, Mode, PCounter, SensorConfig, WindowLaw, sensor};
 use crate::kernel::LANES;
 use crate::netlist::Timing;
@@ -39,7 +39,7 @@ pub enum Runner {
 }
 
 /// Which macropixels were simulated.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize)]
 pub struct TimeKeeping {
     /// Macropixels whose every order of events was decided in closed form.
     pub kept: usize,
@@ -145,6 +145,27 @@ impl<'a> Timed<'a> {
         let mut judged = judged?;
         self.run_cycle(&cycle, starts, &mut judged, &done)?;
         self.finish(starts, pulses, judged, &done)
+    }
+
+    /// How many of the array's pulses cancel, two to a pair: each macropixel's flip-flops have delays of their own.
+    ///
+    /// # Panics
+    /// When there is not one list of pulses for every macropixel.
+    pub fn cancelled(&self, pulses: &[&[SpadEvent]]) -> u64 {
+        let Setting {
+            config, exposure, ..
+        } = self.setting;
+        assert!(pulses.len() == config.pixels());
+        let law = || WindowLaw::new(config, exposure);
+        let Some(cancelling) = Cancelling::of(config.dead_time(), exposure.clock, law) else {
+            return 0;
+        };
+        let of_pixel = |(pixel, pulses): (usize, &&[SpadEvent])| {
+            let orders = self.orders_of(&self.timing(pixel)).into_owned();
+            let shifted = orders.shifted(cancelling.law(), pulses);
+            2 * cancelling.pairs(&shifted).count() as u64
+        };
+        pulses.par_iter().enumerate().map(of_pixel).sum()
     }
 
     /// Histograms of the whole array, every macropixel at gate level with its own delays.

@@ -134,7 +134,8 @@ impl Orders {
             let law = WindowLaw::with_timing(setting.config, setting.exposure, timing);
             let first_edge = match law.window(start) {
                 Window::Open(window) => Some(window.first_edge),
-                Window::Race(why) | Window::Irregular(why) => return Err(why),
+                Window::Race(race) => return Err(race.what),
+                Window::Irregular(why) => return Err(why),
                 Window::Never => unreachable!("bins do not stop a counter"),
             };
             match parts.iter_mut().find(|part| part.first_edge == first_edge) {

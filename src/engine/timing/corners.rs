@@ -3,71 +3,117 @@
 //! All delays and limits scale by one factor ([`Conditions::delay_factor`]), so the search is for the factor from
 //! which on the macropixel no longer works, and then for the conditions that have it.
 
-use super::{Limits, MacropixelTiming, Silicon};
+use super::{Aim, Limits, MacropixelTiming, Silicon};
 use crate::chip::SensorConfig;
-use crate::netlist::{Conditions, Process};
+use crate::netlist::{Conditions, Corner};
+use crate::units::Time;
+
+/// Factors on every delay with which a macropixel counts as the library's does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FactorRange {
+    /// The smallest, if faster silicon fails; to 1 in 10⁵.
+    pub fastest: Option<f64>,
+    /// The largest, to 1 in 10⁵.
+    pub slowest: f64,
+    /// Bins by which windows end later there than at a slow clock.
+    pub moved: i64,
+}
 
 /// How far one process can be taken from the library's conditions until the sensor's CLK fails.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CornerLimit {
     /// Silicon.
-    pub process: Process,
+    pub process: Corner,
     /// Whether it works at the library's voltage and temperature.
     pub works_at_reference: bool,
-    /// The highest voltage (to 1 mV) at the library's temperature at which it fails; none if it never does.
+    /// The highest voltage (to 1 mV) at the library's temperature at which it is too slow; none if it never is.
     pub fails_below_v: Option<f64>,
-    /// The lowest temperature (to 0.1 °C) at the library's voltage at which it fails; none if it never does.
+    /// The lowest temperature (to 0.1 °C) at the library's voltage at which it is too slow; none if it never is.
     pub fails_above_c: Option<f64>,
+    /// The lowest voltage at which it is too fast.
+    pub fails_above_v: Option<f64>,
+    /// The highest temperature at which it is too fast.
+    pub fails_below_c: Option<f64>,
 }
 
-/// The largest factor on every delay, to 1 in 10⁵, at which macropixel (0, 0) works at the sensor's CLK; none if
-/// it does not work at a hundredth of its delays. A factor on `silicon` is replaced.
-pub fn critical_factor(config: &SensorConfig, silicon: &Silicon, limits: Limits) -> Option<f64> {
+/// The factors on every delay, to 1 in 10⁵, with which macropixel (0, 0) counts as at the library's delays or, if those
+/// fail, as at a slow clock; none if it does not work at a hundredth of its delays either. A factor on `silicon` is
+/// replaced.
+pub fn factor_range(
+    config: &SensorConfig,
+    silicon: &Silicon,
+    limits: Limits,
+) -> Option<FactorRange> {
+    const ONE: u32 = 100_000;
+    const NEAR_NONE: u32 = 1_000;
+    const STEP: u32 = 2_000;
     let (period, phase) = (config.clock().period(), config.stop_phase());
-    let works = |steps: u32| {
-        let scaled = silicon.at(steps as f64 * 1e-5);
-        MacropixelTiming::of(config, &scaled, limits, (0, 0)).works(period, phase)
+    let timing = |steps: u32| {
+        let scaled = silicon.at(f64::from(steps) * 1e-5);
+        MacropixelTiming::of(config, &scaled, limits, (0, 0))
     };
-    // From the nominal delays, or near none, up to the first that fails: faster ones need not work at a free STOP phase.
-    let mut good = [100_000, 1_000].into_iter().find(|&steps| works(steps))?;
-    let mut bad = good;
-    while works(bad) {
-        good = bad;
-        bad += 2_000;
-    }
-    while bad - good > 1 {
-        let middle = (good + bad) / 2;
-        if works(middle) {
-            good = middle;
-        } else {
-            bad = middle;
+    let library = timing(ONE).aim(period, phase);
+    let works = |steps, aim| timing(steps).slack(period, phase, aim) >= Time::ZERO;
+    let tried = [(ONE, library), (NEAR_NONE, Aim::SLOW)];
+    let (start, aim) = tried.into_iter().find(|&(steps, aim)| works(steps, aim))?;
+    let between = |mut good: u32, mut bad: u32| {
+        while good.abs_diff(bad) > 1 {
+            let middle = (good + bad) / 2;
+            if works(middle, aim) {
+                good = middle;
+            } else {
+                bad = middle;
+            }
         }
-    }
-    Some(good as f64 * 1e-5)
+        f64::from(good) * 1e-5
+    };
+    let bad = (1..)
+        .map(|k| start + k * STEP)
+        .find(|&steps| !works(steps, aim));
+    let bad = bad.expect("no chip works at any delay");
+    let slowest = between(bad - STEP, bad);
+    // Down to delays near none, to the first that fails.
+    let mut faster = (1..)
+        .map_while(|k| start.checked_sub(k * STEP))
+        .filter(|&s| s >= NEAR_NONE);
+    let bad = faster.find(|&steps| !works(steps, aim));
+    Some(FactorRange {
+        fastest: bad.map(|bad| between(bad + STEP, bad)),
+        slowest,
+        moved: aim.moved(),
+    })
 }
 
-/// The limits of slow, typical and fast silicon for a chip that works up to `critical` times its delays.
-pub fn corner_limits(critical: f64) -> [CornerLimit; 3] {
+/// The limits of slow, typical and fast silicon for a chip that works with these factors on its delays.
+pub fn corner_limits(range: Option<FactorRange>) -> [CornerLimit; 3] {
     let reference = Conditions::default();
-    [Process::Slow, Process::Typ, Process::Fast].map(|process| {
-        let fails = |voltage_v: f64, temperature_c: f64| {
+    let slowest = range.map_or(0.0, |range| range.slowest);
+    let fastest = range.and_then(|range| range.fastest).unwrap_or(0.0);
+    [Corner::Slow, Corner::Typ, Corner::Fast].map(|process| {
+        let factor = |voltage_v: f64, temperature_c: f64| {
             let conditions = Conditions {
                 process,
                 voltage_v,
                 temperature_c,
             };
-            conditions
-                .delay_factor()
-                .is_some_and(|factor| factor > critical)
+            conditions.delay_factor()
         };
-        // Downwards from the highest supply, upwards from the lowest temperature: the first that fails.
-        let mut voltages = (0..=2_000).rev().map(|mv| mv as f64 * 1e-3);
-        let mut temperatures = (-550..=1_500).map(|tenth| tenth as f64 * 0.1);
+        let (volts, celsius) = (reference.voltage_v, reference.temperature_c);
+        let at_voltage = |v: &f64| factor(*v, celsius);
+        let at_temperature = |c: &f64| factor(volts, *c);
+        let is_slow = |factor: Option<f64>| factor.is_some_and(|factor| factor > slowest);
+        let is_fast = |factor: Option<f64>| factor.is_some_and(|factor| factor < fastest);
+        let voltages = || (0..=2_000).map(|mv| f64::from(mv) * 1e-3);
+        let temperatures = || (-550..=1_500).map(|tenth| f64::from(tenth) * 0.1);
+        let at_reference = factor(volts, celsius);
         CornerLimit {
             process,
-            works_at_reference: !fails(reference.voltage_v, reference.temperature_c),
-            fails_below_v: voltages.find(|&v| fails(v, reference.temperature_c)),
-            fails_above_c: temperatures.find(|&c| fails(reference.voltage_v, c)),
+            works_at_reference: !is_slow(at_reference) && !is_fast(at_reference),
+            // Towards slower silicon, and towards faster: the first that fails.
+            fails_below_v: voltages().rev().find(|v| is_slow(at_voltage(v))),
+            fails_above_c: temperatures().find(|c| is_slow(at_temperature(c))),
+            fails_above_v: voltages().find(|v| is_fast(at_voltage(v))),
+            fails_below_c: temperatures().rev().find(|c| is_fast(at_temperature(c))),
         }
     })
 }
@@ -78,12 +124,32 @@ mod tests {
 
     #[test]
     fn a_chip_with_less_margin_fails_at_a_higher_voltage_and_a_lower_temperature() {
-        let [tight, loose] = [1.02, 1.05].map(corner_limits);
+        let up_to = |slowest| {
+            corner_limits(Some(FactorRange {
+                fastest: None,
+                slowest,
+                moved: 0,
+            }))
+        };
+        let [tight, loose] = [1.02, 1.05].map(up_to);
+        assert!(
+            tight
+                .iter()
+                .all(|t| t.fails_above_v.is_none() && t.fails_below_c.is_none())
+        );
+        let between = corner_limits(Some(FactorRange {
+            fastest: Some(0.95),
+            slowest: 1.05,
+            moved: 1,
+        }));
+        let [_, typ, fast] = between;
+        assert!(typ.works_at_reference && !fast.works_at_reference);
+        assert!(typ.fails_above_v > Some(1.1) && fast.fails_above_v < Some(1.1));
         for (tight, loose) in tight.iter().zip(loose) {
             assert!(tight.fails_below_v > loose.fails_below_v);
             let (tight, loose) = (tight.fails_above_c, loose.fails_above_c);
             assert!(loose.is_none() || tight.unwrap() <= loose.unwrap());
         }
-        assert!(tight[1].works_at_reference && !corner_limits(0.99)[1].works_at_reference);
+        assert!(tight[1].works_at_reference && !up_to(0.99)[1].works_at_reference);
     }
 }

@@ -37,14 +37,14 @@ pub(super) fn checks(silicon: &Silicon, gate: &GateSimulation<'_>) -> TimingChec
         .asynchronous(gate.netlist(), front_end::is_asynchronous_sampler)
 }
 
-/// Whether a gate-level macropixel counts a pattern of photons into the bins of a slow clock and, if limits are
-/// to be kept, breaks none.
+/// Whether a gate-level macropixel counts a pattern of photons into the bins of a slow clock, or as many bins later, and,
+/// if limits are to be kept, breaks none.
 pub fn gate_works(
     config: &SensorConfig,
     silicon: &Silicon,
     limits: Limits,
-    period: Time,
-    phase: Time,
+    (period, phase): (Time, Time),
+    moved: i64,
 ) -> bool {
     let Ok(clock) = Frequency::from_period(period) else {
         return false;
@@ -76,7 +76,7 @@ pub fn gate_works(
     let mut pulses = Vec::new();
     let mut expected = vec![0; config.bins];
     for bin in 0..config.bins as i64 {
-        let edge = window.first_edge + bin;
+        let edge = window.first_edge + moved + bin;
         if has_photon(bin) && edge > 1 {
             expected[bin as usize] = 1;
             pulses.push(SpadEvent {

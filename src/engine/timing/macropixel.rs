@@ -10,7 +10,8 @@
 //! design, the sixteen that sample SPADs. The histogram's counters run on HIT, once in a laser cycle.
 
 use super::{Limits, Silicon};
-use crate::chip::{PCounter, SensorConfig, front_end, histogram, sensor};
+use crate::chip::front_end::{self, PulseLimits};
+use crate::chip::{PCounter, Race, SensorConfig, histogram, sensor};
 use crate::netlist::{
     Bound, CellKind, CheckKind, Edge, NetId, Netlist, Path, Requirement, Requirements, StaticTiming,
 };
@@ -21,6 +22,8 @@ use crate::units::Time;
 pub struct MacropixelTiming {
     /// The netlist that is analysed, which names the nets of the paths.
     pub netlist: Netlist,
+    /// Dotted path of the macropixel there.
+    pixel: String,
     /// CLK falls → LOCAL_STOP rises: the ripple delay of the thesis (4.6, Fig. 56).
     pub ripple: Path,
     /// CLK falls → STROBE rises.
@@ -50,6 +53,33 @@ pub struct MacropixelTiming {
     recovery: Time,
     removal: Time,
     control_high: Time,
+}
+
+/// Which CLK edges a start value is counted and caught by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Aim {
+    /// Rising edges that the strobe comes after. A slow clock's comes before all of them.
+    pub edges: i64,
+    /// The first falling edge that counts. A slow clock's is edge 1.
+    pub first: i64,
+}
+
+impl Aim {
+    /// A slow clock's.
+    pub const SLOW: Aim = Aim { edges: 0, first: 1 };
+
+    /// Bins by which windows end later than at a slow clock.
+    pub const fn moved(self) -> i64 {
+        self.edges + self.first - 1
+    }
+
+    /// The same with a strobe one rising edge earlier.
+    pub const fn earlier(self) -> Self {
+        Aim {
+            edges: self.edges - 1,
+            ..self
+        }
+    }
 }
 
 impl MacropixelTiming {
@@ -149,6 +179,7 @@ impl MacropixelTiming {
             recovery: limit(CheckKind::Recovery),
             removal: limit(CheckKind::Removal),
             control_high: limit(CheckKind::ControlHigh),
+            pixel,
             netlist,
         }
     }
@@ -200,20 +231,97 @@ impl MacropixelTiming {
         self.forbidden(0).1
     }
 
-    /// What a period leaves over: of the strobe before the shift register's change, and of every other flip-flop.
-    pub fn slack(&self, period: Time) -> Time {
-        let all = self.clk.iter().chain(&self.hits);
-        all.map(|r| r.slack(period)).min().unwrap_or(Time::MAX)
+    /// Dotted path of one of the macropixel's nets.
+    pub fn path_of(&self, name: &str) -> String {
+        format!("{}.{name}", self.pixel)
+    }
+
+    /// Between which edges this macropixel strobes and counts first: by the middle of what is certain, whatever limits say.
+    pub fn aim(&self, period: Time, phase: Time) -> Aim {
+        let t = period.as_fs();
+        let middle = |window: (Time, Time)| (window.0 + window.1).as_fs();
+        // Twice the time from the first rising edge's change of SHIFT to the strobe.
+        let after = middle(self.strobe) - middle(self.shift) - t;
+        let (ignored_until, counts_from) = self.first_in_doubt(phase);
+        let doubt = middle((ignored_until, counts_from));
+        Aim {
+            edges: (after.div_euclid(2 * t) + 1).max(0),
+            first: match self.counts_at_once {
+                true => 1,
+                false => (-(-doubt).div_euclid(2 * t)).max(0),
+            },
+        }
+    }
+
+    /// What a period leaves over of a limit of the flip-flops that catch the strobe, if it comes where `aim` says.
+    pub fn strobe_slack(&self, requirement: &Requirement, period: Time, aim: Aim) -> Time {
+        let later = period * aim.edges;
+        match requirement.kind {
+            CheckKind::Setup => requirement.slack(period) - later,
+            CheckKind::Hold => requirement.slack(period) + later,
+            _ => requirement.slack(period),
+        }
+    }
+
+    /// The strobe and the change of the shift register that is nearest to it.
+    pub fn strobe_race(&self, period: Time) -> Race {
+        let (strobe, shift) = (self.strobe.1, self.shift.0);
+        let hold = self.hit_hold() - (strobe - shift);
+        let setup = self.hit_setup() - (self.shift.1 - self.strobe.0);
+        let edges = (strobe - shift).as_fs().div_euclid(period.as_fs());
+        let shortest = self.clk_period().unwrap_or(period);
+        Race::strobe_at_shift(period, edges, (strobe, shift), (setup, hold), shortest)
+    }
+
+    /// Falling CLK edges after CLK's fall nearest to STOP: until when they are sure not to count, and from when on they are
+    /// sure to.
+    fn first_in_doubt(&self, phase: Time) -> (Time, Time) {
+        (
+            self.release.0 - self.counter_clk.1 - self.removal + phase,
+            self.release.1 - self.counter_clk.0 + self.recovery + phase,
+        )
+    }
+
+    /// What is left over between the reset's release and the CLK edges before and after it, and what meets what if
+    /// nothing is; none where the P-counter is not reset.
+    pub fn first_count(&self, period: Time, phase: Time, aim: Aim) -> Option<(Time, Race)> {
+        if self.counts_at_once {
+            return None;
+        }
+        let (ignored_until, counts_from) = self.first_in_doubt(phase);
+        let (before, after) = (period * (aim.first - 1), period * aim.first);
+        let recovery = after - counts_from;
+        // CLK has no edge before number 0.
+        let removal = (aim.first > 0).then(|| ignored_until - before);
+        let slack = removal.map_or(recovery, |removal| removal.min(recovery));
+        let edge = if slack == recovery { after } else { before };
+        let to_counter_clk = self.counter_clk.1 - phase;
+        let what = "a CLK edge meets the end of the reset pulse";
+        let forbidden = (ignored_until + to_counter_clk, counts_from + to_counter_clk);
+        let race = Race::with_stop(what, edge + to_counter_clk, forbidden, phase, period);
+        Some((slack, race))
+    }
+
+    /// What a period and phase leave over of the tightest limit, if the macropixel is to count as `aim` says.
+    pub fn slack(&self, period: Time, phase: Time, aim: Aim) -> Time {
+        let clk = self.clk.iter().map(|r| r.slack(period)).min();
+        let strobe = self
+            .hits
+            .iter()
+            .map(|r| self.strobe_slack(r, period, aim))
+            .min();
+        let first = self.first_count(period, phase, aim).map(|(slack, _)| slack);
+        let all = [clk, strobe, first].into_iter().flatten();
+        all.min().unwrap_or(Time::MAX)
     }
 
     /// Whether a start value selects the CLK periods it selects at a slow clock, STOP `phase` after CLK's fall.
     pub fn works(&self, period: Time, phase: Time) -> bool {
         let (t, fs) = (period.as_fs(), Time::as_fs);
         // Falling edge k, at k T, counts if it comes after the release, and does not if before.
-        let counts_from = fs(self.release.1 - self.counter_clk.0 + self.recovery + phase);
-        let ignored_until = fs(self.release.0 - self.counter_clk.1 - self.removal + phase);
-        let first = (-(-counts_from).div_euclid(t)).max(0);
-        let is_ambiguous = first > 0 && (first - 1) * t > ignored_until;
+        let (ignored_until, counts_from) = self.first_in_doubt(phase);
+        let first = (-(-fs(counts_from)).div_euclid(t)).max(0);
+        let is_ambiguous = first > 0 && (first - 1) * t > fs(ignored_until);
         let (first, is_ambiguous) = if self.counts_at_once {
             (1, false)
         } else {
@@ -234,6 +342,8 @@ impl MacropixelTiming {
 /// What the flip-flops of a macropixel ask that have clocks of their own.
 #[derive(Debug, Clone)]
 pub struct LocalClocks {
+    /// The netlist that is analysed, which names the flip-flops.
+    pub netlist: Netlist,
     /// Histogram counters, of the time between two rises of HIT: the laser cycle.
     pub counts: Vec<Requirement>,
     /// Toggle flip-flops, of the time between two pulses of one SPAD.
@@ -268,6 +378,32 @@ impl LocalClocks {
                 .flat_map(|raw| requirements(raw, &[]))
                 .filter(|r| !netlist.cell_path(r.cell).ends_with(".first"))
                 .collect(),
+            netlist,
+        }
+    }
+
+    /// What a dead time leaves over of a limit of a toggle flip-flop. Pulses last the dead time; how soon the next one
+    /// follows is chance, and a limit on the time between them has none.
+    pub fn toggle_slack(&self, requirement: &Requirement, dead_time: Time) -> Option<Time> {
+        match requirement.kind {
+            CheckKind::ClockHigh => Some(dead_time - requirement.need),
+            CheckKind::ClockLow => None,
+            _ => Some(requirement.slack(dead_time)),
+        }
+    }
+
+    /// What the toggle flip-flops ask of SPAD_RAW.
+    pub fn pulses(&self) -> PulseLimits {
+        let need = |kind| {
+            let of_kind = self.toggles.iter().filter(|r| r.kind == kind);
+            of_kind
+                .map(|r| r.need)
+                .max()
+                .expect("a front end has flip-flops")
+        };
+        PulseLimits {
+            width: need(CheckKind::ClockHigh),
+            apart: need(CheckKind::Setup),
         }
     }
 }

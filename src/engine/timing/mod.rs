@@ -15,6 +15,7 @@
 //! | `load` | how fast start values can be loaded |
 //! | `spread` | ripple and margin of every macropixel under mismatch |
 //! | `corners` | process, voltage and temperature at which a clock fails |
+//! | `verdict` | whether all of it is met: what `timing`, `frame` and `replay` say |
 
 mod corners;
 mod correlation;
@@ -22,13 +23,15 @@ mod gates;
 mod load;
 mod macropixel;
 mod spread;
+mod verdict;
 
-pub use corners::{CornerLimit, corner_limits, critical_factor};
+pub use corners::{CornerLimit, FactorRange, corner_limits, factor_range};
 pub use correlation::{CorrelationTiming, WORST_PHOTONS};
 pub use gates::{ResetTiming, gate_works, reset, ripple};
 pub use load::{LoadTiming, load_works};
-pub use macropixel::{LocalClocks, MacropixelTiming, longest};
+pub use macropixel::{Aim, LocalClocks, MacropixelTiming, longest};
 pub use spread::{PixelTiming, Spread, spread};
+pub use verdict::{Margin, TimingVerdict, VerdictReport};
 
 use crate::netlist::{Corner, Library, Mismatch, Netlist, Timing, derated_limits, varied_as};
 use crate::units::Time;

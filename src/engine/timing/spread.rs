@@ -51,19 +51,25 @@ impl Spread {
 /// Analyses every macropixel of the sensor at its CLK and STOP phase; `done` hears of each.
 pub fn spread(config: &SensorConfig, silicon: &Silicon, done: impl Fn() + Sync) -> Spread {
     let (period, phase) = (config.clock().period(), config.stop_phase());
+    // As the window law has it, which knows of the library's delays only.
+    let library = Silicon::nominal(silicon.corner);
+    let library = MacropixelTiming::of(config, &library, Limits::Kept, (0, 0));
+    let aim = library.aim(period, phase);
     let pixel = |index: usize| {
         let position = (index / config.cols, index % config.cols);
         let kept = MacropixelTiming::of(config, silicon, Limits::Kept, position);
-        let keeps_limits = kept.works(period, phase);
-        let counts_right = keeps_limits
-            || MacropixelTiming::of(config, silicon, Limits::Ignored, position)
-                .works(period, phase);
+        let slack = kept.slack(period, phase, aim);
+        let keeps_limits = slack >= Time::ZERO;
+        let counts_right = keeps_limits || {
+            let ignored = MacropixelTiming::of(config, silicon, Limits::Ignored, position);
+            ignored.slack(period, phase, aim) >= Time::ZERO
+        };
         done();
         PixelTiming {
             row: position.0,
             col: position.1,
             ripple: kept.ripple.delay(),
-            slack: kept.slack(period),
+            slack,
             keeps_limits,
             counts_right,
         }

@@ -18,7 +18,7 @@ mod sight;
 mod tables;
 
 use super::light::full_stream;
-use super::{Engine, EngineError, Exposed, LitPixel, Work};
+use super::{Engine, EngineError, Exposed, LitPixel, Work, follows};
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw, correlation, histogram, window_law};
 use crate::photon::{PhotonStream, SpadEvent};
@@ -53,6 +53,7 @@ impl<'a> Window<'a> {
 
     /// The window of a start value, if it opens.
     fn window(&self, start: u16) -> Result<Option<OpenWindow>, EngineError> {
+        follows(self.config, &self.law.timing().pulses)?;
         match self.law.window(start) {
             window_law::Window::Open(window) => Ok(Some(window)),
             window_law::Window::Never => Ok(None),

@@ -18,6 +18,7 @@
 
 use rayon::prelude::*;
 
+use crate::chip::front_end::PulseLimits;
 use crate::chip::{EventType, Exposure, SensorConfig, WindowLaw, histogram};
 use crate::engine::{Cohort, CohortOptions, Engine, EngineError, LitPixel, Window, stream_config};
 use crate::photon::{PhotonStream, PixelLight, SPADS};
@@ -173,8 +174,11 @@ impl Trial {
                 trial.echo_bins = self.echo_bins.round();
             }
             Effect::Ties => trial.ties_by_lot = true,
-            // The shortest there is.
-            Effect::DeadTime => trial.sensor.dead_time_ns = 1e-6,
+            // The shortest that the front end follows.
+            Effect::DeadTime => {
+                let limits = PulseLimits::of(trial.sensor.corner);
+                trial.sensor.dead_time_ns = limits.shortest().as_ns();
+            }
             Effect::OneHit => trial.every_pulse = true,
             Effect::Threshold => {
                 trial.sensor.event_type = EventType::Greater;

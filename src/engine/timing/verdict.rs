@@ -1,0 +1,315 @@
+//! The verdict on a sensor's timing: whether it is met, with how much left over, and where it is tightest.
+//!
+//! | margin | what must not be too late, too early, too short | against |
+//! |---|---|---|
+//! | CLK | data and clock pulses of the flip-flops behind CLK | the CLK period |
+//! | strobe | LOCAL_STOP's strobe, a ripple after the counted CLK edge | two changes of the shift register |
+//! | first count | the release of COUNTER_RESET | the CLK edges before and after it |
+//! | reset pulse | COUNTER_RESET | what it must outlast |
+//! | SPAD_RAW | pulse width, toggle rate and hold of the toggle flip-flops | the dead time |
+//! | HIT | data of the histogram's counters | the shortest laser cycle |
+//! | LOAD_CLK | as CLK, and the gating of MEMORY_LOAD | the LOAD_CLK period |
+//!
+//! Static timing knows of no values, but what each clock edge is for: a strobe that comes after a rising CLK edge which it
+//! precedes at a slow clock breaks nothing. It takes the shift register one bin later, and so the window law aims it. Only
+//! silicon that differs from the library's must strobe between the same two edges as the library does.
+
+use serde::Serialize;
+
+use super::{Aim, Limits, LoadTiming, LocalClocks, MacropixelTiming, Silicon};
+use crate::chip::window_law::Window;
+use crate::chip::{Exposure, Race, SensorConfig, WindowLaw};
+use crate::netlist::{CheckKind, Netlist, Requirement};
+use crate::units::Time;
+
+/// Rows of memories that are analysed for LOAD_CLK: they differ in their token only.
+const LOADED_ROWS: usize = 2;
+
+/// What is left over at one place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Margin {
+    /// Which limit: clock and check.
+    pub check: String,
+    /// Where: the path's ends.
+    pub path: String,
+    /// What is left over, negative where the limit is broken.
+    pub slack: Time,
+    /// What meets what, where more can be said than that.
+    race: Option<Race>,
+    complaint: Option<String>,
+}
+
+/// Whether a sensor's timing is met.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimingVerdict {
+    /// The least margin of each check, the tightest first.
+    pub margins: Vec<Margin>,
+    /// What should be known beside them.
+    pub notes: Vec<String>,
+}
+
+/// The verdict as JSON: times in picoseconds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerdictReport {
+    /// Whether every limit is kept.
+    pub met: bool,
+    /// What is left over where it is tightest, ps.
+    pub slack_ps: f64,
+    /// The check that is tightest.
+    pub check: String,
+    /// Its path.
+    pub path: String,
+    /// The verdict in words, with the cure.
+    pub verdict: String,
+    /// What should be known beside it.
+    pub notes: Vec<String>,
+}
+
+impl TimingVerdict {
+    /// Judges the sensor at its CLK, STOP phase, LOAD_CLK and dead time; where macropixels differ, the one at `position`.
+    pub fn of(config: &SensorConfig, silicon: &Silicon, position: (usize, usize)) -> Self {
+        let (period, phase) = (config.clock().period(), config.stop_phase());
+        let pixel = MacropixelTiming::of(config, silicon, Limits::Kept, position);
+        let library = Silicon::nominal(silicon.corner);
+        let is_library = *silicon == library;
+        let aim = match is_library {
+            true => pixel.aim(period, phase),
+            false => {
+                MacropixelTiming::of(config, &library, Limits::Kept, (0, 0)).aim(period, phase)
+            }
+        };
+        let mut margins = pixel_margins(&pixel, period, phase, aim);
+        margins.extend(local_margins(config, silicon));
+        margins.extend(load_margins(config, silicon));
+        // The law also knows what reset P-counters of other kinds wait for, and is on the safe side by a rounding.
+        let is_met = margins.iter().all(|margin| margin.slack >= Time::ZERO);
+        let race = (is_library && is_met).then(|| law_race(config)).flatten();
+        if let Some(race) = race {
+            margins.push(Margin {
+                check: "window law".to_owned(),
+                path: pixel.path_of("p_counter"),
+                // Where the law rounds to the safe side, too.
+                slack: race.slack().min(Time::from_fs(-1)),
+                race: Some(race),
+                complaint: None,
+            });
+        }
+        margins.sort_by_key(|margin| margin.slack);
+        TimingVerdict {
+            notes: notes(config, is_met.then_some((&pixel, aim))),
+            margins,
+        }
+    }
+
+    /// The tightest place.
+    pub fn worst(&self) -> &Margin {
+        self.margins.first().expect("a sensor has flip-flops")
+    }
+
+    /// Whether every limit is kept.
+    pub fn is_met(&self) -> bool {
+        self.worst().slack >= Time::ZERO
+    }
+
+    /// For JSON.
+    pub fn report(&self) -> VerdictReport {
+        let worst = self.worst();
+        VerdictReport {
+            met: self.is_met(),
+            slack_ps: worst.slack.as_ns() * 1e3,
+            check: worst.check.clone(),
+            path: worst.path.clone(),
+            verdict: self.to_string(),
+            notes: self.notes.clone(),
+        }
+    }
+}
+
+impl std::fmt::Display for TimingVerdict {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Margin {
+            check,
+            path,
+            slack,
+            race,
+            complaint,
+        } = self.worst();
+        if self.is_met() {
+            return write!(f, "met, {slack} left ({check}: {path})");
+        }
+        write!(f, "fails by {} ({check}: {path})", -*slack)?;
+        match (race, complaint) {
+            (Some(race), _) => write!(f, ": {race}; {}", race.cure),
+            (None, Some(complaint)) => write!(f, ": {complaint}"),
+            (None, None) => Ok(()),
+        }
+    }
+}
+
+/// The tightest requirement of each check behind a clock; `name` is what the checks are called by.
+fn tightest<'r>(
+    name: &str,
+    clock: &str,
+    netlist: &Netlist,
+    requirements: impl Iterator<Item = &'r Requirement>,
+    slack: impl Fn(&Requirement) -> Option<Time>,
+) -> Vec<Margin> {
+    let mut least: [Option<(Time, &Requirement)>; CheckKind::ALL.len()] = Default::default();
+    for requirement in requirements {
+        let Some(slack) = slack(requirement) else {
+            continue;
+        };
+        let least = &mut least[requirement.kind as usize];
+        if least.is_none_or(|(before, _)| slack < before) {
+            *least = Some((slack, requirement));
+        }
+    }
+    let margin = |(slack, requirement): (Time, &Requirement)| Margin {
+        check: format!("{name} {}", requirement.kind.name()),
+        path: requirement.ends(netlist, clock),
+        slack,
+        race: None,
+        complaint: None,
+    };
+    least.into_iter().flatten().map(margin).collect()
+}
+
+/// Margins within one macropixel, but for those of SPADs and histogram.
+fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) -> Vec<Margin> {
+    let mut margins = tightest("CLK", "CLK", &pixel.netlist, pixel.clk.iter(), |r| {
+        Some(r.slack(period))
+    });
+    for margin in &mut margins {
+        if margin.slack < Time::ZERO && margin.check == "CLK setup" {
+            let what = "a path is slower than a CLK period";
+            margin.race = Some(Race::too_slow(what, period - margin.slack, period));
+        }
+    }
+    let strobes = tightest("strobe", "CLK", &pixel.netlist, pixel.hits.iter(), |r| {
+        Some(pixel.strobe_slack(r, period, aim))
+    });
+    // Slower or faster silicon may strobe clear of the change that it is near, but on the other side of it.
+    let race = Some(pixel.strobe_race(period)).filter(|race| race.slack() < Time::ZERO);
+    let moved = pixel.aim(period, phase).moved() - aim.moved();
+    let slipped = format!(
+        "windows end {moved} bins later than the window law has it, which knows of the library's delays; give another clk_hz, or silicon nearer to the library's"
+    );
+    for mut margin in strobes {
+        if margin.slack < Time::ZERO {
+            (margin.race, margin.complaint) = (race, Some(slipped.clone()));
+        }
+        margins.push(margin);
+    }
+    let path = |name: &str| format!("STOP rise to {} fall", pixel.path_of(name));
+    if let Some((slack, race)) = pixel.first_count(period, phase, aim) {
+        margins.push(Margin {
+            check: "first count, recovery and removal".to_owned(),
+            path: path("COUNTER_RESET"),
+            slack,
+            race: (slack < Time::ZERO).then_some(race),
+            complaint: None,
+        });
+    }
+    margins.push(Margin {
+        check: "reset pulse".to_owned(),
+        path: path("COUNTER_RESET"),
+        slack: pixel.reset_width() - pixel.reset_need(),
+        race: None,
+        complaint: None,
+    });
+    margins
+}
+
+/// Margins of flip-flops with clocks of their own.
+fn local_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
+    let local = LocalClocks::of(config, silicon);
+    let dead_time = config.dead_time();
+    let mut margins = tightest(
+        "SPAD_RAW",
+        "SPAD_RAW",
+        &local.netlist,
+        local.toggles.iter(),
+        |r| local.toggle_slack(r, dead_time),
+    );
+    let complaint = local.pulses().complaint(config.dead_time_ns);
+    for margin in margins
+        .iter_mut()
+        .filter(|margin| margin.slack < Time::ZERO)
+    {
+        margin.complaint.clone_from(&complaint);
+    }
+    // No laser cycle is shorter than two CLK periods. How long HIT is high and low, start values say.
+    let between = config.clock().periods(2);
+    margins.extend(tightest(
+        "HIT",
+        "HIT",
+        &local.netlist,
+        local.counts.iter(),
+        |r| r.kind.concerns_data().then(|| r.slack(between)),
+    ));
+    margins
+}
+
+/// Margins of the load path.
+fn load_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
+    let rows = SensorConfig {
+        rows: config.rows.min(LOADED_ROWS),
+        ..config.clone()
+    };
+    let load = LoadTiming::of(&rows, silicon, Limits::Kept);
+    let period = config.load_clock().period();
+    let mut margins = tightest(
+        "LOAD_CLK",
+        "LOAD_CLK",
+        &load.netlist,
+        load.load_clk.iter(),
+        |r| Some(r.slack(period)),
+    );
+    margins.push(Margin {
+        check: "LOAD_CLK gating".to_owned(),
+        path: "LOAD_CLK rise to the gates of MEMORY_LOAD".to_owned(),
+        slack: Time::from_fs(period.as_fs() / 2) - load.row_done.max(load.token),
+        race: None,
+        complaint: None,
+    });
+    margins
+}
+
+/// What the window law says against every window in the middle of a long laser cycle.
+fn law_race(config: &SensorConfig) -> Option<Race> {
+    let start = config.largest_start() / 4;
+    let periods = 4 * (u32::from(config.largest_start()) + 1);
+    match WindowLaw::new(config, &Exposure::new(config, periods, 1)).window(start) {
+        Window::Race(race) => Some(race),
+        Window::Open(_) | Window::Never | Window::Irregular(_) => None,
+    }
+}
+
+/// What should be known of a sensor; `met` is the macropixel and its aim if all limits are kept.
+fn notes(config: &SensorConfig, met: Option<(&MacropixelTiming, Aim)>) -> Vec<String> {
+    let period = config.clock().period();
+    let mut notes = Vec::new();
+    if let Some((pixel, aim)) = met.filter(|(_, aim)| aim.edges > 0) {
+        let earlier = aim.earlier();
+        let hold = pixel.hits.iter().filter(|r| r.kind == CheckKind::Hold);
+        let slack = hold.map(|r| pixel.strobe_slack(r, period, earlier)).min();
+        notes.push(format!(
+            "the strobe comes after {} that it precedes at a slow clock, and windows end {} later, as the window law has it; the hold slack of {} before that edge is of a path that nothing exercises",
+            plural(aim.edges, "rising CLK edge"),
+            plural(aim.moved(), "bin"),
+            slack.unwrap_or_default()
+        ));
+    }
+    if config.dead_time() <= period {
+        notes.push(format!(
+            "two photons of a SPAD within a CLK period ({period}) cancel, as the dead time ({}) lets them",
+            config.dead_time()
+        ));
+    }
+    notes
+}
+
+fn plural(count: i64, what: &str) -> String {
+    let ending = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{ending}")
+}
