@@ -5,7 +5,7 @@
 //! over the target only when it is complete.
 
 use std::fmt;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
@@ -168,6 +168,20 @@ impl Write for OutputFile {
 
     fn flush(&mut self) -> io::Result<()> {
         self.writer.flush()
+    }
+}
+
+/// Formats that tell at the beginning what is known at the end go back for it.
+impl Seek for OutputFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.writer.seek(to)
+    }
+}
+
+impl Read for OutputFile {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.writer.flush()?;
+        self.writer.get_mut().read(buffer)
     }
 }
 

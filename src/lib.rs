@@ -13,7 +13,7 @@
 //! | [`logic`] | four-valued logic |
 //! | [`netlist`] | cells, hierarchical builder, delays, Verilog |
 //! | [`kernel`] | the discrete event kernel |
-//! | [`waves`] | VCD and GTKWave save files |
+//! | [`waves`] | VCD and FST, views for GTKWave and Surfer |
 //! | [`chip`] | the circuits beside their reference models, the window law |
 //! | [`photon`] | photon budget, SPADs, the photon stream |
 //! | [`engine`] | the ways to run an exposure |

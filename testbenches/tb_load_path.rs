@@ -7,21 +7,21 @@
 //!
 //! A small array is loaded four times in one power-up, the third time only in part; then a whole sensor once.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 use bitvec::slice::BitSlice;
 use guided_dtof::chip::{SensorConfig, load_path};
 use guided_dtof::cli::testbench;
 use guided_dtof::engine::load::{load, load_netlist};
-use guided_dtof::engine::waveform::{write_vcd, write_view};
+use guided_dtof::engine::waveform::write_waves;
 use guided_dtof::files::InputError;
 use guided_dtof::kernel::{Drive, Kernel, Recorder, in_order};
 use guided_dtof::logic::Logic::{One, X, Zero};
 use guided_dtof::netlist::{CellKind, Library, NetId, Netlist, Timing};
 use guided_dtof::report::Checks;
 use guided_dtof::units::{Frequency, Time};
-use guided_dtof::waves::{Entry, Group, SaveFile};
+use guided_dtof::waves::{Entry, Group, Layout};
 
 /// When the chip comes out of reset.
 const RESET_END: Time = Time::from_ns(2);
@@ -38,11 +38,10 @@ fn main() -> ExitCode {
     )
 }
 
-fn run(out: &Path, checks: &mut Checks) -> Result<PathBuf, InputError> {
-    let vcd = out.join("tb_load_path.vcd");
-    small_array(&vcd, checks)?;
+fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
+    small_array(waves, checks)?;
     whole_sensor(checks);
-    Ok(vcd)
+    Ok(())
 }
 
 /// Start values without a pattern, different for every `seed`.
@@ -150,7 +149,7 @@ fn pulses(recorder: &Recorder, memory_load: &[NetId]) -> Vec<Pulse> {
     all
 }
 
-fn small_array(vcd: &Path, checks: &mut Checks) -> Result<(), InputError> {
+fn small_array(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let config = SensorConfig {
         rows: 4,
         cols: 3,
@@ -193,7 +192,8 @@ fn small_array(vcd: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let mut stimulus = in_order(std::mem::take(&mut bench.drives));
     let mut recorder = Recorder::new((0..bench.netlist.net_count()).map(NetId::new));
     let mut found = Vec::new();
-    write_vcd(vcd, &bench.netlist, Time::MAX, |waves| {
+    let view = view(&config, spans[0]);
+    write_waves(waves, &bench.netlist, &view, |waves| {
         let mut observers = (&mut recorder, waves);
         for &(_, end) in &spans {
             kernel.run(
@@ -205,7 +205,6 @@ fn small_array(vcd: &Path, checks: &mut Checks) -> Result<(), InputError> {
         }
         kernel.now()
     })?;
-    write_view(vcd, &bench.netlist, &view(&config, spans[0]))?;
 
     let unknown = |c: &&(Time, NetId, _)| c.0 > RESET_END && c.2 == X;
     let unknown = recorder.changes().iter().filter(unknown).count();
@@ -379,7 +378,7 @@ fn whole_sensor(checks: &mut Checks) {
 }
 
 /// The first load: Fig. 57's signals, then every row with its macropixels' memories.
-fn view(config: &SensorConfig, (start, end): (Time, Time)) -> SaveFile {
+fn view(config: &SensorConfig, (start, end): (Time, Time)) -> Layout {
     let memory = |row, col, signal: &str| format!("{}.{signal}", load_path::memory_name(row, col));
     let shared = [
         Entry::binary("RESETB"),
@@ -398,7 +397,7 @@ fn view(config: &SensorConfig, (start, end): (Time, Time)) -> SaveFile {
             [load].into_iter().chain(memories),
         ));
     }
-    SaveFile {
+    Layout {
         groups,
         zoom: (Time::ZERO, end + PAUSE),
         marker: Some(start),

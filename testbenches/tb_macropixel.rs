@@ -9,7 +9,7 @@
 //! Everything goes through the sensor's pins: serial load, CLK, STOP and the SPADs' pulses.
 
 use std::fmt::Debug;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -19,13 +19,13 @@ use guided_dtof::chip::{
 };
 use guided_dtof::cli::testbench;
 use guided_dtof::engine::GateSimulation;
-use guided_dtof::engine::waveform::{write_vcd, write_view};
+use guided_dtof::engine::waveform::write_waves;
 use guided_dtof::files::InputError;
 use guided_dtof::kernel::Recorder;
 use guided_dtof::photon::SpadEvent;
 use guided_dtof::report::Checks;
 use guided_dtof::units::Time;
-use guided_dtof::waves::{Entry, Group, SaveFile};
+use guided_dtof::waves::{Entry, Group, Layout};
 
 /// Start values of Fig. 48's two macropixels.
 const STARTS: [u16; 2] = [52, 49];
@@ -40,14 +40,13 @@ fn main() -> ExitCode {
     )
 }
 
-fn run(out: &Path, checks: &mut Checks) -> Result<PathBuf, InputError> {
-    let vcd = out.join("tb_macropixel.vcd");
-    figure_48(&vcd, checks)?;
+fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
+    figure_48(waves, checks)?;
     bin_edge(checks);
     full_bins(checks);
     coincidences(checks);
     cancelling_pulses(checks);
-    Ok(vcd)
+    Ok(())
 }
 
 /// A sensor of one macropixel.
@@ -113,7 +112,7 @@ fn shown<T: Debug>(counts: &Option<T>) -> String {
         .map_or("unknown".to_owned(), |c| format!("{c:?}"))
 }
 
-fn figure_48(vcd: &Path, checks: &mut Checks) -> Result<(), InputError> {
+fn figure_48(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let config = SensorConfig {
         cols: 2,
         ..config()
@@ -141,12 +140,11 @@ fn figure_48(vcd: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let local_stop = netlist.signal("LOCAL_STOP").expect("a port of the sensor");
     let mut recorder = Recorder::new(local_stop.iter().copied());
     let origin = gate.schedule().origin;
-    write_vcd(vcd, &netlist, Time::MAX, |waves| {
+    let view = view(&config, origin, origin + exposure.stop(1));
+    write_waves(waves, &netlist, &view, |waves| {
         gate.run(&mut (&mut recorder, waves));
         gate.schedule().end
     })?;
-    let view = view(&config, origin, origin + exposure.stop(1));
-    write_view(vcd, &netlist, &view)?;
 
     checks.equal(
         "start values loaded",
@@ -205,7 +203,7 @@ fn figure_48(vcd: &Path, checks: &mut Checks) -> Result<(), InputError> {
     Ok(())
 }
 
-fn view(config: &SensorConfig, origin: Time, end: Time) -> SaveFile {
+fn view(config: &SensorConfig, origin: Time, end: Time) -> Layout {
     let mut groups = vec![Group::new(
         "Global signals",
         [
@@ -235,7 +233,7 @@ fn view(config: &SensorConfig, origin: Time, end: Time) -> SaveFile {
             signals.into_iter().chain(bins),
         ));
     }
-    SaveFile {
+    Layout {
         groups,
         zoom: (origin - Time::from_ns(5), end + Time::from_ns(5)),
         marker: Some(origin),

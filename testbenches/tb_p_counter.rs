@@ -9,19 +9,19 @@
 //!
 //! ENABLE changes with rising STOP edges, as in the sensor, where a flip-flop on STOP sees to it.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 use guided_dtof::chip::{ChipTiming, Exposure, SensorConfig, p_counter, p_counter_timing};
 use guided_dtof::cli::testbench;
-use guided_dtof::engine::waveform::{write_vcd, write_view};
+use guided_dtof::engine::waveform::write_waves;
 use guided_dtof::files::InputError;
 use guided_dtof::kernel::{Drive, Kernel, Observer, Recorder, clock, in_order};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{CellKind, Library, ModuleBuilder, NetId, Netlist, Timing};
 use guided_dtof::report::Checks;
 use guided_dtof::units::Time;
-use guided_dtof::waves::{Entry, Group, SaveFile};
+use guided_dtof::waves::{Entry, Group, Layout};
 
 /// Start value of Fig. 54.
 const FIRST: u64 = 5;
@@ -44,12 +44,11 @@ fn main() -> ExitCode {
     )
 }
 
-fn run(out: &Path, checks: &mut Checks) -> Result<PathBuf, InputError> {
+fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let bench = Bench::new();
-    let vcd = out.join("tb_p_counter.vcd");
-    figure_54(&bench, &vcd, checks)?;
+    figure_54(&bench, waves, checks)?;
     every_start_value(&bench, checks);
-    Ok(vcd)
+    Ok(())
 }
 
 /// The circuit under test and its nets.
@@ -177,7 +176,7 @@ impl Observer for Unknowns {
 
 /// Cycles 0 and 1 count from [`FIRST`], cycle 2 is disabled and loads [`SECOND`], cycles 3 and 4 count from it,
 /// and then STOP stays away.
-fn figure_54(bench: &Bench, vcd: &Path, checks: &mut Checks) -> Result<(), InputError> {
+fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let Bench { timing, .. } = bench;
     let exposure = Exposure::new(&bench.config, STOP_PERIODS as u32, 5);
     let stop = |cycle: i64| ORIGIN + exposure.stop(cycle);
@@ -210,7 +209,8 @@ fn figure_54(bench: &Bench, vcd: &Path, checks: &mut Checks) -> Result<(), Input
     let mut recorder = Recorder::new((0..bench.netlist.net_count()).map(NetId::new));
     let mut unknowns = Unknowns::default();
     let mut unknown_at_release = 0;
-    write_vcd(vcd, &bench.netlist, Time::MAX, |waves| {
+    let view = view(stop(0), stop(5));
+    write_waves(waves, &bench.netlist, &view, |waves| {
         kernel.run(&mut stimulus, RESET_END, &mut (&mut recorder, &mut *waves));
         let nets = (0..bench.netlist.net_count()).map(NetId::new);
         unknown_at_release = nets.filter(|&net| kernel.value(net) == Logic::X).count();
@@ -218,7 +218,6 @@ fn figure_54(bench: &Bench, vcd: &Path, checks: &mut Checks) -> Result<(), Input
         kernel.run(&mut stimulus, end, &mut observers);
         end
     })?;
-    write_view(vcd, &bench.netlist, &view(stop(0), stop(5)))?;
 
     checks.equal(
         "unknown nets when RESETB is released",
@@ -323,7 +322,7 @@ fn figure_54(bench: &Bench, vcd: &Path, checks: &mut Checks) -> Result<(), Input
     Ok(())
 }
 
-fn view(first_stop: Time, last: Time) -> SaveFile {
+fn view(first_stop: Time, last: Time) -> Layout {
     let inputs = [
         Entry::binary("RESETB"),
         Entry::binary("ENABLE"),
@@ -339,7 +338,7 @@ fn view(first_stop: Time, last: Time) -> SaveFile {
         Entry::decimal("p_counter.COUNTER_OUT"),
         Entry::binary("LOCAL_STOP"),
     ];
-    SaveFile {
+    Layout {
         groups: vec![
             Group::new("Global signals", inputs),
             Group::new("P-counter (Fig. 54)", counter),

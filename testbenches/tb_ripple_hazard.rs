@@ -16,7 +16,7 @@
 //! twice the ripple, since the strobe's multiplexer and buffer take more time than the shift register's flip-flop.
 
 use std::fmt::Debug;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ use guided_dtof::chip::{Exposure, SensorConfig, histogram, sensor};
 use guided_dtof::cli::testbench;
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::engine::timing::{Limits, MacropixelTiming, Silicon, shortest_period};
-use guided_dtof::engine::waveform::{write_vcd, write_view};
+use guided_dtof::engine::waveform::write_waves;
 use guided_dtof::files::InputError;
 use guided_dtof::kernel::{CheckReport, Policy, Recorder};
 use guided_dtof::logic::Logic;
@@ -32,7 +32,7 @@ use guided_dtof::netlist::{CheckKind, Corner, Library, Mismatch, NetId, Netlist,
 use guided_dtof::photon::SpadEvent;
 use guided_dtof::report::Checks;
 use guided_dtof::units::{Frequency, Time};
-use guided_dtof::waves::{Entry, Group, SaveFile};
+use guided_dtof::waves::{Entry, Group, Layout};
 
 /// Start value of both macropixels.
 const START: u16 = 20;
@@ -52,12 +52,11 @@ fn main() -> ExitCode {
     )
 }
 
-fn run(out: &Path, checks: &mut Checks) -> Result<PathBuf, InputError> {
-    let vcd = out.join("tb_ripple_hazard.vcd");
+fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     far_from_the_crossing(checks);
     crossing(checks);
-    at_the_crossing(&vcd, checks)?;
-    Ok(vcd)
+    at_the_crossing(waves, checks)?;
+    Ok(())
 }
 
 /// Two macropixels in a row.
@@ -121,13 +120,13 @@ fn delays(netlist: &Netlist) -> Timing {
     timing
 }
 
-/// Exposes both macropixels at this CLK period; `vcd` gets the waveform and `view` the netlist and time of each
+/// Exposes both macropixels at this CLK period; `waves` gets the waveform and `view` the netlist and time of each
 /// STOP edge.
 fn expose(
     period: Time,
     policy: Policy,
-    vcd: Option<&Path>,
-    view: impl FnOnce(&dyn Fn(i64) -> Time) -> SaveFile,
+    waves: Option<&Path>,
+    view: impl FnOnce(&dyn Fn(i64) -> Time) -> Layout,
 ) -> Result<Outcome, InputError> {
     let bins = bins();
     let exposure = Exposure {
@@ -172,14 +171,13 @@ fn expose(
     let schedule = gate.schedule();
     let stop = |cycle: i64| schedule.origin + exposure.stop(cycle);
     let mut found = gate.timing_checks(policy);
-    match vcd {
+    match waves {
         None => gate.run(&mut (&mut recorder, &mut found)),
-        Some(vcd) => {
-            write_vcd(vcd, &netlist, Time::MAX, |waves| {
+        Some(waves) => {
+            write_waves(waves, &netlist, &view(&stop), |waves| {
                 gate.run(&mut ((&mut recorder, &mut found), waves));
                 schedule.end
             })?;
-            write_view(vcd, &netlist, &view(&stop))?;
         }
     }
     let captured = |pixel| {
@@ -212,7 +210,7 @@ fn expose(
 
 /// Without a waveform.
 fn outcome(period: Time, policy: Policy) -> Outcome {
-    let view = |_: &dyn Fn(i64) -> Time| SaveFile {
+    let view = |_: &dyn Fn(i64) -> Time| Layout {
         groups: Vec::new(),
         zoom: (Time::ZERO, Time::ZERO),
         marker: None,
@@ -304,11 +302,11 @@ fn between() -> (Time, Vec<bool>) {
 }
 
 /// At the crossing itself: with ideal flip-flops, and with flip-flops that go unknown.
-fn at_the_crossing(vcd: &Path, checks: &mut Checks) -> Result<(), InputError> {
+fn at_the_crossing(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let (period, sees_old) = between();
     let bins = bins();
     let look = |stop: &dyn Fn(i64) -> Time| view(stop, period, &sees_old);
-    let found = expose(period, Policy::ReportOnly, Some(vcd), look)?;
+    let found = expose(period, Policy::ReportOnly, Some(waves), look)?;
     let predicted: Vec<Option<u64>> = expected(false)
         .iter()
         .zip(expected(true))
@@ -336,7 +334,10 @@ fn at_the_crossing(vcd: &Path, checks: &mut Checks) -> Result<(), InputError> {
         (bins.len()..=2 * bins.len()).contains(&violated),
     );
 
-    let with_x = vcd.with_file_name("tb_ripple_hazard_x.vcd");
+    let name = "tb_ripple_hazard_x";
+    let with_x = waves
+        .with_file_name(name)
+        .with_extension(waves.extension().unwrap_or_default());
     let look = |stop: &dyn Fn(i64) -> Time| view(stop, period, &sees_old);
     let found = expose(period, Policy::XOnViolation, Some(&with_x), look)?;
     let captured = &found.pixels[1];
@@ -354,7 +355,7 @@ fn at_the_crossing(vcd: &Path, checks: &mut Checks) -> Result<(), InputError> {
 }
 
 /// The strobe of the first doubled photon, the marker on it, with the first lost one's bins beside it.
-fn view(stop: &dyn Fn(i64) -> Time, period: Time, sees_old: &[bool]) -> SaveFile {
+fn view(stop: &dyn Fn(i64) -> Time, period: Time, sees_old: &[bool]) -> Layout {
     let doubled = (1..sees_old.len()).find(|&bin| sees_old[bin] && !sees_old[bin - 1]);
     let lost = (1..sees_old.len()).find(|&bin| !sees_old[bin] && sees_old[bin - 1]);
     let (doubled, lost) = (doubled.unwrap_or(1), lost.unwrap_or(1));
@@ -385,7 +386,7 @@ fn view(stop: &dyn Fn(i64) -> Time, period: Time, sees_old: &[bool]) -> SaveFile
         let title = format!("{pixel}: {title} (Fig. 56)");
         groups.push(Group::new(title, signals.into_iter().chain(bins)));
     }
-    SaveFile {
+    Layout {
         groups,
         zoom: (strobe - period, strobe + period),
         marker: Some(strobe),

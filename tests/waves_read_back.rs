@@ -1,12 +1,15 @@
 //! Whatever the simulation did, a reader of its dump sees: same names, times and values.
 //!
-//! Random circuits are driven at random; every change is recorded beside the dump. Two independent
-//! readers, Surfer's and that of the `vcd` crate, must then report for every signal exactly what
-//! the recording says, one value per instant.
+//! Random circuits are driven at random; every change is recorded beside a VCD and an FST file of the whole
+//! simulation or of a span of it. Two independent readers, Surfer's and that of the `vcd` crate, must then report for
+//! every signal exactly what the recording says, one value per instant; and GTKWave's `fst2vcd`, where it is installed,
+//! must make of the FST file the same declarations and changes as the VCD has.
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::Cursor;
-use std::sync::Arc;
+use std::ops::RangeInclusive;
+use std::process::Command;
+use std::sync::{Arc, Once};
 
 use guided_dtof::kernel::{Drive, Kernel, Recorder, Stimulus};
 use guided_dtof::logic::Logic;
@@ -15,7 +18,7 @@ use guided_dtof::netlist::{
     Timing,
 };
 use guided_dtof::units::Time;
-use guided_dtof::waves::{Selection, VcdWriter};
+use guided_dtof::waves::{FstWriter, Selection, VcdWriter};
 use proptest::prelude::*;
 
 /// Times (fs) and values of one signal, first the initial one.
@@ -138,25 +141,54 @@ fn coarse_library() -> Library {
     library
 }
 
-/// The dump of a simulation, and every change of every net in it.
-fn simulate(netlist: &Netlist, library: &Library, drives: Vec<Drive>) -> (String, Recorder) {
+/// The files of a simulation, what they keep of it, and every change of every net in it.
+struct Simulated {
+    vcd: String,
+    fst: Vec<u8>,
+    span: RangeInclusive<u64>,
+    recorder: Recorder,
+}
+
+/// Simulates, and keeps this part of the whole (from, until), in thousandths.
+fn simulate(
+    netlist: &Netlist,
+    library: &Library,
+    drives: Vec<Drive>,
+    kept: Option<(i64, i64)>,
+) -> Simulated {
     let end = drives.last().unwrap().time + Time::from_ns(3);
     let drives: Box<dyn Iterator<Item = Drive> + Send> = Box::new(drives.into_iter());
     let mut stimulus: Stimulus = drives.peekable();
-    let mut observers = (
-        Recorder::new((0..netlist.net_count()).map(NetId::new)),
-        VcdWriter::new(Vec::new(), netlist, &Selection::all().with_anonymous()).unwrap(),
-    );
+    let selection = Selection::all().with_anonymous();
+    let mut vcd = VcdWriter::new(Vec::new(), netlist, &selection).unwrap();
+    let mut fst = FstWriter::new(Cursor::new(Vec::new()), netlist, &selection).unwrap();
+    let mut span = Time::ZERO..=end;
+    if let Some((from, until)) = kept {
+        let part = |thousandth| Time::from_fs(end.as_fs() / 1000 * thousandth);
+        span = part(from.min(until))..=part(from.max(until));
+        vcd = vcd.keep(span.clone());
+        fst = fst.keep(span.clone());
+    }
+    let recorder = Recorder::new((0..netlist.net_count()).map(NetId::new));
+    let mut observers = (recorder, (vcd, fst));
     let mut kernel = Kernel::new(netlist, &Timing::nominal(netlist, library, Corner::Typ));
     kernel.run(&mut stimulus, end, &mut observers);
-    let (recorder, waves) = observers;
-    let text = String::from_utf8(waves.finish(end).unwrap()).unwrap();
-    assert!(text.ends_with(&format!("\n#{}\n", end.as_fs())));
-    (text, recorder)
+    let (recorder, (vcd, fst)) = observers;
+    let vcd = String::from_utf8(vcd.finish(end).unwrap()).unwrap();
+    let fst = fst.finish(end).unwrap().into_inner();
+    assert!(vcd.ends_with('\n'));
+    let span = span.start().as_fs() as u64..=span.end().as_fs() as u64;
+    Simulated {
+        vcd,
+        fst,
+        span,
+        recorder,
+    }
 }
 
-/// What a dump should say of `nets` (bit 0 first): one value per instant, and only changes.
-fn expected(recorder: &Recorder, nets: &[NetId]) -> Changes {
+/// What a file should say of `nets` (bit 0 first): their value where it begins, then one per instant, and only changes.
+fn expected(simulated: &Simulated, nets: &[NetId]) -> Changes {
+    let (recorder, span) = (&simulated.recorder, &simulated.span);
     let mut values: HashMap<NetId, Logic> = nets.iter().map(|&n| (n, Logic::X)).collect();
     let text = |values: &HashMap<NetId, Logic>| -> String {
         nets.iter().rev().map(|n| values[n].to_char()).collect()
@@ -167,12 +199,23 @@ fn expected(recorder: &Recorder, nets: &[NetId]) -> Changes {
             by_time.entry(time.as_fs()).or_default().push((net, value));
         }
     }
-    let mut changes = vec![(0, text(&values))];
+    let mut before = text(&values);
+    let mut changes = Vec::new();
     for (time, instant) in by_time {
         values.extend(instant);
-        if changes.last().unwrap().1 != text(&values) {
-            changes.push((time as u64, text(&values)));
+        let (time, now) = (time as u64, text(&values));
+        if span.contains(&time) && changes.is_empty() {
+            changes.push((*span.start(), before.clone()));
         }
+        if span.contains(&time) && before != now {
+            changes.push((time, now.clone()));
+        }
+        if time <= *span.end() {
+            before = now;
+        }
+    }
+    if changes.is_empty() {
+        changes.push((*span.start(), before));
     }
     changes
 }
@@ -201,9 +244,16 @@ fn signals(netlist: &Netlist) -> Vec<(Vec<String>, bool, Vec<NetId>)> {
     signals
 }
 
-/// Checks the dump with Surfer's reader.
-fn check_with_wellen(text: &str, netlist: &Netlist, recorder: &Recorder) {
-    let mut waves = wellen::simple::read_from_reader(Cursor::new(text.to_owned())).unwrap();
+/// Checks a file with Surfer's reader.
+fn check_with_wellen(file: &[u8], netlist: &Netlist, simulated: &Simulated) {
+    let mut waves = wellen::simple::read_from_reader(Cursor::new(file.to_owned())).unwrap();
+    let first = *waves.time_table().first().unwrap();
+    assert_eq!(first, *simulated.span.start(), "the file begins elsewhere");
+    let unit = waves.hierarchy().timescale().unwrap();
+    assert_eq!(
+        (unit.factor, unit.unit),
+        (1, wellen::TimescaleUnit::FemtoSeconds)
+    );
     let mut signal_of: HashMap<Vec<NetId>, wellen::SignalRef> = HashMap::new();
     for (path, is_bus, nets) in signals(netlist) {
         let (name, scopes) = path.split_last().unwrap();
@@ -223,7 +273,7 @@ fn check_with_wellen(text: &str, netlist: &Netlist, recorder: &Recorder) {
         let changes = changes
             .map(|(time, value)| (times[time as usize], value.to_bit_string().unwrap()))
             .collect();
-        let wanted = settled(expected(recorder, &nets));
+        let wanted = settled(expected(simulated, &nets));
         assert_eq!(settled(changes), wanted, "{path:?}");
     }
     let mut distinct: Vec<_> = signal_of.values().collect();
@@ -236,8 +286,8 @@ fn check_with_wellen(text: &str, netlist: &Netlist, recorder: &Recorder) {
     );
 }
 
-/// Checks the dump with the `vcd` crate's reader, which reports every line.
-fn check_with_vcd(text: &str, netlist: &Netlist, recorder: &Recorder) {
+/// Times and values of every line of a VCD, by identifier code.
+fn lines(text: &str) -> (vcd::Header, HashMap<vcd::IdCode, Changes>) {
     let mut parser = vcd::Parser::new(text.as_bytes());
     let header = parser.parse_header().unwrap();
     assert_eq!(header.timescale, Some((1, vcd::TimescaleUnit::FS)));
@@ -258,13 +308,86 @@ fn check_with_vcd(text: &str, netlist: &Netlist, recorder: &Recorder) {
             _ => continue,
         };
         is_time_used = true;
-        lines.entry(code).or_default().push((time.unwrap(), value));
+        // `fst2vcd` leaves out the time of the first values where it is 0.
+        let time = time.unwrap_or(0);
+        lines.entry(code).or_default().push((time, value));
     }
+    (header, lines)
+}
+
+/// Checks the VCD with the `vcd` crate's reader, which reports every line.
+fn check_with_vcd(netlist: &Netlist, simulated: &Simulated) {
+    let (header, lines) = lines(&simulated.vcd);
     for (path, _, nets) in signals(netlist) {
         let var = header.find_var(&path).expect("every signal is declared");
         // Not settled: no line may repeat what is known.
-        assert_eq!(lines[&var.code], expected(recorder, &nets), "{path:?}");
+        assert_eq!(lines[&var.code], expected(simulated, &nets), "{path:?}");
     }
+}
+
+/// Path, type, width, range and changes of every variable, in the order of the file.
+type Declared = Vec<(
+    String,
+    vcd::VarType,
+    u32,
+    Option<vcd::ReferenceIndex>,
+    Changes,
+)>;
+
+fn declared(text: &str) -> Declared {
+    fn add(
+        items: &[vcd::ScopeItem],
+        path: &str,
+        lines: &HashMap<vcd::IdCode, Changes>,
+        all: &mut Declared,
+    ) {
+        for item in items {
+            match item {
+                vcd::ScopeItem::Var(var) => {
+                    let path = format!("{path}.{}", var.reference);
+                    let changes = settled(lines[&var.code].clone());
+                    all.push((path, var.var_type, var.size, var.index, changes));
+                }
+                vcd::ScopeItem::Scope(scope) => {
+                    let path = format!("{path}.{}", scope.identifier);
+                    add(&scope.items, &path, lines, all);
+                }
+                _ => {}
+            }
+        }
+    }
+    let (header, lines) = lines(text);
+    let mut all = Vec::new();
+    add(&header.items, "", &lines, &mut all);
+    all
+}
+
+/// Checks the FST file with GTKWave's own converter, where there is one.
+fn check_with_fst2vcd(simulated: &Simulated) {
+    static SKIPPED: Once = Once::new();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.fst");
+    std::fs::write(&path, &simulated.fst).unwrap();
+    let Ok(output) = Command::new("fst2vcd").arg(&path).output() else {
+        SKIPPED
+            .call_once(|| eprintln!("SKIPPED: no fst2vcd; install gtkwave to compare FST with it"));
+        return;
+    };
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(declared(&text), declared(&simulated.vcd));
+}
+
+/// How a simulation is driven: input, value, gap in fs.
+type Choices = Vec<(usize, u8, i64)>;
+
+fn choices(most: usize) -> impl Strategy<Value = Choices> {
+    let choice = (
+        any::<usize>(),
+        prop_oneof![8 => 0u8..2, 1 => 2u8..4],
+        prop_oneof![Just(0), 0i64..3_000, 0i64..2_000_000],
+    );
+    prop::collection::vec(choice, 0..most)
 }
 
 proptest! {
@@ -274,32 +397,43 @@ proptest! {
     fn readers_see_what_happened(
         stages in 1usize..6,
         gates in prop::collection::vec(any::<(u8, u16, u16)>(), 1..12),
-        choices in prop::collection::vec(
-            (
-                any::<usize>(),
-                prop_oneof![8 => 0u8..2, 1 => 2u8..4],
-                prop_oneof![Just(0), 0i64..3_000, 0i64..2_000_000],
-            ),
-            0..120,
-        ),
+        choices in choices(120),
         is_coarse in any::<bool>(),
+        kept in prop::option::of((0i64..=1000, 0i64..=1000)),
     ) {
         let netlist = chip(stages, &gates);
         let library = if is_coarse { coarse_library() } else { Library::default() };
-        let (text, recorder) = simulate(&netlist, &library, drives(&netlist, &choices));
-        check_with_wellen(&text, &netlist, &recorder);
-        check_with_vcd(&text, &netlist, &recorder);
+        let simulated = simulate(&netlist, &library, drives(&netlist, &choices), kept);
+        check_with_wellen(simulated.vcd.as_bytes(), &netlist, &simulated);
+        check_with_vcd(&netlist, &simulated);
+        check_with_wellen(&simulated.fst, &netlist, &simulated);
+        check_with_fst2vcd(&simulated);
     }
+}
+
+/// Many changes: several blocks of FST, at whose ends nothing may be lost or told twice.
+#[test]
+fn a_long_file_reads_back() {
+    let netlist = chip(5, &[(0, 5, 9), (1, 3, 12)]);
+    let inputs = netlist.inputs().len();
+    let choices: Choices = (0..120_000)
+        .map(|i| (i, (i / inputs % 2) as u8, 300_000 + i as i64 % 7))
+        .collect();
+    let drives = drives(&netlist, &choices);
+    let simulated = simulate(&netlist, &Library::default(), drives, Some((100, 900)));
+    assert!(simulated.fst.len() < simulated.vcd.len() / 4);
+    check_with_wellen(&simulated.fst, &netlist, &simulated);
+    check_with_fst2vcd(&simulated);
 }
 
 #[test]
 fn the_same_simulation_writes_the_same_bytes() {
-    let choices: Vec<(usize, u8, i64)> =
-        (0..200).map(|i| (i, (i / 5 % 2) as u8, 400_000)).collect();
+    let choices: Choices = (0..200).map(|i| (i, (i / 5 % 2) as u8, 400_000)).collect();
     let run = || {
         let netlist = chip(4, &[(0, 5, 9), (1, 3, 12)]);
         let drives = drives(&netlist, &choices);
-        simulate(&netlist, &Library::default(), drives).0
+        let simulated = simulate(&netlist, &Library::default(), drives, None);
+        (simulated.vcd, simulated.fst)
     };
     assert_eq!(run(), run());
 }

@@ -13,6 +13,7 @@ use crate::chip::SensorConfig;
 use crate::chip::WindowLaw;
 use crate::engine::recording::check_exposure;
 use crate::engine::timing::{Silicon, TimingVerdict, VerdictReport};
+use crate::engine::waveform::WaveCycles;
 use crate::engine::{CohortOptions, Work};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::guide::GuideMap;
@@ -23,6 +24,7 @@ use crate::system::{
     EngineKind, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Probe, Summary, take_frame,
 };
 use crate::units::Time;
+use crate::waves::WaveFormat;
 
 /// Arguments of `gdtof frame`.
 #[derive(Args)]
@@ -51,9 +53,13 @@ pub struct FrameArgs {
     /// it, the guided macropixel nearest to the centre.
     #[arg(long, value_name = "R,C")]
     probe: Vec<String>,
-    /// Keep only the first N laser cycles in the waveforms of probes.
-    #[arg(long, value_name = "N")]
-    wave_cycles: Option<u32>,
+    /// What the waveforms of probes keep: the first N laser cycles, or `all`. Without it, the first that counts, one
+    /// before it and two after it.
+    #[arg(long, value_name = "N|all", value_parser = wave_cycles)]
+    wave_cycles: Option<WaveCycles>,
+    /// Format of the waveforms of probes.
+    #[arg(long, value_enum, default_value_t)]
+    wave_format: WaveFormat,
     /// Steps to a CLK period in which the cohort engine follows the dead time: more are finer and slower.
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=64))]
     sub_bins: u8,
@@ -105,8 +111,8 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
     let probe_at = |(row, col)| Probe {
         row,
         col,
-        vcd: args.out.join(format!("probe_r{row}_c{col}.vcd")),
-        wave_cycles: args.wave_cycles,
+        waves: args.out.join(wave_name(args, (row, col))),
+        wave_cycles: args.wave_cycles.unwrap_or_default(),
     };
     let settings = FrameSettings {
         sensor,
@@ -159,6 +165,21 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
         }
     }
     Ok(())
+}
+
+fn wave_cycles(text: &str) -> Result<WaveCycles, String> {
+    match text {
+        "all" => Ok(WaveCycles::All),
+        _ => text
+            .parse()
+            .map(WaveCycles::First)
+            .map_err(|_| "give a number of laser cycles, or all".to_owned()),
+    }
+}
+
+/// File name of a probe's waveform.
+fn wave_name(args: &FrameArgs, (row, col): (usize, usize)) -> String {
+    format!("probe_r{row}_c{col}.{}", args.wave_format.extension())
 }
 
 /// `None` where the choice is left to the guide.
@@ -379,10 +400,7 @@ fn table(args: &FrameArgs, timing: &VerdictReport, frame: &Frame) -> Table {
     );
     table.push("run time: all", format!("{:.2} s", times.total_s()));
     let names = ["depth.png", "histograms.npy", "frame.json"].map(String::from);
-    let waves = frame
-        .probes
-        .iter()
-        .map(|(r, c)| format!("probe_r{r}_c{c}.vcd"));
+    let waves = frame.probes.iter().map(|&at| wave_name(args, at));
     let names: Vec<String> = names.into_iter().chain(waves).collect();
     table.push(format!("in {}", args.out.display()), names.join(" "));
     table

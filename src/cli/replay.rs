@@ -23,6 +23,7 @@ use crate::kernel::{CheckReport, Observer, Policy};
 use crate::photon::SpadEvent;
 use crate::report::{Table, write_npy_u16};
 use crate::system::EngineKind;
+use crate::waves::WaveFormat;
 
 /// What is replayed.
 #[derive(Args)]
@@ -124,9 +125,13 @@ pub struct ReplayArgs {
     /// standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Waveform of every named net (needs --engine gate); a GTKWave save file goes beside it.
+    /// Waveform of every named net (needs --engine gate), as FST if its name ends in .fst, else as VCD; views for GTKWave
+    /// and Surfer go beside it.
     #[arg(long, value_name = "FILE")]
     vcd: Option<PathBuf>,
+    /// Format of the waveform, whatever its name.
+    #[arg(long, value_enum, requires = "vcd")]
+    wave_format: Option<WaveFormat>,
     /// Delays that replace the library's (SDF, in the sensor's corner; needs --engine gate).
     #[arg(long, value_name = "FILE")]
     sdf: Option<PathBuf>,
@@ -309,18 +314,17 @@ fn replay_array(
         let timing = silicon.timing(simulation.netlist());
         simulation = simulation.with_timing(&timing);
     }
-    let vcd = args.vcd.as_deref();
     let mut events = simulation.hardware_events();
     match args.checks {
         // Pulses reach flip-flops whose delays only the gates know.
-        None if args.sdf.is_some() => watch(&mut simulation, stimuli, vcd, &mut events)?,
-        None => watch(&mut simulation, stimuli, vcd, &mut ())?,
+        None if args.sdf.is_some() => watch(&mut simulation, stimuli, args, &mut events)?,
+        None => watch(&mut simulation, stimuli, args, &mut ())?,
         Some(policy) => {
             let mut checks = simulation.timing_checks(policy.into());
             watch(
                 &mut simulation,
                 stimuli,
-                vcd,
+                args,
                 &mut (&mut checks, &mut events),
             )?;
             let report = Report {
@@ -360,16 +364,24 @@ struct Report<'a> {
 fn watch<O: Observer>(
     simulation: &mut GateSimulation<'_>,
     stimuli: &Stimuli,
-    vcd: Option<&Path>,
+    args: &ReplayArgs,
     observer: &mut O,
 ) -> Result<(), InputError> {
-    let Some(vcd) = vcd else {
+    let Some(waves) = &args.vcd else {
         simulation.run(observer);
         return Ok(());
     };
-    let start = *stimuli.starts.first().expect("a sensor has a macropixel");
-    let view = View::of_window(&[(0, 0)], &stimuli.config, &stimuli.exposure, start);
-    waveform::record(simulation, vcd, &view, observer)
+    let Stimuli {
+        config,
+        exposure,
+        starts,
+        ..
+    } = stimuli;
+    let pixels = (0..config.rows).flat_map(|row| (0..config.cols).map(move |col| (row, col)));
+    let start = *starts.first().expect("a sensor has a macropixel");
+    let view = View::of_array(pixels.collect(), config, exposure, start);
+    let format = args.wave_format.unwrap_or(WaveFormat::of(waves));
+    waveform::record(simulation, waves, format, &view, observer)
 }
 
 /// Macropixels with delays that are not the library's.

@@ -7,30 +7,38 @@ use clap::{CommandFactory, FromArgMatches, Parser};
 
 use crate::files::{InputError, create_folder};
 use crate::report::Checks;
+use crate::waves::WaveFormat;
 
 #[derive(Parser)]
 struct TestbenchArgs {
-    /// Folder for the waveform and its GTKWave save file, made if it is not there.
+    /// Folder for the waveform and its views for GTKWave and Surfer, made if it is not there.
     #[arg(long, value_name = "DIR", default_value = "waves")]
     out: PathBuf,
+    /// Format of the waveform.
+    #[arg(long, value_enum, default_value_t)]
+    wave_format: WaveFormat,
 }
 
-/// Runs the testbench `name`: `run` fills in the checks and returns the waveform that it wrote into the folder
-/// it is given. Exit status 0 when every check holds, 1 when one fails, 2 when a file cannot be written.
+/// Runs the testbench `name`: `run` fills in the checks and writes the waveform that it is given the path of. Exit status 0 when every check holds, 1 when one fails, 2 when a file cannot be written.
 pub fn testbench(
     name: &'static str,
     about: &'static str,
-    run: impl FnOnce(&Path, &mut Checks) -> Result<PathBuf, InputError>,
+    run: impl FnOnce(&Path, &mut Checks) -> Result<(), InputError>,
 ) -> ExitCode {
     let command = TestbenchArgs::command().name(name).about(about);
     let args = TestbenchArgs::from_arg_matches(&command.get_matches());
     let args = args.unwrap_or_else(|error| error.exit());
+    let waves = format!("{name}.{}", args.wave_format.extension());
+    let waves = args.out.join(waves);
     let mut checks = Checks::new();
-    let result = create_folder(&args.out).and_then(|()| run(&args.out, &mut checks));
+    let result = create_folder(&args.out).and_then(|()| run(&waves, &mut checks));
     match result {
-        Ok(vcd) => {
+        Ok(()) => {
             print!("{checks}");
-            println!("waveform: gtkwave {}", vcd.with_extension("gtkw").display());
+            println!(
+                "waveform: gtkwave {}",
+                waves.with_extension("gtkw").display()
+            );
             checks.exit_code()
         }
         Err(error) => {

@@ -1,155 +1,280 @@
-//! Waveforms of the sensor: a VCD of every named net, and beside it a GTKWave save file that groups the
-//! signals as the thesis's timing diagrams do (Fig. 47, 54, 57).
+//! Waveforms of the sensor: every named net as VCD or FST, and beside it views for GTKWave and Surfer that group the
+//! signals as the thesis's timing diagrams do (Fig. 47, 54, 57) and open at the first HIT.
 
-use std::ops::Range;
+use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Arc;
 
 use super::gate::GateSimulation;
-use crate::chip::window_law::{Window, WindowLaw};
+use super::{Engine, Window};
+use crate::chip::window_law::WindowLaw;
 use crate::chip::{Exposure, SensorConfig, histogram, sensor};
-use crate::files::{InputError, OutputFile};
+use crate::files::InputError;
 use crate::kernel::Observer;
-use crate::netlist::Netlist;
+use crate::logic::Logic;
+use crate::netlist::{NetId, Netlist};
+use crate::photon::SpadEvent;
 use crate::units::Time;
-use crate::waves::{Entry, Group, SaveFile, Selection, VcdWriter};
+use crate::waves::{Entry, Group, Layout, Selection, WaveFile, WaveFormat};
 
-/// What a waveform shows.
-#[derive(Debug, Clone)]
-pub struct View<'p> {
-    /// Macropixels (row, col) whose signals are grouped.
-    pub pixels: &'p [(usize, usize)],
-    /// Where the viewer looks first, from the first rising edge of STOP.
-    pub focus: Range<Time>,
-    /// Where the marker stands, from the first rising edge of STOP.
-    pub marker: Time,
-    /// Changes after this time, from the first rising edge of STOP, are left out of the file.
-    pub limit: Option<Time>,
+/// CLK periods that a view shows before its marker, and after: the end of a window, and what becomes of it.
+const SHOWN_PERIODS: (i64, i64) = (18, 4);
+
+/// Laser cycles kept before the first one that counts, and after it.
+const KEPT_AROUND: (i64, i64) = (1, 2);
+
+/// Which laser cycles a waveform keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum WaveCycles {
+    /// The first laser cycle that counts, one before it (the load, if there is none) and two after it. Where nothing is
+    /// ever counted, the first laser cycles.
+    #[default]
+    FirstHits,
+    /// So many laser cycles from power-up on.
+    First(u32),
+    /// Everything from power-up on.
+    All,
 }
 
-impl<'p> View<'p> {
-    /// Looks at how the first laser cycle's window of `start` closes: the last counts, LOCAL_STOP (with the
-    /// marker) and what the histogram makes of it.
-    pub fn of_window(
-        pixels: &'p [(usize, usize)],
+impl WaveCycles {
+    /// Laser cycles of which the waveform of one macropixel is kept; it has everything from power-up if the first of
+    /// them is not after the exposure's first.
+    fn around(
+        self,
         config: &SensorConfig,
         exposure: &Exposure,
         start: u16,
-    ) -> Self {
-        let marker = match WindowLaw::new(config, exposure).window(start) {
-            Window::Open(open) => open.strobe_cause,
-            Window::Never | Window::Irregular(_) | Window::Race(_) => Time::ZERO,
-        };
-        let periods = |k| exposure.clock.periods(k);
-        View {
-            pixels,
-            focus: marker - periods(18)..marker + periods(4),
-            marker,
-            limit: None,
+        pulses: &[SpadEvent],
+    ) -> (i64, i64) {
+        match self {
+            WaveCycles::All => (0, i64::from(exposure.laser_cycles)),
+            WaveCycles::First(cycles) => (0, i64::from(cycles)),
+            WaveCycles::FirstHits => {
+                let first = first_counting_cycle(config, exposure, start, pulses);
+                let first = i64::from(first.unwrap_or(0));
+                (first - KEPT_AROUND.0, first + 1 + KEPT_AROUND.1)
+            }
         }
     }
 }
 
-/// Runs `simulation` to its end with every named net in `vcd` (and `observer` watching, too), and writes a save file
-/// for `view` beside it.
+/// The laser cycle of a macropixel's first count by the window law, `None` if it never counts or the law does not hold
+/// for this start value.
+fn first_counting_cycle(
+    config: &SensorConfig,
+    exposure: &Exposure,
+    start: u16,
+    pulses: &[SpadEvent],
+) -> Option<u32> {
+    let counts_within = |laser_cycles: u32| {
+        let part = Exposure {
+            laser_cycles,
+            ..*exposure
+        };
+        let end = part.end();
+        let seen = pulses.partition_point(|pulse| pulse.time < end);
+        let histogram = Window::new(config, &part).histogram(start, &pulses[..seen]);
+        Some(histogram.ok()?.iter().any(|&count| count > 0))
+    };
+    // Nothing within `without` laser cycles, something within `with`. Doubling keeps the search as cheap as what it
+    // finds, and below the number of laser cycles after which a counter could have wrapped to zero.
+    let (mut without, mut with) = (0, 1);
+    while !counts_within(with)? {
+        if with == exposure.laser_cycles {
+            return None;
+        }
+        without = with;
+        with = with.saturating_mul(2).min(exposure.laser_cycles);
+    }
+    while with - without > 1 {
+        let middle = without + (with - without) / 2;
+        match counts_within(middle)? {
+            true => with = middle,
+            false => without = middle,
+        }
+    }
+    Some(without)
+}
+
+/// What a waveform keeps and shows. Times are from the first rising edge of STOP.
+#[derive(Debug, Clone)]
+pub struct View {
+    /// Macropixels (row, col): the one that hits first is shown, the first of them if none does.
+    pixels: Vec<(usize, usize)>,
+    /// Where the first window of the first of them closes: the marker, if none hits.
+    closing: Time,
+    /// What is shown before and after the marker.
+    around: (Time, Time),
+    /// From when to when changes are kept; from power-up if the beginning is not after the first rising edge of STOP.
+    kept: RangeInclusive<Time>,
+}
+
+impl View {
+    /// Everything about these macropixels; `start` is the start value of the first.
+    pub fn of_array(
+        pixels: Vec<(usize, usize)>,
+        config: &SensorConfig,
+        exposure: &Exposure,
+        start: u16,
+    ) -> Self {
+        let window = WindowLaw::new(config, exposure).window(start).open();
+        let (before, after) = SHOWN_PERIODS;
+        View {
+            pixels,
+            closing: window.map_or(Time::ZERO, |open| open.strobe_cause),
+            around: (
+                exposure.clock.periods(before),
+                exposure.clock.periods(after),
+            ),
+            kept: Time::ZERO..=Time::MAX,
+        }
+    }
+
+    /// What is to be kept of one macropixel with its start value and SPAD pulses (in order of time).
+    pub fn of_pixel(
+        pixel: (usize, usize),
+        config: &SensorConfig,
+        exposure: &Exposure,
+        start: u16,
+        pulses: &[SpadEvent],
+        cycles: WaveCycles,
+    ) -> Self {
+        let (from, until) = cycles.around(config, exposure, start, pulses);
+        let stop = |cycle| match cycle {
+            // The counts of the last laser cycle settle after its end.
+            cycle if cycle >= i64::from(exposure.laser_cycles) => Time::MAX,
+            cycle => exposure.stop(cycle),
+        };
+        View {
+            kept: stop(from)..=stop(until),
+            ..Self::of_array(vec![pixel], config, exposure, start)
+        }
+    }
+}
+
+/// Runs `simulation` to its end with every named net in the file `waves` (and `observer` watching, too), and writes the
+/// views beside it.
 ///
 /// # Errors
 /// When a file cannot be written.
 pub fn record<O: Observer>(
     simulation: &mut GateSimulation<'_>,
-    vcd: &Path,
-    view: &View<'_>,
+    waves: &Path,
+    format: WaveFormat,
+    view: &View,
     observer: &mut O,
 ) -> Result<(), InputError> {
     let schedule = simulation.schedule();
     let origin = schedule.origin;
-    let save_file = SaveFile {
-        groups: groups(simulation.netlist(), view.pixels),
-        zoom: (origin + view.focus.start, origin + view.focus.end),
-        marker: Some(origin + view.marker),
+    let at = |time: Time| match time {
+        Time::MAX => schedule.end,
+        time => (origin + time).min(schedule.end),
+    };
+    let span = match *view.kept.start() {
+        from if from > Time::ZERO => at(from)..=at(*view.kept.end()),
+        _ => Time::ZERO..=at(*view.kept.end()),
     };
     let netlist = Arc::clone(simulation.netlist());
-    let limit = view.limit.map_or(schedule.end, |limit| origin + limit);
-    write_vcd(vcd, &netlist, limit, |writer| {
-        simulation.run(&mut (writer, observer));
-        schedule.end
-    })?;
-    write_view(vcd, &netlist, &save_file)
-}
-
-/// Writes what `run` lets the observer see of `netlist` to `vcd`, changes after `limit` left out; `run` returns
-/// the end of the simulation.
-///
-/// # Errors
-/// When the file cannot be written; it is then not there at all.
-pub fn write_vcd(
-    vcd: &Path,
-    netlist: &Netlist,
-    limit: Time,
-    run: impl FnOnce(&mut VcdWriter<OutputFile>) -> Time,
-) -> Result<(), InputError> {
-    let failed = |e: std::io::Error| {
-        InputError::new(
-            vcd.display(),
-            format!("cannot be written ({e}); free some space"),
-        )
+    let mut first_hit = FirstHit::new(&netlist, &view.pixels, origin);
+    let mut file = WaveFile::create(waves, format, &netlist, &Selection::all(), span.clone())?;
+    simulation.run(&mut (&mut file, (&mut first_hit, observer)));
+    file.finish(schedule.end)?;
+    let found = first_hit.found.filter(|(time, _)| span.contains(time));
+    let (marker, pixel) = found.unwrap_or((origin + view.closing, view.pixels[0]));
+    let layout = Layout {
+        groups: groups(&netlist, pixel),
+        zoom: (marker - view.around.0, marker + view.around.1),
+        marker: Some(marker),
     };
-    let file = OutputFile::create(vcd)?;
-    let mut writer = VcdWriter::new(file, netlist, &Selection::all())
-        .map_err(failed)?
-        .limit(limit);
-    let end = run(&mut writer);
-    writer.finish(end).map_err(failed)?.commit()
+    layout.write_beside(waves, &netlist, *span.end())
 }
 
-/// Writes the save file of a VCD beside it, with the extension `.gtkw`.
+/// Finds the first HIT of an exposure.
+struct FirstHit {
+    /// Macropixel of every net that is a HIT.
+    hits: Vec<Option<(usize, usize)>>,
+    origin: Time,
+    found: Option<(Time, (usize, usize))>,
+}
+
+impl FirstHit {
+    fn new(netlist: &Netlist, pixels: &[(usize, usize)], origin: Time) -> Self {
+        let mut hits = vec![None; netlist.net_count()];
+        for &(row, col) in pixels {
+            let hit = format!("{}.HIT", sensor::pixel_name(row, col));
+            for net in netlist.signal(&hit).into_iter().flatten() {
+                hits[net.index()] = Some((row, col));
+            }
+        }
+        FirstHit {
+            hits,
+            origin,
+            found: None,
+        }
+    }
+}
+
+impl Observer for FirstHit {
+    #[inline]
+    fn change(&mut self, time: Time, net: NetId, value: Logic) {
+        if self.found.is_none() && value == Logic::One && time >= self.origin {
+            self.found = self.hits[net.index()].map(|pixel| (time, pixel));
+        }
+    }
+}
+
+/// Writes every named net of `netlist` that `run` lets the observer see to `waves`, in the format of its name, and
+/// `layout` beside it; `run` returns the end of the simulation.
 ///
 /// # Errors
-/// When the file cannot be written.
-pub fn write_view(vcd: &Path, netlist: &Netlist, view: &SaveFile) -> Result<(), InputError> {
-    let name = vcd.file_name().unwrap_or_default().to_string_lossy();
-    OutputFile::write_with(&vcd.with_extension("gtkw"), |out| {
-        view.write(out, netlist, &name)
-    })
+/// When a file cannot be written; it is then not there at all.
+pub fn write_waves(
+    waves: &Path,
+    netlist: &Netlist,
+    layout: &Layout,
+    run: impl FnOnce(&mut WaveFile) -> Time,
+) -> Result<(), InputError> {
+    let all = Time::ZERO..=Time::MAX;
+    let format = WaveFormat::of(waves);
+    let mut file = WaveFile::create(waves, format, netlist, &Selection::all(), all)?;
+    let end = run(&mut file);
+    file.finish(end)?;
+    layout.write_beside(waves, netlist, end)
 }
 
-fn groups(netlist: &Netlist, pixels: &[(usize, usize)]) -> Vec<Group> {
-    let mut groups = Vec::new();
-    for &(row, col) in pixels {
-        let pixel = sensor::pixel_name(row, col);
-        let of = |name: &str| format!("{pixel}.{name}");
-        let has_signal = |path: &String| netlist.signal(path).is_some();
-        let memory = Some(of("p_counter.MEMORY")).filter(has_signal);
-        let mut counter = vec![
-            Entry::binary("CLK"),
-            Entry::binary("STOP"),
-            Entry::binary(of("ENABLE")),
-            Entry::binary(of("MEMORY_LOAD")),
-            Entry::decimal(of("COUNTER_INIT")),
-        ];
-        counter.extend(memory.map(Entry::decimal));
-        counter.extend([
-            Entry::binary(of("COUNTER_RESET")),
-            Entry::binary(of("COUNTER_CLK")),
-            Entry::decimal(of("p_counter.COUNTER_OUT")),
-            Entry::binary(of("LOCAL_STOP")),
-        ]);
-        groups.push(Group::new(format!("P-counter {pixel} (Fig. 54)"), counter));
-        let bins = (0..)
-            .map(|bin| of(&format!("histogram.{}", histogram::bin_name(bin))))
-            .take_while(has_signal)
-            .map(Entry::decimal);
-        let histogram = [
-            Entry::hex(of("SPAD_RAW")),
-            Entry::hex(of("SPAD_TIMED")),
-            Entry::binary(of("SPAD_EVENT")),
-            Entry::binary(of("metdc.SHIFT")),
-            Entry::binary(of("metdc.STROBE")),
-            Entry::binary(of("HIT")),
-        ];
-        let signals = histogram.into_iter().chain(bins);
-        groups.push(Group::new(format!("Histogram {pixel} (Fig. 47)"), signals));
-    }
+/// The signals of the macropixel (row, col), and the load path.
+fn groups(netlist: &Netlist, (row, col): (usize, usize)) -> Vec<Group> {
+    let pixel = sensor::pixel_name(row, col);
+    let of = |name: &str| format!("{pixel}.{name}");
+    let has_signal = |path: &String| netlist.signal(path).is_some();
+    let memory = Some(of("p_counter.MEMORY")).filter(has_signal);
+    let mut counter = vec![
+        Entry::binary("CLK"),
+        Entry::binary("STOP"),
+        Entry::binary(of("ENABLE")),
+        Entry::binary(of("MEMORY_LOAD")),
+        Entry::decimal(of("COUNTER_INIT")),
+    ];
+    counter.extend(memory.map(Entry::decimal));
+    counter.extend([
+        Entry::binary(of("COUNTER_RESET")),
+        Entry::binary(of("COUNTER_CLK")),
+        Entry::decimal(of("p_counter.COUNTER_OUT")),
+        Entry::binary(of("LOCAL_STOP")),
+    ]);
+    let bins = (0..)
+        .map(|bin| of(&format!("histogram.{}", histogram::bin_name(bin))))
+        .take_while(has_signal)
+        .map(Entry::decimal);
+    let histogram = [
+        Entry::hex(of("SPAD_RAW")),
+        Entry::hex(of("SPAD_TIMED")),
+        Entry::binary(of("SPAD_EVENT")),
+        Entry::binary(of("metdc.SHIFT")),
+        Entry::binary(of("metdc.STROBE")),
+        Entry::binary(of("HIT")),
+    ];
+    let signals = histogram.into_iter().chain(bins);
     let load = [
         Entry::binary("LOAD_ENABLE"),
         Entry::binary("LOAD_CLK"),
@@ -158,6 +283,9 @@ fn groups(netlist: &Netlist, pixels: &[(usize, usize)]) -> Vec<Group> {
         Entry::binary("ROW_DONE"),
         Entry::binary("MEMORY_LOAD"),
     ];
-    groups.push(Group::new("Load path (Fig. 57)", load));
-    groups
+    vec![
+        Group::new(format!("P-counter {pixel} (Fig. 54)"), counter),
+        Group::new(format!("Histogram {pixel} (Fig. 47)"), signals),
+        Group::new("Load path (Fig. 57)", load),
+    ]
 }

@@ -16,7 +16,7 @@ use super::remark::Circumstances;
 use super::result::{Frame, PhaseTimes};
 use super::tolerance::Tolerance;
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
-use crate::engine::waveform::{self, View};
+use crate::engine::waveform::{self, View, WaveCycles};
 use crate::engine::{
     Cohort, CohortOptions, Cycle, Engine, EngineError, Gate, GateSimulation, LitPixel, Window,
     expose, expose_without_skipping, load, stream_config,
@@ -27,6 +27,7 @@ use crate::photon::{PhotonStream, SpadEvent};
 use crate::ranging::{DepthOptions, EchoFinder};
 use crate::scene::{GroundTruth, Scene};
 use crate::units::Time;
+use crate::waves::WaveFormat;
 
 /// Which engine runs the macropixels that are not probed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, clap::ValueEnum)]
@@ -76,10 +77,10 @@ pub struct Probe {
     pub row: usize,
     /// Column in the array.
     pub col: usize,
-    /// Where its VCD goes; the GTKWave save file goes beside it.
-    pub vcd: PathBuf,
-    /// Laser cycles in the waveform; `None` for all.
-    pub wave_cycles: Option<u32>,
+    /// Where its waveform goes, in the format of the name; the views for GTKWave and Surfer go beside it.
+    pub waves: PathBuf,
+    /// What the waveform keeps.
+    pub wave_cycles: WaveCycles,
 }
 
 /// Everything a frame depends on.
@@ -351,12 +352,9 @@ fn run_probe(
 ) -> Result<Vec<u16>, FrameError> {
     let at = (probe.row, probe.col);
     let mut simulation = GateSimulation::new(sensor, exposure, at, (1, 1), &[start], &[events]);
-    let pixels = [at];
-    let view = View {
-        limit: probe.wave_cycles.map(|n| exposure.stop(n as i64)),
-        ..View::of_window(&pixels, sensor, exposure, start)
-    };
-    waveform::record(&mut simulation, &probe.vcd, &view, &mut ())?;
+    let view = View::of_pixel(at, sensor, exposure, start, events, probe.wave_cycles);
+    let format = WaveFormat::of(&probe.waves);
+    waveform::record(&mut simulation, &probe.waves, format, &view, &mut ())?;
     Ok(simulation.histograms()?.remove(0))
 }
 

@@ -1,9 +1,9 @@
-//! Waveforms for viewers: value change dumps, and save files that lay out what to look at.
+//! Waveforms for viewers: value change dumps or FST files, and files that lay out what to look at.
 //!
 //! ```text
-//!   Netlist ─► Selection ─┐
-//!   Kernel ──(observes)───┴─► VcdWriter ─► frame.vcd  ─┐
-//!   Netlist ────────────────► SaveFile  ─► frame.gtkw ─┴─► GTKWave (Surfer reads the VCD)
+//!   Netlist ─► Selection ─┐              ┌─► Vcd ─► frame.vcd ─┐
+//!   Kernel ──(observes)───┴─► WaveWriter ┴─► Fst ─► frame.fst ─┴─► GTKWave, Surfer
+//!   Netlist ────────────────► Layout ─► frame.gtkw, frame.sucl ──────┘
 //! ```
 //!
 //! Two runs of the same simulation write the same bytes: files carry no date.
@@ -30,11 +30,19 @@
 //! # Ok::<(), std::io::Error>(())
 //! ```
 
+mod file;
+mod fst;
 mod gtkw;
+mod layout;
 mod selection;
+mod surfer;
+mod variables;
 mod vcd;
-mod vcd_header;
+mod writer;
 
-pub use gtkw::{Entry, Group, Radix, SaveFile};
+pub use file::{VIEWS, WaveFile, WaveFormat};
+pub use fst::{Fst, FstWriter};
+pub use layout::{Entry, Group, Layout, Radix};
 pub use selection::Selection;
-pub use vcd::VcdWriter;
+pub use vcd::{Vcd, VcdWriter};
+pub use writer::{Format, WaveWriter};

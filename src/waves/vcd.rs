@@ -1,196 +1,129 @@
-//! Value change dumps: an observer of the kernel that writes what every viewer reads.
-//!
-//! One instant of simulated time is written as a whole, when the next one begins. Changes within
-//! it are only noted; then each net is compared with what the file last said of it. So a glitch
-//! of zero width leaves no trace, a value is never repeated (a viewer would draw a repetition as
-//! a toggle), a bus of which several bits change gets one line, and a time is written only if a
-//! change follows it.
-//!
-//! ```text
-//!   change(t, net, v) ─► nets[net].now = v, once on `changed`
-//!   t advances ────────► changed ─► differs from nets[net].written? ─► "1!"  and every bus it
-//!                                                                     is a bit of ─► "b0101 #"
-//! ```
+//! Value change dumps: the format that every viewer reads.
 //!
 //! The header goes through the `vcd` crate. The crate formats a change bit by bit, at a fifth of
 //! the speed that bytes of our own reach; changes are most of a file, so they are written here.
 //!
 //! Traps: GTKWave refuses times beyond 2⁵³ units, which are 9 s of femtoseconds; it cannot read a
 //! name with a colon, a bracket or a leading dollar (the netlist allows only identifiers, so none
-//! can occur), nor a last line without a newline. The nets are taken to be unknown when the
-//! writer is made: it must observe the simulation from its start.
+//! can occur), nor a last line without a newline.
 
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
+
+use vcd::{IdCode, ReferenceIndex, TimescaleUnit, VarType};
 
 use super::selection::Selection;
-use super::vcd_header::{BLOCK, Bus, NO_SCALAR, ScalarLine, Variables, write_header};
-use crate::kernel::Observer;
-use crate::logic::Logic;
-use crate::netlist::{NetId, Netlist};
+use super::variables::{Declaration, Declare, Variables};
+use super::writer::{Format, WaveWriter};
+use crate::netlist::Netlist;
 use crate::units::Time;
 
-/// Character of each value, indexed by [`Logic::bits`].
-const CHARACTERS: [u8; 4] = *b"01xz";
-
-/// What the writer knows of one net.
-#[derive(Clone, Copy)]
-struct NetState {
-    /// Index into `scalars`, or [`NO_SCALAR`].
-    scalar: u32,
-    /// Present value, as a character.
-    now: u8,
-    /// The value that the file shows, as a character.
-    written: u8,
-    /// Already on the list of changed nets; or not shown at all, and never to be put there.
-    is_settled: bool,
-}
+/// Bytes collected before they are handed to the underlying writer.
+const BLOCK: usize = 1 << 16;
 
 /// Writes a value change dump of a simulation that it observes.
 ///
 /// Output is handed over in large blocks, so `out` needs no buffer of its own.
-pub struct VcdWriter<W: Write> {
-    out: W,
-    error: Option<io::Error>,
-    buffer: Vec<u8>,
-    limit: Time,
-    /// The instant whose changes are being collected.
-    now: Time,
-    /// The last time written.
-    stamped: Time,
-    nets: Vec<NetState>,
-    changed: Vec<u32>,
-    scalars: Vec<ScalarLine>,
-    buses: Vec<Bus>,
-    bus_bits: Vec<u32>,
-    changed_buses: Vec<u32>,
-    /// Buses of net `n`: `net_buses[net_buses_start[n]..net_buses_start[n + 1]]`.
-    net_buses: Vec<u32>,
-    net_buses_start: Vec<u32>,
-}
+pub type VcdWriter<W> = WaveWriter<Vcd<W>>;
 
 impl<W: Write> VcdWriter<W> {
-    /// Starts a dump of the selected signals at time 0, with every net unknown.
+    /// Starts a dump of the selected signals, with every net unknown.
     ///
     /// # Errors
     /// Those of `out`, and a path in `selection` that does not exist.
     pub fn new(mut out: W, netlist: &Netlist, selection: &Selection) -> io::Result<Self> {
-        let Variables {
-            scalar_of_net,
-            scalars,
-            buses,
-            bus_bits,
-            ..
-        } = write_header(&mut out, netlist, selection)?;
-        let (net_buses_start, net_buses) = invert(netlist.net_count(), &buses, &bus_bits);
-        let unknown = CHARACTERS[Logic::X as usize];
-        let nets = scalar_of_net
-            .iter()
-            .zip(net_buses_start.windows(2))
-            .map(|(&scalar, buses)| NetState {
-                scalar,
-                now: unknown,
-                written: unknown,
-                is_settled: scalar == NO_SCALAR && buses[0] == buses[1],
-            })
-            .collect();
-        Ok(VcdWriter {
+        let (variables, lines) = write_header(&mut out, netlist, selection)?;
+        let vcd = Vcd {
             out,
             error: None,
             buffer: Vec::with_capacity(2 * BLOCK),
-            limit: Time::MAX,
-            now: Time::ZERO,
+            lines,
             stamped: Time::ZERO,
-            nets,
-            changed: Vec::new(),
-            scalars,
-            buses,
-            bus_bits,
-            changed_buses: Vec::new(),
-            net_buses,
-            net_buses_start,
-        })
+        };
+        Ok(WaveWriter::of(vcd, netlist, variables))
+    }
+}
+
+/// Writes everything before the first change, and returns what got which identifier code.
+fn write_header(
+    out: &mut impl Write,
+    netlist: &Netlist,
+    selection: &Selection,
+) -> io::Result<(Variables, Vec<Line>)> {
+    let mut header = Header {
+        out: vcd::Writer::new(BufWriter::with_capacity(BLOCK, out)),
+        lines: Vec::new(),
+    };
+    let version = concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"));
+    header.out.version(version)?;
+    header.out.timescale(1, TimescaleUnit::FS)?;
+    let variables = Variables::declare(netlist, selection, &mut header)?;
+    header.out.enddefinitions()?;
+    header.out.flush()?;
+    Ok((variables, header.lines))
+}
+
+/// The format: what [`VcdWriter`] writes.
+pub struct Vcd<W> {
+    out: W,
+    error: Option<io::Error>,
+    buffer: Vec<u8>,
+    lines: Vec<Line>,
+    stamped: Time,
+}
+
+/// The end of a variable's lines: one character, which is the value of a scalar or the space behind those of a
+/// bus, identifier code, newline.
+#[derive(Clone, Copy)]
+struct Line {
+    bytes: [u8; 8],
+    length: u8,
+}
+
+impl Line {
+    fn new(code: IdCode) -> Self {
+        let text = format!(" {code}\n");
+        // 94⁵ codes, more than there can be nets, have at most five characters.
+        assert!(text.len() <= 8, "identifier code too long");
+        let mut bytes = [0; 8];
+        bytes[..text.len()].copy_from_slice(text.as_bytes());
+        let length = text.len() as u8;
+        Line { bytes, length }
+    }
+}
+
+struct Header<W: Write> {
+    out: vcd::Writer<W>,
+    lines: Vec<Line>,
+}
+
+impl<W: Write> Declare for Header<W> {
+    fn scope(&mut self, name: &str) -> io::Result<()> {
+        self.out.add_module(name)
     }
 
-    /// Ignores every change after `limit`.
-    pub fn limit(mut self, limit: Time) -> Self {
-        self.limit = limit;
-        self
+    fn up_scope(&mut self) -> io::Result<()> {
+        self.out.upscope()
     }
 
-    /// Writes what is pending and marks the end of the simulation (or the limit, if that is
-    /// earlier), so that viewers show the last values up to there.
-    ///
-    /// # Errors
-    /// The first error of the underlying writer since the start; the file is then incomplete.
-    pub fn finish(mut self, end: Time) -> io::Result<W> {
-        self.write_instant();
-        let end = end.min(self.limit);
-        if end > self.stamped {
-            self.stamp(end);
+    fn signal(&mut self, signal: &Declaration<'_>) -> io::Result<()> {
+        let code = IdCode::from(signal.variable);
+        if !signal.is_alias {
+            self.lines.push(Line::new(code));
         }
-        self.write_block();
-        match self.error {
-            Some(error) => Err(error),
-            None => {
-                self.out.flush()?;
-                Ok(self.out)
-            }
-        }
+        let range = ReferenceIndex::Range(signal.width as i32 - 1, 0);
+        let range = signal.is_bus.then_some(range);
+        let (wire, name) = (VarType::Wire, signal.name);
+        self.out.var_def(wire, signal.width, code, name, range)
     }
+}
 
-    /// Writes the changes of the instant that ends.
-    fn write_instant(&mut self) {
-        let changed = std::mem::take(&mut self.changed);
-        for &net in &changed {
-            let state = &mut self.nets[net as usize];
-            state.is_settled = false;
-            if state.now == state.written {
-                continue;
-            }
-            state.written = state.now;
-            let NetState { scalar, now, .. } = *state;
-            if self.stamped != self.now {
-                self.stamp(self.now);
-            }
-            if scalar != NO_SCALAR {
-                let mut line = self.scalars[scalar as usize];
-                line.bytes[0] = now;
-                // Eight bytes at once and back to the true length: cheaper than a variable copy.
-                let length = self.buffer.len() + line.length as usize;
-                self.buffer.extend_from_slice(&line.bytes);
-                self.buffer.truncate(length);
-            }
-            let buses = &self.net_buses_start[net as usize..][..2];
-            for &index in &self.net_buses[buses[0] as usize..buses[1] as usize] {
-                let bus = &mut self.buses[index as usize];
-                if !bus.is_changed {
-                    bus.is_changed = true;
-                    self.changed_buses.push(index);
-                }
-            }
-        }
-        self.changed = changed;
-        self.changed.clear();
-        for &index in &self.changed_buses {
-            let bus = &mut self.buses[index as usize];
-            bus.is_changed = false;
-            let bits = &self.bus_bits[bus.bits.clone()];
-            self.buffer.push(b'b');
-            self.buffer
-                .extend(bits.iter().map(|&net| self.nets[net as usize].now));
-            self.buffer.extend_from_slice(&bus.tail);
-        }
-        self.changed_buses.clear();
-        if self.buffer.len() >= BLOCK {
-            self.write_block();
-        }
-    }
-
-    fn stamp(&mut self, time: Time) {
-        self.stamped = time;
-        self.buffer.push(b'#');
-        push_decimal(&mut self.buffer, time.as_fs().unsigned_abs());
-        self.buffer.push(b'\n');
+impl<W: Write> Vcd<W> {
+    #[inline]
+    fn line(&mut self, Line { bytes, length }: Line) {
+        // Eight bytes at once and back to the true length: cheaper than a variable copy.
+        let end = self.buffer.len() + usize::from(length);
+        self.buffer.extend_from_slice(&bytes);
+        self.buffer.truncate(end);
     }
 
     /// Hands the buffer over. After an error the rest is dropped: the file is lost anyway.
@@ -202,22 +135,58 @@ impl<W: Write> VcdWriter<W> {
     }
 }
 
-impl<W: Write> Observer for VcdWriter<W> {
+impl<W: Write> Format for Vcd<W> {
+    type Out = W;
+
+    fn begin(&mut self, time: Time) {
+        self.time(time);
+        self.buffer.extend_from_slice(b"$dumpvars\n");
+    }
+
+    fn begun(&mut self) {
+        self.buffer.extend_from_slice(b"$end\n");
+    }
+
     #[inline]
-    fn change(&mut self, time: Time, net: NetId, value: Logic) {
-        if time > self.limit {
-            return;
+    fn time(&mut self, time: Time) {
+        self.stamped = time;
+        self.buffer.push(b'#');
+        push_decimal(&mut self.buffer, time.as_fs().unsigned_abs());
+        self.buffer.push(b'\n');
+    }
+
+    #[inline]
+    fn scalar(&mut self, variable: u32, value: u8) {
+        let mut line = self.lines[variable as usize];
+        line.bytes[0] = value;
+        self.line(line);
+    }
+
+    #[inline]
+    fn bus(&mut self, variable: u32, values: impl ExactSizeIterator<Item = u8>) {
+        self.buffer.push(b'b');
+        self.buffer.extend(values);
+        self.line(self.lines[variable as usize]);
+    }
+
+    #[inline]
+    fn end_instant(&mut self) {
+        if self.buffer.len() >= BLOCK {
+            self.write_block();
         }
-        // A change in the past counts as one of the present: a file's times never go back.
-        if time > self.now {
-            self.write_instant();
-            self.now = time;
+    }
+
+    fn finish(mut self, end: Time) -> io::Result<W> {
+        if end > self.stamped {
+            self.time(end);
         }
-        let state = &mut self.nets[net.index()];
-        state.now = CHARACTERS[value as usize];
-        if !state.is_settled {
-            state.is_settled = true;
-            self.changed.push(net.index() as u32);
+        self.write_block();
+        match self.error {
+            Some(error) => Err(error),
+            None => {
+                self.out.flush()?;
+                Ok(self.out)
+            }
         }
     }
 }
@@ -238,30 +207,11 @@ fn push_decimal(buffer: &mut Vec<u8>, mut number: u64) {
     buffer.extend_from_slice(&digits[start..]);
 }
 
-/// Lists for every net the buses that it is a bit of: start of each net's list, then the lists.
-fn invert(net_count: usize, buses: &[Bus], bus_bits: &[u32]) -> (Vec<u32>, Vec<u32>) {
-    let mut start = vec![0u32; net_count + 1];
-    for &net in bus_bits {
-        start[net as usize + 1] += 1;
-    }
-    for i in 1..start.len() {
-        start[i] += start[i - 1];
-    }
-    let mut next = start.clone();
-    let mut lists = vec![0; bus_bits.len()];
-    for (index, bus) in buses.iter().enumerate() {
-        for &net in &bus_bits[bus.bits.clone()] {
-            let at = &mut next[net as usize];
-            lists[*at as usize] = index as u32;
-            *at += 1;
-        }
-    }
-    (start, lists)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::Observer;
+    use crate::logic::Logic;
     use crate::netlist::{CellKind, ModuleBuilder};
 
     /// Two inverters in a row below a top with a bus of both outputs, and one anonymous net.
@@ -331,10 +281,10 @@ $enddefinitions $end
 #0
 $dumpvars
 x!
+bxx "
 x#
 x$
 x%
-bxx "
 $end
 "#
         );
@@ -406,10 +356,50 @@ $upscope $end
     #[test]
     fn a_limit_ends_the_file_there() {
         let changes = [(5, "A", One), (50, "A", Zero), (51, "A", One)];
-        let limited = writer(Selection::all()).limit(Time::from_fs(50));
+        let until = |fs| Time::ZERO..=Time::from_fs(fs);
+        let limited = writer(Selection::all()).keep(until(50));
         assert_eq!(body(limited, changes), "#5\n1!\n#50\n0!\n");
-        let limited = writer(Selection::all()).limit(Time::from_fs(49));
+        let limited = writer(Selection::all()).keep(until(49));
         assert_eq!(body(limited, changes), "#5\n1!\n#49\n");
+    }
+
+    #[test]
+    fn a_kept_span_begins_with_the_values_there() {
+        let span = |from, until| {
+            let span = Time::from_fs(from)..=Time::from_fs(until);
+            let mut writer = writer(Selection::all()).keep(span);
+            let netlist = pair();
+            for (fs, net, value) in [
+                (0, "A", Zero),
+                (5, "Z[0]", One),
+                (8, "A", X),
+                (8, "A", One),
+                (20, "A", Zero),
+                (20, "Z[0]", Zero),
+                (30, "Z[1]", One),
+            ] {
+                writer.change(Time::from_fs(fs), netlist.net(net).unwrap(), value);
+            }
+            let text = String::from_utf8(writer.finish(Time::from_fs(100)).unwrap()).unwrap();
+            let (_, body) = text.split_once("$enddefinitions $end\n").unwrap();
+            body.replace('\n', " ")
+        };
+        let values = |a: char, z: &str, rest: &str| {
+            format!(
+                "$dumpvars {a}! b{z} \" {}# {}$ x% $end {rest}",
+                &z[1..],
+                &z[..1]
+            )
+        };
+        // Between two instants.
+        let changes = "#20 0! 0# bx0 \" #25 ";
+        assert_eq!(span(10, 25), format!("#10 {}", values('1', "x1", changes)));
+        // At an instant: what changes in it does so after the first values.
+        let changes = "0! 0# bx0 \" #30 1$ b10 \" #100 ";
+        assert_eq!(span(20, 900), format!("#20 {}", values('1', "x1", changes)));
+        // After the last change, and after the end.
+        assert_eq!(span(40, 50), format!("#40 {}", values('0', "10", "#50 ")));
+        assert_eq!(span(400, 500), format!("#100 {}", values('0', "10", "")));
     }
 
     #[test]

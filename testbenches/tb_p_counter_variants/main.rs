@@ -15,7 +15,7 @@
 mod comparison;
 mod memoryless;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -25,13 +25,13 @@ use guided_dtof::chip::{
     p_counter_timing,
 };
 use guided_dtof::cli::testbench;
-use guided_dtof::engine::waveform::{write_vcd, write_view};
+use guided_dtof::engine::waveform::write_waves;
 use guided_dtof::files::{InputError, OutputFile};
 use guided_dtof::kernel::{Drive, Kernel, Recorder, clock, in_order};
 use guided_dtof::netlist::{Library, Module, ModuleBuilder, NetId, Netlist, Timing};
 use guided_dtof::report::Checks;
 use guided_dtof::units::Time;
-use guided_dtof::waves::{Entry, Group, SaveFile};
+use guided_dtof::waves::{Entry, Group, Layout};
 
 /// First STOP edge.
 const ORIGIN: Time = Time::from_ns(60);
@@ -64,7 +64,7 @@ fn main() -> ExitCode {
     )
 }
 
-fn run(out: &Path, checks: &mut Checks) -> Result<PathBuf, InputError> {
+fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let grid = comparison::compare(checks);
     println!("{grid}");
     println!(
@@ -73,16 +73,15 @@ fn run(out: &Path, checks: &mut Checks) -> Result<PathBuf, InputError> {
     println!(
         "settled: every net after a count. CLK period: STOP on CLK's fall, setup and hold not counted.\n"
     );
-    let table = out.join("tb_p_counter_variants.csv");
+    let table = waves.with_extension("csv");
     OutputFile::write_with(&table, |out| grid.write_csv(out))?;
 
-    let vcd = out.join("tb_p_counter_variants.vcd");
     let bench = Bench::new();
-    let seen = bench.simulate(&vcd)?;
+    let seen = bench.simulate(waves)?;
     false_capture(&bench, &seen, checks);
     repeated_capture(&bench, &seen, checks);
     memoryless::coming_round(checks);
-    Ok(vcd)
+    Ok(())
 }
 
 /// Some laser cycles with one start value.
@@ -277,8 +276,8 @@ impl Bench {
         drives
     }
 
-    /// Runs both scenes into `vcd`.
-    fn simulate(&self, vcd: &Path) -> Result<Recorder, InputError> {
+    /// Runs both scenes, with their waveform in `waves`.
+    fn simulate(&self, waves: &Path) -> Result<Recorder, InputError> {
         let nets = CHANNELS.iter().flat_map(|(name, ..)| {
             let paths = ["LOCAL_STOP", "metdc.HIT", "metdc_early.HIT"];
             paths.map(|path| self.bus(&format!("{name}.{path}")))
@@ -288,7 +287,7 @@ impl Bench {
         let timing = Timing::nominal(&self.netlist, &Library::default(), corner);
         let mut kernel = Kernel::new(&self.netlist, &timing);
         let end = self.at(SLOW_LASER.end() + 40);
-        write_vcd(vcd, &self.netlist, Time::MAX, |waves| {
+        write_waves(waves, &self.netlist, &self.view(), |waves| {
             kernel.run(
                 &mut in_order(self.drives()),
                 end,
@@ -296,11 +295,10 @@ impl Bench {
             );
             end
         })?;
-        write_view(vcd, &self.netlist, &self.view())?;
         Ok(recorder)
     }
 
-    fn view(&self) -> SaveFile {
+    fn view(&self) -> Layout {
         let shared = ["CLK", "STOP", "ENABLE", "SPAD_EVENT", "HIT_CLEAR"].map(Entry::binary);
         let mut groups = vec![Group::new("Global signals", shared)];
         for (name, tap, _) in CHANNELS {
@@ -317,7 +315,7 @@ impl Bench {
             }
             groups.push(Group::new(format!("P-counter {name}"), signals));
         }
-        SaveFile {
+        Layout {
             groups,
             zoom: (Time::ZERO, self.at(HIGH.end() + 10)),
             marker: Some(self.at(HIGH.stop(1))),
