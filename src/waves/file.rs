@@ -21,7 +21,7 @@ pub enum WaveFormat {
     /// Value change dump: text that every tool reads.
     #[default]
     Vcd,
-    /// GTKWave's compressed format: a twentieth of the size or less.
+    /// GTKWave's compressed format, several times smaller.
     Fst,
 }
 
@@ -50,8 +50,8 @@ pub struct WaveFile {
 }
 
 enum Writer {
-    Vcd(VcdWriter<OutputFile>),
-    Fst(FstWriter<OutputFile>),
+    Vcd(Box<VcdWriter<OutputFile>>),
+    Fst(Box<FstWriter<OutputFile>>),
 }
 
 impl WaveFile {
@@ -71,11 +71,11 @@ impl WaveFile {
         let writer = match format {
             WaveFormat::Vcd => {
                 let writer = VcdWriter::new(file, netlist, selection).map_err(failed)?;
-                Writer::Vcd(writer.keep(span))
+                Writer::Vcd(Box::new(writer.keep(span)))
             }
             WaveFormat::Fst => {
                 let writer = FstWriter::new(file, netlist, selection).map_err(failed)?;
-                Writer::Fst(writer.keep(span))
+                Writer::Fst(Box::new(writer.keep(span)))
             }
         };
         let path = path.to_owned();

@@ -1,4 +1,4 @@
-//! FST: GTKWave's compressed waveforms, a few bits a change. Surfer reads them, too.
+//! FST: GTKWave's compressed waveforms, a few bytes a change. Surfer reads them, too.
 //!
 //! Bytes go through the `fst-writer` crate. It collects changes by variable and compresses them in blocks; a block is
 //! given to the file when its changes fill [`BLOCK`]. The same signals and changes are in it as in the VCD, and no date.
