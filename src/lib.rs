@@ -10,6 +10,7 @@
 //! | [`units`] | integer femtoseconds, exact clock frequencies, constants |
 //! | [`numerics`] | quadrature, special functions, confidence intervals |
 //! | [`files`] | user's input with line numbers, output whole or not at all |
+//! | [`settings`] | settings files and `--set`, held to tables of their keys |
 //! | [`logic`] | four-valued logic |
 //! | [`netlist`] | cells, hierarchical builder, delays, Verilog |
 //! | [`kernel`] | the discrete event kernel |
@@ -56,6 +57,7 @@ pub mod ranging;
 pub mod report;
 pub mod reproduce;
 pub mod scene;
+pub mod settings;
 pub mod system;
 pub mod theory;
 pub mod units;

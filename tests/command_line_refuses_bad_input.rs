@@ -204,7 +204,7 @@ fn every_kind_of_bad_input_is_one_sentence_and_status_2() {
         ),
         (
             vec!["frame", "--scene", "scene_key.toml"],
-            "scene_key.toml:3: unknown field `shade`",
+            "scene_key.toml:3: in [light], unknown field `shade`",
         ),
         (
             vec!["frame", "--scene", "scene_empty.toml"],
@@ -230,6 +230,277 @@ fn every_kind_of_bad_input_is_one_sentence_and_status_2() {
     ] {
         refused(dir, &arguments, says);
     }
+}
+
+/// Runs a command with little address space: one that fills its memory aborts (status 134) instead of taking ours.
+#[cfg(unix)]
+fn gdtof_in_a_gigabyte(folder: &Path, arguments: &[&str]) -> Output {
+    let mut child = Command::new("sh")
+        .args([
+            "-c",
+            "ulimit -v 1048576; exec \"$0\" \"$@\"",
+            env!("CARGO_BIN_EXE_gdtof"),
+        ])
+        .args(arguments)
+        .current_dir(folder)
+        .env("RAYON_NUM_THREADS", "2")
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Far longer than a refusal takes: what never ends fails here.
+    let begun = std::time::Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        if begun.elapsed().as_secs() > 60 {
+            child.kill().unwrap();
+            panic!("{arguments:?} does not end");
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    child.wait_with_output().unwrap()
+}
+
+/// Devices, pipes and binaries in the place of every kind of input file.
+#[test]
+#[cfg(unix)]
+fn input_that_is_no_text_or_never_ends_is_refused_early() {
+    let folder = folder();
+    let dir = folder.path();
+    let status = Command::new("mkfifo").arg(dir.join("pipe")).status();
+    assert!(status.unwrap().success());
+    // A sparse file of a terabyte of zeros.
+    let huge = std::fs::File::create(dir.join("huge")).unwrap();
+    huge.set_len(1 << 40).unwrap();
+    std::fs::write(dir.join("utf16"), [0xff, 0xfe, b'r', 0]).unwrap();
+    let sources = [
+        ("/dev/zero", "/dev/zero"),
+        ("/dev/urandom", "/dev/urandom"),
+        ("pipe", "pipe: is a named pipe"),
+        ("huge", "huge"),
+        ("utf16", "UTF-16; save it as UTF-8"),
+        (".", ".: cannot be read"),
+    ];
+    for (source, says) in sources {
+        let gate = replay(&["--engine", "gate", "--sdf", source]);
+        for arguments in [
+            with(&replay(&[]), "--inits", source),
+            with(&replay(&[]), "--events", source),
+            replay(&["--sensor", source]),
+            gate,
+            vec!["frame", "--scene", source],
+            vec!["range", "--format", "tmf8820", "--histograms", source],
+        ] {
+            let output = gdtof_in_a_gigabyte(dir, &arguments);
+            let error = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+            assert!(error.contains(says), "{arguments:?}: {error}");
+            assert_eq!(
+                error.trim_end().lines().count(),
+                1,
+                "{arguments:?}: {error}"
+            );
+            // Not a megabyte of what it found.
+            assert!(error.len() < 400, "{arguments:?}: {error}");
+        }
+    }
+}
+
+/// Text without an end through a pipe that the shell has made, and a table that is as long and fine.
+#[test]
+#[cfg(unix)]
+fn endless_text_is_refused_and_long_tables_are_read() {
+    let folder = folder();
+    let dir = folder.path();
+    let fed = |producer: &str, arguments: &[&str]| {
+        let command = format!("{producer} | \"$0\" \"$@\"");
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &command, env!("CARGO_BIN_EXE_gdtof")]);
+        shell.args(arguments).current_dir(dir).output().unwrap()
+    };
+    let events = with(&replay(&[]), "--events", "/dev/stdin");
+    let scene = ["frame", "--scene", "/dev/stdin"];
+    let captures = ["range", "--format", "tmf8820", "--histograms", "/dev/stdin"];
+    for (producer, arguments, says) in [
+        ("yes", &events[..], "the header is \"y\""),
+        (
+            "yes '#'",
+            &events[..],
+            "nothing but blank lines and comments",
+        ),
+        (
+            "yes '' | tr -d '\\n' | cat - /dev/zero",
+            &events[..],
+            "binary",
+        ),
+        (
+            "yes | tr -d '\\n'",
+            &events[..],
+            "a line of more than a mebibyte",
+        ),
+        ("yes 'a = 1'", &scene[..], "may never end"),
+        ("yes ' '", &captures[..], "may never end"),
+    ] {
+        let output = fed(producer, arguments);
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{producer}: {error}");
+        assert!(error.contains(says), "{producer}: {error}");
+    }
+    // 2.4 MB, from a pipe.
+    let table = "(echo time_fs,row,col,spad; yes 20000000,0,0,3 | head -n 150000)";
+    let output = fed(table, &events);
+    assert!(output.status.success(), "{output:?}");
+    assert!(String::from_utf8_lossy(&output.stderr).contains("149999 of 150000 events"));
+}
+
+#[test]
+fn a_byte_order_mark_is_read_over_everywhere() {
+    let folder = folder();
+    let dir = folder.path();
+    let mark =
+        |name: &str, text: &str| std::fs::write(dir.join(name), format!("\u{feff}{text}")).unwrap();
+    let plain = gdtof(dir, &replay(&[]));
+    mark("inits.csv", INITS);
+    mark("events.csv", EVENTS);
+    mark("sensor.toml", "rows = 1\r\ncols = 2\r\n");
+    let marked = gdtof(dir, &replay(&["--sensor", "sensor.toml"]));
+    assert!(marked.status.success(), "{marked:?}");
+    assert_eq!(marked.stdout, plain.stdout);
+    mark("scene.toml", "[light]\nilluminance_klux = 5\n");
+    assert!(
+        gdtof(dir, &["scene", "--scene", "scene.toml"])
+            .status
+            .success()
+    );
+    mark("captures.json", "[]");
+    let captures = [
+        "range",
+        "--format",
+        "tmf8820",
+        "--histograms",
+        "captures.json",
+    ];
+    refused(dir, &captures, "has no captures");
+}
+
+#[test]
+fn set_changes_single_keys_and_names_itself_in_complaints() {
+    let folder = folder();
+    let dir = folder.path();
+    let printed = |arguments: &[&str]| {
+        let output = gdtof(dir, arguments);
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let has = |text: &str, line: &str| assert!(text.lines().any(|l| l == line), "{line}: {text}");
+    std::fs::write(dir.join("s.toml"), "bins = 8\nclk_hz = 200e6\n").unwrap();
+    let sensor = printed(&[
+        "sensor",
+        "--sensor",
+        "s.toml",
+        "--set",
+        "sensor.clk_hz=300 MHz",
+        "--set",
+        "sensor.p_counter=comparator",
+        "--set",
+        "sensor.rows=3",
+        "--set",
+        "sensor.rows=4",
+        "--cols",
+        "5",
+    ]);
+    for line in [
+        "bins = 8",
+        "clk_hz = 300000000.0",
+        "p_counter = \"comparator\"",
+        "rows = 4",
+        "cols = 5",
+    ] {
+        has(&sensor, line);
+    }
+    // What is printed is input.
+    std::fs::write(dir.join("printed.toml"), &sensor).unwrap();
+    assert_eq!(printed(&["sensor", "--sensor", "printed.toml"]), sensor);
+    let scene = printed(&[
+        "scene",
+        "--set",
+        "scene.lidar.pde=20 %",
+        "--set",
+        "scene.stereo.position_m=[0, \"20 cm\", 0]",
+        "--set",
+        "scene.object.car.reflectivity=0.77",
+        "--set",
+        "scene.object.1.depth_m=3",
+    ]);
+    for line in [
+        "pde = 0.2",
+        "position_m = [0.0, 0.2, 0.0]",
+        "reflectivity = 0.77",
+        "depth_m = 3.0",
+    ] {
+        has(&scene, line);
+    }
+    std::fs::write(dir.join("printed.toml"), &scene).unwrap();
+    assert_eq!(printed(&["scene", "--scene", "printed.toml"]), scene);
+
+    let timing = |value| vec!["timing", "--set", value];
+    for (arguments, says) in [
+        (
+            timing("sensor.rows=0"),
+            "--set sensor.rows=0: rows = 0 is impossible; give 1 to 256",
+        ),
+        (
+            timing("sensor.clk_hz=8 ns"),
+            "--set sensor.clk_hz=8 ns: clk_hz = \"8 ns\" is a time; give a frequency",
+        ),
+        (
+            timing("sensor.clk=8"),
+            "--set sensor.clk=8: unknown field `clk`",
+        ),
+        (timing("sensor.clk_hz"), "has no value; give key=value"),
+        (
+            timing("clk_hz=3e8"),
+            "give sensor.KEY=VALUE or scene.SECTION.KEY=VALUE",
+        ),
+        (timing("scene.lidar.pde=0.1"), "this command reads no scene"),
+        (
+            vec!["scene", "--set", "scene.object.bus.reflectivity=1"],
+            "there is no object \"bus\"",
+        ),
+        (
+            vec!["scene", "--set", "scene.object.reflectivity=1"],
+            "object is a list",
+        ),
+        (
+            vec!["frame", "--set", "scene.light.illuminance_klux=1e5"],
+            "illuminance_klux = 100000 is impossible",
+        ),
+        (
+            replay(&["--set", "sensor.bins=0"]),
+            "bins = 0 is impossible",
+        ),
+        (
+            vec!["pareto", "--set", "scene.lidar.pde=-1"],
+            "in [lidar], pde = -1 is impossible; give 0 to 1",
+        ),
+    ] {
+        refused(dir, &arguments, says);
+    }
+    let both = gdtof(
+        dir,
+        &[
+            "frame",
+            "--set",
+            "scene.lidar.pde=2",
+            "--set",
+            "sensor.bins=0",
+        ],
+    );
+    let error = String::from_utf8(both.stderr).unwrap();
+    assert_eq!(
+        (both.status.code(), error.lines().count()),
+        (Some(2), 2),
+        "{error}"
+    );
 }
 
 #[test]

@@ -7,9 +7,11 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::config_keys::{KEYS, SECTION};
 use super::front_end::PulseLimits;
-use crate::files::{InputError, parse_toml, read_text};
+use crate::files::{InputError, read_text};
 use crate::netlist::Corner;
+use crate::settings::{Document, Fault, Key, commented};
 use crate::units::{Frequency, Time};
 
 /// Bits of THRESHOLD: enough for "more than all sixteen SPADs".
@@ -211,19 +213,34 @@ impl SensorConfig {
     /// # Errors
     /// Unknown keys, wrong types and impossible values, with their line.
     pub fn parse(source: impl std::fmt::Display, text: &str) -> Result<Self, InputError> {
-        let config: Self = parse_toml(&source, text)?;
-        config.check().map_err(|(key, message)| {
-            let assigns = |line: &str| {
-                line.trim_start()
-                    .strip_prefix(key)
-                    .is_some_and(|rest| rest.trim_start().starts_with('='))
-            };
-            match text.lines().position(assigns) {
-                Some(line) => InputError::at(&source, line + 1, message),
-                None => InputError::new(&source, message),
-            }
-        })?;
+        Self::read_document(&Document::parse(source, text)?)
+    }
+
+    /// Reads and checks a document.
+    ///
+    /// # Errors
+    /// Unknown keys, wrong types and impossible values, all of them at once.
+    pub fn read_document(document: &Document) -> Result<Self, InputError> {
+        let mut faults = Vec::new();
+        let nothing = toml::Table::new();
+        let given = document.table();
+        let read = document.section::<Self>("", given, KEYS, &nothing, &mut faults);
+        let config: Self = read.try_into().unwrap_or_default();
+        if faults.is_empty() {
+            let fault = config.check().err();
+            faults.extend(fault.map(|(key, message)| Fault {
+                path: key.into(),
+                message,
+            }));
+        }
+        document.complain(faults)?;
         Ok(config)
+    }
+
+    /// The configuration as a commented file, which [`SensorConfig::parse`] reads back.
+    pub fn commented(&self) -> String {
+        let table = |config: &Self| toml::Table::try_from(config).expect("numbers and words");
+        commented(&[SECTION], &table(self), &table(&Self::default()))
     }
 
     /// Checks every value; on failure names the key at fault and says what it may be.
@@ -231,24 +248,10 @@ impl SensorConfig {
     /// # Errors
     /// The key and a sentence about it.
     pub fn check(&self) -> Result<(), (&'static str, String)> {
-        let whole = [
-            ("rows", self.rows, 1, 256),
-            ("cols", self.cols, 1, 256),
-            ("counter_bits", self.counter_bits, 2, 12),
-            ("bins", self.bins, 1, 64),
-            ("bin_bits", self.bin_bits, 1, 16),
-            (
-                "threshold",
-                self.threshold as usize,
-                0,
-                (1 << THRESHOLD_BITS) - 1,
-            ),
-        ];
-        for (key, value, least, most) in whole {
-            if !(least..=most).contains(&value) {
-                let message = format!("{key} = {value} is impossible; give {least} to {most}");
-                return Err((key, message));
-            }
+        let values = toml::Table::try_from(self).expect("numbers and words");
+        let fault_of = |key: &Key| Some((key.name, key.fault(values.get(key.name)?)?));
+        if let Some(fault) = KEYS.iter().find_map(fault_of) {
+            return Err(fault);
         }
         if self.p_counter == PCounter::Comparator && self.tap == Tap::Msb {
             let message = "tap = \"msb\" is impossible with p_counter = \"comparator\", which counts up; give tap = \"borrow\"";
@@ -259,34 +262,8 @@ impl SensorConfig {
             let key = "p_counter";
             return Err((key, message.to_owned()));
         }
-        for (key, hz, least, most) in [
-            ("clk_hz", self.clk_hz, 1e6, 2e9),
-            ("load_clk_hz", self.load_clk_hz, 1e6, 1e9),
-        ] {
-            if !(least..=most).contains(&hz) {
-                let message = format!("{key} = {hz} is impossible; give {least:e} to {most:e} Hz");
-                return Err((key, message));
-            }
-        }
-        if !(self.dead_time_ns > 0.0 && self.dead_time_ns <= 1e6) {
-            let message = format!(
-                "dead_time_ns = {} is impossible; give a number above 0 and up to 1e6",
-                self.dead_time_ns
-            );
-            return Err(("dead_time_ns", message));
-        }
         if let Some(message) = PulseLimits::of(self.corner).complaint(self.dead_time_ns) {
             return Err(("dead_time_ns", message));
-        }
-        for (key, value, most) in [
-            ("afterpulse_probability", self.afterpulse_probability, 1.0),
-            ("afterpulse_time_ns", self.afterpulse_time_ns, 1e6),
-            ("crosstalk_probability", self.crosstalk_probability, 1.0),
-        ] {
-            if !(0.0..=most).contains(&value) {
-                let message = format!("{key} = {value} is impossible; give 0 to {most}");
-                return Err((key, message));
-            }
         }
         let half_period_ps = 0.5e12 / self.clk_hz;
         if self.stop_phase_ps.is_nan() || self.stop_phase_ps.abs() > half_period_ps {
@@ -344,6 +321,7 @@ impl SensorConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Range;
     use proptest::prelude::*;
 
     #[test]
@@ -418,6 +396,88 @@ mod tests {
         let config = SensorConfig::default();
         let text = toml::to_string(&config).unwrap();
         assert_eq!(SensorConfig::parse("default", &text).unwrap(), config);
+        assert_eq!(
+            SensorConfig::parse("default", &config.commented()).unwrap(),
+            config
+        );
+    }
+
+    #[test]
+    fn every_key_is_explained_and_has_its_range() {
+        let text = SensorConfig::default().commented();
+        let table = toml::Table::try_from(SensorConfig::default()).unwrap();
+        let mut known: Vec<&str> = KEYS.iter().map(|key| key.name).collect();
+        known.sort_unstable();
+        assert!(table.keys().eq(&known), "{known:?}");
+        for key in KEYS {
+            assert!(
+                !key.what.is_empty() && !key.source.is_empty(),
+                "{}",
+                key.name
+            );
+            let line = format!("{} = {}", key.name, table[key.name]);
+            assert!(text.lines().any(|l| l == line), "{line}");
+            // Units stand in names, too.
+            let suffix = format!("_{}", key.unit.to_lowercase());
+            assert!(
+                key.unit.is_empty() || key.name.ends_with(&suffix),
+                "{}",
+                key.name
+            );
+            let parse = |value: &str| SensorConfig::parse("s", &format!("{} = {value}", key.name));
+            if let Range::OneOf(words) = key.range {
+                for word in words {
+                    let text = format!("after_borrow = \"wrap\"\n{} = \"{word}\"", key.name);
+                    let text = if key.name == "after_borrow" {
+                        &text[22..]
+                    } else {
+                        &text[..]
+                    };
+                    SensorConfig::parse("s", text).unwrap();
+                }
+                assert!(parse("\"other\"").is_err(), "{}", key.name);
+            }
+            if let Range::Within(least, most) = key.range {
+                // The slowest clock allows every phase.
+                let clk = if key.name == "clk_hz" {
+                    ""
+                } else {
+                    "clk_hz = 1e6\n"
+                };
+                let with =
+                    |value| SensorConfig::parse("s", &format!("{clk}{} = {value}", key.name));
+                for value in [least, most] {
+                    with(value).unwrap();
+                }
+                for value in [least - 1.0, most + 1.0] {
+                    assert!(with(value).is_err(), "{} = {value}", key.name);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_may_have_units_and_all_faults_are_told() {
+        let config = SensorConfig::parse("s", "clk_hz = \"300 MHz\"\ndead_time_ns = \"9500 ps\"");
+        let config = config.unwrap();
+        assert_eq!((config.clk_hz, config.dead_time_ns), (300e6, 9.5));
+        let text = "rows = 0\nclk_hz = \"8 ns\"\ncolour = 1\nbins = 2.5\nmode = 3\n";
+        let error = SensorConfig::parse("s.toml", text).unwrap_err();
+        let told = error.to_string();
+        let lines: Vec<&str> = told.lines().collect();
+        assert_eq!(lines.len(), 5, "{told}");
+        for (line, says) in [
+            "s.toml:1: rows = 0 is impossible; give 1 to 256",
+            "s.toml:2: clk_hz = \"8 ns\" is a time; give a frequency",
+            "s.toml:3: unknown field `colour`",
+            "s.toml:4: bins: ",
+            "s.toml:5: mode: ",
+        ]
+        .iter()
+        .enumerate()
+        {
+            assert!(lines[line].starts_with(says), "{told}");
+        }
     }
 
     proptest! {

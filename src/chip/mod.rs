@@ -13,6 +13,7 @@
 //! asks it.
 
 pub mod config;
+mod config_keys;
 pub mod correlation;
 pub mod exposure;
 pub mod front_end;

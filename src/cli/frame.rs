@@ -8,20 +8,21 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::{SensorArgs, say};
+use super::{SceneArgs, say};
 use crate::chip::SensorConfig;
 use crate::chip::WindowLaw;
 use crate::engine::recording::check_exposure;
 use crate::engine::timing::{Silicon, TimingVerdict, VerdictReport};
 use crate::engine::waveform::WaveCycles;
 use crate::engine::{CohortOptions, Work};
-use crate::files::{InputError, OutputFile, create_folder};
+use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::guide::GuideMap;
 use crate::ranging::DepthOptions;
 use crate::report::{Table, write_npy_u16};
 use crate::scene::Scene;
 use crate::system::{
-    EngineKind, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Probe, Summary, take_frame,
+    DistanceLaw, EngineKind, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Probe, Summary,
+    take_frame,
 };
 use crate::units::Time;
 use crate::waves::WaveFormat;
@@ -30,10 +31,7 @@ use crate::waves::WaveFormat;
 #[derive(Args)]
 pub struct FrameArgs {
     #[command(flatten)]
-    sensor: SensorArgs,
-    /// Scene (TOML); without it, a street on a bright day.
-    #[arg(long, value_name = "FILE")]
-    scene: Option<PathBuf>,
+    scene: SceneArgs,
     /// Folder for the results; it is made if need be.
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
@@ -85,11 +83,7 @@ pub struct FrameArgs {
 /// # Errors
 /// Bad input, unwritable output, and what [`take_frame`] reports.
 pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
-    let sensor = args.sensor.read()?;
-    let scene = match &args.scene {
-        Some(path) => Scene::load(path)?,
-        None => Scene::outdoor(),
-    };
+    let (sensor, scene) = args.scene.read()?;
     let exposure = check_exposure(&sensor, args.stop_periods, args.laser_cycles)?;
     let chosen = chosen_probes(&args.probe, &sensor)?;
     if let Some((why, cure)) = WindowLaw::new(&sensor, &exposure).refusal() {
@@ -107,11 +101,11 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
         let message = format!("{rate} is no share of macropixels; give a number above 0, up to 1");
         return Err(InputError::new("--false-alarm-rate", message).into());
     }
-    create_folder(&args.out)?;
+    let results = ResultSet::begin(&args.out)?;
     let probe_at = |(row, col)| Probe {
         row,
         col,
-        waves: args.out.join(wave_name(args, (row, col))),
+        waves: results.staging().join(wave_name(args, (row, col))),
         wave_cycles: args.wave_cycles.unwrap_or_default(),
     };
     let settings = FrameSettings {
@@ -148,8 +142,11 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
         |macropixels| progress.inc(macropixels as u64),
     )?;
 
-    let report = Report::new(args, &settings.sensor, &timing, &frame);
-    write_results(&args.out, &frame, &report)?;
+    let report = Report::new(args, &settings, &timing, &frame);
+    write_results(results.staging(), &frame, &report)?;
+    for sentence in results.commit("frame", &report.configuration)? {
+        eprintln!("gdtof: {sentence}");
+    }
     if args.json {
         say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
     } else {
@@ -235,11 +232,11 @@ fn nearest_guided(guide: &GuideMap) -> Option<(usize, usize)> {
         })
 }
 
-/// The contents of frame.json.
+/// What was asked for: in frame.json and in the manifest.
 #[derive(Serialize)]
-struct Report<'a> {
-    version: &'static str,
-    scene: String,
+struct Configuration<'a> {
+    scene_name: String,
+    scene: &'a Scene,
     sensor: &'a SensorConfig,
     stop_periods: u32,
     laser_cycles: u32,
@@ -247,12 +244,21 @@ struct Report<'a> {
     engine: EngineKind,
     false_alarm_rate: f64,
     walk_correction: bool,
+}
+
+/// The contents of frame.json.
+#[derive(Serialize)]
+struct Report<'a> {
+    version: &'static str,
+    #[serde(flatten)]
+    configuration: Configuration<'a>,
     summary: Summary,
     remark: Option<&'a str>,
     photons_expected: f64,
     work: Work,
     timing: &'a VerdictReport,
     tolerance: Option<Kept>,
+    distance: DistanceLaw,
     load_bits: usize,
     load_time_s: f64,
     exposure_time_s: f64,
@@ -267,26 +273,34 @@ struct Report<'a> {
 impl<'a> Report<'a> {
     fn new(
         args: &FrameArgs,
-        sensor: &'a SensorConfig,
+        settings: &'a FrameSettings,
         timing: &'a VerdictReport,
         frame: &'a Frame,
     ) -> Self {
         Report {
             version: env!("CARGO_PKG_VERSION"),
-            scene: scene_name(args),
-            sensor,
-            stop_periods: args.stop_periods,
-            laser_cycles: args.laser_cycles,
-            seed: args.seed,
-            engine: args.engine,
-            false_alarm_rate: args.false_alarm_rate,
-            walk_correction: !args.no_walk_correction,
+            configuration: Configuration {
+                scene_name: args.scene.scene_name(),
+                scene: &settings.scene,
+                sensor: &settings.sensor,
+                stop_periods: args.stop_periods,
+                laser_cycles: args.laser_cycles,
+                seed: args.seed,
+                engine: args.engine,
+                false_alarm_rate: args.false_alarm_rate,
+                walk_correction: !args.no_walk_correction,
+            },
             summary: frame.summary(),
             remark: frame.remark.as_deref(),
             photons_expected: frame.photons_expected,
             work: frame.work,
             timing,
             tolerance: frame.kept,
+            distance: DistanceLaw::new(
+                &settings.sensor,
+                &settings.exposure,
+                frame.pixels.iter().filter_map(|pixel| pixel.start),
+            ),
             load_bits: frame.load_bits,
             load_time_s: frame.load_time.as_s(),
             exposure_time_s: frame.exposure_time.as_s(),
@@ -300,17 +314,10 @@ impl<'a> Report<'a> {
     }
 }
 
-fn scene_name(args: &FrameArgs) -> String {
-    match &args.scene {
-        Some(path) => path.display().to_string(),
-        None => "built-in street".to_owned(),
-    }
-}
-
 fn write_results(out: &Path, frame: &Frame, report: &Report<'_>) -> anyhow::Result<()> {
     let shape = report.histograms_shape.map(|n| n as u64);
     write_npy_u16(&out.join("histograms.npy"), &shape, &frame.histograms)?;
-    quality::depth_map(out, frame, report.laser_cycles)?;
+    quality::depth_map(out, frame, report.configuration.laser_cycles)?;
     OutputFile::write_with(&out.join("frame.json"), |w| {
         serde_json::to_writer(&mut *w, report)?;
         writeln!(w)
@@ -321,7 +328,7 @@ fn write_results(out: &Path, frame: &Frame, report: &Report<'_>) -> anyhow::Resu
 fn table(args: &FrameArgs, timing: &VerdictReport, frame: &Frame) -> Table {
     let summary = frame.summary();
     let of = |part: usize, whole: usize| format!("{part} of {whole}");
-    let mut table = Table::new(format!("Frame of {}", scene_name(args)))
+    let mut table = Table::new(format!("Frame of {}", args.scene.scene_name()))
         .row(
             "macropixels that see a surface",
             of(summary.with_target, summary.pixels),
@@ -399,7 +406,7 @@ fn table(args: &FrameArgs, timing: &VerdictReport, frame: &Frame) -> Table {
         format!("{:.2} s", times.probes_s),
     );
     table.push("run time: all", format!("{:.2} s", times.total_s()));
-    let names = ["depth.png", "histograms.npy", "frame.json"].map(String::from);
+    let names = ["depth.png", "histograms.npy", "frame.json", MANIFEST].map(String::from);
     let waves = frame.probes.iter().map(|&at| wave_name(args, at));
     let names: Vec<String> = names.into_iter().chain(waves).collect();
     table.push(format!("in {}", args.out.display()), names.join(" "));

@@ -8,6 +8,7 @@ mod range;
 mod replay;
 mod reproduce;
 mod sdf;
+mod settings;
 mod silicon;
 mod speed;
 mod testbench;
@@ -16,14 +17,13 @@ mod timing;
 pub use testbench::testbench;
 
 use std::io::Write;
-use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 
-use crate::chip::SensorConfig;
+use self::settings::{SceneArgs, SensorArgs};
 use crate::engine::EngineError;
-use crate::files::InputError;
+use crate::files::{InputError, clean_up_when_interrupted};
 use crate::system::FrameError;
 
 /// A guided direct time-of-flight lidar chip, simulated down to gates and flip-flops.
@@ -50,42 +50,22 @@ enum Command {
     Timing(timing::TimingArgs),
     /// Run time against error.
     Pareto(pareto::ParetoArgs),
+    /// Print the sensor as a commented file: every key with its unit, range and source.
+    Sensor(SensorArgs),
+    /// Print the scene as a commented file: every key with its unit, range and source.
+    Scene(SceneArgs),
     /// Write the chip for other tools.
     #[command(subcommand)]
     Export(export::ExportCommand),
 }
 
-/// Which sensor.
-#[derive(Args)]
-struct SensorArgs {
-    /// Sensor configuration (TOML); without it, the QuantIC4x4.
-    #[arg(long, value_name = "FILE")]
-    sensor: Option<PathBuf>,
-    /// Macropixel rows, instead of the configuration's.
-    #[arg(long, value_name = "R")]
-    rows: Option<usize>,
-    /// Macropixel columns, instead of the configuration's.
-    #[arg(long, value_name = "C")]
-    cols: Option<usize>,
-}
-
-impl SensorArgs {
-    fn read(&self) -> Result<SensorConfig, InputError> {
-        let mut config = match &self.sensor {
-            Some(path) => SensorConfig::read(path)?,
-            None => SensorConfig::default(),
-        };
-        config.rows = self.rows.unwrap_or(config.rows);
-        config.cols = self.cols.unwrap_or(config.cols);
-        config
-            .check()
-            .map_err(|(key, message)| InputError::new(format!("--{key}"), message))?;
-        Ok(config)
-    }
-}
-
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
+    if let Err(error) = clean_up_when_interrupted() {
+        eprintln!(
+            "gdtof: signals cannot be watched ({error}); an interrupted run will leave its files"
+        );
+    }
     let result = match Cli::parse().command {
         Command::Frame(args) => frame::run(&args),
         Command::Replay(args) => replay::run(&args),
@@ -94,13 +74,17 @@ pub fn main() -> ExitCode {
         Command::Speed(args) => speed::run(&args),
         Command::Timing(args) => timing::run(&args),
         Command::Pareto(args) => pareto::run(&args),
+        Command::Sensor(args) => settings::print_sensor(&args),
+        Command::Scene(args) => settings::print_scene(&args),
         Command::Export(command) => export::run(&command),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("gdtof: {error:#}");
+            for line in format!("{error:#}").lines() {
+                eprintln!("gdtof: {line}");
+            }
             ExitCode::from(if is_bad_input(&error) { 2 } else { 1 })
         }
     }

@@ -11,22 +11,19 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::{SensorArgs, say};
+use super::{SceneArgs, say};
 use crate::engine::recording::check_exposure;
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::report::{Axis, Chart, Grid, Style};
-use crate::scene::Scene;
 use crate::system::pareto::{Done, GATE_CYCLES, Method, ParetoSettings, Point, Summary, summarise};
 use crate::system::stability;
 
 /// Arguments of `gdtof pareto`.
 #[derive(Args)]
 pub struct ParetoArgs {
+    /// Of the scene, optics and laser are used.
     #[command(flatten)]
-    sensor: SensorArgs,
-    /// Scene (TOML) whose optics and laser are used; without it, the built-in street's.
-    #[arg(long, value_name = "FILE")]
-    scene: Option<PathBuf>,
+    scene: SceneArgs,
     /// Ranges of the walls that are looked at, m; those out of the P-counter's reach are left out (9 bits at 384 MHz:
     /// beyond about 197 m).
     #[arg(long, value_name = "M,…", value_delimiter = ',', default_values_t = [5.0, 20.0, 50.0, 100.0, 195.0])]
@@ -148,12 +145,8 @@ fn stability(markdown: bool) -> anyhow::Result<()> {
 }
 
 fn settings(args: &ParetoArgs) -> Result<ParetoSettings, InputError> {
-    let sensor = args.sensor.read()?;
+    let (sensor, scene) = args.scene.read()?;
     check_exposure(&sensor, args.stop_periods, args.laser_cycles)?;
-    let scene = match &args.scene {
-        Some(path) => Scene::load(path)?,
-        None => Scene::outdoor(),
-    };
     let numbers = [
         ("--ranges", &args.ranges[..], 0.1, 1e4),
         ("--klux", &args.klux[..], 0.0, 1e3),

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::say;
-use crate::files::{InputError, OutputFile, read_text};
+use crate::files::{InputError, OutputFile, parse_json, read_text};
 use crate::ranging::tmf8820::{self, Capture};
 use crate::ranging::{ArrivalOptions, Calibration, Echo, arrival};
 use crate::report::Grid;
@@ -73,33 +73,75 @@ struct Sighting {
     sensor_m: f64,
 }
 
+/// Readings, a zone of a capture each, that no depth is taken from, by the first cause.
+#[derive(Default, Serialize)]
+struct LeftOut {
+    /// The capture's reference histogram has no pulse to count from.
+    no_reference_pulse: usize,
+    /// The sensor itself reports no target.
+    no_target_reported: usize,
+    /// The histogram has no pulse of [`LEAST_SIGNAL`] counts.
+    no_pulse: usize,
+}
+
+impl LeftOut {
+    fn causes(&self) -> [(usize, String); 3] {
+        [
+            (
+                self.no_reference_pulse,
+                "whose capture has no pulse in its reference histogram".into(),
+            ),
+            (
+                self.no_target_reported,
+                "where the sensor reports no target".into(),
+            ),
+            (
+                self.no_pulse,
+                format!("without a pulse of {LEAST_SIGNAL} counts above background"),
+            ),
+        ]
+    }
+
+    fn all(&self) -> usize {
+        self.causes().iter().map(|(count, _)| count).sum()
+    }
+}
+
 /// Every zone that sees the plane: the sensor reports a target there, and there is a pulse. Both criteria are
 /// about the same zones, so that the two depths are compared on equal terms.
-fn sightings(captures: &[Capture]) -> Vec<Sighting> {
+fn sightings(captures: &[Capture]) -> (Vec<Sighting>, LeftOut) {
     let options = ArrivalOptions::default();
     let mut found = Vec::new();
+    let mut left_out = LeftOut::default();
     for (index, capture) in captures.iter().enumerate() {
         let Some(reference) = arrival(&capture.reference_hist, &options) else {
+            left_out.no_reference_pulse += capture.hists.len();
             continue;
         };
         for (zone, counts) in capture.hists.iter().enumerate() {
             let sensor_m = capture.on_chip_depths_mm[zone] * 1e-3;
-            let pulse = arrival(counts, &options).filter(|p| p.signal_counts >= LEAST_SIGNAL);
-            if let (Some(pulse), true) = (pulse, sensor_m > 0.0) {
-                found.push(Sighting {
-                    capture: index,
-                    echo: Echo {
-                        zone,
-                        arrival_bins: pulse.position_bins - reference.position_bins,
-                        signal_counts: pulse.signal_counts,
-                    },
-                    true_m: capture.dist_to_plane_m,
-                    sensor_m,
-                });
+            if sensor_m <= 0.0 {
+                left_out.no_target_reported += 1;
+                continue;
             }
+            let pulse = arrival(counts, &options).filter(|p| p.signal_counts >= LEAST_SIGNAL);
+            let Some(pulse) = pulse else {
+                left_out.no_pulse += 1;
+                continue;
+            };
+            found.push(Sighting {
+                capture: index,
+                echo: Echo {
+                    zone,
+                    arrival_bins: pulse.position_bins - reference.position_bins,
+                    signal_counts: pulse.signal_counts,
+                },
+                true_m: capture.dist_to_plane_m,
+                sensor_m,
+            });
         }
     }
-    found
+    (found, left_out)
 }
 
 /// Is each capture one to fit on?
@@ -130,10 +172,8 @@ fn calibrate(args: &RangeArgs, zones: usize, of: &[&Sighting]) -> Result<Calibra
 }
 
 fn read_calibration(path: &std::path::Path, zones: usize) -> Result<Calibration, InputError> {
-    let calibration: Calibration = serde_json::from_str(&read_text(path)?).map_err(|e| {
-        let message = format!("{e}; give a file made by --save-calibration");
-        InputError::at(path.display(), e.line(), message)
-    })?;
+    let wanted = "a file made by --save-calibration";
+    let calibration: Calibration = parse_json(path.display(), &read_text(path)?, wanted)?;
     if calibration.zones.len() == zones {
         return Ok(calibration);
     }
@@ -186,6 +226,8 @@ struct Report {
     zones: usize,
     /// Zones that see the plane, in all captures.
     sightings: usize,
+    /// The other readings of all captures.
+    left_out: LeftOut,
     /// Those that errors are about.
     reported: usize,
     fit: Option<Fit>,
@@ -206,7 +248,7 @@ pub fn run(args: &RangeArgs) -> anyhow::Result<()> {
         Format::Tmf8820 => tmf8820::read(&args.histograms)?,
     };
     let zones = captures[0].hists.len();
-    let sightings = sightings(&captures);
+    let (sightings, left_out) = sightings(&captures);
     let on = match args.calibration {
         Some(_) => vec![false; captures.len()],
         None => fitted_on(&captures, args.fit),
@@ -259,6 +301,7 @@ pub fn run(args: &RangeArgs) -> anyhow::Result<()> {
         captures: captures.len(),
         zones,
         sightings: sightings.len(),
+        left_out,
         reported: reported.len(),
         fit: args.calibration.is_none().then_some(args.fit),
         depths: Errors::of(reported.iter().map(|s| depth(s) - s.true_m)),
@@ -294,8 +337,18 @@ fn table(report: &Report) -> String {
             format!("{:.2}", 1e3 * line.offset_m),
         ]);
     }
+    let mut left_out = format!(
+        "{} of {} readings are left out\n",
+        report.left_out.all(),
+        report.captures * report.zones
+    );
+    for (count, cause) in report.left_out.causes() {
+        if count > 0 {
+            left_out += &format!("  {count} {cause}\n");
+        }
+    }
     format!(
-        "{} captures of {} zones; {} times a zone sees the plane, {} of them reported here\n\n{errors}\n{lines}walk {:.3} mm for a million counts\n",
+        "{} captures of {} zones; {} times a zone sees the plane, {} of them reported here\n{left_out}\n{errors}\n{lines}walk {:.3} mm for a million counts\n",
         report.captures,
         report.zones,
         report.sightings,

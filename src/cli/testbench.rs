@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
 
-use crate::files::{InputError, create_folder};
+use crate::files::{InputError, clean_up_when_interrupted, create_folder};
 use crate::report::Checks;
 use crate::waves::WaveFormat;
 
@@ -31,6 +31,9 @@ pub fn testbench(
     let waves = format!("{name}.{}", args.wave_format.extension());
     let waves = args.out.join(waves);
     let mut checks = Checks::new();
+    if let Err(error) = clean_up_when_interrupted() {
+        eprintln!("{name}: signals cannot be watched ({error})");
+    }
     let result = create_folder(&args.out).and_then(|()| run(&waves, &mut checks));
     match result {
         Ok(()) => {

@@ -6,10 +6,11 @@
 //!   one at or after the end of the exposure.
 
 use std::collections::HashMap;
+use std::io::BufRead;
 use std::path::Path;
 
 use crate::chip::{Exposure, SPADS, SensorConfig};
-use crate::files::{InputError, read_text};
+use crate::files::{InputError, Lines};
 use crate::photon::{SpadEvent, apply_dead_time};
 use crate::units::Time;
 
@@ -49,7 +50,7 @@ pub fn check_exposure(
 /// Unreadable files, malformed lines, pixels outside the array, values beyond 2ⁿ − 1, duplicated or
 /// missing macropixels: file, line and cure.
 pub fn read_starts(path: &Path, config: &SensorConfig) -> Result<Vec<u16>, InputError> {
-    parse_starts(&path.display().to_string(), &read_text(path)?, config)
+    starts_of(Lines::open(path)?, config)
 }
 
 /// As [`read_starts`], from text; `source` names it in complaints.
@@ -61,9 +62,14 @@ pub fn parse_starts(
     text: &str,
     config: &SensorConfig,
 ) -> Result<Vec<u16>, InputError> {
+    starts_of(Lines::new(source, text.as_bytes()), config)
+}
+
+fn starts_of<R: BufRead>(lines: Lines<R>, config: &SensorConfig) -> Result<Vec<u16>, InputError> {
     let mut starts = vec![None; config.pixels()];
     let mut first_line = HashMap::new();
-    for row in rows(source, text, ["row", "col", "init"])? {
+    let source = &lines.source().to_owned();
+    for row in rows(lines, ["row", "col", "init"])? {
         let (line, [r, c, init]) = row?;
         let pixel = pixel_index(source, line, r, c, config)?;
         if init < 0 || init > config.largest_start() as i64 {
@@ -116,12 +122,7 @@ pub fn read_events(
     config: &SensorConfig,
     exposure: &Exposure,
 ) -> Result<Recording, InputError> {
-    parse_events(
-        &path.display().to_string(),
-        &read_text(path)?,
-        config,
-        exposure,
-    )
+    events_of(Lines::open(path)?, config, exposure)
 }
 
 /// As [`read_events`], from text; `source` names it in complaints.
@@ -134,11 +135,20 @@ pub fn parse_events(
     config: &SensorConfig,
     exposure: &Exposure,
 ) -> Result<Recording, InputError> {
+    events_of(Lines::new(source, text.as_bytes()), config, exposure)
+}
+
+fn events_of<R: BufRead>(
+    lines: Lines<R>,
+    config: &SensorConfig,
+    exposure: &Exposure,
+) -> Result<Recording, InputError> {
+    let source = &lines.source().to_owned();
     let mut recording = Recording {
         pulses: vec![Vec::new(); config.pixels()],
         ..Recording::default()
     };
-    for row in rows(source, text, ["time_fs", "row", "col", "spad"])? {
+    for row in rows(lines, ["time_fs", "row", "col", "spad"])? {
         let (line, [time_fs, r, c, spad]) = row?;
         let pixel = pixel_index(source, line, r, c, config)?;
         if !(0..SPADS as i64).contains(&spad) {
@@ -190,20 +200,16 @@ fn pixel_index(
 
 /// Line number and numbers of every line of a table with this header. Blank lines and lines that start with
 /// `#` are passed over.
-fn rows<'t, const N: usize>(
-    source: &'t str,
-    text: &'t str,
+fn rows<R: BufRead, const N: usize>(
+    mut lines: Lines<R>,
     header: [&'static str; N],
-) -> Result<impl Iterator<Item = Result<(usize, [i64; N]), InputError>> + 't, InputError> {
+) -> Result<impl Iterator<Item = Result<(usize, [i64; N]), InputError>>, InputError> {
     let expected = header.join(",");
-    let mut lines = text
-        .lines()
-        .enumerate()
-        .map(|(index, line)| (index + 1, line.trim()))
-        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-    match lines.next() {
+    let source = lines.source().to_owned();
+    match lines.next_used()? {
         Some((_, found)) if found.split(',').map(str::trim).eq(header) => {}
         Some((line, found)) => {
+            let found: String = found.chars().take(80).collect();
             let message = format!("the header is {found:?}; it must be \"{expected}\"");
             return Err(InputError::at(source, line, message));
         }
@@ -212,26 +218,32 @@ fn rows<'t, const N: usize>(
             return Err(InputError::new(source, message));
         }
     }
-    Ok(lines.map(move |(line, content)| {
+    let row = move |line: usize, content: &str| {
         let mut values = [0; N];
         let mut fields = content.split(',').map(str::trim);
         for (value, name) in values.iter_mut().zip(header) {
             let Some(field) = fields.next() else {
                 let message = format!("{name} is missing; a line needs \"{expected}\"");
-                return Err(InputError::at(source, line, message));
+                return Err(InputError::at(&source, line, message));
             };
             *value = field.parse().map_err(|_| {
+                let field: String = field.chars().take(80).collect();
                 let message = format!("{name} is {field:?}; write a whole number");
-                InputError::at(source, line, message)
+                InputError::at(&source, line, message)
             })?;
         }
         match fields.next() {
             None => Ok((line, values)),
             Some(_) => {
                 let message = format!("too many values; a line needs \"{expected}\"");
-                Err(InputError::at(source, line, message))
+                Err(InputError::at(&source, line, message))
             }
         }
+    };
+    Ok(std::iter::from_fn(move || match lines.next_used() {
+        Ok(None) => None,
+        Ok(Some((line, content))) => Some(row(line, content)),
+        Err(error) => Some(Err(error)),
     }))
 }
 

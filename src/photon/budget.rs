@@ -21,7 +21,7 @@ use super::solar::{FULL_SUN_KLUX, band_irradiance};
 use crate::units::{PLANCK_J_S, SPEED_OF_LIGHT_M_PER_S};
 
 /// How a target's exitance becomes power on the pixel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Convention {
     /// As printed in Equations 9 to 16, with the factor 1/π.
@@ -41,7 +41,9 @@ impl Convention {
 }
 
 /// What the laser lights up (Fig. 30).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum Spot {
     /// The projected sensor area and nothing else (Eq. 7).

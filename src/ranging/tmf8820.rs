@@ -14,7 +14,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::files::{InputError, read_text};
+use crate::files::{InputError, parse_json, read_text};
 
 /// One capture.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -41,10 +41,7 @@ pub fn read(path: &Path) -> Result<Vec<Capture>, InputError> {
 }
 
 fn parse(source: impl std::fmt::Display, text: &str) -> Result<Vec<Capture>, InputError> {
-    let captures: Vec<Capture> = serde_json::from_str(text).map_err(|e| {
-        let message = format!("{e}; give a list of TMF8820 captures");
-        InputError::at(&source, e.line(), message)
-    })?;
+    let captures: Vec<Capture> = parse_json(&source, text, "a list of TMF8820 captures")?;
     let Some(first) = captures.first() else {
         return Err(InputError::new(
             source,

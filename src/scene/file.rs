@@ -1,19 +1,21 @@
-//! Scene files: reading them, and finding the line of a value that breaks a rule.
-//!
-//! A file is read in two passes, the second of which only runs on a complaint, to find its line.
+//! Scene files: reading them, all faults at once, and printing them.
 
 use std::path::Path;
 
-use super::rules::{Fault, complaint};
-use super::settings::Scene;
+use toml::{Table, Value};
+
+use super::keys::{LIDAR, LIGHT, OBJECT, SECTIONS, STEREO};
+use super::rules::{check_object, check_stereo};
+use super::settings::{Lidar, Light, Scene, Stereo};
 use super::shape::{Object, Shape};
 use super::vector::Vec3;
-use crate::files::{InputError, line_of, parse_toml, read_text};
+use crate::files::{InputError, read_text};
+use crate::settings::{Document, Fault, Key, commented};
 
 const OUTDOOR: &str = include_str!("../../vectors/scenes/outdoor.toml");
 
 /// Kinds of object in a file.
-#[derive(Debug, Clone, Copy, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Kind {
     Ground,
@@ -23,26 +25,34 @@ enum Kind {
 }
 
 /// An `[[object]]` entry: one flat table, so that unknown keys are found at their own line.
-#[derive(Debug, serde::Deserialize)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ObjectEntry {
-    kind: Kind,
     name: String,
+    kind: Kind,
     reflectivity: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
     depth_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     centre_m: Option<Vec3>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     normal: Option<Vec3>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     width_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     height_m: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     size_m: Option<Vec3>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     yaw_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     radius_m: Option<f64>,
 }
 
 impl ObjectEntry {
     /// The value of a key that this kind of object needs.
     fn need<T>(&self, key: &str, value: Option<T>) -> Result<T, String> {
-        value.ok_or_else(|| format!("object \"{}\" lacks `{key}`", self.name))
+        value.ok_or_else(|| format!("object \"{}\" lacks `{key}`; add it", self.name))
     }
 
     /// Complains about keys that mean nothing for this kind of object.
@@ -63,7 +73,7 @@ impl ObjectEntry {
         {
             None => Ok(()),
             Some((key, _)) => Err(format!(
-                "object \"{}\" has `{key}`, which its kind does not use",
+                "object \"{}\" has `{key}`, which its kind does not use; remove it",
                 self.name
             )),
         }
@@ -114,6 +124,55 @@ impl TryFrom<ObjectEntry> for Object {
     }
 }
 
+impl From<Object> for ObjectEntry {
+    fn from(object: Object) -> Self {
+        let mut entry = ObjectEntry {
+            name: object.name,
+            kind: Kind::Ground,
+            reflectivity: object.reflectivity,
+            depth_m: None,
+            centre_m: None,
+            normal: None,
+            width_m: None,
+            height_m: None,
+            size_m: None,
+            yaw_deg: None,
+            radius_m: None,
+        };
+        match object.shape {
+            Shape::Ground { depth_m } => entry.depth_m = Some(depth_m),
+            Shape::Plane {
+                centre_m,
+                normal,
+                width_m,
+                height_m,
+            } => {
+                entry.kind = Kind::Plane;
+                entry.centre_m = Some(centre_m);
+                entry.normal = Some(normal);
+                entry.width_m = Some(width_m);
+                entry.height_m = Some(height_m);
+            }
+            Shape::Box {
+                centre_m,
+                size_m,
+                yaw_deg,
+            } => {
+                entry.kind = Kind::Box;
+                entry.centre_m = Some(centre_m);
+                entry.size_m = Some(size_m);
+                entry.yaw_deg = Some(yaw_deg);
+            }
+            Shape::Sphere { centre_m, radius_m } => {
+                entry.kind = Kind::Sphere;
+                entry.centre_m = Some(centre_m);
+                entry.radius_m = Some(radius_m);
+            }
+        }
+        entry
+    }
+}
+
 impl Scene {
     /// The built-in scene: a street from 15 to 180 m, 50 klux.
     pub fn outdoor() -> Self {
@@ -121,6 +180,11 @@ impl Scene {
             Ok(scene) => scene,
             Err(error) => unreachable!("the built-in scene is tested: {error}"),
         }
+    }
+
+    /// The file of the built-in scene, to be changed by `--set`.
+    pub fn outdoor_document() -> Document {
+        Document::parse("the built-in street", OUTDOOR).expect("the built-in scene is tested")
     }
 
     /// Reads a scene file.
@@ -134,27 +198,168 @@ impl Scene {
     /// Reads a scene from TOML text; `source` names it in complaints.
     ///
     /// # Errors
-    /// Syntax errors, unknown or missing keys, and values [`Scene::validate`] refuses, each with
-    /// the line where it stands.
+    /// As [`Scene::read`], each fault with its line.
     pub fn parse(source: &str, text: &str) -> Result<Self, InputError> {
-        let scene: Scene = parse_toml(source, text)?;
-        scene.first_fault().map_err(|fault| InputError {
-            line: line_of_fault(text, &fault),
-            ..complaint(source, &fault)
-        })?;
+        Scene::read(&Document::parse(source, text)?)
+    }
+
+    /// Reads a scene from its document. Keys that are left out have their default: [`Lidar::default`],
+    /// [`Stereo::default`], [`Light::default`]; a document without objects is a scene without any.
+    ///
+    /// # Errors
+    /// Syntax errors; unknown keys, keys that an object lacks, and values that cannot be, all of them at once.
+    pub fn read(document: &Document) -> Result<Self, InputError> {
+        if document.is_empty() {
+            let message = "has no settings; give at least one, or leave the scene out for the built-in street";
+            document.complain(vec![Fault {
+                path: String::new(),
+                message: message.into(),
+            }])?;
+        }
+        let mut faults = Vec::new();
+        let mut scene = Scene {
+            lidar: Lidar::default(),
+            stereo: Stereo::default(),
+            light: Light::default(),
+            objects: Vec::new(),
+        };
+        for (name, value) in document.table() {
+            let message = match (name.as_str(), value) {
+                ("lidar", Value::Table(given)) => {
+                    scene.lidar = section(document, name, given, LIDAR, &mut faults);
+                    continue;
+                }
+                ("stereo", Value::Table(given)) => {
+                    scene.stereo = section(document, name, given, STEREO, &mut faults);
+                    continue;
+                }
+                ("light", Value::Table(given)) => {
+                    scene.light = section(document, name, given, LIGHT, &mut faults);
+                    continue;
+                }
+                ("object", Value::Array(items)) => {
+                    for (index, item) in items.iter().enumerate() {
+                        let path = format!("object.{index}");
+                        scene
+                            .objects
+                            .extend(object(document, &path, item, &mut faults));
+                    }
+                    continue;
+                }
+                ("object", _) => "object is no list; write each object as a section [[object]]",
+                ("lidar" | "stereo" | "light", _) => {
+                    "this must be a section; write its name in brackets, and its keys below"
+                }
+                _ => "unknown section; give [lidar], [stereo], [light] or [[object]]",
+            };
+            let message = format!("{name}: {message}");
+            faults.push(Fault {
+                path: name.clone(),
+                message,
+            });
+        }
+        if !faults.iter().any(|fault| fault.path.starts_with("stereo.")) {
+            faults.extend(check_stereo(&scene.stereo));
+        }
+        for fault in &mut faults {
+            fault.message = place(document, &fault.path) + &fault.message;
+        }
+        document.complain(faults)?;
         Ok(scene)
+    }
+
+    /// All values as a TOML table.
+    pub(super) fn table(&self) -> Table {
+        Table::try_from(self).expect("a scene is numbers and texts")
+    }
+
+    /// The scene as a commented file, which [`Scene::parse`] reads back.
+    pub fn commented(&self) -> String {
+        let left_out = Scene {
+            lidar: Lidar::default(),
+            stereo: Stereo::default(),
+            light: Light::default(),
+            objects: Vec::new(),
+        };
+        commented(SECTIONS, &self.table(), &left_out.table())
     }
 }
 
-/// Where the faulty value stands, or its section if the value was left to its default.
-fn line_of_fault(text: &str, fault: &Fault) -> Option<usize> {
-    let document = toml::de::DeTable::parse(text).ok()?;
-    let mut place = document.get_ref().get(fault.section)?;
-    if let Some(index) = fault.entry {
-        place = place.get_ref().get(index)?;
+/// A section whose keys all have defaults.
+fn section<T: serde::de::DeserializeOwned + Default>(
+    document: &Document,
+    name: &str,
+    given: &Table,
+    keys: &[Key],
+    faults: &mut Vec<Fault>,
+) -> T {
+    let read = document.section::<T>(name, given, keys, &Table::new(), faults);
+    read.try_into().unwrap_or_default()
+}
+
+/// The object at `path`, if it has no fault.
+fn object(
+    document: &Document,
+    path: &str,
+    item: &Value,
+    faults: &mut Vec<Fault>,
+) -> Option<Object> {
+    let mut complain = |message: String| {
+        let path = path.to_owned();
+        faults.push(Fault { path, message });
+    };
+    let Value::Table(given) = item else {
+        complain("this must be a section [[object]]; write its keys below".into());
+        return None;
+    };
+    let needed = [
+        ("name", Value::from("")),
+        ("kind", Value::from("ground")),
+        ("reflectivity", Value::from(0.0)),
+    ];
+    let lacks = needed.iter().find(|(key, _)| !given.contains_key(*key));
+    if let Some((key, _)) = lacks {
+        complain(format!("lacks `{key}`; add it"));
     }
-    let value = place.get_ref().get(fault.key).unwrap_or(place);
-    Some(line_of(text, value.span().start))
+    let lacks = lacks.is_some();
+    let rest = needed.into_iter().map(|(k, v)| (k.to_owned(), v)).collect();
+    let before = faults.len();
+    let read = document.section::<ObjectEntry>(path, given, OBJECT, &rest, faults);
+    if lacks || faults.len() > before {
+        return None;
+    }
+    match read.try_into::<Object>() {
+        Ok(object) => {
+            let fault = check_object(path, &object);
+            let is_fine = fault.is_none();
+            faults.extend(fault);
+            is_fine.then_some(object)
+        }
+        Err(e) => {
+            let (path, message) = (path.to_owned(), e.message().trim().to_owned());
+            faults.push(Fault { path, message });
+            None
+        }
+    }
+}
+
+/// Where a fault is, as the beginning of a sentence.
+fn place(document: &Document, path: &str) -> String {
+    let mut names = path.split('.');
+    match (names.next(), names.next()) {
+        (Some("object"), Some(index)) => {
+            let index: usize = index.parse().unwrap_or(0);
+            let item = document
+                .table()
+                .get("object")
+                .and_then(|list| list.get(index));
+            let name = item.and_then(|item| item.get("name")?.as_str());
+            let name = name.map_or(String::new(), |name| format!(" ({name})"));
+            format!("in [[object]] number {}{name}, ", index + 1)
+        }
+        (Some(section), Some(_)) => format!("in [{section}], "),
+        _ => String::new(),
+    }
 }
 
 #[cfg(test)]
@@ -196,6 +401,7 @@ mod tests {
             let (error, text) = complaint_after(old, new);
             assert_eq!(error.line, line_with(&text, new), "{error}");
             assert!(error.to_string().contains("; give "), "{error}");
+            assert!(error.further.is_empty(), "{error}");
         }
     }
 
@@ -213,13 +419,102 @@ mod tests {
     }
 
     #[test]
-    fn the_stereo_section_may_be_left_out() {
-        let text = "[lidar]\nfov_deg = 16\nwavelength_nm = 940\npulse_energy_uj = 10\n\
-            pulse_fwhm_ns = 4\npde = 0.2\nlens_diameter_mm = 6\nlens_f_number = 2\n\
-            solar_irradiance_w_m2 = 3\n[light]\nilluminance_klux = 1\n";
-        let scene = Scene::parse("s.toml", text).unwrap();
-        assert_eq!(scene.stereo.width, 1440);
+    fn what_is_left_out_takes_its_default() {
+        let scene = Scene::parse("s.toml", "[light]\nilluminance_klux = 5\n").unwrap();
+        let street = Scene::outdoor();
+        assert_eq!(scene.light.illuminance_klux, 5.0);
+        assert_eq!(scene.stereo, Stereo::default());
         assert!(scene.objects.is_empty());
+        // The street's optics, but for the dark counts, which files have always left out for none.
+        let dark_count_hz = 0.0;
+        let lidar = Lidar {
+            dark_count_hz,
+            ..street.lidar
+        };
+        assert_eq!(scene.lidar, lidar);
+        let scene = Scene::parse("s.toml", "[lidar]\npde = 0.3\n").unwrap();
+        assert_eq!(scene.lidar, Lidar { pde: 0.3, ..lidar });
+        assert_eq!(scene.light, street.light);
+        assert!(Scene::parse("s.toml", "# nothing\n").is_err());
+    }
+
+    #[test]
+    fn all_faults_are_told_at_once_with_their_lines() {
+        let text = "[lidar]\npde = 1.5\nfov_deg = \"8 ns\"\ncolour = 1\n\
+            [light]\nilluminance_klux = nan\n[[object]]\nname = \"a\"\nkind = \"cone\"\n\
+            reflectivity = -1\n[[object]]\nkind = \"sphere\"\n[weather]\n";
+        let error = Scene::parse("s.toml", text).unwrap_err();
+        let told = error.to_string();
+        let lines: Vec<&str> = told.lines().collect();
+        for (line, says) in [
+            "s.toml:2: in [lidar], pde = 1.5 is impossible; give 0 to 1",
+            "s.toml:3: in [lidar], fov_deg = \"8 ns\" is a time; give an angle",
+            "s.toml:4: in [lidar], unknown field `colour`",
+            "s.toml:6: in [light], illuminance_klux = NaN is impossible; give 0 to 1000 klux",
+            "s.toml:9: in [[object]] number 1 (a), kind: unknown variant `cone`",
+            "s.toml:10: in [[object]] number 1 (a), reflectivity = -1 is impossible",
+            "s.toml:11: in [[object]] number 2, lacks `name`",
+            "s.toml:13: weather: unknown section",
+        ]
+        .iter()
+        .enumerate()
+        {
+            assert!(lines[line].starts_with(says), "{told}");
+        }
+        assert_eq!(lines.len(), 8, "{told}");
+    }
+
+    #[test]
+    fn the_commented_scene_reads_back_and_has_every_key() {
+        let street = Scene::outdoor();
+        let text = street.commented();
+        assert_eq!(Scene::parse("printed", &text).unwrap(), street);
+        // Every key of the structs, as serde knows them, is in the tables and in the text, and the other way round.
+        let table = street.table();
+        let mut keys: Vec<(String, String)> = Vec::new();
+        for (section, value) in &table {
+            let of = |table: &Table| -> Vec<(String, String)> {
+                table
+                    .keys()
+                    .map(|key| (section.clone(), key.clone()))
+                    .collect()
+            };
+            match value {
+                Value::Array(items) => {
+                    keys.extend(items.iter().flat_map(|i| of(i.as_table().unwrap())))
+                }
+                value => keys.extend(of(value.as_table().unwrap())),
+            }
+        }
+        keys.sort();
+        keys.dedup();
+        let mut known: Vec<(String, String)> = SECTIONS
+            .iter()
+            .flat_map(|s| {
+                s.keys
+                    .iter()
+                    .map(|key| (s.name.to_owned(), key.name.to_owned()))
+            })
+            .collect();
+        known.sort();
+        assert_eq!(keys, known);
+        for (_, key) in keys {
+            assert!(
+                text.lines()
+                    .any(|line| line.starts_with(&format!("{key} = "))),
+                "{key}"
+            );
+        }
+    }
+
+    /// Units stand in names, too; what they say must be the table's.
+    #[test]
+    fn units_are_those_of_the_names() {
+        let keys = SECTIONS.iter().flat_map(|s| s.keys);
+        for key in keys.filter(|key| !key.unit.is_empty() && key.unit != "px") {
+            let suffix = key.unit.to_lowercase().replace('/', "_");
+            assert!(key.name.ends_with(&format!("_{suffix}")), "{}", key.name);
+        }
     }
 
     proptest! {

@@ -5,6 +5,7 @@
 
 mod camera;
 mod file;
+mod keys;
 mod light;
 mod rules;
 mod settings;

@@ -12,24 +12,23 @@ use crate::units::Time;
 ///
 /// Read one with [`Scene::parse`] or [`Scene::load`], or take [`Scene::outdoor`]. After changing
 /// fields call [`Scene::validate`].
-#[derive(Debug, Clone, PartialEq, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Scene {
     /// Laser, lens and SPADs of the lidar.
     pub lidar: Lidar,
     /// The camera pair that guides it; the thesis's rig unless given.
-    #[serde(default)]
     pub stereo: Stereo,
     /// Sunlight.
     pub light: Light,
     /// What there is to see.
-    #[serde(default, rename = "object")]
+    #[serde(rename = "object")]
     pub objects: Vec<Object>,
 }
 
 /// The lidar's optics. Rows and columns are the sensor's business, not the scene's.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
+/// What a file leaves out is the built-in street's, but for dark counts: none.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Lidar {
     /// Horizontal field of view, degrees. Macropixels are square, so the vertical one follows
     /// from the sensor's shape.
@@ -47,27 +46,38 @@ pub struct Lidar {
     /// Focal length over diameter.
     pub lens_f_number: f64,
     /// Transmittance of lens and filter, 0 to 1.
-    #[serde(default = "one")]
     pub transmittance: f64,
     /// Solar irradiance within the filter's band at 100 klux, W/m².
     pub solar_irradiance_w_m2: f64,
     /// Dark counts of one macropixel, all SPADs together, per second.
-    #[serde(default)]
     pub dark_count_hz: f64,
     /// What the laser lights up: the field of view, or the circle around it.
-    #[serde(default)]
     pub spot: Spot,
     /// Constant of the photon budget.
-    #[serde(default)]
     pub convention: Convention,
 }
 
-fn one() -> f64 {
-    1.0
+impl Default for Lidar {
+    fn default() -> Self {
+        Lidar {
+            fov_deg: 16.0,
+            wavelength_nm: 940.0,
+            pulse_energy_uj: 20.0,
+            pulse_fwhm_ns: 4.5,
+            pde: 0.185,
+            lens_diameter_mm: 4.0,
+            lens_f_number: 2.2,
+            transmittance: 1.0,
+            solar_irradiance_w_m2: 3.047,
+            dark_count_hz: 0.0,
+            spot: Spot::default(),
+            convention: Convention::default(),
+        }
+    }
 }
 
 /// The stereo camera rig of thesis 5.2.2 (Table 12), whose values are the default of every field.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Stereo {
     /// Distance from the principal (left) to the right camera, m.
@@ -123,12 +133,20 @@ impl Stereo {
     }
 }
 
-/// Sunlight on the scene.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
+/// Sunlight on the scene; what a file leaves out is the built-in street's.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Light {
     /// Illuminance, klux; 100 is full sun.
     pub illuminance_klux: f64,
+}
+
+impl Default for Light {
+    fn default() -> Self {
+        Light {
+            illuminance_klux: 50.0,
+        }
+    }
 }
 
 impl Scene {

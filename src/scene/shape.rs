@@ -6,8 +6,11 @@ use super::vector::{Ray, Vec3};
 const NEAREST_M: f64 = 1e-6;
 
 /// A thing that reflects light, evenly and diffusely.
-#[derive(Debug, Clone, PartialEq, serde::Deserialize)]
-#[serde(try_from = "super::file::ObjectEntry")]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(
+    into = "super::file::ObjectEntry",
+    try_from = "super::file::ObjectEntry"
+)]
 pub struct Object {
     /// Name for reports and complaints.
     pub name: String,

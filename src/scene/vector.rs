@@ -3,8 +3,8 @@
 use std::ops::{Add, Mul, Sub};
 
 /// A point or direction, m (or without unit): x right, y down, z forward. In files `[x, y, z]`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Deserialize)]
-#[serde(from = "[f64; 3]")]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(from = "[f64; 3]", into = "[f64; 3]")]
 pub struct Vec3 {
     /// To the right.
     pub x: f64,
@@ -64,6 +64,12 @@ impl Vec3 {
 impl From<[f64; 3]> for Vec3 {
     fn from([x, y, z]: [f64; 3]) -> Self {
         Vec3 { x, y, z }
+    }
+}
+
+impl From<Vec3> for [f64; 3] {
+    fn from(vector: Vec3) -> Self {
+        vector.components()
     }
 }
 

@@ -1,5 +1,6 @@
 //! The guided system as a whole: camera pair, sensor and laser take one frame together.
 
+mod distance;
 mod frame;
 pub mod pareto;
 mod pixel;
@@ -10,6 +11,7 @@ pub mod stability;
 mod summary;
 mod tolerance;
 
+pub use distance::DistanceLaw;
 pub use frame::{EngineKind, FrameError, FrameSettings, Probe, take_frame};
 pub use pixel::{NoDepth, PixelDepth};
 pub use result::{Frame, PhaseTimes};

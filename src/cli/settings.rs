@@ -1,0 +1,143 @@
+//! `--sensor`, `--scene` and `--set`, and the commands that print what they make: `gdtof sensor` and `gdtof scene`.
+//!
+//! ```text
+//!   --sensor FILE ─┐                      --scene FILE ─┐
+//!   --set sensor.… ┼─► SensorConfig       --set scene.… ┴─► Scene
+//!   --rows, --cols ┘
+//! ```
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::say;
+use crate::chip::SensorConfig;
+use crate::files::{InputError, read_text};
+use crate::scene::Scene;
+use crate::settings::Document;
+
+/// Which sensor.
+#[derive(Args)]
+pub struct SensorArgs {
+    /// Sensor configuration (TOML); without it, the QuantIC4x4.
+    #[arg(long, value_name = "FILE")]
+    sensor: Option<PathBuf>,
+    /// Macropixel rows, instead of the configuration's.
+    #[arg(long, value_name = "R")]
+    rows: Option<usize>,
+    /// Macropixel columns, instead of the configuration's.
+    #[arg(long, value_name = "C")]
+    cols: Option<usize>,
+    /// Set one key of the sensor or scene, whatever its file says, as sensor.clk_hz=300e6, \"sensor.clk_hz=300 MHz\" or
+    /// scene.lidar.pde=0.2; may be repeated, and the last one counts. `gdtof sensor` and `gdtof scene` list the keys.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+/// Which sensor, and which scene before it.
+#[derive(Args)]
+pub struct SceneArgs {
+    #[command(flatten)]
+    sensor: SensorArgs,
+    /// Scene (TOML); without it, a street on a bright day.
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+}
+
+impl SensorArgs {
+    /// The sensor, for a command that needs no scene.
+    ///
+    /// # Errors
+    /// Unreadable files, bad keys and values, and `--set` of anything but the sensor.
+    pub fn read(&self) -> Result<SensorConfig, InputError> {
+        self.read_with(None)
+    }
+
+    /// Whether rows and columns are both asked for on the command line.
+    pub fn gives_size(&self) -> bool {
+        let is_set = |key: &str| {
+            let prefix = format!("sensor.{key}=");
+            self.set.iter().any(|set| set.starts_with(&prefix))
+        };
+        (self.rows.is_some() || is_set("rows")) && (self.cols.is_some() || is_set("cols"))
+    }
+
+    fn read_with(&self, mut scene: Option<&mut Document>) -> Result<SensorConfig, InputError> {
+        let mut sensor = match &self.sensor {
+            Some(path) => read(path)?,
+            None => Document::of("the sensor", toml::Table::new()),
+        };
+        for assignment in &self.set {
+            let option = format!("--set {assignment}");
+            if let Some(rest) = assignment.strip_prefix("sensor.") {
+                sensor.assign(rest, &option)?;
+            } else if let Some(rest) = assignment.strip_prefix("scene.") {
+                let Some(scene) = &mut scene else {
+                    let message = "this command reads no scene; leave it out";
+                    return Err(InputError::new(option, message));
+                };
+                scene.assign(rest, &option)?;
+            } else {
+                let message = "is no key of the sensor or scene; give sensor.KEY=VALUE or scene.SECTION.KEY=VALUE";
+                return Err(InputError::new(option, message));
+            }
+        }
+        for (key, value) in [("rows", self.rows), ("cols", self.cols)] {
+            if let Some(value) = value {
+                let value = i64::try_from(value).unwrap_or(i64::MAX);
+                sensor.set_value(key, value.into(), &format!("--{key}"));
+            }
+        }
+        SensorConfig::read_document(&sensor)
+    }
+}
+
+impl SceneArgs {
+    /// The sensor and the scene.
+    ///
+    /// # Errors
+    /// Unreadable files, bad keys and values.
+    pub fn read(&self) -> Result<(SensorConfig, Scene), InputError> {
+        let mut document = match &self.scene {
+            Some(path) => read(path)?,
+            None => Scene::outdoor_document(),
+        };
+        let sensor = self.sensor.read_with(Some(&mut document));
+        let scene = Scene::read(&document);
+        match (sensor, scene) {
+            (Ok(sensor), Ok(scene)) => Ok((sensor, scene)),
+            (sensor, scene) => {
+                let faults = [sensor.err(), scene.err()];
+                InputError::all(faults.into_iter().flatten()).map(|()| unreachable!("one failed"))
+            }
+        }
+    }
+
+    /// What reports call the scene.
+    pub fn scene_name(&self) -> String {
+        match &self.scene {
+            Some(path) => path.display().to_string(),
+            None => "built-in street".to_owned(),
+        }
+    }
+}
+
+fn read(path: &Path) -> Result<Document, InputError> {
+    Document::parse(path.display(), &read_text(path)?)
+}
+
+/// `gdtof sensor`.
+///
+/// # Errors
+/// Bad input.
+pub fn print_sensor(args: &SensorArgs) -> anyhow::Result<()> {
+    Ok(say(args.read()?.commented())?)
+}
+
+/// `gdtof scene`.
+///
+/// # Errors
+/// Bad input.
+pub fn print_scene(args: &SceneArgs) -> anyhow::Result<()> {
+    Ok(say(args.read()?.1.commented())?)
+}

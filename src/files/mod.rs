@@ -1,0 +1,23 @@
+//! Files in and out: user's input read with line numbers, output written whole or not at all.
+//!
+//! | file | what |
+//! |---|---|
+//! | `complaint.rs` | what is wrong with an input: `FILE:LINE: what is wrong; what to do` |
+//! | `input.rs` | texts, read whole or line by line, and what is no text refused |
+//! | `output.rs` | output files: beside the target first, then renamed over it |
+//! | `temporary.rs` | what stands there meanwhile, and what killed runs left of it |
+//! | `interruption.rs` | signals that end the program |
+//! | `result_set.rs` | the results of a run as one set with a manifest |
+
+mod complaint;
+mod input;
+mod interruption;
+mod output;
+mod result_set;
+mod temporary;
+
+pub use complaint::InputError;
+pub use input::{Lines, line_of, parse_json, parse_toml, read_text};
+pub use interruption::clean_up_when_interrupted;
+pub use output::{OutputFile, create_folder};
+pub use result_set::{MANIFEST, ManifestFile, ResultSet};

@@ -1,0 +1,301 @@
+//! The keys of a scene file: units, ranges, sources.
+
+use crate::settings::{Key, Range, Section};
+
+/// Beyond a million metres the squares in the geometry lose the small lengths.
+const FAR_M: f64 = 1e6;
+
+const fn key(
+    name: &'static str,
+    unit: &'static str,
+    range: Range,
+    what: &'static str,
+    source: &'static str,
+) -> Key {
+    Key {
+        name,
+        what,
+        unit,
+        range,
+        source,
+    }
+}
+
+const CHOSEN: &str = "chosen for the street";
+const RIG: &str = "thesis Table 12";
+const LENGTH: Range = Range::Above(0.0, FAR_M);
+const POSITION: Range = Range::Within(-FAR_M, FAR_M);
+const SHARE: Range = Range::Within(0.0, 1.0);
+
+pub(super) const LIDAR: &[Key] = &[
+    key(
+        "fov_deg",
+        "deg",
+        Range::Within(0.1, 150.0),
+        "Horizontal field of view; the vertical one follows from the sensor's rows, as macropixels are square",
+        "chosen: 64 columns of 0.25 degrees",
+    ),
+    key(
+        "wavelength_nm",
+        "nm",
+        Range::Within(100.0, 1e4),
+        "Laser wavelength",
+        "thesis 3.2, a dip of the solar spectrum",
+    ),
+    key(
+        "pulse_energy_uj",
+        "uJ",
+        Range::Within(0.0, f64::MAX),
+        "Energy of one laser pulse over the whole field of view",
+        CHOSEN,
+    ),
+    key(
+        "pulse_fwhm_ns",
+        "ns",
+        Range::Within(0.0, 1e6),
+        "Full width at half maximum of the Gaussian pulse, jitter included",
+        "thesis 6.4.2",
+    ),
+    key(
+        "pde",
+        "",
+        SHARE,
+        "Photon detection efficiency of the SPADs",
+        "thesis Table 6",
+    ),
+    key(
+        "lens_diameter_mm",
+        "mm",
+        Range::Above(0.0, f64::MAX),
+        "Diameter of the lens aperture",
+        CHOSEN,
+    ),
+    key(
+        "lens_f_number",
+        "",
+        Range::Above(0.0, f64::MAX),
+        "Focal length over diameter of the lens",
+        CHOSEN,
+    ),
+    key(
+        "transmittance",
+        "",
+        SHARE,
+        "Share of the light that lens and filter let through",
+        "thesis Eq. 15, where it is left out",
+    ),
+    key(
+        "solar_irradiance_w_m2",
+        "W/m2",
+        Range::Within(0.0, f64::MAX),
+        "Solar irradiance within the filter's band at 100 klux",
+        "ASTM G173 global tilt, 935 to 945 nm",
+    ),
+    key(
+        "dark_count_hz",
+        "Hz",
+        Range::Within(0.0, 1e9),
+        "Dark counts of one macropixel, all its SPADs together",
+        "chosen: 1.25 kHz for each of 16 SPADs",
+    ),
+    key(
+        "spot",
+        "",
+        Range::OneOf(&["rectangle", "round"]),
+        "What the laser lights up: the field of view, or the circle around it",
+        "thesis Eq. 7",
+    ),
+    key(
+        "convention",
+        "",
+        Range::OneOf(&["thesis", "lambertian"]),
+        "Constant of the photon budget: as printed in the thesis, or pi times that",
+        "thesis Eq. 9 to 16",
+    ),
+];
+
+pub(super) const STEREO: &[Key] = &[
+    key(
+        "baseline_m",
+        "m",
+        LENGTH,
+        "Distance from the principal (left) to the right camera",
+        RIG,
+    ),
+    key(
+        "focal_mm",
+        "mm",
+        Range::Above(0.0, f64::MAX),
+        "Focal length of both lenses",
+        RIG,
+    ),
+    key(
+        "pixel_pitch_um",
+        "um",
+        Range::Above(0.0, f64::MAX),
+        "Pixel pitch of both cameras",
+        RIG,
+    ),
+    key(
+        "width",
+        "px",
+        Range::Within(1.0, 16_384.0),
+        "Columns of an image",
+        RIG,
+    ),
+    key(
+        "height",
+        "px",
+        Range::Within(1.0, 16_384.0),
+        "Rows of an image",
+        RIG,
+    ),
+    key(
+        "disparity_sigma_px",
+        "px",
+        Range::Within(0.0, f64::MAX),
+        "Standard deviation of the matched disparity",
+        "thesis Fig. 68, where 1/3 px is overlaid",
+    ),
+    key(
+        "subpixel_steps",
+        "",
+        Range::Within(1.0, 65_536.0),
+        "Disparities are multiples of one over this many pixels",
+        "chosen: what semi-global matching gives",
+    ),
+    key(
+        "min_disparity_px",
+        "px",
+        Range::Above(0.0, f64::MAX),
+        "Smallest disparity accepted",
+        "thesis 5.2.1, an error below 10 % for a whole pixel",
+    ),
+    key(
+        "max_disparity_px",
+        "px",
+        Range::Above(0.0, f64::MAX),
+        "Largest disparity searched",
+        "chosen: the disparity at 15 m, where the thesis's rig begins to see",
+    ),
+    key(
+        "position_m",
+        "m",
+        POSITION,
+        "Place of the principal camera, [right, down, forward] of the lidar",
+        CHOSEN,
+    ),
+    key(
+        "yaw_error_deg",
+        "deg",
+        Range::Within(-45.0, 45.0),
+        "By how much the right camera has turned outwards since calibration",
+        "thesis Fig. 70; none",
+    ),
+];
+
+pub(super) const LIGHT: &[Key] = &[key(
+    "illuminance_klux",
+    "klux",
+    Range::Limited(0.0, 1000.0, "full sun is 100 klux"),
+    "Illuminance of the scene by the sun",
+    CHOSEN,
+)];
+
+pub(super) const OBJECT: &[Key] = &[
+    key(
+        "name",
+        "",
+        Range::Text,
+        "Name in complaints and for --set",
+        "-",
+    ),
+    key(
+        "kind",
+        "",
+        Range::OneOf(&["ground", "plane", "box", "sphere"]),
+        "Shape",
+        "-",
+    ),
+    key(
+        "reflectivity",
+        "",
+        SHARE,
+        "Lambertian reflectivity at the laser's wavelength",
+        "-",
+    ),
+    key(
+        "depth_m",
+        "m",
+        LENGTH,
+        "Of a ground: how far it lies below the lidar",
+        "-",
+    ),
+    key(
+        "centre_m",
+        "m",
+        POSITION,
+        "Of a plane, box or sphere: its middle, [right, down, forward] of the lidar",
+        "-",
+    ),
+    key(
+        "normal",
+        "",
+        POSITION,
+        "Of a plane: any vector at right angles to it; towards the lidar if left out",
+        "-",
+    ),
+    key(
+        "width_m",
+        "m",
+        LENGTH,
+        "Of a plane: extent along its horizontal edge",
+        "-",
+    ),
+    key(
+        "height_m",
+        "m",
+        LENGTH,
+        "Of a plane: extent along its other edge",
+        "-",
+    ),
+    key(
+        "size_m",
+        "m",
+        LENGTH,
+        "Of a box: extents [right, down, forward] before it is turned",
+        "-",
+    ),
+    key(
+        "yaw_deg",
+        "deg",
+        Range::Within(-360.0, 360.0),
+        "Of a box: its turn about the vertical axis, the front to the right; none if left out",
+        "-",
+    ),
+    key("radius_m", "m", LENGTH, "Of a sphere: its radius", "-"),
+];
+
+/// The sections of a scene file.
+pub(super) const SECTIONS: &[Section] = &[
+    Section {
+        name: "lidar",
+        what: "Laser, lens and SPADs of the lidar",
+        keys: LIDAR,
+    },
+    Section {
+        name: "stereo",
+        what: "The camera pair that guides it",
+        keys: STEREO,
+    },
+    Section {
+        name: "light",
+        what: "Sunlight",
+        keys: LIGHT,
+    },
+    Section {
+        name: "object",
+        what: "What there is to see: as many objects as wanted, none if left out. Metres; x right, y down, z forward; the lidar is at the origin",
+        keys: OBJECT,
+    },
+];

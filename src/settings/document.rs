@@ -1,0 +1,259 @@
+//! A settings file and what `--set` changes in it, with the place of every value for complaints.
+//!
+//! `--set sensor.KEY=VALUE` and `--set scene.SECTION.KEY=VALUE` write as a line `KEY = VALUE` of that section would; a value
+//! that is no TOML is taken as text, so that words and quantities need no quotes. Later ones win, and all win over the
+//! file. An object goes by its name or its number from 1: `--set scene.object.car.reflectivity=0.5`.
+
+use std::collections::BTreeMap;
+
+use serde::de::DeserializeOwned;
+use toml::de::{DeTable, DeValue};
+use toml::{Table, Value};
+
+use super::key::Key;
+use crate::files::{InputError, line_of};
+
+/// Something wrong with a setting.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fault {
+    /// Names from the root to the value, lists counted from 0, joined by dots.
+    pub path: String,
+    /// What is wrong and what to do about it.
+    pub message: String,
+}
+
+/// Where a value comes from.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+enum Origin {
+    Line(usize),
+    Option(String),
+}
+
+/// Settings as given, not yet checked.
+#[derive(Debug, Clone)]
+pub struct Document {
+    source: String,
+    table: Table,
+    origins: BTreeMap<String, Origin>,
+}
+
+impl Document {
+    /// Reads TOML text; `source` names it in complaints.
+    ///
+    /// # Errors
+    /// When it is no TOML, with the line.
+    pub fn parse(source: impl std::fmt::Display, text: &str) -> Result<Self, InputError> {
+        let table: Table = crate::files::parse_toml(&source, text)?;
+        let mut document = Self::of(source, table);
+        if let Ok(spans) = DeTable::parse(text) {
+            note_lines(spans.get_ref(), "", text, &mut document.origins);
+        }
+        Ok(document)
+    }
+
+    /// Settings that stand in no file.
+    pub fn of(source: impl std::fmt::Display, table: Table) -> Self {
+        Document {
+            source: source.to_string(),
+            table,
+            origins: BTreeMap::new(),
+        }
+    }
+
+    /// All values.
+    pub fn table(&self) -> &Table {
+        &self.table
+    }
+
+    /// Whether there is no value at all.
+    pub fn is_empty(&self) -> bool {
+        self.table.is_empty()
+    }
+
+    /// Writes a value of the root, as the command-line option `option` asks.
+    pub fn set_value(&mut self, key: &str, value: Value, option: &str) {
+        self.table.insert(key.into(), value);
+        self.origins
+            .insert(key.into(), Origin::Option(option.into()));
+    }
+
+    /// Writes what `--set` asks, `assignment` without its first name (`sensor.`, `scene.`); `option` is the whole option.
+    ///
+    /// # Errors
+    /// When it is no assignment, or there is no such object.
+    pub fn assign(&mut self, assignment: &str, option: &str) -> Result<(), InputError> {
+        let complain = |message: String| Err(InputError::new(option, message));
+        let Some((names, value)) = assignment.split_once('=') else {
+            return complain("has no value; give key=value".into());
+        };
+        let Some(names) = names_of(names) else {
+            return complain(format!(
+                "{names:?} is no key; give names with dots between them"
+            ));
+        };
+        let (last, folders) = names.split_last().expect("a key has a name");
+        let mut path = String::new();
+        let mut table = &mut self.table;
+        let mut folders = folders.iter();
+        while let Some(name) = folders.next() {
+            extend(&mut path, name);
+            let entry = table
+                .entry(name.as_str())
+                .or_insert_with(|| Table::new().into());
+            table = match entry {
+                Value::Table(inner) => inner,
+                Value::Array(list) => {
+                    let Some(which) = folders.next() else {
+                        let message = format!(
+                            "{name} is a list; give {name}.NAME.key=value or {name}.NUMBER.key=value, counted from 1"
+                        );
+                        return complain(message);
+                    };
+                    let Some(index) = index_in(list, which) else {
+                        return complain(format!(
+                            "there is no {name} {which:?}; give the name of one, or its number from 1 to {}",
+                            list.len()
+                        ));
+                    };
+                    extend(&mut path, &index.to_string());
+                    list[index].as_table_mut().expect("index_in finds tables")
+                }
+                _ => return complain(format!("{name} is no section; give another key")),
+            };
+        }
+        extend(&mut path, last);
+        table.insert(last.clone(), value_of(value));
+        self.origins.insert(path, Origin::Option(option.into()));
+        Ok(())
+    }
+
+    /// Reads a section: quantities to plain numbers, then types, then ranges. Faults are added to `faults`, and their values
+    /// left out. `rest` is what must be beside a single value to make up a `T`.
+    pub fn section<T: DeserializeOwned>(
+        &self,
+        path: &str,
+        given: &Table,
+        keys: &[Key],
+        rest: &Table,
+        faults: &mut Vec<Fault>,
+    ) -> Table {
+        let mut read = Table::new();
+        for (name, value) in given {
+            let key = keys.iter().find(|key| key.name == name);
+            let plain = key.map_or(Ok(value.clone()), |key| key.plain(value));
+            let typed = plain.and_then(|value| {
+                let mut alone = rest.clone();
+                alone.insert(name.clone(), value.clone());
+                match alone.try_into::<T>() {
+                    Ok(_) => Ok(value),
+                    Err(e) => {
+                        let message = e.message().trim().replace('\n', " ");
+                        let about = match key {
+                            Some(_) => format!("{name}: "),
+                            None => String::new(),
+                        };
+                        Err(format!("{about}{message}; correct this entry"))
+                    }
+                }
+            });
+            let checked = typed.and_then(|value| match key.and_then(|key| key.fault(&value)) {
+                None => Ok(value),
+                Some(message) => Err(message),
+            });
+            match checked {
+                Ok(value) => drop(read.insert(name.clone(), value)),
+                Err(message) => {
+                    let mut path = path.to_owned();
+                    extend(&mut path, name);
+                    faults.push(Fault { path, message });
+                }
+            }
+        }
+        read
+    }
+
+    /// All faults as one complaint, in the order of the file.
+    ///
+    /// # Errors
+    /// When there is any.
+    pub fn complain(&self, faults: Vec<Fault>) -> Result<(), InputError> {
+        let mut placed: Vec<_> = faults
+            .into_iter()
+            .map(|fault| (self.origin(&fault.path).cloned(), fault.message))
+            .collect();
+        placed.sort_by(|a, b| a.0.cmp(&b.0));
+        InputError::all(placed.into_iter().map(|(origin, message)| match origin {
+            Some(Origin::Line(line)) => InputError::at(&self.source, line, message),
+            Some(Origin::Option(option)) => InputError::new(option, message),
+            None => InputError::new(&self.source, message),
+        }))
+    }
+
+    /// Where a value stands, or else its section.
+    fn origin(&self, path: &str) -> Option<&Origin> {
+        self.origins.get(path).or_else(|| {
+            let (section, _) = path.rsplit_once('.')?;
+            self.origin(section)
+        })
+    }
+}
+
+fn extend(path: &mut String, name: &str) {
+    if !path.is_empty() {
+        path.push('.');
+    }
+    path.push_str(name);
+}
+
+fn note_lines(table: &DeTable<'_>, path: &str, text: &str, origins: &mut BTreeMap<String, Origin>) {
+    for (key, value) in table.iter() {
+        let mut path = path.to_owned();
+        extend(&mut path, key.get_ref());
+        let line = |offset| Origin::Line(line_of(text, offset));
+        origins.insert(path.clone(), line(key.span().start));
+        match value.get_ref() {
+            DeValue::Table(inner) => note_lines(inner, &path, text, origins),
+            DeValue::Array(list) => {
+                for (index, item) in list.iter().enumerate() {
+                    let path = format!("{path}.{index}");
+                    origins.insert(path.clone(), line(item.span().start));
+                    if let DeValue::Table(inner) = item.get_ref() {
+                        note_lines(inner, &path, text, origins);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The names of a dotted key, as TOML reads it.
+fn names_of(key: &str) -> Option<Vec<String>> {
+    let mut value: Value = one_value(&format!("{key} = 0"))?.into();
+    let mut names = Vec::new();
+    while let Value::Table(table) = value {
+        let (name, inner) = table.into_iter().next()?;
+        names.push(name);
+        value = inner;
+    }
+    (!names.is_empty()).then_some(names)
+}
+
+fn value_of(text: &str) -> Value {
+    let table = one_value(&format!("x = {text}"));
+    let value = table.and_then(|mut table| table.remove("x"));
+    value.unwrap_or_else(|| Value::String(text.trim().into()))
+}
+
+/// A table with a single value.
+fn one_value(text: &str) -> Option<Table> {
+    let table: Table = toml::from_str(text).ok()?;
+    (table.len() == 1).then_some(table)
+}
+
+fn index_in(list: &[Value], which: &str) -> Option<usize> {
+    let has_name = |item: &Value| item.get("name").and_then(Value::as_str) == Some(which);
+    let number = || which.parse::<usize>().ok()?.checked_sub(1);
+    let index = list.iter().position(has_name).or_else(number)?;
+    list.get(index)?.is_table().then_some(index)
+}

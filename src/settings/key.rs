@@ -1,0 +1,123 @@
+//! One key of a settings file.
+
+use toml::Value;
+
+use super::quantity;
+
+/// A key: what it is, in which unit, what it may be, and where its default comes from.
+#[derive(Debug, Clone, Copy)]
+pub struct Key {
+    /// Name in files.
+    pub name: &'static str,
+    /// What it is, without a full stop.
+    pub what: &'static str,
+    /// Symbol of the unit that plain numbers have; empty for numbers without one and for words.
+    pub unit: &'static str,
+    /// What it may be.
+    pub range: Range,
+    /// Where its default comes from.
+    pub source: &'static str,
+}
+
+/// What a key may be. Of a list of numbers, each is held to it.
+#[derive(Debug, Clone, Copy)]
+pub enum Range {
+    /// From the first number to the second, both included.
+    Within(f64, f64),
+    /// Above the first number, up to the second.
+    Above(f64, f64),
+    /// As [`Range::Within`], with the reason for the upper limit.
+    Limited(f64, f64, &'static str),
+    /// One of these words.
+    OneOf(&'static [&'static str]),
+    /// true or false.
+    Switch,
+    /// Any text.
+    Text,
+}
+
+impl Range {
+    fn holds(self, value: f64) -> bool {
+        match self {
+            Range::Within(least, most) | Range::Limited(least, most, _) => {
+                (least..=most).contains(&value)
+            }
+            Range::Above(below, most) => value > below && value <= most,
+            Range::OneOf(_) | Range::Switch | Range::Text => true,
+        }
+    }
+}
+
+impl std::fmt::Display for Range {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let short = |x: f64| match x.abs() {
+            a if a != 0.0 && !(1e-3..1e5).contains(&a) => format!("{x:e}"),
+            _ => format!("{x}"),
+        };
+        match *self {
+            Range::Within(least, f64::MAX) => write!(f, "{} or more", short(least)),
+            Range::Above(below, f64::MAX) => write!(f, "above {}", short(below)),
+            Range::Within(least, most) | Range::Limited(least, most, _) => {
+                write!(f, "{} to {}", short(least), short(most))
+            }
+            Range::Above(below, most) => {
+                write!(f, "above {}, up to {}", short(below), short(most))
+            }
+            Range::OneOf(words) => write!(f, "{}", words.join(", ")),
+            Range::Switch => write!(f, "true or false"),
+            Range::Text => write!(f, "any text"),
+        }
+    }
+}
+
+impl Key {
+    /// The same value as a plain number (or list of numbers) in the key's unit, where it is a number with a unit as text.
+    ///
+    /// # Errors
+    /// What is wrong with the text, and the cure.
+    pub(super) fn plain(&self, value: &Value) -> Result<Value, String> {
+        let is_number = !matches!(self.range, Range::OneOf(_) | Range::Switch | Range::Text);
+        match value {
+            Value::String(text) if is_number => {
+                let number = quantity::in_unit(text, self.unit)
+                    .map_err(|message| format!("{} = {text:?} {message}", self.name))?;
+                // Whole numbers stay whole, for keys that count.
+                Ok(if number.fract() == 0.0 && number.abs() < 1e15 {
+                    Value::Integer(number as i64)
+                } else {
+                    Value::Float(number)
+                })
+            }
+            Value::Array(values) => {
+                let values: Result<_, String> = values.iter().map(|v| self.plain(v)).collect();
+                Ok(Value::Array(values?))
+            }
+            other => Ok(other.clone()),
+        }
+    }
+
+    /// What is wrong with a plain value of the right type, if anything.
+    pub fn fault(&self, value: &Value) -> Option<String> {
+        let number = match value {
+            Value::Integer(number) => *number as f64,
+            Value::Float(number) => *number,
+            Value::Array(values) => return values.iter().find_map(|v| self.fault(v)),
+            _ => return None,
+        };
+        if self.range.holds(number) {
+            return None;
+        }
+        let unit = match self.unit {
+            "" => String::new(),
+            unit => format!(" {unit}"),
+        };
+        let because = match self.range {
+            Range::Limited(_, _, reason) if number >= 0.0 => format!(": {reason}"),
+            _ => String::new(),
+        };
+        Some(format!(
+            "{} = {number} is impossible; give {}{unit}{because}",
+            self.name, self.range
+        ))
+    }
+}
