@@ -10,7 +10,8 @@ use crate::units::SPEED_OF_LIGHT_M_PER_S;
 /// The law of an exposure's distances, with its numbers.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DistanceLaw {
-    /// In the names of the other fields. Bin b reaches from position b − ½ to b + ½.
+    /// In the names of the other fields. Bin b reaches from position b − ½ to b + ½. Range walk is still in it: of a
+    /// macropixel's peak it gives `peak_m`, of which `measured_m` is the correction.
     pub formula: &'static str,
     /// m/s.
     pub speed_of_light_m_per_s: f64,
@@ -35,7 +36,7 @@ impl DistanceLaw {
             }
         }
         DistanceLaw {
-            formula: "distance_m = speed_of_light_m_per_s / 2 * (window_opens_s[start] + (position_bins + 0.5) * bin_width_s)",
+            formula: "peak_m = speed_of_light_m_per_s / 2 * (window_opens_s[start] + (position_bins + 0.5) * bin_width_s)",
             speed_of_light_m_per_s: SPEED_OF_LIGHT_M_PER_S,
             bin_width_s: 1.0 / exposure.clock.as_hz(),
             window_opens_s,
