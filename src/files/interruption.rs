@@ -23,7 +23,7 @@ pub fn clean_up_when_interrupted() -> io::Result<()> {
     std::thread::Builder::new()
         .name("signals".into())
         .spawn(move || {
-            for signal in signals.forever() {
+            if let Some(signal) = signals.forever().next() {
                 end(signal);
             }
         })?;
