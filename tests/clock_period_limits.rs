@@ -1,7 +1,7 @@
 //! What static timing allows is what the gates can do: CLK and LOAD_CLK periods, the reset pulse, the correlation
 //! path; nominal, derated and with mismatch.
 
-use guided_dtof::chip::{Exposure, SensorConfig, Window, WindowLaw};
+use guided_dtof::chip::{AfterBorrow, Exposure, Mode, PCounter, SensorConfig, Window, WindowLaw};
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::engine::timing::{
     CorrelationTiming, Limits, LoadTiming, LocalClocks, MacropixelTiming, Silicon, TimingVerdict,
@@ -13,6 +13,7 @@ use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{CellKind, Corner, Library, Mismatch};
 use guided_dtof::photon::SpadEvent;
 use guided_dtof::units::Time;
+use rand::{RngExt, SeedableRng, rngs::StdRng};
 
 const SLOW: Time = Time::from_ns(20);
 const TYPICAL: Silicon = Silicon::nominal(Corner::Typ);
@@ -366,6 +367,47 @@ fn one_verdict_on_every_clock() {
         !verdict.is_met() && verdict.worst().check == "strobe setup",
         "{verdict}"
     );
+}
+
+/// Random sensors of all kinds: the verdict is met exactly where the window law finds no race.
+#[test]
+fn the_verdict_is_that_of_the_window_law_in_every_mode_and_with_every_p_counter() {
+    let random = &mut StdRng::seed_from_u64(9);
+    let (mut met, mut failed) = (0, 0);
+    for case in 0..60 {
+        let p_counter = PCounter::ALL[case % PCounter::ALL.len()];
+        let is_conventional = random.random_bool(0.4);
+        let mhz = random.random_range(300.0..900.0);
+        let config = SensorConfig {
+            p_counter,
+            mode: if is_conventional {
+                Mode::Conventional
+            } else {
+                Mode::Guided
+            },
+            after_borrow: match p_counter {
+                PCounter::Memoryless => AfterBorrow::Wrap,
+                _ => AfterBorrow::Hold,
+            },
+            stop_phase_ps: random.random_range(-0.99..0.99) * 0.5e6 / mhz,
+            counter_bits: random.random_range(4..10),
+            corner: Corner::ALL[random.random_range(0..3)],
+            ..at_mhz(mhz)
+        };
+        assert_eq!(config.check(), Ok(()));
+        let verdict = TimingVerdict::of(&config, &Silicon::nominal(config.corner), (0, 0));
+        let exposure = Exposure::new(&config, 1 << (config.counter_bits + 1), 4);
+        let start = config.largest_start() / 4;
+        let window = WindowLaw::new(&config, &exposure).window(start);
+        let is_race = matches!(window, Window::Race(_));
+        assert_eq!(
+            verdict.is_met(),
+            !is_race,
+            "{verdict}\n{window:?}\n{config:?}"
+        );
+        if is_race { failed += 1 } else { met += 1 }
+    }
+    assert!(met > 10 && failed > 5, "{met} met, {failed} failed");
 }
 
 #[test]

@@ -169,6 +169,44 @@ fn photons_that_cancel_are_told_of_on_every_engine() {
 }
 
 #[test]
+fn a_frame_states_its_timing_and_the_photons_that_cancel() {
+    let (_, told) = frame(&["--laser-cycles", "20"]);
+    assert_eq!(told["timing"]["met"], true);
+    assert!(told["timing"]["slack_ps"].as_f64().unwrap() > 0.0);
+    assert!(
+        told["timing"]["path"]
+            .as_str()
+            .unwrap()
+            .contains("mp_r0_c0")
+    );
+    assert_eq!(told["work"]["cancelled"], 0);
+
+    let folder = tempfile::tempdir().unwrap();
+    let sensor = folder.path().join("sensor.toml");
+    std::fs::write(&sensor, "clk_hz = 500e6\ndead_time_ns = 0.5\n").unwrap();
+    let arguments = [
+        "--laser-cycles",
+        "300",
+        "--sensor",
+        sensor.to_str().unwrap(),
+        "--engine",
+    ];
+    let told = ["window", "cycle"].map(|engine| frame(&[&arguments[..], &[engine]].concat()).1);
+    let cancelled = told
+        .each_ref()
+        .map(|told| told["work"]["cancelled"].as_u64().unwrap());
+    assert!(
+        cancelled[0] > 0 && cancelled[0] == cancelled[1],
+        "{cancelled:?}"
+    );
+    let notes = told[0]["timing"]["notes"].to_string();
+    assert!(
+        notes.contains("rising CLK edge that it precedes") && notes.contains("cancel"),
+        "{notes}"
+    );
+}
+
+#[test]
 fn a_dead_time_that_the_front_end_cannot_follow_is_refused_by_all_in_the_same_words() {
     for (dead_time, meant) in [
         ("8e-9", "did you mean 8 (ns)?"),

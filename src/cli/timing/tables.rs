@@ -206,7 +206,8 @@ pub fn flip_flops(subject: &Subject<'_>, load: &LoadTiming) -> Section {
     let local = LocalClocks::of(config, subject.silicon);
     let pixel = &subject.kept;
     let period = config.clock().period();
-    let aim = pixel.aim(period, config.stop_phase());
+    let phase = config.stop_phase();
+    let aim = pixel.aim(period, phase);
     let load_period = config.load_clock().period();
     type Slack<'s> = &'s dyn Fn(&Requirement) -> Option<Time>;
     let clocks: [(&str, &Netlist, &[Requirement], Slack<'_>); 5] = [
@@ -214,7 +215,7 @@ pub fn flip_flops(subject: &Subject<'_>, load: &LoadTiming) -> Section {
             Some(r.slack(period))
         }),
         ("STROBE", &pixel.netlist, &pixel.hits, &|r| {
-            Some(pixel.strobe_slack(r, period, aim))
+            Some(pixel.strobe_slack(r, period, phase, aim))
         }),
         ("HIT", &local.netlist, &local.counts, &|_| None),
         ("SPAD_RAW", &local.netlist, &local.toggles, &|r| {

@@ -11,7 +11,7 @@
 
 use super::{Limits, Silicon};
 use crate::chip::front_end::{self, PulseLimits};
-use crate::chip::{PCounter, Race, SensorConfig, histogram, sensor};
+use crate::chip::{Mode, PCounter, Race, SensorConfig, histogram, sensor};
 use crate::netlist::{
     Bound, CellKind, CheckKind, Edge, NetId, Netlist, Path, Requirement, Requirements, StaticTiming,
 };
@@ -48,6 +48,8 @@ pub struct MacropixelTiming {
     pub clk: Vec<Requirement>,
     /// Strobe to the METDC's HIT flip-flops: setup after one change of SHIFT, hold before the next.
     pub hits: Vec<Requirement>,
+    /// STOP rises → STROBE rises, where STOP makes the strobe: in the conventional mode.
+    stop_strobe: Option<(Time, Time)>,
     /// Whether the first count is the first that ENABLE lets through, and not the first after a reset.
     counts_at_once: bool,
     recovery: Time,
@@ -116,11 +118,23 @@ impl MacropixelTiming {
         let clk = clk.expect("every loop is cut");
         let (rise, fall) = (clk.arrivals(Edge::Rise), clk.arrivals(Edge::Fall));
         let stop = after("STOP", Edge::Rise, &cuts);
-        let counter_out = bus("p_counter.COUNTER_OUT");
-        // Each stage's own reset path: what arrives at a stage output goes no further.
-        let reset_cuts: Vec<NetId> = cuts.iter().chain(&counter_out).copied().collect();
+        let stop_strobe = (config.mode == Mode::Conventional).then(|| {
+            let cuts: Vec<NetId> = cuts.iter().copied().chain([net("LOCAL_STOP")]).collect();
+            let stop = after("STOP", Edge::Rise, &cuts);
+            stop.edge_window(net("metdc.STROBE"), Edge::Rise)
+                .expect(whole)
+        });
+        let p_counter = netlist.scope(&format!("{pixel}.p_counter"));
+        let counting = netlist.cells_of(p_counter.expect("a P-counter"));
+        let cells = counting.map(|cell| &netlist.cells()[cell]);
+        let stage_clocks: Vec<NetId> = cells
+            .filter(|cell| cell.kind.is_flip_flop())
+            .map(|cell| cell.inputs[1])
+            .collect();
+        // What arrives at a stage's clock goes no further: the flip-flop behind it is held in reset.
+        let reset_cuts: Vec<NetId> = cuts.iter().chain(&stage_clocks).copied().collect();
         let reset = after("COUNTER_RESET", Edge::Rise, &reset_cuts);
-        let clears = counter_out
+        let clears = stage_clocks
             .iter()
             .filter_map(|&n| reset.edge_window(n, Edge::Rise));
         let local_stop = net("LOCAL_STOP");
@@ -170,6 +184,7 @@ impl MacropixelTiming {
             reset_to_counter_clk: local_stop_falls
                 .zip(unblocked)
                 .map_or(Time::ZERO, |(falls, unblocked)| falls.1 + unblocked.1),
+            stop_strobe,
             counts_at_once: config.p_counter == PCounter::Memoryless,
             hits,
             clk: clk_rest
@@ -241,36 +256,73 @@ impl MacropixelTiming {
         let t = period.as_fs();
         let middle = |window: (Time, Time)| (window.0 + window.1).as_fs();
         // Twice the time from the first rising edge's change of SHIFT to the strobe.
-        let after = middle(self.strobe) - middle(self.shift) - t;
+        let (earlier, later) = self.strobe_offsets(phase);
+        let strobe = (self.strobe.0 + earlier, self.strobe.1 + later);
+        let after = middle(strobe) - middle(self.shift) - t;
         let (ignored_until, counts_from) = self.first_in_doubt(phase);
         let doubt = middle((ignored_until, counts_from));
         Aim {
-            edges: (after.div_euclid(2 * t) + 1).max(0),
-            first: match self.counts_at_once {
-                true => 1,
-                false => (-(-doubt).div_euclid(2 * t)).max(0),
+            edges: after.div_euclid(2 * t) + 1,
+            first: match self.counts_from_reset() {
+                true => (-(-doubt).div_euclid(2 * t)).max(0),
+                false => 1,
             },
         }
     }
 
-    /// What a period leaves over of a limit of the flip-flops that catch the strobe, if it comes where `aim` says.
-    pub fn strobe_slack(&self, requirement: &Requirement, period: Time, aim: Aim) -> Time {
-        let later = period * aim.edges;
+    /// By how much STOP's strobe comes after that of LOCAL_STOP, seen from CLK's fall: earliest and latest.
+    fn strobe_offsets(&self, phase: Time) -> (Time, Time) {
+        self.stop_strobe.map_or((Time::ZERO, Time::ZERO), |strobe| {
+            (
+                strobe.0 + phase - self.strobe.0,
+                strobe.1 + phase - self.strobe.1,
+            )
+        })
+    }
+
+    /// Whether each laser cycle's first count is the first after its reset, and counts at all.
+    fn counts_from_reset(&self) -> bool {
+        !self.counts_at_once && self.stop_strobe.is_none()
+    }
+
+    /// What a period and phase leave over of a limit of the flip-flops that catch the strobe, if it comes where `aim` says.
+    pub fn strobe_slack(
+        &self,
+        requirement: &Requirement,
+        period: Time,
+        phase: Time,
+        aim: Aim,
+    ) -> Time {
+        let (earlier, later) = self.strobe_offsets(phase);
         match requirement.kind {
-            CheckKind::Setup => requirement.slack(period) - later,
-            CheckKind::Hold => requirement.slack(period) + later,
+            CheckKind::Setup => requirement.slack(period) - period * aim.edges + earlier,
+            CheckKind::Hold => requirement.slack(period) + period * aim.edges - later,
             _ => requirement.slack(period),
         }
     }
 
     /// The strobe and the change of the shift register that is nearest to it.
-    pub fn strobe_race(&self, period: Time) -> Race {
+    pub fn strobe_race(&self, period: Time, phase: Time) -> Race {
         let (strobe, shift) = (self.strobe.1, self.shift.0);
         let hold = self.hit_hold() - (strobe - shift);
         let setup = self.hit_setup() - (self.shift.1 - self.strobe.0);
-        let edges = (strobe - shift).as_fs().div_euclid(period.as_fs());
-        let shortest = self.clk_period().unwrap_or(period);
-        Race::strobe_at_shift(period, edges, (strobe, shift), (setup, hold), shortest)
+        let nearest = |strobe: Time| (strobe - shift).as_fs().div_euclid(period.as_fs());
+        let Some(stop_strobe) = self.stop_strobe else {
+            let shortest = self.clk_period().unwrap_or(period);
+            let signals = (strobe, shift);
+            return Race::strobe_at_shift(
+                period,
+                nearest(strobe),
+                signals,
+                (setup, hold),
+                shortest,
+            );
+        };
+        let half = Time::from_fs(period.as_fs() / 2);
+        let change = half + period * nearest(stop_strobe.1 + phase) + shift - phase;
+        let what = "a change of the shift register meets the strobe";
+        let forbidden = (stop_strobe.0 - setup, stop_strobe.1 + hold);
+        Race::with_stop(what, change, forbidden, phase, period)
     }
 
     /// Falling CLK edges after CLK's fall nearest to STOP: until when they are sure not to count, and from when on they are
@@ -285,7 +337,7 @@ impl MacropixelTiming {
     /// What is left over between the reset's release and the CLK edges before and after it, and what meets what if
     /// nothing is; none where the P-counter is not reset.
     pub fn first_count(&self, period: Time, phase: Time, aim: Aim) -> Option<(Time, Race)> {
-        if self.counts_at_once {
+        if !self.counts_from_reset() {
             return None;
         }
         let (ignored_until, counts_from) = self.first_in_doubt(phase);
@@ -308,7 +360,7 @@ impl MacropixelTiming {
         let strobe = self
             .hits
             .iter()
-            .map(|r| self.strobe_slack(r, period, aim))
+            .map(|r| self.strobe_slack(r, period, phase, aim))
             .min();
         let first = self.first_count(period, phase, aim).map(|(slack, _)| slack);
         let all = [clk, strobe, first].into_iter().flatten();

@@ -186,10 +186,10 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
         }
     }
     let strobes = tightest("strobe", "CLK", &pixel.netlist, pixel.hits.iter(), |r| {
-        Some(pixel.strobe_slack(r, period, aim))
+        Some(pixel.strobe_slack(r, period, phase, aim))
     });
     // Slower or faster silicon may strobe clear of the change that it is near, but on the other side of it.
-    let race = Some(pixel.strobe_race(period)).filter(|race| race.slack() < Time::ZERO);
+    let race = Some(pixel.strobe_race(period, phase)).filter(|race| race.slack() < Time::ZERO);
     let moved = pixel.aim(period, phase).moved() - aim.moved();
     let slipped = format!(
         "windows end {moved} bins later than the window law has it, which knows of the library's delays; give another clk_hz, or silicon nearer to the library's"
@@ -292,7 +292,9 @@ fn notes(config: &SensorConfig, met: Option<(&MacropixelTiming, Aim)>) -> Vec<St
     if let Some((pixel, aim)) = met.filter(|(_, aim)| aim.edges > 0) {
         let earlier = aim.earlier();
         let hold = pixel.hits.iter().filter(|r| r.kind == CheckKind::Hold);
-        let slack = hold.map(|r| pixel.strobe_slack(r, period, earlier)).min();
+        let slack = hold
+            .map(|r| pixel.strobe_slack(r, period, config.stop_phase(), earlier))
+            .min();
         notes.push(format!(
             "the strobe comes after {} that it precedes at a slow clock, and windows end {} later, as the window law has it; the hold slack of {} before that edge is of a path that nothing exercises",
             plural(aim.edges, "rising CLK edge"),
