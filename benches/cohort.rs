@@ -40,7 +40,7 @@ fn frame(c: &mut Criterion) {
     ];
     for (name, sub_bins, neglect) in ways {
         let options = CohortOptions {
-            sub_bins,
+            sub_bins: Some(sub_bins),
             neglect,
             ..CohortOptions::default()
         };

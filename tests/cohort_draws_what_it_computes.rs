@@ -31,7 +31,7 @@ fn paralysable_spads_follow_their_closed_form() {
     };
     stream.spads.law = DeadTimeLaw::Paralysable;
     let options = CohortOptions {
-        sub_bins: 32,
+        sub_bins: Some(32),
         neglect: 0.0,
         ..CohortOptions::default()
     };

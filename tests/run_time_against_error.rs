@@ -171,10 +171,7 @@ fn a_tolerance_is_kept_by_the_cheapest_engine() {
     for tolerance_m in [1e-6, 1e-4, 1e-2] {
         let (exposed, kept) = within(tolerance_m);
         assert!(kept.bound_m <= tolerance_m, "{kept:?}");
-        assert_eq!(
-            kept.on_window + kept.on_cohort.iter().sum::<usize>(),
-            pixels.len()
-        );
+        assert_eq!(kept.on_window + kept.on_cohort, pixels.len());
         assert!(kept.on_window <= on_window, "{kept:?}");
         on_window = kept.on_window;
         assert_eq!(exposed.histograms.len(), pixels.len());

@@ -58,9 +58,10 @@ pub struct FrameArgs {
     /// Format of the waveforms of probes.
     #[arg(long, value_enum, default_value_t)]
     wave_format: WaveFormat,
-    /// Steps to a CLK period in which the cohort engine follows the dead time: more are finer and slower.
-    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=64))]
-    sub_bins: u8,
+    /// Steps to a CLK period in which the cohort engine follows the dead time. Without it, as finely as it takes to keep
+    /// each bin's mean within a tenth of its counting noise.
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u8).range(1..=64))]
+    sub_bins: Option<u8>,
     /// Let every macropixel have the cheapest engine that adds at most M metres of depth error on average.
     #[arg(long, value_name = "M", conflicts_with_all = ["engine", "sub_bins", "no_skip"])]
     tolerance: Option<f64>,
@@ -115,7 +116,7 @@ pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
         seed: args.seed,
         engine: args.engine,
         cohort: CohortOptions {
-            sub_bins: args.sub_bins.into(),
+            sub_bins: args.sub_bins.map(usize::from),
             ..CohortOptions::default()
         },
         tolerance_m: args.tolerance,
@@ -360,10 +361,9 @@ fn table(args: &FrameArgs, timing: &VerdictReport, frame: &Frame) -> Table {
             "depth error added, bound",
             format!("{:.1e} m of {:.1e} m", kept.bound_m, kept.tolerance_m),
         );
-        let cohort: usize = kept.on_cohort.iter().sum();
         table.push(
             "macropixels on window, cohort",
-            format!("{}, {cohort}", kept.on_window),
+            format!("{}, {}", kept.on_window, kept.on_cohort),
         );
     }
     let lost = work.lost_to_dead_time as f64;

@@ -123,6 +123,20 @@ pub enum EngineError {
         "SPADs may stay busy from one laser cycle's window to the next (probability up to {0:.1e}), which the cohort engine cannot follow; use --engine window, a longer laser cycle or less light"
     )]
     Memory(f64),
+    /// The finest cells of the cohort engine do not keep its error.
+    #[error(
+        "the cohort engine, with {cells} cells to a CLK period, may put the mean of bin {bin} off by {off:.2e} counts where its counting noise is {noise:.2e}; use --engine window, or --sub-bins with less exactness"
+    )]
+    CoarseCohorts {
+        /// First bin concerned.
+        bin: usize,
+        /// What its mean may be off, counts.
+        off: f64,
+        /// Standard deviation of its count.
+        noise: f64,
+        /// Cells of a CLK period at least.
+        cells: u32,
+    },
     /// A histogram bin of the netlist holds X.
     #[error("bin {bin} of {macropixel} is unknown (X) at the end of the exposure")]
     Unknown {

@@ -246,7 +246,7 @@ impl ParetoSettings {
             }
             Method::Cohort(sub_bins) => {
                 let options = CohortOptions {
-                    sub_bins,
+                    sub_bins: Some(sub_bins),
                     ..CohortOptions::default()
                 };
                 expose(

@@ -1,11 +1,11 @@
 //! The cheapest engine for every macropixel that keeps a stated depth error.
 //!
-//! The window engine is exact and its cost goes with the photons in a window. The cohort engine's does not, but its
-//! dead time ends in steps: with k steps to a CLK period the mean counts of its bins, and so the depth they give, are a
-//! little off. How much is computed and not guessed: from the mean counts with k and 2k steps follow two depths, and
-//! since the error falls at least in proportion to the steps, twice their difference bounds what k steps leave. The
-//! bound is on the depth that a histogram of mean counts gives, that is on what the engine adds to the depth
-//! of a macropixel on average; the photons' own noise is the same on both engines and no error of either.
+//! The window engine is exact and its cost goes with the photons in a window. The cohort engine's does not, but the means of
+//! its bins, and so the depth they give, are a little off. How much is computed and not guessed: its means are known
+//! to within a part of their counting noise, [`CohortOptions::error`], so from means a hundred times as exact follows
+//! another depth. Twice the difference, and what the hundredth that is left may do to it, bound what the engine adds
+//! to the depth of a macropixel on average; the photons' own noise is the same on both engines and no error of either.
+//! Both follow one law of echoes ([`crate::photon::EchoLaw`]).
 //!
 //! Macropixels without light, or whose bound cannot be kept, go to the window engine, as do those in which it is the
 //! cheaper one.
@@ -15,18 +15,21 @@ use serde::Serialize;
 
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::engine::{Cohort, CohortOptions, EngineError, Exposed, LitPixel, Window, Work, expose};
-use crate::photon::{PhotonStream, SPADS};
+use crate::photon::{PhotonStream, PixelLight, SPADS};
 use crate::ranging::{PeakOptions, interpolate};
 
-/// Steps to a CLK period that the cohort engine may take, cheapest first.
-const STEPS: [usize; 4] = [1, 2, 4, 8];
+/// The part of a bin's counting noise to which its mean is known for the bound.
+const BOUND_ERROR: f64 = 0.001;
 
-/// Photons that the window engine handles in the time of one bin and step of the cohort engine, where it pools laser
+/// Photons that the window engine handles in the time in which the cohort engine computes what SPADs do in light that is
+/// far from even: means for the bound at both exactnesses, and once more to draw.
+const PHOTONS_PER_LIGHT: f64 = 6000.0;
+
+/// Photons that the window engine handles in the time of one bin of the cohort engine, where it pools laser
 /// cycles.
 const PHOTONS_PER_POOL: f64 = 30.0;
 
-/// The same where it follows their joint state: with every SPAD ready, and for each one that is blind on average, times
-/// the square root of the steps. Fitted to macropixels of 16 000 laser cycles under 8 and 50 Mcounts/s.
+/// The same where it follows their joint state: with every SPAD ready, and for each one that is blind on average. Fitted to macropixels of 16 000 laser cycles under 8 and 50 Mcounts/s.
 const PHOTONS_PER_JOINT: [f64; 2] = [300.0, 3000.0];
 
 /// The same in the time of one photon where blinding light makes the window engine draw whole laser cycles and sort them.
@@ -39,8 +42,7 @@ const WHOLE_COUNTS: f64 = 1e9;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Choice {
     Window,
-    /// Index into [`STEPS`].
-    Cohort(usize),
+    Cohort,
 }
 
 /// What was chosen, and the bound that it keeps.
@@ -52,8 +54,8 @@ pub struct Kept {
     pub bound_m: f64,
     /// Macropixels on the window engine.
     pub on_window: usize,
-    /// Macropixels on the cohort engine with 1, 2, 4 and 8 steps to a CLK period.
-    pub on_cohort: [usize; STEPS.len()],
+    /// Macropixels on the cohort engine.
+    pub on_cohort: usize,
 }
 
 /// A frame's chip and clocks, and the depth error that it may have.
@@ -87,17 +89,17 @@ impl Tolerance<'_> {
             exposure,
             peak,
         } = *self;
-        let cohorts = STEPS.map(|sub_bins| {
-            let options = CohortOptions {
-                sub_bins,
-                ..CohortOptions::default()
-            };
-            Cohort::new(config, exposure, options)
-        });
+        let cohort = Cohort::new(config, exposure, CohortOptions::default());
+        let options = CohortOptions {
+            error: BOUND_ERROR,
+            ..CohortOptions::default()
+        };
+        let exact = Cohort::new(config, exposure, options);
         let law = WindowLaw::new(config, exposure);
         let window = Window::new(config, exposure);
         let planner = Planner {
-            cohorts: &cohorts,
+            cohort: &cohort,
+            exact: &exact,
             law: &law,
             peak,
             window: &window,
@@ -116,8 +118,7 @@ impl Tolerance<'_> {
         };
         let mut histograms = vec![Vec::new(); pixels.len()];
         let mut work = Work::default();
-        let choices = (0..STEPS.len()).map(Choice::Cohort);
-        for choice in std::iter::once(Choice::Window).chain(choices) {
+        for choice in [Choice::Window, Choice::Cohort] {
             let members: Vec<usize> = (0..pixels.len()).filter(|&i| plan[i].0 == choice).collect();
             let chosen: Vec<LitPixel> = members.iter().map(|&i| pixels[i]).collect();
             let exposed = match choice {
@@ -125,9 +126,9 @@ impl Tolerance<'_> {
                     kept.on_window = members.len();
                     expose(&window, stream, &chosen, &done)?
                 }
-                Choice::Cohort(steps) => {
-                    kept.on_cohort[steps] = members.len();
-                    expose(&cohorts[steps], stream, &chosen, &done)?
+                Choice::Cohort => {
+                    kept.on_cohort = members.len();
+                    expose(&cohort, stream, &chosen, &done)?
                 }
             };
             work += exposed.work;
@@ -140,7 +141,8 @@ impl Tolerance<'_> {
 }
 
 struct Planner<'a> {
-    cohorts: &'a [Cohort<'a>; STEPS.len()],
+    cohort: &'a Cohort<'a>,
+    exact: &'a Cohort<'a>,
     law: &'a WindowLaw,
     peak: &'a PeakOptions,
     window: &'a Window<'a>,
@@ -165,37 +167,48 @@ impl Planner<'_> {
         let photons = handled * f64::from(stream.laser_cycles);
         let per_dead_time = per_cycle / window_s * stream.spads.dead_time.as_s();
         let blind = per_dead_time / (1.0 + per_dead_time / SPADS as f64);
-        let mut coarse = self.depth_m(0, pixel);
-        for (steps, per_period) in STEPS.iter().enumerate().take(STEPS.len() - 1) {
-            let pools = self.cohorts[steps].pools(stream, pixel.start, light);
-            let [ready, more] = PHOTONS_PER_JOINT;
-            let per_step = match pools {
-                Ok(true) => PHOTONS_PER_POOL,
-                _ => ready + more * blind * (*per_period as f64).sqrt(),
-            };
-            if (self.bins * per_period) as f64 * per_step >= photons {
-                return exact;
-            }
-            let fine = self.depth_m(steps + 1, pixel);
-            let (Some(a), Some(b)) = (coarse, fine) else {
-                return exact;
-            };
-            let bound_m = 2.0 * (a - b).abs();
-            if bound_m <= tolerance_m {
-                return (Choice::Cohort(steps), bound_m);
-            }
-            coarse = fine;
+        let [ready, more] = PHOTONS_PER_JOINT;
+        let per_bin = match self.cohort.pools(stream, pixel.start, light) {
+            Ok(true) => PHOTONS_PER_POOL,
+            Ok(false) => ready + more * blind,
+            Err(_) => return exact,
+        };
+        if self.bins as f64 * per_bin + PHOTONS_PER_LIGHT >= photons {
+            return exact;
         }
-        exact
+        match self.bound_m(pixel, light) {
+            Some(bound_m) if bound_m <= tolerance_m => (Choice::Cohort, bound_m),
+            _ => exact,
+        }
     }
 
-    /// The depth of mean counts, m; `None` where there is none, or where the cohort engine refuses.
-    fn depth_m(&self, steps: usize, pixel: &LitPixel) -> Option<f64> {
+    /// Bound on what the cohort engine adds to the depth of `pixel` on average, m; `None` where there is no depth, or where
+    /// it refuses.
+    fn bound_m(&self, pixel: &LitPixel, light: &PixelLight) -> Option<f64> {
+        let stream = self.stream.config();
+        let means = |cohort: &Cohort| cohort.expected(stream, pixel.start, light).ok();
+        let exact = means(self.exact)?;
+        let drawn_m = self.depth_m(pixel, &means(self.cohort)?)?;
+        let exact_m = self.depth_m(pixel, &exact)?;
+        // What is left of the error is worst where it has one sign before the peak and the other after it.
+        let (peak, _) = exact
+            .iter()
+            .enumerate()
+            .max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let tilted_m = [1.0, -1.0].map(|sign| {
+            let tilted = exact.iter().enumerate().map(|(bin, mean)| {
+                let sign = if bin <= peak { sign } else { -sign };
+                (mean + sign * BOUND_ERROR * mean.sqrt()).max(0.0)
+            });
+            self.depth_m(pixel, &tilted.collect::<Vec<_>>())
+        });
+        let left_m = tilted_m.map(|tilted_m| tilted_m.map(|tilted_m| (tilted_m - exact_m).abs()));
+        Some(2.0 * (drawn_m - exact_m).abs() + left_m[0]?.max(left_m[1]?))
+    }
+
+    /// The depth of mean counts, m; `None` where there is none.
+    fn depth_m(&self, pixel: &LitPixel, means: &[f64]) -> Option<f64> {
         let window = self.law.window(pixel.start).open()?;
-        let cohort = &self.cohorts[steps];
-        let means = cohort
-            .expected(self.stream.config(), pixel.start, &pixel.light?)
-            .ok()?;
         let scale = WHOLE_COUNTS / means.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let counts: Vec<u32> = means
             .iter()

@@ -27,7 +27,7 @@ pub fn run(
                 let p = absorbed(mean);
                 each_hit(p, random, |spad, random| {
                     let able = match fired[spad] {
-                        Some(before) => blindness.able((step - before) as usize),
+                        Some(before) => blindness.able(step as usize, (step - before) as usize),
                         None => 1.0,
                     };
                     let makes_pulse = random.uniform() < able;

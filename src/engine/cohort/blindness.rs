@@ -26,6 +26,8 @@ pub struct Blindness {
     pub law: DeadTimeLaw,
     /// Probability of being able to fire one, two, … steps after; certain beyond.
     able: SmallVec<[f64; FEW]>,
+    /// The same for each step of a window in turn, where it has been computed from the light.
+    by_step: Vec<f64>,
 }
 
 impl Blindness {
@@ -40,7 +42,19 @@ impl Blindness {
         while able.last().is_some_and(|&able| able == 1.0) {
             able.pop();
         }
-        Blindness { law, able }
+        Blindness {
+            law,
+            able,
+            by_step: Vec::new(),
+        }
+    }
+
+    /// The same dead time in light that makes SPADs able to fire so, by step and age.
+    pub fn in_light(&self, by_step: Vec<f64>) -> Self {
+        Blindness {
+            by_step,
+            ..self.clone()
+        }
     }
 
     /// Steps after which an avalanche is forgotten.
@@ -58,23 +72,35 @@ impl Blindness {
         }
     }
 
-    /// Probability of being able to fire `age` ≥ 1 steps after the last avalanche.
-    pub fn able(&self, age: usize) -> f64 {
-        self.able.get(age - 1).copied().unwrap_or(1.0)
+    /// Probability of being able to fire in step `step` of the window, `age` ≥ 1 steps after the last avalanche.
+    #[inline]
+    pub fn able(&self, step: usize, age: usize) -> f64 {
+        match self.able.get(age - 1) {
+            None => 1.0,
+            Some(&able) if self.by_step.is_empty() => able,
+            Some(_) => self.by_step[step * self.able.len() + age - 1],
+        }
+    }
+
+    /// How far [`Blindness::able`] may be from what it is in even light, `age` steps after, where photons come up to three
+    /// times as densely as on average in either step.
+    pub fn most_uneven(&self, age: usize) -> f64 {
+        let able = self.able[age - 1];
+        (9.0 * able.min(1.0 - able)).min(able.max(1.0 - able))
     }
 
     /// Probability that a photon, present with probability `p`, takes a SPAD of `age` back to age 0.
-    fn renews(&self, age: usize, p: f64) -> f64 {
+    fn renews(&self, step: usize, age: usize, p: f64) -> f64 {
         match self.law {
-            DeadTimeLaw::NonParalysable => p * self.able(age),
+            DeadTimeLaw::NonParalysable => p * self.able(step, age),
             DeadTimeLaw::Paralysable => p,
         }
     }
 
     /// The complement of [`Blindness::renews`]; `q` is 1 − `p`.
-    fn keeps(&self, age: usize, p: f64, q: f64) -> f64 {
+    fn keeps(&self, step: usize, age: usize, p: f64, q: f64) -> f64 {
         match self.law {
-            DeadTimeLaw::NonParalysable => q + p * (1.0 - self.able(age)),
+            DeadTimeLaw::NonParalysable => q + p * (1.0 - self.able(step, age)),
             DeadTimeLaw::Paralysable => q,
         }
     }
@@ -103,7 +129,7 @@ impl BlindSpad {
     /// Mean pulses a step in the steady state under `mean` photons a step. Relative error below 10⁻¹¹ from
     /// 10⁻¹⁵ to 10³ photons, for dead times to a thousand steps.
     pub fn steady_pulse(&self, mean: f64) -> f64 {
-        Ages::steady(&self.0, mean).pulse(&self.0, mean)
+        Ages::steady(&self.0, mean).pulse(&self.0, 0, mean)
     }
 }
 
@@ -126,6 +152,11 @@ impl Ages {
         }
     }
 
+    /// Makes those free that have no age.
+    pub fn fill_up(&mut self) {
+        self.free = (1.0 - self.aged.iter().sum::<f64>()).max(0.0);
+    }
+
     /// The steady state under `mean` photons a step.
     pub fn steady(blindness: &Blindness, mean: f64) -> Self {
         let (p, q) = photon_or_none(mean);
@@ -134,7 +165,7 @@ impl Ages {
         for age in 1..=blindness.memory() {
             aged.push(survives);
             sum += survives;
-            survives *= blindness.keeps(age, p, q);
+            survives *= blindness.keeps(0, age, p, q);
         }
         // What leaves the free state, p · free, is what returns to it, renewals · survives.
         let renewals = p / (p * sum + survives);
@@ -145,14 +176,14 @@ impl Ages {
         }
     }
 
-    /// One step with `mean` photons.
-    pub fn step(&mut self, blindness: &Blindness, mean: f64) {
+    /// Step `step` of the window, with `mean` photons.
+    pub fn step(&mut self, blindness: &Blindness, step: usize, mean: f64) {
         let (p, q) = photon_or_none(mean);
         let mut renewed = p * self.free;
         self.free *= q;
         for (index, age) in self.aged.iter_mut().enumerate() {
-            renewed += *age * blindness.renews(index + 1, p);
-            *age *= blindness.keeps(index + 1, p, q);
+            renewed += *age * blindness.renews(step, index + 1, p);
+            *age *= blindness.keeps(step, index + 1, p, q);
         }
         match self.aged.last_mut() {
             Some(oldest) => {
@@ -163,11 +194,11 @@ impl Ages {
         }
     }
 
-    /// Probability of a pulse in a step with `mean` photons.
-    pub fn pulse(&self, blindness: &Blindness, mean: f64) -> f64 {
+    /// Probability of a pulse in step `step` of the window, with `mean` photons.
+    pub fn pulse(&self, blindness: &Blindness, step: usize, mean: f64) -> f64 {
         let aged = self.aged.iter().enumerate();
         let able: f64 = aged
-            .map(|(index, age)| age * blindness.able(index + 1))
+            .map(|(index, age)| age * blindness.able(step, index + 1))
             .sum();
         absorbed(mean) * (self.free + able)
     }
@@ -184,7 +215,7 @@ mod tests {
     fn blindness_adds_up_to_the_dead_time_less_half_a_step() {
         for steps in [1.0, 1.3, 3.072, 7.999, 40.5] {
             let blindness = Blindness::new(DeadTimeLaw::NonParalysable, steps);
-            let sum: f64 = (1..100).map(|age| 1.0 - blindness.able(age)).sum();
+            let sum: f64 = (1..100).map(|age| 1.0 - blindness.able(0, age)).sum();
             assert!((sum - (steps - 0.5)).abs() < 1e-12, "{steps}: {sum}");
         }
     }
@@ -196,7 +227,7 @@ mod tests {
             let steady = Ages::steady(&blindness, mean);
             prop_assert!((steady.aged.iter().sum::<f64>() + steady.free - 1.0).abs() < 1e-12);
             let mut later = steady.clone();
-            later.step(&blindness, mean);
+            later.step(&blindness, 0, mean);
             for (a, b) in steady.aged.iter().zip(&later.aged) {
                 prop_assert!((a - b).abs() < 1e-12, "{steady:?} {later:?}");
             }
@@ -212,7 +243,7 @@ mod tests {
                 let mut able = vec![0.0; whole - 1];
                 able.truncate(whole - 1);
                 let able = able.into();
-                let blindness = Blindness { law, able };
+                let blindness = Blindness { law, able, by_step: Vec::new() };
                 let mut ages = Ages::rested(&blindness);
                 let mut pulses: Vec<f64> = Vec::new();
                 for (i, &mean) in means.iter().enumerate() {
@@ -221,10 +252,10 @@ mod tests {
                         DeadTimeLaw::NonParalysable => 1.0 - pulses[before].iter().sum::<f64>(),
                         DeadTimeLaw::Paralysable => libm::exp(-means[before].iter().sum::<f64>()),
                     };
-                    let pulse = ages.pulse(&blindness, mean);
+                    let pulse = ages.pulse(&blindness, 0, mean);
                     prop_assert!((pulse - expected).abs() < 1e-12, "{law:?} {i}: {pulse} {expected}");
                     pulses.push(pulse);
-                    ages.step(&blindness, mean);
+                    ages.step(&blindness, 0, mean);
                 }
             }
         }

@@ -251,7 +251,8 @@ impl<'a> Tree<'a> {
         while at != ROOT {
             let Node { parent, oldest, .. } = self.nodes[at as usize];
             let age = (self.step - oldest.step) as usize;
-            let able = self.blindness.able(age);
+            let step = self.step as usize - self.blindness.memory();
+            let able = self.blindness.able(step, age);
             let (class, p, q, able) = match self.blindness.law {
                 DeadTimeLaw::NonParalysable => (age, p * able, q + p * (1.0 - able), 1.0),
                 DeadTimeLaw::Paralysable => (FREE, p, q, able),

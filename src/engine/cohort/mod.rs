@@ -11,24 +11,30 @@
 //!
 //! What they share, and what it costs in exactness:
 //!
-//! * **Dead time in steps** (`blindness.rs`): [`CohortOptions::sub_bins`] steps to a CLK period, the error knob. The
-//!   probability of being blind is exact to first order in the photons on one SPAD in a step. Twice the steps leave
-//!   a quarter of the error: at one signal photon a laser cycle and 8 Mcounts/s, 4·10⁻³ of the mean of the worst bin
-//!   in one step, 2·10⁻⁴ in four.
+//! * **Dead time** (`fine.rs`): cohorts move in steps of a CLK period. How able a SPAD is to fire in one, by the step of its
+//!   last avalanche, is computed from the light on cells that are halved until the mean of every bin is known to within
+//!   [`CohortOptions::error`] of its counting noise, and refused where 256 cells to a CLK period do not do. In little light
+//!   it is as in even light, which a bound shows first ([`Cohort::is_even_enough`]). So means and each two successive
+//!   pulses of a SPAD have their probabilities; how three in successive dead times depend on each other within
+//!   a period is left out. [`CohortOptions::sub_bins`] overrides all that: so many steps to a CLK period, in each of
+//!   which light is taken to be even (`blindness.rs`); twice the steps leave a quarter of the error.
 //! * **Start.** A window begins with every SPAD in the state that the light before it leaves behind: the steady state
-//!   of the background, carried step by step through an echo where one comes before the window. It is a
+//!   of the background, carried through an echo where one comes before the window. It is a
 //!   probability for each age of one SPAD, computed, not drawn.
-//! * **Memory.** Laser cycles are taken to be independent. They are unless a SPAD stays busy from one window to the
-//!   next: without a dead time's length free of photons it cannot be told whether it has recovered.
-//!   The probability of that, over all SPADs and cycles, is bounded; beyond [`CohortOptions::memory`]
-//!   the engine refuses. Cycles so early that the first STOP edge is still remembered are run one by one from rest.
+//! * **Memory.** Laser cycles are taken to be independent (`cycles.rs`). They are unless a SPAD stays busy from one window
+//!   to the next; the probability of that, over all SPADs and cycles, is bounded, and beyond [`CohortOptions::memory`]
+//!   the engine refuses.
 //! * A SPAD is to fire at most once in a CLK period: a shorter dead time is refused. So are afterpulses, crosstalk and
 //!   measured laser pulses.
+//!
+//! So an exposure takes one step a bin, whatever light there is, and at most as many states as it has laser cycles.
 
 mod abreast;
 mod alone;
 mod blindness;
+mod cycles;
 mod draw;
+mod fine;
 mod hits;
 mod joint;
 mod light;
@@ -38,21 +44,20 @@ mod pooled;
 mod rejection;
 mod words;
 
-use std::ops::Range;
 use std::sync::OnceLock;
 
 use smallvec::{SmallVec, smallvec};
 
 pub use self::blindness::BlindSpad;
-use self::blindness::{Ages, Blindness};
+use self::blindness::Blindness;
+use self::cycles::{Class, LikeCycles, Scene};
 pub use self::draw::none_of;
-use self::hits::Hits;
 pub use self::hits::at_least_hit;
-use self::light::{SpadLight, absorbed};
+use self::light::SpadLight;
 use self::words::RandomWords;
 use super::{Engine, EngineError, Exposed, LitPixel, Work, follows};
-use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw, correlation, histogram, window_law};
-use crate::photon::{PhotonStream, PixelLight, SPADS, SpadEvent, StreamConfig};
+use crate::chip::{Exposure, SensorConfig, WindowLaw, correlation, histogram, window_law};
+use crate::photon::{DeadTimeLaw, PhotonStream, PixelLight, SPADS, SpadEvent, StreamConfig};
 
 /// Whether 0, 1, 2, … SPADs that fire in a CLK period make an event.
 type EventTable = [bool; SPADS + 1];
@@ -75,8 +80,11 @@ struct Steps {
 /// The engine's knobs: what may be left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CohortOptions {
-    /// Steps to a CLK period, at least 1. More make the dead time's end finer and cost more.
-    pub sub_bins: usize,
+    /// Steps to a CLK period, at least 1, in which the dead time is followed as in even light; `None`, the default, for
+    /// one, with what SPADs do in it computed as finely as [`CohortOptions::error`] takes.
+    pub sub_bins: Option<usize>,
+    /// Largest error of a bin's mean, in standard deviations of its count over the exposure.
+    pub error: f64,
     /// Largest correlation between two bins that may be neglected to save time; 0 never neglects any.
     pub neglect: f64,
     /// Largest probability, for a whole exposure of a macropixel, that laser cycles depend on each other.
@@ -86,7 +94,8 @@ pub struct CohortOptions {
 impl Default for CohortOptions {
     fn default() -> Self {
         CohortOptions {
-            sub_bins: 1,
+            sub_bins: None,
+            error: 0.1,
             neglect: 1e-4,
             memory: 1e-6,
         }
@@ -96,9 +105,6 @@ impl Default for CohortOptions {
 /// SPADs that are worth following one by one in a CLK period, for each of its steps, before [`joint`] is the cheaper
 /// way.
 const WORTH_LOOKING_AT: f64 = 200.0;
-
-/// What is left of a state that counts as forgotten.
-const FORGOTTEN: f64 = 1e-15;
 
 /// Draws histograms from their distribution.
 pub struct Cohort<'a> {
@@ -123,7 +129,7 @@ struct Opening {
 impl<'a> Cohort<'a> {
     /// An engine for this sensor and exposure.
     pub fn new(config: &'a SensorConfig, exposure: &'a Exposure, options: CohortOptions) -> Self {
-        debug_assert!(options.sub_bins >= 1, "a period has a step");
+        debug_assert!(options.sub_bins != Some(0), "a period has a step");
         let is_event = std::array::from_fn(|fired| {
             let spads = ((1u32 << fired) - 1) as u16;
             correlation::model(spads, config.event_type, config.threshold)
@@ -154,7 +160,8 @@ impl<'a> Cohort<'a> {
     /// everything given.
     ///
     /// # Errors
-    /// Races of the window law, a dead time below a CLK period, and laser cycles that depend on each other.
+    /// Races of the window law, a dead time below a CLK period, laser cycles that depend on each other, and light in which
+    /// [`CohortOptions::error`] cannot be kept.
     pub fn draw(
         &self,
         stream: &StreamConfig,
@@ -194,13 +201,14 @@ impl<'a> Cohort<'a> {
             return Ok(sums);
         };
         let random = &mut RandomWords::new(stream.seed, pixel);
-        let (blindness, is_event) = (&cohorts.blindness, &self.is_event);
+        let is_event = &self.is_event;
         for LikeCycles {
             cycles,
+            blindness,
             ages,
             steps,
             not_compared,
-        } in cohorts.iter()
+        } in &cohorts
         {
             let counts = match cycles {
                 0 => continue,
@@ -235,11 +243,10 @@ impl<'a> Cohort<'a> {
         light: &PixelLight,
     ) -> Result<bool, EngineError> {
         let cohorts = self.cohorts(stream, start, light)?;
-        Ok(cohorts.is_none_or(
-            |Cohorts {
-                 blindness, settled, ..
-             }| { self.is_pooled(&blindness, &settled.steps, settled.cycles) },
-        ))
+        let most = |cohorts: Vec<LikeCycles>| cohorts.into_iter().max_by_key(|like| like.cycles);
+        Ok(cohorts
+            .and_then(most)
+            .is_none_or(|like| self.is_pooled(&like.blindness, &like.steps, like.cycles)))
     }
 
     /// Mean of every bin of [`Cohort::hits`], computed.
@@ -252,28 +259,26 @@ impl<'a> Cohort<'a> {
         start: u16,
         light: &PixelLight,
     ) -> Result<Vec<f64>, EngineError> {
-        let mut means = vec![0.0; self.config.bins];
+        let mut sums = vec![0.0; self.config.bins];
         let Some(cohorts) = self.cohorts(stream, start, light)? else {
-            return Ok(means);
+            return Ok(sums);
         };
-        for cohort in cohorts.iter() {
-            let mut ages = cohort.ages.clone();
-            let periods = cohort.steps.means.chunks(cohort.steps.per_period);
-            for (bin, (sum, period)) in means.iter_mut().zip(periods).enumerate() {
+        for like in &cohorts {
+            let mut ages = like.ages.clone();
+            let mut means = like.steps.means.iter().enumerate();
+            for (bin, sum) in sums.iter_mut().enumerate() {
                 let mut pulse = 0.0;
-                for &mean in period {
-                    pulse += ages.pulse(&cohorts.blindness, mean);
-                    ages.step(&cohorts.blindness, mean);
+                for (step, &mean) in means.by_ref().take(like.steps.per_period) {
+                    pulse += ages.pulse(&like.blindness, step, mean);
+                    ages.step(&like.blindness, step, mean);
                 }
-                let fired = Hits::new(SPADS, pulse, 1.0 - pulse);
-                let events = (0..=SPADS).filter(|&spads| self.is_event[spads]);
-                let event: f64 = events.map(|spads| fired.exactly(spads)).sum();
-                if bin >= cohort.not_compared {
-                    *sum += cohort.cycles as f64 * event;
+                if bin >= like.not_compared {
+                    let [event, _] = fine::event(&self.is_event, pulse);
+                    *sum += like.cycles as f64 * event;
                 }
             }
         }
-        Ok(means)
+        Ok(sums)
     }
 
     /// The laser cycles of an exposure by what they have in common; `None` where no window opens.
@@ -282,8 +287,7 @@ impl<'a> Cohort<'a> {
         stream: &StreamConfig,
         start: u16,
         light: &PixelLight,
-    ) -> Result<Option<Cohorts>, EngineError> {
-        let bins = self.config.bins;
+    ) -> Result<Option<Vec<LikeCycles>>, EngineError> {
         follows(self.config, &self.law.timing().pulses)?;
         let Opening { window, from_fs } = self.opening(start);
         let window = match window {
@@ -302,69 +306,82 @@ impl<'a> Cohort<'a> {
         if let Some((_, what)) = refusals.into_iter().find(|(refuses, _)| *refuses) {
             return Err(EngineError::NotInCohorts(what));
         }
-        let dead_steps = dead_fs / period_fs * self.options.sub_bins as f64;
-        let light = SpadLight::new(stream, light);
-        let scene = Scene {
-            light,
-            busy: absorbed(light.background(dead_fs)),
-            blindness: Blindness::new(stream.spads.law, dead_steps),
-            step_fs: period_fs / self.options.sub_bins as f64,
-            dead_fs,
-            from_fs,
-            cycle_fs: period_fs * f64::from(stream.stop_periods),
-        };
-        let cycles = i64::from(self.exposure.laser_cycles);
-        let between_fs = scene.cycle_fs - bins as f64 * period_fs;
-        let memory = scene.remembers(between_fs) * SPADS as f64 * cycles as f64;
-        if cycles > 1 && memory > self.options.memory {
-            return Err(EngineError::Memory(memory));
-        }
-
-        // A conventional cycle is latched by the STOP edge that ends it; the exposure's first one ends one, too.
-        let first_cycle = match self.config.mode {
-            Mode::Guided => 0,
-            Mode::Conventional => -1,
-        };
-        let settled = |cycle: i64| {
-            let since_fs = cycle as f64 * scene.cycle_fs + scene.from_fs;
-            scene.remembers(since_fs) * SPADS as f64 <= self.options.memory
-        };
-        let early = (first_cycle..cycles)
-            .take_while(|&cycle| !settled(cycle))
-            .map(|cycle| {
-                let dark_until_fs = -(cycle as f64) * scene.cycle_fs;
-                // The pipeline starts empty: nothing before rising edge -1 was ever compared.
-                let first_edge = cycle * i64::from(self.exposure.stop_periods) + window.first_edge;
-                LikeCycles {
-                    cycles: 1,
-                    ages: scene.rested_start(dark_until_fs),
-                    steps: self.steps(&scene, dark_until_fs),
-                    not_compared: (-1 - first_edge).clamp(0, bins as i64) as usize,
-                }
-            });
-        let early: Vec<LikeCycles> = early.collect();
-        let settled = LikeCycles {
-            cycles: (cycles - first_cycle) as u64 - early.len() as u64,
-            ages: scene.steady_start(),
-            steps: self.steps(&scene, f64::NEG_INFINITY),
-            not_compared: 0,
-        };
-        Ok(Some(Cohorts {
-            blindness: scene.blindness,
-            early,
-            settled,
-        }))
+        let scene = Scene::new(
+            SpadLight::new(stream, light),
+            [dead_fs, period_fs],
+            [from_fs, stream.cycle_s() * 1e15],
+            self.config.bins,
+        );
+        let classes =
+            scene.classes(self.config, self.exposure, window.first_edge, &self.options)?;
+        let like = |class| self.like_cycles(&scene, stream.spads.law, class);
+        classes.iter().map(like).collect::<Result<_, _>>().map(Some)
     }
 
-    fn steps(&self, scene: &Scene, dark_until_fs: f64) -> Steps {
-        let per_period = self.options.sub_bins;
-        let count = self.config.bins * per_period;
-        Steps {
-            means: scene
-                .light
-                .steps(scene.from_fs, scene.step_fs, count, dark_until_fs),
-            per_period,
+    /// The state, light and dead time of a class of laser cycles, as finely as they have to be known.
+    fn like_cycles(
+        &self,
+        scene: &Scene,
+        law: DeadTimeLaw,
+        class: &Class,
+    ) -> Result<LikeCycles, EngineError> {
+        let per_period = self.options.sub_bins.unwrap_or(1);
+        let step_fs = scene.period_fs / per_period as f64;
+        let blindness = Blindness::new(law, scene.dead_fs / step_fs);
+        let steps = scene.steps(per_period, &class.extent);
+        let as_in_even_light = self.options.sub_bins.is_some()
+            || self.is_even_enough(scene, &blindness, class, &steps);
+        let (blindness, ages) = if as_in_even_light {
+            let ages = scene.start(&blindness, class, step_fs);
+            (blindness, ages)
+        } else {
+            let error = self.options.error;
+            let fine = fine::solve(scene, &blindness, class, &self.is_event, error)?;
+            (blindness.in_light(fine.able), fine.ages)
+        };
+        Ok(LikeCycles {
+            cycles: class.cycles,
+            blindness,
+            ages,
+            steps,
+            not_compared: class.not_compared,
+        })
+    }
+
+    /// Whether a bound shows that taking light to be even within a CLK period keeps the error, for events of any SPAD.
+    ///
+    /// With μ photons on a SPAD in a CLK period, 16·μ·μ′·|Δ| of the events of a bin are amiss where a SPAD that was hit by
+    /// μ′ before is able with another probability, by Δ, than in even light; and what two photons before do, (Σμ′)²/2 of
+    /// them, may be wrong altogether.
+    fn is_even_enough(
+        &self,
+        scene: &Scene,
+        blindness: &Blindness,
+        class: &Class,
+        steps: &Steps,
+    ) -> bool {
+        let any_spad = |(spads, &is_event): (usize, &bool)| is_event == (spads > 0);
+        if !self.is_event.iter().enumerate().all(any_spad) {
+            return false;
         }
+        let Some(past) = scene.even_past(blindness.memory(), class) else {
+            return false;
+        };
+        let memory = past.len();
+        let photons: SmallVec<[f64; 2 * FEW_STEPS]> =
+            past.iter().chain(&steps.means).copied().collect();
+        let allowed = self.options.error * self.options.error / class.cycles as f64;
+        photons[memory..].iter().enumerate().all(|(bin, &now)| {
+            let (mut uneven, mut all) = (0.0, now);
+            for (age, before) in (1..).zip(photons[bin..bin + memory].iter().rev()) {
+                uneven += blindness.most_uneven(age) * before;
+                all += before;
+            }
+            let events = SPADS as f64 * now;
+            let off = events * (uneven + 0.5 * all * all);
+            let at_least = events * (1.0 - all - 0.5 * events);
+            off * off <= allowed * at_least * (1.0 - events).max(0.0)
+        })
     }
 }
 
@@ -400,91 +417,5 @@ impl Engine for Cohort<'_> {
             };
         }
         Ok(exposed)
-    }
-}
-
-/// A macropixel's laser cycles.
-struct Cohorts {
-    blindness: Blindness,
-    /// Those that may remember the first STOP edge, one by one.
-    early: Vec<LikeCycles>,
-    settled: LikeCycles,
-}
-
-impl Cohorts {
-    fn iter(&self) -> impl Iterator<Item = &LikeCycles> {
-        self.early.iter().chain([&self.settled])
-    }
-}
-
-/// Laser cycles with the same light and the same state at the start of the window.
-struct LikeCycles {
-    cycles: u64,
-    ages: Ages,
-    steps: Steps,
-    /// First bins that the pipeline has not reached yet.
-    not_compared: usize,
-}
-
-/// Light and dead time around one macropixel's window. Times in femtoseconds from its laser cycle's STOP edge.
-struct Scene {
-    light: SpadLight,
-    blindness: Blindness,
-    step_fs: f64,
-    dead_fs: f64,
-    from_fs: f64,
-    cycle_fs: f64,
-    /// Probability of a background photon on a SPAD within a dead time.
-    busy: f64,
-}
-
-impl Scene {
-    /// Bound on the probability that a SPAD has no dead time's length without photons in `duration_fs`, one echo in it
-    /// included: that it cannot be told whether it has recovered.
-    fn remembers(&self, duration_fs: f64) -> f64 {
-        let echo = self.light.echo(0.0);
-        let (echo_fs, cuts) = echo.map_or((0.0, 0.0), |echo| (echo.end - echo.start, 1.0));
-        let stretches = ((duration_fs - echo_fs) / self.dead_fs - cuts).floor();
-        self.busy.powi(stretches.clamp(0.0, 1e9) as i32)
-    }
-
-    /// The state at the start of the window in a settled laser cycle.
-    fn steady_start(&self) -> Ages {
-        let background = self.light.background(self.step_fs);
-        let steady = Ages::steady(&self.blindness, background);
-        let is_remembered = |echo: &Range<f64>| {
-            let stretches = ((self.from_fs - echo.end) / self.dead_fs).clamp(0.0, 1e9);
-            self.busy.powi(stretches as i32) > FORGOTTEN
-        };
-        let own_cycle = (self.from_fs / self.cycle_fs).floor();
-        let echoes = [own_cycle - 1.0, own_cycle].map(|cycle| self.light.echo(cycle));
-        let earliest = echoes
-            .into_iter()
-            .flatten()
-            .filter(|echo| echo.start < self.from_fs && is_remembered(echo))
-            .map(|echo| echo.start)
-            .reduce(f64::min);
-        match earliest {
-            Some(since) => self.carried(steady, since, f64::NEG_INFINITY),
-            None => steady,
-        }
-    }
-
-    /// The state at the start of a window after rest until `since_fs`.
-    fn rested_start(&self, since_fs: f64) -> Ages {
-        self.carried(Ages::rested(&self.blindness), since_fs, since_fs)
-    }
-
-    /// The state at the start of the window, when it was `ages` at `since_fs`.
-    fn carried(&self, mut ages: Ages, since_fs: f64, dark_until_fs: f64) -> Ages {
-        let count = ((self.from_fs - since_fs) / self.step_fs).ceil().max(0.0);
-        let from_fs = self.from_fs - count * self.step_fs;
-        for mean in self
-            .light
-            .steps(from_fs, self.step_fs, count as usize, dark_until_fs)
-        {
-            ages.step(&self.blindness, mean);
-        }
-        ages
     }
 }

@@ -129,9 +129,16 @@ impl Period<'_> {
         }
     }
 
-    /// What becomes of a SPAD that fired `age` ≥ 1 steps before this period and gets a photon in it.
+    /// What becomes of a SPAD that fired `age` ≥ 1 steps before this period, which begins with step `first` of the window,
+    /// and gets a photon in it.
     #[inline(always)]
-    pub fn meet(&self, age: usize, blindness: &Blindness, random: &mut RandomWords) -> Meeting {
+    pub fn meet(
+        &self,
+        first: usize,
+        age: usize,
+        blindness: &Blindness,
+        random: &mut RandomWords,
+    ) -> Meeting {
         let mut meeting = Meeting {
             pulses: false,
             renewed: None,
@@ -147,7 +154,7 @@ impl Period<'_> {
             }
             is_hit = true;
             let since = meeting.renewed.map_or(age + step, |renewed| step - renewed);
-            let able = blindness.able(since);
+            let able = blindness.able(first + step, since);
             let pulses = able > 0.0 && random.coarse() < able;
             meeting.pulses |= pulses;
             if pulses || blindness.law == DeadTimeLaw::Paralysable {
@@ -234,7 +241,7 @@ mod tests {
                 let mut thrown = told;
                 let place = |renewed: Option<usize>| renewed.map_or(0, |step| step + 1);
                 for _ in 0..TRIALS {
-                    let meeting = period.meet(age, &blindness, &mut random);
+                    let meeting = period.meet(0, age, &blindness, &mut random);
                     told[usize::from(meeting.pulses)][place(meeting.renewed)] += 1;
                     loop {
                         let photons = p.map(|p| random.uniform() < p);
@@ -244,7 +251,7 @@ mod tests {
                         let (mut since, mut pulses, mut renewed) = (age, false, None);
                         for (step, _) in photons.iter().enumerate().filter(|(_, comes)| **comes) {
                             let now = renewed.map_or(since + step, |from| step - from);
-                            let fires = random.uniform() < blindness.able(now);
+                            let fires = random.uniform() < blindness.able(0, now);
                             pulses |= fires;
                             if fires || law == DeadTimeLaw::Paralysable {
                                 renewed = Some(step);

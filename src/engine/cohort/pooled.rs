@@ -317,6 +317,7 @@ impl<'a> Pool<'a> {
     ) -> u64 {
         let (blindness, memory) = (self.blindness, self.blindness.memory());
         let groups = 1 + memory - self.surely_blind;
+        let first = self.now - memory;
         // One vector is the common case, and stays in registers.
         let (mut few, mut many): ([_; 1], SmallVec<[[f64; VECTOR]; 4]>);
         let missed = match groups <= VECTOR {
@@ -340,7 +341,7 @@ impl<'a> Pool<'a> {
             let met = *fired - count(missed[1] - missed[0]);
             others -= met;
             for _ in 0..met {
-                let meeting = period.meet(memory - step, blindness, random);
+                let meeting = period.meet(first, memory - step, blindness, random);
                 if let Some(step) = meeting.renewed {
                     renewed[step] += 1;
                     *fired -= 1;

@@ -313,7 +313,7 @@ impl Trial {
             return Ok(chunks.into_iter().flatten().map(widen).collect());
         };
         let options = CohortOptions {
-            sub_bins,
+            sub_bins: Some(sub_bins),
             ..CohortOptions::default()
         };
         let engine = Cohort::new(&sensor, &exposure, options);

@@ -1,0 +1,249 @@
+//! The laser cycles of an exposure by what they have in common: light, and the state in which their windows begin.
+//!
+//! ```text
+//!   laser cycle   0    1    2    …                      N−2  N−1
+//!                 ╰─ early ─╯   ╰─ settled, all alike ─╯   ╰─ late
+//! ```
+//!
+//! Early ones may remember the first STOP edge, or lack an echo that a cycle before the exposure would have sent; late
+//! ones lack that of a cycle after it. All others are alike, unless a SPAD stays busy from one window to the next:
+//! without a dead time's length free of photons it cannot be told whether it has recovered. The probability of that
+//! is bounded by going back from a window, dead time by dead time ([`Scene::busy_back_to`]).
+
+use smallvec::SmallVec;
+
+use super::blindness::{Ages, Blindness};
+use super::light::{Extent, SpadLight, absorbed};
+use super::{CohortOptions, FEW_STEPS, Steps};
+use crate::chip::{Exposure, Mode, SensorConfig};
+use crate::engine::EngineError;
+use crate::photon::SPADS;
+
+/// What is left of a state that counts as forgotten.
+const FORGOTTEN: f64 = 1e-15;
+
+/// Dead times gone back at most. Light that keeps SPADs busy for longer is refused where laser cycles meet.
+const FARTHEST: f64 = 1000.0;
+
+/// Laser cycles with the same light and the same state at the start of the window.
+pub struct LikeCycles {
+    pub cycles: u64,
+    pub blindness: Blindness,
+    pub ages: Ages,
+    pub steps: Steps,
+    /// First bins that the pipeline has not reached yet.
+    pub not_compared: usize,
+}
+
+/// Light and dead time around one macropixel's window. Times in femtoseconds from its laser cycle's STOP edge.
+pub struct Scene {
+    pub light: SpadLight,
+    pub dead_fs: f64,
+    pub period_fs: f64,
+    pub from_fs: f64,
+    pub bins: usize,
+    pub cycle_fs: f64,
+    /// Probability of a background photon on a SPAD within a dead time.
+    busy: f64,
+}
+
+/// How far a window looks back.
+#[derive(Debug, Clone, Copy)]
+struct Back {
+    /// Bound on the probability that a SPAD has seen no dead time's length without photons since then.
+    busy: f64,
+    /// How long before the window.
+    for_fs: f64,
+}
+
+/// How a settled laser cycle's neighbours begin.
+#[derive(Debug, Clone)]
+pub enum Before {
+    /// Dark until then: every SPAD is ready.
+    Dark(f64),
+    /// Background for ever, and echoes from then on.
+    Steady(f64),
+}
+
+/// A class of laser cycles, before anything is computed of it.
+pub struct Class {
+    pub cycles: u64,
+    pub extent: Extent,
+    pub before: Before,
+    pub not_compared: usize,
+}
+
+impl Scene {
+    /// Lengths of a dead time and of a CLK period, the start of the window and the length of a laser cycle, fs.
+    pub fn new(
+        light: SpadLight,
+        [dead_fs, period_fs]: [f64; 2],
+        [from_fs, cycle_fs]: [f64; 2],
+        bins: usize,
+    ) -> Self {
+        Scene {
+            busy: absorbed(light.background(dead_fs)),
+            light,
+            dead_fs,
+            period_fs,
+            from_fs,
+            bins,
+            cycle_fs,
+        }
+    }
+
+    /// End of the window.
+    pub fn until_fs(&self) -> f64 {
+        self.from_fs + self.bins as f64 * self.period_fs
+    }
+
+    /// Goes back from the start of the window by dead times, until `enough` is known or `for_fs` is over: a SPAD that sees
+    /// no photon in one of them is ready after it, whatever was before.
+    fn busy_back_to(&self, for_fs: f64, enough: f64) -> Back {
+        let most = (for_fs / self.dead_fs).floor().clamp(0.0, FARTHEST);
+        // The logarithm of 0 is −∞, that of 1 is 0: one dead time, and as many as there are.
+        let dead_times = -libm::log(enough) / -libm::log(self.busy);
+        let alone = dead_times.ceil().max(1.0).min(most);
+        let reach = self.from_fs - alone * self.dead_fs..self.from_fs;
+        if self.light.echoes_in(reach).is_empty() {
+            return Back {
+                busy: self.busy.powi(alone as i32),
+                for_fs: alone * self.dead_fs,
+            };
+        }
+        // Echoes of all laser cycles, sent or not: more light makes the bound no smaller.
+        let (mut busy, mut stretches) = (1.0, 0.0);
+        while busy > enough && stretches < most {
+            stretches += 1.0;
+            let from_fs = self.from_fs - stretches * self.dead_fs;
+            let endless = Extent::of_echoes(self.light.echoes_in(from_fs..from_fs + self.dead_fs));
+            busy *= absorbed(self.light.steps(from_fs, self.dead_fs, 1, &endless)[0]);
+        }
+        Back {
+            busy,
+            for_fs: stretches * self.dead_fs,
+        }
+    }
+
+    /// The laser cycles of an exposure.
+    ///
+    /// # Errors
+    /// Laser cycles that depend on each other.
+    pub fn classes(
+        &self,
+        config: &SensorConfig,
+        exposure: &Exposure,
+        first_edge: i64,
+        options: &CohortOptions,
+    ) -> Result<SmallVec<[Class; 1]>, EngineError> {
+        let cycles = i64::from(exposure.laser_cycles);
+        let for_one = options.memory / SPADS as f64;
+        let enough = FORGOTTEN.min(for_one / cycles as f64);
+        let between_fs = self.cycle_fs - self.bins as f64 * self.period_fs;
+        let back = self.busy_back_to(f64::INFINITY, enough);
+        if cycles > 1 && (back.for_fs > between_fs || back.busy > enough) {
+            let busy = self.busy_back_to(between_fs, enough).busy * SPADS as f64 * cycles as f64;
+            if busy > options.memory {
+                return Err(EngineError::Memory(busy));
+            }
+        }
+
+        // A conventional cycle is latched by the STOP edge that ends it; the exposure's first one ends one, too.
+        let first = match config.mode {
+            Mode::Guided => 0,
+            Mode::Conventional => -1,
+        };
+        let is_settled = |cycle: i64| {
+            let since_fs = cycle as f64 * self.cycle_fs + self.from_fs;
+            since_fs >= back.for_fs || self.busy_back_to(since_fs, for_one).busy <= for_one
+        };
+        let mut settled_from = first;
+        while settled_from < cycles && !is_settled(settled_from) {
+            settled_from += 1;
+        }
+        let since_fs = self.from_fs - back.for_fs;
+        let reaching = self.light.echoes_in(since_fs..self.until_fs());
+        // Echo k, counted from laser cycle n, is sent if 0 ≤ n + k < N.
+        let mut ends: SmallVec<[i64; 8]> = (first..settled_from).collect();
+        ends.extend(reaching.clone().flat_map(|k| [-k, cycles - k]));
+        ends.push(settled_from);
+        ends.push(cycles - ((self.until_fs() / self.cycle_fs).ceil() as i64 - 1).clamp(0, cycles));
+        ends.retain(|end| (first..cycles).contains(end));
+        ends.push(cycles);
+        ends.sort_unstable();
+        ends.dedup();
+        let classes = ends.windows(2).map(|ends| {
+            let cycle = ends[0];
+            let is_settled = cycle >= settled_from;
+            let starts_fs = -(cycle as f64) * self.cycle_fs;
+            let sent = reaching.start.max(-cycle)..reaching.end.min(cycles - cycle);
+            let start_fs = if is_settled {
+                f64::NEG_INFINITY
+            } else {
+                starts_fs
+            };
+            // The pipeline starts empty: nothing before rising edge -1 was ever compared.
+            let edge = cycle * i64::from(exposure.stop_periods) + first_edge;
+            let earliest = sent.clone().next().map(|k| self.light.echo(k).start);
+            let echoes_from = earliest.map_or(self.from_fs, |earliest| earliest.max(since_fs));
+            Class {
+                cycles: (ends[1] - ends[0]) as u64,
+                extent: Extent {
+                    lit_fs: start_fs..starts_fs + cycles as f64 * self.cycle_fs,
+                    echoes: sent,
+                },
+                before: match is_settled {
+                    true => Before::Steady(echoes_from),
+                    false => Before::Dark(starts_fs),
+                },
+                not_compared: (-1 - edge).clamp(0, self.bins as i64) as usize,
+            }
+        });
+        Ok(classes.collect())
+    }
+
+    /// The state at the start of the window in steps of `step_fs`.
+    pub fn start(&self, blindness: &Blindness, class: &Class, step_fs: f64) -> Ages {
+        let (mut ages, since_fs) = match class.before {
+            Before::Dark(until_fs) => (Ages::rested(blindness), until_fs),
+            Before::Steady(until_fs) => {
+                let background = self.light.background(step_fs);
+                (Ages::steady(blindness, background), until_fs)
+            }
+        };
+        let count = ((self.from_fs - since_fs) / step_fs).ceil().max(0.0);
+        if count > 0.0 {
+            let from_fs = self.from_fs - count * step_fs;
+            for mean in self
+                .light
+                .steps(from_fs, step_fs, count as usize, &class.extent)
+            {
+                ages.step(blindness, 0, mean);
+            }
+        }
+        ages
+    }
+
+    /// The light on the window.
+    pub fn steps(&self, per_period: usize, extent: &Extent) -> Steps {
+        let (step_fs, count) = (self.period_fs / per_period as f64, self.bins * per_period);
+        Steps {
+            means: self.light.steps(self.from_fs, step_fs, count, extent),
+            per_period,
+        }
+    }
+
+    /// The light on as many CLK periods before the window, if neither there nor in the window it is far from even within
+    /// one: no echo is shorter, none is missing, and the exposure has long begun.
+    pub fn even_past(&self, periods: usize, class: &Class) -> Option<SmallVec<[f64; FEW_STEPS]>> {
+        let from_fs = self.from_fs - periods as f64 * self.period_fs;
+        let has_echo = !self.light.echoes_in(from_fs..self.until_fs()).is_empty();
+        let is_narrow = has_echo && 2.0 * self.light.sigma_fs() < self.period_fs;
+        let is_lit =
+            class.extent.lit_fs.start <= from_fs && class.extent.lit_fs.end >= self.until_fs();
+        (is_lit && !is_narrow).then(|| {
+            self.light
+                .steps(from_fs, self.period_fs, periods, &class.extent)
+        })
+    }
+}
