@@ -173,6 +173,14 @@ impl Case<'_> {
         stream
     }
 
+    /// Seeds of the comparison: photons thrown one by one take their time.
+    fn seeds(&self) -> u64 {
+        match self.photons {
+            Photons::Stream => seeds(),
+            Photons::Thrown => seeds() / 4,
+        }
+    }
+
     /// Compares both engines; differences in standard errors may not exceed what their number lets expect.
     fn agrees(&self) {
         let exposure = Exposure::new(&self.sensor, self.stop_periods, self.laser_cycles);
@@ -187,7 +195,7 @@ impl Case<'_> {
             start: self.start,
             light: Some(self.light),
         };
-        let by_photons = (0..seeds())
+        let by_photons = (0..self.seeds())
             .into_par_iter()
             .fold(
                 || empty.clone(),
@@ -211,7 +219,7 @@ impl Case<'_> {
                 },
             )
             .reduce(|| empty.clone(), Moments::merge);
-        let drawn = (0..4 * seeds())
+        let drawn = (0..4 * self.seeds())
             .into_par_iter()
             .fold(
                 || empty.clone(),
@@ -565,6 +573,44 @@ fn blinding_echoes_and_the_tails_behind_them() {
             }
             .agrees();
         }
+    }
+}
+
+/// Each of 1 %, and both of 5 % where they show more.
+#[test]
+fn afterpulses_and_crosstalk() {
+    for (name, probability, afterpulse_time_ns, signal_per_cycle, background_hz) in [
+        ("daylight", 0.01, 5.0, 0.8, 40e6),
+        ("dusk, slow traps", 0.05, 30.0, 0.3, 4e6),
+        ("saturating echo", 0.01, 5.0, 60.0, 200e6),
+        ("5 %", 0.05, 5.0, 5.0, 80e6),
+    ] {
+        let sensor = SensorConfig {
+            afterpulse_probability: probability,
+            afterpulse_time_ns,
+            crosstalk_probability: probability,
+            ..SensorConfig::default()
+        };
+        let light = PixelLight {
+            signal_per_cycle,
+            background_hz,
+            ..case().light
+        };
+        let name = format!("secondaries, {name}");
+        Case {
+            name: &name,
+            sensor,
+            light,
+            stop_periods: 400,
+            laser_cycles: 12,
+            photons: Photons::Thrown,
+            options: CohortOptions {
+                memory: 1.0,
+                ..CohortOptions::default()
+            },
+            ..case()
+        }
+        .agrees();
     }
 }
 

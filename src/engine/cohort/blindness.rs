@@ -140,7 +140,7 @@ pub struct Ages {
     /// Entry a: last avalanche a + 1 steps ago.
     pub aged: SmallVec<[f64; FEW]>,
     /// No avalanche that still matters.
-    free: f64,
+    pub free: f64,
 }
 
 impl Ages {

@@ -39,6 +39,8 @@ pub struct LikeCycles {
 pub struct Scene {
     pub light: SpadLight,
     pub dead_fs: f64,
+    /// How long after a dead time its avalanche may have caused another one.
+    pub pending_fs: f64,
     pub period_fs: f64,
     pub from_fs: f64,
     pub bins: usize,
@@ -74,10 +76,10 @@ pub struct Class {
 }
 
 impl Scene {
-    /// Lengths of a dead time and of a CLK period, the start of the window and the length of a laser cycle, fs.
+    /// Lengths of a dead time, of what an avalanche may cause after it, and of a CLK period, the start of the window and the length of a laser cycle, fs.
     pub fn new(
         light: SpadLight,
-        [dead_fs, period_fs]: [f64; 2],
+        [dead_fs, pending_fs, period_fs]: [f64; 3],
         [from_fs, cycle_fs]: [f64; 2],
         bins: usize,
     ) -> Self {
@@ -85,6 +87,7 @@ impl Scene {
             busy: absorbed(light.background(dead_fs)),
             light,
             dead_fs,
+            pending_fs,
             period_fs,
             from_fs,
             bins,
@@ -98,9 +101,11 @@ impl Scene {
     }
 
     /// Goes back from the start of the window by dead times, until `enough` is known or `for_fs` is over: a SPAD that sees
-    /// no photon in one of them is ready after it, whatever was before.
+    /// no photon in one of them is ready after it, whatever was before, but for what is pending.
     fn busy_back_to(&self, for_fs: f64, enough: f64) -> Back {
-        let most = (for_fs / self.dead_fs).floor().clamp(0.0, FARTHEST);
+        let most = ((for_fs - self.pending_fs) / self.dead_fs)
+            .floor()
+            .clamp(0.0, FARTHEST);
         // The logarithm of 0 is −∞, that of 1 is 0: one dead time, and as many as there are.
         let dead_times = -libm::log(enough) / -libm::log(self.busy);
         let alone = dead_times.ceil().max(1.0).min(most);
@@ -108,7 +113,7 @@ impl Scene {
         if self.light.echoes_in(reach).is_empty() {
             return Back {
                 busy: self.busy.powi(alone as i32),
-                for_fs: alone * self.dead_fs,
+                for_fs: alone * self.dead_fs + self.pending_fs,
             };
         }
         // Echoes of all laser cycles, sent or not: more light makes the bound no smaller.
@@ -121,7 +126,7 @@ impl Scene {
         }
         Back {
             busy,
-            for_fs: stretches * self.dead_fs,
+            for_fs: stretches * self.dead_fs + self.pending_fs,
         }
     }
 

@@ -24,17 +24,17 @@
 //!
 //! Halving all cells leaves a quarter of the error, so the difference between two grids bounds it ([`solve`]).
 
-use smallvec::SmallVec;
+use smallvec::{SmallVec, smallvec};
 
-use super::EventTable;
 use super::blindness::{Ages, Blindness};
 use super::cycles::{Before, Class, Scene};
+use super::grid::{CELLS, Grid};
 use super::hits::Hits;
+use super::light::absorbed;
+use super::secondaries::{Acts, Cell, Secondaries};
+use super::{EventTable, FEW_STEPS};
 use crate::engine::EngineError;
 use crate::photon::{DeadTimeLaw, SPADS};
-
-/// Cells of a CLK period on the coarsest grid, at least.
-const CELLS: f64 = 4.0;
 
 /// How often cells are halved at most: 256 of them to a CLK period.
 const HALVINGS: u32 = 6;
@@ -43,14 +43,6 @@ const HALVINGS: u32 = 6;
 /// leaves a third.
 const LEFT: f64 = 0.5;
 
-/// Edges that are closer than that are one, fs.
-const CLOSE_FS: f64 = 0.01;
-
-/// Where a narrow pulse is cut, in standard deviations: cells within it are shorter than it.
-const BENDS: [f64; 13] = [
-    -4.5, -3.5, -2.75, -2.0, -1.4, -0.7, 0.0, 0.7, 1.4, 2.0, 2.75, 3.5, 4.5,
-];
-
 /// What a SPAD does in a window.
 #[derive(Debug, Clone)]
 pub struct Fine {
@@ -58,8 +50,62 @@ pub struct Fine {
     pub ages: Ages,
     /// Probability of being able to fire, for every CLK period and 1, 2, … of them since the last avalanche.
     pub able: Vec<f64>,
+    /// Mean photons in every CLK period: what makes a SPAD fire that has been ready for long as often as it does.
+    pub photons: SmallVec<[f64; FEW_STEPS]>,
     /// Probability of a pulse in every CLK period.
-    pub pulses: SmallVec<[f64; 16]>,
+    pulses: SmallVec<[f64; FEW_STEPS]>,
+    /// What cohorts that know no more than this are off it.
+    missed: SmallVec<[f64; FEW_STEPS]>,
+}
+
+impl Fine {
+    /// Turns the probabilities of a pulse in `able` into what they are for a SPAD that gets a photon.
+    fn divide_by_photons(&mut self) {
+        let memory = self.ages.aged.len();
+        for (able, &mean) in self.able.chunks_mut(memory).zip(&self.photons) {
+            let photon = absorbed(mean);
+            for able in able {
+                *able = if photon > 0.0 {
+                    (*able / photon).min(1.0)
+                } else {
+                    1.0
+                };
+            }
+        }
+    }
+
+    /// The same where avalanches have secondaries: SPADs that have been ready for long are given as many photons as make
+    /// all pulses of each CLK period, among them those of carriers that are released later than the cohorts remember.
+    fn balance(&mut self) {
+        let memory = self.ages.aged.len();
+        let (mut aged, mut free) = (self.ages.aged.clone(), self.ages.free);
+        for (bin, able) in self.able.chunks_mut(memory).enumerate() {
+            let pulses = self.pulses[bin];
+            let of_aged = |photon: f64| -> f64 {
+                let each = aged.iter().zip(&*able);
+                each.map(|(share, fires)| share * fires.min(photon)).sum()
+            };
+            let mut photon = absorbed(self.photons[bin]);
+            // A SPAD of some age fires no more often than it gets photons; few rounds settle how often that is.
+            for _ in 0..8 {
+                let wanted = (pulses - of_aged(photon)) / free.max(f64::MIN_POSITIVE);
+                photon = wanted.clamp(0.0, 1.0 - f64::EPSILON);
+            }
+            let reached = of_aged(photon) + free * photon;
+            self.missed[bin] = reached - pulses;
+            for (share, able) in aged.iter_mut().zip(&mut *able) {
+                *able = able.min(photon);
+                *share *= 1.0 - *able;
+                *able = if photon > 0.0 { *able / photon } else { 1.0 };
+            }
+            free *= 1.0 - photon;
+            if let Some(oldest) = aged.last_mut() {
+                free += std::mem::replace(oldest, reached);
+                aged.rotate_right(1);
+            }
+            self.photons[bin] = -libm::log1p(-photon);
+        }
+    }
 }
 
 /// As fine as it takes for the mean of every bin of the class's laser cycles to be known to within `error` of its counting
@@ -70,20 +116,21 @@ pub struct Fine {
 pub fn solve(
     scene: &Scene,
     blindness: &Blindness,
+    secondaries: Secondaries,
     class: &Class,
     is_event: &EventTable,
     error: f64,
 ) -> Result<Fine, EngineError> {
-    let events = |fine: &Fine| -> SmallVec<[[f64; 2]; 16]> {
+    let events = |fine: &Fine| -> SmallVec<[[f64; 2]; FEW_STEPS]> {
         fine.pulses
             .iter()
             .map(|&pulse| event(is_event, pulse))
             .collect()
     };
     let cycles = class.cycles as f64;
-    let mut coarse = events(&carry(scene, blindness, class, 0));
+    let mut coarse = events(&carry(scene, blindness, secondaries, class, 0));
     for halvings in 1..=HALVINGS {
-        let fine = carry(scene, blindness, class, halvings);
+        let fine = carry(scene, blindness, secondaries, class, halvings);
         let finer = events(&fine);
         // Of each bin, in counts: what the mean is off, and the noise that it may be a part of.
         let bins = coarse.iter().zip(&finer).map(|(coarse, &[p, q])| {
@@ -122,75 +169,14 @@ pub fn event(is_event: &EventTable, pulse: f64) -> [f64; 2] {
     sums
 }
 
-/// Cells of time, which repeat every dead time.
-struct Grid {
-    /// Edges, fs after the start of the window.
-    edges: Vec<f64>,
-    /// Cells in a dead time.
-    per_dead_time: usize,
-    /// Edge at the start of every CLK period: those that are remembered at the start of the window, the window's, and one
-    /// more.
-    periods: Vec<usize>,
-}
-
-impl Grid {
-    /// From `since_fs` before the window on.
-    fn new(scene: &Scene, class: &Class, since_fs: f64, memory: usize, halvings: u32) -> Self {
-        let (dead_fs, period_fs) = (scene.dead_fs, scene.period_fs);
-        let start_fs = -since_fs;
-        let period = |number: usize| (number as f64 - memory as f64) * period_fs;
-        let periods = 0..memory + scene.bins + 1;
-        let until_fs = scene.bins as f64 * period_fs;
-        let mut bends: Vec<f64> = periods.clone().map(period).collect();
-        let lit_fs = &class.extent.lit_fs;
-        bends.extend([lit_fs.start, lit_fs.end].map(|end| end - scene.from_fs));
-        let sigma_fs = scene.light.sigma_fs();
-        if sigma_fs * CELLS < period_fs {
-            let reaching = scene
-                .light
-                .echoes_in(scene.from_fs + start_fs..scene.until_fs());
-            let echoes = &class.extent.echoes;
-            for number in reaching.start.max(echoes.start)..reaching.end.min(echoes.end) {
-                let centre_fs = scene.light.centre_fs(number) - scene.from_fs;
-                bends.extend(BENDS.map(|bend| centre_fs + bend * sigma_fs));
-                // A pulse without width is somewhere within a femtosecond.
-                bends.push(centre_fs + 1.0);
-            }
-        }
-        bends.retain(|bend| (start_fs..=until_fs).contains(bend));
-        let mut phases: Vec<f64> = bends
-            .iter()
-            .map(|bend| (bend - start_fs).rem_euclid(dead_fs))
-            .collect();
-        phases.push(0.0);
-        phases.retain(|phase| *phase < dead_fs - CLOSE_FS);
-        phases.sort_unstable_by(f64::total_cmp);
-        phases.dedup_by(|later, earlier| *later - *earlier < CLOSE_FS);
-        let longest_fs = period_fs / CELLS;
-        let mut cells = Vec::with_capacity(phases.len() << halvings);
-        for (i, &phase) in phases.iter().enumerate() {
-            let next = phases.get(i + 1).copied().unwrap_or(dead_fs);
-            let parts = ((next - phase) / longest_fs).ceil() * f64::from(1u32 << halvings);
-            cells.extend(
-                (0..parts as usize).map(|part| phase + (next - phase) * part as f64 / parts),
-            );
-        }
-        let dead_times = ((until_fs - start_fs) / dead_fs).ceil() as usize + 1;
-        let repeated = (0..dead_times).flat_map(|n| cells.iter().map(move |cell| (n, *cell)));
-        let all = repeated.map(|(n, cell)| start_fs + n as f64 * dead_fs + cell);
-        let edges: Vec<f64> = all.take_while(|edge| *edge < until_fs + CLOSE_FS).collect();
-        let edge_of =
-            |number: usize| edges.partition_point(|edge| *edge < period(number) - CLOSE_FS);
-        Grid {
-            periods: periods.map(edge_of).collect(),
-            per_dead_time: cells.len(),
-            edges,
-        }
-    }
-}
-
 /// One SPAD, carried through the window.
-fn carry(scene: &Scene, blindness: &Blindness, class: &Class, halvings: u32) -> Fine {
+fn carry(
+    scene: &Scene,
+    blindness: &Blindness,
+    secondaries: Secondaries,
+    class: &Class,
+    halvings: u32,
+) -> Fine {
     let memory = blindness.memory();
     let remembered_fs = memory as f64 * scene.period_fs;
     let (is_dark, since_fs) = match class.before {
@@ -214,6 +200,7 @@ fn carry(scene: &Scene, blindness: &Blindness, class: &Class, halvings: u32) -> 
         grid,
         cells,
         memory,
+        secondaries,
     };
     match blindness.law {
         DeadTimeLaw::NonParalysable => {
@@ -228,42 +215,11 @@ fn carry(scene: &Scene, blindness: &Blindness, class: &Class, halvings: u32) -> 
     }
 }
 
-/// Photons in a cell.
-#[derive(Debug, Clone, Copy)]
-struct Cell {
-    mean: f64,
-    /// Probability of none.
-    none: f64,
-    /// Probability of any.
-    any: f64,
-    /// Of those that come back to readiness in the cell, those still ready at its end.
-    stay: f64,
-    /// The others.
-    fire: f64,
-}
-
-impl Cell {
-    fn new(mean: f64) -> Self {
-        let any = -libm::expm1(-mean);
-        // Where the quotient would lose its digits, a series.
-        let fire = match mean < 1e-3 {
-            true => mean * (0.5 - mean * (1.0 / 6.0 - mean * (1.0 / 24.0))),
-            false => 1.0 - any / mean,
-        };
-        Cell {
-            mean,
-            none: 1.0 - any,
-            any,
-            stay: 1.0 - fire,
-            fire,
-        }
-    }
-}
-
 struct Spad {
     grid: Grid,
     cells: Vec<Cell>,
     memory: usize,
+    secondaries: Secondaries,
 }
 
 impl Spad {
@@ -276,74 +232,87 @@ impl Spad {
         self.grid.periods.len() - 1 - self.memory
     }
 
-    /// Probability of a photon in CLK period `number`.
-    fn photon(&self, number: usize) -> f64 {
-        let mean: f64 = self.cells[self.period(number)]
+    fn width_fs(&self, cell: usize) -> f64 {
+        self.grid.edges[cell + 1] - self.grid.edges[cell]
+    }
+
+    /// Mean photons in CLK period `number`.
+    fn mean(&self, number: usize) -> f64 {
+        self.cells[self.period(number)]
             .iter()
             .map(|cell| cell.mean)
-            .sum();
-        -libm::expm1(-mean)
+            .sum()
     }
 
     /// From the steady state of `rate` photons a femtosecond.
     fn non_paralysable(&self, blindness: &Blindness, rate: f64, dead_fs: f64) -> Fine {
-        let (memory, back) = (self.memory, self.grid.per_dead_time);
-        let mut ready = 1.0 / (1.0 + rate * dead_fs);
-        let edges = &self.grid.edges;
-        let steady = rate * ready;
-        // Pulses, from a dead time before the grid on.
-        let mut pulses: Vec<f64> = (0..back.min(self.cells.len()))
-            .map(|cell| steady * (edges[cell + 1] - edges[cell]))
+        let (memory, back, secondaries) = (self.memory, self.grid.per_dead_time, &self.secondaries);
+        let (mut ready, steady) = secondaries.steady(rate, dead_fs);
+        // From a dead time before the grid on.
+        let mut acts: Vec<Acts> = (0..back)
+            .map(|cell| match cell < self.cells.len() {
+                true => steady.times(self.width_fs(cell)),
+                false => Acts::default(),
+            })
             .collect();
-        pulses.resize(back, 0.0);
+        // Of each cell, avalanches that one SPAD gets from others.
+        let mut crossing = Vec::with_capacity(self.cells.len());
         for (cell, light) in self.cells.iter().enumerate() {
-            let returning = pulses[cell];
-            pulses.push(ready * light.any + returning * light.fire);
-            ready = ready * light.none + returning * light.stay;
+            let before = acts[cell];
+            let returning = [0, 1].map(|trap| before.pulses[trap] + before.silent[trap]);
+            let [ours, _] = light.take(ready[0] + ready[1], returning[0] + returning[1]);
+            crossing.push(secondaries.crosstalk * ours);
+            let width_fs = self.width_fs(cell);
+            acts.push(secondaries.act(light, crossing[cell], width_fs, &mut ready, returning));
         }
-        let pulses = &pulses[back..];
-        let in_period = |number: usize| -> f64 { pulses[self.period(number)].iter().sum() };
+        let acts = &acts[back..];
+        let in_period =
+            |number: usize| -> f64 { acts[self.period(number)].iter().map(Acts::seen).sum() };
 
+        let windows = memory..memory + self.bins();
         let mut fine = Fine {
             ages: Ages::rested(blindness),
             able: vec![1.0; self.bins() * memory],
-            pulses: (memory..memory + self.bins()).map(in_period).collect(),
+            photons: windows.clone().map(|number| self.mean(number)).collect(),
+            pulses: windows.map(in_period).collect(),
+            missed: smallvec![0.0; self.bins()],
         };
         // What a SPAD does after its last pulse in each CLK period.
         for number in 0..memory + self.bins() {
             let source = self.period(number);
             let mut blind = in_period(number);
-            let mut ready = 0.0;
+            let mut ready = [0.0; 2];
             for age in 1..=memory.min(memory + self.bins() - 1 - number) {
                 let now = number + age;
-                let left = (blind + ready).max(0.0);
+                let left = (blind + ready[0] + ready[1]).max(0.0);
                 if now == memory {
                     fine.ages.aged[age - 1] = left;
                 }
                 let cells = self.period(now);
-                if cells.end <= source.start + back {
-                    // All are blind still.
-                    if now >= memory {
-                        fine.able[(now - memory) * memory + age - 1] = 0.0;
-                    }
-                    continue;
-                }
                 let mut fired = 0.0;
-                for cell in cells {
-                    let light = &self.cells[cell];
-                    let from = cell.checked_sub(back).filter(|from| source.contains(from));
-                    let returning = from.map_or(0.0, |from| pulses[from]);
-                    blind -= returning;
-                    fired += ready * light.any + returning * light.fire;
-                    ready = ready * light.none + returning * light.stay;
+                if cells.end > source.start + back {
+                    for cell in cells {
+                        let from = cell.checked_sub(back).filter(|from| source.contains(from));
+                        let returning = from.map_or([0.0; 2], |from| acts[from].pulses);
+                        blind -= returning[0] + returning[1];
+                        let (light, width_fs) = (&self.cells[cell], self.width_fs(cell));
+                        let act =
+                            secondaries.act(light, crossing[cell], width_fs, &mut ready, returning);
+                        fired += act.seen();
+                        // Who is blinded without a pulse stays so for as long as that matters.
+                        blind += act.silent[0] + act.silent[1];
+                    }
                 }
-                let photon = self.photon(now);
-                if now >= memory && left > 0.0 && photon > 0.0 {
-                    fine.able[(now - memory) * memory + age - 1] = (fired / left / photon).min(1.0);
+                if now >= memory && left > 0.0 {
+                    fine.able[(now - memory) * memory + age - 1] = fired / left;
                 }
             }
         }
         fine.ages.fill_up();
+        match secondaries.are_none() {
+            true => fine.divide_by_photons(),
+            false => fine.balance(),
+        }
         fine
     }
 
@@ -365,11 +334,20 @@ impl Spad {
                 none_after *= self.cells[cell].none;
             }
         }
-        let photon: Vec<f64> = numbers.clone().map(|number| self.photon(number)).collect();
+        let photon: Vec<f64> = numbers
+            .clone()
+            .map(|number| -libm::expm1(-self.mean(number)))
+            .collect();
         let mut fine = Fine {
             ages: Ages::rested(blindness),
             able: vec![1.0; self.bins() * memory],
+            photons: numbers
+                .clone()
+                .skip(memory)
+                .map(|number| self.mean(number))
+                .collect(),
             pulses: SmallVec::new(),
+            missed: smallvec![0.0; self.bins()],
         };
         for now in numbers.skip(memory) {
             let (mut aged, mut pulse) = (1.0, 0.0);

@@ -24,8 +24,11 @@
 //! * **Memory.** Laser cycles are taken to be independent (`cycles.rs`). They are unless a SPAD stays busy from one window
 //!   to the next; the probability of that, over all SPADs and cycles, is bounded, and beyond [`CohortOptions::memory`]
 //!   the engine refuses.
-//! * A SPAD is to fire at most once in a CLK period: a shorter dead time is refused. So are afterpulses, crosstalk and
-//!   measured laser pulses.
+//! * **Afterpulses and crosstalk** enter the light as probabilities of one SPAD among its neighbours (`fine.rs`): means are
+//!   kept, but how an afterpulse follows its own pulse is remembered for a dead time only, and crosstalk,
+//!   which blinds a SPAD of a cycle that has its event already, hits any SPAD. So crosstalk is refused where an event
+//!   takes several SPADs, as both are for paralysable SPADs and with [`CohortOptions::sub_bins`].
+//! * A SPAD is to fire at most once in a CLK period: a shorter dead time is refused, and so are measured laser pulses.
 //!
 //! So an exposure takes one step a bin, whatever light there is, and at most as many states as it has laser cycles.
 
@@ -35,6 +38,7 @@ mod blindness;
 mod cycles;
 mod draw;
 mod fine;
+mod grid;
 mod hits;
 mod joint;
 mod light;
@@ -42,6 +46,7 @@ mod overlap;
 mod period;
 mod pooled;
 mod rejection;
+mod secondaries;
 mod words;
 
 use std::sync::OnceLock;
@@ -54,10 +59,13 @@ use self::cycles::{Class, LikeCycles, Scene};
 pub use self::draw::none_of;
 pub use self::hits::at_least_hit;
 use self::light::SpadLight;
+use self::secondaries::Secondaries;
 use self::words::RandomWords;
 use super::{Engine, EngineError, Exposed, LitPixel, Work, follows};
 use crate::chip::{Exposure, SensorConfig, WindowLaw, correlation, histogram, window_law};
-use crate::photon::{DeadTimeLaw, PhotonStream, PixelLight, SPADS, SpadEvent, StreamConfig};
+use crate::photon::{
+    DeadTimeLaw, PhotonStream, PixelLight, SPADS, SpadEvent, SpadModel, StreamConfig,
+};
 
 /// Whether 0, 1, 2, … SPADs that fire in a CLK period make an event.
 type EventTable = [bool; SPADS + 1];
@@ -298,9 +306,22 @@ impl<'a> Cohort<'a> {
         };
         let period_fs = 1e15 / stream.clock.as_hz();
         let dead_fs = stream.spads.dead_time.as_fs() as f64;
+        let spads = &stream.spads;
+        let has_secondaries = spads.has_secondaries();
         let refusals = [
             (dead_fs < period_fs, "a dead time shorter than a CLK period"),
-            (stream.spads.has_secondaries(), "afterpulses and crosstalk"),
+            (
+                has_secondaries && spads.law == DeadTimeLaw::Paralysable,
+                "afterpulses and crosstalk of paralysable SPADs",
+            ),
+            (
+                has_secondaries && self.options.sub_bins.is_some(),
+                "afterpulses and crosstalk in steps of --sub-bins",
+            ),
+            (
+                spads.crosstalk_probability > 0.0 && !self.is_any_spad(),
+                "crosstalk where an event takes more than one SPAD",
+            ),
             (stream.pulse_shape.is_some(), "a measured laser pulse"),
         ];
         if let Some((_, what)) = refusals.into_iter().find(|(refuses, _)| *refuses) {
@@ -308,13 +329,13 @@ impl<'a> Cohort<'a> {
         }
         let scene = Scene::new(
             SpadLight::new(stream, light),
-            [dead_fs, period_fs],
+            [dead_fs, spads.memory().as_fs() as f64 - dead_fs, period_fs],
             [from_fs, stream.cycle_s() * 1e15],
             self.config.bins,
         );
         let classes =
             scene.classes(self.config, self.exposure, window.first_edge, &self.options)?;
-        let like = |class| self.like_cycles(&scene, stream.spads.law, class);
+        let like = |class| self.like_cycles(&scene, spads, class);
         classes.iter().map(like).collect::<Result<_, _>>().map(Some)
     }
 
@@ -322,21 +343,23 @@ impl<'a> Cohort<'a> {
     fn like_cycles(
         &self,
         scene: &Scene,
-        law: DeadTimeLaw,
+        spads: &SpadModel,
         class: &Class,
     ) -> Result<LikeCycles, EngineError> {
         let per_period = self.options.sub_bins.unwrap_or(1);
         let step_fs = scene.period_fs / per_period as f64;
-        let blindness = Blindness::new(law, scene.dead_fs / step_fs);
-        let steps = scene.steps(per_period, &class.extent);
+        let blindness = Blindness::new(spads.law, scene.dead_fs / step_fs);
+        let mut steps = scene.steps(per_period, &class.extent);
         let as_in_even_light = self.options.sub_bins.is_some()
-            || self.is_even_enough(scene, &blindness, class, &steps);
+            || !spads.has_secondaries() && self.is_even_enough(scene, &blindness, class, &steps);
         let (blindness, ages) = if as_in_even_light {
             let ages = scene.start(&blindness, class, step_fs);
             (blindness, ages)
         } else {
-            let error = self.options.error;
-            let fine = fine::solve(scene, &blindness, class, &self.is_event, error)?;
+            let secondaries = Secondaries::of(spads);
+            let (is_event, error) = (&self.is_event, self.options.error);
+            let fine = fine::solve(scene, &blindness, secondaries, class, is_event, error)?;
+            steps.means = fine.photons;
             (blindness.in_light(fine.able), fine.ages)
         };
         Ok(LikeCycles {
@@ -346,6 +369,12 @@ impl<'a> Cohort<'a> {
             steps,
             not_compared: class.not_compared,
         })
+    }
+
+    /// Whether one SPAD makes an event, and more do, too.
+    fn is_any_spad(&self) -> bool {
+        let mut counts = self.is_event.iter().enumerate();
+        counts.all(|(spads, &is_event)| is_event == (spads > 0))
     }
 
     /// Whether a bound shows that taking light to be even within a CLK period keeps the error, for events of any SPAD.
@@ -360,8 +389,7 @@ impl<'a> Cohort<'a> {
         class: &Class,
         steps: &Steps,
     ) -> bool {
-        let any_spad = |(spads, &is_event): (usize, &bool)| is_event == (spads > 0);
-        if !self.is_event.iter().enumerate().all(any_spad) {
+        if !self.is_any_spad() {
             return false;
         }
         let Some(past) = scene.even_past(blindness.memory(), class) else {
