@@ -22,7 +22,8 @@
 //! pair of successive pulses, are as exact as the cells are fine, while cohorts remember no more than CLK
 //! periods; what is left out is how three pulses in successive dead times depend on each other within a period.
 //!
-//! Halving all cells leaves a quarter of the error, so the difference between two grids bounds it ([`solve`]).
+//! Halving all cells leaves a quarter of the error; so from two grids follows what the next ones would tell, and from how far
+//! that moves with another halving what it is off at most ([`solve`]).
 
 use smallvec::{SmallVec, smallvec};
 
@@ -38,10 +39,6 @@ use crate::photon::{DeadTimeLaw, SPADS};
 
 /// How often cells are halved at most: 256 of them to a CLK period.
 const HALVINGS: u32 = 6;
-
-/// Of the difference between a grid and one twice as coarse, what the finer one is off at most. A second-order scheme
-/// leaves a third.
-const LEFT: f64 = 0.5;
 
 /// What a SPAD does in a window.
 #[derive(Debug, Clone)]
@@ -59,6 +56,28 @@ pub struct Fine {
 }
 
 impl Fine {
+    /// What ever finer cells would tell, from these and ones twice as long: a second-order error has a third of their
+    /// difference left.
+    fn extrapolated(&self, coarse: &Self) -> Self {
+        let probability = |fine: f64, coarse: f64| (fine + (fine - coarse) / 3.0).clamp(0.0, 1.0);
+        let mut found = self.clone();
+        let probabilities = [
+            (&mut found.ages.aged[..], &coarse.ages.aged[..]),
+            (&mut found.able[..], &coarse.able[..]),
+            (&mut found.pulses[..], &coarse.pulses[..]),
+        ];
+        for (fine, coarse) in probabilities {
+            for (fine, coarse) in fine.iter_mut().zip(coarse) {
+                *fine = probability(*fine, *coarse);
+            }
+        }
+        for (fine, coarse) in found.photons.iter_mut().zip(&coarse.photons) {
+            *fine = (*fine + (*fine - coarse) / 3.0).max(0.0);
+        }
+        found.ages.fill_up();
+        found
+    }
+
     /// Turns the probabilities of a pulse in `able` into what they are for a SPAD that gets a photon.
     fn divide_by_photons(&mut self) {
         let memory = self.ages.aged.len();
@@ -127,21 +146,27 @@ pub fn solve(
             .map(|&pulse| event(is_event, pulse))
             .collect()
     };
+    let missed = |fine: &Fine, bin: usize| {
+        let reached = (fine.pulses[bin] + fine.missed[bin]).clamp(0.0, 1.0);
+        event(is_event, reached)[0] - event(is_event, fine.pulses[bin])[0]
+    };
     let cycles = class.cycles as f64;
-    let mut coarse = events(&carry(scene, blindness, secondaries, class, 0));
+    let mut coarse = carry(scene, blindness, secondaries, class, 0);
+    let mut known = None;
     for halvings in 1..=HALVINGS {
         let fine = carry(scene, blindness, secondaries, class, halvings);
-        let finer = events(&fine);
-        // Of each bin, in counts: what the mean is off, and the noise that it may be a part of.
-        let bins = coarse.iter().zip(&finer).map(|(coarse, &[p, q])| {
-            let off = LEFT * cycles * (p - coarse[0]).abs();
-            (off, (cycles * p * q).sqrt())
+        let found = fine.extrapolated(&coarse);
+        let (events_found, before) = (events(&found), known.unwrap_or_else(|| events(&fine)));
+        // Of each bin, in counts: what the mean is off at most, and the noise that it may be a part of.
+        let bins = before.iter().zip(&events_found).enumerate();
+        let bins = bins.map(|(bin, (before, &[p, q]))| {
+            let off = (p - before[0]).abs() + missed(&found, bin).abs();
+            (cycles * off, (cycles * p * q).sqrt())
         });
-        let worst = bins
-            .enumerate()
-            .find(|(_, (off, noise))| *off > error * noise + ROUNDING);
+        let mut bins = bins.enumerate();
+        let worst = bins.find(|(_, (off, noise))| *off > error * noise + ROUNDING);
         match worst {
-            None => return Ok(fine),
+            None => return Ok(found),
             Some((bin, (off, noise))) if halvings == HALVINGS => {
                 return Err(EngineError::CoarseCohorts {
                     bin,
@@ -150,7 +175,7 @@ pub fn solve(
                     cells: (CELLS as u32) << HALVINGS,
                 });
             }
-            Some(_) => coarse = finer,
+            Some(_) => (coarse, known) = (fine, Some(events_found)),
         }
     }
     unreachable!("the last halving returns")
