@@ -1,12 +1,11 @@
-//! The gate engine's figures as `name value` lines, for `benches/compare/icarus.sh` to set beside Icarus Verilog's:
-//! net changes per second on one core, elaboration by size of the array, cost of timing checks.
-//! Best of several runs.
+//! The gate engine's own figures, which `benches/compare/icarus.sh` prints below its table: net changes per second on one
+//! core, elaboration by size of the array, cost of timing checks. Processor time; least, median and most of the runs.
 //!
 //!   cargo bench --bench figures
 
 use std::hint::black_box;
-use std::time::Instant;
 
+use cpu_time::ProcessTime;
 use guided_dtof::chip::{Exposure, SensorConfig, sensor};
 use guided_dtof::engine::{GateSimulation, LaneSimulation, stream_config};
 use guided_dtof::kernel::Policy;
@@ -19,15 +18,28 @@ const STOP_PERIODS: u32 = 520;
 const LASER_CYCLES: u32 = 50;
 const LANES: u16 = 64;
 
-/// Shortest of several times, s, of what `run` does after `prepare`.
-fn best<T>(prepare: impl Fn() -> T, run: impl Fn(&mut T)) -> f64 {
-    let time = || {
+/// Processor seconds of what `run` does after `prepare`, in ascending order.
+fn seconds<T>(prepare: impl Fn() -> T, run: impl Fn(&mut T)) -> [f64; RUNS] {
+    let mut seconds = [(); RUNS].map(|()| {
         let mut prepared = prepare();
-        let start = Instant::now();
+        let clock = ProcessTime::now();
         run(&mut prepared);
-        start.elapsed().as_secs_f64()
-    };
-    (0..RUNS).map(|_| time()).fold(f64::INFINITY, f64::min)
+        clock.elapsed().as_secs_f64()
+    });
+    seconds.sort_by(f64::total_cmp);
+    seconds
+}
+
+/// One line: least, median and most of what `value` makes of each run's seconds.
+fn print(what: &str, seconds: &[f64; RUNS], value: impl Fn(f64) -> f64) {
+    let mut values = seconds.map(value);
+    values.sort_by(f64::total_cmp);
+    println!(
+        "{what}: {:.2} {:.2} {:.2}",
+        values[0],
+        values[RUNS / 2],
+        values[RUNS - 1]
+    );
 }
 
 fn main() {
@@ -38,10 +50,13 @@ fn main() {
             ..SensorConfig::default()
         };
         let elaborate = || Netlist::elaborate(&sensor::circuit(&config));
-        let cells = elaborate().cells().len();
-        println!("cells_{side} {cells}");
-        let seconds = best(|| (), |()| drop(black_box(elaborate())));
-        println!("elaborate_{side}_s {seconds:.4}");
+        let cells = elaborate().cells().len() as f64;
+        let seconds = seconds(|| (), |()| drop(black_box(elaborate())));
+        print(
+            &format!("elaboration of {side}x{side}, ns a cell"),
+            &seconds,
+            |s| 1e9 * s / cells,
+        );
     }
     let config = SensorConfig::default();
     let exposure = Exposure::new(&config, STOP_PERIODS, LASER_CYCLES);
@@ -60,21 +75,31 @@ fn main() {
     let mut once = one();
     once.run(&mut ());
     let changes = once.statistics().changes as f64;
-    let seconds = best(one, |gate| gate.run(&mut ()));
-    println!("scalar_changes_per_s {:.4e}", changes / seconds);
+    let unchecked = seconds(one, |gate| gate.run(&mut ()));
+    let million = |changes: f64| move |seconds: f64| 1e-6 * changes / seconds;
+    print(
+        "one macropixel, M net changes/s",
+        &unchecked,
+        million(changes),
+    );
     let checked = || {
         let gate = one();
         let checks = gate.timing_checks(Policy::ReportOnly);
         (gate, checks)
     };
-    let with_checks = best(checked, |(gate, checks)| gate.run(checks));
-    println!("checks_ratio {:.2}", with_checks / seconds);
+    let with_checks = seconds(checked, |(gate, checks)| gate.run(checks));
+    let median = unchecked[RUNS / 2];
+    print("timing checks, times as long", &with_checks, |s| s / median);
 
     let starts: Vec<u16> = (0..LANES).map(|lane| lane * 8).collect();
     let together = || LaneSimulation::new(&config, &exposure, &starts, &photons);
     let mut once = together();
     once.run(&mut ());
     let changes = once.kernel().lane_changes() as f64;
-    let seconds = best(together, |lanes| lanes.run(&mut ()));
-    println!("lane_changes_per_s {:.4e}", changes / seconds);
+    let together = seconds(together, |lanes| lanes.run(&mut ()));
+    print(
+        "64 macropixels in lanes, M net changes/s",
+        &together,
+        million(changes),
+    );
 }

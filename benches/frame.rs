@@ -9,7 +9,7 @@ use criterion::{
     BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main,
 };
 use guided_dtof::engine::Window;
-use guided_dtof::system::{SPEED_LASER_CYCLES, SpeedFrame};
+use guided_dtof::system::{SPEED_LASER_CYCLES, SpeedCase, SpeedFrame};
 
 fn frames(c: &mut Criterion) {
     let mut group = c.benchmark_group("frame, 16000 laser cycles");
@@ -26,7 +26,12 @@ fn frames(c: &mut Criterion) {
         (2, 64, 520),
         (2, 256, 4800),
     ] {
-        let frame = SpeedFrame::new(side, stop_periods, SPEED_LASER_CYCLES);
+        let frame = SpeedFrame::new(
+            SpeedCase::Street,
+            (side, side),
+            stop_periods,
+            SPEED_LASER_CYCLES,
+        );
         let engine = Window::new(&frame.config, &frame.exposure);
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)

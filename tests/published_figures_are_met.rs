@@ -117,7 +117,12 @@ fn the_tally_counts_every_row_and_claim_once() {
         .claims
         .iter()
         .filter(|c| overall(&c.rows) == Verdict::Agrees);
-    assert_eq!(lines[0][1], agree.count(), "{text}");
+    let agree = agree.count();
+    assert_eq!(lines[0][1], agree, "{text}");
+    let readme = include_str!("../README.md").replace('\n', " ");
+    assert!(readme.contains(&format!(
+        "all that is published of it agrees: {agree} of 28 are,"
+    )));
 }
 
 /// A difference from a published 0 has no percentage.

@@ -1,20 +1,29 @@
-//! Our side of `verilator.sh`: draws a stimulus for 64×64 macropixels, writes it for the other simulator, and
-//! prints the seconds of the cycle engine's logic on all threads and on one, and of sorting the photons.
+//! Our side of `verilator.sh`: draws a stimulus for 64×64 macropixels, writes it for the other simulators, and prints the
+//! processor seconds of the cycle engine on one thread, a line a run: its logic, and packing the photons for it.
+//!
+//! | stimulus | |
+//! |---|---|
+//! | `street` | 10 Mcounts/s a macropixel, and a signal photon in each laser cycle, near the end of the window |
+//! | `bright` | 100 Mcounts/s a SPAD behind a dead time of 8 ns: a pulse in one CLK period of 7 |
+//! | `every` | every SPAD in every CLK period |
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
-use std::time::Instant;
 
-use guided_dtof::chip::{Exposure, SensorConfig};
+use cpu_time::ProcessTime;
+use guided_dtof::chip::{Exposure, SPADS, SensorConfig};
 use guided_dtof::engine::Cycle;
 use guided_dtof::photon::SpadEvent;
 use guided_dtof::units::Time;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
+/// Rising CLK edge and SPAD.
+type Taken = Vec<(u32, u16)>;
+
 fn main() -> std::io::Result<()> {
     let arguments: Vec<String> = std::env::args().filter(|a| a != "--bench").collect();
-    let [_, directory, periods, cycles] = &arguments[..] else {
+    let [_, directory, stimulus, periods, cycles, runs] = &arguments[..] else {
         eprintln!("cycle_compare is run by benches/compare/verilator.sh");
         return Ok(());
     };
@@ -23,31 +32,27 @@ fn main() -> std::io::Result<()> {
     let config = SensorConfig::default();
     let exposure = Exposure::new(&config, periods, cycles);
     let random = &mut StdRng::seed_from_u64(1);
+    // Windows that the laser cycle is long enough for.
+    let largest = 512.min(periods - 2) as u16;
     let starts: Vec<u16> = (0..config.pixels())
-        .map(|_| random.random_range(0..512))
+        .map(|_| random.random_range(0..largest))
         .collect();
-
-    // 10 Mcounts/s of background and one signal photon in each laser cycle, near the end of the window.
-    let edges = periods * cycles;
-    let background = (10e6 / config.clk_hz * f64::from(edges)) as usize;
-    let mut events = Vec::new();
-    for (pixel, &start) in starts.iter().enumerate() {
-        let signal = (0..cycles).map(|c| (c * periods + u32::from(start) + edges - 8) % edges);
-        let mut taken: Vec<(u32, u16)> = (0..background)
-            .map(|_| random.random_range(0..edges))
-            .collect::<Vec<_>>()
-            .into_iter()
-            .chain(signal)
-            .map(|edge| (edge, random.random_range(0..16)))
-            .collect();
-        taken.sort_unstable();
-        taken.dedup();
-        events.push((pixel as u16, taken));
-    }
-    let half = Time::from_fs(config.clock().period().as_fs() / 2);
-    let pulses: Vec<Vec<SpadEvent>> = events
+    let taken: Vec<Taken> = starts
         .iter()
-        .map(|(_, taken)| {
+        .map(|&start| match stimulus.as_str() {
+            "bright" => bright(random, &config, periods * cycles),
+            "every" => (0..periods * cycles)
+                .flat_map(|edge| (0..SPADS as u16).map(move |spad| (edge, spad)))
+                .collect(),
+            _ => street(random, &config, periods, cycles, start),
+        })
+        .collect();
+    write_stimulus(Path::new(directory), &starts, &taken)?;
+
+    let half = Time::from_fs(config.clock().period().as_fs() / 2);
+    let pulses: Vec<Vec<SpadEvent>> = taken
+        .iter()
+        .map(|taken| {
             let pulse = |&(edge, spad): &(u32, u16)| SpadEvent {
                 time: exposure.rising(i64::from(edge)) - half,
                 spad: spad as u8,
@@ -55,61 +60,84 @@ fn main() -> std::io::Result<()> {
             taken.iter().map(pulse).collect()
         })
         .collect();
-    write_stimulus(Path::new(directory), &starts, &events)?;
-
+    drop(taken);
     let pulses: Vec<&[SpadEvent]> = pulses.iter().map(Vec::as_slice).collect();
     let engine = Cycle::new(&config, &exposure);
     assert_eq!(engine.unlevelled(), None);
-    let (mut sorting, mut all, mut one) = (f64::MAX, f64::MAX, f64::MAX);
-    let single = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .expect("a thread");
-    let mut histograms = Vec::new();
-    let mut packed = engine.pack(&starts, &pulses);
-    for _ in 0..5 {
-        let start = Instant::now();
-        packed = engine.pack(&starts, &pulses);
-        sorting = sorting.min(start.elapsed().as_secs_f64());
-        let start = Instant::now();
-        histograms = engine.run(&starts, &packed).expect("it is levelised");
-        all = all.min(start.elapsed().as_secs_f64());
-        let start = Instant::now();
-        single
-            .install(|| engine.run(&starts, &packed))
-            .expect("it is levelised");
-        one = one.min(start.elapsed().as_secs_f64());
-    }
-    let mut out = BufWriter::new(File::create(Path::new(directory).join("ours.bin"))?);
-    for count in histograms.concat() {
-        out.write_all(&count.to_le_bytes())?;
-    }
-    out.flush()?;
-    println!("{all} {one} {sorting}");
-    drop(packed);
-    Ok(())
+    let single = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    single.expect("a thread").install(|| {
+        let mut histograms = Vec::new();
+        for _ in 0..number(runs) {
+            let clock = ProcessTime::now();
+            let packed = engine.pack(&starts, &pulses);
+            let packing = clock.elapsed().as_secs_f64();
+            let clock = ProcessTime::now();
+            histograms = engine.run(&starts, &packed).expect("it is levelised");
+            println!("{:.9} {packing:.9}", clock.elapsed().as_secs_f64());
+        }
+        let counts = histograms.concat().into_iter().flat_map(u16::to_le_bytes);
+        std::fs::write(
+            Path::new(directory).join("ours.bin"),
+            counts.collect::<Vec<u8>>(),
+        )
+    })
 }
 
-fn write_stimulus(
-    directory: &Path,
-    starts: &[u16],
-    events: &[(u16, Vec<(u32, u16)>)],
-) -> std::io::Result<()> {
-    let mut out = BufWriter::new(File::create(directory.join("starts.bin"))?);
+fn street(
+    random: &mut StdRng,
+    config: &SensorConfig,
+    periods: u32,
+    cycles: u32,
+    start: u16,
+) -> Taken {
+    let edges = periods * cycles;
+    let background = (10e6 / config.clk_hz * f64::from(edges)) as usize;
+    let signal = (0..cycles).map(|c| (c * periods + u32::from(start) + edges - 8) % edges);
+    let mut taken: Taken = (0..background)
+        .map(|_| random.random_range(0..edges))
+        .collect::<Vec<_>>()
+        .into_iter()
+        .chain(signal)
+        .map(|edge| (edge, random.random_range(0..SPADS as u16)))
+        .collect();
+    taken.sort_unstable();
+    taken.dedup();
+    taken
+}
+
+fn bright(random: &mut StdRng, config: &SensorConfig, edges: u32) -> Taken {
+    // Dead for 8 ns, then 100 Mcounts/s: 18 ns from pulse to pulse.
+    let (dead, chance) = ((8e-9 * config.clk_hz).ceil() as u32, 100e6 / config.clk_hz);
+    let mut taken = Taken::new();
+    for spad in 0..SPADS as u16 {
+        let mut edge = 0;
+        while edge < edges {
+            if random.random_bool(chance) {
+                taken.push((edge, spad));
+                edge += dead;
+            } else {
+                edge += 1;
+            }
+        }
+    }
+    taken.sort_unstable();
+    taken
+}
+
+fn write_stimulus(directory: &Path, starts: &[u16], taken: &[Taken]) -> std::io::Result<()> {
+    let file = |name: &str| File::create(directory.join(name)).map(BufWriter::new);
+    let mut out = file("starts.bin")?;
     for start in starts {
         out.write_all(&start.to_le_bytes())?;
     }
     out.flush()?;
-    let mut all: Vec<(u32, u16, u16)> = events
-        .iter()
-        .flat_map(|(pixel, taken)| taken.iter().map(move |&(edge, spad)| (edge, *pixel, spad)))
-        .collect();
-    all.sort_unstable();
-    let mut out = BufWriter::new(File::create(directory.join("pulses.bin"))?);
-    for (edge, pixel, spad) in all {
-        out.write_all(&edge.to_le_bytes())?;
-        out.write_all(&pixel.to_le_bytes())?;
-        out.write_all(&spad.to_le_bytes())?;
+    let (mut pulses, mut lengths) = (file("pulses.bin")?, file("lengths.bin")?);
+    for taken in taken {
+        lengths.write_all(&(taken.len() as u32).to_le_bytes())?;
+        for &(edge, spad) in taken {
+            pulses.write_all(&(edge << 4 | u32::from(spad)).to_le_bytes())?;
+        }
     }
-    out.flush()
+    lengths.flush()?;
+    pulses.flush()
 }

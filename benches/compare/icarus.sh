@@ -1,28 +1,26 @@
 #!/usr/bin/env bash
-# The same netlist, stimulus and machine: Icarus Verilog against our gate engine, alone and in lanes, in one run.
-# Icarus runs the exported cells, which are exact edge for edge, and cells written for its speed; ratios are
-# against the latter. Histograms must agree. Whole processes are timed, start and files included: processor time,
-# the best of three (of one for the exported cells, which are slow). Needs iverilog and GNU time.
+# The same netlist, stimulus and machine, one core each: Icarus Verilog against our gate engine, alone and in lanes.
+# Icarus runs the exported cells, which are exact edge for edge, and cells written for its speed; each with the exported
+# testbench, which parses its stimulus as it goes, and with one that loads it at once. Histograms must agree. Whole
+# processes are timed, start and files included, by the kernel's accounting to the microsecond: least, median and most of
+# the runs. A second exposure of one laser cycle tells start from simulation. Needs iverilog and Python.
 #
-#   benches/compare/icarus.sh [LASER_CYCLES]
+#   benches/compare/icarus.sh [LASER_CYCLES [RUNS]]
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-cycles=${1:-100}
+cycles=${1:-200}
+runs=${2:-5}
 periods=520
-for tool in iverilog /usr/bin/time; do
-    command -v $tool >/dev/null || { echo "$tool is not installed: nothing to compare with" >&2; exit 2; }
-done
+command -v iverilog >/dev/null || { echo "iverilog is not installed: nothing to compare with" >&2; exit 2; }
 cargo build --release --quiet --bin gdtof
-figures=$(cargo bench --quiet --bench figures)
+here=$PWD/benches/compare
 gdtof=$PWD/target/release/gdtof
-lean=$PWD/benches/compare/lean_cells.v
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-cd "$work"
 
-# 10 Mcounts/s of background and about one signal photon in a laser cycle, in each of $1 columns.
+# 10 Mcounts/s of background and about one signal photon in each of $2 laser cycles, in each of $1 columns.
 stimulus() {
-    awk -v cols="$1" -v n="$cycles" -v p="$periods" 'BEGIN {
+    awk -v cols="$1" -v n="$2" -v p="$periods" 'BEGIN {
         srand(1); t = 1e15 / 384e6 * p
         print "time_fs,row,col,spad" > "events.csv"; print "row,col,init" > "inits.csv"
         for (c = 0; c < cols; c++) {
@@ -35,58 +33,34 @@ stimulus() {
         }
     }'
 }
-# Runs a command so many times; prints the least processor time (s) and the peak memory (MB).
-measure() {
-    local runs=$1; shift
-    for _ in $(seq "$runs"); do
-        /usr/bin/time -a -o times -f "%U %S %M" "$@" >/dev/null 2>&1
-    done
-    awk '{ s = $1 + $2; if (NR == 1 || s < least) least = s; if ($3 > peak) peak = $3 }
-         END { printf "%.3f %.1f", least, peak / 1024 }' times
-    rm times
-}
-ours() { # columns, more arguments
-    local cols=$1; shift
-    measure 3 "$gdtof" replay --rows 1 --cols "$cols" --inits inits.csv --events events.csv \
-        --stop-periods $periods --laser-cycles "$cycles" --engine gate --out ours.csv "$@"
-}
+measure() { echo "$1 $2 $(python3 "$here/measure.py" "$3" "${@:4}")" >>"$work/times"; }
 
-stimulus 1
-"$gdtof" export verilog --rows 1 --cols 1 --inits inits.csv --events events.csv \
-    --stop-periods $periods --laser-cycles "$cycles" --out verilog >/dev/null 2>&1
-(cd verilog && iverilog -g2005 -o sim tb.v design.v cells.v && iverilog -g2005 -o lean tb.v design.v "$lean")
-one=$(ours 1)
-one_vcd=$(ours 1 --vcd ours.vcd)
-exact=$(cd verilog && measure 1 vvp -n sim)
-cmp ours.csv verilog/histograms.csv
-exact_vcd=$(cd verilog && measure 1 vvp -n sim +vcd)
-theirs=$(cd verilog && measure 3 vvp -n lean)
-cmp ours.csv verilog/histograms.csv
-theirs_vcd=$(cd verilog && measure 3 vvp -n lean +vcd)
-stimulus 64
-lanes=$(ours 64)
-{
-    printf '%s\n' "$figures"
-    echo "one $one"; echo "one_vcd $one_vcd"; echo "lanes $lanes"
-    echo "exact $exact"; echo "exact_vcd $exact_vcd"; echo "lean $theirs"; echo "lean_vcd $theirs_vcd"
-} | awk -v k="$((cycles * periods))" '
-    { v[$1] = $2; m[$1] = $3 }
-    function row(name, key, pixels,   on) {
-        on = key "_vcd"
-        printf "%-42s %9.3f %18.3g %9.1f %9.1f %10s\n", name, v[key], pixels * k / v[key], \
-            pixels * v["lean"] / v[key], m[key], (on in v) ? sprintf("%.2f", v[on] / v[key]) : "-"
-    }
-    END {
-        printf "%-42s %9s %18s %9s %9s %10s\n", "", "CPU s", "macropixel-CLK/s", "x Icarus", "peak MB", "VCD on/off"
-        row("Icarus Verilog, exported cells", "exact", 1)
-        row("Icarus Verilog, cells written for speed", "lean", 1)
-        row("gate engine, one macropixel", "one", 1)
-        row("gate engine, 64 macropixels in lanes", "lanes", 64)
-        print ""
-        printf "net changes per second and core: %.1f M scalar, %.1f M in lanes\n", \
-            v["scalar_changes_per_s"] / 1e6, v["lane_changes_per_s"] / 1e6
-        printf "timing checks on/off: %.2f\n", v["checks_ratio"]
-        for (side = 16; side <= 64; side *= 2)
-            printf "elaboration of %dx%d: %.3f s, %.1f ns a cell\n", side, side, v["elaborate_" side "_s"], \
-                1e9 * v["elaborate_" side "_s"] / v["cells_" side]
-    }'
+for n in 1 "$cycles"; do
+    mkdir -p "$work/$n" && cd "$work/$n"
+    replay=(--inits inits.csv --events events.csv --stop-periods $periods --laser-cycles "$n")
+    stimulus 64 "$n"
+    measure lanes "$n" "$runs" "$gdtof" replay --rows 1 --cols 64 "${replay[@]}" --engine gate --out lanes.csv
+    stimulus 1 "$n"
+    measure one "$n" "$runs" "$gdtof" replay --rows 1 --cols 1 "${replay[@]}" --engine gate --out one.csv
+    measure one_vcd "$n" "$runs" "$gdtof" replay --rows 1 --cols 1 "${replay[@]}" --engine gate --out one.csv --vcd one.vcd
+    "$gdtof" export verilog --rows 1 --cols 1 "${replay[@]}" --out verilog >/dev/null 2>&1
+    cd verilog
+    python3 "$here/preload.py" .
+    for cells in exact lean; do
+        file=cells.v
+        [ $cells = exact ] || file=$here/lean_cells.v
+        iverilog -g2005 -o $cells tb.v design.v "$file"
+        iverilog -g2005 -o ${cells}_preloaded tb_preloaded.v design.v "$file"
+        # The exported cells take minutes: a third of the runs.
+        [ $cells = exact ] && some=$(((runs + 2) / 3)) || some=$runs
+        for bench in $cells ${cells}_preloaded; do
+            rm -f histograms.csv
+            measure $bench "$n" "$some" vvp -n $bench
+            cmp ../one.csv histograms.csv
+        done
+    done
+    measure lean_vcd "$n" "$runs" vvp -n lean +vcd
+done
+cd "$here/../.."
+python3 "$here/icarus_table.py" "$work/times" $periods
+cargo bench --quiet --bench figures

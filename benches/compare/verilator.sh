@@ -1,37 +1,44 @@
 #!/usr/bin/env bash
-# The same macropixels, stimulus and machine: Verilator on RTL that is written for its speed (macropixels.v) against our
-# cycle engine on the netlist, logic only, in one run. Histograms must agree. Needs verilator and a C++ compiler.
+# The same macropixels, stimulus and machine, one thread each: Verilator on RTL that is written for its speed, as one loop
+# over memories and bit-sliced in words of 64 and of all 4096 macropixels, against our cycle engine on the netlist.
+# Histograms must agree. Processor time by a clock of nanoseconds; least, median and most of the runs; with and without
+# sorting the photons by CLK edge, which either side needs. Needs verilator, a C++ compiler and Python.
 #
-#   benches/compare/verilator.sh [LASER_CYCLES [REPEATS]]
+#   benches/compare/verilator.sh [RUNS]
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-cycles=${1:-20}
-repeats=${2:-3}
-periods=520
+runs=${1:-5}
 command -v verilator >/dev/null || { echo "verilator is not installed: nothing to compare with" >&2; exit 2; }
 here=$PWD/benches/compare
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-(cd "$work" && verilator --cc --exe --build -O3 --x-assign fast --x-initial fast --noassert --top-module macropixels \
-    -Wno-WIDTH -CFLAGS "-O3 -march=native" -MAKEFLAGS "OPT_FAST=-O3" \
-    --Mdir build -o sim "$here/macropixels.v" "$here/macropixels.cpp") >"$work/build.log" 2>&1 ||
-    { tail -20 "$work/build.log" >&2; exit 1; }
-
-# Best of several, turn by turn, so that both see the same neighbours.
-ours=""; theirs=""; one=""
-least() { awk -v a="$1" -v b="$2" 'BEGIN { print (a == "" || b < a) ? b : a }'; }
-for _ in $(seq "$repeats"); do
-    read -r two_threads one_thread packing < <(cargo bench --quiet --bench cycle_compare -- "$work" $periods "$cycles" 2>/dev/null)
-    ours=$(least "$ours" "$two_threads"); one=$(least "$one" "$one_thread"); pack=$(least "${pack:-}" "$packing")
-    theirs=$(least "$theirs" "$(cd "$work" && ./build/sim $periods "$cycles")")
-    cmp "$work/ours.bin" "$work/verilator.bin"
+build() { # name, file, C++ flags, Verilator's flags
+    (cd "$work" && verilator --cc --exe --build -O3 --x-assign fast --x-initial fast --noassert "${@:4}" \
+        --top-module macropixels -Wno-WIDTH -CFLAGS "-O3 -march=native $3" -MAKEFLAGS "OPT_FAST=-O3 OPT_SLOW=-O3" \
+        --Mdir "$1" -o sim "$here/$2" "$here/verilator.cpp") >"$work/$1.log" 2>&1 ||
+        { tail -20 "$work/$1.log" >&2; exit 1; }
+}
+build loop macropixels_loop.v ""
+for width in 64 4096; do
+    build $width macropixels_sliced.v -DWIDTH=$width -GWIDTH=$width --unroll-count 16
 done
-awk -v t="$theirs" -v o="$ours" -v s="$one" -v p="$pack" -v k="$((4096 * cycles * periods))" -v n="$(nproc)" 'BEGIN {
-    row = "%-48s %9.4f %18.3g %8.1f\n"
-    printf "%-48s %9s %18s %8s\n", "64x64 macropixels, histograms equal", "seconds", "macropixel-CLK/s", "ratio"
-    printf row, "Verilator, RTL as one loop over memories", t, k / t, 1
-    printf row, "cycle engine, netlist, one thread", s, k / s, t / s
-    printf row, "cycle engine, netlist, " n " threads", o, k / o, t / o
-    printf "%-48s %9.4f\n", "(sorting photons for the cycle engine, " n " threads)", p
-}'
+
+# Name, stimulus, STOP period and laser cycles.
+compare() {
+    local kind
+    cargo bench --quiet --bench cycle_compare -- "$work" "$2" "$3" "$4" "$runs" >"$work/ours" 2>/dev/null
+    for kind in loop 64 4096; do
+        (cd "$work" && ./$kind/sim "$3" "$4" "$runs") >"$work/$kind.times"
+        cmp "$work/ours.bin" "$work/theirs.bin"
+    done
+    python3 "$here/spread.py" "$1" $((4096 * $3 * $4)) "$work"/{loop,4096,64}.times "$work/ours"
+}
+python3 "$here/spread.py"
+compare "street, 20 laser cycles of 520" street 520 20
+compare "street, 200 laser cycles of 520" street 520 200
+compare "street, 260 laser cycles of 40" street 40 260
+compare "100 Mcounts/s a SPAD, 4 laser cycles of 520" bright 520 4
+compare "every SPAD every CLK, 1 laser cycle of 520" every 520 1
+echo "Ratios are of medians, theirs to ours. Left out by ours: control of laser cycles after the recorded one (of 1: none), CLK"
+echo "periods in which no net changes. By the bit-sliced RTL: counters at rest, carries that have ended. By all: X and delays."

@@ -55,7 +55,7 @@ pub fn rows() -> Vec<Row> {
     let faintest = 100.0 * (thompson_ns(FAINT) / bound_ns(FAINT) - 1.0).abs();
     rows.push(
         Row::ours("the same for an echo that is lost in the background", "%", faintest)
-            .remark("The limit of a signal far below Fig. 33's: 100 background counts a bin cannot make it more."),
+            .remark("The limit of a signal far below Fig. 33's."),
     );
     rows.push(Row::ours(
         "Thompson at 100 signal counts",

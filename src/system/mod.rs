@@ -15,6 +15,6 @@ pub use distance::DistanceLaw;
 pub use frame::{EngineKind, FrameError, FrameSettings, Probe, take_frame};
 pub use pixel::{NoDepth, PixelDepth};
 pub use result::{Frame, PhaseTimes};
-pub use speed::{SPEED_LASER_CYCLES, SpeedFrame};
+pub use speed::{SPEED_LASER_CYCLES, SpeedCase, SpeedFrame};
 pub use summary::Summary;
 pub use tolerance::{Kept, Tolerance};

@@ -84,6 +84,7 @@ pub struct Cycle<'a> {
     config: &'a SensorConfig,
     exposure: &'a Exposure,
     law: WindowLaw,
+    replays_control: bool,
     machine: OnceLock<Result<Machine, Unlevelled>>,
 }
 
@@ -100,7 +101,18 @@ impl<'a> Cycle<'a> {
             config,
             exposure,
             law: WindowLaw::new(config, exposure),
+            replays_control: true,
             machine: OnceLock::new(),
+        }
+    }
+
+    /// The same engine with control simulated in every laser cycle, where otherwise one that repeats is recorded once and
+    /// replayed. Histograms are the same; the time that it takes shows what the recording saves.
+    #[must_use]
+    pub fn with_live_control(self) -> Self {
+        Cycle {
+            replays_control: false,
+            ..self
         }
     }
 
@@ -153,7 +165,9 @@ impl<'a> Cycle<'a> {
             .par_iter()
             .map(|(pixels, pulses)| {
                 let starts: Vec<u16> = pixels.iter().map(|&pixel| starts[pixel]).collect();
-                machine.run(self.exposure, self.clocked(), &starts, pulses)
+                let schedule =
+                    Schedule::new(&machine.levelised.causes, self.exposure, self.clocked());
+                machine.run(schedule, self.replays_control, &starts, pulses)
             })
             .collect();
         let mut histograms = vec![Vec::new(); starts.len()];
@@ -170,8 +184,8 @@ impl Machine {
     /// Histograms of one block.
     fn run(
         &self,
-        exposure: &Exposure,
-        clocked: usize,
+        schedule: Schedule<'_>,
+        replays_control: bool,
         starts: &[u16],
         pulses: &Packed,
     ) -> Result<Vec<Vec<u16>>, Unlevelled> {
@@ -179,13 +193,18 @@ impl Machine {
             stream,
             passes: tape,
             parts,
-            causes,
             ..
         } = &self.levelised;
         let mut block = Block::new(tape, self.start(starts)?);
         let mut flow = Flow::new(stream, pulses);
-        let schedule = Schedule::new(causes, exposure, clocked);
-        passes::run(tape, parts, &mut block, &mut flow, schedule);
+        passes::run(
+            tape,
+            parts,
+            &mut block,
+            &mut flow,
+            schedule,
+            replays_control,
+        );
         if let Some(place) = block.trapped {
             return Err(Unlevelled::Trapped(self.name(place)));
         }

@@ -26,7 +26,7 @@ const SETTLING_PASSES: i64 = 256;
 /// Laser cycles that are recorded before control is taken to have no period.
 const RECORDINGS: usize = 4;
 
-/// Runs all passes of one block.
+/// Runs all passes of one block, control in every laser cycle anew unless it may be replayed.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub fn run(
     tape: &PassTape,
@@ -34,9 +34,11 @@ pub fn run(
     block: &mut Block,
     flow: &mut Flow<'_>,
     mut schedule: Schedule<'_>,
+    replays_control: bool,
 ) {
     let is_control = |action: u16| !parts.photonic.contains(action);
-    let can_replay = schedule.is_periodic()
+    let can_replay = replays_control
+        && schedule.is_periodic()
         && tape
             .clock
             .iter()
