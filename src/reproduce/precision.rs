@@ -54,8 +54,12 @@ pub fn rows() -> Vec<Row> {
     );
     let faintest = 100.0 * (thompson_ns(FAINT) / bound_ns(FAINT) - 1.0).abs();
     rows.push(
-        Row::ours("the same for an echo that is lost in the background", "%", faintest)
-            .remark("The limit of a signal far below Fig. 33's."),
+        Row::ours(
+            "the same for an echo that is lost in the background",
+            "%",
+            faintest,
+        )
+        .remark("The limit of a signal far below Fig. 33's."),
     );
     rows.push(Row::ours(
         "Thompson at 100 signal counts",
