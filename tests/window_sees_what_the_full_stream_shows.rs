@@ -240,7 +240,7 @@ fn photons_that_cancel_are_told_of_by_every_engine() {
         let stream = stream_config(&config, &exposure, 3, Time::from_ps(1_900));
         let spads = SpadModel {
             dead_time,
-            ..stream.spads.clone()
+            ..stream.spads
         };
         let stream = PhotonStream::new(&StreamConfig { spads, ..stream });
         let window = Window::new(&config, &exposure);
