@@ -81,6 +81,40 @@ fn spads() -> impl Strategy<Value = SpadModel> {
     )
 }
 
+/// Where an echo is.
+#[derive(Debug, Clone, Copy)]
+enum Arrival {
+    /// So many bins before LOCAL_STOP.
+    BinsBefore(f64),
+    /// A share of the time from 3σ before a laser cycle to 3σ after it.
+    InCycle(f64),
+}
+
+fn arrivals() -> impl Strategy<Value = Arrival> {
+    prop_oneof![
+        3 => (-4f64..20.0).prop_map(Arrival::BinsBefore),
+        1 => (0f64..1.0).prop_map(Arrival::InCycle),
+        // An echo about STOP.
+        1 => (-0.01f64..0.01).prop_map(|share| Arrival::InCycle(share.rem_euclid(1.0))),
+    ]
+}
+
+/// How wide a laser pulse is.
+#[derive(Debug, Clone, Copy)]
+enum Sigma {
+    Fs(i64),
+    /// In CLK periods: up to longer than a window.
+    Bins(f64),
+}
+
+fn sigmas() -> impl Strategy<Value = Sigma> {
+    prop_oneof![
+        1 => Just(Sigma::Fs(0)),
+        6 => (500_000i64..4_000_000).prop_map(Sigma::Fs),
+        1 => (1f64..40.0).prop_map(Sigma::Bins),
+    ]
+}
+
 /// `most_periods`: longest laser cycle, in CLK periods; `slowest_mhz`: lowest CLK frequency.
 fn cases(most_periods: u32, slowest_mhz: f64) -> impl Strategy<Value = Case> {
     let cycles = prop_oneof![3 => 1u32..40, 1 => 500u32..1100];
@@ -90,7 +124,7 @@ fn cases(most_periods: u32, slowest_mhz: f64) -> impl Strategy<Value = Case> {
         (sensors(slowest_mhz), spads()),
         (2..most_periods, cycles),
         (any::<u64>(), any::<u32>()),
-        (rate_hz, signal, -4f64..20.0),
+        (rate_hz, signal, arrivals(), sigmas()),
         (any::<u16>(), 0u8..4, any::<bool>()),
     )
         .prop_map(
@@ -98,7 +132,7 @@ fn cases(most_periods: u32, slowest_mhz: f64) -> impl Strategy<Value = Case> {
                 (config, spads),
                 (stop_periods, laser_cycles),
                 (seed, number),
-                (background_hz, signal_per_cycle, bins_off),
+                (background_hz, signal_per_cycle, arrival, sigma),
                 (start, choice, measured),
             )| {
                 let exposure = Exposure::new(&config, stop_periods, laser_cycles);
@@ -111,13 +145,23 @@ fn cases(most_periods: u32, slowest_mhz: f64) -> impl Strategy<Value = Case> {
                 };
                 let start = start.min(config.largest_start());
                 let clk_fs = 1e9 / config.clk_hz * 1e6;
-                // Mostly in the window.
-                let arrival_fs = (f64::from(start) - bins_off) * clk_fs;
+                let sigma_fs = match sigma {
+                    Sigma::Fs(sigma_fs) => sigma_fs,
+                    Sigma::Bins(wide) => (wide * clk_fs) as i64,
+                };
+                let arrival_fs = match arrival {
+                    Arrival::BinsBefore(bins) => (f64::from(start) - bins) * clk_fs,
+                    Arrival::InCycle(share) => {
+                        let room_fs = 3.0 * sigma_fs as f64;
+                        let cycle_fs = f64::from(stop_periods) * clk_fs;
+                        share * (cycle_fs + 2.0 * room_fs) - room_fs
+                    }
+                };
                 let shape = PulseShape::new(Time::from_ps(700), &[0.0, 2.0, 1.0, 0.0]);
                 let stream = StreamConfig {
                     spads,
                     pulse_shape: measured.then(|| shape.unwrap()),
-                    ..stream_config(&config, &exposure, seed, Time::from_ps(1_500))
+                    ..stream_config(&config, &exposure, seed, Time::from_fs(sigma_fs))
                 };
                 let light = Some(PixelLight {
                     signal_per_cycle,
@@ -331,4 +375,61 @@ fn a_frame_without_skipping_is_the_same_frame() {
             "{full} photons without skipping, {some} with"
         );
     }
+}
+
+/// A SPAD fires at most once a dead time, and an exposure costs no more than that, however much light there is.
+#[test]
+fn an_echo_costs_what_is_detected() {
+    let config = SensorConfig::default();
+    let exposure = Exposure::new(&config, 520, 400);
+    let stream = PhotonStream::new(&stream_config(&config, &exposure, 3, Time::from_ps(1_900)));
+    let drawn = |signal_per_cycle| {
+        let pixel = LitPixel {
+            number: 7,
+            start: 200,
+            light: Some(PixelLight {
+                signal_per_cycle,
+                arrival: config.clock().periods(192),
+                background_hz: 8e6,
+            }),
+        };
+        let engine = Window::new(&config, &exposure);
+        let exposed = expose(&engine, &stream, &[pixel], |_| ()).unwrap();
+        let all = full_stream(&engine, &stream, &[pixel]).unwrap();
+        assert_eq!(exposed.histograms, all.histograms);
+        (exposed.work.photons_drawn, all.work.photons_drawn)
+    };
+    // The pulse lasts less than four dead times.
+    let most = 16 * 4 * 400;
+    for signal_per_cycle in [100.0, 1e3, 1e4] {
+        let (seen, all) = drawn(signal_per_cycle);
+        assert!(
+            seen < most && all < most + 8 * 520 * 400 / 100,
+            "{seen} {all} {signal_per_cycle}"
+        );
+    }
+}
+
+#[test]
+fn light_that_blinds_is_refused_with_its_numbers() {
+    let (config, exposure, stream, mut pixels) = frame();
+    if let Some(light) = &mut pixels[1].light {
+        light.background_hz = 2.1e9;
+    }
+    let engine = Window::new(&config, &exposure);
+    let refused = expose(&engine, &stream, &pixels, |_| ()).unwrap_err();
+    assert!(refused.is_refusal());
+    let says = refused.to_string();
+    for part in [
+        "131.2 Mcounts/s a SPAD",
+        "51 % of the time",
+        "125.0 Mcounts/s",
+        "8 ns",
+    ] {
+        assert!(says.contains(part), "{says}");
+    }
+    assert_eq!(
+        Err(refused),
+        expose_without_skipping(&engine, &stream, &pixels, |_| ())
+    );
 }

@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::{Cancelling, Engine, EngineError};
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::photon::{
-    DeadTimeLaw, PhotonStream, PixelLight, PixelPhotons, SpadEvent, SpadModel, StreamConfig,
+    DeadTimeLaw, PhotonStream, PixelLight, PixelPhotons, SPADS, SpadEvent, SpadModel, StreamConfig,
 };
 use crate::units::Time;
 
@@ -116,13 +116,14 @@ pub fn stream_config(
 /// macropixels as they are finished. Neither threads nor batches change the histograms.
 ///
 /// # Errors
-/// As [`Engine::expose`].
+/// As [`Engine::expose`], and where background light blinds SPADs more than half of the time.
 pub fn expose<E: Engine + ?Sized>(
     engine: &E,
     stream: &PhotonStream,
     pixels: &[LitPixel],
     done: impl Fn(usize) + Sync,
 ) -> Result<Exposed, EngineError> {
+    refuse_blinding(stream, pixels)?;
     in_batches(engine, pixels, done, |batch| engine.expose(stream, batch))
 }
 
@@ -130,16 +131,35 @@ pub fn expose<E: Engine + ?Sized>(
 /// same; what it took is not.
 ///
 /// # Errors
-/// As [`Engine::histograms`].
+/// As [`expose`].
 pub fn expose_without_skipping<E: Engine + ?Sized>(
     engine: &E,
     stream: &PhotonStream,
     pixels: &[LitPixel],
     done: impl Fn(usize) + Sync,
 ) -> Result<Exposed, EngineError> {
+    refuse_blinding(stream, pixels)?;
     in_batches(engine, pixels, done, |batch| {
         full_stream(engine, stream, batch)
     })
+}
+
+/// Background photons of a SPAD in a dead time up to which exposures are simulated: it is blind half of the time then. The
+/// cost of finding a SPAD's state grows with e to the power of this.
+const MOST_BLINDING: f64 = 1.0;
+
+fn refuse_blinding(stream: &PhotonStream, pixels: &[LitPixel]) -> Result<(), EngineError> {
+    let dead_time = stream.config().spads.dead_time;
+    let lights = pixels.iter().filter_map(|pixel| pixel.light);
+    let brightest_hz = lights.map(|light| light.background_hz).fold(0.0, f64::max) / SPADS as f64;
+    match brightest_hz * dead_time.as_s() <= MOST_BLINDING {
+        true => Ok(()),
+        false => Err(EngineError::Blinding {
+            background_hz: brightest_hz,
+            most_hz: MOST_BLINDING / dead_time.as_s(),
+            dead_time,
+        }),
+    }
 }
 
 fn in_batches<E: Engine + ?Sized>(
@@ -164,11 +184,43 @@ fn in_batches<E: Engine + ?Sized>(
     })
 }
 
-/// Draws every photon of the exposure and gives the pulses to [`Engine::histograms`].
+/// Bytes of pulses that are kept at a time. Two threads stay below 200 MB with it, unless a single macropixel has more.
+const MOST_PULSE_BYTES: f64 = 64e6;
+
+/// Draws every photon of the exposure and gives the pulses to [`Engine::histograms`], as many macropixels at a time as the
+/// memory for their pulses allows.
 ///
 /// # Errors
 /// As [`Engine::histograms`].
 pub fn full_stream<E: Engine + ?Sized>(
+    engine: &E,
+    stream: &PhotonStream,
+    pixels: &[LitPixel],
+) -> Result<Exposed, EngineError> {
+    let bytes = |pixel: &LitPixel| {
+        let edges = pixel
+            .light
+            .map_or(0.0, |light| stream.config().most_edges(&light));
+        edges * size_of::<SpadEvent>() as f64
+    };
+    let mut exposed = Exposed::default();
+    let mut rest = pixels;
+    while !rest.is_empty() {
+        let mut total = 0.0;
+        let fitting = rest.iter().take_while(|pixel| {
+            total += bytes(pixel);
+            total <= MOST_PULSE_BYTES
+        });
+        let (now, later) = rest.split_at(fitting.count().max(1));
+        let Exposed { histograms, work } = whole_pixels(engine, stream, now)?;
+        exposed.histograms.extend(histograms);
+        exposed.work += work;
+        rest = later;
+    }
+    Ok(exposed)
+}
+
+fn whole_pixels<E: Engine + ?Sized>(
     engine: &E,
     stream: &PhotonStream,
     pixels: &[LitPixel],

@@ -137,6 +137,22 @@ pub enum EngineError {
         /// Cells of a CLK period at least.
         cells: u32,
     },
+    /// Background light blinds SPADs more than half of the time.
+    #[error(
+        "background light of {:.1} Mcounts/s a SPAD keeps it blind for {:.0} % of the time; exposures are simulated up to {:.1} Mcounts/s, one photon a dead time of {} ns: give less light, a smaller or darker lens, a narrower filter or a shorter dead time",
+        background_hz / 1e6,
+        100.0 * background_hz / (background_hz + most_hz),
+        most_hz / 1e6,
+        dead_time.as_ns()
+    )]
+    Blinding {
+        /// Background photons and dark counts of a SPAD, 1/s.
+        background_hz: f64,
+        /// Most that are simulated, 1/s.
+        most_hz: f64,
+        /// The SPADs' dead time.
+        dead_time: crate::units::Time,
+    },
     /// A histogram bin of the netlist holds X.
     #[error("bin {bin} of {macropixel} is unknown (X) at the end of the exposure")]
     Unknown {

@@ -1,6 +1,7 @@
 //! Light and the SPADs that see it: photon budget (thesis 3.2.1), sunlight, lens and filter, dead time,
 //! and the random-access photon stream that drives every engine.
 
+mod avalanches;
 mod budget;
 mod echo;
 mod gaussian;
@@ -13,6 +14,7 @@ pub mod solar;
 mod spad;
 mod stream;
 
+pub use avalanches::{Avalanches, Unknown};
 pub use budget::{Convention, PhotonBudget, Spot};
 pub use echo::{ECHO_REACH, EchoLaw};
 pub use gaussian::{pulse_share, pulse_shares};
@@ -22,9 +24,11 @@ pub use pulse::{PulseError, PulseShape};
 pub use quantile::{NormalSampler, RANKS};
 pub use random::{Poisson, Purpose, normal, philox_key, random_stream};
 pub use spad::{
-    AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, SPADS, SpadEvent, SpadModel, apply_dead_time,
+    AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, Photon, SPADS, SpadEvent, SpadModel,
+    apply_dead_time,
 };
 pub use stream::{
-    Draw, GROUP, Group, PER_BLOCK, PLACE_BITS, PhotonStream, PixelLight, PixelPhotons, PixelStream,
-    Place, Run, Slots, Span, StreamConfig, TIME_BITS, signal_rank,
+    Background, Draw, GROUP, Group, NEVER_FS, OrderedEchoes, PER_BLOCK, PLACE_BITS, PhotonStream,
+    PixelLight, PixelPhotons, PixelStream, Place, Run, Slots, Span, StreamConfig, TILE, TIME_BITS,
+    signal_rank, spad_of,
 };

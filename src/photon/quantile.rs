@@ -96,17 +96,40 @@ impl NormalSampler {
         }
     }
 
+    /// The standard deviation.
+    pub fn sigma(&self) -> f64 {
+        self.sigma
+    }
+
+    /// The value below which a share `p` of all draws lies, 0 ≤ `p` ≤ 1; at most as far out as draws are.
+    #[inline]
+    pub fn quantile(&self, p: f64) -> f64 {
+        let tail = p.min(1.0 - p).max(0.5f64.powi(TAIL_BITS as i32 + 2));
+        let z = self.below(tail);
+        if p > 0.5 {
+            -z * self.sigma
+        } else {
+            z * self.sigma
+        }
+    }
+
+    /// The quantile of a tail of 2⁻⁵⁰ to ½ of the standard normal distribution.
+    #[inline]
+    fn below(&self, tail: f64) -> f64 {
+        let bits = tail.to_bits();
+        let piece = ((bits >> WITHIN_BITS) - FIRST_PIECE) as usize;
+        let [c0, c1, c2, c3] = self.cubics[piece % ROOM];
+        let within = tail - f64::from_bits(bits & !WITHIN);
+        c0 + within * (c1 + within * (c2 + within * c3))
+    }
+
     /// A draw from the lowest 49 bits of `word`: the highest is its sign, the others are the tail beyond it in steps of
     /// 2⁻⁴⁹.
     #[inline]
     pub fn draw(&self, word: u64) -> f64 {
         let half_steps = (word & ((1 << TAIL_BITS) - 1)) << 1 | 1;
         let tail = half_steps as f64 * 0.5f64.powi(TAIL_BITS as i32 + 2);
-        let bits = tail.to_bits();
-        let piece = ((bits >> WITHIN_BITS) - FIRST_PIECE) as usize;
-        let [c0, c1, c2, c3] = self.cubics[piece % ROOM];
-        let within = tail - f64::from_bits(bits & !WITHIN);
-        let z = c0 + within * (c1 + within * (c2 + within * c3));
+        let z = self.below(tail);
         let sign = word >> TAIL_BITS << 63;
         f64::from_bits((z * self.sigma).to_bits() ^ sign)
     }

@@ -23,6 +23,20 @@ pub enum Purpose {
     Avalanches = 4,
     /// Splits of cohorts of laser cycles.
     Cohort = 5,
+    /// How many photons breed.
+    BreedingCounts = 6,
+    /// Cycles, times and SPADs of background photons that breed.
+    BreedingPhotons = 7,
+    /// Cycles, times and SPADs of signal photons that breed.
+    BreedingSignal = 8,
+    /// Gaps and SPADs of background photons of bright macropixels.
+    BrightPhotons = 9,
+    /// Times of signal photons of bright macropixels.
+    BrightSignal = 10,
+    /// Gaps and SPADs of those background photons that breed.
+    BrightBreedingPhotons = 11,
+    /// Times of those signal photons that breed.
+    BrightBreedingSignal = 12,
 }
 
 /// The stream of random words for (`seed`, `purpose`, `index`, `sub_index`).

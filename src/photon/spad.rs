@@ -13,12 +13,11 @@
 //! An afterpulse comes from the same SPAD after its dead time, with an exponential delay that is cut at
 //! [`AFTERPULSE_REACH`] time constants. Crosstalk fires a direct neighbour within the macropixel after
 //! [`CROSSTALK_DELAY`]; what leaves the macropixel is lost. Neither breeds further ones: probabilities are those of one
-//! generation. Both are drawn from the avalanche's own time, SPAD and macropixel, so that whoever
-//! starts from a known state sees the same ones.
+//! generation. Which photons breed, should they make an avalanche, is drawn with the photons ([`Photon::breeds`]); what
+//! they breed is drawn from their own time, SPAD and macropixel, so that whoever starts from a known state sees the
+//! same.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
+use super::avalanches::Avalanches;
 use super::random::Purpose;
 use crate::units::Time;
 
@@ -38,6 +37,28 @@ pub struct SpadEvent {
     pub time: Time,
     /// Which SPAD_RAW wire, below [`SPADS`].
     pub spad: u8,
+}
+
+/// A photon or dark count on one SPAD, seen or not. Ordered by time, then SPAD.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Photon {
+    /// When, counted from the first rising edge of STOP of the exposure.
+    pub time: Time,
+    /// Which SPAD, below [`SPADS`].
+    pub spad: u8,
+    /// Whether its avalanche, if it makes one, has an afterpulse or crosstalk.
+    pub breeds: bool,
+}
+
+impl From<SpadEvent> for Photon {
+    /// One that does not breed.
+    fn from(event: SpadEvent) -> Self {
+        Photon {
+            time: event.time,
+            spad: event.spad,
+            breeds: false,
+        }
+    }
 }
 
 /// What an avalanche in a blind SPAD does.
@@ -79,88 +100,56 @@ impl SpadModel {
         self.afterpulse_probability > 0.0 || self.crosstalk_probability > 0.0
     }
 
-    /// How long a photon can matter: where more than this time passes without one, every SPAD is ready afterwards and
-    /// nothing is pending.
-    pub fn memory(&self) -> Time {
-        let mut secondary = Time::ZERO;
+    /// Chance that an avalanche breeds: has an afterpulse, crosstalk, or both.
+    pub fn breeding_probability(&self) -> f64 {
+        let (afterpulse, crosstalk) = (self.afterpulse_probability, self.crosstalk_probability);
+        afterpulse + crosstalk - afterpulse * crosstalk
+    }
+
+    /// Longest time from an avalanche that breeds to the last avalanche that it causes; zero where none does.
+    pub fn reach(&self) -> Time {
+        let mut reach = Time::ZERO;
         if self.afterpulse_probability > 0.0 {
-            secondary = self.dead_time + self.afterpulse_time * AFTERPULSE_REACH + Time::from_fs(2);
+            reach = self.dead_time + self.afterpulse_time * AFTERPULSE_REACH + Time::from_fs(2);
         }
         if self.crosstalk_probability > 0.0 {
-            secondary = secondary.max(CROSSTALK_DELAY);
+            reach = reach.max(CROSSTALK_DELAY);
         }
-        secondary + self.dead_time
+        reach
     }
 
-    /// Turns photons of macropixel `pixel` into rising edges; returns how many avalanches met a blind SPAD. `events` are
-    /// sorted by (time, SPAD), before and after; before the first one the macropixel was in the dark. `key` is that of
-    /// the photon stream.
-    pub fn detect(&self, key: [u32; 2], pixel: u32, events: &mut Vec<SpadEvent>) -> u64 {
-        debug_assert!(events.is_sorted(), "events must come in order");
-        if !self.has_secondaries() {
-            let before = events.len();
-            let mut readiness = Readiness::new(self);
-            events.retain(|event| readiness.fires(event));
-            return (before - events.len()) as u64;
-        }
-        let photons = std::mem::take(events);
-        let mut photons = photons.into_iter().peekable();
-        let mut secondaries = BinaryHeap::new();
-        let mut readiness = Readiness::new(self);
-        let mut lost = 0;
-        loop {
-            let secondary = secondaries.peek().map(|&Reverse(event)| event);
-            let (event, is_photon) = match (photons.peek(), secondary) {
-                (None, None) => break,
-                (Some(&photon), earliest) if earliest.is_none_or(|s| photon <= s) => {
-                    photons.next();
-                    (photon, true)
-                }
-                (_, earliest) => {
-                    secondaries.pop();
-                    (earliest.expect("not both are none"), false)
-                }
-            };
-            if !readiness.fires(&event) {
-                lost += 1;
-                continue;
-            }
-            events.push(event);
-            if is_photon {
-                self.breed(key, pixel, event, |child| secondaries.push(Reverse(child)));
-            }
-        }
-        lost
-    }
-
-    /// The avalanches that a photon's avalanche causes.
-    fn breed(
+    /// The avalanches that the avalanche `parent` of macropixel `pixel` causes, if it is one that breeds. `key` is that
+    /// of the photon stream.
+    pub(super) fn children(
         &self,
         key: [u32; 2],
         pixel: u32,
         parent: SpadEvent,
-        mut child: impl FnMut(SpadEvent),
-    ) {
+    ) -> impl Iterator<Item = SpadEvent> {
         let time_fs = parent.time.as_fs() as u64;
         let purpose = Purpose::Avalanches as u32 | u32::from(parent.spad) << 8;
         let counter = [time_fs as u32, (time_fs >> 32) as u32, pixel, purpose];
         let words = rand_philox::philox4x32_10(counter, key);
-        let happens = |word: u32, probability: f64| f64::from(word) < probability * 2f64.powi(32);
-        if happens(words[0], self.afterpulse_probability) {
+        // One word tells which of the two it causes, given that it causes something.
+        let (afterpulse, crosstalk) = (self.afterpulse_probability, self.crosstalk_probability);
+        let choice = rand_philox::u32_to_unit_f64(words[0]) * self.breeding_probability();
+        let has_afterpulse = choice < afterpulse;
+        let has_crosstalk = choice < afterpulse * crosstalk || choice >= afterpulse;
+        let afterpulse = has_afterpulse.then(|| {
             let reached = -libm::expm1(-AFTERPULSE_REACH as f64);
             let share = reached * rand_philox::u32_to_unit_f64(words[1]);
             let delay_fs = -libm::log1p(-share) * self.afterpulse_time.as_fs() as f64;
-            child(SpadEvent {
+            SpadEvent {
                 time: parent.time + self.dead_time + Time::from_fs(1 + delay_fs.round() as i64),
                 spad: parent.spad,
-            });
-        }
-        if happens(words[2], self.crosstalk_probability)
-            && let Some(spad) = neighbour(parent.spad, words[3] >> 30)
-        {
-            let time = parent.time + CROSSTALK_DELAY;
-            child(SpadEvent { time, spad });
-        }
+            }
+        });
+        let neighbour = has_crosstalk.then(|| neighbour(parent.spad, words[3] >> 30));
+        let crosstalk = neighbour.flatten().map(|spad| SpadEvent {
+            time: parent.time + CROSSTALK_DELAY,
+            spad,
+        });
+        afterpulse.into_iter().chain(crosstalk)
     }
 }
 
@@ -175,40 +164,16 @@ fn neighbour(spad: u8, direction: u32) -> Option<u8> {
     }
 }
 
-/// Until when each SPAD is blind.
-struct Readiness {
-    blind_until: [Time; SPADS],
-    dead_time: Time,
-    law: DeadTimeLaw,
-}
-
-impl Readiness {
-    fn new(model: &SpadModel) -> Self {
-        Readiness {
-            blind_until: [Time::from_fs(i64::MIN); SPADS],
-            dead_time: model.dead_time,
-            law: model.law,
-        }
-    }
-
-    /// Whether an avalanche makes an edge.
-    fn fires(&mut self, event: &SpadEvent) -> bool {
-        let until = &mut self.blind_until[usize::from(event.spad)];
-        let fires = event.time > *until;
-        if fires || self.law == DeadTimeLaw::Paralysable {
-            *until = event.time + self.dead_time;
-        }
-        fires
-    }
-}
-
 /// Removes the events that fall into the (non-paralysable) dead time of their SPAD; returns how many.
 ///
 /// `events` must be sorted by (time, SPAD) with times from 0 on. An event stays if and only if it
 /// is strictly later than the SPAD's last kept event plus `dead_time`. With a dead time of zero
 /// only exact coincidences on one SPAD are removed.
 pub fn apply_dead_time(events: &mut Vec<SpadEvent>, dead_time: Time) -> u64 {
-    SpadModel::with_dead_time(dead_time).detect([0; 2], 0, events)
+    let model = SpadModel::with_dead_time(dead_time);
+    let photons: Vec<Photon> = events.iter().map(|&event| event.into()).collect();
+    events.clear();
+    Avalanches::in_the_dark(&model, [0; 2], 0).run_to_the_end(&photons, events)
 }
 
 #[cfg(test)]
@@ -242,6 +207,14 @@ mod tests {
         kept
     }
 
+    /// Edges of photons that do not breed, and how many were lost.
+    fn detected(model: &SpadModel, photons: &[SpadEvent]) -> (Vec<SpadEvent>, u64) {
+        let photons: Vec<Photon> = photons.iter().map(|&event| event.into()).collect();
+        let mut edges = Vec::new();
+        let lost = Avalanches::in_the_dark(model, [0; 2], 0).run_to_the_end(&photons, &mut edges);
+        (edges, lost)
+    }
+
     #[test]
     fn an_avalanche_at_the_very_end_of_a_pulse_makes_no_edge() {
         let mut events = vec![event(0, 3), event(10, 3), event(11, 3)];
@@ -252,14 +225,13 @@ mod tests {
     #[test]
     fn a_suppressed_avalanche_prolongs_the_pulse_only_if_paralysable() {
         let photons = [event(0, 0), event(6, 0), event(12, 0)];
-        let mut events = photons.to_vec();
         let mut model = SpadModel::with_dead_time(Time::from_fs(10));
-        assert_eq!(model.detect([0; 2], 0, &mut events), 1);
-        assert_eq!(events, [event(0, 0), event(12, 0)]);
+        assert_eq!(
+            detected(&model, &photons),
+            (vec![event(0, 0), event(12, 0)], 1)
+        );
         model.law = DeadTimeLaw::Paralysable;
-        let mut events = photons.to_vec();
-        assert_eq!(model.detect([0; 2], 0, &mut events), 2);
-        assert_eq!(events, [event(0, 0)]);
+        assert_eq!(detected(&model, &photons), (vec![event(0, 0)], 2));
     }
 
     #[test]
@@ -269,43 +241,38 @@ mod tests {
         assert_eq!(events.len(), 3);
     }
 
-    /// Lonely avalanches of SPAD 5, and what they cause.
-    fn secondaries(model: &SpadModel, lonely: i64) -> Vec<(Time, u8)> {
+    /// What lonely avalanches of SPAD 5 that breed cause: SPAD, and time since the avalanche.
+    fn children(model: &SpadModel, lonely: i64) -> Vec<Vec<(Time, u8)>> {
         let apart = Time::from_ns(10_000);
-        let mut events: Vec<_> = (0..lonely)
-            .map(|n| SpadEvent {
-                time: apart * n,
-                spad: 5,
+        let parents = (0..lonely).map(|n| event((apart * n).as_fs(), 5));
+        let since = |parent: SpadEvent, child: SpadEvent| (child.time - parent.time, child.spad);
+        parents
+            .map(|parent| {
+                let children = model.children([1, 2], 3, parent);
+                children.map(|child| since(parent, child)).collect()
             })
-            .collect();
-        assert_eq!(model.detect([1, 2], 3, &mut events), 0);
-        let caused = events.iter().map(|e| {
-            let since = e.time.as_fs() % apart.as_fs();
-            (Time::from_fs(since), e.spad)
-        });
-        caused.filter(|(since, _)| *since > Time::ZERO).collect()
+            .collect()
     }
 
     #[test]
-    fn afterpulses_have_their_probability_and_delay() {
+    fn afterpulses_have_their_delay() {
         let model = SpadModel {
             afterpulse_probability: 0.2,
             afterpulse_time: Time::from_ns(5),
             ..SpadModel::with_dead_time(Time::from_ns(8))
         };
-        let n = 20_000;
-        let caused = secondaries(&model, n);
-        let expected = 0.2 * n as f64;
-        assert!((caused.len() as f64 - expected).abs() < 5.0 * (expected * 0.8).sqrt());
-        let delays = caused.iter().map(|&(since, spad)| {
-            assert_eq!(spad, 5);
-            assert!(since > model.dead_time && since <= model.memory() - model.dead_time);
+        let n = 5_000;
+        let delays = children(&model, n).into_iter().map(|caused| {
+            let [(since, 5)] = caused[..] else {
+                panic!("one afterpulse, not {caused:?}");
+            };
+            assert!(since > model.dead_time && since <= model.reach());
             (since - model.dead_time).as_ns()
         });
-        let mean = delays.sum::<f64>() / caused.len() as f64;
+        let mean = delays.sum::<f64>() / n as f64;
         // Mean of an exponential cut at 8 time constants.
         let expected = 5.0 * (1.0 - 8.0 / (8f64.exp() - 1.0));
-        assert!((mean - expected).abs() < 5.0 * 5.0 / (caused.len() as f64).sqrt());
+        assert!((mean - expected).abs() < 5.0 * 5.0 / (n as f64).sqrt());
     }
 
     #[test]
@@ -314,26 +281,48 @@ mod tests {
             crosstalk_probability: 0.5,
             ..SpadModel::with_dead_time(Time::from_ns(8))
         };
-        let n = 8_000;
-        let caused = secondaries(&model, n);
+        let n = 4_000;
+        let caused: Vec<_> = children(&model, n).concat();
         for neighbour in [1, 4, 6, 9] {
-            let hits = caused
-                .iter()
-                .filter(|&&(_, spad)| spad == neighbour)
-                .count() as f64;
-            let expected = 0.5 * n as f64 / 4.0;
+            let hits = caused.iter().filter(|&&(_, spad)| spad == neighbour);
+            let (hits, expected) = (hits.count() as f64, n as f64 / 4.0);
             assert!(
                 (hits - expected).abs() < 5.0 * expected.sqrt(),
                 "{hits} {expected}"
             );
         }
-        assert!(
-            caused
-                .iter()
-                .all(|&(since, spad)| { since == CROSSTALK_DELAY && [1, 4, 6, 9].contains(&spad) })
-        );
+        assert!(caused.iter().all(|&(since, _)| since == CROSSTALK_DELAY));
+        assert_eq!(caused.len() as i64, n);
         let inside = |spad| (0..4).filter_map(|d| neighbour(spad, d)).count();
         assert_eq!([0, 1, 5].map(inside), [2, 3, 4]);
+    }
+
+    #[test]
+    fn avalanches_that_breed_cause_one_or_the_other_or_both() {
+        let model = SpadModel {
+            afterpulse_probability: 0.3,
+            afterpulse_time: Time::from_ns(5),
+            crosstalk_probability: 0.1,
+            ..SpadModel::with_dead_time(Time::from_ns(8))
+        };
+        let breeding = model.breeding_probability();
+        assert!((breeding - 0.37).abs() < 1e-12);
+        let n = 20_000;
+        let caused = children(&model, n);
+        let share = |wanted: &dyn Fn(&[(Time, u8)]) -> bool| {
+            caused.iter().filter(|caused| wanted(caused)).count() as f64 / n as f64
+        };
+        let has_afterpulse = |caused: &[(Time, u8)]| caused.iter().any(|&(_, spad)| spad == 5);
+        for (found, expected) in [
+            (share(&|caused| has_afterpulse(caused)), 0.3 / 0.37),
+            (share(&|caused| caused.len() == 2), 0.03 / 0.37),
+            (share(&|caused| caused.is_empty()), 0.0),
+        ] {
+            assert!(
+                (found - expected).abs() < 5.0 * 0.5 / (n as f64).sqrt(),
+                "{found} {expected}"
+            );
+        }
     }
 
     proptest! {
@@ -348,41 +337,9 @@ mod tests {
             let mut events: Vec<_> = raw.into_iter().map(|(t, s)| event(t, s)).collect();
             events.sort();
             let expected = slow_reference(&events, Time::from_fs(dead_fs), law);
-            let total = events.len();
-            let dropped = model.detect([0; 2], 0, &mut events);
-            prop_assert_eq!(total as u64 - dropped, expected.len() as u64);
-            prop_assert_eq!(events, expected);
-        }
-
-        /// After a gap longer than the memory, what went before does not matter.
-        #[test]
-        fn the_past_is_forgotten_after_the_memory(
-            raw in prop::collection::vec((0i64..200_000, 0u8..16), 1..100),
-            afterpulse_probability in 0.0f64..1.0,
-            crosstalk_probability in 0.0f64..1.0,
-            paralysable: bool,
-        ) {
-            let law = if paralysable { DeadTimeLaw::Paralysable } else { DeadTimeLaw::NonParalysable };
-            let model = SpadModel {
-                law,
-                afterpulse_probability,
-                afterpulse_time: Time::from_fs(500),
-                crosstalk_probability,
-                ..SpadModel::with_dead_time(Time::from_fs(3_000))
-            };
-            let mut before: Vec<_> = raw.iter().map(|&(t, s)| event(t, s)).collect();
-            before.sort();
-            let gap = before.last().unwrap().time + model.memory() + Time::from_fs(1);
-            let after: Vec<_> = before
-                .iter()
-                .map(|e| SpadEvent { time: gap + (e.time - before[0].time), ..*e })
-                .collect();
-            let mut all: Vec<_> = before.iter().chain(&after).copied().collect();
-            let mut alone = after;
-            model.detect([7, 8], 1, &mut all);
-            model.detect([7, 8], 1, &mut alone);
-            all.retain(|e| e.time >= gap);
-            prop_assert_eq!(all, alone);
+            let (edges, lost) = detected(&model, &events);
+            prop_assert_eq!(events.len() as u64 - lost, expected.len() as u64);
+            prop_assert_eq!(edges, expected);
         }
     }
 }

@@ -6,7 +6,9 @@
 //! * a Poisson number of signal photons, spread around the arrival of the echo by the laser pulse and all jitter,
 //! * a Poisson number of background photons and dark counts, uniform over the cycle,
 //!
-//! each on one of the 16 SPADs with equal chance. Photons outside their cycle are discarded.
+//! each on one of the 16 SPADs with equal chance. No echo is cut: what overruns its laser cycle, at either end, falls into
+//! its neighbours ([`EchoLaw`](super::EchoLaw)). Only what comes before the first cycle or
+//! after the last one is no photon.
 //!
 //! ```text
 //!                  slot 0   slot 1   slot 2   …            a slot is a CLK period, or a 2ᵏ-th of a long one
@@ -18,36 +20,41 @@
 //!     …          │        │        │        │             signal:     one key per (macropixel, group)
 //! ```
 //!
-//! The photons of a cycle may begin a little before it ([`StreamConfig::lead`]), and then end as much before the next one;
-//! none comes before the exposure.
+//! The background photons of a cycle may begin a little before it ([`StreamConfig::lead`]), and then end as much before the
+//! next one; none comes before the exposure.
+//!
+//! Macropixels in bright light are drawn by laser cycle instead ([`bright`]). Photons that breed ([`SpadModel`]) are a
+//! stream of their own: parts of a Poisson process chosen by chance are independent.
 //!
 //! The photons under one key are a pure function of (seed, macropixel, slot, group): their Poisson number is drawn
 //! first, then each takes 32 random bits for its cycle, SPAD and time (a signal photon 64, and 128 more for a measured
 //! pulse). So any part can be drawn on any thread in any order, and all see the same light. Only dead time,
-//! afterpulses and crosstalk tie slots and cycles together; they are applied afterwards ([`SpadModel::detect`]).
+//! afterpulses and crosstalk tie slots and cycles together; they are applied afterwards ([`Avalanches`]).
 //!
 //! Timing jitter of a SPAD displaces the points of a Poisson process, which leaves it one: jitter of background changes
 //! nothing, and that of the signal is part of the pulse.
 //!
 //! Limits of the model: rates are detection rates and constant within an exposure; no spread of dead time or dark counts
-//! between SPADs; an echo that outlasts its cycle is cut off and not carried into the next one; background photons come at
-//! multiples of some 20 fs ([`Slots`]).
+//! between SPADs; background photons come at multiples of some 20 fs ([`Slots`]).
 
 use std::cell::OnceCell;
 use std::ops::Range;
 
+use super::avalanches::Avalanches;
 use super::philox::Blocks;
 use super::pulse::{PulseSampler, PulseShape};
 use super::quantile::{NORMAL_BITS, NormalSampler};
 use super::random::{Poisson, Purpose, philox_key};
-use super::spad::{SPADS, SpadEvent, SpadModel};
+use super::spad::{Photon, SPADS, SpadEvent, SpadModel};
 use crate::units::{Frequency, Time};
+pub use bright::{Background, NEVER_FS, OrderedEchoes, TILE, spad_of};
 use draw::ByCycle;
 pub use draw::{Draw, PER_BLOCK, Place, Run};
 use group::FIRST;
 pub use group::{GROUP, Group, PLACE_BITS};
 pub use slot::{Slots, TIME_BITS};
 
+mod bright;
 mod draw;
 mod group;
 mod slot;
@@ -70,7 +77,7 @@ const SIGNAL_RUN: u32 = u32::MAX;
 pub struct Span {
     /// Whose background photons belong to it.
     pub slots: Range<u32>,
-    /// When signal photons belong to it, fs after the start of the cycle: mostly as long as the slots last.
+    /// When photons of the cycle's own echo belong to it, fs after the start of the cycle; that may be outside the cycle.
     pub within_fs: Range<i64>,
 }
 
@@ -102,6 +109,14 @@ impl StreamConfig {
     pub fn cycle_start(&self, cycle: u32) -> Time {
         self.clock
             .periods(i64::from(cycle) * i64::from(self.stop_periods))
+    }
+
+    /// Rising edges of a macropixel's SPADs to be expected in the exposure, at most: as many as photons, and as dead times.
+    pub fn most_edges(&self, light: &PixelLight) -> f64 {
+        let causes = 1.0 + self.spads.afterpulse_probability + self.spads.crosstalk_probability;
+        let photons = light.photons_per_cycle(self) * causes;
+        let dead_times = SPADS as f64 * (self.cycle_s() / self.spads.dead_time.as_s() + 1.0);
+        photons.min(dead_times) * f64::from(self.laser_cycles)
     }
 
     /// Nominal length of a cycle, s.
@@ -184,14 +199,19 @@ impl PhotonStream {
         -self.slots.lead_fs()..self.cycle_fs - self.slots.lead_fs()
     }
 
-    /// What these slots are.
+    /// What these slots are. Of the cycle's own echo, all that comes before the cycle begins with the first slot, and all
+    /// that comes after it ends with the last one.
     pub fn span(&self, slots: Range<u32>) -> Span {
+        let from_fs = match slots.start {
+            0 => -FAR_FS,
+            first => self.slots.start_fs(first),
+        };
         let until_fs = match slots.end == self.slots.count() {
-            true => self.ends_fs().end,
+            true => FAR_FS,
             false => self.slots.start_fs(slots.end),
         };
         Span {
-            within_fs: self.slots.start_fs(slots.start)..until_fs,
+            within_fs: from_fs..until_fs,
             slots,
         }
     }
@@ -201,8 +221,19 @@ impl PhotonStream {
         Group::until(self.config.laser_cycles)
     }
 
-    /// Macropixel number `pixel` under `light`.
+    /// Macropixel number `pixel` under `light`: its photons that do not breed, all if nothing breeds.
     pub fn pixel(&self, pixel: u32, light: &PixelLight) -> PixelStream<'_> {
+        let share = 1.0 - self.config.spads.breeding_probability();
+        self.part(pixel, light, Kind::Plain, share)
+    }
+
+    /// The photons of a macropixel that breed, if there are any.
+    pub fn breeding(&self, pixel: u32, light: &PixelLight) -> Option<PixelStream<'_>> {
+        let share = self.config.spads.breeding_probability();
+        (share > 0.0).then(|| self.part(pixel, light, Kind::Breeding, share))
+    }
+
+    fn part(&self, pixel: u32, light: &PixelLight, kind: Kind, share: f64) -> PixelStream<'_> {
         let reach_fs = self.gaussian.reach();
         let (mut first_fs, mut last_fs) = (-reach_fs, reach_fs);
         if let Some(shape) = &self.shape {
@@ -210,58 +241,216 @@ impl PhotonStream {
             last_fs += shape.range_fs().1;
         }
         // What is so far away is in no cycle, and may be displaced without overflow.
-        let arrival_fs = light.arrival.as_fs().clamp(-FAR_FS, FAR_FS);
-        PixelStream {
+        let arrival_fs = light.arrival.as_fs().clamp(-FAR_FS / 2, FAR_FS / 2);
+        let background_hz = light.background_hz * share;
+        let mut part = PixelStream {
             stream: self,
             pixel,
+            kind,
+            is_bright: bright::is_bright(light, &self.config),
             arrival_fs,
             echo_fs: (
                 arrival_fs + first_fs.floor() as i64,
                 arrival_fs + last_fs.ceil() as i64,
             ),
-            background: Numbers::new(light.background_hz * self.slots.length_s()),
-            signal: Numbers::new(light.signal_per_cycle),
-        }
+            background: Numbers::new(background_hz * self.slots.length_s()),
+            signal: Numbers::new(light.signal_per_cycle * share),
+            gap_fs: 1e15 / background_hz,
+            signal_per_spad: light.signal_per_cycle * share / SPADS as f64,
+            late_fs: 0,
+        };
+        part.late_fs = part.late_fs();
+        part
     }
 
     /// All avalanches of macropixel number `pixel` under `light` in the exposure.
     pub fn pixel_events(&self, pixel: u32, light: &PixelLight) -> PixelPhotons {
-        let stream = self.pixel(pixel, light);
-        let expected = light.photons_per_cycle(&self.config) * f64::from(self.config.laser_cycles);
+        let expected = self.config.most_edges(light);
         // Five standard deviations of room; the cap keeps a huge request from failing up front.
         let room = (expected + 5.0 * expected.sqrt() + 16.0).min(1e7);
         let mut events = Vec::with_capacity(room as usize);
+        let photons = self.pixel_pulses(pixel, light, |pulses| events.extend_from_slice(pulses));
+        PixelPhotons { events, ..photons }
+    }
+
+    /// As [`PhotonStream::pixel_events`], but hands the avalanches over part by part, in their order, so that they need not
+    /// be kept; what it returns has no events.
+    pub fn pixel_pulses(
+        &self,
+        pixel: u32,
+        light: &PixelLight,
+        pulses: impl FnMut(&[SpadEvent]),
+    ) -> PixelPhotons {
+        let plain = self.pixel(pixel, light);
+        let breeding = self.breeding(pixel, light);
+        match plain.is_bright {
+            true => self.bright_pulses(&plain, breeding.as_ref(), pulses),
+            false => self.dim_pulses(&plain, breeding.as_ref(), pulses),
+        }
+    }
+
+    fn dim_pulses(
+        &self,
+        plain: &PixelStream<'_>,
+        breeding: Option<&PixelStream<'_>>,
+        mut pulses: impl FnMut(&[SpadEvent]),
+    ) -> PixelPhotons {
         let mut draw = Draw::default();
         let mut by_cycle = ByCycle::default();
         let all = self.span(0..self.slots.count());
-        for group in self.groups() {
-            stream.draw(group, &all, &mut draw);
-            by_cycle.sort(&draw, &stream);
-            for cycle in 0..group.cycles_in(self.config.laser_cycles) {
-                let start = self.config.cycle_start(group.first_cycle() + cycle);
-                events.extend(by_cycle.of(cycle).iter().map(|&photon| SpadEvent {
-                    time: start + Time::from_fs(photon >> SPAD_BITS),
-                    spad: (photon & (SPADS as i64 - 1)) as u8,
-                }));
-            }
-        }
-        let drawn = events.len() as u64;
-        let lost_to_dead_time = stream.detect(&mut events);
         let end = self.config.cycle_start(self.config.laser_cycles);
-        events.truncate(events.partition_point(|event| event.time < end));
+        let mut photons: Vec<Photon> = Vec::new();
+        let mut edges = Vec::new();
+        let mut avalanches = Avalanches::in_the_dark(&self.config.spads, self.key, plain.pixel);
+        let mut drawn = 0;
+        for group in self.groups() {
+            let cycles = group.cycles_in(self.config.laser_cycles);
+            let carried = photons.len();
+            for light in std::iter::once(plain).chain(breeding) {
+                light.draw(group, &all, &mut draw);
+                by_cycle.sort(&draw, light);
+                for cycle in 0..cycles {
+                    let start = self.config.cycle_start(group.first_cycle() + cycle);
+                    photons.extend(by_cycle.of(cycle).iter().map(|&photon| Photon {
+                        time: start + Time::from_fs(photon >> SPAD_BITS),
+                        spad: (photon & (SPADS as i64 - 1)) as u8,
+                        breeds: light.kind == Kind::Breeding,
+                    }));
+                }
+            }
+            if carried > 0 || breeding.is_some() || !plain.stays_in_its_cycle() {
+                photons.retain(|photon| (Time::ZERO..end).contains(&photon.time));
+                photons.sort_unstable();
+            }
+            // Photons of the next groups come from then on.
+            let next = group.first_cycle().saturating_add(group.cycles());
+            let until = match next < self.config.laser_cycles {
+                true => self.config.cycle_start(next) + plain.earliest(),
+                false => end,
+            };
+            let now = photons.partition_point(|photon| photon.time < until);
+            edges.clear();
+            let known = avalanches.run(&photons[..now], None, until, until, &mut edges);
+            debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
+            photons.drain(..now);
+            drawn += now as u64;
+            pulses(&edges);
+        }
         PixelPhotons {
-            events,
+            events: Vec::new(),
             drawn,
-            lost_to_dead_time,
+            lost_to_dead_time: avalanches.lost(),
+        }
+    }
+
+    fn bright_pulses(
+        &self,
+        plain: &PixelStream<'_>,
+        breeding: Option<&PixelStream<'_>>,
+        mut pulses: impl FnMut(&[SpadEvent]),
+    ) -> PixelPhotons {
+        let config = &self.config;
+        let end = config.cycle_start(config.laser_cycles);
+        let mut photons: Vec<Photon> = Vec::new();
+        let mut edges = Vec::new();
+        let mut avalanches = Avalanches::in_the_dark(&config.spads, self.key, plain.pixel);
+        let mut echoes = plain.ordered_echoes();
+        let (mut drawn, mut next_echo) = (0, 0);
+        for cycle in 0..config.laser_cycles {
+            let until = match cycle + 1 < config.laser_cycles {
+                true => config.cycle_start(cycle + 1) - Time::from_fs(self.slots.lead_fs()),
+                false => end,
+            };
+            // Whatever may blind a SPAD for an echo must find it.
+            let may_begin = |echo: u32| {
+                config.cycle_start(echo) + Time::from_fs(plain.echo_fs.0)
+                    <= until + config.spads.dead_time
+            };
+            while next_echo < config.laser_cycles && may_begin(next_echo) {
+                echoes.add(next_echo);
+                for light in std::iter::once(plain).chain(breeding) {
+                    light.push_listed_echo(next_echo, &mut photons);
+                }
+                next_echo += 1;
+            }
+            for light in std::iter::once(plain).chain(breeding) {
+                for block in 0..light.blocks() {
+                    light.push_block(cycle, block, &mut photons);
+                }
+            }
+            photons.retain(|photon| photon.time < end);
+            photons.sort_unstable();
+            let now = photons.partition_point(|photon| photon.time < until);
+            edges.clear();
+            let known =
+                avalanches.run(&photons[..now], Some(&mut echoes), until, until, &mut edges);
+            debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
+            photons.drain(..now);
+            drawn += now as u64;
+            echoes.forget_before(until);
+            pulses(&edges);
+        }
+        PixelPhotons {
+            events: Vec::new(),
+            drawn: drawn + echoes.drawn(),
+            lost_to_dead_time: avalanches.lost(),
         }
     }
 }
 
-/// The photons of one macropixel, before dead time.
+/// Which photons of a macropixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// Those whose avalanches cause no others.
+    Plain,
+    /// Those whose avalanches do.
+    Breeding,
+}
+
+impl Kind {
+    fn counts(self) -> Purpose {
+        match self {
+            Kind::Plain => Purpose::PhotonCounts,
+            Kind::Breeding => Purpose::BreedingCounts,
+        }
+    }
+
+    fn background(self) -> Purpose {
+        match self {
+            Kind::Plain => Purpose::Photons,
+            Kind::Breeding => Purpose::BreedingPhotons,
+        }
+    }
+
+    fn echo(self) -> Purpose {
+        match self {
+            Kind::Plain => Purpose::Signal,
+            Kind::Breeding => Purpose::BreedingSignal,
+        }
+    }
+
+    fn bright_background(self) -> u32 {
+        match self {
+            Kind::Plain => Purpose::BrightPhotons as u32,
+            Kind::Breeding => Purpose::BrightBreedingPhotons as u32,
+        }
+    }
+
+    fn bright_echo(self) -> u32 {
+        match self {
+            Kind::Plain => Purpose::BrightSignal as u32,
+            Kind::Breeding => Purpose::BrightBreedingSignal as u32,
+        }
+    }
+}
+
+/// The photons of one macropixel, before dead time: those that breed, or the others.
 #[derive(Debug, Clone)]
 pub struct PixelStream<'a> {
     stream: &'a PhotonStream,
     pixel: u32,
+    kind: Kind,
+    is_bright: bool,
     arrival_fs: i64,
     /// Earliest and latest time of a signal photon in its cycle.
     echo_fs: (i64, i64),
@@ -269,13 +458,20 @@ pub struct PixelStream<'a> {
     background: Numbers,
     /// Photons in all slots.
     signal: Numbers,
+    /// Mean time between background photons; infinite in the dark.
+    gap_fs: f64,
+    /// Mean number of signal photons of a SPAD in a laser cycle.
+    signal_per_spad: f64,
+    /// From when on an echo has hardly any photons left.
+    late_fs: i64,
 }
 
 /// Numbers of photons in groups of any length.
 #[derive(Debug, Clone)]
 struct Numbers {
     per_cycle: f64,
-    /// In one of the shortest groups, and in one of the longest. Made when first wanted.
+    /// In one cycle, one of the shortest groups, and one of the longest. Made when first wanted.
+    one: OnceCell<Poisson>,
     short: OnceCell<Poisson>,
     long: OnceCell<Poisson>,
 }
@@ -284,9 +480,15 @@ impl Numbers {
     fn new(per_cycle: f64) -> Self {
         Numbers {
             per_cycle,
+            one: OnceCell::new(),
             short: OnceCell::new(),
             long: OnceCell::new(),
         }
+    }
+
+    /// In one laser cycle.
+    fn per_cycle(&self) -> &Poisson {
+        self.one.get_or_init(|| Poisson::new(self.per_cycle))
     }
 
     /// A distribution, and how many draws of it make the number in this group.
@@ -332,23 +534,81 @@ impl<'a> Counts<'a> {
 }
 
 impl PixelStream<'_> {
-    /// Turns photons of this macropixel, sorted by (time, SPAD) and complete since a time when every SPAD was ready, into
-    /// rising edges; returns how many avalanches met a blind SPAD.
-    pub fn detect(&self, events: &mut Vec<SpadEvent>) -> u64 {
+    /// The SPADs of this macropixel, where its photons are known from `time` on, or from the beginning. `breeding` are the
+    /// photons before `time` that breed, since [`SpadModel::reach`] at least.
+    pub fn avalanches(
+        &self,
+        time: Option<Time>,
+        breeding: impl Iterator<Item = Photon>,
+    ) -> Avalanches<'_> {
+        let (model, key) = (&self.stream.config.spads, self.stream.key);
+        match time {
+            Some(time) => Avalanches::known_from(model, key, self.pixel, time, breeding),
+            None => Avalanches::in_the_dark(model, key, self.pixel),
+        }
+    }
+
+    /// Whether these are the photons that breed.
+    pub fn breeds(&self) -> bool {
+        self.kind == Kind::Breeding
+    }
+
+    /// The avalanches that a photon which breeds causes, if it makes one itself.
+    pub fn children(&self, photon: Photon) -> impl Iterator<Item = SpadEvent> {
+        let parent = SpadEvent {
+            time: photon.time,
+            spad: photon.spad,
+        };
         let spads = &self.stream.config.spads;
-        spads.detect(self.stream.key, self.pixel, events)
+        spads.children(self.stream.key, self.pixel, parent)
+    }
+
+    /// Earliest time of a photon of the echo and later than the last one, fs after the start of its cycle; both 0 where there
+    /// is none.
+    pub fn echo_fs(&self) -> Range<i64> {
+        match self.signal_per_spad > 0.0 {
+            true => self.echo_fs.0..self.echo_fs.1 + 1,
+            false => 0..0,
+        }
+    }
+
+    /// Laser cycles, relative to one of them, whose echoes may have photons `within_fs` after its start.
+    pub fn echoes_within(&self, within_fs: &Range<i64>) -> Range<i64> {
+        let (echo_fs, cycle_fs) = (self.echo_fs(), self.stream.cycle_fs);
+        if echo_fs.is_empty() || within_fs.is_empty() {
+            return 0..0;
+        }
+        // Starts of cycles are rounded: a cycle n later starts up to n + 1 fs later than n whole cycles.
+        let room_fs = 2 + within_fs.start.abs().max(within_fs.end.abs()) / cycle_fs;
+        let first = (within_fs.start - echo_fs.end - room_fs).div_euclid(cycle_fs) + 1;
+        let last = (within_fs.end - echo_fs.start + room_fs - 1).div_euclid(cycle_fs);
+        first..last + 1
+    }
+
+    /// Whether no photon of an echo leaves the time of its own cycle's background photons.
+    pub fn stays_in_its_cycle(&self) -> bool {
+        let (echo_fs, ends_fs) = (self.echo_fs(), self.stream.ends_fs());
+        echo_fs.is_empty() || (echo_fs.start >= ends_fs.start.max(0) && echo_fs.end <= ends_fs.end)
+    }
+
+    /// No photon comes earlier than that after the start of its cycle.
+    fn earliest(&self) -> Time {
+        let background_fs = self.stream.ends_fs().start;
+        Time::from_fs(self.echo_fs().start.min(background_fs))
     }
 
     /// Draws all photons of `group` in a part of its cycles.
     pub fn draw(&self, group: Group, span: &Span, draw: &mut Draw) {
         let key = self.stream.key;
         let numbered = |purpose: Purpose| purpose as u32 | group.number() << 8;
+        debug_assert!(!self.is_bright, "bright light is drawn by laser cycle");
         draw.begin(group);
 
         draw.within_fs = span.within_fs.clone();
         let (background, parts) = self.background.of(group);
         let (signal, signal_parts) = self.signal.of(group);
         let has_echo = !signal.is_zero()
+            && !draw.within_fs.is_empty()
             && self.echo_fs.0 < draw.within_fs.end
             && self.echo_fs.1 >= draw.within_fs.start;
         if has_echo {
@@ -362,14 +622,14 @@ impl PixelStream<'_> {
             }
         }
         let mut numbers = std::mem::take(&mut draw.counts);
-        numbers.generate(key, self.pixel, numbered(Purpose::PhotonCounts));
+        numbers.generate(key, self.pixel, numbered(self.kind.counts()));
 
         let mut counts = Counts::new(&numbers);
         if has_echo {
             let photons = counts.next(signal, signal_parts);
             draw.push_echo(photons, self.stream.shape.is_some());
             draw.echo
-                .generate(key, self.pixel, numbered(Purpose::Signal));
+                .generate(key, self.pixel, numbered(self.kind.echo()));
         }
         if !background.is_zero() {
             for slot in span.slots.clone() {
@@ -377,7 +637,7 @@ impl PixelStream<'_> {
                 draw.push_run(slot, photons);
             }
             draw.background
-                .generate(key, self.pixel, numbered(Purpose::Photons));
+                .generate(key, self.pixel, numbered(self.kind.background()));
         }
         draw.counts = numbers;
     }

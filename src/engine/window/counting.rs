@@ -10,24 +10,26 @@
 //! too close to an edge, photons are taken out again, and what the dead time leaves of them is counted bin by bin. The
 //! times of photons are worked out only there.
 //!
-//! Where secondaries tie SPADs together, or photons are many, cycles are sorted and go through [`SpadModel::detect`]
-//! one by one ([`Counting::count_sorted`]).
-//!
-//! [`SpadModel::detect`]: crate::photon::SpadModel::detect
+//! Cycles with photons that breed are settled as a whole; so are all cycles of a group where photons are many, or where
+//! echoes of other cycles are seen ([`whole`]).
 
 use super::binning::{Binning, Scratch, Wanted};
 use super::codes::{Code, Codes, ROWS};
 use super::echo::EchoRows;
-use super::history::{Photon, certain_from, split};
-use super::sight::{ROUNDING_FS, Sight};
+use super::past::split;
+use super::sight::{Sight, Spans};
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Spacing, Tables};
 use super::{Window, Work, taken};
 use crate::photon::{
-    Draw, Group, PER_BLOCK, PhotonStream, PixelStream, Place, SPADS, SpadEvent, Span,
+    Draw, Group, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SPADS, SpadEvent,
 };
 use crate::units::Time;
+use tile::Tile;
 
+mod bright;
 mod settling;
+mod tile;
+mod whole;
 
 /// Counts macropixels; keeps its tables from one to the next.
 pub struct Counting<'a> {
@@ -37,155 +39,44 @@ pub struct Counting<'a> {
     /// What a CLK period with so many SPADs adds to its bin.
     adds: [i64; SPADS + 1],
     spacing: Spacing,
-    /// Photons of the windows' own cycles.
-    own: Draw,
-    /// Photons of the group's cycles for the windows of the next cycles.
-    previous: Draw,
-    /// Photons of the last cycle of the group before, for the window of the first cycle; all in cycle 0.
-    carried: Vec<(Place, i64)>,
+    plain: Drawn,
+    breeding: Drawn,
     extra: Draw,
-    /// Codes of all photons drawn for the group. Photons are known by their index here.
+    /// Codes of all photons drawn for the group that do not breed. Photons are known by their index here.
     codes: Codes,
     scratch: Scratch,
-    /// Where the codes of `previous` and `carried` begin.
+    /// Where the codes of `plain.previous` and `plain.carried` begin.
     first_code: [usize; 2],
     tables: Tables,
     /// Photons of one cycle: index, row and SPAD.
     together: Vec<(usize, Code)>,
     /// SPADs that fired by row, in one cycle.
     fired: [u8; ROWS],
+    /// Photons of one cycle's window.
     photons: Vec<Photon>,
-    /// Photons by cycle, for those that are sorted.
-    sorted: Vec<(u32, Photon)>,
+    /// Photons by cycle of the group: those of breeding ones, or all where whole cycles are settled.
+    by_cycle: Vec<(u32, Photon)>,
     events: Vec<SpadEvent>,
+    /// Laser cycles side by side, in bright light.
+    tile: Option<Box<Tile>>,
 }
 
-/// One macropixel.
-struct Pixel<'p> {
-    sight: &'p Sight,
-    light: &'p PixelStream<'p>,
-    /// Photons of `own` and `previous`.
-    wanted: [Wanted; 2],
-    echo: [Option<EchoRows>; 2],
-    hits: Vec<i64>,
-    work: Work,
+/// What was drawn of a group.
+#[derive(Debug, Default)]
+struct Drawn {
+    /// Photons of the windows' own cycles.
+    own: Draw,
+    /// Photons of the group's cycles for the windows of the next cycles.
+    previous: Draw,
+    /// Photons of the last cycle of the group before, for the window of the first cycle; all in cycle 0.
+    carried: Vec<(Place, i64)>,
 }
 
-impl<'a> Counting<'a> {
-    /// For macropixels of `engine` in the light of `stream`.
-    pub fn new(engine: &'a Window<'a>, stream: &'a PhotonStream) -> Self {
-        let bins = engine.config.bins;
-        let memory_s = stream.config().spads.memory().as_s();
-        let memory_rows = (memory_s * engine.exposure.clock.as_hz()) as usize;
-        Counting {
-            engine,
-            stream,
-            binning: Binning::new(bins, engine.exposure.clock.as_hz(), stream.slots()),
-            spacing: Spacing {
-                bins,
-                far: memory_rows + 2,
-                blind: memory_rows,
-            },
-            adds: std::array::from_fn(|spads| engine.adds(((1u32 << spads) - 1) as u16)),
-            own: Draw::default(),
-            previous: Draw::default(),
-            carried: Vec::new(),
-            extra: Draw::default(),
-            codes: Codes::default(),
-            scratch: Scratch::default(),
-            first_code: [0; 2],
-            tables: Tables::default(),
-            together: Vec::new(),
-            fired: [0; ROWS],
-            photons: Vec::new(),
-            sorted: Vec::new(),
-            events: Vec::new(),
-        }
-    }
-
-    /// Hits of every bin of a macropixel, and what they took.
-    pub fn expose(&mut self, sight: &Sight, light: &PixelStream<'_>) -> (Vec<i64>, Work) {
-        let origins_fs = [sight.first_fs, sight.first_fs + self.stream.cycle_fs()];
-        let origin_slots = origins_fs.map(|origin_fs| self.binning.slot_of(origin_fs));
-        let has_slots_for_bins = origin_slots.iter().all(Option::is_some);
-        let wanted = [0, 1].map(|later| Wanted {
-            cycles: 0,
-            later,
-            origin_fs: origins_fs[later as usize],
-            origin_slot: origin_slots[later as usize].unwrap_or(0),
-        });
-        let echo = |span: &Span, origin_fs| {
-            let (bins, clk_hz) = (self.engine.config.bins, self.engine.exposure.clock.as_hz());
-            let within_fs = span.within_fs.clone();
-            (!within_fs.is_empty())
-                .then(|| EchoRows::new(light, bins, 1e15 / clk_hz, origin_fs, within_fs))
-                .flatten()
-        };
-        let mut pixel = Pixel {
-            sight,
-            light,
-            wanted,
-            echo: [
-                echo(&sight.own, origins_fs[0]),
-                echo(&sight.previous, origins_fs[1]),
-            ],
-            hits: self.engine.dark_hits(sight.first_edge),
-            work: Work::default(),
-        };
-        self.carried.clear();
-        self.tables.clear_counts();
-        for group in self.stream.groups() {
-            let cycles = group.cycles_in(self.stream.config().laser_cycles);
-            light.draw(group, &sight.own, &mut self.own);
-            light.draw(group, &sight.previous, &mut self.previous);
-            pixel.work.photons_drawn += (self.own.len() + self.previous.len()) as u64;
-            // Photons that come before the exposure are left out there.
-            let is_first = group.first_cycle() == 0 && sight.sees_the_beginning();
-            if has_slots_for_bins && !is_first && !self.stream.config().spads.has_secondaries() {
-                self.encode(&mut pixel, cycles);
-                if self.codes.len() <= MOST_PHOTONS {
-                    self.count_cells(&mut pixel, group);
-                } else {
-                    self.count_sorted(&mut pixel, group, cycles);
-                }
-            } else {
-                self.count_sorted(&mut pixel, group, cycles);
-            }
-            self.carry(light, group);
-        }
-        for (row, hits) in (1..).zip(&mut pixel.hits) {
-            let photons = u64::from(self.tables.count(row));
-            let pairs = u64::from(self.tables.pairs(row));
-            *hits += self.adds[1] * photons as i64 + self.adds[2] * pairs as i64;
-            pixel.work.clk_periods_visited += photons + pairs;
-            pixel.work.pulses += photons + 2 * pairs;
-        }
-        (pixel.hits, pixel.work)
-    }
-
-    /// Encodes all photons that the windows of a group may see.
-    fn encode(&mut self, pixel: &mut Pixel<'_>, cycles: u32) {
-        self.codes.clear();
-        let [own, previous] = &mut pixel.wanted;
-        own.cycles = cycles;
-        previous.cycles = cycles - 1;
-        let draws = [&self.own, &self.previous];
-        for (part, draw) in draws.into_iter().enumerate() {
-            let (wanted, echo) = (&pixel.wanted[part], pixel.echo[part].as_ref());
-            let scratch = &mut self.scratch;
-            self.binning
-                .encode(pixel.light, draw, wanted, echo, scratch, &mut self.codes);
-            self.first_code[part] = self.codes.len();
-        }
-        let wanted = Wanted {
-            cycles: 1,
-            later: 0,
-            ..pixel.wanted[1]
-        };
-        for &photon in &self.carried {
-            self.binning.push(&wanted, Some(photon), &mut self.codes);
-        }
-        self.codes.fill_up(SIDE_BY_SIDE);
+impl Drawn {
+    fn draw(&mut self, light: &PixelStream<'_>, group: Group, spans: &Spans) -> u64 {
+        light.draw(group, &spans.own, &mut self.own);
+        light.draw(group, &spans.previous, &mut self.previous);
+        (self.own.len() + self.previous.len()) as u64
     }
 
     /// Keeps what the first window of the next group may see.
@@ -201,19 +92,195 @@ impl<'a> Counting<'a> {
         self.carried.extend(photons);
     }
 
+    /// All photons by the cycle of the group whose window they are drawn for, the first `cycles` of them.
+    fn photons<'d>(
+        &'d self,
+        light: &'d PixelStream<'d>,
+        stream: &'d PhotonStream,
+        group: Group,
+        cycles: u32,
+    ) -> impl Iterator<Item = (u32, Photon)> + 'd {
+        let first = group.first_cycle();
+        let photon = move |cycle: u32, spad: u8, time_fs: i64| Photon {
+            time: stream.config().cycle_start(cycle) + Time::from_fs(time_fs),
+            spad,
+            breeds: light.breeds(),
+        };
+        let own = self.own.photons(light).filter_map(move |(place, time_fs)| {
+            let (cycle, spad) = split(place);
+            (cycle < cycles).then(|| (cycle, photon(first + cycle, spad, time_fs)))
+        });
+        let previous = self
+            .previous
+            .photons(light)
+            .filter_map(move |(place, time_fs)| {
+                let (cycle, spad) = split(place);
+                (cycle + 1 < cycles).then(|| (cycle + 1, photon(first + cycle, spad, time_fs)))
+            });
+        let carried = self.carried.iter();
+        let carried =
+            carried.map(move |&(spad, time_fs)| (0, photon(first - 1, spad as u8, time_fs)));
+        own.chain(previous).chain(carried)
+    }
+}
+
+/// One macropixel.
+struct Pixel<'p> {
+    sight: &'p Sight,
+    light: &'p PixelStream<'p>,
+    breeding: Option<&'p PixelStream<'p>>,
+    /// Photons of `plain.own` and `plain.previous`.
+    wanted: [Wanted; 2],
+    echo: Option<EchoRows>,
+    hits: Vec<i64>,
+    work: Work,
+}
+
+impl<'a> Counting<'a> {
+    /// For macropixels of `engine` in the light of `stream`.
+    pub fn new(engine: &'a Window<'a>, stream: &'a PhotonStream) -> Self {
+        let bins = engine.config.bins;
+        let dead_s = stream.config().spads.dead_time.as_s();
+        let dead_rows = (dead_s * engine.exposure.clock.as_hz()) as usize;
+        Counting {
+            engine,
+            stream,
+            binning: Binning::new(bins, engine.exposure.clock.as_hz(), stream.slots()),
+            spacing: Spacing {
+                bins,
+                far: dead_rows + 2,
+                blind: dead_rows,
+            },
+            adds: std::array::from_fn(|spads| engine.adds(((1u32 << spads) - 1) as u16)),
+            plain: Drawn::default(),
+            breeding: Drawn::default(),
+            extra: Draw::default(),
+            codes: Codes::default(),
+            scratch: Scratch::default(),
+            first_code: [0; 2],
+            tables: Tables::default(),
+            together: Vec::new(),
+            fired: [0; ROWS],
+            photons: Vec::new(),
+            by_cycle: Vec::new(),
+            events: Vec::new(),
+            tile: None,
+        }
+    }
+
+    /// Hits of every bin of a macropixel, and what they took. `breeding` are its photons that breed, `light` the others.
+    pub fn expose(
+        &mut self,
+        sight: &Sight,
+        light: &PixelStream<'_>,
+        breeding: Option<&PixelStream<'_>>,
+    ) -> (Vec<i64>, Work) {
+        let origins_fs = [sight.first_fs, sight.first_fs + self.stream.cycle_fs()];
+        let origin_slots = origins_fs.map(|origin_fs| self.binning.slot_of(origin_fs));
+        let has_slots_for_bins = origin_slots.iter().all(Option::is_some);
+        let wanted = [0, 1].map(|later| Wanted {
+            cycles: 0,
+            later,
+            origin_fs: origins_fs[later as usize],
+            origin_slot: origin_slots[later as usize].unwrap_or(0),
+        });
+        let (bins, clk_hz) = (self.engine.config.bins, self.engine.exposure.clock.as_hz());
+        let within_fs = sight.plain.own.within_fs.clone();
+        let mut pixel = Pixel {
+            sight,
+            light,
+            breeding,
+            wanted,
+            echo: EchoRows::new(light, bins, 1e15 / clk_hz, origins_fs[0], within_fs),
+            hits: self.engine.dark_hits(sight.first_edge),
+            work: Work::default(),
+        };
+        self.plain.carried.clear();
+        self.breeding.carried.clear();
+        self.tables.clear_counts();
+        if light.is_bright() {
+            self.count_bright(&mut pixel);
+            return (pixel.hits, pixel.work);
+        }
+        let sees_own_echo_only = pixel.sees_own_echo_only();
+        let before_exposure_fs = sight
+            .breeding
+            .own
+            .within_fs
+            .start
+            .min(light.echo_fs().start);
+        let sees_before = sight.sees_the_beginning() || before_exposure_fs < 0;
+        for group in self.stream.groups() {
+            let cycles = group.cycles_in(self.stream.config().laser_cycles);
+            pixel.work.photons_drawn += self.plain.draw(light, group, &sight.plain);
+            if let Some(breeding) = breeding {
+                pixel.work.photons_drawn += self.breeding.draw(breeding, group, &sight.breeding);
+            }
+            // Photons that come before the exposure are left out there.
+            let is_first = group.first_cycle() == 0 && sees_before;
+            let is_simple = has_slots_for_bins && !is_first && sees_own_echo_only;
+            if is_simple && self.encode(&mut pixel, cycles) <= MOST_PHOTONS {
+                self.count_cells(&mut pixel, group);
+            } else {
+                self.count_whole(&mut pixel, group, cycles);
+            }
+            self.plain.carry(light, group);
+            if let Some(breeding) = breeding {
+                self.breeding.carry(breeding, group);
+            }
+        }
+        for (row, hits) in (1..).zip(&mut pixel.hits) {
+            let photons = u64::from(self.tables.count(row));
+            let pairs = u64::from(self.tables.pairs(row));
+            *hits += self.adds[1] * photons as i64 + self.adds[2] * pairs as i64;
+            pixel.work.clk_periods_visited += photons + pairs;
+            pixel.work.pulses += photons + 2 * pairs;
+        }
+        (pixel.hits, pixel.work)
+    }
+
+    /// Encodes all photons that the windows of a group may see and that do not breed; returns how many codes there are.
+    fn encode(&mut self, pixel: &mut Pixel<'_>, cycles: u32) -> usize {
+        self.codes.clear();
+        let [own, previous] = &mut pixel.wanted;
+        own.cycles = cycles;
+        previous.cycles = cycles - 1;
+        let draws = [&self.plain.own, &self.plain.previous];
+        for (part, draw) in draws.into_iter().enumerate() {
+            let (wanted, echo) = (&pixel.wanted[part], pixel.echo.as_ref());
+            let scratch = &mut self.scratch;
+            self.binning
+                .encode(pixel.light, draw, wanted, echo, scratch, &mut self.codes);
+            self.first_code[part] = self.codes.len();
+        }
+        let wanted = Wanted {
+            cycles: 1,
+            later: 0,
+            ..pixel.wanted[1]
+        };
+        for &photon in &self.plain.carried {
+            self.binning.push(&wanted, Some(photon), &mut self.codes);
+        }
+        self.codes.fill_up(SIDE_BY_SIDE);
+        self.codes.len()
+    }
+
     fn count_cells(&mut self, pixel: &mut Pixel<'_>, group: Group) {
-        let own = &pixel.wanted[0];
+        let own = pixel.wanted[0];
         // Where all background photons of the cycles are wanted, their slots tell how many there are in each bin.
         let mut counted = 0;
         if own.cycles == group.cycles() {
-            counted = self.own.words()[0].len() * PER_BLOCK;
-            for run in self.own.runs() {
-                let row = self.binning.row_of(own, run.slot);
+            counted = self.plain.own.words()[0].len() * PER_BLOCK;
+            for run in self.plain.own.runs() {
+                let row = self.binning.row_of(&own, run.slot);
                 self.tables.add(row, run.photons);
             }
         }
         self.tables
             .put(&self.codes, group.cycles() as usize, counted);
+        if pixel.breeding.is_some() {
+            self.count_breeding_cycles(pixel, group, own.cycles);
+        }
         pixel.work.lost_to_dead_time += self.tables.settle_by_rows(&self.codes, &self.spacing);
         let mut index = 0;
         while let Some(special) = self.tables.special(index, &self.codes) {
@@ -222,66 +289,28 @@ impl<'a> Counting<'a> {
         }
     }
 
-    /// Turns `photons` of the SPADs of a set, sorted, relative to the start of their window's laser cycle, into
-    /// `events`: all rising edges in the window. Looks back as far as it takes.
-    fn detect(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spads: u16) {
-        let config = self.stream.config();
-        let start = || config.cycle_start(laser_cycle);
-        let seen_from = Time::from_fs(pixel.sight.first_fs - ROUNDING_FS);
-        let mut past = pixel.sight.past(self.stream, laser_cycle);
-        let mut known_from = match past.is_everything() {
-            true => None,
-            false => Some(Time::from_fs(pixel.sight.drawn_from_fs)),
-        };
-        let memory = config.spads.memory();
-        let certain = loop {
-            if let Some(index) = certain_from(&self.photons, memory, known_from, seen_from) {
-                break index;
-            }
-            let drawn = past.extend(pixel.light, spads, &mut self.extra);
-            self.photons
-                .extend(drawn.map(|(time, spad)| (time - start(), spad)));
-            pixel.work.photons_drawn += self.extra.len() as u64;
-            self.photons.sort_unstable();
-            known_from = past.known_from().map(|time| time - start());
-        };
-        self.events.clear();
-        let photons = self.photons[certain..].iter();
-        self.events
-            .extend(photons.map(|&(time, spad)| SpadEvent { time, spad }));
-        if config.spads.has_secondaries() {
-            // Those are drawn from times of the exposure.
-            let start = start();
-            self.events.iter_mut().for_each(|event| event.time += start);
-            pixel.light.detect(&mut self.events);
-            self.events
-                .iter_mut()
-                .for_each(|event| event.time = event.time - start);
-        } else {
-            pixel.light.detect(&mut self.events);
-        }
-    }
-
     /// When a photon came, relative to the start of the laser cycle of its window.
     fn time_of(&self, light: &PixelStream<'_>, photon: usize, laser_cycle: u32) -> Time {
+        let Drawn {
+            own,
+            previous,
+            carried,
+        } = &self.plain;
         let time_fs = if photon < self.first_code[0] {
-            return Time::from_fs(in_draw(light, &self.own, photon));
+            return Time::from_fs(in_draw(light, own, photon));
         } else if photon < self.first_code[1] {
-            in_draw(light, &self.previous, photon - self.first_code[0])
+            in_draw(light, previous, photon - self.first_code[0])
         } else {
-            self.carried[photon - self.first_code[1]].1
+            carried[photon - self.first_code[1]].1
         };
         Time::from_fs(time_fs) - self.before(laser_cycle)
     }
 
-    /// Whether a photon, perhaps of the echo, is one of the drawn slots.
+    /// Whether a photon, perhaps of the echo, is one of those drawn.
     fn is_drawn(&self, light: &PixelStream<'_>, photon: usize) -> bool {
-        let (draw, at) = match photon {
-            _ if photon < self.first_code[0] => (&self.own, photon),
-            _ if photon < self.first_code[1] => (&self.previous, photon - self.first_code[0]),
-            _ => return true,
-        };
-        draw.within_fs().contains(&in_draw(light, draw, at))
+        let own = &self.plain.own;
+        let is_of_echo = photon < self.first_code[0] && photon >= PER_BLOCK * own.slots().len();
+        !is_of_echo || own.within_fs().contains(&in_draw(light, own, photon))
     }
 
     /// The window of a laser cycle.
@@ -302,55 +331,19 @@ impl<'a> Counting<'a> {
         let start = |cycle| self.stream.config().cycle_start(cycle);
         start(laser_cycle) - start(laser_cycle - 1)
     }
+}
 
-    /// Counts cycle by cycle what all SPADs make of the photons together.
-    fn count_sorted(&mut self, pixel: &mut Pixel<'_>, group: Group, cycles: u32) {
-        let mut sorted = std::mem::take(&mut self.sorted);
-        sorted.clear();
-        let own = self.own.photons(pixel.light).map(|(place, time_fs)| {
-            let (cycle, spad) = split(place);
-            (cycle, (Time::from_fs(time_fs), spad))
-        });
-        sorted.extend(own.filter(|&(cycle, _)| cycle < cycles));
-        let earlier = |cycle: u32, time_fs: i64| {
-            Time::from_fs(time_fs) - self.before(group.first_cycle() + cycle)
+impl Pixel<'_> {
+    /// Whether windows see no echo of another cycle than their own.
+    fn sees_own_echo_only(&self) -> bool {
+        let sees_own_only = |light: &PixelStream<'_>, spans: &Spans| {
+            light
+                .echoes_within(&(spans.from_fs..self.sight.until_fs))
+                .all(|later| later == 0)
         };
-        let previous = self
-            .previous
-            .photons(pixel.light)
-            .filter_map(|(place, time_fs)| {
-                let (cycle, spad) = split(place);
-                let cycle = Some(cycle + 1).filter(|&cycle| cycle < cycles)?;
-                Some((cycle, (earlier(cycle, time_fs), spad)))
-            });
-        sorted.extend(previous);
-        let carried = self.carried.iter();
-        sorted.extend(carried.map(|&(spad, time_fs)| (0, (earlier(0, time_fs), spad as u8))));
-        sorted.sort_unstable();
-        for photons in sorted.chunk_by(|a, b| a.0 == b.0) {
-            let laser_cycle = group.first_cycle() + photons[0].0;
-            let window = self.window(pixel.sight, laser_cycle);
-            self.photons.clear();
-            self.photons
-                .extend(photons.iter().map(|&(_, photon)| photon));
-            let alive = self.photons.iter();
-            let seen = alive
-                .filter(|(time, _)| window.row_of(*time).is_some())
-                .count() as u64;
-            self.detect(pixel, laser_cycle, u16::MAX);
-            let row_of = |event: &SpadEvent| window.row_of(event.time).unwrap_or(0) as i64;
-            let mut alone = 0;
-            for (row, spads) in taken(&self.events, row_of).filter(|(row, _)| *row > 0) {
-                alone += u64::from(spads.count_ones());
-                pixel.hits[row as usize - 1] += self.engine.adds(spads);
-                pixel.work.clk_periods_visited += 1;
-            }
-            let pulses = self.events.iter().filter(|event| row_of(event) > 0).count() as u64;
-            pixel.work.pulses += pulses;
-            pixel.work.cancelled += pulses - alone;
-            pixel.work.lost_to_dead_time += seen.saturating_sub(pulses);
-        }
-        self.sorted = sorted;
+        let breeding = self.breeding;
+        sees_own_only(self.light, &self.sight.plain)
+            && breeding.is_none_or(|light| sees_own_only(light, &self.sight.breeding))
     }
 }
 

@@ -13,15 +13,14 @@ mod binning;
 mod codes;
 mod counting;
 mod echo;
-mod history;
+mod past;
 mod sight;
 mod tables;
 
-use super::light::full_stream;
-use super::{Engine, EngineError, Exposed, LitPixel, Work, follows};
+use super::{Cancelling, Engine, EngineError, Exposed, LitPixel, Work, follows};
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw, correlation, histogram, window_law};
-use crate::photon::{PhotonStream, SpadEvent};
+use crate::photon::{PhotonStream, PixelLight, SpadEvent};
 use counting::Counting;
 use sight::Sight;
 
@@ -62,13 +61,12 @@ impl<'a> Window<'a> {
         }
     }
 
-    /// Whether a macropixel's light blinds so much that all of its photons are drawn, and not only those that its
-    /// window may see.
+    /// Whether all photons of a macropixel are drawn, and not only those that its window may see: laser cycles hardly
+    /// longer than the window, or SPADs that are blind nearly all the time.
     pub fn draws_whole_cycles(&self, stream: &PhotonStream, pixel: &LitPixel) -> bool {
         let window = self.law.window(pixel.start).open();
         window.zip(pixel.light).is_some_and(|(window, light)| {
-            let sight = Sight::new(&self.law, &window, stream);
-            sight.is_none_or(|sight| !sight.suits(stream, &light))
+            sight::is_blinding(stream, &light) || Sight::new(&self.law, &window, stream).is_none()
         })
     }
 
@@ -106,6 +104,70 @@ impl<'a> Window<'a> {
         i64::from(self.is_event(spads)) - i64::from(self.is_event(0))
     }
 
+    /// Counts pulses, sorted by time, of which no edge takes two parts.
+    fn count_pulses(&self, pulses: &[SpadEvent], first_edge: i64, hits: &mut [i64]) {
+        let bins = self.config.bins as i64;
+        let periods = self.exposure.stop_periods as i64;
+        let cycles = self.exposure.laser_cycles as i64;
+        for (edge, spads) in taken(pulses, |p| self.law.edge_of(p.time)) {
+            let adds = self.adds(spads);
+            if adds == 0 {
+                continue;
+            }
+            let offset = edge - first_edge;
+            let last_cycle = offset.div_euclid(periods).min(cycles - 1);
+            // More than one laser cycle sees an edge only when a cycle is shorter than the window.
+            for cycle in (self.first_cycle()..=last_cycle).rev() {
+                let bin = offset - cycle * periods;
+                if bin >= bins {
+                    break;
+                }
+                hits[bin as usize] += adds;
+            }
+        }
+    }
+
+    /// Counts all pulses of a macropixel, part by part.
+    fn count_stream(
+        &self,
+        stream: &PhotonStream,
+        pixel: &LitPixel,
+        light: &PixelLight,
+        first_edge: i64,
+    ) -> (Vec<i64>, Work) {
+        let config = stream.config();
+        let cancelling = Cancelling::of(config.spads.dead_time, config.clock, || self.law.clone());
+        let mut hits = self.dark_hits(first_edge);
+        let mut work = Work::default();
+        let mut cancelled = 0;
+        let mut count = |pulses: &[SpadEvent]| {
+            self.count_pulses(pulses, first_edge, &mut hits);
+            let seen = cancelling
+                .as_ref()
+                .map(|cancelling| cancelling.seen(pixel.start, pulses));
+            cancelled += seen.unwrap_or(0);
+        };
+        // Pulses that the next ones may share an edge with.
+        let mut waiting: Vec<SpadEvent> = Vec::new();
+        let photons = stream.pixel_pulses(pixel.number, light, |pulses| {
+            work.pulses += pulses.len() as u64;
+            waiting.extend_from_slice(pulses);
+            let Some(last) = waiting.last() else {
+                return;
+            };
+            let last_edge = self.law.edge_of(last.time);
+            let done = waiting.partition_point(|pulse| self.law.edge_of(pulse.time) < last_edge);
+            count(&waiting[..done]);
+            waiting.drain(..done);
+        });
+        count(&waiting);
+        work.cancelled = cancelled;
+        work.photons_drawn = photons.drawn;
+        work.lost_to_dead_time = photons.lost_to_dead_time;
+        work.clk_periods_visited = u64::from(config.stop_periods) * u64::from(config.laser_cycles);
+        (hits, work)
+    }
+
     fn counts(&self, hits: &[i64]) -> Vec<u16> {
         let (bits, overflow) = (self.config.bin_bits as u32, self.config.overflow);
         hits.iter()
@@ -120,29 +182,11 @@ impl Engine for Window<'_> {
     }
 
     fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
-        let bins = self.config.bins as i64;
-        let periods = self.exposure.stop_periods as i64;
-        let cycles = self.exposure.laser_cycles as i64;
         let Some(window) = self.window(start)? else {
             return Ok(vec![0; self.config.bins]);
         };
         let mut hits = self.dark_hits(window.first_edge);
-        for (edge, spads) in taken(pulses, |p| self.law.edge_of(p.time)) {
-            let adds = self.adds(spads);
-            if adds == 0 {
-                continue;
-            }
-            let offset = edge - window.first_edge;
-            let last_cycle = offset.div_euclid(periods).min(cycles - 1);
-            // More than one laser cycle sees an edge only when a cycle is shorter than the window.
-            for cycle in (self.first_cycle()..=last_cycle).rev() {
-                let bin = offset - cycle * periods;
-                if bin >= bins {
-                    break;
-                }
-                hits[bin as usize] += adds;
-            }
-        }
+        self.count_pulses(pulses, window.first_edge, &mut hits);
         Ok(self.counts(&hits))
     }
 
@@ -163,20 +207,17 @@ impl Engine for Window<'_> {
                 continue;
             };
             let sight = Sight::new(&self.law, &window, stream);
-            if let Some(sight) = sight.filter(|sight| sight.suits(stream, light)) {
-                let light = stream.pixel(pixel.number, light);
-                let (hits, work) = counting.expose(&sight, &light);
-                exposed.histograms.push(self.counts(&hits));
-                exposed.work += work;
-            } else {
-                let Exposed { histograms, work } = full_stream(self, stream, &[*pixel])?;
-                exposed.histograms.extend(histograms);
-                exposed.work += Work {
-                    macropixels: 0,
-                    clk_periods: 0,
-                    ..work
-                };
-            }
+            let sight = sight.filter(|_| !sight::is_blinding(stream, light));
+            let (hits, work) = match sight {
+                Some(sight) => {
+                    let plain = stream.pixel(pixel.number, light);
+                    let breeding = stream.breeding(pixel.number, light);
+                    counting.expose(&sight, &plain, breeding.as_ref())
+                }
+                None => self.count_stream(stream, pixel, light, window.first_edge),
+            };
+            exposed.histograms.push(self.counts(&hits));
+            exposed.work += work;
         }
         exposed.work.macropixels += pixels.len() as u64;
         exposed.work.clk_periods += pixels.len() as u64 * clk_periods;

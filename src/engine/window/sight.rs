@@ -8,78 +8,68 @@
 //!   drawn            ·      ·   ╰──────┴──────┴──────┴──────┴──────╯      ·      ·      ·      ·
 //! ```
 //!
-//! Windows of small start values begin in the cycle before, so that slots of two cycles are drawn. Where slots are bins,
-//! the last of both end together but for the rounding of CLK edges: that much longer signal photons belong to it.
+//! Windows of small start values begin in the cycle before, so that slots of two cycles are drawn. Photons that breed are
+//! drawn from as much earlier on as afterpulses may take.
 
-use super::history::Past;
+use super::past::Past;
 use crate::chip::window_law::{OpenWindow, WindowLaw};
-use crate::photon::{GROUP, PhotonStream, PixelLight, SPADS, Span};
+use crate::photon::{PhotonStream, PixelLight, SPADS, Span};
 
 /// By how much times relative to a cycle differ from cycle to cycle, fs: STOP and CLK edges are rounded to whole
 /// femtoseconds, and so is the cycle before.
 pub const ROUNDING_FS: i64 = 4;
 
-/// The part of every laser cycle that decides a histogram. Times are in fs after the start of the cycle, within
-/// [`ROUNDING_FS`].
-#[derive(Debug, Clone)]
-pub struct Sight {
-    /// The rising CLK edge that takes the photons of bin 0, counted in the window's cycle.
-    pub first_edge: i64,
-    /// Where bin 0 begins.
-    pub first_fs: i64,
-    /// What is drawn of the window's own cycle.
+/// What is drawn of every laser cycle and the one before it.
+#[derive(Debug, Clone, Default)]
+pub struct Spans {
+    /// Of the window's own cycle, with its echo.
     pub own: Span,
-    /// What is drawn of the cycle before.
+    /// Slots of the cycle before.
     pub previous: Span,
-    /// From when on every photon is in these.
-    pub drawn_from_fs: i64,
+    /// From when on every photon is in these, but for those of other cycles' echoes; after the start of the window's cycle.
+    pub from_fs: i64,
 }
 
-impl Sight {
-    /// The sight of a window; `None` where it and what the SPADs remember do not fit into a laser cycle and the one
-    /// before, so that most photons matter anyway.
-    pub fn new(law: &WindowLaw, window: &OpenWindow, stream: &PhotonStream) -> Option<Self> {
-        let interval = law.interval(window);
-        let (first_fs, end_fs) = (interval.start.as_fs(), interval.end.as_fs());
+impl Spans {
+    /// From `from_fs` until `until_fs`, times after the start of the window's cycle; `None` where that does not fit into
+    /// the cycle and the one before.
+    fn new(stream: &PhotonStream, from_fs: i64, until_fs: i64) -> Option<Self> {
         let (cycle_fs, all, ends) = (stream.cycle_fs(), stream.slots(), stream.ends_fs());
-        let memory_fs = stream.config().spads.memory().as_fs();
-        let from_fs = first_fs - memory_fs - ROUNDING_FS;
-        let until_fs = end_fs + ROUNDING_FS;
         if from_fs <= ends.start - cycle_fs || until_fs >= ends.end {
             return None;
         }
-        let span = |from_fs: i64, until_fs: i64| {
+        let slots = |from_fs: i64, until_fs: i64| {
             if until_fs <= ends.start || from_fs >= ends.end {
-                return Span::default();
+                return 0..0;
             }
             let background_until_fs = (until_fs - all.margin_fs()).max(ends.start + 1);
-            let last = all.at(background_until_fs - 1).min(all.count() - 1);
+            let last = all
+                .at(background_until_fs.min(ends.end) - 1)
+                .min(all.count() - 1);
             let first = all.at(from_fs.max(ends.start)).min(last);
-            let mut span = stream.span(first..last + 1);
-            span.within_fs.end = span.within_fs.end.max(until_fs).min(ends.end);
-            span
+            first..last + 1
         };
-        let own = span(from_fs, until_fs);
-        let previous = span(cycle_fs + from_fs, cycle_fs + until_fs);
-        let drawn_from_fs = match previous.slots.is_empty() {
-            true => own.within_fs.start,
-            false => previous.within_fs.start - cycle_fs,
+        let own = slots(from_fs, until_fs);
+        let previous = slots(cycle_fs + from_fs, cycle_fs + until_fs);
+        let from_fs = match previous.is_empty() {
+            true => all.start_fs(own.start),
+            false => all.start_fs(previous.start) - cycle_fs,
         };
-        Some(Sight {
-            first_edge: window.first_edge,
-            first_fs,
-            own,
-            previous,
-            drawn_from_fs,
+        Some(Spans {
+            own: Span {
+                slots: own,
+                // The cycle before may be longer by a femtosecond.
+                within_fs: from_fs - 1..until_fs,
+            },
+            previous: Span {
+                slots: previous,
+                within_fs: 0..0,
+            },
+            from_fs,
         })
     }
 
-    /// Whether the window of the first cycle that has photons may see one that comes before the exposure.
-    pub fn sees_the_beginning(&self) -> bool {
-        self.own.slots.contains(&0) || self.previous.slots.contains(&0)
-    }
-
-    /// What came before the drawn slots of the window of `laser_cycle`.
+    /// What came before, seen from `laser_cycle`.
     pub fn past<'a>(&self, stream: &'a PhotonStream, laser_cycle: u32) -> Past<'a> {
         if self.previous.slots.is_empty() {
             Past::new(stream, laser_cycle, self.own.slots.start)
@@ -90,27 +80,63 @@ impl Sight {
         }
     }
 
-    /// Whether it pays to draw only these slots. Where light blinds, most cycles have a SPAD whose state at the window is
-    /// not known, and looking back for a gap draws a slot of a whole group each time.
-    pub fn suits(&self, stream: &PhotonStream, light: &PixelLight) -> bool {
-        let spads = &stream.config().spads;
-        let tied = if spads.has_secondaries() { 1 } else { SPADS };
-        let memory_s = spads.memory().as_s();
-        let tied_hz = light.background_hz / tied as f64;
-        let blind = tied_hz * memory_s;
-        // A photon within the memory before the window, and another one soon after it.
-        let uncertain = tied as f64 * libm::expm1(-blind) * libm::expm1(-blind);
-        // How long one waits for a gap; without any photon, as long as the memory itself.
-        let wait_s = match blind > 0.0 {
-            true => memory_s * libm::expm1(blind) / blind,
-            false => memory_s,
-        };
-        let group = f64::from(stream.config().laser_cycles.min(GROUP));
-        let slot_s = stream.slots().length_s();
-        let slot = light.background_hz * slot_s;
-        let looked_back = uncertain * (wait_s / slot_s + 1.0) * slot * group;
-        let slots = (self.own.slots.len() + self.previous.slots.len()) as f64;
-        let seen = slot * slots + light.signal_per_cycle;
-        seen + looked_back < light.photons_per_cycle(stream.config())
+    /// Whether the window of the first cycle that has photons may see a slot that begins before the exposure.
+    fn sees_the_beginning(&self) -> bool {
+        self.own.slots.contains(&0) || self.previous.slots.contains(&0)
     }
+}
+
+/// The part of every laser cycle that decides a histogram. Times are in fs after the start of the cycle, within
+/// [`ROUNDING_FS`].
+#[derive(Debug, Clone)]
+pub struct Sight {
+    /// The rising CLK edge that takes the photons of bin 0, counted in the window's cycle.
+    pub first_edge: i64,
+    /// Where bin 0 begins.
+    pub first_fs: i64,
+    /// Where the last bin is over for certain.
+    pub until_fs: i64,
+    /// What is drawn of photons that do not breed.
+    pub plain: Spans,
+    /// What is drawn of those that do.
+    pub breeding: Spans,
+}
+
+impl Sight {
+    /// The sight of a window; `None` where it and what the SPADs remember do not fit into a laser cycle and the one
+    /// before, so that most photons matter anyway.
+    pub fn new(law: &WindowLaw, window: &OpenWindow, stream: &PhotonStream) -> Option<Self> {
+        let interval = law.interval(window);
+        let (first_fs, end_fs) = (interval.start.as_fs(), interval.end.as_fs());
+        let spads = &stream.config().spads;
+        let from_fs = first_fs - spads.dead_time.as_fs() - ROUNDING_FS;
+        let until_fs = end_fs + ROUNDING_FS;
+        let plain = Spans::new(stream, from_fs, until_fs)?;
+        let breeding_from_fs = plain.from_fs - spads.reach().as_fs() - 2 * ROUNDING_FS;
+        Some(Sight {
+            first_edge: window.first_edge,
+            first_fs,
+            until_fs,
+            breeding: Spans::new(stream, breeding_from_fs, until_fs)?,
+            plain,
+        })
+    }
+
+    /// Whether the first window that has photons may see one that comes before the exposure and is none.
+    pub fn sees_the_beginning(&self) -> bool {
+        self.plain.sees_the_beginning() || self.breeding.sees_the_beginning()
+    }
+}
+
+/// Whether SPADs are blind so much of the time that their state before a window is found sooner by following all of their
+/// exposure than by looking back for a gap.
+pub fn is_blinding(stream: &PhotonStream, light: &PixelLight) -> bool {
+    let (dead_s, cycle_s) = (
+        stream.config().spads.dead_time.as_s(),
+        stream.config().cycle_s(),
+    );
+    let per_spad_hz = light.background_hz / SPADS as f64;
+    // Mean time to a gap of a dead time, and as often as the last of all SPADs takes longer.
+    let wait_s = libm::expm1(per_spad_hz * dead_s) / per_spad_hz * libm::log(SPADS as f64);
+    per_spad_hz > 0.0 && wait_s > 0.5 * cycle_s
 }

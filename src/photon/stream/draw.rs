@@ -190,7 +190,7 @@ impl Draw {
     }
 
     /// Every photon, as place and time after the start of its cycle in fs, in no particular order. `pixel` is whose they
-    /// are. None comes before the exposure.
+    /// are. No background photon comes before the exposure.
     pub fn photons(&self, pixel: &PixelStream<'_>) -> impl Iterator<Item = (Place, i64)> {
         let words = self.words();
         let slots = pixel.slots();
@@ -207,9 +207,10 @@ impl Draw {
             .map(|photon| pixel.signal_photon(self, photon))
             .filter(|(_, time_fs)| self.within_fs.contains(time_fs));
         let is_first_group = self.group.first_cycle() == 0;
-        background.chain(signal).filter(move |&(place, time_fs)| {
+        let background = background.filter(move |&(place, time_fs)| {
             !is_first_group || time_fs >= 0 || place >> SPAD_BITS > 0
-        })
+        });
+        background.chain(signal)
     }
 }
 

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::photon::{CROSSTALK_DELAY, DeadTimeLaw};
+use crate::photon::{CROSSTALK_DELAY, DeadTimeLaw, EchoLaw};
 
 fn config() -> StreamConfig {
     StreamConfig {
@@ -227,6 +227,80 @@ fn a_longer_exposure_begins_with_the_same_photons() {
     assert_eq!(short, long[..short.len()]);
 }
 
+/// Photons in two parts of the first, a middle and the last laser cycle are as many as the law of echoes says.
+#[test]
+fn what_overruns_a_cycle_falls_into_its_neighbours() {
+    let (cycles, cycle_ns) = (12u32, 125.0);
+    let clock = Frequency::from_hz(384_000_000);
+    let stop_periods = 48;
+    for (arrival_ns, sigma_ns, signal_per_cycle) in [
+        (-2.0, 2.0, 0.7),
+        (1.0, 2.0, 5.0),
+        (124.0, 3.0, 0.7),
+        (126.0, 3.0, 5.0),
+        (60.0, 90.0, 1.0),
+        (60.0, 90.0, 5.0),
+        (0.0, 0.0, 0.7),
+        (0.0, 0.0, 5.0),
+    ] {
+        let config = StreamConfig {
+            clock,
+            stop_periods,
+            laser_cycles: cycles,
+            pulse_sigma: Time::from_fs((sigma_ns * 1e6) as i64),
+            spads: SpadModel::with_dead_time(Time::ZERO),
+            ..config()
+        };
+        let light = PixelLight {
+            signal_per_cycle,
+            arrival: Time::from_fs((arrival_ns * 1e6) as i64),
+            background_hz: 0.0,
+        };
+        let law = EchoLaw {
+            cycle_fs: cycle_ns * 1e6,
+            arrival_fs: arrival_ns * 1e6,
+            sigma_fs: sigma_ns * 1e6,
+        };
+        let stream = PhotonStream::new(&config);
+        let pixels = 3000;
+        let mut counts = [[0u64; 2]; 3];
+        for pixel in 0..pixels {
+            // Nothing is lost without dead time, but for photons at the same femtosecond.
+            let photons = stream.pixel_events(pixel, &light);
+            for event in &photons.events {
+                let ns = event.time.as_ns();
+                let cycle = (ns / cycle_ns) as u32;
+                let which = [0, 5, cycles - 1]
+                    .iter()
+                    .position(|&wanted| wanted == cycle);
+                if let Some(which) = which {
+                    let is_late = ns % cycle_ns >= 3.0;
+                    counts[which][usize::from(is_late)] += 1;
+                }
+            }
+        }
+        for (number, counts) in [0, 5, cycles - 1].into_iter().zip(counts) {
+            let parts = [(0.0, 3e6), (3e6, cycle_ns * 1e6)];
+            for (count, (from_fs, to_fs)) in counts.into_iter().zip(parts) {
+                let share = law.share(number, cycles, from_fs, to_fs);
+                let photons = f64::from(pixels) * signal_per_cycle * share;
+                // A pulse without width fires each SPAD once.
+                let fired = SPADS as f64 * -libm::expm1(-signal_per_cycle / SPADS as f64);
+                let expected = if sigma_ns == 0.0 {
+                    photons * fired / signal_per_cycle
+                } else {
+                    photons
+                };
+                let off = (count as f64 - expected).abs();
+                assert!(
+                    off <= 5.0 * expected.sqrt() + 1e-6 * f64::from(pixels),
+                    "{arrival_ns} {sigma_ns} cycle {number} from {from_fs}: {count}, not {expected}"
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn neighbours_in_pixel_slot_group_and_seed_are_independent() {
     // Numbers of photons by cycle within the group.
@@ -234,7 +308,7 @@ fn neighbours_in_pixel_slot_group_and_seed_are_independent() {
         let config = StreamConfig { seed, ..config() };
         let stream = PhotonStream::new(&config);
         let light = PixelLight {
-            background_hz: 1e9,
+            background_hz: 40e6,
             ..BACKGROUND
         };
         let mut draw = Draw::default();

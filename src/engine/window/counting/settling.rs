@@ -14,7 +14,7 @@
 use super::{Counting, Pixel, in_draw};
 use crate::engine::window::codes::{Code, SPAD_MARKS};
 use crate::engine::window::tables::Special;
-use crate::photon::Group;
+use crate::photon::{Group, Photon};
 
 impl Counting<'_> {
     /// Settles the cycle of a special photon.
@@ -83,6 +83,19 @@ impl Counting<'_> {
 
     /// Settles the `last` photon of a cycle and those before it.
     fn settle_all(&mut self, pixel: &mut Pixel<'_>, last: usize, laser_cycle: u32) {
+        if pixel.breeding.is_some() {
+            // Photons that breed did not matter to the window so far, but may when it is looked back.
+            let cycle = laser_cycle - Group::of_cycle(laser_cycle).first_cycle();
+            let first = self.by_cycle.partition_point(|&(of, _)| of < cycle);
+            let of_cycle = self.by_cycle[first..]
+                .iter()
+                .take_while(|&&(of, _)| of == cycle);
+            self.photons.clear();
+            self.photons.extend(of_cycle.map(|&(_, photon)| photon));
+            self.take_cycle(pixel, Some(last), laser_cycle);
+            self.settle_cycle(pixel, laser_cycle);
+            return;
+        }
         self.together.clear();
         let (mut once, mut several, mut is_doubtful) = (0u16, 0u16, false);
         let mut next = Some(last);
@@ -171,15 +184,15 @@ impl Counting<'_> {
         if photon.max(other) >= self.first_code[0] {
             return None;
         }
-        let time_fs = |photon| in_draw(pixel.light, &self.own, photon);
+        let time_fs = |photon| in_draw(pixel.light, &self.plain.own, photon);
         let times_fs = [time_fs(photon), time_fs(other)];
-        let memory_fs = self.stream.config().spads.memory().as_fs();
+        let memory_fs = self.stream.config().spads.dead_time.as_fs();
         let is_blind = (times_fs[0] - times_fs[1]).abs() <= memory_fs;
         let is_seen = u64::from((1..=bins).contains(&second));
         if is_blind {
             // A photon in the window has been preceded by all the memory, in which there was none.
             let first_fs = times_fs[0].min(times_fs[1]);
-            if first == 0 && first_fs - pixel.sight.drawn_from_fs <= memory_fs {
+            if first == 0 && first_fs - pixel.sight.plain.from_fs <= memory_fs {
                 return None;
             }
             pixel.work.lost_to_dead_time += is_seen;
@@ -197,23 +210,27 @@ impl Counting<'_> {
     /// Settles the photons of one SPAD among those `together`.
     fn settle_spad(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spad: u8) {
         let window = self.window(pixel.sight, laser_cycle);
+        let start = self.stream.config().cycle_start(laser_cycle);
         self.photons.clear();
         let mut seen = 0;
         for &(photon, code) in &self.together {
             if code.spad() == spad && self.is_drawn(pixel.light, photon) {
                 let time = self.time_of(pixel.light, photon, laser_cycle);
                 seen += u64::from(window.row_of(time).is_some());
-                self.photons.push((time, spad));
+                self.photons.push(Photon {
+                    time: start + time,
+                    spad,
+                    breeds: false,
+                });
             }
         }
         if seen == 0 {
             return;
         }
-        self.photons.sort_unstable();
         self.detect(pixel, laser_cycle, 1 << spad);
         let mut last = None;
         for event in &self.events {
-            let Some(row) = window.row_of(event.time) else {
+            let Some(row) = window.row_of(event.time - start) else {
                 continue;
             };
             seen -= 1;

@@ -1,0 +1,209 @@
+//! Counting macropixels in bright light, laser cycle by laser cycle.
+//!
+//! Each window begins some blocks of photons before its first bin, with SPADs of which nothing is known. Where that was
+//! not enough to know them in the window, it begins anew twice as far back.
+
+use super::{Counting, Pixel};
+use crate::engine::window::sight::ROUNDING_FS;
+use crate::photon::{Photon, PhotonStream, PixelStream, TILE};
+use crate::units::Time;
+
+/// The beginning of a block of photons.
+#[derive(Debug, Clone, Copy)]
+pub struct Beginning {
+    pub cycle: u32,
+    pub block: u32,
+    /// `None` where the exposure begins.
+    time: Option<Time>,
+}
+
+impl Beginning {
+    /// That of the block which is running at a time in or before `laser_cycle`.
+    fn at(time: Time, laser_cycle: u32, stream: &PhotonStream, light: &PixelStream<'_>) -> Self {
+        let ends_fs = stream.ends_fs();
+        let first = |cycle| stream.config().cycle_start(cycle) + Time::from_fs(ends_fs.start);
+        let mut cycle = laser_cycle;
+        while cycle > 0 && time < first(cycle) {
+            cycle -= 1;
+        }
+        let start = stream.config().cycle_start(cycle);
+        let block = light.block_at((time - start).as_fs());
+        let time = start + Time::from_fs(light.block_fs(block).start);
+        Beginning {
+            cycle,
+            block,
+            time: (cycle > 0 || block > 0).then_some(time),
+        }
+    }
+
+    /// When it is, fs after the start of `laser_cycle`.
+    pub fn begins_fs(
+        &self,
+        stream: &PhotonStream,
+        light: &PixelStream<'_>,
+        laser_cycle: u32,
+    ) -> i64 {
+        let start = |cycle| stream.config().cycle_start(cycle);
+        (start(self.cycle) - start(laser_cycle)).as_fs() + light.block_fs(self.block).start
+    }
+}
+
+impl Counting<'_> {
+    /// Counts a macropixel.
+    pub(super) fn count_bright(&mut self, pixel: &mut Pixel<'_>) {
+        let laser_cycles = self.stream.config().laser_cycles;
+        let layout = self.layout(pixel);
+        let alone = layout
+            .as_ref()
+            .map_or(laser_cycles, |layout| layout.first_cycle);
+        for laser_cycle in 0..alone.min(laser_cycles) {
+            self.count_bright_cycle(pixel, laser_cycle);
+        }
+        if let Some(layout) = layout {
+            for first in (layout.first_cycle..laser_cycles).step_by(TILE) {
+                self.count_tile(pixel, &layout, first);
+            }
+        }
+    }
+
+    /// Where photons of the window of a laser cycle are drawn from at first; `None` if that is the whole exposure.
+    pub(super) fn beginning(&self, pixel: &Pixel<'_>, laser_cycle: u32) -> Option<Beginning> {
+        let start = self.stream.config().cycle_start(laser_cycle);
+        let from = start + Time::from_fs(pixel.sight.first_fs - ROUNDING_FS);
+        let until = start + Time::from_fs(pixel.sight.until_fs);
+        let back = self.first_look_back(pixel.light);
+        let begin = self.beginning_before(pixel, from - back, until, laser_cycle);
+        begin.time.is_some().then_some(begin)
+    }
+
+    /// How long before a window its photons are drawn from at first: two dead times, and more where gaps are rarer. A window
+    /// that needs more takes some ten times as long as one that does not.
+    fn first_look_back(&self, light: &PixelStream<'_>) -> Time {
+        let dead_time = self.stream.config().spads.dead_time;
+        dead_time * (2 + (8.0 * light.per_dead_time()) as i64)
+    }
+
+    /// Counts the window of one laser cycle.
+    pub(super) fn count_bright_cycle(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32) {
+        let config = self.stream.config();
+        let start = config.cycle_start(laser_cycle);
+        let wanted_from = start + Time::from_fs(pixel.sight.first_fs - ROUNDING_FS);
+        let until = start + Time::from_fs(pixel.sight.until_fs);
+        let mut back = self.first_look_back(pixel.light);
+        let drawn = loop {
+            let begin = self.beginning_before(pixel, wanted_from - back, until, laser_cycle);
+            self.photons.clear();
+            self.push_photons(pixel.light, begin, until, laser_cycle);
+            let mut breeding_photons = Vec::new();
+            if let Some(breeding) = pixel.breeding {
+                std::mem::swap(&mut self.photons, &mut breeding_photons);
+                let since = begin.time.map_or(begin, |time| {
+                    let time = time - config.spads.reach();
+                    Beginning::at(time, laser_cycle, self.stream, breeding)
+                });
+                self.push_photons(breeding, since, until, laser_cycle);
+                std::mem::swap(&mut self.photons, &mut breeding_photons);
+            }
+            let known_from = begin.time.unwrap_or(Time::ZERO);
+            self.photons.retain(|photon| photon.time >= known_from);
+            let is_later = |photon: &&Photon| photon.time >= known_from;
+            self.photons
+                .extend(breeding_photons.iter().filter(is_later));
+            self.photons.sort_unstable();
+            let earlier = breeding_photons
+                .iter()
+                .filter(|photon| photon.time < known_from);
+            let mut avalanches = pixel.light.avalanches(begin.time, earlier.copied());
+            let mut echoes = pixel.light.ordered_echoes();
+            for cycle in self.echoes(pixel.light, known_from, until, laser_cycle) {
+                echoes.add(cycle);
+            }
+            self.events.clear();
+            let (photons, events) = (&self.photons, &mut self.events);
+            let known = avalanches.run(photons, Some(&mut echoes), until, wanted_from, events);
+            if known.is_ok() {
+                break self.photons.len() as u64 + echoes.drawn();
+            }
+            back = back * 2;
+        };
+        pixel.work.photons_drawn += drawn;
+        let window = self.window(pixel.sight, laser_cycle);
+        let seen = self.photons.iter();
+        let seen = seen
+            .filter(|photon| window.row_of(photon.time - start).is_some())
+            .count();
+        self.count_events(pixel, &window, start, seen as u64);
+    }
+
+    /// Laser cycles whose echoes may have photons between two times about `laser_cycle`.
+    fn echoes(
+        &self,
+        light: &PixelStream<'_>,
+        from: Time,
+        until: Time,
+        laser_cycle: u32,
+    ) -> impl Iterator<Item = u32> + use<> {
+        let config = self.stream.config();
+        let start = config.cycle_start(laser_cycle);
+        let within_fs = (from - start).as_fs()..(until - start).as_fs();
+        let cycles = config.laser_cycles;
+        light.echoes_within(&within_fs).filter_map(move |later| {
+            let cycle = u32::try_from(i64::from(laser_cycle) + later).ok()?;
+            (cycle < cycles).then_some(cycle)
+        })
+    }
+
+    /// Where photons have to be known from: `from` or before it, and before any echo that is seen.
+    fn beginning_before(
+        &self,
+        pixel: &Pixel<'_>,
+        from: Time,
+        until: Time,
+        laser_cycle: u32,
+    ) -> Beginning {
+        let echo_from = Time::from_fs(pixel.light.echo_fs().start);
+        let mut from = from.max(Time::ZERO);
+        loop {
+            let begin = Beginning::at(from, laser_cycle, self.stream, pixel.light);
+            let Some(known_from) = begin.time else {
+                return begin;
+            };
+            let echoes = self.echoes(pixel.light, known_from, until, laser_cycle);
+            let first = echoes.map(|cycle| self.stream.config().cycle_start(cycle) + echo_from);
+            match first.min().filter(|&first| first < known_from) {
+                Some(first) => from = first.max(Time::ZERO),
+                None => return begin,
+            }
+        }
+    }
+
+    /// Appends the photons since a beginning.
+    fn push_photons(
+        &mut self,
+        light: &PixelStream<'_>,
+        begin: Beginning,
+        until: Time,
+        laser_cycle: u32,
+    ) {
+        let config = self.stream.config();
+        let Beginning {
+            mut cycle,
+            mut block,
+            ..
+        } = begin;
+        let begins =
+            |cycle, block| config.cycle_start(cycle) + Time::from_fs(light.block_fs(block).start);
+        while cycle < config.laser_cycles && begins(cycle, block) < until {
+            light.push_block(cycle, block, &mut self.photons);
+            block += 1;
+            if block == light.blocks() {
+                (cycle, block) = (cycle + 1, 0);
+            }
+        }
+        let from = begin.time.unwrap_or(Time::ZERO);
+        for cycle in self.echoes(light, from, until, laser_cycle) {
+            light.push_listed_echo(cycle, &mut self.photons);
+        }
+        self.photons.retain(|photon| photon.time < until);
+    }
+}

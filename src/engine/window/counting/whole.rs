@@ -1,0 +1,200 @@
+//! Settling all SPADs of a laser cycle together: where avalanches cause others, where photons are many, and where echoes
+//! of other cycles are seen.
+
+use super::{Counting, Pixel, Placed, taken};
+use crate::engine::window::past::Past;
+use crate::engine::window::sight::{ROUNDING_FS, Spans};
+use crate::photon::{Draw, Group, Photon, PixelStream, SpadEvent, Span};
+use crate::units::Time;
+
+impl Counting<'_> {
+    /// Counts a group cycle by cycle.
+    pub(super) fn count_whole(&mut self, pixel: &mut Pixel<'_>, group: Group, cycles: u32) {
+        let mut by_cycle = std::mem::take(&mut self.by_cycle);
+        by_cycle.clear();
+        by_cycle.extend(self.plain.photons(pixel.light, self.stream, group, cycles));
+        self.other_echoes(pixel, pixel.light, &pixel.sight.plain, group, &mut by_cycle);
+        if let Some(breeding) = pixel.breeding {
+            by_cycle.extend(self.breeding.photons(breeding, self.stream, group, cycles));
+            self.other_echoes(pixel, breeding, &pixel.sight.breeding, group, &mut by_cycle);
+        }
+        by_cycle.retain(|(_, photon)| photon.time >= Time::ZERO);
+        by_cycle.sort_unstable_by_key(|&(cycle, _)| cycle);
+        for photons in by_cycle.chunk_by(|a, b| a.0 == b.0) {
+            self.photons.clear();
+            self.photons
+                .extend(photons.iter().map(|&(_, photon)| photon));
+            self.settle_cycle(pixel, group.first_cycle() + photons[0].0);
+        }
+        self.by_cycle = by_cycle;
+    }
+
+    /// Appends photons of other cycles' echoes that the windows of a group may see.
+    fn other_echoes(
+        &self,
+        pixel: &Pixel<'_>,
+        light: &PixelStream<'_>,
+        spans: &Spans,
+        group: Group,
+        by_cycle: &mut Vec<(u32, Photon)>,
+    ) {
+        let config = self.stream.config();
+        let (from_fs, until_fs) = (spans.own.within_fs.start, pixel.sight.until_fs);
+        let cycles = group.cycles_in(config.laser_cycles);
+        let mut draw = Draw::default();
+        for later in light.echoes_within(&(from_fs..until_fs)) {
+            if later == 0 {
+                continue;
+            }
+            // The window's time in that of the echo's cycle, with room for rounding.
+            let moved_fs = later * self.stream.cycle_fs();
+            let room_fs = ROUNDING_FS + later.abs();
+            let span = Span {
+                slots: 0..0,
+                within_fs: from_fs - moved_fs - room_fs..until_fs - moved_fs + room_fs,
+            };
+            let of_windows =
+                i64::from(group.first_cycle())..i64::from(group.first_cycle() + cycles);
+            let mut next = (of_windows.start + later).max(0);
+            let end = (of_windows.end + later).min(i64::from(config.laser_cycles));
+            while next < end {
+                let other = Group::of_cycle(next as u32);
+                light.draw(other, &span, &mut draw);
+                for (place, time_fs) in draw.photons(light) {
+                    let (cycle, spad) = super::split(place);
+                    let cycle = other.first_cycle() + cycle;
+                    let window = i64::from(cycle) - later;
+                    if cycle < config.laser_cycles && of_windows.contains(&window) {
+                        let photon = Photon {
+                            time: config.cycle_start(cycle) + Time::from_fs(time_fs),
+                            spad,
+                            breeds: light.breeds(),
+                        };
+                        by_cycle.push(((window - of_windows.start) as u32, photon));
+                    }
+                }
+                next = i64::from(other.first_cycle()) + i64::from(other.cycles());
+            }
+        }
+    }
+
+    /// Settles the cycles in which an avalanche that breeds may matter. Their photons are in no table afterwards.
+    pub(super) fn count_breeding_cycles(
+        &mut self,
+        pixel: &mut Pixel<'_>,
+        group: Group,
+        cycles: u32,
+    ) {
+        let Some(breeding) = pixel.breeding else {
+            return;
+        };
+        let mut by_cycle = std::mem::take(&mut self.by_cycle);
+        by_cycle.clear();
+        by_cycle.extend(self.breeding.photons(breeding, self.stream, group, cycles));
+        by_cycle.sort_unstable_by_key(|&(cycle, _)| cycle);
+        for photons in by_cycle.chunk_by(|a, b| a.0 == b.0) {
+            let (cycle, laser_cycle) = (photons[0].0, group.first_cycle() + photons[0].0);
+            let start = self.stream.config().cycle_start(laser_cycle);
+            let from = start + Time::from_fs(pixel.sight.plain.from_fs);
+            let until = start + Time::from_fs(pixel.sight.until_fs);
+            let is_seen = |time: Time| time >= from && time < until;
+            let matters = |photon: &Photon| {
+                is_seen(photon.time) || breeding.children(*photon).any(|child| is_seen(child.time))
+            };
+            if !photons.iter().any(|(_, photon)| matters(photon)) {
+                continue;
+            }
+            self.photons.clear();
+            self.photons
+                .extend(photons.iter().map(|&(_, photon)| photon));
+            let last = self.tables.take_last(cycle as usize);
+            self.take_cycle(pixel, last, laser_cycle);
+            self.settle_cycle(pixel, laser_cycle);
+        }
+        self.by_cycle = by_cycle;
+    }
+
+    /// Takes the `last` photon of a cycle and those before it out of the tables, and appends them to `photons`.
+    pub(super) fn take_cycle(&mut self, pixel: &Pixel<'_>, last: Option<usize>, laser_cycle: u32) {
+        let start = self.stream.config().cycle_start(laser_cycle);
+        let mut next = last;
+        while let Some(photon) = next {
+            let code = self.codes.codes()[photon];
+            self.tables.remove(code.row());
+            if self.is_drawn(pixel.light, photon) {
+                let time = start + self.time_of(pixel.light, photon, laser_cycle);
+                self.photons.push(Photon {
+                    time,
+                    spad: code.spad(),
+                    breeds: false,
+                });
+            }
+            next = self.tables.before(photon);
+        }
+    }
+
+    /// Counts the window of a laser cycle with `photons`, in any order.
+    pub(super) fn settle_cycle(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32) {
+        let start = self.stream.config().cycle_start(laser_cycle);
+        let window = self.window(pixel.sight, laser_cycle);
+        let is_seen = |photon: &&Photon| window.row_of(photon.time - start).is_some();
+        let seen = self.photons.iter().filter(is_seen).count() as u64;
+        self.detect(pixel, laser_cycle, u16::MAX);
+        self.count_events(pixel, &window, start, seen);
+    }
+
+    /// Counts the `events` of one laser cycle, which starts at `start`; `seen` photons in the window were drawn.
+    pub(super) fn count_events(
+        &self,
+        pixel: &mut Pixel<'_>,
+        window: &Placed<'_>,
+        start: Time,
+        seen: u64,
+    ) {
+        let row_of = |event: &SpadEvent| window.row_of(event.time - start).unwrap_or(0) as i64;
+        let mut alone = 0;
+        for (row, spads) in taken(&self.events, row_of).filter(|(row, _)| *row > 0) {
+            alone += u64::from(spads.count_ones());
+            pixel.hits[row as usize - 1] += self.engine.adds(spads);
+            pixel.work.clk_periods_visited += 1;
+        }
+        let pulses = self.events.iter().filter(|event| row_of(event) > 0).count() as u64;
+        pixel.work.pulses += pulses;
+        pixel.work.cancelled += pulses - alone;
+        pixel.work.lost_to_dead_time += seen.saturating_sub(pulses);
+    }
+
+    /// Turns `photons` of the SPADs of a set, in any order, and those before them as far as it takes, into `events`: all
+    /// rising edges in the window of a laser cycle, and perhaps some before.
+    pub(super) fn detect(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spads: u16) {
+        let start = self.stream.config().cycle_start(laser_cycle);
+        let wanted_from = start + Time::from_fs(pixel.sight.first_fs - ROUNDING_FS);
+        let until = start + Time::from_fs(pixel.sight.until_fs);
+        let mut past = pixel.sight.plain.past(self.stream, laser_cycle);
+        let mut breeding_past: Option<(&PixelStream<'_>, Past<'_>)> = pixel
+            .breeding
+            .map(|light| (light, pixel.sight.breeding.past(self.stream, laser_cycle)));
+        loop {
+            let known_from = past.known_from();
+            self.photons.sort_unstable();
+            let earlier =
+                known_from.map_or(0, |from| self.photons.partition_point(|p| p.time < from));
+            let later = self.photons.partition_point(|p| p.time < until);
+            let breeding = self.photons[..earlier]
+                .iter()
+                .filter(|photon| photon.breeds);
+            let mut avalanches = pixel.light.avalanches(known_from, breeding.copied());
+            self.events.clear();
+            let photons = &self.photons[earlier..later.max(earlier)];
+            let known = avalanches.run(photons, None, until, wanted_from, &mut self.events);
+            if known.is_ok() {
+                return;
+            }
+            let (extra, photons) = (&mut self.extra, &mut self.photons);
+            pixel.work.photons_drawn += past.extend(pixel.light, spads, extra, photons);
+            if let Some((light, past)) = &mut breeding_past {
+                pixel.work.photons_drawn += past.extend(light, spads, extra, photons);
+            }
+        }
+    }
+}
