@@ -471,6 +471,22 @@ fn set_changes_single_keys_and_names_itself_in_complaints() {
             "illuminance_klux = 100000 is impossible",
         ),
         (
+            vec!["frame", "--set", "scene.light.illuminance_klux=700"],
+            "the sun with bright clouds about it stays below 150 klux",
+        ),
+        (
+            vec!["frame", "--set", "scene.lidar.solar_irradiance_w_m2=1e6"],
+            "the sun has no more outside the atmosphere",
+        ),
+        (
+            vec!["frame", "--set", "scene.lidar.dark_count_hz=1e9"],
+            "16 hot SPADs have 10 MHz each",
+        ),
+        (
+            vec!["frame", "--set", "scene.lidar.pulse_energy_uj=1e7"],
+            "lasers of flash lidars stay below 1 J a pulse",
+        ),
+        (
             replay(&["--set", "sensor.bins=0"]),
             "bins = 0 is impossible",
         ),

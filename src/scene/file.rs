@@ -450,7 +450,7 @@ mod tests {
             "s.toml:2: in [lidar], pde = 1.5 is impossible; give 0 to 1",
             "s.toml:3: in [lidar], fov_deg = \"8 ns\" is a time; give an angle",
             "s.toml:4: in [lidar], unknown field `colour`",
-            "s.toml:6: in [light], illuminance_klux = NaN is impossible; give 0 to 1000 klux",
+            "s.toml:6: in [light], illuminance_klux = NaN is impossible; give 0 to 200 klux",
             "s.toml:9: in [[object]] number 1 (a), kind: unknown variant `cone`",
             "s.toml:10: in [[object]] number 1 (a), reflectivity = -1 is impossible",
             "s.toml:11: in [[object]] number 2, lacks `name`",

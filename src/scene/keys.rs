@@ -45,7 +45,7 @@ pub(super) const LIDAR: &[Key] = &[
     key(
         "pulse_energy_uj",
         "uJ",
-        Range::Within(0.0, f64::MAX),
+        Range::Limited(0.0, 1e6, "lasers of flash lidars stay below 1 J a pulse"),
         "Energy of one laser pulse over the whole field of view",
         CHOSEN,
     ),
@@ -87,14 +87,18 @@ pub(super) const LIDAR: &[Key] = &[
     key(
         "solar_irradiance_w_m2",
         "W/m2",
-        Range::Within(0.0, f64::MAX),
+        Range::Limited(
+            0.0,
+            1361.0,
+            "the sun has no more outside the atmosphere, at all wavelengths together",
+        ),
         "Solar irradiance within the filter's band at 100 klux",
         "ASTM G173 global tilt, 935 to 945 nm",
     ),
     key(
         "dark_count_hz",
         "Hz",
-        Range::Within(0.0, 1e9),
+        Range::Limited(0.0, 1.6e8, "16 hot SPADs have 10 MHz each"),
         "Dark counts of one macropixel, all its SPADs together",
         "chosen: 1.25 kHz for each of 16 SPADs",
     ),
@@ -197,7 +201,11 @@ pub(super) const STEREO: &[Key] = &[
 pub(super) const LIGHT: &[Key] = &[key(
     "illuminance_klux",
     "klux",
-    Range::Limited(0.0, 1000.0, "full sun is 100 klux"),
+    Range::Limited(
+        0.0,
+        200.0,
+        "the sun with bright clouds about it stays below 150 klux",
+    ),
     "Illuminance of the scene by the sun",
     CHOSEN,
 )];
