@@ -6,7 +6,7 @@
 use guided_dtof::chip::{EventType, Exposure, Mode, Overflow, SensorConfig};
 use guided_dtof::engine::{Cohort, CohortOptions, Engine, LitPixel, Window, stream_config};
 use guided_dtof::photon::{
-    DeadTimeLaw, PhotonStream, PixelLight, SpadEvent, StreamConfig, philox_key,
+    Avalanches, DeadTimeLaw, Photon, PhotonStream, PixelLight, SpadEvent, StreamConfig, philox_key,
 };
 use guided_dtof::units::Time;
 use proptest::prelude::*;
@@ -146,16 +146,19 @@ fn thrown(stream: &StreamConfig, light: &PixelLight) -> Vec<SpadEvent> {
         }
     }
     times_fs.retain(|time_fs| (0.0..end_fs).contains(time_fs));
-    let mut events: Vec<SpadEvent> = times_fs
+    let mut photons: Vec<Photon> = times_fs
         .iter()
-        .map(|&time_fs| SpadEvent {
+        .map(|&time_fs| Photon {
             time: Time::from_fs(time_fs as i64),
             spad: (uniform() * 16.0) as u8 % 16,
+            breeds: uniform() <= stream.spads.breeding_probability(),
         })
         .collect();
-    events.sort_unstable();
-    stream.spads.detect(philox_key(stream.seed), 5, &mut events);
-    events
+    photons.sort_unstable();
+    let mut edges = Vec::new();
+    let avalanches = Avalanches::in_the_dark(&stream.spads, philox_key(stream.seed), 5);
+    avalanches.run_to_the_end(&photons, &mut edges);
+    edges
 }
 
 fn seeds() -> u64 {

@@ -329,7 +329,7 @@ impl<'a> Cohort<'a> {
         }
         let scene = Scene::new(
             SpadLight::new(stream, light),
-            [dead_fs, spads.memory().as_fs() as f64 - dead_fs, period_fs],
+            [dead_fs, spads.reach().as_fs() as f64, period_fs],
             [from_fs, stream.cycle_s() * 1e15],
             self.config.bins,
         );
