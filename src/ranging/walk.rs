@@ -16,7 +16,7 @@
 use super::expected::{EchoLight, Response};
 use super::peak::{Peak, PeakOptions, interpolate_at};
 
-/// Rounds of matching arrival and signal. Each leaves about a tenth of the distance.
+/// Most rounds of matching arrival and signal. Most take fewer; counts that hardly rise with the signal take them all.
 const ROUNDS: usize = 12;
 
 /// Bins and relative counts to which arrival and signal are matched: 0.1 mm at 384 MHz, where counting noise is millimetres.

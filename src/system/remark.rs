@@ -83,11 +83,11 @@ impl Circumstances<'_> {
         match (ends.is_empty(), self.sensor.mode) {
             (true, _) => "no start value opens a window".to_owned(),
             (false, Mode::Conventional) => format!(
-                "mode = \"conventional\" opens every window at the STOP that ends the laser cycle, {} away, and the guide asks for {wanted}; give a STOP period that ends there, or mode = \"guided\"",
+                "mode = \"conventional\" opens every window at the STOP that ends the laser cycle, {} away, and the guide's estimates lie {wanted}; give a STOP period that ends there, or mode = \"guided\"",
                 span(&ends)
             ),
             (false, Mode::Guided) => format!(
-                "start values of {bits} bits (counter_bits) and a STOP every {periods} CLK periods open windows {} away, and the guide asks for {wanted}; give more of the one or the other",
+                "start values of {bits} bits (counter_bits) and a STOP every {periods} CLK periods open windows {} away, and the guide's estimates lie {wanted}; give more of the one or the other",
                 span(&ends)
             ),
         }
