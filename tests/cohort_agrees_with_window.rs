@@ -128,9 +128,11 @@ fn thrown(stream: &StreamConfig, light: &PixelLight) -> Vec<SpadEvent> {
     let end_fs = stream.cycle_start(stream.laser_cycles).as_fs() as f64;
     let mut times_fs = Vec::new();
     let mut at_fs = 0.0;
-    while light.background_hz > 0.0 {
-        at_fs -= uniform().ln() * 1e15 / light.background_hz;
-        if at_fs >= end_fs {
+    // In the dark the first one comes after all time.
+    let gap_fs = 1e15 / light.background_hz;
+    loop {
+        at_fs -= uniform().ln() * gap_fs;
+        if at_fs >= end_fs || at_fs.is_nan() {
             break;
         }
         times_fs.push(at_fs);
