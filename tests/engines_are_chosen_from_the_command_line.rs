@@ -88,11 +88,14 @@ fn speed_is_measured_for_every_engine_and_size() {
         &["speed", "--runs", "1", "--largest", "4", "--json"],
     );
     let figures: Vec<Value> = serde_json::from_str(&said).unwrap();
-    for engine in ["cycle", "window", "cohort"] {
+    for work in ["cycle-packing", "window-whole", "cohort"] {
         for side in [1, 4] {
-            let is_it = |f: &&Value| f["engine"] == engine && f["side"] == side;
+            let is_it = |f: &&Value| f["work"] == work && f["rows"] == side;
             let figure = figures.iter().find(is_it).expect("a figure");
-            assert!(figure["median_s"].as_f64().unwrap() > 0.0, "{figure}");
+            assert!(
+                figure["wall"]["median_s"].as_f64().unwrap() > 0.0,
+                "{figure}"
+            );
         }
     }
     let table = gdtof(here.path(), &["speed", "--runs", "1", "--largest", "1"]);

@@ -177,6 +177,6 @@ fn a_tolerance_is_kept_by_the_cheapest_engine() {
         assert_eq!(exposed.histograms.len(), pixels.len());
         assert!(exposed.work.photons_drawn <= exact.work.photons_drawn);
     }
-    // What has no light stays where it costs nothing; nearly all else has gone.
-    assert!((5..15).contains(&on_window), "{on_window}");
+    // What has no light stays where it costs nothing, and what has little where it costs less; the rest has gone.
+    assert!((5..32).contains(&on_window), "{on_window}");
 }

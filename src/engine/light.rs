@@ -116,7 +116,8 @@ pub fn stream_config(
 /// macropixels as they are finished. Neither threads nor batches change the histograms.
 ///
 /// # Errors
-/// As [`Engine::expose`], and where background light blinds SPADs more than half of the time.
+/// As [`Engine::expose`], and where background light blinds SPADs so much that following them all takes
+/// too long.
 pub fn expose<E: Engine + ?Sized>(
     engine: &E,
     stream: &PhotonStream,
@@ -144,20 +145,30 @@ pub fn expose_without_skipping<E: Engine + ?Sized>(
     })
 }
 
-/// Background photons of a SPAD in a dead time up to which exposures are simulated: it is blind half of the time then. The
-/// cost of finding a SPAD's state grows with e to the power of this.
-const MOST_BLINDING: f64 = 1.0;
+/// Background photons of a SPAD in a dead time from which on it is blind more than half of the time: so often that its
+/// state is found by following all of its photons, and no longer from those shortly before a window.
+const BLINDING: f64 = 1.0;
+
+/// Photons of macropixels in such light that are drawn at most: a minute of work on one core, at some 60 ns each. A small
+/// array before a whole field of view, which gathers much light on each macropixel, stays far below.
+const MOST_BLINDING_PHOTONS: f64 = 1e9;
 
 fn refuse_blinding(stream: &PhotonStream, pixels: &[LitPixel]) -> Result<(), EngineError> {
-    let dead_time = stream.config().spads.dead_time;
+    let config = stream.config();
+    let most_hz = BLINDING / config.spads.dead_time.as_s();
     let lights = pixels.iter().filter_map(|pixel| pixel.light);
-    let brightest_hz = lights.map(|light| light.background_hz).fold(0.0, f64::max) / SPADS as f64;
-    match brightest_hz * dead_time.as_s() <= MOST_BLINDING {
+    let rates_hz = lights.map(|light| light.background_hz);
+    let blinding_hz = rates_hz.filter(|hz| hz / SPADS as f64 > most_hz);
+    let (brightest_hz, total_hz) =
+        blinding_hz.fold((0f64, 0f64), |(most, sum), hz| (most.max(hz), sum + hz));
+    let photons = total_hz * config.cycle_s() * f64::from(config.laser_cycles);
+    match photons <= MOST_BLINDING_PHOTONS {
         true => Ok(()),
         false => Err(EngineError::Blinding {
-            background_hz: brightest_hz,
-            most_hz: MOST_BLINDING / dead_time.as_s(),
-            dead_time,
+            background_hz: brightest_hz / SPADS as f64,
+            most_hz,
+            photons,
+            most_photons: MOST_BLINDING_PHOTONS,
         }),
     }
 }

@@ -137,21 +137,22 @@ pub enum EngineError {
         /// Cells of a CLK period at least.
         cells: u32,
     },
-    /// Background light blinds SPADs more than half of the time.
+    /// Background light blinds SPADs more than half of the time, and there are too many such photons to follow.
     #[error(
-        "background light of {:.1} Mcounts/s a SPAD keeps it blind for {:.0} % of the time; exposures are simulated up to {:.1} Mcounts/s, one photon a dead time of {} ns: give less light, a smaller or darker lens, a narrower filter or a shorter dead time",
+        "background light of {:.1} Mcounts/s a SPAD keeps it blind for {:.0} % of the time, and the exposure has {photons:.1e} such photons, of which {most_photons:.0e} are simulated; give less than {:.1} Mcounts/s (less light, a smaller or darker lens, a narrower filter, a shorter dead time), or fewer macropixels or laser cycles",
         background_hz / 1e6,
         100.0 * background_hz / (background_hz + most_hz),
         most_hz / 1e6,
-        dead_time.as_ns()
     )]
     Blinding {
-        /// Background photons and dark counts of a SPAD, 1/s.
+        /// Background photons and dark counts of a SPAD, 1/s, where there are most.
         background_hz: f64,
-        /// Most that are simulated, 1/s.
+        /// From that rate on a SPAD is blind more than half of the time, 1/s.
         most_hz: f64,
-        /// The SPADs' dead time.
-        dead_time: crate::units::Time,
+        /// Photons of all macropixels in such light in the exposure.
+        photons: f64,
+        /// As many are simulated.
+        most_photons: f64,
     },
     /// A histogram bin of the netlist holds X.
     #[error("bin {bin} of {macropixel} is unknown (X) at the end of the exposure")]

@@ -108,6 +108,10 @@ impl Sight {
     pub fn new(law: &WindowLaw, window: &OpenWindow, stream: &PhotonStream) -> Option<Self> {
         let interval = law.interval(window);
         let (first_fs, end_fs) = (interval.start.as_fs(), interval.end.as_fs());
+        if end_fs - first_fs > stream.cycle_fs() {
+            // A pulse in two windows would be judged twice.
+            return None;
+        }
         let spads = &stream.config().spads;
         let from_fs = first_fs - spads.dead_time.as_fs() - ROUNDING_FS;
         let until_fs = end_fs + ROUNDING_FS;
