@@ -1,11 +1,18 @@
-//! `gdtof range` on histograms of a real sensor, and on made ones whose depths are known.
+//! `gdtof range` on histograms of a real sensor, on made ones whose depths are known, and on the sample captures in
+//! `vectors/range`, which our own chip has taken.
 //!
 //! The real captures are not part of the project. They are looked for in the folder that GDTOF_DATA names, or in
 //! `shared/data` beside the checkout; without them that test says so and is skipped.
 
 use std::io::Write;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+
+use guided_dtof::chip::{Exposure, SensorConfig, WindowLaw};
+use guided_dtof::engine::{LitPixel, Window, expose, stream_config};
+use guided_dtof::photon::PhotonStream;
+use guided_dtof::scene::{GroundTruth, Object, Scene, Shape, Vec3};
 
 fn range(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_gdtof"))
@@ -135,6 +142,101 @@ fn a_kept_calibration_gives_the_same_depths_and_foreign_ones_are_refused() {
     refused(&["--histograms", "cal.json"], "cal.json:1");
     std::fs::write(file("few.json"), "[]").unwrap();
     refused(&["--histograms", "few.json"], "at least one");
+}
+
+/// Counts of `zones`, macropixels of a 3×3 array whose windows reach from the lidar to 25 m, before a plane at
+/// `distance_m`.
+fn modelled_counts(
+    zones: Range<u32>,
+    distance_m: f64,
+    reflectivity: f64,
+    seed: u64,
+) -> Vec<Vec<u16>> {
+    let sensor = modelled_sensor();
+    let exposure = Exposure::new(&sensor, 120, 2_000);
+    let mut scene = Scene::outdoor();
+    scene.lidar.pulse_energy_uj = 0.1;
+    scene.light.illuminance_klux = 10.0;
+    scene.objects = vec![Object {
+        name: "plane".into(),
+        reflectivity,
+        shape: Shape::Plane {
+            centre_m: Vec3::new(0.0, 0.0, distance_m),
+            normal: Vec3::new(0.0, 0.0, -1.0),
+            width_m: 100.0,
+            height_m: 100.0,
+        },
+    }];
+    scene.validate("the plane").unwrap();
+    let light = scene.pixel_light(&GroundTruth::render(&scene, 3, 3));
+    let pixels: Vec<LitPixel> = zones
+        .map(|number| LitPixel {
+            number,
+            start: MODELLED_START,
+            light: Some(light[number as usize]),
+        })
+        .collect();
+    let stream = stream_config(&sensor, &exposure, seed, scene.pulse_sigma());
+    let engine = Window::new(&sensor, &exposure);
+    let exposed = expose(&engine, &PhotonStream::new(&stream), &pixels, |_| ()).unwrap();
+    exposed.histograms
+}
+
+/// Bins 0 to 63 lie before the end of this start value's window, at 25 m.
+const MODELLED_START: u16 = 62;
+
+fn modelled_sensor() -> SensorConfig {
+    SensorConfig {
+        rows: 3,
+        cols: 3,
+        bins: 64,
+        bin_bits: 16,
+        ..SensorConfig::default()
+    }
+}
+
+/// A plane from 2 to 21 m. The reference is a dim surface half a metre away; the chip's own depth is the middle of its
+/// fullest bin.
+fn modelled_captures() -> String {
+    let sensor = modelled_sensor();
+    let law = WindowLaw::new(&sensor, &Exposure::new(&sensor, 120, 1));
+    let window = law.window(MODELLED_START).open().unwrap();
+    let captures: Vec<String> = (0..20)
+        .map(|i| {
+            let distance_m = 2.0 + f64::from(i);
+            let seed = 2 * i as u64;
+            let zones = modelled_counts(0..9, distance_m, 0.5, seed);
+            let reference = modelled_counts(4..5, 0.5, 0.001, seed + 1).remove(0);
+            let own_mm = zones.iter().map(|counts| {
+                let fullest = (0..counts.len()).max_by_key(|&bin| counts[bin]).unwrap();
+                let range_m = law.time_of(&window, fullest as f64).as_range_m();
+                (1e3 * range_m).round() as i64
+            });
+            let capture = serde_json::json!({
+                "capture": i, "dist_to_plane_m": distance_m, "reference_hist": reference,
+                "hists": zones, "on_chip_depths_mm": own_mm.collect::<Vec<_>>(),
+            });
+            capture.to_string()
+        })
+        .collect();
+    format!("[\n{}\n]\n", captures.join(",\n"))
+}
+
+/// Set GDTOF_REMAKE to write the file anew (`vectors/remake.sh` does) after a deliberate change.
+#[test]
+fn the_sample_captures_are_ranged() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("vectors/range/captures.json");
+    if std::env::var_os("GDTOF_REMAKE").is_some() {
+        std::fs::write(&file, modelled_captures()).unwrap();
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let report = report(folder.path(), &["--histograms", file.to_str().unwrap()]);
+    assert_eq!(report["captures"], 20);
+    assert_eq!(report["zones"], 9);
+    assert_eq!(report["sightings"], 180, "{report:#}");
+    // The chip's own depth is a bin's, 390 mm: 113 mm RMS within it.
+    let (ours, own) = (rms_mm(&report, "depths"), rms_mm(&report, "sensor"));
+    assert!(ours < 60.0 && ours < 0.5 * own, "{report:#}");
 }
 
 #[test]
