@@ -149,8 +149,8 @@ pub fn expose_without_skipping<E: Engine + ?Sized>(
 /// state is found by following all of its photons, and no longer from those shortly before a window.
 const BLINDING: f64 = 1.0;
 
-/// Photons of macropixels in such light that are drawn at most: a minute of work on one core, at some 60 ns each. A small
-/// array before a whole field of view, which gathers much light on each macropixel, stays far below.
+/// Photons of macropixels in such light that are drawn at most: chosen, not measured, to be of the order of a minute. A small
+/// array before a whole field of view, which gathers much light on each macropixel, stays below.
 const MOST_BLINDING_PHOTONS: f64 = 1e9;
 
 fn refuse_blinding(stream: &PhotonStream, pixels: &[LitPixel]) -> Result<(), EngineError> {
@@ -195,7 +195,8 @@ fn in_batches<E: Engine + ?Sized>(
     })
 }
 
-/// Bytes of pulses that are kept at a time. Two threads stay below 200 MB with it, unless a single macropixel has more.
+/// Bytes of pulses that a thread keeps at a time, unless a single macropixel has more. Chosen, so that two threads keep less
+/// than 200 MB of them.
 const MOST_PULSE_BYTES: f64 = 64e6;
 
 /// Draws every photon of the exposure and gives the pulses to [`Engine::histograms`], as many macropixels at a time as the

@@ -44,7 +44,7 @@ const CHUNK_BITS: u32 = 10;
 
 /// A light is drawn by laser cycle from so many background photons of a macropixel per second on. Time of 4096 windows of 16
 /// bins in 1600 laser cycles with 8 ns of dead time, by slots and groups | by laser cycle: 0.5 | 1.9 s at 80 Mcounts/s,
-/// 9.3 | 3.6 s at 400.
+/// 9.3 | 3.6 s at 400, on a busy machine; between them it is a guess.
 const BRIGHT_BACKGROUND_HZ: f64 = 160e6;
 
 /// From so many signal photons a laser cycle on; likewise 1.0 | 2.0 s at 5, 52 | 3.6 s at 60.

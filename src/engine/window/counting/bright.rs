@@ -76,8 +76,8 @@ impl Counting<'_> {
         begin.time.is_some().then_some(begin)
     }
 
-    /// How long before a window its photons are drawn from at first: two dead times, and more where gaps are rarer. A window
-    /// that needs more takes some ten times as long as one that does not.
+    /// How long before a window its photons are drawn from at first: two dead times, and more where gaps are rarer. With two
+    /// alone, 1600 Mcounts/s took 24 s where 400 took 3.6; with this 17 and 4.0.
     fn first_look_back(&self, light: &PixelStream<'_>) -> Time {
         let dead_time = self.stream.config().spads.dead_time;
         dead_time * (2 + (8.0 * light.per_dead_time()) as i64)
