@@ -417,6 +417,32 @@ fn an_echo_costs_what_is_detected() {
     }
 }
 
+/// Afterpulses alone can make a SPAD's state unknown; looking further back must end without a dead time, too.
+#[test]
+fn afterpulses_without_a_dead_time_in_bright_light() {
+    let (config, exposure, stream, mut pixels) = frame();
+    let spads = SpadModel {
+        afterpulse_probability: 0.4,
+        afterpulse_time: Time::from_ns(5),
+        crosstalk_probability: 0.2,
+        ..SpadModel::with_dead_time(Time::ZERO)
+    };
+    pixels.truncate(5);
+    for pixel in &mut pixels {
+        if let Some(light) = &mut pixel.light {
+            light.background_hz = 3e8;
+        }
+    }
+    let stream = PhotonStream::new(&StreamConfig {
+        spads,
+        ..stream.config().clone()
+    });
+    let window = Window::new(&config, &exposure);
+    let seen = window.expose(&stream, &pixels).unwrap();
+    let all = full_stream(&window, &stream, &pixels).unwrap();
+    assert_eq!(seen.histograms, all.histograms);
+}
+
 #[test]
 fn light_that_blinds_is_refused_with_its_numbers() {
     let (config, exposure, stream, mut pixels) = frame();

@@ -27,7 +27,11 @@ impl Beginning {
             cycle -= 1;
         }
         let start = stream.config().cycle_start(cycle);
-        let block = light.block_at((time - start).as_fs());
+        // Where slots are short, whole blocks may come before the exposure.
+        let block = match time > Time::ZERO {
+            true => light.block_at((time - start).as_fs()),
+            false => 0,
+        };
         let time = start + Time::from_fs(light.block_fs(block).start);
         Beginning {
             cycle,
@@ -77,10 +81,12 @@ impl Counting<'_> {
     }
 
     /// How long before a window its photons are drawn from at first: two dead times, and more where gaps are rarer. With two
-    /// alone, 1600 Mcounts/s took 24 s where 400 took 3.6; with this 17 and 4.0.
+    /// alone, 1600 Mcounts/s took 24 s where 400 took 3.6; with this 17 and 4.0. Never nothing, which doubling would leave
+    /// as it is: without a dead time, it is afterpulses that make the state unknown.
     fn first_look_back(&self, light: &PixelStream<'_>) -> Time {
         let dead_time = self.stream.config().spads.dead_time;
-        dead_time * (2 + (8.0 * light.per_dead_time()) as i64)
+        let dead_times = dead_time * (2 + (8.0 * light.per_dead_time()) as i64);
+        dead_times.max(self.stream.config().clock.period())
     }
 
     /// Counts the window of one laser cycle.
