@@ -18,7 +18,7 @@
 //! Which photon is the next one depends on the SPAD's state; whoever draws an echo has to know it from the echo's
 //! beginning on ([`Avalanches`](crate::photon::Avalanches) tells where it does not).
 //!
-//! Echoes of measured pulses, and photons that breed, are drawn photon by photon.
+//! Echoes of measured pulses or of half a laser cycle, and photons that breed, are drawn photon by photon.
 
 use std::ops::Range;
 
@@ -187,9 +187,14 @@ impl<'a> PixelStream<'a> {
     }
 
     /// Whether photons of the echo are drawn only where their SPAD is ready ([`OrderedEchoes`]).
-    fn has_ordered_echo(&self) -> bool {
+    ///
+    /// Such an echo has to be followed from its beginning. Where echoes come one upon the other, that would be from the
+    /// beginning of the exposure, for each window.
+    pub fn has_ordered_echo(&self) -> bool {
         let is_gaussian = self.stream.shape.is_none();
-        self.is_bright && is_gaussian && self.kind == Kind::Plain && self.signal_per_spad > 0.0
+        let is_short = self.echo_fs.1 - self.echo_fs.0 < self.stream.cycle_fs / 2;
+        let is_plain = self.kind == Kind::Plain;
+        self.is_bright && is_gaussian && is_short && is_plain && self.signal_per_spad > 0.0
     }
 
     /// Whether there is an echo whose photons are drawn one by one, whatever the SPADs do.

@@ -159,7 +159,7 @@ impl Counting<'_> {
         })
     }
 
-    /// Where photons have to be known from: `from` or before it, and before any echo that is seen.
+    /// Where photons have to be known from: `from` or before it, and before any ordered echo that is seen.
     fn beginning_before(
         &self,
         pixel: &Pixel<'_>,
@@ -174,6 +174,9 @@ impl Counting<'_> {
             let Some(known_from) = begin.time else {
                 return begin;
             };
+            if !pixel.light.has_ordered_echo() {
+                return begin;
+            }
             let echoes = self.echoes(pixel.light, known_from, until, laser_cycle);
             let first = echoes.map(|cycle| self.stream.config().cycle_start(cycle) + echo_from);
             match first.min().filter(|&first| first < known_from) {
