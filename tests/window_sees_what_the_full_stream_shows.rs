@@ -117,7 +117,8 @@ fn sigmas() -> impl Strategy<Value = Sigma> {
 
 /// `most_periods`: longest laser cycle, in CLK periods; `slowest_mhz`: lowest CLK frequency.
 fn cases(most_periods: u32, slowest_mhz: f64) -> impl Strategy<Value = Case> {
-    let cycles = prop_oneof![3 => 1u32..40, 1 => 500u32..1100];
+    // Groups of photons end at 128, 256 … 2048 laser cycles.
+    let cycles = prop_oneof![6 => 1u32..40, 2 => 500u32..1100, 1 => 2000u32..2200];
     let rate_hz = prop_oneof![1 => Just(0.0), 3 => 1e5f64..2e7, 2 => 2e7f64..5e8];
     let signal = prop_oneof![1 => Just(0.0), 3 => 0.01f64..3.0, 1 => 3.0f64..40.0];
     (

@@ -27,6 +27,9 @@ pub const SPADS: usize = 16;
 /// Longest delay of an afterpulse after the dead time, in time constants; e⁻⁸ of the exponential lie beyond.
 pub const AFTERPULSE_REACH: i64 = 8;
 
+/// The share of the exponential within them: 1 − e⁻⁸.
+const AFTERPULSE_REACHED: f64 = 0.999_664_537_372_097_5;
+
 /// How long after an avalanche crosstalk fires a neighbour.
 pub const CROSSTALK_DELAY: Time = Time::from_ps(10);
 
@@ -136,8 +139,7 @@ impl SpadModel {
         let has_afterpulse = choice < afterpulse;
         let has_crosstalk = choice < afterpulse * crosstalk || choice >= afterpulse;
         let afterpulse = has_afterpulse.then(|| {
-            let reached = -libm::expm1(-AFTERPULSE_REACH as f64);
-            let share = reached * rand_philox::u32_to_unit_f64(words[1]);
+            let share = AFTERPULSE_REACHED * rand_philox::u32_to_unit_f64(words[1]);
             let delay_fs = -libm::log1p(-share) * self.afterpulse_time.as_fs() as f64;
             SpadEvent {
                 time: parent.time + self.dead_time + Time::from_fs(1 + delay_fs.round() as i64),
@@ -270,6 +272,7 @@ mod tests {
             (since - model.dead_time).as_ns()
         });
         let mean = delays.sum::<f64>() / n as f64;
+        assert_eq!(AFTERPULSE_REACHED, -libm::expm1(-AFTERPULSE_REACH as f64));
         // Mean of an exponential cut at 8 time constants.
         let expected = 5.0 * (1.0 - 8.0 / (8f64.exp() - 1.0));
         assert!((mean - expected).abs() < 5.0 * 5.0 / (n as f64).sqrt());

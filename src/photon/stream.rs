@@ -46,7 +46,7 @@ use super::pulse::{PulseSampler, PulseShape};
 use super::quantile::{NORMAL_BITS, NormalSampler};
 use super::random::{Poisson, Purpose, philox_key};
 use super::spad::{Photon, SPADS, SpadEvent, SpadModel};
-use crate::units::{Frequency, Time};
+use crate::units::{Every, Frequency, Time};
 pub use bright::{Background, NEVER_FS, OrderedEchoes, TILE, spad_of};
 use draw::ByCycle;
 pub use draw::{Draw, PER_BLOCK, Place, Run};
@@ -68,6 +68,10 @@ const ROUNDER: f64 = 6_755_399_441_055_744.0;
 const FAR_FS: i64 = 1 << 60;
 
 const _: () = assert!(PLACE_BITS + NORMAL_BITS <= u64::BITS);
+
+/// Photons that breed are rare if a slot of the shortest group has fewer of them: numbers of photons that are mostly 0 take
+/// longer than the photons.
+const RARE: f64 = 1.0;
 
 /// Second counter word of the number of signal photons; slots are below it.
 const SIGNAL_RUN: u32 = u32::MAX;
@@ -159,6 +163,7 @@ pub struct PixelPhotons {
 pub struct PhotonStream {
     config: StreamConfig,
     key: [u32; 2],
+    starts: Every,
     cycle_fs: i64,
     slots: Slots,
     gaussian: NormalSampler,
@@ -171,6 +176,7 @@ impl PhotonStream {
         debug_assert!(config.stop_periods > 0, "a cycle needs a length");
         PhotonStream {
             key: philox_key(config.seed),
+            starts: config.clock.every(config.stop_periods),
             cycle_fs: config.clock.whole_fs(i64::from(config.stop_periods)),
             slots: Slots::new(config.clock, config.stop_periods, config.lead),
             gaussian: NormalSampler::new(config.pulse_sigma.as_fs() as f64),
@@ -182,6 +188,12 @@ impl PhotonStream {
     /// What it was made of.
     pub fn config(&self) -> &StreamConfig {
         &self.config
+    }
+
+    /// [`StreamConfig::cycle_start`].
+    #[inline]
+    pub fn cycle_start(&self, cycle: u32) -> Time {
+        self.starts.at(cycle)
     }
 
     /// The whole femtoseconds of a laser cycle.
@@ -257,6 +269,8 @@ impl PhotonStream {
             signal: Numbers::new(light.signal_per_cycle * share),
             gap_fs: 1e15 / background_hz,
             signal_per_spad: light.signal_per_cycle * share / SPADS as f64,
+            has_long_groups: kind == Kind::Breeding
+                && background_hz * self.slots.length_s() * f64::from(FIRST) < RARE,
             late_fs: 0,
         };
         part.late_fs = part.late_fs();
@@ -298,19 +312,24 @@ impl PhotonStream {
         let mut draw = Draw::default();
         let mut by_cycle = ByCycle::default();
         let all = self.span(0..self.slots.count());
-        let end = self.config.cycle_start(self.config.laser_cycles);
+        let end = self.cycle_start(self.config.laser_cycles);
         let mut photons: Vec<Photon> = Vec::new();
         let mut edges = Vec::new();
         let mut avalanches = Avalanches::in_the_dark(&self.config.spads, self.key, plain.pixel);
         let mut drawn = 0;
         for group in self.groups() {
-            let cycles = group.cycles_in(self.config.laser_cycles);
             let carried = photons.len();
             for light in std::iter::once(plain).chain(breeding) {
-                light.draw(group, &all, &mut draw);
+                let group_of_light = light.group_of(group.first_cycle());
+                if group_of_light.first_cycle() != group.first_cycle() {
+                    // It came with one of the groups before.
+                    continue;
+                }
+                let cycles = group_of_light.cycles_in(self.config.laser_cycles);
+                light.draw(group_of_light, &all, &mut draw);
                 by_cycle.sort(&draw, light);
                 for cycle in 0..cycles {
-                    let start = self.config.cycle_start(group.first_cycle() + cycle);
+                    let start = self.cycle_start(group.first_cycle() + cycle);
                     photons.extend(by_cycle.of(cycle).iter().map(|&photon| Photon {
                         time: start + Time::from_fs(photon >> SPAD_BITS),
                         spad: (photon & (SPADS as i64 - 1)) as u8,
@@ -325,7 +344,7 @@ impl PhotonStream {
             // Photons of the next groups come from then on.
             let next = group.first_cycle().saturating_add(group.cycles());
             let until = match next < self.config.laser_cycles {
-                true => self.config.cycle_start(next) + plain.earliest(),
+                true => self.cycle_start(next) + plain.earliest(),
                 false => end,
             };
             let now = photons.partition_point(|photon| photon.time < until);
@@ -350,7 +369,7 @@ impl PhotonStream {
         mut pulses: impl FnMut(&[SpadEvent]),
     ) -> PixelPhotons {
         let config = &self.config;
-        let end = config.cycle_start(config.laser_cycles);
+        let end = self.cycle_start(config.laser_cycles);
         let mut photons: Vec<Photon> = Vec::new();
         let mut edges = Vec::new();
         let mut avalanches = Avalanches::in_the_dark(&config.spads, self.key, plain.pixel);
@@ -358,12 +377,12 @@ impl PhotonStream {
         let (mut drawn, mut next_echo) = (0, 0);
         for cycle in 0..config.laser_cycles {
             let until = match cycle + 1 < config.laser_cycles {
-                true => config.cycle_start(cycle + 1) - Time::from_fs(self.slots.lead_fs()),
+                true => self.cycle_start(cycle + 1) - Time::from_fs(self.slots.lead_fs()),
                 false => end,
             };
             // Whatever may blind a SPAD for an echo must find it.
             let may_begin = |echo: u32| {
-                config.cycle_start(echo) + Time::from_fs(plain.echo_fs.0)
+                self.cycle_start(echo) + Time::from_fs(plain.echo_fs.0)
                     <= until + config.spads.dead_time
             };
             while next_echo < config.laser_cycles && may_begin(next_echo) {
@@ -462,6 +481,8 @@ pub struct PixelStream<'a> {
     gap_fs: f64,
     /// Mean number of signal photons of a SPAD in a laser cycle.
     signal_per_spad: f64,
+    /// Whether all groups are of the longest kind.
+    has_long_groups: bool,
     /// From when on an echo has hardly any photons left.
     late_fs: i64,
 }
@@ -545,6 +566,14 @@ impl PixelStream<'_> {
         match time {
             Some(time) => Avalanches::known_from(model, key, self.pixel, time, breeding),
             None => Avalanches::in_the_dark(model, key, self.pixel),
+        }
+    }
+
+    /// The group of a laser cycle.
+    pub fn group_of(&self, cycle: u32) -> Group {
+        match self.has_long_groups {
+            true => Group::long(cycle),
+            false => Group::of_cycle(cycle),
         }
     }
 

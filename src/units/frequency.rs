@@ -147,6 +147,17 @@ impl Frequency {
         })
     }
 
+    /// The times of every `periods`-th whole period.
+    pub fn every(self, periods: u32) -> Every {
+        let modulus = 2 * self.numerator;
+        let step = 2 * i128::from(periods) * FS_PER_S * i128::from(self.denominator);
+        Every {
+            whole_fs: (step / i128::from(modulus)) as i64,
+            rest: (step % i128::from(modulus)) as u64,
+            modulus,
+        }
+    }
+
     /// How many whole half periods lie in `[0, t]`: the largest `k` with `half_periods(k) <= t`.
     pub fn half_periods_until(self, t: Time) -> i64 {
         let guess = (t.as_fs() as i128 * 2 * self.numerator as i128)
@@ -156,6 +167,32 @@ impl Frequency {
             k += 1;
         }
         k
+    }
+}
+
+/// The times of every so many-th period of a clock: those of [`Frequency::periods`], without a long division where the
+/// clock's frequency has few digits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Every {
+    whole_fs: i64,
+    rest: u64,
+    modulus: u64,
+}
+
+impl Every {
+    /// The `n`-th of them; the first is number 0, at time 0.
+    #[inline]
+    pub fn at(&self, n: u32) -> Time {
+        let half = self.modulus / 2;
+        let short = self.rest.checked_mul(n.into());
+        let rest = match short.and_then(|rest| rest.checked_add(half)) {
+            Some(rest) => rest / self.modulus,
+            None => {
+                let rest = u128::from(self.rest) * u128::from(n) + u128::from(half);
+                (rest / u128::from(self.modulus)) as u64
+            }
+        };
+        Time::from_fs(i64::from(n) * self.whole_fs + rest as i64)
     }
 }
 
@@ -215,6 +252,18 @@ mod tests {
             for (k, tick) in (first..).zip(f.ticks(first).take(10_000)) {
                 prop_assert_eq!(tick, f.half_periods(k));
             }
+        }
+
+        #[test]
+        fn every_so_manyth_period_is_that_period(
+            hz in prop_oneof![1e3f64..2e9, (1u32..2_000).prop_map(|mhz| f64::from(mhz) * 1e6)],
+            periods in 1u32..10_000,
+            n in prop_oneof![0u32..100_000, any::<u32>()],
+        ) {
+            let f = Frequency::from_hz_f64(hz).unwrap();
+            let k = i64::from(n) * i64::from(periods);
+            prop_assume!((k as f64) < 9e3 * hz);
+            prop_assert_eq!(f.every(periods).at(n), f.periods(k));
         }
 
         #[test]

@@ -8,5 +8,5 @@ mod frequency;
 mod time;
 
 pub use constants::{PLANCK_J_S, SPEED_OF_LIGHT_M_PER_S};
-pub use frequency::{Frequency, FrequencyError};
+pub use frequency::{Every, Frequency, FrequencyError};
 pub use time::Time;

@@ -24,8 +24,10 @@ use crate::photon::{
     Draw, Group, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SPADS, SpadEvent,
 };
 use crate::units::Time;
+use breeding::Breeding;
 use tile::Tile;
 
+mod breeding;
 mod bright;
 mod settling;
 mod tile;
@@ -40,7 +42,7 @@ pub struct Counting<'a> {
     adds: [i64; SPADS + 1],
     spacing: Spacing,
     plain: Drawn,
-    breeding: Drawn,
+    breeding: Breeding,
     extra: Draw,
     /// Codes of all photons drawn for the group that do not breed. Photons are known by their index here.
     codes: Codes,
@@ -54,7 +56,7 @@ pub struct Counting<'a> {
     fired: [u8; ROWS],
     /// Photons of one cycle's window.
     photons: Vec<Photon>,
-    /// Photons by cycle of the group: those of breeding ones, or all where whole cycles are settled.
+    /// Photons by cycle of the group, where whole cycles are settled.
     by_cycle: Vec<(u32, Photon)>,
     events: Vec<SpadEvent>,
     /// Laser cycles side by side, in bright light.
@@ -102,7 +104,7 @@ impl Drawn {
     ) -> impl Iterator<Item = (u32, Photon)> + 'd {
         let first = group.first_cycle();
         let photon = move |cycle: u32, spad: u8, time_fs: i64| Photon {
-            time: stream.config().cycle_start(cycle) + Time::from_fs(time_fs),
+            time: stream.cycle_start(cycle) + Time::from_fs(time_fs),
             spad,
             breeds: light.breeds(),
         };
@@ -153,7 +155,7 @@ impl<'a> Counting<'a> {
             },
             adds: std::array::from_fn(|spads| engine.adds(((1u32 << spads) - 1) as u16)),
             plain: Drawn::default(),
-            breeding: Drawn::default(),
+            breeding: Breeding::default(),
             extra: Draw::default(),
             codes: Codes::default(),
             scratch: Scratch::default(),
@@ -196,7 +198,7 @@ impl<'a> Counting<'a> {
             work: Work::default(),
         };
         self.plain.carried.clear();
-        self.breeding.carried.clear();
+        self.breeding.clear();
         self.tables.clear_counts();
         if light.is_bright() {
             self.count_bright(&mut pixel);
@@ -214,7 +216,8 @@ impl<'a> Counting<'a> {
             let cycles = group.cycles_in(self.stream.config().laser_cycles);
             pixel.work.photons_drawn += self.plain.draw(light, group, &sight.plain);
             if let Some(breeding) = breeding {
-                pixel.work.photons_drawn += self.breeding.draw(breeding, group, &sight.breeding);
+                let (first, spans) = (group.first_cycle(), &sight.breeding);
+                pixel.work.photons_drawn += self.breeding.draw(breeding, self.stream, first, spans);
             }
             // Photons that come before the exposure are left out there.
             let is_first = group.first_cycle() == 0 && sees_before;
@@ -225,9 +228,6 @@ impl<'a> Counting<'a> {
                 self.count_whole(&mut pixel, group, cycles);
             }
             self.plain.carry(light, group);
-            if let Some(breeding) = breeding {
-                self.breeding.carry(breeding, group);
-            }
         }
         for (row, hits) in (1..).zip(&mut pixel.hits) {
             let photons = u64::from(self.tables.count(row));
@@ -279,7 +279,7 @@ impl<'a> Counting<'a> {
         self.tables
             .put(&self.codes, group.cycles() as usize, counted);
         if pixel.breeding.is_some() {
-            self.count_breeding_cycles(pixel, group, own.cycles);
+            self.count_breeding_cycles(pixel, group);
         }
         pixel.work.lost_to_dead_time += self.tables.settle_by_rows(&self.codes, &self.spacing);
         let mut index = 0;
@@ -328,7 +328,7 @@ impl<'a> Counting<'a> {
 
     /// How long before a laser cycle the one before it starts.
     fn before(&self, laser_cycle: u32) -> Time {
-        let start = |cycle| self.stream.config().cycle_start(cycle);
+        let start = |cycle| self.stream.cycle_start(cycle);
         start(laser_cycle) - start(laser_cycle - 1)
     }
 }

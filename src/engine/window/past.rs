@@ -8,7 +8,7 @@
 //! What a window's photons do depends on the SPADs' state before. Where that is not known, the slot before is drawn as
 //! well, and so on, over cycles and groups, at the worst to the beginning of the exposure.
 
-use crate::photon::{Draw, Group, Photon, PhotonStream, PixelStream, Place, SPADS, Span};
+use crate::photon::{Draw, Photon, PhotonStream, PixelStream, Place, SPADS, Span};
 use crate::units::Time;
 
 /// Photons of a macropixel from some slot on, ever further back.
@@ -37,7 +37,7 @@ impl<'a> Past<'a> {
 
     /// From when on all photons are known; `None` if that is the whole exposure.
     pub fn known_from(&self) -> Option<Time> {
-        let start = || self.stream.config().cycle_start(self.cycle);
+        let start = || self.stream.cycle_start(self.cycle);
         let slot_fs = self.stream.slots().start_fs(self.slot);
         (!self.is_everything()).then(|| start() + Time::from_fs(slot_fs))
     }
@@ -54,8 +54,7 @@ impl<'a> Past<'a> {
         if self.is_everything() {
             return 0;
         }
-        let config = self.stream.config();
-        let start = |cycle| config.cycle_start(cycle);
+        let start = |cycle| self.stream.cycle_start(cycle);
         let end = self.known_from().expect("not everything is known");
         if self.slot > 0 {
             self.slot -= 1;
@@ -103,9 +102,9 @@ impl<'a> Past<'a> {
         photons: &mut Vec<Photon>,
     ) -> u64 {
         let cycle = self.cycle_after(later).expect("the exposure has it");
-        let group = Group::of_cycle(cycle);
+        let group = pixel.group_of(cycle);
         pixel.draw(group, &Span { slots, within_fs }, draw);
-        let start = self.stream.config().cycle_start(cycle);
+        let start = self.stream.cycle_start(cycle);
         let wanted = cycle - group.first_cycle();
         photons.extend(draw.photons(pixel).filter_map(|(place, time_fs)| {
             let (cycle, spad) = split(place);

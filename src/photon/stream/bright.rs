@@ -255,7 +255,7 @@ impl<'a> PixelStream<'a> {
         }
         let block_fs = self.block_fs(block);
         let length = (block_fs.end - block_fs.start) as f64;
-        let start = self.stream.config.cycle_start(cycle);
+        let start = self.stream.cycle_start(cycle);
         let mut at = 0.0;
         for chunk in 0.. {
             let second = block << CHUNK_BITS | chunk;
@@ -285,8 +285,8 @@ impl<'a> PixelStream<'a> {
         }
         let config = &self.stream.config;
         let (start, end) = (
-            config.cycle_start(cycle),
-            config.cycle_start(config.laser_cycles),
+            self.stream.cycle_start(cycle),
+            self.stream.cycle_start(config.laser_cycles),
         );
         let words = |second: u32| {
             let counter = [cycle, second, self.pixel, self.kind.bright_echo()];
@@ -408,10 +408,7 @@ impl<'a> PixelStream<'a> {
     pub fn ordered_echoes(&self) -> OrderedEchoes<'_> {
         OrderedEchoes {
             pixel: self,
-            end: self
-                .stream
-                .config
-                .cycle_start(self.stream.config.laser_cycles),
+            end: self.stream.cycle_start(self.stream.config.laser_cycles),
             echoes: Vec::new(),
             next: None,
             drawn: 0,
@@ -452,7 +449,7 @@ impl OrderedEchoes<'_> {
         if !self.pixel.has_ordered_echo() {
             return;
         }
-        let start = self.pixel.stream.config.cycle_start(cycle);
+        let start = self.pixel.stream.cycle_start(cycle);
         let mut echo = OrderedEcho {
             cycle,
             start,

@@ -8,7 +8,7 @@
 //!
 //! Long groups take less time per photon, but an exposure draws its last one whole, whatever it needs of it. So groups
 //! begin short and double until they have [`GROUP`] cycles: less than half of what is drawn comes after the exposure, and
-//! a longer exposure begins with the same photons.
+//! a longer exposure begins with the same photons. Photons that breed and are rare have long groups only.
 
 use super::SPAD_BITS;
 use super::draw::Place;
@@ -54,6 +54,15 @@ impl Group {
             number: shorter + (first_cycle >> bits),
             first_cycle,
             bits,
+        }
+    }
+
+    /// The longest group that a laser cycle may be in, where all groups are so long; a numbering of their own.
+    pub fn long(cycle: u32) -> Self {
+        Group {
+            number: cycle >> GROUP_BITS,
+            first_cycle: cycle >> GROUP_BITS << GROUP_BITS,
+            bits: GROUP_BITS,
         }
     }
 

@@ -21,12 +21,12 @@ impl Beginning {
     /// That of the block which is running at a time in or before `laser_cycle`.
     fn at(time: Time, laser_cycle: u32, stream: &PhotonStream, light: &PixelStream<'_>) -> Self {
         let ends_fs = stream.ends_fs();
-        let first = |cycle| stream.config().cycle_start(cycle) + Time::from_fs(ends_fs.start);
+        let first = |cycle| stream.cycle_start(cycle) + Time::from_fs(ends_fs.start);
         let mut cycle = laser_cycle;
         while cycle > 0 && time < first(cycle) {
             cycle -= 1;
         }
-        let start = stream.config().cycle_start(cycle);
+        let start = stream.cycle_start(cycle);
         // Where slots are short, whole blocks may come before the exposure.
         let block = match time > Time::ZERO {
             true => light.block_at((time - start).as_fs()),
@@ -47,7 +47,7 @@ impl Beginning {
         light: &PixelStream<'_>,
         laser_cycle: u32,
     ) -> i64 {
-        let start = |cycle| stream.config().cycle_start(cycle);
+        let start = |cycle| stream.cycle_start(cycle);
         (start(self.cycle) - start(laser_cycle)).as_fs() + light.block_fs(self.block).start
     }
 }
@@ -72,7 +72,7 @@ impl Counting<'_> {
 
     /// Where photons of the window of a laser cycle are drawn from at first; `None` if that is the whole exposure.
     pub(super) fn beginning(&self, pixel: &Pixel<'_>, laser_cycle: u32) -> Option<Beginning> {
-        let start = self.stream.config().cycle_start(laser_cycle);
+        let start = self.stream.cycle_start(laser_cycle);
         let from = start + Time::from_fs(pixel.sight.first_fs - ROUNDING_FS);
         let until = start + Time::from_fs(pixel.sight.until_fs);
         let back = self.first_look_back(pixel.light);
@@ -92,7 +92,7 @@ impl Counting<'_> {
     /// Counts the window of one laser cycle.
     pub(super) fn count_bright_cycle(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32) {
         let config = self.stream.config();
-        let start = config.cycle_start(laser_cycle);
+        let start = self.stream.cycle_start(laser_cycle);
         let wanted_from = start + Time::from_fs(pixel.sight.first_fs - ROUNDING_FS);
         let until = start + Time::from_fs(pixel.sight.until_fs);
         let mut back = self.first_look_back(pixel.light);
@@ -150,7 +150,7 @@ impl Counting<'_> {
         laser_cycle: u32,
     ) -> impl Iterator<Item = u32> + use<> {
         let config = self.stream.config();
-        let start = config.cycle_start(laser_cycle);
+        let start = self.stream.cycle_start(laser_cycle);
         let within_fs = (from - start).as_fs()..(until - start).as_fs();
         let cycles = config.laser_cycles;
         light.echoes_within(&within_fs).filter_map(move |later| {
@@ -178,7 +178,7 @@ impl Counting<'_> {
                 return begin;
             }
             let echoes = self.echoes(pixel.light, known_from, until, laser_cycle);
-            let first = echoes.map(|cycle| self.stream.config().cycle_start(cycle) + echo_from);
+            let first = echoes.map(|cycle| self.stream.cycle_start(cycle) + echo_from);
             match first.min().filter(|&first| first < known_from) {
                 Some(first) => from = first.max(Time::ZERO),
                 None => return begin,
@@ -200,8 +200,9 @@ impl Counting<'_> {
             mut block,
             ..
         } = begin;
-        let begins =
-            |cycle, block| config.cycle_start(cycle) + Time::from_fs(light.block_fs(block).start);
+        let begins = |cycle, block| {
+            self.stream.cycle_start(cycle) + Time::from_fs(light.block_fs(block).start)
+        };
         while cycle < config.laser_cycles && begins(cycle, block) < until {
             light.push_block(cycle, block, &mut self.photons);
             block += 1;

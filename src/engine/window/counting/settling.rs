@@ -83,25 +83,11 @@ impl Counting<'_> {
 
     /// Settles the `last` photon of a cycle and those before it.
     fn settle_all(&mut self, pixel: &mut Pixel<'_>, last: usize, laser_cycle: u32) {
-        if pixel.breeding.is_some() {
-            // Photons that breed did not matter to the window so far, but may when it is looked back.
-            let cycle = laser_cycle - Group::of_cycle(laser_cycle).first_cycle();
-            let first = self.by_cycle.partition_point(|&(of, _)| of < cycle);
-            let of_cycle = self.by_cycle[first..]
-                .iter()
-                .take_while(|&&(of, _)| of == cycle);
-            self.photons.clear();
-            self.photons.extend(of_cycle.map(|&(_, photon)| photon));
-            self.take_cycle(pixel, Some(last), laser_cycle);
-            self.settle_cycle(pixel, laser_cycle);
-            return;
-        }
         self.together.clear();
         let (mut once, mut several, mut is_doubtful) = (0u16, 0u16, false);
         let mut next = Some(last);
         while let Some(photon) = next {
             let code = self.codes.codes()[photon];
-            self.tables.remove(code.row());
             let spad = 1 << code.spad();
             several |= once & spad;
             if code.is_doubtful() {
@@ -112,16 +98,33 @@ impl Counting<'_> {
             self.together.push((photon, code));
             next = self.tables.before(photon);
         }
+        let work = pixel.work;
+        let mut left = several;
+        if !is_doubtful {
+            left = self.settle_pairs(pixel, several);
+        }
+        if left != 0 && pixel.breeding.is_some() {
+            // Photons that breed did not matter to the window so far, but may when it is looked back.
+            pixel.work = work;
+            for (_, code) in &self.together {
+                self.fired[code.row()] = 0;
+            }
+            let photons = self.breeding.of(laser_cycle..laser_cycle + 1).iter();
+            self.photons.clear();
+            self.photons.extend(photons.map(|&(_, photon)| photon));
+            self.take_cycle(pixel, Some(last), laser_cycle);
+            self.settle_cycle(pixel, laser_cycle);
+            return;
+        }
         for (_, code) in &self.together {
+            self.tables.remove(code.row());
             let alone = several >> code.spad() & 1 == 0;
             self.fired[code.row()] += u8::from(alone);
         }
-        while several != 0 {
-            let spad = several.trailing_zeros() as u8;
-            several &= several - 1;
-            if is_doubtful || !self.settle_pair(pixel, spad) {
-                self.settle_spad(pixel, laser_cycle, spad);
-            }
+        while left != 0 {
+            let spad = left.trailing_zeros() as u8;
+            left &= left - 1;
+            self.settle_spad(pixel, laser_cycle, spad);
         }
         if is_doubtful {
             for row in 0..=pixel.hits.len() {
@@ -132,6 +135,20 @@ impl Counting<'_> {
             let row = self.together[index].1.row();
             self.tell(pixel, row);
         }
+    }
+
+    /// Settles those of some SPADs that have just two photons and need no look back; returns the others.
+    fn settle_pairs(&mut self, pixel: &mut Pixel<'_>, spads: u16) -> u16 {
+        let mut left = spads;
+        let mut next = spads;
+        while next != 0 {
+            let spad = next.trailing_zeros() as u8;
+            next &= next - 1;
+            if self.settle_pair(pixel, spad) {
+                left &= !(1 << spad);
+            }
+        }
+        left
     }
 
     /// Adds what fired in a CLK period to its bin.
@@ -210,7 +227,7 @@ impl Counting<'_> {
     /// Settles the photons of one SPAD among those `together`.
     fn settle_spad(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spad: u8) {
         let window = self.window(pixel.sight, laser_cycle);
-        let start = self.stream.config().cycle_start(laser_cycle);
+        let start = self.stream.cycle_start(laser_cycle);
         self.photons.clear();
         let mut seen = 0;
         for &(photon, code) in &self.together {

@@ -262,7 +262,7 @@ impl Counting<'_> {
             _ => {
                 let own = cycle(lane);
                 let other = (i64::from(own) + relative) as u32;
-                (config.cycle_start(other) - config.cycle_start(own)).as_fs()
+                (self.stream.cycle_start(other) - self.stream.cycle_start(own)).as_fs()
             }
         };
         let mut tile = self.tile.take().unwrap_or_default();

@@ -15,7 +15,8 @@ impl Counting<'_> {
         by_cycle.extend(self.plain.photons(pixel.light, self.stream, group, cycles));
         self.other_echoes(pixel, pixel.light, &pixel.sight.plain, group, &mut by_cycle);
         if let Some(breeding) = pixel.breeding {
-            by_cycle.extend(self.breeding.photons(breeding, self.stream, group, cycles));
+            let photons = self.breeding.of_group(group).iter();
+            by_cycle.extend(photons.map(|&(cycle, photon)| (cycle - group.first_cycle(), photon)));
             self.other_echoes(pixel, breeding, &pixel.sight.breeding, group, &mut by_cycle);
         }
         by_cycle.retain(|(_, photon)| photon.time >= Time::ZERO);
@@ -58,7 +59,7 @@ impl Counting<'_> {
             let mut next = (of_windows.start + later).max(0);
             let end = (of_windows.end + later).min(i64::from(config.laser_cycles));
             while next < end {
-                let other = Group::of_cycle(next as u32);
+                let other = light.group_of(next as u32);
                 light.draw(other, &span, &mut draw);
                 for (place, time_fs) in draw.photons(light) {
                     let (cycle, spad) = super::split(place);
@@ -66,7 +67,7 @@ impl Counting<'_> {
                     let window = i64::from(cycle) - later;
                     if cycle < config.laser_cycles && of_windows.contains(&window) {
                         let photon = Photon {
-                            time: config.cycle_start(cycle) + Time::from_fs(time_fs),
+                            time: self.stream.cycle_start(cycle) + Time::from_fs(time_fs),
                             spad,
                             breeds: light.breeds(),
                         };
@@ -79,27 +80,19 @@ impl Counting<'_> {
     }
 
     /// Settles the cycles in which an avalanche that breeds may matter. Their photons are in no table afterwards.
-    pub(super) fn count_breeding_cycles(
-        &mut self,
-        pixel: &mut Pixel<'_>,
-        group: Group,
-        cycles: u32,
-    ) {
-        let Some(breeding) = pixel.breeding else {
+    pub(super) fn count_breeding_cycles(&mut self, pixel: &mut Pixel<'_>, group: Group) {
+        let Some(light) = pixel.breeding else {
             return;
         };
-        let mut by_cycle = std::mem::take(&mut self.by_cycle);
-        by_cycle.clear();
-        by_cycle.extend(self.breeding.photons(breeding, self.stream, group, cycles));
-        by_cycle.sort_unstable_by_key(|&(cycle, _)| cycle);
-        for photons in by_cycle.chunk_by(|a, b| a.0 == b.0) {
-            let (cycle, laser_cycle) = (photons[0].0, group.first_cycle() + photons[0].0);
-            let start = self.stream.config().cycle_start(laser_cycle);
+        let breeding = std::mem::take(&mut self.breeding);
+        for photons in breeding.of_group(group).chunk_by(|a, b| a.0 == b.0) {
+            let laser_cycle = photons[0].0;
+            let start = self.stream.cycle_start(laser_cycle);
             let from = start + Time::from_fs(pixel.sight.plain.from_fs);
             let until = start + Time::from_fs(pixel.sight.until_fs);
             let is_seen = |time: Time| time >= from && time < until;
             let matters = |photon: &Photon| {
-                is_seen(photon.time) || breeding.children(*photon).any(|child| is_seen(child.time))
+                is_seen(photon.time) || light.children(*photon).any(|child| is_seen(child.time))
             };
             if !photons.iter().any(|(_, photon)| matters(photon)) {
                 continue;
@@ -107,16 +100,17 @@ impl Counting<'_> {
             self.photons.clear();
             self.photons
                 .extend(photons.iter().map(|&(_, photon)| photon));
+            let cycle = laser_cycle - group.first_cycle();
             let last = self.tables.take_last(cycle as usize);
             self.take_cycle(pixel, last, laser_cycle);
             self.settle_cycle(pixel, laser_cycle);
         }
-        self.by_cycle = by_cycle;
+        self.breeding = breeding;
     }
 
     /// Takes the `last` photon of a cycle and those before it out of the tables, and appends them to `photons`.
     pub(super) fn take_cycle(&mut self, pixel: &Pixel<'_>, last: Option<usize>, laser_cycle: u32) {
-        let start = self.stream.config().cycle_start(laser_cycle);
+        let start = self.stream.cycle_start(laser_cycle);
         let mut next = last;
         while let Some(photon) = next {
             let code = self.codes.codes()[photon];
@@ -135,7 +129,7 @@ impl Counting<'_> {
 
     /// Counts the window of a laser cycle with `photons`, in any order.
     pub(super) fn settle_cycle(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32) {
-        let start = self.stream.config().cycle_start(laser_cycle);
+        let start = self.stream.cycle_start(laser_cycle);
         let window = self.window(pixel.sight, laser_cycle);
         let is_seen = |photon: &&Photon| window.row_of(photon.time - start).is_some();
         let seen = self.photons.iter().filter(is_seen).count() as u64;
@@ -167,7 +161,7 @@ impl Counting<'_> {
     /// Turns `photons` of the SPADs of a set, in any order, and those before them as far as it takes, into `events`: all
     /// rising edges in the window of a laser cycle, and perhaps some before.
     pub(super) fn detect(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spads: u16) {
-        let start = self.stream.config().cycle_start(laser_cycle);
+        let start = self.stream.cycle_start(laser_cycle);
         let wanted_from = start + Time::from_fs(pixel.sight.first_fs - ROUNDING_FS);
         let until = start + Time::from_fs(pixel.sight.until_fs);
         let mut past = pixel.sight.plain.past(self.stream, laser_cycle);
