@@ -37,26 +37,28 @@
 //! Limits of the model: rates are detection rates and constant within an exposure; no spread of dead time or dark counts
 //! between SPADs; background photons come at multiples of some 20 fs ([`Slots`]).
 
-use std::cell::OnceCell;
 use std::ops::Range;
 
 use super::avalanches::Avalanches;
-use super::philox::Blocks;
 use super::pulse::{PulseSampler, PulseShape};
 use super::quantile::{NORMAL_BITS, NormalSampler};
-use super::random::{Poisson, Purpose, philox_key};
+use super::random::{Purpose, philox_key};
 use super::spad::{Photon, SPADS, SpadEvent, SpadModel};
 use crate::units::{Every, Frequency, Time};
-pub use bright::{Background, NEVER_FS, OrderedEchoes, TILE, spad_of};
-use draw::ByCycle;
+pub use bright::{Background, TILE, spad_of};
 pub use draw::{Draw, PER_BLOCK, Place, Run};
 use group::FIRST;
 pub use group::{GROUP, Group, PLACE_BITS};
+use numbers::{Counts, Numbers};
+pub use ordered::{NEVER_FS, OrderedEchoes};
 pub use slot::{Slots, TIME_BITS};
 
 mod bright;
 mod draw;
 mod group;
+mod numbers;
+mod ordered;
+mod pulses;
 mod slot;
 
 const SPAD_BITS: u32 = SPADS.trailing_zeros();
@@ -276,145 +278,6 @@ impl PhotonStream {
         part.late_fs = part.late_fs();
         part
     }
-
-    /// All avalanches of macropixel number `pixel` under `light` in the exposure.
-    pub fn pixel_events(&self, pixel: u32, light: &PixelLight) -> PixelPhotons {
-        let expected = self.config.most_edges(light);
-        // Five standard deviations of room; the cap keeps a huge request from failing up front.
-        let room = (expected + 5.0 * expected.sqrt() + 16.0).min(1e7);
-        let mut events = Vec::with_capacity(room as usize);
-        let photons = self.pixel_pulses(pixel, light, |pulses| events.extend_from_slice(pulses));
-        PixelPhotons { events, ..photons }
-    }
-
-    /// As [`PhotonStream::pixel_events`], but hands the avalanches over part by part, in their order, so that they need not
-    /// be kept; what it returns has no events.
-    pub fn pixel_pulses(
-        &self,
-        pixel: u32,
-        light: &PixelLight,
-        pulses: impl FnMut(&[SpadEvent]),
-    ) -> PixelPhotons {
-        let plain = self.pixel(pixel, light);
-        let breeding = self.breeding(pixel, light);
-        match plain.is_bright {
-            true => self.bright_pulses(&plain, breeding.as_ref(), pulses),
-            false => self.dim_pulses(&plain, breeding.as_ref(), pulses),
-        }
-    }
-
-    fn dim_pulses(
-        &self,
-        plain: &PixelStream<'_>,
-        breeding: Option<&PixelStream<'_>>,
-        mut pulses: impl FnMut(&[SpadEvent]),
-    ) -> PixelPhotons {
-        let mut draw = Draw::default();
-        let mut by_cycle = ByCycle::default();
-        let all = self.span(0..self.slots.count());
-        let end = self.cycle_start(self.config.laser_cycles);
-        let mut photons: Vec<Photon> = Vec::new();
-        let mut edges = Vec::new();
-        let mut avalanches = Avalanches::in_the_dark(&self.config.spads, self.key, plain.pixel);
-        let mut drawn = 0;
-        for group in self.groups() {
-            let carried = photons.len();
-            for light in std::iter::once(plain).chain(breeding) {
-                let group_of_light = light.group_of(group.first_cycle());
-                if group_of_light.first_cycle() != group.first_cycle() {
-                    // It came with one of the groups before.
-                    continue;
-                }
-                let cycles = group_of_light.cycles_in(self.config.laser_cycles);
-                light.draw(group_of_light, &all, &mut draw);
-                by_cycle.sort(&draw, light);
-                for cycle in 0..cycles {
-                    let start = self.cycle_start(group.first_cycle() + cycle);
-                    photons.extend(by_cycle.of(cycle).iter().map(|&photon| Photon {
-                        time: start + Time::from_fs(photon >> SPAD_BITS),
-                        spad: (photon & (SPADS as i64 - 1)) as u8,
-                        breeds: light.kind == Kind::Breeding,
-                    }));
-                }
-            }
-            if carried > 0 || breeding.is_some() || !plain.stays_in_its_cycle() {
-                photons.retain(|photon| (Time::ZERO..end).contains(&photon.time));
-                photons.sort_unstable();
-            }
-            // Photons of the next groups come from then on.
-            let next = group.first_cycle().saturating_add(group.cycles());
-            let until = match next < self.config.laser_cycles {
-                true => self.cycle_start(next) + plain.earliest(),
-                false => end,
-            };
-            let now = photons.partition_point(|photon| photon.time < until);
-            edges.clear();
-            let known = avalanches.run(&photons[..now], None, until, until, &mut edges);
-            debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
-            photons.drain(..now);
-            drawn += now as u64;
-            pulses(&edges);
-        }
-        PixelPhotons {
-            events: Vec::new(),
-            drawn,
-            lost_to_dead_time: avalanches.lost(),
-        }
-    }
-
-    fn bright_pulses(
-        &self,
-        plain: &PixelStream<'_>,
-        breeding: Option<&PixelStream<'_>>,
-        mut pulses: impl FnMut(&[SpadEvent]),
-    ) -> PixelPhotons {
-        let config = &self.config;
-        let end = self.cycle_start(config.laser_cycles);
-        let mut photons: Vec<Photon> = Vec::new();
-        let mut edges = Vec::new();
-        let mut avalanches = Avalanches::in_the_dark(&config.spads, self.key, plain.pixel);
-        let mut echoes = plain.ordered_echoes();
-        let (mut drawn, mut next_echo) = (0, 0);
-        for cycle in 0..config.laser_cycles {
-            let until = match cycle + 1 < config.laser_cycles {
-                true => self.cycle_start(cycle + 1) - Time::from_fs(self.slots.lead_fs()),
-                false => end,
-            };
-            // Whatever may blind a SPAD for an echo must find it.
-            let may_begin = |echo: u32| {
-                self.cycle_start(echo) + Time::from_fs(plain.echo_fs.0)
-                    <= until + config.spads.dead_time
-            };
-            while next_echo < config.laser_cycles && may_begin(next_echo) {
-                echoes.add(next_echo);
-                for light in std::iter::once(plain).chain(breeding) {
-                    light.push_listed_echo(next_echo, &mut photons);
-                }
-                next_echo += 1;
-            }
-            for light in std::iter::once(plain).chain(breeding) {
-                for block in 0..light.blocks() {
-                    light.push_block(cycle, block, &mut photons);
-                }
-            }
-            photons.retain(|photon| photon.time < end);
-            photons.sort_unstable();
-            let now = photons.partition_point(|photon| photon.time < until);
-            edges.clear();
-            let known =
-                avalanches.run(&photons[..now], Some(&mut echoes), until, until, &mut edges);
-            debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
-            photons.drain(..now);
-            drawn += now as u64;
-            echoes.forget_before(until);
-            pulses(&edges);
-        }
-        PixelPhotons {
-            events: Vec::new(),
-            drawn: drawn + echoes.drawn(),
-            lost_to_dead_time: avalanches.lost(),
-        }
-    }
 }
 
 /// Which photons of a macropixel.
@@ -487,73 +350,6 @@ pub struct PixelStream<'a> {
     late_fs: i64,
 }
 
-/// Numbers of photons in groups of any length.
-#[derive(Debug, Clone)]
-struct Numbers {
-    per_cycle: f64,
-    /// In one cycle, one of the shortest groups, and one of the longest. Made when first wanted.
-    one: OnceCell<Poisson>,
-    short: OnceCell<Poisson>,
-    long: OnceCell<Poisson>,
-}
-
-impl Numbers {
-    fn new(per_cycle: f64) -> Self {
-        Numbers {
-            per_cycle,
-            one: OnceCell::new(),
-            short: OnceCell::new(),
-            long: OnceCell::new(),
-        }
-    }
-
-    /// In one laser cycle.
-    fn per_cycle(&self) -> &Poisson {
-        self.one.get_or_init(|| Poisson::new(self.per_cycle))
-    }
-
-    /// A distribution, and how many draws of it make the number in this group.
-    fn of(&self, group: Group) -> (&Poisson, u32) {
-        let (cell, cycles) = match group.cycles() {
-            GROUP => (&self.long, GROUP),
-            _ => (&self.short, FIRST),
-        };
-        let poisson = cell.get_or_init(|| Poisson::new(self.per_cycle * f64::from(cycles)));
-        (poisson, group.cycles() / cycles)
-    }
-}
-
-/// Numbers of photons from blocks of random words.
-struct Counts<'a> {
-    /// First and second word of the next number, as rows of blocks; and of the one after it, from the same block.
-    rows: [[&'a [u32]; 2]; 2],
-    block: usize,
-}
-
-impl<'a> Counts<'a> {
-    fn new(blocks: &'a Blocks) -> Self {
-        let [a, b, c, d] = blocks.rows();
-        Counts {
-            rows: [[a, b], [c, d]],
-            block: 0,
-        }
-    }
-
-    /// The sum of `draws` Poisson numbers from the next blocks.
-    #[inline]
-    fn next(&mut self, poisson: &Poisson, draws: u32) -> u32 {
-        let parts = poisson.words() * draws;
-        let mut total = 0;
-        for part in 0..parts {
-            let [low, high] = self.rows[part as usize % 2];
-            let word = u64::from(low[self.block]) | u64::from(high[self.block]) << 32;
-            total += poisson.part(word);
-            self.block += usize::from(part % 2 == 1 || part + 1 == parts);
-        }
-        total
-    }
-}
-
 impl PixelStream<'_> {
     /// The SPADs of this macropixel, where its photons are known from `time` on, or from the beginning. `breeding` are the
     /// photons before `time` that breed, since [`SpadModel::reach`] at least.
@@ -575,6 +371,11 @@ impl PixelStream<'_> {
             true => Group::long(cycle),
             false => Group::of_cycle(cycle),
         }
+    }
+
+    /// Start of a laser cycle.
+    pub fn cycle_start(&self, cycle: u32) -> Time {
+        self.stream.cycle_start(cycle)
     }
 
     /// Whether these are the photons that breed.

@@ -64,20 +64,19 @@ impl<'a> Past<'a> {
         }
         let slot_fs = self.stream.slots().start_fs(self.slot);
         let end_fs = (end - start(self.cycle)).as_fs();
-        let mut drawn = self.draw_part(
-            pixel,
-            0,
-            self.slot..self.slot + 1,
-            0..0,
-            spads,
-            draw,
-            photons,
-        );
+        let background = Span {
+            slots: self.slot..self.slot + 1,
+            within_fs: 0..0,
+        };
+        let mut drawn = draw_part(pixel, self.cycle, &background, spads, draw, photons);
         for later in pixel.echoes_within(&(slot_fs..end_fs)) {
             if let Some(cycle) = self.cycle_after(later) {
                 let moved_fs = (start(cycle) - start(self.cycle)).as_fs();
-                let within_fs = slot_fs - moved_fs..end_fs - moved_fs;
-                drawn += self.draw_part(pixel, later, 0..0, within_fs, spads, draw, photons);
+                let echo = Span {
+                    slots: 0..0,
+                    within_fs: slot_fs - moved_fs..end_fs - moved_fs,
+                };
+                drawn += draw_part(pixel, cycle, &echo, spads, draw, photons);
             }
         }
         photons.retain(|photon| photon.time >= Time::ZERO);
@@ -89,33 +88,30 @@ impl<'a> Past<'a> {
         let cycle = u32::try_from(i64::from(self.cycle) + later).ok()?;
         (cycle < self.stream.config().laser_cycles).then_some(cycle)
     }
+}
 
-    #[allow(clippy::too_many_arguments)]
-    fn draw_part(
-        &self,
-        pixel: &PixelStream<'_>,
-        later: i64,
-        slots: std::ops::Range<u32>,
-        within_fs: std::ops::Range<i64>,
-        spads: u16,
-        draw: &mut Draw,
-        photons: &mut Vec<Photon>,
-    ) -> u64 {
-        let cycle = self.cycle_after(later).expect("the exposure has it");
-        let group = pixel.group_of(cycle);
-        pixel.draw(group, &Span { slots, within_fs }, draw);
-        let start = self.stream.cycle_start(cycle);
-        let wanted = cycle - group.first_cycle();
-        photons.extend(draw.photons(pixel).filter_map(|(place, time_fs)| {
-            let (cycle, spad) = split(place);
-            (cycle == wanted && spads >> spad & 1 != 0).then(|| Photon {
-                time: start + Time::from_fs(time_fs),
-                spad,
-                breeds: pixel.breeds(),
-            })
-        }));
-        draw.len() as u64
-    }
+/// Appends the photons in a part of one laser cycle that fall on SPADs of a set. Returns how many photons were drawn.
+fn draw_part(
+    pixel: &PixelStream<'_>,
+    cycle: u32,
+    span: &Span,
+    spads: u16,
+    draw: &mut Draw,
+    photons: &mut Vec<Photon>,
+) -> u64 {
+    let group = pixel.group_of(cycle);
+    pixel.draw(group, span, draw);
+    let start = pixel.cycle_start(cycle);
+    let wanted = cycle - group.first_cycle();
+    photons.extend(draw.photons(pixel).filter_map(|(place, time_fs)| {
+        let (cycle, spad) = split(place);
+        (cycle == wanted && spads >> spad & 1 != 0).then(|| Photon {
+            time: start + Time::from_fs(time_fs),
+            spad,
+            breeds: pixel.breeds(),
+        })
+    }));
+    draw.len() as u64
 }
 
 /// Cycle within the group, and SPAD.

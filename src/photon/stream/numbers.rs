@@ -1,0 +1,74 @@
+//! How many photons there are in a group of laser cycles.
+
+use std::cell::OnceCell;
+
+use super::group::{FIRST, GROUP, Group};
+use crate::photon::philox::Blocks;
+use crate::photon::random::Poisson;
+
+/// Numbers of photons in groups of any length.
+#[derive(Debug, Clone)]
+pub(super) struct Numbers {
+    per_cycle: f64,
+    /// In one cycle, one of the shortest groups, and one of the longest. Made when first wanted.
+    one: OnceCell<Poisson>,
+    short: OnceCell<Poisson>,
+    long: OnceCell<Poisson>,
+}
+
+impl Numbers {
+    pub(super) fn new(per_cycle: f64) -> Self {
+        Numbers {
+            per_cycle,
+            one: OnceCell::new(),
+            short: OnceCell::new(),
+            long: OnceCell::new(),
+        }
+    }
+
+    /// In one laser cycle.
+    pub(super) fn per_cycle(&self) -> &Poisson {
+        self.one.get_or_init(|| Poisson::new(self.per_cycle))
+    }
+
+    /// A distribution, and how many draws of it make the number in this group.
+    pub(super) fn of(&self, group: Group) -> (&Poisson, u32) {
+        let (cell, cycles) = match group.cycles() {
+            GROUP => (&self.long, GROUP),
+            _ => (&self.short, FIRST),
+        };
+        let poisson = cell.get_or_init(|| Poisson::new(self.per_cycle * f64::from(cycles)));
+        (poisson, group.cycles() / cycles)
+    }
+}
+
+/// Numbers of photons from blocks of random words.
+pub(super) struct Counts<'a> {
+    /// First and second word of the next number, as rows of blocks; and of the one after it, from the same block.
+    rows: [[&'a [u32]; 2]; 2],
+    block: usize,
+}
+
+impl<'a> Counts<'a> {
+    pub(super) fn new(blocks: &'a Blocks) -> Self {
+        let [a, b, c, d] = blocks.rows();
+        Counts {
+            rows: [[a, b], [c, d]],
+            block: 0,
+        }
+    }
+
+    /// The sum of `draws` Poisson numbers from the next blocks.
+    #[inline]
+    pub(super) fn next(&mut self, poisson: &Poisson, draws: u32) -> u32 {
+        let parts = poisson.words() * draws;
+        let mut total = 0;
+        for part in 0..parts {
+            let [low, high] = self.rows[part as usize % 2];
+            let word = u64::from(low[self.block]) | u64::from(high[self.block]) << 32;
+            total += poisson.part(word);
+            self.block += usize::from(part % 2 == 1 || part + 1 == parts);
+        }
+        total
+    }
+}

@@ -1,0 +1,148 @@
+//! All avalanches of a macropixel in an exposure, in their order: the whole stream and what its SPADs make of it.
+
+use super::draw::ByCycle;
+use super::{Draw, Kind, PhotonStream, PixelLight, PixelPhotons, PixelStream, SPAD_BITS};
+use crate::photon::avalanches::Avalanches;
+use crate::photon::spad::{Photon, SPADS, SpadEvent};
+use crate::units::Time;
+
+impl PhotonStream {
+    /// All avalanches of macropixel number `pixel` under `light` in the exposure.
+    pub fn pixel_events(&self, pixel: u32, light: &PixelLight) -> PixelPhotons {
+        let expected = self.config.most_edges(light);
+        // Five standard deviations of room; the cap keeps a huge request from failing up front.
+        let room = (expected + 5.0 * expected.sqrt() + 16.0).min(1e7);
+        let mut events = Vec::with_capacity(room as usize);
+        let photons = self.pixel_pulses(pixel, light, |pulses| events.extend_from_slice(pulses));
+        PixelPhotons { events, ..photons }
+    }
+
+    /// As [`PhotonStream::pixel_events`], but hands the avalanches over part by part, in their order, so that they need not
+    /// be kept; what it returns has no events.
+    pub fn pixel_pulses(
+        &self,
+        pixel: u32,
+        light: &PixelLight,
+        pulses: impl FnMut(&[SpadEvent]),
+    ) -> PixelPhotons {
+        let plain = self.pixel(pixel, light);
+        let breeding = self.breeding(pixel, light);
+        match plain.is_bright {
+            true => self.bright_pulses(&plain, breeding.as_ref(), pulses),
+            false => self.dim_pulses(&plain, breeding.as_ref(), pulses),
+        }
+    }
+
+    fn dim_pulses(
+        &self,
+        plain: &PixelStream<'_>,
+        breeding: Option<&PixelStream<'_>>,
+        mut pulses: impl FnMut(&[SpadEvent]),
+    ) -> PixelPhotons {
+        let mut draw = Draw::default();
+        let mut by_cycle = ByCycle::default();
+        let all = self.span(0..self.slots.count());
+        let end = self.cycle_start(self.config.laser_cycles);
+        let mut photons: Vec<Photon> = Vec::new();
+        let mut edges = Vec::new();
+        let mut avalanches = Avalanches::in_the_dark(&self.config.spads, self.key, plain.pixel);
+        let mut drawn = 0;
+        for group in self.groups() {
+            let carried = photons.len();
+            for light in std::iter::once(plain).chain(breeding) {
+                let group_of_light = light.group_of(group.first_cycle());
+                if group_of_light.first_cycle() != group.first_cycle() {
+                    // It came with one of the groups before.
+                    continue;
+                }
+                let cycles = group_of_light.cycles_in(self.config.laser_cycles);
+                light.draw(group_of_light, &all, &mut draw);
+                by_cycle.sort(&draw, light);
+                for cycle in 0..cycles {
+                    let start = self.cycle_start(group.first_cycle() + cycle);
+                    photons.extend(by_cycle.of(cycle).iter().map(|&photon| Photon {
+                        time: start + Time::from_fs(photon >> SPAD_BITS),
+                        spad: (photon & (SPADS as i64 - 1)) as u8,
+                        breeds: light.kind == Kind::Breeding,
+                    }));
+                }
+            }
+            if carried > 0 || breeding.is_some() || !plain.stays_in_its_cycle() {
+                photons.retain(|photon| (Time::ZERO..end).contains(&photon.time));
+                photons.sort_unstable();
+            }
+            // Photons of the next groups come from then on.
+            let next = group.first_cycle().saturating_add(group.cycles());
+            let until = match next < self.config.laser_cycles {
+                true => self.cycle_start(next) + plain.earliest(),
+                false => end,
+            };
+            let now = photons.partition_point(|photon| photon.time < until);
+            edges.clear();
+            let known = avalanches.run(&photons[..now], None, until, until, &mut edges);
+            debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
+            photons.drain(..now);
+            drawn += now as u64;
+            pulses(&edges);
+        }
+        PixelPhotons {
+            events: Vec::new(),
+            drawn,
+            lost_to_dead_time: avalanches.lost(),
+        }
+    }
+
+    fn bright_pulses(
+        &self,
+        plain: &PixelStream<'_>,
+        breeding: Option<&PixelStream<'_>>,
+        mut pulses: impl FnMut(&[SpadEvent]),
+    ) -> PixelPhotons {
+        let config = &self.config;
+        let end = self.cycle_start(config.laser_cycles);
+        let mut photons: Vec<Photon> = Vec::new();
+        let mut edges = Vec::new();
+        let mut avalanches = Avalanches::in_the_dark(&config.spads, self.key, plain.pixel);
+        let mut echoes = plain.ordered_echoes();
+        let (mut drawn, mut next_echo) = (0, 0);
+        for cycle in 0..config.laser_cycles {
+            let until = match cycle + 1 < config.laser_cycles {
+                true => self.cycle_start(cycle + 1) - Time::from_fs(self.slots.lead_fs()),
+                false => end,
+            };
+            // Whatever may blind a SPAD for an echo must find it.
+            let may_begin = |echo: u32| {
+                self.cycle_start(echo) + Time::from_fs(plain.echo_fs.0)
+                    <= until + config.spads.dead_time
+            };
+            while next_echo < config.laser_cycles && may_begin(next_echo) {
+                echoes.add(next_echo);
+                for light in std::iter::once(plain).chain(breeding) {
+                    light.push_listed_echo(next_echo, &mut photons);
+                }
+                next_echo += 1;
+            }
+            for light in std::iter::once(plain).chain(breeding) {
+                for block in 0..light.blocks() {
+                    light.push_block(cycle, block, &mut photons);
+                }
+            }
+            photons.retain(|photon| photon.time < end);
+            photons.sort_unstable();
+            let now = photons.partition_point(|photon| photon.time < until);
+            edges.clear();
+            let known =
+                avalanches.run(&photons[..now], Some(&mut echoes), until, until, &mut edges);
+            debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
+            photons.drain(..now);
+            drawn += now as u64;
+            echoes.forget_before(until);
+            pulses(&edges);
+        }
+        PixelPhotons {
+            events: Vec::new(),
+            drawn: drawn + echoes.drawn(),
+            lost_to_dead_time: avalanches.lost(),
+        }
+    }
+}
