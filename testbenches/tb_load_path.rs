@@ -11,7 +11,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use bitvec::slice::BitSlice;
-use guided_dtof::chip::{SensorConfig, load_path};
+use guided_dtof::chip::{LoadPins, LoadProbe, Probe, SensorConfig, load_path, probes};
 use guided_dtof::cli::testbench;
 use guided_dtof::engine::load::{load, load_netlist};
 use guided_dtof::engine::waveform::write_waves;
@@ -69,15 +69,14 @@ struct Bench {
 impl Bench {
     fn new(config: SensorConfig) -> Self {
         let netlist = load_netlist(&config);
-        let net = |path| netlist.net(path).expect("a pin of the load path");
-        let bus = |path| netlist.signal(path).expect("a bus of the load path");
+        let pins = LoadPins::of(&netlist);
         let mut bench = Bench {
-            resetb: net("RESETB"),
-            enable: net("LOAD_ENABLE"),
-            clk: net("LOAD_CLK"),
-            serial: net("COUNTER_INITS"),
-            row_bits: bus("COUNTER_INIT_ROW"),
-            memory_load: bus("MEMORY_LOAD"),
+            resetb: pins.resetb,
+            enable: pins.enable,
+            clk: pins.clk,
+            serial: pins.serial,
+            row_bits: LoadProbe::Row.bus(&netlist),
+            memory_load: LoadProbe::MemoryLoad.bus(&netlist),
             drives: Vec::new(),
             config,
             netlist,
@@ -114,13 +113,8 @@ impl Bench {
 
     /// Start values in the memories now; `None` where a bit is unknown.
     fn memories(&self, kernel: &Kernel) -> Vec<Option<u64>> {
-        let memory = |row, col| {
-            let path = format!("{}.MEMORY", load_path::memory_name(row, col));
-            kernel.number(&self.netlist.signal(&path).expect("a memory of the array"))
-        };
-        let rows = 0..self.config.rows;
-        let places = rows.flat_map(|row| (0..self.config.cols).map(move |col| (row, col)));
-        places.map(|(row, col)| memory(row, col)).collect()
+        let memories = probes::memories(&self.netlist, self.config.rows, self.config.cols);
+        memories.iter().map(|nets| kernel.number(nets)).collect()
     }
 }
 
@@ -379,22 +373,21 @@ fn whole_sensor(checks: &mut Checks) {
 
 /// The first load: Fig. 57's signals, then every row with its macropixels' memories.
 fn view(config: &SensorConfig, (start, end): (Time, Time)) -> Layout {
-    let memory = |row, col, signal: &str| format!("{}.{signal}", load_path::memory_name(row, col));
     let shared = [
         Entry::binary("RESETB"),
-        Entry::binary("LOAD_ENABLE"),
-        Entry::binary("LOAD_CLK"),
-        Entry::binary("COUNTER_INITS"),
-        Entry::hex("COUNTER_INIT_ROW"),
-        Entry::binary("ROW_DONE"),
+        Entry::binary(LoadProbe::Enable.path()),
+        Entry::binary(LoadProbe::Clk.path()),
+        Entry::binary(LoadProbe::Serial.path()),
+        Entry::hex(LoadProbe::Row.path()),
+        Entry::binary(LoadProbe::RowDone.path()),
     ];
     let mut groups = vec![Group::new("Load path (Fig. 57)", shared)];
     for row in 0..config.rows {
-        let load = Entry::binary(memory(row, 0, "MEMORY_LOAD"));
-        let memories = (0..config.cols).map(|col| Entry::decimal(memory(row, col, "MEMORY")));
+        let load = Probe::MemoryLoad.path(&load_path::memory_name(row, 0));
+        let memories = (0..config.cols).map(|col| Entry::decimal(probes::memory_path(row, col)));
         groups.push(Group::new(
             format!("Row {row}, columns 0 to {}", config.cols - 1),
-            [load].into_iter().chain(memories),
+            [Entry::binary(load)].into_iter().chain(memories),
         ));
     }
     Layout {

@@ -15,7 +15,8 @@ use std::sync::Arc;
 
 use guided_dtof::chip::window_law::OpenWindow;
 use guided_dtof::chip::{
-    EventType, Exposure, Overflow, SPADS, SensorConfig, WindowLaw, correlation, histogram, sensor,
+    EventType, Exposure, Overflow, Probe, SPADS, SensorConfig, SensorPins, WindowLaw, correlation,
+    histogram, probes, sensor,
 };
 use guided_dtof::cli::testbench;
 use guided_dtof::engine::GateSimulation;
@@ -137,7 +138,7 @@ fn figure_48(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let lists = [&pulses[..], &pulses[..]];
     let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 2), &STARTS, &lists);
     let netlist = Arc::clone(gate.netlist());
-    let local_stop = netlist.signal("LOCAL_STOP").expect("a port of the sensor");
+    let local_stop = SensorPins::of(&netlist).local_stop;
     let mut recorder = Recorder::new(local_stop.iter().copied());
     let origin = gate.schedule().origin;
     let view = view(&config, origin, origin + exposure.stop(1));
@@ -214,20 +215,18 @@ fn view(config: &SensorConfig, origin: Time, end: Time) -> Layout {
     )];
     for (col, start) in STARTS.into_iter().enumerate() {
         let pixel = sensor::pixel_name(0, col);
-        let of = |name: &str| format!("{pixel}.{name}");
         let signals = [
-            Entry::hex(of("SPAD_RAW")),
-            Entry::hex(of("SPAD_TIMED")),
-            Entry::binary(of("SPAD_EVENT")),
-            Entry::decimal(of("p_counter.COUNTER_OUT")),
-            Entry::binary(of("LOCAL_STOP")),
-            Entry::binary(of("metdc.SHIFT")),
-            Entry::binary(of("HIT")),
+            Entry::hex(Probe::SpadRaw.path(&pixel)),
+            Entry::hex(Probe::SpadTimed.path(&pixel)),
+            Entry::binary(Probe::SpadEvent.path(&pixel)),
+            Entry::decimal(Probe::CounterOut.path(&pixel)),
+            Entry::binary(Probe::LocalStop.path(&pixel)),
+            Entry::binary(Probe::Shift.path(&pixel)),
+            Entry::binary(Probe::Hit.path(&pixel)),
         ];
         // The first, the middle and the last bin; GTKWave widens its column of names for a longer title.
         let bins = [0, config.bins / 2, config.bins - 1];
-        let bins =
-            bins.map(|bin| Entry::decimal(of(&format!("histogram.{}", histogram::bin_name(bin)))));
+        let bins = bins.map(|bin| Entry::decimal(probes::bin_path(&pixel, bin)));
         groups.push(Group::new(
             format!("Macropixel {}: {start} (Fig. 48)", col + 1),
             signals.into_iter().chain(bins),

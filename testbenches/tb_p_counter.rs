@@ -12,7 +12,9 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use guided_dtof::chip::{ChipTiming, Exposure, SensorConfig, p_counter, p_counter_timing};
+use guided_dtof::chip::{
+    ChipTiming, Exposure, Probe, Probes, SensorConfig, p_counter, p_counter_timing,
+};
 use guided_dtof::cli::testbench;
 use guided_dtof::engine::waveform::write_waves;
 use guided_dtof::files::InputError;
@@ -73,20 +75,20 @@ impl Bench {
     fn new() -> Self {
         let config = SensorConfig::default();
         let netlist = circuit(&config);
-        let net = |path| netlist.net(path).expect("a net of the circuit");
-        let bus = |path| netlist.signal(path).expect("a bus of the circuit");
+        let probes = Probes::at(&netlist, "");
+        let net = |probe| probes.net(probe);
         Bench {
-            clk: net("CLK"),
-            stop: net("STOP"),
-            resetb: net("RESETB"),
-            enable: net("ENABLE"),
-            init: bus("COUNTER_INIT"),
-            load: net("MEMORY_LOAD"),
-            memory: bus("p_counter.MEMORY"),
-            counter_reset: net("COUNTER_RESET"),
-            counter_clk: net("COUNTER_CLK"),
-            counter_out: bus("p_counter.COUNTER_OUT"),
-            local_stop: net("LOCAL_STOP"),
+            clk: net(Probe::Clk),
+            stop: net(Probe::Stop),
+            resetb: netlist.net("RESETB").expect("a pin of the circuit"),
+            enable: net(Probe::Enable),
+            init: probes.bus(Probe::CounterInit).to_vec(),
+            load: net(Probe::MemoryLoad),
+            memory: probes.bus(Probe::Memory).to_vec(),
+            counter_reset: net(Probe::CounterReset),
+            counter_clk: net(Probe::CounterClk),
+            counter_out: probes.bus(Probe::CounterOut).to_vec(),
+            local_stop: net(Probe::LocalStop),
             timing: ChipTiming::of(&config),
             config,
             netlist,
@@ -323,20 +325,22 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
 }
 
 fn view(first_stop: Time, last: Time) -> Layout {
+    let binary = |probe: Probe| Entry::binary(probe.path(""));
+    let decimal = |probe: Probe| Entry::decimal(probe.path(""));
     let inputs = [
         Entry::binary("RESETB"),
-        Entry::binary("ENABLE"),
-        Entry::binary("CLK"),
-        Entry::binary("STOP"),
-        Entry::decimal("COUNTER_INIT"),
-        Entry::binary("MEMORY_LOAD"),
+        binary(Probe::Enable),
+        binary(Probe::Clk),
+        binary(Probe::Stop),
+        decimal(Probe::CounterInit),
+        binary(Probe::MemoryLoad),
     ];
     let counter = [
-        Entry::decimal("p_counter.MEMORY"),
-        Entry::binary("COUNTER_RESET"),
-        Entry::binary("COUNTER_CLK"),
-        Entry::decimal("p_counter.COUNTER_OUT"),
-        Entry::binary("LOCAL_STOP"),
+        decimal(Probe::Memory),
+        binary(Probe::CounterReset),
+        binary(Probe::CounterClk),
+        decimal(Probe::CounterOut),
+        binary(Probe::LocalStop),
     ];
     Layout {
         groups: vec![

@@ -20,7 +20,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use guided_dtof::chip::{Exposure, SensorConfig, histogram, sensor};
+use guided_dtof::chip::{Exposure, Probe, Probes, SensorConfig, probes, sensor};
 use guided_dtof::cli::testbench;
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::engine::timing::{Limits, MacropixelTiming, Silicon, shortest_period};
@@ -90,18 +90,20 @@ struct Captured {
 /// Both macropixels, and what the timing checks say.
 struct Outcome {
     pixels: Vec<Captured>,
+    /// Paths of the HIT flip-flops of both.
+    hit_cells: [Vec<String>; 2],
     report: CheckReport,
 }
 
 impl Outcome {
     /// Setup and hold violations in the HIT flip-flops of one macropixel.
     fn violations(&self, pixel: usize) -> usize {
-        let hit = format!("{}.metdc.hit_", sensor::pixel_name(0, pixel));
+        let hits = &self.hit_cells[pixel];
         let of_hits = self
             .report
             .violations
             .iter()
-            .filter(|v| v.cell.contains(&hit));
+            .filter(|v| hits.contains(&v.cell));
         of_hits.filter(|v| v.kind.concerns_data()).count()
     }
 }
@@ -154,18 +156,10 @@ fn expose(
     let timing = delays(gate.netlist());
     let mut gate = gate.with_timing(&timing);
     let netlist = Arc::clone(gate.netlist());
-    let signal = |pixel: usize, name: &str| -> Vec<NetId> {
-        let path = format!("{}.{name}", sensor::pixel_name(0, pixel));
-        netlist.signal(&path).expect("a signal of the macropixel")
-    };
-    let counts = |pixel| {
-        let bins = 0..config.bins;
-        bins.map(move |bin| signal(pixel, &format!("histogram.{}", histogram::bin_name(bin))))
-    };
-    let watched = (0..2).flat_map(|pixel| {
-        signal(pixel, "HIT")
-            .into_iter()
-            .chain(counts(pixel).flatten())
+    let probes = gate.probes().to_vec();
+    let watched = probes.iter().flat_map(|probes| {
+        let counts = probes.bins().iter().flatten();
+        probes.bus(Probe::Hit).iter().chain(counts).copied()
     });
     let mut recorder = Recorder::new(watched);
     let schedule = gate.schedule();
@@ -180,12 +174,12 @@ fn expose(
             })?;
         }
     }
-    let captured = |pixel| {
+    let captured = |probes: &Probes| {
         let mut hits = [0; 4];
         for cycle in 0..bins.len() as i64 {
             // The register as it stands when the next laser cycle begins.
-            let seen = signal(pixel, "HIT");
-            let seen = seen
+            let seen = probes
+                .bus(Probe::Hit)
                 .iter()
                 .map(|&net| recorder.value_at(net, stop(cycle + 1)));
             let seen: Vec<Logic> = seen.collect();
@@ -196,14 +190,18 @@ fn expose(
                 ones.min(2)
             }] += 1;
         }
-        let number = |nets: Vec<NetId>| recorder.number_at(&nets, schedule.end);
+        let number = |nets: &Vec<NetId>| recorder.number_at(nets, schedule.end);
         Captured {
-            counts: counts(pixel).map(number).collect(),
+            counts: probes.bins().iter().map(number).collect(),
             hits,
         }
     };
     Ok(Outcome {
-        pixels: (0..2).map(captured).collect(),
+        pixels: probes.iter().map(captured).collect(),
+        hit_cells: [0, 1].map(|pixel| {
+            let cells = probes[pixel].hit_cells(&netlist).into_iter();
+            cells.map(|cell| netlist.cell_path(cell)).collect()
+        }),
         report: found.report(&netlist),
     })
 }
@@ -288,10 +286,10 @@ fn between() -> (Time, Vec<bool>) {
         ..Silicon::nominal(Corner::Typ)
     };
     let paths = MacropixelTiming::of(&config(), &silicon, Limits::Ignored, (0, 1));
+    let hit_cells = paths.probes().hit_cells(&paths.netlist);
     let strobe_after_shift = |bin: usize| {
-        let name = format!(".metdc.hit_{bin}");
         let of_hit = paths.hits.iter().filter(|r| r.kind == CheckKind::Hold);
-        let mut of_hit = of_hit.filter(|r| paths.netlist.cell_path(r.cell).ends_with(&name));
+        let mut of_hit = of_hit.filter(|r| r.cell == hit_cells[bin]);
         of_hit.next().expect("every bin has its HIT").need
     };
     let needs: Vec<Time> = (0..config().bins).map(strobe_after_shift).collect();
@@ -368,13 +366,12 @@ fn view(stop: &dyn Fn(i64) -> Time, period: Time, sees_old: &[bool]) -> Layout {
     )];
     for (pixel, title) in ["library's delays", "mismatch"].into_iter().enumerate() {
         let pixel = sensor::pixel_name(0, pixel);
-        let of = |name: &str| format!("{pixel}.{name}");
         let signals = [
-            Entry::decimal(of("p_counter.COUNTER_OUT")),
-            Entry::binary(of("LOCAL_STOP")),
-            Entry::binary(of("metdc.STROBE")),
-            Entry::binary(of("metdc.SHIFT")),
-            Entry::binary(of("HIT")),
+            Entry::decimal(Probe::CounterOut.path(&pixel)),
+            Entry::binary(Probe::LocalStop.path(&pixel)),
+            Entry::binary(Probe::Strobe.path(&pixel)),
+            Entry::binary(Probe::Shift.path(&pixel)),
+            Entry::binary(Probe::Hit.path(&pixel)),
         ];
         let bins = [doubled, doubled - 1, lost, lost - 1];
         let mut bins = bins.to_vec();
@@ -382,7 +379,7 @@ fn view(stop: &dyn Fn(i64) -> Time, period: Time, sees_old: &[bool]) -> Layout {
         bins.dedup();
         let bins = bins
             .iter()
-            .map(|&bin| Entry::decimal(of(&format!("histogram.{}", histogram::bin_name(bin)))));
+            .map(|&bin| Entry::decimal(probes::bin_path(&pixel, bin)));
         let title = format!("{pixel}: {title} (Fig. 56)");
         groups.push(Group::new(title, signals.into_iter().chain(bins)));
     }

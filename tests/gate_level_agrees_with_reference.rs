@@ -5,7 +5,7 @@ use guided_dtof::chip::macropixel::Model;
 use guided_dtof::chip::p_counter::starts_high;
 use guided_dtof::chip::window_law::{Window as LawWindow, WindowLaw};
 use guided_dtof::chip::{
-    AfterBorrow, EventType, Exposure, Mode, Overflow, PCounter, SensorConfig, Tap,
+    AfterBorrow, EventType, Exposure, Mode, Overflow, PCounter, Probe, SensorConfig, Tap,
 };
 use guided_dtof::engine::{Cycle, Engine, EngineError, GateSimulation, Window};
 use guided_dtof::kernel::Recorder;
@@ -133,7 +133,7 @@ proptest! {
         }
 
         let mut gate = GateSimulation::new(config, &exposure, (0, 0), (1, 1), &[*start], &[&case.pulses]);
-        let local_stop = gate.netlist().net("mp_r0_c0.LOCAL_STOP").unwrap();
+        let local_stop = gate.probes()[0].net(Probe::LocalStop);
         let mut recorder = Recorder::new([local_stop]);
         gate.run(&mut recorder);
         let has_memory = config.p_counter != PCounter::Memoryless;

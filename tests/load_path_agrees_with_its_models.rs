@@ -3,9 +3,9 @@
 mod bench;
 
 use bench::{Bench, SETTLING, corners};
-use guided_dtof::chip::load_path;
+use guided_dtof::chip::{load_path, probes};
 use guided_dtof::logic::Logic;
-use guided_dtof::netlist::{CellKind, NetId};
+use guided_dtof::netlist::CellKind;
 use guided_dtof::units::Time;
 use proptest::prelude::*;
 
@@ -127,10 +127,7 @@ proptest! {
             let arrived = load_path::codes(&stream, cols, bits);
             expected[..arrived.len()].copy_from_slice(&arrived);
         }
-        let places = (0..rows).flat_map(|row| (0..cols).map(move |col| (row, col)));
-        let memories: Vec<Vec<NetId>> = places
-            .map(|(row, col)| bench.bus(&format!("{}.MEMORY", load_path::memory_name(row, col))))
-            .collect();
+        let memories = probes::memories(&bench.netlist, rows, cols);
         let mut run = bench.start(&[]);
         run.until(now + SETTLING);
         let found: Vec<Option<u64>> = memories.iter().map(|nets| run.kernel.number(nets)).collect();

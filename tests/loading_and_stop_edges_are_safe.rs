@@ -1,7 +1,7 @@
 //! What may go wrong between the clocks either does no harm or is reported: loading while counting, a STOP edge
 //! anywhere in the CLK period, a reset pulse too short, two pulses of a SPAD within a period.
 
-use guided_dtof::chip::{Exposure, SensorConfig, Window, WindowLaw, macropixel};
+use guided_dtof::chip::{Exposure, Probe, Probes, SensorConfig, Window, WindowLaw, macropixel};
 use guided_dtof::engine::{
     self as fast, Cancelling, Cycle, Engine, Gate, GateSimulation, HardwareEventKind,
     HardwareEvents,
@@ -69,7 +69,7 @@ impl Bench {
         let mut kernel = Kernel::new(&netlist, &Timing::nominal(&netlist, &library, Corner::Typ));
         let local_stop = nets("LOCAL_STOP")[0];
         let mut recorder = Recorder::new([local_stop]);
-        let mut events = HardwareEvents::new(&netlist, &config, &[""], ns(3));
+        let mut events = HardwareEvents::new(&netlist, &config, &[Probes::at(&netlist, "")], ns(3));
         let mut checks = TimingChecks::new(&netlist, &library, Corner::Typ)
             .policy(Policy::ReportOnly)
             .not_before(ns(20));
@@ -220,7 +220,7 @@ fn captured(config: &SensorConfig, exposure: &Exposure, start: u16, chain: Optio
         let timing = shortened(gate.netlist(), factor);
         gate = gate.with_timing(&timing);
     }
-    let local_stop = gate.netlist().signal("LOCAL_STOP").unwrap()[0];
+    let local_stop = gate.probes()[0].net(Probe::LocalStop);
     let mut recorder = Recorder::new([local_stop]);
     let mut events = gate.hardware_events();
     let mut checks = gate.timing_checks(Policy::ReportOnly);
@@ -240,9 +240,8 @@ fn captured(config: &SensorConfig, exposure: &Exposure, start: u16, chain: Optio
 
 fn shortened(netlist: &Netlist, factor: f64) -> Timing {
     let mut timing = Timing::nominal(netlist, &Library::default(), Corner::Typ);
-    for (index, cell) in netlist.cells().iter().enumerate() {
-        let is_chain = netlist.cell_path(index).contains(".p_counter_timing.");
-        if cell.kind == CellKind::Buf && is_chain {
+    for index in Probes::of_macropixel(netlist, 0, 0).timing_block_cells(netlist) {
+        if netlist.cells()[index].kind == CellKind::Buf {
             let delays = timing.of(index).map(|mut arc| {
                 arc.rise_fs = (arc.rise_fs as f64 * factor) as u32;
                 arc.fall_fs = (arc.fall_fs as f64 * factor) as u32;

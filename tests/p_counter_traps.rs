@@ -6,8 +6,8 @@ mod bench;
 use bench::{Bench, SETTLING};
 use guided_dtof::chip::window_law::Window as LawWindow;
 use guided_dtof::chip::{
-    AfterBorrow, Exposure, PCounter, SensorConfig, Tap, WindowLaw, macropixel, p_counter,
-    p_counter_timing,
+    AfterBorrow, Exposure, PCounter, Probe, Probes, SensorConfig, Tap, WindowLaw, macropixel,
+    p_counter, p_counter_timing,
 };
 use guided_dtof::engine::{Cycle, Engine, EngineError, Gate, GateSimulation, Window};
 use guided_dtof::kernel::Recorder;
@@ -59,7 +59,8 @@ fn loads(p_counter: PCounter, holds_reset: bool) -> (usize, usize) {
         };
         bench.pulse(reset.0, reset.1, "COUNTER_RESET");
     }
-    let (out, local_stop) = (bench.bus("COUNTER_OUT"), bench.net("LOCAL_STOP"));
+    let probes = Probes::of_block(&bench.netlist);
+    let (out, local_stop) = (probes.bus(Probe::CounterOut), bench.net("LOCAL_STOP"));
     let mut run = bench.start(&["LOCAL_STOP"]);
     let wrong = (0..LOADS)
         .filter(|&load| run.number_at(at(load + 1) - Time::from_fs(1), &out) != Some(start(load)))
@@ -88,7 +89,8 @@ fn a_counter_is_unknown_until_its_first_reset() {
         for edge in 0..20 {
             bench.pulse(SETTLING * (1 + edge), HALF, "COUNTER_CLK");
         }
-        let (out, local_stop) = (bench.bus("COUNTER_OUT"), bench.net("LOCAL_STOP"));
+        let probes = Probes::of_block(&bench.netlist);
+        let (out, local_stop) = (probes.bus(Probe::CounterOut), bench.net("LOCAL_STOP"));
         bench.pulse(SETTLING * 30, SETTLING, "MEMORY_RESET");
         bench.pulse(SETTLING * 30, SETTLING, "COUNTER_RESET");
         let mut run = bench.start(&[]);
@@ -166,7 +168,7 @@ fn releasing_the_chips_reset_while_enabled_gives_one_false_local_stop() {
     let config = sensor(PCounter::Ripple);
     let exposure = Exposure::new(&config, 40, 1);
     let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[0], &[&[]]);
-    let local_stop = gate.netlist().net("LOCAL_STOP[0]").unwrap();
+    let local_stop = gate.probes()[0].net(Probe::LocalStop);
     let mut recorder = Recorder::new([local_stop]);
     gate.run(&mut recorder);
     let rises = recorder.rising_edges(local_stop);
@@ -199,7 +201,8 @@ fn pulse_resets(config: &SensorConfig, width: Time) -> bool {
             bench.pulse(now, SETTLING, "COUNTER_RESET");
             now += SETTLING * 2;
         }
-        let (out, local_stop) = (bench.bus("COUNTER_OUT"), bench.net("LOCAL_STOP"));
+        let probes = Probes::of_block(&bench.netlist);
+        let (out, local_stop) = (probes.bus(Probe::CounterOut), bench.net("LOCAL_STOP"));
         let mut run = bench.start(&[]);
         ends.into_iter().all(|end| {
             run.number_at(end, &out) == Some(start)
@@ -226,7 +229,7 @@ fn the_reset_pulse_must_outlast_the_way_to_the_next_stages_clock() {
 
 fn local_stops(config: &SensorConfig, exposure: &Exposure, start: u16) -> Vec<Time> {
     let mut gate = GateSimulation::new(config, exposure, (0, 0), (1, 1), &[start], &[&[]]);
-    let local_stop = gate.netlist().net("LOCAL_STOP[0]").unwrap();
+    let local_stop = gate.probes()[0].net(Probe::LocalStop);
     let mut recorder = Recorder::new([local_stop]);
     gate.run(&mut recorder);
     let origin = gate.schedule().origin;
@@ -349,7 +352,8 @@ fn enabling_while_clk_is_low_counts_one_step_too_many() {
         let enable = SETTLING * if enabled_low { 11 } else { 10 } + HALF;
         bench.drive(enable, "ENABLE", true);
         let falls = if enabled_low { 3 } else { 4 };
-        let out = bench.bus("p_counter.COUNTER_OUT");
+        let probes = Probes::at(&bench.netlist, "");
+        let out = probes.bus(Probe::CounterOut);
         let mut run = bench.start(&[]);
         let found = run.number_at(SETTLING * 18, &out);
         assert_eq!(found, Some(100 - falls - u64::from(enabled_low)));

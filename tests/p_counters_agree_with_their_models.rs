@@ -5,7 +5,7 @@ mod bench;
 
 use bench::{Bench, SETTLING, corners};
 use guided_dtof::chip::p_counter::{self, starts_high};
-use guided_dtof::chip::{AfterBorrow, PCounter, SensorConfig, Tap};
+use guided_dtof::chip::{AfterBorrow, PCounter, Probe, Probes, SensorConfig, Tap};
 use guided_dtof::logic::Logic::One;
 use guided_dtof::netlist::{CellKind, Corner};
 use guided_dtof::units::Time;
@@ -137,7 +137,8 @@ proptest! {
             }
             now += Time::from_ps(*pause);
         }
-        let (out, local_stop) = (bench.bus("COUNTER_OUT"), bench.net("LOCAL_STOP"));
+        let out = Probes::of_block(&bench.netlist).bus(Probe::CounterOut).to_vec();
+        let local_stop = bench.net("LOCAL_STOP");
         let mut run = bench.start(&["LOCAL_STOP"]);
         let found = run.number_at(now + SETTLING, &out);
         prop_assert_eq!(found, Some(model.counter_out()));

@@ -2,6 +2,8 @@
 
 use std::process::Command;
 
+use guided_dtof::chip::Probe;
+
 fn passes(name: &str, program: &str, signal: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("waves");
@@ -35,12 +37,8 @@ fn the_p_counter_and_its_timing_block() {
 
 #[test]
 fn the_variants_of_the_p_counter() {
-    let signal = [
-        "tb_p_counter_variants",
-        "msb_wrap",
-        "p_counter",
-        "COUNTER_OUT",
-    ];
+    let count = Probe::CounterOut.name();
+    let signal = ["tb_p_counter_variants", "msb_wrap", "p_counter", count];
     passes(
         "tb_p_counter_variants",
         env!("CARGO_BIN_EXE_tb_p_counter_variants"),

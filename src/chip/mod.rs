@@ -10,7 +10,7 @@
 //! ```
 //!
 //! [`window_law`] says which photons a start value selects; everything that aims or reads a window
-//! asks it.
+//! asks it. [`probes`] says where nets are: nothing else knows the names of those inside the chip.
 
 pub mod config;
 mod config_keys;
@@ -23,6 +23,7 @@ pub mod macropixel;
 pub mod metdc;
 pub mod p_counter;
 pub mod p_counter_timing;
+pub mod probes;
 pub mod race;
 pub mod sensor;
 pub mod timing;
@@ -32,6 +33,7 @@ pub use config::{
     AfterBorrow, EventType, Mode, Overflow, PCounter, SensorConfig, THRESHOLD_BITS, Tap,
 };
 pub use exposure::Exposure;
+pub use probes::{LoadPins, LoadProbe, Probe, Probes, SensorPins};
 pub use race::{Cure, Race};
 pub use timing::ChipTiming;
 pub use window_law::{Window, WindowLaw};

@@ -6,7 +6,7 @@
 use super::config::SensorConfig;
 use super::front_end::PulseLimits;
 use super::p_counter::CounterTiming;
-use super::{correlation, p_counter_timing};
+use super::{Probe, Probes, correlation, p_counter_timing};
 use crate::logic::Logic::{One, Zero};
 use crate::netlist::{CellKind, CheckKind, Corner, Edge, Library, Netlist, StaticTiming, Timing};
 use crate::units::Time;
@@ -103,16 +103,16 @@ impl ChipTiming {
 fn longest_correlation(library: &Library, corner: Corner) -> Time {
     let netlist = Netlist::elaborate(&correlation::circuit());
     let timing = Timing::nominal(&netlist, library, corner);
-    let nets = |name| netlist.signal(name).expect("a port of the block");
-    let starts: Vec<_> = nets("SPAD_TIMED")
-        .into_iter()
-        .flat_map(|net| Edge::BOTH.map(|edge| (net, edge)))
+    let probes = Probes::of_block(&netlist);
+    let timed = probes.bus(Probe::SpadTimed).iter();
+    let starts: Vec<_> = timed
+        .flat_map(|&net| Edge::BOTH.map(|edge| (net, edge)))
         .collect();
     let arrivals = StaticTiming::new(&netlist, &timing)
         .arrivals(&starts, &[])
         .expect("the block is combinational");
     let (_, longest) = arrivals
-        .window(nets("SPAD_EVENT")[0])
+        .window(probes.net(Probe::SpadEvent))
         .expect("SPAD_EVENT depends on SPAD_TIMED");
     longest
 }

@@ -4,20 +4,22 @@ use std::sync::Arc;
 
 use super::hardware_events::HardwareEvents;
 use super::lanes::LaneSimulation;
-use super::stimulus::{Pins, Schedule, StimulusPlan};
+use super::stimulus::{Schedule, StimulusPlan};
 use super::{Engine, EngineError, follows};
 use crate::chip::front_end::PulseLimits;
-use crate::chip::{Exposure, SensorConfig, WindowLaw, front_end, histogram, sensor};
+use crate::chip::{
+    Exposure, Probe, Probes, SensorConfig, SensorPins, WindowLaw, front_end, sensor,
+};
 use crate::kernel::{Kernel, LANES, Observer, Policy, Statistics, TimingChecks};
-use crate::netlist::{Library, Netlist, Timing};
+use crate::netlist::{Library, NetId, Netlist, Timing};
 use crate::photon::SpadEvent;
 
 /// A rectangle of the sensor at gate level, loaded and exposed through its pins.
 pub struct GateSimulation<'a> {
     config: &'a SensorConfig,
-    first: (usize, usize),
-    size: (usize, usize),
     netlist: Arc<Netlist>,
+    /// Of each macropixel, row-major.
+    probes: Vec<Probes>,
     timing: Timing,
     kernel: Kernel,
     plan: StimulusPlan<'a>,
@@ -37,11 +39,14 @@ impl<'a> GateSimulation<'a> {
         let netlist = Arc::new(Netlist::elaborate(&sensor::window(config, first, size)));
         let timing = Timing::nominal(&netlist, &Library::default(), config.corner);
         let kernel = Kernel::new(&netlist, &timing);
+        let rectangle = (0..size.0).flat_map(|row| (0..size.1).map(move |col| (row, col)));
+        let probes = rectangle
+            .map(|(row, col)| Probes::of_macropixel(&netlist, first.0 + row, first.1 + col))
+            .collect();
         GateSimulation {
             config,
-            first,
-            size,
             netlist,
+            probes,
             timing,
             kernel,
             plan: StimulusPlan::new(config, exposure, size.1, starts, pulses),
@@ -85,18 +90,13 @@ impl<'a> GateSimulation<'a> {
 
     /// A watch for hardware events in every macropixel, from the end of the power-up reset on, to run it with.
     pub fn hardware_events(&self) -> HardwareEvents {
-        let paths = self.of_pixels(str::to_owned);
-        HardwareEvents::new(
-            &self.netlist,
-            self.config,
-            &paths,
-            self.schedule().reset_end,
-        )
+        let released = self.schedule().reset_end;
+        HardwareEvents::new(&self.netlist, self.config, &self.probes, released)
     }
 
     /// Simulates load and exposure to the end.
     pub fn run<O: Observer>(&mut self, observer: &mut O) {
-        let pins = Pins::of(&self.netlist);
+        let pins = SensorPins::of(&self.netlist);
         let mut stimulus = self.plan.stimulus(&pins);
         let end = self.plan.schedule().end;
         self.kernel.run(&mut stimulus, end, observer);
@@ -109,10 +109,11 @@ impl<'a> GateSimulation<'a> {
 
     /// Start values in the P-counters' memories, row-major; `None` where a bit is unknown, and without memory.
     pub fn loaded(&self) -> Vec<Option<u16>> {
-        self.of_pixels(|path| {
-            let memory = self.netlist.signal(&format!("{path}.p_counter.MEMORY"))?;
-            self.kernel.number(&memory).map(|code| code as u16)
-        })
+        let loaded = |probes: &Probes| {
+            let memory = probes.find(Probe::Memory)?;
+            self.kernel.number(memory).map(|code| code as u16)
+        };
+        self.probes.iter().map(loaded).collect()
     }
 
     /// Counts of every macropixel and bin, row-major, bin 0 earliest.
@@ -120,32 +121,22 @@ impl<'a> GateSimulation<'a> {
     /// # Errors
     /// When a bit of a count is unknown.
     pub fn histograms(&self) -> Result<Vec<Vec<u16>>, EngineError> {
-        let pixels = self.of_pixels(|path| {
-            (0..self.config.bins)
-                .map(|bin| {
-                    let count = format!("{path}.histogram.{}", histogram::bin_name(bin));
-                    let count = self.netlist.signal(&count).expect("every bin has a count");
-                    self.kernel.number(&count).map(|n| n as u16).ok_or(bin)
+        let histogram = |probes: &Probes| {
+            let count = |(bin, nets): (usize, &Vec<NetId>)| {
+                let count = self.kernel.number(nets).map(|n| n as u16);
+                count.ok_or_else(|| EngineError::Unknown {
+                    macropixel: probes.macropixel().to_owned(),
+                    bin,
                 })
-                .collect::<Result<Vec<u16>, usize>>()
-        });
-        let checked = pixels.into_iter().enumerate().map(|(index, histogram)| {
-            let (row, col) = (index / self.size.1, index % self.size.1);
-            histogram.map_err(|bin| EngineError::Unknown {
-                macropixel: sensor::pixel_name(self.first.0 + row, self.first.1 + col),
-                bin,
-            })
-        });
-        checked.collect()
+            };
+            probes.bins().iter().enumerate().map(count).collect()
+        };
+        self.probes.iter().map(histogram).collect()
     }
 
-    fn of_pixels<T>(&self, f: impl Fn(&str) -> T) -> Vec<T> {
-        let (rows, cols) = self.size;
-        let at = |row, col| f(&sensor::pixel_name(self.first.0 + row, self.first.1 + col));
-        (0..rows)
-            .flat_map(|row| (0..cols).map(move |col| (row, col)))
-            .map(|(row, col)| at(row, col))
-            .collect()
+    /// Handles of each macropixel's nets, row-major.
+    pub fn probes(&self) -> &[Probes] {
+        &self.probes
     }
 }
 

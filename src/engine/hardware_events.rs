@@ -14,7 +14,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::chip::{Mode, PCounter, SPADS, SensorConfig, Tap};
+use crate::chip::{Mode, PCounter, Probe, Probes, SPADS, SensorConfig, Tap, probes};
 use crate::kernel::Observer;
 use crate::logic::Logic;
 use crate::netlist::{NetId, Netlist};
@@ -159,15 +159,14 @@ pub struct HardwareEvents {
 }
 
 impl HardwareEvents {
-    /// Watches the macropixels at these paths below the top (an empty path: the top is one) of a sensor with this
-    /// configuration; nothing before `not_before` is judged.
+    /// Watches these macropixels of a sensor with this configuration; nothing before `not_before` is judged.
     ///
     /// # Panics
     /// When one of them is no macropixel.
-    pub fn new<S: AsRef<str>>(
+    pub fn new(
         netlist: &Netlist,
         config: &SensorConfig,
-        macropixels: &[S],
+        macropixels: &[Probes],
         not_before: Time,
     ) -> Self {
         let judges_counts = config.p_counter == PCounter::Ripple
@@ -175,38 +174,27 @@ impl HardwareEvents {
             && config.mode == Mode::Guided;
         let mut roles = vec![Vec::new(); netlist.net_count()];
         let mut pixels = Vec::new();
-        for (index, path) in macropixels.iter().enumerate() {
-            let path = path.as_ref();
-            let nets = |name: &str| -> Vec<NetId> {
-                let full = if path.is_empty() {
-                    name.to_owned()
-                } else {
-                    format!("{path}.{name}")
-                };
-                let nets = netlist.signal(&full);
-                nets.unwrap_or_else(|| panic!("{path} has no {name}"))
-            };
+        for (index, probes) in macropixels.iter().enumerate() {
             let mut watch = |net: NetId, role| roles[net.index()].push((index as u32, role));
-            watch(nets("CLK")[0], Role::Clk);
-            watch(nets("PIXEL_CLEAR")[0], Role::PixelClear);
+            watch(probes.net(Probe::Clk), Role::Clk);
+            watch(probes.net(Probe::PixelClear), Role::PixelClear);
             if judges_counts {
-                watch(nets("STOP")[0], Role::Stop);
-                watch(nets("COUNTER_RESET")[0], Role::CounterReset);
-                watch(nets("COUNTER_CLK")[0], Role::CounterClk);
-                watch(nets("LOCAL_STOP")[0], Role::LocalStop);
-                for (bit, &net) in nets("p_counter.MEMORY").iter().enumerate() {
+                watch(probes.net(Probe::Stop), Role::Stop);
+                watch(probes.net(Probe::CounterReset), Role::CounterReset);
+                watch(probes.net(Probe::CounterClk), Role::CounterClk);
+                watch(probes.net(Probe::LocalStop), Role::LocalStop);
+                for (bit, &net) in probes.bus(Probe::Memory).iter().enumerate() {
                     watch(net, Role::Memory(bit as u8));
                 }
-                for (bit, &net) in nets("p_counter.COUNTER_OUT").iter().enumerate() {
+                for (bit, &net) in probes.bus(Probe::CounterOut).iter().enumerate() {
                     watch(net, Role::CounterOut(bit as u8));
                 }
             }
-            for spad in 0..SPADS {
-                let toggle = nets(&format!("front_end.spad_{spad}.TOGGLE"))[0];
+            for (spad, &toggle) in probes.toggles().iter().enumerate() {
                 watch(toggle, Role::Toggle(spad as u8));
             }
             pixels.push(Macropixel {
-                path: path.to_owned(),
+                path: probes.macropixel().to_owned(),
                 reset: Logic::X,
                 local_stop: Logic::X,
                 memory: Bits::default(),
@@ -248,7 +236,7 @@ impl HardwareEvents {
             Role::Stop if value == Logic::One => {
                 let is_free = p.reset == Logic::Zero;
                 let missed = std::mem::replace(&mut p.awaits_reset, is_free.then_some(time));
-                found = missed.map(|stop| (HardwareEventKind::ResetTooShort, stop, String::new()));
+                found = missed.map(|stop| (HardwareEventKind::ResetTooShort, stop, p.path.clone()));
             }
             Role::Stop => {}
             Role::PixelClear => p.is_cleared = value != Logic::Zero,
@@ -266,7 +254,7 @@ impl HardwareEvents {
                 let starts_right =
                     p.out == p.memory && p.local_stop == Logic::Zero && p.clk_fell >= p.reset_rose;
                 if let (Some(released), false) = (p.released.take(), starts_right) {
-                    found = Some((HardwareEventKind::ResetTooShort, released, String::new()));
+                    found = Some((HardwareEventKind::ResetTooShort, released, p.path.clone()));
                 }
             }
             Role::CounterClk => {}
@@ -277,7 +265,8 @@ impl HardwareEvents {
                 let was_known = before.known >> bit & 1 == 1;
                 if was_known && before != p.memory && p.reset == Logic::Zero {
                     let kind = HardwareEventKind::MemoryWrittenWhileCounting;
-                    found = Some((kind, time, format!(".p_counter.MEMORY[{bit}]")));
+                    let memory = Probe::Memory.path(&p.path);
+                    found = Some((kind, time, format!("{memory}[{bit}]")));
                 }
             }
             Role::Toggle(spad) => {
@@ -288,20 +277,18 @@ impl HardwareEvents {
                     let changes = &mut p.toggled[spad as usize];
                     *changes = changes.saturating_add(1);
                     if changes.is_multiple_of(2) {
-                        let instance = format!(".front_end.spad_{spad}");
+                        let instance = probes::spad_path(&p.path, spad.into());
                         found = Some((HardwareEventKind::PulsesCancelled, time, instance));
                     }
                 }
             }
         }
-        if let Some((kind, when, part)) = found.filter(|_| time >= self.not_before) {
+        if let Some((kind, when, instance)) = found.filter(|_| time >= self.not_before) {
             self.counts[kind as usize] += 1;
             if self.report.hardware_events.len() == MOST_EVENTS {
                 self.report.hardware_events_left_out += 1;
                 return;
             }
-            let instance = format!("{}{part}", p.path);
-            let instance = instance.trim_start_matches('.').to_owned();
             self.report.hardware_events.push(HardwareEvent {
                 kind,
                 instance,

@@ -6,8 +6,8 @@
 use bitvec::vec::BitVec;
 
 use super::EngineError;
-use super::stimulus::{Pins, Schedule, StimulusPlan};
-use crate::chip::{Exposure, PCounter, SPADS, SensorConfig, histogram, load_path, sensor};
+use super::stimulus::{Schedule, StimulusPlan};
+use crate::chip::{Exposure, Probe, Probes, SPADS, SensorConfig, SensorPins, load_path, sensor};
 use crate::kernel::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
 use crate::netlist::{Library, NetId, Netlist, Timing};
 use crate::photon::SpadEvent;
@@ -17,6 +17,7 @@ use crate::units::Time;
 pub struct LaneSimulation<'a> {
     config: &'a SensorConfig,
     netlist: Netlist,
+    probes: Probes,
     kernel: LaneKernel,
     shared: StimulusPlan<'a>,
     serial: Vec<BitVec>,
@@ -48,6 +49,7 @@ impl<'a> LaneSimulation<'a> {
         all.sort_unstable_by_key(|(lane, pulse)| (pulse.time, *lane, pulse.spad));
         LaneSimulation {
             config,
+            probes: Probes::of_macropixel(&netlist, 0, 0),
             netlist,
             kernel,
             shared: StimulusPlan::new(config, exposure, 1, &[0], &[&[]]),
@@ -88,13 +90,13 @@ impl<'a> LaneSimulation<'a> {
 
     /// Simulates from power-up to `end`, in simulation time.
     pub(super) fn run_until<O: LaneObserver>(&mut self, end: Time, observer: &mut O) {
-        let pins = Pins::of(&self.netlist);
+        let pins = SensorPins::of(&self.netlist);
         let mut stimulus = self.stimulus(&pins).peekable();
         self.kernel.run(&mut stimulus, end, observer);
     }
 
-    fn stimulus(&self, pins: &Pins) -> impl Iterator<Item = LaneDrive> + use<> {
-        let serial = pins.serial();
+    fn stimulus(&self, pins: &SensorPins) -> impl Iterator<Item = LaneDrive> + use<> {
+        let serial = pins.load.serial;
         let everyone = |time, net, values| LaneDrive {
             time,
             net,
@@ -116,7 +118,7 @@ impl<'a> LaneSimulation<'a> {
             }
         }
         let (origin, dead_time) = (self.schedule().origin, self.config.dead_time());
-        let spad_raw: [NetId; SPADS] = std::array::from_fn(|spad| pins.spad_raw()[spad]);
+        let spad_raw: [NetId; SPADS] = std::array::from_fn(|spad| pins.spad_raw[spad]);
         for &(lane, pulse) in &self.pulses {
             let net = spad_raw[usize::from(pulse.spad)];
             let time = origin + pulse.time;
@@ -141,11 +143,8 @@ impl<'a> LaneSimulation<'a> {
 
     /// Start value in the P-counter's memory of each lane; `None` where a bit is unknown, and without memory.
     pub fn loaded(&self) -> Vec<Option<u16>> {
-        if self.config.p_counter == PCounter::Memoryless {
-            return self.lanes(|_| None);
-        }
-        let memory = self.signal("p_counter.MEMORY");
-        self.lanes(|lane| self.kernel.number(&memory, lane).map(|code| code as u16))
+        let memory = self.probes.find(Probe::Memory);
+        self.lanes(|lane| self.kernel.number(memory?, lane).map(|code| code as u16))
     }
 
     /// Counts of each lane, bin 0 earliest.
@@ -153,9 +152,6 @@ impl<'a> LaneSimulation<'a> {
     /// # Errors
     /// When a bit of a count is unknown; the lane stands for the column.
     pub fn histograms(&self) -> Result<Vec<Vec<u16>>, EngineError> {
-        let bins: Vec<Vec<NetId>> = (0..self.config.bins)
-            .map(|bin| self.signal(&format!("histogram.{}", histogram::bin_name(bin))))
-            .collect();
         let counts = self.lanes(|lane| {
             let count = |(bin, nets): (usize, &Vec<NetId>)| {
                 let number = self.kernel.number(nets, lane).map(|n| n as u16);
@@ -164,15 +160,9 @@ impl<'a> LaneSimulation<'a> {
                     bin,
                 })
             };
-            bins.iter().enumerate().map(count).collect()
+            self.probes.bins().iter().enumerate().map(count).collect()
         });
         counts.into_iter().collect()
-    }
-
-    fn signal(&self, name: &str) -> Vec<NetId> {
-        let path = format!("{}.{name}", sensor::pixel_name(0, 0));
-        let nets = self.netlist.signal(&path);
-        nets.expect("every macropixel has it")
     }
 
     fn lanes<T>(&self, f: impl Fn(usize) -> T) -> Vec<T> {

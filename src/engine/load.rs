@@ -1,7 +1,7 @@
 //! Loads a whole array at gate level: serial bits into the netlist of deserialiser, row scanner and memories.
 
-use super::stimulus::{LoadPins, load_stimulus};
-use crate::chip::{SensorConfig, load_path};
+use super::stimulus::load_stimulus;
+use crate::chip::{LoadPins, SensorConfig, load_path, probes};
 use crate::kernel::{Kernel, Observer, Statistics};
 use crate::netlist::{Library, Netlist, Timing};
 use crate::units::Time;
@@ -32,19 +32,10 @@ pub fn load<O: Observer>(
     let mut kernel = Kernel::new(netlist, &timing);
     let settled = end + config.load_clock().periods(1);
     kernel.run(&mut stimulus, settled, observer);
-    let memory = |row, col| {
-        let path = format!("{}.MEMORY", load_path::memory_name(row, col));
-        let nets = netlist
-            .signal(&path)
-            .expect("every macropixel has a memory");
-        kernel.number(&nets).map(|code| code as u16)
-    };
-    let starts = (0..config.rows)
-        .flat_map(|row| (0..config.cols).map(move |col| (row, col)))
-        .map(|(row, col)| memory(row, col))
-        .collect();
+    let memories = probes::memories(netlist, config.rows, config.cols);
+    let start = |nets: &Vec<_>| kernel.number(nets).map(|code| code as u16);
     Load {
-        starts,
+        starts: memories.iter().map(start).collect(),
         duration: config.load_time(),
         statistics: kernel.statistics(),
     }

@@ -38,7 +38,7 @@ pub use lanes::LaneSimulation;
 pub use light::{
     Exposed, LitPixel, Work, expose, expose_without_skipping, full_stream, stream_config,
 };
-pub use stimulus::{LoadPins, Pins, Schedule, StimulusPlan};
+pub use stimulus::{Schedule, StimulusPlan};
 pub use testbench::{export_annotated_verilog, export_netlist, export_verilog};
 pub use timed::{Runner, TimeKeeping, Timed, Timekept};
 pub use window::Window;

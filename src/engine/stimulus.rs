@@ -15,9 +15,10 @@
 
 use bitvec::slice::BitSlice;
 
-use crate::chip::{Exposure, Mode, SPADS, SensorConfig, THRESHOLD_BITS, load_path};
+use crate::chip::{
+    Exposure, LoadPins, Mode, SPADS, SensorConfig, SensorPins, THRESHOLD_BITS, load_path,
+};
 use crate::kernel::{Drive, Stimulus, clock, merge};
-use crate::netlist::{NetId, Netlist};
 use crate::photon::SpadEvent;
 use crate::units::{Frequency, Time};
 
@@ -27,34 +28,6 @@ const RESET_END: Time = Time::from_ns(2);
 const LOAD_START: Time = Time::from_ns(5);
 /// Quiet time between load and exposure, and for counts to ripple through after it.
 const SETTLING: Time = Time::from_ns(20);
-
-/// The pins that start values come in through.
-#[derive(Debug, Clone, Copy)]
-pub struct LoadPins {
-    resetb: NetId,
-    clk: NetId,
-    enable: NetId,
-    serial: NetId,
-}
-
-impl LoadPins {
-    /// Finds the pins of an elaborated load path or sensor.
-    ///
-    /// # Panics
-    /// When the netlist is neither.
-    pub fn of(netlist: &Netlist) -> Self {
-        let pin = |name| {
-            let net = netlist.net(name);
-            net.unwrap_or_else(|| panic!("the netlist has no pin {name}"))
-        };
-        LoadPins {
-            resetb: pin("RESETB"),
-            clk: pin("LOAD_CLK"),
-            enable: pin("LOAD_ENABLE"),
-            serial: pin("COUNTER_INITS"),
-        }
-    }
-}
 
 /// Power-up and serial load: the bits of `stream` on COUNTER_INITS, and the time at which they are in.
 pub fn load_stimulus<'a>(
@@ -83,58 +56,6 @@ pub fn load_stimulus<'a>(
         std::iter::once(edge).chain(data)
     });
     (end, merge([boxed(control.into_iter()), boxed(edges)]))
-}
-
-/// The sensor's input nets.
-#[derive(Debug, Clone)]
-pub struct Pins {
-    load: LoadPins,
-    clk: NetId,
-    stop: NetId,
-    enable: NetId,
-    histogram_clear: NetId,
-    conventional: NetId,
-    event_type: Vec<NetId>,
-    threshold: Vec<NetId>,
-    spad_raw: Vec<NetId>,
-}
-
-impl Pins {
-    /// Finds the pins of an elaborated sensor.
-    ///
-    /// # Panics
-    /// When the netlist is no sensor.
-    pub fn of(netlist: &Netlist) -> Self {
-        let bus = |name| {
-            netlist
-                .signal(name)
-                .unwrap_or_else(|| panic!("the netlist has no pin {name}"))
-        };
-        let pin = |name| bus(name)[0];
-        Pins {
-            load: LoadPins::of(netlist),
-            clk: pin("CLK"),
-            stop: pin("STOP"),
-            enable: pin("ENABLE"),
-            histogram_clear: pin("HISTOGRAM_CLEAR"),
-            conventional: pin("CONVENTIONAL"),
-            event_type: bus("TYPE"),
-            threshold: bus("THRESHOLD"),
-            spad_raw: bus("SPAD_RAW"),
-        }
-    }
-}
-
-impl Pins {
-    /// COUNTER_INITS.
-    pub(super) fn serial(&self) -> NetId {
-        self.load.serial
-    }
-
-    /// SPAD_RAW, 16 nets for every macropixel, row-major.
-    pub(super) fn spad_raw(&self) -> &[NetId] {
-        &self.spad_raw
-    }
 }
 
 /// Where load and exposure lie in simulation time.
@@ -207,7 +128,7 @@ impl<'a> StimulusPlan<'a> {
     }
 
     /// All drives in time order.
-    pub fn stimulus(&'a self, pins: &Pins) -> Stimulus<'a> {
+    pub fn stimulus(&'a self, pins: &SensorPins) -> Stimulus<'a> {
         merge([
             boxed(self.control(pins).into_iter()),
             boxed(load_stimulus(pins.load, self.config.load_clock(), &self.stream).1),
@@ -217,7 +138,7 @@ impl<'a> StimulusPlan<'a> {
         ])
     }
 
-    fn control(&self, pins: &Pins) -> Vec<Drive> {
+    fn control(&self, pins: &SensorPins) -> Vec<Drive> {
         let (config, schedule) = (self.config, self.schedule);
         let mut drives = Vec::new();
         let mut drive = |time, net, value: bool| drives.push(Drive::new(time, net, value));
@@ -246,7 +167,7 @@ impl<'a> StimulusPlan<'a> {
         drives
     }
 
-    fn clk(&self, pins: &Pins) -> impl Iterator<Item = Drive> + Send + 'a {
+    fn clk(&self, pins: &SensorPins) -> impl Iterator<Item = Drive> + Send + 'a {
         let exposure = self.exposure;
         let origin = self.schedule.origin - exposure.stop_phase;
         let periods = exposure.laser_cycles as i64 * exposure.stop_periods as i64;
@@ -260,7 +181,7 @@ impl<'a> StimulusPlan<'a> {
         std::iter::once(Drive::new(Time::ZERO, pins.clk, true)).chain(edges)
     }
 
-    fn stop(&self, pins: &Pins) -> impl Iterator<Item = Drive> + Send + 'a {
+    fn stop(&self, pins: &SensorPins) -> impl Iterator<Item = Drive> + Send + 'a {
         let (exposure, origin, stop) = (self.exposure, self.schedule.origin, pins.stop);
         let last = exposure.laser_cycles as i64;
         let edges = (0..=last).flat_map(move |cycle| {
@@ -277,7 +198,7 @@ impl<'a> StimulusPlan<'a> {
         std::iter::once(Drive::new(Time::ZERO, stop, false)).chain(edges)
     }
 
-    fn spads(&'a self, pins: &Pins) -> impl Iterator<Item = Drive> + Send + 'a {
+    fn spads(&'a self, pins: &SensorPins) -> impl Iterator<Item = Drive> + Send + 'a {
         let (origin, dead_time) = (self.schedule.origin, self.config.dead_time());
         let nets = pins.spad_raw.clone();
         let end = self.schedule.end;

@@ -16,8 +16,8 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::stimulus::{Pins, StimulusPlan};
-use crate::chip::{SensorConfig, histogram, sensor};
+use super::stimulus::StimulusPlan;
+use crate::chip::{SensorConfig, SensorPins, probes, sensor};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::netlist::{
     Corner, Direction, Library, Module, Netlist, Timing, write_cells, write_delays, write_modules,
@@ -109,7 +109,7 @@ fn write_stimulus(
     for (pin, net) in netlist.inputs().into_iter().enumerate() {
         pin_of_net[net.index()] = pin;
     }
-    for drive in plan.stimulus(&Pins::of(netlist)) {
+    for drive in plan.stimulus(&SensorPins::of(netlist)) {
         let (time_fs, pin) = (drive.time.as_fs(), pin_of_net[drive.net.index()]);
         writeln!(out, "{time_fs} {pin} {}", drive.value)?;
     }
@@ -209,10 +209,10 @@ module tb;
         let (row, col) = (pixel / cols, pixel % cols);
         let path = sensor::pixel_name(row, col);
         for bin in 0..config.bins {
-            let count = histogram::bin_name(bin);
+            let count = probes::bin_path(&path, bin);
             writeln!(
                 out,
-                "    $fwrite(histograms, \"{row},{col},{bin},%0d\\n\", dut.{path}.histogram.{count});"
+                "    $fwrite(histograms, \"{row},{col},{bin},%0d\\n\", dut.{count});"
             )?;
         }
     }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::gate::GateSimulation;
 use super::{Engine, Window};
 use crate::chip::window_law::WindowLaw;
-use crate::chip::{Exposure, SensorConfig, histogram, sensor};
+use crate::chip::{Exposure, LoadProbe, Probe, Probes, SensorConfig};
 use crate::files::InputError;
 use crate::kernel::Observer;
 use crate::logic::Logic;
@@ -201,8 +201,8 @@ impl FirstHit {
     fn new(netlist: &Netlist, pixels: &[(usize, usize)], origin: Time) -> Self {
         let mut hits = vec![None; netlist.net_count()];
         for &(row, col) in pixels {
-            let hit = format!("{}.HIT", sensor::pixel_name(row, col));
-            for net in netlist.signal(&hit).into_iter().flatten() {
+            let probes = Probes::of_macropixel(netlist, row, col);
+            for net in probes.bus(Probe::Hit) {
                 hits[net.index()] = Some((row, col));
             }
         }
@@ -244,48 +244,52 @@ pub fn write_waves(
 
 /// The signals of the macropixel (row, col), and the load path.
 fn groups(netlist: &Netlist, (row, col): (usize, usize)) -> Vec<Group> {
-    let pixel = sensor::pixel_name(row, col);
-    let of = |name: &str| format!("{pixel}.{name}");
-    let has_signal = |path: &String| netlist.signal(path).is_some();
-    let memory = Some(of("p_counter.MEMORY")).filter(has_signal);
-    let mut counter = vec![
-        Entry::binary("CLK"),
-        Entry::binary("STOP"),
-        Entry::binary(of("ENABLE")),
-        Entry::binary(of("MEMORY_LOAD")),
-        Entry::decimal(of("COUNTER_INIT")),
+    let probes = Probes::of_macropixel(netlist, row, col);
+    let binary = |probe| Entry::binary(probes.path(probe));
+    let decimal = |probe| Entry::decimal(probes.path(probe));
+    let hex = |probe| Entry::hex(probes.path(probe));
+    let memory = probes.find(Probe::Memory).map(|_| decimal(Probe::Memory));
+    let loaded = [
+        // Names that the sensor's pins have, too.
+        Entry::binary(Probe::Clk.name()),
+        Entry::binary(Probe::Stop.name()),
+        binary(Probe::Enable),
+        binary(Probe::MemoryLoad),
+        decimal(Probe::CounterInit),
     ];
-    counter.extend(memory.map(Entry::decimal));
-    counter.extend([
-        Entry::binary(of("COUNTER_RESET")),
-        Entry::binary(of("COUNTER_CLK")),
-        Entry::decimal(of("p_counter.COUNTER_OUT")),
-        Entry::binary(of("LOCAL_STOP")),
-    ]);
-    let bins = (0..)
-        .map(|bin| of(&format!("histogram.{}", histogram::bin_name(bin))))
-        .take_while(has_signal)
-        .map(Entry::decimal);
-    let histogram = [
-        Entry::hex(of("SPAD_RAW")),
-        Entry::hex(of("SPAD_TIMED")),
-        Entry::binary(of("SPAD_EVENT")),
-        Entry::binary(of("metdc.SHIFT")),
-        Entry::binary(of("metdc.STROBE")),
-        Entry::binary(of("HIT")),
+    let counted = [
+        binary(Probe::CounterReset),
+        binary(Probe::CounterClk),
+        decimal(Probe::CounterOut),
+        binary(Probe::LocalStop),
     ];
-    let signals = histogram.into_iter().chain(bins);
+    let events = [
+        hex(Probe::SpadRaw),
+        hex(Probe::SpadTimed),
+        binary(Probe::SpadEvent),
+        binary(Probe::Shift),
+        binary(Probe::Strobe),
+        binary(Probe::Hit),
+    ];
+    let bins = (0..probes.bins().len()).map(|bin| Entry::decimal(probes.bin_path(bin)));
     let load = [
-        Entry::binary("LOAD_ENABLE"),
-        Entry::binary("LOAD_CLK"),
-        Entry::binary("COUNTER_INITS"),
-        Entry::hex("COUNTER_INIT_ROW"),
-        Entry::binary("ROW_DONE"),
-        Entry::binary("MEMORY_LOAD"),
+        Entry::binary(LoadProbe::Enable.path()),
+        Entry::binary(LoadProbe::Clk.path()),
+        Entry::binary(LoadProbe::Serial.path()),
+        Entry::hex(LoadProbe::Row.path()),
+        Entry::binary(LoadProbe::RowDone.path()),
+        Entry::binary(LoadProbe::MemoryLoad.path()),
     ];
+    let pixel = probes.macropixel();
     vec![
-        Group::new(format!("P-counter {pixel} (Fig. 54)"), counter),
-        Group::new(format!("Histogram {pixel} (Fig. 47)"), signals),
+        Group::new(
+            format!("P-counter {pixel} (Fig. 54)"),
+            loaded.into_iter().chain(memory).chain(counted),
+        ),
+        Group::new(
+            format!("Histogram {pixel} (Fig. 47)"),
+            events.into_iter().chain(bins),
+        ),
         Group::new("Load path (Fig. 57)", load),
     ]
 }

@@ -2,7 +2,7 @@
 
 use super::claim::{Published::*, Row};
 use crate::chip::{
-    Exposure, PCounter, SensorConfig, load_path, p_counter, p_counter_timing, sensor,
+    Exposure, PCounter, Probe, SensorConfig, load_path, p_counter, p_counter_timing,
 };
 use crate::engine::timing::{
     Limits, MacropixelTiming, Silicon, gate_works, phases, ripple, shortest_period,
@@ -42,28 +42,29 @@ impl Edges {
         let exposure = Exposure::new(&config, STOP_PERIODS, 3);
         let mut simulation =
             GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[start], &[&[]]);
-        let netlist = simulation.netlist().clone();
-        let net = |name: &str| {
-            let path = format!("{}.{name}", sensor::pixel_name(0, 0));
-            netlist.signal(&path).expect("a net of the macropixel")[0]
-        };
-        let names = ["COUNTER_RESET", "COUNTER_CLK", "CLK", "LOCAL_STOP"].map(net);
-        let mut recorder = Recorder::new(names);
+        let probes = [
+            Probe::CounterReset,
+            Probe::CounterClk,
+            Probe::Clk,
+            Probe::LocalStop,
+        ];
+        let nets = probes.map(|probe| simulation.probes()[0].net(probe));
+        let mut recorder = Recorder::new(nets);
         simulation.run(&mut recorder);
         let cycle = simulation.schedule().origin + exposure.stop(1);
         let span = cycle..cycle + exposure.stop(1);
         let within = |times: Vec<Time>| -> Vec<Time> {
             times.into_iter().filter(|t| span.contains(t)).collect()
         };
-        let released = within(recorder.falling_edges(names[0]));
+        let released = within(recorder.falling_edges(nets[0]));
         let counts = |t: &Time| released.first().is_some_and(|release| t > release);
-        let mut counter_clk = within(recorder.rising_edges(names[1]));
+        let mut counter_clk = within(recorder.rising_edges(nets[1]));
         counter_clk.retain(counts);
         Edges {
             stop: cycle,
             counter_clk,
-            clk_falls: within(recorder.falling_edges(names[2])),
-            local_stop: within(recorder.rising_edges(names[3])),
+            clk_falls: within(recorder.falling_edges(nets[2])),
+            local_stop: within(recorder.rising_edges(nets[3])),
         }
     }
 

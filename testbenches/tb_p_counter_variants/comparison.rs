@@ -1,7 +1,8 @@
 //! Every variant of the P-counter in one table: transistors, delays, glitches and the shortest CLK period.
 
 use guided_dtof::chip::{
-    AfterBorrow, PCounter, SensorConfig, Tap, macropixel, p_counter, p_counter_timing,
+    AfterBorrow, PCounter, Probe, Probes, SensorConfig, Tap, macropixel, p_counter,
+    p_counter_timing,
 };
 use guided_dtof::engine::timing::{
     Limits, MacropixelTiming, Silicon, gate_works, ripple, shortest_period,
@@ -118,7 +119,7 @@ impl Row {
         let area: u64 = blocks.iter().map(|b| b.area()).sum();
         let netlist = Netlist::elaborate(&blocks[0]);
         let timing = TYPICAL.timing(&netlist);
-        let clk = netlist.net("COUNTER_CLK").expect("a pin");
+        let clk = Probes::of_block(&netlist).net(Probe::CounterClk);
         let arrivals = StaticTiming::new(&netlist, &timing).arrivals(&[(clk, Edge::Rise)], &[]);
         let arrivals = arrivals.expect("a P-counter has no loop");
         let nets = (0..netlist.net_count()).map(NetId::new);
@@ -252,7 +253,9 @@ impl Activity {
         let mut kernel = Kernel::new(netlist, &TYPICAL.timing(netlist));
         kernel.run(&mut in_order(drives), edge(counts), &mut recorder);
 
-        let (local_stop, equal) = (pin("LOCAL_STOP"), netlist.net("EQUAL"));
+        let probes = Probes::of_block(netlist);
+        let local_stop = probes.net(Probe::LocalStop);
+        let equal = probes.find(Probe::Equal).map(|nets| nets[0]);
         let mut of = Activity {
             counts,
             changes: 0,

@@ -21,7 +21,7 @@ use std::sync::Arc;
 
 use guided_dtof::chip::window_law::Window;
 use guided_dtof::chip::{
-    AfterBorrow, ChipTiming, Exposure, SensorConfig, Tap, WindowLaw, metdc, p_counter,
+    AfterBorrow, ChipTiming, Exposure, Probe, SensorConfig, Tap, WindowLaw, metdc, p_counter,
     p_counter_timing,
 };
 use guided_dtof::cli::testbench;
@@ -119,6 +119,8 @@ fn config(tap: Tap, after_borrow: AfterBorrow) -> SensorConfig {
     }
 }
 
+/// Both METDCs of a channel: HIT cleared by COUNTER_RESET, and before STOP.
+const METDCS: [&str; 2] = ["metdc", "metdc_early"];
 /// Pins that all channels share, in order of declaration.
 const PINS: [&str; 9] = [
     "CLK",
@@ -181,7 +183,7 @@ fn channel(name: &str, config: &SensorConfig) -> Arc<Module> {
             ("LOCAL_STOP", &local_stop),
         ],
     );
-    for (name, hit_clear) in [("metdc", &counter_reset), ("metdc_early", &early_clear)] {
+    for (name, hit_clear) in METDCS.into_iter().zip([&counter_reset, &early_clear]) {
         m.instance(
             name,
             &metdc::circuit(config.bins),
@@ -279,8 +281,9 @@ impl Bench {
     /// Runs both scenes, with their waveform in `waves`.
     fn simulate(&self, waves: &Path) -> Result<Recorder, InputError> {
         let nets = CHANNELS.iter().flat_map(|(name, ..)| {
-            let paths = ["LOCAL_STOP", "metdc.HIT", "metdc_early.HIT"];
-            paths.map(|path| self.bus(&format!("{name}.{path}")))
+            let local_stop = self.bus(&Probe::LocalStop.path(name));
+            let hits = METDCS.map(|metdc| self.bus(&Probe::Hit.path(&format!("{name}.{metdc}"))));
+            hits.into_iter().chain([local_stop])
         });
         let mut recorder = Recorder::new(nets.flatten());
         let corner = SensorConfig::default().corner;
@@ -302,16 +305,17 @@ impl Bench {
         let shared = ["CLK", "STOP", "ENABLE", "SPAD_EVENT", "HIT_CLEAR"].map(Entry::binary);
         let mut groups = vec![Group::new("Global signals", shared)];
         for (name, tap, _) in CHANNELS {
-            let of = |signal: &str| format!("{name}.{signal}");
+            let [hit, early_hit] =
+                METDCS.map(|metdc| Entry::hex(Probe::Hit.path(&format!("{name}.{metdc}"))));
             let mut signals = vec![
-                Entry::binary(of("COUNTER_RESET")),
-                Entry::binary(of("COUNTER_CLK")),
-                Entry::decimal(of("p_counter.COUNTER_OUT")),
-                Entry::binary(of("LOCAL_STOP")),
-                Entry::hex(of("metdc.HIT")),
+                Entry::binary(Probe::CounterReset.path(name)),
+                Entry::binary(Probe::CounterClk.path(name)),
+                Entry::decimal(Probe::CounterOut.path(name)),
+                Entry::binary(Probe::LocalStop.path(name)),
+                hit,
             ];
             if tap == Tap::Msb {
-                signals.push(Entry::hex(of("metdc_early.HIT")));
+                signals.push(early_hit);
             }
             groups.push(Group::new(format!("P-counter {name}"), signals));
         }
@@ -325,7 +329,7 @@ impl Bench {
     /// Rises of LOCAL_STOP in a scene, from its first STOP edge; the load's own are left out.
     fn rises(&self, seen: &Recorder, channel: &str, scene: &Scene) -> Vec<Time> {
         let from = self.at(scene.from);
-        let rises = seen.rising_edges(self.bus(&format!("{channel}.LOCAL_STOP"))[0]);
+        let rises = seen.rising_edges(self.bus(&Probe::LocalStop.path(channel))[0]);
         let within = rises
             .into_iter()
             .filter(|&t| t > from && t < self.at(scene.end() + 10));
@@ -335,7 +339,7 @@ impl Bench {
     /// Counts that the histogram of a METDC would have after a scene, bin by bin.
     fn counts(&self, seen: &Recorder, metdc: &str, scene: &Scene) -> Vec<usize> {
         let within = |t: &Time| (self.at(scene.from)..self.at(scene.end() + 10)).contains(t);
-        let hit = self.bus(&format!("{metdc}.HIT"));
+        let hit = self.bus(&Probe::Hit.path(metdc));
         let rises = hit.iter().map(|&net| seen.rising_edges(net));
         rises
             .map(|times| times.iter().filter(|t| within(t)).count())

@@ -1,6 +1,6 @@
 //! The P-counter without memory in a sensor: it must come round with STOP (thesis 4.4.3).
 
-use guided_dtof::chip::{ChipTiming, Exposure, PCounter};
+use guided_dtof::chip::{ChipTiming, Exposure, PCounter, Probe};
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::kernel::Recorder;
 use guided_dtof::report::Checks;
@@ -19,15 +19,9 @@ pub fn coming_round(checks: &mut Checks) {
         for start in starts {
             let mut gate =
                 GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[start], &[&[]]);
-            let pixel = "mp_r0_c0.p_counter";
-            let net = gate
-                .netlist()
-                .net(&format!("{pixel}.LOCAL_STOP"))
-                .expect("LOCAL_STOP");
-            let count = gate
-                .netlist()
-                .signal(&format!("{pixel}.COUNTER_OUT"))
-                .expect("COUNTER_OUT");
+            let probes = &gate.probes()[0];
+            let net = probes.net(Probe::LocalStop);
+            let count = probes.bus(Probe::CounterOut).to_vec();
             let mut recorder = Recorder::new(count.iter().copied().chain([net]));
             gate.run(&mut recorder);
             let origin = gate.schedule().origin;

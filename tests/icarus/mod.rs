@@ -5,6 +5,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::Command;
 
+use guided_dtof::chip::SensorPins;
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::kernel::Recorder;
 use guided_dtof::netlist::{Corner, Netlist, Timing};
@@ -99,7 +100,7 @@ impl Seen {
 
     /// By our kernel, which has yet to run an array of `cols` columns.
     pub fn by_kernel(gate: &mut GateSimulation<'_>, cols: usize) -> Self {
-        let local_stops = gate.netlist().signal("LOCAL_STOP").unwrap();
+        let local_stops = SensorPins::of(gate.netlist()).local_stop;
         let mut recorder = Recorder::new(local_stops.clone());
         gate.run(&mut recorder);
         let origin = gate.schedule().origin;

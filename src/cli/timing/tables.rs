@@ -1,7 +1,7 @@
 //! The tables of `gdtof timing`, one function each.
 
 use super::section::{Cell, Section};
-use crate::chip::SensorConfig;
+use crate::chip::{Probe, SensorConfig};
 use crate::engine::timing::{
     CorrelationTiming, Limits, LoadTiming, LocalClocks, MacropixelTiming, Silicon, TimingVerdict,
     corner_limits, factor_range, gate_works, load_works, longest, phases, reset, ripple,
@@ -214,10 +214,10 @@ pub fn flip_flops(subject: &Subject<'_>, load: &LoadTiming) -> Section {
         ("CLK", &pixel.netlist, &pixel.clk, &|r| {
             Some(r.slack(period))
         }),
-        ("STROBE", &pixel.netlist, &pixel.hits, &|r| {
+        (Probe::Strobe.name(), &pixel.netlist, &pixel.hits, &|r| {
             Some(pixel.strobe_slack(r, period, phase, aim))
         }),
-        ("HIT", &local.netlist, &local.counts, &|_| None),
+        (Probe::Hit.name(), &local.netlist, &local.counts, &|_| None),
         ("SPAD_RAW", &local.netlist, &local.toggles, &|r| {
             local.toggle_slack(r, config.dead_time())
         }),

@@ -17,7 +17,7 @@
 use std::collections::HashMap;
 
 use super::Unlevelled;
-use crate::chip::{Exposure, SensorConfig, histogram, sensor};
+use crate::chip::{Exposure, Probes, SensorConfig, SensorPins, sensor};
 use crate::engine::{GateSimulation, LaneSimulation};
 use crate::kernel::{LANES, Recorder};
 use crate::logic::Logic;
@@ -75,31 +75,25 @@ impl Survey {
     pub fn new(config: &SensorConfig, exposure: &Exposure) -> Self {
         let netlist = Netlist::elaborate(&sensor::window(config, (0, 0), (1, 1)));
         let timing = Timing::nominal(&netlist, &Library::default(), config.corner);
-        let pixel = sensor::pixel_name(0, 0);
-        let bins = (0..config.bins)
-            .map(|bin| {
-                let path = format!("{pixel}.histogram.{}", histogram::bin_name(bin));
-                netlist.signal(&path).expect("every bin has a count")
-            })
-            .collect();
+        let bins = Probes::of_macropixel(&netlist, 0, 0).bins().to_vec();
+        let pins = SensorPins::of(&netlist);
         let mut driver = vec![None; netlist.net_count()];
         for (index, cell) in netlist.cells().iter().enumerate() {
             for (output, net) in cell.outputs.iter().enumerate().filter(|(_, n)| n.is_some()) {
                 driver[net.index()] = Some((index, output));
             }
         }
-        let pin = |name| netlist.signal(name).expect("a pin of the sensor");
         let mut survey = Survey {
-            clk: pin("CLK")[0],
-            spads: pin("SPAD_RAW"),
+            clk: pins.clk,
             class: vec![Class::Free; netlist.net_count()],
             initial: initial_values(config, exposure, &netlist),
             bins,
+            spads: pins.spad_raw.clone(),
             driver,
             timing,
             netlist,
         };
-        survey.sort_nets();
+        survey.sort_nets(&pins);
         survey
     }
 
@@ -173,12 +167,11 @@ impl Survey {
         }
     }
 
-    fn sort_nets(&mut self) {
+    fn sort_nets(&mut self, pins: &SensorPins) {
         // What edges can reach at all.
-        let pins = ["CLK", "STOP", "ENABLE"];
-        let pin = |name| self.netlist.net(name).expect("a pin of the sensor");
         let mut moves = vec![false; self.netlist.net_count()];
-        for net in pins.map(pin).into_iter().chain(self.spads.iter().copied()) {
+        let shared = [pins.clk, pins.stop, pins.enable];
+        for net in shared.into_iter().chain(pins.spad_raw.iter().copied()) {
             moves[net.index()] = true;
         }
         let spads = self.spads.clone();

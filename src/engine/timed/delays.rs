@@ -10,9 +10,9 @@
 //! they decide is the order of the simulated events. Loops (LOCAL_STOP blocks COUNTER_CLK) are cut where one part's
 //! question ends and the next one's begins.
 
-use crate::chip::{Mode, SPADS, SensorConfig, sensor};
+use crate::chip::{Mode, Probe, Probes, SPADS, SensorConfig, sensor};
 use crate::logic::Logic::{One, Zero};
-use crate::netlist::{Arrivals, CellKind, Edge, FlatCell, NetId, Netlist, StaticTiming, Timing};
+use crate::netlist::{Arrivals, CellKind, Edge, NetId, Netlist, StaticTiming, Timing};
 use crate::units::Time;
 
 /// Earliest and latest.
@@ -107,23 +107,9 @@ impl Anatomy {
     pub fn new(config: &SensorConfig) -> Self {
         let netlist = Netlist::elaborate(&sensor::window(config, (0, 0), (1, 1)));
         let pixel = sensor::pixel_name(0, 0);
-        let path = |name: &str| format!("{pixel}.{name}");
-        let bus = |name: &str| {
-            netlist
-                .signal(&path(name))
-                .expect("every macropixel has it")
-        };
-        let net = |name: &str| bus(name)[0];
-        let counter_reset = net("COUNTER_RESET");
-        let pulse = net("p_counter_timing.PULSE");
-        let drives_reset = |cell: &&FlatCell| cell.outputs[0] == counter_reset;
-        let or = netlist.cells().iter().find(drives_reset);
-        let or = or.expect("COUNTER_RESET has a driver");
-        let clear = or.inputs[..2].iter().find(|&&input| input != pulse);
-        let toggle = |spad| path(&format!("front_end.spad_{spad}.toggle"));
-        let toggles = std::array::from_fn(|spad| netlist.cell(&toggle(spad)).expect("a SPAD"));
-        let p_counter = netlist.scope(&path("p_counter")).expect("a P-counter");
-        let is_flip_flop = |&cell: &usize| netlist.cells()[cell].kind.is_flip_flop();
+        let probes = Probes::of_macropixel(&netlist, 0, 0);
+        let net = |probe| probes.net(probe);
+        let toggles = probes.toggle_cells(&netlist);
         let paths = (0..netlist.cells().len()).map(|cell| {
             let path = netlist.cell_path(cell);
             match path.split_once(&pixel) {
@@ -134,21 +120,21 @@ impl Anatomy {
         Anatomy {
             paths: paths.collect(),
             mode: config.mode,
-            clk: net("CLK"),
-            stop: net("STOP"),
-            run: net("ENABLE"),
-            block: net("p_counter_timing.BLOCK"),
-            clear: *clear.expect("an OR has two inputs"),
-            counter_clk: net("COUNTER_CLK"),
-            counter_reset,
-            local_stop: net("LOCAL_STOP"),
-            strobe: net("metdc.STROBE"),
-            hit_reset: net("metdc.HIT_RESET"),
-            event: net("SPAD_EVENT"),
-            shift: bus("metdc.SHIFT"),
-            hit: bus("HIT"),
-            toggles,
-            counting: netlist.cells_of(p_counter).filter(is_flip_flop).collect(),
+            clk: net(Probe::Clk),
+            stop: net(Probe::Stop),
+            run: net(Probe::Enable),
+            block: net(Probe::Block),
+            clear: probes.counter_clear(&netlist),
+            counter_clk: net(Probe::CounterClk),
+            counter_reset: net(Probe::CounterReset),
+            local_stop: net(Probe::LocalStop),
+            strobe: net(Probe::Strobe),
+            hit_reset: net(Probe::HitReset),
+            event: net(Probe::SpadEvent),
+            shift: probes.bus(Probe::Shift).to_vec(),
+            hit: probes.bus(Probe::Hit).to_vec(),
+            toggles: std::array::from_fn(|spad| toggles[spad]),
+            counting: probes.counter_cells(&netlist),
             netlist,
         }
     }

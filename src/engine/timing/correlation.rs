@@ -16,7 +16,7 @@
 
 use super::gates::{checks, simulation};
 use super::{Limits, Silicon, shortest_period};
-use crate::chip::{EventType, Exposure, SensorConfig, sensor};
+use crate::chip::{EventType, Exposure, Probe, SensorConfig};
 use crate::kernel::Recorder;
 use crate::netlist::CheckKind;
 use crate::photon::SpadEvent;
@@ -81,13 +81,11 @@ fn take(config: &SensorConfig, silicon: &Silicon, limits: Limits, period: Time) 
         })
         .collect();
     let mut gate = simulation(&config, silicon, &exposure, 2, &pulses);
-    let signal = |name: &str| {
-        let path = format!("{}.{name}", sensor::pixel_name(0, 0));
-        gate.netlist()
-            .signal(&path)
-            .expect("a signal of the macropixel")[0]
-    };
-    let (event, first) = (signal("SPAD_EVENT"), signal("metdc.SHIFT"));
+    let probes = &gate.probes()[0];
+    let (event, first) = (probes.net(Probe::SpadEvent), probes.net(Probe::Shift));
+    let first_stage = gate
+        .netlist()
+        .cell_path(probes.shift_cells(gate.netlist())[0]);
     let mut recorder = Recorder::new([event, first]);
     let origin = gate.schedule().origin;
     // The event of edge e is at the shift register's first stage after edge e + 1.
@@ -98,10 +96,7 @@ fn take(config: &SensorConfig, silicon: &Silicon, limits: Limits, period: Time) 
     let mut checks = checks(silicon, &gate);
     gate.run(&mut (&mut recorder, &mut checks));
     let report = checks.report(gate.netlist());
-    let at_first = report
-        .violations
-        .iter()
-        .filter(|v| v.cell.ends_with(".metdc.shift_0"));
+    let at_first = report.violations.iter().filter(|v| v.cell == first_stage);
     let mut at_first = at_first.filter(|v| matches!(v.kind, CheckKind::Setup | CheckKind::Hold));
     let is_kept = limits == Limits::Ignored || at_first.next().is_none();
     let launch = origin + exposure.rising(FIRST + 1);

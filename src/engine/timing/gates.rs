@@ -2,7 +2,9 @@
 
 use super::{Limits, Silicon};
 use crate::chip::p_counter::Rises;
-use crate::chip::{Exposure, PCounter, SensorConfig, WindowLaw, front_end, p_counter, sensor};
+use crate::chip::{
+    Exposure, PCounter, Probe, Probes, SensorConfig, WindowLaw, front_end, p_counter,
+};
 use crate::engine::GateSimulation;
 use crate::kernel::{Drive, Kernel, Policy, Recorder, TimingChecks, in_order};
 use crate::netlist::{Edge, Netlist, StaticTiming};
@@ -106,14 +108,14 @@ pub fn gate_works(
 pub fn ripple(config: &SensorConfig, silicon: &Silicon) -> (Time, Time) {
     let netlist = Netlist::elaborate(&p_counter::circuit(config));
     let timing = silicon.timing(&netlist);
-    let net = |name: &str| netlist.net(name).expect("a pin of the P-counter");
-    let (clk, stop) = (net("COUNTER_CLK"), net("LOCAL_STOP"));
+    let probes = Probes::of_block(&netlist);
+    let (clk, stop) = (probes.net(Probe::CounterClk), probes.net(Probe::LocalStop));
     let analysis = StaticTiming::new(&netlist, &timing);
     let arrivals = analysis
         .arrivals(&[(clk, Edge::Rise)], &[])
         .expect("a P-counter has no loop");
     let (_, longest) = arrivals.edge_window(stop, Edge::Rise).expect("the ripple");
-    let resets = [net("MEMORY_RESET"), net("COUNTER_RESET")];
+    let resets = [Probe::MemoryReset, Probe::CounterReset].map(|probe| probes.net(probe));
     let edge = Time::from_ns(200);
     let inputs = netlist.inputs().into_iter();
     let power_up = inputs.map(|n| Drive::new(Time::ZERO, n, resets.contains(&n)));
@@ -162,14 +164,12 @@ fn after_reset(config: &SensorConfig, silicon: &Silicon, start: u16, periods: u3
     config.stop_phase_ps = 0.0;
     let exposure = Exposure::new(&config, periods, 2);
     let mut gate = simulation(&config, silicon, &exposure, start, &[]);
-    let signal = |name: &str| {
-        let path = format!("{}.{name}", sensor::pixel_name(0, 0));
-        gate.netlist()
-            .signal(&path)
-            .expect("a signal of the macropixel")
-    };
-    let (reset, clk) = (signal("COUNTER_RESET")[0], signal("COUNTER_CLK")[0]);
-    let stages = signal("p_counter.COUNTER_OUT");
+    let probes = &gate.probes()[0];
+    let (reset, clk) = (
+        probes.net(Probe::CounterReset),
+        probes.net(Probe::CounterClk),
+    );
+    let stages = probes.bus(Probe::CounterOut).to_vec();
     let mut recorder = Recorder::new(stages.iter().copied().chain([reset, clk]));
     let stop = gate.schedule().origin + exposure.stop(1);
     gate.run(&mut recorder);

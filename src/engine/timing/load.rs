@@ -6,8 +6,7 @@
 
 use super::macropixel::worst_path;
 use super::{Limits, Silicon, gates};
-use crate::chip::{SensorConfig, load_path};
-use crate::engine::LoadPins;
+use crate::chip::{LoadPins, LoadProbe, SensorConfig, load_path, probes};
 use crate::engine::stimulus::load_stimulus;
 use crate::kernel::{Kernel, TimingChecks};
 use crate::netlist::{
@@ -41,20 +40,20 @@ impl LoadTiming {
         let timing = silicon.timing(&netlist);
         let library = silicon.limits(limits);
         let analysis = StaticTiming::new(&netlist, &timing);
-        let net = |name: &str| netlist.net(name).expect("a net of the load path");
         let requirements = |cuts: &[NetId]| {
             let corner = silicon.corner;
-            Requirements::of(&netlist, &analysis, net("LOAD_CLK"), cuts, &library, corner)
+            let clock = LoadProbe::Clk.net(&netlist);
+            Requirements::of(&netlist, &analysis, clock, cuts, &library, corner)
                 .expect("the load path has no loop")
         };
         // The inverse of ROW_DONE clocks the tokens and gates WRITE.
-        let done = net("ROW_DONE");
+        let done = LoadProbe::RowDone.net(&netlist);
         let inverters = netlist.cells().iter().filter(|c| c.kind == CellKind::Inv);
         let mut inverters = inverters.filter(|c| c.inputs[0] == done);
         let step = inverters.next().expect("ROW_DONE's inverter").outputs[0];
-        let select = netlist.signal("row_scanner.SELECT").expect("the tokens");
-        let write = net("row_scanner.WRITE");
-        let loads = netlist.signal("MEMORY_LOAD").expect("the rows");
+        let select = LoadProbe::Select.bus(&netlist);
+        let write = LoadProbe::Write.net(&netlist);
+        let loads = LoadProbe::MemoryLoad.bus(&netlist);
         let tokens = requirements(&loads);
         let gated = requirements(&[step]);
         let is_memory = |r: &&Requirement| loads.contains(&netlist.cells()[r.cell].inputs[1]);
@@ -112,11 +111,9 @@ pub fn load_works(config: &SensorConfig, silicon: &Silicon, limits: Limits, peri
         Limits::Kept => kernel.run(&mut stimulus, settled, &mut checks),
         Limits::Ignored => kernel.run(&mut stimulus, settled, &mut ()),
     }
-    let memory = |pixel: usize| {
-        let name = load_path::memory_name(pixel / cols, pixel % cols);
-        let nets = netlist.signal(&format!("{name}.MEMORY"));
-        kernel.number(&nets.expect("every macropixel has a memory"))
-    };
-    let is_right = (0..starts.len()).all(|pixel| memory(pixel) == Some(starts[pixel].into()));
+    let mut memories = probes::memories(&netlist, ROWS, cols)
+        .into_iter()
+        .zip(&starts);
+    let is_right = memories.all(|(nets, &start)| kernel.number(&nets) == Some(start.into()));
     is_right && (limits == Limits::Ignored || checks.report(&netlist).violated() == 0)
 }

@@ -11,7 +11,7 @@
 
 use super::{Limits, Silicon};
 use crate::chip::front_end::{self, PulseLimits};
-use crate::chip::{Mode, PCounter, Race, SensorConfig, histogram, sensor};
+use crate::chip::{Mode, PCounter, Probe, Probes, Race, SensorConfig, sensor};
 use crate::netlist::{
     Bound, CellKind, CheckKind, Edge, NetId, Netlist, Path, Requirement, Requirements, StaticTiming,
 };
@@ -22,8 +22,7 @@ use crate::units::Time;
 pub struct MacropixelTiming {
     /// The netlist that is analysed, which names the nets of the paths.
     pub netlist: Netlist,
-    /// Dotted path of the macropixel there.
-    pixel: String,
+    probes: Probes,
     /// CLK falls → LOCAL_STOP rises: the ripple delay of the thesis (4.6, Fig. 56).
     pub ripple: Path,
     /// CLK falls → STROBE rises.
@@ -94,63 +93,66 @@ impl MacropixelTiming {
     ) -> Self {
         // The very netlist that the gate engine simulates, so that a cell's mismatch is the same in both.
         let netlist = Netlist::elaborate(&sensor::window(config, position, (1, 1)));
-        let pixel = sensor::pixel_name(position.0, position.1);
+        let probes = Probes::of_macropixel(&netlist, position.0, position.1);
         let timing = silicon.timing(&netlist);
         let library = silicon.limits(limits);
         let analysis = StaticTiming::new(&netlist, &timing);
-        let bus = |name: &str| {
-            let nets = netlist.signal(&format!("{pixel}.{name}"));
-            nets.expect("a signal of the macropixel")
-        };
-        let net = |name: &str| bus(name)[0];
+        let net = |probe| probes.net(probe);
         // LOCAL_STOP blocks COUNTER_CLK, and FULL blocks a bin's clock: both loops are cut, as is the reset.
-        let after = |from: &str, edge, cuts: &[NetId]| {
+        let after = |from, edge, cuts: &[NetId]| {
             let arrivals = analysis.arrivals(&[(net(from), edge)], cuts);
             arrivals.expect("every loop is cut")
         };
         let whole = "the macropixel connects these";
-        let block = net("p_counter_timing.BLOCK");
-        let hit = bus("HIT");
+        let (block, hit) = (net(Probe::Block), probes.bus(Probe::Hit));
         // ENABLE changes with STOP, but only before the first and after the last laser cycle.
-        let cuts: Vec<NetId> = hit.iter().copied().chain([block, net("ENABLE")]).collect();
-        let (clock, corner) = (net("CLK"), silicon.corner);
+        let cuts: Vec<NetId> = hit
+            .iter()
+            .copied()
+            .chain([block, net(Probe::Enable)])
+            .collect();
+        let (clock, corner) = (net(Probe::Clk), silicon.corner);
         let clk = Requirements::of(&netlist, &analysis, clock, &cuts, &library, corner);
         let clk = clk.expect("every loop is cut");
         let (rise, fall) = (clk.arrivals(Edge::Rise), clk.arrivals(Edge::Fall));
-        let stop = after("STOP", Edge::Rise, &cuts);
+        let stop = after(Probe::Stop, Edge::Rise, &cuts);
         let stop_strobe = (config.mode == Mode::Conventional).then(|| {
-            let cuts: Vec<NetId> = cuts.iter().copied().chain([net("LOCAL_STOP")]).collect();
-            let stop = after("STOP", Edge::Rise, &cuts);
-            stop.edge_window(net("metdc.STROBE"), Edge::Rise)
+            let cuts: Vec<NetId> = cuts
+                .iter()
+                .copied()
+                .chain([net(Probe::LocalStop)])
+                .collect();
+            let stop = after(Probe::Stop, Edge::Rise, &cuts);
+            stop.edge_window(net(Probe::Strobe), Edge::Rise)
                 .expect(whole)
         });
-        let p_counter = netlist.scope(&format!("{pixel}.p_counter"));
-        let counting = netlist.cells_of(p_counter.expect("a P-counter"));
-        let cells = counting.map(|cell| &netlist.cells()[cell]);
-        let stage_clocks: Vec<NetId> = cells
-            .filter(|cell| cell.kind.is_flip_flop())
-            .map(|cell| cell.inputs[1])
+        let counting = probes.counter_cells(&netlist).into_iter();
+        let stage_clocks: Vec<NetId> = counting
+            .map(|cell| netlist.cells()[cell].inputs[1])
             .collect();
         // What arrives at a stage's clock goes no further: the flip-flop behind it is held in reset.
         let reset_cuts: Vec<NetId> = cuts.iter().chain(&stage_clocks).copied().collect();
-        let reset = after("COUNTER_RESET", Edge::Rise, &reset_cuts);
+        let reset = after(Probe::CounterReset, Edge::Rise, &reset_cuts);
         let clears = stage_clocks
             .iter()
             .filter_map(|&n| reset.edge_window(n, Edge::Rise));
-        let local_stop = net("LOCAL_STOP");
+        let local_stop = net(Probe::LocalStop);
         // A counter without memory is not reset, and one that wraps is not blocked.
         let local_stop_falls = reset.edge_window(local_stop, Edge::Fall);
         let unblocks = after(
-            "LOCAL_STOP",
+            Probe::LocalStop,
             Edge::Fall,
-            &[net("COUNTER_CLK"), net("metdc.STROBE")],
+            &[net(Probe::CounterClk), net(Probe::Strobe)],
         );
-        let unblocked = unblocks.edge_window(net("COUNTER_CLK"), Edge::Rise);
-        let shift = bus("metdc.SHIFT");
-        let shift = shift.iter().filter_map(|&bit| rise.window(bit));
+        let unblocked = unblocks.edge_window(net(Probe::CounterClk), Edge::Rise);
+        let shift = probes
+            .bus(Probe::Shift)
+            .iter()
+            .filter_map(|&bit| rise.window(bit));
         let shift = shift.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
 
-        let is_hit = |r: &Requirement| netlist.cell_path(r.cell).contains(".metdc.hit_");
+        let hit_cells = probes.hit_cells(&netlist);
+        let is_hit = |r: &Requirement| hit_cells.contains(&r.cell);
         let of_first_sampler = |r: &Requirement| {
             r.kind.concerns_data() && front_end::is_asynchronous_sampler(&netlist.cell_path(r.cell))
         };
@@ -164,21 +166,21 @@ impl MacropixelTiming {
                 .path(local_stop, Edge::Rise, Bound::Longest)
                 .expect(whole),
             strobe: fall
-                .edge_window(net("metdc.STROBE"), Edge::Rise)
+                .edge_window(net(Probe::Strobe), Edge::Rise)
                 .expect(whole),
             shift: shift.expect(whole),
             event: rise
-                .path_to(net("SPAD_EVENT"), Bound::Longest)
+                .path_to(net(Probe::SpadEvent), Bound::Longest)
                 .expect(whole),
             shortest: worst_path(&clk, clk_rest.iter(), CheckKind::Hold).expect(whole),
             counter_clk: fall
-                .edge_window(net("COUNTER_CLK"), Edge::Rise)
+                .edge_window(net(Probe::CounterClk), Edge::Rise)
                 .expect(whole),
             reset: stop
-                .edge_window(net("COUNTER_RESET"), Edge::Rise)
+                .edge_window(net(Probe::CounterReset), Edge::Rise)
                 .expect(whole),
             release: stop
-                .edge_window(net("COUNTER_RESET"), Edge::Fall)
+                .edge_window(net(Probe::CounterReset), Edge::Fall)
                 .expect(whole),
             reset_to_stage_clock: clears.map(|w| w.1).max().unwrap_or(Time::ZERO),
             reset_to_counter_clk: local_stop_falls
@@ -194,7 +196,7 @@ impl MacropixelTiming {
             recovery: limit(CheckKind::Recovery),
             removal: limit(CheckKind::Removal),
             control_high: limit(CheckKind::ControlHigh),
-            pixel,
+            probes,
             netlist,
         }
     }
@@ -223,7 +225,8 @@ impl MacropixelTiming {
 
     /// Shortest CLK period of the path CLK → SPAD_EVENT → shift register.
     pub fn correlation_period(&self) -> Option<Time> {
-        let first = |r: &&Requirement| self.netlist.cell_path(r.cell).ends_with(".metdc.shift_0");
+        let stages = self.probes.shift_cells(&self.netlist);
+        let first = |r: &&Requirement| r.cell == stages[0];
         let setups = self.clk.iter().filter(|r| r.kind == CheckKind::Setup);
         longest(setups.filter(first))
     }
@@ -246,9 +249,9 @@ impl MacropixelTiming {
         self.forbidden(0).1
     }
 
-    /// Dotted path of one of the macropixel's nets.
-    pub fn path_of(&self, name: &str) -> String {
-        format!("{}.{name}", self.pixel)
+    /// Handles of the macropixel's nets.
+    pub fn probes(&self) -> &Probes {
+        &self.probes
     }
 
     /// Between which edges this macropixel strobes and counts first: by the middle of what is certain, whatever limits say.
@@ -409,26 +412,24 @@ impl LocalClocks {
         let timing = silicon.timing(&netlist);
         let library = silicon.limits(Limits::Kept);
         let analysis = StaticTiming::new(&netlist, &timing);
-        let bus = |name: &str| {
-            let nets = netlist.signal(&format!("{}.{name}", sensor::pixel_name(0, 0)));
-            nets.expect("a signal of the macropixel")
-        };
+        let probes = Probes::of_macropixel(&netlist, 0, 0);
+        let toggles = probes.toggle_cells(&netlist);
         let requirements = |clock: NetId, cuts: &[NetId]| {
             let corner = silicon.corner;
             let found = Requirements::of(&netlist, &analysis, clock, cuts, &library, corner);
             found.expect("every loop is cut").all().to_vec()
         };
         // A count's Q only tells whether the bin is full.
-        let count = |bin| bus(&format!("histogram.{}", histogram::bin_name(bin)));
-        let hits = bus("HIT").into_iter().enumerate();
+        let hits = probes.bus(Probe::Hit).iter().zip(probes.bins());
+        let raw = probes.bus(Probe::SpadRaw).iter();
         LocalClocks {
             counts: hits
-                .flat_map(|(bin, hit)| requirements(hit, &count(bin)))
+                .flat_map(|(&hit, count)| requirements(hit, count))
                 .collect(),
-            toggles: bus("SPAD_RAW")
-                .into_iter()
-                .flat_map(|raw| requirements(raw, &[]))
-                .filter(|r| !netlist.cell_path(r.cell).ends_with(".first"))
+            // The flip-flop behind a toggle has CLK for its clock.
+            toggles: raw
+                .flat_map(|&raw| requirements(raw, &[]))
+                .filter(|r| toggles.contains(&r.cell))
                 .collect(),
             netlist,
         }

@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use super::{Aim, Limits, LoadTiming, LocalClocks, MacropixelTiming, Silicon};
 use crate::chip::window_law::Window;
-use crate::chip::{Exposure, Race, SensorConfig, WindowLaw};
+use crate::chip::{Exposure, Probe, Race, SensorConfig, WindowLaw};
 use crate::netlist::{CheckKind, Netlist, Requirement};
 use crate::units::Time;
 
@@ -87,7 +87,7 @@ impl TimingVerdict {
         if let Some(race) = race {
             margins.push(Margin {
                 check: "window law".to_owned(),
-                path: pixel.path_of("p_counter"),
+                path: pixel.probes().p_counter(),
                 // Where the law rounds to the safe side, too.
                 slack: race.slack().min(Time::from_fs(-1)),
                 race: Some(race),
@@ -200,11 +200,12 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
         }
         margins.push(margin);
     }
-    let path = |name: &str| format!("STOP rise to {} fall", pixel.path_of(name));
+    let counter_reset = pixel.probes().path(Probe::CounterReset);
+    let path = format!("STOP rise to {counter_reset} fall");
     if let Some((slack, race)) = pixel.first_count(period, phase, aim) {
         margins.push(Margin {
             check: "first count, recovery and removal".to_owned(),
-            path: path("COUNTER_RESET"),
+            path: path.clone(),
             slack,
             race: (slack < Time::ZERO).then_some(race),
             complaint: None,
@@ -212,7 +213,7 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
     }
     margins.push(Margin {
         check: "reset pulse".to_owned(),
-        path: path("COUNTER_RESET"),
+        path,
         slack: pixel.reset_width() - pixel.reset_need(),
         race: None,
         complaint: None,
@@ -241,8 +242,8 @@ fn local_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
     // No laser cycle is shorter than two CLK periods. How long HIT is high and low, start values say.
     let between = config.clock().periods(2);
     margins.extend(tightest(
-        "HIT",
-        "HIT",
+        Probe::Hit.name(),
+        Probe::Hit.name(),
         &local.netlist,
         local.counts.iter(),
         |r| r.kind.concerns_data().then(|| r.slack(between)),
