@@ -5,9 +5,9 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 mkdir -p vectors/traces
 mkdir -p vectors/range vectors/timing
-GDTOF_REMAKE=1 cargo test --release --quiet --test traces_are_deterministic golden
-GDTOF_REMAKE=1 cargo test --release --quiet --test golden_vectors_hold delays
-GDTOF_REMAKE=1 cargo test --release --quiet --test real_histograms_are_ranged sample
+GDTOF_REMAKE=1 cargo test --release --quiet --test chip traces_are_deterministic::golden
+GDTOF_REMAKE=1 cargo test --release --quiet --test command golden_vectors_hold::delays
+GDTOF_REMAKE=1 cargo test --release --quiet --test command real_histograms_are_ranged::sample
 cd vectors/replay
 cargo run --release --quiet -- replay --sensor sensor.toml --inits inits.csv --events events.csv \
     --stop-periods 80 --laser-cycles 40 --engine gate --out histograms.csv

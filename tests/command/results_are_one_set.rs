@@ -1,7 +1,5 @@
 //! Runs that are interrupted, killed or repeated: nothing half written stays, and what is in a folder is of one run.
 
-#![cfg(unix)]
-
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};

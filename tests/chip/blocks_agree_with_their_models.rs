@@ -1,7 +1,7 @@
 //! Every circuit, elaborated alone and driven at random, does what the plain-Rust model beside it says, at the
 //! times that the chip's timing says.
 
-mod bench;
+use crate::bench;
 
 use bench::{Bench, SETTLING, corners};
 use guided_dtof::chip::{

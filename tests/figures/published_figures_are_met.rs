@@ -119,7 +119,7 @@ fn the_tally_counts_every_row_and_claim_once() {
         .filter(|c| overall(&c.rows) == Verdict::Agrees);
     let agree = agree.count();
     assert_eq!(lines[0][1], agree, "{text}");
-    let readme = include_str!("../README.md").replace('\n', " ");
+    let readme = include_str!("../../README.md").replace('\n', " ");
     assert!(readme.contains(&format!(
         "all that is published of it agrees: {agree} of 28 are,"
     )));
@@ -171,7 +171,7 @@ fn verdicts_are_the_known_ones() {
         result.rows.iter().map(line)
     });
     let found: Vec<String> = lines.collect();
-    let known: Vec<&str> = include_str!("../vectors/reproduce/verdicts.txt")
+    let known: Vec<&str> = include_str!("../../vectors/reproduce/verdicts.txt")
         .lines()
         .collect();
     let found_set: BTreeSet<&str> = found.iter().map(String::as_str).collect();

@@ -1,9 +1,9 @@
 //! The levelised netlist counts what the gates and the reference model count: random sensors, clocks, STOP phases,
 //! start values and pulses, many macropixels in one block.
 //!
-//! `GDTOF_CASES=10000 cargo test --release --test cycle_agrees_with_gate` runs more of them.
+//! `GDTOF_CASES=10000 cargo test --release --test engines cycle_agrees_with_gate` runs more of them.
 
-mod scenario;
+use crate::scenario;
 
 use guided_dtof::chip::macropixel::Model;
 use guided_dtof::chip::window_law::{Window, WindowLaw};

@@ -1,7 +1,7 @@
 //! What goes wrong with a P-counter when it is loaded, reset, enabled or aimed carelessly, and what keeps the sensor
 //! from it. Each trap is shown to be one: a test here fails if the circuit stops falling into it.
 
-mod bench;
+use crate::bench;
 
 use bench::{Bench, SETTLING};
 use guided_dtof::chip::window_law::Window as LawWindow;

@@ -1,8 +1,8 @@
 //! The exported macropixel in Icarus Verilog, on random stimuli: the same LOCAL_STOP times to the
 //! femtosecond and the same histogram counts as our kernel. Skipped, loudly, where Icarus is absent.
 
-mod icarus;
-mod scenario;
+use crate::icarus;
+use crate::scenario;
 
 use guided_dtof::engine::{GateSimulation, StimulusPlan, export_verilog};
 use icarus::Seen;

@@ -2,8 +2,8 @@
 //! a warning, cells do what those of our kernel do, Verilator and Yosys read it all. A tool that is absent is skipped,
 //! loudly.
 
-mod icarus;
-mod scenario;
+use crate::icarus;
+use crate::scenario;
 
 use std::fmt::Write as _;
 use std::fs;

@@ -2,12 +2,8 @@
 //! handled, not of the number of threads, not of the build. `vectors/traces/hashes.csv` holds the hashes of
 //! random circuits; every build must find the same ones.
 
-#[allow(dead_code)]
-mod every_edge {
-    pub mod circuit;
-    mod placement;
-}
-mod scenario;
+use crate::every_edge;
+use crate::scenario;
 
 use std::fmt::Write as _;
 use std::path::Path;

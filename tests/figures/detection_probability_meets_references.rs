@@ -35,7 +35,7 @@ fn relative(got: f64, want: f64) -> f64 {
 #[test]
 fn exact_sums_agree_to_one_in_a_million_million() {
     let mut worst = 0.0f64;
-    for row in rows(include_str!("../vectors/theory/detection.csv")) {
+    for row in rows(include_str!("../../vectors/theory/detection.csv")) {
         let (signal, background) = (number(row[2]), number(row[3]));
         let (bins, ties) = (row[4].parse().unwrap(), ties(row[5]));
         let got = match row[0] {
@@ -65,7 +65,7 @@ fn exact_sums_agree_to_one_in_a_million_million() {
 
 #[test]
 fn gaussian_sums_agree_to_one_in_a_million_million() {
-    for row in rows(include_str!("../vectors/theory/gaussian.csv")) {
+    for row in rows(include_str!("../../vectors/theory/gaussian.csv")) {
         let light = PerCycle {
             signal: number(row[1]),
             background: number(row[2]),

@@ -1,9 +1,9 @@
 //! Fast engines that keep time count what the gates count with the same delays: random sensors, clocks near and far from
 //! their limits, STOP phases, corners, conditions, mismatch, start values and pulses.
 //!
-//! `GDTOF_CASES=1500 cargo test --release --test timed_agrees_with_gate -- --nocapture` runs thousands of macropixels.
+//! `GDTOF_CASES=1500 cargo test --release --test engines timed_agrees_with_gate -- --nocapture` runs thousands of macropixels.
 
-mod scenario;
+use crate::scenario;
 
 use std::collections::BTreeMap;
 

@@ -10,7 +10,7 @@ use guided_dtof::theory::{MeasuredPulse, Pulse};
 
 #[test]
 fn cramer_rao_agrees_to_one_in_a_million_million() {
-    for row in include_str!("../vectors/theory/precision.csv")
+    for row in include_str!("../../vectors/theory/precision.csv")
         .lines()
         .skip(1)
     {

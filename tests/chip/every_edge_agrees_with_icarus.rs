@@ -17,17 +17,13 @@
 //! exported cells wait with `#0` until all of them have happened, which it does define; so no case
 //! is discarded. What remains outside are delays of zero: the library has none, and none are drawn.
 //!
-//! `GDTOF_CASES=10000 cargo test --test every_edge_agrees_with_icarus -- --nocapture` runs more
+//! `GDTOF_CASES=10000 cargo test --test chip every_edge_agrees_with_icarus -- --nocapture` runs more
 //! random circuits than the usual 500 and shows how much was compared.
 
-mod icarus;
-mod scenario;
+use crate::icarus;
+use crate::scenario;
 
-mod every_edge {
-    pub mod circuit;
-    mod placement;
-    pub mod waves;
-}
+use crate::every_edge;
 
 use std::cell::Cell;
 use std::fmt::Write as _;

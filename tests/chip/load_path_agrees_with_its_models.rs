@@ -1,6 +1,6 @@
 //! Deserialiser and row scanner, alone and with memories, do what the plain-Rust models beside them say.
 
-mod bench;
+use crate::bench;
 
 use bench::{Bench, SETTLING, corners};
 use guided_dtof::chip::{load_path, probes};

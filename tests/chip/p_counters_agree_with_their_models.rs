@@ -1,7 +1,7 @@
 //! Every variant of the P-counter, elaborated alone and driven at random, counts as its plain-Rust model does and
 //! raises LOCAL_STOP at the femtosecond that static timing says.
 
-mod bench;
+use crate::bench;
 
 use bench::{Bench, SETTLING, corners};
 use guided_dtof::chip::p_counter::{self, starts_high};

@@ -2,7 +2,7 @@
 //! times to the femtosecond and the same histograms as our kernel, whether we annotate the file onto our cells or Icarus
 //! onto the standard ones. Skipped, loudly, where Icarus is absent.
 
-mod icarus;
+use crate::icarus;
 
 use std::collections::HashSet;
 

@@ -1,12 +1,8 @@
 //! 64 macropixels in one lane-parallel simulation: every value change of every net of every lane comes at the
 //! time, and with the value, that it has when the macropixel is simulated alone.
 
-#[allow(dead_code)]
-mod every_edge {
-    pub mod circuit;
-    mod placement;
-}
-mod scenario;
+use crate::every_edge;
+use crate::scenario;
 
 use std::collections::BTreeMap;
 

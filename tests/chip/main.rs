@@ -1,0 +1,31 @@
+//! The chip and its kernel: blocks, timing, waveforms, other simulators.
+
+mod bench;
+mod every_edge {
+    pub mod circuit;
+    mod placement;
+    pub mod waves;
+}
+mod icarus;
+#[path = "../shared/scenario.rs"]
+mod scenario;
+
+mod annotated_delays_agree_with_icarus;
+mod blocks_agree_with_their_models;
+mod clock_period_limits;
+mod every_edge_agrees_with_icarus;
+mod gate_level_agrees_with_reference;
+mod icarus_agrees_with_the_kernel;
+mod lanes_agree_with_single_pixels;
+mod load_path_agrees_with_its_models;
+mod loading_and_stop_edges_are_safe;
+mod p_counter_traps;
+mod p_counters_agree_with_their_models;
+mod serial_load_reaches_every_macropixel;
+mod standard_cells_serve_other_tools;
+mod static_timing_bounds_the_kernel;
+mod testbenches_pass;
+mod the_sensor_keeps_its_timing_checks;
+mod timing_checks_find_violations;
+mod traces_are_deterministic;
+mod waves_read_back;

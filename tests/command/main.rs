@@ -1,0 +1,12 @@
+//! The `gdtof` command as its users meet it.
+
+mod command_line_refuses_bad_input;
+mod delay_files_replay;
+mod engines_are_chosen_from_the_command_line;
+mod golden_vectors_hold;
+mod mismatch_replays;
+mod probes_keep_their_first_hits;
+mod real_histograms_are_ranged;
+#[cfg(unix)]
+mod results_are_one_set;
+mod run_time_against_error;

@@ -1,0 +1,5 @@
+//! Formulas against references of many digits, and the published figures.
+
+mod detection_probability_meets_references;
+mod precision_meets_references;
+mod published_figures_are_met;
