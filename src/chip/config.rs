@@ -8,7 +8,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::config_keys::{KEYS, SECTION};
-use super::front_end::PulseLimits;
+use super::timing::ChipTiming;
 use crate::files::{InputError, read_text};
 use crate::netlist::Corner;
 use crate::settings::{Document, Fault, Key, commented};
@@ -41,7 +41,7 @@ impl EventType {
 }
 
 /// What a full histogram bin does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Overflow {
     /// Stays full.
@@ -63,7 +63,7 @@ pub enum Mode {
 /// How the P-counter is built (thesis 4.4). All have the same pins. All but the last open the same time windows where the
 /// counter holds after LOCAL_STOP. Where it wraps, LOCAL_STOP comes again after 2ⁿ⁺¹ counts of a counter of n bits with
 /// its borrow, and after 2ⁿ of one without: of the comparator, and of all with the tap `msb`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PCounter {
     /// Ripple down counter of reset-only flip-flops, Q or Q̄ chosen by the memory bit (Fig. 51c, 53).
@@ -101,7 +101,7 @@ impl PCounter {
 }
 
 /// Where the P-counter's LOCAL_STOP comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Tap {
     /// One stage more than is programmed: it rises when the counter rolls over past zero.
@@ -112,7 +112,7 @@ pub enum Tap {
 }
 
 /// What the P-counter does once LOCAL_STOP has risen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum AfterBorrow {
     /// Waits for the next reset: LOCAL_STOP blocks COUNTER_CLK.
@@ -262,7 +262,7 @@ impl SensorConfig {
             let key = "p_counter";
             return Err((key, message.to_owned()));
         }
-        if let Some(message) = PulseLimits::of(self.corner).complaint(self.dead_time_ns) {
+        if let Some(message) = ChipTiming::of(self).pulses.complaint(self.dead_time_ns) {
             return Err(("dead_time_ns", message));
         }
         let half_period_ps = 0.5e12 / self.clk_hz;

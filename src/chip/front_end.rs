@@ -20,8 +20,7 @@
 use std::sync::Arc;
 
 use super::{SPADS, finished};
-use crate::logic::Logic::{One, Zero};
-use crate::netlist::{CellKind, CheckKind, Corner, Library, Module, ModuleBuilder, Net};
+use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 use crate::units::Time;
 
 /// What the toggle flip-flops ask of SPAD_RAW. What lies between the end of one pulse and the next one is chance, and left
@@ -35,17 +34,6 @@ pub struct PulseLimits {
 }
 
 impl PulseLimits {
-    /// Those of the cell library in one corner.
-    pub fn of(corner: Corner) -> Self {
-        let library = Library::default();
-        let limit = |check| Time::from_fs(library.checks(CellKind::Dffr).at(check, corner).into());
-        let clock_to_q = |to| library.delay(CellKind::Dffr, 1, to, corner);
-        PulseLimits {
-            width: limit(CheckKind::ClockHigh),
-            apart: clock_to_q(One).max(clock_to_q(Zero)) + limit(CheckKind::Setup),
-        }
-    }
-
     /// The shortest dead time that keeps both.
     pub fn shortest(&self) -> Time {
         self.width.max(self.apart)

@@ -36,6 +36,7 @@ pub use exposure::Exposure;
 pub use probes::{LoadPins, LoadProbe, Probe, Probes, SensorPins};
 pub use race::{Cure, Race};
 pub use timing::ChipTiming;
+pub use timing::silicon::{Limits, Silicon};
 pub use window_law::{Window, WindowLaw};
 
 /// SPADs of one macropixel, 4×4 (thesis 4.2).

@@ -12,7 +12,7 @@
 //! blocks (a P-counter on a test bench) has only some of the probes; asking for another is a bug of ours, and panics.
 
 use super::{SPADS, histogram, load_path, sensor};
-use crate::netlist::{NetId, Netlist};
+use crate::netlist::{CellKind, NetId, Netlist};
 
 /// A net or bus of a macropixel that something outside the circuits looks at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -286,6 +286,19 @@ impl Probes {
     /// Dotted path of the P-counter.
     pub fn p_counter(&self) -> String {
         join([&self.path, P_COUNTER])
+    }
+
+    /// The inverse of ENABLE, which resets the P-counter and keeps CLK from it.
+    ///
+    /// # Panics
+    /// When the circuit has no P-counter timing block.
+    pub fn disabled(&self, netlist: &Netlist) -> NetId {
+        let enable = self.net(Probe::Enable);
+        let mut cells = self
+            .timing_block_cells(netlist)
+            .map(|c| &netlist.cells()[c]);
+        let inverter = cells.find(|cell| cell.kind == CellKind::Inv && cell.inputs[0] == enable);
+        inverter.expect("ENABLE has an inverter").outputs[0]
     }
 
     /// What makes COUNTER_RESET besides the pulse at STOP: reset and ENABLE.

@@ -30,7 +30,7 @@ pub fn pixel_name(row: usize, col: usize) -> String {
 /// Ports: CLK, STOP, RESETB, ENABLE, HISTOGRAM_CLEAR, CONVENTIONAL, TYPE\<2\>, THRESHOLD\<5\>, LOAD_CLK,
 /// LOAD_ENABLE, COUNTER_INITS, SPAD_RAW\<rows × cols × 16\> (row-major).
 pub fn circuit(config: &SensorConfig) -> Arc<Module> {
-    window(config, (0, 0), (config.rows, config.cols))
+    subarray(config, (0, 0), (config.rows, config.cols))
 }
 
 /// A rectangle of the sensor, as a chip of its own: `size` (rows, cols) macropixels from `first`
@@ -38,7 +38,7 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
 ///
 /// # Panics
 /// When the rectangle is empty.
-pub fn window(
+pub fn subarray(
     config: &SensorConfig,
     first: (usize, usize),
     (rows, cols): (usize, usize),

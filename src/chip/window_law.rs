@@ -18,7 +18,7 @@
 //! the first falling edge that ENABLE lets through. One that wraps may raise LOCAL_STOP again in the same laser
 //! cycle, where HIT still holds what it latched before: no single window describes that, and the law says so.
 //!
-//! [`ChipTiming`] adds up the cell delays on the paths concerned; tests hold both against the netlist.
+//! [`ChipTiming`] has the delays of the paths concerned, measured on the netlist; tests hold the law against it.
 
 use std::ops::Range;
 

@@ -10,9 +10,9 @@ use rayon::prelude::*;
 use super::sdf::annotated_timing;
 use super::silicon::SiliconArgs;
 use super::{SensorArgs, say};
-use crate::chip::{Exposure, SensorConfig, WindowLaw};
+use crate::chip::{Exposure, SensorConfig, Silicon, WindowLaw};
 use crate::engine::recording::{Recording, check_exposure, read_events, read_starts};
-use crate::engine::timing::{Silicon, TimingVerdict, VerdictReport};
+use crate::engine::timing::{TimingVerdict, VerdictReport};
 use crate::engine::waveform::{self, View};
 use crate::engine::{
     Cancelling, EngineError, GateSimulation, HardwareEventKind, HardwareEventReport, Runner,

@@ -7,12 +7,12 @@ use clap::{Args, ValueEnum};
 use indicatif::{DecimalBytes, ProgressBar, ProgressStyle};
 
 use super::{SensorArgs, say};
-use crate::chip::{SensorConfig, sensor};
+use crate::chip::{SensorConfig, Silicon, sensor};
 use crate::files::{InputError, OutputFile, read_text};
 use crate::netlist::sdf::{
     Sdf, SdfDivider, SdfOptions, SdfTimescale, Skipped, annotate, write_sdf,
 };
-use crate::netlist::{Corner, Library, Netlist, Timing};
+use crate::netlist::{Corner, Netlist, Timing};
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Divider {
@@ -96,8 +96,8 @@ fn write_library(
     options: SdfOptions,
 ) -> std::io::Result<usize> {
     let netlist = Netlist::elaborate(&sensor::circuit(config));
-    let library = Library::default();
-    let [min, typ, max] = Corner::ALL.map(|c| Timing::nominal(&netlist, &library, c));
+    let library = Silicon::library();
+    let [min, typ, max] = Corner::ALL.map(|c| Timing::nominal(&netlist, library, c));
     write_sdf(out, &netlist, [&min, &typ, &max], options)?;
     Ok(netlist.cells().len())
 }
@@ -126,7 +126,7 @@ pub fn annotated_timing(
 ) -> Result<Timing, InputError> {
     let text = read_text(path)?;
     let sdf = Sdf::parse(&path.display().to_string(), &text)?;
-    let mut timing = Timing::nominal(netlist, &Library::default(), config.corner);
+    let mut timing = Silicon::of(config).timing(netlist);
     let result = annotate(&mut timing, netlist, &sdf, config.corner)?;
     let at = |skipped: &Skipped| {
         format!(

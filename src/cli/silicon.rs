@@ -7,7 +7,7 @@
 
 use clap::Args;
 
-use crate::engine::timing::Silicon;
+use crate::chip::Silicon;
 use crate::files::InputError;
 use crate::netlist::{Conditions, Corner, Mismatch};
 

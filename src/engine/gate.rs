@@ -6,12 +6,12 @@ use super::hardware_events::HardwareEvents;
 use super::lanes::LaneSimulation;
 use super::stimulus::{Schedule, StimulusPlan};
 use super::{Engine, EngineError, follows};
-use crate::chip::front_end::PulseLimits;
 use crate::chip::{
-    Exposure, Probe, Probes, SensorConfig, SensorPins, WindowLaw, front_end, sensor,
+    ChipTiming, Exposure, Probe, Probes, SensorConfig, SensorPins, Silicon, WindowLaw, front_end,
+    sensor,
 };
 use crate::kernel::{Kernel, LANES, Observer, Policy, Statistics, TimingChecks};
-use crate::netlist::{Library, NetId, Netlist, Timing};
+use crate::netlist::{NetId, Netlist, Timing};
 use crate::photon::SpadEvent;
 
 /// A rectangle of the sensor at gate level, loaded and exposed through its pins.
@@ -36,8 +36,8 @@ impl<'a> GateSimulation<'a> {
         starts: &[u16],
         pulses: &[&[SpadEvent]],
     ) -> Self {
-        let netlist = Arc::new(Netlist::elaborate(&sensor::window(config, first, size)));
-        let timing = Timing::nominal(&netlist, &Library::default(), config.corner);
+        let netlist = Arc::new(Netlist::elaborate(&sensor::subarray(config, first, size)));
+        let timing = Silicon::of(config).timing(&netlist);
         let kernel = Kernel::new(&netlist, &timing);
         let rectangle = (0..size.0).flat_map(|row| (0..size.1).map(move |col| (row, col)));
         let probes = rectangle
@@ -81,7 +81,7 @@ impl<'a> GateSimulation<'a> {
     /// Timing checks of this netlist in the sensor's corner, from the end of the power-up reset on, to run it with. The
     /// front ends' first samplers count as asynchronous.
     pub fn timing_checks(&self, policy: Policy) -> TimingChecks {
-        TimingChecks::new(&self.netlist, &Library::default(), self.config.corner)
+        TimingChecks::new(&self.netlist, Silicon::library(), self.config.corner)
             .limits(&self.netlist, &self.timing)
             .policy(policy)
             .not_before(self.schedule().reset_end)
@@ -154,12 +154,12 @@ impl<'a> Gate<'a> {
 
     /// The netlist of each macropixel with its load path.
     pub fn netlist(&self) -> Netlist {
-        Netlist::elaborate(&sensor::window(self.config, (0, 0), (1, 1)))
+        Netlist::elaborate(&sensor::subarray(self.config, (0, 0), (1, 1)))
     }
 
     /// The library's delays of that netlist in the sensor's corner.
     pub fn nominal_timing(&self) -> Timing {
-        Timing::nominal(&self.netlist(), &Library::default(), self.config.corner)
+        Silicon::of(self.config).timing(&self.netlist())
     }
 
     /// Histograms of macropixels with delays of their own, such as the mismatch of each. Neighbours in the list
@@ -178,7 +178,7 @@ impl<'a> Gate<'a> {
         pulses: &[&[SpadEvent]],
     ) -> Result<Vec<Vec<u16>>, EngineError> {
         assert!(timings.len() == starts.len() && starts.len() == pulses.len());
-        follows(self.config, &PulseLimits::of(self.config.corner))?;
+        follows(self.config, &ChipTiming::of(self.config).pulses)?;
         let mut histograms = Vec::with_capacity(starts.len());
         for alike in timings.chunk_by(|a, b| std::ptr::eq(*a, *b)) {
             let (from, to) = (histograms.len(), histograms.len() + alike.len());

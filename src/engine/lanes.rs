@@ -7,9 +7,11 @@ use bitvec::vec::BitVec;
 
 use super::EngineError;
 use super::stimulus::{Schedule, StimulusPlan};
-use crate::chip::{Exposure, Probe, Probes, SPADS, SensorConfig, SensorPins, load_path, sensor};
+use crate::chip::{
+    Exposure, Probe, Probes, SPADS, SensorConfig, SensorPins, Silicon, load_path, sensor,
+};
 use crate::kernel::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
-use crate::netlist::{Library, NetId, Netlist, Timing};
+use crate::netlist::{NetId, Netlist, Timing};
 use crate::photon::SpadEvent;
 use crate::units::Time;
 
@@ -36,8 +38,8 @@ impl<'a> LaneSimulation<'a> {
         pulses: &[&[SpadEvent]],
     ) -> Self {
         assert!(starts.len() <= LANES && starts.len() == pulses.len());
-        let netlist = Netlist::elaborate(&sensor::window(config, (0, 0), (1, 1)));
-        let timing = Timing::nominal(&netlist, &Library::default(), config.corner);
+        let netlist = Netlist::elaborate(&sensor::subarray(config, (0, 0), (1, 1)));
+        let timing = Silicon::of(config).timing(&netlist);
         let kernel = LaneKernel::new(&netlist, &timing);
         let end = exposure.end();
         let mut all: Vec<(usize, SpadEvent)> = pulses

@@ -1,9 +1,9 @@
 //! Loads a whole array at gate level: serial bits into the netlist of deserialiser, row scanner and memories.
 
 use super::stimulus::load_stimulus;
-use crate::chip::{LoadPins, SensorConfig, load_path, probes};
+use crate::chip::{LoadPins, SensorConfig, Silicon, load_path, probes};
 use crate::kernel::{Kernel, Observer, Statistics};
-use crate::netlist::{Library, Netlist, Timing};
+use crate::netlist::Netlist;
 use crate::units::Time;
 
 /// What the load path did with a set of start values.
@@ -28,7 +28,7 @@ pub fn load<O: Observer>(
     debug_assert_eq!(starts.len(), config.pixels());
     let stream = load_path::stream(starts, config.cols, config.counter_bits);
     let (end, mut stimulus) = load_stimulus(LoadPins::of(netlist), config.load_clock(), &stream);
-    let timing = Timing::nominal(netlist, &Library::default(), config.corner);
+    let timing = Silicon::of(config).timing(netlist);
     let mut kernel = Kernel::new(netlist, &timing);
     let settled = end + config.load_clock().periods(1);
     kernel.run(&mut stimulus, settled, observer);

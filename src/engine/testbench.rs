@@ -17,10 +17,10 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use super::stimulus::StimulusPlan;
-use crate::chip::{SensorConfig, SensorPins, probes, sensor};
+use crate::chip::{SensorConfig, SensorPins, Silicon, probes, sensor};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::netlist::{
-    Corner, Direction, Library, Module, Netlist, Timing, write_cells, write_delays, write_modules,
+    Corner, Direction, Module, Netlist, Timing, write_cells, write_delays, write_modules,
     write_parametric_cells, write_standard_cells,
 };
 
@@ -29,8 +29,8 @@ use crate::netlist::{
 /// # Errors
 /// When the folder or a file in it cannot be written.
 pub fn export_netlist(folder: &Path, config: &SensorConfig) -> Result<(), InputError> {
-    let (library, corner) = (Library::default(), config.corner);
-    write_netlist(folder, config, &|out| write_cells(out, &library, corner))
+    let (library, corner) = (Silicon::library(), config.corner);
+    write_netlist(folder, config, &|out| write_cells(out, library, corner))
 }
 
 /// As [`export_netlist`], with stimulus and testbench.
@@ -57,12 +57,12 @@ pub fn export_annotated_verilog(
     plan: &StimulusPlan<'_>,
     timing: &Timing,
 ) -> Result<(), InputError> {
-    let (library, corner) = (Library::default(), config.corner);
+    let (library, corner) = (Silicon::library(), config.corner);
     write_netlist(folder, config, &|out| {
-        write_parametric_cells(out, &library, corner)
+        write_parametric_cells(out, library, corner)
     })?;
     let netlist = Netlist::elaborate(&sensor::circuit(config));
-    let nominal = Timing::nominal(&netlist, &library, corner);
+    let nominal = Timing::nominal(&netlist, library, corner);
     OutputFile::write_with(&folder.join("delays.v"), |out| {
         write_delays(out, "dut", &netlist, timing, &nominal)
     })?;
@@ -78,7 +78,7 @@ fn write_netlist(
     let file = |name: &str| folder.join(name);
     OutputFile::write_with(&file("cells.v"), exact_cells)?;
     OutputFile::write_with(&file("cells_specify.v"), |out| {
-        write_standard_cells(out, &Library::default())
+        write_standard_cells(out, Silicon::library())
     })?;
     OutputFile::write_with(&file("design.v"), |out| {
         write_modules(out, &sensor::circuit(config))

@@ -101,9 +101,20 @@ impl<'n> Requirements<'n> {
         corner: Corner,
     ) -> Result<Self, TimingLoop> {
         let after = |edge| analysis.arrivals(&[(clock, edge)], barriers);
+        let arrivals = [after(Edge::Rise)?, after(Edge::Fall)?];
+        Ok(Self::behind(netlist, arrivals, library, corner))
+    }
+
+    /// The same for known `arrivals` after the clock's rise and after its fall.
+    pub fn behind(
+        netlist: &'n Netlist,
+        arrivals: [Arrivals<'n>; 2],
+        library: &Library,
+        corner: Corner,
+    ) -> Self {
         let mut found = Requirements {
             netlist,
-            arrivals: [after(Edge::Rise)?, after(Edge::Fall)?],
+            arrivals,
             all: Vec::new(),
         };
         for (cell, leaf) in netlist.cells().iter().enumerate() {
@@ -111,7 +122,7 @@ impl<'n> Requirements<'n> {
                 found.add(cell, leaf.kind, library, corner);
             }
         }
-        Ok(found)
+        found
     }
 
     fn add(&mut self, cell: usize, kind: CellKind, library: &Library, corner: Corner) {

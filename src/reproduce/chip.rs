@@ -2,11 +2,10 @@
 
 use super::claim::{Published::*, Row};
 use crate::chip::{
-    Exposure, PCounter, Probe, SensorConfig, load_path, p_counter, p_counter_timing,
+    Exposure, Limits, PCounter, Probe, SensorConfig, Silicon, load_path, p_counter,
+    p_counter_timing,
 };
-use crate::engine::timing::{
-    Limits, MacropixelTiming, Silicon, gate_works, phases, ripple, shortest_period,
-};
+use crate::engine::timing::{MacropixelTiming, gate_works, phases, ripple, shortest_period};
 use crate::engine::{GateSimulation, load};
 use crate::kernel::Recorder;
 use crate::netlist::{CellKind, Corner};

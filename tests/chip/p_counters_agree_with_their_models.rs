@@ -5,7 +5,7 @@ use crate::bench;
 
 use bench::{Bench, SETTLING, corners};
 use guided_dtof::chip::p_counter::{self, starts_high};
-use guided_dtof::chip::{AfterBorrow, PCounter, Probe, Probes, SensorConfig, Tap};
+use guided_dtof::chip::{AfterBorrow, ChipTiming, PCounter, Probe, Probes, SensorConfig, Tap};
 use guided_dtof::logic::Logic::One;
 use guided_dtof::netlist::{CellKind, Corner};
 use guided_dtof::units::Time;
@@ -185,7 +185,7 @@ fn the_ripple_is_the_sum_of_its_stages() {
                     corner,
                     ..SensorConfig::default()
                 };
-                let timing = p_counter::CounterTiming::of(&config, &library);
+                let timing = ChipTiming::of(&config).counter;
                 assert_eq!(timing.clk_to_local_stop, expected, "{p_counter:?} {tap:?}");
             }
         }

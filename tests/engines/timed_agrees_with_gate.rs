@@ -7,8 +7,9 @@ use crate::scenario;
 
 use std::collections::BTreeMap;
 
-use guided_dtof::chip::{AfterBorrow, ChipTiming, Mode, PCounter, SensorConfig, Tap, sensor};
-use guided_dtof::engine::timing::Silicon;
+use guided_dtof::chip::{
+    AfterBorrow, ChipTiming, Mode, PCounter, SensorConfig, Silicon, Tap, sensor,
+};
 use guided_dtof::engine::{Gate, Runner, Timed};
 use guided_dtof::netlist::{Corner, Mismatch, Netlist, Timing};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
@@ -98,7 +99,7 @@ fn compare(seed: u64, scenario: &Scenario, silicon: &Silicon) -> Tally {
     let pulses = scenario.pulses();
     let timing = |pixel: usize| {
         let position = (pixel / config.cols, pixel % config.cols);
-        silicon.timing(&Netlist::elaborate(&sensor::window(
+        silicon.timing(&Netlist::elaborate(&sensor::subarray(
             config,
             position,
             (1, 1),

@@ -32,11 +32,7 @@ use std::sync::Arc;
 
 use super::config::{AfterBorrow, PCounter, SensorConfig, Tap};
 use super::finished;
-use crate::netlist::{
-    CellKind, CheckKind, Edge, Library, Module, ModuleBuilder, Net, NetId, Netlist, StaticTiming,
-    Timing,
-};
-use crate::units::Time;
+use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
 /// The P-counter of a sensor.
 ///
@@ -276,89 +272,6 @@ impl Rises {
 /// Whether LOCAL_STOP is high already when the counter holds its start value.
 pub fn starts_high(config: &SensorConfig, start: u16) -> bool {
     config.tap == Tap::Msb && start >> (config.counter_bits - 1) & 1 == 1
-}
-
-/// Delays and limits of a P-counter, from its netlist by static timing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct CounterTiming {
-    /// COUNTER_CLK rising → LOCAL_STOP rising.
-    pub clk_to_local_stop: Time,
-    /// COUNTER_RESET rising → LOCAL_STOP rising, where a start value can make it.
-    pub reset_to_local_stop: Option<Time>,
-    /// COUNTER_RESET falling → the last flip-flop that COUNTER_CLK clocks is released.
-    pub release: Time,
-    /// COUNTER_RESET rising → the first count may come: everything it samples has settled, setup included.
-    pub settle: Time,
-    /// One count → the next may come: longest path and setup.
-    pub period: Time,
-    /// Longest recovery time among the flip-flops that COUNTER_CLK clocks.
-    pub recovery: Time,
-    /// Longest removal time among them.
-    pub removal: Time,
-    /// Their longest minimum high pulse of COUNTER_CLK.
-    pub clock_high: Time,
-}
-
-impl CounterTiming {
-    /// Analyses the P-counter of a sensor in the sensor's corner.
-    pub fn of(config: &SensorConfig, library: &Library) -> Self {
-        let netlist = Netlist::elaborate(&circuit(config));
-        let timing = Timing::nominal(&netlist, library, config.corner);
-        Self::analyse(config, library, &netlist, &timing)
-    }
-
-    /// The same for given delays of `netlist`, which must be that of [`circuit`].
-    pub fn analyse(
-        config: &SensorConfig,
-        library: &Library,
-        netlist: &Netlist,
-        timing: &Timing,
-    ) -> Self {
-        let analysis = StaticTiming::new(netlist, timing);
-        let pin = |name| netlist.net(name).expect("a pin of the P-counter");
-        let (clk, reset, local_stop) =
-            (pin("COUNTER_CLK"), pin("COUNTER_RESET"), pin("LOCAL_STOP"));
-        let flip_flops = || netlist.cells().iter().filter(|c| c.kind.is_flip_flop());
-        // A reset goes no further than each stage: the next one is held, too.
-        let stage_clocks: Vec<NetId> = flip_flops().map(|c| c.inputs[1]).collect();
-        let after = |net, edge, barriers: &[NetId]| {
-            let barriers: Vec<NetId> = barriers.iter().copied().filter(|&b| b != net).collect();
-            let arrivals = analysis.arrivals(&[(net, edge)], &barriers);
-            arrivals.expect("a P-counter has no loop")
-        };
-        let counts = after(clk, Edge::Rise, &[]);
-        let resets = after(reset, Edge::Rise, &stage_clocks);
-        let releases = after(reset, Edge::Fall, &stage_clocks);
-        let limit =
-            |kind, check| Time::from_fs(i64::from(library.checks(kind).at(check, config.corner)));
-        let mut of = CounterTiming {
-            clk_to_local_stop: counts
-                .edge_window(local_stop, Edge::Rise)
-                .expect("every P-counter raises LOCAL_STOP")
-                .1,
-            reset_to_local_stop: resets.edge_window(local_stop, Edge::Rise).map(|w| w.1),
-            release: Time::ZERO,
-            settle: Time::ZERO,
-            period: Time::ZERO,
-            recovery: Time::ZERO,
-            removal: Time::ZERO,
-            clock_high: Time::ZERO,
-        };
-        for cell in flip_flops().filter(|c| c.inputs[1] == clk) {
-            let setup = limit(cell.kind, CheckKind::Setup);
-            let settled = |window: Option<(Time, Time)>| window.map_or(Time::ZERO, |w| w.1 + setup);
-            of.period = of.period.max(settled(counts.window(cell.inputs[0])));
-            of.settle = of.settle.max(settled(resets.window(cell.inputs[0])));
-            for &control in &cell.inputs[2..cell.kind.inputs().len()] {
-                let released = releases.edge_window(control, Edge::Fall);
-                of.release = of.release.max(released.map_or(Time::ZERO, |w| w.1));
-            }
-            of.recovery = of.recovery.max(limit(cell.kind, CheckKind::Recovery));
-            of.removal = of.removal.max(limit(cell.kind, CheckKind::Removal));
-            of.clock_high = of.clock_high.max(limit(cell.kind, CheckKind::ClockHigh));
-        }
-        of
-    }
 }
 
 #[cfg(test)]

@@ -6,8 +6,8 @@ use std::path::Path;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::section::{Cell, Section};
-use crate::chip::SensorConfig;
-use crate::engine::timing::{Silicon, Spread, spread};
+use crate::chip::{SensorConfig, Silicon};
+use crate::engine::timing::{Spread, spread};
 use crate::files::InputError;
 use crate::report::{Axis, Chart, Style};
 

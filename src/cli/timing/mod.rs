@@ -13,7 +13,8 @@ use self::section::{Cell, Section};
 use self::tables::Subject;
 use super::silicon::SiliconArgs;
 use super::{SensorArgs, say};
-use crate::engine::timing::{Limits, LoadTiming, Silicon, TimingVerdict};
+use crate::chip::{Limits, Silicon};
+use crate::engine::timing::{LoadTiming, TimingVerdict};
 use crate::files::InputError;
 
 /// Arguments of `gdtof timing`.

@@ -33,7 +33,7 @@ use super::stream::StreamTape;
 use super::survey::{Class, Survey, output};
 use super::tape::{Action, Code, PassTape, SINK, ZERO};
 use super::word::inversion;
-use crate::chip::{Exposure, SensorConfig};
+use crate::chip::{Exposure, SensorConfig, Silicon};
 use crate::netlist::{CellKind, DataLimit, Edge, FlatCell, Library, NetId, caused};
 use crate::units::Time;
 use arrivals::Reach;
@@ -94,7 +94,7 @@ struct Arc {
 
 struct Leveliser<'s> {
     survey: &'s Survey,
-    cell_library: Library,
+    cell_library: &'static Library,
     config: &'s SensorConfig,
     period_fs: i64,
     /// No cell is faster.
@@ -125,7 +125,7 @@ impl Levelised {
     ) -> Result<Self, Unlevelled> {
         let mut leveliser = Leveliser {
             survey,
-            cell_library: Library::default(),
+            cell_library: Silicon::library(),
             config,
             period_fs: exposure.clock.period().as_fs(),
             fastest_fs: fastest_cell_fs(survey),

@@ -17,11 +17,11 @@
 use std::collections::HashMap;
 
 use super::Unlevelled;
-use crate::chip::{Exposure, Probes, SensorConfig, SensorPins, sensor};
+use crate::chip::{Exposure, Probes, SensorConfig, SensorPins, Silicon, sensor};
 use crate::engine::{GateSimulation, LaneSimulation};
 use crate::kernel::{LANES, Recorder};
 use crate::logic::Logic;
-use crate::netlist::{CellKind, FlatCell, Library, MAX_INPUTS, NetId, Netlist, Timing};
+use crate::netlist::{CellKind, FlatCell, MAX_INPUTS, NetId, Netlist, Timing};
 use crate::units::Time;
 
 /// What a net depends on during an exposure.
@@ -73,8 +73,8 @@ pub struct Survey {
 impl Survey {
     /// Simulates power-up and load of every start value, and sorts the nets.
     pub fn new(config: &SensorConfig, exposure: &Exposure) -> Self {
-        let netlist = Netlist::elaborate(&sensor::window(config, (0, 0), (1, 1)));
-        let timing = Timing::nominal(&netlist, &Library::default(), config.corner);
+        let netlist = Netlist::elaborate(&sensor::subarray(config, (0, 0), (1, 1)));
+        let timing = Silicon::of(config).timing(&netlist);
         let bins = Probes::of_macropixel(&netlist, 0, 0).bins().to_vec();
         let pins = SensorPins::of(&netlist);
         let mut driver = vec![None; netlist.net_count()];

@@ -6,12 +6,11 @@
 //! ```
 //!
 //! The gate engine's flip-flops take what is there: a histogram depends on delays only through the order in which events
-//! arrive. Static timing of a macropixel's own netlist bounds every arrival ([`delays`]); where the bounds decide every
+//! arrive. Static timing of a macropixel's own netlist bounds every arrival ([`MacropixelDelays`]); where the bounds decide every
 //! order that counts ([`orders`]), [`WindowLaw`] with its own delays says which CLK edges its bins see, each by itself where
 //! they differ. Only macropixels with an order in doubt are simulated. Histograms are those of
 //! [`Gate::histograms_with`], bit for bit.
 
-mod delays;
 mod orders;
 
 use std::borrow::Cow;
@@ -20,14 +19,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 
 use super::stimulus::StimulusPlan;
-use super::timing::Silicon;
 use super::{Cancelling, Cycle, Engine, EngineError, Gate, LaneSimulation, Window};
-use crate::chip::{ChipTiming, Exposure, Mode, PCounter, SensorConfig, WindowLaw, sensor};
+use crate::chip::timing::macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays};
+use crate::chip::{ChipTiming, Exposure, Mode, PCounter, SensorConfig, Silicon, WindowLaw, sensor};
 use crate::kernel::LANES;
 use crate::netlist::Timing;
 use crate::photon::SpadEvent;
-use delays::Anatomy;
-use orders::{Doubt, Orders, Part, Setting};
+use orders::{Delays, Doubt, Orders, Part, Setting};
 
 /// What runs the macropixels whose orders are decided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,7 +58,9 @@ pub struct Timekept {
 pub struct Timed<'a> {
     setting: Setting<'a>,
     silicon: Silicon,
-    anatomy: Anatomy,
+    circuit: MacropixelCircuit,
+    /// Path of each cell before and, where the macropixel is in it, after its name.
+    paths: Vec<(String, Option<String>)>,
     /// Without mismatch all macropixels are alike.
     alike: Option<(Timing, Orders)>,
 }
@@ -75,7 +75,19 @@ enum Judged {
 impl<'a> Timed<'a> {
     /// An engine for this sensor and exposure; `silicon` says what its macropixels are made of.
     pub fn new(config: &'a SensorConfig, exposure: &'a Exposure, silicon: &Silicon) -> Self {
+        // Macropixels differ in the names of their cells only.
+        let circuit = MacropixelCircuit::new(config, (0, 0));
+        let name = circuit.probes.macropixel();
+        let paths = (0..circuit.netlist.cells().len()).map(|cell| {
+            let path = circuit.netlist.cell_path(cell);
+            match path.split_once(name) {
+                Some((before, after)) => (before.to_owned(), Some(after.to_owned())),
+                None => (path, None),
+            }
+        });
         let mut engine = Timed {
+            paths: paths.collect(),
+            circuit,
             setting: Setting {
                 config,
                 exposure,
@@ -83,11 +95,10 @@ impl<'a> Timed<'a> {
                 schedule: StimulusPlan::new(config, exposure, 1, &[0], &[&[]]).schedule(),
             },
             silicon: *silicon,
-            anatomy: Anatomy::new(config),
             alike: None,
         };
         if silicon.mismatch.is_none() {
-            let timing = silicon.timing(&engine.anatomy.netlist);
+            let timing = silicon.timing(&engine.circuit.netlist);
             let orders = engine.orders(&timing);
             engine.alike = Some((timing, orders));
         }
@@ -349,12 +360,23 @@ impl<'a> Timed<'a> {
         }
         let cols = self.setting.config.cols;
         let name = sensor::pixel_name(pixel / cols, pixel % cols);
-        let path = |cell| self.anatomy.cell_path(cell, &name);
-        Cow::Owned(self.silicon.timing_as(&self.anatomy.netlist, path))
+        let path = |cell: usize| match &self.paths[cell] {
+            (path, None) => path.clone(),
+            (before, Some(after)) => [before, name.as_str(), after].concat(),
+        };
+        Cow::Owned(self.silicon.timing_as(&self.circuit.netlist, path))
     }
 
     fn orders(&self, timing: &Timing) -> Orders {
-        Orders::new(&self.setting, &self.anatomy.delays(timing))
+        let paths = self.circuit.paths(timing);
+        let macropixel = MacropixelDelays::of(&paths);
+        let is_guided = self.setting.config.mode == Mode::Guided;
+        let counter = is_guided.then(|| CounterDelays::of(&paths, &macropixel));
+        let delays = Delays {
+            macropixel,
+            counter,
+        };
+        Orders::new(&self.setting, &delays)
     }
 
     fn orders_of(&self, timing: &Timing) -> Cow<'_, Orders> {

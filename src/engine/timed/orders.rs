@@ -12,8 +12,9 @@
 //! the arrival is uncertain: its *race* is then two spans that overlap. Orders that hold in any silicon scaled as a whole,
 //! but perhaps not in one whose cells differ, are asked for here. Whatever is not proven is in doubt.
 
-use super::delays::{CounterDelays, Delays, Span, hull, spread};
-use crate::chip::p_counter::{CounterTiming, Rises, starts_high};
+use crate::chip::p_counter::{Rises, starts_high};
+use crate::chip::timing::CounterTiming;
+use crate::chip::timing::macropixel::{CounterDelays, MacropixelDelays, Span, hull, spread};
 use crate::chip::window_law::{Window, WindowLaw};
 use crate::chip::{
     AfterBorrow, ChipTiming, Exposure, Mode, Overflow, PCounter, SPADS, SensorConfig,
@@ -41,6 +42,30 @@ pub struct Orders {
     counter_clk: Time,
     /// STOP rises → COUNTER_RESET rises, latest.
     reset: Time,
+}
+
+/// Delays of a macropixel in its mode.
+pub struct Delays {
+    /// Those of either mode.
+    pub macropixel: MacropixelDelays,
+    /// What the guided mode needs, too.
+    pub counter: Option<CounterDelays>,
+}
+
+impl Delays {
+    /// CLK falls (guided) or STOP rises (conventional) → STROBE rises.
+    fn strobe(&self) -> Span {
+        let counter = self.counter.as_ref();
+        counter.map_or(self.macropixel.stop_strobe, |counter| counter.strobe)
+    }
+
+    /// COUNTER_RESET falls (guided) or STOP rises (conventional) → HIT's reset ends.
+    fn hit_release(&self) -> Span {
+        let counter = self.counter.as_ref();
+        counter.map_or(self.macropixel.stop_hit_release, |counter| {
+            counter.hit_release
+        })
+    }
 }
 
 /// Bins that follow one law.
@@ -75,11 +100,11 @@ impl Orders {
         };
         Orders {
             law: WindowLaw::with_timing(setting.config, setting.exposure, timing),
-            shift: delays.shift.clone(),
-            latency: delays.latency.map(|(rise, _)| rise),
+            shift: delays.macropixel.shift.clone(),
+            latency: delays.macropixel.latency.map(|(rise, _)| rise),
             doubt: always(setting, delays),
             counter_clk: counter.map_or(Time::ZERO, |c| c.counter_clk.0),
-            reset: counter.map_or(Time::ZERO, |c| c.reset.1),
+            reset: delays.macropixel.reset.1,
         }
     }
 
@@ -94,9 +119,9 @@ impl Orders {
         }
         let (config, exposure) = (setting.config, setting.exposure);
         // Otherwise a LOCAL_STOP that starts high stays so, and the counter at rest.
-        let is_stirred =
+        let reset_can_raise_local_stop =
             config.after_borrow == AfterBorrow::Wrap || config.p_counter == PCounter::SetReset;
-        if config.mode == Mode::Guided && starts_high(config, start) && is_stirred {
+        if config.mode == Mode::Guided && starts_high(config, start) && reset_can_raise_local_stop {
             return Err("a reset raises LOCAL_STOP");
         }
         let whole = |first_edge| Part {
@@ -165,6 +190,8 @@ impl Orders {
 
 /// What the law asks for in either mode.
 fn common(setting: &Setting<'_>, delays: &Delays) -> ChipTiming {
+    let strobe = delays.strobe();
+    let delays = &delays.macropixel;
     let shift = delays.shift.iter().copied().reduce(hull);
     let shift = shift.expect("a sensor has bins");
     ChipTiming {
@@ -174,7 +201,7 @@ fn common(setting: &Setting<'_>, delays: &Delays) -> ChipTiming {
         // Until the bin has taken the hit: HIT, the gate of its clock, and one to spare.
         strobe_to_hit: delays.slowest * 3,
         // The law adds the rounding of clock edges.
-        setup: spread(delays.strobe),
+        setup: spread(strobe),
         hold: spread(shift),
         recovery: MARGIN,
         removal: MARGIN,
@@ -184,7 +211,7 @@ fn common(setting: &Setting<'_>, delays: &Delays) -> ChipTiming {
 
 fn conventional(setting: &Setting<'_>, delays: &Delays) -> ChipTiming {
     ChipTiming {
-        stop_to_strobe: delays.strobe.1,
+        stop_to_strobe: delays.strobe().1,
         ..common(setting, delays)
     }
 }
@@ -193,27 +220,28 @@ fn guided(setting: &Setting<'_>, delays: &Delays, counter: &CounterDelays) -> Ch
     let CounterDelays {
         counter_clk,
         local_stop,
-        reset,
-        release,
+        strobe,
+        hit_release,
         ..
     } = *counter;
+    let MacropixelDelays { reset, release, .. } = delays.macropixel;
     let jitter = spread(counter_clk);
     ChipTiming {
         clk_to_counter_clk: counter_clk.1,
         counter: CounterTiming {
             clk_to_local_stop: local_stop.1 - counter_clk.1,
             release: counter.released,
-            settle: counter.reset_settled,
-            period: counter.settled + MARGIN,
+            settle: counter.reset_settled.unwrap_or(Time::ZERO),
+            period: counter.settled - counter_clk.0 + MARGIN,
             recovery: jitter + MARGIN,
             removal: spread(release) + MARGIN,
             ..setting.nominal.counter
         },
-        local_stop_to_strobe: delays.strobe.1 - local_stop.1,
+        local_stop_to_strobe: strobe.1 - local_stop.1,
         stop_to_reset: reset.1 + jitter + MARGIN,
         stop_to_reset_release: release.1,
         stop_to_hit_reset: reset.0 + counter.hit_reset.0,
-        stop_to_hit_release: release.1 + delays.hit_release.1,
+        stop_to_hit_release: release.1 + hit_release.1,
         ..common(setting, delays)
     }
 }
@@ -221,6 +249,9 @@ fn guided(setting: &Setting<'_>, delays: &Delays, counter: &CounterDelays) -> Ch
 /// The first thing in doubt for every start value.
 fn always(setting: &Setting<'_>, delays: &Delays) -> Option<Doubt> {
     let (config, exposure, schedule) = (setting.config, setting.exposure, setting.schedule);
+    let (strobe, hit_release) = (delays.strobe(), delays.hit_release());
+    let counter = delays.counter.as_ref();
+    let delays = &delays.macropixel;
     let slowest = delays.slowest;
     let period = exposure.clock.period() - MARGIN;
     let half = Time::from_fs(period.as_fs() / 2);
@@ -247,7 +278,7 @@ fn always(setting: &Setting<'_>, delays: &Delays) -> Option<Doubt> {
             "a SPAD's pulses are shorter than its flip-flop's delay",
         ),
         (
-            settling < laser_cycle && delays.strobe.1 + settling < after_the_end,
+            settling < laser_cycle && strobe.1 + settling < after_the_end,
             "a bin has no time to count",
         ),
         (
@@ -258,11 +289,10 @@ fn always(setting: &Setting<'_>, delays: &Delays) -> Option<Doubt> {
         ),
     ];
     let unmet = |orders: &[(bool, Doubt)]| orders.iter().find(|(holds, _)| !holds).map(|o| o.1);
-    let by_mode = || match &delays.counter {
+    let by_mode = || match counter {
         // STOP stays high, and low, for a period at least.
         None => unmet(&[(
-            delays.hit_release.1 + MARGIN < delays.strobe.0
-                && delays.strobe.1 + slowest * 4 < period,
+            hit_release.1 + MARGIN < strobe.0 && strobe.1 + slowest * 4 < period,
             "HIT's reset meets the strobe",
         )]),
         Some(counter) => unmet(&counter_orders(config, delays, counter, period)),
@@ -273,18 +303,14 @@ fn always(setting: &Setting<'_>, delays: &Delays) -> Option<Doubt> {
 /// Orders within the P-counter and its timing block, from one STOP edge.
 fn counter_orders(
     config: &SensorConfig,
-    delays: &Delays,
+    delays: &MacropixelDelays,
     counter: &CounterDelays,
     period: Time,
 ) -> [(bool, Doubt); 6] {
-    let CounterDelays {
-        reset,
-        release,
-        clear,
-        ..
-    } = *counter;
+    let MacropixelDelays { reset, release, .. } = *delays;
+    let clear = counter.clear;
     // From a count to its strobe, at the least.
-    let to_strobe = delays.strobe.0 - counter.counter_clk.1;
+    let to_strobe = counter.strobe.0 - counter.counter_clk.1;
     let reset_width = release.0 - reset.1;
     let blocks_late = counter.block.is_some_and(|block| block >= period);
     [
@@ -293,7 +319,7 @@ fn counter_orders(
             "a P-counter without memory is left to the gates",
         ),
         (
-            counter.reset_edges + MARGIN < reset_width && release.1 < period,
+            counter.reset_edges() + MARGIN < reset_width && release.1 < period,
             "the reset pulse is too short",
         ),
         (
@@ -308,7 +334,7 @@ fn counter_orders(
             "LOCAL_STOP blocks the P-counter too late",
         ),
         (
-            delays.hit_release.1 + MARGIN < to_strobe,
+            counter.hit_release.1 + MARGIN < to_strobe,
             "the strobe meets the end of HIT's reset",
         ),
         (

@@ -3,8 +3,8 @@
 //! All delays and limits scale by one factor ([`Conditions::delay_factor`]), so the search is for the factor from
 //! which on the macropixel no longer works, and then for the conditions that have it.
 
-use super::{Aim, Limits, MacropixelTiming, Silicon};
-use crate::chip::SensorConfig;
+use super::{Aim, MacropixelTiming};
+use crate::chip::{Limits, SensorConfig, Silicon};
 use crate::netlist::{Conditions, Corner};
 use crate::units::Time;
 

@@ -15,8 +15,8 @@
 //! *rise* with THRESHOLD<1> = 0: then bit 1 alone is greater, before its agreement withdraws the lower bits'.
 
 use super::gates::{checks, simulation};
-use super::{Limits, Silicon, shortest_period};
-use crate::chip::{EventType, Exposure, Probe, SensorConfig};
+use super::shortest_period;
+use crate::chip::{EventType, Exposure, Limits, Probe, SensorConfig, Silicon};
 use crate::kernel::Recorder;
 use crate::netlist::CheckKind;
 use crate::photon::SpadEvent;

@@ -1,13 +1,14 @@
 //! The event kernel's answers to the questions of static timing.
 
-use super::{Limits, Silicon};
 use crate::chip::p_counter::Rises;
+use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::{
-    Exposure, PCounter, Probe, Probes, SensorConfig, WindowLaw, front_end, p_counter,
+    ChipTiming, Exposure, Limits, PCounter, Probe, Probes, SensorConfig, Silicon, WindowLaw,
+    front_end, p_counter,
 };
 use crate::engine::GateSimulation;
 use crate::kernel::{Drive, Kernel, Policy, Recorder, TimingChecks, in_order};
-use crate::netlist::{Edge, Netlist, StaticTiming};
+use crate::netlist::Netlist;
 use crate::photon::SpadEvent;
 use crate::units::{Frequency, Time};
 
@@ -104,17 +105,19 @@ pub fn gate_works(
     violated == 0 && counted.is_ok_and(|found| found[0] == expected)
 }
 
-/// COUNTER_CLK rises → LOCAL_STOP rises for the sensor's P-counter: longest path, and as simulated from start value 0.
+/// COUNTER_CLK rises → LOCAL_STOP rises for the P-counter of macropixel (0, 0): longest path, and as simulated from start
+/// value 0.
 pub fn ripple(config: &SensorConfig, silicon: &Silicon) -> (Time, Time) {
     let netlist = Netlist::elaborate(&p_counter::circuit(config));
-    let timing = silicon.timing(&netlist);
+    // Each cell has the mismatch that it has in the macropixel.
+    let macropixel = MacropixelCircuit::new(config, (0, 0)).path();
+    let in_macropixel = |cell| format!("{macropixel}.{}", netlist.cell_path(cell));
+    let timing = silicon.timing_as(&netlist, in_macropixel);
     let probes = Probes::of_block(&netlist);
     let (clk, stop) = (probes.net(Probe::CounterClk), probes.net(Probe::LocalStop));
-    let analysis = StaticTiming::new(&netlist, &timing);
-    let arrivals = analysis
-        .arrivals(&[(clk, Edge::Rise)], &[])
-        .expect("a P-counter has no loop");
-    let (_, longest) = arrivals.edge_window(stop, Edge::Rise).expect("the ripple");
+    let longest = ChipTiming::measure(config, silicon)
+        .counter
+        .clk_to_local_stop;
     let resets = [Probe::MemoryReset, Probe::CounterReset].map(|probe| probes.net(probe));
     let edge = Time::from_ns(200);
     let inputs = netlist.inputs().into_iter();

@@ -4,9 +4,9 @@
 //! rise and must have arrived when it falls (a gating check); then only the fall makes MEMORY_LOAD rise, and the
 //! memories have half a period of setup and half of hold. Nothing here waits for CLK.
 
+use super::gates;
 use super::macropixel::worst_path;
-use super::{Limits, Silicon, gates};
-use crate::chip::{LoadPins, LoadProbe, SensorConfig, load_path, probes};
+use crate::chip::{Limits, LoadPins, LoadProbe, SensorConfig, Silicon, load_path, probes};
 use crate::engine::stimulus::load_stimulus;
 use crate::kernel::{Kernel, TimingChecks};
 use crate::netlist::{

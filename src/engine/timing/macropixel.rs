@@ -9,11 +9,11 @@
 //! All flip-flops of the macropixel count, with setup, hold, recovery, removal and pulse widths. Left out are, by
 //! design, the sixteen that sample SPADs. The histogram's counters run on HIT, once in a laser cycle.
 
-use super::{Limits, Silicon};
-use crate::chip::front_end::{self, PulseLimits};
-use crate::chip::{Mode, PCounter, Probe, Probes, Race, SensorConfig, sensor};
+use crate::chip::front_end;
+use crate::chip::timing::macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays, hull};
+use crate::chip::{Limits, Mode, PCounter, Probe, Probes, Race, SensorConfig, Silicon};
 use crate::netlist::{
-    Bound, CellKind, CheckKind, Edge, NetId, Netlist, Path, Requirement, Requirements, StaticTiming,
+    Bound, CellKind, CheckKind, Edge, NetId, Netlist, Path, Requirement, Requirements,
 };
 use crate::units::Time;
 
@@ -92,66 +92,18 @@ impl MacropixelTiming {
         position: (usize, usize),
     ) -> Self {
         // The very netlist that the gate engine simulates, so that a cell's mismatch is the same in both.
-        let netlist = Netlist::elaborate(&sensor::window(config, position, (1, 1)));
-        let probes = Probes::of_macropixel(&netlist, position.0, position.1);
-        let timing = silicon.timing(&netlist);
-        let library = silicon.limits(limits);
-        let analysis = StaticTiming::new(&netlist, &timing);
-        let net = |probe| probes.net(probe);
-        // LOCAL_STOP blocks COUNTER_CLK, and FULL blocks a bin's clock: both loops are cut, as is the reset.
-        let after = |from, edge, cuts: &[NetId]| {
-            let arrivals = analysis.arrivals(&[(net(from), edge)], cuts);
-            arrivals.expect("every loop is cut")
-        };
-        let whole = "the macropixel connects these";
-        let (block, hit) = (net(Probe::Block), probes.bus(Probe::Hit));
-        // ENABLE changes with STOP, but only before the first and after the last laser cycle.
-        let cuts: Vec<NetId> = hit
-            .iter()
-            .copied()
-            .chain([block, net(Probe::Enable)])
-            .collect();
-        let (clock, corner) = (net(Probe::Clk), silicon.corner);
-        let clk = Requirements::of(&netlist, &analysis, clock, &cuts, &library, corner);
-        let clk = clk.expect("every loop is cut");
+        let circuit = MacropixelCircuit::new(config, position);
+        let timing = silicon.timing(&circuit.netlist);
+        let (library, corner) = (silicon.limits(limits), silicon.corner);
+        let paths = circuit.paths(&timing);
+        let delays = MacropixelDelays::of(&paths);
+        let counter = CounterDelays::of(&paths, &delays);
+        let (netlist, probes) = (&circuit.netlist, &circuit.probes);
+        let clk = Edge::BOTH.map(|edge| paths.after_clk(edge));
+        let clk = Requirements::behind(netlist, clk, &library, corner);
         let (rise, fall) = (clk.arrivals(Edge::Rise), clk.arrivals(Edge::Fall));
-        let stop = after(Probe::Stop, Edge::Rise, &cuts);
-        let stop_strobe = (config.mode == Mode::Conventional).then(|| {
-            let cuts: Vec<NetId> = cuts
-                .iter()
-                .copied()
-                .chain([net(Probe::LocalStop)])
-                .collect();
-            let stop = after(Probe::Stop, Edge::Rise, &cuts);
-            stop.edge_window(net(Probe::Strobe), Edge::Rise)
-                .expect(whole)
-        });
-        let counting = probes.counter_cells(&netlist).into_iter();
-        let stage_clocks: Vec<NetId> = counting
-            .map(|cell| netlist.cells()[cell].inputs[1])
-            .collect();
-        // What arrives at a stage's clock goes no further: the flip-flop behind it is held in reset.
-        let reset_cuts: Vec<NetId> = cuts.iter().chain(&stage_clocks).copied().collect();
-        let reset = after(Probe::CounterReset, Edge::Rise, &reset_cuts);
-        let clears = stage_clocks
-            .iter()
-            .filter_map(|&n| reset.edge_window(n, Edge::Rise));
-        let local_stop = net(Probe::LocalStop);
-        // A counter without memory is not reset, and one that wraps is not blocked.
-        let local_stop_falls = reset.edge_window(local_stop, Edge::Fall);
-        let unblocks = after(
-            Probe::LocalStop,
-            Edge::Fall,
-            &[net(Probe::CounterClk), net(Probe::Strobe)],
-        );
-        let unblocked = unblocks.edge_window(net(Probe::CounterClk), Edge::Rise);
-        let shift = probes
-            .bus(Probe::Shift)
-            .iter()
-            .filter_map(|&bit| rise.window(bit));
-        let shift = shift.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
 
-        let hit_cells = probes.hit_cells(&netlist);
+        let hit_cells = probes.hit_cells(netlist);
         let is_hit = |r: &Requirement| hit_cells.contains(&r.cell);
         let of_first_sampler = |r: &Requirement| {
             r.kind.concerns_data() && front_end::is_asynchronous_sampler(&netlist.cell_path(r.cell))
@@ -159,34 +111,25 @@ impl MacropixelTiming {
         let (hits, clk_rest): (Vec<_>, Vec<_>) = clk.all().iter().copied().partition(is_hit);
         let limit = |kind: CheckKind| {
             let limits = library.checks(CellKind::Dffr);
-            Time::from_fs(limits.at(kind, silicon.corner).into())
+            Time::from_fs(limits.at(kind, corner).into())
         };
+        let whole = "the macropixel connects these";
         MacropixelTiming {
             ripple: fall
-                .path(local_stop, Edge::Rise, Bound::Longest)
+                .path(probes.net(Probe::LocalStop), Edge::Rise, Bound::Longest)
                 .expect(whole),
-            strobe: fall
-                .edge_window(net(Probe::Strobe), Edge::Rise)
-                .expect(whole),
-            shift: shift.expect(whole),
+            strobe: counter.strobe,
+            shift: delays.shift.iter().copied().reduce(hull).expect(whole),
             event: rise
-                .path_to(net(Probe::SpadEvent), Bound::Longest)
+                .path_to(probes.net(Probe::SpadEvent), Bound::Longest)
                 .expect(whole),
             shortest: worst_path(&clk, clk_rest.iter(), CheckKind::Hold).expect(whole),
-            counter_clk: fall
-                .edge_window(net(Probe::CounterClk), Edge::Rise)
-                .expect(whole),
-            reset: stop
-                .edge_window(net(Probe::CounterReset), Edge::Rise)
-                .expect(whole),
-            release: stop
-                .edge_window(net(Probe::CounterReset), Edge::Fall)
-                .expect(whole),
-            reset_to_stage_clock: clears.map(|w| w.1).max().unwrap_or(Time::ZERO),
-            reset_to_counter_clk: local_stop_falls
-                .zip(unblocked)
-                .map_or(Time::ZERO, |(falls, unblocked)| falls.1 + unblocked.1),
-            stop_strobe,
+            counter_clk: counter.counter_clk,
+            reset: delays.reset,
+            release: delays.release,
+            reset_to_stage_clock: counter.reset_to_stage_clock.unwrap_or(Time::ZERO),
+            reset_to_counter_clk: counter.reset_to_counter_clk.unwrap_or(Time::ZERO),
+            stop_strobe: (config.mode == Mode::Conventional).then_some(delays.stop_strobe),
             counts_at_once: config.p_counter == PCounter::Memoryless,
             hits,
             clk: clk_rest
@@ -196,8 +139,8 @@ impl MacropixelTiming {
             recovery: limit(CheckKind::Recovery),
             removal: limit(CheckKind::Removal),
             control_high: limit(CheckKind::ControlHigh),
-            probes,
-            netlist,
+            probes: circuit.probes,
+            netlist: circuit.netlist,
         }
     }
 
@@ -408,15 +351,16 @@ pub struct LocalClocks {
 impl LocalClocks {
     /// Analyses macropixel (0, 0), limits kept.
     pub fn of(config: &SensorConfig, silicon: &Silicon) -> Self {
-        let netlist = Netlist::elaborate(&sensor::window(config, (0, 0), (1, 1)));
-        let timing = silicon.timing(&netlist);
+        let circuit = MacropixelCircuit::new(config, (0, 0));
+        let (netlist, probes) = (&circuit.netlist, &circuit.probes);
+        let timing = silicon.timing(netlist);
         let library = silicon.limits(Limits::Kept);
-        let analysis = StaticTiming::new(&netlist, &timing);
-        let probes = Probes::of_macropixel(&netlist, 0, 0);
-        let toggles = probes.toggle_cells(&netlist);
+        let paths = circuit.paths(&timing);
+        let toggles = probes.toggle_cells(netlist);
         let requirements = |clock: NetId, cuts: &[NetId]| {
             let corner = silicon.corner;
-            let found = Requirements::of(&netlist, &analysis, clock, cuts, &library, corner);
+            let analysis = paths.analysis();
+            let found = Requirements::of(netlist, analysis, clock, cuts, &library, corner);
             found.expect("every loop is cut").all().to_vec()
         };
         // A count's Q only tells whether the bin is full.
@@ -431,7 +375,7 @@ impl LocalClocks {
                 .flat_map(|&raw| requirements(raw, &[]))
                 .filter(|r| toggles.contains(&r.cell))
                 .collect(),
-            netlist,
+            netlist: circuit.netlist,
         }
     }
 
@@ -442,21 +386,6 @@ impl LocalClocks {
             CheckKind::ClockHigh => Some(dead_time - requirement.need),
             CheckKind::ClockLow => None,
             _ => Some(requirement.slack(dead_time)),
-        }
-    }
-
-    /// What the toggle flip-flops ask of SPAD_RAW.
-    pub fn pulses(&self) -> PulseLimits {
-        let need = |kind| {
-            let of_kind = self.toggles.iter().filter(|r| r.kind == kind);
-            of_kind
-                .map(|r| r.need)
-                .max()
-                .expect("a front end has flip-flops")
-        };
-        PulseLimits {
-            width: need(CheckKind::ClockHigh),
-            apart: need(CheckKind::Setup),
         }
     }
 }

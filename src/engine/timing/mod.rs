@@ -33,66 +33,7 @@ pub use macropixel::{Aim, LocalClocks, MacropixelTiming, longest};
 pub use spread::{PixelTiming, Spread, spread};
 pub use verdict::{Margin, TimingVerdict, VerdictReport};
 
-use crate::netlist::{Corner, Library, Mismatch, Netlist, Timing, derated_limits, varied_as};
 use crate::units::Time;
-
-/// What the analysed chip is made of.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Silicon {
-    /// Corner of the library.
-    pub corner: Corner,
-    /// Factor on every delay and limit: process, voltage, temperature.
-    pub factor: f64,
-    /// Random differences between cells, on delays only.
-    pub mismatch: Option<Mismatch>,
-}
-
-/// Whether flip-flops' limits count, or only what they capture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Limits {
-    /// Setup, hold, recovery, removal and pulse widths must be kept.
-    Kept,
-    /// A flip-flop captures what is at D in the instant of its clock edge.
-    Ignored,
-}
-
-impl Silicon {
-    /// The library as it stands, without mismatch.
-    pub const fn nominal(corner: Corner) -> Self {
-        Silicon {
-            corner,
-            factor: 1.0,
-            mismatch: None,
-        }
-    }
-
-    /// The same chip with every delay and limit times `factor`, instead of its own.
-    #[must_use]
-    pub const fn at(mut self, factor: f64) -> Self {
-        self.factor = factor;
-        self
-    }
-
-    /// Delays of a netlist.
-    pub fn timing(&self, netlist: &Netlist) -> Timing {
-        self.timing_as(netlist, |cell| netlist.cell_path(cell))
-    }
-
-    /// Delays of another netlist that differs from this one in names only: there each cell is at `path` of its index.
-    pub fn timing_as(&self, netlist: &Netlist, path: impl Fn(usize) -> String) -> Timing {
-        let nominal = Timing::nominal(netlist, &Library::default(), self.corner);
-        varied_as(netlist, &nominal, self.factor, self.mismatch, path)
-    }
-
-    /// The library with this silicon's limits (and nominal delays).
-    pub fn limits(&self, limits: Limits) -> Library {
-        let factor = match limits {
-            Limits::Kept => self.factor,
-            Limits::Ignored => 0.0,
-        };
-        derated_limits(&Library::default(), factor)
-    }
-}
 
 /// STOP phases that are tried: sixteenths of a CLK period, half a period either way.
 pub fn phases(period: Time) -> impl Iterator<Item = Time> {

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::{Limits, MacropixelTiming, Silicon};
-use crate::chip::SensorConfig;
+use super::MacropixelTiming;
+use crate::chip::{Limits, SensorConfig, Silicon};
 use crate::units::Time;
 
 /// One macropixel of the array.

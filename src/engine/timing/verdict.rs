@@ -16,9 +16,9 @@
 
 use serde::Serialize;
 
-use super::{Aim, Limits, LoadTiming, LocalClocks, MacropixelTiming, Silicon};
+use super::{Aim, LoadTiming, LocalClocks, MacropixelTiming};
 use crate::chip::window_law::Window;
-use crate::chip::{Exposure, Probe, Race, SensorConfig, WindowLaw};
+use crate::chip::{ChipTiming, Exposure, Limits, Probe, Race, SensorConfig, Silicon, WindowLaw};
 use crate::netlist::{CheckKind, Netlist, Requirement};
 use crate::units::Time;
 
@@ -232,7 +232,8 @@ fn local_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
         local.toggles.iter(),
         |r| local.toggle_slack(r, dead_time),
     );
-    let complaint = local.pulses().complaint(config.dead_time_ns);
+    let pulses = ChipTiming::measure(config, silicon).pulses;
+    let complaint = pulses.complaint(config.dead_time_ns);
     for margin in margins
         .iter_mut()
         .filter(|margin| margin.slack < Time::ZERO)

@@ -18,8 +18,7 @@
 
 use rayon::prelude::*;
 
-use crate::chip::front_end::PulseLimits;
-use crate::chip::{EventType, Exposure, SensorConfig, WindowLaw, histogram};
+use crate::chip::{ChipTiming, EventType, Exposure, SensorConfig, WindowLaw, histogram};
 use crate::engine::{Cohort, CohortOptions, Engine, EngineError, LitPixel, Window, stream_config};
 use crate::photon::{PhotonStream, PixelLight, SPADS};
 use crate::theory::detection::PerCycle;
@@ -176,7 +175,7 @@ impl Trial {
             Effect::Ties => trial.ties_by_lot = true,
             // The shortest that the front end follows.
             Effect::DeadTime => {
-                let limits = PulseLimits::of(trial.sensor.corner);
+                let limits = ChipTiming::of(&trial.sensor).pulses;
                 trial.sensor.dead_time_ns = limits.shortest().as_ns();
             }
             Effect::OneHit => trial.every_pulse = true,

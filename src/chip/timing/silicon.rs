@@ -1,0 +1,75 @@
+//! What a chip is made of: a cell library in one corner, its conditions, and the mismatch of its cells.
+
+use std::sync::LazyLock;
+
+use crate::chip::SensorConfig;
+use crate::netlist::{Corner, Library, Mismatch, Netlist, Timing, derated_limits, varied_as};
+
+/// What the chip is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Silicon {
+    /// Corner of the library.
+    pub corner: Corner,
+    /// Factor on every delay and limit: process, voltage, temperature.
+    pub factor: f64,
+    /// Random differences between cells, on delays only.
+    pub mismatch: Option<Mismatch>,
+}
+
+/// Whether flip-flops' limits count, or only what they capture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Limits {
+    /// Setup, hold, recovery, removal and pulse widths must be kept.
+    Kept,
+    /// A flip-flop captures what is at D in the instant of its clock edge.
+    Ignored,
+}
+
+impl Silicon {
+    /// The cell library that every chip is made of.
+    pub fn library() -> &'static Library {
+        static LIBRARY: LazyLock<Library> = LazyLock::new(Library::default);
+        &LIBRARY
+    }
+
+    /// The library as it stands, without mismatch.
+    pub const fn nominal(corner: Corner) -> Self {
+        Silicon {
+            corner,
+            factor: 1.0,
+            mismatch: None,
+        }
+    }
+
+    /// That of a sensor without mismatch: the library in the sensor's corner.
+    pub const fn of(config: &SensorConfig) -> Self {
+        Silicon::nominal(config.corner)
+    }
+
+    /// The same chip with every delay and limit times `factor`, instead of its own.
+    #[must_use]
+    pub const fn at(mut self, factor: f64) -> Self {
+        self.factor = factor;
+        self
+    }
+
+    /// Delays of a netlist.
+    pub fn timing(&self, netlist: &Netlist) -> Timing {
+        self.timing_as(netlist, |cell| netlist.cell_path(cell))
+    }
+
+    /// Delays of another netlist that differs from this one in names only: there each cell is at `path` of its index.
+    pub fn timing_as(&self, netlist: &Netlist, path: impl Fn(usize) -> String) -> Timing {
+        let nominal = Timing::nominal(netlist, Self::library(), self.corner);
+        varied_as(netlist, &nominal, self.factor, self.mismatch, path)
+    }
+
+    /// The library with this silicon's limits (and nominal delays).
+    pub fn limits(&self, limits: Limits) -> Library {
+        let factor = match limits {
+            Limits::Kept => self.factor,
+            Limits::Ignored => 0.0,
+        };
+        derated_limits(Self::library(), factor)
+    }
+}
