@@ -15,8 +15,8 @@ use crate::engine::recording::{Recording, check_exposure, read_events, read_star
 use crate::engine::timing::{TimingVerdict, VerdictReport};
 use crate::engine::waveform::{self, View};
 use crate::engine::{
-    Cancelling, EngineError, GateSimulation, HardwareEventKind, HardwareEventReport, Runner,
-    TimeKeeping, Timed,
+    Cancelling, ClosedFormCoverage, EngineError, GateSimulation, HardwareEventKind,
+    HardwareEventReport, Runner, Timed,
 };
 use crate::files::{InputError, OutputFile};
 use crate::kernel::{CheckReport, Observer, Policy};
@@ -222,7 +222,7 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         after_the_end: recording.after_the_end,
         photons_that_cancel: replayed.cancelled,
         timing,
-        time_keeping: replayed.keeping,
+        time_keeping: replayed.coverage,
     };
     summary.tell(&stimuli.config);
     let out = args.out.as_deref();
@@ -240,7 +240,7 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
 struct Replayed {
     histograms: Vec<Vec<u16>>,
     cancelled: u64,
-    keeping: Option<TimeKeeping>,
+    coverage: Option<ClosedFormCoverage>,
 }
 
 /// What became of the events.
@@ -252,14 +252,14 @@ struct Summary {
     after_the_end: u64,
     photons_that_cancel: u64,
     timing: Option<VerdictReport>,
-    time_keeping: Option<TimeKeeping>,
+    time_keeping: Option<ClosedFormCoverage>,
 }
 
 impl Summary {
     /// Says on standard error what the chip loses without a word.
     fn tell(&self, config: &SensorConfig) {
-        if let Some(keeping) = &self.time_keeping {
-            eprint!("{}", table(keeping));
+        if let Some(coverage) = &self.time_keeping {
+            eprint!("{}", table(coverage));
         }
         if let Some(timing) = self.timing.as_ref().filter(|timing| !timing.met) {
             eprintln!("gdtof: timing {}", timing.verdict);
@@ -348,7 +348,7 @@ fn replay_array(
     Ok(Replayed {
         histograms: simulation.histograms()?,
         cancelled,
-        keeping: None,
+        coverage: None,
     })
 }
 
@@ -406,30 +406,30 @@ fn replay_timed(
         EngineKind::Cohort => return Err(EngineError::NoPhotons("cohort").into()),
     };
     let timed = Timed::new(config, exposure, silicon);
-    let (histograms, keeping) = match runner {
+    let (histograms, coverage) = match runner {
         None => (timed.by_gates(starts, &pulses, done)?, None),
         Some(runner) => {
             let found = timed.histograms(runner, starts, &pulses, done)?;
-            (found.histograms, Some(found.keeping))
+            (found.histograms, Some(found.coverage))
         }
     };
     progress.finish_and_clear();
     Ok(Replayed {
         histograms,
         cancelled: timed.cancelled(&pulses),
-        keeping,
+        coverage,
     })
 }
 
 /// Which macropixels kept time, and why the others did not.
-fn table(keeping: &TimeKeeping) -> Table {
+fn table(coverage: &ClosedFormCoverage) -> Table {
     let mut table = Table::new("Time keeping")
-        .row("macropixels in closed form", keeping.kept)
+        .row("macropixels in closed form", coverage.decided)
         .row(
             "macropixels replayed at gate level",
-            keeping.replayed.values().sum::<usize>(),
+            coverage.replayed.values().sum::<usize>(),
         );
-    for (why, macropixels) in &keeping.replayed {
+    for (why, macropixels) in &coverage.replayed {
         table.push(format!("  {why}"), macropixels);
     }
     table
@@ -457,7 +457,7 @@ fn replay(stimuli: &Stimuli, kind: EngineKind) -> anyhow::Result<Replayed> {
     Ok(Replayed {
         histograms: batches?.concat(),
         cancelled: cancelled(stimuli),
-        keeping: None,
+        coverage: None,
     })
 }
 

@@ -40,7 +40,7 @@ pub use light::{
 };
 pub use stimulus::{Schedule, StimulusPlan};
 pub use testbench::{export_annotated_verilog, export_netlist, export_verilog};
-pub use timed::{Runner, TimeKeeping, Timed, Timekept};
+pub use timed::{ClosedFormCoverage, Runner, Timed, TimedHistograms};
 pub use window::Window;
 
 use crate::chip::front_end::PulseLimits;
@@ -120,9 +120,12 @@ pub enum EngineError {
     NotInCohorts(&'static str),
     /// Laser cycles depend on each other: a bound on the probability, over a macropixel's exposure.
     #[error(
-        "SPADs may stay busy from one laser cycle's window to the next (probability up to {0:.1e}), which the cohort engine cannot follow; use --engine window, a longer laser cycle or less light"
+        "SPADs may stay busy from one laser cycle's window to the next (probability up to {bound:.1e}), which the cohort engine cannot follow; use --engine window, a longer laser cycle or less light"
     )]
-    Memory(f64),
+    CyclesNotIndependent {
+        /// The bound.
+        bound: f64,
+    },
     /// The finest cells of the cohort engine do not keep its error.
     #[error(
         "the cohort engine, with {cells} cells to a CLK period, may put the mean of bin {bin} off by {off:.2e} counts where its counting noise is {noise:.2e}; use --engine window, or --sub-bins with less exactness"

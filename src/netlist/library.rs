@@ -115,17 +115,17 @@ impl Delay {
 
 /// Delays from one input pin to the cell's outputs, by direction of the output's change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Arc {
+pub struct TimingArc {
     /// Output rises.
     pub rise: Delay,
     /// Output falls.
     pub fall: Delay,
 }
 
-impl Arc {
+impl TimingArc {
     /// Both directions, corners scaled from the typical delays (fs).
     pub const fn scaled(rise_fs: u32, fall_fs: u32) -> Self {
-        Arc {
+        TimingArc {
             rise: Delay::scaled(rise_fs),
             fall: Delay::scaled(fall_fs),
         }
@@ -144,7 +144,7 @@ impl Arc {
 }
 
 /// Arcs of one cell, indexed by input pin. The D pin of a flip-flop has none (all zero).
-pub type CellArcs = [Arc; MAX_INPUTS];
+pub type CellArcs = [TimingArc; MAX_INPUTS];
 
 /// The delays of every cell, and the limits of every flip-flop.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -156,15 +156,15 @@ pub struct Library {
 impl Default for Library {
     /// The library described at the head of this file.
     fn default() -> Self {
-        const NONE: Arc = Arc::scaled(0, 0);
+        const NONE: TimingArc = TimingArc::scaled(0, 0);
         const fn gate(rise_fs: u32, fall_fs: u32) -> CellArcs {
-            let arc = Arc::scaled(rise_fs, fall_fs);
+            let arc = TimingArc::scaled(rise_fs, fall_fs);
             [arc, arc, NONE, NONE]
         }
-        const CLOCK_TO_Q: Arc = Arc::scaled(75_311, 75_311);
-        const RESET_TO_Q: Arc = Arc::scaled(81_043, 81_043);
-        const MUX_DATA: Arc = Arc::scaled(45_127, 46_381);
-        const MUX_SELECT: Arc = Arc::scaled(52_919, 54_037);
+        const CLOCK_TO_Q: TimingArc = TimingArc::scaled(75_311, 75_311);
+        const RESET_TO_Q: TimingArc = TimingArc::scaled(81_043, 81_043);
+        const MUX_DATA: TimingArc = TimingArc::scaled(45_127, 46_381);
+        const MUX_SELECT: TimingArc = TimingArc::scaled(52_919, 54_037);
         let cells = CellKind::ALL.map(|kind| match kind {
             CellKind::Inv => gate(21_013, 18_979),
             CellKind::Buf => gate(46_219, 45_403),
@@ -177,8 +177,8 @@ impl Default for Library {
             CellKind::Mux2 => [MUX_DATA, MUX_DATA, MUX_SELECT, NONE],
             CellKind::Dffr => [NONE, CLOCK_TO_Q, RESET_TO_Q, NONE],
             CellKind::Dffsr => {
-                const SLOWER_CLOCK: Arc = Arc::scaled(96_181, 96_181);
-                const SLOWER_CLEAR: Arc = Arc::scaled(104_233, 104_233);
+                const SLOWER_CLOCK: TimingArc = TimingArc::scaled(96_181, 96_181);
+                const SLOWER_CLEAR: TimingArc = TimingArc::scaled(104_233, 104_233);
                 [NONE, SLOWER_CLOCK, SLOWER_CLEAR, SLOWER_CLEAR]
             }
         });
@@ -232,7 +232,7 @@ mod tests {
 
     #[test]
     fn unknown_outputs_come_as_early_as_any() {
-        let arc = Arc::scaled(20, 10);
+        let arc = TimingArc::scaled(20, 10);
         assert_eq!(arc.delay_fs(Corner::Typ, Logic::X), 10);
     }
 }

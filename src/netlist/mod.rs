@@ -28,7 +28,7 @@ pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS, next_state};
 pub use checks::{CheckKind, CheckLimits, DataLimit};
 pub use flat::{FlatCell, NetId, Netlist, Scope};
 pub use instance_limits::{Control, InstanceLimits};
-pub use library::{Arc, CellArcs, Corner, Delay, Library};
+pub use library::{CellArcs, Corner, Delay, Library, TimingArc};
 pub use module::{Cell, Direction, Instance, Module, Net, Port, Signal};
 pub use requirements::{Requirement, Requirements};
 pub(crate) use static_timing::caused;

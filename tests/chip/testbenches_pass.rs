@@ -1,6 +1,5 @@
 //! Every testbench passes, and leaves a waveform that a viewer can read and a save file beside it.
 
-use guided_dtof::chip::Probe;
 use std::process::Command;
 
 use guided_dtof::chip::Probe;

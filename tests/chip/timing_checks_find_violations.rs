@@ -4,8 +4,8 @@
 use guided_dtof::kernel::{CheckReport, Drive, Kernel, Policy, Recorder, TimingChecks, merge};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{
-    Arc, CellKind, CheckKind, CheckLimits, Corner, DataLimit, Delay, Edge, Library, ModuleBuilder,
-    NetId, Netlist, Timing,
+    CellKind, CheckKind, CheckLimits, Corner, DataLimit, Delay, Edge, Library, ModuleBuilder,
+    NetId, Netlist, Timing, TimingArc,
 };
 use guided_dtof::units::Time;
 use proptest::prelude::*;
@@ -429,7 +429,7 @@ proptest! {
         let hold = DataLimit { rise: hold, fall: hold_fall };
         let limits = CheckLimits { setup, hold, recovery, removal, clock_high, clock_low, control_high };
         library.set_checks(kind, limits);
-        let arc = |fs| Arc { rise: Delay::fixed(fs), fall: Delay::fixed(fs) };
+        let arc = |fs| TimingArc { rise: Delay::fixed(fs), fall: Delay::fixed(fs) };
         library.set_arcs(kind, [arc(0), arc(delays[0]), arc(delays[1]), arc(delays[1])]);
         let netlist = pair(kind);
         let pins = kind.inputs();

@@ -14,8 +14,7 @@ use std::sync::{Arc, Once};
 use guided_dtof::kernel::{Drive, Kernel, Recorder, Stimulus};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{
-    Arc as DelayArc, CellKind, Corner, Delay, Library, Module, ModuleBuilder, NetId, Netlist,
-    Timing,
+    CellKind, Corner, Delay, Library, Module, ModuleBuilder, NetId, Netlist, Timing, TimingArc,
 };
 use guided_dtof::units::Time;
 use guided_dtof::waves::{FstWriter, Selection, VcdWriter};
@@ -132,7 +131,7 @@ fn coarse_library() -> Library {
     let mut library = Library::default();
     for kind in CellKind::ALL {
         let fs = if kind.is_flip_flop() { 1_000 } else { 0 };
-        let arc = DelayArc {
+        let arc = TimingArc {
             rise: Delay::fixed(fs),
             fall: Delay::fixed(fs),
         };

@@ -125,12 +125,12 @@ fn compare(seed: u64, scenario: &Scenario, silicon: &Silicon) -> Tally {
             assert_eq!(
                 counts, gate,
                 "seed {seed}, {runner:?}, macropixel {pixel} with start {start}: {config:?} {exposure:?} {silicon:?} {:?}",
-                found.keeping
+                found.coverage
             );
         }
         tally = Tally {
-            kept: found.keeping.kept,
-            replayed: found.keeping.replayed,
+            kept: found.coverage.decided,
+            replayed: found.coverage.replayed,
         };
         assert_eq!(tally.macropixels(), config.pixels());
     }

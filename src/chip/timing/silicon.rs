@@ -73,3 +73,36 @@ impl Silicon {
         derated_limits(Self::library(), factor)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    /// Lines of code that ask for the default library, in all files below a folder: tests and comments left out.
+    fn users(folder: &Path, found: &mut Vec<String>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                users(&path, found);
+                continue;
+            }
+            let text = std::fs::read_to_string(&path).unwrap();
+            let code = text.split("#[cfg(test)]").next().unwrap();
+            let mut lines = code
+                .lines()
+                .filter(|line| !line.trim_start().starts_with("//"));
+            if !path.ends_with("tests.rs") && lines.any(|line| line.contains("Library::default")) {
+                found.push(path.display().to_string());
+            }
+        }
+    }
+
+    #[test]
+    fn one_place_says_which_library_chips_are_made_of() {
+        let mut found = Vec::new();
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+        users(&source, &mut found);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].ends_with("silicon.rs"), "{found:?}");
+    }
+}

@@ -30,7 +30,7 @@ pub fn binomials(n: &[u64; LANES], p: &Lanes, q: &Lanes, random: &mut RandomWord
         many += u64::from(mean >= INVERSION_MEAN);
     }
     let mut drawn = [0.0; LANES];
-    if many > WORTH_A_ROW {
+    if many > MOST_DRAWN_SINGLY {
         reject(&trials, &rarer, &other, &mut drawn, random);
     } else if many > 0 {
         for lane in 0..LANES {
@@ -51,8 +51,11 @@ pub fn binomials(n: &[u64; LANES], p: &Lanes, q: &Lanes, random: &mut RandomWord
     successes
 }
 
-/// Lanes of many successes that are sooner done one by one.
-const WORTH_A_ROW: u64 = 5;
+/// Up to so many lanes of many successes are drawn one by one, more of them all together. Measured, 16 000 trials, AVX-512:
+/// one by one is quicker up to 7 lanes at a mean of 30 and up to 10 at a mean of 400, so that together costs 6 lanes 12 % and
+/// 43 % more (414 ns against 368 ns, 344 ns against 241 ns) and saves 16 of them 44 % and 34 %. It stays at 5 because it
+/// decides which random words a lane gets: another number would give other histograms for the same seed.
+const MOST_DRAWN_SINGLY: u64 = 5;
 
 /// Lanes of many successes, by rejection.
 #[inline(always)]

@@ -149,7 +149,7 @@ impl Scene {
         if cycles > 1 && (back.for_fs > between_fs || back.busy > enough) {
             let busy = self.busy_back_to(between_fs, enough).busy * SPADS as f64 * cycles as f64;
             if busy > options.memory {
-                return Err(EngineError::Memory(busy));
+                return Err(EngineError::CyclesNotIndependent { bound: busy });
             }
         }
 

@@ -10,7 +10,7 @@
 //!
 //! Every CLK period of the exposure is stepped. Time enters twice, exactly: in which CLK edge takes a pulse, and in
 //! the order in which the edges of one period arrive. Otherwise there is no delay and, after the reset that the
-//! event kernel simulates, no X. Nothing here knows what a macropixel is: what the netlist says is what is run.
+//! event kernel simulates, no X. What is run is what the netlist says; of the macropixel only pins and bins are named.
 //!
 //! Macropixels go into blocks by their start values, so that a block's windows are open in the same CLK periods, and
 //! its counters at rest in the others, which are skipped where nothing would change. A netlist, or a configuration, for

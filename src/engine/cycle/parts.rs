@@ -31,8 +31,8 @@ pub struct Parts {
     pub runs: Vec<Run>,
     /// The run that begins with an action, if any.
     pub run_from: Vec<Option<u16>>,
-    /// While only these are pending, samples may wait; empty if they never may.
-    pub calm: Bits,
+    /// While only these are pending, samples are deferrable; empty if they never are.
+    pub deferrable: Bits,
 }
 
 /// Samplers one behind the other that sample the same lanes.
@@ -106,16 +106,16 @@ impl Parts {
 
         let tail = reached(tape, samplers().flat_map(|(_, a)| targets(tape, a)));
         let clocked = reached(tape, tape.clock.iter().copied());
-        let mut calm = Bits::new(tape.actions.len());
+        let mut deferrable = Bits::new(tape.actions.len());
         if may_wait(tape, &tail, &clocked, places) {
-            calm = clocked;
+            deferrable = clocked;
             for (index, _) in samplers() {
-                calm.insert(index);
+                deferrable.insert(index);
             }
         }
         let mut runs: Vec<Run> = Vec::new();
         let mut run_from = vec![None; tape.actions.len()];
-        for (index, action) in samplers().filter(|&(index, _)| calm.contains(index)) {
+        for (index, action) in samplers().filter(|&(index, _)| deferrable.contains(index)) {
             let tap = match action.code {
                 Code::Sampler { tap, offset } => tape.taps[usize::from(tap)].at(offset),
                 _ => unreachable!("a sampler"),
@@ -142,7 +142,7 @@ impl Parts {
             photonic,
             photonic_places,
             interface,
-            calm,
+            deferrable,
         }
     }
 }

@@ -89,8 +89,8 @@ struct Record {
     values: Vec<Word>,
     /// Photonic actions woken.
     woken: Vec<u16>,
-    /// Samplers that run, in passes from the first, while control is not calm.
-    hasty: Vec<(i64, u16)>,
+    /// Samplers that run, in passes from the first, while control makes them not deferrable.
+    not_deferrable: Vec<(i64, u16)>,
 }
 
 /// Effects of one action of control: ends in the lists of the record.
@@ -112,7 +112,7 @@ impl Record {
             written: Vec::new(),
             values: Vec::new(),
             woken: Vec::new(),
-            hasty: Vec::new(),
+            not_deferrable: Vec::new(),
         }
     }
 
@@ -217,12 +217,20 @@ impl Passes<'_, '_> {
                     changed
                 }
                 Some(record) => {
-                    if waits && !self.is_calm(false) {
-                        record.hasty.push((self.pass - record.first_pass, index));
+                    if waits && !self.is_deferrable(false) {
+                        record
+                            .not_deferrable
+                            .push((self.pass - record.first_pass, index));
                     }
-                    self.perform(index, waits && self.is_calm(true) && self.is_calm(false))
+                    self.perform(
+                        index,
+                        waits && self.is_deferrable(true) && self.is_deferrable(false),
+                    )
                 }
-                None => self.perform(index, waits && self.is_calm(true) && self.is_calm(false)),
+                None => self.perform(
+                    index,
+                    waits && self.is_deferrable(true) && self.is_deferrable(false),
+                ),
             };
             is_at_rest &= changed == [false; 2] || matches!(action.code, Code::Set(_));
         }
@@ -277,8 +285,10 @@ impl Passes<'_, '_> {
                     } else if let Some(next) = next {
                         from = next + 1;
                         let waits = self.may_wait(next, due)
-                            && self.is_calm(true)
-                            && !record.hasty.contains(&(self.pass - first_pass, next));
+                            && self.is_deferrable(true)
+                            && !record
+                                .not_deferrable
+                                .contains(&(self.pass - first_pass, next));
                         self.perform(next, waits);
                     } else {
                         break;
@@ -317,9 +327,9 @@ impl Passes<'_, '_> {
 
     /// Whether none of the photonic actions, or of the others, that are pending would mind a sample that waits.
     #[inline(always)]
-    fn is_calm(&self, photonic: bool) -> bool {
+    fn is_deferrable(&self, photonic: bool) -> bool {
         let Parts {
-            calm,
+            deferrable,
             photonic: all,
             ..
         } = self.parts;
@@ -330,7 +340,7 @@ impl Passes<'_, '_> {
             } else {
                 !all.0[group]
             };
-            any |= pending & which & !calm.0[group];
+            any |= pending & which & !deferrable.0[group];
         }
         any == 0
     }

@@ -1,4 +1,4 @@
-//! The fast engines keeping time: gate-accurate histograms where every macropixel has delays of its own.
+//! The fast engines with the timing of each macropixel: gate-accurate histograms where every macropixel has delays of its own.
 //!
 //! ```text
 //!   silicon ─► delays ─► orders ─┬ decided ─► pulses shifted by each SPAD's latency ─► Window or Cycle ─┐
@@ -36,22 +36,23 @@ pub enum Runner {
     Window,
 }
 
-/// Which macropixels were simulated.
+/// How many macropixels were decided in closed form, and why the others were simulated.
 #[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize)]
-pub struct TimeKeeping {
+pub struct ClosedFormCoverage {
     /// Macropixels whose every order of events was decided in closed form.
-    pub kept: usize,
+    #[serde(rename = "kept")]
+    pub decided: usize,
     /// Macropixels replayed at gate level, by what was in doubt.
     pub replayed: BTreeMap<&'static str, usize>,
 }
 
 /// Histograms, and how they came about.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Timekept {
+pub struct TimedHistograms {
     /// Counts of every macropixel and bin, row-major, bin 0 earliest.
     pub histograms: Vec<Vec<u16>>,
     /// Which macropixels were simulated.
-    pub keeping: TimeKeeping,
+    pub coverage: ClosedFormCoverage,
 }
 
 /// Runs an array of macropixels made of one silicon.
@@ -118,7 +119,7 @@ impl<'a> Timed<'a> {
         starts: &[u16],
         pulses: &[&[SpadEvent]],
         done: impl Fn(usize) + Sync,
-    ) -> Result<Timekept, EngineError> {
+    ) -> Result<TimedHistograms, EngineError> {
         let pixels = self.setting.config.pixels();
         assert!(starts.len() == pixels && pulses.len() == pixels);
         let cycle = Cycle::new(self.setting.config, self.setting.exposure);
@@ -256,17 +257,17 @@ impl<'a> Timed<'a> {
         pulses: &[&[SpadEvent]],
         judged: Vec<Judged>,
         done: &(impl Fn(usize) + Sync),
-    ) -> Result<Timekept, EngineError> {
-        let mut found = Timekept::default();
+    ) -> Result<TimedHistograms, EngineError> {
+        let mut found = TimedHistograms::default();
         let mut in_doubt = Vec::new();
         for (pixel, judged) in judged.into_iter().enumerate() {
             found.histograms.push(match judged {
                 Judged::Counted(counts) => {
-                    found.keeping.kept += 1;
+                    found.coverage.decided += 1;
                     counts
                 }
                 Judged::InDoubt(doubt) => {
-                    *found.keeping.replayed.entry(doubt).or_default() += 1;
+                    *found.coverage.replayed.entry(doubt).or_default() += 1;
                     in_doubt.push(pixel);
                     Vec::new()
                 }

@@ -40,7 +40,7 @@ const _: () = assert!(CYCLES << CYCLE_SHIFT == 1 << u32::BITS);
 pub struct Code(u32);
 
 impl Code {
-    /// No photon, without marks. It has a row and a cycle that nobody looks at.
+    /// No photon, without marks. Padding: row and cycle out of range.
     pub const NONE: Code = Code(GROUP << CYCLE_SHIFT | (ROWS as u32 - 1));
 
     /// Of a photon at `place`, in one of `bins` bins, and its mark.

@@ -12,8 +12,8 @@ use super::placement::{Item, MOST_INPUTS, Recipe, placed};
 use guided_dtof::kernel::Drive;
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{
-    Arc as DelayArc, CellArcs, CellKind, Corner, Delay, DelayModel, Library, MAX_INPUTS, Module,
-    Netlist, Timing,
+    CellArcs, CellKind, Corner, Delay, DelayModel, Library, MAX_INPUTS, Module, Netlist, Timing,
+    TimingArc,
 };
 use guided_dtof::units::Time;
 use proptest::prelude::*;
@@ -199,7 +199,7 @@ impl Case {
         let mut library = Library::default();
         for kind in CellKind::ALL {
             let has = |mask: u16| mask >> kind as u16 & 1 == 1;
-            let mut arcs: CellArcs = [(); MAX_INPUTS].map(|()| DelayArc {
+            let mut arcs: CellArcs = [(); MAX_INPUTS].map(|()| TimingArc {
                 rise: delay(),
                 fall: delay(),
             });
