@@ -17,7 +17,9 @@
 //! | [`waves`] | VCD and FST, views for GTKWave and Surfer |
 //! | [`chip`] | the circuits beside their reference models, the window law |
 //! | [`photon`] | photon budget, SPADs, the photon stream |
+//! | [`bench`] | stimulus, recordings, hardware events, Verilog testbench |
 //! | [`engine`] | the ways to run an exposure |
+//! | [`analysis`] | the periods, corners and spread that static timing allows |
 //! | [`scene`] | surfaces, optics, sunlight, ground truth |
 //! | [`guide`] | the stereo camera pair and its mapping onto macropixels |
 //! | [`theory`] | detection probability, precision, partial histograms, design, significance |
@@ -43,6 +45,8 @@
 //! assert_eq!(counts, Window::new(&config, &exposure).histogram(25, &[photon]).unwrap());
 //! ```
 
+pub mod analysis;
+pub mod bench;
 pub mod chip;
 pub mod cli;
 pub mod engine;

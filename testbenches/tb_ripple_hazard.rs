@@ -20,10 +20,10 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
+use guided_dtof::analysis::{MacropixelTiming, shortest_period};
 use guided_dtof::chip::{Exposure, Limits, Probe, Probes, SensorConfig, Silicon, probes, sensor};
 use guided_dtof::cli::testbench;
 use guided_dtof::engine::GateSimulation;
-use guided_dtof::engine::timing::{MacropixelTiming, shortest_period};
 use guided_dtof::engine::waveform::write_waves;
 use guided_dtof::files::InputError;
 use guided_dtof::kernel::{CheckReport, Policy, Recorder};

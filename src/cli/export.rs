@@ -6,8 +6,8 @@ use clap::{Args, Subcommand};
 
 use super::replay::Stimuli;
 use super::{SensorArgs, say, sdf};
+use crate::bench::{StimulusPlan, export_annotated_verilog, export_netlist, export_verilog};
 use crate::chip::sensor;
-use crate::engine::{StimulusPlan, export_annotated_verilog, export_netlist, export_verilog};
 use crate::netlist::Netlist;
 
 /// What to export.

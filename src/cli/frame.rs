@@ -9,10 +9,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use super::{SceneArgs, say};
+use crate::analysis::{TimingVerdict, VerdictReport};
+use crate::bench::recording::check_exposure;
 use crate::chip::WindowLaw;
 use crate::chip::{SensorConfig, Silicon};
-use crate::engine::recording::check_exposure;
-use crate::engine::timing::{TimingVerdict, VerdictReport};
 use crate::engine::waveform::WaveCycles;
 use crate::engine::{CohortOptions, Work};
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};

@@ -12,7 +12,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use super::{SceneArgs, say};
-use crate::engine::recording::check_exposure;
+use crate::bench::recording::check_exposure;
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::report::{Axis, Chart, Grid, Style};
 use crate::system::pareto::{Done, GATE_CYCLES, Method, ParetoSettings, Point, Summary, summarise};

@@ -10,14 +10,12 @@ use rayon::prelude::*;
 use super::sdf::annotated_timing;
 use super::silicon::SiliconArgs;
 use super::{SensorArgs, say};
+use crate::analysis::{TimingVerdict, VerdictReport};
+use crate::bench::recording::{Recording, check_exposure, read_events, read_starts};
+use crate::bench::{HardwareEventKind, HardwareEventReport};
 use crate::chip::{Exposure, SensorConfig, Silicon, WindowLaw};
-use crate::engine::recording::{Recording, check_exposure, read_events, read_starts};
-use crate::engine::timing::{TimingVerdict, VerdictReport};
 use crate::engine::waveform::{self, View};
-use crate::engine::{
-    Cancelling, ClosedFormCoverage, EngineError, GateSimulation, HardwareEventKind,
-    HardwareEventReport, Runner, Timed,
-};
+use crate::engine::{Cancelling, ClosedFormCoverage, EngineError, GateSimulation, Runner, Timed};
 use crate::files::{InputError, OutputFile};
 use crate::kernel::{CheckReport, Observer, Policy};
 use crate::photon::SpadEvent;

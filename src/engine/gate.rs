@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use super::hardware_events::HardwareEvents;
 use super::lanes::LaneSimulation;
-use super::stimulus::{Schedule, StimulusPlan};
 use super::{Engine, EngineError, follows};
+use crate::bench::{HardwareEvents, Schedule, StimulusPlan};
 use crate::chip::{
     ChipTiming, Exposure, Probe, Probes, SensorConfig, SensorPins, Silicon, WindowLaw, front_end,
     sensor,

@@ -6,7 +6,7 @@
 use bitvec::vec::BitVec;
 
 use super::EngineError;
-use super::stimulus::{Schedule, StimulusPlan};
+use crate::bench::{Schedule, StimulusPlan};
 use crate::chip::{
     Exposure, Probe, Probes, SPADS, SensorConfig, SensorPins, Silicon, load_path, sensor,
 };

@@ -1,6 +1,6 @@
 //! Loads a whole array at gate level: serial bits into the netlist of deserialiser, row scanner and memories.
 
-use super::stimulus::load_stimulus;
+use crate::bench::load_stimulus;
 use crate::chip::{LoadPins, SensorConfig, Silicon, load_path, probes};
 use crate::kernel::{Kernel, Observer, Statistics};
 use crate::netlist::Netlist;

@@ -17,15 +17,10 @@ mod cancelling;
 pub mod cohort;
 mod cycle;
 mod gate;
-mod hardware_events;
 mod lanes;
 mod light;
 pub mod load;
-pub mod recording;
-mod stimulus;
-mod testbench;
 mod timed;
-pub mod timing;
 pub mod waveform;
 mod window;
 
@@ -33,13 +28,10 @@ pub use cancelling::Cancelling;
 pub use cohort::{Cohort, CohortOptions};
 pub use cycle::{Cycle, PackedPulses, Unlevelled};
 pub use gate::{Gate, GateSimulation};
-pub use hardware_events::{HardwareEvent, HardwareEventKind, HardwareEventReport, HardwareEvents};
 pub use lanes::LaneSimulation;
 pub use light::{
     Exposed, LitPixel, Work, expose, expose_without_skipping, full_stream, stream_config,
 };
-pub use stimulus::{Schedule, StimulusPlan};
-pub use testbench::{export_annotated_verilog, export_netlist, export_verilog};
 pub use timed::{ClosedFormCoverage, Runner, Timed, TimedHistograms};
 pub use window::Window;
 

@@ -1,11 +1,11 @@
 //! Claims 2 to 6: what the thesis says of the chip, measured on its netlist.
 
 use super::claim::{Published::*, Row};
+use crate::analysis::{MacropixelTiming, gate_works, phases, ripple, shortest_period};
 use crate::chip::{
     Exposure, Limits, PCounter, Probe, SensorConfig, Silicon, load_path, p_counter,
     p_counter_timing,
 };
-use crate::engine::timing::{MacropixelTiming, gate_works, phases, ripple, shortest_period};
 use crate::engine::{GateSimulation, load};
 use crate::kernel::Recorder;
 use crate::netlist::{CellKind, Corner};

@@ -1,10 +1,10 @@
 //! Every variant of the P-counter in one table: transistors, delays, glitches and the shortest CLK period.
 
+use guided_dtof::analysis::{MacropixelTiming, gate_works, ripple, shortest_period};
 use guided_dtof::chip::{
     AfterBorrow, Limits, PCounter, Probe, Probes, SensorConfig, Silicon, Tap, macropixel,
     p_counter, p_counter_timing,
 };
-use guided_dtof::engine::timing::{MacropixelTiming, gate_works, ripple, shortest_period};
 use guided_dtof::kernel::{Drive, Kernel, Recorder, in_order};
 use guided_dtof::netlist::{CellKind, Corner, Edge, NetId, Netlist, StaticTiming};
 use guided_dtof::report::{Checks, Grid};

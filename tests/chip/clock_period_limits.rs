@@ -1,14 +1,14 @@
 //! What static timing allows is what the gates can do: CLK and LOAD_CLK periods, the reset pulse, the correlation
 //! path; nominal, derated and with mismatch.
 
+use guided_dtof::analysis::{
+    CorrelationTiming, LoadTiming, LocalClocks, MacropixelTiming, TimingVerdict, corner_limits,
+    factor_range, gate_works, load_works, phases, reset, ripple, shortest_period, spread,
+};
 use guided_dtof::chip::{
     AfterBorrow, Exposure, Limits, Mode, PCounter, SensorConfig, Silicon, Window, WindowLaw,
 };
 use guided_dtof::engine::GateSimulation;
-use guided_dtof::engine::timing::{
-    CorrelationTiming, LoadTiming, LocalClocks, MacropixelTiming, TimingVerdict, corner_limits,
-    factor_range, gate_works, load_works, phases, reset, ripple, shortest_period, spread,
-};
 use guided_dtof::kernel::{CheckReport, Policy};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{CellKind, Corner, Library, Mismatch};

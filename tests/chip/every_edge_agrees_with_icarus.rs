@@ -33,7 +33,8 @@ use std::time::Instant;
 
 use every_edge::circuit::{self, Case};
 use every_edge::waves::{Figures, Waves};
-use guided_dtof::engine::{GateSimulation, StimulusPlan, export_verilog};
+use guided_dtof::bench::{StimulusPlan, export_verilog};
+use guided_dtof::engine::GateSimulation;
 use guided_dtof::kernel::{Drive, Kernel, merge};
 use guided_dtof::netlist::{
     Direction, Module, Netlist, Timing, write_cells, write_delays, write_modules,

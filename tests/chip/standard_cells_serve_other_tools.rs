@@ -11,8 +11,9 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use guided_dtof::bench::{StimulusPlan, export_netlist, export_verilog};
 use guided_dtof::chip::SensorConfig;
-use guided_dtof::engine::{GateSimulation, StimulusPlan, export_netlist, export_verilog};
+use guided_dtof::engine::GateSimulation;
 use guided_dtof::netlist::{CellKind, Corner, Library, write_cells, write_standard_cells};
 use icarus::Seen;
 use rand::{SeedableRng, rngs::StdRng};

@@ -6,8 +6,8 @@ use std::path::Path;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::section::{Cell, Section};
+use crate::analysis::{Spread, spread};
 use crate::chip::{SensorConfig, Silicon};
-use crate::engine::timing::{Spread, spread};
 use crate::files::InputError;
 use crate::report::{Axis, Chart, Style};
 
@@ -34,7 +34,7 @@ pub fn table(config: &SensorConfig, found: &Spread) -> Section {
     let ps = |seconds: f64| Cell::Number(Some(seconds * 1e12), 3);
     let count = |number: usize| Cell::Number(Some(number as f64), 0);
     let (slowest, tightest) = (found.slowest(), found.tightest());
-    let fails = |works: fn(&crate::engine::timing::PixelTiming) -> bool| {
+    let fails = |works: fn(&crate::analysis::PixelTiming) -> bool| {
         count(found.pixels.iter().filter(|p| !works(p)).count())
     };
     section.push(["mean ripple (ps)".into(), ps(found.mean_s)]);

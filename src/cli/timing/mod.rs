@@ -13,8 +13,8 @@ use self::section::{Cell, Section};
 use self::tables::Subject;
 use super::silicon::SiliconArgs;
 use super::{SensorArgs, say};
+use crate::analysis::{LoadTiming, TimingVerdict};
 use crate::chip::{Limits, Silicon};
-use crate::engine::timing::{LoadTiming, TimingVerdict};
 use crate::files::InputError;
 
 /// Arguments of `gdtof timing`.

@@ -1,11 +1,11 @@
 //! The tables of `gdtof timing`, one function each.
 
 use super::section::{Cell, Section};
-use crate::chip::{Limits, Probe, SensorConfig, Silicon};
-use crate::engine::timing::{
+use crate::analysis::{
     CorrelationTiming, LoadTiming, LocalClocks, MacropixelTiming, TimingVerdict, corner_limits,
     factor_range, gate_works, load_works, longest, phases, reset, ripple, shortest_period,
 };
+use crate::chip::{Limits, Probe, SensorConfig, Silicon};
 use crate::netlist::{CheckKind, Netlist, Path, Requirement};
 use crate::units::Time;
 

@@ -18,8 +18,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use super::stimulus::StimulusPlan;
 use super::{Cancelling, Cycle, Engine, EngineError, Gate, LaneSimulation, Window};
+use crate::bench::StimulusPlan;
 use crate::chip::timing::macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays};
 use crate::chip::{ChipTiming, Exposure, Mode, PCounter, SensorConfig, Silicon, WindowLaw, sensor};
 use crate::kernel::LANES;

@@ -12,6 +12,7 @@
 //! the arrival is uncertain: its *race* is then two spans that overlap. Orders that hold in any silicon scaled as a whole,
 //! but perhaps not in one whose cells differ, are asked for here. Whatever is not proven is in doubt.
 
+use crate::bench::Schedule;
 use crate::chip::p_counter::{Rises, starts_high};
 use crate::chip::timing::CounterTiming;
 use crate::chip::timing::macropixel::{CounterDelays, MacropixelDelays, Span, hull, spread};
@@ -19,7 +20,6 @@ use crate::chip::window_law::{Window, WindowLaw};
 use crate::chip::{
     AfterBorrow, ChipTiming, Exposure, Mode, Overflow, PCounter, SPADS, SensorConfig,
 };
-use crate::engine::Schedule;
 use crate::photon::SpadEvent;
 use crate::units::Time;
 

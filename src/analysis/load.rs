@@ -6,8 +6,8 @@
 
 use super::gates;
 use super::macropixel::worst_path;
+use crate::bench::load_stimulus;
 use crate::chip::{Limits, LoadPins, LoadProbe, SensorConfig, Silicon, load_path, probes};
-use crate::engine::stimulus::load_stimulus;
 use crate::kernel::{Kernel, TimingChecks};
 use crate::netlist::{
     CellKind, CheckKind, Edge, NetId, Netlist, Path, Requirement, Requirements, StaticTiming,
