@@ -1,0 +1,31 @@
+//! A window's edges: which photon times each start value's bins collect.
+//!
+//! `cargo run --release --example edges_of_a_window`
+
+use guided_dtof::chip::{Exposure, SensorConfig, Window, WindowLaw};
+
+fn main() {
+    let config = SensorConfig::default();
+    let exposure = Exposure::new(&config, 520, 1000);
+    let law = WindowLaw::new(&config, &exposure);
+    println!("start   opens after STOP       closes             strobe's slack");
+    for start in [0, 1, 16, 100, 511] {
+        match law.window(start) {
+            Window::Open(window) => {
+                let seen = law.interval(&window);
+                println!(
+                    "{start:5}   {:<20} {:<20} {}",
+                    seen.start, seen.end, window.slack
+                );
+            }
+            Window::Never => println!("{start:5}   LOCAL_STOP does not come"),
+            Window::Irregular(why) => println!("{start:5}   {why}"),
+            Window::Race(race) => println!("{start:5}   {race}"),
+        }
+    }
+    let window = law.window(100).open().expect("it is open");
+    for bin in [0, 1, 15] {
+        let times = law.bin_interval(&window, 0, bin);
+        println!("start 100, bin {bin:2}: {} to {}", times.start, times.end);
+    }
+}
