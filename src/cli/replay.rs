@@ -1,113 +1,30 @@
 //! `gdtof replay`: recorded SPAD events in, histograms out.
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
+mod histograms;
+mod stimuli;
+
+use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
+use super::say;
 use super::sdf::annotated_timing;
 use super::silicon::SiliconArgs;
-use super::{SensorArgs, say};
 use crate::analysis::{TimingVerdict, VerdictReport};
-use crate::bench::recording::{Recording, check_exposure, read_events, read_starts};
 use crate::bench::{HardwareEventKind, HardwareEventReport};
-use crate::chip::{Exposure, SensorConfig, Silicon, WindowLaw};
+use crate::chip::{SensorConfig, Silicon, WindowLaw};
 use crate::engine::waveform::{self, View};
 use crate::engine::{Cancelling, ClosedFormCoverage, EngineError, GateSimulation, Runner, Timed};
 use crate::files::{InputError, OutputFile};
 use crate::kernel::{CheckReport, Observer, Policy};
-use crate::photon::SpadEvent;
-use crate::report::{Table, write_npy_u16};
+use crate::report::Table;
 use crate::system::EngineKind;
 use crate::waves::WaveFormat;
-
-/// What is replayed.
-#[derive(Args)]
-pub struct StimulusArgs {
-    #[command(flatten)]
-    sensor: SensorArgs,
-    /// Start values: CSV `row,col,init`, one line for every macropixel.
-    #[arg(long, value_name = "FILE")]
-    inits: PathBuf,
-    /// Rising edges of SPAD_RAW: CSV `time_fs,row,col,spad` from the first rising edge of STOP.
-    #[arg(long, value_name = "FILE")]
-    events: PathBuf,
-    /// CLK periods in a laser cycle.
-    #[arg(long, value_name = "P")]
-    stop_periods: u32,
-    /// Laser cycles of the exposure.
-    #[arg(long, value_name = "N")]
-    laser_cycles: u32,
-}
-
-/// What is replayed, read and checked: shared with `gdtof export verilog`.
-pub struct Stimuli {
-    /// The chip.
-    pub config: SensorConfig,
-    /// Its clocks.
-    pub exposure: Exposure,
-    /// Start values, row-major.
-    pub starts: Vec<u16>,
-    /// SPAD pulses.
-    pub recording: Recording,
-}
-
-impl StimulusArgs {
-    /// Reads and checks everything.
-    ///
-    /// # Errors
-    /// One sentence about the first thing that cannot be.
-    pub fn read(&self) -> Result<Stimuli, InputError> {
-        let periods = (self.stop_periods, self.laser_cycles);
-        Stimuli::read(self.sensor.read()?, &self.inits, &self.events, periods)
-    }
-}
-
-impl Stimuli {
-    /// Reads start values and events of a sensor; `periods` are CLK periods in a laser cycle and laser cycles.
-    ///
-    /// # Errors
-    /// One sentence about the first thing that cannot be.
-    pub fn read(
-        config: SensorConfig,
-        inits: &Path,
-        events: &Path,
-        (stop_periods, laser_cycles): (u32, u32),
-    ) -> Result<Self, InputError> {
-        let exposure = check_exposure(&config, stop_periods, laser_cycles)?;
-        let starts = read_starts(inits, &config)?;
-        let recording = read_events(events, &config, &exposure)?;
-        let dropped = [
-            (
-                recording.lost_to_dead_time,
-                "fell into the dead time of their SPAD",
-            ),
-            (
-                recording.after_the_end,
-                "came after the end of the exposure",
-            ),
-        ];
-        for (count, what) in dropped.into_iter().filter(|(count, _)| *count > 0) {
-            eprintln!(
-                "gdtof: {count} of {} events {what} and were not used",
-                recording.read
-            );
-        }
-        Ok(Stimuli {
-            config,
-            exposure,
-            starts,
-            recording,
-        })
-    }
-
-    /// Pulses of every macropixel, row-major.
-    pub fn pulses(&self) -> Vec<&[SpadEvent]> {
-        self.recording.pulses.iter().map(Vec::as_slice).collect()
-    }
-}
+use histograms::{Format, write};
+pub use stimuli::Stimuli;
+use stimuli::StimulusArgs;
 
 /// Arguments of `gdtof replay`.
 #[derive(Args)]
@@ -457,53 +374,4 @@ fn replay(stimuli: &Stimuli, kind: EngineKind) -> anyhow::Result<Replayed> {
         cancelled: cancelled(stimuli),
         coverage: None,
     })
-}
-
-#[derive(Clone, Copy)]
-enum Format {
-    Npy,
-    Csv,
-}
-
-impl Format {
-    fn of(path: &Path) -> Result<Self, InputError> {
-        match path.extension().and_then(|e| e.to_str()) {
-            Some("npy") => Ok(Format::Npy),
-            Some("csv") => Ok(Format::Csv),
-            _ => {
-                let message = "is neither .npy nor .csv; choose one of the two";
-                Err(InputError::new(
-                    format!("--out {}", path.display()),
-                    message,
-                ))
-            }
-        }
-    }
-}
-
-fn write(
-    config: &SensorConfig,
-    histograms: &[Vec<u16>],
-    out: Option<&Path>,
-    format: Format,
-) -> anyhow::Result<()> {
-    let csv = |w: &mut dyn Write| {
-        writeln!(w, "row,col,bin,count")?;
-        for (pixel, histogram) in histograms.iter().enumerate() {
-            let (row, col) = (pixel / config.cols, pixel % config.cols);
-            for (bin, count) in histogram.iter().enumerate() {
-                writeln!(w, "{row},{col},{bin},{count}")?;
-            }
-        }
-        Ok(())
-    };
-    match (out, format) {
-        (None, _) => csv(&mut std::io::stdout().lock())?,
-        (Some(path), Format::Csv) => OutputFile::write_with(path, csv)?,
-        (Some(path), Format::Npy) => {
-            let shape = [config.rows, config.cols, config.bins].map(|n| n as u64);
-            write_npy_u16(path, &shape, &histograms.concat())?;
-        }
-    }
-    Ok(())
 }

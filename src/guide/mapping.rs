@@ -101,14 +101,14 @@ fn land(scene: &Scene, lidar: &PinholeCamera, point: &StereoPoint) -> Option<Lan
     Some(Landing {
         index: row as usize * lidar.width as usize + col as usize,
         off_centre2: du * du + dv * dv,
-        range_m: from_lidar.norm(),
+        range_m: from_lidar.length(),
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{GroundTruth, Object, Shape, Vec3};
+    use crate::scene::{DVec3, GroundTruth, Object, Shape};
 
     fn perfect_wall(z_m: f64) -> Scene {
         let mut scene = Scene::outdoor();
@@ -118,8 +118,8 @@ mod tests {
             name: "wall".into(),
             reflectivity: 0.5,
             shape: Shape::Plane {
-                centre_m: Vec3::new(0.0, 0.0, z_m),
-                normal: Vec3::new(0.0, 0.0, -1.0),
+                centre_m: DVec3::new(0.0, 0.0, z_m),
+                normal: DVec3::new(0.0, 0.0, -1.0),
                 width_m: 1e4,
                 height_m: 1e4,
             },
@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn a_perfect_rig_guides_every_pixel_to_the_truth() {
-        for position_m in [Vec3::default(), Vec3::new(-0.5, 0.1, 0.3)] {
+        for position_m in [DVec3::ZERO, DVec3::new(-0.5, 0.1, 0.3)] {
             let mut scene = perfect_wall(60.0);
             scene.stereo.position_m = position_m;
             let guide = GuideMap::estimate(&scene, 64, 64, 0);

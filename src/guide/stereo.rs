@@ -12,8 +12,10 @@
 //! Limits: errors of neighbouring pixels are independent, whereas a matcher smooths; there are
 //! no gross mismatches, and texture and light play no part.
 
+use glam::DVec3;
+
 use crate::photon::{Purpose, normal, random_stream};
-use crate::scene::{PinholeCamera, Ray, Scene, Stereo, Vec3};
+use crate::scene::{PinholeCamera, Ray, Scene, Stereo, turned};
 
 /// How much nearer than the expected point the right camera's view may end, as a share of the
 /// range, before the point counts as occluded: room for rounding on slanted surfaces.
@@ -39,7 +41,7 @@ pub struct StereoPoint {
     /// Estimated depth along the camera's axis, m (Z' of Eq. 26).
     pub depth_m: f64,
     /// The estimated point in the principal camera's coordinates (Eq. 31), m.
-    pub point_m: Vec3,
+    pub point_m: DVec3,
 }
 
 impl<'a> StereoRig<'a> {
@@ -93,22 +95,22 @@ impl<'a> StereoRig<'a> {
     }
 
     /// The image column at which the right camera sees `point_m`; `None` if it does not.
-    fn seen_by_right_camera(&self, point_m: Vec3) -> Option<f64> {
+    fn seen_by_right_camera(&self, point_m: DVec3) -> Option<f64> {
         let Stereo {
             baseline_m,
             position_m,
             yaw_error_deg,
             ..
         } = self.scene.stereo;
-        let origin = position_m + Vec3::new(baseline_m, 0.0, 0.0);
+        let origin = position_m + DVec3::new(baseline_m, 0.0, 0.0);
         let towards = point_m - origin;
         // The world seen from a camera turned to the right is the world turned to the left.
         let yaw_rad = yaw_error_deg.to_radians();
-        let in_camera = towards.turned((yaw_rad.cos(), -yaw_rad.sin()));
+        let in_camera = turned(towards, (yaw_rad.cos(), -yaw_rad.sin()));
         let (u, v) = self.camera.project(in_camera)?;
         self.camera.pixel_at((u, v))?;
         let first_m = self.scene.hit(&Ray::new(origin, towards))?.range_m;
-        let visible = first_m >= towards.norm() * (1.0 - OCCLUSION_TOLERANCE);
+        let visible = first_m >= towards.length() * (1.0 - OCCLUSION_TOLERANCE);
         visible.then_some(u)
     }
 
@@ -135,8 +137,8 @@ mod tests {
             name: "wall".into(),
             reflectivity: 0.5,
             shape: Shape::Plane {
-                centre_m: Vec3::new(0.0, 0.0, z_m),
-                normal: Vec3::new(0.0, 0.0, -1.0),
+                centre_m: DVec3::new(0.0, 0.0, z_m),
+                normal: DVec3::new(0.0, 0.0, -1.0),
                 width_m: 2.0 * half_width_m,
                 height_m: 1e4,
             },
@@ -207,11 +209,11 @@ mod tests {
         // A narrow post at 20 m before a wall at 60 m. The post covers columns of the left image
         // around its own, and hides a strip of wall from the right camera.
         let mut scene = scene_with(vec![wall(20.0, 0.25), wall(60.0, 1e4)]);
-        scene.stereo.position_m = Vec3::default();
+        scene.stereo.position_m = DVec3::ZERO;
         scene.stereo.disparity_sigma_px = 0.0;
         let rig = StereoRig::new(&scene, 0);
         let depth_at = |x_m: f64, z_m: f64| {
-            let (u, v) = rig.camera().project(Vec3::new(x_m, 0.0, z_m)).unwrap();
+            let (u, v) = rig.camera().project(DVec3::new(x_m, 0.0, z_m)).unwrap();
             rig.measure(v as u32, u as u32).map(|p| p.depth_m.round())
         };
         assert_eq!(depth_at(0.0, 20.0), Some(20.0));

@@ -4,7 +4,7 @@ use super::claim::{Published::*, Row};
 use super::design::HSLIDAR_BIN_M;
 use crate::guide::StereoRig;
 use crate::report::{Axis, Chart, Style};
-use crate::scene::{Object, Scene, Shape, Vec3};
+use crate::scene::{DVec3, Object, Scene, Shape};
 use crate::theory::design::{StereoPair, three_sigma, tolerated_sigma};
 
 /// Table 12's pair at full resolution: 12 mm lenses, 3.45 µm pixels, 1 m apart.
@@ -29,8 +29,8 @@ fn wall_at(depth_m: f64) -> Scene {
         name: "wall".into(),
         reflectivity: 0.1,
         shape: Shape::Plane {
-            centre_m: Vec3::new(0.0, 0.0, depth_m),
-            normal: Vec3::new(0.0, 0.0, -1.0),
+            centre_m: DVec3::new(0.0, 0.0, depth_m),
+            normal: DVec3::new(0.0, 0.0, -1.0),
             width_m: 1e4,
             height_m: 1e4,
         },

@@ -5,7 +5,7 @@
 //! i + 0.5. With focal length f in pixels and principal point (u₀, v₀), K is
 //! `[f 0 u₀; 0 f v₀; 0 0 1]`. The camera looks along +z from the origin of its own coordinates.
 
-use super::vector::Vec3;
+use glam::DVec3;
 
 /// A camera without distortion and with square pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,8 +40,8 @@ impl PinholeCamera {
     }
 
     /// The world point at depth z = 1 that pixel coordinates (u, v) see: K⁻¹·(u, v, 1), Eq. 30.
-    pub fn at_unit_depth(&self, (u, v): (f64, f64)) -> Vec3 {
-        Vec3::new(
+    pub fn at_unit_depth(&self, (u, v): (f64, f64)) -> DVec3 {
+        DVec3::new(
             (u - self.centre.0) / self.focal_px,
             (v - self.centre.1) / self.focal_px,
             1.0,
@@ -50,7 +50,7 @@ impl PinholeCamera {
 
     /// The pixel coordinates of a world point, Eq. 32 (with R = 1, T = 0), whether inside the
     /// image or not. `None` for points that are not in front of the camera.
-    pub fn project(&self, point: Vec3) -> Option<(f64, f64)> {
+    pub fn project(&self, point: DVec3) -> Option<(f64, f64)> {
         (point.z > 0.0).then(|| {
             (
                 self.focal_px * point.x / point.z + self.centre.0,
@@ -90,8 +90,8 @@ mod tests {
     #[test]
     fn nothing_behind_the_camera_is_seen() {
         let camera = PinholeCamera::centred(100.0, 64, 64);
-        assert_eq!(camera.project(Vec3::new(0.0, 0.0, -1.0)), None);
-        assert_eq!(camera.project(Vec3::default()), None);
+        assert_eq!(camera.project(DVec3::new(0.0, 0.0, -1.0)), None);
+        assert_eq!(camera.project(DVec3::ZERO), None);
         assert_eq!(camera.pixel_at((-0.1, 3.0)), None);
         assert_eq!(camera.pixel_at((64.0, 3.0)), None);
         assert_eq!(camera.pixel_at((63.9, 3.2)), Some((3, 63)));

@@ -4,6 +4,7 @@
 //! Coordinates in metres: x to the right, y down, z forward, the lidar at the origin.
 
 mod camera;
+mod entry;
 mod file;
 mod keys;
 mod light;
@@ -18,4 +19,7 @@ pub use light::SKY_REFLECTIVITY;
 pub use settings::{Lidar, Light, Scene, Stereo};
 pub use shape::{Object, Shape};
 pub use truth::{GroundTruth, Hit};
-pub use vector::{Ray, Vec3};
+pub use vector::{Ray, turned};
+
+/// A point or direction, m (or without unit): x right, y down, z forward.
+pub use glam::DVec3;

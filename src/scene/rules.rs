@@ -30,7 +30,7 @@ pub(super) fn check_stereo(stereo: &Stereo) -> Option<Fault> {
 /// The object at `path` is somewhere and faces somewhere.
 pub(super) fn check_object(path: &str, object: &Object) -> Option<Fault> {
     match object.shape {
-        Shape::Plane { normal, .. } if normal.norm() <= 1e-9 => Some(Fault {
+        Shape::Plane { normal, .. } if normal.length() <= 1e-9 => Some(Fault {
             path: format!("{path}.normal"),
             message: "normal = [0, 0, 0] is impossible; give a vector whose length is not zero"
                 .into(),

@@ -2,9 +2,10 @@
 
 use std::f64::consts::LN_2;
 
+use glam::DVec3;
+
 use super::camera::PinholeCamera;
 use super::shape::Object;
-use super::vector::Vec3;
 use crate::photon::{Atmosphere, Convention, PhotonBudget, Spot};
 use crate::units::Time;
 
@@ -102,7 +103,7 @@ pub struct Stereo {
     /// while the rig is reported to see down to about 15 m. 232 px is the disparity at 15 m.
     pub max_disparity_px: f64,
     /// Position of the principal camera, with the lidar at the origin, m.
-    pub position_m: Vec3,
+    pub position_m: DVec3,
     /// By how much the right camera has turned outwards since calibration, degrees (Fig. 70).
     pub yaw_error_deg: f64,
 }
@@ -119,7 +120,7 @@ impl Default for Stereo {
             subpixel_steps: 16,
             min_disparity_px: 10.0,
             max_disparity_px: 232.0,
-            position_m: Vec3::default(),
+            position_m: DVec3::ZERO,
             yaw_error_deg: 0.0,
         }
     }

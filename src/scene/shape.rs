@@ -1,6 +1,8 @@
 //! The things in a scene and where a ray meets them.
 
-use super::vector::{Ray, Vec3};
+use glam::DVec3;
+
+use super::vector::{Ray, turned};
 
 /// Hits nearer than this are the surface on which a ray starts, m.
 const NEAREST_M: f64 = 1e-6;
@@ -8,8 +10,8 @@ const NEAREST_M: f64 = 1e-6;
 /// A thing that reflects light, evenly and diffusely.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(
-    into = "super::file::ObjectEntry",
-    try_from = "super::file::ObjectEntry"
+    into = "super::entry::ObjectEntry",
+    try_from = "super::entry::ObjectEntry"
 )]
 pub struct Object {
     /// Name for reports and complaints.
@@ -31,9 +33,9 @@ pub enum Shape {
     /// A flat rectangle, seen from both sides.
     Plane {
         /// Its middle.
-        centre_m: Vec3,
+        centre_m: DVec3,
         /// Any vector at right angles to it, with any length but zero.
-        normal: Vec3,
+        normal: DVec3,
         /// Extent along the horizontal edge.
         width_m: f64,
         /// Extent along the other edge.
@@ -42,16 +44,16 @@ pub enum Shape {
     /// A box standing upright.
     Box {
         /// Its middle.
-        centre_m: Vec3,
+        centre_m: DVec3,
         /// Extents along x, y and z before turning.
-        size_m: Vec3,
+        size_m: DVec3,
         /// Turn about the vertical axis; positive takes its forward face to the right.
         yaw_deg: f64,
     },
     /// A ball.
     Sphere {
         /// Its middle.
-        centre_m: Vec3,
+        centre_m: DVec3,
         /// Its radius.
         radius_m: f64,
     },
@@ -85,19 +87,19 @@ fn in_front(range_m: f64) -> Option<f64> {
 
 fn intersect_plane(
     ray: &Ray,
-    centre_m: Vec3,
-    normal: Vec3,
+    centre_m: DVec3,
+    normal: DVec3,
     (width_m, height_m): (f64, f64),
 ) -> Option<f64> {
-    let normal = normal.unit();
+    let normal = normal.normalize();
     let range_m = in_front((centre_m - ray.origin).dot(normal) / ray.direction.dot(normal))?;
     // The first edge is horizontal; a plane that lies flat has no preferred one and takes x.
-    let down = Vec3::new(0.0, 1.0, 0.0);
+    let down = DVec3::new(0.0, 1.0, 0.0);
     let horizontal = down.cross(normal);
-    let along = if horizontal.norm() > 1e-9 {
-        horizontal.unit()
+    let along = if horizontal.length() > 1e-9 {
+        horizontal.normalize()
     } else {
-        Vec3::new(1.0, 0.0, 0.0)
+        DVec3::new(1.0, 0.0, 0.0)
     };
     let across = normal.cross(along);
     let offset = ray.at(range_m) - centre_m;
@@ -107,11 +109,11 @@ fn intersect_plane(
 }
 
 /// Slab method in the box's own coordinates.
-fn intersect_box(ray: &Ray, centre_m: Vec3, size_m: Vec3, yaw_rad: f64) -> Option<f64> {
+fn intersect_box(ray: &Ray, centre_m: DVec3, size_m: DVec3, yaw_rad: f64) -> Option<f64> {
     let back = (yaw_rad.cos(), -yaw_rad.sin());
-    let origin = (ray.origin - centre_m).turned(back).components();
-    let direction = ray.direction.turned(back).components();
-    let half = (size_m * 0.5).components();
+    let origin = turned(ray.origin - centre_m, back);
+    let direction = turned(ray.direction, back);
+    let half = size_m * 0.5;
     let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
     for axis in 0..3 {
         if direction[axis] == 0.0 {
@@ -131,7 +133,7 @@ fn intersect_box(ray: &Ray, centre_m: Vec3, size_m: Vec3, yaw_rad: f64) -> Optio
     in_front(enter).or_else(|| in_front(leave))
 }
 
-fn intersect_sphere(ray: &Ray, centre_m: Vec3, radius_m: f64) -> Option<f64> {
+fn intersect_sphere(ray: &Ray, centre_m: DVec3, radius_m: f64) -> Option<f64> {
     let to_centre = centre_m - ray.origin;
     let along_m = to_centre.dot(ray.direction);
     let miss = to_centre - ray.direction * along_m;
@@ -149,7 +151,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn ray(x: f64, y: f64, z: f64) -> Ray {
-        Ray::new(Vec3::default(), Vec3::new(x, y, z))
+        Ray::new(DVec3::ZERO, DVec3::new(x, y, z))
     }
 
     #[test]
@@ -164,8 +166,8 @@ mod tests {
     #[test]
     fn a_plane_ends_at_its_edges() {
         let plane = Shape::Plane {
-            centre_m: Vec3::new(0.0, 0.0, 10.0),
-            normal: Vec3::new(0.0, 0.0, -3.0),
+            centre_m: DVec3::new(0.0, 0.0, 10.0),
+            normal: DVec3::new(0.0, 0.0, -3.0),
             width_m: 4.0,
             height_m: 2.0,
         };
@@ -179,8 +181,8 @@ mod tests {
     #[test]
     fn a_turned_box_shows_its_corner() {
         let shape = Shape::Box {
-            centre_m: Vec3::new(0.0, 0.0, 10.0),
-            size_m: Vec3::new(2.0, 2.0, 2.0),
+            centre_m: DVec3::new(0.0, 0.0, 10.0),
+            size_m: DVec3::new(2.0, 2.0, 2.0),
             yaw_deg: 45.0,
         };
         let range_m = shape.intersect(&ray(0.0, 0.0, 1.0)).unwrap();
@@ -191,8 +193,8 @@ mod tests {
     fn a_positive_yaw_turns_the_front_to_the_right() {
         // A long thin box, turned by 30°: its near end is on the left, its far end on the right.
         let shape = Shape::Box {
-            centre_m: Vec3::new(0.0, 0.0, 10.0),
-            size_m: Vec3::new(0.1, 1.0, 8.0),
+            centre_m: DVec3::new(0.0, 0.0, 10.0),
+            size_m: DVec3::new(0.1, 1.0, 8.0),
             yaw_deg: 30.0,
         };
         assert!(
@@ -209,14 +211,14 @@ mod tests {
 
     #[test]
     fn from_inside_one_sees_the_far_wall() {
-        let centre_m = Vec3::default();
+        let centre_m = DVec3::ZERO;
         let sphere = Shape::Sphere {
             centre_m,
             radius_m: 3.0,
         };
         let cube = Shape::Box {
             centre_m,
-            size_m: Vec3::new(2.0, 2.0, 2.0),
+            size_m: DVec3::new(2.0, 2.0, 2.0),
             yaw_deg: 0.0,
         };
         assert_eq!(sphere.intersect(&ray(0.0, 0.0, 1.0)), Some(3.0));
@@ -226,10 +228,10 @@ mod tests {
     proptest! {
         #[test]
         fn hits_of_a_sphere_lie_on_it(x in -1.0f64..1.0, y in -1.0f64..1.0, radius_m in 0.1f64..3.0) {
-            let centre_m = Vec3::new(0.3, -0.2, 8.0);
+            let centre_m = DVec3::new(0.3, -0.2, 8.0);
             let ray = ray(x, y, 8.0);
             if let Some(range_m) = (Shape::Sphere { centre_m, radius_m }).intersect(&ray) {
-                prop_assert!(((ray.at(range_m) - centre_m).norm() - radius_m).abs() < 1e-6);
+                prop_assert!(((ray.at(range_m) - centre_m).length() - radius_m).abs() < 1e-6);
             }
         }
     }

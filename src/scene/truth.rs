@@ -3,8 +3,10 @@
 //! A macropixel is taken to see one point, the one on the ray through its centre; edges that
 //! cross a macropixel do not mix two distances.
 
+use glam::DVec3;
+
 use super::settings::Scene;
-use super::vector::{Ray, Vec3};
+use super::vector::Ray;
 
 /// The first surface point along a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,7 +62,7 @@ impl GroundTruth {
             .flat_map(|row| (0..cols).map(move |col| (row, col)))
             .map(|(row, col)| {
                 let centre = (f64::from(col) + 0.5, f64::from(row) + 0.5);
-                scene.hit(&Ray::new(Vec3::default(), camera.at_unit_depth(centre)))
+                scene.hit(&Ray::new(DVec3::ZERO, camera.at_unit_depth(centre)))
             })
             .collect();
         GroundTruth {
@@ -88,8 +90,8 @@ mod tests {
             name: "wall".into(),
             reflectivity: 0.4,
             shape: Shape::Plane {
-                centre_m: Vec3::new(0.0, 0.0, z_m),
-                normal: Vec3::new(0.0, 0.0, 1.0),
+                centre_m: DVec3::new(0.0, 0.0, z_m),
+                normal: DVec3::new(0.0, 0.0, 1.0),
                 width_m: 1e4,
                 height_m: 1e4,
             },
@@ -113,7 +115,7 @@ mod tests {
         let near = wall(20.0).objects[0].clone();
         scene.objects.push(near);
         let hit = scene
-            .hit(&Ray::new(Vec3::default(), Vec3::new(0.0, 0.0, 1.0)))
+            .hit(&Ray::new(DVec3::ZERO, DVec3::new(0.0, 0.0, 1.0)))
             .unwrap();
         assert_eq!((hit.range_m, hit.object), (20.0, 1));
     }

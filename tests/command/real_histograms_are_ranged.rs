@@ -12,7 +12,7 @@ use std::process::{Command, Output};
 use guided_dtof::chip::{Exposure, SensorConfig, WindowLaw};
 use guided_dtof::engine::{LitPixel, Window, expose, stream_config};
 use guided_dtof::photon::PhotonStream;
-use guided_dtof::scene::{GroundTruth, Object, Scene, Shape, Vec3};
+use guided_dtof::scene::{DVec3, GroundTruth, Object, Scene, Shape};
 
 fn range(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_gdtof"))
@@ -161,8 +161,8 @@ fn modelled_counts(
         name: "plane".into(),
         reflectivity,
         shape: Shape::Plane {
-            centre_m: Vec3::new(0.0, 0.0, distance_m),
-            normal: Vec3::new(0.0, 0.0, -1.0),
+            centre_m: DVec3::new(0.0, 0.0, distance_m),
+            normal: DVec3::new(0.0, 0.0, -1.0),
             width_m: 100.0,
             height_m: 100.0,
         },

@@ -1,0 +1,97 @@
+//! What is replayed or exported as a testbench: a sensor, its start values and recorded SPAD events.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::bench::recording::{Recording, check_exposure, read_events, read_starts};
+use crate::chip::{Exposure, SensorConfig};
+use crate::cli::SensorArgs;
+use crate::files::InputError;
+use crate::photon::SpadEvent;
+
+/// What is replayed.
+#[derive(Args)]
+pub struct StimulusArgs {
+    #[command(flatten)]
+    sensor: SensorArgs,
+    /// Start values: CSV `row,col,init`, one line for every macropixel.
+    #[arg(long, value_name = "FILE")]
+    inits: PathBuf,
+    /// Rising edges of SPAD_RAW: CSV `time_fs,row,col,spad` from the first rising edge of STOP.
+    #[arg(long, value_name = "FILE")]
+    events: PathBuf,
+    /// CLK periods in a laser cycle.
+    #[arg(long, value_name = "P")]
+    stop_periods: u32,
+    /// Laser cycles of the exposure.
+    #[arg(long, value_name = "N")]
+    laser_cycles: u32,
+}
+
+/// What is replayed, read and checked: shared with `gdtof export verilog`.
+pub struct Stimuli {
+    /// The chip.
+    pub config: SensorConfig,
+    /// Its clocks.
+    pub exposure: Exposure,
+    /// Start values, row-major.
+    pub starts: Vec<u16>,
+    /// SPAD pulses.
+    pub recording: Recording,
+}
+
+impl StimulusArgs {
+    /// Reads and checks everything.
+    ///
+    /// # Errors
+    /// One sentence about the first thing that cannot be.
+    pub fn read(&self) -> Result<Stimuli, InputError> {
+        let periods = (self.stop_periods, self.laser_cycles);
+        Stimuli::read(self.sensor.read()?, &self.inits, &self.events, periods)
+    }
+}
+
+impl Stimuli {
+    /// Reads start values and events of a sensor; `periods` are CLK periods in a laser cycle and laser cycles.
+    ///
+    /// # Errors
+    /// One sentence about the first thing that cannot be.
+    pub fn read(
+        config: SensorConfig,
+        inits: &Path,
+        events: &Path,
+        (stop_periods, laser_cycles): (u32, u32),
+    ) -> Result<Self, InputError> {
+        let exposure = check_exposure(&config, stop_periods, laser_cycles)?;
+        let starts = read_starts(inits, &config)?;
+        let recording = read_events(events, &config, &exposure)?;
+        let dropped = [
+            (
+                recording.lost_to_dead_time,
+                "fell into the dead time of their SPAD",
+            ),
+            (
+                recording.after_the_end,
+                "came after the end of the exposure",
+            ),
+        ];
+        for (count, what) in dropped.into_iter().filter(|(count, _)| *count > 0) {
+            eprintln!(
+                "gdtof: {count} of {} events {what} and were not used",
+                recording.read
+            );
+        }
+        Ok(Stimuli {
+            config,
+            exposure,
+            starts,
+            recording,
+        })
+    }
+
+    /// Pulses of every macropixel, row-major.
+    pub fn pulses(&self) -> Vec<&[SpadEvent]> {
+        self.recording.pulses.iter().map(Vec::as_slice).collect()
+    }
+}
