@@ -258,7 +258,7 @@ struct Report<'a> {
     photons_expected: f64,
     work: Work,
     timing: &'a VerdictReport,
-    tolerance: Option<Kept>,
+    tolerance: Option<&'a Kept>,
     distance: DistanceLaw,
     load_bits: usize,
     load_time_s: f64,
@@ -296,7 +296,7 @@ impl<'a> Report<'a> {
             photons_expected: frame.photons_expected,
             work: frame.work,
             timing,
-            tolerance: frame.kept,
+            tolerance: frame.kept.as_ref(),
             distance: DistanceLaw::new(
                 &settings.sensor,
                 &settings.exposure,
@@ -365,6 +365,15 @@ fn table(args: &FrameArgs, timing: &VerdictReport, frame: &Frame) -> Table {
             "macropixels on window, cohort",
             format!("{}, {}", kept.on_window, kept.on_cohort),
         );
+        for (why, pixels) in kept.refused() {
+            table.push(format!("  refused by cohort: {why}"), pixels);
+        }
+        if kept.refused().next().is_some() {
+            table.push(
+                "  run time of those refused",
+                percent(kept.refused_run_time_share, 1.0),
+            );
+        }
     }
     let lost = work.lost_to_dead_time as f64;
     table.push(

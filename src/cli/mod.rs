@@ -108,7 +108,9 @@ fn is_bad_input(error: &anyhow::Error) -> bool {
         || matches!(error.downcast_ref::<EngineError>(), Some(e) if e.is_refusal())
         || match error.downcast_ref() {
             Some(FrameError::Input(_)) => true,
-            Some(FrameError::Engine(error)) => error.is_refusal(),
+            Some(FrameError::Engine(error) | FrameError::Refused { why: error, .. }) => {
+                error.is_refusal()
+            }
             _ => false,
         }
 }

@@ -116,6 +116,18 @@ pub enum FrameError {
     /// The engine cannot run this configuration.
     #[error(transparent)]
     Engine(#[from] EngineError),
+    /// The cohort engine cannot take all macropixels of a frame.
+    #[error(
+        "{why}; this is so for {refused} of {pixels} macropixels, which --tolerance leaves to the window engine"
+    )]
+    Refused {
+        /// The refusal of the first of them.
+        why: EngineError,
+        /// Macropixels that the engine refuses.
+        refused: usize,
+        /// Macropixels of the frame.
+        pixels: usize,
+    },
     /// The load path left other start values in the array than were sent.
     #[error(
         "the load path netlist left {found:?} in macropixel ({row}, {col}) where {sent} was sent"
@@ -238,6 +250,12 @@ pub fn take_frame(
             let (exposed, kept) = tolerance.expose(&stream, &pixels, exposed)?;
             (exposed, Some(kept))
         }
+        (None, true) if *engine_kind == EngineKind::Cohort => {
+            let cohort = Cohort::new(sensor, exposure, *cohort);
+            let refused = |why| refused_by(&cohort, &stream, &pixels, why);
+            let exposed = expose(&cohort, &stream, &pixels, exposed).map_err(refused)?;
+            (exposed, None)
+        }
         (None, true) => (expose(&*engine, &stream, &pixels, exposed)?, None),
         (None, false) => {
             let exposed = expose_without_skipping(&*engine, &stream, &pixels, exposed)?;
@@ -341,6 +359,27 @@ pub fn take_frame(
         probes: probes.iter().map(|p| (p.row, p.col)).collect(),
         times,
     })
+}
+
+/// The refusal of a frame by the cohort engine, with how much of the frame it is about.
+fn refused_by(
+    cohort: &Cohort,
+    stream: &PhotonStream,
+    pixels: &[LitPixel],
+    why: EngineError,
+) -> FrameError {
+    let is_refused = |pixel: &&LitPixel| {
+        let light = pixel.light.as_ref();
+        light.is_some_and(|light| {
+            let cohorts = cohort.cohorts_in_steps(stream.config(), pixel.start, light);
+            cohorts.is_err()
+        })
+    };
+    FrameError::Refused {
+        why,
+        refused: pixels.par_iter().filter(is_refused).count(),
+        pixels: pixels.len(),
+    }
 }
 
 fn run_probe(

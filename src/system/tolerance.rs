@@ -8,45 +8,68 @@
 //! Both follow one law of echoes ([`crate::photon::EchoLaw`]).
 //!
 //! Macropixels without light, or whose bound cannot be kept, go to the window engine, as do those in which it is the
-//! cheaper one.
+//! cheaper one ([`super::price`]) and those that the cohort engine refuses ([`OnWindow`]).
+
+use std::collections::BTreeMap;
+use std::time::Instant;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::price;
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
-use crate::engine::{Cohort, CohortOptions, EngineError, Exposed, LitPixel, Window, Work, expose};
-use crate::photon::{PhotonStream, PixelLight, SPADS};
+use crate::engine::{
+    Cohort, CohortOptions, Engine, EngineError, Exposed, LitPixel, Window, Work, expose,
+};
+use crate::photon::{PhotonStream, PixelLight};
 use crate::ranging::{PeakOptions, interpolate};
 
 /// The part of a bin's counting noise to which its mean is known for the bound.
 const BOUND_ERROR: f64 = 0.001;
 
-/// Photons that the window engine handles in the time in which the cohort engine computes what SPADs do in light that is
-/// far from even: means for the bound at both exactnesses, and once more to draw.
-const PHOTONS_PER_LIGHT: f64 = 6000.0;
-
-/// Photons that the window engine handles in the time of one bin of the cohort engine, where it pools laser
-/// cycles.
-const PHOTONS_PER_POOL: f64 = 30.0;
-
-/// The same where it follows their joint state: with every SPAD ready, and for each one that is blind on average. Fitted to macropixels of 16 000 laser cycles under 8 and 50 Mcounts/s.
-const PHOTONS_PER_JOINT: [f64; 2] = [300.0, 3000.0];
-
-/// The same in the time of one photon where blinding light makes the window engine draw whole laser cycles and sort them.
-const PHOTONS_PER_SORTED: f64 = 15.0;
-
 /// Totals to which mean counts are scaled before they are rounded to whole ones: a depth keeps nine digits.
 const WHOLE_COUNTS: f64 = 1e9;
 
-/// How a macropixel is exposed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Choice {
-    Window,
-    Cohort,
+/// Why a macropixel is on the window engine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OnWindow {
+    /// No light, or no error allowed: there is no choice.
+    NoChoice,
+    /// The window engine is the cheaper one.
+    Cheaper,
+    /// The bound on the depth error is larger than the tolerance, or there is no depth.
+    BeyondTolerance,
+    /// The cohort engine refuses: laser cycles may depend on each other.
+    CyclesDepend,
+    /// The cohort engine refuses: it does not know its means exactly enough.
+    NotExact,
+    /// The cohort engine refuses: its model leaves this light or these SPADs out.
+    NotModelled,
+}
+
+impl OnWindow {
+    /// What stands behind a refusal of the cohort engine, in words; `None` where it did not refuse.
+    pub fn refusal(self) -> Option<&'static str> {
+        match self {
+            OnWindow::NoChoice | OnWindow::Cheaper | OnWindow::BeyondTolerance => None,
+            OnWindow::CyclesDepend => Some("laser cycles may depend on each other"),
+            OnWindow::NotExact => Some("means not exact enough"),
+            OnWindow::NotModelled => Some("light or SPADs that it does not model"),
+        }
+    }
+
+    fn refused(error: &EngineError) -> Self {
+        match error {
+            EngineError::CyclesNotIndependent { .. } => OnWindow::CyclesDepend,
+            EngineError::CoarseCohorts { .. } => OnWindow::NotExact,
+            _ => OnWindow::NotModelled,
+        }
+    }
 }
 
 /// What was chosen, and the bound that it keeps.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Kept {
     /// What was asked for, m.
     pub tolerance_m: f64,
@@ -54,8 +77,20 @@ pub struct Kept {
     pub bound_m: f64,
     /// Macropixels on the window engine.
     pub on_window: usize,
+    /// These by the reason why they are there.
+    pub on_window_by_reason: BTreeMap<OnWindow, usize>,
     /// Macropixels on the cohort engine.
     pub on_cohort: usize,
+    /// Share of the exposure's run time, planning included, that macropixels took which the cohort engine refused.
+    pub refused_run_time_share: f64,
+}
+
+impl Kept {
+    /// Macropixels that the cohort engine refused, by the reason in words.
+    pub fn refused(&self) -> impl Iterator<Item = (&'static str, usize)> {
+        let reasons = self.on_window_by_reason.iter();
+        reasons.filter_map(|(why, &pixels)| Some((why.refusal()?, pixels)))
+    }
 }
 
 /// A frame's chip and clocks, and the depth error that it may have.
@@ -104,37 +139,46 @@ impl Tolerance<'_> {
             peak,
             window: &window,
             stream,
-            bins: config.bins,
+            config,
         };
-        let plan: Vec<(Choice, f64)> = pixels
+        let begin = Instant::now();
+        let plan: Vec<Result<f64, OnWindow>> = pixels
             .par_iter()
             .map(|pixel| planner.choose(pixel, tolerance_m))
             .collect();
 
         let mut kept = Kept {
             tolerance_m,
-            bound_m: plan.iter().map(|(_, bound_m)| *bound_m).fold(0.0, f64::max),
+            bound_m: plan.iter().flatten().copied().fold(0.0, f64::max),
+            on_cohort: plan.iter().flatten().count(),
             ..Kept::default()
+        };
+        kept.on_window = pixels.len() - kept.on_cohort;
+        for &why in plan.iter().filter_map(|choice| choice.as_ref().err()) {
+            *kept.on_window_by_reason.entry(why).or_default() += 1;
+        }
+        let is_refused = |choice: &Result<f64, OnWindow>| match choice {
+            Ok(_) => false,
+            Err(why) => why.refusal().is_some(),
         };
         let mut histograms = vec![Vec::new(); pixels.len()];
         let mut work = Work::default();
-        for choice in [Choice::Window, Choice::Cohort] {
-            let members: Vec<usize> = (0..pixels.len()).filter(|&i| plan[i].0 == choice).collect();
+        let mut run = |engine: &dyn Engine, takes: &dyn Fn(&Result<f64, OnWindow>) -> bool| {
+            let begin = Instant::now();
+            let members: Vec<usize> = (0..pixels.len()).filter(|&i| takes(&plan[i])).collect();
             let chosen: Vec<LitPixel> = members.iter().map(|&i| pixels[i]).collect();
-            let exposed = match choice {
-                Choice::Window => {
-                    kept.on_window = members.len();
-                    expose(&window, stream, &chosen, &done)?
-                }
-                Choice::Cohort => {
-                    kept.on_cohort = members.len();
-                    expose(&cohort, stream, &chosen, &done)?
-                }
-            };
+            let exposed = expose(engine, stream, &chosen, &done)?;
             work += exposed.work;
             for (pixel, counts) in members.into_iter().zip(exposed.histograms) {
                 histograms[pixel] = counts;
             }
+            Ok::<_, EngineError>(begin.elapsed())
+        };
+        run(&cohort, &|choice| choice.is_ok())?;
+        run(&window, &|choice| choice.is_err() && !is_refused(choice))?;
+        let refused = run(&window, &is_refused)?;
+        if kept.refused().next().is_some() {
+            kept.refused_run_time_share = refused.as_secs_f64() / begin.elapsed().as_secs_f64();
         }
         Ok((Exposed { histograms, work }, kept))
     }
@@ -147,49 +191,44 @@ struct Planner<'a> {
     peak: &'a PeakOptions,
     window: &'a Window<'a>,
     stream: &'a PhotonStream,
-    bins: usize,
+    config: &'a SensorConfig,
 }
 
 impl Planner<'_> {
-    /// The cheapest way to expose `pixel` and the bound on its depth error, m.
-    fn choose(&self, pixel: &LitPixel, tolerance_m: f64) -> (Choice, f64) {
-        let exact = (Choice::Window, 0.0);
-        let Some(light) = pixel.light.as_ref().filter(|_| tolerance_m > 0.0) else {
-            return exact;
-        };
-        let stream = self.stream.config();
-        let window_s = self.bins as f64 / stream.clock.as_hz();
-        let per_cycle = light.background_hz * window_s + light.signal_per_cycle;
-        let handled = match self.window.draws_whole_cycles(self.stream, pixel) {
-            true => PHOTONS_PER_SORTED * light.photons_per_cycle(stream),
-            false => per_cycle,
-        };
-        let photons = handled * f64::from(stream.laser_cycles);
-        let per_dead_time = per_cycle / window_s * stream.spads.dead_time.as_s();
-        let blind = per_dead_time / (1.0 + per_dead_time / SPADS as f64);
-        let [ready, more] = PHOTONS_PER_JOINT;
-        let per_bin = match self.cohort.pools(stream, pixel.start, light) {
-            Ok(true) => PHOTONS_PER_POOL,
-            Ok(false) => ready + more * blind,
-            Err(_) => return exact,
-        };
-        if self.bins as f64 * per_bin + PHOTONS_PER_LIGHT >= photons {
-            return exact;
+    /// The bound on the depth error of `pixel` on the cohort engine, m, where that is the cheaper one and keeps it.
+    fn choose(&self, pixel: &LitPixel, tolerance_m: f64) -> Result<f64, OnWindow> {
+        let light = pixel.light.as_ref().filter(|_| tolerance_m > 0.0);
+        let light = light.ok_or(OnWindow::NoChoice)?;
+        let window_ns = price::window_ns(self.window, self.config, self.stream, pixel, light);
+        if window_ns <= price::BOUND_NS {
+            return Err(OnWindow::Cheaper);
         }
-        match self.bound_m(pixel, light) {
-            Some(bound_m) if bound_m <= tolerance_m => (Choice::Cohort, bound_m),
-            _ => exact,
+        let refused = |error| OnWindow::refused(&error);
+        let cohort_ns = price::cohort_ns(self.cohort, self.stream, pixel.start, light);
+        if window_ns <= cohort_ns.map_err(refused)? {
+            return Err(OnWindow::Cheaper);
+        }
+        match self.bound_m(pixel, light).map_err(refused)? {
+            Some(bound_m) if bound_m <= tolerance_m => Ok(bound_m),
+            _ => Err(OnWindow::BeyondTolerance),
         }
     }
 
-    /// Bound on what the cohort engine adds to the depth of `pixel` on average, m; `None` where there is no depth, or where
-    /// it refuses.
-    fn bound_m(&self, pixel: &LitPixel, light: &PixelLight) -> Option<f64> {
+    /// Bound on what the cohort engine adds to the depth of `pixel` on average, m; `None` where there is no depth.
+    ///
+    /// # Errors
+    /// As [`Cohort::draw`].
+    fn bound_m(&self, pixel: &LitPixel, light: &PixelLight) -> Result<Option<f64>, EngineError> {
         let stream = self.stream.config();
-        let means = |cohort: &Cohort| cohort.expected(stream, pixel.start, light).ok();
-        let exact = means(self.exact)?;
-        let drawn_m = self.depth_m(pixel, &means(self.cohort)?)?;
-        let exact_m = self.depth_m(pixel, &exact)?;
+        let exact = self.exact.expected(stream, pixel.start, light)?;
+        let drawn = self.cohort.expected(stream, pixel.start, light)?;
+        Ok(self.bound_between_m(pixel, &exact, &drawn))
+    }
+
+    /// As [`Planner::bound_m`], from means at both exactnesses.
+    fn bound_between_m(&self, pixel: &LitPixel, exact: &[f64], drawn: &[f64]) -> Option<f64> {
+        let drawn_m = self.depth_m(pixel, drawn)?;
+        let exact_m = self.depth_m(pixel, exact)?;
         // What is left of the error is worst where it has one sign before the peak and the other after it.
         let (peak, _) = exact
             .iter()

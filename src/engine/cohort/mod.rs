@@ -37,6 +37,7 @@ mod alone;
 mod blindness;
 mod cycles;
 mod draw;
+mod effort;
 mod fine;
 mod grid;
 mod hits;
@@ -239,22 +240,32 @@ impl<'a> Cohort<'a> {
                 <= WORTH_LOOKING_AT * steps.per_period as f64
     }
 
-    /// Whether a macropixel's settled laser cycles are pooled, which is some thirty times as fast as following their
-    /// joint state.
+    /// Cohorts that [`Cohort::draw`] follows, summed over the steps of the window: what its time goes with, estimated.
     ///
     /// # Errors
     /// As [`Cohort::draw`].
-    pub fn pools(
+    pub fn cohorts_in_steps(
         &self,
         stream: &StreamConfig,
         start: u16,
         light: &PixelLight,
-    ) -> Result<bool, EngineError> {
-        let cohorts = self.cohorts(stream, start, light)?;
-        let most = |cohorts: Vec<LikeCycles>| cohorts.into_iter().max_by_key(|like| like.cycles);
-        Ok(cohorts
-            .and_then(most)
-            .is_none_or(|like| self.is_pooled(&like.blindness, &like.steps, like.cycles)))
+    ) -> Result<f64, EngineError> {
+        let of = |like: LikeCycles| {
+            let LikeCycles {
+                cycles,
+                blindness,
+                steps,
+                ..
+            } = &like;
+            match *cycles {
+                0 => 0.0,
+                1 => steps.means.len() as f64,
+                _ if self.is_pooled(blindness, steps, *cycles) => steps.means.len() as f64,
+                _ => effort::of_joint_states(&like),
+            }
+        };
+        let cohorts = self.cohorts(stream, start, light)?.unwrap_or_default();
+        Ok(cohorts.into_iter().map(of).sum())
     }
 
     /// Mean of every bin of [`Cohort::hits`], computed.

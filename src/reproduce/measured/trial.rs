@@ -18,9 +18,10 @@
 
 use rayon::prelude::*;
 
+use crate::chip::window_law::OpenWindow;
 use crate::chip::{ChipTiming, EventType, Exposure, SensorConfig, WindowLaw, histogram};
 use crate::engine::{Cohort, CohortOptions, Engine, EngineError, LitPixel, Window, stream_config};
-use crate::photon::{PhotonStream, PixelLight, SPADS};
+use crate::photon::{PhotonStream, PixelLight, SPADS, StreamConfig};
 use crate::theory::detection::PerCycle;
 use crate::units::Time;
 
@@ -104,16 +105,14 @@ const NOT_BLINDING: f64 = 3.0;
 /// Photons on one SPAD in a CLK period below which laser cycles are pooled, at next to no cost.
 const DIM: f64 = 0.01;
 
-/// Photons on one SPAD in a step of the cohort engine, at most: the dead time's end is true to the first order in them.
-const A_STEP: f64 = 0.07;
-
 /// Microseconds that a frame may take; longer ones are fewer, down to a least number.
 const AFFORDABLE_US: f64 = 150.0;
 const FEWEST: usize = 60;
 
-/// What a photon takes in the window engine, and in the cohort engine's joint states a step, µs.
+/// What a photon takes in the window engine, and a cohort in a step of the cohort engine, µs: of the order of what
+/// `cargo bench --bench prices` measures.
 const DRAWN_US: f64 = 0.05;
-const JOINT_US: f64 = 1.0;
+const COHORT_US: f64 = 0.5;
 
 /// Frames that a thread exposes in one go.
 const CHUNK: usize = 64;
@@ -122,8 +121,7 @@ const CHUNK: usize = 64;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Maker {
     Window,
-    /// With so many steps to a CLK period.
-    Cohort(usize),
+    Cohort,
 }
 
 impl Trial {
@@ -206,29 +204,33 @@ impl Trial {
         }
     }
 
-    /// The engine that is the quickest and true enough.
+    /// The engine that is the quickest; window where the cohort engine refuses.
     fn maker(&self) -> Maker {
-        let sensor = &self.sensor;
         let on_spad = (self.signal + self.background()) / SPADS as f64;
-        let blinding = self.background_hz * 1e-9 * sensor.dead_time_ns > NOT_BLINDING;
-        if sensor.dead_time() < sensor.clock().period() {
-            Maker::Window
-        } else if on_spad < DIM {
-            Maker::Cohort(1)
-        } else if !blinding && self.photons() <= WORTH_DRAWING {
+        let blinding = self.background_hz * 1e-9 * self.sensor.dead_time_ns > NOT_BLINDING;
+        let is_worth_drawing = !blinding && self.photons() <= WORTH_DRAWING;
+        if on_spad >= DIM && is_worth_drawing || self.cohorts().is_none() {
             Maker::Window
         } else {
-            Maker::Cohort((on_spad / A_STEP).ceil() as usize)
+            Maker::Cohort
         }
+    }
+
+    /// Cohorts that the cohort engine follows for a frame; `None` where it refuses.
+    fn cohorts(&self) -> Option<f64> {
+        let frames = Frames::new(self, 0, self.sensor.threshold);
+        let (pixel, light) = frames.pixel(0, 0.0);
+        let cohorts = frames
+            .cohort()
+            .cohorts_in_steps(&frames.stream, pixel.start, &light);
+        cohorts.ok()
     }
 
     /// How many of `frames` frames to afford: fewer where an exposure takes very many photons.
     pub fn affordable(&self, frames: usize) -> usize {
-        let on_spad = (self.signal + self.background()) / SPADS as f64;
         let cost_us = match self.maker() {
             Maker::Window => DRAWN_US * self.photons(),
-            Maker::Cohort(_) if on_spad < DIM => 0.0,
-            Maker::Cohort(steps) => JOINT_US * steps as f64 * self.photons(),
+            Maker::Cohort => COHORT_US * self.cohorts().unwrap_or(0.0),
         };
         let share = (AFFORDABLE_US / cost_us).min(1.0);
         ((share * frames as f64) as usize).max(FEWEST.min(frames))
@@ -279,48 +281,78 @@ impl Trial {
         shift: &(impl Fn(usize) -> f64 + Sync),
         threshold: u8,
     ) -> Result<Vec<Vec<u64>>, EngineError> {
+        let setup = Frames::new(self, seed, threshold);
+        let numbers: Vec<usize> = (0..frames).collect();
+        if self.maker() == Maker::Cohort {
+            let engine = setup.cohort();
+            let histograms = numbers.par_iter().map(|&frame| {
+                let (pixel, light) = setup.pixel(frame, shift(frame));
+                engine.hits(&setup.stream, pixel.number, pixel.start, &light)
+            });
+            return histograms.collect();
+        }
+        let engine = Window::new(&setup.sensor, &setup.exposure);
+        let stream = PhotonStream::new(&setup.stream);
+        let chunks = numbers.par_chunks(CHUNK).map(|chunk| {
+            let pixels = chunk
+                .iter()
+                .map(|&frame| setup.pixel(frame, shift(frame)).0);
+            let pixels: Vec<LitPixel> = pixels.collect();
+            Ok(engine.expose(&stream, &pixels)?.histograms)
+        });
+        let chunks: Vec<Vec<Vec<u16>>> = chunks.collect::<Result<_, EngineError>>()?;
+        let widen = |bins: Vec<u16>| bins.into_iter().map(u64::from).collect();
+        Ok(chunks.into_iter().flatten().map(widen).collect())
+    }
+}
+
+/// What the frames of a trial share, on counters that hold all events.
+struct Frames<'t> {
+    trial: &'t Trial,
+    sensor: SensorConfig,
+    exposure: Exposure,
+    stream: StreamConfig,
+    law: WindowLaw,
+    window: OpenWindow,
+}
+
+impl<'t> Frames<'t> {
+    fn new(trial: &'t Trial, seed: u64, threshold: u8) -> Self {
         let sensor = SensorConfig {
             threshold,
             bin_bits: 16,
-            ..self.sensor.clone()
+            ..trial.sensor.clone()
         };
-        let exposure = Exposure::new(&sensor, self.stop_periods, self.cycles);
-        let sigma = Time::from_s(1e-9 * self.sigma_ns);
-        let config = stream_config(&sensor, &exposure, seed, sigma);
+        let exposure = Exposure::new(&sensor, trial.stop_periods, trial.cycles);
+        let sigma = Time::from_s(1e-9 * trial.sigma_ns);
         let law = WindowLaw::new(&sensor, &exposure);
-        let window = law.window(self.start).open();
-        let window = window.expect("a start value whose window opens");
-        let pixel = |frame: usize| LitPixel {
+        let window = law.window(trial.start).open();
+        Frames {
+            trial,
+            stream: stream_config(&sensor, &exposure, seed, sigma),
+            window: window.expect("a start value whose window opens"),
+            sensor,
+            exposure,
+            law,
+        }
+    }
+
+    fn cohort(&self) -> Cohort<'_> {
+        Cohort::new(&self.sensor, &self.exposure, CohortOptions::default())
+    }
+
+    /// The macropixel of a frame, its echo `shift` bins after [`Trial::echo_bins`], and its light.
+    fn pixel(&self, frame: usize, shift: f64) -> (LitPixel, PixelLight) {
+        let light = PixelLight {
+            signal_per_cycle: self.trial.signal,
+            arrival: self.law.time_of(&self.window, self.trial.echo_bins + shift),
+            background_hz: self.trial.background_hz,
+        };
+        let pixel = LitPixel {
             number: frame as u32,
-            start: self.start,
-            light: Some(PixelLight {
-                signal_per_cycle: self.signal,
-                arrival: law.time_of(&window, self.echo_bins + shift(frame)),
-                background_hz: self.background_hz,
-            }),
+            start: self.trial.start,
+            light: Some(light),
         };
-        let numbers: Vec<usize> = (0..frames).collect();
-        let Maker::Cohort(sub_bins) = self.maker() else {
-            let engine = Window::new(&sensor, &exposure);
-            let stream = PhotonStream::new(&config);
-            let chunks = numbers.par_chunks(CHUNK).map(|chunk| {
-                let pixels: Vec<LitPixel> = chunk.iter().map(|&frame| pixel(frame)).collect();
-                Ok(engine.expose(&stream, &pixels)?.histograms)
-            });
-            let chunks: Vec<Vec<Vec<u16>>> = chunks.collect::<Result<_, EngineError>>()?;
-            let widen = |bins: Vec<u16>| bins.into_iter().map(u64::from).collect();
-            return Ok(chunks.into_iter().flatten().map(widen).collect());
-        };
-        let options = CohortOptions {
-            sub_bins: Some(sub_bins),
-            ..CohortOptions::default()
-        };
-        let engine = Cohort::new(&sensor, &exposure, options);
-        let histograms = numbers.par_iter().map(|&frame| {
-            let pixel = pixel(frame);
-            let light = pixel.light.expect("lit above");
-            engine.hits(&config, pixel.number, self.start, &light)
-        });
-        histograms.collect()
+        (pixel, light)
     }
 }

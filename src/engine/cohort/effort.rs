@@ -1,0 +1,79 @@
+//! How many cohorts a macropixel's window takes, without drawing any: what the engine's time goes with.
+//!
+//! Where laser cycles are pooled there is one cohort a step. Elsewhere there are as many as states that laser cycles are in:
+//! how many SPADs fired 1, 2, … steps ago. Of N cycles nearly all are within √(2 ln N) standard deviations of a state's
+//! mean along each age, and no more states are occupied than there are cycles.
+
+use super::blindness::Ages;
+use super::cycles::LikeCycles;
+use crate::photon::SPADS;
+
+/// Which part of √(2 ln N) standard deviations counts: with it the estimate is within a factor of two of the states that N
+/// cycles are in, from a few of them to thousands (the test below).
+const OCCUPIED: f64 = 0.9;
+
+/// States that `cycles` laser cycles are expected to be in, whose SPADs are in the state `ages` with these probabilities.
+pub fn occupied_states(ages: &Ages, cycles: u64) -> f64 {
+    let cycles = cycles as f64;
+    let reach = OCCUPIED * (2.0 * cycles.ln()).sqrt();
+    let deviation = |share: f64| (SPADS as f64 * share * (1.0 - share).max(0.0)).sqrt();
+    let states: f64 = ages
+        .aged
+        .iter()
+        .map(|&share| 1.0 + reach * deviation(share))
+        .product();
+    states * cycles / (states + cycles)
+}
+
+/// Cohorts of laser cycles alike, summed over the steps of a window.
+pub fn of_joint_states(like: &LikeCycles) -> f64 {
+    let mut ages = like.ages.clone();
+    let steps = like.steps.means.iter().enumerate();
+    steps
+        .map(|(step, &mean)| {
+            ages.step(&like.blindness, step, mean);
+            occupied_states(&ages, like.cycles)
+        })
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+    use crate::engine::cohort::blindness::Blindness;
+    use crate::photon::DeadTimeLaw;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+        #[test]
+        fn the_estimate_is_near_the_states_that_drawn_cycles_are_in(
+            dead_time in 1.0f64..4.0,
+            mean in 0.005f64..1.0,
+            cycles in 100u64..4_000,
+            seed in any::<u64>(),
+        ) {
+            use rand::{RngExt, SeedableRng};
+            let blindness = Blindness::new(DeadTimeLaw::NonParalysable, dead_time);
+            let ages = Ages::steady(&blindness, mean);
+            let mut random = rand::rngs::StdRng::seed_from_u64(seed);
+            let mut states = HashSet::new();
+            for _ in 0..cycles {
+                let mut state = vec![0u8; ages.aged.len()];
+                for _ in 0..SPADS {
+                    let mut at = random.random::<f64>();
+                    let age = ages.aged.iter().position(|share| {
+                        at -= share;
+                        at < 0.0
+                    });
+                    age.into_iter().for_each(|age| state[age] += 1);
+                }
+                states.insert(state);
+            }
+            let (drawn, estimated) = (states.len() as f64, occupied_states(&ages, cycles));
+            prop_assert!((0.5..2.0).contains(&(estimated / drawn)), "{estimated} for {drawn}");
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! Light in which steps of a CLK period are farthest from the truth: blinding echoes, echoes anywhere and of any width,
+//! afterpulses and crosstalk.
+
+use guided_dtof::chip::{Exposure, SensorConfig};
+use guided_dtof::engine::{Cohort, CohortOptions, Engine, LitPixel, Window, stream_config};
+use guided_dtof::photon::{DeadTimeLaw, PhotonStream, PixelLight};
+use guided_dtof::units::Time;
+use proptest::prelude::*;
+use rayon::prelude::*;
+
+use super::comparison::{Case, case, seeds};
+
+#[test]
+fn finer_steps_come_nearer_to_the_window_engine() {
+    let light = PixelLight {
+        background_hz: 600e6,
+        signal_per_cycle: 0.0,
+        ..case().light
+    };
+    let (sensor, seeds) = (SensorConfig::default(), seeds() / 8);
+    let exposure = Exposure::new(&sensor, 400, 30);
+    let stream = |seed| stream_config(&sensor, &exposure, seed, Time::from_ps(1_900));
+    let window = Window::new(&sensor, &exposure);
+    let pixel = LitPixel {
+        number: 0,
+        start: 380,
+        light: Some(light),
+    };
+    // The light is even, so all bins share one mean.
+    let counts: u64 = (0..seeds)
+        .into_par_iter()
+        .map(|seed| {
+            let stream = PhotonStream::new(&stream(seed));
+            let exposed = window.expose(&stream, &[pixel]).unwrap();
+            exposed.histograms[0]
+                .iter()
+                .map(|&n| u64::from(n))
+                .sum::<u64>()
+        })
+        .sum();
+    let trials = seeds as f64 * 30.0 * 16.0;
+    let by_photons = counts as f64 / trials;
+    let error = (by_photons * (1.0 - by_photons) / trials).sqrt();
+    let mean = |sub_bins| {
+        let options = CohortOptions {
+            sub_bins: Some(sub_bins),
+            ..CohortOptions::default()
+        };
+        let expected = Cohort::new(&sensor, &exposure, options).expected(&stream(0), 380, &light);
+        expected.unwrap()[8] / 30.0
+    };
+    let finest = mean(64);
+    let offs = [1, 2, 4, 8].map(|sub_bins| (mean(sub_bins) - finest).abs());
+    println!(
+        "an event: {by_photons:.6} ± {error:.6}, in 64 steps {finest:.6}; 1, 2, 4, 8 off by {offs:.7?}"
+    );
+    assert!((finest - by_photons).abs() < 5.0 * error);
+    assert!(offs.windows(2).all(|o| o[1] < 0.6 * o[0]), "{offs:?}");
+}
+
+/// The light in which steps of a CLK period are farthest from the truth.
+#[test]
+fn blinding_echoes_and_the_tails_behind_them() {
+    for law in [DeadTimeLaw::NonParalysable, DeadTimeLaw::Paralysable] {
+        for (name, dead_time_ns, sigma, arrival) in [
+            ("saturating echo", 8.0, 1_900, 85),
+            ("its tail", 8.0, 1_900, 66),
+            ("saturating flash", 8.0, 0, 85),
+            ("tail of a flash", 8.0, 0, 63),
+            ("saturating echo, long dead time", 23.0, 1_900, 75),
+            ("tail, dead time of one CLK period", 2.605, 1_900, 66),
+            ("a pulse of 200 ps", 8.0, 200, 70),
+        ] {
+            let name = format!("{name}, {law:?}");
+            let light = PixelLight {
+                signal_per_cycle: 60.0,
+                arrival: Time::from_ns(arrival),
+                background_hz: 200e6,
+            };
+            let sensor = SensorConfig {
+                dead_time_ns,
+                ..SensorConfig::default()
+            };
+            Case {
+                name: &name,
+                sensor,
+                light,
+                law,
+                sigma: Time::from_ps(sigma),
+                stop_periods: 240,
+                laser_cycles: 12,
+                seeds: seeds() / 4,
+                ..case()
+            }
+            .agrees();
+        }
+    }
+}
+
+/// Each of 1 %, and both of 5 % where they show more.
+#[test]
+fn afterpulses_and_crosstalk() {
+    for (name, probability, afterpulse_time_ns, signal_per_cycle, background_hz) in [
+        ("daylight", 0.01, 5.0, 0.8, 40e6),
+        ("dusk, slow traps", 0.05, 30.0, 0.3, 4e6),
+        ("saturating echo", 0.01, 5.0, 60.0, 200e6),
+        ("5 %", 0.05, 5.0, 5.0, 80e6),
+    ] {
+        let sensor = SensorConfig {
+            afterpulse_probability: probability,
+            afterpulse_time_ns,
+            crosstalk_probability: probability,
+            ..SensorConfig::default()
+        };
+        let light = PixelLight {
+            signal_per_cycle,
+            background_hz,
+            ..case().light
+        };
+        let name = format!("secondaries, {name}");
+        Case {
+            name: &name,
+            sensor,
+            light,
+            stop_periods: 400,
+            laser_cycles: 12,
+            seeds: seeds() / 4,
+            options: CohortOptions {
+                memory: 1.0,
+                ..CohortOptions::default()
+            },
+            ..case()
+        }
+        .agrees();
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, max_shrink_iters: 0, ..ProptestConfig::default() })]
+    /// Arrivals from before a laser cycle to after it, pulses from none to longer than a window.
+    #[test]
+    fn echoes_anywhere(
+        place in 0.0f64..1.0,
+        sigma_ns in prop_oneof![Just(0.0), 0.05f64..3.0, 3.0f64..60.0],
+        start in 0u16..79,
+        signal_per_cycle in 0.5f64..20.0,
+    ) {
+        let cycle_ns = 80.0 * 1e9 / 384e6;
+        let arrival_ns = -3.0 * sigma_ns + place * (cycle_ns + 6.0 * sigma_ns);
+        let light = PixelLight {
+            signal_per_cycle,
+            arrival: Time::from_ps((1e3 * arrival_ns) as i64),
+            background_hz: 5e6,
+        };
+        let name = format!("{signal_per_cycle:.1} photons at {arrival_ns:.1} ns, {sigma_ns:.2} ns wide, start {start}");
+        Case {
+            name: &name,
+            light,
+            start,
+            sigma: Time::from_ps((1e3 * sigma_ns) as i64),
+            stop_periods: 80,
+            laser_cycles: 6,
+            seeds: seeds() / 4,
+            options: CohortOptions { memory: 1.0, ..CohortOptions::default() },
+            ..case()
+        }
+        .agrees();
+    }
+}
