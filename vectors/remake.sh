@@ -27,7 +27,7 @@ for claim in json.load(sys.stdin)["claims"]:
     for row in claim["rows"]:
         print(claim["claim"], row["quantity"], row["verdict"], sep=" | ")' > verdicts.txt
 
-# References of `gdtof pareto --stability` and, some minutes, of the theory; need Python with mpmath.
+# References of `tests/figures/functions_keep_their_promises.rs` and, some minutes, of the theory; need Python with mpmath.
 python3 ../stability/make.py
 cd ../theory
 python3 detection.py

@@ -1,12 +1,10 @@
-//! `gdtof pareto`: run time against error, for each engine and knob; and the numerical stability of the functions
-//! that everything rests on.
+//! `gdtof pareto`: run time against error, for each engine and knob.
 
 use std::cell::Cell;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use anyhow::bail;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -16,7 +14,6 @@ use crate::bench::recording::check_exposure;
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::report::{Axis, Chart, Grid, Style};
 use crate::system::pareto::{Done, GATE_CYCLES, Method, ParetoSettings, Point, Summary, summarise};
-use crate::system::stability;
 
 /// Arguments of `gdtof pareto`.
 #[derive(Args)]
@@ -58,12 +55,6 @@ pub struct ParetoArgs {
     /// JSON instead of the table.
     #[arg(long)]
     json: bool,
-    /// Instead of all that: worst error of each function against references of many digits, at extreme arguments.
-    #[arg(long)]
-    stability: bool,
-    /// The table of --stability as Markdown.
-    #[arg(long, requires = "stability")]
-    markdown: bool,
 }
 
 #[derive(Serialize)]
@@ -78,11 +69,8 @@ struct Report<'a> {
 /// Runs the command.
 ///
 /// # Errors
-/// Bad input, configurations that an engine refuses, files that cannot be written, a function that breaks its promise.
+/// Bad input, configurations that an engine refuses, files that cannot be written.
 pub fn run(args: &ParetoArgs) -> anyhow::Result<()> {
-    if args.stability {
-        return stability(args.markdown);
-    }
     let settings = settings(args)?;
     let methods: Vec<Method> = Method::ALL
         .into_iter()
@@ -127,19 +115,6 @@ pub fn run(args: &ParetoArgs) -> anyhow::Result<()> {
         say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
     } else {
         say(foot(args, &settings))?;
-    }
-    Ok(())
-}
-
-fn stability(markdown: bool) -> anyhow::Result<()> {
-    let (table, kept) = stability::table();
-    say(if markdown {
-        table.markdown()
-    } else {
-        table.to_string()
-    })?;
-    if !kept {
-        bail!("a function is further from its reference than it promises");
     }
     Ok(())
 }

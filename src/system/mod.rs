@@ -4,10 +4,10 @@ mod distance;
 mod frame;
 pub mod pareto;
 mod pixel;
+pub mod price;
 mod remark;
 mod result;
 mod speed;
-pub mod stability;
 mod summary;
 mod tolerance;
 
@@ -17,4 +17,4 @@ pub use pixel::{NoDepth, PixelDepth};
 pub use result::{Frame, PhaseTimes};
 pub use speed::{SPEED_LASER_CYCLES, SpeedCase, SpeedFrame};
 pub use summary::Summary;
-pub use tolerance::{Kept, Tolerance};
+pub use tolerance::{Kept, OnWindow, Tolerance};

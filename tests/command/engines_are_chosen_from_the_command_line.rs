@@ -80,6 +80,99 @@ fn a_tolerance_is_kept_and_its_bound_reported() {
     assert!(on_window(at("0")) > on_window(at("0.1")));
 }
 
+/// A wall so near that its echo saturates SPADs, seen by a compact sensor indoors.
+const WALL_AT_60_CM: &str = r#"
+[lidar]
+fov_deg = 16.0
+pulse_energy_uj = 0.002
+pulse_fwhm_ns = 4.5
+pde = 0.185
+lens_diameter_mm = 4.0
+lens_f_number = 2.2
+dark_count_hz = 20000.0
+[stereo]
+baseline_m = 0.05
+max_disparity_px = 1000.0
+position_m = [-0.025, 0.0, 0.0]
+[light]
+illuminance_klux = 5.0
+[[object]]
+name = "wall"
+kind = "plane"
+centre_m = [0.0, 0.0, 0.60]
+normal = [0.0, 0.0, 1.0]
+width_m = 10.0
+height_m = 10.0
+reflectivity = 0.3
+"#;
+
+/// The cohort engine takes the wall, and on average its depths are no farther from those of the window engine than the
+/// bound says.
+#[test]
+fn the_bound_covers_the_difference_before_a_near_wall() {
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("wall.toml"), WALL_AT_60_CM).unwrap();
+    let wall = |more: &[&str]| -> Value {
+        let small =
+            "frame --rows 16 --cols 16 --scene wall.toml --laser-cycles 16000 --probe none --json";
+        let arguments: Vec<&str> = small.split(' ').chain(more.iter().copied()).collect();
+        serde_json::from_str(&gdtof(here.path(), &arguments)).unwrap()
+    };
+    let (exact, chosen) = (wall(&[]), wall(&["--tolerance", "0.001"]));
+    let kept = &chosen["tolerance"];
+    assert_eq!(kept["on_cohort"], 256, "{kept}");
+    let bound_m = kept["bound_m"].as_f64().unwrap();
+    assert!(bound_m > 0.0 && bound_m <= 0.001, "{kept}");
+
+    let depths = |report: &Value| -> Vec<f64> {
+        let pixels = report["macropixels"].as_array().unwrap();
+        let depth = |pixel: &Value| pixel["peak_m"].as_f64().expect("a peak");
+        pixels.iter().map(depth).collect()
+    };
+    let (exact, chosen) = (depths(&exact), depths(&chosen));
+    let off: Vec<f64> = chosen.iter().zip(&exact).map(|(a, b)| a - b).collect();
+    let n = off.len() as f64;
+    let mean = off.iter().sum::<f64>() / n;
+    let variance = off.iter().map(|off| (off - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    // Chance: 4 standard errors of the mean over macropixels with photons and draws of their own.
+    let chance = 4.0 * (variance / n).sqrt();
+    println!("off by {mean:.2e} m, chance {chance:.2e} m, bound {bound_m:.2e} m");
+    assert!(chance < 1e-3, "too noisy to tell: {chance}");
+    assert!(
+        mean.abs() <= bound_m + chance,
+        "{mean} m, bound {bound_m} m, chance {chance} m"
+    );
+}
+
+#[test]
+fn a_refusal_of_the_cohort_engine_says_what_it_costs() {
+    // Laser cycles hardly longer than the window: SPADs may stay busy from one to the next.
+    let crowded = ["--scene", "wall.toml", "--stop-periods", "24"];
+    let here = tempfile::tempdir().unwrap();
+    std::fs::write(here.path().join("wall.toml"), WALL_AT_60_CM).unwrap();
+    let frame = |more: &[&str]| {
+        let small = ["frame", "--rows", "4", "--cols", "4", "--probe", "none"];
+        let arguments = [&small[..], &crowded, more].concat();
+        Command::new(env!("CARGO_BIN_EXE_gdtof"))
+            .args(arguments)
+            .current_dir(here.path())
+            .output()
+            .unwrap()
+    };
+    let refused = frame(&["--engine", "cohort"]);
+    let error = String::from_utf8(refused.stderr).unwrap();
+    assert_eq!(refused.status.code(), Some(2), "{error}");
+    assert!(error.contains("16 of 16 macropixels"), "{error}");
+
+    let done = frame(&["--tolerance", "0.1"]);
+    let table = String::from_utf8(done.stdout).unwrap();
+    assert!(
+        table.contains("refused by cohort: laser cycles may depend"),
+        "{table}"
+    );
+    assert!(table.contains("run time of those refused"), "{table}");
+}
+
 #[test]
 fn speed_is_measured_for_every_engine_and_size() {
     let here = tempfile::tempdir().unwrap();
@@ -114,13 +207,6 @@ fn run_time_against_error_comes_as_table_csv_and_picture() {
     let picture = std::fs::read_to_string(here.path().join("out/pareto.svg")).unwrap();
     assert!(picture.starts_with("<svg"), "{picture}");
     assert!(here.path().join("out/pareto_cells.csv").exists());
-}
-
-#[test]
-fn stability_is_promised_and_kept() {
-    let here = tempfile::tempdir().unwrap();
-    let said = gdtof(here.path(), &["pareto", "--stability"]);
-    assert!(said.lines().count() > 5, "{said}");
 }
 
 /// Recorded pulses of a sensor with one macropixel on one engine: its output.

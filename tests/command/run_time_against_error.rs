@@ -52,7 +52,8 @@ fn engines_that_share_photons_do_not_differ_and_others_do() {
         Method::Window,
         Method::AnotherSeed,
         Method::FewerCycles(8),
-        Method::Cohort(2),
+        Method::CohortInSteps(2),
+        Method::Cohort,
     ];
     let points = compare(&methods);
     for point in &points {
@@ -112,6 +113,7 @@ fn a_piped_comparison_says_how_far_it_is_and_what_differs() {
         ("window, another seed", "another seed"),
         ("window, 1/8 of the laser cycles", "1/8 of the photons"),
         ("cohort, 4 steps a bin", "own draws, 4 steps"),
+        ("cohort  ", "own draws  "),
     ] {
         let line = table.lines().find(|line| line.starts_with(row));
         let line = line.unwrap_or_else(|| panic!("no row {row}: {table}"));
@@ -120,7 +122,7 @@ fn a_piped_comparison_says_how_far_it_is_and_what_differs() {
     assert!(!table.lines().any(|line| line.starts_with("gate")));
     let messages = String::from_utf8(output.stderr).unwrap();
     assert!(
-        messages.starts_with("1 of 20 engines and walls"),
+        messages.starts_with("1 of 22 engines and walls"),
         "{messages}"
     );
     assert!(!messages.contains('\x1b'), "{messages}");
@@ -177,6 +179,7 @@ fn a_tolerance_is_kept_by_the_cheapest_engine() {
         assert_eq!(exposed.histograms.len(), pixels.len());
         assert!(exposed.work.photons_drawn <= exact.work.photons_drawn);
     }
-    // What has no light stays where it costs nothing, and what has little where it costs less; the rest has gone.
-    assert!((5..32).contains(&on_window), "{on_window}");
+    // In 16 000 laser cycles `cargo bench --bench prices` finds the window engine cheaper up to 0.3 signal photons and
+    // the cohort engine, its bound included, from 2 on: number 15 and number 25 here. The dark ones behind stay, too.
+    assert!((19..28).contains(&on_window), "{on_window}");
 }

@@ -1,5 +1,6 @@
 //! Formulas against references of many digits, and the published figures.
 
 mod detection_probability_meets_references;
+mod functions_keep_their_promises;
 mod precision_meets_references;
 mod published_figures_are_met;

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""References for `gdtof pareto --stability`, at 60 digits with mpmath.
+"""References for `tests/figures/functions_keep_their_promises.rs`, at 60 digits with mpmath.
 
 Each file has a header, then one line per case: arguments as the exact doubles they are, and last the reference.
 Formulas here are written for clarity at high precision, never for stability at double precision.

@@ -2,21 +2,20 @@
 //!
 //! `vectors/stability/make.py` and the scripts in `vectors/theory` compute the references with mpmath at 34 to 360
 //! digits and keep them in files beside them: arguments as exact doubles, references last. [`functions`] lists the
-//! functions concerned, each with the error that its documentation promises; a function joins by a file there and a
-//! line here.
+//! functions concerned, each with the largest error that is promised; a function joins by a file there and a line here.
 
-use crate::chip::{Exposure, Overflow, SensorConfig, WindowLaw, histogram};
-use crate::engine::cohort::{BlindSpad, at_least_hit, none_of};
-use crate::photon::{DeadTimeLaw, NormalSampler, Poisson, pulse_share};
-use crate::ranging::{PeakOptions, interpolate};
-use crate::report::Grid;
-use crate::theory::detection::{self, Detection, Model, PerCycle, Ties};
-use crate::theory::precision::{cramer_rao, thompson};
-use crate::units::{Frequency, Time};
+use guided_dtof::chip::{Exposure, Overflow, SensorConfig, WindowLaw, histogram};
+use guided_dtof::engine::cohort::{BlindSpad, at_least_hit, none_of};
+use guided_dtof::photon::{DeadTimeLaw, NormalSampler, Poisson, pulse_share};
+use guided_dtof::ranging::{PeakOptions, interpolate};
+use guided_dtof::report::Grid;
+use guided_dtof::theory::detection::{self, Detection, Model, PerCycle, Ties};
+use guided_dtof::theory::precision::{cramer_rao, thompson};
+use guided_dtof::units::{Frequency, Time};
 
 /// A result to compare.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Value {
+enum Value {
     /// A number of whole units: femtoseconds, counts.
     Whole(i64),
     /// A real number; NaN stands for "no result".
@@ -25,7 +24,7 @@ pub enum Value {
 
 /// What an error is measured against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Measure {
+enum Measure {
     /// The reference. Where that is 0, any difference counts as infinite.
     Relative,
     /// One: for probabilities that are kept as fixed-point numbers, and for positions.
@@ -34,7 +33,7 @@ pub enum Measure {
 
 /// A table of references: CSV with a header, one case a line.
 #[derive(Debug, Clone, Copy)]
-pub struct References {
+struct References {
     csv: &'static str,
     /// Its last columns hold the references of so many functions; those before are arguments.
     functions: usize,
@@ -44,34 +43,34 @@ pub struct References {
 
 /// A function and its references.
 #[derive(Debug, Clone, Copy)]
-pub struct Function {
+struct Function {
     /// Its name in tables.
-    pub name: &'static str,
+    name: &'static str,
     /// What range the references cover.
-    pub range: &'static str,
+    range: &'static str,
     /// What it is compared with.
-    pub references: References,
+    references: References,
     /// The function of one line's arguments.
-    pub compute: fn(&[f64]) -> Value,
+    compute: fn(&[f64]) -> Value,
     /// How its error is measured.
-    pub measure: Measure,
+    measure: Measure,
     /// The largest error it promises.
-    pub promise: f64,
+    promise: f64,
 }
 
 /// The worst of a function's errors.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Worst {
+struct Worst {
     /// References compared.
-    pub cases: usize,
+    cases: usize,
     /// Largest error.
-    pub error: f64,
+    error: f64,
     /// Where it occurs, as `name = value` pairs; empty if there is no error at all.
-    pub at: String,
+    at: String,
 }
 
 /// Every function in the table.
-pub fn functions() -> Vec<Function> {
+fn functions() -> Vec<Function> {
     macro_rules! references {
         ($name:literal) => {
             references!($name, 0 of 1)
@@ -274,10 +273,7 @@ fn argument(text: &str) -> f64 {
 
 impl Function {
     /// Compares the function with all its references.
-    ///
-    /// # Panics
-    /// When the references are no table of numbers: they come with the program.
-    pub fn worst(&self) -> Worst {
+    fn worst(&self) -> Worst {
         let References {
             csv,
             functions,
@@ -336,7 +332,7 @@ impl Function {
 }
 
 /// The table of all functions, and whether every one keeps its promise.
-pub fn table() -> (Grid, bool) {
+fn table() -> (Grid, bool) {
     let mut grid = Grid::new([
         "function", "range", "cases", "error", "worst", "promised", "at",
     ]);
@@ -361,36 +357,35 @@ pub fn table() -> (Grid, bool) {
     (grid, kept)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+#[test]
+fn every_function_keeps_its_promise() {
+    let (table, kept) = table();
+    println!("{table}");
+    assert!(
+        kept,
+        "a function is further from its reference than it promises: {table}"
+    );
+}
 
-    #[test]
-    fn every_function_keeps_its_promise() {
-        let (table, kept) = table();
-        assert!(kept, "{table}");
+#[test]
+fn a_wrong_function_is_found_out() {
+    let functions = functions();
+    for function in functions.iter().filter(|f| f.promise > 0.0) {
+        let function = Function {
+            compute: |_| Value::Real(1.5),
+            ..*function
+        };
+        assert!(
+            function.worst().error > function.promise,
+            "{}",
+            function.name
+        );
     }
-
-    #[test]
-    fn a_wrong_function_is_found_out() {
-        let functions = functions();
-        for function in functions.iter().filter(|f| f.promise > 0.0) {
-            let function = Function {
-                compute: |_| Value::Real(1.5),
-                ..*function
-            };
-            assert!(
-                function.worst().error > function.promise,
-                "{}",
-                function.name
-            );
-        }
-        for function in functions.iter().filter(|f| f.promise == 0.0) {
-            let function = Function {
-                compute: |_| Value::Whole(7),
-                ..*function
-            };
-            assert!(function.worst().error > 0.0, "{}", function.name);
-        }
+    for function in functions.iter().filter(|f| f.promise == 0.0) {
+        let function = Function {
+            compute: |_| Value::Whole(7),
+            ..*function
+        };
+        assert!(function.worst().error > 0.0, "{}", function.name);
     }
 }
