@@ -5,8 +5,8 @@
 
 use std::path::PathBuf;
 
+use guided_dtof::bench::{StimulusPlan, export_verilog};
 use guided_dtof::chip::{Exposure, SensorConfig};
-use guided_dtof::engine::{StimulusPlan, export_verilog};
 use guided_dtof::files::InputError;
 use guided_dtof::photon::SpadEvent;
 use guided_dtof::units::Time;

@@ -63,7 +63,7 @@ fn loads(p_counter: PCounter, holds_reset: bool) -> (usize, usize) {
     let (out, local_stop) = (probes.bus(Probe::CounterOut), bench.net("LOCAL_STOP"));
     let mut run = bench.start(&["LOCAL_STOP"]);
     let wrong = (0..LOADS)
-        .filter(|&load| run.number_at(at(load + 1) - Time::from_fs(1), &out) != Some(start(load)))
+        .filter(|&load| run.number_at(at(load + 1) - Time::from_fs(1), out) != Some(start(load)))
         .count();
     (wrong, run.recorder.rising_edges(local_stop).len())
 }
@@ -94,13 +94,13 @@ fn a_counter_is_unknown_until_its_first_reset() {
         bench.pulse(SETTLING * 30, SETTLING, "MEMORY_RESET");
         bench.pulse(SETTLING * 30, SETTLING, "COUNTER_RESET");
         let mut run = bench.start(&[]);
-        assert_eq!(run.number_at(SETTLING * 25, &out), None, "{p_counter:?}");
+        assert_eq!(run.number_at(SETTLING * 25, out), None, "{p_counter:?}");
         assert_eq!(
             run.is_high_at(SETTLING * 25, local_stop),
             None,
             "{p_counter:?}"
         );
-        assert_eq!(run.number_at(SETTLING * 35, &out), Some(0), "{p_counter:?}");
+        assert_eq!(run.number_at(SETTLING * 35, out), Some(0), "{p_counter:?}");
     }
 }
 
@@ -205,8 +205,7 @@ fn pulse_resets(config: &SensorConfig, width: Time) -> bool {
         let (out, local_stop) = (probes.bus(Probe::CounterOut), bench.net("LOCAL_STOP"));
         let mut run = bench.start(&[]);
         ends.into_iter().all(|end| {
-            run.number_at(end, &out) == Some(start)
-                && run.is_high_at(end, local_stop) == Some(false)
+            run.number_at(end, out) == Some(start) && run.is_high_at(end, local_stop) == Some(false)
         })
     })
 }
@@ -355,7 +354,7 @@ fn enabling_while_clk_is_low_counts_one_step_too_many() {
         let probes = Probes::at(&bench.netlist, "");
         let out = probes.bus(Probe::CounterOut);
         let mut run = bench.start(&[]);
-        let found = run.number_at(SETTLING * 18, &out);
+        let found = run.number_at(SETTLING * 18, out);
         assert_eq!(found, Some(100 - falls - u64::from(enabled_low)));
     }
 }
