@@ -5,7 +5,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use guided_dtof::chip::{Exposure, SensorConfig};
-use guided_dtof::engine::{Engine, LitPixel, Window, stream_config};
+use guided_dtof::engine::{Expose, LitPixel, Window, stream_config};
 use guided_dtof::photon::{PhotonStream, PixelLight};
 use guided_dtof::units::Time;
 

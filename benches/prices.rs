@@ -6,7 +6,7 @@
 
 use cpu_time::ThreadTime;
 use guided_dtof::chip::{Exposure, SensorConfig, WindowLaw};
-use guided_dtof::engine::{Cohort, CohortOptions, Engine, LitPixel, Window, stream_config};
+use guided_dtof::engine::{Cohort, CohortOptions, Expose, LitPixel, Window, stream_config};
 use guided_dtof::photon::{PhotonStream, PixelLight};
 use guided_dtof::system::price;
 use guided_dtof::units::Time;

@@ -6,7 +6,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use guided_dtof::chip::{Exposure, SensorConfig, sensor};
 use guided_dtof::engine::load::{load, load_netlist};
-use guided_dtof::engine::{Cycle, Engine, GateSimulation, LaneSimulation, Window, stream_config};
+use guided_dtof::engine::{Cycle, GateSimulation, LaneSimulation, Replay, Window, stream_config};
 use guided_dtof::netlist::Netlist;
 use guided_dtof::photon::{PhotonStream, PixelLight, SpadEvent};
 use guided_dtof::units::Time;

@@ -3,7 +3,7 @@
 //! `cargo run --release --example depth_from_histograms`
 
 use guided_dtof::chip::{Exposure, SensorConfig};
-use guided_dtof::engine::{Engine, EngineError, LitPixel, Window, stream_config};
+use guided_dtof::engine::{Engine, EngineError, Expose, LitPixel, Replay, Window, stream_config};
 use guided_dtof::photon::{PhotonStream, PixelLight};
 use guided_dtof::ranging::{DepthOptions, EchoFinder};
 use guided_dtof::theory::precision::{range_m, time_ns};
@@ -30,7 +30,7 @@ fn main() -> Result<(), EngineError> {
                 background_hz: 8e6,
             }),
         };
-        let histogram = window.expose(&stream, &[pixel])?.histograms.remove(0);
+        let histogram = window.expose(&stream, &[pixel])?.histograms[0].to_vec();
         let counts: Vec<u32> = histogram.into_iter().map(u32::from).collect();
         match finder.find(&counts).filter(|found| found.is_significant) {
             Some(found) => {

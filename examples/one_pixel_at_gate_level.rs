@@ -3,7 +3,7 @@
 //! `cargo run --release --example one_pixel_at_gate_level`
 
 use guided_dtof::chip::{Exposure, SensorConfig};
-use guided_dtof::engine::{Engine, EngineError, Gate, Window};
+use guided_dtof::engine::{EngineError, Gate, Replay, Window};
 use guided_dtof::photon::SpadEvent;
 use guided_dtof::units::Time;
 

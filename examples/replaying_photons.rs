@@ -3,7 +3,7 @@
 //! `cargo run --release --example replaying_photons`
 
 use guided_dtof::chip::{Exposure, SensorConfig};
-use guided_dtof::engine::{Cycle, Engine, EngineError, Window, stream_config};
+use guided_dtof::engine::{Cycle, Engine, EngineError, Replay, Window, stream_config};
 use guided_dtof::photon::{PhotonStream, PixelLight};
 use guided_dtof::units::Time;
 

@@ -3,7 +3,7 @@
 //! `cargo run --release --example sensor_of_your_own`
 
 use guided_dtof::chip::{Exposure, PCounter, SensorConfig};
-use guided_dtof::engine::{Cycle, Engine, EngineError, Gate, Window};
+use guided_dtof::engine::{Cycle, EngineError, Gate, Replay, Window};
 use guided_dtof::photon::SpadEvent;
 use guided_dtof::units::Time;
 
@@ -28,7 +28,7 @@ fn main() -> Result<(), EngineError> {
             spad: cycle as u8,
         })
         .collect();
-    let engines: [(&str, &dyn Engine); 3] = [
+    let engines: [(&str, &dyn Replay); 3] = [
         ("gate", &Gate::new(&config, &exposure)),
         ("cycle", &Cycle::new(&config, &exposure)),
         ("window", &Window::new(&config, &exposure)),

@@ -3,7 +3,7 @@
 //! `cargo run --release --example sweeping_threshold`
 
 use guided_dtof::chip::{Exposure, SensorConfig};
-use guided_dtof::engine::{Engine, EngineError, LitPixel, Window, stream_config};
+use guided_dtof::engine::{Engine, EngineError, Expose, LitPixel, Replay, Window, stream_config};
 use guided_dtof::photon::{PhotonStream, PixelLight};
 use guided_dtof::units::Time;
 
@@ -29,7 +29,7 @@ fn main() -> Result<(), EngineError> {
         };
         // More than THRESHOLD SPADs: background is suppressed faster than the echo.
         let exposed = window.expose(&stream, &[pixel])?;
-        println!("{threshold:9}  {:?}", exposed.histograms[0]);
+        println!("{threshold:9}  {:?}", &exposed.histograms[0]);
     }
     Ok(())
 }

@@ -33,7 +33,7 @@
 //!
 //! ```
 //! use guided_dtof::chip::{Exposure, SensorConfig};
-//! use guided_dtof::engine::{Engine, Gate, Window};
+//! use guided_dtof::engine::{Gate, Replay, Window};
 //! use guided_dtof::photon::SpadEvent;
 //! use guided_dtof::units::Time;
 //!

@@ -86,7 +86,7 @@ fn counted(
     let size = (1, 1);
     let mut gate = GateSimulation::new(config, exposure, (0, 0), size, &[start], &[pulses]);
     gate.run(&mut ());
-    Some(gate.histograms().ok()?.remove(0))
+    Some(gate.histograms().ok()?.into_counts())
 }
 
 /// What the window law says is counted of pulses that come alone in their CLK period.

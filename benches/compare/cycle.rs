@@ -13,7 +13,7 @@ use std::path::Path;
 
 use cpu_time::ProcessTime;
 use guided_dtof::chip::{Exposure, SPADS, SensorConfig};
-use guided_dtof::engine::Cycle;
+use guided_dtof::engine::{Cycle, Histograms};
 use guided_dtof::photon::SpadEvent;
 use guided_dtof::units::Time;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
@@ -66,7 +66,7 @@ fn main() -> std::io::Result<()> {
     assert_eq!(engine.unlevelled(), None);
     let single = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     single.expect("a thread").install(|| {
-        let mut histograms = Vec::new();
+        let mut histograms = Histograms::new(config.bins);
         for _ in 0..number(runs) {
             let clock = ProcessTime::now();
             let packed = engine.pack(&starts, &pulses);
@@ -75,7 +75,7 @@ fn main() -> std::io::Result<()> {
             histograms = engine.run(&starts, &packed).expect("it is levelised");
             println!("{:.9} {packing:.9}", clock.elapsed().as_secs_f64());
         }
-        let counts = histograms.concat().into_iter().flat_map(u16::to_le_bytes);
+        let counts = histograms.counts().iter().flat_map(|n| n.to_le_bytes());
         std::fs::write(
             Path::new(directory).join("ours.bin"),
             counts.collect::<Vec<u8>>(),

@@ -16,7 +16,9 @@ use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::bench::{HardwareEventKind, HardwareEventReport};
 use crate::chip::{SensorConfig, Silicon, WindowLaw};
 use crate::engine::waveform::{self, View};
-use crate::engine::{Cancelling, ClosedFormCoverage, EngineError, GateSimulation, Runner, Timed};
+use crate::engine::{
+    Cancelling, ClosedFormCoverage, EngineError, GateSimulation, Histograms, Runner, Timed,
+};
 use crate::files::{InputError, OutputFile};
 use crate::kernel::{CheckReport, Observer, Policy};
 use crate::report::Table;
@@ -153,7 +155,7 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
 
 /// Histograms of the array, and what else a replay finds.
 struct Replayed {
-    histograms: Vec<Vec<u16>>,
+    histograms: Histograms,
     cancelled: u64,
     coverage: Option<ClosedFormCoverage>,
 }
@@ -318,7 +320,7 @@ fn replay_timed(
         EngineKind::Gate => None,
         EngineKind::Cycle => Some(Runner::Cycle),
         EngineKind::Window => Some(Runner::Window),
-        EngineKind::Cohort => return Err(EngineError::NoPhotons("cohort").into()),
+        EngineKind::Cohort => return Err(EngineError::NoPhotons.into()),
     };
     let timed = Timed::new(config, exposure, silicon);
     let (histograms, coverage) = match runner {
@@ -356,7 +358,7 @@ fn progress(stimuli: &Stimuli) -> anyhow::Result<ProgressBar> {
 }
 
 fn replay(stimuli: &Stimuli, kind: EngineKind) -> anyhow::Result<Replayed> {
-    let engine = kind.build(&stimuli.config, &stimuli.exposure);
+    let engine = kind.replay(&stimuli.config, &stimuli.exposure)?;
     let progress = progress(stimuli)?;
     let batches: Result<Vec<_>, EngineError> = stimuli
         .starts
@@ -370,7 +372,7 @@ fn replay(stimuli: &Stimuli, kind: EngineKind) -> anyhow::Result<Replayed> {
         .collect();
     progress.finish_and_clear();
     Ok(Replayed {
-        histograms: batches?.concat(),
+        histograms: Histograms::joined(engine.bins(), batches?),
         cancelled: cancelled(stimuli),
         coverage: None,
     })

@@ -16,7 +16,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
 
 use super::say;
-use crate::engine::{Cohort, CohortOptions, Cycle, Engine, Window};
+use crate::engine::{Cohort, CohortOptions, Cycle, Expose, Replay, Window};
 use crate::photon::SpadEvent;
 use crate::report::Grid;
 use crate::system::{SPEED_LASER_CYCLES, SpeedCase, SpeedFrame};
@@ -320,7 +320,7 @@ fn times(frame: &SpeedFrame, work: Work, runs: u16) -> anyhow::Result<(Spread, S
     let (config, exposure) = (&frame.config, &frame.exposure);
     let cycle = || Cycle::new(config, exposure);
     let window = Window::new(config, exposure);
-    let on_light = |engine: &dyn Engine| timed(runs, || frame.expose(engine));
+    let on_light = |engine: &dyn Expose| timed(runs, || frame.expose(engine));
     match work {
         Work::CycleWhole => return on_light(&cycle()),
         Work::WindowWhole => return on_light(&window),

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use super::lanes::LaneSimulation;
-use super::{Engine, EngineError, follows};
+use super::{
+    Engine, EngineError, Expose, Exposed, Histograms, LitPixel, Replay, follows, full_stream,
+};
 use crate::bench::{HardwareEvents, Schedule, StimulusPlan};
 use crate::chip::{
     ChipTiming, Exposure, Probe, Probes, SensorConfig, SensorPins, Silicon, WindowLaw, front_end,
@@ -11,7 +13,7 @@ use crate::chip::{
 };
 use crate::kernel::{Kernel, LANES, Observer, Policy, Statistics, TimingChecks};
 use crate::netlist::{NetId, Netlist, Timing};
-use crate::photon::SpadEvent;
+use crate::photon::{PhotonStream, SpadEvent};
 
 /// A rectangle of the sensor at gate level, loaded and exposed through its pins.
 pub struct GateSimulation<'a> {
@@ -119,7 +121,7 @@ impl<'a> GateSimulation<'a> {
     ///
     /// # Errors
     /// When a bit of a count is unknown.
-    pub fn histograms(&self) -> Result<Vec<Vec<u16>>, EngineError> {
+    pub fn histograms(&self) -> Result<Histograms, EngineError> {
         let histogram = |probes: &Probes| {
             let count = |(bin, nets): (usize, &Vec<NetId>)| {
                 let count = self.kernel.number(nets).map(|n| n as u16);
@@ -128,9 +130,14 @@ impl<'a> GateSimulation<'a> {
                     bin,
                 })
             };
-            probes.bins().iter().enumerate().map(count).collect()
+            let counts: Result<Vec<u16>, _> = probes.bins().iter().enumerate().map(count).collect();
+            counts
         };
-        self.probes.iter().map(histogram).collect()
+        let mut histograms = Histograms::new(self.config.bins);
+        for probes in &self.probes {
+            histograms.push(&histogram(probes)?);
+        }
+        Ok(histograms)
     }
 
     /// Handles of each macropixel's nets, row-major.
@@ -175,15 +182,15 @@ impl<'a> Gate<'a> {
         timings: &[&Timing],
         starts: &[u16],
         pulses: &[&[SpadEvent]],
-    ) -> Result<Vec<Vec<u16>>, EngineError> {
+    ) -> Result<Histograms, EngineError> {
         assert!(timings.len() == starts.len() && starts.len() == pulses.len());
         follows(self.config, &ChipTiming::of(self.config).pulses)?;
-        let mut histograms = Vec::with_capacity(starts.len());
+        let mut histograms = Histograms::new(self.config.bins);
         for alike in timings.chunk_by(|a, b| std::ptr::eq(*a, *b)) {
             let (from, to) = (histograms.len(), histograms.len() + alike.len());
             let batches = starts[from..to].chunks(LANES);
             for (starts, pulses) in batches.zip(pulses[from..to].chunks(LANES)) {
-                histograms.extend(self.batch(alike[0], starts, pulses)?);
+                histograms.append(&self.batch(alike[0], starts, pulses)?);
             }
         }
         Ok(histograms)
@@ -195,7 +202,7 @@ impl<'a> Gate<'a> {
         timing: &Timing,
         starts: &[u16],
         pulses: &[&[SpadEvent]],
-    ) -> Result<Vec<Vec<u16>>, EngineError> {
+    ) -> Result<Histograms, EngineError> {
         // One alone is quicker without lanes.
         if starts.len() == 1 {
             let (first, size) = ((0, 0), (1, 1));
@@ -217,17 +224,28 @@ impl Engine for Gate<'_> {
         WindowLaw::new(self.config, self.exposure)
     }
 
+    fn bins(&self) -> usize {
+        self.config.bins
+    }
+}
+
+impl Replay for Gate<'_> {
     fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
-        let mut histograms = self.histograms(&[start], &[pulses])?;
-        Ok(histograms.remove(0))
+        Ok(self.histograms(&[start], &[pulses])?.into_counts())
     }
 
     fn histograms(
         &self,
         starts: &[u16],
         pulses: &[&[SpadEvent]],
-    ) -> Result<Vec<Vec<u16>>, EngineError> {
+    ) -> Result<Histograms, EngineError> {
         let nominal = self.nominal_timing();
         self.histograms_with(&vec![&nominal; starts.len()], starts, pulses)
+    }
+}
+
+impl Expose for Gate<'_> {
+    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+        full_stream(self, stream, pixels)
     }
 }

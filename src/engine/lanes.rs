@@ -5,7 +5,7 @@
 
 use bitvec::vec::BitVec;
 
-use super::EngineError;
+use super::{EngineError, Histograms};
 use crate::bench::{Schedule, StimulusPlan};
 use crate::chip::{
     Exposure, Probe, Probes, SPADS, SensorConfig, SensorPins, Silicon, load_path, sensor,
@@ -153,7 +153,7 @@ impl<'a> LaneSimulation<'a> {
     ///
     /// # Errors
     /// When a bit of a count is unknown; the lane stands for the column.
-    pub fn histograms(&self) -> Result<Vec<Vec<u16>>, EngineError> {
+    pub fn histograms(&self) -> Result<Histograms, EngineError> {
         let counts = self.lanes(|lane| {
             let count = |(bin, nets): (usize, &Vec<NetId>)| {
                 let number = self.kernel.number(nets, lane).map(|n| n as u16);
@@ -162,9 +162,12 @@ impl<'a> LaneSimulation<'a> {
                     bin,
                 })
             };
-            self.probes.bins().iter().enumerate().map(count).collect()
+            let counts: Result<Vec<u16>, _> =
+                self.probes.bins().iter().enumerate().map(count).collect();
+            counts
         });
-        counts.into_iter().collect()
+        let counts = counts.into_iter().collect::<Result<Vec<_>, _>>()?;
+        Ok(Histograms::from_rows(self.probes.bins().len(), counts))
     }
 
     fn lanes<T>(&self, f: impl Fn(usize) -> T) -> Vec<T> {

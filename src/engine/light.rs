@@ -2,7 +2,7 @@
 //!
 //! An engine takes macropixels with their start values and the light on them and gives histograms. How it comes by
 //! photons is its own business: [`full_stream`] draws every photon of the exposure and hands the pulses to the engine;
-//! an engine that needs fewer photons, or none, overrides [`Engine::expose`].
+//! an engine that needs fewer photons, or none, has a way of its own ([`Expose::expose`]).
 
 use std::iter::Sum;
 use std::ops::AddAssign;
@@ -10,7 +10,7 @@ use std::ops::AddAssign;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Cancelling, Engine, EngineError};
+use super::{Cancelling, Engine, EngineError, Expose, Histograms, Replay};
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::photon::{
     DeadTimeLaw, PhotonStream, PixelLight, PixelPhotons, SPADS, SpadEvent, SpadModel, StreamConfig,
@@ -29,12 +29,22 @@ pub struct LitPixel {
 }
 
 /// Histograms, and what they took.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Exposed {
-    /// Counts of every macropixel and bin, bin 0 earliest.
-    pub histograms: Vec<Vec<u16>>,
+    /// Counts of every macropixel and bin.
+    pub histograms: Histograms,
     /// What was simulated.
     pub work: Work,
+}
+
+impl Exposed {
+    /// Of no macropixel.
+    pub fn new(bins: usize) -> Self {
+        Exposed {
+            histograms: Histograms::new(bins),
+            work: Work::default(),
+        }
+    }
 }
 
 /// What an engine did, and what it had no need to do. Sums over macropixels.
@@ -116,9 +126,9 @@ pub fn stream_config(
 /// macropixels as they are finished. Neither threads nor batches change the histograms.
 ///
 /// # Errors
-/// As [`Engine::expose`], and where background light blinds SPADs so much that following them all takes
+/// As [`Expose::expose`], and where background light blinds SPADs so much that following them all takes
 /// too long.
-pub fn expose<E: Engine + ?Sized>(
+pub fn expose<E: Expose + ?Sized>(
     engine: &E,
     stream: &PhotonStream,
     pixels: &[LitPixel],
@@ -133,7 +143,7 @@ pub fn expose<E: Engine + ?Sized>(
 ///
 /// # Errors
 /// As [`expose`].
-pub fn expose_without_skipping<E: Engine + ?Sized>(
+pub fn expose_without_skipping<E: Replay + ?Sized>(
     engine: &E,
     stream: &PhotonStream,
     pixels: &[LitPixel],
@@ -187,24 +197,24 @@ fn in_batches<E: Engine + ?Sized>(
             Ok(exposed)
         })
         .collect::<Result<_, EngineError>>()?;
-    let work = batches.iter().map(|batch| batch.work).sum();
-    let histograms = batches.into_iter().flat_map(|batch| batch.histograms);
-    Ok(Exposed {
-        histograms: histograms.collect(),
-        work,
-    })
+    let mut all = Exposed::new(engine.bins());
+    for batch in batches {
+        all.histograms.append(&batch.histograms);
+        all.work += batch.work;
+    }
+    Ok(all)
 }
 
 /// Bytes of pulses that a thread keeps at a time, unless a single macropixel has more. Chosen, so that two threads keep less
 /// than 200 MB of them.
 const MOST_PULSE_BYTES: f64 = 64e6;
 
-/// Draws every photon of the exposure and gives the pulses to [`Engine::histograms`], as many macropixels at a time as the
+/// Draws every photon of the exposure and gives the pulses to [`Replay::histograms`], as many macropixels at a time as the
 /// memory for their pulses allows.
 ///
 /// # Errors
-/// As [`Engine::histograms`].
-pub fn full_stream<E: Engine + ?Sized>(
+/// As [`Replay::histograms`].
+pub fn full_stream<E: Replay + ?Sized>(
     engine: &E,
     stream: &PhotonStream,
     pixels: &[LitPixel],
@@ -215,7 +225,7 @@ pub fn full_stream<E: Engine + ?Sized>(
             .map_or(0.0, |light| stream.config().most_edges(&light));
         edges * size_of::<SpadEvent>() as f64
     };
-    let mut exposed = Exposed::default();
+    let mut exposed = Exposed::new(engine.bins());
     let mut rest = pixels;
     while !rest.is_empty() {
         let mut total = 0.0;
@@ -225,14 +235,14 @@ pub fn full_stream<E: Engine + ?Sized>(
         });
         let (now, later) = rest.split_at(fitting.count().max(1));
         let Exposed { histograms, work } = whole_pixels(engine, stream, now)?;
-        exposed.histograms.extend(histograms);
+        exposed.histograms.append(&histograms);
         exposed.work += work;
         rest = later;
     }
     Ok(exposed)
 }
 
-fn whole_pixels<E: Engine + ?Sized>(
+fn whole_pixels<E: Replay + ?Sized>(
     engine: &E,
     stream: &PhotonStream,
     pixels: &[LitPixel],

@@ -17,6 +17,7 @@ mod cancelling;
 pub mod cohort;
 mod cycle;
 mod gate;
+mod histograms;
 mod lanes;
 mod light;
 pub mod load;
@@ -28,6 +29,7 @@ pub use cancelling::Cancelling;
 pub use cohort::{Cohort, CohortOptions};
 pub use cycle::{Cycle, PackedPulses, Unlevelled};
 pub use gate::{Gate, GateSimulation};
+pub use histograms::Histograms;
 pub use lanes::LaneSimulation;
 pub use light::{
     Exposed, LitPixel, Work, expose, expose_without_skipping, full_stream, stream_config,
@@ -41,8 +43,22 @@ use crate::photon::{PhotonStream, SpadEvent};
 
 const _: () = assert!(crate::chip::SPADS == crate::photon::SPADS);
 
-/// Runs macropixels through an exposure: one that was recorded, or one to light.
+/// What every engine tells of itself. What it runs is in [`Replay`] and [`Expose`].
 pub trait Engine: Sync {
+    /// The window law of its sensor and exposure.
+    fn law(&self) -> WindowLaw;
+
+    /// Bins of a macropixel.
+    fn bins(&self) -> usize;
+
+    /// How many macropixels are best given to this engine at once.
+    fn batch(&self) -> usize {
+        crate::kernel::LANES
+    }
+}
+
+/// Engines that run recorded pulses: pulses in, histograms out.
+pub trait Replay: Engine {
     /// Counts of every bin, bin 0 earliest, for a start value and the rising edges of SPAD_RAW, sorted by
     /// time from the first STOP edge and thinned by the dead time.
     ///
@@ -54,34 +70,29 @@ pub trait Engine: Sync {
     /// it runs [`Engine::batch`] of them together; the results are the same.
     ///
     /// # Errors
-    /// As [`Engine::histogram`], of the first macropixel concerned.
+    /// As [`Replay::histogram`], of the first macropixel concerned.
     fn histograms(
         &self,
         starts: &[u16],
         pulses: &[&[SpadEvent]],
-    ) -> Result<Vec<Vec<u16>>, EngineError> {
-        let macropixels = starts.iter().zip(pulses);
-        macropixels
-            .map(|(&start, pulses)| self.histogram(start, pulses))
-            .collect()
+    ) -> Result<Histograms, EngineError> {
+        let mut histograms = Histograms::new(self.bins());
+        for (&start, pulses) in starts.iter().zip(pulses) {
+            histograms.push(&self.histogram(start, pulses)?);
+        }
+        Ok(histograms)
     }
+}
 
+/// Engines that expose macropixels to light: light in, histograms out.
+pub trait Expose: Engine {
     /// Histograms of macropixels in the light of `stream`, in the order of `pixels`. For the same stream they are
-    /// those of [`full_stream`], which draws every photon; an engine that needs fewer may leave the others out.
+    /// those of [`full_stream`], which draws every photon; an engine that needs fewer may leave the others out, and
+    /// [`Cohort`] gives others of the same distribution.
     ///
     /// # Errors
-    /// As [`Engine::histograms`].
-    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
-        full_stream(self, stream, pixels)
-    }
-
-    /// The window law of its sensor and exposure.
-    fn law(&self) -> WindowLaw;
-
-    /// How many macropixels are best given to this engine at once.
-    fn batch(&self) -> usize {
-        crate::kernel::LANES
-    }
+    /// When this engine cannot tell what the circuit does in this light.
+    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError>;
 }
 
 /// Whether the front end, with these limits, follows the pulses of this sensor's SPADs.
@@ -102,11 +113,11 @@ pub enum EngineError {
     /// Pulses are shorter, or follow each other faster, than the front end's flip-flops.
     #[error("{0}")]
     FrontEnd(String),
-    /// The engine works without photons.
+    /// The cohort engine works without photons.
     #[error(
-        "the {0} engine knows no single photons and cannot replay recorded ones; use --engine window"
+        "the cohort engine knows no single photons and cannot replay recorded ones; use --engine window"
     )]
-    NoPhotons(&'static str),
+    NoPhotons,
     /// The cohort engine's model of light and SPADs leaves this out.
     #[error("the cohort engine cannot follow {0}; use --engine window")]
     NotInCohorts(&'static str),

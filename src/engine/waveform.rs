@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::gate::GateSimulation;
-use super::{Engine, Window};
+use super::{Replay, Window};
 use crate::chip::window_law::WindowLaw;
 use crate::chip::{Exposure, LoadProbe, Probe, Probes, SensorConfig};
 use crate::files::InputError;

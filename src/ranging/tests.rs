@@ -46,8 +46,8 @@ impl Bench {
             .collect();
         let engine = Window::new(&self.config, &self.exposure);
         let exposed = expose(&engine, &PhotonStream::new(&stream), &pixels, |_| {}).unwrap();
-        let real = |counts: Vec<u16>| counts.into_iter().map(u32::from).collect();
-        exposed.histograms.into_iter().map(real).collect()
+        let real = |counts: &[u16]| counts.iter().copied().map(u32::from).collect();
+        exposed.histograms.iter().map(real).collect()
     }
 
     fn echo(&self, position_bins: f64, signal_per_cycle: f64, background_hz: f64) -> PixelLight {

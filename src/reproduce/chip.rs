@@ -6,7 +6,7 @@ use crate::chip::{
     Exposure, Limits, PCounter, Probe, SensorConfig, Silicon, load_path, p_counter,
     p_counter_timing,
 };
-use crate::engine::{GateSimulation, load};
+use crate::engine::{GateSimulation, Histograms, load};
 use crate::kernel::Recorder;
 use crate::netlist::{CellKind, Corner};
 use crate::photon::SpadEvent;
@@ -201,7 +201,7 @@ pub fn fig_48_rows() -> Vec<Row> {
     ]
 }
 
-fn fig_48_bins() -> Vec<Vec<u16>> {
+fn fig_48_bins() -> Histograms {
     let config = SensorConfig {
         rows: 1,
         cols: 2,

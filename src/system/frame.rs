@@ -18,8 +18,8 @@ use super::tolerance::Tolerance;
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::engine::waveform::{self, View, WaveCycles};
 use crate::engine::{
-    Cohort, CohortOptions, Cycle, Engine, EngineError, Gate, GateSimulation, LitPixel, Window,
-    expose, expose_without_skipping, load, stream_config,
+    Cohort, CohortOptions, Cycle, EngineError, Expose, Gate, GateSimulation, LitPixel, Replay,
+    Window, expose, expose_without_skipping, load, stream_config,
 };
 use crate::files::InputError;
 use crate::guide::GuideMap;
@@ -55,12 +55,29 @@ impl EngineKind {
         }
     }
 
-    /// The engine, for a sensor and an exposure.
-    pub fn build<'a>(
+    /// The engine that replays pulses, for a sensor and an exposure.
+    ///
+    /// # Errors
+    /// `cohort` has no photons.
+    pub fn replay<'a>(
         self,
         config: &'a SensorConfig,
         exposure: &'a Exposure,
-    ) -> Box<dyn Engine + 'a> {
+    ) -> Result<Box<dyn Replay + 'a>, EngineError> {
+        match self {
+            EngineKind::Gate => Ok(Box::new(Gate::new(config, exposure))),
+            EngineKind::Cycle => Ok(Box::new(Cycle::new(config, exposure))),
+            EngineKind::Window => Ok(Box::new(Window::new(config, exposure))),
+            EngineKind::Cohort => Err(EngineError::NoPhotons),
+        }
+    }
+
+    /// The engine that is exposed to light, for a sensor and an exposure.
+    pub fn expose<'a>(
+        self,
+        config: &'a SensorConfig,
+        exposure: &'a Exposure,
+    ) -> Box<dyn Expose + 'a> {
         match self {
             EngineKind::Gate => Box::new(Gate::new(config, exposure)),
             EngineKind::Cycle => Box::new(Cycle::new(config, exposure)),
@@ -235,9 +252,9 @@ pub fn take_frame(
         .sum();
     times.light_s = clock.lap();
 
-    let engine: Box<dyn Engine> = match engine_kind {
+    let engine: Box<dyn Expose> = match engine_kind {
         EngineKind::Cohort => Box::new(Cohort::new(sensor, exposure, *cohort)),
-        kind => kind.build(sensor, exposure),
+        kind => kind.expose(sensor, exposure),
     };
     let (exposed, kept) = match (tolerance_m, skip) {
         (&Some(tolerance_m), _) => {
@@ -258,6 +275,7 @@ pub fn take_frame(
         }
         (None, true) => (expose(&*engine, &stream, &pixels, exposed)?, None),
         (None, false) => {
+            let engine = engine_kind.replay(sensor, exposure)?;
             let exposed = expose_without_skipping(&*engine, &stream, &pixels, exposed)?;
             (exposed, None)
         }
@@ -278,7 +296,7 @@ pub fn take_frame(
         let engine = engine_kind.of_probes(kept.is_some());
         let model = match kept.is_some() || engine != *engine_kind {
             true => Window::new(sensor, exposure).histogram(start, &events)?,
-            false => exposed.histograms[pixel].clone(),
+            false => exposed.histograms[pixel].to_vec(),
         };
         if gate == model {
             return Ok(());
@@ -347,7 +365,7 @@ pub fn take_frame(
         cols: sensor.cols,
         bins: sensor.bins,
         bin_m: exposure.clock.period().as_range_m(),
-        histograms: exposed.histograms.concat(),
+        histograms: exposed.histograms.into_counts(),
         pixels: depths,
         remark,
         photons_expected,
@@ -394,7 +412,7 @@ fn run_probe(
     let view = View::of_pixel(at, sensor, exposure, start, events, probe.wave_cycles);
     let format = WaveFormat::of(&probe.waves);
     waveform::record(&mut simulation, &probe.waves, format, &view, &mut ())?;
-    Ok(simulation.histograms()?.remove(0))
+    Ok(simulation.histograms()?.into_counts())
 }
 
 /// Splits elapsed time into laps.

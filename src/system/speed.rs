@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::chip::{Exposure, SPADS, SensorConfig};
-use crate::engine::{Engine, EngineError, Exposed, LitPixel, expose, stream_config};
+use crate::engine::{EngineError, Expose, Exposed, LitPixel, expose, stream_config};
 use crate::photon::{PhotonStream, PixelLight, SpadEvent};
 use crate::units::Time;
 
@@ -130,7 +130,7 @@ impl SpeedFrame {
     ///
     /// # Errors
     /// As [`expose`].
-    pub fn expose(&self, engine: &dyn Engine) -> Result<Exposed, EngineError> {
+    pub fn expose(&self, engine: &dyn Expose) -> Result<Exposed, EngineError> {
         expose(engine, &self.stream, &self.pixels, |_| ())
     }
 }
@@ -138,7 +138,7 @@ impl SpeedFrame {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::{Cycle, Window};
+    use crate::engine::{Cycle, Replay, Window};
 
     /// What is timed is one and the same exposure, however much of it is left out.
     #[test]

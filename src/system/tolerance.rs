@@ -19,7 +19,7 @@ use serde::Serialize;
 use super::price;
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::engine::{
-    Cohort, CohortOptions, Engine, EngineError, Exposed, LitPixel, Window, Work, expose,
+    Cohort, CohortOptions, EngineError, Expose, Exposed, Histograms, LitPixel, Window, Work, expose,
 };
 use crate::photon::{PhotonStream, PixelLight};
 use crate::ranging::{PeakOptions, interpolate};
@@ -161,16 +161,16 @@ impl Tolerance<'_> {
             Ok(_) => false,
             Err(why) => why.refusal().is_some(),
         };
-        let mut histograms = vec![Vec::new(); pixels.len()];
+        let mut histograms = Histograms::empty(pixels.len(), self.config.bins);
         let mut work = Work::default();
-        let mut run = |engine: &dyn Engine, takes: &dyn Fn(&Result<f64, OnWindow>) -> bool| {
+        let mut run = |engine: &dyn Expose, takes: &dyn Fn(&Result<f64, OnWindow>) -> bool| {
             let begin = Instant::now();
             let members: Vec<usize> = (0..pixels.len()).filter(|&i| takes(&plan[i])).collect();
             let chosen: Vec<LitPixel> = members.iter().map(|&i| pixels[i]).collect();
             let exposed = expose(engine, stream, &chosen, &done)?;
             work += exposed.work;
-            for (pixel, counts) in members.into_iter().zip(exposed.histograms) {
-                histograms[pixel] = counts;
+            for (pixel, counts) in members.into_iter().zip(&exposed.histograms) {
+                histograms[pixel].copy_from_slice(counts);
             }
             Ok::<_, EngineError>(begin.elapsed())
         };

@@ -7,7 +7,7 @@ use guided_dtof::chip::window_law::{Window as LawWindow, WindowLaw};
 use guided_dtof::chip::{
     AfterBorrow, EventType, Exposure, Mode, Overflow, PCounter, Probe, SensorConfig, Tap,
 };
-use guided_dtof::engine::{Cycle, Engine, EngineError, GateSimulation, Window};
+use guided_dtof::engine::{Cycle, EngineError, GateSimulation, Replay, Window};
 use guided_dtof::kernel::Recorder;
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
 use guided_dtof::units::Time;
@@ -138,7 +138,7 @@ proptest! {
         gate.run(&mut recorder);
         let has_memory = config.p_counter != PCounter::Memoryless;
         prop_assert_eq!(gate.loaded(), vec![has_memory.then_some(*start)]);
-        let by_gates = gate.histograms().unwrap().remove(0);
+        let by_gates = gate.histograms().unwrap().into_counts();
 
         let by_cycles = Cycle::new(config, &exposure).histogram(*start, &case.pulses).unwrap();
         prop_assert_eq!(&by_gates, &by_cycles);
@@ -215,7 +215,7 @@ proptest! {
         let pulse = SpadEvent { time, spad: 7 };
         let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[start], &[&[pulse]]);
         gate.run(&mut ());
-        let counted = gate.histograms().unwrap().remove(0);
+        let counted = gate.histograms().unwrap().into_counts();
         let expected: Vec<u16> = (0..16)
             .map(|b| {
                 let collects = |c| law.bin_interval(&window, c, b).contains(&time);

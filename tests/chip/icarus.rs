@@ -108,9 +108,9 @@ impl Seen {
             counts: Vec::new(),
             stops: Vec::new(),
         };
-        for (pixel, counts) in gate.histograms().unwrap().into_iter().enumerate() {
+        for (pixel, counts) in gate.histograms().unwrap().iter().enumerate() {
             let [row, col] = [pixel / cols, pixel % cols].map(|n| n as i64);
-            for (bin, count) in counts.into_iter().enumerate() {
+            for (bin, &count) in counts.iter().enumerate() {
                 seen.counts.push(vec![row, col, bin as i64, count.into()]);
             }
             let rises = recorder.rising_edges(local_stops[pixel]).into_iter();

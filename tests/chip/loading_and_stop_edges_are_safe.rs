@@ -3,7 +3,7 @@
 
 use guided_dtof::bench::{HardwareEventKind, HardwareEvents};
 use guided_dtof::chip::{Exposure, Probe, Probes, SensorConfig, Window, WindowLaw, macropixel};
-use guided_dtof::engine::{self as fast, Cancelling, Cycle, Engine, Gate, GateSimulation};
+use guided_dtof::engine::{self as fast, Cancelling, Cycle, Gate, GateSimulation, Replay};
 use guided_dtof::kernel::{Drive, Kernel, Policy, Recorder, TimingChecks, clock, in_order};
 use guided_dtof::netlist::{CellKind, Corner, Library, NetId, Netlist, Timing};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
@@ -359,7 +359,7 @@ fn pulses_that_the_front_end_cannot_follow_are_refused_by_every_engine() {
         ..SensorConfig::default()
     };
     let exposure = Exposure::new(&config, 100, 1);
-    let engines: [&dyn Engine; 3] = [
+    let engines: [&dyn Replay; 3] = [
         &Gate::new(&config, &exposure),
         &Cycle::new(&config, &exposure),
         &fast::Window::new(&config, &exposure),

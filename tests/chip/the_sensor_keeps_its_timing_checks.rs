@@ -1,7 +1,7 @@
 //! The default sensor under scattered light breaks no limit of any flip-flop but those that sample SPADs.
 
 use guided_dtof::chip::{Exposure, SensorConfig};
-use guided_dtof::engine::GateSimulation;
+use guided_dtof::engine::{GateSimulation, Histograms};
 use guided_dtof::kernel::{CheckReport, Policy};
 use guided_dtof::netlist::{CheckKind, Corner};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
@@ -23,7 +23,7 @@ fn pulses(config: &SensorConfig, exposure: &Exposure, count: i64) -> Vec<SpadEve
     pulses
 }
 
-fn sensor_report(config: &SensorConfig, policy: Policy) -> (CheckReport, Option<Vec<Vec<u16>>>) {
+fn sensor_report(config: &SensorConfig, policy: Policy) -> (CheckReport, Option<Histograms>) {
     let exposure = Exposure::new(config, 60, 40);
     let pulses = pulses(config, &exposure, 1_500);
     let start = [20];

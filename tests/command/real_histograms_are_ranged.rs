@@ -179,7 +179,7 @@ fn modelled_counts(
     let stream = stream_config(&sensor, &exposure, seed, scene.pulse_sigma());
     let engine = Window::new(&sensor, &exposure);
     let exposed = expose(&engine, &PhotonStream::new(&stream), &pixels, |_| ()).unwrap();
-    exposed.histograms
+    exposed.histograms.iter().map(<[u16]>::to_vec).collect()
 }
 
 /// Bins 0 to 63 lie before the end of this start value's window, at 25 m.

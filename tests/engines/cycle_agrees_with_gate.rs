@@ -8,7 +8,7 @@ use crate::scenario;
 use guided_dtof::chip::macropixel::Model;
 use guided_dtof::chip::window_law::{Window, WindowLaw};
 use guided_dtof::chip::{Exposure, PCounter, SensorConfig};
-use guided_dtof::engine::{Cycle, Engine, Gate};
+use guided_dtof::engine::{Cycle, Engine, Gate, Histograms, Replay};
 use guided_dtof::netlist::Corner;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use scenario::{Scenario, cases};
@@ -24,12 +24,7 @@ struct Tally {
 
 /// Runs random chips of up to `most` macropixels, those whose windows are certain. Whatever the P-counter, nearly all
 /// chips have a tape.
-fn compare(
-    first_seed: u64,
-    cases: u32,
-    most: usize,
-    expected: impl Fn(&Scenario) -> Vec<Vec<u16>>,
-) {
+fn compare(first_seed: u64, cases: u32, most: usize, expected: impl Fn(&Scenario) -> Histograms) {
     let mut tallies = [Tally::default(); PCounter::ALL.len()];
     for seed in first_seed..first_seed + u64::from(cases) {
         let random = &mut StdRng::seed_from_u64(seed);
@@ -53,10 +48,11 @@ fn compare(
             tally.unlevelled += 1;
             continue;
         };
-        for (lane, (found, expected)) in found.iter().zip(expected(&scenario)).enumerate() {
+        let expected = expected(&scenario);
+        for (lane, (found, expected)) in found.iter().zip(&expected).enumerate() {
             let start = starts[lane];
             assert_eq!(
-                found, &expected,
+                found, expected,
                 "seed {seed}, start {start}, {config:?} {exposure:?}"
             );
         }
@@ -80,7 +76,7 @@ fn leave_out_races(scenario: &mut Scenario) {
         .unzip();
 }
 
-fn gates(scenario: &Scenario) -> Vec<Vec<u16>> {
+fn gates(scenario: &Scenario) -> Histograms {
     let gate = Gate::new(&scenario.config, &scenario.exposure);
     gate.histograms(&scenario.starts, &scenario.pulses())
         .expect("known counts")
@@ -137,12 +133,8 @@ fn as_the_reference_model_counts_in_larger_numbers() {
                     .map(|p: &guided_dtof::photon::SpadEvent| (p.time, p.spad)),
             )
         };
-        scenario
-            .starts
-            .iter()
-            .zip(&scenario.pulses)
-            .map(one)
-            .collect()
+        let macropixels = scenario.starts.iter().zip(&scenario.pulses);
+        Histograms::from_rows(scenario.config.bins, macropixels.map(one))
     };
     compare(1_000_000, cases(120), 1_200, model);
 }

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use crate::chip::SensorConfig;
+use crate::engine::Histograms;
 use crate::files::{InputError, OutputFile};
 use crate::report::write_npy_u16;
 
@@ -34,7 +35,7 @@ impl Format {
 /// Writes histograms to `out`, or as CSV to standard output.
 pub fn write(
     config: &SensorConfig,
-    histograms: &[Vec<u16>],
+    histograms: &Histograms,
     out: Option<&Path>,
     format: Format,
 ) -> anyhow::Result<()> {
@@ -53,7 +54,7 @@ pub fn write(
         (Some(path), Format::Csv) => OutputFile::write_with(path, csv)?,
         (Some(path), Format::Npy) => {
             let shape = [config.rows, config.cols, config.bins].map(|n| n as u64);
-            write_npy_u16(path, &shape, &histograms.concat())?;
+            write_npy_u16(path, &shape, histograms.counts())?;
         }
     }
     Ok(())

@@ -62,11 +62,9 @@ pub use self::hits::at_least_hit;
 use self::light::SpadLight;
 use self::secondaries::Secondaries;
 use self::words::RandomWords;
-use super::{Engine, EngineError, Exposed, LitPixel, Work, follows};
+use super::{Engine, EngineError, Expose, Exposed, LitPixel, Work, follows};
 use crate::chip::{Exposure, SensorConfig, WindowLaw, correlation, histogram, window_law};
-use crate::photon::{
-    DeadTimeLaw, PhotonStream, PixelLight, SPADS, SpadEvent, SpadModel, StreamConfig,
-};
+use crate::photon::{DeadTimeLaw, PhotonStream, PixelLight, SPADS, SpadModel, StreamConfig};
 
 /// Whether 0, 1, 2, … SPADs that fire in a CLK period make an event.
 type EventTable = [bool; SPADS + 1];
@@ -429,10 +427,12 @@ impl Engine for Cohort<'_> {
         self.law.clone()
     }
 
-    fn histogram(&self, _: u16, _: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
-        Err(EngineError::NoPhotons("cohort"))
+    fn bins(&self) -> usize {
+        self.config.bins
     }
+}
 
+impl Expose for Cohort<'_> {
     fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
         let dark = PixelLight {
             signal_per_cycle: 0.0,
@@ -440,11 +440,11 @@ impl Engine for Cohort<'_> {
             background_hz: 0.0,
         };
         let config = stream.config();
-        let mut exposed = Exposed::default();
+        let mut exposed = Exposed::new(self.config.bins);
         for pixel in pixels {
             let light = pixel.light.unwrap_or(dark);
             let counts = self.draw(config, pixel.number, pixel.start, &light)?;
-            exposed.histograms.push(counts);
+            exposed.histograms.push(&counts);
             let closed = self.opening(pixel.start).window.open().is_none();
             let periods = u64::from(config.stop_periods) * u64::from(config.laser_cycles);
             exposed.work += Work {

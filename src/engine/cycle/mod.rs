@@ -31,10 +31,12 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use super::{Engine, EngineError, Gate, follows};
+use super::{
+    Engine, EngineError, Expose, Exposed, Gate, Histograms, LitPixel, Replay, follows, full_stream,
+};
 use crate::chip::window_law::{Window, WindowLaw};
 use crate::chip::{Exposure, SensorConfig};
-use crate::photon::SpadEvent;
+use crate::photon::{PhotonStream, SpadEvent};
 use levelise::Levelised;
 use packing::Packed;
 use schedule::Schedule;
@@ -158,7 +160,7 @@ impl<'a> Cycle<'a> {
     ///
     /// # Errors
     /// As [`Cycle::unlevelled`], or when an edge goes where the tape has no place for it.
-    pub fn run(&self, starts: &[u16], packed: &PackedPulses) -> Result<Vec<Vec<u16>>, Unlevelled> {
+    pub fn run(&self, starts: &[u16], packed: &PackedPulses) -> Result<Histograms, Unlevelled> {
         let machine = self.machine().map_err(Unlevelled::clone)?;
         let blocks: Result<Vec<_>, Unlevelled> = packed
             .blocks
@@ -170,10 +172,10 @@ impl<'a> Cycle<'a> {
                 machine.run(schedule, self.replays_control, &starts, pulses)
             })
             .collect();
-        let mut histograms = vec![Vec::new(); starts.len()];
+        let mut histograms = Histograms::empty(starts.len(), self.config.bins);
         for ((pixels, _), block) in packed.blocks.iter().zip(blocks?) {
-            for (&pixel, histogram) in pixels.iter().zip(block) {
-                histograms[pixel] = histogram;
+            for (&pixel, histogram) in pixels.iter().zip(&block) {
+                histograms[pixel].copy_from_slice(histogram);
             }
         }
         Ok(histograms)
@@ -188,7 +190,7 @@ impl Machine {
         replays_control: bool,
         starts: &[u16],
         pulses: &Packed,
-    ) -> Result<Vec<Vec<u16>>, Unlevelled> {
+    ) -> Result<Histograms, Unlevelled> {
         let Levelised {
             stream,
             passes: tape,
@@ -238,14 +240,14 @@ impl Machine {
         net.map_or_else(String::new, |&(_, net, _)| self.survey.name(net))
     }
 
-    fn counts(&self, block: &Block, lanes: usize) -> Vec<Vec<u16>> {
+    fn counts(&self, block: &Block, lanes: usize) -> Histograms {
         let bins = &self.levelised.bins;
-        let mut counts = vec![vec![0; bins.len()]; lanes];
+        let mut counts = Histograms::empty(lanes, bins.len());
         for (bin, bits) in bins.iter().enumerate() {
             for (weight, &(place, inverted)) in bits.iter().enumerate() {
                 let word = block.words[usize::from(place)] ^ inversion(inverted);
-                for (lane, counts) in counts.iter_mut().enumerate() {
-                    counts[bin] |= u16::from(word.lane(lane)) << weight;
+                for lane in 0..lanes {
+                    counts[lane][bin] |= u16::from(word.lane(lane)) << weight;
                 }
             }
         }
@@ -258,15 +260,25 @@ impl Engine for Cycle<'_> {
         self.law.clone()
     }
 
+    fn bins(&self) -> usize {
+        self.config.bins
+    }
+
+    fn batch(&self) -> usize {
+        8 * WORD_LANES
+    }
+}
+
+impl Replay for Cycle<'_> {
     fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
-        Ok(self.histograms(&[start], &[pulses])?.remove(0))
+        Ok(self.histograms(&[start], &[pulses])?.into_counts())
     }
 
     fn histograms(
         &self,
         starts: &[u16],
         pulses: &[&[SpadEvent]],
-    ) -> Result<Vec<Vec<u16>>, EngineError> {
+    ) -> Result<Histograms, EngineError> {
         follows(self.config, &self.law.timing().pulses)?;
         for &start in starts {
             if let Window::Race(why) = self.law.window(start) {
@@ -280,8 +292,10 @@ impl Engine for Cycle<'_> {
         }
         Gate::new(self.config, self.exposure).histograms(starts, pulses)
     }
+}
 
-    fn batch(&self) -> usize {
-        8 * WORD_LANES
+impl Expose for Cycle<'_> {
+    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+        full_stream(self, stream, pixels)
     }
 }

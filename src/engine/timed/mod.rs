@@ -18,7 +18,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use super::{Cancelling, Cycle, Engine, EngineError, Gate, LaneSimulation, Window};
+use super::{
+    Cancelling, Cycle, Engine, EngineError, Gate, Histograms, LaneSimulation, Replay, Window,
+};
 use crate::bench::StimulusPlan;
 use crate::chip::timing::macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays};
 use crate::chip::{ChipTiming, Exposure, Mode, PCounter, SensorConfig, Silicon, WindowLaw, sensor};
@@ -47,10 +49,10 @@ pub struct ClosedFormCoverage {
 }
 
 /// Histograms, and how they came about.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TimedHistograms {
     /// Counts of every macropixel and bin, row-major, bin 0 earliest.
-    pub histograms: Vec<Vec<u16>>,
+    pub histograms: Histograms,
     /// Which macropixels were simulated.
     pub coverage: ClosedFormCoverage,
 }
@@ -192,7 +194,7 @@ impl<'a> Timed<'a> {
         starts: &[u16],
         pulses: &[&[SpadEvent]],
         done: impl Fn(usize) + Sync,
-    ) -> Result<Vec<Vec<u16>>, EngineError> {
+    ) -> Result<Histograms, EngineError> {
         assert!(starts.len() == self.setting.config.pixels() && pulses.len() == starts.len());
         let all: Vec<usize> = (0..starts.len()).collect();
         self.replay(&all, starts, pulses, &done)
@@ -242,8 +244,8 @@ impl<'a> Timed<'a> {
             .zip(pulses.chunks(cycle.batch()))
         {
             let counts = cycle.histograms(starts, pulses)?;
-            for (&pixel, counts) in numbers.iter().zip(counts) {
-                judged[pixel] = Judged::Counted(counts);
+            for (&pixel, counts) in numbers.iter().zip(&counts) {
+                judged[pixel] = Judged::Counted(counts.to_vec());
             }
             done(numbers.len());
         }
@@ -258,25 +260,28 @@ impl<'a> Timed<'a> {
         judged: Vec<Judged>,
         done: &(impl Fn(usize) + Sync),
     ) -> Result<TimedHistograms, EngineError> {
-        let mut found = TimedHistograms::default();
+        let bins = self.setting.config.bins;
+        let mut found = TimedHistograms {
+            histograms: Histograms::empty(starts.len(), bins),
+            coverage: ClosedFormCoverage::default(),
+        };
         let mut in_doubt = Vec::new();
         for (pixel, judged) in judged.into_iter().enumerate() {
-            found.histograms.push(match judged {
+            match judged {
                 Judged::Counted(counts) => {
                     found.coverage.decided += 1;
-                    counts
+                    found.histograms[pixel].copy_from_slice(&counts);
                 }
                 Judged::InDoubt(doubt) => {
                     *found.coverage.replayed.entry(doubt).or_default() += 1;
                     in_doubt.push(pixel);
-                    Vec::new()
                 }
                 Judged::ForCycle(_) => unreachable!("the cycle engine has run"),
-            });
+            }
         }
         let replayed = self.replay(&in_doubt, starts, pulses, done)?;
-        for (pixel, counts) in in_doubt.into_iter().zip(replayed) {
-            found.histograms[pixel] = counts;
+        for (pixel, counts) in in_doubt.into_iter().zip(&replayed) {
+            found.histograms[pixel].copy_from_slice(counts);
         }
         Ok(found)
     }
@@ -288,11 +293,11 @@ impl<'a> Timed<'a> {
         starts: &[u16],
         pulses: &[&[SpadEvent]],
         done: &(impl Fn(usize) + Sync),
-    ) -> Result<Vec<Vec<u16>>, EngineError> {
+    ) -> Result<Histograms, EngineError> {
         let gate = Gate::new(self.setting.config, self.setting.exposure);
         // Those that are alike share an event queue.
         let together = if self.alike.is_some() { LANES } else { 1 };
-        let batches: Result<Vec<_>, EngineError> = numbers
+        let batches: Result<Vec<Histograms>, EngineError> = numbers
             .par_chunks(together)
             .map(|numbers| {
                 let timing = self.timing(numbers[0]);
@@ -305,7 +310,7 @@ impl<'a> Timed<'a> {
                 histograms.map_err(|error| self.named(numbers, error))
             })
             .collect();
-        Ok(batches?.concat())
+        Ok(Histograms::joined(self.setting.config.bins, batches?))
     }
 
     /// An error of one macropixel alone, with its name in the array.

@@ -17,7 +17,7 @@ mod past;
 mod sight;
 mod tables;
 
-use super::{Cancelling, Engine, EngineError, Exposed, LitPixel, Work, follows};
+use super::{Cancelling, Engine, EngineError, Expose, Exposed, LitPixel, Replay, Work, follows};
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw, correlation, histogram, window_law};
 use crate::photon::{PhotonStream, PixelLight, SpadEvent};
@@ -181,6 +181,12 @@ impl Engine for Window<'_> {
         self.law.clone()
     }
 
+    fn bins(&self) -> usize {
+        self.config.bins
+    }
+}
+
+impl Replay for Window<'_> {
     fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
         let Some(window) = self.window(start)? else {
             return Ok(vec![0; self.config.bins]);
@@ -189,20 +195,22 @@ impl Engine for Window<'_> {
         self.count_pulses(pulses, window.first_edge, &mut hits);
         Ok(self.counts(&hits))
     }
+}
 
+impl Expose for Window<'_> {
     fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
         let mut counting = Counting::new(self, stream);
-        let mut exposed = Exposed::default();
+        let mut exposed = Exposed::new(self.config.bins);
         let clk_periods =
             u64::from(self.exposure.stop_periods) * u64::from(self.exposure.laser_cycles);
         for pixel in pixels {
             let Some(light) = &pixel.light else {
-                exposed.histograms.push(self.histogram(pixel.start, &[])?);
+                exposed.histograms.push(&self.histogram(pixel.start, &[])?);
                 exposed.work.skipped_dark += 1;
                 continue;
             };
             let Some(window) = self.window(pixel.start)? else {
-                exposed.histograms.push(vec![0; self.config.bins]);
+                exposed.histograms.push(&vec![0; self.config.bins]);
                 exposed.work.skipped_closed += 1;
                 continue;
             };
@@ -216,7 +224,7 @@ impl Engine for Window<'_> {
                 }
                 None => self.count_stream(stream, pixel, light, window.first_edge),
             };
-            exposed.histograms.push(self.counts(&hits));
+            exposed.histograms.push(&self.counts(&hits));
             exposed.work += work;
         }
         exposed.work.macropixels += pixels.len() as u64;

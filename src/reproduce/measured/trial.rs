@@ -20,7 +20,9 @@ use rayon::prelude::*;
 
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{ChipTiming, EventType, Exposure, SensorConfig, WindowLaw, histogram};
-use crate::engine::{Cohort, CohortOptions, Engine, EngineError, LitPixel, Window, stream_config};
+use crate::engine::{
+    Cohort, CohortOptions, EngineError, Expose, Histograms, LitPixel, Window, stream_config,
+};
 use crate::photon::{PhotonStream, PixelLight, SPADS, StreamConfig};
 use crate::theory::detection::PerCycle;
 use crate::units::Time;
@@ -300,9 +302,9 @@ impl Trial {
             let pixels: Vec<LitPixel> = pixels.collect();
             Ok(engine.expose(&stream, &pixels)?.histograms)
         });
-        let chunks: Vec<Vec<Vec<u16>>> = chunks.collect::<Result<_, EngineError>>()?;
-        let widen = |bins: Vec<u16>| bins.into_iter().map(u64::from).collect();
-        Ok(chunks.into_iter().flatten().map(widen).collect())
+        let chunks: Vec<Histograms> = chunks.collect::<Result<_, EngineError>>()?;
+        let widen = |bins: &[u16]| bins.iter().copied().map(u64::from).collect();
+        Ok(chunks.iter().flatten().map(widen).collect())
     }
 }
 

@@ -30,8 +30,7 @@ impl Errors {
         scale: f64,
     ) -> Self {
         let (mut differences, mut counts) = (0.0, 0.0);
-        let bins = exact.histograms.first().map_or(0, Vec::len);
-        let mut moments = vec![[0.0; 3]; bins];
+        let mut moments = vec![[0.0; 3]; exact.histograms.bins()];
         let mut depths = Vec::new();
         for ((pixel, found), exact) in pixels.iter().zip(&found.histograms).zip(&exact.histograms) {
             for ((&found, &exact), moments) in found.iter().zip(exact).zip(&mut moments) {
@@ -63,7 +62,7 @@ impl Errors {
             } else {
                 0.0
             },
-            mean_shift: f64::sqrt(shifts.sum::<f64>() / bins.max(1) as f64),
+            mean_shift: f64::sqrt(shifts.sum::<f64>() / exact.histograms.bins() as f64),
             depth_rms_m: mean(&mut depths.iter().map(|d| d * d)).map(f64::sqrt),
             depth_mean_m: mean(&mut depths.iter().copied()),
         }

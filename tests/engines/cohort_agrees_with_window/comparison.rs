@@ -1,7 +1,9 @@
 //! Means, variances and covariances of both engines over many seeds, for one macropixel under one light.
 
 use guided_dtof::chip::{Exposure, SensorConfig};
-use guided_dtof::engine::{Cohort, CohortOptions, Engine, LitPixel, Window, stream_config};
+use guided_dtof::engine::{
+    Cohort, CohortOptions, Engine, Expose, LitPixel, Replay, Window, stream_config,
+};
 use guided_dtof::photon::{DeadTimeLaw, PhotonStream, PixelLight, StreamConfig};
 use guided_dtof::units::Time;
 use rayon::prelude::*;
