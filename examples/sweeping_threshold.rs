@@ -3,7 +3,7 @@
 //! `cargo run --release --example sweeping_threshold`
 
 use guided_dtof::chip::{Exposure, SensorConfig};
-use guided_dtof::engine::{Engine, EngineError, Expose, LitPixel, Replay, Window, stream_config};
+use guided_dtof::engine::{Engine, EngineError, Expose, LitPixel, Window, stream_config};
 use guided_dtof::photon::{PhotonStream, PixelLight};
 use guided_dtof::units::Time;
 

@@ -4,7 +4,7 @@
 //! `cargo run --release --example theory_beside_simulation`
 
 use guided_dtof::chip::{Exposure, SensorConfig};
-use guided_dtof::engine::{Engine, EngineError, Expose, LitPixel, Replay, Window, stream_config};
+use guided_dtof::engine::{Engine, EngineError, Expose, LitPixel, Window, stream_config};
 use guided_dtof::photon::{PhotonStream, PixelLight};
 use guided_dtof::theory::detection::{Model, PerCycle, Ties, probability};
 use guided_dtof::units::Time;

@@ -2,9 +2,7 @@
 //! seed and macropixel alone, and what it cannot follow it refuses.
 
 use guided_dtof::chip::{Exposure, SensorConfig};
-use guided_dtof::engine::{
-    Cohort, CohortOptions, Engine, Expose, Histograms, LitPixel, Replay, stream_config,
-};
+use guided_dtof::engine::{Cohort, CohortOptions, Expose, Histograms, LitPixel, stream_config};
 use guided_dtof::photon::{DeadTimeLaw, PhotonStream, PixelLight};
 use guided_dtof::units::Time;
 

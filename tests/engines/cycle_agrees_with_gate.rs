@@ -8,7 +8,7 @@ use crate::scenario;
 use guided_dtof::chip::macropixel::Model;
 use guided_dtof::chip::window_law::{Window, WindowLaw};
 use guided_dtof::chip::{Exposure, PCounter, SensorConfig};
-use guided_dtof::engine::{Cycle, Engine, Gate, Histograms, Replay};
+use guided_dtof::engine::{Cycle, Gate, Histograms, Replay};
 use guided_dtof::netlist::Corner;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use scenario::{Scenario, cases};

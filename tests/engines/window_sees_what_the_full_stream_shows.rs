@@ -4,8 +4,8 @@
 use guided_dtof::chip::window_law::{Window as LawWindow, WindowLaw};
 use guided_dtof::chip::{EventType, Exposure, Mode, Overflow, SensorConfig};
 use guided_dtof::engine::{
-    Cycle, Engine, Expose, Histograms, LitPixel, Replay, Window, expose, expose_without_skipping,
-    full_stream, stream_config,
+    Cycle, Expose, Histograms, LitPixel, Window, expose, expose_without_skipping, full_stream,
+    stream_config,
 };
 use guided_dtof::photon::{
     DeadTimeLaw, PhotonStream, PixelLight, PulseShape, SpadModel, StreamConfig,

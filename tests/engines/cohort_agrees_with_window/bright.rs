@@ -2,7 +2,7 @@
 //! afterpulses and crosstalk.
 
 use guided_dtof::chip::{Exposure, SensorConfig};
-use guided_dtof::engine::{Cohort, CohortOptions, Expose, LitPixel, Replay, Window, stream_config};
+use guided_dtof::engine::{Cohort, CohortOptions, Expose, LitPixel, Window, stream_config};
 use guided_dtof::photon::{DeadTimeLaw, PhotonStream, PixelLight};
 use guided_dtof::units::Time;
 use proptest::prelude::*;

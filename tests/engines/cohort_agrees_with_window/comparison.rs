@@ -1,9 +1,7 @@
 //! Means, variances and covariances of both engines over many seeds, for one macropixel under one light.
 
 use guided_dtof::chip::{Exposure, SensorConfig};
-use guided_dtof::engine::{
-    Cohort, CohortOptions, Engine, Expose, LitPixel, Replay, Window, stream_config,
-};
+use guided_dtof::engine::{Cohort, CohortOptions, Expose, LitPixel, Window, stream_config};
 use guided_dtof::photon::{DeadTimeLaw, PhotonStream, PixelLight, StreamConfig};
 use guided_dtof::units::Time;
 use rayon::prelude::*;
