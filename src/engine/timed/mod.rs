@@ -127,10 +127,10 @@ impl<'a> Timed<'a> {
         let cycle = Cycle::new(self.setting.config, self.setting.exposure);
         let is_levelled = runner == Runner::Cycle && cycle.unlevelled().is_none();
         let common = WindowLaw::new(self.setting.config, self.setting.exposure);
-        let spoilt = self.spoilt_starts(starts);
+        let corrupted = self.corrupted_starts(starts);
         let judge = |pixel: usize| {
             let (start, pulses) = (starts[pixel], pulses[pixel]);
-            if spoilt.contains(&start) {
+            if corrupted.contains(&start) {
                 return Ok(Judged::InDoubt("the load leaves another start value"));
             }
             let timing = self.timing(pixel);
@@ -326,16 +326,16 @@ impl<'a> Timed<'a> {
     }
 
     /// Start values that the load does not bring into the P-counters. Its delays are the same for every macropixel.
-    fn spoilt_starts(&self, starts: &[u16]) -> BTreeSet<u16> {
+    fn corrupted_starts(&self, starts: &[u16]) -> BTreeSet<u16> {
         let Setting {
             config,
             exposure,
             schedule,
             ..
         } = self.setting;
-        let mut spoilt = BTreeSet::new();
+        let mut corrupted = BTreeSet::new();
         if config.mode == Mode::Conventional || config.p_counter == PCounter::Memoryless {
-            return spoilt;
+            return corrupted;
         }
         let timing = self.timing(0);
         let distinct: Vec<u16> = starts
@@ -350,13 +350,13 @@ impl<'a> Timed<'a> {
             let mut lanes = lanes.with_timing(&timing);
             lanes.run_until(schedule.origin - exposure.clock.period(), &mut ());
             let loaded = starts.iter().zip(lanes.loaded());
-            spoilt.extend(
+            corrupted.extend(
                 loaded
                     .filter(|&(&start, found)| found != Some(start))
                     .map(|(s, _)| *s),
             );
         }
-        spoilt
+        corrupted
     }
 
     /// Delays of a macropixel, whose cells are known by its place in the array.

@@ -23,7 +23,8 @@ use crate::chip::{
 use crate::photon::SpadEvent;
 use crate::units::Time;
 
-/// What lies between two events whose order is decided, at least: rounding of clock edges and to spare.
+/// Two events are in order if they are at least so far apart: a thousand times the rounding of clock edges, less than a tenth
+/// of the fastest gate of the fast corner.
 const MARGIN: Time = Time::from_ps(1);
 
 /// Why macropixels are replayed.
@@ -198,7 +199,7 @@ fn common(setting: &Setting<'_>, delays: &Delays) -> ChipTiming {
         spad_to_toggle: delays.latency[0].0,
         clk_to_shift: shift.1,
         clk_to_event: delays.event.max(shift.1),
-        // Until the bin has taken the hit: HIT, the gate of its clock, and one to spare.
+        // Until the bin has taken the hit: a cell each for HIT and the gate of its clock, and one more as a margin.
         strobe_to_hit: delays.slowest * 3,
         // The law adds the rounding of clock edges.
         setup: spread(strobe),
