@@ -17,7 +17,7 @@
 //! | [`waves`] | VCD and FST, views for GTKWave and Surfer |
 //! | [`chip`] | the circuits beside their reference models, the window law |
 //! | [`photon`] | photon budget, SPADs, the photon stream |
-//! | [`bench`] | stimulus, recordings, hardware events, Verilog testbench |
+//! | [`bench`](mod@bench) | stimulus, recordings, hardware events, Verilog testbench |
 //! | [`engine`] | the ways to run an exposure |
 //! | [`analysis`] | the periods, corners and spread that static timing allows |
 //! | [`scene`] | surfaces, optics, sunlight, ground truth |
