@@ -24,8 +24,12 @@ fn main() {
         }
     }
     let window = law.window(100).open().expect("it is open");
+    let edges: Vec<_> = law.edges(&window, 0).collect();
     for bin in [0, 1, 15] {
-        let times = law.bin_interval(&window, 0, bin);
-        println!("start 100, bin {bin:2}: {} to {}", times.start, times.end);
+        println!(
+            "start 100, bin {bin:2}: {} to {}",
+            edges[bin],
+            edges[bin + 1]
+        );
     }
 }

@@ -12,6 +12,7 @@
 //! [`window_law`] says which photons a start value selects; everything that aims or reads a window
 //! asks it. [`probes`] says where nets are: nothing else knows the names of those inside the chip.
 
+pub mod bin_edges;
 pub mod config;
 mod config_keys;
 pub mod correlation;

@@ -18,9 +18,9 @@
 //! the first falling edge that ENABLE lets through. One that wraps may raise LOCAL_STOP again in the same laser
 //! cycle, where HIT still holds what it latched before: no single window describes that, and the law says so.
 //!
+//! Which photon times the bins of a window collect stands in [`bin_edges`](super::bin_edges).
+//!
 //! [`ChipTiming`] has the delays of the paths concerned, measured on the netlist; tests hold the law against it.
-
-use std::ops::Range;
 
 use super::config::{Mode, PCounter, SensorConfig};
 use super::exposure::Exposure;
@@ -80,11 +80,11 @@ struct LocalStop {
 /// The law for one sensor and exposure.
 #[derive(Debug, Clone)]
 pub struct WindowLaw {
-    config: SensorConfig,
-    exposure: Exposure,
-    timing: ChipTiming,
-    bins: i64,
-    period_fs: f64,
+    pub(super) config: SensorConfig,
+    pub(super) exposure: Exposure,
+    pub(super) timing: ChipTiming,
+    pub(super) bins: i64,
+    pub(super) period_fs: f64,
 }
 
 impl WindowLaw {
@@ -345,92 +345,9 @@ impl WindowLaw {
     }
 
     /// A few start values, one of which opens a window if most do.
-    fn samples(&self) -> [u16; 4] {
+    pub(super) fn samples(&self) -> [u16; 4] {
         let largest = self.config.largest_start();
         [0, 1, 16.min(largest), largest / 2]
-    }
-
-    /// The rising CLK edge that takes a SPAD pulse at `pulse` after the exposure's first STOP edge: the first one at or
-    /// after the pulse has toggled its flip-flop.
-    #[inline]
-    pub fn edge_of(&self, pulse: Time) -> i64 {
-        let sampled = pulse + self.timing.spad_to_toggle;
-        let periods = (sampled + self.exposure.stop_phase).as_fs() as f64 / self.period_fs - 0.5;
-        let edge = periods.ceil();
-        // Exact arithmetic only where rounding could decide.
-        if (edge - periods - 0.5).abs() < 0.499 {
-            return edge as i64;
-        }
-        self.exposure.rising_until(sampled - Time::from_fs(1)) + 1
-    }
-
-    /// Whether a rising CLK edge, counted from the exposure's first STOP edge, takes photons for `window` in any laser
-    /// cycle.
-    pub fn collects(&self, window: &OpenWindow, edge: i64) -> bool {
-        let (cycles, periods) = (self.exposure.laser_cycles, self.exposure.stop_periods);
-        // A conventional cycle is latched by the STOP edge that ends it; the exposure's first one ends one, too.
-        let first_cycle = match self.config.mode {
-            Mode::Guided => 0,
-            Mode::Conventional => -1,
-        };
-        let offset = edge - window.first_edge;
-        let cycle = offset.div_euclid(periods.into()).min(i64::from(cycles) - 1);
-        cycle >= first_cycle && offset - cycle * i64::from(periods) < self.bins
-    }
-
-    /// Photon times that `bin` of `window` collects in laser cycle `cycle`, half open, from the exposure's
-    /// first STOP edge.
-    pub fn bin_interval(&self, window: &OpenWindow, cycle: i64, bin: i64) -> Range<Time> {
-        let edge = cycle * self.exposure.stop_periods as i64 + window.first_edge + bin;
-        self.taken_until(edge - 1)..self.taken_until(edge)
-    }
-
-    /// Until when a rising CLK edge takes pulses.
-    fn taken_until(&self, edge: i64) -> Time {
-        self.exposure.rising(edge) - self.timing.spad_to_toggle + Time::from_fs(1)
-    }
-
-    /// How long before the exposure's first STOP edge the pulses begin that are taken together with one at that edge.
-    pub fn lead(&self) -> Time {
-        Time::ZERO - self.taken_until(self.edge_of(Time::ZERO) - 1)
-    }
-
-    /// Photon times that the whole window collects, relative to its laser cycle's STOP edge.
-    pub fn interval(&self, window: &OpenWindow) -> Range<Time> {
-        self.bin_interval(window, 0, 0).start..self.bin_interval(window, 0, self.bins - 1).end
-    }
-
-    /// Photon time of a position in the histogram (bin b's centre is b), relative to STOP.
-    pub fn time_of(&self, window: &OpenWindow, position_bins: f64) -> Time {
-        let first = self.bin_interval(window, 0, 0);
-        let centre = (first.start.as_fs() + first.end.as_fs()) as f64 / 2.0;
-        let bin_fs = 1e15 / self.exposure.clock.as_hz();
-        Time::from_fs((centre + position_bins * bin_fs).round() as i64)
-    }
-
-    /// The start value whose window is centred nearest to photon time `time` after STOP, or `None` where no
-    /// start value opens a window that contains it.
-    pub fn start_for(&self, time: Time) -> Option<u16> {
-        let distance = |start: u16| {
-            let interval = self.interval(&self.window(start).open()?);
-            let centre = Time::from_fs((interval.start.as_fs() + interval.end.as_fs()) / 2);
-            Some((centre - time).as_fs().abs())
-        };
-        let period_s = 1.0 / self.exposure.clock.as_hz();
-        let opens = |start| Some((start, self.window(start).open()?));
-        let (sample, window) = self.samples().into_iter().find_map(opens)?;
-        let centre = self.interval(&window);
-        let centre_s = (centre.start.as_s() + centre.end.as_s()) / 2.0;
-        let guess = sample as f64 + ((time.as_s() - centre_s) / period_s).round();
-        let largest = self.config.largest_start();
-        let guess = guess.clamp(0.0, largest as f64) as u16;
-        let candidates = guess.saturating_sub(1)..=(guess + 1).min(largest);
-        let best = candidates
-            .filter_map(|start| Some((distance(start)?, start)))
-            .min()?
-            .1;
-        let window = self.window(best).open()?;
-        self.interval(&window).contains(&time).then_some(best)
     }
 }
 
