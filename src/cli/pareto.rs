@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::{SceneArgs, say};
 use crate::bench::recording::check_exposure;
 use crate::files::{InputError, OutputFile, create_folder};
-use crate::report::{Axis, Chart, Grid, Style};
+use crate::report::{Axis, Chart, Grid, Style, aligned, width};
 use crate::system::pareto::{Done, GATE_CYCLES, Method, ParetoSettings, Point, Summary, summarise};
 
 /// Arguments of `gdtof pareto`.
@@ -253,8 +253,8 @@ const HEADINGS: [&str; 8] = [
 impl Rows {
     fn new(methods: &[Method]) -> Self {
         let widest = |text: fn(Method) -> String| {
-            let lengths = methods.iter().map(|&m| text(m).chars().count());
-            lengths.max().unwrap_or(0)
+            let texts: Vec<String> = methods.iter().map(|&m| text(m)).collect();
+            width(texts.iter())
         };
         let mut widths = [0; 8];
         let least = [
@@ -273,17 +273,8 @@ impl Rows {
         Rows { widths }
     }
 
-    fn line(&self, cells: [String; 8]) -> String {
-        let [first, rest @ ..] = &cells;
-        let rest = rest.iter().zip(&self.widths[1..]);
-        let rest: String = rest
-            .map(|(cell, &width)| format!("  {cell:>width$}"))
-            .collect();
-        format!("{first:<width$}{rest}\n", width = self.widths[0])
-    }
-
     fn headings(&self) -> String {
-        self.line(HEADINGS.map(str::to_owned))
+        aligned(&HEADINGS.map(str::to_owned), &self.widths)
     }
 
     fn row(&self, summary: &Summary) -> String {
@@ -299,7 +290,7 @@ impl Rows {
             (Some(range_m), Some(klux)) => format!("{range_m} m, {klux} klux"),
             _ => "-".into(),
         };
-        self.line([
+        let cells = [
             summary.method.name(),
             summary.method.against_cycle(),
             pair(summary.run_time_ns, worst.run_time_ns, 3),
@@ -308,7 +299,8 @@ impl Rows {
             pair(summary.mean_shift, worst.mean_shift, 3),
             depth,
             wall,
-        ])
+        ];
+        aligned(&cells, &self.widths)
     }
 }
 

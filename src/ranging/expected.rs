@@ -16,6 +16,7 @@
 //! before the next laser cycle's. Left out: afterpulses and crosstalk.
 
 use crate::chip::{EventType, SensorConfig};
+use crate::numerics::normal_above;
 use crate::photon::SPADS;
 use crate::units::Time;
 
@@ -203,7 +204,7 @@ fn share_before(time: f64, sigma: f64) -> f64 {
     let z = time / sigma;
     match z.abs() > 8.0 || sigma == 0.0 {
         true => f64::from(time > 0.0),
-        false => 0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2),
+        false => normal_above(-z),
     }
 }
 

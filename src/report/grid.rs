@@ -66,26 +66,28 @@ impl fmt::Display for Grid {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let all = || std::iter::once(&self.headings).chain(&self.rows);
         let widths: Vec<usize> = (0..self.headings.len())
-            .map(|column| {
-                all()
-                    .map(|row| row[column].chars().count())
-                    .max()
-                    .unwrap_or(0)
-            })
+            .map(|column| width(all().map(|row| &row[column])))
             .collect();
-        for row in all() {
-            let mut line = String::new();
-            for (column, (cell, &width)) in row.iter().zip(&widths).enumerate() {
-                if column == 0 {
-                    line += &format!("{cell:<width$}");
-                } else {
-                    line += &format!("  {cell:>width$}");
-                }
-            }
-            writeln!(f, "{}", line.trim_end())?;
-        }
-        Ok(())
+        all().try_for_each(|row| f.write_str(&aligned(row, &widths)))
     }
+}
+
+/// What the widest of these cells takes on a terminal.
+pub fn width<'c>(cells: impl Iterator<Item = &'c String>) -> usize {
+    cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+}
+
+/// A line of cells, columns of these widths two spaces apart. The first column aligns left, all others right.
+pub fn aligned(cells: &[String], widths: &[usize]) -> String {
+    let mut line = String::new();
+    for (column, (cell, &width)) in cells.iter().zip(widths).enumerate() {
+        line += &match column {
+            0 => format!("{cell:<width$}"),
+            _ => format!("  {cell:>width$}"),
+        };
+    }
+    line.truncate(line.trim_end().len());
+    line + "\n"
 }
 
 #[cfg(test)]

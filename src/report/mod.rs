@@ -13,6 +13,6 @@ mod table;
 pub use array::write_npy_u16;
 pub use chart::{Axis, Chart, Scale, Series, Style};
 pub use checks::Checks;
-pub use grid::Grid;
+pub use grid::{Grid, aligned, width};
 pub use image::{Cell, DepthMap};
 pub use table::Table;

@@ -2,11 +2,13 @@
 
 use std::fmt;
 
+use super::grid::{aligned, width};
+
 /// Rows of a name and a value. Names align left, values right.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Table {
     title: String,
-    rows: Vec<(String, String)>,
+    rows: Vec<[String; 2]>,
 }
 
 impl Table {
@@ -27,7 +29,7 @@ impl Table {
 
     /// Adds a row.
     pub fn push(&mut self, name: impl Into<String>, value: impl fmt::Display) {
-        self.rows.push((name.into(), value.to_string()));
+        self.rows.push([name.into(), value.to_string()]);
     }
 }
 
@@ -38,15 +40,9 @@ impl fmt::Display for Table {
         if !self.title.is_empty() {
             writeln!(f, "{}", self.title)?;
         }
-        let width = |cells: &mut dyn Iterator<Item = &String>| {
-            cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
-        };
-        let names = width(&mut self.rows.iter().map(|(name, _)| name));
-        let values = width(&mut self.rows.iter().map(|(_, value)| value));
-        for (name, value) in &self.rows {
-            writeln!(f, "  {name:<names$}  {value:>values$}")?;
-        }
-        Ok(())
+        let widths = [0, 1].map(|column| width(self.rows.iter().map(|row| &row[column])));
+        let mut rows = self.rows.iter();
+        rows.try_for_each(|row| write!(f, "  {}", aligned(row, &widths)))
     }
 }
 

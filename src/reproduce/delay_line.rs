@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 use super::claim::{Published::*, Row};
 use super::penalty::sigma_over_fwhm;
+use crate::numerics::normal_above;
 use crate::photon::{Poisson, Purpose, normal, random_stream};
 use crate::report::{Axis, Chart, Style};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -70,9 +71,7 @@ impl DelayLine {
     /// Photon counts of an echo at `time_ns`.
     fn histogram(&self, pixel: u32, time_ns: f64) -> [f64; BINS] {
         let mut random = random_stream(21, Purpose::Photons, pixel, 0);
-        let below = |edge: f64| {
-            0.5 * libm::erfc((time_ns - edge) / (pulse_sigma_ns() * std::f64::consts::SQRT_2))
-        };
+        let below = |edge: f64| normal_above((time_ns - edge) / pulse_sigma_ns());
         std::array::from_fn(|bin| {
             let share = below(self.edges_ns[bin + 1]) - below(self.edges_ns[bin]);
             Poisson::new(PHOTONS * share).draw(&mut random) as f64

@@ -12,7 +12,9 @@
 //! window can only be put on a grid of steps, so its centre is off by up to half a step: counted here as an
 //! error of its own, uniform and independent of the estimate's.
 
-use libm::{erf, erfc};
+use libm::erf;
+
+use crate::numerics::{normal_above, normal_density};
 
 /// ±3σ of a normal distribution: the thesis's "99.7 %".
 pub fn three_sigma() -> f64 {
@@ -71,7 +73,7 @@ pub fn share_inside(sigma: f64, window: f64, step: f64) -> f64 {
     }
     // The mean of the outside share over the offset u: ∫ Q((half + u)/σ) du from −step/2 to step/2, both sides
     // alike; ∫ Q is t·Q(t) − φ(t).
-    let outside = |t: f64| t * tail(t) - density(t);
+    let outside = |t: f64| t * normal_above(t) - normal_density(t);
     let low = (half - 0.5 * step) / sigma;
     let high = (half + 0.5 * step) / sigma;
     1.0 - 2.0 * sigma / step * (outside(high) - outside(low))
@@ -93,14 +95,6 @@ pub fn tolerated_sigma(window: f64, step: f64, share: f64) -> Option<f64> {
         }
     }
     Some(low)
-}
-
-fn tail(t: f64) -> f64 {
-    0.5 * erfc(t / std::f64::consts::SQRT_2)
-}
-
-fn density(t: f64) -> f64 {
-    (-0.5 * t * t).exp() / (2.0 * std::f64::consts::PI).sqrt()
 }
 
 /// A pair of cameras, reduced to what its depth errors depend on.
@@ -185,7 +179,7 @@ mod tests {
         for (sigma, window, step) in [(1.0, 6.0, 1.0), (0.2, 3.0, 2.0), (2.0, 3.0, 0.5)] {
             let inside = |offset: f64| {
                 let half = 0.5 * window;
-                1.0 - tail((half - offset) / sigma) - tail((half + offset) / sigma)
+                1.0 - normal_above((half - offset) / sigma) - normal_above((half + offset) / sigma)
             };
             let n = 20_000;
             let mean = (0..n)

@@ -22,7 +22,7 @@
 
 use std::f64::consts::PI;
 
-use crate::numerics::{poisson_deviance, stirling_error};
+use crate::numerics::{normal_above, poisson_deviance, stirling_error};
 
 /// The search for the fullest stretch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,9 +90,8 @@ impl Scan {
 fn gain(width: usize, sigma_bins: f64) -> f64 {
     const STEPS: usize = 16;
     let half = width as f64 / 2.0;
-    let below = |z: f64| 0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2);
     let share = |off: f64| match sigma_bins > 0.0 {
-        true => below((half - off) / sigma_bins) - below((-half - off) / sigma_bins),
+        true => normal_above((off - half) / sigma_bins) - normal_above((off + half) / sigma_bins),
         false => 1.0,
     };
     let offs = (0..STEPS).map(|i| (i as f64 + 0.5) / (2 * STEPS) as f64);
