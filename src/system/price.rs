@@ -3,9 +3,10 @@
 //! Prices are nanoseconds of processor time of one thread. `cargo bench --bench prices` measures them and prints each
 //! estimate beside what it stands for: the least of three runs of 16 macropixels, 384 MHz, 16 bins, laser cycles of 520 CLK
 //! periods, 1000 and 16 000 of them, from 0.1 to 1600 Mcounts/s of background and 0 to 60 signal photons a laser cycle.
-//! The machine was shared; only ratios matter here. Estimates were mostly within a third of what was measured where it decides, and
-//! by them the dearer engine is chosen in 2 of these 84 lights, for 19 % and 8 % more. What the window engine takes for
-//! any macropixel, some 10 µs, decides nothing and is left out, as is what afterpulses and crosstalk cost either engine.
+//! The machine was shared; only ratios matter here. Where there is a choice, estimates were 0.7 to 1.4 times (window) and 0.5
+//! to 1.3 times (cohort; 0.3 times with 1600 Mcounts/s, where both cost the same) what was measured, and the dearer engine is
+//! chosen in 5 of these 84 lights: for 8 % and 19 % more in two, and for some microseconds where both take below 20. What the
+//! window engine takes for any macropixel, some 10 µs, is left out, as is what afterpulses and crosstalk cost either.
 
 use crate::chip::SensorConfig;
 use crate::engine::{Cohort, EngineError, LitPixel, Window};
