@@ -16,10 +16,10 @@
 mod cancelling;
 pub mod cohort;
 mod cycle;
+mod exposing;
 mod gate;
 mod histograms;
 mod lanes;
-mod light;
 pub mod load;
 mod timed;
 pub mod waveform;
@@ -28,12 +28,12 @@ mod window;
 pub use cancelling::Cancelling;
 pub use cohort::{Cohort, CohortOptions};
 pub use cycle::{Cycle, PackedPulses, Unlevelled};
+pub use exposing::{
+    Exposed, LitPixel, Work, expose, expose_without_skipping, full_stream, stream_config,
+};
 pub use gate::{Gate, GateSimulation};
 pub use histograms::Histograms;
 pub use lanes::LaneSimulation;
-pub use light::{
-    Exposed, LitPixel, Work, expose, expose_without_skipping, full_stream, stream_config,
-};
 pub use timed::{ClosedFormCoverage, Runner, Timed, TimedHistograms};
 pub use window::Window;
 

@@ -5,7 +5,7 @@
 
 use super::check_banks::{Bank, CLOCK, DATA, Data, RESET, SET};
 use super::check_report::{BINS, Policy, slack_bin};
-use super::checks::{Found, History, NEVER, TimingChecks};
+use super::timing_checks::{Found, History, NEVER, TimingChecks};
 use crate::logic::Logic;
 use crate::netlist::{CheckKind, Control, Edge};
 

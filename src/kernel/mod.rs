@@ -23,13 +23,13 @@
 mod check_banks;
 mod check_judge;
 mod check_report;
-mod checks;
 mod compiled;
 mod lane_word;
 mod lanes;
 mod observer;
 mod simulation;
 mod stimulus;
+mod timing_checks;
 mod trace_hash;
 mod transport;
 mod wheel;
@@ -37,10 +37,10 @@ mod wheel;
 pub use check_report::{
     BIN_FS, BINS, CheckReport, CheckSummary, FIRST_BIN_FS, Place, Policy, Violation,
 };
-pub use checks::TimingChecks;
 pub use lane_word::{LANES, Lanes};
 pub use lanes::{LaneDrive, LaneKernel, LaneObserver};
 pub use observer::{Observer, Recorder};
 pub use simulation::{Kernel, Statistics};
 pub use stimulus::{Drive, Stimulus, clock, in_order, merge};
+pub use timing_checks::TimingChecks;
 pub use trace_hash::TraceHash;

@@ -1,6 +1,6 @@
 //! The limits of one flip-flop in one corner: those of the library, or its own from a delay file.
 
-use super::checks::{CheckKind, CheckLimits};
+use super::check_limits::{CheckKind, CheckLimits};
 use super::library::Corner;
 use super::static_timing::Edge;
 

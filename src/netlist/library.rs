@@ -11,7 +11,7 @@
 //! that two different paths almost never end in the same femtosecond.
 
 use super::cell::{CellKind, MAX_INPUTS};
-use super::checks::CheckLimits;
+use super::check_limits::CheckLimits;
 use crate::logic::Logic;
 use crate::units::Time;
 

@@ -11,7 +11,7 @@
 
 mod builder;
 mod cell;
-mod checks;
+mod check_limits;
 mod flat;
 mod instance_limits;
 mod library;
@@ -25,7 +25,7 @@ mod verilog;
 
 pub use builder::{ModuleBuilder, NetlistError};
 pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS, next_state};
-pub use checks::{CheckKind, CheckLimits, DataLimit};
+pub use check_limits::{CheckKind, CheckLimits, DataLimit};
 pub use flat::{FlatCell, NetId, Netlist, Scope};
 pub use instance_limits::{Control, InstanceLimits};
 pub use library::{CellArcs, Corner, Delay, Library, TimingArc};

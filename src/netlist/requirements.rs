@@ -15,7 +15,7 @@
 //! As [`StaticTiming`] does, this knows of no values: a flip-flop is asked for what no stimulus may ever do.
 
 use super::cell::CellKind;
-use super::checks::CheckKind;
+use super::check_limits::CheckKind;
 use super::flat::{NetId, Netlist};
 use super::library::{Corner, Library};
 use super::static_timing::{Arrivals, Bound, Edge, Path, StaticTiming, TimingLoop};

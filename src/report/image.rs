@@ -66,7 +66,7 @@ pub struct DepthMap<'a> {
     pub cells: &'a [Cell],
     /// Ends of the depth scale, m: yellow, violet. Depths beyond take the end's colour.
     pub range_m: (f32, f32),
-    /// Names of categories, at most as many as [`CATEGORY_COLOURS`]; those that occur stand in the legend with
+    /// Names of categories, at most as many as `CATEGORY_COLOURS`; those that occur stand in the legend with
     /// their numbers.
     pub categories: &'a [&'a str],
     /// Screen pixels of a square's side.

@@ -3,16 +3,16 @@
 mod array;
 mod canvas;
 mod chart;
-mod checks;
 mod colour;
 mod grid;
 mod image;
 mod legend;
 mod table;
+mod verdicts;
 
 pub use array::write_npy_u16;
 pub use chart::{Axis, Chart, Scale, Series, Style};
-pub use checks::Checks;
 pub use grid::{Grid, aligned, width};
 pub use image::{Cell, DepthMap};
 pub use table::Table;
+pub use verdicts::Checks;

@@ -2,7 +2,8 @@
 
 use super::claim::Claim;
 use super::{
-    chip, delay_line, design, light, measured, penalty, precision, sensors, silicon, stereo, system,
+    chip, delay_line, design, measured, penalty, photon_budget, precision, sensors, silicon,
+    stereo, system,
 };
 use crate::engine::EngineError;
 use crate::report::{Chart, Grid};
@@ -107,19 +108,19 @@ pub const CLAIMS: [Claim; 28] = [
         7,
         "signal photons",
         "3.3.2, Eq. 15, Table 6",
-        light::signal_rows,
+        photon_budget::signal_rows,
     ),
     claim(
         8,
         "sunlight",
         "3.3.2, Eq. 16, Table 6",
-        light::background_rows,
+        photon_budget::background_rows,
     ),
     claim(
         9,
         "probability of detection",
         "3.2.2, Eq. 17 to 19, Fig. 32",
-        light::detection_rows,
+        photon_budget::detection_rows,
     ),
     claim(10, "precision", "3.2.3, Eq. 20, Fig. 33", precision::rows),
     claim(
@@ -186,7 +187,7 @@ pub const CLAIMS: [Claim; 28] = [
         21,
         "light of the demonstrator",
         "6.3.1, Fig. 94",
-        light::demonstrator_rows,
+        photon_budget::demonstrator_rows,
     ),
     claim(
         22,
@@ -243,15 +244,15 @@ pub const TABLES: [Table; 4] = [
 
 /// Every figure, by number.
 pub const FIGURES: [Figure; 28] = [
-    figure(20, "wavelength of a VCSEL", light::figure_20),
+    figure(20, "wavelength of a VCSEL", photon_budget::figure_20),
     figure(
         28,
         "bins per pixel of published sensors",
         sensors::figure_28,
     ),
-    figure(32, "probability of detection", light::figure_32),
+    figure(32, "probability of detection", photon_budget::figure_32),
     figure(33, "precision", precision::figure_33),
-    figure(34, "photon budget", light::figure_34),
+    figure(34, "photon budget", photon_budget::figure_34),
     figure(35, "laser cycles against distance", penalty::figure_35),
     figure(36, "counts of a bin", silicon::figure_36),
     figure(37, "bins of a full histogram", silicon::figure_37),
@@ -286,7 +287,11 @@ pub const FIGURES: [Figure; 28] = [
         "a plane before and after calibration",
         delay_line::figure_93,
     ),
-    figure(94, "photon budget of the demonstrator", light::figure_94),
+    figure(
+        94,
+        "photon budget of the demonstrator",
+        photon_budget::figure_94,
+    ),
     figure(104, "σ of the demonstrator", system::figure_104),
     figure(106, "time of a frame", system::figure_106),
     figure(

@@ -6,8 +6,8 @@
 mod camera;
 mod entry;
 mod file;
+mod illumination;
 mod keys;
-mod light;
 mod rules;
 mod settings;
 mod shape;
@@ -15,7 +15,7 @@ mod truth;
 mod vector;
 
 pub use camera::PinholeCamera;
-pub use light::SKY_REFLECTIVITY;
+pub use illumination::SKY_REFLECTIVITY;
 pub use settings::{Lidar, Light, Scene, Stereo};
 pub use shape::{Object, Shape};
 pub use truth::{GroundTruth, Hit};

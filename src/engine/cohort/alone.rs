@@ -4,7 +4,7 @@
 //! number, and those after it are asked one by one.
 
 use super::blindness::{Ages, Blindness};
-use super::light::absorbed;
+use super::spad_light::absorbed;
 use super::words::RandomWords;
 use super::{Counts, EventTable, Steps};
 use crate::photon::{DeadTimeLaw, SPADS};

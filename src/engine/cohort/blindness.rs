@@ -14,7 +14,7 @@
 
 use smallvec::{SmallVec, smallvec};
 
-use super::light::{DIM, absorbed};
+use super::spad_light::{DIM, absorbed};
 use crate::photon::DeadTimeLaw;
 
 /// Steps of dead time that need no memory of their own.

@@ -13,7 +13,7 @@
 use smallvec::SmallVec;
 
 use super::blindness::{Ages, Blindness};
-use super::light::{Extent, SpadLight, absorbed};
+use super::spad_light::{Extent, SpadLight, absorbed};
 use super::{CohortOptions, FEW_STEPS, Steps};
 use crate::chip::{Exposure, Mode, SensorConfig};
 use crate::engine::EngineError;

@@ -14,7 +14,7 @@
 //! * **Dead time** (`fine.rs`): cohorts move in steps of a CLK period. How able a SPAD is to fire in one, by the step of its
 //!   last avalanche, is computed from the light on cells that are halved until the mean of every bin is known to within
 //!   [`CohortOptions::error`] of its counting noise, and refused where 256 cells to a CLK period do not do. In little light
-//!   it is as in even light, which a bound shows first ([`Cohort::is_even_enough`]). So means and each two successive
+//!   it is as in even light, which a bound shows first (`is_even_enough`). So means and each two successive
 //!   pulses of a SPAD have their probabilities; how three in successive dead times depend on each other within
 //!   a period is left out. [`CohortOptions::sub_bins`] overrides all that: so many steps to a CLK period, in each of
 //!   which light is taken to be even (`blindness.rs`); twice the steps leave a quarter of the error.
@@ -42,12 +42,12 @@ mod fine;
 mod grid;
 mod hits;
 mod joint;
-mod light;
 mod overlap;
 mod period;
 mod pooled;
 mod rejection;
 mod secondaries;
+mod spad_light;
 mod words;
 
 use std::sync::OnceLock;
@@ -59,8 +59,8 @@ use self::blindness::Blindness;
 use self::cycles::{Class, LikeCycles, Scene};
 pub use self::draw::none_of;
 pub use self::hits::at_least_hit;
-use self::light::SpadLight;
 use self::secondaries::Secondaries;
+use self::spad_light::SpadLight;
 use self::words::RandomWords;
 use super::{Engine, EngineError, Expose, Exposed, LitPixel, Work, follows};
 use crate::chip::{Exposure, SensorConfig, WindowLaw, correlation, histogram, window_law};

@@ -11,7 +11,7 @@ use smallvec::SmallVec;
 
 use super::blindness::Blindness;
 use super::draw::binomial;
-use super::light::{DIM, absorbed, absorbed_dim};
+use super::spad_light::{DIM, absorbed, absorbed_dim};
 use super::words::RandomWords;
 use super::{FEW_STEPS, Steps};
 use crate::photon::DeadTimeLaw;

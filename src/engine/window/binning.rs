@@ -13,7 +13,7 @@
 use multiversion::multiversion;
 
 use super::codes::{Code, Codes, SPAD_BITS, bin_mark, spad_mark};
-use super::echo::{EchoRows, Passed};
+use super::echo_rows::{EchoRows, Passed};
 use super::sight::ROUNDING_FS;
 use crate::photon::{Draw, PER_BLOCK, PixelStream, Place, Slots, TIME_BITS};
 

@@ -15,7 +15,7 @@
 
 use super::binning::{Binning, Scratch, Wanted};
 use super::codes::{Code, Codes, ROWS};
-use super::echo::EchoRows;
+use super::echo_rows::EchoRows;
 use super::past::split;
 use super::sight::{Sight, Spans};
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Spacing, Tables};

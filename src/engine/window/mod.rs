@@ -12,7 +12,7 @@
 mod binning;
 mod codes;
 mod counting;
-mod echo;
+mod echo_rows;
 mod past;
 mod sight;
 mod tables;

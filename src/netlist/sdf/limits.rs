@@ -14,7 +14,7 @@ use super::annotate::Annotator;
 use super::{CheckKind as Entry, Edge as EntryEdge, PinEdge, SdfCell, SdfCheck, Triple};
 use crate::files::InputError;
 use crate::netlist::cell::CellKind;
-use crate::netlist::checks::CheckKind;
+use crate::netlist::check_limits::CheckKind;
 use crate::netlist::instance_limits::{Control, InstanceLimits};
 use crate::netlist::static_timing::Edge;
 use crate::netlist::timing::Timing;

@@ -166,7 +166,7 @@ impl<'a> PixelStream<'a> {
         self.stream.config.spads.dead_time.as_fs() as f64 / (self.gap_fs * SPADS as f64)
     }
 
-    /// Whether photons of the echo are drawn only where their SPAD is ready ([`OrderedEchoes`]).
+    /// Whether photons of the echo are drawn only where their SPAD is ready ([`OrderedEchoes`](super::OrderedEchoes)).
     ///
     /// Such an echo has to be followed from its beginning. Where echoes come one upon the other, that would be from the
     /// beginning of the exposure, for each window.

@@ -13,11 +13,11 @@ pub struct Summary {
     pub run_time_ns: f64,
     /// Speed-up over the `cycle` engine.
     pub speed_up: f64,
-    /// See [`Errors::mismatch`].
+    /// See [`Errors::mismatch`](super::Errors::mismatch).
     pub mismatch: f64,
-    /// See [`Errors::mean_shift`].
+    /// See [`Errors::mean_shift`](super::Errors::mean_shift).
     pub mean_shift: f64,
-    /// See [`Errors::depth_rms_m`].
+    /// See [`Errors::depth_rms_m`](super::Errors::depth_rms_m).
     pub depth_rms_m: Option<f64>,
     /// Mean difference of depths, either way, m.
     pub depth_mean_m: Option<f64>,
