@@ -5,9 +5,12 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 mkdir -p vectors/traces
 mkdir -p vectors/range vectors/timing
-GDTOF_REMAKE=1 cargo test --release --quiet --test chip traces_are_deterministic::golden
-GDTOF_REMAKE=1 cargo test --release --quiet --test command golden_vectors_hold::delays
-GDTOF_REMAKE=1 cargo test --release --quiet --test command real_histograms_are_ranged::sample
+GDTOF_REMAKE=1 cargo test --release --quiet --test chip -- --exact \
+    traces_are_deterministic::every_build_finds_the_golden_hashes
+GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
+    golden_vectors_hold::in_the_delays_of_every_p_counter
+GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
+    real_histograms_are_ranged::the_sample_captures_are_ranged
 cd vectors/replay
 cargo run --release --quiet -- replay --sensor sensor.toml --inits inits.csv --events events.csv \
     --stop-periods 80 --laser-cycles 40 --engine gate --out histograms.csv
