@@ -9,11 +9,7 @@ use guided_dtof::engine::{Cohort, CohortOptions, LitPixel, expose, stream_config
 use guided_dtof::photon::{PhotonStream, PixelLight};
 use guided_dtof::units::Time;
 
-const LIGHT: PixelLight = PixelLight {
-    signal_per_cycle: 0.1,
-    arrival: Time::from_ns(765),
-    background_hz: 8e6,
-};
+const LIGHT: PixelLight = PixelLight::echo(0.1, Time::from_ns(765)).with_background(8e6);
 
 fn frame(c: &mut Criterion) {
     let config = SensorConfig::default();

@@ -30,11 +30,7 @@ fn cycle(c: &mut Criterion) {
         };
         let exposure = Exposure::new(&config, STOP_PERIODS, laser_cycles);
         let stream = PhotonStream::new(&stream_config(&config, &exposure, 1, Time::from_ps(1_900)));
-        let light = PixelLight {
-            signal_per_cycle: 1.0,
-            arrival: Time::from_ns(765),
-            background_hz: 10e6,
-        };
+        let light = PixelLight::echo(1.0, Time::from_ns(765)).with_background(10e6);
         let pulses: Vec<Vec<SpadEvent>> = (0..config.pixels())
             .map(|pixel| stream.pixel_events(pixel as u32, &light).events)
             .collect();

@@ -6,7 +6,7 @@
 use std::hint::black_box;
 
 use cpu_time::ProcessTime;
-use guided_dtof::chip::{Exposure, SensorConfig, sensor};
+use guided_dtof::chip::{Exposure, SensorConfig, array};
 use guided_dtof::engine::{GateSimulation, LaneSimulation, stream_config};
 use guided_dtof::kernel::Policy;
 use guided_dtof::netlist::Netlist;
@@ -49,7 +49,7 @@ fn main() {
             cols: side,
             ..SensorConfig::default()
         };
-        let elaborate = || Netlist::elaborate(&sensor::circuit(&config));
+        let elaborate = || Netlist::elaborate(&array::circuit(&config));
         let cells = elaborate().cells().len() as f64;
         let seconds = seconds(|| (), |()| drop(black_box(elaborate())));
         print(
@@ -61,11 +61,7 @@ fn main() {
     let config = SensorConfig::default();
     let exposure = Exposure::new(&config, STOP_PERIODS, LASER_CYCLES);
     let stream = PhotonStream::new(&stream_config(&config, &exposure, 1, Time::from_ps(1_900)));
-    let light = PixelLight {
-        signal_per_cycle: 1.0,
-        arrival: Time::from_ns(765),
-        background_hz: 10e6,
-    };
+    let light = PixelLight::echo(1.0, Time::from_ns(765)).with_background(10e6);
     let photons: Vec<Vec<SpadEvent>> = (0..u32::from(LANES))
         .map(|pixel| stream.pixel_events(pixel, &light).events)
         .collect();

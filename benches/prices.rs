@@ -53,11 +53,11 @@ fn main() {
                     .map(|number| {
                         let start = ((stop_periods as u16 - 17) / PIXELS * number).min(510);
                         let open = law.window(start).open().expect("a window that opens");
-                        let light = PixelLight {
+                        let light = PixelLight::echo(
                             signal_per_cycle,
-                            arrival: law.time_of(&open, 7.0 + f64::from(number) / 16.0),
-                            background_hz,
-                        };
+                            law.time_of(&open, 7.0 + f64::from(number) / 16.0),
+                        )
+                        .with_background(background_hz);
                         LitPixel {
                             number: number.into(),
                             start,

@@ -4,7 +4,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use guided_dtof::chip::{Exposure, SensorConfig, sensor};
+use guided_dtof::chip::{Exposure, SensorConfig, array};
 use guided_dtof::engine::load::{load, load_netlist};
 use guided_dtof::engine::{Cycle, GateSimulation, LaneSimulation, Replay, Window, stream_config};
 use guided_dtof::netlist::Netlist;
@@ -19,11 +19,7 @@ fn stream(config: &SensorConfig, exposure: &Exposure) -> PhotonStream {
     PhotonStream::new(&stream_config(config, exposure, 1, Time::from_ps(1_900)))
 }
 
-const LIGHT: PixelLight = PixelLight {
-    signal_per_cycle: 1.0,
-    arrival: Time::from_ns(765),
-    background_hz: 10e6,
-};
+const LIGHT: PixelLight = PixelLight::echo(1.0, Time::from_ns(765)).with_background(10e6);
 
 fn photons(config: &SensorConfig, exposure: &Exposure) -> Vec<SpadEvent> {
     stream(config, exposure).pixel_events(0, &LIGHT).events
@@ -75,7 +71,7 @@ fn array(c: &mut Criterion) {
     let mut group = c.benchmark_group("64x64 array");
     group.sample_size(10);
     group.bench_function("elaborate", |b| {
-        b.iter(|| black_box(Netlist::elaborate(&sensor::circuit(&config))).net_count());
+        b.iter(|| black_box(Netlist::elaborate(&array::circuit(&config))).net_count());
     });
     let netlist = load_netlist(&config);
     group.bench_function("load at gate level", |b| {

@@ -24,12 +24,12 @@ fn main() {
         }
     }
     let window = law.window(100).open().expect("it is open");
-    let edges: Vec<_> = law.edges(&window, 0).collect();
+    let edges = law.edges(&window, 0);
     for bin in [0, 1, 15] {
+        let collected = edges.bin(bin);
         println!(
             "start 100, bin {bin:2}: {} to {}",
-            edges[bin],
-            edges[bin + 1]
+            collected.start, collected.end
         );
     }
 }

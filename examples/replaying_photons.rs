@@ -10,11 +10,7 @@ use guided_dtof::units::Time;
 fn main() -> Result<(), EngineError> {
     let config = SensorConfig::default();
     let exposure = Exposure::new(&config, 520, 2000);
-    let light = PixelLight {
-        signal_per_cycle: 0.4,
-        arrival: Time::from_ns(400),
-        background_hz: 20e6,
-    };
+    let light = PixelLight::echo(0.4, Time::from_ns(400)).with_background(20e6);
     let stream = PhotonStream::new(&stream_config(&config, &exposure, 7, Time::from_ps(1_900)));
     let photons = stream.pixel_events(0, &light);
     println!(
@@ -22,7 +18,10 @@ fn main() -> Result<(), EngineError> {
         photons.drawn, photons.lost_to_dead_time
     );
     let window = Window::new(&config, &exposure);
-    let start = window.law().start_for(light.arrival).expect("within reach");
+    let start = window
+        .law()
+        .start_for(light.arrival())
+        .expect("within reach");
     let counts = window.histogram(start, &photons.events)?;
     println!("start value {start}, window {counts:?}");
     let cycle = Cycle::new(&config, &exposure).histogram(start, &photons.events)?;

@@ -17,8 +17,8 @@ fn main() -> Result<(), EngineError> {
         dead_time_ns: 12.0,
         ..SensorConfig::default()
     };
-    if let Err((key, why)) = config.check() {
-        println!("{key}: {why}");
+    if let Err(fault) = config.check() {
+        println!("{fault}");
         return Ok(());
     }
     let exposure = Exposure::new(&config, 140, 8);

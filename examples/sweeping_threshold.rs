@@ -21,11 +21,7 @@ fn main() -> Result<(), EngineError> {
         let pixel = LitPixel {
             number: 0,
             start: window.law().start_for(arrival).expect("within reach"),
-            light: Some(PixelLight {
-                signal_per_cycle: 2.0,
-                arrival,
-                background_hz: 100e6,
-            }),
+            light: Some(PixelLight::echo(2.0, arrival).with_background(100e6)),
         };
         // More than THRESHOLD SPADs: background is suppressed faster than the echo.
         let exposed = window.expose(&stream, &[pixel])?;

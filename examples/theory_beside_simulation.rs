@@ -36,11 +36,10 @@ fn main() -> Result<(), EngineError> {
             .map(|number| LitPixel {
                 number,
                 start,
-                light: Some(PixelLight {
-                    signal_per_cycle: light.signal,
-                    arrival,
-                    background_hz: light.background / clk_s,
-                }),
+                light: Some(
+                    PixelLight::echo(light.signal, arrival)
+                        .with_background(light.background / clk_s),
+                ),
             })
             .collect();
         let exposed = window.expose(&stream, &pixels)?;

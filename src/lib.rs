@@ -1,7 +1,6 @@
-//! A guided direct time-of-flight lidar chip, simulated down to gates and flip-flops.
-//!
-//! 64×64 macropixels each count photons only in the short time window that a stereo camera's depth estimate
-//! programmed into them. The chip is described once, as a netlist; every engine and exporter reads it.
+#![cfg_attr(not(test), warn(unreachable_pub))]
+#![doc = include_str!("tutorial.md")]
+//! # Modules
 //!
 //! The folders follow the data's road, and lower ones never import higher ones:
 //!
@@ -28,22 +27,6 @@
 //! | [`system`] | one guided frame, end to end |
 //! | [`reproduce`] | the thesis's figures, published beside computed |
 //! | [`cli`] | the `gdtof` command |
-//!
-//! One macropixel at gate level:
-//!
-//! ```
-//! use guided_dtof::chip::{Exposure, SensorConfig};
-//! use guided_dtof::engine::{Gate, Replay, Window};
-//! use guided_dtof::photon::SpadEvent;
-//! use guided_dtof::units::Time;
-//!
-//! let config = SensorConfig::default();
-//! let exposure = Exposure::new(&config, 60, 3); // 60 CLK periods a laser cycle, 3 cycles
-//! let photon = SpadEvent { time: Time::from_ns(50), spad: 7 };
-//! let counts = Gate::new(&config, &exposure).histogram(25, &[photon]).unwrap();
-//! assert_eq!(counts.iter().sum::<u16>(), 1);
-//! assert_eq!(counts, Window::new(&config, &exposure).histogram(25, &[photon]).unwrap());
-//! ```
 
 pub mod analysis;
 pub mod bench;

@@ -15,8 +15,8 @@ use std::sync::Arc;
 
 use guided_dtof::chip::window_law::OpenWindow;
 use guided_dtof::chip::{
-    EventType, Exposure, Overflow, Probe, SPADS, SensorConfig, SensorPins, WindowLaw, correlation,
-    histogram, probes, sensor,
+    self, EventType, Exposure, Overflow, Probe, SensorConfig, SensorPins, WindowLaw, array,
+    correlation, histogram, probes,
 };
 use guided_dtof::cli::testbench;
 use guided_dtof::engine::GateSimulation;
@@ -28,8 +28,10 @@ use guided_dtof::report::Checks;
 use guided_dtof::units::Time;
 use guided_dtof::waves::{Entry, Group, Layout};
 
-/// Start values of Fig. 48's two macropixels.
-const STARTS: [u16; 2] = [52, 49];
+/// Start values of Fig. 48's two macropixels, three bins apart.
+const FIG_48: [u16; 2] = [52, 49];
+/// Start values of two macropixels of HSLIDAR, half a window apart.
+const HSLIDAR: [u16; 2] = [13, 12];
 /// CLK periods between two STOP edges.
 const STOP_PERIODS: u32 = 64;
 
@@ -42,7 +44,15 @@ fn main() -> ExitCode {
 }
 
 fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
-    figure_48(waves, checks)?;
+    two_windows(waves, &config(), FIG_48, "Fig. 48", checks)?;
+    let hslidar = waves
+        .with_file_name("tb_macropixel_hslidar")
+        .with_extension(waves.extension().unwrap_or_default());
+    let chip = SensorConfig {
+        rows: 1,
+        ..(*chip::hslidar()).clone()
+    };
+    two_windows(&hslidar, &chip, HSLIDAR, "HSLIDAR, 4.9.3", checks)?;
     bin_edge(checks);
     full_bins(checks);
     coincidences(checks);
@@ -113,14 +123,21 @@ fn shown<T: Debug>(counts: &Option<T>) -> String {
         .map_or("unknown".to_owned(), |c| format!("{c:?}"))
 }
 
-fn figure_48(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
+/// Two macropixels with windows that overlap, in the same light.
+fn two_windows(
+    waves: &Path,
+    sensor: &SensorConfig,
+    starts: [u16; 2],
+    figure: &str,
+    checks: &mut Checks,
+) -> Result<(), InputError> {
     let config = SensorConfig {
         cols: 2,
-        ..config()
+        ..sensor.clone()
     };
     let exposure = Exposure::new(&config, STOP_PERIODS, 6);
-    let shift = (STARTS[0] - STARTS[1]) as usize;
-    let (law, second) = window(&config, &exposure, STARTS[1]);
+    let shift = usize::from(starts[0] - starts[1]) * config.step_periods;
+    let (law, second) = window(&config, &exposure, starts[1]);
     let photons_of = |bin: i64| (bin * bin * bin + 3 * bin).rem_euclid(11) as u32 / 2;
     // Photons from before the earlier window to after the later one, a different number in every CLK period;
     // no SPAD fires twice within its dead time.
@@ -130,18 +147,18 @@ fn figure_48(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         .filter(|(cycle, bin)| (cycle + 3) % exposure.laser_cycles <= photons_of(*bin))
         .map(|(cycle, bin)| SpadEvent {
             time: middle(&law, &second, cycle, bin),
-            spad: bin.rem_euclid(SPADS as i64) as u8,
+            spad: bin.rem_euclid(16) as u8,
         })
         .collect();
     pulses.sort_unstable();
 
     let lists = [&pulses[..], &pulses[..]];
-    let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 2), &STARTS, &lists);
+    let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 2), &starts, &lists);
     let netlist = Arc::clone(gate.netlist());
     let local_stop = SensorPins::of(&netlist).local_stop;
     let mut recorder = Recorder::new(local_stop.iter().copied());
     let origin = gate.schedule().origin;
-    let view = view(&config, origin, origin + exposure.stop(1));
+    let view = view(&config, (starts, figure), origin, origin + exposure.stop(1));
     write_waves(waves, &netlist, &view, |waves| {
         gate.run(&mut (&mut recorder, waves));
         gate.schedule().end
@@ -149,11 +166,11 @@ fn figure_48(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
 
     checks.equal(
         "start values loaded",
-        shown(&Some(STARTS)),
+        shown(&Some(starts)),
         shown(&gate.loaded().into_iter().collect::<Option<Vec<u16>>>()),
     );
     let histograms = gate.histograms().ok();
-    for (pixel, &start) in STARTS.iter().enumerate() {
+    for (pixel, &start) in starts.iter().enumerate() {
         let found = histograms.as_ref().map(|h| &h[pixel]);
         checks.equal(
             format!("start value {start}: histogram, against the window law"),
@@ -169,7 +186,7 @@ fn figure_48(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     checks.that(
         format!(
             "bins 0 up of {} are bins {shift} up of {}",
-            STARTS[0], STARTS[1]
+            starts[0], starts[1]
         ),
         format!("{earlier:?}"),
         format!("{later:?}"),
@@ -186,14 +203,14 @@ fn figure_48(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         checks.that(
             format!(
                 "laser cycle {cycle}: LOCAL_STOP {} before that of {}",
-                STARTS[1], STARTS[0]
+                starts[1], starts[0]
             ),
             format!("{shift} periods, {expected}"),
             found,
             (found - expected).as_fs().abs() <= 1,
         );
     }
-    for (rises, start) in rises.iter().zip(STARTS) {
+    for (rises, start) in rises.iter().zip(starts) {
         let what = format!("start value {start}: LOCAL_STOPs");
         checks.equal(what, exposure.laser_cycles as usize, rises.len());
         let (_, window) = window(&config, &exposure, start);
@@ -204,7 +221,12 @@ fn figure_48(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     Ok(())
 }
 
-fn view(config: &SensorConfig, origin: Time, end: Time) -> Layout {
+fn view(
+    config: &SensorConfig,
+    (starts, figure): ([u16; 2], &str),
+    origin: Time,
+    end: Time,
+) -> Layout {
     let mut groups = vec![Group::new(
         "Global signals",
         [
@@ -213,8 +235,8 @@ fn view(config: &SensorConfig, origin: Time, end: Time) -> Layout {
             Entry::binary("ENABLE"),
         ],
     )];
-    for (col, start) in STARTS.into_iter().enumerate() {
-        let pixel = sensor::pixel_name(0, col);
+    for (col, start) in starts.into_iter().enumerate() {
+        let pixel = array::pixel_name(0, col);
         let signals = [
             Entry::hex(Probe::SpadRaw.path(&pixel)),
             Entry::hex(Probe::SpadTimed.path(&pixel)),
@@ -228,7 +250,7 @@ fn view(config: &SensorConfig, origin: Time, end: Time) -> Layout {
         let bins = [0, config.bins / 2, config.bins - 1];
         let bins = bins.map(|bin| Entry::decimal(probes::bin_path(&pixel, bin)));
         groups.push(Group::new(
-            format!("Macropixel {}: {start} (Fig. 48)", col + 1),
+            format!("Macropixel {}: {start} ({figure})", col + 1),
             signals.into_iter().chain(bins),
         ));
     }
@@ -305,7 +327,7 @@ fn coincidences(checks: &mut Checks) {
         (EventType::Greater, 3),
         (EventType::Equal, 2),
         (EventType::Less, 4),
-        (EventType::Greater, SPADS as u8),
+        (EventType::Greater, 16),
     ];
     for (event_type, threshold) in cases {
         let config = SensorConfig {
@@ -317,14 +339,14 @@ fn coincidences(checks: &mut Checks) {
         };
         let exposure = Exposure::new(&config, 32, 1);
         let (law, window) = window(&config, &exposure, start);
-        let spads = |bin: usize| (1u32 << bin) - 1;
+        let spads = |bin: usize| (1u64 << bin) - 1;
         let mut pulses = Vec::new();
         for bin in 0..config.bins {
             let time = middle(&law, &window, 0, bin as i64);
             pulses.extend((0..bin as u8).map(|spad| SpadEvent { time, spad }));
         }
         let expected: Vec<u16> = (0..config.bins)
-            .map(|bin| correlation::model(spads(bin) as u16, event_type, threshold) as u16)
+            .map(|bin| correlation::model(spads(bin), event_type, threshold) as u16)
             .collect();
         let found = counted(&config, &exposure, start, &mut pulses);
         checks.equal(

@@ -21,7 +21,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use guided_dtof::analysis::{MacropixelTiming, shortest_period};
-use guided_dtof::chip::{Exposure, Limits, Probe, Probes, SensorConfig, Silicon, probes, sensor};
+use guided_dtof::chip::{Exposure, Limits, Probe, Probes, SensorConfig, Silicon, array, probes};
 use guided_dtof::cli::testbench;
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::engine::waveform::write_waves;
@@ -112,7 +112,7 @@ impl Outcome {
 fn delays(netlist: &Netlist) -> Timing {
     let nominal = Timing::nominal(netlist, &Library::default(), Corner::Typ);
     let mismatched = varied(netlist, &nominal, 1.0, Some(MISMATCH));
-    let second = format!(".{}.", sensor::pixel_name(0, 1));
+    let second = format!(".{}.", array::pixel_name(0, 1));
     let mut timing = nominal;
     for cell in 0..netlist.cells().len() {
         if netlist.cell_path(cell).contains(&second) {
@@ -237,7 +237,7 @@ fn far_from_the_crossing(checks: &mut Checks) {
         let found = outcome(period, Policy::XOnViolation);
         for (pixel, captured) in found.pixels.iter().enumerate() {
             checks.equal(
-                format!("{mhz} MHz, {}: counts", sensor::pixel_name(0, pixel)),
+                format!("{mhz} MHz, {}: counts", array::pixel_name(0, pixel)),
                 shown(&expected(is_late)),
                 shown(&captured.counts),
             );
@@ -365,7 +365,7 @@ fn view(stop: &dyn Fn(i64) -> Time, period: Time, sees_old: &[bool]) -> Layout {
         ["CLK", "STOP"].map(Entry::binary),
     )];
     for (pixel, title) in ["library's delays", "mismatch"].into_iter().enumerate() {
-        let pixel = sensor::pixel_name(0, pixel);
+        let pixel = array::pixel_name(0, pixel);
         let signals = [
             Entry::decimal(Probe::CounterOut.path(&pixel)),
             Entry::binary(Probe::LocalStop.path(&pixel)),

@@ -12,7 +12,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use cpu_time::ProcessTime;
-use guided_dtof::chip::{Exposure, SPADS, SensorConfig};
+use guided_dtof::chip::{Exposure, SensorConfig};
 use guided_dtof::engine::{Cycle, Histograms};
 use guided_dtof::photon::SpadEvent;
 use guided_dtof::units::Time;
@@ -42,7 +42,7 @@ fn main() -> std::io::Result<()> {
         .map(|&start| match stimulus.as_str() {
             "bright" => bright(random, &config, periods * cycles),
             "every" => (0..periods * cycles)
-                .flat_map(|edge| (0..SPADS as u16).map(move |spad| (edge, spad)))
+                .flat_map(|edge| (0..16u16).map(move |spad| (edge, spad)))
                 .collect(),
             _ => street(random, &config, periods, cycles, start),
         })
@@ -98,7 +98,7 @@ fn street(
         .collect::<Vec<_>>()
         .into_iter()
         .chain(signal)
-        .map(|edge| (edge, random.random_range(0..SPADS as u16)))
+        .map(|edge| (edge, random.random_range(0..16u16)))
         .collect();
     taken.sort_unstable();
     taken.dedup();
@@ -109,7 +109,7 @@ fn bright(random: &mut StdRng, config: &SensorConfig, edges: u32) -> Taken {
     // Dead for 8 ns, then 100 Mcounts/s: 18 ns from pulse to pulse.
     let (dead, chance) = ((8e-9 * config.clk_hz).ceil() as u32, 100e6 / config.clk_hz);
     let mut taken = Taken::new();
-    for spad in 0..SPADS as u16 {
+    for spad in 0..16u16 {
         let mut edge = 0;
         while edge < edges {
             if random.random_bool(chance) {

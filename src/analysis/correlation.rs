@@ -5,9 +5,10 @@
 //!                                                                    ─► NOT (equal or greater) rises ─► SPAD_EVENT
 //! ```
 //!
-//! Seven SPADs fire in one CLK period, five others in the next: with TYPE = less and THRESHOLD = 6, SPAD_EVENT
+//! Of 16 SPADs seven fire in one CLK period, five others in the next: with TYPE = less and THRESHOLD = 6, SPAD_EVENT
 //! must rise, and does so through the whole carry and comparison chain. The sets were found by a search over pairs
-//! of SPAD_TIMED words that share no SPAD (none fires in two successive periods: dead time).
+//! of SPAD_TIMED words that share no SPAD (none fires in two successive periods: dead time). With other numbers of SPADs the
+//! worst of [`TRIED`] random pairs is taken.
 //!
 //! The longest path of static timing is longer by two differences between XOR's rise and fall and one of AND's. It is
 //! false. It wants a carry of the ones' column to *rise* last: then both bits of its half adder are 1, COUNT<0>
@@ -22,9 +23,57 @@ use crate::netlist::CheckKind;
 use crate::photon::SpadEvent;
 use crate::units::{Frequency, Time};
 
-/// SPADs that fire in one CLK period, and in the next; see the head of this file.
-pub const WORST_PHOTONS: [u16; 2] = [0b1101_1100_1001_0000, 0b0010_0011_0000_1001];
-const THRESHOLD: u8 = 6;
+/// What excites a long path.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Photons {
+    /// SPADs that fire in one CLK period, and in the next.
+    fired: [u64; 2],
+    /// With TYPE = less, so that the second word makes an event and the first one none.
+    threshold: u8,
+}
+
+/// The worst of 16 SPADs; see the head of this file.
+const WORST_OF_16: Photons = Photons {
+    fired: [0b1101_1100_1001_0000, 0b0010_0011_0000_1001],
+    threshold: 6,
+};
+
+/// Random pairs that are tried with other numbers of SPADs. Chosen: a hundred take half a second.
+const TRIED: u32 = 100;
+
+impl Photons {
+    /// Any that make an event after none: the `number`-th of a sequence.
+    fn random(spads: usize, number: u32) -> Self {
+        let word = |at: u32| rand_philox::philox4x32_10([number, at, 0, 0], [0; 2])[0] as usize;
+        let threshold = 1 + word(64) % spads;
+        let mut left: Vec<u32> = (0..spads as u32).collect();
+        left.sort_by_key(|&spad| word(spad));
+        let before = threshold + word(65) % (spads - threshold + 1);
+        let after = (word(66) % threshold).min(spads - before);
+        let mut fired = [0u64; 2];
+        for (index, spad) in left.into_iter().take(before + after).enumerate() {
+            fired[usize::from(index >= before)] |= 1 << spad;
+        }
+        let threshold = threshold as u8;
+        Photons { fired, threshold }
+    }
+
+    /// The worst that is known for this sensor.
+    fn worst(config: &SensorConfig, silicon: &Silicon, limits: Limits) -> Self {
+        if config.spads() == 16 {
+            return WORST_OF_16;
+        }
+        let settled = |photons: &Photons| {
+            let taken = take(config, silicon, limits, SLOW, photons);
+            taken.map_or(Time::ZERO, |taken| taken.settled)
+        };
+        let tried = (0..TRIED).map(|number| Photons::random(config.spads(), number));
+        tried.max_by_key(settled).expect("some are tried")
+    }
+}
+
+/// A CLK period that every path is shorter than.
+const SLOW: Time = Time::from_ns(20);
 
 /// The correlation path as the event kernel sees it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,11 +87,12 @@ pub struct CorrelationTiming {
 impl CorrelationTiming {
     /// Simulates the worst photons at a slow clock, and at ever shorter periods.
     pub fn of(config: &SensorConfig, silicon: &Silicon, limits: Limits) -> Self {
-        const SLOW: Time = Time::from_ns(20);
+        let photons = &Photons::worst(config, silicon, limits);
+        let settled = take(config, silicon, limits, SLOW, photons);
         CorrelationTiming {
-            settled: take(config, silicon, limits, SLOW).map_or(Time::MAX, |taken| taken.settled),
+            settled: settled.map_or(Time::MAX, |taken| taken.settled),
             period: shortest_period(SLOW, |period| {
-                take(config, silicon, limits, period).is_some_and(|taken| taken.is_right)
+                take(config, silicon, limits, period, photons).is_some_and(|taken| taken.is_right)
             }),
         }
     }
@@ -53,7 +103,13 @@ struct Taken {
     is_right: bool,
 }
 
-fn take(config: &SensorConfig, silicon: &Silicon, limits: Limits, period: Time) -> Option<Taken> {
+fn take(
+    config: &SensorConfig,
+    silicon: &Silicon,
+    limits: Limits,
+    period: Time,
+    photons: &Photons,
+) -> Option<Taken> {
     const FIRST: i64 = 6;
     let exposure = Exposure {
         clock: Frequency::from_period(period).ok()?,
@@ -64,14 +120,14 @@ fn take(config: &SensorConfig, silicon: &Silicon, limits: Limits, period: Time) 
     let config = SensorConfig {
         clk_hz: exposure.clock.as_hz(),
         event_type: EventType::Less,
-        threshold: THRESHOLD,
+        threshold: photons.threshold,
         ..config.clone()
     };
     let half = Time::from_fs(period.as_fs() / 2);
     let pulses: Vec<SpadEvent> = (FIRST..)
-        .zip(WORST_PHOTONS)
+        .zip(photons.fired)
         .flat_map(|(edge, word)| {
-            (0..16)
+            (0..64)
                 .filter(move |s| word >> s & 1 == 1)
                 .map(move |s| (edge, s))
         })

@@ -3,8 +3,8 @@
 use crate::chip::p_counter::Rises;
 use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::{
-    ChipTiming, Exposure, Limits, PCounter, Probe, Probes, SensorConfig, Silicon, WindowLaw,
-    front_end, p_counter,
+    ChipTiming, Exposure, Limits, PCounter, Probe, Probes, Sensor, SensorConfig, Silicon,
+    WindowLaw, front_end, p_counter,
 };
 use crate::engine::GateSimulation;
 use crate::kernel::{Drive, Kernel, Policy, Recorder, TimingChecks, in_order};
@@ -18,21 +18,19 @@ const SLOW_HZ: f64 = 20e6;
 pub(super) const RESET_RELEASED: Time = Time::from_ns(4);
 
 /// A macropixel of this silicon, ready to run.
-pub(super) fn simulation<'a>(
-    config: &'a SensorConfig,
+pub(super) fn simulation(
+    config: &SensorConfig,
     silicon: &Silicon,
-    exposure: &'a Exposure,
+    exposure: &Exposure,
     start: u16,
     pulses: &[SpadEvent],
-) -> GateSimulation<'a> {
-    let one = (1, 1);
-    let gate = GateSimulation::new(config, exposure, (0, 0), one, &[start], &[pulses]);
-    let timing = silicon.timing(gate.netlist());
-    gate.with_timing(&timing)
+) -> GateSimulation {
+    let sensor = Sensor::from(config).made_of(silicon);
+    GateSimulation::new(sensor, exposure, (0, 0), (1, 1), &[start], &[pulses])
 }
 
 /// Timing checks with this silicon's limits, SPAD samplers excepted.
-pub(super) fn checks(silicon: &Silicon, gate: &GateSimulation<'_>) -> TimingChecks {
+pub(super) fn checks(silicon: &Silicon, gate: &GateSimulation) -> TimingChecks {
     let library = silicon.limits(Limits::Kept);
     TimingChecks::new(gate.netlist(), &library, silicon.corner)
         .policy(Policy::ReportOnly)
@@ -59,7 +57,7 @@ pub fn gate_works(
         stop_phase: phase,
         stop_periods: match (config.p_counter, every) {
             (PCounter::Memoryless, Some(every)) => every as u32,
-            _ => start as u32 + 12,
+            _ => u32::from(start) * config.step_periods as u32 + 12,
         },
         laser_cycles: 1,
     };
@@ -74,7 +72,7 @@ pub fn gate_works(
     };
     let mut config = config.clone();
     config.clk_hz = clock.as_hz();
-    // A pattern that no shift maps to itself; one SPAD per photon, so that dead time plays no part.
+    // A pattern that no shift maps to itself.
     let has_photon = |bin: i64| [0, 1, 3, 4, 8, 13, 15].contains(&(bin % 16));
     let mut pulses = Vec::new();
     let mut expected = vec![0; config.bins];
@@ -84,7 +82,8 @@ pub fn gate_works(
             expected[bin as usize] = 1;
             pulses.push(SpadEvent {
                 time: exposure.rising(edge) - Time::from_fs(period.as_fs() / 2),
-                spad: (bin % 16) as u8,
+                // One SPAD after the other: dead time plays a part only where there are few.
+                spad: (bin % config.spads() as i64) as u8,
             });
         }
     }

@@ -11,7 +11,7 @@
 
 use crate::chip::front_end;
 use crate::chip::timing::macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays, hull};
-use crate::chip::{Limits, Mode, PCounter, Probe, Probes, Race, SensorConfig, Silicon};
+use crate::chip::{Conflict, Limits, Mode, PCounter, Probe, Probes, Race, SensorConfig, Silicon};
 use crate::netlist::{
     Bound, CellKind, CheckKind, Edge, NetId, Netlist, Path, Requirement, Requirements,
 };
@@ -266,7 +266,7 @@ impl MacropixelTiming {
         };
         let half = Time::from_fs(period.as_fs() / 2);
         let change = half + period * nearest(stop_strobe.1 + phase) + shift - phase;
-        let what = "a change of the shift register meets the strobe";
+        let what = Conflict::ShiftAtStrobe;
         let forbidden = (stop_strobe.0 - setup, stop_strobe.1 + hold);
         Race::with_stop(what, change, forbidden, phase, period)
     }
@@ -294,7 +294,7 @@ impl MacropixelTiming {
         let slack = removal.map_or(recovery, |removal| removal.min(recovery));
         let edge = if slack == recovery { after } else { before };
         let to_counter_clk = self.counter_clk.1 - phase;
-        let what = "a CLK edge meets the end of the reset pulse";
+        let what = Conflict::ClkAtResetEnd;
         let forbidden = (ignored_until + to_counter_clk, counts_from + to_counter_clk);
         let race = Race::with_stop(what, edge + to_counter_clk, forbidden, phase, period);
         Some((slack, race))

@@ -26,7 +26,7 @@ mod spread;
 mod verdict;
 
 pub use corners::{CornerLimit, FactorRange, corner_limits, factor_range};
-pub use correlation::{CorrelationTiming, WORST_PHOTONS};
+pub use correlation::CorrelationTiming;
 pub use gates::{ResetTiming, gate_works, reset, ripple};
 pub use load::{LoadTiming, load_works};
 pub use macropixel::{Aim, LocalClocks, MacropixelTiming, longest};

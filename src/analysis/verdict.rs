@@ -17,8 +17,11 @@
 use serde::Serialize;
 
 use super::{Aim, LoadTiming, LocalClocks, MacropixelTiming};
+use crate::chip::front_end::DeadTimeTooShort;
 use crate::chip::window_law::Window;
-use crate::chip::{ChipTiming, Exposure, Limits, Probe, Race, SensorConfig, Silicon, WindowLaw};
+use crate::chip::{
+    ChipTiming, Conflict, Exposure, Limits, Probe, Race, SensorConfig, Silicon, WindowLaw,
+};
 use crate::netlist::{CheckKind, Netlist, Requirement};
 use crate::units::Time;
 
@@ -34,9 +37,27 @@ pub struct Margin {
     pub path: String,
     /// What is left over, negative where the limit is broken.
     pub slack: Time,
-    /// What meets what, where more can be said than that.
-    race: Option<Race>,
-    complaint: Option<String>,
+    /// Why it is broken, where more can be said than that.
+    fault: Option<Fault>,
+}
+
+/// Why a limit is broken.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum Fault {
+    /// Something comes when it must not.
+    #[error("{0}; {cure}", cure = .0.cure)]
+    Race(Race),
+    /// The strobe is clear of the shift register's changes, but between other ones than the library's.
+    #[error(
+        "windows end {bins} bins later than the window law has it, which knows of the library's delays; give another clk_hz, or silicon nearer to the library's"
+    )]
+    Slipped {
+        /// By how many bins.
+        bins: i64,
+    },
+    /// SPADs are too fast for the front end.
+    #[error("{0}; {cure}", cure = .0.cure())]
+    FrontEnd(DeadTimeTooShort),
 }
 
 /// Whether a sensor's timing is met.
@@ -90,8 +111,7 @@ impl TimingVerdict {
                 path: pixel.probes().p_counter(),
                 // Where the law rounds to the safe side, too.
                 slack: race.slack().min(Time::from_fs(-1)),
-                race: Some(race),
-                complaint: None,
+                fault: Some(Fault::Race(race)),
             });
         }
         margins.sort_by_key(|margin| margin.slack);
@@ -131,17 +151,15 @@ impl std::fmt::Display for TimingVerdict {
             check,
             path,
             slack,
-            race,
-            complaint,
+            fault,
         } = self.worst();
         if self.is_met() {
             return write!(f, "met, {slack} left ({check}: {path})");
         }
         write!(f, "fails by {} ({check}: {path})", -*slack)?;
-        match (race, complaint) {
-            (Some(race), _) => write!(f, ": {race}; {}", race.cure),
-            (None, Some(complaint)) => write!(f, ": {complaint}"),
-            (None, None) => Ok(()),
+        match fault {
+            Some(fault) => write!(f, ": {fault}"),
+            None => Ok(()),
         }
     }
 }
@@ -168,8 +186,7 @@ fn tightest<'r>(
         check: format!("{name} {}", requirement.kind.name()),
         path: requirement.ends(netlist, clock),
         slack,
-        race: None,
-        complaint: None,
+        fault: None,
     };
     least.into_iter().flatten().map(margin).collect()
 }
@@ -181,8 +198,8 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
     });
     for margin in &mut margins {
         if margin.slack < Time::ZERO && margin.check == "CLK setup" {
-            let what = "a path is slower than a CLK period";
-            margin.race = Some(Race::too_slow(what, period - margin.slack, period));
+            let race = Race::too_slow(Conflict::SlowPath, period - margin.slack, period);
+            margin.fault = Some(Fault::Race(race));
         }
     }
     let strobes = tightest("strobe", "CLK", &pixel.netlist, pixel.hits.iter(), |r| {
@@ -190,13 +207,10 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
     });
     // Slower or faster silicon may strobe clear of the change that it is near, but on the other side of it.
     let race = Some(pixel.strobe_race(period, phase)).filter(|race| race.slack() < Time::ZERO);
-    let moved = pixel.aim(period, phase).moved() - aim.moved();
-    let slipped = format!(
-        "windows end {moved} bins later than the window law has it, which knows of the library's delays; give another clk_hz, or silicon nearer to the library's"
-    );
+    let bins = pixel.aim(period, phase).moved() - aim.moved();
     for mut margin in strobes {
         if margin.slack < Time::ZERO {
-            (margin.race, margin.complaint) = (race, Some(slipped.clone()));
+            margin.fault = Some(race.map_or(Fault::Slipped { bins }, Fault::Race));
         }
         margins.push(margin);
     }
@@ -207,16 +221,14 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
             check: "first count, recovery and removal".to_owned(),
             path: path.clone(),
             slack,
-            race: (slack < Time::ZERO).then_some(race),
-            complaint: None,
+            fault: (slack < Time::ZERO).then_some(Fault::Race(race)),
         });
     }
     margins.push(Margin {
         check: "reset pulse".to_owned(),
         path,
         slack: pixel.reset_width() - pixel.reset_need(),
-        race: None,
-        complaint: None,
+        fault: None,
     });
     margins
 }
@@ -233,12 +245,12 @@ fn local_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
         |r| local.toggle_slack(r, dead_time),
     );
     let pulses = ChipTiming::measure(config, silicon).pulses;
-    let complaint = pulses.complaint(config.dead_time_ns);
+    let fault = pulses.follow(config.dead_time_ns).err();
     for margin in margins
         .iter_mut()
         .filter(|margin| margin.slack < Time::ZERO)
     {
-        margin.complaint.clone_from(&complaint);
+        margin.fault = fault.map(Fault::FrontEnd);
     }
     // No laser cycle is shorter than two CLK periods. How long HIT is high and low, start values say.
     let between = config.clock().periods(2);
@@ -271,8 +283,7 @@ fn load_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
         check: "LOAD_CLK gating".to_owned(),
         path: "LOAD_CLK rise to the gates of MEMORY_LOAD".to_owned(),
         slack: Time::from_fs(period.as_fs() / 2) - load.row_done.max(load.token),
-        race: None,
-        complaint: None,
+        fault: None,
     });
     margins
 }
@@ -280,7 +291,7 @@ fn load_margins(config: &SensorConfig, silicon: &Silicon) -> Vec<Margin> {
 /// What the window law says against every window in the middle of a long laser cycle.
 fn law_race(config: &SensorConfig) -> Option<Race> {
     let start = config.largest_start() / 4;
-    let periods = 4 * (u32::from(config.largest_start()) + 1);
+    let periods = 4 * config.step_periods as u32 * (u32::from(config.largest_start()) + 1);
     match WindowLaw::new(config, &Exposure::new(config, periods, 1)).window(start) {
         Window::Race(race) => Some(race),
         Window::Open(_) | Window::Never | Window::Irregular(_) => None,

@@ -14,7 +14,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::chip::{Mode, PCounter, Probe, Probes, SPADS, SensorConfig, Tap, probes};
+use crate::chip::{Mode, PCounter, Probe, Probes, SensorConfig, Tap, probes};
 use crate::kernel::Observer;
 use crate::logic::Logic;
 use crate::netlist::{NetId, Netlist};
@@ -144,7 +144,7 @@ struct Macropixel {
     is_cleared: bool,
     toggle: Bits,
     /// Changes of each SPAD's toggle since CLK last rose.
-    toggled: [u8; SPADS],
+    toggled: Vec<u8>,
 }
 
 /// Watches macropixels of a netlist.
@@ -205,7 +205,7 @@ impl HardwareEvents {
                 awaits_reset: None,
                 is_cleared: true,
                 toggle: Bits::default(),
-                toggled: [0; SPADS],
+                toggled: vec![0; config.spads()],
             });
         }
         HardwareEvents {
@@ -231,7 +231,7 @@ impl HardwareEvents {
         let p = &mut self.pixels[pixel];
         let mut found = None;
         match role {
-            Role::Clk if value == Logic::One => p.toggled = [0; SPADS],
+            Role::Clk if value == Logic::One => p.toggled.fill(0),
             Role::Clk => p.clk_fell = time,
             Role::Stop if value == Logic::One => {
                 let is_free = p.reset == Logic::Zero;

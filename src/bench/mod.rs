@@ -11,5 +11,6 @@ mod stimulus;
 mod verilog;
 
 pub use hardware_events::{HardwareEvent, HardwareEventKind, HardwareEventReport, HardwareEvents};
-pub use stimulus::{Schedule, StimulusPlan, load_stimulus};
+pub(crate) use stimulus::load_stimulus;
+pub use stimulus::{Schedule, StimulusPlan};
 pub use verilog::{export_annotated_verilog, export_netlist, export_verilog};

@@ -9,47 +9,17 @@ use std::collections::HashMap;
 use std::io::BufRead;
 use std::path::Path;
 
-use crate::chip::{Exposure, SPADS, SensorConfig};
+use crate::chip::{Exposure, SensorConfig};
 use crate::files::{InputError, Lines};
 use crate::photon::{SpadEvent, apply_dead_time};
 use crate::units::Time;
-
-/// Longest exposure, s. GTKWave refuses times beyond 2⁵³ fs, which is 9.007 s.
-const LONGEST_EXPOSURE_S: f64 = 9.0;
-
-/// Checks the length of an exposure given on a command line.
-///
-/// # Errors
-/// When it has no laser cycle, a laser cycle shorter than two CLK periods, or lasts longer than 9 s.
-pub fn check_exposure(
-    config: &SensorConfig,
-    stop_periods: u32,
-    laser_cycles: u32,
-) -> Result<Exposure, InputError> {
-    if stop_periods < 2 {
-        let message = format!("{stop_periods} CLK periods are no laser cycle; give at least 2");
-        return Err(InputError::new("--stop-periods", message));
-    }
-    if laser_cycles == 0 {
-        let message = "an exposure needs a laser cycle; give at least 1";
-        return Err(InputError::new("--laser-cycles", message));
-    }
-    let seconds = stop_periods as f64 * laser_cycles as f64 / config.clk_hz;
-    if seconds > LONGEST_EXPOSURE_S {
-        let message = format!(
-            "{stop_periods} CLK periods times {laser_cycles} laser cycles last {seconds:.1} s; stay below {LONGEST_EXPOSURE_S} s"
-        );
-        return Err(InputError::new("--laser-cycles", message));
-    }
-    Ok(Exposure::new(config, stop_periods, laser_cycles))
-}
 
 /// Start values of an array, row-major.
 ///
 /// # Errors
 /// Unreadable files, malformed lines, pixels outside the array, values beyond 2ⁿ − 1, duplicated or
 /// missing macropixels: file, line and cure.
-pub fn read_starts(path: &Path, config: &SensorConfig) -> Result<Vec<u16>, InputError> {
+pub(crate) fn read_starts(path: &Path, config: &SensorConfig) -> Result<Vec<u16>, InputError> {
     starts_of(Lines::open(path)?, config)
 }
 
@@ -57,7 +27,8 @@ pub fn read_starts(path: &Path, config: &SensorConfig) -> Result<Vec<u16>, Input
 ///
 /// # Errors
 /// As [`read_starts`].
-pub fn parse_starts(
+#[cfg(test)]
+pub(crate) fn parse_starts(
     source: &str,
     text: &str,
     config: &SensorConfig,
@@ -90,7 +61,7 @@ fn starts_of<R: BufRead>(lines: Lines<R>, config: &SensorConfig) -> Result<Vec<u
     }
     if let Some(pixel) = starts.iter().position(Option::is_none) {
         let message = format!(
-            "macropixel ({}, {}) has no start value; add a line for it or shrink the array with --rows and --cols",
+            "macropixel ({}, {}) has no start value; add a line for it or shrink the array (rows, cols)",
             pixel / config.cols,
             pixel % config.cols
         );
@@ -117,7 +88,7 @@ pub struct Recording {
 /// # Errors
 /// Unreadable files, malformed lines, pixels or SPADs that do not exist, events before time 0: file, line
 /// and cure.
-pub fn read_events(
+pub(crate) fn read_events(
     path: &Path,
     config: &SensorConfig,
     exposure: &Exposure,
@@ -129,7 +100,8 @@ pub fn read_events(
 ///
 /// # Errors
 /// As [`read_events`].
-pub fn parse_events(
+#[cfg(test)]
+pub(crate) fn parse_events(
     source: &str,
     text: &str,
     config: &SensorConfig,
@@ -151,8 +123,11 @@ fn events_of<R: BufRead>(
     for row in rows(lines, ["time_fs", "row", "col", "spad"])? {
         let (line, [time_fs, r, c, spad]) = row?;
         let pixel = pixel_index(source, line, r, c, config)?;
-        if !(0..SPADS as i64).contains(&spad) {
-            let message = format!("SPAD {spad} does not exist; give 0 to {}", SPADS - 1);
+        if !(0..config.spads() as i64).contains(&spad) {
+            let message = format!(
+                "SPAD {spad} does not exist; give 0 to {}",
+                config.spads() - 1
+            );
             return Err(InputError::at(source, line, message));
         }
         if time_fs < 0 {
@@ -261,7 +236,7 @@ mod tests {
     }
 
     fn exposure() -> Exposure {
-        check_exposure(&config(), 100, 10).unwrap()
+        Exposure::new(&config(), 100, 10)
     }
 
     const FOUR: &str = "row,col,init\n0,0,1\n0,1,2\n1,0,3\n1,1,4\n";

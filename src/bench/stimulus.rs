@@ -15,9 +15,7 @@
 
 use bitvec::slice::BitSlice;
 
-use crate::chip::{
-    Exposure, LoadPins, Mode, SPADS, SensorConfig, SensorPins, THRESHOLD_BITS, load_path,
-};
+use crate::chip::{Exposure, LoadPins, Mode, Sensor, SensorPins, load_path};
 use crate::kernel::{Drive, Stimulus, clock, merge};
 use crate::photon::SpadEvent;
 use crate::units::{Frequency, Time};
@@ -30,7 +28,7 @@ const LOAD_START: Time = Time::from_ns(5);
 const SETTLING: Time = Time::from_ns(20);
 
 /// Power-up and serial load: the bits of `stream` on COUNTER_INITS, and the time at which they are in.
-pub fn load_stimulus<'a>(
+pub(crate) fn load_stimulus<'a>(
     pins: LoadPins,
     clock: Frequency,
     stream: &'a BitSlice,
@@ -74,27 +72,28 @@ pub struct Schedule {
 }
 
 /// Everything that is driven into one sensor for one frame.
-pub struct StimulusPlan<'a> {
-    config: &'a SensorConfig,
-    exposure: &'a Exposure,
+pub struct StimulusPlan {
+    sensor: Sensor,
+    exposure: Exposure,
     stream: bitvec::vec::BitVec,
     pulses: Vec<(usize, SpadEvent)>,
     schedule: Schedule,
 }
 
-impl<'a> StimulusPlan<'a> {
+impl StimulusPlan {
     /// Plans the load of `starts` (row-major, `cols` to a row) and an exposure with these rising edges of
     /// SPAD_RAW (one list per macropixel, in the same order, thinned by the dead time).
     pub fn new(
-        config: &'a SensorConfig,
-        exposure: &'a Exposure,
+        sensor: impl Into<Sensor>,
+        exposure: &Exposure,
         cols: usize,
         starts: &[u16],
         pulses: &[&[SpadEvent]],
     ) -> Self {
         debug_assert_eq!(starts.len(), pulses.len());
-        let stream = load_path::stream(starts, cols, config.counter_bits);
-        let half = |k| LOAD_START + config.load_clock().half_periods(k);
+        let sensor = sensor.into();
+        let stream = load_path::stream(starts, cols, sensor.counter_bits);
+        let half = |k| LOAD_START + sensor.load_clock().half_periods(k);
         let load_end = half(2 * stream.len() as i64 + 1);
         // On a whole nanosecond, so that edges are easy to read off.
         let origin_ns = (load_end + SETTLING + exposure.clock.period()).as_fs() / 1_000_000 + 1;
@@ -114,8 +113,8 @@ impl<'a> StimulusPlan<'a> {
             end: origin + last_edge + exposure.clock.period() + SETTLING,
         };
         StimulusPlan {
-            config,
-            exposure,
+            sensor,
+            exposure: *exposure,
             stream,
             pulses: all,
             schedule,
@@ -128,10 +127,10 @@ impl<'a> StimulusPlan<'a> {
     }
 
     /// All drives in time order.
-    pub fn stimulus(&'a self, pins: &SensorPins) -> Stimulus<'a> {
+    pub fn stimulus(&self, pins: &SensorPins) -> Stimulus<'_> {
         merge([
             boxed(self.control(pins).into_iter()),
-            boxed(load_stimulus(pins.load, self.config.load_clock(), &self.stream).1),
+            boxed(load_stimulus(pins.load, self.sensor.load_clock(), &self.stream).1),
             boxed(self.clk(pins)),
             boxed(self.stop(pins)),
             boxed(self.spads(pins)),
@@ -139,7 +138,7 @@ impl<'a> StimulusPlan<'a> {
     }
 
     fn control(&self, pins: &SensorPins) -> Vec<Drive> {
-        let (config, schedule) = (self.config, self.schedule);
+        let (config, schedule) = (&self.sensor, self.schedule);
         let mut drives = Vec::new();
         let mut drive = |time, net, value: bool| drives.push(Drive::new(time, net, value));
         let start = Time::ZERO;
@@ -149,8 +148,8 @@ impl<'a> StimulusPlan<'a> {
         for (bit, &net) in pins.event_type.iter().enumerate() {
             drive(start, net, config.event_type.code() >> bit & 1 == 1);
         }
-        for bit in 0..THRESHOLD_BITS {
-            drive(start, pins.threshold[bit], config.threshold >> bit & 1 == 1);
+        for (bit, &net) in pins.threshold.iter().enumerate() {
+            drive(start, net, config.threshold >> bit & 1 == 1);
         }
         for &net in &pins.spad_raw {
             drive(start, net, false);
@@ -167,7 +166,7 @@ impl<'a> StimulusPlan<'a> {
         drives
     }
 
-    fn clk(&self, pins: &SensorPins) -> impl Iterator<Item = Drive> + Send + 'a {
+    fn clk(&self, pins: &SensorPins) -> impl Iterator<Item = Drive> + Send + use<> {
         let exposure = self.exposure;
         let origin = self.schedule.origin - exposure.stop_phase;
         let periods = exposure.laser_cycles as i64 * exposure.stop_periods as i64;
@@ -181,7 +180,7 @@ impl<'a> StimulusPlan<'a> {
         std::iter::once(Drive::new(Time::ZERO, pins.clk, true)).chain(edges)
     }
 
-    fn stop(&self, pins: &SensorPins) -> impl Iterator<Item = Drive> + Send + 'a {
+    fn stop(&self, pins: &SensorPins) -> impl Iterator<Item = Drive> + Send + use<> {
         let (exposure, origin, stop) = (self.exposure, self.schedule.origin, pins.stop);
         let last = exposure.laser_cycles as i64;
         let edges = (0..=last).flat_map(move |cycle| {
@@ -198,14 +197,14 @@ impl<'a> StimulusPlan<'a> {
         std::iter::once(Drive::new(Time::ZERO, stop, false)).chain(edges)
     }
 
-    fn spads(&'a self, pins: &SensorPins) -> impl Iterator<Item = Drive> + Send + 'a {
-        let (origin, dead_time) = (self.schedule.origin, self.config.dead_time());
-        let nets = pins.spad_raw.clone();
+    fn spads<'p>(&'p self, pins: &SensorPins) -> impl Iterator<Item = Drive> + Send + use<'p> {
+        let (origin, dead_time) = (self.schedule.origin, self.sensor.dead_time());
+        let (nets, spads) = (pins.spad_raw.clone(), self.sensor.spads());
         let end = self.schedule.end;
         let edges = move |offset: Time, value: bool| {
             let nets = nets.clone();
             let drives = self.pulses.iter().map(move |(pixel, pulse)| {
-                let net = nets[pixel * SPADS + pulse.spad as usize];
+                let net = nets[pixel * spads + pulse.spad as usize];
                 Drive::new(origin + pulse.time + offset, net, value)
             });
             boxed(drives.take_while(move |d| d.time <= end))

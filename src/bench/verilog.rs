@@ -17,7 +17,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use super::stimulus::StimulusPlan;
-use crate::chip::{SensorConfig, SensorPins, Silicon, probes, sensor};
+use crate::chip::{SensorConfig, SensorPins, Silicon, array, probes};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::netlist::{
     Corner, Direction, Module, Netlist, Timing, write_cells, write_delays, write_modules,
@@ -40,13 +40,13 @@ pub fn export_netlist(folder: &Path, config: &SensorConfig) -> Result<(), InputE
 pub fn export_verilog(
     folder: &Path,
     config: &SensorConfig,
-    plan: &StimulusPlan<'_>,
+    plan: &StimulusPlan,
 ) -> Result<(), InputError> {
     export_netlist(folder, config)?;
     write_replay(folder, config, plan, false)
 }
 
-/// As [`export_verilog`], with the delays of `timing`, which is that of [`sensor::circuit`]: the cells of `cells.v` take
+/// As [`export_verilog`], with the delays of `timing`, which is that of [`array::circuit`]: the cells of `cells.v` take
 /// delays as parameters, and one more file, `delays.v`, sets those that differ from the library.
 ///
 /// # Errors
@@ -54,14 +54,14 @@ pub fn export_verilog(
 pub fn export_annotated_verilog(
     folder: &Path,
     config: &SensorConfig,
-    plan: &StimulusPlan<'_>,
+    plan: &StimulusPlan,
     timing: &Timing,
 ) -> Result<(), InputError> {
     let (library, corner) = (Silicon::library(), config.corner);
     write_netlist(folder, config, &|out| {
         write_parametric_cells(out, library, corner)
     })?;
-    let netlist = Netlist::elaborate(&sensor::circuit(config));
+    let netlist = Netlist::elaborate(&array::circuit(config));
     let nominal = Timing::nominal(&netlist, library, corner);
     OutputFile::write_with(&folder.join("delays.v"), |out| {
         write_delays(out, "dut", &netlist, timing, &nominal)
@@ -81,17 +81,17 @@ fn write_netlist(
         write_standard_cells(out, Silicon::library())
     })?;
     OutputFile::write_with(&file("design.v"), |out| {
-        write_modules(out, &sensor::circuit(config))
+        write_modules(out, &array::circuit(config))
     })
 }
 
 fn write_replay(
     folder: &Path,
     config: &SensorConfig,
-    plan: &StimulusPlan<'_>,
+    plan: &StimulusPlan,
     is_annotated: bool,
 ) -> Result<(), InputError> {
-    let top = sensor::circuit(config);
+    let top = array::circuit(config);
     OutputFile::write_with(&folder.join("stimulus.txt"), |out| {
         write_stimulus(out, &Netlist::elaborate(&top), plan)
     })?;
@@ -100,11 +100,7 @@ fn write_replay(
     })
 }
 
-fn write_stimulus(
-    out: &mut dyn Write,
-    netlist: &Netlist,
-    plan: &StimulusPlan<'_>,
-) -> io::Result<()> {
+fn write_stimulus(out: &mut dyn Write, netlist: &Netlist, plan: &StimulusPlan) -> io::Result<()> {
     let mut pin_of_net = vec![0; netlist.net_count()];
     for (pin, net) in netlist.inputs().into_iter().enumerate() {
         pin_of_net[net.index()] = pin;
@@ -120,7 +116,7 @@ fn write_testbench(
     out: &mut dyn Write,
     top: &Module,
     config: &SensorConfig,
-    plan: &StimulusPlan<'_>,
+    plan: &StimulusPlan,
     is_annotated: bool,
 ) -> io::Result<()> {
     let include = if is_annotated {
@@ -207,7 +203,7 @@ module tb;
     )?;
     for pixel in 0..pixels {
         let (row, col) = (pixel / cols, pixel % cols);
-        let path = sensor::pixel_name(row, col);
+        let path = array::pixel_name(row, col);
         for bin in 0..config.bins {
             let count = probes::bin_path(&path, bin);
             writeln!(

@@ -1,6 +1,6 @@
 //! The keys of a sensor file: units, ranges, sources.
 
-use super::config::THRESHOLD_BITS;
+use super::spad_grid::{MOST_SPADS, count_bits};
 use crate::settings::{Key, Range, Section};
 
 const fn key(
@@ -37,6 +37,20 @@ pub(super) const KEYS: &[Key] = &[
     key("rows", "", whole(1, 256), "Macropixel rows", CHIP),
     key("cols", "", whole(1, 256), "Macropixel columns", CHIP),
     key(
+        "spad_rows",
+        "",
+        whole(1, 8),
+        "Rows of a macropixel's SPADs: 1, 2, 4 or 8",
+        "thesis 4.2",
+    ),
+    key(
+        "spad_cols",
+        "",
+        whole(1, 8),
+        "Columns of a macropixel's SPADs: 1, 2, 4 or 8",
+        "thesis 4.2",
+    ),
+    key(
         "counter_bits",
         "",
         whole(2, 12),
@@ -69,6 +83,13 @@ pub(super) const KEYS: &[Key] = &[
         Range::OneOf(&["hold", "wrap"]),
         "What the P-counter does after LOCAL_STOP; without memory it must wrap",
         "thesis 4.5",
+    ),
+    key(
+        "step_periods",
+        "",
+        whole(1, 8),
+        "CLK periods from a start value's window to the next one's: 1, 2, 4 or 8; without memory 1",
+        "thesis 4.9.3, Table 10",
     ),
     key("bins", "", whole(1, 64), "Histogram bins", CHIP),
     key("bin_bits", "", whole(1, 16), "Bits of each bin", CHIP),
@@ -138,8 +159,8 @@ pub(super) const KEYS: &[Key] = &[
     key(
         "threshold",
         "",
-        whole(0, (1 << THRESHOLD_BITS) - 1),
-        "THRESHOLD: SPADs",
+        whole(0, (1 << count_bits(MOST_SPADS)) - 1),
+        "THRESHOLD: SPADs; at most 31 with 4x4 of them",
         "chosen: any photon counts",
     ),
     key(

@@ -21,7 +21,62 @@ pub struct Exposure {
     pub laser_cycles: u32,
 }
 
+/// Longest exposure, s. GTKWave refuses times beyond 2⁵³ fs, which is 9.007 s.
+const LONGEST_S: f64 = 9.0;
+
+/// Why an exposure cannot have this length.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum ExposureError {
+    /// STOP needs a CLK period high and one low.
+    #[error("{stop_periods} CLK periods are no laser cycle; give at least 2")]
+    ShortCycle {
+        /// CLK periods in a laser cycle.
+        stop_periods: u32,
+    },
+    /// There is no laser cycle.
+    #[error("an exposure needs a laser cycle; give at least 1")]
+    NoCycle,
+    /// Waveforms of it could not be shown.
+    #[error(
+        "{stop_periods} CLK periods times {laser_cycles} laser cycles last {seconds:.1} s; stay below {LONGEST_S} s"
+    )]
+    TooLong {
+        /// CLK periods in a laser cycle.
+        stop_periods: u32,
+        /// Laser cycles.
+        laser_cycles: u32,
+        /// How long they last, s.
+        seconds: f64,
+    },
+}
+
 impl Exposure {
+    /// An exposure of the given length on this sensor, checked.
+    ///
+    /// # Errors
+    /// When it has no laser cycle, a laser cycle shorter than two CLK periods, or lasts longer than 9 s.
+    pub fn checked(
+        config: &SensorConfig,
+        stop_periods: u32,
+        laser_cycles: u32,
+    ) -> Result<Self, ExposureError> {
+        let seconds = f64::from(stop_periods) * f64::from(laser_cycles) / config.clk_hz;
+        if stop_periods < 2 {
+            return Err(ExposureError::ShortCycle { stop_periods });
+        }
+        if laser_cycles == 0 {
+            return Err(ExposureError::NoCycle);
+        }
+        if seconds > LONGEST_S {
+            return Err(ExposureError::TooLong {
+                stop_periods,
+                laser_cycles,
+                seconds,
+            });
+        }
+        Ok(Self::new(config, stop_periods, laser_cycles))
+    }
+
     /// An exposure of the given length on this sensor.
     pub fn new(config: &SensorConfig, stop_periods: u32, laser_cycles: u32) -> Self {
         Exposure {

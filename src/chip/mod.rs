@@ -13,40 +13,31 @@
 //! asks it. [`probes`] says where nets are: nothing else knows the names of those inside the chip.
 
 pub mod bin_edges;
+mod blocks;
 pub mod config;
 mod config_keys;
-pub mod correlation;
+pub mod empty_pixel;
 pub mod exposure;
-pub mod front_end;
-pub mod histogram;
-pub mod load_path;
-pub mod macropixel;
-pub mod metdc;
-pub mod p_counter;
-pub mod p_counter_timing;
 pub mod probes;
 pub mod race;
-pub mod sensor;
+mod sensor_file;
+pub mod sensors;
+mod spad_grid;
 pub mod timing;
 pub mod window_law;
 
-pub use config::{
-    AfterBorrow, EventType, Mode, Overflow, PCounter, SensorConfig, THRESHOLD_BITS, Tap,
+pub use bin_edges::BinEdges;
+pub use blocks::{
+    array, correlation, front_end, histogram, load_path, macropixel, metdc, p_counter,
+    p_counter_timing,
 };
-pub use exposure::Exposure;
+pub use config::{AfterBorrow, EventType, Mode, Overflow, PCounter, SensorConfig, Tap};
+pub use exposure::{Exposure, ExposureError};
 pub use probes::{LoadPins, LoadProbe, Probe, Probes, SensorPins};
-pub use race::{Cure, Race};
+pub use race::{Conflict, Cure, NoAim, Race};
+pub use sensor_file::SensorFault;
+pub use sensors::{Sensor, hslidar, quantic4x4};
+pub use spad_grid::{MOST_SPADS, SIDES, SpadGrid, count_bits};
 pub use timing::ChipTiming;
 pub use timing::silicon::{Limits, Silicon};
-pub use window_law::{Window, WindowLaw};
-
-/// SPADs of one macropixel, 4×4 (thesis 4.2).
-pub const SPADS: usize = 16;
-
-use crate::netlist::{Module, NetlistError};
-use std::sync::Arc;
-
-/// Unwraps a circuit of this crate, whose correctness is ours to guarantee.
-fn finished(module: Result<Arc<Module>, NetlistError>) -> Arc<Module> {
-    module.unwrap_or_else(|error| panic!("a circuit of this crate is malformed: {error}"))
-}
+pub use window_law::{Irregular, Window, WindowLaw};

@@ -2,18 +2,85 @@
 
 use std::fmt;
 
+use super::window_law::Irregular;
 use crate::units::Time;
 
 /// What a cure adds to the end of a forbidden time: clock edges are rounded to whole femtoseconds, each by itself.
 const ROUNDING: Time = Time::from_fs(4);
 
+/// What meets what. The first is the one that comes at the wrong time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+pub enum Conflict {
+    /// Data and clock of the METDC's shift register.
+    #[error("the correlation block is slower than a CLK period")]
+    SlowCorrelation,
+    /// One count and the next.
+    #[error("the P-counter is slower than a CLK period")]
+    SlowCounter,
+    /// Data and CLK of some flip-flop.
+    #[error("a path is slower than a CLK period")]
+    SlowPath,
+    /// STROBE after LOCAL_STOP and the shift register.
+    #[error("the strobe meets a change of the shift register")]
+    StrobeAtShift,
+    /// The shift register and STROBE after STOP, in the conventional mode.
+    #[error("a change of the shift register meets the strobe")]
+    ShiftAtStrobe,
+    /// COUNTER_CLK and COUNTER_RESET.
+    #[error("a CLK edge meets the end of the reset pulse")]
+    ClkAtResetEnd,
+    /// STROBE and HIT's reset at the end of its laser cycle.
+    #[error("the strobe meets the next laser cycle's reset")]
+    StrobeAtNextReset,
+    /// STROBE of a P-counter that nothing resets, and HIT's reset.
+    #[error("the strobe meets a laser cycle's reset")]
+    StrobeAtReset,
+    /// STROBE where COUNTER_RESET raises LOCAL_STOP, and HIT's reset.
+    #[error("the strobe that the reset makes meets the end of HIT's reset")]
+    ResetStrobeAtHitReset,
+    /// CLK and ENABLE of a P-counter that nothing resets.
+    #[error("CLK rises as ENABLE lets it through")]
+    ClkAtEnable,
+    /// LOCAL_STOP of a P-counter that nothing resets, and ENABLE.
+    #[error("LOCAL_STOP rises as ENABLE changes")]
+    LocalStopAtEnable,
+}
+
+/// The event that the times of a race are counted from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Origin {
+    /// CLK's fall that the P-counter counts.
+    #[error("CLK falls")]
+    ClkFalls,
+    /// The edge of CLK that launches the signal.
+    #[error("CLK's edge")]
+    ClkEdge,
+    /// The laser cycle's STOP edge.
+    #[error("STOP rises")]
+    StopRises,
+    /// The exposure's first STOP edge.
+    #[error("the first STOP edge")]
+    FirstStop,
+}
+
+/// Why windows cannot be aimed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NoAim {
+    /// Two signals are too close to call.
+    #[error("{0}")]
+    Race(Race),
+    /// No single window describes what is counted.
+    #[error("{0}")]
+    Irregular(Irregular),
+}
+
 /// A signal that comes when it must not: a flip-flop's setup, hold, recovery or removal time is broken, or may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Race {
-    /// What meets what. The first is the one that comes at the wrong time.
-    pub what: &'static str,
+    /// What meets what.
+    pub what: Conflict,
     /// The event that times are counted from.
-    pub after: &'static str,
+    pub after: Origin,
     /// When it comes.
     pub comes: Time,
     /// From when on it must not …
@@ -72,8 +139,8 @@ impl Race {
         let at_most = Time::from_fs(band(strobe - shift - setup, odd)) - ROUNDING;
         let is_possible = at_most > shortest && at_most > upper(odd + 2);
         Race {
-            what: "the strobe meets a change of the shift register",
-            after: "CLK falls",
+            what: Conflict::StrobeAtShift,
+            after: Origin::ClkFalls,
             comes: strobe,
             from: change - hold,
             to: Some(change + setup),
@@ -86,7 +153,7 @@ impl Race {
 
     /// A signal that CLK launches (so that it comes earlier after STOP where STOP comes later) in a time that STOP forbids.
     pub fn with_stop(
-        what: &'static str,
+        what: Conflict,
         comes: Time,
         (from, to): (Time, Time),
         phase: Time,
@@ -95,7 +162,7 @@ impl Race {
         let within = |p: &Time| p.as_fs().abs() <= period.as_fs() / 2;
         Race {
             what,
-            after: "STOP rises",
+            after: Origin::StopRises,
             comes,
             from,
             to: Some(to),
@@ -107,10 +174,10 @@ impl Race {
     }
 
     /// A path that takes `comes` from CLK's edge where the period allows `until`.
-    pub fn too_slow(what: &'static str, comes: Time, until: Time) -> Self {
+    pub fn too_slow(what: Conflict, comes: Time, until: Time) -> Self {
         Race {
             what,
-            after: "CLK's edge",
+            after: Origin::ClkEdge,
             comes,
             from: until,
             to: None,
@@ -176,7 +243,7 @@ impl fmt::Display for Cure {
             },
             Cure::LaserCycle => write!(
                 f,
-                "give other --stop-periods, or start values whose windows end elsewhere in the laser cycle"
+                "give another length of the laser cycle, or start values whose windows end elsewhere in it"
             ),
             Cure::Tap => write!(f, "give tap = \"borrow\""),
         }

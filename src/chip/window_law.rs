@@ -18,14 +18,17 @@
 //! the first falling edge that ENABLE lets through. One that wraps may raise LOCAL_STOP again in the same laser
 //! cycle, where HIT still holds what it latched before: no single window describes that, and the law says so.
 //!
-//! Which photon times the bins of a window collect stands in [`bin_edges`](super::bin_edges).
+//! Which photon times the bins of a window collect stands in [`bin_edges`](super::bin_edges), and what they count without photons in
+//! [`empty_pixel`](super::empty_pixel).
 //!
 //! [`ChipTiming`] has the delays of the paths concerned, measured on the netlist; tests hold the law against it.
 
-use super::config::{Mode, PCounter, SensorConfig};
+use super::bin_edges::Bins;
+use super::config::{Mode, PCounter};
 use super::exposure::Exposure;
 use super::p_counter::{Rises, starts_high};
-use super::race::{Cure, Race};
+use super::race::{Conflict, Cure, NoAim, Origin, Race};
+use super::sensors::Sensor;
 use super::timing::ChipTiming;
 use crate::units::Time;
 
@@ -41,13 +44,47 @@ pub enum Window {
     Never,
     /// The histogram is latched several times in a laser cycle, or not in the same CLK period of every one. What is
     /// counted then depends on what HIT still holds, and only an engine that goes through every CLK period can tell.
-    Irregular(&'static str),
+    Irregular(Irregular),
     /// Two signals come closer than a flip-flop's setup, hold, recovery or removal time allows: the circuit
     /// promises nothing, and only the gate-level engine shows what its model makes of it.
     Race(Race),
 }
 
+/// Why the histogram is not latched once in every laser cycle, in the same CLK period of each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+pub enum Irregular {
+    /// The P-counter wraps within the laser cycle.
+    #[error("LOCAL_STOP rises more than once in a laser cycle ({rises} times)")]
+    LocalStopRepeats {
+        /// Rising edges of LOCAL_STOP in a laser cycle.
+        rises: usize,
+    },
+    /// A P-counter without memory, which STOP does not reset, comes round in another time than STOP does.
+    #[error(
+        "STOP comes every {stop_periods} CLK periods and the P-counter without memory comes round in {round}, so windows drift"
+    )]
+    OutOfStep {
+        /// CLK periods from one STOP edge to the next.
+        stop_periods: i64,
+        /// CLK periods in which the P-counter comes round.
+        round: i64,
+    },
+}
+
 impl Window {
+    /// The open window, or `None` where it never opens.
+    ///
+    /// # Errors
+    /// What keeps the law from telling.
+    pub fn settled(self) -> Result<Option<OpenWindow>, NoAim> {
+        match self {
+            Window::Open(window) => Ok(Some(window)),
+            Window::Never => Ok(None),
+            Window::Irregular(why) => Err(NoAim::Irregular(why)),
+            Window::Race(race) => Err(NoAim::Race(race)),
+        }
+    }
+
     /// The open window, if it is one.
     pub fn open(self) -> Option<OpenWindow> {
         match self {
@@ -60,6 +97,8 @@ impl Window {
 /// A window relative to the STOP edge of its laser cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OpenWindow {
+    /// The start value that opens it.
+    pub start: u16,
     /// The rising CLK edge that takes the photons of bin 0 (edge 0 is the first after STOP at phase 0).
     pub first_edge: i64,
     /// Rise of LOCAL_STOP (guided) or STOP (conventional) after the laser cycle's STOP edge.
@@ -74,35 +113,50 @@ struct LocalStop {
     /// After its laser cycle's STOP edge.
     time: Time,
     /// What keeps it from rising once in every laser cycle at this place, if anything.
-    irregular: Option<&'static str>,
+    irregular: Option<Irregular>,
 }
 
 /// The law for one sensor and exposure.
 #[derive(Debug, Clone)]
 pub struct WindowLaw {
-    pub(super) config: SensorConfig,
+    pub(super) sensor: Sensor,
     pub(super) exposure: Exposure,
     pub(super) timing: ChipTiming,
     pub(super) bins: i64,
+    pub(super) edges: Bins,
     pub(super) period_fs: f64,
 }
 
 impl WindowLaw {
     /// The law for this sensor in this exposure.
-    pub fn new(config: &SensorConfig, exposure: &Exposure) -> Self {
-        Self::with_timing(config, exposure, ChipTiming::of(config))
+    pub fn new(sensor: impl Into<Sensor>, exposure: &Exposure) -> Self {
+        let sensor = sensor.into();
+        let timing = *sensor.timing();
+        Self::with_timing(sensor, exposure, timing)
     }
 
     /// The law for a macropixel with delays of its own. Where they are known between bounds only, `timing` has the
     /// latest, and limits that are wider by the distance of the bounds.
-    pub fn with_timing(config: &SensorConfig, exposure: &Exposure, timing: ChipTiming) -> Self {
+    pub fn with_timing(sensor: impl Into<Sensor>, exposure: &Exposure, timing: ChipTiming) -> Self {
+        let sensor = sensor.into();
         WindowLaw {
-            config: config.clone(),
+            bins: sensor.bins as i64,
+            sensor,
             exposure: *exposure,
             timing,
-            bins: config.bins as i64,
+            edges: Bins::Clk,
             period_fs: 1e15 / exposure.clock.as_hz(),
         }
+    }
+
+    /// The sensor.
+    pub fn sensor(&self) -> &Sensor {
+        &self.sensor
+    }
+
+    /// Its clocks.
+    pub fn exposure(&self) -> &Exposure {
+        &self.exposure
     }
 
     /// The delays the law is computed from.
@@ -117,14 +171,14 @@ impl WindowLaw {
         let period = exposure.clock.period();
         let to_shift = timing.clk_to_event + timing.setup + ROUNDING;
         if period <= to_shift {
-            let what = "the correlation block is slower than a CLK period";
+            let what = Conflict::SlowCorrelation;
             return Window::Race(Race::too_slow(what, to_shift, period));
         }
-        let (cause, arrival, irregular) = match self.config.mode {
+        let (cause, arrival, irregular) = match self.sensor.mode {
             // A laser cycle is counted by the STOP edge that ends it.
             Mode::Conventional => (end, end + timing.stop_to_strobe, None),
             Mode::Guided => {
-                let is_reset = self.config.p_counter != PCounter::Memoryless;
+                let is_reset = self.sensor.p_counter != PCounter::Memoryless;
                 let found = if is_reset {
                     self.with_reset(start)
                 } else {
@@ -154,6 +208,7 @@ impl WindowLaw {
             return Window::Irregular(why);
         }
         Window::Open(OpenWindow {
+            start,
             first_edge: last - self.bins,
             strobe_cause: cause,
             slack,
@@ -165,7 +220,7 @@ impl WindowLaw {
         let (exposure, timing) = (&self.exposure, &self.timing);
         let period = exposure.clock.period();
         let (setup, hold) = (timing.setup + ROUNDING, timing.hold + ROUNDING);
-        match self.config.mode {
+        match self.sensor.mode {
             Mode::Guided => {
                 let strobe = timing.ripple() + timing.local_stop_to_strobe;
                 let edge = exposure.rising_until(change - timing.clk_to_shift);
@@ -176,7 +231,7 @@ impl WindowLaw {
             }
             // The shift register comes earlier after STOP where STOP comes later.
             Mode::Conventional => {
-                let what = "a change of the shift register meets the strobe";
+                let what = Conflict::ShiftAtStrobe;
                 let strobe = arrival - cause;
                 let forbidden = (strobe - setup, strobe + hold);
                 Race::with_stop(what, change - cause, forbidden, exposure.stop_phase, period)
@@ -191,10 +246,10 @@ impl WindowLaw {
         let (period, phase) = (exposure.clock.period(), exposure.stop_phase);
         let count = counter.period + ROUNDING;
         if period <= count {
-            let what = "the P-counter is slower than a CLK period";
+            let what = Conflict::SlowCounter;
             return Err(Window::Race(Race::too_slow(what, count, period)));
         }
-        let Some(rises) = Rises::of(&self.config, start) else {
+        let Some(rises) = Rises::of(&self.sensor, start) else {
             return Err(Window::Never);
         };
         let released = timing.stop_to_reset_release + counter.release + counter.recovery;
@@ -207,7 +262,7 @@ impl WindowLaw {
         }
         let edge = counter_clk(first - 1);
         if in_doubt.contains(&edge) {
-            let what = "a CLK edge meets the end of the reset pulse";
+            let what = Conflict::ClkAtResetEnd;
             let race = Race::with_stop(what, edge, in_doubt.into_inner(), phase, period);
             return Err(Window::Race(race));
         }
@@ -230,15 +285,15 @@ impl WindowLaw {
         }
         if margin <= ROUNDING {
             return Err(Window::Race(Race {
-                what: "the strobe meets the next laser cycle's reset",
-                after: "STOP rises",
+                what: Conflict::StrobeAtNextReset,
+                after: Origin::StopRises,
                 comes: strobe,
                 from: deadline - ROUNDING,
                 to: rises.every.is_none().then_some(deadline + ROUNDING),
                 cure: Cure::LaserCycle,
             }));
         }
-        if rises.every.is_some() && starts_high(&self.config, start) {
+        if rises.every.is_some() && starts_high(&self.sensor, start) {
             let delay = counter
                 .reset_to_local_stop
                 .expect("the tap msb rises at a reset");
@@ -246,8 +301,8 @@ impl WindowLaw {
             let until = timing.stop_to_hit_release - timing.removal - ROUNDING;
             if arrival >= until {
                 return Err(Window::Race(Race {
-                    what: "the strobe that the reset makes meets the end of HIT's reset",
-                    after: "STOP rises",
+                    what: Conflict::ResetStrobeAtHitReset,
+                    after: Origin::StopRises,
                     comes: arrival,
                     from: until,
                     to: None,
@@ -258,7 +313,7 @@ impl WindowLaw {
         Ok(LocalStop {
             time: exposure.falling(edge) + timing.ripple(),
             irregular: (edges.len() > 1)
-                .then_some("LOCAL_STOP rises more than once in a laser cycle"),
+                .then_some(Irregular::LocalStopRepeats { rises: edges.len() }),
         })
     }
 
@@ -275,12 +330,12 @@ impl WindowLaw {
             .into_iter()
             .find(|t| (in_doubt.0..=in_doubt.1).contains(t));
         if let Some(edge) = meets {
-            let what = "CLK rises as ENABLE lets it through";
+            let what = Conflict::ClkAtEnable;
             let (phase, period) = (exposure.stop_phase, exposure.clock.period());
             let race = Race::with_stop(what, edge, in_doubt, phase, period);
             return Err(Window::Race(race));
         }
-        let rises = Rises::of(&self.config, start).expect("a counter without memory wraps");
+        let rises = Rises::of(&self.sensor, start).expect("a counter without memory wraps");
         let every = rises.every.expect("a counter without memory wraps");
         let periods = exposure.stop_periods as i64;
         let last = periods * exposure.laser_cycles as i64;
@@ -289,8 +344,8 @@ impl WindowLaw {
         if is_first_count || (last >= edge && (last - edge) % every == 0) {
             let comes = exposure.falling(if is_first_count { first } else { last });
             return Err(Window::Race(Race {
-                what: "LOCAL_STOP rises as ENABLE changes",
-                after: "the first STOP edge",
+                what: Conflict::LocalStopAtEnable,
+                after: Origin::FirstStop,
                 comes,
                 from: comes.min(enabled),
                 to: Some(comes.max(if is_first_count {
@@ -315,8 +370,8 @@ impl WindowLaw {
         let mut edges = (edge..last).step_by(every as usize).take(periods as usize);
         if let Some(strobe) = edges.find_map(meets_reset) {
             return Err(Window::Race(Race {
-                what: "the strobe meets a laser cycle's reset",
-                after: "STOP rises",
+                what: Conflict::StrobeAtReset,
+                after: Origin::StopRises,
                 comes: strobe,
                 from: *in_doubt.start(),
                 to: Some(*in_doubt.end()),
@@ -325,157 +380,26 @@ impl WindowLaw {
         }
         Ok(LocalStop {
             time: exposure.falling(edge) + timing.ripple(),
-            irregular: (periods != every)
-                .then_some("STOP does not come once in each round of the P-counter without memory"),
+            irregular: (periods != every).then_some(Irregular::OutOfStep {
+                stop_periods: periods,
+                round: every,
+            }),
         })
     }
 
-    /// Why no window can be aimed, if so, and the cure: the reason for which start values do not open one.
-    pub fn refusal(&self) -> Option<(String, String)> {
-        let reason = |start| match self.window(start) {
-            Window::Race(race) => Some((race.to_string(), race.cure.to_string())),
-            Window::Irregular(why) => {
-                let cure = "give after_borrow = \"hold\", or other --stop-periods";
-                Some((why.to_owned(), cure.to_owned()))
-            }
-            Window::Open(_) | Window::Never => None,
-        };
+    /// Why no window can be aimed, if so: the reason for which start values do not open one.
+    pub fn refusal(&self) -> Option<NoAim> {
+        let reason = |start| self.window(start).settled().err();
         let mut reasons = self.samples().into_iter().map(reason);
         reasons.try_fold(None, |_, why| why.map(Some))?
     }
 
     /// A few start values, one of which opens a window if most do.
     pub(super) fn samples(&self) -> [u16; 4] {
-        let largest = self.config.largest_start();
+        let largest = self.sensor.largest_start();
         [0, 1, 16.min(largest), largest / 2]
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::chip::AfterBorrow;
-    use crate::netlist::Corner;
-    use proptest::prelude::*;
-
-    fn law(config: &SensorConfig) -> WindowLaw {
-        WindowLaw::new(config, &Exposure::new(config, 520, 1))
-    }
-
-    #[test]
-    fn the_typical_ripple_is_the_published_one() {
-        let ripple = ChipTiming::of(&SensorConfig::default()).ripple();
-        assert!((ripple.as_ns() - 1.2).abs() < 0.01, "{ripple}");
-    }
-
-    #[test]
-    fn at_384_mhz_the_window_ends_one_and_a_half_periods_before_the_start_value() {
-        let config = SensorConfig::default();
-        let law = law(&config);
-        let window = law.window(100).open().unwrap();
-        assert_eq!(window.first_edge, 100 - 16);
-        let end = law.interval(&window).end;
-        let expected = config.clock().half_periods(2 * 99 + 1) - law.timing().spad_to_toggle;
-        assert!((end - expected).as_fs().abs() <= 2);
-    }
-
-    #[test]
-    fn a_start_value_beyond_the_laser_cycle_never_opens() {
-        let config = SensorConfig::default();
-        let short = WindowLaw::new(&config, &Exposure::new(&config, 100, 1));
-        assert!(short.window(98).open().is_some());
-        assert_eq!(short.window(99), Window::Never);
-        assert_eq!(short.window(511), Window::Never);
-    }
-
-    proptest! {
-        #[test]
-        fn a_cure_keeps_the_two_signals_apart(
-            clk_mhz in 150f64..900.0,
-            phase in -1f64..1.0,
-            corner in prop::sample::select(Corner::ALL.to_vec()),
-            mode in prop::sample::select(vec![Mode::Guided, Mode::Conventional]),
-            p_counter in prop::sample::select(PCounter::ALL.to_vec()),
-        ) {
-            let after_borrow = match p_counter {
-                PCounter::Memoryless => AfterBorrow::Wrap,
-                _ => AfterBorrow::Hold,
-            };
-            let config = SensorConfig {
-                clk_hz: clk_mhz * 1e6,
-                stop_phase_ps: phase * 0.5e6 / clk_mhz,
-                corner,
-                mode,
-                p_counter,
-                after_borrow,
-                ..SensorConfig::default()
-            };
-            let window = |config: &SensorConfig| {
-                WindowLaw::new(config, &Exposure::new(config, 1024, 1)).window(100)
-            };
-            if let Window::Race(race) = window(&config) {
-                prop_assert!(race.slack() <= ROUNDING, "{race}");
-                let mut cured = Vec::new();
-                let mut push = |change: &dyn Fn(&mut SensorConfig)| {
-                    let mut config = config.clone();
-                    change(&mut config);
-                    cured.push(config);
-                };
-                match race.cure {
-                    Cure::Period { at_least, at_most } => {
-                        for period in [Some(at_least), at_most].into_iter().flatten() {
-                            push(&|config| config.clk_hz = 1.0 / period.as_s());
-                        }
-                    }
-                    Cure::Phase { at_most, at_least } => {
-                        for phase in [at_most, at_least].into_iter().flatten() {
-                            push(&|config| config.stop_phase_ps = phase.as_ns() * 1e3);
-                        }
-                    }
-                    Cure::LaserCycle | Cure::Tap => {}
-                }
-                for config in cured {
-                    let again = window(&config);
-                    let is_same = matches!(again, Window::Race(r) if r.what == race.what);
-                    prop_assert!(!is_same, "{race}; {}: {again:?}", race.cure);
-                }
-            }
-        }
-
-        #[test]
-        fn bins_tile_time(start in 0u16..512, cycle in 0i64..1000, clk_mhz in 100f64..420.0) {
-            let config = SensorConfig { clk_hz: clk_mhz * 1e6, ..SensorConfig::default() };
-            let law = law(&config);
-            if let Some(window) = law.window(start).open() {
-                for bin in 0..15 {
-                    let here = law.bin_interval(&window, cycle, bin);
-                    let next = law.bin_interval(&window, cycle, bin + 1);
-                    prop_assert_eq!(here.end, next.start);
-                    let width = here.end - here.start;
-                    prop_assert!((width - config.clock().period()).as_fs().abs() <= 1);
-                }
-            }
-        }
-
-        #[test]
-        fn the_chosen_start_value_is_the_best_of_all(ns in 0.0f64..1400.0, clk_mhz in 200f64..400.0) {
-            let config = SensorConfig { clk_hz: clk_mhz * 1e6, ..SensorConfig::default() };
-            let law = law(&config);
-            let time = Time::from_s(ns * 1e-9);
-            let centre_distance = |start| {
-                let interval = law.interval(&law.window(start).open()?);
-                interval.contains(&time).then(|| {
-                    let centre = (interval.start.as_fs() + interval.end.as_fs()) / 2;
-                    ((centre - time.as_fs()).abs(), start)
-                })
-            };
-            let best = (0..512).filter_map(centre_distance).min();
-            let chosen = law.start_for(time);
-            prop_assert_eq!(chosen.is_some(), best.is_some());
-            if let (Some(chosen), Some((distance, _))) = (chosen, best) {
-                let got = centre_distance(chosen).unwrap().0;
-                prop_assert!(got <= distance + 1, "{got} {distance}");
-            }
-        }
-    }
-}
+mod tests;

@@ -7,12 +7,12 @@ use clap::{Args, Subcommand};
 use super::replay::Stimuli;
 use super::{SensorArgs, say, sdf};
 use crate::bench::{StimulusPlan, export_annotated_verilog, export_netlist, export_verilog};
-use crate::chip::sensor;
+use crate::chip::array;
 use crate::netlist::Netlist;
 
 /// What to export.
 #[derive(Subcommand)]
-pub enum ExportCommand {
+pub(super) enum ExportCommand {
     /// Structural Verilog with two sets of cell models and, for a stimulus, a testbench that replays it.
     Verilog(VerilogArgs),
     /// The delay of every cell, min:typ:max, as SDF (IEEE 1497).
@@ -21,7 +21,7 @@ pub enum ExportCommand {
 
 /// Arguments of `gdtof export verilog`.
 #[derive(Args)]
-pub struct VerilogArgs {
+pub(super) struct VerilogArgs {
     #[command(flatten)]
     sensor: SensorArgs,
     /// For a testbench: start values, CSV `row,col,init`, one line for every macropixel.
@@ -49,7 +49,7 @@ pub struct VerilogArgs {
 ///
 /// # Errors
 /// Bad input and unwritable output.
-pub fn run(command: &ExportCommand) -> anyhow::Result<()> {
+pub(super) fn run(command: &ExportCommand) -> anyhow::Result<()> {
     match command {
         ExportCommand::Verilog(args) => run_verilog(args),
         ExportCommand::Sdf(args) => sdf::run(args),
@@ -82,7 +82,7 @@ fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
     match &args.sdf {
         None => export_verilog(&args.out, &stimuli.config, &plan)?,
         Some(path) => {
-            let netlist = Netlist::elaborate(&sensor::circuit(&stimuli.config));
+            let netlist = Netlist::elaborate(&array::circuit(&stimuli.config));
             let timing = sdf::annotated_timing(path, &netlist, &stimuli.config)?;
             export_annotated_verilog(&args.out, &stimuli.config, &plan, &timing)?;
         }

@@ -8,9 +8,8 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::{SceneArgs, say};
+use super::{SceneArgs, say, wording};
 use crate::analysis::{TimingVerdict, VerdictReport};
-use crate::bench::recording::check_exposure;
 use crate::chip::WindowLaw;
 use crate::chip::{SensorConfig, Silicon};
 use crate::engine::waveform::WaveCycles;
@@ -29,7 +28,7 @@ use crate::waves::WaveFormat;
 
 /// Arguments of `gdtof frame`.
 #[derive(Args)]
-pub struct FrameArgs {
+pub(super) struct FrameArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Folder for the results; it is made if need be.
@@ -83,11 +82,12 @@ pub struct FrameArgs {
 ///
 /// # Errors
 /// Bad input, unwritable output, and what [`take_frame`] reports.
-pub fn run(args: &FrameArgs) -> anyhow::Result<()> {
+pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     let (sensor, scene) = args.scene.read()?;
-    let exposure = check_exposure(&sensor, args.stop_periods, args.laser_cycles)?;
+    let exposure = wording::exposure(&sensor, args.stop_periods, args.laser_cycles)?;
     let chosen = chosen_probes(&args.probe, &sensor)?;
-    if let Some((why, cure)) = WindowLaw::new(&sensor, &exposure).refusal() {
+    if let Some(why) = WindowLaw::new(&sensor, &exposure).refusal() {
+        let (why, cure) = wording::of_no_aim(&why);
         let message = format!("{why}, so the guide cannot aim time windows; {cure}");
         return Err(InputError::new("--sensor", message).into());
     }
@@ -298,8 +298,7 @@ impl<'a> Report<'a> {
             timing,
             tolerance: frame.kept.as_ref(),
             distance: DistanceLaw::new(
-                &settings.sensor,
-                &settings.exposure,
+                &WindowLaw::new(&settings.sensor, &settings.exposure),
                 frame.pixels.iter().filter_map(|pixel| pixel.start),
             ),
             load_bits: frame.load_bits,

@@ -13,6 +13,7 @@ mod silicon;
 mod speed;
 mod testbench;
 mod timing;
+mod wording;
 
 pub use testbench::testbench;
 
@@ -22,9 +23,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use self::settings::{SceneArgs, SensorArgs};
-use crate::engine::EngineError;
-use crate::files::{InputError, clean_up_when_interrupted};
-use crate::system::FrameError;
+use crate::files::clean_up_when_interrupted;
 
 /// A guided direct time-of-flight lidar chip, simulated down to gates and flip-flops.
 #[derive(Parser)]
@@ -82,10 +81,10 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            for line in format!("{error:#}").lines() {
+            for line in wording::sentence(&error).lines() {
                 eprintln!("gdtof: {line}");
             }
-            ExitCode::from(if is_bad_input(&error) { 2 } else { 1 })
+            ExitCode::from(if wording::is_bad_input(&error) { 2 } else { 1 })
         }
     }
 }
@@ -101,16 +100,4 @@ fn say(text: impl std::fmt::Display) -> std::io::Result<()> {
 fn is_closed_pipe(error: &anyhow::Error) -> bool {
     let io_error = error.downcast_ref::<std::io::Error>();
     io_error.is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
-}
-
-fn is_bad_input(error: &anyhow::Error) -> bool {
-    error.is::<InputError>()
-        || matches!(error.downcast_ref::<EngineError>(), Some(e) if e.is_refusal())
-        || match error.downcast_ref() {
-            Some(FrameError::Input(_)) => true,
-            Some(FrameError::Engine(error) | FrameError::Refused { why: error, .. }) => {
-                error.is_refusal()
-            }
-            _ => false,
-        }
 }

@@ -9,15 +9,14 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::{SceneArgs, say};
-use crate::bench::recording::check_exposure;
+use super::{SceneArgs, say, wording};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::report::{Axis, Chart, Grid, Style, aligned, width};
 use crate::system::pareto::{Done, GATE_CYCLES, Method, ParetoSettings, Point, Summary, summarise};
 
 /// Arguments of `gdtof pareto`.
 #[derive(Args)]
-pub struct ParetoArgs {
+pub(super) struct ParetoArgs {
     /// Of the scene, optics and laser are used.
     #[command(flatten)]
     scene: SceneArgs,
@@ -70,7 +69,7 @@ struct Report<'a> {
 ///
 /// # Errors
 /// Bad input, configurations that an engine refuses, files that cannot be written.
-pub fn run(args: &ParetoArgs) -> anyhow::Result<()> {
+pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
     let settings = settings(args)?;
     let methods: Vec<Method> = Method::ALL
         .into_iter()
@@ -121,7 +120,7 @@ pub fn run(args: &ParetoArgs) -> anyhow::Result<()> {
 
 fn settings(args: &ParetoArgs) -> Result<ParetoSettings, InputError> {
     let (sensor, scene) = args.scene.read()?;
-    check_exposure(&sensor, args.stop_periods, args.laser_cycles)?;
+    wording::exposure(&sensor, args.stop_periods, args.laser_cycles)?;
     let numbers = [
         ("--ranges", &args.ranges[..], 0.1, 1e4),
         ("--klux", &args.klux[..], 0.0, 1e3),

@@ -33,7 +33,7 @@ enum Fit {
 
 /// Arguments of `gdtof range`.
 #[derive(Args)]
-pub struct RangeArgs {
+pub(super) struct RangeArgs {
     /// File of histograms.
     #[arg(long, value_name = "FILE")]
     histograms: PathBuf,
@@ -243,7 +243,7 @@ struct Report {
 ///
 /// # Errors
 /// Bad input, files that cannot be written.
-pub fn run(args: &RangeArgs) -> anyhow::Result<()> {
+pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     let captures = match args.format {
         Format::Tmf8820 => tmf8820::read(&args.histograms)?,
     };

@@ -14,10 +14,11 @@ use super::sdf::annotated_timing;
 use super::silicon::SiliconArgs;
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::bench::{HardwareEventKind, HardwareEventReport};
-use crate::chip::{SensorConfig, Silicon, WindowLaw};
+use crate::chip::{Sensor, SensorConfig, Silicon};
 use crate::engine::waveform::{self, View};
 use crate::engine::{
-    Cancelling, ClosedFormCoverage, EngineError, GateSimulation, Histograms, Runner, Timed,
+    ClosedFormCoverage, EngineError, Gate, GateSimulation, Histograms, PulsedPixel, Replay, Runner,
+    Timed, cancelled,
 };
 use crate::files::{InputError, OutputFile};
 use crate::kernel::{CheckReport, Observer, Policy};
@@ -25,12 +26,12 @@ use crate::report::Table;
 use crate::system::EngineKind;
 use crate::waves::WaveFormat;
 use histograms::{Format, write};
-pub use stimuli::Stimuli;
+pub(super) use stimuli::Stimuli;
 use stimuli::StimulusArgs;
 
 /// Arguments of `gdtof replay`.
 #[derive(Args)]
-pub struct ReplayArgs {
+pub(super) struct ReplayArgs {
     #[command(flatten)]
     stimuli: StimulusArgs,
     /// Engine that runs the chip.
@@ -86,7 +87,7 @@ impl From<Checks> for Policy {
 ///
 /// # Errors
 /// Bad input, unwritable output, and configurations that the engine refuses.
-pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
+pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let format = match &args.out {
         None => Format::Csv,
         Some(path) => Format::of(path)?,
@@ -128,8 +129,7 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let needs_array = args.vcd.is_some() || args.sdf.is_some() || args.checks.is_some();
     let replayed = match silicon {
         _ if needs_array => replay_array(&stimuli, args, silicon)?,
-        Some(silicon) => replay_timed(&stimuli, args.engine, &silicon)?,
-        None => replay(&stimuli, args.engine)?,
+        silicon => replay(&stimuli, args.engine, silicon.as_ref())?,
     };
     let recording = &stimuli.recording;
     let summary = Summary {
@@ -192,22 +192,6 @@ impl Summary {
     }
 }
 
-/// How many photons of the recording cancel, two to a pair, with the library's delays.
-fn cancelled(stimuli: &Stimuli) -> u64 {
-    let Stimuli {
-        config, exposure, ..
-    } = stimuli;
-    let law = || WindowLaw::new(config, exposure);
-    let cancelling = Cancelling::of(config.dead_time(), exposure.clock, law);
-    cancelling.map_or(0, |cancelling| {
-        let pulses = stimuli.pulses();
-        pulses
-            .iter()
-            .map(|pulses| 2 * cancelling.pairs(pulses).count() as u64)
-            .sum()
-    })
-}
-
 /// The whole array as one netlist, with its waveform, annotated delays and timing checks.
 fn replay_array(
     stimuli: &Stimuli,
@@ -255,12 +239,20 @@ fn replay_array(
             }
         }
     }
+    let pulses = stimuli.pulses();
+    let pixels = PulsedPixel::array(&stimuli.starts, &pulses);
+    let exposure = &stimuli.exposure;
     let cancelled = match silicon {
         _ if args.sdf.is_some() => 2 * events.count(HardwareEventKind::PulsesCancelled),
         Some(silicon) => {
-            Timed::new(config, &stimuli.exposure, &silicon).cancelled(&stimuli.pulses())
+            let timed = Timed::new(
+                Sensor::from(config).made_of(&silicon),
+                exposure,
+                Runner::Gate,
+            );
+            cancelled(&timed, config, &pixels)
         }
-        None => cancelled(stimuli),
+        None => cancelled(&Gate::new(config, exposure), config, &pixels),
     };
     Ok(Replayed {
         histograms: simulation.histograms()?,
@@ -279,7 +271,7 @@ struct Report<'a> {
 }
 
 fn watch<O: Observer>(
-    simulation: &mut GateSimulation<'_>,
+    simulation: &mut GateSimulation,
     stimuli: &Stimuli,
     args: &ReplayArgs,
     observer: &mut O,
@@ -301,43 +293,6 @@ fn watch<O: Observer>(
     waveform::record(simulation, waves, format, &view, observer)
 }
 
-/// Macropixels with delays that are not the library's.
-fn replay_timed(
-    stimuli: &Stimuli,
-    kind: EngineKind,
-    silicon: &Silicon,
-) -> anyhow::Result<Replayed> {
-    let Stimuli {
-        config,
-        exposure,
-        starts,
-        ..
-    } = stimuli;
-    let pulses = stimuli.pulses();
-    let progress = progress(stimuli)?;
-    let done = |macropixels| progress.inc(macropixels as u64);
-    let runner = match kind {
-        EngineKind::Gate => None,
-        EngineKind::Cycle => Some(Runner::Cycle),
-        EngineKind::Window => Some(Runner::Window),
-        EngineKind::Cohort => return Err(EngineError::NoPhotons.into()),
-    };
-    let timed = Timed::new(config, exposure, silicon);
-    let (histograms, coverage) = match runner {
-        None => (timed.by_gates(starts, &pulses, done)?, None),
-        Some(runner) => {
-            let found = timed.histograms(runner, starts, &pulses, done)?;
-            (found.histograms, Some(found.coverage))
-        }
-    };
-    progress.finish_and_clear();
-    Ok(Replayed {
-        histograms,
-        cancelled: timed.cancelled(&pulses),
-        coverage,
-    })
-}
-
 /// Which macropixels kept time, and why the others did not.
 fn table(coverage: &ClosedFormCoverage) -> Table {
     let mut table = Table::new("Time keeping")
@@ -352,28 +307,49 @@ fn table(coverage: &ClosedFormCoverage) -> Table {
     table
 }
 
-fn progress(stimuli: &Stimuli) -> anyhow::Result<ProgressBar> {
-    let style = ProgressStyle::with_template("replaying {bar:40} {pos}/{len} macropixels")?;
-    Ok(ProgressBar::new(stimuli.starts.len() as u64).with_style(style))
+/// Each macropixel by itself: with the library's delays, or with those of `silicon`.
+fn replay(
+    stimuli: &Stimuli,
+    kind: EngineKind,
+    silicon: Option<&Silicon>,
+) -> anyhow::Result<Replayed> {
+    let Stimuli {
+        config, exposure, ..
+    } = stimuli;
+    let Some(silicon) = silicon else {
+        return run_engine(stimuli, &*kind.replay(config, exposure)?);
+    };
+    let runner = match kind {
+        EngineKind::Gate => Runner::Gate,
+        EngineKind::Cycle => Runner::Cycle,
+        EngineKind::Window => Runner::Window,
+        EngineKind::Cohort => return Err(EngineError::NoPhotons.into()),
+    };
+    let timed = Timed::new(Sensor::from(config).made_of(silicon), exposure, runner);
+    let replayed = run_engine(stimuli, &timed)?;
+    Ok(Replayed {
+        coverage: (runner != Runner::Gate).then(|| timed.coverage()),
+        ..replayed
+    })
 }
 
-fn replay(stimuli: &Stimuli, kind: EngineKind) -> anyhow::Result<Replayed> {
-    let engine = kind.replay(&stimuli.config, &stimuli.exposure)?;
-    let progress = progress(stimuli)?;
-    let batches: Result<Vec<_>, EngineError> = stimuli
-        .starts
+fn run_engine(stimuli: &Stimuli, engine: &dyn Replay) -> anyhow::Result<Replayed> {
+    let style = ProgressStyle::with_template("replaying {bar:40} {pos}/{len} macropixels")?;
+    let progress = ProgressBar::new(stimuli.starts.len() as u64).with_style(style);
+    let pulses = stimuli.pulses();
+    let pixels = PulsedPixel::array(&stimuli.starts, &pulses);
+    let batches: Result<Vec<Histograms>, EngineError> = pixels
         .par_chunks(engine.batch())
-        .zip(stimuli.pulses().par_chunks(engine.batch()))
-        .map(|(starts, pulses)| {
-            let histograms = engine.histograms(starts, pulses);
-            progress.inc(starts.len() as u64);
+        .map(|pixels| {
+            let histograms = engine.replay(pixels);
+            progress.inc(pixels.len() as u64);
             histograms
         })
         .collect();
     progress.finish_and_clear();
     Ok(Replayed {
         histograms: Histograms::joined(engine.bins(), batches?),
-        cancelled: cancelled(stimuli),
+        cancelled: cancelled(engine, &stimuli.config, &pixels),
         coverage: None,
     })
 }

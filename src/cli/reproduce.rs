@@ -12,7 +12,7 @@ use crate::reproduce::{self, Report, Selection};
 
 /// Arguments of `gdtof reproduce`.
 #[derive(Args)]
-pub struct ReproduceArgs {
+pub(super) struct ReproduceArgs {
     /// Only this claim of the list; may be repeated. Without any choice, everything.
     #[arg(long, value_name = "N")]
     claim: Vec<u32>,
@@ -42,7 +42,7 @@ pub struct ReproduceArgs {
 ///
 /// # Errors
 /// Numbers that do not exist, unwritable output, and claims that leave their tolerance.
-pub fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
+pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
     let chosen = Selection {
         claims: args.claim.clone(),
         figures: args.figure.clone(),
@@ -60,7 +60,7 @@ pub fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
     };
     selection
         .check()
-        .map_err(|(option, message)| InputError::new(option, message))?;
+        .map_err(|fault| InputError::new(format!("--{}", fault.part.name()), fault.to_string()))?;
     if let Some(folder) = &args.out {
         create_folder(folder)?;
     }

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use indicatif::{DecimalBytes, ProgressBar, ProgressStyle};
 
 use super::{SensorArgs, say};
-use crate::chip::{SensorConfig, Silicon, sensor};
+use crate::chip::{SensorConfig, Silicon, array};
 use crate::files::{InputError, OutputFile, read_text};
 use crate::netlist::sdf::{
     Sdf, SdfDivider, SdfOptions, SdfTimescale, Skipped, annotate, write_sdf,
@@ -36,7 +36,7 @@ const LARGEST_UNASKED: u64 = 100_000_000;
 
 /// Arguments of `gdtof export sdf`.
 #[derive(Args)]
-pub struct SdfArgs {
+pub(super) struct SdfArgs {
     #[command(flatten)]
     sensor: SensorArgs,
     /// The delay file.
@@ -54,7 +54,7 @@ pub struct SdfArgs {
 ///
 /// # Errors
 /// Bad input and unwritable output.
-pub fn run(args: &SdfArgs) -> anyhow::Result<()> {
+pub(super) fn run(args: &SdfArgs) -> anyhow::Result<()> {
     let config = args.sensor.read()?;
     let options = SdfOptions {
         divider: match args.divider {
@@ -95,7 +95,7 @@ fn write_library(
     config: &SensorConfig,
     options: SdfOptions,
 ) -> std::io::Result<usize> {
-    let netlist = Netlist::elaborate(&sensor::circuit(config));
+    let netlist = Netlist::elaborate(&array::circuit(config));
     let library = Silicon::library();
     let [min, typ, max] = Corner::ALL.map(|c| Timing::nominal(&netlist, library, c));
     write_sdf(out, &netlist, [&min, &typ, &max], options)?;
@@ -119,7 +119,7 @@ fn size(config: &SensorConfig, options: SdfOptions) -> std::io::Result<u64> {
 ///
 /// # Errors
 /// Unreadable and malformed files, and files of another design.
-pub fn annotated_timing(
+pub(super) fn annotated_timing(
     path: &Path,
     netlist: &Netlist,
     config: &SensorConfig,

@@ -11,15 +11,16 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::say;
-use crate::chip::SensorConfig;
+use crate::chip::sensors::CHIPS;
+use crate::chip::{Sensor, SensorConfig};
 use crate::files::{InputError, read_text};
 use crate::scene::Scene;
 use crate::settings::Document;
 
 /// Which sensor.
 #[derive(Args)]
-pub struct SensorArgs {
-    /// Sensor configuration (TOML); without it, the QuantIC4x4.
+pub(super) struct SensorArgs {
+    /// Sensor configuration (TOML), or one of the chips quantic4x4 (without it) and hslidar.
     #[arg(long, value_name = "FILE")]
     sensor: Option<PathBuf>,
     /// Macropixel rows, instead of the configuration's.
@@ -36,7 +37,7 @@ pub struct SensorArgs {
 
 /// Which sensor, and which scene before it.
 #[derive(Args)]
-pub struct SceneArgs {
+pub(super) struct SceneArgs {
     #[command(flatten)]
     sensor: SensorArgs,
     /// Scene (TOML); without it, a street on a bright day.
@@ -49,12 +50,12 @@ impl SensorArgs {
     ///
     /// # Errors
     /// Unreadable files, bad keys and values, and `--set` of anything but the sensor.
-    pub fn read(&self) -> Result<SensorConfig, InputError> {
+    pub(super) fn read(&self) -> Result<SensorConfig, InputError> {
         self.read_with(None)
     }
 
     /// Whether rows and columns are both asked for on the command line.
-    pub fn gives_size(&self) -> bool {
+    pub(super) fn gives_size(&self) -> bool {
         let is_set = |key: &str| {
             let prefix = format!("sensor.{key}=");
             self.set.iter().any(|set| set.starts_with(&prefix))
@@ -64,7 +65,7 @@ impl SensorArgs {
 
     fn read_with(&self, mut scene: Option<&mut Document>) -> Result<SensorConfig, InputError> {
         let mut sensor = match &self.sensor {
-            Some(path) => read(path)?,
+            Some(path) => described(path)?,
             None => Document::of("the sensor", toml::Table::new()),
         };
         for assignment in &self.set {
@@ -97,7 +98,7 @@ impl SceneArgs {
     ///
     /// # Errors
     /// Unreadable files, bad keys and values.
-    pub fn read(&self) -> Result<(SensorConfig, Scene), InputError> {
+    pub(super) fn read(&self) -> Result<(SensorConfig, Scene), InputError> {
         let mut document = match &self.scene {
             Some(path) => read(path)?,
             None => Scene::outdoor_document(),
@@ -114,12 +115,28 @@ impl SceneArgs {
     }
 
     /// What reports call the scene.
-    pub fn scene_name(&self) -> String {
+    pub(super) fn scene_name(&self) -> String {
         match &self.scene {
             Some(path) => path.display().to_string(),
             None => "built-in street".to_owned(),
         }
     }
+}
+
+/// A sensor file, or the description of a chip that is known by name. A file of such a name comes first.
+fn described(path: &Path) -> Result<Document, InputError> {
+    if path.exists() || path.extension().is_some() {
+        return read(path);
+    }
+    let chip = path.to_str().and_then(Sensor::named).ok_or_else(|| {
+        let names = CHIPS.map(|(name, _)| name).join(" or ");
+        InputError::new(
+            path.display(),
+            format!("is no file and no chip; give {names}, or a file"),
+        )
+    })?;
+    let table = toml::Table::try_from(&*chip).expect("numbers and words");
+    Ok(Document::of(path.display(), table))
 }
 
 fn read(path: &Path) -> Result<Document, InputError> {
@@ -130,7 +147,7 @@ fn read(path: &Path) -> Result<Document, InputError> {
 ///
 /// # Errors
 /// Bad input.
-pub fn print_sensor(args: &SensorArgs) -> anyhow::Result<()> {
+pub(super) fn print_sensor(args: &SensorArgs) -> anyhow::Result<()> {
     Ok(say(args.read()?.commented())?)
 }
 
@@ -138,6 +155,6 @@ pub fn print_sensor(args: &SensorArgs) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// Bad input.
-pub fn print_scene(args: &SceneArgs) -> anyhow::Result<()> {
+pub(super) fn print_scene(args: &SceneArgs) -> anyhow::Result<()> {
     Ok(say(args.read()?.1.commented())?)
 }

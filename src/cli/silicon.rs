@@ -13,7 +13,7 @@ use crate::netlist::{Conditions, Corner, Mismatch};
 
 /// Silicon and its conditions.
 #[derive(Args)]
-pub struct SiliconArgs {
+pub(super) struct SiliconArgs {
     /// Silicon, slow, typ or fast: like voltage and temperature it scales the delays of the sensor's corner.
     #[arg(long, value_name = "SPEED", default_value = "typ")]
     process: Corner,
@@ -41,7 +41,7 @@ impl SiliconArgs {
     ///
     /// # Errors
     /// Conditions and mismatch for which no delays are known.
-    pub fn read(&self, corner: Corner) -> Result<Silicon, InputError> {
+    pub(super) fn read(&self, corner: Corner) -> Result<Silicon, InputError> {
         let factor = self.conditions().delay_factor().ok_or_else(|| {
             let message = "no delays are known there; give -55 to 150 °C and a supply up to 2 V at least 0.2 V above the threshold of about 0.4 V";
             InputError::new("--voltage, --temperature", message)
@@ -62,7 +62,7 @@ impl SiliconArgs {
     }
 
     /// Process, supply and temperature.
-    pub fn conditions(&self) -> Conditions {
+    pub(super) fn conditions(&self) -> Conditions {
         Conditions {
             process: self.process,
             voltage_v: self.voltage,

@@ -139,7 +139,7 @@ impl Subject {
 
 /// Arguments of `gdtof speed`.
 #[derive(Args)]
-pub struct SpeedArgs {
+pub(super) struct SpeedArgs {
     /// Timed runs of each figure: the table gives least, median and most.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1000))]
     runs: u16,
@@ -203,7 +203,7 @@ impl Figure {
 ///
 /// # Errors
 /// When a process for a figure cannot be started.
-pub fn run(args: &SpeedArgs) -> anyhow::Result<()> {
+pub(super) fn run(args: &SpeedArgs) -> anyhow::Result<()> {
     if let Some(subject) = &args.only {
         let subject = serde_json::from_str(subject).context("no figure to measure")?;
         let figure = measure(subject, args.runs)?;

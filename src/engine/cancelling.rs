@@ -10,7 +10,10 @@
 //! count has them left out, as the chip has; this tells how many there were. Which CLK edge takes a pulse is the window
 //! law's to say, so that every engine reports the same.
 
-use crate::chip::{SPADS, WindowLaw, window_law};
+use rayon::prelude::*;
+
+use super::{PulsedPixel, Replay};
+use crate::chip::{MOST_SPADS, SensorConfig, WindowLaw, window_law};
 use crate::photon::SpadEvent;
 use crate::units::{Frequency, Time};
 
@@ -21,9 +24,11 @@ pub struct Cancelling {
 }
 
 impl Cancelling {
-    /// `None` where the dead time keeps the pulses of a SPAD farther apart than CLK edges; `law` is not asked for then.
+    /// `None` where the dead time keeps the pulses of a SPAD farther apart than CLK edges; `law` is not asked for then. Nor is
+    /// anything told of bins that are not CLK periods.
     pub fn of(dead_time: Time, clock: Frequency, law: impl FnOnce() -> WindowLaw) -> Option<Self> {
-        (dead_time <= clock.period()).then(|| Cancelling { law: law() })
+        let law = (dead_time <= clock.period()).then(law)?;
+        law.has_clk_bins().then_some(Cancelling { law })
     }
 
     /// The law that says which CLK edge takes a pulse.
@@ -37,7 +42,7 @@ impl Cancelling {
         &'p self,
         pulses: &'p [SpadEvent],
     ) -> impl Iterator<Item = (i64, SpadEvent)> + 'p {
-        let mut last = [None; SPADS];
+        let mut last = [None; MOST_SPADS];
         pulses.iter().filter_map(move |&pulse| {
             let edge = self.law.edge_of(pulse.time);
             let last = &mut last[usize::from(pulse.spad)];
@@ -52,7 +57,9 @@ impl Cancelling {
     pub fn seen(&self, start: u16, pulses: &[SpadEvent]) -> u64 {
         let window = self.law.window(start);
         let is_seen = |edge: i64| match &window {
-            window_law::Window::Open(window) => self.law.collects(window, edge),
+            window_law::Window::Open(window) => {
+                self.law.bins_of_edge(window, edge).next().is_some()
+            }
             window_law::Window::Never => false,
             window_law::Window::Irregular(_) | window_law::Window::Race(_) => true,
         };
@@ -61,4 +68,21 @@ impl Cancelling {
             .filter(|&(edge, _)| is_seen(edge))
             .count() as u64
     }
+}
+
+/// How many pulses of these macropixels cancel, two to a pair, in windows and outside.
+pub fn cancelled<R: Replay + ?Sized>(
+    engine: &R,
+    config: &SensorConfig,
+    pixels: &[PulsedPixel<'_>],
+) -> u64 {
+    let cancelling = Cancelling::of(config.dead_time(), config.clock(), || engine.law());
+    let Some(cancelling) = cancelling else {
+        return 0;
+    };
+    let of_pixel = |pixel: &PulsedPixel<'_>| {
+        let pulses = engine.as_the_law_sees(pixel.number, pixel.pulses);
+        2 * cancelling.pairs(&pulses).count() as u64
+    };
+    pixels.par_iter().map(of_pixel).sum()
 }

@@ -10,15 +10,15 @@ use std::ops::AddAssign;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Cancelling, Engine, EngineError, Expose, Histograms, Replay};
+use super::{Cancelling, Engine, EngineError, Expose, Histograms, PulsedPixel, Replay};
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::photon::{
-    DeadTimeLaw, PhotonStream, PixelLight, PixelPhotons, SPADS, SpadEvent, SpadModel, StreamConfig,
+    DeadTimeLaw, PhotonStream, PixelLight, PixelPhotons, SpadEvent, SpadModel, StreamConfig,
 };
 use crate::units::Time;
 
 /// A macropixel and the light on it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LitPixel {
     /// Its number in the array, row-major: the key of its photons.
     pub number: u32,
@@ -110,6 +110,7 @@ pub fn stream_config(
         pulse_sigma,
         pulse_shape: None,
         spads: SpadModel {
+            grid: config.spad_grid(),
             dead_time: config.dead_time(),
             law: match config.paralysable {
                 false => DeadTimeLaw::NonParalysable,
@@ -163,19 +164,34 @@ const BLINDING: f64 = 1.0;
 /// array before a whole field of view, which gathers much light on each macropixel, stays below.
 const MOST_BLINDING_PHOTONS: f64 = 1e9;
 
+/// Refuses light whose SPADs differ, but are not those of the sensor.
+pub(super) fn refuse_other_spads(
+    stream: &PhotonStream,
+    pixels: &[LitPixel],
+) -> Result<(), EngineError> {
+    let spads = stream.spads();
+    let lights = pixels.iter().filter_map(|pixel| pixel.light.as_ref());
+    let mut counts = lights.filter_map(|light| Some(light.spads()?.spads()));
+    match counts.find(|&given| given != spads) {
+        None => Ok(()),
+        Some(given) => Err(EngineError::OtherSpads { given, spads }),
+    }
+}
+
 fn refuse_blinding(stream: &PhotonStream, pixels: &[LitPixel]) -> Result<(), EngineError> {
     let config = stream.config();
+    let spads = stream.spads() as f64;
     let most_hz = BLINDING / config.spads.dead_time.as_s();
-    let lights = pixels.iter().filter_map(|pixel| pixel.light);
-    let rates_hz = lights.map(|light| light.background_hz);
-    let blinding_hz = rates_hz.filter(|hz| hz / SPADS as f64 > most_hz);
+    let lights = pixels.iter().filter_map(|pixel| pixel.light.as_ref());
+    let rates_hz = lights.map(PixelLight::background_hz);
+    let blinding_hz = rates_hz.filter(|hz| hz / spads > most_hz);
     let (brightest_hz, total_hz) =
         blinding_hz.fold((0f64, 0f64), |(most, sum), hz| (most.max(hz), sum + hz));
     let photons = total_hz * config.cycle_s() * f64::from(config.laser_cycles);
     match photons <= MOST_BLINDING_PHOTONS {
         true => Ok(()),
         false => Err(EngineError::Blinding {
-            background_hz: brightest_hz / SPADS as f64,
+            background_hz: brightest_hz / spads,
             most_hz,
             photons,
             most_photons: MOST_BLINDING_PHOTONS,
@@ -209,22 +225,22 @@ fn in_batches<E: Engine + ?Sized>(
 /// than 200 MB of them.
 const MOST_PULSE_BYTES: f64 = 64e6;
 
-/// Draws every photon of the exposure and gives the pulses to [`Replay::histograms`], as many macropixels at a time as the
+/// Draws every photon of the exposure and gives the pulses to [`Replay::replay`], as many macropixels at a time as the
 /// memory for their pulses allows.
 ///
 /// # Errors
-/// As [`Replay::histograms`].
+/// As [`Replay::replay`], and where light is given for another number of SPADs.
 pub fn full_stream<E: Replay + ?Sized>(
     engine: &E,
     stream: &PhotonStream,
     pixels: &[LitPixel],
 ) -> Result<Exposed, EngineError> {
     let bytes = |pixel: &LitPixel| {
-        let edges = pixel
-            .light
-            .map_or(0.0, |light| stream.config().most_edges(&light));
+        let light = pixel.light.as_ref();
+        let edges = light.map_or(0.0, |light| stream.config().most_edges(light));
         edges * size_of::<SpadEvent>() as f64
     };
+    refuse_other_spads(stream, pixels)?;
     let mut exposed = Exposed::new(engine.bins());
     let mut rest = pixels;
     while !rest.is_empty() {
@@ -254,16 +270,23 @@ fn whole_pixels<E: Replay + ?Sized>(
             None => PixelPhotons::default(),
         })
         .collect();
-    let starts: Vec<u16> = pixels.iter().map(|pixel| pixel.start).collect();
-    let pulses: Vec<&[SpadEvent]> = photons.iter().map(|p| &p.events[..]).collect();
-    let histograms = engine.histograms(&starts, &pulses)?;
+    let pulsed = pixels.iter().zip(&photons);
+    let pulsed: Vec<PulsedPixel<'_>> = pulsed
+        .map(|(pixel, photons)| PulsedPixel {
+            number: pixel.number,
+            start: pixel.start,
+            pulses: &photons.events,
+        })
+        .collect();
+    let histograms = engine.replay(&pulsed)?;
     let config = stream.config();
     let cancelling = Cancelling::of(config.spads.dead_time, config.clock, || engine.law());
     let cancelled = cancelling.map_or(0, |cancelling| {
-        let macropixels = starts.iter().zip(&pulses);
-        macropixels
-            .map(|(&start, pulses)| cancelling.seen(start, pulses))
-            .sum()
+        let seen = |pixel: &PulsedPixel<'_>| {
+            let pulses = engine.as_the_law_sees(pixel.number, pixel.pulses);
+            cancelling.seen(pixel.start, &pulses)
+        };
+        pulsed.iter().map(seen).sum()
     });
     let clk_periods =
         pixels.len() as u64 * u64::from(config.stop_periods) * u64::from(config.laser_cycles);

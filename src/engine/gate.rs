@@ -4,53 +4,54 @@ use std::sync::Arc;
 
 use super::lanes::LaneSimulation;
 use super::{
-    Engine, EngineError, Expose, Exposed, Histograms, LitPixel, Replay, follows, full_stream,
+    Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay, follows,
+    full_stream,
 };
 use crate::bench::{HardwareEvents, Schedule, StimulusPlan};
 use crate::chip::{
-    ChipTiming, Exposure, Probe, Probes, SensorConfig, SensorPins, Silicon, WindowLaw, front_end,
-    sensor,
+    Exposure, Probe, Probes, Sensor, SensorPins, Silicon, WindowLaw, array, front_end,
 };
 use crate::kernel::{Kernel, LANES, Observer, Policy, Statistics, TimingChecks};
 use crate::netlist::{NetId, Netlist, Timing};
 use crate::photon::{PhotonStream, SpadEvent};
 
 /// A rectangle of the sensor at gate level, loaded and exposed through its pins.
-pub struct GateSimulation<'a> {
-    config: &'a SensorConfig,
+pub struct GateSimulation {
+    sensor: Sensor,
     netlist: Arc<Netlist>,
     /// Of each macropixel, row-major.
     probes: Vec<Probes>,
     timing: Timing,
     kernel: Kernel,
-    plan: StimulusPlan<'a>,
+    plan: StimulusPlan,
 }
 
-impl<'a> GateSimulation<'a> {
+impl GateSimulation {
     /// Prepares `size` (rows, cols) macropixels from `first` (row, col) on; `starts` and `pulses` are
     /// row-major over that rectangle.
     pub fn new(
-        config: &'a SensorConfig,
-        exposure: &'a Exposure,
+        sensor: impl Into<Sensor>,
+        exposure: &Exposure,
         first: (usize, usize),
         size: (usize, usize),
         starts: &[u16],
         pulses: &[&[SpadEvent]],
     ) -> Self {
-        let netlist = Arc::new(Netlist::elaborate(&sensor::subarray(config, first, size)));
-        let timing = Silicon::of(config).timing(&netlist);
+        let sensor = sensor.into();
+        let netlist = Arc::new(Netlist::elaborate(&array::subarray(&sensor, first, size)));
+        let timing = sensor.silicon().timing(&netlist);
         let kernel = Kernel::new(&netlist, &timing);
         let rectangle = (0..size.0).flat_map(|row| (0..size.1).map(move |col| (row, col)));
         let probes = rectangle
             .map(|(row, col)| Probes::of_macropixel(&netlist, first.0 + row, first.1 + col))
             .collect();
         GateSimulation {
-            config,
             netlist,
             probes,
             timing,
             kernel,
-            plan: StimulusPlan::new(config, exposure, size.1, starts, pulses),
+            plan: StimulusPlan::new(&sensor, exposure, size.1, starts, pulses),
+            sensor,
         }
     }
 
@@ -82,7 +83,7 @@ impl<'a> GateSimulation<'a> {
     /// Timing checks of this netlist in the sensor's corner, from the end of the power-up reset on, to run it with. The
     /// front ends' first samplers count as asynchronous.
     pub fn timing_checks(&self, policy: Policy) -> TimingChecks {
-        TimingChecks::new(&self.netlist, Silicon::library(), self.config.corner)
+        TimingChecks::new(&self.netlist, Silicon::library(), self.sensor.corner)
             .limits(&self.netlist, &self.timing)
             .policy(policy)
             .not_before(self.schedule().reset_end)
@@ -92,7 +93,7 @@ impl<'a> GateSimulation<'a> {
     /// A watch for hardware events in every macropixel, from the end of the power-up reset on, to run it with.
     pub fn hardware_events(&self) -> HardwareEvents {
         let released = self.schedule().reset_end;
-        HardwareEvents::new(&self.netlist, self.config, &self.probes, released)
+        HardwareEvents::new(&self.netlist, &self.sensor, &self.probes, released)
     }
 
     /// Simulates load and exposure to the end.
@@ -133,7 +134,7 @@ impl<'a> GateSimulation<'a> {
             let counts: Result<Vec<u16>, _> = probes.bins().iter().enumerate().map(count).collect();
             counts
         };
-        let mut histograms = Histograms::new(self.config.bins);
+        let mut histograms = Histograms::new(self.sensor.bins);
         for probes in &self.probes {
             histograms.push(&histogram(probes)?);
         }
@@ -147,25 +148,28 @@ impl<'a> GateSimulation<'a> {
 }
 
 /// Simulates macropixels at gate level, each with a load path of its own: one alone, several in lanes.
-pub struct Gate<'a> {
-    config: &'a SensorConfig,
-    exposure: &'a Exposure,
+pub struct Gate {
+    sensor: Sensor,
+    exposure: Exposure,
 }
 
-impl<'a> Gate<'a> {
+impl Gate {
     /// An engine for this sensor and exposure.
-    pub fn new(config: &'a SensorConfig, exposure: &'a Exposure) -> Self {
-        Gate { config, exposure }
+    pub fn new(sensor: impl Into<Sensor>, exposure: &Exposure) -> Self {
+        Gate {
+            sensor: sensor.into(),
+            exposure: *exposure,
+        }
     }
 
     /// The netlist of each macropixel with its load path.
     pub fn netlist(&self) -> Netlist {
-        Netlist::elaborate(&sensor::subarray(self.config, (0, 0), (1, 1)))
+        Netlist::elaborate(&array::subarray(&self.sensor, (0, 0), (1, 1)))
     }
 
     /// The library's delays of that netlist in the sensor's corner.
     pub fn nominal_timing(&self) -> Timing {
-        Silicon::of(self.config).timing(&self.netlist())
+        self.sensor.silicon().timing(&self.netlist())
     }
 
     /// Histograms of macropixels with delays of their own, such as the mismatch of each. Neighbours in the list
@@ -177,74 +181,65 @@ impl<'a> Gate<'a> {
     ///
     /// # Panics
     /// When the lists have different lengths.
-    pub fn histograms_with(
+    pub fn replay_with(
         &self,
         timings: &[&Timing],
-        starts: &[u16],
-        pulses: &[&[SpadEvent]],
+        pixels: &[PulsedPixel<'_>],
     ) -> Result<Histograms, EngineError> {
-        assert!(timings.len() == starts.len() && starts.len() == pulses.len());
-        follows(self.config, &ChipTiming::of(self.config).pulses)?;
-        let mut histograms = Histograms::new(self.config.bins);
+        assert!(timings.len() == pixels.len());
+        follows(&self.sensor, &self.sensor.timing().pulses)?;
+        let mut histograms = Histograms::new(self.sensor.bins);
         for alike in timings.chunk_by(|a, b| std::ptr::eq(*a, *b)) {
             let (from, to) = (histograms.len(), histograms.len() + alike.len());
-            let batches = starts[from..to].chunks(LANES);
-            for (starts, pulses) in batches.zip(pulses[from..to].chunks(LANES)) {
-                histograms.append(&self.batch(alike[0], starts, pulses)?);
+            for pixels in pixels[from..to].chunks(LANES) {
+                histograms.append(&self.run_batch(alike[0], pixels)?);
             }
         }
         Ok(histograms)
     }
 
     /// At most [`LANES`] macropixels with the same delays.
-    fn batch(
+    fn run_batch(
         &self,
         timing: &Timing,
-        starts: &[u16],
-        pulses: &[&[SpadEvent]],
+        pixels: &[PulsedPixel<'_>],
     ) -> Result<Histograms, EngineError> {
+        let starts: &Vec<u16> = &pixels.iter().map(|pixel| pixel.start).collect();
+        let pulses: &Vec<&[SpadEvent]> = &pixels.iter().map(|pixel| pixel.pulses).collect();
         // One alone is quicker without lanes.
         if starts.len() == 1 {
             let (first, size) = ((0, 0), (1, 1));
             let alone =
-                GateSimulation::new(self.config, self.exposure, first, size, starts, pulses);
+                GateSimulation::new(&self.sensor, &self.exposure, first, size, starts, pulses);
             let mut alone = alone.with_timing(timing);
             alone.run(&mut ());
             return alone.histograms();
         }
-        let lanes = LaneSimulation::new(self.config, self.exposure, starts, pulses);
+        let lanes = LaneSimulation::new(&self.sensor, &self.exposure, starts, pulses);
         let mut lanes = lanes.with_timing(timing);
         lanes.run(&mut ());
         lanes.histograms()
     }
 }
 
-impl Engine for Gate<'_> {
+impl Engine for Gate {
     fn law(&self) -> WindowLaw {
-        WindowLaw::new(self.config, self.exposure)
+        WindowLaw::new(&self.sensor, &self.exposure)
     }
 
     fn bins(&self) -> usize {
-        self.config.bins
+        self.sensor.bins
     }
 }
 
-impl Replay for Gate<'_> {
-    fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
-        Ok(self.histograms(&[start], &[pulses])?.into_counts())
-    }
-
-    fn histograms(
-        &self,
-        starts: &[u16],
-        pulses: &[&[SpadEvent]],
-    ) -> Result<Histograms, EngineError> {
+impl Replay for Gate {
+    fn replay(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError> {
         let nominal = self.nominal_timing();
-        self.histograms_with(&vec![&nominal; starts.len()], starts, pulses)
+        self.replay_with(&vec![&nominal; pixels.len()], pixels)
     }
 }
 
-impl Expose for Gate<'_> {
+impl Expose for Gate {
     fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
         full_stream(self, stream, pixels)
     }

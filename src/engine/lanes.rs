@@ -7,39 +7,38 @@ use bitvec::vec::BitVec;
 
 use super::{EngineError, Histograms};
 use crate::bench::{Schedule, StimulusPlan};
-use crate::chip::{
-    Exposure, Probe, Probes, SPADS, SensorConfig, SensorPins, Silicon, load_path, sensor,
-};
+use crate::chip::{Exposure, Probe, Probes, Sensor, SensorPins, array, load_path};
 use crate::kernel::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
 use crate::netlist::{NetId, Netlist, Timing};
 use crate::photon::SpadEvent;
 use crate::units::Time;
 
 /// Up to 64 macropixels at gate level, loaded and exposed together.
-pub struct LaneSimulation<'a> {
-    config: &'a SensorConfig,
+pub struct LaneSimulation {
+    sensor: Sensor,
     netlist: Netlist,
     probes: Probes,
     kernel: LaneKernel,
-    shared: StimulusPlan<'a>,
+    shared: StimulusPlan,
     serial: Vec<BitVec>,
     pulses: Vec<(usize, SpadEvent)>,
 }
 
-impl<'a> LaneSimulation<'a> {
+impl LaneSimulation {
     /// Prepares one lane for each start value and its pulses.
     ///
     /// # Panics
     /// When there are more than [`LANES`], or lists of different lengths.
     pub fn new(
-        config: &'a SensorConfig,
-        exposure: &'a Exposure,
+        sensor: impl Into<Sensor>,
+        exposure: &Exposure,
         starts: &[u16],
         pulses: &[&[SpadEvent]],
     ) -> Self {
         assert!(starts.len() <= LANES && starts.len() == pulses.len());
-        let netlist = Netlist::elaborate(&sensor::subarray(config, (0, 0), (1, 1)));
-        let timing = Silicon::of(config).timing(&netlist);
+        let sensor = sensor.into();
+        let netlist = Netlist::elaborate(&array::subarray(&sensor, (0, 0), (1, 1)));
+        let timing = sensor.silicon().timing(&netlist);
         let kernel = LaneKernel::new(&netlist, &timing);
         let end = exposure.end();
         let mut all: Vec<(usize, SpadEvent)> = pulses
@@ -50,16 +49,16 @@ impl<'a> LaneSimulation<'a> {
             .collect();
         all.sort_unstable_by_key(|(lane, pulse)| (pulse.time, *lane, pulse.spad));
         LaneSimulation {
-            config,
             probes: Probes::of_macropixel(&netlist, 0, 0),
             netlist,
             kernel,
-            shared: StimulusPlan::new(config, exposure, 1, &[0], &[&[]]),
+            shared: StimulusPlan::new(&sensor, exposure, 1, &[0], &[&[]]),
             serial: starts
                 .iter()
-                .map(|&start| load_path::stream(&[start], 1, config.counter_bits))
+                .map(|&start| load_path::stream(&[start], 1, sensor.counter_bits))
                 .collect(),
             pulses: all,
+            sensor,
         }
     }
 
@@ -119,10 +118,9 @@ impl<'a> LaneSimulation<'a> {
                 bit += 1;
             }
         }
-        let (origin, dead_time) = (self.schedule().origin, self.config.dead_time());
-        let spad_raw: [NetId; SPADS] = std::array::from_fn(|spad| pins.spad_raw[spad]);
+        let (origin, dead_time) = (self.schedule().origin, self.sensor.dead_time());
         for &(lane, pulse) in &self.pulses {
-            let net = spad_raw[usize::from(pulse.spad)];
+            let net = pins.spad_raw[usize::from(pulse.spad)];
             let time = origin + pulse.time;
             let mask = 1 << lane;
             let (rise, fall) = (Lanes::known(u64::MAX), Lanes::known(0));

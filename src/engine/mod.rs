@@ -8,7 +8,7 @@
 //! | [`Cohort`] | no photons: laser cycles in the same state move together | `Window`, in distribution |
 //! | [`Timed`] | `Window` or `Cycle` with each macropixel's own delays, `Gate` where these leave an order in doubt | `Gate` with the same delays |
 //!
-//! The first three take the same start value and SPAD pulses and give the same histogram. `Cycle` and `Window` assume what
+//! All but `Cohort` take the same start value and SPAD pulses ([`Replay`]) and, with the same delays, give the same histogram. `Cycle` and `Window` assume what
 //! the window law can promise, and refuse a configuration in which two signals race. The macropixel's
 //! plain-Rust reference model ([`crate::chip::macropixel::Model`]) is the tests' slow judge of all of them. `Window`
 //! also refuses a P-counter that raises LOCAL_STOP more than once in a laser cycle.
@@ -16,6 +16,7 @@
 mod cancelling;
 pub mod cohort;
 mod cycle;
+mod error;
 mod exposing;
 mod gate;
 mod histograms;
@@ -25,23 +26,24 @@ mod timed;
 pub mod waveform;
 mod window;
 
-pub use cancelling::Cancelling;
+pub use cancelling::{Cancelling, cancelled};
 pub use cohort::{Cohort, CohortOptions};
 pub use cycle::{Cycle, PackedPulses, Unlevelled};
+pub use error::{EngineError, NotModelled};
 pub use exposing::{
     Exposed, LitPixel, Work, expose, expose_without_skipping, full_stream, stream_config,
 };
 pub use gate::{Gate, GateSimulation};
 pub use histograms::Histograms;
 pub use lanes::LaneSimulation;
-pub use timed::{ClosedFormCoverage, Runner, Timed, TimedHistograms};
+pub use timed::{ClosedFormCoverage, Doubt, Runner, Timed};
 pub use window::Window;
 
-use crate::chip::front_end::PulseLimits;
-use crate::chip::{Race, SensorConfig, WindowLaw};
-use crate::photon::{PhotonStream, SpadEvent};
+use std::borrow::Cow;
 
-const _: () = assert!(crate::chip::SPADS == crate::photon::SPADS);
+use crate::chip::WindowLaw;
+use crate::photon::{PhotonStream, SpadEvent};
+use error::follows;
 
 /// What every engine tells of itself. What it runs is in [`Replay`] and [`Expose`].
 pub trait Engine: Sync {
@@ -57,30 +59,67 @@ pub trait Engine: Sync {
     }
 }
 
+/// A macropixel and the pulses of its SPADs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PulsedPixel<'p> {
+    /// Its number in the array, row-major: its delays may be its own.
+    pub number: u32,
+    /// The start value in its P-counter.
+    pub start: u16,
+    /// Rising edges of SPAD_RAW, sorted by time from the first STOP edge and thinned by the dead time.
+    pub pulses: &'p [SpadEvent],
+}
+
+impl<'p> PulsedPixel<'p> {
+    /// The first macropixels of an array, in its order.
+    pub fn array(starts: &[u16], pulses: &[&'p [SpadEvent]]) -> Vec<Self> {
+        debug_assert_eq!(starts.len(), pulses.len());
+        let pixels = (0..).zip(starts).zip(pulses);
+        pixels
+            .map(|((number, &start), &pulses)| PulsedPixel {
+                number,
+                start,
+                pulses,
+            })
+            .collect()
+    }
+}
+
 /// Engines that run recorded pulses: pulses in, histograms out.
 pub trait Replay: Engine {
-    /// Counts of every bin, bin 0 earliest, for a start value and the rising edges of SPAD_RAW, sorted by
-    /// time from the first STOP edge and thinned by the dead time.
+    /// Counts of every macropixel and bin, bin 0 earliest. An engine that gains by it runs [`Engine::batch`] of them
+    /// together; the results are the same.
     ///
     /// # Errors
-    /// When this engine cannot tell what the circuit does.
-    fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError>;
+    /// When this engine cannot tell what the circuit does, of the first macropixel concerned.
+    fn replay(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError>;
 
-    /// Histograms of several macropixels, each with its start value and pulses. An engine that gains by
-    /// it runs [`Engine::batch`] of them together; the results are the same.
+    /// The pulses of macropixel `number` where [`Engine::law`] must see them to take them at the CLK edges at which that
+    /// macropixel does: elsewhere only if its delays are not the library's.
+    fn as_the_law_sees<'p>(&self, number: u32, pulses: &'p [SpadEvent]) -> Cow<'p, [SpadEvent]> {
+        let _ = number;
+        Cow::Borrowed(pulses)
+    }
+
+    /// Counts of every bin of the array's first macropixel. See [`PulsedPixel`] for start value and pulses.
     ///
     /// # Errors
-    /// As [`Replay::histogram`], of the first macropixel concerned.
+    /// As [`Replay::replay`].
+    fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
+        let counts = self.replay(&PulsedPixel::array(&[start], &[pulses]))?;
+        Ok(counts.into_counts())
+    }
+
+    /// Histograms of the array's first macropixels, each with its start value and pulses.
+    ///
+    /// # Errors
+    /// As [`Replay::replay`].
     fn histograms(
         &self,
         starts: &[u16],
         pulses: &[&[SpadEvent]],
     ) -> Result<Histograms, EngineError> {
-        let mut histograms = Histograms::new(self.bins());
-        for (&start, pulses) in starts.iter().zip(pulses) {
-            histograms.push(&self.histogram(start, pulses)?);
-        }
-        Ok(histograms)
+        self.replay(&PulsedPixel::array(starts, pulses))
     }
 }
 
@@ -93,86 +132,4 @@ pub trait Expose: Engine {
     /// # Errors
     /// When this engine cannot tell what the circuit does in this light.
     fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError>;
-}
-
-/// Whether the front end, with these limits, follows the pulses of this sensor's SPADs.
-fn follows(config: &SensorConfig, limits: &PulseLimits) -> Result<(), EngineError> {
-    let complaint = limits.complaint(config.dead_time_ns);
-    complaint.map_or(Ok(()), |complaint| Err(EngineError::FrontEnd(complaint)))
-}
-
-/// Why an engine has no answer.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum EngineError {
-    /// The window law finds two signals too close to call.
-    #[error("{0}, so only the gate engine can tell what is counted; use --engine gate, or {cure}", cure = .0.cure)]
-    Race(Race),
-    /// The window law has no single window for this start value.
-    #[error("{0}, so the window engine cannot tell what is counted; use --engine cycle or gate")]
-    Irregular(&'static str),
-    /// Pulses are shorter, or follow each other faster, than the front end's flip-flops.
-    #[error("{0}")]
-    FrontEnd(String),
-    /// The cohort engine works without photons.
-    #[error(
-        "the cohort engine knows no single photons and cannot replay recorded ones; use --engine window"
-    )]
-    NoPhotons,
-    /// The cohort engine's model of light and SPADs leaves this out.
-    #[error("the cohort engine cannot follow {0}; use --engine window")]
-    NotInCohorts(&'static str),
-    /// Laser cycles depend on each other: a bound on the probability, over a macropixel's exposure.
-    #[error(
-        "SPADs may stay busy from one laser cycle's window to the next (probability up to {bound:.1e}), which the cohort engine cannot follow; use --engine window, a longer laser cycle or less light"
-    )]
-    CyclesNotIndependent {
-        /// The bound.
-        bound: f64,
-    },
-    /// The finest cells of the cohort engine do not keep its error.
-    #[error(
-        "the cohort engine, with {cells} cells to a CLK period, may put the mean of bin {bin} off by {off:.2e} counts where its counting noise is {noise:.2e}; use --engine window, or --sub-bins with less exactness"
-    )]
-    CoarseCohorts {
-        /// First bin concerned.
-        bin: usize,
-        /// What its mean may be off, counts.
-        off: f64,
-        /// Standard deviation of its count.
-        noise: f64,
-        /// Cells of a CLK period at least.
-        cells: u32,
-    },
-    /// Background light blinds SPADs more than half of the time, and there are too many such photons to follow.
-    #[error(
-        "background light of {:.1} Mcounts/s a SPAD keeps it blind for {:.0} % of the time, and the exposure has {photons:.1e} such photons, of which {most_photons:.0e} are simulated; give less than {:.1} Mcounts/s (less light, a smaller or darker lens, a narrower filter, a shorter dead time), or fewer macropixels or laser cycles",
-        background_hz / 1e6,
-        100.0 * background_hz / (background_hz + most_hz),
-        most_hz / 1e6,
-    )]
-    Blinding {
-        /// Background photons and dark counts of a SPAD, 1/s, where there are most.
-        background_hz: f64,
-        /// From that rate on a SPAD is blind more than half of the time, 1/s.
-        most_hz: f64,
-        /// Photons of all macropixels in such light in the exposure.
-        photons: f64,
-        /// As many are simulated.
-        most_photons: f64,
-    },
-    /// A histogram bin of the netlist holds X.
-    #[error("bin {bin} of {macropixel} is unknown (X) at the end of the exposure")]
-    Unknown {
-        /// Name of the macropixel, or its lane.
-        macropixel: String,
-        /// First unknown bin.
-        bin: usize,
-    },
-}
-
-impl EngineError {
-    /// Whether the user asked for what this engine cannot do, and another can.
-    pub fn is_refusal(&self) -> bool {
-        !matches!(self, EngineError::Unknown { .. })
-    }
 }

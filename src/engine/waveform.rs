@@ -158,7 +158,7 @@ impl View {
 /// # Errors
 /// When a file cannot be written.
 pub fn record<O: Observer>(
-    simulation: &mut GateSimulation<'_>,
+    simulation: &mut GateSimulation,
     waves: &Path,
     format: WaveFormat,
     view: &View,

@@ -66,7 +66,7 @@ fn flaw(bytes: &[u8], are_first: bool) -> Option<&'static str> {
 ///
 /// # Errors
 /// When it cannot be read, is no UTF-8 text, or is a pipe or device with more than a mebibyte.
-pub fn read_text(path: &Path) -> Result<String, InputError> {
+pub(crate) fn read_text(path: &Path) -> Result<String, InputError> {
     let (mut file, has_end) = open(path)?;
     let mut bytes = Vec::new();
     let mut checked = 0;
@@ -200,7 +200,7 @@ impl<R: BufRead> Lines<R> {
 ///
 /// # Errors
 /// Syntax errors, unknown keys and wrong types, with their line.
-pub fn parse_toml<T: DeserializeOwned>(
+pub(crate) fn parse_toml<T: DeserializeOwned>(
     source: impl fmt::Display,
     text: &str,
 ) -> Result<T, InputError> {
@@ -217,7 +217,7 @@ pub fn parse_toml<T: DeserializeOwned>(
 ///
 /// # Errors
 /// Syntax errors, unknown keys and wrong types, with their line.
-pub fn parse_json<T: DeserializeOwned>(
+pub(crate) fn parse_json<T: DeserializeOwned>(
     source: impl fmt::Display,
     text: &str,
     wanted: &str,
@@ -227,7 +227,7 @@ pub fn parse_json<T: DeserializeOwned>(
 }
 
 /// The one-based line of byte `offset` in `text`.
-pub fn line_of(text: &str, offset: usize) -> usize {
+pub(crate) fn line_of(text: &str, offset: usize) -> usize {
     let end = offset.min(text.len());
     1 + text.as_bytes()[..end]
         .iter()

@@ -12,7 +12,7 @@ use std::io;
 /// # Errors
 /// When the signals cannot be watched.
 #[cfg(unix)]
-pub fn clean_up_when_interrupted() -> io::Result<()> {
+pub(crate) fn clean_up_when_interrupted() -> io::Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
     let mut wanted = vec![SIGINT, SIGTERM];
@@ -35,7 +35,7 @@ pub fn clean_up_when_interrupted() -> io::Result<()> {
 /// # Errors
 /// None.
 #[cfg(not(unix))]
-pub fn clean_up_when_interrupted() -> io::Result<()> {
+pub(crate) fn clean_up_when_interrupted() -> io::Result<()> {
     Ok(())
 }
 

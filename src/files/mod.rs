@@ -17,7 +17,8 @@ mod result_set;
 mod temporary;
 
 pub use complaint::InputError;
-pub use input::{Lines, line_of, parse_json, parse_toml, read_text};
-pub use interruption::clean_up_when_interrupted;
+pub use input::Lines;
+pub(crate) use input::{line_of, parse_json, parse_toml, read_text};
+pub(crate) use interruption::clean_up_when_interrupted;
 pub use output::{OutputFile, create_folder};
 pub use result_set::{MANIFEST, ManifestFile, ResultSet};

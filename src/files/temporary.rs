@@ -51,7 +51,7 @@ pub(super) struct Temporary {
 
 impl Temporary {
     /// An empty file in `folder`, open for writing.
-    pub fn file_in(folder: &Path) -> io::Result<(Self, File)> {
+    pub(super) fn file_in(folder: &Path) -> io::Result<(Self, File)> {
         let temporary = Self::make(folder, |path| {
             let mut options = File::options();
             options.read(true).write(true).create_new(true);
@@ -62,7 +62,7 @@ impl Temporary {
     }
 
     /// An empty folder in `folder`.
-    pub fn folder_in(folder: &Path) -> io::Result<Self> {
+    pub(super) fn folder_in(folder: &Path) -> io::Result<Self> {
         Self::make(folder, |path| {
             fs::create_dir(path)?;
             File::open(path)
@@ -90,12 +90,12 @@ impl Temporary {
     }
 
     /// Where it stands.
-    pub fn path(&self) -> &Path {
+    pub(super) fn path(&self) -> &Path {
         &self.path
     }
 
     /// Gives a file its final name, whatever had that name before.
-    pub fn rename(self, target: &Path) -> io::Result<()> {
+    pub(super) fn rename(self, target: &Path) -> io::Result<()> {
         let mut registry = Registry::lock();
         fs::rename(&self.path, target)?;
         registry.live.remove(&self.path);
@@ -163,21 +163,21 @@ pub(super) mod lock {
 
     /// Locks `file`, once nobody else does. Without effect where there are no locks.
     #[cfg(unix)]
-    pub fn wait_for(file: &File) {
+    pub(crate) fn wait_for(file: &File) {
         use rustix::fs::{FlockOperation, flock};
         while let Err(rustix::io::Errno::INTR) = flock(file, FlockOperation::LockExclusive) {}
     }
 
     /// Locks `file` if nobody else does, and says whether it did.
     #[cfg(unix)]
-    pub fn is_free(file: &File) -> bool {
+    pub(crate) fn is_free(file: &File) -> bool {
         use rustix::fs::{FlockOperation, flock};
         flock(file, FlockOperation::NonBlockingLockExclusive).is_ok()
     }
 
     /// Is `file` what stands at `path`?
     #[cfg(unix)]
-    pub fn is_same(path: &Path, file: &File) -> bool {
+    pub(crate) fn is_same(path: &Path, file: &File) -> bool {
         use std::os::unix::fs::MetadataExt;
         let place = |m: std::fs::Metadata| (m.dev(), m.ino());
         let at_path = std::fs::symlink_metadata(path).map(place).ok();

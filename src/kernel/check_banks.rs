@@ -108,7 +108,7 @@ pub(super) struct CheckedPins {
 }
 
 impl CheckedPins {
-    pub fn new(flip_flops: &[FlipFlop], banks: &[Bank], net_count: usize) -> Self {
+    pub(super) fn new(flip_flops: &[FlipFlop], banks: &[Bank], net_count: usize) -> Self {
         let pins = || {
             let data = flip_flops.iter().enumerate();
             let data = data.map(|(index, f)| (index as u32, DATA as u8, f.nets[DATA]));
@@ -137,24 +137,24 @@ impl CheckedPins {
 
     /// Whether any pin on `net` is checked.
     #[inline]
-    pub fn has_any(&self, net: usize) -> bool {
+    pub(super) fn has_any(&self, net: usize) -> bool {
         self.start[net] != self.start[net + 1]
     }
 
     /// Positions in the list of all, for [`CheckedPins::at`].
     #[inline]
-    pub fn of(&self, net: usize) -> std::ops::Range<usize> {
+    pub(super) fn of(&self, net: usize) -> std::ops::Range<usize> {
         self.start[net] as usize..self.start[net + 1] as usize
     }
 
     /// Flip-flop (for D) or bank (for other pins), and pin.
     #[inline]
-    pub fn at(&self, position: usize) -> (u32, usize) {
+    pub(super) fn at(&self, position: usize) -> (u32, usize) {
         let (index, pin) = self.loads[position];
         (index, pin as usize)
     }
 
-    pub fn memory_bytes(&self) -> usize {
+    pub(super) fn memory_bytes(&self) -> usize {
         size_of_val(&self.start[..]) + size_of_val(&self.loads[..])
     }
 }

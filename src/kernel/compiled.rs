@@ -18,12 +18,12 @@ impl Load {
     }
 
     #[inline]
-    pub fn cell(self) -> usize {
+    pub(super) fn cell(self) -> usize {
         (self.0 >> Self::CELL_SHIFT) as usize
     }
 
     #[inline]
-    pub fn pin(self) -> usize {
+    pub(super) fn pin(self) -> usize {
         (self.0 & 3) as usize
     }
 }
@@ -57,7 +57,7 @@ pub(super) struct Tables {
 }
 
 impl Tables {
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         let unpack = |packed: usize| [0, 2, 4, 6].map(|s| Logic::from_bits((packed >> s) as u8));
         let mut tables = Tables {
             gates: [[0; 256]; CellKind::ALL.len()],
@@ -79,13 +79,13 @@ impl Tables {
     }
 
     #[inline]
-    pub fn gate(&self, kind: CellKind, inputs: u8) -> u8 {
+    pub(super) fn gate(&self, kind: CellKind, inputs: u8) -> u8 {
         self.gates[kind as usize][inputs as usize]
     }
 
     /// `inputs` with D and clock among them, and the clock before.
     #[inline]
-    pub fn flip_flop(&self, inputs: u8, clock_before: u8, state: u8) -> u8 {
+    pub(super) fn flip_flop(&self, inputs: u8, clock_before: u8, state: u8) -> u8 {
         let before_and_state = (clock_before | state << 2) as usize;
         self.flip_flop[inputs as usize | before_and_state << 8]
     }
@@ -97,7 +97,7 @@ pub(super) struct DelaySet([[u32; 4]; MAX_INPUTS]);
 
 impl DelaySet {
     /// The sets of `timing`, in its order.
-    pub fn all(timing: &Timing) -> Vec<Self> {
+    pub(super) fn all(timing: &Timing) -> Vec<Self> {
         let by_value = |arc: &ArcDelay| Logic::ALL.map(|to| arc.to(to));
         let sets = timing.sets().iter();
         sets.map(|set| DelaySet(set.each_ref().map(by_value)))
@@ -105,14 +105,14 @@ impl DelaySet {
     }
 
     /// Delays by new value from one pin.
-    pub fn after_pin(&self, pin: usize) -> &[u32; 4] {
+    pub(super) fn after_pin(&self, pin: usize) -> &[u32; 4] {
         &self.0[pin]
     }
 
     /// Delays by new value for the pins in which `inputs` and `evaluated` differ: the shortest of the arcs
     /// concerned. A flip-flop's D is no cause; `inputs` and `evaluated` must agree on it.
     #[inline]
-    pub fn after(&self, inputs: u8, evaluated: u8) -> [u32; 4] {
+    pub(super) fn after(&self, inputs: u8, evaluated: u8) -> [u32; 4] {
         let differing = inputs ^ evaluated;
         let mut pairs = (differing | differing >> 1) & 0b0101_0101;
         debug_assert!(pairs != 0, "evaluated without a cause");
@@ -139,7 +139,7 @@ pub(super) struct FanOut {
 }
 
 impl FanOut {
-    pub fn new(netlist: &Netlist) -> Self {
+    pub(super) fn new(netlist: &Netlist) -> Self {
         let is_clock = |cell: &FlatCell, pin| cell.kind.is_flip_flop() && pin == CLOCK;
         FanOut {
             active: Loads::new(netlist, |cell, pin| {
@@ -192,7 +192,7 @@ impl Loads {
     }
 
     #[inline]
-    pub fn of(&self, net: usize) -> &[Load] {
+    pub(super) fn of(&self, net: usize) -> &[Load] {
         &self.loads[self.start[net] as usize..self.start[net + 1] as usize]
     }
 }

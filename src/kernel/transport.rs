@@ -26,7 +26,7 @@ pub(super) struct TransportQueues {
 
 impl TransportQueues {
     /// One queue for each net that a cell of this kind drives.
-    pub fn new(netlist: &Netlist, timing: &Timing) -> Self {
+    pub(super) fn new(netlist: &Netlist, timing: &Timing) -> Self {
         let mut queues = TransportQueues::default();
         for net in transport_nets(netlist, timing) {
             queues.of_net.resize(netlist.net_count(), NONE);
@@ -37,14 +37,14 @@ impl TransportQueues {
     }
 
     /// Nets with a queue.
-    pub fn nets(&self) -> impl Iterator<Item = usize> {
+    pub(super) fn nets(&self) -> impl Iterator<Item = usize> {
         let of_net = self.of_net.iter().enumerate();
         of_net.filter(|(_, q)| **q != NONE).map(|(net, _)| net)
     }
 
     /// Sends `net`, which now is `present`, to `value` at the time that `due_fs` has for it. Whether a change is
     /// to arrive then: none does where the value is on its way already.
-    pub fn send(&mut self, net: usize, present: u8, value: u8, due_fs: i64) -> bool {
+    pub(super) fn send(&mut self, net: usize, present: u8, value: u8, due_fs: i64) -> bool {
         let queue = &mut self.queues[self.of_net[net] as usize];
         let last = |queue: &VecDeque<(i64, u8)>| queue.back().map_or(present, |&(_, v)| v);
         if last(queue) == value {
@@ -61,7 +61,7 @@ impl TransportQueues {
     }
 
     /// The value that arrives on `net` now, if any does.
-    pub fn arriving(&mut self, net: usize, now_fs: i64) -> Option<u8> {
+    pub(super) fn arriving(&mut self, net: usize, now_fs: i64) -> Option<u8> {
         let queue = &mut self.queues[self.of_net[net] as usize];
         let &(time_fs, value) = queue.front()?;
         (time_fs == now_fs).then(|| {

@@ -57,7 +57,7 @@ pub(super) struct TimeWheel {
 }
 
 impl TimeWheel {
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         TimeWheel {
             first: Box::new([NONE; SLOTS]),
             nodes: Vec::new(),
@@ -72,7 +72,7 @@ impl TimeWheel {
     }
 
     #[inline]
-    pub fn push(&mut self, event: Event) {
+    pub(super) fn push(&mut self, event: Event) {
         let slot = event.time_fs >> SLOT_BITS;
         debug_assert!(slot >= self.open_slot, "an event before the present");
         if slot == self.open_slot {
@@ -105,7 +105,7 @@ impl TimeWheel {
 
     /// Time of the next event if it is not after `limit_fs`.
     #[inline]
-    pub fn next_time(&mut self, limit_fs: i64) -> Option<i64> {
+    pub(super) fn next_time(&mut self, limit_fs: i64) -> Option<i64> {
         loop {
             if let Some(event) = self.open.get(self.position) {
                 return (event.time_fs <= limit_fs).then_some(event.time_fs);
@@ -124,7 +124,7 @@ impl TimeWheel {
 
     /// The next event, if it is due at exactly `time_fs`.
     #[inline]
-    pub fn pop_at(&mut self, time_fs: i64) -> Option<Event> {
+    pub(super) fn pop_at(&mut self, time_fs: i64) -> Option<Event> {
         let event = *self.open.get(self.position)?;
         (event.time_fs == time_fs).then(|| {
             self.position += 1;
@@ -134,7 +134,7 @@ impl TimeWheel {
 
     /// Moves the present to `time_fs`; no event may be due before it.
     #[inline]
-    pub fn advance(&mut self, time_fs: i64) {
+    pub(super) fn advance(&mut self, time_fs: i64) {
         let slot = time_fs >> SLOT_BITS;
         if slot != self.open_slot {
             debug_assert!(self.position == self.open.len() && slot > self.open_slot);

@@ -121,7 +121,7 @@ impl CellKind {
     /// Output of a gate for its inputs (unused inputs are ignored).
     ///
     /// # Panics
-    /// For flip-flops, whose output is not a function of their inputs: see [`next_state`].
+    /// For flip-flops, whose output is not a function of their inputs: see `next_state`.
     pub const fn output(self, inputs: [Logic; MAX_INPUTS]) -> Logic {
         let [a, b, s, _] = inputs;
         match self {
@@ -143,7 +143,7 @@ impl CellKind {
 ///
 /// A clock edge from or to an unknown level may or may not have been a rising edge, and an unknown
 /// reset may or may not be active: the new state is known only if every possibility leads to it.
-pub const fn next_state(
+pub(crate) const fn next_state(
     state: Logic,
     data: Logic,
     clock_before: Logic,

@@ -14,8 +14,8 @@
 //! scale as the delays do.
 
 use super::cell::CellKind;
-use super::library::{Corner, Delay};
-use super::static_timing::Edge;
+use super::corner::Edge;
+use super::corner::{Corner, Delay};
 
 /// A limit on D, by the direction in which it changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

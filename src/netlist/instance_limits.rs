@@ -1,8 +1,8 @@
 //! The limits of one flip-flop in one corner: those of the library, or its own from a delay file.
 
 use super::check_limits::{CheckKind, CheckLimits};
-use super::library::Corner;
-use super::static_timing::Edge;
+use super::corner::Corner;
+use super::corner::Edge;
 
 /// Which of a flip-flop's controls a check is about. D and CK have no such choice and are under `Reset`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

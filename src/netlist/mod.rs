@@ -12,6 +12,7 @@
 mod builder;
 mod cell;
 mod check_limits;
+mod corner;
 mod flat;
 mod instance_limits;
 mod library;
@@ -24,17 +25,20 @@ mod variation;
 mod verilog;
 
 pub use builder::{ModuleBuilder, NetlistError};
-pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS, next_state};
+pub(crate) use cell::next_state;
+pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
 pub use check_limits::{CheckKind, CheckLimits, DataLimit};
+pub use corner::{Corner, Delay, Edge};
 pub use flat::{FlatCell, NetId, Netlist, Scope};
 pub use instance_limits::{Control, InstanceLimits};
-pub use library::{CellArcs, Corner, Delay, Library, TimingArc};
+pub use library::{CellArcs, Library, TimingArc};
 pub use module::{Cell, Direction, Instance, Module, Net, Port, Signal};
 pub use requirements::{Requirement, Requirements};
 pub(crate) use static_timing::caused;
-pub use static_timing::{Arrivals, Bound, Edge, Path, StaticTiming, Step, TimingLoop};
+pub use static_timing::{Arrivals, Bound, Path, StaticTiming, Step, TimingLoop};
 pub use timing::{ArcDelay, CellDelays, DelayModel, Timing};
-pub use variation::{Conditions, Mismatch, derated_limits, varied, varied_as};
+pub use variation::{Conditions, Mismatch, varied};
+pub(crate) use variation::{derated_limits, varied_as};
 pub use verilog::{
     write_cells, write_delays, write_modules, write_parametric_cells, write_standard_cells,
 };

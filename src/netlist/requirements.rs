@@ -16,9 +16,11 @@
 
 use super::cell::CellKind;
 use super::check_limits::CheckKind;
+use super::corner::Corner;
+use super::corner::Edge;
 use super::flat::{NetId, Netlist};
-use super::library::{Corner, Library};
-use super::static_timing::{Arrivals, Bound, Edge, Path, StaticTiming, TimingLoop};
+use super::library::Library;
+use super::static_timing::{Arrivals, Bound, Path, StaticTiming, TimingLoop};
 use crate::units::Time;
 
 /// One limit of one flip-flop, as a condition on the clock's period.

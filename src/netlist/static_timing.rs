@@ -19,51 +19,10 @@
 //! arrive at but do not leave. Time in whole femtoseconds; work is linear in the arcs reached.
 
 use super::cell::CellKind;
+use super::corner::Edge;
 use super::flat::{FlatCell, NetId, Netlist};
 use super::timing::Timing;
-use crate::logic::Logic;
 use crate::units::Time;
-
-/// Direction of a change.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum Edge {
-    /// To 1.
-    Rise,
-    /// To 0.
-    Fall,
-}
-
-impl Edge {
-    /// Either direction.
-    pub const BOTH: [Edge; 2] = [Edge::Rise, Edge::Fall];
-
-    /// The direction of a change to `value`, if it is to a known level.
-    pub fn to(value: Logic) -> Option<Self> {
-        match value {
-            Logic::One => Some(Edge::Rise),
-            Logic::Zero => Some(Edge::Fall),
-            Logic::X | Logic::Z => None,
-        }
-    }
-
-    /// The level after the edge.
-    pub const fn level(self) -> Logic {
-        match self {
-            Edge::Rise => Logic::One,
-            Edge::Fall => Logic::Zero,
-        }
-    }
-
-    pub(super) const fn opposite(self) -> Self {
-        match self {
-            Edge::Rise => Edge::Fall,
-            Edge::Fall => Edge::Rise,
-        }
-    }
-}
 
 /// Which of the two bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -396,6 +355,7 @@ impl Path {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::logic::Logic;
     use crate::netlist::{Corner, Library, ModuleBuilder, Net};
 
     #[test]

@@ -6,9 +6,10 @@
 use std::collections::BTreeMap;
 
 use super::cell::{CellKind, MAX_INPUTS};
+use super::corner::Corner;
 use super::flat::Netlist;
 use super::instance_limits::InstanceLimits;
-use super::library::{Corner, Library};
+use super::library::Library;
 use crate::logic::Logic;
 
 /// What becomes of a pulse that is shorter than the delay it meets.

@@ -20,8 +20,9 @@
 use rand_philox::{Philox, splitmix64, u32_to_unit_f64};
 
 use super::cell::CellKind;
+use super::corner::Corner;
 use super::flat::Netlist;
-use super::library::{Corner, Library};
+use super::library::Library;
 use super::timing::Timing;
 
 /// Where the chip is operated, and what it is made of.
@@ -116,7 +117,7 @@ fn hash(path: &str) -> u64 {
 }
 
 /// The limits of `library` times `factor`, as conditions scale them; delays are left alone.
-pub fn derated_limits(library: &Library, factor: f64) -> Library {
+pub(crate) fn derated_limits(library: &Library, factor: f64) -> Library {
     let mut derated = library.clone();
     for kind in CellKind::ALL {
         derated.set_checks(kind, library.checks(kind).scaled(factor));
@@ -138,7 +139,7 @@ pub fn varied(
 }
 
 /// The same where each cell is the one at `path` of its index: a netlist may stand for another that differs in names.
-pub fn varied_as(
+pub(crate) fn varied_as(
     netlist: &Netlist,
     nominal: &Timing,
     factor: f64,

@@ -32,7 +32,7 @@ pub fn count(whole: f64) -> u64 {
 
 /// The largest whole number up to x, which is below 2⁵¹ in magnitude.
 #[inline(always)]
-pub fn floor(x: f64) -> f64 {
+pub(crate) fn floor(x: f64) -> f64 {
     let nearest = (x + ROUNDER) - ROUNDER;
     if nearest > x { nearest - 1.0 } else { nearest }
 }
@@ -95,7 +95,7 @@ pub fn ln(x: f64) -> f64 {
 
 /// P(Z > z) of the standard normal distribution for 0 ≤ z ≤ 37.5; 0 beyond. Relative error below 10⁻¹³ (that of z²/2).
 #[inline(always)]
-pub fn normal_above(z: f64) -> f64 {
+pub(crate) fn normal_above(z: f64) -> f64 {
     /// [`BEND`] / ([`BEND`] + z) where the fit ends, at z = 38.
     const LEAST: f64 = BEND / (BEND + 38.0);
     const BEND: f64 = 5.0;

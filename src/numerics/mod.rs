@@ -7,8 +7,8 @@ pub mod probit;
 mod quadrature;
 mod special;
 
-pub use quadrature::{gauss_legendre, integrate};
-pub use special::{
+pub(crate) use quadrature::{gauss_legendre, integrate};
+pub(crate) use special::{
     erfcx, ln_exprel_neg, ln_normal_below, ln_sum_exp, normal_above, normal_density,
     poisson_deviance, stirling_error, stirling_series,
 };

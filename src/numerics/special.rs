@@ -3,12 +3,12 @@
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 /// Density of the standard normal distribution.
-pub fn normal_density(z: f64) -> f64 {
+pub(crate) fn normal_density(z: f64) -> f64 {
     (-0.5 * z * z).exp() / (2.0 * PI).sqrt()
 }
 
 /// P(Z > z) of the standard normal distribution, with relative accuracy in the upper tail.
-pub fn normal_above(z: f64) -> f64 {
+pub(crate) fn normal_above(z: f64) -> f64 {
     if z < 1.0 {
         return 0.5 * libm::erfc(z * FRAC_1_SQRT_2);
     }
@@ -22,7 +22,7 @@ pub fn normal_above(z: f64) -> f64 {
 }
 
 /// ln P(Z < z), with relative accuracy where the probability is near 1 and where it is near 0.
-pub fn ln_normal_below(z: f64) -> f64 {
+pub(crate) fn ln_normal_below(z: f64) -> f64 {
     match z {
         z if z > -1.0 => (-normal_above(z)).ln_1p(),
         z => -0.5 * z * z + (0.5 * erfcx(-z * FRAC_1_SQRT_2)).ln(),
@@ -30,7 +30,7 @@ pub fn ln_normal_below(z: f64) -> f64 {
 }
 
 /// exp(x²)·erfc(x) for x ≥ 0, which never underflows.
-pub fn erfcx(x: f64) -> f64 {
+pub(crate) fn erfcx(x: f64) -> f64 {
     debug_assert!(x >= 0.0, "{x}");
     if x < 5.0 {
         // x² is rounded; what the rounding lost is put back to first order.
@@ -46,7 +46,7 @@ pub fn erfcx(x: f64) -> f64 {
 }
 
 /// ln((1 − e^(−t))/t) for t ≥ 0: about −t/2 near 0, −ln t far away, 0 at 0.
-pub fn ln_exprel_neg(t: f64) -> f64 {
+pub(crate) fn ln_exprel_neg(t: f64) -> f64 {
     debug_assert!(t >= 0.0, "{t}");
     if t > 1.0 {
         return (-(-t).exp()).ln_1p() - t.ln();
@@ -71,7 +71,7 @@ pub fn ln_exprel_neg(t: f64) -> f64 {
 }
 
 /// ln(eᵃ + eᵇ); either may be −∞.
-pub fn ln_sum_exp(a: f64, b: f64) -> f64 {
+pub(crate) fn ln_sum_exp(a: f64, b: f64) -> f64 {
     let (small, large) = if a < b { (a, b) } else { (b, a) };
     if small == f64::NEG_INFINITY {
         return large;
@@ -80,7 +80,7 @@ pub fn ln_sum_exp(a: f64, b: f64) -> f64 {
 }
 
 /// ln n! − (n ln n − n + ½ ln 2πn), the error of Stirling's formula, for n ≥ 1.
-pub fn stirling_error(n: u64) -> f64 {
+pub(crate) fn stirling_error(n: u64) -> f64 {
     if n < 16 {
         let factorial: f64 = (2..=n).map(|k| k as f64).product();
         let n = n as f64;
@@ -91,7 +91,7 @@ pub fn stirling_error(n: u64) -> f64 {
 
 /// As [`stirling_error`], for n ≥ 11, without a branch.
 #[inline(always)]
-pub fn stirling_series(n: f64) -> f64 {
+pub(crate) fn stirling_series(n: f64) -> f64 {
     const COEFFICIENTS: [f64; 6] = [
         1.0 / 12.0,
         -1.0 / 360.0,
@@ -110,7 +110,7 @@ pub fn stirling_series(n: f64) -> f64 {
 ///
 /// Loader's trick (C. Loader, Fast and accurate computation of binomial probabilities, 2000):
 /// with v = (x − µ)/(x + µ) the logarithm is 2 artanh v, and the leading terms cancel by algebra.
-pub fn poisson_deviance(x: f64, mean: f64) -> f64 {
+pub(crate) fn poisson_deviance(x: f64, mean: f64) -> f64 {
     let difference = x - mean;
     if difference.abs() >= 0.1 * (x + mean) {
         return if x == 0.0 {

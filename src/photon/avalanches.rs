@@ -16,8 +16,9 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::spad::{DeadTimeLaw, Photon, SPADS, SpadEvent, SpadModel};
+use super::spad::{DeadTimeLaw, Photon, SpadEvent, SpadModel};
 use super::stream::OrderedEchoes;
+use crate::chip::MOST_SPADS;
 use crate::units::Time;
 
 /// What is asked for depends on the time before the photons are known.
@@ -41,9 +42,9 @@ pub struct Avalanches<'a> {
     key: [u32; 2],
     pixel: u32,
     /// Until when each SPAD is blind, at the latest.
-    blind_until: [Time; SPADS],
+    blind_until: [Time; MOST_SPADS],
     /// SPADs that may be ready before that.
-    unknown: u16,
+    unknown: u64,
     /// Afterpulses and crosstalk to come, and whether they come for certain.
     pending: BinaryHeap<Reverse<(SpadEvent, bool)>>,
     lost: u64,
@@ -57,7 +58,7 @@ impl<'a> Avalanches<'a> {
             model,
             key,
             pixel,
-            blind_until: [Time::from_fs(i64::MIN / 2); SPADS],
+            blind_until: [Time::from_fs(i64::MIN / 2); MOST_SPADS],
             unknown: 0,
             pending: BinaryHeap::new(),
             lost: 0,
@@ -74,8 +75,8 @@ impl<'a> Avalanches<'a> {
         breeding: impl Iterator<Item = Photon>,
     ) -> Self {
         let mut avalanches = Self::in_the_dark(model, key, pixel);
-        avalanches.blind_until = [time - Time::from_fs(1) + model.dead_time; SPADS];
-        avalanches.unknown = u16::MAX;
+        avalanches.blind_until = [time - Time::from_fs(1) + model.dead_time; MOST_SPADS];
+        avalanches.unknown = u64::MAX;
         for photon in breeding {
             avalanches.breed(photon, false);
         }

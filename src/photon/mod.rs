@@ -5,6 +5,7 @@ mod avalanches;
 mod budget;
 mod echo;
 mod gaussian;
+mod light;
 mod optics;
 pub(crate) mod philox;
 mod pulse;
@@ -18,17 +19,17 @@ pub use avalanches::{Avalanches, Unknown};
 pub use budget::{Convention, PhotonBudget, Spot};
 pub use echo::{ECHO_REACH, EchoLaw};
 pub use gaussian::{pulse_share, pulse_shares};
+pub use light::{Echo, LightError, PixelLight, Profile, Segment, SpadSpread};
 pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
 pub use philox::LANES;
 pub use pulse::{PulseError, PulseShape};
 pub use quantile::{NormalSampler, RANKS};
 pub use random::{Poisson, Purpose, normal, philox_key, random_stream};
 pub use spad::{
-    AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, Photon, SPADS, SpadEvent, SpadModel,
-    apply_dead_time,
+    AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, Photon, SpadEvent, SpadModel, apply_dead_time,
 };
 pub use stream::{
-    Background, Draw, GROUP, Group, NEVER_FS, OrderedEchoes, PER_BLOCK, PLACE_BITS, PhotonStream,
-    PixelLight, PixelPhotons, PixelStream, Place, Run, Slots, Span, StreamConfig, TILE, TIME_BITS,
-    signal_rank, spad_of,
+    Background, Draw, GROUP, Group, LightParts, NEVER_FS, OrderedEchoes, PER_BLOCK, PLACE_BITS,
+    PhotonStream, PixelPhotons, PixelStream, Place, Run, Slots, Span, StreamConfig, TILE,
+    TIME_BITS, signal_rank, spad_of,
 };

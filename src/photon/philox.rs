@@ -16,7 +16,7 @@ const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 /// Random blocks in runs: a run is a row of blocks with successive first counter words from 0 on and one second
 /// counter word.
 #[derive(Debug, Clone, Default)]
-pub struct Blocks {
+pub(crate) struct Blocks {
     blocks: usize,
     /// Longer than needed, so that runs are written [`LANES`] at a time.
     first: Vec<u32>,
@@ -26,13 +26,13 @@ pub struct Blocks {
 
 impl Blocks {
     /// Forgets all runs.
-    pub fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.blocks = 0;
     }
 
     /// Asks for a run of `blocks` blocks with this second counter word.
     #[inline]
-    pub fn push_run(&mut self, second: u32, blocks: u32) {
+    pub(crate) fn push_run(&mut self, second: u32, blocks: u32) {
         let start = self.blocks;
         self.blocks += blocks as usize;
         let room = self.blocks + LANES;
@@ -56,7 +56,7 @@ impl Blocks {
     }
 
     /// Blocks asked for.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.blocks
     }
 
@@ -65,7 +65,7 @@ impl Blocks {
     }
 
     /// Generates all blocks with this key, third and fourth counter word.
-    pub fn generate(&mut self, key: [u32; 2], third: u32, fourth: u32) {
+    pub(crate) fn generate(&mut self, key: [u32; 2], third: u32, fourth: u32) {
         let filled_up = self.filled_up();
         let room = self.first.len();
         for words in &mut self.words {
@@ -83,20 +83,25 @@ impl Blocks {
 
     /// The four words of every block, a row for each; and of others that fill the rows up to a multiple of [`LANES`].
     #[inline]
-    pub fn rows(&self) -> [&[u32]; 4] {
+    pub(crate) fn rows(&self) -> [&[u32]; 4] {
         let filled_up = self.filled_up();
         self.words.each_ref().map(|words| &words[..filled_up])
     }
 
     /// The second counter word of every block, filled up alike.
     #[inline]
-    pub fn seconds(&self) -> &[u32] {
+    pub(crate) fn seconds(&self) -> &[u32] {
         &self.second[..self.filled_up()]
     }
 }
 
 /// Writes the words, by rows, of twice [`LANES`] blocks with first counter words from `first` on and these other ones.
-pub fn blocks_from(first: u32, others: [u32; 3], key: [u32; 2], words: &mut [[u32; 2 * LANES]; 4]) {
+pub(crate) fn blocks_from(
+    first: u32,
+    others: [u32; 3],
+    key: [u32; 2],
+    words: &mut [[u32; 2 * LANES]; 4],
+) {
     let [second, third, fourth] = others;
     let firsts: [u32; 2 * LANES] = std::array::from_fn(|block| first.wrapping_add(block as u32));
     let [row0, row1, row2, row3] = words;

@@ -101,7 +101,7 @@ struct Column {
 
 /// Draws times from a density.
 #[derive(Debug, Clone)]
-pub struct PulseSampler {
+pub(super) struct PulseSampler {
     columns: Vec<Column>,
     first_fs: f64,
     cell_fs: f64,
@@ -109,7 +109,7 @@ pub struct PulseSampler {
 
 impl PulseSampler {
     /// A measured pulse.
-    pub fn measured(shape: &PulseShape) -> Self {
+    pub(super) fn measured(shape: &PulseShape) -> Self {
         let cells = shape.samples.windows(2).map(mass_and_slope);
         Self::new(cells, 0.0, shape.step.as_fs() as f64)
     }
@@ -151,7 +151,7 @@ impl PulseSampler {
 
     /// A time in fs, from four random words.
     #[inline]
-    pub fn draw(&self, [tilt, other, place, choice]: [u32; 4]) -> f64 {
+    pub(super) fn draw(&self, [tilt, other, place, choice]: [u32; 4]) -> f64 {
         let product = u64::from(choice) * self.columns.len() as u64;
         let own = (product >> 32) as usize;
         let column = &self.columns[own];
@@ -172,7 +172,7 @@ impl PulseSampler {
     }
 
     /// Earliest and latest time, fs.
-    pub fn range_fs(&self) -> (f64, f64) {
+    pub(super) fn range_fs(&self) -> (f64, f64) {
         let width = self.cell_fs * self.columns.len() as f64;
         (self.first_fs, self.first_fs + width)
     }

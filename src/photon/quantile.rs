@@ -13,7 +13,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::sync::LazyLock;
 
 /// Random bits of a draw: one for the sign, the others for the probability of the tail beyond it.
-pub const NORMAL_BITS: u32 = 1 + TAIL_BITS;
+pub(super) const NORMAL_BITS: u32 = 1 + TAIL_BITS;
 const TAIL_BITS: u32 = 48;
 
 /// Bits of a rank. Few, so that many fit into a vector, with room for edges above all ranks.

@@ -37,6 +37,8 @@ pub enum Purpose {
     BrightBreedingPhotons = 11,
     /// Times of those signal photons that breed.
     BrightBreedingSignal = 12,
+    /// Which photons of a layer of light are kept.
+    Thinning = 13,
 }
 
 /// The stream of random words for (`seed`, `purpose`, `index`, `sub_index`).
@@ -53,6 +55,17 @@ pub fn random_stream(seed: u64, purpose: Purpose, index: u32, sub_index: u32) ->
 pub fn philox_key(seed: u64) -> [u32; 2] {
     let key = splitmix64(seed);
     [key as u32, (key >> 32) as u32]
+}
+
+/// The key of a layer of light: that of the seed for the first one, and others that no seed near it has.
+pub(super) fn layer_key(key: [u32; 2], layer: u32) -> [u32; 2] {
+    match layer {
+        0 => key,
+        _ => {
+            let seed = u64::from(key[0]) | u64::from(key[1]) << 32;
+            philox_key(seed.wrapping_add(u64::from(layer)))
+        }
+    }
 }
 
 /// One draw of the standard normal distribution (Box and Muller, the cosine half).

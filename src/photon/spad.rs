@@ -1,6 +1,6 @@
 //! What a SPAD does with photons: an edge, then blindness for the dead time; at times an afterpulse or crosstalk.
 //!
-//! A macropixel has 4×4 SPADs that share their photons evenly. Each drives one wire, SPAD_RAW<15:0>, which rises with
+//! The SPADs of a macropixel share its photons evenly. Each drives one wire of SPAD_RAW, which rises with
 //! an avalanche and stays high for the dead time. An avalanche exactly at the end of a pulse makes no edge, because the
 //! wire falls and rises in the same instant.
 //!
@@ -19,10 +19,8 @@
 
 use super::avalanches::Avalanches;
 use super::random::Purpose;
+use crate::chip::SpadGrid;
 use crate::units::Time;
-
-/// SPADs of one macropixel.
-pub const SPADS: usize = 16;
 
 /// Longest delay of an afterpulse after the dead time, in time constants; e⁻⁸ of the exponential lie beyond.
 pub const AFTERPULSE_REACH: i64 = 8;
@@ -38,7 +36,7 @@ pub const CROSSTALK_DELAY: Time = Time::from_ps(10);
 pub struct SpadEvent {
     /// When, counted from the first rising edge of STOP of the exposure.
     pub time: Time,
-    /// Which SPAD_RAW wire, below [`SPADS`].
+    /// Which SPAD_RAW wire.
     pub spad: u8,
 }
 
@@ -47,7 +45,7 @@ pub struct SpadEvent {
 pub struct Photon {
     /// When, counted from the first rising edge of STOP of the exposure.
     pub time: Time,
-    /// Which SPAD, below [`SPADS`].
+    /// Which SPAD.
     pub spad: u8,
     /// Whether its avalanche, if it makes one, has an afterpulse or crosstalk.
     pub breeds: bool,
@@ -77,6 +75,8 @@ pub enum DeadTimeLaw {
 /// How SPADs answer to photons.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpadModel {
+    /// The SPADs of a macropixel.
+    pub grid: SpadGrid,
     /// How long a SPAD stays blind after an avalanche.
     pub dead_time: Time,
     /// What an avalanche during that time does.
@@ -146,23 +146,12 @@ impl SpadModel {
                 spad: parent.spad,
             }
         });
-        let neighbour = has_crosstalk.then(|| neighbour(parent.spad, words[3] >> 30));
+        let neighbour = has_crosstalk.then(|| self.grid.neighbour(parent.spad, words[3] >> 30));
         let crosstalk = neighbour.flatten().map(|spad| SpadEvent {
             time: parent.time + CROSSTALK_DELAY,
             spad,
         });
         afterpulse.into_iter().chain(crosstalk)
-    }
-}
-
-/// The neighbour of a SPAD to the left, right, top or bottom of the 4×4 array, if there is one.
-fn neighbour(spad: u8, direction: u32) -> Option<u8> {
-    let (row, col) = (spad / 4, spad % 4);
-    match direction {
-        0 => (col > 0).then(|| spad - 1),
-        1 => (col < 3).then(|| spad + 1),
-        2 => (row > 0).then(|| spad - 4),
-        _ => (row < 3).then(|| spad + 4),
     }
 }
 
@@ -193,7 +182,7 @@ mod tests {
     /// The rules, one SPAD at a time, straight from their wording.
     fn slow_reference(events: &[SpadEvent], dead_time: Time, law: DeadTimeLaw) -> Vec<SpadEvent> {
         let mut kept = Vec::new();
-        for spad in 0..SPADS as u8 {
+        for spad in 0..16u8 {
             let mut last: Option<Time> = None;
             for e in events.iter().filter(|e| e.spad == spad) {
                 let ready = last.is_none_or(|l| e.time > l + dead_time);
@@ -296,7 +285,7 @@ mod tests {
         }
         assert!(caused.iter().all(|&(since, _)| since == CROSSTALK_DELAY));
         assert_eq!(caused.len() as i64, n);
-        let inside = |spad| (0..4).filter_map(|d| neighbour(spad, d)).count();
+        let inside = |spad| (0..4).filter_map(|d| model.grid.neighbour(spad, d)).count();
         assert_eq!([0, 1, 5].map(inside), [2, 3, 4]);
     }
 

@@ -6,7 +6,7 @@
 //! * a Poisson number of signal photons, spread around the arrival of the echo by the laser pulse and all jitter,
 //! * a Poisson number of background photons and dark counts, uniform over the cycle,
 //!
-//! each on one of the 16 SPADs with equal chance. No echo is cut: what overruns its laser cycle, at either end, falls into
+//! each on one of the macropixel's SPADs with equal chance. No echo is cut: what overruns its laser cycle, at either end, falls into
 //! its neighbours ([`EchoLaw`](super::EchoLaw)). Only what comes before the first cycle or
 //! after the last one is no photon.
 //!
@@ -34,21 +34,31 @@
 //! Timing jitter of a SPAD displaces the points of a Poisson process, which leaves it one: jitter of background changes
 //! nothing, and that of the signal is part of the pulse.
 //!
-//! Limits of the model: rates are detection rates and constant within an exposure; no spread of dead time or dark counts
-//! between SPADs; background photons come at multiples of some 20 fs ([`Slots`]).
+//! Light that is a list ([`PixelLight`]) is drawn layer by layer: each is such a stream with a key of its own, in some laser
+//! cycles. A profile, or SPADs that differ, are drawn at their greatest rate and thinned by a random word that is a pure
+//! function of the photon's own ([`Limits`]); whatever SPADs there are, that leaves a Poisson process.
+//!
+//! Limits of the model: no spread of dead time between SPADs; background photons come at multiples of some 20 fs
+//! ([`Slots`]).
 
 use std::ops::Range;
+use std::sync::Arc;
+
+use smallvec::SmallVec;
 
 use super::avalanches::Avalanches;
+use super::light::{Layer, PixelLight};
 use super::pulse::{PulseSampler, PulseShape};
 use super::quantile::{NORMAL_BITS, NormalSampler};
-use super::random::{Purpose, philox_key};
-use super::spad::{Photon, SPADS, SpadEvent, SpadModel};
+use super::random::{Purpose, layer_key, philox_key};
+use super::spad::{Photon, SpadEvent, SpadModel};
 use crate::units::{Every, Frequency, Time};
 pub use bright::{Background, TILE, spad_of};
 pub use draw::{Draw, PER_BLOCK, Place, Run};
 use group::FIRST;
 pub use group::{GROUP, Group, PLACE_BITS};
+use kind::Kind;
+use limits::Limits;
 use numbers::{Counts, Numbers};
 pub use ordered::{NEVER_FS, OrderedEchoes};
 pub use slot::{Slots, TIME_BITS};
@@ -56,12 +66,12 @@ pub use slot::{Slots, TIME_BITS};
 mod bright;
 mod draw;
 mod group;
+mod kind;
+mod limits;
 mod numbers;
 mod ordered;
 mod pulses;
 mod slot;
-
-const SPAD_BITS: u32 = SPADS.trailing_zeros();
 
 /// Adding it to numbers up to ±2⁵¹ leaves no fraction, and the number in the low bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
@@ -120,32 +130,21 @@ impl StreamConfig {
     /// Rising edges of a macropixel's SPADs to be expected in the exposure, at most: as many as photons, and as dead times.
     pub fn most_edges(&self, light: &PixelLight) -> f64 {
         let causes = 1.0 + self.spads.afterpulse_probability + self.spads.crosstalk_probability;
-        let photons = light.photons_per_cycle(self) * causes;
-        let dead_times = SPADS as f64 * (self.cycle_s() / self.spads.dead_time.as_s() + 1.0);
+        let photons = self.most_photons_per_cycle(light) * causes;
+        let dead_times =
+            self.spads.grid.spads() as f64 * (self.cycle_s() / self.spads.dead_time.as_s() + 1.0);
         photons.min(dead_times) * f64::from(self.laser_cycles)
+    }
+
+    /// Mean number of photons and dark counts that are drawn for a laser cycle, at most: of the brightest segment, and before
+    /// any are thinned.
+    pub fn most_photons_per_cycle(&self, light: &PixelLight) -> f64 {
+        light.signal_per_cycle() + light.background_hz() * self.cycle_s()
     }
 
     /// Nominal length of a cycle, s.
     pub fn cycle_s(&self) -> f64 {
         f64::from(self.stop_periods) / self.clock.as_hz()
-    }
-}
-
-/// The light on one macropixel.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PixelLight {
-    /// Mean number of detected signal photons per laser cycle, finite and ≥ 0.
-    pub signal_per_cycle: f64,
-    /// Centre of the echo (of a Gaussian pulse) after the start of its cycle.
-    pub arrival: Time,
-    /// Mean rate of detected background photons and dark counts of all SPADs, finite and ≥ 0.
-    pub background_hz: f64,
-}
-
-impl PixelLight {
-    /// Mean number of photons and dark counts in a laser cycle of `config`.
-    pub fn photons_per_cycle(&self, config: &StreamConfig) -> f64 {
-        self.signal_per_cycle + self.background_hz * config.cycle_s()
     }
 }
 
@@ -169,8 +168,12 @@ pub struct PhotonStream {
     cycle_fs: i64,
     slots: Slots,
     gaussian: NormalSampler,
-    shape: Option<PulseSampler>,
+    shape: Option<Arc<PulseSampler>>,
 }
+
+/// The parts of a macropixel's light: one that does not breed comes first. Light of one echo has no more than that, and one
+/// that breeds.
+pub type LightParts<'a> = SmallVec<[PixelStream<'a>; 2]>;
 
 impl PhotonStream {
     /// Prepares the stream.
@@ -182,7 +185,7 @@ impl PhotonStream {
             cycle_fs: config.clock.whole_fs(i64::from(config.stop_periods)),
             slots: Slots::new(config.clock, config.stop_periods, config.lead),
             gaussian: NormalSampler::new(config.pulse_sigma.as_fs() as f64),
-            shape: config.pulse_shape.as_ref().map(PulseSampler::measured),
+            shape: config.pulse_shape.as_ref().map(sampler),
             config: config.clone(),
         }
     }
@@ -190,6 +193,12 @@ impl PhotonStream {
     /// What it was made of.
     pub fn config(&self) -> &StreamConfig {
         &self.config
+    }
+
+    /// SPADs of a macropixel.
+    #[inline]
+    pub fn spads(&self) -> usize {
+        self.config.spads.grid.spads()
     }
 
     /// [`StreamConfig::cycle_start`].
@@ -232,45 +241,79 @@ impl PhotonStream {
 
     /// Groups of the exposure; the last one may outlast it.
     pub fn groups(&self) -> impl Iterator<Item = Group> + use<> {
-        Group::until(self.config.laser_cycles)
+        Group::until(self.config.laser_cycles, self.config.spads.grid)
     }
 
-    /// Macropixel number `pixel` under `light`: its photons that do not breed, all if nothing breeds.
-    pub fn pixel(&self, pixel: u32, light: &PixelLight) -> PixelStream<'_> {
-        let share = 1.0 - self.config.spads.breeding_probability();
-        self.part(pixel, light, Kind::Plain, share)
+    /// The photons of macropixel number `pixel` under `light`, by parts that are drawn independently.
+    pub fn parts(&self, pixel: u32, light: &PixelLight) -> LightParts<'_> {
+        debug_assert!(
+            light
+                .spads()
+                .is_none_or(|spads| spads.spads() == self.spads()),
+            "engines refuse light for other SPADs"
+        );
+        let breeding = self.config.spads.breeding_probability();
+        let is_bright = bright::is_bright(light, &self.config);
+        let mut parts = LightParts::new();
+        for (number, layer) in (0..).zip(light.layers()) {
+            let key = layer_key(self.key, number);
+            // The first layer is there even if it is dark: it is what SPADs are asked of.
+            if number > 0 && layer.background_hz == 0.0 && layer.signal_per_cycle == 0.0 {
+                continue;
+            }
+            for (kind, share) in [(Kind::Plain, 1.0 - breeding), (Kind::Breeding, breeding)] {
+                if kind == Kind::Plain || share > 0.0 {
+                    let mut part = self.part(pixel, &layer, kind, share);
+                    (part.key, part.is_bright, part.is_alone) = (key, is_bright, light.is_plain());
+                    parts.push(part);
+                }
+            }
+        }
+        parts
     }
 
-    /// The photons of a macropixel that breed, if there are any.
-    pub fn breeding(&self, pixel: u32, light: &PixelLight) -> Option<PixelStream<'_>> {
-        let share = self.config.spads.breeding_probability();
-        (share > 0.0).then(|| self.part(pixel, light, Kind::Breeding, share))
-    }
-
-    fn part(&self, pixel: u32, light: &PixelLight, kind: Kind, share: f64) -> PixelStream<'_> {
-        let reach_fs = self.gaussian.reach();
+    fn part(&self, pixel: u32, layer: &Layer<'_>, kind: Kind, share: f64) -> PixelStream<'_> {
+        let echo = layer.echo;
+        let gaussian = match echo.and_then(|echo| echo.sigma) {
+            Some(sigma) => {
+                debug_assert!(sigma >= Time::ZERO, "a standard deviation");
+                NormalSampler::new(sigma.as_fs() as f64)
+            }
+            None => self.gaussian,
+        };
+        let shape = match echo.and_then(|echo| echo.shape.as_ref()) {
+            Some(shape) => Some(sampler(shape)),
+            None => self.shape.clone(),
+        };
+        let reach_fs = gaussian.reach();
         let (mut first_fs, mut last_fs) = (-reach_fs, reach_fs);
-        if let Some(shape) = &self.shape {
+        if let Some(shape) = &shape {
             first_fs += shape.range_fs().0;
             last_fs += shape.range_fs().1;
         }
         // What is so far away is in no cycle, and may be displaced without overflow.
-        let arrival_fs = light.arrival.as_fs().clamp(-FAR_FS / 2, FAR_FS / 2);
-        let background_hz = light.background_hz * share;
+        let arrival_fs = echo.map_or(0, |echo| echo.arrival.as_fs());
+        let arrival_fs = arrival_fs.clamp(-FAR_FS / 2, FAR_FS / 2);
+        let background_hz = layer.background_hz * share;
         let mut part = PixelStream {
             stream: self,
+            key: self.key,
             pixel,
             kind,
-            is_bright: bright::is_bright(light, &self.config),
+            is_bright: false,
+            is_alone: true,
+            limits: Limits::of(layer, self),
+            gaussian,
+            shape,
             arrival_fs,
             echo_fs: (
                 arrival_fs + first_fs.floor() as i64,
                 arrival_fs + last_fs.ceil() as i64,
             ),
             background: Numbers::new(background_hz * self.slots.length_s()),
-            signal: Numbers::new(light.signal_per_cycle * share),
+            signal: Numbers::new(layer.signal_per_cycle * share),
             gap_fs: 1e15 / background_hz,
-            signal_per_spad: light.signal_per_cycle * share / SPADS as f64,
+            signal_per_spad: layer.signal_per_cycle * share / self.spads() as f64,
             has_long_groups: kind == Kind::Breeding
                 && background_hz * self.slots.length_s() * f64::from(FIRST) < RARE,
             late_fs: 0,
@@ -280,59 +323,26 @@ impl PhotonStream {
     }
 }
 
-/// Which photons of a macropixel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    /// Those whose avalanches cause no others.
-    Plain,
-    /// Those whose avalanches do.
-    Breeding,
+fn sampler(shape: &PulseShape) -> Arc<PulseSampler> {
+    Arc::new(PulseSampler::measured(shape))
 }
 
-impl Kind {
-    fn counts(self) -> Purpose {
-        match self {
-            Kind::Plain => Purpose::PhotonCounts,
-            Kind::Breeding => Purpose::BreedingCounts,
-        }
-    }
-
-    fn background(self) -> Purpose {
-        match self {
-            Kind::Plain => Purpose::Photons,
-            Kind::Breeding => Purpose::BreedingPhotons,
-        }
-    }
-
-    fn echo(self) -> Purpose {
-        match self {
-            Kind::Plain => Purpose::Signal,
-            Kind::Breeding => Purpose::BreedingSignal,
-        }
-    }
-
-    fn bright_background(self) -> u32 {
-        match self {
-            Kind::Plain => Purpose::BrightPhotons as u32,
-            Kind::Breeding => Purpose::BrightBreedingPhotons as u32,
-        }
-    }
-
-    fn bright_echo(self) -> u32 {
-        match self {
-            Kind::Plain => Purpose::BrightSignal as u32,
-            Kind::Breeding => Purpose::BrightBreedingSignal as u32,
-        }
-    }
-}
-
-/// The photons of one macropixel, before dead time: those that breed, or the others.
+/// The photons of one part of a macropixel's light, before dead time: those of a layer that breed, or the others.
 #[derive(Debug, Clone)]
 pub struct PixelStream<'a> {
     stream: &'a PhotonStream,
+    /// Of the layer.
+    key: [u32; 2],
     pixel: u32,
     kind: Kind,
+    /// All parts of a macropixel's light are, or none is.
     is_bright: bool,
+    /// Whether the light has one layer, all photons of which are kept.
+    is_alone: bool,
+    /// Which photons are kept, if not all.
+    limits: Option<Limits>,
+    gaussian: NormalSampler,
+    shape: Option<Arc<PulseSampler>>,
     arrival_fs: i64,
     /// Earliest and latest time of a signal photon in its cycle.
     echo_fs: (i64, i64),
@@ -367,15 +377,21 @@ impl PixelStream<'_> {
 
     /// The group of a laser cycle.
     pub fn group_of(&self, cycle: u32) -> Group {
+        let grid = self.stream.config.spads.grid;
         match self.has_long_groups {
-            true => Group::long(cycle),
-            false => Group::of_cycle(cycle),
+            true => Group::long(cycle, grid),
+            false => Group::of_cycle(cycle, grid),
         }
     }
 
     /// Start of a laser cycle.
     pub fn cycle_start(&self, cycle: u32) -> Time {
         self.stream.cycle_start(cycle)
+    }
+
+    /// Whether the light has no other layer, and all that is drawn is kept: only then random words tell all of it.
+    pub fn is_alone(&self) -> bool {
+        self.is_alone
     }
 
     /// Whether these are the photons that breed.
@@ -429,10 +445,17 @@ impl PixelStream<'_> {
 
     /// Draws all photons of `group` in a part of its cycles.
     pub fn draw(&self, group: Group, span: &Span, draw: &mut Draw) {
-        let key = self.stream.key;
+        let key = self.key;
         let numbered = |purpose: Purpose| purpose as u32 | group.number() << 8;
         debug_assert!(!self.is_bright, "bright light is drawn by laser cycle");
         draw.begin(group);
+        if self
+            .limits
+            .as_ref()
+            .is_some_and(|limits| limits.is_outside(group))
+        {
+            return;
+        }
 
         draw.within_fs = span.within_fs.clone();
         let (background, parts) = self.background.of(group);
@@ -457,7 +480,7 @@ impl PixelStream<'_> {
         let mut counts = Counts::new(&numbers);
         if has_echo {
             let photons = counts.next(signal, signal_parts);
-            draw.push_echo(photons, self.stream.shape.is_some());
+            draw.push_echo(photons, self.shape.is_some());
             draw.echo
                 .generate(key, self.pixel, numbered(self.kind.echo()));
         }
@@ -470,6 +493,9 @@ impl PixelStream<'_> {
                 .generate(key, self.pixel, numbered(self.kind.background()));
         }
         draw.counts = numbers;
+        if self.limits.is_some() {
+            draw.thin(self);
+        }
     }
 
     /// The slots of the stream.
@@ -482,8 +508,8 @@ impl PixelStream<'_> {
     #[inline]
     pub fn signal_photon(&self, draw: &Draw, number: usize) -> (Place, i64) {
         let word = draw.echo_word(number);
-        let mut after_fs = self.stream.gaussian.draw(word);
-        if let Some(shape) = &self.stream.shape {
+        let mut after_fs = self.gaussian.draw(word);
+        if let Some(shape) = &self.shape {
             after_fs += shape.draw(draw.echo_words(number));
         }
         let place = draw.group.place((word >> 32) as u32);
@@ -496,8 +522,8 @@ impl PixelStream<'_> {
         let after_fs = time_fs - self.arrival_fs as f64;
         // Times are rounded.
         let tolerance_fs = tolerance_fs + 1.0;
-        let gaussian = &self.stream.gaussian;
-        (self.stream.shape.is_none()).then(|| gaussian.ranks_at(after_fs, tolerance_fs))
+        let gaussian = &self.gaussian;
+        (self.shape.is_none()).then(|| gaussian.ranks_at(after_fs, tolerance_fs))
     }
 }
 

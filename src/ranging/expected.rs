@@ -6,7 +6,7 @@
 //!   bin        counts in a laser cycle if as many SPADs fired in it as TYPE and THRESHOLD ask for
 //! ```
 //!
-//! Times are in bins: bin i reaches from i − ½ to i + ½, as positions of peaks do. A SPAD's chance to be ready follows
+//! Bins are equal. Times are in bins: bin i reaches from i − ½ to i + ½, as positions of peaks do. A SPAD's chance to be ready follows
 //! exactly from the light: it is, unless it fired within the last dead time (non-paralysable), or unless a photon came
 //! within it (paralysable). SPADs fire independently, so the number of those that fire in a bin is binomial. The integral
 //! over time takes steps of an eighth of a bin; tests find the means of simulated light to five standard deviations
@@ -17,7 +17,6 @@
 
 use crate::chip::{EventType, SensorConfig};
 use crate::numerics::normal_above;
-use crate::photon::SPADS;
 use crate::units::Time;
 
 /// Steps to a bin.
@@ -46,18 +45,21 @@ pub struct Response {
     pulse_sigma_bins: f64,
     event_type: EventType,
     threshold: u8,
+    spads: usize,
 }
 
 impl Response {
-    /// Of a sensor's macropixels to Gaussian pulses of standard deviation `pulse_sigma`, all jitter included.
-    pub fn new(config: &SensorConfig, pulse_sigma: Time) -> Self {
+    /// Of a sensor's macropixels, with bins of `bin_s` seconds each, to Gaussian pulses of standard deviation `pulse_sigma`,
+    /// all jitter included.
+    pub fn new(config: &SensorConfig, bin_s: f64, pulse_sigma: Time) -> Self {
         Response {
             bins: config.bins,
-            dead_time_bins: config.dead_time().as_s() * config.clk_hz,
+            dead_time_bins: config.dead_time().as_s() / bin_s,
             paralysable: config.paralysable,
-            pulse_sigma_bins: pulse_sigma.as_s() * config.clk_hz,
+            pulse_sigma_bins: pulse_sigma.as_s() / bin_s,
             event_type: config.event_type,
             threshold: config.threshold,
+            spads: config.spads(),
         }
     }
 
@@ -75,21 +77,22 @@ impl Response {
     pub fn counts_if_fired(&self, fired: f64) -> f64 {
         let fired = fired.clamp(0.0, 1.0);
         if (self.event_type, self.threshold) == (EventType::Greater, 0) {
-            return -(SPADS as f64 * (-fired).ln_1p()).exp_m1();
+            return -(self.spads as f64 * (-fired).ln_1p()).exp_m1();
         }
         let threshold = usize::from(self.threshold);
         let mut choices = 1.0;
         let mut chance = 0.0;
-        for n in 0..=SPADS {
+        for n in 0..=self.spads {
             let counts = match self.event_type {
                 EventType::Less => n < threshold,
                 EventType::Equal => n == threshold,
                 EventType::Greater => n > threshold,
             };
             if counts {
-                chance += choices * fired.powi(n as i32) * (1.0 - fired).powi((SPADS - n) as i32);
+                chance +=
+                    choices * fired.powi(n as i32) * (1.0 - fired).powi((self.spads - n) as i32);
             }
-            choices *= (SPADS - n) as f64 / (n + 1) as f64;
+            choices *= (self.spads - n) as f64 / (n + 1) as f64;
         }
         chance
     }
@@ -97,7 +100,7 @@ impl Response {
     /// The background, photons in a bin and laser cycle, under which a bin counts with `chance`; `None` where brighter light
     /// need not count more (TYPE other than greater) or no light counts so much.
     pub fn background_for(&self, chance: f64) -> Option<f64> {
-        if self.event_type != EventType::Greater || usize::from(self.threshold) >= SPADS {
+        if self.event_type != EventType::Greater || usize::from(self.threshold) >= self.spads {
             return None;
         }
         // A SPAD that is blind for d bins after it fired, or after a photon, fires in a bin with at most this chance.
@@ -128,13 +131,13 @@ impl Response {
                 light
             }
         };
-        Some(light * SPADS as f64)
+        Some(light * self.spads as f64)
     }
 
     /// The chance of every bin to count in a laser cycle.
     pub fn chances(&self, light: &EchoLight) -> Vec<f64> {
         let sigma = self.pulse_sigma_bins;
-        let per_spad = 1.0 / SPADS as f64;
+        let per_spad = 1.0 / self.spads as f64;
         let signal = light.signal * per_spad;
         let background = light.background_per_bin * per_spad;
         let h = 1.0 / STEPS as f64;

@@ -12,7 +12,7 @@
 use super::expected::{EchoLight, Response};
 use super::peak::{Peak, PeakOptions, interpolate_at};
 use super::walk::WalkCorrection;
-use crate::chip::{EventType, Exposure, Overflow, SensorConfig};
+use crate::chip::{EventType, Overflow, WindowLaw};
 use crate::theory::significance::Scan;
 use crate::units::Time;
 
@@ -54,9 +54,17 @@ pub struct Sighting {
     pub is_saturated: bool,
 }
 
+/// Bins whose lengths differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "bins differ in length, and what is significant in a histogram is known for equal ones only"
+)]
+pub struct UnequalBins;
+
 /// Finds echoes in the histograms of one sensor and exposure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EchoFinder {
+    bin_s: f64,
     peak: PeakOptions,
     ln_false_alarm: f64,
     scan: Scan,
@@ -66,23 +74,29 @@ pub struct EchoFinder {
 }
 
 impl EchoFinder {
-    /// For Gaussian pulses of standard deviation `pulse_sigma`, all jitter included.
+    /// For the bins of `law` and Gaussian pulses of standard deviation `pulse_sigma`.
     ///
     /// Range walk is taken out where brighter light gives more counts (TYPE greater, and THRESHOLD below the number of
     /// SPADs) and the SPADs have recovered from one echo before the next window opens.
+    ///
+    /// # Errors
+    /// Bins that differ: a stretch of them is then full by chance more often than another, and pile-up moves peaks otherwise in
+    /// each.
     pub fn new(
-        config: &SensorConfig,
-        exposure: &Exposure,
+        law: &WindowLaw,
         pulse_sigma: Time,
         options: &DepthOptions,
-    ) -> Self {
+    ) -> Result<Self, UnequalBins> {
+        let (config, exposure) = (law.sensor(), law.exposure());
+        let bin_s = law.bin_width_s().ok_or(UnequalBins)?;
         let laser_cycles = exposure.laser_cycles;
-        let response = Response::new(config, pulse_sigma);
-        let recovers =
-            response.dead_time_bins() + config.bins as f64 <= f64::from(exposure.stop_periods);
+        let response = Response::new(config, bin_s, pulse_sigma);
+        let laser_cycle_bins = exposure.stop(1).as_s() / bin_s;
+        let recovers = response.dead_time_bins() + config.bins as f64 <= laser_cycle_bins;
         let brighter_is_more = config.event_type == EventType::Greater;
         let capacity = (1u32 << config.bin_bits) - 1;
-        EchoFinder {
+        Ok(EchoFinder {
+            bin_s,
             peak: options.peak,
             ln_false_alarm: options.false_alarm_rate.ln(),
             scan: Scan::matched(response.pulse_sigma_bins(), config.bins, laser_cycles),
@@ -95,7 +109,12 @@ impl EchoFinder {
                     peak: options.peak,
                 },
             ),
-        }
+        })
+    }
+
+    /// Length of a bin, s.
+    pub fn bin_s(&self) -> f64 {
+        self.bin_s
     }
 
     /// The echo in `counts`, one entry per bin, earliest first; `None` if no bin stands out at all.

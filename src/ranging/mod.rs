@@ -11,7 +11,7 @@ mod walk;
 pub use arrival::{ArrivalOptions, arrival};
 pub use calibration::{Calibration, CalibrationError, Echo, ZoneCalibration};
 pub use expected::{EchoLight, Response};
-pub use finder::{DepthOptions, EchoFinder, Sighting};
+pub use finder::{DepthOptions, EchoFinder, Sighting, UnequalBins};
 pub use peak::{Background, Peak, PeakOptions, interpolate};
 pub use walk::{Corrected, WalkCorrection};
 

@@ -70,7 +70,11 @@ pub fn interpolate(counts: &[u32], options: &PeakOptions) -> Option<Peak> {
 }
 
 /// As [`interpolate`], about a given bin of `counts` and with counts that need not be whole, such as mean ones.
-pub fn interpolate_at(counts: &[f64], peak_bin: usize, options: &PeakOptions) -> Option<Peak> {
+pub(super) fn interpolate_at(
+    counts: &[f64],
+    peak_bin: usize,
+    options: &PeakOptions,
+) -> Option<Peak> {
     let region = options.region(peak_bin, counts.len());
     let background_per_bin = match options.background {
         Background::None => 0.0,

@@ -51,11 +51,11 @@ impl Bench {
     }
 
     fn echo(&self, position_bins: f64, signal_per_cycle: f64, background_hz: f64) -> PixelLight {
-        PixelLight {
+        PixelLight::echo(
             signal_per_cycle,
-            arrival: self.law.time_of(&self.window, position_bins),
-            background_hz,
-        }
+            self.law.time_of(&self.window, position_bins),
+        )
+        .with_background(background_hz)
     }
 }
 
@@ -72,8 +72,8 @@ fn dark_windows_alarm_as_often_as_stated() {
         let bench = Bench::new(SensorConfig::default(), laser_cycles, 60.0);
         let dark = bench.echo(0.0, 0.0, background_hz);
         let options = DepthOptions::default();
-        let finder = EchoFinder::new(&bench.config, &bench.exposure, PULSE_SIGMA, &options);
-        let histograms = bench.expose(3, windows, |_| dark);
+        let finder = EchoFinder::new(&bench.law, PULSE_SIGMA, &options).unwrap();
+        let histograms = bench.expose(3, windows, |_| dark.clone());
         let sightings: Vec<Sighting> = histograms.iter().filter_map(|h| finder.find(h)).collect();
         for rate in [1e-2, 1e-3] {
             let alarms = sightings
@@ -130,11 +130,13 @@ fn the_mean_histogram_is_that_of_simulated_light() {
             let (cycles, number) = (2000, 100);
             let bench = Bench::new(config.clone(), cycles, 60.0);
             let light = bench.echo(6.7, signal, background_hz);
-            let histograms = bench.expose(5, number, |_| light);
-            let chances = Response::new(&bench.config, PULSE_SIGMA).chances(&EchoLight {
+            let histograms = bench.expose(5, number, |_| light.clone());
+            let bin_s = bench.law.bin_width_s().unwrap();
+            let response = Response::new(&bench.config, bin_s, PULSE_SIGMA);
+            let chances = response.chances(&EchoLight {
                 position_bins: 6.7,
                 signal,
-                background_per_bin: background_hz / bench.config.clk_hz,
+                background_per_bin: background_hz * bin_s,
             });
             let trials = f64::from(cycles * number);
             for (bin, chance) in chances.into_iter().enumerate() {
@@ -178,8 +180,8 @@ fn range_walk_is_taken_out() {
                 correct_walk,
                 ..DepthOptions::default()
             };
-            let finder = EchoFinder::new(&bench.config, &bench.exposure, PULSE_SIGMA, &options);
-            let bin_mm = 1e3 * bench.exposure.clock.period().as_range_m();
+            let finder = EchoFinder::new(&bench.law, PULSE_SIGMA, &options).unwrap();
+            let bin_mm = 1e3 * Time::from_s(bench.law.bin_width_s().unwrap()).as_range_m();
             let errors = (0..number).zip(&histograms).map(|(n, counts)| {
                 let found = finder.find(counts).unwrap();
                 assert!(found.is_significant && found.light.is_some() == correct_walk);
@@ -213,12 +215,7 @@ fn full_bins_are_told_from_peaks() {
         ..SensorConfig::default()
     };
     let bench = Bench::new(config, 1000, 60.0);
-    let finder = EchoFinder::new(
-        &bench.config,
-        &bench.exposure,
-        PULSE_SIGMA,
-        &DepthOptions::default(),
-    );
+    let finder = EchoFinder::new(&bench.law, PULSE_SIGMA, &DepthOptions::default()).unwrap();
     let saturated = |counts: &[u32]| finder.find(counts).unwrap().is_saturated;
     assert!(saturated(&[31; 16]));
     let mut counts = [2; 16];

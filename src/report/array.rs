@@ -14,7 +14,7 @@ use crate::files::{InputError, OutputFile};
 ///
 /// # Panics
 /// When `shape` does not have as many elements as `data`.
-pub fn write_npy_u16(path: &Path, shape: &[u64], data: &[u16]) -> Result<(), InputError> {
+pub(crate) fn write_npy_u16(path: &Path, shape: &[u64], data: &[u16]) -> Result<(), InputError> {
     let elements: u64 = shape.iter().product();
     assert_eq!(
         elements,

@@ -6,14 +6,14 @@ const WEIGHT: FontWeight = FontWeight::Regular;
 const SIZE: RasterHeight = RasterHeight::Size16;
 
 /// Width of a character, px.
-pub const CHARACTER_WIDTH_PX: usize = get_raster_width(WEIGHT, SIZE);
+pub(super) const CHARACTER_WIDTH_PX: usize = get_raster_width(WEIGHT, SIZE);
 
 /// Height of a line of text, px.
-pub const LINE_PX: usize = SIZE.val();
+pub(super) const LINE_PX: usize = SIZE.val();
 
 /// Pixels as indices into a palette, row by row from the top left.
 #[derive(Debug, Clone)]
-pub struct Canvas {
+pub(super) struct Canvas {
     width: usize,
     height: usize,
     pixels: Vec<u8>,
@@ -21,7 +21,7 @@ pub struct Canvas {
 
 impl Canvas {
     /// A canvas of one colour.
-    pub fn new(width: usize, height: usize, colour: u8) -> Self {
+    pub(super) fn new(width: usize, height: usize, colour: u8) -> Self {
         Canvas {
             width,
             height,
@@ -30,22 +30,29 @@ impl Canvas {
     }
 
     /// Width, px.
-    pub fn width(&self) -> usize {
+    pub(super) fn width(&self) -> usize {
         self.width
     }
 
     /// Height, px.
-    pub fn height(&self) -> usize {
+    pub(super) fn height(&self) -> usize {
         self.height
     }
 
     /// All pixels, length width·height.
-    pub fn pixels(&self) -> &[u8] {
+    pub(super) fn pixels(&self) -> &[u8] {
         &self.pixels
     }
 
     /// Fills a rectangle; what lies outside the canvas is cut off.
-    pub fn fill(&mut self, left: usize, top: usize, width: usize, height: usize, colour: u8) {
+    pub(super) fn fill(
+        &mut self,
+        left: usize,
+        top: usize,
+        width: usize,
+        height: usize,
+        colour: u8,
+    ) {
         let right = left.saturating_add(width).min(self.width);
         let bottom = top.saturating_add(height).min(self.height);
         for y in top..bottom {
@@ -58,7 +65,7 @@ impl Canvas {
     /// Writes text from its top left corner; a character outside printable ASCII becomes `?`.
     ///
     /// `shades` are the palette's colours from paper to ink; the first leaves what is there.
-    pub fn text(&mut self, left: usize, top: usize, text: &str, shades: &[u8]) {
+    pub(super) fn text(&mut self, left: usize, top: usize, text: &str, shades: &[u8]) {
         debug_assert!(shades.len() > 1, "no ink");
         for (i, character) in text.chars().enumerate() {
             let is_printable = (' '..='~').contains(&character);

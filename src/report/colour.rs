@@ -6,7 +6,7 @@
 //! in lightness to within the tested bounds.
 
 /// A colour, sRGB.
-pub type Rgb = [u8; 3];
+pub(super) type Rgb = [u8; 3];
 
 /// Nearest to farthest.
 const STOPS: [Rgb; 6] = [
@@ -19,7 +19,7 @@ const STOPS: [Rgb; 6] = [
 ];
 
 /// What has no depth: greys for what was not looked at, reds for what was looked at in vain. Neighbours differ in lightness.
-pub const CATEGORY_COLOURS: [Rgb; 7] = [
+pub(super) const CATEGORY_COLOURS: [Rgb; 7] = [
     [226, 226, 226],
     [160, 160, 160],
     [100, 100, 100],
@@ -30,7 +30,7 @@ pub const CATEGORY_COLOURS: [Rgb; 7] = [
 ];
 
 /// The colour at `position` of the scale, 0 (nearest) to 1 (farthest); clamped, NaN is nearest.
-pub fn scale_colour(position: f64) -> Rgb {
+pub(super) fn scale_colour(position: f64) -> Rgb {
     let along = position.clamp(0.0, 1.0) * (STOPS.len() - 1) as f64;
     let stop = (along as usize).min(STOPS.len() - 2);
     let share = if along.is_nan() {

@@ -9,7 +9,7 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::chart::{Series, Style};
+use super::series::{Series, Style};
 
 /// Colours of the series in turn; the first eight after Okabe and Ito, who chose them for the colour-blind.
 const COLOURS: [RGBColor; 12] = [
@@ -29,7 +29,7 @@ const COLOURS: [RGBColor; 12] = [
 
 /// Colour of a series, and the shape of its dots.
 #[derive(Debug, Clone, Copy)]
-pub struct Look {
+pub(super) struct Look {
     /// Of everything drawn.
     pub colour: RGBColor,
     /// Which of the six shapes.
@@ -37,7 +37,7 @@ pub struct Look {
 }
 
 /// How each of `series` looks. Whiskers take the colour of the series before; dots change their shape each time.
-pub fn looks(series: &[Series]) -> impl Iterator<Item = Look> {
+pub(super) fn looks(series: &[Series]) -> impl Iterator<Item = Look> {
     let (mut coloured, mut dotted) = (0, 0);
     series.iter().map(move |series| {
         coloured += usize::from(series.style != Style::Whiskers);
@@ -51,7 +51,7 @@ pub fn looks(series: &[Series]) -> impl Iterator<Item = Look> {
 
 impl Look {
     /// Corners of a dot, in pixels from its place.
-    pub fn outline(self) -> Vec<(i32, i32)> {
+    pub(super) fn outline(self) -> Vec<(i32, i32)> {
         match self.shape {
             0 => vec![
                 (-2, -4),
@@ -87,14 +87,14 @@ const LEFT: i32 = 30;
 const WIDTH: i32 = 860;
 
 /// The names of the series, row by row.
-pub struct Legend<'s> {
+pub(super) struct Legend<'s> {
     entries: Vec<(&'s Series, Look, (i32, i32))>,
     rows: u32,
 }
 
 impl<'s> Legend<'s> {
     /// Lays out all series that have a name.
-    pub fn of(series: &'s [Series]) -> Self {
+    pub(super) fn of(series: &'s [Series]) -> Self {
         let (mut x, mut row) = (LEFT, 0);
         let named = series.iter().zip(looks(series));
         let entries = named
@@ -121,12 +121,12 @@ impl<'s> Legend<'s> {
     }
 
     /// Pixels that it takes.
-    pub fn height(&self) -> u32 {
+    pub(super) fn height(&self) -> u32 {
         self.rows * ROW + if self.rows > 0 { 10 } else { 0 }
     }
 
     /// Draws it into an area of that height.
-    pub fn draw<'a>(
+    pub(super) fn draw<'a>(
         &self,
         area: &DrawingArea<SVGBackend<'a>, Shift>,
     ) -> Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>> {

@@ -7,12 +7,15 @@ mod colour;
 mod grid;
 mod image;
 mod legend;
+mod series;
 mod table;
 mod verdicts;
 
-pub use array::write_npy_u16;
-pub use chart::{Axis, Chart, Scale, Series, Style};
-pub use grid::{Grid, aligned, width};
+pub(crate) use array::write_npy_u16;
+pub use chart::{Axis, Chart, Scale};
+pub(crate) use grid::aligned;
+pub use grid::{Grid, width};
 pub use image::{Cell, DepthMap};
+pub use series::{Series, Style};
 pub use table::Table;
 pub use verdicts::Checks;

@@ -88,7 +88,7 @@ impl Edges {
 }
 
 /// Claim 2: the ripple, and the CLK period it allows.
-pub fn ripple_rows() -> Vec<Row> {
+pub(super) fn ripple_rows() -> Vec<Row> {
     let config = SensorConfig::default();
     let timing = MacropixelTiming::of(&config, &NOMINAL, Limits::Ignored, (0, 0));
     let starts = [0, 1, 5, 21, 31, 42, 52, 60];
@@ -123,7 +123,7 @@ pub fn ripple_rows() -> Vec<Row> {
 }
 
 /// Fig. 56's question: the ripple against the number of stages.
-pub fn figure_56() -> Vec<Chart> {
+pub(super) fn figure_56() -> Vec<Chart> {
     let delays: Vec<(usize, Time, Time)> = (1..=12)
         .map(|bits| {
             let (longest, simulated) = ripple(&counter_of(bits), &NOMINAL);
@@ -154,7 +154,7 @@ pub fn figure_56() -> Vec<Chart> {
 }
 
 /// Claim 3: Fig. 54.
-pub fn fig_54_rows() -> Vec<Row> {
+pub(super) fn fig_54_rows() -> Vec<Row> {
     let edges = Edges::of(5);
     let after_stop = edges
         .counter_clk
@@ -170,7 +170,7 @@ pub fn fig_54_rows() -> Vec<Row> {
 }
 
 /// Claim 4: Fig. 48.
-pub fn fig_48_rows() -> Vec<Row> {
+pub(super) fn fig_48_rows() -> Vec<Row> {
     let period = SensorConfig::default().clock().period();
     let [first, second] = [52, 49].map(|start| {
         let edges = Edges::of(start);
@@ -226,7 +226,7 @@ fn fig_48_bins() -> Histograms {
 }
 
 /// Claim 5: the serial load.
-pub fn load_rows() -> Vec<Row> {
+pub(super) fn load_rows() -> Vec<Row> {
     let config = SensorConfig::default();
     let netlist = load::load_netlist(&config);
     let starts: Vec<u16> = (0..config.pixels() as u32)
@@ -285,7 +285,7 @@ fn stage_transistors(p_counter: PCounter) -> f64 {
 }
 
 /// Claim 6: transistors.
-pub fn area_rows() -> Vec<Row> {
+pub(super) fn area_rows() -> Vec<Row> {
     let flip_flop = f64::from(CellKind::Dffr.transistors());
     let stage = stage_transistors(PCounter::Ripple);
     let config = SensorConfig {

@@ -102,7 +102,7 @@ fn last_digit(text: &str) -> f64 {
 }
 
 /// A number with four significant digits; whole numbers up to a million with all of theirs.
-pub fn figure(value: f64) -> String {
+pub(super) fn figure(value: f64) -> String {
     let magnitude = value.abs();
     if value == 0.0 {
         "0".into()

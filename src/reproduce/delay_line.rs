@@ -135,7 +135,7 @@ fn mean_and_sigma(values: &[f64]) -> (f64, f64) {
 }
 
 /// Claim 20: the delay lines and the plane of Fig. 92.
-pub fn rows() -> Vec<Row> {
+pub(super) fn rows() -> Vec<Row> {
     let sweep = Sweep::at(plane_ns());
     let (mean_ns, spread_ns) = mean_and_sigma(&sweep.widths_ns);
     let (_, before_m) = mean_and_sigma(&sweep.before_m);
@@ -170,7 +170,7 @@ pub fn rows() -> Vec<Row> {
 }
 
 /// Fig. 91: bin intervals.
-pub fn figure_91() -> Vec<Chart> {
+pub(super) fn figure_91() -> Vec<Chart> {
     let widths = Sweep::at(plane_ns()).widths_ns;
     vec![
         Chart::new(
@@ -183,7 +183,7 @@ pub fn figure_91() -> Vec<Chart> {
 }
 
 /// Fig. 93: the plane before and after calibration.
-pub fn figure_93() -> Vec<Chart> {
+pub(super) fn figure_93() -> Vec<Chart> {
     let sweep = Sweep::at(plane_ns());
     let outline = |values: &[f64]| histogram(values, 1.8, 3.2, 140);
     vec![

@@ -7,7 +7,7 @@ use crate::theory::design::Design;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// The speed of light as the thesis rounds it, m/s.
-pub const ROUNDED_LIGHT_M_PER_S: f64 = 3e8;
+pub(super) const ROUNDED_LIGHT_M_PER_S: f64 = 3e8;
 
 /// Table 9: clock in MHz, then z_max, z_bin and σ_source in m, as printed.
 const TABLE_9: [(f64, &str, &str, &str); 7] = [
@@ -31,7 +31,7 @@ fn quantic(clk_mhz: f64, light_m_per_s: f64) -> Design {
 }
 
 /// Claim 1: Table 9 and the example at 384 MHz.
-pub fn table_9_rows() -> Vec<Row> {
+pub(super) fn table_9_rows() -> Vec<Row> {
     let mut rows = Vec::new();
     for (mhz, z_max, z_bin, sigma) in TABLE_9 {
         let design = quantic(mhz, ROUNDED_LIGHT_M_PER_S);
@@ -79,7 +79,7 @@ pub fn table_9_rows() -> Vec<Row> {
 }
 
 /// Table 9 at both speeds of light, with the window's steps counted.
-pub fn table_9() -> Grid {
+pub(super) fn table_9() -> Grid {
     let mut grid = Grid::new([
         "f_CLK (MHz)",
         "z_max (m), c = 3e8",
@@ -108,18 +108,18 @@ pub fn table_9() -> Grid {
 }
 
 /// Background rate (counts/s) and laser cycles that size the histogram of Table 6's system (3.3.2, 3.3.3).
-pub const TABLE_6_BACKGROUND_HZ: f64 = 20e6;
+pub(super) const TABLE_6_BACKGROUND_HZ: f64 = 20e6;
 /// See [`TABLE_6_BACKGROUND_HZ`].
-pub const TABLE_6_CYCLES: f64 = 25_000.0;
+pub(super) const TABLE_6_CYCLES: f64 = 25_000.0;
 /// Bin interval of Table 6's system: what the thesis calls 5 ns and 0.8 m.
-pub const TABLE_6_BIN_S: f64 = 5e-9;
+pub(super) const TABLE_6_BIN_S: f64 = 5e-9;
 /// See [`TABLE_6_BIN_S`].
-pub const TABLE_6_BIN_M: f64 = 0.8;
+pub(super) const TABLE_6_BIN_M: f64 = 0.8;
 /// A quarter of a 30 µm pixel, µm² (3.3.5).
-pub const QUARTER_PIXEL_UM2: f64 = 225.0;
+pub(super) const QUARTER_PIXEL_UM2: f64 = 225.0;
 
 /// The full histogram of Table 6's system: 256 bins, of as many bits as its background asks for.
-pub fn full_histogram() -> Storage {
+pub(super) fn full_histogram() -> Storage {
     Storage {
         bins: full_bins(200.0, TABLE_6_BIN_M).next_power_of_two(),
         bin_bits: bits_for(TABLE_6_BACKGROUND_HZ * TABLE_6_BIN_S * TABLE_6_CYCLES),
@@ -127,7 +127,7 @@ pub fn full_histogram() -> Storage {
 }
 
 /// Claim 12: bins and bits of a full histogram.
-pub fn size_rows() -> Vec<Row> {
+pub(super) fn size_rows() -> Vec<Row> {
     let storage = full_histogram();
     let background = TABLE_6_BACKGROUND_HZ * TABLE_6_BIN_S * TABLE_6_CYCLES;
     let bins_of_5_ns = full_bins(200.0, TABLE_6_BIN_S * SPEED_OF_LIGHT_M_PER_S / 2.0);
@@ -163,7 +163,7 @@ pub fn size_rows() -> Vec<Row> {
 }
 
 /// Claim 13: process generations that the histograms fit.
-pub fn silicon_rows() -> Vec<Row> {
+pub(super) fn silicon_rows() -> Vec<Row> {
     let full = full_histogram();
     let reduced = Storage { bins: 16, ..full };
     let node = |storage: Storage, area| {
@@ -195,7 +195,7 @@ pub fn silicon_rows() -> Vec<Row> {
 }
 
 /// Fig. 39's data: the cells by generation, and what fits a quarter of the pixel.
-pub fn table_39() -> Grid {
+pub(super) fn table_39() -> Grid {
     let mut grid = Grid::new([
         "source",
         "node (nm)",
@@ -220,10 +220,10 @@ pub fn table_39() -> Grid {
 }
 
 /// The demonstrator's bin interval, 2.6 ns, in metres.
-pub const HSLIDAR_BIN_M: f64 = 2.6e-9 * SPEED_OF_LIGHT_M_PER_S / 2.0;
+pub(super) const HSLIDAR_BIN_M: f64 = 2.6e-9 * SPEED_OF_LIGHT_M_PER_S / 2.0;
 
 /// Claim 16: on-chip data of the demonstrator.
-pub fn data_rows() -> Vec<Row> {
+pub(super) fn data_rows() -> Vec<Row> {
     let bins = full_bins(75.0, HSLIDAR_BIN_M);
     let ratio = f64::from(bins) / 8.0;
     let to_window_end = full_bins(75.0 + 8.0 * HSLIDAR_BIN_M, HSLIDAR_BIN_M);

@@ -28,7 +28,8 @@ mod stereo;
 mod system;
 
 pub use claim::{Claim, Published, Row, Verdict, overall};
-pub use page::{SLIPS_TITLE, grid, heading, html, markdown, slips as slips_grid, tally};
+pub(crate) use page::heading;
+pub use page::{SLIPS_TITLE, grid, html, markdown, slips as slips_grid, tally};
 pub use registry::{CLAIMS, FIGURES, Figure, MEASUREMENTS, Measurement, TABLES, Table};
 
 pub use slips::{SLIPS, Slip};
@@ -87,31 +88,71 @@ impl Selection {
         chosen.into_iter().map(Vec::len).sum()
     }
 
-    /// What is chosen that does not exist, in words.
+    /// Whether everything that is chosen exists.
     ///
     /// # Errors
-    /// The kind, the number, and which numbers there are.
-    pub fn check(&self) -> Result<(), (&'static str, String)> {
+    /// The first that does not.
+    pub fn check(&self) -> Result<(), NothingThere> {
         let known = Selection::all();
-        let kinds = [
-            ("--claim", &self.claims, &known.claims),
-            ("--figure", &self.figures, &known.figures),
-            ("--table", &self.tables, &known.tables),
-            ("--measurement", &self.measurements, &known.measurements),
+        let parts = [
+            (Part::Claim, &self.claims, known.claims),
+            (Part::Figure, &self.figures, known.figures),
+            (Part::Table, &self.tables, known.tables),
+            (Part::Measurement, &self.measurements, known.measurements),
         ];
-        for (option, chosen, known) in kinds {
-            if let Some(number) = chosen.iter().find(|n| !known.contains(n)) {
-                let known: Vec<String> = known.iter().map(u32::to_string).collect();
-                let message = format!(
-                    "there is no {} {number} to reproduce; choose from {}",
-                    &option[2..],
-                    known.join(", ")
-                );
-                return Err((option, message));
+        for (part, chosen, known) in parts {
+            if let Some(&number) = chosen.iter().find(|n| !known.contains(n)) {
+                return Err(NothingThere {
+                    part,
+                    number,
+                    known,
+                });
             }
         }
         Ok(())
     }
+}
+
+/// What can be reproduced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// A claim of the thesis.
+    Claim,
+    /// A figure of it.
+    Figure,
+    /// A table of it.
+    Table,
+    /// One of our own measurements.
+    Measurement,
+}
+
+impl Part {
+    /// What it is called.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Part::Claim => "claim",
+            Part::Figure => "figure",
+            Part::Table => "table",
+            Part::Measurement => "measurement",
+        }
+    }
+}
+
+/// A number that nothing has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("there is no {} {number} to reproduce; choose from {}", part.name(), listed(known))]
+pub struct NothingThere {
+    /// What was asked for.
+    pub part: Part,
+    /// Its number.
+    pub number: u32,
+    /// Numbers that there are.
+    pub known: Vec<u32>,
+}
+
+fn listed(numbers: &[u32]) -> String {
+    let numbers: Vec<String> = numbers.iter().map(u32::to_string).collect();
+    numbers.join(", ")
 }
 
 /// A claim and its rows.
@@ -386,8 +427,9 @@ mod tests {
             figures: vec![35, 999],
             ..Selection::default()
         };
-        let (option, message) = selection.check().unwrap_err();
-        assert_eq!(option, "--figure");
+        let fault = selection.check().unwrap_err();
+        assert_eq!((fault.part, fault.number), (Part::Figure, 999));
+        let message = fault.to_string();
         assert!(
             message.contains("no figure 999") && message.contains("35"),
             "{message}"

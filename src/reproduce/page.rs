@@ -167,7 +167,7 @@ pub fn slips(slips: &[Slip]) -> Grid {
 }
 
 /// What stands above a measurement.
-pub fn heading(result: &MeasurementResult) -> String {
+pub(crate) fn heading(result: &MeasurementResult) -> String {
     format!(
         "The chip against its theory {}: {}",
         result.number, result.title

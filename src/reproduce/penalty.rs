@@ -10,7 +10,7 @@ use crate::theory::precision;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// σ of a Gaussian pulse over its full width at half maximum, 1/√(8 ln 2).
-pub fn sigma_over_fwhm() -> f64 {
+pub(super) fn sigma_over_fwhm() -> f64 {
     1.0 / (8.0 * std::f64::consts::LN_2).sqrt()
 }
 
@@ -20,7 +20,7 @@ const EVERY_PHOTON: Model = Model::Poisson(Ties::Random);
 const ONE_HIT: Model = Model::Bernoulli(Ties::Random);
 
 /// Table 6's system with 16 bins (Table 7).
-pub fn long_range() -> System {
+pub(super) fn long_range() -> System {
     System {
         link: Link {
             signal: 1140.0,
@@ -43,12 +43,12 @@ pub fn long_range() -> System {
 }
 
 /// Background rate of the demonstrator at an illuminance, counts/s: 4.8 Mcounts/s at 60 klux (Fig. 94).
-pub fn demonstrator_light(klux: f64) -> f64 {
+pub(super) fn demonstrator_light(klux: f64) -> f64 {
     4.8e6 * klux / 60.0
 }
 
 /// The demonstrator (Table 15).
-pub fn demonstrator() -> System {
+pub(super) fn demonstrator() -> System {
     let link = Link {
         signal: 89.0,
         background_hz: 8e6,
@@ -100,7 +100,7 @@ fn sigma_for(cycles: f64) -> f64 {
 }
 
 /// Claim 11: laser cycles at 200 m.
-pub fn cycles_rows() -> Vec<Row> {
+pub(super) fn cycles_rows() -> Vec<Row> {
     let system = long_range();
     let needed = system.measure(200.0).laser_cycles;
     let thompson = System {
@@ -132,7 +132,7 @@ pub fn cycles_rows() -> Vec<Row> {
 }
 
 /// Claim 14: penalties of Table 7's configurations at 200 m.
-pub fn long_range_rows() -> Vec<Row> {
+pub(super) fn long_range_rows() -> Vec<Row> {
     let system = long_range();
     let full = system.full(200.0);
     let (zooming, sliding) = (system.zooming(200.0), system.sliding(200.0, 0));
@@ -177,7 +177,7 @@ fn zooming_takes(system: &System, steps: usize) -> f64 {
 }
 
 /// Claim 15: penalties of the demonstrator at 75 m.
-pub fn demonstrator_rows() -> Vec<Row> {
+pub(super) fn demonstrator_rows() -> Vec<Row> {
     let system = demonstrator();
     let full = system.full(75.0);
     let (zooming, sliding) = (system.zooming(75.0), system.sliding(75.0, 0));
@@ -313,7 +313,7 @@ impl Curves {
 }
 
 /// Fig. 35: laser cycles of a full histogram.
-pub fn figure_35() -> Vec<Chart> {
+pub(super) fn figure_35() -> Vec<Chart> {
     let fits = |z_m: f64| SPEED_OF_LIGHT_M_PER_S / (2.0 * z_m * 30.0);
     let needed = Curves::of(long_range(), 200).full();
     vec![
@@ -337,7 +337,7 @@ pub fn figure_35() -> Vec<Chart> {
 }
 
 /// Fig. 42: laser cycles of the detection step.
-pub fn figure_42() -> Vec<Chart> {
+pub(super) fn figure_42() -> Vec<Chart> {
     let detecting = |system: System| Curves::of(system, 200).detecting();
     vec![
         Chart::new(
@@ -359,7 +359,7 @@ pub fn figure_42() -> Vec<Chart> {
 }
 
 /// Fig. 43: laser cycles of each window of sliding.
-pub fn figure_43() -> Vec<Chart> {
+pub(super) fn figure_43() -> Vec<Chart> {
     let steps = long_range().sliding(200.0, 0).steps;
     let each: Points = steps
         .iter()
@@ -413,7 +413,7 @@ fn penalties(title: &str, system: System, to_m: u32) -> Chart {
 }
 
 /// Fig. 44: laser cycles of the three schemes.
-pub fn figure_44() -> Vec<Chart> {
+pub(super) fn figure_44() -> Vec<Chart> {
     vec![schemes(
         "Laser cycles for Table 6's goals (16-bin schemes of Table 7)",
         long_range(),
@@ -422,7 +422,7 @@ pub fn figure_44() -> Vec<Chart> {
 }
 
 /// Fig. 45: their penalties.
-pub fn figure_45() -> Vec<Chart> {
+pub(super) fn figure_45() -> Vec<Chart> {
     let chart = penalties(
         "Laser power penalty of 16-bin partial histograms (Table 6)",
         long_range(),
@@ -432,7 +432,7 @@ pub fn figure_45() -> Vec<Chart> {
 }
 
 /// Fig. 108: laser cycles of the demonstrator's schemes.
-pub fn figure_108() -> Vec<Chart> {
+pub(super) fn figure_108() -> Vec<Chart> {
     vec![schemes(
         "Laser cycles for 10 cm (Table 15, 8 bins)",
         demonstrator(),
@@ -441,7 +441,7 @@ pub fn figure_108() -> Vec<Chart> {
 }
 
 /// Fig. 109: their penalties.
-pub fn figure_109() -> Vec<Chart> {
+pub(super) fn figure_109() -> Vec<Chart> {
     let chart = penalties(
         "Laser power penalty of 8-bin partial histograms (Table 15)",
         demonstrator(),
@@ -455,7 +455,7 @@ pub fn figure_109() -> Vec<Chart> {
 }
 
 /// Tables 7 and 15's systems, scheme by scheme, with overflow counted.
-pub fn table_7() -> Grid {
+pub(super) fn table_7() -> Grid {
     let mut grid = Grid::new([
         "system, scheme",
         "steps",

@@ -22,7 +22,7 @@ fn table_6(convention: Convention) -> PhotonBudget {
 const REFLECTIVITY: f64 = 0.1;
 
 /// Claim 7: signal photons.
-pub fn signal_rows() -> Vec<Row> {
+pub(super) fn signal_rows() -> Vec<Row> {
     let thesis = table_6(Convention::Thesis);
     let at_200 = thesis.signal_per_pulse_far_field(200.0, REFLECTIVITY);
     let exact = thesis.signal_per_pulse(200.0, REFLECTIVITY);
@@ -38,7 +38,7 @@ pub fn signal_rows() -> Vec<Row> {
 }
 
 /// Claim 8: sunlight.
-pub fn background_rows() -> Vec<Row> {
+pub(super) fn background_rows() -> Vec<Row> {
     let filter = Filter::new(905.0, 20.0, FilterShape::TopHat);
     let irradiance = band_irradiance(&filter);
     let hz = table_6(Convention::Thesis).background_hz(REFLECTIVITY, FULL_SUN_KLUX);
@@ -66,7 +66,7 @@ pub fn background_rows() -> Vec<Row> {
 }
 
 /// Claim 21: the demonstrator's measured light.
-pub fn demonstrator_rows() -> Vec<Row> {
+pub(super) fn demonstrator_rows() -> Vec<Row> {
     let scaled = super::penalty::demonstrator_light(100.0) / 1e6;
     vec![
         Row::holds(
@@ -130,7 +130,7 @@ fn formula(bins: u32, cycles: u64, model: Model) -> f64 {
 }
 
 /// Claim 9: P_D against Monte Carlo.
-pub fn detection_rows() -> Vec<Row> {
+pub(super) fn detection_rows() -> Vec<Row> {
     let points: Vec<(u32, u64)> = FIG_32_BINS
         .into_iter()
         .flat_map(|bins| fig_32_cycles().map(|cycles| (bins, cycles)))
@@ -178,7 +178,7 @@ pub fn detection_rows() -> Vec<Row> {
 }
 
 /// Fig. 32: P_D by formula and by Monte Carlo.
-pub fn figure_32() -> Vec<Chart> {
+pub(super) fn figure_32() -> Vec<Chart> {
     let mut chart = Chart::new(
         "Probability of detection, γ_s = 0.1, γ_b = 1/M: formula and 5000 Monte Carlo runs a point",
         Axis::log("laser cycles N"),
@@ -197,7 +197,7 @@ pub fn figure_32() -> Vec<Chart> {
 }
 
 /// Fig. 34: photon budget against distance.
-pub fn figure_34() -> Vec<Chart> {
+pub(super) fn figure_34() -> Vec<Chart> {
     let budget = table_6(Convention::Thesis);
     let signal = (5..=250).map(|z| {
         (
@@ -220,7 +220,7 @@ pub fn figure_34() -> Vec<Chart> {
 }
 
 /// Fig. 94b: the demonstrator's budget.
-pub fn figure_94() -> Vec<Chart> {
+pub(super) fn figure_94() -> Vec<Chart> {
     let signal = (2..=75).map(|z| (f64::from(z), 89.0 / f64::from(z * z)));
     let background = |klux: f64| super::penalty::demonstrator_light(klux) * 2.6e-9;
     let level = |klux: f64| [(2.0, background(klux)), (75.0, background(klux))];
@@ -237,7 +237,7 @@ pub fn figure_94() -> Vec<Chart> {
 }
 
 /// Fig. 20: wavelength of a VCSEL over temperature.
-pub fn figure_20() -> Vec<Chart> {
+pub(super) fn figure_20() -> Vec<Chart> {
     let drift = LaserDrift::vcsel(940.0);
     let line = |offset_nm: f64| {
         (-40..=105).map(move |c| (f64::from(c), drift.wavelength_nm(f64::from(c), offset_nm)))

@@ -30,7 +30,7 @@ fn thompson_ns(signal: f64) -> f64 {
 const KNOWN_BOUNDS_NS: [(f64, f64); 3] = [(100.0, 0.536543), (1e3, 0.075241), (1e5, 0.004929)];
 
 /// Claim 10.
-pub fn rows() -> Vec<Row> {
+pub(super) fn rows() -> Vec<Row> {
     let mut rows: Vec<Row> = KNOWN_BOUNDS_NS
         .into_iter()
         .map(|(signal, reference_ns)| {
@@ -74,7 +74,7 @@ pub fn rows() -> Vec<Row> {
 }
 
 /// Fig. 33.
-pub fn figure_33() -> Vec<Chart> {
+pub(super) fn figure_33() -> Vec<Chart> {
     vec![
         Chart::new(
             "Precision: Thompson and the Cramér-Rao bound (a = 1 ns, σ = 1.5 ns, 100 background counts per bin)",

@@ -225,7 +225,7 @@ impl Sensor {
 }
 
 /// Claim 28: histogram reduction ratios, and the place of the demonstrator.
-pub fn rows() -> Vec<Row> {
+pub(super) fn rows() -> Vec<Row> {
     let inverse = |bins, steps| 1.0 / zooming_reduction(bins, steps);
     let widest = |stacked: bool| {
         let bins = SENSORS
@@ -273,7 +273,7 @@ pub fn rows() -> Vec<Row> {
 }
 
 /// Tables 5 and 16 through the same theory.
-pub fn table() -> Grid {
+pub(super) fn table() -> Grid {
     let mut grid = Grid::new([
         "sensor",
         "year",
@@ -307,7 +307,7 @@ pub fn table() -> Grid {
 }
 
 /// Fig. 28: bins per pixel by year.
-pub fn figure_28() -> Vec<Chart> {
+pub(super) fn figure_28() -> Vec<Chart> {
     let bins = |stacked: bool| {
         let of_kind = SENSORS.iter().filter(move |s| s.stacked == stacked);
         of_kind.filter_map(|s| Some((f64::from(s.year), f64::from(s.bins?))))

@@ -20,7 +20,7 @@ fn intervals_ns() -> impl Iterator<Item = f64> + Clone {
 }
 
 /// Fig. 36: counts that a bin must hold.
-pub fn figure_36() -> Vec<Chart> {
+pub(super) fn figure_36() -> Vec<Chart> {
     let mut chart = Chart::new(
         "Background counts in a bin after 25 000 laser cycles",
         Axis::linear("bin interval (ns)"),
@@ -39,7 +39,7 @@ pub fn figure_36() -> Vec<Chart> {
 }
 
 /// Fig. 37: bins of a full histogram.
-pub fn figure_37() -> Vec<Chart> {
+pub(super) fn figure_37() -> Vec<Chart> {
     let mut chart = Chart::new(
         "Bins of a full histogram",
         Axis::linear("maximum distance (m)"),
@@ -60,7 +60,7 @@ pub fn figure_37() -> Vec<Chart> {
 }
 
 /// Fig. 38: bits of a full histogram to 200 m.
-pub fn figure_38() -> Vec<Chart> {
+pub(super) fn figure_38() -> Vec<Chart> {
     let mut chart = Chart::new(
         "Memory of a full histogram to 200 m, 25 000 laser cycles",
         Axis::linear("bin interval (ns)"),
@@ -84,7 +84,7 @@ pub fn figure_38() -> Vec<Chart> {
 }
 
 /// Fig. 39: area of a bit.
-pub fn figure_39() -> Vec<Chart> {
+pub(super) fn figure_39() -> Vec<Chart> {
     let cells = SRAM_CELLS
         .iter()
         .map(|c| (f64::from(c.node_nm), c.area_um2));
@@ -99,7 +99,7 @@ pub fn figure_39() -> Vec<Chart> {
 }
 
 /// Fig. 40: area of the full histogram against that of the pixel.
-pub fn figure_40() -> Vec<Chart> {
+pub(super) fn figure_40() -> Vec<Chart> {
     let area = |storage: Storage| {
         let nodes = SRAM_CELLS.iter();
         nodes.map(move |cell| (f64::from(cell.node_nm), storage.area_um2(cell)))
@@ -128,7 +128,7 @@ pub fn figure_40() -> Vec<Chart> {
 }
 
 /// Fig. 41: bins and bits that fit a quarter of the pixel.
-pub fn figure_41() -> Vec<Chart> {
+pub(super) fn figure_41() -> Vec<Chart> {
     let mut chart = Chart::new(
         "Bins that fit a quarter of the pixel (225 µm²)",
         Axis::linear("bits of a bin"),

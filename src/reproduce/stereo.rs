@@ -74,7 +74,7 @@ fn rig_errors() -> Vec<(f64, f64)> {
 }
 
 /// Claim 17: error against distance, and the nearest distance.
-pub fn error_rows() -> Vec<Row> {
+pub(super) fn error_rows() -> Vec<Row> {
     let errors = rig_errors();
     let ratio = errors
         .iter()
@@ -99,7 +99,7 @@ pub fn error_rows() -> Vec<Row> {
 }
 
 /// Fig. 61: distance limits of a 1 m pair.
-pub fn figure_61() -> Vec<Chart> {
+pub(super) fn figure_61() -> Vec<Chart> {
     let focal_mm = || (4..=100).map(|i| f64::from(i) * 0.5);
     let limit = |disparity_px: f64, pitch_um: f64| {
         focal_mm().map(move |f| {
@@ -125,7 +125,7 @@ pub fn figure_61() -> Vec<Chart> {
 }
 
 /// Fig. 68 and 105: error against distance.
-pub fn figure_68() -> Vec<Chart> {
+pub(super) fn figure_68() -> Vec<Chart> {
     let line = |sigma_px: f64| {
         (10..=200).step_by(2).map(move |z| {
             let z_m = f64::from(z);
@@ -145,7 +145,7 @@ pub fn figure_68() -> Vec<Chart> {
 }
 
 /// Claim 18: a yaw of 0.1° at 40 m.
-pub fn yaw_rows() -> Vec<Row> {
+pub(super) fn yaw_rows() -> Vec<Row> {
     let depth_m = 40.0;
     let mut scene = wall_at(depth_m);
     scene.stereo.yaw_error_deg = 0.1;
@@ -191,7 +191,7 @@ pub fn yaw_rows() -> Vec<Row> {
 }
 
 /// Fig. 70: a yaw after calibration at 40 m.
-pub fn figure_70() -> Vec<Chart> {
+pub(super) fn figure_70() -> Vec<Chart> {
     let angles = || (-20..=20).map(|i| f64::from(i) * 0.01);
     let modelled = (-4..=4).map(|i| {
         let yaw_deg = f64::from(i) * 0.05;
@@ -216,7 +216,7 @@ pub fn figure_70() -> Vec<Chart> {
 }
 
 /// Claim 19: the smallest bins that a stereo guide allows.
-pub fn bin_rows() -> Vec<Row> {
+pub(super) fn bin_rows() -> Vec<Row> {
     let hslidar_sigma_m = 8.0 * HSLIDAR_BIN_M / 6.0;
     let reach = |sigma_m: f64| (sigma_m * PAIR.focal_px * PAIR.baseline_m / THIRD_PX).sqrt();
     let on_grid = tolerated_sigma(8.0, HSLIDAR_STEP_BINS, three_sigma());
@@ -254,7 +254,7 @@ pub fn bin_rows() -> Vec<Row> {
 }
 
 /// Fig. 71: the least bin interval against distance, both sensors.
-pub fn figure_71() -> Vec<Chart> {
+pub(super) fn figure_71() -> Vec<Chart> {
     let depths = || (10..=200).step_by(2).map(f64::from);
     let least = |bins: u32| depths().map(move |z_m| (z_m, PAIR.least_bin_m(z_m, THIRD_PX, bins)));
     let on_grid = |bins: u32, step: f64| {
@@ -284,7 +284,7 @@ pub fn figure_71() -> Vec<Chart> {
 }
 
 /// Claim 26: what throws a target out of its window.
-pub fn motion_rows() -> Vec<Row> {
+pub(super) fn motion_rows() -> Vec<Row> {
     let window_m = 8.0 * HSLIDAR_BIN_M;
     let metres_per_mile = 1609.344;
     let per_frame_m = 65.0 * metres_per_mile / 3600.0 / 3.0;

@@ -35,7 +35,7 @@ fn bound_m(range_m: f64, klux: f64) -> f64 {
 }
 
 /// Claim 22: errors to 50 m.
-pub fn error_rows() -> Vec<Row> {
+pub(super) fn error_rows() -> Vec<Row> {
     let why = "The HSLIDAR chip and its measured delay lines are not modelled, so the whole chain cannot be run; the bound below is what its light allows.";
     vec![
         Row::not_modelled("RMS error to 50 m at 72 klux", "m", AtMost("0.15"), why),
@@ -46,7 +46,7 @@ pub fn error_rows() -> Vec<Row> {
 }
 
 /// Fig. 104: σ against distance, as a bound.
-pub fn figure_104() -> Vec<Chart> {
+pub(super) fn figure_104() -> Vec<Chart> {
     let line = |klux| (5..=80).map(move |z| (f64::from(z), bound_m(f64::from(z), klux)));
     vec![
         Chart::new(
@@ -65,7 +65,7 @@ pub fn figure_104() -> Vec<Chart> {
 }
 
 /// Claim 23: windows that overlap enough to follow a target.
-pub fn tracking_rows() -> Vec<Row> {
+pub(super) fn tracking_rows() -> Vec<Row> {
     let window_m = 8.0 * HSLIDAR_BIN_M;
     let step_m = metres(STEP_S);
     let overlap_m = window_m - step_m;
@@ -136,7 +136,7 @@ fn least_visibility_m(range_m: f64, klux: f64) -> f64 {
 }
 
 /// Claim 24: fog.
-pub fn fog_rows() -> Vec<Row> {
+pub(super) fn fog_rows() -> Vec<Row> {
     vec![
         Row::not_modelled("car resolved in fog", "m", Within("60", 5.0), "The fog's density is not published, and its early backscatter is not modelled."),
         Row::ours("least visibility for P_D 99.7 % at 60 m, 10 % target, 5 klux", "m", least_visibility_m(60.0, 5.0))
@@ -145,7 +145,7 @@ pub fn fog_rows() -> Vec<Row> {
 }
 
 /// Claim 25: glass.
-pub fn glass_rows() -> Vec<Row> {
+pub(super) fn glass_rows() -> Vec<Row> {
     vec![Row::not_modelled(
         "figure behind a glass door",
         "",
@@ -155,7 +155,7 @@ pub fn glass_rows() -> Vec<Row> {
 }
 
 /// Claim 27: the time of a frame.
-pub fn frame_rows() -> Vec<Row> {
+pub(super) fn frame_rows() -> Vec<Row> {
     let hslidar = SensorConfig {
         rows: 32,
         cols: 64,
@@ -202,7 +202,7 @@ pub fn frame_rows() -> Vec<Row> {
 }
 
 /// Fig. 106: the frame's time.
-pub fn figure_106() -> Vec<Chart> {
+pub(super) fn figure_106() -> Vec<Chart> {
     let bars = [
         BEFORE_EXPOSURE_S,
         EXPOSURE_S,

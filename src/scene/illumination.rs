@@ -33,17 +33,13 @@ impl Scene {
         };
         (truth.range_m.iter().zip(&truth.reflectivity))
             .map(|(range_m, &reflectivity)| match *range_m {
-                Some(range_m) => PixelLight {
-                    signal_per_cycle: (budget.signal_per_pulse(range_m, reflectivity))
-                        .min(MOST_SIGNAL_PER_CYCLE),
-                    arrival: Time::of_flight(range_m),
-                    background_hz: background_hz(reflectivity),
-                },
-                None => PixelLight {
-                    signal_per_cycle: 0.0,
-                    arrival: Time::ZERO,
-                    background_hz: background_hz(SKY_REFLECTIVITY),
-                },
+                Some(range_m) => {
+                    let signal = budget.signal_per_pulse(range_m, reflectivity);
+                    let echo = signal.min(MOST_SIGNAL_PER_CYCLE);
+                    PixelLight::echo(echo, Time::of_flight(range_m))
+                        .with_background(background_hz(reflectivity))
+                }
+                None => PixelLight::background(background_hz(SKY_REFLECTIVITY)),
             })
             .collect()
     }
@@ -59,8 +55,8 @@ mod tests {
         let truth = GroundTruth::render(&scene, 64, 64);
         let lights = scene.pixel_light(&truth);
         let sky = truth.range_m.iter().position(Option::is_none).unwrap();
-        assert_eq!(lights[sky].signal_per_cycle, 0.0);
-        assert!(lights[sky].background_hz > 1e6);
+        assert_eq!(lights[sky].signal_per_cycle(), 0.0);
+        assert!(lights[sky].background_hz() > 1e6);
     }
 
     #[test]
@@ -83,8 +79,8 @@ mod tests {
         scene.lidar.pulse_energy_uj = 1e300;
         let truth = GroundTruth::render(&scene, 4, 4);
         for light in scene.pixel_light(&truth) {
-            assert!(light.signal_per_cycle <= MOST_SIGNAL_PER_CYCLE);
-            assert!(light.background_hz <= MOST_BACKGROUND_HZ);
+            assert!(light.signal_per_cycle() <= MOST_SIGNAL_PER_CYCLE);
+            assert!(light.background_hz() <= MOST_BACKGROUND_HZ);
         }
     }
 
@@ -96,9 +92,9 @@ mod tests {
         scene.lidar.dark_count_hz += 1000.0;
         let after = scene.pixel_light(&truth);
         for ((range_m, a), b) in truth.range_m.iter().zip(&before).zip(&after) {
-            assert!((b.background_hz - a.background_hz - 1000.0).abs() < 1e-6);
+            assert!((b.background_hz() - a.background_hz() - 1000.0).abs() < 1e-6);
             if let Some(r) = range_m {
-                assert!((a.arrival.as_range_m() - r).abs() < 1e-6);
+                assert!((a.arrival().as_range_m() - r).abs() < 1e-6);
             }
         }
     }

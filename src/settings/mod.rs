@@ -6,7 +6,7 @@
 //! ```
 //!
 //! A key's table says its unit, its range and where its default comes from, once: for reading, for rules, and for the
-//! commented file that [`commented`] prints.
+//! commented file that `commented` prints.
 
 mod document;
 mod key;
@@ -15,4 +15,5 @@ mod quantity;
 
 pub use document::{Document, Fault};
 pub use key::{Key, Range};
-pub use print::{Section, commented};
+pub use print::Section;
+pub(crate) use print::commented;

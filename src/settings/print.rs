@@ -20,7 +20,7 @@ pub struct Section {
 /// All of `values`, by `sections`, every key with what it is, its unit, range and source. What a key is where a file
 /// leaves it out is added where that is another value (`left_out` has these). A list gets its keys explained once, before
 /// its items.
-pub fn commented(sections: &[Section], values: &Table, left_out: &Table) -> String {
+pub(crate) fn commented(sections: &[Section], values: &Table, left_out: &Table) -> String {
     let mut text = String::new();
     for section in sections {
         if !text.is_empty() {

@@ -24,9 +24,9 @@ use crate::engine::{
 use crate::files::InputError;
 use crate::guide::GuideMap;
 use crate::photon::{PhotonStream, SpadEvent};
-use crate::ranging::{DepthOptions, EchoFinder};
+use crate::ranging::{DepthOptions, EchoFinder, UnequalBins};
 use crate::scene::{GroundTruth, Scene};
-use crate::units::Time;
+use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
 use crate::waves::WaveFormat;
 
 /// Which engine runs the macropixels that are not probed.
@@ -133,10 +133,11 @@ pub enum FrameError {
     /// The engine cannot run this configuration.
     #[error(transparent)]
     Engine(#[from] EngineError),
+    /// Depths cannot be found in such histograms.
+    #[error(transparent)]
+    Ranging(#[from] UnequalBins),
     /// The cohort engine cannot take all macropixels of a frame.
-    #[error(
-        "{why}; this is so for {refused} of {pixels} macropixels, which --tolerance leaves to the window engine"
-    )]
+    #[error("{why}; this is so for {refused} of {pixels} macropixels")]
     Refused {
         /// The refusal of the first of them.
         why: EngineError,
@@ -243,12 +244,14 @@ pub fn take_frame(
         .map(|pixel| LitPixel {
             number: pixel as u32,
             start: starts[pixel],
-            light: wanted[pixel].map(|_| light[pixel]),
+            light: wanted[pixel].map(|_| light[pixel].clone()),
         })
         .collect();
     let photons_expected = light
         .iter()
-        .map(|light| light.photons_per_cycle(stream.config()) * f64::from(exposure.laser_cycles))
+        .map(|light| {
+            stream.config().most_photons_per_cycle(light) * f64::from(exposure.laser_cycles)
+        })
         .sum();
     times.light_s = clock.lap();
 
@@ -289,13 +292,14 @@ pub fn take_frame(
             number,
             start,
             light,
-        } = pixels[pixel];
-        let photons = light.map(|light| stream.pixel_events(number, &light));
+        } = &pixels[pixel];
+        let photons = light.as_ref();
+        let photons = photons.map(|light| stream.pixel_events(*number, light));
         let events = photons.unwrap_or_default().events;
-        let gate = run_probe(sensor, exposure, probe, start, &events)?;
+        let gate = run_probe(sensor, exposure, probe, *start, &events)?;
         let engine = engine_kind.of_probes(kept.is_some());
         let model = match kept.is_some() || engine != *engine_kind {
-            true => Window::new(sensor, exposure).histogram(start, &events)?,
+            true => Window::new(sensor, exposure).histogram(*start, &events)?,
             false => exposed.histograms[pixel].to_vec(),
         };
         if gate == model {
@@ -311,7 +315,7 @@ pub fn take_frame(
     })?;
     times.probes_s = clock.lap();
 
-    let finder = EchoFinder::new(sensor, exposure, scene.pulse_sigma(), depth);
+    let finder = EchoFinder::new(&law, scene.pulse_sigma(), depth)?;
     let spads_fire = scene.lidar.pde > 0.0 || scene.lidar.dark_count_hz > 0.0;
     let depths: Vec<PixelDepth> = (0..sensor.pixels())
         .into_par_iter()
@@ -353,6 +357,7 @@ pub fn take_frame(
     let circumstances = Circumstances {
         sensor,
         exposure,
+        bin_s: finder.bin_s(),
         scene,
         light: &light,
         pixels: &depths,
@@ -364,7 +369,7 @@ pub fn take_frame(
         rows: sensor.rows,
         cols: sensor.cols,
         bins: sensor.bins,
-        bin_m: exposure.clock.period().as_range_m(),
+        bin_m: finder.bin_s() * SPEED_OF_LIGHT_M_PER_S / 2.0,
         histograms: exposed.histograms.into_counts(),
         pixels: depths,
         remark,

@@ -108,13 +108,20 @@ impl ParetoSettings {
         let budget = self
             .scene
             .photon_budget(self.sensor.rows as u32, self.sensor.cols as u32);
-        let bin_m = SPEED_OF_LIGHT_M_PER_S / (2.0 * self.sensor.clk_hz);
+        let bin_m = |range_m: f64| {
+            let window = law
+                .window(law.start_for(Time::of_flight(range_m))?)
+                .open()?;
+            let width_s = law.edges(&window, 0).mean_width_s();
+            Some(width_s * SPEED_OF_LIGHT_M_PER_S / 2.0)
+        };
         let cells = self.illuminances_klux.iter().flat_map(|&klux| {
             let ranges = self.ranges_m.iter();
             ranges.map(move |&range_m| (klux, range_m))
         });
         cells
             .filter_map(|(illuminance_klux, range_m)| {
+                let bin_m = bin_m(range_m)?;
                 let pixel = |number: usize| {
                     let phase = number as f64 / self.macropixels as f64 - 0.5;
                     let range_m = range_m + phase * bin_m;
@@ -122,13 +129,16 @@ impl ParetoSettings {
                     Some(LitPixel {
                         number: number as u32,
                         start: law.start_for(arrival)?,
-                        light: Some(PixelLight {
-                            signal_per_cycle: budget.signal_per_pulse(range_m, self.reflectivity),
-                            arrival,
-                            background_hz: budget
-                                .background_hz(self.reflectivity, illuminance_klux)
-                                + self.scene.lidar.dark_count_hz,
-                        }),
+                        light: Some(
+                            PixelLight::echo(
+                                budget.signal_per_pulse(range_m, self.reflectivity),
+                                arrival,
+                            )
+                            .with_background(
+                                budget.background_hz(self.reflectivity, illuminance_klux)
+                                    + self.scene.lidar.dark_count_hz,
+                            ),
+                        ),
                     })
                 };
                 let pixels: Option<Vec<LitPixel>> = (0..self.macropixels).map(pixel).collect();

@@ -10,7 +10,7 @@
 
 use crate::chip::SensorConfig;
 use crate::engine::{Cohort, EngineError, LitPixel, Window};
-use crate::photon::{PhotonStream, PixelLight, SPADS};
+use crate::photon::{PhotonStream, PixelLight};
 
 /// A photon in the window of the window engine.
 const PHOTON_NS: f64 = 5.0;
@@ -45,12 +45,13 @@ pub fn window_ns(
 ) -> f64 {
     let cycles = f64::from(stream.config().laser_cycles);
     if window.draws_whole_cycles(stream, pixel) {
-        return cycles * SORTED_NS * light.photons_per_cycle(stream.config());
+        return cycles * SORTED_NS * stream.config().most_photons_per_cycle(light);
     }
-    let background = light.background_hz * config.bins as f64 / config.clk_hz;
-    let photons = background + light.signal_per_cycle;
-    let spads = SPADS as f64;
-    let fired = -spads * libm::expm1(-light.signal_per_cycle / spads);
+    let background = light.background_hz() * config.bins as f64 / config.clk_hz;
+    let signal = light.signal_per_cycle();
+    let photons = background + signal;
+    let spads = config.spads() as f64;
+    let fired = -spads * libm::expm1(-signal / spads);
     let one_by_one = photons * (PHOTON_NS + TOGETHER_NS * photons);
     let bright = BRIGHT_CYCLE_NS + BRIGHT_PHOTON_NS * background + BRIGHT_ECHO_NS * fired;
     // The engine draws cycle by cycle where that is cheaper, or nearly so.

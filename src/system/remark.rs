@@ -2,16 +2,19 @@
 
 use super::pixel::{NoDepth, PixelDepth};
 use crate::chip::{EventType, Exposure, Mode, SensorConfig, WindowLaw};
-use crate::photon::{PixelLight, SPADS};
+use crate::photon::PixelLight;
 use crate::ranging::{EchoLight, Response};
 use crate::scene::Scene;
+use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// A frame's circumstances.
-pub struct Circumstances<'a> {
+pub(super) struct Circumstances<'a> {
     /// The chip.
     pub sensor: &'a SensorConfig,
     /// Its clocks.
     pub exposure: &'a Exposure,
+    /// Length of a bin, s.
+    pub bin_s: f64,
     /// The world.
     pub scene: &'a Scene,
     /// The light on every macropixel.
@@ -22,7 +25,7 @@ pub struct Circumstances<'a> {
 
 impl Circumstances<'_> {
     /// The sentence, if fewer than half of the macropixels that see a surface have a depth.
-    pub fn remark(&self) -> Option<String> {
+    pub(super) fn remark(&self) -> Option<String> {
         let seeing = || self.pixels.iter().filter(|p| p.true_m.is_some());
         let surfaces = seeing().count();
         if surfaces == 0 {
@@ -112,7 +115,8 @@ impl Circumstances<'_> {
             .filter_map(|p| Some((p.guide_m? - p.true_m?).abs()))
             .collect();
         let largest = errors.iter().fold(0.0, |a: f64, &b| a.max(b));
-        let window_m = self.bin_m() * self.sensor.bins as f64;
+        let window_s = self.bin_s * self.sensor.bins as f64;
+        let window_m = window_s * SPEED_OF_LIGHT_M_PER_S / 2.0;
         format!(
             "a window is {window_m:.1} m long, and the guide is wrong by up to {largest:.1} m; give more bins, a slower CLK or a better guide"
         )
@@ -140,24 +144,18 @@ impl Circumstances<'_> {
                     "{asked} a bin of the brightest echo has with a probability of {chance:.1e} in each of {cycles} laser cycles; give event_type = \"greater\" and a lower threshold"
                 ),
                 false => format!(
-                    "{asked} the {SPADS} of a macropixel never have; give event_type = \"greater\" and a lower threshold"
+                    "{asked} the {} of a macropixel never have; give event_type = \"greater\" and a lower threshold",
+                    self.sensor.spads()
                 ),
             };
         }
         let brightest = self.brightest(NoDepth::NoSignificantPeak);
         let (signal, background) = brightest.map_or((0.0, 0.0), |light| {
-            (
-                light.signal_per_cycle,
-                light.background_hz / self.sensor.clk_hz,
-            )
+            (light.signal_per_cycle(), light.background_hz() * self.bin_s)
         });
         format!(
             "the brightest of these echoes brings {signal:.2e} photons a laser cycle to a background of {background:.2e} a bin, for {cycles} laser cycles; give more of them, or more light"
         )
-    }
-
-    fn bin_m(&self) -> f64 {
-        self.exposure.clock.period().as_range_m()
     }
 
     /// The light of the brightest echo without a depth for this reason.
@@ -166,7 +164,7 @@ impl Circumstances<'_> {
         with_reason
             .filter(|(pixel, _)| pixel.no_depth == Some(reason) && pixel.true_m.is_some())
             .map(|(_, light)| light)
-            .max_by(|a, b| a.signal_per_cycle.total_cmp(&b.signal_per_cycle))
+            .max_by(|a, b| a.signal_per_cycle().total_cmp(&b.signal_per_cycle()))
     }
 
     /// The chance that the fullest bin of that echo counts in a laser cycle.
@@ -174,10 +172,11 @@ impl Circumstances<'_> {
         let Some(light) = self.brightest(reason) else {
             return 0.0;
         };
-        let chances = Response::new(self.sensor, self.scene.pulse_sigma()).chances(&EchoLight {
+        let response = Response::new(self.sensor, self.bin_s, self.scene.pulse_sigma());
+        let chances = response.chances(&EchoLight {
             position_bins: (self.sensor.bins / 2) as f64,
-            signal: light.signal_per_cycle,
-            background_per_bin: light.background_hz / self.sensor.clk_hz,
+            signal: light.signal_per_cycle(),
+            background_per_bin: light.background_hz() * self.bin_s,
         });
         chances.into_iter().fold(0.0, f64::max)
     }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::chip::{Exposure, SPADS, SensorConfig};
+use crate::chip::{Exposure, SensorConfig};
 use crate::engine::{EngineError, Expose, Exposed, LitPixel, expose, stream_config};
 use crate::photon::{PhotonStream, PixelLight, SpadEvent};
 use crate::units::Time;
@@ -65,7 +65,7 @@ impl SpeedFrame {
             _ => stop_periods,
         };
         let background_hz = match case {
-            SpeedCase::Bright => 100e6 * SPADS as f64,
+            SpeedCase::Bright => 100e6 * config.spads() as f64,
             _ => 8e6,
         };
         let exposure = Exposure::new(&config, stop_periods, laser_cycles);
@@ -79,13 +79,15 @@ impl SpeedFrame {
             LitPixel {
                 number,
                 start: start as u16,
-                light: Some(PixelLight {
-                    signal_per_cycle: 0.1,
-                    arrival: exposure
-                        .clock
-                        .periods(middle.rem_euclid(i64::from(stop_periods))),
-                    background_hz,
-                }),
+                light: Some(
+                    PixelLight::echo(
+                        0.1,
+                        exposure
+                            .clock
+                            .periods(middle.rem_euclid(i64::from(stop_periods))),
+                    )
+                    .with_background(background_hz),
+                ),
             }
         });
         SpeedFrame {
@@ -120,7 +122,7 @@ impl SpeedFrame {
         let edges = i64::from(exposure.stop_periods) * i64::from(exposure.laser_cycles);
         // Pulses come with the falling CLK edge, far from the rising one that takes them.
         let times = (0..edges).map(|edge| exposure.falling(edge));
-        let spads = 0..SPADS as u8;
+        let spads = 0..self.config.spads() as u8;
         times
             .flat_map(|time| spads.clone().map(move |spad| SpadEvent { time, spad }))
             .collect()

@@ -166,7 +166,7 @@ impl Tolerance<'_> {
         let mut run = |engine: &dyn Expose, takes: &dyn Fn(&Result<f64, OnWindow>) -> bool| {
             let begin = Instant::now();
             let members: Vec<usize> = (0..pixels.len()).filter(|&i| takes(&plan[i])).collect();
-            let chosen: Vec<LitPixel> = members.iter().map(|&i| pixels[i]).collect();
+            let chosen: Vec<LitPixel> = members.iter().map(|&i| pixels[i].clone()).collect();
             let exposed = expose(engine, stream, &chosen, &done)?;
             work += exposed.work;
             for (pixel, counts) in members.into_iter().zip(&exposed.histograms) {
@@ -185,11 +185,11 @@ impl Tolerance<'_> {
 }
 
 struct Planner<'a> {
-    cohort: &'a Cohort<'a>,
-    exact: &'a Cohort<'a>,
+    cohort: &'a Cohort,
+    exact: &'a Cohort,
     law: &'a WindowLaw,
     peak: &'a PeakOptions,
-    window: &'a Window<'a>,
+    window: &'a Window,
     stream: &'a PhotonStream,
     config: &'a SensorConfig,
 }

@@ -107,13 +107,13 @@ pub fn full_bins(range: f64, bin: f64) -> u32 {
 }
 
 /// Bits of a counter that holds `count`; at least one.
-pub fn bits_for(count: f64) -> u32 {
+pub(crate) fn bits_for(count: f64) -> u32 {
     debug_assert!((0.0..1e18).contains(&count));
     (count.ceil() as u64).max(1).ilog2() + 1
 }
 
 /// Bins of `bin_bits` that fit into `area_um2` of `cell`.
-pub fn bins_within(area_um2: f64, bin_bits: u32, cell: &SramCell) -> u32 {
+pub(crate) fn bins_within(area_um2: f64, bin_bits: u32, cell: &SramCell) -> u32 {
     debug_assert!(bin_bits > 0);
     (area_um2 / (cell.area_um2 * f64::from(bin_bits))).floor() as u32
 }

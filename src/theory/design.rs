@@ -17,7 +17,7 @@ use libm::erf;
 use crate::numerics::{normal_above, normal_density};
 
 /// ±3σ of a normal distribution: the thesis's "99.7 %".
-pub fn three_sigma() -> f64 {
+pub(crate) fn three_sigma() -> f64 {
     erf(3.0 / std::f64::consts::SQRT_2)
 }
 
@@ -66,7 +66,7 @@ impl Design {
 /// standard deviation `sigma` and a window centre that is off by up to half a `step` (0: none), uniformly.
 ///
 /// All three in the same unit; `sigma` and `window` above 0.
-pub fn share_inside(sigma: f64, window: f64, step: f64) -> f64 {
+pub(crate) fn share_inside(sigma: f64, window: f64, step: f64) -> f64 {
     let half = 0.5 * window;
     if step <= 1e-6 * sigma {
         return erf(half / (sigma * std::f64::consts::SQRT_2));
@@ -81,7 +81,7 @@ pub fn share_inside(sigma: f64, window: f64, step: f64) -> f64 {
 
 /// The greatest `sigma` for which [`share_inside`] is at least `share` (0 to 1, exclusive); `None` where even a
 /// perfect estimate falls outside more often, because the steps are wider than the window.
-pub fn tolerated_sigma(window: f64, step: f64, share: f64) -> Option<f64> {
+pub(crate) fn tolerated_sigma(window: f64, step: f64, share: f64) -> Option<f64> {
     let (mut low, mut high) = (1e-9 * window, 1e3 * window);
     if share_inside(low, window, step) < share {
         return None;

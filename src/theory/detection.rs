@@ -17,7 +17,6 @@
 //! for any M below 10⁶.
 
 use super::counts::{Counts, Tails};
-pub use super::cycles::laser_cycles_for;
 use super::gaussian;
 use crate::numerics::ln_exprel_neg;
 

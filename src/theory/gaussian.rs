@@ -14,13 +14,13 @@ const SMOOTH_SIGMA: f64 = 1024.0;
 const REACH: f64 = 39.0;
 
 /// P_D with the standard deviation that is meant, √mean. `signal` µ_S and `background` µ_B are mean counts.
-pub fn as_meant(signal: f64, background: f64, bins: u32) -> f64 {
+pub(super) fn as_meant(signal: f64, background: f64, bins: u32) -> f64 {
     let total = signal + background;
     sum(total, total.sqrt(), background, background.sqrt(), bins)
 }
 
 /// P_D exactly as Eq. 18 and 19 are printed: each mean serves as its own standard deviation.
-pub fn as_printed(signal: f64, background: f64, bins: u32) -> f64 {
+pub(super) fn as_printed(signal: f64, background: f64, bins: u32) -> f64 {
     let total = signal + background;
     sum(total, total, background, background, bins)
 }

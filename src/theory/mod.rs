@@ -3,7 +3,7 @@
 
 pub mod capacity;
 mod counts;
-mod cycles;
+pub mod cycles;
 pub mod design;
 pub mod detection;
 pub mod estimators;

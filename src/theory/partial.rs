@@ -21,7 +21,8 @@
 
 use super::Counts;
 use super::capacity::full_bins;
-use super::detection::{self, PerCycle, laser_cycles_for};
+use super::cycles::laser_cycles_for;
+use super::detection::{self, PerCycle};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Light as a function of range.
@@ -130,7 +131,7 @@ impl Cost {
 }
 
 /// The greatest mean of a Poisson count that exceeds a counter of `bin_bits` with no more than `chance`.
-pub fn largest_mean(bin_bits: u32, chance: f64) -> f64 {
+pub(crate) fn largest_mean(bin_bits: u32, chance: f64) -> f64 {
     let capacity = (1u64 << bin_bits) - 1;
     let overflows = |mean: f64| Counts::poisson(mean, 0.0).above(capacity) > chance;
     let (mut low, mut high) = (0.0, capacity as f64);
@@ -149,13 +150,13 @@ pub fn largest_mean(bin_bits: u32, chance: f64) -> f64 {
 }
 
 /// Share of a full histogram's bins that `bins` bins need which zoom over `steps` steps (Eq. 5).
-pub fn zooming_reduction(bins: u32, steps: u32) -> f64 {
+pub(crate) fn zooming_reduction(bins: u32, steps: u32) -> f64 {
     f64::from(bins) / f64::from(bins).powi(steps as i32)
 }
 
 /// Share of a full histogram's bins that `bins` bins need which slide over `windows` windows, each of which repeats
 /// `overlap` bins of the one before.
-pub fn sliding_reduction(bins: u32, windows: u32, overlap: u32) -> f64 {
+pub(crate) fn sliding_reduction(bins: u32, windows: u32, overlap: u32) -> f64 {
     let covered = bins + (windows - 1) * (bins - overlap);
     f64::from(bins) / f64::from(covered)
 }

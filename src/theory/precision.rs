@@ -174,20 +174,8 @@ fn ln_root_mean(ln_information: impl Fn(f64) -> f64, breaks: &[f64]) -> f64 {
     0.5 * (mean.ln() - least)
 }
 
-/// Laser cycles for a precision of `target_ns` after Thompson, when one cycle brings `background` counts
-/// per bin (γ_b) and `signal` counts (γ_s).
-pub fn thompson_laser_cycles(
-    target_ns: f64,
-    bin_ns: f64,
-    sigma_ns: f64,
-    background: f64,
-    signal: f64,
-) -> f64 {
-    (thompson(bin_ns, sigma_ns, background, signal) / target_ns).powi(2)
-}
-
-/// Laser cycles for a precision of `target_ns` by the Cramér-Rao bound; arguments as in
-/// [`thompson_laser_cycles`]. Round up for a whole number.
+/// Laser cycles for a precision of `target_ns` by the Cramér-Rao bound, when one cycle brings `background` counts
+/// per bin (γ_b) and `signal` counts (γ_s). Round up for a whole number.
 pub fn cramer_rao_laser_cycles(
     target_ns: f64,
     bin_ns: f64,

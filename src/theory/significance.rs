@@ -102,7 +102,7 @@ fn gain(width: usize, sigma_bins: f64) -> f64 {
 ///
 /// Summed upwards from k, so that it keeps its digits however small it is; up to the mean, where it says nothing, it is
 /// taken as 0. Accurate to about 10⁻¹².
-pub fn ln_hypergeometric_tail(k: u64, marked: u64, drawn: u64, cells: u64) -> f64 {
+pub(crate) fn ln_hypergeometric_tail(k: u64, marked: u64, drawn: u64, cells: u64) -> f64 {
     debug_assert!(marked <= cells && drawn <= cells);
     let most = marked.min(drawn);
     if k > most {

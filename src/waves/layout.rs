@@ -93,7 +93,7 @@ impl Shape {
     ///
     /// # Errors
     /// When `netlist` has none.
-    pub fn of(netlist: &Netlist, path: &str) -> io::Result<Self> {
+    pub(super) fn of(netlist: &Netlist, path: &str) -> io::Result<Self> {
         let (scope, name) = path.rsplit_once('.').unwrap_or(("", path));
         let signal = netlist
             .scope(scope)
@@ -106,7 +106,7 @@ impl Shape {
     }
 
     /// Its range as GTKWave names it, if it is a bus. GTKWave shortens the range [0:0] when it reads the file.
-    pub fn range(&self) -> String {
+    pub(super) fn range(&self) -> String {
         match (self.is_bus, self.width) {
             (false, _) => String::new(),
             (true, 1) => "[0]".to_owned(),
@@ -115,7 +115,7 @@ impl Shape {
     }
 
     /// Characters of its longest value in `radix`.
-    pub fn digits(&self, radix: Radix) -> usize {
+    pub(super) fn digits(&self, radix: Radix) -> usize {
         match radix {
             Radix::Binary => self.width,
             Radix::Hex => self.width.div_ceil(4),

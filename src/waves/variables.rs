@@ -53,7 +53,7 @@ impl Variables {
     ///
     /// # Errors
     /// Those of `out`, and a path in `selection` that does not exist.
-    pub fn declare(
+    pub(super) fn declare(
         netlist: &Netlist,
         selection: &Selection,
         out: &mut impl Declare,
@@ -124,7 +124,7 @@ impl Variables {
     }
 
     /// Lists for every net the buses that it is a bit of: start of each net's list, then the lists.
-    pub fn buses_of_nets(&self) -> (Vec<u32>, Vec<u32>) {
+    pub(super) fn buses_of_nets(&self) -> (Vec<u32>, Vec<u32>) {
         let buses = || (0u32..).zip(&self.all).filter(|(_, v)| v.nets.len() > 1);
         let mut start = vec![0u32; self.scalar_of_net.len() + 1];
         for (_, bus) in buses() {

@@ -19,7 +19,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use guided_dtof::chip::window_law::Window;
+use guided_dtof::chip::window_law::{Irregular, Window};
 use guided_dtof::chip::{
     AfterBorrow, ChipTiming, Exposure, Probe, SensorConfig, Tap, WindowLaw, metdc, p_counter,
     p_counter_timing,
@@ -466,7 +466,9 @@ fn repeated_capture(bench: &Bench, seen: &Recorder, checks: &mut Checks) {
         let exposure = Exposure::new(&config, scene.stop_periods as u32, 1);
         let law = match WindowLaw::new(&config, &exposure).window(scene.start as u16) {
             Window::Open(_) => "one window".to_owned(),
-            Window::Irregular(why) => why.to_owned(),
+            Window::Irregular(Irregular::LocalStopRepeats { .. }) => {
+                "LOCAL_STOP rises more than once in a laser cycle".to_owned()
+            }
             other => format!("{other:?}"),
         };
         let expected = match after_borrow {

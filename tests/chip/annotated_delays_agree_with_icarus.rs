@@ -7,7 +7,7 @@ use crate::icarus;
 use std::collections::HashSet;
 
 use guided_dtof::bench::{StimulusPlan, export_annotated_verilog};
-use guided_dtof::chip::{Exposure, SensorConfig, sensor};
+use guided_dtof::chip::{Exposure, SensorConfig, array};
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::netlist::sdf::{Sdf, SdfOptions, annotate, write_sdf};
 use guided_dtof::netlist::{Corner, Library, Netlist, Timing};
@@ -38,7 +38,7 @@ fn compare(seed: u64) -> Vec<Vec<i64>> {
     apply_dead_time(&mut pulses, config.dead_time());
     let pulses = [&pulses[..]];
 
-    let netlist = Netlist::elaborate(&sensor::circuit(&config));
+    let netlist = Netlist::elaborate(&array::circuit(&config));
     let nominal = Timing::nominal(&netlist, &Library::default(), config.corner);
     let drawn = random_delays(&netlist, &nominal, random);
     let mut text = Vec::new();

@@ -5,7 +5,7 @@ use crate::bench;
 
 use bench::{Bench, SETTLING, corners};
 use guided_dtof::chip::{
-    AfterBorrow, EventType, Overflow, SPADS, correlation, front_end, histogram, metdc,
+    AfterBorrow, EventType, Overflow, correlation, count_bits, front_end, histogram, metdc,
     p_counter_timing,
 };
 use guided_dtof::logic::Logic;
@@ -68,9 +68,10 @@ proptest! {
     fn the_front_end_gives_each_pulse_one_period(
         corner in corners(),
         period_ps in 600i64..5_000,
-        pulses in prop::collection::vec((0u8..16, 0i64..60, 0i64..1_000_000, any::<bool>()), 0..100),
+        spads in prop_oneof![Just(1u8), Just(4), Just(16), Just(64)],
+        pulses in prop::collection::vec((0u8..64, 0i64..60, 0i64..1_000_000, any::<bool>()), 0..100),
     ) {
-        let mut bench = Bench::new(&front_end::circuit(), corner);
+        let mut bench = Bench::new(&front_end::circuit(usize::from(spads)), corner);
         let timing = bench.timing();
         let width = Time::from_ps(100);
         let rise = |k: i64| SETTLING * 2 + Time::from_ps(period_ps) * k;
@@ -79,11 +80,11 @@ proptest! {
             .into_iter()
             .map(|(spad, k, within, is_close)| {
                 let offset = if is_close { within % 3 - 1 } else { within * period_ps / 1_000 };
-                (rise(k) - timing.spad_to_toggle + Time::from_fs(offset), spad)
+                (rise(k) - timing.spad_to_toggle + Time::from_fs(offset), spad % spads)
             })
             .collect();
         pulses.sort_unstable();
-        let mut free_from = [Time::ZERO; SPADS];
+        let mut free_from = [Time::ZERO; 64];
         pulses.retain(|&(time, spad)| {
             let is_free = time > free_from[spad as usize];
             if is_free {
@@ -108,7 +109,7 @@ proptest! {
             }
             model.clock();
             let found = run.number_at(rise(k + 1) - Time::from_fs(1), &timed);
-            prop_assert_eq!(found, Some(model.spad_timed() as u64), "after edge {}", k);
+            prop_assert_eq!(found, Some(model.spad_timed()), "after edge {}", k);
         }
     }
 
@@ -234,14 +235,19 @@ const TYPES: [EventType; 4] = [
 ];
 
 /// Drives one condition after the other and returns the longest time that SPAD_EVENT took to settle.
-fn correlate(corner: Corner, conditions: impl Iterator<Item = (u16, u8, u8)>) -> Time {
-    let mut bench = Bench::new(&correlation::circuit(), corner);
+fn correlate(
+    spads: usize,
+    corner: Corner,
+    conditions: impl Iterator<Item = (u64, u8, u8)>,
+) -> Time {
+    let mut bench = Bench::new(&correlation::circuit(spads), corner);
     let timing = bench.timing();
-    let step = timing.clk_to_event;
+    // That of 16 SPADs; a tree of 64 adds two levels and bits.
+    let step = timing.clk_to_event * if spads > 16 { 2 } else { 1 };
     let conditions: Vec<_> = conditions.collect();
     let at = |k: usize| SETTLING + step * k as i64;
     for (k, &(timed, code, threshold)) in conditions.iter().enumerate() {
-        bench.number(at(k), "SPAD_TIMED", timed as u64);
+        bench.number(at(k), "SPAD_TIMED", timed);
         bench.number(at(k), "TYPE", code as u64);
         bench.number(at(k), "THRESHOLD", threshold as u64);
     }
@@ -250,14 +256,18 @@ fn correlate(corner: Corner, conditions: impl Iterator<Item = (u16, u8, u8)>) ->
     for (k, &(timed, code, threshold)) in conditions.iter().enumerate() {
         let expected = correlation::model(timed, TYPES[code as usize], threshold);
         let found = run.is_high_at(at(k + 1) - Time::from_fs(1), event);
-        assert_eq!(found, Some(expected), "{timed:#06x} {code} {threshold}");
+        assert_eq!(
+            found,
+            Some(expected),
+            "{spads}: {timed:#x} {code} {threshold}"
+        );
     }
     let taken = |&(time, ..): &(Time, NetId, Logic)| {
         let since = (time - SETTLING).as_fs().max(0);
         Time::from_fs(since % step.as_fs())
     };
     let slowest = run.recorder.changes().iter().map(taken).max();
-    let netlist = Netlist::elaborate(&correlation::circuit());
+    let netlist = Netlist::elaborate(&correlation::circuit(spads));
     let starts = netlist.inputs().into_iter();
     let starts: Vec<_> = starts
         .flat_map(|net| Edge::BOTH.map(|edge| (net, edge)))
@@ -278,21 +288,31 @@ fn correlate(corner: Corner, conditions: impl Iterator<Item = (u16, u8, u8)>) ->
 #[test]
 fn the_correlation_block_counts_every_pattern_of_spads() {
     // Neighbours in this order differ in about half their bits; type and threshold go through all pairs.
-    let conditions = (0..1u32 << SPADS).map(|i| {
-        let timed = i.wrapping_mul(0x9e37) as u16;
+    let conditions = (0..1u32 << 16).map(|i| {
+        let timed = u64::from(i.wrapping_mul(0x9e37) as u16);
         (timed, (i % 4) as u8, (i / 4 % 32) as u8)
     });
-    let slowest = correlate(Corner::Typ, conditions);
+    let slowest = correlate(16, Corner::Typ, conditions);
     assert!(slowest > Time::ZERO);
 }
 
 #[test]
 fn the_correlation_block_compares_every_count_with_every_threshold() {
-    for corner in Corner::ALL {
-        let conditions = (0..=SPADS as u32).flat_map(|count| {
-            let timed = ((1u32 << count) - 1) as u16;
-            (0..128u8).map(move |c| (timed.rotate_left(c as u32), c % 4, c / 4))
+    for (spads, corner) in [1, 2, 4, 16, 64]
+        .into_iter()
+        .zip(Corner::ALL.into_iter().cycle())
+    {
+        let all = u64::MAX >> (64 - spads);
+        let thresholds = 1 << count_bits(spads);
+        let conditions = (0..=spads as u32).flat_map(|count| {
+            let timed = ((1u128 << count) - 1) as u64;
+            (0..4 * thresholds as u32).map(move |c| {
+                let by = c % spads as u32;
+                let turned =
+                    (timed << by | timed.checked_shr(spads as u32 - by).unwrap_or(0)) & all;
+                (turned, (c % 4) as u8, (c / 4) as u8)
+            })
         });
-        correlate(corner, conditions);
+        correlate(spads, corner, conditions);
     }
 }

@@ -22,6 +22,7 @@
 
 use crate::icarus;
 use crate::scenario;
+use crate::wide8x8::wide8x8;
 
 use crate::every_edge;
 
@@ -34,6 +35,7 @@ use std::time::Instant;
 use every_edge::circuit::{self, Case};
 use every_edge::waves::{Figures, Waves};
 use guided_dtof::bench::{StimulusPlan, export_verilog};
+use guided_dtof::chip::{SensorConfig, hslidar};
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::kernel::{Drive, Kernel, merge};
 use guided_dtof::netlist::{
@@ -235,6 +237,28 @@ fn random_macropixels() {
         }
     }
     all.print("macropixels", sensors, start);
+}
+
+#[test]
+fn sensors_of_another_kind() {
+    if !icarus::is_here() {
+        return;
+    }
+    let start = Instant::now();
+    let mut all = Figures::default();
+    let seeds = 0..4;
+    for sensor in [wide8x8().unwrap(), hslidar()] {
+        let config = SensorConfig {
+            rows: 1,
+            cols: 1,
+            ..(*sensor).clone()
+        };
+        for seed in seeds.clone() {
+            let scenario = Scenario::of(&mut StdRng::seed_from_u64(seed), config.clone());
+            all = all + compare_sensor(&scenario);
+        }
+    }
+    all.print("sensors of another kind", 2 * seeds.end, start);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use crate::scenario;
 use std::collections::BTreeMap;
 
 use every_edge::circuit::{self, Case};
-use guided_dtof::engine::{Gate, GateSimulation, LaneSimulation};
+use guided_dtof::engine::{Gate, GateSimulation, LaneSimulation, PulsedPixel};
 use guided_dtof::kernel::{
     Drive, Kernel, LANES, LaneDrive, LaneKernel, LaneObserver, Lanes, Observer, in_order,
 };
@@ -164,7 +164,8 @@ fn where_macropixels_have_delays_of_their_own() {
         let timings: Vec<&Timing> = (0..pixels)
             .map(|_| &silicon[random.random_range(0..4)])
             .collect();
-        let found = gate.histograms_with(&timings, starts, &pulses).unwrap();
+        let pixels_with_pulses = PulsedPixel::array(starts, &pulses);
+        let found = gate.replay_with(&timings, &pixels_with_pulses).unwrap();
         for pixel in 0..pixels {
             let (start, pulses) = (&starts[pixel..=pixel], &pulses[pixel..=pixel]);
             let alone = GateSimulation::new(config, exposure, (0, 0), (1, 1), start, pulses);

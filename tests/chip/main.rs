@@ -9,6 +9,8 @@ mod every_edge {
 mod icarus;
 #[path = "../shared/scenario.rs"]
 mod scenario;
+#[path = "../shared/wide8x8.rs"]
+mod wide8x8;
 
 mod annotated_delays_agree_with_icarus;
 mod blocks_agree_with_their_models;

@@ -36,15 +36,25 @@ fn sensors() -> impl Strategy<Value = SensorConfig> {
     let p_counter = prop::sample::select(PCounter::ALL.to_vec());
     let tap = prop::sample::select(vec![Tap::Borrow, Tap::Msb]);
     let after_borrow = prop::sample::select(vec![AfterBorrow::Hold, AfterBorrow::Wrap]);
-    let sensor = |(p_counter, tap, after_borrow, counter_bits, corner)| SensorConfig {
+    let step_periods = prop::sample::select(vec![1usize, 1, 2, 4, 8]);
+    let sensor =
+        |(p_counter, tap, after_borrow, step_periods, counter_bits, corner)| SensorConfig {
+            step_periods,
+            p_counter,
+            tap,
+            after_borrow,
+            counter_bits,
+            corner,
+            ..SensorConfig::default()
+        };
+    (
         p_counter,
         tap,
         after_borrow,
-        counter_bits,
-        corner,
-        ..SensorConfig::default()
-    };
-    (p_counter, tap, after_borrow, 2usize..13, corners())
+        step_periods,
+        2usize..13,
+        corners(),
+    )
         .prop_map(sensor)
         .prop_filter("possible", |sensor| sensor.check().is_ok())
 }

@@ -142,8 +142,8 @@ proptest! {
         words in prop::collection::vec(any::<u64>(), 1..12),
     ) {
         let circuit = match block {
-            0 => correlation::circuit(),
-            1 => front_end::circuit(),
+            0 => correlation::circuit(16),
+            1 => front_end::circuit(16),
             2 => metdc::circuit(16),
             // A saturating bin's FULL gates its own clock: a loop.
             3 => histogram::circuit(2, 5, Overflow::Wrap),

@@ -173,7 +173,7 @@ fn modelled_counts(
         .map(|number| LitPixel {
             number,
             start: MODELLED_START,
-            light: Some(light[number as usize]),
+            light: Some(light[number as usize].clone()),
         })
         .collect();
     let stream = stream_config(&sensor, &exposure, seed, scene.pulse_sigma());

@@ -138,10 +138,12 @@ fn lit(config: &SensorConfig, exposure: &Exposure) -> (PhotonStream, Vec<LitPixe
         LitPixel {
             number: number.into(),
             start,
-            light: (number % 8 != 7).then(|| PixelLight {
-                signal_per_cycle: 0.02 * 1.2f64.powi(number.into()),
-                arrival: law.time_of(&window, 6.0 + 0.1 * f64::from(number)),
-                background_hz: 1e5 * 1.2f64.powi(number.into()),
+            light: (number % 8 != 7).then(|| {
+                PixelLight::echo(
+                    0.02 * 1.2f64.powi(number.into()),
+                    law.time_of(&window, 6.0 + 0.1 * f64::from(number)),
+                )
+                .with_background(1e5 * 1.2f64.powi(number.into()))
             }),
         }
     });

@@ -5,11 +5,11 @@
 use std::f64::consts::PI;
 
 use guided_dtof::numerics::intervals::Estimate;
-use guided_dtof::photon::SPADS;
 use guided_dtof::reproduce::measured::detection::{attributions, detected};
 use guided_dtof::reproduce::measured::precision::{Estimator, by_formula, scatter};
 use guided_dtof::reproduce::measured::{Effect, Trial};
-use guided_dtof::theory::detection::{Model, Ties, laser_cycles_for, probability};
+use guided_dtof::theory::cycles::laser_cycles_for;
+use guided_dtof::theory::detection::{Model, Ties, probability};
 
 const EQ_17: Model = Model::Poisson(Ties::Random);
 
@@ -62,7 +62,7 @@ fn in_thin_light_times_scatter_as_the_bound_says() {
     let error = 1.0 / (2.0 * frames as f64).sqrt();
     let ratio = thin.spread.value / bound;
     assert!((ratio - 1.0).abs() < RARE * error, "{ratio}");
-    let early = in_thin_light.signal / SPADS as f64 * trial.sigma_ns / (2.0 * PI.sqrt());
+    let early = in_thin_light.signal / 16.0 * trial.sigma_ns / (2.0 * PI.sqrt());
     let bias = (thin.bias.value + early) / (bound / (frames as f64).sqrt());
     assert!(bias.abs() < RARE, "{bias} standard errors");
 }

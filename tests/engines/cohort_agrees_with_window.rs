@@ -5,5 +5,5 @@
 
 mod bright;
 mod chip;
-mod comparison;
+pub mod comparison;
 mod ways;

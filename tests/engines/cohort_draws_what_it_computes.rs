@@ -7,17 +7,9 @@ use guided_dtof::photon::{DeadTimeLaw, PhotonStream, PixelLight};
 use guided_dtof::units::Time;
 
 /// A target in bright daylight.
-const LIGHT: PixelLight = PixelLight {
-    signal_per_cycle: 0.8,
-    arrival: Time::from_ns(85),
-    background_hz: 40e6,
-};
+const LIGHT: PixelLight = PixelLight::echo(0.8, Time::from_ns(85)).with_background(40e6);
 
-const DARK: PixelLight = PixelLight {
-    signal_per_cycle: 0.0,
-    background_hz: 0.0,
-    ..LIGHT
-};
+const DARK: PixelLight = PixelLight::dark();
 
 #[test]
 fn paralysable_spads_follow_their_closed_form() {
@@ -25,10 +17,7 @@ fn paralysable_spads_follow_their_closed_form() {
     let sensor = SensorConfig::default();
     let exposure = Exposure::new(&sensor, 520, 1_000_000_000);
     let mut stream = stream_config(&sensor, &exposure, 1, Time::from_ps(1_900));
-    let light = PixelLight {
-        background_hz: 200e6,
-        ..DARK
-    };
+    let light = DARK.with_background(200e6);
     stream.spads.law = DeadTimeLaw::Paralysable;
     let options = CohortOptions {
         sub_bins: Some(32),
@@ -63,11 +52,8 @@ fn draws_have_the_computed_means_for_a_billion_cycles_and_every_law() {
         ] {
             let options = CohortOptions::default();
             let cohort = Cohort::new(&sensor, &exposure, options);
-            let light = PixelLight {
-                signal_per_cycle,
-                arrival: Time::from_ns(760),
-                background_hz,
-            };
+            let light = PixelLight::echo(signal_per_cycle, Time::from_ns(760))
+                .with_background(background_hz);
             let stream = |seed| {
                 let mut stream = stream_config(&sensor, &exposure, seed, Time::from_ps(1_900));
                 stream.spads.law = law;
@@ -103,14 +89,7 @@ fn what_cohorts_cannot_follow_is_refused() {
     };
     for (sensor, light, expected) in [
         (short, LIGHT, "dead time"),
-        (
-            SensorConfig::default(),
-            PixelLight {
-                background_hz: 1e12,
-                ..LIGHT
-            },
-            "busy",
-        ),
+        (SensorConfig::default(), LIGHT.with_background(1e12), "busy"),
         (
             SensorConfig {
                 dead_time_ns: 500.0,
@@ -125,7 +104,7 @@ fn what_cohorts_cannot_follow_is_refused() {
         let cohort = Cohort::new(&sensor, &exposure, CohortOptions::default());
         let error = cohort.draw(&stream, 0, 40, &light).unwrap_err().to_string();
         assert!(
-            error.contains(expected) && error.contains("--engine window"),
+            error.contains(expected) && error.contains("cannot follow"),
             "{error}"
         );
     }

@@ -7,7 +7,7 @@ use crate::scenario;
 
 use guided_dtof::chip::macropixel::Model;
 use guided_dtof::chip::window_law::{Window, WindowLaw};
-use guided_dtof::chip::{Exposure, PCounter, SensorConfig};
+use guided_dtof::chip::{EventType, Exposure, Mode, PCounter, SensorConfig};
 use guided_dtof::engine::{Cycle, Gate, Histograms, Replay};
 use guided_dtof::netlist::Corner;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
@@ -137,4 +137,31 @@ fn as_the_reference_model_counts_in_larger_numbers() {
         Histograms::from_rows(scenario.config.bins, macropixels.map(one))
     };
     compare(1_000_000, cases(120), 1_200, model);
+}
+
+/// SPAD_EVENT is a constant, and STOP rises so long before CLK falls that HIT samples after the rising CLK edge.
+#[test]
+fn an_event_that_never_comes_is_sampled_as_the_gates_sample_it() {
+    for (spad_rows, event_type, threshold) in [
+        (1, EventType::Less, 0),
+        (1, EventType::Equal, 0),
+        (4, EventType::Less, 0),
+    ] {
+        let config = SensorConfig {
+            spad_rows,
+            spad_cols: spad_rows,
+            counter_bits: 4,
+            bins: 1,
+            clk_hz: 4e6,
+            stop_phase_ps: -107_203.0,
+            event_type,
+            threshold,
+            mode: Mode::Conventional,
+            ..SensorConfig::default()
+        };
+        let exposure = Exposure::new(&config, 4, 20);
+        let gate = Gate::new(&config, &exposure).histogram(0, &[]);
+        let cycle = Cycle::new(&config, &exposure).histogram(0, &[]);
+        assert_eq!(gate, cycle, "{config:?}");
+    }
 }

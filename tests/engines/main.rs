@@ -2,10 +2,15 @@
 
 #[path = "../shared/scenario.rs"]
 mod scenario;
+#[path = "../shared/wide8x8.rs"]
+mod wide8x8;
 
+mod a_sensor_in_one_file;
+mod bins_lie_where_edges_say;
 mod chip_against_theory;
 mod cohort_agrees_with_window;
 mod cohort_draws_what_it_computes;
 mod cycle_agrees_with_gate;
+mod light_is_a_list;
 mod timed_agrees_with_gate;
 mod window_sees_what_the_full_stream_shows;

@@ -8,9 +8,9 @@ use crate::scenario;
 use std::collections::BTreeMap;
 
 use guided_dtof::chip::{
-    AfterBorrow, ChipTiming, Mode, PCounter, SensorConfig, Silicon, Tap, sensor,
+    AfterBorrow, ChipTiming, Mode, PCounter, Sensor, SensorConfig, Silicon, Tap, array,
 };
-use guided_dtof::engine::{Gate, Runner, Timed};
+use guided_dtof::engine::{Doubt, Gate, Histograms, PulsedPixel, Replay, Runner, Timed};
 use guided_dtof::netlist::{Corner, Mismatch, Netlist, Timing};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use scenario::{Scenario, cases};
@@ -19,7 +19,7 @@ use scenario::{Scenario, cases};
 #[derive(Default)]
 struct Tally {
     kept: usize,
-    replayed: BTreeMap<&'static str, usize>,
+    replayed: BTreeMap<Doubt, usize>,
 }
 
 impl Tally {
@@ -99,7 +99,7 @@ fn compare(seed: u64, scenario: &Scenario, silicon: &Silicon) -> Tally {
     let pulses = scenario.pulses();
     let timing = |pixel: usize| {
         let position = (pixel / config.cols, pixel % config.cols);
-        silicon.timing(&Netlist::elaborate(&sensor::subarray(
+        silicon.timing(&Netlist::elaborate(&array::subarray(
             config,
             position,
             (1, 1),
@@ -107,30 +107,36 @@ fn compare(seed: u64, scenario: &Scenario, silicon: &Silicon) -> Tally {
     };
     let timings: Vec<Timing> = (0..config.pixels()).map(timing).collect();
     let timings: Vec<&Timing> = timings.iter().collect();
-    let gates = Gate::new(config, exposure).histograms_with(&timings, starts, &pulses);
-    let timed = Timed::new(config, exposure, silicon);
+    let pixels = PulsedPixel::array(starts, &pulses);
+    let gates = Gate::new(config, exposure).replay_with(&timings, &pixels);
     let mut tally = Tally::default();
     for runner in [Runner::Window, Runner::Cycle] {
-        let found = timed.histograms(runner, starts, &pulses, |_| ());
+        let timed = Timed::new(Sensor::from(config).made_of(silicon), exposure, runner);
+        // In two parts, the last one first: what a macropixel is made of goes with its number.
+        let (before, after) = pixels.split_at(pixels.len() / 2);
+        let found = [after, before].map(|part| timed.replay(part));
         let Ok(gates) = &gates else {
             assert!(
-                found.is_err(),
+                found.iter().any(Result::is_err),
                 "seed {seed}: {config:?} {exposure:?} {silicon:?}"
             );
             continue;
         };
-        let found = found.unwrap();
-        for (pixel, (counts, gate)) in found.histograms.iter().zip(gates).enumerate() {
+        let parts = found.map(Result::unwrap).into_iter().rev();
+        let found = Histograms::joined(config.bins, parts);
+        for (pixel, (counts, gate)) in found.iter().zip(gates).enumerate() {
             let start = starts[pixel];
             assert_eq!(
-                counts, gate,
+                counts,
+                gate,
                 "seed {seed}, {runner:?}, macropixel {pixel} with start {start}: {config:?} {exposure:?} {silicon:?} {:?}",
-                found.coverage
+                timed.coverage()
             );
         }
+        let coverage = timed.coverage();
         tally = Tally {
-            kept: found.coverage.decided,
-            replayed: found.coverage.replayed,
+            kept: coverage.decided,
+            replayed: coverage.replayed,
         };
         assert_eq!(tally.macropixels(), config.pixels());
     }

@@ -17,11 +17,11 @@ use guided_dtof::units::Time;
 use proptest::prelude::*;
 
 #[derive(Debug, Clone)]
-struct Case {
-    config: SensorConfig,
-    exposure: Exposure,
-    stream: StreamConfig,
-    pixel: LitPixel,
+pub struct Case {
+    pub config: SensorConfig,
+    pub exposure: Exposure,
+    pub stream: StreamConfig,
+    pub pixel: LitPixel,
 }
 
 /// `slowest_mhz`: lowest CLK frequency.
@@ -35,20 +35,29 @@ fn sensors(slowest_mhz: f64) -> impl Strategy<Value = SensorConfig> {
         1 => (0u8..4).prop_map(|t| (EventType::Less, t)),
     ];
     let mode = prop_oneof![4 => Just(Mode::Guided), 1 => Just(Mode::Conventional)];
+    let grid = prop_oneof![
+        3 => Just((4, 4)),
+        1 => Just((2, 2)),
+        1 => Just((8, 8)),
+        1 => prop::sample::select(vec![(1, 1), (2, 1), (2, 4), (1, 8)]),
+    ];
     (
-        (4usize..10, 1usize..33, clk_mhz),
+        (4usize..10, 1usize..33, clk_mhz, grid),
         (-0.9f64..0.9, event_type, mode),
     )
         .prop_map(
-            |((counter_bits, bins, clk_mhz), (phase, event, mode))| SensorConfig {
+            |((counter_bits, bins, clk_mhz, grid), (phase, event, mode))| SensorConfig {
                 rows: 1,
                 cols: 1,
+                spad_rows: grid.0,
+                spad_cols: grid.1,
                 counter_bits,
                 bins,
                 clk_hz: clk_mhz * 1e6,
                 stop_phase_ps: phase * 0.5e6 / clk_mhz,
                 event_type: event.0,
-                threshold: event.1,
+                // One SPAD has one bit of THRESHOLD.
+                threshold: event.1.min((2 * grid.0 * grid.1 - 1) as u8),
                 overflow: Overflow::Wrap,
                 mode,
                 ..SensorConfig::default()
@@ -78,20 +87,21 @@ fn spads() -> impl Strategy<Value = SpadModel> {
             afterpulse_probability: afterpulse,
             afterpulse_time: Time::from_fs(time_fs),
             crosstalk_probability: crosstalk,
+            ..SpadModel::default()
         },
     )
 }
 
 /// Where an echo is.
 #[derive(Debug, Clone, Copy)]
-enum Arrival {
+pub enum Arrival {
     /// So many bins before LOCAL_STOP.
     BinsBefore(f64),
     /// A share of the time from 3σ before a laser cycle to 3σ after it.
     InCycle(f64),
 }
 
-fn arrivals() -> impl Strategy<Value = Arrival> {
+pub fn arrivals() -> impl Strategy<Value = Arrival> {
     prop_oneof![
         3 => (-4f64..20.0).prop_map(Arrival::BinsBefore),
         1 => (0f64..1.0).prop_map(Arrival::InCycle),
@@ -100,15 +110,38 @@ fn arrivals() -> impl Strategy<Value = Arrival> {
     ]
 }
 
+impl Arrival {
+    /// Its time in fs, for a start value and CLK period, a laser cycle and a pulse.
+    pub fn fs(self, start: u16, clk_fs: f64, cycle_fs: f64, sigma_fs: i64) -> i64 {
+        let arrival_fs = match self {
+            Arrival::BinsBefore(bins) => (f64::from(start) - bins) * clk_fs,
+            Arrival::InCycle(share) => {
+                let room_fs = 3.0 * sigma_fs as f64;
+                share * (cycle_fs + 2.0 * room_fs) - room_fs
+            }
+        };
+        arrival_fs as i64
+    }
+}
+
 /// How wide a laser pulse is.
 #[derive(Debug, Clone, Copy)]
-enum Sigma {
+pub enum Sigma {
     Fs(i64),
     /// In CLK periods: up to longer than a window.
     Bins(f64),
 }
 
-fn sigmas() -> impl Strategy<Value = Sigma> {
+impl Sigma {
+    pub fn fs(self, clk_fs: f64) -> i64 {
+        match self {
+            Sigma::Fs(sigma_fs) => sigma_fs,
+            Sigma::Bins(wide) => (wide * clk_fs) as i64,
+        }
+    }
+}
+
+pub fn sigmas() -> impl Strategy<Value = Sigma> {
     prop_oneof![
         1 => Just(Sigma::Fs(0)),
         6 => (500_000i64..4_000_000).prop_map(Sigma::Fs),
@@ -117,7 +150,7 @@ fn sigmas() -> impl Strategy<Value = Sigma> {
 }
 
 /// `most_periods`: longest laser cycle, in CLK periods; `slowest_mhz`: lowest CLK frequency.
-fn cases(most_periods: u32, slowest_mhz: f64) -> impl Strategy<Value = Case> {
+pub fn cases(most_periods: u32, slowest_mhz: f64) -> impl Strategy<Value = Case> {
     // Groups of photons end at 128, 256 … 2048 laser cycles.
     let cycles = prop_oneof![6 => 1u32..40, 2 => 500u32..1100, 1 => 2000u32..2200];
     let rate_hz = prop_oneof![1 => Just(0.0), 3 => 1e5f64..2e7, 2 => 2e7f64..5e8];
@@ -154,29 +187,22 @@ fn cases(most_periods: u32, slowest_mhz: f64) -> impl Strategy<Value = Case> {
                 };
                 let start = start.min(config.largest_start());
                 let clk_fs = 1e9 / config.clk_hz * 1e6;
-                let sigma_fs = match sigma {
-                    Sigma::Fs(sigma_fs) => sigma_fs,
-                    Sigma::Bins(wide) => (wide * clk_fs) as i64,
-                };
-                let arrival_fs = match arrival {
-                    Arrival::BinsBefore(bins) => (f64::from(start) - bins) * clk_fs,
-                    Arrival::InCycle(share) => {
-                        let room_fs = 3.0 * sigma_fs as f64;
-                        let cycle_fs = f64::from(stop_periods) * clk_fs;
-                        share * (cycle_fs + 2.0 * room_fs) - room_fs
-                    }
-                };
+                let sigma_fs = sigma.fs(clk_fs);
+                let cycle_fs = f64::from(stop_periods) * clk_fs;
+                let arrival_fs = arrival.fs(start, clk_fs, cycle_fs, sigma_fs);
                 let shape = PulseShape::new(Time::from_ps(700), &[0.0, 2.0, 1.0, 0.0]);
                 let stream = StreamConfig {
-                    spads,
+                    spads: SpadModel {
+                        grid: config.spad_grid(),
+                        ..spads
+                    },
                     pulse_shape: measured.then(|| shape.unwrap()),
                     ..stream_config(&config, &exposure, seed, Time::from_fs(sigma_fs))
                 };
-                let light = Some(PixelLight {
-                    signal_per_cycle,
-                    arrival: Time::from_fs(arrival_fs as i64),
-                    background_hz,
-                });
+                let light = Some(
+                    PixelLight::echo(signal_per_cycle, Time::from_fs(arrival_fs))
+                        .with_background(background_hz),
+                );
                 let pixel = LitPixel {
                     number,
                     start,
@@ -193,7 +219,7 @@ fn cases(most_periods: u32, slowest_mhz: f64) -> impl Strategy<Value = Case> {
 }
 
 /// The histogram of the window engine, after comparing it with the whole stream on both fast engines.
-fn agreed(case: &Case) -> Option<Vec<u16>> {
+pub fn agreed(case: &Case) -> Option<Vec<u16>> {
     let Case {
         config,
         exposure,
@@ -203,12 +229,13 @@ fn agreed(case: &Case) -> Option<Vec<u16>> {
     if let LawWindow::Race(_) = WindowLaw::new(config, exposure).window(pixel.start) {
         return None;
     }
+    let pixels = std::slice::from_ref(pixel);
     let stream = PhotonStream::new(stream);
     let window = Window::new(config, exposure);
-    let seen = window.expose(&stream, &[*pixel]).unwrap();
-    let all = full_stream(&window, &stream, &[*pixel]).unwrap();
+    let seen = window.expose(&stream, pixels).unwrap();
+    let all = full_stream(&window, &stream, pixels).unwrap();
     assert_eq!(seen.histograms, all.histograms);
-    let cycle = full_stream(&Cycle::new(config, exposure), &stream, &[*pixel]).unwrap();
+    let cycle = full_stream(&Cycle::new(config, exposure), &stream, pixels).unwrap();
     assert_eq!(seen.histograms, cycle.histograms);
     assert_eq!(seen.work.cancelled, all.work.cancelled);
     assert_eq!(seen.work.cancelled, cycle.work.cancelled);
@@ -248,11 +275,10 @@ fn frame() -> (SensorConfig, Exposure, PhotonStream, Vec<LitPixel>) {
         .map(|number| LitPixel {
             number: u32::from(number),
             start: number * 8,
-            light: (number % 7 != 0).then_some(PixelLight {
-                signal_per_cycle: 0.1,
-                arrival: config.clock().periods(i64::from(number) * 8 - 8),
-                background_hz: 8e6,
-            }),
+            light: (number % 7 != 0).then_some(
+                PixelLight::echo(0.1, config.clock().periods(i64::from(number) * 8 - 8))
+                    .with_background(8e6),
+            ),
         })
         .collect();
     (config, exposure, stream, pixels)
@@ -276,7 +302,9 @@ fn threads_order_and_neighbours_change_nothing() {
     let reversed = on(3, &backwards);
     assert!(one.histograms.iter().eq(reversed.histograms.iter().rev()));
     assert_eq!(one.work, reversed.work);
-    let alone = pixels.iter().map(|pixel| on(1, &[*pixel]).histograms);
+    let alone = pixels
+        .iter()
+        .map(|pixel| on(1, std::slice::from_ref(pixel)).histograms);
     let alone = Histograms::joined(config.bins, alone);
     assert_eq!(one.histograms, alone);
     let all = expose_without_skipping(&engine, &stream, &pixels, |_| ()).unwrap();
@@ -391,18 +419,15 @@ fn an_echo_costs_what_is_detected() {
     let exposure = Exposure::new(&config, 520, 400);
     let stream = PhotonStream::new(&stream_config(&config, &exposure, 3, Time::from_ps(1_900)));
     let drawn = |signal_per_cycle| {
-        let pixel = LitPixel {
+        let arrival = config.clock().periods(192);
+        let pixels = [LitPixel {
             number: 7,
             start: 200,
-            light: Some(PixelLight {
-                signal_per_cycle,
-                arrival: config.clock().periods(192),
-                background_hz: 8e6,
-            }),
-        };
+            light: Some(PixelLight::echo(signal_per_cycle, arrival).with_background(8e6)),
+        }];
         let engine = Window::new(&config, &exposure);
-        let exposed = expose(&engine, &stream, &[pixel], |_| ()).unwrap();
-        let all = full_stream(&engine, &stream, &[pixel]).unwrap();
+        let exposed = expose(&engine, &stream, &pixels, |_| ()).unwrap();
+        let all = full_stream(&engine, &stream, &pixels).unwrap();
         assert_eq!(exposed.histograms, all.histograms);
         (exposed.work.photons_drawn, all.work.photons_drawn)
     };
@@ -430,7 +455,7 @@ fn afterpulses_without_a_dead_time_in_bright_light() {
     pixels.truncate(5);
     for pixel in &mut pixels {
         if let Some(light) = &mut pixel.light {
-            light.background_hz = 3e8;
+            *light = light.clone().with_background(3e8);
         }
     }
     let stream = PhotonStream::new(&StreamConfig {
@@ -449,7 +474,7 @@ fn light_that_blinds_is_refused_with_its_numbers() {
     let engine = Window::new(&config, &exposure);
     for pixel in &mut pixels {
         if let Some(light) = &mut pixel.light {
-            light.background_hz = 2.1e10;
+            *light = light.clone().with_background(2.1e10);
         }
     }
     let refused = expose(&engine, &stream, &pixels, |_| ()).unwrap_err();

@@ -1,9 +1,8 @@
 //! Probability of detection against 360-digit sums (`vectors/theory/detection.py`) and against dice.
 
 use guided_dtof::photon::{Poisson, Purpose, random_stream};
-use guided_dtof::theory::detection::{
-    Model, PerCycle, Ties, laser_cycles_for, poisson, probability,
-};
+use guided_dtof::theory::cycles::laser_cycles_for;
+use guided_dtof::theory::detection::{Model, PerCycle, Ties, poisson, probability};
 use rand_philox::Philox;
 
 /// Rows of a CSV table without its header.

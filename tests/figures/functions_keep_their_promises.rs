@@ -104,7 +104,7 @@ fn functions() -> Vec<Function> {
             name: "at least k of 16 SPADs hit",
             range: "1e-15 to 34.5 photons: p within 1e-15 of 0 and 1",
             references: references!("stability/hit_tails"),
-            compute: |a| Value::Real(at_least_hit(a[0] as usize, a[1])),
+            compute: |a| Value::Real(at_least_hit(a[0] as usize, 16, a[1])),
             measure: Measure::Relative,
             promise: 1e-13,
         },

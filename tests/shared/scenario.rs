@@ -40,7 +40,9 @@ impl Scenario {
 
     /// Any start values and pulses.
     pub fn exposed(random: &mut StdRng, config: SensorConfig, exposure: Exposure) -> Self {
-        let most = config.largest_start().min(exposure.stop_periods as u16);
+        // Some never open their window.
+        let most = exposure.stop_periods as usize / config.step_periods + 1;
+        let most = config.largest_start().min(most as u16);
         let pixels = config.pixels();
         let starts = (0..pixels).map(|_| random.random_range(0..=most)).collect();
         let pulses = (0..pixels)
@@ -48,7 +50,7 @@ impl Scenario {
                 let mut pulses: Vec<SpadEvent> = (0..random.random_range(0..200))
                     .map(|_| SpadEvent {
                         time: Time::from_fs(random.random_range(0..exposure.end().as_fs())),
-                        spad: random.random_range(0..16),
+                        spad: random.random_range(0..config.spads() as u8),
                     })
                     .collect();
                 pulses.sort_unstable();
@@ -114,10 +116,23 @@ fn random_sensor(random: &mut StdRng, rows: usize, cols: usize) -> SensorConfig 
     let mut p_counters = p_counters();
     let (p_counter, tap, after_borrow) =
         p_counters.remove(random.random_range(0..p_counters.len()));
+    // Every other macropixel is the QuantIC4x4's.
+    const GRIDS: [(usize, usize); 5] = [(2, 2), (8, 8), (1, 1), (2, 4), (8, 1)];
+    let (spad_rows, spad_cols) = match random.random_bool(0.5) {
+        true => (4, 4),
+        false => GRIDS[random.random_range(0..GRIDS.len())],
+    };
     SensorConfig {
+        spad_rows,
+        spad_cols,
         p_counter,
         tap,
         after_borrow,
+        // Without a reset there is no divider.
+        step_periods: match p_counter {
+            PCounter::Memoryless => 1,
+            _ => [1, 1, 1, 2, 4, 8][random.random_range(0..6)],
+        },
         rows,
         cols,
         clk_hz,
@@ -126,7 +141,7 @@ fn random_sensor(random: &mut StdRng, rows: usize, cols: usize) -> SensorConfig 
         bins: random.random_range(2..17),
         bin_bits: random.random_range(2..15),
         dead_time_ns: random.random_range(3.0..12.0),
-        threshold: random.random_range(0..3),
+        threshold: random.random_range(0..2 + u8::from(spad_rows * spad_cols > 1)),
         event_type: [EventType::Greater, EventType::Equal, EventType::Less]
             [random.random_range(0..3)],
         mode: if random.random_bool(0.2) {

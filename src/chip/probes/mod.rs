@@ -25,7 +25,7 @@ mod tests;
 pub use load_path::{LoadProbe, memories, memory_path};
 pub use pins::{LoadPins, SensorPins};
 
-use super::{histogram, sensor};
+use super::{array, histogram};
 use crate::netlist::{CellKind, NetId, Netlist};
 
 /// A net or bus of a macropixel that something outside the circuits looks at.
@@ -63,6 +63,8 @@ pub enum Probe {
     Block,
     /// The start value; a P-counter without memory has none.
     Memory,
+    /// COUNTER_CLK divided; only where windows step by several CLK periods.
+    StepClk,
     /// The count.
     CounterOut,
     /// The comparator's result before its flip-flop; only that P-counter has one.
@@ -79,7 +81,7 @@ pub enum Probe {
 
 impl Probe {
     /// Every probe, in the order of their declaration.
-    pub const ALL: [Probe; 22] = [
+    pub const ALL: [Probe; 23] = [
         Probe::Clk,
         Probe::Stop,
         Probe::Enable,
@@ -96,6 +98,7 @@ impl Probe {
         Probe::ResetPulse,
         Probe::Block,
         Probe::Memory,
+        Probe::StepClk,
         Probe::CounterOut,
         Probe::Equal,
         Probe::Shift,
@@ -123,6 +126,7 @@ impl Probe {
             Probe::ResetPulse => (Some(P_COUNTER_TIMING), "PULSE"),
             Probe::Block => (Some(P_COUNTER_TIMING), "BLOCK"),
             Probe::Memory => (Some(P_COUNTER), "MEMORY"),
+            Probe::StepClk => (Some(P_COUNTER), "STEP_CLK"),
             Probe::CounterOut => (Some(P_COUNTER), "COUNTER_OUT"),
             Probe::Equal => (Some(P_COUNTER), "EQUAL"),
             Probe::Shift => (Some(METDC), "SHIFT"),
@@ -181,7 +185,7 @@ impl Probes {
     /// # Panics
     /// When the netlist has no such macropixel.
     pub fn of_macropixel(netlist: &Netlist, row: usize, col: usize) -> Self {
-        let name = sensor::pixel_name(row, col);
+        let name = array::pixel_name(row, col);
         assert!(netlist.scope(&name).is_some(), "no macropixel {name}");
         Self::at(netlist, &name)
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::*;
-use crate::chip::{PCounter, SPADS, SensorConfig, load_path, p_counter};
+use crate::chip::{PCounter, SensorConfig, load_path, p_counter};
 
 fn config(p_counter: PCounter) -> SensorConfig {
     SensorConfig {
@@ -19,12 +19,13 @@ fn config(p_counter: PCounter) -> SensorConfig {
 fn a_macropixel_has_every_probe_but_those_of_other_p_counters() {
     for p_counter in PCounter::ALL {
         let config = config(p_counter);
-        let netlist = Netlist::elaborate(&sensor::circuit(&config));
+        let netlist = Netlist::elaborate(&array::circuit(&config));
         let probes = Probes::of_macropixel(&netlist, 1, 2);
         for probe in Probe::ALL {
             let expected = match probe {
                 Probe::Memory => p_counter != PCounter::Memoryless,
                 Probe::Equal => p_counter == PCounter::Comparator,
+                Probe::StepClk => false,
                 _ => true,
             };
             assert_eq!(probes.find(probe).is_some(), expected, "{probe:?}");
@@ -35,7 +36,7 @@ fn a_macropixel_has_every_probe_but_those_of_other_p_counters() {
                 );
             }
         }
-        assert_eq!(probes.toggles().len(), SPADS);
+        assert_eq!(probes.toggles().len(), config.spads());
         assert_eq!(probes.bins().len(), config.bins);
         assert_eq!(
             probes.net(Probe::LocalStop),
@@ -47,7 +48,7 @@ fn a_macropixel_has_every_probe_but_those_of_other_p_counters() {
 #[test]
 fn cells_drive_the_nets_that_they_are_named_after() {
     let config = config(PCounter::Ripple);
-    let netlist = Netlist::elaborate(&sensor::circuit(&config));
+    let netlist = Netlist::elaborate(&array::circuit(&config));
     let probes = Probes::of_macropixel(&netlist, 0, 1);
     let outputs = |cells: Vec<usize>| -> Vec<NetId> {
         let output = |cell: usize| netlist.cells()[cell].outputs[0];
@@ -99,7 +100,7 @@ fn inner_names() -> (BTreeSet<String>, BTreeSet<String>) {
     let (mut inner, mut hidden) = (BTreeSet::new(), BTreeSet::new());
     let (mut pins, mut ports) = (BTreeSet::new(), BTreeSet::new());
     for p_counter in PCounter::ALL {
-        let netlist = Netlist::elaborate(&sensor::circuit(&config(p_counter)));
+        let netlist = Netlist::elaborate(&array::circuit(&config(p_counter)));
         for (index, scope) in netlist.scopes().iter().enumerate() {
             for (_, signal) in scope.module.port_signals() {
                 ports.insert(signal.name.clone());
@@ -170,7 +171,7 @@ fn nobody_else_names_an_inner_net() {
 #[test]
 fn the_load_path_is_found_with_and_without_its_macropixels() {
     let config = config(PCounter::Ripple);
-    let sensor = Netlist::elaborate(&sensor::circuit(&config));
+    let sensor = Netlist::elaborate(&array::circuit(&config));
     let (rows, cols, bits) = (config.rows, config.cols, config.counter_bits);
     let load = Netlist::elaborate(&load_path::with_memories(rows, cols, bits));
     for netlist in [&sensor, &load] {

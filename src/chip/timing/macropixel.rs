@@ -15,7 +15,7 @@
 //! * RUN (the macropixels' ENABLE): it changes with STOP, but only before the first and after the last laser cycle.
 //! * Clocks of the P-counter's stages during a reset: the flip-flops behind them are held.
 
-use crate::chip::{Probe, Probes, SPADS, SensorConfig, sensor};
+use crate::chip::{Probe, Probes, SensorConfig, array};
 use crate::logic::Logic::{One, Zero};
 use crate::netlist::{Arrivals, CellKind, Edge, NetId, Netlist, StaticTiming, Timing};
 use crate::units::Time;
@@ -29,7 +29,7 @@ pub fn spread(span: Span) -> Time {
 }
 
 /// The span from the earlier beginning to the later end.
-pub fn hull(a: Span, b: Span) -> Span {
+pub(crate) fn hull(a: Span, b: Span) -> Span {
     (a.0.min(b.0), a.1.max(b.1))
 }
 
@@ -52,7 +52,7 @@ pub struct MacropixelCircuit {
 impl MacropixelCircuit {
     /// The macropixel at `position` (row, column) of a sensor: its cells' names, and so their mismatch, depend on that.
     pub fn new(config: &SensorConfig, position: (usize, usize)) -> Self {
-        let netlist = Netlist::elaborate(&sensor::subarray(config, position, (1, 1)));
+        let netlist = Netlist::elaborate(&array::subarray(config, position, (1, 1)));
         let probes = Probes::of_macropixel(&netlist, position.0, position.1);
         MacropixelCircuit {
             toggles: probes.toggle_cells(&netlist),
@@ -80,11 +80,16 @@ impl MacropixelCircuit {
         }
     }
 
-    /// The P-counter's flip-flops whose clock is COUNTER_CLK itself: of a ripple counter the first one.
+    /// The P-counter's flip-flops whose clock is COUNTER_CLK itself, or what a divider leaves of it: of a ripple counter the
+    /// first one, and of the divider.
     pub fn clocked_by_counter_clk(&self) -> impl Iterator<Item = usize> + '_ {
         let counter_clk = self.probes.net(Probe::CounterClk);
+        let divided = self.probes.find(Probe::StepClk).map(|nets| nets[0]);
         let all = self.counting.iter().copied();
-        all.filter(move |&cell| self.pin(cell, 1) == counter_clk)
+        all.filter(move |&cell| {
+            let clock = self.pin(cell, 1);
+            clock == counter_clk || Some(clock) == divided
+        })
     }
 
     fn pin(&self, cell: usize, pin: usize) -> NetId {
@@ -189,7 +194,7 @@ impl<'c> MacropixelPaths<'c> {
 #[derive(Debug, Clone)]
 pub struct MacropixelDelays {
     /// SPAD_RAW rises → TOGGLE rises, falls; of each SPAD.
-    pub latency: [(Time, Time); SPADS],
+    pub latency: Vec<(Time, Time)>,
     /// CLK rises → SPAD_EVENT settled, latest. A path that no values excite may be longer than any that they do: see
     /// the timing analysis of the correlation block.
     pub event: Time,
@@ -226,7 +231,11 @@ impl MacropixelDelays {
         let shift = circuit.probes.bus(Probe::Shift).iter().rev();
         let hits = circuit.hits.iter().map(|&cell| paths.clock_to_q(cell).0);
         MacropixelDelays {
-            latency: std::array::from_fn(|spad| paths.clock_to_q(circuit.toggles[spad])),
+            latency: circuit
+                .toggles
+                .iter()
+                .map(|&toggle| paths.clock_to_q(toggle))
+                .collect(),
             event: changes(&rise, net(Probe::SpadEvent)).1,
             shift: shift.map(|&bit| changes(&rise, bit)).collect(),
             reset: edge(&stop, net(Probe::CounterReset), Edge::Rise),

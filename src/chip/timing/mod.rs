@@ -177,10 +177,12 @@ impl ChipTiming {
 /// What a macropixel's circuit and delays depend on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct Circuit {
+    spads: usize,
     counter_bits: usize,
     p_counter: PCounter,
     tap: Tap,
     after_borrow: AfterBorrow,
+    step_periods: usize,
     bins: usize,
     bin_bits: usize,
     overflow: Overflow,
@@ -190,10 +192,12 @@ struct Circuit {
 impl Circuit {
     fn of(config: &SensorConfig) -> Self {
         Circuit {
+            spads: config.spads(),
             counter_bits: config.counter_bits,
             p_counter: config.p_counter,
             tap: config.tap,
             after_borrow: config.after_borrow,
+            step_periods: config.step_periods,
             bins: config.bins,
             bin_bits: config.bin_bits,
             overflow: config.overflow,

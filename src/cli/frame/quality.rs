@@ -8,7 +8,7 @@ use crate::report::{Cell, DepthMap, Table};
 use crate::system::{Frame, NoDepth, Summary};
 
 /// How good the depths are, and why there are no others.
-pub fn rows(table: &mut Table, args: &FrameArgs, summary: &Summary) {
+pub(super) fn rows(table: &mut Table, args: &FrameArgs, summary: &Summary) {
     let metres = |value: Option<f64>| match value {
         Some(m) => format!("{m:.3} m"),
         None => "-".to_owned(),
@@ -69,7 +69,7 @@ pub fn rows(table: &mut Table, args: &FrameArgs, summary: &Summary) {
 ///
 /// # Errors
 /// When it cannot be written.
-pub fn depth_map(out: &Path, frame: &Frame, laser_cycles: u32) -> Result<(), InputError> {
+pub(super) fn depth_map(out: &Path, frame: &Frame, laser_cycles: u32) -> Result<(), InputError> {
     let cells: Vec<Cell> = (frame.pixels.iter())
         .map(|pixel| match (pixel.measured_m, pixel.no_depth) {
             (_, Some(reason)) => Cell::Category(reason as usize),

@@ -10,14 +10,14 @@ use crate::report::write_npy_u16;
 
 /// Format of histograms.
 #[derive(Clone, Copy)]
-pub enum Format {
+pub(super) enum Format {
     Npy,
     Csv,
 }
 
 impl Format {
     /// That of a file's name.
-    pub fn of(path: &Path) -> Result<Self, InputError> {
+    pub(super) fn of(path: &Path) -> Result<Self, InputError> {
         match path.extension().and_then(|e| e.to_str()) {
             Some("npy") => Ok(Format::Npy),
             Some("csv") => Ok(Format::Csv),
@@ -33,7 +33,7 @@ impl Format {
 }
 
 /// Writes histograms to `out`, or as CSV to standard output.
-pub fn write(
+pub(super) fn write(
     config: &SensorConfig,
     histograms: &Histograms,
     out: Option<&Path>,

@@ -4,15 +4,15 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::bench::recording::{Recording, check_exposure, read_events, read_starts};
+use crate::bench::recording::{Recording, read_events, read_starts};
 use crate::chip::{Exposure, SensorConfig};
-use crate::cli::SensorArgs;
+use crate::cli::{SensorArgs, wording};
 use crate::files::InputError;
 use crate::photon::SpadEvent;
 
 /// What is replayed.
 #[derive(Args)]
-pub struct StimulusArgs {
+pub(super) struct StimulusArgs {
     #[command(flatten)]
     sensor: SensorArgs,
     /// Start values: CSV `row,col,init`, one line for every macropixel.
@@ -30,7 +30,7 @@ pub struct StimulusArgs {
 }
 
 /// What is replayed, read and checked: shared with `gdtof export verilog`.
-pub struct Stimuli {
+pub(crate) struct Stimuli {
     /// The chip.
     pub config: SensorConfig,
     /// Its clocks.
@@ -46,7 +46,7 @@ impl StimulusArgs {
     ///
     /// # Errors
     /// One sentence about the first thing that cannot be.
-    pub fn read(&self) -> Result<Stimuli, InputError> {
+    pub(super) fn read(&self) -> Result<Stimuli, InputError> {
         let periods = (self.stop_periods, self.laser_cycles);
         Stimuli::read(self.sensor.read()?, &self.inits, &self.events, periods)
     }
@@ -57,13 +57,13 @@ impl Stimuli {
     ///
     /// # Errors
     /// One sentence about the first thing that cannot be.
-    pub fn read(
+    pub(crate) fn read(
         config: SensorConfig,
         inits: &Path,
         events: &Path,
         (stop_periods, laser_cycles): (u32, u32),
     ) -> Result<Self, InputError> {
-        let exposure = check_exposure(&config, stop_periods, laser_cycles)?;
+        let exposure = wording::exposure(&config, stop_periods, laser_cycles)?;
         let starts = read_starts(inits, &config)?;
         let recording = read_events(events, &config, &exposure)?;
         let dropped = [
@@ -91,7 +91,7 @@ impl Stimuli {
     }
 
     /// Pulses of every macropixel, row-major.
-    pub fn pulses(&self) -> Vec<&[SpadEvent]> {
+    pub(crate) fn pulses(&self) -> Vec<&[SpadEvent]> {
         self.recording.pulses.iter().map(Vec::as_slice).collect()
     }
 }

@@ -15,7 +15,7 @@ use crate::report::{Axis, Chart, Style};
 const BARS: usize = 48;
 
 /// Analyses all macropixels, with a bar on a terminal.
-pub fn analyse(config: &SensorConfig, silicon: &Silicon) -> anyhow::Result<Spread> {
+pub(super) fn analyse(config: &SensorConfig, silicon: &Silicon) -> anyhow::Result<Spread> {
     let style = ProgressStyle::with_template("analysing {bar:40} {pos}/{len} macropixels")?;
     let progress = ProgressBar::new(config.pixels() as u64).with_style(style);
     let found = spread(config, silicon, || progress.inc(1));
@@ -24,7 +24,7 @@ pub fn analyse(config: &SensorConfig, silicon: &Silicon) -> anyhow::Result<Sprea
 }
 
 /// Statistics and how many macropixels fail.
-pub fn table(config: &SensorConfig, found: &Spread) -> Section {
+pub(super) fn table(config: &SensorConfig, found: &Spread) -> Section {
     let title = format!(
         "Mismatch: ripple CLK fall to LOCAL_STOP of {} macropixels at {} MHz",
         found.pixels.len(),
@@ -61,7 +61,7 @@ pub fn table(config: &SensorConfig, found: &Spread) -> Section {
 }
 
 /// Writes the distribution with the normal curve of its mean and deviation.
-pub fn plot(config: &SensorConfig, found: &Spread, path: &Path) -> Result<(), InputError> {
+pub(super) fn plot(config: &SensorConfig, found: &Spread, path: &Path) -> Result<(), InputError> {
     let ripples: Vec<f64> = found
         .pixels
         .iter()

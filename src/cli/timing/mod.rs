@@ -19,7 +19,7 @@ use crate::files::InputError;
 
 /// Arguments of `gdtof timing`.
 #[derive(Args)]
-pub struct TimingArgs {
+pub(super) struct TimingArgs {
     #[command(flatten)]
     sensor: SensorArgs,
     #[command(flatten)]
@@ -39,7 +39,7 @@ pub struct TimingArgs {
 ///
 /// # Errors
 /// Bad input.
-pub fn run(args: &TimingArgs) -> anyhow::Result<()> {
+pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
     let config = args.sensor.read()?;
     let silicon = args.silicon.read(config.corner)?;
     if let (Some(plot), None) = (&args.plot, silicon.mismatch) {

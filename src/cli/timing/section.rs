@@ -6,7 +6,7 @@ use crate::report::Grid;
 use crate::units::Time;
 
 /// One value of a table.
-pub enum Cell {
+pub(super) enum Cell {
     /// A name.
     Text(String),
     /// A time; in JSON, picoseconds.
@@ -60,7 +60,7 @@ impl From<Option<Time>> for Cell {
 }
 
 /// A titled table.
-pub struct Section {
+pub(super) struct Section {
     key: &'static str,
     title: String,
     headings: &'static [&'static str],
@@ -69,7 +69,7 @@ pub struct Section {
 
 impl Section {
     /// An empty table; `key` is its name in JSON, where headings name the columns.
-    pub fn new(
+    pub(super) fn new(
         key: &'static str,
         title: impl Into<String>,
         headings: &'static [&'static str],
@@ -83,14 +83,14 @@ impl Section {
     }
 
     /// Adds a row, which must have a cell for every heading.
-    pub fn push(&mut self, cells: impl IntoIterator<Item = Cell>) {
+    pub(super) fn push(&mut self, cells: impl IntoIterator<Item = Cell>) {
         let row: Vec<Cell> = cells.into_iter().collect();
         debug_assert_eq!(row.len(), self.headings.len());
         self.rows.push(row);
     }
 
     /// The table for a terminal, title first and an empty line last.
-    pub fn text(&self) -> String {
+    pub(super) fn text(&self) -> String {
         let mut grid = Grid::new(self.headings.iter().copied());
         for row in &self.rows {
             grid.push(row.iter().map(Cell::text));
@@ -99,7 +99,7 @@ impl Section {
     }
 
     /// Adds the table to a document: a list of objects.
-    pub fn add_to(&self, document: &mut Map<String, Value>) {
+    pub(super) fn add_to(&self, document: &mut Map<String, Value>) {
         let object = |row: &Vec<Cell>| -> Value {
             let keys = self.headings.iter().map(|h| h.replace([' ', '-'], "_"));
             keys.zip(row.iter().map(Cell::json))

@@ -13,7 +13,7 @@ use crate::units::Time;
 const SLOW: Time = Time::from_ns(20);
 
 /// What is analysed: the sensor, its silicon, and its macropixel with limits kept and ignored.
-pub struct Subject<'a> {
+pub(super) struct Subject<'a> {
     pub config: &'a SensorConfig,
     pub silicon: &'a Silicon,
     pub kept: MacropixelTiming,
@@ -21,7 +21,7 @@ pub struct Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
-    pub fn new(config: &'a SensorConfig, silicon: &'a Silicon) -> Self {
+    pub(super) fn new(config: &'a SensorConfig, silicon: &'a Silicon) -> Self {
         let pixel = |limits| MacropixelTiming::of(config, silicon, limits, (0, 0));
         Subject {
             config,
@@ -40,7 +40,7 @@ impl<'a> Subject<'a> {
 }
 
 /// The verdict, and what should be known beside it.
-pub fn verdict(verdict: &TimingVerdict) -> Section {
+pub(super) fn verdict(verdict: &TimingVerdict) -> Section {
     let title = format!("Timing: {verdict}");
     let notes = verdict.notes.iter().map(|note| format!("\n  note: {note}"));
     let title = title + &notes.collect::<String>();
@@ -56,7 +56,7 @@ pub fn verdict(verdict: &TimingVerdict) -> Section {
 }
 
 /// Earliest and latest changes.
-pub fn windows(subject: &Subject<'_>) -> Section {
+pub(super) fn windows(subject: &Subject<'_>) -> Section {
     let pixel = &subject.kept;
     let title = "Windows of a macropixel";
     let mut section = Section::new("windows", title, &["from, to", "shortest", "longest"]);
@@ -77,7 +77,7 @@ pub fn windows(subject: &Subject<'_>) -> Section {
 }
 
 /// The reset pulse and what it must outlast.
-pub fn reset_pulse(subject: &Subject<'_>) -> Section {
+pub(super) fn reset_pulse(subject: &Subject<'_>) -> Section {
     let (pixel, simulated) = (&subject.kept, reset(subject.config, subject.silicon));
     let title = "Reset pulse, and what it must outlast";
     let mut section = Section::new("reset", title, &["", "static", "event-driven"]);
@@ -107,7 +107,7 @@ pub fn reset_pulse(subject: &Subject<'_>) -> Section {
 }
 
 /// Shortest CLK periods.
-pub fn periods(subject: &Subject<'_>) -> Section {
+pub(super) fn periods(subject: &Subject<'_>) -> Section {
     let Subject {
         config, silicon, ..
     } = subject;
@@ -158,7 +158,7 @@ pub fn periods(subject: &Subject<'_>) -> Section {
 }
 
 /// CLK periods at which no STOP phase helps.
-pub fn forbidden(subject: &Subject<'_>) -> Section {
+pub(super) fn forbidden(subject: &Subject<'_>) -> Section {
     let title = "CLK periods at which the strobe breaks setup or hold, whatever STOP's phase";
     let headings = &["rising CLK edge after the counted fall", "from", "to"];
     let mut section = Section::new("forbidden", title, headings);
@@ -170,7 +170,7 @@ pub fn forbidden(subject: &Subject<'_>) -> Section {
 }
 
 /// How fast start values can be loaded.
-pub fn load_clk(subject: &Subject<'_>, load: &LoadTiming) -> Section {
+pub(super) fn load_clk(subject: &Subject<'_>, load: &LoadTiming) -> Section {
     let Subject {
         config, silicon, ..
     } = subject;
@@ -190,7 +190,7 @@ pub fn load_clk(subject: &Subject<'_>, load: &LoadTiming) -> Section {
 }
 
 /// The tightest flip-flop of every clock and check.
-pub fn flip_flops(subject: &Subject<'_>, load: &LoadTiming) -> Section {
+pub(super) fn flip_flops(subject: &Subject<'_>, load: &LoadTiming) -> Section {
     let config = subject.config;
     let headings = &[
         "clock",
@@ -248,7 +248,7 @@ pub fn flip_flops(subject: &Subject<'_>, load: &LoadTiming) -> Section {
 }
 
 /// Ripple by number of stages.
-pub fn ripples(config: &SensorConfig, silicon: &Silicon) -> Section {
+pub(super) fn ripples(config: &SensorConfig, silicon: &Silicon) -> Section {
     let title = "Ripple COUNTER_CLK to LOCAL_STOP";
     let mut section = Section::new("ripples", title, &["stages", "static", "event-driven"]);
     for counter_bits in 2..=12 {
@@ -263,7 +263,7 @@ pub fn ripples(config: &SensorConfig, silicon: &Silicon) -> Section {
 }
 
 /// Where the sensor's CLK fails: the factors on all delays beyond which it does, and the conditions that have them.
-pub fn corners(config: &SensorConfig, silicon: &Silicon) -> Section {
+pub(super) fn corners(config: &SensorConfig, silicon: &Silicon) -> Section {
     let headings = &[
         "process",
         "at 1.1 V, 50 C",
@@ -318,7 +318,7 @@ pub fn corners(config: &SensorConfig, silicon: &Silicon) -> Section {
 }
 
 /// Every step of the longest and shortest paths.
-pub fn paths(subject: &Subject<'_>, load: &LoadTiming) -> Section {
+pub(super) fn paths(subject: &Subject<'_>, load: &LoadTiming) -> Section {
     let headings = &["path", "cell, input", "net", "edge", "time"];
     let mut section = Section::new("paths", "Longest and shortest paths", headings);
     let pixel = &subject.kept;

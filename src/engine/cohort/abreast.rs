@@ -10,14 +10,19 @@ use super::words::RandomWords;
 use crate::numerics::branchless::{VECTOR, count, floor, real};
 
 /// Bins that go abreast.
-pub const LANES: usize = 16;
+pub(super) const LANES: usize = 16;
 
 /// A number for each bin.
-pub type Lanes = [f64; LANES];
+pub(super) type Lanes = [f64; LANES];
 
 /// How many of `n` trials, below 2⁵², succeed in each lane, as [`super::draw::binomial`] would draw it.
 #[inline(always)]
-pub fn binomials(n: &[u64; LANES], p: &Lanes, q: &Lanes, random: &mut RandomWords) -> [u64; LANES] {
+pub(super) fn binomials(
+    n: &[u64; LANES],
+    p: &Lanes,
+    q: &Lanes,
+    random: &mut RandomWords,
+) -> [u64; LANES] {
     // Counted are the rarer ones of successes and failures.
     let (mut trials, mut rarer, mut other) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
     let (mut few, mut many) = (0, 0u64);

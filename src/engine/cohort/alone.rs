@@ -7,49 +7,55 @@ use super::blindness::{Ages, Blindness};
 use super::spad_light::absorbed;
 use super::words::RandomWords;
 use super::{Counts, EventTable, Steps};
-use crate::photon::{DeadTimeLaw, SPADS};
+use crate::photon::DeadTimeLaw;
+use smallvec::{SmallVec, smallvec};
 
 /// Events of every bin of a laser cycle that begins in the state `ages`.
-pub fn run(
+pub(super) fn run(
     blindness: &Blindness,
     ages: &Ages,
     steps: &Steps,
     is_event: &EventTable,
     random: &mut RandomWords,
 ) -> Counts {
-    let mut fired = fired_before(ages, random);
+    let spads = is_event.spads();
+    let mut fired = fired_before(ages, spads, random);
     let mut step = 0;
     let periods = steps.means.chunks(steps.per_period);
     periods
         .map(|period| {
-            let mut pulses = 0u16;
+            let mut pulses = 0u64;
             for &mean in period {
                 let p = absorbed(mean);
-                each_hit(p, random, |spad, random| {
+                each_hit(p, spads, random, |spad, random| {
                     let able = match fired[spad] {
                         Some(before) => blindness.able(step as usize, (step - before) as usize),
                         None => 1.0,
                     };
                     let makes_pulse = random.uniform() < able;
-                    pulses |= u16::from(makes_pulse) << spad;
+                    pulses |= u64::from(makes_pulse) << spad;
                     if makes_pulse || blindness.law == DeadTimeLaw::Paralysable {
                         fired[spad] = Some(step);
                     }
                 });
                 step += 1;
             }
-            u64::from(is_event[pulses.count_ones() as usize])
+            u64::from(is_event.0[pulses.count_ones() as usize])
         })
         .collect()
 }
 
 /// The step of each SPAD's last avalanche, counted from the window's first.
-fn fired_before(ages: &Ages, random: &mut RandomWords) -> [Option<i64>; SPADS] {
+fn fired_before(
+    ages: &Ages,
+    spads: usize,
+    random: &mut RandomWords,
+) -> SmallVec<[Option<i64>; 16]> {
     let blind: f64 = ages.aged.iter().sum();
     if blind == 0.0 {
-        return [None; SPADS];
+        return smallvec![None; spads];
     }
-    std::array::from_fn(|_| {
+    let age = |_| {
         let mut place = random.uniform();
         if place >= blind {
             return None;
@@ -60,20 +66,26 @@ fn fired_before(ages: &Ages, random: &mut RandomWords) -> [Option<i64>; SPADS] {
         };
         let age = ages.aged.iter().position(younger)?;
         Some(-1 - age as i64)
-    })
+    };
+    (0..spads).map(age).collect()
 }
 
 /// Calls `hit` for every SPAD that gets a photon, each with probability `p`.
-fn each_hit(p: f64, random: &mut RandomWords, mut hit: impl FnMut(usize, &mut RandomWords)) {
+fn each_hit(
+    p: f64,
+    spads: usize,
+    random: &mut RandomWords,
+    mut hit: impl FnMut(usize, &mut RandomWords),
+) {
     let mut place = random.uniform();
-    if place >= p * SPADS as f64 {
+    if place >= p * spads as f64 {
         return; // more than the probability of any
     }
     let mut is_first = p;
-    for first in 0..SPADS {
+    for first in 0..spads {
         if place < is_first {
             hit(first, random);
-            for spad in first + 1..SPADS {
+            for spad in first + 1..spads {
                 if random.uniform() < p {
                     hit(spad, random);
                 }
@@ -104,7 +116,7 @@ mod tests {
                     means: means[..BINS * per_period].into(),
                     per_period,
                 };
-                let is_event: EventTable = std::array::from_fn(|spads| spads >= least);
+                let is_event = EventTable::new(16, |spads| spads >= least);
                 let mut random = RandomWords::new(5, 0);
                 let mut both = [[[0u32; BINS]; BINS]; 2];
                 for _ in 0..TRIALS {

@@ -22,7 +22,7 @@ const FEW: usize = 8;
 
 /// Blindness of one SPAD by the steps since the avalanche that blinded it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Blindness {
+pub(super) struct Blindness {
     pub law: DeadTimeLaw,
     /// Probability of being able to fire one, two, … steps after; certain beyond.
     able: SmallVec<[f64; FEW]>,
@@ -32,7 +32,7 @@ pub struct Blindness {
 
 impl Blindness {
     /// A dead time of `steps` ≥ 1.
-    pub fn new(law: DeadTimeLaw, steps: f64) -> Self {
+    pub(super) fn new(law: DeadTimeLaw, steps: f64) -> Self {
         debug_assert!(steps >= 1.0, "{steps} steps");
         let whole = steps.floor();
         let rest = steps - whole;
@@ -50,7 +50,7 @@ impl Blindness {
     }
 
     /// The same dead time in light that makes SPADs able to fire so, by step and age.
-    pub fn in_light(&self, by_step: Vec<f64>) -> Self {
+    pub(super) fn in_light(&self, by_step: Vec<f64>) -> Self {
         Blindness {
             by_step,
             ..self.clone()
@@ -58,13 +58,13 @@ impl Blindness {
     }
 
     /// Steps after which an avalanche is forgotten.
-    pub fn memory(&self) -> usize {
+    pub(super) fn memory(&self) -> usize {
         self.able.len()
     }
 
     /// How many of the ages 1, 2, … leave a SPAD alone for so many `steps`, whatever photons come: no pulse, and no new
     /// age.
-    pub fn surely_blind(&self, steps: usize) -> usize {
+    pub(super) fn surely_blind(&self, steps: usize) -> usize {
         let certain = self.able.iter().take_while(|&&able| able == 0.0);
         match self.law {
             DeadTimeLaw::NonParalysable => (certain.count() + 1).saturating_sub(steps),
@@ -74,7 +74,7 @@ impl Blindness {
 
     /// Probability of being able to fire in step `step` of the window, `age` ≥ 1 steps after the last avalanche.
     #[inline]
-    pub fn able(&self, step: usize, age: usize) -> f64 {
+    pub(super) fn able(&self, step: usize, age: usize) -> f64 {
         match self.able.get(age - 1) {
             None => 1.0,
             Some(&able) if self.by_step.is_empty() => able,
@@ -84,7 +84,7 @@ impl Blindness {
 
     /// How far [`Blindness::able`] may be from what it is in even light, `age` steps after, where photons come up to three
     /// times as densely as on average in either step.
-    pub fn most_uneven(&self, age: usize) -> f64 {
+    pub(super) fn most_uneven(&self, age: usize) -> f64 {
         let able = self.able[age - 1];
         (9.0 * able.min(1.0 - able)).min(able.max(1.0 - able))
     }
@@ -136,7 +136,7 @@ impl BlindSpad {
 /// Probability of each age of one SPAD at the start of a step. For the paralysable law an age counts from the last
 /// avalanche, seen or not.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Ages {
+pub(super) struct Ages {
     /// Entry a: last avalanche a + 1 steps ago.
     pub aged: SmallVec<[f64; FEW]>,
     /// No avalanche that still matters.
@@ -145,7 +145,7 @@ pub struct Ages {
 
 impl Ages {
     /// A SPAD that has seen nothing yet.
-    pub fn rested(blindness: &Blindness) -> Self {
+    pub(super) fn rested(blindness: &Blindness) -> Self {
         Ages {
             aged: smallvec![0.0; blindness.memory()],
             free: 1.0,
@@ -153,12 +153,12 @@ impl Ages {
     }
 
     /// Makes those free that have no age.
-    pub fn fill_up(&mut self) {
+    pub(super) fn fill_up(&mut self) {
         self.free = (1.0 - self.aged.iter().sum::<f64>()).max(0.0);
     }
 
     /// The steady state under `mean` photons a step.
-    pub fn steady(blindness: &Blindness, mean: f64) -> Self {
+    pub(super) fn steady(blindness: &Blindness, mean: f64) -> Self {
         let (p, q) = photon_or_none(mean);
         let mut aged = SmallVec::with_capacity(blindness.memory());
         let (mut survives, mut sum) = (1.0, 0.0);
@@ -177,7 +177,7 @@ impl Ages {
     }
 
     /// Step `step` of the window, with `mean` photons.
-    pub fn step(&mut self, blindness: &Blindness, step: usize, mean: f64) {
+    pub(super) fn step(&mut self, blindness: &Blindness, step: usize, mean: f64) {
         let (p, q) = photon_or_none(mean);
         let mut renewed = p * self.free;
         self.free *= q;
@@ -195,7 +195,7 @@ impl Ages {
     }
 
     /// Probability of a pulse in step `step` of the window, with `mean` photons.
-    pub fn pulse(&self, blindness: &Blindness, step: usize, mean: f64) -> f64 {
+    pub(super) fn pulse(&self, blindness: &Blindness, step: usize, mean: f64) -> f64 {
         let aged = self.aged.iter().enumerate();
         let able: f64 = aged
             .map(|(index, age)| age * blindness.able(step, index + 1))

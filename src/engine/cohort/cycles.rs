@@ -15,9 +15,9 @@ use smallvec::SmallVec;
 use super::blindness::{Ages, Blindness};
 use super::spad_light::{Extent, SpadLight, absorbed};
 use super::{CohortOptions, FEW_STEPS, Steps};
-use crate::chip::{Exposure, Mode, SensorConfig};
+use crate::chip::window_law::OpenWindow;
+use crate::chip::{SensorConfig, WindowLaw};
 use crate::engine::EngineError;
-use crate::photon::SPADS;
 
 /// What is left of a state that counts as forgotten.
 const FORGOTTEN: f64 = 1e-15;
@@ -26,7 +26,7 @@ const FORGOTTEN: f64 = 1e-15;
 const FARTHEST: f64 = 1000.0;
 
 /// Laser cycles with the same light and the same state at the start of the window.
-pub struct LikeCycles {
+pub(super) struct LikeCycles {
     pub cycles: u64,
     pub blindness: Blindness,
     pub ages: Ages,
@@ -36,7 +36,7 @@ pub struct LikeCycles {
 }
 
 /// Light and dead time around one macropixel's window. Times in femtoseconds from its laser cycle's STOP edge.
-pub struct Scene {
+pub(super) struct Scene {
     pub light: SpadLight,
     pub dead_fs: f64,
     /// How long after a dead time its avalanche may have caused another one.
@@ -60,15 +60,15 @@ struct Back {
 
 /// How a settled laser cycle's neighbours begin.
 #[derive(Debug, Clone)]
-pub enum Before {
+pub(super) enum Before {
     /// Dark until then: every SPAD is ready.
     Dark(f64),
-    /// Background for ever, and echoes from then on.
+    /// Background for ever, and from then on all the light there is. What is forgotten by the window may have been another.
     Steady(f64),
 }
 
 /// A class of laser cycles, before anything is computed of it.
-pub struct Class {
+pub(super) struct Class {
     pub cycles: u64,
     pub extent: Extent,
     pub before: Before,
@@ -77,14 +77,14 @@ pub struct Class {
 
 impl Scene {
     /// Lengths of a dead time, of what an avalanche may cause after it, and of a CLK period, the start of the window and the length of a laser cycle, fs.
-    pub fn new(
+    pub(super) fn new(
         light: SpadLight,
         [dead_fs, pending_fs, period_fs]: [f64; 3],
         [from_fs, cycle_fs]: [f64; 2],
         bins: usize,
     ) -> Self {
         Scene {
-            busy: absorbed(light.background(dead_fs)),
+            busy: absorbed(light.most_background(dead_fs)),
             light,
             dead_fs,
             pending_fs,
@@ -96,7 +96,7 @@ impl Scene {
     }
 
     /// End of the window.
-    pub fn until_fs(&self) -> f64 {
+    pub(super) fn until_fs(&self) -> f64 {
         self.from_fs + self.bins as f64 * self.period_fs
     }
 
@@ -121,8 +121,7 @@ impl Scene {
         while busy > enough && stretches < most {
             stretches += 1.0;
             let from_fs = self.from_fs - stretches * self.dead_fs;
-            let endless = Extent::of_echoes(self.light.echoes_in(from_fs..from_fs + self.dead_fs));
-            busy *= absorbed(self.light.steps(from_fs, self.dead_fs, 1, &endless)[0]);
+            busy *= absorbed(self.light.most(from_fs, self.dead_fs));
         }
         Back {
             busy,
@@ -134,30 +133,27 @@ impl Scene {
     ///
     /// # Errors
     /// Laser cycles that depend on each other.
-    pub fn classes(
+    pub(super) fn classes(
         &self,
         config: &SensorConfig,
-        exposure: &Exposure,
-        first_edge: i64,
+        law: &WindowLaw,
+        window: &OpenWindow,
         options: &CohortOptions,
     ) -> Result<SmallVec<[Class; 1]>, EngineError> {
-        let cycles = i64::from(exposure.laser_cycles);
-        let for_one = options.memory / SPADS as f64;
+        let latched = law.latched_cycles();
+        let (first, cycles) = (latched.start, latched.end);
+        let for_one = options.memory / config.spads() as f64;
         let enough = FORGOTTEN.min(for_one / cycles as f64);
         let between_fs = self.cycle_fs - self.bins as f64 * self.period_fs;
         let back = self.busy_back_to(f64::INFINITY, enough);
         if cycles > 1 && (back.for_fs > between_fs || back.busy > enough) {
-            let busy = self.busy_back_to(between_fs, enough).busy * SPADS as f64 * cycles as f64;
+            let busy =
+                self.busy_back_to(between_fs, enough).busy * config.spads() as f64 * cycles as f64;
             if busy > options.memory {
                 return Err(EngineError::CyclesNotIndependent { bound: busy });
             }
         }
 
-        // A conventional cycle is latched by the STOP edge that ends it; the exposure's first one ends one, too.
-        let first = match config.mode {
-            Mode::Guided => 0,
-            Mode::Conventional => -1,
-        };
         let is_settled = |cycle: i64| {
             let since_fs = cycle as f64 * self.cycle_fs + self.from_fs;
             since_fs >= back.for_fs || self.busy_back_to(since_fs, for_one).busy <= for_one
@@ -172,6 +168,12 @@ impl Scene {
         let mut ends: SmallVec<[i64; 8]> = (first..settled_from).collect();
         ends.extend(reaching.clone().flat_map(|k| [-k, cycles - k]));
         ends.push(settled_from);
+        // Where the light changes, laser cycles before and after it that see both are alone.
+        let cycles_fs = |time_fs: f64| (time_fs / self.cycle_fs).ceil() as i64;
+        let ahead = (cycles_fs(self.until_fs()) - 1).max(reaching.end).max(0);
+        let behind = cycles_fs(-since_fs).max(-reaching.start).max(0);
+        let near = |change: i64| change - ahead..=change + behind + 1;
+        ends.extend(self.light.changes().flat_map(near));
         ends.push(cycles - ((self.until_fs() / self.cycle_fs).ceil() as i64 - 1).clamp(0, cycles));
         ends.retain(|end| (first..cycles).contains(end));
         ends.push(cycles);
@@ -187,28 +189,26 @@ impl Scene {
             } else {
                 starts_fs
             };
-            // The pipeline starts empty: nothing before rising edge -1 was ever compared.
-            let edge = cycle * i64::from(exposure.stop_periods) + first_edge;
-            let earliest = sent.clone().next().map(|k| self.light.echo(k).start);
-            let echoes_from = earliest.map_or(self.from_fs, |earliest| earliest.max(since_fs));
+            let steady_until = self.light.steady_until(sent.clone(), self.from_fs);
             Class {
                 cycles: (ends[1] - ends[0]) as u64,
                 extent: Extent {
+                    cycle,
                     lit_fs: start_fs..starts_fs + cycles as f64 * self.cycle_fs,
                     echoes: sent,
                 },
                 before: match is_settled {
-                    true => Before::Steady(echoes_from),
+                    true => Before::Steady(steady_until.max(since_fs)),
                     false => Before::Dark(starts_fs),
                 },
-                not_compared: (-1 - edge).clamp(0, self.bins as i64) as usize,
+                not_compared: law.not_compared(window, cycle),
             }
         });
         Ok(classes.collect())
     }
 
     /// The state at the start of the window in steps of `step_fs`.
-    pub fn start(&self, blindness: &Blindness, class: &Class, step_fs: f64) -> Ages {
+    pub(super) fn start(&self, blindness: &Blindness, class: &Class, step_fs: f64) -> Ages {
         let (mut ages, since_fs) = match class.before {
             Before::Dark(until_fs) => (Ages::rested(blindness), until_fs),
             Before::Steady(until_fs) => {
@@ -230,7 +230,7 @@ impl Scene {
     }
 
     /// The light on the window.
-    pub fn steps(&self, per_period: usize, extent: &Extent) -> Steps {
+    pub(super) fn steps(&self, per_period: usize, extent: &Extent) -> Steps {
         let (step_fs, count) = (self.period_fs / per_period as f64, self.bins * per_period);
         Steps {
             means: self.light.steps(self.from_fs, step_fs, count, extent),
@@ -240,10 +240,14 @@ impl Scene {
 
     /// The light on as many CLK periods before the window, if neither there nor in the window it is far from even within
     /// one: no echo is shorter, none is missing, and the exposure has long begun.
-    pub fn even_past(&self, periods: usize, class: &Class) -> Option<SmallVec<[f64; FEW_STEPS]>> {
+    pub(super) fn even_past(
+        &self,
+        periods: usize,
+        class: &Class,
+    ) -> Option<SmallVec<[f64; FEW_STEPS]>> {
         let from_fs = self.from_fs - periods as f64 * self.period_fs;
-        let has_echo = !self.light.echoes_in(from_fs..self.until_fs()).is_empty();
-        let is_narrow = has_echo && 2.0 * self.light.sigma_fs() < self.period_fs;
+        let finest_fs = self.light.finest_fs(from_fs..self.until_fs());
+        let is_narrow = finest_fs.is_some_and(|sigma_fs| 2.0 * sigma_fs < self.period_fs);
         let is_lit =
             class.extent.lit_fs.start <= from_fs && class.extent.lit_fs.end >= self.until_fs();
         (is_lit && !is_narrow).then(|| {

@@ -4,7 +4,7 @@ use super::rejection::Rejection;
 use super::words::RandomWords;
 
 /// Above this, logarithms are quicker than factors.
-pub const MOST_FACTORS: u64 = 4096;
+pub(super) const MOST_FACTORS: u64 = 4096;
 
 /// `base` to the `exponent`, by squaring, without a branch that depends on its digits.
 fn power(mut base: f64, mut exponent: u64) -> f64 {
@@ -18,14 +18,14 @@ fn power(mut base: f64, mut exponent: u64) -> f64 {
 }
 
 /// Means from which rejection is the faster way; it may not begin any earlier.
-pub const INVERSION_MEAN: f64 = 10.0;
+pub(super) const INVERSION_MEAN: f64 = 10.0;
 
 /// How many of `n` trials succeed, each with probability `p`; `q` is 1 − `p`.
 ///
 /// Both are given because neither follows from the other when it is tiny. A generator that takes only p keeps few
 /// digits of a small one: at p = 10⁻¹⁵ and n = 10⁹, 1 − p alone puts the mean 11 % off.
 #[inline]
-pub fn binomial(n: u64, p: f64, q: f64, random: &mut RandomWords) -> u64 {
+pub(super) fn binomial(n: u64, p: f64, q: f64, random: &mut RandomWords) -> u64 {
     debug_assert!(
         p >= 0.0 && q >= 0.0 && (p + q - 1.0).abs() < 1e-12,
         "{p} + {q}"
@@ -44,10 +44,10 @@ pub fn binomial(n: u64, p: f64, q: f64, random: &mut RandomWords) -> u64 {
 }
 
 /// Largest result of an inversion: 10 + 110 is 35 standard deviations above the largest mean.
-pub const INVERSION_LIMIT: u64 = 120;
+pub(super) const INVERSION_LIMIT: u64 = 120;
 
 /// 1/k, so that the sum waits for no division.
-pub const RECIPROCALS: [f64; INVERSION_LIMIT as usize + 1] = {
+pub(super) const RECIPROCALS: [f64; INVERSION_LIMIT as usize + 1] = {
     let mut reciprocals = [f64::INFINITY; INVERSION_LIMIT as usize + 1];
     let mut k = 1;
     while k < reciprocals.len() {

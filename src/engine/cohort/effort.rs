@@ -6,33 +6,36 @@
 
 use super::blindness::Ages;
 use super::cycles::LikeCycles;
-use crate::photon::SPADS;
 
 /// Which part of √(2 ln N) standard deviations counts: with it the estimate is within a factor of two of the states that N
-/// cycles are in, from a few of them to thousands (the test below).
+/// cycles are in, from a few of them to thousands, and of three with 4 or 64 SPADs (the test below).
 const OCCUPIED: f64 = 0.9;
 
-/// States that `cycles` laser cycles are expected to be in, whose SPADs are in the state `ages` with these probabilities.
-pub fn occupied_states(ages: &Ages, cycles: u64) -> f64 {
+/// States that `cycles` laser cycles are expected to be in, each of whose `spads` are in the state `ages` with these probabilities.
+pub(super) fn occupied_states(ages: &Ages, spads: usize, cycles: u64) -> f64 {
     let cycles = cycles as f64;
     let reach = OCCUPIED * (2.0 * cycles.ln()).sqrt();
-    let deviation = |share: f64| (SPADS as f64 * share * (1.0 - share).max(0.0)).sqrt();
+    let deviation = |share: f64| (spads as f64 * share * (1.0 - share).max(0.0)).sqrt();
     let states: f64 = ages
         .aged
         .iter()
         .map(|&share| 1.0 + reach * deviation(share))
         .product();
+    // Not more than there are ways to spread SPADs over ages.
+    let ways =
+        (1..=ages.aged.len()).fold(1.0, |ways, age| ways * (spads + age) as f64 / age as f64);
+    let states = states.min(ways);
     states * cycles / (states + cycles)
 }
 
 /// Cohorts of laser cycles alike, summed over the steps of a window.
-pub fn of_joint_states(like: &LikeCycles) -> f64 {
+pub(super) fn of_joint_states(like: &LikeCycles, spads: usize) -> f64 {
     let mut ages = like.ages.clone();
     let steps = like.steps.means.iter().enumerate();
     steps
         .map(|(step, &mean)| {
             ages.step(&like.blindness, step, mean);
-            occupied_states(&ages, like.cycles)
+            occupied_states(&ages, spads, like.cycles)
         })
         .sum()
 }
@@ -53,6 +56,7 @@ mod tests {
             dead_time in 1.0f64..4.0,
             mean in 0.005f64..1.0,
             cycles in 100u64..4_000,
+            spads in prop_oneof![Just(4usize), Just(16), Just(64)],
             seed in any::<u64>(),
         ) {
             use rand::{RngExt, SeedableRng};
@@ -62,7 +66,7 @@ mod tests {
             let mut states = HashSet::new();
             for _ in 0..cycles {
                 let mut state = vec![0u8; ages.aged.len()];
-                for _ in 0..SPADS {
+                for _ in 0..spads {
                     let mut at = random.random::<f64>();
                     let age = ages.aged.iter().position(|share| {
                         at -= share;
@@ -72,8 +76,9 @@ mod tests {
                 }
                 states.insert(state);
             }
-            let (drawn, estimated) = (states.len() as f64, occupied_states(&ages, cycles));
-            prop_assert!((0.5..2.0).contains(&(estimated / drawn)), "{estimated} for {drawn}");
+            let (drawn, estimated) = (states.len() as f64, occupied_states(&ages, spads, cycles));
+            let factor = if spads == 16 { 2.0 } else { 3.0 };
+            prop_assert!((1.0 / factor..factor).contains(&(estimated / drawn)), "{estimated} for {drawn}");
         }
     }
 }

@@ -35,14 +35,14 @@ use super::secondaries::{Acts, Cell, Secondaries};
 use super::spad_light::absorbed;
 use super::{EventTable, FEW_STEPS};
 use crate::engine::EngineError;
-use crate::photon::{DeadTimeLaw, SPADS};
+use crate::photon::DeadTimeLaw;
 
 /// How often cells are halved at most: 256 of them to a CLK period.
 const HALVINGS: u32 = 6;
 
 /// What a SPAD does in a window.
 #[derive(Debug, Clone)]
-pub struct Fine {
+pub(super) struct Fine {
     /// Its state at the start.
     pub ages: Ages,
     /// Probability of being able to fire, for every CLK period and 1, 2, … of them since the last avalanche.
@@ -132,7 +132,7 @@ impl Fine {
 ///
 /// # Errors
 /// When the finest grid does not do.
-pub fn solve(
+pub(super) fn solve(
     scene: &Scene,
     blindness: &Blindness,
     secondaries: Secondaries,
@@ -185,10 +185,10 @@ pub fn solve(
 const ROUNDING: f64 = 1e-6;
 
 /// Probability of an event and of none, when each SPAD makes a pulse with probability `pulse`.
-pub fn event(is_event: &EventTable, pulse: f64) -> [f64; 2] {
-    let fired = Hits::new(SPADS, pulse, 1.0 - pulse);
+pub(super) fn event(is_event: &EventTable, pulse: f64) -> [f64; 2] {
+    let fired = Hits::new(is_event.spads(), pulse, 1.0 - pulse);
     let mut sums = [0.0; 2];
-    for (spads, &is_event) in is_event.iter().enumerate() {
+    for (spads, &is_event) in is_event.0.iter().enumerate() {
         sums[usize::from(!is_event)] += fired.exactly(spads);
     }
     sums

@@ -5,7 +5,7 @@
 use super::cycles::{Class, Scene};
 
 /// Cells of a CLK period on the coarsest grid, at least.
-pub const CELLS: f64 = 4.0;
+pub(super) const CELLS: f64 = 4.0;
 
 /// Edges that are closer than that are one, fs.
 const CLOSE_FS: f64 = 0.01;
@@ -16,7 +16,7 @@ const BENDS: [f64; 13] = [
 ];
 
 /// Cells of time, which repeat every dead time.
-pub struct Grid {
+pub(super) struct Grid {
     /// Edges, fs after the start of the window.
     pub edges: Vec<f64>,
     /// Cells in a dead time.
@@ -28,7 +28,13 @@ pub struct Grid {
 
 impl Grid {
     /// From `since_fs` before the window on.
-    pub fn new(scene: &Scene, class: &Class, since_fs: f64, memory: usize, halvings: u32) -> Self {
+    pub(super) fn new(
+        scene: &Scene,
+        class: &Class,
+        since_fs: f64,
+        memory: usize,
+        halvings: u32,
+    ) -> Self {
         let (dead_fs, period_fs) = (scene.dead_fs, scene.period_fs);
         let start_fs = -since_fs;
         let period = |number: usize| (number as f64 - memory as f64) * period_fs;
@@ -37,19 +43,17 @@ impl Grid {
         let mut bends: Vec<f64> = periods.clone().map(period).collect();
         let lit_fs = &class.extent.lit_fs;
         bends.extend([lit_fs.start, lit_fs.end].map(|end| end - scene.from_fs));
-        let sigma_fs = scene.light.sigma_fs();
-        if sigma_fs * CELLS < period_fs {
-            let reaching = scene
-                .light
-                .echoes_in(scene.from_fs + start_fs..scene.until_fs());
-            let echoes = &class.extent.echoes;
-            for number in reaching.start.max(echoes.start)..reaching.end.min(echoes.end) {
-                let centre_fs = scene.light.centre_fs(number) - scene.from_fs;
+        let stretch_fs = scene.from_fs + start_fs..scene.until_fs();
+        for (number, echo) in scene.light.sent(stretch_fs.clone(), &class.extent) {
+            let (centre_fs, sigma_fs) = (echo.centre_fs(number) - scene.from_fs, echo.sigma_fs());
+            if sigma_fs * CELLS < period_fs {
                 bends.extend(BENDS.map(|bend| centre_fs + bend * sigma_fs));
                 // A pulse without width is somewhere within a femtosecond.
                 bends.push(centre_fs + 1.0);
             }
         }
+        let uneven = scene.light.bends_fs(stretch_fs, &class.extent);
+        bends.extend(uneven.into_iter().map(|bend_fs| bend_fs - scene.from_fs));
         bends.retain(|bend| (start_fs..=until_fs).contains(bend));
         let mut phases: Vec<f64> = bends
             .iter()

@@ -1,23 +1,26 @@
 //! How many of some SPADs a photon hits in one step: the binomial tails that split a cohort.
 
+use smallvec::{SmallVec, smallvec};
+
 use super::draw::binomial;
 use super::words::RandomWords;
-use crate::photon::SPADS;
 
 /// Probabilities that at least 0, 1, 2, … of some SPADs are hit, and their complements.
-#[derive(Debug, Clone, Copy)]
-pub struct Hits {
+#[derive(Debug, Clone)]
+pub(super) struct Hits {
     spads: usize,
-    at_least: [f64; SPADS + 2],
-    exactly: [f64; SPADS + 1],
+    at_least: SmallVec<[f64; FEW_SPADS + 2]>,
+    exactly: SmallVec<[f64; FEW_SPADS + 1]>,
 }
+
+/// Numbers of SPADs that need no memory of their own.
+const FEW_SPADS: usize = 16;
 
 impl Hits {
     /// Each of `spads` SPADs is hit with probability `p`; `q` is 1 − `p`.
-    pub fn new(spads: usize, p: f64, q: f64) -> Self {
-        debug_assert!(spads <= SPADS);
-        let mut exactly = [0.0; SPADS + 1];
-        let mut at_least = [0.0; SPADS + 2];
+    pub(super) fn new(spads: usize, p: f64, q: f64) -> Self {
+        let mut exactly = smallvec![0.0; spads + 1];
+        let mut at_least = smallvec![0.0; spads + 2];
         if q > 0.0 {
             exactly[0] = q.powi(spads as i32);
             for hit in 0..spads {
@@ -44,27 +47,27 @@ impl Hits {
     }
 
     /// How many SPADs there are.
-    pub fn spads(&self) -> usize {
+    pub(super) fn spads(&self) -> usize {
         self.spads
     }
 
     /// Probability that any is hit.
-    pub fn any(&self) -> f64 {
+    pub(super) fn any(&self) -> f64 {
         self.at_least[1]
     }
 
     /// Probability that none is hit.
-    pub fn none(&self) -> f64 {
+    pub(super) fn none(&self) -> f64 {
         self.exactly[0]
     }
 
     /// Probability that exactly `hit` are hit.
-    pub fn exactly(&self, hit: usize) -> f64 {
+    pub(super) fn exactly(&self, hit: usize) -> f64 {
         self.exactly[hit]
     }
 
     /// Of `cycles` laser cycles in each of which at least `least` SPADs are hit, those with one more at least.
-    pub fn more(&self, cycles: u64, least: usize, random: &mut RandomWords) -> u64 {
+    pub(super) fn more(&self, cycles: u64, least: usize, random: &mut RandomWords) -> u64 {
         if cycles == 0 || least >= self.spads || self.at_least[least] == 0.0 {
             return 0;
         }
@@ -74,10 +77,10 @@ impl Hits {
     }
 }
 
-/// Probability that at least `k` of a macropixel's SPADs are hit, with `mean` photons on each. Relative error below
+/// Probability that at least `k` of a macropixel's `spads` are hit, with `mean` photons on each. Relative error below
 /// 10⁻¹³ down to 10⁻²⁹⁰.
-pub fn at_least_hit(k: usize, mean: f64) -> f64 {
-    Hits::new(SPADS, -libm::expm1(-mean), libm::exp(-mean)).at_least[k]
+pub fn at_least_hit(k: usize, spads: usize, mean: f64) -> f64 {
+    Hits::new(spads, -libm::expm1(-mean), libm::exp(-mean)).at_least[k]
 }
 
 #[cfg(test)]
@@ -87,7 +90,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn tails_add_up(spads in 0usize..=16, mean in 1e-12f64..400.0) {
+        fn tails_add_up(spads in 0usize..=64, mean in 1e-12f64..400.0) {
             let (p, q) = (-libm::expm1(-mean), libm::exp(-mean));
             let hits = Hits::new(spads, p, q);
             prop_assert!((hits.at_least[0] - 1.0).abs() < 1e-12);

@@ -14,15 +14,18 @@
 //! what. When an avalanche is forgotten, its nodes are leaves, and fold into their parents. Only nodes with cycles
 //! in them cost anything; nothing is rounded or merged that differs.
 
+use smallvec::SmallVec;
+
 use super::blindness::{Ages, Blindness};
 use super::draw::binomial;
 use super::hits::Hits;
 use super::words::RandomWords;
 use super::{Counts, EventTable, Steps};
-use crate::photon::{DeadTimeLaw, SPADS};
+use crate::chip::MOST_SPADS;
+use crate::photon::DeadTimeLaw;
 
 /// Counts of every bin after `cycles` laser cycles that begin in the state `ages`.
-pub fn run(
+pub(super) fn run(
     blindness: &Blindness,
     ages: &Ages,
     steps: &Steps,
@@ -30,7 +33,7 @@ pub fn run(
     cycles: u64,
     random: &mut RandomWords,
 ) -> Counts {
-    let mut tree = Tree::new(blindness, cycles);
+    let mut tree = Tree::new(blindness, is_event.spads(), cycles);
     tree.age(ages, random);
     let periods = steps.means.chunks(steps.per_period);
     periods
@@ -71,6 +74,7 @@ const NONE: u32 = u32::MAX;
 
 struct Tree<'a> {
     blindness: &'a Blindness,
+    spads: usize,
     nodes: Vec<Node>,
     unused: Vec<u32>,
     laws: Laws,
@@ -116,7 +120,7 @@ impl Group {
 struct Laws {
     laws: Vec<Hits>,
     /// Which of them is that of so many SPADs, plus 1, by the class of SPADs.
-    numbers: Vec<[u16; SPADS + 1]>,
+    numbers: Vec<[u16; MOST_SPADS + 1]>,
 }
 
 impl Laws {
@@ -128,7 +132,7 @@ impl Laws {
     /// The law of `spads` SPADs, each of which is hit with `p`; `q` is 1 − `p`. Both are the same for all of a class.
     fn number(&mut self, class: usize, spads: usize, p: f64, q: f64) -> usize {
         if self.numbers.len() <= class {
-            self.numbers.resize(class + 1, [0; SPADS + 1]);
+            self.numbers.resize(class + 1, [0; MOST_SPADS + 1]);
         }
         let known = &mut self.numbers[class][spads];
         if *known == 0 {
@@ -154,7 +158,7 @@ struct Outcome {
 }
 
 impl<'a> Tree<'a> {
-    fn new(blindness: &'a Blindness, cycles: u64) -> Self {
+    fn new(blindness: &'a Blindness, spads: usize, cycles: u64) -> Self {
         let root = Node {
             cycles,
             parent: NONE,
@@ -168,6 +172,7 @@ impl<'a> Tree<'a> {
         };
         Tree {
             blindness,
+            spads,
             nodes: vec![root],
             unused: Vec::new(),
             laws: Laws::default(),
@@ -231,7 +236,7 @@ impl<'a> Tree<'a> {
 
     /// The free SPADs of `node`.
     fn free(&mut self, node: u32, p: f64, q: f64, able: f64) -> Group {
-        let spads = SPADS - usize::from(self.nodes[node as usize].depth);
+        let spads = self.spads - usize::from(self.nodes[node as usize].depth);
         let number = self.laws.number(FREE, spads, p, q);
         Group::free(number, &self.laws.laws[number], able)
     }
@@ -366,18 +371,13 @@ impl<'a> Tree<'a> {
 
     /// The node that `node` becomes, made if need be.
     fn destination(&mut self, node: u32, outcome: &Outcome) -> u32 {
-        let mut way = [Avalanche {
-            step: 0,
-            pulse: false,
-        }; SPADS];
-        let mut length = 0;
+        let mut way: SmallVec<[Avalanche; 16]> = SmallVec::new();
         let mut at = node;
         let mut replaced = outcome.replaced.iter().peekable();
         while at != ROOT {
             let Node { parent, oldest, .. } = self.nodes[at as usize];
             if replaced.next_if(|&&old| old == oldest).is_none() {
-                way[length] = oldest;
-                length += 1;
+                way.push(oldest);
             }
             at = parent;
         }
@@ -392,7 +392,7 @@ impl<'a> Tree<'a> {
                 at = self.child(at, Avalanche { step, pulse });
             }
         }
-        for &avalanche in way[..length].iter().rev() {
+        for &avalanche in way.iter().rev() {
             at = self.child(at, avalanche);
         }
         at
@@ -445,7 +445,7 @@ impl<'a> Tree<'a> {
                 pulses += usize::from(at.oldest.pulse && at.oldest.step >= self.period);
                 at = &self.nodes[at.parent as usize];
             }
-            is_event[pulses]
+            is_event.0[pulses]
         });
         counted.map(|node| node.cycles).sum()
     }

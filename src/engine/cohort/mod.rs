@@ -28,7 +28,8 @@
 //!   kept, but how an afterpulse follows its own pulse is remembered for a dead time only, and crosstalk,
 //!   which blinds a SPAD of a cycle that has its event already, hits any SPAD. So crosstalk is refused where an event
 //!   takes several SPADs, as both are for paralysable SPADs and with [`CohortOptions::sub_bins`].
-//! * A SPAD is to fire at most once in a CLK period: a shorter dead time is refused, and so are measured laser pulses.
+//! * A SPAD is to fire at most once in a CLK period: a shorter dead time is refused. So are measured laser pulses, and SPADs that
+//!   differ.
 //!
 //! So an exposure takes one step a bin, whatever light there is, and at most as many states as it has laser cycles.
 
@@ -62,12 +63,24 @@ pub use self::hits::at_least_hit;
 use self::secondaries::Secondaries;
 use self::spad_light::SpadLight;
 use self::words::RandomWords;
-use super::{Engine, EngineError, Expose, Exposed, LitPixel, Work, follows};
-use crate::chip::{Exposure, SensorConfig, WindowLaw, correlation, histogram, window_law};
-use crate::photon::{DeadTimeLaw, PhotonStream, PixelLight, SPADS, SpadModel, StreamConfig};
+use super::{Engine, EngineError, Expose, Exposed, LitPixel, NotModelled, Work, follows};
+use crate::chip::{Exposure, Sensor, WindowLaw, correlation, histogram, window_law};
+use crate::photon::{DeadTimeLaw, PhotonStream, PixelLight, Segment, SpadModel, StreamConfig};
 
-/// Whether 0, 1, 2, … SPADs that fire in a CLK period make an event.
-type EventTable = [bool; SPADS + 1];
+/// Whether 0, 1, 2, … SPADs that fire in a CLK period make an event, up to all of a macropixel.
+#[derive(Debug, Clone)]
+struct EventTable(SmallVec<[bool; 17]>);
+
+impl EventTable {
+    fn new(spads: usize, is_event: impl Fn(usize) -> bool) -> Self {
+        EventTable((0..=spads).map(is_event).collect())
+    }
+
+    /// SPADs of a macropixel.
+    fn spads(&self) -> usize {
+        self.0.len() - 1
+    }
+}
 
 /// Steps of a window that need no memory of their own.
 const FEW_STEPS: usize = 16;
@@ -114,9 +127,8 @@ impl Default for CohortOptions {
 const WORTH_LOOKING_AT: f64 = 200.0;
 
 /// Draws histograms from their distribution.
-pub struct Cohort<'a> {
-    config: &'a SensorConfig,
-    exposure: &'a Exposure,
+pub struct Cohort {
+    sensor: Sensor,
     law: WindowLaw,
     /// What the law says of each start value, once it has been asked.
     windows: Vec<OnceLock<Opening>>,
@@ -133,22 +145,27 @@ struct Opening {
     from_fs: f64,
 }
 
-impl<'a> Cohort<'a> {
+impl Cohort {
     /// An engine for this sensor and exposure.
-    pub fn new(config: &'a SensorConfig, exposure: &'a Exposure, options: CohortOptions) -> Self {
+    pub fn new(sensor: impl Into<Sensor>, exposure: &Exposure, options: CohortOptions) -> Self {
+        Self::with_law(WindowLaw::new(sensor, exposure), options)
+    }
+
+    /// An engine for macropixels with a law of their own.
+    pub fn with_law(law: WindowLaw, options: CohortOptions) -> Self {
+        let sensor = law.sensor().clone();
         debug_assert!(options.sub_bins != Some(0), "a period has a step");
-        let is_event = std::array::from_fn(|fired| {
-            let spads = ((1u32 << fired) - 1) as u16;
-            correlation::model(spads, config.event_type, config.threshold)
+        let is_event = EventTable::new(sensor.spads(), |fired| {
+            let spads = ((1u128 << fired) - 1) as u64;
+            correlation::model(spads, sensor.event_type, sensor.threshold)
         });
         Cohort {
-            config,
-            exposure,
-            law: WindowLaw::new(config, exposure),
-            windows: vec![OnceLock::new(); usize::from(config.largest_start()) + 1],
+            law,
+            windows: vec![OnceLock::new(); usize::from(sensor.largest_start()) + 1],
             options,
             most_photons: pooled::most_photons(options.neglect),
             is_event,
+            sensor,
         }
     }
 
@@ -176,7 +193,7 @@ impl<'a> Cohort<'a> {
         start: u16,
         light: &PixelLight,
     ) -> Result<Vec<u16>, EngineError> {
-        let (bits, overflow) = (self.config.bin_bits as u32, self.config.overflow);
+        let (bits, overflow) = (self.sensor.bin_bits as u32, self.sensor.overflow);
         let sums = self.sums(stream, pixel, start, light)?;
         let counts = sums.iter().map(|&n| histogram::model(n, bits, overflow));
         Ok(counts.collect())
@@ -203,7 +220,7 @@ impl<'a> Cohort<'a> {
         start: u16,
         light: &PixelLight,
     ) -> Result<Counts, EngineError> {
-        let mut sums: Counts = smallvec![0; self.config.bins];
+        let mut sums: Counts = smallvec![0; self.sensor.bins];
         let Some(cohorts) = self.cohorts(stream, start, light)? else {
             return Ok(sums);
         };
@@ -234,8 +251,12 @@ impl<'a> Cohort<'a> {
     fn is_pooled(&self, blindness: &Blindness, steps: &Steps, cycles: u64) -> bool {
         let photons = pooled::largest(steps);
         photons <= self.most_photons
-            && pooled::looked_at(blindness, steps, photons, cycles)
-                <= WORTH_LOOKING_AT * steps.per_period as f64
+            && pooled::looked_at(
+                blindness,
+                steps,
+                photons,
+                self.is_event.spads() as u64 * cycles,
+            ) <= WORTH_LOOKING_AT * steps.per_period as f64
     }
 
     /// Cohorts that [`Cohort::draw`] follows, summed over the steps of the window: what its time goes with, estimated.
@@ -259,7 +280,7 @@ impl<'a> Cohort<'a> {
                 0 => 0.0,
                 1 => steps.means.len() as f64,
                 _ if self.is_pooled(blindness, steps, *cycles) => steps.means.len() as f64,
-                _ => effort::of_joint_states(&like),
+                _ => effort::of_joint_states(&like, self.is_event.spads()),
             }
         };
         let cohorts = self.cohorts(stream, start, light)?.unwrap_or_default();
@@ -276,7 +297,7 @@ impl<'a> Cohort<'a> {
         start: u16,
         light: &PixelLight,
     ) -> Result<Vec<f64>, EngineError> {
-        let mut sums = vec![0.0; self.config.bins];
+        let mut sums = vec![0.0; self.sensor.bins];
         let Some(cohorts) = self.cohorts(stream, start, light)? else {
             return Ok(sums);
         };
@@ -305,33 +326,43 @@ impl<'a> Cohort<'a> {
         start: u16,
         light: &PixelLight,
     ) -> Result<Option<Vec<LikeCycles>>, EngineError> {
-        follows(self.config, &self.law.timing().pulses)?;
+        follows(&self.sensor, &self.law.timing().pulses)?;
         let Opening { window, from_fs } = self.opening(start);
-        let window = match window {
-            window_law::Window::Open(window) => window,
-            window_law::Window::Never => return Ok(None),
-            window_law::Window::Irregular(why) => return Err(EngineError::Irregular(why)),
-            window_law::Window::Race(why) => return Err(EngineError::Race(why)),
+        let Some(window) = window.settled()? else {
+            return Ok(None);
         };
         let period_fs = 1e15 / stream.clock.as_hz();
         let dead_fs = stream.spads.dead_time.as_fs() as f64;
         let spads = &stream.spads;
         let has_secondaries = spads.has_secondaries();
+        let mut echoes = light.segments().flat_map(Segment::echoes);
+        let has_shape = echoes.any(|echo| echo.shape.is_some());
         let refusals = [
-            (dead_fs < period_fs, "a dead time shorter than a CLK period"),
+            (!self.law.has_clk_bins(), NotModelled::UnequalBins),
+            (
+                dead_fs < period_fs,
+                NotModelled::ShortDeadTime {
+                    dead_time: spads.dead_time,
+                    period: stream.clock.period(),
+                },
+            ),
             (
                 has_secondaries && spads.law == DeadTimeLaw::Paralysable,
-                "afterpulses and crosstalk of paralysable SPADs",
+                NotModelled::SecondariesOfParalysable,
             ),
             (
                 has_secondaries && self.options.sub_bins.is_some(),
-                "afterpulses and crosstalk in steps of --sub-bins",
+                NotModelled::SecondariesInFixedSteps,
             ),
             (
                 spads.crosstalk_probability > 0.0 && !self.is_any_spad(),
-                "crosstalk where an event takes more than one SPAD",
+                NotModelled::CrosstalkInCoincidence,
             ),
-            (stream.pulse_shape.is_some(), "a measured laser pulse"),
+            (
+                stream.pulse_shape.is_some() || has_shape,
+                NotModelled::MeasuredPulse,
+            ),
+            (light.spads().is_some(), NotModelled::SpadsThatDiffer),
         ];
         if let Some((_, what)) = refusals.into_iter().find(|(refuses, _)| *refuses) {
             return Err(EngineError::NotInCohorts(what));
@@ -340,10 +371,9 @@ impl<'a> Cohort<'a> {
             SpadLight::new(stream, light),
             [dead_fs, spads.reach().as_fs() as f64, period_fs],
             [from_fs, stream.cycle_s() * 1e15],
-            self.config.bins,
+            self.sensor.bins,
         );
-        let classes =
-            scene.classes(self.config, self.exposure, window.first_edge, &self.options)?;
+        let classes = scene.classes(&self.sensor, &self.law, &window, &self.options)?;
         let like = |class| self.like_cycles(&scene, spads, class);
         classes.iter().map(like).collect::<Result<_, _>>().map(Some)
     }
@@ -382,13 +412,13 @@ impl<'a> Cohort<'a> {
 
     /// Whether one SPAD makes an event, and more do, too.
     fn is_any_spad(&self) -> bool {
-        let mut counts = self.is_event.iter().enumerate();
+        let mut counts = self.is_event.0.iter().enumerate();
         counts.all(|(spads, &is_event)| is_event == (spads > 0))
     }
 
     /// Whether a bound shows that taking light to be even within a CLK period keeps the error, for events of any SPAD.
     ///
-    /// With μ photons on a SPAD in a CLK period, 16·μ·μ′·|Δ| of the events of a bin are amiss where a SPAD that was hit by
+    /// With μ photons on each of n SPADs in a CLK period, n·μ·μ′·|Δ| of the events of a bin are amiss where a SPAD that was hit by
     /// μ′ before is able with another probability, by Δ, than in even light; and what two photons before do, (Σμ′)²/2 of
     /// them, may be wrong altogether.
     fn is_even_enough(
@@ -414,7 +444,7 @@ impl<'a> Cohort<'a> {
                 uneven += blindness.most_uneven(age) * before;
                 all += before;
             }
-            let events = SPADS as f64 * now;
+            let events = self.is_event.spads() as f64 * now;
             let off = events * (uneven + 0.5 * all * all);
             let at_least = events * (1.0 - all - 0.5 * events);
             off * off <= allowed * at_least * (1.0 - events).max(0.0)
@@ -422,28 +452,24 @@ impl<'a> Cohort<'a> {
     }
 }
 
-impl Engine for Cohort<'_> {
+impl Engine for Cohort {
     fn law(&self) -> WindowLaw {
         self.law.clone()
     }
 
     fn bins(&self) -> usize {
-        self.config.bins
+        self.sensor.bins
     }
 }
 
-impl Expose for Cohort<'_> {
+impl Expose for Cohort {
     fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
-        let dark = PixelLight {
-            signal_per_cycle: 0.0,
-            arrival: crate::units::Time::ZERO,
-            background_hz: 0.0,
-        };
+        let dark = PixelLight::dark();
         let config = stream.config();
-        let mut exposed = Exposed::new(self.config.bins);
+        let mut exposed = Exposed::new(self.sensor.bins);
         for pixel in pixels {
-            let light = pixel.light.unwrap_or(dark);
-            let counts = self.draw(config, pixel.number, pixel.start, &light)?;
+            let light = pixel.light.as_ref().unwrap_or(&dark);
+            let counts = self.draw(config, pixel.number, pixel.start, light)?;
             exposed.histograms.push(&counts);
             let closed = self.opening(pixel.start).window.open().is_none();
             let periods = u64::from(config.stop_periods) * u64::from(config.laser_cycles);
@@ -451,7 +477,7 @@ impl Expose for Cohort<'_> {
                 macropixels: 1,
                 skipped_closed: u64::from(closed),
                 clk_periods: periods,
-                clk_periods_visited: if closed { 0 } else { self.config.bins as u64 },
+                clk_periods_visited: if closed { 0 } else { self.sensor.bins as u64 },
                 ..Work::default()
             };
         }

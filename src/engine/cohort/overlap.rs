@@ -10,7 +10,7 @@ use crate::numerics::branchless::{VECTOR, real};
 
 /// So many draws from a total of which a number is marked.
 #[derive(Debug, Clone, Copy)]
-pub struct Overlap {
+pub(super) struct Overlap {
     draws: u64,
     total: f64,
     /// What is left of the total for the last draw.
@@ -22,7 +22,7 @@ pub struct Overlap {
 impl Overlap {
     /// So many `draws`, without putting back, from `total`, at most `bound` of which are marked.
     #[inline(always)]
-    pub fn new(total: u64, draws: u64, bound: u64) -> Self {
+    pub(super) fn new(total: u64, draws: u64, bound: u64) -> Self {
         let last = real(total) - real(draws) + 1.0;
         Overlap {
             draws,
@@ -35,7 +35,12 @@ impl Overlap {
     /// Takes the marked ones drawn, when so many draws are `candidates`, out of their groups. Entry i of `marked` counts
     /// those of the groups 0 to i; entries after the last group repeat its count.
     #[inline(always)]
-    pub fn meet(&self, candidates: u64, marked: &mut [[f64; VECTOR]], random: &mut RandomWords) {
+    pub(super) fn meet(
+        &self,
+        candidates: u64,
+        marked: &mut [[f64; VECTOR]],
+        random: &mut RandomWords,
+    ) {
         debug_assert!(candidates <= self.draws, "{candidates} of {self:?}");
         let mut places: Option<Vec<u64>> = None;
         for candidate in 0..candidates {

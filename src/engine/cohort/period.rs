@@ -18,7 +18,7 @@ use crate::photon::DeadTimeLaw;
 
 /// What happens to a SPAD that fired lately and is hit in this period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Meeting {
+pub(super) struct Meeting {
     /// Whether it makes a pulse.
     pub pulses: bool,
     /// The step from which on it is blind anew, if it is.
@@ -27,7 +27,7 @@ pub struct Meeting {
 
 /// Photons on one SPAD in every CLK period of a window.
 #[derive(Debug, Clone)]
-pub struct Photons(SmallVec<[Step; FEW_STEPS]>);
+pub(super) struct Photons(SmallVec<[Step; FEW_STEPS]>);
 
 /// Probabilities of a photon in one step, and of any in its period from it on and up to it.
 #[derive(Debug, Clone, Copy)]
@@ -40,7 +40,7 @@ struct Step {
 impl Photons {
     /// Of the mean photons of all steps.
     #[inline(always)]
-    pub fn new(steps: &Steps) -> Self {
+    pub(super) fn new(steps: &Steps) -> Self {
         let per_period = steps.per_period;
         let mut photons = steps.means.clone();
         if photons.iter().all(|&mean| mean < DIM) {
@@ -70,7 +70,7 @@ impl Photons {
 
     /// The period of each bin, which has `per_period` steps, in rows of `width`.
     #[inline(always)]
-    pub fn rows(
+    pub(super) fn rows(
         &self,
         per_period: usize,
         width: usize,
@@ -82,23 +82,23 @@ impl Photons {
 
 /// Photons on one SPAD in one CLK period.
 #[derive(Debug, Clone, Copy)]
-pub struct Period<'p>(&'p [Step]);
+pub(super) struct Period<'p>(&'p [Step]);
 
 impl Period<'_> {
     /// Its steps.
-    pub fn steps(&self) -> usize {
+    pub(super) fn steps(&self) -> usize {
         self.0.len()
     }
 
     /// p/(1 − p) for the probability p of a photon.
-    pub fn odds(&self) -> f64 {
+    pub(super) fn odds(&self) -> f64 {
         self.0[0].from / (1.0 - self.0[0].from)
     }
 
     /// Splits `hit` SPADs that were ready, and get a photon in this period, by the step from which on they are blind:
     /// that of the first photon, or for paralysable ones that of the last. Calls `blind` with steps and SPADs.
     #[inline(always)]
-    pub fn split(
+    pub(super) fn split(
         &self,
         hit: u64,
         law: DeadTimeLaw,
@@ -132,7 +132,7 @@ impl Period<'_> {
     /// What becomes of a SPAD that fired `age` ≥ 1 steps before this period, which begins with step `first` of the window,
     /// and gets a photon in it.
     #[inline(always)]
-    pub fn meet(
+    pub(super) fn meet(
         &self,
         first: usize,
         age: usize,

@@ -1,7 +1,7 @@
 //! All SPADs of all laser cycles in one pool: the fast way in little light.
 //!
 //! ```text
-//!   pool: 16 N SPADs ──┬─ fired 1, 2, … steps ago: so many of each
+//!   pool: all  SPADs ──┬─ fired 1, 2, … steps ago: so many of each
 //!                      └─ free
 //!   one CLK period: W₁ of N cycles see a photon at all, W₂ of those on a second SPAD, …     (binomial)
 //!                   K of the SPADs that do are ones that fired lately                        (hypergeometric)
@@ -27,11 +27,11 @@ use super::overlap::Overlap;
 use super::period::{Period, Photons};
 use super::words::RandomWords;
 use super::{Counts, EventTable, Steps};
+use crate::chip::MOST_SPADS;
 use crate::numerics::branchless::{VECTOR, count, real};
-use crate::photon::SPADS;
 
 /// Most photons on a SPAD in a CLK period.
-pub fn largest(steps: &Steps) -> f64 {
+pub(super) fn largest(steps: &Steps) -> f64 {
     let periods = steps.means.chunks(steps.per_period);
     let means = periods.map(|period| period.iter().sum());
     means.fold(0.0, f64::max)
@@ -39,14 +39,15 @@ pub fn largest(steps: &Steps) -> f64 {
 
 /// Most photons on a SPAD in a CLK period with which [`run`] leaves out no larger correlations between two bins than this
 /// `neglect`: ρ for it is eᵐ − 1 with m photons.
-pub fn most_photons(neglect: f64) -> f64 {
+pub(super) fn most_photons(neglect: f64) -> f64 {
     libm::log1p(neglect.sqrt())
 }
 
-/// Mean number of SPADs in a period that [`run`] has to follow one by one, with `photons` on a SPAD in it at most.
-pub fn looked_at(blindness: &Blindness, steps: &Steps, photons: f64, cycles: u64) -> f64 {
+/// Mean number of SPADs in a period that [`run`] has to follow one by one, of `spads` in all laser cycles, with `photons` on a SPAD
+/// in it at most.
+pub(super) fn looked_at(blindness: &Blindness, steps: &Steps, photons: f64, spads: u64) -> f64 {
     let periods = blindness.memory() as f64 / steps.per_period as f64;
-    (SPADS as u64 * cycles) as f64 * periods * photons * photons
+    spads as f64 * periods * photons * photons
 }
 
 /// Counts of every bin after `cycles` laser cycles that begin in the state `ages`.
@@ -64,20 +65,23 @@ pub fn run(
     random: &mut RandomWords,
 ) -> Counts {
     let photons = Photons::new(steps);
-    let spads = SPADS as u64 * cycles;
+    let spads = is_event.spads() as u64 * cycles;
     let mut fired = fired_before(ages, spads, random);
     fired.resize(fired.len() + steps.means.len(), 0);
     let pool = Pool::new(blindness, steps.per_period, spads, &mut fired);
-    match steps.per_period {
+    match (steps.per_period, is_event.spads()) {
         // The same, for the compiler to unroll.
-        1 => follow(1, &photons, pool, is_event, cycles, random),
-        any => follow(any, &photons, pool, is_event, cycles, random),
+        (1, 16) => follow::<16>(1, 16, &photons, pool, is_event, cycles, random),
+        (any, 16) => follow::<16>(any, 16, &photons, pool, is_event, cycles, random),
+        (any, spads) => follow::<MOST_SPADS>(any, spads, &photons, pool, is_event, cycles, random),
     }
 }
 
+/// `MOST` is no less than `spads`.
 #[inline(always)]
-fn follow(
+fn follow<const MOST: usize>(
     per_period: usize,
+    spads: usize,
     photons: &Photons,
     mut pool: Pool,
     is_event: &EventTable,
@@ -86,7 +90,7 @@ fn follow(
 ) -> Counts {
     let mut counts = Counts::new();
     for periods in photons.rows(per_period, LANES) {
-        let mut seen = see(periods.clone(), cycles, random);
+        let mut seen = see::<MOST>(periods.clone(), spads, cycles, random);
         let sums = seen.hits();
         let (overlaps, candidates) = pool.candidates(&sums, random);
         let mut number = 0;
@@ -126,7 +130,7 @@ impl Seen {
         let mut events = [0; LANES];
         let none = [0; LANES];
         let beyond = self.0[1..].iter().chain([&none]);
-        for ((row, next), &is_event) in self.0.iter().zip(beyond).zip(is_event) {
+        for ((row, next), &is_event) in self.0.iter().zip(beyond).zip(&is_event.0) {
             let counts = if is_event { u64::MAX } else { 0 };
             for lane in 0..LANES {
                 events[lane] += (row[lane] - next[lane]) & counts;
@@ -136,11 +140,12 @@ impl Seen {
     }
 }
 
-/// With o = p/(1 − p), of cycles in which k or more SPADs are hit it is k with probability 1/tₖ, where
-/// tₖ = 1 + (16 − k)/(k + 1) · o · tₖ₊₁ and t₁₆ = 1: every term is positive, so no digits are lost.
+/// With o = p/(1 − p), of cycles in which k or more of n SPADs are hit it is k with probability 1/tₖ, where
+/// tₖ = 1 + (n − k)/(k + 1) · o · tₖ₊₁ and tₙ = 1: every term is positive, so no digits are lost.
 #[inline(always)]
-fn see<'p>(
+fn see<'p, const MOST: usize>(
     periods: impl Iterator<Item = Period<'p>>,
+    spads: usize,
     cycles: u64,
     random: &mut RandomWords,
 ) -> Seen {
@@ -149,10 +154,11 @@ fn see<'p>(
         *odds = period.odds();
     }
     // tₖ − 1
-    let mut more = [[0.0; LANES]; SPADS];
+    let mut more = [[0.0; LANES]; MOST];
+    let more = &mut more[..spads];
     let mut t = [1.0; LANES];
     for (hit, more) in more.iter_mut().enumerate().rev() {
-        let ways = (SPADS - hit) as f64 / (hit + 1) as f64;
+        let ways = (spads - hit) as f64 / (hit + 1) as f64;
         for lane in 0..LANES {
             more[lane] = ways * odds[lane] * t[lane];
             t[lane] = 1.0 + more[lane];
@@ -160,7 +166,7 @@ fn see<'p>(
     }
     let mut at_least = [cycles; LANES];
     let mut seen = SmallVec::new();
-    for more in &more {
+    for more in more {
         seen.push(at_least);
         let (mut p, mut exactly) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
@@ -173,6 +179,8 @@ fn see<'p>(
         }
     }
     seen.push(at_least);
+    // There always is a row of two SPADs.
+    seen.resize(seen.len().max(3), [0; LANES]);
     Seen(seen)
 }
 

@@ -9,7 +9,7 @@ use crate::numerics::{branchless, stirling_error, stirling_series};
 /// The number of successes in so many `trials`, each with probability `p` = 1 − `q` up to a half; the mean is at least
 /// 10.
 #[derive(Debug, Clone, Copy)]
-pub struct Rejection {
+pub(super) struct Rejection {
     trials: f64,
     p: f64,
     q: f64,
@@ -20,7 +20,7 @@ pub struct Rejection {
 
 /// Two uniform numbers, and the place that the first leads to.
 #[derive(Debug, Clone, Copy)]
-pub struct Proposal {
+pub(super) struct Proposal {
     /// How far from the ends of its interval the first number is.
     us: f64,
     v: f64,
@@ -29,7 +29,7 @@ pub struct Proposal {
 
 impl Rejection {
     #[inline(always)]
-    pub fn new(trials: f64, p: f64, q: f64) -> Self {
+    pub(super) fn new(trials: f64, p: f64, q: f64) -> Self {
         let deviation = (trials * p * q).sqrt();
         let b = 1.15 + 2.53 * deviation;
         Rejection {
@@ -44,7 +44,7 @@ impl Rejection {
 
     /// The proposal that `u` and `v` in [0, 1) make.
     #[inline(always)]
-    pub fn propose(&self, u: f64, v: f64) -> Proposal {
+    pub(super) fn propose(&self, u: f64, v: f64) -> Proposal {
         let u = u - 0.5;
         let us = 0.5 - u.abs();
         let centre = self.trials * self.p + 0.5;
@@ -54,19 +54,19 @@ impl Rejection {
 
     /// Whether a proposal is taken unseen.
     #[inline(always)]
-    pub fn takes(&self, proposal: &Proposal) -> bool {
+    pub(super) fn takes(&self, proposal: &Proposal) -> bool {
         (proposal.us >= 0.07) & (proposal.v <= 0.92 - 4.2 / self.b)
     }
 
     /// Whether a proposal that is not taken unseen passes, unless it lies [at an end](Self::is_at_an_end).
     #[inline(always)]
-    pub fn passes(&self, proposal: &Proposal) -> bool {
+    pub(super) fn passes(&self, proposal: &Proposal) -> bool {
         self.weigh(proposal, stirling_series)
     }
 
     /// Whether a proposal is one that [`Rejection::passes`] cannot weigh.
     #[inline(always)]
-    pub fn is_at_an_end(&self, proposal: &Proposal) -> bool {
+    pub(super) fn is_at_an_end(&self, proposal: &Proposal) -> bool {
         // The series is in powers of k + 1 and good from 11 on.
         let (k, mode) = (branchless::floor(proposal.place), self.mode());
         k.min(mode).min(self.trials - k.max(mode)) < 10.0
@@ -74,7 +74,7 @@ impl Rejection {
 
     /// Draws on until a proposal passes.
     #[inline]
-    pub fn draw(&self, random: &mut RandomWords) -> u64 {
+    pub(super) fn draw(&self, random: &mut RandomWords) -> u64 {
         loop {
             let proposal = self.propose(random.uniform(), random.coarse());
             if self.takes(&proposal) || self.passes_anywhere(&proposal) {
@@ -85,7 +85,7 @@ impl Rejection {
 
     /// As [`Rejection::passes`], also at the ends.
     #[cold]
-    pub fn passes_anywhere(&self, proposal: &Proposal) -> bool {
+    pub(super) fn passes_anywhere(&self, proposal: &Proposal) -> bool {
         match self.is_at_an_end(proposal) {
             true => self.weigh(proposal, |n| stirling_error(n as u64)),
             false => self.passes(proposal),

@@ -13,7 +13,7 @@ use crate::photon::SpadModel;
 
 /// What a hazard in a cell does.
 #[derive(Debug, Clone, Copy)]
-pub struct Cell {
+pub(super) struct Cell {
     pub mean: f64,
     /// Probability of nothing.
     pub none: f64,
@@ -26,7 +26,7 @@ pub struct Cell {
 }
 
 impl Cell {
-    pub fn new(mean: f64) -> Self {
+    pub(super) fn new(mean: f64) -> Self {
         let any = -libm::expm1(-mean);
         // Where the quotient would lose its digits, a series.
         let fire = match mean < 1e-3 {
@@ -51,18 +51,18 @@ impl Cell {
     }
 
     /// Those of `ready` SPADs and of `returning` ones to which something happens, and those that are ready afterwards.
-    pub fn take(&self, ready: f64, returning: f64) -> [f64; 2] {
+    pub(super) fn take(&self, ready: f64, returning: f64) -> [f64; 2] {
         let taken = ready * self.any + returning * self.fire;
         [taken, ready * self.none + returning * self.stay]
     }
 }
 
 /// SPADs without a trapped carrier and with one.
-pub type Traps = [f64; 2];
+pub(super) type Traps = [f64; 2];
 
 /// What avalanches cause besides pulses, for one SPAD among its neighbours.
 #[derive(Debug, Clone, Copy)]
-pub struct Secondaries {
+pub(super) struct Secondaries {
     /// Probability that a photon's avalanche leaves a carrier in a trap, to be released after the dead time.
     trapped: f64,
     /// Releases per femtosecond.
@@ -73,13 +73,12 @@ pub struct Secondaries {
     pub crosstalk: f64,
 }
 
-/// Pairs of neighbours among those that each SPAD would have without the edge of the macropixel: 24 of 32 in 4×4.
-const NEIGHBOURS_WITHIN: f64 = 0.75;
-
 impl Secondaries {
-    pub fn of(spads: &SpadModel) -> Self {
+    pub(super) fn of(spads: &SpadModel) -> Self {
         let time_fs = spads.afterpulse_time.as_fs() as f64;
         let afterpulses = spads.afterpulse_probability > 0.0;
+        // Of four neighbours that each SPAD would have without the edge of the macropixel: 3 of 4 in 4×4.
+        let within = 2.0 * spads.grid.neighbours() as f64 / (4 * spads.grid.spads()) as f64;
         // Without a delay a carrier is released as soon as it can be.
         let released_per_fs = if afterpulses {
             1.0 / time_fs.max(1.0)
@@ -90,18 +89,18 @@ impl Secondaries {
             trapped: spads.afterpulse_probability,
             released_per_fs,
             outlasts: libm::exp(-released_per_fs * spads.dead_time.as_fs() as f64),
-            crosstalk: NEIGHBOURS_WITHIN * spads.crosstalk_probability,
+            crosstalk: within * spads.crosstalk_probability,
         }
     }
 
-    pub fn are_none(&self) -> bool {
+    pub(super) fn are_none(&self) -> bool {
         self.trapped == 0.0 && self.crosstalk == 0.0
     }
 
     /// What `ready` SPADs and those `returning` do in a cell of so many femtoseconds, with so many photons on each and
     /// `crossing` avalanches that come from others: what is ready afterwards, the pulses, by whether a carrier stays
     /// trapped, and avalanches that are no pulse of their own.
-    pub fn act(
+    pub(super) fn act(
         &self,
         photons: &Cell,
         crossing: f64,
@@ -135,7 +134,7 @@ impl Secondaries {
     }
 
     /// The steady state under `rate` photons a femtosecond: ready SPADs, and pulses and silent avalanches a femtosecond.
-    pub fn steady(&self, rate: f64, dead_fs: f64) -> (Traps, Acts) {
+    pub(super) fn steady(&self, rate: f64, dead_fs: f64) -> (Traps, Acts) {
         let mut ready = [1.0 / (1.0 + rate * dead_fs), 0.0];
         let mut acts = Acts::default();
         // Each round leaves a part of the error as small as the secondaries.
@@ -166,7 +165,7 @@ impl Secondaries {
 
 /// Avalanches of one SPAD, in a cell or a femtosecond.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Acts {
+pub(super) struct Acts {
     /// Pulses.
     pub pulses: Traps,
     /// Crosstalk: it comes with an event that is there already.
@@ -174,14 +173,14 @@ pub struct Acts {
 }
 
 impl Acts {
-    pub fn times(self, factor: f64) -> Self {
+    pub(super) fn times(self, factor: f64) -> Self {
         Acts {
             pulses: self.pulses.map(|part| part * factor),
             silent: self.silent.map(|part| part * factor),
         }
     }
 
-    pub fn seen(&self) -> f64 {
+    pub(super) fn seen(&self) -> f64 {
         self.pulses[0] + self.pulses[1]
     }
 }

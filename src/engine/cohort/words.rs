@@ -3,7 +3,7 @@
 use crate::photon::{Purpose, philox, philox_key};
 
 /// Random words, made many at a time: a pure function of seed and macropixel.
-pub struct RandomWords {
+pub(super) struct RandomWords {
     key: [u32; 2],
     pixel: u32,
     next_block: u32,
@@ -16,7 +16,7 @@ const READY: usize = 8 * philox::LANES;
 
 impl RandomWords {
     /// The words of one macropixel.
-    pub fn new(seed: u64, pixel: u32) -> Self {
+    pub(super) fn new(seed: u64, pixel: u32) -> Self {
         RandomWords {
             key: philox_key(seed),
             pixel,
@@ -56,34 +56,34 @@ impl RandomWords {
 
     /// A number in [0, 1) with 52 random bits.
     #[inline(always)]
-    pub fn uniform(&mut self) -> f64 {
+    pub(super) fn uniform(&mut self) -> f64 {
         unit(self.take())
     }
 
     /// As many numbers in [0, 1), with 52 random bits each.
     #[inline(always)]
-    pub fn uniforms<const N: usize>(&mut self) -> [f64; N] {
+    pub(super) fn uniforms<const N: usize>(&mut self) -> [f64; N] {
         let (low, high) = (self.take::<N>(), self.take::<N>());
         std::array::from_fn(|i| unit([low[i], high[i]]))
     }
 
     /// A number in [0, 1) with 32 random bits: enough where 2⁻³² of a draw is of no consequence.
     #[inline(always)]
-    pub fn coarse(&mut self) -> f64 {
+    pub(super) fn coarse(&mut self) -> f64 {
         let [coarse] = self.coarses();
         coarse
     }
 
     /// As many of these.
     #[inline(always)]
-    pub fn coarses<const N: usize>(&mut self) -> [f64; N] {
+    pub(super) fn coarses<const N: usize>(&mut self) -> [f64; N] {
         self.take::<N>()
             .map(|word| f64::from(word) * (0.5f64).powi(32))
     }
 
     /// A whole number below `n` > 0; uneven by less than n/2⁶⁴.
     #[inline(always)]
-    pub fn below(&mut self, n: u64) -> u64 {
+    pub(super) fn below(&mut self, n: u64) -> u64 {
         let [high, low] = self.take().map(u128::from);
         (((high << 32 | low) * u128::from(n)) >> 64) as u64
     }

@@ -22,7 +22,7 @@ use crate::netlist::{CellKind, NetId};
 
 /// An expression, `delay` periods late, perhaps inverted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Literal {
+pub(super) struct Literal {
     /// Index into [`Expressions::nodes`].
     pub node: usize,
     /// Whole periods.
@@ -51,7 +51,7 @@ impl Literal {
     }
 
     /// The opposite.
-    pub fn inverse(self) -> Self {
+    pub(super) fn inverse(self) -> Self {
         self.inverse_if(true)
     }
 
@@ -84,7 +84,7 @@ impl Literal {
 
 /// How a sequence is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Node {
+pub(super) enum Node {
     /// Always 0.
     Zero,
     /// Parity of one SPAD's pulses.
@@ -105,7 +105,7 @@ pub enum Node {
 
 impl Node {
     /// What it reads.
-    pub fn inputs(self) -> Vec<Literal> {
+    pub(super) fn inputs(self) -> Vec<Literal> {
         match self {
             Node::Zero | Node::Input(_) => vec![],
             Node::Toggle(spad) => vec![Literal {
@@ -118,7 +118,7 @@ impl Node {
     }
 
     /// Its value for those of its inputs, inversions included; of a toggle without pulses, 0.
-    pub fn value(self, inputs: &[bool]) -> bool {
+    pub(super) fn value(self, inputs: &[bool]) -> bool {
         match (self, inputs) {
             (Node::And(..), [a, b]) => a & b,
             (Node::Xor(..), [a, b]) => a ^ b,
@@ -137,7 +137,7 @@ impl Node {
 }
 
 /// Expressions of a netlist's stream part: node 0 is constant, nodes 1 … are its SPADs.
-pub struct Expressions<'s> {
+pub(super) struct Expressions<'s> {
     survey: &'s Survey,
     nodes: Vec<Node>,
     index: HashMap<Node, usize>,
@@ -148,7 +148,7 @@ pub struct Expressions<'s> {
 
 impl<'s> Expressions<'s> {
     /// None yet.
-    pub fn new(survey: &'s Survey) -> Self {
+    pub(super) fn new(survey: &'s Survey) -> Self {
         let spads = survey.spads.len();
         let nodes: Vec<Node> = [Node::Zero]
             .into_iter()
@@ -164,7 +164,7 @@ impl<'s> Expressions<'s> {
     }
 
     /// Every node, inputs before what reads them.
-    pub fn nodes(&self) -> &[Node] {
+    pub(super) fn nodes(&self) -> &[Node] {
         &self.nodes
     }
 
@@ -172,7 +172,7 @@ impl<'s> Expressions<'s> {
     ///
     /// # Errors
     /// When its registers start with values that it cannot have.
-    pub fn of_net(&mut self, net: NetId) -> Result<Literal, Unlevelled> {
+    pub(super) fn of_net(&mut self, net: NetId) -> Result<Literal, Unlevelled> {
         if let Class::Constant(value) = self.survey.class(net) {
             return Ok(Literal::FALSE.inverse_if(value));
         }
@@ -216,7 +216,7 @@ impl<'s> Expressions<'s> {
     }
 
     /// The value of a node `delay` periods before the first edge.
-    pub fn history(&self, node: usize, delay: usize) -> bool {
+    pub(super) fn history(&self, node: usize, delay: usize) -> bool {
         if let Some(&held) = self.held.get(&(node, delay)) {
             return held;
         }

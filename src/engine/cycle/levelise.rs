@@ -42,10 +42,10 @@ use arrivals::Reach;
 type Node = (NetId, Edge);
 
 /// A place of the pass tape and whether it is read inverted.
-pub type Bit = (u16, bool);
+pub(super) type Bit = (u16, bool);
 
 /// A macropixel as two tapes.
-pub struct Levelised {
+pub(super) struct Levelised {
     /// Photons, up to what the strobe samples.
     pub stream: StreamTape,
     /// Everything else.
@@ -118,7 +118,7 @@ impl Levelised {
     ///
     /// # Errors
     /// What stands in the way.
-    pub fn new(
+    pub(super) fn new(
         survey: &Survey,
         config: &SensorConfig,
         exposure: &Exposure,

@@ -32,10 +32,11 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use super::{
-    Engine, EngineError, Expose, Exposed, Gate, Histograms, LitPixel, Replay, follows, full_stream,
+    Engine, EngineError, Expose, Exposed, Gate, Histograms, LitPixel, PulsedPixel, Replay, follows,
+    full_stream,
 };
 use crate::chip::window_law::{Window, WindowLaw};
-use crate::chip::{Exposure, SensorConfig};
+use crate::chip::{Exposure, Sensor};
 use crate::photon::{PhotonStream, SpadEvent};
 use levelise::Levelised;
 use packing::Packed;
@@ -82,9 +83,9 @@ struct Machine {
 }
 
 /// Runs the levelised netlist.
-pub struct Cycle<'a> {
-    config: &'a SensorConfig,
-    exposure: &'a Exposure,
+pub struct Cycle {
+    sensor: Sensor,
+    exposure: Exposure,
     law: WindowLaw,
     replays_control: bool,
     machine: OnceLock<Result<Machine, Unlevelled>>,
@@ -96,13 +97,14 @@ pub struct PackedPulses {
     blocks: Vec<(Vec<usize>, Packed)>,
 }
 
-impl<'a> Cycle<'a> {
+impl Cycle {
     /// An engine for this sensor and exposure. The netlist is levelised when it is first needed.
-    pub fn new(config: &'a SensorConfig, exposure: &'a Exposure) -> Self {
+    pub fn new(sensor: impl Into<Sensor>, exposure: &Exposure) -> Self {
+        let sensor = sensor.into();
         Cycle {
-            config,
-            exposure,
-            law: WindowLaw::new(config, exposure),
+            law: WindowLaw::new(&sensor, exposure),
+            sensor,
+            exposure: *exposure,
             replays_control: true,
             machine: OnceLock::new(),
         }
@@ -120,8 +122,8 @@ impl<'a> Cycle<'a> {
 
     fn machine(&self) -> Result<&Machine, &Unlevelled> {
         let machine = self.machine.get_or_init(|| {
-            let survey = Survey::new(self.config, self.exposure);
-            let levelised = Levelised::new(&survey, self.config, self.exposure)?;
+            let survey = Survey::new(&self.sensor, &self.exposure);
+            let levelised = Levelised::new(&survey, &self.sensor, &self.exposure)?;
             Ok(Machine { survey, levelised })
         });
         machine.as_ref()
@@ -168,11 +170,11 @@ impl<'a> Cycle<'a> {
             .map(|(pixels, pulses)| {
                 let starts: Vec<u16> = pixels.iter().map(|&pixel| starts[pixel]).collect();
                 let schedule =
-                    Schedule::new(&machine.levelised.causes, self.exposure, self.clocked());
+                    Schedule::new(&machine.levelised.causes, &self.exposure, self.clocked());
                 machine.run(schedule, self.replays_control, &starts, pulses)
             })
             .collect();
-        let mut histograms = Histograms::empty(starts.len(), self.config.bins);
+        let mut histograms = Histograms::empty(starts.len(), self.sensor.bins);
         for ((pixels, _), block) in packed.blocks.iter().zip(blocks?) {
             for (&pixel, histogram) in pixels.iter().zip(&block) {
                 histograms[pixel].copy_from_slice(histogram);
@@ -255,13 +257,13 @@ impl Machine {
     }
 }
 
-impl Engine for Cycle<'_> {
+impl Engine for Cycle {
     fn law(&self) -> WindowLaw {
         self.law.clone()
     }
 
     fn bins(&self) -> usize {
-        self.config.bins
+        self.sensor.bins
     }
 
     fn batch(&self) -> usize {
@@ -269,32 +271,26 @@ impl Engine for Cycle<'_> {
     }
 }
 
-impl Replay for Cycle<'_> {
-    fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
-        Ok(self.histograms(&[start], &[pulses])?.into_counts())
-    }
-
-    fn histograms(
-        &self,
-        starts: &[u16],
-        pulses: &[&[SpadEvent]],
-    ) -> Result<Histograms, EngineError> {
-        follows(self.config, &self.law.timing().pulses)?;
-        for &start in starts {
+impl Replay for Cycle {
+    fn replay(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError> {
+        follows(&self.sensor, &self.law.timing().pulses)?;
+        let starts: Vec<u16> = pixels.iter().map(|pixel| pixel.start).collect();
+        let pulses: Vec<&[SpadEvent]> = pixels.iter().map(|pixel| pixel.pulses).collect();
+        for &start in &starts {
             if let Window::Race(why) = self.law.window(start) {
                 return Err(EngineError::Race(why));
             }
         }
         if self.unlevelled().is_none()
-            && let Ok(histograms) = self.run(starts, &self.pack(starts, pulses))
+            && let Ok(histograms) = self.run(&starts, &self.pack(&starts, &pulses))
         {
             return Ok(histograms);
         }
-        Gate::new(self.config, self.exposure).histograms(starts, pulses)
+        Gate::new(&self.sensor, &self.exposure).replay(pixels)
     }
 }
 
-impl Expose for Cycle<'_> {
+impl Expose for Cycle {
     fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
         full_stream(self, stream, pixels)
     }

@@ -5,42 +5,42 @@
 
 use super::stream::PERIODS;
 use super::word::WORD_LANES;
-use crate::chip::{SPADS, WindowLaw};
+use crate::chip::{MOST_SPADS, WindowLaw};
 use crate::photon::SpadEvent;
 
 /// One pulse in a chunk: its period there, its SPAD and its lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Pulse(u32);
+pub(super) struct Pulse(u32);
 
-const _: () = assert!(SPADS <= 16 && WORD_LANES <= 1 << 12 && PERIODS <= 1 << 16);
+const _: () = assert!(MOST_SPADS <= 1 << 6 && WORD_LANES <= 1 << 10 && PERIODS <= 1 << 16);
 
 impl Pulse {
     fn new(period: usize, spad: usize, lane: usize) -> Self {
-        Pulse((period << 16 | spad << 12 | lane) as u32)
+        Pulse((period << 16 | spad << 10 | lane) as u32)
     }
 
     /// Rising edge within the chunk.
     #[inline(always)]
-    pub fn period(self) -> usize {
+    pub(super) fn period(self) -> usize {
         (self.0 >> 16) as usize
     }
 
     /// SPAD.
     #[inline(always)]
-    pub fn spad(self) -> usize {
-        (self.0 >> 12 & 15) as usize
+    pub(super) fn spad(self) -> usize {
+        (self.0 >> 10 & 0x3f) as usize
     }
 
     /// Lane.
     #[inline(always)]
-    pub fn lane(self) -> usize {
-        (self.0 & 0xfff) as usize
+    pub(super) fn lane(self) -> usize {
+        (self.0 & 0x3ff) as usize
     }
 }
 
 /// The pulses of a block.
 #[derive(Debug, Default)]
-pub struct Packed {
+pub(super) struct Packed {
     pulses: Vec<Pulse>,
     /// First pulse of every chunk, and the end.
     chunks: Vec<u32>,
@@ -48,7 +48,7 @@ pub struct Packed {
 
 impl Packed {
     /// Sorts one list of pulses per lane into `chunks` chunks; later pulses are left out.
-    pub fn new<'p>(
+    pub(super) fn new<'p>(
         law: &WindowLaw,
         chunks: usize,
         lanes: impl Iterator<Item = &'p [SpadEvent]> + Clone,
@@ -85,7 +85,7 @@ impl Packed {
     }
 
     /// The pulses of one chunk; none after the last.
-    pub fn chunk(&self, chunk: usize) -> &[Pulse] {
+    pub(super) fn chunk(&self, chunk: usize) -> &[Pulse] {
         match self.chunks[chunk.min(self.chunks.len() - 1)..] {
             [first, end, ..] => &self.pulses[first as usize..end as usize],
             _ => &[],

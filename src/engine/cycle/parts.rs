@@ -18,7 +18,7 @@ use super::tape::{Action, Bits, Code, PassTape, SINK, ZERO};
 
 /// The parts of a tape.
 #[derive(Debug, Clone)]
-pub struct Parts {
+pub(super) struct Parts {
     /// All actions.
     pub every: Bits,
     /// Those that photons can make a difference to.
@@ -37,7 +37,7 @@ pub struct Parts {
 
 /// Samplers one behind the other that sample the same lanes.
 #[derive(Debug, Clone)]
-pub struct Run {
+pub(super) struct Run {
     /// Them.
     pub actions: Range<u16>,
     /// What each of them samples, from the pass that it is in.
@@ -68,7 +68,7 @@ fn read(action: &Action) -> impl Iterator<Item = u16> {
 
 impl Parts {
     /// Those of a tape with so many places.
-    pub fn new(tape: &PassTape, places: usize) -> Self {
+    pub(super) fn new(tape: &PassTape, places: usize) -> Self {
         let samplers = || (0..).zip(&tape.actions).filter(|(_, a)| is_sampler(a));
         let mut every = Bits::new(tape.actions.len());
         (0..tape.actions.len()).for_each(|index| {

@@ -6,7 +6,7 @@
 use crate::chip::Exposure;
 
 /// The causes of an exposure, handed out in order.
-pub struct Schedule<'a> {
+pub(super) struct Schedule<'a> {
     /// Causes by group, as in [`Levelised`](super::levelise::Levelised).
     groups: &'a [Vec<(i64, u16)>],
     laser_cycles: i64,
@@ -19,7 +19,7 @@ pub struct Schedule<'a> {
 
 impl<'a> Schedule<'a> {
     /// The causes of an exposure with CLK edges in `clocked` passes.
-    pub fn new(groups: &'a [Vec<(i64, u16)>], exposure: &Exposure, clocked: usize) -> Self {
+    pub(super) fn new(groups: &'a [Vec<(i64, u16)>], exposure: &Exposure, clocked: usize) -> Self {
         Schedule {
             groups,
             laser_cycles: i64::from(exposure.laser_cycles),
@@ -31,7 +31,7 @@ impl<'a> Schedule<'a> {
 
     /// The next cause other than CLK: its pass and action.
     #[inline]
-    pub fn due(&mut self) -> Option<(i64, u16)> {
+    pub(super) fn due(&mut self) -> Option<(i64, u16)> {
         while self.next.0 <= self.laser_cycles {
             let (cycle, index) = self.next;
             let last = self.groups.len() - 1;
@@ -51,14 +51,14 @@ impl<'a> Schedule<'a> {
 
     /// The next cause that is due by `pass`.
     #[inline]
-    pub fn next_until(&mut self, pass: i64) -> Option<u16> {
+    pub(super) fn next_until(&mut self, pass: i64) -> Option<u16> {
         let (_, action) = self.due().filter(|&(due, _)| due <= pass)?;
         self.next.1 += 1;
         Some(action)
     }
 
     /// Whether all middle cycles are alike: each one's causes come before the next one's.
-    pub fn is_periodic(&self) -> bool {
+    pub(super) fn is_periodic(&self) -> bool {
         let first = |group: &Vec<(i64, u16)>| group.first().map(|&(pass, _)| pass);
         let [_, middle, last, _] = self.groups else {
             return false;
@@ -71,7 +71,7 @@ impl<'a> Schedule<'a> {
     }
 
     /// How many middle cycles begin with the next one, if its first cause is the next cause and due in `pass`.
-    pub fn middle_cycles(&mut self, pass: i64) -> Option<i64> {
+    pub(super) fn middle_cycles(&mut self, pass: i64) -> Option<i64> {
         let (due, _) = self.due()?;
         let (cycle, index) = self.next;
         let is_first = due == pass && index == 0 && cycle >= 1;
@@ -79,12 +79,12 @@ impl<'a> Schedule<'a> {
     }
 
     /// CLK periods of a laser cycle.
-    pub fn stop_periods(&self) -> i64 {
+    pub(super) fn stop_periods(&self) -> i64 {
         self.stop_periods
     }
 
     /// Every action that a cause other than CLK starts.
-    pub fn actions(&self) -> impl Iterator<Item = u16> {
+    pub(super) fn actions(&self) -> impl Iterator<Item = u16> {
         self.groups.iter().flatten().map(|&(_, action)| action)
     }
 }

@@ -20,7 +20,7 @@ use super::word::{Word, inversion};
 use crate::netlist::NetId;
 
 /// CLK periods in a chunk.
-pub const PERIODS: usize = 16;
+pub(super) const PERIODS: usize = 16;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
@@ -46,7 +46,7 @@ struct Op {
 
 /// A sequence as the passes read it.
 #[derive(Debug, Clone, Copy)]
-pub struct Tap {
+pub(super) struct Tap {
     /// Place of the chunk's first period, delay included.
     place: usize,
     invert: u64,
@@ -62,7 +62,7 @@ struct Ring {
 
 /// The tape.
 #[derive(Debug, Clone, Default)]
-pub struct StreamTape {
+pub(super) struct StreamTape {
     ops: Vec<Op>,
     rings: Vec<Ring>,
     /// Place of each SPAD's input, if it is used.
@@ -77,7 +77,7 @@ impl StreamTape {
     ///
     /// # Errors
     /// When the registers start with values that they cannot have.
-    pub fn new(
+    pub(super) fn new(
         expressions: &mut Expressions<'_>,
         spads: usize,
         nets: &[NetId],
@@ -137,7 +137,7 @@ impl StreamTape {
 
 /// The stream of one block: chunks are computed when something first reads them, and those that nobody reads are
 /// not, nor are their photons looked at.
-pub struct Flow<'a> {
+pub(super) struct Flow<'a> {
     tape: &'a StreamTape,
     pulses: &'a Packed,
     words: Vec<Word>,
@@ -147,7 +147,7 @@ pub struct Flow<'a> {
 
 impl Tap {
     /// The same sequence, so many periods later.
-    pub fn at(self, offset: i8) -> Self {
+    pub(super) fn at(self, offset: i8) -> Self {
         Tap {
             place: self.place.wrapping_add_signed(offset.into()),
             ..self
@@ -157,7 +157,7 @@ impl Tap {
 
 impl<'a> Flow<'a> {
     /// A block with these pulses.
-    pub fn new(tape: &'a StreamTape, pulses: &'a Packed) -> Self {
+    pub(super) fn new(tape: &'a StreamTape, pulses: &'a Packed) -> Self {
         Flow {
             tape,
             pulses,
@@ -168,14 +168,14 @@ impl<'a> Flow<'a> {
 
     /// A sequence just before rising edge `pass`.
     #[inline(always)]
-    pub fn read(&mut self, tap: Tap, pass: i64) -> Word {
+    pub(super) fn read(&mut self, tap: Tap, pass: i64) -> Word {
         let period = self.seek(pass);
         self.words[tap.place.wrapping_add_signed(period)] ^ tap.invert
     }
 
     /// Adds to `sums` what sequences are in some lanes just before rising edge `pass`.
     #[inline(always)]
-    pub fn gather(&mut self, taps: &[Tap], pass: i64, lanes: Word, sums: &mut [Word]) {
+    pub(super) fn gather(&mut self, taps: &[Tap], pass: i64, lanes: Word, sums: &mut [Word]) {
         let period = self.seek(pass);
         for (tap, sum) in taps.iter().zip(sums) {
             let value = self.words[tap.place.wrapping_add_signed(period)] ^ tap.invert;
@@ -312,7 +312,13 @@ impl Layout {
         };
         use Node as N;
         let (kind, partner) = match nodes[node] {
-            N::Zero | N::Input(_) => {
+            N::Zero => {
+                self.allocate(expressions, node, tape);
+                // No register delays a constant, so that a pass that samples after its rising edge reads a period ahead.
+                self.end += 1;
+                return;
+            }
+            N::Input(_) => {
                 self.allocate(expressions, node, tape);
                 return;
             }

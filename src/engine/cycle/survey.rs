@@ -17,7 +17,7 @@
 use std::collections::HashMap;
 
 use super::Unlevelled;
-use crate::chip::{Exposure, Probes, SensorConfig, SensorPins, Silicon, sensor};
+use crate::chip::{Exposure, Probes, SensorConfig, SensorPins, Silicon, array};
 use crate::engine::{GateSimulation, LaneSimulation};
 use crate::kernel::{LANES, Recorder};
 use crate::logic::Logic;
@@ -26,7 +26,7 @@ use crate::units::Time;
 
 /// What a net depends on during an exposure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Class {
+pub(super) enum Class {
     /// One value for all.
     Constant(bool),
     /// One value for each start value.
@@ -41,7 +41,7 @@ pub enum Class {
 
 /// A change of a uniform net.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct UniformEdge {
+pub(super) struct UniformEdge {
     /// From the STOP edge of its laser cycle.
     pub time: Time,
     /// Which net.
@@ -51,7 +51,7 @@ pub struct UniformEdge {
 }
 
 /// The netlist of one macropixel with its load path, and what is known of it.
-pub struct Survey {
+pub(super) struct Survey {
     /// The sensor with one macropixel.
     pub netlist: Netlist,
     /// Its delays.
@@ -72,8 +72,8 @@ pub struct Survey {
 
 impl Survey {
     /// Simulates power-up and load of every start value, and sorts the nets.
-    pub fn new(config: &SensorConfig, exposure: &Exposure) -> Self {
-        let netlist = Netlist::elaborate(&sensor::subarray(config, (0, 0), (1, 1)));
+    pub(super) fn new(config: &SensorConfig, exposure: &Exposure) -> Self {
+        let netlist = Netlist::elaborate(&array::subarray(config, (0, 0), (1, 1)));
         let timing = Silicon::of(config).timing(&netlist);
         let bins = Probes::of_macropixel(&netlist, 0, 0).bins().to_vec();
         let pins = SensorPins::of(&netlist);
@@ -101,7 +101,7 @@ impl Survey {
     ///
     /// # Errors
     /// When it is unknown.
-    pub fn initial(&self, net: NetId, start: u16) -> Result<bool, Unlevelled> {
+    pub(super) fn initial(&self, net: NetId, start: u16) -> Result<bool, Unlevelled> {
         let (one, zero) = self.initial[usize::from(start) / LANES][net.index()];
         match (
             one >> (usize::from(start) % LANES) & 1,
@@ -114,7 +114,7 @@ impl Survey {
     }
 
     /// The net's path, for messages.
-    pub fn name(&self, net: NetId) -> String {
+    pub(super) fn name(&self, net: NetId) -> String {
         self.netlist.net_path(net).unwrap_or_else(|| {
             let (cell, _) = self.driver[net.index()].expect("a net has a name or a driver");
             format!("the output of {}", self.netlist.cell_path(cell))
@@ -122,7 +122,7 @@ impl Survey {
     }
 
     /// Class of a net; an unconnected pin is a constant 0.
-    pub fn class(&self, net: NetId) -> Class {
+    pub(super) fn class(&self, net: NetId) -> Class {
         if net.is_some() {
             self.class[net.index()]
         } else {
@@ -131,7 +131,7 @@ impl Survey {
     }
 
     /// Which input pins of a cell can make a difference, given the constants.
-    pub fn relevant(&self, cell: &FlatCell) -> [bool; MAX_INPUTS] {
+    pub(super) fn relevant(&self, cell: &FlatCell) -> [bool; MAX_INPUTS] {
         let constant = cell.inputs.map(|net| match self.class(net) {
             Class::Constant(value) => Some(value),
             _ => None,
@@ -151,7 +151,7 @@ impl Survey {
     }
 
     /// The value of `net` when the exposure starts, if it is the same for every start value.
-    pub fn shared_initial(&self, net: NetId) -> Option<bool> {
+    pub(super) fn shared_initial(&self, net: NetId) -> Option<bool> {
         let net = net.index();
         let full = |word: &dyn Fn(&(u64, u64)) -> u64| {
             self.initial
@@ -262,7 +262,7 @@ impl Survey {
 
     /// Every change of `nets` in the first, a middle and the last laser cycle, and at the STOP edge that ends
     /// the exposure; an exposure of fewer cycles has as many groups as STOP edges.
-    pub fn uniform_edges(
+    pub(super) fn uniform_edges(
         &self,
         config: &SensorConfig,
         exposure: &Exposure,
@@ -303,7 +303,7 @@ fn key(cell: &FlatCell) -> FlatCellKey {
 }
 
 /// Output of a gate whose inputs are the bits of `bits`.
-pub fn output(kind: CellKind, bits: u8) -> bool {
+pub(super) fn output(kind: CellKind, bits: u8) -> bool {
     let inputs = std::array::from_fn(|pin| Logic::from(bits >> pin & 1 == 1));
     kind.output(inputs) == Logic::One
 }

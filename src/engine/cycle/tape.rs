@@ -18,13 +18,13 @@ use super::stream::{Flow, Tap};
 use super::word::Word;
 
 /// Place of a word that is always 0.
-pub const ZERO: u16 = 0;
+pub(super) const ZERO: u16 = 0;
 /// Place of a word that nobody reads.
-pub const SINK: u16 = 1;
+pub(super) const SINK: u16 = 1;
 
 /// What an action computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Code {
+pub(super) enum Code {
     /// A net that all macropixels share takes a value.
     Set(bool),
     /// a AND b.
@@ -51,7 +51,7 @@ pub enum Code {
 
 /// One step of the tape.
 #[derive(Debug, Clone, Copy)]
-pub struct Action {
+pub(super) struct Action {
     /// What is computed.
     pub code: Code,
     /// Places of the inputs.
@@ -74,7 +74,7 @@ pub struct Action {
 
 impl Action {
     /// An action for both directions that reads nothing and wakes nobody yet.
-    pub fn new(code: Code, out: u16) -> Self {
+    pub(super) fn new(code: Code, out: u16) -> Self {
         Action {
             code,
             inputs: [ZERO; 4],
@@ -91,7 +91,7 @@ impl Action {
 
 /// The tape.
 #[derive(Debug, Clone, Default)]
-pub struct PassTape {
+pub(super) struct PassTape {
     /// Actions in order of arrival.
     pub actions: Vec<Action>,
     /// Actions that are woken.
@@ -107,24 +107,24 @@ pub struct PassTape {
 impl PassTape {
     /// What a change of an action's result wakes.
     #[inline(always)]
-    pub fn woken(&self, action: &Action, direction: usize) -> &[u16] {
+    pub(super) fn woken(&self, action: &Action, direction: usize) -> &[u16] {
         &self.wakes[action.wakes[direction] as usize..action.wakes[direction + 1] as usize]
     }
 }
 
 /// A set of actions.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Bits(pub Vec<u64>);
+pub(super) struct Bits(pub Vec<u64>);
 
 impl Bits {
     /// Without any of `count` actions.
-    pub fn new(count: usize) -> Self {
+    pub(super) fn new(count: usize) -> Self {
         Bits(vec![0; count.div_ceil(64)])
     }
 
     /// Adds one; whether it was new.
     #[inline(always)]
-    pub fn insert(&mut self, index: u16) -> bool {
+    pub(super) fn insert(&mut self, index: u16) -> bool {
         let word = &mut self.0[usize::from(index >> 6)];
         let old = *word;
         *word |= 1 << (index & 63);
@@ -133,13 +133,13 @@ impl Bits {
 
     /// Takes one out.
     #[inline(always)]
-    pub fn remove(&mut self, index: u16) {
+    pub(super) fn remove(&mut self, index: u16) {
         self.0[usize::from(index >> 6)] &= !(1 << (index & 63));
     }
 
     /// Takes out a range of them, if all are in the set; whether they were.
     #[inline(always)]
-    pub fn take(&mut self, range: &Range<u16>) -> bool {
+    pub(super) fn take(&mut self, range: &Range<u16>) -> bool {
         for index in range.start..range.end {
             if !self.contains(index) {
                 return false;
@@ -153,13 +153,13 @@ impl Bits {
 
     /// Whether it is in the set.
     #[inline(always)]
-    pub fn contains(&self, index: u16) -> bool {
+    pub(super) fn contains(&self, index: u16) -> bool {
         self.0[usize::from(index >> 6)] >> (index & 63) & 1 == 1
     }
 
     /// Whether none is.
     #[inline(always)]
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         let mut any = 0;
         for word in &self.0 {
             any |= word;
@@ -169,7 +169,7 @@ impl Bits {
 
     /// The first one from `from` on that is also in `among`.
     #[inline(always)]
-    pub fn next_among(&self, among: &Bits, from: u16) -> Option<u16> {
+    pub(super) fn next_among(&self, among: &Bits, from: u16) -> Option<u16> {
         let mut group = usize::from(from >> 6);
         let mut bits = self.0.get(group)? & among.0[group] & u64::MAX << (from & 63);
         while bits == 0 {
@@ -182,7 +182,7 @@ impl Bits {
 
 /// One block of macropixels.
 #[derive(Debug, Clone)]
-pub struct Block {
+pub(super) struct Block {
     /// Values of nets and masks of lanes.
     pub words: Vec<Word>,
     /// Actions to run, a bit each.
@@ -193,7 +193,7 @@ pub struct Block {
 
 impl Block {
     /// A block whose nets have these values.
-    pub fn new(tape: &PassTape, words: Vec<Word>) -> Self {
+    pub(super) fn new(tape: &PassTape, words: Vec<Word>) -> Self {
         Block {
             words,
             pending: Bits::new(tape.actions.len()),
@@ -203,19 +203,19 @@ impl Block {
 
     /// Notes that an action's effect is not known.
     #[cold]
-    pub fn doubt(&mut self, action: &Action) {
+    pub(super) fn doubt(&mut self, action: &Action) {
         self.trapped.get_or_insert(action.out);
     }
 
     /// Whether nothing is on its way.
-    pub fn is_settled(&self) -> bool {
+    pub(super) fn is_settled(&self) -> bool {
         self.pending.is_empty()
     }
 }
 
 /// Runs one action; whether any lane rose, and fell.
 #[inline(always)]
-pub fn step(
+pub(super) fn step(
     action: &Action,
     words: &mut [Word],
     taps: &[Tap],
@@ -252,7 +252,7 @@ pub fn step(
 
 /// Gives an action its result; whether any lane rose, and fell.
 #[inline(always)]
-pub fn change(action: &Action, words: &mut [Word], new: Word) -> [bool; 2] {
+pub(super) fn change(action: &Action, words: &mut [Word], new: Word) -> [bool; 2] {
     let old = words[usize::from(action.out)];
     let [rising, falling] = action.directions;
     let rise = new & !old & rising;
@@ -265,7 +265,7 @@ pub fn change(action: &Action, words: &mut [Word], new: Word) -> [bool; 2] {
 
 /// Lanes in which a flip-flop's clock has risen, and neither reset nor set holds it.
 #[inline(always)]
-pub fn clocked(action: &Action, words: &[Word]) -> Word {
+pub(super) fn clocked(action: &Action, words: &[Word]) -> Word {
     let [_, edge, reset, set] = action.inputs;
     let [_, _, ireset, iset, _] = action.invert;
     words[usize::from(edge)]
@@ -286,6 +286,6 @@ fn sampled(action: &Action, words: &[Word], taps: &[Tap], flow: &mut Flow<'_>, p
 
 /// Whether a flip-flop's clock has risen in a lane that neither reset nor set holds.
 #[cold]
-pub fn counts(action: &Action, words: &[Word]) -> bool {
+pub(super) fn counts(action: &Action, words: &[Word]) -> bool {
     clocked(action, words).any()
 }

@@ -8,26 +8,26 @@
 use std::ops::{BitAnd, BitOr, BitXor, Not};
 
 /// Macropixels in a word, and in a block of them.
-pub const WORD_LANES: usize = 512;
+pub(super) const WORD_LANES: usize = 512;
 const PARTS: usize = WORD_LANES / 64;
 
 /// A bit of every macropixel of a block, aligned to cache lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(align(64))]
-pub struct Word(pub [u64; PARTS]);
+pub(super) struct Word(pub [u64; PARTS]);
 
 impl Word {
     /// 0 in every lane.
-    pub const ZERO: Word = Word([0; PARTS]);
+    pub(super) const ZERO: Word = Word([0; PARTS]);
 
     /// The same value in every lane.
-    pub const fn all(value: bool) -> Self {
+    pub(super) const fn all(value: bool) -> Self {
         Word([if value { u64::MAX } else { 0 }; PARTS])
     }
 
     /// Whether any lane is 1.
     #[inline(always)]
-    pub fn any(self) -> bool {
+    pub(super) fn any(self) -> bool {
         let mut any = 0;
         for i in 0..PARTS {
             any |= self.0[i];
@@ -36,18 +36,18 @@ impl Word {
     }
 
     /// One lane.
-    pub fn lane(&self, lane: usize) -> bool {
+    pub(super) fn lane(&self, lane: usize) -> bool {
         self.0[lane / 64] >> (lane % 64) & 1 == 1
     }
 
     /// Sets one lane.
-    pub fn set(&mut self, lane: usize, value: bool) {
+    pub(super) fn set(&mut self, lane: usize, value: bool) {
         self.0[lane / 64] |= u64::from(value) << (lane % 64);
     }
 
     /// Inverts one lane.
     #[inline(always)]
-    pub fn flip(&mut self, lane: usize) {
+    pub(super) fn flip(&mut self, lane: usize) {
         self.0[lane / 64] ^= 1 << (lane % 64);
     }
 }
@@ -123,6 +123,6 @@ impl Not for Word {
 }
 
 /// All ones to invert, or nothing: for `^`.
-pub const fn inversion(inverted: bool) -> u64 {
+pub(super) const fn inversion(inverted: bool) -> u64 {
     if inverted { u64::MAX } else { 0 }
 }

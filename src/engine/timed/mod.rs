@@ -9,33 +9,40 @@
 //! arrive. Static timing of a macropixel's own netlist bounds every arrival ([`MacropixelDelays`]); where the bounds decide every
 //! order that counts ([`orders`]), [`WindowLaw`] with its own delays says which CLK edges its bins see, each by itself where
 //! they differ. Only macropixels with an order in doubt are simulated. Histograms are those of
-//! [`Gate::histograms_with`], bit for bit.
+//! [`Gate::replay_with`], bit for bit.
 
+mod doubt;
 mod orders;
 
 use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
+use std::sync::{Mutex, MutexGuard};
 
 use rayon::prelude::*;
 
+pub use self::doubt::Doubt;
+use self::orders::{Delays, Orders, Part, Setting};
 use super::{
-    Cancelling, Cycle, Engine, EngineError, Gate, Histograms, LaneSimulation, Replay, Window,
+    Cycle, Engine, EngineError, Expose, Exposed, Gate, Histograms, LaneSimulation, LitPixel,
+    PulsedPixel, Replay, Window, full_stream,
 };
 use crate::bench::StimulusPlan;
 use crate::chip::timing::macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays};
-use crate::chip::{ChipTiming, Exposure, Mode, PCounter, SensorConfig, Silicon, WindowLaw, sensor};
+use crate::chip::{Exposure, Mode, PCounter, Sensor, Silicon, WindowLaw, array};
 use crate::kernel::LANES;
 use crate::netlist::Timing;
-use crate::photon::SpadEvent;
-use orders::{Delays, Doubt, Orders, Part, Setting};
+use crate::photon::{PhotonStream, SpadEvent};
 
-/// What runs the macropixels whose orders are decided.
+/// What runs the macropixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Runner {
-    /// The levelised netlist where windows lie as the library has them, and the window law elsewhere.
+    /// Those whose orders are decided: the levelised netlist where windows lie as the library has them, and the window law
+    /// elsewhere. The others: the gates.
     Cycle,
-    /// The window law.
+    /// Those whose orders are decided: the window law. The others: the gates.
     Window,
+    /// All of them: the gates.
+    Gate,
 }
 
 /// How many macropixels were decided in closed form, and why the others were simulated.
@@ -45,27 +52,25 @@ pub struct ClosedFormCoverage {
     #[serde(rename = "kept")]
     pub decided: usize,
     /// Macropixels replayed at gate level, by what was in doubt.
-    pub replayed: BTreeMap<&'static str, usize>,
+    pub replayed: BTreeMap<Doubt, usize>,
 }
 
-/// Histograms, and how they came about.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TimedHistograms {
-    /// Counts of every macropixel and bin, row-major, bin 0 earliest.
-    pub histograms: Histograms,
-    /// Which macropixels were simulated.
-    pub coverage: ClosedFormCoverage,
-}
-
-/// Runs an array of macropixels made of one silicon.
-pub struct Timed<'a> {
-    setting: Setting<'a>,
+/// Runs macropixels made of one silicon.
+pub struct Timed {
+    setting: Setting,
     silicon: Silicon,
+    runner: Runner,
     circuit: MacropixelCircuit,
     /// Path of each cell before and, where the macropixel is in it, after its name.
     paths: Vec<(String, Option<String>)>,
     /// Without mismatch all macropixels are alike.
     alike: Option<(Timing, Orders)>,
+    /// The law with the library's delays.
+    common: WindowLaw,
+    cycle: Cycle,
+    /// Whether the load leaves each start value as it was sent, as far as it is known.
+    arrives: Mutex<BTreeMap<u16, bool>>,
+    coverage: Mutex<ClosedFormCoverage>,
 }
 
 /// What a look at a macropixel's delays leads to.
@@ -75,11 +80,14 @@ enum Judged {
     InDoubt(Doubt),
 }
 
-impl<'a> Timed<'a> {
-    /// An engine for this sensor and exposure; `silicon` says what its macropixels are made of.
-    pub fn new(config: &'a SensorConfig, exposure: &'a Exposure, silicon: &Silicon) -> Self {
+impl Timed {
+    /// An engine for this sensor, in which each macropixel has the delays of its own silicon, and exposure.
+    pub fn new(sensor: impl Into<Sensor>, exposure: &Exposure, runner: Runner) -> Self {
+        let made: Sensor = sensor.into();
+        let silicon = *made.silicon();
+        let sensor = made.made_of(&Silicon::of(&made));
         // Macropixels differ in the names of their cells only.
-        let circuit = MacropixelCircuit::new(config, (0, 0));
+        let circuit = MacropixelCircuit::new(&sensor, (0, 0));
         let name = circuit.probes.macropixel();
         let paths = (0..circuit.netlist.cells().len()).map(|cell| {
             let path = circuit.netlist.cell_path(cell);
@@ -92,13 +100,18 @@ impl<'a> Timed<'a> {
             paths: paths.collect(),
             circuit,
             setting: Setting {
-                config,
-                exposure,
-                nominal: ChipTiming::of(config),
-                schedule: StimulusPlan::new(config, exposure, 1, &[0], &[&[]]).schedule(),
+                exposure: *exposure,
+                nominal: *sensor.timing(),
+                schedule: StimulusPlan::new(&sensor, exposure, 1, &[0], &[&[]]).schedule(),
+                sensor: sensor.clone(),
             },
-            silicon: *silicon,
+            silicon,
+            runner,
             alike: None,
+            common: WindowLaw::new(&sensor, exposure),
+            cycle: Cycle::new(&sensor, exposure),
+            arrives: Mutex::default(),
+            coverage: Mutex::default(),
         };
         if silicon.mismatch.is_none() {
             let timing = silicon.timing(&engine.circuit.netlist);
@@ -108,96 +121,33 @@ impl<'a> Timed<'a> {
         engine
     }
 
-    /// Histograms of the whole array, row-major. `done` is told of macropixels as they are finished.
-    ///
-    /// # Errors
-    /// When a bit of a count is unknown.
-    ///
-    /// # Panics
-    /// When there is not one start value and one list of pulses for every macropixel.
-    pub fn histograms(
-        &self,
-        runner: Runner,
-        starts: &[u16],
-        pulses: &[&[SpadEvent]],
-        done: impl Fn(usize) + Sync,
-    ) -> Result<TimedHistograms, EngineError> {
-        let pixels = self.setting.config.pixels();
-        assert!(starts.len() == pixels && pulses.len() == pixels);
-        let cycle = Cycle::new(self.setting.config, self.setting.exposure);
-        let is_levelled = runner == Runner::Cycle && cycle.unlevelled().is_none();
-        let common = WindowLaw::new(self.setting.config, self.setting.exposure);
-        let corrupted = self.corrupted_starts(starts);
-        let judge = |pixel: usize| {
-            let (start, pulses) = (starts[pixel], pulses[pixel]);
-            if corrupted.contains(&start) {
-                return Ok(Judged::InDoubt("the load leaves another start value"));
-            }
-            let timing = self.timing(pixel);
-            let orders = self.orders_of(&timing);
-            let parts = match orders.parts(&self.setting, start) {
-                Ok(parts) => parts,
-                Err(doubt) => return Ok(Judged::InDoubt(doubt)),
-            };
-            let window = common.window(start).open();
-            let is_common = |part: &Part| part.first_edge == window.map(|w| w.first_edge);
-            if is_levelled && window.is_some() && parts.iter().all(is_common) {
-                return Ok(Judged::ForCycle(orders.shifted(&common, pulses)));
-            }
-            Ok(Judged::Counted(
-                self.by_laws(&orders, parts, start, pulses)?,
-            ))
-        };
-        let judged: Result<Vec<Judged>, EngineError> = (0..pixels)
-            .into_par_iter()
-            .map(|pixel| {
-                let judged = judge(pixel)?;
-                done(usize::from(matches!(judged, Judged::Counted(_))));
-                Ok(judged)
-            })
-            .collect();
-        let mut judged = judged?;
-        self.run_cycle(&cycle, starts, &mut judged, &done)?;
-        self.finish(starts, pulses, judged, &done)
+    /// What runs the macropixels.
+    pub fn runner(&self) -> Runner {
+        self.runner
     }
 
-    /// How many of the array's pulses cancel, two to a pair: each macropixel's flip-flops have delays of their own.
-    ///
-    /// # Panics
-    /// When there is not one list of pulses for every macropixel.
-    pub fn cancelled(&self, pulses: &[&[SpadEvent]]) -> u64 {
-        let Setting {
-            config, exposure, ..
-        } = self.setting;
-        assert!(pulses.len() == config.pixels());
-        let law = || WindowLaw::new(config, exposure);
-        let Some(cancelling) = Cancelling::of(config.dead_time(), exposure.clock, law) else {
-            return 0;
-        };
-        let of_pixel = |(pixel, pulses): (usize, &&[SpadEvent])| {
-            let orders = self.orders_of(&self.timing(pixel)).into_owned();
-            let shifted = orders.shifted(cancelling.law(), pulses);
-            2 * cancelling.pairs(&shifted).count() as u64
-        };
-        pulses.par_iter().enumerate().map(of_pixel).sum()
+    /// What became of the macropixels that were replayed so far; nothing where the gates run all of them.
+    pub fn coverage(&self) -> ClosedFormCoverage {
+        locked(&self.coverage).clone()
     }
 
-    /// Histograms of the whole array, every macropixel at gate level with its own delays.
-    ///
-    /// # Errors
-    /// As [`Timed::histograms`].
-    ///
-    /// # Panics
-    /// As [`Timed::histograms`].
-    pub fn by_gates(
-        &self,
-        starts: &[u16],
-        pulses: &[&[SpadEvent]],
-        done: impl Fn(usize) + Sync,
-    ) -> Result<Histograms, EngineError> {
-        assert!(starts.len() == self.setting.config.pixels() && pulses.len() == starts.len());
-        let all: Vec<usize> = (0..starts.len()).collect();
-        self.replay(&all, starts, pulses, &done)
+    /// Counts in closed form where a macropixel's delays decide every order of events.
+    fn judge(&self, pixel: &PulsedPixel<'_>) -> Result<Judged, EngineError> {
+        let timing = self.timing(pixel.number);
+        let orders = self.orders_of(&timing);
+        let parts = match orders.parts(&self.setting, pixel.start) {
+            Ok(parts) => parts,
+            Err(doubt) => return Ok(Judged::InDoubt(doubt)),
+        };
+        let window = self.common.window(pixel.start).open();
+        let is_common = |part: &Part| part.first_edge == window.map(|w| w.first_edge);
+        let is_levelled = self.runner == Runner::Cycle && self.cycle.unlevelled().is_none();
+        if is_levelled && window.is_some() && parts.iter().all(is_common) {
+            let pulses = orders.shifted(&self.common, pixel.pulses);
+            return Ok(Judged::ForCycle(pulses));
+        }
+        let counts = self.by_laws(&orders, parts, pixel.start, pixel.pulses)?;
+        Ok(Judged::Counted(counts))
     }
 
     /// Counts of one macropixel whose bins follow these laws.
@@ -208,10 +158,10 @@ impl<'a> Timed<'a> {
         start: u16,
         pulses: &[SpadEvent],
     ) -> Result<Vec<u16>, EngineError> {
-        let mut counts = vec![0; self.setting.config.bins];
+        let mut counts = vec![0; self.setting.sensor.bins];
         for Part { law, bins, .. } in parts {
             let pulses = orders.shifted(&law, pulses);
-            let engine = Window::with_law(self.setting.config, self.setting.exposure, law);
+            let engine = Window::with_law(law);
             let histogram = engine.histogram(start, &pulses)?;
             for bin in bins {
                 counts[bin] = histogram[bin];
@@ -223,149 +173,100 @@ impl<'a> Timed<'a> {
     /// Counts the macropixels that were left to the cycle engine.
     fn run_cycle(
         &self,
-        cycle: &Cycle<'_>,
-        starts: &[u16],
+        pixels: &[PulsedPixel<'_>],
         judged: &mut [Judged],
-        done: &impl Fn(usize),
     ) -> Result<(), EngineError> {
-        let mut numbers = Vec::new();
-        let mut pulses = Vec::new();
-        for (pixel, judged) in judged.iter_mut().enumerate() {
-            if let Judged::ForCycle(shifted) = judged {
-                numbers.push(pixel);
-                pulses.push(std::mem::take(shifted));
+        let is_for_cycle = |judged: &Judged| matches!(judged, Judged::ForCycle(_));
+        let places: Vec<usize> = (0..judged.len())
+            .filter(|&place| is_for_cycle(&judged[place]))
+            .collect();
+        for places in places.chunks(self.cycle.batch()) {
+            let shifted = places.iter().map(|&place| match &judged[place] {
+                Judged::ForCycle(pulses) => PulsedPixel {
+                    pulses,
+                    ..pixels[place]
+                },
+                Judged::Counted(_) | Judged::InDoubt(_) => unreachable!("filtered"),
+            });
+            let shifted: Vec<PulsedPixel<'_>> = shifted.collect();
+            let counts = self.cycle.replay(&shifted)?;
+            for (&place, counts) in places.iter().zip(&counts) {
+                judged[place] = Judged::Counted(counts.to_vec());
             }
-        }
-        let starts: Vec<u16> = numbers.iter().map(|&pixel| starts[pixel]).collect();
-        let pulses: Vec<&[SpadEvent]> = pulses.iter().map(Vec::as_slice).collect();
-        for ((numbers, starts), pulses) in numbers
-            .chunks(cycle.batch())
-            .zip(starts.chunks(cycle.batch()))
-            .zip(pulses.chunks(cycle.batch()))
-        {
-            let counts = cycle.histograms(starts, pulses)?;
-            for (&pixel, counts) in numbers.iter().zip(&counts) {
-                judged[pixel] = Judged::Counted(counts.to_vec());
-            }
-            done(numbers.len());
         }
         Ok(())
     }
 
-    /// Replays what is in doubt.
-    fn finish(
-        &self,
-        starts: &[u16],
-        pulses: &[&[SpadEvent]],
-        judged: Vec<Judged>,
-        done: &(impl Fn(usize) + Sync),
-    ) -> Result<TimedHistograms, EngineError> {
-        let bins = self.setting.config.bins;
-        let mut found = TimedHistograms {
-            histograms: Histograms::empty(starts.len(), bins),
-            coverage: ClosedFormCoverage::default(),
-        };
-        let mut in_doubt = Vec::new();
-        for (pixel, judged) in judged.into_iter().enumerate() {
-            match judged {
-                Judged::Counted(counts) => {
-                    found.coverage.decided += 1;
-                    found.histograms[pixel].copy_from_slice(&counts);
-                }
-                Judged::InDoubt(doubt) => {
-                    *found.coverage.replayed.entry(doubt).or_default() += 1;
-                    in_doubt.push(pixel);
-                }
-                Judged::ForCycle(_) => unreachable!("the cycle engine has run"),
-            }
-        }
-        let replayed = self.replay(&in_doubt, starts, pulses, done)?;
-        for (pixel, counts) in in_doubt.into_iter().zip(&replayed) {
-            found.histograms[pixel].copy_from_slice(counts);
-        }
-        Ok(found)
-    }
-
     /// Macropixels at gate level, each with its own delays.
-    fn replay(
-        &self,
-        numbers: &[usize],
-        starts: &[u16],
-        pulses: &[&[SpadEvent]],
-        done: &(impl Fn(usize) + Sync),
-    ) -> Result<Histograms, EngineError> {
-        let gate = Gate::new(self.setting.config, self.setting.exposure);
+    fn by_gates(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError> {
+        let gate = Gate::new(&self.setting.sensor, &self.setting.exposure);
         // Those that are alike share an event queue.
         let together = if self.alike.is_some() { LANES } else { 1 };
-        let batches: Result<Vec<Histograms>, EngineError> = numbers
+        let batches: Result<Vec<Histograms>, EngineError> = pixels
             .par_chunks(together)
-            .map(|numbers| {
-                let timing = self.timing(numbers[0]);
-                let timings = vec![&*timing; numbers.len()];
-                let starts: Vec<u16> = numbers.iter().map(|&pixel| starts[pixel]).collect();
-                let pulses: Vec<&[SpadEvent]> =
-                    numbers.iter().map(|&pixel| pulses[pixel]).collect();
-                let histograms = gate.histograms_with(&timings, &starts, &pulses);
-                done(numbers.len());
-                histograms.map_err(|error| self.named(numbers, error))
+            .map(|pixels| {
+                let timing = self.timing(pixels[0].number);
+                let histograms = gate.replay_with(&vec![&*timing; pixels.len()], pixels);
+                histograms.map_err(|error| self.named(pixels, error))
             })
             .collect();
-        Ok(Histograms::joined(self.setting.config.bins, batches?))
+        Ok(Histograms::joined(self.setting.sensor.bins, batches?))
     }
 
     /// An error of one macropixel alone, with its name in the array.
-    fn named(&self, numbers: &[usize], error: EngineError) -> EngineError {
-        let cols = self.setting.config.cols;
-        match (numbers, error) {
-            (&[pixel], EngineError::Unknown { bin, .. }) => EngineError::Unknown {
-                macropixel: sensor::pixel_name(pixel / cols, pixel % cols),
+    fn named(&self, pixels: &[PulsedPixel<'_>], error: EngineError) -> EngineError {
+        match (pixels, error) {
+            ([pixel], EngineError::Unknown { bin, .. }) => EngineError::Unknown {
+                macropixel: self.name(pixel.number),
                 bin,
             },
             (_, error) => error,
         }
     }
 
-    /// Start values that the load does not bring into the P-counters. Its delays are the same for every macropixel.
-    fn corrupted_starts(&self, starts: &[u16]) -> BTreeSet<u16> {
+    fn name(&self, number: u32) -> String {
+        let (number, cols) = (number as usize, self.setting.sensor.cols);
+        array::pixel_name(number / cols, number % cols)
+    }
+
+    /// Whether the load brings each of these start values into the P-counters. Its delays are the same for every macropixel.
+    fn arrive(&self, starts: impl Iterator<Item = u16>) -> BTreeMap<u16, bool> {
         let Setting {
-            config,
+            sensor,
             exposure,
             schedule,
             ..
-        } = self.setting;
-        let mut corrupted = BTreeSet::new();
-        if config.mode == Mode::Conventional || config.p_counter == PCounter::Memoryless {
-            return corrupted;
+        } = &self.setting;
+        let always = sensor.mode == Mode::Conventional || sensor.p_counter == PCounter::Memoryless;
+        let mut found: BTreeMap<u16, bool> = starts.map(|start| (start, true)).collect();
+        if always {
+            return found;
         }
+        // Kept locked, so that no start value is simulated twice.
+        let mut known = locked(&self.arrives);
+        let unknown = found.keys().filter(|start| !known.contains_key(start));
+        let unknown: Vec<u16> = unknown.copied().collect();
         let timing = self.timing(0);
-        let distinct: Vec<u16> = starts
-            .iter()
-            .copied()
-            .collect::<BTreeSet<_>>()
-            .into_iter()
-            .collect();
-        for starts in distinct.chunks(LANES) {
+        for starts in unknown.chunks(LANES) {
             let dark: Vec<&[SpadEvent]> = vec![&[]; starts.len()];
-            let lanes = LaneSimulation::new(config, exposure, starts, &dark);
+            let lanes = LaneSimulation::new(sensor, exposure, starts, &dark);
             let mut lanes = lanes.with_timing(&timing);
             lanes.run_until(schedule.origin - exposure.clock.period(), &mut ());
             let loaded = starts.iter().zip(lanes.loaded());
-            corrupted.extend(
-                loaded
-                    .filter(|&(&start, found)| found != Some(start))
-                    .map(|(s, _)| *s),
-            );
+            known.extend(loaded.map(|(&start, found)| (start, found == Some(start))));
         }
-        corrupted
+        for (start, arrives) in &mut found {
+            *arrives = known[start];
+        }
+        found
     }
 
     /// Delays of a macropixel, whose cells are known by its place in the array.
-    fn timing(&self, pixel: usize) -> Cow<'_, Timing> {
+    fn timing(&self, number: u32) -> Cow<'_, Timing> {
         if let Some((timing, _)) = &self.alike {
             return Cow::Borrowed(timing);
         }
-        let cols = self.setting.config.cols;
-        let name = sensor::pixel_name(pixel / cols, pixel % cols);
+        let name = self.name(number);
         let path = |cell: usize| match &self.paths[cell] {
             (path, None) => path.clone(),
             (before, Some(after)) => [before, name.as_str(), after].concat(),
@@ -376,7 +277,7 @@ impl<'a> Timed<'a> {
     fn orders(&self, timing: &Timing) -> Orders {
         let paths = self.circuit.paths(timing);
         let macropixel = MacropixelDelays::of(&paths);
-        let is_guided = self.setting.config.mode == Mode::Guided;
+        let is_guided = self.setting.sensor.mode == Mode::Guided;
         let counter = is_guided.then(|| CounterDelays::of(&paths, &macropixel));
         let delays = Delays {
             macropixel,
@@ -391,4 +292,91 @@ impl<'a> Timed<'a> {
             None => Cow::Owned(self.orders(timing)),
         }
     }
+}
+
+impl Engine for Timed {
+    /// With the library's delays.
+    fn law(&self) -> WindowLaw {
+        self.common.clone()
+    }
+
+    fn bins(&self) -> usize {
+        self.setting.sensor.bins
+    }
+
+    fn batch(&self) -> usize {
+        match self.runner {
+            Runner::Cycle => self.cycle.batch(),
+            // Most of an array's start values are among those of so many macropixels: they are loaded together.
+            Runner::Window => 8 * LANES,
+            Runner::Gate => LANES,
+        }
+    }
+}
+
+impl Replay for Timed {
+    fn replay(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError> {
+        if self.runner == Runner::Gate {
+            return self.by_gates(pixels);
+        }
+        let arrive = self.arrive(pixels.iter().map(|pixel| pixel.start));
+        let judge = |pixel: &PulsedPixel<'_>| match arrive[&pixel.start] {
+            true => self.judge(pixel),
+            false => Ok(Judged::InDoubt(Doubt::Load)),
+        };
+        let judged: Result<Vec<Judged>, EngineError> = pixels.par_iter().map(judge).collect();
+        let mut judged = judged?;
+        self.run_cycle(pixels, &mut judged)?;
+
+        let mut histograms = Histograms::empty(pixels.len(), self.bins());
+        let mut coverage = ClosedFormCoverage::default();
+        let mut in_doubt = Vec::new();
+        for (place, judged) in judged.into_iter().enumerate() {
+            match judged {
+                Judged::Counted(counts) => {
+                    coverage.decided += 1;
+                    histograms[place].copy_from_slice(&counts);
+                }
+                Judged::InDoubt(doubt) => {
+                    *coverage.replayed.entry(doubt).or_default() += 1;
+                    in_doubt.push(place);
+                }
+                Judged::ForCycle(_) => unreachable!("the cycle engine has run"),
+            }
+        }
+        let doubtful: Vec<PulsedPixel<'_>> = in_doubt.iter().map(|&place| pixels[place]).collect();
+        let replayed = self.by_gates(&doubtful)?;
+        for (place, counts) in in_doubt.into_iter().zip(&replayed) {
+            histograms[place].copy_from_slice(counts);
+        }
+        locked(&self.coverage).add(coverage);
+        Ok(histograms)
+    }
+
+    fn as_the_law_sees<'p>(&self, number: u32, pulses: &'p [SpadEvent]) -> Cow<'p, [SpadEvent]> {
+        let timing = self.timing(number);
+        Cow::Owned(self.orders_of(&timing).shifted(&self.common, pulses))
+    }
+}
+
+impl Expose for Timed {
+    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+        full_stream(self, stream, pixels)
+    }
+}
+
+impl ClosedFormCoverage {
+    fn add(&mut self, other: Self) {
+        self.decided += other.decided;
+        for (doubt, macropixels) in other.replayed {
+            *self.replayed.entry(doubt).or_default() += macropixels;
+        }
+    }
+}
+
+/// What a thread that panicked left is as whole as it was: it is changed in one step.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner())
 }

@@ -12,13 +12,14 @@
 //! the arrival is uncertain: its *race* is then two spans that overlap. Orders that hold in any silicon scaled as a whole,
 //! but perhaps not in one whose cells differ, are asked for here. Whatever is not proven is in doubt.
 
+use super::doubt::Doubt;
 use crate::bench::Schedule;
 use crate::chip::p_counter::{Rises, starts_high};
 use crate::chip::timing::CounterTiming;
 use crate::chip::timing::macropixel::{CounterDelays, MacropixelDelays, Span, hull, spread};
 use crate::chip::window_law::{Window, WindowLaw};
 use crate::chip::{
-    AfterBorrow, ChipTiming, Exposure, Mode, Overflow, PCounter, SPADS, SensorConfig,
+    AfterBorrow, ChipTiming, Conflict, Exposure, Mode, Overflow, PCounter, Sensor, SensorConfig,
 };
 use crate::photon::SpadEvent;
 use crate::units::Time;
@@ -27,16 +28,13 @@ use crate::units::Time;
 /// of the fastest gate of the fast corner.
 const MARGIN: Time = Time::from_ps(1);
 
-/// Why macropixels are replayed.
-pub type Doubt = &'static str;
-
 /// One macropixel's own time.
 #[derive(Clone)]
-pub struct Orders {
+pub(super) struct Orders {
     law: WindowLaw,
     /// CLK rises → what each bin takes changes.
     shift: Vec<Span>,
-    latency: [Time; SPADS],
+    latency: Vec<Time>,
     /// What is in doubt for every start value.
     doubt: Option<Doubt>,
     /// CLK falls → COUNTER_CLK rises, earliest.
@@ -46,7 +44,7 @@ pub struct Orders {
 }
 
 /// Delays of a macropixel in its mode.
-pub struct Delays {
+pub(super) struct Delays {
     /// Those of either mode.
     pub macropixel: MacropixelDelays,
     /// What the guided mode needs, too.
@@ -70,7 +68,7 @@ impl Delays {
 }
 
 /// Bins that follow one law.
-pub struct Part {
+pub(super) struct Part {
     /// The law.
     pub law: WindowLaw,
     /// The rising CLK edge that takes the photons of bin 0; `None` where the window never opens.
@@ -80,11 +78,11 @@ pub struct Part {
 }
 
 /// What all macropixels of an array share.
-pub struct Setting<'a> {
-    /// The sensor.
-    pub config: &'a SensorConfig,
+pub(super) struct Setting {
+    /// The sensor with the library's delays.
+    pub sensor: Sensor,
     /// Its clocks.
-    pub exposure: &'a Exposure,
+    pub exposure: Exposure,
     /// Delays of the library, where a macropixel's own do not matter.
     pub nominal: ChipTiming,
     /// Where power-up, load and exposure lie in simulation time.
@@ -93,16 +91,17 @@ pub struct Setting<'a> {
 
 impl Orders {
     /// What these delays decide.
-    pub fn new(setting: &Setting<'_>, delays: &Delays) -> Self {
+    pub(super) fn new(setting: &Setting, delays: &Delays) -> Self {
         let counter = delays.counter.as_ref();
+        let rises = delays.macropixel.latency.iter();
         let timing = match counter {
             None => conventional(setting, delays),
             Some(counter) => guided(setting, delays, counter),
         };
         Orders {
-            law: WindowLaw::with_timing(setting.config, setting.exposure, timing),
+            law: WindowLaw::with_timing(&setting.sensor, &setting.exposure, timing),
             shift: delays.macropixel.shift.clone(),
-            latency: delays.macropixel.latency.map(|(rise, _)| rise),
+            latency: rises.map(|&(rise, _)| rise).collect(),
             doubt: always(setting, delays),
             counter_clk: counter.map_or(Time::ZERO, |c| c.counter_clk.0),
             reset: delays.macropixel.reset.1,
@@ -114,16 +113,16 @@ impl Orders {
     ///
     /// # Errors
     /// What is in doubt.
-    pub fn parts(&self, setting: &Setting<'_>, start: u16) -> Result<Vec<Part>, Doubt> {
+    pub(super) fn parts(&self, setting: &Setting, start: u16) -> Result<Vec<Part>, Doubt> {
         if let Some(doubt) = self.doubt {
             return Err(doubt);
         }
-        let (config, exposure) = (setting.config, setting.exposure);
+        let (config, exposure) = (&setting.sensor, &setting.exposure);
         // Otherwise a LOCAL_STOP that starts high stays so, and the counter at rest.
         let reset_can_raise_local_stop =
             config.after_borrow == AfterBorrow::Wrap || config.p_counter == PCounter::SetReset;
         if config.mode == Mode::Guided && starts_high(config, start) && reset_can_raise_local_stop {
-            return Err("a reset raises LOCAL_STOP");
+            return Err(Doubt::ResetRaisesLocalStop);
         }
         let whole = |first_edge| Part {
             law: self.law.clone(),
@@ -132,7 +131,7 @@ impl Orders {
         };
         match self.law.window(start) {
             Window::Open(window) => Ok(vec![whole(Some(window.first_edge))]),
-            Window::Irregular(why) => Err(why),
+            Window::Irregular(why) => Err(Doubt::Irregular(why)),
             Window::Race(_) => self.bin_by_bin(setting, start),
             Window::Never => {
                 // No count is earlier than the one of CLK's first falling edge.
@@ -142,14 +141,14 @@ impl Orders {
                 });
                 match is_reset_first {
                     true => Ok(vec![whole(None)]),
-                    false => Err("the strobe meets the next laser cycle's reset"),
+                    false => Err(Doubt::Race(Conflict::StrobeAtNextReset)),
                 }
             }
         }
     }
 
     /// The same where not all bins see the shift register after the same change. Bins know nothing of each other.
-    fn bin_by_bin(&self, setting: &Setting<'_>, start: u16) -> Result<Vec<Part>, Doubt> {
+    fn bin_by_bin(&self, setting: &Setting, start: u16) -> Result<Vec<Part>, Doubt> {
         let mut parts: Vec<Part> = Vec::new();
         for (bin, &shift) in self.shift.iter().enumerate() {
             let timing = ChipTiming {
@@ -157,13 +156,10 @@ impl Orders {
                 hold: spread(shift),
                 ..*self.law.timing()
             };
-            let law = WindowLaw::with_timing(setting.config, setting.exposure, timing);
-            let first_edge = match law.window(start) {
-                Window::Open(window) => Some(window.first_edge),
-                Window::Race(race) => return Err(race.what),
-                Window::Irregular(why) => return Err(why),
-                Window::Never => unreachable!("bins do not stop a counter"),
-            };
+            let law = WindowLaw::with_timing(&setting.sensor, &setting.exposure, timing);
+            let window = law.window(start).settled()?;
+            debug_assert!(window.is_some(), "bins do not stop a counter");
+            let first_edge = window.map(|window| window.first_edge);
             match parts.iter_mut().find(|part| part.first_edge == first_edge) {
                 Some(part) => part.bins.push(bin),
                 None => parts.push(Part {
@@ -177,7 +173,7 @@ impl Orders {
     }
 
     /// `pulses` as a macropixel must see them whose front end is that of `law`, to take them at the same CLK edges.
-    pub fn shifted(&self, law: &WindowLaw, pulses: &[SpadEvent]) -> Vec<SpadEvent> {
+    pub(super) fn shifted(&self, law: &WindowLaw, pulses: &[SpadEvent]) -> Vec<SpadEvent> {
         let common = law.timing().spad_to_toggle;
         let shift = |pulse: &SpadEvent| SpadEvent {
             time: pulse.time + self.latency[usize::from(pulse.spad)] - common,
@@ -190,7 +186,7 @@ impl Orders {
 }
 
 /// What the law asks for in either mode.
-fn common(setting: &Setting<'_>, delays: &Delays) -> ChipTiming {
+fn common(setting: &Setting, delays: &Delays) -> ChipTiming {
     let strobe = delays.strobe();
     let delays = &delays.macropixel;
     let shift = delays.shift.iter().copied().reduce(hull);
@@ -210,14 +206,14 @@ fn common(setting: &Setting<'_>, delays: &Delays) -> ChipTiming {
     }
 }
 
-fn conventional(setting: &Setting<'_>, delays: &Delays) -> ChipTiming {
+fn conventional(setting: &Setting, delays: &Delays) -> ChipTiming {
     ChipTiming {
         stop_to_strobe: delays.strobe().1,
         ..common(setting, delays)
     }
 }
 
-fn guided(setting: &Setting<'_>, delays: &Delays, counter: &CounterDelays) -> ChipTiming {
+fn guided(setting: &Setting, delays: &Delays, counter: &CounterDelays) -> ChipTiming {
     let CounterDelays {
         counter_clk,
         local_stop,
@@ -248,8 +244,8 @@ fn guided(setting: &Setting<'_>, delays: &Delays, counter: &CounterDelays) -> Ch
 }
 
 /// The first thing in doubt for every start value.
-fn always(setting: &Setting<'_>, delays: &Delays) -> Option<Doubt> {
-    let (config, exposure, schedule) = (setting.config, setting.exposure, setting.schedule);
+fn always(setting: &Setting, delays: &Delays) -> Option<Doubt> {
+    let (config, exposure, schedule) = (&setting.sensor, &setting.exposure, setting.schedule);
     let (strobe, hit_release) = (delays.strobe(), delays.hit_release());
     let counter = delays.counter.as_ref();
     let delays = &delays.macropixel;
@@ -264,29 +260,29 @@ fn always(setting: &Setting<'_>, delays: &Delays) -> Option<Doubt> {
     let shared = [
         (
             slowest * 4 < schedule.reset_end && slowest * 10 < quiet,
-            "power-up has no time to settle",
+            Doubt::PowerUp,
         ),
-        (slowest < half, "a cell is slower than half a CLK period"),
+        (slowest < half, Doubt::SlowCell),
         (
             delays.latency.iter().all(|(rise, fall)| rise == fall),
-            "a SPAD's flip-flop rises and falls at different speeds",
+            Doubt::UnevenLatency,
         ),
         (
             delays
                 .latency
                 .iter()
                 .all(|(rise, _)| *rise + MARGIN < config.dead_time()),
-            "a SPAD's pulses are shorter than its flip-flop's delay",
+            Doubt::ShortPulse,
         ),
         (
             settling < laser_cycle && strobe.1 + settling < after_the_end,
-            "a bin has no time to count",
+            Doubt::SlowBin,
         ),
         (
             // A carry passes 2ⁿ bits of a bin before it comes to those beside them in the tree that tells when the bin is
             // full, n gates deep: the tree has seen them fall by then, and is never high on the way.
             delays.slowest_and < delays.fastest_flip_flop * 2 || config.overflow == Overflow::Wrap,
-            "a bin may seem full for a moment",
+            Doubt::FullForAMoment,
         ),
     ];
     let unmet = |orders: &[(bool, Doubt)]| orders.iter().find(|(holds, _)| !holds).map(|o| o.1);
@@ -294,7 +290,7 @@ fn always(setting: &Setting<'_>, delays: &Delays) -> Option<Doubt> {
         // STOP stays high, and low, for a period at least.
         None => unmet(&[(
             hit_release.1 + MARGIN < strobe.0 && strobe.1 + slowest * 4 < period,
-            "HIT's reset meets the strobe",
+            Doubt::ResetMeetsStrobe,
         )]),
         Some(counter) => unmet(&counter_orders(config, delays, counter, period)),
     };
@@ -315,32 +311,29 @@ fn counter_orders(
     let reset_width = release.0 - reset.1;
     let blocks_late = counter.block.is_some_and(|block| block >= period);
     [
-        (
-            config.p_counter != PCounter::Memoryless,
-            "a P-counter without memory is left to the gates",
-        ),
+        (config.p_counter != PCounter::Memoryless, Doubt::Memoryless),
         (
             counter.reset_edges() + MARGIN < reset_width && release.1 < period,
-            "the reset pulse is too short",
+            Doubt::ShortReset,
         ),
         (
             // COUNTER_RESET's two causes overlap, and the first COUNTER_CLK edge meets it.
             reset.1 + MARGIN < clear.0
                 && clear.1 + MARGIN < release.0
                 && counter.enabled + MARGIN < release.0,
-            "ENABLE changes as the reset pulse ends",
+            Doubt::EnableMeetsReset,
         ),
         (
             !blocks_late || config.after_borrow == AfterBorrow::Wrap,
-            "LOCAL_STOP blocks the P-counter too late",
+            Doubt::LateBlock,
         ),
         (
             counter.hit_release.1 + MARGIN < to_strobe,
-            "the strobe meets the end of HIT's reset",
+            Doubt::StrobeMeetsReset,
         ),
         (
             reset.1 + counter.hit_falls + delays.slowest < release.0 + to_strobe,
-            "HIT has no time to fall",
+            Doubt::SlowHit,
         ),
     ]
 }

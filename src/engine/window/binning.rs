@@ -29,7 +29,7 @@ const ALIGNED_FS: i64 = 2;
 
 /// Room for what is found out on the way.
 #[derive(Debug, Default)]
-pub struct Scratch {
+pub(super) struct Scratch {
     slot_codes: Vec<Code>,
     slot_marks: Vec<u32>,
     passed: Passed,
@@ -37,7 +37,7 @@ pub struct Scratch {
 
 /// Which photons of a draw are wanted, and what for.
 #[derive(Debug, Clone, Copy)]
-pub struct Wanted {
+pub(super) struct Wanted {
     /// Those of cycles before this one of the group.
     pub cycles: u32,
     /// By how many cycles their windows come after them.
@@ -51,14 +51,14 @@ pub struct Wanted {
 impl Wanted {
     /// The place of a photon's window.
     #[inline(always)]
-    pub fn place(&self, place: u32) -> u32 {
+    pub(super) fn place(&self, place: u32) -> u32 {
         place + (self.later << SPAD_BITS)
     }
 }
 
 /// Bins of one window. Times are relative to the start of bin 0.
 #[derive(Debug, Clone, Copy)]
-pub struct Binning {
+pub(super) struct Binning {
     bins: u32,
     slots: Slots,
     /// CLK periods of a femtosecond.
@@ -71,7 +71,7 @@ pub struct Binning {
 
 impl Binning {
     /// For `bins` bins (1 to 64) of a CLK of at most 2 GHz with these slots, fewer than 2²⁴ to a period.
-    pub fn new(bins: usize, clk_hz: f64, slots: Slots) -> Self {
+    pub(super) fn new(bins: usize, clk_hz: f64, slots: Slots) -> Self {
         let periods_per_fs = clk_hz * 1e-15;
         let one = f64::from(FRACTION + 1);
         // Slots start and photons come at whole femtoseconds; a little more is for the arithmetic.
@@ -88,7 +88,7 @@ impl Binning {
     }
 
     /// The slot that begins at `origin_fs`, the start of bin 0; `None` if none does, so that bins are not slots.
-    pub fn slot_of(&self, origin_fs: i64) -> Option<i32> {
+    pub(super) fn slot_of(&self, origin_fs: i64) -> Option<i32> {
         let length_fs = self.slots.length_s() * 1e15;
         let slot = ((origin_fs + self.slots.lead_fs()) as f64 / length_fs).round();
         let off_fs = (origin_fs + self.slots.lead_fs()) as f64 - slot * length_fs;
@@ -96,14 +96,14 @@ impl Binning {
     }
 
     /// The row of a slot.
-    pub fn row_of(&self, wanted: &Wanted, slot: u32) -> usize {
+    pub(super) fn row_of(&self, wanted: &Wanted, slot: u32) -> usize {
         let k = self.slots.per_period_bits();
         row_of(slot, wanted.origin_slot, k, self.bins) as usize
     }
 
     /// Appends the codes of a draw, those of its background photons (by rows, as [`Draw::words`] has them) before those
     /// of its signal.
-    pub fn encode(
+    pub(super) fn encode(
         &self,
         light: &PixelStream<'_>,
         draw: &Draw,
@@ -170,7 +170,7 @@ impl Binning {
     }
 
     /// Appends the code of one photon, as place and time after the start of its cycle.
-    pub fn push(&self, wanted: &Wanted, photon: Option<(Place, i64)>, codes: &mut Codes) {
+    pub(super) fn push(&self, wanted: &Wanted, photon: Option<(Place, i64)>, codes: &mut Codes) {
         let (code, mark) = codes.append(1);
         (code[0], mark[0]) = match photon {
             Some((place, time_fs)) => {
@@ -183,7 +183,7 @@ impl Binning {
 
     /// The code of one photon at `time_fs`.
     #[inline]
-    pub fn encode_one(&self, time_fs: i64) -> Code {
+    pub(super) fn encode_one(&self, time_fs: i64) -> Code {
         self.code(time_fs, 0).0
     }
 
@@ -278,6 +278,7 @@ fn doubt(steps: u32, words: &[u32], codes: &mut [Code]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chip::SpadGrid;
     use crate::photon::{GROUP, Group, PhotonStream, SpadModel, StreamConfig};
     use crate::units::{Frequency, Time};
     use proptest::prelude::*;
@@ -326,7 +327,7 @@ mod tests {
             let row = (periods.floor() + 1.0).clamp(0.0, bins as f64 + 1.0) as usize;
             let off_edge_fs = (periods - periods.round()).abs() * period_fs;
             let wanted = Wanted { cycles, later, origin_fs, origin_slot };
-            let group = Group::of_cycle(GROUP);
+            let group = Group::of_cycle(GROUP, SpadGrid::default());
             let mut codes = Codes::default();
             let mut in_slot = (vec![Code::NONE], vec![0]);
             encode_slots(&binning, &wanted, &[slot], (&mut in_slot.0, &mut in_slot.1));

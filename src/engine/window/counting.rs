@@ -11,38 +11,37 @@
 //! times of photons are worked out only there.
 //!
 //! Cycles with photons that breed are settled as a whole; so are all cycles of a group where photons are many, or where
-//! echoes of other cycles are seen ([`whole`]).
+//! echoes of other cycles are seen, and all of light with several layers ([`whole`]).
 
 use super::binning::{Binning, Scratch, Wanted};
-use super::codes::{Code, Codes, ROWS};
+use super::codes::{Code, Codes, ROWS, SPADS};
 use super::echo_rows::EchoRows;
-use super::past::split;
 use super::sight::{Sight, Spans};
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Spacing, Tables};
 use super::{Window, Work, taken};
-use crate::photon::{
-    Draw, Group, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SPADS, SpadEvent,
-};
+use crate::photon::{Draw, Group, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SpadEvent};
 use crate::units::Time;
-use breeding::Breeding;
+use by_window::ByWindow;
 use tile::Tile;
 
-mod breeding;
 mod bright;
+mod by_window;
 mod settling;
 mod tile;
 mod whole;
 
 /// Counts macropixels; keeps its tables from one to the next.
-pub struct Counting<'a> {
-    engine: &'a Window<'a>,
+pub(super) struct Counting<'a> {
+    engine: &'a Window,
     stream: &'a PhotonStream,
     binning: Binning,
     /// What a CLK period with so many SPADs adds to its bin.
     adds: [i64; SPADS + 1],
     spacing: Spacing,
     plain: Drawn,
-    breeding: Breeding,
+    breeding: ByWindow,
+    /// Photons of light with several layers, one for each part.
+    layers: Vec<ByWindow>,
     extra: Draw,
     /// Codes of all photons drawn for the group that do not breed. Photons are known by their index here.
     codes: Codes,
@@ -88,7 +87,7 @@ impl Drawn {
             return;
         }
         let photons = self.previous.photons(light).filter_map(|(place, time_fs)| {
-            let (cycle, spad) = split(place);
+            let (cycle, spad) = group.split(place);
             (cycle + 1 == group.cycles()).then_some((Place::from(spad), time_fs))
         });
         self.carried.extend(photons);
@@ -109,14 +108,14 @@ impl Drawn {
             breeds: light.breeds(),
         };
         let own = self.own.photons(light).filter_map(move |(place, time_fs)| {
-            let (cycle, spad) = split(place);
+            let (cycle, spad) = group.split(place);
             (cycle < cycles).then(|| (cycle, photon(first + cycle, spad, time_fs)))
         });
         let previous = self
             .previous
             .photons(light)
             .filter_map(move |(place, time_fs)| {
-                let (cycle, spad) = split(place);
+                let (cycle, spad) = group.split(place);
                 (cycle + 1 < cycles).then(|| (cycle + 1, photon(first + cycle, spad, time_fs)))
             });
         let carried = self.carried.iter();
@@ -129,7 +128,11 @@ impl Drawn {
 /// One macropixel.
 struct Pixel<'p> {
     sight: &'p Sight,
+    /// All parts of the light.
+    parts: &'p [PixelStream<'p>],
+    /// The first of them, which does not breed.
     light: &'p PixelStream<'p>,
+    /// The photons that do, where there is but one layer.
     breeding: Option<&'p PixelStream<'p>>,
     /// Photons of `plain.own` and `plain.previous`.
     wanted: [Wanted; 2],
@@ -140,8 +143,8 @@ struct Pixel<'p> {
 
 impl<'a> Counting<'a> {
     /// For macropixels of `engine` in the light of `stream`.
-    pub fn new(engine: &'a Window<'a>, stream: &'a PhotonStream) -> Self {
-        let bins = engine.config.bins;
+    pub(super) fn new(engine: &'a Window, stream: &'a PhotonStream) -> Self {
+        let bins = engine.sensor.bins;
         let dead_s = stream.config().spads.dead_time.as_s();
         let dead_rows = (dead_s * engine.exposure.clock.as_hz()) as usize;
         Counting {
@@ -153,9 +156,10 @@ impl<'a> Counting<'a> {
                 far: dead_rows + 2,
                 blind: dead_rows,
             },
-            adds: std::array::from_fn(|spads| engine.adds(((1u32 << spads) - 1) as u16)),
+            adds: std::array::from_fn(|spads| engine.adds((1 << spads) - 1)),
             plain: Drawn::default(),
-            breeding: Breeding::default(),
+            breeding: ByWindow::default(),
+            layers: Vec::new(),
             extra: Draw::default(),
             codes: Codes::default(),
             scratch: Scratch::default(),
@@ -170,31 +174,30 @@ impl<'a> Counting<'a> {
         }
     }
 
-    /// Hits of every bin of a macropixel, and what they took. `breeding` are its photons that breed, `light` the others.
-    pub fn expose(
-        &mut self,
-        sight: &Sight,
-        light: &PixelStream<'_>,
-        breeding: Option<&PixelStream<'_>>,
-    ) -> (Vec<i64>, Work) {
+    /// Hits of every bin of a macropixel, and what they took. `parts` are those of its light ([`PhotonStream::parts`]).
+    pub(super) fn expose(&mut self, sight: &Sight, parts: &[PixelStream<'_>]) -> (Vec<i64>, Work) {
+        let light = &parts[0];
+        let breeding = parts.get(1).filter(|_| light.is_alone());
         let origins_fs = [sight.first_fs, sight.first_fs + self.stream.cycle_fs()];
         let origin_slots = origins_fs.map(|origin_fs| self.binning.slot_of(origin_fs));
         let has_slots_for_bins = origin_slots.iter().all(Option::is_some);
+        let has_marks = self.stream.spads() == SPADS;
         let wanted = [0, 1].map(|later| Wanted {
             cycles: 0,
             later,
             origin_fs: origins_fs[later as usize],
             origin_slot: origin_slots[later as usize].unwrap_or(0),
         });
-        let (bins, clk_hz) = (self.engine.config.bins, self.engine.exposure.clock.as_hz());
+        let (bins, clk_hz) = (self.engine.sensor.bins, self.engine.exposure.clock.as_hz());
         let within_fs = sight.plain.own.within_fs.clone();
         let mut pixel = Pixel {
             sight,
+            parts,
             light,
             breeding,
             wanted,
             echo: EchoRows::new(light, bins, 1e15 / clk_hz, origins_fs[0], within_fs),
-            hits: self.engine.dark_hits(sight.first_edge),
+            hits: self.engine.law.empty_hits(&sight.window),
             work: Work::default(),
         };
         self.plain.carried.clear();
@@ -202,6 +205,10 @@ impl<'a> Counting<'a> {
         self.tables.clear_counts();
         if light.is_bright() {
             self.count_bright(&mut pixel);
+            return (pixel.hits, pixel.work);
+        }
+        if !light.is_alone() {
+            self.count_layers(&mut pixel);
             return (pixel.hits, pixel.work);
         }
         let sees_own_echo_only = pixel.sees_own_echo_only();
@@ -221,7 +228,7 @@ impl<'a> Counting<'a> {
             }
             // Photons that come before the exposure are left out there.
             let is_first = group.first_cycle() == 0 && sees_before;
-            let is_simple = has_slots_for_bins && !is_first && sees_own_echo_only;
+            let is_simple = has_marks && has_slots_for_bins && !is_first && sees_own_echo_only;
             if is_simple && self.encode(&mut pixel, cycles) <= MOST_PHOTONS {
                 self.count_cells(&mut pixel, group);
             } else {
@@ -334,6 +341,14 @@ impl<'a> Counting<'a> {
 }
 
 impl Pixel<'_> {
+    /// What is drawn of a part of the light.
+    fn spans(&self, part: &PixelStream<'_>) -> &Spans {
+        match part.breeds() {
+            true => &self.sight.breeding,
+            false => &self.sight.plain,
+        }
+    }
+
     /// Whether windows see no echo of another cycle than their own.
     fn sees_own_echo_only(&self) -> bool {
         let sees_own_only = |light: &PixelStream<'_>, spans: &Spans| {
@@ -363,7 +378,7 @@ fn in_draw(light: &PixelStream<'_>, draw: &Draw, at: usize) -> i64 {
 
 /// The window of one laser cycle.
 struct Placed<'w> {
-    engine: &'w Window<'w>,
+    engine: &'w Window,
     binning: Binning,
     sight: &'w Sight,
     laser_cycle: u32,
@@ -373,15 +388,13 @@ impl Placed<'_> {
     /// Bin + 1 of a time relative to the start of the laser cycle, if it is within the window.
     fn row_of(&self, time: Time) -> Option<usize> {
         let code = self.binning.encode_one(time.as_fs() - self.sight.first_fs);
-        let bins = self.engine.config.bins;
+        let bins = self.engine.sensor.bins;
         if !code.is_doubtful() {
             return Some(code.row()).filter(|row| (1..=bins).contains(row));
         }
-        let exposure = self.engine.exposure;
-        let cycle = i64::from(self.laser_cycle);
-        let edge = self.engine.law.edge_of(exposure.stop(cycle) + time);
-        let first_edge = self.sight.first_edge + cycle * i64::from(exposure.stop_periods);
-        let bin = usize::try_from(edge - first_edge).ok()?;
-        (bin < bins).then_some(bin + 1)
+        let (law, cycle) = (&self.engine.law, i64::from(self.laser_cycle));
+        let pulse = self.engine.exposure.stop(cycle) + time;
+        let bin = law.bin_of(&self.sight.window, cycle, pulse)?;
+        Some(bin + 1)
     }
 }

@@ -19,7 +19,7 @@ use crate::photon::{LANES, PixelStream, RANKS, signal_rank};
 
 /// Edges of rows, as ranks: the first that may be, and the first that is for certain, at the edge or after it.
 #[derive(Debug, Clone)]
-pub struct EchoRows {
+pub(super) struct EchoRows {
     bins: u32,
     /// Beginning and end of the drawn slots.
     ends: [[i16; 2]; 2],
@@ -34,7 +34,7 @@ const TOGETHER: usize = 2 * LANES;
 
 /// Room for what is found out about photons.
 #[derive(Debug, Clone, Default)]
-pub struct Passed {
+pub(super) struct Passed {
     ranks: Vec<i16>,
     /// How many edges they have passed for certain.
     rows: Vec<i16>,
@@ -45,7 +45,7 @@ pub struct Passed {
 impl EchoRows {
     /// For `bins` bins of `period_fs` from `origin_fs` on, of what is drawn `within_fs`; all times after the start of the
     /// cycle. `None` where the pulse has no ranks.
-    pub fn new(
+    pub(super) fn new(
         light: &PixelStream<'_>,
         bins: usize,
         period_fs: f64,
@@ -75,7 +75,7 @@ impl EchoRows {
     }
 
     /// Codes and marks of photons with these random words, low and high, a multiple of [`LANES`].
-    pub fn encode(
+    pub(super) fn encode(
         &self,
         wanted: &Wanted,
         place_shift: u32,

@@ -17,112 +17,107 @@ mod past;
 mod sight;
 mod tables;
 
-use super::{Cancelling, Engine, EngineError, Expose, Exposed, LitPixel, Replay, Work, follows};
+use super::exposing::refuse_other_spads;
+use super::{
+    Cancelling, Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay,
+    Work, follows,
+};
 use crate::chip::window_law::OpenWindow;
-use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw, correlation, histogram, window_law};
+use crate::chip::{Exposure, Sensor, WindowLaw, correlation, histogram};
 use crate::photon::{PhotonStream, PixelLight, SpadEvent};
 use counting::Counting;
 use sight::Sight;
 
 /// Counts through the window law.
-pub struct Window<'a> {
-    config: &'a SensorConfig,
-    exposure: &'a Exposure,
+pub struct Window {
+    sensor: Sensor,
+    exposure: Exposure,
     law: WindowLaw,
 }
 
-impl<'a> Window<'a> {
+impl Window {
     /// An engine for this sensor and exposure.
-    pub fn new(config: &'a SensorConfig, exposure: &'a Exposure) -> Self {
-        Self::with_law(config, exposure, WindowLaw::new(config, exposure))
+    pub fn new(sensor: impl Into<Sensor>, exposure: &Exposure) -> Self {
+        Self::with_law(WindowLaw::new(sensor, exposure))
     }
 
-    /// An engine for macropixels with delays of their own, which `law` is made of.
-    pub(super) fn with_law(
-        config: &'a SensorConfig,
-        exposure: &'a Exposure,
-        law: WindowLaw,
-    ) -> Self {
+    /// An engine for macropixels with delays, or edges of bins, of their own, which `law` is made of.
+    pub fn with_law(law: WindowLaw) -> Self {
         Window {
-            config,
-            exposure,
+            sensor: law.sensor().clone(),
+            exposure: *law.exposure(),
             law,
         }
     }
 
     /// The window of a start value, if it opens.
     fn window(&self, start: u16) -> Result<Option<OpenWindow>, EngineError> {
-        follows(self.config, &self.law.timing().pulses)?;
-        match self.law.window(start) {
-            window_law::Window::Open(window) => Ok(Some(window)),
-            window_law::Window::Never => Ok(None),
-            window_law::Window::Irregular(why) => Err(EngineError::Irregular(why)),
-            window_law::Window::Race(why) => Err(EngineError::Race(why)),
-        }
+        follows(&self.sensor, &self.law.timing().pulses)?;
+        Ok(self.law.window(start).settled()?)
     }
 
     /// Whether all photons of a macropixel are drawn, and not only those that its window may see: laser cycles hardly
-    /// longer than the window, or SPADs that are blind nearly all the time.
+    /// longer than the window, SPADs that are blind nearly all the time, or bins that are not CLK periods.
     pub fn draws_whole_cycles(&self, stream: &PhotonStream, pixel: &LitPixel) -> bool {
         let window = self.law.window(pixel.start).open();
-        window.zip(pixel.light).is_some_and(|(window, light)| {
-            sight::is_blinding(stream, &light) || Sight::new(&self.law, &window, stream).is_none()
-        })
-    }
-
-    fn is_event(&self, spads: u16) -> bool {
-        correlation::model(spads, self.config.event_type, self.config.threshold)
-    }
-
-    /// Hits of every bin in the dark. A conventional cycle is latched by the STOP edge that ends it; the exposure's first
-    /// STOP edge ends one, too.
-    fn dark_hits(&self, first_edge: i64) -> Vec<i64> {
-        let bins = self.config.bins as i64;
-        if !self.is_event(0) {
-            return vec![0; self.config.bins];
-        }
-        let periods = self.exposure.stop_periods as i64;
-        let cycles = self.exposure.laser_cycles as i64;
-        (0..bins)
-            .map(|bin| {
-                // The pipeline starts empty: nothing before rising edge -1 was ever compared.
-                let first_compared = (-1 - first_edge - bin + periods - 1).div_euclid(periods);
-                (cycles - first_compared.max(self.first_cycle())).max(0)
+        window
+            .zip(pixel.light.as_ref())
+            .is_some_and(|(window, light)| {
+                sight::is_blinding(stream, light)
+                    || Sight::new(&self.law, &window, stream).is_none()
             })
-            .collect()
     }
 
-    fn first_cycle(&self) -> i64 {
-        match self.config.mode {
-            Mode::Guided => 0,
-            Mode::Conventional => -1,
-        }
+    fn is_event(&self, spads: u64) -> bool {
+        correlation::model(spads, self.sensor.event_type, self.sensor.threshold)
     }
 
-    /// What a CLK period with light adds to the hits of its bin, beyond those in the dark.
-    fn adds(&self, spads: u16) -> i64 {
+    /// What the SPADs that fire in a bin add to its hits, beyond those of an empty macropixel.
+    fn adds(&self, spads: u64) -> i64 {
         i64::from(self.is_event(spads)) - i64::from(self.is_event(0))
     }
 
-    /// Counts pulses, sorted by time, of which no edge takes two parts.
-    fn count_pulses(&self, pulses: &[SpadEvent], first_edge: i64, hits: &mut [i64]) {
-        let bins = self.config.bins as i64;
-        let periods = self.exposure.stop_periods as i64;
-        let cycles = self.exposure.laser_cycles as i64;
-        for (edge, spads) in taken(pulses, |p| self.law.edge_of(p.time)) {
+    /// Counts pulses, sorted by time, of which no bin takes two parts.
+    fn count_pulses(&self, pulses: &[SpadEvent], window: &OpenWindow, hits: &mut [i64]) {
+        if !self.law.has_clk_bins() {
+            return self.count_between_edges(pulses, window, hits);
+        }
+        for (edge, spads) in taken(pulses, |pulse| self.law.edge_of(pulse.time)) {
             let adds = self.adds(spads);
-            if adds == 0 {
-                continue;
-            }
-            let offset = edge - first_edge;
-            let last_cycle = offset.div_euclid(periods).min(cycles - 1);
-            // More than one laser cycle sees an edge only when a cycle is shorter than the window.
-            for cycle in (self.first_cycle()..=last_cycle).rev() {
-                let bin = offset - cycle * periods;
-                if bin >= bins {
-                    break;
+            if adds != 0 {
+                for bin in self.law.bins_of_edge(window, edge) {
+                    hits[bin] += adds;
                 }
-                hits[bin as usize] += adds;
+            }
+        }
+    }
+
+    /// The same by the edges of the bins, whatever those are: laser cycle by laser cycle, leaving out those without pulses.
+    fn count_between_edges(&self, pulses: &[SpadEvent], window: &OpenWindow, hits: &mut [i64]) {
+        let cycles = self.law.latched_cycles();
+        let mut cycle = cycles.start;
+        let mut pulses = pulses;
+        while cycle < cycles.end {
+            let seen = self.law.interval_in(window, cycle);
+            // The next laser cycle's window may begin before this one's has ended.
+            pulses = &pulses[pulses.partition_point(|pulse| pulse.time < seen.start)..];
+            let Some(next) = pulses.first() else {
+                return;
+            };
+            if next.time < seen.end {
+                let within = pulses.partition_point(|pulse| pulse.time < seen.end);
+                let edges = self.law.edges(window, cycle);
+                let bin_of = |pulse: &SpadEvent| edges.bin_of(pulse.time);
+                for (bin, spads) in taken(&pulses[..within], bin_of) {
+                    let bin = bin.expect("a window is its bins");
+                    hits[bin] += self.adds(spads);
+                }
+                cycle += 1;
+            } else {
+                // Laser cycles are equal but for a femtosecond: at the latest in the one after these the pulse may be seen.
+                let cycle_fs = self.exposure.stop(1).as_fs();
+                let without = (next.time - seen.end).as_fs() / cycle_fs;
+                cycle += without.max(1);
             }
         }
     }
@@ -133,26 +128,26 @@ impl<'a> Window<'a> {
         stream: &PhotonStream,
         pixel: &LitPixel,
         light: &PixelLight,
-        first_edge: i64,
+        window: &OpenWindow,
     ) -> (Vec<i64>, Work) {
         let config = stream.config();
         let cancelling = Cancelling::of(config.spads.dead_time, config.clock, || self.law.clone());
-        let mut hits = self.dark_hits(first_edge);
+        let mut hits = self.law.empty_hits(window);
         let mut work = Work::default();
         let mut cancelled = 0;
         let mut count = |pulses: &[SpadEvent]| {
-            self.count_pulses(pulses, first_edge, &mut hits);
+            self.count_pulses(pulses, window, &mut hits);
             let seen = cancelling
                 .as_ref()
                 .map(|cancelling| cancelling.seen(pixel.start, pulses));
             cancelled += seen.unwrap_or(0);
         };
-        // Pulses that the next ones may share an edge with.
+        // Pulses that the next ones may share a bin with.
         let mut waiting: Vec<SpadEvent> = Vec::new();
         let photons = stream.pixel_pulses(pixel.number, light, |pulses| {
             work.pulses += pulses.len() as u64;
             waiting.extend_from_slice(pulses);
-            let Some(last) = waiting.last() else {
+            let Some(last) = waiting.last().filter(|_| self.law.has_clk_bins()) else {
                 return;
             };
             let last_edge = self.law.edge_of(last.time);
@@ -169,38 +164,43 @@ impl<'a> Window<'a> {
     }
 
     fn counts(&self, hits: &[i64]) -> Vec<u16> {
-        let (bits, overflow) = (self.config.bin_bits as u32, self.config.overflow);
+        let (bits, overflow) = (self.sensor.bin_bits as u32, self.sensor.overflow);
         hits.iter()
             .map(|&n| histogram::model(n as u64, bits, overflow))
             .collect()
     }
 }
 
-impl Engine for Window<'_> {
+impl Engine for Window {
     fn law(&self) -> WindowLaw {
         self.law.clone()
     }
 
     fn bins(&self) -> usize {
-        self.config.bins
+        self.sensor.bins
     }
 }
 
-impl Replay for Window<'_> {
-    fn histogram(&self, start: u16, pulses: &[SpadEvent]) -> Result<Vec<u16>, EngineError> {
-        let Some(window) = self.window(start)? else {
-            return Ok(vec![0; self.config.bins]);
-        };
-        let mut hits = self.dark_hits(window.first_edge);
-        self.count_pulses(pulses, window.first_edge, &mut hits);
-        Ok(self.counts(&hits))
+impl Replay for Window {
+    fn replay(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError> {
+        let mut histograms = Histograms::new(self.sensor.bins);
+        for &PulsedPixel { start, pulses, .. } in pixels {
+            let mut hits = vec![0; self.sensor.bins];
+            if let Some(window) = self.window(start)? {
+                hits = self.law.empty_hits(&window);
+                self.count_pulses(pulses, &window, &mut hits);
+            }
+            histograms.push(&self.counts(&hits));
+        }
+        Ok(histograms)
     }
 }
 
-impl Expose for Window<'_> {
+impl Expose for Window {
     fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+        refuse_other_spads(stream, pixels)?;
         let mut counting = Counting::new(self, stream);
-        let mut exposed = Exposed::new(self.config.bins);
+        let mut exposed = Exposed::new(self.sensor.bins);
         let clk_periods =
             u64::from(self.exposure.stop_periods) * u64::from(self.exposure.laser_cycles);
         for pixel in pixels {
@@ -210,7 +210,7 @@ impl Expose for Window<'_> {
                 continue;
             };
             let Some(window) = self.window(pixel.start)? else {
-                exposed.histograms.push(&vec![0; self.config.bins]);
+                exposed.histograms.push(&vec![0; self.sensor.bins]);
                 exposed.work.skipped_closed += 1;
                 continue;
             };
@@ -218,11 +218,10 @@ impl Expose for Window<'_> {
             let sight = sight.filter(|_| !sight::is_blinding(stream, light));
             let (hits, work) = match sight {
                 Some(sight) => {
-                    let plain = stream.pixel(pixel.number, light);
-                    let breeding = stream.breeding(pixel.number, light);
-                    counting.expose(&sight, &plain, breeding.as_ref())
+                    let parts = stream.parts(pixel.number, light);
+                    counting.expose(&sight, &parts)
                 }
-                None => self.count_stream(stream, pixel, light, window.first_edge),
+                None => self.count_stream(stream, pixel, light, &window),
             };
             exposed.histograms.push(&self.counts(&hits));
             exposed.work += work;
@@ -233,21 +232,21 @@ impl Expose for Window<'_> {
     }
 }
 
-/// Pulses grouped by the edge that takes them: (edge, SPADs with an odd number of pulses).
-fn taken<'p>(
+/// Pulses grouped by what takes them, a CLK edge or a bin, and the SPADs with an odd number of them.
+fn taken<'p, K: PartialEq + 'p>(
     pulses: &'p [SpadEvent],
-    edge_of: impl Fn(&SpadEvent) -> i64 + 'p,
-) -> impl Iterator<Item = (i64, u16)> + 'p {
+    taker_of: impl Fn(&SpadEvent) -> K + 'p,
+) -> impl Iterator<Item = (K, u64)> + 'p {
     let mut pulses = pulses
         .iter()
-        .map(move |pulse| (edge_of(pulse), pulse.spad))
+        .map(move |pulse| (taker_of(pulse), pulse.spad))
         .peekable();
     std::iter::from_fn(move || {
-        let (edge, spad) = pulses.next()?;
+        let (taker, spad) = pulses.next()?;
         let mut spads = 1 << spad;
-        while let Some((_, spad)) = pulses.next_if(|&(e, _)| e == edge) {
+        while let Some((_, spad)) = pulses.next_if(|(other, _)| *other == taker) {
             spads ^= 1 << spad;
         }
-        Some((edge, spads))
+        Some((taker, spads))
     })
 }

@@ -8,12 +8,12 @@
 //! What a window's photons do depends on the SPADs' state before. Where that is not known, the slot before is drawn as
 //! well, and so on, over cycles and groups, at the worst to the beginning of the exposure.
 
-use crate::photon::{Draw, Photon, PhotonStream, PixelStream, Place, SPADS, Span};
+use crate::photon::{Draw, Photon, PhotonStream, PixelStream, Span};
 use crate::units::Time;
 
 /// Photons of a macropixel from some slot on, ever further back.
 #[derive(Debug, Clone, Copy)]
-pub struct Past<'a> {
+pub(super) struct Past<'a> {
     stream: &'a PhotonStream,
     /// First slot drawn so far, and its cycle.
     slot: u32,
@@ -22,7 +22,7 @@ pub struct Past<'a> {
 
 impl<'a> Past<'a> {
     /// The past of `slot` in laser cycle `cycle`.
-    pub fn new(stream: &'a PhotonStream, cycle: u32, slot: u32) -> Self {
+    pub(super) fn new(stream: &'a PhotonStream, cycle: u32, slot: u32) -> Self {
         Past {
             stream,
             slot,
@@ -36,7 +36,7 @@ impl<'a> Past<'a> {
     }
 
     /// From when on all photons are known; `None` if that is the whole exposure.
-    pub fn known_from(&self) -> Option<Time> {
+    pub(super) fn known_from(&self) -> Option<Time> {
         let start = || self.stream.cycle_start(self.cycle);
         let slot_fs = self.stream.slots().start_fs(self.slot);
         (!self.is_everything()).then(|| start() + Time::from_fs(slot_fs))
@@ -44,10 +44,10 @@ impl<'a> Past<'a> {
 
     /// Draws the slot before, if there is one, and appends its photons that fall on SPADs of the set `spads`, in no
     /// particular order. Returns how many photons were drawn.
-    pub fn extend(
+    pub(super) fn extend(
         &mut self,
         pixel: &PixelStream<'_>,
-        spads: u16,
+        spads: u64,
         draw: &mut Draw,
         photons: &mut Vec<Photon>,
     ) -> u64 {
@@ -95,7 +95,7 @@ fn draw_part(
     pixel: &PixelStream<'_>,
     cycle: u32,
     span: &Span,
-    spads: u16,
+    spads: u64,
     draw: &mut Draw,
     photons: &mut Vec<Photon>,
 ) -> u64 {
@@ -104,7 +104,7 @@ fn draw_part(
     let start = pixel.cycle_start(cycle);
     let wanted = cycle - group.first_cycle();
     photons.extend(draw.photons(pixel).filter_map(|(place, time_fs)| {
-        let (cycle, spad) = split(place);
+        let (cycle, spad) = group.split(place);
         (cycle == wanted && spads >> spad & 1 != 0).then(|| Photon {
             time: start + Time::from_fs(time_fs),
             spad,
@@ -112,10 +112,4 @@ fn draw_part(
         })
     }));
     draw.len() as u64
-}
-
-/// Cycle within the group, and SPAD.
-pub fn split(place: Place) -> (u32, u8) {
-    let place = u32::from(place);
-    (place / SPADS as u32, (place % SPADS as u32) as u8)
 }

@@ -13,15 +13,15 @@
 
 use super::past::Past;
 use crate::chip::window_law::{OpenWindow, WindowLaw};
-use crate::photon::{PhotonStream, PixelLight, SPADS, Span};
+use crate::photon::{PhotonStream, PixelLight, Span};
 
 /// By how much times relative to a cycle differ from cycle to cycle, fs: STOP and CLK edges are rounded to whole
 /// femtoseconds, and so is the cycle before.
-pub const ROUNDING_FS: i64 = 4;
+pub(super) const ROUNDING_FS: i64 = 4;
 
 /// What is drawn of every laser cycle and the one before it.
 #[derive(Debug, Clone, Default)]
-pub struct Spans {
+pub(super) struct Spans {
     /// Of the window's own cycle, with its echo.
     pub own: Span,
     /// Slots of the cycle before.
@@ -70,7 +70,7 @@ impl Spans {
     }
 
     /// What came before, seen from `laser_cycle`.
-    pub fn past<'a>(&self, stream: &'a PhotonStream, laser_cycle: u32) -> Past<'a> {
+    pub(super) fn past<'a>(&self, stream: &'a PhotonStream, laser_cycle: u32) -> Past<'a> {
         if self.previous.slots.is_empty() {
             Past::new(stream, laser_cycle, self.own.slots.start)
         } else if let Some(before) = laser_cycle.checked_sub(1) {
@@ -89,9 +89,9 @@ impl Spans {
 /// The part of every laser cycle that decides a histogram. Times are in fs after the start of the cycle, within
 /// [`ROUNDING_FS`].
 #[derive(Debug, Clone)]
-pub struct Sight {
-    /// The rising CLK edge that takes the photons of bin 0, counted in the window's cycle.
-    pub first_edge: i64,
+pub(super) struct Sight {
+    /// The window.
+    pub window: OpenWindow,
     /// Where bin 0 begins.
     pub first_fs: i64,
     /// Where the last bin is over for certain.
@@ -104,8 +104,12 @@ pub struct Sight {
 
 impl Sight {
     /// The sight of a window; `None` where it and what the SPADs remember do not fit into a laser cycle and the one
-    /// before, so that most photons matter anyway.
-    pub fn new(law: &WindowLaw, window: &OpenWindow, stream: &PhotonStream) -> Option<Self> {
+    /// before, so that most photons matter anyway, and where bins are not CLK periods, which is what photons are binned by when
+    /// they are drawn together.
+    pub(super) fn new(law: &WindowLaw, window: &OpenWindow, stream: &PhotonStream) -> Option<Self> {
+        if !law.has_clk_bins() {
+            return None;
+        }
         let interval = law.interval(window);
         let (first_fs, end_fs) = (interval.start.as_fs(), interval.end.as_fs());
         if end_fs - first_fs > stream.cycle_fs() {
@@ -118,7 +122,7 @@ impl Sight {
         let plain = Spans::new(stream, from_fs, until_fs)?;
         let breeding_from_fs = plain.from_fs - spads.reach().as_fs() - 2 * ROUNDING_FS;
         Some(Sight {
-            first_edge: window.first_edge,
+            window: *window,
             first_fs,
             until_fs,
             breeding: Spans::new(stream, breeding_from_fs, until_fs)?,
@@ -127,20 +131,20 @@ impl Sight {
     }
 
     /// Whether the first window that has photons may see one that comes before the exposure and is none.
-    pub fn sees_the_beginning(&self) -> bool {
+    pub(super) fn sees_the_beginning(&self) -> bool {
         self.plain.sees_the_beginning() || self.breeding.sees_the_beginning()
     }
 }
 
 /// Whether SPADs are blind so much of the time that their state before a window is found sooner by following all of their
 /// exposure than by looking back for a gap.
-pub fn is_blinding(stream: &PhotonStream, light: &PixelLight) -> bool {
+pub(super) fn is_blinding(stream: &PhotonStream, light: &PixelLight) -> bool {
     let (dead_s, cycle_s) = (
         stream.config().spads.dead_time.as_s(),
         stream.config().cycle_s(),
     );
-    let per_spad_hz = light.background_hz / SPADS as f64;
+    let per_spad_hz = light.background_hz() / stream.spads() as f64;
     // Mean time to a gap of a dead time, and as often as the last of all SPADs takes longer.
-    let wait_s = libm::expm1(per_spad_hz * dead_s) / per_spad_hz * libm::log(SPADS as f64);
+    let wait_s = libm::expm1(per_spad_hz * dead_s) / per_spad_hz * libm::log(stream.spads() as f64);
     per_spad_hz > 0.0 && wait_s > 0.5 * cycle_s
 }

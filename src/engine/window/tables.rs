@@ -5,18 +5,18 @@ use multiversion::multiversion;
 use super::codes::{CYCLES, Code, Codes, MARKED_BINS, ROWS, SPAD_MARKS};
 
 /// Most photons of a group.
-pub const MOST_PHOTONS: usize = PHOTONS - 1;
+pub(super) const MOST_PHOTONS: usize = PHOTONS - 1;
 const PHOTONS: usize = 1 << 16;
 
 /// Every photon may meet another one, and may be in doubt as well.
 const SPECIALS: usize = 2 * PHOTONS;
 
 /// Photons that are counted in different tables, so that none waits for the count of the one before.
-pub const SIDE_BY_SIDE: usize = 4;
+pub(super) const SIDE_BY_SIDE: usize = 4;
 
 /// How many photons came by row, which SPADs and rows have one by cycle, and all photons by cycle. Photons are kept by
 /// their index + 1; 0 is none.
-pub struct Tables {
+pub(super) struct Tables {
     /// What is taken out is taken out of the first one, which may fall below 0 and wrap; their sum is right.
     counts: [[u32; ROWS]; SIDE_BY_SIDE],
     /// By row, how often two SPADs fired in the same CLK period, as [`Tables::settle_by_rows`] found.
@@ -38,7 +38,7 @@ const _: () = assert!(PHOTONS as u64 == ONE_SPECIAL >> PHOTON_SHIFT);
 
 /// A photon that needs a closer look.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Special {
+pub(super) struct Special {
     /// Which.
     pub photon: usize,
     /// Marks that earlier photons of its cycle have, too; all if it is doubtful.
@@ -49,7 +49,7 @@ pub struct Special {
 
 /// What the rows of a SPAD's only two photons tell, neither of which is doubtful.
 #[derive(Debug, Clone, Copy)]
-pub struct Spacing {
+pub(super) struct Spacing {
     /// Rows of bins, 1 to this.
     pub bins: usize,
     /// Farther apart than the SPADs' memory, if by more.
@@ -62,13 +62,13 @@ impl Spacing {
     /// Whether both make pulses as far as anybody can see: nothing is counted outside the window, and photons far apart do
     /// not meet. `first` is the lower row.
     #[inline(always)]
-    pub fn both_fire(&self, first: usize, second: usize) -> bool {
+    pub(super) fn both_fire(&self, first: usize, second: usize) -> bool {
         (second == 0) | (first > self.bins) | ((first > 0) & (second - first > self.far))
     }
 
     /// Whether the photon in the `second` row meets the blindness that the `first` one leaves, the lower row.
     #[inline(always)]
-    pub fn one_fires(&self, first: usize, second: usize) -> bool {
+    pub(super) fn one_fires(&self, first: usize, second: usize) -> bool {
         let apart = second - first;
         (first > 0) & (second <= self.bins) & (apart > 0) & (apart < self.blind)
     }
@@ -96,24 +96,24 @@ impl Default for Tables {
 
 impl Tables {
     /// Begins a macropixel.
-    pub fn clear_counts(&mut self) {
+    pub(super) fn clear_counts(&mut self) {
         self.counts = [[0; ROWS]; SIDE_BY_SIDE];
         self.pairs = [0; ROWS];
     }
 
     /// Photons of a row, without those that were taken out.
-    pub fn count(&self, row: usize) -> u32 {
+    pub(super) fn count(&self, row: usize) -> u32 {
         let parts = self.counts.iter().map(|counts| counts[row]);
         parts.fold(0, u32::wrapping_add)
     }
 
     /// CLK periods of a row in which two SPADs fired. Their photons were taken out.
-    pub fn pairs(&self, row: usize) -> u32 {
+    pub(super) fn pairs(&self, row: usize) -> u32 {
         self.pairs[row]
     }
 
     /// More photons of a row.
-    pub fn add(&mut self, row: usize, photons: u32) {
+    pub(super) fn add(&mut self, row: usize, photons: u32) {
         let count = &mut self.counts[0][row];
         *count = count.wrapping_add(photons);
     }
@@ -121,7 +121,7 @@ impl Tables {
     /// Puts the photons of a group of `cycles` laser cycles, at most [`MOST_PHOTONS`], filled up to a multiple of
     /// [`SIDE_BY_SIDE`]. The first ones have been counted by row ([`Tables::add`]), the rest from `counted` on, a
     /// multiple as well, are counted here.
-    pub fn put(&mut self, codes: &Codes, cycles: usize, counted: usize) {
+    pub(super) fn put(&mut self, codes: &Codes, cycles: usize, counted: usize) {
         debug_assert!(codes.len() <= MOST_PHOTONS && codes.len().is_multiple_of(SIDE_BY_SIDE));
         debug_assert!(counted.is_multiple_of(SIDE_BY_SIDE));
         // The cycle of what is no photon need not be empty.
@@ -142,7 +142,7 @@ impl Tables {
 
     /// Settles photons that are the only special ones of their cycle, where rows tell what becomes of them; the others stay
     /// special. Returns how many met a blind SPAD. What happens is as random as the light, so nothing branches on it.
-    pub fn settle_by_rows(&mut self, codes: &Codes, spacing: &Spacing) -> u64 {
+    pub(super) fn settle_by_rows(&mut self, codes: &Codes, spacing: &Spacing) -> u64 {
         let (mut kept, mut lost) = (0, 0);
         let (codes, marks_tell_bins) = (codes.codes(), spacing.bins <= MARKED_BINS);
         for index in 0..self.specials {
@@ -180,7 +180,7 @@ impl Tables {
 
     /// The `index`-th photon that has its SPAD or its bin in common with an earlier one of its cycle, or is doubtful. A
     /// photon may come twice.
-    pub fn special(&self, index: usize, codes: &Codes) -> Option<Special> {
+    pub(super) fn special(&self, index: usize, codes: &Codes) -> Option<Special> {
         let special = *self.special[..self.specials].get(index)?;
         Some(self.unpacked(special, codes.codes()))
     }
@@ -197,18 +197,18 @@ impl Tables {
     }
 
     /// The last photon of a cycle, which is empty afterwards.
-    pub fn take_last(&mut self, cycle: usize) -> Option<usize> {
+    pub(super) fn take_last(&mut self, cycle: usize) -> Option<usize> {
         let word = std::mem::take(&mut self.cycles[cycle]);
         (((word % ONE_SPECIAL) >> PHOTON_SHIFT) as usize).checked_sub(1)
     }
 
     /// The photon of the same cycle before this one.
-    pub fn before(&self, photon: usize) -> Option<usize> {
+    pub(super) fn before(&self, photon: usize) -> Option<usize> {
         usize::from(self.before[photon]).checked_sub(1)
     }
 
     /// One photon less in a row.
-    pub fn remove(&mut self, row: usize) {
+    pub(super) fn remove(&mut self, row: usize) {
         let count = &mut self.counts[0][row];
         *count = count.wrapping_sub(1);
     }

@@ -6,8 +6,8 @@ use super::wires::Wire;
 use super::{DelayPath, Edge, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance, Skipped};
 use crate::files::InputError;
 use crate::netlist::cell::{CellKind, MAX_INPUTS};
+use crate::netlist::corner::Corner;
 use crate::netlist::flat::Netlist;
-use crate::netlist::library::Corner;
 use crate::netlist::timing::Timing;
 
 /// What an annotation did.
@@ -123,7 +123,7 @@ impl Annotator<'_, '_, '_> {
                     return self.error(
                         entry.line,
                         format!(
-                            "the chip has no instance {path}; give a path below its top and the right DIVIDER, --rows and --cols"
+                            "the chip has no instance {path}; give a path below its top and the right DIVIDER, and an array with as many rows and columns"
                         ),
                     );
                 };

@@ -15,8 +15,8 @@ use super::{CheckKind as Entry, Edge as EntryEdge, PinEdge, SdfCell, SdfCheck, T
 use crate::files::InputError;
 use crate::netlist::cell::CellKind;
 use crate::netlist::check_limits::CheckKind;
+use crate::netlist::corner::Edge;
 use crate::netlist::instance_limits::{Control, InstanceLimits};
-use crate::netlist::static_timing::Edge;
 use crate::netlist::timing::Timing;
 
 const NO_SUCH_CHECK: &str = "checks of pins or edges that a flip-flop does not act on";

@@ -51,7 +51,7 @@ pub use writer::{SdfDivider, SdfOptions, SdfTimescale, write_sdf};
 
 use std::borrow::Cow;
 
-use super::library::Corner;
+use super::corner::Corner;
 
 /// Minimum, typical and maximum of a number, fs; members may be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -22,7 +22,7 @@ pub(super) struct Tokens<'a> {
 }
 
 impl<'a> Tokens<'a> {
-    pub fn new(text: &'a str) -> Self {
+    pub(super) fn new(text: &'a str) -> Self {
         Tokens {
             text,
             at: 0,
@@ -41,7 +41,7 @@ impl<'a> Tokens<'a> {
     }
 
     /// The next token and its line, or line, reason and cure.
-    pub fn next(&mut self) -> Result<(Token<'a>, usize), (usize, String)> {
+    pub(super) fn next(&mut self) -> Result<(Token<'a>, usize), (usize, String)> {
         self.skip_blanks()?;
         let line = self.line;
         let single = |this: &mut Self, token| {

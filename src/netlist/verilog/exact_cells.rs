@@ -24,8 +24,9 @@ use std::io::{self, Write};
 use super::{TIMESCALE, primitive};
 use crate::logic::Logic;
 use crate::netlist::cell::CellKind;
+use crate::netlist::corner::Corner;
 use crate::netlist::flat::Netlist;
-use crate::netlist::library::{CellArcs, Corner, Library};
+use crate::netlist::library::{CellArcs, Library};
 use crate::netlist::timing::{DelayModel, Timing};
 
 /// Lets every change of `value` arrive after its delay. One that overtakes others cancels them. The queue's last place

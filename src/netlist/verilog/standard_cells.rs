@@ -23,8 +23,9 @@ use std::io::{self, Write};
 
 use super::primitive;
 use crate::netlist::cell::CellKind;
+use crate::netlist::corner::Corner;
 use crate::netlist::instance_limits::InstanceLimits;
-use crate::netlist::library::{Corner, Library};
+use crate::netlist::library::Library;
 use crate::netlist::sdf::{CheckKind, Edge, PinEdge, SdfCheck, checks_of};
 
 const HEAD: &str = "\

@@ -18,16 +18,18 @@
 //! Which photon is the next one depends on the SPAD's state; whoever draws an echo has to know it from the echo's
 //! beginning on ([`Avalanches`](crate::photon::Avalanches) tells where it does not).
 //!
-//! Echoes of measured pulses or of half a laser cycle, and photons that breed, are drawn photon by photon.
+//! Echoes of measured pulses or of half a laser cycle, those of light with several layers, and photons that breed, are drawn
+//! photon by photon.
 
 use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::{Kind, PixelLight, PixelStream, SPAD_BITS, StreamConfig, nearest};
+use super::{Kind, PixelStream, StreamConfig, nearest};
 use crate::numerics::branchless;
+use crate::photon::light::PixelLight;
 use crate::photon::philox::{LANES, blocks_from};
-use crate::photon::spad::{Photon, SPADS};
+use crate::photon::spad::Photon;
 use crate::units::Time;
 
 /// Slots of a block of background photons.
@@ -61,18 +63,20 @@ const BRIGHT_SIGNAL: f64 = 8.0;
 /// much as by the background above.
 const BRIGHT_BLIND_SHARE: f64 = 0.08;
 
-/// Whether this light is drawn by laser cycle.
+/// Whether this light is drawn by laser cycle, all parts of it.
 pub(super) fn is_bright(light: &PixelLight, config: &StreamConfig) -> bool {
-    let blind = light.background_hz / SPADS as f64 * config.spads.dead_time.as_s();
-    light.background_hz > BRIGHT_BACKGROUND_HZ
-        || light.signal_per_cycle > BRIGHT_SIGNAL
+    let background_hz = light.background_hz();
+    let blind = background_hz / config.spads.grid.spads() as f64 * config.spads.dead_time.as_s();
+    background_hz > BRIGHT_BACKGROUND_HZ
+        || light.signal_per_cycle() > BRIGHT_SIGNAL
         || blind > BRIGHT_BLIND_SHARE
 }
 
-/// Random words of a gap: the highest 28 bits make a number strictly between 0 and 1, the lowest 4 the SPAD.
+/// Random words of a gap: the highest 28 bits make a number strictly between 0 and 1, the lowest ones the SPAD: 4, or a few
+/// more where there are more SPADs, which then share what hardly moves the gap.
 #[inline(always)]
 fn gap_in_means(word: u32) -> f64 {
-    -branchless::ln((branchless::real(u64::from(word >> SPAD_BITS)) + 0.5) * 0.5f64.powi(28))
+    -branchless::ln((branchless::real(u64::from(word >> 4)) + 0.5) * 0.5f64.powi(28))
 }
 
 /// A block of background photons of [`TILE`] successive laser cycles, some photons of each at a time.
@@ -93,10 +97,10 @@ pub struct Background<'a> {
     pub words: [[u32; TILE]; PER_BLOCK],
 }
 
-/// The SPAD of a background photon's random word.
+/// The SPAD of a background photon's random word, in a macropixel of `spads`, a power of two.
 #[inline(always)]
-pub fn spad_of(word: u32) -> usize {
-    word as usize % SPADS
+pub fn spad_of(word: u32, spads: usize) -> usize {
+    word as usize & (spads - 1)
 }
 
 impl Background<'_> {
@@ -113,12 +117,7 @@ impl Background<'_> {
             self.pixel.pixel,
             self.pixel.kind.bright_background(),
         ];
-        blocks_from(
-            self.first_cycle,
-            others,
-            self.pixel.stream.key,
-            &mut self.words,
-        );
+        blocks_from(self.first_cycle, others, self.pixel.key, &mut self.words);
         add_gaps(
             &mut self.at,
             self.pixel.gap_fs,
@@ -169,7 +168,8 @@ impl<'a> PixelStream<'a> {
 
     /// Mean number of background photons of a SPAD in a dead time.
     pub fn per_dead_time(&self) -> f64 {
-        self.stream.config.spads.dead_time.as_fs() as f64 / (self.gap_fs * SPADS as f64)
+        self.stream.config.spads.dead_time.as_fs() as f64
+            / (self.gap_fs * self.stream.spads() as f64)
     }
 
     /// Whether photons of the echo are drawn only where their SPAD is ready ([`OrderedEchoes`](super::OrderedEchoes)).
@@ -177,10 +177,11 @@ impl<'a> PixelStream<'a> {
     /// Such an echo has to be followed from its beginning. Where echoes come one upon the other, that would be from the
     /// beginning of the exposure, for each window.
     pub fn has_ordered_echo(&self) -> bool {
-        let is_gaussian = self.stream.shape.is_none();
+        let is_gaussian = self.shape.is_none();
         let is_short = self.echo_fs.1 - self.echo_fs.0 < self.stream.cycle_fs / 2;
         let is_plain = self.kind == Kind::Plain;
-        self.is_bright && is_gaussian && is_short && is_plain && self.signal_per_spad > 0.0
+        let is_drawn_so = self.is_bright && self.is_alone && is_plain;
+        is_drawn_so && is_gaussian && is_short && self.signal_per_spad > 0.0
     }
 
     /// Whether there is an echo whose photons are drawn one by one, whatever the SPADs do.
@@ -236,7 +237,7 @@ impl<'a> PixelStream<'a> {
 
     /// Appends the background photons of one block of one laser cycle, in their order; those before the exposure are none.
     pub fn push_block(&self, cycle: u32, block: u32, photons: &mut Vec<Photon>) {
-        if !self.gap_fs.is_finite() {
+        if !self.gap_fs.is_finite() || !self.draws_background_in(cycle) {
             return;
         }
         let block_fs = self.block_fs(block);
@@ -246,16 +247,24 @@ impl<'a> PixelStream<'a> {
         for chunk in 0.. {
             let second = chunk_word(block, chunk);
             let counter = [cycle, second, self.pixel, self.kind.bright_background()];
-            for word in rand_philox::philox4x32_10(counter, self.stream.key) {
+            for word in rand_philox::philox4x32_10(counter, self.key) {
                 at += gap_in_means(word) * self.gap_fs;
                 if at >= length {
                     return;
                 }
-                let time = start + Time::from_fs(block_fs.start + at as i64);
-                if time >= Time::ZERO {
+                let time_fs = block_fs.start + at as i64;
+                let (time, spad) = (
+                    start + Time::from_fs(time_fs),
+                    spad_of(word, self.stream.spads()) as u8,
+                );
+                let is_kept = self.limits.is_none() || {
+                    let words = [word, second.rotate_left(16) ^ cycle];
+                    self.keeps_background(cycle, spad, time_fs, words)
+                };
+                if time >= Time::ZERO && is_kept {
                     photons.push(Photon {
                         time,
-                        spad: spad_of(word) as u8,
+                        spad,
                         breeds: self.kind == Kind::Breeding,
                     });
                 }
@@ -266,7 +275,7 @@ impl<'a> PixelStream<'a> {
     /// Appends the photons of one laser cycle's echo, in no particular order, where they do not depend on the SPADs' states;
     /// those before or after the exposure are none.
     pub fn push_listed_echo(&self, cycle: u32, photons: &mut Vec<Photon>) {
-        if !self.has_listed_echo() {
+        if !self.has_listed_echo() || !self.sends_echo_in(cycle) {
             return;
         }
         let config = &self.stream.config;
@@ -276,7 +285,7 @@ impl<'a> PixelStream<'a> {
         );
         let words = |second: u32| {
             let counter = [cycle, second, self.pixel, self.kind.bright_echo()];
-            rand_philox::philox4x32_10(counter, self.stream.key)
+            rand_philox::philox4x32_10(counter, self.key)
         };
         let per_cycle = self.signal.per_cycle();
         let number: u32 = (0..per_cycle.words())
@@ -287,18 +296,16 @@ impl<'a> PixelStream<'a> {
             .sum();
         for photon in 0..number {
             let [low, high, ..] = words(2 * photon);
-            let mut after_fs = self
-                .stream
-                .gaussian
-                .draw(u64::from(low) | u64::from(high) << 32);
-            if let Some(shape) = &self.stream.shape {
+            let mut after_fs = self.gaussian.draw(u64::from(low) | u64::from(high) << 32);
+            if let Some(shape) = &self.shape {
                 after_fs += shape.draw(words(2 * photon + 1));
             }
             let time = start + Time::from_fs(self.arrival_fs + nearest(after_fs));
-            if (Time::ZERO..end).contains(&time) {
+            let spad = (u64::from(high) >> (u32::BITS - config.spads.grid.bits())) as u8;
+            if (Time::ZERO..end).contains(&time) && self.keeps_signal(cycle, spad, [low, high]) {
                 photons.push(Photon {
                     time,
-                    spad: (high >> (u32::BITS - SPAD_BITS)) as u8,
+                    spad,
                     breeds: self.kind == Kind::Breeding,
                 });
             }

@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
+use super::PixelStream;
 use super::group::{GROUP, Group};
-use super::{PixelStream, SPAD_BITS};
+use crate::chip::MOST_SPADS;
 use crate::photon::philox::{Blocks, LANES};
-use crate::photon::spad::SPADS;
 
-/// Where in its group a photon falls: cycle within the group and SPAD, as `cycle << 4 | SPAD`.
+/// Where in its group a photon falls: cycle within the group and, in the lowest bits, SPAD ([`Group::split`]).
 pub type Place = u16;
 
 /// Photons that one block of random words makes.
@@ -56,6 +56,8 @@ pub struct Draw {
     pub(super) within_fs: Range<i64>,
     pub(super) group: Group,
     photons: usize,
+    /// Photons that were left when some were thinned out.
+    kept: Vec<(Place, i64)>,
 }
 
 impl Draw {
@@ -67,6 +69,7 @@ impl Draw {
         self.echo.clear();
         self.echo_photons = 0;
         self.photons = 0;
+        self.kept.clear();
         self.group = group;
     }
 
@@ -93,7 +96,7 @@ impl Draw {
             .push_run(slot, photons.div_ceil(PER_BLOCK as u32));
     }
 
-    /// How many photons were drawn.
+    /// How many photons were drawn, kept or not.
     pub fn len(&self) -> usize {
         self.photons + self.echo_photons
     }
@@ -208,16 +211,55 @@ impl Draw {
             .filter(|(_, time_fs)| self.within_fs.contains(time_fs));
         let is_first_group = self.group.first_cycle() == 0;
         let background = background.filter(move |&(place, time_fs)| {
-            !is_first_group || time_fs >= 0 || place >> SPAD_BITS > 0
+            !is_first_group || time_fs >= 0 || self.group.split(place).0 > 0
         });
-        background.chain(signal)
+        background.chain(signal).chain(self.kept.iter().copied())
+    }
+
+    /// Keeps only those photons that `pixel` keeps. They are worked out here, and are no words any more.
+    pub(super) fn thin(&mut self, pixel: &PixelStream<'_>) {
+        let mut kept = std::mem::take(&mut self.kept);
+        let first_cycle = self.group.first_cycle();
+        let slots = pixel.slots();
+        for run in &self.runs {
+            for (blocks, words) in run.blocks().into_iter().zip(self.words()) {
+                for &word in &words[blocks] {
+                    let (place, time_fs) = (self.group.place(word), slots.time_fs(run.slot, word));
+                    let (cycle, spad) = self.group.split(place);
+                    let cycle = first_cycle + cycle;
+                    let is_before_exposure = cycle == 0 && time_fs < 0;
+                    if !is_before_exposure
+                        && pixel.keeps_background(cycle, spad, time_fs, [word, run.slot])
+                    {
+                        kept.push((place, time_fs));
+                    }
+                }
+            }
+        }
+        for number in self.echo_numbers() {
+            let (place, time_fs) = pixel.signal_photon(self, number);
+            let (cycle, spad) = self.group.split(place);
+            let word = self.echo_word(number);
+            let words = [word as u32, (word >> 32) as u32];
+            if self.within_fs.contains(&time_fs)
+                && pixel.keeps_signal(first_cycle + cycle, spad, words)
+            {
+                kept.push((place, time_fs));
+            }
+        }
+        self.runs.clear();
+        self.photons += std::mem::take(&mut self.echo_photons);
+        self.kept = kept;
     }
 }
+
+/// Bits of a SPAD's number below a time.
+pub(super) const SPAD_SHIFT: u32 = MOST_SPADS.trailing_zeros();
 
 /// Photons of a group sorted by cycle, then time, then SPAD.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ByCycle {
-    /// Time after the start of the cycle in fs and SPAD, as `time << 4 | SPAD`.
+    /// Time after the start of the cycle in fs and SPAD, as `time << SPAD_SHIFT | SPAD`.
     photons: Vec<i64>,
     /// Where each cycle's photons end.
     ends: Vec<usize>,
@@ -227,9 +269,8 @@ impl ByCycle {
     pub(super) fn sort(&mut self, draw: &Draw, pixel: &PixelStream<'_>) {
         self.ends.clear();
         self.ends.resize(GROUP as usize, 0);
-        let cycle_of = |place: Place| usize::from(place >> SPAD_BITS);
         for (place, _) in draw.photons(pixel) {
-            self.ends[cycle_of(place)] += 1;
+            self.ends[draw.group.split(place).0 as usize] += 1;
         }
         let mut total = 0;
         for end in &mut self.ends {
@@ -239,9 +280,9 @@ impl ByCycle {
         self.photons.clear();
         self.photons.resize(total, 0);
         for (place, time_fs) in draw.photons(pixel) {
-            let end = &mut self.ends[cycle_of(place)];
-            let spad = i64::from(place) & (SPADS as i64 - 1);
-            self.photons[*end] = time_fs << SPAD_BITS | spad;
+            let (cycle, spad) = draw.group.split(place);
+            let end = &mut self.ends[cycle as usize];
+            self.photons[*end] = time_fs << SPAD_SHIFT | i64::from(spad);
             *end += 1;
         }
         let mut start = 0;

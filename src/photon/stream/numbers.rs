@@ -2,7 +2,7 @@
 
 use std::cell::OnceCell;
 
-use super::group::{FIRST, GROUP, Group};
+use super::group::{FIRST, Group};
 use crate::photon::philox::Blocks;
 use crate::photon::random::Poisson;
 
@@ -33,9 +33,9 @@ impl Numbers {
 
     /// A distribution, and how many draws of it make the number in this group.
     pub(super) fn of(&self, group: Group) -> (&Poisson, u32) {
-        let (cell, cycles) = match group.cycles() {
-            GROUP => (&self.long, GROUP),
-            _ => (&self.short, FIRST),
+        let (cell, cycles) = match group.cycles() == group.longest() {
+            true => (&self.long, group.longest()),
+            false => (&self.short, FIRST),
         };
         let poisson = cell.get_or_init(|| Poisson::new(self.per_cycle * f64::from(cycles)));
         (poisson, group.cycles() / cycles)

@@ -10,9 +10,10 @@ use multiversion::multiversion;
 
 use super::bright::{PER_BLOCK, TILE};
 use super::{PixelStream, nearest};
+use crate::chip::MOST_SPADS;
 use crate::numerics::branchless;
 use crate::photon::philox::blocks_from;
-use crate::photon::spad::{DeadTimeLaw, Photon, SPADS};
+use crate::photon::spad::{DeadTimeLaw, Photon};
 use crate::units::Time;
 
 /// An exponential number of mean 1.
@@ -55,10 +56,7 @@ impl<'a> PixelStream<'a> {
         if reached >= self.signal_per_spad {
             return NEVER_FS;
         }
-        let after_fs = self
-            .stream
-            .gaussian
-            .quantile(reached / self.signal_per_spad);
+        let after_fs = self.gaussian.quantile(reached / self.signal_per_spad);
         self.arrival_fs + nearest(after_fs)
     }
 
@@ -72,10 +70,7 @@ impl<'a> PixelStream<'a> {
     pub(super) fn late_fs(&self) -> i64 {
         match self.signal_per_spad > LATE {
             true => {
-                let after_fs = self
-                    .stream
-                    .gaussian
-                    .quantile(1.0 - LATE / self.signal_per_spad);
+                let after_fs = self.gaussian.quantile(1.0 - LATE / self.signal_per_spad);
                 self.arrival_fs + after_fs.ceil() as i64
             }
             false => i64::MIN,
@@ -84,10 +79,7 @@ impl<'a> PixelStream<'a> {
 
     /// The intensity of the echo on a SPAD until `time_fs` after the start of its cycle, photons.
     fn passed_until(&self, time_fs: i64) -> f64 {
-        let (after_fs, sigma_fs) = (
-            (time_fs - self.arrival_fs) as f64,
-            self.stream.gaussian.sigma(),
-        );
+        let (after_fs, sigma_fs) = ((time_fs - self.arrival_fs) as f64, self.gaussian.sigma());
         if sigma_fs == 0.0 {
             return if after_fs >= 0.0 {
                 self.signal_per_spad
@@ -102,13 +94,14 @@ impl<'a> PixelStream<'a> {
 
     /// First photons of the echoes of [`TILE`] laser cycles from `first_cycle` on, by SPAD and cycle: times after the start of
     /// the cycle, fs, or [`NEVER_FS`].
-    pub fn first_arrivals(&self, first_cycle: u32, times_fs: &mut [[i64; TILE]; SPADS]) {
+    pub fn first_arrivals(&self, first_cycle: u32, times_fs: &mut [[i64; TILE]]) {
         if !self.has_ordered_echo() {
-            *times_fs = [[NEVER_FS; TILE]; SPADS];
+            times_fs.fill([NEVER_FS; TILE]);
             return;
         }
-        let mut words = [[0; TILE]; SPADS];
-        self.echo_words(first_cycle, 0, &mut words);
+        let mut words = [[0; TILE]; MOST_SPADS];
+        let words = &mut words[..times_fs.len().next_multiple_of(PER_BLOCK)];
+        self.echo_words(first_cycle, 0, words);
         let mut reached = [0.0; TILE];
         for (words, times_fs) in words.iter().zip(times_fs) {
             exponentials(words, &mut reached);
@@ -119,11 +112,12 @@ impl<'a> PixelStream<'a> {
     }
 
     /// The random words of the echoes of [`TILE`] laser cycles from `first_cycle` on, after `drawn` of them.
-    pub fn echo_words(&self, first_cycle: u32, drawn: u32, words: &mut [[u32; TILE]; SPADS]) {
-        let runs = (SPADS / PER_BLOCK) as u32;
+    /// There is a row for each SPAD, and as many more as fill up a block.
+    pub fn echo_words(&self, first_cycle: u32, drawn: u32, words: &mut [[u32; TILE]]) {
+        let runs = (words.len() / PER_BLOCK) as u32;
         for (run, words) in (drawn * runs..).zip(words.as_chunks_mut::<PER_BLOCK>().0) {
             let others = [run, self.pixel, self.kind.bright_echo()];
-            blocks_from(first_cycle, others, self.stream.key, words);
+            blocks_from(first_cycle, others, self.key, words);
         }
     }
 
@@ -155,9 +149,9 @@ struct OrderedEcho {
     cycle: u32,
     start: Time,
     /// Its next photon on each SPAD.
-    next: [Time; SPADS],
+    next: [Time; MOST_SPADS],
     /// How many have been drawn on each SPAD.
-    drawn: [u32; SPADS],
+    drawn: [u32; MOST_SPADS],
 }
 
 impl OrderedEchoes<'_> {
@@ -170,10 +164,10 @@ impl OrderedEchoes<'_> {
         let mut echo = OrderedEcho {
             cycle,
             start,
-            next: [start; SPADS],
-            drawn: [0; SPADS],
+            next: [start; MOST_SPADS],
+            drawn: [0; MOST_SPADS],
         };
-        for spad in 0..SPADS {
+        for spad in 0..self.pixel.stream.spads() {
             self.pixel.draw_next(&mut echo, spad, None);
         }
         self.echoes.push(echo);
@@ -199,7 +193,10 @@ impl OrderedEchoes<'_> {
     }
 
     fn earliest(&self) -> Option<Photon> {
-        let times = self.echoes.iter().flat_map(|echo| (0u8..).zip(&echo.next));
+        let times = self
+            .echoes
+            .iter()
+            .flat_map(|echo| (0u8..).zip(&echo.next[..self.pixel.stream.spads()]));
         let (&time, spad) = times.map(|(spad, time)| (time, spad)).min()?;
         let photon = Photon {
             time,
@@ -246,10 +243,11 @@ impl OrderedEchoes<'_> {
 impl PixelStream<'_> {
     /// The next random word of a laser cycle's echo on a SPAD, of which `drawn` have been drawn.
     pub fn echo_word(&self, cycle: u32, spad: usize, drawn: &mut u32) -> u32 {
-        let second = *drawn * (SPADS / PER_BLOCK) as u32 + (spad / PER_BLOCK) as u32;
+        let second =
+            *drawn * self.stream.spads().div_ceil(PER_BLOCK) as u32 + (spad / PER_BLOCK) as u32;
         *drawn += 1;
         let counter = [cycle, second, self.pixel, self.kind.bright_echo()];
-        rand_philox::philox4x32_10(counter, self.stream.key)[spad % PER_BLOCK]
+        rand_philox::philox4x32_10(counter, self.key)[spad % PER_BLOCK]
     }
 
     /// Draws the first photon of an echo, or the first after a time.
@@ -296,7 +294,7 @@ impl PixelStream<'_> {
         if last <= at_first {
             return first;
         }
-        let after_fs = self.stream.gaussian.quantile(last / self.signal_per_spad);
+        let after_fs = self.gaussian.quantile(last / self.signal_per_spad);
         let time = echo.start + Time::from_fs(self.arrival_fs + nearest(after_fs));
         time.clamp(first, until)
     }

@@ -1,9 +1,10 @@
 //! All avalanches of a macropixel in an exposure, in their order: the whole stream and what its SPADs make of it.
 
-use super::draw::ByCycle;
-use super::{Draw, Kind, PhotonStream, PixelLight, PixelPhotons, PixelStream, SPAD_BITS};
+use super::draw::{ByCycle, SPAD_SHIFT};
+use super::{Draw, PhotonStream, PixelPhotons, PixelStream};
 use crate::photon::avalanches::Avalanches;
-use crate::photon::spad::{Photon, SPADS, SpadEvent};
+use crate::photon::light::PixelLight;
+use crate::photon::spad::{Photon, SpadEvent};
 use crate::units::Time;
 
 impl PhotonStream {
@@ -25,18 +26,16 @@ impl PhotonStream {
         light: &PixelLight,
         pulses: impl FnMut(&[SpadEvent]),
     ) -> PixelPhotons {
-        let plain = self.pixel(pixel, light);
-        let breeding = self.breeding(pixel, light);
-        match plain.is_bright {
-            true => self.bright_pulses(&plain, breeding.as_ref(), pulses),
-            false => self.dim_pulses(&plain, breeding.as_ref(), pulses),
+        let parts = self.parts(pixel, light);
+        match parts[0].is_bright {
+            true => self.bright_pulses(&parts, pulses),
+            false => self.dim_pulses(&parts, pulses),
         }
     }
 
     fn dim_pulses(
         &self,
-        plain: &PixelStream<'_>,
-        breeding: Option<&PixelStream<'_>>,
+        parts: &[PixelStream<'_>],
         mut pulses: impl FnMut(&[SpadEvent]),
     ) -> PixelPhotons {
         let mut draw = Draw::default();
@@ -45,11 +44,15 @@ impl PhotonStream {
         let end = self.cycle_start(self.config.laser_cycles);
         let mut photons: Vec<Photon> = Vec::new();
         let mut edges = Vec::new();
-        let mut avalanches = Avalanches::in_the_dark(&self.config.spads, self.key, plain.pixel);
+        let pixel = parts[0].pixel;
+        let mut avalanches = Avalanches::in_the_dark(&self.config.spads, self.key, pixel);
+        let are_sorted = parts.len() == 1 && parts[0].stays_in_its_cycle();
+        let earliest = parts.iter().map(PixelStream::earliest).min();
+        let earliest = earliest.unwrap_or(Time::ZERO);
         let mut drawn = 0;
         for group in self.groups() {
             let carried = photons.len();
-            for light in std::iter::once(plain).chain(breeding) {
+            for light in parts {
                 let group_of_light = light.group_of(group.first_cycle());
                 if group_of_light.first_cycle() != group.first_cycle() {
                     // It came with one of the groups before.
@@ -61,20 +64,20 @@ impl PhotonStream {
                 for cycle in 0..cycles {
                     let start = self.cycle_start(group.first_cycle() + cycle);
                     photons.extend(by_cycle.of(cycle).iter().map(|&photon| Photon {
-                        time: start + Time::from_fs(photon >> SPAD_BITS),
-                        spad: (photon & (SPADS as i64 - 1)) as u8,
-                        breeds: light.kind == Kind::Breeding,
+                        time: start + Time::from_fs(photon >> SPAD_SHIFT),
+                        spad: (photon & ((1 << SPAD_SHIFT) - 1)) as u8,
+                        breeds: light.breeds(),
                     }));
                 }
             }
-            if carried > 0 || breeding.is_some() || !plain.stays_in_its_cycle() {
+            if carried > 0 || !are_sorted {
                 photons.retain(|photon| (Time::ZERO..end).contains(&photon.time));
                 photons.sort_unstable();
             }
             // Photons of the next groups come from then on.
             let next = group.first_cycle().saturating_add(group.cycles());
             let until = match next < self.config.laser_cycles {
-                true => self.cycle_start(next) + plain.earliest(),
+                true => self.cycle_start(next) + earliest,
                 false => end,
             };
             let now = photons.partition_point(|photon| photon.time < until);
@@ -94,16 +97,19 @@ impl PhotonStream {
 
     fn bright_pulses(
         &self,
-        plain: &PixelStream<'_>,
-        breeding: Option<&PixelStream<'_>>,
+        parts: &[PixelStream<'_>],
         mut pulses: impl FnMut(&[SpadEvent]),
     ) -> PixelPhotons {
         let config = &self.config;
         let end = self.cycle_start(config.laser_cycles);
         let mut photons: Vec<Photon> = Vec::new();
         let mut edges = Vec::new();
-        let mut avalanches = Avalanches::in_the_dark(&config.spads, self.key, plain.pixel);
-        let mut echoes = plain.ordered_echoes();
+        let pixel = parts[0].pixel;
+        let mut avalanches = Avalanches::in_the_dark(&config.spads, self.key, pixel);
+        // Light with an ordered echo has no other layer.
+        let mut echoes = parts[0].ordered_echoes();
+        let earliest_fs = parts.iter().map(|part| part.echo_fs.0).min();
+        let earliest = Time::from_fs(earliest_fs.unwrap_or(0));
         let (mut drawn, mut next_echo) = (0, 0);
         for cycle in 0..config.laser_cycles {
             let until = match cycle + 1 < config.laser_cycles {
@@ -111,18 +117,16 @@ impl PhotonStream {
                 false => end,
             };
             // Whatever may blind a SPAD for an echo must find it.
-            let may_begin = |echo: u32| {
-                self.cycle_start(echo) + Time::from_fs(plain.echo_fs.0)
-                    <= until + config.spads.dead_time
-            };
+            let may_begin =
+                |echo: u32| self.cycle_start(echo) + earliest <= until + config.spads.dead_time;
             while next_echo < config.laser_cycles && may_begin(next_echo) {
                 echoes.add(next_echo);
-                for light in std::iter::once(plain).chain(breeding) {
+                for light in parts {
                     light.push_listed_echo(next_echo, &mut photons);
                 }
                 next_echo += 1;
             }
-            for light in std::iter::once(plain).chain(breeding) {
+            for light in parts {
                 for block in 0..light.blocks() {
                     light.push_block(cycle, block, &mut photons);
                 }

@@ -14,7 +14,7 @@
 use crate::units::{Frequency, Time};
 
 /// Slots are no longer than that, fs.
-pub const LONGEST_FS: i64 = 1 << 22;
+pub(super) const LONGEST_FS: i64 = 1 << 22;
 
 /// Bits of a random word that place a photon in its slot, the lowest ones.
 pub const TIME_BITS: u32 = 17;

@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::chip::SpadGrid;
 use crate::photon::{CROSSTALK_DELAY, DeadTimeLaw, EchoLaw};
 
 fn config() -> StreamConfig {
@@ -18,16 +19,9 @@ fn config() -> StreamConfig {
     }
 }
 
-const LIGHT: PixelLight = PixelLight {
-    signal_per_cycle: 0.5,
-    arrival: Time::from_ns(400),
-    background_hz: 8e6,
-};
+const LIGHT: PixelLight = PixelLight::echo(0.5, Time::from_ns(400)).with_background(8e6);
 
-const BACKGROUND: PixelLight = PixelLight {
-    signal_per_cycle: 0.0,
-    ..LIGHT
-};
+const BACKGROUND: PixelLight = PixelLight::background(8e6);
 
 /// Is a Poisson count within five standard deviations of its mean?
 fn plausible(count: u64, mean: f64) -> bool {
@@ -61,23 +55,16 @@ fn rates_are_as_asked() {
     let stream = PhotonStream::new(&config());
     let cycles = f64::from(config().laser_cycles);
     let background = stream.pixel_events(3, &BACKGROUND);
-    let mean = LIGHT.background_hz * config().cycle_s() * cycles;
+    let mean = LIGHT.background_hz() * config().cycle_s() * cycles;
     assert!(
         plausible(background.drawn, mean),
         "{} {mean}",
         background.drawn
     );
-    let signal = PixelLight {
-        background_hz: 0.0,
-        ..LIGHT
-    };
+    let signal = LIGHT.with_background(0.0);
     let signal = stream.pixel_events(3, &signal);
     assert!(plausible(signal.drawn, 0.5 * cycles), "{}", signal.drawn);
-    let dark = PixelLight {
-        signal_per_cycle: 0.0,
-        background_hz: 0.0,
-        ..LIGHT
-    };
+    let dark = PixelLight::dark();
     assert_eq!(stream.pixel_events(3, &dark), PixelPhotons::default());
 }
 
@@ -85,7 +72,7 @@ fn rates_are_as_asked() {
 fn background_is_even_over_spads_cycles_and_time() {
     let config = config();
     let photons = PhotonStream::new(&config).pixel_events(0, &BACKGROUND);
-    let mut by_spad = [0u64; SPADS];
+    let mut by_spad = [0u64; 16];
     let mut by_cycle = vec![0u64; 2000];
     let mut times = Vec::new();
     let cycle_fs = config.cycle_s() * 1e15;
@@ -110,7 +97,7 @@ fn background_gaps_are_exponential_also_across_slots_and_cycles() {
         .events
         .windows(2)
         .map(|w| (w[1].time - w[0].time).as_s());
-    let d = kolmogorov(gaps.collect(), |x| -(-LIGHT.background_hz * x).exp_m1());
+    let d = kolmogorov(gaps.collect(), |x| -(-LIGHT.background_hz() * x).exp_m1());
     assert!(d < KOLMOGOROV_LIMIT, "{d}");
 }
 
@@ -133,7 +120,7 @@ fn numbers_in_disjoint_intervals_are_poisson() {
     let n = counts.len() as f64;
     let mean = counts.iter().sum::<f64>() / n;
     let variance = counts.iter().map(|c| (c - mean) * (c - mean)).sum::<f64>() / n;
-    let expected = 0.2 * LIGHT.background_hz * config.cycle_s() + LIGHT.signal_per_cycle;
+    let expected = 0.2 * LIGHT.background_hz() * config.cycle_s() + LIGHT.signal_per_cycle();
     assert!((mean - expected).abs() < 5.0 * (expected / n).sqrt());
     assert!((variance / mean - 1.0).abs() < 5.0 * (2.0 / n).sqrt());
 }
@@ -141,16 +128,12 @@ fn numbers_in_disjoint_intervals_are_poisson() {
 #[test]
 fn the_echo_is_a_gaussian_around_its_arrival() {
     let config = config();
-    let light = PixelLight {
-        signal_per_cycle: 5.0,
-        background_hz: 0.0,
-        ..LIGHT
-    };
+    let light = PixelLight::echo(5.0, LIGHT.arrival());
     let photons = PhotonStream::new(&config).pixel_events(9, &light);
     let cycle = Time::from_fs(config.clock.whole_fs(500));
     let late = photons.events.iter().map(|e| {
         let cycles = e.time.as_fs() / cycle.as_fs();
-        (e.time - config.cycle_start(cycles as u32) - light.arrival).as_ns()
+        (e.time - config.cycle_start(cycles as u32) - light.arrival()).as_ns()
     });
     let d = kolmogorov(late.collect(), |x| libm::erfc(-x / 1.7 / 2f64.sqrt()) / 2.0);
     assert!(d < KOLMOGOROV_LIMIT, "{d}");
@@ -163,15 +146,11 @@ fn a_measured_pulse_adds_to_the_jitter() {
         pulse_shape: Some(shape.clone()),
         ..config()
     };
-    let light = PixelLight {
-        signal_per_cycle: 5.0,
-        background_hz: 0.0,
-        ..LIGHT
-    };
+    let light = PixelLight::echo(5.0, LIGHT.arrival());
     let photons = PhotonStream::new(&config).pixel_events(9, &light);
     let late = photons.events.iter().map(|e| {
         let cycles = e.time.as_fs() / config.clock.whole_fs(500);
-        (e.time - config.cycle_start(cycles as u32) - light.arrival).as_ns()
+        (e.time - config.cycle_start(cycles as u32) - light.arrival()).as_ns()
     });
     // The convolution, summed over slices of the pulse.
     let slices = 2000;
@@ -191,7 +170,7 @@ fn a_measured_pulse_adds_to_the_jitter() {
 #[test]
 fn any_part_can_be_drawn_alone() {
     let stream = PhotonStream::new(&config());
-    let pixel = stream.pixel(5, &LIGHT);
+    let pixel = &stream.parts(5, &LIGHT)[0];
     let mut parts = Vec::new();
     let mut draw = Draw::default();
     let cuts = [0, 1, 160, 189, 190, 191, stream.slots().count()];
@@ -199,10 +178,10 @@ fn any_part_can_be_drawn_alone() {
     for group in groups.into_iter().rev() {
         for cut in cuts.windows(2).rev() {
             pixel.draw(group, &stream.span(cut[0]..cut[1]), &mut draw);
-            parts.extend(draw.photons(&pixel).filter_map(|(place, time_fs)| {
-                let cycle = group.first_cycle() + u32::from(place >> SPAD_BITS);
+            parts.extend(draw.photons(pixel).filter_map(|(place, time_fs)| {
+                let (cycle, spad) = group.split(place);
+                let cycle = group.first_cycle() + cycle;
                 let time = stream.config().cycle_start(cycle) + Time::from_fs(time_fs);
-                let spad = place as u8 & 15;
                 (cycle < stream.config().laser_cycles).then_some(SpadEvent { time, spad })
             }));
         }
@@ -251,11 +230,7 @@ fn what_overruns_a_cycle_falls_into_its_neighbours() {
             spads: SpadModel::with_dead_time(Time::ZERO),
             ..config()
         };
-        let light = PixelLight {
-            signal_per_cycle,
-            arrival: Time::from_fs((arrival_ns * 1e6) as i64),
-            background_hz: 0.0,
-        };
+        let light = PixelLight::echo(signal_per_cycle, Time::from_fs((arrival_ns * 1e6) as i64));
         let law = EchoLaw {
             cycle_fs: cycle_ns * 1e6,
             arrival_fs: arrival_ns * 1e6,
@@ -285,7 +260,7 @@ fn what_overruns_a_cycle_falls_into_its_neighbours() {
                 let share = law.share(number, cycles, from_fs, to_fs);
                 let photons = f64::from(pixels) * signal_per_cycle * share;
                 // A pulse without width fires each SPAD once.
-                let fired = SPADS as f64 * -libm::expm1(-signal_per_cycle / SPADS as f64);
+                let fired = 16.0 * -libm::expm1(-signal_per_cycle / 16.0);
                 let expected = if sigma_ns == 0.0 {
                     photons * fired / signal_per_cycle
                 } else {
@@ -307,20 +282,18 @@ fn neighbours_in_pixel_slot_group_and_seed_are_independent() {
     let counts = |seed: u64, pixel: u32, group: u32, slot: u32| -> Vec<f64> {
         let config = StreamConfig { seed, ..config() };
         let stream = PhotonStream::new(&config);
-        let light = PixelLight {
-            background_hz: 40e6,
-            ..BACKGROUND
-        };
+        let light = BACKGROUND.with_background(40e6);
         let mut draw = Draw::default();
-        let pixel = stream.pixel(pixel, &light);
+        let parts = stream.parts(pixel, &light);
+        let pixel = &parts[0];
         pixel.draw(
-            Group::of_cycle(group * GROUP),
+            Group::of_cycle(group * GROUP, SpadGrid::default()),
             &stream.span(slot..slot + 1),
             &mut draw,
         );
         let mut counts = vec![0.0; GROUP as usize];
-        for (place, _) in draw.photons(&pixel) {
-            counts[usize::from(place >> SPAD_BITS)] += 1.0;
+        for (place, _) in draw.photons(pixel) {
+            counts[draw.group().split(place).0 as usize] += 1.0;
         }
         counts
     };
@@ -358,10 +331,7 @@ fn seen(law: DeadTimeLaw, per_spad_hz: f64) -> f64 {
         },
         ..config()
     };
-    let light = PixelLight {
-        background_hz: per_spad_hz * SPADS as f64,
-        ..BACKGROUND
-    };
+    let light = BACKGROUND.with_background(per_spad_hz * 16.0);
     let photons = PhotonStream::new(&config).pixel_events(0, &light);
     photons.events.len() as f64 / photons.drawn as f64
 }
@@ -390,10 +360,7 @@ fn secondaries_come_after_their_avalanches_in_a_stream_too() {
         laser_cycles: 20_000,
         ..config()
     };
-    let light = PixelLight {
-        background_hz: 1e6,
-        ..BACKGROUND
-    };
+    let light = BACKGROUND.with_background(1e6);
     let photons = PhotonStream::new(&config).pixel_events(0, &light);
     let more =
         (photons.events.len() as f64 + photons.lost_to_dead_time as f64) / photons.drawn as f64;
@@ -436,11 +403,7 @@ proptest! {
                 ..SpadModel::with_dead_time(Time::from_ns(dead_ns))
             },
         };
-        let light = PixelLight {
-            signal_per_cycle,
-            arrival: Time::from_ns(arrival_ns),
-            background_hz,
-        };
+        let light = PixelLight::echo(signal_per_cycle, Time::from_ns(arrival_ns)).with_background(background_hz);
         let photons = PhotonStream::new(&config).pixel_events(pixel, &light);
         if afterpulse_probability == 0.0 {
             prop_assert_eq!(photons.events.len() as u64 + photons.lost_to_dead_time, photons.drawn);
@@ -448,7 +411,7 @@ proptest! {
         prop_assert!(photons.events.is_sorted());
         prop_assert!(photons.events.iter().all(|e| e.time >= Time::ZERO
             && e.time < config.cycle_start(config.laser_cycles)));
-        for spad in 0..SPADS as u8 {
+        for spad in 0..16u8 {
             let times: Vec<_> =
                 photons.events.iter().filter(|e| e.spad == spad).map(|e| e.time).collect();
             prop_assert!(times.windows(2).all(|w| w[1] > w[0] + config.spads.dead_time));

@@ -6,7 +6,8 @@ use crate::chip::Overflow;
 use crate::engine::EngineError;
 use crate::numerics::intervals::{Estimate, share};
 use crate::report::{Axis, Chart, Grid, Style};
-use crate::theory::detection::{Model, PerCycle, Ties, laser_cycles_for, probability};
+use crate::theory::cycles::laser_cycles_for;
+use crate::theory::detection::{Model, PerCycle, Ties, probability};
 
 /// Eq. 17 with every photon counted, ties by lot.
 const EQ_17: Model = Model::Poisson(Ties::Random);
@@ -280,7 +281,7 @@ fn failures(frames: usize) -> Result<Grid, EngineError> {
 ///
 /// # Errors
 /// Configurations that no engine can run.
-pub fn study(frames: usize) -> Result<Study, EngineError> {
+pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
     let (sweep, chart) = sweep(frames)?;
     Ok(Study {
         notes: vec![

@@ -14,7 +14,8 @@ use crate::numerics::intervals::Estimate;
 use crate::numerics::probit::{Point, crossing};
 use crate::report::Grid;
 use crate::reproduce::penalty::long_range;
-use crate::theory::detection::{Model, PerCycle, Ties, laser_cycles_for};
+use crate::theory::cycles::laser_cycles_for;
+use crate::theory::detection::{Model, PerCycle, Ties};
 use crate::theory::partial::{Purpose, System};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
@@ -25,7 +26,7 @@ const LADDER: [f64; 5] = [0.4, 0.55, 0.7, 0.85, 1.05];
 ///
 /// # Errors
 /// Configurations that no engine can run.
-pub fn cycles_to_detect(
+pub(crate) fn cycles_to_detect(
     trial: &Trial,
     wanted: f64,
     frames: usize,
@@ -145,7 +146,7 @@ impl Schemes {
             let formula = system.measure(range_m).laser_cycles;
             let trial = fine(system, range_m, (formula as u32).max(20));
             debug_assert!(by_formula(&trial).1.is_finite());
-            Ok((
+            Ok::<_, EngineError>((
                 formula,
                 cycles_to_measure(&trial, wanted_ns, frames, seed + 1)?,
             ))
@@ -302,7 +303,7 @@ fn detections<'a>(wanted: f64, all: impl Iterator<Item = &'a Detection>) -> Grid
 ///
 /// # Errors
 /// Configurations that no engine can run.
-pub fn study(frames: usize) -> Result<Study, EngineError> {
+pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
     let system = long_range();
     let wanted = system.goal.detection;
     let measure = |range_m: f64| Schemes::measure(&system, range_m, frames);

@@ -252,7 +252,7 @@ fn failures(frames: usize) -> Result<Grid, EngineError> {
 ///
 /// # Errors
 /// Configurations that no engine can run.
-pub fn study(frames: usize) -> Result<Study, EngineError> {
+pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
     let (sweep, chart) = sweep(frames)?;
     Ok(Study {
         notes: vec![

@@ -23,7 +23,7 @@ use crate::chip::{ChipTiming, EventType, Exposure, SensorConfig, WindowLaw, hist
 use crate::engine::{
     Cohort, CohortOptions, EngineError, Expose, Histograms, LitPixel, Window, stream_config,
 };
-use crate::photon::{PhotonStream, PixelLight, SPADS, StreamConfig};
+use crate::photon::{PhotonStream, PixelLight, StreamConfig};
 use crate::theory::detection::PerCycle;
 use crate::units::Time;
 
@@ -208,7 +208,7 @@ impl Trial {
 
     /// The engine that is the quickest; window where the cohort engine refuses.
     fn maker(&self) -> Maker {
-        let on_spad = (self.signal + self.background()) / SPADS as f64;
+        let on_spad = (self.signal + self.background()) / self.sensor.spads() as f64;
         let blinding = self.background_hz * 1e-9 * self.sensor.dead_time_ns > NOT_BLINDING;
         let is_worth_drawing = !blinding && self.photons() <= WORTH_DRAWING;
         if on_spad >= DIM && is_worth_drawing || self.cohorts().is_none() {
@@ -255,7 +255,7 @@ impl Trial {
     ) -> Result<Vec<Vec<u32>>, EngineError> {
         let mut hits = self.hits(frames, seed, &shift, self.sensor.threshold)?;
         if self.every_pulse {
-            for threshold in self.sensor.threshold + 1..SPADS as u8 {
+            for threshold in self.sensor.threshold + 1..self.sensor.spads() as u8 {
                 let more = self.hits(frames, seed, &shift, threshold)?;
                 if more.iter().flatten().all(|&n| n == 0) {
                     break;
@@ -339,21 +339,19 @@ impl<'t> Frames<'t> {
         }
     }
 
-    fn cohort(&self) -> Cohort<'_> {
+    fn cohort(&self) -> Cohort {
         Cohort::new(&self.sensor, &self.exposure, CohortOptions::default())
     }
 
     /// The macropixel of a frame, its echo `shift` bins after [`Trial::echo_bins`], and its light.
     fn pixel(&self, frame: usize, shift: f64) -> (LitPixel, PixelLight) {
-        let light = PixelLight {
-            signal_per_cycle: self.trial.signal,
-            arrival: self.law.time_of(&self.window, self.trial.echo_bins + shift),
-            background_hz: self.trial.background_hz,
-        };
+        let arrival = self.law.time_of(&self.window, self.trial.echo_bins + shift);
+        let light =
+            PixelLight::echo(self.trial.signal, arrival).with_background(self.trial.background_hz);
         let pixel = LitPixel {
             number: frame as u32,
             start: self.trial.start,
-            light: Some(light),
+            light: Some(light.clone()),
         };
         (pixel, light)
     }

@@ -1,6 +1,47 @@
 //! `--set KEY=VALUE` on the commands that read settings.
 
 use super::{folder, gdtof, refused, replay};
+use guided_dtof::chip::{SensorConfig, hslidar};
+
+#[test]
+fn chips_are_known_by_name_and_files_come_first() {
+    let folder = folder();
+    let dir = folder.path();
+    let printed = |arguments: &[&str]| {
+        let output = gdtof(dir, arguments);
+        assert!(output.status.success(), "{output:?}");
+        let text = String::from_utf8(output.stdout).unwrap();
+        SensorConfig::parse("printed", &text).unwrap()
+    };
+    assert_eq!(printed(&["sensor", "--sensor", "hslidar"]), *hslidar());
+    let changed = [
+        "sensor",
+        "--sensor",
+        "hslidar",
+        "--set",
+        "sensor.step_periods=2",
+    ];
+    assert_eq!(printed(&changed).step_periods, 2);
+    let impossible = [
+        "sensor",
+        "--sensor",
+        "hslidar",
+        "--set",
+        "sensor.step_periods=3",
+    ];
+    refused(
+        dir,
+        &impossible,
+        "step_periods = 3 is impossible; give 1, 2, 4 or 8",
+    );
+    refused(
+        dir,
+        &["sensor", "--sensor", "hsl"],
+        "hsl: is no file and no chip; give quantic4x4 or hslidar",
+    );
+    std::fs::write(dir.join("hslidar"), "bins = 5\n").unwrap();
+    assert_eq!(printed(&["sensor", "--sensor", "hslidar"]).bins, 5);
+}
 
 #[test]
 fn set_changes_single_keys_and_names_itself_in_complaints() {

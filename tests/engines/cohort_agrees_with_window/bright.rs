@@ -12,26 +12,22 @@ use super::comparison::{Case, case, seeds};
 
 #[test]
 fn finer_steps_come_nearer_to_the_window_engine() {
-    let light = PixelLight {
-        background_hz: 600e6,
-        signal_per_cycle: 0.0,
-        ..case().light
-    };
+    let light = PixelLight::background(600e6);
     let (sensor, seeds) = (SensorConfig::default(), seeds() / 8);
     let exposure = Exposure::new(&sensor, 400, 30);
     let stream = |seed| stream_config(&sensor, &exposure, seed, Time::from_ps(1_900));
     let window = Window::new(&sensor, &exposure);
-    let pixel = LitPixel {
+    let pixels = [LitPixel {
         number: 0,
         start: 380,
-        light: Some(light),
-    };
+        light: Some(light.clone()),
+    }];
     // The light is even, so all bins share one mean.
     let counts: u64 = (0..seeds)
         .into_par_iter()
         .map(|seed| {
             let stream = PhotonStream::new(&stream(seed));
-            let exposed = window.expose(&stream, &[pixel]).unwrap();
+            let exposed = window.expose(&stream, &pixels).unwrap();
             exposed.histograms[0]
                 .iter()
                 .map(|&n| u64::from(n))
@@ -72,11 +68,7 @@ fn blinding_echoes_and_the_tails_behind_them() {
             ("a pulse of 200 ps", 8.0, 200, 70),
         ] {
             let name = format!("{name}, {law:?}");
-            let light = PixelLight {
-                signal_per_cycle: 60.0,
-                arrival: Time::from_ns(arrival),
-                background_hz: 200e6,
-            };
+            let light = PixelLight::echo(60.0, Time::from_ns(arrival)).with_background(200e6);
             let sensor = SensorConfig {
                 dead_time_ns,
                 ..SensorConfig::default()
@@ -112,11 +104,8 @@ fn afterpulses_and_crosstalk() {
             crosstalk_probability: probability,
             ..SensorConfig::default()
         };
-        let light = PixelLight {
-            signal_per_cycle,
-            background_hz,
-            ..case().light
-        };
+        let light = PixelLight::echo(signal_per_cycle, case().light.arrival())
+            .with_background(background_hz);
         let name = format!("secondaries, {name}");
         Case {
             name: &name,
@@ -147,11 +136,7 @@ proptest! {
     ) {
         let cycle_ns = 80.0 * 1e9 / 384e6;
         let arrival_ns = -3.0 * sigma_ns + place * (cycle_ns + 6.0 * sigma_ns);
-        let light = PixelLight {
-            signal_per_cycle,
-            arrival: Time::from_ps((1e3 * arrival_ns) as i64),
-            background_hz: 5e6,
-        };
+        let light = PixelLight::echo(signal_per_cycle, Time::from_ps((1e3 * arrival_ns) as i64)).with_background(5e6);
         let name = format!("{signal_per_cycle:.1} photons at {arrival_ns:.1} ns, {sigma_ns:.2} ns wide, start {start}");
         Case {
             name: &name,

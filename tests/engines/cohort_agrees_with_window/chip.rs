@@ -9,11 +9,7 @@ use super::ways::options;
 
 #[test]
 fn coincidences_of_each_type() {
-    let light = PixelLight {
-        background_hz: 150e6,
-        signal_per_cycle: 4.0,
-        ..case().light
-    };
+    let light = PixelLight::echo(4.0, case().light.arrival()).with_background(150e6);
     for (event_type, threshold, neglect) in [
         (EventType::Greater, 1, 0.0),
         (EventType::Greater, 1, 1.0),
@@ -31,7 +27,7 @@ fn coincidences_of_each_type() {
         Case {
             name: &name,
             sensor,
-            light,
+            light: light.clone(),
             options,
             stop_periods: 120,
             laser_cycles: 30,
@@ -42,11 +38,39 @@ fn coincidences_of_each_type() {
 }
 
 #[test]
+fn macropixels_of_other_sizes() {
+    for (side, threshold, signal, neglect) in [
+        (2, 0, 1.0, 0.0),
+        (2, 1, 1.0, 1.0),
+        (8, 0, 1.0, 1.0),
+        (8, 2, 8.0, 0.0),
+        (1, 0, 0.2, 1.0),
+    ] {
+        let sensor = SensorConfig {
+            spad_rows: side,
+            spad_cols: side,
+            threshold,
+            ..SensorConfig::default()
+        };
+        let name = format!("{side}x{side} SPADs, THRESHOLD {threshold}, neglect {neglect}");
+        let light = PixelLight::echo(signal, case().light.arrival())
+            .with_background(1e6 * (side * side) as f64);
+        Case {
+            name: &name,
+            sensor,
+            light,
+            options: options(neglect),
+            stop_periods: 120,
+            laser_cycles: 30,
+            ..case()
+        }
+        .agrees();
+    }
+}
+
+#[test]
 fn windows_at_both_ends_and_in_the_conventional_mode() {
-    let light = PixelLight {
-        arrival: Time::from_ns(4),
-        ..case().light
-    };
+    let light = case().light.with_arrival(Time::from_ns(4));
     let conventional = SensorConfig {
         mode: Mode::Conventional,
         event_type: EventType::Less,
@@ -80,11 +104,11 @@ fn windows_at_both_ends_and_in_the_conventional_mode() {
         ),
         ("conventional", 0, Time::from_ns(140), conventional),
     ] {
-        let light = PixelLight { arrival, ..light };
+        let light = light.clone().with_arrival(arrival);
         Case {
             name,
             start,
-            light,
+            light: light.clone(),
             sensor,
             laser_cycles: 12,
             ..case()

@@ -94,11 +94,7 @@ pub fn case() -> Case<'static> {
         stop_periods: 64,
         laser_cycles: 60,
         start: 40,
-        light: PixelLight {
-            signal_per_cycle: 0.8,
-            arrival: Time::from_ns(85),
-            background_hz: 40e6,
-        },
+        light: PixelLight::echo(0.8, Time::from_ns(85)).with_background(40e6),
         law: DeadTimeLaw::NonParalysable,
         sigma: Time::from_ps(1_900),
         options: CohortOptions::default(),
@@ -131,18 +127,18 @@ impl Case<'_> {
             .expected(&self.stream(0), self.start, &self.light)
             .unwrap();
         let empty = Moments::new(&expected);
-        let pixel = LitPixel {
+        let pixels = [LitPixel {
             number: 5,
             start: self.start,
-            light: Some(self.light),
-        };
+            light: Some(self.light.clone()),
+        }];
         let by_photons = (0..self.seeds)
             .into_par_iter()
             .fold(
                 || empty.clone(),
                 |moments, seed| {
                     let stream = PhotonStream::new(&self.stream(seed));
-                    let exposed = window.expose(&stream, &[pixel]).unwrap();
+                    let exposed = window.expose(&stream, &pixels).unwrap();
                     moments.add(&exposed.histograms[0])
                 },
             )

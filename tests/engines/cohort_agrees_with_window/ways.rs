@@ -15,11 +15,7 @@ pub fn options(neglect: f64) -> CohortOptions {
 
 #[test]
 fn the_pool_of_spads() {
-    let light = PixelLight {
-        background_hz: 15e6,
-        signal_per_cycle: 0.3,
-        ..case().light
-    };
+    let light = PixelLight::echo(0.3, case().light.arrival()).with_background(15e6);
     let name = "pool, 15 Mcounts/s";
     Case {
         name,
@@ -88,11 +84,7 @@ fn the_pool_in_finer_steps() {
 
 #[test]
 fn much_light_in_finer_steps() {
-    let light = PixelLight {
-        background_hz: 400e6,
-        signal_per_cycle: 10.0,
-        ..case().light
-    };
+    let light = PixelLight::echo(10.0, case().light.arrival()).with_background(400e6);
     let options = CohortOptions {
         sub_bins: Some(4),
         ..options(0.0)

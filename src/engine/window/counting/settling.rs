@@ -84,7 +84,7 @@ impl Counting<'_> {
     /// Settles the `last` photon of a cycle and those before it.
     fn settle_all(&mut self, pixel: &mut Pixel<'_>, last: usize, laser_cycle: u32) {
         self.together.clear();
-        let (mut once, mut several, mut is_doubtful) = (0u16, 0u16, false);
+        let (mut once, mut several, mut is_doubtful) = (0u64, 0u64, false);
         let mut next = Some(last);
         while let Some(photon) = next {
             let code = self.codes.codes()[photon];
@@ -138,7 +138,7 @@ impl Counting<'_> {
     }
 
     /// Settles those of some SPADs that have just two photons and need no look back; returns the others.
-    fn settle_pairs(&mut self, pixel: &mut Pixel<'_>, spads: u16) -> u16 {
+    fn settle_pairs(&mut self, pixel: &mut Pixel<'_>, spads: u64) -> u64 {
         let mut left = spads;
         let mut next = spads;
         while next != 0 {

@@ -14,16 +14,16 @@ use multiversion::multiversion;
 
 use super::bright::Beginning;
 use super::{Counting, Pixel};
-use crate::engine::window::codes::ROWS;
+use crate::engine::window::codes::{ROWS, SPADS};
 use crate::engine::window::sight::ROUNDING_FS;
-use crate::photon::{DeadTimeLaw, NEVER_FS, PixelStream, SPADS, TILE, spad_of};
+use crate::photon::{DeadTimeLaw, NEVER_FS, PixelStream, TILE, spad_of};
 
 /// Binary places of a position in CLK periods.
 const FRACTION_BITS: u32 = 20;
 
 /// What the windows of all laser cycles but the first ones have in common. Times are fs after the start of the window's
 /// cycle.
-pub struct Layout {
+pub(super) struct Layout {
     /// Blocks of photons that are drawn, in their order, with their laser cycle relative to the window's.
     blocks: Vec<(i64, u32)>,
     /// The first laser cycle that is like that.
@@ -43,7 +43,7 @@ pub struct Layout {
 }
 
 /// The state of all lanes. Times are fs after the start of the lane's laser cycle.
-pub struct Tile {
+pub(super) struct Tile {
     blind_until_fs: [[i64; SPADS]; TILE],
     /// SPADs that may be ready before that.
     unknown: [u16; TILE],
@@ -207,7 +207,8 @@ impl Counting<'_> {
         let (config, light, sight) = (self.stream.config(), pixel.light, pixel.sight);
         let is_paralysable = config.spads.law == DeadTimeLaw::Paralysable;
         let last_cycle = config.laser_cycles.checked_sub(1)?;
-        if light.has_listed_echo() || pixel.breeding.is_some() {
+        let is_packed = self.stream.spads() == SPADS && light.is_alone();
+        if !is_packed || light.has_listed_echo() || pixel.breeding.is_some() {
             return None;
         }
         let begin = self.beginning(pixel, last_cycle)?;
@@ -247,7 +248,7 @@ impl Counting<'_> {
             origin_fs: sight.first_fs - period_fs as i64,
             periods_per_fs: (2f64.powi(64) / period_fs) as u64,
             doubt: doubt.ceil() as u64 + 3,
-            rows: self.engine.config.bins,
+            rows: self.engine.sensor.bins,
         })
     }
 
@@ -307,7 +308,7 @@ impl Counting<'_> {
                                 light,
                                 cycle(lane),
                                 lane,
-                                spad_of(words[lane]),
+                                spad_of(words[lane], SPADS),
                                 time_fs,
                             );
                         }

@@ -1,9 +1,12 @@
-//! Settling all SPADs of a laser cycle together: where avalanches cause others, where photons are many, and where echoes
-//! of other cycles are seen.
+//! Settling all SPADs of a laser cycle together: where avalanches cause others, where photons are many, where echoes of other
+//! cycles are seen, and where light has several layers.
 
+use smallvec::SmallVec;
+
+use super::by_window::ByWindow;
 use super::{Counting, Pixel, Placed, taken};
 use crate::engine::window::past::Past;
-use crate::engine::window::sight::{ROUNDING_FS, Spans};
+use crate::engine::window::sight::ROUNDING_FS;
 use crate::photon::{Draw, Group, Photon, PixelStream, SpadEvent, Span};
 use crate::units::Time;
 
@@ -13,12 +16,44 @@ impl Counting<'_> {
         let mut by_cycle = std::mem::take(&mut self.by_cycle);
         by_cycle.clear();
         by_cycle.extend(self.plain.photons(pixel.light, self.stream, group, cycles));
-        self.other_echoes(pixel, pixel.light, &pixel.sight.plain, group, &mut by_cycle);
+        self.other_echoes(pixel, pixel.light, group, &mut by_cycle);
         if let Some(breeding) = pixel.breeding {
             let photons = self.breeding.of_group(group).iter();
             by_cycle.extend(photons.map(|&(cycle, photon)| (cycle - group.first_cycle(), photon)));
-            self.other_echoes(pixel, breeding, &pixel.sight.breeding, group, &mut by_cycle);
+            self.other_echoes(pixel, breeding, group, &mut by_cycle);
         }
+        self.settle_cycles(pixel, group, &mut by_cycle);
+        self.by_cycle = by_cycle;
+    }
+
+    /// Counts a macropixel in light of several layers, cycle by cycle.
+    pub(super) fn count_layers(&mut self, pixel: &mut Pixel<'_>) {
+        let mut layers = std::mem::take(&mut self.layers);
+        layers.resize_with(layers.len().max(pixel.parts.len()), ByWindow::default);
+        layers.iter_mut().for_each(ByWindow::clear);
+        let mut by_cycle = std::mem::take(&mut self.by_cycle);
+        for group in self.stream.groups() {
+            by_cycle.clear();
+            for (layer, part) in layers.iter_mut().zip(pixel.parts) {
+                let (first, spans) = (group.first_cycle(), pixel.spans(part));
+                pixel.work.photons_drawn += layer.draw(part, self.stream, first, spans);
+                let photons = layer.of_group(group).iter();
+                by_cycle.extend(photons.map(|&(cycle, photon)| (cycle - first, photon)));
+                self.other_echoes(pixel, part, group, &mut by_cycle);
+            }
+            self.settle_cycles(pixel, group, &mut by_cycle);
+        }
+        self.by_cycle = by_cycle;
+        self.layers = layers;
+    }
+
+    /// Counts the windows of a group with these photons, by cycle of the group, in any order.
+    fn settle_cycles(
+        &mut self,
+        pixel: &mut Pixel<'_>,
+        group: Group,
+        by_cycle: &mut Vec<(u32, Photon)>,
+    ) {
         by_cycle.retain(|(_, photon)| photon.time >= Time::ZERO);
         by_cycle.sort_unstable_by_key(|&(cycle, _)| cycle);
         for photons in by_cycle.chunk_by(|a, b| a.0 == b.0) {
@@ -27,7 +62,6 @@ impl Counting<'_> {
                 .extend(photons.iter().map(|&(_, photon)| photon));
             self.settle_cycle(pixel, group.first_cycle() + photons[0].0);
         }
-        self.by_cycle = by_cycle;
     }
 
     /// Appends photons of other cycles' echoes that the windows of a group may see.
@@ -35,12 +69,12 @@ impl Counting<'_> {
         &self,
         pixel: &Pixel<'_>,
         light: &PixelStream<'_>,
-        spans: &Spans,
         group: Group,
         by_cycle: &mut Vec<(u32, Photon)>,
     ) {
         let config = self.stream.config();
-        let (from_fs, until_fs) = (spans.own.within_fs.start, pixel.sight.until_fs);
+        let from_fs = pixel.spans(light).own.within_fs.start;
+        let until_fs = pixel.sight.until_fs;
         let cycles = group.cycles_in(config.laser_cycles);
         let mut draw = Draw::default();
         for later in light.echoes_within(&(from_fs..until_fs)) {
@@ -62,7 +96,7 @@ impl Counting<'_> {
                 let other = light.group_of(next as u32);
                 light.draw(other, &span, &mut draw);
                 for (place, time_fs) in draw.photons(light) {
-                    let (cycle, spad) = super::split(place);
+                    let (cycle, spad) = other.split(place);
                     let cycle = other.first_cycle() + cycle;
                     let window = i64::from(cycle) - later;
                     if cycle < config.laser_cycles && of_windows.contains(&window) {
@@ -133,7 +167,7 @@ impl Counting<'_> {
         let window = self.window(pixel.sight, laser_cycle);
         let is_seen = |photon: &&Photon| window.row_of(photon.time - start).is_some();
         let seen = self.photons.iter().filter(is_seen).count() as u64;
-        self.detect(pixel, laser_cycle, u16::MAX);
+        self.detect(pixel, laser_cycle, u64::MAX);
         self.count_events(pixel, &window, start, seen);
     }
 
@@ -160,16 +194,16 @@ impl Counting<'_> {
 
     /// Turns `photons` of the SPADs of a set, in any order, and those before them as far as it takes, into `events`: all
     /// rising edges in the window of a laser cycle, and perhaps some before.
-    pub(super) fn detect(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spads: u16) {
+    pub(super) fn detect(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spads: u64) {
         let start = self.stream.cycle_start(laser_cycle);
         let wanted_from = start + Time::from_fs(pixel.sight.first_fs - ROUNDING_FS);
         let until = start + Time::from_fs(pixel.sight.until_fs);
-        let mut past = pixel.sight.plain.past(self.stream, laser_cycle);
-        let mut breeding_past: Option<(&PixelStream<'_>, Past<'_>)> = pixel
-            .breeding
-            .map(|light| (light, pixel.sight.breeding.past(self.stream, laser_cycle)));
+        let past = |part| (part, pixel.spans(part).past(self.stream, laser_cycle));
+        let mut pasts: SmallVec<[(&PixelStream<'_>, Past<'_>); 2]> =
+            pixel.parts.iter().map(past).collect();
         loop {
-            let known_from = past.known_from();
+            // Photons that breed are known from earlier on.
+            let known_from = pasts[0].1.known_from();
             self.photons.sort_unstable();
             let earlier =
                 known_from.map_or(0, |from| self.photons.partition_point(|p| p.time < from));
@@ -185,9 +219,8 @@ impl Counting<'_> {
                 return;
             }
             let (extra, photons) = (&mut self.extra, &mut self.photons);
-            pixel.work.photons_drawn += past.extend(pixel.light, spads, extra, photons);
-            if let Some((light, past)) = &mut breeding_past {
-                pixel.work.photons_drawn += past.extend(light, spads, extra, photons);
+            for (part, past) in &mut pasts {
+                pixel.work.photons_drawn += past.extend(part, spads, extra, photons);
             }
         }
     }

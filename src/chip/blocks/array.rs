@@ -1,0 +1,131 @@
+//! QuantIC4x4: the array, its load path, and the one flip-flop that starts an exposure (thesis 4.2, 4.7).
+//!
+//! ```text
+//!   COUNTER_INITS, LOAD_CLK, LOAD_ENABLE ─► deserialiser, row_scanner ─┬ COUNTER_INIT_ROW (by column)
+//!                                                                      └ MEMORY_LOAD (by row)
+//!   ENABLE ─►[RUN]─► ENABLE of every macropixel       RESETB, HISTOGRAM_CLEAR ─► PIXEL_CLEAR
+//!             ▲
+//!            STOP                                     instances mp_r{row}_c{col}
+//! ```
+//!
+//! RUN takes ENABLE on rising STOP edges, so that counting starts with a whole laser cycle and stops
+//! with one: releasing the counters in mid-cycle would give a false LOCAL_STOP.
+//!
+//! Start values are loaded while RUN is low. PIXEL_CLEAR empties histograms and pipelines without
+//! touching the start values, which RESETB wipes.
+
+use std::sync::Arc;
+
+use super::{finished, load_path, macropixel};
+use crate::chip::config::SensorConfig;
+use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
+
+/// The instance name of a macropixel.
+pub fn pixel_name(row: usize, col: usize) -> String {
+    format!("mp_r{row}_c{col}")
+}
+
+/// The sensor with every macropixel of the configuration.
+///
+/// Ports: CLK, STOP, RESETB, ENABLE, HISTOGRAM_CLEAR, CONVENTIONAL, TYPE\<2\>, THRESHOLD\<bits\>, LOAD_CLK,
+/// LOAD_ENABLE, COUNTER_INITS, SPAD_RAW\<rows × cols × SPADs\> (row-major).
+pub fn circuit(config: &SensorConfig) -> Arc<Module> {
+    subarray(config, (0, 0), (config.rows, config.cols))
+}
+
+/// A rectangle of the sensor, as a chip of its own: `size` (rows, cols) macropixels from `first`
+/// (row, col) on, with a load path of that size. Instances keep the names they have in the array.
+///
+/// # Panics
+/// When the rectangle is empty.
+pub fn subarray(
+    config: &SensorConfig,
+    first: (usize, usize),
+    (rows, cols): (usize, usize),
+) -> Arc<Module> {
+    assert!(rows > 0 && cols > 0, "a sensor needs a macropixel");
+    let (bits, spads) = (config.counter_bits, config.spads());
+    let pixel = macropixel::circuit(config);
+    let mut m = ModuleBuilder::new("quantic4x4");
+    let clk = m.input("CLK");
+    let stop = m.input("STOP");
+    let resetb = m.input("RESETB");
+    let enable = m.input("ENABLE");
+    let histogram_clear = m.input("HISTOGRAM_CLEAR");
+    let conventional = m.input("CONVENTIONAL");
+    let event_type = m.input_bus("TYPE", 2);
+    let threshold = m.input_bus("THRESHOLD", config.threshold_bits());
+    let load_clk = m.input("LOAD_CLK");
+    let load_enable = m.input("LOAD_ENABLE");
+    let serial = m.input("COUNTER_INITS");
+    let raw = m.input_bus("SPAD_RAW", rows * cols * spads);
+    let local_stop = m.output_bus("LOCAL_STOP", rows * cols);
+
+    let run = m.wire("RUN");
+    let pixel_clear = m.wire("PIXEL_CLEAR");
+    let reset = m.gate(CellKind::Inv, &[resetb]);
+    m.cell(
+        "run",
+        CellKind::Dffr,
+        &[enable, stop, reset],
+        &[run, Net::NONE],
+    );
+    m.gate_into(CellKind::Or2, &[reset, histogram_clear], pixel_clear);
+    let (row_bits, load) = load_path::place(
+        &mut m,
+        rows,
+        cols,
+        bits,
+        [serial, load_clk, load_enable, resetb],
+    );
+
+    for row in 0..rows {
+        for col in 0..cols {
+            let index = row * cols + col;
+            m.instance(
+                &pixel_name(first.0 + row, first.1 + col),
+                &pixel,
+                &[
+                    ("CLK", &[clk]),
+                    ("STOP", &[stop]),
+                    ("RESETB", &[resetb]),
+                    ("ENABLE", &[run]),
+                    ("PIXEL_CLEAR", &[pixel_clear]),
+                    ("CONVENTIONAL", &[conventional]),
+                    ("TYPE", &event_type),
+                    ("THRESHOLD", &threshold),
+                    ("COUNTER_INIT", &row_bits[col * bits..][..bits]),
+                    ("MEMORY_LOAD", &load[row..=row]),
+                    ("SPAD_RAW", &raw[index * spads..][..spads]),
+                    ("LOCAL_STOP", &local_stop[index..=index]),
+                ],
+            );
+        }
+    }
+    finished(m.finish())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::netlist::Netlist;
+
+    #[test]
+    fn the_array_elaborates_and_is_addressed_by_name() {
+        let config = SensorConfig {
+            rows: 3,
+            cols: 2,
+            ..SensorConfig::default()
+        };
+        let netlist = Netlist::elaborate(&circuit(&config));
+        assert!(netlist.net("mp_r2_c1.p_counter.LOCAL_STOP").is_some());
+        assert_eq!(
+            netlist.net("mp_r2_c1.LOCAL_STOP"),
+            netlist.net("LOCAL_STOP[5]")
+        );
+        assert_eq!(
+            netlist.net("mp_r1_c1.COUNTER_INIT[0]"),
+            netlist.net("COUNTER_INIT_ROW[9]")
+        );
+    }
+}

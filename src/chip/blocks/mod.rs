@@ -1,0 +1,21 @@
+//! The circuits of the chip, one file for each block of its diagram (thesis Fig. 46 to 59), each beside its plain-Rust
+//! reference model.
+
+pub mod array;
+pub mod correlation;
+pub mod front_end;
+pub mod histogram;
+pub mod load_path;
+pub mod macropixel;
+pub mod metdc;
+pub mod p_counter;
+pub mod p_counter_timing;
+
+use std::sync::Arc;
+
+use crate::netlist::{Module, NetlistError};
+
+/// Unwraps a circuit of this crate, whose correctness is ours to guarantee.
+fn finished(module: Result<Arc<Module>, NetlistError>) -> Arc<Module> {
+    module.unwrap_or_else(|error| panic!("a circuit of this crate is malformed: {error}"))
+}

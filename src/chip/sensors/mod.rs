@@ -1,0 +1,162 @@
+//! Sensors: chips described once, one file each.
+//!
+//! ```text
+//!   SensorConfig   geometry, blocks, clocks, mode ─┐
+//!   Silicon        library corner, conditions, ────┴─► Sensor ──► circuits, delays, window law, every engine
+//!                  mismatch                            (shared, immutable)
+//! ```
+//!
+//! A [`Sensor`] is a value: engines keep one, and copies share what is in it.
+
+use std::ops::Deref;
+use std::sync::{Arc, OnceLock};
+
+mod hslidar;
+mod quantic4x4;
+
+pub use hslidar::hslidar;
+pub use quantic4x4::quantic4x4;
+
+use super::config::SensorConfig;
+use super::sensor_file::SensorFault;
+use super::timing::ChipTiming;
+use super::timing::silicon::Silicon;
+
+/// A sensor that is possible, and what it is made of. Copies share their contents; the fields of its [`SensorConfig`] are
+/// read as its own.
+#[derive(Debug, Clone)]
+pub struct Sensor(Arc<Parts>);
+
+#[derive(Debug)]
+struct Parts {
+    config: SensorConfig,
+    silicon: Silicon,
+    timing: OnceLock<ChipTiming>,
+}
+
+/// A chip's name, and what makes its [`Sensor`].
+pub type Chip = (&'static str, fn() -> Sensor);
+
+/// The chips described here.
+pub const CHIPS: [Chip; 2] = [("quantic4x4", quantic4x4), ("hslidar", hslidar)];
+
+impl Sensor {
+    /// The chip of this name, one of [`CHIPS`].
+    pub fn named(name: &str) -> Option<Self> {
+        let chip = CHIPS.iter().find(|(known, _)| *known == name);
+        chip.map(|(_, chip)| chip())
+    }
+
+    /// A sensor of this description, made of the library in its corner.
+    ///
+    /// # Errors
+    /// What [`SensorConfig::check`] finds.
+    pub fn new(config: SensorConfig) -> Result<Self, SensorFault> {
+        config.check()?;
+        Ok(config.into())
+    }
+
+    /// The same sensor made of other silicon: other conditions, mismatch of its cells.
+    pub fn made_of(&self, silicon: &Silicon) -> Self {
+        Self::from_parts(self.0.config.clone(), *silicon)
+    }
+
+    /// What it is made of.
+    pub fn silicon(&self) -> &Silicon {
+        &self.0.silicon
+    }
+
+    /// Delays of macropixel (0, 0), measured once. Where cells have mismatch, others have others.
+    pub fn timing(&self) -> &ChipTiming {
+        let Parts {
+            config,
+            silicon,
+            timing,
+        } = &*self.0;
+        timing.get_or_init(|| match *silicon == Silicon::of(config) {
+            true => ChipTiming::of(config),
+            false => ChipTiming::measure(config, silicon),
+        })
+    }
+
+    fn from_parts(config: SensorConfig, silicon: Silicon) -> Self {
+        Sensor(Arc::new(Parts {
+            config,
+            silicon,
+            timing: OnceLock::new(),
+        }))
+    }
+}
+
+impl Deref for Sensor {
+    type Target = SensorConfig;
+
+    fn deref(&self) -> &SensorConfig {
+        &self.0.config
+    }
+}
+
+/// Sensors are equal if they are described alike and made of the same.
+impl PartialEq for Sensor {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+            || self.0.config == other.0.config && self.0.silicon == other.0.silicon
+    }
+}
+
+impl From<SensorConfig> for Sensor {
+    /// A sensor of this description, made of the library in its corner. The description must have passed
+    /// [`SensorConfig::check`].
+    fn from(config: SensorConfig) -> Self {
+        let silicon = Silicon::of(&config);
+        Self::from_parts(config, silicon)
+    }
+}
+
+impl From<&SensorConfig> for Sensor {
+    /// As from the [`SensorConfig`] itself.
+    fn from(config: &SensorConfig) -> Self {
+        config.clone().into()
+    }
+}
+
+impl From<&Sensor> for Sensor {
+    /// A copy, which shares its contents.
+    fn from(sensor: &Sensor) -> Self {
+        sensor.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn copies_share_their_delays_and_other_silicon_has_others() {
+        let sensor = quantic4x4();
+        let copy = Sensor::from(&sensor);
+        assert!(std::ptr::eq(sensor.timing(), copy.timing()));
+        assert_eq!(*sensor.timing(), ChipTiming::of(&sensor));
+        let slow = sensor.made_of(&sensor.silicon().at(1.5));
+        assert!(slow.timing().ripple() > sensor.timing().ripple());
+        assert!(slow != sensor && copy == sensor);
+    }
+
+    #[test]
+    fn every_chip_is_possible_and_has_its_name() {
+        for (name, chip) in CHIPS {
+            assert!(chip().check().is_ok(), "{name}");
+            assert_eq!(Sensor::named(name), Some(chip()));
+        }
+        assert!(Sensor::named("other").is_none());
+    }
+
+    #[test]
+    fn what_is_impossible_is_no_sensor() {
+        let config = SensorConfig {
+            rows: 0,
+            ..SensorConfig::default()
+        };
+        assert_eq!(Sensor::new(config).unwrap_err().key(), "rows");
+    }
+}

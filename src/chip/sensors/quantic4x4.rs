@@ -1,0 +1,43 @@
+//! QuantIC4x4, the guided direct time-of-flight chip (thesis 4.2, 4.8, Table 11): 64×64 macropixels of 4×4 SPADs, a 9-bit
+//! ripple P-counter in each, 16 bins of 14 bits, one CLK period long, at 384 MHz.
+
+use super::Sensor;
+use crate::chip::config::{AfterBorrow, EventType, Mode, Overflow, PCounter, SensorConfig, Tap};
+use crate::netlist::Corner;
+
+/// The chip in its guided mode, in typical silicon.
+pub fn quantic4x4() -> Sensor {
+    SensorConfig::default().into()
+}
+
+impl Default for SensorConfig {
+    /// The QuantIC4x4: what a sensor file leaves out.
+    fn default() -> Self {
+        SensorConfig {
+            rows: 64,
+            cols: 64,
+            spad_rows: 4,
+            spad_cols: 4,
+            counter_bits: 9,
+            p_counter: PCounter::Ripple,
+            tap: Tap::Borrow,
+            after_borrow: AfterBorrow::Hold,
+            step_periods: 1,
+            bins: 16,
+            bin_bits: 14,
+            clk_hz: 384e6,
+            stop_phase_ps: 0.0,
+            load_clk_hz: 200e6,
+            dead_time_ns: 8.0,
+            paralysable: false,
+            afterpulse_probability: 0.0,
+            afterpulse_time_ns: 5.0,
+            crosstalk_probability: 0.0,
+            event_type: EventType::Greater,
+            threshold: 0,
+            overflow: Overflow::Saturate,
+            mode: Mode::Guided,
+            corner: Corner::Typ,
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! SPADs of a macropixel that differ in how many photons they detect, and in dark counts.
+
+use std::sync::Arc;
+
+use super::layer::Layer;
+use super::{LightError, is_amount};
+
+/// How the SPADs of a macropixel differ.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpadSpread {
+    /// Of every SPAD, relative to the greatest one.
+    pub(super) efficiency: Arc<[f64]>,
+    pub(super) greatest_factor: f64,
+    /// Of every SPAD, relative to the greatest one.
+    dark: Arc<[f64]>,
+    pub(super) greatest_dark_hz: f64,
+}
+
+impl SpadSpread {
+    /// Of SPAD i, `factors[i]` times the photons of an even share are detected, and `dark_hz[i]` dark counts per second come
+    /// besides. Factors need not have a mean of 1.
+    ///
+    /// # Errors
+    /// When there is not one factor and one rate for each SPAD, or one is negative or not finite.
+    pub fn new(factors: &[f64], dark_hz: &[f64]) -> Result<Self, LightError> {
+        if factors.is_empty() || factors.len() != dark_hz.len() {
+            return Err(LightError::Spads {
+                factors: factors.len(),
+                dark: dark_hz.len(),
+            });
+        }
+        if let Some(&odd) = factors.iter().chain(dark_hz).find(|n| !is_amount(**n)) {
+            return Err(LightError::Spad(odd));
+        }
+        let (efficiency, greatest_factor) = relative(factors);
+        let (dark, greatest_dark_hz) = relative(dark_hz);
+        Ok(SpadSpread {
+            efficiency,
+            greatest_factor,
+            dark,
+            greatest_dark_hz,
+        })
+    }
+
+    /// How many SPADs it is for.
+    pub fn spads(&self) -> usize {
+        self.efficiency.len()
+    }
+
+    pub(super) fn dark_counts(&self) -> Layer<'_> {
+        Layer {
+            by_spad: Some(&self.dark),
+            ..Layer::constant(self.greatest_dark_hz * self.spads() as f64)
+        }
+    }
+}
+
+/// Numbers relative to the greatest one, and that one.
+fn relative(numbers: &[f64]) -> (Arc<[f64]>, f64) {
+    let greatest = numbers.iter().copied().fold(0.0, f64::max);
+    let share = |n: &f64| if greatest > 0.0 { n / greatest } else { 0.0 };
+    (numbers.iter().map(share).collect(), greatest)
+}
