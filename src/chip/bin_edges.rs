@@ -254,11 +254,20 @@ impl WindowLaw {
         let guess = sample as f64 + ((time.as_s() - centre_s) / step_s).round();
         let largest = self.sensor.largest_start();
         let guess = guess.clamp(0.0, largest as f64) as u16;
-        let candidates = guess.saturating_sub(1)..=(guess + 1).min(largest);
-        let best = candidates
-            .filter_map(|start| Some((distance(start)?, start)))
-            .min()?
-            .1;
+        // Windows beside the guess suffice where they open; where some do not, as at the laser cycle's end, any that
+        // contains the time may be the best.
+        let within =
+            |reach: u16| guess.saturating_sub(reach)..=(guess.saturating_add(reach)).min(largest);
+        let beside = within(1).map(|start| Some((distance(start)?, start)));
+        let best = match beside.collect::<Option<Vec<_>>>() {
+            Some(beside) => beside.into_iter().min()?.1,
+            None => {
+                let half_s = (centre.end - centre.start).as_s() / 2.0;
+                let reach = (half_s / step_s).ceil() as u16 + 1;
+                let opening = within(reach).filter_map(|start| Some((distance(start)?, start)));
+                opening.min()?.1
+            }
+        };
         let window = self.window(best).open()?;
         self.interval(&window).contains(&time).then_some(best)
     }
