@@ -26,6 +26,7 @@
 //! | [`report`] | pictures, arrays, tables |
 //! | [`system`] | one guided frame, end to end |
 //! | [`reproduce`] | the thesis's figures, published beside computed |
+//! | [`testbenches`] | the chip's blocks driven and checked at gate level, with waveforms |
 //! | [`cli`] | the `gdtof` command |
 
 pub mod analysis;
@@ -46,6 +47,7 @@ pub mod reproduce;
 pub mod scene;
 pub mod settings;
 pub mod system;
+pub mod testbenches;
 pub mod theory;
 pub mod units;
 pub mod waves;

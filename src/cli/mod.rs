@@ -11,11 +11,11 @@ mod sdf;
 mod settings;
 mod silicon;
 mod speed;
-mod testbench;
+mod tb;
 mod timing;
 mod wording;
 
-pub use testbench::testbench;
+pub use tb::testbench;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -53,6 +53,8 @@ enum Command {
     Sensor(SensorArgs),
     /// Print the scene as a commented file: every key with its unit, range and source.
     Scene(SceneArgs),
+    /// Run the testbenches of the chip's blocks, all or those named.
+    Tb(tb::TbArgs),
     /// Write the chip for other tools.
     #[command(subcommand)]
     Export(export::ExportCommand),
@@ -66,6 +68,7 @@ pub fn main() -> ExitCode {
         );
     }
     let result = match Cli::parse().command {
+        Command::Tb(args) => return finish(tb::run(&args)),
         Command::Frame(args) => frame::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Reproduce(args) => reproduce::run(&args),
@@ -77,8 +80,12 @@ pub fn main() -> ExitCode {
         Command::Scene(args) => settings::print_scene(&args),
         Command::Export(command) => export::run(&command),
     };
+    finish(result.map(|()| ExitCode::SUCCESS))
+}
+
+fn finish(result: anyhow::Result<ExitCode>) -> ExitCode {
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(status) => status,
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             for line in wording::sentence(&error).lines() {

@@ -1,83 +1,143 @@
-//! Every testbench passes, and leaves a waveform that a viewer can read and a save file beside it.
+//! Every testbench passes, and leaves a waveform that a viewer can read and a view beside it.
 
-use std::process::Command;
+use std::path::Path;
+use std::process::{Command, Output};
 
-use guided_dtof::chip::Probe;
+use guided_dtof::testbenches::TESTBENCHES;
 
-fn passes(name: &str, program: &str, signal: &[&str]) {
+const KEPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/waves");
+
+fn gdtof(arguments: &[&str]) -> Output {
+    let program = env!("CARGO_BIN_EXE_gdtof");
+    Command::new(program).args(arguments).output().unwrap()
+}
+
+/// Files of a folder whose names end so.
+fn files(folder: &Path, extension: &str) -> Vec<String> {
+    let names = std::fs::read_dir(folder).unwrap();
+    let names = names.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<String> = names.filter(|name| name.ends_with(extension)).collect();
+    names.sort();
+    names
+}
+
+/// Signals that a GTKWave view shows, buses without their range.
+fn shown(view: &str) -> Vec<&str> {
+    let lines = view
+        .lines()
+        .filter(|line| !line.starts_with(['[', '@', '-', '*']));
+    let whole = lines.map(|line| line.split('[').next().unwrap());
+    whole.filter(|line| !line.is_empty()).collect()
+}
+
+#[test]
+fn all_pass_and_leave_the_views_that_are_in_the_repository() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = gdtof(&["tb", "--verbose", "--out", folder.path().to_str().unwrap()]);
+    let text = String::from_utf8(run.stdout).unwrap();
+    assert!(run.status.success(), "{text}");
+    for testbench in TESTBENCHES {
+        assert!(files(folder.path(), ".vcd").contains(&format!("{}.vcd", testbench.name)));
+    }
+    let views = files(folder.path(), ".gtkw");
+    assert_eq!(views, files(Path::new(KEPT), ".gtkw"));
+    for name in views {
+        let view = std::fs::read_to_string(folder.path().join(&name)).unwrap();
+        let kept = std::fs::read_to_string(format!("{KEPT}/{name}")).unwrap();
+        assert!(
+            view == kept,
+            "{name}: `gdtof tb` in the repository renews its view"
+        );
+
+        let dump = name.replace(".gtkw", ".vcd");
+        assert!(view.contains(&format!("[dumpfile] \"{dump}\"")));
+        let waves = wellen::simple::read(folder.path().join(dump)).unwrap();
+        assert!(waves.time_table().len() > 100);
+        let signals = shown(&view);
+        assert!(signals.len() > 5, "{name} shows {signals:?}");
+        for signal in signals {
+            let scopes: Vec<&str> = signal.split('.').collect();
+            let (last, scopes) = scopes.split_last().unwrap();
+            let found = waves.hierarchy().lookup_var(scopes, last);
+            assert!(found.is_some(), "{name}: no {signal}");
+        }
+    }
+}
+
+#[test]
+fn those_named_run_and_list_runs_none() {
+    let list = gdtof(&["tb", "--list"]);
+    let list = String::from_utf8(list.stdout).unwrap();
+    assert_eq!(list.lines().count(), TESTBENCHES.len());
+
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("waves");
-    let run = Command::new(program).arg("--out").arg(&out).output();
-    let run = run.unwrap();
-    let text = String::from_utf8(run.stdout).unwrap();
-    assert!(run.status.success(), "{name}:\n{text}");
-    assert!(text.contains(" checked, 0 failed"), "{name}:\n{text}");
-
-    let waves = wellen::simple::read(out.join(format!("{name}.vcd"))).unwrap();
-    let (last, scopes) = signal.split_last().unwrap();
-    let signal = waves.hierarchy().lookup_var(scopes, last);
-    assert!(signal.is_some(), "{name} has no {last}");
-    assert!(waves.time_table().len() > 100);
-    let view = std::fs::read_to_string(out.join(format!("{name}.gtkw"))).unwrap();
-    assert!(view.contains(&format!("[dumpfile] \"{name}.vcd\"")));
-    // The views in the repository are those that the testbenches write.
-    let kept = concat!(env!("CARGO_MANIFEST_DIR"), "/waves");
-    let kept = std::fs::read_to_string(format!("{kept}/{name}.gtkw")).unwrap();
+    let run = gdtof(&[
+        "tb",
+        "p_counter",
+        "--json",
+        "--wave-format",
+        "fst",
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    assert!(run.status.success());
+    let entries: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+    assert_eq!(entries.as_array().unwrap().len(), 1);
+    assert_eq!(entries[0]["name"], "tb_p_counter");
     assert_eq!(
-        view, kept,
-        "{name}: run it in the repository to renew its view"
+        (&entries[0]["passed"], &entries[0]["failed"]),
+        (&true.into(), &0.into())
     );
+    assert_eq!(files(&out, ".fst"), ["tb_p_counter.fst"]);
 }
 
 #[test]
-fn the_p_counter_and_its_timing_block() {
-    let signal = ["tb_p_counter", "p_counter", "LOCAL_STOP"];
-    passes("tb_p_counter", env!("CARGO_BIN_EXE_tb_p_counter"), &signal);
-}
-
-#[test]
-fn the_variants_of_the_p_counter() {
-    let count = Probe::CounterOut.name();
-    let signal = ["tb_p_counter_variants", "msb_wrap", "p_counter", count];
-    passes(
-        "tb_p_counter_variants",
-        env!("CARGO_BIN_EXE_tb_p_counter_variants"),
-        &signal,
-    );
-}
-
-#[test]
-fn the_load_path() {
-    let signal = ["load_path", "row_scanner", "MEMORY_LOAD"];
-    passes("tb_load_path", env!("CARGO_BIN_EXE_tb_load_path"), &signal);
-}
-
-#[test]
-fn the_macropixel() {
-    let signal = ["quantic4x4", "mp_r0_c1", "LOCAL_STOP"];
-    passes(
-        "tb_macropixel",
-        env!("CARGO_BIN_EXE_tb_macropixel"),
-        &signal,
-    );
-}
-
-#[test]
-fn the_ripple_hazard() {
-    let signal = ["quantic4x4", "mp_r0_c1", "LOCAL_STOP"];
-    passes(
-        "tb_ripple_hazard",
-        env!("CARGO_BIN_EXE_tb_ripple_hazard"),
-        &signal,
-    );
-}
-
-#[test]
-fn a_folder_that_cannot_be_made_is_one_sentence_and_exit_status_2() {
-    let file = tempfile::NamedTempFile::new().unwrap();
+fn a_testbench_of_its_own_prints_all_its_checks() {
+    let folder = tempfile::tempdir().unwrap();
     let program = env!("CARGO_BIN_EXE_tb_macropixel");
-    let run = Command::new(program).arg("--out").arg(file.path()).output();
-    let run = run.unwrap();
-    assert_eq!(run.status.code(), Some(2));
-    assert_eq!(String::from_utf8(run.stderr).unwrap().lines().count(), 1);
+    let run = Command::new(program)
+        .arg("--out")
+        .arg(folder.path())
+        .output()
+        .unwrap();
+    let text = String::from_utf8(run.stdout).unwrap();
+    assert!(
+        run.status.success() && text.contains(" checked, 0 failed"),
+        "{text}"
+    );
+}
+
+#[test]
+fn unknown_names_and_folders_that_cannot_be_made_are_one_sentence_and_exit_status_2() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let taken = file.path().to_str().unwrap();
+    for arguments in [
+        &["tb", "histgram"][..],
+        &["tb", "macropixel", "--out", taken],
+    ] {
+        let run = gdtof(arguments);
+        assert_eq!(run.status.code(), Some(2), "{arguments:?}");
+        assert_eq!(String::from_utf8(run.stderr).unwrap().lines().count(), 1);
+    }
+}
+
+#[test]
+fn the_readme_links_every_view_and_testbench_to_files_that_are_there() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let readme = std::fs::read_to_string(root.join("README.md")).unwrap();
+    let table = readme
+        .split("## Blocks and their testbenches")
+        .nth(1)
+        .unwrap();
+    let table = table.split("\n## ").next().unwrap();
+    let links = table.split("](").skip(1);
+    let links: Vec<&str> = links.map(|rest| rest.split(')').next().unwrap()).collect();
+    for link in &links {
+        assert!(root.join(link).is_file(), "{link}");
+    }
+    for testbench in TESTBENCHES {
+        let view = format!("waves/{}.gtkw", testbench.name);
+        assert!(links.contains(&&*view), "{view} is in no row");
+    }
 }

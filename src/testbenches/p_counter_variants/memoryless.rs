@@ -1,16 +1,16 @@
 //! The P-counter without memory in a sensor: it must come round with STOP (thesis 4.4.3).
 
-use guided_dtof::chip::{ChipTiming, Exposure, PCounter, Probe};
-use guided_dtof::engine::GateSimulation;
-use guided_dtof::kernel::Recorder;
-use guided_dtof::report::Checks;
-use guided_dtof::units::Time;
+use crate::chip::{ChipTiming, Exposure, PCounter, Probe};
+use crate::engine::GateSimulation;
+use crate::kernel::Recorder;
+use crate::report::Checks;
+use crate::units::Time;
 
-use crate::comparison::sensor;
-use crate::numbers;
+use super::comparison::sensor;
+use super::numbers;
 
 /// The P-counter without memory: STOP every 512 CLK periods, and eight too many.
-pub fn coming_round(checks: &mut Checks) {
+pub(super) fn coming_round(checks: &mut Checks) {
     const CYCLES: u32 = 5;
     let config = sensor(PCounter::Memoryless);
     let round = u32::from(config.largest_start()) + 1;

@@ -1,20 +1,20 @@
 //! Every variant of the P-counter in one table: transistors, delays, glitches and the shortest CLK period.
 
-use guided_dtof::analysis::{MacropixelTiming, gate_works, ripple, shortest_period};
-use guided_dtof::chip::{
+use crate::analysis::{MacropixelTiming, gate_works, ripple, shortest_period};
+use crate::chip::{
     AfterBorrow, Limits, PCounter, Probe, Probes, SensorConfig, Silicon, Tap, macropixel,
     p_counter, p_counter_timing,
 };
-use guided_dtof::kernel::{Drive, Kernel, Recorder, in_order};
-use guided_dtof::netlist::{CellKind, Corner, Edge, NetId, Netlist, StaticTiming};
-use guided_dtof::report::{Checks, Grid};
-use guided_dtof::units::Time;
+use crate::kernel::{Drive, Kernel, Recorder, in_order};
+use crate::netlist::{CellKind, Corner, Edge, NetId, Netlist, StaticTiming};
+use crate::report::{Checks, Grid};
+use crate::units::Time;
 
 /// Longest CLK period that is tried.
 const SLOW: Time = Time::from_ns(20);
 
 /// A sensor of one macropixel with this P-counter, LOCAL_STOP taken where it suits.
-pub fn sensor(p_counter: PCounter) -> SensorConfig {
+pub(super) fn sensor(p_counter: PCounter) -> SensorConfig {
     let (tap, after_borrow) = match p_counter {
         PCounter::Memoryless => (Tap::Msb, AfterBorrow::Wrap),
         _ => (Tap::Borrow, AfterBorrow::Hold),
@@ -33,7 +33,7 @@ pub fn sensor(p_counter: PCounter) -> SensorConfig {
 const TYPICAL: Silicon = Silicon::nominal(Corner::Typ);
 
 /// Compares the variants.
-pub fn compare(checks: &mut Checks) -> Grid {
+pub(super) fn compare(checks: &mut Checks) -> Grid {
     let mut grid = Grid::new([
         "P-counter",
         "T/stage",

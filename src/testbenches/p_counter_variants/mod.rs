@@ -16,22 +16,21 @@ mod comparison;
 mod memoryless;
 
 use std::path::Path;
-use std::process::ExitCode;
 use std::sync::Arc;
 
-use guided_dtof::chip::window_law::{Irregular, Window};
-use guided_dtof::chip::{
+use crate::chip::window_law::{Irregular, Window};
+use crate::chip::{
     AfterBorrow, ChipTiming, Exposure, Probe, SensorConfig, Tap, WindowLaw, metdc, p_counter,
     p_counter_timing,
 };
-use guided_dtof::cli::testbench;
-use guided_dtof::engine::waveform::write_waves;
-use guided_dtof::files::{InputError, OutputFile};
-use guided_dtof::kernel::{Drive, Kernel, Recorder, clock, in_order};
-use guided_dtof::netlist::{Library, Module, ModuleBuilder, NetId, Netlist, Timing};
-use guided_dtof::report::Checks;
-use guided_dtof::units::Time;
-use guided_dtof::waves::{Entry, Group, Layout};
+use crate::engine::waveform::write_waves;
+use crate::files::{InputError, OutputFile};
+use crate::kernel::{Drive, Kernel, Recorder, clock, in_order};
+use crate::netlist::{Library, Module, ModuleBuilder, NetId, Netlist, Timing};
+use crate::report::Checks;
+use crate::testbenches::Testbench;
+use crate::units::Time;
+use crate::waves::{Entry, Group, Layout};
 
 /// First STOP edge.
 const ORIGIN: Time = Time::from_ns(60);
@@ -56,23 +55,19 @@ const TAIL: i64 = 5;
 /// An event in each window: CLK edges before the last that it sees.
 const BEFORE_END: i64 = 10;
 
-fn main() -> ExitCode {
-    testbench(
-        "tb_p_counter_variants",
-        "P-counter variants: cost and speed, the tap msb's false capture, the wrapping counter's repeated one",
-        run,
-    )
-}
+pub(super) const TESTBENCH: Testbench = Testbench {
+    name: "tb_p_counter_variants",
+    about: "P-counter variants: cost and speed, the tap msb's false capture, the wrapping counter's repeated one",
+    run,
+};
 
 fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let grid = comparison::compare(checks);
-    println!("{grid}");
-    println!(
-        "T: transistors. Shares are of the macropixel's transistors, and of their area; the thesis's, below 5 %, is of the layout."
-    );
-    println!(
-        "settled: every net after a count. CLK period: STOP on CLK's fall, setup and hold not counted.\n"
-    );
+    checks.note(format!(
+        "{grid}\n\
+        T: transistors. Shares are of the macropixel's transistors, and of their area; the thesis's, below 5 %, is of the layout.\n\
+        settled: every net after a count. CLK period: STOP on CLK's fall, setup and hold not counted.\n"
+    ));
     let table = waves.with_extension("csv");
     OutputFile::write_with(&table, |out| grid.write_csv(out))?;
 

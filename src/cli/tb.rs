@@ -1,0 +1,214 @@
+//! `gdtof tb`: lists and runs the testbenches; and the binaries `tb_*`, each of which runs one.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::{Args, CommandFactory, FromArgMatches, Parser};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::say;
+use crate::files::{InputError, clean_up_when_interrupted, create_folder};
+use crate::report::{Checks, Grid};
+use crate::testbenches::{TESTBENCHES, Testbench};
+use crate::waves::WaveFormat;
+
+/// Where waveforms go.
+#[derive(Args)]
+struct WaveArgs {
+    /// Folder for waveforms and their views for GTKWave and Surfer, made if it is not there.
+    #[arg(long, value_name = "DIR", default_value = "waves")]
+    out: PathBuf,
+    /// Format of the waveforms.
+    #[arg(long, value_enum, default_value_t)]
+    wave_format: WaveFormat,
+}
+
+impl WaveArgs {
+    fn path(&self, testbench: &Testbench) -> PathBuf {
+        let extension = self.wave_format.extension();
+        self.out.join(format!("{}.{extension}", testbench.name))
+    }
+}
+
+/// Arguments of `gdtof tb`.
+#[derive(Args)]
+pub(super) struct TbArgs {
+    /// Testbenches to run, with or without their `tb_`; without any, all of them.
+    #[arg(value_name = "NAME")]
+    names: Vec<String>,
+    /// Only list them.
+    #[arg(long, conflicts_with_all = ["out", "wave_format", "verbose"])]
+    list: bool,
+    /// Print every check, not only those that fail.
+    #[arg(long, short)]
+    verbose: bool,
+    #[command(flatten)]
+    waves: WaveArgs,
+    /// Print JSON instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A testbench that has run, or is only listed.
+#[derive(Serialize)]
+struct Entry {
+    name: &'static str,
+    about: &'static str,
+    #[serde(flatten)]
+    result: Option<RunResult>,
+}
+
+#[derive(Serialize)]
+struct RunResult {
+    passed: bool,
+    checked: usize,
+    failed: usize,
+    run_time_s: f64,
+    waveform: PathBuf,
+    #[serde(skip)]
+    checks: Checks,
+}
+
+/// Runs the command; exit status 1 when a check fails.
+///
+/// # Errors
+/// Unknown names and files that cannot be written.
+pub(super) fn run(args: &TbArgs) -> anyhow::Result<ExitCode> {
+    let testbenches = chosen(&args.names)?;
+    if !args.list {
+        create_folder(&args.waves.out)?;
+    }
+    let entry = |testbench: &Testbench| {
+        let result = match args.list {
+            true => None,
+            false => Some(run_one(testbench, &args.waves.path(testbench))?),
+        };
+        Ok(Entry {
+            name: testbench.name,
+            about: testbench.about,
+            result,
+        })
+    };
+    let entries: Result<Vec<Entry>, InputError> = testbenches.par_iter().map(entry).collect();
+    let entries = entries?;
+    let results = || entries.iter().filter_map(|entry| entry.result.as_ref());
+    if args.json {
+        let text = serde_json::to_string_pretty(&entries)?;
+        say(format_args!("{text}\n"))?;
+    } else {
+        for entry in &entries {
+            let Some(result) = &entry.result else {
+                continue;
+            };
+            if args.verbose || !result.passed {
+                say(format_args!("{}\n{}\n", entry.name, result.checks))?;
+            }
+        }
+        say(table(&entries))?;
+        if let Some(first) = results().next() {
+            let view = first.waveform.with_extension("gtkw");
+            say(format_args!(
+                "waveforms: gtkwave {}, for example\n",
+                view.display()
+            ))?;
+        }
+    }
+    Ok(match results().all(|result| result.passed) {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::FAILURE,
+    })
+}
+
+fn chosen(names: &[String]) -> Result<Vec<Testbench>, InputError> {
+    if names.is_empty() {
+        return Ok(TESTBENCHES.to_vec());
+    }
+    let mut chosen: Vec<Testbench> = Vec::new();
+    for name in names {
+        let testbench = Testbench::named(name).ok_or_else(|| {
+            let all: Vec<&str> = TESTBENCHES.iter().map(|tb| tb.name).collect();
+            InputError::new(name, format!("is no testbench; give {}", all.join(", ")))
+        })?;
+        if chosen.iter().all(|other| other.name != testbench.name) {
+            chosen.push(testbench);
+        }
+    }
+    Ok(chosen)
+}
+
+fn run_one(testbench: &Testbench, waves: &Path) -> Result<RunResult, InputError> {
+    let begin = Instant::now();
+    let checks = testbench.run(waves)?;
+    Ok(RunResult {
+        passed: checks.passed(),
+        checked: checks.made(),
+        failed: checks.failed(),
+        run_time_s: begin.elapsed().as_secs_f64(),
+        waveform: waves.to_owned(),
+        checks,
+    })
+}
+
+fn table(entries: &[Entry]) -> String {
+    let width = entries.iter().map(|entry| entry.name.len()).max();
+    let width = width.unwrap_or(0);
+    if entries.iter().all(|entry| entry.result.is_none()) {
+        let line = |entry: &Entry| format!("{:width$}  {}\n", entry.name, entry.about);
+        return entries.iter().map(line).collect();
+    }
+    let mut grid = Grid::new(["testbench", "checked", "failed", "run time", ""]);
+    for entry in entries {
+        let Some(result) = &entry.result else {
+            continue;
+        };
+        grid.push([
+            entry.name.to_owned(),
+            result.checked.to_string(),
+            result.failed.to_string(),
+            format!("{:.2} s", result.run_time_s),
+            if result.passed { "ok" } else { "FAILED" }.to_owned(),
+        ]);
+    }
+    grid.to_string()
+}
+
+#[derive(Parser)]
+struct OneArgs {
+    #[command(flatten)]
+    waves: WaveArgs,
+}
+
+/// Runs the testbench `name` as a program of its own, and prints its checks. Exit status 0 when every check holds, 1
+/// when one fails, 2 when a file cannot be written.
+///
+/// # Panics
+/// When there is no testbench of this name.
+pub fn testbench(name: &'static str) -> ExitCode {
+    let testbench = Testbench::named(name).expect("a testbench for each tb_* binary");
+    let command = OneArgs::command().name(name).about(testbench.about);
+    let args = OneArgs::from_arg_matches(&command.get_matches());
+    let args = args.unwrap_or_else(|error| error.exit()).waves;
+    if let Err(error) = clean_up_when_interrupted() {
+        eprintln!("{name}: signals cannot be watched ({error})");
+    }
+    let waves = args.path(&testbench);
+    let result = create_folder(&args.out).and_then(|()| testbench.run(&waves));
+    match result {
+        Ok(checks) => {
+            let view = waves.with_extension("gtkw");
+            let text = format!("{checks}waveform: gtkwave {}\n", view.display());
+            // A reader that has gone away changes no verdict.
+            let _ = say(text);
+            match checks.passed() {
+                true => ExitCode::SUCCESS,
+                false => ExitCode::FAILURE,
+            }
+        }
+        Err(error) => {
+            eprintln!("{name}: {error}");
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,0 +1,404 @@
+//! Testbench of the macropixel: two of them in a sensor, as in Fig. 48, and what a photon becomes on its way to
+//! a bin (thesis 4.2, 4.3, Fig. 47, 48).
+//!
+//! ```text
+//!   SPAD_RAW ─► mp_r0_c0, start value 52 ─► LOCAL_STOP ─► histogram
+//!          └──► mp_r0_c1, start value 49 ─► LOCAL_STOP, 3 CLK periods earlier ─► the same histogram, 3 bins on
+//! ```
+//!
+//! Everything goes through the sensor's pins: serial load, CLK, STOP and the SPADs' pulses.
+
+use std::fmt::Debug;
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::chip::window_law::OpenWindow;
+use crate::chip::{
+    self, EventType, Exposure, Overflow, Probe, SensorConfig, SensorPins, WindowLaw, array,
+    correlation, histogram, probes,
+};
+use crate::engine::GateSimulation;
+use crate::engine::waveform::write_waves;
+use crate::files::InputError;
+use crate::kernel::Recorder;
+use crate::photon::SpadEvent;
+use crate::report::Checks;
+use crate::testbenches::Testbench;
+use crate::units::Time;
+use crate::waves::{Entry, Group, Layout};
+
+/// Start values of Fig. 48's two macropixels, three bins apart.
+const FIG_48: [u16; 2] = [52, 49];
+/// Start values of two macropixels of HSLIDAR, half a window apart.
+const HSLIDAR: [u16; 2] = [13, 12];
+/// CLK periods between two STOP edges.
+const STOP_PERIODS: u32 = 64;
+
+pub(super) const TESTBENCH: Testbench = Testbench {
+    name: "tb_macropixel",
+    about: "Macropixels: Fig. 48's two windows, and which photon is counted where",
+    run,
+};
+
+fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
+    two_windows(waves, &config(), FIG_48, "Fig. 48", checks)?;
+    let hslidar = waves
+        .with_file_name("tb_macropixel_hslidar")
+        .with_extension(waves.extension().unwrap_or_default());
+    let chip = SensorConfig {
+        rows: 1,
+        ..(*chip::hslidar()).clone()
+    };
+    two_windows(&hslidar, &chip, HSLIDAR, "HSLIDAR, 4.9.3", checks)?;
+    bin_edge(checks);
+    full_bins(checks);
+    coincidences(checks);
+    cancelling_pulses(checks);
+    Ok(())
+}
+
+/// A sensor of one macropixel.
+fn config() -> SensorConfig {
+    SensorConfig {
+        rows: 1,
+        cols: 1,
+        ..SensorConfig::default()
+    }
+}
+
+/// The law of an exposure, and the window that it gives a start value.
+fn window(config: &SensorConfig, exposure: &Exposure, start: u16) -> (WindowLaw, OpenWindow) {
+    let law = WindowLaw::new(config, exposure);
+    let window = law
+        .window(start)
+        .open()
+        .expect("a start value within the laser cycle");
+    (law, window)
+}
+
+/// The middle of a bin in one laser cycle.
+fn middle(law: &WindowLaw, window: &OpenWindow, cycle: u32, bin: i64) -> Time {
+    let bin = law.bin_interval(window, cycle as i64, bin);
+    Time::from_fs((bin.start + bin.end).as_fs() / 2)
+}
+
+/// What the gates count with one start value; `None` where a bin is unknown.
+fn counted(
+    config: &SensorConfig,
+    exposure: &Exposure,
+    start: u16,
+    pulses: &mut [SpadEvent],
+) -> Option<Vec<u16>> {
+    pulses.sort_unstable();
+    let size = (1, 1);
+    let mut gate = GateSimulation::new(config, exposure, (0, 0), size, &[start], &[pulses]);
+    gate.run(&mut ());
+    Some(gate.histograms().ok()?.into_counts())
+}
+
+/// What the window law says is counted of pulses that come alone in their CLK period.
+fn by_law(
+    config: &SensorConfig,
+    exposure: &Exposure,
+    start: u16,
+    pulses: &[SpadEvent],
+) -> Vec<u16> {
+    let (law, window) = window(config, exposure, start);
+    let in_bin = |bin: i64, pulse: &&SpadEvent| {
+        let mut cycles = 0..exposure.laser_cycles as i64;
+        cycles.any(|cycle| law.bin_interval(&window, cycle, bin).contains(&pulse.time))
+    };
+    let bins = 0..config.bins as i64;
+    bins.map(|bin| pulses.iter().filter(|p| in_bin(bin, p)).count() as u16)
+        .collect()
+}
+
+/// Histograms and other lists, or that there is none.
+fn shown<T: Debug>(counts: &Option<T>) -> String {
+    counts
+        .as_ref()
+        .map_or("unknown".to_owned(), |c| format!("{c:?}"))
+}
+
+/// Two macropixels with windows that overlap, in the same light.
+fn two_windows(
+    waves: &Path,
+    sensor: &SensorConfig,
+    starts: [u16; 2],
+    figure: &str,
+    checks: &mut Checks,
+) -> Result<(), InputError> {
+    let config = SensorConfig {
+        cols: 2,
+        ..sensor.clone()
+    };
+    let exposure = Exposure::new(&config, STOP_PERIODS, 6);
+    let shift = usize::from(starts[0] - starts[1]) * config.step_periods;
+    let (law, second) = window(&config, &exposure, starts[1]);
+    let photons_of = |bin: i64| (bin * bin * bin + 3 * bin).rem_euclid(11) as u32 / 2;
+    // Photons from before the earlier window to after the later one, a different number in every CLK period;
+    // no SPAD fires twice within its dead time.
+    let (first_bin, last_bin) = (-4, (config.bins + shift) as i64 + 4);
+    let mut pulses: Vec<SpadEvent> = (0..exposure.laser_cycles)
+        .flat_map(|cycle| (first_bin..last_bin).map(move |bin| (cycle, bin)))
+        .filter(|(cycle, bin)| (cycle + 3) % exposure.laser_cycles <= photons_of(*bin))
+        .map(|(cycle, bin)| SpadEvent {
+            time: middle(&law, &second, cycle, bin),
+            spad: bin.rem_euclid(16) as u8,
+        })
+        .collect();
+    pulses.sort_unstable();
+
+    let lists = [&pulses[..], &pulses[..]];
+    let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 2), &starts, &lists);
+    let netlist = Arc::clone(gate.netlist());
+    let local_stop = SensorPins::of(&netlist).local_stop;
+    let mut recorder = Recorder::new(local_stop.iter().copied());
+    let origin = gate.schedule().origin;
+    let view = view(&config, (starts, figure), origin, origin + exposure.stop(1));
+    write_waves(waves, &netlist, &view, |waves| {
+        gate.run(&mut (&mut recorder, waves));
+        gate.schedule().end
+    })?;
+
+    checks.equal(
+        "start values loaded",
+        shown(&Some(starts)),
+        shown(&gate.loaded().into_iter().collect::<Option<Vec<u16>>>()),
+    );
+    let histograms = gate.histograms().ok();
+    for (pixel, &start) in starts.iter().enumerate() {
+        let found = histograms.as_ref().map(|h| &h[pixel]);
+        checks.equal(
+            format!("start value {start}: histogram, against the window law"),
+            shown(&Some(by_law(&config, &exposure, start, &pulses))),
+            shown(&found),
+        );
+    }
+    let (later, earlier) = match &histograms {
+        Some(h) => (&h[0][..config.bins - shift], &h[1][shift..]),
+        None => (&[][..], &[][..]),
+    };
+    let is_telling = later.iter().any(|&n| n != later[0]);
+    checks.that(
+        format!(
+            "bins 0 up of {} are bins {shift} up of {}",
+            starts[0], starts[1]
+        ),
+        format!("{earlier:?}"),
+        format!("{later:?}"),
+        is_telling && later == earlier,
+    );
+    let rises = local_stop
+        .iter()
+        .map(|&net| recorder.rising_edges(net))
+        .collect::<Vec<_>>();
+    for (cycle, (later, earlier)) in rises[0].iter().zip(&rises[1]).enumerate() {
+        // Each edge of CLK is rounded to a femtosecond.
+        let expected = exposure.clock.periods(shift as i64);
+        let found = *later - *earlier;
+        checks.that(
+            format!(
+                "laser cycle {cycle}: LOCAL_STOP {} before that of {}",
+                starts[1], starts[0]
+            ),
+            format!("{shift} periods, {expected}"),
+            found,
+            (found - expected).as_fs().abs() <= 1,
+        );
+    }
+    for (rises, start) in rises.iter().zip(starts) {
+        let what = format!("start value {start}: LOCAL_STOPs");
+        checks.equal(what, exposure.laser_cycles as usize, rises.len());
+        let (_, window) = window(&config, &exposure, start);
+        let found: Vec<Time> = rises.iter().take(1).map(|&t| t - origin).collect();
+        let what = format!("start value {start}: first LOCAL_STOP after STOP, by the law");
+        checks.times(what, window.strobe_cause, &found);
+    }
+    Ok(())
+}
+
+fn view(
+    config: &SensorConfig,
+    (starts, figure): ([u16; 2], &str),
+    origin: Time,
+    end: Time,
+) -> Layout {
+    let mut groups = vec![Group::new(
+        "Global signals",
+        [
+            Entry::binary("CLK"),
+            Entry::binary("STOP"),
+            Entry::binary("ENABLE"),
+        ],
+    )];
+    for (col, start) in starts.into_iter().enumerate() {
+        let pixel = array::pixel_name(0, col);
+        let signals = [
+            Entry::hex(Probe::SpadRaw.path(&pixel)),
+            Entry::hex(Probe::SpadTimed.path(&pixel)),
+            Entry::binary(Probe::SpadEvent.path(&pixel)),
+            Entry::decimal(Probe::CounterOut.path(&pixel)),
+            Entry::binary(Probe::LocalStop.path(&pixel)),
+            Entry::binary(Probe::Shift.path(&pixel)),
+            Entry::binary(Probe::Hit.path(&pixel)),
+        ];
+        // The first, the middle and the last bin; GTKWave widens its column of names for a longer title.
+        let bins = [0, config.bins / 2, config.bins - 1];
+        let bins = bins.map(|bin| Entry::decimal(probes::bin_path(&pixel, bin)));
+        groups.push(Group::new(
+            format!("Macropixel {}: {start} ({figure})", col + 1),
+            signals.into_iter().chain(bins),
+        ));
+    }
+    Layout {
+        groups,
+        zoom: (origin - Time::from_ns(5), end + Time::from_ns(5)),
+        marker: Some(origin),
+    }
+}
+
+/// One photon, femtosecond by femtosecond across the edge between two bins.
+fn bin_edge(checks: &mut Checks) {
+    let (config, start, bin) = (config(), 20, 8);
+    let exposure = Exposure::new(&config, STOP_PERIODS, 1);
+    let (law, window) = window(&config, &exposure, start);
+    let edge = law.bin_interval(&window, 0, bin).start;
+    for offset_fs in -2..=2 {
+        let time = edge + Time::from_fs(offset_fs);
+        let mut pulse = [SpadEvent { time, spad: 7 }];
+        let found = counted(&config, &exposure, start, &mut pulse);
+        let bins = |counts: &[u16]| -> Vec<usize> {
+            (0..counts.len()).filter(|&b| counts[b] > 0).collect()
+        };
+        checks.equal(
+            format!(
+                "photon {offset_fs:+} fs from the edge of bins {} and {bin}: bin",
+                bin - 1
+            ),
+            shown(&Some([if offset_fs < 0 { bin - 1 } else { bin }])),
+            shown(&found.map(|counts| bins(&counts))),
+        );
+    }
+}
+
+/// More photons than a small bin can count.
+fn full_bins(checks: &mut Checks) {
+    for overflow in [Overflow::Saturate, Overflow::Wrap] {
+        let config = SensorConfig {
+            bin_bits: 3,
+            overflow,
+            ..config()
+        };
+        let (start, bin) = (20, 5);
+        let exposure = Exposure::new(&config, 32, 12);
+        let (law, window) = window(&config, &exposure, start);
+        let mut pulses: Vec<SpadEvent> = (0..exposure.laser_cycles)
+            .map(|cycle| SpadEvent {
+                time: middle(&law, &window, cycle, bin),
+                spad: cycle as u8,
+            })
+            .collect();
+        let hits = pulses.len() as u64;
+        let found = counted(&config, &exposure, start, &mut pulses);
+        checks.equal(
+            format!(
+                "{hits} photons in a bin of {} bits, overflow = {overflow:?}",
+                config.bin_bits
+            ),
+            shown(&Some(histogram::model(
+                hits,
+                config.bin_bits as u32,
+                overflow,
+            ))),
+            shown(&found.map(|counts| counts[bin as usize])),
+        );
+    }
+}
+
+/// Bin b gets b coincident photons, and TYPE and THRESHOLD pick the bins.
+fn coincidences(checks: &mut Checks) {
+    let start = 20;
+    let cases = [
+        (EventType::Greater, 0),
+        (EventType::Greater, 3),
+        (EventType::Equal, 2),
+        (EventType::Less, 4),
+        (EventType::Greater, 16),
+    ];
+    for (event_type, threshold) in cases {
+        let config = SensorConfig {
+            bins: 6,
+            event_type,
+            threshold,
+            dead_time_ns: 1.0,
+            ..config()
+        };
+        let exposure = Exposure::new(&config, 32, 1);
+        let (law, window) = window(&config, &exposure, start);
+        let spads = |bin: usize| (1u64 << bin) - 1;
+        let mut pulses = Vec::new();
+        for bin in 0..config.bins {
+            let time = middle(&law, &window, 0, bin as i64);
+            pulses.extend((0..bin as u8).map(|spad| SpadEvent { time, spad }));
+        }
+        let expected: Vec<u16> = (0..config.bins)
+            .map(|bin| correlation::model(spads(bin), event_type, threshold) as u16)
+            .collect();
+        let found = counted(&config, &exposure, start, &mut pulses);
+        checks.equal(
+            format!(
+                "0 to {} coincident photons, TYPE = {event_type:?} than {threshold}",
+                config.bins - 1
+            )
+            .replace("Equal than", "Equal to"),
+            shown(&Some(expected)),
+            shown(&found),
+        );
+    }
+}
+
+/// A toggle front end loses two pulses of one SPAD within one CLK period.
+fn cancelling_pulses(checks: &mut Checks) {
+    let config = SensorConfig {
+        dead_time_ns: 0.5,
+        ..config()
+    };
+    let (start, bin) = (20, 6);
+    let exposure = Exposure::new(&config, 32, 1);
+    let (law, window) = window(&config, &exposure, start);
+    let centre = middle(&law, &window, 0, bin);
+    let apart = Time::from_ps(500);
+    let at = |time, spad| SpadEvent { time, spad };
+    let bin_start = law.bin_interval(&window, 0, bin).start;
+    let cases = [
+        ("one pulse of a SPAD", vec![at(centre, 3)], 0, 1),
+        (
+            "two pulses of one SPAD within one CLK period cancel",
+            vec![at(centre - apart, 3), at(centre + apart, 3)],
+            0,
+            0,
+        ),
+        (
+            "pulses of two SPADs within one CLK period are one event",
+            vec![at(centre - apart, 3), at(centre + apart, 4)],
+            0,
+            1,
+        ),
+        (
+            "two pulses of one SPAD on either side of a bin's edge",
+            vec![at(bin_start - apart, 3), at(bin_start + apart, 3)],
+            1,
+            1,
+        ),
+    ];
+    for (what, mut pulses, before, within) in cases {
+        let found = counted(&config, &exposure, start, &mut pulses);
+        let bin = bin as usize;
+        checks.equal(
+            format!("{what}: bins {} and {bin}", bin - 1),
+            shown(&Some([before, within])),
+            shown(&found.map(|counts| [counts[bin - 1], counts[bin]])),
+        );
+    }
+}

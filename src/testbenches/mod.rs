@@ -1,0 +1,70 @@
+//! Testbenches: each drives one block of the chip at gate level, checks what it does and leaves its waveform.
+//!
+//! `gdtof tb` runs them, as do the binaries `tb_*`. A new one is a file here with a `TESTBENCH`, and its line in
+//! [`TESTBENCHES`].
+
+mod load_path;
+mod macropixel;
+mod p_counter;
+mod p_counter_variants;
+mod ripple_hazard;
+
+use std::path::Path;
+
+use crate::files::InputError;
+use crate::report::Checks;
+
+/// A testbench.
+#[derive(Debug, Clone, Copy)]
+pub struct Testbench {
+    /// Its name, which is also its waveform's.
+    pub name: &'static str,
+    /// What it is about, in a line.
+    pub about: &'static str,
+    /// Fills in the checks and writes the waveform to the path it is given, with the views beside it.
+    run: fn(&Path, &mut Checks) -> Result<(), InputError>,
+}
+
+/// All of them, simplest block first.
+pub const TESTBENCHES: &[Testbench] = &[
+    p_counter::TESTBENCH,
+    p_counter_variants::TESTBENCH,
+    load_path::TESTBENCH,
+    macropixel::TESTBENCH,
+    ripple_hazard::TESTBENCH,
+];
+
+impl Testbench {
+    /// The testbench of this name, with or without its `tb_`.
+    pub fn named(name: &str) -> Option<Self> {
+        let is_named =
+            |tb: &&Testbench| name == tb.name || Some(name) == tb.name.strip_prefix("tb_");
+        TESTBENCHES.iter().find(is_named).copied()
+    }
+
+    /// Runs it. The waveform goes to `waves`, in the format of its name; what belongs to it goes beside it.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn run(&self, waves: &Path) -> Result<Checks, InputError> {
+        let mut checks = Checks::new();
+        (self.run)(waves, &mut checks)?;
+        Ok(checks)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_testbench_is_found_by_its_name_and_without_tb() {
+        for testbench in TESTBENCHES {
+            let short = testbench.name.strip_prefix("tb_").unwrap();
+            for name in [testbench.name, short] {
+                assert_eq!(Testbench::named(name).unwrap().name, testbench.name);
+            }
+        }
+        assert!(Testbench::named("tb_").is_none());
+    }
+}

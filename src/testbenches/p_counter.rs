@@ -1,0 +1,434 @@
+//! Testbench of the P-counter with its timing block: the sequence of Fig. 54, and the ripple to LOCAL_STOP for
+//! every start value (thesis 4.5, 4.6).
+//!
+//! ```text
+//!   CLK, STOP, RESETB, ENABLE ─► p_counter_timing ─COUNTER_CLK, COUNTER_RESET, MEMORY_RESET─► p_counter ─┬► LOCAL_STOP
+//!                                      ▲                         COUNTER_INIT, MEMORY_LOAD ─►            │
+//!                                      └────────────────────────────────────────────────────────────────┘
+//! ```
+//!
+//! ENABLE changes with rising STOP edges, as in the sensor, where a flip-flop on STOP sees to it.
+
+use std::path::Path;
+
+use crate::chip::{ChipTiming, Exposure, Probe, Probes, SensorConfig, p_counter, p_counter_timing};
+use crate::engine::waveform::write_waves;
+use crate::files::InputError;
+use crate::kernel::{Drive, Kernel, Observer, Recorder, clock, in_order};
+use crate::logic::Logic;
+use crate::netlist::{CellKind, Library, ModuleBuilder, NetId, Netlist, Timing};
+use crate::report::Checks;
+use crate::testbenches::Testbench;
+use crate::units::Time;
+use crate::waves::{Entry, Group, Layout};
+
+/// Start value of Fig. 54.
+const FIRST: u64 = 5;
+/// Start value that is loaded afterwards.
+const SECOND: u64 = 9;
+/// CLK periods between two STOP edges of the sequence.
+const STOP_PERIODS: i64 = 14;
+/// CLK periods without STOP at its end: more than a free-running counter needs to come round twice.
+const HOLD_PERIODS: i64 = 1100;
+/// First STOP edge of the sequence.
+const ORIGIN: Time = Time::from_ns(20);
+/// When the chip comes out of reset.
+const RESET_END: Time = Time::from_ns(2);
+
+pub(super) const TESTBENCH: Testbench = Testbench {
+    name: "tb_p_counter",
+    about: "P-counter and timing block: Fig. 54's sequence, and the ripple of every start value",
+    run,
+};
+
+fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
+    let bench = Bench::new();
+    figure_54(&bench, waves, checks)?;
+    every_start_value(&bench, checks);
+    Ok(())
+}
+
+/// The circuit under test and its nets.
+struct Bench {
+    config: SensorConfig,
+    timing: ChipTiming,
+    netlist: Netlist,
+    clk: NetId,
+    stop: NetId,
+    resetb: NetId,
+    enable: NetId,
+    init: Vec<NetId>,
+    load: NetId,
+    memory: Vec<NetId>,
+    counter_reset: NetId,
+    counter_clk: NetId,
+    counter_out: Vec<NetId>,
+    local_stop: NetId,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let config = SensorConfig::default();
+        let netlist = circuit(&config);
+        let probes = Probes::at(&netlist, "");
+        let net = |probe| probes.net(probe);
+        Bench {
+            clk: net(Probe::Clk),
+            stop: net(Probe::Stop),
+            resetb: netlist.net("RESETB").expect("a pin of the circuit"),
+            enable: net(Probe::Enable),
+            init: probes.bus(Probe::CounterInit).to_vec(),
+            load: net(Probe::MemoryLoad),
+            memory: probes.bus(Probe::Memory).to_vec(),
+            counter_reset: net(Probe::CounterReset),
+            counter_clk: net(Probe::CounterClk),
+            counter_out: probes.bus(Probe::CounterOut).to_vec(),
+            local_stop: net(Probe::LocalStop),
+            timing: ChipTiming::of(&config),
+            config,
+            netlist,
+        }
+    }
+
+    fn kernel(&self) -> Kernel {
+        Kernel::new(
+            &self.netlist,
+            &Timing::nominal(&self.netlist, &Library::default(), self.config.corner),
+        )
+    }
+
+    /// Power-up: everything low but CLK, and RESETB released at [`RESET_END`].
+    fn power_up(&self) -> Vec<Drive> {
+        let start = |net, value: bool| Drive::new(Time::ZERO, net, value);
+        let mut drives: Vec<Drive> = self.init.iter().map(|&net| start(net, false)).collect();
+        drives
+            .extend([self.stop, self.resetb, self.enable, self.load].map(|net| start(net, false)));
+        drives.push(start(self.clk, true));
+        drives.push(Drive::new(RESET_END, self.resetb, true));
+        drives
+    }
+
+    /// COUNTER_INIT at `time`, a pulse of MEMORY_LOAD after it; returns the pulse's rise.
+    fn load(&self, drives: &mut Vec<Drive>, time: Time, value: u64) -> Time {
+        let bit = |(i, &net): (usize, &NetId)| Drive::new(time, net, value >> i & 1 == 1);
+        drives.extend(self.init.iter().enumerate().map(bit));
+        let rise = time + Time::from_ns(2);
+        drives.push(Drive::new(rise, self.load, true));
+        drives.push(Drive::new(rise + Time::from_ns(2), self.load, false));
+        rise
+    }
+}
+
+/// P-counter and timing block, connected as in a macropixel.
+fn circuit(config: &SensorConfig) -> Netlist {
+    let mut m = ModuleBuilder::new("tb_p_counter");
+    let clk = [m.input("CLK")];
+    let stop = [m.input("STOP")];
+    let resetb = [m.input("RESETB")];
+    let enable = [m.input("ENABLE")];
+    let init = m.input_bus("COUNTER_INIT", config.counter_bits);
+    let load = [m.input("MEMORY_LOAD")];
+    let local_stop = [m.output("LOCAL_STOP")];
+    let counter_clk = [m.wire("COUNTER_CLK")];
+    let counter_reset = [m.wire("COUNTER_RESET")];
+    let memory_reset = [m.wire("MEMORY_RESET")];
+    m.instance(
+        "p_counter_timing",
+        &p_counter_timing::circuit(config.after_borrow),
+        &[
+            ("CLK", &clk),
+            ("STOP", &stop),
+            ("RESETB", &resetb),
+            ("ENABLE", &enable),
+            ("LOCAL_STOP", &local_stop),
+            ("COUNTER_CLK", &counter_clk),
+            ("COUNTER_RESET", &counter_reset),
+            ("MEMORY_RESET", &memory_reset),
+        ],
+    );
+    m.instance(
+        "p_counter",
+        &p_counter::circuit(config),
+        &[
+            ("COUNTER_INIT", &init),
+            ("MEMORY_LOAD", &load),
+            ("MEMORY_RESET", &memory_reset),
+            ("COUNTER_CLK", &counter_clk),
+            ("COUNTER_RESET", &counter_reset),
+            ("LOCAL_STOP", &local_stop),
+        ],
+    );
+    Netlist::elaborate(&m.finish().expect("the testbench's circuit is whole"))
+}
+
+/// Counts changes to X.
+#[derive(Default)]
+struct Unknowns(usize);
+
+impl Observer for Unknowns {
+    fn change(&mut self, _: Time, _: NetId, value: Logic) {
+        self.0 += (value == Logic::X) as usize;
+    }
+}
+
+/// Cycles 0 and 1 count from [`FIRST`], cycle 2 is disabled and loads [`SECOND`], cycles 3 and 4 count from it,
+/// and then STOP stays away.
+fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
+    let Bench { timing, .. } = bench;
+    let exposure = Exposure::new(&bench.config, STOP_PERIODS as u32, 5);
+    let stop = |cycle: i64| ORIGIN + exposure.stop(cycle);
+    let falling = |cycle: i64, k: i64| ORIGIN + exposure.falling(cycle * STOP_PERIODS + k);
+    let end = stop(4) + exposure.clock.periods(STOP_PERIODS + HOLD_PERIODS);
+
+    let mut drives = bench.power_up();
+    let loads = [
+        (FIRST, bench.load(&mut drives, Time::from_ns(5), FIRST)),
+        (
+            SECOND,
+            bench.load(&mut drives, stop(2) + Time::from_ns(8), SECOND),
+        ),
+    ];
+    for cycle in 0..5 {
+        drives.push(Drive::new(stop(cycle), bench.stop, true));
+        let fall = ORIGIN + exposure.stop_fall(cycle);
+        drives.push(Drive::new(fall, bench.stop, false));
+    }
+    for (cycle, enabled) in [(0, true), (2, false), (3, true)] {
+        drives.push(Drive::new(stop(cycle), bench.enable, enabled));
+    }
+    // CLK runs from the release of the reset on.
+    let half_periods = 2 * (5 * STOP_PERIODS + HOLD_PERIODS);
+    let clock_edges = clock(bench.clk, exposure.clock, ORIGIN, -12, half_periods);
+    drives.extend(clock_edges);
+
+    let mut stimulus = in_order(drives);
+    let mut kernel = bench.kernel();
+    let mut recorder = Recorder::new((0..bench.netlist.net_count()).map(NetId::new));
+    let mut unknowns = Unknowns::default();
+    let mut unknown_at_release = 0;
+    let view = view(stop(0), stop(5));
+    write_waves(waves, &bench.netlist, &view, |waves| {
+        kernel.run(&mut stimulus, RESET_END, &mut (&mut recorder, &mut *waves));
+        let nets = (0..bench.netlist.net_count()).map(NetId::new);
+        unknown_at_release = nets.filter(|&net| kernel.value(net) == Logic::X).count();
+        let mut observers = ((&mut recorder, &mut unknowns), waves);
+        kernel.run(&mut stimulus, end, &mut observers);
+        end
+    })?;
+
+    checks.equal(
+        "unknown nets when RESETB is released",
+        0,
+        unknown_at_release,
+    );
+    checks.equal("changes to X after that", 0, unknowns.0);
+    for (value, rise) in loads {
+        let after = rise + timing.clk_to_shift;
+        let found = (
+            recorder.number_at(&bench.memory, after - Time::from_fs(1)),
+            recorder.number_at(&bench.memory, after),
+        );
+        let is_new = found.0 != found.1 && found.1 == Some(value);
+        let what = format!("MEMORY, clk-to-Q after MEMORY_LOAD rises with {value}");
+        checks.that(what, value, shown(found.1), is_new);
+        let what = format!("COUNTER_OUT follows it to {value} without COUNTER_CLK");
+        let found = recorder.number_at(&bench.counter_out, after + timing.stop_to_reset);
+        checks.equal(what, shown(Some(value)), shown(found));
+    }
+    let local_stops = recorder.rising_edges(bench.local_stop);
+    let falls = recorder.falling_edges(bench.local_stop);
+    let disabled = |t: &&Time| (stop(2)..stop(3)).contains(*t) || **t < stop(0);
+    let while_disabled = local_stops.iter().filter(disabled).count();
+    checks.equal("LOCAL_STOP rises while disabled", 0, while_disabled);
+    let clocked = recorder.rising_edges(bench.counter_clk);
+    let found = clocked.iter().filter(disabled).count();
+    checks.equal("COUNTER_CLK rises while disabled", 0, found);
+
+    let reset_to_q = Library::default().delay(CellKind::Dffr, 2, Logic::Zero, bench.config.corner);
+    let rises = recorder.rising_edges(bench.counter_reset);
+    let releases = recorder.falling_edges(bench.counter_reset);
+    let half_period = exposure.clock.half_periods(1);
+    for (cycle, start) in [(0, FIRST), (1, FIRST), (3, SECOND), (4, SECOND)] {
+        let next = if cycle == 4 { end } else { stop(cycle + 1) };
+        let within = |t: &&Time| (stop(cycle)..next).contains(*t);
+        let relative = |t: &Time| *t - stop(cycle);
+        let in_reset = stop(cycle) + timing.stop_to_reset_release - Time::from_fs(1);
+        let found = recorder.number_at(&bench.counter_out, in_reset);
+        let what = format!("cycle {cycle}: COUNTER_OUT when COUNTER_RESET falls");
+        checks.equal(what, shown(Some(start)), shown(found));
+
+        // Every count is read half a period after its edge, when the ripple is over.
+        let mut model = p_counter::Model::new(&bench.config, start as u16);
+        let expected = std::iter::from_fn(|| {
+            (!model.local_stop()).then(|| {
+                model.clock();
+                model.counter_out()
+            })
+        });
+        let edges = clocked.iter().filter(within).filter(|t| **t > in_reset);
+        let found = edges.map(|&t| recorder.number_at(&bench.counter_out, t + half_period));
+        checks.equal(
+            format!("cycle {cycle}: COUNTER_OUT after each rise of COUNTER_CLK"),
+            sequence(expected.map(Some)),
+            sequence(found),
+        );
+        let found: Vec<Time> = local_stops.iter().filter(within).map(relative).collect();
+        checks.equal(format!("cycle {cycle}: LOCAL_STOP rises"), 1, found.len());
+        let edge = falling(cycle, start as i64 + 1);
+        let expected = edge + timing.ripple() - stop(cycle);
+        let what = format!(
+            "cycle {cycle}: LOCAL_STOP rises after STOP, by CLK fall {}",
+            start + 1
+        );
+        checks.times(what, expected, &found);
+        if cycle != 4 {
+            let expected = next + timing.stop_to_reset + reset_to_q;
+            let after_rise = |t: &&Time| **t > edge;
+            let found = falls.iter().find(after_rise).copied().unwrap_or(Time::ZERO);
+            let what = format!("cycle {cycle}: LOCAL_STOP falls after the next STOP");
+            checks.time(what, expected - next, found - next);
+        }
+        let found: Vec<Time> = releases
+            .iter()
+            .filter(within)
+            .take(1)
+            .map(relative)
+            .collect();
+        let what = format!("cycle {cycle}: COUNTER_RESET falls after STOP");
+        checks.times(what, timing.stop_to_reset_release, &found);
+        // Before cycles 0 and 3 the reset is held from the disabled time on.
+        if cycle == 1 || cycle == 4 {
+            let found: Vec<Time> = rises.iter().filter(within).map(relative).collect();
+            let what = format!("cycle {cycle}: COUNTER_RESET rises after STOP");
+            checks.times(what, timing.stop_to_reset, &found);
+        }
+    }
+    let last_rise = local_stops.last().copied().unwrap_or(end);
+    let held = recorder.value_at(bench.local_stop, end) == Logic::One;
+    let clocked_since = clocked.iter().filter(|&&t| t > last_rise).count();
+    let fallen_since = falls.iter().filter(|&&t| t > last_rise).count();
+    let quiet = recorder.falling_edges(bench.clk);
+    let quiet = quiet.iter().filter(|&&t| t > last_rise).count();
+    checks.that(
+        "CLK periods without STOP for which LOCAL_STOP stays high",
+        format!("at least {HOLD_PERIODS}"),
+        quiet,
+        held && fallen_since == 0 && quiet as i64 >= HOLD_PERIODS,
+    );
+    checks.equal("COUNTER_CLK rises in that time", 0, clocked_since);
+    Ok(())
+}
+
+fn view(first_stop: Time, last: Time) -> Layout {
+    let binary = |probe: Probe| Entry::binary(probe.path(""));
+    let decimal = |probe: Probe| Entry::decimal(probe.path(""));
+    let inputs = [
+        Entry::binary("RESETB"),
+        binary(Probe::Enable),
+        binary(Probe::Clk),
+        binary(Probe::Stop),
+        decimal(Probe::CounterInit),
+        binary(Probe::MemoryLoad),
+    ];
+    let counter = [
+        decimal(Probe::Memory),
+        binary(Probe::CounterReset),
+        binary(Probe::CounterClk),
+        decimal(Probe::CounterOut),
+        binary(Probe::LocalStop),
+    ];
+    Layout {
+        groups: vec![
+            Group::new("Global signals", inputs),
+            Group::new("P-counter (Fig. 54)", counter),
+        ],
+        zoom: (Time::ZERO, last),
+        marker: Some(first_stop),
+    }
+}
+
+/// Loads every start value and counts it out twice, the second time from a counter that has rolled over.
+fn every_start_value(bench: &Bench, checks: &mut Checks) {
+    const LOAD_PERIODS: i64 = 4;
+    const AFTER_BORROW: i64 = 3;
+    let (config, timing) = (&bench.config, &bench.timing);
+    let exposure = Exposure::new(config, 2, 1);
+    let at = |period: i64| ORIGIN + exposure.falling(period);
+    let mut drives = bench.power_up();
+    let mut cycles = Vec::new();
+    let mut period = 0;
+    for start in 0..=config.largest_start() as i64 {
+        drives.push(Drive::new(at(period), bench.enable, false));
+        bench.load(&mut drives, at(period), start as u64);
+        period += LOAD_PERIODS;
+        drives.push(Drive::new(at(period), bench.enable, true));
+        for _ in 0..2 {
+            drives.push(Drive::new(at(period), bench.stop, true));
+            drives.push(Drive::new(at(period + 1), bench.stop, false));
+            cycles.push((start, period));
+            period += start + AFTER_BORROW;
+        }
+    }
+    drives.extend(clock(bench.clk, exposure.clock, ORIGIN, 0, 2 * period));
+    let mut recorder = Recorder::new(bench.counter_out.iter().copied().chain([bench.local_stop]));
+    bench
+        .kernel()
+        .run(&mut in_order(drives), at(period), &mut recorder);
+
+    let rises = recorder.rising_edges(bench.local_stop);
+    let expected = cycles.len();
+    let what = format!(
+        "start values 0 to {}, twice each: LOCAL_STOPs",
+        config.largest_start()
+    );
+    checks.equal(what, expected, rises.len());
+    let ripple = |(&rise, &(start, stop)): (&Time, &(i64, i64))| rise - at(stop + start + 1);
+    let ripples: Vec<Time> = rises.iter().zip(&cycles).map(ripple).collect();
+    checks.times(
+        "ripple, CLK fall start + 1 to LOCAL_STOP, of all",
+        timing.ripple(),
+        &ripples,
+    );
+    const PUBLISHED: Time = Time::from_ps(1200);
+    let worst = ripples.iter().copied().max().unwrap_or(Time::ZERO);
+    let off = (worst - PUBLISHED).as_s() / PUBLISHED.as_s();
+    checks.that(
+        "worst ripple against the published one (4.6, Fig. 56)",
+        format!("{PUBLISHED} within 1 %"),
+        format!("{worst}, {:+.2} %", 100.0 * off),
+        off.abs() < 0.01,
+    );
+
+    // Outputs on their way back to the start value are edges for the next stage, too.
+    let last_change = |stop: i64| {
+        let stop = at(stop);
+        let changes = recorder.changes();
+        let until = changes.partition_point(|c| c.0 <= stop + exposure.clock.half_periods(1));
+        let back = changes[..until]
+            .iter()
+            .rev()
+            .find(|c| c.1 != bench.local_stop);
+        back.map_or(Time::ZERO, |c| (c.0 - stop).max(Time::ZERO))
+    };
+    let settled = cycles.iter().map(|&(_, stop)| last_change(stop)).max();
+    let settled = settled.unwrap_or(Time::MAX);
+    checks.that(
+        "latest change of COUNTER_OUT by a reset, after STOP",
+        format!(
+            "before {}, COUNTER_RESET's fall",
+            timing.stop_to_reset_release
+        ),
+        settled,
+        Time::ZERO < settled && settled < timing.stop_to_reset_release,
+    );
+}
+
+/// A number, or X.
+fn shown(number: Option<u64>) -> String {
+    number.map_or("X".to_owned(), |n| n.to_string())
+}
+
+/// Numbers in a row.
+fn sequence(numbers: impl Iterator<Item = Option<u64>>) -> String {
+    numbers.map(shown).collect::<Vec<_>>().join(" ")
+}
