@@ -12,5 +12,5 @@ mod verilog;
 
 pub use hardware_events::{HardwareEvent, HardwareEventKind, HardwareEventReport, HardwareEvents};
 pub(crate) use stimulus::load_stimulus;
-pub use stimulus::{Schedule, StimulusPlan};
+pub use stimulus::{Schedule, Skip, StimulusPlan};
 pub use verilog::{export_annotated_verilog, export_netlist, export_verilog};

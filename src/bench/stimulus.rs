@@ -13,6 +13,8 @@
 //!
 //! The same drives go into the event kernel and into the exported Verilog testbench.
 
+use std::collections::BTreeSet;
+
 use bitvec::slice::BitSlice;
 
 use crate::chip::{Exposure, LoadPins, Mode, Sensor, SensorPins, load_path};
@@ -71,13 +73,40 @@ pub struct Schedule {
     pub end: Time,
 }
 
+/// Laser cycles that are left out: after the load comes the end of one of them, and then the rest of the exposure, at the
+/// times that it has in the whole one.
+///
+/// ```text
+///   STOP      ▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▔▔▔▔▁▁▁▁▔▔▔▔   first laser cycle, the next one, …
+///   CLK       ▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▁▔▁▔▁▔▁▔▁▔▁▔▁▔▁▔▁▔▁▔   `lead_periods` before it
+///   SPAD_RAW  ▁▁▁▁▁▁▁▁▁▔▔▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▁▔▔▁▁▁▁▁▔▔▁▁▁▁▁▔▔▁   one pulse where an odd number is left out
+///                     origin        at rest
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Skip {
+    /// The first laser cycle that is driven.
+    pub first_cycle: u32,
+    /// CLK periods that are driven before it.
+    pub lead_periods: u32,
+}
+
+impl Skip {
+    /// Falling CLK edge with which CLK sets in.
+    fn first_edge(self, exposure: &Exposure) -> i64 {
+        i64::from(self.first_cycle) * i64::from(exposure.stop_periods)
+            - i64::from(self.lead_periods)
+    }
+}
+
 /// Everything that is driven into one sensor for one frame.
+#[derive(Clone)]
 pub struct StimulusPlan {
     sensor: Sensor,
     exposure: Exposure,
     stream: bitvec::vec::BitVec,
     pulses: Vec<(usize, SpadEvent)>,
     schedule: Schedule,
+    skip: Option<Skip>,
 }
 
 impl StimulusPlan {
@@ -118,7 +147,22 @@ impl StimulusPlan {
             stream,
             pulses: all,
             schedule,
+            skip: None,
         }
+    }
+
+    /// The same without some laser cycles, and when the chip is at rest before the others: whatever was to be counted until then
+    /// can be set. `None` if there is no time for that.
+    #[must_use]
+    pub fn skipping(self, skip: Skip) -> Option<(Self, Time)> {
+        let resumes = self.exposure.falling(skip.first_edge(&self.exposure));
+        let rest = resumes - self.exposure.clock.period();
+        let settled = self.sensor.dead_time() + SETTLING;
+        (rest > settled).then(|| {
+            let rest = self.schedule.origin + rest;
+            let skip = Some(skip);
+            (StimulusPlan { skip, ..self }, rest)
+        })
     }
 
     /// Where load and exposure lie in simulation time.
@@ -170,11 +214,12 @@ impl StimulusPlan {
         let exposure = self.exposure;
         let origin = self.schedule.origin - exposure.stop_phase;
         let periods = exposure.laser_cycles as i64 * exposure.stop_periods as i64;
+        let first = self.skip.map_or(0, |skip| skip.first_edge(&exposure));
         let edges = clock(
             pins.clk,
             exposure.clock,
             origin,
-            0,
+            2 * first,
             2 * periods + LAST_HALF_PERIODS + 1,
         );
         std::iter::once(Drive::new(Time::ZERO, pins.clk, true)).chain(edges)
@@ -183,7 +228,8 @@ impl StimulusPlan {
     fn stop(&self, pins: &SensorPins) -> impl Iterator<Item = Drive> + Send + use<> {
         let (exposure, origin, stop) = (self.exposure, self.schedule.origin, pins.stop);
         let last = exposure.laser_cycles as i64;
-        let edges = (0..=last).flat_map(move |cycle| {
+        let first = self.skip.map_or(0, |skip| i64::from(skip.first_cycle));
+        let edges = (first..=last).flat_map(move |cycle| {
             let fall = if cycle == last {
                 exposure.stop(cycle) + exposure.clock.periods(1)
             } else {
@@ -201,13 +247,31 @@ impl StimulusPlan {
         let (origin, dead_time) = (self.schedule.origin, self.sensor.dead_time());
         let (nets, spads) = (pins.spad_raw.clone(), self.sensor.spads());
         let end = self.schedule.end;
+        let net =
+            move |(pixel, pulse): &(usize, SpadEvent)| nets[pixel * spads + pulse.spad as usize];
+        let (left_out, driven) = match self.skip {
+            None => (&[][..], &self.pulses[..]),
+            Some(skip) => {
+                let from = self.exposure.falling(skip.first_edge(&self.exposure));
+                let driven = self.pulses.partition_point(|(_, pulse)| pulse.time < from);
+                self.pulses.split_at(driven)
+            }
+        };
+        let mut odd = BTreeSet::new();
+        for net in left_out.iter().map(&net) {
+            if !odd.insert(net) {
+                odd.remove(&net);
+            }
+        }
         let edges = move |offset: Time, value: bool| {
-            let nets = nets.clone();
-            let drives = self.pulses.iter().map(move |(pixel, pulse)| {
-                let net = nets[pixel * spads + pulse.spad as usize];
-                Drive::new(origin + pulse.time + offset, net, value)
-            });
-            boxed(drives.take_while(move |d| d.time <= end))
+            let (net, odd) = (net.clone(), odd.clone());
+            let odd = odd
+                .into_iter()
+                .map(move |net| Drive::new(origin + offset, net, value));
+            let drives = driven
+                .iter()
+                .map(move |pulse| Drive::new(origin + pulse.1.time + offset, net(pulse), value));
+            boxed(odd.chain(drives.take_while(move |d| d.time <= end)))
         };
         merge([edges(Time::ZERO, true), edges(dead_time, false)])
     }

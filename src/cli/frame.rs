@@ -190,29 +190,9 @@ fn chosen_probes(
     }
     let mut probes = Vec::new();
     for text in texts.iter().filter(|text| *text != "none") {
-        let place = text
-            .split_once(',')
-            .and_then(|(row, col)| Some((row.trim().parse().ok()?, col.trim().parse().ok()?)));
-        match place {
-            Some((row, col)) if row < sensor.rows && col < sensor.cols => {
-                if !probes.contains(&(row, col)) {
-                    probes.push((row, col));
-                }
-            }
-            Some((row, col)) => {
-                let message = format!(
-                    "macropixel ({row}, {col}) is outside the {}x{} array; give rows 0 to {} and columns 0 to {}",
-                    sensor.rows,
-                    sensor.cols,
-                    sensor.rows - 1,
-                    sensor.cols - 1
-                );
-                return Err(InputError::new("--probe", message));
-            }
-            None => {
-                let message = format!("{text:?} is no macropixel; give row,col such as 10,20");
-                return Err(InputError::new("--probe", message));
-            }
+        let place = super::pixel("--probe", text, sensor)?;
+        if !probes.contains(&place) {
+            probes.push(place);
         }
     }
     Ok(Some(probes))

@@ -13,6 +13,7 @@ mod silicon;
 mod speed;
 mod tb;
 mod timing;
+mod wave;
 mod wording;
 
 pub use tb::testbench;
@@ -23,7 +24,8 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use self::settings::{SceneArgs, SensorArgs};
-use crate::files::clean_up_when_interrupted;
+use crate::chip::SensorConfig;
+use crate::files::{InputError, clean_up_when_interrupted};
 
 /// A guided direct time-of-flight lidar chip, simulated down to gates and flip-flops.
 #[derive(Parser)]
@@ -53,6 +55,8 @@ enum Command {
     Sensor(SensorArgs),
     /// Print the scene as a commented file: every key with its unit, range and source.
     Scene(SceneArgs),
+    /// Replay one laser cycle of one macropixel of a frame that was taken, as a waveform.
+    Wave(wave::WaveArgs),
     /// Run the testbenches of the chip's blocks, all or those named.
     Tb(tb::TbArgs),
     /// Write the chip for other tools.
@@ -70,6 +74,7 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Tb(args) => return finish(tb::run(&args)),
         Command::Frame(args) => frame::run(&args),
+        Command::Wave(args) => wave::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Reproduce(args) => reproduce::run(&args),
         Command::Range(args) => range::run(&args),
@@ -94,6 +99,28 @@ fn finish(result: anyhow::Result<ExitCode>) -> ExitCode {
             ExitCode::from(if wording::is_bad_input(&error) { 2 } else { 1 })
         }
     }
+}
+
+/// The macropixel that an option names as row,col.
+///
+/// # Errors
+/// When it is none of the array.
+fn pixel(option: &str, text: &str, sensor: &SensorConfig) -> Result<(usize, usize), InputError> {
+    let place = text
+        .split_once(',')
+        .and_then(|(row, col)| Some((row.trim().parse().ok()?, col.trim().parse().ok()?)));
+    let message = match place {
+        Some((row, col)) if row < sensor.rows && col < sensor.cols => return Ok((row, col)),
+        Some((row, col)) => format!(
+            "macropixel ({row}, {col}) is outside the {}x{} array; give rows 0 to {} and columns 0 to {}",
+            sensor.rows,
+            sensor.cols,
+            sensor.rows - 1,
+            sensor.cols - 1
+        ),
+        None => format!("{text:?} is no macropixel; give row,col such as 10,20"),
+    };
+    Err(InputError::new(option, message))
 }
 
 /// Writes to standard output, whose reader may have gone away.

@@ -7,13 +7,14 @@ use super::{
     Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay, follows,
     full_stream,
 };
-use crate::bench::{HardwareEvents, Schedule, StimulusPlan};
+use crate::bench::{HardwareEvents, Schedule, Skip, StimulusPlan};
 use crate::chip::{
     Exposure, Probe, Probes, Sensor, SensorPins, Silicon, WindowLaw, array, front_end,
 };
 use crate::kernel::{Kernel, LANES, Observer, Policy, Statistics, TimingChecks};
 use crate::netlist::{NetId, Netlist, Timing};
 use crate::photon::{PhotonStream, SpadEvent};
+use crate::units::Time;
 
 /// A rectangle of the sensor at gate level, loaded and exposed through its pins.
 pub struct GateSimulation {
@@ -24,6 +25,8 @@ pub struct GateSimulation {
     timing: Timing,
     kernel: Kernel,
     plan: StimulusPlan,
+    /// When counts are set that would have come of laser cycles that are left out, and the flip-flops of those counts.
+    preset: Option<(Time, Vec<(usize, bool)>)>,
 }
 
 impl GateSimulation {
@@ -51,6 +54,7 @@ impl GateSimulation {
             timing,
             kernel,
             plan: StimulusPlan::new(&sensor, exposure, size.1, starts, pulses),
+            preset: None,
             sensor,
         }
     }
@@ -67,6 +71,26 @@ impl GateSimulation {
     /// after [`GateSimulation::with_timing`].
     pub fn shuffled(mut self, seed: u64) -> Self {
         self.kernel = self.kernel.shuffled(seed);
+        self
+    }
+
+    /// The same simulation without the laser cycles before `skip`, in which the macropixels count what `counted` has,
+    /// row-major. As it is where there is no time to set that.
+    #[must_use]
+    pub(super) fn skipping(mut self, skip: Skip, counted: &Histograms) -> Self {
+        let Some((plan, rest)) = self.plan.clone().skipping(skip) else {
+            return self;
+        };
+        let netlist = &self.netlist;
+        let states = self.probes.iter().enumerate().flat_map(|(pixel, probes)| {
+            let counts = counted[pixel].iter().enumerate();
+            counts.flat_map(move |(bin, &count)| {
+                let cells = probes.bin_cells(netlist, bin).into_iter().enumerate();
+                cells.map(move |(bit, cell)| (cell, count >> bit & 1 == 1))
+            })
+        });
+        self.preset = Some((rest, states.collect()));
+        self.plan = plan;
         self
     }
 
@@ -98,10 +122,18 @@ impl GateSimulation {
 
     /// Simulates load and exposure to the end.
     pub fn run<O: Observer>(&mut self, observer: &mut O) {
+        self.run_until(self.plan.schedule().end, observer);
+    }
+
+    /// Simulates from power-up to `until`.
+    pub(super) fn run_until<O: Observer>(&mut self, until: Time, observer: &mut O) {
         let pins = SensorPins::of(&self.netlist);
         let mut stimulus = self.plan.stimulus(&pins);
-        let end = self.plan.schedule().end;
-        self.kernel.run(&mut stimulus, end, observer);
+        if let Some((rest, states)) = self.preset.take() {
+            self.kernel.run(&mut stimulus, rest, observer);
+            self.kernel.preset(states, observer);
+        }
+        self.kernel.run(&mut stimulus, until, observer);
     }
 
     /// What the simulation did so far.

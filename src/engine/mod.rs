@@ -21,6 +21,7 @@ mod exposing;
 mod gate;
 mod histograms;
 mod lanes;
+mod late_cycle;
 pub mod load;
 mod timed;
 pub mod waveform;
@@ -36,6 +37,7 @@ pub use exposing::{
 pub use gate::{Gate, GateSimulation};
 pub use histograms::Histograms;
 pub use lanes::LaneSimulation;
+pub use late_cycle::late_cycle;
 pub use timed::{ClosedFormCoverage, Doubt, Runner, Timed};
 pub use window::Window;
 

@@ -107,6 +107,8 @@ pub struct View {
     around: (Time, Time),
     /// From when to when changes are kept; from power-up if the beginning is not after the first rising edge of STOP.
     kept: RangeInclusive<Time>,
+    /// Whether the simulation may end with what is kept.
+    is_part: bool,
 }
 
 impl View {
@@ -127,6 +129,7 @@ impl View {
                 exposure.clock.periods(after),
             ),
             kept: Time::ZERO..=Time::MAX,
+            is_part: false,
         }
     }
 
@@ -140,19 +143,40 @@ impl View {
         cycles: WaveCycles,
     ) -> Self {
         let (from, until) = cycles.around(config, exposure, start, pulses);
-        let stop = |cycle| match cycle {
-            // The counts of the last laser cycle settle after its end.
-            cycle if cycle >= i64::from(exposure.laser_cycles) => Time::MAX,
-            cycle => exposure.stop(cycle),
-        };
         View {
-            kept: stop(from)..=stop(until),
+            kept: stop(exposure, from)..=stop(exposure, until),
             ..Self::of_array(vec![pixel], config, exposure, start)
+        }
+    }
+
+    /// One laser cycle of one macropixel with its start value, and nothing after it.
+    pub fn of_cycle(
+        pixel: (usize, usize),
+        config: &SensorConfig,
+        exposure: &Exposure,
+        start: u16,
+        cycle: u32,
+    ) -> Self {
+        let cycle = i64::from(cycle);
+        let whole = Self::of_array(vec![pixel], config, exposure, start);
+        View {
+            closing: exposure.stop(cycle) + whole.closing,
+            kept: stop(exposure, cycle)..=stop(exposure, cycle + 1),
+            is_part: true,
+            ..whole
         }
     }
 }
 
-/// Runs `simulation` to its end with every named net in the file `waves` (and `observer` watching, too), and writes the
+/// The rising STOP edge of a laser cycle. The counts of the exposure's last one settle after its end.
+fn stop(exposure: &Exposure, cycle: i64) -> Time {
+    match cycle {
+        cycle if cycle >= i64::from(exposure.laser_cycles) => Time::MAX,
+        cycle => exposure.stop(cycle),
+    }
+}
+
+/// Runs `simulation` to its end, or that of a view of one laser cycle, with every named net in the file `waves` (and `observer` watching, too), and writes the
 /// views beside it.
 ///
 /// # Errors
@@ -175,10 +199,14 @@ pub fn record<O: Observer>(
         _ => Time::ZERO..=at(*view.kept.end()),
     };
     let netlist = Arc::clone(simulation.netlist());
-    let mut first_hit = FirstHit::new(&netlist, &view.pixels, origin);
+    let mut first_hit = FirstHit::new(&netlist, &view.pixels, origin.max(*span.start()));
     let mut file = WaveFile::create(waves, format, &netlist, &Selection::all(), span.clone())?;
-    simulation.run(&mut (&mut file, (&mut first_hit, observer)));
-    file.finish(schedule.end)?;
+    let end = match view.is_part {
+        true => *span.end(),
+        false => schedule.end,
+    };
+    simulation.run_until(end, &mut (&mut file, (&mut first_hit, observer)));
+    file.finish(end)?;
     let found = first_hit.found.filter(|(time, _)| span.contains(time));
     let (marker, pixel) = found.unwrap_or((origin + view.closing, view.pixels[0]));
     let layout = Layout {
@@ -193,12 +221,13 @@ pub fn record<O: Observer>(
 struct FirstHit {
     /// Macropixel of every net that is a HIT.
     hits: Vec<Option<(usize, usize)>>,
-    origin: Time,
+    /// Those before it, of power-up or of what is not kept, do not count.
+    from: Time,
     found: Option<(Time, (usize, usize))>,
 }
 
 impl FirstHit {
-    fn new(netlist: &Netlist, pixels: &[(usize, usize)], origin: Time) -> Self {
+    fn new(netlist: &Netlist, pixels: &[(usize, usize)], from: Time) -> Self {
         let mut hits = vec![None; netlist.net_count()];
         for &(row, col) in pixels {
             let probes = Probes::of_macropixel(netlist, row, col);
@@ -208,7 +237,7 @@ impl FirstHit {
         }
         FirstHit {
             hits,
-            origin,
+            from,
             found: None,
         }
     }
@@ -217,7 +246,7 @@ impl FirstHit {
 impl Observer for FirstHit {
     #[inline]
     fn change(&mut self, time: Time, net: NetId, value: Logic) {
-        if self.found.is_none() && value == Logic::One && time >= self.origin {
+        if self.found.is_none() && value == Logic::One && time >= self.from {
             self.found = self.hits[net.index()].map(|pixel| (time, pixel));
         }
     }

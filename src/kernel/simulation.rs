@@ -189,6 +189,51 @@ impl Kernel {
         self.schedule(outputs[1], inverted, &delays);
     }
 
+    /// Gives flip-flops (index of their cell) another state and lets everything that follows from it follow, without time
+    /// passing and without a clock edge: the netlist afterwards is as if they had come by it earlier. `observer` hears
+    /// of the nets that changed.
+    ///
+    /// Only at rest: no change may be on its way, and what follows must not reach a reset or set.
+    pub fn preset<O: Observer>(
+        &mut self,
+        states: impl IntoIterator<Item = (usize, bool)>,
+        observer: &mut O,
+    ) {
+        debug_assert!(
+            self.wheel.next_time(i64::MAX).is_none(),
+            "changes are on their way"
+        );
+        let mut changes: Vec<(u32, u8)> = Vec::new();
+        for (cell, state) in states {
+            let cell = &mut self.cells[cell];
+            debug_assert!(cell.kind.is_flip_flop(), "only a flip-flop has a state");
+            let state = Logic::from(state);
+            cell.state = state.bits();
+            let [q, q_n] = cell.outputs;
+            changes.extend([(q, state.bits()), (q_n, state.inverted().bits())]);
+        }
+        while let Some((net, value)) = changes.pop() {
+            let Some(state) = self.nets.get_mut(net as usize) else {
+                continue;
+            };
+            if state.value == value {
+                continue;
+            }
+            state.value = value;
+            state.clock_before = value;
+            let (net, value) = (NetId::new(net as usize), Logic::from_bits(value));
+            observer.change(Time::from_fs(self.now_fs), net, value);
+            for &load in self.fan_out.active.of(net.index()) {
+                let cell = &mut self.cells[load.cell()];
+                debug_assert!(!cell.kind.is_flip_flop(), "a reset or set");
+                let shift = 2 * load.pin();
+                cell.inputs = cell.inputs & !(3 << shift) | value.bits() << shift;
+                cell.evaluated = cell.inputs;
+                changes.push((cell.outputs[0], self.tables.gate(cell.kind, cell.inputs)));
+            }
+        }
+    }
+
     fn settle<O: Observer>(&mut self, observer: &mut O) {
         for _ in 0..MOST_DELTA_CYCLES {
             if self.shuffle.is_some() {

@@ -30,7 +30,17 @@ use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
 use crate::waves::WaveFormat;
 
 /// Which engine runs the macropixels that are not probed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, clap::ValueEnum)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Default,
+    serde::Serialize,
+    serde::Deserialize,
+    clap::ValueEnum,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum EngineKind {
     /// Event-driven simulation of the netlist with its delays.

@@ -9,6 +9,7 @@ mod remark;
 mod result;
 mod speed;
 mod summary;
+mod taken;
 mod tolerance;
 
 pub use distance::DistanceLaw;
@@ -17,4 +18,5 @@ pub use pixel::{NoDepth, PixelDepth};
 pub use result::{Frame, PhaseTimes};
 pub use speed::{SPEED_LASER_CYCLES, SpeedCase, SpeedFrame};
 pub use summary::Summary;
+pub use taken::{TakenFrame, TakenPixel};
 pub use tolerance::{Kept, OnWindow, Tolerance};

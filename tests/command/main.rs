@@ -10,3 +10,4 @@ mod real_histograms_are_ranged;
 #[cfg(unix)]
 mod results_are_one_set;
 mod run_time_against_error;
+mod wave_replays_a_cycle;

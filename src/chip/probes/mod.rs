@@ -265,6 +265,22 @@ impl Probes {
         &self.bins[bin]
     }
 
+    /// The flip-flops of a bin's count, bit 0 first.
+    ///
+    /// # Panics
+    /// When the circuit does not have it.
+    pub fn bin_cells(&self, netlist: &Netlist, bin: usize) -> Vec<usize> {
+        let cell = |bit| {
+            join([
+                &self.path,
+                "histogram",
+                &format!("bin_{bin}"),
+                &format!("bit_{bit}"),
+            ])
+        };
+        cells(netlist, (0..self.bin(bin).len()).map(cell))
+    }
+
     /// The toggle flip-flop of each SPAD.
     pub fn toggle_cells(&self, netlist: &Netlist) -> Vec<usize> {
         let cell = |spad| spad_path(&self.path, spad) + ".toggle";

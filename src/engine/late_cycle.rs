@@ -1,0 +1,82 @@
+//! One laser cycle of an exposure at gate level, without the ones before it.
+//!
+//! ```text
+//!   power-up, load │ at rest: counts of cycles 0 … k−2 are set │ end of cycle k−2 │ cycle k−1 │ cycle k │
+//!                                                                CLK, SPADs         all        all, as in the whole run
+//! ```
+//!
+//! A macropixel remembers little of earlier laser cycles. Each STOP edge resets its P-counter and HIT, the shift register
+//! holds the CLK periods of a window, and front ends know a SPAD's earlier pulses by their parity at most. So the end of a laser
+//! cycle, with one pulse for every SPAD that had an odd number of them before, and one whole laser cycle bring all of that
+//! to where it would be. What is left are the counts: the window engine has them, as it equals the gates, and they are set in the
+//! counters' flip-flops while the chip is at rest ([`Kernel::preset`](crate::kernel::Kernel::preset)).
+//!
+//! Where that is not so, all laser cycles are simulated: a P-counter without memory goes on through STOP edges, and some
+//! windows only gates can tell. Tests compare every change of every net with the whole run's.
+
+use super::gate::GateSimulation;
+use super::{Histograms, Replay, Window};
+use crate::bench::Skip;
+use crate::chip::{Exposure, Mode, PCounter, SensorConfig};
+use crate::photon::SpadEvent;
+
+/// Whole laser cycles that are simulated before the one that is wanted.
+const WARM_UP: u32 = 1;
+
+/// CLK periods from a SPAD's pulse to the last stage of the shift register, besides the stages. The front end takes three.
+const LATENCY: u32 = 8;
+
+/// A simulation of the macropixel `at` (row, col) that is, from the STOP edge of laser cycle `cycle` on, that of the whole
+/// exposure: same changes of every net at the same times. `start` and `pulses` are those of the whole exposure as well.
+pub fn late_cycle(
+    config: &SensorConfig,
+    exposure: &Exposure,
+    at: (usize, usize),
+    start: u16,
+    pulses: &[SpadEvent],
+    cycle: u32,
+) -> GateSimulation {
+    let whole = GateSimulation::new(config, exposure, at, (1, 1), &[start], &[pulses]);
+    let Some(first_cycle) = cycle.checked_sub(WARM_UP) else {
+        return whole;
+    };
+    match counted_before(config, exposure, start, pulses, first_cycle) {
+        None => whole,
+        Some(counted) => {
+            let busy = config.dead_time().as_fs() / exposure.clock.period().as_fs() + 1;
+            let skip = Skip {
+                first_cycle,
+                lead_periods: config.bins as u32 + LATENCY + busy as u32,
+            };
+            whole.skipping(skip, &counted)
+        }
+    }
+}
+
+/// What is counted before the STOP edge of laser cycle `cycle`, where that follows from the window law.
+fn counted_before(
+    config: &SensorConfig,
+    exposure: &Exposure,
+    start: u16,
+    pulses: &[SpadEvent],
+    cycle: u32,
+) -> Option<Histograms> {
+    if config.p_counter == PCounter::Memoryless {
+        return None;
+    }
+    // In the conventional mode the STOP edge that ends a laser cycle counts it.
+    let laser_cycles = match config.mode {
+        Mode::Guided => cycle,
+        Mode::Conventional => cycle.checked_sub(1)?,
+    };
+    if laser_cycles == 0 {
+        return None;
+    }
+    let part = Exposure {
+        laser_cycles,
+        ..*exposure
+    };
+    let end = pulses.partition_point(|pulse| pulse.time < part.end());
+    let window = Window::new(config, &part);
+    window.histograms(&[start], &[&pulses[..end]]).ok()
+}
