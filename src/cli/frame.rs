@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::{SceneArgs, say, wording};
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::WindowLaw;
-use crate::chip::{SensorConfig, Silicon};
+use crate::chip::{Mode, SensorConfig, Silicon};
 use crate::engine::waveform::WaveCycles;
 use crate::engine::{CohortOptions, Work};
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
@@ -151,7 +151,7 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     if args.json {
         say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
     } else {
-        say(table(args, &timing, &frame))?;
+        say(table(args, &settings.sensor, &timing, &frame))?;
         if let Some(remark) = &frame.remark {
             say(format_args!("\n{remark}\n"))?;
         }
@@ -297,7 +297,7 @@ impl<'a> Report<'a> {
 fn write_results(out: &Path, frame: &Frame, report: &Report<'_>) -> anyhow::Result<()> {
     let shape = report.histograms_shape.map(|n| n as u64);
     write_npy_u16(&out.join("histograms.npy"), &shape, &frame.histograms)?;
-    quality::depth_map(out, frame, report.configuration.laser_cycles)?;
+    quality::depth_map(out, frame, &report.configuration)?;
     OutputFile::write_with(&out.join("frame.json"), |w| {
         serde_json::to_writer(&mut *w, report)?;
         writeln!(w)
@@ -305,7 +305,7 @@ fn write_results(out: &Path, frame: &Frame, report: &Report<'_>) -> anyhow::Resu
     Ok(())
 }
 
-fn table(args: &FrameArgs, timing: &VerdictReport, frame: &Frame) -> Table {
+fn table(args: &FrameArgs, sensor: &SensorConfig, timing: &VerdictReport, frame: &Frame) -> Table {
     let summary = frame.summary();
     let of = |part: usize, whole: usize| format!("{part} of {whole}");
     let mut table = Table::new(format!("Frame of {}", args.scene.scene_name()))
@@ -313,7 +313,13 @@ fn table(args: &FrameArgs, timing: &VerdictReport, frame: &Frame) -> Table {
             "macropixels that see a surface",
             of(summary.with_target, summary.pixels),
         )
-        .row("guided", of(summary.guided, summary.pixels))
+        .row(
+            match sensor.mode {
+                Mode::Guided => "guided",
+                Mode::Conventional => "with the one window of the conventional mode",
+            },
+            of(summary.guided, summary.pixels),
+        )
         .row("surface in window", of(summary.in_window, summary.guided));
     quality::rows(&mut table, args, &summary);
     let work = &frame.work;

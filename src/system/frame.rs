@@ -15,7 +15,7 @@ use super::pixel::{NoDepth, PixelDepth};
 use super::remark::Circumstances;
 use super::result::{Frame, PhaseTimes};
 use super::tolerance::Tolerance;
-use crate::chip::{Exposure, SensorConfig, WindowLaw};
+use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw};
 use crate::engine::waveform::{self, View, WaveCycles};
 use crate::engine::{
     Cohort, CohortOptions, Cycle, EngineError, Expose, Gate, GateSimulation, LitPixel, Replay,
@@ -219,13 +219,13 @@ pub fn take_frame(
     let guide = GuideMap::estimate(scene, rows, cols, *seed);
     times.guide_s = clock.lap();
 
-    // Macropixels without an estimate, or with one out of the P-counter's reach, look as far as they can with their
+    // In the guided mode macropixels without an estimate, or with one out of the P-counter's reach, look as far as they can with their
     // SPADs switched off.
     let law = WindowLaw::new(sensor, exposure);
     let wanted: Vec<Option<u16>> = guide
         .range_m
         .par_iter()
-        .map(|range_m| law.start_for(Time::of_flight((*range_m)?)))
+        .map(|&range_m| start_of(&law, range_m))
         .collect();
     let farthest = sensor.largest_start();
     let starts: Vec<u16> = wanted.iter().map(|s| s.unwrap_or(farthest)).collect();
@@ -345,7 +345,7 @@ pub fn take_frame(
             let no_depth = match found {
                 Some(_) => None,
                 None if true_m.is_none() => Some(NoDepth::NoSurface),
-                None if guide_m.is_none() => Some(NoDepth::NoGuide),
+                None if start.is_none() && guide_m.is_none() => Some(NoDepth::NoGuide),
                 None if start.is_none() => Some(NoDepth::OutOfReach),
                 None if !spads_fire => Some(NoDepth::SpadsOff),
                 None if sighting.is_some_and(|s| s.is_saturated) => Some(NoDepth::Saturated),
@@ -392,6 +392,15 @@ pub fn take_frame(
         probes: probes.iter().map(|p| (p.row, p.col)).collect(),
         times,
     })
+}
+
+/// The start value of a macropixel with this estimate of the guide, if it has any use for light.
+pub(super) fn start_of(law: &WindowLaw, guide_m: Option<f64>) -> Option<u16> {
+    match law.sensor().mode {
+        Mode::Guided => law.start_for(Time::of_flight(guide_m?)),
+        // The window is that of STOP, whatever the start value, and needs no guide.
+        Mode::Conventional => law.window(0).open().map(|window| window.start),
+    }
 }
 
 /// The refusal of a frame by the cohort engine, with how much of the frame it is about.

@@ -59,7 +59,7 @@ pub struct PixelDepth {
     pub true_m: Option<f64>,
     /// The guide's estimate.
     pub guide_m: Option<f64>,
-    /// Start value, where the guide gave one within reach.
+    /// Start value, where the guide gave one within reach; in the conventional mode any, everywhere.
     pub start: Option<u16>,
     /// Whether the echo's centre lies in the time window.
     pub in_window: bool,

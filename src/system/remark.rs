@@ -5,7 +5,7 @@ use crate::chip::{EventType, Exposure, Mode, SensorConfig, WindowLaw};
 use crate::photon::PixelLight;
 use crate::ranging::{EchoLight, Response};
 use crate::scene::Scene;
-use crate::units::SPEED_OF_LIGHT_M_PER_S;
+use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
 
 /// A frame's circumstances.
 pub(super) struct Circumstances<'a> {
@@ -81,19 +81,15 @@ impl Circumstances<'_> {
             .flat_map(|within| [within.start, within.end])
             .map(|time| time.as_range_m().max(0.0))
             .collect();
+        if ends.is_empty() {
+            return "no start value opens a window".to_owned();
+        }
         let wanted = self.span_m(NoDepth::OutOfReach, |p| p.guide_m);
         let (bits, periods) = (self.sensor.counter_bits, self.exposure.stop_periods);
-        match (ends.is_empty(), self.sensor.mode) {
-            (true, _) => "no start value opens a window".to_owned(),
-            (false, Mode::Conventional) => format!(
-                "mode = \"conventional\" opens every window at the STOP that ends the laser cycle, {} away, and the guide's estimates lie {wanted}; give a STOP period that ends there, or mode = \"guided\"",
-                span(&ends)
-            ),
-            (false, Mode::Guided) => format!(
-                "start values of {bits} bits (counter_bits) and a STOP every {periods} CLK periods open windows {} away, and the guide's estimates lie {wanted}; give more of the one or the other",
-                span(&ends)
-            ),
-        }
+        format!(
+            "start values of {bits} bits (counter_bits) and a STOP every {periods} CLK periods open windows {} away, and the guide's estimates lie {wanted}; give more of the one or the other",
+            span(&ends)
+        )
     }
 
     fn saturated(&self) -> String {
@@ -110,6 +106,18 @@ impl Circumstances<'_> {
     }
 
     fn outside_window(&self) -> String {
+        if self.sensor.mode == Mode::Conventional {
+            let law = WindowLaw::new(self.sensor, self.exposure);
+            let window = law.window(0).open().map(|window| law.interval(&window));
+            let ends = window.map_or(Vec::new(), |within| {
+                [within.start, within.end].map(Time::as_range_m).to_vec()
+            });
+            return format!(
+                "mode = \"conventional\" opens every window at the STOP that ends the laser cycle, {} away, and these surfaces lie {}; give a STOP period that ends there, or mode = \"guided\"",
+                span(&ends),
+                self.span_m(NoDepth::OutsideWindow, |p| p.true_m)
+            );
+        }
         let errors = self.pixels.iter().filter(|p| p.start.is_some());
         let errors: Vec<f64> = errors
             .filter_map(|p| Some((p.guide_m? - p.true_m?).abs()))
@@ -230,7 +238,7 @@ mod tests {
             ),
             (
                 "mode = \"conventional\"",
-                NoDepth::OutOfReach,
+                NoDepth::OutsideWindow,
                 "the STOP that ends the laser cycle, from 196.",
             ),
             ("threshold = 16", NoDepth::NoSignificantPeak, "never have"),

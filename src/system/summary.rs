@@ -17,9 +17,9 @@ pub struct Summary {
     pub pixels: usize,
     /// Macropixels that see a surface at all.
     pub with_target: usize,
-    /// Macropixels with a start value from the guide.
+    /// Macropixels with a start value from the guide; in the conventional mode all of them.
     pub guided: usize,
-    /// Guided macropixels whose target lies in their window.
+    /// Those of them whose target lies in their window.
     pub in_window: usize,
     /// Macropixels with a depth.
     pub depths: usize,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::frame::EngineKind;
+use super::frame::{EngineKind, start_of};
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::engine::stream_config;
 use crate::files::{InputError, parse_json, read_text};
@@ -12,7 +12,6 @@ use crate::guide::GuideMap;
 use crate::photon::{PhotonStream, SpadEvent};
 use crate::scene::{GroundTruth, Scene};
 use crate::settings::Document;
-use crate::units::Time;
 
 /// What a frame depended on.
 #[derive(Debug, Clone)]
@@ -133,7 +132,7 @@ impl TakenFrame {
         let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
         let law = WindowLaw::new(sensor, &self.exposure);
         let guide_m = GuideMap::estimate(scene, rows, cols, self.seed).range_m[pixel];
-        let given = guide_m.and_then(|range_m| law.start_for(Time::of_flight(range_m)));
+        let given = start_of(&law, guide_m);
         if given != self.starts[pixel] {
             let shown = |start: Option<u16>| start.map_or("none".to_owned(), |s| s.to_string());
             let message = format!(

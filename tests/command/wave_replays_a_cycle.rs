@@ -63,12 +63,16 @@ fn it_is_the_same_stretch_of_the_whole_waveform() {
         (bright, "cycle.fst"),
         ("--sensor hslidar --stop-periods 540", "cycle.vcd"),
         ("--engine gate --set sensor.dead_time_ns=8", "cycle.vcd"),
+        (
+            "--set sensor.mode=conventional --stop-periods 120",
+            "cycle.vcd",
+        ),
     ] {
         let frame = format!(
-            "frame --rows 8 --cols 8 --laser-cycles 30 --seed 3 --probe 4,3 --wave-cycles all {options}"
+            "frame --rows 8 --cols 8 --laser-cycles 12 --seed 3 --probe 4,3 --wave-cycles all {options}"
         );
         succeeds(folder.path(), frame.trim_end());
-        for cycle in [0, 21, 29] {
+        for cycle in [0, 8, 11] {
             let wave = format!("wave --pixel 4,3 --cycle {cycle} --out {file} --json");
             let report = succeeds(folder.path(), &wave);
             let report: serde_json::Value = serde_json::from_str(&report).unwrap();
@@ -77,7 +81,7 @@ fn it_is_the_same_stretch_of_the_whole_waveform() {
             } else {
                 report["from_fs"].as_u64().unwrap()
             };
-            let to = if cycle == 29 {
+            let to = if cycle == 11 {
                 u64::MAX
             } else {
                 report["to_fs"].as_u64().unwrap()
@@ -88,7 +92,7 @@ fn it_is_the_same_stretch_of_the_whole_waveform() {
             for (name, changes) in &whole {
                 assert!(changes == &part[name], "{options}, cycle {cycle}: {name}");
             }
-            assert!(whole.values().any(|changes| changes.len() > 500));
+            assert!(whole.values().any(|changes| changes.len() > 200));
         }
     }
 }

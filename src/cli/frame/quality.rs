@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::FrameArgs;
+use super::{Configuration, FrameArgs};
+use crate::chip::Mode;
 use crate::files::InputError;
 use crate::report::{Cell, DepthMap, Table};
 use crate::system::{Frame, NoDepth, Summary};
@@ -69,7 +70,15 @@ pub(super) fn rows(table: &mut Table, args: &FrameArgs, summary: &Summary) {
 ///
 /// # Errors
 /// When it cannot be written.
-pub(super) fn depth_map(out: &Path, frame: &Frame, laser_cycles: u32) -> Result<(), InputError> {
+pub(super) fn depth_map(
+    out: &Path,
+    frame: &Frame,
+    asked: &Configuration<'_>,
+) -> Result<(), InputError> {
+    let mode = match asked.sensor.mode {
+        Mode::Guided => "guided",
+        Mode::Conventional => "conventional",
+    };
     let cells: Vec<Cell> = (frame.pixels.iter())
         .map(|pixel| match (pixel.measured_m, pixel.no_depth) {
             (_, Some(reason)) => Cell::Category(reason as usize),
@@ -77,7 +86,7 @@ pub(super) fn depth_map(out: &Path, frame: &Frame, laser_cycles: u32) -> Result<
         })
         .collect();
     let map = DepthMap {
-        title: &format!("guided dToF depth, {laser_cycles} laser cycles"),
+        title: &format!("{mode} dToF depth, {} laser cycles", asked.laser_cycles),
         cols: frame.cols,
         cells: &cells,
         range_m: depth_range(&cells),
