@@ -30,7 +30,11 @@ use crate::netlist::{
 /// When the folder or a file in it cannot be written.
 pub fn export_netlist(folder: &Path, config: &SensorConfig) -> Result<(), InputError> {
     let (library, corner) = (Silicon::library(), config.corner);
-    write_netlist(folder, config, &|out| write_cells(out, library, corner))
+    let netlist = Netlist::elaborate(&array::circuit(config));
+    if netlist.own_delays().is_empty() {
+        return write_netlist(folder, config, &|out| write_cells(out, library, corner));
+    }
+    write_with_delays(folder, config, &Silicon::of(config).timing(&netlist))
 }
 
 /// As [`export_netlist`], with stimulus and testbench.
@@ -43,7 +47,8 @@ pub fn export_verilog(
     plan: &StimulusPlan,
 ) -> Result<(), InputError> {
     export_netlist(folder, config)?;
-    write_replay(folder, config, plan, false)
+    let netlist = Netlist::elaborate(&array::circuit(config));
+    write_replay(folder, config, plan, !netlist.own_delays().is_empty())
 }
 
 /// As [`export_verilog`], with the delays of `timing`, which is that of [`array::circuit`]: the cells of `cells.v` take
@@ -57,16 +62,25 @@ pub fn export_annotated_verilog(
     plan: &StimulusPlan,
     timing: &Timing,
 ) -> Result<(), InputError> {
+    write_with_delays(folder, config, timing)?;
+    write_replay(folder, config, plan, true)
+}
+
+/// Cells that take delays as parameters, and `delays.v`, which sets those that differ from the library.
+fn write_with_delays(
+    folder: &Path,
+    config: &SensorConfig,
+    timing: &Timing,
+) -> Result<(), InputError> {
     let (library, corner) = (Silicon::library(), config.corner);
     write_netlist(folder, config, &|out| {
         write_parametric_cells(out, library, corner)
     })?;
     let netlist = Netlist::elaborate(&array::circuit(config));
-    let nominal = Timing::nominal(&netlist, library, corner);
+    let nominal = Timing::of_library(&netlist, library, corner);
     OutputFile::write_with(&folder.join("delays.v"), |out| {
         write_delays(out, "dut", &netlist, timing, &nominal)
-    })?;
-    write_replay(folder, config, plan, true)
+    })
 }
 
 fn write_netlist(

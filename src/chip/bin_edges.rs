@@ -15,6 +15,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::config::{Mode, Tdc};
+use super::sensors::Sensor;
 use super::window_law::{OpenWindow, WindowLaw};
 use crate::units::Time;
 
@@ -23,9 +25,18 @@ use crate::units::Time;
 pub(super) enum Bins {
     /// At rising CLK edges.
     Clk,
-    /// At these times after the window opens, of which there is one more than there are bins. Start values take the lines in
-    /// turn.
+    /// At these times after the window opens, or, where delay lines time photons, before they are frozen; there is one more
+    /// than there are bins. Start values take the lines in turn.
     Taps(Arc<[Vec<Time>]>),
+}
+
+impl Bins {
+    /// Those of a macropixel with delay lines. What is at the last tap came first.
+    pub(super) fn of_delay_lines(sensor: &Sensor, number: usize) -> Self {
+        let taps = sensor.taps(number).expect("the TDC has delay lines");
+        let line = |taps: &Vec<Time>| taps.iter().rev().map(|&tap| Time::ZERO - tap).collect();
+        Bins::Taps(taps.iter().map(line).collect())
+    }
 }
 
 /// The edges of a window's bins in one laser cycle: the time axis of its histogram.
@@ -152,9 +163,26 @@ impl WindowLaw {
             Bins::Clk => self.taken_until(first - 1 + number),
             Bins::Taps(lines) => {
                 let taps = &lines[usize::from(window.start) % lines.len()];
-                self.taken_until(first - 1) + taps[number as usize]
+                let origin = match self.sensor.tdc {
+                    Tdc::Clocked => self.taken_until(first - 1),
+                    Tdc::DelayLine => self.frozen_until(window, cycle),
+                };
+                origin + taps[number as usize]
             }
         }
+    }
+
+    /// Until when a pulse has left its edge on PHOTONS when the delay lines are frozen in laser cycle `cycle`.
+    fn frozen_until(&self, window: &OpenWindow, cycle: i64) -> Time {
+        let (exposure, timing) = (&self.exposure, &self.timing);
+        let sampled = match self.sensor.mode {
+            Mode::Guided => {
+                let edge = window.count_edge + cycle * i64::from(exposure.stop_periods);
+                exposure.falling(edge) + timing.ripple() + timing.local_stop_to_sample
+            }
+            Mode::Conventional => exposure.stop(cycle + 1) + timing.stop_to_sample,
+        };
+        sampled - self.latency + Time::from_fs(1)
     }
 
     /// The rising CLK edge, counted from the exposure's first STOP edge, that opens the window in laser cycle `cycle`.
@@ -166,7 +194,7 @@ impl WindowLaw {
     /// after the pulse has toggled its flip-flop.
     #[inline]
     pub fn edge_of(&self, pulse: Time) -> i64 {
-        let sampled = pulse + self.timing.spad_to_toggle;
+        let sampled = pulse + self.latency;
         let periods = (sampled + self.exposure.stop_phase).as_fs() as f64 / self.period_fs - 0.5;
         let edge = periods.ceil();
         // Exact arithmetic only where rounding could decide.
@@ -214,7 +242,7 @@ impl WindowLaw {
 
     /// Until when a rising CLK edge takes pulses.
     pub(super) fn taken_until(&self, edge: i64) -> Time {
-        self.exposure.rising(edge) - self.timing.spad_to_toggle + Time::from_fs(1)
+        self.exposure.rising(edge) - self.latency + Time::from_fs(1)
     }
 
     /// How long before the exposure's first STOP edge the pulses begin that are taken together with one at that edge.

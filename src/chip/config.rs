@@ -3,6 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::blocks::delay_line::Elements;
 use super::spad_grid::{SpadGrid, count_bits};
 use crate::netlist::Corner;
 use crate::units::{Frequency, Time};
@@ -112,6 +113,18 @@ pub enum AfterBorrow {
     Wrap,
 }
 
+/// What times photons within a window (thesis 4.9.3, Table 10).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Tdc {
+    /// A shift register that CLK clocks: bins are CLK periods.
+    #[default]
+    Clocked,
+    /// Delay lines, whose elements are the bins. SPADs come together in a tree of XORs, so that TYPE and THRESHOLD have
+    /// nothing to compare.
+    DelayLine,
+}
+
 /// A sensor, as its TOML file describes it. Keys that are left out take the QuantIC4x4's value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -134,11 +147,21 @@ pub struct SensorConfig {
     pub after_borrow: AfterBorrow,
     /// CLK periods from a start value's window to the next one's: 1, 2, 4 or 8; without memory 1.
     pub step_periods: usize,
+    /// What times photons: clocked or delay_line.
+    pub tdc: Tdc,
+    /// Control voltage of the delay lines, V ([`SensorConfig::delay_element`]).
+    pub delay_control_v: f64,
+    /// How the elements of the delay lines differ: standard deviation relative to the mean, 0…0.25.
+    pub delay_sigma: f64,
+    /// Which chip, of those whose elements differ.
+    pub delay_seed: u32,
+    /// How much later CLK and STOP come to each column of macropixels than to the one left of it, ps.
+    pub clk_skew_ps: f64,
     /// Histogram bins, 1…64.
     pub bins: usize,
     /// Bits of each bin, 1…16.
     pub bin_bits: usize,
-    /// CLK frequency, Hz; its period is one histogram bin.
+    /// CLK frequency, Hz; its period is one histogram bin where the TDC is clocked.
     pub clk_hz: f64,
     /// Rise of STOP after the falling edge of CLK, ps; at most half a CLK period either way.
     pub stop_phase_ps: f64,
@@ -211,6 +234,34 @@ impl SensorConfig {
     /// k, where windows step by 2ᵏ CLK periods. The configuration must have passed [`SensorConfig::check`].
     pub fn step_bits(&self) -> u32 {
         self.step_periods.trailing_zeros()
+    }
+
+    /// Delay of a delay line's element on average, in typical silicon: T_DL of Table 10.
+    ///
+    /// The thesis says that no formula leads from control voltage to delay (6.3.1), and gives none of its measurements. Here the
+    /// voltage drives transistors that starve the elements' current: the alpha-power law with α = 1.3 and a threshold of
+    /// 0.40 V, as for the other cells, and 0.70 V for the 2.6 ns that the demonstrator had.
+    pub fn delay_element(&self) -> Time {
+        const REFERENCE_V: f64 = 0.70;
+        const REFERENCE_S: f64 = 2.6e-9;
+        const THRESHOLD_V: f64 = 0.40;
+        const ALPHA: f64 = 1.3;
+        let overdrive = (self.delay_control_v - THRESHOLD_V) / (REFERENCE_V - THRESHOLD_V);
+        Time::from_s(REFERENCE_S * libm::pow(overdrive, -ALPHA))
+    }
+
+    /// The elements of its delay lines.
+    pub(super) fn delay_elements(&self) -> Elements {
+        Elements {
+            mean_fs: self.delay_element().as_fs() as u32,
+            sigma: self.delay_sigma,
+            seed: self.delay_seed.into(),
+        }
+    }
+
+    /// By how much CLK and STOP come later to a column of macropixels than to column 0.
+    pub fn clk_skew(&self, col: usize) -> Time {
+        Time::from_s(self.clk_skew_ps * 1e-12 * col as f64)
     }
 
     /// Macropixels.

@@ -9,7 +9,7 @@
 
 use std::ops::Range;
 
-use super::config::Mode;
+use super::config::{Mode, Tdc};
 use super::correlation;
 use super::window_law::{OpenWindow, WindowLaw};
 use crate::units::Time;
@@ -47,7 +47,8 @@ impl WindowLaw {
     /// How often each bin of `window` counts in the exposure where no SPAD ever fires.
     pub fn empty_hits(&self, window: &OpenWindow) -> Vec<i64> {
         let bins = self.sensor.bins;
-        if !correlation::model(0, self.sensor.event_type, self.sensor.threshold) {
+        let compares = self.sensor.tdc == Tdc::Clocked;
+        if !compares || !correlation::model(0, self.sensor.event_type, self.sensor.threshold) {
             return vec![0; bins];
         }
         let cycles = self.latched_cycles();

@@ -28,15 +28,15 @@ pub mod window_law;
 
 pub use bin_edges::BinEdges;
 pub use blocks::{
-    array, correlation, front_end, histogram, load_path, macropixel, metdc, p_counter,
-    p_counter_timing,
+    array, correlation, delay_line, front_end, histogram, load_path, macropixel, metdc, p_counter,
+    p_counter_timing, photon_line,
 };
-pub use config::{AfterBorrow, EventType, Mode, Overflow, PCounter, SensorConfig, Tap};
+pub use config::{AfterBorrow, EventType, Mode, Overflow, PCounter, SensorConfig, Tap, Tdc};
 pub use exposure::{Exposure, ExposureError};
 pub use probes::{LoadPins, LoadProbe, Probe, Probes, SensorPins};
 pub use race::{Conflict, Cure, NoAim, Race};
 pub use sensor_file::SensorFault;
-pub use sensors::{Sensor, hslidar, quantic4x4};
+pub use sensors::{Sensor, hslidar, hslidar_delay_line, quantic4x4};
 pub use spad_grid::{MOST_SPADS, SIDES, SpadGrid, count_bits};
 pub use timing::ChipTiming;
 pub use timing::silicon::{Limits, Silicon};

@@ -21,10 +21,13 @@
 //! Which photon times the bins of a window collect stands in [`bin_edges`](super::bin_edges), and what they count without photons in
 //! [`empty_pixel`](super::empty_pixel).
 //!
+//! Where delay lines time photons, LOCAL_STOP freezes the lines as soon as it comes: CLK has no part in the bins, only in where
+//! windows end.
+//!
 //! [`ChipTiming`] has the delays of the paths concerned, measured on the netlist; tests hold the law against it.
 
 use super::bin_edges::Bins;
-use super::config::{Mode, PCounter};
+use super::config::{Mode, PCounter, Tdc};
 use super::exposure::Exposure;
 use super::p_counter::{Rises, starts_high};
 use super::race::{Conflict, Cure, NoAim, Origin, Race};
@@ -99,12 +102,15 @@ impl Window {
 pub struct OpenWindow {
     /// The start value that opens it.
     pub start: u16,
-    /// The rising CLK edge that takes the photons of bin 0 (edge 0 is the first after STOP at phase 0).
+    /// The rising CLK edge that takes the photons of bin 0 (edge 0 is the first after STOP at phase 0), where CLK does.
     pub first_edge: i64,
     /// Rise of LOCAL_STOP (guided) or STOP (conventional) after the laser cycle's STOP edge.
     pub strobe_cause: Time,
+    /// The falling CLK edge whose count raises LOCAL_STOP, guided mode.
+    pub(super) count_edge: i64,
     /// What the strobe has left of setup after one change of the shift register, and of hold before the next,
-    /// whichever is smaller: the margin that a shorter CLK period or a slower ripple eats up.
+    /// whichever is smaller: the margin that a shorter CLK period or a slower ripple eats up. Means nothing where delay lines
+    /// time photons.
     pub slack: Time,
 }
 
@@ -112,6 +118,8 @@ pub struct OpenWindow {
 struct LocalStop {
     /// After its laser cycle's STOP edge.
     time: Time,
+    /// The falling CLK edge that makes it.
+    edge: i64,
     /// What keeps it from rising once in every laser cycle at this place, if anything.
     irregular: Option<Irregular>,
 }
@@ -125,6 +133,8 @@ pub struct WindowLaw {
     pub(super) bins: i64,
     pub(super) edges: Bins,
     pub(super) period_fs: f64,
+    /// From a SPAD's pulse to what is sampled, less what CLK and STOP come later to the macropixel than to column 0.
+    pub(super) latency: Time,
 }
 
 impl WindowLaw {
@@ -139,14 +149,32 @@ impl WindowLaw {
     /// latest, and limits that are wider by the distance of the bounds.
     pub fn with_timing(sensor: impl Into<Sensor>, exposure: &Exposure, timing: ChipTiming) -> Self {
         let sensor = sensor.into();
+        let edges = match sensor.tdc {
+            Tdc::Clocked => Bins::Clk,
+            Tdc::DelayLine => Bins::of_delay_lines(&sensor, 0),
+        };
         WindowLaw {
             bins: sensor.bins as i64,
             sensor,
             exposure: *exposure,
             timing,
-            edges: Bins::Clk,
+            edges,
             period_fs: 1e15 / exposure.clock.as_hz(),
+            latency: timing.spad_to_sampled,
         }
+    }
+
+    /// The law of a macropixel, by its number in the array, row-major, where that has delay lines of its own, or CLK comes later to it
+    /// than to column 0. Otherwise this one.
+    #[must_use]
+    pub fn of_macropixel(&self, number: u32) -> Self {
+        let mut law = self.clone();
+        let number = number as usize;
+        if self.sensor.tdc == Tdc::DelayLine {
+            law.edges = Bins::of_delay_lines(&self.sensor, number);
+        }
+        law.latency = self.timing.spad_to_sampled - self.sensor.clk_skew(number % self.sensor.cols);
+        law
     }
 
     /// The sensor.
@@ -169,14 +197,15 @@ impl WindowLaw {
         let (exposure, timing) = (&self.exposure, &self.timing);
         let end = exposure.clock.periods(exposure.stop_periods as i64);
         let period = exposure.clock.period();
+        let is_clocked = self.sensor.tdc == Tdc::Clocked;
         let to_shift = timing.clk_to_event + timing.setup + ROUNDING;
-        if period <= to_shift {
+        if is_clocked && period <= to_shift {
             let what = Conflict::SlowCorrelation;
             return Window::Race(Race::too_slow(what, to_shift, period));
         }
-        let (cause, arrival, irregular) = match self.sensor.mode {
+        let (cause, arrival, count_edge, irregular) = match self.sensor.mode {
             // A laser cycle is counted by the STOP edge that ends it.
-            Mode::Conventional => (end, end + timing.stop_to_strobe, None),
+            Mode::Conventional => (end, end + timing.stop_to_strobe, 0, None),
             Mode::Guided => {
                 let is_reset = self.sensor.p_counter != PCounter::Memoryless;
                 let found = if is_reset {
@@ -185,9 +214,11 @@ impl WindowLaw {
                     self.coming_round(start)
                 };
                 match found {
-                    Ok(LocalStop { time, irregular }) => {
-                        (time, time + timing.local_stop_to_strobe, irregular)
-                    }
+                    Ok(LocalStop {
+                        time,
+                        edge,
+                        irregular,
+                    }) => (time, time + timing.local_stop_to_strobe, edge, irregular),
                     Err(window) => return window,
                 }
             }
@@ -196,7 +227,7 @@ impl WindowLaw {
         let after = arrival - (exposure.rising(last) + timing.clk_to_shift);
         let before = exposure.rising(last + 1) + timing.clk_to_shift - arrival;
         let slack = (after - timing.setup).min(before - timing.hold);
-        if slack <= ROUNDING {
+        if is_clocked && slack <= ROUNDING {
             let change = if after < before {
                 arrival - after
             } else {
@@ -211,6 +242,7 @@ impl WindowLaw {
             start,
             first_edge: last - self.bins,
             strobe_cause: cause,
+            count_edge,
             slack,
         })
     }
@@ -312,6 +344,7 @@ impl WindowLaw {
         }
         Ok(LocalStop {
             time: exposure.falling(edge) + timing.ripple(),
+            edge,
             irregular: (edges.len() > 1)
                 .then_some(Irregular::LocalStopRepeats { rises: edges.len() }),
         })
@@ -380,6 +413,7 @@ impl WindowLaw {
         }
         Ok(LocalStop {
             time: exposure.falling(edge) + timing.ripple(),
+            edge,
             irregular: (periods != every).then_some(Irregular::OutOfStep {
                 stop_periods: periods,
                 round: every,

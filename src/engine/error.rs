@@ -69,6 +69,11 @@ pub enum EngineError {
         "cells differ at random (mismatch), so that each macropixel has delays of its own, which only the engine with per-macropixel delays follows"
     )]
     Mismatch,
+    /// Each macropixel has a window law of its own by description, and this engine has one law.
+    #[error(
+        "each macropixel has delay lines of its own, or a CLK that comes later than another's, which only the engines gate and window follow, and in the library's silicon"
+    )]
+    OwnLaws,
     /// Light is given for SPADs one by one, but for another number of them than a macropixel has.
     #[error("light is given for {given} SPADs, but a macropixel has {spads}; give as many")]
     OtherSpads {
@@ -142,6 +147,14 @@ pub(super) fn follows(sensor: &Sensor, limits: &PulseLimits) -> Result<(), Engin
     }
     let followed = limits.follow(sensor.dead_time_ns);
     followed.map_err(EngineError::FrontEnd)
+}
+
+/// Whether one window law describes all macropixels of this sensor.
+pub(super) fn one_law(sensor: &Sensor) -> Result<(), EngineError> {
+    match sensor.has_own_laws() {
+        true => Err(EngineError::OwnLaws),
+        false => Ok(()),
+    }
 }
 
 #[cfg(test)]

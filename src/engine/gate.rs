@@ -1,6 +1,9 @@
 //! The gate engine: the netlist itself, event by event.
 
+use std::borrow::Cow;
 use std::sync::Arc;
+
+use rayon::prelude::*;
 
 use super::lanes::LaneSimulation;
 use super::{
@@ -8,8 +11,10 @@ use super::{
     full_stream,
 };
 use crate::bench::{HardwareEvents, Schedule, Skip, StimulusPlan};
+use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::{
-    Exposure, Probe, Probes, Sensor, SensorPins, Silicon, WindowLaw, array, front_end,
+    Exposure, Probe, Probes, Sensor, SensorPins, Silicon, Tdc, WindowLaw, array, delay_line,
+    front_end,
 };
 use crate::kernel::{Kernel, LANES, Observer, Policy, Statistics, TimingChecks};
 use crate::netlist::{NetId, Netlist, Timing};
@@ -111,7 +116,10 @@ impl GateSimulation {
             .limits(&self.netlist, &self.timing)
             .policy(policy)
             .not_before(self.schedule().reset_end)
-            .asynchronous(&self.netlist, front_end::is_asynchronous_sampler)
+            .asynchronous(&self.netlist, |cell| {
+                front_end::is_asynchronous_sampler(cell)
+                    || delay_line::is_asynchronous_sampler(cell)
+            })
     }
 
     /// A watch for hardware events in every macropixel, from the end of the power-up reset on, to run it with.
@@ -230,6 +238,22 @@ impl Gate {
         Ok(histograms)
     }
 
+    /// A macropixel's pulses by its own CLK: where that comes later to its column than to the first, which is simulated, they come
+    /// earlier.
+    fn by_own_clk<'p>(&self, pixel: &PulsedPixel<'p>) -> Cow<'p, [SpadEvent]> {
+        let skew = self
+            .sensor
+            .clk_skew(pixel.number as usize % self.sensor.cols);
+        if skew == Time::ZERO {
+            return Cow::Borrowed(pixel.pulses);
+        }
+        let earlier = pixel.pulses.iter().map(|pulse| SpadEvent {
+            time: pulse.time - skew,
+            ..*pulse
+        });
+        earlier.collect()
+    }
+
     /// At most [`LANES`] macropixels with the same delays.
     fn run_batch(
         &self,
@@ -237,7 +261,9 @@ impl Gate {
         pixels: &[PulsedPixel<'_>],
     ) -> Result<Histograms, EngineError> {
         let starts: &Vec<u16> = &pixels.iter().map(|pixel| pixel.start).collect();
-        let pulses: &Vec<&[SpadEvent]> = &pixels.iter().map(|pixel| pixel.pulses).collect();
+        let seen: Vec<Cow<'_, [SpadEvent]>> =
+            pixels.iter().map(|pixel| self.by_own_clk(pixel)).collect();
+        let pulses: &Vec<&[SpadEvent]> = &seen.iter().map(|pulses| &**pulses).collect();
         // One alone is quicker without lanes.
         if starts.len() == 1 {
             let (first, size) = ((0, 0), (1, 1));
@@ -266,8 +292,19 @@ impl Engine for Gate {
 
 impl Replay for Gate {
     fn replay(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError> {
-        let nominal = self.nominal_timing();
-        self.replay_with(&vec![&nominal; pixels.len()], pixels)
+        if self.sensor.tdc == Tdc::Clocked {
+            let nominal = self.nominal_timing();
+            return self.replay_with(&vec![&nominal; pixels.len()], pixels);
+        }
+        let circuit = MacropixelCircuit::new(&self.sensor, (0, 0));
+        let alone = pixels.par_iter().map(|pixel| {
+            let number = pixel.number as usize;
+            let position = (number / self.sensor.cols, number % self.sensor.cols);
+            let timing = circuit.timing_at(self.sensor.silicon(), position);
+            self.replay_with(&[&timing], std::slice::from_ref(pixel))
+        });
+        let alone: Result<Vec<Histograms>, EngineError> = alone.collect();
+        Ok(Histograms::joined(self.sensor.bins, alone?))
     }
 }
 

@@ -17,6 +17,7 @@ use std::sync::Arc;
 
 use super::cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
 use super::module::{Cell, Direction, Instance, Module, Names, Net, Port, Signal};
+use super::own_delay::OwnDelay;
 
 /// What is wrong with a circuit description.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -228,6 +229,7 @@ impl ModuleBuilder {
             kind,
             inputs: [Net::NONE; MAX_INPUTS],
             outputs: [Net::NONE; MAX_OUTPUTS],
+            own_delay: None,
         };
         cell.inputs[..inputs.len()].copy_from_slice(inputs);
         cell.outputs[..outputs.len()].copy_from_slice(outputs);
@@ -235,6 +237,26 @@ impl ModuleBuilder {
             self.drive(net, || format!("cell {name}"));
         }
         self.module.cells.push(cell);
+    }
+
+    /// Places a cell with a delay of its own.
+    pub fn cell_with_delay(
+        &mut self,
+        name: &str,
+        kind: CellKind,
+        inputs: &[Net],
+        outputs: &[Net],
+        delay: OwnDelay,
+    ) {
+        self.cell(name, kind, inputs, outputs);
+        if let Some(cell) = self
+            .module
+            .cells
+            .last_mut()
+            .filter(|cell| cell.name == name)
+        {
+            cell.own_delay = Some(delay);
+        }
     }
 
     /// Places a gate that drives `output`.

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use super::cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
 use super::module::{Direction, Module, Net};
+use super::own_delay::OwnDelay;
 
 /// A net of the elaborated chip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -68,6 +69,8 @@ pub struct Netlist {
     net_count: usize,
     scopes: Vec<Scope>,
     net_map: Vec<NetId>,
+    /// Cells with delays of their own, in order.
+    own_delays: Vec<(usize, OwnDelay)>,
 }
 
 impl Netlist {
@@ -78,6 +81,7 @@ impl Netlist {
             net_count: 0,
             scopes: Vec::new(),
             net_map: Vec::new(),
+            own_delays: Vec::new(),
         };
         let ports: Vec<NetId> = top
             .port_signals()
@@ -126,6 +130,8 @@ impl Netlist {
                 inputs: cell.inputs.map(|n| global(&self.net_map, n)),
                 outputs: cell.outputs.map(|n| global(&self.net_map, n)),
             };
+            self.own_delays
+                .extend(cell.own_delay.map(|delay| (self.cells.len(), delay)));
             self.cells.push(flat);
         }
         self.scopes.push(Scope {
@@ -149,6 +155,11 @@ impl Netlist {
     /// Every leaf cell.
     pub fn cells(&self) -> &[FlatCell] {
         &self.cells
+    }
+
+    /// Cells whose delays are their own instead of the library's, in ascending order.
+    pub fn own_delays(&self) -> &[(usize, OwnDelay)] {
+        &self.own_delays
     }
 
     /// Indices of the leaf cells directly in scope `index`, in the order of its module.

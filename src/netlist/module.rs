@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
+use super::own_delay::OwnDelay;
 
 /// A net of one module, local to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -70,7 +71,7 @@ pub struct Port {
 }
 
 /// One leaf cell.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Cell {
     /// Instance name.
     pub name: String,
@@ -80,6 +81,8 @@ pub struct Cell {
     pub inputs: [Net; MAX_INPUTS],
     /// Output nets in pin order, [`Net::NONE`] where unconnected.
     pub outputs: [Net; MAX_OUTPUTS],
+    /// A delay that is the cell's own, instead of the library's.
+    pub own_delay: Option<OwnDelay>,
 }
 
 /// One instance of another module.

@@ -60,8 +60,28 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// Every cell as the library has it in this corner.
+    /// Every cell as the library has it in this corner, or with the delay that is its own.
     pub fn nominal(netlist: &Netlist, library: &Library, corner: Corner) -> Self {
+        Self::nominal_as(netlist, library, corner, |cell| netlist.cell_path(cell))
+    }
+
+    /// The same where each cell is the one at `path` of its index, which says what elements of delay lines it has.
+    pub(crate) fn nominal_as(
+        netlist: &Netlist,
+        library: &Library,
+        corner: Corner,
+        path: impl Fn(usize) -> String,
+    ) -> Self {
+        let mut timing = Self::of_library(netlist, library, corner);
+        for &(cell, delay) in netlist.own_delays() {
+            timing.set(cell, delay.delays(|| path(cell), corner));
+            timing.set_model(cell, delay.model);
+        }
+        timing
+    }
+
+    /// Every cell as the library has it in this corner, even those with delays of their own.
+    pub fn of_library(netlist: &Netlist, library: &Library, corner: Corner) -> Self {
         let arc = |kind: CellKind, pin: usize| ArcDelay {
             rise_fs: library.arcs(kind)[pin].delay_fs(corner, Logic::One),
             fall_fs: library.arcs(kind)[pin].delay_fs(corner, Logic::Zero),

@@ -80,7 +80,7 @@ proptest! {
             .into_iter()
             .map(|(spad, k, within, is_close)| {
                 let offset = if is_close { within % 3 - 1 } else { within * period_ps / 1_000 };
-                (rise(k) - timing.spad_to_toggle + Time::from_fs(offset), spad % spads)
+                (rise(k) - timing.spad_to_sampled + Time::from_fs(offset), spad % spads)
             })
             .collect();
         pulses.sort_unstable();
@@ -104,7 +104,7 @@ proptest! {
         let mut model = front_end::Model::default();
         let mut pulses = pulses.into_iter().peekable();
         for k in 0..63 {
-            while let Some((_, spad)) = pulses.next_if(|(t, _)| *t + timing.spad_to_toggle <= rise(k)) {
+            while let Some((_, spad)) = pulses.next_if(|(t, _)| *t + timing.spad_to_sampled <= rise(k)) {
                 model.pulse(spad);
             }
             model.clock();

@@ -35,7 +35,7 @@ use std::time::Instant;
 use every_edge::circuit::{self, Case};
 use every_edge::waves::{Figures, Waves};
 use guided_dtof::bench::{StimulusPlan, export_verilog};
-use guided_dtof::chip::{SensorConfig, hslidar};
+use guided_dtof::chip::{SensorConfig, hslidar, hslidar_delay_line};
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::kernel::{Drive, Kernel, merge};
 use guided_dtof::netlist::{
@@ -188,7 +188,7 @@ fn compare_all(what: &str, strategy: impl Strategy<Value = Case>) {
     all.get().print(what, cases() as u64, start);
 }
 
-/// Runs one macropixel, with its load path, in both simulators.
+/// Runs all macropixels of a small sensor, with their load path, in both simulators.
 fn compare_sensor(scenario: &Scenario) -> Figures {
     let Scenario {
         config,
@@ -198,13 +198,14 @@ fn compare_sensor(scenario: &Scenario) -> Figures {
     } = scenario;
     let pulses = scenario.pulses();
     let folder = tempfile::tempdir().unwrap();
-    let plan = StimulusPlan::new(config, exposure, 1, starts, &pulses);
+    let size = (config.rows, config.cols);
+    let plan = StimulusPlan::new(config, exposure, size.1, starts, &pulses);
     export_verilog(folder.path(), config, &plan).unwrap();
     icarus::simulate(folder.path(), &["tb.v", "design.v", "cells.v"], &["+vcd"]);
     let dump = File::open(folder.path().join("dut.vcd")).unwrap();
     let theirs = Waves::read(BufReader::new(dump), "tb.dut");
 
-    let mut gate = GateSimulation::new(config, exposure, (0, 0), (1, 1), starts, &pulses);
+    let mut gate = GateSimulation::new(config, exposure, (0, 0), size, starts, &pulses);
     let selection = Selection::all().with_anonymous();
     let mut writer = VcdWriter::new(Vec::new(), gate.netlist(), &selection).unwrap();
     gate.run(&mut writer);
@@ -247,10 +248,17 @@ fn sensors_of_another_kind() {
     let start = Instant::now();
     let mut all = Figures::default();
     let seeds = 0..4;
-    for sensor in [wide8x8().unwrap(), hslidar()] {
+    // Where CLK is skewed, the second column shows it.
+    let sensors = [
+        (wide8x8().unwrap(), 1),
+        (hslidar(), 1),
+        (hslidar_delay_line(), 2),
+    ];
+    let kinds = sensors.len() as u64;
+    for (sensor, cols) in sensors {
         let config = SensorConfig {
             rows: 1,
-            cols: 1,
+            cols,
             ..(*sensor).clone()
         };
         for seed in seeds.clone() {
@@ -258,7 +266,7 @@ fn sensors_of_another_kind() {
             all = all + compare_sensor(&scenario);
         }
     }
-    all.print("sensors of another kind", 2 * seeds.end, start);
+    all.print("sensors of another kind", kinds * seeds.end, start);
 }
 
 #[test]

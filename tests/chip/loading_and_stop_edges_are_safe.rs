@@ -331,7 +331,7 @@ proptest! {
         apply_dead_time(&mut pulses, config.dead_time());
 
         let law = WindowLaw::new(&config, &exposure);
-        let latency = law.timing().spad_to_toggle;
+        let latency = law.timing().spad_to_sampled;
         let cancelling = Cancelling::of(config.dead_time(), exposure.clock, || law).unwrap();
         let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[20], &[&pulses]);
         let toggled = gate.schedule().origin + latency;

@@ -55,7 +55,7 @@ fn on_every_engine() {
 fn delays(timing: &ChipTiming) -> [(&'static str, Option<Time>); 27] {
     let counter = &timing.counter;
     [
-        ("spad_to_toggle", Some(timing.spad_to_toggle)),
+        ("spad_to_sampled", Some(timing.spad_to_sampled)),
         ("pulse_width", Some(timing.pulses.width)),
         ("pulses_apart", Some(timing.pulses.apart)),
         ("clk_to_counter_clk", Some(timing.clk_to_counter_clk)),

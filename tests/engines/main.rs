@@ -11,6 +11,7 @@ mod chip_against_theory;
 mod cohort_agrees_with_window;
 mod cohort_draws_what_it_computes;
 mod cycle_agrees_with_gate;
+mod delay_lines_time_photons;
 mod late_cycle_is_that_of_the_whole_run;
 mod light_is_a_list;
 mod timed_agrees_with_gate;

@@ -159,7 +159,7 @@ fn functions() -> Vec<Function> {
                 let window = law.window(a[0] as u16).open();
                 Value::Whole(window.map_or(i64::MIN, |window| {
                     let photons = law.bin_interval(&window, a[1] as i64, a[2] as i64);
-                    let edge = photons.end + law.timing().spad_to_toggle - Time::from_fs(1);
+                    let edge = photons.end + law.timing().spad_to_sampled - Time::from_fs(1);
                     edge.as_fs()
                 }))
             },

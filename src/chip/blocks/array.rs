@@ -11,6 +11,9 @@
 //! RUN takes ENABLE on rising STOP edges, so that counting starts with a whole laser cycle and stops
 //! with one: releasing the counters in mid-cycle would give a false LOCAL_STOP.
 //!
+//! Where CLK is skewed, CLK, STOP and RUN come to each column as much later as the wires to it are longer, all three alike: what a
+//! macropixel does is then the same at another time.
+//!
 //! Start values are loaded while RUN is low. PIXEL_CLEAR empties histograms and pipelines without
 //! touching the start values, which RESETB wipes.
 
@@ -18,7 +21,10 @@ use std::sync::Arc;
 
 use super::{finished, load_path, macropixel};
 use crate::chip::config::SensorConfig;
-use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
+use crate::netlist::{CellKind, Module, ModuleBuilder, Net, OwnDelay};
+
+/// The name of the top.
+pub const NAME: &str = "quantic4x4";
 
 /// The instance name of a macropixel.
 pub fn pixel_name(row: usize, col: usize) -> String {
@@ -46,7 +52,7 @@ pub fn subarray(
     assert!(rows > 0 && cols > 0, "a sensor needs a macropixel");
     let (bits, spads) = (config.counter_bits, config.spads());
     let pixel = macropixel::circuit(config);
-    let mut m = ModuleBuilder::new("quantic4x4");
+    let mut m = ModuleBuilder::new(NAME);
     let clk = m.input("CLK");
     let stop = m.input("STOP");
     let resetb = m.input("RESETB");
@@ -79,8 +85,33 @@ pub fn subarray(
         [serial, load_clk, load_enable, resetb],
     );
 
+    // What comes to a column later than to the first.
+    let later = |m: &mut ModuleBuilder, name: &str, net: Net, col: usize| {
+        let skew = config.clk_skew(first.1 + col).as_fs() as u32;
+        if skew == 0 {
+            return net;
+        }
+        let output = m.wire(&format!("{name}_C{}", first.1 + col));
+        let name = format!("{}_c{}", name.to_lowercase(), first.1 + col);
+        m.cell_with_delay(
+            &name,
+            CellKind::Buf,
+            &[net],
+            &[output],
+            OwnDelay::wire(skew),
+        );
+        output
+    };
+    let columns: Vec<[Net; 3]> = (0..cols)
+        .map(|col| {
+            [("CLK", clk), ("STOP", stop), ("RUN", run)]
+                .map(|(name, net)| later(&mut m, name, net, col))
+        })
+        .collect();
+
     for row in 0..rows {
         for col in 0..cols {
+            let [clk, stop, run] = columns[col];
             let index = row * cols + col;
             m.instance(
                 &pixel_name(first.0 + row, first.1 + col),

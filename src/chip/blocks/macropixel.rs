@@ -8,17 +8,26 @@
 //!                    └──────── LOCAL_STOP ────┘
 //! ```
 //!
-//! [`Model`] is the same circuit in plain Rust, stepped edge by edge through its blocks' models; only
+//! Where delay lines time photons, `photon_line` is the front end and `delay_line` the METDC, and nothing is correlated:
+//!
+//! ```text
+//!   SPAD_RAW ─► photon_line ─PHOTONS─► delay_line ─HIT─► histogram
+//! ```
+//!
+//! [`Model`] is the clocked one circuit in plain Rust, stepped edge by edge through its blocks' models; only
 //! the arrival of the strobe, of the reset and of the SPAD pulses is timed ([`ChipTiming`]).
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::{correlation, finished, front_end, histogram, metdc, p_counter, p_counter_timing};
-use crate::chip::config::{Mode, PCounter, SensorConfig};
+use super::{
+    correlation, delay_line, finished, front_end, histogram, metdc, p_counter, p_counter_timing,
+    photon_line,
+};
+use crate::chip::config::{Mode, PCounter, SensorConfig, Tdc};
 use crate::chip::exposure::Exposure;
 use crate::chip::timing::ChipTiming;
-use crate::netlist::{Module, ModuleBuilder};
+use crate::netlist::{Module, ModuleBuilder, Net};
 use crate::units::Time;
 
 /// One macropixel.
@@ -44,8 +53,11 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     let counter_reset = [m.wire("COUNTER_RESET")];
     let memory_reset = [m.wire("MEMORY_RESET")];
     let stop_d = [m.wire("STOP_D")];
-    let timed = m.wire_bus("SPAD_TIMED", config.spads());
-    let event = [m.wire("SPAD_EVENT")];
+    let clocked = (config.tdc == Tdc::Clocked).then(|| {
+        let timed = m.wire_bus("SPAD_TIMED", config.spads());
+        (timed, [m.wire("SPAD_EVENT")])
+    });
+    let photons = (config.tdc == Tdc::DelayLine).then(|| [m.wire("PHOTONS")]);
     let hit = m.wire_bus("HIT", config.bins);
 
     m.instance(
@@ -75,41 +87,59 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
             ("LOCAL_STOP", &local_stop),
         ],
     );
-    m.instance(
-        "front_end",
-        &front_end::circuit(config.spads()),
-        &[
-            ("SPAD_RAW", &raw),
-            ("CLK", &clk),
-            ("PIXEL_CLEAR", &clear),
-            ("SPAD_TIMED", &timed),
-        ],
-    );
-    m.instance(
-        "correlation",
-        &correlation::circuit(config.spads()),
-        &[
-            ("SPAD_TIMED", &timed),
-            ("TYPE", &event_type),
-            ("THRESHOLD", &threshold),
-            ("SPAD_EVENT", &event),
-        ],
-    );
-    m.instance(
-        "metdc",
-        &metdc::circuit(config.bins),
-        &[
-            ("CLK", &clk),
-            ("SPAD_EVENT", &event),
-            ("LOCAL_STOP", &local_stop),
-            ("STOP", &stop),
-            ("STOP_D", &stop_d),
-            ("COUNTER_RESET", &counter_reset),
-            ("CONVENTIONAL", &conventional),
-            ("PIXEL_CLEAR", &clear),
-            ("HIT", &hit),
-        ],
-    );
+    let strobes: [(&str, &[Net]); 7] = [
+        ("LOCAL_STOP", &local_stop),
+        ("STOP", &stop),
+        ("STOP_D", &stop_d),
+        ("COUNTER_RESET", &counter_reset),
+        ("CONVENTIONAL", &conventional),
+        ("PIXEL_CLEAR", &clear),
+        ("HIT", &hit),
+    ];
+    if let Some((timed, event)) = &clocked {
+        m.instance(
+            "front_end",
+            &front_end::circuit(config.spads()),
+            &[
+                ("SPAD_RAW", &raw),
+                ("CLK", &clk),
+                ("PIXEL_CLEAR", &clear),
+                ("SPAD_TIMED", timed),
+            ],
+        );
+        m.instance(
+            "correlation",
+            &correlation::circuit(config.spads()),
+            &[
+                ("SPAD_TIMED", timed),
+                ("TYPE", &event_type),
+                ("THRESHOLD", &threshold),
+                ("SPAD_EVENT", event),
+            ],
+        );
+        let events: [(&str, &[Net]); 2] = [("CLK", &clk), ("SPAD_EVENT", event)];
+        let ports = [&events[..], &strobes].concat();
+        m.instance("metdc", &metdc::circuit(config.bins), &ports);
+    }
+    if let Some(photons) = &photons {
+        m.instance(
+            "front_end",
+            &photon_line::circuit(config.spads()),
+            &[
+                ("SPAD_RAW", &raw),
+                ("PIXEL_CLEAR", &clear),
+                ("PHOTONS", photons),
+            ],
+        );
+        let own: [(&str, &[Net]); 4] = [
+            ("PHOTONS", photons),
+            ("COUNTER_INIT", &init[..1]),
+            ("MEMORY_LOAD", &load),
+            ("MEMORY_RESET", &memory_reset),
+        ];
+        let lines = delay_line::circuit(config.bins, &config.delay_elements());
+        m.instance("metdc", &lines, &[&own[..], &strobes].concat());
+    }
     m.instance(
         "histogram",
         &histogram::circuit(config.bins, config.bin_bits, config.overflow),
@@ -236,7 +266,7 @@ impl<'a> Model<'a> {
                 config.event_type,
                 config.threshold,
             ));
-            while let Some((_, spad)) = pulses.next_if(|(t, _)| *t + timing.spad_to_toggle <= rise)
+            while let Some((_, spad)) = pulses.next_if(|(t, _)| *t + timing.spad_to_sampled <= rise)
             {
                 front_end.pulse(spad);
             }

@@ -35,25 +35,13 @@ pub fn circuit(bins: usize) -> Arc<Module> {
     let mut m = ModuleBuilder::new("metdc");
     let clk = m.input("CLK");
     let event = m.input("SPAD_EVENT");
-    let local_stop = m.input("LOCAL_STOP");
-    let stop = m.input("STOP");
-    let stop_d = m.input("STOP_D");
-    let counter_reset = m.input("COUNTER_RESET");
-    let conventional = m.input("CONVENTIONAL");
+    let strobe_inputs = StrobeInputs::of(&mut m);
     let clear = m.input("PIXEL_CLEAR");
     let hit = m.output_bus("HIT", bins);
     let shift = m.wire_bus("SHIFT", bins);
     let strobe = m.wire("STROBE");
-    let hit_reset = m.wire("HIT_RESET");
 
-    let selected = m.gate(CellKind::Mux2, &[local_stop, stop_d, conventional]);
-    m.gate_into(CellKind::Buf, &[selected], strobe);
-    let stop_n = m.gate(CellKind::Inv, &[stop]);
-    m.gate_into(
-        CellKind::Mux2,
-        &[counter_reset, stop_n, conventional],
-        hit_reset,
-    );
+    let hit_reset = strobe_inputs.place(&mut m, strobe);
     for stage in 0..bins {
         let data = if stage == 0 { event } else { shift[stage - 1] };
         m.cell(
@@ -72,6 +60,40 @@ pub fn circuit(bins: usize) -> Arc<Module> {
         );
     }
     finished(m.finish())
+}
+
+/// What a METDC's strobe and the reset of its HIT flip-flops are made of.
+pub(super) struct StrobeInputs {
+    local_stop: Net,
+    stop: Net,
+    stop_d: Net,
+    counter_reset: Net,
+    conventional: Net,
+}
+
+impl StrobeInputs {
+    /// The ports LOCAL_STOP, STOP, STOP_D, COUNTER_RESET and CONVENTIONAL.
+    pub(super) fn of(m: &mut ModuleBuilder) -> Self {
+        StrobeInputs {
+            local_stop: m.input("LOCAL_STOP"),
+            stop: m.input("STOP"),
+            stop_d: m.input("STOP_D"),
+            counter_reset: m.input("COUNTER_RESET"),
+            conventional: m.input("CONVENTIONAL"),
+        }
+    }
+
+    /// Makes `strobe` and the wire HIT_RESET, which it returns.
+    pub(super) fn place(&self, m: &mut ModuleBuilder, strobe: Net) -> Net {
+        let hit_reset = m.wire("HIT_RESET");
+        let causes = [self.local_stop, self.stop_d, self.conventional];
+        let selected = m.gate(CellKind::Mux2, &causes);
+        m.gate_into(CellKind::Buf, &[selected], strobe);
+        let stop_n = m.gate(CellKind::Inv, &[self.stop]);
+        let causes = [self.counter_reset, stop_n, self.conventional];
+        m.gate_into(CellKind::Mux2, &causes, hit_reset);
+        hit_reset
+    }
 }
 
 /// Reference model: the shift register as bits of a word, the newest event in bit 0.

@@ -3,6 +3,7 @@
 
 pub mod array;
 pub mod correlation;
+pub mod delay_line;
 pub mod front_end;
 pub mod histogram;
 pub mod load_path;
@@ -10,6 +11,7 @@ pub mod macropixel;
 pub mod metdc;
 pub mod p_counter;
 pub mod p_counter_timing;
+pub mod photon_line;
 
 use std::sync::Arc;
 

@@ -71,6 +71,14 @@ pub enum Probe {
     Equal,
     /// The METDC's shift register, newest event first.
     Shift,
+    /// All SPADs on one line; only where delay lines time it.
+    Photons,
+    /// Clock of the flip-flops that sample the delay lines; only there.
+    SampleClk,
+    /// Taps of the delay line of even start values, behind the first element first; only there.
+    EvenTap,
+    /// Those of odd start values.
+    OddTap,
     /// Clock of the HIT flip-flops.
     Strobe,
     /// Reset of the HIT flip-flops.
@@ -81,7 +89,7 @@ pub enum Probe {
 
 impl Probe {
     /// Every probe, in the order of their declaration.
-    pub const ALL: [Probe; 23] = [
+    pub const ALL: [Probe; 27] = [
         Probe::Clk,
         Probe::Stop,
         Probe::Enable,
@@ -102,6 +110,10 @@ impl Probe {
         Probe::CounterOut,
         Probe::Equal,
         Probe::Shift,
+        Probe::Photons,
+        Probe::SampleClk,
+        Probe::EvenTap,
+        Probe::OddTap,
         Probe::Strobe,
         Probe::HitReset,
         Probe::Hit,
@@ -130,6 +142,10 @@ impl Probe {
             Probe::CounterOut => (Some(P_COUNTER), "COUNTER_OUT"),
             Probe::Equal => (Some(P_COUNTER), "EQUAL"),
             Probe::Shift => (Some(METDC), "SHIFT"),
+            Probe::Photons => (None, "PHOTONS"),
+            Probe::SampleClk => (Some(METDC), "SAMPLE_CLK"),
+            Probe::EvenTap => (Some(METDC), "EVEN_TAP"),
+            Probe::OddTap => (Some(METDC), "ODD_TAP"),
             Probe::Strobe => (Some(METDC), "STROBE"),
             Probe::HitReset => (Some(METDC), "HIT_RESET"),
             Probe::Hit => (None, "HIT"),

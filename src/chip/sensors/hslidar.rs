@@ -1,12 +1,17 @@
-//! HSLIDAR, the chip that the demonstrator ran on (thesis 4.9, 6.3, Tables 10 and 11), in its clocked mode: 64×32
-//! macropixels of 4×4 SPADs, a 7-bit P-counter of set/reset flip-flops with a delayed reset (Fig. 51b), 8 bins of 12 bits, one
-//! CLK period long, and windows that step by four: half a window (Table 10).
+//! HSLIDAR, the chip that the demonstrator ran on (thesis 4.9, 6.3, Tables 10 and 11): 64×32 macropixels of 4×4 SPADs, a 7-bit
+//! P-counter of set/reset flip-flops with a delayed reset (Fig. 51b) and 8 bins of 12 bits, in either of its modes:
 //!
-//! CLK may have 200 MHz at most (6.3.1), which is what it has here. The thesis gives no dead time and no load clock: those
-//! are the QuantIC4x4's. Its other mode, whose bins are taps of a delay line, is not built yet.
+//! | mode | bin | window step | here |
+//! |---|---|---|---|
+//! | clocked | CLK period | 4 CLK periods, half a window | CLK at its most, 200 MHz (6.3.1) |
+//! | delay line | element, 2.6 ns on average, 0.4 ns σ (Fig. 91) | CLK period | CLK at 80 MHz: 12.5 ns, or 1.875 m (Table 14) |
+//!
+//! The chip has both; each is a sensor of its own here, because nothing of one is used in the other but what they share. The thesis
+//! gives no dead time, no load clock and no scale for the delay that Fig. 90 shows from left to right: dead time and load clock are
+//! the QuantIC4x4's, and the skew is chosen, 45 ps from column to column.
 
 use super::Sensor;
-use crate::chip::config::{PCounter, SensorConfig};
+use crate::chip::config::{PCounter, SensorConfig, Tdc};
 
 /// The chip in its clocked, guided mode, in typical silicon.
 pub fn hslidar() -> Sensor {
@@ -20,6 +25,18 @@ pub fn hslidar() -> Sensor {
         bin_bits: 12,
         clk_hz: 200e6,
         ..SensorConfig::default()
+    };
+    config.into()
+}
+
+/// The chip in its delay-line, guided mode, in typical silicon.
+pub fn hslidar_delay_line() -> Sensor {
+    let config = SensorConfig {
+        tdc: Tdc::DelayLine,
+        step_periods: 1,
+        clk_hz: 80e6,
+        clk_skew_ps: 45.0,
+        ..(*hslidar()).clone()
     };
     config.into()
 }

@@ -14,12 +14,13 @@ use std::sync::{Arc, OnceLock};
 mod hslidar;
 mod quantic4x4;
 
-pub use hslidar::hslidar;
+pub use hslidar::{hslidar, hslidar_delay_line};
 pub use quantic4x4::quantic4x4;
 
-use super::config::SensorConfig;
+use super::config::{SensorConfig, Tdc};
 use super::sensor_file::SensorFault;
 use super::timing::ChipTiming;
+use super::timing::delay_lines::{DelayLines, Taps};
 use super::timing::silicon::Silicon;
 
 /// A sensor that is possible, and what it is made of. Copies share their contents; the fields of its [`SensorConfig`] are
@@ -32,13 +33,18 @@ struct Parts {
     config: SensorConfig,
     silicon: Silicon,
     timing: OnceLock<ChipTiming>,
+    delay_lines: OnceLock<DelayLines>,
 }
 
 /// A chip's name, and what makes its [`Sensor`].
 pub type Chip = (&'static str, fn() -> Sensor);
 
 /// The chips described here.
-pub const CHIPS: [Chip; 2] = [("quantic4x4", quantic4x4), ("hslidar", hslidar)];
+pub const CHIPS: [Chip; 3] = [
+    ("quantic4x4", quantic4x4),
+    ("hslidar", hslidar),
+    ("hslidar_delay_line", hslidar_delay_line),
+];
 
 impl Sensor {
     /// The chip of this name, one of [`CHIPS`].
@@ -72,6 +78,7 @@ impl Sensor {
             config,
             silicon,
             timing,
+            ..
         } = &*self.0;
         timing.get_or_init(|| match *silicon == Silicon::of(config) {
             true => ChipTiming::of(config),
@@ -79,11 +86,32 @@ impl Sensor {
         })
     }
 
+    /// Taps of a macropixel's delay lines, by its number in the array, row-major; `None` where the TDC is clocked.
+    pub(super) fn taps(&self, number: usize) -> Option<Taps> {
+        let Parts {
+            config,
+            silicon,
+            delay_lines,
+            ..
+        } = &*self.0;
+        (config.tdc == Tdc::DelayLine).then(|| {
+            let lines = delay_lines.get_or_init(|| DelayLines::new(config));
+            lines.taps(silicon, number)
+        })
+    }
+
+    /// Whether macropixels differ by description: each has delay lines of its own, or CLK comes later to some. One window law
+    /// does not describe them all then ([`WindowLaw::of_macropixel`](crate::chip::WindowLaw::of_macropixel)).
+    pub fn has_own_laws(&self) -> bool {
+        self.tdc == Tdc::DelayLine || self.clk_skew_ps > 0.0
+    }
+
     fn from_parts(config: SensorConfig, silicon: Silicon) -> Self {
         Sensor(Arc::new(Parts {
             config,
             silicon,
             timing: OnceLock::new(),
+            delay_lines: OnceLock::new(),
         }))
     }
 }

@@ -2,7 +2,9 @@
 //! ripple P-counter in each, 16 bins of 14 bits, one CLK period long, at 384 MHz.
 
 use super::Sensor;
-use crate::chip::config::{AfterBorrow, EventType, Mode, Overflow, PCounter, SensorConfig, Tap};
+use crate::chip::config::{
+    AfterBorrow, EventType, Mode, Overflow, PCounter, SensorConfig, Tap, Tdc,
+};
 use crate::netlist::Corner;
 
 /// The chip in its guided mode, in typical silicon.
@@ -23,6 +25,11 @@ impl Default for SensorConfig {
             tap: Tap::Borrow,
             after_borrow: AfterBorrow::Hold,
             step_periods: 1,
+            tdc: Tdc::Clocked,
+            delay_control_v: 0.70,
+            delay_sigma: 0.4 / 2.6,
+            delay_seed: 1,
+            clk_skew_ps: 0.0,
             bins: 16,
             bin_bits: 14,
             clk_hz: 384e6,

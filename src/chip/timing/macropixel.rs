@@ -15,6 +15,9 @@
 //! * RUN (the macropixels' ENABLE): it changes with STOP, but only before the first and after the last laser cycle.
 //! * Clocks of the P-counter's stages during a reset: the flip-flops behind them are held.
 
+use std::sync::OnceLock;
+
+use super::silicon::Silicon;
 use crate::chip::{Probe, Probes, SensorConfig, array};
 use crate::logic::Logic::{One, Zero};
 use crate::netlist::{Arrivals, CellKind, Edge, NetId, Netlist, StaticTiming, Timing};
@@ -47,6 +50,8 @@ pub struct MacropixelCircuit {
     clear: NetId,
     /// The inverse of ENABLE.
     disabled: NetId,
+    /// Path of each cell before and, where the macropixel is in it, after its name.
+    cell_paths: OnceLock<Vec<(String, Option<String>)>>,
 }
 
 impl MacropixelCircuit {
@@ -60,9 +65,31 @@ impl MacropixelCircuit {
             counting: probes.counter_cells(&netlist),
             clear: probes.counter_clear(&netlist),
             disabled: probes.disabled(&netlist),
+            cell_paths: OnceLock::new(),
             probes,
             netlist,
         }
+    }
+
+    /// Delays in this silicon of the macropixel at another `position` (row, column), which differs in the names of its cells only.
+    pub fn timing_at(&self, silicon: &Silicon, position: (usize, usize)) -> Timing {
+        let split = |cell| {
+            let path = self.netlist.cell_path(cell);
+            match path.split_once(self.probes.macropixel()) {
+                Some((before, after)) => (before.to_owned(), Some(after.to_owned())),
+                None => (path, None),
+            }
+        };
+        let paths = self.cell_paths.get_or_init(|| {
+            let cells = 0..self.netlist.cells().len();
+            cells.map(split).collect()
+        });
+        let name = array::pixel_name(position.0, position.1);
+        let path = |cell: usize| match &paths[cell] {
+            (path, None) => path.clone(),
+            (before, Some(after)) => [before, name.as_str(), after].concat(),
+        };
+        silicon.timing_as(&self.netlist, path)
     }
 
     /// Dotted path of the macropixel, the top's name first.
@@ -90,6 +117,12 @@ impl MacropixelCircuit {
             let clock = self.pin(cell, 1);
             clock == counter_clk || Some(clock) == divided
         })
+    }
+
+    /// The clock that freezes the window: of the delay lines' samples, or of the HIT flip-flops.
+    fn sampling(&self) -> NetId {
+        let sample_clk = self.probes.find(Probe::SampleClk);
+        sample_clk.map_or_else(|| self.probes.net(Probe::Strobe), |nets| nets[0])
     }
 
     fn pin(&self, cell: usize, pin: usize) -> NetId {
@@ -147,6 +180,20 @@ impl<'c> MacropixelPaths<'c> {
         self.after(Probe::Enable, &Edge::BOTH, &cuts)
     }
 
+    /// TOGGLE → PHOTONS, of all SPADs and either edge.
+    fn joining(&self) -> Option<Span> {
+        let probes = &self.circuit.probes;
+        let photons = probes.find(Probe::Photons)?[0];
+        let of = |&toggle: &NetId| {
+            let starts = Edge::BOTH.map(|edge| (toggle, edge));
+            let arrivals = self
+                .analysis
+                .arrivals(&starts, &[Probe::Hit].map(|p| probes.bus(p)).concat());
+            arrivals.expect("every loop is cut").window(photons)
+        };
+        probes.toggles().iter().filter_map(of).reduce(hull)
+    }
+
     fn after(&self, from: Probe, edges: &[Edge], cuts: &[Probe]) -> Arrivals<'c> {
         let probes = &self.circuit.probes;
         let starts: Vec<(NetId, Edge)> =
@@ -195,10 +242,12 @@ impl<'c> MacropixelPaths<'c> {
 pub struct MacropixelDelays {
     /// SPAD_RAW rises → TOGGLE rises, falls; of each SPAD.
     pub latency: Vec<(Time, Time)>,
-    /// CLK rises → SPAD_EVENT settled, latest. A path that no values excite may be longer than any that they do: see
+    /// TOGGLE → PHOTONS, where delay lines time what SPADs have in common.
+    pub joining: Option<Span>,
+    /// CLK rises → SPAD_EVENT settled, latest; nothing where delay lines time photons. A path that no values excite may be longer than any that they do: see
     /// the timing analysis of the correlation block.
     pub event: Time,
-    /// CLK rises → the stage of SHIFT changes that each bin's HIT takes, bin 0 first.
+    /// CLK rises → the stage of SHIFT changes that each bin's HIT takes, bin 0 first; none where delay lines time photons.
     pub shift: Vec<Span>,
     /// STOP rises → COUNTER_RESET rises.
     pub reset: Span,
@@ -208,6 +257,8 @@ pub struct MacropixelDelays {
     pub run: Span,
     /// STOP rises → STROBE rises, where STOP makes the strobe: in the conventional mode.
     pub stop_strobe: Span,
+    /// STOP rises → what freezes the window rises, conventional mode: STROBE, or SAMPLE_CLK before it.
+    pub stop_sample: Span,
     /// STOP rises → HIT's reset ends, conventional mode.
     pub stop_hit_release: Span,
     /// STROBE rises → HIT rises, latest.
@@ -228,7 +279,9 @@ impl MacropixelDelays {
         let rise = paths.after_clk(Edge::Rise);
         let stop = paths.after_stop();
         // The newest event is in the first stage and goes into the last bin.
-        let shift = circuit.probes.bus(Probe::Shift).iter().rev();
+        let shift = circuit.probes.find(Probe::Shift).unwrap_or_default();
+        let shift = shift.iter().rev();
+        let event = circuit.probes.find(Probe::SpadEvent);
         let hits = circuit.hits.iter().map(|&cell| paths.clock_to_q(cell).0);
         MacropixelDelays {
             latency: circuit
@@ -236,12 +289,14 @@ impl MacropixelDelays {
                 .iter()
                 .map(|&toggle| paths.clock_to_q(toggle))
                 .collect(),
-            event: changes(&rise, net(Probe::SpadEvent)).1,
+            joining: paths.joining(),
+            event: event.map_or(Time::ZERO, |nets| changes(&rise, nets[0]).1),
             shift: shift.map(|&bit| changes(&rise, bit)).collect(),
             reset: edge(&stop, net(Probe::CounterReset), Edge::Rise),
             release: edge(&stop, net(Probe::CounterReset), Edge::Fall),
             run: changes(&stop, net(Probe::Enable)),
             stop_strobe: edge(&stop, net(Probe::Strobe), Edge::Rise),
+            stop_sample: edge(&stop, circuit.sampling(), Edge::Rise),
             stop_hit_release: edge(&stop, net(Probe::HitReset), Edge::Fall),
             strobe_to_hit: hits.max().expect("a METDC has bins"),
             slowest: latest(paths.arcs(|_| true)).unwrap_or(Time::ZERO),
@@ -260,6 +315,8 @@ pub struct CounterDelays {
     pub local_stop: Span,
     /// CLK falls → STROBE rises.
     pub strobe: Span,
+    /// CLK falls → what freezes the window rises: STROBE, or SAMPLE_CLK before it.
+    pub sample: Span,
     /// CLK falls → LOCAL_STOP → BLOCK rises, latest; none where LOCAL_STOP does not block.
     pub block: Option<Time>,
     /// CLK falls → data of the flip-flops that COUNTER_CLK clocks settled, latest.
@@ -317,6 +374,7 @@ impl CounterDelays {
             counter_clk: edge(&fall, counter_clk, Edge::Rise),
             local_stop: edge(&fall, net(Probe::LocalStop), Edge::Rise),
             strobe: edge(&fall, net(Probe::Strobe), Edge::Rise),
+            sample: edge(&fall, circuit.sampling(), Edge::Rise),
             block: latest([fall.edge_window(net(Probe::Block), Edge::Rise)].into_iter()),
             settled: settled(&fall).expect("a P-counter counts"),
             released: latest(controls.map(|&net| release.edge_window(net, Edge::Fall)))

@@ -10,18 +10,21 @@
 //! | file | what it has |
 //! |---|---|
 //! | [`silicon`] | the cell library, conditions and mismatch |
+//! | `delay_lines` | taps of the delay lines of every macropixel |
 //! | [`macropixel`] | which edges start a path, where it is cut, and what is read off |
 //!
 //! Reference models and the window law reckon with a sensor's [`ChipTiming`] instead of simulating cells.
 
+pub(crate) mod delay_lines;
 pub mod macropixel;
 pub mod silicon;
 
 use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
-use super::config::{AfterBorrow, Overflow, PCounter, SensorConfig, Tap};
+use super::config::{AfterBorrow, Overflow, PCounter, SensorConfig, Tap, Tdc};
 use super::front_end::PulseLimits;
+use super::photon_line;
 use crate::netlist::{CellKind, CheckKind, Corner};
 use crate::units::Time;
 use macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays};
@@ -30,8 +33,10 @@ use silicon::Silicon;
 /// Delays of the paths that decide where a window lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ChipTiming {
-    /// SPAD_RAW rising to the toggle flip-flop's output: the front-end latency.
-    pub spad_to_toggle: Time,
+    /// SPAD_RAW rising to what is sampled, the toggle flip-flop's output or PHOTONS: the front-end latency.
+    pub spad_to_sampled: Time,
+    /// Delay of each of the stages of the photon line, where there is one.
+    pub photon_line_stage: Time,
     /// What the toggle flip-flops ask of SPAD_RAW.
     pub pulses: PulseLimits,
     /// CLK falling to COUNTER_CLK rising.
@@ -40,11 +45,15 @@ pub struct ChipTiming {
     pub counter: CounterTiming,
     /// LOCAL_STOP rising to the clock of the HIT flip-flops.
     pub local_stop_to_strobe: Time,
+    /// LOCAL_STOP rising to what freezes the window: that clock, or the one that samples the delay lines.
+    pub local_stop_to_sample: Time,
     /// STOP rising to the clock of the HIT flip-flops, conventional mode.
     pub stop_to_strobe: Time,
+    /// STOP rising to what freezes the window, conventional mode.
+    pub stop_to_sample: Time,
     /// Clock of the HIT flip-flops to HIT.
     pub strobe_to_hit: Time,
-    /// CLK rising to a change of the METDC's shift register.
+    /// CLK rising to a change of the METDC's shift register; nothing where there is none.
     pub clk_to_shift: Time,
     /// STOP rising to COUNTER_RESET rising.
     pub stop_to_reset: Time,
@@ -56,7 +65,7 @@ pub struct ChipTiming {
     pub stop_to_hit_release: Time,
     /// STOP rising to the inverse of ENABLE, which blocks COUNTER_CLK, falling.
     pub stop_to_enabled: Time,
-    /// CLK rising to SPAD_EVENT settled, longest path.
+    /// CLK rising to SPAD_EVENT settled, longest path; nothing where events are not clocked.
     pub clk_to_event: Time,
     /// How long before its clock a flip-flop's data must be stable.
     pub setup: Time,
@@ -132,8 +141,10 @@ impl ChipTiming {
         let slowest_toggle = latencies.map(|(rise, fall)| (*rise).max(*fall)).max();
         let toggle = slowest_toggle.expect("a macropixel has SPADs");
         let shift = delays.shift.iter().map(|span| span.1).max();
+        let joining = delays.joining.map_or(Time::ZERO, |span| span.1);
         ChipTiming {
-            spad_to_toggle: delays.latency[0].0,
+            spad_to_sampled: delays.latency[0].0 + joining,
+            photon_line_stage: photon_line::stage(joining, config.spads()),
             pulses: PulseLimits {
                 width: limit(CheckKind::ClockHigh),
                 apart: toggle + limit(CheckKind::Setup),
@@ -152,9 +163,11 @@ impl ChipTiming {
                 clock_high: of_counter(CheckKind::ClockHigh),
             },
             local_stop_to_strobe: counter.strobe.1 - counter.local_stop.1,
+            local_stop_to_sample: counter.sample.1 - counter.local_stop.1,
             stop_to_strobe: delays.stop_strobe.1,
+            stop_to_sample: delays.stop_sample.1,
             strobe_to_hit: delays.strobe_to_hit,
-            clk_to_shift: shift.expect("a METDC has stages"),
+            clk_to_shift: shift.unwrap_or(Time::ZERO),
             stop_to_reset: delays.reset.1,
             stop_to_reset_release: delays.release.1,
             stop_to_hit_reset: delays.reset.1 + counter.hit_reset.1,
@@ -183,6 +196,7 @@ struct Circuit {
     tap: Tap,
     after_borrow: AfterBorrow,
     step_periods: usize,
+    tdc: Tdc,
     bins: usize,
     bin_bits: usize,
     overflow: Overflow,
@@ -198,6 +212,7 @@ impl Circuit {
             tap: config.tap,
             after_borrow: config.after_borrow,
             step_periods: config.step_periods,
+            tdc: config.tdc,
             bins: config.bins,
             bin_bits: config.bin_bits,
             overflow: config.overflow,

@@ -60,7 +60,7 @@ impl Silicon {
 
     /// Delays of another netlist that differs from this one in names only: there each cell is at `path` of its index.
     pub fn timing_as(&self, netlist: &Netlist, path: impl Fn(usize) -> String) -> Timing {
-        let nominal = Timing::nominal(netlist, Self::library(), self.corner);
+        let nominal = Timing::nominal_as(netlist, Self::library(), self.corner, &path);
         varied_as(netlist, &nominal, self.factor, self.mismatch, path)
     }
 

@@ -23,7 +23,7 @@ fn at_384_mhz_the_window_ends_one_and_a_half_periods_before_the_start_value() {
     let window = law.window(100).open().unwrap();
     assert_eq!(window.first_edge, 100 - 16);
     let end = law.interval(&window).end;
-    let expected = config.clock().half_periods(2 * 99 + 1) - law.timing().spad_to_toggle;
+    let expected = config.clock().half_periods(2 * 99 + 1) - law.timing().spad_to_sampled;
     assert!((end - expected).as_fs().abs() <= 2);
 }
 

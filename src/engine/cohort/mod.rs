@@ -63,6 +63,7 @@ pub use self::hits::at_least_hit;
 use self::secondaries::Secondaries;
 use self::spad_light::SpadLight;
 use self::words::RandomWords;
+use super::error::one_law;
 use super::{Engine, EngineError, Expose, Exposed, LitPixel, NotModelled, Work, follows};
 use crate::chip::{Exposure, Sensor, WindowLaw, correlation, histogram, window_law};
 use crate::photon::{DeadTimeLaw, PhotonStream, PixelLight, Segment, SpadModel, StreamConfig};
@@ -327,6 +328,7 @@ impl Cohort {
         light: &PixelLight,
     ) -> Result<Option<Vec<LikeCycles>>, EngineError> {
         follows(&self.sensor, &self.law.timing().pulses)?;
+        one_law(&self.sensor)?;
         let Opening { window, from_fs } = self.opening(start);
         let Some(window) = window.settled()? else {
             return Ok(None);

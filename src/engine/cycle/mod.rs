@@ -31,6 +31,7 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
+use super::error::one_law;
 use super::{
     Engine, EngineError, Expose, Exposed, Gate, Histograms, LitPixel, PulsedPixel, Replay, follows,
     full_stream,
@@ -274,6 +275,7 @@ impl Engine for Cycle {
 impl Replay for Cycle {
     fn replay(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError> {
         follows(&self.sensor, &self.law.timing().pulses)?;
+        one_law(&self.sensor)?;
         let starts: Vec<u16> = pixels.iter().map(|pixel| pixel.start).collect();
         let pulses: Vec<&[SpadEvent]> = pixels.iter().map(|pixel| pixel.pulses).collect();
         for &start in &starts {

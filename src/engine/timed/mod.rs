@@ -22,6 +22,7 @@ use rayon::prelude::*;
 
 pub use self::doubt::Doubt;
 use self::orders::{Delays, Orders, Part, Setting};
+use super::error::one_law;
 use super::{
     Cycle, Engine, EngineError, Expose, Exposed, Gate, Histograms, LaneSimulation, LitPixel,
     PulsedPixel, Replay, Window, full_stream,
@@ -61,8 +62,6 @@ pub struct Timed {
     silicon: Silicon,
     runner: Runner,
     circuit: MacropixelCircuit,
-    /// Path of each cell before and, where the macropixel is in it, after its name.
-    paths: Vec<(String, Option<String>)>,
     /// Without mismatch all macropixels are alike.
     alike: Option<(Timing, Orders)>,
     /// The law with the library's delays.
@@ -88,16 +87,7 @@ impl Timed {
         let sensor = made.made_of(&Silicon::of(&made));
         // Macropixels differ in the names of their cells only.
         let circuit = MacropixelCircuit::new(&sensor, (0, 0));
-        let name = circuit.probes.macropixel();
-        let paths = (0..circuit.netlist.cells().len()).map(|cell| {
-            let path = circuit.netlist.cell_path(cell);
-            match path.split_once(name) {
-                Some((before, after)) => (before.to_owned(), Some(after.to_owned())),
-                None => (path, None),
-            }
-        });
         let mut engine = Timed {
-            paths: paths.collect(),
             circuit,
             setting: Setting {
                 exposure: *exposure,
@@ -113,7 +103,7 @@ impl Timed {
             arrives: Mutex::default(),
             coverage: Mutex::default(),
         };
-        if silicon.mismatch.is_none() {
+        if silicon.mismatch.is_none() && !made.has_own_laws() {
             let timing = silicon.timing(&engine.circuit.netlist);
             let orders = engine.orders(&timing);
             engine.alike = Some((timing, orders));
@@ -266,12 +256,12 @@ impl Timed {
         if let Some((timing, _)) = &self.alike {
             return Cow::Borrowed(timing);
         }
-        let name = self.name(number);
-        let path = |cell: usize| match &self.paths[cell] {
-            (path, None) => path.clone(),
-            (before, Some(after)) => [before, name.as_str(), after].concat(),
-        };
-        Cow::Owned(self.silicon.timing_as(&self.circuit.netlist, path))
+        let number = number as usize;
+        let position = (
+            number / self.setting.sensor.cols,
+            number % self.setting.sensor.cols,
+        );
+        Cow::Owned(self.circuit.timing_at(&self.silicon, position))
     }
 
     fn orders(&self, timing: &Timing) -> Orders {
@@ -319,6 +309,7 @@ impl Replay for Timed {
         if self.runner == Runner::Gate {
             return self.by_gates(pixels);
         }
+        one_law(&self.setting.sensor)?;
         let arrive = self.arrive(pixels.iter().map(|pixel| pixel.start));
         let judge = |pixel: &PulsedPixel<'_>| match arrive[&pixel.start] {
             true => self.judge(pixel),
@@ -354,6 +345,9 @@ impl Replay for Timed {
     }
 
     fn as_the_law_sees<'p>(&self, number: u32, pulses: &'p [SpadEvent]) -> Cow<'p, [SpadEvent]> {
+        if self.setting.sensor.has_own_laws() {
+            return Cow::Borrowed(pulses);
+        }
         let timing = self.timing(number);
         Cow::Owned(self.orders_of(&timing).shifted(&self.common, pulses))
     }

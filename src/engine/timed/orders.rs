@@ -174,7 +174,7 @@ impl Orders {
 
     /// `pulses` as a macropixel must see them whose front end is that of `law`, to take them at the same CLK edges.
     pub(super) fn shifted(&self, law: &WindowLaw, pulses: &[SpadEvent]) -> Vec<SpadEvent> {
-        let common = law.timing().spad_to_toggle;
+        let common = law.timing().spad_to_sampled;
         let shift = |pulse: &SpadEvent| SpadEvent {
             time: pulse.time + self.latency[usize::from(pulse.spad)] - common,
             spad: pulse.spad,
@@ -192,7 +192,7 @@ fn common(setting: &Setting, delays: &Delays) -> ChipTiming {
     let shift = delays.shift.iter().copied().reduce(hull);
     let shift = shift.expect("a sensor has bins");
     ChipTiming {
-        spad_to_toggle: delays.latency[0].0,
+        spad_to_sampled: delays.latency[0].0,
         clk_to_shift: shift.1,
         clk_to_event: delays.event.max(shift.1),
         // Until the bin has taken the hit: a cell each for HIT and the gate of its clock, and one more as a margin.

@@ -19,6 +19,7 @@ use super::echo_rows::EchoRows;
 use super::sight::{Sight, Spans};
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Spacing, Tables};
 use super::{Window, Work, taken};
+use crate::chip::BinEdges;
 use crate::photon::{Draw, Group, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SpadEvent};
 use crate::units::Time;
 use by_window::ByWindow;
@@ -189,6 +190,7 @@ impl<'a> Counting<'a> {
             origin_slot: origin_slots[later as usize].unwrap_or(0),
         });
         let (bins, clk_hz) = (self.engine.sensor.bins, self.engine.exposure.clock.as_hz());
+        let has_clk_bins = self.engine.law.has_clk_bins();
         let within_fs = sight.plain.own.within_fs.clone();
         let mut pixel = Pixel {
             sight,
@@ -196,7 +198,9 @@ impl<'a> Counting<'a> {
             light,
             breeding,
             wanted,
-            echo: EchoRows::new(light, bins, 1e15 / clk_hz, origins_fs[0], within_fs),
+            echo: has_clk_bins
+                .then(|| EchoRows::new(light, bins, 1e15 / clk_hz, origins_fs[0], within_fs))
+                .flatten(),
             hits: self.engine.law.empty_hits(&sight.window),
             work: Work::default(),
         };
@@ -207,7 +211,7 @@ impl<'a> Counting<'a> {
             self.count_bright(&mut pixel);
             return (pixel.hits, pixel.work);
         }
-        if !light.is_alone() {
+        if !light.is_alone() || !has_clk_bins {
             self.count_layers(&mut pixel);
             return (pixel.hits, pixel.work);
         }
@@ -325,11 +329,14 @@ impl<'a> Counting<'a> {
     where
         'a: 'w,
     {
+        let law = &self.engine.law;
+        let edges = || law.edges(&sight.window, i64::from(laser_cycle));
         Placed {
             engine: self.engine,
             binning: self.binning,
             sight,
             laser_cycle,
+            edges: (!law.has_clk_bins()).then(edges),
         }
     }
 
@@ -382,11 +389,17 @@ struct Placed<'w> {
     binning: Binning,
     sight: &'w Sight,
     laser_cycle: u32,
+    /// Of its bins, where they are not CLK periods.
+    edges: Option<BinEdges>,
 }
 
 impl Placed<'_> {
     /// Bin + 1 of a time relative to the start of the laser cycle, if it is within the window.
     fn row_of(&self, time: Time) -> Option<usize> {
+        if let Some(edges) = &self.edges {
+            let pulse = self.engine.exposure.stop(i64::from(self.laser_cycle)) + time;
+            return edges.bin_of(pulse).map(|bin| bin + 1);
+        }
         let code = self.binning.encode_one(time.as_fs() - self.sight.first_fs);
         let bins = self.engine.sensor.bins;
         if !code.is_doubtful() {

@@ -17,22 +17,28 @@ mod past;
 mod sight;
 mod tables;
 
+use std::borrow::Cow;
+
 use super::exposing::refuse_other_spads;
 use super::{
     Cancelling, Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay,
     Work, follows,
 };
 use crate::chip::window_law::OpenWindow;
-use crate::chip::{Exposure, Sensor, WindowLaw, correlation, histogram};
+use crate::chip::{Exposure, Sensor, Tdc, WindowLaw, correlation, histogram, photon_line};
 use crate::photon::{PhotonStream, PixelLight, SpadEvent};
+use crate::units::Time;
 use counting::Counting;
 use sight::Sight;
 
 /// Counts through the window law.
+#[derive(Clone)]
 pub struct Window {
     sensor: Sensor,
     exposure: Exposure,
     law: WindowLaw,
+    /// Whether `law` is that of one macropixel, where each has its own.
+    is_of_macropixel: bool,
 }
 
 impl Window {
@@ -47,6 +53,18 @@ impl Window {
             sensor: law.sensor().clone(),
             exposure: *law.exposure(),
             law,
+            is_of_macropixel: false,
+        }
+    }
+
+    /// This engine with the law of a macropixel.
+    fn of_macropixel(&self, number: u32) -> Cow<'_, Self> {
+        match self.sensor.has_own_laws() && !self.is_of_macropixel {
+            true => Cow::Owned(Window {
+                is_of_macropixel: true,
+                ..Self::with_law(self.law.of_macropixel(number))
+            }),
+            false => Cow::Borrowed(self),
         }
     }
 
@@ -74,11 +92,18 @@ impl Window {
 
     /// What the SPADs that fire in a bin add to its hits, beyond those of an empty macropixel.
     fn adds(&self, spads: u64) -> i64 {
+        if self.sensor.tdc == Tdc::DelayLine {
+            return i64::from(spads.count_ones() % 2);
+        }
         i64::from(self.is_event(spads)) - i64::from(self.is_event(0))
     }
 
     /// Counts pulses, sorted by time, of which no bin takes two parts.
     fn count_pulses(&self, pulses: &[SpadEvent], window: &OpenWindow, hits: &mut [i64]) {
+        if self.sensor.tdc == Tdc::DelayLine {
+            let edges = self.line_edges(pulses);
+            return self.count_between_edges(&edges, window, hits);
+        }
         if !self.law.has_clk_bins() {
             return self.count_between_edges(pulses, window, hits);
         }
@@ -90,6 +115,15 @@ impl Window {
                 }
             }
         }
+    }
+
+    /// Those of some pulses that leave an edge on the photon line.
+    fn line_edges(&self, pulses: &[SpadEvent]) -> Vec<SpadEvent> {
+        let pulses: Vec<(Time, u8)> = pulses.iter().map(|p| (p.time, p.spad)).collect();
+        let stage = self.law.timing().photon_line_stage;
+        let edges = photon_line::model(&pulses, self.sensor.spads(), stage);
+        let event = |(time, spad)| SpadEvent { time, spad };
+        edges.into_iter().map(event).collect()
     }
 
     /// The same by the edges of the bins, whatever those are: laser cycle by laser cycle, leaving out those without pulses.
@@ -184,11 +218,17 @@ impl Engine for Window {
 impl Replay for Window {
     fn replay(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError> {
         let mut histograms = Histograms::new(self.sensor.bins);
-        for &PulsedPixel { start, pulses, .. } in pixels {
+        for &PulsedPixel {
+            number,
+            start,
+            pulses,
+        } in pixels
+        {
+            let engine = self.of_macropixel(number);
             let mut hits = vec![0; self.sensor.bins];
-            if let Some(window) = self.window(start)? {
-                hits = self.law.empty_hits(&window);
-                self.count_pulses(pulses, &window, &mut hits);
+            if let Some(window) = engine.window(start)? {
+                hits = engine.law.empty_hits(&window);
+                engine.count_pulses(pulses, &window, &mut hits);
             }
             histograms.push(&self.counts(&hits));
         }
@@ -199,6 +239,16 @@ impl Replay for Window {
 impl Expose for Window {
     fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
         refuse_other_spads(stream, pixels)?;
+        if self.sensor.has_own_laws() && !self.is_of_macropixel {
+            let mut exposed = Exposed::new(self.sensor.bins);
+            for pixel in pixels {
+                let engine = self.of_macropixel(pixel.number);
+                let alone = engine.expose(stream, std::slice::from_ref(pixel))?;
+                exposed.histograms.append(&alone.histograms);
+                exposed.work += alone.work;
+            }
+            return Ok(exposed);
+        }
         let mut counting = Counting::new(self, stream);
         let mut exposed = Exposed::new(self.sensor.bins);
         let clk_periods =

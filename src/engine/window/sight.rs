@@ -13,6 +13,7 @@
 
 use super::past::Past;
 use crate::chip::window_law::{OpenWindow, WindowLaw};
+use crate::chip::{Tdc, photon_line};
 use crate::photon::{PhotonStream, PixelLight, Span};
 
 /// By how much times relative to a cycle differ from cycle to cycle, fs: STOP and CLK edges are rounded to whole
@@ -92,7 +93,7 @@ impl Spans {
 pub(super) struct Sight {
     /// The window.
     pub window: OpenWindow,
-    /// Where bin 0 begins.
+    /// Where bin 0 begins, or what decides of it.
     pub first_fs: i64,
     /// Where the last bin is over for certain.
     pub until_fs: i64,
@@ -107,11 +108,15 @@ impl Sight {
     /// before, so that most photons matter anyway, and where bins are not CLK periods, which is what photons are binned by when
     /// they are drawn together.
     pub(super) fn new(law: &WindowLaw, window: &OpenWindow, stream: &PhotonStream) -> Option<Self> {
-        if !law.has_clk_bins() {
+        let interval = law.interval(window);
+        let (mut first_fs, mut end_fs) = (interval.start.as_fs(), interval.end.as_fs());
+        if law.sensor().tdc == Tdc::DelayLine {
+            // Pulses before and after it may keep others in it from leaving an edge.
+            first_fs -= photon_line::REACH.as_fs();
+            end_fs += photon_line::REACH.as_fs();
+        } else if !law.has_clk_bins() {
             return None;
         }
-        let interval = law.interval(window);
-        let (first_fs, end_fs) = (interval.start.as_fs(), interval.end.as_fs());
         if end_fs - first_fs > stream.cycle_fs() {
             // A pulse in two windows would be judged twice.
             return None;

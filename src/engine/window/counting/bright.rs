@@ -56,7 +56,8 @@ impl Counting<'_> {
     /// Counts a macropixel.
     pub(super) fn count_bright(&mut self, pixel: &mut Pixel<'_>) {
         let laser_cycles = self.stream.config().laser_cycles;
-        let layout = self.layout(pixel);
+        let has_clk_bins = self.engine.law.has_clk_bins();
+        let layout = self.layout(pixel).filter(|_| has_clk_bins);
         let alone = layout
             .as_ref()
             .map_or(laser_cycles, |layout| layout.first_cycle);

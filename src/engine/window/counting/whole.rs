@@ -5,6 +5,7 @@ use smallvec::SmallVec;
 
 use super::by_window::ByWindow;
 use super::{Counting, Pixel, Placed, taken};
+use crate::chip::Tdc;
 use crate::engine::window::past::Past;
 use crate::engine::window::sight::ROUNDING_FS;
 use crate::photon::{Draw, Group, Photon, PixelStream, SpadEvent, Span};
@@ -180,6 +181,9 @@ impl Counting<'_> {
         seen: u64,
     ) {
         let row_of = |event: &SpadEvent| window.row_of(event.time - start).unwrap_or(0) as i64;
+        if self.engine.sensor.tdc == Tdc::DelayLine {
+            return self.count_line_edges(pixel, row_of, seen);
+        }
         let mut alone = 0;
         for (row, spads) in taken(&self.events, row_of).filter(|(row, _)| *row > 0) {
             alone += u64::from(spads.count_ones());
@@ -189,6 +193,28 @@ impl Counting<'_> {
         let pulses = self.events.iter().filter(|event| row_of(event) > 0).count() as u64;
         pixel.work.pulses += pulses;
         pixel.work.cancelled += pulses - alone;
+        pixel.work.lost_to_dead_time += seen.saturating_sub(pulses);
+    }
+
+    /// Counts `events` where delay lines time them: bins with an odd number of edges.
+    fn count_line_edges(
+        &self,
+        pixel: &mut Pixel<'_>,
+        row_of: impl Fn(&SpadEvent) -> i64,
+        seen: u64,
+    ) {
+        let pulses = self.events.iter().filter(|event| row_of(event) > 0).count() as u64;
+        let mut counted = 0;
+        let edges = self.engine.line_edges(&self.events);
+        for of_bin in edges.chunk_by(|a, b| row_of(a) == row_of(b)) {
+            let row = row_of(&of_bin[0]);
+            if row > 0 && of_bin.len() % 2 == 1 {
+                pixel.hits[row as usize - 1] += 1;
+                counted += 1;
+            }
+        }
+        pixel.work.pulses += pulses;
+        pixel.work.cancelled += pulses - counted;
         pixel.work.lost_to_dead_time += seen.saturating_sub(pulses);
     }
 

@@ -1,0 +1,122 @@
+//! Photon line: all SPADs of a macropixel on one line, on which every pulse is an edge (thesis 2.4.1, Fig. 22b; 4.9.3). It is the
+//! front end of a TDC that a delay line times, and knows no CLK.
+//!
+//! ```text
+//!                 toggle
+//!               ┌────────┐
+//!            ┌─►│D      Q├──► XOR ─┐
+//!            └──┤QN      │   ┌►    ├─► XOR ─► … ─► driver ─► PHOTONS
+//!   SPAD_RAW ──►│>       │   │  … ─┘
+//!               └────────┘  other SPADs
+//! ```
+//!
+//! Timing: the XORs and the driver are laid out to switch equally fast either way, because what counts is when an edge comes, and
+//! every SPAD passes as many of them. Two pulses closer than an XOR's delay meet at the one that joins their SPADs and leave no
+//! edge there: it has no time to switch. Pulses that come between the same two taps of the delay line cancel as well.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::finished;
+use crate::netlist::{CellKind, Module, ModuleBuilder, OwnDelay};
+use crate::units::Time;
+
+/// Delay of an XOR or the driver in the typical corner, fs: between those of the library's XOR to either side.
+const STAGE_FS: u32 = 57_553;
+
+/// A pulse of one SPAD as an edge. Ports: SPAD_RAW, PIXEL_CLEAR → TOGGLE.
+fn toggling() -> Arc<Module> {
+    let mut m = ModuleBuilder::new("toggling");
+    let raw = m.input("SPAD_RAW");
+    let clear = m.input("PIXEL_CLEAR");
+    let toggle = m.output("TOGGLE");
+    let toggle_n = m.wire("TOGGLE_N");
+    m.cell(
+        "toggle",
+        CellKind::Dffr,
+        &[toggle_n, raw, clear],
+        &[toggle, toggle_n],
+    );
+    finished(m.finish())
+}
+
+/// The photon line of so many SPADs, a power of two.
+///
+/// Ports: SPAD_RAW\<SPADs\>, PIXEL_CLEAR → PHOTONS.
+pub fn circuit(spads: usize) -> Arc<Module> {
+    debug_assert!(spads.is_power_of_two(), "every SPAD passes as many XORs");
+    let toggling = toggling();
+    let mut m = ModuleBuilder::new("photon_line");
+    let raw = m.input_bus("SPAD_RAW", spads);
+    let clear = m.input("PIXEL_CLEAR");
+    let photons = m.output("PHOTONS");
+    let mut level = m.wire_bus("TOGGLES", spads);
+    for spad in 0..spads {
+        m.instance(
+            &format!("spad_{spad}"),
+            &toggling,
+            &[
+                ("SPAD_RAW", &raw[spad..=spad]),
+                ("PIXEL_CLEAR", &[clear]),
+                ("TOGGLE", &level[spad..=spad]),
+            ],
+        );
+    }
+    let stage = OwnDelay::balanced(STAGE_FS);
+    while level.len() > 1 {
+        let joined = m.wire_bus(&format!("OF_{}", 2 * spads / level.len()), level.len() / 2);
+        for (pair, (inputs, &output)) in level.chunks(2).zip(&joined).enumerate() {
+            let name = format!("xor_{}_{pair}", 2 * spads / level.len());
+            m.cell_with_delay(&name, CellKind::Xor2, inputs, &[output], stage);
+        }
+        level = joined;
+    }
+    m.cell_with_delay("driver", CellKind::Buf, &level, &[photons], stage);
+    finished(m.finish())
+}
+
+/// Longest time by which a pulse may come before or after another one and decide, with others in between, whether that one leaves an
+/// edge: eight SPADs would have to fire within an XOR's delay (60 ps) of each other, one after the other.
+pub const REACH: Time = Time::from_ps(500);
+
+/// Delay of each stage of a line of so many SPADs from that of all of them, TOGGLE → PHOTONS: an XOR for each halving of the SPADs, and
+/// the driver.
+pub fn stage(toggle_to_photons: Time, spads: usize) -> Time {
+    let stages = i64::from(spads.trailing_zeros()) + 1;
+    debug_assert!(toggle_to_photons.as_fs() % stages == 0, "stages are alike");
+    Time::from_fs(toggle_to_photons.as_fs() / stages)
+}
+
+/// Reference model: which of some pulses, (time, SPAD) sorted by time, leave an edge on the line of so many SPADs, whose XORs
+/// take `stage`. Edges come as many stages after their pulses.
+pub fn model(pulses: &[(Time, u8)], spads: usize, stage: Time) -> Vec<(Time, u8)> {
+    let mut left = pulses.to_vec();
+    let is_apart = |pair: &[(Time, u8)]| pair[1].0 >= pair[0].0 + stage;
+    if !pulses.windows(2).all(is_apart) {
+        left = edges(pulses, 0..spads as u8, stage);
+    }
+    left
+}
+
+/// Edges on the net that joins a range of SPADs.
+fn edges(pulses: &[(Time, u8)], spads: Range<u8>, stage: Time) -> Vec<(Time, u8)> {
+    if pulses.len() <= 1 || spads.len() == 1 {
+        return pulses.to_vec();
+    }
+    let middle = spads.start + (spads.end - spads.start) / 2;
+    let (low, high): (Vec<_>, Vec<_>) = pulses.iter().partition(|(_, spad)| *spad < middle);
+    let mut inputs = edges(&low, spads.start..middle, stage);
+    inputs.extend(edges(&high, middle..spads.end, stage));
+    inputs.sort_unstable();
+    let mut outputs: Vec<(Time, u8)> = Vec::with_capacity(inputs.len());
+    for input in inputs {
+        // An edge that is still on its way through the XOR is taken back.
+        match outputs.last() {
+            Some(pending) if input.0 < pending.0 + stage => {
+                outputs.pop();
+            }
+            _ => outputs.push(input),
+        }
+    }
+    outputs
+}
