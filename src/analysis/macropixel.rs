@@ -28,9 +28,9 @@ pub struct MacropixelTiming {
     /// CLK falls → STROBE rises.
     pub strobe: (Time, Time),
     /// CLK rises → SHIFT changes, all stages together.
-    pub shift: (Time, Time),
+    pub shift: Option<(Time, Time)>,
     /// CLK rises → SPAD_EVENT settled.
-    pub event: Path,
+    pub event: Option<Path>,
     /// The shortest path from CLK to the data of a flip-flop on the same edge, by its hold.
     pub shortest: Path,
     /// CLK falls → COUNTER_CLK rises.
@@ -119,10 +119,10 @@ impl MacropixelTiming {
                 .path(probes.net(Probe::LocalStop), Edge::Rise, Bound::Longest)
                 .expect(whole),
             strobe: counter.strobe,
-            shift: delays.shift.iter().copied().reduce(hull).expect(whole),
-            event: rise
-                .path_to(probes.net(Probe::SpadEvent), Bound::Longest)
-                .expect(whole),
+            shift: delays.shift.iter().copied().reduce(hull),
+            event: probes
+                .find(Probe::SpadEvent)
+                .and_then(|nets| rise.path_to(nets[0], Bound::Longest)),
             shortest: worst_path(&clk, clk_rest.iter(), CheckKind::Hold).expect(whole),
             counter_clk: counter.counter_clk,
             reset: delays.reset,
@@ -204,7 +204,10 @@ impl MacropixelTiming {
         // Twice the time from the first rising edge's change of SHIFT to the strobe.
         let (earlier, later) = self.strobe_offsets(phase);
         let strobe = (self.strobe.0 + earlier, self.strobe.1 + later);
-        let after = middle(strobe) - middle(self.shift) - t;
+        // HIT takes what delay lines have sampled just before, at the strobe that comes after the same edge.
+        let after = self
+            .shift
+            .map_or(0, |shift| middle(strobe) - middle(shift) - t);
         let (ignored_until, counts_from) = self.first_in_doubt(phase);
         let doubt = middle((ignored_until, counts_from));
         Aim {
@@ -247,28 +250,25 @@ impl MacropixelTiming {
         }
     }
 
-    /// The strobe and the change of the shift register that is nearest to it.
-    pub fn strobe_race(&self, period: Time, phase: Time) -> Race {
-        let (strobe, shift) = (self.strobe.1, self.shift.0);
+    /// The strobe and the change of the shift register that is nearest to it; none where there is no shift register.
+    pub fn strobe_race(&self, period: Time, phase: Time) -> Option<Race> {
+        let changes = self.shift?;
+        let (strobe, shift) = (self.strobe.1, changes.0);
         let hold = self.hit_hold() - (strobe - shift);
-        let setup = self.hit_setup() - (self.shift.1 - self.strobe.0);
+        let setup = self.hit_setup() - (changes.1 - self.strobe.0);
         let nearest = |strobe: Time| (strobe - shift).as_fs().div_euclid(period.as_fs());
         let Some(stop_strobe) = self.stop_strobe else {
             let shortest = self.clk_period().unwrap_or(period);
             let signals = (strobe, shift);
-            return Race::strobe_at_shift(
-                period,
-                nearest(strobe),
-                signals,
-                (setup, hold),
-                shortest,
-            );
+            let race =
+                Race::strobe_at_shift(period, nearest(strobe), signals, (setup, hold), shortest);
+            return Some(race);
         };
         let half = Time::from_fs(period.as_fs() / 2);
         let change = half + period * nearest(stop_strobe.1 + phase) + shift - phase;
         let what = Conflict::ShiftAtStrobe;
         let forbidden = (stop_strobe.0 - setup, stop_strobe.1 + hold);
-        Race::with_stop(what, change, forbidden, phase, period)
+        Some(Race::with_stop(what, change, forbidden, phase, period))
     }
 
     /// Falling CLK edges after CLK's fall nearest to STOP: until when they are sure not to count, and from when on they are

@@ -20,7 +20,7 @@ use super::{Aim, LoadTiming, LocalClocks, MacropixelTiming};
 use crate::chip::front_end::DeadTimeTooShort;
 use crate::chip::window_law::Window;
 use crate::chip::{
-    ChipTiming, Conflict, Exposure, Limits, Probe, Race, SensorConfig, Silicon, WindowLaw,
+    ChipTiming, Conflict, Exposure, Limits, Probe, Race, SensorConfig, Silicon, Tdc, WindowLaw,
 };
 use crate::netlist::{CheckKind, Netlist, Requirement};
 use crate::units::Time;
@@ -206,7 +206,8 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
         Some(pixel.strobe_slack(r, period, phase, aim))
     });
     // Slower or faster silicon may strobe clear of the change that it is near, but on the other side of it.
-    let race = Some(pixel.strobe_race(period, phase)).filter(|race| race.slack() < Time::ZERO);
+    let race = pixel.strobe_race(period, phase);
+    let race = race.filter(|race| race.slack() < Time::ZERO);
     let bins = pixel.aim(period, phase).moved() - aim.moved();
     for mut margin in strobes {
         if margin.slack < Time::ZERO {
@@ -302,7 +303,8 @@ fn law_race(config: &SensorConfig) -> Option<Race> {
 fn notes(config: &SensorConfig, met: Option<(&MacropixelTiming, Aim)>) -> Vec<String> {
     let period = config.clock().period();
     let mut notes = Vec::new();
-    if let Some((pixel, aim)) = met.filter(|(_, aim)| aim.edges > 0) {
+    let is_clocked = config.tdc == Tdc::Clocked;
+    if let Some((pixel, aim)) = met.filter(|(_, aim)| is_clocked && aim.edges > 0) {
         let earlier = aim.earlier();
         let hold = pixel.hits.iter().filter(|r| r.kind == CheckKind::Hold);
         let slack = hold
@@ -315,7 +317,7 @@ fn notes(config: &SensorConfig, met: Option<(&MacropixelTiming, Aim)>) -> Vec<St
             slack.unwrap_or_default()
         ));
     }
-    if config.dead_time() <= period {
+    if is_clocked && config.dead_time() <= period {
         notes.push(format!(
             "two photons of a SPAD within a CLK period ({period}) cancel, as the dead time ({}) lets them",
             config.dead_time()

@@ -17,7 +17,7 @@ use std::collections::BTreeSet;
 
 use bitvec::slice::BitSlice;
 
-use crate::chip::{Exposure, LoadPins, Mode, Sensor, SensorPins, load_path};
+use crate::chip::{Exposure, LoadPins, Mode, Sensor, SensorPins, Tdc, load_path};
 use crate::kernel::{Drive, Stimulus, clock, merge};
 use crate::photon::SpadEvent;
 use crate::units::{Frequency, Time};
@@ -56,6 +56,15 @@ pub(crate) fn load_stimulus<'a>(
         std::iter::once(edge).chain(data)
     });
     (end, merge([boxed(control.into_iter()), boxed(edges)]))
+}
+
+/// Longer than delay lines take to be empty and CLK to come to the last column: twice the average for mismatch and slow silicon.
+fn delay_lines(sensor: &Sensor) -> Time {
+    let line = match sensor.tdc {
+        Tdc::Clocked => Time::ZERO,
+        Tdc::DelayLine => sensor.delay_element() * (2 * sensor.bins as i64),
+    };
+    line + sensor.clk_skew(sensor.cols)
 }
 
 /// Where load and exposure lie in simulation time.
@@ -125,7 +134,8 @@ impl StimulusPlan {
         let half = |k| LOAD_START + sensor.load_clock().half_periods(k);
         let load_end = half(2 * stream.len() as i64 + 1);
         // On a whole nanosecond, so that edges are easy to read off.
-        let origin_ns = (load_end + SETTLING + exposure.clock.period()).as_fs() / 1_000_000 + 1;
+        let quiet = SETTLING + exposure.clock.period() + delay_lines(&sensor);
+        let origin_ns = (load_end + quiet).as_fs() / 1_000_000 + 1;
         let origin = Time::from_ns(origin_ns);
         let last_edge = exposure.clock.half_periods(LAST_HALF_PERIODS) + exposure.end();
         let mut all: Vec<(usize, SpadEvent)> = pulses
@@ -139,7 +149,7 @@ impl StimulusPlan {
             first_bit: half(1),
             load_end,
             origin,
-            end: origin + last_edge + exposure.clock.period() + SETTLING,
+            end: origin + last_edge + exposure.clock.period() + SETTLING + delay_lines(&sensor),
         };
         StimulusPlan {
             sensor,

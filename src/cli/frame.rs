@@ -70,6 +70,9 @@ pub(super) struct FrameArgs {
     /// Share of macropixels without an echo that may be given a depth; 1 takes every peak for one.
     #[arg(long, value_name = "P", default_value_t = 1e-3)]
     false_alarm_rate: f64,
+    /// When the bins of the sensor's delay lines are, as `gdtof calibrate` has measured it; without it, all are taken to be alike.
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
     /// Leave the range walk of strong echoes in the depths.
     #[arg(long)]
     no_walk_correction: bool,
@@ -102,6 +105,10 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
         let message = format!("{rate} is no share of macropixels; give a number above 0, up to 1");
         return Err(InputError::new("--false-alarm-rate", message).into());
     }
+    let calibration = match &args.calibration {
+        Some(path) => Some(super::calibrate::read(path, &sensor)?),
+        None => None,
+    };
     let results = ResultSet::begin(&args.out)?;
     let probe_at = |(row, col)| Probe {
         row,
@@ -126,6 +133,7 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
             correct_walk: !args.no_walk_correction,
             ..DepthOptions::default()
         },
+        calibration,
     };
     let progress = ProgressBar::new(settings.sensor.pixels() as u64).with_style(
         ProgressStyle::with_template("exposing {bar:40} {pos}/{len} macropixels, {eta} left")?,
@@ -225,6 +233,8 @@ struct Configuration<'a> {
     engine: EngineKind,
     false_alarm_rate: f64,
     walk_correction: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibration: Option<String>,
 }
 
 /// The contents of frame.json.
@@ -270,6 +280,7 @@ impl<'a> Report<'a> {
                 engine: args.engine,
                 false_alarm_rate: args.false_alarm_rate,
                 walk_correction: !args.no_walk_correction,
+                calibration: args.calibration.as_ref().map(|p| p.display().to_string()),
             },
             summary: frame.summary(),
             remark: frame.remark.as_deref(),
@@ -278,7 +289,7 @@ impl<'a> Report<'a> {
             timing,
             tolerance: frame.kept.as_ref(),
             distance: DistanceLaw::new(
-                &WindowLaw::new(&settings.sensor, &settings.exposure),
+                &WindowLaw::new(alike(&settings.sensor), &settings.exposure),
                 frame.pixels.iter().filter_map(|pixel| pixel.start),
             ),
             load_bits: frame.load_bits,
@@ -291,6 +302,15 @@ impl<'a> Report<'a> {
             histograms_shape: [frame.rows, frame.cols, frame.bins],
             macropixels: &frame.pixels,
         }
+    }
+}
+
+/// The sensor as frame.json's one law for all macropixels describes it.
+fn alike(sensor: &SensorConfig) -> SensorConfig {
+    SensorConfig {
+        delay_sigma: 0.0,
+        clk_skew_ps: 0.0,
+        ..sensor.clone()
     }
 }
 

@@ -1,6 +1,7 @@
 //! The command line. Bad input ends with one sentence on standard error and exit status 2; anything
 //! else that goes wrong with exit status 1.
 
+mod calibrate;
 mod export;
 mod frame;
 mod pareto;
@@ -45,6 +46,8 @@ enum Command {
     Reproduce(reproduce::ReproduceArgs),
     /// Depths from a real sensor's histograms, beside its own.
     Range(range::RangeArgs),
+    /// Sweep a picosecond laser over the bins of a sensor with delay lines, and keep when they are.
+    Calibrate(calibrate::CalibrateArgs),
     /// How fast the fast engines are, by size of the array and threads, and the memory they take.
     Speed(speed::SpeedArgs),
     /// How fast the chip can be clocked: ripple, periods, margins.
@@ -78,6 +81,7 @@ pub fn main() -> ExitCode {
         Command::Replay(args) => replay::run(&args),
         Command::Reproduce(args) => reproduce::run(&args),
         Command::Range(args) => range::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
         Command::Speed(args) => speed::run(&args),
         Command::Timing(args) => timing::run(&args),
         Command::Pareto(args) => pareto::run(&args),

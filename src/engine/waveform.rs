@@ -292,14 +292,23 @@ fn groups(netlist: &Netlist, (row, col): (usize, usize)) -> Vec<Group> {
         decimal(Probe::CounterOut),
         binary(Probe::LocalStop),
     ];
+    // Either TDC has some of them.
     let events = [
-        hex(Probe::SpadRaw),
-        hex(Probe::SpadTimed),
-        binary(Probe::SpadEvent),
-        binary(Probe::Shift),
-        binary(Probe::Strobe),
-        binary(Probe::Hit),
+        (Probe::SpadRaw, hex(Probe::SpadRaw)),
+        (Probe::SpadTimed, hex(Probe::SpadTimed)),
+        (Probe::SpadEvent, binary(Probe::SpadEvent)),
+        (Probe::Shift, binary(Probe::Shift)),
+        (Probe::Photons, binary(Probe::Photons)),
+        (Probe::EvenTap, binary(Probe::EvenTap)),
+        (Probe::OddTap, binary(Probe::OddTap)),
+        (Probe::SampleClk, binary(Probe::SampleClk)),
+        (Probe::Strobe, binary(Probe::Strobe)),
+        (Probe::Hit, binary(Probe::Hit)),
     ];
+    let events = events
+        .into_iter()
+        .filter(|(probe, _)| probes.find(*probe).is_some());
+    let events = events.map(|(_, entry)| entry);
     let bins = (0..probes.bins().len()).map(|bin| Entry::decimal(probes.bin_path(bin)));
     let load = [
         Entry::binary(LoadProbe::Enable.path()),
@@ -315,10 +324,7 @@ fn groups(netlist: &Netlist, (row, col): (usize, usize)) -> Vec<Group> {
             format!("P-counter {pixel} (Fig. 54)"),
             loaded.into_iter().chain(memory).chain(counted),
         ),
-        Group::new(
-            format!("Histogram {pixel} (Fig. 47)"),
-            events.into_iter().chain(bins),
-        ),
+        Group::new(format!("Histogram {pixel} (Fig. 47)"), events.chain(bins)),
         Group::new("Load path (Fig. 57)", load),
     ]
 }

@@ -12,8 +12,8 @@
 use super::expected::{EchoLight, Response};
 use super::peak::{Peak, PeakOptions, interpolate_at};
 use super::walk::WalkCorrection;
-use crate::chip::{EventType, Overflow, WindowLaw};
-use crate::theory::significance::Scan;
+use crate::chip::{EventType, Overflow, Tdc, WindowLaw};
+use crate::theory::significance::{Scan, Stretch};
 use crate::units::Time;
 
 /// How depths are found.
@@ -80,20 +80,25 @@ impl EchoFinder {
     /// SPADs) and the SPADs have recovered from one echo before the next window opens.
     ///
     /// # Errors
-    /// Bins that differ: a stretch of them is then full by chance more often than another, and pile-up moves peaks otherwise in
-    /// each.
+    /// Bins of a clocked TDC that differ: pile-up moves peaks otherwise in each. Those of delay lines are told to
+    /// [`EchoFinder::find_in`], and range walk stays in.
     pub fn new(
         law: &WindowLaw,
         pulse_sigma: Time,
         options: &DepthOptions,
     ) -> Result<Self, UnequalBins> {
         let (config, exposure) = (law.sensor(), law.exposure());
-        let bin_s = law.bin_width_s().ok_or(UnequalBins)?;
+        let bin_s = match config.tdc {
+            Tdc::Clocked => law.bin_width_s().ok_or(UnequalBins)?,
+            Tdc::DelayLine => config.delay_element().as_s(),
+        };
         let laser_cycles = exposure.laser_cycles;
         let response = Response::new(config, bin_s, pulse_sigma);
         let laser_cycle_bins = exposure.stop(1).as_s() / bin_s;
         let recovers = response.dead_time_bins() + config.bins as f64 <= laser_cycle_bins;
-        let brighter_is_more = config.event_type == EventType::Greater;
+        // On a line that all SPADs share, photons cancel, and brighter light may give fewer counts.
+        let brighter_is_more =
+            config.event_type == EventType::Greater && config.tdc == Tdc::Clocked;
         let capacity = (1u32 << config.bin_bits) - 1;
         Ok(EchoFinder {
             bin_s,
@@ -119,7 +124,15 @@ impl EchoFinder {
 
     /// The echo in `counts`, one entry per bin, earliest first; `None` if no bin stands out at all.
     pub fn find(&self, counts: &[u32]) -> Option<Sighting> {
-        let stretch = self.scan.fullest(counts);
+        self.judge(counts, self.scan.fullest(counts))
+    }
+
+    /// The same where bins differ in length: `shares` are their lengths over the mean length.
+    pub fn find_in(&self, counts: &[u32], shares: &[f64]) -> Option<Sighting> {
+        self.judge(counts, self.scan.least_likely(counts, shares))
+    }
+
+    fn judge(&self, counts: &[u32], stretch: Stretch) -> Option<Sighting> {
         let bins = stretch.first..stretch.first + self.scan.width;
         let peak_bin = bins.rev().max_by_key(|&bin| counts[bin])?;
         let real: Vec<f64> = counts.iter().map(|&n| f64::from(n)).collect();

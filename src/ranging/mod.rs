@@ -5,6 +5,7 @@ mod calibration;
 mod expected;
 mod finder;
 mod peak;
+mod profile;
 pub mod tmf8820;
 mod walk;
 
@@ -12,7 +13,8 @@ pub use arrival::{ArrivalOptions, arrival};
 pub use calibration::{Calibration, CalibrationError, Echo, ZoneCalibration};
 pub use expected::{EchoLight, Response};
 pub use finder::{DepthOptions, EchoFinder, Sighting, UnequalBins};
-pub use peak::{Background, Peak, PeakOptions, interpolate};
+pub use peak::{Background, CentreOfMass, Peak, PeakOptions, centre_of_mass, interpolate};
+pub use profile::{BinProfile, LineProfile, OtherSensor};
 pub use walk::{Corrected, WalkCorrection};
 
 #[cfg(test)]

@@ -75,21 +75,49 @@ pub(super) fn interpolate_at(
     peak_bin: usize,
     options: &PeakOptions,
 ) -> Option<Peak> {
+    // Moments about the fullest bin keep their digits in a long histogram.
+    let place = |bin: usize| bin as f64 - peak_bin as f64;
+    let mass = centre_of_mass(counts, peak_bin, options, place)?;
+    Some(Peak {
+        position_bins: peak_bin as f64 + mass.place,
+        peak_bin,
+        signal_counts: mass.signal_counts,
+        background_per_bin: mass.background_per_bin,
+    })
+}
+
+/// Where the counts of a peak are on average.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CentreOfMass {
+    /// In what the places of bins are given in.
+    pub place: f64,
+    /// Counts of the peak region above background.
+    pub signal_counts: f64,
+    /// Background taken off each bin, counts.
+    pub background_per_bin: f64,
+}
+
+/// The centre of mass of the peak about `peak_bin`, where bin i is at `place(i)`: Eq. 28 with places that are the bins' numbers, Eq. 29 with
+/// the times C_i of a calibration. `None` if no count of the peak region exceeds the background.
+pub fn centre_of_mass(
+    counts: &[f64],
+    peak_bin: usize,
+    options: &PeakOptions,
+    place: impl Fn(usize) -> f64,
+) -> Option<CentreOfMass> {
     let region = options.region(peak_bin, counts.len());
     let background_per_bin = match options.background {
         Background::None => 0.0,
         Background::Median => median(counts[..region.start].iter().chain(&counts[region.end..])),
     };
     let (mut signal_counts, mut moment) = (0.0, 0.0);
-    // Moments about the fullest bin keep their digits in a long histogram.
     for bin in region {
         let signal = (counts[bin] - background_per_bin).max(0.0);
         signal_counts += signal;
-        moment += signal * (bin as f64 - peak_bin as f64);
+        moment += signal * place(bin);
     }
-    (signal_counts > 0.0).then(|| Peak {
-        position_bins: peak_bin as f64 + moment / signal_counts,
-        peak_bin,
+    (signal_counts > 0.0).then(|| CentreOfMass {
+        place: moment / signal_counts,
         signal_counts,
         background_per_bin,
     })

@@ -180,7 +180,7 @@ pub const CLAIMS: [Claim; 28] = [
     claim(
         20,
         "delay lines and their calibration",
-        "6.3.1, Eq. 28 and 29, Fig. 91 to 93",
+        "6.3.1, Eq. 28 and 29, Fig. 90 to 93",
         delay_line::rows,
     ),
     claim(
@@ -243,7 +243,7 @@ pub const TABLES: [Table; 4] = [
 ];
 
 /// Every figure, by number.
-pub const FIGURES: [Figure; 28] = [
+pub const FIGURES: [Figure; 30] = [
     figure(20, "wavelength of a VCSEL", photon_budget::figure_20),
     figure(
         28,
@@ -281,7 +281,17 @@ pub const FIGURES: [Figure; 28] = [
         "least bin interval for a stereo guide",
         stereo::figure_71,
     ),
+    figure(
+        90,
+        "bins of delay lines while a laser is delayed",
+        delay_line::figure_90,
+    ),
     figure(91, "bin intervals of delay lines", delay_line::figure_91),
+    figure(
+        92,
+        "a plane through delay lines, by column",
+        delay_line::figure_92,
+    ),
     figure(
         93,
         "a plane before and after calibration",

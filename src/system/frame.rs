@@ -11,11 +11,12 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
+use super::aim::{Aims, Place, own_law};
 use super::pixel::{NoDepth, PixelDepth};
 use super::remark::Circumstances;
 use super::result::{Frame, PhaseTimes};
 use super::tolerance::Tolerance;
-use crate::chip::{Exposure, Mode, SensorConfig, WindowLaw};
+use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::engine::waveform::{self, View, WaveCycles};
 use crate::engine::{
     Cohort, CohortOptions, Cycle, EngineError, Expose, Gate, GateSimulation, LitPixel, Replay,
@@ -24,7 +25,7 @@ use crate::engine::{
 use crate::files::InputError;
 use crate::guide::GuideMap;
 use crate::photon::{PhotonStream, SpadEvent};
-use crate::ranging::{DepthOptions, EchoFinder, UnequalBins};
+use crate::ranging::{BinProfile, DepthOptions, EchoFinder, UnequalBins};
 use crate::scene::{GroundTruth, Scene};
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
 use crate::waves::WaveFormat;
@@ -132,6 +133,8 @@ pub struct FrameSettings {
     pub skip: bool,
     /// Depth from histograms.
     pub depth: DepthOptions,
+    /// When the bins of delay lines are, if that has been measured; without it, all are taken to be alike.
+    pub calibration: Option<BinProfile>,
 }
 
 /// Why there is no frame.
@@ -209,6 +212,7 @@ pub fn take_frame(
         tolerance_m,
         skip,
         depth,
+        calibration,
     } = settings;
     let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
     let mut clock = Stopwatch::new();
@@ -221,11 +225,12 @@ pub fn take_frame(
 
     // In the guided mode macropixels without an estimate, or with one out of the P-counter's reach, look as far as they can with their
     // SPADs switched off.
-    let law = WindowLaw::new(sensor, exposure);
+    let aims = Aims::new(sensor, exposure, calibration.as_ref());
     let wanted: Vec<Option<u16>> = guide
         .range_m
         .par_iter()
-        .map(|&range_m| start_of(&law, range_m))
+        .enumerate()
+        .map(|(pixel, &range_m)| aims.start_of(pixel, range_m))
         .collect();
     let farthest = sensor.largest_start();
     let starts: Vec<u16> = wanted.iter().map(|s| s.unwrap_or(farthest)).collect();
@@ -325,6 +330,7 @@ pub fn take_frame(
     })?;
     times.probes_s = clock.lap();
 
+    let law = WindowLaw::new(sensor, exposure);
     let finder = EchoFinder::new(&law, scene.pulse_sigma(), depth)?;
     let spads_fire = scene.lidar.pde > 0.0 || scene.lidar.dark_count_hz > 0.0;
     let depths: Vec<PixelDepth> = (0..sensor.pixels())
@@ -332,6 +338,7 @@ pub fn take_frame(
         .map(|pixel| {
             let (true_m, guide_m) = (truth.range_m[pixel], guide.range_m[pixel]);
             let start = wanted[pixel];
+            let law = own_law(&law, pixel);
             let window = start.and_then(|start| law.window(start).open());
             let in_window = window.zip(true_m).is_some_and(|(window, true_m)| {
                 law.interval(&window).contains(&Time::of_flight(true_m))
@@ -339,9 +346,16 @@ pub fn take_frame(
             let counts: Vec<u32> = (exposed.histograms[pixel].iter())
                 .map(|&n| n.into())
                 .collect();
-            let sighting = window.and_then(|_| finder.find(&counts));
+            let place = Place {
+                pixel,
+                start: start.unwrap_or(farthest),
+                law: &law,
+                profile: aims.profile(),
+                peak: &depth.peak,
+            };
+            let sighting = window.and_then(|_| place.find(&finder, &counts));
             let found = sighting.filter(|s| s.is_significant && !s.is_saturated);
-            let range_m = |bins: f64| window.map(|window| law.time_of(&window, bins).as_range_m());
+            let range_m = |bins: f64, at: usize| place.range_m(window?, &counts, bins, at);
             let no_depth = match found {
                 Some(_) => None,
                 None if true_m.is_none() => Some(NoDepth::NoSurface),
@@ -357,9 +371,9 @@ pub fn take_frame(
                 guide_m,
                 start,
                 in_window,
-                measured_m: found.and_then(|s| range_m(s.position_bins)),
+                measured_m: found.and_then(|s| range_m(s.position_bins, s.peak.peak_bin)),
                 no_depth,
-                peak_m: sighting.and_then(|s| range_m(s.peak.position_bins)),
+                peak_m: sighting.and_then(|s| range_m(s.peak.position_bins, s.peak.peak_bin)),
                 confidence: sighting.map(|s| s.confidence),
             }
         })
@@ -392,15 +406,6 @@ pub fn take_frame(
         probes: probes.iter().map(|p| (p.row, p.col)).collect(),
         times,
     })
-}
-
-/// The start value of a macropixel with this estimate of the guide, if it has any use for light.
-pub(super) fn start_of(law: &WindowLaw, guide_m: Option<f64>) -> Option<u16> {
-    match law.sensor().mode {
-        Mode::Guided => law.start_for(Time::of_flight(guide_m?)),
-        // The window is that of STOP, whatever the start value, and needs no guide.
-        Mode::Conventional => law.window(0).open().map(|window| window.start),
-    }
 }
 
 /// The refusal of a frame by the cohort engine, with how much of the frame it is about.

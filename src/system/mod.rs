@@ -1,5 +1,7 @@
 //! The guided system as a whole: camera pair, sensor and laser take one frame together.
 
+mod aim;
+mod calibrate;
 mod distance;
 mod frame;
 pub mod pareto;
@@ -12,6 +14,7 @@ mod summary;
 mod taken;
 mod tolerance;
 
+pub use calibrate::{Sweep, calibrate};
 pub use distance::DistanceLaw;
 pub use frame::{EngineKind, FrameError, FrameSettings, Probe, take_frame};
 pub use pixel::{NoDepth, PixelDepth};

@@ -220,6 +220,7 @@ mod tests {
             tolerance_m: None,
             skip: true,
             depth: DepthOptions::default(),
+            calibration: None,
         };
         let frame = take_frame(&settings, |_| Vec::new(), |_| {}).unwrap();
         for pixel in &frame.pixels {

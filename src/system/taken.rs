@@ -4,8 +4,9 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::frame::{EngineKind, start_of};
-use crate::chip::{Exposure, SensorConfig, WindowLaw};
+use super::aim::Aims;
+use super::frame::EngineKind;
+use crate::chip::{Exposure, SensorConfig};
 use crate::engine::stream_config;
 use crate::files::{InputError, parse_json, read_text};
 use crate::guide::GuideMap;
@@ -29,6 +30,8 @@ pub struct TakenFrame {
     pub engine: EngineKind,
     /// Whether a tolerance chose engines instead.
     pub has_tolerance: bool,
+    /// Whether its bins had been calibrated.
+    is_calibrated: bool,
     /// Start value of each macropixel, row-major; `None` where SPADs were off.
     starts: Vec<Option<u16>>,
 }
@@ -43,6 +46,7 @@ struct FrameFile {
     seed: u64,
     engine: EngineKind,
     tolerance: Option<serde::de::IgnoredAny>,
+    calibration: Option<serde::de::IgnoredAny>,
     macropixels: Vec<Start>,
 }
 
@@ -109,6 +113,7 @@ impl TakenFrame {
             seed: file.seed,
             engine: file.engine,
             has_tolerance: file.tolerance.is_some(),
+            is_calibrated: file.calibration.is_some(),
             starts,
             source,
         })
@@ -130,9 +135,12 @@ impl TakenFrame {
         assert!(row < sensor.rows && col < sensor.cols);
         let pixel = row * sensor.cols + col;
         let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
-        let law = WindowLaw::new(sensor, &self.exposure);
         let guide_m = GuideMap::estimate(scene, rows, cols, self.seed).range_m[pixel];
-        let given = start_of(&law, guide_m);
+        // What a calibration made of the guide's estimate is not known here.
+        let given = match self.is_calibrated {
+            true => self.starts[pixel],
+            false => Aims::new(sensor, &self.exposure, None).start_of(pixel, guide_m),
+        };
         if given != self.starts[pixel] {
             let shown = |start: Option<u16>| start.map_or("none".to_owned(), |s| s.to_string());
             let message = format!(

@@ -86,6 +86,37 @@ impl Scan {
     }
 }
 
+impl Scan {
+    /// The stretch of `counts` that is least likely by chance where bins differ in length: `shares` are those of light that comes at any
+    /// time alike, 1 on average over the bins. With equal ones it is [`fullest`](Self::fullest).
+    pub fn least_likely(&self, counts: &[u32], shares: &[f64]) -> Stretch {
+        debug_assert_eq!(counts.len(), shares.len());
+        let sum = |counts: &[u32]| counts.iter().map(|&n| u64::from(n)).sum::<u64>();
+        let cycles = f64::from(counts.iter().copied().fold(self.laser_cycles, u32::max));
+        let (marked, cells) = (sum(counts), (counts.len() as f64 * cycles).round() as u64);
+        let positions = counts.len() - self.width + 1;
+        let stretch = |first: usize| {
+            let bins = first..first + self.width;
+            let drawn = (shares[bins.clone()].iter().sum::<f64>() * cycles).round() as u64;
+            let counts = sum(&counts[bins]);
+            let ln_one = ln_hypergeometric_tail(counts, marked, drawn.min(cells), cells);
+            Stretch {
+                first,
+                counts,
+                ln_false_alarm: (ln_one + (positions as f64).ln()).min(0.0),
+            }
+        };
+        let by_chance = |a: &Stretch, b: &Stretch| {
+            let fuller = b.counts.cmp(&a.counts);
+            a.ln_false_alarm.total_cmp(&b.ln_false_alarm).then(fuller)
+        };
+        let stretches = (0..positions).map(stretch);
+        stretches
+            .min_by(by_chance)
+            .expect("a histogram has a stretch")
+    }
+}
+
 /// Share of a pulse in the best of all stretches of `width` bins, averaged over where it lies, over √width.
 fn gain(width: usize, sigma_bins: f64) -> f64 {
     const STEPS: usize = 16;
@@ -210,6 +241,17 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn with_equal_bins_the_least_likely_stretch_is_the_fullest(
+            counts in prop::collection::vec(0u32..60, 4..20), width in 1usize..4
+        ) {
+            let scan = Scan { width, laser_cycles: 100 };
+            let equal = vec![1.0; counts.len()];
+            let (full, least) = (scan.fullest(&counts), scan.least_likely(&counts, &equal));
+            prop_assert!((full.ln_false_alarm - least.ln_false_alarm).abs() < 1e-9);
+            prop_assert_eq!(full.counts, least.counts);
+        }
+
         #[test]
         fn tails_are_those_of_counting(cells in 1u64..60, marked in 0u64..60, drawn in 0u64..60, k in 0u64..60) {
             let (marked, drawn) = (marked.min(cells), drawn.min(cells));

@@ -388,6 +388,7 @@ fn a_frame_without_skipping_is_the_same_frame() {
             tolerance_m: None,
             skip,
             depth: DepthOptions::default(),
+            calibration: None,
             cohort: Default::default(),
         };
         take_frame(&settings, |_| Vec::new(), |_| ()).unwrap()

@@ -27,7 +27,7 @@ impl Default for SensorConfig {
             step_periods: 1,
             tdc: Tdc::Clocked,
             delay_control_v: 0.70,
-            delay_sigma: 0.4 / 2.6,
+            delay_sigma: 0.154,
             delay_seed: 1,
             clk_skew_ps: 0.0,
             bins: 16,

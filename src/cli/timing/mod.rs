@@ -14,7 +14,7 @@ use self::tables::Subject;
 use super::silicon::SiliconArgs;
 use super::{SensorArgs, say};
 use crate::analysis::{LoadTiming, TimingVerdict};
-use crate::chip::{Limits, Silicon};
+use crate::chip::{Limits, Silicon, Tdc};
 use crate::files::InputError;
 
 /// Arguments of `gdtof timing`.
@@ -42,6 +42,10 @@ pub(super) struct TimingArgs {
 pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
     let config = args.sensor.read()?;
     let silicon = args.silicon.read(config.corner)?;
+    if config.tdc == Tdc::DelayLine {
+        let message = "the tables are those of a clocked TDC, and this sensor has delay lines; frame states whether its timing is met, and calibrate measures its bins";
+        return Err(InputError::new("--sensor", message).into());
+    }
     if let (Some(plot), None) = (&args.plot, silicon.mismatch) {
         let message =
             "without mismatch all macropixels are equal; add --mismatch 0.05, for example";

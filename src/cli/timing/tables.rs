@@ -66,8 +66,14 @@ pub(super) fn windows(subject: &Subject<'_>) -> Section {
         ("CLK fall to LOCAL_STOP rise (ripple)", only(&pixel.ripple)),
         ("CLK fall to COUNTER_CLK rise", both(pixel.counter_clk)),
         ("CLK fall to STROBE rise", both(pixel.strobe)),
-        ("CLK rise to SHIFT change", both(pixel.shift)),
-        ("CLK rise to SPAD_EVENT", only(&pixel.event)),
+        (
+            "CLK rise to SHIFT change",
+            pixel.shift.map_or((None, Time::ZERO), both),
+        ),
+        (
+            "CLK rise to SPAD_EVENT",
+            pixel.event.as_ref().map_or((None, Time::ZERO), only),
+        ),
         ("STOP rise to COUNTER_RESET rise", both(pixel.reset)),
         ("STOP rise to COUNTER_RESET fall", both(pixel.release)),
     ] {
@@ -322,9 +328,10 @@ pub(super) fn paths(subject: &Subject<'_>, load: &LoadTiming) -> Section {
     let headings = &["path", "cell, input", "net", "edge", "time"];
     let mut section = Section::new("paths", "Longest and shortest paths", headings);
     let pixel = &subject.kept;
+    let event = pixel.event.as_ref().expect("of clocked TDCs only");
     for (name, netlist, path) in [
         ("CLK to LOCAL_STOP, longest", &pixel.netlist, &pixel.ripple),
-        ("CLK to SPAD_EVENT, longest", &pixel.netlist, &pixel.event),
+        ("CLK to SPAD_EVENT, longest", &pixel.netlist, event),
         ("CLK to D, shortest", &pixel.netlist, &pixel.shortest),
         ("LOAD_CLK to D, longest", &load.netlist, &load.longest),
         ("LOAD_CLK to D, shortest", &load.netlist, &load.shortest),

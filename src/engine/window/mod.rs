@@ -57,13 +57,18 @@ impl Window {
         }
     }
 
+    /// An engine for any number of exposures of the one macropixel that `law` is of, whatever their numbers.
+    pub(crate) fn of_one(law: WindowLaw) -> Self {
+        Window {
+            is_of_macropixel: true,
+            ..Self::with_law(law)
+        }
+    }
+
     /// This engine with the law of a macropixel.
     fn of_macropixel(&self, number: u32) -> Cow<'_, Self> {
         match self.sensor.has_own_laws() && !self.is_of_macropixel {
-            true => Cow::Owned(Window {
-                is_of_macropixel: true,
-                ..Self::with_law(self.law.of_macropixel(number))
-            }),
+            true => Cow::Owned(Self::of_one(self.law.of_macropixel(number))),
             false => Cow::Borrowed(self),
         }
     }

@@ -1,0 +1,148 @@
+//! `gdtof calibrate`: the bin profile of a sensor with delay lines, by a swept laser.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::{SensorArgs, say, wording};
+use crate::chip::{Sensor, SensorConfig, Tdc, WindowLaw};
+use crate::files::{InputError, OutputFile, read_text};
+use crate::ranging::BinProfile;
+use crate::report::Table;
+use crate::system::{Sweep, calibrate};
+use crate::units::Time;
+
+/// Arguments of `gdtof calibrate`.
+#[derive(Args)]
+pub(super) struct CalibrateArgs {
+    #[command(flatten)]
+    sensor: SensorArgs,
+    /// File for the profile (JSON), which `gdtof frame --calibration` reads.
+    #[arg(long, value_name = "FILE", default_value = "calibration.json")]
+    out: PathBuf,
+    /// CLK periods in a laser cycle.
+    #[arg(long, value_name = "P", default_value_t = 140)]
+    stop_periods: u32,
+    /// Delay of the laser from one step to the next, ps.
+    #[arg(long, value_name = "PS", default_value_t = 10.0)]
+    step_ps: f64,
+    /// Laser cycles of a step.
+    #[arg(long, value_name = "N", default_value_t = Sweep::default().laser_cycles, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    laser_cycles: u32,
+    /// Detected photons of a macropixel in a laser cycle, on average.
+    #[arg(long, value_name = "N", default_value_t = Sweep::default().photons_per_cycle)]
+    photons_per_cycle: f64,
+    /// Seed of the photons.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, and a file that cannot be written.
+pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
+    let config = args.sensor.read()?;
+    if config.tdc != Tdc::DelayLine {
+        let message = "bins of a clocked TDC are CLK periods, and there is nothing to calibrate; give a sensor with tdc = \"delay_line\", such as hslidar_delay_line";
+        return Err(InputError::new("--sensor", message).into());
+    }
+    for (option, value, most) in [
+        ("--step-ps", args.step_ps, 1e4),
+        ("--photons-per-cycle", args.photons_per_cycle, 100.0),
+    ] {
+        if !(value > 0.0 && value <= most) {
+            let message = format!("{value} is impossible; give a number above 0, up to {most}");
+            return Err(InputError::new(option, message).into());
+        }
+    }
+    let exposure = wording::exposure(&config, args.stop_periods, args.laser_cycles)?;
+    if let Some(why) = WindowLaw::new(&config, &exposure).refusal() {
+        let (why, cure) = wording::of_no_aim(&why);
+        return Err(InputError::new("--sensor", format!("{why}; {cure}")).into());
+    }
+    let sweep = Sweep {
+        step: Time::from_s(args.step_ps * 1e-12),
+        laser_cycles: args.laser_cycles,
+        photons_per_cycle: args.photons_per_cycle,
+        seed: args.seed,
+        ..Sweep::default()
+    };
+    let progress = ProgressBar::new(config.pixels() as u64).with_style(
+        ProgressStyle::with_template("sweeping {bar:40} {pos}/{len} macropixels, {eta} left")?,
+    );
+    let sensor = Sensor::from(&config);
+    let profile = calibrate(&sensor, args.stop_periods, &sweep, || progress.inc(1))?;
+    progress.finish_and_clear();
+    OutputFile::write_with(&args.out, |out| {
+        serde_json::to_writer(&mut *out, &profile)?;
+        writeln!(out)
+    })?;
+    say(table(&profile))?;
+    Ok(())
+}
+
+fn table(profile: &BinProfile) -> Table {
+    let mut table = Table::new("Bins found");
+    for (line, name) in ["even", "odd"].into_iter().enumerate() {
+        let lengths = profile
+            .macropixels
+            .iter()
+            .flat_map(|lines| &lines[line].length_s);
+        let lengths: Vec<f64> = lengths.map(|s| s * 1e12).collect();
+        let n = lengths.len() as f64;
+        let mean = lengths.iter().sum::<f64>() / n;
+        let variance = lengths.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / n;
+        let bound = |f: fn(f64, f64) -> f64| lengths.iter().copied().reduce(f).unwrap_or(mean);
+        let of = format!("{name} windows");
+        table.push(&of, format!("{} bins", lengths.len()));
+        table.push(
+            format!("{of}, length"),
+            format!("{mean:.1} ps, σ {:.1} ps", variance.sqrt()),
+        );
+        let (least, most) = (bound(f64::min), bound(f64::max));
+        table.push(
+            format!("{of}, least and most"),
+            format!("{least:.0} and {most:.0} ps"),
+        );
+    }
+    table
+}
+
+/// Reads a profile, which must be of this sensor.
+///
+/// # Errors
+/// A file that is none, and another sensor's.
+pub(super) fn read(path: &Path, sensor: &SensorConfig) -> Result<BinProfile, InputError> {
+    let text = read_text(path)?;
+    let profile: BinProfile = serde_json::from_str(&text).map_err(|error| {
+        let message = format!("this is no bin profile ({error}); make one with gdtof calibrate");
+        InputError::at(path.display(), error.line(), message)
+    })?;
+    let is_whole = profile.macropixels.len() == profile.sensor.pixels()
+        && profile.macropixels.iter().flatten().all(|line| {
+            let lengths = [line.middle_s.len(), line.length_s.len()];
+            lengths == [profile.sensor.bins; 2]
+                && line
+                    .length_s
+                    .iter()
+                    .chain(&line.middle_s)
+                    .all(|s| s.is_finite())
+        });
+    let refused = match profile.check(sensor) {
+        Ok(()) if sensor.tdc == Tdc::Clocked => {
+            Some("it is of delay lines, and this sensor's TDC is clocked".to_owned())
+        }
+        Ok(()) if is_whole => None,
+        Ok(()) => Some("it does not have every bin of every macropixel".to_owned()),
+        Err(other) => Some(other.to_string()),
+    };
+    match refused {
+        None => Ok(profile),
+        Some(why) => {
+            let message = format!("{why}; make one for this sensor with gdtof calibrate");
+            Err(InputError::new(path.display(), message))
+        }
+    }
+}
