@@ -20,7 +20,7 @@ use crate::settings::Document;
 /// Which sensor.
 #[derive(Args)]
 pub(super) struct SensorArgs {
-    /// Sensor configuration (TOML), or one of the chips quantic4x4 (without it) and hslidar.
+    /// Sensor configuration (TOML), or one of the chips quantic4x4 (without it), hslidar and hslidar_delay_line.
     #[arg(long, value_name = "FILE")]
     sensor: Option<PathBuf>,
     /// Macropixel rows, instead of the configuration's.

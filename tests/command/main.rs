@@ -2,6 +2,7 @@
 
 mod command_line_refuses_bad_input;
 mod delay_files_replay;
+mod delay_lines_are_calibrated;
 mod engines_are_chosen_from_the_command_line;
 mod golden_vectors_hold;
 mod mismatch_replays;

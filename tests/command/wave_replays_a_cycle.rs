@@ -62,6 +62,10 @@ fn it_is_the_same_stretch_of_the_whole_waveform() {
         ("", "cycle.vcd"),
         (bright, "cycle.fst"),
         ("--sensor hslidar --stop-periods 540", "cycle.vcd"),
+        (
+            "--sensor hslidar_delay_line --stop-periods 140",
+            "cycle.vcd",
+        ),
         ("--engine gate --set sensor.dead_time_ns=8", "cycle.vcd"),
         (
             "--set sensor.mode=conventional --stop-periods 120",

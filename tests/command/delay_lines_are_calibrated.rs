@@ -1,0 +1,99 @@
+//! `gdtof calibrate` and `gdtof frame --calibration`: bins of delay lines are measured, kept, used, and another sensor's refused.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn gdtof(folder: &Path, arguments: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gdtof"));
+    command.args(arguments.split(' ')).current_dir(folder);
+    command.output().unwrap()
+}
+
+const SENSOR: &str = "--sensor hslidar_delay_line --rows 8 --cols 16";
+const FRAME: &str = "--stop-periods 140 --laser-cycles 3000 --set scene.lidar.pde=0.01 --json";
+
+/// Median absolute error of the depths, m.
+fn median_error_m(output: &Output) -> f64 {
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let pixels = report["macropixels"].as_array().unwrap().iter();
+    let error = |pixel: &serde_json::Value| {
+        let (measured, truth) = (pixel["measured_m"].as_f64()?, pixel["true_m"].as_f64()?);
+        Some((measured - truth).abs())
+    };
+    let mut errors: Vec<f64> = pixels.filter_map(error).collect();
+    assert!(errors.len() > 30, "{} depths", errors.len());
+    errors.sort_by(f64::total_cmp);
+    errors[errors.len() / 2]
+}
+
+#[test]
+fn a_calibration_makes_depths_better_and_belongs_to_its_sensor() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let swept = gdtof(folder, &format!("calibrate {SENSOR} --out c.json"));
+    assert!(swept.status.success());
+    let table = String::from_utf8(swept.stdout).unwrap();
+    assert!(table.contains("1024 bins"), "{table}");
+    let without = median_error_m(&gdtof(folder, &format!("frame {SENSOR} {FRAME}")));
+    let calibrated = format!("frame {SENSOR} {FRAME} --calibration c.json");
+    let with = median_error_m(&gdtof(folder, &calibrated));
+    assert!(with < 0.5 * without, "{with} {without}");
+
+    for (arguments, says) in [
+        (
+            "--set sensor.delay_control_v=0.72",
+            "it is of a sensor with delay_control_v = 0.7, and this one has delay_control_v = 0.72; make one",
+        ),
+        (
+            "--set sensor.delay_seed=2",
+            "it is of a sensor with delay_seed = 1, and this one",
+        ),
+        (
+            "--set sensor.clk_skew_ps=-1",
+            "clk_skew_ps = -1 is impossible; give 0 to 200",
+        ),
+    ] {
+        let refused = gdtof(folder, &format!("{calibrated} --out other {arguments}"));
+        let said = String::from_utf8(refused.stderr).unwrap();
+        assert_eq!(refused.status.code(), Some(2), "{said}");
+        assert!(said.contains(says), "{said}");
+        assert!(!folder.join("other").exists());
+    }
+}
+
+#[test]
+fn what_cannot_be_calibrated_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("text.json"), "no profile").unwrap();
+    for (arguments, says) in [
+        (
+            "calibrate --sensor hslidar",
+            "--sensor: bins of a clocked TDC are CLK periods",
+        ),
+        (
+            "calibrate --sensor hslidar_delay_line --step-ps -10",
+            "--step-ps: -10 is impossible; give",
+        ),
+        (
+            "frame --sensor hslidar_delay_line --stop-periods 140 --calibration text.json",
+            "text.json:1: this is no bin profile",
+        ),
+        (
+            "frame --sensor hslidar_delay_line --stop-periods 140 --engine cohort",
+            "use --engine window or gate",
+        ),
+        (
+            "timing --sensor hslidar_delay_line",
+            "--sensor: the tables are those of a clocked TDC",
+        ),
+    ] {
+        let refused = gdtof(folder, arguments);
+        let said = String::from_utf8(refused.stderr).unwrap();
+        assert_eq!(refused.status.code(), Some(2), "{arguments}: {said}");
+        assert!(said.contains(says), "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+    }
+}
