@@ -15,10 +15,11 @@
 //! windows only gates can tell. Tests compare every change of every net with the whole run's.
 
 use super::gate::GateSimulation;
-use super::{Histograms, Replay, Window};
+use super::{Histograms, PulsedPixel, Replay, Window};
 use crate::bench::Skip;
-use crate::chip::{Exposure, Mode, PCounter, SensorConfig};
+use crate::chip::{Exposure, Mode, PCounter, SensorConfig, Tdc};
 use crate::photon::SpadEvent;
+use crate::units::Time;
 
 /// Whole laser cycles that are simulated before the one that is wanted.
 const WARM_UP: u32 = 1;
@@ -40,10 +41,22 @@ pub fn late_cycle(
     let Some(first_cycle) = cycle.checked_sub(WARM_UP) else {
         return whole;
     };
-    match counted_before(config, exposure, start, pulses, first_cycle) {
+    let pixel = PulsedPixel {
+        number: (at.0 * config.cols + at.1) as u32,
+        start,
+        pulses,
+    };
+    match counted_before(config, exposure, pixel, first_cycle) {
         None => whole,
         Some(counted) => {
-            let busy = config.dead_time().as_fs() / exposure.clock.period().as_fs() + 1;
+            // What delay lines hold, twice for mismatch.
+            let line = match config.tdc {
+                Tdc::Clocked => Time::ZERO,
+                Tdc::DelayLine => config.delay_element() * (2 * config.bins as i64),
+            };
+            let busy = (config.dead_time() + line + config.clk_skew(at.1)).as_fs()
+                / exposure.clock.period().as_fs()
+                + 1;
             let skip = Skip {
                 first_cycle,
                 lead_periods: config.bins as u32 + LATENCY + busy as u32,
@@ -57,8 +70,7 @@ pub fn late_cycle(
 fn counted_before(
     config: &SensorConfig,
     exposure: &Exposure,
-    start: u16,
-    pulses: &[SpadEvent],
+    pixel: PulsedPixel<'_>,
     cycle: u32,
 ) -> Option<Histograms> {
     if config.p_counter == PCounter::Memoryless {
@@ -76,7 +88,13 @@ fn counted_before(
         laser_cycles,
         ..*exposure
     };
-    let end = pulses.partition_point(|pulse| pulse.time < part.end());
+    // The last window of a column to which CLK comes late ends later.
+    let until = part.end() + config.clk_skew(pixel.number as usize % config.cols);
+    let end = pixel.pulses.partition_point(|pulse| pulse.time < until);
     let window = Window::new(config, &part);
-    window.histograms(&[start], &[&pulses[..end]]).ok()
+    let pixel = PulsedPixel {
+        pulses: &pixel.pulses[..end],
+        ..pixel
+    };
+    window.replay(&[pixel]).ok()
 }

@@ -74,8 +74,8 @@ fn what_cannot_be_calibrated_is_refused() {
             "--sensor: bins of a clocked TDC are CLK periods",
         ),
         (
-            "calibrate --sensor hslidar_delay_line --step-ps -10",
-            "--step-ps: -10 is impossible; give",
+            "calibrate --sensor hslidar_delay_line --step-ps 0",
+            "--step-ps: 0 is impossible; give",
         ),
         (
             "frame --sensor hslidar_delay_line --stop-periods 140 --calibration text.json",
