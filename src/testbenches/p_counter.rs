@@ -11,12 +11,14 @@
 
 use std::path::Path;
 
-use crate::chip::{ChipTiming, Exposure, Probe, Probes, SensorConfig, p_counter, p_counter_timing};
+use crate::chip::{
+    ChipTiming, Exposure, Probe, Probes, SensorConfig, Silicon, p_counter, p_counter_timing,
+};
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
 use crate::kernel::{Drive, Kernel, Observer, Recorder, clock, in_order};
 use crate::logic::Logic;
-use crate::netlist::{CellKind, Library, ModuleBuilder, NetId, Netlist, Timing};
+use crate::netlist::{CellKind, ModuleBuilder, NetId, Netlist, Timing};
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::Time;
@@ -93,7 +95,7 @@ impl Bench {
     fn kernel(&self) -> Kernel {
         Kernel::new(
             &self.netlist,
-            &Timing::nominal(&self.netlist, &Library::default(), self.config.corner),
+            &Timing::nominal(&self.netlist, Silicon::library(), self.config.corner),
         )
     }
 
@@ -244,7 +246,7 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
     let found = clocked.iter().filter(disabled).count();
     checks.equal("COUNTER_CLK rises while disabled", 0, found);
 
-    let reset_to_q = Library::default().delay(CellKind::Dffr, 2, Logic::Zero, bench.config.corner);
+    let reset_to_q = Silicon::library().delay(CellKind::Dffr, 2, Logic::Zero, bench.config.corner);
     let rises = recorder.rising_edges(bench.counter_reset);
     let releases = recorder.falling_edges(bench.counter_reset);
     let half_period = exposure.clock.half_periods(1);

@@ -26,7 +26,7 @@ use crate::engine::waveform::write_waves;
 use crate::files::InputError;
 use crate::kernel::{CheckReport, Policy, Recorder};
 use crate::logic::Logic;
-use crate::netlist::{CheckKind, Corner, Library, Mismatch, NetId, Netlist, Timing, varied};
+use crate::netlist::{CheckKind, Corner, Mismatch, NetId, Netlist, Timing, varied};
 use crate::photon::SpadEvent;
 use crate::report::Checks;
 use crate::testbenches::Testbench;
@@ -107,7 +107,7 @@ impl Outcome {
 
 /// The library's delays, and in the second macropixel its mismatch.
 fn delays(netlist: &Netlist) -> Timing {
-    let nominal = Timing::nominal(netlist, &Library::default(), Corner::Typ);
+    let nominal = Timing::nominal(netlist, Silicon::library(), Corner::Typ);
     let mismatched = varied(netlist, &nominal, 1.0, Some(MISMATCH));
     let second = format!(".{}.", array::pixel_name(0, 1));
     let mut timing = nominal;

@@ -108,7 +108,7 @@ pub fn circuit(bins: usize, elements: &Elements) -> Arc<Module> {
         let changes = pairs.map(|pair| m.gate(CellKind::Xor2, pair));
         changes.collect::<Vec<Net>>()
     });
-    for bin in 0..bins {
+    for (bin, &hit) in hit.iter().enumerate() {
         let newest_first = bins - 1 - bin;
         let [even, of_odd] = [0, 1].map(|line: usize| changes[line][newest_first]);
         let data = m.gate(CellKind::Mux2, &[even, of_odd, odd]);
@@ -116,7 +116,7 @@ pub fn circuit(bins: usize, elements: &Elements) -> Arc<Module> {
             &format!("hit_{bin}"),
             CellKind::Dffr,
             &[data, strobe, hit_reset],
-            &[hit[bin], Net::NONE],
+            &[hit, Net::NONE],
         );
     }
     finished(m.finish())

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::*;
-use crate::chip::{PCounter, SensorConfig, load_path, p_counter};
+use crate::chip::{PCounter, SensorConfig, Tdc, load_path, p_counter};
 
 fn config(p_counter: PCounter) -> SensorConfig {
     SensorConfig {
@@ -16,9 +16,16 @@ fn config(p_counter: PCounter) -> SensorConfig {
 }
 
 #[test]
-fn a_macropixel_has_every_probe_but_those_of_other_p_counters() {
-    for p_counter in PCounter::ALL {
-        let config = config(p_counter);
+fn a_macropixel_has_every_probe_but_those_of_other_p_counters_and_tdcs() {
+    let clocked = PCounter::ALL.map(|p_counter| (p_counter, Tdc::Clocked));
+    for (p_counter, tdc) in clocked
+        .into_iter()
+        .chain([(PCounter::SetReset, Tdc::DelayLine)])
+    {
+        let config = SensorConfig {
+            tdc,
+            ..config(p_counter)
+        };
         let netlist = Netlist::elaborate(&array::circuit(&config));
         let probes = Probes::of_macropixel(&netlist, 1, 2);
         for probe in Probe::ALL {
@@ -26,6 +33,10 @@ fn a_macropixel_has_every_probe_but_those_of_other_p_counters() {
                 Probe::Memory => p_counter != PCounter::Memoryless,
                 Probe::Equal => p_counter == PCounter::Comparator,
                 Probe::StepClk => false,
+                Probe::SpadTimed | Probe::SpadEvent | Probe::Shift => tdc == Tdc::Clocked,
+                Probe::Photons | Probe::SampleClk | Probe::EvenTap | Probe::OddTap => {
+                    tdc == Tdc::DelayLine
+                }
                 _ => true,
             };
             assert_eq!(probes.find(probe).is_some(), expected, "{probe:?}");

@@ -20,13 +20,13 @@ use std::sync::Arc;
 
 use crate::chip::window_law::{Irregular, Window};
 use crate::chip::{
-    AfterBorrow, ChipTiming, Exposure, Probe, SensorConfig, Tap, WindowLaw, metdc, p_counter,
-    p_counter_timing,
+    AfterBorrow, ChipTiming, Exposure, Probe, SensorConfig, Silicon, Tap, WindowLaw, metdc,
+    p_counter, p_counter_timing,
 };
 use crate::engine::waveform::write_waves;
 use crate::files::{InputError, OutputFile};
 use crate::kernel::{Drive, Kernel, Recorder, clock, in_order};
-use crate::netlist::{Library, Module, ModuleBuilder, NetId, Netlist, Timing};
+use crate::netlist::{Module, ModuleBuilder, NetId, Netlist, Timing};
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::Time;
@@ -282,7 +282,7 @@ impl Bench {
         });
         let mut recorder = Recorder::new(nets.flatten());
         let corner = SensorConfig::default().corner;
-        let timing = Timing::nominal(&self.netlist, &Library::default(), corner);
+        let timing = Timing::nominal(&self.netlist, Silicon::library(), corner);
         let mut kernel = Kernel::new(&self.netlist, &timing);
         let end = self.at(SLOW_LASER.end() + 40);
         write_waves(waves, &self.netlist, &self.view(), |waves| {
