@@ -3,6 +3,7 @@
 //! `gdtof tb` runs them, as do the binaries `tb_*`. A new one is a file here with a `TESTBENCH`, and its line in
 //! [`TESTBENCHES`].
 
+mod delay_line;
 mod load_path;
 mod macropixel;
 mod p_counter;
@@ -31,6 +32,7 @@ pub const TESTBENCHES: &[Testbench] = &[
     p_counter_variants::TESTBENCH,
     load_path::TESTBENCH,
     macropixel::TESTBENCH,
+    delay_line::TESTBENCH,
     ripple_hazard::TESTBENCH,
 ];
 

@@ -5,8 +5,8 @@ use crate::bench;
 
 use bench::{Bench, SETTLING, corners};
 use guided_dtof::chip::{
-    AfterBorrow, EventType, Overflow, correlation, count_bits, front_end, histogram, metdc,
-    p_counter_timing,
+    AfterBorrow, ChipTiming, EventType, Overflow, SensorConfig, Tdc, correlation, count_bits,
+    front_end, histogram, metdc, p_counter_timing, photon_line,
 };
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{Corner, Edge, Library, NetId, Netlist, StaticTiming, Timing};
@@ -111,6 +111,52 @@ proptest! {
             let found = run.number_at(rise(k + 1) - Time::from_fs(1), &timed);
             prop_assert_eq!(found, Some(model.spad_timed()), "after edge {}", k);
         }
+    }
+
+    #[test]
+    fn the_photon_line_keeps_the_edges_of_pulses_that_are_far_enough_apart(
+        corner in corners(),
+        spads in prop_oneof![Just(1u8), Just(2), Just(16), Just(64)],
+        pulses in prop::collection::vec((0u8..64, 0i64..30, 0i64..200_000), 0..100),
+    ) {
+        let mut bench = Bench::new(&photon_line::circuit(usize::from(spads)), corner);
+        let delay_line = SensorConfig {
+            tdc: Tdc::DelayLine,
+            spad_rows: 1 << (spads.trailing_zeros() / 2),
+            spad_cols: 1 << spads.trailing_zeros().div_ceil(2),
+            corner,
+            ..SensorConfig::default()
+        };
+        let timing = ChipTiming::of(&delay_line);
+        // In bursts, shorter than some XORs take.
+        let at = |burst: i64, within: i64| SETTLING * 2 + Time::from_ns(2) * burst + Time::from_fs(within);
+        let mut pulses: Vec<(Time, u8)> = pulses
+            .into_iter()
+            .map(|(spad, burst, within)| (at(burst, within), spad % spads))
+            .collect();
+        pulses.sort_unstable();
+        let mut free_from = [Time::ZERO; 64];
+        pulses.retain(|&(time, spad)| {
+            let is_free = time > free_from[usize::from(spad)];
+            if is_free {
+                free_from[usize::from(spad)] = time + Time::from_ns(1);
+            }
+            is_free
+        });
+        bench.pulse(Time::ZERO, SETTLING, "PIXEL_CLEAR");
+        for &(time, spad) in &pulses {
+            bench.pulse(time, Time::from_ps(300), &format!("SPAD_RAW[{spad}]"));
+        }
+        let photons = bench.net("PHOTONS");
+        let mut run = bench.start(&["PHOTONS"]);
+        run.until(at(40, 0));
+        let mut found: Vec<Time> = run.recorder.rising_edges(photons);
+        found.extend(run.recorder.falling_edges(photons));
+        found.retain(|&time| time > SETTLING);
+        found.sort_unstable();
+        let left = photon_line::model(&pulses, usize::from(spads), timing.photon_line_stage);
+        let expected: Vec<Time> = left.iter().map(|(time, _)| *time + timing.spad_to_sampled).collect();
+        prop_assert_eq!(found, expected);
     }
 
     #[test]
