@@ -244,7 +244,7 @@ mod tests {
         for sensor in sensors() {
             let step_m = 0.5 * 299_792_458.0 * sensor.step_periods as f64 / sensor.clk_hz;
             let range_m = |pixel: u32, exposure: u32| {
-                (pixel % 2 == 0 && exposure < 45).then_some(12.0 * step_m)
+                (pixel.is_multiple_of(2) && exposure < 45).then_some(12.0 * step_m)
             };
             run(&sensor, 50, range_m, |exposure, _, trackers| {
                 for (pixel, tracker) in trackers.iter().enumerate() {
