@@ -22,7 +22,8 @@ pub(super) struct ReproduceArgs {
     /// Only this table of the thesis; may be repeated.
     #[arg(long, value_name = "N")]
     table: Vec<u32>,
-    /// Only this measurement of the chip against its theory: 1 probability of detection, 2 precision, 3 penalty; may be
+    /// Only this measurement of the chip against its theory: 1 probability of detection, 2 precision, 3 penalty, 4 zooming and
+    /// sliding at 200 m and 75 m; may be
     /// repeated.
     #[arg(long, value_name = "N")]
     measurement: Vec<u32>,

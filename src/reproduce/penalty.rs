@@ -2,6 +2,9 @@
 
 use super::claim::{Published::*, Row};
 use super::design::{ROUNDED_LIGHT_M_PER_S, TABLE_6_BACKGROUND_HZ, TABLE_6_BIN_M, TABLE_6_BIN_S};
+use super::measured::partial::{
+    AtRange, OnChip, demonstrator_on_chip, long_range_on_chip, with_interval,
+};
 use crate::report::{Axis, Chart, Grid, Style};
 use crate::theory::capacity::full_bins;
 use crate::theory::detection::{Model, Ties};
@@ -138,7 +141,16 @@ pub(super) fn long_range_rows() -> Vec<Row> {
     let (zooming, sliding) = (system.zooming(200.0), system.sliding(200.0, 0));
     let chip = one_hit(system).zooming(200.0);
     let approaching = Says("approaching 4×", 3.0, 4.0);
-    vec![
+    let on_chip = long_range_on_chip().at(200.0);
+    let measured = on_chip.penalty_of_sliding();
+    let mut rows = vec![
+        Row::holds("penalty of sliding, measured", "×", approaching, measured.value)
+            .remark(format!("{}: 16 guided windows of the chip, {} laser cycles over {}.", with_interval(&measured, 2), with_interval(&on_chip.sliding, 0), with_interval(&on_chip.guided, 0))),
+        zooming_row("penalty of zooming, measured", on_chip, approaching)
+            .differs("The conventional mode's bins on a CLK of 12 MHz hold 1.7 background photons a laser cycle, of which the chip counts one: they lose the echo that the thesis reckons with."),
+    ];
+    rows.extend(detection_rows(on_chip));
+    rows.extend([
         Row::holds("penalty of sliding", "×", approaching, penalty(&sliding, &full)),
         Row::holds("penalty of zooming", "×", approaching, penalty(&zooming, &full))
             .remark("σ = FWHM/2.355, Cramér-Rao, exact Poisson P_D, ties by lot."),
@@ -159,6 +171,55 @@ pub(super) fn long_range_rows() -> Vec<Row> {
         Row::ours("exposures of a full or guided histogram, 12-bit bins", "", full.exposures(12)),
         Row::ours("penalty of a guided histogram", "×", penalty(&full, &full))
             .remark("Its window's 16 bins need the measurement's cycles and no more."),
+    ]);
+    rows
+}
+
+/// The measured penalty of zooming.
+fn zooming_row(what: &str, at: &AtRange, published: super::claim::Published) -> Row {
+    let penalty = at.penalty_of_zooming();
+    let text = penalty.map_or("never".to_owned(), |p| with_interval(&p, 2));
+    Row::holds(
+        what,
+        "×",
+        published,
+        penalty.map_or(f64::INFINITY, |p| p.value),
+    )
+    .remark(format!(
+        "{text}: the conventional mode's coarse bins, then a guided window."
+    ))
+}
+
+/// What the chip finds in as many laser cycles as zooming's coarsest detection is reckoned to take, and what its counters do.
+fn detection_rows(at: &AtRange) -> Vec<Row> {
+    let Some(coarsest) = at.detections.first() else {
+        return Vec::new();
+    };
+    let range_m = at.range_m;
+    let [in_12, in_14] = coarsest.exposures.map(f64::from);
+    vec![
+        Row::ours(
+            format!("P_D of zooming's coarsest step in the reckoned cycles at {range_m} m, measured"),
+            "",
+            coarsest.found.value,
+        )
+        .remark(format!(
+            "{} of 0.997 wanted, in {} frames of {:.0} laser cycles, added from exposures that the counters hold.",
+            with_interval(&coarsest.found, 2),
+            coarsest.frames,
+            coarsest.reckoned
+        )),
+        Row::ours(
+            format!("its exposures, 12-bit bins, at {range_m} m, measured"),
+            "",
+            in_12,
+        )
+        .remark(format!(
+            "In a single one {:.0} % have a full bin of 12 bits, {:.0} % one of 14.",
+            100.0 * coarsest.full[0],
+            100.0 * coarsest.full[1]
+        )),
+        Row::ours(format!("the same, 14-bit bins, at {range_m} m"), "", in_14),
     ]
 }
 
@@ -187,7 +248,43 @@ pub(super) fn demonstrator_rows() -> Vec<Row> {
     let last_end_m = sliding.steps.last().map_or(f64::NAN, |step| step.range_m);
     let coarse_m = f64::from(system.bins) * system.window_m;
     let coarse_ns = 2e9 * coarse_m / SPEED_OF_LIGHT_M_PER_S;
-    vec![
+    let (at_75, at_74) = (
+        demonstrator_on_chip().at(75.0),
+        demonstrator_on_chip().at(74.0),
+    );
+    let sliding_75 = at_75.penalty_of_sliding();
+    let sliding_74 = at_74.penalty_of_sliding();
+    let zooming_75 = at_75
+        .penalty_of_zooming()
+        .map_or(f64::INFINITY, |p| p.value);
+    let mut rows = vec![
+        Row::holds(
+            "penalty of the better partial histogram, measured",
+            "×",
+            AtLeast("6"),
+            sliding_75.value.min(zooming_75),
+        )
+        .remark(format!(
+            "Sliding: {}, {} laser cycles over {}; at 74 m {}.",
+            with_interval(&sliding_75, 2),
+            with_interval(&at_75.sliding, 0),
+            with_interval(&at_75.guided, 0),
+            with_interval(&sliding_74, 2)
+        )),
+        zooming_row("penalty of zooming, measured", at_75, Nothing),
+        zooming_row("the same at 74 m, measured", at_74, Nothing),
+        Row::ours("laser cycles of a guided histogram, measured", "", at_75.guided.value).remark(
+            format!(
+                "{} for the spread of those frames that measure the echo within 0.5 m: {} of {} frames of the reckoned number do. The others take a peak of the background for it, which no formula of a spread knows.",
+                with_interval(&at_75.guided, 0),
+                with_interval(&at_75.measurement.found, 3),
+                at_75.measurement.frames
+            ),
+        ),
+    ];
+    rows.extend(detection_rows(at_75));
+    rows.extend(detection_rows(at_74));
+    rows.extend([
         Row::holds(
             "penalty of the better partial histogram",
             "×",
@@ -234,7 +331,8 @@ pub(super) fn demonstrator_rows() -> Vec<Row> {
             zooming.exposures(12),
         )
         .remark("HSLIDAR's bins; without off-chip sums its coarse bins overflow."),
-    ]
+    ]);
+    rows
 }
 
 /// Laser cycles of a system's schemes against range. What zooming detects and which windows sliding visits changes
@@ -354,6 +452,11 @@ pub(super) fn figure_42() -> Vec<Chart> {
             "one hit per bin and cycle (this chip)",
             Style::Dashed,
             detecting(one_hit(long_range())),
+        )
+        .with(
+            "measured on the chip",
+            Style::Points,
+            points(long_range_on_chip(), |at| Some(at.detecting()?.value)),
         ),
     ]
 }
@@ -371,6 +474,8 @@ pub(super) fn figure_43() -> Vec<Chart> {
         (end_m, sum)
     });
     let total: Points = total.collect();
+    let windows = &long_range_on_chip().windows;
+    let measured: Points = windows.iter().map(|(end_m, n)| (*end_m, n.value)).collect();
     vec![
         Chart::new(
             "Sliding: laser cycles of each window, and of all up to it",
@@ -378,12 +483,22 @@ pub(super) fn figure_43() -> Vec<Chart> {
             Axis::linear("laser cycles"),
         )
         .with("all windows so far", Style::Line, total)
-        .with("this window", Style::Bars, each),
+        .with("this window", Style::Bars, each)
+        .with("this window, measured on the chip", Style::Points, measured),
     ]
 }
 
-fn schemes(title: &str, system: System, to_m: u32) -> Chart {
-    let curves = Curves::of(system, to_m);
+/// What was measured, against range.
+fn points(on_chip: &OnChip, of: impl Fn(&AtRange) -> Option<f64>) -> Points {
+    let ranges = on_chip.ranges.iter();
+    ranges
+        .filter_map(|at| Some((at.range_m, of(at)?)))
+        .collect()
+}
+
+fn schemes(title: &str, on_chip: &OnChip, to_m: u32) -> Chart {
+    let curves = Curves::of(on_chip.system, to_m);
+    let measured = |of: fn(&AtRange) -> Option<f64>| points(on_chip, of);
     Chart::new(
         title,
         Axis::linear("distance (m)"),
@@ -392,11 +507,26 @@ fn schemes(title: &str, system: System, to_m: u32) -> Chart {
     .with("full and guided", Style::Line, curves.full())
     .with("zooming", Style::Line, curves.zooming())
     .with("sliding", Style::Line, curves.sliding())
+    .with(
+        "guided, measured",
+        Style::Points,
+        measured(|at| Some(at.guided.value)),
+    )
+    .with(
+        "zooming, measured",
+        Style::Points,
+        measured(|at| Some(at.zooming()?.value)),
+    )
+    .with(
+        "sliding, measured",
+        Style::Points,
+        measured(|at| Some(at.sliding.value)),
+    )
 }
 
-fn penalties(title: &str, system: System, to_m: u32) -> Chart {
-    let curves = Curves::of(system, to_m);
-    let chip = Curves::of(one_hit(system), to_m);
+fn penalties(title: &str, on_chip: &OnChip, to_m: u32) -> Chart {
+    let curves = Curves::of(on_chip.system, to_m);
+    let chip = Curves::of(one_hit(on_chip.system), to_m);
     Chart::new(
         title,
         Axis::linear("distance (m)"),
@@ -410,13 +540,23 @@ fn penalties(title: &str, system: System, to_m: u32) -> Chart {
         Style::Dashed,
         chip.penalty_of_zooming(),
     )
+    .with(
+        "zooming, measured",
+        Style::Points,
+        points(on_chip, |at| Some(at.penalty_of_zooming()?.value)),
+    )
+    .with(
+        "sliding, measured",
+        Style::Points,
+        points(on_chip, |at| Some(at.penalty_of_sliding().value)),
+    )
 }
 
 /// Fig. 44: laser cycles of the three schemes.
 pub(super) fn figure_44() -> Vec<Chart> {
     vec![schemes(
         "Laser cycles for Table 6's goals (16-bin schemes of Table 7)",
-        long_range(),
+        long_range_on_chip(),
         200,
     )]
 }
@@ -425,7 +565,7 @@ pub(super) fn figure_44() -> Vec<Chart> {
 pub(super) fn figure_45() -> Vec<Chart> {
     let chart = penalties(
         "Laser power penalty of 16-bin partial histograms (Table 6)",
-        long_range(),
+        long_range_on_chip(),
         200,
     );
     vec![chart.with("published: approaching 4", Style::Points, [(200.0, 4.0)])]
@@ -435,7 +575,7 @@ pub(super) fn figure_45() -> Vec<Chart> {
 pub(super) fn figure_108() -> Vec<Chart> {
     vec![schemes(
         "Laser cycles for 10 cm (Table 15, 8 bins)",
-        demonstrator(),
+        demonstrator_on_chip(),
         80,
     )]
 }
@@ -444,7 +584,7 @@ pub(super) fn figure_108() -> Vec<Chart> {
 pub(super) fn figure_109() -> Vec<Chart> {
     let chart = penalties(
         "Laser power penalty of 8-bin partial histograms (Table 15)",
-        demonstrator(),
+        demonstrator_on_chip(),
         80,
     );
     vec![chart.with(

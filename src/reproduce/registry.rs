@@ -317,7 +317,7 @@ pub const FIGURES: [Figure; 30] = [
 ];
 
 /// Every measurement, by number.
-pub const MEASUREMENTS: [Measurement; 3] = [
+pub const MEASUREMENTS: [Measurement; 4] = [
     Measurement {
         number: 1,
         title: "probability of detection (3.2.2, Eq. 17)",
@@ -332,5 +332,10 @@ pub const MEASUREMENTS: [Measurement; 3] = [
         number: 3,
         title: "penalty of partial histograms (3.4)",
         measure: measured::penalty::study,
+    },
+    Measurement {
+        number: 4,
+        title: "zooming and sliding at 200 m and 75 m (3.4, 6.4.2)",
+        measure: measured::partial::study,
     },
 ];

@@ -27,7 +27,7 @@ pub fn detected(trial: &Trial, frames: usize, seed: u64) -> Result<Estimate, Eng
 }
 
 /// P_D in some histograms. By lot, a tie of k bins is found one time in k.
-fn judged(trial: &Trial, histograms: &[Vec<u32>], by_lot: bool) -> Estimate {
+pub(super) fn judged(trial: &Trial, histograms: &[Vec<u32>], by_lot: bool) -> Estimate {
     let echo = trial.echo_bins.round() as usize;
     let won = |counts: &Vec<u32>| {
         let most = counts.iter().max().expect("a bin");

@@ -8,6 +8,7 @@
 //! Seeds are fixed, so that a table is the same every time; the number of frames is the reader's choice.
 
 pub mod detection;
+pub mod partial;
 pub mod penalty;
 pub mod precision;
 mod trial;

@@ -175,7 +175,7 @@ fn exactly(value: f64) -> Estimate {
 }
 
 /// Independent errors add in squares.
-fn sum(a: &Estimate, b: &Estimate) -> Estimate {
+pub(super) fn sum(a: &Estimate, b: &Estimate) -> Estimate {
     let value = a.value + b.value;
     let down = (a.value - a.low).hypot(b.value - b.low);
     let up = (a.high - a.value).hypot(b.high - b.value);
@@ -187,13 +187,13 @@ fn sum(a: &Estimate, b: &Estimate) -> Estimate {
 }
 
 /// a/b with relative errors in squares.
-fn ratio(a: &Estimate, b: &Estimate) -> Estimate {
+pub(super) fn ratio(a: &Estimate, b: &Estimate) -> Estimate {
     let value = a.value / b.value;
     let down = (1.0 - a.low / a.value).hypot(b.high / b.value - 1.0);
     let up = (a.high / a.value - 1.0).hypot(1.0 - b.low / b.value);
     Estimate {
         value,
-        low: value * (1.0 - down),
+        low: value * (1.0 - down).max(0.0),
         high: value * (1.0 + up),
     }
 }

@@ -40,6 +40,23 @@ pub fn scatter(
     seed: u64,
     estimator: Estimator,
 ) -> Result<Scatter, EngineError> {
+    let errors = errors_ns(trial, frames, seed, estimator)?;
+    Ok(Scatter {
+        spread: deviation(&errors),
+        bias: mean(&errors),
+    })
+}
+
+/// Errors of the times of `frames` frames of `trial`, or as many as are affordable, ns.
+///
+/// # Errors
+/// Configurations that no engine can run.
+pub(super) fn errors_ns(
+    trial: &Trial,
+    frames: usize,
+    seed: u64,
+    estimator: Estimator,
+) -> Result<Vec<f64>, EngineError> {
     let frames = trial.affordable(frames);
     // The same places for every frame count, each as often, in an order that has nothing to do with the frame's light.
     let shift = |frame: usize| (frame as f64 + 0.5) / frames as f64 - 0.5;
@@ -62,11 +79,7 @@ pub fn scatter(
         };
         (bins - truth_bins) * expected.bin_ns
     });
-    let errors: Vec<f64> = errors.collect();
-    Ok(Scatter {
-        spread: deviation(&errors),
-        bias: mean(&errors),
-    })
+    Ok(errors.collect())
 }
 
 /// Mean counts of a bin without echo, and of the whole echo, over all histograms: what a host knows after some frames.
