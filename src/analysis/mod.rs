@@ -13,6 +13,8 @@
 //! | `gates` | the same, asked of the event kernel |
 //! | `correlation` | the photons that excite the longest correlation path |
 //! | `load` | how fast start values can be loaded |
+//! | `power` | switching power, block by block |
+//! | `readout` | how fast histograms can be read |
 //! | `spread` | ripple and margin of every macropixel under mismatch |
 //! | `corners` | process, voltage and temperature at which a clock fails |
 //! | `verdict` | whether all of it is met: what `timing`, `frame` and `replay` say |
@@ -22,6 +24,8 @@ mod correlation;
 mod gates;
 mod load;
 mod macropixel;
+mod power;
+mod readout;
 mod spread;
 mod verdict;
 
@@ -30,6 +34,8 @@ pub use correlation::CorrelationTiming;
 pub use gates::{ResetTiming, gate_works, reset, ripple};
 pub use load::{LoadTiming, load_works};
 pub use macropixel::{Aim, LocalClocks, MacropixelTiming, longest};
+pub use power::{Capacitances, MacropixelPower};
+pub use readout::{ReadTiming, read_works};
 pub use spread::{PixelTiming, Spread, spread};
 pub use verdict::{Margin, TimingVerdict, VerdictReport};
 

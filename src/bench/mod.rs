@@ -11,6 +11,6 @@ mod stimulus;
 mod verilog;
 
 pub use hardware_events::{HardwareEvent, HardwareEventKind, HardwareEventReport, HardwareEvents};
-pub(crate) use stimulus::load_stimulus;
 pub use stimulus::{Schedule, Skip, StimulusPlan};
+pub(crate) use stimulus::{load_stimulus, read_stimulus, reload_stimulus};
 pub use verilog::{export_annotated_verilog, export_netlist, export_verilog};

@@ -11,13 +11,19 @@
 //!                                         └ origin: time 0 of the exposure
 //! ```
 //!
+//! Where histograms are read through the pins, that comes last: READ_ENABLE is high for it, with one rising edge of READ_CLK
+//! for each bit of DATA_OUT.
+//!
 //! The same drives go into the event kernel and into the exported Verilog testbench.
 
 use std::collections::BTreeSet;
 
 use bitvec::slice::BitSlice;
 
-use crate::chip::{Exposure, LoadPins, Mode, Sensor, SensorPins, Tdc, load_path};
+use crate::chip::readout::ReadoutOrder;
+use crate::chip::{
+    Exposure, LoadPins, Mode, ReadPins, Sensor, SensorConfig, SensorPins, Tdc, load_path,
+};
 use crate::kernel::{Drive, Stimulus, clock, merge};
 use crate::photon::SpadEvent;
 use crate::units::{Frequency, Time};
@@ -26,6 +32,8 @@ use crate::units::{Frequency, Time};
 const RESET_END: Time = Time::from_ns(2);
 /// Falling LOAD_CLK edge that precedes the first bit.
 const LOAD_START: Time = Time::from_ns(5);
+/// From READ_ENABLE to the first bit: the first word settles, in any corner.
+const READ_SETTLING: Time = Time::from_ns(5);
 /// Quiet time between load and exposure, and for counts to ripple through after it.
 const SETTLING: Time = Time::from_ns(20);
 
@@ -35,16 +43,30 @@ pub(crate) fn load_stimulus<'a>(
     clock: Frequency,
     stream: &'a BitSlice,
 ) -> (Time, Stimulus<'a>) {
-    let bits = stream.len() as i64;
-    let half = move |k| LOAD_START + clock.half_periods(k);
-    let end = half(2 * bits + 1);
     let enabled = Time::from_fs((RESET_END + LOAD_START).as_fs() / 2);
-    let control = [
+    let power_up = [
         Drive::new(Time::ZERO, pins.resetb, false),
         Drive::new(Time::ZERO, pins.enable, false),
         Drive::new(Time::ZERO, pins.clk, false),
         Drive::new(Time::ZERO, pins.serial, false),
         Drive::new(RESET_END, pins.resetb, true),
+    ];
+    let (end, load) = reload_stimulus(pins, clock, (enabled, LOAD_START), stream);
+    (end, merge([boxed(power_up.into_iter()), boxed(load)]))
+}
+
+/// The serial load alone: LOAD_ENABLE rises at `enabled`, the first bit is there at `start`, and the time at which all bits
+/// are in.
+pub(crate) fn reload_stimulus<'a>(
+    pins: LoadPins,
+    clock: Frequency,
+    (enabled, start): (Time, Time),
+    stream: &'a BitSlice,
+) -> (Time, Stimulus<'a>) {
+    let bits = stream.len() as i64;
+    let half = move |k| start + clock.half_periods(k);
+    let end = half(2 * bits + 1);
+    let control = [
         Drive::new(enabled, pins.enable, true),
         Drive::new(end, pins.enable, false),
     ];
@@ -67,6 +89,23 @@ fn delay_lines(sensor: &Sensor) -> Time {
     line + sensor.clk_skew(sensor.cols)
 }
 
+/// A readout from `start` on, READ_ENABLE's rise: `periods` of READ_CLK, and the time at which all bits are out.
+pub(crate) fn read_stimulus(
+    pins: &ReadPins,
+    clock: Frequency,
+    start: Time,
+    periods: usize,
+) -> (Time, Stimulus<'static>) {
+    let (enable, clk) = (pins.enable, pins.clk);
+    let first = start + READ_SETTLING;
+    let half = move |k: i64| first + clock.half_periods(k);
+    let end = half(2 * periods as i64);
+    let edges = (0..2 * periods as i64).map(move |k| Drive::new(half(k), clk, k % 2 == 0));
+    let begin = std::iter::once(Drive::new(start, enable, true));
+    let close = std::iter::once(Drive::new(end, enable, false));
+    (end, merge([boxed(begin.chain(edges).chain(close))]))
+}
+
 /// Where load and exposure lie in simulation time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Schedule {
@@ -78,7 +117,9 @@ pub struct Schedule {
     pub load_end: Time,
     /// First rising edge of STOP: time 0 of the exposure.
     pub origin: Time,
-    /// When everything has settled.
+    /// When all counts have settled.
+    pub counted: Time,
+    /// When everything has settled, and all counts have been read if they are to be.
     pub end: Time,
 }
 
@@ -116,6 +157,8 @@ pub struct StimulusPlan {
     pulses: Vec<(usize, SpadEvent)>,
     schedule: Schedule,
     skip: Option<Skip>,
+    order: ReadoutOrder,
+    is_read: bool,
 }
 
 impl StimulusPlan {
@@ -144,20 +187,29 @@ impl StimulusPlan {
             .flat_map(|(pixel, list)| list.iter().map(move |p| (pixel, *p)))
             .collect();
         all.sort_unstable_by_key(|(pixel, p)| (p.time, *pixel, p.spad));
+        let counted =
+            origin + last_edge + exposure.clock.period() + SETTLING + delay_lines(&sensor);
         let schedule = Schedule {
             reset_end: RESET_END,
             first_bit: half(1),
             load_end,
             origin,
-            end: origin + last_edge + exposure.clock.period() + SETTLING + delay_lines(&sensor),
+            counted,
+            end: counted,
         };
         StimulusPlan {
-            sensor,
             exposure: *exposure,
             stream,
             pulses: all,
             schedule,
             skip: None,
+            order: ReadoutOrder::of(&SensorConfig {
+                rows: starts.len() / cols,
+                cols,
+                ..(*sensor).clone()
+            }),
+            is_read: false,
+            sensor,
         }
     }
 
@@ -175,6 +227,26 @@ impl StimulusPlan {
         })
     }
 
+    /// The same, and then all counts are read through the pins.
+    #[must_use]
+    pub fn with_readout(mut self) -> Self {
+        self.is_read = true;
+        let periods = self.order.periods() as i64;
+        let read = self.sensor.read_clock().periods(periods);
+        self.schedule.end = self.schedule.counted + READ_SETTLING + read + SETTLING;
+        self
+    }
+
+    /// In which order counts leave the pins.
+    pub(crate) fn order(&self) -> ReadoutOrder {
+        self.order
+    }
+
+    /// In which order counts leave the pins, if they are read.
+    pub fn readout(&self) -> Option<ReadoutOrder> {
+        self.is_read.then_some(self.order)
+    }
+
     /// Where load and exposure lie in simulation time.
     pub fn schedule(&self) -> Schedule {
         self.schedule
@@ -188,6 +260,7 @@ impl StimulusPlan {
             boxed(self.clk(pins)),
             boxed(self.stop(pins)),
             boxed(self.spads(pins)),
+            boxed(self.read(pins)),
         ])
     }
 
@@ -198,6 +271,8 @@ impl StimulusPlan {
         let start = Time::ZERO;
         drive(start, pins.histogram_clear, true);
         drive(start, pins.enable, false);
+        drive(start, pins.read.enable, false);
+        drive(start, pins.read.clk, false);
         drive(start, pins.conventional, config.mode == Mode::Conventional);
         for (bit, &net) in pins.event_type.iter().enumerate() {
             drive(start, net, config.event_type.code() >> bit & 1 == 1);
@@ -218,6 +293,22 @@ impl StimulusPlan {
             false,
         );
         drives
+    }
+
+    fn read(&self, pins: &SensorPins) -> impl Iterator<Item = Drive> + Send + use<> {
+        let clock = self.sensor.read_clock();
+        let read = || {
+            read_stimulus(
+                &pins.read,
+                clock,
+                self.schedule.counted,
+                self.order.periods(),
+            )
+        };
+        self.is_read
+            .then(read)
+            .into_iter()
+            .flat_map(|(_, read)| read)
     }
 
     fn clk(&self, pins: &SensorPins) -> impl Iterator<Item = Drive> + Send + use<> {
@@ -256,7 +347,7 @@ impl StimulusPlan {
     fn spads<'p>(&'p self, pins: &SensorPins) -> impl Iterator<Item = Drive> + Send + use<'p> {
         let (origin, dead_time) = (self.schedule.origin, self.sensor.dead_time());
         let (nets, spads) = (pins.spad_raw.clone(), self.sensor.spads());
-        let end = self.schedule.end;
+        let end = self.schedule.counted;
         let net =
             move |(pixel, pulse): &(usize, SpadEvent)| nets[pixel * spads + pulse.spad as usize];
         let (left_out, driven) = match self.skip {

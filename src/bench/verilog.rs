@@ -9,7 +9,8 @@
 //! | `cells_specify.v` | cells with `specify` blocks in three corners, which take SDF: any tool |
 //!
 //! For a stimulus there are `stimulus.txt` (every change of every input pin: time in fs, pin, value) and `tb.v`, which
-//! replays it on either cells, and writes `histograms.csv` and `local_stops.csv`, and `dut.vcd` when run with `+vcd`.
+//! replays it on either cells, and writes `histograms.csv` and `local_stops.csv`, for a plan with a readout what the pins tell of the
+//! histograms as `readout.csv`, and `dut.vcd` when run with `+vcd`.
 //! Compiled with the macro `SDF`, the name of a delay file in quotes, it annotates that onto `cells_specify.v`. Where
 //! cells have delays of their own without it, it includes `delays.v`, which sets the parameters of `cells.v`.
 
@@ -17,12 +18,14 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use super::stimulus::StimulusPlan;
-use crate::chip::{SensorConfig, SensorPins, Silicon, array, probes};
+use crate::chip::readout::ReadoutOrder;
+use crate::chip::{ReadProbe, SensorConfig, SensorPins, Silicon, array, probes};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::netlist::{
     Corner, Direction, Module, Netlist, Timing, write_cells, write_delays, write_modules,
     write_parametric_cells, write_standard_cells,
 };
+use crate::units::Time;
 
 /// Writes cells and netlist of the whole array into `folder`.
 ///
@@ -141,12 +144,22 @@ fn write_testbench(
     let schedule = plan.schedule();
     let name = top.name();
     let mut pins = 0;
-    let mut ports = Vec::new();
+    let (mut ports, mut outputs) = (Vec::new(), Vec::new());
+    let mut read_clk = 0;
     for (direction, signal) in top.port_signals() {
         let connection = match direction {
-            Direction::Output => "local_stop".to_owned(),
+            Direction::Output => {
+                let wire = signal.name.to_lowercase();
+                outputs.push(format!("  wire [{}:0] {wire};\n", signal.width() - 1));
+                wire
+            }
             Direction::Input => {
                 let low = pins;
+                read_clk = if signal.name == ReadProbe::Clk.path() {
+                    low
+                } else {
+                    read_clk
+                };
                 pins += signal.width();
                 if signal.is_bus {
                     format!("pins[{}:{low}]", pins - 1)
@@ -166,8 +179,7 @@ fn write_testbench(
 `timescale 1fs/1fs
 module tb;
   reg [{last_pin}:0] pins;
-  wire [{last_pixel}:0] local_stop;
-  reg value;
+{outputs}  reg value;
   reg [63:0] at;
   integer stimulus, histograms, stops, pin;
 
@@ -175,7 +187,7 @@ module tb;
 {ports}
   );
 {include}
-  genvar i;
+{sampler}  genvar i;
   generate
     for (i = 0; i < {pixels}; i = i + 1) begin : watch
       // Times count from the first rising edge of STOP.
@@ -210,8 +222,9 @@ module tb;
             Corner::Slow => "max",
         },
         last_pin = pins - 1,
-        last_pixel = pixels - 1,
+        outputs = outputs.concat(),
         ports = ports.join(",\n"),
+        sampler = plan.readout().map_or(String::new(), |order| sampler(&order, read_clk, schedule.counted)),
         origin = schedule.origin.as_fs(),
         end = schedule.end.as_fs(),
     )?;
@@ -226,6 +239,9 @@ module tb;
             )?;
         }
     }
+    if plan.readout().is_some() {
+        writeln!(out, "    write_readout;")?;
+    }
     write!(
         out,
         "\
@@ -235,5 +251,51 @@ module tb;
   end
 endmodule
 "
+    )
+}
+
+/// Verilog that samples DATA_OUT with the falling edges of pin `clk`, and a task that writes what it has seen.
+fn sampler(order: &ReadoutOrder, clk: usize, counted: Time) -> String {
+    let ReadoutOrder {
+        rows,
+        cols,
+        bins,
+        bits,
+        cols_per_pin,
+    } = *order;
+    format!(
+        "\
+  // Counts as the pins tell them, most significant bit first.
+  reg [{last_bit}:0] counts[0:{last_count}];
+  integer readout, period, word, column, out, count;
+  initial period = 0;
+  always @(negedge pins[{clk}])
+    if ($time > {counted}) begin
+      word = period / {word_periods};
+      for (out = 0; out < {pins}; out = out + 1) begin
+        column = out * {cols_per_pin} + period % {word_periods} / {bits};
+        if (column < {cols}) begin
+          count = (word / {bins} * {cols} + column) * {bins} + word % {bins};
+          counts[count] = counts[count] << 1 | data_out[out];
+        end
+      end
+      period = period + 1;
+    end
+  task write_readout;
+    begin
+      readout = $fopen(\"readout.csv\", \"w\");
+      $fwrite(readout, \"row,col,bin,count\\n\");
+      for (count = 0; count <= {last_count}; count = count + 1)
+        $fwrite(readout, \"%0d,%0d,%0d,%0d\\n\", count / {row}, count / {bins} % {cols}, count % {bins}, counts[count]);
+      $fclose(readout);
+    end
+  endtask
+",
+        last_bit = bits - 1,
+        last_count = rows * cols * bins - 1,
+        word_periods = order.word_periods(),
+        pins = order.pins(),
+        row = cols * bins,
+        counted = counted.as_fs(),
     )
 }

@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::blocks::delay_line::Elements;
+use super::blocks::readout::ReadoutOrder;
 use super::spad_grid::{SpadGrid, count_bits};
 use crate::netlist::Corner;
 use crate::units::{Frequency, Time};
@@ -167,6 +168,11 @@ pub struct SensorConfig {
     pub stop_phase_ps: f64,
     /// Deserialiser clock, Hz (thesis 4.7: "a few hundred megahertz").
     pub load_clk_hz: f64,
+    /// Pins through which histograms leave, each with a serialiser for its share of the columns, 1…256; no more are used than
+    /// there are columns.
+    pub readout_pins: usize,
+    /// Serialiser clock, Hz.
+    pub read_clk_hz: f64,
     /// SPAD dead time and width of a SPAD_RAW pulse, ns; no shorter than the front end follows, and longer than a CLK
     /// period if no photons are to cancel.
     pub dead_time_ns: f64,
@@ -199,6 +205,11 @@ impl SensorConfig {
     /// Deserialiser clock. The configuration must have passed [`SensorConfig::check`].
     pub fn load_clock(&self) -> Frequency {
         Frequency::from_hz_f64(self.load_clk_hz).expect("checked")
+    }
+
+    /// Serialiser clock. The configuration must have passed [`SensorConfig::check`].
+    pub fn read_clock(&self) -> Frequency {
+        Frequency::from_hz_f64(self.read_clk_hz).expect("checked")
     }
 
     /// Rise of STOP after CLK's fall.
@@ -272,6 +283,17 @@ impl SensorConfig {
     /// Bits of one serial load (thesis 4.7: 36.9 kbit).
     pub fn load_bits(&self) -> usize {
         self.pixels() * self.counter_bits
+    }
+
+    /// Bits of all histograms.
+    pub fn histogram_bits(&self) -> usize {
+        self.pixels() * self.bins * self.bin_bits
+    }
+
+    /// Time of one readout.
+    pub fn readout_time(&self) -> Time {
+        let periods = ReadoutOrder::of(self).periods();
+        self.read_clock().periods(periods as i64)
     }
 
     /// Time of one serial load.

@@ -150,6 +150,20 @@ pub(super) const KEYS: &[Key] = &[
         "thesis 4.7, a few hundred megahertz",
     ),
     key(
+        "readout_pins",
+        "",
+        whole(1, 256),
+        "Pins through which histograms leave, each with a serialiser for its share of the columns",
+        CHOSEN,
+    ),
+    key(
+        "read_clk_hz",
+        "Hz",
+        Range::Within(1e6, 1e9),
+        "Serialiser clock",
+        "chosen: that of the deserialiser",
+    ),
+    key(
         "dead_time_ns",
         "ns",
         Range::Above(0.0, 1e6),

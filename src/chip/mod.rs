@@ -7,6 +7,7 @@
 //!                 └──────────────────────────────────────────▲───────────────────────────┘
 //!  COUNTER_INITS ─► deserialiser ─COUNTER_INIT_ROW───────────┤
 //!                   row_scanner ──MEMORY_LOAD────────────────┘
+//!  DATA_OUT ◄─ serialiser ◄─ column_bus ◄─ WORD of every macropixel ◄─ readout_scanner
 //! ```
 //!
 //! [`window_law`] says which photons a start value selects; everything that aims or reads a window
@@ -29,11 +30,11 @@ pub mod window_law;
 pub use bin_edges::BinEdges;
 pub use blocks::{
     array, correlation, delay_line, front_end, histogram, load_path, macropixel, metdc, p_counter,
-    p_counter_timing, photon_line,
+    p_counter_timing, photon_line, readout,
 };
 pub use config::{AfterBorrow, EventType, Mode, Overflow, PCounter, SensorConfig, Tap, Tdc};
 pub use exposure::{Exposure, ExposureError};
-pub use probes::{LoadPins, LoadProbe, Probe, Probes, SensorPins};
+pub use probes::{LoadPins, LoadProbe, Probe, Probes, ReadPins, ReadProbe, SensorPins};
 pub use race::{Conflict, Cure, NoAim, Race};
 pub use sensor_file::SensorFault;
 pub use sensors::{Sensor, hslidar, hslidar_delay_line, quantic4x4};

@@ -40,6 +40,9 @@ pub(super) struct VerilogArgs {
     /// be.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// The testbench also reads the histograms through the pins, into readout.csv.
+    #[arg(long, requires = "inits")]
+    readout: bool,
     /// Delays that replace the library's (SDF); they go into delays.v, which tb.v includes.
     #[arg(long, value_name = "FILE", requires = "inits")]
     sdf: Option<PathBuf>,
@@ -79,6 +82,10 @@ fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
         &stimuli.starts,
         &stimuli.pulses(),
     );
+    let plan = match args.readout {
+        true => plan.with_readout(),
+        false => plan,
+    };
     match &args.sdf {
         None => export_verilog(&args.out, &stimuli.config, &plan)?,
         Some(path) => {

@@ -5,6 +5,7 @@ mod calibrate;
 mod export;
 mod frame;
 mod pareto;
+mod power;
 mod range;
 mod replay;
 mod reproduce;
@@ -52,6 +53,8 @@ enum Command {
     Speed(speed::SpeedArgs),
     /// How fast the chip can be clocked: ripple, periods, margins.
     Timing(timing::TimingArgs),
+    /// What the blocks of a macropixel take from the supply, by the toggles of a gate-level run.
+    Power(power::PowerArgs),
     /// Run time against error.
     Pareto(pareto::ParetoArgs),
     /// Print the sensor as a commented file: every key with its unit, range and source.
@@ -84,6 +87,7 @@ pub fn main() -> ExitCode {
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Speed(args) => speed::run(&args),
         Command::Timing(args) => timing::run(&args),
+        Command::Power(args) => power::run(&args),
         Command::Pareto(args) => pareto::run(&args),
         Command::Sensor(args) => settings::print_sensor(&args),
         Command::Scene(args) => settings::print_scene(&args),

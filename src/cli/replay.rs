@@ -4,6 +4,7 @@ mod histograms;
 mod stimuli;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -21,10 +22,11 @@ use crate::engine::{
     Timed, cancelled,
 };
 use crate::files::{InputError, OutputFile};
-use crate::kernel::{CheckReport, Observer, Policy};
+use crate::kernel::{Activity, CheckReport, Observer, Policy};
 use crate::report::Table;
 use crate::system::EngineKind;
-use crate::waves::WaveFormat;
+use crate::units::Time;
+use crate::waves::{WaveFormat, write_saif};
 use histograms::{Format, write};
 pub(super) use stimuli::Stimuli;
 use stimuli::StimulusArgs;
@@ -47,6 +49,9 @@ pub(super) struct ReplayArgs {
     /// and Surfer go beside it.
     #[arg(long, value_name = "FILE")]
     vcd: Option<PathBuf>,
+    /// Switching activity of every net, from power-up to the end, as SAIF 2.0 for power tools (needs --engine gate).
+    #[arg(long, value_name = "FILE")]
+    saif: Option<PathBuf>,
     /// Format of the waveform, whatever its name.
     #[arg(long, value_enum, requires = "vcd")]
     wave_format: Option<WaveFormat>,
@@ -101,6 +106,11 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
             "only the gate engine has delays of single cells; add --engine gate or leave --sdf out";
         return Err(InputError::new(format!("--sdf {}", sdf.display()), message).into());
     }
+    if let (Some(saif), true) = (&args.saif, args.engine != EngineKind::Gate) {
+        let message =
+            "only the gate engine has nets that toggle; add --engine gate or leave --saif out";
+        return Err(InputError::new(format!("--saif {}", saif.display()), message).into());
+    }
     if args.checks.is_some() && args.engine != EngineKind::Gate {
         let message =
             "only the gate engine has timing checks; add --engine gate or leave --checks out";
@@ -126,7 +136,8 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         );
         return Err(InputError::new(*option, message).into());
     }
-    let needs_array = args.vcd.is_some() || args.sdf.is_some() || args.checks.is_some();
+    let needs_array =
+        args.vcd.is_some() || args.saif.is_some() || args.sdf.is_some() || args.checks.is_some();
     let replayed = match silicon {
         _ if needs_array => replay_array(&stimuli, args, silicon)?,
         silicon => replay(&stimuli, args.engine, silicon.as_ref())?,
@@ -271,6 +282,25 @@ struct Report<'a> {
 }
 
 fn watch<O: Observer>(
+    simulation: &mut GateSimulation,
+    stimuli: &Stimuli,
+    args: &ReplayArgs,
+    observer: &mut O,
+) -> Result<(), InputError> {
+    let Some(saif) = &args.saif else {
+        return record(simulation, stimuli, args, observer);
+    };
+    let netlist = Arc::clone(simulation.netlist());
+    let mut activity = Activity::new(netlist.net_count(), Time::ZERO);
+    record(simulation, stimuli, args, &mut (&mut activity, observer))?;
+    let end = simulation.now();
+    OutputFile::write_with(saif, |out| {
+        write_saif(out, &netlist, &activity.until(end), end)
+    })
+}
+
+/// Runs the simulation, with its waveform if one is asked for.
+fn record<O: Observer>(
     simulation: &mut GateSimulation,
     stimuli: &Stimuli,
     args: &ReplayArgs,

@@ -30,8 +30,8 @@ enum Timescale {
     Ps,
 }
 
-/// Largest file that is written without --rows and --cols, bytes: some 280 macropixels, more than anybody reads or a
-/// simulator annotates without having planned to. All 4096 of the QuantIC4x4 take 1.5 GB.
+/// Largest file that is written without --rows and --cols, bytes: some 200 macropixels, more than anybody reads or a
+/// simulator annotates without having planned to. All 4096 of the QuantIC4x4 take 2.1 GB.
 const LARGEST_UNASKED: u64 = 100_000_000;
 
 /// Arguments of `gdtof export sdf`.

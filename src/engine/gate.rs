@@ -6,17 +6,20 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::lanes::LaneSimulation;
+use super::readout::PinSampler;
 use super::{
     Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay, follows,
     full_stream,
 };
-use crate::bench::{HardwareEvents, Schedule, Skip, StimulusPlan};
+use crate::bench::{HardwareEvents, Schedule, Skip, StimulusPlan, read_stimulus, reload_stimulus};
 use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::{
-    Exposure, Probe, Probes, Sensor, SensorPins, Silicon, Tdc, WindowLaw, array, delay_line,
-    front_end,
+    Exposure, LoadPins, Probe, Probes, ReadPins, Sensor, SensorPins, Silicon, Tdc, WindowLaw,
+    array, delay_line, front_end, load_path,
 };
-use crate::kernel::{Kernel, LANES, Observer, Policy, Statistics, TimingChecks};
+use crate::kernel::{
+    Drive, Kernel, LANES, Observer, Policy, Statistics, Stimulus, TimingChecks, merge,
+};
 use crate::netlist::{NetId, Netlist, Timing};
 use crate::photon::{PhotonStream, SpadEvent};
 use crate::units::Time;
@@ -99,6 +102,17 @@ impl GateSimulation {
         self
     }
 
+    /// The same simulation, which reads all counts through the pins in the end. Call it before [`GateSimulation::run`].
+    pub fn with_readout(mut self) -> Self {
+        self.plan = self.plan.with_readout();
+        self
+    }
+
+    /// Delays of that netlist.
+    pub fn timing(&self) -> &Timing {
+        &self.timing
+    }
+
     /// The netlist that is simulated.
     pub fn netlist(&self) -> &Arc<Netlist> {
         &self.netlist
@@ -142,6 +156,69 @@ impl GateSimulation {
             self.kernel.preset(states, observer);
         }
         self.kernel.run(&mut stimulus, until, observer);
+    }
+
+    /// Reads all counts through the pins, after [`GateSimulation::run`] and as often as one likes.
+    ///
+    /// # Errors
+    /// When a bit of a count is unknown.
+    pub fn read_out<O: Observer>(&mut self, observer: &mut O) -> Result<Histograms, EngineError> {
+        self.read_out_with(self.kernel.now(), merge([]), observer)
+    }
+
+    /// The same while the start values of the next exposure (row-major) are loaded, which takes its own time.
+    ///
+    /// # Errors
+    /// As [`GateSimulation::read_out`].
+    pub fn read_out_while_loading<O: Observer>(
+        &mut self,
+        starts: &[u16],
+        observer: &mut O,
+    ) -> Result<Histograms, EngineError> {
+        debug_assert_eq!(starts.len(), self.probes.len());
+        let cols = self.plan.order().cols;
+        let stream = load_path::stream(starts, cols, self.sensor.counter_bits);
+        let clock = self.sensor.load_clock();
+        let times = (self.kernel.now(), self.kernel.now() + clock.period());
+        let (end, load) = reload_stimulus(LoadPins::of(&self.netlist), clock, times, &stream);
+        self.read_out_with(end, load, observer)
+    }
+
+    fn read_out_with<O: Observer>(
+        &mut self,
+        others_end: Time,
+        others: Stimulus<'_>,
+        observer: &mut O,
+    ) -> Result<Histograms, EngineError> {
+        let order = self.plan.order();
+        let pins = ReadPins::of(&self.netlist);
+        let (clock, start) = (self.sensor.read_clock(), self.kernel.now());
+        let (end, read) = read_stimulus(&pins, clock, start, order.periods());
+        let streams: [Box<dyn Iterator<Item = Drive> + Send>; 2] =
+            [Box::new(read), Box::new(others)];
+        let mut stimulus = merge(streams);
+        let mut sampler = PinSampler::new(&self.netlist, |net| self.kernel.value(net));
+        let mut observers = (&mut sampler, observer);
+        let settled = end.max(others_end) + clock.period();
+        self.kernel.run(&mut stimulus, settled, &mut observers);
+        let mut histograms = Histograms::new(self.sensor.bins);
+        let counts = sampler.counts(&order);
+        for (probes, counts) in self.probes.iter().zip(counts.chunks(self.sensor.bins)) {
+            let known = |(bin, &count): (usize, &Option<u16>)| {
+                count.ok_or_else(|| EngineError::Unknown {
+                    macropixel: probes.macropixel().to_owned(),
+                    bin,
+                })
+            };
+            let counts: Result<Vec<u16>, _> = counts.iter().enumerate().map(known).collect();
+            histograms.push(&counts?);
+        }
+        Ok(histograms)
+    }
+
+    /// The present, in simulation time.
+    pub fn now(&self) -> Time {
+        self.kernel.now()
     }
 
     /// What the simulation did so far.

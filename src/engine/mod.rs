@@ -23,6 +23,7 @@ mod histograms;
 mod lanes;
 mod late_cycle;
 pub mod load;
+pub mod readout;
 mod timed;
 pub mod waveform;
 mod window;

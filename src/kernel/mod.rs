@@ -20,6 +20,7 @@
 //! simulators agree with this one, ties included. The hot loop neither allocates (buckets keep
 //! their memory), nor hashes, nor touches a string.
 
+mod activity;
 mod check_banks;
 mod check_judge;
 mod check_report;
@@ -34,6 +35,7 @@ mod trace_hash;
 mod transport;
 mod wheel;
 
+pub use activity::{Activity, NetActivity};
 pub use check_report::{
     BIN_FS, BINS, CheckReport, CheckSummary, FIRST_BIN_FS, Place, Policy, Violation,
 };

@@ -8,6 +8,7 @@ mod load_path;
 mod macropixel;
 mod p_counter;
 mod p_counter_variants;
+mod readout;
 mod ripple_hazard;
 
 use std::path::Path;
@@ -33,6 +34,7 @@ pub const TESTBENCHES: &[Testbench] = &[
     load_path::TESTBENCH,
     macropixel::TESTBENCH,
     delay_line::TESTBENCH,
+    readout::TESTBENCH,
     ripple_hazard::TESTBENCH,
 ];
 

@@ -6,6 +6,8 @@
 //!   Netlist ────────────────► Layout ─► frame.gtkw, frame.sucl ──────┘
 //! ```
 //!
+//! Beside them [`write_saif`] writes the activity of every net, for power tools.
+//!
 //! Two runs of the same simulation write the same bytes: files carry no date.
 //!
 //! ```
@@ -34,6 +36,7 @@ mod file;
 mod fst;
 mod gtkw;
 mod layout;
+mod saif;
 mod selection;
 mod surfer;
 mod variables;
@@ -43,6 +46,7 @@ mod writer;
 pub use file::{VIEWS, WaveFile, WaveFormat};
 pub use fst::{Fst, FstWriter};
 pub use layout::{Entry, Group, Layout, Radix};
+pub use saif::write_saif;
 pub use selection::Selection;
 pub use vcd::{Vcd, VcdWriter};
 pub use writer::{Format, WaveWriter};

@@ -2,8 +2,9 @@
 //! path; nominal, derated and with mismatch.
 
 use guided_dtof::analysis::{
-    CorrelationTiming, LoadTiming, LocalClocks, MacropixelTiming, TimingVerdict, corner_limits,
-    factor_range, gate_works, load_works, phases, reset, ripple, shortest_period, spread,
+    CorrelationTiming, LoadTiming, LocalClocks, MacropixelTiming, ReadTiming, TimingVerdict,
+    corner_limits, factor_range, gate_works, load_works, phases, read_works, reset, ripple,
+    shortest_period, spread,
 };
 use guided_dtof::chip::{
     AfterBorrow, Exposure, Limits, Mode, PCounter, SensorConfig, Silicon, Window, WindowLaw,
@@ -200,6 +201,33 @@ fn start_values_load_right_down_to_the_shortest_load_clk_period() {
 }
 
 #[test]
+fn histograms_are_read_right_down_to_the_shortest_read_clk_period() {
+    for (bins, readout_pins) in [(16, 8), (3, 64)] {
+        let config = SensorConfig {
+            bins,
+            readout_pins,
+            rows: 2,
+            ..SensorConfig::default()
+        };
+        for silicon in [TYPICAL, mismatched(3)] {
+            let by_paths = ReadTiming::of(&config, &silicon, Limits::Kept).period();
+            let by_paths = by_paths.unwrap();
+            let works = |period| read_works(&config, &silicon, Limits::Kept, period);
+            let by_gates = shortest_period(Time::from_ns(5), works).unwrap();
+            assert!(
+                by_gates <= by_paths + Time::from_ps(1),
+                "{by_gates} {by_paths}"
+            );
+            assert!(
+                by_paths - by_gates < Time::from_ps(60),
+                "{by_gates} {by_paths}"
+            );
+            assert!(works(by_paths + Time::from_ps(1)) && !works(by_gates - Time::from_ps(1)));
+        }
+    }
+}
+
+#[test]
 fn every_flip_flop_of_the_chip_is_asked() {
     let config = SensorConfig {
         rows: 2,
@@ -225,13 +253,15 @@ fn every_flip_flop_of_the_chip_is_asked() {
         unasked.map(|(index, _)| netlist.cell_path(index)).collect()
     };
     for cell in left_out(&paths.netlist, &asked) {
-        // Samplers of SPADs, of ENABLE by STOP, and what LOAD_CLK moves.
+        // Samplers of SPADs, of ENABLE by STOP, and what LOAD_CLK and READ_CLK move.
         let known = [
             ".first",
             "quantic4x4.run",
             ".memory_",
             "deserialiser",
             "row_scanner",
+            "readout_scanner",
+            "serialiser",
         ];
         assert!(known.iter().any(|name| cell.contains(name)), "{cell}");
     }
@@ -244,6 +274,9 @@ fn every_flip_flop_of_the_chip_is_asked() {
             .all(|cell| cell.ends_with("deserialiser.shift_0")),
         "{left:?}"
     );
+    let read = ReadTiming::of(&config, &TYPICAL, Limits::Kept);
+    let asked: Vec<usize> = read.read_clk.iter().map(|r| r.cell).collect();
+    assert_eq!(left_out(&read.netlist, &asked), [""; 0]);
 }
 
 #[test]

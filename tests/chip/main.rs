@@ -12,6 +12,7 @@ mod scenario;
 #[path = "../shared/wide8x8.rs"]
 mod wide8x8;
 
+mod activity_agrees_with_waves;
 mod annotated_delays_agree_with_icarus;
 mod blocks_agree_with_their_models;
 mod clock_period_limits;
@@ -23,6 +24,7 @@ mod load_path_agrees_with_its_models;
 mod loading_and_stop_edges_are_safe;
 mod p_counter_traps;
 mod p_counters_agree_with_their_models;
+mod readout_agrees_with_its_models;
 mod serial_load_reaches_every_macropixel;
 mod standard_cells_serve_other_tools;
 mod static_timing_bounds_the_kernel;

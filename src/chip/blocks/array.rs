@@ -1,4 +1,4 @@
-//! QuantIC4x4: the array, its load path, and the one flip-flop that starts an exposure (thesis 4.2, 4.7).
+//! QuantIC4x4: the array, its load path, its readout, and the one flip-flop that starts an exposure (thesis 4.2, 4.7).
 //!
 //! ```text
 //!   COUNTER_INITS, LOAD_CLK, LOAD_ENABLE ─► deserialiser, row_scanner ─┬ COUNTER_INIT_ROW (by column)
@@ -6,6 +6,7 @@
 //!   ENABLE ─►[RUN]─► ENABLE of every macropixel       RESETB, HISTOGRAM_CLEAR ─► PIXEL_CLEAR
 //!             ▲
 //!            STOP                                     instances mp_r{row}_c{col}
+//!   READ_CLK, READ_ENABLE ─► readout_scanner ─► WORD of a row ─► columns, serialisers ─► DATA_OUT
 //! ```
 //!
 //! RUN takes ENABLE on rising STOP edges, so that counting starts with a whole laser cycle and stops
@@ -19,7 +20,8 @@
 
 use std::sync::Arc;
 
-use super::{finished, load_path, macropixel};
+use super::readout::ReadoutOrder;
+use super::{finished, load_path, macropixel, readout};
 use crate::chip::config::SensorConfig;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net, OwnDelay};
 
@@ -34,7 +36,8 @@ pub fn pixel_name(row: usize, col: usize) -> String {
 /// The sensor with every macropixel of the configuration.
 ///
 /// Ports: CLK, STOP, RESETB, ENABLE, HISTOGRAM_CLEAR, CONVENTIONAL, TYPE\<2\>, THRESHOLD\<bits\>, LOAD_CLK,
-/// LOAD_ENABLE, COUNTER_INITS, SPAD_RAW\<rows × cols × SPADs\> (row-major).
+/// LOAD_ENABLE, COUNTER_INITS, READ_CLK, READ_ENABLE, SPAD_RAW\<rows × cols × SPADs\> (row-major) →
+/// LOCAL_STOP\<rows × cols\>, DATA_OUT\<readout pins\>.
 pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     subarray(config, (0, 0), (config.rows, config.cols))
 }
@@ -64,8 +67,12 @@ pub fn subarray(
     let load_clk = m.input("LOAD_CLK");
     let load_enable = m.input("LOAD_ENABLE");
     let serial = m.input("COUNTER_INITS");
+    let read_clk = m.input("READ_CLK");
+    let read_enable = m.input("READ_ENABLE");
     let raw = m.input_bus("SPAD_RAW", rows * cols * spads);
     let local_stop = m.output_bus("LOCAL_STOP", rows * cols);
+    let order = ReadoutOrder::of_array(config, (rows, cols));
+    let data_out = m.output_bus("DATA_OUT", order.pins());
 
     let run = m.wire("RUN");
     let pixel_clear = m.wire("PIXEL_CLEAR");
@@ -108,6 +115,7 @@ pub fn subarray(
                 .map(|(name, net)| later(&mut m, name, net, col))
         })
         .collect();
+    let read = readout::place(&mut m, order, [read_clk, read_enable, resetb], &data_out);
 
     for row in 0..rows {
         for col in 0..cols {
@@ -128,7 +136,10 @@ pub fn subarray(
                     ("COUNTER_INIT", &row_bits[col * bits..][..bits]),
                     ("MEMORY_LOAD", &load[row..=row]),
                     ("SPAD_RAW", &raw[index * spads..][..spads]),
+                    ("ROW_READ", &read.rows[row..=row]),
+                    ("BIN_READ", &read.bins),
                     ("LOCAL_STOP", &local_stop[index..=index]),
+                    ("WORD", &read.words[index * order.bits..][..order.bits]),
                 ],
             );
         }

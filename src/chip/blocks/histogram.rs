@@ -52,14 +52,14 @@ pub(crate) fn bin_name(bin: usize) -> String {
 
 /// The histogram of a macropixel: bin 0 is the earliest CLK period.
 ///
-/// Ports: HIT\<bins\>, PIXEL_CLEAR; the counts are its buses BIN_0, BIN_1, ….
+/// Ports: HIT\<bins\>, PIXEL_CLEAR → the counts BIN_0\<bits\>, BIN_1\<bits\>, ….
 pub fn circuit(bins: usize, bits: usize, overflow: Overflow) -> Arc<Module> {
     let counter = bin_counter(bits, overflow);
     let mut m = ModuleBuilder::new("histogram");
     let hit = m.input_bus("HIT", bins);
     let clear = m.input("PIXEL_CLEAR");
     for bin in 0..bins {
-        let count = m.wire_bus(&bin_name(bin), bits);
+        let count = m.output_bus(&bin_name(bin), bits);
         m.instance(
             &format!("bin_{bin}"),
             &counter,

@@ -6,6 +6,8 @@
 //!   STOP, CLK ─► p_counter_timing ──────► p_counter ◄── COUNTER_INIT, MEMORY_LOAD
 //!                    ▲                        │
 //!                    └──────── LOCAL_STOP ────┘
+//!   ROW_READ, BIN_READ ─► bin_select ◄── counts of the histogram
+//!                             └─► WORD
 //! ```
 //!
 //! Where delay lines time photons, `photon_line` is the front end and `delay_line` the METDC, and nothing is correlated:
@@ -22,7 +24,7 @@ use std::sync::Arc;
 
 use super::{
     correlation, delay_line, finished, front_end, histogram, metdc, p_counter, p_counter_timing,
-    photon_line,
+    photon_line, readout,
 };
 use crate::chip::config::{Mode, PCounter, SensorConfig, Tdc};
 use crate::chip::exposure::Exposure;
@@ -33,7 +35,7 @@ use crate::units::Time;
 /// One macropixel.
 ///
 /// Ports: CLK, STOP, RESETB, ENABLE, PIXEL_CLEAR, CONVENTIONAL, TYPE\<2\>, THRESHOLD\<bits\>,
-/// COUNTER_INIT\<bits\>, MEMORY_LOAD, SPAD_RAW\<SPADs\> → LOCAL_STOP.
+/// COUNTER_INIT\<bits\>, MEMORY_LOAD, SPAD_RAW\<SPADs\>, ROW_READ, BIN_READ\<bins\> → LOCAL_STOP, WORD\<bin bits\>.
 pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     let mut m = ModuleBuilder::new("macropixel");
     let clk = [m.input("CLK")];
@@ -47,7 +49,10 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     let init = m.input_bus("COUNTER_INIT", config.counter_bits);
     let load = [m.input("MEMORY_LOAD")];
     let raw = m.input_bus("SPAD_RAW", config.spads());
+    let row_read = [m.input("ROW_READ")];
+    let bin_read = m.input_bus("BIN_READ", config.bins);
     let local_stop = [m.output("LOCAL_STOP")];
+    let word = m.output_bus("WORD", config.bin_bits);
 
     let counter_clk = [m.wire("COUNTER_CLK")];
     let counter_reset = [m.wire("COUNTER_RESET")];
@@ -59,6 +64,7 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     });
     let photons = (config.tdc == Tdc::DelayLine).then(|| [m.wire("PHOTONS")]);
     let hit = m.wire_bus("HIT", config.bins);
+    let counts = m.wire_bus("COUNT", config.bins * config.bin_bits);
 
     m.instance(
         "p_counter_timing",
@@ -140,10 +146,24 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
         let lines = delay_line::circuit(config.bins, &config.delay_elements());
         m.instance("metdc", &lines, &[&own[..], &strobes].concat());
     }
+    let bins: Vec<String> = (0..config.bins).map(histogram::bin_name).collect();
+    let mut histogram_ports = vec![("HIT", &hit[..]), ("PIXEL_CLEAR", &clear)];
+    let of_bins = bins.iter().zip(counts.chunks(config.bin_bits));
+    histogram_ports.extend(of_bins.map(|(name, count)| (name.as_str(), count)));
     m.instance(
         "histogram",
         &histogram::circuit(config.bins, config.bin_bits, config.overflow),
-        &[("HIT", &hit), ("PIXEL_CLEAR", &clear)],
+        &histogram_ports,
+    );
+    m.instance(
+        "bin_select",
+        &readout::bin_select(config.bins, config.bin_bits),
+        &[
+            ("ROW_READ", &row_read),
+            ("BIN_READ", &bin_read),
+            ("COUNT", &counts),
+            ("WORD", &word),
+        ],
     );
     finished(m.finish())
 }

@@ -12,6 +12,7 @@ pub mod metdc;
 pub mod p_counter;
 pub mod p_counter_timing;
 pub mod photon_line;
+pub mod readout;
 
 use std::sync::Arc;
 

@@ -11,19 +11,22 @@
 //! | file | what it has |
 //! |---|---|
 //! | this | [`Probes`] of a macropixel |
+//! | `readout` | [`ReadProbe`]s of the readout |
 //! | `load_path` | [`LoadProbe`]s and memories of the load path |
-//! | `pins` | [`SensorPins`] and [`LoadPins`], which a tester drives |
+//! | `pins` | [`SensorPins`], [`LoadPins`] and [`ReadPins`], which a tester drives |
 //!
 //! Handles are resolved once, by a hash look-up for each part of a path. A circuit that has only some of a macropixel's
 //! blocks (a P-counter on a test bench) has only some of the probes; asking for another is a bug of ours, and panics.
 
 mod load_path;
 mod pins;
+mod readout;
 #[cfg(test)]
 mod tests;
 
 pub use load_path::{LoadProbe, memories, memory_path};
-pub use pins::{LoadPins, SensorPins};
+pub use pins::{LoadPins, ReadPins, SensorPins};
+pub use readout::ReadProbe;
 
 use super::{array, histogram};
 use crate::netlist::{CellKind, NetId, Netlist};

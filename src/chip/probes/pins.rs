@@ -1,6 +1,6 @@
 //! The sensor's pins, for whoever drives them.
 
-use super::{LoadProbe, top_bus};
+use super::{LoadProbe, ReadProbe, top_bus};
 use crate::netlist::{NetId, Netlist};
 
 /// The pins that start values come in through.
@@ -31,11 +31,38 @@ impl LoadPins {
     }
 }
 
+/// The pins that counts leave through.
+#[derive(Debug, Clone)]
+pub struct ReadPins {
+    /// READ_CLK.
+    pub clk: NetId,
+    /// READ_ENABLE.
+    pub enable: NetId,
+    /// DATA_OUT, a net a serialiser.
+    pub data: Vec<NetId>,
+}
+
+impl ReadPins {
+    /// Finds the pins of an elaborated readout or sensor.
+    ///
+    /// # Panics
+    /// When the netlist is neither.
+    pub fn of(netlist: &Netlist) -> Self {
+        ReadPins {
+            clk: ReadProbe::Clk.net(netlist),
+            enable: ReadProbe::Enable.net(netlist),
+            data: ReadProbe::DataOut.bus(netlist),
+        }
+    }
+}
+
 /// The sensor's pins.
 #[derive(Debug, Clone)]
 pub struct SensorPins {
     /// Those of the load path.
     pub load: LoadPins,
+    /// Those of the readout.
+    pub read: ReadPins,
     /// CLK.
     pub clk: NetId,
     /// STOP.
@@ -66,6 +93,7 @@ impl SensorPins {
         let pin = |name| bus(name)[0];
         SensorPins {
             load: LoadPins::of(netlist),
+            read: ReadPins::of(netlist),
             clk: pin("CLK"),
             stop: pin("STOP"),
             enable: pin("ENABLE"),

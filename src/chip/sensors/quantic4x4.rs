@@ -35,6 +35,8 @@ impl Default for SensorConfig {
             clk_hz: 384e6,
             stop_phase_ps: 0.0,
             load_clk_hz: 200e6,
+            readout_pins: 8,
+            read_clk_hz: 200e6,
             dead_time_ns: 8.0,
             paralysable: false,
             afterpulse_probability: 0.0,

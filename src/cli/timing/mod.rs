@@ -13,7 +13,7 @@ use self::section::{Cell, Section};
 use self::tables::Subject;
 use super::silicon::SiliconArgs;
 use super::{SensorArgs, say};
-use crate::analysis::{LoadTiming, TimingVerdict};
+use crate::analysis::{LoadTiming, ReadTiming, TimingVerdict};
 use crate::chip::{Limits, Silicon, Tdc};
 use crate::files::InputError;
 
@@ -53,6 +53,7 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
     }
     let subject = Subject::new(&config, &silicon);
     let load = LoadTiming::of(&config, &silicon, Limits::Kept);
+    let read = ReadTiming::of(&config, &silicon, Limits::Kept);
     let spread = match silicon.mismatch {
         Some(_) => Some(distribution::analyse(&config, &silicon)?),
         None => None,
@@ -70,7 +71,8 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
         tables::periods(&subject),
         tables::forbidden(&subject),
         tables::load_clk(&subject, &load),
-        tables::flip_flops(&subject, &load),
+        tables::read_clk(&subject, &read),
+        tables::flip_flops(&subject, &load, &read),
         tables::ripples(&config, &silicon),
         tables::corners(&config, &silicon),
     ];

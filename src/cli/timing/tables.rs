@@ -2,8 +2,9 @@
 
 use super::section::{Cell, Section};
 use crate::analysis::{
-    CorrelationTiming, LoadTiming, LocalClocks, MacropixelTiming, TimingVerdict, corner_limits,
-    factor_range, gate_works, load_works, longest, phases, reset, ripple, shortest_period,
+    CorrelationTiming, LoadTiming, LocalClocks, MacropixelTiming, ReadTiming, TimingVerdict,
+    corner_limits, factor_range, gate_works, load_works, longest, phases, read_works, reset,
+    ripple, shortest_period,
 };
 use crate::chip::{Limits, Probe, SensorConfig, Silicon};
 use crate::netlist::{CheckKind, Netlist, Path, Requirement};
@@ -195,8 +196,28 @@ pub(super) fn load_clk(subject: &Subject<'_>, load: &LoadTiming) -> Section {
     section
 }
 
+/// How fast histograms can be read.
+pub(super) fn read_clk(subject: &Subject<'_>, read: &ReadTiming) -> Section {
+    let Subject {
+        config, silicon, ..
+    } = subject;
+    let title = "Shortest READ_CLK period";
+    let headings = &["limited by", "static", "event-driven", "static (MHz)"];
+    let mut section = Section::new("read_clk", title, headings);
+    let ignored = ReadTiming::of(config, silicon, Limits::Ignored).period();
+    for (name, limits, paths) in [
+        ("what is read", Limits::Ignored, ignored),
+        ("setup, hold, widths", Limits::Kept, read.period()),
+    ] {
+        let gates = shortest_period(SLOW, |p| read_works(config, silicon, limits, p));
+        let mhz = Cell::Number(paths.map(|t| 1e-6 / t.as_s()), 1);
+        section.push([name.into(), paths.into(), gates.into(), mhz]);
+    }
+    section
+}
+
 /// The tightest flip-flop of every clock and check.
-pub(super) fn flip_flops(subject: &Subject<'_>, load: &LoadTiming) -> Section {
+pub(super) fn flip_flops(subject: &Subject<'_>, load: &LoadTiming, read: &ReadTiming) -> Section {
     let config = subject.config;
     let headings = &[
         "clock",
@@ -206,7 +227,8 @@ pub(super) fn flip_flops(subject: &Subject<'_>, load: &LoadTiming) -> Section {
         "shortest period",
         "slack",
     ];
-    let title = "Tightest flip-flops; slack at the configured CLK, LOAD_CLK and dead time";
+    let title =
+        "Tightest flip-flops; slack at the configured CLK, LOAD_CLK, READ_CLK and dead time";
     let mut section = Section::new("flip_flops", title, headings);
     let local = LocalClocks::of(config, subject.silicon);
     let pixel = &subject.kept;
@@ -214,8 +236,9 @@ pub(super) fn flip_flops(subject: &Subject<'_>, load: &LoadTiming) -> Section {
     let phase = config.stop_phase();
     let aim = pixel.aim(period, phase);
     let load_period = config.load_clock().period();
+    let read_period = config.read_clock().period();
     type Slack<'s> = &'s dyn Fn(&Requirement) -> Option<Time>;
-    let clocks: [(&str, &Netlist, &[Requirement], Slack<'_>); 5] = [
+    let clocks: [(&str, &Netlist, &[Requirement], Slack<'_>); 6] = [
         ("CLK", &pixel.netlist, &pixel.clk, &|r| {
             Some(r.slack(period))
         }),
@@ -228,6 +251,9 @@ pub(super) fn flip_flops(subject: &Subject<'_>, load: &LoadTiming) -> Section {
         }),
         ("LOAD_CLK", &load.netlist, &load.load_clk, &|r| {
             Some(r.slack(load_period))
+        }),
+        ("READ_CLK", &read.netlist, &read.read_clk, &|r| {
+            Some(r.slack(read_period))
         }),
     ];
     for (clock, netlist, all, slack) in clocks {

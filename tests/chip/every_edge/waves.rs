@@ -51,6 +51,13 @@ impl Figures {
 }
 
 impl Waves {
+    /// Every signal's path and its changes.
+    pub fn changes(&self) -> impl Iterator<Item = (&str, &[(u64, String)])> {
+        self.0
+            .iter()
+            .map(|(path, changes)| (path.as_str(), changes.as_slice()))
+    }
+
     /// Reads the signals of the scope at a dotted path and of the scopes below it.
     pub fn read(dump: impl BufRead + Seek + Send + Sync + 'static, scope: &str) -> Self {
         let mut waves = wellen::simple::read_from_reader(dump).unwrap();

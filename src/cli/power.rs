@@ -1,0 +1,208 @@
+//! `gdtof power`: what a macropixel's blocks take from the supply, by the toggles of a gate-level run.
+
+use clap::Args;
+
+use super::{SensorArgs, say};
+use crate::analysis::{Capacitances, MacropixelPower};
+use crate::chip::{Exposure, Mode, PCounter, SensorConfig};
+use crate::files::InputError;
+use crate::photon::{SpadEvent, apply_dead_time};
+use crate::report::Grid;
+use crate::units::Time;
+use rand_philox::splitmix64;
+
+/// Pulses of the laser a second (thesis, Tables 6 and 14).
+const LASER_HZ: f64 = 80e3;
+
+/// Arguments of `gdtof power`.
+#[derive(Args)]
+pub(super) struct PowerArgs {
+    #[command(flatten)]
+    sensor: SensorArgs,
+    /// CLK periods in a laser cycle; without it as many as 80 kHz allow.
+    #[arg(long, value_name = "P")]
+    stop_periods: Option<u32>,
+    /// Laser cycles that are simulated.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..))]
+    laser_cycles: u32,
+    /// Start value of the P-counter; without it half of the largest.
+    #[arg(long, value_name = "CODE")]
+    start: Option<u16>,
+    /// Counts of the macropixel's SPADs a second, evenly spread over them.
+    #[arg(long, value_name = "HZ", default_value_t = 20e6)]
+    counts_hz: f64,
+    /// Supply, V.
+    #[arg(long, value_name = "V", default_value_t = Capacitances::default().supply_v)]
+    supply_v: f64,
+    /// Capacitance of the gates of a transistor pair, fF.
+    #[arg(long, value_name = "FF", default_value_t = 1.0)]
+    pair_ff: f64,
+    /// Capacitance of the wire to a pin, fF.
+    #[arg(long, value_name = "FF", default_value_t = 1.0)]
+    wire_ff: f64,
+    /// Capacitance of the drains at an output, fF.
+    #[arg(long, value_name = "FF", default_value_t = 0.6)]
+    drain_ff: f64,
+    /// Print as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A sensor that is compared, and what it took.
+#[derive(serde::Serialize)]
+struct Variant {
+    p_counter: &'static str,
+    mode: Mode,
+    p_counter_share: f64,
+    cycle_j: f64,
+    mean_w: f64,
+    #[serde(flatten)]
+    power: MacropixelPower,
+}
+
+impl Variant {
+    fn heading(&self) -> String {
+        let mode = match self.mode {
+            Mode::Guided => "guided",
+            Mode::Conventional => "conventional",
+        };
+        format!("{}, {mode}", self.p_counter)
+    }
+}
+
+/// Blocks that the guided mode adds (thesis 4.5).
+const P_COUNTER_BLOCKS: [&str; 2] = ["p_counter", "p_counter_timing"];
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input.
+pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
+    let config = args.sensor.read()?;
+    let capacitances = capacitances(args)?;
+    let stop_periods = match args.stop_periods {
+        Some(0) => {
+            return Err(
+                InputError::new("--stop-periods 0", "is no laser cycle; give 1 or more").into(),
+            );
+        }
+        Some(periods) => periods,
+        None => (config.clk_hz / LASER_HZ).round() as u32,
+    };
+    let start = args.start.unwrap_or(config.largest_start() / 2 + 1);
+    if start > config.largest_start() {
+        let message = format!(
+            "does not fit the {}-bit P-counter; give 0 to {}",
+            config.counter_bits,
+            config.largest_start()
+        );
+        return Err(InputError::new(format!("--start {start}"), message).into());
+    }
+    let mut variants = Vec::new();
+    let mut wanted = vec![(config.p_counter, config.mode)];
+    for variant in [
+        (PCounter::Ripple, Mode::Guided),
+        (PCounter::Synchronous, Mode::Guided),
+        (PCounter::Ripple, Mode::Conventional),
+    ] {
+        if !wanted.contains(&variant) {
+            wanted.push(variant);
+        }
+    }
+    for (p_counter, mode) in wanted {
+        let config = SensorConfig {
+            p_counter,
+            mode,
+            ..config.clone()
+        };
+        if config.check().is_err() {
+            continue;
+        }
+        let exposure = Exposure::new(&config, stop_periods, args.laser_cycles);
+        let pulses = pulses(&config, &exposure, args.counts_hz);
+        let power = MacropixelPower::of(&config, &exposure, start, &pulses, &capacitances);
+        variants.push(Variant {
+            p_counter: p_counter.name(),
+            mode,
+            p_counter_share: power.of_blocks_j(&P_COUNTER_BLOCKS) / power.cycle_j(),
+            cycle_j: power.cycle_j(),
+            mean_w: power.mean_w(),
+            power,
+        });
+    }
+    if args.json {
+        return Ok(say(format_args!(
+            "{}\n",
+            serde_json::to_string_pretty(&variants)?
+        ))?);
+    }
+    say(format_args!(
+        "Switching energy of a macropixel in a laser cycle of {stop_periods} CLK periods at {} MHz, pJ (share)\n{}",
+        config.clk_hz / 1e6,
+        table(&variants, config.pixels())
+    ))?;
+    Ok(())
+}
+
+fn capacitances(args: &PowerArgs) -> Result<Capacitances, InputError> {
+    let values = [
+        ("--supply-v", args.supply_v),
+        ("--pair-ff", args.pair_ff),
+        ("--wire-ff", args.wire_ff),
+        ("--drain-ff", args.drain_ff),
+        ("--counts-hz", args.counts_hz),
+    ];
+    for (option, value) in values {
+        // Beyond a count a nanosecond no SPAD recovers.
+        if !(value >= 0.0 && value <= 1e9) {
+            let message = "is impossible; give a number from 0 to 1e9";
+            return Err(InputError::new(format!("{option} {value}"), message));
+        }
+    }
+    Ok(Capacitances {
+        supply_v: args.supply_v,
+        pair_f: args.pair_ff * 1e-15,
+        wire_f: args.wire_ff * 1e-15,
+        drain_f: args.drain_ff * 1e-15,
+    })
+}
+
+/// Pulses at times without a pattern, the same in every run.
+fn pulses(config: &SensorConfig, exposure: &Exposure, counts_hz: f64) -> Vec<SpadEvent> {
+    let end_fs = exposure.end().as_fs() as u64;
+    let pulses = 0..(counts_hz * exposure.end().as_s()).round() as u64;
+    let mut pulses: Vec<SpadEvent> = pulses
+        .map(|index| SpadEvent {
+            time: Time::from_fs((splitmix64(2 * index) % end_fs) as i64),
+            spad: (splitmix64(2 * index + 1) % config.spads() as u64) as u8,
+        })
+        .collect();
+    pulses.sort_unstable();
+    apply_dead_time(&mut pulses, config.dead_time());
+    pulses
+}
+
+fn table(variants: &[Variant], pixels: usize) -> Grid {
+    let headings = variants.iter().map(Variant::heading);
+    let mut grid = Grid::new(["block".to_owned()].into_iter().chain(headings));
+    let mut row = |name: &str, cell: &dyn Fn(&Variant) -> String| {
+        let cells = variants.iter().map(cell);
+        grid.push([name.to_owned()].into_iter().chain(cells));
+    };
+    let share = |j: f64, variant: &Variant| {
+        format!("{:.3} ({:.1} %)", j * 1e12, 100.0 * j / variant.cycle_j)
+    };
+    for (name, _) in &variants[0].power.blocks_j {
+        row(name, &|v| share(v.power.of_blocks_j(&[name]), v));
+    }
+    row("P-counter and its timing", &|v| {
+        share(v.power.of_blocks_j(&P_COUNTER_BLOCKS), v)
+    });
+    row("macropixel", &|v| format!("{:.3}", v.cycle_j * 1e12));
+    row("toggles", &|v| format!("{:.0}", v.power.toggles));
+    row("mean power, uW", &|v| format!("{:.3}", v.mean_w * 1e6));
+    row(&format!("of {pixels} macropixels, mW"), &|v| {
+        format!("{:.2}", v.mean_w * 1e3 * pixels as f64)
+    });
+    grid
+}
