@@ -154,7 +154,7 @@ fn capacitances(args: &PowerArgs) -> Result<Capacitances, InputError> {
     ];
     for (option, value) in values {
         // Beyond a count a nanosecond no SPAD recovers.
-        if !(value >= 0.0 && value <= 1e9) {
+        if !(0.0..=1e9).contains(&value) {
             let message = "is impossible; give a number from 0 to 1e9";
             return Err(InputError::new(format!("{option} {value}"), message));
         }

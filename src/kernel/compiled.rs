@@ -139,13 +139,16 @@ pub(super) struct FanOut {
 }
 
 impl FanOut {
-    pub(super) fn new(netlist: &Netlist) -> Self {
+    /// Without the clocks of `apart`.
+    pub(super) fn new(netlist: &Netlist, apart: &[bool]) -> Self {
         let is_clock = |cell: &FlatCell, pin| cell.kind.is_flip_flop() && pin == CLOCK;
         FanOut {
-            active: Loads::new(netlist, |cell, pin| {
+            active: Loads::new(netlist, |_, cell, pin| {
                 cell.kind.triggers(pin) && !is_clock(cell, pin)
             }),
-            clocks: Loads::new(netlist, is_clock),
+            clocks: Loads::new(netlist, |index, cell, pin| {
+                !apart.get(index).is_some_and(|&apart| apart) && is_clock(cell, pin)
+            }),
         }
     }
 }
@@ -158,7 +161,7 @@ pub(super) struct Loads {
 
 impl Loads {
     /// The pins that `counts`.
-    fn new(netlist: &Netlist, counts: impl Fn(&FlatCell, usize) -> bool) -> Self {
+    fn new(netlist: &Netlist, counts: impl Fn(usize, &FlatCell, usize) -> bool) -> Self {
         let mut start = vec![0u32; netlist.net_count() + 1];
         let cells = netlist.cells();
         assert!(
@@ -166,13 +169,14 @@ impl Loads {
             "more cells than a Load can number"
         );
         let counts = &counts;
-        let pins = |cell: &FlatCell| {
+        let pins = |index: usize, cell: &FlatCell| {
             let cell = *cell;
-            let pins = (0..cell.kind.inputs().len()).filter(move |&pin| counts(&cell, pin));
+            let pins = 0..cell.kind.inputs().len();
+            let pins = pins.filter(move |&pin| counts(index, &cell, pin));
             pins.map(move |pin| (pin, cell.inputs[pin].index()))
         };
-        for cell in cells {
-            for (_, net) in pins(cell) {
+        for (index, cell) in cells.iter().enumerate() {
+            for (_, net) in pins(index, cell) {
                 start[net + 1] += 1;
             }
         }
@@ -182,7 +186,7 @@ impl Loads {
         let mut next = start.clone();
         let mut loads = vec![Load(0); *start.last().expect("never empty") as usize];
         for (index, cell) in cells.iter().enumerate() {
-            for (pin, net) in pins(cell) {
+            for (pin, net) in pins(index, cell) {
                 let at = &mut next[net];
                 loads[*at as usize] = Load::new(index, pin);
                 *at += 1;

@@ -130,7 +130,7 @@ impl LaneKernel {
             now_fs: 0,
             nets: vec![net; netlist.net_count()],
             cells: cells.collect(),
-            fan_out: FanOut::new(netlist),
+            fan_out: FanOut::new(netlist, &[]),
             delays: DelaySet::all(timing),
             wheel: TimeWheel::new(),
             groups: Vec::new(),

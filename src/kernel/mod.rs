@@ -28,6 +28,7 @@ mod compiled;
 mod lane_word;
 mod lanes;
 mod observer;
+mod shift_banks;
 mod simulation;
 mod stimulus;
 mod timing_checks;

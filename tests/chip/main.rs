@@ -26,6 +26,7 @@ mod p_counter_traps;
 mod p_counters_agree_with_their_models;
 mod readout_agrees_with_its_models;
 mod serial_load_reaches_every_macropixel;
+mod shift_banks_change_nothing;
 mod standard_cells_serve_other_tools;
 mod static_timing_bounds_the_kernel;
 mod testbenches_pass;

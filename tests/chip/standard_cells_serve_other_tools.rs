@@ -259,6 +259,16 @@ fn yosys_reads_it() {
     });
 }
 
+/// Pins depend on every counter: without the readout all of them were cleared away.
+#[test]
+fn yosys_finds_no_counter_that_does_nothing() {
+    with_every_p_counter(|folder| {
+        let script = "read_verilog -specify -lib cells_specify.v; read_verilog design.v; hierarchy -check -top quantic4x4; \
+                      flatten; opt_clean -purge; select -assert-count 224 c:*.histogram.bin_*.bit_*";
+        is_silent(folder, "yosys", &["-q", "-p", script], "");
+    });
+}
+
 #[test]
 fn without_a_stimulus_the_netlist_comes_alone() {
     let folder = tempfile::tempdir().unwrap();
