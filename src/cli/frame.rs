@@ -252,6 +252,7 @@ struct Report<'a> {
     distance: DistanceLaw,
     load_bits: usize,
     load_time_s: f64,
+    readout_time_s: f64,
     exposure_time_s: f64,
     exposure_run_time_s: f64,
     run_time_s: f64,
@@ -294,6 +295,7 @@ impl<'a> Report<'a> {
             ),
             load_bits: frame.load_bits,
             load_time_s: frame.load_time.as_s(),
+            readout_time_s: frame.readout_time.as_s(),
             exposure_time_s: frame.exposure_time.as_s(),
             exposure_run_time_s: frame.times.exposure_s,
             run_time_s: frame.times.total_s(),
@@ -396,6 +398,7 @@ fn table(args: &FrameArgs, sensor: &SensorConfig, timing: &VerdictReport, frame:
         "serial load",
         format!("{} bits, {}", frame.load_bits, frame.load_time),
     );
+    table.push("readout", frame.readout_time);
     table.push("exposure", frame.exposure_time);
     let left_over = Time::from_s(timing.slack_ps * 1e-12);
     let met = if timing.met { "met" } else { "FAILS" };

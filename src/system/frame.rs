@@ -402,6 +402,7 @@ pub fn take_frame(
         kept,
         load_bits: sensor.load_bits(),
         load_time: load.duration,
+        readout_time: sensor.readout_time(),
         exposure_time: exposure.end(),
         probes: probes.iter().map(|p| (p.row, p.col)).collect(),
         times,

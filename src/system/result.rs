@@ -70,6 +70,8 @@ pub struct Frame {
     pub load_bits: usize,
     /// Time the chip needs for the load.
     pub load_time: Time,
+    /// Time the chip needs to give its histograms away, a READ_CLK period for each bit of a pin.
+    pub readout_time: Time,
     /// Time the chip exposes.
     pub exposure_time: Time,
     /// Macropixels that were also run at gate level and agreed to the count, with the `window` engine on the same

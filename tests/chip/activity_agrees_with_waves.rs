@@ -200,3 +200,36 @@ fn replay_writes_it_from_the_gates_and_from_nothing_else() {
     let (_, nets) = read_saif(&text);
     assert!(nets["CLK"][3] >= 2 * 160, "{:?}", nets["CLK"]);
 }
+
+#[test]
+fn power_says_what_each_block_takes_and_refuses_what_is_impossible() {
+    let power = |arguments: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_gdtof"))
+            .args(["power", "--stop-periods", "600", "--laser-cycles", "1"])
+            .args(arguments)
+            .output()
+            .unwrap()
+    };
+    let energies = |arguments: &[&str]| -> Vec<f64> {
+        let found = power(&[arguments, &["--json"]].concat());
+        assert!(found.status.success(), "{found:?}");
+        let found: serde_json::Value = serde_json::from_slice(&found.stdout).unwrap();
+        let variants = found.as_array().unwrap();
+        variants
+            .iter()
+            .map(|v| v["cycle_j"].as_f64().unwrap())
+            .collect()
+    };
+    let found = energies(&[]);
+    // Ripple, synchronous, conventional.
+    assert!(found.len() == 3 && found[0] < found[1], "{found:?}");
+    // Twice the supply, four times the energy.
+    for (twice, once) in energies(&["--supply-v", "2.2"]).iter().zip(&found) {
+        assert!((twice / once - 4.0).abs() < 1e-9);
+    }
+    for wrong in [["--start", "512"], ["--supply-v", "-1"]] {
+        let refused = power(&wrong);
+        assert_eq!(refused.status.code(), Some(2), "{wrong:?}");
+        assert!(refused.stdout.is_empty());
+    }
+}
