@@ -60,6 +60,13 @@ impl Photons {
 
     /// The worst that is known for this sensor.
     fn worst(config: &SensorConfig, silicon: &Silicon, limits: Limits) -> Self {
+        if config.front_end.joins() {
+            // One line, which is high after the pulses that make an event, and low again.
+            return Photons {
+                fired: [(1 << config.spads_of_an_event()) - 1, 0],
+                threshold: 1,
+            };
+        }
         if config.spads() == 16 {
             return WORST_OF_16;
         }

@@ -80,11 +80,12 @@ pub fn gate_works(
         let edge = window.first_edge + moved + bin;
         if has_photon(bin) && edge > 1 {
             expected[bin as usize] = 1;
-            pulses.push(SpadEvent {
+            let together = config.spads_of_an_event() as i64;
+            pulses.extend((0..together).map(|of_event| SpadEvent {
                 time: exposure.rising(edge) - Time::from_fs(period.as_fs() / 2),
                 // One SPAD after the other: dead time plays a part only where there are few.
-                spad: (bin % config.spads() as i64) as u8,
-            });
+                spad: ((bin * together + of_event) % config.spads() as i64) as u8,
+            }));
         }
     }
     pulses.sort_unstable();

@@ -370,7 +370,7 @@ impl LocalClocks {
             counts: hits
                 .flat_map(|(&hit, count)| requirements(hit, count))
                 .collect(),
-            // The flip-flop behind a toggle has CLK for its clock.
+            // The flip-flop behind a toggle has CLK for its clock. One behind a wire that SPADs share is none of a SPAD.
             toggles: raw
                 .flat_map(|&raw| requirements(raw, &[]))
                 .filter(|r| toggles.contains(&r.cell))

@@ -52,6 +52,45 @@ pub enum Mode {
     Conventional,
 }
 
+/// How the pulses of a macropixel's SPADs become SPAD_TIMED (thesis 2.4.1, Fig. 22).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FrontEnd {
+    /// A toggle flip-flop and samplers for each SPAD, whose events the correlation block sums up (Fig. 22d).
+    Summation,
+    /// Pulse shapers and an OR tree (Fig. 22a).
+    OrTree,
+    /// Toggle flip-flops and an XOR tree (Fig. 22b).
+    XorTree,
+    /// Pulse shapers, and an event where so many SPADs as the sensor says fire within a shaped pulse (Fig. 22c).
+    Coincidence,
+}
+
+impl FrontEnd {
+    /// Every variant, the sensor's own first.
+    pub const ALL: [FrontEnd; 4] = [
+        FrontEnd::Summation,
+        FrontEnd::OrTree,
+        FrontEnd::XorTree,
+        FrontEnd::Coincidence,
+    ];
+
+    /// Name in sensor files and tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            FrontEnd::Summation => "summation",
+            FrontEnd::OrTree => "or_tree",
+            FrontEnd::XorTree => "xor_tree",
+            FrontEnd::Coincidence => "coincidence",
+        }
+    }
+
+    /// Whether all SPADs share one line, whose edges depend on more than one SPAD.
+    pub const fn joins(self) -> bool {
+        !matches!(self, FrontEnd::Summation)
+    }
+}
+
 /// How the P-counter is built (thesis 4.4). All have the same pins. All but the last open the same time windows where the
 /// counter holds after LOCAL_STOP. Where it wraps, LOCAL_STOP comes again after 2ⁿ⁺¹ counts of a counter of n bits with
 /// its borrow, and after 2ⁿ of one without: of the comparator, and of all with the tap `msb`.
@@ -138,6 +177,11 @@ pub struct SensorConfig {
     pub spad_rows: usize,
     /// Columns of a macropixel's SPADs: 1, 2, 4 or 8.
     pub spad_cols: usize,
+    /// How pulses of SPADs become SPAD_TIMED: summation, or_tree, xor_tree or coincidence. All but the first join SPADs on one
+    /// line, and are run by the gate engine.
+    pub front_end: FrontEnd,
+    /// SPADs that must fire within a shaped pulse for an event, from 1; of the front end coincidence.
+    pub coincident_spads: usize,
     /// Programmable bits of the P-counter, 2…12.
     pub counter_bits: usize,
     /// How the P-counter is built: ripple, set_reset, synchronous, comparator or memoryless.
@@ -186,7 +230,7 @@ pub struct SensorConfig {
     pub crosstalk_probability: f64,
     /// TYPE.
     pub event_type: EventType,
-    /// THRESHOLD, SPADs; from 0 to what its bits can say, 31 with 4×4 SPADs.
+    /// THRESHOLD, SPADs, or lines of a front end that joins them: one that TYPE can meet.
     pub threshold: u8,
     /// What full bins do.
     pub overflow: Overflow,
@@ -237,9 +281,25 @@ impl SensorConfig {
         self.spad_rows * self.spad_cols
     }
 
+    /// Lines of SPAD_TIMED, which the correlation block counts: one a SPAD, or one for all.
+    pub fn lines(&self) -> usize {
+        match self.front_end.joins() {
+            false => self.spads(),
+            true => 1,
+        }
+    }
+
+    /// SPADs that must fire together to raise a line of SPAD_TIMED.
+    pub fn spads_of_an_event(&self) -> usize {
+        match self.front_end {
+            FrontEnd::Coincidence => self.coincident_spads,
+            FrontEnd::Summation | FrontEnd::OrTree | FrontEnd::XorTree => 1,
+        }
+    }
+
     /// Bits of THRESHOLD.
     pub fn threshold_bits(&self) -> usize {
-        count_bits(self.spads())
+        count_bits(self.lines())
     }
 
     /// k, where windows step by 2ᵏ CLK periods. The configuration must have passed [`SensorConfig::check`].

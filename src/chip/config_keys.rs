@@ -51,6 +51,20 @@ pub(super) const KEYS: &[Key] = &[
         "thesis 4.2",
     ),
     key(
+        "front_end",
+        "",
+        Range::OneOf(&["summation", "or_tree", "xor_tree", "coincidence"]),
+        "How SPADs' pulses become events; all but the first join them on one line, for the gate engine",
+        "thesis 2.4.1, Fig. 22",
+    ),
+    key(
+        "coincident_spads",
+        "",
+        whole(1, MOST_SPADS as u32),
+        "SPADs that must fire together with front_end = \"coincidence\"",
+        CHOSEN,
+    ),
+    key(
         "counter_bits",
         "",
         whole(2, 12),

@@ -32,11 +32,13 @@ pub use blocks::{
     array, correlation, delay_line, front_end, histogram, load_path, macropixel, metdc, p_counter,
     p_counter_timing, photon_line, readout,
 };
-pub use config::{AfterBorrow, EventType, Mode, Overflow, PCounter, SensorConfig, Tap, Tdc};
+pub use config::{
+    AfterBorrow, EventType, FrontEnd, Mode, Overflow, PCounter, SensorConfig, Tap, Tdc,
+};
 pub use exposure::{Exposure, ExposureError};
 pub use probes::{LoadPins, LoadProbe, Probe, Probes, ReadPins, ReadProbe, SensorPins};
 pub use race::{Conflict, Cure, NoAim, Race};
-pub use sensor_file::SensorFault;
+pub use sensor_file::{Lines, NeverMet, SensorFault};
 pub use sensors::{Sensor, hslidar, hslidar_delay_line, quantic4x4};
 pub use spad_grid::{MOST_SPADS, SIDES, SpadGrid, count_bits};
 pub use timing::ChipTiming;

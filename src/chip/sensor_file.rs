@@ -1,11 +1,13 @@
 //! Sensor files: reading, printing, and what of a sensor is possible.
 
+use std::fmt;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
-use super::config::{AfterBorrow, PCounter, SensorConfig, Tap};
+use super::config::{AfterBorrow, EventType, FrontEnd, PCounter, SensorConfig, Tap, Tdc};
 use super::config_keys::{KEYS, SECTION};
 use super::front_end::DeadTimeTooShort;
-use super::spad_grid::SIDES;
+use super::spad_grid::{SIDES, count_bits};
 use super::timing::ChipTiming;
 use crate::files::{InputError, read_text};
 use crate::settings::{Document, Fault, Key, commented};
@@ -36,17 +38,32 @@ pub enum SensorFault {
     )]
     StepsWithoutReset(usize),
     /// A threshold that the correlation block has no bits for.
-    #[error(
-        "threshold = {threshold} has more bits than THRESHOLD with {spads} SPADs; give 0 to {most}"
-    )]
+    #[error("threshold = {threshold} has more bits than THRESHOLD with {lines}; give 0 to {most}")]
     Threshold {
         /// What is asked for.
         threshold: u8,
-        /// SPADs of a macropixel.
-        spads: usize,
+        /// What is counted.
+        lines: Lines,
         /// The largest that there are bits for.
         most: u32,
     },
+    /// A threshold that no number of SPADs meets.
+    #[error("{0}")]
+    NeverMet(NeverMet),
+    /// More SPADs must fire than there are.
+    #[error("coincident_spads = {asked} is impossible with {spads} SPADs; give 1 to {spads}")]
+    CoincidentSpads {
+        /// What is asked for.
+        asked: usize,
+        /// SPADs of a macropixel.
+        spads: usize,
+    },
+    /// Delay lines take another front end.
+    #[error(
+        "front_end = {:?} is impossible with tdc = \"delay_line\", whose photon line joins SPADs itself; give front_end = \"summation\"",
+        .0.name()
+    )]
+    FrontEndOfDelayLine(FrontEnd),
     /// A comparator has no stages to tap.
     #[error(
         "tap = \"msb\" is impossible with p_counter = \"comparator\", which counts up; give tap = \"borrow\""
@@ -72,6 +89,68 @@ pub enum SensorFault {
     },
 }
 
+/// What the correlation block of a sensor counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Lines {
+    /// Its front end.
+    pub front_end: FrontEnd,
+    /// Lines of SPAD_TIMED.
+    pub count: usize,
+}
+
+impl fmt::Display for Lines {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.front_end.joins(), self.count) {
+            (true, _) => write!(f, "the one line of front_end = {:?}", self.front_end.name()),
+            (false, 1) => write!(f, "1 SPAD"),
+            (false, count) => write!(f, "{count} SPADs"),
+        }
+    }
+}
+
+/// A condition that no number of SPADs meets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NeverMet {
+    /// TYPE.
+    pub event_type: EventType,
+    /// THRESHOLD.
+    pub threshold: u8,
+    /// What is counted.
+    pub lines: Lines,
+}
+
+impl NeverMet {
+    /// The thresholds of this type that a number from 0 to `lines` meets.
+    fn possible(event_type: EventType, lines: usize) -> RangeInclusive<usize> {
+        match event_type {
+            EventType::Less => 1..=(1 << count_bits(lines)) - 1,
+            EventType::Equal => 0..=lines,
+            EventType::Greater => 0..=lines - 1,
+        }
+    }
+}
+
+impl fmt::Display for NeverMet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (asks, name) = match self.event_type {
+            EventType::Less => ("fewer than", "less"),
+            EventType::Equal => ("exactly", "equal"),
+            EventType::Greater => ("more than", "greater"),
+        };
+        let possible = NeverMet::possible(self.event_type, self.lines.count);
+        let (threshold, lines) = (self.threshold, self.lines);
+        let (least, most) = possible.into_inner();
+        write!(
+            f,
+            "threshold = {threshold} with event_type = {name:?} asks for {asks} {threshold}, which {lines} can never be; give "
+        )?;
+        match least == most {
+            true => write!(f, "{least}"),
+            false => write!(f, "{least} to {most}"),
+        }
+    }
+}
+
 /// CLK periods that windows may step by.
 const STEPS: [usize; 4] = [1, 2, 4, 8];
 
@@ -83,7 +162,9 @@ impl SensorFault {
             SensorFault::SpadRows(_) => "spad_rows",
             SensorFault::SpadCols(_) => "spad_cols",
             SensorFault::StepPeriods(_) | SensorFault::StepsWithoutReset(_) => "step_periods",
-            SensorFault::Threshold { .. } => "threshold",
+            SensorFault::Threshold { .. } | SensorFault::NeverMet(_) => "threshold",
+            SensorFault::FrontEndOfDelayLine(_) => "front_end",
+            SensorFault::CoincidentSpads { .. } => "coincident_spads",
             SensorFault::TapOfComparator => "tap",
             SensorFault::HoldWithoutMemory => "p_counter",
             SensorFault::DeadTime(_) => "dead_time_ns",
@@ -159,13 +240,33 @@ impl SensorConfig {
         if !STEPS.contains(&self.step_periods) {
             return Err(SensorFault::StepPeriods(self.step_periods));
         }
+        if self.front_end.joins() && self.tdc == Tdc::DelayLine {
+            return Err(SensorFault::FrontEndOfDelayLine(self.front_end));
+        }
+        let asked = self.coincident_spads;
+        if self.front_end == FrontEnd::Coincidence && asked > self.spads() {
+            let spads = self.spads();
+            return Err(SensorFault::CoincidentSpads { asked, spads });
+        }
         let most = (1 << self.threshold_bits()) - 1;
-        if u32::from(self.threshold) > most {
+        let (threshold, event_type) = (self.threshold, self.event_type);
+        let lines = Lines {
+            front_end: self.front_end,
+            count: self.lines(),
+        };
+        if u32::from(threshold) > most {
             return Err(SensorFault::Threshold {
-                threshold: self.threshold,
-                spads: self.spads(),
+                threshold,
+                lines,
                 most,
             });
+        }
+        if !NeverMet::possible(event_type, lines.count).contains(&usize::from(threshold)) {
+            return Err(SensorFault::NeverMet(NeverMet {
+                event_type,
+                threshold,
+                lines,
+            }));
         }
         if self.p_counter == PCounter::Comparator && self.tap == Tap::Msb {
             return Err(SensorFault::TapOfComparator);
@@ -191,6 +292,7 @@ impl SensorConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chip::correlation;
     use crate::netlist::Corner;
     use crate::settings::Range;
     use proptest::prelude::*;
@@ -215,6 +317,15 @@ mod tests {
             ("stop_phase_ps = 2e3", 1),
             ("threshold = 32", 1),
             ("spad_rows = 2\nspad_cols = 2\nthreshold = 8", 3),
+            ("threshold = 16", 1),
+            ("threshold = 17\nevent_type = \"equal\"", 1),
+            ("event_type = \"less\"\nthreshold = 0", 2),
+            ("front_end = \"or_tree\"\nthreshold = 1", 2),
+            ("front_end = \"coincidence\"\ncoincident_spads = 17", 2),
+            ("coincident_spads = 0", 1),
+            ("front_end = \"and_tree\"", 1),
+            ("tdc = \"delay_line\"\nfront_end = \"xor_tree\"", 2),
+            ("front_end = \"or_tree\"\ndead_time_ns = 0.9", 2),
             ("spad_cols = 3", 1),
             ("step_periods = 5", 1),
             (
@@ -251,6 +362,43 @@ mod tests {
             assert!(error.message.contains(says), "{error}");
         }
         assert!(SensorConfig::parse("s.toml", "dead_time_ns = 0.1104").is_ok());
+    }
+
+    #[test]
+    fn a_threshold_that_can_never_be_met_is_refused_with_those_that_can() {
+        for (text, says) in [
+            (
+                "threshold = 16",
+                "threshold = 16 with event_type = \"greater\" asks for more than 16, which 16 SPADs can never be; give 0 to 15",
+            ),
+            (
+                "threshold = 17\nevent_type = \"equal\"",
+                "asks for exactly 17, which 16 SPADs can never be; give 0 to 16",
+            ),
+            (
+                "threshold = 0\nevent_type = \"less\"",
+                "asks for fewer than 0, which 16 SPADs can never be; give 1 to 31",
+            ),
+            (
+                "threshold = 1\nfront_end = \"xor_tree\"",
+                "which the one line of front_end = \"xor_tree\" can never be; give 0",
+            ),
+        ] {
+            let error = SensorConfig::parse("s.toml", text).unwrap_err();
+            assert!(error.message.ends_with(says), "{error}");
+        }
+        // Every other condition is one that some number of SPADs meets.
+        let types = [EventType::Less, EventType::Equal, EventType::Greater];
+        for (event_type, threshold) in types.into_iter().flat_map(|t| (0..32).map(move |n| (t, n)))
+        {
+            let config = SensorConfig {
+                event_type,
+                threshold,
+                ..SensorConfig::default()
+            };
+            let is_met = |spads: u32| correlation::model((1 << spads) - 1, event_type, threshold);
+            assert_eq!(config.check().is_ok(), (0..=16).any(is_met), "{config:?}");
+        }
     }
 
     #[test]
@@ -311,20 +459,29 @@ mod tests {
                     } else {
                         &text[..]
                     };
-                    SensorConfig::parse("s", text).unwrap();
+                    // Fewer than none are never.
+                    let met = if key.name == "event_type" {
+                        "\nthreshold = 1"
+                    } else {
+                        ""
+                    };
+                    SensorConfig::parse("s", &format!("{text}{met}")).unwrap();
                 }
                 assert!(parse("\"other\"").is_err(), "{}", key.name);
             }
             if let Range::Within(least, most) = key.range {
                 // The slowest clock allows every phase.
-                // The most SPADs allow every threshold.
-                let clk = match key.name {
-                    "clk_hz" => "",
-                    "threshold" => "spad_rows = 8\nspad_cols = 8\n",
-                    _ => "clk_hz = 1e6\n",
+                // The most SPADs allow every threshold, and fewer than the largest there are always.
+                let with = |value: f64| {
+                    let clk = match key.name {
+                        "clk_hz" => "",
+                        "threshold" if value > 0.0 => {
+                            "spad_rows = 8\nspad_cols = 8\nevent_type = \"less\"\n"
+                        }
+                        _ => "clk_hz = 1e6\n",
+                    };
+                    SensorConfig::parse("s", &format!("{clk}{} = {value}", key.name))
                 };
-                let with =
-                    |value| SensorConfig::parse("s", &format!("{clk}{} = {value}", key.name));
                 for value in [least, most] {
                     with(value).unwrap();
                 }

@@ -50,6 +50,9 @@ fn cure(error: &EngineError) -> Option<String> {
         EngineError::Irregular(why) => {
             format!("use --engine cycle or gate, or {}", of_irregular(why))
         }
+        EngineError::Joined(_) => {
+            "use --engine gate or cycle, or give front_end = \"summation\"".to_owned()
+        }
         EngineError::FrontEnd(too_short) => too_short.cure(),
         EngineError::NoPhotons | EngineError::NotInCohorts(_) => "use --engine window".to_owned(),
         EngineError::CyclesNotIndependent { .. } => {

@@ -25,10 +25,11 @@ pub struct Cancelling {
 
 impl Cancelling {
     /// `None` where the dead time keeps the pulses of a SPAD farther apart than CLK edges; `law` is not asked for then. Nor is
-    /// anything told of bins that are not CLK periods.
+    /// anything told of bins that are not CLK periods, and of SPADs that share a wire.
     pub fn of(dead_time: Time, clock: Frequency, law: impl FnOnce() -> WindowLaw) -> Option<Self> {
         let law = (dead_time <= clock.period()).then(law)?;
-        law.has_clk_bins().then_some(Cancelling { law })
+        let tells = law.has_clk_bins() && !law.sensor().front_end.joins();
+        tells.then_some(Cancelling { law })
     }
 
     /// The law that says which CLK edge takes a pulse.

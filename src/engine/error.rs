@@ -4,7 +4,7 @@
 use crate::chip::front_end::{DeadTimeTooShort, PulseLimits};
 use crate::chip::race::NoAim;
 use crate::chip::window_law::Irregular;
-use crate::chip::{Race, Sensor};
+use crate::chip::{FrontEnd, Race, Sensor};
 use crate::units::Time;
 
 /// Why an engine has no answer.
@@ -19,6 +19,12 @@ pub enum EngineError {
     /// Pulses are shorter, or follow each other faster, than the front end's flip-flops.
     #[error("{0}")]
     FrontEnd(DeadTimeTooShort),
+    /// SPADs share a wire, and what a pulse does depends on those of others.
+    #[error(
+        "front_end = {:?} joins all SPADs on one wire, on which the delays of gates decide what is counted, so only the gate engine can tell",
+        .0.name()
+    )]
+    Joined(FrontEnd),
     /// The cohort engine works without photons.
     #[error("the cohort engine knows no single photons and cannot replay recorded ones")]
     NoPhotons,
@@ -154,6 +160,14 @@ pub(super) fn one_law(sensor: &Sensor) -> Result<(), EngineError> {
     match sensor.has_own_laws() {
         true => Err(EngineError::OwnLaws),
         false => Ok(()),
+    }
+}
+
+/// Whether each SPAD has a line of its own, as engines without gates take it.
+pub(super) fn has_a_line_a_spad(sensor: &Sensor) -> Result<(), EngineError> {
+    match sensor.front_end.joins() {
+        false => Ok(()),
+        true => Err(EngineError::Joined(sensor.front_end)),
     }
 }
 

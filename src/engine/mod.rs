@@ -46,7 +46,7 @@ use std::borrow::Cow;
 
 use crate::chip::WindowLaw;
 use crate::photon::{PhotonStream, SpadEvent};
-use error::follows;
+use error::{follows, has_a_line_a_spad};
 
 /// What every engine tells of itself. What it runs is in [`Replay`] and [`Expose`].
 pub trait Engine: Sync {

@@ -171,12 +171,22 @@ impl Chart {
             .x_label_area_size(46)
             .y_label_area_size(74)
             .build_cartesian_2d(x, y)?;
+        // Ticks are sums of steps, and come to zero only nearly.
+        let (wide, high) = (chart.x_range(), chart.y_range());
+        let tick = |value: f64, scale: Scale, range: &Range<f64>| {
+            let is_zero = value.abs() < 1e-9 * (range.end - range.start);
+            short(if scale == Scale::Linear && is_zero {
+                0.0
+            } else {
+                value
+            })
+        };
         chart
             .configure_mesh()
             .x_desc(&self.x.label)
             .y_desc(&self.y.label)
-            .x_label_formatter(&|v| short(*v))
-            .y_label_formatter(&|v| short(*v))
+            .x_label_formatter(&|v| tick(*v, self.x.scale, &wide))
+            .y_label_formatter(&|v| tick(*v, self.y.scale, &high))
             .light_line_style(WHITE)
             .label_style(("sans-serif", 14))
             .draw()?;

@@ -242,7 +242,6 @@ mod tests {
                 NoDepth::OutsideWindow,
                 "the STOP that ends the laser cycle, from 196.",
             ),
-            ("threshold = 16", NoDepth::NoSignificantPeak, "never have"),
             (
                 "threshold = 10",
                 NoDepth::NoSignificantPeak,

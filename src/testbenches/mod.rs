@@ -4,6 +4,7 @@
 //! [`TESTBENCHES`].
 
 mod delay_line;
+mod front_ends;
 mod load_path;
 mod macropixel;
 mod p_counter;
@@ -36,6 +37,7 @@ pub const TESTBENCHES: &[Testbench] = &[
     delay_line::TESTBENCH,
     readout::TESTBENCH,
     ripple_hazard::TESTBENCH,
+    front_ends::TESTBENCH,
 ];
 
 impl Testbench {

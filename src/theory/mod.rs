@@ -7,6 +7,7 @@ pub mod cycles;
 pub mod design;
 pub mod detection;
 pub mod estimators;
+pub mod front_ends;
 mod gaussian;
 pub mod partial;
 pub mod precision;

@@ -8,6 +8,7 @@ use guided_dtof::chip::{
     AfterBorrow, ChipTiming, EventType, Overflow, SensorConfig, Tdc, correlation, count_bits,
     front_end, histogram, metdc, p_counter_timing, photon_line,
 };
+use guided_dtof::kernel::{LaneDrive, LaneKernel, Lanes};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{Corner, Edge, Library, NetId, Netlist, StaticTiming, Timing};
 use guided_dtof::units::Time;
@@ -71,7 +72,7 @@ proptest! {
         spads in prop_oneof![Just(1u8), Just(4), Just(16), Just(64)],
         pulses in prop::collection::vec((0u8..64, 0i64..60, 0i64..1_000_000, any::<bool>()), 0..100),
     ) {
-        let mut bench = Bench::new(&front_end::circuit(usize::from(spads)), corner);
+        let mut bench = Bench::new(&front_end::summation::circuit(usize::from(spads)), corner);
         let timing = bench.timing();
         let width = Time::from_ps(100);
         let rise = |k: i64| SETTLING * 2 + Time::from_ps(period_ps) * k;
@@ -101,7 +102,7 @@ proptest! {
         }
         let timed = bench.bus("SPAD_TIMED");
         let mut run = bench.start(&[]);
-        let mut model = front_end::Model::default();
+        let mut model = front_end::summation::Model::default();
         let mut pulses = pulses.into_iter().peekable();
         for k in 0..63 {
             while let Some((_, spad)) = pulses.next_if(|(t, _)| *t + timing.spad_to_sampled <= rise(k)) {
@@ -340,6 +341,74 @@ fn the_correlation_block_counts_every_pattern_of_spads() {
     });
     let slowest = correlate(16, Corner::Typ, conditions);
     assert!(slowest > Time::ZERO);
+}
+
+/// All words, types and thresholds, also those that nothing meets: 64 words at once, which differ in the first six SPADs.
+/// The others change one at a time, and thresholds and types run while they rest, so that little changes from one condition
+/// to the next.
+#[test]
+fn the_correlation_block_compares_every_word_by_every_type_with_every_threshold() {
+    const THRESHOLDS: u8 = 18;
+    let netlist = Netlist::elaborate(&correlation::circuit(16));
+    let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+    let bus = |path: &str| netlist.signal(path).unwrap();
+    let (timed, code, threshold) = (bus("SPAD_TIMED"), bus("TYPE"), bus("THRESHOLD"));
+    let event = netlist.net("SPAD_EVENT").unwrap();
+    let step = ChipTiming::of(&SensorConfig::default()).clk_to_event;
+    let mut kernel = LaneKernel::new(&netlist, &timing);
+    let mut now = Time::ZERO;
+    let (mut compared, mut met) = (0u64, [0u64; 3]);
+    for upper in (0..1u64 << 10).map(|k| k ^ k >> 1) {
+        for t in 0..THRESHOLDS {
+            for (kind, event_type) in TYPES.into_iter().take(3).enumerate() {
+                let bits = |nets: &[NetId], number: u64| -> Vec<(NetId, u64)> {
+                    let all = |bit: usize| if number >> bit & 1 == 1 { u64::MAX } else { 0 };
+                    nets.iter()
+                        .enumerate()
+                        .map(|(bit, &net)| (net, all(bit)))
+                        .collect()
+                };
+                let lanes =
+                    |bit: usize| (0..64).fold(0, |word, lane| word | (lane >> bit & 1) << lane);
+                let lower = timed[..6].iter().enumerate();
+                let values = lower
+                    .map(|(bit, &net)| (net, lanes(bit)))
+                    .chain(bits(&timed[6..], upper))
+                    .chain(bits(&code, kind as u64))
+                    .chain(bits(&threshold, t.into()));
+                let drives: Vec<LaneDrive> = values
+                    .map(|(net, values)| LaneDrive {
+                        time: now,
+                        net,
+                        mask: u64::MAX,
+                        values: Lanes::known(values),
+                    })
+                    .collect();
+                now += step;
+                kernel.run(
+                    &mut drives.into_iter().peekable(),
+                    now - Time::from_fs(1),
+                    &mut (),
+                );
+                let expected = (0..64).fold(0, |word, lane| {
+                    let is_met = correlation::model(upper << 6 | lane, event_type, t);
+                    word | u64::from(is_met) << lane
+                });
+                assert_eq!(
+                    kernel.value(event),
+                    Lanes::known(expected),
+                    "{upper:#x} {event_type:?} {t}"
+                );
+                compared += 64;
+                met[kind] += u64::from(expected.count_ones());
+            }
+        }
+    }
+    assert_eq!(compared, (1 << 16) * 3 * u64::from(THRESHOLDS));
+    // A word of c SPADs is fewer than the 17 − c thresholds above c, exactly one of them, and more than c.
+    let words = 1u64 << 16;
+    let fired = words * 8;
+    assert_eq!(met, [words * 17 - fired, words, fired]);
 }
 
 #[test]

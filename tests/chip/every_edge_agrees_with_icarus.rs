@@ -35,7 +35,7 @@ use std::time::Instant;
 use every_edge::circuit::{self, Case};
 use every_edge::waves::{Figures, Waves};
 use guided_dtof::bench::{StimulusPlan, export_verilog};
-use guided_dtof::chip::{SensorConfig, hslidar, hslidar_delay_line};
+use guided_dtof::chip::{FrontEnd, SensorConfig, hslidar, hslidar_delay_line};
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::kernel::{Drive, Kernel, merge};
 use guided_dtof::netlist::{
@@ -267,6 +267,33 @@ fn sensors_of_another_kind() {
         }
     }
     all.print("sensors of another kind", kinds * seeds.end, start);
+}
+
+#[test]
+fn macropixels_whose_spads_share_a_wire() {
+    if !icarus::is_here() {
+        return;
+    }
+    let start = Instant::now();
+    let mut all = Figures::default();
+    let joined = FrontEnd::ALL.into_iter().filter(|kind| kind.joins());
+    for (seed, front_end) in (0..).zip(joined.clone()) {
+        let random = &mut StdRng::seed_from_u64(seed);
+        let config = SensorConfig {
+            rows: 1,
+            cols: 1,
+            front_end,
+            coincident_spads: 3,
+            dead_time_ns: 2.0,
+            ..SensorConfig::default()
+        };
+        all = all + compare_sensor(&Scenario::of(random, config));
+    }
+    all.print(
+        "macropixels whose SPADs share a wire",
+        joined.count() as u64,
+        start,
+    );
 }
 
 #[test]

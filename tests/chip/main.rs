@@ -17,6 +17,7 @@ mod annotated_delays_agree_with_icarus;
 mod blocks_agree_with_their_models;
 mod clock_period_limits;
 mod every_edge_agrees_with_icarus;
+mod front_ends_agree_with_their_models;
 mod gate_level_agrees_with_reference;
 mod icarus_agrees_with_the_kernel;
 mod lanes_agree_with_single_pixels;

@@ -143,7 +143,7 @@ proptest! {
     ) {
         let circuit = match block {
             0 => correlation::circuit(16),
-            1 => front_end::circuit(16),
+            1 => front_end::summation::circuit(16),
             2 => metdc::circuit(16),
             // A saturating bin's FULL gates its own clock: a loop.
             3 => histogram::circuit(2, 5, Overflow::Wrap),

@@ -122,7 +122,7 @@ fn random_sensor(random: &mut StdRng, rows: usize, cols: usize) -> SensorConfig 
         true => (4, 4),
         false => GRIDS[random.random_range(0..GRIDS.len())],
     };
-    SensorConfig {
+    let mut config = SensorConfig {
         spad_rows,
         spad_cols,
         p_counter,
@@ -151,5 +151,13 @@ fn random_sensor(random: &mut StdRng, rows: usize, cols: usize) -> SensorConfig 
         },
         corner: Corner::ALL[random.random_range(0..3)],
         ..SensorConfig::default()
-    }
+    };
+    // One that some number of SPADs meets.
+    let possible = match config.event_type {
+        EventType::Less => 1..=u8::MAX,
+        EventType::Equal => 0..=config.spads() as u8,
+        EventType::Greater => 0..=config.spads() as u8 - 1,
+    };
+    config.threshold = config.threshold.clamp(*possible.start(), *possible.end());
+    config
 }

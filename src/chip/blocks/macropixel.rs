@@ -59,7 +59,7 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     let memory_reset = [m.wire("MEMORY_RESET")];
     let stop_d = [m.wire("STOP_D")];
     let clocked = (config.tdc == Tdc::Clocked).then(|| {
-        let timed = m.wire_bus("SPAD_TIMED", config.spads());
+        let timed = m.wire_bus("SPAD_TIMED", config.lines());
         (timed, [m.wire("SPAD_EVENT")])
     });
     let photons = (config.tdc == Tdc::DelayLine).then(|| [m.wire("PHOTONS")]);
@@ -105,7 +105,7 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     if let Some((timed, event)) = &clocked {
         m.instance(
             "front_end",
-            &front_end::circuit(config.spads()),
+            &front_end::circuit(config),
             &[
                 ("SPAD_RAW", &raw),
                 ("CLK", &clk),
@@ -115,7 +115,7 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
         );
         m.instance(
             "correlation",
-            &correlation::circuit(config.spads()),
+            &correlation::circuit(config.lines()),
             &[
                 ("SPAD_TIMED", timed),
                 ("TYPE", &event_type),
@@ -216,7 +216,7 @@ impl<'a> Model<'a> {
         let has_memory = config.p_counter != PCounter::Memoryless;
         let mut pulses = pulses.into_iter().peekable();
         let mut counter = p_counter::Model::new(config, start);
-        let mut front_end = front_end::Model::default();
+        let mut front_end = front_end::Model::new(config, timing);
         let mut metdc = metdc::Model::new(config.bins as u32);
         let mut hit = Hit::new(self);
         let mut pending: VecDeque<Strobe> = VecDeque::new();
@@ -286,9 +286,10 @@ impl<'a> Model<'a> {
                 config.event_type,
                 config.threshold,
             ));
-            while let Some((_, spad)) = pulses.next_if(|(t, _)| *t + timing.spad_to_sampled <= rise)
+            while let Some((time, spad)) =
+                pulses.next_if(|(t, _)| *t + timing.spad_to_sampled <= rise)
             {
-                front_end.pulse(spad);
+                front_end.pulse(time, spad);
             }
             front_end.clock();
         }

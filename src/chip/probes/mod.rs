@@ -28,7 +28,7 @@ pub use load_path::{LoadProbe, memories, memory_path};
 pub use pins::{LoadPins, ReadPins, SensorPins};
 pub use readout::ReadProbe;
 
-use super::{array, histogram};
+use super::{array, front_end, histogram};
 use crate::netlist::{CellKind, NetId, Netlist};
 
 /// A net or bus of a macropixel that something outside the circuits looks at.
@@ -50,7 +50,11 @@ pub enum Probe {
     CounterInit,
     /// SPAD_RAW, one bit a SPAD.
     SpadRaw,
-    /// SPAD_TIMED, one bit a SPAD.
+    /// Shaped pulses, one bit a SPAD; only front ends with pulse shapers have them.
+    Shaped,
+    /// The wire that all SPADs share; only front ends that join them have one.
+    Wire,
+    /// SPAD_TIMED, one bit a SPAD, or one for all.
     SpadTimed,
     /// SPAD_EVENT.
     SpadEvent,
@@ -92,7 +96,7 @@ pub enum Probe {
 
 impl Probe {
     /// Every probe, in the order of their declaration.
-    pub const ALL: [Probe; 27] = [
+    pub const ALL: [Probe; 29] = [
         Probe::Clk,
         Probe::Stop,
         Probe::Enable,
@@ -101,6 +105,8 @@ impl Probe {
         Probe::MemoryReset,
         Probe::CounterInit,
         Probe::SpadRaw,
+        Probe::Shaped,
+        Probe::Wire,
         Probe::SpadTimed,
         Probe::SpadEvent,
         Probe::LocalStop,
@@ -133,6 +139,8 @@ impl Probe {
             Probe::MemoryReset => (None, "MEMORY_RESET"),
             Probe::CounterInit => (None, "COUNTER_INIT"),
             Probe::SpadRaw => (None, "SPAD_RAW"),
+            Probe::Shaped => (Some(FRONT_END), "SHAPED"),
+            Probe::Wire => (Some(FRONT_END), "WIRE"),
             Probe::SpadTimed => (None, "SPAD_TIMED"),
             Probe::SpadEvent => (None, "SPAD_EVENT"),
             Probe::LocalStop => (None, "LOCAL_STOP"),
@@ -167,6 +175,7 @@ impl Probe {
     }
 }
 
+const FRONT_END: &str = "front_end";
 const P_COUNTER_TIMING: &str = "p_counter_timing";
 const P_COUNTER: &str = "p_counter";
 const METDC: &str = "metdc";
@@ -179,7 +188,7 @@ fn join<const N: usize>(parts: [&str; N]) -> String {
 
 /// Dotted path of the retiming of a SPAD in the macropixel at `macropixel`.
 pub fn spad_path(macropixel: &str, spad: usize) -> String {
-    join([macropixel, "front_end", &format!("spad_{spad}")])
+    join([macropixel, FRONT_END, &format!("spad_{spad}")])
 }
 
 /// Dotted path of a bin's count in the macropixel at `macropixel`.
@@ -193,7 +202,7 @@ pub struct Probes {
     path: String,
     /// By probe; empty where the circuit has none.
     nets: Vec<Vec<NetId>>,
-    /// Toggle flip-flop's output by SPAD.
+    /// Toggle flip-flop's output by SPAD; none where SPADs share the wire before it.
     toggles: Vec<NetId>,
     bins: Vec<Vec<NetId>>,
 }
@@ -269,7 +278,7 @@ impl Probes {
         self.bus(probe)[0]
     }
 
-    /// Output of the toggle flip-flop of each SPAD.
+    /// Output of the toggle flip-flop of each SPAD; none where SPADs share the wire before it.
     pub fn toggles(&self) -> &[NetId] {
         &self.toggles
     }
@@ -304,6 +313,21 @@ impl Probes {
     pub fn toggle_cells(&self, netlist: &Netlist) -> Vec<usize> {
         let cell = |spad| spad_path(&self.path, spad) + ".toggle";
         cells(netlist, (0..self.toggles.len()).map(cell))
+    }
+
+    /// What CLK samples where SPADs share a wire: D of the first sampler.
+    pub fn joined_sample(&self, netlist: &Netlist) -> Option<NetId> {
+        let first = netlist.cell(&join([&self.path, FRONT_END, front_end::JOINED, "first"]))?;
+        Some(netlist.cells()[first].inputs[0])
+    }
+
+    /// The end of each pulse shaper's delay chain, by SPAD.
+    pub fn shaper_ends(&self, netlist: &Netlist) -> Vec<NetId> {
+        let late = |spad| {
+            let shaper = format!("shaper_{spad}");
+            netlist.net(&join([&self.path, FRONT_END, &shaper, "LATE"]))
+        };
+        (0..).map_while(late).collect()
     }
 
     /// The stages of the METDC's shift register, the first one first.

@@ -32,7 +32,7 @@ fn a_macropixel_has_every_probe_but_those_of_other_p_counters_and_tdcs() {
             let expected = match probe {
                 Probe::Memory => p_counter != PCounter::Memoryless,
                 Probe::Equal => p_counter == PCounter::Comparator,
-                Probe::StepClk => false,
+                Probe::StepClk | Probe::Shaped | Probe::Wire => false,
                 Probe::SpadTimed | Probe::SpadEvent | Probe::Shift => tdc == Tdc::Clocked,
                 Probe::Photons | Probe::SampleClk | Probe::EvenTap | Probe::OddTap => {
                     tdc == Tdc::DelayLine

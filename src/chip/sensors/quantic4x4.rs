@@ -3,7 +3,7 @@
 
 use super::Sensor;
 use crate::chip::config::{
-    AfterBorrow, EventType, Mode, Overflow, PCounter, SensorConfig, Tap, Tdc,
+    AfterBorrow, EventType, FrontEnd, Mode, Overflow, PCounter, SensorConfig, Tap, Tdc,
 };
 use crate::netlist::Corner;
 
@@ -20,6 +20,8 @@ impl Default for SensorConfig {
             cols: 64,
             spad_rows: 4,
             spad_cols: 4,
+            front_end: FrontEnd::Summation,
+            coincident_spads: 2,
             counter_bits: 9,
             p_counter: PCounter::Ripple,
             tap: Tap::Borrow,

@@ -43,6 +43,10 @@ pub struct MacropixelCircuit {
     /// Handles of its nets.
     pub probes: Probes,
     toggles: Vec<usize>,
+    /// What CLK samples where SPADs share a wire.
+    joined: Option<NetId>,
+    /// Ends of the pulse shapers' delay chains.
+    late: Vec<NetId>,
     hits: Vec<usize>,
     /// The P-counter's flip-flops, memory excepted.
     counting: Vec<usize>,
@@ -61,6 +65,8 @@ impl MacropixelCircuit {
         let probes = Probes::of_macropixel(&netlist, position.0, position.1);
         MacropixelCircuit {
             toggles: probes.toggle_cells(&netlist),
+            joined: probes.joined_sample(&netlist),
+            late: probes.shaper_ends(&netlist),
             hits: probes.hit_cells(&netlist),
             counting: probes.counter_cells(&netlist),
             clear: probes.counter_clear(&netlist),
@@ -221,6 +227,43 @@ impl<'c> MacropixelPaths<'c> {
         (rise, fall)
     }
 
+    /// SPAD_RAW rises → what CLK samples, of each SPAD.
+    fn front_end_latency(&self) -> Vec<Span> {
+        let Some(sampled) = self.circuit.joined else {
+            let toggles = self.circuit.toggles.iter();
+            return toggles.map(|&toggle| self.clock_to_q(toggle)).collect();
+        };
+        let raw = self.circuit.probes.bus(Probe::SpadRaw).iter();
+        raw.map(|&raw| changes(&self.after_spad(raw, Edge::Rise), sampled))
+            .collect()
+    }
+
+    /// Delays of the slowest pulse shaper.
+    fn shaper_delays(&self) -> Option<ShaperDelays> {
+        let probes = &self.circuit.probes;
+        let shaped = probes.find(Probe::Shaped)?.iter();
+        let raw = probes.bus(Probe::SpadRaw).iter();
+        let of_spad = |(&raw, (&shaped, &late)): (&NetId, (&NetId, &NetId))| {
+            let rise = self.after_spad(raw, Edge::Rise);
+            let fall = self.after_spad(raw, Edge::Fall);
+            ShaperDelays {
+                width: edge(&rise, shaped, Edge::Fall).1 - edge(&rise, shaped, Edge::Rise).0,
+                recovery: edge(&fall, late, Edge::Rise).1,
+            }
+        };
+        let all = raw.zip(shaped.zip(&self.circuit.late)).map(of_spad);
+        all.reduce(|a, b| ShaperDelays {
+            width: a.width.max(b.width),
+            recovery: a.recovery.max(b.recovery),
+        })
+    }
+
+    /// What an edge of one SPAD changes.
+    fn after_spad(&self, raw: NetId, edge: Edge) -> Arrivals<'c> {
+        let arrivals = self.analysis.arrivals(&[(raw, edge)], &[]);
+        arrivals.expect("a front end has no loops")
+    }
+
     /// Fastest and slowest arc of every cell of some kinds.
     fn arcs(&self, is: impl Fn(CellKind) -> bool) -> impl Iterator<Item = Option<Span>> {
         let cells = self.circuit.netlist.cells().iter().enumerate();
@@ -237,11 +280,22 @@ impl<'c> MacropixelPaths<'c> {
     }
 }
 
+/// Delays of pulse shapers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ShaperDelays {
+    /// How long a shaped pulse is, longest.
+    pub width: Time,
+    /// SPAD_RAW falls → the delay chain is ready for the next pulse, latest.
+    pub recovery: Time,
+}
+
 /// Delays of one macropixel, its P-counter left out.
 #[derive(Debug, Clone)]
 pub struct MacropixelDelays {
-    /// SPAD_RAW rises → TOGGLE rises, falls; of each SPAD.
+    /// SPAD_RAW rises → TOGGLE rises, falls; of each SPAD. Where SPADs share a wire: → what CLK samples, earliest and latest.
     pub latency: Vec<(Time, Time)>,
+    /// The slowest pulse shaper, where there are any.
+    pub shaper: Option<ShaperDelays>,
     /// TOGGLE → PHOTONS, where delay lines time what SPADs have in common.
     pub joining: Option<Span>,
     /// CLK rises → SPAD_EVENT settled, latest; nothing where delay lines time photons. A path that no values excite may be longer than any that they do: see
@@ -284,11 +338,8 @@ impl MacropixelDelays {
         let event = circuit.probes.find(Probe::SpadEvent);
         let hits = circuit.hits.iter().map(|&cell| paths.clock_to_q(cell).0);
         MacropixelDelays {
-            latency: circuit
-                .toggles
-                .iter()
-                .map(|&toggle| paths.clock_to_q(toggle))
-                .collect(),
+            latency: paths.front_end_latency(),
+            shaper: paths.shaper_delays(),
             joining: paths.joining(),
             event: event.map_or(Time::ZERO, |nets| changes(&rise, nets[0]).1),
             shift: shift.map(|&bit| changes(&rise, bit)).collect(),

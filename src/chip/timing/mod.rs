@@ -22,7 +22,7 @@ pub mod silicon;
 use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
-use super::config::{AfterBorrow, Overflow, PCounter, SensorConfig, Tap, Tdc};
+use super::config::{AfterBorrow, FrontEnd, Overflow, PCounter, SensorConfig, Tap, Tdc};
 use super::front_end::PulseLimits;
 use super::photon_line;
 use crate::netlist::{CellKind, CheckKind, Corner};
@@ -33,11 +33,12 @@ use silicon::Silicon;
 /// Delays of the paths that decide where a window lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ChipTiming {
-    /// SPAD_RAW rising to what is sampled, the toggle flip-flop's output or PHOTONS: the front-end latency.
+    /// SPAD_RAW rising to what is sampled, the toggle flip-flop's output or PHOTONS: the front-end latency. Earliest, where SPADs
+    /// share a wire whose gates rise and fall at different speeds.
     pub spad_to_sampled: Time,
     /// Delay of each of the stages of the photon line, where there is one.
     pub photon_line_stage: Time,
-    /// What the toggle flip-flops ask of SPAD_RAW.
+    /// What the front end asks of SPAD_RAW.
     pub pulses: PulseLimits,
     /// CLK falling to COUNTER_CLK rising.
     pub clk_to_counter_clk: Time,
@@ -145,9 +146,17 @@ impl ChipTiming {
         ChipTiming {
             spad_to_sampled: delays.latency[0].0 + joining,
             photon_line_stage: photon_line::stage(joining, config.spads()),
-            pulses: PulseLimits {
-                width: limit(CheckKind::ClockHigh),
-                apart: toggle + limit(CheckKind::Setup),
+            pulses: match delays.shaper {
+                None => PulseLimits {
+                    width: limit(CheckKind::ClockHigh),
+                    apart: toggle + limit(CheckKind::Setup),
+                    shaped: None,
+                },
+                Some(shaper) => PulseLimits {
+                    width: shaper.width,
+                    apart: shaper.width + shaper.recovery,
+                    shaped: Some(shaper.width),
+                },
             },
             clk_to_counter_clk: counter.counter_clk.1,
             counter: CounterTiming {
@@ -191,6 +200,8 @@ impl ChipTiming {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct Circuit {
     spads: usize,
+    front_end: FrontEnd,
+    coincident_spads: usize,
     counter_bits: usize,
     p_counter: PCounter,
     tap: Tap,
@@ -207,6 +218,8 @@ impl Circuit {
     fn of(config: &SensorConfig) -> Self {
         Circuit {
             spads: config.spads(),
+            front_end: config.front_end,
+            coincident_spads: config.coincident_spads,
             counter_bits: config.counter_bits,
             p_counter: config.p_counter,
             tap: config.tap,

@@ -83,7 +83,10 @@ mod tests {
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             if path.is_dir() {
-                users(&path, found);
+                // A testbench of one block makes that of the library itself.
+                if !path.ends_with("testbenches") {
+                    users(&path, found);
+                }
                 continue;
             }
             let text = std::fs::read_to_string(&path).unwrap();

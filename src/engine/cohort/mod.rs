@@ -64,7 +64,9 @@ use self::secondaries::Secondaries;
 use self::spad_light::SpadLight;
 use self::words::RandomWords;
 use super::error::one_law;
-use super::{Engine, EngineError, Expose, Exposed, LitPixel, NotModelled, Work, follows};
+use super::{
+    Engine, EngineError, Expose, Exposed, LitPixel, NotModelled, Work, follows, has_a_line_a_spad,
+};
 use crate::chip::{Exposure, Sensor, WindowLaw, correlation, histogram, window_law};
 use crate::photon::{DeadTimeLaw, PhotonStream, PixelLight, Segment, SpadModel, StreamConfig};
 
@@ -329,6 +331,7 @@ impl Cohort {
     ) -> Result<Option<Vec<LikeCycles>>, EngineError> {
         follows(&self.sensor, &self.law.timing().pulses)?;
         one_law(&self.sensor)?;
+        has_a_line_a_spad(&self.sensor)?;
         let Opening { window, from_fs } = self.opening(start);
         let Some(window) = window.settled()? else {
             return Ok(None);

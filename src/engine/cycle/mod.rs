@@ -123,6 +123,10 @@ impl Cycle {
 
     fn machine(&self) -> Result<&Machine, &Unlevelled> {
         let machine = self.machine.get_or_init(|| {
+            if self.sensor.front_end.joins() {
+                let wire = "the wire that all SPADs share".to_owned();
+                return Err(Unlevelled::Structure(wire));
+            }
             let survey = Survey::new(&self.sensor, &self.exposure);
             let levelised = Levelised::new(&survey, &self.sensor, &self.exposure)?;
             Ok(Machine { survey, levelised })

@@ -17,6 +17,9 @@ pub enum Doubt {
     /// The longest delay of a cell reaches the next clock edge.
     #[error("a cell is slower than half a CLK period")]
     SlowCell,
+    /// A front end that joins SPADs.
+    #[error("SPADs that share a wire are left to the gates")]
+    SharedWire,
     /// Latencies of a SPAD's two edges.
     #[error("a SPAD's flip-flop rises and falls at different speeds")]
     UnevenLatency,

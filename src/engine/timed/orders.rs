@@ -263,6 +263,7 @@ fn always(setting: &Setting, delays: &Delays) -> Option<Doubt> {
             Doubt::PowerUp,
         ),
         (slowest < half, Doubt::SlowCell),
+        (!config.front_end.joins(), Doubt::SharedWire),
         (
             delays.latency.iter().all(|(rise, fall)| rise == fall),
             Doubt::UnevenLatency,

@@ -22,7 +22,7 @@ use std::borrow::Cow;
 use super::exposing::refuse_other_spads;
 use super::{
     Cancelling, Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay,
-    Work, follows,
+    Work, follows, has_a_line_a_spad,
 };
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, Sensor, Tdc, WindowLaw, correlation, histogram, photon_line};
@@ -76,6 +76,7 @@ impl Window {
     /// The window of a start value, if it opens.
     fn window(&self, start: u16) -> Result<Option<OpenWindow>, EngineError> {
         follows(&self.sensor, &self.law.timing().pulses)?;
+        has_a_line_a_spad(&self.sensor)?;
         Ok(self.law.window(start).settled()?)
     }
 

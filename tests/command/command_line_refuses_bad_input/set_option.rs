@@ -117,6 +117,10 @@ fn set_changes_single_keys_and_names_itself_in_complaints() {
             timing("sensor.clk=8"),
             "--set sensor.clk=8: unknown field `clk`",
         ),
+        (
+            timing("sensor.threshold=16"),
+            "--set sensor.threshold=16: threshold = 16 with event_type = \"greater\" asks for more than 16, which 16 SPADs can never be; give 0 to 15",
+        ),
         (timing("sensor.clk_hz"), "has no value; give key=value"),
         (
             timing("clk_hz=3e8"),
