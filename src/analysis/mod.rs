@@ -15,10 +15,12 @@
 //! | `load` | how fast start values can be loaded |
 //! | `power` | switching power, block by block |
 //! | `readout` | how fast histograms can be read |
+//! | `code_density` | how equal the steps of a time-to-digital converter are |
 //! | `spread` | ripple and margin of every macropixel under mismatch |
 //! | `corners` | process, voltage and temperature at which a clock fails |
 //! | `verdict` | whether all of it is met: what `timing`, `frame` and `replay` say |
 
+mod code_density;
 mod corners;
 mod correlation;
 mod gates;
@@ -29,6 +31,7 @@ mod readout;
 mod spread;
 mod verdict;
 
+pub use code_density::Linearity;
 pub use corners::{CornerLimit, FactorRange, corner_limits, factor_range};
 pub use correlation::CorrelationTiming;
 pub use gates::{ResetTiming, gate_works, reset, ripple};

@@ -30,7 +30,7 @@ pub mod window_law;
 pub use bin_edges::BinEdges;
 pub use blocks::{
     array, correlation, delay_line, front_end, histogram, load_path, macropixel, metdc, p_counter,
-    p_counter_timing, photon_line, readout,
+    p_counter_timing, photon_line, readout, tdc,
 };
 pub use config::{
     AfterBorrow, EventType, FrontEnd, Mode, Overflow, PCounter, SensorConfig, Tap, Tdc,

@@ -11,6 +11,7 @@ mod p_counter;
 mod p_counter_variants;
 mod readout;
 mod ripple_hazard;
+mod tdc;
 
 use std::path::Path;
 
@@ -38,6 +39,7 @@ pub const TESTBENCHES: &[Testbench] = &[
     readout::TESTBENCH,
     ripple_hazard::TESTBENCH,
     front_ends::TESTBENCH,
+    tdc::TESTBENCH,
 ];
 
 impl Testbench {

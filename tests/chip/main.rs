@@ -30,6 +30,7 @@ mod serial_load_reaches_every_macropixel;
 mod shift_banks_change_nothing;
 mod standard_cells_serve_other_tools;
 mod static_timing_bounds_the_kernel;
+mod tdcs_agree_with_their_models;
 mod testbenches_pass;
 mod the_sensor_keeps_its_timing_checks;
 mod timing_checks_find_violations;

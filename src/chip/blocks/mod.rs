@@ -13,6 +13,7 @@ pub mod p_counter;
 pub mod p_counter_timing;
 pub mod photon_line;
 pub mod readout;
+pub mod tdc;
 
 use std::sync::Arc;
 

@@ -1,0 +1,609 @@
+//! Testbench of the time-to-digital converters of 2.4.3: clock counter, gated ring oscillator and delay line, their DNL and
+//! INL by a code-density test, and what coupling does to rings that differ (thesis 2.4.3, Fig. 23).
+//!
+//! ```text
+//!   START, STOP ─┬─► clock counter ─► code of 2.6 ns      intervals spread evenly, 64 conversions in the lanes of one
+//!                ├─► ring of 25 ────► code of 1 ns        simulation; each code against the model, and how often each
+//!                └─► 32 buffers ────► code of 46 ps       comes against the delays of its elements
+//! ```
+//!
+//! Beside the waveform it leaves three charts with their numbers: DNL, INL, and the frequencies of a row of rings.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::analysis::Linearity;
+use crate::chip::tdc::coupling::Row;
+use crate::chip::tdc::{Steps, clock_counter, delay_line, ring_oscillator};
+use crate::engine::waveform::write_waves;
+use crate::files::InputError;
+use crate::kernel::{Drive, Kernel, LANES, LaneDrive, LaneKernel, Lanes, Recorder, in_order};
+use crate::logic::Logic;
+use crate::netlist::{
+    CellKind, Corner, Library, Mismatch, Module, ModuleBuilder, Netlist, Timing, varied,
+};
+use crate::report::{Axis, Chart, Checks, Grid, Style};
+use crate::testbenches::Testbench;
+use crate::units::{Frequency, Time};
+use crate::waves::{Entry, Group, Layout};
+use rand_philox::{philox4x32_10, u32_to_unit_f64};
+
+/// Batches of 64 conversions: 38 400, about 1200 a code.
+const BATCHES: i64 = 600;
+/// Codes of each converter, those at the ends among them.
+const CODES: usize = 32;
+/// Bits of the counters.
+const BITS: usize = 6;
+/// Stages of a ring: a period of 1 ns.
+const STAGES: usize = 25;
+/// Mismatch of an inverter; a buffer has 14 %, between the two of the thesis's delay line (15 %, 6.3.1) and none.
+const SIGMA: f64 = 0.2;
+/// Rings in a row.
+const RINGS: usize = 16;
+/// From a conversion's begin to its TDC_RESET's end, and to START where that is common.
+const CLEARED: Time = Time::from_ns(2);
+const BEGIN: Time = Time::from_ns(4);
+
+pub(super) const TESTBENCH: Testbench = Testbench {
+    name: "tb_tdc",
+    about: "Clock counter, gated ring oscillator and delay line: DNL and INL by code density; coupled rings",
+    run,
+};
+
+fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
+    let converters = [clocked(), ring(), line()];
+    let densities = converters.each_ref().map(|tdc| tdc.density(checks));
+    checks.note(table(&converters, &densities));
+    for (tdc, density) in converters.iter().zip(&densities) {
+        compare(tdc, density, checks);
+    }
+    charts(waves, &converters, &densities)?;
+    rings(waves, checks)?;
+    waveform(waves, checks)
+}
+
+/// Which of START and STOP comes at one time in all lanes. A clock's edges are common, too.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Common {
+    Start,
+    Stop,
+}
+
+/// A converter on its own, and its model.
+struct Tdc {
+    name: &'static str,
+    /// Of its intervals.
+    seed: u32,
+    netlist: Netlist,
+    timing: Timing,
+    code: &'static str,
+    common: Common,
+    clock: Option<Frequency>,
+    /// Where codes begin; those of the clock counter depend on START's phase, and only their widths are here.
+    steps: Steps,
+    /// Longest interval.
+    range: Time,
+}
+
+fn made(module: &Arc<Module>, sigma: f64, seed: u64) -> (Netlist, Timing) {
+    let netlist = Netlist::elaborate(module);
+    let nominal = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+    let mismatch = Mismatch { sigma, seed };
+    let timing = varied(&netlist, &nominal, 1.0, Some(mismatch));
+    (netlist, timing)
+}
+
+fn clocked() -> Tdc {
+    let (netlist, timing) = made(&clock_counter::circuit(BITS), SIGMA, 1);
+    let clock = Frequency::from_hz_f64(384e6).expect("a frequency");
+    Tdc {
+        name: "clock counter",
+        seed: 1,
+        netlist,
+        timing,
+        code: "CODE",
+        common: Common::Stop,
+        clock: Some(clock),
+        steps: Steps::new((0..CODES as i64).map(|k| clock.periods(k)).collect()),
+        range: clock.periods(CODES as i64),
+    }
+}
+
+fn ring() -> Tdc {
+    let (netlist, timing) = made(&ring_oscillator::circuit(STAGES, BITS), SIGMA, 1);
+    let model = ring_oscillator::Model::of(&netlist, &timing, "");
+    Tdc {
+        name: "ring oscillator",
+        seed: 2,
+        code: "CODE",
+        common: Common::Start,
+        clock: None,
+        steps: model.steps(CODES),
+        range: model.period * CODES as i64,
+        netlist,
+        timing,
+    }
+}
+
+fn line() -> Tdc {
+    let (netlist, timing) = made(&delay_line::circuit(CODES), SIGMA, 1);
+    let steps = delay_line::model(&netlist, &timing, "");
+    Tdc {
+        name: "delay line",
+        seed: 3,
+        code: "SEEN",
+        common: Common::Start,
+        clock: None,
+        range: *steps.edges().last().expect("it has elements") + Time::from_ps(40),
+        steps,
+        netlist,
+        timing,
+    }
+}
+
+/// How often each code came.
+struct Density {
+    counts: Vec<f64>,
+    /// Conversions that lasted from the first code's begin to the last one's end.
+    linearity: Linearity,
+}
+
+impl Tdc {
+    /// The clock, or one to reckon with, and its periods from one batch of conversions to the next: START's samplers and the
+    /// counter's ripple have settled by then.
+    fn slots(&self) -> (Frequency, i64) {
+        let least = BEGIN + self.range + Time::from_ns(16);
+        let clock = self
+            .clock
+            .unwrap_or(Frequency::from_hz_f64(1e9).expect("a frequency"));
+        (clock, (least.as_s() * clock.as_hz()).ceil() as i64)
+    }
+
+    /// When NOT CLK rises in a stretch of time.
+    fn samples(&self, from: Time, to: Time) -> impl Iterator<Item = Time> {
+        let clock = self.clock.expect("it has a clock");
+        let cells = self.netlist.cells().iter();
+        let mut inverters = cells
+            .enumerate()
+            .filter(|(_, cell)| cell.kind == CellKind::Inv);
+        let (inverter, _) = inverters.next().expect("it inverts CLK");
+        let late = Time::from_fs(self.timing.of(inverter)[0].to(Logic::One).into());
+        let first = (from.as_s() * clock.as_hz()) as i64 - 2;
+        let falls = (first..).map(move |k| clock.half_periods(2 * k + 1) + late);
+        falls.take_while(move |&fall| fall < to)
+    }
+
+    /// The code test, and each code against the model.
+    fn density(&self, checks: &mut Checks) -> Density {
+        let input = |name: &str| self.netlist.net(name).expect("it is an input");
+        let (start, stop, clear) = (input("START"), input("STOP"), input("TDC_RESET"));
+        let code = self.netlist.signal(self.code).expect("it is an output");
+        let (clock, periods) = self.slots();
+        let mut kernel = LaneKernel::new(&self.netlist, &self.timing);
+        let all = |time, net, level: bool| LaneDrive {
+            time,
+            net,
+            mask: u64::MAX,
+            values: Lanes::all(Logic::from(level)),
+        };
+        let mut counts = vec![0.0; CODES + 1];
+        let mut others = 0;
+        for batch in 0..BATCHES {
+            let (first, last) = (periods * batch, periods * (batch + 1));
+            let [at, next] = [first, last].map(|period| clock.periods(period));
+            // START and STOP of each lane.
+            let draw = |lane: usize| {
+                let word = philox4x32_10([batch as u32, lane as u32, 0, 0], [23, self.seed])[0];
+                let interval = Time::from_s(self.range.as_s() * u32_to_unit_f64(word));
+                let (begin, end) = (at + BEGIN, at + BEGIN + self.range);
+                match self.common {
+                    Common::Start => (begin, begin + interval),
+                    Common::Stop => (end - interval, end),
+                }
+            };
+            let conversions: Vec<(Time, Time)> = (0..LANES).map(draw).collect();
+            let read = next - Time::from_ns(3);
+            let mut drives = vec![
+                all(at, clear, true),
+                all(at, start, false),
+                all(at, stop, false),
+                all(at + CLEARED, clear, false),
+                all(read + Time::from_ns(1), start, false),
+                all(read + Time::from_ns(2), stop, false),
+            ];
+            for (lane, &(started, stopped)) in conversions.iter().enumerate() {
+                let rises = [(started, start), (stopped, stop)];
+                drives.extend(rises.map(|(time, net)| LaneDrive {
+                    mask: 1 << lane,
+                    ..all(time, net, true)
+                }));
+            }
+            if self.clock.is_some() {
+                let clk = input("CLK");
+                let edges = 2 * first..2 * last;
+                drives.extend(edges.map(|k| all(clock.half_periods(k), clk, k % 2 == 0)));
+            }
+            drives.sort_by_key(|drive| drive.time);
+            let (before, after): (Vec<_>, Vec<_>) =
+                drives.into_iter().partition(|drive| drive.time <= read);
+            kernel.run(&mut before.into_iter().peekable(), read, &mut ());
+            for (lane, &(started, stopped)) in conversions.iter().enumerate() {
+                let word = kernel.number(&code, lane);
+                let found = match self.code {
+                    "SEEN" => word.map(|seen| seen.count_ones() as usize),
+                    _ => word.map(|code| code as usize),
+                };
+                let expected = match self.clock {
+                    None => self.steps.code(stopped - started),
+                    Some(_) => clock_counter::model(self.samples(at, next), started, stopped),
+                };
+                others += usize::from(found != Some(expected));
+                if let Some(count) = found.and_then(|code| counts.get_mut(code)) {
+                    *count += 1.0;
+                }
+            }
+            let end = next - Time::from_fs(1);
+            kernel.run(&mut after.into_iter().peekable(), end, &mut ());
+        }
+        let conversions = BATCHES as usize * LANES;
+        checks.equal(
+            format!(
+                "{}: conversions of {conversions} with another code than the model's",
+                self.name
+            ),
+            0,
+            others,
+        );
+        // Codes between the first and the last have both edges within the range.
+        let inner = &counts[1..CODES];
+        Density {
+            linearity: Linearity::of(inner),
+            counts,
+        }
+    }
+
+    /// What the elements' delays say.
+    fn expected(&self) -> Linearity {
+        Linearity::of(&self.steps.widths_s())
+    }
+}
+
+fn table(converters: &[Tdc], densities: &[Density]) -> String {
+    let mut grid = Grid::new([
+        "converter",
+        "transistors",
+        "step (ps)",
+        "DNL expected",
+        "DNL measured",
+        "INL expected",
+        "INL measured",
+        "noise of DNL",
+    ]);
+    for (tdc, density) in converters.iter().zip(densities) {
+        let (expected, found) = (tdc.expected(), &density.linearity);
+        let transistors = tdc
+            .netlist
+            .cells()
+            .iter()
+            .map(|cell| cell.kind.transistors());
+        let signed = |value: f64| format!("{value:+.3}");
+        grid.push([
+            tdc.name.to_owned(),
+            transistors.sum::<u32>().to_string(),
+            format!("{:.1}", expected.step * 1e12),
+            signed(expected.worst_dnl()),
+            signed(found.worst_dnl()),
+            signed(expected.worst_inl()),
+            signed(found.worst_inl()),
+            format!("{:.3}", 1.0 / found.step.sqrt()),
+        ]);
+    }
+    format!(
+        "Code density, {} conversions each; DNL and INL in steps, at their worst\n{grid}",
+        BATCHES as usize * LANES
+    )
+}
+
+/// Counts scatter by their square root: DNL against the elements' delays within five standard errors.
+fn compare(tdc: &Tdc, density: &Density, checks: &mut Checks) {
+    let (expected, found) = (tdc.expected(), &density.linearity);
+    let codes = expected.dnl.iter().zip(&found.dnl).enumerate();
+    let sigmas = codes.map(|(code, (expected, found))| {
+        let noise = ((1.0 + expected) / density.linearity.step).sqrt();
+        ((found - expected).abs() / noise, code + 1)
+    });
+    let (worst, code) = sigmas
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .expect("there are codes");
+    checks.that(
+        format!("{}: DNL of every code against its delays", tdc.name),
+        "within 5 standard errors",
+        format!("{worst:.1} at code {code}"),
+        worst < 5.0,
+    );
+    let total: f64 = density.counts.iter().sum();
+    let share = density.linearity.step / total * tdc.range.as_s();
+    let off = share / expected.step - 1.0;
+    checks.that(
+        format!("{}: mean step", tdc.name),
+        format!("{:.2} ps", expected.step * 1e12),
+        format!("{:.2} ps", share * 1e12),
+        off.abs() < 0.01,
+    );
+}
+
+fn charts(waves: &Path, converters: &[Tdc], densities: &[Density]) -> Result<(), InputError> {
+    let chart = |what: &str, of: fn(&Linearity) -> &[f64]| {
+        let x = Axis::linear("code");
+        let mut chart = Chart::new(
+            format!(
+                "{what} of {} conversions, against the elements' delays",
+                BATCHES as usize * LANES
+            ),
+            x,
+            Axis::linear(format!("{what} (steps)")),
+        );
+        for (tdc, density) in converters.iter().zip(densities) {
+            let points = |linearity: &Linearity| -> Vec<(f64, f64)> {
+                let codes = of(linearity).iter().enumerate();
+                codes
+                    .map(|(code, &value)| (code as f64 + 1.0, value))
+                    .collect()
+            };
+            chart = chart
+                .with(
+                    format!("{}, gates", tdc.name),
+                    Style::Points,
+                    points(&density.linearity),
+                )
+                .with(
+                    format!("{}, delays", tdc.name),
+                    Style::Line,
+                    points(&tdc.expected()),
+                );
+        }
+        chart
+    };
+    chart("DNL", |linearity| &linearity.dnl).write(&waves.with_extension("svg"))?;
+    chart("INL", |linearity| &linearity.inl).write(&waves.with_file_name("tb_tdc_inl.svg"))
+}
+
+/// A row of rings that differ: each one's period at gate level, and what coupling makes of them.
+fn rings(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
+    const SHOWN: Time = Time::from_ns(100);
+    let mut m = ModuleBuilder::new("rings");
+    let pins = [
+        ("START", m.input("START")),
+        ("STOP", m.input("STOP")),
+        ("TDC_RESET", m.input("TDC_RESET")),
+    ];
+    let pins = pins.map(|(name, net)| (name, [net]));
+    let pins: Vec<_> = pins.iter().map(|(name, net)| (*name, &net[..])).collect();
+    let ring = ring_oscillator::circuit(STAGES, BITS);
+    (0..RINGS).for_each(|pixel| m.instance(&format!("pixel_{pixel}"), &ring, &pins));
+    let (netlist, timing) = made(
+        &m.finish().expect("the testbench's circuit is whole"),
+        SIGMA,
+        2,
+    );
+    let nets: Vec<_> = (0..RINGS)
+        .map(|pixel| {
+            netlist
+                .signal(&format!("pixel_{pixel}.RING"))
+                .expect("it was built above")[0]
+        })
+        .collect();
+    let mut drives: Vec<Drive> = netlist
+        .inputs()
+        .into_iter()
+        .map(|net| Drive::new(Time::ZERO, net, false))
+        .collect();
+    let start = netlist.net("START").expect("it is an input");
+    drives.push(Drive::new(BEGIN, start, true));
+    let mut recorder = Recorder::new(nets.iter().copied());
+    Kernel::new(&netlist, &timing).run(&mut in_order(drives), SHOWN, &mut recorder);
+
+    let mut free_hz = Vec::new();
+    let mut wrong = 0;
+    for (pixel, &net) in nets.iter().enumerate() {
+        let falls = recorder.falling_edges(net);
+        // The first fall is from rest.
+        let periods: Vec<Time> = falls.windows(2).map(|ends| ends[1] - ends[0]).collect();
+        let model = ring_oscillator::Model::of(&netlist, &timing, &format!("pixel_{pixel}"));
+        wrong += periods
+            .iter()
+            .filter(|&&period| period != model.period)
+            .count();
+        free_hz.push(1.0 / model.period.as_s());
+    }
+    checks.equal(
+        format!("{RINGS} rings: periods that are not the sum of their cells' delays"),
+        0,
+        wrong,
+    );
+    let spread = |hz: &[f64]| {
+        let mean = hz.iter().sum::<f64>() / hz.len() as f64;
+        let square: f64 = hz.iter().map(|hz| (hz / mean - 1.0).powi(2)).sum();
+        (square / (hz.len() - 1) as f64).sqrt()
+    };
+    let row = |pull_hz| Row {
+        free_hz: free_hz.clone(),
+        pull_hz,
+    };
+    let least = row(0.0).least_pull_hz();
+    let coupled = [0.3, 1.1].map(|share| (share, row(share * least).run(4e-6)));
+    let locked = row(least).locked_hz();
+    let mut text = format!(
+        "{RINGS} rings, {:.1} MHz on average: spread {:.2} % alone",
+        locked * 1e-6,
+        100.0 * spread(&free_hz)
+    );
+    for (share, hz) in &coupled {
+        text += &format!(
+            ", {:.4} % pulled by {:.1} MHz ({share} of what locks them)",
+            100.0 * spread(hz),
+            share * least * 1e-6
+        );
+    }
+    checks.note(text);
+    // A mean of so many delays, each with the mismatch of its cell.
+    let inverter = SIGMA / (STAGES as f64).sqrt();
+    let alone = spread(&free_hz);
+    checks.that(
+        "rings alone: spread of their periods, against an inverter's over the square root of the stages",
+        format!("{:.1} % within a half", 100.0 * inverter),
+        format!("{:.1} %", 100.0 * alone),
+        (alone / inverter - 1.0).abs() < 0.5,
+    );
+    let [(_, loose), (_, tight)] = &coupled;
+    checks.that(
+        "rings coupled by 1.1 of the least pull share one frequency, the mean",
+        format!("{:.4} MHz", locked * 1e-6),
+        format!("{:.4} MHz, spread {:.1e}", tight[0] * 1e-6, spread(tight)),
+        (tight[0] / locked - 1.0).abs() < 1e-6 && spread(tight) < 1e-6,
+    );
+    checks.that(
+        "rings coupled by 0.3 of it do not",
+        "a spread between",
+        format!("{:.2} %", 100.0 * spread(loose)),
+        spread(loose) > 1e-4 && spread(loose) < alone,
+    );
+    let points = |hz: &[f64]| -> Vec<(f64, f64)> {
+        hz.iter()
+            .enumerate()
+            .map(|(pixel, hz)| (pixel as f64, hz * 1e-6))
+            .collect()
+    };
+    let [(_, loose), (_, tight)] = &coupled;
+    Chart::new(
+        "Ring oscillators of a row of pixels",
+        Axis::linear("pixel"),
+        Axis::linear("frequency (MHz)"),
+    )
+    .with("alone, gates", Style::Points, points(&free_hz))
+    .with(
+        "coupled, 0.3 of the least pull",
+        Style::Dashed,
+        points(loose),
+    )
+    .with("coupled, 1.1 of the least pull", Style::Line, points(tight))
+    .write(&waves.with_file_name("tb_tdc_rings.svg"))
+}
+
+/// Three intervals in all converters at once.
+fn waveform(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
+    const SLOT: Time = Time::from_ns(40);
+    let clock = Frequency::from_hz_f64(384e6).expect("a frequency");
+    let intervals = [
+        Time::from_ps(600),
+        Time::from_ps(1_200),
+        Time::from_ps(15_000),
+    ];
+    let mut m = ModuleBuilder::new("tdcs");
+    let [start, stop, clear, clk] =
+        ["START", "STOP", "TDC_RESET", "CLK"].map(|name| [m.input(name)]);
+    let pins = [
+        ("START", &start[..]),
+        ("STOP", &stop),
+        ("TDC_RESET", &clear),
+    ];
+    let with_clk: Vec<_> = pins.into_iter().chain([("CLK", &clk[..])]).collect();
+    m.instance("clock_counter", &clock_counter::circuit(BITS), &with_clk);
+    m.instance("ring", &ring_oscillator::circuit(STAGES, BITS), &pins);
+    m.instance("line", &delay_line::circuit(CODES), &pins);
+    let (netlist, timing) = made(
+        &m.finish().expect("the testbench's circuit is whole"),
+        SIGMA,
+        1,
+    );
+
+    let mut drives: Vec<Drive> = netlist
+        .inputs()
+        .into_iter()
+        .map(|net| Drive::new(Time::ZERO, net, false))
+        .collect();
+    for (slot, &interval) in (0..).zip(&intervals) {
+        let at = SLOT * slot;
+        let fall = at + SLOT - Time::from_ns(5);
+        let pulses = [
+            (clear, at + Time::from_fs(1), at + CLEARED),
+            (start, at + BEGIN, fall),
+            (stop, at + BEGIN + interval, fall + Time::from_ns(2)),
+        ];
+        for (name, (_, up, down)) in ["TDC_RESET", "START", "STOP"].into_iter().zip(pulses) {
+            let net = netlist.net(name).expect("it is an input");
+            drives.extend([Drive::new(up, net, true), Drive::new(down, net, false)]);
+        }
+    }
+    let end = SLOT * intervals.len() as i64;
+    let clk = netlist.net("CLK").expect("it is an input");
+    let edges = (1..)
+        .map(|k| (clock.half_periods(k), k % 2 == 0))
+        .take_while(|edge| edge.0 < end);
+    drives.extend(edges.map(|(time, level)| Drive::new(time, clk, level)));
+    let codes = ["ring.CODE", "line.SEEN"];
+    let nets = codes.map(|path| netlist.signal(path).expect("it was built above"));
+    let models = [
+        ring_oscillator::Model::of(&netlist, &timing, "ring").steps(1 << BITS),
+        delay_line::model(&netlist, &timing, "line"),
+    ];
+    let mut kernel = Kernel::new(&netlist, &timing);
+    let mut stimulus = in_order(drives);
+    let mut found = Vec::new();
+    write_waves(waves, &netlist, &view(), |waves| {
+        for slot in 1..=intervals.len() as i64 {
+            kernel.run(&mut stimulus, SLOT * slot - Time::from_ns(6), waves);
+            found.push(nets.each_ref().map(|nets| kernel.number(nets)));
+        }
+        kernel.run(&mut stimulus, end, waves);
+        end
+    })?;
+    for (&interval, found) in intervals.iter().zip(found) {
+        let expected = models.each_ref().map(|steps| steps.code(interval));
+        let ones = found[1].map(|seen| seen.count_ones() as usize);
+        let found = [found[0].map(|code| code as usize), ones];
+        checks.that(
+            format!("{interval} in the waveform: codes of ring and line"),
+            format!("{} and {}", expected[0], expected[1]),
+            found
+                .map(|code| code.map_or("unknown".to_owned(), |n| n.to_string()))
+                .join(" and "),
+            found == expected.map(Some),
+        );
+    }
+    Ok(())
+}
+
+fn view() -> Layout {
+    let group = |title: &str, entries: &[Entry]| Group::new(title, entries.iter().cloned());
+    Layout {
+        groups: vec![
+            group(
+                "Interval",
+                &["START", "STOP", "TDC_RESET", "CLK"].map(Entry::binary),
+            ),
+            group(
+                "Clock counter",
+                &[
+                    Entry::binary("clock_counter.GATE"),
+                    Entry::binary("clock_counter.GATED_CLK"),
+                    Entry::decimal("clock_counter.CODE"),
+                ],
+            ),
+            group(
+                "Gated ring oscillator",
+                &[
+                    Entry::binary("ring.GATE"),
+                    Entry::hex("ring.RING"),
+                    Entry::decimal("ring.CODE"),
+                ],
+            ),
+            group(
+                "Delay line",
+                &[Entry::hex("line.TAP"), Entry::hex("line.SEEN")],
+            ),
+        ],
+        zoom: (BEGIN - Time::from_ns(2), BEGIN + Time::from_ns(4)),
+        marker: Some(BEGIN),
+    }
+}
