@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::delay_line::Elements;
+use super::blocks::metdc_delay_line::Elements;
 use super::blocks::readout::ReadoutOrder;
 use super::spad_grid::{SpadGrid, count_bits};
 use crate::netlist::Corner;

@@ -29,8 +29,8 @@ pub mod window_law;
 
 pub use bin_edges::BinEdges;
 pub use blocks::{
-    array, correlation, delay_line, front_end, histogram, load_path, macropixel, metdc, p_counter,
-    p_counter_timing, photon_line, readout, tdc,
+    array, correlation, front_end, histogram, load_path, macropixel, metdc, metdc_delay_line,
+    p_counter, p_counter_timing, photon_line, readout, tdc,
 };
 pub use config::{
     AfterBorrow, EventType, FrontEnd, Mode, Overflow, PCounter, SensorConfig, Tap, Tdc,

@@ -58,6 +58,18 @@ pub enum SensorFault {
         /// SPADs of a macropixel.
         spads: usize,
     },
+    /// Delay lines have no correlation block.
+    #[error(
+        "{key} = {asked} is impossible with tdc = \"delay_line\", where every pulse is an edge and nothing is compared; give {only}"
+    )]
+    CorrelationOfDelayLine {
+        /// The key.
+        key: &'static str,
+        /// What is asked for.
+        asked: String,
+        /// What is possible.
+        only: &'static str,
+    },
     /// Delay lines take another front end.
     #[error(
         "front_end = {:?} is impossible with tdc = \"delay_line\", whose photon line joins SPADs itself; give front_end = \"summation\"",
@@ -164,6 +176,7 @@ impl SensorFault {
             SensorFault::StepPeriods(_) | SensorFault::StepsWithoutReset(_) => "step_periods",
             SensorFault::Threshold { .. } | SensorFault::NeverMet(_) => "threshold",
             SensorFault::FrontEndOfDelayLine(_) => "front_end",
+            SensorFault::CorrelationOfDelayLine { key, .. } => key,
             SensorFault::CoincidentSpads { .. } => "coincident_spads",
             SensorFault::TapOfComparator => "tap",
             SensorFault::HoldWithoutMemory => "p_counter",
@@ -242,6 +255,15 @@ impl SensorConfig {
         }
         if self.front_end.joins() && self.tdc == Tdc::DelayLine {
             return Err(SensorFault::FrontEndOfDelayLine(self.front_end));
+        }
+        let compares = self.event_type != EventType::Greater || self.threshold > 0;
+        if compares && self.tdc == Tdc::DelayLine {
+            let (key, asked, only) = match self.event_type {
+                EventType::Greater => ("threshold", self.threshold.to_string(), "0"),
+                EventType::Less => ("event_type", "\"less\"".to_owned(), "\"greater\""),
+                EventType::Equal => ("event_type", "\"equal\"".to_owned(), "\"greater\""),
+            };
+            return Err(SensorFault::CorrelationOfDelayLine { key, asked, only });
         }
         let asked = self.coincident_spads;
         if self.front_end == FrontEnd::Coincidence && asked > self.spads() {
@@ -332,6 +354,13 @@ mod tests {
                 "p_counter = \"memoryless\"\nafter_borrow = \"wrap\"\nstep_periods = 4",
                 3,
             ),
+            ("tdc = \"delay_line\"\nthreshold = 1", 2),
+            (
+                "\nevent_type = \"less\"\nthreshold = 3\ntdc = \"delay_line\"",
+                2,
+            ),
+            ("clk_skew_ps = -1", 1),
+            ("delay_sigma = -0.1", 1),
             ("colour = 1", 1),
             ("rows = -3", 1),
             ("afterpulse_probability = 1.1", 1),

@@ -15,7 +15,7 @@ use crate::bench::{HardwareEvents, Schedule, Skip, StimulusPlan, read_stimulus, 
 use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::{
     Exposure, LoadPins, Probe, Probes, ReadPins, Sensor, SensorPins, Silicon, Tdc, WindowLaw,
-    array, delay_line, front_end, load_path,
+    array, front_end, load_path, metdc_delay_line,
 };
 use crate::kernel::{
     Drive, Kernel, LANES, Observer, Policy, Statistics, Stimulus, TimingChecks, merge,
@@ -132,7 +132,7 @@ impl GateSimulation {
             .not_before(self.schedule().reset_end)
             .asynchronous(&self.netlist, |cell| {
                 front_end::is_asynchronous_sampler(cell)
-                    || delay_line::is_asynchronous_sampler(cell)
+                    || metdc_delay_line::is_asynchronous_sampler(cell)
             })
     }
 

@@ -10,10 +10,10 @@
 //!                             └─► WORD
 //! ```
 //!
-//! Where delay lines time photons, `photon_line` is the front end and `delay_line` the METDC, and nothing is correlated:
+//! Where delay lines time photons, `photon_line` is the front end and `metdc_delay_line` the METDC, and nothing is correlated:
 //!
 //! ```text
-//!   SPAD_RAW ─► photon_line ─PHOTONS─► delay_line ─HIT─► histogram
+//!   SPAD_RAW ─► photon_line ─PHOTONS─► metdc_delay_line ─HIT─► histogram
 //! ```
 //!
 //! [`Model`] is the clocked one circuit in plain Rust, stepped edge by edge through its blocks' models; only
@@ -23,8 +23,8 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::{
-    correlation, delay_line, finished, front_end, histogram, metdc, p_counter, p_counter_timing,
-    photon_line, readout,
+    correlation, finished, front_end, histogram, metdc, metdc_delay_line, p_counter,
+    p_counter_timing, photon_line, readout,
 };
 use crate::chip::config::{Mode, PCounter, SensorConfig, Tdc};
 use crate::chip::exposure::Exposure;
@@ -143,7 +143,7 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
             ("MEMORY_LOAD", &load),
             ("MEMORY_RESET", &memory_reset),
         ];
-        let lines = delay_line::circuit(config.bins, &config.delay_elements());
+        let lines = metdc_delay_line::circuit(config.bins, &config.delay_elements());
         m.instance("metdc", &lines, &[&own[..], &strobes].concat());
     }
     let bins: Vec<String> = (0..config.bins).map(histogram::bin_name).collect();

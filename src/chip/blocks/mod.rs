@@ -3,12 +3,12 @@
 
 pub mod array;
 pub mod correlation;
-pub mod delay_line;
 pub mod front_end;
 pub mod histogram;
 pub mod load_path;
 pub mod macropixel;
 pub mod metdc;
+pub mod metdc_delay_line;
 pub mod p_counter;
 pub mod p_counter_timing;
 pub mod photon_line;

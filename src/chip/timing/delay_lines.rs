@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::silicon::Silicon;
 use crate::chip::config::SensorConfig;
-use crate::chip::{Probe, Probes, array, delay_line};
+use crate::chip::{Probe, Probes, array, metdc_delay_line};
 use crate::netlist::{Edge, NetId, Netlist, StaticTiming};
 use crate::units::Time;
 
@@ -25,7 +25,7 @@ pub(crate) struct DelayLines {
 impl DelayLines {
     /// Those of a sensor whose TDC has some.
     pub(crate) fn new(config: &SensorConfig) -> Self {
-        let metdc = delay_line::circuit(config.bins, &config.delay_elements());
+        let metdc = metdc_delay_line::circuit(config.bins, &config.delay_elements());
         DelayLines {
             netlist: Netlist::elaborate(&metdc),
             cols: config.cols,
