@@ -32,6 +32,19 @@ pub const MANIFEST: &str = "manifest.json";
 pub struct ResultSet {
     folder: PathBuf,
     staging: Temporary,
+    /// Dropped after what is staged in it.
+    _made: Option<MadeFolder>,
+}
+
+/// A folder that is removed again if nothing came into it.
+#[derive(Debug)]
+struct MadeFolder(PathBuf);
+
+impl Drop for MadeFolder {
+    fn drop(&mut self) {
+        // One that is not empty stays.
+        let _ = fs::remove_dir(&self.0);
+    }
 }
 
 /// What a manifest says of a file.
@@ -121,12 +134,15 @@ impl ResultSet {
     /// # Errors
     /// When the folder cannot be written.
     pub fn begin(folder: &Path) -> Result<Self, InputError> {
+        let was_there = folder.exists();
         create_folder(folder)?;
+        let made = (!was_there).then(|| MadeFolder(folder.to_owned()));
         let staging = Temporary::folder_in(folder);
         let staging = staging.map_err(|e| InputError::unwritable(folder, &e))?;
         Ok(ResultSet {
             folder: folder.to_owned(),
             staging,
+            _made: made,
         })
     }
 
@@ -306,6 +322,18 @@ mod tests {
             .iter()
             .map(|(n, t)| (n.to_string(), t.to_string()))
             .collect()
+    }
+
+    #[test]
+    fn a_set_that_is_given_up_leaves_no_folder_but_one_that_was_there() {
+        let dir = tempfile::tempdir().unwrap();
+        let (new, old) = (dir.path().join("new"), dir.path().join("old"));
+        fs::create_dir(&old).unwrap();
+        for out in [&new, &old] {
+            let set = ResultSet::begin(out).unwrap();
+            fs::write(set.staging().join("a"), "half").unwrap();
+        }
+        assert!(!new.exists() && old.exists());
     }
 
     #[test]
