@@ -84,6 +84,9 @@ pub(super) fn demonstrator_rows() -> Vec<Row> {
         )
         .given("Measured, and put into the model: the laser's energy, which could give it, is not published."),
     ]
+    .into_iter()
+    .chain(super::delay_line::light_rows())
+    .collect()
 }
 
 /// Signal photons per cycle, and numbers of bins, of Fig. 32.
