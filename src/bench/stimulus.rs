@@ -22,7 +22,7 @@ use bitvec::slice::BitSlice;
 
 use crate::chip::readout::ReadoutOrder;
 use crate::chip::{
-    Exposure, LoadPins, Mode, ReadPins, Sensor, SensorConfig, SensorPins, Tdc, load_path,
+    Exposure, LoadPins, Mode, ReadPins, Sensor, SensorConfig, SensorPins, load_path,
 };
 use crate::kernel::{Drive, Stimulus, clock, merge};
 use crate::photon::SpadEvent;
@@ -80,13 +80,9 @@ pub(crate) fn reload_stimulus<'a>(
     (end, merge([boxed(control.into_iter()), boxed(edges)]))
 }
 
-/// Longer than delay lines take to be empty and CLK to come to the last column: twice the average for mismatch and slow silicon.
+/// Longer than delay lines take to be empty and CLK to come to the last column.
 fn delay_lines(sensor: &Sensor) -> Time {
-    let line = match sensor.tdc {
-        Tdc::Clocked => Time::ZERO,
-        Tdc::DelayLine => sensor.delay_element() * (2 * sensor.bins as i64),
-    };
-    line + sensor.clk_skew(sensor.cols)
+    sensor.longest_delay_line() + sensor.clk_skew(sensor.cols)
 }
 
 /// A readout from `start` on, READ_ENABLE's rise: `periods` of READ_CLK, and the time at which all bits are out.

@@ -10,7 +10,7 @@ use crate::chip::{Sensor, SensorConfig, Tdc, WindowLaw};
 use crate::files::{InputError, OutputFile, read_text};
 use crate::ranging::BinProfile;
 use crate::report::Table;
-use crate::system::{Sweep, calibrate};
+use crate::system::{Sweep, SweepError, calibrate};
 use crate::units::Time;
 
 /// Arguments of `gdtof calibrate`.
@@ -48,12 +48,12 @@ pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
         let message = "bins of a clocked TDC are CLK periods, and there is nothing to calibrate; give a sensor with tdc = \"delay_line\", such as hslidar_delay_line";
         return Err(InputError::new("--sensor", message).into());
     }
-    for (option, value, most) in [
-        ("--step-ps", args.step_ps, 1e4),
-        ("--photons-per-cycle", args.photons_per_cycle, 100.0),
+    for (option, value, least, most) in [
+        ("--step-ps", args.step_ps, 1.0, 1e3),
+        ("--photons-per-cycle", args.photons_per_cycle, 0.01, 100.0),
     ] {
-        if !(value > 0.0 && value <= most) {
-            let message = format!("{value} is impossible; give a number above 0, up to {most}");
+        if !(least..=most).contains(&value) {
+            let message = format!("{value} is impossible; give {least} to {most}");
             return Err(InputError::new(option, message).into());
         }
     }
@@ -73,8 +73,16 @@ pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
         ProgressStyle::with_template("sweeping {bar:40} {pos}/{len} macropixels, {eta} left")?,
     );
     let sensor = Sensor::from(&config);
-    let profile = calibrate(&sensor, args.stop_periods, &sweep, || progress.inc(1))?;
+    let profile = calibrate(&sensor, args.stop_periods, &sweep, || progress.inc(1));
     progress.finish_and_clear();
+    let profile = match profile {
+        Err(why @ SweepError::NoWindow { .. }) => {
+            let message = format!("{why}; give a longer laser cycle, or more counter_bits");
+            return Err(InputError::new("--stop-periods", message).into());
+        }
+        Err(SweepError::Engine(why)) => return Err(why.into()),
+        Ok(profile) => profile,
+    };
     OutputFile::write_with(&args.out, |out| {
         serde_json::to_writer(&mut *out, &profile)?;
         writeln!(out)

@@ -290,7 +290,8 @@ impl<'a> Report<'a> {
             timing,
             tolerance: frame.kept.as_ref(),
             distance: DistanceLaw::new(
-                &WindowLaw::new(alike(&settings.sensor), &settings.exposure),
+                // One law for all macropixels.
+                &WindowLaw::new(settings.sensor.alike(), &settings.exposure),
                 frame.pixels.iter().filter_map(|pixel| pixel.start),
             ),
             load_bits: frame.load_bits,
@@ -304,15 +305,6 @@ impl<'a> Report<'a> {
             histograms_shape: [frame.rows, frame.cols, frame.bins],
             macropixels: &frame.pixels,
         }
-    }
-}
-
-/// The sensor as frame.json's one law for all macropixels describes it.
-fn alike(sensor: &SensorConfig) -> SensorConfig {
-    SensorConfig {
-        delay_sigma: 0.0,
-        clk_skew_ps: 0.0,
-        ..sensor.clone()
     }
 }
 

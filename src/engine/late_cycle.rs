@@ -17,9 +17,8 @@
 use super::gate::GateSimulation;
 use super::{Histograms, PulsedPixel, Replay, Window};
 use crate::bench::Skip;
-use crate::chip::{Exposure, Mode, PCounter, SensorConfig, Tdc};
+use crate::chip::{Exposure, Mode, PCounter, SensorConfig};
 use crate::photon::SpadEvent;
-use crate::units::Time;
 
 /// Whole laser cycles that are simulated before the one that is wanted.
 const WARM_UP: u32 = 1;
@@ -49,14 +48,8 @@ pub fn late_cycle(
     match counted_before(config, exposure, pixel, first_cycle) {
         None => whole,
         Some(counted) => {
-            // What delay lines hold, twice for mismatch.
-            let line = match config.tdc {
-                Tdc::Clocked => Time::ZERO,
-                Tdc::DelayLine => config.delay_element() * (2 * config.bins as i64),
-            };
-            let busy = (config.dead_time() + line + config.clk_skew(at.1)).as_fs()
-                / exposure.clock.period().as_fs()
-                + 1;
+            let busy = config.dead_time() + config.longest_delay_line() + config.clk_skew(at.1);
+            let busy = busy.as_fs() / exposure.clock.period().as_fs() + 1;
             let skip = Skip {
                 first_cycle,
                 lead_periods: config.bins as u32 + LATENCY + busy as u32,

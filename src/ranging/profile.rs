@@ -63,12 +63,7 @@ const FREE: [&str; 10] = [
 impl BinProfile {
     /// What is assumed without a calibration: elements of the mean delay, and no skew.
     pub fn ideal(sensor: &SensorConfig, exposure: &Exposure) -> Self {
-        let alike = SensorConfig {
-            delay_sigma: 0.0,
-            clk_skew_ps: 0.0,
-            ..sensor.clone()
-        };
-        let law = WindowLaw::new(&alike, exposure);
+        let law = WindowLaw::new(sensor.alike(), exposure);
         let opens = |parity: u16| {
             let mut starts = (parity..=sensor.largest_start()).step_by(2);
             starts.find_map(|start| law.window(start).open())

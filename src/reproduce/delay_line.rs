@@ -56,13 +56,8 @@ fn measured() -> &'static Measured {
         let calibrated = calibrated.expect("the window engine follows delay lines");
         let exposure = Exposure::new(&sensor, STOP_PERIODS, LASER_CYCLES);
         let ideal = BinProfile::ideal(&sensor, &exposure);
-        let alike = SensorConfig {
-            delay_sigma: 0.0,
-            clk_skew_ps: 0.0,
-            ..(*sensor).clone()
-        };
         let arrival = Time::of_flight(PLANE_M);
-        let start = WindowLaw::new(&alike, &exposure).start_for(arrival);
+        let start = WindowLaw::new(sensor.alike(), &exposure).start_for(arrival);
         let start = start.expect("the first windows see it");
         let pulse_sigma = Time::from_s(4.5e-9 * sigma_over_fwhm());
         let stream = PhotonStream::new(&stream_config(&sensor, &exposure, 1, pulse_sigma));

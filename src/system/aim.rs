@@ -32,15 +32,10 @@ impl<'p> Aims<'p> {
         exposure: &Exposure,
         calibration: Option<&'p BinProfile>,
     ) -> Self {
-        let alike = SensorConfig {
-            delay_sigma: 0.0,
-            clk_skew_ps: 0.0,
-            ..sensor.clone()
-        };
         let ideal = || Cow::Owned(BinProfile::ideal(sensor, exposure));
         let has_lines = sensor.tdc == Tdc::DelayLine;
         Aims {
-            law: WindowLaw::new(&alike, exposure),
+            law: WindowLaw::new(sensor.alike(), exposure),
             is_calibrated: calibration.is_some(),
             profile: has_lines.then(|| calibration.map_or_else(ideal, Cow::Borrowed)),
         }

@@ -50,30 +50,26 @@ impl Default for Sweep {
 /// macropixel.
 ///
 /// # Errors
-/// What the window engine refuses.
+/// What the window engine refuses, and laser cycles without a window of either kind that can be swept.
 ///
 /// # Panics
-/// Where the TDC is clocked, or no window of either kind opens.
+/// Where the TDC is clocked.
 pub fn calibrate(
     sensor: &Sensor,
     stop_periods: u32,
     sweep: &Sweep,
     swept: impl Fn() + Sync,
-) -> Result<BinProfile, EngineError> {
+) -> Result<BinProfile, SweepError> {
     assert_eq!(
         sensor.tdc,
         Tdc::DelayLine,
         "a clocked TDC has nothing to sweep"
     );
     let exposure = Exposure::new(sensor, stop_periods, sweep.laser_cycles);
-    let mut starts = BinProfile::ideal(sensor, &exposure).starts;
-    // The first windows reach before the laser's trigger.
-    let line = sensor.delay_element().as_s() * sensor.bins as f64 * 2.0;
-    let steps = (line * sensor.clk_hz / sensor.step_periods as f64).ceil() as u16;
-    starts
-        .iter_mut()
-        .for_each(|start| *start += 2 * steps.div_ceil(2));
-
+    let starts = [
+        first_seen(sensor, &exposure, 0)?,
+        first_seen(sensor, &exposure, 1)?,
+    ];
     let law = WindowLaw::new(sensor, &exposure);
     let stream = PhotonStream::new(&stream_config(
         sensor,
@@ -81,9 +77,10 @@ pub fn calibrate(
         sweep.seed,
         sweep.pulse_sigma,
     ));
-    let line = |pixel: usize, start: u16| -> Result<LineProfile, EngineError> {
+    let line = |pixel: usize, start: u16| -> Result<LineProfile, SweepError> {
         let law = law.of_macropixel(pixel as u32);
-        let window = law.window(start).settled()?.expect("it opens");
+        let window = law.window(start).settled().map_err(EngineError::from)?;
+        let window = window.expect("it opens in the law of all");
         let seen = law.interval(&window);
         // The laser knows no more of the window than where it may be at most.
         let room = sweep.step * 40;
@@ -107,7 +104,7 @@ pub fn calibrate(
             sweep.step,
         ))
     };
-    let macropixels: Result<Vec<[LineProfile; 2]>, EngineError> = (0..sensor.pixels())
+    let macropixels: Result<Vec<[LineProfile; 2]>, SweepError> = (0..sensor.pixels())
         .into_par_iter()
         .map(|pixel| {
             let lines = [line(pixel, starts[0])?, line(pixel, starts[1])?];
@@ -120,6 +117,36 @@ pub fn calibrate(
         starts,
         macropixels: macropixels?,
     })
+}
+
+/// Why bins cannot be swept.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SweepError {
+    /// The window engine refuses.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    /// All windows begin before the laser's trigger, or end after the laser cycle.
+    #[error(
+        "no window of {} start value lies within the laser cycle, after the laser's trigger",
+        if *.is_odd { "an odd" } else { "an even" }
+    )]
+    NoWindow {
+        /// Which kind has none.
+        is_odd: bool,
+    },
+}
+
+/// The first even (`parity` 0) or odd (1) start value whose window lies after the laser's trigger, by half a line for mismatch.
+fn first_seen(sensor: &Sensor, exposure: &Exposure, parity: u16) -> Result<u16, SweepError> {
+    let law = WindowLaw::new(sensor.alike(), exposure);
+    let half = Time::from_fs(sensor.longest_delay_line().as_fs() / 4);
+    let is_seen = |start: &u16| {
+        let window = law.window(*start).open();
+        window.is_some_and(|window| law.interval(&window).start > half)
+    };
+    let mut starts = (parity..=sensor.largest_start()).step_by(2);
+    let is_odd = parity == 1;
+    starts.find(is_seen).ok_or(SweepError::NoWindow { is_odd })
 }
 
 /// Middle and length of every bin from the steps at which it is the fullest.

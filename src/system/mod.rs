@@ -15,7 +15,7 @@ mod summary;
 mod taken;
 mod tolerance;
 
-pub use calibrate::{Sweep, calibrate};
+pub use calibrate::{Sweep, SweepError, calibrate};
 pub use distance::DistanceLaw;
 pub use frame::{EngineKind, FrameError, FrameSettings, Probe, take_frame};
 pub use pixel::{NoDepth, PixelDepth};

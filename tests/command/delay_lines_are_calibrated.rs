@@ -78,6 +78,10 @@ fn what_cannot_be_calibrated_is_refused() {
             "--step-ps: 0 is impossible; give",
         ),
         (
+            "calibrate --sensor hslidar_delay_line --rows 1 --cols 2 --stop-periods 4",
+            "--stop-periods: no window of an odd start value lies within the laser cycle",
+        ),
+        (
             "frame --sensor hslidar_delay_line --stop-periods 140 --calibration text.json",
             "text.json:1: this is no bin profile",
         ),
