@@ -17,35 +17,19 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::finished;
+use super::{finished, front_end};
 use crate::netlist::{CellKind, Module, ModuleBuilder, OwnDelay};
 use crate::units::Time;
 
 /// Delay of an XOR or the driver in the typical corner, fs: between those of the library's XOR to either side.
 const STAGE_FS: u32 = 57_553;
 
-/// A pulse of one SPAD as an edge. Ports: SPAD_RAW, PIXEL_CLEAR → TOGGLE.
-fn toggling() -> Arc<Module> {
-    let mut m = ModuleBuilder::new("toggling");
-    let raw = m.input("SPAD_RAW");
-    let clear = m.input("PIXEL_CLEAR");
-    let toggle = m.output("TOGGLE");
-    let toggle_n = m.wire("TOGGLE_N");
-    m.cell(
-        "toggle",
-        CellKind::Dffr,
-        &[toggle_n, raw, clear],
-        &[toggle, toggle_n],
-    );
-    finished(m.finish())
-}
-
 /// The photon line of so many SPADs, a power of two.
 ///
 /// Ports: SPAD_RAW\<SPADs\>, PIXEL_CLEAR → PHOTONS.
 pub fn circuit(spads: usize) -> Arc<Module> {
     debug_assert!(spads.is_power_of_two(), "every SPAD passes as many XORs");
-    let toggling = toggling();
+    let toggle = front_end::xor_tree::toggle();
     let mut m = ModuleBuilder::new("photon_line");
     let raw = m.input_bus("SPAD_RAW", spads);
     let clear = m.input("PIXEL_CLEAR");
@@ -54,7 +38,7 @@ pub fn circuit(spads: usize) -> Arc<Module> {
     for spad in 0..spads {
         m.instance(
             &format!("spad_{spad}"),
-            &toggling,
+            &toggle,
             &[
                 ("SPAD_RAW", &raw[spad..=spad]),
                 ("PIXEL_CLEAR", &[clear]),

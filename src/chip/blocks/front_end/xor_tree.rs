@@ -19,8 +19,8 @@ use super::{JOINED, Pins};
 use crate::chip::blocks::finished;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
-/// Toggle of one SPAD. Ports: SPAD_RAW, PIXEL_CLEAR → TOGGLE.
-fn toggle() -> Arc<Module> {
+/// Toggle of one SPAD: every pulse is an edge. Ports: SPAD_RAW, PIXEL_CLEAR → TOGGLE.
+pub(in crate::chip::blocks) fn toggle() -> Arc<Module> {
     let mut m = ModuleBuilder::new("toggle");
     let raw = m.input("SPAD_RAW");
     let clear = m.input("PIXEL_CLEAR");
