@@ -1,4 +1,4 @@
-//! Step and lock: how HSLIDAR finds targets without a guide (thesis 4.9, after the chip's own publication): every macropixel steps
+//! Step and lock: how HSLIDAR finds targets without a guide (thesis 4.9): every macropixel steps
 //! its window over the range until a peak shows, locks on to it, and follows it to the windows beside.
 //!
 //! ```text
@@ -8,7 +8,7 @@
 //!   locked ──peak in its first or last bins──► window before or after it ──┘
 //! ```
 //!
-//! One exposure is one step. The chip decides by comparing bins with each other; which comparison is not published, and here it is the
+//! One exposure is one step. The chip decides by comparing bins with each other; which comparison the thesis does not say, and here it is the
 //! test that ranging makes of a peak ([`Scan`](crate::theory::significance::Scan)), at a false-alarm rate of its own.
 
 use crate::chip::WindowLaw;

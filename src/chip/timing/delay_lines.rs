@@ -14,7 +14,7 @@ use crate::units::Time;
 /// after an edge of PHOTONS, rising.
 pub(crate) type Taps = Arc<[Vec<Time>]>;
 
-/// The delay lines of an array. Each macropixel's are measured when they are first asked for, in 20 µs.
+/// The delay lines of an array. Each macropixel's are measured when they are first asked for.
 #[derive(Debug)]
 pub(crate) struct DelayLines {
     netlist: Netlist,
