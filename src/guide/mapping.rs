@@ -83,7 +83,7 @@ impl GuideMap {
 
 /// Camera pixels from one measurement to the next.
 fn stride(rig: &StereoRig, lidar: &PinholeCamera) -> u32 {
-    let camera_px_per_macropixel = rig.camera().focal_px / lidar.focal_px;
+    let camera_px_per_macropixel = rig.camera().focal_px / lidar.focal_px.max(lidar.focal_v_px);
     (camera_px_per_macropixel / SAMPLES_ACROSS).floor().max(1.0) as u32
 }
 

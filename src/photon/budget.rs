@@ -54,12 +54,13 @@ pub enum Spot {
 }
 
 impl Spot {
-    /// Share of the laser's power that falls on one pixel's area on the target (Eq. 7 and 8 times Eq. 11).
-    pub fn share_per_pixel(self, rows: u32, cols: u32) -> f64 {
+    /// Share of the laser's power that falls on the area on the target of one pixel with this pitch in x and y, in any unit (Eq. 7
+    /// and 8 times Eq. 11).
+    pub fn share_per_pixel(self, rows: u32, cols: u32, [x, y]: [f64; 2]) -> f64 {
         let (rows, cols) = (f64::from(rows), f64::from(cols));
         match self {
             Spot::Rectangle => 1.0 / (rows * cols),
-            Spot::Round => 4.0 / (PI * (rows * rows + cols * cols)),
+            Spot::Round => 4.0 * x * y / (PI * ((rows * y).powi(2) + (cols * x).powi(2))),
         }
     }
 }
@@ -79,8 +80,8 @@ pub struct PhotonBudget {
     pub lens_diameter_m: f64,
     /// Focal length of the lens, m.
     pub lens_focal_m: f64,
-    /// Pitch of a (square) macropixel, m; its square is A_pix.
-    pub pixel_pitch_m: f64,
+    /// Pitch of a macropixel in x and y, m; their product is A_pix.
+    pub pixel_pitch_m: [f64; 2],
     /// Rows of the array.
     pub rows: u32,
     /// Columns of the array.
@@ -112,8 +113,7 @@ impl PhotonBudget {
     /// under `illuminance_klux` of sunlight: Eq. 16, independent of the range, because the growing
     /// footprint (Eq. 11) and the shrinking lens share cancel.
     pub fn background_hz(&self, reflectivity: f64, illuminance_klux: f64) -> f64 {
-        let radians = self.pixel_pitch_m / self.lens_focal_m;
-        let etendue_m2 = (radians * self.lens_diameter_m / 2.0).powi(2);
+        let etendue_m2 = self.solid_angle_sr() * (self.lens_diameter_m / 2.0).powi(2);
         self.background_per_m2(reflectivity, illuminance_klux) * etendue_m2
     }
 
@@ -136,20 +136,32 @@ impl PhotonBudget {
 
     /// A_scene of Eq. 11: what one macropixel sees of a target at `range_m`, m².
     pub fn scene_area_m2(&self, range_m: f64) -> f64 {
-        (self.pixel_pitch_m * range_m / self.lens_focal_m).powi(2)
+        self.solid_angle_sr() * range_m * range_m
+    }
+
+    /// What one macropixel sees, sr: A_pix over f².
+    fn solid_angle_sr(&self) -> f64 {
+        let [x_m, y_m] = self.pixel_pitch_m;
+        x_m * y_m / self.lens_focal_m.powi(2)
     }
 
     /// M_target,source of Eq. 7 and 8, per pulse instead of per second: the laser's energy on the target at
     /// `range_m`, J/m². What Eq. 9 makes of it is [`PhotonBudget::signal_per_pulse`].
     pub fn target_exposure_j_m2(&self, range_m: f64) -> f64 {
-        let share = self.spot.share_per_pixel(self.rows, self.cols);
-        self.pulse_energy_j * share / self.scene_area_m2(range_m)
+        self.pixel_energy_j() / self.scene_area_m2(range_m)
     }
 
     /// What would be detected of one pulse if the lens took all that the pixel's target sends back.
     fn signal_at_target(&self, range_m: f64, reflectivity: f64) -> f64 {
-        let pixel_j = self.pulse_energy_j * self.spot.share_per_pixel(self.rows, self.cols);
-        self.atmosphere.round_trip(range_m) * self.counts_per_joule(reflectivity) * pixel_j
+        self.atmosphere.round_trip(range_m)
+            * self.counts_per_joule(reflectivity)
+            * self.pixel_energy_j()
+    }
+
+    /// What of a pulse falls on one pixel's area on the target, J.
+    fn pixel_energy_j(&self) -> f64 {
+        let share = (self.spot).share_per_pixel(self.rows, self.cols, self.pixel_pitch_m);
+        self.pulse_energy_j * share
     }
 
     /// Detections per second and square metre of sunlit target, before the lens's share.
@@ -177,7 +189,7 @@ impl PhotonBudget {
             pulse_energy_j: 50e-6,
             lens_diameter_m: lens.diameter_m,
             lens_focal_m: lens.focal_m(),
-            pixel_pitch_m: 30e-6,
+            pixel_pitch_m: [30e-6; 2],
             rows: 63,
             cols: 200,
             solar_irradiance_w_m2: band_irradiance(&Filter::new(905.0, 20.0, FilterShape::TopHat)),
@@ -273,11 +285,13 @@ mod tests {
 
     #[test]
     fn a_round_spot_wastes_light() {
-        let ratio = |rows, cols| {
-            Spot::Rectangle.share_per_pixel(rows, cols) / Spot::Round.share_per_pixel(rows, cols)
+        let ratio = |rows, cols, pitch| {
+            Spot::Rectangle.share_per_pixel(rows, cols, pitch)
+                / Spot::Round.share_per_pixel(rows, cols, pitch)
         };
-        assert!((ratio(64, 64) - PI / 2.0).abs() < 1e-12);
-        assert!(ratio(63, 200) > PI / 2.0);
+        assert!((ratio(64, 64, [1.0; 2]) - PI / 2.0).abs() < 1e-12);
+        assert!((ratio(64, 32, [27.0, 54.0]) - PI / 2.0).abs() < 1e-12);
+        assert!(ratio(63, 200, [1.0; 2]) > PI / 2.0);
     }
 
     #[test]

@@ -2,16 +2,18 @@
 //! Equations 30 to 32).
 //!
 //! Pixel coordinates are continuous: pixel number i covers [i, i + 1) and has its centre at
-//! i + 0.5. With focal length f in pixels and principal point (u₀, v₀), K is
-//! `[f 0 u₀; 0 f v₀; 0 0 1]`. The camera looks along +z from the origin of its own coordinates.
+//! i + 0.5. With focal lengths f_u in pixel widths and f_v in pixel heights and principal point (u₀, v₀), K is
+//! `[f_u 0 u₀; 0 f_v v₀; 0 0 1]`. The camera looks along +z from the origin of its own coordinates.
 
 use glam::DVec3;
 
-/// A camera without distortion and with square pixels.
+/// A camera without distortion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PinholeCamera {
-    /// Focal length in pixels.
+    /// Focal length in widths of a pixel (f_u).
     pub focal_px: f64,
+    /// Focal length in heights of a pixel (f_v).
+    pub focal_v_px: f64,
     /// Columns.
     pub width: u32,
     /// Rows.
@@ -21,17 +23,18 @@ pub struct PinholeCamera {
 }
 
 impl PinholeCamera {
-    /// A camera whose principal point is the middle of its image.
+    /// A camera with square pixels whose principal point is the middle of its image.
     pub fn centred(focal_px: f64, width: u32, height: u32) -> Self {
         PinholeCamera {
             focal_px,
+            focal_v_px: focal_px,
             width,
             height,
             centre: (f64::from(width) / 2.0, f64::from(height) / 2.0),
         }
     }
 
-    /// A centred camera that sees `fov_deg` degrees (0 to 180, exclusive) from its left to its
+    /// A centred camera with square pixels that sees `fov_deg` degrees (0 to 180, exclusive) from its left to its
     /// right edge.
     pub fn with_horizontal_fov(fov_deg: f64, width: u32, height: u32) -> Self {
         let half_width = f64::from(width) / 2.0;
@@ -39,11 +42,20 @@ impl PinholeCamera {
         Self::centred(focal_px, width, height)
     }
 
+    /// This camera with pixels that are `aspect` (> 0) times as high as wide.
+    #[must_use]
+    pub fn with_pixel_aspect(self, aspect: f64) -> Self {
+        PinholeCamera {
+            focal_v_px: self.focal_px / aspect,
+            ..self
+        }
+    }
+
     /// The world point at depth z = 1 that pixel coordinates (u, v) see: K⁻¹·(u, v, 1), Eq. 30.
     pub fn at_unit_depth(&self, (u, v): (f64, f64)) -> DVec3 {
         DVec3::new(
             (u - self.centre.0) / self.focal_px,
-            (v - self.centre.1) / self.focal_px,
+            (v - self.centre.1) / self.focal_v_px,
             1.0,
         )
     }
@@ -54,7 +66,7 @@ impl PinholeCamera {
         (point.z > 0.0).then(|| {
             (
                 self.focal_px * point.x / point.z + self.centre.0,
-                self.focal_px * point.y / point.z + self.centre.1,
+                self.focal_v_px * point.y / point.z + self.centre.1,
             )
         })
     }
@@ -97,10 +109,25 @@ mod tests {
         assert_eq!(camera.pixel_at((63.9, 3.2)), Some((3, 63)));
     }
 
+    #[test]
+    fn hslidar_sees_16_by_4_degrees() {
+        // Macropixels of 114 um x 54 um behind 25 mm (thesis 6.3.1).
+        let camera = PinholeCamera::centred(25e-3 / 114e-6, 64, 32).with_pixel_aspect(54.0 / 114.0);
+        let corner = camera.at_unit_depth((64.0, 32.0));
+        let (h, v) = (corner.x.atan(), corner.y.atan());
+        assert!((2.0 * h.to_degrees() - 16.6).abs() < 0.05, "{h}");
+        assert!((2.0 * v.to_degrees() - 3.96).abs() < 0.01, "{v}");
+    }
+
     proptest! {
         #[test]
-        fn projection_undoes_the_ray(u in 0.0f64..1440.0, v in 0.0f64..1080.0, z in 0.1f64..500.0) {
-            let camera = PinholeCamera::centred(3478.0, 1440, 1080);
+        fn projection_undoes_the_ray(
+            u in 0.0f64..1440.0,
+            v in 0.0f64..1080.0,
+            z in 0.1f64..500.0,
+            aspect in 0.1f64..10.0,
+        ) {
+            let camera = PinholeCamera::centred(3478.0, 1440, 1080).with_pixel_aspect(aspect);
             let (u2, v2) = camera.project(camera.at_unit_depth((u, v)) * z).unwrap();
             prop_assert!((u - u2).abs() < 1e-9 && (v - v2).abs() < 1e-9);
         }

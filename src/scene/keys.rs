@@ -32,8 +32,15 @@ pub(super) const LIDAR: &[Key] = &[
         "fov_deg",
         "deg",
         Range::Within(0.1, 150.0),
-        "Horizontal field of view; the vertical one follows from the sensor's rows, as macropixels are square",
+        "Horizontal field of view; the vertical one follows from the sensor's rows and the shape of its macropixels",
         "chosen: 64 columns of 0.25 degrees",
+    ),
+    key(
+        "macropixel_aspect",
+        "",
+        Range::Within(0.01, 100.0),
+        "Height of a macropixel over its width; HSLIDAR's are 54 um over 114 um",
+        "chosen: square",
     ),
     key(
         "wavelength_nm",
