@@ -114,16 +114,16 @@ mod tests {
         let mut scene = Scene::outdoor();
         scene.stereo.disparity_sigma_px = 0.0;
         scene.stereo.subpixel_steps = 65_536;
-        scene.objects = vec![Object {
-            name: "wall".into(),
-            reflectivity: 0.5,
-            shape: Shape::Plane {
+        scene.objects = vec![Object::new(
+            "wall",
+            0.5,
+            Shape::Plane {
                 centre_m: DVec3::new(0.0, 0.0, z_m),
                 normal: DVec3::new(0.0, 0.0, -1.0),
                 width_m: 1e4,
                 height_m: 1e4,
             },
-        }];
+        )];
         scene
     }
 

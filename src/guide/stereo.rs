@@ -133,16 +133,16 @@ mod tests {
     use crate::scene::{Object, Shape};
 
     fn wall(z_m: f64, half_width_m: f64) -> Object {
-        Object {
-            name: "wall".into(),
-            reflectivity: 0.5,
-            shape: Shape::Plane {
+        Object::new(
+            "wall",
+            0.5,
+            Shape::Plane {
                 centre_m: DVec3::new(0.0, 0.0, z_m),
                 normal: DVec3::new(0.0, 0.0, -1.0),
                 width_m: 2.0 * half_width_m,
                 height_m: 1e4,
             },
-        }
+        )
     }
 
     fn scene_with(objects: Vec<Object>) -> Scene {

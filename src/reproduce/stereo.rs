@@ -25,16 +25,16 @@ const HSLIDAR_STEP_BINS: f64 = 12.5 / 2.6;
 /// The built-in rig before a wall across the whole view.
 fn wall_at(depth_m: f64) -> Scene {
     let mut scene = Scene::outdoor();
-    scene.objects = vec![Object {
-        name: "wall".into(),
-        reflectivity: 0.1,
-        shape: Shape::Plane {
+    scene.objects = vec![Object::new(
+        "wall",
+        0.1,
+        Shape::Plane {
             centre_m: DVec3::new(0.0, 0.0, depth_m),
             normal: DVec3::new(0.0, 0.0, -1.0),
             width_m: 1e4,
             height_m: 1e4,
         },
-    }];
+    )];
     scene
 }
 

@@ -22,6 +22,12 @@ pub(super) struct ObjectEntry {
     kind: Kind,
     reflectivity: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
+    grey: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    retro: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    velocity_m_s: Option<DVec3>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     depth_m: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     centre_m: Option<DVec3>,
@@ -107,9 +113,10 @@ impl TryFrom<ObjectEntry> for Object {
             }
         };
         Ok(Object {
-            name: entry.name,
-            reflectivity: entry.reflectivity,
-            shape,
+            grey: entry.grey,
+            retro: entry.retro.unwrap_or(1.0),
+            velocity_m_s: entry.velocity_m_s.unwrap_or(DVec3::ZERO),
+            ..Object::new(entry.name, entry.reflectivity, shape)
         })
     }
 }
@@ -120,6 +127,9 @@ impl From<Object> for ObjectEntry {
             name: object.name,
             kind: Kind::Ground,
             reflectivity: object.reflectivity,
+            grey: object.grey,
+            retro: (object.retro != 1.0).then_some(object.retro),
+            velocity_m_s: (object.velocity_m_s != DVec3::ZERO).then_some(object.velocity_m_s),
             depth_m: None,
             centre_m: None,
             normal: None,

@@ -305,9 +305,13 @@ mod tests {
         assert_eq!(lines.len(), 8, "{told}");
     }
 
+    /// Objects that have the keys which the street's lack.
+    const FURTHER: &str = "[[object]]\nname = \"sign\"\nkind = \"sphere\"\ncentre_m = [0, 0, 9]\nradius_m = 1\n\
+        reflectivity = 0.9\ngrey = 0.1\nretro = 500\nvelocity_m_s = [1, 0, \"-2 m/s\"]\n";
+
     #[test]
     fn the_commented_scene_reads_back_and_has_every_key() {
-        let street = Scene::outdoor();
+        let street = Scene::parse("further", &format!("{OUTDOOR}{FURTHER}")).unwrap();
         let text = street.commented();
         assert_eq!(Scene::parse("printed", &text).unwrap(), street);
         // Every key of the structs, as serde knows them, is in the tables and in the text, and the other way round.

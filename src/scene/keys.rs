@@ -240,6 +240,27 @@ pub(super) const OBJECT: &[Key] = &[
         "-",
     ),
     key(
+        "grey",
+        "",
+        SHARE,
+        "Lambertian reflectivity that the cameras see; as reflectivity if left out",
+        "-",
+    ),
+    key(
+        "retro",
+        "",
+        Range::Within(1.0, 1e4),
+        "How many times more of the laser's light returns than from a Lambertian surface; 1 if left out, traffic signs 300 to 2000",
+        "chosen: pi * 100 to 700 cd/lx/m2 of signs' sheeting, over a reflectivity of 1",
+    ),
+    key(
+        "velocity_m_s",
+        "m/s",
+        Range::Within(-1e4, 1e4),
+        "Velocity in the world, [right, down, forward]; at rest if left out",
+        "-",
+    ),
+    key(
         "depth_m",
         "m",
         LENGTH,

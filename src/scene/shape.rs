@@ -8,6 +8,8 @@ use super::vector::{Ray, turned};
 const NEAREST_M: f64 = 1e-6;
 
 /// A thing that reflects light, evenly and diffusely.
+///
+/// Make one with [`Object::new`], then change what is to differ.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(
     into = "super::entry::ObjectEntry",
@@ -18,8 +20,29 @@ pub struct Object {
     pub name: String,
     /// Lambertian reflectivity at the laser's wavelength, 0 to 1.
     pub reflectivity: f64,
-    /// Where and what it is.
+    /// Lambertian reflectivity where the cameras see, 0 to 1; `None` for the same as the laser's.
+    pub grey: Option<f64>,
+    /// By how much more of the laser's light returns than a Lambertian surface of this reflectivity sends back, 1 or
+    /// more: retroreflectors. Sunlight does not return so.
+    pub retro: f64,
+    /// Velocity in the world, m/s.
+    pub velocity_m_s: DVec3,
+    /// Where and what it is at time 0.
     pub shape: Shape,
+}
+
+impl Object {
+    /// A thing at rest that looks alike to laser and cameras.
+    pub fn new(name: impl Into<String>, reflectivity: f64, shape: Shape) -> Self {
+        Object {
+            name: name.into(),
+            reflectivity,
+            grey: None,
+            retro: 1.0,
+            velocity_m_s: DVec3::ZERO,
+            shape,
+        }
+    }
 }
 
 /// Geometry of an object, all lengths in metres.
@@ -77,6 +100,44 @@ impl Shape {
             } => intersect_box(ray, centre_m, size_m, yaw_deg.to_radians()),
             Shape::Sphere { centre_m, radius_m } => intersect_sphere(ray, centre_m, radius_m),
         }
+    }
+
+    /// A unit vector at right angles to the surface at `point`, which lies on it; of the two it is any.
+    pub(super) fn normal_at(&self, point: DVec3) -> DVec3 {
+        match *self {
+            Shape::Ground { .. } => DVec3::NEG_Y,
+            Shape::Plane { normal, .. } => normal.normalize(),
+            Shape::Box {
+                centre_m,
+                size_m,
+                yaw_deg,
+            } => {
+                let (sine, cosine) = yaw_deg.to_radians().sin_cos();
+                let inside = turned(point - centre_m, (cosine, -sine));
+                // Of the six faces the point lies on the one that it is nearest to.
+                let depths = size_m * 0.5 - inside.abs();
+                let axis = (0..3).fold(0, |least, axis| match depths[axis] < depths[least] {
+                    true => axis,
+                    false => least,
+                });
+                let mut normal = DVec3::ZERO;
+                normal[axis] = 1.0;
+                turned(normal, (cosine, sine))
+            }
+            Shape::Sphere { centre_m, .. } => (point - centre_m).normalize(),
+        }
+    }
+
+    /// The shape at another place.
+    pub(super) fn shifted(self, by_m: DVec3) -> Self {
+        let mut moved = self;
+        match &mut moved {
+            Shape::Ground { depth_m } => *depth_m += by_m.y,
+            Shape::Plane { centre_m, .. }
+            | Shape::Box { centre_m, .. }
+            | Shape::Sphere { centre_m, .. } => *centre_m += by_m,
+        }
+        moved
     }
 }
 

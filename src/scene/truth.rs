@@ -1,43 +1,13 @@
-//! What is really there: the nearest surface along a ray, and that of every macropixel.
+//! What is really there: the surface that every macropixel sees.
 //!
 //! A macropixel is taken to see one point, the one on the ray through its centre; edges that
 //! cross a macropixel do not mix two distances.
 
 use glam::DVec3;
 
+use super::cast::Hit;
 use super::settings::Scene;
 use super::vector::Ray;
-
-/// The first surface point along a ray.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hit {
-    /// Distance from the ray's origin, m.
-    pub range_m: f64,
-    /// Reflectivity of the surface, 0 to 1.
-    pub reflectivity: f64,
-    /// Index into [`Scene::objects`].
-    pub object: usize,
-}
-
-impl Scene {
-    /// The nearest surface along `ray`; `None` for the sky. Of two in the same place the one
-    /// listed first in the scene counts.
-    pub fn hit(&self, ray: &Ray) -> Option<Hit> {
-        let mut nearest: Option<Hit> = None;
-        for (index, object) in self.objects.iter().enumerate() {
-            if let Some(range_m) = object.shape.intersect(ray)
-                && nearest.is_none_or(|n| range_m < n.range_m)
-            {
-                nearest = Some(Hit {
-                    range_m,
-                    reflectivity: object.reflectivity,
-                    object: index,
-                });
-            }
-        }
-        nearest
-    }
-}
 
 /// True range and reflectivity of every macropixel, row by row from the top left.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,16 +56,13 @@ mod tests {
     /// The outdoor optics before a wall at `z_m`.
     fn wall(z_m: f64) -> Scene {
         let mut scene = Scene::outdoor();
-        scene.objects = vec![Object {
-            name: "wall".into(),
-            reflectivity: 0.4,
-            shape: Shape::Plane {
-                centre_m: DVec3::new(0.0, 0.0, z_m),
-                normal: DVec3::new(0.0, 0.0, 1.0),
-                width_m: 1e4,
-                height_m: 1e4,
-            },
-        }];
+        let shape = Shape::Plane {
+            centre_m: DVec3::new(0.0, 0.0, z_m),
+            normal: DVec3::new(0.0, 0.0, 1.0),
+            width_m: 1e4,
+            height_m: 1e4,
+        };
+        scene.objects = vec![Object::new("wall", 0.4, shape)];
         scene
     }
 
@@ -107,17 +74,6 @@ mod tests {
         let expected = 50.0 * (1.0 + 2.0 * half * half).sqrt();
         assert!((corner - expected).abs() < 1e-9, "{corner} {expected}");
         assert!(truth.reflectivity.iter().all(|&r| r == 0.4));
-    }
-
-    #[test]
-    fn the_nearest_surface_hides_the_others() {
-        let mut scene = wall(50.0);
-        let near = wall(20.0).objects[0].clone();
-        scene.objects.push(near);
-        let hit = scene
-            .hit(&Ray::new(DVec3::ZERO, DVec3::new(0.0, 0.0, 1.0)))
-            .unwrap();
-        assert_eq!((hit.range_m, hit.object), (20.0, 1));
     }
 
     #[test]

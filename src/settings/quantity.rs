@@ -6,6 +6,7 @@ enum Dimension {
     Time,
     Frequency,
     Length,
+    Speed,
     Angle,
     Energy,
     Illuminance,
@@ -20,6 +21,7 @@ impl Dimension {
             Dimension::Time => "a time",
             Dimension::Frequency => "a frequency",
             Dimension::Length => "a length",
+            Dimension::Speed => "a velocity",
             Dimension::Angle => "an angle",
             Dimension::Energy => "an energy",
             Dimension::Illuminance => "an illuminance",
@@ -31,7 +33,7 @@ impl Dimension {
 }
 
 /// Symbol, what it measures, and its power of ten of the dimension's base unit.
-const UNITS: [(&str, Dimension, i32); 42] = [
+const UNITS: [(&str, Dimension, i32); 44] = [
     ("s", Dimension::Time, 0),
     ("ms", Dimension::Time, -3),
     ("us", Dimension::Time, -6),
@@ -50,6 +52,8 @@ const UNITS: [(&str, Dimension, i32); 42] = [
     ("um", Dimension::Length, -6),
     ("µm", Dimension::Length, -6),
     ("nm", Dimension::Length, -9),
+    ("m/s", Dimension::Speed, 0),
+    ("km/s", Dimension::Speed, 3),
     ("deg", Dimension::Angle, 0),
     ("°", Dimension::Angle, 0),
     ("J", Dimension::Energy, 0),

@@ -157,16 +157,16 @@ fn modelled_counts(
     let mut scene = Scene::outdoor();
     scene.lidar.pulse_energy_uj = 0.1;
     scene.light.illuminance_klux = 10.0;
-    scene.objects = vec![Object {
-        name: "plane".into(),
+    scene.objects = vec![Object::new(
+        "plane",
         reflectivity,
-        shape: Shape::Plane {
+        Shape::Plane {
             centre_m: DVec3::new(0.0, 0.0, distance_m),
             normal: DVec3::new(0.0, 0.0, -1.0),
             width_m: 100.0,
             height_m: 100.0,
         },
-    }];
+    )];
     scene.validate("the plane").unwrap();
     let light = scene.pixel_light(&GroundTruth::render(&scene, 3, 3));
     let pixels: Vec<LitPixel> = zones
