@@ -3,6 +3,7 @@
 mod quality;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -15,7 +16,7 @@ use crate::chip::{Mode, SensorConfig, Silicon};
 use crate::engine::waveform::WaveCycles;
 use crate::engine::{CohortOptions, Work};
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
-use crate::guide::GuideMap;
+use crate::guide::{BehaviouralStereo, GuideMap};
 use crate::ranging::DepthOptions;
 use crate::report::{Table, write_npy_u16};
 use crate::scene::Scene;
@@ -134,6 +135,7 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
             ..DepthOptions::default()
         },
         calibration,
+        guide: Arc::new(BehaviouralStereo),
     };
     let progress = ProgressBar::new(settings.sensor.pixels() as u64).with_style(
         ProgressStyle::with_template("exposing {bar:40} {pos}/{len} macropixels, {eta} left")?,

@@ -27,7 +27,7 @@ pub(super) fn is_bad_input(error: &anyhow::Error) -> bool {
     error.is::<InputError>()
         || matches!(error.downcast_ref::<EngineError>(), Some(e) if e.is_refusal())
         || match error.downcast_ref() {
-            Some(FrameError::Input(_)) => true,
+            Some(FrameError::Input(_) | FrameError::Guide(_)) => true,
             Some(FrameError::Engine(error) | FrameError::Refused { why: error, .. }) => {
                 error.is_refusal()
             }

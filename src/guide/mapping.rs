@@ -15,6 +15,7 @@
 
 use rayon::prelude::*;
 
+use super::map::GuideMap;
 use super::stereo::{StereoPoint, StereoRig};
 use crate::scene::{PinholeCamera, Scene};
 
@@ -24,18 +25,6 @@ use crate::scene::{PinholeCamera, Scene};
 /// more would cost time and change little.
 const SAMPLES_ACROSS: f64 = 3.0;
 
-/// The guide's estimate for every macropixel.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GuideMap {
-    /// Rows of the array.
-    pub rows: u32,
-    /// Columns of the array.
-    pub cols: u32,
-    /// Distance from the lidar to the estimated point (radial, as a time of flight measures it,
-    /// not z), m; `None` where no camera pixel landed. Row by row, length rows·cols.
-    pub range_m: Vec<Option<f64>>,
-}
-
 /// A stereo point that has landed in the lidar's image.
 #[derive(Debug, Clone, Copy)]
 struct Landing {
@@ -43,42 +32,33 @@ struct Landing {
     /// Squared distance from the macropixel's centre, in macropixels².
     off_centre2: f64,
     range_m: f64,
+    sigma_m: f64,
 }
 
-impl GuideMap {
-    /// Measures with the scene's stereo rig and maps onto a `rows` × `cols` array; equal seeds
-    /// give equal maps, whatever the number of threads.
-    pub fn estimate(scene: &Scene, rows: u32, cols: u32, seed: u64) -> Self {
-        let rig = StereoRig::new(scene, seed);
-        let lidar = scene.lidar_camera(rows, cols);
-        let stride = stride(&rig, &lidar);
-        let image_rows: Vec<u32> = offsets(rig.camera().height, stride).collect();
-        let landings: Vec<Vec<Landing>> = image_rows
-            .par_iter()
-            .map(|&row| {
-                offsets(rig.camera().width, stride)
-                    .filter_map(|col| land(scene, &lidar, &rig.measure(row, col)?))
-                    .collect()
-            })
-            .collect();
-        let mut best: Vec<Option<Landing>> = vec![None; rows as usize * cols as usize];
-        for landing in landings.into_iter().flatten() {
-            let slot = &mut best[landing.index];
-            if slot.is_none_or(|b| landing.off_centre2 < b.off_centre2) {
-                *slot = Some(landing);
-            }
-        }
-        GuideMap {
-            rows,
-            cols,
-            range_m: best.iter().map(|b| b.map(|b| b.range_m)).collect(),
+/// Measures with the scene's stereo rig and maps onto a `rows` × `cols` array; equal seeds
+/// give equal maps, whatever the number of threads.
+pub(super) fn of_rig(scene: &Scene, rows: u32, cols: u32, seed: u64) -> GuideMap {
+    let rig = StereoRig::new(scene, seed);
+    let lidar = scene.lidar_camera(rows, cols);
+    let stride = stride(&rig, &lidar);
+    let image_rows: Vec<u32> = offsets(rig.camera().height, stride).collect();
+    let landings: Vec<Vec<Landing>> = image_rows
+        .par_iter()
+        .map(|&row| {
+            offsets(rig.camera().width, stride)
+                .filter_map(|col| land(&rig, scene, &lidar, &rig.measure(row, col)?))
+                .collect()
+        })
+        .collect();
+    let mut best: Vec<Option<Landing>> = vec![None; rows as usize * cols as usize];
+    for landing in landings.into_iter().flatten() {
+        let slot = &mut best[landing.index];
+        if slot.is_none_or(|b| landing.off_centre2 < b.off_centre2) {
+            *slot = Some(landing);
         }
     }
-
-    /// How many macropixels have an estimate.
-    pub fn guided(&self) -> usize {
-        self.range_m.iter().flatten().count()
-    }
+    let estimates = best.iter().map(|b| b.map(|b| (b.range_m, b.sigma_m)));
+    GuideMap::new(rows, cols, estimates)
 }
 
 /// Camera pixels from one measurement to the next.
@@ -93,15 +73,24 @@ fn offsets(size: u32, stride: u32) -> impl Iterator<Item = u32> {
 }
 
 /// Where in the lidar's image a stereo point lands; `None` outside.
-fn land(scene: &Scene, lidar: &PinholeCamera, point: &StereoPoint) -> Option<Landing> {
+fn land(
+    rig: &StereoRig,
+    scene: &Scene,
+    lidar: &PinholeCamera,
+    point: &StereoPoint,
+) -> Option<Landing> {
     let from_lidar = point.point_m + scene.stereo.position_m;
     let (u, v) = lidar.project(from_lidar)?;
     let (row, col) = lidar.pixel_at((u, v))?;
     let (du, dv) = (u - f64::from(col) - 0.5, v - f64::from(row) - 0.5);
+    // The error is along the camera's ray: what of it the lidar sees as range is its share along the lidar's.
+    let range_per_depth = from_lidar.normalize().dot(point.point_m) / point.depth_m;
+    let sigma_m = rig.depth_sigma_m(point.depth_m);
     Some(Landing {
         index: row as usize * lidar.width as usize + col as usize,
         off_centre2: du * du + dv * dv,
         range_m: from_lidar.length(),
+        sigma_m: sigma_m * range_per_depth.abs(),
     })
 }
 
@@ -132,7 +121,7 @@ mod tests {
         for position_m in [DVec3::ZERO, DVec3::new(-0.5, 0.1, 0.3)] {
             let mut scene = perfect_wall(60.0);
             scene.stereo.position_m = position_m;
-            let guide = GuideMap::estimate(&scene, 64, 64, 0);
+            let guide = of_rig(&scene, 64, 64, 0);
             let truth = GroundTruth::render(&scene, 64, 64);
             assert_eq!(guide.guided(), 64 * 64);
             for (g, t) in guide
@@ -150,7 +139,7 @@ mod tests {
     #[test]
     fn the_street_is_guided_almost_everywhere_but_in_the_sky() {
         let scene = Scene::outdoor();
-        let guide = GuideMap::estimate(&scene, 64, 64, 1);
+        let guide = of_rig(&scene, 64, 64, 1);
         let truth = GroundTruth::render(&scene, 64, 64);
         let rig = StereoRig::new(&scene, 1);
         let (mut surfaces, mut guided, mut close) = (0, 0, 0);
@@ -174,19 +163,19 @@ mod tests {
     #[test]
     fn a_seed_gives_the_same_map_on_any_number_of_threads() {
         let scene = Scene::outdoor();
-        let here = GuideMap::estimate(&scene, 16, 16, 5);
+        let here = of_rig(&scene, 16, 16, 5);
         let alone = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
             .build()
             .unwrap()
-            .install(|| GuideMap::estimate(&scene, 16, 16, 5));
+            .install(|| of_rig(&scene, 16, 16, 5));
         assert_eq!(here, alone);
-        assert_ne!(here, GuideMap::estimate(&scene, 16, 16, 6));
+        assert_ne!(here, of_rig(&scene, 16, 16, 6));
     }
 
     #[test]
     fn an_array_finer_than_the_camera_has_gaps_but_works() {
-        let guide = GuideMap::estimate(&perfect_wall(60.0), 64, 2048, 0);
+        let guide = of_rig(&perfect_wall(60.0), 64, 2048, 0);
         assert!(guide.guided() > 0 && guide.guided() < 64 * 2048);
     }
 }

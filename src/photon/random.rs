@@ -39,6 +39,8 @@ pub enum Purpose {
     BrightBreedingSignal = 12,
     /// Which photons of a layer of light are kept.
     Thinning = 13,
+    /// Errors of guides other than the camera pair.
+    Guide = 20,
 }
 
 /// The stream of random words for (`seed`, `purpose`, `index`, `sub_index`).

@@ -288,10 +288,13 @@ mod tests {
 
     #[test]
     fn a_full_frame_is_a_small_file() {
+        use crate::guide::{BehaviouralStereo, Guide, GuideInput};
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("frame.png");
         let scene = crate::scene::Scene::outdoor();
-        let guide = crate::guide::GuideMap::estimate(&scene, 64, 64, 1);
+        let guide = BehaviouralStereo
+            .estimate(&GuideInput::still(&scene, 64, 64, 1))
+            .unwrap();
         let cells: Vec<Cell> = (guide.range_m.iter())
             .map(|range_m| range_m.map_or(Cell::Category(0), |m| Cell::Depth(m as f32)))
             .collect();

@@ -4,6 +4,7 @@
 //! The chip itself always does what its netlist says. What is assumed of it and wrong shows in the depths.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, Mode, SensorConfig, Tdc, WindowLaw};
@@ -19,6 +20,7 @@ pub(super) fn own_law(law: &WindowLaw, pixel: usize) -> Cow<'_, WindowLaw> {
 }
 
 /// Where windows are taken to be.
+#[derive(Debug)]
 pub(super) struct Aims<'p> {
     law: WindowLaw,
     profile: Option<Cow<'p, BinProfile>>,
@@ -44,6 +46,12 @@ impl<'p> Aims<'p> {
     /// When bins are, where that is no law's.
     pub(super) fn profile(&self) -> Option<&BinProfile> {
         self.profile.as_deref()
+    }
+
+    /// Photon times that the window of a start value sees, from STOP; `None` where it does not open.
+    pub(super) fn seen_by(&self, start: u16) -> Option<Range<Time>> {
+        let window = self.law.window(start).open()?;
+        Some(self.law.interval(&window))
     }
 
     /// The start value of a macropixel with this estimate of the guide, if it has any use for light.

@@ -7,12 +7,14 @@
 //! ```
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use rayon::prelude::*;
 
 use super::aim::{Aims, Place, own_law};
 use super::pixel::{NoDepth, PixelDepth};
+use super::policy::{Pointing, WindowPolicy};
 use super::remark::Circumstances;
 use super::result::{Frame, PhaseTimes};
 use super::tolerance::Tolerance;
@@ -23,7 +25,7 @@ use crate::engine::{
     Window, expose, expose_without_skipping, load, stream_config,
 };
 use crate::files::InputError;
-use crate::guide::GuideMap;
+use crate::guide::{Guide, GuideError, GuideInput, GuideMap};
 use crate::photon::{PhotonStream, SpadEvent};
 use crate::ranging::{BinProfile, DepthOptions, EchoFinder, UnequalBins};
 use crate::scene::{GroundTruth, Scene};
@@ -135,6 +137,8 @@ pub struct FrameSettings {
     pub depth: DepthOptions,
     /// When the bins of delay lines are, if that has been measured; without it, all are taken to be alike.
     pub calibration: Option<BinProfile>,
+    /// What tells where targets roughly are.
+    pub guide: Arc<dyn Guide>,
 }
 
 /// Why there is no frame.
@@ -146,6 +150,9 @@ pub enum FrameError {
     /// The engine cannot run this configuration.
     #[error(transparent)]
     Engine(#[from] EngineError),
+    /// The guide has no map.
+    #[error(transparent)]
+    Guide(#[from] GuideError),
     /// Depths cannot be found in such histograms.
     #[error(transparent)]
     Ranging(#[from] UnequalBins),
@@ -195,10 +202,51 @@ pub enum FrameError {
 /// `exposed` is told of macropixels as they are done.
 ///
 /// # Errors
-/// Configurations that the engine refuses, waveforms that cannot be written, and disagreement between
-/// netlist and models, which would be a fault of this program.
+/// A guide without a map, and what [`take_guided_frame`] reports.
 pub fn take_frame(
     settings: &FrameSettings,
+    probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
+    exposed: impl Fn(usize) + Sync,
+) -> Result<Frame, FrameError> {
+    let FrameSettings {
+        sensor,
+        scene,
+        exposure,
+        seed,
+        ..
+    } = settings;
+    let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
+    let mut clock = Stopwatch::new();
+    let guide = settings
+        .guide
+        .estimate(&GuideInput::still(scene, rows, cols, *seed))?;
+    let guide_s = clock.lap();
+    let mut pointing = Pointing::new(
+        WindowPolicy::default(),
+        sensor,
+        exposure,
+        settings.calibration.as_ref(),
+    );
+    let wanted = pointing.windows(&guide, &[]);
+    let windows_s = clock.lap();
+    let mut frame = take_guided_frame(settings, &guide, &wanted, probes, exposed)?;
+    (frame.times.guide_s, frame.times.windows_s) = (guide_s, windows_s);
+    Ok(frame)
+}
+
+/// Takes a frame through windows that are given: `wanted` has a start value for every macropixel, row-major, `None` for one whose
+/// SPADs are off. `guide` is what they were chosen by, for the reasons why macropixels have no depth; the settings' own guide is not asked.
+///
+/// # Errors
+/// Configurations that the engine refuses, waveforms that cannot be written, and disagreement between
+/// netlist and models, which would be a fault of this program.
+///
+/// # Panics
+/// When guide or start values are not one for each macropixel.
+pub fn take_guided_frame(
+    settings: &FrameSettings,
+    guide: &GuideMap,
+    wanted: &[Option<u16>],
     probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
     exposed: impl Fn(usize) + Sync,
 ) -> Result<Frame, FrameError> {
@@ -213,28 +261,21 @@ pub fn take_frame(
         skip,
         depth,
         calibration,
+        guide: source,
     } = settings;
+    assert_eq!(wanted.len(), sensor.pixels());
+    assert_eq!(guide.range_m.len(), sensor.pixels());
     let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
     let mut clock = Stopwatch::new();
     let mut times = PhaseTimes::default();
 
     let truth = GroundTruth::render(scene, rows, cols);
     times.scene_s = clock.lap();
-    let guide = GuideMap::estimate(scene, rows, cols, *seed);
-    times.guide_s = clock.lap();
 
-    // In the guided mode macropixels without an estimate, or with one out of the P-counter's reach, look as far as they can with their
-    // SPADs switched off.
+    // A macropixel whose SPADs are off looks as far as it can.
     let aims = Aims::new(sensor, exposure, calibration.as_ref());
-    let wanted: Vec<Option<u16>> = guide
-        .range_m
-        .par_iter()
-        .enumerate()
-        .map(|(pixel, &range_m)| aims.start_of(pixel, range_m))
-        .collect();
     let farthest = sensor.largest_start();
     let starts: Vec<u16> = wanted.iter().map(|s| s.unwrap_or(farthest)).collect();
-    times.windows_s = clock.lap();
 
     let load_netlist = load::load_netlist(sensor);
     let load = load::load(sensor, &load_netlist, &starts, &mut ());
@@ -300,7 +341,7 @@ pub fn take_frame(
     };
     times.exposure_s = clock.lap();
 
-    let probes = probes(&guide);
+    let probes = probes(guide);
     probes.par_iter().try_for_each(|probe| {
         let pixel = probe.row * sensor.cols + probe.col;
         let LitPixel {
@@ -383,6 +424,7 @@ pub fn take_frame(
         exposure,
         bin_s: finder.bin_s(),
         scene,
+        guide: &**source,
         light: &light,
         pixels: &depths,
     };

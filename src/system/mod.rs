@@ -6,6 +6,7 @@ mod distance;
 mod frame;
 pub mod pareto;
 mod pixel;
+mod policy;
 pub mod price;
 mod remark;
 mod result;
@@ -17,8 +18,9 @@ mod tolerance;
 
 pub use calibrate::{Sweep, SweepError, calibrate};
 pub use distance::DistanceLaw;
-pub use frame::{EngineKind, FrameError, FrameSettings, Probe, take_frame};
+pub use frame::{EngineKind, FrameError, FrameSettings, Probe, take_frame, take_guided_frame};
 pub use pixel::{NoDepth, PixelDepth};
+pub use policy::{Pointing, Unguided, Why, WindowPolicy};
 pub use result::{Frame, PhaseTimes};
 pub use speed::{SPEED_LASER_CYCLES, SpeedCase, SpeedFrame};
 pub use step_and_lock::{LockOptions, LockState, StepAndLock, Tracker};

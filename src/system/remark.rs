@@ -2,6 +2,7 @@
 
 use super::pixel::{NoDepth, PixelDepth};
 use crate::chip::{EventType, Exposure, Mode, SensorConfig, WindowLaw};
+use crate::guide::Guide;
 use crate::photon::PixelLight;
 use crate::ranging::{EchoLight, Response};
 use crate::scene::Scene;
@@ -17,6 +18,8 @@ pub(super) struct Circumstances<'a> {
     pub bin_s: f64,
     /// The world.
     pub scene: &'a Scene,
+    /// What the windows were put by.
+    pub guide: &'a dyn Guide,
     /// The light on every macropixel.
     pub light: &'a [PixelLight],
     /// What became of every macropixel.
@@ -63,14 +66,14 @@ impl Circumstances<'_> {
     }
 
     fn no_guide(&self) -> String {
-        let stereo = &self.scene.stereo;
-        let metre_pixels = stereo.camera().focal_px * stereo.baseline_m;
         let surfaces = self.span_m(NoDepth::NoGuide, |p| p.true_m);
-        format!(
-            "the surfaces are {surfaces} away, and the camera pair measures from {:.1} m to {:.1} m, where both cameras see the same",
-            metre_pixels / stereo.max_disparity_px,
-            metre_pixels / stereo.min_disparity_px,
-        )
+        match self.guide.reach(self.scene) {
+            Some(reach) => format!("the surfaces are {surfaces} away, and {reach}"),
+            None => format!(
+                "the guide ({}) has no estimate of surfaces {surfaces} away",
+                self.guide.name()
+            ),
+        }
     }
 
     fn out_of_reach(&self) -> String {
@@ -200,7 +203,10 @@ fn span(metres: &[f64]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
+
     use crate::engine::CohortOptions;
+    use crate::guide::BehaviouralStereo;
     use crate::ranging::DepthOptions;
     use crate::system::{EngineKind, Frame, FrameSettings, take_frame};
 
@@ -221,6 +227,7 @@ mod tests {
             skip: true,
             depth: DepthOptions::default(),
             calibration: None,
+            guide: Arc::new(BehaviouralStereo),
         };
         let frame = take_frame(&settings, |_| Vec::new(), |_| {}).unwrap();
         for pixel in &frame.pixels {

@@ -9,7 +9,7 @@ use super::frame::EngineKind;
 use crate::chip::{Exposure, SensorConfig};
 use crate::engine::stream_config;
 use crate::files::{InputError, parse_json, read_text};
-use crate::guide::GuideMap;
+use crate::guide::{BehaviouralStereo, Guide, GuideInput};
 use crate::photon::{PhotonStream, SpadEvent};
 use crate::scene::{GroundTruth, Scene};
 use crate::settings::Document;
@@ -135,11 +135,15 @@ impl TakenFrame {
         assert!(row < sensor.rows && col < sensor.cols);
         let pixel = row * sensor.cols + col;
         let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
-        let guide_m = GuideMap::estimate(scene, rows, cols, self.seed).range_m[pixel];
-        // What a calibration made of the guide's estimate is not known here.
+        // What a calibration made of the guide's estimate is not known here, nor are other guides.
         let given = match self.is_calibrated {
             true => self.starts[pixel],
-            false => Aims::new(sensor, &self.exposure, None).start_of(pixel, guide_m),
+            false => {
+                let input = GuideInput::still(scene, rows, cols, self.seed);
+                let guide = BehaviouralStereo.estimate(&input);
+                let guide = guide.map_err(|why| InputError::new(&self.source, why.to_string()))?;
+                Aims::new(sensor, &self.exposure, None).start_of(pixel, guide.range_m[pixel])
+            }
         };
         if given != self.starts[pixel] {
             let shown = |start: Option<u16>| start.map_or("none".to_owned(), |s| s.to_string());

@@ -7,6 +7,7 @@ use guided_dtof::engine::{
     Cycle, Expose, Histograms, LitPixel, Window, expose, expose_without_skipping, full_stream,
     stream_config,
 };
+use guided_dtof::guide::BehaviouralStereo;
 use guided_dtof::photon::{
     DeadTimeLaw, PhotonStream, PixelLight, PulseShape, SpadModel, StreamConfig,
 };
@@ -389,6 +390,7 @@ fn a_frame_without_skipping_is_the_same_frame() {
             skip,
             depth: DepthOptions::default(),
             calibration: None,
+            guide: std::sync::Arc::new(BehaviouralStereo),
             cohort: Default::default(),
         };
         take_frame(&settings, |_| Vec::new(), |_| ()).unwrap()

@@ -1,0 +1,257 @@
+//! Radar as a guide (thesis 7.4.1): good range, coarse angle. "It could point a guided dToF system to a broad area of interest".
+//!
+//! ```text
+//!        beam (azimuth × elevation)                          power
+//!     ┌──────────────────────────┐                             │      ▂
+//!     │ rays to all surfaces     │ ──► range cells, ΔΩ·cos²/r² │  ▂   █      strongest cell: the beam's range,
+//!     │            in the beam   │                             └──┴───┴──► r  for all macropixels in it
+//!     └──────────────────────────┘
+//! ```
+//!
+//! The scene says nothing of radio waves: all materials send back alike, as rough surfaces that favour the perpendicular (cos² of the
+//! angle of incidence), and power falls with r⁴ while a beam covers r² of surface. Radar and lidar stand in the same place. There is no
+//! clutter, no multipath, no Doppler.
+//!
+//! A beam's range is one for all of its macropixels, and which of the surfaces in the beam one of them sees, radar does not know. Its
+//! claim says so: the variance is that of the range itself and the spread of the beam's profile about it, each cell weighted by the
+//! solid angle that its power stands for (power·r²).
+
+use rayon::prelude::*;
+
+use super::{Guide, GuideError, GuideInput, GuideMap};
+use crate::photon::{Purpose, normal, random_stream};
+use crate::scene::{DVec3, Ray, Scene};
+use crate::settings::{Key, Range};
+
+/// What of a guide's random numbers tells this one's from others'.
+const DRAWS: u32 = 5;
+
+/// Rays across a beam, either way: surfaces of a sixteenth of a beam are found.
+const RAYS_ACROSS: u32 = 16;
+
+/// A radar that looks where the lidar looks.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Radar {
+    /// Width of a beam, degrees.
+    pub azimuth_beam_deg: f64,
+    /// Height of a beam, degrees.
+    pub elevation_beam_deg: f64,
+    /// Surfaces nearer to each other than this are one echo, m.
+    pub resolution_m: f64,
+    /// Standard deviation of an echo's range, m.
+    pub range_sigma_m: f64,
+    /// Distance beyond which nothing is found, m.
+    pub reach_m: f64,
+}
+
+impl Default for Radar {
+    fn default() -> Self {
+        Radar {
+            azimuth_beam_deg: 2.0,
+            elevation_beam_deg: 4.0,
+            resolution_m: 0.5,
+            range_sigma_m: 0.15,
+            reach_m: 250.0,
+        }
+    }
+}
+
+pub(super) const KEYS: &[Key] = &[
+    Key {
+        name: "azimuth_beam_deg",
+        what: "Width of a beam",
+        unit: "deg",
+        range: Range::Within(0.1, 90.0),
+        source: "chosen: an automotive imaging radar",
+    },
+    Key {
+        name: "elevation_beam_deg",
+        what: "Height of a beam",
+        unit: "deg",
+        range: Range::Within(0.1, 90.0),
+        source: "chosen: an automotive imaging radar",
+    },
+    Key {
+        name: "resolution_m",
+        what: "Surfaces nearer to each other than this are one echo",
+        unit: "m",
+        range: Range::Within(0.01, 100.0),
+        source: "chosen: 300 MHz of bandwidth",
+    },
+    Key {
+        name: "range_sigma_m",
+        what: "Standard deviation of an echo's range",
+        unit: "m",
+        range: Range::Within(0.0, 100.0),
+        source: "chosen",
+    },
+    Key {
+        name: "reach_m",
+        what: "Distance beyond which nothing is found",
+        unit: "m",
+        range: Range::Above(0.0, 1e5),
+        source: "chosen",
+    },
+];
+
+/// What a ray of a beam meets.
+#[derive(Debug, Clone, Copy)]
+struct Echo {
+    range_m: f64,
+    power: f64,
+}
+
+impl Radar {
+    /// The beam, counted from the one about the axis, that a direction is in: column and row.
+    fn beam_of(&self, towards: DVec3) -> (i32, i32) {
+        let azimuth_deg = towards.x.atan2(towards.z).to_degrees();
+        let elevation_deg = towards.y.atan2(towards.x.hypot(towards.z)).to_degrees();
+        (
+            (azimuth_deg / self.azimuth_beam_deg).round() as i32,
+            (elevation_deg / self.elevation_beam_deg).round() as i32,
+        )
+    }
+
+    /// What comes back within a beam.
+    fn echoes(&self, scene: &Scene, (col, row): (i32, i32)) -> Vec<Echo> {
+        let angles = |beam: i32, width_deg: f64| {
+            let at = move |n: u32| (f64::from(n) + 0.5) / f64::from(RAYS_ACROSS) - 0.5;
+            (0..RAYS_ACROSS).map(move |n| ((f64::from(beam) + at(n)) * width_deg).to_radians())
+        };
+        let rays = angles(row, self.elevation_beam_deg).flat_map(|elevation| {
+            angles(col, self.azimuth_beam_deg).map(move |azimuth| {
+                let across = elevation.cos();
+                DVec3::new(
+                    across * azimuth.sin(),
+                    elevation.sin(),
+                    across * azimuth.cos(),
+                )
+            })
+        });
+        let echoes = rays.filter_map(|towards| {
+            let hit = scene.hit(&Ray::new(DVec3::ZERO, towards))?;
+            let power = hit.range_m.powi(-2);
+            (hit.range_m <= self.reach_m && power > 0.0).then_some(Echo {
+                range_m: hit.range_m,
+                power,
+            })
+        });
+        echoes.collect()
+    }
+
+    /// Range of the strongest cell, and its variance as the range of any surface of the beam, m and m².
+    fn strongest(&self, echoes: &[Echo]) -> Option<(f64, f64)> {
+        let cell = |echo: &Echo| (echo.range_m / self.resolution_m).floor() as i64;
+        let mut cells: Vec<(i64, f64, f64)> = Vec::new();
+        let mut sorted = echoes.to_vec();
+        sorted.sort_by(|a, b| a.range_m.total_cmp(&b.range_m));
+        for echo in &sorted {
+            let moment = echo.power * echo.range_m;
+            match cells.last_mut() {
+                Some((last, power, sum)) if *last == cell(echo) => {
+                    *power += echo.power;
+                    *sum += moment;
+                }
+                _ => cells.push((cell(echo), echo.power, moment)),
+            }
+        }
+        let (_, power, sum) = cells.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let range_m = sum / power;
+        let weights = echoes
+            .iter()
+            .map(|e| (e.power * e.range_m.powi(2), e.range_m));
+        let (total, spread) = weights.fold((0.0, 0.0), |(total, spread), (w, r)| {
+            (total + w, spread + w * (r - range_m).powi(2))
+        });
+        Some((range_m, spread / total))
+    }
+}
+
+impl Guide for Radar {
+    fn name(&self) -> &str {
+        "radar"
+    }
+
+    fn estimate(&self, input: &GuideInput<'_>) -> Result<GuideMap, GuideError> {
+        let lidar = input.scene.lidar_camera(input.rows, input.cols);
+        let pixels = input.rows as usize * input.cols as usize;
+        let beams: Vec<(i32, i32)> = (0..pixels)
+            .map(|pixel| {
+                let (row, col) = (pixel as u32 / input.cols, pixel as u32 % input.cols);
+                let centre = (f64::from(col) + 0.5, f64::from(row) + 0.5);
+                self.beam_of(lidar.at_unit_depth(centre))
+            })
+            .collect();
+        let mut each = beams.clone();
+        each.sort_unstable();
+        each.dedup();
+        let found: Vec<Option<(f64, f64)>> = (0..each.len() as u32)
+            .into_par_iter()
+            .map(|number| {
+                let echoes = self.echoes(input.scene, each[number as usize]);
+                let (range_m, spread_m2) = self.strongest(&echoes)?;
+                let mut random = random_stream(input.seed, Purpose::Guide, number, DRAWS);
+                let measured_m = range_m + self.range_sigma_m * normal(&mut random);
+                let sigma_m = (self.range_sigma_m.powi(2) + spread_m2).sqrt();
+                Some((measured_m.max(0.0), sigma_m))
+            })
+            .collect();
+        let of_pixel = |beam| found[each.binary_search(beam).expect("a beam of the array")];
+        let estimates = beams.iter().map(of_pixel);
+        Ok(GuideMap::new(input.rows, input.cols, estimates))
+    }
+
+    fn reach(&self, _scene: &Scene) -> Option<String> {
+        Some(format!("the radar finds nothing beyond {} m", self.reach_m))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::guide::test_scenes::{errors_m, normalised_errors, wall_at};
+
+    #[test]
+    fn a_wall_is_as_far_as_it_says_and_one_range_serves_a_beam() {
+        let scene = wall_at(50.0);
+        let radar = Radar::default();
+        let map = radar
+            .estimate(&GuideInput::still(&scene, 64, 64, 1))
+            .unwrap();
+        let mut ranges: Vec<u64> = map.range_m.iter().flatten().map(|m| m.to_bits()).collect();
+        ranges.sort_unstable();
+        ranges.dedup();
+        // 16 degrees of 2 and 4, beams about the axis: 9 by 5.
+        assert_eq!((map.guided(), ranges.len()), (4096, 45));
+        // The wall's range changes within a beam, by up to half a metre in the corners.
+        let errors = normalised_errors(&radar, &scene, 32, 0..60);
+        let variance = errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64;
+        assert!((0.85..1.15).contains(&variance), "{variance}");
+    }
+
+    #[test]
+    fn over_the_street_errors_are_as_large_as_claimed() {
+        let scene = Scene::outdoor();
+        let errors = errors_m(&Radar::default(), &scene, 64, 1..4);
+        let within = |k: f64| errors.iter().filter(|(e, s)| e.abs() <= k * s).count();
+        let share = |k: f64| within(k) as f64 / errors.len() as f64;
+        // The spread of a beam is no Gaussian: more lies close, some far out.
+        assert!(
+            share(1.0) > 0.5 && share(3.0) > 0.9,
+            "{} {}",
+            share(1.0),
+            share(3.0)
+        );
+    }
+
+    #[test]
+    fn empty_beams_and_what_is_out_of_reach_have_no_estimate() {
+        let radar = Radar {
+            reach_m: 49.0,
+            ..Radar::default()
+        };
+        let map = radar.estimate(&GuideInput::still(&wall_at(50.0), 16, 16, 1));
+        assert_eq!(map.unwrap().guided(), 0);
+    }
+}

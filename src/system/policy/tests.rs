@@ -1,0 +1,246 @@
+use super::*;
+use crate::chip::{Sensor, hslidar};
+use crate::photon::{Purpose, normal, random_stream};
+
+const SIZE: usize = 16;
+
+fn sensor() -> SensorConfig {
+    SensorConfig {
+        rows: SIZE,
+        cols: SIZE,
+        ..SensorConfig::default()
+    }
+}
+
+fn pointing(policy: WindowPolicy, sensor: &SensorConfig) -> Pointing<'static> {
+    Pointing::new(policy, sensor, &Exposure::new(sensor, 520, 100), None)
+}
+
+fn map(estimates: &[Option<(f64, f64)>]) -> GuideMap {
+    GuideMap::new(SIZE as u32, SIZE as u32, estimates.iter().copied())
+}
+
+/// What a sensor that finds every target in its window would measure.
+fn seen(
+    pointing: &Pointing<'_>,
+    starts: &[Option<u16>],
+    truth_m: &[Option<f64>],
+) -> Vec<Option<f64>> {
+    let pixels = starts.iter().zip(truth_m);
+    pixels
+        .map(|(start, truth_m)| {
+            let window = pointing.windows_m[usize::from((*start)?)].clone()?;
+            truth_m.filter(|m| window.contains(m))
+        })
+        .collect()
+}
+
+/// Runs exposures with the same guide; how many until each macropixel has found its target, `None` if it has not in `most`.
+fn exposures_until_found(
+    policy: WindowPolicy,
+    sensor: &SensorConfig,
+    guide: &GuideMap,
+    truth_m: &[Option<f64>],
+    most: usize,
+) -> Vec<Option<usize>> {
+    let mut pointing = pointing(policy, sensor);
+    let mut found = vec![None; truth_m.len()];
+    let mut last = Vec::new();
+    for exposure in 0..most {
+        let starts = pointing.windows(guide, &last);
+        last = seen(&pointing, &starts, truth_m);
+        for (found, seen) in found.iter_mut().zip(&last) {
+            match (*found, seen) {
+                (None, Some(_)) => *found = Some(exposure + 1),
+                (Some(_), None) => panic!("lost again in exposure {exposure}"),
+                _ => {}
+            }
+        }
+    }
+    found
+}
+
+fn window_m(pointing: &Pointing<'_>) -> f64 {
+    let windows = pointing.windows_m.iter().flatten();
+    windows.map(|w| w.end - w.start).fold(0.0, f64::max)
+}
+
+#[test]
+fn by_default_every_window_is_in_the_middle_of_its_estimate() {
+    let sensor = sensor();
+    let exposure = Exposure::new(&sensor, 520, 100);
+    let mut pointing = pointing(WindowPolicy::default(), &sensor);
+    let estimates: Vec<_> = (0..SIZE * SIZE)
+        .map(|pixel| (pixel % 3 > 0).then_some((pixel as f64, 50.0)))
+        .collect();
+    let starts = pointing.windows(&map(&estimates), &[]);
+    let aims = Aims::new(&sensor, &exposure, None);
+    for (pixel, estimate) in estimates.iter().enumerate() {
+        assert_eq!(starts[pixel], aims.start_of(pixel, estimate.map(|e| e.0)));
+    }
+    // It stays so, whatever was seen.
+    let nothing = vec![None; SIZE * SIZE];
+    assert_eq!(pointing.windows(&map(&estimates), &nothing), starts);
+}
+
+/// Six windows of uncertainty: the target is found, the sooner the likelier its place is.
+#[test]
+fn a_macropixel_in_doubt_steps_until_it_has_found_its_target() {
+    let (sigma_m, guide_m) = (6.0, 80.0);
+    let policy = WindowPolicy {
+        steps_in_doubt: true,
+        ..WindowPolicy::default()
+    };
+    let truth_m: Vec<Option<f64>> = (0..SIZE * SIZE)
+        .map(|pixel| {
+            let mut random = random_stream(3, Purpose::Guide, pixel as u32, 0);
+            Some(guide_m + sigma_m * normal(&mut random))
+        })
+        .collect();
+    let guide = map(&vec![Some((guide_m, sigma_m)); SIZE * SIZE]);
+    let found = exposures_until_found(policy, &sensor(), &guide, &truth_m, 16);
+    let pointing = pointing(policy, &sensor());
+    let inner_m = 0.75 * window_m(&pointing);
+    for (found, truth_m) in found.iter().zip(&truth_m) {
+        let off_m = (truth_m.unwrap() - guide_m).abs();
+        // Steps to either side in turns, with a few for windows that are looked at again.
+        let most = 2.0 * (off_m / inner_m).ceil() + 6.0;
+        assert!(
+            found.is_some_and(|n| n as f64 <= most),
+            "{off_m} m: {found:?}"
+        );
+    }
+    let soon = found.iter().filter(|n| n.is_some_and(|n| n == 1)).count();
+    // A window of 6.2 m about the middle holds 39 % of errors of 6 m.
+    assert!((70..135).contains(&soon), "{soon}");
+}
+
+#[test]
+fn a_sure_guide_is_followed_and_left_only_after_patience() {
+    let patient = WindowPolicy {
+        patience: Some(2),
+        ..WindowPolicy::default()
+    };
+    // Sure and wrong by four windows.
+    let guide = map(&vec![Some((80.0, 0.1)); SIZE * SIZE]);
+    let truth_m = vec![Some(105.0); SIZE * SIZE];
+    let never = exposures_until_found(WindowPolicy::default(), &sensor(), &guide, &truth_m, 30);
+    assert!(never.iter().all(Option::is_none));
+    let found = exposures_until_found(patient, &sensor(), &guide, &truth_m, 80);
+    assert!(
+        found.iter().all(|n| n.is_some_and(|n| n > 3)),
+        "{:?}",
+        found[0]
+    );
+    let mut sure = pointing(patient, &sensor());
+    let first = sure.windows(&guide, &[]);
+    let nothing = vec![None; SIZE * SIZE];
+    assert_eq!(sure.windows(&guide, &nothing), first);
+    assert_ne!(sure.windows(&guide, &nothing), first);
+    assert!(sure.why().iter().all(|why| *why == Why::Stepped));
+}
+
+#[test]
+fn a_sweep_finds_everything_in_one_round_and_holds_it() {
+    let policy = WindowPolicy {
+        unguided: Unguided::Sweep,
+        ..WindowPolicy::default()
+    };
+    for sensor in [
+        sensor(),
+        SensorConfig {
+            rows: SIZE,
+            cols: SIZE,
+            ..(*hslidar()).clone()
+        },
+    ] {
+        let nothing = map(&vec![None; SIZE * SIZE]);
+        let sweeping = pointing(policy, &sensor);
+        let ends: Vec<_> = sweeping.windows_m.iter().flatten().collect();
+        let (near_m, far_m) = (ends[0].start + 2.0, ends[ends.len() - 1].end - 2.0);
+        let truth_m: Vec<Option<f64>> = (0..SIZE * SIZE)
+            .map(|n| Some(near_m + (far_m - near_m) * n as f64 / (SIZE * SIZE) as f64))
+            .collect();
+        // Windows step by what they do not share, in whole start values.
+        let step_m = sweeping.cells.1;
+        let each_m = ((0.75 * window_m(&sweeping) / step_m).round() * step_m).max(step_m);
+        let round = ((far_m - near_m + 4.0) / each_m).ceil() as usize + 1;
+        let found = exposures_until_found(policy, &sensor, &nothing, &truth_m, round + 5);
+        assert!(
+            found.iter().all(|n| n.is_some_and(|n| n <= round)),
+            "{round}: {found:?}"
+        );
+    }
+}
+
+#[test]
+fn macropixels_without_an_estimate_do_what_the_policy_says() {
+    let mut estimates = vec![Some((60.0, 0.1)); SIZE * SIZE];
+    let here = 5 * SIZE + 5;
+    let starts_with = |unguided, estimates: &[Option<(f64, f64)>]| {
+        let policy = WindowPolicy {
+            unguided,
+            ..WindowPolicy::default()
+        };
+        let mut pointing = pointing(policy, &sensor());
+        let before = pointing.windows(&map(&vec![Some((60.0, 0.1)); SIZE * SIZE]), &[]);
+        let after = pointing.windows(&map(estimates), &[]);
+        (before[here], after[here], pointing.why()[here])
+    };
+    estimates[here] = None;
+    estimates[here + 1] = Some((90.0, 0.1));
+    let (before, off, why) = starts_with(Unguided::Off, &estimates);
+    assert_eq!((off, why), (None, Why::Off));
+    assert_eq!(
+        starts_with(Unguided::Keep, &estimates),
+        (before, before, Why::Kept)
+    );
+    let (_, taken, why) = starts_with(Unguided::Neighbour, &estimates);
+    assert_eq!(why, Why::Neighbour);
+    // Of the eight beside it the farthest, as an occluded background is.
+    let aims = pointing(WindowPolicy::default(), &sensor()).aims;
+    assert_eq!(taken, aims.start_of(here, Some(90.0)));
+    let (_, swept, why) = starts_with(Unguided::Sweep, &estimates);
+    assert_eq!((swept.is_some(), why), (true, Why::Swept));
+    // Nobody near enough has one.
+    let none = vec![None; SIZE * SIZE];
+    assert_eq!(starts_with(Unguided::Neighbour, &none).1, None);
+}
+
+#[test]
+fn another_target_of_the_guide_ends_a_search() {
+    let policy = WindowPolicy::for_sequences();
+    let mut pointing = pointing(policy, &sensor());
+    let nothing = vec![None; SIZE * SIZE];
+    let there = map(&vec![Some((80.0, 0.1)); SIZE * SIZE]);
+    for _ in 0..6 {
+        pointing.windows(&there, &nothing);
+    }
+    assert!(pointing.why().iter().all(|why| *why == Why::Stepped));
+    let here = map(&vec![Some((40.0, 0.1)); SIZE * SIZE]);
+    let starts = pointing.windows(&here, &nothing);
+    assert!(pointing.why().iter().all(|why| *why == Why::Guided));
+    assert_eq!(starts[0], pointing.aims.start_of(0, Some(40.0)));
+}
+
+#[test]
+fn the_conventional_mode_has_one_window() {
+    let sensor = SensorConfig {
+        mode: Mode::Conventional,
+        ..sensor()
+    };
+    let mut pointing = pointing(WindowPolicy::for_sequences(), &sensor);
+    let starts = pointing.windows(&map(&vec![None; SIZE * SIZE]), &[]);
+    assert!(starts[0].is_some() && starts.iter().all(|start| *start == starts[0]));
+}
+
+#[test]
+fn the_least_bin_is_that_of_equation_25() {
+    let policy = WindowPolicy {
+        within: 0.997_300_203_936_739_8,
+        ..WindowPolicy::default()
+    };
+    let sensor = Sensor::from(sensor());
+    let bin_m = policy.least_bin_m(1.0, sensor.bins);
+    assert!((bin_m - 6.0 / 16.0).abs() < 1e-9, "{bin_m}");
+}
