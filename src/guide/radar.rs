@@ -131,7 +131,8 @@ impl Radar {
         });
         let echoes = rays.filter_map(|towards| {
             let hit = scene.hit(&Ray::new(DVec3::ZERO, towards))?;
-            let power = hit.range_m.powi(-2);
+            let incidence = hit.normal.dot(towards).abs();
+            let power = (incidence / hit.range_m).powi(2);
             (hit.range_m <= self.reach_m && power > 0.0).then_some(Echo {
                 range_m: hit.range_m,
                 power,
