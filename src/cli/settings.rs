@@ -13,7 +13,7 @@ use clap::Args;
 use super::say;
 use crate::chip::sensors::CHIPS;
 use crate::chip::{Sensor, SensorConfig};
-use crate::files::{InputError, read_text};
+use crate::files::InputError;
 use crate::scene::Scene;
 use crate::settings::Document;
 
@@ -140,7 +140,7 @@ fn described(path: &Path) -> Result<Document, InputError> {
 }
 
 fn read(path: &Path) -> Result<Document, InputError> {
-    Document::parse(path.display(), &read_text(path)?)
+    Document::load(path)
 }
 
 /// `gdtof sensor`.

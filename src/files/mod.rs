@@ -5,6 +5,7 @@
 //! | `complaint.rs` | what is wrong with an input: `FILE:LINE: what is wrong; what to do` |
 //! | `input.rs` | texts, read whole or line by line, and what is no text refused |
 //! | `matrix.rs` | matrices of numbers from `.npy` files |
+//! | `raster.rs` | pictures and maps: PNG, `.npy`, PFM |
 //! | `output.rs` | output files: beside the target first, then renamed over it |
 //! | `temporary.rs` | what stands there meanwhile, and what killed runs left of it |
 //! | `interruption.rs` | signals that end the program |
@@ -15,6 +16,7 @@ mod input;
 mod interruption;
 mod matrix;
 mod output;
+mod raster;
 mod result_set;
 mod temporary;
 
@@ -24,4 +26,5 @@ pub(crate) use input::{line_of, parse_json, parse_toml, read_text};
 pub(crate) use interruption::clean_up_when_interrupted;
 pub(crate) use matrix::Matrix;
 pub use output::{OutputFile, create_folder};
+pub use raster::Raster;
 pub use result_set::{MANIFEST, ManifestFile, ResultSet};

@@ -1,9 +1,11 @@
 //! Where rays end: the nearest surface along one, and everything that sends light back along it.
 
 use glam::DVec3;
-use smallvec::{SmallVec, smallvec};
+use smallvec::SmallVec;
 
+use super::object::Object;
 use super::settings::Scene;
+use super::shape::Meeting;
 use super::vector::Ray;
 
 /// A surface point that a ray meets, and what its material is there.
@@ -43,21 +45,87 @@ pub struct Returns {
     pub sky_share: f64,
 }
 
+/// What is weaker than this share of its light, both ways, is not followed: of 10⁴ signal photons a pulse, more than
+/// are modelled, one is left.
+const LEAST_SHARE: f64 = 1e-4;
+
+/// Most mirrors that a ray is followed over.
+const MOST_MIRRORS: u32 = 2;
+
 impl Scene {
-    /// The nearest opaque surface along `ray`; `None` for the sky. Of two in the same place the one
-    /// listed first in the scene counts.
+    /// The nearest opaque surface along `ray`, as if panes were not there; `None` for the sky. Of two in the same place
+    /// the one listed first in the scene counts.
     pub fn hit(&self, ray: &Ray) -> Option<Hit> {
-        let mut nearest: Option<(f64, usize)> = None;
+        self.nearest(ray, |object| !object.is_pane())
+    }
+
+    /// All that sends light back along `ray`: panes themselves, what stands behind them, and what they mirror.
+    ///
+    /// Light goes there and back the same way, so what is left of it is a share of a share. A pane's thickness and the
+    /// laser's own mirror image are left out.
+    pub fn returns(&self, ray: &Ray) -> Returns {
+        let mut returns = Returns {
+            surfaces: SmallVec::new(),
+            sky_share: 0.0,
+        };
+        self.follow(ray, 0.0, 1.0, 0, &mut returns);
+        let by_range = |a: &Return, b: &Return| a.hit.range_m.total_cmp(&b.hit.range_m);
+        returns.surfaces.sort_by(by_range);
+        returns
+    }
+
+    /// Follows a ray that has come `so_far_m` and of whose light `share` arrives one way.
+    fn follow(&self, ray: &Ray, so_far_m: f64, share: f64, mirrors: u32, returns: &mut Returns) {
+        let Some(mut hit) = self.nearest(ray, |_| true) else {
+            returns.sky_share += share;
+            return;
+        };
+        let object = &self.objects[hit.object];
+        let point = ray.at(hit.range_m);
+        hit.range_m += so_far_m;
+        if hit.reflectivity > 0.0
+            || hit.grey > 0.0
+            || (object.transmittance, object.mirror) == (0.0, 0.0)
+        {
+            returns.surfaces.push(Return {
+                hit,
+                share: share * share,
+                share_back: share,
+            });
+        }
+        let onwards = |part: f64| Some(share * part).filter(|share| share * share >= LEAST_SHARE);
+        if let Some(left) = onwards(object.transmittance) {
+            let beyond = Ray {
+                origin: point,
+                ..*ray
+            };
+            self.follow(&beyond, hit.range_m, left, mirrors, returns);
+        }
+        if let Some(left) = onwards(object.mirror)
+            && mirrors < MOST_MIRRORS
+        {
+            let thrown_back = ray.direction - hit.normal * (2.0 * ray.direction.dot(hit.normal));
+            let reflected = Ray::new(point, thrown_back);
+            self.follow(&reflected, hit.range_m, left, mirrors + 1, returns);
+        }
+    }
+
+    /// The nearest surface along `ray` of the objects that are `wanted`.
+    fn nearest(&self, ray: &Ray, wanted: impl Fn(&Object) -> bool) -> Option<Hit> {
+        let mut nearest: Option<(Meeting, usize)> = None;
         for (index, object) in self.objects.iter().enumerate() {
-            if let Some(range_m) = object.shape.intersect(ray)
-                && nearest.is_none_or(|(least_m, _)| range_m < least_m)
+            if wanted(object)
+                && let Some(meeting) = object.shape.meet(ray)
+                && nearest.is_none_or(|(least, _)| meeting.range_m < least.range_m)
             {
-                nearest = Some((range_m, index));
+                nearest = Some((meeting, index));
             }
         }
-        let (range_m, index) = nearest?;
+        let (Meeting { range_m, part }, index) = nearest?;
         let object = &self.objects[index];
-        let normal = object.shape.normal_at(ray.at(range_m));
+        let point = ray.at(range_m);
+        let normal = object.shape.normal_at(point, part);
+        let (reflectivity, grey) = object.material_at(point, part);
         Some(Hit {
             range_m,
             normal: if normal.dot(ray.direction) > 0.0 {
@@ -65,36 +133,18 @@ impl Scene {
             } else {
                 normal
             },
-            reflectivity: object.reflectivity,
-            grey: object.grey.unwrap_or(object.reflectivity),
+            reflectivity,
+            grey,
             retro: object.retro,
             object: index,
         })
-    }
-
-    /// All that sends light back along `ray`.
-    pub fn returns(&self, ray: &Ray) -> Returns {
-        match self.hit(ray) {
-            Some(hit) => Returns {
-                surfaces: smallvec![Return {
-                    hit,
-                    share: 1.0,
-                    share_back: 1.0,
-                }],
-                sky_share: 0.0,
-            },
-            None => Returns {
-                surfaces: smallvec![],
-                sky_share: 1.0,
-            },
-        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Object, Shape};
+    use crate::scene::{Pattern, Shape, Texture};
     use proptest::prelude::*;
 
     fn wall(z_m: f64) -> Object {
@@ -144,19 +194,111 @@ mod tests {
         assert_eq!((returns.surfaces.len(), returns.sky_share), (0, 1.0));
     }
 
+    /// A pane between two walls, at 45 degrees, that throws light to the right.
+    fn behind_glass(transmittance: f64, mirror: f64) -> Scene {
+        let pane = Shape::Plane {
+            centre_m: DVec3::new(0.0, 0.0, 5.0),
+            normal: DVec3::new(1.0, 0.0, -1.0),
+            width_m: 4.0,
+            height_m: 4.0,
+        };
+        let aside = Shape::Plane {
+            centre_m: DVec3::new(7.0, 0.0, 5.0),
+            normal: DVec3::X,
+            width_m: 4.0,
+            height_m: 4.0,
+        };
+        scene(vec![
+            Object {
+                transmittance,
+                mirror,
+                ..Object::new("pane", 0.02, pane)
+            },
+            Object::new("aside", 0.7, aside),
+            wall(20.0),
+        ])
+    }
+
+    #[test]
+    fn a_pane_returns_itself_what_stands_behind_it_and_what_it_mirrors() {
+        let scene = behind_glass(0.8, 0.1);
+        let returns = scene.returns(&ahead());
+        let found: Vec<_> = (returns.surfaces.iter())
+            .map(|r| (r.hit.object, r.hit.range_m.round(), (r.share * 1e6).round()))
+            .collect();
+        assert_eq!(found, [(0, 5.0, 1e6), (1, 12.0, 1e4), (2, 20.0, 64e4)]);
+        assert!((returns.surfaces[2].share_back - 0.8).abs() < 1e-12);
+        assert_eq!(returns.sky_share, 0.0);
+        // The guide's opaque surface is behind the pane.
+        assert_eq!(scene.hit(&ahead()).unwrap().object, 2);
+        // Without a wall there is sky behind it, and a little of it arrives.
+        let mut open = behind_glass(0.8, 0.1);
+        open.objects.truncate(1);
+        let returns = open.returns(&ahead());
+        assert_eq!(returns.surfaces.len(), 1);
+        assert!((returns.sky_share - 0.9).abs() < 1e-12);
+    }
+
+    #[test]
+    fn two_mirrors_that_face_each_other_end() {
+        let mut scene = behind_glass(0.0, 1.0);
+        scene.objects[0].shape = wall(5.0).shape;
+        let behind = Object {
+            mirror: 1.0,
+            ..wall(-5.0)
+        };
+        scene.objects.push(behind);
+        let returns = scene.returns(&ahead());
+        assert_eq!(returns.surfaces.len(), 3);
+        assert_eq!(returns.surfaces[1].hit.range_m, 15.0);
+    }
+
+    #[test]
+    fn a_texture_gives_laser_and_cameras_their_own_greys() {
+        let mut objects = vec![wall(5.0)];
+        objects[0].grey = Some(0.9);
+        objects[0].texture = Some(Texture {
+            second_grey: Some(0.1),
+            ..Texture::new(Pattern::Stripes, 1.0, 0.3)
+        });
+        let scene = scene(objects);
+        let look = |x: f64| {
+            let hit = scene.hit(&Ray::new(DVec3::new(x, 0.0, 0.0), DVec3::Z));
+            hit.map(|hit| (hit.reflectivity, hit.grey)).unwrap()
+        };
+        assert_ne!(look(0.5), look(1.5));
+        for (reflectivity, grey) in [look(0.5), look(1.5)] {
+            assert!([(0.4, 0.9), (0.3, 0.1)].contains(&(reflectivity, grey)));
+        }
+    }
+
     proptest! {
+        /// No light is made: shares one way sum to what is not lost, at most 1.
+        #[test]
+        fn panes_pass_no_more_light_than_they_get(transmittance in 0.0f64..1.0, rest in 0.0f64..1.0, x in -0.3f64..0.3) {
+            let mirror = (1.0 - transmittance) * rest;
+            let scene = behind_glass(transmittance, mirror);
+            let returns = scene.returns(&Ray::new(DVec3::ZERO, DVec3::new(x, 0.0, 1.0)));
+            let opaque = returns.surfaces.iter().filter(|r| r.hit.object != 0);
+            let sum = returns.sky_share + opaque.map(|r| r.share_back).sum::<f64>();
+            prop_assert!(sum <= 1.0 + 1e-12);
+            prop_assert!(returns.surfaces.is_sorted_by(|a, b| a.hit.range_m <= b.hit.range_m));
+        }
+
         /// The normal says how the range changes with the ray: to first order, neighbouring rays end in the plane at
         /// right angles to it.
         #[test]
         fn normals_are_at_right_angles_to_the_surface(
-            x in -0.4f64..0.4, y in -0.4f64..0.4, yaw_deg in -180.0f64..180.0, kind in 0..4,
+            x in -0.4f64..0.4, y in -0.4f64..0.4, yaw_deg in -180.0f64..180.0, kind in 0..6,
         ) {
             let centre_m = DVec3::new(0.0, 0.0, 5.0);
             let shape = match kind {
                 0 => Shape::Ground { depth_m: 1.0 },
                 1 => Shape::Plane { centre_m, normal: DVec3::new(0.3, -0.5, 1.0), width_m: 9.0, height_m: 9.0 },
                 2 => Shape::Box { centre_m, size_m: DVec3::new(1.0, 2.0, 3.0), yaw_deg },
-                _ => Shape::Sphere { centre_m, radius_m: 1.5 },
+                3 => Shape::Sphere { centre_m, radius_m: 1.5 },
+                4 => Shape::Cylinder { centre_m, axis: DVec3::new(0.2, -0.5, yaw_deg / 90.0), radius_m: 0.8, height_m: 2.0 },
+                _ => Shape::Person { foot_m: DVec3::new(0.0, 1.0, 5.0), height_m: 2.0, yaw_deg },
             };
             let scene = scene(vec![Object::new("it", 0.5, shape)]);
             let ray = |x, y| Ray::new(DVec3::ZERO, DVec3::new(x, y, 1.0));

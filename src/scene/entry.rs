@@ -1,8 +1,20 @@
 //! Objects as scene files write them: one flat table each, with the keys of its kind.
 
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
 use glam::DVec3;
 
-use super::shape::{Object, Shape};
+use super::motion::Waypoint;
+use super::object::Object;
+use super::shape::Shape;
+use super::texture::{Pattern, Picture, Texture};
+
+/// Height of a person that a file gives none, m: about the mean of adults in Europe.
+const PERSON_M: f64 = 1.72;
+
+/// Size of a texture that a file gives none, m.
+const TEXTURE_M: f64 = 0.5;
 
 /// Kinds of object in a file.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
@@ -12,38 +24,90 @@ enum Kind {
     Plane,
     Box,
     Sphere,
+    Cylinder,
+    Person,
 }
 
-/// An `[[object]]` entry: one flat table, so that unknown keys are found at their own line.
-#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct ObjectEntry {
-    name: String,
-    kind: Kind,
-    reflectivity: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    grey: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    retro: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    velocity_m_s: Option<DVec3>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    depth_m: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    centre_m: Option<DVec3>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    normal: Option<DVec3>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    width_m: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    height_m: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    size_m: Option<DVec3>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    yaw_deg: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    radius_m: Option<f64>,
+/// Kinds of texture in a file.
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum TextureKind {
+    Checker,
+    Stripes,
+    Noise,
+    Image,
 }
+
+/// Writes an entry's struct, an entry without optional keys, and the list of which of them are given.
+macro_rules! entry {
+    ($($key:ident: $kind:ty,)*) => {
+        /// An `[[object]]` entry: one flat table, so that unknown keys are found at their own line.
+        #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub(super) struct ObjectEntry {
+            name: String,
+            kind: Kind,
+            reflectivity: f64,
+            $(#[serde(skip_serializing_if = "Option::is_none")] $key: Option<$kind>,)*
+        }
+
+        impl ObjectEntry {
+            fn bare(name: String, reflectivity: f64) -> Self {
+                ObjectEntry { name, kind: Kind::Ground, reflectivity, $($key: None,)* }
+            }
+
+            fn given(&self) -> impl Iterator<Item = &'static str> {
+                let keys = [$((stringify!($key), self.$key.is_some()),)*];
+                keys.into_iter().filter_map(|(key, is_given)| is_given.then_some(key))
+            }
+        }
+    };
+}
+
+entry! {
+    grey: f64,
+    retro: f64,
+    transmittance: f64,
+    mirror: f64,
+    texture: TextureKind,
+    texture_file: PathBuf,
+    texture_size_m: f64,
+    texture_seed: u32,
+    texture_shift_m: (f64, f64),
+    texture_turn_deg: f64,
+    second_reflectivity: f64,
+    second_grey: f64,
+    velocity_m_s: DVec3,
+    waypoints: Vec<Waypoint>,
+    depth_m: f64,
+    centre_m: DVec3,
+    normal: DVec3,
+    width_m: f64,
+    height_m: f64,
+    size_m: DVec3,
+    yaw_deg: f64,
+    radius_m: f64,
+    axis: DVec3,
+    foot_m: DVec3,
+}
+
+/// Keys that every kind of object may have.
+const OF_ALL: &[&str] = &[
+    "grey",
+    "retro",
+    "transmittance",
+    "mirror",
+    "texture",
+    "texture_file",
+    "texture_size_m",
+    "texture_seed",
+    "texture_shift_m",
+    "texture_turn_deg",
+    "second_reflectivity",
+    "second_grey",
+    "velocity_m_s",
+    "waypoints",
+];
 
 impl ObjectEntry {
     /// The value of a key that this kind of object needs.
@@ -53,122 +117,218 @@ impl ObjectEntry {
 
     /// Complains about keys that mean nothing for this kind of object.
     fn refuse_others(&self, allowed: &[&str]) -> Result<(), String> {
-        let given = [
-            ("depth_m", self.depth_m.is_some()),
-            ("centre_m", self.centre_m.is_some()),
-            ("normal", self.normal.is_some()),
-            ("width_m", self.width_m.is_some()),
-            ("height_m", self.height_m.is_some()),
-            ("size_m", self.size_m.is_some()),
-            ("yaw_deg", self.yaw_deg.is_some()),
-            ("radius_m", self.radius_m.is_some()),
-        ];
-        match given
-            .iter()
-            .find(|(key, present)| *present && !allowed.contains(key))
-        {
+        let is_other = |key: &&str| !allowed.contains(key) && !OF_ALL.contains(key);
+        match self.given().find(is_other) {
             None => Ok(()),
-            Some((key, _)) => Err(format!(
+            Some(key) => Err(format!(
                 "object \"{}\" has `{key}`, which its kind does not use; remove it",
                 self.name
             )),
         }
     }
-}
 
-impl TryFrom<ObjectEntry> for Object {
-    type Error = String;
+    /// The object, with the files that it names, which are relative to `folder`.
+    ///
+    /// # Errors
+    /// Keys that its kind needs and does not have, or has and does not use; files that cannot be read.
+    pub(super) fn object(self, folder: &Path) -> Result<Object, String> {
+        let shape = self.shape()?;
+        let texture = self.pattern(folder)?;
+        Ok(Object {
+            grey: self.grey,
+            retro: self.retro.unwrap_or(1.0),
+            texture,
+            transmittance: self.transmittance.unwrap_or(0.0),
+            mirror: self.mirror.unwrap_or(0.0),
+            velocity_m_s: self.velocity_m_s.unwrap_or(DVec3::ZERO),
+            waypoints: self.waypoints.unwrap_or_default(),
+            ..Object::new(self.name, self.reflectivity, shape)
+        })
+    }
 
-    fn try_from(entry: ObjectEntry) -> Result<Self, String> {
-        let shape = match entry.kind {
+    fn shape(&self) -> Result<Shape, String> {
+        Ok(match self.kind {
             Kind::Ground => {
-                entry.refuse_others(&["depth_m"])?;
+                self.refuse_others(&["depth_m"])?;
                 Shape::Ground {
-                    depth_m: entry.need("depth_m", entry.depth_m)?,
+                    depth_m: self.need("depth_m", self.depth_m)?,
                 }
             }
             Kind::Plane => {
-                entry.refuse_others(&["centre_m", "normal", "width_m", "height_m"])?;
+                self.refuse_others(&["centre_m", "normal", "width_m", "height_m"])?;
                 Shape::Plane {
-                    centre_m: entry.need("centre_m", entry.centre_m)?,
-                    normal: entry.normal.unwrap_or(DVec3::new(0.0, 0.0, -1.0)),
-                    width_m: entry.need("width_m", entry.width_m)?,
-                    height_m: entry.need("height_m", entry.height_m)?,
+                    centre_m: self.need("centre_m", self.centre_m)?,
+                    normal: self.normal.unwrap_or(DVec3::NEG_Z),
+                    width_m: self.need("width_m", self.width_m)?,
+                    height_m: self.need("height_m", self.height_m)?,
                 }
             }
             Kind::Box => {
-                entry.refuse_others(&["centre_m", "size_m", "yaw_deg"])?;
+                self.refuse_others(&["centre_m", "size_m", "yaw_deg"])?;
                 Shape::Box {
-                    centre_m: entry.need("centre_m", entry.centre_m)?,
-                    size_m: entry.need("size_m", entry.size_m)?,
-                    yaw_deg: entry.yaw_deg.unwrap_or(0.0),
+                    centre_m: self.need("centre_m", self.centre_m)?,
+                    size_m: self.need("size_m", self.size_m)?,
+                    yaw_deg: self.yaw_deg.unwrap_or(0.0),
                 }
             }
             Kind::Sphere => {
-                entry.refuse_others(&["centre_m", "radius_m"])?;
+                self.refuse_others(&["centre_m", "radius_m"])?;
                 Shape::Sphere {
-                    centre_m: entry.need("centre_m", entry.centre_m)?,
-                    radius_m: entry.need("radius_m", entry.radius_m)?,
+                    centre_m: self.need("centre_m", self.centre_m)?,
+                    radius_m: self.need("radius_m", self.radius_m)?,
                 }
             }
-        };
-        Ok(Object {
-            grey: entry.grey,
-            retro: entry.retro.unwrap_or(1.0),
-            velocity_m_s: entry.velocity_m_s.unwrap_or(DVec3::ZERO),
-            ..Object::new(entry.name, entry.reflectivity, shape)
+            Kind::Cylinder => {
+                self.refuse_others(&["centre_m", "axis", "radius_m", "height_m"])?;
+                Shape::Cylinder {
+                    centre_m: self.need("centre_m", self.centre_m)?,
+                    axis: self.axis.unwrap_or(DVec3::NEG_Y),
+                    radius_m: self.need("radius_m", self.radius_m)?,
+                    height_m: self.need("height_m", self.height_m)?,
+                }
+            }
+            Kind::Person => {
+                self.refuse_others(&["foot_m", "height_m", "yaw_deg"])?;
+                Shape::Person {
+                    foot_m: self.need("foot_m", self.foot_m)?,
+                    height_m: self.height_m.unwrap_or(PERSON_M),
+                    yaw_deg: self.yaw_deg.unwrap_or(0.0),
+                }
+            }
         })
     }
+
+    fn pattern(&self, folder: &Path) -> Result<Option<Texture>, String> {
+        let is_of_texture = |key: &&str| key.starts_with("texture_") || key.starts_with("second_");
+        let Some(kind) = self.texture else {
+            return match self.given().find(is_of_texture) {
+                None => Ok(None),
+                Some(key) => Err(format!(
+                    "object \"{}\" has `{key}`, but no `texture`; give one of checker, stripes, noise and image",
+                    self.name
+                )),
+            };
+        };
+        let pattern = match kind {
+            TextureKind::Checker => Pattern::Checker,
+            TextureKind::Stripes => Pattern::Stripes,
+            TextureKind::Noise => Pattern::Noise(self.texture_seed.unwrap_or(0)),
+            TextureKind::Image => {
+                let file = self.need("texture_file", self.texture_file.as_ref())?;
+                let picture = Picture::read(&placed(folder, file)).map_err(|e| e.to_string())?;
+                Pattern::Image(Arc::new(picture))
+            }
+        };
+        let second_reflectivity = self.second_reflectivity.unwrap_or(0.0);
+        let size_m = self.texture_size_m.unwrap_or(TEXTURE_M);
+        Ok(Some(Texture {
+            second_grey: self.second_grey,
+            shift_m: self.texture_shift_m.unwrap_or((0.0, 0.0)),
+            turn_deg: self.texture_turn_deg.unwrap_or(0.0),
+            ..Texture::new(pattern, size_m, second_reflectivity)
+        }))
+    }
+}
+
+/// A file that a scene in `folder` names. It keeps its place when the scene is printed elsewhere.
+fn placed(folder: &Path, file: &Path) -> PathBuf {
+    let joined = folder.join(file);
+    std::path::absolute(&joined).unwrap_or(joined)
 }
 
 impl From<Object> for ObjectEntry {
     fn from(object: Object) -> Self {
+        let other_than = |usual: f64, value: f64| (value != usual).then_some(value);
         let mut entry = ObjectEntry {
-            name: object.name,
-            kind: Kind::Ground,
-            reflectivity: object.reflectivity,
             grey: object.grey,
-            retro: (object.retro != 1.0).then_some(object.retro),
+            retro: other_than(1.0, object.retro),
+            transmittance: other_than(0.0, object.transmittance),
+            mirror: other_than(0.0, object.mirror),
             velocity_m_s: (object.velocity_m_s != DVec3::ZERO).then_some(object.velocity_m_s),
-            depth_m: None,
-            centre_m: None,
-            normal: None,
-            width_m: None,
-            height_m: None,
-            size_m: None,
-            yaw_deg: None,
-            radius_m: None,
+            waypoints: (!object.waypoints.is_empty()).then_some(object.waypoints),
+            ..ObjectEntry::bare(object.name, object.reflectivity)
         };
-        match object.shape {
-            Shape::Ground { depth_m } => entry.depth_m = Some(depth_m),
+        entry.write_shape(object.shape);
+        if let Some(texture) = object.texture {
+            entry.write_texture(texture);
+        }
+        entry
+    }
+}
+
+impl ObjectEntry {
+    fn write_texture(&mut self, texture: Texture) {
+        self.texture = Some(match texture.pattern {
+            Pattern::Checker => TextureKind::Checker,
+            Pattern::Stripes => TextureKind::Stripes,
+            Pattern::Noise(seed) => {
+                self.texture_seed = Some(seed);
+                TextureKind::Noise
+            }
+            Pattern::Image(picture) => {
+                self.texture_file = Some(picture.path.clone());
+                TextureKind::Image
+            }
+        });
+        self.texture_size_m = Some(texture.size_m);
+        self.texture_shift_m = (texture.shift_m != (0.0, 0.0)).then_some(texture.shift_m);
+        self.texture_turn_deg = (texture.turn_deg != 0.0).then_some(texture.turn_deg);
+        self.second_reflectivity = Some(texture.second_reflectivity);
+        self.second_grey = texture.second_grey;
+    }
+
+    fn write_shape(&mut self, shape: Shape) {
+        match shape {
+            Shape::Ground { depth_m } => self.depth_m = Some(depth_m),
             Shape::Plane {
                 centre_m,
                 normal,
                 width_m,
                 height_m,
             } => {
-                entry.kind = Kind::Plane;
-                entry.centre_m = Some(centre_m);
-                entry.normal = Some(normal);
-                entry.width_m = Some(width_m);
-                entry.height_m = Some(height_m);
+                self.kind = Kind::Plane;
+                self.centre_m = Some(centre_m);
+                self.normal = Some(normal);
+                self.width_m = Some(width_m);
+                self.height_m = Some(height_m);
             }
             Shape::Box {
                 centre_m,
                 size_m,
                 yaw_deg,
             } => {
-                entry.kind = Kind::Box;
-                entry.centre_m = Some(centre_m);
-                entry.size_m = Some(size_m);
-                entry.yaw_deg = Some(yaw_deg);
+                self.kind = Kind::Box;
+                self.centre_m = Some(centre_m);
+                self.size_m = Some(size_m);
+                self.yaw_deg = Some(yaw_deg);
             }
             Shape::Sphere { centre_m, radius_m } => {
-                entry.kind = Kind::Sphere;
-                entry.centre_m = Some(centre_m);
-                entry.radius_m = Some(radius_m);
+                self.kind = Kind::Sphere;
+                self.centre_m = Some(centre_m);
+                self.radius_m = Some(radius_m);
+            }
+            Shape::Cylinder {
+                centre_m,
+                axis,
+                radius_m,
+                height_m,
+            } => {
+                self.kind = Kind::Cylinder;
+                self.centre_m = Some(centre_m);
+                self.axis = Some(axis);
+                self.radius_m = Some(radius_m);
+                self.height_m = Some(height_m);
+            }
+            Shape::Person {
+                foot_m,
+                height_m,
+                yaw_deg,
+            } => {
+                self.kind = Kind::Person;
+                self.foot_m = Some(foot_m);
+                self.height_m = Some(height_m);
+                self.yaw_deg = Some(yaw_deg);
             }
         }
-        entry
     }
 }

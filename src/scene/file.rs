@@ -5,11 +5,11 @@ use std::path::Path;
 use toml::{Table, Value};
 
 use super::entry::ObjectEntry;
-use super::keys::{LIDAR, LIGHT, OBJECT, SECTIONS, STEREO};
-use super::rules::{check_object, check_stereo};
-use super::settings::{Lidar, Light, Scene, Stereo};
-use super::shape::Object;
-use crate::files::{InputError, read_text};
+use super::keys::{LIDAR, LIGHT, MEDIUM, OBJECT, RIG, SECTIONS, STEREO};
+use super::object::Object;
+use super::rules::{check_object, check_rig, check_stereo};
+use super::settings::Scene;
+use crate::files::InputError;
 use crate::settings::{Document, Fault, Key, commented};
 
 const OUTDOOR: &str = include_str!("../../vectors/scenes/outdoor.toml");
@@ -28,12 +28,12 @@ impl Scene {
         Document::parse("the built-in street", OUTDOOR).expect("the built-in scene is tested")
     }
 
-    /// Reads a scene file.
+    /// Reads a scene file. Files that it names are relative to its folder.
     ///
     /// # Errors
-    /// As [`Scene::parse`], or when the file cannot be read.
+    /// As [`Scene::read`], or when the file cannot be read.
     pub fn load(path: &Path) -> Result<Self, InputError> {
-        Scene::parse(&path.display().to_string(), &read_text(path)?)
+        Scene::read(&Document::load(path)?)
     }
 
     /// Reads a scene from TOML text; `source` names it in complaints.
@@ -58,12 +58,7 @@ impl Scene {
             }])?;
         }
         let mut faults = Vec::new();
-        let mut scene = Scene {
-            lidar: Lidar::default(),
-            stereo: Stereo::default(),
-            light: Light::default(),
-            objects: Vec::new(),
-        };
+        let mut scene = Scene::default();
         for (name, value) in document.table() {
             let message = match (name.as_str(), value) {
                 ("lidar", Value::Table(given)) => {
@@ -78,6 +73,14 @@ impl Scene {
                     scene.light = section(document, name, given, LIGHT, &mut faults);
                     continue;
                 }
+                ("medium", Value::Table(given)) => {
+                    scene.medium = section(document, name, given, MEDIUM, &mut faults);
+                    continue;
+                }
+                ("rig", Value::Table(given)) => {
+                    scene.rig = section(document, name, given, RIG, &mut faults);
+                    continue;
+                }
                 ("object", Value::Array(items)) => {
                     for (index, item) in items.iter().enumerate() {
                         let path = format!("object.{index}");
@@ -88,10 +91,12 @@ impl Scene {
                     continue;
                 }
                 ("object", _) => "object is no list; write each object as a section [[object]]",
-                ("lidar" | "stereo" | "light", _) => {
+                ("lidar" | "stereo" | "light" | "medium" | "rig", _) => {
                     "this must be a section; write its name in brackets, and its keys below"
                 }
-                _ => "unknown section; give [lidar], [stereo], [light] or [[object]]",
+                _ => {
+                    "unknown section; give [lidar], [stereo], [light], [medium], [rig] or [[object]]"
+                }
             };
             let message = format!("{name}: {message}");
             faults.push(Fault {
@@ -102,6 +107,7 @@ impl Scene {
         if !faults.iter().any(|fault| fault.path.starts_with("stereo.")) {
             faults.extend(check_stereo(&scene.stereo));
         }
+        faults.extend(check_rig(&scene.rig));
         for fault in &mut faults {
             fault.message = place(document, &fault.path) + &fault.message;
         }
@@ -116,12 +122,7 @@ impl Scene {
 
     /// The scene as a commented file, which [`Scene::parse`] reads back.
     pub fn commented(&self) -> String {
-        let left_out = Scene {
-            lidar: Lidar::default(),
-            stereo: Stereo::default(),
-            light: Light::default(),
-            objects: Vec::new(),
-        };
+        let left_out = Scene::default();
         commented(SECTIONS, &self.table(), &left_out.table())
     }
 }
@@ -169,15 +170,20 @@ fn object(
     if lacks || faults.len() > before {
         return None;
     }
-    match read.try_into::<Object>() {
+    let entry = read.try_into::<ObjectEntry>();
+    let told = |e: toml::de::Error| e.message().trim().to_owned();
+    let entry = entry
+        .map_err(told)
+        .and_then(|e| e.object(document.folder()));
+    match entry {
         Ok(object) => {
             let fault = check_object(path, &object);
             let is_fine = fault.is_none();
             faults.extend(fault);
             is_fine.then_some(object)
         }
-        Err(e) => {
-            let (path, message) = (path.to_owned(), e.message().trim().to_owned());
+        Err(message) => {
+            let path = path.to_owned();
             faults.push(Fault { path, message });
             None
         }
@@ -206,6 +212,7 @@ fn place(document: &Document, path: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{Lidar, Stereo};
     use proptest::prelude::*;
 
     /// The complaint about the built-in scene after one replacement, which must apply.
@@ -305,13 +312,62 @@ mod tests {
         assert_eq!(lines.len(), 8, "{told}");
     }
 
-    /// Objects that have the keys which the street's lack.
-    const FURTHER: &str = "[[object]]\nname = \"sign\"\nkind = \"sphere\"\ncentre_m = [0, 0, 9]\nradius_m = 1\n\
-        reflectivity = 0.9\ngrey = 0.1\nretro = 500\nvelocity_m_s = [1, 0, \"-2 m/s\"]\n";
+    /// What has the keys that the street lacks.
+    const FURTHER: &str = r#"
+[medium]
+extinction_1_m = 0.05
+backscatter_1_m_sr = 0.003
+
+[rig]
+waypoints = [[0, 0, 0, 0, 0], [1, 0, 0, 5, 3]]
+
+[[object]]
+name = "sign"
+kind = "sphere"
+centre_m = [0, 0, 9]
+radius_m = 1
+reflectivity = 0.5
+grey = 0.1
+retro = 500
+transmittance = 0.2
+mirror = 0.3
+velocity_m_s = [1, 0, "-2 m/s"]
+
+[[object]]
+name = "pole"
+kind = "cylinder"
+centre_m = [0, 0, 9]
+radius_m = 1
+height_m = 2
+axis = [0, 1, 1]
+reflectivity = 0.5
+texture = "noise"
+texture_size_m = 0.1
+texture_seed = 4
+texture_shift_m = [0.1, 0.2]
+texture_turn_deg = 3
+second_reflectivity = 0.4
+second_grey = 0.3
+
+[[object]]
+name = "child"
+kind = "person"
+foot_m = [0, 2, 9]
+height_m = 1.2
+reflectivity = 0.5
+waypoints = [[0, 0, 0, 0], [2, 1, 0, 0]]
+"#;
 
     #[test]
     fn the_commented_scene_reads_back_and_has_every_key() {
-        let street = Scene::parse("further", &format!("{OUTDOOR}{FURTHER}")).unwrap();
+        let street = Scene::parse(
+            "further",
+            &format!(
+                "{}{FURTHER}",
+                OUTDOOR.replace("[light]", "[light]\nsun_elevation_deg = 30")
+            ),
+        )
+        .unwrap();
         let text = street.commented();
         assert_eq!(Scene::parse("printed", &text).unwrap(), street);
         // Every key of the structs, as serde knows them, is in the tables and in the text, and the other way round.
@@ -342,6 +398,8 @@ mod tests {
             })
             .collect();
         known.sort();
+        // A picture is a file beside the scene; other tests have one.
+        known.retain(|(_, key)| key != "texture_file");
         assert_eq!(keys, known);
         for (_, key) in keys {
             assert!(
@@ -350,6 +408,104 @@ mod tests {
                 "{key}"
             );
         }
+    }
+
+    /// A scene file in a folder of its own, with a picture beside it.
+    fn with_picture(picture: &[u8], object: &str) -> Result<Scene, InputError> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("s.toml");
+        std::fs::write(dir.path().join("p.pfm"), picture).unwrap();
+        std::fs::write(
+            &path,
+            format!("[light]\n[[object]]\nname = \"it\"\n{object}"),
+        )
+        .unwrap();
+        Scene::load(&path)
+    }
+
+    const PICTURED: &str = "kind = \"ground\"\nreflectivity = 0.8\ndepth_m = 2\ntexture = \"image\"\n\
+        texture_file = \"p.pfm\"\ntexture_size_m = 2\n";
+
+    #[test]
+    fn pictures_are_relative_to_their_scene_file() {
+        let picture = [
+            b"Pf\n2 1\n-1\n".to_vec(),
+            [0f32, 1.0].map(f32::to_le_bytes).concat(),
+        ]
+        .concat();
+        let scene = with_picture(&picture, PICTURED).unwrap();
+        let down = |x: f64| crate::scene::Ray::new(glam::DVec3::new(x, 0.0, 0.3), glam::DVec3::Y);
+        let seen = |x| scene.hit(&down(x)).unwrap().reflectivity;
+        assert!(seen(0.5).abs() < 1e-9 && (seen(1.5) - 0.8).abs() < 1e-9);
+        assert!((seen(1.0) - 0.4).abs() < 1e-9);
+        // Printed, it names the file in a way that holds anywhere.
+        let file = scene.table()["object"][0]["texture_file"]
+            .as_str()
+            .unwrap()
+            .to_owned();
+        assert!(Path::new(&file).is_absolute() && file.ends_with("p.pfm"));
+    }
+
+    #[test]
+    fn pictures_that_cannot_be_used_are_refused_with_scene_and_line() {
+        let not_a_number = [b"Pf\n1 1\n-1\n".to_vec(), f32::NAN.to_le_bytes().to_vec()].concat();
+        for (picture, object, says) in [
+            (&b"P6"[..], PICTURED, "is no PNG"),
+            (&not_a_number, PICTURED, "no number at row 0, column 0"),
+            (
+                b"",
+                "kind = \"ground\"\nreflectivity = 1\ndepth_m = 1\ntexture = \"image\"",
+                "lacks `texture_file`",
+            ),
+            (
+                b"",
+                "kind = \"ground\"\nreflectivity = 1\ndepth_m = 1\nsecond_grey = 0.5",
+                "no `texture`",
+            ),
+        ] {
+            let error = with_picture(picture, object).unwrap_err();
+            assert!(error.to_string().contains(says), "{error}");
+            assert_eq!(error.line, Some(2), "{error}");
+        }
+    }
+
+    #[test]
+    fn impossible_panes_and_motions_are_refused() {
+        for (keys, says) in [
+            (
+                "transmittance = 0.9\nmirror = 0.2",
+                "more light than there is",
+            ),
+            (
+                "transmittance = 0.9\ngrey = 0.3",
+                "more light than there is",
+            ),
+            (
+                "velocity_m_s = [1, 0, 0]\nwaypoints = [[0, 0, 0, 0]]",
+                "two motions",
+            ),
+            (
+                "waypoints = [[1, 0, 0, 0], [0, 0, 0, 0]]",
+                "from 1 s to 0 s; give times that rise",
+            ),
+            ("waypoints = [[1, 0, 0]]", "waypoints: "),
+        ] {
+            let text = format!(
+                "[[object]]\nname = \"it\"\nkind = \"ground\"\ndepth_m = 1\nreflectivity = 0.2\n{keys}\n"
+            );
+            let error = Scene::parse("s.toml", &text).unwrap_err();
+            assert!(error.to_string().contains(says), "{error}");
+        }
+        let error = Scene::parse(
+            "s.toml",
+            "[rig]\nyaw_rate_deg_s = 3\nwaypoints = [[0, 0, 0, 0, 0]]\n",
+        );
+        assert!(
+            error
+                .unwrap_err()
+                .to_string()
+                .contains("in [rig], waypoints and a velocity")
+        );
     }
 
     /// Units stand in names, too; what they say must be the table's.

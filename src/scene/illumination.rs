@@ -39,7 +39,7 @@ impl Scene {
                     PixelLight::echo(echo, Time::of_flight(range_m))
                         .with_background(background_hz(reflectivity))
                 }
-                None => PixelLight::background(background_hz(SKY_REFLECTIVITY)),
+                None => PixelLight::background(background_hz(self.light.sky_reflectivity)),
             })
             .collect()
     }

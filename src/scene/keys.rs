@@ -22,7 +22,7 @@ const fn key(
 }
 
 const CHOSEN: &str = "chosen for the street";
-const RIG: &str = "thesis Table 12";
+const TABLE_12: &str = "thesis Table 12";
 const LENGTH: Range = Range::Above(0.0, FAR_M);
 const POSITION: Range = Range::Within(-FAR_M, FAR_M);
 const SHARE: Range = Range::Within(0.0, 1.0);
@@ -131,35 +131,35 @@ pub(super) const STEREO: &[Key] = &[
         "m",
         LENGTH,
         "Distance from the principal (left) to the right camera",
-        RIG,
+        TABLE_12,
     ),
     key(
         "focal_mm",
         "mm",
         Range::Above(0.0, f64::MAX),
         "Focal length of both lenses",
-        RIG,
+        TABLE_12,
     ),
     key(
         "pixel_pitch_um",
         "um",
         Range::Above(0.0, f64::MAX),
         "Pixel pitch of both cameras",
-        RIG,
+        TABLE_12,
     ),
     key(
         "width",
         "px",
         Range::Within(1.0, 16_384.0),
         "Columns of an image",
-        RIG,
+        TABLE_12,
     ),
     key(
         "height",
         "px",
         Range::Within(1.0, 16_384.0),
         "Rows of an image",
-        RIG,
+        TABLE_12,
     ),
     key(
         "disparity_sigma_px",
@@ -205,17 +205,105 @@ pub(super) const STEREO: &[Key] = &[
     ),
 ];
 
-pub(super) const LIGHT: &[Key] = &[key(
-    "illuminance_klux",
-    "klux",
-    Range::Limited(
-        0.0,
-        200.0,
-        "the sun with bright clouds about it stays below 150 klux",
+pub(super) const LIGHT: &[Key] = &[
+    key(
+        "illuminance_klux",
+        "klux",
+        Range::Limited(
+            0.0,
+            200.0,
+            "the sun with bright clouds about it stays below 150 klux",
+        ),
+        "Illuminance of the scene by the sun",
+        CHOSEN,
     ),
-    "Illuminance of the scene by the sun",
-    CHOSEN,
-)];
+    key(
+        "sun_elevation_deg",
+        "deg",
+        Range::Within(-90.0, 90.0),
+        "Height of the sun above the horizon, for shadows and slopes; light from everywhere if left out",
+        "thesis Eq. 16, where surfaces face the sun",
+    ),
+    key(
+        "sun_azimuth_deg",
+        "deg",
+        Range::Within(-360.0, 360.0),
+        "Where the sun stands, to the right of forward",
+        "chosen",
+    ),
+    key(
+        "sky_share",
+        "",
+        SHARE,
+        "Share of the illuminance that comes from the sky, where the sun has a place",
+        "chosen: a clear day; 1 is an overcast one",
+    ),
+    key(
+        "sky_reflectivity",
+        "",
+        Range::Within(0.0, 10.0),
+        "What a surface in the sun's light would reflect to be as bright as the sky",
+        "chosen: a clear sky in the near infrared; haze is brighter",
+    ),
+];
+
+pub(super) const MEDIUM: &[Key] = &[
+    key(
+        "extinction_1_m",
+        "1/m",
+        Range::Within(0.0, 10.0),
+        "Share of light that fog takes away per metre: 3.912 over the visibility",
+        "clear air; Koschmieder's law",
+    ),
+    key(
+        "backscatter_1_m_sr",
+        "1/m/sr",
+        Range::Within(0.0, 10.0),
+        "Share of light that fog sends straight back; extinction over 18.8 sr if left out",
+        "O'Connor, Illingworth and Hogan 2004, droplets at 905 nm",
+    ),
+    key(
+        "rain_mm_h",
+        "mm/h",
+        Range::Within(0.0, 500.0),
+        "Rain, which weakens light and sends none back",
+        "ITU-R P.1814: 1.076 R^0.67 dB/km",
+    ),
+    key(
+        "overlap_m",
+        "m",
+        LENGTH,
+        "Nearest fog that the laser lights up and the macropixels see",
+        "chosen: laser and lens stand side by side",
+    ),
+];
+
+const SPEED: Range = Range::Within(-1e4, 1e4);
+const PLACES: Range = Range::Within(-FAR_M, FAR_M);
+
+pub(super) const RIG: &[Key] = &[
+    key(
+        "velocity_m_s",
+        "m/s",
+        SPEED,
+        "Velocity of lidar and cameras in the world, [right, down, forward] of how they look at time 0",
+        "at rest",
+    ),
+    key(
+        "yaw_rate_deg_s",
+        "deg/s",
+        Range::Within(-3600.0, 3600.0),
+        "How fast they turn to the right",
+        "at rest",
+    ),
+    key(
+        "waypoints",
+        "",
+        PLACES,
+        "Where they are at what time, straight between: a list of [s, m right, m down, m forward, degrees to the right]",
+        "none",
+    ),
+];
 
 pub(super) const OBJECT: &[Key] = &[
     key(
@@ -228,7 +316,7 @@ pub(super) const OBJECT: &[Key] = &[
     key(
         "kind",
         "",
-        Range::OneOf(&["ground", "plane", "box", "sphere"]),
+        Range::OneOf(&["ground", "plane", "box", "sphere", "cylinder", "person"]),
         "Shape",
         "-",
     ),
@@ -254,10 +342,87 @@ pub(super) const OBJECT: &[Key] = &[
         "chosen: pi * 100 to 700 cd/lx/m2 of signs' sheeting, over a reflectivity of 1",
     ),
     key(
+        "transmittance",
+        "",
+        SHARE,
+        "Share of light that passes straight through: panes; 0 if left out",
+        "-",
+    ),
+    key(
+        "mirror",
+        "",
+        SHARE,
+        "Share of light that is thrown back as by a mirror; 0 if left out, clean panes about 0.08",
+        "-",
+    ),
+    key(
+        "texture",
+        "",
+        Range::OneOf(&["checker", "stripes", "noise", "image"]),
+        "Pattern of this and a second material; plain if left out",
+        "-",
+    ),
+    key(
+        "texture_file",
+        "",
+        Range::Text,
+        "Of an image: PNG, .npy or PFM, relative to the scene file; white is this material, black the second",
+        "-",
+    ),
+    key(
+        "texture_size_m",
+        "m",
+        LENGTH,
+        "Edge of a checker, width of a stripe or image, size of the largest clouds; 0.5 m if left out",
+        "-",
+    ),
+    key(
+        "texture_seed",
+        "",
+        Range::Within(0.0, 4_294_967_295.0),
+        "Of noise: equal seeds give equal clouds; 0 if left out",
+        "-",
+    ),
+    key(
+        "texture_shift_m",
+        "m",
+        POSITION,
+        "Shift of the pattern along the surface, [right, down]; none if left out",
+        "-",
+    ),
+    key(
+        "texture_turn_deg",
+        "deg",
+        Range::Within(-3600.0, 3600.0),
+        "Turn of the pattern on the surface; none if left out",
+        "-",
+    ),
+    key(
+        "second_reflectivity",
+        "",
+        SHARE,
+        "Of a texture: the second material's reflectivity at the laser's wavelength; 0 if left out",
+        "-",
+    ),
+    key(
+        "second_grey",
+        "",
+        SHARE,
+        "Of a texture: what the cameras see of the second material; as second_reflectivity if left out",
+        "-",
+    ),
+    key(
         "velocity_m_s",
         "m/s",
-        Range::Within(-1e4, 1e4),
+        SPEED,
         "Velocity in the world, [right, down, forward]; at rest if left out",
+        "-",
+    ),
+    key(
+        "waypoints",
+        "",
+        PLACES,
+        "Where it is at what time, straight between: a list of [s, m right, m down, m forward] from its place",
         "-",
     ),
     key(
@@ -271,7 +436,7 @@ pub(super) const OBJECT: &[Key] = &[
         "centre_m",
         "m",
         POSITION,
-        "Of a plane, box or sphere: its middle, [right, down, forward] of the lidar",
+        "Of a plane, box, sphere or cylinder: its middle, [right, down, forward] of the lidar",
         "-",
     ),
     key(
@@ -292,7 +457,7 @@ pub(super) const OBJECT: &[Key] = &[
         "height_m",
         "m",
         LENGTH,
-        "Of a plane: extent along its other edge",
+        "Of a plane: extent along its other edge; of a cylinder: its length; of a person: 1.72 m if left out",
         "-",
     ),
     key(
@@ -306,10 +471,30 @@ pub(super) const OBJECT: &[Key] = &[
         "yaw_deg",
         "deg",
         Range::Within(-360.0, 360.0),
-        "Of a box: its turn about the vertical axis, the front to the right; none if left out",
+        "Of a box or person: its turn about the vertical axis, the front to the right; none if left out, and a person walks forward",
         "-",
     ),
-    key("radius_m", "m", LENGTH, "Of a sphere: its radius", "-"),
+    key(
+        "radius_m",
+        "m",
+        LENGTH,
+        "Of a sphere or cylinder: its radius",
+        "-",
+    ),
+    key(
+        "axis",
+        "",
+        POSITION,
+        "Of a cylinder: any vector along it; upright if left out, as poles are",
+        "-",
+    ),
+    key(
+        "foot_m",
+        "m",
+        POSITION,
+        "Of a person: where it stands, [right, down, forward] of the lidar",
+        "-",
+    ),
 ];
 
 /// The sections of a scene file.
@@ -328,6 +513,16 @@ pub(super) const SECTIONS: &[Section] = &[
         name: "light",
         what: "Sunlight",
         keys: LIGHT,
+    },
+    Section {
+        name: "medium",
+        what: "What is in the air",
+        keys: MEDIUM,
+    },
+    Section {
+        name: "rig",
+        what: "Motion of lidar and cameras together; the scene is described at time 0",
+        keys: RIG,
     },
     Section {
         name: "object",

@@ -5,22 +5,30 @@
 
 mod camera;
 mod cast;
+mod daylight;
 mod entry;
 mod file;
 mod illumination;
 mod keys;
+mod medium;
 mod motion;
+mod object;
 mod rules;
 mod settings;
 mod shape;
+mod texture;
 mod truth;
 mod vector;
 
 pub use camera::PinholeCamera;
 pub use cast::{Hit, Return, Returns};
 pub use illumination::SKY_REFLECTIVITY;
+pub use medium::{DROPLET_LIDAR_RATIO_SR, Medium};
+pub use motion::{Rig, RigWaypoint, Waypoint};
+pub use object::Object;
 pub use settings::{Lidar, Light, Scene, Stereo};
-pub use shape::{Object, Shape};
+pub use shape::Shape;
+pub use texture::{Pattern, Picture, Texture};
 pub use truth::GroundTruth;
 pub use vector::{Ray, turned};
 

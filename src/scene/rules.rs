@@ -1,8 +1,10 @@
 //! What makes a scene a possible one, beyond the range of each key; the same rules for files and for scenes built in
 //! code.
 
+use super::motion::Rig;
+use super::object::Object;
 use super::settings::{Scene, Stereo};
-use super::shape::{Object, Shape};
+use super::shape::Shape;
 use crate::files::InputError;
 use crate::settings::{Document, Fault};
 
@@ -27,16 +29,66 @@ pub(super) fn check_stereo(stereo: &Stereo) -> Option<Fault> {
     })
 }
 
-/// The object at `path` is somewhere and faces somewhere.
+/// The object at `path` is somewhere, faces somewhere, makes no light, and moves in one way.
 pub(super) fn check_object(path: &str, object: &Object) -> Option<Fault> {
+    let fault = |key: &str, message: String| {
+        let path = format!("{path}.{key}");
+        Some(Fault { path, message })
+    };
+    let no_length = |key: &str| {
+        let message =
+            format!("{key} = [0, 0, 0] is impossible; give a vector whose length is not zero");
+        fault(key, message)
+    };
     match object.shape {
-        Shape::Plane { normal, .. } if normal.length() <= 1e-9 => Some(Fault {
-            path: format!("{path}.normal"),
-            message: "normal = [0, 0, 0] is impossible; give a vector whose length is not zero"
-                .into(),
-        }),
-        _ => None,
+        Shape::Plane { normal, .. } if normal.length() <= 1e-9 => return no_length("normal"),
+        Shape::Cylinder { axis, .. } if axis.length() <= 1e-9 => return no_length("axis"),
+        _ => {}
     }
+    let texture = object.texture.as_ref();
+    let second = texture.map_or(0.0, |t| {
+        t.second_reflectivity.max(t.second_grey.unwrap_or(0.0))
+    });
+    let first = object.reflectivity.max(object.grey.unwrap_or(0.0));
+    let passed = object.transmittance + object.mirror;
+    if passed > 0.0 && passed + first.max(second) > 1.0 + 1e-9 {
+        let message = format!(
+            "transmittance, mirror and reflectivity (or grey) are {} together, more light than there is; give at most 1",
+            passed + first.max(second)
+        );
+        return fault("transmittance", message);
+    }
+    let is_moving = object.velocity_m_s != glam::DVec3::ZERO;
+    if is_moving && !object.waypoints.is_empty() {
+        return fault("waypoints", BOTH.into());
+    }
+    let times = object.waypoints.iter().map(|at| at.time_s);
+    times_fall(times).and_then(|message| fault("waypoints", message))
+}
+
+const BOTH: &str = "waypoints and a velocity are two motions; give one of them";
+
+/// The rig moves in one way.
+pub(super) fn check_rig(rig: &Rig) -> Option<Fault> {
+    let turns = rig.yaw_rate_deg_s != 0.0 || rig.velocity_m_s != glam::DVec3::ZERO;
+    let message = if turns && !rig.waypoints.is_empty() {
+        Some(BOTH.to_owned())
+    } else {
+        times_fall(rig.waypoints.iter().map(|at| at.time_s))
+    };
+    message.map(|message| Fault {
+        path: "rig.waypoints".into(),
+        message,
+    })
+}
+
+/// What is wrong with the times of waypoints, if anything.
+fn times_fall(times: impl Iterator<Item = f64> + Clone) -> Option<String> {
+    let falls = |(from, to): &(f64, f64)| from >= to;
+    let (from, to) = times.clone().zip(times.skip(1)).find(falls)?;
+    Some(format!(
+        "waypoints go from {from} s to {to} s; give times that rise"
+    ))
 }
 
 #[cfg(test)]

@@ -5,15 +5,20 @@ use std::f64::consts::LN_2;
 use glam::DVec3;
 
 use super::camera::PinholeCamera;
-use super::shape::Object;
+use super::illumination::SKY_REFLECTIVITY;
+use super::medium::Medium;
+use super::motion::Rig;
+use super::object::Object;
 use crate::photon::{Atmosphere, Convention, PhotonBudget, Spot};
 use crate::units::Time;
 
-/// A static world and the optics through which it is seen.
+/// A world and the optics through which it is seen. By default there is nothing in it.
+///
+/// What moves is described where it is at time 0; [`Scene::at`] gives the scene at other times.
 ///
 /// Read one with [`Scene::parse`] or [`Scene::load`], or take [`Scene::outdoor`]. After changing
 /// fields call [`Scene::validate`].
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
 pub struct Scene {
     /// Laser, lens and SPADs of the lidar.
     pub lidar: Lidar,
@@ -21,6 +26,10 @@ pub struct Scene {
     pub stereo: Stereo,
     /// Sunlight.
     pub light: Light,
+    /// Fog and rain; clear air unless given.
+    pub medium: Medium,
+    /// Motion of lidar and cameras; none unless given.
+    pub rig: Rig,
     /// What there is to see.
     #[serde(rename = "object")]
     pub objects: Vec<Object>,
@@ -167,14 +176,27 @@ impl Stereo {
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Light {
-    /// Illuminance, klux; 100 is full sun.
+    /// Illuminance, klux; 100 is full sun. With a place for the sun, that of a surface that faces it.
     pub illuminance_klux: f64,
+    /// Height of the sun above the horizon, degrees; `None` for light from everywhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sun_elevation_deg: Option<f64>,
+    /// Where the sun stands, degrees to the right of forward.
+    pub sun_azimuth_deg: f64,
+    /// Share of the illuminance that comes from the sky, where the sun has a place.
+    pub sky_share: f64,
+    /// What a Lambertian surface in the sun's light would reflect to be as bright as the sky.
+    pub sky_reflectivity: f64,
 }
 
 impl Default for Light {
     fn default() -> Self {
         Light {
             illuminance_klux: 50.0,
+            sun_elevation_deg: None,
+            sun_azimuth_deg: 0.0,
+            sky_share: 0.2,
+            sky_reflectivity: SKY_REFLECTIVITY,
         }
     }
 }

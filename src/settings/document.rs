@@ -5,13 +5,14 @@
 //! file. An object goes by its name or its number from 1: `--set scene.object.car.reflectivity=0.5`.
 
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
 use super::key::Key;
-use crate::files::{InputError, line_of};
+use crate::files::{InputError, line_of, read_text};
 
 /// Something wrong with a setting.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,6 +34,7 @@ enum Origin {
 #[derive(Debug, Clone)]
 pub struct Document {
     source: String,
+    folder: PathBuf,
     table: Table,
     origins: BTreeMap<String, Origin>,
 }
@@ -51,10 +53,26 @@ impl Document {
         Ok(document)
     }
 
+    /// Reads a TOML file.
+    ///
+    /// # Errors
+    /// When it cannot be read or is no TOML.
+    pub fn load(path: &Path) -> Result<Self, InputError> {
+        let mut document = Self::parse(path.display(), &read_text(path)?)?;
+        document.folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        Ok(document)
+    }
+
+    /// The folder that files named in it are relative to: the file's own, or else the current one.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
     /// Settings that stand in no file.
     pub fn of(source: impl std::fmt::Display, table: Table) -> Self {
         Document {
             source: source.to_string(),
+            folder: PathBuf::new(),
             table,
             origins: BTreeMap::new(),
         }

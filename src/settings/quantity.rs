@@ -7,6 +7,10 @@ enum Dimension {
     Frequency,
     Length,
     Speed,
+    PerLength,
+    PerLengthAndAngle,
+    Rain,
+    AngularSpeed,
     Angle,
     Energy,
     Illuminance,
@@ -22,6 +26,10 @@ impl Dimension {
             Dimension::Frequency => "a frequency",
             Dimension::Length => "a length",
             Dimension::Speed => "a velocity",
+            Dimension::PerLength => "a share per length",
+            Dimension::PerLengthAndAngle => "a share per length and solid angle",
+            Dimension::Rain => "an amount of rain",
+            Dimension::AngularSpeed => "an angular velocity",
             Dimension::Angle => "an angle",
             Dimension::Energy => "an energy",
             Dimension::Illuminance => "an illuminance",
@@ -33,7 +41,7 @@ impl Dimension {
 }
 
 /// Symbol, what it measures, and its power of ten of the dimension's base unit.
-const UNITS: [(&str, Dimension, i32); 44] = [
+const UNITS: [(&str, Dimension, i32); 49] = [
     ("s", Dimension::Time, 0),
     ("ms", Dimension::Time, -3),
     ("us", Dimension::Time, -6),
@@ -54,6 +62,11 @@ const UNITS: [(&str, Dimension, i32); 44] = [
     ("nm", Dimension::Length, -9),
     ("m/s", Dimension::Speed, 0),
     ("km/s", Dimension::Speed, 3),
+    ("1/m", Dimension::PerLength, 0),
+    ("1/km", Dimension::PerLength, -3),
+    ("1/m/sr", Dimension::PerLengthAndAngle, 0),
+    ("mm/h", Dimension::Rain, 0),
+    ("deg/s", Dimension::AngularSpeed, 0),
     ("deg", Dimension::Angle, 0),
     ("°", Dimension::Angle, 0),
     ("J", Dimension::Energy, 0),

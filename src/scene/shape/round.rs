@@ -1,0 +1,125 @@
+//! Spheres, cylinders and capsules.
+
+use glam::DVec3;
+
+use super::{Meeting, in_front};
+use crate::scene::vector::Ray;
+
+/// The parts of a cylinder.
+const SIDE: u32 = 0;
+const END: u32 = 1;
+
+pub(super) fn meet_sphere(ray: &Ray, centre_m: DVec3, radius_m: f64) -> Option<Meeting> {
+    let to_centre = centre_m - ray.origin;
+    let along_m = to_centre.dot(ray.direction);
+    let miss = to_centre - ray.direction * along_m;
+    let half_chord_m2 = radius_m * radius_m - miss.dot(miss);
+    if half_chord_m2 < 0.0 {
+        return None;
+    }
+    let half_chord_m = half_chord_m2.sqrt();
+    let range_m = in_front(along_m - half_chord_m).or_else(|| in_front(along_m + half_chord_m))?;
+    Some(Meeting { range_m, part: 0 })
+}
+
+/// Around the vertical axis at the equator, and down along the meridian.
+pub(super) fn on_sphere(offset: DVec3, radius_m: f64) -> (f64, f64) {
+    let down = (offset.y / radius_m).clamp(-1.0, 1.0).asin();
+    (radius_m * offset.x.atan2(-offset.z), radius_m * down)
+}
+
+/// Ranges at which a line enters and leaves the endless cylinder of `radius_m` about the axis (of unit length) through
+/// `from_m`; `None` if it never does, infinite where it stays inside.
+fn pierced(ray: &Ray, from_m: DVec3, axis: DVec3, radius_m: f64) -> Option<(f64, f64)> {
+    let flat = |v: DVec3| v - axis * v.dot(axis);
+    let (offset, direction) = (flat(ray.origin - from_m), flat(ray.direction));
+    let (a, b) = (direction.length_squared(), offset.dot(direction));
+    let c = offset.length_squared() - radius_m * radius_m;
+    if a < 1e-24 {
+        return (c <= 0.0).then_some((f64::NEG_INFINITY, f64::INFINITY));
+    }
+    let square = b * b - a * c;
+    (square >= 0.0).then(|| ((-b - square.sqrt()) / a, (-b + square.sqrt()) / a))
+}
+
+/// A cylinder with flat ends; `axis` has unit length.
+pub(super) fn meet_cylinder(
+    ray: &Ray,
+    centre_m: DVec3,
+    axis: DVec3,
+    (radius_m, height_m): (f64, f64),
+) -> Option<Meeting> {
+    let (enter, leave) = pierced(ray, centre_m, axis, radius_m)?;
+    let (start, rise) = ((ray.origin - centre_m).dot(axis), ray.direction.dot(axis));
+    let half_m = height_m / 2.0;
+    let (low, high) = if rise == 0.0 {
+        if start.abs() > half_m {
+            return None;
+        }
+        (f64::NEG_INFINITY, f64::INFINITY)
+    } else {
+        let (a, b) = ((-half_m - start) / rise, (half_m - start) / rise);
+        (a.min(b), a.max(b))
+    };
+    let first = if low > enter {
+        (low, END)
+    } else {
+        (enter, SIDE)
+    };
+    let last = if high < leave {
+        (high, END)
+    } else {
+        (leave, SIDE)
+    };
+    if first.0 > last.0 {
+        return None;
+    }
+    let meeting = |(range_m, part)| in_front(range_m).map(|range_m| Meeting { range_m, part });
+    meeting(first).or_else(|| meeting(last))
+}
+
+pub(super) fn cylinder_normal(offset: DVec3, axis: DVec3, part: u32) -> DVec3 {
+    match part {
+        SIDE => (offset - axis * offset.dot(axis)).normalize(),
+        _ => axis,
+    }
+}
+
+/// Around the side and along it, or across an end.
+pub(super) fn on_cylinder(offset: DVec3, axis: DVec3, radius_m: f64, part: u32) -> (f64, f64) {
+    let (side, other) = axis.any_orthonormal_pair();
+    let (x, y) = (offset.dot(side), offset.dot(other));
+    match part {
+        SIDE => (radius_m * y.atan2(x), offset.dot(axis)),
+        _ => (x, y),
+    }
+}
+
+/// A cylinder whose ends are half balls, from `from_m` to `to_m`.
+pub(super) fn meet_capsule(
+    ray: &Ray,
+    (from_m, to_m): (DVec3, DVec3),
+    radius_m: f64,
+) -> Option<Meeting> {
+    let length_m = from_m.distance(to_m);
+    let axis = (to_m - from_m) / length_m;
+    let on_side = pierced(ray, from_m, axis, radius_m).and_then(|(enter, leave)| {
+        let meets = |range_m: f64| {
+            let height_m = (ray.at(range_m) - from_m).dot(axis);
+            in_front(range_m).filter(|_| (0.0..=length_m).contains(&height_m))
+        };
+        meets(enter).or_else(|| meets(leave))
+    });
+    let end = |centre_m| meet_sphere(ray, centre_m, radius_m).map(|meeting| meeting.range_m);
+    // From outside the nearest of the three surfaces is the capsule's; nobody looks from inside one.
+    let nearest = [on_side, end(from_m), end(to_m)].into_iter().flatten();
+    let range_m = nearest.reduce(f64::min)?;
+    Some(Meeting { range_m, part: 0 })
+}
+
+/// From the axis of a capsule to a point of its surface.
+pub(super) fn capsule_normal(point: DVec3, (from_m, to_m): (DVec3, DVec3)) -> DVec3 {
+    let along = to_m - from_m;
+    let share = (point - from_m).dot(along) / along.length_squared();
+    (point - from_m - along * share.clamp(0.0, 1.0)).normalize()
+}
