@@ -19,6 +19,7 @@
 //! | [`bench`](mod@bench) | stimulus, recordings, hardware events, Verilog testbench |
 //! | [`engine`] | the ways to run an exposure |
 //! | [`analysis`] | the periods, corners and spread that static timing allows |
+//! | [`stereo`] | semi-global matching of two grey images |
 //! | [`scene`] | surfaces, optics, sunlight, ground truth |
 //! | [`guide`] | the stereo camera pair and its mapping onto macropixels |
 //! | [`theory`] | detection probability, precision, partial histograms, design, significance |
@@ -46,6 +47,7 @@ pub mod report;
 pub mod reproduce;
 pub mod scene;
 pub mod settings;
+pub mod stereo;
 pub mod system;
 pub mod testbenches;
 pub mod theory;

@@ -13,6 +13,7 @@ mod sdf;
 mod settings;
 mod silicon;
 mod speed;
+mod stereo;
 mod tb;
 mod timing;
 mod wave;
@@ -49,6 +50,8 @@ enum Command {
     Range(range::RangeArgs),
     /// Sweep a picosecond laser over the bins of a sensor with delay lines, and keep when they are.
     Calibrate(calibrate::CalibrateArgs),
+    /// Disparities of a rectified pair of pictures, by semi-global matching.
+    Stereo(stereo::StereoArgs),
     /// How fast the fast engines are, by size of the array and threads, and the memory they take.
     Speed(speed::SpeedArgs),
     /// How fast the chip can be clocked: ripple, periods, margins.
@@ -85,6 +88,7 @@ pub fn main() -> ExitCode {
         Command::Reproduce(args) => reproduce::run(&args),
         Command::Range(args) => range::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
+        Command::Stereo(args) => stereo::run(&args),
         Command::Speed(args) => speed::run(&args),
         Command::Timing(args) => timing::run(&args),
         Command::Power(args) => power::run(&args),

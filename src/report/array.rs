@@ -15,6 +15,25 @@ use crate::files::{InputError, OutputFile};
 /// # Panics
 /// When `shape` does not have as many elements as `data`.
 pub(crate) fn write_npy_u16(path: &Path, shape: &[u64], data: &[u16]) -> Result<(), InputError> {
+    write_npy(path, shape, data)
+}
+
+/// Writes `data` as a `float32` array of `shape`, last axis fastest.
+///
+/// # Errors
+/// When the file cannot be written; no part of it is then left behind.
+///
+/// # Panics
+/// When `shape` does not have as many elements as `data`.
+pub(crate) fn write_npy_f32(path: &Path, shape: &[u64], data: &[f32]) -> Result<(), InputError> {
+    write_npy(path, shape, data)
+}
+
+fn write_npy<T: npyz::AutoSerialize + Copy>(
+    path: &Path,
+    shape: &[u64],
+    data: &[T],
+) -> Result<(), InputError> {
     let elements: u64 = shape.iter().product();
     assert_eq!(
         elements,

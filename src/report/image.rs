@@ -64,8 +64,11 @@ pub struct DepthMap<'a> {
     pub cols: usize,
     /// Squares, row by row from the top left.
     pub cells: &'a [Cell],
-    /// Ends of the depth scale, m: yellow, violet. Depths beyond take the end's colour.
+    /// Ends of the depth scale, m: yellow, violet. Depths beyond take the end's colour. Where yellow is the greater number, as of disparities,
+    /// the scale falls.
     pub range_m: (f32, f32),
+    /// What stands behind numbers of the scale.
+    pub unit: &'a str,
     /// Names of categories, at most as many as `CATEGORY_COLOURS`; those that occur stand in the legend with
     /// their numbers.
     pub categories: &'a [&'a str],
@@ -80,8 +83,8 @@ impl DepthMap<'_> {
     /// When the file cannot be written, or a picture of this size cannot be made.
     ///
     /// # Panics
-    /// When the cells do not fill rows of `cols`, there are none, `scale` is zero, a category has no name or colour, or the range does
-    /// not rise.
+    /// When the cells do not fill rows of `cols`, there are none, `scale` is zero, a category has no name or colour, or the range's
+    /// ends are equal.
     pub fn write_png(&self, path: &Path) -> Result<(), InputError> {
         let canvas = self.draw();
         OutputFile::write_with(path, |file| encode(file, &canvas))
@@ -97,7 +100,7 @@ impl DepthMap<'_> {
             "an empty picture"
         );
         assert_eq!(cells.len() % cols, 0, "cells do not fill rows of {cols}");
-        assert!(min_m < max_m, "depth range {min_m} to {max_m} m");
+        assert!(min_m != max_m, "depth range {min_m} to {max_m}");
         assert!(self.categories.len() <= CATEGORY_COLOURS.len(), "no colour");
         let range_m = (f64::from(min_m), f64::from(max_m));
         let (map_width, map_height) = (cols * scale, cells.len() / cols * scale);
@@ -121,7 +124,14 @@ impl DepthMap<'_> {
             };
             canvas.fill(left, top, scale, scale, colour);
         }
-        draw_bar(&mut canvas, bar_left, map_top, bar_height, range_m);
+        draw_bar(
+            &mut canvas,
+            bar_left,
+            map_top,
+            bar_height,
+            range_m,
+            self.unit,
+        );
         for (category, text, left, top) in entries {
             let (top, colour) = (legend_top + top, CATEGORIES + category as u8);
             let sample_top = top + (LINE_PX - SAMPLE_PX) / 2;
@@ -170,25 +180,33 @@ fn step(depth_m: f64, (min_m, max_m): (f64, f64)) -> u8 {
 }
 
 /// The colour bar: the nearest depth on top, round numbers beside it.
-fn draw_bar(canvas: &mut Canvas, left: usize, top: usize, height: usize, range_m: (f64, f64)) {
+fn draw_bar(
+    canvas: &mut Canvas,
+    left: usize,
+    top: usize,
+    height: usize,
+    range_m: (f64, f64),
+    unit: &str,
+) {
     let (min_m, max_m) = range_m;
+    let (low_m, high_m) = (min_m.min(max_m), min_m.max(max_m));
     for y in 0..height {
         let depth_m = min_m + (max_m - min_m) * y as f64 / (height - 1) as f64;
         canvas.fill(left, top + y, BAR_PX, 1, step(depth_m, range_m));
     }
     let most = (height / (2 * LINE_PX)).clamp(2, 12);
-    let interval_m = round_interval((max_m - min_m) / most as f64);
+    let interval_m = round_interval((high_m - low_m) / most as f64);
     let decimals = (-interval_m.log10().floor()).clamp(0.0, 3.0) as usize;
-    let first = (min_m / interval_m - 1e-6).ceil();
+    let first = (low_m / interval_m - 1e-6).ceil();
     for n in 0..=most {
         let depth_m = (first + n as f64) * interval_m;
         let position = (depth_m - min_m) / (max_m - min_m);
-        if position > 1.0 + 1e-6 {
+        if depth_m > high_m + 1e-6 * (high_m - low_m) {
             break;
         }
         let y = top + (position * (height - 1) as f64).round() as usize;
         canvas.fill(left + BAR_PX, y, TICK_PX, 1, INK);
-        let label = format!("{depth_m:.decimals$} m");
+        let label = format!("{depth_m:.decimals$} {unit}");
         canvas.text(
             left + BAR_PX + LABEL_OFFSET_PX,
             y - LINE_PX / 2,
@@ -268,6 +286,7 @@ mod tests {
             cols: 3,
             cells: &cells,
             range_m: (10.0, 90.0),
+            unit: "m",
             categories: &["sky", "dark", "lost"],
             scale: 8,
         };
@@ -303,6 +322,7 @@ mod tests {
             cols: 64,
             cells: &cells,
             range_m: (10.0, 200.0),
+            unit: "m",
             categories: &["no guide"],
             scale: 8,
         };
@@ -331,6 +351,7 @@ mod tests {
             cols: 1,
             cells: &[Cell::Depth(0.5)],
             range_m: (0.0, 1e-3),
+            unit: "m",
             categories: &[],
             scale: 1,
         };
@@ -339,6 +360,7 @@ mod tests {
         let map = DepthMap {
             cells: &[Cell::Category(0)],
             range_m: (-2e6, 3e6),
+            unit: "m",
             categories: &[&long],
             ..map
         };

@@ -90,6 +90,7 @@ pub(super) fn depth_map(
         cols: frame.cols,
         cells: &cells,
         range_m: depth_range(&cells),
+        unit: "m",
         categories: &NoDepth::ALL.map(NoDepth::name),
         scale: (512 / frame.rows.max(frame.cols)).max(1),
     };

@@ -1,0 +1,382 @@
+//! `gdtof stereo`: disparities of a rectified pair of pictures, by semi-global matching.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::say;
+use crate::files::{InputError, MANIFEST, OutputFile, Raster, ResultSet};
+use crate::report::{Cell, DepthMap, Table, write_npy_f32};
+use crate::stereo::{Census, DisparityMap, GreyImage, MatchError, Matcher, Paths, Workspace};
+
+/// Arguments of `gdtof stereo`.
+#[derive(Args)]
+pub(super) struct StereoArgs {
+    /// Left picture (PNG), rectified.
+    left: PathBuf,
+    /// Right picture (PNG), rectified: points stand in the same row as in the left one.
+    right: PathBuf,
+    #[command(flatten)]
+    matching: MatchingArgs,
+    /// True disparities of the left picture (.npy, rows x columns; NaN or infinite where not known) to compare with.
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
+    /// Folder for results.
+    #[arg(long, short, value_name = "FOLDER", default_value = "stereo")]
+    out: PathBuf,
+    /// Match so many times and tell the least and the middle run time.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    repeat: u32,
+    /// Print as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// How to match.
+#[derive(Args)]
+struct MatchingArgs {
+    /// Disparities searched, 1 to 256.
+    #[arg(long, value_name = "N", default_value_t = Matcher::default().disparities)]
+    disparities: usize,
+    /// Least disparity searched, px.
+    #[arg(
+        long,
+        value_name = "PX",
+        default_value_t = 0,
+        allow_negative_numbers = true
+    )]
+    min_disparity: i32,
+    /// Paths along which costs are gathered.
+    #[arg(long, value_enum, default_value = "5")]
+    paths: PathsArg,
+    /// Neighbourhood of the census, columns x rows.
+    #[arg(long, value_name = "COLSxROWS", default_value = "7x7")]
+    census: String,
+    /// Penalty of a step of one disparity.
+    #[arg(long, value_name = "P", default_value_t = Matcher::default().p1)]
+    p1: u8,
+    /// Penalty of a greater step where the image is even.
+    #[arg(long, value_name = "P", default_value_t = Matcher::default().p2)]
+    p2: u8,
+    /// By how much the second best disparity must be worse, per cent.
+    #[arg(long, value_name = "PERCENT", default_value_t = Matcher::default().uniqueness_percent)]
+    uniqueness: u32,
+    /// By how much left and right may disagree, px; "none" does not ask.
+    #[arg(long, value_name = "PX", default_value = "1")]
+    left_right: String,
+    /// Patches of fewer pixels are taken out.
+    #[arg(long, value_name = "PX", default_value_t = Matcher::default().speckle_px)]
+    speckle: usize,
+    /// Leave out the median filter.
+    #[arg(long)]
+    no_median: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum PathsArg {
+    #[value(name = "3")]
+    Three,
+    #[value(name = "4")]
+    Four,
+    #[value(name = "5")]
+    Five,
+    #[value(name = "8")]
+    Eight,
+}
+
+impl MatchingArgs {
+    fn matcher(&self) -> Result<Matcher, InputError> {
+        let census = (self.census.split_once('x'))
+            .and_then(|(cols, rows)| Some((cols.parse().ok()?, rows.parse().ok()?)));
+        let Some((cols, rows)) = census else {
+            let message = format!(
+                "{:?} is no neighbourhood; give columns x rows such as 7x7",
+                self.census
+            );
+            return Err(InputError::new("--census", message));
+        };
+        let left_right_px = match self.left_right.as_str() {
+            "none" => None,
+            px => Some(px.parse().map_err(|_| {
+                let message = format!("{px:?} is no number of pixels; give 0, 1, ... or none");
+                InputError::new("--left-right", message)
+            })?),
+        };
+        let matcher = Matcher {
+            min_disparity: self.min_disparity,
+            disparities: self.disparities,
+            paths: match self.paths {
+                PathsArg::Three => Paths::Three,
+                PathsArg::Four => Paths::Four,
+                PathsArg::Five => Paths::Five,
+                PathsArg::Eight => Paths::Eight,
+            },
+            census: Census { cols, rows },
+            p1: self.p1,
+            p2: self.p2,
+            uniqueness_percent: self.uniqueness,
+            left_right_px,
+            median: !self.no_median,
+            speckle_px: self.speckle,
+            ..Matcher::default()
+        };
+        Ok(Matcher {
+            p2_least: matcher
+                .p2_least
+                .clamp(matcher.p1.min(matcher.p2), matcher.p2),
+            ..matcher
+        })
+    }
+}
+
+/// What is wrong, and with which option it is mended.
+pub(super) fn cannot_match(left: &Path, right: &Path, error: &MatchError) -> InputError {
+    let (what, cure) = match error {
+        MatchError::Sizes { .. } => {
+            let message = format!("{error} ({}); give a rectified pair", right.display());
+            return InputError::new(left.display(), message);
+        }
+        MatchError::Disparities(_) => ("--disparities", "give 1 to 256"),
+        MatchError::OutOfImage { .. } => ("--min-disparity", "give one within the image's width"),
+        MatchError::Census { .. } => ("--census", "give odd ones such as 7x7"),
+        MatchError::Penalties { .. } => ("--p1, --p2", "give smaller ones, P1 first"),
+        MatchError::SpeckleStep(_) => ("--speckle", "give a positive one"),
+        MatchError::Memory { .. } => ("--paths", "give 3 or 5, or smaller pictures"),
+    };
+    InputError::new(what, format!("{error}; {cure}"))
+}
+
+/// A picture as an image.
+///
+/// # Errors
+/// When it cannot be read.
+pub(super) fn read_image(path: &Path) -> Result<GreyImage, InputError> {
+    let complain = |message: String| InputError::new(path.display(), message);
+    let raster = Raster::read(path)?;
+    let bits = match raster.white {
+        255.0 => 8,
+        65_535.0 => 16,
+        _ => return Err(complain("is no PNG; give a picture".into())),
+    };
+    let pixels = raster.values.iter().map(|v| v.round() as u16).collect();
+    GreyImage::new(raster.width, raster.height, bits, pixels)
+        .map_err(|error| complain(format!("is no picture: {error}; give another")))
+}
+
+/// Errors of disparities against the truth, where that is known.
+#[derive(Debug, Serialize)]
+struct Errors {
+    /// Pixels whose truth is known.
+    known: usize,
+    /// Share of these that have a disparity, per cent.
+    valid_percent: f64,
+    /// Share of valid ones that are more than 2 px off, per cent.
+    bad_2px_percent: f64,
+    /// Share of known ones that are more than 2 px off or have none, per cent.
+    bad_2px_or_invalid_percent: f64,
+    /// Root mean square of valid ones, px.
+    rms_px: f64,
+    /// Half of the valid ones are off by no more, px.
+    median_px: f64,
+}
+
+impl Errors {
+    fn of(map: &DisparityMap, truth: &[f32]) -> Self {
+        let known = || {
+            truth
+                .iter()
+                .zip(map.values_px())
+                .filter(|(t, _)| t.is_finite())
+        };
+        let mut off_px: Vec<f64> = known()
+            .filter(|(_, d)| !d.is_nan())
+            .map(|(t, d)| (f64::from(*d) - f64::from(*t)).abs())
+            .collect();
+        off_px.sort_by(f64::total_cmp);
+        let bad = off_px.iter().filter(|&&px| px > 2.0).count();
+        let (known, valid) = (known().count(), off_px.len());
+        let percent = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
+        let squares: f64 = off_px.iter().map(|px| px * px).sum();
+        Errors {
+            known,
+            valid_percent: percent(valid, known),
+            bad_2px_percent: percent(bad, valid),
+            bad_2px_or_invalid_percent: percent(known - valid + bad, known),
+            rms_px: (squares / valid.max(1) as f64).sqrt(),
+            median_px: off_px.get(valid / 2).copied().unwrap_or(f64::NAN),
+        }
+    }
+}
+
+/// What is printed and kept.
+#[derive(Serialize)]
+struct Report {
+    width: usize,
+    height: usize,
+    disparities: usize,
+    paths: usize,
+    matched: usize,
+    /// Least and middle run time of all repetitions, s.
+    run_time_s: [f64; 2],
+    threads: usize,
+    errors: Option<Errors>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, and results that cannot be written.
+pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
+    let matcher = args.matching.matcher()?;
+    let (left, right) = (read_image(&args.left)?, read_image(&args.right)?);
+    let truth = match &args.truth {
+        Some(path) => Some(read_truth(path, &left)?),
+        None => None,
+    };
+    let mut workspace = Workspace::default();
+    let mut times_s = Vec::new();
+    let mut matched = || {
+        let start = Instant::now();
+        let map = matcher.match_pair_in(&mut workspace, &left, &right);
+        times_s.push(start.elapsed().as_secs_f64());
+        map.map_err(|error| cannot_match(&args.left, &args.right, &error))
+    };
+    let mut map = matched()?;
+    for _ in 1..args.repeat {
+        map = matched()?;
+    }
+    times_s.sort_by(f64::total_cmp);
+    let report = Report {
+        width: map.width(),
+        height: map.height(),
+        disparities: matcher.disparities,
+        paths: matcher.paths.number(),
+        matched: map.matched(),
+        run_time_s: [times_s[0], times_s[times_s.len() / 2]],
+        threads: rayon::current_num_threads(),
+        errors: truth.map(|truth| Errors::of(&map, &truth)),
+    };
+    let set = ResultSet::begin(&args.out)?;
+    let shape = [map.height() as u64, map.width() as u64];
+    write_npy_f32(
+        &set.staging().join("disparity.npy"),
+        &shape,
+        map.values_px(),
+    )?;
+    picture(&matcher, &map).write_png(&set.staging().join("disparity.png"))?;
+    OutputFile::write_with(&set.staging().join("stereo.json"), |w| {
+        serde_json::to_writer_pretty(&mut *w, &report)?;
+        writeln!(w)
+    })?;
+    for note in set.commit("stereo", [&args.left, &args.right])? {
+        eprintln!("gdtof: {note}");
+    }
+    match args.json {
+        true => say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?,
+        false => say(table(args, &report))?,
+    }
+    Ok(())
+}
+
+fn read_truth(path: &Path, left: &GreyImage) -> Result<Vec<f32>, InputError> {
+    let truth = Raster::read(path)?;
+    if (truth.width, truth.height) == (left.width(), left.height()) {
+        return Ok(truth.values);
+    }
+    let message = format!(
+        "has {} x {} values and the pictures {} x {} pixels; give the truth of these pictures",
+        truth.width,
+        truth.height,
+        left.width(),
+        left.height()
+    );
+    Err(InputError::new(path.display(), message))
+}
+
+/// Draws disparities; near is yellow as in pictures of depth.
+struct Drawn {
+    cells: Vec<Cell>,
+    cols: usize,
+    ends_px: (f32, f32),
+}
+
+fn picture(matcher: &Matcher, map: &DisparityMap) -> Drawn {
+    let cells: Vec<Cell> = (map.values_px().iter())
+        .map(|&d| {
+            if d.is_nan() {
+                Cell::Category(0)
+            } else {
+                Cell::Depth(d)
+            }
+        })
+        .collect();
+    let known = || map.values_px().iter().copied().filter(|d| !d.is_nan());
+    let least = known().fold(f32::INFINITY, f32::min).floor();
+    let most = known().fold(f32::NEG_INFINITY, f32::max).ceil();
+    let first = matcher.min_disparity as f32;
+    let ends_px = match least < most {
+        true => (most, least),
+        false => (first + matcher.disparities as f32, first),
+    };
+    Drawn {
+        cells,
+        cols: map.width(),
+        ends_px,
+    }
+}
+
+impl Drawn {
+    fn write_png(&self, path: &Path) -> Result<(), InputError> {
+        let map = DepthMap {
+            title: "Disparity",
+            cols: self.cols,
+            cells: &self.cells,
+            range_m: self.ends_px,
+            unit: "px",
+            categories: &["none"],
+            scale: (512 / self.cols).max(1),
+        };
+        map.write_png(path)
+    }
+}
+
+fn table(args: &StereoArgs, report: &Report) -> Table {
+    let percent = |value: f64| format!("{value:.2} %");
+    let pixels = report.width * report.height;
+    let mut table = Table::new(format!(
+        "{} and {}, {} disparities, {} paths",
+        args.left.display(),
+        args.right.display(),
+        report.disparities,
+        report.paths
+    ))
+    .row("matched", format!("{} of {pixels}", report.matched));
+    if let Some(errors) = &report.errors {
+        table.push("truth known", errors.known);
+        table.push("  of these matched", percent(errors.valid_percent));
+        table.push(
+            "  more than 2 px off, of those matched",
+            percent(errors.bad_2px_percent),
+        );
+        table.push(
+            "  more than 2 px off or not matched",
+            percent(errors.bad_2px_or_invalid_percent),
+        );
+        table.push("  RMS error", format!("{:.3} px", errors.rms_px));
+        table.push("  median error", format!("{:.3} px", errors.median_px));
+    }
+    let [least, middle] = report.run_time_s.map(|s| format!("{:.1} ms", 1e3 * s));
+    let threads = report.threads;
+    let times = match args.repeat {
+        1 => least,
+        n => format!("{least} least, {middle} median of {n}"),
+    };
+    table.push("run time", format!("{times}, {threads} threads"));
+    table.push(
+        format!("in {}", args.out.display()),
+        ["disparity.png", "disparity.npy", "stereo.json", MANIFEST].join(" "),
+    );
+    table
+}
