@@ -40,7 +40,7 @@ pub(super) struct SensorArgs {
 pub(super) struct SceneArgs {
     #[command(flatten)]
     sensor: SensorArgs,
-    /// Scene (TOML); without it, a street on a bright day.
+    /// Scene (TOML), or one of the built-in street (without it), van, fog, glass, sweep, night and empty.
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
 }
@@ -100,7 +100,7 @@ impl SceneArgs {
     /// Unreadable files, bad keys and values.
     pub(super) fn read(&self) -> Result<(SensorConfig, Scene), InputError> {
         let mut document = match &self.scene {
-            Some(path) => read(path)?,
+            Some(path) => scene_document(path)?,
             None => Scene::outdoor_document(),
         };
         let sensor = self.sensor.read_with(Some(&mut document));
@@ -117,15 +117,37 @@ impl SceneArgs {
     /// What reports call the scene.
     pub(super) fn scene_name(&self) -> String {
         match &self.scene {
+            Some(path) if is_name(path) => format!("built-in {}", path.display()),
             Some(path) => path.display().to_string(),
             None => "built-in street".to_owned(),
         }
     }
 }
 
+/// Whether something is the name of what is built in rather than a file. A file of such a name comes first.
+fn is_name(path: &Path) -> bool {
+    !path.exists() && path.extension().is_none()
+}
+
+/// A scene file, or a built-in scene.
+fn scene_document(path: &Path) -> Result<Document, InputError> {
+    if !is_name(path) {
+        return read(path);
+    }
+    let named = path.to_str().and_then(Scene::built_in_document);
+    named.ok_or_else(|| {
+        let names: Vec<&str> = Scene::built_in().map(|(name, _)| name).collect();
+        let message = format!(
+            "is no file and no built-in scene; give {}, or a file",
+            names.join(" or ")
+        );
+        InputError::new(path.display(), message)
+    })
+}
+
 /// A sensor file, or the description of a chip that is known by name. A file of such a name comes first.
 fn described(path: &Path) -> Result<Document, InputError> {
-    if path.exists() || path.extension().is_some() {
+    if !is_name(path) {
         return read(path);
     }
     let chip = path.to_str().and_then(Sensor::named).ok_or_else(|| {

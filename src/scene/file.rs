@@ -12,20 +12,15 @@ use super::settings::Scene;
 use crate::files::InputError;
 use crate::settings::{Document, Fault, Key, commented};
 
-const OUTDOOR: &str = include_str!("../../vectors/scenes/outdoor.toml");
-
 impl Scene {
-    /// The built-in scene: a street from 15 to 180 m, 50 klux.
+    /// The built-in street, from 15 to 180 m, 50 klux.
     pub fn outdoor() -> Self {
-        match Scene::parse("outdoor.toml", OUTDOOR) {
-            Ok(scene) => scene,
-            Err(error) => unreachable!("the built-in scene is tested: {error}"),
-        }
+        Scene::named("street").expect("the street is built in")
     }
 
-    /// The file of the built-in scene, to be changed by `--set`.
+    /// The file of the built-in street, to be changed by `--set`.
     pub fn outdoor_document() -> Document {
-        Document::parse("the built-in street", OUTDOOR).expect("the built-in scene is tested")
+        Scene::built_in_document("street").expect("the street is built in")
     }
 
     /// Reads a scene file. Files that it names are relative to its folder.
@@ -214,6 +209,8 @@ mod tests {
     use super::*;
     use crate::scene::{Lidar, Stereo};
     use proptest::prelude::*;
+
+    const OUTDOOR: &str = include_str!("../../vectors/scenes/outdoor.toml");
 
     /// The complaint about the built-in scene after one replacement, which must apply.
     fn complaint_after(old: &str, new: &str) -> (InputError, String) {
