@@ -46,12 +46,33 @@ pub(super) fn of_rig(scene: &Scene, rows: u32, cols: u32, seed: u64) -> GuideMap
         .par_iter()
         .map(|&row| {
             offsets(rig.camera().width, stride)
-                .filter_map(|col| land(&rig, scene, &lidar, &rig.measure(row, col)?))
+                .filter_map(|col| {
+                    let point = rig.measure(row, col)?;
+                    land(scene, &lidar, &point, rig.depth_sigma_m(point.depth_m))
+                })
                 .collect()
         })
         .collect();
+    nearest_to_centres(rows, cols, landings.into_iter().flatten())
+}
+
+/// Maps points onto a `rows` × `cols` array; `sigma_m` gives the standard deviation of a depth, m.
+pub(super) fn of_points(
+    scene: &Scene,
+    rows: u32,
+    cols: u32,
+    points: Vec<StereoPoint>,
+    sigma_m: impl Fn(f64) -> f64,
+) -> GuideMap {
+    let lidar = scene.lidar_camera(rows, cols);
+    let landings =
+        (points.iter()).filter_map(|point| land(scene, &lidar, point, sigma_m(point.depth_m)));
+    nearest_to_centres(rows, cols, landings)
+}
+
+fn nearest_to_centres(rows: u32, cols: u32, landings: impl Iterator<Item = Landing>) -> GuideMap {
     let mut best: Vec<Option<Landing>> = vec![None; rows as usize * cols as usize];
-    for landing in landings.into_iter().flatten() {
+    for landing in landings {
         let slot = &mut best[landing.index];
         if slot.is_none_or(|b| landing.off_centre2 < b.off_centre2) {
             *slot = Some(landing);
@@ -74,10 +95,10 @@ fn offsets(size: u32, stride: u32) -> impl Iterator<Item = u32> {
 
 /// Where in the lidar's image a stereo point lands; `None` outside.
 fn land(
-    rig: &StereoRig,
     scene: &Scene,
     lidar: &PinholeCamera,
     point: &StereoPoint,
+    sigma_m: f64,
 ) -> Option<Landing> {
     let from_lidar = point.point_m + scene.stereo.position_m;
     let (u, v) = lidar.project(from_lidar)?;
@@ -85,7 +106,6 @@ fn land(
     let (du, dv) = (u - f64::from(col) - 0.5, v - f64::from(row) - 0.5);
     // The error is along the camera's ray: what of it the lidar sees as range is its share along the lidar's.
     let range_per_depth = from_lidar.normalize().dot(point.point_m) / point.depth_m;
-    let sigma_m = rig.depth_sigma_m(point.depth_m);
     Some(Landing {
         index: row as usize * lidar.width as usize + col as usize,
         off_centre2: du * du + dv * dv,

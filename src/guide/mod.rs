@@ -17,6 +17,9 @@ mod monocular;
 mod noisy_truth;
 pub mod options;
 mod radar;
+mod render;
+mod rendered;
+mod right_camera;
 mod stereo;
 #[cfg(test)]
 mod test_scenes;
@@ -33,6 +36,7 @@ pub use map::GuideMap;
 pub use monocular::Monocular;
 pub use noisy_truth::NoisyTruth;
 pub use radar::Radar;
+pub use rendered::MatchedStereo;
 pub use stereo::{StereoPoint, StereoRig};
 
 /// A frame that the lidar has taken before.

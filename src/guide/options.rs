@@ -8,8 +8,8 @@ use toml::Table;
 
 use super::from_file::{FileMap, FileSigma};
 use super::fused::{Fused, MOST_GUIDES};
-use super::{BehaviouralStereo, Guide, Kalman, Monocular, NoisyTruth, Radar};
-use super::{kalman, monocular, noisy_truth, radar};
+use super::{BehaviouralStereo, Guide, Kalman, MatchedStereo, Monocular, NoisyTruth, Radar};
+use super::{kalman, monocular, noisy_truth, radar, rendered};
 use crate::files::InputError;
 use crate::settings::{Document, Key, Range};
 
@@ -44,6 +44,12 @@ pub const KINDS: &[Kind] = &[
         what: "The true distance with a Gaussian error",
         keys: noisy_truth::KEYS,
         make: |document, keys| Ok(Arc::new(read::<NoisyTruth>(document, keys)?)),
+    },
+    Kind {
+        name: "matched",
+        what: "The scene's camera pair: rendered images, semi-global matching",
+        keys: rendered::KEYS,
+        make: |document, keys| Ok(Arc::new(read::<MatchedStereo>(document, keys)?)),
     },
     Kind {
         name: "monocular",
@@ -215,6 +221,7 @@ mod tests {
             (noisy_truth::KEYS, Table::try_from(NoisyTruth::default())),
             (monocular::KEYS, Table::try_from(Monocular::default())),
             (radar::KEYS, Table::try_from(Radar::default())),
+            (rendered::KEYS, Table::try_from(MatchedStereo::default())),
             (kalman::KEYS, Table::try_from(Kalman::default())),
         ];
         for (keys, table) in tables {

@@ -14,8 +14,9 @@
 
 use glam::DVec3;
 
+use super::right_camera::RightCamera;
 use crate::photon::{Purpose, normal, random_stream};
-use crate::scene::{PinholeCamera, Ray, Scene, Stereo, turned};
+use crate::scene::{PinholeCamera, Ray, Scene};
 
 /// How much nearer than the expected point the right camera's view may end, as a share of the
 /// range, before the point counts as occluded: room for rounding on slanted surfaces.
@@ -26,6 +27,7 @@ const OCCLUSION_TOLERANCE: f64 = 1e-6;
 pub struct StereoRig<'a> {
     scene: &'a Scene,
     camera: PinholeCamera,
+    right: RightCamera,
     seed: u64,
 }
 
@@ -50,6 +52,7 @@ impl<'a> StereoRig<'a> {
         StereoRig {
             scene,
             camera: scene.stereo.camera(),
+            right: RightCamera::new(&scene.stereo),
             seed,
         }
     }
@@ -96,19 +99,9 @@ impl<'a> StereoRig<'a> {
 
     /// The image column at which the right camera sees `point_m`; `None` if it does not.
     fn seen_by_right_camera(&self, point_m: DVec3) -> Option<f64> {
-        let Stereo {
-            baseline_m,
-            position_m,
-            yaw_error_deg,
-            ..
-        } = self.scene.stereo;
-        let origin = position_m + DVec3::new(baseline_m, 0.0, 0.0);
+        let origin = self.right.origin_m();
         let towards = point_m - origin;
-        // The world seen from a camera turned to the right is the world turned to the left.
-        let yaw_rad = yaw_error_deg.to_radians();
-        let in_camera = turned(towards, (yaw_rad.cos(), -yaw_rad.sin()));
-        let (u, v) = self.camera.project(in_camera)?;
-        self.camera.pixel_at((u, v))?;
+        let (u, _) = self.right.sees_at(point_m)?;
         let first_m = self.scene.hit(&Ray::new(origin, towards))?.range_m;
         let visible = first_m >= towards.length() * (1.0 - OCCLUSION_TOLERANCE);
         visible.then_some(u)

@@ -203,6 +203,34 @@ pub(super) const STEREO: &[Key] = &[
         "By how much the right camera has turned outwards since calibration",
         "thesis Fig. 70; none",
     ),
+    key(
+        "pitch_error_deg",
+        "deg",
+        Range::Within(-45.0, 45.0),
+        "By how much it has turned upwards",
+        "none",
+    ),
+    key(
+        "roll_error_deg",
+        "deg",
+        Range::Within(-45.0, 45.0),
+        "By how much it has turned clockwise about its axis",
+        "none",
+    ),
+    key(
+        "baseline_error_m",
+        "m",
+        Range::Within(-10.0, 10.0),
+        "By how much it has moved outwards",
+        "none",
+    ),
+    key(
+        "focal_error_percent",
+        "",
+        Range::Within(-50.0, 50.0),
+        "By how much its focal length has grown, per cent",
+        "none",
+    ),
 ];
 
 pub(super) const LIGHT: &[Key] = &[

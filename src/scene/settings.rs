@@ -144,6 +144,14 @@ pub struct Stereo {
     pub position_m: DVec3,
     /// By how much the right camera has turned outwards since calibration, degrees (Fig. 70).
     pub yaw_error_deg: f64,
+    /// By how much it has turned upwards, degrees.
+    pub pitch_error_deg: f64,
+    /// By how much it has turned about its axis, clockwise as it looks, degrees.
+    pub roll_error_deg: f64,
+    /// By how much it has moved outwards, m.
+    pub baseline_error_m: f64,
+    /// By how much its focal length has grown, per cent.
+    pub focal_error_percent: f64,
 }
 
 impl Default for Stereo {
@@ -160,6 +168,10 @@ impl Default for Stereo {
             max_disparity_px: 232.0,
             position_m: DVec3::ZERO,
             yaw_error_deg: 0.0,
+            pitch_error_deg: 0.0,
+            roll_error_deg: 0.0,
+            baseline_error_m: 0.0,
+            focal_error_percent: 0.0,
         }
     }
 }

@@ -1,0 +1,198 @@
+//! What the two cameras see of a scene: grey images with the noise of a sensor (thesis Table 12).
+//!
+//! ```text
+//!  ray of a pixel ─► surface: grey · daylight ─► fog ─► exposure ─► electrons + shot and read noise ─► 12 bits
+//!                    sky
+//! ```
+//!
+//! One ray a pixel, through its middle. Details smaller than a pixel would be chance, another one in each image; so textures of the scene should not be
+//! finer, and the grain that plain surfaces are given here (no real surface is without) has none finer than two pixels.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::right_camera::RightCamera;
+use crate::photon::{Purpose, normal, random_stream};
+use crate::scene::{PinholeCamera, Ray, SKY_REFLECTIVITY, Scene};
+use crate::stereo::GreyImage;
+
+/// Electrons of a pixel that is full, and of its readout noise: Sony's IMX273 holds some 10 000 and reads with some 2.5.
+const FULL_WELL_E: f64 = 10_000.0;
+const READ_NOISE_E: f64 = 2.5;
+
+/// Electrons per second of a pixel for a white surface in a klux: E·τ/(4N²) on the sensor with the f-number 2.4 of Table 12 and τ = 0.9, 3.45 µm
+/// pixels, 4.2·10¹⁵ photons in a lumen second (sunlight, visible), quantum efficiency 0.6 (assumed).
+const ELECTRONS_PER_S_KLUX: f64 = 1e3 * 0.9 / (4.0 * 2.4 * 2.4) * 3.45e-6 * 3.45e-6 * 4.2e15 * 0.6;
+
+/// Longest exposure: a frame of 226 frames a second (Table 12).
+const LONGEST_EXPOSURE_S: f64 = 1.0 / 226.0;
+
+/// The exposure fills this share of the well with what but a hundredth of the pixels are brighter than.
+const EXPOSED_TO: f64 = 0.8;
+
+const BITS: u32 = 12;
+
+/// The part of the images that is rendered, in binned pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Crop {
+    /// Camera pixels that make one across.
+    pub(super) binning: u32,
+    /// First column and row.
+    pub(super) left: u32,
+    pub(super) top: u32,
+    /// Columns and rows.
+    pub(super) width: u32,
+    pub(super) height: u32,
+}
+
+impl Crop {
+    /// The camera's coordinates of the middle of a pixel of the crop.
+    pub(super) fn middle(&self, row: usize, col: usize) -> (f64, f64) {
+        let along =
+            |first: u32, n: usize| (f64::from(first) + n as f64 + 0.5) * f64::from(self.binning);
+        (along(self.left, col), along(self.top, row))
+    }
+}
+
+/// Left and right image of the crop.
+pub(super) fn pair(scene: &Scene, crop: Crop, grain: f64, seed: u64) -> [GreyImage; 2] {
+    let camera = scene.stereo.camera();
+    let right = RightCamera::new(&scene.stereo);
+    let position_m = scene.stereo.position_m;
+    let seen = [
+        radiances(scene, crop, &camera, grain, |at| {
+            Ray::new(position_m, camera.at_unit_depth(at))
+        }),
+        radiances(scene, crop, &camera, grain, |at| right.ray(at)),
+    ];
+    let exposure_s = exposure_s(scene, &seen[0]);
+    let mut side = 0;
+    seen.map(|radiances| {
+        side += 1;
+        expose(scene, crop, &radiances, exposure_s, seed, side)
+    })
+}
+
+/// What a white surface in the scene's daylight would give as 1, row by row.
+fn radiances(
+    scene: &Scene,
+    crop: Crop,
+    camera: &PinholeCamera,
+    grain: f64,
+    ray: impl Fn((f64, f64)) -> Ray + Sync,
+) -> Vec<f32> {
+    let pixel_rad = f64::from(crop.binning) / camera.focal_px;
+    let has_panes = scene
+        .objects
+        .iter()
+        .any(|o| o.transmittance > 0.0 || o.mirror > 0.0);
+    let rows = (0..crop.height as usize).into_par_iter();
+    rows.flat_map_iter(|row| {
+        let ray = &ray;
+        (0..crop.width as usize).map(move |col| {
+            let ray = ray(crop.middle(row, col));
+            let radiance = match has_panes {
+                false => match scene.hit(&ray) {
+                    Some(hit) => surface(scene, &ray, &hit, grain, pixel_rad),
+                    None => SKY_REFLECTIVITY,
+                },
+                true => {
+                    let returns = scene.returns(&ray);
+                    let surfaces = returns
+                        .surfaces
+                        .iter()
+                        .map(|r| r.share_back * surface(scene, &ray, &r.hit, grain, pixel_rad));
+                    surfaces.sum::<f64>() + returns.sky_share * SKY_REFLECTIVITY
+                }
+            };
+            radiance as f32
+        })
+    })
+    .collect()
+}
+
+fn surface(scene: &Scene, ray: &Ray, hit: &crate::scene::Hit, grain: f64, pixel_rad: f64) -> f64 {
+    let point = ray.at(hit.range_m);
+    let mut grey = hit.grey * scene.daylight(point, hit.normal);
+    if grain > 0.0 && scene.objects[hit.object].texture.is_none() {
+        grey *= (1.0 + grain * grain_at(point, 2.0 * pixel_rad * hit.range_m)).max(0.0);
+    }
+    let medium = &scene.medium;
+    if medium.is_clear() {
+        return grey;
+    }
+    grey * medium.transmission(hit.range_m) + medium.airlight(hit.range_m) * SKY_REFLECTIVITY
+}
+
+/// Noise of standard deviation about 1 at a point: clouds of three sizes, each half the one before, of which the smallest is at least `finest_m` and fades
+/// as it comes near to that.
+fn grain_at(point: DVec3, finest_m: f64) -> f64 {
+    let finest = finest_m.max(1e-3).log2();
+    let first = finest.floor() as i32;
+    let fade = 1.0 - (finest - f64::from(first));
+    let octave = |k: i32| cloud(point * (-f64::from(first + k)).exp2(), first + k);
+    // Uniform numbers between −1 and 1 blended over eight corners have a standard deviation of about 0.31.
+    (fade * octave(1) + octave(2) + octave(3) + (1.0 - fade) * octave(4)) / (0.31 * 3f64.sqrt())
+}
+
+/// Random numbers from −1 to 1 on a grid of 1, smoothly between.
+fn cloud(point: DVec3, layer: i32) -> f64 {
+    let corner = point.floor();
+    let within = point - corner;
+    let smooth = within * within * (DVec3::splat(3.0) - 2.0 * within);
+    let cell = [corner.x as i64, corner.y as i64, corner.z as i64];
+    let mut sum = 0.0;
+    for bits in 0..8u64 {
+        let on = [bits & 1, bits >> 1 & 1, bits >> 2];
+        let mut hash = layer as u64;
+        let mut weight = 1.0;
+        for axis in 0..3 {
+            let at = cell[axis].wrapping_add(on[axis] as i64) as u64;
+            hash = (hash ^ at).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            hash ^= hash >> 29;
+            weight *= if on[axis] == 1 {
+                smooth[axis]
+            } else {
+                1.0 - smooth[axis]
+            };
+        }
+        hash = hash.wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        sum += weight * ((hash >> 40) as f64 / f64::from(1 << 23) - 1.0);
+    }
+    sum
+}
+
+fn exposure_s(scene: &Scene, radiances: &[f32]) -> f64 {
+    let mut sorted = radiances.to_vec();
+    let rank = sorted.len() * 99 / 100;
+    let bright = *sorted.select_nth_unstable_by(rank, f32::total_cmp).1;
+    let per_s = f64::from(bright) * scene.light.illuminance_klux * ELECTRONS_PER_S_KLUX;
+    (EXPOSED_TO * FULL_WELL_E / per_s).min(LONGEST_EXPOSURE_S)
+}
+
+fn expose(
+    scene: &Scene,
+    crop: Crop,
+    radiances: &[f32],
+    exposure_s: f64,
+    seed: u64,
+    side: u32,
+) -> GreyImage {
+    let binned = f64::from(crop.binning * crop.binning);
+    let electrons = scene.light.illuminance_klux * ELECTRONS_PER_S_KLUX * exposure_s * binned;
+    let white = f64::from((1u32 << BITS) - 1);
+    let width = crop.width as usize;
+    let rows = radiances.par_chunks(width).enumerate();
+    let pixels: Vec<u16> = rows
+        .flat_map_iter(|(row, radiances)| {
+            let mut random = random_stream(seed, Purpose::Stereo, row as u32, side);
+            radiances.iter().map(move |&radiance| {
+                let signal_e = f64::from(radiance) * electrons;
+                let noise_e = (signal_e + READ_NOISE_E * READ_NOISE_E * binned).sqrt();
+                let share = (signal_e + noise_e * normal(&mut random)) / (FULL_WELL_E * binned);
+                (share * white).round().clamp(0.0, white) as u16
+            })
+        })
+        .collect();
+    GreyImage::new(width, crop.height as usize, BITS, pixels).expect("held to its bits")
+}
