@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::motion::Waypoint;
 use super::object::Object;
-use super::shape::Shape;
+use super::shape::{DepthMap, MapFiles, Mesh, Shape};
 use super::texture::{Pattern, Picture, Texture};
 
 /// Height of a person that a file gives none, m: about the mean of adults in Europe.
@@ -26,6 +26,16 @@ enum Kind {
     Sphere,
     Cylinder,
     Person,
+    Mesh,
+    Map,
+}
+
+/// What the numbers of a depth map are.
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum DepthKind {
+    Axis,
+    Range,
 }
 
 /// Kinds of texture in a file.
@@ -89,6 +99,15 @@ entry! {
     radius_m: f64,
     axis: DVec3,
     foot_m: DVec3,
+    file: PathBuf,
+    scale_m: f64,
+    depth_file: PathBuf,
+    reflectivity_file: PathBuf,
+    grey_file: PathBuf,
+    depth_unit_m: f64,
+    depth_along: DepthKind,
+    focal_px: f64,
+    principal_px: (f64, f64),
 }
 
 /// Keys that every kind of object may have.
@@ -107,6 +126,19 @@ const OF_ALL: &[&str] = &[
     "second_grey",
     "velocity_m_s",
     "waypoints",
+];
+
+/// Keys that maps have beside these.
+const OF_MAPS: &[&str] = &[
+    "depth_file",
+    "reflectivity_file",
+    "grey_file",
+    "depth_unit_m",
+    "depth_along",
+    "focal_px",
+    "principal_px",
+    "centre_m",
+    "yaw_deg",
 ];
 
 impl ObjectEntry {
@@ -132,7 +164,7 @@ impl ObjectEntry {
     /// # Errors
     /// Keys that its kind needs and does not have, or has and does not use; files that cannot be read.
     pub(super) fn object(self, folder: &Path) -> Result<Object, String> {
-        let shape = self.shape()?;
+        let shape = self.shape(folder)?;
         let texture = self.pattern(folder)?;
         Ok(Object {
             grey: self.grey,
@@ -146,7 +178,7 @@ impl ObjectEntry {
         })
     }
 
-    fn shape(&self) -> Result<Shape, String> {
+    fn shape(&self, folder: &Path) -> Result<Shape, String> {
         Ok(match self.kind {
             Kind::Ground => {
                 self.refuse_others(&["depth_m"])?;
@@ -193,6 +225,34 @@ impl ObjectEntry {
                     foot_m: self.need("foot_m", self.foot_m)?,
                     height_m: self.height_m.unwrap_or(PERSON_M),
                     yaw_deg: self.yaw_deg.unwrap_or(0.0),
+                }
+            }
+            Kind::Mesh => {
+                self.refuse_others(&["file", "centre_m", "scale_m", "yaw_deg"])?;
+                let file = placed(folder, self.need("file", self.file.as_ref())?);
+                Shape::Mesh {
+                    centre_m: self.need("centre_m", self.centre_m)?,
+                    scale_m: self.scale_m.unwrap_or(1.0),
+                    yaw_deg: self.yaw_deg.unwrap_or(0.0),
+                    mesh: Arc::new(Mesh::read(&file).map_err(|e| e.to_string())?),
+                }
+            }
+            Kind::Map => {
+                self.refuse_others(OF_MAPS)?;
+                let at = |file: &PathBuf| placed(folder, file);
+                let files = MapFiles {
+                    depth: at(self.need("depth_file", self.depth_file.as_ref())?),
+                    reflectivity: self.reflectivity_file.as_ref().map(at),
+                    grey: self.grey_file.as_ref().map(at),
+                    unit_m: self.depth_unit_m,
+                    is_range: matches!(self.depth_along, Some(DepthKind::Range)),
+                    focal_px: self.need("focal_px", self.focal_px)?,
+                    principal_px: self.principal_px,
+                };
+                Shape::Map {
+                    centre_m: self.centre_m.unwrap_or(DVec3::ZERO),
+                    yaw_deg: self.yaw_deg.unwrap_or(0.0),
+                    map: Arc::new(DepthMap::read(files).map_err(|e| e.to_string())?),
                 }
             }
         })
@@ -328,6 +388,38 @@ impl ObjectEntry {
                 self.foot_m = Some(foot_m);
                 self.height_m = Some(height_m);
                 self.yaw_deg = Some(yaw_deg);
+            }
+            Shape::Mesh {
+                centre_m,
+                scale_m,
+                yaw_deg,
+                mesh,
+            } => {
+                self.kind = Kind::Mesh;
+                self.centre_m = Some(centre_m);
+                self.scale_m = Some(scale_m);
+                self.yaw_deg = Some(yaw_deg);
+                self.file = Some(mesh.path().to_owned());
+            }
+            Shape::Map {
+                centre_m,
+                yaw_deg,
+                map,
+            } => {
+                let files = map.files().clone();
+                self.kind = Kind::Map;
+                self.centre_m = Some(centre_m);
+                self.yaw_deg = Some(yaw_deg);
+                self.depth_file = Some(files.depth);
+                self.reflectivity_file = files.reflectivity;
+                self.grey_file = files.grey;
+                self.depth_unit_m = files.unit_m;
+                self.depth_along = Some(match files.is_range {
+                    true => DepthKind::Range,
+                    false => DepthKind::Axis,
+                });
+                self.focal_px = Some(files.focal_px);
+                self.principal_px = files.principal_px;
             }
         }
     }

@@ -28,7 +28,7 @@ pub use medium::{DROPLET_LIDAR_RATIO_SR, Medium};
 pub use motion::{Rig, RigWaypoint, Waypoint};
 pub use object::Object;
 pub use settings::{Lidar, Light, Scene, Stereo};
-pub use shape::Shape;
+pub use shape::{DepthMap, MapFiles, Mesh, Shape};
 pub use texture::{Pattern, Picture, Texture};
 pub use truth::GroundTruth;
 pub use vector::{Ray, turned};

@@ -59,15 +59,17 @@ impl Object {
 
     /// Reflectivity for the laser and for the cameras at a point of the surface.
     pub(super) fn material_at(&self, point: DVec3, part: u32) -> (f64, f64) {
-        let grey = self.grey.unwrap_or(self.reflectivity);
+        let (own_reflectivity, own_grey) = self.shape.own_material(point);
+        let reflectivity = own_reflectivity.unwrap_or(self.reflectivity);
+        let grey = own_grey.or(self.grey).unwrap_or(reflectivity);
         let Some(texture) = &self.texture else {
-            return (self.reflectivity, grey);
+            return (reflectivity, grey);
         };
         let share = texture.share_at((self.shape).on_surface(point, part, texture.seen_turned_deg));
         let second_grey = texture.second_grey.unwrap_or(texture.second_reflectivity);
         let mix = |first: f64, second: f64| second + (first - second) * share;
         (
-            mix(self.reflectivity, texture.second_reflectivity),
+            mix(reflectivity, texture.second_reflectivity),
             mix(grey, second_grey),
         )
     }

@@ -4,17 +4,26 @@
 //!   Shape ─┬─ flat:   ground, plane         meet(ray) ─► range, part (face, limb, triangle)
 //!          ├─ solid:  box                   normal_at(point, part)
 //!          ├─ round:  sphere, cylinder      on_surface(point, part) ─► metres along the surface, for textures
-//!          └─ person: a body of these
+//!          ├─ person: a body of these
+//!          ├─ mesh:   triangles of a file
+//!          └─ map:    depths that a camera has seen
 //! ```
 //!
 //! Shapes that can be turned do their geometry in coordinates of their own ([`Pose`]).
 
 mod flat;
+mod map;
+mod mesh;
 mod person;
 mod round;
 mod solid;
 
+use std::sync::Arc;
+
 use glam::DVec3;
+
+pub use map::{DepthMap, MapFiles};
+pub use mesh::Mesh;
 
 use super::vector::{Ray, turned};
 
@@ -77,6 +86,26 @@ pub enum Shape {
         /// right.
         yaw_deg: f64,
     },
+    /// Triangles of a file.
+    Mesh {
+        /// Where the origin of the file's coordinates is.
+        centre_m: DVec3,
+        /// The file's unit of length.
+        scale_m: f64,
+        /// Turn about the vertical axis; positive takes its forward side to the right.
+        yaw_deg: f64,
+        /// What was read of it.
+        mesh: Arc<Mesh>,
+    },
+    /// What a camera has seen.
+    Map {
+        /// Where the camera stood.
+        centre_m: DVec3,
+        /// Which way it looked, degrees to the right of forward.
+        yaw_deg: f64,
+        /// What it has seen.
+        map: Arc<DepthMap>,
+    },
 }
 
 /// Where a ray meets a shape.
@@ -119,6 +148,26 @@ impl Shape {
                 height_m,
                 yaw_deg,
             } => person::meet(&Pose::new(foot_m, yaw_deg).inwards(ray), height_m),
+            Shape::Mesh {
+                centre_m,
+                scale_m,
+                yaw_deg,
+                ref mesh,
+            } => {
+                let inside = Pose::new(centre_m, yaw_deg).inwards(ray);
+                let scaled = Ray {
+                    origin: inside.origin / scale_m,
+                    direction: inside.direction,
+                };
+                let meeting = mesh.meet(&scaled)?;
+                let range_m = in_front(meeting.range_m * scale_m)?;
+                Some(Meeting { range_m, ..meeting })
+            }
+            Shape::Map {
+                centre_m,
+                yaw_deg,
+                ref map,
+            } => map.meet(&Pose::new(centre_m, yaw_deg).inwards(ray)),
         }
     }
 
@@ -141,6 +190,20 @@ impl Shape {
             } => {
                 let pose = Pose::new(foot_m, yaw_deg);
                 pose.outwards(person::normal_at(pose.inside(point) / height_m, part))
+            }
+            Shape::Mesh {
+                centre_m,
+                yaw_deg,
+                ref mesh,
+                ..
+            } => Pose::new(centre_m, yaw_deg).outwards(mesh.normal(part)),
+            Shape::Map {
+                centre_m,
+                yaw_deg,
+                ref map,
+            } => {
+                let pose = Pose::new(centre_m, yaw_deg);
+                pose.outwards(map.normal_at(pose.inside(point)))
             }
         }
     }
@@ -179,6 +242,34 @@ impl Shape {
                 let inside = Pose::new(foot_m, yaw_deg).inside(point);
                 (inside.x + 0.7 * inside.z, inside.y)
             }
+            Shape::Mesh {
+                centre_m,
+                scale_m,
+                yaw_deg,
+                ref mesh,
+            } => {
+                let inside = Pose::new(centre_m, yaw_deg).inside(point) / scale_m;
+                let (u, v) = mesh.on_surface(inside, part);
+                (u * scale_m, v * scale_m)
+            }
+            Shape::Map {
+                centre_m, yaw_deg, ..
+            } => {
+                let inside = Pose::new(centre_m, yaw_deg).inside(point);
+                (inside.x, inside.y)
+            }
+        }
+    }
+
+    /// Reflectivity for the laser and for the cameras, where the shape itself knows them.
+    pub(super) fn own_material(&self, point: DVec3) -> (Option<f64>, Option<f64>) {
+        match self {
+            Shape::Map {
+                centre_m,
+                yaw_deg,
+                map,
+            } => map.material_at(Pose::new(*centre_m, *yaw_deg).inside(point)),
+            _ => (None, None),
         }
     }
 
@@ -190,7 +281,9 @@ impl Shape {
             Shape::Plane { centre_m, .. }
             | Shape::Box { centre_m, .. }
             | Shape::Sphere { centre_m, .. }
-            | Shape::Cylinder { centre_m, .. } => *centre_m += by_m,
+            | Shape::Cylinder { centre_m, .. }
+            | Shape::Mesh { centre_m, .. }
+            | Shape::Map { centre_m, .. } => *centre_m += by_m,
             Shape::Person { foot_m, .. } => *foot_m += by_m,
         }
         moved
@@ -217,6 +310,12 @@ impl Shape {
                 turn(normal);
             }
             Shape::Box {
+                centre_m, yaw_deg, ..
+            }
+            | Shape::Mesh {
+                centre_m, yaw_deg, ..
+            }
+            | Shape::Map {
                 centre_m, yaw_deg, ..
             }
             | Shape::Person {
