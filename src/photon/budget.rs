@@ -4,12 +4,13 @@
 //! the target is Lambertian and fills the pixel, the lens collects the share R = sin²α = d²/(4z² + d²) of
 //! what the target sends back. The printed results, Eq. 12 and 13 and from them 15 and 16, drop the d² in
 //! that denominator. Here it stays; the printed forms stand beside, under names ending in `_far_field`.
-//! As in the thesis the angle of incidence plays no part.
+//! The angle of incidence plays no part here, as in the thesis; whoever knows it takes its cosine times the reflectivity
+//! (`Scene::pixel_light`).
 //!
 //! The printed derivation divides by π when it turns the target's exitance into a radiance
 //! (Eq. 9) and then multiplies by sin²α (Eq. 12). Integrating a Lambertian radiance over the lens
-//! gives π·sin²α, so radiometry wants no division at all. [`Convention`] offers both; the figures
-//! of the thesis (1140 z⁻² photons, 20 Mcounts/s) need the printed form.
+//! gives π·sin²α, so radiometry wants no division at all. [`Convention`] offers both: scenes have the latter unless
+//! told otherwise, the figures of the thesis (1140 z⁻² photons, 20 Mcounts/s) need the printed form.
 //!
 //! Air that scatters takes light from the echo twice, on its way there and back. The background keeps its
 //! brightness: what the air takes from the sunlit target it replaces by sunlight of its own.
@@ -25,9 +26,9 @@ use crate::units::{PLANCK_J_S, SPEED_OF_LIGHT_M_PER_S};
 #[serde(rename_all = "lowercase")]
 pub enum Convention {
     /// As printed in Equations 9 to 16, with the factor 1/π.
-    #[default]
     Thesis,
     /// Lambertian radiometry: π times the thesis's figures, for signal and background alike.
+    #[default]
     Lambertian,
 }
 
@@ -290,7 +291,7 @@ mod tests {
                 / Spot::Round.share_per_pixel(rows, cols, pitch)
         };
         assert!((ratio(64, 64, [1.0; 2]) - PI / 2.0).abs() < 1e-12);
-        assert!((ratio(64, 32, [27.0, 54.0]) - PI / 2.0).abs() < 1e-12);
+        assert!((ratio(64, 32, [54.0, 27.0]) - PI / 2.0).abs() < 1e-12);
         assert!(ratio(63, 200, [1.0; 2]) > PI / 2.0);
     }
 

@@ -76,6 +76,34 @@ impl PulseShape {
     }
 }
 
+impl PulseShape {
+    /// Mean time of its photons, fs after its beginning.
+    pub fn mean_fs(&self) -> f64 {
+        self.moments().0 * self.step.as_fs() as f64
+    }
+
+    /// Variance of the times of its photons, fs².
+    pub fn variance_fs2(&self) -> f64 {
+        let (mean, square) = self.moments();
+        let step_fs = self.step.as_fs() as f64;
+        (square - mean * mean).max(0.0) * step_fs * step_fs
+    }
+
+    /// First and second moment, in steps.
+    fn moments(&self) -> (f64, f64) {
+        let (mut total, mut first, mut second) = (0.0, 0.0, 0.0);
+        for (cell, ends) in self.samples.windows(2).enumerate() {
+            let (mass, slope) = mass_and_slope(ends);
+            let begin = cell as f64;
+            let (mean, square) = (0.5 + slope / 6.0, 1.0 / 3.0 + slope / 6.0);
+            total += mass;
+            first += mass * (begin + mean);
+            second += mass * (begin * begin + 2.0 * begin * mean + square);
+        }
+        (first / total, second / total)
+    }
+}
+
 /// Mass of a cell and slope of its density, relative: density 1 + slope·(2x − 1) for x from 0 to 1.
 fn mass_and_slope(ends: &[f64]) -> (f64, f64) {
     let sum = ends[0] + ends[1];
@@ -215,6 +243,27 @@ mod tests {
             shape.cumulative(Time::from_fs(x.round() as i64))
         });
         assert!(d < LIMIT, "{d}");
+    }
+
+    #[test]
+    fn moments_are_those_of_the_draws() {
+        let shape = PulseShape::new(Time::from_ps(900), &[0.0, 5.0, 3.0, 0.0, 1.0]).unwrap();
+        let sampler = PulseSampler::measured(&shape);
+        let mut random = random_stream(6, Purpose::Photons, 0, 0);
+        let n = 200_000;
+        let draws = (0..n).map(|_| sampler.draw(std::array::from_fn(|_| random.next_u32())));
+        let (sum, squares) = draws.fold((0.0, 0.0), |(a, b), x| (a + x, b + x * x));
+        let mean = sum / f64::from(n);
+        let variance = squares / f64::from(n) - mean * mean;
+        let sigma = shape.variance_fs2().sqrt();
+        assert!(
+            (mean - shape.mean_fs()).abs() < 5.0 * sigma / f64::from(n).sqrt(),
+            "{mean}"
+        );
+        assert!(
+            (variance / shape.variance_fs2() - 1.0).abs() < 0.02,
+            "{variance}"
+        );
     }
 
     #[test]

@@ -41,6 +41,8 @@ pub enum Purpose {
     Thinning = 13,
     /// Errors of guides other than the camera pair.
     Guide = 20,
+    /// How SPADs of the array differ.
+    SpadSpread = 21,
 }
 
 /// The stream of random words for (`seed`, `purpose`, `index`, `sub_index`).

@@ -4,13 +4,14 @@ use std::path::Path;
 
 use toml::{Table, Value};
 
+use super::curve::read_file;
 use super::entry::ObjectEntry;
 use super::keys::{LIDAR, LIGHT, MEDIUM, OBJECT, RIG, SECTIONS, STEREO};
 use super::object::Object;
 use super::rules::{check_object, check_rig, check_stereo};
 use super::settings::Scene;
 use crate::files::InputError;
-use crate::settings::{Document, Fault, Key, commented};
+use crate::settings::{Document, Fault, Key, Range, commented};
 
 impl Scene {
     /// The built-in street, from 15 to 180 m, 50 klux.
@@ -57,7 +58,12 @@ impl Scene {
         for (name, value) in document.table() {
             let message = match (name.as_str(), value) {
                 ("lidar", Value::Table(given)) => {
-                    scene.lidar = section(document, name, given, LIDAR, &mut faults);
+                    let given = with_curves(document, name, given, LIDAR, &mut faults);
+                    let before = faults.len();
+                    scene.lidar = section(document, name, &given, LIDAR, &mut faults);
+                    if faults.len() == before {
+                        faults.extend(scene.lidar.fault());
+                    }
                     continue;
                 }
                 ("stereo", Value::Table(given)) => {
@@ -120,6 +126,34 @@ impl Scene {
         let left_out = Scene::default();
         commented(SECTIONS, &self.table(), &left_out.table())
     }
+}
+
+/// A section with what is in the files that it names, in the place of their names.
+fn with_curves(
+    document: &Document,
+    name: &str,
+    given: &Table,
+    keys: &[Key],
+    faults: &mut Vec<Fault>,
+) -> Table {
+    let mut read = given.clone();
+    let is_curve = |key: &&Key| matches!(key.range, Range::WordOrCurve(..));
+    for key in keys.iter().filter(is_curve) {
+        let path = format!("{name}.{}", key.name);
+        let Some(value) = given.get(key.name) else {
+            continue;
+        };
+        match read_file(value, document.folder()) {
+            Ok(None) => (),
+            Ok(Some(curve)) => drop(read.insert(key.name.into(), curve)),
+            Err(why) => {
+                read.remove(key.name);
+                let message = format!("{}: {why}", key.name);
+                faults.push(Fault { path, message });
+            }
+        }
+    }
+    read
 }
 
 /// A section whose keys all have defaults.
@@ -248,6 +282,71 @@ mod tests {
             assert!(error.to_string().contains("; give "), "{error}");
             assert!(error.further.is_empty(), "{error}");
         }
+    }
+
+    #[test]
+    fn optics_that_cannot_be_are_refused_with_their_line() {
+        for (lines, says) in [
+            (
+                "filter = \"top_hat\"\nfilter_centre_nm = 905",
+                "lets nothing of the laser's 940 nm through",
+            ),
+            (
+                "filter = [[930, 0.9], [935, 0.0]]",
+                "lets nothing of the laser's 940 nm through",
+            ),
+            (
+                "filter = [[930, 0.9], [945, 1.7]]",
+                "transmittance of 1.7; give 0 to 1",
+            ),
+            ("filter = \"brick\"", "filter: unknown variant `brick`"),
+            ("filter = 3", "3 is no word and no list of pairs"),
+            (
+                "pde_curve = [[400, 0.3], [900, 0.1]]",
+                "no detection efficiency at the laser's 940 nm",
+            ),
+            (
+                "vignetting = [[1, 1.0], [9, 0.5]]",
+                "angles from 1 to 9 degrees",
+            ),
+            ("beam = [[0, 1.0], [0, 0.5]]", "rising order"),
+            ("beam = \"no/such.csv\"", "no/such.csv"),
+            ("pulse = [[0, 1]]", "1 points make no curve"),
+            ("pulse = [[0, 0.0], [1, 0.0]]", "all values are 0"),
+            ("hot_spad_share = 1.5", "give 0 to 1"),
+        ] {
+            let text = format!("[light]\nilluminance_klux = 5\n[lidar]\n{lines}\n");
+            let error = Scene::parse("s.toml", &text).unwrap_err();
+            assert!(error.to_string().contains(says), "{lines}: {error}");
+            assert!(
+                error.line.is_some_and(|line| line >= 3),
+                "{lines}: {error:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn curves_are_read_from_files_beside_the_scene_and_kept_in_it() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("laser.csv"), "ns,power\n0,0\n2,1\n6,0\n").unwrap();
+        let path = folder.path().join("s.toml");
+        std::fs::write(&path, "[lidar]\npulse = \"laser.csv\"\n").unwrap();
+        let scene = Scene::load(&path).unwrap();
+        let points = [[0.0, 0.0], [2.0, 1.0], [6.0, 0.0]];
+        assert_eq!(scene.lidar.pulse.curve().unwrap().points(), points);
+        assert_eq!(
+            Scene::parse("elsewhere", &scene.commented()).unwrap(),
+            scene
+        );
+        std::fs::write(folder.path().join("laser.csv"), "0,0\n2,x\n").unwrap();
+        let error = Scene::load(&path).unwrap_err();
+        assert_eq!(error.line, Some(2));
+        assert!(
+            error
+                .to_string()
+                .contains("laser.csv:2: \"2,x\" is no pair of numbers"),
+            "{error}"
+        );
     }
 
     #[test]

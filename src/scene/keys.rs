@@ -60,15 +60,56 @@ pub(super) const LIDAR: &[Key] = &[
         "pulse_fwhm_ns",
         "ns",
         Range::Within(0.0, 1e6),
-        "Full width at half maximum of the Gaussian pulse, jitter included",
+        "Full width at half maximum of the Gaussian pulse, jitter included; with a measured pulse that of what jitter adds",
         "thesis 6.4.2",
+    ),
+    key(
+        "pulse",
+        "",
+        Range::WordOrCurve(&["gaussian"], "time in ns and power"),
+        "Laser pulse",
+        "thesis 6.4.2",
+    ),
+    key(
+        "beam",
+        "",
+        Range::WordOrCurve(
+            &["uniform", "gaussian"],
+            "degrees off the axis and intensity",
+        ),
+        "Where the laser's energy goes: uniform is as spot says",
+        "thesis Eq. 7",
+    ),
+    key(
+        "beam_fwhm_deg",
+        "deg",
+        Range::Above(0.0, 180.0),
+        "Full width at half maximum of a Gaussian beam",
+        "chosen: the field of view",
     ),
     key(
         "pde",
         "",
         SHARE,
-        "Photon detection efficiency of the SPADs",
+        "Photon detection efficiency of the SPADs at the laser's wavelength",
         "thesis Table 6",
+    ),
+    key(
+        "pde_curve",
+        "",
+        Range::WordOrCurve(
+            &["flat"],
+            "wavelength in nm and efficiency, of which only the shape counts",
+        ),
+        "Photon detection efficiency over wavelength, for sunlight",
+        "thesis Eq. 14",
+    ),
+    key(
+        "pde_spread",
+        "",
+        Range::Within(0.0, 1.0),
+        "Standard deviation of a SPAD's detection efficiency, relative to the mean; window takes some 12 times as long with it",
+        "none in the thesis",
     ),
     key(
         "lens_diameter_mm",
@@ -92,6 +133,40 @@ pub(super) const LIDAR: &[Key] = &[
         "thesis Eq. 15, where it is left out",
     ),
     key(
+        "vignetting",
+        "",
+        Range::WordOrCurve(
+            &["none", "cos4"],
+            "degrees off the axis and illumination of the array",
+        ),
+        "What an evenly bright scene gives a macropixel off the axis",
+        "thesis Eq. 12, which has none",
+    ),
+    key(
+        "filter",
+        "",
+        Range::WordOrCurve(
+            &["irradiance", "top_hat", "gaussian", "cosine", "lorentz"],
+            "wavelength in nm and transmittance",
+        ),
+        "Band-pass filter, through which ASTM G173 sunlight comes; irradiance is one that lets solar_irradiance_w_m2 through",
+        "thesis 2.3.3",
+    ),
+    key(
+        "filter_centre_nm",
+        "nm",
+        Range::Within(100.0, 1e4),
+        "Centre of a filter that is a shape",
+        "the laser",
+    ),
+    key(
+        "filter_fwhm_nm",
+        "nm",
+        Range::Above(0.0, 1e4),
+        "Full width at half maximum of a filter that is a shape",
+        "chosen",
+    ),
+    key(
         "solar_irradiance_w_m2",
         "W/m2",
         Range::Limited(
@@ -99,7 +174,7 @@ pub(super) const LIDAR: &[Key] = &[
             1361.0,
             "the sun has no more outside the atmosphere, at all wavelengths together",
         ),
-        "Solar irradiance within the filter's band at 100 klux",
+        "Solar irradiance within the filter's band at 100 klux, where filter is irradiance",
         "ASTM G173 global tilt, 935 to 945 nm",
     ),
     key(
@@ -108,6 +183,38 @@ pub(super) const LIDAR: &[Key] = &[
         Range::Limited(0.0, 1.6e8, "16 hot SPADs have 10 MHz each"),
         "Dark counts of one macropixel, all its SPADs together",
         "chosen: 1.25 kHz for each of 16 SPADs",
+    ),
+    key(
+        "dark_count_spread",
+        "",
+        Range::Within(0.0, 5.0),
+        "Standard deviation of the natural logarithm of a SPAD's dark count rate, whose mean stays",
+        "none in the thesis",
+    ),
+    key(
+        "hot_spad_share",
+        "",
+        SHARE,
+        "Share of SPADs that are hot",
+        "none in the thesis",
+    ),
+    key(
+        "hot_spad_hz",
+        "Hz",
+        Range::Limited(
+            0.0,
+            1e7,
+            "a SPAD that fires more often is to be switched off",
+        ),
+        "Dark counts of a hot SPAD",
+        "chosen",
+    ),
+    key(
+        "spad_seed",
+        "",
+        Range::Within(0.0, 4_294_967_295.0),
+        "Which SPADs are hot, dark or insensitive",
+        "chosen",
     ),
     key(
         "spot",
@@ -120,8 +227,8 @@ pub(super) const LIDAR: &[Key] = &[
         "convention",
         "",
         Range::OneOf(&["thesis", "lambertian"]),
-        "Constant of the photon budget: as printed in the thesis, or pi times that",
-        "thesis Eq. 9 to 16",
+        "Constant of the photon budget: Lambertian radiometry, or 1/pi of it, as printed in the thesis",
+        "radiometry: a Lambertian surface sends the share sin2(alpha) of its light into a cone",
     ),
 ];
 

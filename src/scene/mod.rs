@@ -6,31 +6,37 @@
 mod builtin;
 mod camera;
 mod cast;
+mod curve;
 mod daylight;
 mod entry;
 mod file;
+mod fog;
 mod illumination;
 mod keys;
 mod medium;
 mod motion;
 mod object;
+mod optics;
 mod rules;
 mod settings;
 mod shape;
+mod spads;
 mod texture;
 mod truth;
 mod vector;
 
 pub use camera::PinholeCamera;
 pub use cast::{Hit, Return, Returns};
+pub use curve::{Curve, CurveError, Measured};
 pub use illumination::SKY_REFLECTIVITY;
 pub use medium::{DROPLET_LIDAR_RATIO_SR, Medium};
 pub use motion::{Rig, RigWaypoint, Waypoint};
 pub use object::Object;
+pub use optics::{BeamWord, FilterWord, PdeWord, PulseWord, VignettingWord};
 pub use settings::{Lidar, Light, Scene, Stereo};
 pub use shape::{DepthMap, MapFiles, Mesh, Shape};
 pub use texture::{Pattern, Picture, Texture};
-pub use truth::GroundTruth;
+pub use truth::{GroundTruth, Surface};
 pub use vector::{Ray, turned};
 
 /// A point or direction, m (or without unit): x right, y down, z forward.

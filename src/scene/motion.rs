@@ -7,6 +7,7 @@
 
 use glam::DVec3;
 
+use super::object::Object;
 use super::settings::Scene;
 
 /// Where an object is at a time.
@@ -148,6 +149,34 @@ impl Scene {
         scene.light.sun_azimuth_deg -= yaw_deg;
         scene.rig = Rig::default();
         scene
+    }
+
+    /// The longest way of an object, as seen from the rig, and how far the rig turns, from now on for `duration_s` seconds: m
+    /// and degrees. Turning is left out of the ways.
+    pub(super) fn ways_over(&self, duration_s: f64) -> (f64, f64) {
+        const STEPS: u32 = 16;
+        let times = (0..=STEPS).map(|n| duration_s * f64::from(n) / f64::from(STEPS));
+        let times: Vec<f64> = times.collect();
+        let rig: Vec<(DVec3, f64)> = times.iter().map(|&time_s| self.rig.at(time_s)).collect();
+        let turn_deg = rig
+            .windows(2)
+            .map(|pair| (pair[1].1 - pair[0].1).abs())
+            .sum();
+        let way_m = |object: &Object| -> f64 {
+            let places = times.iter().zip(&rig).map(|(&time_s, (rig_m, _))| {
+                let points = object.waypoints.iter().map(|&at| at.into());
+                match along(points, time_s) {
+                    Some([_, x, y, z]) => DVec3::new(x, y, z) - *rig_m,
+                    None => object.velocity_m_s * time_s - *rig_m,
+                }
+            });
+            let places: Vec<DVec3> = places.collect();
+            places
+                .windows(2)
+                .map(|pair| (pair[1] - pair[0]).length())
+                .sum()
+        };
+        (self.objects.iter().map(way_m).fold(0.0, f64::max), turn_deg)
     }
 
     /// Whether the scene is the same at all times.

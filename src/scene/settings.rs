@@ -5,10 +5,12 @@ use std::f64::consts::LN_2;
 use glam::DVec3;
 
 use super::camera::PinholeCamera;
+use super::curve::Measured;
 use super::illumination::SKY_REFLECTIVITY;
 use super::medium::Medium;
 use super::motion::Rig;
 use super::object::Object;
+use super::optics::{BeamWord, FilterWord, PdeWord, PulseWord, VignettingWord};
 use crate::photon::{Atmosphere, Convention, PhotonBudget, Spot};
 use crate::units::Time;
 
@@ -37,7 +39,7 @@ pub struct Scene {
 
 /// The lidar's optics. Rows and columns are the sensor's business, not the scene's.
 /// What a file leaves out is the built-in street's, but for dark counts: none.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Lidar {
     /// Horizontal field of view, degrees. The vertical one follows from the sensor's rows and the macropixels' shape.
@@ -48,20 +50,46 @@ pub struct Lidar {
     pub wavelength_nm: f64,
     /// Energy of one pulse over the whole field of view, µJ.
     pub pulse_energy_uj: f64,
-    /// Full width at half maximum of the (Gaussian) pulse, jitter included, ns.
+    /// Full width at half maximum of the Gaussian pulse, jitter included, or of what jitter adds to a measured pulse, ns.
     pub pulse_fwhm_ns: f64,
-    /// Photon detection efficiency of the SPADs, 0 to 1.
+    /// Measured power over time, ns, whose centre of mass leaves with the STOP edge.
+    pub pulse: Measured<PulseWord>,
+    /// How the laser's energy is spread over directions: uniform as `spot` says, or intensity over degrees off the axis.
+    pub beam: Measured<BeamWord>,
+    /// Full width at half maximum of a Gaussian beam, degrees.
+    pub beam_fwhm_deg: f64,
+    /// Photon detection efficiency of the SPADs at the laser's wavelength, 0 to 1.
     pub pde: f64,
+    /// Photon detection efficiency over wavelength, nm, of which only the shape counts.
+    pub pde_curve: Measured<PdeWord>,
+    /// Standard deviation of a SPAD's detection efficiency, relative to the mean.
+    pub pde_spread: f64,
     /// Diameter of the lens aperture, mm.
     pub lens_diameter_mm: f64,
     /// Focal length over diameter.
     pub lens_f_number: f64,
     /// Transmittance of lens and filter, 0 to 1.
     pub transmittance: f64,
-    /// Solar irradiance within the filter's band at 100 klux, W/m².
+    /// What an evenly bright scene gives off the axis relative to the middle: a word, or a curve over degrees.
+    pub vignetting: Measured<VignettingWord>,
+    /// Band-pass filter: a shape, or transmittance over wavelength, nm.
+    pub filter: Measured<FilterWord>,
+    /// Centre of a filter that is a shape, nm.
+    pub filter_centre_nm: f64,
+    /// Full width at half maximum of it, nm.
+    pub filter_fwhm_nm: f64,
+    /// Solar irradiance within the filter's band at 100 klux, W/m², where `filter` is irradiance.
     pub solar_irradiance_w_m2: f64,
-    /// Dark counts of one macropixel, all SPADs together, per second.
+    /// Dark counts of one macropixel, all SPADs together, per second; the mean where they differ.
     pub dark_count_hz: f64,
+    /// Standard deviation of the natural logarithm of a SPAD's dark count rate.
+    pub dark_count_spread: f64,
+    /// Share of SPADs that are hot, 0 to 1.
+    pub hot_spad_share: f64,
+    /// Dark counts of a hot SPAD per second.
+    pub hot_spad_hz: f64,
+    /// Which SPADs are how: seed of the array.
+    pub spad_seed: u32,
     /// What the laser lights up: the field of view, or the circle around it.
     pub spot: Spot,
     /// Constant of the photon budget.
@@ -76,12 +104,25 @@ impl Default for Lidar {
             wavelength_nm: 940.0,
             pulse_energy_uj: 20.0,
             pulse_fwhm_ns: 4.5,
+            pulse: Measured::default(),
+            beam: Measured::default(),
+            beam_fwhm_deg: 16.0,
             pde: 0.185,
+            pde_curve: Measured::default(),
+            pde_spread: 0.0,
             lens_diameter_mm: 4.0,
             lens_f_number: 2.2,
             transmittance: 1.0,
+            vignetting: Measured::default(),
+            filter: Measured::default(),
+            filter_centre_nm: 940.0,
+            filter_fwhm_nm: 10.0,
             solar_irradiance_w_m2: 3.047,
             dark_count_hz: 0.0,
+            dark_count_spread: 0.0,
+            hot_spad_share: 0.0,
+            hot_spad_hz: 1e6,
+            spad_seed: 1,
             spot: Spot::default(),
             convention: Convention::default(),
         }
@@ -111,6 +152,7 @@ impl Lidar {
             dark_count_hz: 0.0,
             spot: Spot::Rectangle,
             convention: Convention::Lambertian,
+            ..Lidar::default()
         }
     }
 }
@@ -231,14 +273,15 @@ impl Scene {
         PhotonBudget {
             pde: lidar.pde,
             wavelength_nm: lidar.wavelength_nm,
-            transmittance: lidar.transmittance,
+            transmittance: lidar.transmittance * lidar.laser_transmission(),
             pulse_energy_j: lidar.pulse_energy_uj * 1e-6,
             lens_diameter_m,
             lens_focal_m,
             pixel_pitch_m: [camera.focal_px, camera.focal_v_px].map(|px| lens_focal_m / px),
             rows,
             cols,
-            solar_irradiance_w_m2: lidar.solar_irradiance_w_m2,
+            // The transmittance above is for signal and background alike.
+            solar_irradiance_w_m2: lidar.effective_irradiance_w_m2() / lidar.laser_transmission(),
             spot: lidar.spot,
             atmosphere: Atmosphere::CLEAR,
             convention: lidar.convention,

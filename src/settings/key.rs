@@ -30,6 +30,8 @@ pub enum Range {
     Limited(f64, f64, &'static str),
     /// One of these words.
     OneOf(&'static [&'static str]),
+    /// One of these words, or a measured curve of such pairs, in the file or in a CSV file.
+    WordOrCurve(&'static [&'static str], &'static str),
     /// true or false.
     Switch,
     /// Any text.
@@ -43,7 +45,7 @@ impl Range {
                 (least..=most).contains(&value)
             }
             Range::Above(below, most) => value > below && value <= most,
-            Range::OneOf(_) | Range::Switch | Range::Text => true,
+            Range::OneOf(_) | Range::WordOrCurve(..) | Range::Switch | Range::Text => true,
         }
     }
 }
@@ -64,6 +66,11 @@ impl std::fmt::Display for Range {
                 write!(f, "above {}, up to {}", short(below), short(most))
             }
             Range::OneOf(words) => write!(f, "{}", words.join(", ")),
+            Range::WordOrCurve(words, of) => write!(
+                f,
+                "{}, pairs of {of}, or a .csv file of two such columns",
+                words.join(", ")
+            ),
             Range::Switch => write!(f, "true or false"),
             Range::Text => write!(f, "any text"),
         }
@@ -76,7 +83,10 @@ impl Key {
     /// # Errors
     /// What is wrong with the text, and the cure.
     pub(super) fn plain(&self, value: &Value) -> Result<Value, String> {
-        let is_number = !matches!(self.range, Range::OneOf(_) | Range::Switch | Range::Text);
+        let is_number = !matches!(
+            self.range,
+            Range::OneOf(_) | Range::WordOrCurve(..) | Range::Switch | Range::Text
+        );
         match value {
             Value::String(text) if is_number => {
                 let number = quantity::in_unit(text, self.unit)

@@ -26,7 +26,7 @@ use crate::engine::{
 };
 use crate::files::InputError;
 use crate::guide::{Guide, GuideError, GuideInput, GuideMap};
-use crate::photon::{PhotonStream, SpadEvent};
+use crate::photon::{PhotonStream, SpadEvent, StreamConfig};
 use crate::ranging::{BinProfile, DepthOptions, EchoFinder, UnequalBins};
 use crate::scene::{GroundTruth, Scene};
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
@@ -269,7 +269,9 @@ pub fn take_guided_frame(
     let mut clock = Stopwatch::new();
     let mut times = PhaseTimes::default();
 
-    let truth = GroundTruth::render(scene, rows, cols);
+    // Where something moves, the truth is that of the middle of the exposure.
+    let exposure_s = exposure.end().as_s();
+    let truth = GroundTruth::render(&scene.at(0.5 * exposure_s), rows, cols);
     times.scene_s = clock.lap();
 
     // A macropixel whose SPADs are off looks as far as it can.
@@ -294,8 +296,10 @@ pub fn take_guided_frame(
     times.load_s = clock.lap();
 
     let stream = stream_config(sensor, exposure, *seed, scene.pulse_sigma());
-    let stream = PhotonStream::new(&stream);
-    let light = scene.pixel_light(&truth);
+    let stream = PhotonStream::new(&scene.with_pulse(stream));
+    let StreamConfig { spads, .. } = stream.config();
+    let cycle_s = stream.config().cycle_s();
+    let light = scene.light_during(&truth, spads, exposure.laser_cycles, cycle_s);
     let pixels: Vec<LitPixel> = (0..sensor.pixels())
         .map(|pixel| LitPixel {
             number: pixel as u32,
@@ -372,7 +376,7 @@ pub fn take_guided_frame(
     times.probes_s = clock.lap();
 
     let law = WindowLaw::new(sensor, exposure);
-    let finder = EchoFinder::new(&law, scene.pulse_sigma(), depth)?;
+    let finder = EchoFinder::new(&law, scene.pulse_resolution(), depth)?;
     let spads_fire = scene.lidar.pde > 0.0 || scene.lidar.dark_count_hz > 0.0;
     let depths: Vec<PixelDepth> = (0..sensor.pixels())
         .into_par_iter()

@@ -162,10 +162,15 @@ impl TakenFrame {
             ..self.exposure
         };
         let stream = stream_config(sensor, &exposure, self.seed, scene.pulse_sigma());
-        let stream = PhotonStream::new(&stream);
+        let stream = PhotonStream::new(&scene.with_pulse(stream));
         let light = given.map(|_| {
-            let truth = GroundTruth::render(scene, rows, cols);
-            scene.pixel_light(&truth).swap_remove(pixel)
+            let cycle_s = stream.config().cycle_s();
+            let cycles = self.exposure.laser_cycles;
+            let middle_s = 0.5 * f64::from(cycles) * cycle_s;
+            let truth = GroundTruth::render(&scene.at(middle_s), rows, cols);
+            let spads = &stream.config().spads;
+            let mut light = scene.light_during(&truth, spads, cycles, cycle_s);
+            light.swap_remove(pixel)
         });
         let photons = light.map(|light| stream.pixel_events(pixel as u32, &light));
         Ok(TakenPixel {
