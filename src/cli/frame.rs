@@ -3,12 +3,12 @@
 mod quality;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use super::guiding::GuideArgs;
 use super::{SceneArgs, say, wording};
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::WindowLaw;
@@ -16,13 +16,13 @@ use crate::chip::{Mode, SensorConfig, Silicon};
 use crate::engine::waveform::WaveCycles;
 use crate::engine::{CohortOptions, Work};
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
-use crate::guide::{BehaviouralStereo, GuideMap};
+use crate::guide::GuideMap;
 use crate::ranging::DepthOptions;
 use crate::report::{Table, write_npy_u16};
 use crate::scene::Scene;
 use crate::system::{
     DistanceLaw, EngineKind, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Probe, Summary,
-    take_frame,
+    WindowPolicy, take_frame_by,
 };
 use crate::units::Time;
 use crate::waves::WaveFormat;
@@ -32,6 +32,8 @@ use crate::waves::WaveFormat;
 pub(super) struct FrameArgs {
     #[command(flatten)]
     scene: SceneArgs,
+    #[command(flatten)]
+    guiding: GuideArgs,
     /// Folder for the results; it is made if need be.
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
@@ -88,7 +90,12 @@ pub(super) struct FrameArgs {
 /// Bad input, unwritable output, and what [`take_frame`] reports.
 pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     let (sensor, scene) = args.scene.read()?;
-    let exposure = wording::exposure(&sensor, args.stop_periods, args.laser_cycles)?;
+    let (guide, policy) = args.guiding.read(WindowPolicy::default())?;
+    let wanted = (args.stop_periods, args.seed);
+    let (sensor, stop_periods) =
+        args.guiding
+            .with_bins((&*guide, &policy), sensor, &scene, wanted)?;
+    let exposure = wording::exposure(&sensor, stop_periods, args.laser_cycles)?;
     let chosen = chosen_probes(&args.probe, &sensor)?;
     if let Some(why) = WindowLaw::new(&sensor, &exposure).refusal() {
         let (why, cure) = wording::of_no_aim(&why);
@@ -135,13 +142,14 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
             ..DepthOptions::default()
         },
         calibration,
-        guide: Arc::new(BehaviouralStereo),
+        guide,
     };
     let progress = ProgressBar::new(settings.sensor.pixels() as u64).with_style(
         ProgressStyle::with_template("exposing {bar:40} {pos}/{len} macropixels, {eta} left")?,
     );
-    let frame = take_frame(
+    let frame = take_frame_by(
         &settings,
+        policy,
         |guide| {
             progress.finish_and_clear();
             let pixels = match chosen {
@@ -161,7 +169,7 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     if args.json {
         say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
     } else {
-        say(table(args, &settings.sensor, &timing, &frame))?;
+        say(table(args, &settings, &timing, &frame))?;
         if let Some(remark) = &frame.remark {
             say(format_args!("\n{remark}\n"))?;
         }
@@ -237,6 +245,10 @@ struct Configuration<'a> {
     walk_correction: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     calibration: Option<String>,
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    guides: &'a [String],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    windows: Option<&'a str>,
 }
 
 /// The contents of frame.json.
@@ -266,7 +278,7 @@ struct Report<'a> {
 
 impl<'a> Report<'a> {
     fn new(
-        args: &FrameArgs,
+        args: &'a FrameArgs,
         settings: &'a FrameSettings,
         timing: &'a VerdictReport,
         frame: &'a Frame,
@@ -277,13 +289,15 @@ impl<'a> Report<'a> {
                 scene_name: args.scene.scene_name(),
                 scene: &settings.scene,
                 sensor: &settings.sensor,
-                stop_periods: args.stop_periods,
+                stop_periods: settings.exposure.stop_periods,
                 laser_cycles: args.laser_cycles,
                 seed: args.seed,
                 engine: args.engine,
                 false_alarm_rate: args.false_alarm_rate,
                 walk_correction: !args.no_walk_correction,
                 calibration: args.calibration.as_ref().map(|p| p.display().to_string()),
+                guides: args.guiding.guides(),
+                windows: args.guiding.windows(),
             },
             summary: frame.summary(),
             remark: frame.remark.as_deref(),
@@ -321,7 +335,12 @@ fn write_results(out: &Path, frame: &Frame, report: &Report<'_>) -> anyhow::Resu
     Ok(())
 }
 
-fn table(args: &FrameArgs, sensor: &SensorConfig, timing: &VerdictReport, frame: &Frame) -> Table {
+fn table(
+    args: &FrameArgs,
+    settings: &FrameSettings,
+    timing: &VerdictReport,
+    frame: &Frame,
+) -> Table {
     let summary = frame.summary();
     let of = |part: usize, whole: usize| format!("{part} of {whole}");
     let mut table = Table::new(format!("Frame of {}", args.scene.scene_name()))
@@ -330,13 +349,16 @@ fn table(args: &FrameArgs, sensor: &SensorConfig, timing: &VerdictReport, frame:
             of(summary.with_target, summary.pixels),
         )
         .row(
-            match sensor.mode {
+            match settings.sensor.mode {
                 Mode::Guided => "guided",
                 Mode::Conventional => "with the one window of the conventional mode",
             },
             of(summary.guided, summary.pixels),
         )
         .row("surface in window", of(summary.in_window, summary.guided));
+    if !args.guiding.guides().is_empty() {
+        table.push("guide", settings.guide.name());
+    }
     quality::rows(&mut table, args, &summary);
     let work = &frame.work;
     let percent = |part: f64, whole: f64| format!("{:.2} %", 100.0 * part / whole.max(1.0));

@@ -4,6 +4,7 @@
 mod calibrate;
 mod export;
 mod frame;
+mod guiding;
 mod pareto;
 mod power;
 mod range;

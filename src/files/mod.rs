@@ -4,7 +4,6 @@
 //! |---|---|
 //! | `complaint.rs` | what is wrong with an input: `FILE:LINE: what is wrong; what to do` |
 //! | `input.rs` | texts, read whole or line by line, and what is no text refused |
-//! | `matrix.rs` | matrices of numbers from `.npy` files |
 //! | `raster.rs` | pictures and maps: PNG, `.npy`, PFM |
 //! | `output.rs` | output files: beside the target first, then renamed over it |
 //! | `temporary.rs` | what stands there meanwhile, and what killed runs left of it |
@@ -14,7 +13,6 @@
 mod complaint;
 mod input;
 mod interruption;
-mod matrix;
 mod output;
 mod raster;
 mod result_set;
@@ -24,7 +22,6 @@ pub use complaint::InputError;
 pub use input::Lines;
 pub(crate) use input::{line_of, parse_json, parse_toml, read_text};
 pub(crate) use interruption::clean_up_when_interrupted;
-pub(crate) use matrix::Matrix;
 pub use output::{OutputFile, create_folder};
 pub use raster::Raster;
 pub use result_set::{MANIFEST, ManifestFile, ResultSet};

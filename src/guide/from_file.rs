@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{Guide, GuideError, GuideInput, GuideMap};
-use crate::files::{InputError, Matrix};
+use crate::files::{InputError, Raster};
 
 /// A map that was read: distances in metres, 0 where there is no estimate.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,31 +24,31 @@ pub enum FileSigma<'a> {
 }
 
 impl FileMap {
-    /// Reads a `.npy` file of distances from the lidar along the ray, float32 or float64, rows × cols, m.
+    /// Reads a `.npy` (or PFM) file of distances from the lidar along the ray, rows × cols, m.
     ///
     /// # Errors
     /// When a file cannot be read or is no such array, when a number is none, negative or infinite, and when there is no standard deviation
     /// for a range.
     pub fn read(path: &Path, sigma: FileSigma<'_>) -> Result<Self, InputError> {
         let ranges = read_lengths(path)?;
-        let (rows, cols) = (ranges.rows, ranges.cols);
+        let (rows, cols) = (ranges.height, ranges.width);
         let sigmas = match sigma {
             FileSigma::Same(sigma_m) => vec![sigma_m; rows * cols],
             FileSigma::Map(sigma_path) => {
                 let sigmas = read_lengths(sigma_path)?;
-                if (sigmas.rows, sigmas.cols) != (rows, cols) {
+                if (sigmas.height, sigmas.width) != (rows, cols) {
                     let message = format!(
                         "is {}x{}, and the ranges in {} are {rows}x{cols}; give arrays of one shape",
-                        sigmas.rows,
-                        sigmas.cols,
+                        sigmas.height,
+                        sigmas.width,
                         path.display()
                     );
                     return Err(InputError::new(sigma_path.display(), message));
                 }
-                sigmas.elements
+                lengths(&sigmas).collect()
             }
         };
-        let pairs = ranges.elements.into_iter().zip(sigmas);
+        let pairs = lengths(&ranges).zip(sigmas);
         Ok(FileMap {
             source: path.display().to_string(),
             rows,
@@ -58,18 +58,22 @@ impl FileMap {
     }
 }
 
-/// A matrix of lengths, m.
-fn read_lengths(path: &Path) -> Result<Matrix, InputError> {
-    let matrix = Matrix::read_npy(path)?;
-    let is_length = |x: &f64| x.is_finite() && *x >= 0.0;
-    match matrix.elements.iter().position(|x| !is_length(x)) {
-        None => Ok(matrix),
+fn lengths(raster: &Raster) -> impl Iterator<Item = f64> {
+    raster.values.iter().map(|&m| m.into())
+}
+
+/// A raster of lengths, m.
+fn read_lengths(path: &Path) -> Result<Raster, InputError> {
+    let raster = Raster::read(path)?;
+    let is_length = |x: &f32| x.is_finite() && *x >= 0.0;
+    match raster.values.iter().position(|x| !is_length(x)) {
+        None => Ok(raster),
         Some(at) => {
             let message = format!(
                 "has {} in row {}, column {} (counted from 0); give metres, and 0 where there is no estimate",
-                matrix.elements[at],
-                at / matrix.cols,
-                at % matrix.cols
+                raster.values[at],
+                at / raster.width,
+                at % raster.width
             );
             Err(InputError::new(path.display(), message))
         }
@@ -119,7 +123,7 @@ mod tests {
     #[test]
     fn a_map_comes_as_it_was_written_and_zero_is_no_estimate() {
         let ranges = written(2, 2, &[10.0, 0.0, 30.0, 40.0]);
-        let sigmas = written(2, 2, &[0.1, 0.2, 0.3, 0.4]);
+        let sigmas = written(2, 2, &[0.125, 0.25, 0.5, 0.75]);
         let scene = wall_at(60.0);
         let input = GuideInput::still(&scene, 2, 2, 0);
         let read = |sigma| FileMap::read(ranges.path(), sigma).unwrap();
@@ -127,7 +131,7 @@ mod tests {
             .estimate(&input)
             .unwrap();
         assert_eq!(map.range_m, [Some(10.0), None, Some(30.0), Some(40.0)]);
-        assert_eq!(map.sigma_m, [0.1, f64::INFINITY, 0.3, 0.4]);
+        assert_eq!(map.sigma_m, [0.125, f64::INFINITY, 0.5, 0.75]);
         let map = read(FileSigma::Same(0.7)).estimate(&input).unwrap();
         assert_eq!(map.sigma_m, [0.7, f64::INFINITY, 0.7, 0.7]);
         let wrong = GuideInput::still(&scene, 4, 4, 0);

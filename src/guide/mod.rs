@@ -10,6 +10,7 @@
 mod behavioural;
 mod from_file;
 mod fused;
+mod intensity;
 mod kalman;
 mod map;
 mod mapping;
@@ -31,6 +32,7 @@ use crate::scene::{DVec3, Scene};
 pub use behavioural::BehaviouralStereo;
 pub use from_file::FileMap;
 pub use fused::Fused;
+pub use intensity::IntensityStereo;
 pub use kalman::Kalman;
 pub use map::GuideMap;
 pub use monocular::Monocular;

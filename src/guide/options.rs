@@ -8,8 +8,10 @@ use toml::Table;
 
 use super::from_file::{FileMap, FileSigma};
 use super::fused::{Fused, MOST_GUIDES};
-use super::{BehaviouralStereo, Guide, Kalman, MatchedStereo, Monocular, NoisyTruth, Radar};
-use super::{kalman, monocular, noisy_truth, radar, rendered};
+use super::{
+    BehaviouralStereo, Guide, IntensityStereo, Kalman, MatchedStereo, Monocular, NoisyTruth, Radar,
+};
+use super::{intensity, kalman, monocular, noisy_truth, radar, rendered};
 use crate::files::InputError;
 use crate::settings::{Document, Key, Range};
 
@@ -62,6 +64,12 @@ pub const KINDS: &[Kind] = &[
         what: "Good range, coarse angle",
         keys: radar::KEYS,
         make: |document, keys| Ok(Arc::new(read::<Radar>(document, keys)?)),
+    },
+    Kind {
+        name: "intensity",
+        what: "The intensity images of two lidars, matched",
+        keys: intensity::KEYS,
+        make: |document, keys| Ok(Arc::new(read::<IntensityStereo>(document, keys)?)),
     },
     Kind {
         name: "kalman",
@@ -222,6 +230,7 @@ mod tests {
             (monocular::KEYS, Table::try_from(Monocular::default())),
             (radar::KEYS, Table::try_from(Radar::default())),
             (rendered::KEYS, Table::try_from(MatchedStereo::default())),
+            (intensity::KEYS, Table::try_from(IntensityStereo::default())),
             (kalman::KEYS, Table::try_from(Kalman::default())),
         ];
         for (keys, table) in tables {

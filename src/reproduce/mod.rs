@@ -15,6 +15,7 @@ mod chip;
 mod claim;
 mod delay_line;
 mod design;
+mod guided_bins;
 pub mod measured;
 mod page;
 mod penalty;

@@ -198,8 +198,8 @@ pub enum FrameError {
     },
 }
 
-/// Takes a frame. `probes` chooses the macropixels to run at gate level once the guide is known;
-/// `exposed` is told of macropixels as they are done.
+/// Takes a frame, every window in the middle of the guide's estimate. `probes` chooses the macropixels to run at gate level once the
+/// guide is known; `exposed` is told of macropixels as they are done.
 ///
 /// # Errors
 /// A guide without a map, and what [`take_guided_frame`] reports.
@@ -208,25 +208,33 @@ pub fn take_frame(
     probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
     exposed: impl Fn(usize) + Sync,
 ) -> Result<Frame, FrameError> {
+    take_frame_by(settings, WindowPolicy::default(), probes, exposed)
+}
+
+/// As [`take_frame`], with windows that a policy chooses; nothing came before the frame.
+///
+/// # Errors
+/// As those of [`take_frame`].
+pub fn take_frame_by(
+    settings: &FrameSettings,
+    policy: WindowPolicy,
+    probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
+    exposed: impl Fn(usize) + Sync,
+) -> Result<Frame, FrameError> {
     let FrameSettings {
         sensor,
         scene,
         exposure,
         seed,
+        calibration,
         ..
     } = settings;
     let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
     let mut clock = Stopwatch::new();
-    let guide = settings
-        .guide
-        .estimate(&GuideInput::still(scene, rows, cols, *seed))?;
+    let input = GuideInput::still(scene, rows, cols, *seed);
+    let guide = settings.guide.estimate(&input)?;
     let guide_s = clock.lap();
-    let mut pointing = Pointing::new(
-        WindowPolicy::default(),
-        sensor,
-        exposure,
-        settings.calibration.as_ref(),
-    );
+    let mut pointing = Pointing::new(policy, sensor, exposure, calibration.as_ref());
     let wanted = pointing.windows(&guide, &[]);
     let windows_s = clock.lap();
     let mut frame = take_guided_frame(settings, &guide, &wanted, probes, exposed)?;

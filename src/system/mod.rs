@@ -18,9 +18,11 @@ mod tolerance;
 
 pub use calibrate::{Sweep, SweepError, calibrate};
 pub use distance::DistanceLaw;
-pub use frame::{EngineKind, FrameError, FrameSettings, Probe, take_frame, take_guided_frame};
+pub use frame::{
+    EngineKind, FrameError, FrameSettings, Probe, take_frame, take_frame_by, take_guided_frame,
+};
 pub use pixel::{NoDepth, PixelDepth};
-pub use policy::{Pointing, Unguided, Why, WindowPolicy};
+pub use policy::{POLICY_KEYS, Pointing, Unguided, Why, WindowPolicy, share_held};
 pub use result::{Frame, PhaseTimes};
 pub use speed::{SPEED_LASER_CYCLES, SpeedCase, SpeedFrame};
 pub use step_and_lock::{LockOptions, LockState, StepAndLock, Tracker};

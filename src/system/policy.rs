@@ -21,6 +21,9 @@
 //!
 //! Macropixels that find a peak keep to it, as [`StepAndLock`](super::StepAndLock) does, until the guide says that there is another target.
 
+mod bins;
+mod options;
+
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -31,6 +34,9 @@ use crate::guide::GuideMap;
 use crate::numerics::normal_above;
 use crate::ranging::BinProfile;
 use crate::units::Time;
+
+pub use bins::share_held;
+pub use options::POLICY_KEYS;
 
 /// What a macropixel does of which the guide says nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]

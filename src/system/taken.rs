@@ -30,8 +30,8 @@ pub struct TakenFrame {
     pub engine: EngineKind,
     /// Whether a tolerance chose engines instead.
     pub has_tolerance: bool,
-    /// Whether its bins had been calibrated.
-    is_calibrated: bool,
+    /// Whether its windows are those of the camera pair's estimates by the window law: not calibrated, no other guide or policy.
+    is_plain: bool,
     /// Start value of each macropixel, row-major; `None` where SPADs were off.
     starts: Vec<Option<u16>>,
 }
@@ -47,6 +47,9 @@ struct FrameFile {
     engine: EngineKind,
     tolerance: Option<serde::de::IgnoredAny>,
     calibration: Option<serde::de::IgnoredAny>,
+    #[serde(default)]
+    guides: Vec<String>,
+    windows: Option<serde::de::IgnoredAny>,
     macropixels: Vec<Start>,
 }
 
@@ -113,7 +116,9 @@ impl TakenFrame {
             seed: file.seed,
             engine: file.engine,
             has_tolerance: file.tolerance.is_some(),
-            is_calibrated: file.calibration.is_some(),
+            is_plain: file.calibration.is_none()
+                && file.guides.is_empty()
+                && file.windows.is_none(),
             starts,
             source,
         })
@@ -136,9 +141,9 @@ impl TakenFrame {
         let pixel = row * sensor.cols + col;
         let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
         // What a calibration made of the guide's estimate is not known here, nor are other guides.
-        let given = match self.is_calibrated {
-            true => self.starts[pixel],
-            false => {
+        let given = match self.is_plain {
+            false => self.starts[pixel],
+            true => {
                 let input = GuideInput::still(scene, rows, cols, self.seed);
                 let guide = BehaviouralStereo.estimate(&input);
                 let guide = guide.map_err(|why| InputError::new(&self.source, why.to_string()))?;

@@ -5,6 +5,7 @@ mod delay_files_replay;
 mod delay_lines_are_calibrated;
 mod engines_are_chosen_from_the_command_line;
 mod golden_vectors_hold;
+mod guides_from_the_command_line;
 mod mismatch_replays;
 mod one_window_for_all;
 mod probes_keep_their_first_hits;

@@ -1,6 +1,13 @@
+use std::sync::Arc;
+
 use super::*;
 use crate::chip::{Sensor, hslidar};
+use crate::engine::CohortOptions;
+use crate::guide::{Guide, GuideInput, NoisyTruth};
 use crate::photon::{Purpose, normal, random_stream};
+use crate::ranging::DepthOptions;
+use crate::scene::Scene;
+use crate::system::{EngineKind, FrameSettings, PixelDepth, take_guided_frame};
 
 const SIZE: usize = 16;
 
@@ -243,4 +250,63 @@ fn the_least_bin_is_that_of_equation_25() {
     let sensor = Sensor::from(sensor());
     let bin_m = policy.least_bin_m(1.0, sensor.bins);
     assert!((bin_m - 6.0 / 16.0).abs() < 1e-9, "{bin_m}");
+}
+
+/// The whole chain, photons and ranging included: a guide that errs by a window and says so, on the street.
+#[test]
+fn stepped_windows_find_the_street_that_one_window_misses() {
+    let sensor = SensorConfig {
+        rows: 8,
+        cols: 8,
+        ..SensorConfig::default()
+    };
+    // An array of 8×8 gathers on each macropixel the light of 64 of the real one; it is given as much less.
+    let mut scene = Scene::outdoor();
+    scene.light.illuminance_klux /= 64.0;
+    scene.lidar.pulse_energy_uj /= 64.0;
+    let guide = NoisyTruth {
+        sigma_m: 6.0,
+        sigma_per_m: 0.0,
+    };
+    let mut settings = FrameSettings {
+        exposure: Exposure::new(&sensor, 520, 2000),
+        sensor,
+        guide: Arc::new(guide),
+        scene,
+        seed: 1,
+        engine: EngineKind::Window,
+        cohort: CohortOptions::default(),
+        tolerance_m: None,
+        skip: true,
+        depth: DepthOptions::default(),
+        calibration: None,
+    };
+    let input = GuideInput::still(&settings.scene, 8, 8, 1);
+    let map = guide.estimate(&input).unwrap();
+    let mut found = |policy: WindowPolicy, frames: u64| {
+        let sensor = settings.sensor.clone();
+        let mut pointing = Pointing::new(policy, &sensor, &settings.exposure, None);
+        let mut seen_m = Vec::new();
+        let mut right = 0;
+        for frame in 0..frames {
+            settings.seed = 1 + frame;
+            let wanted = pointing.windows(&map, &seen_m);
+            let taken = take_guided_frame(&settings, &map, &wanted, |_| Vec::new(), |_| {});
+            let pixels = taken.unwrap().pixels;
+            seen_m = pixels.iter().map(|p| p.measured_m).collect();
+            let is_right = |p: &&PixelDepth| p.error_m().is_some_and(|e| e.abs() < 0.4);
+            right = pixels.iter().filter(is_right).count();
+        }
+        right
+    };
+    let stepping = WindowPolicy {
+        steps_in_doubt: true,
+        ..WindowPolicy::default()
+    };
+    let (one, last) = (found(WindowPolicy::default(), 1), found(stepping, 8));
+    assert!(
+        3 * one < 2 * last && map.guided() * 9 <= last * 10,
+        "{one} {last} of {}",
+        map.guided()
+    );
 }
