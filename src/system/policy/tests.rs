@@ -6,7 +6,7 @@ use crate::engine::CohortOptions;
 use crate::guide::{Guide, GuideInput, NoisyTruth};
 use crate::photon::{Purpose, normal, random_stream};
 use crate::ranging::DepthOptions;
-use crate::scene::Scene;
+use crate::scene::{DVec3, Object, Scene, Shape};
 use crate::system::{EngineKind, FrameSettings, PixelDepth, take_guided_frame};
 
 const SIZE: usize = 16;
@@ -252,9 +252,9 @@ fn the_least_bin_is_that_of_equation_25() {
     assert!((bin_m - 6.0 / 16.0).abs() < 1e-9, "{bin_m}");
 }
 
-/// The whole chain, photons and ranging included: a guide that errs by a window and says so, on the street.
+/// The whole chain, photons and ranging included: a guide that errs by a window and says so, before a wall.
 #[test]
-fn stepped_windows_find_the_street_that_one_window_misses() {
+fn stepped_windows_find_the_wall_that_one_window_misses() {
     let sensor = SensorConfig {
         rows: 8,
         cols: 8,
@@ -264,6 +264,13 @@ fn stepped_windows_find_the_street_that_one_window_misses() {
     let mut scene = Scene::outdoor();
     scene.light.illuminance_klux /= 64.0;
     scene.lidar.pulse_energy_uj /= 64.0;
+    let wall = Shape::Plane {
+        centre_m: DVec3::new(0.0, 0.0, 60.0),
+        normal: DVec3::new(0.0, 0.0, -1.0),
+        width_m: 1e3,
+        height_m: 1e3,
+    };
+    scene.objects = vec![Object::new("wall", 0.5, wall)];
     let guide = NoisyTruth {
         sigma_m: 6.0,
         sigma_per_m: 0.0,
