@@ -99,6 +99,11 @@ fn weighted_mean(estimates: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f
     if let Some(exact) = estimates.clone().find(|(_, sigma_m)| *sigma_m == 0.0) {
         return exact;
     }
+    // One alone stays what it is, to the bit.
+    let mut each = estimates.clone();
+    if let (Some(only), None) = (each.next(), each.next()) {
+        return only;
+    }
     let (weights, sum) = estimates.fold((0.0, 0.0), |(weights, sum), (range_m, sigma_m)| {
         let weight = 1.0 / (sigma_m * sigma_m);
         (weights + weight, sum + weight * range_m)
