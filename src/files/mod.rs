@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `complaint.rs` | what is wrong with an input: `FILE:LINE: what is wrong; what to do` |
 //! | `input.rs` | texts, read whole or line by line, and what is no text refused |
-//! | `raster.rs` | pictures and maps: PNG, `.npy`, PFM |
+//! | `raster.rs` | pictures and maps: PNG, `.npy`, PFM, EXR |
 //! | `output.rs` | output files: beside the target first, then renamed over it |
 //! | `temporary.rs` | what stands there meanwhile, and what killed runs left of it |
 //! | `interruption.rs` | signals that end the program |

@@ -1,10 +1,11 @@
-//! Pictures and maps that users give: one number a pixel, from PNG (8 or 16 bit), NumPy (`.npy`), PFM or OpenEXR.
+//! Pictures and maps that users give: one number a pixel, from PNG (8 or 16 bit), NumPy (`.npy`), PFM or OpenEXR
+//! (one channel).
 //!
 //! How large a raster is stands in its header, and is held to a limit before anything is unpacked: a PNG of some
 //! kilobytes can unpack to gigabytes.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::Path;
 
 use super::complaint::InputError;
@@ -43,7 +44,8 @@ impl Raster {
             [0x89, b'P', b'N', b'G', ..] => read_png(reader),
             [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => read_npy(reader),
             [b'P', b'f' | b'F', ..] => read_pfm(reader),
-            _ => Err("is no PNG, .npy or PFM; convert it to one of them".into()),
+            [0x76, 0x2f, 0x31, 0x01, ..] => read_exr(reader),
+            _ => Err("is no PNG, .npy, PFM or EXR; convert it to one of them".into()),
         };
         read.map_err(complain)
     }
@@ -196,6 +198,47 @@ fn read_pfm(mut reader: BufReader<File>) -> Result<Raster, String> {
     })
 }
 
+/// The first layer's channel Z, or else V, Y or its only one.
+fn read_exr(mut reader: BufReader<File>) -> Result<Raster, String> {
+    use exr::prelude::{MetaData, ReadChannels, ReadLayers, read};
+    let broken = |e: exr::error::Error| broken("EXR", e);
+    let about = MetaData::read_from_buffered(&mut reader, false).map_err(broken)?;
+    let layer = about.headers.first();
+    let size = layer.ok_or("has no layer; save it again")?.layer_size;
+    check_size(size.width() as u64, size.height() as u64)?;
+    reader.rewind().map_err(|e| e.to_string())?;
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(reader)
+        .map_err(broken)?;
+    let channels = &image.layer_data.channel_data.list;
+    let named = |name: &str| channels.iter().find(|channel| channel.name.eq(name));
+    let chosen = ["Z", "V", "Y"].into_iter().find_map(named);
+    let only = channels.first().filter(|_| channels.len() == 1);
+    let Some(channel) = chosen.or(only) else {
+        let names: Vec<String> = channels.iter().map(|c| c.name.to_string()).collect();
+        return Err(format!(
+            "has the channels {}; save one of them, as Z or Y",
+            names.join(", ")
+        ));
+    };
+    if channel.sampling.0 != 1 || channel.sampling.1 != 1 {
+        return Err("has a channel of fewer pixels than the picture; save it in full".into());
+    }
+    let size = image.layer_data.size;
+    Ok(Raster {
+        width: size.width(),
+        height: size.height(),
+        values: channel.sample_data.values_as_f32().collect(),
+        white: 1.0,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -244,6 +287,33 @@ mod tests {
         bytes
     }
 
+    /// Floats under these names.
+    fn exr_of(width: usize, channels: &[(&str, &[f32])]) -> Vec<u8> {
+        use exr::prelude::*;
+        let channel = |(name, values): &(&str, &[f32])| {
+            AnyChannel::new(*name, FlatSamples::F32(values.to_vec()))
+        };
+        let list: SmallVec<[_; 4]> = channels.iter().map(channel).collect();
+        let size = (width, channels[0].1.len() / width);
+        let encoding = Encoding {
+            compression: Compression::ZIP16,
+            ..Encoding::default()
+        };
+        let layer = Layer::new(
+            size,
+            LayerAttributes::default(),
+            encoding,
+            AnyChannels::sort(list),
+        );
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        Image::from_layer(layer)
+            .write()
+            .non_parallel()
+            .to_buffered(&mut bytes)
+            .unwrap();
+        bytes.into_inner()
+    }
+
     #[test]
     fn all_kinds_hold_the_same_numbers() {
         use png::{BitDepth, ColorType};
@@ -260,6 +330,8 @@ mod tests {
         for bytes in [
             png_of(3, 2, ColorType::Grayscale, BitDepth::Sixteen, &wide),
             [b"Pf\n3 2\n-1.0\n".to_vec(), pfm].concat(),
+            exr_of(3, &[("B", &[0.0; 6]), ("Z", &expected)]),
+            exr_of(3, &[("depth", &expected)]),
             npy_of(&[2, 3], npyz::Order::C, &expected),
             npy_of(&[2, 3], npyz::Order::C, &doubles),
             npy_of(&[2, 3], npyz::Order::Fortran, &columns),
@@ -301,6 +373,11 @@ mod tests {
             (npy_of(&[6], npyz::Order::C, &[0f32; 6]), "[6]"),
             (npy_of(&[1, 1], npyz::Order::C, &[true]), "type"),
             (vec![], "is no PNG"),
+            (
+                exr_of(2, &[("R", &[0.0; 4]), ("G", &[0.0; 4])]),
+                "channels G, R",
+            ),
+            (exr_of(2, &[("Z", &[0.0; 4])])[..90].to_vec(), "broken EXR"),
         ] {
             let error = read(&bytes).unwrap_err().to_string();
             assert!(error.contains(says), "{error}");
@@ -319,11 +396,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn garbage_is_refused_without_a_panic(kind in 0..4, rest in prop::collection::vec(any::<u8>(), 0..300)) {
+        fn garbage_is_refused_without_a_panic(kind in 0..5, rest in prop::collection::vec(any::<u8>(), 0..300)) {
             let start: &[u8] = match kind {
                 0 => &[0x89, b'P', b'N', b'G', 0x0d, 0x0a, 0x1a, 0x0a, 0, 0, 0, 13, b'I', b'H', b'D', b'R'],
                 1 => b"\x93NUMPY\x01\x00\x76\x00{'descr': '<f4', 'fortran_order': ",
                 2 => b"Pf\n",
+                3 => b"\x76\x2f\x31\x01\x02\0\0\0channels\0chlist\0",
                 _ => b"",
             };
             let _ = read(&[start, &rest].concat());

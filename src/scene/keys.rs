@@ -503,7 +503,7 @@ pub(super) const OBJECT: &[Key] = &[
         "texture_file",
         "",
         Range::Text,
-        "Of an image: PNG, .npy or PFM, relative to the scene file; white is this material, black the second",
+        "Of an image: PNG, .npy, PFM or EXR, relative to the scene file; white is this material, black the second",
         "-",
     ),
     key(
@@ -650,7 +650,7 @@ pub(super) const OBJECT: &[Key] = &[
         "depth_file",
         "",
         Range::Text,
-        "Of a map: depths that a camera has seen (PNG, .npy or PFM), 0 where nothing is, relative to the scene file",
+        "Of a map: depths that a camera has seen (PNG, .npy, PFM or EXR), 0 where nothing is, relative to the scene file",
         "-",
     ),
     key(

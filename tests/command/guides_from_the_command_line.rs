@@ -123,7 +123,7 @@ fn guides_that_cannot_be_are_refused_in_one_sentence() {
         ),
         (
             ["--guide", "file:path=text.npy"],
-            "text.npy: is no PNG, .npy or PFM",
+            "text.npy: is no PNG, .npy, PFM or EXR",
         ),
         (["--guide", "file"], "names no file"),
         (["--guide", "radar:reach_m=0"], "reach_m = 0 is impossible"),

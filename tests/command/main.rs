@@ -13,4 +13,5 @@ mod real_histograms_are_ranged;
 #[cfg(unix)]
 mod results_are_one_set;
 mod run_time_against_error;
+mod scenes_name_files;
 mod wave_replays_a_cycle;
