@@ -65,7 +65,7 @@ fn cure(error: &EngineError) -> Option<String> {
             "give less than {:.1} Mcounts/s (less light, a smaller or darker lens, a narrower filter, a shorter dead time), or fewer macropixels or laser cycles",
             most_hz / 1e6
         ),
-        EngineError::OwnLaws => "use --engine window or gate".to_owned(),
+        EngineError::OwnLaws => "use --engine window, cohort or gate".to_owned(),
         EngineError::Mismatch | EngineError::OtherSpads { .. } | EngineError::Unknown { .. } => {
             return None;
         }

@@ -77,7 +77,7 @@ pub enum EngineError {
     Mismatch,
     /// Each macropixel has a window law of its own by description, and this engine has one law.
     #[error(
-        "each macropixel has delay lines of its own, or a CLK that comes later than another's, which only the engines gate and window follow, and in the library's silicon"
+        "each macropixel has delay lines of its own, or a CLK that comes later than another's, which only the engines gate, window and cohort follow, and in the library's silicon"
     )]
     OwnLaws,
     /// Light is given for SPADs one by one, but for another number of them than a macropixel has.
@@ -101,16 +101,25 @@ pub enum EngineError {
 /// What the cohort engine's model of light and SPADs leaves out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NotModelled {
-    /// SPADs are followed in steps of a CLK period.
-    #[error("bins that are not CLK periods")]
-    UnequalBins,
+    /// Steps that [`CohortOptions::sub_bins`](super::CohortOptions) fixes are parts of a CLK period.
+    #[error("bins that are not CLK periods in a fixed number of steps to one")]
+    UnequalBinsInFixedSteps,
+    /// Bins have a length.
+    #[error("bins without length")]
+    EmptyBins,
     /// Two pulses of a SPAD may fall into one bin.
-    #[error("a dead time ({dead_time}) shorter than a CLK period ({period})")]
+    #[error("a dead time ({dead_time}) shorter than a bin ({bin})")]
     ShortDeadTime {
         /// The SPADs' dead time.
         dead_time: Time,
-        /// A CLK period.
-        period: Time,
+        /// The longest bin of the window.
+        bin: Time,
+    },
+    /// Pulses that leave no edge on a photon line because they are closer than an XOR's delay.
+    #[error("light in which many pulses meet on the photon line at an edge of bin {bin}")]
+    Meetings {
+        /// First bin concerned.
+        bin: usize,
     },
     /// Avalanches that prolong a dead time and breed others.
     #[error("afterpulses and crosstalk of paralysable SPADs")]

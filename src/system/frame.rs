@@ -473,6 +473,7 @@ fn refused_by(
     let is_refused = |pixel: &&LitPixel| {
         let light = pixel.light.as_ref();
         light.is_some_and(|light| {
+            let cohort = cohort.of_macropixel(pixel.number);
             let cohorts = cohort.cohorts_in_steps(stream.config(), pixel.start, light);
             cohorts.is_err()
         })

@@ -49,6 +49,22 @@ impl Blindness {
         }
     }
 
+    /// A dead time of so many of the longest and of the shortest steps, where they are not alike. Ages in between are for
+    /// [`Blindness::in_light`] to tell.
+    pub(super) fn of_unequal(law: DeadTimeLaw, longest: f64, shortest: f64) -> Self {
+        debug_assert!(
+            1.0 <= longest && longest <= shortest,
+            "steps are no longer than a dead time"
+        );
+        let certain = longest.floor() as usize - 1;
+        let able = (1..=shortest.ceil() as usize).map(|age| if age <= certain { 0.0 } else { 0.5 });
+        Blindness {
+            law,
+            able: able.collect(),
+            by_step: Vec::new(),
+        }
+    }
+
     /// The same dead time in light that makes SPADs able to fire so, by step and age.
     pub(super) fn in_light(&self, by_step: Vec<f64>) -> Self {
         Blindness {

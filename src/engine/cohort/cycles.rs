@@ -41,9 +41,12 @@ pub(super) struct Scene {
     pub dead_fs: f64,
     /// How long after a dead time its avalanche may have caused another one.
     pub pending_fs: f64,
+    /// Steps in which what was before the window is remembered: a CLK period, or the shortest bin.
     pub period_fs: f64,
     pub from_fs: f64,
     pub bins: usize,
+    /// Where bins begin and the last one ends, fs after the start of the window, if they are not CLK periods.
+    pub edges_fs: Option<Vec<f64>>,
     pub cycle_fs: f64,
     /// Probability of a background photon on a SPAD within a dead time.
     busy: f64,
@@ -82,8 +85,10 @@ impl Scene {
         [dead_fs, pending_fs, period_fs]: [f64; 3],
         [from_fs, cycle_fs]: [f64; 2],
         bins: usize,
+        edges_fs: Option<Vec<f64>>,
     ) -> Self {
         Scene {
+            edges_fs,
             busy: absorbed(light.most_background(dead_fs)),
             light,
             dead_fs,
@@ -97,7 +102,15 @@ impl Scene {
 
     /// End of the window.
     pub(super) fn until_fs(&self) -> f64 {
-        self.from_fs + self.bins as f64 * self.period_fs
+        self.from_fs + self.edge_fs(self.bins)
+    }
+
+    /// Where bin `number` begins, or where the last one ends, fs after the start of the window.
+    pub(super) fn edge_fs(&self, number: usize) -> f64 {
+        match &self.edges_fs {
+            Some(edges_fs) => edges_fs[number],
+            None => number as f64 * self.period_fs,
+        }
     }
 
     /// Goes back from the start of the window by dead times, until `enough` is known or `for_fs` is over: a SPAD that sees
@@ -144,7 +157,7 @@ impl Scene {
         let (first, cycles) = (latched.start, latched.end);
         let for_one = options.memory / config.spads() as f64;
         let enough = FORGOTTEN.min(for_one / cycles as f64);
-        let between_fs = self.cycle_fs - self.bins as f64 * self.period_fs;
+        let between_fs = self.cycle_fs - self.edge_fs(self.bins);
         let back = self.busy_back_to(f64::INFINITY, enough);
         if cycles > 1 && (back.for_fs > between_fs || back.busy > enough) {
             let busy =
@@ -231,6 +244,14 @@ impl Scene {
 
     /// The light on the window.
     pub(super) fn steps(&self, per_period: usize, extent: &Extent) -> Steps {
+        if let Some(edges_fs) = &self.edges_fs {
+            debug_assert_eq!(per_period, 1, "fixed steps in unequal bins are refused");
+            let edges_fs: Vec<f64> = edges_fs.iter().map(|edge| self.from_fs + edge).collect();
+            return Steps {
+                means: self.light.between(&edges_fs, extent).into(),
+                per_period,
+            };
+        }
         let (step_fs, count) = (self.period_fs / per_period as f64, self.bins * per_period);
         Steps {
             means: self.light.steps(self.from_fs, step_fs, count, extent),
@@ -238,13 +259,16 @@ impl Scene {
         }
     }
 
-    /// The light on as many CLK periods before the window, if neither there nor in the window it is far from even within
-    /// one: no echo is shorter, none is missing, and the exposure has long begun.
+    /// The light on as many CLK periods before the window, if these are its bins, and it is far from even within one neither there nor
+    /// in the window: no echo is shorter, none is missing, and the exposure has long begun.
     pub(super) fn even_past(
         &self,
         periods: usize,
         class: &Class,
     ) -> Option<SmallVec<[f64; FEW_STEPS]>> {
+        if self.edges_fs.is_some() {
+            return None;
+        }
         let from_fs = self.from_fs - periods as f64 * self.period_fs;
         let finest_fs = self.light.finest_fs(from_fs..self.until_fs());
         let is_narrow = finest_fs.is_some_and(|sigma_fs| 2.0 * sigma_fs < self.period_fs);

@@ -37,9 +37,12 @@ impl Grid {
     ) -> Self {
         let (dead_fs, period_fs) = (scene.dead_fs, scene.period_fs);
         let start_fs = -since_fs;
-        let period = |number: usize| (number as f64 - memory as f64) * period_fs;
+        let period = |number: usize| match number.checked_sub(memory) {
+            Some(bin) if bin <= scene.bins => scene.edge_fs(bin),
+            _ => (number as f64 - memory as f64) * period_fs,
+        };
         let periods = 0..memory + scene.bins + 1;
-        let until_fs = scene.bins as f64 * period_fs;
+        let until_fs = scene.edge_fs(scene.bins);
         let mut bends: Vec<f64> = periods.clone().map(period).collect();
         let lit_fs = &class.extent.lit_fs;
         bends.extend([lit_fs.start, lit_fs.end].map(|end| end - scene.from_fs));

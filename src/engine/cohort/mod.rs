@@ -28,8 +28,10 @@
 //!   kept, but how an afterpulse follows its own pulse is remembered for a dead time only, and crosstalk,
 //!   which blinds a SPAD of a cycle that has its event already, hits any SPAD. So crosstalk is refused where an event
 //!   takes several SPADs, as both are for paralysable SPADs and with [`CohortOptions::sub_bins`].
-//! * A SPAD is to fire at most once in a CLK period: a shorter dead time is refused. So are measured laser pulses, and SPADs that
+//! * A SPAD is to fire at most once in a bin: a shorter dead time is refused. So are measured laser pulses, and SPADs that
 //!   differ.
+//! * Bins of delay lines are the steps, unequal as they are; what is before a window is remembered in steps as long as the shortest
+//!   bin. An odd number of SPADs counts in them; light in which pulses meet on the photon line (`check_meetings`) is refused.
 //!
 //! So an exposure takes one step a bin, whatever light there is, and at most as many states as it has laser cycles.
 
@@ -51,6 +53,7 @@ mod secondaries;
 mod spad_light;
 mod words;
 
+use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use smallvec::{SmallVec, smallvec};
@@ -63,12 +66,12 @@ pub use self::hits::at_least_hit;
 use self::secondaries::Secondaries;
 use self::spad_light::SpadLight;
 use self::words::RandomWords;
-use super::error::one_law;
 use super::{
     Engine, EngineError, Expose, Exposed, LitPixel, NotModelled, Work, follows, has_a_line_a_spad,
 };
-use crate::chip::{Exposure, Sensor, WindowLaw, correlation, histogram, window_law};
+use crate::chip::{Exposure, Sensor, Tdc, WindowLaw, correlation, histogram, window_law};
 use crate::photon::{DeadTimeLaw, PhotonStream, PixelLight, Segment, SpadModel, StreamConfig};
+use crate::units::Time;
 
 /// Whether 0, 1, 2, … SPADs that fire in a CLK period make an event, up to all of a macropixel.
 #[derive(Debug, Clone)]
@@ -129,7 +132,11 @@ impl Default for CohortOptions {
 /// way.
 const WORTH_LOOKING_AT: f64 = 200.0;
 
+/// Counts of a bin that are no error.
+const MEETINGS_THAT_DO_NOT_COUNT: f64 = 0.01;
+
 /// Draws histograms from their distribution.
+#[derive(Clone)]
 pub struct Cohort {
     sensor: Sensor,
     law: WindowLaw,
@@ -139,6 +146,8 @@ pub struct Cohort {
     /// Photons on a SPAD in a CLK period up to which cycles may be pooled.
     most_photons: f64,
     is_event: EventTable,
+    /// Whether the law is that of one macropixel, where each has its own.
+    is_of_macropixel: bool,
 }
 
 /// A start value's window, and the beginning of the photon times it collects, in femtoseconds after STOP.
@@ -159,6 +168,10 @@ impl Cohort {
         let sensor = law.sensor().clone();
         debug_assert!(options.sub_bins != Some(0), "a period has a step");
         let is_event = EventTable::new(sensor.spads(), |fired| {
+            // Each SPAD turns the photon line of a delay line over.
+            if sensor.tdc == Tdc::DelayLine {
+                return fired % 2 == 1;
+            }
             let spads = ((1u128 << fired) - 1) as u64;
             correlation::model(spads, sensor.event_type, sensor.threshold)
         });
@@ -169,6 +182,19 @@ impl Cohort {
             most_photons: pooled::most_photons(options.neglect),
             is_event,
             sensor,
+            is_of_macropixel: false,
+        }
+    }
+
+    /// This engine with the law of a macropixel, where each has its own: what [`Cohort::expected`] and
+    /// [`Cohort::cohorts_in_steps`] are asked of there.
+    pub fn of_macropixel(&self, number: u32) -> Cow<'_, Self> {
+        match self.sensor.has_own_laws() && !self.is_of_macropixel {
+            true => Cow::Owned(Cohort {
+                is_of_macropixel: true,
+                ..Self::with_law(self.law.of_macropixel(number), self.options)
+            }),
+            false => Cow::Borrowed(self),
         }
     }
 
@@ -224,7 +250,8 @@ impl Cohort {
         light: &PixelLight,
     ) -> Result<Counts, EngineError> {
         let mut sums: Counts = smallvec![0; self.sensor.bins];
-        let Some(cohorts) = self.cohorts(stream, start, light)? else {
+        let engine = self.of_macropixel(pixel);
+        let Some(cohorts) = engine.cohorts(stream, start, light)? else {
             return Ok(sums);
         };
         let random = &mut RandomWords::new(stream.seed, pixel);
@@ -330,25 +357,50 @@ impl Cohort {
         light: &PixelLight,
     ) -> Result<Option<Vec<LikeCycles>>, EngineError> {
         follows(&self.sensor, &self.law.timing().pulses)?;
-        one_law(&self.sensor)?;
+        if self.sensor.has_own_laws() && !self.is_of_macropixel {
+            return Err(EngineError::OwnLaws);
+        }
         has_a_line_a_spad(&self.sensor)?;
         let Opening { window, from_fs } = self.opening(start);
         let Some(window) = window.settled()? else {
             return Ok(None);
         };
-        let period_fs = 1e15 / stream.clock.as_hz();
+        let edges_fs = (!self.law.has_clk_bins()).then(|| {
+            let edges = self.law.edges(&window, 0);
+            let edges = edges.edges().iter();
+            edges
+                .map(|edge| edge.as_fs() as f64 - from_fs)
+                .collect::<Vec<f64>>()
+        });
+        let clk_fs = 1e15 / stream.clock.as_hz();
+        let [period_fs, longest_fs] = match &edges_fs {
+            None => [clk_fs; 2],
+            Some(edges_fs) => {
+                let widths = edges_fs.windows(2).map(|pair| pair[1] - pair[0]);
+                let shortest = widths.clone().fold(f64::INFINITY, f64::min);
+                [shortest, widths.fold(0.0, f64::max)]
+            }
+        };
         let dead_fs = stream.spads.dead_time.as_fs() as f64;
         let spads = &stream.spads;
         let has_secondaries = spads.has_secondaries();
         let mut echoes = light.segments().flat_map(Segment::echoes);
         let has_shape = echoes.any(|echo| echo.shape.is_some());
         let refusals = [
-            (!self.law.has_clk_bins(), NotModelled::UnequalBins),
             (
-                dead_fs < period_fs,
+                edges_fs.is_some() && self.options.sub_bins.is_some(),
+                NotModelled::UnequalBinsInFixedSteps,
+            ),
+            (
+                // A bin without length is left out of what is asked of steps.
+                period_fs <= 0.0,
+                NotModelled::EmptyBins,
+            ),
+            (
+                dead_fs < longest_fs,
                 NotModelled::ShortDeadTime {
                     dead_time: spads.dead_time,
-                    period: stream.clock.period(),
+                    bin: Time::from_fs(longest_fs as i64),
                 },
             ),
             (
@@ -377,7 +429,11 @@ impl Cohort {
             [dead_fs, spads.reach().as_fs() as f64, period_fs],
             [from_fs, stream.cycle_s() * 1e15],
             self.sensor.bins,
+            edges_fs,
         );
+        if self.sensor.tdc == Tdc::DelayLine {
+            self.check_meetings(&scene, stream)?;
+        }
         let classes = scene.classes(&self.sensor, &self.law, &window, &self.options)?;
         let like = |class| self.like_cycles(&scene, spads, class);
         classes.iter().map(like).collect::<Result<_, _>>().map(Some)
@@ -392,7 +448,15 @@ impl Cohort {
     ) -> Result<LikeCycles, EngineError> {
         let per_period = self.options.sub_bins.unwrap_or(1);
         let step_fs = scene.period_fs / per_period as f64;
-        let blindness = Blindness::new(spads.law, scene.dead_fs / step_fs);
+        let blindness = match &scene.edges_fs {
+            None => Blindness::new(spads.law, scene.dead_fs / step_fs),
+            Some(edges_fs) => {
+                let widths = edges_fs.windows(2).map(|pair| pair[1] - pair[0]);
+                let longest_fs = widths.fold(0.0, f64::max);
+                let [longest, shortest] = [longest_fs, step_fs].map(|fs| scene.dead_fs / fs);
+                Blindness::of_unequal(spads.law, longest, shortest)
+            }
+        };
         let mut steps = scene.steps(per_period, &class.extent);
         let as_in_even_light = self.options.sub_bins.is_some()
             || !spads.has_secondaries() && self.is_even_enough(scene, &blindness, class, &steps);
@@ -413,6 +477,34 @@ impl Cohort {
             steps,
             not_compared: class.not_compared,
         })
+    }
+
+    /// Two pulses that meet on a photon line leave no edge ([`photon_line`]). In one bin they cancel anyway; to either side of an
+    /// edge of a bin, which is all that is left out here, each bin loses a count.
+    ///
+    /// # Errors
+    /// Where that may put the mean of a bin off by more than [`CohortOptions::error`] of its counting noise: λ²·stage² of the laser
+    /// cycles at either edge, with λ photons on all SPADs, at most.
+    fn check_meetings(&self, scene: &Scene, stream: &StreamConfig) -> Result<(), EngineError> {
+        let stage_fs = self.law.timing().photon_line_stage.as_fs() as f64;
+        let spads = self.sensor.spads() as f64;
+        let cycles = f64::from(stream.laser_cycles);
+        for bin in 0..self.sensor.bins {
+            let [from_fs, until_fs] = [bin, bin + 1].map(|n| scene.from_fs + scene.edge_fs(n));
+            let meeting = [from_fs, until_fs].map(|edge_fs| {
+                let near = scene.light.most(edge_fs - stage_fs, 2.0 * stage_fs);
+                (0.5 * spads * near).powi(2)
+            });
+            let off = cycles * (meeting[0] + meeting[1]);
+            let photons = spads * scene.light.most(from_fs, until_fs - from_fs);
+            // Odd numbers of a Poisson variable.
+            let odd = -0.5 * libm::expm1(-2.0 * photons);
+            let noise = (cycles * odd * (1.0 - odd)).sqrt();
+            if off > self.options.error * noise + MEETINGS_THAT_DO_NOT_COUNT {
+                return Err(EngineError::NotInCohorts(NotModelled::Meetings { bin }));
+            }
+        }
+        Ok(())
     }
 
     /// Whether one SPAD makes an event, and more do, too.

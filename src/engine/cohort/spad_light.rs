@@ -301,11 +301,15 @@ impl SpadLight {
         let edge = |i: usize| from_fs + step_fs * i as f64;
         let lit_fs = &extent.lit_fs;
         let mut means: SmallVec<_> = smallvec![self.background(step_fs); count];
-        if lit_fs.start > from_fs || lit_fs.end < edge(count) || !self.is_steady() {
+        let is_steady = self.is_steady();
+        if lit_fs.start > from_fs || lit_fs.end < edge(count) || !is_steady {
             for (i, mean) in means.iter_mut().enumerate() {
                 let from = edge(i).max(lit_fs.start);
                 let until = edge(i + 1).min(lit_fs.end).max(from);
-                *mean = self.background_between(from, until, extent);
+                *mean = match is_steady {
+                    true => self.background(until - from),
+                    false => self.background_between(from, until, extent),
+                };
             }
         }
         for (number, echo) in self.sent(from_fs..edge(count), extent) {

@@ -1,6 +1,9 @@
 //! Every TYPE and mode, windows at both ends of a laser cycle, counters that overflow.
 
-use guided_dtof::chip::{EventType, Mode, Overflow, SensorConfig};
+use guided_dtof::chip::{
+    EventType, Exposure, Mode, Overflow, SensorConfig, WindowLaw, hslidar_delay_line,
+};
+use guided_dtof::engine::{Cohort, CohortOptions, EngineError, NotModelled, stream_config};
 use guided_dtof::photon::PixelLight;
 use guided_dtof::units::Time;
 
@@ -66,6 +69,50 @@ fn macropixels_of_other_sizes() {
         }
         .agrees();
     }
+}
+
+/// Bins of unequal lengths, of which an odd number of SPADs counts.
+#[test]
+fn delay_lines() {
+    let sensor = hslidar_delay_line();
+    let exposure = Exposure::new(&sensor, 140, 60);
+    let law = WindowLaw::new(&sensor, &exposure).of_macropixel(5);
+    for (start, signal, background_hz, neglect) in [
+        (20, 0.8, 8e6, 1.0),
+        (21, 0.8, 8e6, 0.0),
+        (77, 3.0, 60e6, 0.0),
+        (90, 5.0, 20e6, 1.0),
+        (1, 0.5, 100e6, 0.0),
+    ] {
+        let window = law.window(start).open().unwrap();
+        let light = PixelLight::echo(signal, law.time_of(&window, 3.3));
+        Case {
+            name: &format!("delay line, start value {start}, {signal} photons, {background_hz} Hz"),
+            sensor: (*sensor).clone(),
+            stop_periods: 140,
+            start,
+            light: light.with_background(background_hz),
+            options: options(neglect),
+            ..case()
+        }
+        .agrees();
+    }
+}
+
+/// Two pulses within an XOR's delay leave no edge, which is left out: where that shows, it is refused.
+#[test]
+fn light_in_which_pulses_meet_on_a_photon_line_is_refused() {
+    let sensor = hslidar_delay_line();
+    let exposure = Exposure::new(&sensor, 140, 16_000);
+    let cohort = Cohort::new(&sensor, &exposure, CohortOptions::default());
+    let stream = stream_config(&sensor, &exposure, 1, Time::from_ps(1_900));
+    let in_light = |hz| cohort.draw(&stream, 0, 40, &PixelLight::background(hz));
+    assert!(in_light(3e7).is_ok());
+    let refused = in_light(1e9).unwrap_err();
+    assert_eq!(
+        refused,
+        EngineError::NotInCohorts(NotModelled::Meetings { bin: 0 })
+    );
 }
 
 #[test]

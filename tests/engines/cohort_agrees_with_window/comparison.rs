@@ -124,6 +124,7 @@ impl Case<'_> {
         let window = Window::new(&self.sensor, &exposure);
         let cohort = Cohort::new(&self.sensor, &exposure, self.options);
         let expected = cohort
+            .of_macropixel(5)
             .expected(&self.stream(0), self.start, &self.light)
             .unwrap();
         let empty = Moments::new(&expected);
