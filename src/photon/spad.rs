@@ -161,7 +161,11 @@ impl SpadModel {
 /// is strictly later than the SPAD's last kept event plus `dead_time`. With a dead time of zero
 /// only exact coincidences on one SPAD are removed.
 pub fn apply_dead_time(events: &mut Vec<SpadEvent>, dead_time: Time) -> u64 {
-    let model = SpadModel::with_dead_time(dead_time);
+    let model = SpadModel {
+        // Events may be of any SPADs there are.
+        grid: SpadGrid::new(8, 8),
+        ..SpadModel::with_dead_time(dead_time)
+    };
     let photons: Vec<Photon> = events.iter().map(|&event| event.into()).collect();
     events.clear();
     Avalanches::in_the_dark(&model, [0; 2], 0).run_to_the_end(&photons, events)

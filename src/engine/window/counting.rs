@@ -165,7 +165,7 @@ impl<'a> Counting<'a> {
             codes: Codes::default(),
             scratch: Scratch::default(),
             first_code: [0; 2],
-            tables: Tables::default(),
+            tables: Tables::take(),
             together: Vec::new(),
             fired: [0; ROWS],
             photons: Vec::new(),
@@ -173,6 +173,11 @@ impl<'a> Counting<'a> {
             events: Vec::new(),
             tile: None,
         }
+    }
+
+    /// Keeps its tables for who counts next on this thread.
+    pub(super) fn finish(self) {
+        self.tables.keep();
     }
 
     /// Hits of every bin of a macropixel, and what they took. `parts` are those of its light ([`PhotonStream::parts`]).

@@ -282,6 +282,7 @@ impl Expose for Window {
             exposed.histograms.push(&self.counts(&hits));
             exposed.work += work;
         }
+        counting.finish();
         exposed.work.macropixels += pixels.len() as u64;
         exposed.work.clk_periods += pixels.len() as u64 * clk_periods;
         Ok(exposed)

@@ -225,8 +225,11 @@ impl Counting<'_> {
         let wanted_from = start + Time::from_fs(pixel.sight.first_fs - ROUNDING_FS);
         let until = start + Time::from_fs(pixel.sight.until_fs);
         let past = |part| (part, pixel.spans(part).past(self.stream, laser_cycle));
-        let mut pasts: SmallVec<[(&PixelStream<'_>, Past<'_>); 2]> =
-            pixel.parts.iter().map(past).collect();
+        let mut pasts: SmallVec<[(&PixelStream<'_>, Past<'_>); 2]> = SmallVec::new();
+        pasts.push(past(&pixel.parts[0]));
+        for part in &pixel.parts[1..] {
+            pasts.push(past(part));
+        }
         loop {
             // Photons that breed are known from earlier on.
             let known_from = pasts[0].1.known_from();
