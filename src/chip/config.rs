@@ -212,6 +212,8 @@ pub struct SensorConfig {
     pub stop_phase_ps: f64,
     /// Deserialiser clock, Hz (thesis 4.7: "a few hundred megahertz").
     pub load_clk_hz: f64,
+    /// Whether the sensor must be reset, and stand still, before windows are written (thesis 4.9.5, Table 11).
+    pub reset_to_load: bool,
     /// Pins through which histograms leave, each with a serialiser for its share of the columns, 1…256; no more are used than
     /// there are columns.
     pub readout_pins: usize,
@@ -379,5 +381,16 @@ impl SensorConfig {
     pub fn load_time(&self) -> Time {
         self.load_clock()
             .half_periods(2 * self.load_bits() as i64 + 1)
+    }
+
+    /// Time from one frame to the next one with windows of its own, of an exposure that ends `exposed` after it began: the load
+    /// goes on while the frame before is exposed and read out, and is hidden behind them, unless the sensor has to be reset for
+    /// it (thesis 4.9.5). Guide and ranging take none of it.
+    pub fn frame_time(&self, exposed: Time) -> Time {
+        let counted = exposed + self.readout_time();
+        match self.reset_to_load {
+            true => counted + self.load_time(),
+            false => counted.max(self.load_time()),
+        }
     }
 }

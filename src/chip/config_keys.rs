@@ -164,6 +164,13 @@ pub(super) const KEYS: &[Key] = &[
         "thesis 4.7, a few hundred megahertz",
     ),
     key(
+        "reset_to_load",
+        "",
+        Range::Switch,
+        "Whether the sensor must be reset, and stand still, before windows are written",
+        "thesis 4.9.5, Table 11: no, but HSLIDAR must",
+    ),
+    key(
         "readout_pins",
         "",
         whole(1, 256),

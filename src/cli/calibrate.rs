@@ -10,7 +10,7 @@ use crate::chip::{Sensor, SensorConfig, Tdc, WindowLaw};
 use crate::files::{InputError, OutputFile, read_text};
 use crate::ranging::BinProfile;
 use crate::report::Table;
-use crate::system::{Sweep, SweepError, calibrate};
+use crate::system::{Calibrated, Sweep, SweepError, calibrate};
 use crate::units::Time;
 
 /// Arguments of `gdtof calibrate`.
@@ -33,6 +33,9 @@ pub(super) struct CalibrateArgs {
     /// Detected photons of a macropixel in a laser cycle, on average.
     #[arg(long, value_name = "N", default_value_t = Sweep::default().photons_per_cycle)]
     photons_per_cycle: f64,
+    /// Sweep every window, not one even and one odd one, and take the mean; also says how far windows of a line differ.
+    #[arg(long)]
+    every_window: bool,
     /// Seed of the photons.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -67,31 +70,33 @@ pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
         laser_cycles: args.laser_cycles,
         photons_per_cycle: args.photons_per_cycle,
         seed: args.seed,
+        every_window: args.every_window,
         ..Sweep::default()
     };
     let progress = ProgressBar::new(config.pixels() as u64).with_style(
         ProgressStyle::with_template("sweeping {bar:40} {pos}/{len} macropixels, {eta} left")?,
     );
     let sensor = Sensor::from(&config);
-    let profile = calibrate(&sensor, args.stop_periods, &sweep, || progress.inc(1));
+    let found = calibrate(&sensor, args.stop_periods, &sweep, || progress.inc(1));
     progress.finish_and_clear();
-    let profile = match profile {
+    let found = match found {
         Err(why @ SweepError::NoWindow { .. }) => {
             let message = format!("{why}; give a longer laser cycle, or more counter_bits");
             return Err(InputError::new("--stop-periods", message).into());
         }
         Err(SweepError::Engine(why)) => return Err(why.into()),
-        Ok(profile) => profile,
+        Ok(found) => found,
     };
     OutputFile::write_with(&args.out, |out| {
-        serde_json::to_writer(&mut *out, &profile)?;
+        serde_json::to_writer(&mut *out, &found.profile)?;
         writeln!(out)
     })?;
-    say(table(&profile))?;
+    say(table(&found))?;
     Ok(())
 }
 
-fn table(profile: &BinProfile) -> Table {
+fn table(found: &Calibrated) -> Table {
+    let profile = &found.profile;
     let mut table = Table::new("Bins found");
     for (line, name) in ["even", "odd"].into_iter().enumerate() {
         let lengths = profile
@@ -104,7 +109,11 @@ fn table(profile: &BinProfile) -> Table {
         let variance = lengths.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / n;
         let bound = |f: fn(f64, f64) -> f64| lengths.iter().copied().reduce(f).unwrap_or(mean);
         let of = format!("{name} windows");
-        table.push(&of, format!("{} bins", lengths.len()));
+        let windows = match found.windows[line] {
+            1 => "1 window".to_owned(),
+            windows => format!("mean of {windows} windows"),
+        };
+        table.push(&of, format!("{} bins, {windows}", lengths.len()));
         table.push(
             format!("{of}, length"),
             format!("{mean:.1} ps, σ {:.1} ps", variance.sqrt()),
@@ -114,6 +123,11 @@ fn table(profile: &BinProfile) -> Table {
             format!("{of}, least and most"),
             format!("{least:.0} and {most:.0} ps"),
         );
+    }
+    if found.windows.iter().any(|&windows| windows > 1) {
+        let largest_ps = found.largest_difference.as_s() * 1e12;
+        let text = format!("{largest_ps:.0} ps at most, of a bin's middle from its mean");
+        table.push("windows of a line differ by", text);
     }
     table
 }

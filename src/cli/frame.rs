@@ -268,6 +268,7 @@ struct Report<'a> {
     load_time_s: f64,
     readout_time_s: f64,
     exposure_time_s: f64,
+    frame_time_s: f64,
     exposure_run_time_s: f64,
     run_time_s: f64,
     run_times: PhaseTimes,
@@ -314,6 +315,7 @@ impl<'a> Report<'a> {
             load_time_s: frame.load_time.as_s(),
             readout_time_s: frame.readout_time.as_s(),
             exposure_time_s: frame.exposure_time.as_s(),
+            frame_time_s: settings.sensor.frame_time(frame.exposure_time).as_s(),
             exposure_run_time_s: frame.times.exposure_s,
             run_time_s: frame.times.total_s(),
             run_times: frame.times,
@@ -416,6 +418,17 @@ fn table(
     );
     table.push("readout", frame.readout_time);
     table.push("exposure", frame.exposure_time);
+    let load = match settings.sensor.reset_to_load {
+        true => "windows are loaded between frames, after a reset",
+        false => "the load is hidden behind the frame before",
+    };
+    table.push(
+        "frame after frame",
+        format!(
+            "{}, {load}",
+            settings.sensor.frame_time(frame.exposure_time)
+        ),
+    );
     let left_over = Time::from_s(timing.slack_ps * 1e-12);
     let met = if timing.met { "met" } else { "FAILS" };
     table.push("timing, slack", format!("{met}, {left_over}"));

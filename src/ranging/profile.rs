@@ -47,7 +47,7 @@ pub struct OtherSensor {
 }
 
 /// Keys on which bins do not depend.
-const FREE: [&str; 10] = [
+const FREE: [&str; 13] = [
     "bin_bits",
     "overflow",
     "dead_time_ns",
@@ -58,6 +58,9 @@ const FREE: [&str; 10] = [
     "event_type",
     "threshold",
     "load_clk_hz",
+    "reset_to_load",
+    "readout_pins",
+    "read_clk_hz",
 ];
 
 impl BinProfile {

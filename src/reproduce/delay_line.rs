@@ -53,7 +53,9 @@ fn measured() -> &'static Measured {
     MEASURED.get_or_init(|| {
         let sensor = sensor();
         let calibrated = calibrate(&sensor, STOP_PERIODS, &Sweep::default(), || ());
-        let calibrated = calibrated.expect("the window engine follows delay lines");
+        let calibrated = calibrated
+            .expect("the window engine follows delay lines")
+            .profile;
         let exposure = Exposure::new(&sensor, STOP_PERIODS, LASER_CYCLES);
         let ideal = BinProfile::ideal(&sensor, &exposure);
         let arrival = Time::of_flight(PLANE_M);

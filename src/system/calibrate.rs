@@ -7,7 +7,8 @@
 //! ```
 //!
 //! Every step is an exposure of its own on the window engine, with photons of its own. One even and one odd window are swept: others
-//! differ from them by whole steps of CLK.
+//! differ from them by whole steps of CLK. [`Sweep::every_window`] sweeps all and takes the mean of what each finds, which is
+//! also the proof of that: [`Calibrated::largest_difference`] is of the order of a step.
 
 use rayon::prelude::*;
 
@@ -30,6 +31,19 @@ pub struct Sweep {
     pub photons_per_cycle: f64,
     /// Seed of the photons.
     pub seed: u64,
+    /// Whether every window is swept, or one even and one odd one.
+    pub every_window: bool,
+}
+
+/// What a sweep has found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Calibrated {
+    /// The bins of every macropixel: means over its even and over its odd windows that were swept.
+    pub profile: BinProfile,
+    /// Even and odd windows of a macropixel that were swept.
+    pub windows: [usize; 2],
+    /// How far the middle of a bin lay from the same bin's mean over all windows, at most.
+    pub largest_difference: Time,
 }
 
 impl Default for Sweep {
@@ -42,6 +56,7 @@ impl Default for Sweep {
             laser_cycles: 16,
             photons_per_cycle: 0.5,
             seed: 1,
+            every_window: false,
         }
     }
 }
@@ -59,26 +74,94 @@ pub fn calibrate(
     stop_periods: u32,
     sweep: &Sweep,
     swept: impl Fn() + Sync,
-) -> Result<BinProfile, SweepError> {
+) -> Result<Calibrated, SweepError> {
     assert_eq!(
         sensor.tdc,
         Tdc::DelayLine,
         "a clocked TDC has nothing to sweep"
     );
     let exposure = Exposure::new(sensor, stop_periods, sweep.laser_cycles);
-    let starts = [
-        first_seen(sensor, &exposure, 0)?,
-        first_seen(sensor, &exposure, 1)?,
-    ];
     let law = WindowLaw::new(sensor, &exposure);
-    let stream = PhotonStream::new(&stream_config(
+    let starts = [0, 1].map(|parity| {
+        let seen = seen(sensor, &exposure, parity);
+        let wanted = if sweep.every_window { usize::MAX } else { 1 };
+        seen.take(wanted).collect::<Vec<u16>>()
+    });
+    for (starts, is_odd) in starts.iter().zip([false, true]) {
+        if starts.is_empty() {
+            return Err(SweepError::NoWindow { is_odd });
+        }
+    }
+    let sweeping = Sweeping {
         sensor,
-        &exposure,
-        sweep.seed,
-        sweep.pulse_sigma,
-    ));
-    let line = |pixel: usize, start: u16| -> Result<LineProfile, SweepError> {
+        sweep,
+        exposure: &exposure,
+    };
+    // What is looked for is how far the windows of one line differ by anything but whole steps.
+    let line = |pixel: usize, starts: &[u16]| -> Result<(LineProfile, f64), SweepError> {
         let law = law.of_macropixel(pixel as u32);
+        let lines: Result<Vec<LineProfile>, SweepError> = (0..)
+            .zip(starts)
+            .map(|(nth, &start)| {
+                let mut line = sweeping.line(&law, pixel, start, nth)?;
+                let steps = i64::from(start - starts[0]) * sensor.step_periods as i64;
+                let later_s = exposure.clock.periods(steps).as_s();
+                line.middle_s
+                    .iter_mut()
+                    .for_each(|middle_s| *middle_s -= later_s);
+                Ok(line)
+            })
+            .collect();
+        Ok(mean(&lines?))
+    };
+    let macropixels: Result<Vec<_>, SweepError> = (0..sensor.pixels())
+        .into_par_iter()
+        .map(|pixel| {
+            let lines = [line(pixel, &starts[0])?, line(pixel, &starts[1])?];
+            swept();
+            Ok(lines)
+        })
+        .collect();
+    let mut largest_s = 0f64;
+    let macropixels = macropixels?.into_iter().map(|lines| {
+        lines.map(|(line, difference_s)| {
+            largest_s = largest_s.max(difference_s);
+            line
+        })
+    });
+    let macropixels = macropixels.collect();
+    Ok(Calibrated {
+        profile: BinProfile {
+            sensor: (**sensor).clone(),
+            starts: [starts[0][0], starts[1][0]],
+            macropixels,
+        },
+        windows: [starts[0].len(), starts[1].len()],
+        largest_difference: Time::from_s(largest_s),
+    })
+}
+
+/// What all sweeps of a sensor share.
+struct Sweeping<'a> {
+    sensor: &'a Sensor,
+    sweep: &'a Sweep,
+    exposure: &'a Exposure,
+}
+
+impl Sweeping<'_> {
+    /// The bins of one window of a macropixel, the `nth` of its kind that is swept.
+    fn line(
+        &self,
+        law: &WindowLaw,
+        pixel: usize,
+        start: u16,
+        nth: u64,
+    ) -> Result<LineProfile, SweepError> {
+        let Sweeping {
+            sensor,
+            sweep,
+            exposure,
+        } = *self;
         let window = law.window(start).settled().map_err(EngineError::from)?;
         let window = window.expect("it opens in the law of all");
         let seen = law.interval(&window);
@@ -97,26 +180,34 @@ pub fn calibrate(
                 light: Some(PixelLight::echo(sweep.photons_per_cycle, delay)),
             })
             .collect();
-        let counts = Window::of_one(law).expose(&stream, &lit)?.histograms;
-        Ok(profile(
-            &counts.iter().collect::<Vec<_>>(),
-            &delays,
-            sweep.step,
-        ))
+        let seed = sweep.seed.wrapping_add(nth);
+        let stream = stream_config(sensor, exposure, seed, sweep.pulse_sigma);
+        let stream = PhotonStream::new(&stream);
+        let counts = Window::of_one(law.clone())
+            .expose(&stream, &lit)?
+            .histograms;
+        let counts: Vec<&[u16]> = counts.iter().collect();
+        Ok(profile(&counts, &delays, sweep.step))
+    }
+}
+
+/// The mean of several profiles of one line, and how far a middle of theirs is from its mean at most, s.
+fn mean(lines: &[LineProfile]) -> (LineProfile, f64) {
+    let of = |values: fn(&LineProfile) -> &[f64]| -> Vec<f64> {
+        let bins = values(&lines[0]).len();
+        let sum = |bin: usize| lines.iter().map(|line| values(line)[bin]).sum::<f64>();
+        (0..bins).map(|bin| sum(bin) / lines.len() as f64).collect()
     };
-    let macropixels: Result<Vec<[LineProfile; 2]>, SweepError> = (0..sensor.pixels())
-        .into_par_iter()
-        .map(|pixel| {
-            let lines = [line(pixel, starts[0])?, line(pixel, starts[1])?];
-            swept();
-            Ok(lines)
-        })
-        .collect();
-    Ok(BinProfile {
-        sensor: (**sensor).clone(),
-        starts,
-        macropixels: macropixels?,
-    })
+    let mean = LineProfile {
+        middle_s: of(|line| &line.middle_s),
+        length_s: of(|line| &line.length_s),
+    };
+    let differences = lines.iter().flat_map(|line| {
+        let pairs = line.middle_s.iter().zip(&mean.middle_s);
+        pairs.map(|(one, mean)| (one - mean).abs())
+    });
+    let largest_s = differences.fold(0.0, f64::max);
+    (mean, largest_s)
 }
 
 /// Why bins cannot be swept.
@@ -136,17 +227,20 @@ pub enum SweepError {
     },
 }
 
-/// The first even (`parity` 0) or odd (1) start value whose window lies after the laser's trigger, by half a line for mismatch.
-fn first_seen(sensor: &Sensor, exposure: &Exposure, parity: u16) -> Result<u16, SweepError> {
+/// The even (`parity` 0) or odd (1) start values whose windows lie within the laser cycle and after the laser's trigger, by half a
+/// line for mismatch.
+fn seen(sensor: &Sensor, exposure: &Exposure, parity: u16) -> impl Iterator<Item = u16> {
     let law = WindowLaw::new(sensor.alike(), exposure);
     let half = Time::from_fs(sensor.longest_delay_line().as_fs() / 4);
-    let is_seen = |start: &u16| {
-        let window = law.window(*start).open();
-        window.is_some_and(|window| law.interval(&window).start > half)
-    };
-    let mut starts = (parity..=sensor.largest_start()).step_by(2);
-    let is_odd = parity == 1;
-    starts.find(is_seen).ok_or(SweepError::NoWindow { is_odd })
+    let end = exposure.stop(1) - exposure.stop(0) - half;
+    let starts = (parity..=sensor.largest_start()).step_by(2);
+    starts.filter(move |&start| {
+        let window = law.window(start).open();
+        window.is_some_and(|window| {
+            let seen = law.interval(&window);
+            seen.start > half && seen.end < end
+        })
+    })
 }
 
 /// Middle and length of every bin from the steps at which it is the fullest.

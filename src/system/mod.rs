@@ -16,7 +16,7 @@ mod summary;
 mod taken;
 mod tolerance;
 
-pub use calibrate::{Sweep, SweepError, calibrate};
+pub use calibrate::{Calibrated, Sweep, SweepError, calibrate};
 pub use distance::DistanceLaw;
 pub use frame::{
     EngineKind, FrameError, FrameSettings, Probe, take_frame, take_frame_by, take_guided_frame,

@@ -36,6 +36,18 @@ fn a_calibration_makes_depths_better_and_belongs_to_its_sensor() {
     assert!(swept.status.success());
     let table = String::from_utf8(swept.stdout).unwrap();
     assert!(table.contains("1024 bins"), "{table}");
+    // Windows of a line are whole steps of CLK apart: what differs is where the laser's steps and photons fell.
+    let every =
+        "calibrate --sensor hslidar_delay_line --rows 1 --cols 2 --every-window --out e.json";
+    let swept = gdtof(folder, every);
+    let table = String::from_utf8(swept.stdout).unwrap();
+    let line = table.lines().find(|line| line.contains("differ by"));
+    let before_unit = line.and_then(|line| line.split(" ps").next()).unwrap();
+    let largest_ps: f64 = before_unit.rsplit(' ').next().unwrap().parse().unwrap();
+    assert!(
+        table.contains("16 bins, mean of") && (1.0..60.0).contains(&largest_ps),
+        "{table}"
+    );
     let without = median_error_m(&gdtof(folder, &format!("frame {SENSOR} {FRAME}")));
     let calibrated = format!("frame {SENSOR} {FRAME} --calibration c.json");
     let with = median_error_m(&gdtof(folder, &calibrated));
@@ -86,8 +98,8 @@ fn what_cannot_be_calibrated_is_refused() {
             "text.json:1: this is no bin profile",
         ),
         (
-            "frame --sensor hslidar_delay_line --stop-periods 140 --engine cohort",
-            "use --engine window or gate",
+            "frame --sensor hslidar_delay_line --stop-periods 140 --engine cycle",
+            "use --engine window, cohort or gate",
         ),
         (
             "timing --sensor hslidar_delay_line",

@@ -21,6 +21,7 @@ pub fn hslidar() -> Sensor {
         counter_bits: 7,
         p_counter: PCounter::SetReset,
         step_periods: 4,
+        reset_to_load: true,
         bins: 8,
         bin_bits: 12,
         clk_hz: 200e6,

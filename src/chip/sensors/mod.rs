@@ -158,6 +158,7 @@ impl From<&Sensor> for Sensor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::Time;
 
     #[test]
     fn copies_share_their_delays_and_other_silicon_has_others() {
@@ -177,6 +178,24 @@ mod tests {
             assert_eq!(Sensor::named(name), Some(chip()));
         }
         assert!(Sensor::named("other").is_none());
+    }
+
+    /// Thesis 4.9.5 and Table 11.
+    #[test]
+    fn a_load_costs_frame_time_where_the_sensor_is_reset_for_it() {
+        let exposed = Time::from_ns(1_000_000);
+        for (sensor, is_reset) in [(quantic4x4(), false), (hslidar(), true)] {
+            let counted = exposed + sensor.readout_time();
+            let load = sensor.frame_time(exposed) - counted;
+            let wanted = if is_reset {
+                sensor.load_time()
+            } else {
+                Time::ZERO
+            };
+            assert_eq!(load, wanted);
+            // Without an exposure to hide behind, the load is what a frame waits for.
+            assert!(sensor.frame_time(Time::ZERO) >= sensor.load_time());
+        }
     }
 
     #[test]

@@ -37,6 +37,7 @@ impl Default for SensorConfig {
             clk_hz: 384e6,
             stop_phase_ps: 0.0,
             load_clk_hz: 200e6,
+            reset_to_load: false,
             readout_pins: 8,
             read_clk_hz: 200e6,
             dead_time_ns: 8.0,
