@@ -1,5 +1,6 @@
 //! `gdtof frame`: the main job.
 
+mod pair;
 mod quality;
 
 use std::path::{Path, PathBuf};
@@ -8,6 +9,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use self::pair::PairReport;
 use super::guiding::GuideArgs;
 use super::{SceneArgs, say, wording};
 use crate::analysis::{TimingVerdict, VerdictReport};
@@ -32,6 +34,8 @@ use crate::waves::WaveFormat;
 pub(super) struct FrameArgs {
     #[command(flatten)]
     scene: SceneArgs,
+    #[command(flatten)]
+    pair: pair::PairArgs,
     #[command(flatten)]
     guiding: GuideArgs,
     /// Folder for the results; it is made if need be.
@@ -90,7 +94,13 @@ pub(super) struct FrameArgs {
 /// Bad input, unwritable output, and what [`take_frame`] reports.
 pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     let (sensor, scene) = args.scene.read()?;
-    let (guide, policy) = args.guiding.read(WindowPolicy::default())?;
+    let pair = args.pair.take(&sensor, scene.clone(), &args.out)?;
+    let scene = pair.as_ref().map_or(scene, |pair| pair.scene.clone());
+    let (named, policy) = args.guiding.read(WindowPolicy::default())?;
+    let guide = match &pair {
+        Some(pair) if args.guiding.guides().is_empty() => pair.guide.clone(),
+        _ => named,
+    };
     let wanted = (args.stop_periods, args.seed);
     let (sensor, stop_periods) =
         args.guiding
@@ -161,15 +171,26 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
         |macropixels| progress.inc(macropixels as u64),
     )?;
 
-    let report = Report::new(args, &settings, &timing, &frame);
+    let pair_report = pair.as_ref().map(|pair| &pair.report);
+    let report = Report::new(args, &settings, &timing, &frame, pair_report);
     write_results(results.staging(), &frame, &report)?;
+    if let Some(pair) = &pair {
+        pair.write(results.staging())?;
+    }
     for sentence in results.commit("frame", &report.configuration)? {
         eprintln!("gdtof: {sentence}");
     }
     if args.json {
         say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
     } else {
-        say(table(args, &settings, &timing, &frame))?;
+        let mut table = table(args, &settings, &timing, &frame);
+        if let Some(pair) = pair_report {
+            pair.rows(&mut table);
+        }
+        say(table)?;
+        if let Some(note) = pair_report.and_then(PairReport::note) {
+            say(format_args!("\n{note}\n"))?;
+        }
         if let Some(remark) = &frame.remark {
             say(format_args!("\n{remark}\n"))?;
         }
@@ -191,6 +212,11 @@ fn wave_cycles(text: &str) -> Result<WaveCycles, String> {
             .map(WaveCycles::First)
             .map_err(|_| "give a number of laser cycles, or all".to_owned()),
     }
+}
+
+/// What reports call the scene.
+fn scene_name(args: &FrameArgs) -> String {
+    (args.pair.name()).unwrap_or_else(|| args.scene.scene_name())
 }
 
 /// File name of a probe's waveform.
@@ -272,6 +298,8 @@ struct Report<'a> {
     exposure_run_time_s: f64,
     run_time_s: f64,
     run_times: PhaseTimes,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pair: Option<&'a PairReport>,
     probes: &'a [(usize, usize)],
     histograms_shape: [usize; 3],
     macropixels: &'a [PixelDepth],
@@ -283,11 +311,12 @@ impl<'a> Report<'a> {
         settings: &'a FrameSettings,
         timing: &'a VerdictReport,
         frame: &'a Frame,
+        pair: Option<&'a PairReport>,
     ) -> Self {
         Report {
             version: env!("CARGO_PKG_VERSION"),
             configuration: Configuration {
-                scene_name: args.scene.scene_name(),
+                scene_name: scene_name(args),
                 scene: &settings.scene,
                 sensor: &settings.sensor,
                 stop_periods: settings.exposure.stop_periods,
@@ -319,6 +348,7 @@ impl<'a> Report<'a> {
             exposure_run_time_s: frame.times.exposure_s,
             run_time_s: frame.times.total_s(),
             run_times: frame.times,
+            pair,
             probes: &frame.probes,
             histograms_shape: [frame.rows, frame.cols, frame.bins],
             macropixels: &frame.pixels,
@@ -345,7 +375,7 @@ fn table(
 ) -> Table {
     let summary = frame.summary();
     let of = |part: usize, whole: usize| format!("{part} of {whole}");
-    let mut table = Table::new(format!("Frame of {}", args.scene.scene_name()))
+    let mut table = Table::new(format!("Frame of {}", scene_name(args)))
         .row(
             "macropixels that see a surface",
             of(summary.with_target, summary.pixels),

@@ -167,7 +167,7 @@ pub(super) fn read_image(path: &Path) -> Result<GreyImage, InputError> {
 
 /// Errors of disparities against the truth, where that is known.
 #[derive(Debug, Serialize)]
-struct Errors {
+pub(super) struct Errors {
     /// Pixels whose truth is known.
     known: usize,
     /// Share of these that have a disparity, per cent.
@@ -183,7 +183,7 @@ struct Errors {
 }
 
 impl Errors {
-    fn of(map: &DisparityMap, truth: &[f32]) -> Self {
+    pub(super) fn of(map: &DisparityMap, truth: &[f32]) -> Self {
         let known = || {
             truth
                 .iter()
@@ -207,6 +207,23 @@ impl Errors {
             rms_px: (squares / valid.max(1) as f64).sqrt(),
             median_px: off_px.get(valid / 2).copied().unwrap_or(f64::NAN),
         }
+    }
+
+    /// Adds them to a table.
+    pub(super) fn rows(&self, table: &mut Table) {
+        let percent = |value: f64| format!("{value:.2} %");
+        table.push("true disparity known", self.known);
+        table.push("  of these matched", percent(self.valid_percent));
+        table.push(
+            "  more than 2 px off, of those matched",
+            percent(self.bad_2px_percent),
+        );
+        table.push(
+            "  more than 2 px off or not matched",
+            percent(self.bad_2px_or_invalid_percent),
+        );
+        table.push("  RMS error", format!("{:.3} px", self.rms_px));
+        table.push("  median error", format!("{:.3} px", self.median_px));
     }
 }
 
@@ -265,7 +282,7 @@ pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
         &shape,
         map.values_px(),
     )?;
-    picture(&matcher, &map).write_png(&set.staging().join("disparity.png"))?;
+    disparity_picture(&matcher, &map, &set.staging().join("disparity.png"))?;
     OutputFile::write_with(&set.staging().join("stereo.json"), |w| {
         serde_json::to_writer_pretty(&mut *w, &report)?;
         writeln!(w)
@@ -280,7 +297,7 @@ pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn read_truth(path: &Path, left: &GreyImage) -> Result<Vec<f32>, InputError> {
+pub(super) fn read_truth(path: &Path, left: &GreyImage) -> Result<Vec<f32>, InputError> {
     let truth = Raster::read(path)?;
     if (truth.width, truth.height) == (left.width(), left.height()) {
         return Ok(truth.values);
@@ -296,54 +313,40 @@ fn read_truth(path: &Path, left: &GreyImage) -> Result<Vec<f32>, InputError> {
 }
 
 /// Draws disparities; near is yellow as in pictures of depth.
-struct Drawn {
-    cells: Vec<Cell>,
-    cols: usize,
-    ends_px: (f32, f32),
-}
-
-fn picture(matcher: &Matcher, map: &DisparityMap) -> Drawn {
+///
+/// # Errors
+/// When the file cannot be written.
+pub(super) fn disparity_picture(
+    matcher: &Matcher,
+    map: &DisparityMap,
+    path: &Path,
+) -> Result<(), InputError> {
     let cells: Vec<Cell> = (map.values_px().iter())
-        .map(|&d| {
-            if d.is_nan() {
-                Cell::Category(0)
-            } else {
-                Cell::Depth(d)
-            }
+        .map(|&d| match d.is_nan() {
+            true => Cell::Category(0),
+            false => Cell::Depth(d),
         })
         .collect();
     let known = || map.values_px().iter().copied().filter(|d| !d.is_nan());
     let least = known().fold(f32::INFINITY, f32::min).floor();
     let most = known().fold(f32::NEG_INFINITY, f32::max).ceil();
     let first = matcher.min_disparity as f32;
-    let ends_px = match least < most {
-        true => (most, least),
-        false => (first + matcher.disparities as f32, first),
-    };
-    Drawn {
-        cells,
+    let picture = DepthMap {
+        title: "Disparity",
         cols: map.width(),
-        ends_px,
-    }
-}
-
-impl Drawn {
-    fn write_png(&self, path: &Path) -> Result<(), InputError> {
-        let map = DepthMap {
-            title: "Disparity",
-            cols: self.cols,
-            cells: &self.cells,
-            range_m: self.ends_px,
-            unit: "px",
-            categories: &["none"],
-            scale: (512 / self.cols).max(1),
-        };
-        map.write_png(path)
-    }
+        cells: &cells,
+        range_m: match least < most {
+            true => (most, least),
+            false => (first + matcher.disparities as f32, first),
+        },
+        unit: "px",
+        categories: &["none"],
+        scale: (512 / map.width()).max(1),
+    };
+    picture.write_png(path)
 }
 
 fn table(args: &StereoArgs, report: &Report) -> Table {
-    let percent = |value: f64| format!("{value:.2} %");
     let pixels = report.width * report.height;
     let mut table = Table::new(format!(
         "{} and {}, {} disparities, {} paths",
@@ -354,18 +357,7 @@ fn table(args: &StereoArgs, report: &Report) -> Table {
     ))
     .row("matched", format!("{} of {pixels}", report.matched));
     if let Some(errors) = &report.errors {
-        table.push("truth known", errors.known);
-        table.push("  of these matched", percent(errors.valid_percent));
-        table.push(
-            "  more than 2 px off, of those matched",
-            percent(errors.bad_2px_percent),
-        );
-        table.push(
-            "  more than 2 px off or not matched",
-            percent(errors.bad_2px_or_invalid_percent),
-        );
-        table.push("  RMS error", format!("{:.3} px", errors.rms_px));
-        table.push("  median error", format!("{:.3} px", errors.median_px));
+        errors.rows(&mut table);
     }
     let [least, middle] = report.run_time_s.map(|s| format!("{:.1} ms", 1e3 * s));
     let threads = report.threads;

@@ -57,16 +57,16 @@ pub(super) fn of_rig(scene: &Scene, rows: u32, cols: u32, seed: u64) -> GuideMap
 }
 
 /// Maps points onto a `rows` × `cols` array; `sigma_m` gives the standard deviation of a depth, m.
-pub(super) fn of_points(
+pub(super) fn of_points<'p>(
     scene: &Scene,
     rows: u32,
     cols: u32,
-    points: Vec<StereoPoint>,
+    points: impl IntoIterator<Item = &'p StereoPoint>,
     sigma_m: impl Fn(f64) -> f64,
 ) -> GuideMap {
     let lidar = scene.lidar_camera(rows, cols);
     let landings =
-        (points.iter()).filter_map(|point| land(scene, &lidar, point, sigma_m(point.depth_m)));
+        (points.into_iter()).filter_map(|point| land(scene, &lidar, point, sigma_m(point.depth_m)));
     nearest_to_centres(rows, cols, landings)
 }
 

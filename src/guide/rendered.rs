@@ -186,7 +186,7 @@ impl Guide for MatchedStereo {
             input.scene,
             input.rows,
             input.cols,
-            self.points(input),
+            &self.points(input),
             sigma_m,
         ))
     }

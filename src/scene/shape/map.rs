@@ -65,6 +65,14 @@ impl DepthMap {
     /// reflectivities that are no shares.
     pub fn read(files: MapFiles) -> Result<Self, InputError> {
         let depth = Raster::read(&files.depth)?;
+        Self::of(files, depth)
+    }
+
+    /// A map whose depths are at hand; `files` says where they will stand, and which others are to be read.
+    ///
+    /// # Errors
+    /// As [`DepthMap::read`].
+    pub fn of(files: MapFiles, depth: Raster) -> Result<Self, InputError> {
         let (width, height) = (depth.width, depth.height);
         let complaint = |path: &Path, message: String| InputError::new(path.display(), message);
         let complain = |message: String| Err(complaint(&files.depth, message));

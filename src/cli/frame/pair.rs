@@ -1,0 +1,303 @@
+//! `gdtof frame --left L.png --right R.png --calib C.toml [--truth D.npy]`: a real camera pair instead of a scene.
+//!
+//! ```text
+//!  left ──┬─► semi-global matching ──► disparities ──► the guide
+//!  right ─┘                               │ (no truth)
+//!  truth ─────────────────────────────────┴─► depths ──┐
+//!  left ─────────────────────────────► reflectivities ─┴─► the scene that sends light back
+//! ```
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use clap::Args;
+use glam::DMat3;
+use serde::Serialize;
+
+use crate::chip::SensorConfig;
+use crate::cli::stereo::{Errors, cannot_match, disparity_picture, read_image, read_truth};
+use crate::files::{InputError, Raster, parse_toml, read_text};
+use crate::guide::{Guide, GuideInput, MatchedPair};
+use crate::report::{Table, write_npy_f32};
+use crate::scene::{DVec3, DepthMap, GroundTruth, MapFiles, Object, PinholeCamera, Scene, Shape};
+use crate::stereo::{DisparityMap, Matcher};
+
+/// Standard deviation that is claimed for a disparity, px: half of all errors on the Motorcycle pair are below 0.15 px, as with 0.22 px, and tails are
+/// longer than a Gaussian's.
+const SIGMA_PX: f64 = 0.25;
+
+const DEPTH_FILE: &str = "depth_map.npy";
+
+/// A pair of pictures.
+#[derive(Args)]
+pub(super) struct PairArgs {
+    /// Left picture of a real, rectified camera pair that stands in for the scene (PNG); with --right and --calib.
+    #[arg(long, value_name = "FILE", requires_all = ["right", "calib"], conflicts_with = "scene")]
+    left: Option<PathBuf>,
+    /// Its right picture.
+    #[arg(long, value_name = "FILE", requires = "left")]
+    right: Option<PathBuf>,
+    /// Its calibration (TOML): left and right (3x3 intrinsics, px), baseline_m; also disparities, min_disparity,
+    /// lidar_position_m (from the left camera) and lidar_fov_deg.
+    #[arg(long, value_name = "FILE", requires = "left")]
+    calib: Option<PathBuf>,
+    /// True disparities of the left picture (.npy, px), from which the light comes; without it, it comes from the pair's own depths.
+    #[arg(long, value_name = "FILE", requires = "left")]
+    truth: Option<PathBuf>,
+}
+
+/// What a calibration file holds.
+#[derive(Debug, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Calibration {
+    left: [[f64; 3]; 3],
+    right: Option<[[f64; 3]; 3]>,
+    baseline_m: f64,
+    disparities: Option<usize>,
+    min_disparity: Option<i32>,
+    lidar_position_m: Option<DVec3>,
+    lidar_fov_deg: Option<f64>,
+}
+
+/// Focal length and principal point, px.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Intrinsics {
+    focal_px: f64,
+    principal_px: (f64, f64),
+}
+
+/// The pair in place of a scene.
+pub(super) struct Taken {
+    pub(super) scene: Scene,
+    pub(super) guide: Arc<dyn Guide>,
+    pub(super) report: PairReport,
+    map: DisparityMap,
+    depths_m: Vec<f32>,
+    matcher: Matcher,
+}
+
+/// What a report says of the pair.
+#[derive(Debug, Serialize)]
+pub(super) struct PairReport {
+    left: String,
+    right: String,
+    light_from: &'static str,
+    matched: usize,
+    disparity_errors: Option<Errors>,
+}
+
+impl PairArgs {
+    /// What the scene is called; `None` where there is no pair.
+    pub(super) fn name(&self) -> Option<String> {
+        Some(format!(
+            "{} and {}",
+            self.left.as_ref()?.display(),
+            self.right.as_ref()?.display()
+        ))
+    }
+
+    /// Reads and matches the pair. `optics` is the scene whose lidar, light and air stay.
+    ///
+    /// # Errors
+    /// Files that cannot be read or are none of a pair; a calibration that cannot be, or that leads nowhere.
+    pub(super) fn take(
+        &self,
+        sensor: &SensorConfig,
+        optics: Scene,
+        out: &Path,
+    ) -> Result<Option<Taken>, InputError> {
+        let (Some(left_path), Some(right_path), Some(calib_path)) =
+            (&self.left, &self.right, &self.calib)
+        else {
+            return Ok(None);
+        };
+        let complain = |message: String| InputError::new(calib_path.display(), message);
+        let calibration: Calibration = parse_toml(calib_path.display(), &read_text(calib_path)?)?;
+        let own = intrinsics("left", calibration.left).map_err(complain)?;
+        let other = match calibration.right {
+            Some(right) => intrinsics("right", right).map_err(complain)?,
+            None => own,
+        };
+        check(&calibration, own, other).map_err(complain)?;
+        let (left, right) = (read_image(left_path)?, read_image(right_path)?);
+        let default = Matcher::default();
+        let matcher = Matcher {
+            disparities: calibration.disparities.unwrap_or(default.disparities),
+            min_disparity: calibration.min_disparity.unwrap_or(default.min_disparity),
+            ..default
+        };
+        let map = (matcher.match_pair(&left, &right))
+            .map_err(|error| cannot_match(left_path, right_path, &error))?;
+        let truth = match &self.truth {
+            Some(path) => Some(read_truth(path, &left)?),
+            None => None,
+        };
+
+        let mut camera =
+            PinholeCamera::centred(own.focal_px, left.width() as u32, left.height() as u32);
+        camera.centre = own.principal_px;
+        let offset_px = other.principal_px.0 - own.principal_px.0;
+        let baseline_m = calibration.baseline_m;
+        let depth_m = |&disparity_px: &f32| {
+            let depth_m = own.focal_px * baseline_m / (f64::from(disparity_px) + offset_px);
+            // Infinite disparities are what Middlebury writes for unknown ones.
+            if disparity_px.is_finite() && depth_m > 0.0 && depth_m.is_finite() {
+                depth_m as f32
+            } else {
+                0.0
+            }
+        };
+        let light = truth.as_deref().unwrap_or(map.values_px());
+        let depths_m: Vec<f32> = light.iter().map(depth_m).collect();
+        if depths_m.iter().all(|&z| z == 0.0) {
+            let place = self.truth.as_ref().unwrap_or(left_path);
+            let message = "no pixel has a depth by this calibration; check disparities, baseline_m and principal points";
+            return Err(InputError::new(place.display(), message));
+        }
+        let raster = Raster {
+            width: left.width(),
+            height: left.height(),
+            values: depths_m.clone(),
+            white: 1.0,
+        };
+        let files = MapFiles {
+            depth: out.join(DEPTH_FILE),
+            reflectivity: Some(left_path.clone()),
+            grey: None,
+            unit_m: Some(1.0),
+            is_range: false,
+            focal_px: own.focal_px,
+            principal_px: Some(own.principal_px),
+        };
+        let from_camera_m = calibration.lidar_position_m.unwrap_or(DVec3::ZERO);
+        let shape = Shape::Map {
+            centre_m: -from_camera_m,
+            yaw_deg: 0.0,
+            map: Arc::new(DepthMap::of(files, raster)?),
+        };
+        let mut scene = optics;
+        scene.objects = vec![Object::new("pair", 1.0, shape)];
+        scene.stereo.position_m = -from_camera_m;
+        let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
+        scene.lidar.fov_deg = (calibration.lidar_fov_deg)
+            .unwrap_or_else(|| fov_deg(own.focal_px, (left.width(), left.height()), (rows, cols)));
+        scene.validate(&calib_path.display().to_string())?;
+
+        let guide = MatchedPair::new(&map, &camera, baseline_m, offset_px, SIGMA_PX);
+        let input = GuideInput::still(&scene, rows, cols, 0);
+        let guided = guide.estimate(&input).map_or(0, |map| map.guided());
+        let seen = GroundTruth::render(&scene, rows, cols);
+        if seen.range_m.iter().flatten().count() == 0 || (guided == 0 && guide.points() > 0) {
+            return Err(complain(
+                "this calibration puts every pixel of the pair outside of the lidar's view; check principal points, lidar_position_m and lidar_fov_deg".into(),
+            ));
+        }
+        let report = PairReport {
+            left: left_path.display().to_string(),
+            right: right_path.display().to_string(),
+            light_from: match truth {
+                Some(_) => "the truth",
+                None => "the pair's own depths",
+            },
+            matched: map.matched(),
+            disparity_errors: truth.map(|truth| Errors::of(&map, &truth)),
+        };
+        Ok(Some(Taken {
+            scene,
+            guide: Arc::new(guide),
+            report,
+            map,
+            depths_m,
+            matcher,
+        }))
+    }
+}
+
+impl Taken {
+    /// Writes depths that light comes from, and disparities that guide.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub(super) fn write(&self, out: &Path) -> Result<(), InputError> {
+        let shape = [self.map.height() as u64, self.map.width() as u64];
+        write_npy_f32(&out.join(DEPTH_FILE), &shape, &self.depths_m)?;
+        write_npy_f32(&out.join("disparity.npy"), &shape, self.map.values_px())?;
+        disparity_picture(&self.matcher, &self.map, &out.join("disparity.png"))
+    }
+}
+
+impl PairReport {
+    /// Adds what there is to say to a frame's table.
+    pub(super) fn rows(&self, table: &mut Table) {
+        table.push("light from", self.light_from);
+        table.push("pixels matched", self.matched);
+        if let Some(errors) = &self.disparity_errors {
+            errors.rows(table);
+        }
+    }
+
+    /// What must be known to read the errors.
+    pub(super) fn note(&self) -> Option<&'static str> {
+        self.disparity_errors.is_none().then_some(
+            "Light comes from the depths that the pair itself has matched: errors of the guide are in both and are not seen. --truth gives other light.",
+        )
+    }
+}
+
+fn intrinsics(name: &str, matrix: [[f64; 3]; 3]) -> Result<Intrinsics, String> {
+    let columns = DMat3::from_cols_array_2d(&matrix);
+    let [[fx, skew, u], [zero, fy, v], last] = matrix;
+    if !matrix.iter().flatten().all(|x| x.is_finite()) || columns.determinant().abs() < 1e-9 {
+        return Err(format!(
+            "the {name} intrinsics {matrix:?} are singular; give [[f, 0, u], [0, f, v], [0, 0, 1]] in pixels"
+        ));
+    }
+    let plain = fx > 0.0 && skew == 0.0 && zero == 0.0 && last == [0.0, 0.0, 1.0];
+    if !plain || (fy / fx - 1.0).abs() > 0.01 {
+        return Err(format!(
+            "the {name} intrinsics {matrix:?} are none of a rectified camera with square pixels; give [[f, 0, u], [0, f, v], [0, 0, 1]]"
+        ));
+    }
+    Ok(Intrinsics {
+        focal_px: fx,
+        principal_px: (u, v),
+    })
+}
+
+fn check(calibration: &Calibration, left: Intrinsics, right: Intrinsics) -> Result<(), String> {
+    if !(calibration.baseline_m > 0.0 && calibration.baseline_m <= 1e3) {
+        let baseline_m = calibration.baseline_m;
+        return Err(format!(
+            "baseline_m = {baseline_m} is impossible; give metres above 0, up to 1000"
+        ));
+    }
+    if (right.focal_px / left.focal_px - 1.0).abs() > 1e-3 {
+        return Err(
+            "focal lengths differ by more than a thousandth; give those of the rectified pair"
+                .into(),
+        );
+    }
+    if (right.principal_px.1 - left.principal_px.1).abs() > 1.0 {
+        return Err("principal points are not in one row; give those of the rectified pair".into());
+    }
+    let place = calibration.lidar_position_m.unwrap_or(DVec3::ZERO);
+    if !(place.is_finite() && place.length() <= 1e3) {
+        return Err(format!(
+            "lidar_position_m = {place} is impossible; give metres, up to 1000"
+        ));
+    }
+    match calibration.lidar_fov_deg {
+        Some(fov) if !(fov > 0.0 && fov < 180.0) => Err(format!(
+            "lidar_fov_deg = {fov} is impossible; give degrees above 0, below 180"
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// The field of view of an array of square macropixels that just fits into a picture.
+fn fov_deg(focal_px: f64, (width, height): (usize, usize), (rows, cols): (u32, u32)) -> f64 {
+    let across = (width as f64 / f64::from(cols)).min(height as f64 / f64::from(rows));
+    2.0 * (0.5 * across * f64::from(cols) / focal_px)
+        .atan()
+        .to_degrees()
+}
