@@ -1,5 +1,6 @@
 //! The `gdtof` command as its users meet it.
 
+mod a_real_pair_is_matched;
 mod command_line_refuses_bad_input;
 mod delay_files_replay;
 mod delay_lines_are_calibrated;

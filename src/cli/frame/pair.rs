@@ -181,7 +181,6 @@ impl PairArgs {
         let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
         scene.lidar.fov_deg = (calibration.lidar_fov_deg)
             .unwrap_or_else(|| fov_deg(own.focal_px, (left.width(), left.height()), (rows, cols)));
-        scene.validate(&calib_path.display().to_string())?;
 
         let guide = MatchedPair::new(&map, &camera, baseline_m, offset_px, SIGMA_PX);
         let input = GuideInput::still(&scene, rows, cols, 0);
