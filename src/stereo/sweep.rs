@@ -26,8 +26,8 @@ use super::path::{add, slot, step};
 use super::settings::{Matcher, NO_PARTNER, Workspace};
 use super::winner::Winners;
 
-/// Rows at once: costs and sums of four rows of 741 pixels and 64 disparities take 0.6 MB of a second-level cache of 1 MB. Two or eight rows
-/// take 3 % longer.
+/// Rows at once: costs and sums of four rows of 741 pixels and 64 disparities take 0.6 MB of a second-level cache of 1 MB
+/// (chosen by that).
 const ROWS_AT_ONCE: usize = 4;
 
 /// Lanes for so many disparities: what vectors take whole.
