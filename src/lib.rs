@@ -25,7 +25,8 @@
 //! | [`theory`] | detection probability, precision, partial histograms, design, significance |
 //! | [`ranging`] | depth from histograms |
 //! | [`report`] | pictures, arrays, tables |
-//! | [`system`] | one guided frame, end to end |
+//! | [`system`] | one guided frame, end to end, and drives of many |
+//! | `demo` | the demonstrator of the thesis before its scenes |
 //! | [`reproduce`] | the thesis's figures, published beside computed |
 //! | [`testbenches`] | the chip's blocks driven and checked at gate level, with waveforms |
 //! | [`cli`] | the `gdtof` command |
@@ -34,6 +35,7 @@ pub mod analysis;
 pub mod bench;
 pub mod chip;
 pub mod cli;
+mod demo;
 pub mod engine;
 pub mod files;
 pub mod guide;

@@ -2,6 +2,8 @@
 //! else that goes wrong with exit status 1.
 
 mod calibrate;
+mod demo;
+mod drive;
 mod export;
 mod frame;
 mod guiding;
@@ -43,6 +45,10 @@ struct Cli {
 enum Command {
     /// Take one guided frame of a scene: depth map, histograms, waveform.
     Frame(frame::FrameArgs),
+    /// Take frame after frame of a world in motion: depth maps, and one recording.
+    Drive(drive::DriveArgs),
+    /// Show the thesis's demonstrator a scene, and say what it found.
+    Demo(demo::DemoArgs),
     /// Run recorded SPAD events through the chip.
     Replay(replay::ReplayArgs),
     /// Print the thesis's figures, published beside computed.
@@ -84,6 +90,8 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Tb(args) => return finish(tb::run(&args)),
         Command::Frame(args) => frame::run(&args),
+        Command::Drive(args) => drive::run(args),
+        Command::Demo(args) => demo::run(&args),
         Command::Wave(args) => wave::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Reproduce(args) => reproduce::run(&args),

@@ -94,6 +94,14 @@ impl SensorArgs {
 }
 
 impl SceneArgs {
+    /// The same with this scene file, if there is one.
+    pub(super) fn or_file(self, scene: Option<PathBuf>) -> Self {
+        SceneArgs {
+            scene: scene.or(self.scene),
+            ..self
+        }
+    }
+
     /// The sensor and the scene.
     ///
     /// # Errors

@@ -69,7 +69,7 @@ impl InputError {
         )
     }
 
-    pub(super) fn unwritable(path: &Path, error: &io::Error) -> Self {
+    pub(crate) fn unwritable(path: &Path, error: &io::Error) -> Self {
         Self::new(
             path.display(),
             format!("cannot be written ({error}); choose a folder that exists and is writable"),

@@ -1,9 +1,10 @@
 //! Arrays for NumPy and MATLAB: the NPY format, version 1.0, little endian, C order.
 
-use std::io;
+use std::fs::File;
+use std::io::{self, BufWriter};
 use std::path::Path;
 
-use npyz::WriterBuilder;
+use npyz::{AutoSerialize, NpyWriter, WriterBuilder};
 
 use crate::files::{InputError, OutputFile};
 
@@ -52,9 +53,65 @@ fn write_npy<T: npyz::AutoSerialize + Copy>(
     })
 }
 
+/// An array that is written piece by piece along its first axis.
+pub(crate) struct NpyStack<T: AutoSerialize>(NpyWriter<T, BufWriter<File>>);
+
+impl<T: AutoSerialize> NpyStack<T> {
+    /// Begins an array of `shape`, last axis fastest.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub(crate) fn begin(path: &Path, shape: &[u64]) -> Result<Self, InputError> {
+        let begun = File::create(path).and_then(|file| {
+            npyz::WriteOptions::new()
+                .default_dtype()
+                .shape(shape)
+                .writer(BufWriter::new(file))
+                .begin_nd()
+        });
+        let writer = begun.map_err(|e| InputError::unwritable(path, &e))?;
+        Ok(NpyStack(writer))
+    }
+
+    /// Writes the next elements.
+    ///
+    /// # Errors
+    /// When they cannot be written.
+    pub(crate) fn extend(&mut self, elements: impl IntoIterator<Item = T>) -> io::Result<()> {
+        self.0.extend(elements)
+    }
+
+    /// Ends the array, which must have all its elements.
+    ///
+    /// # Errors
+    /// When they cannot be written, or there are fewer.
+    pub(crate) fn finish(self) -> io::Result<()> {
+        self.0.finish()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_stack_is_the_array_of_its_pieces() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("stack.npy");
+        let mut stack = NpyStack::begin(&path, &[3, 2]).unwrap();
+        for n in 0..3 {
+            stack.extend([n as f32, f32::NAN]).unwrap();
+        }
+        stack.finish().unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let read = npyz::NpyFile::new(&bytes[..]).unwrap();
+        assert_eq!(read.shape(), [3, 2]);
+        let values = read.into_vec::<f32>().unwrap();
+        assert!(values[4] == 2.0 && values[5].is_nan());
+        let mut short = NpyStack::begin(&path, &[2]).unwrap();
+        short.extend([1u16]).unwrap();
+        assert!(short.finish().is_err());
+    }
 
     #[test]
     fn an_array_comes_back_as_written() {

@@ -2,8 +2,8 @@
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
-const WEIGHT: FontWeight = FontWeight::Regular;
-const SIZE: RasterHeight = RasterHeight::Size16;
+pub(super) const WEIGHT: FontWeight = FontWeight::Regular;
+pub(super) const SIZE: RasterHeight = RasterHeight::Size16;
 
 /// Width of a character, px.
 pub(super) const CHARACTER_WIDTH_PX: usize = get_raster_width(WEIGHT, SIZE);

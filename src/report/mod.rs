@@ -7,11 +7,12 @@ mod colour;
 mod grid;
 mod image;
 mod legend;
+pub(crate) mod picture;
 mod series;
 mod table;
 mod verdicts;
 
-pub(crate) use array::{write_npy_f32, write_npy_u16};
+pub(crate) use array::{NpyStack, write_npy_f32, write_npy_u16};
 pub use chart::{Axis, Chart, Scale};
 pub(crate) use grid::aligned;
 pub use grid::{Grid, width};

@@ -12,13 +12,13 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::aim::{Aims, Place, own_law};
-use super::pixel::{NoDepth, PixelDepth};
+use super::pixel::PixelDepth;
 use super::policy::{Pointing, WindowPolicy};
+use super::ranger::{Known, Ranger};
 use super::remark::Circumstances;
 use super::result::{Frame, PhaseTimes};
 use super::tolerance::Tolerance;
-use crate::chip::{Exposure, SensorConfig, WindowLaw};
+use crate::chip::{Exposure, SensorConfig};
 use crate::engine::waveform::{self, View, WaveCycles};
 use crate::engine::{
     Cohort, CohortOptions, Cycle, EngineError, Expose, Gate, GateSimulation, LitPixel, Replay,
@@ -27,9 +27,9 @@ use crate::engine::{
 use crate::files::InputError;
 use crate::guide::{Guide, GuideError, GuideInput, GuideMap};
 use crate::photon::{PhotonStream, SpadEvent, StreamConfig};
-use crate::ranging::{BinProfile, DepthOptions, EchoFinder, UnequalBins};
+use crate::ranging::{BinProfile, DepthOptions, UnequalBins};
 use crate::scene::{GroundTruth, Scene};
-use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
+use crate::units::SPEED_OF_LIGHT_M_PER_S;
 use crate::waves::WaveFormat;
 
 /// Which engine runs the macropixels that are not probed.
@@ -283,7 +283,6 @@ pub fn take_guided_frame(
     times.scene_s = clock.lap();
 
     // A macropixel whose SPADs are off looks as far as it can.
-    let aims = Aims::new(sensor, exposure, calibration.as_ref());
     let farthest = sensor.largest_start();
     let starts: Vec<u16> = wanted.iter().map(|s| s.unwrap_or(farthest)).collect();
 
@@ -383,58 +382,23 @@ pub fn take_guided_frame(
     })?;
     times.probes_s = clock.lap();
 
-    let law = WindowLaw::new(sensor, exposure);
-    let finder = EchoFinder::new(&law, scene.pulse_resolution(), depth)?;
-    let spads_fire = scene.lidar.pde > 0.0 || scene.lidar.dark_count_hz > 0.0;
+    let ranger = Ranger::new(sensor, exposure, scene, depth, calibration.as_ref())?;
     let depths: Vec<PixelDepth> = (0..sensor.pixels())
         .into_par_iter()
         .map(|pixel| {
-            let (true_m, guide_m) = (truth.range_m[pixel], guide.range_m[pixel]);
-            let start = wanted[pixel];
-            let law = own_law(&law, pixel);
-            let window = start.and_then(|start| law.window(start).open());
-            let in_window = window.zip(true_m).is_some_and(|(window, true_m)| {
-                law.interval(&window).contains(&Time::of_flight(true_m))
-            });
-            let counts: Vec<u32> = (exposed.histograms[pixel].iter())
-                .map(|&n| n.into())
-                .collect();
-            let place = Place {
+            let known = Known {
                 pixel,
-                start: start.unwrap_or(farthest),
-                law: &law,
-                profile: aims.profile(),
-                peak: &depth.peak,
+                start: wanted[pixel],
+                true_m: truth.range_m[pixel],
+                guide_m: guide.range_m[pixel],
             };
-            let sighting = window.and_then(|_| place.find(&finder, &counts));
-            let found = sighting.filter(|s| s.is_significant && !s.is_saturated);
-            let range_m = |bins: f64, at: usize| place.range_m(window?, &counts, bins, at);
-            let no_depth = match found {
-                Some(_) => None,
-                None if true_m.is_none() => Some(NoDepth::NoSurface),
-                None if start.is_none() && guide_m.is_none() => Some(NoDepth::NoGuide),
-                None if start.is_none() => Some(NoDepth::OutOfReach),
-                None if !spads_fire => Some(NoDepth::SpadsOff),
-                None if sighting.is_some_and(|s| s.is_saturated) => Some(NoDepth::Saturated),
-                None if !in_window => Some(NoDepth::OutsideWindow),
-                None => Some(NoDepth::NoSignificantPeak),
-            };
-            PixelDepth {
-                true_m,
-                guide_m,
-                start,
-                in_window,
-                measured_m: found.and_then(|s| range_m(s.position_bins, s.peak.peak_bin)),
-                no_depth,
-                peak_m: sighting.and_then(|s| range_m(s.peak.position_bins, s.peak.peak_bin)),
-                confidence: sighting.map(|s| s.confidence),
-            }
+            ranger.depth(&known, &exposed.histograms[pixel])
         })
         .collect();
     let circumstances = Circumstances {
         sensor,
         exposure,
-        bin_s: finder.bin_s(),
+        bin_s: ranger.bin_s(),
         scene,
         guide: &**source,
         light: &light,
@@ -447,7 +411,7 @@ pub fn take_guided_frame(
         rows: sensor.rows,
         cols: sensor.cols,
         bins: sensor.bins,
-        bin_m: finder.bin_s() * SPEED_OF_LIGHT_M_PER_S / 2.0,
+        bin_m: ranger.bin_s() * SPEED_OF_LIGHT_M_PER_S / 2.0,
         histograms: exposed.histograms.into_counts(),
         pixels: depths,
         remark,

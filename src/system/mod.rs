@@ -3,11 +3,13 @@
 mod aim;
 mod calibrate;
 mod distance;
+mod drive;
 mod frame;
 pub mod pareto;
 mod pixel;
 mod policy;
 pub mod price;
+mod ranger;
 mod remark;
 mod result;
 mod speed;
@@ -18,11 +20,13 @@ mod tolerance;
 
 pub use calibrate::{Calibrated, Sweep, SweepError, calibrate};
 pub use distance::DistanceLaw;
+pub use drive::{Drive, DriveFrame, DriveSettings, FrameClock, FrameTimes, Noise, Reused};
 pub use frame::{
     EngineKind, FrameError, FrameSettings, Probe, take_frame, take_frame_by, take_guided_frame,
 };
 pub use pixel::{NoDepth, PixelDepth};
 pub use policy::{POLICY_KEYS, Pointing, Unguided, Why, WindowPolicy, share_held};
+pub(crate) use ranger::{Known, Ranger};
 pub use result::{Frame, PhaseTimes};
 pub use speed::{SPEED_LASER_CYCLES, SpeedCase, SpeedFrame};
 pub use step_and_lock::{LockOptions, LockState, StepAndLock, Tracker};

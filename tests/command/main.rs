@@ -4,6 +4,7 @@ mod a_real_pair_is_matched;
 mod command_line_refuses_bad_input;
 mod delay_files_replay;
 mod delay_lines_are_calibrated;
+mod drives_are_recorded;
 mod engines_are_chosen_from_the_command_line;
 mod golden_vectors_hold;
 mod guides_from_the_command_line;

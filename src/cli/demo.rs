@@ -1,0 +1,281 @@
+//! `gdtof demo`: the demonstrator before the scenes of the thesis.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use super::say;
+use crate::demo::show::{Show, Shown, write_ply};
+use crate::demo::{Demonstrator, limit, shows, sweep};
+use crate::files::{InputError, MANIFEST, ResultSet};
+use crate::guide::{BehaviouralStereo, Guide, options};
+use crate::report::Grid;
+use crate::units::Time;
+
+/// What the demonstrator is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Demo {
+    /// A van drives away to 75 m in clear weather (Fig. 99, 100).
+    Van,
+    /// A pedestrian and a car in fog of several visibilities (Fig. 101).
+    Fog,
+    /// A figure behind a glass door (Fig. 102).
+    Glass,
+    /// A street without light: no guide, windows that step and hold.
+    Night,
+    /// A pedestrian comes nearer while the right camera has turned (Fig. 70, 107).
+    Yaw,
+    /// A car drives away at up to 65 mph while frames come three times a second (6.5.3).
+    Speed,
+    /// The QuantIC4x4 at 200 m and 25 frames a second (7.3.3): what it takes.
+    Limit,
+    /// A figure stands at steps to 50 m under 72 klux (Fig. 103 to 105).
+    Sweep,
+}
+
+/// Arguments of `gdtof demo`.
+#[derive(Args)]
+pub(super) struct DemoArgs {
+    /// What is shown.
+    #[arg(value_enum)]
+    demo: Demo,
+    /// Folder for the results; it is made if need be. Without it, one named after the demo.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// What guides instead of the behavioural stereo pair, as in `gdtof drive`; several are fused.
+    #[arg(long, value_name = "GUIDE")]
+    guide: Vec<String>,
+    /// Seed of photons and guide errors.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Step of the laser that calibrates the chip's delay lines before the demo, ps.
+    #[arg(long, value_name = "PS", default_value_t = 40.0)]
+    calibration_step_ps: f64,
+}
+
+/// What was asked for, in the manifest.
+#[derive(Serialize)]
+struct Configuration {
+    demo: Demo,
+    guide: Vec<String>,
+    seed: u64,
+    calibration_step_ps: f64,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, unwritable output, and what drives and the calibration report.
+pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
+    if !(1.0..=200.0).contains(&args.calibration_step_ps) {
+        let message = format!("{} is impossible; give 1 to 200", args.calibration_step_ps);
+        return Err(InputError::new("--calibration-step-ps", message).into());
+    }
+    let guide = match args.guide.is_empty() {
+        true => None,
+        false => {
+            let texts = args.guide.iter().map(String::as_str);
+            Some(options::parse_all(texts, "--guide")?)
+        }
+    };
+    let name = args
+        .demo
+        .to_possible_value()
+        .expect("every demo has a name");
+    let out = args
+        .out
+        .clone()
+        .unwrap_or_else(|| PathBuf::from(format!("demo_{}", name.get_name())));
+    let results = ResultSet::begin(&out)?;
+    let began = Instant::now();
+    let bar = |what: &str, length: u64| -> anyhow::Result<ProgressBar> {
+        let template = format!("{what} {{bar:40}} {{pos}}/{{len}}, {{eta}} left");
+        let style = ProgressStyle::with_template(&template)?;
+        Ok(ProgressBar::new(length).with_style(style))
+    };
+    let calibrated = || -> anyhow::Result<Demonstrator> {
+        let progress = bar("calibrating", 2048)?;
+        let step = Time::from_s(args.calibration_step_ps * 1e-12);
+        let demonstrator = Demonstrator::calibrated(step, || progress.inc(1))?;
+        progress.finish_and_clear();
+        Ok(demonstrator)
+    };
+    let mut text = match args.demo {
+        Demo::Limit => {
+            let runs = limit::LASER_PERIODS.len() * limit::ENERGIES.len();
+            let progress = bar("driving", (runs * limit::DISPARITIES_PX.len()) as u64)?;
+            let limits = limit::limits(args.seed, || progress.inc(1))?;
+            progress.finish_and_clear();
+            write_limits(results.staging(), &limits)?
+        }
+        Demo::Sweep => {
+            let demonstrator = calibrated()?;
+            let frames = sweep::DISTANCES_M.len() as u64 * u64::from(sweep::FRAMES);
+            let progress = bar("sweeping", frames)?;
+            let points = sweep::sweep(&demonstrator, sweep::REFLECTIVITY, args.seed, || {
+                progress.inc(1);
+            })?;
+            progress.finish_and_clear();
+            write_sweep(results.staging(), &points)?
+        }
+        shown => {
+            let demonstrator = calibrated()?;
+            let shows = match shown {
+                Demo::Van => shows::van,
+                Demo::Fog => shows::fog,
+                Demo::Glass => shows::glass,
+                Demo::Night => shows::night,
+                Demo::Yaw => shows::yaw,
+                Demo::Speed => shows::speed,
+                Demo::Sweep | Demo::Limit => unreachable!("they have no shows"),
+            };
+            let mut shows = shows(&demonstrator, args.seed);
+            if let Some(guide) = &guide {
+                // Those that show what another guide makes of it keep theirs.
+                let of_stereo =
+                    |show: &&mut Show| show.settings.frame.guide.name() == BehaviouralStereo.name();
+                for show in shows.iter_mut().filter(of_stereo) {
+                    show.settings.frame.guide = guide.clone();
+                }
+            }
+            let frames = shows.iter().map(|show| u64::from(show.frames)).sum();
+            let progress = bar("driving", frames)?;
+            let mut text = String::new();
+            for show in &shows {
+                let shown = show.run(&demonstrator, || progress.inc(1))?;
+                text += &write_shown(results.staging(), show, &shown)?;
+            }
+            progress.finish_and_clear();
+            text
+        }
+    };
+    let configuration = Configuration {
+        demo: args.demo,
+        guide: args.guide.clone(),
+        seed: args.seed,
+        calibration_step_ps: args.calibration_step_ps,
+    };
+    let names = file_names(results.staging())?;
+    for sentence in results.commit("demo", &configuration)? {
+        eprintln!("gdtof: {sentence}");
+    }
+    text += &format!(
+        "run time {:.1} s\nin {}: {names} {MANIFEST}\n",
+        began.elapsed().as_secs_f64(),
+        out.display(),
+    );
+    Ok(say(text)?)
+}
+
+fn file_names(folder: &Path) -> std::io::Result<String> {
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        names.push(entry?.file_name().to_string_lossy().into_owned());
+    }
+    names.sort();
+    Ok(names.join(" "))
+}
+
+/// Pictures, point clouds, and what became of the targets.
+fn write_shown(folder: &Path, show: &Show, shown: &Shown) -> anyhow::Result<String> {
+    let name = &show.name;
+    for (number, picture) in &shown.pictures {
+        picture.write_png(&folder.join(format!("{name}_{number:03}.png")))?;
+    }
+    for (number, points) in &shown.clouds {
+        write_ply(&folder.join(format!("{name}_{number:03}.ply")), points)?;
+    }
+    let json = serde_json::to_string_pretty(&shown.frames)?;
+    std::fs::write(folder.join(format!("{name}.json")), json + "\n")?;
+    let [load_s, exposure_s, readout_s] = shown.chip_s.map(|s| s * 1e3);
+    let mut text = format!(
+        "{name}: guide {:.0} ms, load {load_s:.2} ms, exposure {exposure_s:.1} ms, readout {readout_s:.2} ms: {:.2} fps\n",
+        show.settings.clock.guide_latency_s * 1e3,
+        1.0 / shown.period_s
+    );
+    for (n, target) in show.targets.iter().enumerate() {
+        for frame in &shown.frames {
+            let found = &frame.targets[n];
+            text += &format!("  frame {}, {} {found}\n", frame.number, target.name);
+        }
+    }
+    for outcome in &shown.schemes {
+        text += &format!(
+            "  {}, {} bins, {} exposures: {}\n",
+            outcome.scheme, outcome.bins, outcome.exposures, outcome.found
+        );
+    }
+    Ok(text)
+}
+
+/// What 200 m at 25 fps take.
+fn write_limits(folder: &Path, limits: &[limit::Limit]) -> anyhow::Result<String> {
+    let json = serde_json::to_string_pretty(limits)?;
+    std::fs::write(folder.join("limit.json"), json + "\n")?;
+    let mut grid = Grid::new([
+        "laser",
+        "cycles",
+        "energy",
+        "stereo error",
+        "in window",
+        "right to a bin",
+        "wrong",
+        "no peak",
+    ]);
+    for at in limits {
+        let clock_hz = 384e6 / f64::from(at.stop_periods);
+        let found = &at.found;
+        let percent = |n: usize| format!("{:.0} %", 100.0 * n as f64 / found.seen_by.max(1) as f64);
+        let without = found.without.values().sum();
+        grid.push([
+            format!("{:.0} kHz", clock_hz * 1e-3),
+            at.laser_cycles.to_string(),
+            format!("{} x", at.energy),
+            format!("{} px", at.disparity_px),
+            percent(found.in_window),
+            percent(found.right),
+            percent(found.wrong),
+            percent(without),
+        ]);
+    }
+    Ok(format!(
+        "QuantIC4x4, target of 10 % at {} m, {} klux, {} fps; energy a macropixel over the demonstrator's\n{grid}",
+        limit::RANGE_M,
+        limit::KLUX,
+        limit::FPS,
+    ))
+}
+
+/// Fig. 103 to 105.
+fn write_sweep(folder: &Path, points: &[sweep::SweepPoint]) -> anyhow::Result<String> {
+    for (number, chart) in sweep::charts(points) {
+        chart.write(&folder.join(format!("fig_{number}.svg")))?;
+    }
+    let json = serde_json::to_string_pretty(points)?;
+    std::fs::write(folder.join("sweep.json"), json + "\n")?;
+    let mut grid = Grid::new([
+        "distance, m",
+        "depths",
+        "in window",
+        "mean error, m",
+        "sigma, m",
+        "RMS, m",
+        "guide RMS, m",
+    ]);
+    for p in points {
+        grid.push([
+            format!("{:.0}", p.distance_m),
+            format!("{} of {}", p.depths, p.samples),
+            p.in_window.to_string(),
+            format!("{:.3}", p.mean_error_m),
+            format!("{:.3}", p.sigma_m),
+            format!("{:.3}", p.rms_m),
+            format!("{:.3}", p.guide_rms_m),
+        ]);
+    }
+    Ok(grid.to_string())
+}

@@ -1,0 +1,451 @@
+//! `gdtof drive`: frame after frame of a world in motion.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use super::{SceneArgs, say, wording};
+use crate::chip::{SensorConfig, WindowLaw};
+use crate::engine::{CohortOptions, Work};
+use crate::files::{InputError, MANIFEST, ResultSet};
+use crate::guide::options;
+use crate::ranging::DepthOptions;
+use crate::report::{Cell, DepthMap, NpyStack, Table};
+use crate::scene::Scene;
+use crate::system::{
+    Drive, DriveFrame, DriveSettings, EngineKind, FrameClock, FrameSettings, FrameTimes, NoDepth,
+    Noise, PhaseTimes, Reused, Summary, WindowPolicy,
+};
+
+/// Arguments of `gdtof drive`.
+#[derive(Args)]
+pub(super) struct DriveArgs {
+    /// Scene (TOML), instead of --scene.
+    #[arg(value_name = "SCENE", conflicts_with = "scene")]
+    world: Option<PathBuf>,
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Frames to take.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    frames: u32,
+    /// Folder for the results; it is made if need be.
+    #[arg(long, value_name = "DIR", default_value = "drive")]
+    out: PathBuf,
+    /// CLK periods in a laser cycle.
+    #[arg(long, value_name = "P", default_value_t = 520)]
+    stop_periods: u32,
+    /// Laser cycles of an exposure.
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    laser_cycles: u32,
+    /// Seed of photons and guide errors.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Engine of the macropixels.
+    #[arg(long, value_enum, default_value_t)]
+    engine: EngineKind,
+    /// From the cameras' images to the guide's map, ms.
+    #[arg(long, value_name = "MS", default_value_t = 145.0)]
+    guide_latency_ms: f64,
+    /// The guide works on the next frame while this one is loaded, exposed and read out.
+    #[arg(long)]
+    pipelined: bool,
+    /// What tells where targets are, as NAME or NAME:KEY=VALUE,…: stereo, truth, monocular, radar, kalman or file; several are fused.
+    #[arg(long, value_name = "GUIDE", default_value = "stereo")]
+    guide: Vec<String>,
+    /// Macropixels hold the peak that they have found, step their window in doubt, and take over estimates of neighbours.
+    #[arg(long)]
+    tracking: bool,
+    /// Time of the scene at which the first images are taken, s.
+    #[arg(
+        long,
+        value_name = "S",
+        default_value_t = 0.0,
+        allow_hyphen_values = true
+    )]
+    start_s: f64,
+    /// Parts of an exposure in which the world stands still.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
+    segments: u32,
+    /// `fresh` photons in every frame, or `still` ones: a macropixel whose light and start value have not changed then keeps its
+    /// histogram.
+    #[arg(long, value_enum, default_value_t)]
+    noise: Noise,
+    /// Simulate everything anew in every frame: same results, more work.
+    #[arg(long)]
+    no_skip: bool,
+    /// When the bins of the sensor's delay lines are, as `gdtof calibrate` has measured it.
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+    /// Write no picture of each frame.
+    #[arg(long)]
+    no_pictures: bool,
+    /// Print drive.json instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A line of `frames.jsonl`.
+#[derive(Serialize)]
+struct FrameLine<'a> {
+    number: u32,
+    times: FrameTimes,
+    summary: Summary,
+    reused: Reused,
+    work: Work,
+    run_times: PhaseTimes,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    picture: Option<&'a str>,
+}
+
+/// `drive.json`.
+#[derive(Serialize)]
+struct Report<'a> {
+    version: &'static str,
+    #[serde(flatten)]
+    configuration: &'a Configuration<'a>,
+    frames: u32,
+    frame_period_s: f64,
+    frames_per_s: f64,
+    load_s: f64,
+    exposure_s: f64,
+    readout_s: f64,
+    macropixels: u64,
+    macropixels_reused: u64,
+    loads_reused: u32,
+    worlds_reused: u32,
+    depths: u64,
+    outliers: u64,
+    work: Work,
+    run_time_s: f64,
+}
+
+/// What was asked for.
+#[derive(Serialize)]
+struct Configuration<'a> {
+    scene_name: String,
+    scene: &'a Scene,
+    sensor: &'a SensorConfig,
+    stop_periods: u32,
+    laser_cycles: u32,
+    seed: u64,
+    engine: EngineKind,
+    guide: &'a str,
+    tracking: bool,
+    start_s: f64,
+    clock: FrameClock,
+    segments: u32,
+    noise: Noise,
+    skip: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, unwritable output, and what a drive reports.
+pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
+    let scene_args = args.scene.or_file(args.world);
+    let (sensor, scene) = scene_args.read()?;
+    let exposure = wording::exposure(&sensor, args.stop_periods, args.laser_cycles)?;
+    if let Some(why) = WindowLaw::new(&sensor, &exposure).refusal() {
+        let (why, cure) = wording::of_no_aim(&why);
+        let message = format!("{why}, so the guide cannot aim time windows; {cure}");
+        return Err(InputError::new("--sensor", message).into());
+    }
+    if !(0.0..=1e5).contains(&args.guide_latency_ms) {
+        let message = format!(
+            "{} is no latency; give milliseconds, 0 to 100000",
+            args.guide_latency_ms
+        );
+        return Err(InputError::new("--guide-latency-ms", message).into());
+    }
+    if !(-1e5..=1e5).contains(&args.start_s) {
+        let message = format!(
+            "{} is no time; give seconds, -100000 to 100000",
+            args.start_s
+        );
+        return Err(InputError::new("--start-s", message).into());
+    }
+    let calibration = match &args.calibration {
+        Some(path) => Some(super::calibrate::read(path, &sensor)?),
+        None => None,
+    };
+    let settings = DriveSettings {
+        frame: FrameSettings {
+            sensor,
+            scene,
+            exposure,
+            seed: args.seed,
+            engine: args.engine,
+            cohort: CohortOptions::default(),
+            tolerance_m: None,
+            skip: true,
+            depth: DepthOptions::default(),
+            calibration,
+            guide: options::parse_all(args.guide.iter().map(String::as_str), "--guide")?,
+        },
+        policy: match args.tracking {
+            true => WindowPolicy::for_sequences(),
+            false => WindowPolicy::default(),
+        },
+        clock: FrameClock {
+            guide_latency_s: args.guide_latency_ms * 1e-3,
+            pipelined: args.pipelined,
+        },
+        segments: args.segments,
+        noise: args.noise,
+        reuse: !args.no_skip,
+        only: None,
+        start_s: args.start_s,
+    };
+    let configuration = Configuration {
+        scene_name: scene_args.scene_name(),
+        scene: &settings.frame.scene,
+        sensor: &settings.frame.sensor,
+        stop_periods: args.stop_periods,
+        laser_cycles: args.laser_cycles,
+        seed: args.seed,
+        engine: args.engine,
+        guide: settings.frame.guide.name(),
+        tracking: args.tracking,
+        start_s: args.start_s,
+        clock: settings.clock,
+        segments: args.segments,
+        noise: args.noise,
+        skip: settings.reuse,
+    };
+    let results = ResultSet::begin(&args.out)?;
+    let began = Instant::now();
+    let mut drive = Drive::new(&settings)?;
+    let [load_s, exposure_s, readout_s] = drive.chip_s();
+    let mut report = Report {
+        version: env!("CARGO_PKG_VERSION"),
+        configuration: &configuration,
+        frames: args.frames,
+        frame_period_s: drive.period_s(),
+        frames_per_s: 1.0 / drive.period_s(),
+        load_s,
+        exposure_s,
+        readout_s,
+        macropixels: 0,
+        macropixels_reused: 0,
+        loads_reused: 0,
+        worlds_reused: 0,
+        depths: 0,
+        outliers: 0,
+        work: Work::default(),
+        run_time_s: 0.0,
+    };
+    let mut recording = Recording::begin(results.staging(), &settings, args.frames)?;
+    let progress = ProgressBar::new(args.frames.into()).with_style(ProgressStyle::with_template(
+        "driving {bar:40} {pos}/{len} frames, {eta} left",
+    )?);
+    for number in 0..args.frames {
+        let frame = drive.frame(|_| {})?;
+        let picture = format!("depth_{number:05}.png");
+        let picture = (!args.no_pictures).then_some(picture);
+        if let Some(name) = &picture {
+            depth_map(&frame, &settings, &results.staging().join(name))?;
+        }
+        recording.add(&frame, picture.as_deref())?;
+        report.add(&frame);
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    recording.finish()?;
+    report.run_time_s = began.elapsed().as_secs_f64();
+    let json = serde_json::to_string_pretty(&report)?;
+    let unwritable = |e| InputError::unwritable(&args.out, &e);
+    std::fs::write(results.staging().join("drive.json"), format!("{json}\n"))
+        .map_err(unwritable)?;
+    for sentence in results.commit("drive", &configuration)? {
+        eprintln!("gdtof: {sentence}");
+    }
+    match args.json {
+        true => Ok(say(format_args!("{json}\n"))?),
+        false => Ok(say(report.table(&args.out))?),
+    }
+}
+
+impl Report<'_> {
+    fn add(&mut self, frame: &DriveFrame) {
+        let summary = frame.summary();
+        self.macropixels += frame.pixels.len() as u64;
+        self.macropixels_reused += frame.reused.macropixels as u64;
+        self.loads_reused += u32::from(frame.reused.load);
+        self.worlds_reused += u32::from(frame.reused.world);
+        self.depths += summary.depths as u64;
+        self.outliers += summary.outliers as u64;
+        self.work += frame.work;
+    }
+
+    fn table(&self, out: &Path) -> Table {
+        let ms = |s: f64| format!("{:.2} ms", 1e3 * s);
+        let of = |part: u64, whole: u64| format!("{part} of {whole}");
+        let clock = self.configuration.clock;
+        let mut table = Table::new(format!(
+            "{} frames of {}",
+            self.frames, self.configuration.scene_name
+        ))
+        .row(
+            "frame rate",
+            format!(
+                "{:.2} fps, one every {}",
+                self.frames_per_s,
+                ms(self.frame_period_s)
+            ),
+        )
+        .row("guide, from images to map", ms(clock.guide_latency_s))
+        .row("load", ms(self.load_s))
+        .row("exposure", ms(self.exposure_s))
+        .row("readout", ms(self.readout_s))
+        .row(
+            "depths, wrong by more than a bin",
+            format!("{}, {}", self.depths, self.outliers),
+        )
+        .row("photons drawn", self.work.photons_drawn)
+        .row(
+            "CLK periods visited",
+            of(self.work.clk_periods_visited, self.work.clk_periods),
+        )
+        .row(
+            "macropixels not exposed again",
+            of(self.macropixels_reused, self.macropixels),
+        )
+        .row(
+            "loads not run again",
+            of(self.loads_reused.into(), self.frames.into()),
+        )
+        .row(
+            "worlds not cast again",
+            of(self.worlds_reused.into(), self.frames.into()),
+        );
+        let each = ms(self.run_time_s / f64::from(self.frames));
+        table.push(
+            "run time",
+            format!("{:.2} s, {each} a frame", self.run_time_s),
+        );
+        let names = [
+            "depth.npy",
+            "guide.npy",
+            "truth.npy",
+            "starts.npy",
+            "histograms.npy",
+        ];
+        let rest = ["frames.jsonl", "drive.json", MANIFEST];
+        table.push(format!("in {}", out.display()), names.join(" "));
+        table.push("", rest.join(" "));
+        table
+    }
+}
+
+/// The recording of a drive: stacks of arrays whose first axis is the frame, and an index with a line for each.
+struct Recording {
+    depth: NpyStack<f32>,
+    guide: NpyStack<f32>,
+    truth: NpyStack<f32>,
+    starts: NpyStack<i16>,
+    histograms: NpyStack<u16>,
+    index: BufWriter<File>,
+    folder: PathBuf,
+}
+
+impl Recording {
+    fn begin(folder: &Path, settings: &DriveSettings, frames: u32) -> Result<Self, InputError> {
+        let sensor = &settings.frame.sensor;
+        let shape = [u64::from(frames), sensor.rows as u64, sensor.cols as u64];
+        let [frames, rows, cols] = shape;
+        let index = File::create(folder.join("frames.jsonl"));
+        Ok(Recording {
+            depth: NpyStack::begin(&folder.join("depth.npy"), &shape)?,
+            guide: NpyStack::begin(&folder.join("guide.npy"), &shape)?,
+            truth: NpyStack::begin(&folder.join("truth.npy"), &shape)?,
+            starts: NpyStack::begin(&folder.join("starts.npy"), &shape)?,
+            histograms: NpyStack::begin(
+                &folder.join("histograms.npy"),
+                &[frames, rows, cols, sensor.bins as u64],
+            )?,
+            index: BufWriter::new(index.map_err(|e| InputError::unwritable(folder, &e))?),
+            folder: folder.to_owned(),
+        })
+    }
+
+    fn add(&mut self, frame: &DriveFrame, picture: Option<&str>) -> Result<(), InputError> {
+        let line = FrameLine {
+            number: frame.number,
+            times: frame.times,
+            summary: frame.summary(),
+            reused: frame.reused,
+            work: frame.work,
+            run_times: frame.run_times,
+            picture,
+        };
+        let metres = |m: Option<f64>| m.map_or(f32::NAN, |m| m as f32);
+        let pixels = &frame.pixels;
+        let written = self
+            .depth
+            .extend(pixels.iter().map(|p| metres(p.measured_m)))
+            .and_then(|()| self.guide.extend(pixels.iter().map(|p| metres(p.guide_m))))
+            .and_then(|()| self.truth.extend(pixels.iter().map(|p| metres(p.true_m))))
+            .and_then(|()| {
+                let starts = pixels.iter().map(|p| p.start.map_or(-1, |s| s as i16));
+                self.starts.extend(starts)
+            })
+            .and_then(|()| {
+                self.histograms
+                    .extend(frame.histograms.counts().iter().copied())
+            })
+            .and_then(|()| Ok(serde_json::to_writer(&mut self.index, &line)?))
+            .and_then(|()| writeln!(self.index));
+        written.map_err(|e| InputError::unwritable(&self.folder, &e))
+    }
+
+    fn finish(mut self) -> Result<(), InputError> {
+        let flushed = self.index.flush();
+        let stacks = [
+            self.depth.finish(),
+            self.guide.finish(),
+            self.truth.finish(),
+        ];
+        let rest = [self.starts.finish(), self.histograms.finish(), flushed];
+        let written: std::io::Result<()> = stacks.into_iter().chain(rest).collect();
+        written.map_err(|e| InputError::unwritable(&self.folder, &e))
+    }
+}
+
+/// The frame's depths as a picture; all frames of a drive have the scale of what its guide can see.
+fn depth_map(frame: &DriveFrame, settings: &DriveSettings, path: &Path) -> Result<(), InputError> {
+    let cells: Vec<Cell> = frame
+        .pixels
+        .iter()
+        .map(|pixel| match (pixel.measured_m, pixel.no_depth) {
+            (Some(m), _) => Cell::Depth(m as f32),
+            (None, why) => Cell::Category(why.map_or(0, |why| {
+                let place = NoDepth::ALL.iter().position(|&reason| reason == why);
+                place.expect("all are in the list")
+            })),
+        })
+        .collect();
+    let stereo = &settings.frame.scene.stereo;
+    let metre_pixels = stereo.camera().focal_px * stereo.baseline_m;
+    let range_m = [stereo.max_disparity_px, stereo.min_disparity_px].map(|px| metre_pixels / px);
+    let title = format!(
+        "frame {}, exposed at {:.3} s",
+        frame.number,
+        frame.times.middle_s()
+    );
+    DepthMap {
+        title: &title,
+        cols: settings.frame.sensor.cols,
+        cells: &cells,
+        range_m: (range_m[0] as f32, (range_m[1] as f32).min(200.0)),
+        unit: "m",
+        categories: &NoDepth::ALL.map(NoDepth::name),
+        scale: 8,
+    }
+    .write_png(path)
+}

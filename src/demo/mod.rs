@@ -1,0 +1,93 @@
+//! The demonstrator of the thesis (chapter 6, Table 14): HSLIDAR in its delay-line mode with its calibration, before the scenes that it was
+//! shown with.
+//!
+//! ```text
+//!   scene in motion ─► guide ─► windows ─► 16 000 laser cycles at 80 kHz ─► histograms ─► depths, three times a second
+//! ```
+//!
+//! Every demo is a drive ([`Drive`](crate::system::Drive)) of the whole chain, with what is asked of it measured at the end: whether a
+//! target was found, and if not, why not.
+
+pub(crate) mod found;
+pub(crate) mod limit;
+pub(crate) mod panel;
+pub(crate) mod scenes;
+pub(crate) mod schemes;
+pub(crate) mod show;
+pub(crate) mod shows;
+pub(crate) mod sweep;
+
+use std::sync::Arc;
+
+use crate::chip::{Exposure, Sensor, SensorConfig, hslidar_delay_line};
+use crate::engine::CohortOptions;
+use crate::guide::{BehaviouralStereo, Guide};
+use crate::ranging::{BinProfile, DepthOptions};
+use crate::scene::Scene;
+use crate::system::{
+    DriveSettings, EngineKind, FrameClock, FrameSettings, Noise, Sweep, SweepError, WindowPolicy,
+    calibrate,
+};
+use crate::units::Time;
+
+/// CLK periods in a laser cycle: 80 kHz on a CLK of 80 MHz (Table 14).
+pub(crate) const STOP_PERIODS: u32 = 1000;
+/// Laser cycles of an exposure: 200 ms (6.4.2).
+pub(crate) const LASER_CYCLES: u32 = 16_000;
+
+/// The chip with its calibration.
+#[derive(Debug, Clone)]
+pub(crate) struct Demonstrator {
+    pub(crate) sensor: SensorConfig,
+    pub(crate) exposure: Exposure,
+    pub(crate) calibration: BinProfile,
+}
+
+impl Demonstrator {
+    /// Calibrates the chip as in 6.3.1, with a laser that steps by `step`.
+    ///
+    /// # Errors
+    /// What the sweep reports.
+    pub(crate) fn calibrated(step: Time, swept: impl Fn() + Sync) -> Result<Self, SweepError> {
+        let sensor: Sensor = hslidar_delay_line();
+        let sweep = Sweep {
+            step,
+            ..Sweep::default()
+        };
+        Ok(Demonstrator {
+            calibration: calibrate(&sensor, STOP_PERIODS, &sweep, swept)?.profile,
+            exposure: Exposure::new(&sensor, STOP_PERIODS, LASER_CYCLES),
+            sensor: (*sensor).clone(),
+        })
+    }
+
+    /// A drive through `scene`, as the demonstrator took it. Where the chip has fewer rows, the laser lights as much less with as much less
+    /// energy.
+    pub(crate) fn drive(&self, mut scene: Scene, seed: u64) -> DriveSettings {
+        let rows = hslidar_delay_line().rows;
+        scene.lidar.pulse_energy_uj *= self.sensor.rows as f64 / rows as f64;
+        let guide: Arc<dyn Guide> = Arc::new(BehaviouralStereo);
+        DriveSettings {
+            frame: FrameSettings {
+                sensor: self.sensor.clone(),
+                scene,
+                exposure: self.exposure,
+                seed,
+                engine: EngineKind::Window,
+                cohort: CohortOptions::default(),
+                tolerance_m: None,
+                skip: true,
+                depth: DepthOptions::default(),
+                calibration: Some(self.calibration.clone()),
+                guide,
+            },
+            policy: WindowPolicy::default(),
+            clock: FrameClock::default(),
+            segments: 4,
+            noise: Noise::Fresh,
+            reuse: true,
+            only: None,
+            start_s: 0.0,
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! A scene shown as in Fig. 99 to 102: a drive through it, what became of its targets in every frame, and some frames as pictures.
+
+use std::path::Path;
+
+use super::Demonstrator;
+use super::found::Found;
+use super::panel::Panel;
+use super::schemes::{self, Outcome};
+use crate::files::{InputError, OutputFile};
+use crate::report::picture::Picture;
+use crate::scene::{GroundTruth, Scene};
+use crate::system::{Drive, DriveFrame, DriveSettings, FrameError, FrameTimes, PhaseTimes};
+
+/// Something that is to be found: all objects whose name begins so.
+#[derive(Debug, Clone)]
+pub(crate) struct Target {
+    /// Its name, or how the names of its parts begin.
+    pub(crate) name: &'static str,
+    objects: Vec<usize>,
+}
+
+impl Target {
+    /// The target of this name in a scene.
+    pub(crate) fn in_scene(scene: &Scene, name: &'static str) -> Self {
+        let objects = scene.objects.iter().enumerate();
+        Target {
+            name,
+            objects: objects
+                .filter_map(|(n, object)| object.name.starts_with(name).then_some(n))
+                .collect(),
+        }
+    }
+
+    /// What became of it in a frame.
+    pub(crate) fn found(&self, frame: &DriveFrame) -> Found {
+        let pixels = self.pixels(&frame.truth).map(|pixel| &frame.pixels[pixel]);
+        Found::of(pixels, frame.bin_m)
+    }
+
+    /// The macropixels that see it.
+    pub(crate) fn pixels<'t>(&'t self, truth: &'t GroundTruth) -> impl Iterator<Item = usize> + 't {
+        let objects = truth.object.iter().enumerate();
+        objects.filter_map(|(pixel, object)| self.objects.contains(&(*object)?).then_some(pixel))
+    }
+
+    /// The macropixel in the middle of those that see it, as row and column.
+    fn middle(&self, truth: &GroundTruth) -> Option<(usize, usize)> {
+        let cols = truth.cols as usize;
+        let mut pixels: Vec<(usize, usize)> =
+            self.pixels(truth).map(|p| (p / cols, p % cols)).collect();
+        pixels.sort_unstable();
+        let row = pixels.get(pixels.len() / 2)?.0;
+        let in_row: Vec<usize> = pixels.iter().filter(|p| p.0 == row).map(|p| p.1).collect();
+        Some((row, in_row[in_row.len() / 2]))
+    }
+}
+
+/// What is shown.
+#[derive(Debug, Clone)]
+pub(crate) struct Show {
+    /// Its name, fit for files.
+    pub(crate) name: String,
+    /// The drive.
+    pub(crate) settings: DriveSettings,
+    /// How many frames of it.
+    pub(crate) frames: u32,
+    /// What is to be found.
+    pub(crate) targets: Vec<Target>,
+    /// Ends of the depth scale of pictures, m.
+    pub(crate) range_m: (f64, f64),
+    /// The frames that become pictures.
+    pub(crate) pictures: Vec<u32>,
+    /// Whether the first target is looked for with other schemes, too, as it stands in the last frame.
+    pub(crate) compares: bool,
+}
+
+/// A frame of a show.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub(crate) struct ShownFrame {
+    /// Its number.
+    pub(crate) number: u32,
+    /// When what happened.
+    pub(crate) times: FrameTimes,
+    /// Each target.
+    pub(crate) targets: Vec<Found>,
+    /// What the simulation took.
+    pub(crate) run_times: PhaseTimes,
+}
+
+/// A show that has been run.
+#[derive(Debug, Clone)]
+pub(crate) struct Shown {
+    /// Its frames.
+    pub(crate) frames: Vec<ShownFrame>,
+    /// Frames as pictures, with their numbers.
+    pub(crate) pictures: Vec<(u32, Picture)>,
+    /// Point clouds of the same frames: x right, y down, z forward, m.
+    pub(crate) clouds: Vec<(u32, Vec<[f64; 3]>)>,
+    /// From one frame to the next, s.
+    pub(crate) period_s: f64,
+    /// What load, exposure and readout take, s.
+    pub(crate) chip_s: [f64; 3],
+    /// Other schemes in the last frame.
+    pub(crate) schemes: Vec<Outcome>,
+}
+
+/// Macropixels of a target on which schemes are compared, at most: a full histogram exposes each of them forty times.
+const COMPARED: usize = 48;
+
+impl Show {
+    /// Runs it; `done` is told of every frame.
+    ///
+    /// # Errors
+    /// What a drive reports.
+    pub(crate) fn run(
+        &self,
+        demonstrator: &Demonstrator,
+        done: impl Fn(),
+    ) -> Result<Shown, FrameError> {
+        let mut drive = Drive::new(&self.settings)?;
+        let mut shown = Shown {
+            frames: Vec::new(),
+            pictures: Vec::new(),
+            clouds: Vec::new(),
+            period_s: drive.period_s(),
+            chip_s: drive.chip_s(),
+            schemes: Vec::new(),
+        };
+        for number in 0..self.frames {
+            let frame = drive.frame(|_| {})?;
+            if self.pictures.contains(&number) {
+                shown.pictures.push((number, self.picture(&frame)));
+                shown
+                    .clouds
+                    .push((number, points(&self.settings.frame.scene, &frame)));
+            }
+            if self.compares && number + 1 == self.frames {
+                shown.schemes = self.schemes(demonstrator, &frame)?;
+            }
+            shown.frames.push(ShownFrame {
+                number,
+                times: frame.times,
+                targets: self.targets.iter().map(|t| t.found(&frame)).collect(),
+                run_times: frame.run_times,
+            });
+            done();
+        }
+        Ok(shown)
+    }
+
+    fn schemes(
+        &self,
+        demonstrator: &Demonstrator,
+        frame: &DriveFrame,
+    ) -> Result<Vec<Outcome>, FrameError> {
+        let world = self.settings.frame.scene.at(frame.times.middle_s());
+        let pixels: Vec<usize> = self.targets[0].pixels(&frame.truth).collect();
+        let every = pixels.len().div_ceil(COMPARED).max(1);
+        let pixels: Vec<usize> = pixels.into_iter().step_by(every).collect();
+        match pixels.is_empty() {
+            true => Ok(Vec::new()),
+            false => {
+                let seed = self.settings.frame.seed;
+                schemes::compare(demonstrator, &world, &frame.guide, &pixels, seed)
+            }
+        }
+    }
+
+    fn picture(&self, frame: &DriveFrame) -> Picture {
+        let world = self.settings.frame.scene.at(frame.times.middle_s());
+        let middles = self.targets.iter();
+        let samples: Vec<(&str, (usize, usize))> = middles
+            .filter_map(|target| Some((target.name, target.middle(&frame.truth)?)))
+            .take(3)
+            .collect();
+        let (name, number) = (&self.name, frame.number);
+        let klux = world.light.illuminance_klux;
+        Panel {
+            title: format!(
+                "{name}, frame {number}, {:.2} s, {klux} klux, {} laser cycles",
+                frame.times.middle_s(),
+                self.settings.frame.exposure.laser_cycles
+            ),
+            world: &world,
+            frame,
+            range_m: self.range_m,
+            samples: &samples,
+        }
+        .draw()
+    }
+}
+
+/// Every depth as a point before the lidar, m.
+fn points(scene: &Scene, frame: &DriveFrame) -> Vec<[f64; 3]> {
+    let (rows, cols) = (frame.truth.rows, frame.truth.cols);
+    let camera = scene.lidar_camera(rows, cols);
+    let depths = frame.pixels.iter().enumerate();
+    depths
+        .filter_map(|(pixel, depth)| {
+            let (row, col) = (pixel / cols as usize, pixel % cols as usize);
+            let ray = camera.at_unit_depth((col as f64 + 0.5, row as f64 + 0.5));
+            Some((ray.normalize() * depth.measured_m?).to_array())
+        })
+        .collect()
+}
+
+/// Writes points as PLY, ASCII, x right, y down, z forward, m.
+///
+/// # Errors
+/// When the file cannot be written.
+pub(crate) fn write_ply(path: &Path, points: &[[f64; 3]]) -> Result<(), InputError> {
+    OutputFile::write_with(path, |out| {
+        writeln!(
+            out,
+            "ply\nformat ascii 1.0\nelement vertex {}",
+            points.len()
+        )?;
+        writeln!(
+            out,
+            "property float x\nproperty float y\nproperty float z\nend_header"
+        )?;
+        for [x, y, z] in points {
+            writeln!(out, "{x:.4} {y:.4} {z:.4}")?;
+        }
+        std::io::Result::Ok(())
+    })
+}

@@ -1,0 +1,691 @@
+//! A drive: frame after frame while the world moves (thesis 6.3.3, Fig. 97; 6.4.2, Fig. 106).
+//!
+//! ```text
+//!   images        guide's map       start values   laser cycles              histograms
+//!     ├── latency ────┼───── load ──────┼── exposure ─────┼──── readout ────────┤ depths
+//!   world at this     │                 │ world in segments of the exposure
+//!     time            └ world has moved on
+//! ```
+//!
+//! The guide sees the world when its images are taken, and windows open a latency and a load later. Frames follow one another, or the
+//! guide works on the next one while this one is exposed ([`FrameClock::pipelined`]).
+//!
+//! **What is simulated again.** Only work whose result is provably the one of the frame before is left out, so pictures are the same
+//! without ([`DriveSettings::reuse`]). Start values that are those of the frame before need no load at gate level. Ray casting and light
+//! of a world that has not moved stand. A histogram is a pure function of start value, light, macropixel and the seed of photons: with
+//! [`Noise::Fresh`], where every frame has photons of its own, none is reused; with [`Noise::Still`] a macropixel has the same photons in
+//! every frame, and is exposed anew only where its light or start value has changed.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use super::frame::{FrameError, FrameSettings};
+use super::pixel::PixelDepth;
+use super::policy::{Pointing, WindowPolicy};
+use super::ranger::{Known, Ranger};
+use super::result::PhaseTimes;
+use super::summary::Summary;
+use crate::chip::Exposure;
+use crate::engine::{Expose, Histograms, LitPixel, Work, expose, load, stream_config};
+use crate::guide::{GuideInput, GuideMap, PastFrame};
+use crate::netlist::Netlist;
+use crate::photon::{PhotonStream, PixelLight, SpadModel};
+use crate::scene::{DVec3, GroundTruth, Scene};
+use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
+
+/// Frames that a guide may look back on.
+const REMEMBERED: usize = 4;
+
+/// Where the photons of a frame come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Noise {
+    /// Every frame has photons and guide errors of its own.
+    #[default]
+    Fresh,
+    /// A macropixel has the same photons in every frame, as long as its light and start value are the same.
+    Still,
+}
+
+/// When the parts of a frame begin and end.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct FrameClock {
+    /// From the cameras' exposure to the guide's map, s.
+    pub guide_latency_s: f64,
+    /// The guide works on the next frame while this one is loaded, exposed and read out.
+    pub pipelined: bool,
+}
+
+impl Default for FrameClock {
+    /// The demonstrator's: 145 ms for everything before the exposure, one after the other (Fig. 106).
+    fn default() -> Self {
+        FrameClock {
+            guide_latency_s: 0.145,
+            pipelined: false,
+        }
+    }
+}
+
+/// When what happened in a frame, s on the scene's clock.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct FrameTimes {
+    /// The cameras see the world.
+    pub images_s: f64,
+    /// The guide's map is there, and the load begins.
+    pub load_s: f64,
+    /// The first laser cycle begins.
+    pub exposure_s: f64,
+    /// The last one has ended, and the readout begins.
+    pub readout_s: f64,
+    /// The histograms are out.
+    pub end_s: f64,
+}
+
+impl FrameTimes {
+    /// The middle of the exposure, for which depths hold, s.
+    pub fn middle_s(&self) -> f64 {
+        0.5 * (self.exposure_s + self.readout_s)
+    }
+}
+
+/// Everything that a drive depends on.
+#[derive(Debug, Clone)]
+pub struct DriveSettings {
+    /// What each frame depends on; its scene is the one at time 0, its seed that of the drive.
+    pub frame: FrameSettings,
+    /// How windows follow from the guide.
+    pub policy: WindowPolicy,
+    /// How long the parts of a frame take.
+    pub clock: FrameClock,
+    /// Parts of an exposure in which the world stands still, at least 1.
+    pub segments: u32,
+    /// Where photons come from.
+    pub noise: Noise,
+    /// Leave out what is provably the same as in the frame before; without it everything is simulated anew, for the same pictures.
+    pub reuse: bool,
+    /// Macropixels whose SPADs may be on, row-major; `None` for all.
+    pub only: Option<Vec<bool>>,
+    /// The time of the scene at which the first images are taken, s.
+    pub start_s: f64,
+}
+
+/// What was not simulated again in a frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Reused {
+    /// The load at gate level.
+    pub load: bool,
+    /// Ray casting and light.
+    pub world: bool,
+    /// Macropixels with the histogram and depth of the frame before.
+    pub macropixels: usize,
+}
+
+/// A frame of a drive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriveFrame {
+    /// Its number, from 0.
+    pub number: u32,
+    /// When what happened.
+    pub times: FrameTimes,
+    /// The guide's map.
+    pub guide: GuideMap,
+    /// What is there in the middle of the exposure.
+    pub truth: GroundTruth,
+    /// Counts.
+    pub histograms: Histograms,
+    /// Macropixels, row-major.
+    pub pixels: Vec<PixelDepth>,
+    /// Window of each macropixel, m, where it opens.
+    pub windows_m: Vec<Option<(f64, f64)>>,
+    /// Light's way there and back in one bin, as a distance, m.
+    pub bin_m: f64,
+    /// What the engine did, without what was reused.
+    pub work: Work,
+    /// What was left out.
+    pub reused: Reused,
+    /// What the simulation took.
+    pub run_times: PhaseTimes,
+}
+
+impl DriveFrame {
+    /// The frame in a few numbers.
+    pub fn summary(&self) -> Summary {
+        Summary::new(&self.pixels, self.bin_m)
+    }
+}
+
+/// A drive that goes on from frame to frame; its memory does not grow.
+#[derive(Debug)]
+pub struct Drive<'a> {
+    settings: &'a DriveSettings,
+    pointing: Pointing<'a>,
+    ranger: Ranger<'a>,
+    load_netlist: Netlist,
+    next: u32,
+    past: Vec<PastFrame>,
+    last: Option<Last>,
+}
+
+/// What the next frame may reuse.
+#[derive(Debug)]
+struct Last {
+    starts: Vec<u16>,
+    worlds: Vec<Scene>,
+    truth: GroundTruth,
+    light: Vec<PixelLight>,
+    lit: Vec<LitPixel>,
+    histograms: Histograms,
+    pixels: Vec<PixelDepth>,
+}
+
+impl<'a> Drive<'a> {
+    /// Before the first frame.
+    ///
+    /// # Errors
+    /// Bins in which no depths are found.
+    pub fn new(settings: &'a DriveSettings) -> Result<Self, FrameError> {
+        debug_assert!(settings.segments > 0);
+        let FrameSettings {
+            sensor,
+            scene,
+            exposure,
+            depth,
+            calibration,
+            ..
+        } = &settings.frame;
+        let calibration = calibration.as_ref();
+        Ok(Drive {
+            settings,
+            pointing: Pointing::new(settings.policy, sensor, exposure, calibration),
+            ranger: Ranger::new(sensor, exposure, scene, depth, calibration)?,
+            load_netlist: load::load_netlist(sensor),
+            next: 0,
+            past: Vec::new(),
+            last: None,
+        })
+    }
+
+    /// From one frame to the next, s.
+    pub fn period_s(&self) -> f64 {
+        let FrameClock {
+            guide_latency_s,
+            pipelined,
+        } = self.settings.clock;
+        let chip_s = self.chip_s().iter().sum::<f64>();
+        match pipelined {
+            true => guide_latency_s.max(chip_s),
+            false => guide_latency_s + chip_s,
+        }
+    }
+
+    /// What load, exposure and readout take, s.
+    pub fn chip_s(&self) -> [f64; 3] {
+        let FrameSettings {
+            sensor, exposure, ..
+        } = &self.settings.frame;
+        [sensor.load_time(), exposure.end(), sensor.readout_time()].map(Time::as_s)
+    }
+
+    fn times(&self, number: u32) -> FrameTimes {
+        let [load_s, exposure_s, readout_s] = self.chip_s();
+        let images = self.settings.start_s + f64::from(number) * self.period_s();
+        let loads = images + self.settings.clock.guide_latency_s;
+        let exposes = loads + load_s;
+        let reads = exposes + exposure_s;
+        FrameTimes {
+            images_s: images,
+            load_s: loads,
+            exposure_s: exposes,
+            readout_s: reads,
+            end_s: reads + readout_s,
+        }
+    }
+
+    /// Takes the next frame; `exposed` is told of macropixels as they are done.
+    ///
+    /// # Errors
+    /// What the guide, the engine and the load path report.
+    pub fn frame(&mut self, exposed: impl Fn(usize) + Sync) -> Result<DriveFrame, FrameError> {
+        let DriveSettings {
+            frame,
+            segments,
+            noise,
+            reuse,
+            only,
+            ..
+        } = self.settings;
+        let FrameSettings {
+            sensor,
+            scene,
+            exposure,
+            ..
+        } = frame;
+        let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
+        let number = self.next;
+        let times = self.times(number);
+        let seed = match noise {
+            Noise::Fresh => seed_of(frame.seed, number),
+            Noise::Still => frame.seed,
+        };
+        let mut clock = Lap(Instant::now());
+        let mut run = PhaseTimes::default();
+        let mut reused = Reused::default();
+        let last = self.last.take();
+        let before = last.as_ref().filter(|_| *reuse);
+
+        let input = GuideInput {
+            scene: &scene.at(times.images_s),
+            rows,
+            cols,
+            seed,
+            time_s: times.middle_s(),
+            earlier: &self.past,
+            velocity_m_s: DVec3::ZERO,
+        };
+        let guide = frame.guide.estimate(&input)?;
+        run.guide_s = clock.lap();
+
+        let seen: Vec<Option<f64>> = last
+            .as_ref()
+            .map(|last| last.pixels.iter().map(|p| p.measured_m).collect())
+            .unwrap_or_default();
+        let mut wanted = self.pointing.windows(&guide, &seen);
+        for (start, is_on) in wanted.iter_mut().zip(only.iter().flatten()) {
+            *start = start.filter(|_| *is_on);
+        }
+        let farthest = sensor.largest_start();
+        let starts: Vec<u16> = wanted.iter().map(|s| s.unwrap_or(farthest)).collect();
+        run.windows_s = clock.lap();
+
+        reused.load = before.is_some_and(|last| last.starts == starts);
+        if !reused.load {
+            self.load(&starts)?;
+        }
+        run.load_s = clock.lap();
+
+        let worlds = worlds(scene, &times, *segments);
+        let (truth, light) = match before.filter(|last| last.worlds == worlds) {
+            Some(last) => {
+                reused.world = true;
+                (last.truth.clone(), last.light.clone())
+            }
+            None => {
+                let truths: Vec<GroundTruth> = worlds
+                    .par_iter()
+                    .map(|world| GroundTruth::render(world, rows, cols))
+                    .collect();
+                run.scene_s = clock.lap();
+                let spads = stream_config(sensor, exposure, seed, scene.pulse_sigma()).spads;
+                let light = light_of(&worlds, &truths, exposure, &spads);
+                let middle = truths.len() / 2;
+                (truths.into_iter().nth(middle).expect("one"), light)
+            }
+        };
+        let lit: Vec<LitPixel> = (0..)
+            .zip(starts.iter().zip(wanted.iter().zip(&light)))
+            .map(|(number, (&start, (wanted, light)))| LitPixel {
+                number,
+                start,
+                light: wanted.map(|_| light.clone()),
+            })
+            .collect();
+        run.light_s = clock.lap();
+
+        let same = before.filter(|_| *noise == Noise::Still);
+        let is_same = |pixel: usize| same.is_some_and(|last| last.lit[pixel] == lit[pixel]);
+        let (old, new): (Vec<usize>, Vec<usize>) = (0..lit.len()).partition(|&p| is_same(p));
+        let changed: Vec<LitPixel> = new.iter().map(|&pixel| lit[pixel].clone()).collect();
+        exposed(old.len());
+        let stream = stream_config(sensor, exposure, seed, scene.pulse_sigma());
+        let stream = PhotonStream::new(&scene.with_pulse(stream));
+        let engine: Box<dyn Expose> = frame.engine.expose(sensor, exposure);
+        let taken = expose(&*engine, &stream, &changed, exposed)?;
+        let mut histograms = Histograms::empty(lit.len(), sensor.bins);
+        for (&pixel, counts) in new.iter().zip(&taken.histograms) {
+            histograms[pixel].copy_from_slice(counts);
+        }
+        if let Some(last) = same {
+            for &pixel in &old {
+                histograms[pixel].copy_from_slice(&last.histograms[pixel]);
+            }
+        }
+        reused.macropixels = old.len();
+        run.exposure_s = clock.lap();
+
+        let pixels: Vec<PixelDepth> = (0..lit.len())
+            .into_par_iter()
+            .map(|pixel| {
+                let known = Known {
+                    pixel,
+                    start: wanted[pixel],
+                    true_m: truth.range_m[pixel],
+                    guide_m: guide.range_m[pixel],
+                };
+                let before = same.filter(|_| is_same(pixel));
+                match before.map(|last| last.pixels[pixel]) {
+                    Some(before) if known.is_of(&before) => before,
+                    _ => self.ranger.depth(&known, &histograms[pixel]),
+                }
+            })
+            .collect();
+        let windows_m = (wanted.par_iter().enumerate())
+            .map(|(pixel, start)| self.ranger.window_m(pixel, (*start)?))
+            .collect();
+        run.ranging_s = clock.lap();
+
+        self.remember(&times, &pixels, &histograms);
+        self.last = Some(Last {
+            starts,
+            worlds,
+            truth: truth.clone(),
+            light,
+            lit,
+            histograms: histograms.clone(),
+            pixels: pixels.clone(),
+        });
+        self.next += 1;
+        Ok(DriveFrame {
+            number,
+            times,
+            guide,
+            truth,
+            histograms,
+            pixels,
+            windows_m,
+            bin_m: self.ranger.bin_s() * SPEED_OF_LIGHT_M_PER_S / 2.0,
+            work: taken.work,
+            reused,
+            run_times: run,
+        })
+    }
+
+    /// The start values through the serial pin, at gate level.
+    fn load(&self, starts: &[u16]) -> Result<(), FrameError> {
+        let sensor = &self.settings.frame.sensor;
+        let load = load::load(sensor, &self.load_netlist, starts, &mut ());
+        let arrived = starts.iter().zip(&load.starts).enumerate();
+        for (pixel, (&sent, &found)) in arrived {
+            if found != Some(sent) {
+                let (row, col) = (pixel / sensor.cols, pixel % sensor.cols);
+                return Err(FrameError::Load {
+                    row,
+                    col,
+                    sent,
+                    found,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn remember(&mut self, times: &FrameTimes, pixels: &[PixelDepth], histograms: &Histograms) {
+        if self.past.len() == REMEMBERED {
+            self.past.remove(0);
+        }
+        self.past.push(PastFrame {
+            time_s: times.exposure_s,
+            range_m: pixels.iter().map(|p| p.measured_m).collect(),
+            counts: (histograms.iter())
+                .map(|counts| counts.iter().map(|&n| u32::from(n)).sum())
+                .collect(),
+        });
+    }
+}
+
+/// The seed of a frame's photons and guide errors: SplitMix64 of the drive's, so that no frame has those of another drive's next one.
+fn seed_of(seed: u64, frame: u32) -> u64 {
+    let mut z = seed ^ u64::from(frame).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// The world in the middle of each segment of an exposure; one, if it does not move.
+fn worlds(scene: &Scene, times: &FrameTimes, segments: u32) -> Vec<Scene> {
+    let length_s = (times.readout_s - times.exposure_s) / f64::from(segments);
+    let middle_s = |n: u32| times.exposure_s + (f64::from(n) + 0.5) * length_s;
+    match scene.is_still() {
+        true => vec![scene.at(0.0)],
+        false => (0..segments).map(|n| scene.at(middle_s(n))).collect(),
+    }
+}
+
+/// The light of an exposure on every macropixel: what stays the same in all worlds is the plain light of one. Light whose SPADs
+/// differ cannot change within an exposure, and is that of its middle.
+fn light_of(
+    worlds: &[Scene],
+    truths: &[GroundTruth],
+    exposure: &Exposure,
+    spads: &SpadModel,
+) -> Vec<PixelLight> {
+    let cycle_s = exposure.stop(1).as_s();
+    let cycles = exposure.laser_cycles;
+    let lights: Vec<Vec<PixelLight>> = worlds
+        .iter()
+        .zip(truths)
+        .map(|(world, truth)| world.light_during(truth, spads, cycles, cycle_s))
+        .collect();
+    let parts = worlds.len() as u64;
+    let first_cycle = |n: usize| (n as u64 * u64::from(exposure.laser_cycles) / parts) as u32;
+    (0..lights[0].len())
+        .map(|pixel| {
+            let mut segments: Vec<(u32, PixelLight)> = Vec::new();
+            for (n, light) in lights.iter().enumerate() {
+                let is_new = segments
+                    .last()
+                    .is_none_or(|(_, last)| *last != light[pixel]);
+                // Of more segments than laser cycles some have none.
+                let begins = segments
+                    .last()
+                    .is_none_or(|&(first, _)| first < first_cycle(n));
+                if is_new && begins {
+                    segments.push((first_cycle(n), light[pixel].clone()));
+                }
+            }
+            match segments.len() {
+                1 => segments.swap_remove(0).1,
+                _ => PixelLight::timeline(segments)
+                    .unwrap_or_else(|_| lights[worlds.len() / 2][pixel].clone()),
+            }
+        })
+        .collect()
+}
+
+/// Splits elapsed time.
+struct Lap(Instant);
+
+impl Lap {
+    fn lap(&mut self) -> f64 {
+        let lap = self.0.elapsed().as_secs_f64();
+        self.0 = Instant::now();
+        lap
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chip::SensorConfig;
+    use crate::engine::CohortOptions;
+    use crate::guide::NoisyTruth;
+    use crate::ranging::DepthOptions;
+    use crate::scene::{Object, Shape};
+    use crate::system::EngineKind;
+    use proptest::prelude::*;
+    use std::sync::Arc;
+
+    /// A ball that crosses the field of view before a wall.
+    fn crossing(speed_m_s: f64) -> Scene {
+        let mut scene = Scene::outdoor();
+        let wall = Shape::Plane {
+            centre_m: DVec3::new(0.0, 0.0, 60.0),
+            normal: DVec3::NEG_Z,
+            width_m: 1e3,
+            height_m: 1e3,
+        };
+        let ball = Shape::Sphere {
+            centre_m: DVec3::new(-3.0, 0.0, 40.0),
+            radius_m: 2.0,
+        };
+        scene.objects = vec![
+            Object::new("wall", 0.3, wall),
+            Object::new("ball", 0.5, ball),
+        ];
+        scene.objects[1].velocity_m_s = DVec3::new(speed_m_s, 0.0, 0.0);
+        scene
+    }
+
+    fn settings(scene: Scene, noise: Noise) -> DriveSettings {
+        let sensor = SensorConfig {
+            rows: 6,
+            cols: 8,
+            ..SensorConfig::default()
+        };
+        let exposure = Exposure::new(&sensor, 520, 200);
+        let truth = NoisyTruth {
+            sigma_m: 0.0,
+            ..NoisyTruth::default()
+        };
+        DriveSettings {
+            frame: FrameSettings {
+                sensor,
+                scene,
+                exposure,
+                seed: 7,
+                engine: EngineKind::Window,
+                cohort: CohortOptions::default(),
+                tolerance_m: None,
+                skip: true,
+                depth: DepthOptions::default(),
+                calibration: None,
+                guide: Arc::new(truth),
+            },
+            policy: WindowPolicy::default(),
+            clock: FrameClock {
+                guide_latency_s: 0.1,
+                pipelined: false,
+            },
+            segments: 2,
+            noise,
+            reuse: true,
+            only: None,
+            start_s: 0.0,
+        }
+    }
+
+    fn frames(settings: &DriveSettings, number: u32) -> Vec<DriveFrame> {
+        let mut drive = Drive::new(settings).unwrap();
+        (0..number).map(|_| drive.frame(|_| {}).unwrap()).collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(6))]
+
+        #[test]
+        fn pictures_are_the_same_without_reuse(
+            speed_m_s in prop_oneof![Just(0.0), -8.0f64..8.0],
+            is_still: bool,
+            seed: u64,
+        ) {
+            let noise = if is_still { Noise::Still } else { Noise::Fresh };
+            let mut settings = settings(crossing(speed_m_s), noise);
+            settings.frame.seed = seed;
+            let with = frames(&settings, 3);
+            settings.reuse = false;
+            let without = frames(&settings, 3);
+            for (with, without) in with.iter().zip(&without) {
+                prop_assert_eq!(&with.histograms, &without.histograms);
+                prop_assert_eq!(&with.pixels, &without.pixels);
+                prop_assert_eq!(&with.windows_m, &without.windows_m);
+                prop_assert_eq!(without.reused, Reused::default());
+            }
+        }
+    }
+
+    #[test]
+    fn only_what_changed_is_exposed_again_where_photons_are_still() {
+        let moving = frames(&settings(crossing(5.0), Noise::Still), 3);
+        let pixels = moving[0].pixels.len();
+        assert_eq!(moving[0].reused.macropixels, 0);
+        assert!((pixels / 2..pixels).contains(&moving[1].reused.macropixels));
+        assert!(!moving[1].reused.world);
+        let still = frames(&settings(crossing(0.0), Noise::Still), 2);
+        assert_eq!(still[1].reused.macropixels, pixels);
+        assert!(still[1].reused.world && still[1].reused.load);
+        assert_eq!(still[0].histograms, still[1].histograms);
+        let fresh = frames(&settings(crossing(0.0), Noise::Fresh), 2);
+        assert_eq!(fresh[1].reused.macropixels, 0);
+        assert_ne!(fresh[0].histograms, fresh[1].histograms);
+    }
+
+    #[test]
+    fn the_guide_sees_the_world_of_its_images_and_the_exposure_a_later_one() {
+        let mut scene = crossing(0.0);
+        scene.objects[0].velocity_m_s = DVec3::new(0.0, 0.0, 10.0);
+        let drive = settings(scene, Noise::Fresh);
+        for frame in frames(&drive, 2) {
+            let age_s = frame.times.middle_s() - frame.times.images_s;
+            assert!(age_s > 0.1);
+            for (guide, truth) in frame.guide.range_m.iter().zip(&frame.truth.range_m) {
+                let moved_m = truth.unwrap() - guide.unwrap();
+                // Worlds of an exposure are segments: that of the second half is the nearest to its middle.
+                let off_m = 10.0 * (frame.times.readout_s - frame.times.exposure_s) / 4.0;
+                let is_wall = frame.truth.range_m.len() == 48 && truth.unwrap() > 59.0;
+                let expected_m = if is_wall { 10.0 * age_s + off_m } else { 0.0 };
+                assert!((moved_m - expected_m).abs() < 0.1, "{moved_m} {expected_m}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_pipelined_guide_makes_frames_come_as_fast_as_the_slower_part() {
+        let mut settings = settings(crossing(0.0), Noise::Fresh);
+        let chip_s: f64 = Drive::new(&settings).unwrap().chip_s().iter().sum();
+        let period_s = |settings: &DriveSettings| Drive::new(settings).unwrap().period_s();
+        assert!((period_s(&settings) - 0.1 - chip_s).abs() < 1e-12);
+        settings.clock.pipelined = true;
+        assert_eq!(period_s(&settings), 0.1f64.max(chip_s));
+        settings.start_s = 3.0;
+        let times: Vec<f64> = frames(&settings, 2)
+            .iter()
+            .map(|f| f.times.images_s)
+            .collect();
+        assert!((times[0] - 3.0).abs() < 1e-12 && (times[1] - 3.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn light_in_motion_is_a_timeline_where_something_moves_and_plain_elsewhere() {
+        let settings = settings(crossing(40.0), Noise::Fresh);
+        let times = FrameTimes {
+            images_s: 0.0,
+            load_s: 0.0,
+            exposure_s: 0.0,
+            readout_s: 0.1,
+            end_s: 0.1,
+        };
+        let worlds = worlds(&settings.frame.scene, &times, 4);
+        let truths: Vec<GroundTruth> = worlds
+            .iter()
+            .map(|w| GroundTruth::render(w, 6, 8))
+            .collect();
+        let light = light_of(
+            &worlds,
+            &truths,
+            &settings.frame.exposure,
+            &SpadModel::default(),
+        );
+        let parts: Vec<usize> = light.iter().map(|light| light.segments().count()).collect();
+        assert!(parts.contains(&1) && parts.iter().any(|&n| n > 1));
+        let (spads, exposure) = (SpadModel::default(), &settings.frame.exposure);
+        let lights: Vec<Vec<PixelLight>> = (worlds.iter().zip(&truths))
+            .map(|(world, truth)| world.light_during(truth, &spads, exposure.laser_cycles, 1e-6))
+            .collect();
+        for (pixel, &parts) in parts.iter().enumerate() {
+            let changes = lights
+                .windows(2)
+                .filter(|two| two[0][pixel] != two[1][pixel]);
+            assert_eq!(parts, 1 + changes.count(), "{pixel}");
+        }
+    }
+}
