@@ -88,25 +88,27 @@ pub(crate) fn car(demonstrator: &Demonstrator, mph: f64, seed: u64) -> Show {
 
 /// A pedestrian and a car in fogs of several visibilities, which is not published (Fig. 101).
 pub(crate) fn fog(demonstrator: &Demonstrator, seed: u64) -> Vec<Show> {
-    [400.0, 200.0, 150.0, 120.0, 100.0]
-        .into_iter()
-        .map(|visibility_m| {
-            let scene = scenes::fog(visibility_m);
-            let name = format!("fog_{visibility_m:.0}m");
-            let mut show = of(demonstrator, name, scene.clone(), "car", seed);
-            show.targets.push(Target::in_scene(&scene, "pedestrian"));
-            // The car is 30 m away at first, and 60 m when it stops.
-            show.settings.start_s = FOG_START_S;
-            show.frames = 3;
-            show.pictures = vec![2];
-            show.compares = visibility_m == 150.0;
-            show
-        })
-        .collect()
+    let at = |visibility_m: f64, target: &'static str, start_s: f64| {
+        let scene = scenes::fog(visibility_m);
+        let name = format!("fog_{visibility_m:.0}m_{target}");
+        let mut show = of(demonstrator, name, scene, target, seed);
+        show.settings.start_s = start_s;
+        show.frames = 2;
+        show.pictures = vec![1];
+        show
+    };
+    let mut shows = vec![at(150.0, "pedestrian", WHILE_THE_PEDESTRIAN_CROSSES_S)];
+    shows[0].compares = true;
+    let cars = [400.0, 300.0, 200.0, 150.0];
+    shows.extend(cars.map(|visibility_m| at(visibility_m, "car", WITH_THE_CAR_FAR_S)));
+    shows
 }
 
-/// When the frames of the fog begin, s: the car has 58 m by the middle of the first exposure, and 60 m in the third.
-const FOG_START_S: f64 = 5.3;
+/// When the frames of the fog begin that are about the pedestrian, s: 18 m ahead and 1 m to the right by then.
+const WHILE_THE_PEDESTRIAN_CROSSES_S: f64 = 1.0;
+
+/// And those about the car: it has 60 m by the middle of the first exposure, where it stops.
+const WITH_THE_CAR_FAR_S: f64 = 5.65;
 
 /// A figure behind a glass door (Fig. 102).
 pub(crate) fn glass(demonstrator: &Demonstrator, seed: u64) -> Vec<Show> {
