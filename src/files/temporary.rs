@@ -78,6 +78,8 @@ impl Temporary {
             let path = folder.join(fresh_name());
             let file = match create(&path) {
                 Err(e) if e.kind() == io::ErrorKind::AlreadyExists => continue,
+                // Made, but taken for a leftover by another run before it was opened.
+                Err(e) if e.kind() == io::ErrorKind::NotFound && folder.is_dir() => continue,
                 other => other?,
             };
             lock::wait_for(&file);
