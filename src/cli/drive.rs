@@ -9,11 +9,11 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use super::guiding::GuideArgs;
 use super::{SceneArgs, say, wording};
-use crate::chip::{SensorConfig, WindowLaw};
+use crate::chip::SensorConfig;
 use crate::engine::{CohortOptions, Work};
 use crate::files::{InputError, MANIFEST, ResultSet};
-use crate::guide::options;
 use crate::ranging::DepthOptions;
 use crate::report::{Cell, DepthMap, NpyStack, Table};
 use crate::scene::Scene;
@@ -54,10 +54,10 @@ pub(super) struct DriveArgs {
     /// The guide works on the next frame while this one is loaded, exposed and read out.
     #[arg(long)]
     pipelined: bool,
-    /// What tells where targets are, as NAME or NAME:KEY=VALUE,…: stereo, truth, monocular, radar, kalman or file; several are fused.
-    #[arg(long, value_name = "GUIDE", default_value = "stereo")]
-    guide: Vec<String>,
-    /// Macropixels hold the peak that they have found, step their window in doubt, and take over estimates of neighbours.
+    #[command(flatten)]
+    guiding: GuideArgs,
+    /// Begin with the window policy for sequences, which --windows changes: macropixels hold the peak that they have found, step
+    /// their window in doubt, and take over estimates of neighbours.
     #[arg(long)]
     tracking: bool,
     /// Time of the scene at which the first images are taken, s.
@@ -134,8 +134,10 @@ struct Configuration<'a> {
     laser_cycles: u32,
     seed: u64,
     engine: EngineKind,
-    guide: &'a str,
-    tracking: bool,
+    /// As they were asked for; none for the camera pair.
+    guides: &'a [String],
+    windows: WindowPolicy,
+    calibration: Option<&'a Path>,
     start_s: f64,
     clock: FrameClock,
     segments: u32,
@@ -150,12 +152,16 @@ struct Configuration<'a> {
 pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     let scene_args = args.scene.or_file(args.world);
     let (sensor, scene) = scene_args.read()?;
-    let exposure = wording::exposure(&sensor, args.stop_periods, args.laser_cycles)?;
-    if let Some(why) = WindowLaw::new(&sensor, &exposure).refusal() {
-        let (why, cure) = wording::of_no_aim(&why);
-        let message = format!("{why}, so the guide cannot aim time windows; {cure}");
-        return Err(InputError::new("--sensor", message).into());
-    }
+    let policy = match args.tracking {
+        true => WindowPolicy::for_sequences(),
+        false => WindowPolicy::default(),
+    };
+    let (guide, policy) = args.guiding.read(policy)?;
+    let wanted = (args.stop_periods, args.seed);
+    let (sensor, stop_periods) =
+        args.guiding
+            .with_bins((&*guide, &policy), sensor, &scene, wanted)?;
+    let exposure = wording::guided_exposure(&sensor, stop_periods, args.laser_cycles)?;
     if !(0.0..=1e5).contains(&args.guide_latency_ms) {
         let message = format!(
             "{} is no latency; give milliseconds, 0 to 100000",
@@ -186,12 +192,9 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
             skip: true,
             depth: DepthOptions::default(),
             calibration,
-            guide: options::parse_all(args.guide.iter().map(String::as_str), "--guide")?,
+            guide,
         },
-        policy: match args.tracking {
-            true => WindowPolicy::for_sequences(),
-            false => WindowPolicy::default(),
-        },
+        policy,
         clock: FrameClock {
             guide_latency_s: args.guide_latency_ms * 1e-3,
             pipelined: args.pipelined,
@@ -206,12 +209,13 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         scene_name: scene_args.scene_name(),
         scene: &settings.frame.scene,
         sensor: &settings.frame.sensor,
-        stop_periods: args.stop_periods,
+        stop_periods,
         laser_cycles: args.laser_cycles,
         seed: args.seed,
         engine: args.engine,
-        guide: settings.frame.guide.name(),
-        tracking: args.tracking,
+        guides: args.guiding.guides(),
+        windows: settings.policy,
+        calibration: args.calibration.as_deref(),
         start_s: args.start_s,
         clock: settings.clock,
         segments: args.segments,

@@ -105,13 +105,8 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     let (sensor, stop_periods) =
         args.guiding
             .with_bins((&*guide, &policy), sensor, &scene, wanted)?;
-    let exposure = wording::exposure(&sensor, stop_periods, args.laser_cycles)?;
+    let exposure = wording::guided_exposure(&sensor, stop_periods, args.laser_cycles)?;
     let chosen = chosen_probes(&args.probe, &sensor)?;
-    if let Some(why) = WindowLaw::new(&sensor, &exposure).refusal() {
-        let (why, cure) = wording::of_no_aim(&why);
-        let message = format!("{why}, so the guide cannot aim time windows; {cure}");
-        return Err(InputError::new("--sensor", message).into());
-    }
     let silicon = Silicon::nominal(sensor.corner);
     let timing = TimingVerdict::of(&sensor, &silicon, (0, 0)).report();
     if let Some(metres) = args.tolerance.filter(|m| !(m.is_finite() && *m >= 0.0)) {

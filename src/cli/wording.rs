@@ -2,7 +2,7 @@
 
 use crate::chip::race::{Cure, NoAim};
 use crate::chip::window_law::Irregular;
-use crate::chip::{Exposure, ExposureError, SensorConfig};
+use crate::chip::{Exposure, ExposureError, SensorConfig, WindowLaw};
 use crate::engine::EngineError;
 use crate::files::InputError;
 use crate::system::FrameError;
@@ -115,6 +115,26 @@ pub(super) fn exposure(
         };
         InputError::new(option, fault.to_string())
     })
+}
+
+/// As [`exposure`], of a sensor whose windows a guide can aim.
+///
+/// # Errors
+/// As those of [`exposure`], and a sensor whose windows cannot be aimed.
+pub(super) fn guided_exposure(
+    config: &SensorConfig,
+    stop_periods: u32,
+    laser_cycles: u32,
+) -> Result<Exposure, InputError> {
+    let exposure = exposure(config, stop_periods, laser_cycles)?;
+    match WindowLaw::new(config, &exposure).refusal() {
+        None => Ok(exposure),
+        Some(why) => {
+            let (why, cure) = of_no_aim(&why);
+            let message = format!("{why}, so the guide cannot aim time windows; {cure}");
+            Err(InputError::new("--sensor", message))
+        }
+    }
 }
 
 #[cfg(test)]

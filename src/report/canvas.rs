@@ -2,8 +2,8 @@
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
-pub(super) const WEIGHT: FontWeight = FontWeight::Regular;
-pub(super) const SIZE: RasterHeight = RasterHeight::Size16;
+const WEIGHT: FontWeight = FontWeight::Regular;
+const SIZE: RasterHeight = RasterHeight::Size16;
 
 /// Width of a character, px.
 pub(super) const CHARACTER_WIDTH_PX: usize = get_raster_width(WEIGHT, SIZE);
@@ -67,20 +67,26 @@ impl Canvas {
     /// `shades` are the palette's colours from paper to ink; the first leaves what is there.
     pub(super) fn text(&mut self, left: usize, top: usize, text: &str, shades: &[u8]) {
         debug_assert!(shades.len() > 1, "no ink");
-        for (i, character) in text.chars().enumerate() {
-            let is_printable = (' '..='~').contains(&character);
-            let character = if is_printable { character } else { '?' };
-            let Some(glyph) = get_raster(character, WEIGHT, SIZE) else {
-                continue;
-            };
-            for (y, row) in glyph.rows().enumerate() {
-                for (x, &ink) in row.iter().enumerate() {
-                    let shade = (usize::from(ink) * (shades.len() - 1) + 127) / 255;
-                    if shade > 0 {
-                        let x = left + i * CHARACTER_WIDTH_PX + x;
-                        self.fill(x, top + y, 1, 1, shades[shade]);
-                    }
-                }
+        letters(text, |x, y, ink| {
+            let shade = (usize::from(ink) * (shades.len() - 1) + 127) / 255;
+            if shade > 0 {
+                self.fill(left + x, top + y, 1, 1, shades[shade]);
+            }
+        });
+    }
+}
+
+/// Tells `put` of every pixel of a line of text: column, row and ink, 0 to 255. A character outside printable ASCII becomes `?`.
+pub(super) fn letters(text: &str, mut put: impl FnMut(usize, usize, u8)) {
+    for (i, character) in text.chars().enumerate() {
+        let is_printable = (' '..='~').contains(&character);
+        let character = if is_printable { character } else { '?' };
+        let Some(glyph) = get_raster(character, WEIGHT, SIZE) else {
+            continue;
+        };
+        for (y, row) in glyph.rows().enumerate() {
+            for (x, &ink) in row.iter().enumerate() {
+                put(i * CHARACTER_WIDTH_PX + x, y, ink);
             }
         }
     }

@@ -5,9 +5,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
-use noto_sans_mono_bitmap::get_raster;
-
-use super::canvas::{CHARACTER_WIDTH_PX, LINE_PX, SIZE, WEIGHT};
+use super::canvas::{CHARACTER_WIDTH_PX, LINE_PX, letters};
 use super::colour::{Rgb, scale_colour};
 use crate::files::{InputError, OutputFile};
 
@@ -106,22 +104,13 @@ impl Picture {
 
     /// Writes text from its top left corner; a character outside printable ASCII becomes `?`.
     pub(crate) fn text(&mut self, (left, top): (usize, usize), text: &str, colour: Rgb) {
-        for (i, character) in text.chars().enumerate() {
-            let is_printable = (' '..='~').contains(&character);
-            let character = if is_printable { character } else { '?' };
-            let Some(glyph) = get_raster(character, WEIGHT, SIZE) else {
-                continue;
-            };
-            for (y, row) in glyph.rows().enumerate() {
-                for (x, &ink) in row.iter().enumerate() {
-                    let (x, y) = (left + i * CHARACTER_WIDTH_PX + x, top + y);
-                    if ink > 0 && x < self.width && y < self.height {
-                        let below = &mut self.pixels[y * self.width + x];
-                        *below = mixed(*below, colour, f64::from(ink) / 255.0);
-                    }
-                }
+        letters(text, |x, y, ink| {
+            let (x, y) = (left + x, top + y);
+            if ink > 0 && x < self.width && y < self.height {
+                let below = &mut self.pixels[y * self.width + x];
+                *below = mixed(*below, colour, f64::from(ink) / 255.0);
             }
-        }
+        });
     }
 
     /// A raster of cells, row by row, each `cell` pixels wide and high.

@@ -8,7 +8,6 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
 
 use rayon::prelude::*;
 
@@ -17,6 +16,7 @@ use super::policy::{Pointing, WindowPolicy};
 use super::ranger::{Known, Ranger};
 use super::remark::Circumstances;
 use super::result::{Frame, PhaseTimes};
+use super::stopwatch::Stopwatch;
 use super::tolerance::Tolerance;
 use crate::chip::{Exposure, SensorConfig};
 use crate::engine::waveform::{self, View, WaveCycles};
@@ -26,6 +26,7 @@ use crate::engine::{
 };
 use crate::files::InputError;
 use crate::guide::{Guide, GuideError, GuideInput, GuideMap};
+use crate::netlist::Netlist;
 use crate::photon::{PhotonStream, SpadEvent, StreamConfig};
 use crate::ranging::{BinProfile, DepthOptions, UnequalBins};
 use crate::scene::{GroundTruth, Scene};
@@ -286,20 +287,7 @@ pub fn take_guided_frame(
     let farthest = sensor.largest_start();
     let starts: Vec<u16> = wanted.iter().map(|s| s.unwrap_or(farthest)).collect();
 
-    let load_netlist = load::load_netlist(sensor);
-    let load = load::load(sensor, &load_netlist, &starts, &mut ());
-    drop(load_netlist);
-    for (pixel, (&sent, &found)) in starts.iter().zip(&load.starts).enumerate() {
-        if found != Some(sent) {
-            let (row, col) = (pixel / sensor.cols, pixel % sensor.cols);
-            return Err(FrameError::Load {
-                row,
-                col,
-                sent,
-                found,
-            });
-        }
-    }
+    let load = load_starts(sensor, &load::load_netlist(sensor), &starts)?;
     times.load_s = clock.lap();
 
     let stream = stream_config(sensor, exposure, *seed, scene.pulse_sigma());
@@ -427,6 +415,29 @@ pub fn take_guided_frame(
     })
 }
 
+/// Sends start values through the serial pin of the load path, at gate level.
+///
+/// # Errors
+/// Another start value in the array than was sent.
+pub(super) fn load_starts(
+    sensor: &SensorConfig,
+    load_netlist: &Netlist,
+    starts: &[u16],
+) -> Result<load::Load, FrameError> {
+    let load = load::load(sensor, load_netlist, starts, &mut ());
+    let mut arrived = starts.iter().zip(&load.starts).enumerate();
+    let wrong = arrived.find(|(_, (sent, found))| **found != Some(**sent));
+    match wrong {
+        None => Ok(load),
+        Some((pixel, (&sent, &found))) => Err(FrameError::Load {
+            row: pixel / sensor.cols,
+            col: pixel % sensor.cols,
+            sent,
+            found,
+        }),
+    }
+}
+
 /// The refusal of a frame by the cohort engine, with how much of the frame it is about.
 fn refused_by(
     cohort: &Cohort,
@@ -462,20 +473,4 @@ fn run_probe(
     let format = WaveFormat::of(&probe.waves);
     waveform::record(&mut simulation, &probe.waves, format, &view, &mut ())?;
     Ok(simulation.histograms()?.into_counts())
-}
-
-/// Splits elapsed time into laps.
-struct Stopwatch(Instant);
-
-impl Stopwatch {
-    fn new() -> Self {
-        Stopwatch(Instant::now())
-    }
-
-    fn lap(&mut self) -> f64 {
-        let now = Instant::now();
-        let lap = now - self.0;
-        self.0 = now;
-        lap.as_secs_f64()
-    }
 }

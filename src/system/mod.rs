@@ -14,6 +14,7 @@ mod remark;
 mod result;
 mod speed;
 mod step_and_lock;
+mod stopwatch;
 mod summary;
 mod taken;
 mod tolerance;

@@ -52,6 +52,13 @@ pub(super) struct Scene {
     busy: f64,
 }
 
+/// Lengths of the shortest and the longest bin between these edges.
+pub(super) fn shortest_and_longest(edges_fs: &[f64]) -> [f64; 2] {
+    let widths = edges_fs.windows(2).map(|pair| pair[1] - pair[0]);
+    let shortest = widths.clone().fold(f64::INFINITY, f64::min);
+    [shortest, widths.fold(0.0, f64::max)]
+}
+
 /// How far a window looks back.
 #[derive(Debug, Clone, Copy)]
 struct Back {

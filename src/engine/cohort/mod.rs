@@ -31,7 +31,7 @@
 //! * A SPAD is to fire at most once in a bin: a shorter dead time is refused. So are measured laser pulses, and SPADs that
 //!   differ.
 //! * Bins of delay lines are the steps, unequal as they are; what is before a window is remembered in steps as long as the shortest
-//!   bin. An odd number of SPADs counts in them; light in which pulses meet on the photon line (`check_meetings`) is refused.
+//!   bin. An odd number of SPADs counts in them; light in which pulses meet on the photon line is refused (`events.rs`).
 //!
 //! So an exposure takes one step a bin, whatever light there is, and at most as many states as it has laser cycles.
 
@@ -41,6 +41,7 @@ mod blindness;
 mod cycles;
 mod draw;
 mod effort;
+mod events;
 mod fine;
 mod grid;
 mod hits;
@@ -62,6 +63,7 @@ pub use self::blindness::BlindSpad;
 use self::blindness::Blindness;
 use self::cycles::{Class, LikeCycles, Scene};
 pub use self::draw::none_of;
+use self::events::EventTable;
 pub use self::hits::at_least_hit;
 use self::secondaries::Secondaries;
 use self::spad_light::SpadLight;
@@ -69,24 +71,9 @@ use self::words::RandomWords;
 use super::{
     Engine, EngineError, Expose, Exposed, LitPixel, NotModelled, Work, follows, has_a_line_a_spad,
 };
-use crate::chip::{Exposure, Sensor, Tdc, WindowLaw, correlation, histogram, window_law};
+use crate::chip::{Exposure, Sensor, Tdc, WindowLaw, histogram, window_law};
 use crate::photon::{DeadTimeLaw, PhotonStream, PixelLight, Segment, SpadModel, StreamConfig};
 use crate::units::Time;
-
-/// Whether 0, 1, 2, … SPADs that fire in a CLK period make an event, up to all of a macropixel.
-#[derive(Debug, Clone)]
-struct EventTable(SmallVec<[bool; 17]>);
-
-impl EventTable {
-    fn new(spads: usize, is_event: impl Fn(usize) -> bool) -> Self {
-        EventTable((0..=spads).map(is_event).collect())
-    }
-
-    /// SPADs of a macropixel.
-    fn spads(&self) -> usize {
-        self.0.len() - 1
-    }
-}
 
 /// Steps of a window that need no memory of their own.
 const FEW_STEPS: usize = 16;
@@ -132,9 +119,6 @@ impl Default for CohortOptions {
 /// way.
 const WORTH_LOOKING_AT: f64 = 200.0;
 
-/// Counts of a bin that are no error.
-const MEETINGS_THAT_DO_NOT_COUNT: f64 = 0.01;
-
 /// Draws histograms from their distribution.
 #[derive(Clone)]
 pub struct Cohort {
@@ -167,14 +151,7 @@ impl Cohort {
     pub fn with_law(law: WindowLaw, options: CohortOptions) -> Self {
         let sensor = law.sensor().clone();
         debug_assert!(options.sub_bins != Some(0), "a period has a step");
-        let is_event = EventTable::new(sensor.spads(), |fired| {
-            // Each SPAD turns the photon line of a delay line over.
-            if sensor.tdc == Tdc::DelayLine {
-                return fired % 2 == 1;
-            }
-            let spads = ((1u128 << fired) - 1) as u64;
-            correlation::model(spads, sensor.event_type, sensor.threshold)
-        });
+        let is_event = EventTable::of(&sensor);
         Cohort {
             law,
             windows: vec![OnceLock::new(); usize::from(sensor.largest_start()) + 1],
@@ -375,11 +352,7 @@ impl Cohort {
         let clk_fs = 1e15 / stream.clock.as_hz();
         let [period_fs, longest_fs] = match &edges_fs {
             None => [clk_fs; 2],
-            Some(edges_fs) => {
-                let widths = edges_fs.windows(2).map(|pair| pair[1] - pair[0]);
-                let shortest = widths.clone().fold(f64::INFINITY, f64::min);
-                [shortest, widths.fold(0.0, f64::max)]
-            }
+            Some(edges_fs) => cycles::shortest_and_longest(edges_fs),
         };
         let dead_fs = stream.spads.dead_time.as_fs() as f64;
         let spads = &stream.spads;
@@ -412,7 +385,7 @@ impl Cohort {
                 NotModelled::SecondariesInFixedSteps,
             ),
             (
-                spads.crosstalk_probability > 0.0 && !self.is_any_spad(),
+                spads.crosstalk_probability > 0.0 && !self.is_event.is_any_spad(),
                 NotModelled::CrosstalkInCoincidence,
             ),
             (
@@ -432,7 +405,9 @@ impl Cohort {
             edges_fs,
         );
         if self.sensor.tdc == Tdc::DelayLine {
-            self.check_meetings(&scene, stream)?;
+            let stage = self.law.timing().photon_line_stage;
+            let (spads, error) = (self.sensor.spads(), self.options.error);
+            events::check_meetings(&scene, spads, stage, stream.laser_cycles, error)?;
         }
         let classes = scene.classes(&self.sensor, &self.law, &window, &self.options)?;
         let like = |class| self.like_cycles(&scene, spads, class);
@@ -451,8 +426,7 @@ impl Cohort {
         let blindness = match &scene.edges_fs {
             None => Blindness::new(spads.law, scene.dead_fs / step_fs),
             Some(edges_fs) => {
-                let widths = edges_fs.windows(2).map(|pair| pair[1] - pair[0]);
-                let longest_fs = widths.fold(0.0, f64::max);
+                let [_, longest_fs] = cycles::shortest_and_longest(edges_fs);
                 let [longest, shortest] = [longest_fs, step_fs].map(|fs| scene.dead_fs / fs);
                 Blindness::of_unequal(spads.law, longest, shortest)
             }
@@ -479,40 +453,6 @@ impl Cohort {
         })
     }
 
-    /// Two pulses that meet on a photon line leave no edge ([`photon_line`]). In one bin they cancel anyway; to either side of an
-    /// edge of a bin, which is all that is left out here, each bin loses a count.
-    ///
-    /// # Errors
-    /// Where that may put the mean of a bin off by more than [`CohortOptions::error`] of its counting noise: λ²·stage² of the laser
-    /// cycles at either edge, with λ photons on all SPADs, at most.
-    fn check_meetings(&self, scene: &Scene, stream: &StreamConfig) -> Result<(), EngineError> {
-        let stage_fs = self.law.timing().photon_line_stage.as_fs() as f64;
-        let spads = self.sensor.spads() as f64;
-        let cycles = f64::from(stream.laser_cycles);
-        for bin in 0..self.sensor.bins {
-            let [from_fs, until_fs] = [bin, bin + 1].map(|n| scene.from_fs + scene.edge_fs(n));
-            let meeting = [from_fs, until_fs].map(|edge_fs| {
-                let near = scene.light.most(edge_fs - stage_fs, 2.0 * stage_fs);
-                (0.5 * spads * near).powi(2)
-            });
-            let off = cycles * (meeting[0] + meeting[1]);
-            let photons = spads * scene.light.most(from_fs, until_fs - from_fs);
-            // Odd numbers of a Poisson variable.
-            let odd = -0.5 * libm::expm1(-2.0 * photons);
-            let noise = (cycles * odd * (1.0 - odd)).sqrt();
-            if off > self.options.error * noise + MEETINGS_THAT_DO_NOT_COUNT {
-                return Err(EngineError::NotInCohorts(NotModelled::Meetings { bin }));
-            }
-        }
-        Ok(())
-    }
-
-    /// Whether one SPAD makes an event, and more do, too.
-    fn is_any_spad(&self) -> bool {
-        let mut counts = self.is_event.0.iter().enumerate();
-        counts.all(|(spads, &is_event)| is_event == (spads > 0))
-    }
-
     /// Whether a bound shows that taking light to be even within a CLK period keeps the error, for events of any SPAD.
     ///
     /// With μ photons on each of n SPADs in a CLK period, n·μ·μ′·|Δ| of the events of a bin are amiss where a SPAD that was hit by
@@ -525,7 +465,7 @@ impl Cohort {
         class: &Class,
         steps: &Steps,
     ) -> bool {
-        if !self.is_any_spad() {
+        if !self.is_event.is_any_spad() {
             return false;
         }
         let Some(past) = scene.even_past(blindness.memory(), class) else {

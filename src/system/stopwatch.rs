@@ -1,0 +1,20 @@
+//! Elapsed time, split into laps.
+
+use std::time::Instant;
+
+/// Runs from when it was made.
+pub(super) struct Stopwatch(Instant);
+
+impl Stopwatch {
+    pub(super) fn new() -> Self {
+        Stopwatch(Instant::now())
+    }
+
+    /// Time since the last lap, or since the beginning, s.
+    pub(super) fn lap(&mut self) -> f64 {
+        let now = Instant::now();
+        let lap = now - self.0;
+        self.0 = now;
+        lap.as_secs_f64()
+    }
+}
