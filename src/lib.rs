@@ -26,6 +26,7 @@
 //! | [`ranging`] | depth from histograms |
 //! | [`report`] | pictures, arrays, tables |
 //! | [`system`] | one guided frame, end to end, and drives of many |
+//! | [`request`] | what a user asks for, read and checked |
 //! | `demo` | the demonstrator of the thesis before its scenes |
 //! | [`reproduce`] | the thesis's figures, published beside computed |
 //! | [`testbenches`] | the chip's blocks driven and checked at gate level, with waveforms |
@@ -47,6 +48,7 @@ pub mod photon;
 pub mod ranging;
 pub mod report;
 pub mod reproduce;
+pub mod request;
 pub mod scene;
 pub mod settings;
 pub mod stereo;

@@ -1,15 +1,15 @@
 //! `gdtof calibrate`: the bin profile of a sensor with delay lines, by a swept laser.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::{SensorArgs, say, wording};
-use crate::chip::{Sensor, SensorConfig, Tdc, WindowLaw};
-use crate::files::{InputError, OutputFile, read_text};
-use crate::ranging::BinProfile;
+use super::{SensorArgs, say};
+use crate::chip::{Sensor, Tdc, WindowLaw};
+use crate::files::{InputError, OutputFile};
 use crate::report::Table;
+use crate::request::{self, Spelling};
 use crate::system::{Calibrated, Sweep, SweepError, calibrate};
 use crate::units::Time;
 
@@ -60,9 +60,10 @@ pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
             return Err(InputError::new(option, message).into());
         }
     }
-    let exposure = wording::exposure(&config, args.stop_periods, args.laser_cycles)?;
+    let (stop_periods, laser_cycles) = (args.stop_periods, args.laser_cycles);
+    let exposure = request::exposure(&config, stop_periods, laser_cycles, Spelling::Options)?;
     if let Some(why) = WindowLaw::new(&config, &exposure).refusal() {
-        let (why, cure) = wording::of_no_aim(&why);
+        let (why, cure) = request::of_no_aim(&why, Spelling::Options);
         return Err(InputError::new("--sensor", format!("{why}; {cure}")).into());
     }
     let sweep = Sweep {
@@ -130,41 +131,4 @@ fn table(found: &Calibrated) -> Table {
         table.push("windows of a line differ by", text);
     }
     table
-}
-
-/// Reads a profile, which must be of this sensor.
-///
-/// # Errors
-/// A file that is none, and another sensor's.
-pub(super) fn read(path: &Path, sensor: &SensorConfig) -> Result<BinProfile, InputError> {
-    let text = read_text(path)?;
-    let profile: BinProfile = serde_json::from_str(&text).map_err(|error| {
-        let message = format!("this is no bin profile ({error}); make one with gdtof calibrate");
-        InputError::at(path.display(), error.line(), message)
-    })?;
-    let is_whole = profile.macropixels.len() == profile.sensor.pixels()
-        && profile.macropixels.iter().flatten().all(|line| {
-            let lengths = [line.middle_s.len(), line.length_s.len()];
-            lengths == [profile.sensor.bins; 2]
-                && line
-                    .length_s
-                    .iter()
-                    .chain(&line.middle_s)
-                    .all(|s| s.is_finite())
-        });
-    let refused = match profile.check(sensor) {
-        Ok(()) if sensor.tdc == Tdc::Clocked => {
-            Some("it is of delay lines, and this sensor's TDC is clocked".to_owned())
-        }
-        Ok(()) if is_whole => None,
-        Ok(()) => Some("it does not have every bin of every macropixel".to_owned()),
-        Err(other) => Some(other.to_string()),
-    };
-    match refused {
-        None => Ok(profile),
-        Some(why) => {
-            let message = format!("{why}; make one for this sensor with gdtof calibrate");
-            Err(InputError::new(path.display(), message))
-        }
-    }
 }

@@ -10,16 +10,16 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use super::guiding::GuideArgs;
-use super::{SceneArgs, say, wording};
+use super::{SceneArgs, say};
 use crate::chip::SensorConfig;
-use crate::engine::{CohortOptions, Work};
+use crate::engine::Work;
 use crate::files::{InputError, MANIFEST, ResultSet};
-use crate::ranging::DepthOptions;
 use crate::report::{Cell, DepthMap, NpyStack, Table};
+use crate::request::{FrameRequest, Spelling};
 use crate::scene::Scene;
 use crate::system::{
-    Drive, DriveFrame, DriveSettings, EngineKind, FrameClock, FrameSettings, FrameTimes, NoDepth,
-    Noise, PhaseTimes, Reused, Summary, WindowPolicy,
+    Drive, DriveFrame, DriveSettings, EngineKind, FrameClock, FrameTimes, NoDepth, Noise,
+    PhaseTimes, Reused, Summary, WindowPolicy,
 };
 
 /// Arguments of `gdtof drive`.
@@ -156,12 +156,17 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         true => WindowPolicy::for_sequences(),
         false => WindowPolicy::default(),
     };
-    let (guide, policy) = args.guiding.read(policy)?;
-    let wanted = (args.stop_periods, args.seed);
-    let (sensor, stop_periods) =
-        args.guiding
-            .with_bins((&*guide, &policy), sensor, &scene, wanted)?;
-    let exposure = wording::guided_exposure(&sensor, stop_periods, args.laser_cycles)?;
+    let request = args.guiding.ask(FrameRequest {
+        stop_periods: args.stop_periods,
+        laser_cycles: args.laser_cycles,
+        seed: args.seed,
+        engine: args.engine,
+        calibration: args.calibration.clone(),
+        spelling: Spelling::Options,
+        ..FrameRequest::default()
+    });
+    let policy = request.policy(policy)?;
+    let frame = request.settings_by(sensor, scene, request.guide()?, &policy)?;
     if !(0.0..=1e5).contains(&args.guide_latency_ms) {
         let message = format!(
             "{} is no latency; give milliseconds, 0 to 100000",
@@ -176,24 +181,8 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         );
         return Err(InputError::new("--start-s", message).into());
     }
-    let calibration = match &args.calibration {
-        Some(path) => Some(super::calibrate::read(path, &sensor)?),
-        None => None,
-    };
     let settings = DriveSettings {
-        frame: FrameSettings {
-            sensor,
-            scene,
-            exposure,
-            seed: args.seed,
-            engine: args.engine,
-            cohort: CohortOptions::default(),
-            tolerance_m: None,
-            skip: true,
-            depth: DepthOptions::default(),
-            calibration,
-            guide,
-        },
+        frame,
         policy,
         clock: FrameClock {
             guide_latency_s: args.guide_latency_ms * 1e-3,
@@ -209,7 +198,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         scene_name: scene_args.scene_name(),
         scene: &settings.frame.scene,
         sensor: &settings.frame.sensor,
-        stop_periods,
+        stop_periods: settings.frame.exposure.stop_periods,
         laser_cycles: args.laser_cycles,
         seed: args.seed,
         engine: args.engine,

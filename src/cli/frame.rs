@@ -11,16 +11,16 @@ use serde::Serialize;
 
 use self::pair::PairReport;
 use super::guiding::GuideArgs;
-use super::{SceneArgs, say, wording};
+use super::{SceneArgs, say};
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::WindowLaw;
 use crate::chip::{Mode, SensorConfig, Silicon};
+use crate::engine::Work;
 use crate::engine::waveform::WaveCycles;
-use crate::engine::{CohortOptions, Work};
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::guide::GuideMap;
-use crate::ranging::DepthOptions;
 use crate::report::{Table, write_npy_u16};
+use crate::request::{FrameRequest, Spelling};
 use crate::scene::Scene;
 use crate::system::{
     DistanceLaw, EngineKind, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Probe, Summary,
@@ -96,58 +96,22 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     let (sensor, scene) = args.scene.read()?;
     let pair = args.pair.take(&sensor, scene.clone(), &args.out)?;
     let scene = pair.as_ref().map_or(scene, |pair| pair.scene.clone());
-    let (named, policy) = args.guiding.read(WindowPolicy::default())?;
+    let request = args.request();
+    let policy = request.policy(WindowPolicy::default())?;
     let guide = match &pair {
-        Some(pair) if args.guiding.guides().is_empty() => pair.guide.clone(),
-        _ => named,
+        Some(pair) if request.guides.is_empty() => pair.guide.clone(),
+        _ => request.guide()?,
     };
-    let wanted = (args.stop_periods, args.seed);
-    let (sensor, stop_periods) =
-        args.guiding
-            .with_bins((&*guide, &policy), sensor, &scene, wanted)?;
-    let exposure = wording::guided_exposure(&sensor, stop_periods, args.laser_cycles)?;
     let chosen = chosen_probes(&args.probe, &sensor)?;
-    let silicon = Silicon::nominal(sensor.corner);
-    let timing = TimingVerdict::of(&sensor, &silicon, (0, 0)).report();
-    if let Some(metres) = args.tolerance.filter(|m| !(m.is_finite() && *m >= 0.0)) {
-        let message = format!("{metres} is no depth error; give metres, 0 or more");
-        return Err(InputError::new("--tolerance", message).into());
-    }
-    let rate = args.false_alarm_rate;
-    if !(rate > 0.0 && rate <= 1.0) {
-        let message = format!("{rate} is no share of macropixels; give a number above 0, up to 1");
-        return Err(InputError::new("--false-alarm-rate", message).into());
-    }
-    let calibration = match &args.calibration {
-        Some(path) => Some(super::calibrate::read(path, &sensor)?),
-        None => None,
-    };
+    let settings = request.settings_by(sensor, scene, guide, &policy)?;
+    let silicon = Silicon::nominal(settings.sensor.corner);
+    let timing = TimingVerdict::of(&settings.sensor, &silicon, (0, 0)).report();
     let results = ResultSet::begin(&args.out)?;
     let probe_at = |(row, col)| Probe {
         row,
         col,
         waves: results.staging().join(wave_name(args, (row, col))),
         wave_cycles: args.wave_cycles.unwrap_or_default(),
-    };
-    let settings = FrameSettings {
-        sensor,
-        scene,
-        exposure,
-        seed: args.seed,
-        engine: args.engine,
-        cohort: CohortOptions {
-            sub_bins: args.sub_bins.map(usize::from),
-            ..CohortOptions::default()
-        },
-        tolerance_m: args.tolerance,
-        skip: !args.no_skip,
-        depth: DepthOptions {
-            false_alarm_rate: rate,
-            correct_walk: !args.no_walk_correction,
-            ..DepthOptions::default()
-        },
-        calibration,
-        guide,
     };
     let progress = ProgressBar::new(settings.sensor.pixels() as u64).with_style(
         ProgressStyle::with_template("exposing {bar:40} {pos}/{len} macropixels, {eta} left")?,
@@ -197,6 +161,25 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
         }
     }
     Ok(())
+}
+
+impl FrameArgs {
+    fn request(&self) -> FrameRequest {
+        self.guiding.ask(FrameRequest {
+            stop_periods: self.stop_periods,
+            laser_cycles: self.laser_cycles,
+            seed: self.seed,
+            engine: self.engine,
+            sub_bins: self.sub_bins,
+            tolerance_m: self.tolerance,
+            skip: !self.no_skip,
+            false_alarm_rate: self.false_alarm_rate,
+            correct_walk: !self.no_walk_correction,
+            calibration: self.calibration.clone(),
+            spelling: Spelling::Options,
+            ..FrameRequest::default()
+        })
+    }
 }
 
 fn wave_cycles(text: &str) -> Result<WaveCycles, String> {

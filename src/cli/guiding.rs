@@ -1,15 +1,11 @@
 //! `--guide` and `--windows`: what tells where targets are, and what macropixels make of it.
 
-use std::sync::Arc;
-
 use clap::Args;
 
-use crate::chip::{SensorConfig, Tdc};
-use crate::files::InputError;
-use crate::guide::{BehaviouralStereo, Guide, GuideInput, options};
-use crate::scene::Scene;
+use crate::guide::options;
+use crate::request::FrameRequest;
 use crate::settings::Key;
-use crate::system::{FrameError, POLICY_KEYS, WindowPolicy};
+use crate::system::POLICY_KEYS;
 
 /// How windows are guided.
 #[derive(Args)]
@@ -27,49 +23,14 @@ pub(super) struct GuideArgs {
 }
 
 impl GuideArgs {
-    /// The guide, and `policy` with what is asked of it.
-    ///
-    /// # Errors
-    /// Unknown guides, bad keys and values, unreadable maps.
-    pub(super) fn read(
-        &self,
-        policy: WindowPolicy,
-    ) -> Result<(Arc<dyn Guide>, WindowPolicy), InputError> {
-        let policy = match &self.windows {
-            Some(text) => policy.with(text, "--windows")?,
-            None => policy,
-        };
-        if self.guides.is_empty() {
-            return Ok((Arc::new(BehaviouralStereo), policy));
+    /// Adds to a request what is asked of guide and windows.
+    pub(super) fn ask(&self, request: FrameRequest) -> FrameRequest {
+        FrameRequest {
+            guides: self.guides.clone(),
+            windows: self.windows.clone().unwrap_or_default(),
+            bins_from_guide: self.bins_from_guide,
+            ..request
         }
-        let guides = self.guides.iter().map(String::as_str);
-        Ok((options::parse_all(guides, "--guide")?, policy))
-    }
-
-    /// The sensor and the CLK periods of a laser cycle, with the bins that the guide's errors ask for, if that is wanted.
-    ///
-    /// # Errors
-    /// A guide without a map, and one that no bins hold.
-    pub(super) fn with_bins(
-        &self,
-        (guide, policy): (&dyn Guide, &WindowPolicy),
-        sensor: SensorConfig,
-        scene: &Scene,
-        (stop_periods, seed): (u32, u64),
-    ) -> anyhow::Result<(SensorConfig, u32)> {
-        if !self.bins_from_guide {
-            return Ok((sensor, stop_periods));
-        }
-        let input = GuideInput::still(scene, sensor.rows as u32, sensor.cols as u32, seed);
-        let map = guide.estimate(&input).map_err(FrameError::Guide)?;
-        let slowed = policy.slowed(&map, &sensor, stop_periods);
-        Ok(slowed.ok_or_else(|| {
-            let message = match sensor.tdc {
-                Tdc::DelayLine => "bins of delay lines do not follow CLK; leave it out",
-                Tdc::Clocked => "no CLK makes bins that hold what this guide claims; give another guide or a smaller --windows within",
-            };
-            InputError::new("--bins-from-guide", message)
-        })?)
     }
 
     /// Guides as they were asked for; none for the camera pair.

@@ -9,9 +9,10 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::{SceneArgs, say, wording};
+use super::{SceneArgs, say};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::report::{Axis, Chart, Grid, Style, aligned, width};
+use crate::request::{self, Spelling};
 use crate::system::pareto::{Done, GATE_CYCLES, Method, ParetoSettings, Point, Summary, summarise};
 
 /// Arguments of `gdtof pareto`.
@@ -120,7 +121,8 @@ pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
 
 fn settings(args: &ParetoArgs) -> Result<ParetoSettings, InputError> {
     let (sensor, scene) = args.scene.read()?;
-    wording::exposure(&sensor, args.stop_periods, args.laser_cycles)?;
+    let periods = (args.stop_periods, args.laser_cycles);
+    request::exposure(&sensor, periods.0, periods.1, Spelling::Options)?;
     let numbers = [
         ("--ranges", &args.ranges[..], 0.1, 1e4),
         ("--klux", &args.klux[..], 0.0, 1e3),

@@ -6,9 +6,10 @@ use clap::Args;
 
 use crate::bench::recording::{Recording, read_events, read_starts};
 use crate::chip::{Exposure, SensorConfig};
-use crate::cli::{SensorArgs, wording};
+use crate::cli::SensorArgs;
 use crate::files::InputError;
 use crate::photon::SpadEvent;
+use crate::request::{self, Spelling};
 
 /// What is replayed.
 #[derive(Args)]
@@ -63,7 +64,7 @@ impl Stimuli {
         events: &Path,
         (stop_periods, laser_cycles): (u32, u32),
     ) -> Result<Self, InputError> {
-        let exposure = wording::exposure(&config, stop_periods, laser_cycles)?;
+        let exposure = request::exposure(&config, stop_periods, laser_cycles, Spelling::Options)?;
         let starts = read_starts(inits, &config)?;
         let recording = read_events(events, &config, &exposure)?;
         let dropped = [

@@ -126,7 +126,7 @@ fn set_changes_single_keys_and_names_itself_in_complaints() {
             timing("clk_hz=3e8"),
             "give sensor.KEY=VALUE or scene.SECTION.KEY=VALUE",
         ),
-        (timing("scene.lidar.pde=0.1"), "this command reads no scene"),
+        (timing("scene.lidar.pde=0.1"), "no scene is read here"),
         (
             vec!["scene", "--set", "scene.object.bus.reflectivity=1"],
             "there is no object \"bus\"",

@@ -1,0 +1,21 @@
+//! What a user asks for, read and checked: a sensor and a scene by name, file and single keys, and a frame of them.
+//!
+//! ```text
+//!   names, files, KEY=VALUE ──► Sources ──► SensorConfig, Scene ─┐
+//!   counts, engine, guides ───► FrameRequest ────────────────────┴─► FrameSettings, WindowPolicy
+//! ```
+//!
+//! The command line, sweeps and Python all take this road, so that the same request has the same numbers whichever way it
+//! comes. What complaints call a setting is the [`Spelling`] of the way it came.
+
+mod calibration;
+mod frame;
+mod sources;
+mod spelling;
+mod wording;
+
+pub use self::calibration::read_calibration;
+pub use self::frame::{FRAME_KEYS, FrameRequest};
+pub use self::sources::Sources;
+pub use self::spelling::Spelling;
+pub use self::wording::{exposure, guided_exposure, is_bad_input, of_engine, of_no_aim, sentence};

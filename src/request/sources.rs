@@ -1,0 +1,145 @@
+//! A sensor and a scene: by name or file, with single keys set.
+//!
+//! ```text
+//!   sensor ────────┐                      scene ─────────┐
+//!   set sensor.… ──┼─► SensorConfig       set scene.… ───┴─► Scene
+//!   rows, cols ────┘
+//! ```
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::Spelling;
+use crate::chip::sensors::CHIPS;
+use crate::chip::{Sensor, SensorConfig};
+use crate::files::InputError;
+use crate::scene::Scene;
+use crate::settings::Document;
+
+/// Where a sensor and a scene come from. The default is QuantIC4x4 before the street.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Sources {
+    /// A sensor file (TOML), or one of the chips by name; a file of such a name comes first.
+    pub sensor: Option<PathBuf>,
+    /// A scene file (TOML), or one of the built-in scenes by name; a file of such a name comes first.
+    pub scene: Option<PathBuf>,
+    /// Macropixel rows, instead of the sensor's.
+    pub rows: Option<usize>,
+    /// Macropixel columns, instead of the sensor's.
+    pub cols: Option<usize>,
+    /// Single keys, as `sensor.clk_hz=300e6`, `sensor.clk_hz=300 MHz` or `scene.lidar.pde=0.2`; the last one counts.
+    pub set: Vec<String>,
+    /// What complaints call these settings.
+    #[serde(skip)]
+    pub spelling: Spelling,
+}
+
+impl Sources {
+    /// The sensor, where there is no scene.
+    ///
+    /// # Errors
+    /// Unreadable files, bad keys and values, and a key of anything but the sensor.
+    pub fn read_sensor(&self) -> Result<SensorConfig, InputError> {
+        self.read_sensor_with(None)
+    }
+
+    /// The sensor and the scene.
+    ///
+    /// # Errors
+    /// Unreadable files, bad keys and values.
+    pub fn read(&self) -> Result<(SensorConfig, Scene), InputError> {
+        let mut document = match &self.scene {
+            Some(path) => scene_document(path)?,
+            None => Scene::outdoor_document(),
+        };
+        let sensor = self.read_sensor_with(Some(&mut document));
+        let scene = Scene::read(&document);
+        match (sensor, scene) {
+            (Ok(sensor), Ok(scene)) => Ok((sensor, scene)),
+            (sensor, scene) => {
+                let faults = [sensor.err(), scene.err()];
+                InputError::all(faults.into_iter().flatten()).map(|()| unreachable!("one failed"))
+            }
+        }
+    }
+
+    fn read_sensor_with(
+        &self,
+        mut scene: Option<&mut Document>,
+    ) -> Result<SensorConfig, InputError> {
+        let mut sensor = match &self.sensor {
+            Some(path) => described(path)?,
+            None => Document::of("the sensor", toml::Table::new()),
+        };
+        for assignment in &self.set {
+            let option = format!("{} {assignment}", self.spelling.name("set"));
+            if let Some(rest) = assignment.strip_prefix("sensor.") {
+                sensor.assign(rest, &option)?;
+            } else if let Some(rest) = assignment.strip_prefix("scene.") {
+                let Some(scene) = &mut scene else {
+                    let message = "no scene is read here; leave it out";
+                    return Err(InputError::new(option, message));
+                };
+                scene.assign(rest, &option)?;
+            } else {
+                let message = "is no key of the sensor or scene; give sensor.KEY=VALUE or scene.SECTION.KEY=VALUE";
+                return Err(InputError::new(option, message));
+            }
+        }
+        for (key, value) in [("rows", self.rows), ("cols", self.cols)] {
+            if let Some(value) = value {
+                let value = i64::try_from(value).unwrap_or(i64::MAX);
+                sensor.set_value(key, value.into(), &self.spelling.name(key));
+            }
+        }
+        SensorConfig::read_document(&sensor)
+    }
+
+    /// What reports call the scene.
+    pub fn scene_name(&self) -> String {
+        match &self.scene {
+            Some(path) if is_name(path) => format!("built-in {}", path.display()),
+            Some(path) => path.display().to_string(),
+            None => "built-in street".to_owned(),
+        }
+    }
+}
+
+/// Whether something is the name of what is built in rather than a file. A file of such a name comes first.
+fn is_name(path: &Path) -> bool {
+    !path.exists() && path.extension().is_none()
+}
+
+/// A scene file, or a built-in scene.
+fn scene_document(path: &Path) -> Result<Document, InputError> {
+    if !is_name(path) {
+        return Document::load(path);
+    }
+    let named = path.to_str().and_then(Scene::built_in_document);
+    named.ok_or_else(|| {
+        let names: Vec<&str> = Scene::built_in().map(|(name, _)| name).collect();
+        let message = format!(
+            "is no file and no built-in scene; give {}, or a file",
+            names.join(" or ")
+        );
+        InputError::new(path.display(), message)
+    })
+}
+
+/// A sensor file, or the description of a chip that is known by name. A file of such a name comes first.
+fn described(path: &Path) -> Result<Document, InputError> {
+    if !is_name(path) {
+        return Document::load(path);
+    }
+    let chip = path.to_str().and_then(Sensor::named).ok_or_else(|| {
+        let names = CHIPS.map(|(name, _)| name).join(" or ");
+        InputError::new(
+            path.display(),
+            format!("is no file and no chip; give {names}, or a file"),
+        )
+    })?;
+    let table = toml::Table::try_from(&*chip).expect("numbers and words");
+    Ok(Document::of(path.display(), table))
+}
