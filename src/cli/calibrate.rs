@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 
-use super::{SensorArgs, say};
+use super::SensorArgs;
+use super::voice::{progress, tell};
 use crate::chip::{Sensor, Tdc, WindowLaw};
 use crate::files::{InputError, OutputFile};
 use crate::report::Table;
@@ -74,8 +74,9 @@ pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
         every_window: args.every_window,
         ..Sweep::default()
     };
-    let progress = ProgressBar::new(config.pixels() as u64).with_style(
-        ProgressStyle::with_template("sweeping {bar:40} {pos}/{len} macropixels, {eta} left")?,
+    let progress = progress(
+        config.pixels() as u64,
+        "sweeping {bar:40} {pos}/{len} macropixels, {eta} left",
     );
     let sensor = Sensor::from(&config);
     let found = calibrate(&sensor, args.stop_periods, &sweep, || progress.inc(1));
@@ -92,7 +93,7 @@ pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
         serde_json::to_writer(&mut *out, &found.profile)?;
         writeln!(out)
     })?;
-    say(table(&found))?;
+    tell(table(&found))?;
     Ok(())
 }
 

@@ -4,10 +4,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::say;
+use super::voice::{note, progress, tell};
 use crate::demo::show::{Show, Shown, write_ply};
 use crate::demo::{Demonstrator, limit, shows, sweep};
 use crate::files::{InputError, MANIFEST, ResultSet};
@@ -92,13 +91,12 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
         .unwrap_or_else(|| PathBuf::from(format!("demo_{}", name.get_name())));
     let results = ResultSet::begin(&out)?;
     let began = Instant::now();
-    let bar = |what: &str, length: u64| -> anyhow::Result<ProgressBar> {
+    let bar = |what: &str, length: u64| {
         let template = format!("{what} {{bar:40}} {{pos}}/{{len}}, {{eta}} left");
-        let style = ProgressStyle::with_template(&template)?;
-        Ok(ProgressBar::new(length).with_style(style))
+        progress(length, &template)
     };
     let calibrated = || -> anyhow::Result<Demonstrator> {
-        let progress = bar("calibrating", 2048)?;
+        let progress = bar("calibrating", 2048);
         let step = Time::from_s(args.calibration_step_ps * 1e-12);
         let demonstrator = Demonstrator::calibrated(step, || progress.inc(1))?;
         progress.finish_and_clear();
@@ -107,7 +105,7 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
     let mut text = match args.demo {
         Demo::Limit => {
             let runs = limit::LASER_PERIODS.len() * limit::ENERGIES.len();
-            let progress = bar("driving", (runs * limit::DISPARITIES_PX.len()) as u64)?;
+            let progress = bar("driving", (runs * limit::DISPARITIES_PX.len()) as u64);
             let limits = limit::limits(args.seed, || progress.inc(1))?;
             progress.finish_and_clear();
             write_limits(results.staging(), &limits)?
@@ -115,7 +113,7 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
         Demo::Sweep => {
             let demonstrator = calibrated()?;
             let frames = sweep::DISTANCES_M.len() as u64 * u64::from(sweep::FRAMES);
-            let progress = bar("sweeping", frames)?;
+            let progress = bar("sweeping", frames);
             let points = sweep::sweep(&demonstrator, sweep::REFLECTIVITY, args.seed, || {
                 progress.inc(1);
             })?;
@@ -143,7 +141,7 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
                 }
             }
             let frames = shows.iter().map(|show| u64::from(show.frames)).sum();
-            let progress = bar("driving", frames)?;
+            let progress = bar("driving", frames);
             let mut text = String::new();
             for show in &shows {
                 let shown = show.run(&demonstrator, || progress.inc(1))?;
@@ -161,14 +159,14 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
     };
     let names = file_names(results.staging())?;
     for sentence in results.commit("demo", &configuration)? {
-        eprintln!("gdtof: {sentence}");
+        note(sentence);
     }
     text += &format!(
         "run time {:.1} s\nin {}: {names} {MANIFEST}\n",
         began.elapsed().as_secs_f64(),
         out.display(),
     );
-    Ok(say(text)?)
+    Ok(tell(text)?)
 }
 
 fn file_names(folder: &Path) -> std::io::Result<String> {

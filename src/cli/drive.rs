@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use super::SceneArgs;
 use super::guiding::GuideArgs;
-use super::{SceneArgs, say};
+use super::voice::{note, progress, say, tell};
 use crate::chip::SensorConfig;
 use crate::engine::Work;
 use crate::files::{InputError, MANIFEST, ResultSet};
@@ -234,9 +234,10 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         run_time_s: 0.0,
     };
     let mut recording = Recording::begin(results.staging(), &settings, args.frames)?;
-    let progress = ProgressBar::new(args.frames.into()).with_style(ProgressStyle::with_template(
+    let progress = progress(
+        args.frames.into(),
         "driving {bar:40} {pos}/{len} frames, {eta} left",
-    )?);
+    );
     for number in 0..args.frames {
         let frame = drive.frame(|_| {})?;
         let picture = format!("depth_{number:05}.png");
@@ -256,11 +257,11 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     std::fs::write(results.staging().join("drive.json"), format!("{json}\n"))
         .map_err(unwritable)?;
     for sentence in results.commit("drive", &configuration)? {
-        eprintln!("gdtof: {sentence}");
+        note(sentence);
     }
     match args.json {
         true => Ok(say(format_args!("{json}\n"))?),
-        false => Ok(say(report.table(&args.out))?),
+        false => Ok(tell(report.table(&args.out))?),
     }
 }
 

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::replay::Stimuli;
-use super::{SensorArgs, say, sdf};
+use super::voice::tell;
+use super::{SensorArgs, sdf};
 use crate::bench::{StimulusPlan, export_annotated_verilog, export_netlist, export_verilog};
 use crate::chip::array;
 use crate::netlist::Netlist;
@@ -69,7 +70,7 @@ fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
         args.laser_cycles,
     ) else {
         export_netlist(&args.out, &config)?;
-        say(format_args!(
+        tell(format_args!(
             "design.v, cells.v and cells_specify.v in {folder}; for a testbench, add --inits, --events, --stop-periods and --laser-cycles\n"
         ))?;
         return Ok(());
@@ -94,7 +95,7 @@ fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
             export_annotated_verilog(&args.out, &stimuli.config, &plan, &timing)?;
         }
     }
-    say(format_args!(
+    tell(format_args!(
         "cd {folder} && iverilog -g2005 -o sim tb.v design.v cells.v && vvp sim\n"
     ))?;
     Ok(())

@@ -1,17 +1,17 @@
 //! `gdtof frame`: the main job.
 
 mod pair;
-mod quality;
+mod picture;
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use self::pair::PairReport;
 use super::guiding::GuideArgs;
-use super::{SceneArgs, say};
+use super::voice::{note, progress, say, tell};
+use super::{SceneArgs, quality};
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::WindowLaw;
 use crate::chip::{Mode, SensorConfig, Silicon};
@@ -113,8 +113,9 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
         waves: results.staging().join(wave_name(args, (row, col))),
         wave_cycles: args.wave_cycles.unwrap_or_default(),
     };
-    let progress = ProgressBar::new(settings.sensor.pixels() as u64).with_style(
-        ProgressStyle::with_template("exposing {bar:40} {pos}/{len} macropixels, {eta} left")?,
+    let progress = progress(
+        settings.sensor.pixels() as u64,
+        "exposing {bar:40} {pos}/{len} macropixels, {eta} left",
     );
     let frame = take_frame_by(
         &settings,
@@ -137,7 +138,7 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
         pair.write(results.staging())?;
     }
     for sentence in results.commit("frame", &report.configuration)? {
-        eprintln!("gdtof: {sentence}");
+        note(sentence);
     }
     if args.json {
         say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
@@ -146,18 +147,18 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
         if let Some(pair) = pair_report {
             pair.rows(&mut table);
         }
-        say(table)?;
+        tell(table)?;
         if let Some(note) = pair_report.and_then(PairReport::note) {
-            say(format_args!("\n{note}\n"))?;
+            tell(format_args!("\n{note}\n"))?;
         }
         if let Some(remark) = &frame.remark {
-            say(format_args!("\n{remark}\n"))?;
+            tell(format_args!("\n{remark}\n"))?;
         }
         if !timing.met {
-            say(format_args!("\nTiming {}\n", timing.verdict))?;
+            tell(format_args!("\nTiming {}\n", timing.verdict))?;
         }
         for note in &timing.notes {
-            say(format_args!("\nNote on timing: {note}\n"))?;
+            tell(format_args!("\nNote on timing: {note}\n"))?;
         }
     }
     Ok(())
@@ -337,7 +338,7 @@ impl<'a> Report<'a> {
 fn write_results(out: &Path, frame: &Frame, report: &Report<'_>) -> anyhow::Result<()> {
     let shape = report.histograms_shape.map(|n| n as u64);
     write_npy_u16(&out.join("histograms.npy"), &shape, &frame.histograms)?;
-    quality::depth_map(out, frame, &report.configuration)?;
+    picture::depth_map(out, frame, &report.configuration)?;
     OutputFile::write_with(&out.join("frame.json"), |w| {
         serde_json::to_writer(&mut *w, report)?;
         writeln!(w)
@@ -369,7 +370,7 @@ fn table(
     if !args.guiding.guides().is_empty() {
         table.push("guide", settings.guide.name());
     }
-    quality::rows(&mut table, args, &summary);
+    quality::rows(&mut table, &settings.depth, &summary);
     let work = &frame.work;
     let percent = |part: f64, whole: f64| format!("{:.2} %", 100.0 * part / whole.max(1.0));
     table.push(

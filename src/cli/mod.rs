@@ -3,31 +3,34 @@
 
 mod calibrate;
 mod demo;
+mod doctor;
 mod drive;
 mod export;
 mod frame;
 mod guiding;
 mod pareto;
 mod power;
+mod quality;
 mod range;
 mod replay;
 mod reproduce;
 mod sdf;
 mod settings;
+mod shell;
 mod silicon;
 mod speed;
 mod stereo;
 mod tb;
 mod timing;
+mod voice;
 mod wave;
 mod wording;
 
 pub use tb::testbench;
 
-use std::io::Write;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use self::settings::{SceneArgs, SensorArgs};
 use crate::chip::SensorConfig;
@@ -37,6 +40,12 @@ use crate::files::{InputError, clean_up_when_interrupted};
 #[derive(Parser)]
 #[command(name = "gdtof", version, about)]
 struct Cli {
+    /// Threads at most. Without it, one for each processor.
+    #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Say nothing but errors and what was asked for by --json: no table of what was done, no progress, no notes.
+    #[arg(long, global = true)]
+    quiet: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -53,7 +62,7 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Print the thesis's figures, published beside computed.
     Reproduce(reproduce::ReproduceArgs),
-    /// Depths from a real sensor's histograms, beside its own.
+    /// Depths from histograms that are given: a real sensor's, beside its own, or a frame's.
     Range(range::RangeArgs),
     /// Sweep a picosecond laser over the bins of a sensor with delay lines, and keep when they are.
     Calibrate(calibrate::CalibrateArgs),
@@ -78,6 +87,14 @@ enum Command {
     /// Write the chip for other tools.
     #[command(subcommand)]
     Export(export::ExportCommand),
+    /// Say what this machine gives the program, and which other tools are there.
+    Doctor(doctor::DoctorArgs),
+    /// Print the JSON schema of a kind of file, for editors.
+    Schema(shell::SchemaArgs),
+    /// Print a script with which a shell completes options.
+    Completion(shell::CompletionArgs),
+    /// Write manual pages.
+    Man(shell::ManArgs),
 }
 
 /// Runs the command line of this process.
@@ -87,7 +104,17 @@ pub fn main() -> ExitCode {
             "gdtof: signals cannot be watched ({error}); an interrupted run will leave its files"
         );
     }
-    let result = match Cli::parse().command {
+    let cli = Cli::parse();
+    if cli.quiet {
+        voice::be_quiet();
+    }
+    if let Some(threads) = cli.threads {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
+        if let Err(error) = pool.build_global() {
+            return finish(Err(error.into()));
+        }
+    }
+    let result = match cli.command {
         Command::Tb(args) => return finish(tb::run(&args)),
         Command::Frame(args) => frame::run(&args),
         Command::Drive(args) => drive::run(args),
@@ -105,6 +132,10 @@ pub fn main() -> ExitCode {
         Command::Sensor(args) => settings::print_sensor(&args),
         Command::Scene(args) => settings::print_scene(&args),
         Command::Export(command) => export::run(&command),
+        Command::Doctor(args) => doctor::run(&args),
+        Command::Schema(args) => shell::schema(&args),
+        Command::Completion(args) => shell::completion(&args, Cli::command()),
+        Command::Man(args) => shell::man(&args, Cli::command()),
     };
     finish(result.map(|()| ExitCode::SUCCESS))
 }
@@ -142,13 +173,6 @@ fn pixel(option: &str, text: &str, sensor: &SensorConfig) -> Result<(usize, usiz
         None => format!("{text:?} is no macropixel; give row,col such as 10,20"),
     };
     Err(InputError::new(option, message))
-}
-
-/// Writes to standard output, whose reader may have gone away.
-fn say(text: impl std::fmt::Display) -> std::io::Result<()> {
-    let mut out = std::io::stdout().lock();
-    write!(out, "{text}")?;
-    out.flush()
 }
 
 /// A reader such as `head` that has seen enough is no failure.

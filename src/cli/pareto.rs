@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use serde::Serialize;
 
-use super::{SceneArgs, say};
+use super::SceneArgs;
+use super::voice::{progress, say, tell};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::report::{Axis, Chart, Grid, Style, aligned, width};
 use crate::request::{self, Spelling};
@@ -85,7 +86,7 @@ pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
     let progress = Progress::new(settings.run_count(&methods));
     let rows = (!args.json).then(|| Rows::new(&methods));
     if let Some(rows) = &rows {
-        progress.around(|| say(head(args, &settings, cells) + &rows.headings()))?;
+        progress.around(|| tell(head(args, &settings, cells) + &rows.headings()))?;
     }
     let mut summaries = Vec::new();
     let mut said = Ok(());
@@ -94,7 +95,7 @@ pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
         Done::Method(points) => {
             let summary = summarise(points).expect("there is a wall");
             if let (Some(rows), Ok(())) = (&rows, &said) {
-                said = progress.around(|| say(rows.row(&summary)));
+                said = progress.around(|| tell(rows.row(&summary)));
             }
             summaries.push(summary);
         }
@@ -114,7 +115,7 @@ pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
         };
         say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
     } else {
-        say(foot(args, &settings))?;
+        tell(foot(args, &settings))?;
     }
     Ok(())
 }
@@ -321,11 +322,9 @@ const LINE_EVERY: Duration = Duration::from_secs(10);
 impl Progress {
     fn new(total: usize) -> Self {
         let template = "comparing {bar:40} {pos}/{len} engines and walls, {eta} left";
-        let style =
-            ProgressStyle::with_template(template).expect("a template that indicatif knows");
         let begin = Instant::now();
         Progress {
-            bar: ProgressBar::new(total as u64).with_style(style),
+            bar: progress(total as u64, template),
             is_piped: !std::io::stderr().is_terminal(),
             total,
             begin,

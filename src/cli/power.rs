@@ -2,7 +2,8 @@
 
 use clap::Args;
 
-use super::{SensorArgs, say};
+use super::SensorArgs;
+use super::voice::say;
 use crate::analysis::{Capacitances, MacropixelPower};
 use crate::chip::{Exposure, Mode, PCounter, SensorConfig};
 use crate::files::InputError;

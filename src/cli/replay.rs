@@ -7,12 +7,11 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
-use super::say;
 use super::sdf::annotated_timing;
 use super::silicon::SiliconArgs;
+use super::voice::{progress, say};
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::bench::{HardwareEventKind, HardwareEventReport};
 use crate::chip::{Sensor, SensorConfig, Silicon};
@@ -364,8 +363,8 @@ fn replay(
 }
 
 fn run_engine(stimuli: &Stimuli, engine: &dyn Replay) -> anyhow::Result<Replayed> {
-    let style = ProgressStyle::with_template("replaying {bar:40} {pos}/{len} macropixels")?;
-    let progress = ProgressBar::new(stimuli.starts.len() as u64).with_style(style);
+    let template = "replaying {bar:40} {pos}/{len} macropixels";
+    let progress = progress(stimuli.starts.len() as u64, template);
     let pulses = stimuli.pulses();
     let pixels = PulsedPixel::array(&stimuli.starts, &pulses);
     let batches: Result<Vec<Histograms>, EngineError> = pixels

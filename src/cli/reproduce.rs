@@ -4,9 +4,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 
-use super::say;
+use super::voice::{progress, say};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::reproduce::{self, Report, Selection};
 
@@ -65,9 +64,9 @@ pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
     if let Some(folder) = &args.out {
         create_folder(folder)?;
     }
-    let bar = ProgressBar::new(selection.parts() as u64).with_style(
-        ProgressStyle::with_template("{bar:30} {pos}/{len} claims, tables, figures, measurements")
-            .expect("a template that indicatif knows"),
+    let bar = progress(
+        selection.parts() as u64,
+        "{bar:30} {pos}/{len} claims, tables, figures, measurements",
     );
     let report = reproduce::reproduce(&selection, || bar.inc(1));
     bar.finish_and_clear();

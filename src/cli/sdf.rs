@@ -4,9 +4,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use indicatif::{DecimalBytes, ProgressBar, ProgressStyle};
+use indicatif::DecimalBytes;
 
-use super::{SensorArgs, say};
+use super::SensorArgs;
+use super::voice::{progress, tell};
 use crate::chip::{SensorConfig, Silicon, array};
 use crate::files::{InputError, OutputFile, read_text};
 use crate::netlist::sdf::{
@@ -75,17 +76,17 @@ pub(super) fn run(args: &SdfArgs) -> anyhow::Result<()> {
         );
         return Err(InputError::new(format!("--out {}", args.out.display()), message).into());
     }
-    let style = ProgressStyle::with_template(
+    let progress = progress(
+        bytes,
         "writing {bar:40} {decimal_bytes} of about {decimal_total_bytes}",
-    )?;
-    let progress = ProgressBar::new(bytes).with_style(style);
+    );
     let mut cells = 0;
     OutputFile::write_with(&args.out, |out| {
         cells = write_library(&mut progress.wrap_write(out), &config, options)?;
         Ok(())
     })?;
     progress.finish_and_clear();
-    say(format_args!("{cells} cells in {}\n", args.out.display()))?;
+    tell(format_args!("{cells} cells in {}\n", args.out.display()))?;
     Ok(())
 }
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::say;
+use super::voice::say;
 use crate::chip::SensorConfig;
 use crate::files::InputError;
 use crate::request::{Sources, Spelling};

@@ -12,10 +12,9 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use clap::Args;
 use cpu_time::ProcessTime;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
 
-use super::say;
+use super::voice::{progress, say};
 use crate::engine::{Cohort, CohortOptions, Cycle, Expose, Replay, Window};
 use crate::photon::SpadEvent;
 use crate::report::Grid;
@@ -212,9 +211,10 @@ pub(super) fn run(args: &SpeedArgs) -> anyhow::Result<()> {
     }
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let plan = plan(args.largest.into(), cores.min(2));
-    let progress = ProgressBar::new(plan.len() as u64).with_style(ProgressStyle::with_template(
+    let progress = progress(
+        plan.len() as u64,
         "measuring {bar:40} {pos}/{len} figures, {eta} left",
-    )?);
+    );
     let mut figures = Vec::new();
     for subject in plan {
         figures.push(in_its_own_process(subject, args.runs)?);

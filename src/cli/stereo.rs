@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::say;
+use super::voice::{say, tell};
 use crate::files::{InputError, MANIFEST, OutputFile, Raster, ResultSet};
 use crate::report::{Cell, DepthMap, Table, write_npy_f32};
 use crate::stereo::{Census, DisparityMap, GreyImage, MatchError, Matcher, Paths, Workspace};
@@ -288,11 +288,11 @@ pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
         writeln!(w)
     })?;
     for note in set.commit("stereo", [&args.left, &args.right])? {
-        eprintln!("gdtof: {note}");
+        super::voice::note(note);
     }
     match args.json {
         true => say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?,
-        false => say(table(args, &report))?,
+        false => tell(table(args, &report))?,
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::say;
+use super::voice::say;
 use crate::files::{InputError, clean_up_when_interrupted, create_folder};
 use crate::report::{Checks, Grid};
 use crate::testbenches::{TESTBENCHES, Testbench};

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::say;
+use super::voice::{note, say};
 use crate::engine::late_cycle;
 use crate::engine::waveform::{self, View};
 use crate::files::InputError;
@@ -95,8 +95,8 @@ pub(super) fn run(args: &WaveArgs) -> anyhow::Result<()> {
     let replaced =
         frame.engine.of_probes(frame.has_tolerance) != frame.engine || frame.has_tolerance;
     if replaced {
-        eprintln!(
-            "gdtof: the frame's counts were not all made of photons (cohort); these are the photons that the window engine counts"
+        note(
+            "the frame's counts were not all made of photons (cohort); these are the photons that the window engine counts",
         );
     }
     if args.json {

@@ -11,6 +11,7 @@
 //! | `result_set.rs` | the results of a run as one set with a manifest |
 
 mod complaint;
+mod counts;
 mod input;
 mod interruption;
 mod output;
@@ -19,6 +20,7 @@ mod result_set;
 mod temporary;
 
 pub use complaint::InputError;
+pub(crate) use counts::read_counts;
 pub use input::Lines;
 pub(crate) use input::{line_of, parse_json, parse_toml, read_text};
 pub(crate) use interruption::clean_up_when_interrupted;

@@ -213,11 +213,7 @@ impl FrameRequest {
             return Err(wrong("tolerance", message));
         }
         let rate = self.false_alarm_rate;
-        if !(rate > 0.0 && rate <= 1.0) {
-            let message =
-                format!("{rate} is no share of macropixels; give a number above 0, up to 1");
-            return Err(wrong("false_alarm_rate", message));
-        }
+        check_false_alarm_rate(rate, self.spelling)?;
         if let Some(steps) = self.sub_bins.filter(|steps| !(1..=64).contains(steps)) {
             return Err(wrong(
                 "sub_bins",
@@ -274,6 +270,18 @@ impl FrameRequest {
             InputError::new(self.spelling.name("bins_from_guide"), message)
         })?)
     }
+}
+
+/// Holds a share of false alarms to what it can be.
+///
+/// # Errors
+/// When it is not above 0 and at most 1.
+pub(crate) fn check_false_alarm_rate(rate: f64, spelling: Spelling) -> Result<(), InputError> {
+    if rate > 0.0 && rate <= 1.0 {
+        return Ok(());
+    }
+    let message = format!("{rate} is no share of macropixels; give a number above 0, up to 1");
+    Err(InputError::new(spelling.name("false_alarm_rate"), message))
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ mod spelling;
 mod wording;
 
 pub use self::calibration::read_calibration;
+pub(crate) use self::frame::check_false_alarm_rate;
 pub use self::frame::{FRAME_KEYS, FrameRequest};
 pub use self::sources::Sources;
 pub use self::spelling::Spelling;

@@ -12,8 +12,10 @@ mod document;
 mod key;
 mod print;
 mod quantity;
+mod schema;
 
 pub use document::{Document, Fault};
 pub use key::{Key, Range};
 pub use print::Section;
 pub(crate) use print::commented;
+pub(crate) use schema::schema;

@@ -11,6 +11,7 @@ mod policy;
 pub mod price;
 mod ranger;
 mod remark;
+mod reranged;
 mod result;
 mod speed;
 mod step_and_lock;
@@ -28,6 +29,7 @@ pub use frame::{
 pub use pixel::{NoDepth, PixelDepth};
 pub use policy::{POLICY_KEYS, Pointing, Unguided, Why, WindowPolicy, share_held};
 pub(crate) use ranger::{Known, Ranger};
+pub use reranged::Ranged;
 pub use result::{Frame, PhaseTimes};
 pub use speed::{SPEED_LASER_CYCLES, SpeedCase, SpeedFrame};
 pub use step_and_lock::{LockOptions, LockState, StepAndLock, Tracker};

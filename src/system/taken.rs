@@ -32,8 +32,8 @@ pub struct TakenFrame {
     pub has_tolerance: bool,
     /// Whether its windows are those of the camera pair's estimates by the window law: not calibrated, no other guide or policy.
     is_plain: bool,
-    /// Start value of each macropixel, row-major; `None` where SPADs were off.
-    starts: Vec<Option<u16>>,
+    /// What is known of each macropixel, row-major.
+    pub(super) known: Vec<Macropixel>,
 }
 
 /// The part of `frame.json` that says what was asked for, and the start values.
@@ -50,12 +50,18 @@ struct FrameFile {
     #[serde(default)]
     guides: Vec<String>,
     windows: Option<serde::de::IgnoredAny>,
-    macropixels: Vec<Start>,
+    macropixels: Vec<Macropixel>,
 }
 
-#[derive(Deserialize)]
-struct Start {
-    start: Option<u16>,
+/// What is known of a macropixel.
+#[derive(Debug, Clone, Deserialize)]
+pub(super) struct Macropixel {
+    /// Start value; `None` where SPADs were off.
+    pub(super) start: Option<u16>,
+    /// The true distance, m.
+    pub(super) true_m: Option<f64>,
+    /// The guide's estimate, m.
+    pub(super) guide_m: Option<f64>,
 }
 
 /// The version alone, which other versions have, too.
@@ -100,11 +106,11 @@ impl TakenFrame {
             Ok(exposure) => exposure,
             Err(fault) => return complain(format!("{fault}; take the frame anew")),
         };
-        let starts: Vec<Option<u16>> = file.macropixels.iter().map(|m| m.start).collect();
-        if starts.len() != sensor.pixels() {
+        let known = file.macropixels;
+        if known.len() != sensor.pixels() {
             return complain(format!(
                 "has {} macropixels and a sensor of {}x{}; take the frame anew",
-                starts.len(),
+                known.len(),
                 sensor.rows,
                 sensor.cols
             ));
@@ -119,7 +125,7 @@ impl TakenFrame {
             is_plain: file.calibration.is_none()
                 && file.guides.is_empty()
                 && file.windows.is_none(),
-            starts,
+            known,
             source,
         })
     }
@@ -142,7 +148,7 @@ impl TakenFrame {
         let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
         // What a calibration made of the guide's estimate is not known here, nor are other guides.
         let given = match self.is_plain {
-            false => self.starts[pixel],
+            false => self.known[pixel].start,
             true => {
                 let input = GuideInput::still(scene, rows, cols, self.seed);
                 let guide = BehaviouralStereo.estimate(&input);
@@ -150,11 +156,11 @@ impl TakenFrame {
                 Aims::new(sensor, &self.exposure, None).start_of(pixel, guide.range_m[pixel])
             }
         };
-        if given != self.starts[pixel] {
+        if given != self.known[pixel].start {
             let shown = |start: Option<u16>| start.map_or("none".to_owned(), |s| s.to_string());
             let message = format!(
                 "gives macropixel ({row}, {col}) the start value {}, where its sensor, scene and seed give {}; take the frame anew",
-                shown(self.starts[pixel]),
+                shown(self.known[pixel].start),
                 shown(given)
             );
             return Err(InputError::new(&self.source, message));

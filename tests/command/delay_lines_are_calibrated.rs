@@ -50,8 +50,20 @@ fn a_calibration_makes_depths_better_and_belongs_to_its_sensor() {
     );
     let without = median_error_m(&gdtof(folder, &format!("frame {SENSOR} {FRAME}")));
     let calibrated = format!("frame {SENSOR} {FRAME} --calibration c.json");
-    let with = median_error_m(&gdtof(folder, &calibrated));
+    let frame = gdtof(folder, &calibrated);
+    let with = median_error_m(&frame);
     assert!(with < 0.5 * without, "{with} {without}");
+
+    // Depths from its histograms once more: with the calibration the same to the bit, and worse without.
+    let range = "range --format frame --histograms out/histograms.npy --json";
+    let again = gdtof(folder, &format!("{range} --calibration c.json"));
+    let depths = |output: &Output| {
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        report["macropixels"].clone()
+    };
+    assert_eq!(depths(&again), depths(&frame));
+    let uncalibrated = median_error_m(&gdtof(folder, range));
+    assert!(with < 0.5 * uncalibrated, "{with} {uncalibrated}");
 
     for (arguments, says) in [
         (

@@ -2,6 +2,7 @@
 
 mod a_real_pair_is_matched;
 mod command_line_refuses_bad_input;
+mod counts_are_ranged_in_the_windows_of_a_frame;
 mod delay_files_replay;
 mod delay_lines_are_calibrated;
 mod drives_are_recorded;
@@ -16,4 +17,6 @@ mod real_histograms_are_ranged;
 mod results_are_one_set;
 mod run_time_against_error;
 mod scenes_name_files;
+mod the_book_runs;
+mod the_command_explains_itself;
 mod wave_replays_a_cycle;

@@ -3,11 +3,10 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use indicatif::{ProgressBar, ProgressStyle};
-
 use super::section::{Cell, Section};
 use crate::analysis::{Spread, spread};
 use crate::chip::{SensorConfig, Silicon};
+use crate::cli::voice::progress;
 use crate::files::InputError;
 use crate::report::{Axis, Chart, Style};
 
@@ -16,8 +15,8 @@ const BARS: usize = 48;
 
 /// Analyses all macropixels, with a bar on a terminal.
 pub(super) fn analyse(config: &SensorConfig, silicon: &Silicon) -> anyhow::Result<Spread> {
-    let style = ProgressStyle::with_template("analysing {bar:40} {pos}/{len} macropixels")?;
-    let progress = ProgressBar::new(config.pixels() as u64).with_style(style);
+    let template = "analysing {bar:40} {pos}/{len} macropixels";
+    let progress = progress(config.pixels() as u64, template);
     let found = spread(config, silicon, || progress.inc(1));
     progress.finish_and_clear();
     Ok(found)

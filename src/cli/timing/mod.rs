@@ -11,8 +11,9 @@ use clap::Args;
 
 use self::section::{Cell, Section};
 use self::tables::Subject;
+use super::SensorArgs;
 use super::silicon::SiliconArgs;
-use super::{SensorArgs, say};
+use super::voice::say;
 use crate::analysis::{LoadTiming, ReadTiming, TimingVerdict};
 use crate::chip::{Limits, Silicon, Tdc};
 use crate::files::InputError;

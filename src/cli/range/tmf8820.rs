@@ -1,26 +1,19 @@
-//! `gdtof range`: depths from a real sensor's histograms, beside those it computed itself.
+//! `gdtof range --format tmf8820`: depths from a real sensor's histograms, beside those it computed itself.
 
-use std::path::PathBuf;
-
-use clap::{Args, ValueEnum};
+use clap::ValueEnum;
 use serde::Serialize;
 
-use super::say;
+use super::RangeArgs;
+use crate::cli::voice::say;
 use crate::files::{InputError, OutputFile, parse_json, read_text};
 use crate::ranging::tmf8820::{self, Capture};
 use crate::ranging::{ArrivalOptions, Calibration, Echo, arrival};
 use crate::report::Grid;
 
-#[derive(Clone, Copy, ValueEnum)]
-enum Format {
-    /// JSON captures of an ams TMF8820.
-    Tmf8820,
-}
-
 /// Captures that a calibration is fitted on; the others are reported.
 #[derive(Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
-enum Fit {
+pub(super) enum Fit {
     /// Every second capture, from the first.
     Even,
     /// Every second capture, from the second.
@@ -29,37 +22,6 @@ enum Fit {
     Near,
     /// The farther half.
     Far,
-}
-
-/// Arguments of `gdtof range`.
-#[derive(Args)]
-pub(super) struct RangeArgs {
-    /// File of histograms.
-    #[arg(long, value_name = "FILE")]
-    histograms: PathBuf,
-    /// What the file is.
-    #[arg(long, value_enum)]
-    format: Format,
-    /// Captures to calibrate on, by their true distances; depths and errors are those of the others.
-    #[arg(
-        long,
-        value_enum,
-        default_value = "even",
-        conflicts_with = "calibration"
-    )]
-    fit: Fit,
-    /// Use the calibration in this file instead, on all captures.
-    #[arg(long, value_name = "FILE")]
-    calibration: Option<PathBuf>,
-    /// Keep the calibration (JSON).
-    #[arg(long, value_name = "FILE", conflicts_with = "calibration")]
-    save_calibration: Option<PathBuf>,
-    /// Depths as CSV: capture,zone,true_m,depth_m,sensor_m.
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// JSON instead of tables.
-    #[arg(long)]
-    json: bool,
 }
 
 /// Fewest counts above background that are taken for a pulse.
@@ -244,14 +206,13 @@ struct Report {
 /// # Errors
 /// Bad input, files that cannot be written.
 pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
-    let captures = match args.format {
-        Format::Tmf8820 => tmf8820::read(&args.histograms)?,
-    };
+    let fit = args.fit.unwrap_or(Fit::Even);
+    let captures = tmf8820::read(&args.histograms)?;
     let zones = captures[0].hists.len();
     let (sightings, left_out) = sightings(&captures);
     let on = match args.calibration {
         Some(_) => vec![false; captures.len()],
-        None => fitted_on(&captures, args.fit),
+        None => fitted_on(&captures, fit),
     };
     let (fitted, reported): (Vec<_>, Vec<_>) = sightings.iter().partition(|s| on[s.capture]);
     if reported.is_empty() {
@@ -303,7 +264,7 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
         sightings: sightings.len(),
         left_out,
         reported: reported.len(),
-        fit: args.calibration.is_none().then_some(args.fit),
+        fit: args.calibration.is_none().then_some(fit),
         depths: Errors::of(reported.iter().map(|s| depth(s) - s.true_m)),
         sensor: Errors::of(reported.iter().map(|s| s.sensor_m - s.true_m)),
         sensor_refitted,

@@ -1,0 +1,126 @@
+//! `gdtof doctor`: what this machine gives the program, and which other tools are there.
+
+use std::process::{Command, Stdio};
+
+use clap::Args;
+use serde::Serialize;
+
+use super::voice::say;
+use crate::report::Table;
+
+/// Arguments of `gdtof doctor`.
+#[derive(Args)]
+pub(super) struct DoctorArgs {
+    /// JSON instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A tool, how it tells its version, and what it is for.
+const TOOLS: [(&str, &str, &str); 8] = [
+    (
+        "iverilog",
+        "-V",
+        "tests of the netlist beside an independent simulator",
+    ),
+    ("vvp", "-V", "running exported Verilog (Icarus)"),
+    ("verilator", "--version", "speed beside compiled Verilog"),
+    ("yosys", "-V", "tests of the exported netlist's synthesis"),
+    ("gtkwave", "--version", "looking at waveforms (.gtkw)"),
+    ("surfer", "--version", "looking at waveforms (.sucl)"),
+    ("python3", "--version", "the Python package"),
+    ("chromium", "--version", "tests of the page"),
+];
+
+#[derive(Serialize)]
+struct Tool {
+    name: &'static str,
+    /// First line that it says of itself; `None` where it is not to be had.
+    version: Option<String>,
+    used_for: &'static str,
+}
+
+#[derive(Serialize)]
+struct Report {
+    version: &'static str,
+    target: String,
+    built: &'static str,
+    /// Vector instructions that engines choose among, as this processor has them.
+    vectors: Vec<&'static str>,
+    threads: usize,
+    cores: usize,
+    tools: Vec<Tool>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When the report cannot be written.
+pub(super) fn run(args: &DoctorArgs) -> anyhow::Result<()> {
+    let report = Report {
+        version: env!("CARGO_PKG_VERSION"),
+        target: format!("{} {}", std::env::consts::ARCH, std::env::consts::OS),
+        built: match cfg!(debug_assertions) {
+            true => "without optimisation; give --release for speed",
+            false => "for release",
+        },
+        vectors: vectors(),
+        threads: rayon::current_num_threads(),
+        cores: std::thread::available_parallelism().map_or(1, usize::from),
+        tools: TOOLS
+            .map(|(name, option, used_for)| Tool {
+                name,
+                version: version(name, option),
+                used_for,
+            })
+            .into(),
+    };
+    if args.json {
+        say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
+        return Ok(());
+    }
+    let mut table = Table::new(format!("gdtof {}", report.version))
+        .row("built", report.built)
+        .row("machine", &report.target)
+        .row(
+            "threads, cores",
+            format!("{}, {}", report.threads, report.cores),
+        )
+        .row("vector instructions", report.vectors.join(" "));
+    for tool in &report.tools {
+        let found = tool.version.as_deref().unwrap_or("not found");
+        table.push(tool.name, format!("{found}; for {}", tool.used_for));
+    }
+    Ok(say(table)?)
+}
+
+/// The first line of what a tool says of its version.
+fn version(name: &str, option: &str) -> Option<String> {
+    let output = Command::new(name).arg(option).stdin(Stdio::null()).output();
+    let output = output.ok()?;
+    let said = [output.stdout, output.stderr].concat();
+    let said = String::from_utf8_lossy(&said).into_owned();
+    let line = said.lines().map(str::trim).find(|line| !line.is_empty());
+    Some(line.unwrap_or("found").to_owned())
+}
+
+#[cfg(target_arch = "x86_64")]
+fn vectors() -> Vec<&'static str> {
+    let known = [
+        ("sse4.2", std::is_x86_feature_detected!("sse4.2")),
+        ("avx", std::is_x86_feature_detected!("avx")),
+        ("avx2", std::is_x86_feature_detected!("avx2")),
+        ("fma", std::is_x86_feature_detected!("fma")),
+        ("avx512f", std::is_x86_feature_detected!("avx512f")),
+    ];
+    known
+        .into_iter()
+        .filter(|(_, has)| *has)
+        .map(|(name, _)| name)
+        .collect()
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn vectors() -> Vec<&'static str> {
+    Vec::new()
+}

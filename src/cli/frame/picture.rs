@@ -1,0 +1,57 @@
+//! `depth.png`: depths, and why there are none.
+
+use std::path::Path;
+
+use super::Configuration;
+use crate::chip::Mode;
+use crate::files::InputError;
+use crate::report::{Cell, DepthMap};
+use crate::system::{Frame, NoDepth};
+
+/// Writes `depth.png` into `out`.
+///
+/// # Errors
+/// When it cannot be written.
+pub(super) fn depth_map(
+    out: &Path,
+    frame: &Frame,
+    asked: &Configuration<'_>,
+) -> Result<(), InputError> {
+    let mode = match asked.sensor.mode {
+        Mode::Guided => "guided",
+        Mode::Conventional => "conventional",
+    };
+    let cells: Vec<Cell> = (frame.pixels.iter())
+        .map(|pixel| match (pixel.measured_m, pixel.no_depth) {
+            (_, Some(reason)) => Cell::Category(reason as usize),
+            (depth_m, None) => Cell::Depth(depth_m.unwrap_or_default() as f32),
+        })
+        .collect();
+    let map = DepthMap {
+        title: &format!("{mode} dToF depth, {} laser cycles", asked.laser_cycles),
+        cols: frame.cols,
+        cells: &cells,
+        range_m: depth_range(&cells),
+        unit: "m",
+        categories: &NoDepth::ALL.map(NoDepth::name),
+        scale: (512 / frame.rows.max(frame.cols)).max(1),
+    };
+    map.write_png(&out.join("depth.png"))
+}
+
+/// Shortest and longest depth, a little apart even if all are the same.
+fn depth_range(cells: &[Cell]) -> (f32, f32) {
+    let known = || {
+        cells.iter().filter_map(|cell| match *cell {
+            Cell::Depth(depth_m) => Some(depth_m),
+            Cell::Category(_) => None,
+        })
+    };
+    let shortest = known().fold(f32::INFINITY, f32::min);
+    let longest = known().fold(f32::NEG_INFINITY, f32::max);
+    if shortest.is_finite() && longest.is_finite() {
+        (shortest.floor(), longest.ceil().max(shortest.floor() + 1.0))
+    } else {
+        (0.0, 1.0)
+    }
+}

@@ -1,0 +1,63 @@
+//! How good depths are: rows of the tables of `gdtof frame` and `gdtof range`.
+
+use crate::ranging::DepthOptions;
+use crate::report::Table;
+use crate::system::Summary;
+
+/// How good the depths are, and why there are no others.
+pub(super) fn rows(table: &mut Table, options: &DepthOptions, summary: &Summary) {
+    let metres = |value: Option<f64>| match value {
+        Some(m) => format!("{m:.3} m"),
+        None => "-".to_owned(),
+    };
+    let millimetres = |value: Option<f64>| match value {
+        Some(m) => format!("{:.1} mm", 1e3 * m),
+        None => "-".to_owned(),
+    };
+    let of = |part: usize, whole: usize| format!("{part} of {whole}");
+    let with_surface = summary.depths - summary.depths_without_surface;
+    let is_corrected = options.correct_walk;
+    table.push(
+        format!(
+            "depths of surfaces, false alarms {:e}",
+            options.false_alarm_rate
+        ),
+        of(with_surface, summary.with_target),
+    );
+    table.push("depths of nothing", summary.depths_without_surface);
+    table.push(
+        format!("outliers, beyond a bin of {:.2} m", summary.bin_m),
+        of(summary.outliers, with_surface),
+    );
+    table.push("RMS error of these depths", metres(summary.rms_error_m));
+    table.push(
+        "  without outliers",
+        metres(summary.rms_error_without_outliers_m),
+    );
+    table.push(
+        "  if every peak were a depth",
+        metres(summary.rms_error_of_every_peak_m),
+    );
+    table.push(
+        "median absolute error of these depths",
+        metres(summary.median_absolute_error_m),
+    );
+    table.push(
+        "  of all surfaces, missing ones infinite",
+        metres(summary.median_absolute_error_of_all_m),
+    );
+    table.push(
+        "mean error with range walk",
+        millimetres(summary.mean_error_with_walk_m),
+    );
+    if is_corrected {
+        table.push("  corrected for it", millimetres(summary.mean_error_m));
+    }
+    table.push(
+        "RMS error of the guide in window",
+        metres(summary.guide_rms_error_m),
+    );
+    for (reason, count) in &summary.no_depth {
+        table.push(format!("no depth: {}", reason.name()), count);
+    }
+}

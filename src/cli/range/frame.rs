@@ -1,0 +1,92 @@
+//! `gdtof range --format frame`: depths from counts in the windows of a frame: its own once more, or those of a real chip.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::RangeArgs;
+use crate::cli::quality;
+use crate::cli::voice::{say, tell};
+use crate::files::{OutputFile, read_counts};
+use crate::ranging::DepthOptions;
+use crate::report::Table;
+use crate::request::{Spelling, check_false_alarm_rate, read_calibration};
+use crate::system::{PixelDepth, Ranged, Summary, TakenFrame};
+
+/// What is printed with `--json`.
+#[derive(Serialize)]
+struct Report<'a> {
+    summary: Summary,
+    bin_m: f64,
+    macropixels: &'a [PixelDepth],
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, files that cannot be written.
+pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
+    let beside = args.histograms.with_file_name("frame.json");
+    let taken = TakenFrame::read(args.frame.as_deref().unwrap_or(&beside))?;
+    let sensor = &taken.sensor;
+    let default = DepthOptions::default();
+    let rate = args.false_alarm_rate.unwrap_or(default.false_alarm_rate);
+    check_false_alarm_rate(rate, Spelling::Options)?;
+    let options = DepthOptions {
+        false_alarm_rate: rate,
+        correct_walk: !args.no_walk_correction,
+        ..default
+    };
+    let calibration = match &args.calibration {
+        Some(path) => Some(read_calibration(path, sensor)?),
+        None => None,
+    };
+    let shape = [sensor.rows, sensor.cols, sensor.bins];
+    let counts = read_counts(&args.histograms, shape)?;
+    let ranged = taken.range(&counts, &options, calibration.as_ref())?;
+    if let Some(path) = &args.out {
+        write_csv(path, sensor.cols, &ranged)?;
+    }
+    if args.json {
+        let report = Report {
+            summary: ranged.summary(),
+            bin_m: ranged.bin_m,
+            macropixels: &ranged.pixels,
+        };
+        say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
+        return Ok(());
+    }
+    let mut table = Table::new(format!("Depths of {}", args.histograms.display()));
+    quality::rows(&mut table, &options, &ranged.summary());
+    match &args.out {
+        Some(_) => tell(table)?,
+        None => say(table)?,
+    }
+    Ok(())
+}
+
+fn write_csv(path: &Path, cols: usize, ranged: &Ranged) -> anyhow::Result<()> {
+    let shown = |value: Option<f64>| value.map_or(String::new(), |v| format!("{v:.6}"));
+    OutputFile::write_with(path, |out| {
+        writeln!(
+            out,
+            "row,col,start,true_m,guide_m,depth_m,confidence,no_depth"
+        )?;
+        for (at, pixel) in ranged.pixels.iter().enumerate() {
+            writeln!(
+                out,
+                "{},{},{},{},{},{},{},{}",
+                at / cols,
+                at % cols,
+                pixel.start.map_or(String::new(), |s| s.to_string()),
+                shown(pixel.true_m),
+                shown(pixel.guide_m),
+                shown(pixel.measured_m),
+                shown(pixel.confidence),
+                pixel.no_depth.map_or("", |why| why.name()),
+            )?;
+        }
+        Ok(())
+    })?;
+    Ok(())
+}

@@ -1,0 +1,68 @@
+//! Depths from histograms that are given: a frame's own once more, or those that a real chip counted in the same windows.
+
+use rayon::prelude::*;
+
+use super::pixel::PixelDepth;
+use super::ranger::{Known, Ranger};
+use super::summary::Summary;
+use super::taken::TakenFrame;
+use crate::ranging::{BinProfile, DepthOptions, UnequalBins};
+use crate::units::SPEED_OF_LIGHT_M_PER_S;
+
+/// Depths of an array.
+#[derive(Debug, Clone)]
+pub struct Ranged {
+    /// Every macropixel, row-major.
+    pub pixels: Vec<PixelDepth>,
+    /// Light's way there and back in one bin, m.
+    pub bin_m: f64,
+}
+
+impl Ranged {
+    /// In a few numbers.
+    pub fn summary(&self) -> Summary {
+        Summary::new(&self.pixels, self.bin_m)
+    }
+}
+
+impl TakenFrame {
+    /// Depths from `counts`, rows × columns × bins, counted in the windows of this frame; `calibration` is that of delay lines, and
+    /// true distances and the guide's are the frame's.
+    ///
+    /// # Errors
+    /// Bins that depths cannot be found in.
+    ///
+    /// # Panics
+    /// When there is not a count for every bin of the array.
+    pub fn range(
+        &self,
+        counts: &[u16],
+        options: &DepthOptions,
+        calibration: Option<&BinProfile>,
+    ) -> Result<Ranged, UnequalBins> {
+        let bins = self.sensor.bins;
+        assert_eq!(counts.len(), self.sensor.pixels() * bins);
+        let ranger = Ranger::new(
+            &self.sensor,
+            &self.exposure,
+            &self.scene,
+            options,
+            calibration,
+        )?;
+        let pixels = (self.known.par_iter().enumerate())
+            .map(|(pixel, known)| {
+                let known = Known {
+                    pixel,
+                    start: known.start,
+                    true_m: known.true_m,
+                    guide_m: known.guide_m,
+                };
+                ranger.depth(&known, &counts[pixel * bins..][..bins])
+            })
+            .collect();
+        Ok(Ranged {
+            pixels,
+            bin_m: ranger.bin_s() * SPEED_OF_LIGHT_M_PER_S / 2.0,
+        })
+    }
+}

@@ -1,0 +1,86 @@
+//! `gdtof range --format frame`: depths from counts that are given, in the windows of a frame.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use npyz::WriterBuilder;
+
+fn gdtof(folder: &Path, arguments: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gdtof"));
+    command.args(arguments.split(' ')).current_dir(folder);
+    command.output().unwrap()
+}
+
+fn take(folder: &Path) -> serde_json::Value {
+    let frame = gdtof(
+        folder,
+        "frame --rows 8 --cols 8 --probe none --laser-cycles 400 --set scene.light.illuminance_klux=0 --set scene.lidar.pulse_energy_uj=1 --json",
+    );
+    assert!(frame.status.success(), "{frame:?}");
+    serde_json::from_slice(&frame.stdout).unwrap()
+}
+
+fn write(path: &Path, shape: &[u64], counts: &[i64]) {
+    let mut file = std::fs::File::create(path).unwrap();
+    let options = npyz::WriteOptions::new().default_dtype().shape(shape);
+    let mut writer = options.writer(&mut file).begin_nd().unwrap();
+    writer.extend(counts.iter().copied()).unwrap();
+    writer.finish().unwrap();
+}
+
+#[test]
+fn a_frame_ranged_once_more_is_the_same_and_a_table_of_it_has_every_macropixel() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let frame = take(folder);
+    let range = "range --format frame --histograms out/histograms.npy";
+    let again = gdtof(folder, &format!("{range} --json"));
+    let again: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
+    assert_eq!(again["macropixels"], frame["macropixels"]);
+    assert_eq!(again["summary"], frame["summary"]);
+    assert!(frame["summary"]["depths"].as_u64() > Some(10));
+
+    let with_table = gdtof(folder, &format!("{range} --out depths.csv"));
+    assert!(with_table.status.success());
+    let table = std::fs::read_to_string(folder.join("depths.csv")).unwrap();
+    assert_eq!(table.lines().count(), 65);
+    let depths = table.lines().skip(1).map(|line| line.split(',').nth(5));
+    let with_depth = depths.filter(|depth| !depth.unwrap().is_empty()).count();
+    assert_eq!(Some(with_depth as u64), frame["summary"]["depths"].as_u64());
+}
+
+/// Counts of a chip of one's own: one that saw nothing anywhere has no depths.
+#[test]
+fn other_counts_in_the_same_windows_give_other_depths() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    take(folder);
+    write(&folder.join("dark.npy"), &[8, 8, 16], &[0; 1024]);
+    let range = "range --format frame --frame out/frame.json --json --histograms";
+    let dark = gdtof(folder, &format!("{range} dark.npy"));
+    let dark: serde_json::Value = serde_json::from_slice(&dark.stdout).unwrap();
+    assert_eq!(dark["summary"]["depths"], 0);
+
+    write(&folder.join("small.npy"), &[2, 8, 16], &[0; 256]);
+    for (arguments, says) in [
+        (format!("{range} small.npy"), "give one of [8, 8, 16]"),
+        (
+            format!("{range} dark.npy --fit even"),
+            "--fit: is not for --format frame",
+        ),
+        (
+            format!("{range} dark.npy --false-alarm-rate 0"),
+            "--false-alarm-rate: 0 is no share",
+        ),
+        (
+            "range --format frame --histograms dark.npy".into(),
+            "frame.json",
+        ),
+    ] {
+        let refused = gdtof(folder, &arguments);
+        let said = String::from_utf8(refused.stderr).unwrap();
+        assert_eq!(refused.status.code(), Some(2), "{said}");
+        assert!(said.contains(says), "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+    }
+}
