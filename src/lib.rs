@@ -30,6 +30,7 @@
 //! | `demo` | the demonstrator of the thesis before its scenes |
 //! | [`reproduce`] | the thesis's figures, published beside computed |
 //! | [`testbenches`] | the chip's blocks driven and checked at gate level, with waveforms |
+//! | [`sweep`] | studies: a row of results for each of many frames |
 //! | [`cli`] | the `gdtof` command |
 
 pub mod analysis;
@@ -52,6 +53,7 @@ pub mod request;
 pub mod scene;
 pub mod settings;
 pub mod stereo;
+pub mod sweep;
 pub mod system;
 pub mod testbenches;
 pub mod theory;

@@ -224,6 +224,11 @@ impl SensorConfig {
         Ok(config)
     }
 
+    /// What there is to know of a key of a sensor file, if it is one.
+    pub(crate) fn key(name: &str) -> Option<Key> {
+        KEYS.iter().find(|key| key.name == name).copied()
+    }
+
     /// The configuration as a commented file, which [`SensorConfig::parse`] reads back.
     pub fn commented(&self) -> String {
         let table = |config: &Self| toml::Table::try_from(config).expect("numbers and words");

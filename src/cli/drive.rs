@@ -9,6 +9,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::SceneArgs;
+use super::foxglove::Foxglove;
 use super::guiding::GuideArgs;
 use super::voice::{note, progress, say, tell};
 use crate::chip::SensorConfig;
@@ -84,6 +85,9 @@ pub(super) struct DriveArgs {
     /// Write no picture of each frame.
     #[arg(long)]
     no_pictures: bool,
+    /// Also record drive.mcap for Foxglove: points, depths, pictures and windows.
+    #[arg(long)]
+    mcap: bool,
     /// Print drive.json instead of the table.
     #[arg(long)]
     json: bool,
@@ -234,6 +238,11 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         run_time_s: 0.0,
     };
     let mut recording = Recording::begin(results.staging(), &settings, args.frames)?;
+    let mcap = results.staging().join("drive.mcap");
+    let mut foxglove = match args.mcap {
+        true => Some(Foxglove::begin(&mcap, &settings)?),
+        false => None,
+    };
     let progress = progress(
         args.frames.into(),
         "driving {bar:40} {pos}/{len} frames, {eta} left",
@@ -246,11 +255,19 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
             depth_map(&frame, &settings, &results.staging().join(name))?;
         }
         recording.add(&frame, picture.as_deref())?;
+        if let Some(foxglove) = &mut foxglove {
+            let picture = picture.map(|name| results.staging().join(name));
+            let added = foxglove.add(&frame, picture.as_deref());
+            added.map_err(|e| InputError::unwritable(&mcap, &e))?;
+        }
         report.add(&frame);
         progress.inc(1);
     }
     progress.finish_and_clear();
     recording.finish()?;
+    if let Some(foxglove) = foxglove {
+        foxglove.finish(&mcap)?;
+    }
     report.run_time_s = began.elapsed().as_secs_f64();
     let json = serde_json::to_string_pretty(&report)?;
     let unwritable = |e| InputError::unwritable(&args.out, &e);

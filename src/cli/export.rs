@@ -1,4 +1,4 @@
-//! `gdtof export`: the chip for other tools.
+//! `gdtof export`: the chip, and frames, for other tools.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 
 use super::replay::Stimuli;
 use super::voice::tell;
-use super::{SensorArgs, sdf};
+use super::{SensorArgs, export_frame, sdf};
 use crate::bench::{StimulusPlan, export_annotated_verilog, export_netlist, export_verilog};
 use crate::chip::array;
 use crate::netlist::Netlist;
@@ -18,6 +18,8 @@ pub(super) enum ExportCommand {
     Verilog(VerilogArgs),
     /// The delay of every cell, min:typ:max, as SDF (IEEE 1497).
     Sdf(sdf::SdfArgs),
+    /// A frame that was taken: point clouds (PLY, PCD), arrays (NPY, NPZ), a picture of 16 bits.
+    Frame(export_frame::FrameExportArgs),
 }
 
 /// Arguments of `gdtof export verilog`.
@@ -57,6 +59,7 @@ pub(super) fn run(command: &ExportCommand) -> anyhow::Result<()> {
     match command {
         ExportCommand::Verilog(args) => run_verilog(args),
         ExportCommand::Sdf(args) => sdf::run(args),
+        ExportCommand::Frame(args) => export_frame::run(args),
     }
 }
 

@@ -6,6 +6,8 @@ mod demo;
 mod doctor;
 mod drive;
 mod export;
+mod export_frame;
+mod foxglove;
 mod frame;
 mod guiding;
 mod pareto;
@@ -20,6 +22,7 @@ mod shell;
 mod silicon;
 mod speed;
 mod stereo;
+mod sweep;
 mod tb;
 mod timing;
 mod voice;
@@ -74,6 +77,8 @@ enum Command {
     Timing(timing::TimingArgs),
     /// What the blocks of a macropixel take from the supply, by the toggles of a gate-level run.
     Power(power::PowerArgs),
+    /// A table of frames, or of what theory says, over any settings: lists, ranges, grids, samples.
+    Sweep(sweep::SweepArgs),
     /// Run time against error.
     Pareto(pareto::ParetoArgs),
     /// Print the sensor as a commented file: every key with its unit, range and source.
@@ -84,7 +89,7 @@ enum Command {
     Wave(wave::WaveArgs),
     /// Run the testbenches of the chip's blocks, all or those named.
     Tb(tb::TbArgs),
-    /// Write the chip for other tools.
+    /// Write the chip, or a frame that was taken, for other tools.
     #[command(subcommand)]
     Export(export::ExportCommand),
     /// Say what this machine gives the program, and which other tools are there.
@@ -128,6 +133,7 @@ pub fn main() -> ExitCode {
         Command::Speed(args) => speed::run(&args),
         Command::Timing(args) => timing::run(&args),
         Command::Power(args) => power::run(&args),
+        Command::Sweep(args) => sweep::run(&args),
         Command::Pareto(args) => pareto::run(&args),
         Command::Sensor(args) => settings::print_sensor(&args),
         Command::Scene(args) => settings::print_scene(&args),

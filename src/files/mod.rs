@@ -8,12 +8,14 @@
 //! | `output.rs` | output files: beside the target first, then renamed over it |
 //! | `temporary.rs` | what stands there meanwhile, and what killed runs left of it |
 //! | `interruption.rs` | signals that end the program |
+//! | `journal.rs` | lines with checksums that are only appended |
 //! | `result_set.rs` | the results of a run as one set with a manifest |
 
 mod complaint;
 mod counts;
 mod input;
 mod interruption;
+mod journal;
 mod output;
 mod raster;
 mod result_set;
@@ -24,6 +26,7 @@ pub(crate) use counts::read_counts;
 pub use input::Lines;
 pub(crate) use input::{line_of, parse_json, parse_toml, read_text};
 pub(crate) use interruption::clean_up_when_interrupted;
+pub(crate) use journal::{Journal, JournalReader, journal_line};
 pub use output::{OutputFile, create_folder};
 pub use raster::Raster;
 pub use result_set::{MANIFEST, ManifestFile, ResultSet};

@@ -177,6 +177,17 @@ pub(super) mod lock {
         flock(file, FlockOperation::NonBlockingLockExclusive).is_ok()
     }
 
+    /// Locks `file` if nobody else does, and says whether somebody does. Without locks nobody is known to.
+    #[cfg(unix)]
+    pub(crate) fn is_held_elsewhere(file: &File) -> bool {
+        !is_free(file)
+    }
+
+    #[cfg(not(unix))]
+    pub fn is_held_elsewhere(_: &File) -> bool {
+        false
+    }
+
     /// Is `file` what stands at `path`?
     #[cfg(unix)]
     pub(crate) fn is_same(path: &Path, file: &File) -> bool {

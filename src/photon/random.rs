@@ -43,6 +43,8 @@ pub enum Purpose {
     Guide = 20,
     /// How SPADs of the array differ.
     SpadSpread = 21,
+    /// Which points a study takes.
+    Sweep = 22,
 }
 
 /// The stream of random words for (`seed`, `purpose`, `index`, `sub_index`).

@@ -53,6 +53,34 @@ fn write_npy<T: npyz::AutoSerialize + Copy>(
     })
 }
 
+/// Steps of a metre in pictures of depths: 256 m are as far as they go (as in KITTI's).
+const PNG_STEPS: f32 = 256.0;
+
+/// Writes depths, row-major, m, as a PNG of 16 bits in steps of 1/256 m; 0 where there is none, the last step beyond 255.996 m.
+///
+/// # Errors
+/// When the file cannot be written.
+pub(crate) fn write_depth_png(path: &Path, cols: usize, depths: &[f32]) -> Result<(), InputError> {
+    let step = |depth: &f32| match depth.is_finite() {
+        // A depth is never 0, which would be none.
+        true => (depth * PNG_STEPS).round().clamp(1.0, 65_535.0) as u16,
+        false => 0,
+    };
+    let bytes: Vec<u8> = depths
+        .iter()
+        .flat_map(|depth| step(depth).to_be_bytes())
+        .collect();
+    OutputFile::write_with(path, |out| {
+        let mut encoder = png::Encoder::new(out, cols as u32, (depths.len() / cols) as u32);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Sixteen);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&bytes)?;
+        writer.finish()?;
+        Ok(())
+    })
+}
+
 /// An array that is written piece by piece along its first axis.
 pub(crate) struct NpyStack<T: AutoSerialize>(NpyWriter<T, BufWriter<File>>);
 

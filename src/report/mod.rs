@@ -3,20 +3,27 @@
 mod array;
 mod canvas;
 mod chart;
+mod cloud;
 mod colour;
 mod grid;
 mod image;
 mod legend;
+mod mcap;
+mod npz;
 pub(crate) mod picture;
 mod series;
 mod table;
 mod verdicts;
 
+pub(crate) use array::write_depth_png;
 pub(crate) use array::{NpyStack, write_npy_f32, write_npy_u16};
 pub use chart::{Axis, Chart, Scale};
+pub(crate) use cloud::{CloudPoint, write_pcd, write_ply};
 pub(crate) use grid::aligned;
 pub use grid::{Grid, width};
 pub use image::{Cell, DepthMap};
+pub(crate) use mcap::{Channel, Mcap};
+pub(crate) use npz::Npz;
 pub use series::{Series, Style};
 pub use table::Table;
 pub use verdicts::Checks;

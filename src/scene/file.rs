@@ -116,6 +116,18 @@ impl Scene {
         Ok(scene)
     }
 
+    /// What there is to know of a key, by section and name as `lidar.pde`, or of an object as `object.car.reflectivity`; nothing if it is
+    /// no key.
+    pub(crate) fn key(path: &str) -> Option<Key> {
+        let (section, name) = path.split_once('.')?;
+        let name = match section {
+            "object" => name.rsplit_once('.')?.1,
+            _ => name,
+        };
+        let section = SECTIONS.iter().find(|known| known.name == section)?;
+        section.keys.iter().find(|key| key.name == name).copied()
+    }
+
     /// All values as a TOML table.
     pub(super) fn table(&self) -> Table {
         Table::try_from(self).expect("a scene is numbers and texts")

@@ -207,6 +207,14 @@ impl Document {
         }))
     }
 
+    /// The line of a value, if it stands in a file.
+    pub(crate) fn line(&self, path: &str) -> Option<usize> {
+        match self.origins.get(path) {
+            Some(Origin::Line(line)) => Some(*line),
+            _ => None,
+        }
+    }
+
     /// Where a value stands, or else its section.
     fn origin(&self, path: &str) -> Option<&Origin> {
         self.origins.get(path).or_else(|| {

@@ -82,7 +82,7 @@ impl Key {
     ///
     /// # Errors
     /// What is wrong with the text, and the cure.
-    pub(super) fn plain(&self, value: &Value) -> Result<Value, String> {
+    pub(crate) fn plain(&self, value: &Value) -> Result<Value, String> {
         let is_number = !matches!(
             self.range,
             Range::OneOf(_) | Range::WordOrCurve(..) | Range::Switch | Range::Text

@@ -26,6 +26,7 @@ pub use drive::{Drive, DriveFrame, DriveSettings, FrameClock, FrameTimes, Noise,
 pub use frame::{
     EngineKind, FrameError, FrameSettings, Probe, take_frame, take_frame_by, take_guided_frame,
 };
+pub(crate) use pixel::above_background;
 pub use pixel::{NoDepth, PixelDepth};
 pub use policy::{POLICY_KEYS, Pointing, Unguided, Why, WindowPolicy, share_held};
 pub(crate) use ranger::{Known, Ranger};

@@ -1,13 +1,13 @@
 //! One macropixel of a frame: its depth and how sure that is, or the one reason why it has none.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Why a macropixel has no depth: the first of these that holds, in this order.
 ///
 /// Two are known to the simulation alone, not to the chip: that there is no surface, and that a surface lies outside the
 /// window. Both only say why no peak stood out. A window without its surface whose peak is significant all the same gets a
 /// depth, as it would from the real chip, and counts as an outlier.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NoDepth {
     /// The macropixel sees the sky.
@@ -71,6 +71,15 @@ pub struct PixelDepth {
     pub peak_m: Option<f64>,
     /// −log₁₀ of the chance that light without an echo makes such a peak; `None` where there is no peak.
     pub confidence: Option<f64>,
+}
+
+/// Photons of an echo in a histogram: the counts beyond those of its middle bin, which is background where an echo has few bins.
+pub(crate) fn above_background(counts: &[u16]) -> f32 {
+    let mut sorted = counts.to_vec();
+    sorted.sort_unstable();
+    let background = sorted.get(sorted.len() / 2).copied().unwrap_or(0);
+    let above = counts.iter().map(|&n| n.saturating_sub(background));
+    above.map(f32::from).sum()
 }
 
 impl PixelDepth {

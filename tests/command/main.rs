@@ -7,6 +7,7 @@ mod delay_files_replay;
 mod delay_lines_are_calibrated;
 mod drives_are_recorded;
 mod engines_are_chosen_from_the_command_line;
+mod frames_for_other_tools;
 mod golden_vectors_hold;
 mod guides_from_the_command_line;
 mod mismatch_replays;
@@ -17,6 +18,8 @@ mod real_histograms_are_ranged;
 mod results_are_one_set;
 mod run_time_against_error;
 mod scenes_name_files;
+#[cfg(unix)]
+mod sweeps_go_on;
 mod the_book_runs;
 mod the_command_explains_itself;
 mod wave_replays_a_cycle;

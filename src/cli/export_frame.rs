@@ -1,0 +1,196 @@
+//! `gdtof export frame`: a frame that was taken, as point clouds and arrays.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use serde::Deserialize;
+
+use super::voice::{note, tell};
+use crate::files::{InputError, ResultSet, parse_json, read_text};
+use crate::report::{CloudPoint, Npz, write_depth_png, write_npy_f32, write_pcd, write_ply};
+use crate::system::{NoDepth, TakenFrame, above_background};
+
+/// Arguments of `gdtof export frame`.
+#[derive(Args)]
+pub(super) struct FrameExportArgs {
+    /// Folder that `gdtof frame` has written.
+    #[arg(value_name = "DIR")]
+    frame: PathBuf,
+    /// What to write: frame.ply, frame.pcd, depth.npy, frame.npz, depth16.png; several with commas between. All, without it.
+    #[arg(long, value_name = "FORMAT,…", value_delimiter = ',', value_enum)]
+    format: Vec<Format>,
+    /// Folder for the files; it is made if need be.
+    #[arg(long, value_name = "DIR", default_value = "export")]
+    out: PathBuf,
+}
+
+/// What a frame is written as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// Point cloud, binary PLY: x right, y down, z forward, intensity, confidence, row, col.
+    Ply,
+    /// Point cloud, binary PCD 0.7, with the same fields.
+    Pcd,
+    /// Depths along the rays, rows x cols, m, float32; NaN where there is none.
+    Npy,
+    /// Everything: histograms, depths, guide, truth, peaks, confidence, start values, reasons.
+    Npz,
+    /// Depths as a picture of 16 bits, in steps of 1/256 m; 0 where there is none (as KITTI's).
+    Png16,
+}
+
+/// A macropixel of frame.json.
+#[derive(Deserialize)]
+struct Macropixel {
+    true_m: Option<f64>,
+    guide_m: Option<f64>,
+    start: Option<u16>,
+    in_window: bool,
+    measured_m: Option<f64>,
+    no_depth: Option<NoDepth>,
+    peak_m: Option<f64>,
+    confidence: Option<f64>,
+}
+
+#[derive(Deserialize)]
+struct Macropixels {
+    macropixels: Vec<Macropixel>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A folder without a frame of this version, and files that cannot be written.
+pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
+    let path = args.frame.join("frame.json");
+    let taken = TakenFrame::read(&path)?;
+    let wanted = "the frame.json of a frame that `gdtof frame` has taken";
+    let Macropixels { macropixels } = parse_json(path.display(), &read_text(&path)?, wanted)?;
+    let (rows, cols, bins) = (taken.sensor.rows, taken.sensor.cols, taken.sensor.bins);
+    let histograms = read_histograms(&args.frame.join("histograms.npy"), [rows, cols, bins])?;
+    let is_frame = |folder: &Path| folder.canonicalize().ok() == args.frame.canonicalize().ok();
+    if is_frame(&args.out) {
+        let message =
+            "is the folder of the frame itself, whose files would make room; give another one";
+        return Err(InputError::new("--out", message).into());
+    }
+
+    let camera = taken.scene.lidar_camera(rows as u32, cols as u32);
+    let points: Vec<CloudPoint> = (macropixels
+        .iter()
+        .zip(histograms.chunks_exact(bins))
+        .enumerate())
+    .filter_map(|(pixel, (macropixel, counts))| {
+        let (row, col) = (pixel / cols, pixel % cols);
+        let ray = camera.at_unit_depth((col as f64 + 0.5, row as f64 + 0.5));
+        let at_m = ray.normalize() * macropixel.measured_m?;
+        Some(CloudPoint {
+            at_m: at_m.to_array().map(|x| x as f32),
+            intensity: above_background(counts),
+            confidence: macropixel.confidence.unwrap_or(0.0) as f32,
+            pixel: [row as u16, col as u16],
+        })
+    })
+    .collect();
+    let depths = of(&macropixels, |m| m.measured_m);
+
+    let results = ResultSet::begin(&args.out)?;
+    let all = Format::value_variants();
+    let formats = if args.format.is_empty() {
+        all
+    } else {
+        &args.format[..]
+    };
+    let mut names = Vec::new();
+    for format in all.iter().filter(|format| formats.contains(format)) {
+        let name = match format {
+            Format::Ply => "frame.ply",
+            Format::Pcd => "frame.pcd",
+            Format::Npy => "depth.npy",
+            Format::Npz => "frame.npz",
+            Format::Png16 => "depth16.png",
+        };
+        let path = results.staging().join(name);
+        match format {
+            Format::Ply => write_ply(&path, &points)?,
+            Format::Pcd => write_pcd(&path, &points)?,
+            Format::Npy => write_npy_f32(&path, &[rows as u64, cols as u64], &depths)?,
+            Format::Npz => whole(&macropixels, &histograms, [rows, cols, bins]).write(&path)?,
+            Format::Png16 => write_depth_png(&path, cols, &depths)?,
+        }
+        names.push(name);
+    }
+    let frame = args.frame.display().to_string();
+    for sentence in results.commit("export frame", serde_json::json!({ "frame": frame }))? {
+        note(sentence);
+    }
+    tell(format_args!(
+        "{} in {}: {} of {} macropixels have a depth\n",
+        names.join(", "),
+        args.out.display(),
+        points.len(),
+        macropixels.len()
+    ))?;
+    Ok(())
+}
+
+/// A number of each macropixel; not a number where there is none.
+fn of(macropixels: &[Macropixel], number: impl Fn(&Macropixel) -> Option<f64>) -> Vec<f32> {
+    let number = |macropixel| number(macropixel).map_or(f32::NAN, |x| x as f32);
+    macropixels.iter().map(number).collect()
+}
+
+fn whole(macropixels: &[Macropixel], histograms: &[u16], [rows, cols, bins]: [usize; 3]) -> Npz {
+    let mut arrays = Npz::default();
+    let shape = [rows, cols];
+    arrays.add("histograms", &[rows, cols, bins], histograms);
+    for (name, number) in [
+        (
+            "depth_m",
+            (|m| m.measured_m) as fn(&Macropixel) -> Option<f64>,
+        ),
+        ("guide_m", |m| m.guide_m),
+        ("truth_m", |m| m.true_m),
+        ("peak_m", |m| m.peak_m),
+        ("confidence", |m| m.confidence),
+    ] {
+        arrays.add(name, &shape, &of(macropixels, number));
+    }
+    let start = |m: &Macropixel| m.start.map_or(-1, i32::from);
+    arrays.add(
+        "start",
+        &shape,
+        &macropixels.iter().map(start).collect::<Vec<i32>>(),
+    );
+    let in_window = |m: &Macropixel| u8::from(m.in_window);
+    arrays.add(
+        "in_window",
+        &shape,
+        &macropixels.iter().map(in_window).collect::<Vec<u8>>(),
+    );
+    // 0 where there is a depth.
+    let reason = |m: &Macropixel| m.no_depth.map_or(0, |reason| 1 + reason as u8);
+    arrays.add(
+        "no_depth",
+        &shape,
+        &macropixels.iter().map(reason).collect::<Vec<u8>>(),
+    );
+    arrays
+}
+
+fn read_histograms(path: &Path, shape: [usize; 3]) -> Result<Vec<u16>, InputError> {
+    let complain = |message: String| InputError::new(path.display(), message);
+    let bytes = std::fs::read(path)
+        .map_err(|e| complain(format!("cannot be read ({e}); take the frame anew")))?;
+    let array = npyz::NpyFile::new(&bytes[..]);
+    let array = array.map_err(|e| complain(format!("is no array ({e}); take the frame anew")))?;
+    if array.shape() != shape.map(|n| n as u64) {
+        return Err(complain(format!(
+            "has the shape {:?} where frame.json says {shape:?}; take the frame anew",
+            array.shape()
+        )));
+    }
+    array
+        .into_vec()
+        .map_err(|e| complain(format!("holds no counts ({e}); take the frame anew")))
+}

@@ -1,0 +1,278 @@
+//! A drive for Foxglove and other players: points, depths, pictures and windows as messages with Foxglove's schemas.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use crate::files::{InputError, OutputFile};
+use crate::report::{Channel, CloudPoint, Mcap};
+use crate::scene::DVec3;
+use crate::system::{DriveFrame, DriveSettings, above_background};
+
+const TRANSFORM: usize = 0;
+const POINTS: usize = 1;
+const DEPTHS: usize = 2;
+const PICTURE: usize = 3;
+const WINDOWS: usize = 4;
+
+const CHANNELS: [Channel; 5] = [
+    Channel {
+        topic: "/tf",
+        schema: "foxglove.FrameTransform",
+        json_schema: r#"{"title":"foxglove.FrameTransform","type":"object","properties":{
+            "timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
+            "parent_frame_id":{"type":"string"},"child_frame_id":{"type":"string"},
+            "translation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}},
+            "rotation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"},"w":{"type":"number"}}}}}"#,
+    },
+    Channel {
+        topic: "/lidar/points",
+        schema: "foxglove.PointCloud",
+        json_schema: r#"{"title":"foxglove.PointCloud","type":"object","properties":{
+            "timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
+            "frame_id":{"type":"string"},
+            "pose":{"type":"object","properties":{
+                "position":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}},
+                "orientation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"},"w":{"type":"number"}}}}},
+            "point_stride":{"type":"integer"},
+            "fields":{"type":"array","items":{"type":"object","properties":{"name":{"type":"string"},"offset":{"type":"integer"},"type":{"type":"integer"}}}},
+            "data":{"type":"string","contentEncoding":"base64"}}}"#,
+    },
+    Channel {
+        topic: "/lidar/depth",
+        schema: "foxglove.RawImage",
+        json_schema: r#"{"title":"foxglove.RawImage","type":"object","properties":{
+            "timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
+            "frame_id":{"type":"string"},"width":{"type":"integer"},"height":{"type":"integer"},
+            "encoding":{"type":"string"},"step":{"type":"integer"},
+            "data":{"type":"string","contentEncoding":"base64"}}}"#,
+    },
+    Channel {
+        topic: "/lidar/picture",
+        schema: "foxglove.CompressedImage",
+        json_schema: r#"{"title":"foxglove.CompressedImage","type":"object","properties":{
+            "timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
+            "frame_id":{"type":"string"},
+            "data":{"type":"string","contentEncoding":"base64"},"format":{"type":"string"}}}"#,
+    },
+    Channel {
+        topic: "/lidar/windows",
+        schema: "foxglove.SceneUpdate",
+        json_schema: r#"{"title":"foxglove.SceneUpdate","type":"object","properties":{
+            "deletions":{"type":"array","items":{"type":"object","properties":{}}},
+            "entities":{"type":"array","items":{"type":"object","properties":{
+                "timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
+                "frame_id":{"type":"string"},"id":{"type":"string"},
+                "lifetime":{"type":"object","title":"duration","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
+                "frame_locked":{"type":"boolean"},
+                "metadata":{"type":"array","items":{"type":"object","properties":{"key":{"type":"string"},"value":{"type":"string"}}}},
+                "arrows":{"type":"array","items":{"type":"object"}},"cubes":{"type":"array","items":{"type":"object"}},
+                "spheres":{"type":"array","items":{"type":"object"}},"cylinders":{"type":"array","items":{"type":"object"}},
+                "lines":{"type":"array","items":{"type":"object","properties":{
+                    "type":{"type":"integer"},
+                    "pose":{"type":"object","properties":{
+                        "position":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}},
+                        "orientation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"},"w":{"type":"number"}}}}},
+                    "thickness":{"type":"number"},"scale_invariant":{"type":"boolean"},
+                    "points":{"type":"array","items":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}}},
+                    "color":{"type":"object","properties":{"r":{"type":"number"},"g":{"type":"number"},"b":{"type":"number"},"a":{"type":"number"}}},
+                    "colors":{"type":"array","items":{"type":"object","properties":{"r":{"type":"number"},"g":{"type":"number"},"b":{"type":"number"},"a":{"type":"number"}}}},
+                    "indices":{"type":"array","items":{"type":"integer"}}}}},
+                "triangles":{"type":"array","items":{"type":"object"}},"texts":{"type":"array","items":{"type":"object"}},
+                "models":{"type":"array","items":{"type":"object"}}}}}}}"#,
+    },
+];
+
+/// Windows are drawn of every fourth macropixel of every fourth row: all of them hide what they are about.
+const WINDOW_STEP: usize = 4;
+
+/// Foxglove's number for a field of four bytes, and of two.
+const FLOAT32: u8 = 7;
+const UINT16: u8 = 3;
+
+/// A recording of a drive.
+pub(super) struct Foxglove {
+    mcap: Mcap<OutputFile>,
+    rays: Vec<DVec3>,
+    cols: usize,
+    bins: usize,
+    begin_s: f64,
+}
+
+impl Foxglove {
+    /// Begins `path`.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(super) fn begin(path: &Path, settings: &DriveSettings) -> Result<Self, InputError> {
+        let sensor = &settings.frame.sensor;
+        let (rows, cols) = (sensor.rows, sensor.cols);
+        let camera = settings.frame.scene.lidar_camera(rows as u32, cols as u32);
+        let middle = |pixel: usize| ((pixel % cols) as f64 + 0.5, (pixel / cols) as f64 + 0.5);
+        let ray = |pixel| camera.at_unit_depth(middle(pixel)).normalize();
+        let mcap = Mcap::begin(OutputFile::create(path)?, &CHANNELS);
+        Ok(Foxglove {
+            mcap: mcap.map_err(|e| InputError::unwritable(path, &e))?,
+            rays: (0..rows * cols).map(ray).collect(),
+            cols,
+            bins: sensor.bins,
+            begin_s: settings.start_s,
+        })
+    }
+
+    /// Records a frame at the middle of its exposure, with its picture if there is one.
+    ///
+    /// # Errors
+    /// When it cannot be written, or the picture not be read.
+    pub(super) fn add(
+        &mut self,
+        frame: &DriveFrame,
+        picture: Option<&Path>,
+    ) -> std::io::Result<()> {
+        let time_ns = ((frame.times.middle_s() - self.begin_s).max(0.0) * 1e9).round() as u64;
+        let time = json!({"sec": time_ns / 1_000_000_000, "nsec": time_ns % 1_000_000_000});
+        // Optical axes (x right, y down, z forward) in a world whose z is up.
+        let transform = json!({
+            "timestamp": time, "parent_frame_id": "world", "child_frame_id": "lidar",
+            "translation": xyz(DVec3::ZERO),
+            "rotation": {"x": -0.5, "y": 0.5, "z": -0.5, "w": 0.5},
+        });
+        let fields = ["x", "y", "z", "intensity", "confidence"]
+            .iter()
+            .enumerate();
+        let fields = fields
+            .map(|(number, name)| json!({"name": name, "offset": 4 * number, "type": FLOAT32}));
+        let pixel = ["row", "col"].iter().enumerate();
+        let pixel = pixel
+            .map(|(number, name)| json!({"name": name, "offset": 20 + 2 * number, "type": UINT16}));
+        let points: Vec<u8> = self.points(frame).flat_map(|point| point.bytes()).collect();
+        let points = json!({
+            "timestamp": time, "frame_id": "lidar", "pose": pose(),
+            "point_stride": CloudPoint::BYTES, "fields": fields.chain(pixel).collect::<Vec<_>>(),
+            "data": base64(&points),
+        });
+        let depths = frame
+            .pixels
+            .iter()
+            .map(|pixel| pixel.measured_m.map_or(f32::NAN, |m| m as f32));
+        let depths: Vec<u8> = depths.flat_map(f32::to_le_bytes).collect();
+        let depths = json!({
+            "timestamp": time, "frame_id": "lidar", "width": self.cols, "height": frame.pixels.len() / self.cols,
+            "encoding": "32FC1", "step": 4 * self.cols, "data": base64(&depths),
+        });
+        let mut messages = vec![(TRANSFORM, transform), (POINTS, points), (DEPTHS, depths)];
+        if let Some(picture) = picture {
+            let picture = base64(&std::fs::read(picture)?);
+            messages.push((
+                PICTURE,
+                json!({"timestamp": time, "frame_id": "lidar", "data": picture, "format": "png"}),
+            ));
+        }
+        messages.push((WINDOWS, self.windows(frame, &time)));
+        self.mcap.moment(time_ns, &messages)
+    }
+
+    fn points<'a>(&'a self, frame: &'a DriveFrame) -> impl Iterator<Item = CloudPoint> + 'a {
+        let histograms = frame.histograms.counts().chunks_exact(self.bins);
+        let pixels = frame.pixels.iter().zip(histograms).enumerate();
+        pixels.filter_map(|(number, (pixel, counts))| {
+            Some(CloudPoint {
+                at_m: (self.rays[number] * pixel.measured_m?)
+                    .to_array()
+                    .map(|x| x as f32),
+                intensity: above_background(counts),
+                confidence: pixel.confidence.unwrap_or(0.0) as f32,
+                pixel: [(number / self.cols) as u16, (number % self.cols) as u16],
+            })
+        })
+    }
+
+    /// A stroke along the ray from where a window opens to where it closes.
+    fn windows(&self, frame: &DriveFrame, time: &Value) -> Value {
+        let shown = |pixel: &usize| {
+            (pixel / self.cols).is_multiple_of(WINDOW_STEP)
+                && (pixel % self.cols).is_multiple_of(WINDOW_STEP)
+        };
+        let ends = (0..frame.windows_m.len())
+            .filter(shown)
+            .filter_map(|pixel| {
+                let (from_m, to_m) = frame.windows_m[pixel]?;
+                Some([from_m, to_m].map(|m| xyz(self.rays[pixel] * m)))
+            });
+        let none = json!([]);
+        json!({"deletions": none, "entities": [{
+            "timestamp": time, "frame_id": "lidar", "id": "windows",
+            "lifetime": {"sec": 0, "nsec": 0}, "frame_locked": true, "metadata": none,
+            "arrows": none, "cubes": none, "spheres": none, "cylinders": none,
+            "lines": [{
+                // A list of strokes.
+                "type": 2, "pose": pose(), "thickness": 1.5, "scale_invariant": true,
+                "points": ends.flatten().collect::<Vec<_>>(),
+                "color": {"r": 0.2, "g": 0.6, "b": 1.0, "a": 0.6}, "colors": none, "indices": none,
+            }],
+            "triangles": none, "texts": none, "models": none,
+        }]})
+    }
+
+    /// Ends the recording.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(super) fn finish(self, path: &Path) -> Result<(), InputError> {
+        let file = self.mcap.finish();
+        file.map_err(|e| InputError::unwritable(path, &e))?.commit()
+    }
+}
+
+fn xyz(point: DVec3) -> Value {
+    // Millimetres are more than enough, and keep the text short.
+    let [x, y, z] = point.to_array().map(|x| (x * 1e3).round() / 1e3);
+    json!({"x": x, "y": y, "z": z})
+}
+
+fn pose() -> Value {
+    json!({"position": xyz(DVec3::ZERO), "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}})
+}
+
+/// RFC 4648, with padding.
+fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for chunk in bytes.chunks(3) {
+        let of = |at: usize| u32::from(chunk.get(at).copied().unwrap_or(0));
+        let word = of(0) << 16 | of(1) << 8 | of(2);
+        for letter in 0..4 {
+            text.push(match letter <= chunk.len() {
+                true => LETTERS[(word >> (18 - 6 * letter)) as usize & 63] as char,
+                false => '=',
+            });
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base64_is_that_of_rfc_4648() {
+        for (bytes, text) in [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foobar", "Zm9vYmFy"),
+        ] {
+            assert_eq!(base64(bytes.as_bytes()), text);
+        }
+    }
+
+    #[test]
+    fn schemas_are_json() {
+        for channel in CHANNELS {
+            let schema: Value = serde_json::from_str(channel.json_schema).unwrap();
+            assert_eq!(schema["title"], channel.schema);
+        }
+    }
+}

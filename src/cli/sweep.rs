@@ -1,0 +1,254 @@
+//! `gdtof sweep`: a table of frames, or of what theory says, over any settings.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, Subcommand};
+use serde::Serialize;
+
+use super::voice::{note, progress, tell};
+use crate::files::{InputError, ResultSet};
+use crate::report::Table;
+use crate::sweep::{
+    Drawing, Kind, Outcome, Plot, Results, Shard, Study, SweepError, columns, run as take, study_of,
+};
+
+/// Arguments of `gdtof sweep`.
+#[derive(Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(super) struct SweepArgs {
+    #[command(subcommand)]
+    command: Option<SweepCommand>,
+    /// Study (TOML): what varies in [vary], what does not in [fixed].
+    #[arg(required = true, value_name = "STUDY")]
+    study: Option<PathBuf>,
+    /// Take only every N-th point, from the I-th on: one of N processes, in one folder or several, which `gdtof sweep merge` joins.
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    shard: Option<Shard>,
+    #[command(flatten)]
+    results: ResultArgs,
+}
+
+#[derive(Subcommand)]
+enum SweepCommand {
+    /// Make one table of the rows in several folders.
+    Merge(MergeArgs),
+}
+
+/// Arguments of `gdtof sweep merge`.
+#[derive(Args)]
+struct MergeArgs {
+    /// Folders that `gdtof sweep` has written, all of one study.
+    #[arg(required = true, value_name = "DIR")]
+    folders: Vec<PathBuf>,
+    /// Make a table of the points that are there, if not all are.
+    #[arg(long)]
+    partial: bool,
+    #[command(flatten)]
+    results: ResultArgs,
+}
+
+/// What becomes of the rows.
+#[derive(Args)]
+struct ResultArgs {
+    /// Folder for the results, whatever the study says; of merged folders the first one, without it.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Draw a column over another one, if wished a line for each value of a third; may be repeated.
+    #[arg(long = "plot", value_name = "X,Y[,SERIES]")]
+    plots: Vec<String>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, files that cannot be written, faults of the program.
+pub(super) fn run(args: &SweepArgs) -> anyhow::Result<()> {
+    match (&args.command, &args.study) {
+        (Some(SweepCommand::Merge(merge)), _) => run_merge(merge),
+        (None, Some(study)) => run_study(args, study),
+        (None, None) => unreachable!("clap wants one of them"),
+    }
+}
+
+fn run_study(args: &SweepArgs, path: &Path) -> anyhow::Result<()> {
+    let study = Study::load(path)?;
+    let plots = plots(&args.results, &study)?;
+    let shard = args.shard.unwrap_or(Shard::WHOLE);
+    let folder = args
+        .results
+        .out
+        .clone()
+        .unwrap_or_else(|| study.out.clone());
+    let begin = Instant::now();
+    let progress = progress(
+        shard.share(study.len()),
+        "sweeping {bar:40} {pos}/{len} points, {eta} left",
+    );
+    let outcome = take(&study, &folder, shard, |points| progress.inc(points));
+    progress.finish_and_clear();
+    let outcome = outcome.map_err(plain)?;
+    let seconds = begin.elapsed().as_secs_f64();
+    if outcome.spoilt_lines > 0 {
+        let lines = outcome.spoilt_lines;
+        note(format_args!(
+            "{lines} lines of the journal are damaged; their points were taken anew"
+        ));
+    }
+    let mut table = outcome_table(&study, &outcome, seconds);
+    if shard == Shard::WHOLE {
+        let missing = write(
+            &study,
+            std::slice::from_ref(&folder),
+            &folder,
+            &plots,
+            Some(outcome),
+        )?;
+        debug_assert_eq!(missing, 0);
+        table.push("in", folder.display());
+        tell(table)?;
+    } else {
+        tell(table)?;
+        tell(format_args!(
+            "\nThis is one of {} parts; when all are done: gdtof sweep merge {}\n",
+            shard.of,
+            folder.display()
+        ))?;
+    }
+    Ok(())
+}
+
+fn run_merge(args: &MergeArgs) -> anyhow::Result<()> {
+    let study = study_of(&args.folders[0])?;
+    for folder in &args.folders[1..] {
+        if study_of(folder)?.text() != study.text() {
+            let message = format!(
+                "is of another study than {}; merge folders of one study",
+                args.folders[0].display()
+            );
+            return Err(InputError::new(folder.display(), message).into());
+        }
+    }
+    let plots = plots(&args.results, &study)?;
+    let out = args.results.out.as_ref().unwrap_or(&args.folders[0]);
+    if !args.partial {
+        let there = Results::of(&study, &args.folders)?;
+        let missing = there.missing().map_err(plain)?;
+        if missing > 0 {
+            let message = format!(
+                "{missing} of {} points are in none of these folders; run the shards that take them, or give --partial",
+                study.len()
+            );
+            return Err(InputError::new("gdtof sweep merge", message).into());
+        }
+    }
+    let missing = write(&study, &args.folders, out, &plots, None)?;
+    let mut table =
+        Table::new(format!("Sweep {}", study.name)).row("points", study.len() - missing);
+    if missing > 0 {
+        table.push("points that are missing", missing);
+    }
+    table.push("in", out.display());
+    tell(table)?;
+    Ok(())
+}
+
+/// What is drawn, by columns that there are.
+fn plots(args: &ResultArgs, study: &Study) -> Result<Vec<Plot>, InputError> {
+    let columns = columns(study);
+    let parse = |text: &String| {
+        let plot = Plot::parse(text).ok_or_else(|| {
+            InputError::new(
+                "--plot",
+                format!("{text:?} is no pair of columns; give X,Y or X,Y,SERIES"),
+            )
+        })?;
+        Drawing::new(&plot, study, &columns, "--plot")?;
+        Ok(plot)
+    };
+    args.plots.iter().map(parse).collect()
+}
+
+/// Writes table and charts; returns how many points are missing in them.
+fn write(
+    study: &Study,
+    folders: &[PathBuf],
+    out: &Path,
+    plots: &[Plot],
+    outcome: Option<Outcome>,
+) -> anyhow::Result<u64> {
+    let columns = columns(study);
+    let set = ResultSet::begin(out)?;
+    let drawings = plots
+        .iter()
+        .map(|plot| Drawing::new(plot, study, &columns, "--plot"));
+    let mut drawings: Vec<Drawing<'_>> = drawings.collect::<Result<_, _>>()?;
+    let results = Results::of(study, folders)?;
+    let missing = results.write(set.staging(), |cells| {
+        drawings.iter_mut().for_each(|drawing| drawing.see(cells));
+    });
+    let missing = missing.map_err(plain)?;
+    for (drawing, plot) in drawings.into_iter().zip(plots) {
+        let chart = drawing.chart(study, "--plot")?;
+        chart.write(&set.staging().join(plot.file_name() + ".svg"))?;
+    }
+    let configuration = Configuration {
+        study: study.text(),
+        points: study.len() - missing,
+        outcome,
+    };
+    for sentence in set.commit("sweep", configuration)? {
+        note(sentence);
+    }
+    Ok(missing)
+}
+
+/// As what it is, for the exit status.
+fn plain(error: SweepError) -> anyhow::Error {
+    match error {
+        SweepError::Input(error) => error.into(),
+        SweepError::Frame(error) => error.into(),
+    }
+}
+
+/// What the manifest says.
+#[derive(Serialize)]
+struct Configuration<'a> {
+    study: &'a str,
+    points: u64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    outcome: Option<Outcome>,
+}
+
+fn outcome_table(study: &Study, outcome: &Outcome, seconds: f64) -> Table {
+    let mut table = Table::new(format!("Sweep {}", study.name)).row("points", outcome.points);
+    if outcome.reused > 0 {
+        table.push("there before", outcome.reused);
+    }
+    table.push("taken", outcome.taken);
+    if outcome.without_results > 0 {
+        table.push("without results; see error", outcome.without_results);
+    }
+    if outcome.taken > 0 {
+        table.push("run time", format!("{seconds:.1} s"));
+        let each = match study.kind {
+            Kind::Frame => format!("{:.1} /s", outcome.taken as f64 / seconds),
+            Kind::Theory => format!("{:.0} /s", outcome.taken as f64 / seconds),
+        };
+        table.push("points taken", each);
+    }
+    table
+}
+
+fn shard(text: &str) -> Result<Shard, String> {
+    let numbers = text.split_once('/').and_then(|(part, of)| {
+        let number = |text: &str| text.trim().parse::<u64>().ok();
+        Some((number(part)?, number(of)?))
+    });
+    match numbers {
+        Some((part, of)) if (1..=of).contains(&part) && of <= 1_000_000 => {
+            Ok(Shard { part: part - 1, of })
+        }
+        _ => Err("give a part and the number of parts, as 3/16".to_owned()),
+    }
+}

@@ -1,0 +1,173 @@
+//! Cells of the table of results, and what its columns hold.
+
+use toml::Value;
+
+/// What a column holds. Any cell may be empty.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Holds {
+    /// Whole numbers.
+    Whole,
+    /// Numbers.
+    Number,
+    /// Words.
+    Word,
+    /// true or false.
+    Truth,
+}
+
+/// A column.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Column {
+    /// Heading.
+    pub name: String,
+    /// Unit, if it has one.
+    pub unit: &'static str,
+    /// What it holds.
+    pub holds: Holds,
+}
+
+impl Column {
+    /// A column.
+    pub fn new(name: impl Into<String>, unit: &'static str, holds: Holds) -> Self {
+        Column {
+            name: name.into(),
+            unit,
+            holds,
+        }
+    }
+
+    /// Heading and unit, for an axis.
+    pub fn label(&self) -> String {
+        match self.unit {
+            "" => self.name.clone(),
+            unit => format!("{} ({unit})", self.name),
+        }
+    }
+}
+
+/// One value of the table.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cell {
+    /// Nothing.
+    Empty,
+    /// A whole number.
+    Whole(i64),
+    /// A number; not a number is nothing.
+    Number(f64),
+    /// Words.
+    Word(String),
+    /// true or false.
+    Truth(bool),
+}
+
+impl Cell {
+    /// A number, where there is one.
+    pub fn maybe(number: Option<f64>) -> Self {
+        number.map_or(Cell::Empty, Cell::Number)
+    }
+
+    /// A count.
+    pub fn count(count: usize) -> Self {
+        Cell::Whole(count as i64)
+    }
+
+    /// A setting's value in a column that holds `holds`.
+    pub(super) fn of(value: &Value, holds: Holds) -> Self {
+        match (value, holds) {
+            (Value::Integer(n), Holds::Number) => Cell::Number(*n as f64),
+            (Value::Integer(n), Holds::Whole) => Cell::Whole(*n),
+            (Value::Float(x), Holds::Number) => Cell::Number(*x),
+            (Value::Boolean(b), Holds::Truth) => Cell::Truth(*b),
+            (Value::String(s), _) => Cell::Word(s.clone()),
+            (other, _) => Cell::Word(other.to_string()),
+        }
+    }
+
+    /// As a field of a CSV file.
+    pub(super) fn csv(&self) -> String {
+        match self {
+            Cell::Empty => String::new(),
+            Cell::Whole(n) => n.to_string(),
+            Cell::Number(x) if x.is_nan() => String::new(),
+            Cell::Number(x) => format!("{x:?}"),
+            Cell::Truth(b) => b.to_string(),
+            Cell::Word(word) => {
+                // A line feed in a field is allowed, and half of all readers stumble over it.
+                let word = word.replace('\n', " ");
+                match word.contains([',', '"']) {
+                    true => format!("\"{}\"", word.replace('"', "\"\"")),
+                    false => word,
+                }
+            }
+        }
+    }
+
+    /// As JSON, which has no infinite numbers.
+    pub(super) fn json(&self) -> serde_json::Value {
+        match self {
+            Cell::Empty => serde_json::Value::Null,
+            Cell::Whole(n) => (*n).into(),
+            Cell::Number(x) if x.is_infinite() => (if *x > 0.0 { "inf" } else { "-inf" }).into(),
+            Cell::Number(x) => (*x).into(),
+            Cell::Word(word) => word.as_str().into(),
+            Cell::Truth(b) => (*b).into(),
+        }
+    }
+
+    /// From what [`Cell::json`] makes of a cell of such a column; `None` if it is no such thing.
+    pub(super) fn from_json(json: &serde_json::Value, holds: Holds) -> Option<Self> {
+        Some(match (json, holds) {
+            (serde_json::Value::Null, _) => Cell::Empty,
+            (json, Holds::Whole) => Cell::Whole(json.as_i64()?),
+            (serde_json::Value::String(infinite), Holds::Number) => {
+                Cell::Number(infinite.parse().ok()?)
+            }
+            (json, Holds::Number) => Cell::Number(json.as_f64()?),
+            (json, Holds::Word) => Cell::Word(json.as_str()?.to_owned()),
+            (json, Holds::Truth) => Cell::Truth(json.as_bool()?),
+        })
+    }
+
+    /// The number in it, if it is one.
+    pub fn number(&self) -> Option<f64> {
+        match self {
+            Cell::Whole(n) => Some(*n as f64),
+            Cell::Number(x) => Some(*x),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn any_cell() -> impl Strategy<Value = (Cell, Holds)> {
+        prop_oneof![
+            Just((Cell::Empty, Holds::Number)),
+            any::<i64>().prop_map(|n| (Cell::Whole(n), Holds::Whole)),
+            (any::<f64>().prop_filter("not a number", |x| !x.is_nan()))
+                .prop_map(|x| (Cell::Number(x), Holds::Number)),
+            ".{0,20}".prop_map(|w| (Cell::Word(w), Holds::Word)),
+            any::<bool>().prop_map(|b| (Cell::Truth(b), Holds::Truth)),
+        ]
+    }
+
+    proptest! {
+        /// To the bit, by way of text.
+        #[test]
+        fn cells_come_back_from_json((cell, holds) in any_cell()) {
+            let text = cell.json().to_string();
+            let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+            prop_assert_eq!(Cell::from_json(&json, holds), Some(cell));
+        }
+
+        #[test]
+        fn fields_are_one_line_with_no_comma_of_their_own((cell, _) in any_cell()) {
+            let field = cell.csv();
+            prop_assert!(!field.contains('\n'));
+            prop_assert!(!field.contains(',') || (field.starts_with('"') && field.ends_with('"')));
+        }
+    }
+}

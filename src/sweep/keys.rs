@@ -1,0 +1,166 @@
+//! The names that a study may give values to: keys of sensor, scene, windows, frame and theory.
+
+use toml::{Table, Value};
+
+use super::Kind;
+use super::cell::Holds;
+use super::theory;
+use crate::chip::SensorConfig;
+use crate::request::{FRAME_KEYS, FrameRequest};
+use crate::scene::Scene;
+use crate::settings::{Key, Range};
+use crate::system::{POLICY_KEYS, WindowPolicy};
+
+const fn key(name: &'static str, range: Range, what: &'static str) -> Key {
+    Key {
+        name,
+        what,
+        unit: "",
+        range,
+        source: "chosen",
+    }
+}
+
+const SENSOR: Key = key("sensor", Range::Text, "Chip or sensor file");
+const SCENE: Key = key("scene", Range::Text, "Built-in scene or scene file");
+const GUIDE: Key = key(
+    "guide",
+    Range::Text,
+    "What guides the windows, one or a list of several",
+);
+const WINDOWS: Key = key("windows", Range::Text, "How windows are chosen");
+
+/// A key, and what its values are.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Known {
+    pub(super) key: Key,
+    pub(super) holds: Holds,
+}
+
+/// The key of this name.
+///
+/// # Errors
+/// There is none: what there is instead.
+pub(super) fn find(kind: Kind, name: &str) -> Result<Known, String> {
+    let (group, rest) = name.split_once('.').unwrap_or((name, ""));
+    let none = |there_are: String| Err(format!("{name} is no key of a study; {there_are}"));
+    let all = |keys: &[Key]| -> String {
+        let names: Vec<String> = keys.iter().map(|k| format!("{group}.{}", k.name)).collect();
+        format!("give {}", names.join(", "))
+    };
+    let among = |keys: &[Key]| keys.iter().find(|key| key.name == rest).copied();
+    let (found, defaults) = match (group, rest, kind) {
+        ("sensor", "", _) => (Some(SENSOR), Table::new()),
+        ("scene", "", _) => (Some(SCENE), Table::new()),
+        ("guide", "", Kind::Frame) => (Some(GUIDE), Table::new()),
+        ("windows", "", Kind::Frame) => (Some(WINDOWS), Table::new()),
+        ("sensor", key, _) => {
+            let Some(found) = SensorConfig::key(key) else {
+                return none("`gdtof sensor` lists those of the sensor".into());
+            };
+            let defaults = Table::try_from(SensorConfig::default()).expect("numbers and words");
+            (Some(found), defaults)
+        }
+        ("scene", path, _) => {
+            let Some(found) = Scene::key(path) else {
+                return none("`gdtof scene` lists those of the scene, section and key joined by a dot; an object goes by its name, as scene.object.car.reflectivity".into());
+            };
+            let section = path.split('.').next().unwrap_or_default();
+            let defaults = Table::try_from(Scene::default()).expect("numbers and words");
+            let defaults = defaults.get(section).and_then(Value::as_table);
+            (Some(found), defaults.cloned().unwrap_or_default())
+        }
+        ("windows", _, Kind::Frame) => match among(POLICY_KEYS) {
+            None => return none(all(POLICY_KEYS)),
+            found => {
+                let defaults = Table::try_from(WindowPolicy::for_sequences());
+                (found, defaults.expect("numbers and words"))
+            }
+        },
+        ("frame", "seed", _) => {
+            return none("seeds are those of [study]: seed and replicas".into());
+        }
+        ("frame", "guides" | "windows", _) => {
+            return none("guide and windows stand for themselves".into());
+        }
+        ("frame", _, Kind::Frame) => match among(FRAME_KEYS) {
+            None => return none(all(FRAME_KEYS)),
+            found => {
+                let all = FrameRequest {
+                    sub_bins: Some(1),
+                    ..FrameRequest::default()
+                };
+                (found, Table::try_from(all).expect("numbers and words"))
+            }
+        },
+        ("theory", _, Kind::Theory) => match among(theory::KEYS) {
+            None => return none(all(theory::KEYS)),
+            found => {
+                let whole = theory::WHOLE.iter();
+                (
+                    found,
+                    whole
+                        .map(|name| ((*name).to_owned(), Value::from(1)))
+                        .collect(),
+                )
+            }
+        },
+        (_, _, Kind::Frame) => {
+            return none("give one that begins with sensor, scene, guide, windows or frame".into());
+        }
+        (_, _, Kind::Theory) => {
+            return none("give one that begins with theory, sensor or scene".into());
+        }
+    };
+    let key = found.expect("every other arm has returned");
+    let holds = match key.range {
+        Range::Within(..) | Range::Above(..) | Range::Limited(..) => match defaults.get(key.name) {
+            Some(Value::Integer(_)) => Holds::Whole,
+            _ => Holds::Number,
+        },
+        Range::Switch => Holds::Truth,
+        Range::OneOf(_) | Range::WordOrCurve(..) | Range::Text => Holds::Word,
+    };
+    Ok(Known { key, holds })
+}
+
+/// A value of a key, as a plain number where it is a quantity.
+///
+/// # Errors
+/// What is wrong with it: nothing that depends on other keys.
+pub(super) fn checked(known: &Known, value: &Value) -> Result<Value, String> {
+    let Known { key, holds } = known;
+    let plain = key.plain(value)?;
+    let wrong = |wanted: &str| {
+        Err(format!(
+            "{} = {value} is impossible; give {wanted}",
+            key.name
+        ))
+    };
+    match (&plain, holds, key.range) {
+        (Value::Float(x), Holds::Whole, _) if x.fract() != 0.0 => return wrong("a whole number"),
+        (Value::Integer(_) | Value::Float(_), Holds::Whole | Holds::Number, _) => {}
+        // Positions and such: lists of numbers.
+        (Value::Array(items), Holds::Number, _)
+            if items.iter().all(|i| i.is_integer() || i.is_float()) => {}
+        (_, Holds::Whole | Holds::Number, _) => return wrong("a number"),
+        (Value::Boolean(_), Holds::Truth, _) => {}
+        (_, Holds::Truth, _) => return wrong("true or false"),
+        (Value::String(word), _, Range::OneOf(words)) if !words.contains(&word.as_str()) => {
+            return wrong(&words.join(", "));
+        }
+        (Value::String(_), Holds::Word, _) => {}
+        (Value::Array(items), Holds::Word, _)
+            if key.name == GUIDE.name || matches!(key.range, Range::WordOrCurve(..)) =>
+        {
+            if key.name == GUIDE.name && !items.iter().all(Value::is_str) {
+                return wrong("guides as text");
+            }
+        }
+        (_, Holds::Word, _) => return wrong("text"),
+    }
+    match key.fault(&plain) {
+        Some(fault) => Err(fault),
+        None => Ok(plain),
+    }
+}

@@ -1,0 +1,243 @@
+//! Takes the points of a study that its folder has no rows of, on all threads.
+
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use serde::{Deserialize, Serialize};
+
+use super::SweepError;
+use super::row::{Index, journals_in};
+use super::study::{Kind, Study};
+use super::subject::{Scratch, Subject};
+use crate::files::{InputError, Journal, OutputFile, create_folder, parse_json, read_text};
+
+/// One of so many parts of a study: the points whose number leaves `part` when divided by `of`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    /// From 0.
+    pub part: u64,
+    /// At least 1.
+    pub of: u64,
+}
+
+impl Shard {
+    /// The whole.
+    pub const WHOLE: Shard = Shard { part: 0, of: 1 };
+
+    fn journal(self) -> String {
+        match self.of {
+            1 => "journal.log".into(),
+            of => format!("journal-{}-of-{of}.log", self.part + 1),
+        }
+    }
+
+    /// How many of `points` points are its own.
+    pub fn share(self, points: u64) -> u64 {
+        points.saturating_sub(self.part).div_ceil(self.of)
+    }
+}
+
+/// What became of the points.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Outcome {
+    /// Points of the study, or of its shard.
+    pub points: u64,
+    /// Those whose rows were there.
+    pub reused: u64,
+    /// Those that were taken now.
+    pub taken: u64,
+    /// Those of them that are impossible or that the engine refuses: their rows say why.
+    pub without_results: u64,
+    /// Lines of journals that were of no use.
+    pub spoilt_lines: u64,
+}
+
+/// The study that a folder holds results of.
+#[derive(Debug, Serialize, Deserialize)]
+struct Kept {
+    name: String,
+    source: String,
+    folder: PathBuf,
+    text: String,
+}
+
+/// Where it is kept.
+const STUDY: &str = "study.json";
+
+/// Takes what is missing of a study, or of its shard, in `folder`, and adds it to the journal there. `done` is told of points as they are
+/// done, those that were there included.
+///
+/// With one thread to a point where there are more points than threads: the frames of a study need no help from each other.
+///
+/// # Errors
+/// When another process takes the same, files cannot be written, or the program fails.
+pub fn run(
+    study: &Study,
+    folder: &Path,
+    shard: Shard,
+    done: impl Fn(u64) + Sync,
+) -> Result<Outcome, SweepError> {
+    create_folder(folder)?;
+    let path = folder.join(shard.journal());
+    let Some(journal) = Journal::open(&path)? else {
+        let message =
+            "another process takes these points; wait for it, or give another folder or shard";
+        return Err(InputError::new(path.display(), message).into());
+    };
+    keep(study, folder)?;
+    let there = Index::of(journals_in(folder))?;
+    let points = shard.share(study.len());
+    let workers = (rayon::current_num_threads() as u64).min(points).max(1);
+    // A theoretical point takes less than a write.
+    let batch = match study.kind {
+        Kind::Frame => 1,
+        Kind::Theory => 256,
+    };
+    let work = Work {
+        subject: Subject::new(study),
+        study,
+        shard,
+        points,
+        batch,
+        there: &there,
+        next: AtomicU64::new(0),
+        counts: [const { AtomicU64::new(0) }; 3],
+        journal: Mutex::new(journal),
+        failed: AtomicBool::new(false),
+        error: Mutex::new(None),
+    };
+    if points < 2 * workers && study.kind == Kind::Frame {
+        // Too few to go round: all threads on one frame after the other.
+        work.go(&done);
+    } else {
+        std::thread::scope(|scope| {
+            for _ in 0..workers {
+                scope.spawn(
+                    || match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
+                        Ok(own) => own.install(|| work.go(&done)),
+                        // No more threads to be had: in the common pool, slower.
+                        Err(_) => work.go(&done),
+                    },
+                );
+            }
+        });
+    }
+    if let Some(error) = work.error.into_inner().expect("nobody panicked") {
+        return Err(error);
+    }
+    let [reused, taken, without_results] = work.counts.map(AtomicU64::into_inner);
+    Ok(Outcome {
+        points,
+        reused,
+        taken,
+        without_results,
+        spoilt_lines: there.spoilt as u64,
+    })
+}
+
+/// What all threads share.
+struct Work<'a> {
+    subject: Subject<'a>,
+    study: &'a Study,
+    shard: Shard,
+    points: u64,
+    batch: u64,
+    there: &'a Index,
+    next: AtomicU64,
+    /// Reused, taken, without results.
+    counts: [AtomicU64; 3],
+    journal: Mutex<Journal>,
+    failed: AtomicBool,
+    error: Mutex<Option<SweepError>>,
+}
+
+impl Work<'_> {
+    /// Takes points until there are no more.
+    fn go(&self, done: &(impl Fn(u64) + Sync)) {
+        let mut scratch = Scratch::default();
+        while !self.failed.load(Ordering::Relaxed) {
+            let begin = self.next.fetch_add(self.batch, Ordering::Relaxed);
+            if begin >= self.points {
+                return;
+            }
+            let end = (begin + self.batch).min(self.points);
+            if let Err(error) = self.take(begin..end, &mut scratch) {
+                self.failed.store(true, Ordering::Relaxed);
+                self.error
+                    .lock()
+                    .expect("nobody panicked")
+                    .get_or_insert(error);
+            }
+            done(end - begin);
+        }
+    }
+
+    fn take(&self, batch: std::ops::Range<u64>, scratch: &mut Scratch) -> Result<(), SweepError> {
+        let mut lines = String::new();
+        let mut counts = [0; 3];
+        for at in batch {
+            let index = self.shard.part + at * self.shard.of;
+            let point = self.study.point(index);
+            let Ok(ready) = self.subject.ready(&point, scratch) else {
+                // Found out again, and said, when the table is written.
+                counts[1] += 1;
+                counts[2] += 1;
+                continue;
+            };
+            if self.there.has(ready.key) {
+                counts[0] += 1;
+                continue;
+            }
+            let key = ready.key;
+            let row = self.subject.take(ready, scratch)?;
+            counts[1] += 1;
+            counts[2] += u64::from(row.error.is_some());
+            lines += &row.line(key);
+        }
+        if !lines.is_empty() {
+            self.journal
+                .lock()
+                .expect("nobody panicked")
+                .append(&lines)?;
+        }
+        for (all, some) in self.counts.iter().zip(counts) {
+            all.fetch_add(some, Ordering::Relaxed);
+        }
+        Ok(())
+    }
+}
+
+/// Writes down which study a folder is of.
+fn keep(study: &Study, folder: &Path) -> Result<(), InputError> {
+    let here = std::path::absolute(study.folder()).unwrap_or_else(|_| study.folder().to_owned());
+    let kept = Kept {
+        name: study.name.clone(),
+        source: study.source().to_owned(),
+        folder: here,
+        text: study.text().to_owned(),
+    };
+    OutputFile::write_with(&folder.join(STUDY), |out| {
+        serde_json::to_writer_pretty(&mut *out, &kept)?;
+        writeln!(out)
+    })
+}
+
+/// The study that a folder holds results of.
+///
+/// # Errors
+/// When it is no such folder.
+pub fn study_of(folder: &Path) -> Result<Study, InputError> {
+    let path = folder.join(STUDY);
+    if !path.exists() {
+        let message = "holds no sweep; give a folder that `gdtof sweep` has written";
+        return Err(InputError::new(folder.display(), message));
+    }
+    let text = read_text(&path)?;
+    let kept: Kept = parse_json(
+        path.display(),
+        &text,
+        "a folder that `gdtof sweep` has written",
+    )?;
+    Study::parse(&kept.source, &kept.text, &kept.folder, &kept.name)
+}

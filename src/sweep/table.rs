@@ -1,0 +1,179 @@
+//! The table of a study: a row for each point, in their order, as CSV and Parquet. Rows are read from the journals one by one.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use super::SweepError;
+use super::cell::{Cell, Column, Holds};
+use super::parquet::Parquet;
+use super::row::{Index, Row, journals_in};
+use super::study::{Kind, Study};
+use super::subject::{Scratch, Subject};
+use crate::files::{InputError, OutputFile};
+
+/// Points whose keys are made at once.
+const CHUNK: u64 = 4096;
+
+/// The table, as CSV.
+pub const CSV: &str = "results.csv";
+/// The table, as Parquet.
+pub const PARQUET: &str = "results.parquet";
+/// What each frame took.
+pub const TIMES: &str = "times.csv";
+
+/// The columns of a study's table.
+pub fn columns(study: &Study) -> Vec<Column> {
+    let mut columns = vec![Column::new("point", "", Holds::Whole)];
+    columns.extend(study.varied().map(|varied| varied.column.clone()));
+    if study.kind == Kind::Frame {
+        columns.push(Column::new("seed", "", Holds::Whole));
+    }
+    columns.extend(Subject::columns(study.kind));
+    columns.push(Column::new("error", "", Holds::Word));
+    columns
+}
+
+/// The rows of a study that are in the journals of some folders.
+pub struct Results<'a> {
+    study: &'a Study,
+    index: Index,
+}
+
+impl<'a> Results<'a> {
+    /// Looks through the journals.
+    ///
+    /// # Errors
+    /// When one cannot be read.
+    pub fn of(study: &'a Study, folders: &[PathBuf]) -> Result<Self, InputError> {
+        let journals = folders
+            .iter()
+            .flat_map(|folder| journals_in(folder))
+            .collect();
+        let index = Index::of(journals)?;
+        Ok(Results { study, index })
+    }
+
+    /// How many points have no row.
+    ///
+    /// # Errors
+    /// As those of [`Results::each`].
+    pub fn missing(&self) -> Result<u64, SweepError> {
+        self.each(|_, _| Ok(()), Path::new(""))
+    }
+
+    /// Tells `found` of every point's row, in order: its number, the cells of [`columns`], and what it took. Returns how many points have
+    /// no row.
+    ///
+    /// # Errors
+    /// When a journal cannot be read, and those of `found`.
+    pub fn each(
+        &self,
+        mut found: impl FnMut(Vec<Cell>, f64) -> io::Result<()>,
+        out: &Path,
+    ) -> Result<u64, SweepError> {
+        let study = self.study;
+        let subject = Subject::new(study);
+        let results = Subject::columns(study.kind);
+        let mut rows = self.index.rows(&results)?;
+        let mut missing = 0;
+        let mut begin = 0;
+        while begin < study.len() {
+            let end = (begin + CHUNK).min(study.len());
+            let ready: Vec<_> = (begin..end)
+                .into_par_iter()
+                .map_init(Scratch::default, |scratch, index| {
+                    let point = study.point(index);
+                    let ready = subject.ready(&point, scratch);
+                    (point, ready.map(|ready| ready.key))
+                })
+                .collect();
+            for (index, (point, key)) in (begin..end).zip(ready) {
+                let row = match key {
+                    Ok(key) => rows.get(key)?,
+                    Err(why) => Some(Row {
+                        run_time_s: 0.0,
+                        error: Some(why.to_string()),
+                        cells: Vec::new(),
+                    }),
+                };
+                let Some(row) = row else {
+                    missing += 1;
+                    continue;
+                };
+                let mut cells = vec![Cell::Whole(index as i64)];
+                cells.extend(
+                    study
+                        .varied()
+                        .zip(&point.values)
+                        .map(|(v, value)| v.cell(value)),
+                );
+                if study.kind == Kind::Frame {
+                    cells.push(Cell::Whole(point.seed as i64));
+                }
+                match row.error {
+                    None => {
+                        cells.extend(row.cells);
+                        cells.push(Cell::Empty);
+                    }
+                    Some(why) => {
+                        cells.extend(std::iter::repeat_n(Cell::Empty, results.len()));
+                        cells.push(Cell::Word(why));
+                    }
+                }
+                found(cells, row.run_time_s).map_err(|e| InputError::unwritable(out, &e))?;
+            }
+            begin = end;
+        }
+        Ok(missing)
+    }
+
+    /// Writes [`CSV`], [`PARQUET`] and, of frames, [`TIMES`] into `folder`; `also` sees every row. Returns how many points have no row.
+    ///
+    /// # Errors
+    /// As those of [`Results::each`].
+    pub fn write(&self, folder: &Path, mut also: impl FnMut(&[Cell])) -> Result<u64, SweepError> {
+        let columns = columns(self.study);
+        let mut csv = OutputFile::create(&folder.join(CSV))?;
+        let mut times = match self.study.kind {
+            Kind::Frame => Some(OutputFile::create(&folder.join(TIMES))?),
+            Kind::Theory => None,
+        };
+        let failed = |e| InputError::unwritable(folder, &e);
+        let parquet = OutputFile::create(&folder.join(PARQUET))?;
+        let mut parquet = Parquet::begin(parquet, &columns).map_err(failed)?;
+        let names = columns.iter().map(|column| Cell::Word(column.name.clone()));
+        write_line(&mut csv, names).map_err(failed)?;
+        if let Some(times) = &mut times {
+            let names = ["point", "run_time_s"].map(|name| Cell::Word(name.into()));
+            write_line(times, names).map_err(failed)?;
+        }
+        let write = |cells: Vec<Cell>, run_time_s| {
+            write_line(&mut csv, &cells)?;
+            if let Some(times) = &mut times {
+                write_line(times, [&cells[0], &Cell::Number(run_time_s)])?;
+            }
+            also(&cells);
+            parquet.push(cells)
+        };
+        let missing = self.each(write, folder)?;
+        csv.commit()?;
+        times.map_or(Ok(()), OutputFile::commit)?;
+        parquet.finish().map_err(failed)?.commit()?;
+        Ok(missing)
+    }
+}
+
+fn write_line<C: std::borrow::Borrow<Cell>>(
+    out: &mut impl io::Write,
+    cells: impl IntoIterator<Item = C>,
+) -> io::Result<()> {
+    for (column, cell) in cells.into_iter().enumerate() {
+        if column > 0 {
+            out.write_all(b",")?;
+        }
+        out.write_all(cell.borrow().csv().as_bytes())?;
+    }
+    out.write_all(b"\n")
+}

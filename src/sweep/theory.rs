@@ -1,0 +1,352 @@
+//! What chapter 3 of the thesis says of one macropixel: [`theory`](crate::theory) at a point of a study.
+//!
+//! Light and clocks are those of sensor and scene; the target is a wall at a range of its own. Assumptions are the formulas' own: the whole
+//! echo in one bin for detection, a Gaussian pulse for precision, a Gaussian error of the guide, a window centred on its estimate as
+//! nearly as start values allow.
+
+use toml::Value;
+
+use super::cell::{Cell, Column, Holds};
+use crate::chip::SensorConfig;
+use crate::photon::PhotonBudget;
+use crate::scene::Scene;
+use crate::settings::{Key, Range};
+use crate::theory::cycles::laser_cycles_for;
+use crate::theory::design::share_inside;
+use crate::theory::detection::{Detection, Model, PerCycle, Ties, probability};
+use crate::theory::precision::{cramer_rao, range_m, thompson};
+use crate::units::SPEED_OF_LIGHT_M_PER_S;
+
+const fn key(
+    name: &'static str,
+    unit: &'static str,
+    range: Range,
+    what: &'static str,
+    source: &'static str,
+) -> Key {
+    Key {
+        name,
+        what,
+        unit,
+        range,
+        source,
+    }
+}
+
+/// Keys of `theory`.
+pub(super) const KEYS: &[Key] = &[
+    key(
+        "range_m",
+        "m",
+        Range::Above(0.0, 1e5),
+        "Range of the wall; 50 if left out",
+        "chosen",
+    ),
+    key(
+        "reflectivity",
+        "",
+        Range::Within(0.0, 1.0),
+        "Its reflectivity; 0.3 if left out",
+        "chosen",
+    ),
+    key(
+        "illuminance_klux",
+        "klux",
+        Range::Within(0.0, 200.0),
+        "Sunlight on it; the scene's if left out",
+        "chosen",
+    ),
+    key(
+        "laser_cycles",
+        "",
+        Range::Within(1.0, 1e9),
+        "Laser cycles of the exposure; 1000 if left out",
+        "chosen",
+    ),
+    key(
+        "guide_sigma_m",
+        "m",
+        Range::Above(0.0, 1e5),
+        "Standard deviation of the guide's estimate; 1 if left out",
+        "chosen",
+    ),
+    key(
+        "model",
+        "",
+        Range::OneOf(&["bernoulli", "poisson", "gaussian", "gaussian_as_printed"]),
+        "How counts are distributed; bernoulli, one hit a bin and laser cycle, if left out",
+        "thesis 3.2.2",
+    ),
+    key(
+        "goal_detection",
+        "",
+        Range::Within(0.5, 0.999_999_999),
+        "Probability of detection that laser cycles are found for; they are not looked for if left out",
+        "chosen",
+    ),
+];
+
+/// Those that count.
+pub(super) const WHOLE: &[&str] = &["laser_cycles"];
+
+/// Results, in order.
+pub(super) fn columns() -> Vec<Column> {
+    [
+        ("signal_per_cycle", ""),
+        ("background_per_bin_cycle", ""),
+        ("p_detection", ""),
+        ("p_miss", ""),
+        ("precision_thompson_m", "m"),
+        ("precision_bound_m", "m"),
+        ("laser_cycles_for_goal", ""),
+        ("bin_m", "m"),
+        ("window_m", "m"),
+        ("reach_m", "m"),
+        ("share_in_window", ""),
+        ("p_right", ""),
+    ]
+    .map(|(name, unit)| Column::new(name, unit, Holds::Number))
+    .into()
+}
+
+/// What sensor and scene say.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Rig {
+    budget: PhotonBudget,
+    dark_count_hz: f64,
+    pulse_sigma_ns: f64,
+    clk_hz: f64,
+    bins: usize,
+    counter_bits: usize,
+    illuminance_klux: f64,
+}
+
+impl Rig {
+    pub(super) fn new(sensor: &SensorConfig, scene: &Scene) -> Self {
+        Rig {
+            budget: scene.photon_budget(sensor.rows as u32, sensor.cols as u32),
+            dark_count_hz: scene.lidar.dark_count_hz,
+            pulse_sigma_ns: scene.pulse_sigma().as_s() * 1e9,
+            clk_hz: sensor.clk_hz,
+            bins: sensor.bins,
+            counter_bits: sensor.counter_bits,
+            illuminance_klux: scene.light.illuminance_klux,
+        }
+    }
+}
+
+/// What has just been computed.
+#[derive(Debug, Default)]
+pub(super) struct Last {
+    /// Of a wall without its guide.
+    detection: Option<(Wall, Detection, Option<f64>)>,
+    /// Of a wall in one laser cycle; precision goes with the root of their number.
+    bound_m: Option<(Wall, f64)>,
+}
+
+/// A wall before a rig. Its `Debug` text says all of it, and is what its results are kept under.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Wall {
+    rig: Rig,
+    range_m: f64,
+    reflectivity: f64,
+    laser_cycles: u64,
+    guide_sigma_m: f64,
+    model: Model,
+    goal_detection: Option<f64>,
+}
+
+impl Wall {
+    /// Everything left out.
+    pub(super) fn new(rig: Rig) -> Self {
+        Wall {
+            rig,
+            range_m: 50.0,
+            reflectivity: 0.3,
+            laser_cycles: 1000,
+            guide_sigma_m: 1.0,
+            model: Model::Bernoulli(Ties::Random),
+            goal_detection: None,
+        }
+    }
+
+    /// Takes a checked value of a key of [`KEYS`].
+    pub(super) fn set(&mut self, key: &str, value: &Value) {
+        let number = || value.as_float().or(value.as_integer().map(|n| n as f64));
+        let number = || number().expect("checked");
+        match key {
+            "range_m" => self.range_m = number(),
+            "reflectivity" => self.reflectivity = number(),
+            "illuminance_klux" => self.rig.illuminance_klux = number(),
+            "laser_cycles" => self.laser_cycles = number() as u64,
+            "guide_sigma_m" => self.guide_sigma_m = number(),
+            "goal_detection" => self.goal_detection = Some(number()),
+            "model" => {
+                self.model = match value.as_str().expect("checked") {
+                    "bernoulli" => Model::Bernoulli(Ties::Random),
+                    "poisson" => Model::Poisson(Ties::Random),
+                    "gaussian" => Model::Gaussian,
+                    _ => Model::GaussianAsPrinted,
+                }
+            }
+            _ => unreachable!("{key} is no key of theory"),
+        }
+    }
+
+    /// The results. `last` makes those of a wall that differs from the one before in the guide alone, or in laser cycles, cheap: the bound
+    /// takes an integral, detection and the search for laser cycles a sum.
+    pub(super) fn results(&self, last: &mut Last) -> Vec<Cell> {
+        let Wall { rig, .. } = self;
+        let (bin_s, cycles) = (1.0 / rig.clk_hz, self.laser_cycles as f64);
+        let background_hz = (rig.budget).background_hz(self.reflectivity, rig.illuminance_klux);
+        let light = PerCycle {
+            signal: rig.budget.signal_per_pulse(self.range_m, self.reflectivity),
+            background: (background_hz + rig.dark_count_hz) * bin_s,
+            bins: rig.bins as u32,
+        };
+        let wall = Wall {
+            guide_sigma_m: 1.0,
+            ..*self
+        };
+        let (detection, needed) = match last.detection {
+            Some((known, found, needed)) if known == wall => (found, needed),
+            _ => {
+                let found = probability(&light, self.laser_cycles, self.model);
+                let needed = self.goal_detection.map(|goal| match light.signal > 0.0 {
+                    // Nobody finds what sends nothing back, and the search would go on for long.
+                    false => f64::INFINITY,
+                    true => laser_cycles_for(goal, &light, self.model)
+                        .map_or(f64::INFINITY, |cycles| cycles as f64),
+                });
+                last.detection = Some((wall, found, needed));
+                (found, needed)
+            }
+        };
+        let wall = Wall {
+            laser_cycles: 1,
+            model: Model::Gaussian,
+            goal_detection: None,
+            ..wall
+        };
+        let bound_of_one_cycle = match last.bound_m {
+            Some((known, bound_m)) if known == wall => bound_m,
+            _ => {
+                let bound_ns = cramer_rao(
+                    bin_s * 1e9,
+                    rig.pulse_sigma_ns,
+                    light.background,
+                    light.signal,
+                );
+                last.bound_m = Some((wall, range_m(bound_ns)));
+                range_m(bound_ns)
+            }
+        };
+        let (background, signal) = (cycles * light.background, cycles * light.signal);
+        let thompson_ns = thompson(bin_s * 1e9, rig.pulse_sigma_ns, background, signal);
+        // No light, no precision.
+        let precision = |m: f64| (light.signal > 0.0).then_some(m);
+        let bin_m = 0.5 * bin_s * SPEED_OF_LIGHT_M_PER_S;
+        let window_m = rig.bins as f64 * bin_m;
+        let in_window = share_inside(self.guide_sigma_m, window_m, bin_m);
+        [
+            Some(light.signal),
+            Some(light.background),
+            Some(detection.probability),
+            Some(detection.miss),
+            precision(range_m(thompson_ns)),
+            precision(bound_of_one_cycle / cycles.sqrt()),
+            needed,
+            Some(bin_m),
+            Some(window_m),
+            Some((rig.counter_bits as f64).exp2() * bin_m),
+            Some(in_window),
+            Some(in_window * detection.probability),
+        ]
+        .map(Cell::maybe)
+        .into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_key_is_taken_and_every_result_has_its_column() {
+        let rig = Rig::new(&SensorConfig::default(), &Scene::outdoor());
+        let mut wall = Wall::new(rig);
+        for key in KEYS {
+            let value = match key.name {
+                "model" => Value::from("poisson"),
+                _ => Value::from(1),
+            };
+            let before = format!("{wall:?}");
+            match key.name {
+                "goal_detection" => wall.set(key.name, &Value::from(0.9)),
+                "guide_sigma_m" => wall.set(key.name, &Value::from(2.5)),
+                _ => wall.set(key.name, &value),
+            }
+            assert_ne!(format!("{wall:?}"), before, "{} changes nothing", key.name);
+        }
+        assert_eq!(wall.results(&mut Last::default()).len(), columns().len());
+    }
+
+    #[test]
+    fn results_are_those_of_the_formulas() {
+        let (sensor, scene) = (SensorConfig::default(), Scene::outdoor());
+        let mut wall = Wall::new(Rig::new(&sensor, &scene));
+        wall.set("range_m", &Value::from(120.0));
+        wall.set("goal_detection", &Value::from(0.99));
+        let results = wall.results(&mut Last::default());
+        let of = |name: &str| {
+            let at = columns().iter().position(|c| c.name == name).unwrap();
+            results[at].number().unwrap()
+        };
+        let budget = scene.photon_budget(64, 64);
+        assert_eq!(of("signal_per_cycle"), budget.signal_per_pulse(120.0, 0.3));
+        assert!((of("p_detection") + of("p_miss") - 1.0).abs() < 1e-12);
+        assert_eq!(of("p_right"), of("p_detection") * of("share_in_window"));
+        assert!(of("precision_thompson_m") > 0.0 && of("precision_bound_m") > 0.0);
+        assert!((of("window_m") - 16.0 * of("bin_m")).abs() < 1e-12);
+
+        let mut longer = wall;
+        longer.set(
+            "laser_cycles",
+            &Value::from(of("laser_cycles_for_goal") as i64),
+        );
+        let at = columns()
+            .iter()
+            .position(|c| c.name == "p_detection")
+            .unwrap();
+        assert!(longer.results(&mut Last::default())[at].number().unwrap() >= 0.99);
+    }
+
+    #[test]
+    fn what_was_computed_before_changes_nothing() {
+        let mut last = Last::default();
+        let rig = Rig::new(&SensorConfig::default(), &Scene::outdoor());
+        for range_m in [20.0, 150.0] {
+            for cycles in [100, 1000] {
+                for model in ["bernoulli", "gaussian"] {
+                    for sigma_m in [0.5, 2.0] {
+                        let mut wall = Wall::new(rig);
+                        wall.set("range_m", &Value::from(range_m));
+                        wall.set("laser_cycles", &Value::from(cycles));
+                        wall.set("model", &Value::from(model));
+                        wall.set("guide_sigma_m", &Value::from(sigma_m));
+                        assert_eq!(wall.results(&mut last), wall.results(&mut Last::default()));
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_black_wall_has_no_precision_and_is_found_by_chance() {
+        let mut wall = Wall::new(Rig::new(&SensorConfig::default(), &Scene::outdoor()));
+        wall.set("reflectivity", &Value::from(0));
+        let results = wall.results(&mut Last::default());
+        assert_eq!(results[4], Cell::Empty);
+        assert!((results[2].number().unwrap() - 1.0 / 16.0).abs() < 1e-9);
+    }
+}
