@@ -83,6 +83,48 @@ pub struct Recording {
     pub after_the_end: u64,
 }
 
+impl Recording {
+    /// Of events in any order, each with the number of its macropixel, row-major.
+    ///
+    /// # Panics
+    /// When the array has no such macropixel.
+    pub fn of(
+        events: impl IntoIterator<Item = (usize, SpadEvent)>,
+        config: &SensorConfig,
+        exposure: &Exposure,
+    ) -> Self {
+        let mut recording = Recording::empty(config);
+        for (pixel, event) in events {
+            recording.push(pixel, event, exposure);
+        }
+        recording.settle(config);
+        recording
+    }
+
+    fn empty(config: &SensorConfig) -> Self {
+        Recording {
+            pulses: vec![Vec::new(); config.pixels()],
+            ..Recording::default()
+        }
+    }
+
+    fn push(&mut self, pixel: usize, event: SpadEvent, exposure: &Exposure) {
+        self.read += 1;
+        match event.time >= exposure.end() {
+            true => self.after_the_end += 1,
+            false => self.pulses[pixel].push(event),
+        }
+    }
+
+    /// Sorts what was pushed, and drops what falls into dead times.
+    fn settle(&mut self, config: &SensorConfig) {
+        for pulses in &mut self.pulses {
+            pulses.sort_unstable();
+            self.lost_to_dead_time += apply_dead_time(pulses, config.dead_time());
+        }
+    }
+}
+
 /// Recorded SPAD events of an array.
 ///
 /// # Errors
@@ -116,10 +158,7 @@ fn events_of<R: BufRead>(
     exposure: &Exposure,
 ) -> Result<Recording, InputError> {
     let source = &lines.source().to_owned();
-    let mut recording = Recording {
-        pulses: vec![Vec::new(); config.pixels()],
-        ..Recording::default()
-    };
+    let mut recording = Recording::empty(config);
     for row in rows(lines, ["time_fs", "row", "col", "spad"])? {
         let (line, [time_fs, r, c, spad]) = row?;
         let pixel = pixel_index(source, line, r, c, config)?;
@@ -136,19 +175,13 @@ fn events_of<R: BufRead>(
             );
             return Err(InputError::at(source, line, message));
         }
-        recording.read += 1;
-        let time = Time::from_fs(time_fs);
-        if time >= exposure.end() {
-            recording.after_the_end += 1;
-            continue;
-        }
-        let spad = spad as u8;
-        recording.pulses[pixel].push(SpadEvent { time, spad });
+        let event = SpadEvent {
+            time: Time::from_fs(time_fs),
+            spad: spad as u8,
+        };
+        recording.push(pixel, event, exposure);
     }
-    for pulses in &mut recording.pulses {
-        pulses.sort_unstable();
-        recording.lost_to_dead_time += apply_dead_time(pulses, config.dead_time());
-    }
+    recording.settle(config);
     Ok(recording)
 }
 
@@ -237,6 +270,24 @@ mod tests {
 
     fn exposure() -> Exposure {
         Exposure::new(&config(), 100, 10)
+    }
+
+    #[test]
+    fn events_in_memory_are_recorded_as_those_of_a_file() {
+        let text = "time_fs,row,col,spad\n500,1,0,3\n100,1,0,3\n100,0,1,2\n99999999999,0,0,0\n";
+        let read = parse_events("e", text, &config(), &exposure()).unwrap();
+        let events = [
+            (2, 500, 3),
+            (2, 100, 3),
+            (1, 100, 2),
+            (0, 99_999_999_999, 0),
+        ];
+        let events = events.map(|(pixel, fs, spad)| {
+            let time = Time::from_fs(fs);
+            (pixel, SpadEvent { time, spad })
+        });
+        assert_eq!(Recording::of(events, &config(), &exposure()), read);
+        assert_eq!((read.lost_to_dead_time, read.after_the_end), (1, 1));
     }
 
     const FOUR: &str = "row,col,init\n0,0,1\n0,1,2\n1,0,3\n1,1,4\n";

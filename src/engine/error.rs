@@ -88,6 +88,9 @@ pub enum EngineError {
         /// SPADs of a macropixel.
         spads: usize,
     },
+    /// Who was told of its progress wanted no more of it.
+    #[error("the exposure was stopped before its end")]
+    Stopped,
     /// A histogram bin of the netlist holds X.
     #[error("bin {bin} of {macropixel} is unknown (X) at the end of the exposure")]
     Unknown {
@@ -141,7 +144,7 @@ pub enum NotModelled {
 impl EngineError {
     /// Whether the user asked for what this engine cannot do, and another can.
     pub fn is_refusal(&self) -> bool {
-        !matches!(self, EngineError::Unknown { .. })
+        !matches!(self, EngineError::Unknown { .. } | EngineError::Stopped)
     }
 }
 

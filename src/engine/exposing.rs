@@ -5,7 +5,7 @@
 //! an engine that needs fewer photons, or none, has a way of its own ([`Expose::expose`]).
 
 use std::iter::Sum;
-use std::ops::AddAssign;
+use std::ops::{AddAssign, ControlFlow};
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -123,17 +123,36 @@ pub fn stream_config(
     }
 }
 
+/// What those who are told of progress answer: nothing, or whether to go on.
+pub trait Answer {
+    /// Whether what is in progress is no longer wanted.
+    fn stops(self) -> bool;
+}
+
+impl Answer for () {
+    fn stops(self) -> bool {
+        false
+    }
+}
+
+impl Answer for ControlFlow<()> {
+    fn stops(self) -> bool {
+        self.is_break()
+    }
+}
+
 /// Exposes `pixels` on as many threads as rayon has, in batches of the engine's liking; `done` is told of
-/// macropixels as they are finished. Neither threads nor batches change the histograms.
+/// macropixels as they are finished, of none before each batch, and may stop the exposure by its [`Answer`]: no batch begins after
+/// that. Neither threads nor batches change the histograms.
 ///
 /// # Errors
-/// As [`Expose::expose`], and where background light blinds SPADs so much that following them all takes
-/// too long.
-pub fn expose<E: Expose + ?Sized>(
+/// As [`Expose::expose`], where background light blinds SPADs so much that following them all takes
+/// too long, and [`EngineError::Stopped`].
+pub fn expose<E: Expose + ?Sized, A: Answer>(
     engine: &E,
     stream: &PhotonStream,
     pixels: &[LitPixel],
-    done: impl Fn(usize) + Sync,
+    done: impl Fn(usize) -> A + Sync,
 ) -> Result<Exposed, EngineError> {
     refuse_blinding(stream, pixels)?;
     in_batches(engine, pixels, done, |batch| engine.expose(stream, batch))
@@ -144,11 +163,11 @@ pub fn expose<E: Expose + ?Sized>(
 ///
 /// # Errors
 /// As [`expose`].
-pub fn expose_without_skipping<E: Replay + ?Sized>(
+pub fn expose_without_skipping<E: Replay + ?Sized, A: Answer>(
     engine: &E,
     stream: &PhotonStream,
     pixels: &[LitPixel],
-    done: impl Fn(usize) + Sync,
+    done: impl Fn(usize) -> A + Sync,
 ) -> Result<Exposed, EngineError> {
     refuse_blinding(stream, pixels)?;
     in_batches(engine, pixels, done, |batch| {
@@ -199,18 +218,23 @@ fn refuse_blinding(stream: &PhotonStream, pixels: &[LitPixel]) -> Result<(), Eng
     }
 }
 
-fn in_batches<E: Engine + ?Sized>(
+fn in_batches<E: Engine + ?Sized, A: Answer>(
     engine: &E,
     pixels: &[LitPixel],
-    done: impl Fn(usize) + Sync,
+    done: impl Fn(usize) -> A + Sync,
     expose: impl Fn(&[LitPixel]) -> Result<Exposed, EngineError> + Sync,
 ) -> Result<Exposed, EngineError> {
     let batches: Vec<Exposed> = pixels
         .par_chunks(engine.batch())
         .map(|batch| {
+            if done(0).stops() {
+                return Err(EngineError::Stopped);
+            }
             let exposed = expose(batch)?;
-            done(batch.len());
-            Ok(exposed)
+            match done(batch.len()).stops() {
+                true => Err(EngineError::Stopped),
+                false => Ok(exposed),
+            }
         })
         .collect::<Result<_, EngineError>>()?;
     let mut all = Exposed::new(engine.bins());

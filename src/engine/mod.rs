@@ -33,7 +33,7 @@ pub use cohort::{Cohort, CohortOptions};
 pub use cycle::{Cycle, PackedPulses, Unlevelled};
 pub use error::{EngineError, NotModelled};
 pub use exposing::{
-    Exposed, LitPixel, Work, expose, expose_without_skipping, full_stream, stream_config,
+    Answer, Exposed, LitPixel, Work, expose, expose_without_skipping, full_stream, stream_config,
 };
 pub use gate::{Gate, GateSimulation};
 pub use histograms::Histograms;

@@ -24,6 +24,25 @@ pub enum FileSigma<'a> {
 }
 
 impl FileMap {
+    /// A map of one's own; `source` is what complaints call it. Pairs of range and standard deviation, m, row by row; `None` where there
+    /// is no estimate.
+    ///
+    /// # Panics
+    /// When there are not rows·cols of them.
+    pub fn new(
+        source: impl Into<String>,
+        (rows, cols): (usize, usize),
+        estimates: Vec<Option<(f64, f64)>>,
+    ) -> Self {
+        assert_eq!(estimates.len(), rows * cols);
+        FileMap {
+            source: source.into(),
+            rows,
+            cols,
+            estimates,
+        }
+    }
+
     /// Reads a `.npy` (or PFM) file of distances from the lidar along the ray, rows × cols, m.
     ///
     /// # Errors
@@ -118,6 +137,18 @@ mod tests {
         writer.extend(data.iter().copied()).unwrap();
         writer.finish().unwrap();
         file
+    }
+
+    #[test]
+    fn a_map_in_memory_is_given_as_it_is() {
+        let estimates = vec![Some((10.0, 0.5)), None];
+        let map = FileMap::new("mine", (1, 2), estimates);
+        let scene = crate::scene::Scene::outdoor();
+        let found = map.estimate(&GuideInput::still(&scene, 1, 2, 0)).unwrap();
+        assert_eq!(found.range_m, [Some(10.0), None]);
+        assert_eq!(found.sigma_m, [0.5, f64::INFINITY]);
+        let refused = map.estimate(&GuideInput::still(&scene, 2, 2, 0));
+        assert!(refused.unwrap_err().to_string().starts_with("mine: "));
     }
 
     #[test]

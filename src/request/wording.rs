@@ -72,9 +72,10 @@ fn cure(error: &EngineError, spelling: Spelling) -> Option<String> {
             most_hz / 1e6
         ),
         EngineError::OwnLaws => format!("use {}, cohort or gate", engine("window")),
-        EngineError::Mismatch | EngineError::OtherSpads { .. } | EngineError::Unknown { .. } => {
-            return None;
-        }
+        EngineError::Mismatch
+        | EngineError::OtherSpads { .. }
+        | EngineError::Stopped
+        | EngineError::Unknown { .. } => return None,
     })
 }
 

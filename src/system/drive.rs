@@ -20,7 +20,7 @@
 
 use rayon::prelude::*;
 
-use super::frame::{FrameError, FrameSettings, load_starts};
+use super::frame::{FrameError, FrameSettings, go_on, load_starts};
 use super::pixel::PixelDepth;
 use super::policy::{Pointing, WindowPolicy};
 use super::ranger::{Known, Ranger};
@@ -28,7 +28,7 @@ use super::result::PhaseTimes;
 use super::stopwatch::Stopwatch;
 use super::summary::Summary;
 use crate::chip::Exposure;
-use crate::engine::{Expose, Histograms, LitPixel, Work, expose, load, stream_config};
+use crate::engine::{Answer, Expose, Histograms, LitPixel, Work, expose, load, stream_config};
 use crate::guide::{GuideInput, GuideMap, PastFrame};
 use crate::netlist::Netlist;
 use crate::photon::{PhotonStream, PixelLight, SpadModel};
@@ -246,11 +246,15 @@ impl<'a> Drive<'a> {
         }
     }
 
-    /// Takes the next frame; `exposed` is told of macropixels as they are done.
+    /// Takes the next frame; `exposed` is told of macropixels as they are done, and may stop the frame by its answer. After a frame
+    /// that fails, the next one has nothing to reuse.
     ///
     /// # Errors
-    /// What the guide, the engine and the load path report.
-    pub fn frame(&mut self, exposed: impl Fn(usize) + Sync) -> Result<DriveFrame, FrameError> {
+    /// What the guide, the engine and the load path report, and that it was stopped.
+    pub fn frame<A: Answer>(
+        &mut self,
+        exposed: impl Fn(usize) -> A + Sync,
+    ) -> Result<DriveFrame, FrameError> {
         let DriveSettings {
             frame,
             segments,
@@ -289,6 +293,7 @@ impl<'a> Drive<'a> {
         };
         let guide = frame.guide.estimate(&input)?;
         run.guide_s = clock.lap();
+        go_on(exposed(0))?;
 
         let seen: Vec<Option<f64>> = last
             .as_ref()
@@ -340,7 +345,7 @@ impl<'a> Drive<'a> {
         let is_same = |pixel: usize| same.is_some_and(|last| last.lit[pixel] == lit[pixel]);
         let (old, new): (Vec<usize>, Vec<usize>) = (0..lit.len()).partition(|&p| is_same(p));
         let changed: Vec<LitPixel> = new.iter().map(|&pixel| lit[pixel].clone()).collect();
-        exposed(old.len());
+        go_on(exposed(old.len()))?;
         let stream = stream_config(sensor, exposure, seed, scene.pulse_sigma());
         let stream = PhotonStream::new(&scene.with_pulse(stream));
         let engine: Box<dyn Expose> = frame.engine.expose(sensor, exposure);

@@ -21,8 +21,8 @@ use super::tolerance::Tolerance;
 use crate::chip::{Exposure, SensorConfig};
 use crate::engine::waveform::{self, View, WaveCycles};
 use crate::engine::{
-    Cohort, CohortOptions, Cycle, EngineError, Expose, Gate, GateSimulation, LitPixel, Replay,
-    Window, expose, expose_without_skipping, load, stream_config,
+    Answer, Cohort, CohortOptions, Cycle, EngineError, Expose, Gate, GateSimulation, LitPixel,
+    Replay, Window, expose, expose_without_skipping, load, stream_config,
 };
 use crate::files::InputError;
 use crate::guide::{Guide, GuideError, GuideInput, GuideMap};
@@ -200,14 +200,15 @@ pub enum FrameError {
 }
 
 /// Takes a frame, every window in the middle of the guide's estimate. `probes` chooses the macropixels to run at gate level once the
-/// guide is known; `exposed` is told of macropixels as they are done.
+/// guide is known; `exposed` is told of macropixels as they are done, of none between the steps of the frame, and may stop it by its
+/// [`Answer`].
 ///
 /// # Errors
 /// A guide without a map, and what [`take_guided_frame`] reports.
-pub fn take_frame(
+pub fn take_frame<A: Answer>(
     settings: &FrameSettings,
     probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
-    exposed: impl Fn(usize) + Sync,
+    exposed: impl Fn(usize) -> A + Sync,
 ) -> Result<Frame, FrameError> {
     take_frame_by(settings, WindowPolicy::default(), probes, exposed)
 }
@@ -216,11 +217,11 @@ pub fn take_frame(
 ///
 /// # Errors
 /// As those of [`take_frame`].
-pub fn take_frame_by(
+pub fn take_frame_by<A: Answer>(
     settings: &FrameSettings,
     policy: WindowPolicy,
     probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
-    exposed: impl Fn(usize) + Sync,
+    exposed: impl Fn(usize) -> A + Sync,
 ) -> Result<Frame, FrameError> {
     let FrameSettings {
         sensor,
@@ -235,6 +236,7 @@ pub fn take_frame_by(
     let input = GuideInput::still(scene, rows, cols, *seed);
     let guide = settings.guide.estimate(&input)?;
     let guide_s = clock.lap();
+    go_on(exposed(0))?;
     let mut pointing = Pointing::new(policy, sensor, exposure, calibration.as_ref());
     let wanted = pointing.windows(&guide, &[]);
     let windows_s = clock.lap();
@@ -252,12 +254,12 @@ pub fn take_frame_by(
 ///
 /// # Panics
 /// When guide or start values are not one for each macropixel.
-pub fn take_guided_frame(
+pub fn take_guided_frame<A: Answer>(
     settings: &FrameSettings,
     guide: &GuideMap,
     wanted: &[Option<u16>],
     probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
-    exposed: impl Fn(usize) + Sync,
+    exposed: impl Fn(usize) -> A + Sync,
 ) -> Result<Frame, FrameError> {
     let FrameSettings {
         sensor,
@@ -289,6 +291,7 @@ pub fn take_guided_frame(
 
     let load = load_starts(sensor, &load::load_netlist(sensor), &starts)?;
     times.load_s = clock.lap();
+    go_on(exposed(0))?;
 
     let stream = stream_config(sensor, exposure, *seed, scene.pulse_sigma());
     let stream = PhotonStream::new(&scene.with_pulse(stream));
@@ -314,6 +317,7 @@ pub fn take_guided_frame(
         EngineKind::Cohort => Box::new(Cohort::new(sensor, exposure, *cohort)),
         kind => kind.expose(sensor, exposure),
     };
+    let done = exposed;
     let (exposed, kept) = match (tolerance_m, skip) {
         (&Some(tolerance_m), _) => {
             let tolerance = Tolerance {
@@ -322,19 +326,19 @@ pub fn take_guided_frame(
                 exposure,
                 peak: &depth.peak,
             };
-            let (exposed, kept) = tolerance.expose(&stream, &pixels, exposed)?;
+            let (exposed, kept) = tolerance.expose(&stream, &pixels, &done)?;
             (exposed, Some(kept))
         }
         (None, true) if *engine_kind == EngineKind::Cohort => {
             let cohort = Cohort::new(sensor, exposure, *cohort);
             let refused = |why| refused_by(&cohort, &stream, &pixels, why);
-            let exposed = expose(&cohort, &stream, &pixels, exposed).map_err(refused)?;
+            let exposed = expose(&cohort, &stream, &pixels, &done).map_err(refused)?;
             (exposed, None)
         }
-        (None, true) => (expose(&*engine, &stream, &pixels, exposed)?, None),
+        (None, true) => (expose(&*engine, &stream, &pixels, &done)?, None),
         (None, false) => {
             let engine = engine_kind.replay(sensor, exposure)?;
-            let exposed = expose_without_skipping(&*engine, &stream, &pixels, exposed)?;
+            let exposed = expose_without_skipping(&*engine, &stream, &pixels, &done)?;
             (exposed, None)
         }
     };
@@ -342,6 +346,7 @@ pub fn take_guided_frame(
 
     let probes = probes(guide);
     probes.par_iter().try_for_each(|probe| {
+        go_on(done(0))?;
         let pixel = probe.row * sensor.cols + probe.col;
         let LitPixel {
             number,
@@ -415,6 +420,17 @@ pub fn take_guided_frame(
     })
 }
 
+/// Whether a frame is still wanted.
+///
+/// # Errors
+/// When it is not.
+pub(super) fn go_on(answer: impl Answer) -> Result<(), EngineError> {
+    match answer.stops() {
+        true => Err(EngineError::Stopped),
+        false => Ok(()),
+    }
+}
+
 /// Sends start values through the serial pin of the load path, at gate level.
 ///
 /// # Errors
@@ -445,6 +461,9 @@ fn refused_by(
     pixels: &[LitPixel],
     why: EngineError,
 ) -> FrameError {
+    if why == EngineError::Stopped {
+        return why.into();
+    }
     let is_refused = |pixel: &&LitPixel| {
         let light = pixel.light.as_ref();
         light.is_some_and(|light| {
@@ -473,4 +492,96 @@ fn run_probe(
     let format = WaveFormat::of(&probe.waves);
     waveform::record(&mut simulation, &probe.waves, format, &view, &mut ())?;
     Ok(simulation.histograms()?.into_counts())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+    use crate::guide::BehaviouralStereo;
+    use crate::system::range_counts;
+
+    fn settings() -> FrameSettings {
+        let sensor = SensorConfig {
+            rows: 16,
+            cols: 16,
+            ..SensorConfig::default()
+        };
+        FrameSettings {
+            exposure: Exposure::new(&sensor, 520, 200),
+            sensor,
+            scene: Scene::outdoor(),
+            seed: 1,
+            engine: EngineKind::Window,
+            cohort: CohortOptions::default(),
+            tolerance_m: None,
+            skip: true,
+            depth: DepthOptions::default(),
+            calibration: None,
+            guide: Arc::new(BehaviouralStereo),
+        }
+    }
+
+    #[test]
+    fn a_frame_that_is_no_longer_wanted_begins_no_other_batch() {
+        let settings = settings();
+        let exposed = AtomicUsize::new(0);
+        let stop_at_first = |macropixels| {
+            let before = exposed.fetch_add(macropixels, Ordering::Relaxed);
+            match before + macropixels > 0 {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        };
+        let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+        let refused = alone
+            .unwrap()
+            .install(|| take_frame(&settings, |_| Vec::new(), stop_at_first));
+        assert!(matches!(
+            refused,
+            Err(FrameError::Engine(EngineError::Stopped))
+        ));
+        let engine = Window::new(&settings.sensor, &settings.exposure);
+        assert_eq!(
+            exposed.load(Ordering::Relaxed),
+            crate::engine::Engine::batch(&engine)
+        );
+        // Nobody's cohorts were at fault.
+        let cohort = FrameSettings {
+            engine: EngineKind::Cohort,
+            ..settings
+        };
+        let refused = take_frame(&cohort, |_| Vec::new(), |_| ControlFlow::Break(()));
+        assert!(matches!(
+            refused,
+            Err(FrameError::Engine(EngineError::Stopped))
+        ));
+    }
+
+    #[test]
+    fn a_frames_own_counts_have_its_depths() {
+        let settings = settings();
+        let frame = take_frame(&settings, |_| Vec::new(), |_| {}).unwrap();
+        let starts: Vec<Option<u16>> = frame.pixels.iter().map(|pixel| pixel.start).collect();
+        let readings = range_counts(
+            (&settings.sensor, &settings.exposure),
+            &settings.scene,
+            &settings.depth,
+            None,
+            &starts,
+            &frame.histograms,
+        )
+        .unwrap();
+        assert!(readings.iter().any(|reading| reading.no_depth.is_none()));
+        for (reading, pixel) in readings.iter().zip(&frame.pixels) {
+            assert_eq!(reading.measured_m, pixel.measured_m);
+            assert_eq!(reading.peak_m, pixel.peak_m);
+            assert_eq!(reading.confidence, pixel.confidence);
+            assert_eq!(reading.no_depth.is_none(), pixel.no_depth.is_none());
+            let is_off = reading.no_depth == Some(crate::system::NoDepth::NoGuide);
+            assert!(!is_off || pixel.start.is_none());
+        }
+    }
 }

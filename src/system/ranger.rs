@@ -1,9 +1,14 @@
 //! Depths from the histograms of a frame: echo, distance, and the one reason why a macropixel has none.
 
+use std::borrow::Cow;
+
+use rayon::prelude::*;
+
 use super::aim::{Aims, Place, own_law};
 use super::pixel::{NoDepth, PixelDepth};
+use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
-use crate::ranging::{BinProfile, DepthOptions, EchoFinder, UnequalBins};
+use crate::ranging::{BinProfile, DepthOptions, EchoFinder, Sighting, UnequalBins};
 use crate::scene::Scene;
 use crate::units::Time;
 
@@ -74,19 +79,10 @@ impl<'a> Ranger<'a> {
         Some((seen.start.as_range_m(), seen.end.as_range_m()))
     }
 
-    /// The macropixel's depth from its `counts`, one for each bin.
-    pub(crate) fn depth(&self, known: &Known, counts: &[u16]) -> PixelDepth {
-        let &Known {
-            pixel,
-            start,
-            true_m,
-            guide_m,
-        } = known;
+    /// What the `counts` of a macropixel with this start value say, one for each bin.
+    fn sight(&self, pixel: usize, start: Option<u16>, counts: &[u16]) -> Sight<'_> {
         let law = own_law(&self.law, pixel);
         let window = start.and_then(|start| law.window(start).open());
-        let in_window = window.zip(true_m).is_some_and(|(window, true_m)| {
-            law.interval(&window).contains(&Time::of_flight(true_m))
-        });
         let counts: Vec<u32> = counts.iter().map(|&n| n.into()).collect();
         let place = Place {
             pixel,
@@ -98,25 +94,117 @@ impl<'a> Ranger<'a> {
         let sighting = window.and_then(|_| place.find(&self.finder, &counts));
         let found = sighting.filter(|s| s.is_significant && !s.is_saturated);
         let range_m = |bins: f64, at: usize| place.range_m(window?, &counts, bins, at);
-        let no_depth = match found {
-            Some(_) => None,
-            None if true_m.is_none() => Some(NoDepth::NoSurface),
-            None if start.is_none() && guide_m.is_none() => Some(NoDepth::NoGuide),
-            None if start.is_none() => Some(NoDepth::OutOfReach),
-            None if !self.spads_fire => Some(NoDepth::SpadsOff),
-            None if sighting.is_some_and(|s| s.is_saturated) => Some(NoDepth::Saturated),
-            None if !in_window => Some(NoDepth::OutsideWindow),
-            None => Some(NoDepth::NoSignificantPeak),
+        Sight {
+            measured_m: found.and_then(|s| range_m(s.position_bins, s.peak.peak_bin)),
+            peak_m: sighting.and_then(|s| range_m(s.peak.position_bins, s.peak.peak_bin)),
+            sighting,
+            is_found: found.is_some(),
+            window,
+            law,
+        }
+    }
+
+    /// The macropixel's depth from its `counts`, one for each bin.
+    pub(crate) fn depth(&self, known: &Known, counts: &[u16]) -> PixelDepth {
+        let &Known {
+            pixel,
+            start,
+            true_m,
+            guide_m,
+        } = known;
+        let sight = self.sight(pixel, start, counts);
+        let in_window = sight.window.zip(true_m).is_some_and(|(window, true_m)| {
+            sight
+                .law
+                .interval(&window)
+                .contains(&Time::of_flight(true_m))
+        });
+        let no_depth = match sight.is_found {
+            true => None,
+            false if true_m.is_none() => Some(NoDepth::NoSurface),
+            false if start.is_none() && guide_m.is_none() => Some(NoDepth::NoGuide),
+            false if start.is_none() => Some(NoDepth::OutOfReach),
+            false if !self.spads_fire => Some(NoDepth::SpadsOff),
+            false if sight.is_saturated() => Some(NoDepth::Saturated),
+            false if !in_window => Some(NoDepth::OutsideWindow),
+            false => Some(NoDepth::NoSignificantPeak),
         };
         PixelDepth {
             true_m,
             guide_m,
             start,
             in_window,
-            measured_m: found.and_then(|s| range_m(s.position_bins, s.peak.peak_bin)),
+            measured_m: sight.measured_m,
             no_depth,
-            peak_m: sighting.and_then(|s| range_m(s.peak.position_bins, s.peak.peak_bin)),
-            confidence: sighting.map(|s| s.confidence),
+            peak_m: sight.peak_m,
+            confidence: sight.sighting.map(|s| s.confidence),
         }
     }
+}
+
+/// What a histogram says.
+struct Sight<'l> {
+    law: Cow<'l, WindowLaw>,
+    window: Option<OpenWindow>,
+    sighting: Option<Sighting>,
+    is_found: bool,
+    measured_m: Option<f64>,
+    peak_m: Option<f64>,
+}
+
+impl Sight<'_> {
+    fn is_saturated(&self) -> bool {
+        self.sighting.is_some_and(|s| s.is_saturated)
+    }
+}
+
+/// What a histogram says of distance where nothing is known of what is really there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// Distance, where the peak is significant and not saturated, m.
+    pub measured_m: Option<f64>,
+    /// Why there is none: no guide (SPADs are off), saturated, or no significant peak.
+    pub no_depth: Option<NoDepth>,
+    /// Distance of the histogram's peak with its range walk, significant or not, m.
+    pub peak_m: Option<f64>,
+    /// −log₁₀ of the chance that light without an echo makes such a peak; `None` where there is no peak.
+    pub confidence: Option<f64>,
+}
+
+/// Depths from histograms of whatever origin: `counts` are those of the array, rows × cols × bins, counted in the windows of `starts`,
+/// row-major, `None` where SPADs are off. Of the scene only the laser pulse matters; `calibration` is that of delay lines.
+///
+/// # Errors
+/// Bins that depths are not found in.
+///
+/// # Panics
+/// When there is not a start value for each macropixel and a count for each bin.
+pub fn range_counts(
+    (sensor, exposure): (&SensorConfig, &Exposure),
+    scene: &Scene,
+    options: &DepthOptions,
+    calibration: Option<&BinProfile>,
+    starts: &[Option<u16>],
+    counts: &[u16],
+) -> Result<Vec<Reading>, UnequalBins> {
+    assert_eq!(starts.len(), sensor.pixels());
+    assert_eq!(counts.len(), sensor.pixels() * sensor.bins);
+    let ranger = Ranger::new(sensor, exposure, scene, options, calibration)?;
+    let pixels = counts.par_chunks_exact(sensor.bins).zip(starts).enumerate();
+    let reading = |(pixel, (counts, &start)): (usize, (&[u16], &Option<u16>))| {
+        let sight = ranger.sight(pixel, start, counts);
+        let no_depth = match sight.is_found {
+            true => None,
+            false if start.is_none() => Some(NoDepth::NoGuide),
+            false if sight.is_saturated() => Some(NoDepth::Saturated),
+            false => Some(NoDepth::NoSignificantPeak),
+        };
+        Reading {
+            measured_m: sight.measured_m,
+            no_depth,
+            peak_m: sight.peak_m,
+            confidence: sight.sighting.map(|s| s.confidence),
+        }
+    };
+    Ok(pixels.map(reading).collect())
 }

@@ -19,7 +19,8 @@ use serde::Serialize;
 use super::price;
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
 use crate::engine::{
-    Cohort, CohortOptions, EngineError, Expose, Exposed, Histograms, LitPixel, Window, Work, expose,
+    Answer, Cohort, CohortOptions, EngineError, Expose, Exposed, Histograms, LitPixel, Window,
+    Work, expose,
 };
 use crate::photon::{PhotonStream, PixelLight};
 use crate::ranging::{PeakOptions, interpolate};
@@ -108,15 +109,15 @@ pub struct Tolerance<'a> {
 
 impl Tolerance<'_> {
     /// Exposes `pixels`, each on the cheapest engine that keeps its depth within the tolerance of the exact one's on
-    /// average. `done` is told of macropixels as they are finished.
+    /// average. `done` is told of macropixels as they are finished, and may stop the exposure as in [`expose`].
     ///
     /// # Errors
-    /// Configurations that the window engine refuses.
-    pub fn expose(
+    /// Configurations that the window engine refuses, and [`EngineError::Stopped`].
+    pub fn expose<A: Answer>(
         &self,
         stream: &PhotonStream,
         pixels: &[LitPixel],
-        done: impl Fn(usize) + Sync,
+        done: impl Fn(usize) -> A + Sync,
     ) -> Result<(Exposed, Kept), EngineError> {
         let Tolerance {
             tolerance_m,
