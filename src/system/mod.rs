@@ -30,11 +30,8 @@ pub(crate) use pixel::above_background;
 pub use pixel::{NoDepth, PixelDepth};
 pub use policy::{POLICY_KEYS, Pointing, Unguided, Why, WindowPolicy, share_held};
 pub(crate) use ranger::{Known, Ranger};
-<<<<<<< HEAD
-pub use reranged::Ranged;
-=======
 pub use ranger::{Reading, range_counts};
->>>>>>> edc81a7 (Python package gdtof: frames, drives, replays, depths, timing and theory with NumPy arrays, on the library's own requests)
+pub use reranged::Ranged;
 pub use result::{Frame, PhaseTimes};
 pub use speed::{SPEED_LASER_CYCLES, SpeedCase, SpeedFrame};
 pub use step_and_lock::{LockOptions, LockState, StepAndLock, Tracker};

@@ -1,0 +1,51 @@
+"""A guided direct time-of-flight lidar chip, down to gates and flip-flops.
+
+>>> import gdtof
+>>> frame = gdtof.frame(scene="street", laser_cycles=2000)
+>>> frame.depth.shape
+(64, 64)
+>>> frame.plot()                                                  # doctest: +SKIP
+
+Distances are metres along the ray, NaN where there is none; arrays by macropixel have the shape (rows, cols).
+"""
+
+from . import errors, theory, waves
+from ._frame import Drive, DriveFrame, Frame, Maps, Reason, drive, frame
+from ._gdtof import Guide, Scene, Sensor, __version__
+from ._histograms import Exposed, Ranged, Replayed, expose, range, replay
+from ._timing import Timing, bin_edges, starts_for, timing, windows
+from .errors import Error, InputError, SimulationError
+from .waves import Waveform, read_vcd
+
+__all__ = [
+    "Drive",
+    "DriveFrame",
+    "Error",
+    "Exposed",
+    "Frame",
+    "Guide",
+    "InputError",
+    "Maps",
+    "Ranged",
+    "Reason",
+    "Replayed",
+    "Scene",
+    "Sensor",
+    "SimulationError",
+    "Timing",
+    "Waveform",
+    "__version__",
+    "bin_edges",
+    "drive",
+    "errors",
+    "expose",
+    "frame",
+    "range",
+    "read_vcd",
+    "replay",
+    "starts_for",
+    "theory",
+    "timing",
+    "waves",
+    "windows",
+]

@@ -1,0 +1,74 @@
+"""What functions take, as the extension wants it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._gdtof import Guide, Scene, Sensor
+from .errors import InputError
+
+SensorLike: TypeAlias = Sensor | str | PathLike[str] | None
+SceneLike: TypeAlias = Scene | str | PathLike[str] | None
+GuideLike: TypeAlias = "Guide | str | Sequence[Guide | str] | NDArray[Any] | None"
+Policy: TypeAlias = str | Mapping[str, Any] | None
+
+
+def sensor_of(sensor: SensorLike) -> Sensor:
+    return sensor if isinstance(sensor, Sensor) else Sensor(sensor)
+
+
+def scene_of(scene: SceneLike) -> Scene:
+    return scene if isinstance(scene, Scene) else Scene(scene)
+
+
+def guide_of(guide: GuideLike) -> Guide | None:
+    if guide is None or isinstance(guide, Guide):
+        return guide
+    if isinstance(guide, str):
+        return Guide(guide)
+    if isinstance(guide, np.ndarray):
+        return Guide.from_map(guide)
+    return Guide(*guide)
+
+
+def policy_of(windows: Policy) -> str:
+    """The window policy as `gdtof frame --windows` takes it."""
+    if windows is None or isinstance(windows, str):
+        return windows or ""
+
+    def text(value: Any) -> str:
+        return str(value).lower() if isinstance(value, bool | np.bool_) else str(value)
+
+    return ",".join(f"{key}={text(value)}" for key, value in windows.items())
+
+
+def whole(name: str, values: ArrayLike) -> NDArray[np.int64]:
+    """Whole numbers, without rounding any."""
+    array = np.asarray(values)
+    if array.dtype.kind == "f" and array.size and np.all(array == np.trunc(array)):
+        array = array.astype(np.int64)
+    if array.dtype.kind not in "iub" and array.size:
+        raise InputError(f"{name}: holds numbers of type {array.dtype}; give whole ones")
+    if array.dtype.kind == "u" and array.size and int(array.max()) > np.iinfo(np.int64).max:
+        raise InputError(f"{name}: {array.max()} is too large; give 64-bit numbers")
+    return np.asarray(array, dtype=np.int64, order="C")
+
+
+def starts_of(starts: ArrayLike, sensor: Sensor) -> NDArray[np.int64]:
+    """Start values of every macropixel; a number stands for all."""
+    array = whole("starts", starts)
+    if array.ndim == 0:
+        array = np.full(sensor.shape[:2], array)
+    return array
+
+
+def real(values: ArrayLike, shape: tuple[int, ...] | None = None) -> NDArray[np.float64]:
+    array = np.asarray(values, dtype=np.float64)
+    if shape is not None and array.ndim < len(shape):
+        array = np.broadcast_to(array, shape)
+    return np.ascontiguousarray(array)

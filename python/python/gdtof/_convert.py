@@ -1,0 +1,72 @@
+"""Frames as datasets of xarray and tables of pandas."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ._frame import DriveFrame, Frame, Maps, Reason
+from ._plot import reason_name
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+MAPS = {
+    "depth": ("measured distance along the ray", "m"),
+    "guide": ("the guide's estimate", "m"),
+    "truth": ("true distance", "m"),
+    "peak": ("distance of the histogram's peak with its range walk", "m"),
+    "confidence": ("-log10 of the chance of such a peak without an echo", "1"),
+    "reason": ("why there is no depth", "1"),
+    "start": ("start value of the P-counter, -1 where SPADs are off", "1"),
+    "in_window": ("whether the echo lies in the time window", "1"),
+}
+
+
+def to_xarray(frame: Maps) -> xarray.Dataset:
+    try:
+        import xarray
+    except ImportError as error:
+        raise ImportError("datasets need xarray; pip install 'gdtof[xarray]'") from error
+    rows, cols, bins = frame.shape
+    variables: dict[str, Any] = {
+        name: (("row", "col"), getattr(frame, name), {"long_name": what, "units": unit})
+        for name, (what, unit) in MAPS.items()
+    }
+    variables["reason"][2]["flag_values"] = [int(reason) for reason in Reason]
+    variables["reason"][2]["flag_meanings"] = " ".join(reason.name.lower() for reason in Reason)
+    counts = {"long_name": "counts", "units": "1"}
+    variables["histograms"] = (("row", "col", "bin"), frame.histograms, counts)
+    edges = {"long_name": "edges of the bins after STOP", "units": "ns"}
+    variables["bin_edges"] = (("row", "col", "edge"), frame.bin_edges_ns, edges)
+    coords = {
+        "row": np.arange(rows),
+        "col": np.arange(cols),
+        "bin": np.arange(bins),
+        "edge": np.arange(bins + 1),
+    }
+    attrs: dict[str, Any] = {"bin_m": frame.bin_m}
+    if isinstance(frame, Frame):
+        attrs |= {"stop_periods": frame.stop_periods, "laser_cycles": frame.laser_cycles}
+    if isinstance(frame, DriveFrame):
+        coords["time"] = np.asarray((frame.times["exposure_s"] + frame.times["readout_s"]) / 2)
+        attrs["number"] = frame.number
+    return xarray.Dataset(variables, coords, attrs)
+
+
+def to_pandas(frame: Maps) -> pandas.DataFrame:
+    try:
+        import pandas
+    except ImportError as error:
+        raise ImportError("tables need pandas; pip install 'gdtof[pandas]'") from error
+    rows, cols, _ = frame.shape
+    columns = {name: getattr(frame, name).ravel() for name in MAPS if name != "reason"}
+    columns["counts"] = frame.counts.ravel()
+    index = pandas.MultiIndex.from_product([np.arange(rows), np.arange(cols)], names=["row", "col"])
+    table: pandas.DataFrame = pandas.DataFrame(columns, index=index)
+    names = pandas.Index([reason_name(reason) for reason in Reason])
+    codes = frame.reason.ravel().astype(np.int64)
+    table["reason"] = pandas.Categorical.from_codes(codes, categories=names)
+    return table

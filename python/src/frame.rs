@@ -1,0 +1,254 @@
+//! Frames: requests in, arrays out.
+
+use std::path::PathBuf;
+
+use guided_dtof::chip::{Exposure, SensorConfig, WindowLaw};
+use guided_dtof::engine::waveform::WaveCycles;
+use guided_dtof::request::FrameRequest;
+use guided_dtof::system::{
+    FrameSettings, NoDepth, PixelDepth, Probe, WindowPolicy, take_frame_by, take_guided_frame,
+};
+use guided_dtof::{guide::GuideInput, units::Time};
+use numpy::PyReadonlyArrayDyn;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+
+use crate::arrays::{cube, map, of_start, starts as start_values};
+use crate::background::run;
+use crate::failure::Failure;
+use crate::guide::Guide;
+use crate::scene::Scene;
+use crate::sensor::Sensor;
+use crate::values::{by_json, to_table};
+
+/// The library's request from keys of its own; None is a key that is left out.
+///
+/// # Errors
+/// Unknown keys, and values of other types.
+pub(crate) fn request(keys: &Bound<'_, PyDict>) -> PyResult<FrameRequest> {
+    let table = to_table(keys)?;
+    // One key at a time, to say which one is wrong.
+    for (key, value) in &table {
+        let alone = toml::Table::from_iter([(key.clone(), value.clone())]);
+        if let Err(e) = alone.try_into::<FrameRequest>() {
+            let message = e.message().trim().replace('\n', " ");
+            return Err(Failure::argument(key, message).into());
+        }
+    }
+    let request = table.try_into::<FrameRequest>();
+    request.map_err(|e| Failure::Input(e.message().trim().replace('\n', " ")).into())
+}
+
+/// Edges of the bins of every macropixel in its laser cycle, ns after STOP: one more than there are bins, NaN where its window
+/// does not open.
+pub(crate) fn bin_edges_ns(
+    sensor: &SensorConfig,
+    exposure: &Exposure,
+    starts: &[Option<u16>],
+) -> Vec<f64> {
+    let law = WindowLaw::new(sensor, exposure);
+    let has_own = law.sensor().has_own_laws();
+    let nothing = || vec![f64::NAN; sensor.bins + 1];
+    let edges = starts
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(pixel, start)| {
+            let own = has_own.then(|| law.of_macropixel(pixel as u32));
+            let law = own.as_ref().unwrap_or(&law);
+            let open = start.and_then(|start| law.window(start).open());
+            open.map_or_else(nothing, |open| {
+                let edges = law.edges(&open, 0);
+                edges.edges().iter().map(|edge| edge.as_ns()).collect()
+            })
+        });
+    edges.collect()
+}
+
+/// The reason why a macropixel has no depth, as a number: 0 where it has one.
+pub(crate) fn reason(no_depth: Option<NoDepth>) -> u8 {
+    let place = |why| NoDepth::ALL.iter().position(|other| *other == why);
+    no_depth.map_or(0, |why| 1 + place(why).expect("all are there") as u8)
+}
+
+/// What a frame and a frame of a drive have in common.
+pub(crate) struct Common {
+    pub(crate) shape: (usize, usize),
+    pub(crate) histograms: Vec<u16>,
+    pub(crate) pixels: Vec<PixelDepth>,
+    pub(crate) edges_ns: Vec<f64>,
+}
+
+impl Common {
+    /// As arrays of their shapes.
+    ///
+    /// # Errors
+    /// When there is no memory for them.
+    pub(crate) fn into_dict<'py>(self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let Common {
+            shape,
+            histograms,
+            pixels,
+            edges_ns,
+        } = self;
+        let (rows, cols) = shape;
+        let bins = histograms.len() / (rows * cols);
+        let metres = |of: fn(&PixelDepth) -> Option<f64>| {
+            let values = pixels.iter().map(|pixel| of(pixel).unwrap_or(f64::NAN));
+            map(py, shape, values.collect())
+        };
+        let dict = PyDict::new(py);
+        dict.set_item("histograms", cube(py, (rows, cols, bins), histograms))?;
+        dict.set_item("bin_edges_ns", cube(py, (rows, cols, bins + 1), edges_ns))?;
+        dict.set_item("depth", metres(|p| p.measured_m))?;
+        dict.set_item("guide", metres(|p| p.guide_m))?;
+        dict.set_item("truth", metres(|p| p.true_m))?;
+        dict.set_item("peak", metres(|p| p.peak_m))?;
+        dict.set_item("confidence", metres(|p| p.confidence))?;
+        let reasons = pixels.iter().map(|p| reason(p.no_depth)).collect();
+        dict.set_item("reason", map(py, shape, reasons))?;
+        let starts = pixels.iter().map(|p| of_start(p.start)).collect();
+        dict.set_item("start", map(py, shape, starts))?;
+        let in_window = pixels.iter().map(|p| p.in_window).collect();
+        dict.set_item("in_window", map(py, shape, in_window))?;
+        Ok(dict)
+    }
+}
+
+/// Macropixels to run at gate level, and where their waveforms go.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Probes {
+    places: Vec<(usize, usize)>,
+    folder: PathBuf,
+    format: String,
+    /// The first so many laser cycles; all, if −1; those about the first count, if it is left out.
+    cycles: Option<i64>,
+}
+
+impl Probes {
+    fn probes(&self, sensor: &SensorConfig) -> Result<Vec<Probe>, Failure> {
+        let wave_cycles = match self.cycles {
+            None => WaveCycles::FirstHits,
+            Some(-1) => WaveCycles::All,
+            Some(cycles) => WaveCycles::First(u32::try_from(cycles).map_err(|_| {
+                let message =
+                    format!("{cycles} is impossible; give a number of laser cycles, or \"all\"");
+                Failure::argument("wave_cycles", message)
+            })?),
+        };
+        let probe = |&(row, col): &(usize, usize)| {
+            if row >= sensor.rows || col >= sensor.cols {
+                let message = format!(
+                    "macropixel ({row}, {col}) is outside the {}x{} array; give rows 0 to {} and columns 0 to {}",
+                    sensor.rows,
+                    sensor.cols,
+                    sensor.rows - 1,
+                    sensor.cols - 1
+                );
+                return Err(Failure::argument("probes", message));
+            }
+            let name = format!("probe_r{row}_c{col}.{}", self.format);
+            Ok(Probe {
+                row,
+                col,
+                waves: self.folder.join(name),
+                wave_cycles,
+            })
+        };
+        self.places.iter().map(probe).collect()
+    }
+}
+
+/// Takes a frame; `keys` are those of the library's request. See `gdtof.frame`.
+#[pyfunction]
+#[pyo3(signature = (sensor, scene, guide, keys, tracking, starts, probes, progress))]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "gdtof.frame gives them their names"
+)]
+pub(crate) fn frame<'py>(
+    py: Python<'py>,
+    sensor: Option<&Bound<'py, Sensor>>,
+    scene: Option<&Bound<'py, Scene>>,
+    guide: Option<&Bound<'py, Guide>>,
+    keys: &Bound<'py, PyDict>,
+    tracking: bool,
+    starts: Option<PyReadonlyArrayDyn<'py, i64>>,
+    probes: Option<&Bound<'py, PyAny>>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (request, sensor, world) = (
+        request(keys)?,
+        Sensor::or_default(sensor),
+        Scene::or_default(scene),
+    );
+    let guide = Guide::or_default(guide);
+    let starts = starts.map(|starts| {
+        let shape = [sensor.rows, sensor.cols];
+        start_values(&starts, &shape, sensor.largest_start())
+    });
+    let starts = starts.transpose()?;
+    let probes = probes
+        .map(|probes| probes.extract::<Probes>())
+        .transpose()?;
+    let probes = probes
+        .map(|probes| probes.probes(&sensor))
+        .transpose()?
+        .unwrap_or_default();
+    let taken = run(py, progress, move |watch| {
+        let policy = match tracking {
+            true => WindowPolicy::for_sequences(),
+            false => WindowPolicy::default(),
+        };
+        let policy = request.policy(policy)?;
+        let settings = request.settings_by(sensor, world, guide, &policy)?;
+        watch.check()?;
+        let done = |macropixels| watch.done(macropixels);
+        let frame = match &starts {
+            None => take_frame_by(&settings, policy, |_| probes, done)?,
+            Some(starts) => {
+                let map = settings.guide.estimate(&input(&settings))?;
+                take_guided_frame(&settings, &map, starts, |_| probes, done)?
+            }
+        };
+        let starts: Vec<Option<u16>> = frame.pixels.iter().map(|pixel| pixel.start).collect();
+        let edges_ns = bin_edges_ns(&settings.sensor, &settings.exposure, &starts);
+        Ok((frame, settings.sensor, settings.exposure, edges_ns))
+    })?;
+    let (mut frame, sensor, exposure, edges_ns) = taken;
+    let summary = by_json(py, &frame.summary())?;
+    let dict = Common {
+        shape: (frame.rows, frame.cols),
+        histograms: std::mem::take(&mut frame.histograms),
+        pixels: std::mem::take(&mut frame.pixels),
+        edges_ns,
+    }
+    .into_dict(py)?;
+    let seconds = |time: Time| time.as_s();
+    dict.set_item("summary", summary)?;
+    dict.set_item("sensor", Sensor { config: sensor })?;
+    dict.set_item("stop_periods", exposure.stop_periods)?;
+    dict.set_item("laser_cycles", exposure.laser_cycles)?;
+    dict.set_item("bin_m", frame.bin_m)?;
+    dict.set_item("remark", frame.remark.as_deref())?;
+    dict.set_item("work", by_json(py, &frame.work)?)?;
+    dict.set_item("kept", by_json(py, &frame.kept)?)?;
+    dict.set_item("run_times", by_json(py, &frame.times)?)?;
+    dict.set_item("probes", frame.probes)?;
+    dict.set_item("load_s", seconds(frame.load_time))?;
+    dict.set_item("exposure_s", seconds(frame.exposure_time))?;
+    dict.set_item("readout_s", seconds(frame.readout_time))?;
+    Ok(dict)
+}
+
+/// What the guide of a single frame looks at.
+fn input(settings: &FrameSettings) -> GuideInput<'_> {
+    let FrameSettings {
+        sensor,
+        scene,
+        seed,
+        ..
+    } = settings;
+    GuideInput::still(scene, sensor.rows as u32, sensor.cols as u32, *seed)
+}

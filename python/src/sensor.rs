@@ -1,0 +1,160 @@
+//! Sensors as objects of Python.
+
+use std::path::PathBuf;
+
+use guided_dtof::chip::SensorConfig;
+use guided_dtof::request::Sources;
+use guided_dtof::settings::Document;
+use pyo3::exceptions::{PyAttributeError, PyKeyError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+use toml::Table;
+
+use crate::failure::Failure;
+use crate::values::{assignments, table_to_python, to_python};
+
+/// A sensor: a chip by name, a file, or keys.
+///
+/// Sensor()                                   the QuantIC4x4
+/// Sensor("hslidar", clk_hz="300 MHz")        a chip by name, and a key of it
+/// Sensor("my_chip.toml", rows=16, cols=16)   a file
+///
+/// Keys are those of `gdtof sensor`, which also lists their units and ranges; numbers may be texts with a unit. They are read as
+/// attributes or by name, and cannot be changed: `with_` makes another sensor.
+///
+/// Raises InputError for what cannot be.
+#[pyclass(frozen, module = "gdtof")]
+#[derive(Clone)]
+pub(crate) struct Sensor {
+    pub(crate) config: SensorConfig,
+}
+
+impl Sensor {
+    pub(crate) fn or_default(sensor: Option<&Bound<'_, Self>>) -> SensorConfig {
+        sensor.map_or_else(SensorConfig::default, |sensor| sensor.get().config.clone())
+    }
+
+    fn table(&self) -> Table {
+        Table::try_from(&self.config).expect("numbers and words")
+    }
+}
+
+#[pymethods]
+impl Sensor {
+    #[new]
+    #[pyo3(signature = (source=None, /, **keys))]
+    fn new(source: Option<PathBuf>, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let sources = Sources {
+            sensor: source,
+            set: assignments("sensor.", keys)?,
+            ..Sources::default()
+        };
+        let config = sources.read_sensor().map_err(Failure::from)?;
+        Ok(Sensor { config })
+    }
+
+    /// A sensor from the text of a sensor file (TOML); keys that it leaves out are the QuantIC4x4's.
+    #[staticmethod]
+    fn from_toml(text: &str) -> PyResult<Self> {
+        let config = SensorConfig::parse("sensor", text).map_err(Failure::from)?;
+        Ok(Sensor { config })
+    }
+
+    /// The same sensor with other keys.
+    #[pyo3(signature = (**keys))]
+    fn with_(&self, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut document = Document::of("the sensor", self.table());
+        for assignment in assignments("", keys)? {
+            let place = format!("with_({assignment})");
+            document
+                .assign(&assignment, &place)
+                .map_err(Failure::from)?;
+        }
+        let config = SensorConfig::read_document(&document).map_err(Failure::from)?;
+        Ok(Sensor { config })
+    }
+
+    /// All keys and their values.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        table_to_python(py, &self.table())
+    }
+
+    /// A sensor file, every key with its unit, range and source.
+    fn to_toml(&self) -> String {
+        self.config.commented()
+    }
+
+    /// Names of all keys.
+    fn keys(&self) -> Vec<String> {
+        self.table().keys().cloned().collect()
+    }
+
+    /// Rows and columns of macropixels, and bins of each.
+    #[getter]
+    fn shape(&self) -> (usize, usize, usize) {
+        (self.config.rows, self.config.cols, self.config.bins)
+    }
+
+    /// The largest start value of its P-counter.
+    #[getter]
+    fn largest_start(&self) -> u16 {
+        self.config.largest_start()
+    }
+
+    fn __getitem__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
+        match self.table().get(key) {
+            Some(value) => to_python(py, value),
+            None => Err(PyKeyError::new_err(key.to_owned())),
+        }
+    }
+
+    fn __getattr__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
+        match self.table().get(key) {
+            Some(value) => to_python(py, value),
+            None => Err(PyAttributeError::new_err(format!(
+                "a sensor has no key {key:?}; Sensor.keys() lists all"
+            ))),
+        }
+    }
+
+    fn __dir__(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        let mut names: Vec<String> = (py.get_type::<Self>().dir()?.iter())
+            .map(|name| name.extract())
+            .collect::<PyResult<_>>()?;
+        names.extend(self.keys());
+        Ok(names)
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        let other = other.cast::<Self>();
+        other.is_ok_and(|other| other.get().config == self.config)
+    }
+
+    fn __hash__(&self) -> u64 {
+        crate::values::hash_of(&self.table())
+    }
+
+    fn __repr__(&self) -> String {
+        let (own, usual) = (self.table(), Table::try_from(SensorConfig::default()));
+        let usual = usual.expect("numbers and words");
+        let other = own
+            .iter()
+            .filter(|(key, value)| usual.get(*key) != Some(*value));
+        let keys: Vec<String> = other.map(|(key, value)| format!("{key}={value}")).collect();
+        format!("Sensor({})", keys.join(", "))
+    }
+
+    fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
+        let html = py.import("gdtof._html")?;
+        let arguments = ("Sensor".to_owned(), self.to_dict(py)?);
+        html.call_method1("of_keys", arguments)?.extract()
+    }
+
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let make = py.get_type::<Self>().getattr("from_toml")?;
+        Ok((make, PyTuple::new(py, [self.config.commented()])?))
+    }
+}

@@ -1,0 +1,141 @@
+//! Values of settings between Python and TOML.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use pyo3::IntoPyObjectExt;
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString};
+use serde::Serialize;
+use toml::{Table, Value};
+
+/// A value as a settings file would have it; NumPy's scalars are numbers, too.
+///
+/// # Errors
+/// When it is nothing that a settings file has.
+pub(crate) fn to_toml(value: &Bound<'_, PyAny>) -> PyResult<Value> {
+    if let Ok(flag) = value.cast::<PyBool>() {
+        return Ok(Value::Boolean(flag.is_true()));
+    }
+    if value.is_instance_of::<PyInt>() {
+        return Ok(Value::Integer(value.extract()?));
+    }
+    if value.is_instance_of::<PyFloat>() {
+        return Ok(Value::Float(value.extract()?));
+    }
+    if let Ok(text) = value.cast::<PyString>() {
+        return Ok(Value::String(text.extract()?));
+    }
+    if let Ok(dict) = value.cast::<PyDict>() {
+        return to_table(dict).map(Value::Table);
+    }
+    // NumPy's scalars and arrays say themselves what they are.
+    if let Ok(plain) = value.call_method0("tolist")
+        && !plain.get_type().is(value.get_type())
+    {
+        return to_toml(&plain);
+    }
+    if value.hasattr("__fspath__")? {
+        return Ok(Value::String(value.call_method0("__fspath__")?.extract()?));
+    }
+    if let Ok(items) = value.try_iter() {
+        let items: PyResult<Vec<Value>> = items.map(|item| to_toml(&item?)).collect();
+        return Ok(Value::Array(items?));
+    }
+    let what = value.get_type().name()?;
+    Err(PyTypeError::new_err(format!(
+        "{what} is no value of a setting; give a number, a text, true or false, or a list of these"
+    )))
+}
+
+/// A dict with keys that are texts; keys whose value is None are left out.
+///
+/// # Errors
+/// As [`to_toml`].
+pub(crate) fn to_table(dict: &Bound<'_, PyDict>) -> PyResult<Table> {
+    let mut table = Table::new();
+    for (key, value) in dict {
+        if !value.is_none() {
+            table.insert(key.extract()?, to_toml(&value)?);
+        }
+    }
+    Ok(table)
+}
+
+/// The same as an object of Python.
+///
+/// # Errors
+/// When there is no memory for it.
+pub(crate) fn to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
+    match value {
+        Value::String(text) => text.into_bound_py_any(py),
+        Value::Integer(number) => number.into_bound_py_any(py),
+        Value::Float(number) => number.into_bound_py_any(py),
+        Value::Boolean(flag) => flag.into_bound_py_any(py),
+        Value::Datetime(time) => time.to_string().into_bound_py_any(py),
+        Value::Array(items) => {
+            let items: PyResult<Vec<_>> = items.iter().map(|item| to_python(py, item)).collect();
+            Ok(PyList::new(py, items?)?.into_any())
+        }
+        Value::Table(table) => Ok(table_to_python(py, table)?.into_any()),
+    }
+}
+
+/// A table as a dict.
+///
+/// # Errors
+/// As [`to_python`].
+pub(crate) fn table_to_python<'py>(py: Python<'py>, table: &Table) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    for (key, value) in table {
+        dict.set_item(key, to_python(py, value)?)?;
+    }
+    Ok(dict)
+}
+
+/// What the library would write as JSON, as an object of Python: the same names as in frame.json.
+///
+/// # Errors
+/// When there is no memory for it.
+pub(crate) fn by_json<'py>(py: Python<'py>, value: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
+    let text = serde_json::to_string(value).expect("the library's reports are JSON");
+    py.import("json")?.call_method1("loads", (text,))
+}
+
+/// Settings as the command line's `--set` takes them, each with the first name `of`.
+///
+/// # Errors
+/// Values that are none.
+pub(crate) fn assignments(of: &str, dict: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<String>> {
+    let assignment = |(key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+        let key: String = key.extract()?;
+        Ok(format!("{of}{key}={}", to_toml(&value)?))
+    };
+    dict.into_iter().flatten().map(assignment).collect()
+}
+
+/// A value of a table by its dotted name; items of lists go by their `name`, or by their number from 1.
+pub(crate) fn value_at<'t>(table: &'t Table, key: &str) -> Option<&'t Value> {
+    let mut names = key.split('.');
+    let mut at = table.get(names.next()?)?;
+    for name in names {
+        at = match at {
+            Value::Table(inner) => inner.get(name)?,
+            Value::Array(items) => {
+                let has_name =
+                    |item: &&Value| item.get("name").and_then(Value::as_str) == Some(name);
+                let by_number = || items.get(name.parse::<usize>().ok()?.checked_sub(1)?);
+                items.iter().find(has_name).or_else(by_number)?
+            }
+            _ => return None,
+        };
+    }
+    Some(at)
+}
+
+/// A hash of settings: equal settings have equal ones.
+pub(crate) fn hash_of(table: &Table) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    table.to_string().hash(&mut hasher);
+    hasher.finish()
+}

@@ -1,0 +1,110 @@
+"""Sensors, scenes and guides."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gdtof
+
+
+def test_sensors_come_from_names_files_and_keys(tmp_path: Path) -> None:
+    assert gdtof.Sensor() == gdtof.Sensor("quantic4x4")
+    assert gdtof.Sensor("hslidar").bins == 8
+    file = tmp_path / "chip.toml"
+    file.write_text('rows = 8\nclk_hz = "300 MHz"\n')
+    sensor = gdtof.Sensor(file, cols=4)
+    assert sensor.shape == (8, 4, 16)
+    assert sensor.clk_hz == sensor["clk_hz"] == 300e6
+    assert gdtof.Sensor(str(file), cols=4) == sensor
+    assert sensor.with_(rows=np.int64(2), clk_hz=np.float64(1e8)).to_dict() == {
+        **sensor.to_dict(),
+        "rows": 2,
+        "clk_hz": 1e8,
+    }
+    assert "clk_hz" in dir(sensor) and "with_" in dir(sensor)
+    assert dict(sensor.to_dict()) == {key: sensor[key] for key in sensor.keys()}
+    assert gdtof.Sensor.from_toml(sensor.to_toml()) == sensor
+    assert repr(sensor) == "Sensor(clk_hz=300000000.0, cols=4, rows=8)"
+
+
+def test_scenes_come_from_names_files_and_keys(tmp_path: Path) -> None:
+    street = gdtof.Scene()
+    assert street == gdtof.Scene("street") and street.name == "built-in street"
+    darker = street.with_({"object.car.reflectivity": 0.05, "light.illuminance_klux": "10000 lux"})
+    assert darker["object.car.reflectivity"] == 0.05
+    assert darker["light.illuminance_klux"] == 10.0
+    assert street != darker and hash(street) == hash(gdtof.Scene("street"))
+    file = tmp_path / "mine.toml"
+    file.write_text(darker.to_toml())
+    assert gdtof.Scene(file) == darker
+    assert street.truth(8, 8).shape == (8, 8)
+    van = gdtof.Scene("van")
+    assert not np.array_equal(van.truth(32, 64), van.truth(32, 64, time_s=5.0), equal_nan=True)
+    with pytest.raises(KeyError):
+        street["lidar.pdee"]
+
+
+def test_copies_travel() -> None:
+    guide = gdtof.Guide("radar", gdtof.Guide.from_map([[1.0, np.nan]], sigma_m=[[0.5, 1.0]]))
+    alone = gdtof.Guide.from_map([[1.0, np.nan]], sigma_m=[[0.5, 1.0]])
+    for thing in (gdtof.Sensor("hslidar", rows=4), gdtof.Scene("fog", {"lidar.pde": 0.1})):
+        assert pickle.loads(pickle.dumps(thing)) == thing
+        assert copy.deepcopy(thing) == thing
+    for either in (guide, alone):
+        back = pickle.loads(pickle.dumps(either))
+        assert repr(back) == repr(either)
+        for ours, theirs in zip(either.estimate(rows=1, cols=2), back.estimate(rows=1, cols=2), strict=True):
+            assert np.array_equal(ours, theirs, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("ask", "says"),
+    [
+        (lambda: gdtof.Sensor(rows=0), "rows = 0 is impossible; give 1 to 256"),
+        (lambda: gdtof.Sensor(row=1), "unknown field `row`"),
+        (lambda: gdtof.Sensor(clk_hz="8 ns"), "is a time; give a frequency"),
+        (lambda: gdtof.Sensor().with_(rows="many"), "has an unknown unit; give a plain number"),
+        (lambda: gdtof.Sensor.from_toml("rows = 0"), "sensor:1: rows = 0 is impossible"),
+        (lambda: gdtof.Scene.from_toml("[lidar]\npde = 2", "mine"), "mine:2: in [lidar], pde = 2 is impossible; give 0 to 1"),
+        (lambda: gdtof.Scene().with_({"object.cat.reflectivity": 1}), "there is no object \"cat\""),
+        (lambda: gdtof.Guide("radar:beam=3"), "unknown field `beam`"),
+        (lambda: gdtof.Guide(*["radar"] * 9), "9 guides; give 1 to 8"),
+        (lambda: gdtof.frame(engine="windo"), "engine: unknown variant `windo`"),  # type: ignore[arg-type]
+        (lambda: gdtof.frame(laser_cycles=-1), "laser_cycles: "),
+        (lambda: gdtof.drive(segments=0), "segments: 0 is impossible; give 1 to 64"),
+        (lambda: gdtof.drive(guide_latency_ms=-1), "guide_latency_ms: -1 is no latency"),
+        (lambda: gdtof.drive(frames=-1), "frames: -1 is impossible"),
+        (lambda: gdtof.timing(process="best"), "give slow, typ or fast"),  # type: ignore[arg-type]
+        (lambda: gdtof.timing("hslidar", voltage_v=5.0), "no delays are known there"),
+    ],
+)
+def test_what_cannot_be_is_said_in_a_sentence(ask: object, says: str) -> None:
+    assert callable(ask)
+    with pytest.raises(gdtof.InputError) as raised:
+        ask()
+    assert says in str(raised.value), raised.value
+    assert isinstance(raised.value, ValueError) and isinstance(raised.value, gdtof.Error)
+
+
+def test_what_is_no_setting_is_a_type_error() -> None:
+    with pytest.raises(TypeError, match="is no value of a setting"):
+        gdtof.Sensor(rows=object())
+    with pytest.raises(AttributeError, match="has no key"):
+        _ = gdtof.Sensor().row
+
+
+def test_a_drive_ends_when_it_is_closed() -> None:
+    sensor = gdtof.Sensor(rows=8, cols=8)
+    with gdtof.drive("van", sensor, frames=None, laser_cycles=100) as drive:
+        first = next(drive)
+        assert first.number == 0 and drive.period_s > 0.145
+    assert list(drive) == []
+    still = gdtof.drive("street", sensor, frames=2, laser_cycles=100, noise="still")
+    one, two = still
+    assert np.array_equal(one.histograms, two.histograms)
+    assert two.reused["world"] and two.reused["macropixels"] > 0

@@ -1,0 +1,78 @@
+"""Pictures, tables and what notebooks show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gdtof
+
+
+def test_pictures_are_drawn(frame: gdtof.Frame, tmp_path: Path) -> None:
+    everything = ["depth", "guide", "truth", "peak", "error", "confidence", "reason", "counts"]
+    for maps in ("depth", everything[:4], everything):
+        figure = frame.plot(maps, title="a frame")  # type: ignore[arg-type]
+        figure.savefig(tmp_path / "maps.png")
+        assert (tmp_path / "maps.png").stat().st_size > 5000
+    is_on = np.argwhere(frame.reason == gdtof.Reason.DEPTH)[0]
+    axes = frame.plot_histogram(int(is_on[0]), int(is_on[1]))
+    legend = axes.get_legend()
+    assert legend is not None
+    assert any("truth" in text.get_text() for text in legend.get_texts())
+    off = np.argwhere(frame.start < 0)[0]
+    assert "SPADs are off" in frame.plot_histogram(int(off[0]), int(off[1])).texts[0].get_text()
+    with pytest.raises(gdtof.InputError, match="outside the 16x16 array"):
+        frame.plot_histogram(16, 0)
+    with pytest.raises(gdtof.InputError, match="is no map; give depth"):
+        frame.plot("dept")  # type: ignore[arg-type]
+
+
+def test_datasets_have_dimensions_and_units(frame: gdtof.Frame) -> None:
+    data = frame.to_xarray()
+    assert dict(data.sizes) == {"row": 16, "col": 16, "bin": 16, "edge": 17}
+    assert data["depth"].attrs["units"] == "m"
+    assert data["histograms"].dims == ("row", "col", "bin")
+    # A dataset has the frame's memory.
+    assert np.shares_memory(data["histograms"].values, frame.histograms)
+    moving = next(gdtof.drive("van", gdtof.Sensor(rows=8, cols=8), frames=1, laser_cycles=50))
+    assert float(moving.to_xarray()["time"]) > 0.145
+
+
+def test_tables_have_a_row_for_each_macropixel(frame: gdtof.Frame) -> None:
+    table = frame.to_pandas()
+    assert table.index.names == ["row", "col"] and len(table) == 256
+    assert table.loc[(3, 5), "start"] == frame.start[3, 5]
+    counts = table["reason"].value_counts()
+    assert counts["depth"] == frame.summary["depths"]
+    assert table["counts"].sum() == frame.histograms.sum()
+
+
+def test_notebooks_show_tables_whose_names_are_escaped(frame: gdtof.Frame) -> None:
+    assert "depths, wrong by more than a bin" in frame._repr_html_()
+    assert "clk_hz" in gdtof.Sensor()._repr_html_()
+    text = gdtof.Scene().to_toml().replace('"car"', '"<script>alert(1)</script>"')
+    shown = gdtof.Scene.from_toml(text)._repr_html_()
+    assert "<script>" not in shown and "&lt;script&gt;" in shown
+    assert repr(frame).startswith("<Frame 16x16x16: ")
+
+
+def test_waveforms_are_read(tmp_path: Path) -> None:
+    file = tmp_path / "some.vcd"
+    file.write_text(
+        "$timescale 1 ps $end\n$scope module top $end\n$var wire 1 ! clk $end\n"
+        "$var wire 4 # word [3:0] $end\n$var wire 70 % long [69:0] $end\n$upscope $end\n$enddefinitions $end\n"
+        f"#0\n$dumpvars\nx!\nbxxxx #\n$end\n#5\n0!\nb101 #\nb1{69 * '0'} %\n#10\n1!\n"
+    )
+    wave = gdtof.read_vcd(file)
+    assert wave.find("") == ["top.clk", "top.word", "top.long"]
+    assert wave["clk"].rises_fs().tolist() == [10_000]
+    assert wave["word"].values.tolist() == [-1, 5]
+    assert wave["word"].at(4_999) == -1 and wave["word"].at(5_000) == 5
+    assert wave["long"].at(5_000) == 2**69
+    with pytest.raises(KeyError):
+        wave["stop"]
+    for bad in (tmp_path / "none.vcd", Path(__file__)):
+        with pytest.raises(gdtof.InputError):
+            gdtof.read_vcd(bad)
