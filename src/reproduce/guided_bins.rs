@@ -40,18 +40,18 @@ fn estimates_m(depth_m: f64) -> Vec<(f64, f64)> {
     (0..MAPS).flat_map(of_wall).collect()
 }
 
-/// The smallest bin of a window of `bins` that is centred on every estimate and holds the truth for all but 0.27 % of them, m.
-pub(super) fn least_bin_m(depth_m: f64, bins: usize) -> f64 {
+/// The smallest window that is centred on every estimate and holds the truth for all but 0.27 % of them, m.
+pub(super) fn least_window_m(depth_m: f64) -> f64 {
     let mut off_m: Vec<f64> = estimates_m(depth_m)
         .iter()
         .map(|(guide_m, true_m)| (guide_m - true_m).abs())
         .collect();
     off_m.sort_by(f64::total_cmp);
     let last = (WITHIN * off_m.len() as f64).ceil() as usize - 1;
-    2.0 * off_m[last] / bins as f64
+    2.0 * off_m[last]
 }
 
-/// The same with the windows that `sensor` opens, whose bins are CLK periods: the first bin, from `from_m` on, with which its
+/// The smallest bin with the windows that `sensor` opens, whose bins are CLK periods: the first bin, from `from_m` on, with which its
 /// start values hold as many. CLK periods at which no window can be aimed are passed over.
 pub(super) fn least_bin_of_sensor_m(depth_m: f64, sensor: &SensorConfig, from_m: f64) -> f64 {
     let estimates = estimates_m(depth_m);

@@ -243,7 +243,7 @@ pub const TABLES: [Table; 4] = [
 ];
 
 /// Every figure, by number.
-pub const FIGURES: [Figure; 30] = [
+pub const FIGURES: [Figure; 33] = [
     figure(20, "wavelength of a VCSEL", photon_budget::figure_20),
     figure(
         28,
@@ -274,6 +274,8 @@ pub const FIGURES: [Figure; 30] = [
     figure(45, "penalty of the schemes", penalty::figure_45),
     figure(56, "ripple delay", chip::figure_56),
     figure(61, "distance limits of a stereo pair", stereo::figure_61),
+    figure(66, "stereo depths and their spread", stereo::figure_66),
+    figure(67, "standard deviation of stereo depths", stereo::figure_67),
     figure(68, "stereo error against distance", stereo::figure_68),
     figure(70, "yaw after calibration", stereo::figure_70),
     figure(
@@ -304,6 +306,7 @@ pub const FIGURES: [Figure; 30] = [
     ),
     figure(104, "σ of the demonstrator", system::figure_104),
     figure(106, "time of a frame", system::figure_106),
+    figure(107, "a pedestrian leaves his window", stereo::figure_107),
     figure(
         108,
         "laser cycles of the demonstrator's schemes",

@@ -126,6 +126,118 @@ pub(super) fn figure_61() -> Vec<Chart> {
     ]
 }
 
+/// Estimates of a window of 5×5 pixels in the middle of the image before a wall, as Fig. 66 samples them, m.
+fn sampled_m(depth_m: f64, seed: u64) -> Vec<f64> {
+    let scene = wall_at(depth_m);
+    let rig = StereoRig::new(&scene, seed);
+    let pixels = (538..543).flat_map(|row| (718..723).map(move |col| (row, col)));
+    pixels
+        .filter_map(|(row, col)| Some(rig.measure(row, col)?.depth_m))
+        .collect()
+}
+
+fn mean_and_sigma(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    (mean, (squares / (n - 1.0)).sqrt())
+}
+
+/// Distances of the sweep, m; the thesis goes to 200 m, and says that what is nearer than about 15 m is not resolved.
+fn sweep_m() -> impl Iterator<Item = f64> {
+    (2..=20).map(|i| 10.0 * f64::from(i))
+}
+
+/// Mean and standard deviation of 5×5 pixels at every distance of the sweep.
+fn sampled_sweep() -> Vec<(f64, f64, f64)> {
+    sweep_m()
+        .map(|z_m| {
+            let (mean_m, sigma_m) = mean_and_sigma(&sampled_m(z_m, z_m as u64));
+            (z_m, mean_m, sigma_m)
+        })
+        .collect()
+}
+
+/// Fig. 66: mean and three standard deviations of 5×5 pixels against distance.
+pub(super) fn figure_66() -> Vec<Chart> {
+    let sweep = sampled_sweep();
+    let line = |sigmas: f64| sweep.iter().map(move |(z, m, s)| (*z, m + sigmas * s));
+    vec![
+        Chart::new(
+            "Stereo depth of 5×5 pixels: mean and three standard deviations (one sample a distance)",
+            Axis::linear("distance (m)"),
+            Axis::linear("estimated distance (m)"),
+        )
+        .with("mean, modelled rig", Style::Points, line(0.0))
+        .with("mean + 3 σ", Style::Dashed, line(3.0))
+        .with("mean − 3 σ", Style::Dashed, line(-3.0))
+        .with("true", Style::Line, sweep_m().map(|z| (z, z))),
+    ]
+}
+
+/// Fig. 67: standard deviation of 5×5 pixels, and three of the squared fit.
+pub(super) fn figure_67() -> Vec<Chart> {
+    let sweep = sampled_sweep();
+    // Least squares of σ = a·z²: the fit of Fig. 67 without the terms that Eq. 27 does not have.
+    let squares: f64 = sweep.iter().map(|(z, _, _)| z.powi(4)).sum();
+    let fit = sweep.iter().map(|(z, _, s)| s * z * z).sum::<f64>() / squares;
+    let of_fit = |sigmas: f64| sweep_m().map(move |z| (z, sigmas * fit * z * z));
+    let expected = |sigma_px| sweep_m().map(move |z| (z, PAIR.depth_error_m(z, sigma_px)));
+    vec![
+        Chart::new(
+            "Standard deviation of the stereo depth of 5×5 pixels",
+            Axis::linear("distance (m)"),
+            Axis::linear("σ (m)"),
+        )
+        .with(
+            "modelled rig",
+            Style::Points,
+            sweep.iter().map(|(z, _, s)| (*z, *s)),
+        )
+        .with("squared fit", Style::Line, of_fit(1.0))
+        .with("three times that", Style::Dashed, of_fit(3.0))
+        .with("Eq. 27, ⅓ px", Style::Dashed, expected(THIRD_PX)),
+    ]
+}
+
+/// Fig. 107: a pedestrian who comes nearer, his guide and his window with cameras that have turned towards each other by 0.1°.
+///
+/// The window is the demonstrator's: 8 bins, its centre on the next step of 12.5 ns.
+pub(super) fn figure_107() -> Vec<Chart> {
+    let walk_m = || (60..=100).map(|i| 0.5 * f64::from(i));
+    let mean_m = |z_m: f64, yaw_error_deg: f64| {
+        let mut scene = wall_at(z_m);
+        scene.stereo.yaw_error_deg = yaw_error_deg;
+        let rig = StereoRig::new(&scene, 107);
+        let pixels = (530..550).flat_map(|row| (710..730).map(move |col| (row, col)));
+        let depths: Vec<f64> = pixels
+            .filter_map(|(row, col)| Some(rig.measure(row, col)?.depth_m))
+            .collect();
+        mean_and_sigma(&depths).0
+    };
+    let guided = |yaw_deg: f64| walk_m().map(move |z_m| (z_m, mean_m(z_m, yaw_deg)));
+    let step_m = HSLIDAR_STEP_BINS * HSLIDAR_BIN_M;
+    let slipped: Vec<(f64, f64)> = guided(-0.1).collect();
+    let edge = |bins: f64| {
+        let centre_m = move |guide_m: f64| (guide_m / step_m).round() * step_m;
+        slipped
+            .iter()
+            .map(move |&(z_m, guide_m)| (z_m, centre_m(guide_m) + bins * HSLIDAR_BIN_M))
+    };
+    vec![
+        Chart::new(
+            "A pedestrian walks towards cameras that have turned towards each other by 0.1°",
+            Axis::linear("true distance (m)"),
+            Axis::linear("distance (m)"),
+        )
+        .with("true", Style::Line, walk_m().map(|z| (z, z)))
+        .with("guide, calibrated", Style::Points, guided(0.0))
+        .with("guide, 0.1° off", Style::Points, slipped.iter().copied())
+        .with("window's near edge", Style::Dashed, edge(-4.0))
+        .with("window's far edge", Style::Dashed, edge(4.0)),
+    ]
+}
+
 /// Fig. 68 and 105: error against distance.
 pub(super) fn figure_68() -> Vec<Chart> {
     let line = |sigma_px: f64| {
@@ -202,6 +314,8 @@ pub(super) fn figure_70() -> Vec<Chart> {
         let depths = measured_depths_m(&scene, 5);
         (yaw_deg, depths.iter().sum::<f64>() / depths.len() as f64)
     });
+    // "A 1-2 m error from even a 0.1° mechanical deviation" (6.4.2).
+    let published = [(0.1, 38.0), (0.1, 39.0), (-0.1, 41.0), (-0.1, 42.0)];
     vec![
         Chart::new(
             "A target at 40 m after one camera turned (positive: away from the other)",
@@ -213,7 +327,8 @@ pub(super) fn figure_70() -> Vec<Chart> {
             Style::Line,
             angles().map(|a| (a, 40.0 + PAIR.yaw_error_m(40.0, a))),
         )
-        .with("modelled rig", Style::Points, modelled),
+        .with("modelled rig", Style::Points, modelled)
+        .with("published, 1 to 2 m", Style::Points, published),
     ]
 }
 
@@ -224,7 +339,7 @@ pub(super) fn bin_rows() -> Vec<Row> {
     let on_steps = tolerated_sigma(8.0, HSLIDAR_STEP_BINS, three_sigma());
     let quantic = |z_m| PAIR.least_bin_m(z_m, THIRD_PX, 16);
     let (primary, contingency) = (SensorConfig::default(), hslidar());
-    let centred = guided_bins::least_bin_m(100.0, primary.bins);
+    let centred = guided_bins::least_window_m(100.0) / primary.bins as f64;
     let by_primary = guided_bins::least_bin_of_sensor_m(100.0, &primary, 0.5 * centred);
     let by_contingency = guided_bins::least_bin_of_sensor_m(100.0, &contingency, centred);
     // Eq. 25 takes 1/3 px; the rig's disparities are rounded to 1/16 px besides.
@@ -275,7 +390,8 @@ pub(super) fn bin_rows() -> Vec<Row> {
 pub(super) fn figure_71() -> Vec<Chart> {
     let depths = || (10..=200).step_by(2).map(f64::from);
     let least = |bins: u32| depths().map(move |z_m| (z_m, PAIR.least_bin_m(z_m, THIRD_PX, bins)));
-    let simulated = |bins: usize| DEPTHS_M.map(|z_m| (z_m, guided_bins::least_bin_m(z_m, bins)));
+    let windows = DEPTHS_M.map(|z_m| (z_m, guided_bins::least_window_m(z_m)));
+    let simulated = |bins: f64| windows.map(|(z_m, window_m)| (z_m, window_m / bins));
     let on_grid = |bins: u32, step: f64| {
         depths().filter_map(move |z_m| {
             Some((z_m, PAIR.least_bin_on_grid_m(z_m, THIRD_PX, bins, step)?))
@@ -289,8 +405,8 @@ pub(super) fn figure_71() -> Vec<Chart> {
         )
         .with("primary: QuantIC4x4, 16 bins", Style::Line, least(16))
         .with("contingency: HSLIDAR, 8 bins", Style::Line, least(8))
-        .with("simulated guide, 16 bins", Style::Points, simulated(16))
-        .with("simulated guide, 8 bins", Style::Points, simulated(8))
+        .with("simulated guide, 16 bins", Style::Points, simulated(16.0))
+        .with("simulated guide, 8 bins", Style::Points, simulated(8.0))
         .with(
             "QuantIC4x4, centres on the bin grid",
             Style::Dashed,
