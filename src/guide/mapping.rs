@@ -83,7 +83,7 @@ fn nearest_to_centres(rows: u32, cols: u32, landings: impl Iterator<Item = Landi
 }
 
 /// Camera pixels from one measurement to the next.
-fn stride(rig: &StereoRig, lidar: &PinholeCamera) -> u32 {
+pub(super) fn stride(rig: &StereoRig, lidar: &PinholeCamera) -> u32 {
     let camera_px_per_macropixel = rig.camera().focal_px / lidar.focal_px.max(lidar.focal_v_px);
     (camera_px_per_macropixel / SAMPLES_ACROSS).floor().max(1.0) as u32
 }

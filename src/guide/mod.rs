@@ -8,6 +8,7 @@
 //! claim, which the windows rely on (Eq. 25) and which may be wrong as the range may be.
 
 mod behavioural;
+mod fitted;
 mod from_file;
 mod fused;
 mod intensity;
@@ -31,6 +32,7 @@ use std::fmt::Debug;
 use crate::scene::{DVec3, Scene};
 
 pub use behavioural::BehaviouralStereo;
+pub use fitted::FittedStereo;
 pub use from_file::FileMap;
 pub use fused::Fused;
 pub use intensity::IntensityStereo;

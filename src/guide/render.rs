@@ -162,6 +162,85 @@ fn cloud(point: DVec3, layer: i32) -> f64 {
     sum
 }
 
+/// What the left camera sees at a place.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Look {
+    /// As in the images: a white surface in the scene's daylight gives 1.
+    pub(super) radiance: f64,
+    /// Standard deviation of what its texture or grain makes of it.
+    pub(super) contrast: f64,
+}
+
+/// What `camera`, the left one, sees at pixel coordinates. Textures are sampled around the place.
+pub(super) fn look(
+    scene: &Scene,
+    camera: &PinholeCamera,
+    at: (f64, f64),
+    grain: f64,
+    binning: f64,
+) -> Look {
+    let ray = |at| Ray::new(scene.stereo.position_m, camera.at_unit_depth(at));
+    let middle = ray(at);
+    let Some(hit) = scene.hit(&middle) else {
+        return Look {
+            radiance: SKY_REFLECTIVITY,
+            contrast: 0.0,
+        };
+    };
+    let radiance = surface(scene, &middle, &hit, 0.0, binning / camera.focal_px);
+    let own = hit.grey * scene.daylight(middle.at(hit.range_m), hit.normal);
+    let relative = if scene.objects[hit.object].texture.is_none() {
+        grain
+    } else {
+        // As far as the matcher's neighbourhood reaches.
+        let around = [
+            (-3.0, 0.0),
+            (3.0, 0.0),
+            (0.0, -3.0),
+            (0.0, 3.0),
+            (-2.0, -2.0),
+            (2.0, 2.0),
+        ];
+        let greys = around.into_iter().filter_map(|(du, dv)| {
+            let beside = scene.hit(&ray((at.0 + du * binning, at.1 + dv * binning)))?;
+            (beside.object == hit.object).then_some(beside.grey / hit.grey.max(1e-6))
+        });
+        let greys: Vec<f64> = greys.chain([1.0]).collect();
+        let mean = greys.iter().sum::<f64>() / greys.len() as f64;
+        let squares: f64 = greys.iter().map(|g| (g - mean).powi(2)).sum();
+        (squares / greys.len() as f64).sqrt()
+    };
+    Look {
+        radiance,
+        contrast: relative * own * scene.medium.transmission(hit.range_m),
+    }
+}
+
+/// What becomes of light in a binned pixel.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Exposed {
+    electrons: f64,
+    read_e: f64,
+}
+
+/// The exposure of images in which `radiances` are seen.
+pub(super) fn exposed(scene: &Scene, binning: u32, radiances: &[f32]) -> Exposed {
+    let binned = f64::from(binning * binning);
+    let per_s = scene.light.illuminance_klux * ELECTRONS_PER_S_KLUX;
+    Exposed {
+        electrons: per_s * exposure_s(scene, radiances) * binned,
+        read_e: READ_NOISE_E * binned.sqrt(),
+    }
+}
+
+impl Exposed {
+    /// Contrast over noise.
+    pub(super) fn texture(&self, radiance: f64, contrast: f64) -> f64 {
+        let noise_e = (radiance * self.electrons).sqrt().hypot(self.read_e);
+        contrast * self.electrons / noise_e
+    }
+}
+
 fn exposure_s(scene: &Scene, radiances: &[f32]) -> f64 {
     let mut sorted = radiances.to_vec();
     let rank = sorted.len() * 99 / 100;

@@ -77,7 +77,7 @@ const MARGIN_PX: u32 = 8;
 
 impl MatchedStereo {
     /// The part of the left image that the lidar sees at any distance, and to its left what the right camera sees of it.
-    fn crop(&self, input: &GuideInput<'_>) -> Option<Crop> {
+    pub(super) fn crop(&self, input: &GuideInput<'_>) -> Option<Crop> {
         let stereo = &input.scene.stereo;
         let camera = stereo.camera();
         let lidar = input.scene.lidar_camera(input.rows, input.cols);
@@ -130,7 +130,7 @@ impl MatchedStereo {
     }
 
     /// Disparities of the crop, binned pixels.
-    fn disparities(&self, input: &GuideInput<'_>, crop: Crop) -> Option<DisparityMap> {
+    pub(super) fn disparities(&self, input: &GuideInput<'_>, crop: Crop) -> Option<DisparityMap> {
         let [left, right] = pair(input.scene, crop, self.grain, input.seed);
         self.matcher(input.scene).match_pair(&left, &right).ok()
     }
@@ -199,19 +199,8 @@ impl Guide for MatchedStereo {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::guide::test_scenes::wall_at;
+    use crate::guide::test_scenes::{coarse, wall_at};
     use crate::scene::GroundTruth;
-
-    /// The thesis's rig with a sixth of its pixels either way, which renders 36 times as fast.
-    fn coarse(mut scene: Scene) -> Scene {
-        let stereo = &mut scene.stereo;
-        stereo.pixel_pitch_um *= 6.0;
-        stereo.width /= 6;
-        stereo.height /= 6;
-        stereo.min_disparity_px /= 6.0;
-        stereo.max_disparity_px /= 6.0;
-        scene
-    }
 
     const WHOLE: MatchedStereo = MatchedStereo {
         binning: 1,

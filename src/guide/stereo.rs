@@ -80,12 +80,9 @@ impl<'a> StereoRig<'a> {
     ///
     /// A pure function of the scene, the seed and the pixel.
     pub fn measure(&self, row: u32, col: u32) -> Option<StereoPoint> {
-        let stereo = &self.scene.stereo;
         let pixel = (f64::from(col) + 0.5, f64::from(row) + 0.5);
         let direction = self.camera.at_unit_depth(pixel);
-        let ray = Ray::new(stereo.position_m, direction);
-        let point_m = ray.at(self.scene.hit(&ray)?.range_m);
-        let true_disparity_px = pixel.0 - self.seen_by_right_camera(point_m)?;
+        let true_disparity_px = self.true_disparity_px(pixel)?;
         let disparity_px = self.matched(row, col, true_disparity_px)?;
         let depth_m = self.focal_baseline_px_m() / disparity_px;
         Some(StereoPoint {
@@ -95,6 +92,14 @@ impl<'a> StereoRig<'a> {
             depth_m,
             point_m: direction * depth_m,
         })
+    }
+
+    /// The disparity of what the principal camera sees at pixel coordinates; `None` in the sky and where the right camera does not see it.
+    pub(super) fn true_disparity_px(&self, at: (f64, f64)) -> Option<f64> {
+        let stereo = &self.scene.stereo;
+        let ray = Ray::new(stereo.position_m, self.camera.at_unit_depth(at));
+        let point_m = ray.at(self.scene.hit(&ray)?.range_m);
+        Some(at.0 - self.seen_by_right_camera(point_m)?)
     }
 
     /// The image column at which the right camera sees `point_m`; `None` if it does not.

@@ -22,6 +22,17 @@ pub(super) fn wall_at(depth_m: f64) -> Scene {
     scene
 }
 
+/// The rig with a sixth of its pixels either way, which renders 36 times as fast.
+pub(super) fn coarse(mut scene: Scene) -> Scene {
+    let stereo = &mut scene.stereo;
+    stereo.pixel_pitch_um *= 6.0;
+    stereo.width /= 6;
+    stereo.height /= 6;
+    stereo.min_disparity_px /= 6.0;
+    stereo.max_disparity_px /= 6.0;
+    scene
+}
+
 /// Estimate less truth of every macropixel of `size`×`size`, and the standard deviation claimed for it, m.
 pub(super) fn errors_m(
     guide: &dyn Guide,
