@@ -29,6 +29,7 @@
 //! | [`request`] | what a user asks for, read and checked |
 //! | `demo` | the demonstrator of the thesis before its scenes |
 //! | [`reproduce`] | the thesis's figures, published beside computed |
+//! | `page` | one HTML file to look at a frame or a drive |
 //! | [`testbenches`] | the chip's blocks driven and checked at gate level, with waveforms |
 //! | [`sweep`] | studies: a row of results for each of many frames |
 //! | [`cli`] | the `gdtof` command |
@@ -45,6 +46,7 @@ pub mod kernel;
 pub mod logic;
 pub mod netlist;
 pub mod numerics;
+mod page;
 pub mod photon;
 pub mod ranging;
 pub mod report;

@@ -19,6 +19,7 @@ use crate::engine::Work;
 use crate::engine::waveform::WaveCycles;
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::guide::GuideMap;
+use crate::page::Page;
 use crate::report::{Table, write_npy_u16};
 use crate::request::{FrameRequest, Spelling};
 use crate::scene::Scene;
@@ -83,6 +84,9 @@ pub(super) struct FrameArgs {
     /// Leave the range walk of strong echoes in the depths.
     #[arg(long)]
     no_walk_correction: bool,
+    /// Also write page.html: one file to look at the frame in a browser (gdtof page makes one later).
+    #[arg(long)]
+    page: bool,
     /// Print frame.json instead of the table.
     #[arg(long)]
     json: bool,
@@ -134,6 +138,10 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     let pair_report = pair.as_ref().map(|pair| &pair.report);
     let report = Report::new(args, &settings, &timing, &frame, pair_report);
     write_results(results.staging(), &frame, &report)?;
+    if args.page {
+        let page = Page::of(results.staging(), &args.out, 1)?;
+        page.write(&results.staging().join("page.html"))?;
+    }
     if let Some(pair) = &pair {
         pair.write(results.staging())?;
     }

@@ -10,6 +10,7 @@ mod export_frame;
 mod foxglove;
 mod frame;
 mod guiding;
+mod page;
 mod pareto;
 mod power;
 mod quality;
@@ -85,6 +86,8 @@ enum Command {
     Sensor(SensorArgs),
     /// Print the scene as a commented file: every key with its unit, range and source.
     Scene(SceneArgs),
+    /// Make one HTML file to look at a frame or a drive: maps, histograms, points in space.
+    Page(page::PageArgs),
     /// Replay one laser cycle of one macropixel of a frame that was taken, as a waveform.
     Wave(wave::WaveArgs),
     /// Run the testbenches of the chip's blocks, all or those named.
@@ -124,6 +127,7 @@ pub fn main() -> ExitCode {
         Command::Frame(args) => frame::run(&args),
         Command::Drive(args) => drive::run(args),
         Command::Demo(args) => demo::run(&args),
+        Command::Page(args) => page::run(&args),
         Command::Wave(args) => wave::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Reproduce(args) => reproduce::run(&args),

@@ -42,6 +42,7 @@ pub use monocular::Monocular;
 pub use noisy_truth::NoisyTruth;
 pub use pair::MatchedPair;
 pub use radar::Radar;
+pub(crate) use render::view;
 pub use rendered::MatchedStereo;
 pub use stereo::{StereoPoint, StereoRig};
 

@@ -32,6 +32,9 @@ const EXPOSED_TO: f64 = 0.8;
 
 const BITS: u32 = 12;
 
+/// Grain of surfaces in pictures that are for people.
+const GRAIN_OF_VIEWS: f64 = 0.05;
+
 /// The part of the images that is rendered, in binned pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Crop {
@@ -52,6 +55,21 @@ impl Crop {
             |first: u32, n: usize| (f64::from(first) + n as f64 + 0.5) * f64::from(self.binning);
         (along(self.left, col), along(self.top, row))
     }
+}
+
+/// What a camera in the lidar's place sees in its whole view, `rows` × `cols`: a white surface in the scene's daylight would give 1.
+pub(crate) fn view(scene: &Scene, rows: u32, cols: u32) -> Vec<f32> {
+    let camera = scene.lidar_camera(rows, cols);
+    let whole = Crop {
+        binning: 1,
+        left: 0,
+        top: 0,
+        width: cols,
+        height: rows,
+    };
+    radiances(scene, whole, &camera, GRAIN_OF_VIEWS, |at| {
+        Ray::new(DVec3::ZERO, camera.at_unit_depth(at))
+    })
 }
 
 /// Left and right image of the crop.

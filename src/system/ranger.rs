@@ -8,7 +8,7 @@ use super::aim::{Aims, Place, own_law};
 use super::pixel::{NoDepth, PixelDepth};
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
-use crate::ranging::{BinProfile, DepthOptions, EchoFinder, Sighting, UnequalBins};
+use crate::ranging::{BinProfile, DepthOptions, EchoFinder, Peak, Sighting, UnequalBins};
 use crate::scene::Scene;
 use crate::units::Time;
 
@@ -77,6 +77,24 @@ impl<'a> Ranger<'a> {
         let law = own_law(&self.law, pixel);
         let seen = law.interval(&law.window(start).open()?);
         Some((seen.start.as_range_m(), seen.end.as_range_m()))
+    }
+
+    /// Whether macropixels with the same start value may have windows of their own.
+    pub(crate) fn has_own_windows(&self) -> bool {
+        self.law.sensor().has_own_laws()
+    }
+
+    /// The edges of the bins of a macropixel with this start value, as distances in m; `None` where the window never opens.
+    pub(crate) fn edges_m(&self, pixel: usize, start: u16) -> Option<Vec<f64>> {
+        let law = own_law(&self.law, pixel);
+        let edges = law.edges(&law.window(start).open()?, 0);
+        Some(edges.edges().iter().map(|edge| edge.as_range_m()).collect())
+    }
+
+    /// The peak that the depth is found by, significant or not.
+    pub(crate) fn peak(&self, known: &Known, counts: &[u16]) -> Option<Peak> {
+        let sight = self.sight(known.pixel, known.start, counts);
+        sight.sighting.map(|sighting| sighting.peak)
     }
 
     /// What the `counts` of a macropixel with this start value say, one for each bin.

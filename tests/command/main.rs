@@ -1,5 +1,6 @@
 //! The `gdtof` command as its users meet it.
 
+mod a_page_shows_a_frame;
 mod a_real_pair_is_matched;
 mod command_line_refuses_bad_input;
 mod counts_are_ranged_in_the_windows_of_a_frame;

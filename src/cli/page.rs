@@ -1,0 +1,60 @@
+//! `gdtof page`: one HTML file to look at a frame or a drive.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::voice::{say, tell};
+use crate::page::Page;
+use crate::report::Table;
+
+/// Arguments of `gdtof page`.
+#[derive(Args)]
+pub(super) struct PageArgs {
+    /// Folder that `gdtof frame` or `gdtof drive` has written.
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// File to write.
+    #[arg(long, short, value_name = "FILE", default_value = "page.html")]
+    out: PathBuf,
+    /// Of a drive, show each N-th frame: the page grows by about 0.2 MB with each.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    every: u32,
+    /// Print JSON instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What was written.
+#[derive(Serialize)]
+struct Report<'a> {
+    page: &'a PathBuf,
+    frames: usize,
+    bytes: usize,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input and unwritable output.
+pub(super) fn run(args: &PageArgs) -> anyhow::Result<()> {
+    let page = Page::of(&args.folder, &args.folder, args.every as usize)?;
+    page.write(&args.out)?;
+    let report = Report {
+        page: &args.out,
+        frames: page.frames,
+        bytes: page.size(),
+    };
+    if args.json {
+        return Ok(say(format_args!(
+            "{}\n",
+            serde_json::to_string_pretty(&report)?
+        ))?);
+    }
+    let table = Table::new(format!("Page of {}", args.folder.display()))
+        .row("frames", report.frames)
+        .row("size", format!("{:.1} MB", report.bytes as f64 / 1e6))
+        .row("open in a browser", args.out.display());
+    Ok(tell(table)?)
+}
