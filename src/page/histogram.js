@@ -43,7 +43,7 @@ function drawHistogram(f, pixel) {
   if (fit) {
     const middles = fit.map((_, bin) => (edges[bin] + edges[bin + 1]) / 2);
     traces.push({ type: "scatter", mode: "lines+markers", line: { color: colour("fit"), width: 1.5, dash: "dot" }, marker: { size: 4 }, x: middles, y: fit, hovertemplate: "fit %{y:.1f}<extra></extra>" });
-    note("fit", "fit");
+    note(Number.isFinite(f.depth[pixel]) ? "fit" : "fit, which makes no depth", "fit");
   }
   const most = Math.max(1, ...counts, ...(fit ?? [0])) * 1.08;
   const shapes = [{ type: "rect", xref: "x", yref: "paper", x0: first, x1: last, y0: 0, y1: 1, fillcolor: colour("bars"), opacity: 0.08, line: { width: 0 } }];
