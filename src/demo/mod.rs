@@ -54,11 +54,17 @@ impl Demonstrator {
             step,
             ..Sweep::default()
         };
-        Ok(Demonstrator {
-            calibration: calibrate(&sensor, STOP_PERIODS, &sweep, swept)?.profile,
-            exposure: Exposure::new(&sensor, STOP_PERIODS, LASER_CYCLES),
-            sensor: (*sensor).clone(),
-        })
+        let calibrated = calibrate(&sensor, STOP_PERIODS, &sweep, swept)?;
+        Ok(Self::of(calibrated.profile))
+    }
+
+    /// The chip that a calibration is of, perhaps with fewer rows.
+    pub(crate) fn of(calibration: BinProfile) -> Self {
+        Demonstrator {
+            exposure: Exposure::new(&calibration.sensor, STOP_PERIODS, LASER_CYCLES),
+            sensor: calibration.sensor.clone(),
+            calibration,
+        }
     }
 
     /// A drive through `scene`, as the demonstrator took it. Where the chip has fewer rows, the laser lights as much less with as much less

@@ -88,20 +88,47 @@ pub(crate) fn car(demonstrator: &Demonstrator, mph: f64, seed: u64) -> Show {
 
 /// A pedestrian and a car in fogs of several visibilities, which is not published (Fig. 101).
 pub(crate) fn fog(demonstrator: &Demonstrator, seed: u64) -> Vec<Show> {
-    let at = |visibility_m: f64, target: &'static str, start_s: f64| {
-        let scene = scenes::fog(visibility_m);
-        let name = format!("fog_{visibility_m:.0}m_{target}");
-        let mut show = of(demonstrator, name, scene, target, seed);
-        show.settings.start_s = start_s;
-        show.frames = 2;
-        show.pictures = vec![1];
-        show
-    };
-    let mut shows = vec![at(150.0, "pedestrian", WHILE_THE_PEDESTRIAN_CROSSES_S)];
+    let mut shows = vec![pedestrian_in_fog(demonstrator, seed)];
     shows[0].compares = true;
-    let cars = [400.0, 300.0, 200.0, 150.0];
-    shows.extend(cars.map(|visibility_m| at(visibility_m, "car", WITH_THE_CAR_FAR_S)));
+    let cars = CAR_VISIBILITIES_M.iter();
+    shows.extend(cars.map(|&visibility_m| car_in_fog(demonstrator, visibility_m, seed)));
     shows
+}
+
+/// Visibilities in which the car is looked for, m.
+pub(crate) const CAR_VISIBILITIES_M: [f64; 4] = [400.0, 300.0, 200.0, 150.0];
+
+/// The pedestrian who crosses at 1 m/s in the built-in fog, 18 m ahead.
+pub(crate) fn pedestrian_in_fog(demonstrator: &Demonstrator, seed: u64) -> Show {
+    in_fog(
+        demonstrator,
+        150.0,
+        "pedestrian",
+        WHILE_THE_PEDESTRIAN_CROSSES_S,
+        seed,
+    )
+}
+
+/// The car, 60 m ahead, in a fog of this visibility.
+pub(crate) fn car_in_fog(demonstrator: &Demonstrator, visibility_m: f64, seed: u64) -> Show {
+    in_fog(demonstrator, visibility_m, "car", WITH_THE_CAR_FAR_S, seed)
+}
+
+/// Two frames of the fog.
+fn in_fog(
+    demonstrator: &Demonstrator,
+    visibility_m: f64,
+    target: &'static str,
+    start_s: f64,
+    seed: u64,
+) -> Show {
+    let scene = scenes::fog(visibility_m);
+    let name = format!("fog_{visibility_m:.0}m_{target}");
+    let mut show = of(demonstrator, name, scene, target, seed);
+    show.settings.start_s = start_s;
+    show.frames = 2;
+    show.pictures = vec![1];
+    show
 }
 
 /// When the frames of the fog begin that are about the pedestrian, s: 18 m ahead and 1 m to the right by then.

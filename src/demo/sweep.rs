@@ -51,44 +51,56 @@ pub(crate) fn sweep(
     seed: u64,
     done: impl Fn(),
 ) -> Result<Vec<SweepPoint>, FrameError> {
-    DISTANCES_M
-        .iter()
-        .map(|&distance_m| {
-            let scene = figure_at(distance_m, reflectivity, KLUX);
-            let camera = scene.stereo.camera();
-            let focal_baseline_px_m = camera.focal_px * scene.stereo.baseline_m;
-            let mut settings = demonstrator.drive(scene, seed + (distance_m * 10.0) as u64);
-            let (rows, cols) = (demonstrator.sensor.rows, demonstrator.sensor.cols);
-            let truth = GroundTruth::render(&settings.frame.scene, rows as u32, cols as u32);
-            let square = square_on(&truth);
-            settings.only = Some(square.clone());
-            let mut drive = Drive::new(&settings)?;
-            let mut pixels: Vec<PixelDepth> = Vec::new();
-            for _ in 0..FRAMES {
-                let frame = drive.frame(|_| {})?;
-                let on_it = frame.pixels.iter().zip(&square);
-                pixels.extend(on_it.filter(|&(_, &on)| on).map(|(pixel, _)| pixel));
-                done();
-            }
-            let errors: Vec<f64> = pixels.iter().filter_map(PixelDepth::error_m).collect();
-            let mean_error_m = mean(errors.iter().copied()).unwrap_or(f64::NAN);
-            let square_m2 = |values: &mut dyn Iterator<Item = f64>| {
-                mean(values.map(|v| v * v)).map_or(f64::NAN, f64::sqrt)
-            };
-            let guides = pixels.iter().filter_map(|p| Some(p.guide_m? - p.true_m?));
-            Ok(SweepPoint {
-                distance_m,
-                samples: pixels.len(),
-                depths: errors.len(),
-                in_window: pixels.iter().filter(|p| p.in_window).count(),
-                mean_error_m,
-                sigma_m: square_m2(&mut errors.iter().map(|e| e - mean_error_m)),
-                rms_m: square_m2(&mut errors.iter().copied()),
-                guide_rms_m: square_m2(&mut guides.into_iter()),
-                guide_theory_m: distance_m * distance_m * 0.25 / focal_baseline_px_m,
-            })
-        })
+    let points = DISTANCES_M.iter();
+    points
+        .map(|&distance_m| point(demonstrator, distance_m, reflectivity, seed, &done))
         .collect()
+}
+
+/// The figure at one distance; `done` is told of every frame.
+///
+/// # Errors
+/// What a drive reports.
+pub(crate) fn point(
+    demonstrator: &Demonstrator,
+    distance_m: f64,
+    reflectivity: f64,
+    seed: u64,
+    done: impl Fn(),
+) -> Result<SweepPoint, FrameError> {
+    let scene = figure_at(distance_m, reflectivity, KLUX);
+    let camera = scene.stereo.camera();
+    let focal_baseline_px_m = camera.focal_px * scene.stereo.baseline_m;
+    let mut settings = demonstrator.drive(scene, seed + (distance_m * 10.0) as u64);
+    let (rows, cols) = (demonstrator.sensor.rows, demonstrator.sensor.cols);
+    let truth = GroundTruth::render(&settings.frame.scene, rows as u32, cols as u32);
+    let square = square_on(&truth);
+    settings.only = Some(square.clone());
+    let mut drive = Drive::new(&settings)?;
+    let mut pixels: Vec<PixelDepth> = Vec::new();
+    for _ in 0..FRAMES {
+        let frame = drive.frame(|_| {})?;
+        let on_it = frame.pixels.iter().zip(&square);
+        pixels.extend(on_it.filter(|&(_, &on)| on).map(|(pixel, _)| pixel));
+        done();
+    }
+    let errors: Vec<f64> = pixels.iter().filter_map(PixelDepth::error_m).collect();
+    let mean_error_m = mean(errors.iter().copied()).unwrap_or(f64::NAN);
+    let square_m2 = |values: &mut dyn Iterator<Item = f64>| {
+        mean(values.map(|v| v * v)).map_or(f64::NAN, f64::sqrt)
+    };
+    let guides = pixels.iter().filter_map(|p| Some(p.guide_m? - p.true_m?));
+    Ok(SweepPoint {
+        distance_m,
+        samples: pixels.len(),
+        depths: errors.len(),
+        in_window: pixels.iter().filter(|p| p.in_window).count(),
+        mean_error_m,
+        sigma_m: square_m2(&mut errors.iter().map(|e| e - mean_error_m)),
+        rms_m: square_m2(&mut errors.iter().copied()),
+        guide_rms_m: square_m2(&mut guides.into_iter()),
+        guide_theory_m: distance_m * distance_m * 0.25 / focal_baseline_px_m,
+    })
 }
 
 /// Fig. 103, 104 and 105, with their numbers.

@@ -46,6 +46,7 @@ pub(super) fn of_rig(scene: &Scene, rows: u32, cols: u32, seed: u64) -> GuideMap
         .par_iter()
         .map(|&row| {
             offsets(rig.camera().width, stride)
+                .filter(|&col| may_land(scene, &lidar, &rig, (row, col)))
                 .filter_map(|col| {
                     let point = rig.measure(row, col)?;
                     land(scene, &lidar, &point, rig.depth_sigma_m(point.depth_m))
@@ -91,6 +92,28 @@ pub(super) fn stride(rig: &StereoRig, lidar: &PinholeCamera) -> u32 {
 /// Every `stride`-th pixel of `size`, starting half a stride in.
 fn offsets(size: u32, stride: u32) -> impl Iterator<Item = u32> {
     (stride / 2..size).step_by(stride as usize)
+}
+
+/// Whether a camera pixel may land in the lidar's image, at whatever depth it is measured: as that grows, it goes straight from
+/// where the nearest lands to where the farthest does. Most rows of the demonstrator's cameras see what is above or below it.
+fn may_land(
+    scene: &Scene,
+    lidar: &PinholeCamera,
+    rig: &StereoRig<'_>,
+    (row, col): (u32, u32),
+) -> bool {
+    /// As good as endless.
+    const FAR_M: f64 = 1e9;
+    let pixel = (f64::from(col) + 0.5, f64::from(row) + 0.5);
+    let direction = rig.camera().at_unit_depth(pixel);
+    let nearest_m = rig.focal_baseline_px_m() / scene.stereo.max_disparity_px;
+    let ends = [nearest_m, FAR_M]
+        .map(|depth_m| lidar.project(direction * depth_m + scene.stereo.position_m));
+    let [Some((u0, v0)), Some((u1, v1))] = ends else {
+        return true;
+    };
+    let (width, height) = (f64::from(lidar.width), f64::from(lidar.height));
+    u0.max(u1) >= 0.0 && u0.min(u1) <= width && v0.max(v1) >= 0.0 && v0.min(v1) <= height
 }
 
 /// Where in the lidar's image a stereo point lands; `None` outside.

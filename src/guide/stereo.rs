@@ -98,7 +98,7 @@ impl<'a> StereoRig<'a> {
     pub(super) fn true_disparity_px(&self, at: (f64, f64)) -> Option<f64> {
         let stereo = &self.scene.stereo;
         let ray = Ray::new(stereo.position_m, self.camera.at_unit_depth(at));
-        let point_m = ray.at(self.scene.hit(&ray)?.range_m);
+        let point_m = ray.at(self.scene.range_to_hit(&ray)?);
         Some(at.0 - self.seen_by_right_camera(point_m)?)
     }
 
@@ -107,7 +107,7 @@ impl<'a> StereoRig<'a> {
         let origin = self.right.origin_m();
         let towards = point_m - origin;
         let (u, _) = self.right.sees_at(point_m)?;
-        let first_m = self.scene.hit(&Ray::new(origin, towards))?.range_m;
+        let first_m = self.scene.range_to_hit(&Ray::new(origin, towards))?;
         let visible = first_m >= towards.length() * (1.0 - OCCLUSION_TOLERANCE);
         visible.then_some(u)
     }

@@ -493,7 +493,11 @@ impl PixelStream<'_> {
                 .generate(key, self.pixel, numbered(self.kind.background()));
         }
         draw.counts = numbers;
-        if self.limits.is_some() {
+        if self
+            .limits
+            .as_ref()
+            .is_some_and(|limits| !limits.keep_all_of(group, self.stream))
+        {
             draw.thin(self);
         }
     }

@@ -1,9 +1,11 @@
 //! Where rays end: the nearest surface along one, and everything that sends light back along it.
 
+use std::ops::Range;
+
 use glam::DVec3;
 use smallvec::SmallVec;
 
-use super::object::Object;
+use super::bounds::Candidates;
 use super::settings::Scene;
 use super::shape::Meeting;
 use super::vector::Ray;
@@ -56,7 +58,14 @@ impl Scene {
     /// The nearest opaque surface along `ray`, as if panes were not there; `None` for the sky. Of two in the same place
     /// the one listed first in the scene counts.
     pub fn hit(&self, ray: &Ray) -> Option<Hit> {
-        self.nearest(ray, |object| !object.is_pane())
+        self.nearest(ray, self.all().filter(|&n| !self.objects[n].is_pane()))
+    }
+
+    /// How far it is to that surface, m, without what is there.
+    pub(crate) fn range_to_hit(&self, ray: &Ray) -> Option<f64> {
+        let opaque = self.all().filter(|&n| !self.objects[n].is_pane());
+        let (meeting, _) = self.first_meeting(ray, opaque)?;
+        Some(meeting.range_m)
     }
 
     /// All that sends light back along `ray`: panes themselves, what stands behind them, and what they mirror.
@@ -64,19 +73,40 @@ impl Scene {
     /// Light goes there and back the same way, so what is left of it is a share of a share. A pane's thickness and the
     /// laser's own mirror image are left out.
     pub fn returns(&self, ray: &Ray) -> Returns {
+        self.followed(ray, None)
+    }
+
+    /// The same, where the ray meets no others than the `candidates`.
+    pub(super) fn returns_of(&self, ray: &Ray, candidates: &Candidates) -> Returns {
+        self.followed(ray, Some(candidates))
+    }
+
+    fn followed(&self, ray: &Ray, candidates: Option<&Candidates>) -> Returns {
         let mut returns = Returns {
             surfaces: SmallVec::new(),
             sky_share: 0.0,
         };
-        self.follow(ray, 0.0, 1.0, 0, &mut returns);
+        self.follow(ray, candidates, (0.0, 1.0), 0, &mut returns);
         let by_range = |a: &Return, b: &Return| a.hit.range_m.total_cmp(&b.hit.range_m);
         returns.surfaces.sort_by(by_range);
         returns
     }
 
-    /// Follows a ray that has come `so_far_m` and of whose light `share` arrives one way.
-    fn follow(&self, ray: &Ray, so_far_m: f64, share: f64, mirrors: u32, returns: &mut Returns) {
-        let Some(mut hit) = self.nearest(ray, |_| true) else {
+    /// Follows a ray that has come `so_far_m` and of whose light `share` arrives one way; it meets no others than the
+    /// `candidates`, if they are known.
+    fn follow(
+        &self,
+        ray: &Ray,
+        candidates: Option<&Candidates>,
+        (so_far_m, share): (f64, f64),
+        mirrors: u32,
+        returns: &mut Returns,
+    ) {
+        let nearest = match candidates {
+            Some(candidates) => self.nearest(ray, candidates.iter().map(|&n| n as usize)),
+            None => self.nearest(ray, self.all()),
+        };
+        let Some(mut hit) = nearest else {
             returns.sky_share += share;
             return;
         };
@@ -99,29 +129,42 @@ impl Scene {
                 origin: point,
                 ..*ray
             };
-            self.follow(&beyond, hit.range_m, left, mirrors, returns);
+            self.follow(&beyond, candidates, (hit.range_m, left), mirrors, returns);
         }
         if let Some(left) = onwards(object.mirror)
             && mirrors < MOST_MIRRORS
         {
             let thrown_back = ray.direction - hit.normal * (2.0 * ray.direction.dot(hit.normal));
             let reflected = Ray::new(point, thrown_back);
-            self.follow(&reflected, hit.range_m, left, mirrors + 1, returns);
+            self.follow(&reflected, None, (hit.range_m, left), mirrors + 1, returns);
         }
     }
 
-    /// The nearest surface along `ray` of the objects that are `wanted`.
-    fn nearest(&self, ray: &Ray, wanted: impl Fn(&Object) -> bool) -> Option<Hit> {
+    fn all(&self) -> Range<usize> {
+        0..self.objects.len()
+    }
+
+    /// Where `ray` meets the first of some objects, and which that is.
+    #[inline]
+    fn first_meeting(
+        &self,
+        ray: &Ray,
+        objects: impl Iterator<Item = usize>,
+    ) -> Option<(Meeting, usize)> {
         let mut nearest: Option<(Meeting, usize)> = None;
-        for (index, object) in self.objects.iter().enumerate() {
-            if wanted(object)
-                && let Some(meeting) = object.shape.meet(ray)
+        for index in objects {
+            if let Some(meeting) = self.objects[index].shape.meet(ray)
                 && nearest.is_none_or(|(least, _)| meeting.range_m < least.range_m)
             {
                 nearest = Some((meeting, index));
             }
         }
-        let (Meeting { range_m, part }, index) = nearest?;
+        nearest
+    }
+
+    /// The nearest surface along `ray` of some objects, by their index, rising.
+    fn nearest(&self, ray: &Ray, objects: impl Iterator<Item = usize>) -> Option<Hit> {
+        let (Meeting { range_m, part }, index) = self.first_meeting(ray, objects)?;
         let object = &self.objects[index];
         let point = ray.at(range_m);
         let normal = object.shape.normal_at(point, part);
@@ -144,7 +187,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Pattern, Shape, Texture};
+    use crate::scene::{Object, Pattern, Shape, Texture};
     use proptest::prelude::*;
 
     fn wall(z_m: f64) -> Object {

@@ -3,6 +3,7 @@
 //!
 //! Coordinates in metres: x to the right, y down, z forward, the lidar at the origin.
 
+mod bounds;
 mod builtin;
 mod camera;
 mod cast;

@@ -18,6 +18,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
+use super::bounds::{Bounds, Candidates};
 use super::camera::PinholeCamera;
 use super::cast::{Return, Returns};
 use super::medium::Medium;
@@ -94,9 +95,10 @@ impl GroundTruth {
     /// Looks out of every macropixel of a `rows` × `cols` array.
     pub fn render(scene: &Scene, rows: u32, cols: u32) -> Self {
         let camera = scene.lidar_camera(rows, cols);
+        let bounds = Bounds::of(scene);
         let views: Vec<View> = (0..rows * cols)
             .into_par_iter()
-            .map(|pixel| View::of(scene, &camera, (pixel / cols, pixel % cols)))
+            .map(|pixel| View::of(scene, &bounds, &camera, (pixel / cols, pixel % cols)))
             .collect();
         let surfaces = views.iter().map(|view| view.surfaces(&scene.medium));
         let surfaces: Vec<SmallVec<[Surface; 1]>> = surfaces.collect();
@@ -116,8 +118,10 @@ impl GroundTruth {
 }
 
 impl View {
-    fn of(scene: &Scene, camera: &PinholeCamera, pixel: (u32, u32)) -> Self {
-        let few = cast(scene, camera, pixel, RAYS);
+    fn of(scene: &Scene, bounds: &Bounds, camera: &PinholeCamera, pixel: (u32, u32)) -> Self {
+        let (middle, half_rad) = cone(camera, pixel);
+        let candidates = bounds.about(middle, half_rad);
+        let few = cast(scene, &candidates, camera, pixel, RAYS);
         let first = |returns: &Returns| returns.surfaces.first().map(|s| s.hit.object);
         let is_edge = few.iter().any(|(_, returns)| {
             first(returns) != first(&few[0].1) || returns.surfaces.len() != few[0].1.surfaces.len()
@@ -125,7 +129,7 @@ impl View {
         match is_edge {
             false => View::seen(scene, camera, RAYS, &few),
             true => {
-                let many = cast(scene, camera, pixel, RAYS_AT_EDGES);
+                let many = cast(scene, &candidates, camera, pixel, RAYS_AT_EDGES);
                 View::seen(scene, camera, RAYS_AT_EDGES, &many)
             }
         }
@@ -235,9 +239,22 @@ impl View {
     }
 }
 
-/// Rays of a macropixel, `across` of them in a row and in a column, and what they meet.
+/// The middle of what a macropixel sees, and how far its corners are from it, rad.
+fn cone(camera: &PinholeCamera, (row, col): (u32, u32)) -> (DVec3, f64) {
+    let at = |du: f64, dv: f64| {
+        let place = (f64::from(col) + du, f64::from(row) + dv);
+        camera.at_unit_depth(place).normalize()
+    };
+    let middle = at(0.5, 0.5);
+    let corners = [at(0.0, 0.0), at(0.0, 1.0), at(1.0, 0.0), at(1.0, 1.0)];
+    let away_rad = corners.map(|corner| middle.angle_between(corner));
+    (middle, away_rad.into_iter().fold(0.0, f64::max))
+}
+
+/// Rays of a macropixel, `across` of them in a row and in a column, and what they meet, which is none but the `candidates`.
 fn cast(
     scene: &Scene,
+    candidates: &Candidates,
     camera: &PinholeCamera,
     (row, col): (u32, u32),
     across: u32,
@@ -252,7 +269,8 @@ fn cast(
             let (x, y) = (n % across, n / across);
             let (u, v) = (place(col, x, y), place(row, y, x));
             let direction = camera.at_unit_depth((u, v));
-            (direction, scene.returns(&Ray::new(DVec3::ZERO, direction)))
+            let ray = Ray::new(DVec3::ZERO, direction);
+            (direction, scene.returns_of(&ray, candidates))
         })
         .collect()
 }

@@ -8,7 +8,7 @@ use guided_dtof::engine::{
     Cohort, CohortOptions, Cycle, EngineError, Expose, Gate, GateSimulation, LitPixel, PulsedPixel,
     Replay, Window, full_stream, stream_config,
 };
-use guided_dtof::photon::{PhotonStream, PixelLight, SpadEvent, apply_dead_time};
+use guided_dtof::photon::{Echo, PhotonStream, PixelLight, Profile, SpadEvent, apply_dead_time};
 use guided_dtof::units::Time;
 use proptest::prelude::*;
 
@@ -137,6 +137,64 @@ fn what_a_window_cannot_see_is_not_drawn_and_counts_are_the_same() {
         assert!(seen.work.photons_drawn < all.work.photons_drawn);
         let counted: u32 = gate.histograms.counts().iter().map(|&n| u32::from(n)).sum();
         assert!(counted > 40, "{counted} are few to compare");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    /// Photons are drawn together where windows see them, and mostly counted without their history; the reference draws all of them
+    /// and runs every pulse.
+    #[test]
+    fn windows_count_light_of_many_parts_as_if_all_of_it_were_drawn(
+        photons in prop_oneof![0.0f64..0.3, 0.3f64..6.0],
+        background_hz in prop_oneof![1e5f64..8e6, 8e6f64..8e7],
+        start in 0u16..127,
+        number in 0u32..2048,
+        cycles in prop_oneof![1u32..40, 100u32..3000],
+        change in prop::option::of(0.1f64..0.9),
+        fog_hz in prop::option::of(1e6f64..4e7),
+        later_ns in prop::option::of(-4f64..12.0),
+        paralysable: bool,
+        dead_time_ns in prop_oneof![Just(8.0f64), 0.1f64..30.0],
+        seed: u64,
+    ) {
+        let sensor = SensorConfig {
+            paralysable,
+            dead_time_ns,
+            ..(*hslidar_delay_line()).clone()
+        };
+        let exposure = Exposure::new(&sensor, 140, cycles);
+        let law = WindowLaw::new(&sensor, &exposure).of_macropixel(number);
+        let LawWindow::Open(window) = law.window(start) else {
+            return Ok(());
+        };
+        let arrival = law.time_of(&window, 3.0);
+        let mut light = PixelLight::echo(photons, arrival).with_background(background_hz);
+        if let Some(later_ns) = later_ns {
+            let later = arrival + Time::from_fs((later_ns * 1e6) as i64);
+            light = light.with_echo(Echo::new(0.5 * photons, later));
+        }
+        if let Some(fog_hz) = fog_hz {
+            let edges = [Time::ZERO, arrival, arrival + Time::from_ns(9)];
+            light = light.with_profile(Profile::new(&edges, &[fog_hz, 0.4 * fog_hz]).unwrap());
+        }
+        if let Some(change) = change {
+            let first = (change * f64::from(cycles)) as u32;
+            let moved = PixelLight::echo(photons, arrival + Time::from_ns(3));
+            if first > 0 {
+                let segments = [(0, light), (first, moved.with_background(0.7 * background_hz))];
+                light = PixelLight::timeline(segments).unwrap();
+            }
+        }
+        let stream = stream_config(&sensor, &exposure, seed, Time::from_ps(1_900));
+        let stream = PhotonStream::new(&stream);
+        let pixels = [LitPixel { number, start, light: Some(light) }];
+        let engine = Window::new(&sensor, &exposure);
+        let all = full_stream(&engine, &stream, &pixels).unwrap();
+        let seen = engine.expose(&stream, &pixels).unwrap();
+        prop_assert_eq!(all.histograms, seen.histograms);
+        prop_assert!(seen.work.photons_drawn <= all.work.photons_drawn + 4096);
     }
 }
 

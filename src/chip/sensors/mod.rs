@@ -33,7 +33,7 @@ struct Parts {
     config: SensorConfig,
     silicon: Silicon,
     timing: OnceLock<ChipTiming>,
-    delay_lines: OnceLock<DelayLines>,
+    delay_lines: OnceLock<Arc<DelayLines>>,
 }
 
 /// A chip's name, and what makes its [`Sensor`].
@@ -95,8 +95,8 @@ impl Sensor {
             ..
         } = &*self.0;
         (config.tdc == Tdc::DelayLine).then(|| {
-            let lines = delay_lines.get_or_init(|| DelayLines::new(config));
-            lines.taps(silicon, number)
+            let lines = delay_lines.get_or_init(|| DelayLines::of(config, silicon));
+            lines.taps(number)
         })
     }
 

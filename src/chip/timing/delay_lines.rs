@@ -1,11 +1,14 @@
 //! Delay lines of every macropixel, measured: when an edge of PHOTONS comes to each tap.
 //!
-//! The METDC alone is enough for that, with the delays its cells have at their place in the array.
+//! The METDC alone is enough for that, with the delays its cells have at their place in the array. Lines are kept from one
+//! [`Sensor`](crate::chip::Sensor) of a description to the next: measuring those of an array of 64×32 takes some tenths of a second, and a drive
+//! makes sensors for every frame.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::silicon::Silicon;
 use crate::chip::config::SensorConfig;
+use crate::chip::metdc_delay_line::Elements;
 use crate::chip::{Probe, Probes, array, metdc_delay_line};
 use crate::netlist::{Edge, NetId, Netlist, StaticTiming};
 use crate::units::Time;
@@ -18,30 +21,68 @@ pub(crate) type Taps = Arc<[Vec<Time>]>;
 #[derive(Debug)]
 pub(crate) struct DelayLines {
     netlist: Netlist,
+    silicon: Silicon,
     cols: usize,
     of_macropixel: Box<[OnceLock<Taps>]>,
 }
 
+/// What delay lines depend on.
+#[derive(Debug, Clone, PartialEq)]
+struct Lines {
+    bins: usize,
+    elements: Elements,
+    rows: usize,
+    cols: usize,
+    silicon: Silicon,
+}
+
+/// Arrays whose lines are kept: the chip as it is, without differences, and some others.
+const KEPT: usize = 8;
+
 impl DelayLines {
-    /// Those of a sensor whose TDC has some.
-    pub(crate) fn new(config: &SensorConfig) -> Self {
+    /// Those of a sensor whose TDC has some, perhaps measured before.
+    pub(crate) fn of(config: &SensorConfig, silicon: &Silicon) -> Arc<Self> {
+        static MEASURED: Mutex<Vec<(Lines, Arc<DelayLines>)>> = Mutex::new(Vec::new());
+        let lines = Lines {
+            bins: config.bins,
+            elements: config.delay_elements(),
+            rows: config.rows,
+            cols: config.cols,
+            silicon: *silicon,
+        };
+        let mut measured = MEASURED.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, known)) = measured.iter().find(|(other, _)| *other == lines) {
+            return Arc::clone(known);
+        }
+        let new = Arc::new(Self::new(config, *silicon));
+        if measured.len() == KEPT {
+            measured.remove(0);
+        }
+        measured.push((lines, Arc::clone(&new)));
+        new
+    }
+
+    fn new(config: &SensorConfig, silicon: Silicon) -> Self {
         let metdc = metdc_delay_line::circuit(config.bins, &config.delay_elements());
         DelayLines {
             netlist: Netlist::elaborate(&metdc),
+            silicon,
             cols: config.cols,
             of_macropixel: (0..config.pixels()).map(|_| OnceLock::new()).collect(),
         }
     }
 
     /// Those of a macropixel, by its number in the array, row-major.
-    pub(crate) fn taps(&self, silicon: &Silicon, number: usize) -> Taps {
-        let measured = || self.measure(silicon, (number / self.cols, number % self.cols));
+    pub(crate) fn taps(&self, number: usize) -> Taps {
+        let measured = || self.measure((number / self.cols, number % self.cols));
         let known = self.of_macropixel.get(number);
         Arc::clone(known.map_or(&measured(), |known| known.get_or_init(measured)))
     }
 
-    fn measure(&self, silicon: &Silicon, (row, col): (usize, usize)) -> Taps {
-        let netlist = &self.netlist;
+    fn measure(&self, (row, col): (usize, usize)) -> Taps {
+        let Self {
+            netlist, silicon, ..
+        } = self;
         let path = |cell| {
             let macropixel = array::pixel_name(row, col);
             format!("{}.{macropixel}.{}", array::NAME, netlist.cell_path(cell))

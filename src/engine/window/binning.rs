@@ -181,12 +181,6 @@ impl Binning {
         };
     }
 
-    /// The code of one photon at `time_fs`.
-    #[inline]
-    pub(super) fn encode_one(&self, time_fs: i64) -> Code {
-        self.code(time_fs, 0).0
-    }
-
     #[inline]
     fn code(&self, time_fs: i64, place: u32) -> (Code, u32) {
         let periods = time_fs as f64 * self.periods_per_fs;

@@ -11,7 +11,8 @@
 //! times of photons are worked out only there.
 //!
 //! Cycles with photons that breed are settled as a whole; so are all cycles of a group where photons are many, or where
-//! echoes of other cycles are seen, and all of light with several layers ([`whole`]).
+//! echoes of other cycles are seen ([`whole`]). Light with several layers, and bins that are not CLK periods, are sorted
+//! ([`sorted`]).
 
 use super::binning::{Binning, Scratch, Wanted};
 use super::codes::{Code, Codes, ROWS, SPADS};
@@ -19,7 +20,6 @@ use super::echo_rows::EchoRows;
 use super::sight::{Sight, Spans};
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Spacing, Tables};
 use super::{Window, Work, taken};
-use crate::chip::BinEdges;
 use crate::photon::{Draw, Group, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SpadEvent};
 use crate::units::Time;
 use by_window::ByWindow;
@@ -28,6 +28,7 @@ use tile::Tile;
 mod bright;
 mod by_window;
 mod settling;
+mod sorted;
 mod tile;
 mod whole;
 
@@ -217,7 +218,10 @@ impl<'a> Counting<'a> {
             return (pixel.hits, pixel.work);
         }
         if !light.is_alone() || !has_clk_bins {
-            self.count_layers(&mut pixel);
+            match self.can_sort(&pixel) {
+                true => self.count_sorted(&mut pixel),
+                false => self.count_layers(&mut pixel),
+            }
             return (pixel.hits, pixel.work);
         }
         let sees_own_echo_only = pixel.sees_own_echo_only();
@@ -334,14 +338,10 @@ impl<'a> Counting<'a> {
     where
         'a: 'w,
     {
-        let law = &self.engine.law;
-        let edges = || law.edges(&sight.window, i64::from(laser_cycle));
         Placed {
             engine: self.engine,
-            binning: self.binning,
             sight,
             laser_cycle,
-            edges: (!law.has_clk_bins()).then(edges),
         }
     }
 
@@ -391,24 +391,15 @@ fn in_draw(light: &PixelStream<'_>, draw: &Draw, at: usize) -> i64 {
 /// The window of one laser cycle.
 struct Placed<'w> {
     engine: &'w Window,
-    binning: Binning,
     sight: &'w Sight,
     laser_cycle: u32,
-    /// Of its bins, where they are not CLK periods.
-    edges: Option<BinEdges>,
 }
 
 impl Placed<'_> {
     /// Bin + 1 of a time relative to the start of the laser cycle, if it is within the window.
     fn row_of(&self, time: Time) -> Option<usize> {
-        if let Some(edges) = &self.edges {
-            let pulse = self.engine.exposure.stop(i64::from(self.laser_cycle)) + time;
-            return edges.bin_of(pulse).map(|bin| bin + 1);
-        }
-        let code = self.binning.encode_one(time.as_fs() - self.sight.first_fs);
-        let bins = self.engine.sensor.bins;
-        if !code.is_doubtful() {
-            return Some(code.row()).filter(|row| (1..=bins).contains(row));
+        if let Some(row) = self.sight.rows.row_of(time.as_fs()) {
+            return Some(row).filter(|&row| row > 0);
         }
         let (law, cycle) = (&self.engine.law, i64::from(self.laser_cycle));
         let pulse = self.engine.exposure.stop(cycle) + time;

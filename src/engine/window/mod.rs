@@ -31,6 +31,9 @@ use crate::units::Time;
 use counting::Counting;
 use sight::Sight;
 
+/// A window that opens, and what decides its histogram where that is a part of every laser cycle.
+type Opened = (OpenWindow, Option<Sight>);
+
 /// Counts through the window law.
 #[derive(Clone)]
 pub struct Window {
@@ -257,6 +260,8 @@ impl Expose for Window {
         }
         let mut counting = Counting::new(self, stream);
         let mut exposed = Exposed::new(self.sensor.bins);
+        // Many exposures of one macropixel, as a sweep takes them, are in one window.
+        let mut last: Option<(u16, Option<Opened>)> = None;
         let clk_periods =
             u64::from(self.exposure.stop_periods) * u64::from(self.exposure.laser_cycles);
         for pixel in pixels {
@@ -265,19 +270,26 @@ impl Expose for Window {
                 exposed.work.skipped_dark += 1;
                 continue;
             };
-            let Some(window) = self.window(pixel.start)? else {
+            let seen = match last.take() {
+                Some((start, seen)) if start == pixel.start => seen,
+                _ => self
+                    .window(pixel.start)?
+                    .map(|window| (window, Sight::new(&self.law, &window, stream))),
+            };
+            let (_, seen) = last.insert((pixel.start, seen));
+            let Some((window, sight)) = seen else {
                 exposed.histograms.push(&vec![0; self.sensor.bins]);
                 exposed.work.skipped_closed += 1;
                 continue;
             };
-            let sight = Sight::new(&self.law, &window, stream);
+            let sight = sight.as_ref();
             let sight = sight.filter(|_| !sight::is_blinding(stream, light));
             let (hits, work) = match sight {
                 Some(sight) => {
                     let parts = stream.parts(pixel.number, light);
-                    counting.expose(&sight, &parts)
+                    counting.expose(sight, &parts)
                 }
-                None => self.count_stream(stream, pixel, light, &window),
+                None => self.count_stream(stream, pixel, light, window),
             };
             exposed.histograms.push(&self.counts(&hits));
             exposed.work += work;

@@ -11,6 +11,8 @@
 //! Windows of small start values begin in the cycle before, so that slots of two cycles are drawn. Photons that breed are
 //! drawn from as much earlier on as afterpulses may take.
 
+use smallvec::SmallVec;
+
 use super::past::Past;
 use crate::chip::window_law::{OpenWindow, WindowLaw};
 use crate::chip::{Tdc, photon_line};
@@ -87,12 +89,43 @@ impl Spans {
     }
 }
 
+/// Where the bins of a window lie in every laser cycle, to within [`ROUNDING_FS`].
+#[derive(Debug, Clone)]
+pub(super) struct Rows {
+    /// Edges of the bins after the start of the window's cycle, rising, fs; one more than there are bins.
+    edges_fs: SmallVec<[i64; 17]>,
+}
+
+impl Rows {
+    fn new(law: &WindowLaw, window: &OpenWindow) -> Self {
+        let edges = law.edges(window, 0);
+        Rows {
+            edges_fs: edges.edges().iter().map(|edge| edge.as_fs()).collect(),
+        }
+    }
+
+    /// Bin + 1 of a time, 0 outside the window; `None` where it may be on either side of an edge.
+    #[inline]
+    pub(super) fn row_of(&self, time_fs: i64) -> Option<usize> {
+        let (early_fs, late_fs) = (time_fs - ROUNDING_FS, time_fs + ROUNDING_FS);
+        let (mut passed, mut perhaps) = (0, 0);
+        for &edge_fs in &self.edges_fs {
+            passed += usize::from(edge_fs <= early_fs);
+            perhaps += usize::from(edge_fs <= late_fs);
+        }
+        let is_inside = passed < self.edges_fs.len();
+        (passed == perhaps).then_some(if is_inside { passed } else { 0 })
+    }
+}
+
 /// The part of every laser cycle that decides a histogram. Times are in fs after the start of the cycle, within
 /// [`ROUNDING_FS`].
 #[derive(Debug, Clone)]
 pub(super) struct Sight {
     /// The window.
     pub window: OpenWindow,
+    /// Its bins.
+    pub rows: Rows,
     /// Where bin 0 begins, or what decides of it.
     pub first_fs: i64,
     /// Where the last bin is over for certain.
@@ -128,6 +161,7 @@ impl Sight {
         let breeding_from_fs = plain.from_fs - spads.reach().as_fs() - 2 * ROUNDING_FS;
         Some(Sight {
             window: *window,
+            rows: Rows::new(law, window),
             first_fs,
             until_fs,
             breeding: Spans::new(stream, breeding_from_fs, until_fs)?,

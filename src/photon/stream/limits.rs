@@ -54,6 +54,16 @@ impl Limits {
         drawn.end <= first || drawn.start.saturating_sub(first) >= group.cycles()
     }
 
+    /// Whether all photons of a group's laser cycles within the exposure are kept: slots of its first one may begin before it.
+    pub(super) fn keep_all_of(&self, group: Group, stream: &PhotonStream) -> bool {
+        let Range { start, end } = self.cycles;
+        let first = group.first_cycle();
+        let begins_before = start == 0 || start < first;
+        let ends_after =
+            end >= first.saturating_add(group.cycles()) || end == stream.config.laser_cycles;
+        self.profile.is_none() && self.by_spad.is_none() && begins_before && ends_after
+    }
+
     /// The chance of a photon of this SPAD.
     fn chance(&self, spad: u8) -> f64 {
         match &self.by_spad {

@@ -1,6 +1,8 @@
 //! How many photons there are in a group of laser cycles.
 
-use std::cell::OnceCell;
+use std::cell::{OnceCell, RefCell};
+use std::collections::VecDeque;
+use std::sync::Arc;
 
 use super::group::{FIRST, Group};
 use crate::photon::philox::Blocks;
@@ -11,9 +13,33 @@ use crate::photon::random::Poisson;
 pub(super) struct Numbers {
     per_cycle: f64,
     /// In one cycle, one of the shortest groups, and one of the longest. Made when first wanted.
-    one: OnceCell<Poisson>,
-    short: OnceCell<Poisson>,
-    long: OnceCell<Poisson>,
+    one: OnceCell<Arc<Poisson>>,
+    short: OnceCell<Arc<Poisson>>,
+    long: OnceCell<Arc<Poisson>>,
+}
+
+/// Distributions that a thread keeps: a calibration asks for the same one of every step, a frame for hardly any twice.
+const KEPT: usize = 4;
+
+/// The distribution of this mean, perhaps made before: it takes longer to make than a group of photons to draw.
+fn poisson(mean: f64) -> Arc<Poisson> {
+    /// Bits of the mean, and its distribution; the oldest first.
+    type Made = VecDeque<(u64, Arc<Poisson>)>;
+    thread_local! {
+        static MADE: RefCell<Made> = const { RefCell::new(VecDeque::new()) };
+    }
+    MADE.with_borrow_mut(|made| {
+        let bits = mean.to_bits();
+        if let Some((_, known)) = made.iter().find(|(other, _)| *other == bits) {
+            return Arc::clone(known);
+        }
+        let new = Arc::new(Poisson::new(mean));
+        if made.len() == KEPT {
+            made.pop_front();
+        }
+        made.push_back((bits, Arc::clone(&new)));
+        new
+    })
 }
 
 impl Numbers {
@@ -28,7 +54,7 @@ impl Numbers {
 
     /// In one laser cycle.
     pub(super) fn per_cycle(&self) -> &Poisson {
-        self.one.get_or_init(|| Poisson::new(self.per_cycle))
+        self.one.get_or_init(|| poisson(self.per_cycle))
     }
 
     /// A distribution, and how many draws of it make the number in this group.
@@ -37,7 +63,7 @@ impl Numbers {
             true => (&self.long, group.longest()),
             false => (&self.short, FIRST),
         };
-        let poisson = cell.get_or_init(|| Poisson::new(self.per_cycle * f64::from(cycles)));
+        let poisson = cell.get_or_init(|| poisson(self.per_cycle * f64::from(cycles)));
         (poisson, group.cycles() / cycles)
     }
 }

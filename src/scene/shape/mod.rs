@@ -291,6 +291,36 @@ impl Shape {
 }
 
 impl Shape {
+    /// Middle and radius of a ball that all of it lies in, m; `None` where it has no end, or that has not been worked out.
+    pub(super) fn ball_around(&self) -> Option<(DVec3, f64)> {
+        Some(match self {
+            Shape::Ground { .. } | Shape::Mesh { .. } | Shape::Map { .. } => return None,
+            Shape::Plane {
+                centre_m,
+                width_m,
+                height_m,
+                ..
+            } => (*centre_m, 0.5 * width_m.hypot(*height_m)),
+            Shape::Box {
+                centre_m, size_m, ..
+            } => (*centre_m, 0.5 * size_m.length()),
+            Shape::Sphere { centre_m, radius_m } => (*centre_m, radius_m.abs()),
+            Shape::Cylinder {
+                centre_m,
+                radius_m,
+                height_m,
+                ..
+            } => (*centre_m, radius_m.hypot(0.5 * height_m)),
+            Shape::Person {
+                foot_m, height_m, ..
+            } => {
+                let (middle, size) = person::AROUND;
+                // Turned about the vertical axis, which goes through the middle.
+                (*foot_m + middle * *height_m, 0.5 * size.length() * height_m)
+            }
+        })
+    }
+
     /// Whether it is the same wherever it is moved along itself, so that only its texture tells.
     pub(super) fn is_endless(&self) -> bool {
         matches!(self, Shape::Ground { .. })

@@ -37,7 +37,7 @@ const LIMBS: [Limb; 7] = [
 ];
 
 /// What all limbs lie in: middle and size.
-const AROUND: (DVec3, DVec3) = (at(0.0, -0.5, 0.0), at(0.38, 1.0, 0.32));
+pub(super) const AROUND: (DVec3, DVec3) = (at(0.0, -0.5, 0.0), at(0.38, 1.0, 0.32));
 
 /// Where a ray in the person's own place and turn meets a person of `height_m`. The part is the limb, and in steps of 8
 /// the axis of the trunk's face.

@@ -1,5 +1,5 @@
 //! Settling all SPADs of a laser cycle together: where avalanches cause others, where photons are many, where echoes of other
-//! cycles are seen, and where light has several layers.
+//! cycles are seen, and where photons drawn with their cycle do not tell what becomes of them.
 
 use smallvec::SmallVec;
 

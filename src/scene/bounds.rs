@@ -1,0 +1,167 @@
+//! Which objects the rays of a macropixel may meet at all.
+//!
+//! ```text
+//!                 ·  ray  ╭───╮ ball around an object
+//!   lidar  ◁──────·───────┤   │         met where the angle between its middle and that of the macropixel
+//!            α    ·       ╰───╯  β      is at most α + β
+//! ```
+//!
+//! Every ray is tried on every object otherwise, 16 to 64 rays a macropixel. What a ray meets is the same: an object that is left out
+//! meets none of them. Rays that a mirror throws elsewhere are tried on all.
+
+use glam::DVec3;
+use smallvec::SmallVec;
+
+use super::settings::Scene;
+
+/// Objects that the rays of a macropixel may meet, by their index, rising.
+pub(super) type Candidates = SmallVec<[u32; 16]>;
+
+/// Room for rounding, rad.
+const ROOM_RAD: f64 = 1e-6;
+
+/// Balls around the objects of a scene, as the lidar sees them.
+#[derive(Debug)]
+pub(super) struct Bounds {
+    /// Direction of the middle and half the angle that a ball fills, rad; `None` for an object that is everywhere or about the lidar.
+    balls: Vec<Option<(DVec3, f64)>>,
+}
+
+impl Bounds {
+    /// Those of a scene.
+    pub(super) fn of(scene: &Scene) -> Self {
+        let ball = |(centre_m, radius_m): (DVec3, f64)| {
+            let away_m = centre_m.length();
+            (away_m > radius_m).then(|| (centre_m / away_m, (radius_m / away_m).asin()))
+        };
+        let objects = scene.objects.iter();
+        Bounds {
+            balls: objects
+                .map(|object| object.shape.ball_around().and_then(ball))
+                .collect(),
+        }
+    }
+
+    /// Objects that rays from the lidar may meet which are at most `half_rad` away from the direction `middle`, a unit vector.
+    pub(super) fn about(&self, middle: DVec3, half_rad: f64) -> Candidates {
+        let may_meet = |ball: &Option<(DVec3, f64)>| {
+            ball.is_none_or(|(towards, fills_rad)| {
+                let reach_rad = half_rad + fills_rad + ROOM_RAD;
+                reach_rad >= std::f64::consts::PI || middle.dot(towards) >= reach_rad.cos()
+            })
+        };
+        let balls = (0..).zip(&self.balls);
+        balls
+            .filter_map(|(index, ball)| may_meet(ball).then_some(index))
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{GroundTruth, Object, Ray, Shape};
+    use proptest::prelude::*;
+
+    fn point(within_m: f64) -> impl Strategy<Value = DVec3> {
+        let along = -within_m..within_m;
+        (along.clone(), along.clone(), along).prop_map(|(x, y, z)| DVec3::new(x, y, z))
+    }
+
+    fn shapes() -> impl Strategy<Value = Shape> {
+        let middle = || point(20.0);
+        let any_way = || point(1.0).prop_filter("a direction", |axis| axis.length() > 0.1);
+        prop_oneof![
+            Just(Shape::Ground { depth_m: 1.5 }),
+            (middle(), any_way(), 0.1f64..9.0, 0.1f64..9.0).prop_map(
+                |(centre_m, normal, width_m, height_m)| Shape::Plane {
+                    centre_m,
+                    normal,
+                    width_m,
+                    height_m
+                }
+            ),
+            (middle(), point(5.0), -180f64..180.0).prop_map(|(centre_m, size, yaw_deg)| {
+                Shape::Box {
+                    centre_m,
+                    size_m: size.abs() + 0.01,
+                    yaw_deg,
+                }
+            }),
+            (middle(), 0.1f64..4.0)
+                .prop_map(|(centre_m, radius_m)| Shape::Sphere { centre_m, radius_m }),
+            (middle(), any_way(), 0.1f64..2.0, 0.1f64..9.0).prop_map(
+                |(centre_m, axis, radius_m, height_m)| Shape::Cylinder {
+                    centre_m,
+                    axis,
+                    radius_m,
+                    height_m
+                }
+            ),
+            (middle(), 0.5f64..3.0, -180f64..180.0).prop_map(|(foot_m, height_m, yaw_deg)| {
+                Shape::Person {
+                    foot_m,
+                    height_m,
+                    yaw_deg,
+                }
+            }),
+        ]
+    }
+
+    proptest! {
+        /// Every macropixel, through panes and over mirrors.
+        #[test]
+        fn rays_return_the_same_from_the_objects_they_may_meet(
+            shapes in prop::collection::vec((shapes(), 0f64..0.9, 0f64..0.9), 1..8),
+            fov_deg in 5f64..120.0,
+        ) {
+            let mut scene = Scene::outdoor();
+            scene.lidar.fov_deg = fov_deg;
+            scene.objects = shapes
+                .into_iter()
+                .map(|(shape, transmittance, mirror)| {
+                    let mut object = Object::new("it", 0.3, shape);
+                    (object.transmittance, object.mirror) = (transmittance, mirror * (1.0 - transmittance));
+                    object
+                })
+                .collect();
+            let bounds = Bounds::of(&scene);
+            let camera = scene.lidar_camera(6, 5);
+            for (row, col) in (0..6).flat_map(|row| (0..5).map(move |col| (row, col))) {
+                let at = |du: f64, dv: f64| {
+                    camera.at_unit_depth((f64::from(col) + du, f64::from(row) + dv)).normalize()
+                };
+                let middle = at(0.5, 0.5);
+                let corners = [at(0.0, 0.0), at(0.0, 1.0), at(1.0, 0.0), at(1.0, 1.0)];
+                let half_rad = corners.map(|corner| middle.angle_between(corner));
+                let half_rad = half_rad.into_iter().fold(0.0, f64::max);
+                let candidates = bounds.about(middle, half_rad);
+                for direction in corners.into_iter().chain([middle, at(0.2, 0.9)]) {
+                    let ray = Ray::new(DVec3::ZERO, direction);
+                    prop_assert_eq!(scene.returns(&ray), scene.returns_of(&ray, &candidates));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn most_of_the_street_is_out_of_a_macropixel_s_sight() {
+        let scene = Scene::outdoor();
+        let truth = GroundTruth::render(&scene, 64, 64);
+        let camera = scene.lidar_camera(64, 64);
+        let bounds = Bounds::of(&scene);
+        let mut tried = 0;
+        for pixel in 0..64 * 64u32 {
+            let (row, col) = (f64::from(pixel / 64), f64::from(pixel % 64));
+            let middle = camera.at_unit_depth((col + 0.5, row + 0.5)).normalize();
+            let corner = camera.at_unit_depth((col, row)).normalize();
+            let candidates = bounds.about(middle, 1.01 * middle.angle_between(corner));
+            let seen = truth.surfaces[pixel as usize].iter();
+            for surface in seen {
+                assert!(candidates.contains(&(surface.object as u32)));
+            }
+            tried += candidates.len();
+        }
+        assert!(2 * tried < 64 * 64 * scene.objects.len(), "{tried}");
+    }
+}
