@@ -73,13 +73,7 @@ impl Default for FrameRequest {
 }
 
 const fn key(name: &'static str, range: Range, what: &'static str) -> Key {
-    Key {
-        name,
-        what,
-        unit: "",
-        range,
-        source: "chosen",
-    }
+    Key::new(name, "", range, what, "chosen")
 }
 
 /// What can be asked of a frame, for files that ask for one.
@@ -109,14 +103,13 @@ pub const FRAME_KEYS: &[Key] = &[
         Range::Within(1.0, 64.0),
         "Steps to a CLK period of the cohort engine; as fine as its error needs, if left out",
     ),
-    Key {
-        unit: "m",
-        ..key(
-            "tolerance_m",
-            Range::Within(0.0, f64::MAX),
-            "Depth error that a cheaper engine may add on average; one engine takes all macropixels, if left out",
-        )
-    },
+    Key::new(
+        "tolerance_m",
+        "m",
+        Range::Within(0.0, f64::MAX),
+        "Depth error that a cheaper engine may add on average; one engine takes all macropixels, if left out",
+        "chosen",
+    ),
     key(
         "skip",
         Range::Switch,

@@ -15,22 +15,6 @@ use crate::settings::{Key, Range, Section};
 /// Beyond a million metres the squares in the geometry lose the small lengths.
 const FAR_M: f64 = 1e6;
 
-const fn key(
-    name: &'static str,
-    unit: &'static str,
-    range: Range,
-    what: &'static str,
-    source: &'static str,
-) -> Key {
-    Key {
-        name,
-        what,
-        unit,
-        range,
-        source,
-    }
-}
-
 const CHOSEN: &str = "chosen for the street";
 const TABLE_12: &str = "thesis Table 12";
 const LENGTH: Range = Range::Above(0.0, FAR_M);

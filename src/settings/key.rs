@@ -78,6 +78,23 @@ impl std::fmt::Display for Range {
 }
 
 impl Key {
+    /// A key; see its fields.
+    pub const fn new(
+        name: &'static str,
+        unit: &'static str,
+        range: Range,
+        what: &'static str,
+        source: &'static str,
+    ) -> Self {
+        Key {
+            name,
+            what,
+            unit,
+            range,
+            source,
+        }
+    }
+
     /// The same value as a plain number (or list of numbers) in the key's unit, where it is a number with a unit as text.
     ///
     /// # Errors

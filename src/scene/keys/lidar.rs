@@ -1,52 +1,52 @@
 //! `[lidar]`: laser, lens and SPADs.
 
-use super::{CHOSEN, SHARE, key};
+use super::{CHOSEN, SHARE};
 use crate::settings::{Key, Range};
 
 pub(in crate::scene) const LIDAR: &[Key] = &[
-    key(
+    Key::new(
         "fov_deg",
         "deg",
         Range::Within(0.1, 150.0),
         "Horizontal field of view; the vertical one follows from the sensor's rows and the shape of its macropixels",
         "chosen: 64 columns of 0.25 degrees",
     ),
-    key(
+    Key::new(
         "macropixel_aspect",
         "",
         Range::Within(0.01, 100.0),
         "Height of a macropixel over its width; HSLIDAR's are 54 um over 114 um",
         "chosen: square",
     ),
-    key(
+    Key::new(
         "wavelength_nm",
         "nm",
         Range::Within(100.0, 1e4),
         "Laser wavelength",
         "thesis 3.2, a dip of the solar spectrum",
     ),
-    key(
+    Key::new(
         "pulse_energy_uj",
         "uJ",
         Range::Limited(0.0, 1e6, "lasers of flash lidars stay below 1 J a pulse"),
         "Energy of one laser pulse over the whole field of view",
         CHOSEN,
     ),
-    key(
+    Key::new(
         "pulse_fwhm_ns",
         "ns",
         Range::Within(0.0, 1e6),
         "Full width at half maximum of the Gaussian pulse, jitter included; with a measured pulse that of what jitter adds",
         "thesis 6.4.2",
     ),
-    key(
+    Key::new(
         "pulse",
         "",
         Range::WordOrCurve(&["gaussian"], "time in ns and power"),
         "Laser pulse",
         "thesis 6.4.2",
     ),
-    key(
+    Key::new(
         "beam",
         "",
         Range::WordOrCurve(
@@ -56,21 +56,21 @@ pub(in crate::scene) const LIDAR: &[Key] = &[
         "Where the laser's energy goes: uniform is as spot says",
         "thesis Eq. 7",
     ),
-    key(
+    Key::new(
         "beam_fwhm_deg",
         "deg",
         Range::Above(0.0, 180.0),
         "Full width at half maximum of a Gaussian beam",
         "chosen: the field of view",
     ),
-    key(
+    Key::new(
         "pde",
         "",
         SHARE,
         "Photon detection efficiency of the SPADs at the laser's wavelength",
         "thesis Table 6",
     ),
-    key(
+    Key::new(
         "pde_curve",
         "",
         Range::WordOrCurve(
@@ -80,35 +80,35 @@ pub(in crate::scene) const LIDAR: &[Key] = &[
         "Photon detection efficiency over wavelength, for sunlight",
         "thesis Eq. 14",
     ),
-    key(
+    Key::new(
         "pde_spread",
         "",
         Range::Within(0.0, 1.0),
         "Standard deviation of a SPAD's detection efficiency, relative to the mean; window takes some 12 times as long with it",
         "none in the thesis",
     ),
-    key(
+    Key::new(
         "lens_diameter_mm",
         "mm",
         Range::Above(0.0, f64::MAX),
         "Diameter of the lens aperture",
         CHOSEN,
     ),
-    key(
+    Key::new(
         "lens_f_number",
         "",
         Range::Above(0.0, f64::MAX),
         "Focal length over diameter of the lens",
         CHOSEN,
     ),
-    key(
+    Key::new(
         "transmittance",
         "",
         SHARE,
         "Share of the light that lens and filter let through",
         "thesis Eq. 15, where it is left out",
     ),
-    key(
+    Key::new(
         "vignetting",
         "",
         Range::WordOrCurve(
@@ -118,7 +118,7 @@ pub(in crate::scene) const LIDAR: &[Key] = &[
         "What an evenly bright scene gives a macropixel off the axis",
         "thesis Eq. 12, which has none",
     ),
-    key(
+    Key::new(
         "filter",
         "",
         Range::WordOrCurve(
@@ -128,21 +128,21 @@ pub(in crate::scene) const LIDAR: &[Key] = &[
         "Band-pass filter, through which ASTM G173 sunlight comes; irradiance is one that lets solar_irradiance_w_m2 through",
         "thesis 2.3.3",
     ),
-    key(
+    Key::new(
         "filter_centre_nm",
         "nm",
         Range::Within(100.0, 1e4),
         "Centre of a filter that is a shape",
         "the laser",
     ),
-    key(
+    Key::new(
         "filter_fwhm_nm",
         "nm",
         Range::Above(0.0, 1e4),
         "Full width at half maximum of a filter that is a shape",
         "chosen",
     ),
-    key(
+    Key::new(
         "solar_irradiance_w_m2",
         "W/m2",
         Range::Limited(
@@ -153,28 +153,28 @@ pub(in crate::scene) const LIDAR: &[Key] = &[
         "Solar irradiance within the filter's band at 100 klux, where filter is irradiance",
         "ASTM G173 global tilt, 935 to 945 nm",
     ),
-    key(
+    Key::new(
         "dark_count_hz",
         "Hz",
         Range::Limited(0.0, 1.6e8, "16 hot SPADs have 10 MHz each"),
         "Dark counts of one macropixel, all its SPADs together",
         "chosen: 1.25 kHz for each of 16 SPADs",
     ),
-    key(
+    Key::new(
         "dark_count_spread",
         "",
         Range::Within(0.0, 5.0),
         "Standard deviation of the natural logarithm of a SPAD's dark count rate, whose mean stays",
         "none in the thesis",
     ),
-    key(
+    Key::new(
         "hot_spad_share",
         "",
         SHARE,
         "Share of SPADs that are hot",
         "none in the thesis",
     ),
-    key(
+    Key::new(
         "hot_spad_hz",
         "Hz",
         Range::Limited(
@@ -185,21 +185,21 @@ pub(in crate::scene) const LIDAR: &[Key] = &[
         "Dark counts of a hot SPAD",
         "chosen",
     ),
-    key(
+    Key::new(
         "spad_seed",
         "",
         Range::Within(0.0, 4_294_967_295.0),
         "Which SPADs are hot, dark or insensitive",
         "chosen",
     ),
-    key(
+    Key::new(
         "spot",
         "",
         Range::OneOf(&["rectangle", "round"]),
         "What the laser lights up: the field of view, or the circle around it",
         "thesis Eq. 7",
     ),
-    key(
+    Key::new(
         "convention",
         "",
         Range::OneOf(&["thesis", "lambertian"]),

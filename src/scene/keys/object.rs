@@ -1,17 +1,17 @@
 //! `[[object]]`: what there is to see.
 
-use super::{LENGTH, PLACES, POSITION, SHARE, SPEED, key};
+use super::{LENGTH, PLACES, POSITION, SHARE, SPEED};
 use crate::settings::{Key, Range};
 
 pub(in crate::scene) const OBJECT: &[Key] = &[
-    key(
+    Key::new(
         "name",
         "",
         Range::Text,
         "Name in complaints and for --set",
         "-",
     ),
-    key(
+    Key::new(
         "kind",
         "",
         Range::OneOf(&[
@@ -20,238 +20,238 @@ pub(in crate::scene) const OBJECT: &[Key] = &[
         "Shape",
         "-",
     ),
-    key(
+    Key::new(
         "reflectivity",
         "",
         SHARE,
         "Lambertian reflectivity at the laser's wavelength",
         "-",
     ),
-    key(
+    Key::new(
         "grey",
         "",
         SHARE,
         "Lambertian reflectivity that the cameras see; as reflectivity if left out",
         "-",
     ),
-    key(
+    Key::new(
         "retro",
         "",
         Range::Within(1.0, 1e4),
         "How many times more of the laser's light returns than from a Lambertian surface; 1 if left out, traffic signs 300 to 2000",
         "chosen: pi * 100 to 700 cd/lx/m2 of signs' sheeting, over a reflectivity of 1",
     ),
-    key(
+    Key::new(
         "transmittance",
         "",
         SHARE,
         "Share of light that passes straight through: panes; 0 if left out",
         "-",
     ),
-    key(
+    Key::new(
         "mirror",
         "",
         SHARE,
         "Share of light that is thrown back as by a mirror; 0 if left out, clean panes about 0.08",
         "-",
     ),
-    key(
+    Key::new(
         "texture",
         "",
         Range::OneOf(&["checker", "stripes", "noise", "image"]),
         "Pattern of this and a second material; plain if left out",
         "-",
     ),
-    key(
+    Key::new(
         "texture_file",
         "",
         Range::Text,
         "Of an image: PNG, .npy, PFM or EXR, relative to the scene file; white is this material, black the second",
         "-",
     ),
-    key(
+    Key::new(
         "texture_size_m",
         "m",
         LENGTH,
         "Edge of a checker, width of a stripe or image, size of the largest clouds; 0.5 m if left out",
         "-",
     ),
-    key(
+    Key::new(
         "texture_seed",
         "",
         Range::Within(0.0, 4_294_967_295.0),
         "Of noise: equal seeds give equal clouds; 0 if left out",
         "-",
     ),
-    key(
+    Key::new(
         "texture_shift_m",
         "m",
         POSITION,
         "Shift of the pattern along the surface, [right, down]; none if left out",
         "-",
     ),
-    key(
+    Key::new(
         "texture_turn_deg",
         "deg",
         Range::Within(-3600.0, 3600.0),
         "Turn of the pattern on the surface; none if left out",
         "-",
     ),
-    key(
+    Key::new(
         "second_reflectivity",
         "",
         SHARE,
         "Of a texture: the second material's reflectivity at the laser's wavelength; 0 if left out",
         "-",
     ),
-    key(
+    Key::new(
         "second_grey",
         "",
         SHARE,
         "Of a texture: what the cameras see of the second material; as second_reflectivity if left out",
         "-",
     ),
-    key(
+    Key::new(
         "velocity_m_s",
         "m/s",
         SPEED,
         "Velocity in the world, [right, down, forward]; at rest if left out",
         "-",
     ),
-    key(
+    Key::new(
         "waypoints",
         "",
         PLACES,
         "Where it is at what time, straight between: a list of [s, m right, m down, m forward] from its place",
         "-",
     ),
-    key(
+    Key::new(
         "depth_m",
         "m",
         LENGTH,
         "Of a ground: how far it lies below the lidar",
         "-",
     ),
-    key(
+    Key::new(
         "centre_m",
         "m",
         POSITION,
         "Of a plane, box, sphere or cylinder: its middle, of a mesh: its file's origin, of a map: its camera, [right, down, forward] of the lidar",
         "-",
     ),
-    key(
+    Key::new(
         "normal",
         "",
         POSITION,
         "Of a plane: any vector at right angles to it; towards the lidar if left out",
         "-",
     ),
-    key(
+    Key::new(
         "width_m",
         "m",
         LENGTH,
         "Of a plane: extent along its horizontal edge",
         "-",
     ),
-    key(
+    Key::new(
         "height_m",
         "m",
         LENGTH,
         "Of a plane: extent along its other edge; of a cylinder: its length; of a person: 1.72 m if left out",
         "-",
     ),
-    key(
+    Key::new(
         "size_m",
         "m",
         LENGTH,
         "Of a box: extents [right, down, forward] before it is turned",
         "-",
     ),
-    key(
+    Key::new(
         "yaw_deg",
         "deg",
         Range::Within(-360.0, 360.0),
         "Of a box, person, mesh or map: its turn about the vertical axis, the front to the right; none if left out, and a person walks forward",
         "-",
     ),
-    key(
+    Key::new(
         "radius_m",
         "m",
         LENGTH,
         "Of a sphere or cylinder: its radius",
         "-",
     ),
-    key(
+    Key::new(
         "axis",
         "",
         POSITION,
         "Of a cylinder: any vector along it; upright if left out, as poles are",
         "-",
     ),
-    key(
+    Key::new(
         "foot_m",
         "m",
         POSITION,
         "Of a person: where it stands, [right, down, forward] of the lidar",
         "-",
     ),
-    key(
+    Key::new(
         "file",
         "",
         Range::Text,
         "Of a mesh: an OBJ file (x right, y up, z backwards), relative to the scene file",
         "-",
     ),
-    key(
+    Key::new(
         "scale_m",
         "m",
         LENGTH,
         "Of a mesh: the file's unit of length; 1 m if left out",
         "-",
     ),
-    key(
+    Key::new(
         "depth_file",
         "",
         Range::Text,
         "Of a map: depths that a camera has seen (PNG, .npy, PFM or EXR), 0 where nothing is, relative to the scene file",
         "-",
     ),
-    key(
+    Key::new(
         "reflectivity_file",
         "",
         Range::Text,
         "Of a map: reflectivities at the laser's wavelength, white is 1; the object's reflectivity if left out",
         "-",
     ),
-    key(
+    Key::new(
         "grey_file",
         "",
         Range::Text,
         "Of a map: what the cameras see, white is 1; the object's grey if left out",
         "-",
     ),
-    key(
+    Key::new(
         "depth_unit_m",
         "m",
         LENGTH,
         "Of a map: unit of its depths; if left out a millimetre in a PNG, else a metre",
         "-",
     ),
-    key(
+    Key::new(
         "depth_along",
         "",
         Range::OneOf(&["axis", "range"]),
         "Of a map: whether depths are along the camera's axis or distances from it; axis if left out",
         "-",
     ),
-    key(
+    Key::new(
         "focal_px",
         "px",
         Range::Above(0.0, 1e6),
         "Of a map: focal length of its camera",
         "-",
     ),
-    key(
+    Key::new(
         "principal_px",
         "px",
         Range::Within(-1e6, 1e6),

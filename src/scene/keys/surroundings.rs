@@ -1,10 +1,10 @@
 //! `[light]`, `[medium]` and `[rig]`: sunlight, what is in the air, and how lidar and cameras move.
 
-use super::{CHOSEN, LENGTH, PLACES, SHARE, SPEED, key};
+use super::{CHOSEN, LENGTH, PLACES, SHARE, SPEED};
 use crate::settings::{Key, Range};
 
 pub(in crate::scene) const LIGHT: &[Key] = &[
-    key(
+    Key::new(
         "illuminance_klux",
         "klux",
         Range::Limited(
@@ -15,28 +15,28 @@ pub(in crate::scene) const LIGHT: &[Key] = &[
         "Illuminance of the scene by the sun",
         CHOSEN,
     ),
-    key(
+    Key::new(
         "sun_elevation_deg",
         "deg",
         Range::Within(-90.0, 90.0),
         "Height of the sun above the horizon, for shadows and slopes; light from everywhere if left out",
         "thesis Eq. 16, where surfaces face the sun",
     ),
-    key(
+    Key::new(
         "sun_azimuth_deg",
         "deg",
         Range::Within(-360.0, 360.0),
         "Where the sun stands, to the right of forward",
         "chosen",
     ),
-    key(
+    Key::new(
         "sky_share",
         "",
         SHARE,
         "Share of the illuminance that comes from the sky, where the sun has a place",
         "chosen: a clear day; 1 is an overcast one",
     ),
-    key(
+    Key::new(
         "sky_reflectivity",
         "",
         Range::Within(0.0, 10.0),
@@ -46,28 +46,28 @@ pub(in crate::scene) const LIGHT: &[Key] = &[
 ];
 
 pub(in crate::scene) const MEDIUM: &[Key] = &[
-    key(
+    Key::new(
         "extinction_1_m",
         "1/m",
         Range::Within(0.0, 10.0),
         "Share of light that fog takes away per metre: 3.912 over the visibility",
         "clear air; Koschmieder's law",
     ),
-    key(
+    Key::new(
         "backscatter_1_m_sr",
         "1/m/sr",
         Range::Within(0.0, 10.0),
         "Share of light that fog sends straight back; extinction over 18.8 sr if left out",
         "O'Connor, Illingworth and Hogan 2004, droplets at 905 nm",
     ),
-    key(
+    Key::new(
         "rain_mm_h",
         "mm/h",
         Range::Within(0.0, 500.0),
         "Rain, which weakens light and sends none back",
         "ITU-R P.1814: 1.076 R^0.67 dB/km",
     ),
-    key(
+    Key::new(
         "overlap_m",
         "m",
         LENGTH,
@@ -77,21 +77,21 @@ pub(in crate::scene) const MEDIUM: &[Key] = &[
 ];
 
 pub(in crate::scene) const RIG: &[Key] = &[
-    key(
+    Key::new(
         "velocity_m_s",
         "m/s",
         SPEED,
         "Velocity of lidar and cameras in the world, [right, down, forward] of how they look at time 0",
         "at rest",
     ),
-    key(
+    Key::new(
         "yaw_rate_deg_s",
         "deg/s",
         Range::Within(-3600.0, 3600.0),
         "How fast they turn to the right",
         "at rest",
     ),
-    key(
+    Key::new(
         "waypoints",
         "",
         PLACES,

@@ -7,13 +7,7 @@ use crate::files::InputError;
 use crate::settings::{Document, Key, Range};
 
 const fn key(name: &'static str, range: Range, what: &'static str, source: &'static str) -> Key {
-    Key {
-        name,
-        what,
-        unit: "",
-        range,
-        source,
-    }
+    Key::new(name, "", range, what, source)
 }
 
 /// What can be set.
