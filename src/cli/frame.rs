@@ -470,8 +470,9 @@ fn table(
     );
     table.push("run time: all", format!("{:.2} s", times.total_s()));
     let names = ["depth.png", "histograms.npy", "frame.json", MANIFEST].map(String::from);
+    let page = args.page.then(|| "page.html".to_owned());
     let waves = frame.probes.iter().map(|&at| wave_name(args, at));
-    let names: Vec<String> = names.into_iter().chain(waves).collect();
+    let names: Vec<String> = names.into_iter().chain(page).chain(waves).collect();
     table.push(format!("in {}", args.out.display()), names.join(" "));
     table
 }
