@@ -20,6 +20,7 @@ mod light;
 mod replay;
 mod scene;
 mod sensor;
+mod sweep;
 mod theory;
 mod timing;
 mod values;
@@ -50,6 +51,8 @@ mod _gdtof {
     use super::light::expose;
     #[pymodule_export]
     use super::replay::replay;
+    #[pymodule_export]
+    use super::sweep::{sweep_outline, sweep_part, sweep_table};
     #[pymodule_export]
     use super::theory::{confidence, theory};
     #[pymodule_export]

@@ -208,6 +208,7 @@ fn plain(error: SweepError) -> anyhow::Error {
     match error {
         SweepError::Input(error) => error.into(),
         SweepError::Frame(error) => error.into(),
+        error @ SweepError::Stopped => error.into(),
     }
 }
 

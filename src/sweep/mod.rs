@@ -59,4 +59,7 @@ pub enum SweepError {
     /// The program failed at a frame.
     #[error(transparent)]
     Frame(#[from] FrameError),
+    /// Who was told of its progress wanted no more of it.
+    #[error("the sweep was stopped before its end; it goes on from there when it is started again")]
+    Stopped,
 }

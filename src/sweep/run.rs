@@ -10,6 +10,7 @@ use super::SweepError;
 use super::row::{Index, journals_in};
 use super::study::{Kind, Study};
 use super::subject::{Scratch, Subject};
+use crate::engine::Answer;
 use crate::files::{InputError, Journal, OutputFile, create_folder, parse_json, read_text};
 
 /// One of so many parts of a study: the points whose number leaves `part` when divided by `of`.
@@ -68,15 +69,16 @@ const STUDY: &str = "study.json";
 /// Takes what is missing of a study, or of its shard, in `folder`, and adds it to the journal there. `done` is told of points as they are
 /// done, those that were there included.
 ///
-/// With one thread to a point where there are more points than threads: the frames of a study need no help from each other.
+/// With one thread to a point where there are more points than threads: the frames of a study need no help from each other. `done` may stop
+/// the sweep by its [`Answer`]; points that are being taken are finished.
 ///
 /// # Errors
-/// When another process takes the same, files cannot be written, or the program fails.
-pub fn run(
+/// When another process takes the same, files cannot be written, the program fails, or it is stopped.
+pub fn run<A: Answer>(
     study: &Study,
     folder: &Path,
     shard: Shard,
-    done: impl Fn(u64) + Sync,
+    done: impl Fn(u64) -> A + Sync,
 ) -> Result<Outcome, SweepError> {
     create_folder(folder)?;
     let path = folder.join(shard.journal());
@@ -154,7 +156,7 @@ struct Work<'a> {
 
 impl Work<'_> {
     /// Takes points until there are no more.
-    fn go(&self, done: &(impl Fn(u64) + Sync)) {
+    fn go<A: Answer>(&self, done: &(impl Fn(u64) -> A + Sync)) {
         let mut scratch = Scratch::default();
         while !self.failed.load(Ordering::Relaxed) {
             let begin = self.next.fetch_add(self.batch, Ordering::Relaxed);
@@ -162,14 +164,19 @@ impl Work<'_> {
                 return;
             }
             let end = (begin + self.batch).min(self.points);
-            if let Err(error) = self.take(begin..end, &mut scratch) {
+            let taken = self.take(begin..end, &mut scratch);
+            let stops = done(end - begin).stops();
+            if let Err(error) = taken.and(if stops {
+                Err(SweepError::Stopped)
+            } else {
+                Ok(())
+            }) {
                 self.failed.store(true, Ordering::Relaxed);
                 self.error
                     .lock()
                     .expect("nobody panicked")
                     .get_or_insert(error);
             }
-            done(end - begin);
         }
     }
 

@@ -13,6 +13,7 @@ from . import errors, theory, waves
 from ._frame import Drive, DriveFrame, Frame, Maps, Reason, drive, frame
 from ._gdtof import Guide, Scene, Sensor, __version__
 from ._histograms import Exposed, Ranged, Replayed, expose, range, replay
+from ._sweep import Swept, sweep
 from ._timing import Timing, bin_edges, starts_for, timing, windows
 from .errors import Error, InputError, SimulationError
 from .waves import Waveform, read_vcd
@@ -32,6 +33,7 @@ __all__ = [
     "Scene",
     "Sensor",
     "SimulationError",
+    "Swept",
     "Timing",
     "Waveform",
     "__version__",
@@ -44,6 +46,7 @@ __all__ = [
     "read_vcd",
     "replay",
     "starts_for",
+    "sweep",
     "theory",
     "timing",
     "waves",

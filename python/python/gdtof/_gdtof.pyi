@@ -1,5 +1,6 @@
 from collections.abc import Callable, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import Any, final
 
 import numpy as np
@@ -19,6 +20,9 @@ __all__ = [
     "range_counts",
     "replay",
     "starts_for",
+    "sweep_outline",
+    "sweep_part",
+    "sweep_table",
     "theory",
     "timing",
     "windows",
@@ -153,6 +157,15 @@ def range_counts(
     correct_walk: bool,
     calibration: str | PathLike[str] | None,
 ) -> dict[str, Any]: ...
+def sweep_outline(study: str | PathLike[str]) -> tuple[int, Path, str]: ...
+def sweep_part(
+    study: str | PathLike[str],
+    folder: str | PathLike[str],
+    shard: tuple[int, int],
+    threads: int,
+    progress: Callable[[int], object] | None,
+) -> dict[str, Any]: ...
+def sweep_table(folder: str | PathLike[str]) -> dict[str, int]: ...
 def timing(
     sensor: Sensor | None, process: str, voltage_v: float, temperature_c: float
 ) -> dict[str, Any]: ...

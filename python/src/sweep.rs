@@ -1,0 +1,76 @@
+//! Sweeps: parts of a study, and its table.
+
+use std::path::{Path, PathBuf};
+
+use guided_dtof::files::ResultSet;
+use guided_dtof::sweep::{Results, Shard, Study, SweepError, run as take_points, study_of};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::background::run;
+use crate::failure::Failure;
+use crate::values::by_json;
+
+impl From<SweepError> for Failure {
+    fn from(error: SweepError) -> Self {
+        match error {
+            SweepError::Input(error) => error.into(),
+            SweepError::Frame(error) => error.into(),
+            SweepError::Stopped => Failure::Stopped,
+        }
+    }
+}
+
+/// Points of a study file, its folder for results and its name.
+#[pyfunction]
+pub(crate) fn sweep_outline(study: PathBuf) -> PyResult<(u64, PathBuf, String)> {
+    let study = Study::load(&study).map_err(Failure::from)?;
+    Ok((study.len(), study.out.clone(), study.name))
+}
+
+/// Takes a part of a study on so many threads, 0 for all; see `gdtof.sweep`.
+#[pyfunction]
+pub(crate) fn sweep_part<'py>(
+    py: Python<'py>,
+    study: PathBuf,
+    folder: PathBuf,
+    shard: (u64, u64),
+    threads: usize,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let outcome = run(py, progress, move |watch| {
+        let study = Study::load(&study)?;
+        let shard = Shard {
+            part: shard.0,
+            of: shard.1,
+        };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|why| Failure::Simulation(why.to_string()))?;
+        let done = |points: u64| watch.done(points as usize);
+        Ok(pool.install(|| take_points(&study, &folder, shard, done))?)
+    })?;
+    by_json(py, &outcome)
+}
+
+/// Writes the table of all rows in a folder; how many points have none.
+#[pyfunction]
+pub(crate) fn sweep_table<'py>(py: Python<'py>, folder: PathBuf) -> PyResult<Bound<'py, PyDict>> {
+    let (points, missing) = run(py, None, move |_| Ok(write(&folder)?))?;
+    let dict = PyDict::new(py);
+    dict.set_item("points", points)?;
+    dict.set_item("missing", missing)?;
+    Ok(dict)
+}
+
+fn write(folder: &Path) -> Result<(u64, u64), SweepError> {
+    let study = study_of(folder)?;
+    let set = ResultSet::begin(folder)?;
+    let results = Results::of(&study, &[folder.to_owned()])?;
+    let missing = results.write(set.staging(), |_| ())?;
+    let configuration = serde_json::json!({
+        "study": study.text(),
+        "points": study.len() - missing,
+    });
+    set.commit("sweep", configuration)?;
+    Ok((study.len(), missing))
+}
