@@ -10,7 +10,7 @@ pub(super) use object::OBJECT;
 pub(super) use stereo::STEREO;
 pub(super) use surroundings::{LIGHT, MEDIUM, RIG};
 
-use crate::settings::{Key, Range, Section};
+use crate::settings::{Range, Section};
 
 /// Beyond a million metres the squares in the geometry lose the small lengths.
 const FAR_M: f64 = 1e6;
