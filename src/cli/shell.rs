@@ -9,6 +9,7 @@ use super::voice::{say, tell};
 use crate::chip::SensorConfig;
 use crate::files::{OutputFile, create_folder};
 use crate::scene::Scene;
+use crate::sweep::Study;
 
 /// Arguments of `gdtof completion`.
 #[derive(Args)]
@@ -33,6 +34,8 @@ enum File {
     Sensor,
     /// A scene.
     Scene,
+    /// A study of `gdtof sweep`.
+    Study,
 }
 
 /// Arguments of `gdtof schema`.
@@ -89,6 +92,7 @@ pub(super) fn schema(args: &SchemaArgs) -> anyhow::Result<()> {
     let schema = match args.file {
         File::Sensor => SensorConfig::schema(),
         File::Scene => Scene::schema(),
+        File::Study => Study::schema(),
     };
     Ok(say(format_args!("{schema:#}\n"))?)
 }

@@ -10,7 +10,7 @@ use super::design::{self, Design, MOST_SOBOL_AXES};
 use super::keys::{self, Known};
 use super::values::{Axis, Span, Values, Varied};
 use crate::files::InputError;
-use crate::settings::{Document, Fault, Key, Range};
+use crate::settings::{Document, Fault, Key, Range, Section, schema};
 
 /// What is made of each point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -154,6 +154,32 @@ pub(super) struct Point {
 }
 
 impl Study {
+    /// The JSON schema of a study file. What may stand in [fixed] and [vary] depends on the scene and its objects, and is left open.
+    pub fn schema() -> serde_json::Value {
+        let section = Section {
+            name: "study",
+            what: "What is made of each point, and which points are taken",
+            keys: STUDY,
+        };
+        let numbers = ["points", "seed", "replicas"].map(|key| (key.to_owned(), Value::from(1)));
+        let values = Table::from_iter([("study".to_owned(), Table::from_iter(numbers).into())]);
+        let mut schema = schema("A study of gdtof", &[section], &values);
+        for (name, what) in [
+            (
+                "fixed",
+                "Values of keys that do not vary: sensor.KEY, scene.SECTION.KEY, guide, windows.KEY, frame.KEY, theory.KEY",
+            ),
+            (
+                "vary",
+                "Lists or ranges {from, to, steps, scale} of keys that do; [[vary.zip]] for keys that go together",
+            ),
+        ] {
+            schema["properties"][name] =
+                serde_json::json!({ "type": "object", "description": what });
+        }
+        schema
+    }
+
     /// Reads a study file.
     ///
     /// # Errors
@@ -562,4 +588,69 @@ fn span(known: &Known, name: &str, range: &Table) -> Result<Span, String> {
         is_log: scale == Scale::Log,
         is_whole: known.holds == Holds::Whole,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn study(text: &str) -> Study {
+        Study::parse("study.toml", text, Path::new(""), "test").unwrap()
+    }
+
+    fn numbers(study: &Study, index: u64) -> Vec<f64> {
+        let values = study.point(index).values.into_iter();
+        let number = |value: Value| value.as_float().or(value.as_integer().map(|n| n as f64));
+        values.map(|value| number(value).unwrap()).collect()
+    }
+
+    #[test]
+    fn the_first_key_varies_slowest_and_seeds_fastest() {
+        let study = study(
+            "[study]\nseed = 7\nreplicas = 2\n[vary]\nsensor.rows = [4, 8]\n[[vary.zip]]\nsensor.bins = [8, 16, 32]\n\
+             frame.laser_cycles = { from = 10, to = 1000, steps = 3, scale = \"log\" }\n",
+        );
+        assert_eq!(study.len(), 12);
+        let all: Vec<_> = (0..12)
+            .map(|index| (numbers(&study, index), study.point(index).seed))
+            .collect();
+        assert_eq!(all[0], (vec![4.0, 8.0, 10.0], 7));
+        assert_eq!(all[1], (vec![4.0, 8.0, 10.0], 8));
+        assert_eq!(all[3], (vec![4.0, 16.0, 100.0], 8));
+        assert_eq!(all[11], (vec![8.0, 32.0, 1000.0], 8));
+    }
+
+    #[test]
+    fn drawn_points_stay_within_their_ranges_and_keys_that_count_are_whole() {
+        for design in ["latin", "sobol"] {
+            let text = format!(
+                "[study]\ndesign = \"{design}\"\npoints = 64\n[vary]\nsensor.clk_hz = {{ from = \"100 MHz\", to = 4e8 }}\n\
+                 sensor.threshold = [1, 2, 3, 4]\nframe.laser_cycles = {{ from = 1, to = 1000, scale = \"log\" }}\n"
+            );
+            let study = study(&text);
+            let points: Vec<_> = (0..64).map(|index| numbers(&study, index)).collect();
+            for point in &points {
+                assert!((1e8..=4e8).contains(&point[0]) && (1.0..=1000.0).contains(&point[2]));
+                assert_eq!(point[2].fract(), 0.0);
+            }
+            // In equal ratios: as many of them below the geometric mean as above.
+            let low = points.iter().filter(|point| point[2] < 31.6).count();
+            assert!((28..=36).contains(&low), "{design}: {low}");
+            for threshold in 1..=4 {
+                let of = points
+                    .iter()
+                    .filter(|point| point[1] == f64::from(threshold));
+                assert_eq!(of.count(), 16, "{design}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_schema_has_every_key_of_a_study() {
+        let schema = Study::schema();
+        for key in STUDY {
+            assert!(schema["properties"]["study"]["properties"][key.name].is_object());
+        }
+        assert!(schema["properties"]["vary"].is_object());
+    }
 }
