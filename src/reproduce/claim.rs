@@ -44,7 +44,11 @@ impl Published {
     /// Whether `value` is within the tolerance, a last bit of rounding granted.
     fn agrees(self, value: f64) -> Option<bool> {
         let (low, high) = self.range()?;
-        let rounding = 1e-12 * value.abs();
+        let rounding = if value.is_finite() {
+            1e-12 * value.abs()
+        } else {
+            0.0
+        };
         Some((low - rounding..=high + rounding).contains(&value))
     }
 
@@ -347,6 +351,7 @@ mod tests {
         assert_eq!(row(Exactly("0.38"), 0.375).verdict(), Verdict::Agrees);
         assert_eq!(row(Exactly("0.38"), 0.374).verdict(), Verdict::Fails);
         assert_eq!(row(Exactly("0.38"), f64::NAN).verdict(), Verdict::Fails);
+        assert_eq!(row(AtMost("6"), f64::INFINITY).verdict(), Verdict::Fails);
         assert_eq!(
             row(Exactly("0.38"), 0.5).differs("why").verdict(),
             Verdict::Differs

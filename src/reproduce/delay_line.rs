@@ -95,6 +95,11 @@ fn measured() -> &'static Measured {
     })
 }
 
+/// The calibration of the four rows.
+pub(super) fn calibrated() -> &'static BinProfile {
+    &measured().calibrated
+}
+
 /// Lengths of all bins that the sweep found, ns.
 fn lengths_ns() -> Vec<f64> {
     let lines = measured().calibrated.macropixels.iter().flatten();

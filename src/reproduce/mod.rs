@@ -14,6 +14,7 @@
 mod chip;
 mod claim;
 mod delay_line;
+mod demonstrator;
 mod design;
 mod guided_bins;
 pub mod measured;

@@ -2,8 +2,8 @@
 
 use super::claim::Claim;
 use super::{
-    chip, delay_line, design, measured, penalty, photon_budget, precision, sensors, silicon,
-    stereo, system,
+    chip, delay_line, demonstrator, design, measured, penalty, photon_budget, precision, sensors,
+    silicon, stereo, system,
 };
 use crate::engine::EngineError;
 use crate::report::{Chart, Grid};
@@ -202,7 +202,7 @@ pub const CLAIMS: [Claim; 28] = [
         system::tracking_rows,
     ),
     claim(24, "fog", "6.4.1, Fig. 101", system::fog_rows),
-    claim(25, "glass", "6.4.1, Fig. 102", system::glass_rows),
+    claim(25, "glass", "6.4.1, Fig. 102", demonstrator::glass_rows),
     claim(
         26,
         "targets that leave their window",
@@ -243,7 +243,7 @@ pub const TABLES: [Table; 4] = [
 ];
 
 /// Every figure, by number.
-pub const FIGURES: [Figure; 33] = [
+pub const FIGURES: [Figure; 34] = [
     figure(20, "wavelength of a VCSEL", photon_budget::figure_20),
     figure(
         28,
@@ -303,6 +303,11 @@ pub const FIGURES: [Figure; 33] = [
         94,
         "photon budget of the demonstrator",
         photon_budget::figure_94,
+    ),
+    figure(
+        103,
+        "distances by the demonstrator",
+        demonstrator::figure_103,
     ),
     figure(104, "σ of the demonstrator", system::figure_104),
     figure(106, "time of a frame", system::figure_106),

@@ -1,6 +1,7 @@
 //! Claims 17, 18, 19 and 26: the stereo pair of Table 12 as a guide.
 
 use super::claim::{Published::*, Row};
+use super::demonstrator;
 use super::design::HSLIDAR_BIN_M;
 use super::guided_bins;
 use crate::chip::{SensorConfig, hslidar};
@@ -426,23 +427,27 @@ pub(super) fn motion_rows() -> Vec<Row> {
     let metres_per_mile = 1609.344;
     let per_frame_m = 65.0 * metres_per_mile / 3600.0 / 3.0;
     let slip_m = -PAIR.yaw_error_m(40.0, 0.1);
-    vec![
+    let mut rows = demonstrator::motion_rows();
+    rows.extend([
         Row::holds(
             "way of a car at 65 mph per frame at 3 fps",
             "m",
             Exactly("10"),
             per_frame_m,
         )
-        .given("65 mph over 3 fps, both published."),
+        .given("65 mph over 3 fps, both published.")
+        .aside(),
         Row::holds("depth window", "m", Exactly("3"), window_m)
-            .given("8 bins of 2.6 ns, both published."),
+            .given("8 bins of 2.6 ns, both published.")
+            .aside(),
         Row::holds(
             "way over half the window",
             "",
             Says("exceeding", 1.0, f64::INFINITY),
             per_frame_m / (0.5 * window_m),
         )
-        .given("The two lines above; no target moves in the model.")
+        .given("The two lines above.")
+        .aside()
         .remark("Above 1 the car has left a window that was centred on it."),
         Row::holds(
             "error of a 0.1° slip at 40 m over half the window",
@@ -456,5 +461,6 @@ pub(super) fn motion_rows() -> Vec<Row> {
             "m/s",
             3.0 * 0.5 * window_m,
         ),
-    ]
+    ]);
+    rows
 }

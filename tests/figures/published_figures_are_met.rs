@@ -56,7 +56,7 @@ fn computed(number: u32, what: &str) -> f64 {
 /// times.
 #[test]
 fn inputs_that_come_out_again_are_given_and_meet_no_claim() {
-    for (number, inputs) in [(2, 3), (20, 2), (21, 2), (23, 3), (27, 3)] {
+    for (number, inputs) in [(2, 3), (20, 2), (21, 2), (27, 3)] {
         let rows = rows_of(number);
         let given = rows.iter().filter(|r| r.verdict() == Verdict::Given);
         assert_eq!(given.count(), inputs, "claim {number}");
@@ -64,15 +64,24 @@ fn inputs_that_come_out_again_are_given_and_meet_no_claim() {
     }
 }
 
+/// What is published of the demonstrator before its scenes comes from the whole chain; inputs that come out again are asides.
 #[test]
-fn no_claim_is_met_while_a_headline_is_not_modelled() {
-    for number in [22, 23, 24, 25] {
+fn the_demonstrator_s_claims_are_measured() {
+    for number in 22..=26 {
         let rows = rows_of(number);
-        assert_eq!(overall(rows), Verdict::NotModelled, "claim {number}");
+        let verdict = overall(rows);
         assert!(
-            rows.iter().all(|r| r.verdict() != Verdict::Agrees),
-            "claim {number}"
+            matches!(verdict, Verdict::Agrees | Verdict::Differs),
+            "claim {number}: {verdict:?}"
         );
+        for row in rows.iter().filter(|row| !row.is_aside) {
+            let verdict = row.verdict();
+            assert!(
+                !matches!(verdict, Verdict::Given | Verdict::NotModelled),
+                "claim {number}: {}: {verdict:?}",
+                row.what
+            );
+        }
     }
 }
 
