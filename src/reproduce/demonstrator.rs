@@ -23,10 +23,7 @@ use crate::scene::DVec3;
 const SEED: u64 = 1;
 
 /// Distances from which on the van is followed, m, to its end at 75 m; four frames each.
-const VAN_FROM_M: [f64; 3] = [35.0, 50.0, 72.0];
-
-/// And nearer, where what it sends back fills bins of 12 bits.
-const VAN_NEAR_M: f64 = 22.0;
+const VAN_FROM_M: [f64; 4] = [22.0, 35.0, 50.0, 72.0];
 
 /// How much lower than in the demo the demonstrator stands before the fog, m: four rows are 0.5 m high at 60 m, and should be on
 /// the car.
@@ -130,18 +127,21 @@ pub(super) fn tracking_rows() -> Vec<Row> {
     let frames = legs.concat();
     let where_found = frames.iter().filter(|found| found.is_found());
     let farthest_m = where_found.clone().filter_map(|found| found.true_m);
+    let missed = frames.iter().filter(|found| !found.is_found());
+    let missed: Vec<String> = missed.map(ToString::to_string).collect();
     let fast = found(shows::van_at(&chain(), 5.0, 70.0, SEED));
     let mut rows = vec![
         Row::holds(
-            "share of frames in which most of the van's macropixels are right to a bin, 35 to 75 m, 15 klux",
+            "share of frames in which most of the van's macropixels are right to a bin, 22 to 75 m, 15 klux",
             "",
             Says("successfully tracked and resolved", 1.0, 1.0),
             where_found.count() as f64 / frames.len() as f64,
         )
-        .differs("Targets at the seam of two windows are in neither where the guide is off.")
+        .differs("Four rows of the chip see the middle of the van alone; the demo's 32 find it in all of 20 frames.")
         .remark(format!(
-            "{} frames, four from each of 35, 50 and 72 m on; the van drives away at 2 m/s, which is chosen.",
-            frames.len()
+            "{} frames, four from each of 22, 35, 50 and 72 m on; the van drives away at 2 m/s, which is chosen. {}",
+            frames.len(),
+            missed.join(" ")
         )),
         Row::holds(
             "farthest distance at which it is found",
@@ -155,22 +155,12 @@ pub(super) fn tracking_rows() -> Vec<Row> {
         let what = format!("share of the van's macropixels right to a bin from {from_m} m on");
         Row::ours(what, "", share_right(frames))
     }));
-    rows.extend([
-        Row::ours(
-            format!("the same from {VAN_NEAR_M} m on"),
-            "",
-            share_right(&from(VAN_NEAR_M)),
-        )
-        .remark("What is missing has full bins: 12 bits of 16 000 laser cycles."),
-        Row::ours(
-            "the same of a van at 5 m/s, from 70 m on",
-            "",
-            share_right(&fast),
-        )
-        .remark(
-            "From the images to the middle of the exposure it moves 1.2 m of a window of 3.1 m.",
-        ),
-    ]);
+    rows.extend([Row::ours(
+        "the same of a van at 5 m/s, from 70 m on",
+        "",
+        share_right(&fast),
+    )
+    .remark("From the images to the middle of the exposure it moves 1.2 m of a window of 3.1 m.")]);
     rows
 }
 
