@@ -137,7 +137,7 @@ pub(super) fn tracking_rows() -> Vec<Row> {
             Says("successfully tracked and resolved", 1.0, 1.0),
             where_found.count() as f64 / frames.len() as f64,
         )
-        .differs("Four rows of the chip see the middle of the van alone; the demo's 32 find it in all of 20 frames.")
+        .differs("Near by, bins of 12 bits are full in most macropixels of the van's middle, which four rows see; the demo's 32 rows find it in all of 20 frames.")
         .remark(format!(
             "{} frames, four from each of 22, 35, 50 and 72 m on; the van drives away at 2 m/s, which is chosen. {}",
             frames.len(),
