@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use guided_dtof::ranging::DepthOptions;
-use guided_dtof::request::{Spelling, guided_exposure, read_calibration};
+use guided_dtof::request::{Spelling, check_false_alarm_rate, guided_exposure, read_calibration};
 use guided_dtof::system;
 use numpy::PyReadonlyArrayDyn;
 use pyo3::prelude::*;
@@ -39,12 +39,7 @@ pub(crate) fn range_counts<'py>(
     let starts = start_values(&starts, &[shape.0, shape.1], sensor.largest_start())?;
     let exposure = guided_exposure(&sensor, periods.0, periods.1, Spelling::Keys);
     let exposure = exposure.map_err(Failure::from)?;
-    if !(false_alarm_rate > 0.0 && false_alarm_rate <= 1.0) {
-        let message = format!(
-            "{false_alarm_rate} is no share of macropixels; give a number above 0, up to 1"
-        );
-        return Err(Failure::argument("false_alarm_rate", message).into());
-    }
+    check_false_alarm_rate(false_alarm_rate, Spelling::Keys).map_err(Failure::from)?;
     let options = DepthOptions {
         false_alarm_rate,
         correct_walk,

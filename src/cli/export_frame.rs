@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use serde::Deserialize;
 
 use super::voice::{note, tell};
-use crate::files::{InputError, ResultSet, parse_json, read_text};
+use crate::files::{InputError, ResultSet, parse_json, read_counts, read_text};
 use crate::report::{CloudPoint, Npz, write_depth_png, write_npy_f32, write_pcd, write_ply};
 use crate::system::{NoDepth, TakenFrame, above_background};
 
@@ -67,7 +67,7 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
     let wanted = "the frame.json of a frame that `gdtof frame` has taken";
     let Macropixels { macropixels } = parse_json(path.display(), &read_text(&path)?, wanted)?;
     let (rows, cols, bins) = (taken.sensor.rows, taken.sensor.cols, taken.sensor.bins);
-    let histograms = read_histograms(&args.frame.join("histograms.npy"), [rows, cols, bins])?;
+    let histograms = read_counts(&args.frame.join("histograms.npy"), [rows, cols, bins])?;
     let is_frame = |folder: &Path| folder.canonicalize().ok() == args.frame.canonicalize().ok();
     if is_frame(&args.out) {
         let message =
@@ -176,21 +176,4 @@ fn whole(macropixels: &[Macropixel], histograms: &[u16], [rows, cols, bins]: [us
         &macropixels.iter().map(reason).collect::<Vec<u8>>(),
     );
     arrays
-}
-
-fn read_histograms(path: &Path, shape: [usize; 3]) -> Result<Vec<u16>, InputError> {
-    let complain = |message: String| InputError::new(path.display(), message);
-    let bytes = std::fs::read(path)
-        .map_err(|e| complain(format!("cannot be read ({e}); take the frame anew")))?;
-    let array = npyz::NpyFile::new(&bytes[..]);
-    let array = array.map_err(|e| complain(format!("is no array ({e}); take the frame anew")))?;
-    if array.shape() != shape.map(|n| n as u64) {
-        return Err(complain(format!(
-            "has the shape {:?} where frame.json says {shape:?}; take the frame anew",
-            array.shape()
-        )));
-    }
-    array
-        .into_vec()
-        .map_err(|e| complain(format!("holds no counts ({e}); take the frame anew")))
 }

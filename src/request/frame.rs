@@ -269,7 +269,7 @@ impl FrameRequest {
 ///
 /// # Errors
 /// When it is not above 0 and at most 1.
-pub(crate) fn check_false_alarm_rate(rate: f64, spelling: Spelling) -> Result<(), InputError> {
+pub fn check_false_alarm_rate(rate: f64, spelling: Spelling) -> Result<(), InputError> {
     if rate > 0.0 && rate <= 1.0 {
         return Ok(());
     }

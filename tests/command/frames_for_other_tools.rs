@@ -154,7 +154,10 @@ fn a_folder_without_a_frame_is_refused() {
     let histograms = here.join("out").join("histograms.npy");
     let bytes = fs::read(&histograms).unwrap();
     fs::write(&histograms, &bytes[..40]).unwrap();
-    refused(&["export", "frame", "out"], "histograms.npy: is no array");
+    refused(
+        &["export", "frame", "out"],
+        "histograms.npy: is no NumPy file",
+    );
     assert!(!here.join("export").exists());
 }
 
