@@ -32,7 +32,7 @@ fn frames(c: &mut Criterion) {
             stop_periods,
             SPEED_LASER_CYCLES,
         );
-        let engine = Window::new(&frame.config, &frame.exposure);
+        let engine = Window::new(&frame.sensor, &frame.exposure);
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use guided_dtof::ranging::DepthOptions;
 use guided_dtof::request::{Spelling, check_false_alarm_rate, guided_exposure, read_calibration};
-use guided_dtof::system;
+use guided_dtof::system::{self, NoDepth};
 use numpy::PyReadonlyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -12,7 +12,6 @@ use pyo3::types::PyDict;
 use crate::arrays::{map, starts as start_values, values};
 use crate::background::run;
 use crate::failure::Failure;
-use crate::frame::reason;
 use crate::scene::Scene;
 use crate::sensor::Sensor;
 
@@ -70,7 +69,7 @@ pub(crate) fn range_counts<'py>(
     dict.set_item("depth", metres(|r| r.measured_m))?;
     dict.set_item("peak", metres(|r| r.peak_m))?;
     dict.set_item("confidence", metres(|r| r.confidence))?;
-    let reasons = readings.iter().map(|r| reason(r.no_depth)).collect();
+    let reasons = readings.iter().map(|r| NoDepth::number(r.no_depth)).collect();
     dict.set_item("reason", map(py, shape, reasons))?;
     Ok(dict)
 }

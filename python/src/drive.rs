@@ -125,8 +125,8 @@ impl Drive {
                 false => WindowPolicy::default(),
             };
             let policy = request.policy(policy)?;
+            let frame = request.settings_by(sensor, world, guide, &policy)?;
             Ok(DriveSettings {
-                frame: request.settings_by(sensor, world, guide, &policy)?,
                 policy,
                 clock: FrameClock {
                     guide_latency_s: drive_keys.guide_latency_ms * 1e-3,
@@ -135,8 +135,8 @@ impl Drive {
                 segments: drive_keys.segments,
                 noise,
                 reuse: drive_keys.reuse,
-                only: None,
                 start_s: drive_keys.start_s,
+                ..DriveSettings::new(frame)
             })
         };
         spawn(move || {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use guided_dtof::chip::{Exposure, SensorConfig, WindowLaw};
+use guided_dtof::chip::{Exposure, Sensor as Chip, WindowLaw};
 use guided_dtof::engine::waveform::WaveCycles;
 use guided_dtof::request::FrameRequest;
 use guided_dtof::system::{
@@ -43,7 +43,7 @@ pub(crate) fn request(keys: &Bound<'_, PyDict>) -> PyResult<FrameRequest> {
 /// Edges of the bins of every macropixel in its laser cycle, ns after STOP: one more than there are bins, NaN where its window
 /// does not open.
 pub(crate) fn bin_edges_ns(
-    sensor: &SensorConfig,
+    sensor: &Chip,
     exposure: &Exposure,
     starts: &[Option<u16>],
 ) -> Vec<f64> {
@@ -63,12 +63,6 @@ pub(crate) fn bin_edges_ns(
             })
         });
     edges.collect()
-}
-
-/// The reason why a macropixel has no depth, as a number: 0 where it has one.
-pub(crate) fn reason(no_depth: Option<NoDepth>) -> u8 {
-    let place = |why| NoDepth::ALL.iter().position(|other| *other == why);
-    no_depth.map_or(0, |why| 1 + place(why).expect("all are there") as u8)
 }
 
 /// What a frame and a frame of a drive have in common.
@@ -105,7 +99,7 @@ impl Common {
         dict.set_item("truth", metres(|p| p.true_m))?;
         dict.set_item("peak", metres(|p| p.peak_m))?;
         dict.set_item("confidence", metres(|p| p.confidence))?;
-        let reasons = pixels.iter().map(|p| reason(p.no_depth)).collect();
+        let reasons = pixels.iter().map(|p| NoDepth::number(p.no_depth)).collect();
         dict.set_item("reason", map(py, shape, reasons))?;
         let starts = pixels.iter().map(|p| of_start(p.start)).collect();
         dict.set_item("start", map(py, shape, starts))?;
@@ -127,7 +121,7 @@ struct Probes {
 }
 
 impl Probes {
-    fn probes(&self, sensor: &SensorConfig) -> Result<Vec<Probe>, Failure> {
+    fn probes(&self, sensor: &Chip) -> Result<Vec<Probe>, Failure> {
         let wave_cycles = match self.cycles {
             None => WaveCycles::FirstHits,
             Some(-1) => WaveCycles::All,
@@ -227,7 +221,7 @@ pub(crate) fn frame<'py>(
     .into_dict(py)?;
     let seconds = |time: Time| time.as_s();
     dict.set_item("summary", summary)?;
-    dict.set_item("sensor", Sensor { config: sensor })?;
+    dict.set_item("sensor", Sensor { chip: sensor })?;
     dict.set_item("stop_periods", exposure.stop_periods)?;
     dict.set_item("laser_cycles", exposure.laser_cycles)?;
     dict.set_item("bin_m", frame.bin_m)?;

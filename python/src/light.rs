@@ -1,9 +1,9 @@
 //! Light of one's own on every macropixel.
 
-use guided_dtof::engine::{LitPixel, expose as expose_to, stream_config};
-use guided_dtof::photon::{Echo, PhotonStream, PixelLight, Profile};
+use guided_dtof::engine::{CohortOptions, LitPixel, expose as expose_to};
+use guided_dtof::photon::{Echo, PixelLight, Profile};
 use guided_dtof::request::{Spelling, exposure};
-use guided_dtof::system::EngineKind;
+use guided_dtof::system::{EngineKind, photon_stream};
 use guided_dtof::units::Time;
 use numpy::PyReadonlyArrayDyn;
 use numpy::PyUntypedArrayMethods;
@@ -130,9 +130,8 @@ pub(crate) fn expose<'py>(
             })
         });
         let pixels = pixels.collect::<Result<Vec<LitPixel>, Failure>>()?;
-        let stream = stream_config(&sensor, &exposure, seed, world.pulse_sigma());
-        let stream = PhotonStream::new(&world.with_pulse(stream));
-        let engine = engine.expose(&sensor, &exposure);
+        let stream = photon_stream(&sensor, &exposure, seed, &world);
+        let engine = engine.expose(&sensor, &exposure, CohortOptions::default());
         Ok(expose_to(&*engine, &stream, &pixels, |n| watch.done(n))?)
     })?;
     let dict = PyDict::new(py);

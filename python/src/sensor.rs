@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use guided_dtof::chip::SensorConfig;
+use guided_dtof::chip::{Sensor as Chip, SensorConfig};
 use guided_dtof::request::Sources;
 use guided_dtof::settings::Document;
 use pyo3::exceptions::{PyAttributeError, PyKeyError};
@@ -26,16 +26,16 @@ use crate::values::{assignments, table_to_python, to_python};
 #[pyclass(frozen, module = "gdtof")]
 #[derive(Clone)]
 pub(crate) struct Sensor {
-    pub(crate) config: SensorConfig,
+    pub(crate) chip: Chip,
 }
 
 impl Sensor {
-    pub(crate) fn or_default(sensor: Option<&Bound<'_, Self>>) -> SensorConfig {
-        sensor.map_or_else(SensorConfig::default, |sensor| sensor.get().config.clone())
+    pub(crate) fn or_default(sensor: Option<&Bound<'_, Self>>) -> Chip {
+        sensor.map_or_else(Chip::default, |sensor| sensor.get().chip.clone())
     }
 
     fn table(&self) -> Table {
-        Table::try_from(&self.config).expect("numbers and words")
+        Table::try_from(&*self.chip).expect("numbers and words")
     }
 }
 
@@ -49,15 +49,16 @@ impl Sensor {
             set: assignments("sensor.", keys)?,
             ..Sources::default()
         };
-        let config = sources.read_sensor().map_err(Failure::from)?;
-        Ok(Sensor { config })
+        let chip = sources.read_sensor().map_err(Failure::from)?;
+        Ok(Sensor { chip })
     }
 
     /// A sensor from the text of a sensor file (TOML); keys that it leaves out are the QuantIC4x4's.
     #[staticmethod]
     fn from_toml(text: &str) -> PyResult<Self> {
         let config = SensorConfig::parse("sensor", text).map_err(Failure::from)?;
-        Ok(Sensor { config })
+        let chip = config.into();
+        Ok(Sensor { chip })
     }
 
     /// The same sensor with other keys.
@@ -71,7 +72,8 @@ impl Sensor {
                 .map_err(Failure::from)?;
         }
         let config = SensorConfig::read_document(&document).map_err(Failure::from)?;
-        Ok(Sensor { config })
+        let chip = config.into();
+        Ok(Sensor { chip })
     }
 
     /// All keys and their values.
@@ -81,7 +83,7 @@ impl Sensor {
 
     /// A sensor file, every key with its unit, range and source.
     fn to_toml(&self) -> String {
-        self.config.commented()
+        self.chip.commented()
     }
 
     /// Names of all keys.
@@ -92,13 +94,13 @@ impl Sensor {
     /// Rows and columns of macropixels, and bins of each.
     #[getter]
     fn shape(&self) -> (usize, usize, usize) {
-        (self.config.rows, self.config.cols, self.config.bins)
+        (self.chip.rows, self.chip.cols, self.chip.bins)
     }
 
     /// The largest start value of its P-counter.
     #[getter]
     fn largest_start(&self) -> u16 {
-        self.config.largest_start()
+        self.chip.largest_start()
     }
 
     fn __getitem__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
@@ -127,7 +129,7 @@ impl Sensor {
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
         let other = other.cast::<Self>();
-        other.is_ok_and(|other| other.get().config == self.config)
+        other.is_ok_and(|other| other.get().chip == self.chip)
     }
 
     fn __hash__(&self) -> u64 {
@@ -155,6 +157,6 @@ impl Sensor {
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let make = py.get_type::<Self>().getattr("from_toml")?;
-        Ok((make, PyTuple::new(py, [self.config.commented()])?))
+        Ok((make, PyTuple::new(py, [self.chip.commented()])?))
     }
 }

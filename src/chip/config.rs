@@ -332,17 +332,6 @@ impl SensorConfig {
         }
     }
 
-    /// This sensor with delay lines whose elements are all alike, and a CLK that comes everywhere at once: what is assumed of one that
-    /// has not been calibrated.
-    #[must_use]
-    pub fn alike(&self) -> Self {
-        SensorConfig {
-            delay_sigma: 0.0,
-            clk_skew_ps: 0.0,
-            ..self.clone()
-        }
-    }
-
     /// Longer than the delay lines of any macropixel: twice the average, for mismatch and slow silicon. Nothing where there are none.
     pub fn longest_delay_line(&self) -> Time {
         match self.tdc {

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::SensorArgs;
 use super::voice::{progress, tell};
-use crate::chip::{Sensor, Tdc, WindowLaw};
+use crate::chip::{Tdc, WindowLaw};
 use crate::files::{InputError, OutputFile};
 use crate::report::Table;
 use crate::request::{self, Spelling};
@@ -46,8 +46,8 @@ pub(super) struct CalibrateArgs {
 /// # Errors
 /// Bad input, and a file that cannot be written.
 pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
-    let config = args.sensor.read()?;
-    if config.tdc != Tdc::DelayLine {
+    let sensor = args.sensor.read()?;
+    if sensor.tdc != Tdc::DelayLine {
         let message = "bins of a clocked TDC are CLK periods, and there is nothing to calibrate; give a sensor with tdc = \"delay_line\", such as hslidar_delay_line";
         return Err(InputError::new("--sensor", message).into());
     }
@@ -61,8 +61,8 @@ pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
         }
     }
     let (stop_periods, laser_cycles) = (args.stop_periods, args.laser_cycles);
-    let exposure = request::exposure(&config, stop_periods, laser_cycles, Spelling::Options)?;
-    if let Some(why) = WindowLaw::new(&config, &exposure).refusal() {
+    let exposure = request::exposure(&sensor, stop_periods, laser_cycles, Spelling::Options)?;
+    if let Some(why) = WindowLaw::new(&sensor, &exposure).refusal() {
         let (why, cure) = request::of_no_aim(&why, Spelling::Options);
         return Err(InputError::new("--sensor", format!("{why}; {cure}")).into());
     }
@@ -75,10 +75,9 @@ pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
         ..Sweep::default()
     };
     let progress = progress(
-        config.pixels() as u64,
+        sensor.pixels() as u64,
         "sweeping {bar:40} {pos}/{len} macropixels, {eta} left",
     );
-    let sensor = Sensor::from(&config);
     let found = calibrate(&sensor, args.stop_periods, &sweep, || progress.inc(1));
     progress.finish_and_clear();
     let found = match found {

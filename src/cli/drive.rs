@@ -9,14 +9,13 @@ use clap::Args;
 use serde::Serialize;
 
 use super::SceneArgs;
+use super::asked::ExposureArgs;
 use super::foxglove::Foxglove;
-use super::guiding::GuideArgs;
 use super::voice::{note, progress, say, tell};
 use crate::chip::SensorConfig;
 use crate::engine::Work;
 use crate::files::{InputError, MANIFEST, ResultSet};
 use crate::report::{Cell, DepthMap, NpyStack, Table};
-use crate::request::{FrameRequest, Spelling};
 use crate::scene::Scene;
 use crate::system::{
     Drive, DriveFrame, DriveSettings, EngineKind, FrameClock, FrameTimes, NoDepth, Noise,
@@ -37,26 +36,14 @@ pub(super) struct DriveArgs {
     /// Folder for the results; it is made if need be.
     #[arg(long, value_name = "DIR", default_value = "drive")]
     out: PathBuf,
-    /// CLK periods in a laser cycle.
-    #[arg(long, value_name = "P", default_value_t = 520)]
-    stop_periods: u32,
-    /// Laser cycles of an exposure.
-    #[arg(long, value_name = "N", default_value_t = 1000)]
-    laser_cycles: u32,
-    /// Seed of photons and guide errors.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Engine of the macropixels.
-    #[arg(long, value_enum, default_value_t)]
-    engine: EngineKind,
+    #[command(flatten)]
+    exposure: ExposureArgs,
     /// From the cameras' images to the guide's map, ms.
     #[arg(long, value_name = "MS", default_value_t = 145.0)]
     guide_latency_ms: f64,
     /// The guide works on the next frame while this one is loaded, exposed and read out.
     #[arg(long)]
     pipelined: bool,
-    #[command(flatten)]
-    guiding: GuideArgs,
     /// Begin with the window policy for sequences, which --windows changes: macropixels hold the peak that they have found, step
     /// their window in doubt, and take over estimates of neighbours.
     #[arg(long)]
@@ -79,9 +66,6 @@ pub(super) struct DriveArgs {
     /// Simulate everything anew in every frame: same results, more work.
     #[arg(long)]
     no_skip: bool,
-    /// When the bins of the sensor's delay lines are, as `gdtof calibrate` has measured it.
-    #[arg(long, value_name = "FILE")]
-    calibration: Option<PathBuf>,
     /// Write no picture of each frame.
     #[arg(long)]
     no_pictures: bool,
@@ -160,15 +144,8 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         true => WindowPolicy::for_sequences(),
         false => WindowPolicy::default(),
     };
-    let request = args.guiding.ask(FrameRequest {
-        stop_periods: args.stop_periods,
-        laser_cycles: args.laser_cycles,
-        seed: args.seed,
-        engine: args.engine,
-        calibration: args.calibration.clone(),
-        spelling: Spelling::Options,
-        ..FrameRequest::default()
-    });
+    let asked = &args.exposure;
+    let request = asked.request();
     let policy = request.policy(policy)?;
     let frame = request.settings_by(sensor, scene, request.guide()?, &policy)?;
     if !(0.0..=1e5).contains(&args.guide_latency_ms) {
@@ -186,7 +163,6 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         return Err(InputError::new("--start-s", message).into());
     }
     let settings = DriveSettings {
-        frame,
         policy,
         clock: FrameClock {
             guide_latency_s: args.guide_latency_ms * 1e-3,
@@ -195,20 +171,20 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         segments: args.segments,
         noise: args.noise,
         reuse: !args.no_skip,
-        only: None,
         start_s: args.start_s,
+        ..DriveSettings::new(frame)
     };
     let configuration = Configuration {
         scene_name: scene_args.scene_name(),
         scene: &settings.frame.scene,
         sensor: &settings.frame.sensor,
         stop_periods: settings.frame.exposure.stop_periods,
-        laser_cycles: args.laser_cycles,
-        seed: args.seed,
-        engine: args.engine,
-        guides: args.guiding.guides(),
+        laser_cycles: asked.laser_cycles,
+        seed: asked.seed,
+        engine: asked.engine,
+        guides: asked.guiding.guides(),
         windows: settings.policy,
-        calibration: args.calibration.as_deref(),
+        calibration: asked.calibration.as_deref(),
         start_s: args.start_s,
         clock: settings.clock,
         segments: args.segments,
@@ -435,10 +411,7 @@ fn depth_map(frame: &DriveFrame, settings: &DriveSettings, path: &Path) -> Resul
         .iter()
         .map(|pixel| match (pixel.measured_m, pixel.no_depth) {
             (Some(m), _) => Cell::Depth(m as f32),
-            (None, why) => Cell::Category(why.map_or(0, |why| {
-                let place = NoDepth::ALL.iter().position(|&reason| reason == why);
-                place.expect("all are in the list")
-            })),
+            (None, why) => Cell::Category(why.map_or(0, |why| why as usize)),
         })
         .collect();
     let stereo = &settings.frame.scene.stereo;

@@ -64,7 +64,7 @@ pub(super) fn run(command: &ExportCommand) -> anyhow::Result<()> {
 }
 
 fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
-    let config = args.sensor.read()?;
+    let sensor = args.sensor.read()?;
     let folder = args.out.display();
     let (Some(inits), Some(events), Some(stop_periods), Some(laser_cycles)) = (
         &args.inits,
@@ -72,17 +72,17 @@ fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
         args.stop_periods,
         args.laser_cycles,
     ) else {
-        export_netlist(&args.out, &config)?;
+        export_netlist(&args.out, &sensor)?;
         tell(format_args!(
             "design.v, cells.v and cells_specify.v in {folder}; for a testbench, add --inits, --events, --stop-periods and --laser-cycles\n"
         ))?;
         return Ok(());
     };
-    let stimuli = Stimuli::read(config, inits, events, (stop_periods, laser_cycles))?;
+    let stimuli = Stimuli::read(sensor, inits, events, (stop_periods, laser_cycles))?;
     let plan = StimulusPlan::new(
-        &stimuli.config,
+        &stimuli.sensor,
         &stimuli.exposure,
-        stimuli.config.cols,
+        stimuli.sensor.cols,
         &stimuli.starts,
         &stimuli.pulses(),
     );
@@ -91,11 +91,11 @@ fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
         false => plan,
     };
     match &args.sdf {
-        None => export_verilog(&args.out, &stimuli.config, &plan)?,
+        None => export_verilog(&args.out, &stimuli.sensor, &plan)?,
         Some(path) => {
-            let netlist = Netlist::elaborate(&array::circuit(&stimuli.config));
-            let timing = sdf::annotated_timing(path, &netlist, &stimuli.config)?;
-            export_annotated_verilog(&args.out, &stimuli.config, &plan, &timing)?;
+            let netlist = Netlist::elaborate(&array::circuit(&stimuli.sensor));
+            let timing = sdf::annotated_timing(path, &netlist, &stimuli.sensor)?;
+            export_annotated_verilog(&args.out, &stimuli.sensor, &plan, &timing)?;
         }
     }
     tell(format_args!(

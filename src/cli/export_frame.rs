@@ -3,12 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use serde::Deserialize;
 
 use super::voice::{note, tell};
-use crate::files::{InputError, ResultSet, parse_json, read_counts, read_text};
+use crate::files::{InputError, ResultSet, read_counts};
 use crate::report::{CloudPoint, Npz, write_depth_png, write_npy_f32, write_pcd, write_ply};
-use crate::system::{NoDepth, TakenFrame, above_background};
+use crate::system::{NoDepth, PixelDepth, TakenFrame, above_background};
 
 /// Arguments of `gdtof export frame`.
 #[derive(Args)]
@@ -39,35 +38,18 @@ enum Format {
     Png16,
 }
 
-/// A macropixel of frame.json.
-#[derive(Deserialize)]
-struct Macropixel {
-    true_m: Option<f64>,
-    guide_m: Option<f64>,
-    start: Option<u16>,
-    in_window: bool,
-    measured_m: Option<f64>,
-    no_depth: Option<NoDepth>,
-    peak_m: Option<f64>,
-    confidence: Option<f64>,
-}
-
-#[derive(Deserialize)]
-struct Macropixels {
-    macropixels: Vec<Macropixel>,
-}
-
 /// Runs the command.
 ///
 /// # Errors
 /// A folder without a frame of this version, and files that cannot be written.
 pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
-    let path = args.frame.join("frame.json");
-    let taken = TakenFrame::read(&path)?;
-    let wanted = "the frame.json of a frame that `gdtof frame` has taken";
-    let Macropixels { macropixels } = parse_json(path.display(), &read_text(&path)?, wanted)?;
-    let (rows, cols, bins) = (taken.sensor.rows, taken.sensor.cols, taken.sensor.bins);
-    let histograms = read_counts(&args.frame.join("histograms.npy"), [rows, cols, bins])?;
+    let TakenFrame {
+        settings, pixels, ..
+    } = TakenFrame::read(&args.frame.join("frame.json"))?;
+    let sensor = &settings.sensor;
+    let (rows, cols, bins) = (sensor.rows, sensor.cols, sensor.bins);
+    let shape = [rows, cols, bins];
+    let histograms = read_counts(&args.frame.join("histograms.npy"), &shape)?;
     let is_frame = |folder: &Path| folder.canonicalize().ok() == args.frame.canonicalize().ok();
     if is_frame(&args.out) {
         let message =
@@ -75,24 +57,21 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
         return Err(InputError::new("--out", message).into());
     }
 
-    let camera = taken.scene.lidar_camera(rows as u32, cols as u32);
-    let points: Vec<CloudPoint> = (macropixels
-        .iter()
-        .zip(histograms.chunks_exact(bins))
-        .enumerate())
-    .filter_map(|(pixel, (macropixel, counts))| {
-        let (row, col) = (pixel / cols, pixel % cols);
-        let ray = camera.at_unit_depth((col as f64 + 0.5, row as f64 + 0.5));
-        let at_m = ray.normalize() * macropixel.measured_m?;
-        Some(CloudPoint {
-            at_m: at_m.to_array().map(|x| x as f32),
-            intensity: above_background(counts),
-            confidence: macropixel.confidence.unwrap_or(0.0) as f32,
-            pixel: [row as u16, col as u16],
+    let camera = settings.scene.lidar_camera(rows as u32, cols as u32);
+    let points: Vec<CloudPoint> = (pixels.iter().zip(histograms.chunks_exact(bins)).enumerate())
+        .filter_map(|(at, (pixel, counts))| {
+            let (row, col) = (at / cols, at % cols);
+            let ray = camera.at_unit_depth((col as f64 + 0.5, row as f64 + 0.5));
+            let at_m = ray.normalize() * pixel.measured_m?;
+            Some(CloudPoint {
+                at_m: at_m.to_array().map(|x| x as f32),
+                intensity: above_background(counts),
+                confidence: pixel.confidence.unwrap_or(0.0) as f32,
+                pixel: [row as u16, col as u16],
+            })
         })
-    })
-    .collect();
-    let depths = of(&macropixels, |m| m.measured_m);
+        .collect();
+    let depths = of(&pixels, |pixel| pixel.measured_m);
 
     let results = ResultSet::begin(&args.out)?;
     let all = Format::value_variants();
@@ -115,7 +94,7 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
             Format::Ply => write_ply(&path, &points)?,
             Format::Pcd => write_pcd(&path, &points)?,
             Format::Npy => write_npy_f32(&path, &[rows as u64, cols as u64], &depths)?,
-            Format::Npz => whole(&macropixels, &histograms, [rows, cols, bins]).write(&path)?,
+            Format::Npz => whole(&pixels, &histograms, shape).write(&path)?,
             Format::Png16 => write_depth_png(&path, cols, &depths)?,
         }
         names.push(name);
@@ -129,51 +108,50 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
         names.join(", "),
         args.out.display(),
         points.len(),
-        macropixels.len()
+        pixels.len()
     ))?;
     Ok(())
 }
 
 /// A number of each macropixel; not a number where there is none.
-fn of(macropixels: &[Macropixel], number: impl Fn(&Macropixel) -> Option<f64>) -> Vec<f32> {
-    let number = |macropixel| number(macropixel).map_or(f32::NAN, |x| x as f32);
-    macropixels.iter().map(number).collect()
+fn of(pixels: &[PixelDepth], number: impl Fn(&PixelDepth) -> Option<f64>) -> Vec<f32> {
+    let number = |pixel| number(pixel).map_or(f32::NAN, |x| x as f32);
+    pixels.iter().map(number).collect()
 }
 
-fn whole(macropixels: &[Macropixel], histograms: &[u16], [rows, cols, bins]: [usize; 3]) -> Npz {
+fn whole(pixels: &[PixelDepth], histograms: &[u16], [rows, cols, bins]: [usize; 3]) -> Npz {
     let mut arrays = Npz::default();
     let shape = [rows, cols];
     arrays.add("histograms", &[rows, cols, bins], histograms);
     for (name, number) in [
         (
             "depth_m",
-            (|m| m.measured_m) as fn(&Macropixel) -> Option<f64>,
+            (|m| m.measured_m) as fn(&PixelDepth) -> Option<f64>,
         ),
         ("guide_m", |m| m.guide_m),
         ("truth_m", |m| m.true_m),
         ("peak_m", |m| m.peak_m),
         ("confidence", |m| m.confidence),
     ] {
-        arrays.add(name, &shape, &of(macropixels, number));
+        arrays.add(name, &shape, &of(pixels, number));
     }
-    let start = |m: &Macropixel| m.start.map_or(-1, i32::from);
+    let start = |m: &PixelDepth| m.start.map_or(-1, i32::from);
     arrays.add(
         "start",
         &shape,
-        &macropixels.iter().map(start).collect::<Vec<i32>>(),
+        &pixels.iter().map(start).collect::<Vec<i32>>(),
     );
-    let in_window = |m: &Macropixel| u8::from(m.in_window);
+    let in_window = |m: &PixelDepth| u8::from(m.in_window);
     arrays.add(
         "in_window",
         &shape,
-        &macropixels.iter().map(in_window).collect::<Vec<u8>>(),
+        &pixels.iter().map(in_window).collect::<Vec<u8>>(),
     );
-    // 0 where there is a depth.
-    let reason = |m: &Macropixel| m.no_depth.map_or(0, |reason| 1 + reason as u8);
+    let reason = |m: &PixelDepth| NoDepth::number(m.no_depth);
     arrays.add(
         "no_depth",
         &shape,
-        &macropixels.iter().map(reason).collect::<Vec<u8>>(),
+        &pixels.iter().map(reason).collect::<Vec<u8>>(),
     );
     arrays
 }

@@ -9,7 +9,7 @@ use clap::Args;
 use serde::Serialize;
 
 use self::pair::PairReport;
-use super::guiding::GuideArgs;
+use super::asked::ExposureArgs;
 use super::voice::{note, progress, say, tell};
 use super::{SceneArgs, quality};
 use crate::analysis::{TimingVerdict, VerdictReport};
@@ -21,7 +21,7 @@ use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::guide::GuideMap;
 use crate::page::Page;
 use crate::report::{Table, write_npy_u16};
-use crate::request::{FrameRequest, Spelling};
+use crate::request::FrameRequest;
 use crate::scene::Scene;
 use crate::system::{
     DistanceLaw, EngineKind, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Probe, Summary,
@@ -38,22 +38,10 @@ pub(super) struct FrameArgs {
     #[command(flatten)]
     pair: pair::PairArgs,
     #[command(flatten)]
-    guiding: GuideArgs,
+    exposure: ExposureArgs,
     /// Folder for the results; it is made if need be.
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
-    /// CLK periods in a laser cycle.
-    #[arg(long, value_name = "P", default_value_t = 520)]
-    stop_periods: u32,
-    /// Laser cycles of the exposure.
-    #[arg(long, value_name = "N", default_value_t = 1000)]
-    laser_cycles: u32,
-    /// Seed of photons and stereo errors.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Engine of the macropixels that are not probed.
-    #[arg(long, value_enum, default_value_t)]
-    engine: EngineKind,
     /// Macropixel to run at gate level with its waveform, as row,col or `none`; may be repeated. Without
     /// it, the guided macropixel nearest to the centre.
     #[arg(long, value_name = "R,C")]
@@ -78,9 +66,6 @@ pub(super) struct FrameArgs {
     /// Share of macropixels without an echo that may be given a depth; 1 takes every peak for one.
     #[arg(long, value_name = "P", default_value_t = 1e-3)]
     false_alarm_rate: f64,
-    /// When the bins of the sensor's delay lines are, as `gdtof calibrate` has measured it; without it, all are taken to be alike.
-    #[arg(long, value_name = "FILE")]
-    calibration: Option<PathBuf>,
     /// Leave the range walk of strong echoes in the depths.
     #[arg(long)]
     no_walk_correction: bool,
@@ -174,20 +159,14 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
 
 impl FrameArgs {
     fn request(&self) -> FrameRequest {
-        self.guiding.ask(FrameRequest {
-            stop_periods: self.stop_periods,
-            laser_cycles: self.laser_cycles,
-            seed: self.seed,
-            engine: self.engine,
+        FrameRequest {
             sub_bins: self.sub_bins,
             tolerance_m: self.tolerance,
             skip: !self.no_skip,
             false_alarm_rate: self.false_alarm_rate,
             correct_walk: !self.no_walk_correction,
-            calibration: self.calibration.clone(),
-            spelling: Spelling::Options,
-            ..FrameRequest::default()
-        })
+            ..self.exposure.request()
+        }
     }
 }
 
@@ -300,6 +279,7 @@ impl<'a> Report<'a> {
         frame: &'a Frame,
         pair: Option<&'a PairReport>,
     ) -> Self {
+        let asked = &args.exposure;
         Report {
             version: env!("CARGO_PKG_VERSION"),
             configuration: Configuration {
@@ -307,14 +287,14 @@ impl<'a> Report<'a> {
                 scene: &settings.scene,
                 sensor: &settings.sensor,
                 stop_periods: settings.exposure.stop_periods,
-                laser_cycles: args.laser_cycles,
-                seed: args.seed,
-                engine: args.engine,
+                laser_cycles: asked.laser_cycles,
+                seed: asked.seed,
+                engine: asked.engine,
                 false_alarm_rate: args.false_alarm_rate,
                 walk_correction: !args.no_walk_correction,
-                calibration: args.calibration.as_ref().map(|p| p.display().to_string()),
-                guides: args.guiding.guides(),
-                windows: args.guiding.windows(),
+                calibration: asked.calibration.as_ref().map(|p| p.display().to_string()),
+                guides: asked.guiding.guides(),
+                windows: asked.guiding.windows(),
             },
             summary: frame.summary(),
             remark: frame.remark.as_deref(),
@@ -375,7 +355,7 @@ fn table(
             of(summary.guided, summary.pixels),
         )
         .row("surface in window", of(summary.in_window, summary.guided));
-    if !args.guiding.guides().is_empty() {
+    if !args.exposure.guiding.guides().is_empty() {
         table.push("guide", settings.guide.name());
     }
     quality::rows(&mut table, &settings.depth, &summary);
@@ -451,7 +431,7 @@ fn table(
     table.push("timing, slack", format!("{met}, {left_over}"));
     table.push("timing, tightest", &timing.check);
     for (row, col) in &frame.probes {
-        let engine = args.engine.of_probes(frame.kept.is_some());
+        let engine = args.exposure.engine.of_probes(frame.kept.is_some());
         let agrees = format!("agrees with {engine:?} engine").to_lowercase();
         table.push(format!("gate level ({row}, {col})"), agrees);
     }

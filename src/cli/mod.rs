@@ -1,6 +1,7 @@
 //! The command line. Bad input ends with one sentence on standard error and exit status 2; anything
 //! else that goes wrong with exit status 1.
 
+mod asked;
 mod calibrate;
 mod demo;
 mod doctor;

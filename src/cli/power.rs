@@ -114,7 +114,7 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
         let config = SensorConfig {
             p_counter,
             mode,
-            ..config.clone()
+            ..SensorConfig::clone(&config)
         };
         if config.check().is_err() {
             continue;

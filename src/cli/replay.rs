@@ -14,7 +14,7 @@ use super::silicon::SiliconArgs;
 use super::voice::{progress, say};
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::bench::{HardwareEventKind, HardwareEventReport};
-use crate::chip::{Sensor, SensorConfig, Silicon};
+use crate::chip::{SensorConfig, Silicon};
 use crate::engine::waveform::{self, View};
 use crate::engine::{
     ClosedFormCoverage, EngineError, Gate, GateSimulation, Histograms, PulsedPixel, Replay, Runner,
@@ -120,10 +120,10 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         return Err(InputError::new(format!("--checks-json {}", json.display()), message).into());
     }
     let stimuli = args.stimuli.read()?;
-    let silicon = args.silicon.read(stimuli.config.corner)?;
+    let silicon = args.silicon.read(stimuli.sensor.corner)?;
     // Delays of a file are the gates' to judge, and mismatched macropixels each their own (`gdtof timing --mismatch`).
     let timing = (args.sdf.is_none() && silicon.mismatch.is_none())
-        .then(|| TimingVerdict::of(&stimuli.config, &silicon, (0, 0)).report());
+        .then(|| TimingVerdict::of(&stimuli.sensor, &silicon, (0, 0)).report());
     let silicon = (silicon != Silicon::nominal(silicon.corner)).then_some(silicon);
     let clash = [
         (args.sdf.is_some(), "--sdf"),
@@ -151,9 +151,9 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         timing,
         time_keeping: replayed.coverage,
     };
-    summary.tell(&stimuli.config);
+    summary.tell(&stimuli.sensor);
     let out = args.out.as_deref();
-    write(&stimuli.config, &replayed.histograms, out, format)?;
+    write(&stimuli.sensor, &replayed.histograms, out, format)?;
     if args.json {
         say(format_args!(
             "{}\n",
@@ -208,17 +208,17 @@ fn replay_array(
     args: &ReplayArgs,
     silicon: Option<Silicon>,
 ) -> anyhow::Result<Replayed> {
-    let config = &stimuli.config;
+    let sensor = &stimuli.sensor;
     let mut simulation = GateSimulation::new(
-        config,
+        sensor,
         &stimuli.exposure,
         (0, 0),
-        (config.rows, config.cols),
+        (sensor.rows, sensor.cols),
         &stimuli.starts,
         &stimuli.pulses(),
     );
     if let Some(sdf) = &args.sdf {
-        let timing = annotated_timing(sdf, simulation.netlist(), config)?;
+        let timing = annotated_timing(sdf, simulation.netlist(), sensor)?;
         simulation = simulation.with_timing(&timing);
     }
     if let Some(silicon) = silicon {
@@ -255,14 +255,10 @@ fn replay_array(
     let cancelled = match silicon {
         _ if args.sdf.is_some() => 2 * events.count(HardwareEventKind::PulsesCancelled),
         Some(silicon) => {
-            let timed = Timed::new(
-                Sensor::from(config).made_of(&silicon),
-                exposure,
-                Runner::Gate,
-            );
-            cancelled(&timed, config, &pixels)
+            let timed = Timed::new(sensor.made_of(&silicon), exposure, Runner::Gate);
+            cancelled(&timed, sensor, &pixels)
         }
-        None => cancelled(&Gate::new(config, exposure), config, &pixels),
+        None => cancelled(&Gate::new(sensor, exposure), sensor, &pixels),
     };
     Ok(Replayed {
         histograms: simulation.histograms()?,
@@ -310,14 +306,14 @@ fn record<O: Observer>(
         return Ok(());
     };
     let Stimuli {
-        config,
+        sensor,
         exposure,
         starts,
         ..
     } = stimuli;
-    let pixels = (0..config.rows).flat_map(|row| (0..config.cols).map(move |col| (row, col)));
+    let pixels = (0..sensor.rows).flat_map(|row| (0..sensor.cols).map(move |col| (row, col)));
     let start = *starts.first().expect("a sensor has a macropixel");
-    let view = View::of_array(pixels.collect(), config, exposure, start);
+    let view = View::of_array(pixels.collect(), sensor, exposure, start);
     let format = args.wave_format.unwrap_or(WaveFormat::of(waves));
     waveform::record(simulation, waves, format, &view, observer)
 }
@@ -343,10 +339,10 @@ fn replay(
     silicon: Option<&Silicon>,
 ) -> anyhow::Result<Replayed> {
     let Stimuli {
-        config, exposure, ..
+        sensor, exposure, ..
     } = stimuli;
     let Some(silicon) = silicon else {
-        return run_engine(stimuli, &*kind.replay(config, exposure)?);
+        return run_engine(stimuli, &*kind.replay(sensor, exposure)?);
     };
     let runner = match kind {
         EngineKind::Gate => Runner::Gate,
@@ -354,7 +350,7 @@ fn replay(
         EngineKind::Window => Runner::Window,
         EngineKind::Cohort => return Err(EngineError::NoPhotons.into()),
     };
-    let timed = Timed::new(Sensor::from(config).made_of(silicon), exposure, runner);
+    let timed = Timed::new(sensor.made_of(silicon), exposure, runner);
     let replayed = run_engine(stimuli, &timed)?;
     Ok(Replayed {
         coverage: (runner != Runner::Gate).then(|| timed.coverage()),
@@ -378,7 +374,7 @@ fn run_engine(stimuli: &Stimuli, engine: &dyn Replay) -> anyhow::Result<Replayed
     progress.finish_and_clear();
     Ok(Replayed {
         histograms: Histograms::joined(engine.bins(), batches?),
-        cancelled: cancelled(engine, &stimuli.config, &pixels),
+        cancelled: cancelled(engine, &stimuli.sensor, &pixels),
         coverage: None,
     })
 }

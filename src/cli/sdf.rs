@@ -68,7 +68,7 @@ pub(super) fn run(args: &SdfArgs) -> anyhow::Result<()> {
         },
     };
     let bytes = size(&config, options)?;
-    let SensorConfig { rows, cols, .. } = config;
+    let SensorConfig { rows, cols, .. } = &*config;
     if bytes > LARGEST_UNASKED && !args.sensor.gives_size() {
         let message = format!(
             "the delays of {rows} × {cols} macropixels take about {}; choose how many with --rows and --cols, as for export verilog (--rows {rows} --cols {cols} writes all)",

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::voice::say;
-use crate::chip::SensorConfig;
+use crate::chip::Sensor;
 use crate::files::InputError;
 use crate::request::{Sources, Spelling};
 use crate::scene::Scene;
@@ -43,7 +43,7 @@ impl SensorArgs {
     ///
     /// # Errors
     /// Unreadable files, bad keys and values, and `--set` of anything but the sensor.
-    pub(super) fn read(&self) -> Result<SensorConfig, InputError> {
+    pub(super) fn read(&self) -> Result<Sensor, InputError> {
         self.sources(None).read_sensor()
     }
 
@@ -81,7 +81,7 @@ impl SceneArgs {
     ///
     /// # Errors
     /// Unreadable files, bad keys and values.
-    pub(super) fn read(&self) -> Result<(SensorConfig, Scene), InputError> {
+    pub(super) fn read(&self) -> Result<(Sensor, Scene), InputError> {
         self.sources().read()
     }
 

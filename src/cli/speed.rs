@@ -317,14 +317,14 @@ fn measure(subject: Subject, runs: u16) -> anyhow::Result<Figure> {
 }
 
 fn times(frame: &SpeedFrame, work: Work, runs: u16) -> anyhow::Result<(Spread, Spread)> {
-    let (config, exposure) = (&frame.config, &frame.exposure);
-    let cycle = || Cycle::new(config, exposure);
-    let window = Window::new(config, exposure);
+    let (sensor, exposure) = (&frame.sensor, &frame.exposure);
+    let cycle = || Cycle::new(sensor, exposure);
+    let window = Window::new(sensor, exposure);
     let on_light = |engine: &dyn Expose| timed(runs, || frame.expose(engine));
     match work {
         Work::CycleWhole => return on_light(&cycle()),
         Work::WindowWhole => return on_light(&window),
-        Work::Cohort => return on_light(&Cohort::new(config, exposure, CohortOptions::default())),
+        Work::Cohort => return on_light(&Cohort::new(sensor, exposure, CohortOptions::default())),
         _ => (),
     }
     let (starts, photons) = (frame.starts(), frame.pulses());

@@ -54,7 +54,7 @@ struct Report {
 /// Bad input and unwritable output.
 pub(super) fn run(args: &WaveArgs) -> anyhow::Result<()> {
     let frame = TakenFrame::read(&args.frame)?;
-    let (sensor, exposure) = (&frame.sensor, &frame.exposure);
+    let (sensor, exposure) = (&frame.settings.sensor, &frame.settings.exposure);
     let at = super::pixel("--pixel", &args.pixel, sensor)?;
     if args.cycle >= exposure.laser_cycles {
         let message = format!(
@@ -92,8 +92,8 @@ pub(super) fn run(args: &WaveArgs) -> anyhow::Result<()> {
         to_fs: (origin + to).as_fs(),
         waveform: waves,
     };
-    let replaced =
-        frame.engine.of_probes(frame.has_tolerance) != frame.engine || frame.has_tolerance;
+    let engine = frame.settings.engine;
+    let replaced = engine.of_probes(frame.has_tolerance) != engine || frame.has_tolerance;
     if replaced {
         note(
             "the frame's counts were not all made of photons (cohort); these are the photons that the window engine counts",

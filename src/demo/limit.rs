@@ -4,18 +4,11 @@
 //! laser cycles of that exposure see of a target of 10 % at 190 m, and whether the guide's windows hold it, is measured for more and
 //! more laser energy and for better and better stereo.
 
-use std::sync::Arc;
-
 use super::found::Found;
 use super::scenes;
-use crate::chip::{Exposure, SensorConfig};
-use crate::engine::CohortOptions;
-use crate::guide::BehaviouralStereo;
-use crate::ranging::DepthOptions;
+use crate::chip::{Exposure, Sensor};
 use crate::scene::{DVec3, GroundTruth, Scene, Stereo};
-use crate::system::{
-    Drive, DriveSettings, EngineKind, FrameClock, FrameError, FrameSettings, Noise, WindowPolicy,
-};
+use crate::system::{Drive, DriveSettings, FrameClock, FrameError, FrameSettings};
 
 /// Where the target stands, m. The chip's last window ends at 2⁹ bins, 199.9 m: a target at 200 m is outside all of them, and one just
 /// before it where the guide is wrong by a little.
@@ -71,7 +64,7 @@ fn limit(
     disparity_px: f64,
     seed: u64,
 ) -> Result<Limit, FrameError> {
-    let sensor = SensorConfig::default();
+    let sensor = Sensor::default();
     let chip_s = 1.0 / FPS - sensor.load_time().as_s() - sensor.readout_time().as_s();
     let laser_cycles = (chip_s * sensor.clk_hz / f64::from(stop_periods)).floor() as u32;
     let exposure = Exposure::new(&sensor, stop_periods, laser_cycles);
@@ -82,30 +75,18 @@ fn limit(
         .iter()
         .map(|&object| object == Some(1))
         .collect();
+    let frame = FrameSettings {
+        seed,
+        ..FrameSettings::new(sensor, scene, exposure)
+    };
     let settings = DriveSettings {
-        frame: FrameSettings {
-            sensor,
-            scene,
-            exposure,
-            seed,
-            engine: EngineKind::Window,
-            cohort: CohortOptions::default(),
-            tolerance_m: None,
-            skip: true,
-            depth: DepthOptions::default(),
-            calibration: None,
-            guide: Arc::new(BehaviouralStereo),
-        },
-        policy: WindowPolicy::default(),
         clock: FrameClock {
             guide_latency_s: 1.0 / FPS,
             pipelined: true,
         },
         segments: 1,
-        noise: Noise::Fresh,
-        reuse: true,
         only: Some(only.clone()),
-        start_s: 0.0,
+        ..DriveSettings::new(frame)
     };
     let mut drive = Drive::new(&settings)?;
     let period_s = drive.period_s();

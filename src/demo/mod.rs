@@ -17,17 +17,10 @@ pub(crate) mod show;
 pub(crate) mod shows;
 pub(crate) mod sweep;
 
-use std::sync::Arc;
-
-use crate::chip::{Exposure, Sensor, SensorConfig, hslidar_delay_line};
-use crate::engine::CohortOptions;
-use crate::guide::{BehaviouralStereo, Guide};
-use crate::ranging::{BinProfile, DepthOptions};
+use crate::chip::{Exposure, Sensor, hslidar_delay_line};
+use crate::ranging::BinProfile;
 use crate::scene::Scene;
-use crate::system::{
-    DriveSettings, EngineKind, FrameClock, FrameSettings, Noise, Sweep, SweepError, WindowPolicy,
-    calibrate,
-};
+use crate::system::{DriveSettings, FrameSettings, Sweep, SweepError, calibrate};
 use crate::units::Time;
 
 /// CLK periods in a laser cycle: 80 kHz on a CLK of 80 MHz (Table 14).
@@ -38,7 +31,7 @@ pub(crate) const LASER_CYCLES: u32 = 16_000;
 /// The chip with its calibration.
 #[derive(Debug, Clone)]
 pub(crate) struct Demonstrator {
-    pub(crate) sensor: SensorConfig,
+    pub(crate) sensor: Sensor,
     pub(crate) exposure: Exposure,
     pub(crate) calibration: BinProfile,
 }
@@ -62,7 +55,7 @@ impl Demonstrator {
     pub(crate) fn of(calibration: BinProfile) -> Self {
         Demonstrator {
             exposure: Exposure::new(&calibration.sensor, STOP_PERIODS, LASER_CYCLES),
-            sensor: calibration.sensor.clone(),
+            sensor: Sensor::from(&calibration.sensor),
             calibration,
         }
     }
@@ -72,28 +65,10 @@ impl Demonstrator {
     pub(crate) fn drive(&self, mut scene: Scene, seed: u64) -> DriveSettings {
         let rows = hslidar_delay_line().rows;
         scene.lidar.pulse_energy_uj *= self.sensor.rows as f64 / rows as f64;
-        let guide: Arc<dyn Guide> = Arc::new(BehaviouralStereo);
-        DriveSettings {
-            frame: FrameSettings {
-                sensor: self.sensor.clone(),
-                scene,
-                exposure: self.exposure,
-                seed,
-                engine: EngineKind::Window,
-                cohort: CohortOptions::default(),
-                tolerance_m: None,
-                skip: true,
-                depth: DepthOptions::default(),
-                calibration: Some(self.calibration.clone()),
-                guide,
-            },
-            policy: WindowPolicy::default(),
-            clock: FrameClock::default(),
-            segments: 4,
-            noise: Noise::Fresh,
-            reuse: true,
-            only: None,
-            start_s: 0.0,
-        }
+        DriveSettings::new(FrameSettings {
+            seed,
+            calibration: Some(self.calibration.clone()),
+            ..FrameSettings::new(&self.sensor, scene, self.exposure)
+        })
     }
 }

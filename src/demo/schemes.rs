@@ -16,12 +16,12 @@ use rayon::prelude::*;
 use super::Demonstrator;
 use super::found::Found;
 use crate::chip::{Exposure, Sensor, SensorConfig, Tdc, WindowLaw, hslidar};
-use crate::engine::{Expose, Histograms, LitPixel, Window, expose, stream_config};
+use crate::engine::{Histograms, LitPixel, Window, expose};
 use crate::guide::GuideMap;
-use crate::photon::{PhotonStream, PixelLight};
+use crate::photon::PixelLight;
 use crate::ranging::DepthOptions;
 use crate::scene::{GroundTruth, Scene};
-use crate::system::{FrameError, Known, PixelDepth, Pointing, Ranger, WindowPolicy};
+use crate::system::{FrameError, Known, PixelDepth, Pointing, Ranger, WindowPolicy, photon_stream};
 use crate::units::Time;
 
 /// How far full, sliding and zooming histograms look, m: the demonstrator's 75 m and a little.
@@ -74,7 +74,7 @@ pub(crate) fn compare(
         seed,
     };
     let cycles = demonstrator.exposure.laser_cycles;
-    let law = WindowLaw::new(Sensor::from(sensor).alike(), &demonstrator.exposure);
+    let law = WindowLaw::new(sensor.alike(), &demonstrator.exposure);
     let starts: Vec<u16> = (0..=sensor.largest_start())
         .filter(|&start| {
             let window = law.window(start).open();
@@ -159,20 +159,15 @@ impl Bench<'_> {
 
     fn expose(
         &self,
-        sensor: &SensorConfig,
+        sensor: &Sensor,
         exposure: &Exposure,
         salt: u64,
         lit: &[LitPixel],
     ) -> Result<Histograms, FrameError> {
         let seed = self.seed.wrapping_mul(1000).wrapping_add(salt);
-        let stream = stream_config(sensor, exposure, seed, self.world.pulse_sigma());
-        let engine: Box<dyn Expose> = Box::new(Window::new(sensor, exposure));
-        let exposed = expose(
-            &*engine,
-            &PhotonStream::new(&self.world.with_pulse(stream)),
-            lit,
-            |_| {},
-        )?;
+        let stream = photon_stream(sensor, exposure, seed, self.world);
+        let engine = Window::new(sensor, exposure);
+        let exposed = expose(&engine, &stream, lit, |_| {})?;
         Ok(exposed.histograms)
     }
 
@@ -217,12 +212,12 @@ impl Bench<'_> {
         let mut looks: Vec<Time> =
             vec![Time::from_s(0.5 * ZOOM_BINS_S[0] * 8.0); self.pixels.len()];
         for (step, bin_s) in ZOOM_BINS_S.into_iter().enumerate() {
-            let sensor = SensorConfig {
+            let sensor = Sensor::from(SensorConfig {
                 tdc: Tdc::Clocked,
                 step_periods: 1,
                 clk_hz: 1.0 / bin_s,
                 ..(*hslidar()).clone()
-            };
+            });
             let periods = (laser_cycle_s / bin_s).floor() as u32;
             let exposure = Exposure::new(&sensor, periods, cycles);
             let law = WindowLaw::new(&sensor, &exposure);
@@ -242,7 +237,7 @@ impl Bench<'_> {
             }
         }
         let sensor = &self.demonstrator.sensor;
-        let law = WindowLaw::new(Sensor::from(sensor).alike(), &self.demonstrator.exposure);
+        let law = WindowLaw::new(sensor.alike(), &self.demonstrator.exposure);
         let starts: Vec<Option<u16>> = looks.iter().map(|&look| law.start_for(look)).collect();
         self.depths(cycles, 990, 1, |pixel| {
             let at = self.pixels.iter().position(|&p| p == pixel);

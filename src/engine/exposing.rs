@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{Cancelling, Engine, EngineError, Expose, Histograms, PulsedPixel, Replay};
-use crate::chip::{Exposure, SensorConfig, WindowLaw};
+use crate::chip::{Exposure, Sensor, WindowLaw};
 use crate::photon::{
     DeadTimeLaw, PhotonStream, PixelLight, PixelPhotons, SpadEvent, SpadModel, StreamConfig,
 };
@@ -96,29 +96,30 @@ impl Sum for Work {
 /// The stream of light for a sensor in an exposure, with its slots where the sensor's bins are. `pulse_sigma` is that of
 /// the laser pulse with all jitter.
 pub fn stream_config(
-    config: &SensorConfig,
+    sensor: impl Into<Sensor>,
     exposure: &Exposure,
     seed: u64,
     pulse_sigma: Time,
 ) -> StreamConfig {
+    let sensor = sensor.into();
     StreamConfig {
         seed,
         clock: exposure.clock,
         stop_periods: exposure.stop_periods,
         laser_cycles: exposure.laser_cycles,
-        lead: WindowLaw::new(config, exposure).lead(),
+        lead: WindowLaw::new(&sensor, exposure).lead(),
         pulse_sigma,
         pulse_shape: None,
         spads: SpadModel {
-            grid: config.spad_grid(),
-            dead_time: config.dead_time(),
-            law: match config.paralysable {
+            grid: sensor.spad_grid(),
+            dead_time: sensor.dead_time(),
+            law: match sensor.paralysable {
                 false => DeadTimeLaw::NonParalysable,
                 true => DeadTimeLaw::Paralysable,
             },
-            afterpulse_probability: config.afterpulse_probability,
-            afterpulse_time: Time::from_s(config.afterpulse_time_ns * 1e-9),
-            crosstalk_probability: config.crosstalk_probability,
+            afterpulse_probability: sensor.afterpulse_probability,
+            afterpulse_time: Time::from_s(sensor.afterpulse_time_ns * 1e-9),
+            crosstalk_probability: sensor.crosstalk_probability,
         },
     }
 }

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `complaint.rs` | what is wrong with an input: `FILE:LINE: what is wrong; what to do` |
 //! | `input.rs` | texts, read whole or line by line, and what is no text refused |
+//! | `arrays.rs` | NumPy files of known shape: results that are read again, users' counts |
 //! | `raster.rs` | pictures and maps: PNG, `.npy`, PFM, EXR |
 //! | `output.rs` | output files: beside the target first, then renamed over it |
 //! | `temporary.rs` | what stands there meanwhile, and what killed runs left of it |
@@ -11,8 +12,8 @@
 //! | `journal.rs` | lines with checksums that are only appended |
 //! | `result_set.rs` | the results of a run as one set with a manifest |
 
+mod arrays;
 mod complaint;
-mod counts;
 mod input;
 mod interruption;
 mod journal;
@@ -21,8 +22,8 @@ mod raster;
 mod result_set;
 mod temporary;
 
+pub(crate) use arrays::{read_array, read_counts};
 pub use complaint::InputError;
-pub(crate) use counts::read_counts;
 pub use input::Lines;
 pub(crate) use input::{line_of, parse_json, parse_toml, read_text};
 pub(crate) use interruption::clean_up_when_interrupted;

@@ -24,10 +24,11 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::recording::{Recorded, Recording};
+use crate::chip::SensorConfig;
 use crate::files::InputError;
 use crate::guide::view;
 use crate::scene::{DVec3, Ray, Scene};
-use crate::system::{NoDepth, Ranger};
+use crate::system::{NoDepth, Ranger, TakenSettings};
 
 /// Pixels of the camera view across a macropixel.
 const ACROSS: u32 = 4;
@@ -109,19 +110,17 @@ impl Packed {
     /// # Errors
     /// Histograms that no depth is found in.
     pub(super) fn new(recording: &Recording, folder: &Path) -> Result<Self, InputError> {
-        let &Recording {
-            ref scene,
-            ref sensor,
-            exposure,
-            ..
-        } = recording;
-        let ranger = Ranger::new(
-            sensor,
-            &exposure,
+        let TakenSettings {
+            scene_name,
             scene,
-            &recording.options,
-            recording.calibration.as_ref(),
-        );
+            sensor,
+            exposure,
+            seed,
+            depth,
+            ..
+        } = &recording.settings;
+        let calibration = recording.calibration.as_ref();
+        let ranger = Ranger::new(sensor, exposure, scene, depth, calibration);
         let ranger = ranger.map_err(|why| InputError::new(folder.display(), why.to_string()))?;
         let mut windows = Windows::default();
         let arrays: Vec<Vec<u8>> = (recording.frames.iter())
@@ -140,13 +139,13 @@ impl Packed {
             summary: frame.summary.clone(),
         });
         let meta = Meta {
-            title: format!("{kind} of {}", recording.scene_name),
+            title: format!("{kind} of {scene_name}"),
             version: env!("CARGO_PKG_VERSION"),
             is_drive: recording.is_drive,
-            scene: (recording.scene_name.strip_prefix("built-in "))
-                .unwrap_or(&recording.scene_name)
+            scene: (scene_name.strip_prefix("built-in "))
+                .unwrap_or(scene_name)
                 .to_owned(),
-            seed: recording.seed,
+            seed: *seed,
             stop_periods: exposure.stop_periods,
             folder: folder.display().to_string(),
             rows: sensor.rows,
@@ -175,7 +174,8 @@ fn arrays(
     ranger: &Ranger<'_>,
     windows: &mut Windows,
 ) -> Vec<u8> {
-    let bins = recording.sensor.bins;
+    let TakenSettings { sensor, scene, .. } = &recording.settings;
+    let bins = sensor.bins;
     let counts_of = |pixel: usize| &frame.counts[pixel * bins..(pixel + 1) * bins];
     let found: Vec<_> = (frame.known.par_iter())
         .map(|known| {
@@ -207,25 +207,21 @@ fn arrays(
         let start = known.start.map_or(-1, |start| start as i16);
         bytes.extend(start.to_le_bytes());
     }
-    let scene = recording.scene.at(frame.time_s);
-    for object in objects(&scene, recording) {
+    let scene = scene.at(frame.time_s);
+    for object in objects(&scene, sensor) {
         bytes.extend(object.to_le_bytes());
     }
     bytes.extend(frame.counts.iter().flat_map(|n| n.to_le_bytes()));
     bytes.extend(found.iter().map(|(pixel, _)| {
-        let reason = pixel.no_depth.map_or(0, |why| {
-            let all = NoDepth::ALL.iter();
-            all.take_while(|&&other| other != why).count() as u8 + 1
-        });
-        reason + if pixel.in_window { IN_WINDOW } else { 0 }
+        NoDepth::number(pixel.no_depth) + if pixel.in_window { IN_WINDOW } else { 0 }
     }));
-    bytes.extend(picture(&scene, recording));
+    bytes.extend(picture(&scene, sensor));
     bytes
 }
 
 /// What the middle of every macropixel sees, from 1; 0 for the sky.
-fn objects(scene: &Scene, recording: &Recording) -> Vec<u16> {
-    let (rows, cols) = (recording.sensor.rows, recording.sensor.cols);
+fn objects(scene: &Scene, sensor: &SensorConfig) -> Vec<u16> {
+    let (rows, cols) = (sensor.rows, sensor.cols);
     let camera = scene.lidar_camera(rows as u32, cols as u32);
     let pixels = (0..rows * cols).into_par_iter();
     let seen = pixels.map(|pixel| {
@@ -237,8 +233,8 @@ fn objects(scene: &Scene, recording: &Recording) -> Vec<u16> {
 }
 
 /// What a camera in the lidar's place sees, in bytes of grey.
-fn picture(scene: &Scene, recording: &Recording) -> Vec<u8> {
-    let (rows, cols) = (recording.sensor.rows as u32, recording.sensor.cols as u32);
+fn picture(scene: &Scene, sensor: &SensorConfig) -> Vec<u8> {
+    let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
     let seen = view(scene, rows * ACROSS, cols * ACROSS);
     let mut sorted = seen.clone();
     let rank = sorted.len() * 99 / 100;

@@ -10,7 +10,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::chip::{Exposure, SensorConfig, WindowLaw};
+use crate::chip::{Exposure, Sensor, SensorConfig, WindowLaw};
 
 /// Bins of one delay line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -65,7 +65,7 @@ const FREE: [&str; 13] = [
 
 impl BinProfile {
     /// What is assumed without a calibration: elements of the mean delay, and no skew.
-    pub fn ideal(sensor: &SensorConfig, exposure: &Exposure) -> Self {
+    pub fn ideal(sensor: &Sensor, exposure: &Exposure) -> Self {
         let law = WindowLaw::new(sensor.alike(), exposure);
         let opens = |parity: u16| {
             let mut starts = (parity..=sensor.largest_start()).step_by(2);
@@ -91,7 +91,7 @@ impl BinProfile {
         };
         let lines = [line(&windows[0]), line(&windows[1])];
         BinProfile {
-            sensor: sensor.clone(),
+            sensor: SensorConfig::clone(sensor),
             starts: [0, 1].map(|parity| windows[parity].map_or(parity as u16, |w| w.start)),
             macropixels: vec![lines; sensor.pixels()],
         }

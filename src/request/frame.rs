@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::{Spelling, guided_exposure, read_calibration};
-use crate::chip::{SensorConfig, Tdc};
+use crate::chip::{Sensor, Tdc};
 use crate::engine::CohortOptions;
 use crate::files::InputError;
 use crate::guide::{BehaviouralStereo, Guide, GuideInput, options};
@@ -174,7 +174,7 @@ impl FrameRequest {
     /// What cannot be, by the setting at fault; a guide without a map, where bins are to follow it.
     pub fn settings(
         &self,
-        sensor: SensorConfig,
+        sensor: Sensor,
         scene: Scene,
     ) -> Result<(FrameSettings, WindowPolicy), FrameError> {
         let guide = self.guide()?;
@@ -188,7 +188,7 @@ impl FrameRequest {
     /// As those of [`FrameRequest::settings`].
     pub fn settings_by(
         &self,
-        sensor: SensorConfig,
+        sensor: Sensor,
         scene: Scene,
         guide: Arc<dyn Guide>,
         policy: &WindowPolicy,
@@ -218,9 +218,6 @@ impl FrameRequest {
             None => None,
         };
         Ok(FrameSettings {
-            sensor,
-            scene,
-            exposure,
             seed: self.seed,
             engine: self.engine,
             cohort: CohortOptions {
@@ -236,17 +233,18 @@ impl FrameRequest {
             },
             calibration,
             guide,
+            ..FrameSettings::new(sensor, scene, exposure)
         })
     }
 
     /// The sensor and the CLK periods of a laser cycle, with the bins that the guide's errors ask for.
     fn with_bins(
         &self,
-        sensor: SensorConfig,
+        sensor: Sensor,
         scene: &Scene,
         guide: &dyn Guide,
         policy: &WindowPolicy,
-    ) -> Result<(SensorConfig, u32), FrameError> {
+    ) -> Result<(Sensor, u32), FrameError> {
         let input = GuideInput::still(scene, sensor.rows as u32, sensor.cols as u32, self.seed);
         let map = guide.estimate(&input)?;
         let slowed = policy.slowed(&map, &sensor, self.stop_periods);
@@ -338,7 +336,7 @@ mod tests {
                     spelling,
                     ..request.clone()
                 };
-                let refused = request.settings(SensorConfig::default(), Scene::outdoor());
+                let refused = request.settings(Sensor::default(), Scene::outdoor());
                 let sentence = refused.unwrap_err().to_string();
                 assert!(sentence.starts_with(&spelling.name(key)), "{sentence}");
             }

@@ -1,7 +1,7 @@
 //! What a user asks for, read and checked: a sensor and a scene by name, file and single keys, and a frame of them.
 //!
 //! ```text
-//!   names, files, KEY=VALUE ──► Sources ──► SensorConfig, Scene ─┐
+//!   names, files, KEY=VALUE ──► Sources ──► Sensor, Scene ───────┐
 //!   counts, engine, guides ───► FrameRequest ────────────────────┴─► FrameSettings, WindowPolicy
 //! ```
 //!

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   sensor ────────┐                      scene ─────────┐
-//!   set sensor.… ──┼─► SensorConfig       set scene.… ───┴─► Scene
+//!   set sensor.… ──┼─► Sensor             set scene.… ───┴─► Scene
 //!   rows, cols ────┘
 //! ```
 
@@ -41,7 +41,7 @@ impl Sources {
     ///
     /// # Errors
     /// Unreadable files, bad keys and values, and a key of anything but the sensor.
-    pub fn read_sensor(&self) -> Result<SensorConfig, InputError> {
+    pub fn read_sensor(&self) -> Result<Sensor, InputError> {
         self.read_sensor_with(None)
     }
 
@@ -49,7 +49,7 @@ impl Sources {
     ///
     /// # Errors
     /// Unreadable files, bad keys and values.
-    pub fn read(&self) -> Result<(SensorConfig, Scene), InputError> {
+    pub fn read(&self) -> Result<(Sensor, Scene), InputError> {
         let mut document = match &self.scene {
             Some(path) => scene_document(path)?,
             None => Scene::outdoor_document(),
@@ -65,10 +65,7 @@ impl Sources {
         }
     }
 
-    fn read_sensor_with(
-        &self,
-        mut scene: Option<&mut Document>,
-    ) -> Result<SensorConfig, InputError> {
+    fn read_sensor_with(&self, mut scene: Option<&mut Document>) -> Result<Sensor, InputError> {
         let mut sensor = match &self.sensor {
             Some(path) => described(path)?,
             None => Document::of("the sensor", toml::Table::new()),
@@ -94,7 +91,7 @@ impl Sources {
                 sensor.set_value(key, value.into(), &self.spelling.name(key));
             }
         }
-        SensorConfig::read_document(&sensor)
+        Ok(SensorConfig::read_document(&sensor)?.into())
     }
 
     /// What reports call the scene.

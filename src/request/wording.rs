@@ -3,7 +3,7 @@
 use super::Spelling;
 use crate::chip::race::{Cure, NoAim};
 use crate::chip::window_law::Irregular;
-use crate::chip::{Exposure, ExposureError, SensorConfig, WindowLaw};
+use crate::chip::{Exposure, ExposureError, Sensor, SensorConfig, WindowLaw};
 use crate::engine::EngineError;
 use crate::files::InputError;
 use crate::system::FrameError;
@@ -134,13 +134,13 @@ pub fn exposure(
 /// # Errors
 /// As those of [`exposure`], and a sensor whose windows cannot be aimed.
 pub fn guided_exposure(
-    config: &SensorConfig,
+    sensor: &Sensor,
     stop_periods: u32,
     laser_cycles: u32,
     spelling: Spelling,
 ) -> Result<Exposure, InputError> {
-    let exposure = exposure(config, stop_periods, laser_cycles, spelling)?;
-    match WindowLaw::new(config, &exposure).refusal() {
+    let exposure = exposure(sensor, stop_periods, laser_cycles, spelling)?;
+    match WindowLaw::new(sensor, &exposure).refusal() {
         None => Ok(exposure),
         Some(why) => {
             let (why, cure) = of_no_aim(&why, spelling);

@@ -14,7 +14,7 @@ use super::cell::{Cell, Column, Holds};
 use super::row::{Key, Row};
 use super::study::{Kind, Point, Study};
 use super::theory::{self, Last, Rig, Wall};
-use crate::chip::SensorConfig;
+use crate::chip::{Sensor, SensorConfig};
 use crate::files::InputError;
 use crate::request::{FrameRequest, Sources, Spelling, is_bad_input, sentence};
 use crate::scene::Scene;
@@ -27,7 +27,12 @@ pub(super) struct Subject<'a> {
     columns: Vec<Column>,
     /// Hashes of files that have been looked at: they are taken not to change while a study runs.
     hashes: Mutex<HashMap<PathBuf, String>>,
+    /// The latest sensors that differ.
+    sensors: Mutex<Vec<Sensor>>,
 }
+
+/// Sensors that are kept for points to come: a study that varies more of them has each of them measured again.
+const MOST_SENSORS: usize = 64;
 
 /// What a thread keeps from point to point.
 #[derive(Default)]
@@ -39,7 +44,7 @@ pub(super) struct Scratch {
 /// A sensor before a scene.
 struct World {
     sources: Sources,
-    sensor: SensorConfig,
+    sensor: Sensor,
     scene: Scene,
     /// All that a result depends on of it.
     content: String,
@@ -65,6 +70,7 @@ impl<'a> Subject<'a> {
             names: study.varied().map(|varied| varied.name.clone()).collect(),
             columns: Self::columns(study.kind),
             hashes: Mutex::default(),
+            sensors: Mutex::default(),
         }
     }
 
@@ -172,7 +178,8 @@ impl<'a> Subject<'a> {
 
     fn world(&self, sources: Sources) -> Result<World, InputError> {
         let (sensor, scene) = sources.read()?;
-        let json = serde_json::to_value((&sensor, &scene)).expect("numbers and words");
+        let sensor = self.shared(sensor);
+        let json = serde_json::to_value((&*sensor, &scene)).expect("numbers and words");
         let mut content = json.to_string();
         self.files_in(&json[1]["object"], &mut content);
         Ok(World {
@@ -182,6 +189,19 @@ impl<'a> Subject<'a> {
             scene,
             content,
         })
+    }
+
+    /// The sensor of an earlier point, where that was the same, with all that has been measured of it.
+    fn shared(&self, sensor: Sensor) -> Sensor {
+        let mut sensors = self.sensors.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = sensors.iter().find(|known| **known == sensor) {
+            return known.clone();
+        }
+        if sensors.len() == MOST_SENSORS {
+            sensors.remove(0);
+        }
+        sensors.push(sensor.clone());
+        sensor
     }
 
     /// Adds the hashes of all files that are named anywhere in it.
@@ -360,6 +380,28 @@ mod tests {
 
     fn study(text: &str) -> Study {
         Study::parse("study.toml", text, Path::new(""), "test").unwrap()
+    }
+
+    #[test]
+    fn points_of_one_sensor_share_it() {
+        let study =
+            study("[vary]\nscene.lidar.pde = [0.1, 0.2]\nsensor.clk_hz = [\"384 MHz\", 3e8]\n");
+        let subject = Subject::new(&study);
+        let sensor = |index| {
+            // Each point on a thread of its own, as it were.
+            let ready = subject.ready(&study.point(index), &mut Scratch::default());
+            match ready.unwrap().task {
+                Task::Frame(world, _) => world.sensor.clone(),
+                Task::Theory(_) => unreachable!("frames are asked for"),
+            }
+        };
+        let sensors: Vec<Sensor> = (0..study.len()).map(sensor).collect();
+        assert_eq!(sensors.len(), 4);
+        for one in &sensors {
+            let same: Vec<&Sensor> = sensors.iter().filter(|other| *other == one).collect();
+            assert_eq!(same.len(), 2);
+            assert!(same.iter().all(|s| std::ptr::eq(s.timing(), one.timing())));
+        }
     }
 
     fn keys(text: &str) -> Vec<Key> {

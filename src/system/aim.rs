@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::chip::window_law::OpenWindow;
-use crate::chip::{Exposure, Mode, SensorConfig, Tdc, WindowLaw};
+use crate::chip::{Exposure, Mode, Sensor, Tdc, WindowLaw};
 use crate::ranging::{BinProfile, EchoFinder, PeakOptions, Sighting, centre_of_mass};
 use crate::units::Time;
 
@@ -30,7 +30,7 @@ pub(super) struct Aims<'p> {
 impl<'p> Aims<'p> {
     /// For a sensor, with its calibration if there is one.
     pub(super) fn new(
-        sensor: &SensorConfig,
+        sensor: &Sensor,
         exposure: &Exposure,
         calibration: Option<&'p BinProfile>,
     ) -> Self {

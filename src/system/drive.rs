@@ -20,18 +20,21 @@
 
 use rayon::prelude::*;
 
-use super::frame::{FrameError, FrameSettings, go_on, load_starts};
+use super::error::FrameError;
+use super::frame::{go_on, load_starts};
+use super::light::{light_in, lit, photon_stream, starts_of};
 use super::pixel::PixelDepth;
 use super::policy::{Pointing, WindowPolicy};
 use super::ranger::{Known, Ranger};
 use super::result::PhaseTimes;
+use super::settings::FrameSettings;
 use super::stopwatch::Stopwatch;
 use super::summary::Summary;
 use crate::chip::Exposure;
-use crate::engine::{Answer, Expose, Histograms, LitPixel, Work, expose, load, stream_config};
+use crate::engine::{Answer, Histograms, LitPixel, Work, expose, load};
 use crate::guide::{GuideInput, GuideMap, PastFrame};
 use crate::netlist::Netlist;
-use crate::photon::{PhotonStream, PixelLight, SpadModel};
+use crate::photon::{PhotonStream, PixelLight};
 use crate::scene::{DVec3, GroundTruth, Scene};
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
 
@@ -112,6 +115,23 @@ pub struct DriveSettings {
     pub only: Option<Vec<bool>>,
     /// The time of the scene at which the first images are taken, s.
     pub start_s: f64,
+}
+
+impl DriveSettings {
+    /// A drive of such frames from time 0 on, all macropixels lit, windows in the middle of the guide's estimates and the demonstrator's
+    /// clock; exposures have four segments, every frame its own photons, and what is the same as before is not simulated again.
+    pub fn new(frame: FrameSettings) -> Self {
+        DriveSettings {
+            frame,
+            policy: WindowPolicy::default(),
+            clock: FrameClock::default(),
+            segments: 4,
+            noise: Noise::default(),
+            reuse: true,
+            only: None,
+            start_s: 0.0,
+        }
+    }
 }
 
 /// What was not simulated again in a frame.
@@ -303,8 +323,7 @@ impl<'a> Drive<'a> {
         for (start, is_on) in wanted.iter_mut().zip(only.iter().flatten()) {
             *start = start.filter(|_| *is_on);
         }
-        let farthest = sensor.largest_start();
-        let starts: Vec<u16> = wanted.iter().map(|s| s.unwrap_or(farthest)).collect();
+        let starts = starts_of(sensor, &wanted);
         run.windows_s = clock.lap();
 
         reused.load = before.is_some_and(|last| last.starts == starts);
@@ -313,6 +332,7 @@ impl<'a> Drive<'a> {
         }
         run.load_s = clock.lap();
 
+        let stream = photon_stream(sensor, exposure, seed, scene);
         let worlds = worlds(scene, &times, *segments);
         let (truth, light) = match before.filter(|last| last.worlds == worlds) {
             Some(last) => {
@@ -325,20 +345,12 @@ impl<'a> Drive<'a> {
                     .map(|world| GroundTruth::render(world, rows, cols))
                     .collect();
                 run.scene_s = clock.lap();
-                let spads = stream_config(sensor, exposure, seed, scene.pulse_sigma()).spads;
-                let light = light_of(&worlds, &truths, exposure, &spads);
+                let light = light_of(&worlds, &truths, exposure, &stream);
                 let middle = truths.len() / 2;
                 (truths.into_iter().nth(middle).expect("one"), light)
             }
         };
-        let lit: Vec<LitPixel> = (0..)
-            .zip(starts.iter().zip(wanted.iter().zip(&light)))
-            .map(|(number, (&start, (wanted, light)))| LitPixel {
-                number,
-                start,
-                light: wanted.map(|_| light.clone()),
-            })
-            .collect();
+        let lit = lit(sensor, &wanted, &light);
         run.light_s = clock.lap();
 
         let same = before.filter(|_| *noise == Noise::Still);
@@ -346,9 +358,7 @@ impl<'a> Drive<'a> {
         let (old, new): (Vec<usize>, Vec<usize>) = (0..lit.len()).partition(|&p| is_same(p));
         let changed: Vec<LitPixel> = new.iter().map(|&pixel| lit[pixel].clone()).collect();
         go_on(exposed(old.len()))?;
-        let stream = stream_config(sensor, exposure, seed, scene.pulse_sigma());
-        let stream = PhotonStream::new(&scene.with_pulse(stream));
-        let engine: Box<dyn Expose> = frame.engine.expose(sensor, exposure);
+        let engine = frame.engine.expose(sensor, exposure, frame.cohort);
         let taken = expose(&*engine, &stream, &changed, exposed)?;
         let mut histograms = Histograms::empty(lit.len(), sensor.bins);
         for (&pixel, counts) in new.iter().zip(&taken.histograms) {
@@ -362,22 +372,19 @@ impl<'a> Drive<'a> {
         reused.macropixels = old.len();
         run.exposure_s = clock.lap();
 
-        let pixels: Vec<PixelDepth> = (0..lit.len())
-            .into_par_iter()
-            .map(|pixel| {
-                let known = Known {
-                    pixel,
-                    start: wanted[pixel],
-                    true_m: truth.range_m[pixel],
-                    guide_m: guide.range_m[pixel],
-                };
-                let before = same.filter(|_| is_same(pixel));
-                match before.map(|last| last.pixels[pixel]) {
-                    Some(before) if known.is_of(&before) => before,
-                    _ => self.ranger.depth(&known, &histograms[pixel]),
-                }
-            })
-            .collect();
+        let pixels = self.ranger.of_array(histograms.counts(), |pixel, counts| {
+            let known = Known {
+                pixel,
+                start: wanted[pixel],
+                true_m: truth.range_m[pixel],
+                guide_m: guide.range_m[pixel],
+            };
+            let before = same.filter(|_| is_same(pixel));
+            match before.map(|last| last.pixels[pixel]) {
+                Some(before) if known.is_of(&before) => before,
+                _ => self.ranger.depth(&known, counts),
+            }
+        });
         let windows_m = (wanted.par_iter().enumerate())
             .map(|(pixel, start)| self.ranger.window_m(pixel, (*start)?))
             .collect();
@@ -447,14 +454,12 @@ fn light_of(
     worlds: &[Scene],
     truths: &[GroundTruth],
     exposure: &Exposure,
-    spads: &SpadModel,
+    stream: &PhotonStream,
 ) -> Vec<PixelLight> {
-    let cycle_s = exposure.stop(1).as_s();
-    let cycles = exposure.laser_cycles;
     let lights: Vec<Vec<PixelLight>> = worlds
         .iter()
         .zip(truths)
-        .map(|(world, truth)| world.light_during(truth, spads, cycles, cycle_s))
+        .map(|(world, truth)| light_in(exposure, world, truth, stream))
         .collect();
     let parts = worlds.len() as u64;
     let first_cycle = |n: usize| (n as u64 * u64::from(exposure.laser_cycles) / parts) as u32;

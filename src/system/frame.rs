@@ -6,198 +6,28 @@
 //!                                            (gate level)    (any engine, probes also at gate level)
 //! ```
 
-use std::path::PathBuf;
-use std::sync::Arc;
-
 use rayon::prelude::*;
 
-use super::pixel::PixelDepth;
+use super::error::FrameError;
+use super::light::{light_in, lit, photon_stream, starts_of, truth_in};
 use super::policy::{Pointing, WindowPolicy};
 use super::ranger::{Known, Ranger};
 use super::remark::Circumstances;
 use super::result::{Frame, PhaseTimes};
+use super::settings::{EngineKind, FrameSettings, Probe};
 use super::stopwatch::Stopwatch;
 use super::tolerance::Tolerance;
-use crate::chip::{Exposure, SensorConfig};
-use crate::engine::waveform::{self, View, WaveCycles};
+use crate::chip::{Exposure, Sensor, SensorConfig};
+use crate::engine::waveform::{self, View};
 use crate::engine::{
-    Answer, Cohort, CohortOptions, Cycle, EngineError, Expose, Gate, GateSimulation, LitPixel,
-    Replay, Window, expose, expose_without_skipping, load, stream_config,
+    Answer, Cohort, EngineError, GateSimulation, LitPixel, Replay, Window, expose,
+    expose_without_skipping, load,
 };
-use crate::files::InputError;
-use crate::guide::{Guide, GuideError, GuideInput, GuideMap};
+use crate::guide::{GuideInput, GuideMap};
 use crate::netlist::Netlist;
-use crate::photon::{PhotonStream, SpadEvent, StreamConfig};
-use crate::ranging::{BinProfile, DepthOptions, UnequalBins};
-use crate::scene::{GroundTruth, Scene};
+use crate::photon::{PhotonStream, SpadEvent};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 use crate::waves::WaveFormat;
-
-/// Which engine runs the macropixels that are not probed.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Default,
-    serde::Serialize,
-    serde::Deserialize,
-    clap::ValueEnum,
-)]
-#[serde(rename_all = "lowercase")]
-pub enum EngineKind {
-    /// Event-driven simulation of the netlist with its delays.
-    Gate,
-    /// The levelised netlist, every CLK period.
-    Cycle,
-    /// The window law: only the CLK periods a window can see.
-    #[default]
-    Window,
-    /// No photons: histograms from their distribution, laser cycles in the same state together.
-    Cohort,
-}
-
-impl EngineKind {
-    /// The engine that probes at gate level are compared with when this one is asked for: `window` in the place of
-    /// `cohort`, which has no photons, and of what a tolerance chooses.
-    pub fn of_probes(self, has_tolerance: bool) -> Self {
-        match self {
-            EngineKind::Cohort => EngineKind::Window,
-            _ if has_tolerance => EngineKind::Window,
-            kind => kind,
-        }
-    }
-
-    /// The engine that replays pulses, for a sensor and an exposure.
-    ///
-    /// # Errors
-    /// `cohort` has no photons.
-    pub fn replay<'a>(
-        self,
-        config: &'a SensorConfig,
-        exposure: &'a Exposure,
-    ) -> Result<Box<dyn Replay + 'a>, EngineError> {
-        match self {
-            EngineKind::Gate => Ok(Box::new(Gate::new(config, exposure))),
-            EngineKind::Cycle => Ok(Box::new(Cycle::new(config, exposure))),
-            EngineKind::Window => Ok(Box::new(Window::new(config, exposure))),
-            EngineKind::Cohort => Err(EngineError::NoPhotons),
-        }
-    }
-
-    /// The engine that is exposed to light, for a sensor and an exposure.
-    pub fn expose<'a>(
-        self,
-        config: &'a SensorConfig,
-        exposure: &'a Exposure,
-    ) -> Box<dyn Expose + 'a> {
-        match self {
-            EngineKind::Gate => Box::new(Gate::new(config, exposure)),
-            EngineKind::Cycle => Box::new(Cycle::new(config, exposure)),
-            EngineKind::Window => Box::new(Window::new(config, exposure)),
-            EngineKind::Cohort => Box::new(Cohort::new(config, exposure, CohortOptions::default())),
-        }
-    }
-}
-
-/// A macropixel to run at gate level as well, with its waveform.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Probe {
-    /// Row in the array.
-    pub row: usize,
-    /// Column in the array.
-    pub col: usize,
-    /// Where its waveform goes, in the format of the name; the views for GTKWave and Surfer go beside it.
-    pub waves: PathBuf,
-    /// What the waveform keeps.
-    pub wave_cycles: WaveCycles,
-}
-
-/// Everything a frame depends on.
-#[derive(Debug, Clone)]
-pub struct FrameSettings {
-    /// The chip.
-    pub sensor: SensorConfig,
-    /// The world, the optics and the camera pair.
-    pub scene: Scene,
-    /// The exposure of `sensor`.
-    pub exposure: Exposure,
-    /// Seed of photons and stereo errors.
-    pub seed: u64,
-    /// Engine of the macropixels.
-    pub engine: EngineKind,
-    /// Knobs of the cohort engine.
-    pub cohort: CohortOptions,
-    /// Depth error that a cheaper engine may add on average, m: each macropixel gets the cheapest that keeps it, whatever
-    /// `engine` says.
-    pub tolerance_m: Option<f64>,
-    /// Leave out what the engine can do without; `false` draws and runs everything, for the same histograms.
-    pub skip: bool,
-    /// Depth from histograms.
-    pub depth: DepthOptions,
-    /// When the bins of delay lines are, if that has been measured; without it, all are taken to be alike.
-    pub calibration: Option<BinProfile>,
-    /// What tells where targets roughly are.
-    pub guide: Arc<dyn Guide>,
-}
-
-/// Why there is no frame.
-#[derive(Debug, thiserror::Error)]
-pub enum FrameError {
-    /// Something the user gave cannot be.
-    #[error(transparent)]
-    Input(#[from] InputError),
-    /// The engine cannot run this configuration.
-    #[error(transparent)]
-    Engine(#[from] EngineError),
-    /// The guide has no map.
-    #[error(transparent)]
-    Guide(#[from] GuideError),
-    /// Depths cannot be found in such histograms.
-    #[error(transparent)]
-    Ranging(#[from] UnequalBins),
-    /// The cohort engine cannot take all macropixels of a frame.
-    #[error("{why}; this is so for {refused} of {pixels} macropixels")]
-    Refused {
-        /// The refusal of the first of them.
-        why: EngineError,
-        /// Macropixels that the engine refuses.
-        refused: usize,
-        /// Macropixels of the frame.
-        pixels: usize,
-    },
-    /// The load path left other start values in the array than were sent.
-    #[error(
-        "the load path netlist left {found:?} in macropixel ({row}, {col}) where {sent} was sent"
-    )]
-    Load {
-        /// Row in the array.
-        row: usize,
-        /// Column in the array.
-        col: usize,
-        /// Start value sent.
-        sent: u16,
-        /// Start value found, if known.
-        found: Option<u16>,
-    },
-    /// A probed macropixel counts differently at gate level.
-    #[error(
-        "macropixel ({row}, {col}) counts {gate:?} at gate level and {model:?} on the {engine:?} engine"
-    )]
-    Disagreement {
-        /// Row in the array.
-        row: usize,
-        /// Column in the array.
-        col: usize,
-        /// Engine of the frame.
-        engine: EngineKind,
-        /// Counts at gate level.
-        gate: Vec<u16>,
-        /// Counts of the engine.
-        model: Vec<u16>,
-    },
-}
 
 /// Takes a frame, every window in the middle of the guide's estimate. `probes` chooses the macropixels to run at gate level once the
 /// guide is known; `exposed` is told of macropixels as they are done, of none between the steps of the frame, and may stop it by its
@@ -276,35 +106,20 @@ pub fn take_guided_frame<A: Answer>(
     } = settings;
     assert_eq!(wanted.len(), sensor.pixels());
     assert_eq!(guide.range_m.len(), sensor.pixels());
-    let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
     let mut clock = Stopwatch::new();
     let mut times = PhaseTimes::default();
 
-    // Where something moves, the truth is that of the middle of the exposure.
-    let exposure_s = exposure.end().as_s();
-    let truth = GroundTruth::render(&scene.at(0.5 * exposure_s), rows, cols);
+    let truth = truth_in(sensor, exposure, scene);
     times.scene_s = clock.lap();
 
-    // A macropixel whose SPADs are off looks as far as it can.
-    let farthest = sensor.largest_start();
-    let starts: Vec<u16> = wanted.iter().map(|s| s.unwrap_or(farthest)).collect();
-
+    let starts = starts_of(sensor, wanted);
     let load = load_starts(sensor, &load::load_netlist(sensor), &starts)?;
     times.load_s = clock.lap();
     go_on(exposed(0))?;
 
-    let stream = stream_config(sensor, exposure, *seed, scene.pulse_sigma());
-    let stream = PhotonStream::new(&scene.with_pulse(stream));
-    let StreamConfig { spads, .. } = stream.config();
-    let cycle_s = stream.config().cycle_s();
-    let light = scene.light_during(&truth, spads, exposure.laser_cycles, cycle_s);
-    let pixels: Vec<LitPixel> = (0..sensor.pixels())
-        .map(|pixel| LitPixel {
-            number: pixel as u32,
-            start: starts[pixel],
-            light: wanted[pixel].map(|_| light[pixel].clone()),
-        })
-        .collect();
+    let stream = photon_stream(sensor, exposure, *seed, scene);
+    let light = light_in(exposure, scene, &truth, &stream);
+    let pixels = lit(sensor, wanted, &light);
     let photons_expected = light
         .iter()
         .map(|light| {
@@ -313,16 +128,12 @@ pub fn take_guided_frame<A: Answer>(
         .sum();
     times.light_s = clock.lap();
 
-    let engine: Box<dyn Expose> = match engine_kind {
-        EngineKind::Cohort => Box::new(Cohort::new(sensor, exposure, *cohort)),
-        kind => kind.expose(sensor, exposure),
-    };
     let done = exposed;
     let (exposed, kept) = match (tolerance_m, skip) {
         (&Some(tolerance_m), _) => {
             let tolerance = Tolerance {
                 tolerance_m,
-                config: sensor,
+                sensor,
                 exposure,
                 peak: &depth.peak,
             };
@@ -335,7 +146,10 @@ pub fn take_guided_frame<A: Answer>(
             let exposed = expose(&cohort, &stream, &pixels, &done).map_err(refused)?;
             (exposed, None)
         }
-        (None, true) => (expose(&*engine, &stream, &pixels, &done)?, None),
+        (None, true) => {
+            let engine = engine_kind.expose(sensor, exposure, *cohort);
+            (expose(&*engine, &stream, &pixels, &done)?, None)
+        }
         (None, false) => {
             let engine = engine_kind.replay(sensor, exposure)?;
             let exposed = expose_without_skipping(&*engine, &stream, &pixels, &done)?;
@@ -376,18 +190,15 @@ pub fn take_guided_frame<A: Answer>(
     times.probes_s = clock.lap();
 
     let ranger = Ranger::new(sensor, exposure, scene, depth, calibration.as_ref())?;
-    let depths: Vec<PixelDepth> = (0..sensor.pixels())
-        .into_par_iter()
-        .map(|pixel| {
-            let known = Known {
-                pixel,
-                start: wanted[pixel],
-                true_m: truth.range_m[pixel],
-                guide_m: guide.range_m[pixel],
-            };
-            ranger.depth(&known, &exposed.histograms[pixel])
-        })
-        .collect();
+    let depths = ranger.of_array(exposed.histograms.counts(), |pixel, counts| {
+        let known = Known {
+            pixel,
+            start: wanted[pixel],
+            true_m: truth.range_m[pixel],
+            guide_m: guide.range_m[pixel],
+        };
+        ranger.depth(&known, counts)
+    });
     let circumstances = Circumstances {
         sensor,
         exposure,
@@ -480,7 +291,7 @@ fn refused_by(
 }
 
 fn run_probe(
-    sensor: &SensorConfig,
+    sensor: &Sensor,
     exposure: &Exposure,
     probe: &Probe,
     start: u16,
@@ -500,7 +311,7 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     use super::*;
-    use crate::guide::BehaviouralStereo;
+    use crate::scene::Scene;
     use crate::system::range_counts;
 
     fn settings() -> FrameSettings {
@@ -509,19 +320,8 @@ mod tests {
             cols: 16,
             ..SensorConfig::default()
         };
-        FrameSettings {
-            exposure: Exposure::new(&sensor, 520, 200),
-            sensor,
-            scene: Scene::outdoor(),
-            seed: 1,
-            engine: EngineKind::Window,
-            cohort: CohortOptions::default(),
-            tolerance_m: None,
-            skip: true,
-            depth: DepthOptions::default(),
-            calibration: None,
-            guide: Arc::new(BehaviouralStereo),
-        }
+        let exposure = Exposure::new(&sensor, 520, 200);
+        FrameSettings::new(sensor, Scene::outdoor(), exposure)
     }
 
     #[test]

@@ -23,7 +23,7 @@ pub use errors::Errors;
 pub use method::{GATE_CYCLES, Method};
 pub use summary::{Summary, Worst, summarise};
 
-use crate::chip::{Exposure, SensorConfig, WindowLaw};
+use crate::chip::{Exposure, Sensor, WindowLaw};
 use crate::engine::{
     Cohort, CohortOptions, Cycle, EngineError, Exposed, Gate, LitPixel, Window, expose,
     expose_without_skipping, stream_config,
@@ -45,7 +45,7 @@ pub enum Done<'p> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParetoSettings {
     /// The chip.
-    pub sensor: SensorConfig,
+    pub sensor: Sensor,
     /// Optics, laser and dark counts; illuminance and surfaces are the cells'.
     pub scene: Scene,
     /// CLK periods in a laser cycle.

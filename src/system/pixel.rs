@@ -38,6 +38,11 @@ impl NoDepth {
         NoDepth::NoSignificantPeak,
     ];
 
+    /// The reason as a number in arrays: its place in [`NoDepth::ALL`] from 1 on, and 0 where there is a depth.
+    pub fn number(no_depth: Option<Self>) -> u8 {
+        no_depth.map_or(0, |why| 1 + why as u8)
+    }
+
     /// In tables and legends.
     pub const fn name(self) -> &'static str {
         match self {
@@ -53,7 +58,7 @@ impl NoDepth {
 }
 
 /// One macropixel of a frame. Distances are radial, in metres.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PixelDepth {
     /// Ground truth; `None` for the sky.
     pub true_m: Option<f64>,
@@ -91,5 +96,17 @@ impl PixelDepth {
     /// The peak's less the true distance, m: the error with range walk, and before peaks are judged.
     pub fn peak_error_m(&self) -> Option<f64> {
         Some(self.peak_m? - self.true_m?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reasons_are_numbered_in_their_order() {
+        let numbers = NoDepth::ALL.map(|why| NoDepth::number(Some(why)));
+        assert_eq!(numbers, [1, 2, 3, 4, 5, 6, 7]);
+        assert_eq!(NoDepth::number(None), 0);
     }
 }

@@ -29,7 +29,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::aim::Aims;
-use crate::chip::{Exposure, Mode, SensorConfig};
+use crate::chip::{Exposure, Mode, Sensor};
 use crate::guide::GuideMap;
 use crate::numerics::normal_above;
 use crate::ranging::BinProfile;
@@ -179,7 +179,7 @@ impl<'p> Pointing<'p> {
     /// Before the first frame; `calibration` is that of delay lines.
     pub fn new(
         policy: WindowPolicy,
-        sensor: &SensorConfig,
+        sensor: &Sensor,
         exposure: &Exposure,
         calibration: Option<&'p BinProfile>,
     ) -> Self {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::aim::{Aims, Place, own_law};
 use super::pixel::{NoDepth, PixelDepth};
 use crate::chip::window_law::OpenWindow;
-use crate::chip::{Exposure, SensorConfig, WindowLaw};
+use crate::chip::{Exposure, Sensor, WindowLaw};
 use crate::ranging::{BinProfile, DepthOptions, EchoFinder, Peak, Sighting, UnequalBins};
 use crate::scene::Scene;
 use crate::units::Time;
@@ -26,9 +26,19 @@ pub(crate) struct Known {
 }
 
 impl Known {
+    /// What was known of macropixel number `pixel` when its depth was found.
+    pub(crate) fn of(pixel: usize, depth: &PixelDepth) -> Self {
+        Known {
+            pixel,
+            start: depth.start,
+            true_m: depth.true_m,
+            guide_m: depth.guide_m,
+        }
+    }
+
     /// Whether this was known of a macropixel when its depth was found.
-    pub(crate) fn is_of(&self, pixel: &PixelDepth) -> bool {
-        (self.start, self.true_m, self.guide_m) == (pixel.start, pixel.true_m, pixel.guide_m)
+    pub(crate) fn is_of(&self, depth: &PixelDepth) -> bool {
+        *self == Known::of(self.pixel, depth)
     }
 }
 
@@ -49,7 +59,7 @@ impl<'a> Ranger<'a> {
     /// # Errors
     /// Bins that the finder does not take.
     pub(crate) fn new(
-        sensor: &SensorConfig,
+        sensor: &Sensor,
         exposure: &Exposure,
         scene: &Scene,
         options: &'a DepthOptions,
@@ -112,11 +122,21 @@ impl<'a> Ranger<'a> {
         let sighting = window.and_then(|_| place.find(&self.finder, &counts));
         let found = sighting.filter(|s| s.is_significant && !s.is_saturated);
         let range_m = |bins: f64, at: usize| place.range_m(window?, &counts, bins, at);
-        Sight {
+        let no_depth = match sighting {
+            _ if found.is_some() => None,
+            _ if start.is_none() => Some(NoDepth::NoGuide),
+            Some(sighting) if sighting.is_saturated => Some(NoDepth::Saturated),
+            _ => Some(NoDepth::NoSignificantPeak),
+        };
+        let reading = Reading {
             measured_m: found.and_then(|s| range_m(s.position_bins, s.peak.peak_bin)),
+            no_depth,
             peak_m: sighting.and_then(|s| range_m(s.peak.position_bins, s.peak.peak_bin)),
+            confidence: sighting.map(|s| s.confidence),
+        };
+        Sight {
+            reading,
             sighting,
-            is_found: found.is_some(),
             window,
             law,
         }
@@ -137,43 +157,49 @@ impl<'a> Ranger<'a> {
                 .interval(&window)
                 .contains(&Time::of_flight(true_m))
         });
-        let no_depth = match sight.is_found {
-            true => None,
-            false if true_m.is_none() => Some(NoDepth::NoSurface),
-            false if start.is_none() && guide_m.is_none() => Some(NoDepth::NoGuide),
-            false if start.is_none() => Some(NoDepth::OutOfReach),
-            false if !self.spads_fire => Some(NoDepth::SpadsOff),
-            false if sight.is_saturated() => Some(NoDepth::Saturated),
-            false if !in_window => Some(NoDepth::OutsideWindow),
-            false => Some(NoDepth::NoSignificantPeak),
-        };
+        let no_depth = sight.reading.no_depth.map(|seen| match seen {
+            _ if true_m.is_none() => NoDepth::NoSurface,
+            _ if start.is_none() && guide_m.is_none() => NoDepth::NoGuide,
+            _ if start.is_none() => NoDepth::OutOfReach,
+            _ if !self.spads_fire => NoDepth::SpadsOff,
+            NoDepth::Saturated => NoDepth::Saturated,
+            _ if !in_window => NoDepth::OutsideWindow,
+            _ => NoDepth::NoSignificantPeak,
+        });
         PixelDepth {
             true_m,
             guide_m,
             start,
             in_window,
-            measured_m: sight.measured_m,
+            measured_m: sight.reading.measured_m,
             no_depth,
-            peak_m: sight.peak_m,
-            confidence: sight.sighting.map(|s| s.confidence),
+            peak_m: sight.reading.peak_m,
+            confidence: sight.reading.confidence,
         }
     }
-}
 
-/// What a histogram says.
-struct Sight<'l> {
-    law: Cow<'l, WindowLaw>,
-    window: Option<OpenWindow>,
-    sighting: Option<Sighting>,
-    is_found: bool,
-    measured_m: Option<f64>,
-    peak_m: Option<f64>,
-}
-
-impl Sight<'_> {
-    fn is_saturated(&self) -> bool {
-        self.sighting.is_some_and(|s| s.is_saturated)
+    /// What `of` makes of every macropixel and its counts; `counts` are those of the array, rows × cols × bins.
+    ///
+    /// # Panics
+    /// When there is not a count for every bin of the array.
+    pub(crate) fn of_array<T: Send>(
+        &self,
+        counts: &[u16],
+        of: impl Fn(usize, &[u16]) -> T + Sync,
+    ) -> Vec<T> {
+        let sensor = self.law.sensor();
+        assert_eq!(counts.len(), sensor.pixels() * sensor.bins);
+        let pixels = counts.par_chunks_exact(sensor.bins).enumerate();
+        pixels.map(|(pixel, counts)| of(pixel, counts)).collect()
     }
+}
+
+/// What a histogram says, and through which window.
+struct Sight<'l> {
+    reading: Reading,
+    sighting: Option<Sighting>,
+    window: Option<OpenWindow>,
+    law: Cow<'l, WindowLaw>,
 }
 
 /// What a histogram says of distance where nothing is known of what is really there.
@@ -198,7 +224,7 @@ pub struct Reading {
 /// # Panics
 /// When there is not a start value for each macropixel and a count for each bin.
 pub fn range_counts(
-    (sensor, exposure): (&SensorConfig, &Exposure),
+    (sensor, exposure): (&Sensor, &Exposure),
     scene: &Scene,
     options: &DepthOptions,
     calibration: Option<&BinProfile>,
@@ -206,23 +232,7 @@ pub fn range_counts(
     counts: &[u16],
 ) -> Result<Vec<Reading>, UnequalBins> {
     assert_eq!(starts.len(), sensor.pixels());
-    assert_eq!(counts.len(), sensor.pixels() * sensor.bins);
     let ranger = Ranger::new(sensor, exposure, scene, options, calibration)?;
-    let pixels = counts.par_chunks_exact(sensor.bins).zip(starts).enumerate();
-    let reading = |(pixel, (counts, &start)): (usize, (&[u16], &Option<u16>))| {
-        let sight = ranger.sight(pixel, start, counts);
-        let no_depth = match sight.is_found {
-            true => None,
-            false if start.is_none() => Some(NoDepth::NoGuide),
-            false if sight.is_saturated() => Some(NoDepth::Saturated),
-            false => Some(NoDepth::NoSignificantPeak),
-        };
-        Reading {
-            measured_m: sight.measured_m,
-            no_depth,
-            peak_m: sight.peak_m,
-            confidence: sight.sighting.map(|s| s.confidence),
-        }
-    };
-    Ok(pixels.map(reading).collect())
+    let reading = |pixel, counts: &[u16]| ranger.sight(pixel, starts[pixel], counts).reading;
+    Ok(ranger.of_array(counts, reading))
 }

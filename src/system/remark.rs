@@ -1,7 +1,7 @@
 //! One sentence on why a frame has so few depths: the commonest reason, with the numbers behind it and what would help.
 
 use super::pixel::{NoDepth, PixelDepth};
-use crate::chip::{EventType, Exposure, Mode, SensorConfig, WindowLaw};
+use crate::chip::{EventType, Exposure, Mode, Sensor, SensorConfig, WindowLaw};
 use crate::guide::Guide;
 use crate::photon::PixelLight;
 use crate::ranging::{EchoLight, Response};
@@ -11,7 +11,7 @@ use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
 /// A frame's circumstances.
 pub(super) struct Circumstances<'a> {
     /// The chip.
-    pub sensor: &'a SensorConfig,
+    pub sensor: &'a Sensor,
     /// Its clocks.
     pub exposure: &'a Exposure,
     /// Length of a bin, s.
@@ -138,7 +138,7 @@ impl Circumstances<'_> {
             threshold,
             event_type,
             ..
-        } = self.sensor;
+        } = &**self.sensor;
         let wanted = match event_type {
             EventType::Less => "fewer than",
             EventType::Equal => "exactly",
@@ -203,13 +203,9 @@ fn span(metres: &[f64]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::Arc;
-
-    use crate::engine::CohortOptions;
-    use crate::guide::BehaviouralStereo;
-    use crate::ranging::DepthOptions;
+    use crate::chip::SensorConfig;
     use crate::scene::{DVec3, Ray};
-    use crate::system::{EngineKind, Frame, FrameSettings, take_frame};
+    use crate::system::{Frame, FrameSettings, take_frame};
 
     /// A small frame of the street.
     fn frame(sensor: &str, change: impl Fn(&mut Scene)) -> Frame {
@@ -217,19 +213,8 @@ mod tests {
         let sensor = SensorConfig::parse("test", &text).unwrap();
         let mut scene = Scene::outdoor();
         change(&mut scene);
-        let settings = FrameSettings {
-            exposure: Exposure::new(&sensor, 520, 1000),
-            sensor,
-            scene,
-            seed: 1,
-            engine: EngineKind::Window,
-            cohort: CohortOptions::default(),
-            tolerance_m: None,
-            skip: true,
-            depth: DepthOptions::default(),
-            calibration: None,
-            guide: Arc::new(BehaviouralStereo),
-        };
+        let exposure = Exposure::new(&sensor, 520, 1000);
+        let settings = FrameSettings::new(sensor, scene, exposure);
         let frame = take_frame(&settings, |_| Vec::new(), |_| {}).unwrap();
         for pixel in &frame.pixels {
             assert_eq!(pixel.measured_m.is_some(), pixel.no_depth.is_none());

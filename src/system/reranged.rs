@@ -1,11 +1,9 @@
 //! Depths from histograms that are given: a frame's own once more, or those that a real chip counted in the same windows.
 
-use rayon::prelude::*;
-
 use super::pixel::PixelDepth;
 use super::ranger::{Known, Ranger};
 use super::summary::Summary;
-use super::taken::TakenFrame;
+use super::taken::{TakenFrame, TakenSettings};
 use crate::ranging::{BinProfile, DepthOptions, UnequalBins};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
@@ -40,28 +38,18 @@ impl TakenFrame {
         options: &DepthOptions,
         calibration: Option<&BinProfile>,
     ) -> Result<Ranged, UnequalBins> {
-        let bins = self.sensor.bins;
-        assert_eq!(counts.len(), self.sensor.pixels() * bins);
-        let ranger = Ranger::new(
-            &self.sensor,
-            &self.exposure,
-            &self.scene,
-            options,
-            calibration,
-        )?;
-        let pixels = (self.known.par_iter().enumerate())
-            .map(|(pixel, known)| {
-                let known = Known {
-                    pixel,
-                    start: known.start,
-                    true_m: known.true_m,
-                    guide_m: known.guide_m,
-                };
-                ranger.depth(&known, &counts[pixel * bins..][..bins])
-            })
-            .collect();
+        let TakenSettings {
+            sensor,
+            exposure,
+            scene,
+            ..
+        } = &self.settings;
+        let ranger = Ranger::new(sensor, exposure, scene, options, calibration)?;
+        let depth = |pixel: usize, counts: &[u16]| {
+            ranger.depth(&Known::of(pixel, &self.pixels[pixel]), counts)
+        };
         Ok(Ranged {
-            pixels,
+            pixels: ranger.of_array(counts, depth),
             bin_m: ranger.bin_s() * SPEED_OF_LIGHT_M_PER_S / 2.0,
         })
     }

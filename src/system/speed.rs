@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::chip::{Exposure, SensorConfig};
+use crate::chip::{Exposure, Sensor, SensorConfig};
 use crate::engine::{EngineError, Expose, Exposed, LitPixel, expose, stream_config};
 use crate::photon::{PhotonStream, PixelLight, SpadEvent};
 use crate::units::Time;
@@ -32,7 +32,7 @@ const SHORT_STOP_PERIODS: u32 = 40;
 #[derive(Debug, Clone)]
 pub struct SpeedFrame {
     /// The default sensor, of another size.
-    pub config: SensorConfig,
+    pub sensor: Sensor,
     /// Its exposure.
     pub exposure: Exposure,
     /// The photons.
@@ -60,22 +60,23 @@ impl SpeedFrame {
             // Below the CLK period of 2.6 ns, or pulses would cancel in the front end.
             config.dead_time_ns = 2.0;
         }
+        let sensor = Sensor::from(config);
         let stop_periods = match case {
             SpeedCase::ShortStop => SHORT_STOP_PERIODS,
             _ => stop_periods,
         };
         let background_hz = match case {
-            SpeedCase::Bright => 100e6 * config.spads() as f64,
+            SpeedCase::Bright => 100e6 * sensor.spads() as f64,
             _ => 8e6,
         };
-        let exposure = Exposure::new(&config, stop_periods, laser_cycles);
-        let stream = stream_config(&config, &exposure, 1, Time::from_ps(1_900));
+        let exposure = Exposure::new(&sensor, stop_periods, laser_cycles);
+        let stream = stream_config(&sensor, &exposure, 1, Time::from_ps(1_900));
         // A start value that the laser cycle is too short for never opens a window.
-        let starts = (u32::from(config.largest_start()) + 1).min(stop_periods - 2);
-        let pixels = (0..config.pixels() as u32).map(|number| {
+        let starts = (u32::from(sensor.largest_start()) + 1).min(stop_periods - 2);
+        let pixels = (0..sensor.pixels() as u32).map(|number| {
             // An odd factor reaches every start value.
             let start = number.wrapping_mul(197) % starts;
-            let middle = i64::from(start) - config.bins as i64 / 2;
+            let middle = i64::from(start) - sensor.bins as i64 / 2;
             LitPixel {
                 number,
                 start: start as u16,
@@ -93,7 +94,7 @@ impl SpeedFrame {
         SpeedFrame {
             pixels: pixels.collect(),
             stream: PhotonStream::new(&stream),
-            config,
+            sensor,
             exposure,
             case,
         }
@@ -122,7 +123,7 @@ impl SpeedFrame {
         let edges = i64::from(exposure.stop_periods) * i64::from(exposure.laser_cycles);
         // Pulses come with the falling CLK edge, far from the rising one that takes them.
         let times = (0..edges).map(|edge| exposure.falling(edge));
-        let spads = 0..self.config.spads() as u8;
+        let spads = 0..self.sensor.spads() as u8;
         times
             .flat_map(|time| spads.clone().map(move |spad| SpadEvent { time, spad }))
             .collect()
@@ -152,15 +153,15 @@ mod tests {
             SpeedCase::EverySpadEveryClk,
         ] {
             let frame = SpeedFrame::new(case, (2, 13), 520, 8);
-            let (config, exposure) = (&frame.config, &frame.exposure);
+            let (sensor, exposure) = (&frame.sensor, &frame.exposure);
             let (starts, pulses) = (frame.starts(), frame.pulses());
             let pulses: Vec<&[SpadEvent]> = pulses.iter().map(Vec::as_slice).collect();
-            let cycle = Cycle::new(config, exposure);
+            let cycle = Cycle::new(sensor, exposure);
             let packed = cycle.pack(&starts, &pulses);
             let replayed = cycle.run(&starts, &packed).unwrap();
-            let live = Cycle::new(config, exposure).with_live_control();
+            let live = Cycle::new(sensor, exposure).with_live_control();
             assert_eq!(live.run(&starts, &packed).unwrap(), replayed, "{case:?}");
-            let window = Window::new(config, exposure);
+            let window = Window::new(sensor, exposure);
             assert_eq!(
                 window.histograms(&starts, &pulses).unwrap(),
                 replayed,

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::price;
-use crate::chip::{Exposure, SensorConfig, WindowLaw};
+use crate::chip::{Exposure, Sensor, WindowLaw};
 use crate::engine::{
     Answer, Cohort, CohortOptions, EngineError, Expose, Exposed, Histograms, LitPixel, Window,
     Work, expose,
@@ -100,7 +100,7 @@ pub struct Tolerance<'a> {
     /// Depth error that the choice of engine may add on average, m.
     pub tolerance_m: f64,
     /// The chip.
-    pub config: &'a SensorConfig,
+    pub sensor: &'a Sensor,
     /// Its exposure.
     pub exposure: &'a Exposure,
     /// Depth from histograms.
@@ -121,18 +121,18 @@ impl Tolerance<'_> {
     ) -> Result<(Exposed, Kept), EngineError> {
         let Tolerance {
             tolerance_m,
-            config,
+            sensor,
             exposure,
             peak,
         } = *self;
-        let cohort = Cohort::new(config, exposure, CohortOptions::default());
+        let cohort = Cohort::new(sensor, exposure, CohortOptions::default());
         let options = CohortOptions {
             error: BOUND_ERROR,
             ..CohortOptions::default()
         };
-        let exact = Cohort::new(config, exposure, options);
-        let law = WindowLaw::new(config, exposure);
-        let window = Window::new(config, exposure);
+        let exact = Cohort::new(sensor, exposure, options);
+        let law = WindowLaw::new(sensor, exposure);
+        let window = Window::new(sensor, exposure);
         let planner = Planner {
             cohort: &cohort,
             exact: &exact,
@@ -140,7 +140,7 @@ impl Tolerance<'_> {
             peak,
             window: &window,
             stream,
-            config,
+            sensor,
         };
         let begin = Instant::now();
         let plan: Vec<Result<f64, OnWindow>> = pixels
@@ -162,7 +162,7 @@ impl Tolerance<'_> {
             Ok(_) => false,
             Err(why) => why.refusal().is_some(),
         };
-        let mut histograms = Histograms::empty(pixels.len(), self.config.bins);
+        let mut histograms = Histograms::empty(pixels.len(), self.sensor.bins);
         let mut work = Work::default();
         let mut run = |engine: &dyn Expose, takes: &dyn Fn(&Result<f64, OnWindow>) -> bool| {
             let begin = Instant::now();
@@ -192,7 +192,7 @@ struct Planner<'a> {
     peak: &'a PeakOptions,
     window: &'a Window,
     stream: &'a PhotonStream,
-    config: &'a SensorConfig,
+    sensor: &'a Sensor,
 }
 
 impl Planner<'_> {
@@ -200,7 +200,7 @@ impl Planner<'_> {
     fn choose(&self, pixel: &LitPixel, tolerance_m: f64) -> Result<f64, OnWindow> {
         let light = pixel.light.as_ref().filter(|_| tolerance_m > 0.0);
         let light = light.ok_or(OnWindow::NoChoice)?;
-        let window_ns = price::window_ns(self.window, self.config, self.stream, pixel, light);
+        let window_ns = price::window_ns(self.window, self.sensor, self.stream, pixel, light);
         if window_ns <= price::BOUND_NS {
             return Err(OnWindow::Cheaper);
         }

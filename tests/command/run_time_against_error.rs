@@ -3,7 +3,7 @@
 
 use std::process::Command;
 
-use guided_dtof::chip::{Exposure, SensorConfig, WindowLaw};
+use guided_dtof::chip::{Exposure, Sensor, SensorConfig, WindowLaw};
 use guided_dtof::engine::{LitPixel, Window, expose, stream_config};
 use guided_dtof::photon::{Convention, PhotonStream, PixelLight};
 use guided_dtof::ranging::PeakOptions;
@@ -17,11 +17,11 @@ fn compare(methods: &[Method]) -> Vec<Point> {
     let mut scene = Scene::outdoor();
     scene.lidar.convention = Convention::Thesis;
     let settings = ParetoSettings {
-        sensor: SensorConfig {
+        sensor: Sensor::from(SensorConfig {
             rows: 8,
             cols: 8,
             ..SensorConfig::default()
-        },
+        }),
         scene,
         stop_periods: 120,
         laser_cycles: 40,
@@ -132,9 +132,9 @@ fn a_piped_comparison_says_how_far_it_is_and_what_differs() {
 }
 
 /// A row of macropixels at 384 MHz in ever brighter light, echo in the middle of each window.
-fn lit(config: &SensorConfig, exposure: &Exposure) -> (PhotonStream, Vec<LitPixel>) {
-    let law = WindowLaw::new(config, exposure);
-    let stream = stream_config(config, exposure, 5, Time::from_ps(1_900));
+fn lit(sensor: &Sensor, exposure: &Exposure) -> (PhotonStream, Vec<LitPixel>) {
+    let law = WindowLaw::new(sensor, exposure);
+    let stream = stream_config(sensor, exposure, 5, Time::from_ps(1_900));
     let pixels = (0..40).map(|number| {
         let start = 60 + number * 5;
         let window = law.window(start).open().unwrap();
@@ -155,20 +155,20 @@ fn lit(config: &SensorConfig, exposure: &Exposure) -> (PhotonStream, Vec<LitPixe
 
 #[test]
 fn a_tolerance_is_kept_by_the_cheapest_engine() {
-    let config = SensorConfig::default();
-    let exposure = Exposure::new(&config, 520, 16_000);
-    let (stream, pixels) = lit(&config, &exposure);
+    let sensor = Sensor::default();
+    let exposure = Exposure::new(&sensor, 520, 16_000);
+    let (stream, pixels) = lit(&sensor, &exposure);
     let peak = PeakOptions::default();
     let within = |tolerance_m| {
         let tolerance = Tolerance {
             tolerance_m,
-            config: &config,
+            sensor: &sensor,
             exposure: &exposure,
             peak: &peak,
         };
         tolerance.expose(&stream, &pixels, |_| ()).unwrap()
     };
-    let exact = expose(&Window::new(&config, &exposure), &stream, &pixels, |_| ()).unwrap();
+    let exact = expose(&Window::new(&sensor, &exposure), &stream, &pixels, |_| ()).unwrap();
 
     let (strict, kept) = within(0.0);
     assert_eq!(strict.histograms, exact.histograms);

@@ -7,11 +7,9 @@ use guided_dtof::engine::{
     Cycle, Expose, Histograms, LitPixel, Window, expose, expose_without_skipping, full_stream,
     stream_config,
 };
-use guided_dtof::guide::BehaviouralStereo;
 use guided_dtof::photon::{
     DeadTimeLaw, PhotonStream, PixelLight, PulseShape, SpadModel, StreamConfig,
 };
-use guided_dtof::ranging::DepthOptions;
 use guided_dtof::scene::Scene;
 use guided_dtof::system::{EngineKind, FrameSettings, take_frame};
 use guided_dtof::units::Time;
@@ -380,18 +378,12 @@ fn a_frame_without_skipping_is_the_same_frame() {
     scene.light.illuminance_klux /= 64.0;
     scene.lidar.pulse_energy_uj /= 64.0;
     let take = |engine, skip| {
+        let exposure = Exposure::new(&sensor, 520, 512);
         let settings = FrameSettings {
-            exposure: Exposure::new(&sensor, 520, 512),
-            sensor: sensor.clone(),
-            scene: scene.clone(),
             seed: 5,
             engine,
-            tolerance_m: None,
             skip,
-            depth: DepthOptions::default(),
-            calibration: None,
-            guide: std::sync::Arc::new(BehaviouralStereo),
-            cohort: Default::default(),
+            ..FrameSettings::new(&sensor, scene.clone(), exposure)
         };
         take_frame(&settings, |_| Vec::new(), |_| ()).unwrap()
     };

@@ -34,6 +34,7 @@ struct Parts {
     silicon: Silicon,
     timing: OnceLock<ChipTiming>,
     delay_lines: OnceLock<Arc<DelayLines>>,
+    alike: OnceLock<Sensor>,
 }
 
 /// A chip's name, and what makes its [`Sensor`].
@@ -106,12 +107,31 @@ impl Sensor {
         self.tdc == Tdc::DelayLine || self.clk_skew_ps > 0.0
     }
 
+    /// This sensor of the library's own silicon with delay lines whose elements are all alike, and a CLK that comes everywhere at once:
+    /// what is assumed of one that has not been calibrated. A copy, where it is such a sensor.
+    #[must_use]
+    pub fn alike(&self) -> Self {
+        let config = SensorConfig {
+            delay_sigma: 0.0,
+            clk_skew_ps: 0.0,
+            ..self.0.config.clone()
+        };
+        let silicon = Silicon::of(&config);
+        let is_alike = config == self.0.config || !self.has_own_laws();
+        if is_alike && silicon == self.0.silicon {
+            return self.clone();
+        }
+        let alike = || Self::from_parts(config, silicon);
+        self.0.alike.get_or_init(alike).clone()
+    }
+
     fn from_parts(config: SensorConfig, silicon: Silicon) -> Self {
         Sensor(Arc::new(Parts {
             config,
             silicon,
             timing: OnceLock::new(),
             delay_lines: OnceLock::new(),
+            alike: OnceLock::new(),
         }))
     }
 }
@@ -129,6 +149,13 @@ impl PartialEq for Sensor {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
             || self.0.config == other.0.config && self.0.silicon == other.0.silicon
+    }
+}
+
+impl Default for Sensor {
+    /// The QuantIC4x4.
+    fn default() -> Self {
+        quantic4x4()
     }
 }
 
@@ -169,6 +196,17 @@ mod tests {
         let slow = sensor.made_of(&sensor.silicon().at(1.5));
         assert!(slow.timing().ripple() > sensor.timing().ripple());
         assert!(slow != sensor && copy == sensor);
+    }
+
+    #[test]
+    fn what_is_assumed_without_calibration_is_made_once() {
+        let clocked = quantic4x4();
+        assert!(std::ptr::eq(clocked.timing(), clocked.alike().timing()));
+        let lines = hslidar_delay_line();
+        let alike = lines.alike();
+        assert!(std::ptr::eq(alike.timing(), lines.clone().alike().timing()));
+        assert!((lines.delay_sigma, lines.clk_skew_ps) > (0.0, 0.0));
+        assert_eq!((alike.delay_sigma, alike.clk_skew_ps), (0.0, 0.0));
     }
 
     #[test]

@@ -28,7 +28,7 @@ struct Report<'a> {
 pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     let beside = args.histograms.with_file_name("frame.json");
     let taken = TakenFrame::read(args.frame.as_deref().unwrap_or(&beside))?;
-    let sensor = &taken.sensor;
+    let sensor = &taken.settings.sensor;
     let default = DepthOptions::default();
     let rate = args.false_alarm_rate.unwrap_or(default.false_alarm_rate);
     check_false_alarm_rate(rate, Spelling::Options)?;
@@ -42,7 +42,7 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
         None => None,
     };
     let shape = [sensor.rows, sensor.cols, sensor.bins];
-    let counts = read_counts(&args.histograms, shape)?;
+    let counts = read_counts(&args.histograms, &shape)?;
     let ranged = taken.range(&counts, &options, calibration.as_ref())?;
     if let Some(path) = &args.out {
         write_csv(path, sensor.cols, &ranged)?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::bench::recording::{Recording, read_events, read_starts};
-use crate::chip::{Exposure, SensorConfig};
+use crate::chip::{Exposure, Sensor};
 use crate::cli::SensorArgs;
 use crate::files::InputError;
 use crate::photon::SpadEvent;
@@ -33,7 +33,7 @@ pub(super) struct StimulusArgs {
 /// What is replayed, read and checked: shared with `gdtof export verilog`.
 pub(crate) struct Stimuli {
     /// The chip.
-    pub config: SensorConfig,
+    pub sensor: Sensor,
     /// Its clocks.
     pub exposure: Exposure,
     /// Start values, row-major.
@@ -59,14 +59,14 @@ impl Stimuli {
     /// # Errors
     /// One sentence about the first thing that cannot be.
     pub(crate) fn read(
-        config: SensorConfig,
+        sensor: Sensor,
         inits: &Path,
         events: &Path,
         (stop_periods, laser_cycles): (u32, u32),
     ) -> Result<Self, InputError> {
-        let exposure = request::exposure(&config, stop_periods, laser_cycles, Spelling::Options)?;
-        let starts = read_starts(inits, &config)?;
-        let recording = read_events(events, &config, &exposure)?;
+        let exposure = request::exposure(&sensor, stop_periods, laser_cycles, Spelling::Options)?;
+        let starts = read_starts(inits, &sensor)?;
+        let recording = read_events(events, &sensor, &exposure)?;
         let dropped = [
             (
                 recording.lost_to_dead_time,
@@ -84,7 +84,7 @@ impl Stimuli {
             );
         }
         Ok(Stimuli {
-            config,
+            sensor,
             exposure,
             starts,
             recording,

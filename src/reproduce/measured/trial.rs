@@ -19,7 +19,7 @@
 use rayon::prelude::*;
 
 use crate::chip::window_law::OpenWindow;
-use crate::chip::{ChipTiming, EventType, Exposure, SensorConfig, WindowLaw, histogram};
+use crate::chip::{ChipTiming, EventType, Exposure, Sensor, SensorConfig, WindowLaw, histogram};
 use crate::engine::{
     Cohort, CohortOptions, EngineError, Expose, Histograms, LitPixel, Window, stream_config,
 };
@@ -311,7 +311,7 @@ impl Trial {
 /// What the frames of a trial share, on counters that hold all events.
 struct Frames<'t> {
     trial: &'t Trial,
-    sensor: SensorConfig,
+    sensor: Sensor,
     exposure: Exposure,
     stream: StreamConfig,
     law: WindowLaw,
@@ -320,11 +320,11 @@ struct Frames<'t> {
 
 impl<'t> Frames<'t> {
     fn new(trial: &'t Trial, seed: u64, threshold: u8) -> Self {
-        let sensor = SensorConfig {
+        let sensor = Sensor::from(SensorConfig {
             threshold,
             bin_bits: 16,
             ..trial.sensor.clone()
-        };
+        });
         let exposure = Exposure::new(&sensor, trial.stop_periods, trial.cycles);
         let sigma = Time::from_s(1e-9 * trial.sigma_ns);
         let law = WindowLaw::new(&sensor, &exposure);

@@ -2,11 +2,8 @@
 
 use super::*;
 use crate::chip::SensorConfig;
-use crate::engine::CohortOptions;
 use crate::guide::NoisyTruth;
-use crate::ranging::DepthOptions;
 use crate::scene::{Object, Shape};
-use crate::system::EngineKind;
 use proptest::prelude::*;
 use std::sync::Arc;
 
@@ -42,30 +39,19 @@ fn settings(scene: Scene, noise: Noise) -> DriveSettings {
         sigma_m: 0.0,
         ..NoisyTruth::default()
     };
+    let frame = FrameSettings {
+        seed: 7,
+        guide: Arc::new(truth),
+        ..FrameSettings::new(sensor, scene, exposure)
+    };
     DriveSettings {
-        frame: FrameSettings {
-            sensor,
-            scene,
-            exposure,
-            seed: 7,
-            engine: EngineKind::Window,
-            cohort: CohortOptions::default(),
-            tolerance_m: None,
-            skip: true,
-            depth: DepthOptions::default(),
-            calibration: None,
-            guide: Arc::new(truth),
-        },
-        policy: WindowPolicy::default(),
         clock: FrameClock {
             guide_latency_s: 0.1,
             pipelined: false,
         },
         segments: 2,
         noise,
-        reuse: true,
-        only: None,
-        start_s: 0.0,
+        ..DriveSettings::new(frame)
     }
 }
 
@@ -164,17 +150,19 @@ fn light_in_motion_is_a_timeline_where_something_moves_and_plain_elsewhere() {
         .iter()
         .map(|w| GroundTruth::render(w, 6, 8))
         .collect();
-    let light = light_of(
-        &worlds,
-        &truths,
-        &settings.frame.exposure,
-        &SpadModel::default(),
-    );
+    let FrameSettings {
+        sensor,
+        scene,
+        exposure,
+        ..
+    } = &settings.frame;
+    let stream = photon_stream(sensor, exposure, 7, scene);
+    let light = light_of(&worlds, &truths, exposure, &stream);
     let parts: Vec<usize> = light.iter().map(|light| light.segments().count()).collect();
     assert!(parts.contains(&1) && parts.iter().any(|&n| n > 1));
-    let (spads, exposure) = (SpadModel::default(), &settings.frame.exposure);
+    let spads = &stream.config().spads;
     let lights: Vec<Vec<PixelLight>> = (worlds.iter().zip(&truths))
-        .map(|(world, truth)| world.light_during(truth, &spads, exposure.laser_cycles, 1e-6))
+        .map(|(world, truth)| world.light_during(truth, spads, exposure.laser_cycles, 1e-6))
         .collect();
     for (pixel, &parts) in parts.iter().enumerate() {
         let changes = lights

@@ -4,7 +4,7 @@
 //! wider than they need, those of which it is not, narrower ones.
 
 use super::WindowPolicy;
-use crate::chip::{Exposure, SensorConfig, Tdc, WindowLaw};
+use crate::chip::{Exposure, Sensor, SensorConfig, Tdc, WindowLaw};
 use crate::guide::GuideMap;
 use crate::theory::design::share_inside;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -38,19 +38,19 @@ impl WindowPolicy {
     pub fn slowed(
         &self,
         guide: &GuideMap,
-        sensor: &SensorConfig,
+        sensor: &Sensor,
         stop_periods: u32,
-    ) -> Option<(SensorConfig, u32)> {
+    ) -> Option<(Sensor, u32)> {
         if sensor.tdc != Tdc::Clocked {
             return None;
         }
         let own_bin_m = SPEED_OF_LIGHT_M_PER_S / (2.0 * sensor.clk_hz);
         let mut slower = 1.0;
         while own_bin_m * slower <= LONGEST_BIN_M {
-            let slowed = SensorConfig {
+            let slowed = Sensor::from(SensorConfig {
                 clk_hz: sensor.clk_hz / slower,
-                ..sensor.clone()
-            };
+                ..SensorConfig::clone(sensor)
+            });
             let periods = (f64::from(stop_periods) / slower).ceil() as u32;
             let holds = share_held(guide, sensor, own_bin_m * slower) >= self.within;
             // At some periods two signals meet and no window can be aimed.
@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn windows_of_the_slowed_chip_hold_the_share_that_is_asked_for() {
-        let sensor = SensorConfig::default();
+        let sensor = Sensor::default();
         let (policy, sigma_m) = (WindowPolicy::default(), 2.5);
         let (slowed, periods) = policy.slowed(&map(sigma_m), &sensor, 520).unwrap();
         // Eq. 25 asks for bins of 6·2.5/16 m = 0.94 m; 99.7 % and centres on the grid change that by a hundredth.
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn a_guide_that_is_sure_leaves_clk_alone_and_one_that_knows_nothing_has_no_bin() {
-        let sensor = SensorConfig::default();
+        let sensor = Sensor::default();
         let policy = WindowPolicy::default();
         let (same, periods) = policy.slowed(&map(0.1), &sensor, 520).unwrap();
         assert_eq!((same, periods), (sensor.clone(), 520));

@@ -1,17 +1,15 @@
 use std::sync::Arc;
 
 use super::*;
-use crate::chip::{Sensor, hslidar};
-use crate::engine::CohortOptions;
+use crate::chip::{SensorConfig, hslidar};
 use crate::guide::{Guide, GuideInput, NoisyTruth};
 use crate::photon::{Purpose, normal, random_stream};
-use crate::ranging::DepthOptions;
 use crate::scene::{DVec3, Object, Scene, Shape};
-use crate::system::{EngineKind, FrameSettings, PixelDepth, take_guided_frame};
+use crate::system::{FrameSettings, PixelDepth, take_guided_frame};
 
 const SIZE: usize = 16;
 
-fn sensor() -> SensorConfig {
+fn config() -> SensorConfig {
     SensorConfig {
         rows: SIZE,
         cols: SIZE,
@@ -19,7 +17,11 @@ fn sensor() -> SensorConfig {
     }
 }
 
-fn pointing(policy: WindowPolicy, sensor: &SensorConfig) -> Pointing<'static> {
+fn sensor() -> Sensor {
+    config().into()
+}
+
+fn pointing(policy: WindowPolicy, sensor: &Sensor) -> Pointing<'static> {
     Pointing::new(policy, sensor, &Exposure::new(sensor, 520, 100), None)
 }
 
@@ -45,7 +47,7 @@ fn seen(
 /// Runs exposures with the same guide; how many until each macropixel has found its target, `None` if it has not in `most`.
 fn exposures_until_found(
     policy: WindowPolicy,
-    sensor: &SensorConfig,
+    sensor: &Sensor,
     guide: &GuideMap,
     truth_m: &[Option<f64>],
     most: usize,
@@ -155,11 +157,11 @@ fn a_sweep_finds_everything_in_one_round_and_holds_it() {
     };
     for sensor in [
         sensor(),
-        SensorConfig {
+        Sensor::from(SensorConfig {
             rows: SIZE,
             cols: SIZE,
             ..(*hslidar()).clone()
-        },
+        }),
     ] {
         let nothing = map(&vec![None; SIZE * SIZE]);
         let sweeping = pointing(policy, &sensor);
@@ -232,10 +234,10 @@ fn another_target_of_the_guide_ends_a_search() {
 
 #[test]
 fn the_conventional_mode_has_one_window() {
-    let sensor = SensorConfig {
+    let sensor = Sensor::from(SensorConfig {
         mode: Mode::Conventional,
-        ..sensor()
-    };
+        ..config()
+    });
     let mut pointing = pointing(WindowPolicy::for_sequences(), &sensor);
     let starts = pointing.windows(&map(&vec![None; SIZE * SIZE]), &[]);
     assert!(starts[0].is_some() && starts.iter().all(|start| *start == starts[0]));
@@ -247,7 +249,7 @@ fn the_least_bin_is_that_of_equation_25() {
         within: 0.997_300_203_936_739_8,
         ..WindowPolicy::default()
     };
-    let sensor = Sensor::from(sensor());
+    let sensor = sensor();
     let bin_m = policy.least_bin_m(1.0, sensor.bins);
     assert!((bin_m - 6.0 / 16.0).abs() < 1e-9, "{bin_m}");
 }
@@ -275,18 +277,10 @@ fn stepped_windows_find_the_wall_that_one_window_misses() {
         sigma_m: 6.0,
         sigma_per_m: 0.0,
     };
+    let exposure = Exposure::new(&sensor, 520, 2000);
     let mut settings = FrameSettings {
-        exposure: Exposure::new(&sensor, 520, 2000),
-        sensor,
         guide: Arc::new(guide),
-        scene,
-        seed: 1,
-        engine: EngineKind::Window,
-        cohort: CohortOptions::default(),
-        tolerance_m: None,
-        skip: true,
-        depth: DepthOptions::default(),
-        calibration: None,
+        ..FrameSettings::new(sensor, scene, exposure)
     };
     let input = GuideInput::still(&settings.scene, 8, 8, 1);
     let map = guide.estimate(&input).unwrap();

@@ -1,0 +1,46 @@
+//! What `gdtof frame` and `gdtof drive` ask of an exposure alike.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::guiding::GuideArgs;
+use crate::request::{FrameRequest, Spelling};
+use crate::system::EngineKind;
+
+/// An exposure, and how its windows are guided.
+#[derive(Args)]
+pub(super) struct ExposureArgs {
+    #[command(flatten)]
+    pub(super) guiding: GuideArgs,
+    /// CLK periods in a laser cycle.
+    #[arg(long, value_name = "P", default_value_t = 520)]
+    pub(super) stop_periods: u32,
+    /// Laser cycles of an exposure.
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    pub(super) laser_cycles: u32,
+    /// Seed of photons and guide errors.
+    #[arg(long, default_value_t = 1)]
+    pub(super) seed: u64,
+    /// Engine of the macropixels that are not probed.
+    #[arg(long, value_enum, default_value_t)]
+    pub(super) engine: EngineKind,
+    /// When the bins of the sensor's delay lines are, as `gdtof calibrate` has measured it; without it, all are taken to be alike.
+    #[arg(long, value_name = "FILE")]
+    pub(super) calibration: Option<PathBuf>,
+}
+
+impl ExposureArgs {
+    /// The request with all of this, and the default of everything else.
+    pub(super) fn request(&self) -> FrameRequest {
+        self.guiding.ask(FrameRequest {
+            stop_periods: self.stop_periods,
+            laser_cycles: self.laser_cycles,
+            seed: self.seed,
+            engine: self.engine,
+            calibration: self.calibration.clone(),
+            spelling: Spelling::Options,
+            ..FrameRequest::default()
+        })
+    }
+}
