@@ -223,7 +223,7 @@ pub const TABLES: [Table; 4] = [
     table(
         7,
         "schemes of Tables 7 and 15 and what they cost, overflow counted",
-        penalty::table_7,
+        penalty::charts::table_7,
     ),
     table(
         9,
@@ -253,7 +253,11 @@ pub const FIGURES: [Figure; 34] = [
     figure(32, "probability of detection", photon_budget::figure_32),
     figure(33, "precision", precision::figure_33),
     figure(34, "photon budget", photon_budget::figure_34),
-    figure(35, "laser cycles against distance", penalty::figure_35),
+    figure(
+        35,
+        "laser cycles against distance",
+        penalty::charts::figure_35,
+    ),
     figure(36, "counts of a bin", silicon::figure_36),
     figure(37, "bins of a full histogram", silicon::figure_37),
     figure(38, "bits of a full histogram", silicon::figure_38),
@@ -267,11 +271,19 @@ pub const FIGURES: [Figure; 34] = [
     figure(
         42,
         "laser cycles of zooming's detection",
-        penalty::figure_42,
+        penalty::charts::figure_42,
     ),
-    figure(43, "laser cycles of sliding's windows", penalty::figure_43),
-    figure(44, "laser cycles of the schemes", penalty::figure_44),
-    figure(45, "penalty of the schemes", penalty::figure_45),
+    figure(
+        43,
+        "laser cycles of sliding's windows",
+        penalty::charts::figure_43,
+    ),
+    figure(
+        44,
+        "laser cycles of the schemes",
+        penalty::charts::figure_44,
+    ),
+    figure(45, "penalty of the schemes", penalty::charts::figure_45),
     figure(56, "ripple delay", chip::figure_56),
     figure(61, "distance limits of a stereo pair", stereo::figure_61),
     figure(66, "stereo depths and their spread", stereo::figure_66),
@@ -315,12 +327,12 @@ pub const FIGURES: [Figure; 34] = [
     figure(
         108,
         "laser cycles of the demonstrator's schemes",
-        penalty::figure_108,
+        penalty::charts::figure_108,
     ),
     figure(
         109,
         "penalty of the demonstrator's schemes",
-        penalty::figure_109,
+        penalty::charts::figure_109,
     ),
 ];
 

@@ -9,7 +9,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `study.rs` | the study file: what varies, over what |
+//! | `study.rs` | what varies, over what, point by point; `study/reading.rs`: the study file |
 //! | `keys.rs` | the names it may give values to |
 //! | `values.rs` | lists and ranges |
 //! | `design.rs` | grid, Latin hypercube, Sobol' sequence |

@@ -15,6 +15,7 @@ mod flat;
 mod map;
 mod mesh;
 mod person;
+mod pose;
 mod round;
 mod solid;
 
@@ -25,6 +26,7 @@ use glam::DVec3;
 pub use map::{DepthMap, MapFiles};
 pub use mesh::Mesh;
 
+use self::pose::Pose;
 use super::vector::{Ray, turned};
 
 /// Hits nearer than this are the surface on which a ray starts, m.
@@ -363,43 +365,6 @@ impl Shape {
             }
         }
         seen
-    }
-}
-
-/// Place and turn of a shape that has coordinates of its own.
-#[derive(Debug, Clone, Copy)]
-struct Pose {
-    centre_m: DVec3,
-    cosine_sine: (f64, f64),
-}
-
-impl Pose {
-    fn new(centre_m: DVec3, yaw_deg: f64) -> Self {
-        let (sine, cosine) = yaw_deg.to_radians().sin_cos();
-        Pose {
-            centre_m,
-            cosine_sine: (cosine, sine),
-        }
-    }
-
-    /// A point in the shape's own coordinates.
-    fn inside(&self, point: DVec3) -> DVec3 {
-        let (cosine, sine) = self.cosine_sine;
-        turned(point - self.centre_m, (cosine, -sine))
-    }
-
-    /// A ray in the shape's own coordinates; distances along it are the same.
-    fn inwards(&self, ray: &Ray) -> Ray {
-        let (cosine, sine) = self.cosine_sine;
-        Ray {
-            origin: self.inside(ray.origin),
-            direction: turned(ray.direction, (cosine, -sine)),
-        }
-    }
-
-    /// A direction of the shape's own coordinates in those of the scene.
-    fn outwards(&self, direction: DVec3) -> DVec3 {
-        turned(direction, self.cosine_sine)
     }
 }
 

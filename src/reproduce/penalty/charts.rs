@@ -1,0 +1,312 @@
+//! Figures of laser cycles and penalties, and table 7.
+
+use super::{demonstrator, long_range, one_hit, penalty};
+use crate::report::{Axis, Chart, Grid, Style};
+use crate::reproduce::measured::partial::{
+    AtRange, OnChip, demonstrator_on_chip, long_range_on_chip,
+};
+use crate::theory::capacity::full_bins;
+use crate::theory::partial::{Purpose, System};
+use crate::units::SPEED_OF_LIGHT_M_PER_S;
+
+/// Laser cycles of a system's schemes against range. What zooming detects and which windows sliding visits changes
+/// only from window to window, so that is computed once a window.
+struct Curves {
+    system: System,
+    to_m: u32,
+    /// Detection cycles of zooming, by the target's window.
+    detecting: Vec<f64>,
+    /// Cycles of sliding, by the target's window.
+    sliding: Vec<f64>,
+}
+
+/// Points (x, y).
+type Points = Vec<(f64, f64)>;
+
+impl Curves {
+    fn of(system: System, to_m: u32) -> Self {
+        let windows = full_bins(f64::from(to_m), system.window_m);
+        let window_end_m = |window: u32| f64::from(window) * system.window_m;
+        let detecting = (1..=windows).map(|window| {
+            let steps = system.zooming(window_end_m(window)).steps;
+            let detections = steps.iter().filter(|step| step.purpose != Purpose::Measure);
+            detections.map(|step| step.laser_cycles).sum()
+        });
+        let mut sum = 0.0;
+        let sliding = system.sliding(window_end_m(windows), 0).steps;
+        let sliding = sliding.iter().map(|step| {
+            sum += step.laser_cycles;
+            sum
+        });
+        Curves {
+            system,
+            to_m,
+            detecting: detecting.collect(),
+            sliding: sliding.collect(),
+        }
+    }
+
+    /// `cost` of the measurement's cycles and the target's window (from 0), every metre.
+    fn points(&self, cost: impl Fn(f64, usize) -> f64) -> Points {
+        let ranges = (1..=self.to_m).map(f64::from);
+        ranges
+            .map(|z_m| {
+                let window = full_bins(z_m, self.system.window_m) as usize - 1;
+                (z_m, cost(self.system.measure(z_m).laser_cycles, window))
+            })
+            .collect()
+    }
+
+    fn full(&self) -> Points {
+        self.points(|measuring, _| measuring)
+    }
+
+    fn detecting(&self) -> Points {
+        let mut points = self.points(|_, window| self.detecting[window]);
+        points.retain(|p| p.1 > 0.0);
+        points
+    }
+
+    fn zooming(&self) -> Points {
+        self.points(|measuring, window| self.detecting[window] + measuring)
+    }
+
+    fn sliding(&self) -> Points {
+        self.points(|_, window| self.sliding[window])
+    }
+
+    fn penalty_of_zooming(&self) -> Points {
+        self.points(|measuring, window| 1.0 + self.detecting[window] / measuring)
+    }
+
+    fn penalty_of_sliding(&self) -> Points {
+        self.points(|measuring, window| self.sliding[window] / measuring)
+    }
+}
+
+/// Fig. 35: laser cycles of a full histogram.
+pub(in crate::reproduce) fn figure_35() -> Vec<Chart> {
+    let fits = |z_m: f64| SPEED_OF_LIGHT_M_PER_S / (2.0 * z_m * 30.0);
+    let needed = Curves::of(long_range(), 200).full();
+    vec![
+        Chart::new(
+            "Laser cycles for 0.1 m (Table 6, 5 ns bins), and what a frame at 30 fps holds",
+            Axis::linear("distance (m)").between(0.0, 205.0),
+            Axis::log("laser cycles").between(1.0, 1e6),
+        )
+        .with("needed, Cramér-Rao", Style::Line, needed)
+        .with(
+            "that fit a frame",
+            Style::Line,
+            (5..=200).map(|z| (f64::from(z), fits(f64::from(z)))),
+        )
+        .with(
+            "published, both at 200 m",
+            Style::Points,
+            [(200.0, 25_000.0)],
+        ),
+    ]
+}
+
+/// Fig. 42: laser cycles of the detection step.
+pub(in crate::reproduce) fn figure_42() -> Vec<Chart> {
+    let detecting = |system: System| Curves::of(system, 200).detecting();
+    vec![
+        Chart::new(
+            "Laser cycles of zooming's detection step (16 bins of 12.5 m, P_D 99.7 %)",
+            Axis::linear("distance (m)").between(0.0, 205.0),
+            Axis::linear("laser cycles"),
+        )
+        .with(
+            "every photon counts (thesis)",
+            Style::Line,
+            detecting(long_range()),
+        )
+        .with(
+            "one hit per bin and cycle (this chip)",
+            Style::Dashed,
+            detecting(one_hit(long_range())),
+        )
+        .with(
+            "measured on the chip",
+            Style::Points,
+            points(long_range_on_chip(), |at| Some(at.detecting()?.value)),
+        ),
+    ]
+}
+
+/// Fig. 43: laser cycles of each window of sliding.
+pub(in crate::reproduce) fn figure_43() -> Vec<Chart> {
+    let steps = long_range().sliding(200.0, 0).steps;
+    let each: Points = steps
+        .iter()
+        .map(|step| (step.range_m, step.laser_cycles))
+        .collect();
+    let mut sum = 0.0;
+    let total = each.iter().map(|&(end_m, cycles)| {
+        sum += cycles;
+        (end_m, sum)
+    });
+    let total: Points = total.collect();
+    let windows = &long_range_on_chip().windows;
+    let measured: Points = windows.iter().map(|(end_m, n)| (*end_m, n.value)).collect();
+    vec![
+        Chart::new(
+            "Sliding: laser cycles of each window, and of all up to it",
+            Axis::linear("end of the window (m)"),
+            Axis::linear("laser cycles"),
+        )
+        .with("all windows so far", Style::Line, total)
+        .with("this window", Style::Bars, each)
+        .with("this window, measured on the chip", Style::Points, measured),
+    ]
+}
+
+/// What was measured, against range.
+fn points(on_chip: &OnChip, of: impl Fn(&AtRange) -> Option<f64>) -> Points {
+    let ranges = on_chip.ranges.iter();
+    ranges
+        .filter_map(|at| Some((at.range_m, of(at)?)))
+        .collect()
+}
+
+fn schemes(title: &str, on_chip: &OnChip, to_m: u32) -> Chart {
+    let curves = Curves::of(on_chip.system, to_m);
+    let measured = |of: fn(&AtRange) -> Option<f64>| points(on_chip, of);
+    Chart::new(
+        title,
+        Axis::linear("distance (m)"),
+        Axis::log("laser cycles"),
+    )
+    .with("full and guided", Style::Line, curves.full())
+    .with("zooming", Style::Line, curves.zooming())
+    .with("sliding", Style::Line, curves.sliding())
+    .with(
+        "guided, measured",
+        Style::Points,
+        measured(|at| Some(at.guided.value)),
+    )
+    .with(
+        "zooming, measured",
+        Style::Points,
+        measured(|at| Some(at.zooming()?.value)),
+    )
+    .with(
+        "sliding, measured",
+        Style::Points,
+        measured(|at| Some(at.sliding.value)),
+    )
+}
+
+fn penalties(title: &str, on_chip: &OnChip, to_m: u32) -> Chart {
+    let curves = Curves::of(on_chip.system, to_m);
+    let chip = Curves::of(one_hit(on_chip.system), to_m);
+    Chart::new(
+        title,
+        Axis::linear("distance (m)"),
+        Axis::log("penalty (×)"),
+    )
+    .with("guided", Style::Line, [(1.0, 1.0), (f64::from(to_m), 1.0)])
+    .with("zooming", Style::Line, curves.penalty_of_zooming())
+    .with("sliding", Style::Line, curves.penalty_of_sliding())
+    .with(
+        "zooming, one hit per bin and cycle",
+        Style::Dashed,
+        chip.penalty_of_zooming(),
+    )
+    .with(
+        "zooming, measured",
+        Style::Points,
+        points(on_chip, |at| Some(at.penalty_of_zooming()?.value)),
+    )
+    .with(
+        "sliding, measured",
+        Style::Points,
+        points(on_chip, |at| Some(at.penalty_of_sliding().value)),
+    )
+}
+
+/// Fig. 44: laser cycles of the three schemes.
+pub(in crate::reproduce) fn figure_44() -> Vec<Chart> {
+    vec![schemes(
+        "Laser cycles for Table 6's goals (16-bin schemes of Table 7)",
+        long_range_on_chip(),
+        200,
+    )]
+}
+
+/// Fig. 45: their penalties.
+pub(in crate::reproduce) fn figure_45() -> Vec<Chart> {
+    let chart = penalties(
+        "Laser power penalty of 16-bin partial histograms (Table 6)",
+        long_range_on_chip(),
+        200,
+    );
+    vec![chart.with("published: approaching 4", Style::Points, [(200.0, 4.0)])]
+}
+
+/// Fig. 108: laser cycles of the demonstrator's schemes.
+pub(in crate::reproduce) fn figure_108() -> Vec<Chart> {
+    vec![schemes(
+        "Laser cycles for 10 cm (Table 15, 8 bins)",
+        demonstrator_on_chip(),
+        80,
+    )]
+}
+
+/// Fig. 109: their penalties.
+pub(in crate::reproduce) fn figure_109() -> Vec<Chart> {
+    let chart = penalties(
+        "Laser power penalty of 8-bin partial histograms (Table 15)",
+        demonstrator_on_chip(),
+        80,
+    );
+    vec![chart.with(
+        "published: at least 6 at 75 m",
+        Style::Points,
+        [(75.0, 6.0)],
+    )]
+}
+
+/// Tables 7 and 15's systems, scheme by scheme, with overflow counted.
+pub(in crate::reproduce) fn table_7() -> Grid {
+    let mut grid = Grid::new([
+        "system, scheme",
+        "steps",
+        "laser cycles",
+        "penalty (×)",
+        "exposures, 12 bit",
+        "exposures, 14 bit",
+    ]);
+    let systems = [
+        ("Table 6 at 200 m", long_range(), 200.0),
+        ("Table 15 at 75 m", demonstrator(), 75.0),
+    ];
+    for (name, system, z_m) in systems {
+        let full = system.full(z_m);
+        let costs = [
+            ("full or guided", system.full(z_m)),
+            ("zooming", system.zooming(z_m)),
+            (
+                "zooming, one hit per bin and cycle",
+                one_hit(system).zooming(z_m),
+            ),
+            ("sliding", system.sliding(z_m, 0)),
+            (
+                "sliding, quarter overlap",
+                system.sliding(z_m, system.bins / 4),
+            ),
+        ];
+        for (scheme, cost) in costs {
+            grid.push([
+                format!("{name}, {scheme}"),
+                cost.steps.len().to_string(),
+                format!("{:.0}", cost.laser_cycles()),
+                format!("{:.2}", penalty(&cost, &full)),
+                format!("{:.0}", cost.exposures(12)),
+                format!("{:.0}", cost.exposures(14)),
+            ]);
+        }
+    }
+    grid
+}

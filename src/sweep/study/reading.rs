@@ -1,0 +1,479 @@
+//! A study's text: its keys, and everything that is wrong with it at once.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use toml::{Table, Value};
+
+use super::{Kind, MOST_POINTS, Study};
+use crate::files::InputError;
+use crate::settings::{Document, Fault, Key, Range, Section, schema};
+use crate::sweep::cell::{Column, Holds};
+use crate::sweep::design::{Design, MOST_SOBOL_AXES};
+use crate::sweep::keys::{self, Known};
+use crate::sweep::values::{Axis, Span, Values, Varied};
+
+const fn key(name: &'static str, range: Range, what: &'static str) -> Key {
+    Key {
+        name,
+        what,
+        unit: "",
+        range,
+        source: "chosen",
+    }
+}
+
+/// Keys of `[study]`.
+const STUDY: &[Key] = &[
+    key(
+        "name",
+        Range::Text,
+        "What reports call it; the file's name without it",
+    ),
+    key(
+        "kind",
+        Range::OneOf(&["frame", "theory"]),
+        "What is made of each point",
+    ),
+    key(
+        "out",
+        Range::Text,
+        "Folder of its results; `sweep-` and the name without it",
+    ),
+    key(
+        "design",
+        Range::OneOf(&["grid", "latin", "sobol"]),
+        "Which points are taken",
+    ),
+    key(
+        "points",
+        Range::Within(1.0, MOST_POINTS as f64),
+        "How many, of a latin hypercube or a sobol sequence",
+    ),
+    key(
+        "seed",
+        Range::Within(0.0, 9e15),
+        "Seed of the first replica, and of the design",
+    ),
+    key(
+        "replicas",
+        Range::Within(1.0, 1e6),
+        "Times that each point is taken, with seeds one after the other",
+    ),
+];
+
+/// `[study]`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Head {
+    name: String,
+    kind: Kind,
+    out: PathBuf,
+    design: String,
+    points: Option<u64>,
+    seed: u64,
+    replicas: u64,
+}
+
+impl Default for Head {
+    fn default() -> Self {
+        Head {
+            name: String::new(),
+            kind: Kind::Frame,
+            out: PathBuf::new(),
+            design: "grid".into(),
+            points: None,
+            seed: 1,
+            replicas: 1,
+        }
+    }
+}
+
+/// A range, as a study writes it.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RangeEntry {
+    from: Value,
+    to: Value,
+    steps: Option<u32>,
+    #[serde(default)]
+    scale: Scale,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Scale {
+    #[default]
+    Linear,
+    Log,
+}
+
+impl Study {
+    /// The JSON schema of a study file. What may stand in [fixed] and [vary] depends on the scene and its objects, and is left open.
+    pub fn schema() -> serde_json::Value {
+        let section = Section {
+            name: "study",
+            what: "What is made of each point, and which points are taken",
+            keys: STUDY,
+        };
+        let numbers = ["points", "seed", "replicas"].map(|key| (key.to_owned(), Value::from(1)));
+        let values = Table::from_iter([("study".to_owned(), Table::from_iter(numbers).into())]);
+        let mut schema = schema("A study of gdtof", &[section], &values);
+        for (name, what) in [
+            (
+                "fixed",
+                "Values of keys that do not vary: sensor.KEY, scene.SECTION.KEY, guide, windows.KEY, frame.KEY, theory.KEY",
+            ),
+            (
+                "vary",
+                "Lists or ranges {from, to, steps, scale} of keys that do; [[vary.zip]] for keys that go together",
+            ),
+        ] {
+            schema["properties"][name] =
+                serde_json::json!({ "type": "object", "description": what });
+        }
+        schema
+    }
+
+    /// Reads a study file.
+    ///
+    /// # Errors
+    /// As [`Study::parse`], or when it cannot be read.
+    pub fn load(path: &Path) -> Result<Self, InputError> {
+        let text = crate::files::read_text(path)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        Self::parse(path.display(), &text, folder, &stem)
+    }
+
+    /// Reads a study; `source` names it in complaints, files that it names are relative to `folder`, and `name` is what it is called if
+    /// it does not say.
+    ///
+    /// # Errors
+    /// No TOML; unknown keys, values that no sensor, scene or frame takes, empty lists, more points than [`MOST_POINTS`]: all of them
+    /// at once, with their lines.
+    pub fn parse(
+        source: impl std::fmt::Display,
+        text: &str,
+        folder: &Path,
+        name: &str,
+    ) -> Result<Self, InputError> {
+        let document = Document::parse(&source, text)?;
+        let mut faults = Vec::new();
+        let mut fault = |path: &str, message: String| {
+            let path = path.to_owned();
+            faults.push(Fault { path, message });
+        };
+        let nothing = Table::new();
+        let section = |name: &str| match document.table().get(name) {
+            None => Ok(&nothing),
+            Some(Value::Table(table)) => Ok(table),
+            Some(_) => Err(format!(
+                "{name}: this must be a section; write its name in brackets, and its keys below"
+            )),
+        };
+        for name in document.table().keys() {
+            if !["study", "fixed", "vary"].contains(&name.as_str()) {
+                fault(
+                    name,
+                    format!("{name}: unknown section; give [study], [vary] or [fixed]"),
+                );
+            }
+        }
+        let mut sections = ["study", "fixed", "vary"].map(|name| {
+            section(name).unwrap_or_else(|message| {
+                fault(name, message);
+                &nothing
+            })
+        });
+        let [study, fixed, vary] = &mut sections;
+        let mut study_faults = Vec::new();
+        let head = document.section::<Head>("study", study, STUDY, &nothing, &mut study_faults);
+        let head: Head = head.try_into().expect("every value has been tried");
+
+        let mut assignments = Vec::new();
+        flatten("", fixed, &mut |name, value| {
+            let path = format!("fixed.{name}");
+            match keys::find(head.kind, name).and_then(|known| keys::checked(&known, value)) {
+                Ok(value) => assignments.push((name.to_owned(), value)),
+                Err(message) => fault(&path, message),
+            }
+        });
+
+        // In the order in which they are written: the first one varies slowest.
+        let mut axes: Vec<(Option<usize>, Axis)> = Vec::new();
+        let is_zip = |(name, _): &(&String, &Value)| *name == "zip";
+        let zipped = vary.iter().find(is_zip).map(|(_, value)| value);
+        let alone: Table = (vary.iter().filter(|entry| !is_zip(entry)))
+            .map(|(name, value)| (name.clone(), value.clone()))
+            .collect();
+        flatten("", &alone, &mut |name, value| {
+            let path = format!("vary.{name}");
+            match varied(head.kind, name, value) {
+                Ok(varied) => axes.push((document.line(&path), Axis(vec![varied]))),
+                Err(message) => fault(&path, message),
+            }
+        });
+        let groups = match zipped {
+            None => &Vec::new(),
+            Some(Value::Array(groups)) => groups,
+            Some(_) => {
+                fault(
+                    "vary.zip",
+                    "zip is no list; write each group as a section [[vary.zip]]".into(),
+                );
+                &Vec::new()
+            }
+        };
+        for (index, group) in groups.iter().enumerate() {
+            let place = format!("vary.zip.{index}");
+            let Value::Table(group) = group else {
+                fault(
+                    &place,
+                    "this must be a section; write [[vary.zip]], and its keys below".into(),
+                );
+                continue;
+            };
+            let mut members = Vec::new();
+            flatten(
+                "",
+                group,
+                &mut |name, value| match varied(head.kind, name, value) {
+                    Ok(varied) => members.push((document.line(&format!("{place}.{name}")), varied)),
+                    Err(message) => fault(&format!("{place}.{name}"), message),
+                },
+            );
+            members.sort_by_key(|(line, _)| *line);
+            let members: Vec<Varied> = members.into_iter().map(|(_, varied)| varied).collect();
+            let Some(first) = members.first() else {
+                continue;
+            };
+            if let Some(other) = members.iter().find(|other| other.len() != first.len()) {
+                let count = |varied: &Varied| match varied.len() {
+                    Some(n) => format!("{} has {n} values", varied.name),
+                    None => format!("{} has no steps", varied.name),
+                };
+                fault(
+                    &place,
+                    format!(
+                        "{} and {}; give as many of each",
+                        count(first),
+                        count(other)
+                    ),
+                );
+                continue;
+            }
+            axes.push((document.line(&place), Axis(members)));
+        }
+        axes.sort_by_key(|(line, _)| *line);
+        let axes: Vec<Axis> = axes.into_iter().map(|(_, axis)| axis).collect();
+
+        let names: Vec<&str> = axes
+            .iter()
+            .flat_map(|a| &a.0)
+            .map(|v| v.name.as_str())
+            .collect();
+        for (index, name) in names.iter().enumerate() {
+            if names[..index].contains(name) {
+                fault(
+                    &format!("vary.{name}"),
+                    format!("{name} varies twice; leave one out"),
+                );
+            }
+            if assignments.iter().any(|(fixed, _)| fixed == name) {
+                fault(
+                    &format!("fixed.{name}"),
+                    format!("{name} is fixed and varies, too; leave one out"),
+                );
+            }
+        }
+        let design = design_of(&head, &axes, &mut fault);
+        if head.kind == Kind::Theory && head.replicas > 1 {
+            fault(
+                "study.replicas",
+                "replicas: theory has no chance in it, and replicas would be alike; leave it out"
+                    .into(),
+            );
+        }
+        faults.extend(study_faults);
+        let any = !faults.is_empty();
+        document.complain(faults)?;
+        debug_assert!(!any);
+        let name = match head.name.is_empty() {
+            true => name.to_owned(),
+            false => head.name,
+        };
+        let study = Study {
+            out: match head.out.as_os_str().is_empty() {
+                true => format!("sweep-{name}").into(),
+                false => head.out,
+            },
+            name,
+            kind: head.kind,
+            seed: head.seed,
+            replicas: head.replicas,
+            design,
+            text: text.to_owned(),
+            source: source.to_string(),
+            folder: folder.to_owned(),
+            fixed: assignments,
+            axes,
+        };
+        let points = study.points().ok_or_else(|| {
+            let message = format!(
+                "has more than {MOST_POINTS} points; give fewer values, or a design with points"
+            );
+            InputError::new(&study.source, message)
+        })?;
+        debug_assert!(points > 0);
+        Ok(study)
+    }
+}
+
+fn design_of(head: &Head, axes: &[Axis], fault: &mut impl FnMut(&str, String)) -> Design {
+    let drawn = match (head.design.as_str(), head.points) {
+        ("grid", None) => {
+            for varied in axes.iter().flat_map(|axis| &axis.0) {
+                if varied.len().is_none() {
+                    let message = format!(
+                        "{}: a grid goes in steps; give steps, or design = \"latin\" or \"sobol\"",
+                        varied.name
+                    );
+                    fault(&format!("vary.{}", varied.name), message);
+                }
+            }
+            return Design::Grid;
+        }
+        ("grid", Some(_)) => {
+            let message = "points: a grid has as many as its values make; leave it out, or give design = \"latin\" or \"sobol\"";
+            fault("study.points", message.into());
+            return Design::Grid;
+        }
+        (design, None) => {
+            fault(
+                "study.design",
+                format!("design = \"{design}\" takes so many points as it is told; give points"),
+            );
+            return Design::Grid;
+        }
+        ("latin", Some(points)) => Design::Latin(points),
+        (_, Some(points)) => Design::Sobol(points),
+    };
+    if axes.is_empty() {
+        fault(
+            "study.design",
+            "design: nothing varies; give keys in [vary]".into(),
+        );
+    }
+    if matches!(drawn, Design::Sobol(_)) && axes.len() > MOST_SOBOL_AXES {
+        let message = format!(
+            "design = \"sobol\" has directions for {MOST_SOBOL_AXES} keys, and {} vary; give design = \"latin\"",
+            axes.len()
+        );
+        fault("study.design", message);
+    }
+    drawn
+}
+
+/// Tells `found` of every value of nested tables, its names joined by dots. A range counts as a value.
+fn flatten(prefix: &str, table: &Table, found: &mut dyn FnMut(&str, &Value)) {
+    for (name, value) in table {
+        let name = match prefix {
+            "" => name.clone(),
+            _ => format!("{prefix}.{name}"),
+        };
+        match value {
+            Value::Table(inner) if !inner.contains_key("from") && !inner.contains_key("to") => {
+                flatten(&name, inner, found);
+            }
+            _ => found(&name, value),
+        }
+    }
+}
+
+/// What `[vary]` says of a key.
+fn varied(kind: Kind, name: &str, value: &Value) -> Result<Varied, String> {
+    let known = keys::find(kind, name)?;
+    let values = match value {
+        Value::Array(list) if list.is_empty() => {
+            return Err(format!("{name} has no values; give at least one"));
+        }
+        Value::Array(list) => {
+            let list: Result<_, String> = list
+                .iter()
+                .map(|value| keys::checked(&known, value))
+                .collect();
+            Values::List(list?)
+        }
+        Value::Table(range) => Values::Range(span(&known, name, range)?),
+        _ => {
+            return Err(format!(
+                "{name} has one value; give a list or a range, or write it below [fixed]"
+            ));
+        }
+    };
+    let is_list = |value: &Value| value.is_array();
+    let holds = match &values {
+        // A position is no number that one could plot.
+        Values::List(list) if list.iter().any(is_list) => Holds::Word,
+        _ => known.holds,
+    };
+    Ok(Varied {
+        name: name.to_owned(),
+        column: Column::new(name, known.key.unit, holds),
+        values,
+    })
+}
+
+fn span(known: &Known, name: &str, range: &Table) -> Result<Span, String> {
+    let RangeEntry {
+        from,
+        to,
+        steps,
+        scale,
+    } = range.clone().try_into().map_err(|e: toml::de::Error| {
+        let message = e.message().trim().replace('\n', " ");
+        format!(
+            "{name}: {message}; give {{from = …, to = …, steps = …, scale = \"linear\" or \"log\"}}"
+        )
+    })?;
+    let ends = [from, to].map(|end| -> Result<f64, String> {
+        let end = keys::checked(known, &end)?;
+        let number = end.as_integer().map(|n| n as f64).or(end.as_float());
+        number.ok_or_else(|| format!("{name} takes no numbers; give a list of its values"))
+    });
+    let [from, to] = ends;
+    let (from, to) = (from?, to?);
+    if steps == Some(0) || (steps == Some(1) && from != to) {
+        return Err(format!(
+            "{name}: a range has 2 steps at least, its ends; give steps"
+        ));
+    }
+    if scale == Scale::Log && !(from > 0.0 && to > 0.0) {
+        return Err(format!(
+            "{name}: equal ratios never come to {}; give ends above 0, or scale = \"linear\"",
+            from.min(to)
+        ));
+    }
+    Ok(Span {
+        from,
+        to,
+        steps,
+        is_log: scale == Scale::Log,
+        is_whole: known.holds == Holds::Whole,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_schema_has_every_key_of_a_study() {
+        let schema = Study::schema();
+        for key in STUDY {
+            assert!(schema["properties"]["study"]["properties"][key.name].is_object());
+        }
+        assert!(schema["properties"]["vary"].is_object());
+    }
+}
