@@ -69,7 +69,10 @@ pub(crate) fn range_counts<'py>(
     dict.set_item("depth", metres(|r| r.measured_m))?;
     dict.set_item("peak", metres(|r| r.peak_m))?;
     dict.set_item("confidence", metres(|r| r.confidence))?;
-    let reasons = readings.iter().map(|r| NoDepth::number(r.no_depth)).collect();
+    let reasons = readings
+        .iter()
+        .map(|r| NoDepth::number(r.no_depth))
+        .collect();
     dict.set_item("reason", map(py, shape, reasons))?;
     Ok(dict)
 }

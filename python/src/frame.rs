@@ -42,11 +42,7 @@ pub(crate) fn request(keys: &Bound<'_, PyDict>) -> PyResult<FrameRequest> {
 
 /// Edges of the bins of every macropixel in its laser cycle, ns after STOP: one more than there are bins, NaN where its window
 /// does not open.
-pub(crate) fn bin_edges_ns(
-    sensor: &Chip,
-    exposure: &Exposure,
-    starts: &[Option<u16>],
-) -> Vec<f64> {
+pub(crate) fn bin_edges_ns(sensor: &Chip, exposure: &Exposure, starts: &[Option<u16>]) -> Vec<f64> {
     let law = WindowLaw::new(sensor, exposure);
     let has_own = law.sensor().has_own_laws();
     let nothing = || vec![f64::NAN; sensor.bins + 1];

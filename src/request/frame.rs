@@ -72,33 +72,29 @@ impl Default for FrameRequest {
     }
 }
 
-const fn key(name: &'static str, range: Range, what: &'static str) -> Key {
-    Key::new(name, "", range, what, "chosen")
-}
-
 /// What can be asked of a frame, for files that ask for one.
 pub const FRAME_KEYS: &[Key] = &[
-    key(
+    Key::chosen(
         "stop_periods",
         Range::Within(1.0, u32::MAX as f64),
         "CLK periods in a laser cycle",
     ),
-    key(
+    Key::chosen(
         "laser_cycles",
         Range::Within(1.0, u32::MAX as f64),
         "Laser cycles of the exposure",
     ),
-    key(
+    Key::chosen(
         "seed",
         Range::Within(0.0, f64::MAX),
         "Seed of photons and guide errors",
     ),
-    key(
+    Key::chosen(
         "engine",
         Range::OneOf(&["gate", "cycle", "window", "cohort"]),
         "Engine of the macropixels",
     ),
-    key(
+    Key::chosen(
         "sub_bins",
         Range::Within(1.0, 64.0),
         "Steps to a CLK period of the cohort engine; as fine as its error needs, if left out",
@@ -110,37 +106,37 @@ pub const FRAME_KEYS: &[Key] = &[
         "Depth error that a cheaper engine may add on average; one engine takes all macropixels, if left out",
         "chosen",
     ),
-    key(
+    Key::chosen(
         "skip",
         Range::Switch,
         "Leave out what the engine can do without, for the same histograms",
     ),
-    key(
+    Key::chosen(
         "false_alarm_rate",
         Range::Above(0.0, 1.0),
         "Share of macropixels without an echo that may be given a depth",
     ),
-    key(
+    Key::chosen(
         "correct_walk",
         Range::Switch,
         "Mend the range walk of strong echoes",
     ),
-    key(
+    Key::chosen(
         "calibration",
         Range::Text,
         "File of a bin profile, for sensors with delay lines",
     ),
-    key(
+    Key::chosen(
         "guides",
         Range::Text,
         "List of what guides the windows, as \"radar:range_sigma_m=0.2\"; the scene's camera pair, if empty",
     ),
-    key(
+    Key::chosen(
         "windows",
         Range::Text,
         "What is changed in the window policy, as \"unguided=neighbour,overlap=0.3\"",
     ),
-    key(
+    Key::chosen(
         "bins_from_guide",
         Range::Switch,
         "Slow CLK down until windows hold what the guide claims of its errors",

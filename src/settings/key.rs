@@ -95,6 +95,11 @@ impl Key {
         }
     }
 
+    /// A key without a unit, whose default is chosen.
+    pub const fn chosen(name: &'static str, range: Range, what: &'static str) -> Self {
+        Key::new(name, "", range, what, "chosen")
+    }
+
     /// The same value as a plain number (or list of numbers) in the key's unit, where it is a number with a unit as text.
     ///
     /// # Errors

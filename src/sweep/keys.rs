@@ -11,24 +11,14 @@ use crate::scene::Scene;
 use crate::settings::{Key, Range};
 use crate::system::{POLICY_KEYS, WindowPolicy};
 
-const fn key(name: &'static str, range: Range, what: &'static str) -> Key {
-    Key {
-        name,
-        what,
-        unit: "",
-        range,
-        source: "chosen",
-    }
-}
-
-const SENSOR: Key = key("sensor", Range::Text, "Chip or sensor file");
-const SCENE: Key = key("scene", Range::Text, "Built-in scene or scene file");
-const GUIDE: Key = key(
+const SENSOR: Key = Key::chosen("sensor", Range::Text, "Chip or sensor file");
+const SCENE: Key = Key::chosen("scene", Range::Text, "Built-in scene or scene file");
+const GUIDE: Key = Key::chosen(
     "guide",
     Range::Text,
     "What guides the windows, one or a list of several",
 );
-const WINDOWS: Key = key("windows", Range::Text, "How windows are chosen");
+const WINDOWS: Key = Key::chosen("windows", Range::Text, "How windows are chosen");
 
 /// A key, and what its values are.
 #[derive(Debug, Clone, Copy)]

@@ -17,67 +17,51 @@ use crate::theory::detection::{Detection, Model, PerCycle, Ties, probability};
 use crate::theory::precision::{cramer_rao, range_m, thompson};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
-const fn key(
-    name: &'static str,
-    unit: &'static str,
-    range: Range,
-    what: &'static str,
-    source: &'static str,
-) -> Key {
-    Key {
-        name,
-        what,
-        unit,
-        range,
-        source,
-    }
-}
-
 /// Keys of `theory`.
 pub(super) const KEYS: &[Key] = &[
-    key(
+    Key::new(
         "range_m",
         "m",
         Range::Above(0.0, 1e5),
         "Range of the wall; 50 if left out",
         "chosen",
     ),
-    key(
+    Key::new(
         "reflectivity",
         "",
         Range::Within(0.0, 1.0),
         "Its reflectivity; 0.3 if left out",
         "chosen",
     ),
-    key(
+    Key::new(
         "illuminance_klux",
         "klux",
         Range::Within(0.0, 200.0),
         "Sunlight on it; the scene's if left out",
         "chosen",
     ),
-    key(
+    Key::new(
         "laser_cycles",
         "",
         Range::Within(1.0, 1e9),
         "Laser cycles of the exposure; 1000 if left out",
         "chosen",
     ),
-    key(
+    Key::new(
         "guide_sigma_m",
         "m",
         Range::Above(0.0, 1e5),
         "Standard deviation of the guide's estimate; 1 if left out",
         "chosen",
     ),
-    key(
+    Key::new(
         "model",
         "",
         Range::OneOf(&["bernoulli", "poisson", "gaussian", "gaussian_as_printed"]),
         "How counts are distributed; bernoulli, one hit a bin and laser cycle, if left out",
         "thesis 3.2.2",
     ),
-    key(
+    Key::new(
         "goal_detection",
         "",
         Range::Within(0.5, 0.999_999_999),

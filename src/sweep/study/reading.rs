@@ -13,49 +13,39 @@ use crate::sweep::design::{Design, MOST_SOBOL_AXES};
 use crate::sweep::keys::{self, Known};
 use crate::sweep::values::{Axis, Span, Values, Varied};
 
-const fn key(name: &'static str, range: Range, what: &'static str) -> Key {
-    Key {
-        name,
-        what,
-        unit: "",
-        range,
-        source: "chosen",
-    }
-}
-
 /// Keys of `[study]`.
 const STUDY: &[Key] = &[
-    key(
+    Key::chosen(
         "name",
         Range::Text,
         "What reports call it; the file's name without it",
     ),
-    key(
+    Key::chosen(
         "kind",
         Range::OneOf(&["frame", "theory"]),
         "What is made of each point",
     ),
-    key(
+    Key::chosen(
         "out",
         Range::Text,
         "Folder of its results; `sweep-` and the name without it",
     ),
-    key(
+    Key::chosen(
         "design",
         Range::OneOf(&["grid", "latin", "sobol"]),
         "Which points are taken",
     ),
-    key(
+    Key::chosen(
         "points",
         Range::Within(1.0, MOST_POINTS as f64),
         "How many, of a latin hypercube or a sobol sequence",
     ),
-    key(
+    Key::chosen(
         "seed",
         Range::Within(0.0, 9e15),
         "Seed of the first replica, and of the design",
     ),
-    key(
+    Key::chosen(
         "replicas",
         Range::Within(1.0, 1e6),
         "Times that each point is taken, with seeds one after the other",
