@@ -197,7 +197,19 @@ impl Loads {
 
     #[inline]
     pub(super) fn of(&self, net: usize) -> &[Load] {
-        &self.loads[self.start[net] as usize..self.start[net + 1] as usize]
+        &self.loads[self.range_of(net)]
+    }
+
+    /// Places of a net's loads among all.
+    #[inline]
+    pub(super) fn range_of(&self, net: usize) -> std::ops::Range<usize> {
+        self.start[net] as usize..self.start[net + 1] as usize
+    }
+
+    /// The load at a place.
+    #[inline]
+    pub(super) fn at(&self, place: usize) -> Load {
+        self.loads[place]
     }
 }
 

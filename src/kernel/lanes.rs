@@ -77,12 +77,20 @@ struct CellState {
     inputs: [u32; MAX_INPUTS],
     outputs: [u32; 2],
     delays: u32,
-    /// Lanes in which each pin changed since the last evaluation.
+    /// Lanes in which each pin changed since the last evaluation; a flip-flop's clock is in its net's [`ClockEdge`].
     changed: [u64; MAX_INPUTS],
-    /// Lanes in which the clock rose, and in which it may have risen.
-    rose: u64,
-    may_have_risen: u64,
     state: Lanes,
+}
+
+/// What a clock did in this round of an instant.
+#[derive(Clone, Copy, Default)]
+struct ClockEdge {
+    /// Lanes in which it went high or unknown.
+    changed: u64,
+    /// Lanes in which it rose.
+    rose: u64,
+    /// Lanes in which it may have risen.
+    may_have_risen: u64,
 }
 
 /// An event-driven simulation of up to 64 copies of one netlist.
@@ -96,6 +104,10 @@ pub struct LaneKernel {
     groups: Vec<Group>,
     free_group: u32,
     dirty: Vec<u32>,
+    /// By net; of clocks only.
+    edges: Vec<ClockEdge>,
+    /// Clocks with an edge in this round.
+    risen: Vec<u32>,
     events: u64,
     lane_changes: u64,
 }
@@ -122,8 +134,6 @@ impl LaneKernel {
                 outputs: cell.outputs.map(index),
                 delays: timing.set_of(i),
                 changed: [0; MAX_INPUTS],
-                rose: 0,
-                may_have_risen: 0,
                 state: unknown,
             });
         LaneKernel {
@@ -136,6 +146,8 @@ impl LaneKernel {
             groups: Vec::new(),
             free_group: NONE,
             dirty: Vec::new(),
+            edges: vec![ClockEdge::default(); netlist.net_count()],
+            risen: Vec::new(),
             events: 0,
             lane_changes: 0,
         }
@@ -203,7 +215,7 @@ impl LaneKernel {
                     self.apply(net, mask, values, observer);
                 }
             }
-            if self.dirty.is_empty() {
+            if self.dirty.is_empty() && self.risen.is_empty() {
                 return;
             }
             let mut dirty = std::mem::take(&mut self.dirty);
@@ -212,7 +224,25 @@ impl LaneKernel {
             }
             dirty.clear();
             self.dirty = dirty;
+            // After the others: a flip-flop whose reset changed, too, has seen both by now, and this changes nothing.
+            while let Some(net) = self.risen.pop() {
+                self.clock(net as usize);
+            }
         }
+    }
+
+    /// The flip-flops on a clock that has risen look at D; most hold already what they would take.
+    fn clock(&mut self, net: usize) {
+        let edge = self.edges[net];
+        for at in self.fan_out.clocks.range_of(net) {
+            let index = self.fan_out.clocks.at(at).cell();
+            let cell = &self.cells[index];
+            let data = self.nets[cell.inputs[0] as usize].value;
+            if edge.may_have_risen | edge.rose & cell.state.differs(data) != 0 {
+                self.evaluate(index);
+            }
+        }
+        self.edges[net] = ClockEdge::default();
     }
 
     /// Unlinks the group of `net` that is due now; returns its lanes and their values.
@@ -247,19 +277,15 @@ impl LaneKernel {
             }
         }
         // A clock going low causes nothing.
-        let caused = mask & !after.zero;
-        if caused == 0 {
-            return;
-        }
-        for &load in self.fan_out.clocks.of(net) {
-            let cell = &mut self.cells[load.cell()];
-            cell.changed[CLOCK] |= caused;
-            cell.rose |= rose;
-            cell.may_have_risen |= may_have_risen;
-            if !cell.is_dirty {
-                cell.is_dirty = true;
-                self.dirty.push(load.cell() as u32);
+        let changed = mask & !after.zero;
+        if changed != 0 && !self.fan_out.clocks.of(net).is_empty() {
+            let edge = &mut self.edges[net];
+            if edge.changed == 0 {
+                self.risen.push(net as u32);
             }
+            edge.changed |= changed;
+            edge.rose |= rose;
+            edge.may_have_risen |= may_have_risen;
         }
     }
 
@@ -280,10 +306,12 @@ impl LaneKernel {
             CellKind::Mux2 => Lanes::mux(input(0), input(1), input(2)),
             CellKind::Dffr | CellKind::Dffsr => {
                 let data = input(0);
+                let edge = &self.edges[cell.inputs[CLOCK] as usize];
+                cell.changed[CLOCK] = edge.changed;
                 let clocked = cell
                     .state
-                    .replaced(cell.rose, data)
-                    .blurred(cell.may_have_risen, data);
+                    .replaced(edge.rose, data)
+                    .blurred(edge.may_have_risen, data);
                 let set = match cell.kind {
                     CellKind::Dffsr => input(3),
                     _ => Lanes::all(Logic::Zero),
@@ -295,7 +323,6 @@ impl LaneKernel {
                 let next = after_set
                     .replaced(reset.one, zero)
                     .blurred(reset.unknown(), zero);
-                (cell.rose, cell.may_have_risen) = (0, 0);
                 cell.state = next;
                 next
             }

@@ -1,4 +1,5 @@
-//! The event queue: a time wheel with an occupancy bitmap, and a heap for the far future.
+//! The event queue: a short sorted list of what comes next, a time wheel with an occupancy bitmap, and a heap for the far
+//! future.
 //!
 //! Gate delays span tens to hundreds of picoseconds, so nearly every event falls into the wheel's
 //! 16.8 ns; long quiet gaps between events are skipped by scanning the bitmap. Events of
@@ -7,11 +8,12 @@
 //! generation.
 //!
 //! ```text
-//!   first[slot] ──► node ──► node ──► NONE        free ──► node ──► NONE
+//!   near ─► event, event, … before `horizon`, sorted      first[slot] ──► node ──► node ──► NONE, from `horizon` on
 //! ```
 //!
-//! The slots are linked lists in one pool whose nodes are taken again last freed first: few events are on their
-//! way at once, so what the wheel touches stays in the nearest cache, wherever in the wheel they lie.
+//! Few events are on their way at once, mostly fewer than ten in a macropixel whose photons are few: then all are in the sorted
+//! list, and the wheel is empty. Where the list grows longer than [`MOST_NEAR`], its last slots go to the wheel. The wheel's slots are linked
+//! lists in one pool whose nodes are taken again last freed first, so that what it touches stays in the nearest cache.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -38,9 +40,19 @@ struct Node {
     next: u32,
 }
 
+/// Events in the sorted list beyond which its last slots go to the wheel.
+const MOST_NEAR: usize = 24;
+
 /// Events in time order. Time never runs backwards: pushes must not precede [`TimeWheel::advance`].
 #[derive(Debug, Clone)]
 pub(super) struct TimeWheel {
+    /// Events in slots before `horizon`, sorted by (time, net); those before `position` are over.
+    near: Vec<Event>,
+    position: usize,
+    /// First slot whose events are in the wheel.
+    horizon: i64,
+    /// Slot of the present: the wheel's slots lie from here to once around it.
+    present: i64,
     /// First node of each slot's list.
     first: Box<[u32; SLOTS]>,
     nodes: Vec<Node>,
@@ -50,45 +62,67 @@ pub(super) struct TimeWheel {
     /// Bit w is set when `occupied[w]` is not zero.
     summary: u32,
     far: BinaryHeap<Reverse<Event>>,
-    /// The slot being drained, sorted; `position` is the next event of it.
-    open: Vec<Event>,
-    position: usize,
-    open_slot: i64,
 }
 
 impl TimeWheel {
     pub(super) fn new() -> Self {
         TimeWheel {
+            near: Vec::new(),
+            position: 0,
+            horizon: i64::MAX,
+            present: 0,
             first: Box::new([NONE; SLOTS]),
             nodes: Vec::new(),
             free: NONE,
             occupied: [0; WORDS],
             summary: 0,
             far: BinaryHeap::new(),
-            open: Vec::new(),
-            position: 0,
-            open_slot: 0,
         }
     }
 
     #[inline]
     pub(super) fn push(&mut self, event: Event) {
         let slot = event.time_fs >> SLOT_BITS;
-        debug_assert!(slot >= self.open_slot, "an event before the present");
-        if slot == self.open_slot {
-            let rest = &self.open[self.position..];
-            let key = |e: &Event| (e.time_fs, e.net);
-            let at = self.position + rest.partition_point(|e| key(e) <= key(&event));
-            self.open.insert(at, event);
-        } else if slot - self.open_slot < SLOTS as i64 {
-            self.put(slot, event);
-        } else {
-            self.far.push(Reverse(event));
+        debug_assert!(slot >= self.present, "an event before the present");
+        if slot >= self.horizon {
+            return self.put(slot, event);
+        }
+        let key = (event.time_fs, event.net);
+        // What is pushed last mostly comes last.
+        let mut at = self.near.len();
+        while at > self.position && (self.near[at - 1].time_fs, self.near[at - 1].net) > key {
+            at -= 1;
+        }
+        self.near.insert(at, event);
+        if self.near.len() > 2 * MOST_NEAR {
+            self.shorten();
         }
     }
 
-    #[inline]
+    /// Forgets what is over, and moves the last slots to the wheel where the list is still long.
+    #[cold]
+    fn shorten(&mut self) {
+        self.near.drain(..self.position);
+        self.position = 0;
+        if self.near.len() <= MOST_NEAR {
+            return;
+        }
+        let horizon = (self.near[MOST_NEAR / 2].time_fs >> SLOT_BITS) + 1;
+        self.horizon = horizon;
+        let is_near = |event: &Event| event.time_fs >> SLOT_BITS < horizon;
+        let stay = self.near.partition_point(is_near);
+        for at in stay..self.near.len() {
+            let event = self.near[at];
+            self.put(event.time_fs >> SLOT_BITS, event);
+        }
+        self.near.truncate(stay);
+    }
+
+    /// Into the wheel, or where that does not reach.
     fn put(&mut self, slot: i64, event: Event) {
+        if slot - self.present >= SLOTS as i64 {
+            return self.far.push(Reverse(event));
+        }
         let index = slot as usize % SLOTS;
         let next = std::mem::replace(&mut self.first[index], self.free);
         let node = Node { event, next };
@@ -107,13 +141,21 @@ impl TimeWheel {
     #[inline]
     pub(super) fn next_time(&mut self, limit_fs: i64) -> Option<i64> {
         loop {
-            if let Some(event) = self.open.get(self.position) {
+            if let Some(event) = self.near.get(self.position) {
                 return (event.time_fs <= limit_fs).then_some(event.time_fs);
+            }
+            self.near.clear();
+            self.position = 0;
+            if self.horizon == i64::MAX {
+                return None;
             }
             let slot = match (self.next_slot(), self.far.peek()) {
                 (Some(slot), _) => slot,
                 (None, Some(Reverse(event))) => event.time_fs >> SLOT_BITS,
-                (None, None) => return None,
+                (None, None) => {
+                    self.horizon = i64::MAX;
+                    return None;
+                }
             };
             if slot > limit_fs >> SLOT_BITS {
                 return None;
@@ -125,7 +167,7 @@ impl TimeWheel {
     /// The next event, if it is due at exactly `time_fs`.
     #[inline]
     pub(super) fn pop_at(&mut self, time_fs: i64) -> Option<Event> {
-        let event = *self.open.get(self.position)?;
+        let event = *self.near.get(self.position)?;
         (event.time_fs == time_fs).then(|| {
             self.position += 1;
             event
@@ -136,20 +178,42 @@ impl TimeWheel {
     #[inline]
     pub(super) fn advance(&mut self, time_fs: i64) {
         let slot = time_fs >> SLOT_BITS;
-        if slot != self.open_slot {
-            debug_assert!(self.position == self.open.len() && slot > self.open_slot);
-            self.open(slot);
+        if slot != self.present {
+            debug_assert!(slot > self.present, "the past");
+            self.present = slot;
+            if !self.far.is_empty() {
+                self.approach();
+            }
+            // Events of the present are in the list, so that what is pushed into its slot comes in order.
+            if slot >= self.horizon {
+                self.open(slot);
+            }
         }
     }
 
+    /// Takes into the wheel what it reaches by now.
+    #[cold]
+    fn approach(&mut self) {
+        while let Some(Reverse(event)) = self.far.peek() {
+            let slot = event.time_fs >> SLOT_BITS;
+            if slot - self.present >= SLOTS as i64 {
+                break;
+            }
+            let Reverse(event) = self.far.pop().expect("peeked");
+            self.put(slot, event);
+        }
+    }
+
+    /// Moves the wheel's first slot to the list; nothing may be in the wheel before it.
     fn open(&mut self, slot: i64) {
-        self.open.clear();
-        self.position = 0;
-        self.open_slot = slot;
+        self.present = slot;
+        self.approach();
+        self.horizon = slot + 1;
+        let from = self.near.len();
         let index = slot as usize % SLOTS;
         let mut at = std::mem::replace(&mut self.first[index], NONE);
         while let Some(node) = self.nodes.get_mut(at as usize) {
-            self.open.push(node.event);
+            self.near.push(node.event);
             let next = std::mem::replace(&mut node.next, self.free);
             self.free = at;
             at = next;
@@ -158,30 +222,21 @@ impl TimeWheel {
         if self.occupied[index / 64] == 0 {
             self.summary &= !(1 << (index / 64));
         }
-        while let Some(Reverse(event)) = self.far.peek() {
-            let far_slot = event.time_fs >> SLOT_BITS;
-            if far_slot - slot >= SLOTS as i64 {
-                break;
-            }
-            let Reverse(event) = self.far.pop().expect("peeked");
-            if far_slot == slot {
-                self.open.push(event);
-            } else {
-                self.put(far_slot, event);
-            }
+        if self.summary == 0 && self.far.is_empty() {
+            self.horizon = i64::MAX;
         }
-        if self.open.len() > 1 {
-            self.open.sort_unstable_by_key(|e| (e.time_fs, e.net));
+        if self.near.len() > from + 1 {
+            self.near[from..].sort_unstable_by_key(|e| (e.time_fs, e.net));
         }
     }
 
-    /// The first occupied slot after the open one, going once around the wheel.
+    /// The first occupied slot from the present on, going once around the wheel.
     #[inline]
     fn next_slot(&self) -> Option<i64> {
         if self.summary == 0 {
             return None;
         }
-        let start = (self.open_slot as usize + 1) % SLOTS;
+        let start = self.present as usize % SLOTS;
         let (word, bit) = (start / 64, start % 64);
         let here = self.occupied[word] >> bit << bit;
         let index = if here != 0 {
@@ -192,8 +247,8 @@ impl TimeWheel {
             let next = (word + 1 + turned.trailing_zeros() as usize) % WORDS;
             next * 64 + self.occupied[next].trailing_zeros() as usize
         };
-        let ahead = (index + SLOTS - self.open_slot as usize % SLOTS) % SLOTS;
-        Some(self.open_slot + ahead as i64)
+        let ahead = (index + SLOTS - start) % SLOTS;
+        Some(self.present + ahead as i64)
     }
 }
 
