@@ -16,11 +16,11 @@ use super::remark::Circumstances;
 use super::result::{Frame, PhaseTimes};
 use super::settings::{EngineKind, FrameSettings, Probe};
 use super::stopwatch::Stopwatch;
-use super::tolerance::Tolerance;
+use super::tolerance::{Kept, Tolerance};
 use crate::chip::{Exposure, Sensor, SensorConfig};
 use crate::engine::waveform::{self, View};
 use crate::engine::{
-    Answer, Cohort, EngineError, GateSimulation, LitPixel, Replay, Window, expose,
+    Answer, Cohort, EngineError, Exposed, GateSimulation, LitPixel, Replay, Window, expose,
     expose_without_skipping, load,
 };
 use crate::guide::{GuideInput, GuideMap};
@@ -97,12 +97,10 @@ pub fn take_guided_frame<A: Answer>(
         exposure,
         seed,
         engine: engine_kind,
-        cohort,
-        tolerance_m,
-        skip,
         depth,
         calibration,
         guide: source,
+        ..
     } = settings;
     assert_eq!(wanted.len(), sensor.pixels());
     assert_eq!(guide.range_m.len(), sensor.pixels());
@@ -128,94 +126,71 @@ pub fn take_guided_frame<A: Answer>(
         .sum();
     times.light_s = clock.lap();
 
-    let done = exposed;
-    let (exposed, kept) = match (tolerance_m, skip) {
-        (&Some(tolerance_m), _) => {
-            let tolerance = Tolerance {
-                tolerance_m,
-                sensor,
-                exposure,
-                peak: &depth.peak,
-            };
-            let (exposed, kept) = tolerance.expose(&stream, &pixels, &done)?;
-            (exposed, Some(kept))
-        }
-        (None, true) if *engine_kind == EngineKind::Cohort => {
-            let cohort = Cohort::new(sensor, exposure, *cohort);
-            let refused = |why| refused_by(&cohort, &stream, &pixels, why);
-            let exposed = expose(&cohort, &stream, &pixels, &done).map_err(refused)?;
-            (exposed, None)
-        }
-        (None, true) => {
-            let engine = engine_kind.expose(sensor, exposure, *cohort);
-            (expose(&*engine, &stream, &pixels, &done)?, None)
-        }
-        (None, false) => {
-            let engine = engine_kind.replay(sensor, exposure)?;
-            let exposed = expose_without_skipping(&*engine, &stream, &pixels, &done)?;
-            (exposed, None)
-        }
-    };
-    times.exposure_s = clock.lap();
-
+    // A probe keeps one processor busy about as long as the engine and the ranging keep the others.
     let probes = probes(guide);
-    probes.par_iter().try_for_each(|probe| {
-        go_on(done(0))?;
-        let pixel = probe.row * sensor.cols + probe.col;
-        let LitPixel {
-            number,
-            start,
-            light,
-        } = &pixels[pixel];
-        let photons = light.as_ref();
-        let photons = photons.map(|light| stream.pixel_events(*number, light));
-        let events = photons.unwrap_or_default().events;
-        let gate = run_probe(sensor, exposure, probe, *start, &events)?;
+    let done = exposed;
+    let at_gates = || {
+        let mut clock = Stopwatch::new();
+        let at_gates = |probe| {
+            go_on(done(0))?;
+            AtGates::run(sensor, exposure, &stream, &pixels, probe)
+        };
+        let probed = probes.par_iter().map(at_gates);
+        (probed.collect::<Result<Vec<_>, _>>(), clock.lap())
+    };
+    let by_engine = || {
+        let mut clock = Stopwatch::new();
+        let (exposed, kept) = expose_array(settings, &stream, &pixels, &done)?;
+        let exposure_s = clock.lap();
+        let ranger = Ranger::new(sensor, exposure, scene, depth, calibration.as_ref())?;
+        let depths = ranger.of_array(exposed.histograms.counts(), |pixel, counts| {
+            let known = Known {
+                pixel,
+                start: wanted[pixel],
+                true_m: truth.range_m[pixel],
+                guide_m: guide.range_m[pixel],
+            };
+            ranger.depth(&known, counts)
+        });
+        let circumstances = Circumstances {
+            sensor,
+            exposure,
+            bin_s: ranger.bin_s(),
+            scene,
+            guide: &**source,
+            light: &light,
+            pixels: &depths,
+        };
+        let remark = circumstances.remark();
+        let ranged = (depths, ranger.bin_s(), remark);
+        Ok::<_, FrameError>((exposed, kept, ranged, [exposure_s, clock.lap()]))
+    };
+    let ((at_gates, probes_s), by_engine) = rayon::join(at_gates, by_engine);
+    let (exposed, kept, (depths, bin_s, remark), took_s) = by_engine?;
+    [times.exposure_s, times.ranging_s] = took_s;
+    times.probes_s = probes_s;
+    for probed in at_gates? {
         let engine = engine_kind.of_probes(kept.is_some());
         let model = match kept.is_some() || engine != *engine_kind {
-            true => Window::new(sensor, exposure).histogram(*start, &events)?,
-            false => exposed.histograms[pixel].to_vec(),
+            true => Window::new(sensor, exposure).histogram(probed.start, &probed.events)?,
+            false => exposed.histograms[probed.pixel].to_vec(),
         };
-        if gate == model {
-            return Ok(());
+        if probed.counts != model {
+            return Err(FrameError::Disagreement {
+                row: probed.pixel / sensor.cols,
+                col: probed.pixel % sensor.cols,
+                engine,
+                gate: probed.counts,
+                model,
+            });
         }
-        Err(FrameError::Disagreement {
-            row: probe.row,
-            col: probe.col,
-            engine,
-            gate,
-            model,
-        })
-    })?;
-    times.probes_s = clock.lap();
-
-    let ranger = Ranger::new(sensor, exposure, scene, depth, calibration.as_ref())?;
-    let depths = ranger.of_array(exposed.histograms.counts(), |pixel, counts| {
-        let known = Known {
-            pixel,
-            start: wanted[pixel],
-            true_m: truth.range_m[pixel],
-            guide_m: guide.range_m[pixel],
-        };
-        ranger.depth(&known, counts)
-    });
-    let circumstances = Circumstances {
-        sensor,
-        exposure,
-        bin_s: ranger.bin_s(),
-        scene,
-        guide: &**source,
-        light: &light,
-        pixels: &depths,
-    };
-    let remark = circumstances.remark();
-    times.ranging_s = clock.lap();
+    }
 
     Ok(Frame {
         rows: sensor.rows,
         cols: sensor.cols,
         bins: sensor.bins,
-        bin_m: ranger.bin_s() * SPEED_OF_LIGHT_M_PER_S / 2.0,
+        bin_m: bin_s * SPEED_OF_LIGHT_M_PER_S / 2.0,
         histograms: exposed.histograms.into_counts(),
         pixels: depths,
         remark,
@@ -290,19 +265,89 @@ fn refused_by(
     }
 }
 
-fn run_probe(
-    sensor: &Sensor,
-    exposure: &Exposure,
-    probe: &Probe,
+/// The histograms of all macropixels by the engine that the settings ask for, and what a tolerance kept to.
+fn expose_array<A: Answer>(
+    settings: &FrameSettings,
+    stream: &PhotonStream,
+    pixels: &[LitPixel],
+    done: &(impl Fn(usize) -> A + Sync),
+) -> Result<(Exposed, Option<Kept>), FrameError> {
+    let FrameSettings {
+        sensor,
+        exposure,
+        engine,
+        cohort,
+        ..
+    } = settings;
+    match (settings.tolerance_m, settings.skip) {
+        (Some(tolerance_m), _) => {
+            let tolerance = Tolerance {
+                tolerance_m,
+                sensor,
+                exposure,
+                peak: &settings.depth.peak,
+            };
+            let (exposed, kept) = tolerance.expose(stream, pixels, done)?;
+            Ok((exposed, Some(kept)))
+        }
+        (None, true) if *engine == EngineKind::Cohort => {
+            let cohort = Cohort::new(sensor, exposure, *cohort);
+            let refused = |why| refused_by(&cohort, stream, pixels, why);
+            let exposed = expose(&cohort, stream, pixels, done).map_err(refused)?;
+            Ok((exposed, None))
+        }
+        (None, true) => {
+            let engine = engine.expose(sensor, exposure, *cohort);
+            Ok((expose(&*engine, stream, pixels, done)?, None))
+        }
+        (None, false) => {
+            let engine = engine.replay(sensor, exposure)?;
+            let exposed = expose_without_skipping(&*engine, stream, pixels, done)?;
+            Ok((exposed, None))
+        }
+    }
+}
+
+/// A macropixel as its gates counted.
+struct AtGates {
+    pixel: usize,
     start: u16,
-    events: &[SpadEvent],
-) -> Result<Vec<u16>, FrameError> {
-    let at = (probe.row, probe.col);
-    let mut simulation = GateSimulation::new(sensor, exposure, at, (1, 1), &[start], &[events]);
-    let view = View::of_pixel(at, sensor, exposure, start, events, probe.wave_cycles);
-    let format = WaveFormat::of(&probe.waves);
-    waveform::record(&mut simulation, &probe.waves, format, &view, &mut ())?;
-    Ok(simulation.histograms()?.into_counts())
+    events: Vec<SpadEvent>,
+    counts: Vec<u16>,
+}
+
+impl AtGates {
+    /// Runs a probe, and writes its waveform.
+    fn run(
+        sensor: &Sensor,
+        exposure: &Exposure,
+        stream: &PhotonStream,
+        pixels: &[LitPixel],
+        probe: &Probe,
+    ) -> Result<Self, FrameError> {
+        let at = (probe.row, probe.col);
+        let pixel = probe.row * sensor.cols + probe.col;
+        let LitPixel {
+            number,
+            start,
+            light,
+        } = &pixels[pixel];
+        let photons = light.as_ref();
+        let photons = photons.map(|light| stream.pixel_events(*number, light));
+        let events = photons.unwrap_or_default().events;
+        let start = *start;
+        let mut simulation =
+            GateSimulation::new(sensor, exposure, at, (1, 1), &[start], &[&events]);
+        let view = View::of_pixel(at, sensor, exposure, start, &events, probe.wave_cycles);
+        let format = WaveFormat::of(&probe.waves);
+        waveform::record(&mut simulation, &probe.waves, format, &view, &mut ())?;
+        Ok(AtGates {
+            pixel,
+            start,
+            counts: simulation.histograms()?.into_counts(),
+            events,
+        })
+    }
 }
 
 #[cfg(test)]
