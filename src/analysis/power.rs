@@ -137,7 +137,7 @@ impl MacropixelPower {
         let origin = gate.schedule().origin;
         // CLK's first fall comes with STOP, or half a period before it.
         let from = origin - exposure.clock.period();
-        let mut activity = Activity::new(netlist.net_count(), from);
+        let mut activity = Activity::new(&netlist, from);
         gate.run(&mut activity);
         let nets = activity.until(gate.now());
         let scope = netlist.scope(gate.probes()[0].macropixel());
@@ -203,7 +203,7 @@ mod tests {
             drives.push(Drive::new(Time::from_ns(10 + k), net("A"), k % 2 == 1));
         }
         let from = Time::from_ns(5);
-        let mut activity = Activity::new(netlist.net_count(), from);
+        let mut activity = Activity::new(&netlist, from);
         let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
         let end = Time::from_ns(30);
         Kernel::new(&netlist, &timing).run(&mut in_order(drives), end, &mut activity);

@@ -51,6 +51,9 @@ pub(super) struct ReplayArgs {
     /// Switching activity of every net, from power-up to the end, as SAIF 2.0 for power tools (needs --engine gate).
     #[arg(long, value_name = "FILE")]
     saif: Option<PathBuf>,
+    /// Count transport glitches in that file, too (TG), which some readers refuse.
+    #[arg(long, requires = "saif")]
+    saif_glitches: bool,
     /// Format of the waveform, whatever its name.
     #[arg(long, value_enum, requires = "vcd")]
     wave_format: Option<WaveFormat>,
@@ -286,11 +289,12 @@ fn watch<O: Observer>(
         return record(simulation, stimuli, args, observer);
     };
     let netlist = Arc::clone(simulation.netlist());
-    let mut activity = Activity::new(netlist.net_count(), Time::ZERO);
+    let mut activity = Activity::new(&netlist, Time::ZERO);
     record(simulation, stimuli, args, &mut (&mut activity, observer))?;
     let end = simulation.now();
     OutputFile::write_with(saif, |out| {
-        write_saif(out, &netlist, &activity.until(end), end)
+        let nets = activity.until(end);
+        write_saif(out, &netlist, &nets, end, args.saif_glitches)
     })
 }
 

@@ -1,17 +1,28 @@
 //! Switching activity: how often each net changes, and how long it has each value. Power and SAIF files come from it.
+//!
+//! ```text
+//!   input    ──┐_____________________________┌──   one settling: from a change of any input to the next
+//!   net      _____┌─┐_____┌────────────────────   three toggles, of which two are the edges of a transport glitch
+//!   driver   _______________________┌┐_________   a pulse shorter than the driver's delay: an inertial glitch
+//! ```
 
 use super::observer::Observer;
 use crate::logic::Logic;
-use crate::netlist::NetId;
+use crate::netlist::{NetId, Netlist};
 use crate::units::Time;
 
-/// What one net did.
+/// What one net did. Glitches are counted in edges, two a pulse; what is one is defined here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct NetActivity {
     /// Changes between 0 and 1, either way; one through X counts once.
     pub toggles: u64,
-    /// Times that it went to X and came back to the value before: what is left of a pulse too short to decide.
-    pub glitches: u64,
+    /// Those of them that are extra, before the net settles: it comes from one steady value to another with one toggle or
+    /// none, and what it makes beyond that between a change of an input and the next one is a pulse. A pulse that the
+    /// circuit makes of one edge on purpose is such a one, too; nothing but its purpose tells it from a hazard.
+    pub transport_glitch_edges: u64,
+    /// Edges of pulses that never come, because they are shorter than the driver's delay, and of those of which an X is
+    /// left: times that the net went to X and came back to the value before.
+    pub inertial_glitch_edges: u64,
     /// Time at 0.
     pub low: Time,
     /// Time at 1.
@@ -27,27 +38,39 @@ struct State {
     now: Logic,
     /// The last known value.
     known: Logic,
+    /// The last toggle is an odd one of the settling that began then: the next one of it goes back.
+    may_go_back: Option<Time>,
+    is_input: bool,
 }
 
 /// Counts the activity of every net from some time on.
 #[derive(Debug, Clone)]
 pub struct Activity {
     from: Time,
+    /// When an input changed last.
+    settling: Time,
     nets: Vec<State>,
 }
 
 impl Activity {
-    /// Nothing observed yet of `nets` nets, all unknown; what happens before `from` only sets their values.
-    pub fn new(nets: usize, from: Time) -> Self {
+    /// Nothing observed yet of the nets of `netlist`, all unknown; what happens before `from` only sets their values.
+    pub fn new(netlist: &Netlist, from: Time) -> Self {
         let state = State {
             found: NetActivity::default(),
             since: from,
             now: Logic::X,
             known: Logic::X,
+            may_go_back: None,
+            is_input: false,
         };
+        let mut nets = vec![state; netlist.net_count()];
+        for input in netlist.inputs() {
+            nets[input.index()].is_input = true;
+        }
         Activity {
             from,
-            nets: vec![state; nets],
+            settling: from,
+            nets,
         }
     }
 
@@ -79,12 +102,25 @@ impl State {
         *time += until - self.since;
         self.since = until;
     }
+
+    fn toggle(&mut self, settling: Time) {
+        self.found.toggles += 1;
+        if self.may_go_back == Some(settling) {
+            self.found.transport_glitch_edges += 2;
+            self.may_go_back = None;
+        } else {
+            self.may_go_back = Some(settling);
+        }
+    }
 }
 
 impl Observer for Activity {
     #[inline]
     fn change(&mut self, time: Time, net: NetId, value: Logic) {
         let state = &mut self.nets[net.index()];
+        if state.is_input {
+            self.settling = time;
+        }
         let counts = time >= self.from;
         if counts {
             state.spend(time);
@@ -92,35 +128,57 @@ impl Observer for Activity {
         if value.to_bool().is_some() {
             if counts && state.known.to_bool().is_some() {
                 if state.known != value {
-                    state.found.toggles += 1;
+                    state.toggle(self.settling);
                 } else if state.now != value {
-                    state.found.glitches += 1;
+                    state.found.inertial_glitch_edges += 2;
                 }
             }
             state.known = value;
         }
         state.now = value;
     }
+
+    #[inline]
+    fn swallowed(&mut self, time: Time, net: NetId, pulses: u32) {
+        if time >= self.from {
+            let found = &mut self.nets[net.index()].found;
+            found.inertial_glitch_edges += 2 * u64::from(pulses);
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::{Drive, Kernel, in_order};
+    use crate::netlist::{ArcDelay, CellKind, Corner, Library, MAX_INPUTS, ModuleBuilder, Timing};
     use Logic::{One, X, Zero};
 
+    /// Input A, output Z = A NAND (A inverted three times): low for a while where A rises.
+    fn one_shot() -> Netlist {
+        let mut m = ModuleBuilder::new("one_shot");
+        let a = m.input("A");
+        let z = m.output("Z");
+        let late = (0..3).fold(a, |net, _| m.gate(CellKind::Inv, &[net]));
+        m.gate_into(CellKind::Nand2, &[a, late], z);
+        Netlist::elaborate(&m.finish().unwrap())
+    }
+
     fn observed(from: i64, changes: &[(i64, Logic)], end: i64) -> NetActivity {
-        let mut activity = Activity::new(1, Time::from_fs(from));
+        let netlist = one_shot();
+        let net = netlist.net("Z").unwrap();
+        let mut activity = Activity::new(&netlist, Time::from_fs(from));
         for &(time, value) in changes {
-            activity.change(Time::from_fs(time), NetId::new(0), value);
+            activity.change(Time::from_fs(time), net, value);
         }
-        activity.until(Time::from_fs(end))[0]
+        activity.until(Time::from_fs(end))[net.index()]
     }
 
     #[test]
     fn values_are_timed_and_toggles_counted() {
         let found = observed(0, &[(10, Zero), (15, One), (18, Zero), (30, One)], 100);
         let times = [found.low, found.high, found.unknown].map(Time::as_fs);
-        assert_eq!((found.toggles, found.glitches), (3, 0));
+        assert_eq!((found.toggles, found.inertial_glitch_edges), (3, 0));
         assert_eq!(times, [5 + 12, 3 + 70, 10]);
     }
 
@@ -128,7 +186,7 @@ mod tests {
     fn x_on_the_way_is_one_toggle_and_x_and_back_a_glitch() {
         let changes = [(0, Zero), (5, X), (6, One), (8, X), (9, One)];
         let found = observed(0, &changes, 10);
-        assert_eq!((found.toggles, found.glitches), (1, 1));
+        assert_eq!((found.toggles, found.inertial_glitch_edges), (1, 2));
         assert_eq!(found.unknown.as_fs(), 2);
     }
 
@@ -138,5 +196,36 @@ mod tests {
         assert_eq!(found.toggles, 1);
         let times = [found.low, found.high, found.unknown].map(Time::as_fs);
         assert_eq!(times, [5, 5, 0]);
+    }
+
+    /// A pulse that is let through is a transport glitch, one that is not an inertial glitch.
+    #[test]
+    fn a_hazard_by_hand() {
+        let netlist = one_shot();
+        let [a, z] = ["A", "Z"].map(|name| netlist.net(name).unwrap());
+        let drives = (0..21).map(|k| Drive::new(Time::from_ns(k), a, k % 2 == 1));
+        let drives: Vec<Drive> = drives.collect();
+        let run = |timing: &Timing| {
+            let mut activity = Activity::new(&netlist, Time::ZERO);
+            let end = Time::from_ns(30);
+            Kernel::new(&netlist, timing).run(&mut in_order(drives.clone()), end, &mut activity);
+            let nets = activity.until(end);
+            let glitches = |net: NetId| {
+                let found = nets[net.index()];
+                let glitches = [found.transport_glitch_edges, found.inertial_glitch_edges];
+                (found.toggles, glitches)
+            };
+            (glitches(a), glitches(z))
+        };
+        let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        assert_eq!(run(&timing), ((20, [0, 0]), (20, [20, 0])));
+        // The gate slower than the chain.
+        let nand = netlist.cells().iter().position(|cell| cell.outputs[0] == z);
+        let slow = ArcDelay {
+            rise_fs: 500_000,
+            fall_fs: 500_000,
+        };
+        timing.set(nand.unwrap(), [slow; MAX_INPUTS]);
+        assert_eq!(run(&timing), ((20, [0, 0]), (0, [0, 20])));
     }
 }

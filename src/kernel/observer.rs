@@ -15,6 +15,10 @@ pub trait Observer {
     fn doubtful(&mut self) -> Option<usize> {
         None
     }
+
+    /// `net`'s driver went to another value and back in less than its delay: so many pulses never come. Nothing changes.
+    #[inline]
+    fn swallowed(&mut self, _: Time, _: NetId, _pulses: u32) {}
 }
 
 /// Watches nothing, at no cost.
@@ -35,6 +39,12 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
     fn doubtful(&mut self) -> Option<usize> {
         self.0.doubtful().or_else(|| self.1.doubtful())
     }
+
+    #[inline]
+    fn swallowed(&mut self, time: Time, net: NetId, pulses: u32) {
+        self.0.swallowed(time, net, pulses);
+        self.1.swallowed(time, net, pulses);
+    }
 }
 
 impl<O: Observer> Observer for &mut O {
@@ -46,6 +56,11 @@ impl<O: Observer> Observer for &mut O {
     #[inline]
     fn doubtful(&mut self) -> Option<usize> {
         (**self).doubtful()
+    }
+
+    #[inline]
+    fn swallowed(&mut self, time: Time, net: NetId, pulses: u32) {
+        (**self).swallowed(time, net, pulses);
     }
 }
 

@@ -207,8 +207,9 @@ impl Kernel {
         let (outputs, set) = (cell.outputs, cell.delays as usize);
         let inverted = Logic::from_bits(state).inverted().bits();
         let delays = *self.delays[set].after_pin(CLOCK);
-        self.schedule(outputs[0], state, &delays);
-        self.schedule(outputs[1], inverted, &delays);
+        // A value that becomes unknown is no pulse.
+        self.schedule(outputs[0], state, &delays, &mut ());
+        self.schedule(outputs[1], inverted, &delays, &mut ());
     }
 
     /// Gives flip-flops (index of their cell) another state and lets everything that follows from it follow, without time
@@ -276,13 +277,13 @@ impl Kernel {
             }
             self.statistics.evaluations += dirty.len() as u64;
             for &cell in &dirty {
-                self.evaluate(cell as usize);
+                self.evaluate(cell as usize, observer);
             }
             dirty.clear();
             self.dirty = dirty;
             // After the others: a flip-flop whose reset changed, too, has seen both by now, and this changes nothing.
             while let Some(net) = self.risen.pop() {
-                self.clock(net as usize);
+                self.clock(net as usize, observer);
             }
         }
         panic!("zero-delay loop oscillates at {}", self.now());
@@ -350,10 +351,10 @@ impl Kernel {
 
     /// The flip-flops on a clock that has risen look at D.
     #[inline]
-    fn clock(&mut self, net: usize) {
+    fn clock<O: Observer>(&mut self, net: usize, observer: &mut O) {
         for bank in 0..self.banks.len() {
             if self.banks[bank].clock as usize == net {
-                self.clock_bank(bank);
+                self.clock_bank(bank, observer);
             }
         }
         let loads = self.fan_out.clocks.of(net);
@@ -366,7 +367,7 @@ impl Kernel {
                 cell.inputs & RESET_AND_SET != 0 || nets[cell.data as usize].value != cell.state
             }));
         while let Some(cell) = self.woken.pop() {
-            self.evaluate_flip_flop(cell, self.cells[cell].inputs);
+            self.evaluate_flip_flop(cell, self.cells[cell].inputs, observer);
         }
         let state = &mut self.nets[net];
         state.has_risen = false;
@@ -374,7 +375,7 @@ impl Kernel {
     }
 
     #[inline]
-    fn evaluate(&mut self, index: usize) {
+    fn evaluate<O: Observer>(&mut self, index: usize, observer: &mut O) {
         let cell = &mut self.cells[index];
         cell.is_dirty = false;
         // An input that changed and changed back within the instant did nothing.
@@ -385,18 +386,18 @@ impl Kernel {
         cell.evaluated = inputs;
         if kind.is_flip_flop() {
             self.dissolve_bank_of(index);
-            self.evaluate_flip_flop(index, evaluated);
+            self.evaluate_flip_flop(index, evaluated, observer);
         } else {
             let (output, set) = (cell.outputs[0], cell.delays);
             let value = self.tables.gate(kind, inputs);
             let delays = self.delays[set as usize].after(inputs, evaluated);
-            self.schedule(output, value, &delays);
+            self.schedule(output, value, &delays, observer);
         }
     }
 
     /// With its reset and set before.
     #[inline]
-    fn evaluate_flip_flop(&mut self, index: usize, evaluated: u8) {
+    fn evaluate_flip_flop<O: Observer>(&mut self, index: usize, evaluated: u8, observer: &mut O) {
         let cell = &mut self.cells[index];
         let clock = &self.nets[cell.clock as usize];
         let data = self.nets[cell.data as usize].value;
@@ -412,12 +413,18 @@ impl Kernel {
         let (outputs, set) = (cell.outputs, cell.delays);
         let inverted = Logic::from_bits(state).inverted().bits();
         let delays = self.delays[set as usize].after(inputs, before);
-        self.schedule(outputs[0], state, &delays);
-        self.schedule(outputs[1], inverted, &delays);
+        self.schedule(outputs[0], state, &delays, observer);
+        self.schedule(outputs[1], inverted, &delays, observer);
     }
 
     #[inline]
-    fn schedule(&mut self, net: u32, value: u8, delays_fs: &[u32; 4]) {
+    fn schedule<O: Observer>(
+        &mut self,
+        net: u32,
+        value: u8,
+        delays_fs: &[u32; 4],
+        observer: &mut O,
+    ) {
         let Some(state) = self.nets.get_mut(net as usize) else {
             return;
         };
@@ -426,7 +433,12 @@ impl Kernel {
         }
         if state.pending != NONE {
             if state.pending == QUEUED {
-                return self.send(net, value, self.now_fs + delays_fs[value as usize] as i64);
+                let time_fs = self.now_fs + delays_fs[value as usize] as i64;
+                return self.send(net, value, time_fs, observer);
+            }
+            // Back to where the net is, from one known value to the other.
+            if state.value == value && (value | state.pending) <= Logic::One.bits() {
+                observer.swallowed(Time::from_fs(self.now_fs), NetId::new(net as usize), 1);
             }
             state.generation = (state.generation + 1) & (u32::MAX >> 2);
             state.pending = NONE;
@@ -443,9 +455,14 @@ impl Kernel {
 
     /// [`Kernel::schedule`] with a transport delay.
     #[inline(never)]
-    fn send(&mut self, net: u32, value: u8, time_fs: i64) {
+    fn send<O: Observer>(&mut self, net: u32, value: u8, time_fs: i64, observer: &mut O) {
         let present = self.nets[net as usize].value;
-        if self.transport.send(net as usize, present, value, time_fs) {
+        let sent = self.transport.send(net as usize, present, value, time_fs);
+        if sent.swallowed > 0 {
+            let now = Time::from_fs(self.now_fs);
+            observer.swallowed(now, NetId::new(net as usize), sent.swallowed);
+        }
+        if sent.arrives {
             self.wheel.push(Event {
                 time_fs,
                 net,

@@ -15,6 +15,20 @@ use crate::netlist::{DelayModel, Netlist, Timing};
 /// No queue.
 const NONE: u32 = u32::MAX;
 
+/// What became of a change that was sent on its way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Sent {
+    /// Whether it is to arrive: it is not where the net has its value then without it.
+    pub arrives: bool,
+    /// Pulses from a known value to the other and back that it overtook, and that never arrive.
+    pub swallowed: u32,
+}
+
+/// From a known value to the other.
+fn is_edge(before: u8, after: u8) -> bool {
+    (before | after) <= 1 && before != after
+}
+
 /// The nets that cells with transport delays drive.
 #[derive(Default)]
 pub(super) struct TransportQueues {
@@ -42,22 +56,32 @@ impl TransportQueues {
         of_net.filter(|(_, q)| **q != NONE).map(|(net, _)| net)
     }
 
-    /// Sends `net`, which now is `present`, to `value` at the time that `due_fs` has for it. Whether a change is
-    /// to arrive then: none does where the value is on its way already.
-    pub(super) fn send(&mut self, net: usize, present: u8, value: u8, due_fs: i64) -> bool {
+    /// Sends `net`, which now is `present`, to `value` at the time that `due_fs` has for it.
+    pub(super) fn send(&mut self, net: usize, present: u8, value: u8, due_fs: i64) -> Sent {
         let queue = &mut self.queues[self.of_net[net] as usize];
         let last = |queue: &VecDeque<(i64, u8)>| queue.back().map_or(present, |&(_, v)| v);
+        let mut sent = Sent::default();
         if last(queue) == value {
-            return false;
+            return sent;
         }
-        while queue.back().is_some_and(|&(time_fs, _)| time_fs >= due_fs) {
+        // Changes between known values, from the newest back to the last that stays.
+        let (mut edges, mut after) = (0, value);
+        while let Some(&(time_fs, before)) = queue.back()
+            && time_fs >= due_fs
+        {
             queue.pop_back();
+            edges += u32::from(is_edge(before, after));
+            after = before;
         }
-        if last(queue) == value {
-            return false;
+        let before = last(queue);
+        edges += u32::from(is_edge(before, after));
+        // One of them is left where the ends differ.
+        sent.swallowed = edges / 2;
+        sent.arrives = before != value;
+        if sent.arrives {
+            queue.push_back((due_fs, value));
         }
-        queue.push_back((due_fs, value));
-        true
+        sent
     }
 
     /// The value that arrives on `net` now, if any does.
@@ -86,6 +110,11 @@ mod tests {
     use super::*;
     use crate::netlist::{CellKind, Corner, Library, ModuleBuilder};
 
+    const ARRIVES: Sent = Sent {
+        arrives: true,
+        swallowed: 0,
+    };
+
     fn one_net() -> (TransportQueues, usize) {
         let mut m = ModuleBuilder::new("m");
         let a = m.input("A");
@@ -101,9 +130,13 @@ mod tests {
     #[test]
     fn short_pulses_come_through() {
         let (mut queues, net) = one_net();
-        assert!(queues.send(net, 0, 1, 100));
-        assert!(queues.send(net, 0, 0, 103));
-        assert!(!queues.send(net, 0, 0, 107), "on its way already");
+        assert_eq!(queues.send(net, 0, 1, 100), ARRIVES);
+        assert_eq!(queues.send(net, 0, 0, 103), ARRIVES);
+        assert_eq!(
+            queues.send(net, 0, 0, 107),
+            Sent::default(),
+            "on its way already"
+        );
         assert_eq!(queues.arriving(net, 99), None);
         assert_eq!(queues.arriving(net, 100), Some(1));
         assert_eq!(queues.arriving(net, 103), Some(0));
@@ -112,12 +145,38 @@ mod tests {
     #[test]
     fn what_is_overtaken_never_arrives() {
         let (mut queues, net) = one_net();
-        assert!(queues.send(net, 0, 1, 100));
-        assert!(!queues.send(net, 0, 0, 100), "back to where it was");
+        assert_eq!(queues.send(net, 0, 1, 100), ARRIVES);
+        let back_to_where_it_was = Sent {
+            arrives: false,
+            swallowed: 1,
+        };
+        assert_eq!(queues.send(net, 0, 0, 100), back_to_where_it_was);
         assert_eq!(queues.arriving(net, 100), None);
-        assert!(queues.send(net, 0, 1, 200));
-        assert!(queues.send(net, 0, 2, 150));
+        assert_eq!(queues.send(net, 0, 1, 200), ARRIVES);
+        assert_eq!(queues.send(net, 0, 2, 150), ARRIVES);
         assert_eq!(queues.arriving(net, 150), Some(2));
         assert_eq!(queues.arriving(net, 200), None);
+    }
+
+    #[test]
+    fn of_several_changes_overtaken_the_pulses_count() {
+        let (mut queues, net) = one_net();
+        for (value, due_fs) in [(1, 100), (0, 110), (1, 120), (0, 130)] {
+            assert_eq!(queues.send(net, 0, value, due_fs), ARRIVES);
+        }
+        // 1 0 1 0 1 becomes 1: two pulses to 0.
+        let two = Sent {
+            arrives: false,
+            swallowed: 2,
+        };
+        assert_eq!(queues.send(net, 0, 1, 105), two);
+        // 1 X 0 1 becomes 1: what is unknown on the way makes no pulse.
+        assert_eq!(queues.send(net, 0, 2, 115), ARRIVES);
+        assert_eq!(queues.send(net, 0, 0, 125), ARRIVES);
+        let no_pulse = Sent {
+            arrives: false,
+            swallowed: 0,
+        };
+        assert_eq!(queues.send(net, 0, 1, 102), no_pulse);
     }
 }

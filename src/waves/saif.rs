@@ -2,9 +2,13 @@
 //! tools read them.
 //!
 //! Every net of every scope is there under each of its names, those that never change and those that the builder numbered
-//! included: names are the ones of the exported Verilog. T0 + T1 + TX is the duration for each. TX has Z, too. TC counts
-//! changes between 0 and 1, one through X once; IG counts those to X and back. A pulse that a gate's inertial delay
-//! swallows makes no change and is in no count.
+//! included: names are the ones of the exported Verilog. T0 + T1 + TX is the duration for each. TX has Z, too. The counts are
+//! of edges, two a pulse; what is a glitch is this crate's definition:
+//!
+//! * TC: changes between 0 and 1, one through X once. All that happens, glitches let through included.
+//! * TG: those of them that are extra on the way to a steady value ([`NetActivity::transport_glitch_edges`]). Only on request:
+//!   there are readers whose grammar has no TG (OpenSTA's), and they refuse the file.
+//! * IG: what an inertial delay takes away or makes X, and is not in TC ([`NetActivity::inertial_glitch_edges`]).
 
 use std::io::{self, Write};
 
@@ -12,7 +16,7 @@ use crate::kernel::NetActivity;
 use crate::netlist::Netlist;
 use crate::units::Time;
 
-/// Writes what `nets` did, by net of `netlist`, in `duration`.
+/// Writes what `nets` did, by net of `netlist`, in `duration`; TG only with `transport_glitches`.
 ///
 /// # Errors
 /// Those of `out`.
@@ -21,6 +25,7 @@ pub fn write_saif(
     netlist: &Netlist,
     nets: &[NetActivity],
     duration: Time,
+    transport_glitches: bool,
 ) -> io::Result<()> {
     let top = &netlist.scopes()[0].name;
     writeln!(out, "(SAIFILE")?;
@@ -55,11 +60,15 @@ pub fn write_saif(
                 }
                 let found = &nets[net.index()];
                 let [low, high, unknown] = [found.low, found.high, found.unknown].map(Time::as_fs);
-                writeln!(
+                write!(
                     out,
-                    " (T0 {low}) (T1 {high}) (TX {unknown}) (TC {}) (IG {}))",
-                    found.toggles, found.glitches
+                    " (T0 {low}) (T1 {high}) (TX {unknown}) (TC {})",
+                    found.toggles
                 )?;
+                if transport_glitches {
+                    write!(out, " (TG {})", found.transport_glitch_edges)?;
+                }
+                writeln!(out, " (IG {}))", found.inertial_glitch_edges)?;
             }
         }
         writeln!(out, ")")?;

@@ -1,26 +1,34 @@
-//! Switching activity and its SAIF file tell what the waveform of the same run shows, counted from the dump.
+//! Switching activity and its SAIF file tell what the waveform of the same run shows, counted from the dump; and of pulses
+//! that no dump has, what each cell by itself makes of the waves at its pins.
 
 use crate::every_edge;
+use crate::icarus;
 use crate::scenario;
 
-use std::collections::BTreeMap;
-use std::io::Cursor;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::{BufReader, Cursor};
 use std::path::Path;
 use std::process::{Command, Output};
 
 use every_edge::circuit::{self, Case};
 use every_edge::waves::Waves;
+use guided_dtof::bench::{StimulusPlan, export_verilog};
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::kernel::{Activity, Kernel, in_order};
-use guided_dtof::netlist::Netlist;
+use guided_dtof::logic::Logic;
+use guided_dtof::netlist::{DelayModel, NetId, Netlist, Timing};
 use guided_dtof::units::Time;
 use guided_dtof::waves::{Selection, VcdWriter, write_saif};
 use proptest::prelude::*;
 use rand::{SeedableRng, rngs::StdRng};
 use scenario::Scenario;
 
-/// T0, T1, TX, TC, IG.
-type Row = [i64; 5];
+/// T0, T1, TX, TC, TG (0 in a file without), IG.
+type Row = [i64; 6];
+
+/// Where a row has its edges of inertial glitches.
+const IG: usize = 5;
 
 /// Duration, and every net of a SAIF file by its path below the top.
 fn read_saif(text: &str) -> (i64, BTreeMap<String, Row>) {
@@ -37,8 +45,26 @@ fn read_saif(text: &str) -> (i64, BTreeMap<String, Row>) {
             ["INSTANCE", name] => path.push(name.to_owned()),
             // A list of nets or an instance ends.
             [] if depth < path.len() as i64 + 1 => _ = path.pop(),
-            [name, "T0", t0, "T1", t1, "TX", tx, "TC", tc, "IG", ig] => {
-                let row = [t0, t1, tx, tc, ig].map(|n| n.parse().unwrap());
+            [
+                name,
+                "T0",
+                t0,
+                "T1",
+                t1,
+                "TX",
+                tx,
+                "TC",
+                tc,
+                ref tg @ ..,
+                "IG",
+                ig,
+            ] => {
+                let tg = match tg {
+                    [] => "0",
+                    &["TG", tg] => tg,
+                    _ => panic!("{line}"),
+                };
+                let row = [t0, t1, tx, tc, tg, ig].map(|n| n.parse().unwrap());
                 let name = name.replace('\\', "");
                 let below = path[1..].iter().cloned().chain([name]);
                 let path = below.collect::<Vec<_>>().join(".");
@@ -51,63 +77,217 @@ fn read_saif(text: &str) -> (i64, BTreeMap<String, Row>) {
     (duration, nets)
 }
 
-/// The slow obvious count: every bit of every signal, value after value.
-fn count(changes: &[(u64, String)], bit: usize, end: i64) -> Row {
-    let mut row = [0; 5];
-    let (mut known, mut before, mut since) = ('x', 'x', 0);
-    for (time, value) in changes {
-        let value = value.chars().rev().nth(bit).unwrap().to_ascii_lowercase();
-        let slot = |value| match value {
-            '0' => 0,
-            '1' => 1,
-            _ => 2,
-        };
-        row[slot(before)] += *time as i64 - since;
-        if slot(value) < 2 && known != 'x' {
-            row[3] += i64::from(value != known);
-            row[4] += i64::from(value == known && value != before);
+/// Times (fs) and values of one net, from time 0 on, one value an instant.
+type Changes = Vec<(i64, Logic)>;
+
+/// Every bit of every signal of a dump by its path, and the net that it is.
+fn bits(netlist: &Netlist, waves: &Waves) -> Vec<(String, NetId, Changes)> {
+    let mut bits = Vec::new();
+    let dumped: BTreeMap<&str, &[(u64, String)]> = waves.changes().collect();
+    for (index, scope) in netlist.scopes().iter().enumerate() {
+        let scope_path = netlist.scope_path(index);
+        let below_top = scope_path.split_once('.').map(|(_, below)| below);
+        for signal in scope.module.signals() {
+            let names = below_top.into_iter().chain([signal.name.as_str()]);
+            let path = names.collect::<Vec<_>>().join(".");
+            for (bit, net) in netlist.signal_nets(scope, signal).enumerate() {
+                let of_bit = |(time, value): &(u64, String)| {
+                    let value = match value.chars().rev().nth(bit).unwrap() {
+                        '0' => Logic::Zero,
+                        '1' => Logic::One,
+                        'z' | 'Z' => Logic::Z,
+                        _ => Logic::X,
+                    };
+                    (*time as i64, value)
+                };
+                let mut changes: Changes = dumped[path.as_str()].iter().map(of_bit).collect();
+                changes.dedup_by_key(|change| change.1);
+                let name = match signal.is_bus {
+                    true => format!("{path}[{bit}]"),
+                    false => path.clone(),
+                };
+                bits.push((name, net, changes));
+            }
         }
-        if slot(value) < 2 {
-            known = value;
-        }
-        (before, since) = (value, *time as i64);
     }
-    row[match before {
-        '0' => 0,
-        '1' => 1,
-        _ => 2,
-    }] += end - since;
+    bits
+}
+
+/// The slow obvious count, value after value; of inertial glitches those that a dump shows.
+fn count(changes: &Changes, input_changes: &BTreeSet<i64>, end: i64) -> Row {
+    let mut row = [0; 6];
+    let slot = |value| match value {
+        Logic::Zero => 0,
+        Logic::One => 1,
+        Logic::X | Logic::Z => 2,
+    };
+    let ends = changes.iter().skip(1).map(|&(time, _)| time).chain([end]);
+    for (&(time, value), until) in changes.iter().zip(ends) {
+        row[slot(value)] += until - time;
+    }
+    let known: Vec<usize> = (0..changes.len())
+        .filter(|&k| changes[k].1.to_bool().is_some())
+        .collect();
+    let mut in_settling: BTreeMap<Option<&i64>, i64> = BTreeMap::new();
+    for pair in known.windows(2) {
+        let [(_, before), (time, after)] = [changes[pair[0]], changes[pair[1]]];
+        if before == after {
+            row[IG] += 2;
+        } else {
+            row[3] += 1;
+            let settling = input_changes.range(..=time).next_back();
+            *in_settling.entry(settling).or_default() += 1;
+        }
+    }
+    row[4] = in_settling.values().map(|toggles| toggles & !1).sum();
     row
 }
 
-/// Compares a SAIF file with a dump of the same run; gives toggles, and nets that have none.
-fn compare(saif: &str, dump: Vec<u8>, top: &str, end: Time) -> Result<(i64, usize), TestCaseError> {
-    let (duration, nets) = read_saif(saif);
-    prop_assert_eq!(duration, end.as_fs());
-    let waves = Waves::read(Cursor::new(dump), top);
-    let mut seen = 0;
-    for (path, changes) in waves.changes() {
-        let width = changes.first().map_or(1, |(_, value)| value.len());
-        for bit in 0..width {
-            let row = nets
-                .get(path)
-                .or_else(|| nets.get(&format!("{path}[{bit}]")));
-            prop_assert!(row.is_some(), "{} is in no list", path);
-            prop_assert_eq!(*row.unwrap(), count(changes, bit, end.as_fs()), "{}", path);
-            seen += 1;
+/// The state of a flip-flop: what every possibility of its unknown pins leads to.
+fn latched(state: Logic, [data, clock, reset, set]: [Logic; 4], clock_before: Logic) -> Logic {
+    let may_be = |value: Logic| match value.to_bool() {
+        Some(value) => vec![value],
+        None => vec![false, true],
+    };
+    let mut found = BTreeSet::new();
+    for (reset, set) in may_be(reset)
+        .into_iter()
+        .flat_map(|r| may_be(set).into_iter().map(move |s| (r, s)))
+    {
+        for (before, now) in may_be(clock_before)
+            .into_iter()
+            .flat_map(|b| may_be(clock).into_iter().map(move |n| (b, n)))
+        {
+            let rises = clock.seen() != clock_before.seen() && !before && now;
+            let clocked = if rises { data } else { state };
+            let values = match (reset, set) {
+                (true, _) => vec![false],
+                (false, true) => vec![true],
+                (false, false) => may_be(clocked),
+            };
+            found.extend(values);
         }
     }
-    prop_assert_eq!(seen, nets.len());
-    for (path, row) in &nets {
-        prop_assert_eq!(row[..3].iter().sum::<i64>(), duration, "{}", path);
+    match found.len() {
+        1 => Logic::from(found.contains(&true)),
+        _ => Logic::X,
     }
-    let quiet = nets.values().filter(|row| row[3] == 0).count();
-    Ok((nets.values().map(|row| row[3]).sum(), quiet))
+}
+
+/// Pulses of each net that are shorter than its driver's delay: each cell by itself, from the waves at its pins.
+fn swallowed(netlist: &Netlist, timing: &Timing, of_net: &[Changes]) -> Vec<i64> {
+    let mut pulses = vec![0; of_net.len()];
+    for (index, cell) in netlist.cells().iter().enumerate() {
+        let pins = &cell.inputs[..cell.kind.inputs().len()];
+        let at = |net: NetId, time: i64| {
+            let changes = &of_net[net.index()];
+            let until = changes.partition_point(|change| change.0 <= time);
+            until.checked_sub(1).map_or(Logic::X, |k| changes[k].1)
+        };
+        let times: BTreeSet<i64> = pins
+            .iter()
+            .flat_map(|net| of_net[net.index()].iter().map(|change| change.0))
+            .collect();
+        for (which, &output) in cell.outputs.iter().enumerate().filter(|(_, o)| o.is_some()) {
+            let mut last = Logic::X;
+            let mut on_their_way: Vec<(i64, Logic)> = Vec::new();
+            for &time in &times {
+                let value = |pin: usize, time| pins.get(pin).map_or(Logic::Zero, |&p| at(p, time));
+                let now = [0, 1, 2, 3].map(|pin| value(pin, time));
+                let next = match (cell.kind.is_flip_flop(), which) {
+                    (false, _) => cell.kind.output(now),
+                    (true, 0) => latched(last, now, value(1, time - 1)),
+                    (true, _) => latched(last.inverted(), now, value(1, time - 1)).inverted(),
+                };
+                if next == last {
+                    continue;
+                }
+                last = next;
+                // A clock that goes low causes nothing.
+                let is_fall = |pin| cell.kind.is_flip_flop() && pin == 1 && now[1] == Logic::Zero;
+                let causes = (0..pins.len()).filter(|&pin| {
+                    cell.kind.triggers(pin) && !is_fall(pin) && now[pin] != value(pin, time - 1)
+                });
+                let delays = causes.map(|pin| i64::from(timing.of(index)[pin].to(next)));
+                let due = time + delays.min().unwrap();
+                on_their_way.retain(|&(arrives, _)| arrives > time);
+                let stays = match timing.model(index) {
+                    DelayModel::Inertial => 0,
+                    DelayModel::Transport => on_their_way.partition_point(|&(t, _)| t < due),
+                };
+                let dropped = on_their_way.split_off(stays);
+                let before = on_their_way.last().map_or(at(output, time), |&(_, v)| v);
+                let values: Vec<Logic> = [before]
+                    .into_iter()
+                    .chain(dropped.into_iter().map(|(_, value)| value))
+                    .chain([next])
+                    .collect();
+                let edges = values.windows(2).filter(|pair| {
+                    pair[0] != pair[1] && pair.iter().all(|v| v.to_bool().is_some())
+                });
+                // One of them is left where the ends differ.
+                pulses[output.index()] += edges.count() as i64 / 2;
+                if before != next {
+                    on_their_way.push((due, next));
+                }
+            }
+        }
+    }
+    pulses
+}
+
+/// What was compared.
+#[derive(Debug, Default)]
+struct Compared {
+    toggles: i64,
+    quiet: usize,
+    transport_glitches: i64,
+    inertial_glitches: i64,
+}
+
+/// Compares a SAIF file with a dump of the same run.
+fn compare(
+    saif: &str,
+    (netlist, timing): (&Netlist, &Timing),
+    waves: &Waves,
+    end: Time,
+) -> Result<Compared, TestCaseError> {
+    let (duration, nets) = read_saif(saif);
+    prop_assert_eq!(duration, end.as_fs());
+    let mut bits = bits(netlist, waves);
+    for (.., changes) in &mut bits {
+        // Another simulator's dump may go on.
+        changes.retain(|&(time, _)| time <= duration);
+    }
+    let mut of_net = vec![Changes::new(); netlist.net_count()];
+    for (_, net, changes) in &bits {
+        of_net[net.index()].clone_from(changes);
+    }
+    let inputs = netlist.inputs();
+    let input_changes = inputs.iter().flat_map(|input| &of_net[input.index()]);
+    let input_changes = input_changes.map(|change| change.0).collect();
+    let swallowed = swallowed(netlist, timing, &of_net);
+    for (path, net, changes) in &bits {
+        let row = nets.get(path);
+        prop_assert!(row.is_some(), "{} is in no list", path);
+        let mut expected = count(changes, &input_changes, duration);
+        expected[IG] += 2 * swallowed[net.index()];
+        prop_assert_eq!(*row.unwrap(), expected, "{}", path);
+        prop_assert_eq!(expected[..3].iter().sum::<i64>(), duration, "{}", path);
+    }
+    prop_assert_eq!(bits.len(), nets.len());
+    let sum = |column: usize| nets.values().map(|row| row[column]).sum();
+    Ok(Compared {
+        toggles: sum(3),
+        quiet: nets.values().filter(|row| row[3] == 0).count(),
+        transport_glitches: sum(4),
+        inertial_glitches: sum(IG),
+    })
 }
 
 fn saif(netlist: &Netlist, activity: &Activity, end: Time) -> String {
     let mut text = Vec::new();
-    write_saif(&mut text, netlist, &activity.until(end), end).unwrap();
+    write_saif(&mut text, netlist, &activity.until(end), end, true).unwrap();
     String::from_utf8(text).unwrap()
 }
 
@@ -117,16 +297,14 @@ fn random_circuit(case: &Case) -> Result<(), TestCaseError> {
     let end = drives.last().map_or(Time::ZERO, |d| d.time) + Time::from_ns(2);
     let all = Selection::all().with_anonymous();
     let mut dump = VcdWriter::new(Vec::new(), &netlist, &all).unwrap();
-    let mut activity = Activity::new(netlist.net_count(), Time::ZERO);
-    let mut kernel = Kernel::new(&netlist, &case.timing(&netlist));
+    let mut activity = Activity::new(&netlist, Time::ZERO);
+    let timing = case.timing(&netlist);
+    let mut kernel = Kernel::new(&netlist, &timing);
     kernel.run(&mut in_order(drives), end, &mut (&mut dump, &mut activity));
-    let top = &netlist.scopes()[0].name;
-    compare(
-        &saif(&netlist, &activity, end),
-        dump.finish(end).unwrap(),
-        top,
-        end,
-    )?;
+    let dump = Cursor::new(dump.finish(end).unwrap());
+    let waves = Waves::read(dump, &netlist.scopes()[0].name);
+    let text = saif(&netlist, &activity, end);
+    compare(&text, (&netlist, &timing), &waves, end)?;
     Ok(())
 }
 
@@ -154,13 +332,29 @@ fn in_an_exposed_sensor() {
         let netlist = gate.netlist().clone();
         let all = Selection::all().with_anonymous();
         let mut dump = VcdWriter::new(Vec::new(), &netlist, &all).unwrap();
-        let mut activity = Activity::new(netlist.net_count(), Time::ZERO);
+        let mut activity = Activity::new(&netlist, Time::ZERO);
         gate.run(&mut (&mut dump, &mut activity));
         let end = gate.now();
-        let top = &netlist.scopes()[0].name;
         let text = saif(&netlist, &activity, end);
-        let (toggles, quiet) = compare(&text, dump.finish(end).unwrap(), top, end).unwrap();
-        assert!(toggles > 10_000 && quiet > 100, "{toggles} {quiet}");
+        let ours = Cursor::new(dump.finish(end).unwrap());
+        let ours = Waves::read(ours, &netlist.scopes()[0].name);
+        let compare = |waves: &Waves| {
+            let all = compare(&text, (&netlist, gate.timing()), waves, end).unwrap();
+            assert!(all.toggles > 10_000 && all.quiet > 100, "{all:?}");
+            assert!(
+                all.transport_glitches > 0 && all.inertial_glitches > 0,
+                "{all:?}"
+            );
+        };
+        compare(&ours);
+        if seed == 0 && icarus::is_here() {
+            let folder = tempfile::tempdir().unwrap();
+            let plan = StimulusPlan::new(config, exposure, 2, starts, &pulses);
+            export_verilog(folder.path(), config, &plan).unwrap();
+            icarus::simulate(folder.path(), &["tb.v", "design.v", "cells.v"], &["+vcd"]);
+            let dump = File::open(folder.path().join("dut.vcd")).unwrap();
+            compare(&Waves::read(BufReader::new(dump), "tb.dut"));
+        }
     }
 }
 
@@ -194,11 +388,26 @@ fn replay_writes_it_from_the_gates_and_from_nothing_else() {
     );
     assert!(!folder.path().join("activity.saif").exists());
 
-    let written = replay(folder.path(), &["--engine", "gate"]);
-    assert!(written.status.success(), "{written:?}");
-    let text = std::fs::read_to_string(folder.path().join("activity.saif")).unwrap();
+    let written = |arguments: &[&str]| {
+        let written = replay(folder.path(), &[&["--engine", "gate"], arguments].concat());
+        assert!(written.status.success(), "{written:?}");
+        std::fs::read_to_string(folder.path().join("activity.saif")).unwrap()
+    };
+    let text = written(&[]);
     let (_, nets) = read_saif(&text);
     assert!(nets["CLK"][3] >= 2 * 160, "{:?}", nets["CLK"]);
+    // Transport glitches are there on request and change nothing else.
+    let with_glitches = written(&["--saif-glitches"]);
+    let without: Vec<String> = with_glitches
+        .lines()
+        .map(|line| match line.split_once(" (TG ") {
+            Some((before, after)) => format!("{before}{}", &after[after.find(')').unwrap() + 1..]),
+            None => line.to_owned(),
+        })
+        .collect();
+    assert!(without.iter().eq(text.lines()));
+    let (_, glitches) = read_saif(&with_glitches);
+    assert!(glitches.values().any(|row| row[4] > 0));
 }
 
 #[test]

@@ -17,7 +17,7 @@ impl Kernel {
 
     /// A clock edge at a bank: one shift if it is formed or can be, otherwise flip-flop by flip-flop.
     #[inline]
-    pub(super) fn clock_bank(&mut self, index: usize) {
+    pub(super) fn clock_bank<O: Observer>(&mut self, index: usize, observer: &mut O) {
         self.statistics.evaluations += self.banks[index].cells.len() as u64;
         let bank = &self.banks[index];
         let clock = &self.nets[bank.clock as usize];
@@ -46,7 +46,7 @@ impl Kernel {
         self.dissolve(index);
         for stage in 0..self.banks[index].cells.len() {
             let cell = self.banks[index].cells[stage] as usize;
-            self.evaluate_flip_flop(cell, self.cells[cell].inputs);
+            self.evaluate_flip_flop(cell, self.cells[cell].inputs, observer);
         }
     }
 
