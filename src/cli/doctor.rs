@@ -94,14 +94,25 @@ pub(super) fn run(args: &DoctorArgs) -> anyhow::Result<()> {
     Ok(say(table)?)
 }
 
-/// The first line of what a tool says of its version.
+/// What a tool says of its version; that it is there, where it says nothing of the kind.
 fn version(name: &str, option: &str) -> Option<String> {
     let output = Command::new(name).arg(option).stdin(Stdio::null()).output();
     let output = output.ok()?;
     let said = [output.stdout, output.stderr].concat();
-    let said = String::from_utf8_lossy(&said).into_owned();
-    let line = said.lines().map(str::trim).find(|line| !line.is_empty());
-    Some(line.unwrap_or("found").to_owned())
+    let said = String::from_utf8_lossy(&said);
+    Some(version_in(&said).unwrap_or("found").to_owned())
+}
+
+/// The first line with a number like 1.2: GTKWave without a display tells how it is used, too.
+fn version_in(said: &str) -> Option<&str> {
+    let has_number = |line: &&str| {
+        let letters = line.as_bytes().windows(3);
+        let mut numbers = letters.filter(|letters| {
+            letters[0].is_ascii_digit() && letters[1] == b'.' && letters[2].is_ascii_digit()
+        });
+        numbers.next().is_some()
+    };
+    said.lines().map(str::trim).find(has_number)
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -123,4 +134,17 @@ fn vectors() -> Vec<&'static str> {
 #[cfg(not(target_arch = "x86_64"))]
 fn vectors() -> Vec<&'static str> {
     Vec::new()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::version_in;
+
+    #[test]
+    fn a_version_is_found_among_other_lines() {
+        let usage = "\nUsage: gtkwave [OPTION]... [DUMPFILE]\n\n  GTKWave Analyzer v3.3.118 (w)1999-2023 BSI\n";
+        let version = version_in(usage);
+        assert_eq!(version, Some("GTKWave Analyzer v3.3.118 (w)1999-2023 BSI"));
+        assert_eq!(version_in("Could not initialize GTK!\n"), None);
+    }
 }
