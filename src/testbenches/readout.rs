@@ -236,7 +236,7 @@ fn whole_array(checks: &mut Checks) {
     }
     let netlists = netlists(&config);
     let pins = order.pins();
-    for mhz in [50, 200, 400] {
+    for mhz in CLOCKS_MHZ {
         config.load_clk_hz = f64::from(mhz) * 1e6;
         config.read_clk_hz = config.load_clk_hz;
         let found = times(&config, &netlists, &counts);
