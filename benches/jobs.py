@@ -33,7 +33,7 @@ POINTS = 200
 FRAMES = 100
 
 
-def run(command: list[str], folder: str) -> tuple[float, float, float]:
+def run(command: list[str]) -> tuple[float, float, float]:
     """Wall seconds, processor seconds and peak memory in MB of one process."""
     begin = time.perf_counter()
     with open(os.devnull, "w") as nothing:
@@ -52,7 +52,7 @@ def job(name: str, command: list[str], runs: int, folder: str, inner: dict[str, 
     times, inside = [], {key: [] for key in inner}
     report = {}
     for _ in range(runs):
-        times.append(run([*command, "--out", out], folder))
+        times.append(run([*command, "--out", out]))
         if inner:
             report = json.loads(pathlib.Path(out, "frame.json").read_text())
             for key in inner:
@@ -67,7 +67,7 @@ def job(name: str, command: list[str], runs: int, folder: str, inner: dict[str, 
     if report:
         work, expected = report["work"], report["photons_expected"]
         drawn = work["photons_drawn"]
-        print(f"  skipped: {expected - drawn:.0f} of {expected:.0f} photons that no window sees; gdtof {' '.join(command)}")
+        print(f"  photons drawn: {drawn} of {expected:.0f}; gdtof {' '.join(command)}")
 
 
 def row(name: str, seconds: list[float], more: str) -> None:
@@ -89,7 +89,7 @@ def main() -> None:
         job(f"drive of {FRAMES} frames, matched", drive, 1, folder, {})
         study = pathlib.Path(folder, "study.toml")
         study.write_text(STUDY)
-        wall, cpu, peak = run(["sweep", str(study), "--out", os.path.join(folder, "sweep")], folder)
+        wall, cpu, peak = run(["sweep", str(study), "--out", os.path.join(folder, "sweep")])
         row(f"sweep of {POINTS} cohort frames", [wall], f"{POINTS / wall:.1f} a second, {cpu:.1f} s, {peak:.0f} MB")
 
 

@@ -11,8 +11,8 @@
 //!   near ─► event, event, … before `horizon`, sorted      first[slot] ──► node ──► node ──► NONE, from `horizon` on
 //! ```
 //!
-//! Few events are on their way at once, mostly fewer than ten in a macropixel whose photons are few: then all are in the sorted
-//! list, and the wheel is empty. Where the list grows longer than [`MOST_NEAR`], its last slots go to the wheel. The wheel's slots are linked
+//! Where few events are on their way at once, as in a macropixel whose photons are few, all are in the sorted list, and the wheel
+//! is empty. Where the list grows to twice [`MOST_NEAR`], its last slots go to the wheel. The wheel's slots are linked
 //! lists in one pool whose nodes are taken again last freed first, so that what it touches stays in the nearest cache.
 
 use std::cmp::Reverse;
@@ -40,7 +40,7 @@ struct Node {
     next: u32,
 }
 
-/// Events in the sorted list beyond which its last slots go to the wheel.
+/// Events that may stay in the sorted list when it is shortened, which it is at twice as many. Chosen.
 const MOST_NEAR: usize = 24;
 
 /// Events in time order. Time never runs backwards: pushes must not precede [`TimeWheel::advance`].

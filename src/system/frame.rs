@@ -129,13 +129,13 @@ pub fn take_guided_frame<A: Answer>(
     // A probe keeps one processor busy about as long as the engine and the ranging keep the others.
     let probes = probes(guide);
     let done = exposed;
-    let at_gates = || {
+    let by_gates = || {
         let mut clock = Stopwatch::new();
-        let at_gates = |probe| {
+        let run = |probe| {
             go_on(done(0))?;
             AtGates::run(sensor, exposure, &stream, &pixels, probe)
         };
-        let probed = probes.par_iter().map(at_gates);
+        let probed = probes.par_iter().map(run);
         (probed.collect::<Result<Vec<_>, _>>(), clock.lap())
     };
     let by_engine = || {
@@ -165,11 +165,11 @@ pub fn take_guided_frame<A: Answer>(
         let ranged = (depths, ranger.bin_s(), remark);
         Ok::<_, FrameError>((exposed, kept, ranged, [exposure_s, clock.lap()]))
     };
-    let ((at_gates, probes_s), by_engine) = rayon::join(at_gates, by_engine);
-    let (exposed, kept, (depths, bin_s, remark), took_s) = by_engine?;
+    let ((probed, probes_s), exposed) = rayon::join(by_gates, by_engine);
+    let (exposed, kept, (depths, bin_s, remark), took_s) = exposed?;
     [times.exposure_s, times.ranging_s] = took_s;
     times.probes_s = probes_s;
-    for probed in at_gates? {
+    for probed in probed? {
         let engine = engine_kind.of_probes(kept.is_some());
         let model = match kept.is_some() || engine != *engine_kind {
             true => Window::new(sensor, exposure).histogram(probed.start, &probed.events)?,
