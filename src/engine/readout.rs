@@ -1,10 +1,11 @@
 //! Reads histograms through the chip's pins at gate level: of a sensor that has been exposed, or of a whole array with
 //! nothing but counts behind the readout.
 
+use super::load::{load, load_netlist};
 use crate::bench::read_stimulus;
 use crate::chip::readout::{ReadoutOrder, with_counts};
-use crate::chip::{ReadPins, ReadProbe, SensorConfig, Silicon};
-use crate::kernel::{Drive, Kernel, Observer, Statistics, Stimulus, in_order, merge};
+use crate::chip::{LoadProbe, ReadPins, ReadProbe, SensorConfig, Silicon};
+use crate::kernel::{Drive, Kernel, Observer, Recorder, Statistics, Stimulus, in_order, merge};
 use crate::logic::Logic;
 use crate::netlist::{NetId, Netlist};
 use crate::units::{Frequency, Time};
@@ -106,12 +107,9 @@ pub(crate) fn power_up(netlist: &Netlist, order: &ReadoutOrder, counts: &[u16]) 
         .collect()
 }
 
-/// How long a stream took of which each bit has a rising edge of `clock`: from the first of `rises` to the end of the last
-/// one's period.
-///
-/// # Panics
-/// When there are none.
-pub fn clocked(rises: &[Time], clock: Frequency) -> Time {
+/// How long a stream took of which each bit has a rising edge of `clock`: from the first of `rises`, of which there is one at
+/// least, to the end of the last one's period.
+fn clocked(rises: &[Time], clock: Frequency) -> Time {
     rises[rises.len() - 1] - rises[0] + clock.period()
 }
 
@@ -147,4 +145,79 @@ fn boxed(drives: Stimulus<'static>) -> Box<dyn Iterator<Item = Drive> + Send> {
 /// The readout of this sensor with pins for counts in place of its macropixels, elaborated.
 pub fn readout_netlist(config: &SensorConfig) -> Netlist {
     Netlist::elaborate(&with_counts(ReadoutOrder::of(config)))
+}
+
+/// A sensor's pins with nothing but memories and counts behind them, elaborated once for all clocks.
+#[derive(Debug, Clone)]
+pub struct PinNetlists {
+    load: Netlist,
+    read: Netlist,
+}
+
+/// What one load and one readout through the pins did, and how long they took.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PinTimes {
+    /// Rising LOAD_CLK edges.
+    pub load_bits: usize,
+    /// Macropixels whose start value arrived.
+    pub starts_right: usize,
+    /// Bins whose count was read as it was put in.
+    pub counts_right: usize,
+    /// First to last rising LOAD_CLK edge, and a period.
+    pub load: Time,
+    /// First to last rising READ_CLK edge, and a period.
+    pub read: Time,
+}
+
+impl PinNetlists {
+    /// Those of this sensor.
+    pub fn of(config: &SensorConfig) -> Self {
+        PinNetlists {
+            load: load_netlist(config),
+            read: readout_netlist(config),
+        }
+    }
+
+    /// Loads start values that are all over the counter's range, and reads `counts` (macropixels row-major, bin 0 first), with
+    /// both clocks at `mhz`; `config` is that of the netlists.
+    pub fn run_at(&self, mhz: u32, config: &SensorConfig, counts: &[u16]) -> PinTimes {
+        let clock_hz = f64::from(mhz) * 1e6;
+        let config = SensorConfig {
+            load_clk_hz: clock_hz,
+            read_clk_hz: clock_hz,
+            ..config.clone()
+        };
+        let starts: Vec<u16> = (0..config.pixels() as u32)
+            .map(|i| (i.wrapping_mul(2_654_435_761) >> 7) as u16 & config.largest_start())
+            .collect();
+        let clocks = [
+            LoadProbe::Clk.net(&self.load),
+            ReadProbe::Clk.net(&self.read),
+        ];
+        let mut edges = clocks.map(|clock| Recorder::new([clock]));
+        let loaded = load(&config, &self.load, &starts, &mut edges[0]);
+        let read = read_out(&config, &self.read, counts, &mut edges[1]);
+        let [load_rises, read_rises] = [0, 1].map(|i| edges[i].rising_edges(clocks[i]));
+        let right = |found: &[Option<u16>], sent: &[u16]| {
+            let pairs = found.iter().zip(sent);
+            pairs.filter(|(a, b)| **a == Some(**b)).count()
+        };
+        PinTimes {
+            load_bits: load_rises.len(),
+            starts_right: right(&loaded.starts, &starts),
+            counts_right: right(&read.counts, counts),
+            load: clocked(&load_rises, config.load_clock()),
+            read: clocked(&read_rises, config.read_clock()),
+        }
+    }
+}
+
+/// A count in one of 97 bins of the whole array, macropixels row-major: zeros shift as fast as anything, and cost nothing to
+/// simulate.
+pub fn sparse_counts(config: &SensorConfig) -> Vec<u16> {
+    let mut counts = vec![0; config.pixels() * config.bins];
+    for index in (0..counts.len()).step_by(97) {
+        counts[index] = (index % (1 << config.bin_bits)) as u16;
+    }
+    counts
 }

@@ -4,12 +4,12 @@ use super::claim::{Published::*, Row};
 use crate::analysis::{MacropixelTiming, gate_works, phases, ripple, shortest_period};
 use crate::chip::readout::{self as readout_blocks, ReadoutOrder};
 use crate::chip::{
-    Exposure, Limits, LoadProbe, PCounter, Probe, ReadProbe, SensorConfig, Silicon, p_counter,
-    p_counter_timing,
+    Exposure, Limits, PCounter, Probe, SensorConfig, Silicon, p_counter, p_counter_timing,
 };
-use crate::engine::{GateSimulation, Histograms, load, readout};
+use crate::engine::readout::{PinNetlists, PinTimes, sparse_counts};
+use crate::engine::{GateSimulation, Histograms};
 use crate::kernel::Recorder;
-use crate::netlist::{CellKind, Corner, Netlist};
+use crate::netlist::{CellKind, Corner};
 use crate::photon::SpadEvent;
 use crate::report::{Axis, Chart, Style};
 use crate::units::Time;
@@ -229,12 +229,12 @@ fn fig_48_bins() -> Histograms {
 /// Claim 5: the serial load, and the readout that it must not outlast.
 pub(super) fn load_rows() -> Vec<Row> {
     let config = SensorConfig::default();
-    let netlists = [
-        load::load_netlist(&config),
-        readout::readout_netlist(&config),
-    ];
-    let all = PIN_CLOCKS_MHZ.map(|mhz| PinTimes::at(mhz, &netlists));
-    let worst = all.iter().map(|times| times.load_s / times.read_s);
+    let netlists = PinNetlists::of(&config);
+    let counts = sparse_counts(&config);
+    let all = PIN_CLOCKS_MHZ.map(|mhz| netlists.run_at(mhz, &config, &counts));
+    let worst = all
+        .iter()
+        .map(|times| times.load.as_s() / times.read.as_s());
     let worst = worst.fold(f64::NEG_INFINITY, f64::max);
     let fewest_right = |pick: fn(&PinTimes) -> usize| all.iter().map(pick).min().unwrap_or(0);
     let pins = ReadoutOrder::of(&config).pins() as f64;
@@ -255,7 +255,7 @@ pub(super) fn load_rows() -> Vec<Row> {
             "time of a load at 200 MHz",
             "µs",
             Says("a few hundred microseconds", 100.0, 999.0),
-            at_200.load_s * 1e6,
+            at_200.load.as_s() * 1e6,
         )
         .remark("First to last LOAD_CLK edge, and a period. At \"a few hundred megahertz\", of which 200 is our choice."),
         Row::ours(
@@ -264,19 +264,19 @@ pub(super) fn load_rows() -> Vec<Row> {
             fewest_right(|times| times.counts_right) as f64,
         )
         .remark("Bin selection, columns and serialisers of the whole array at gate level, at the worst of the six clocks."),
-        Row::ours("time of a readout at 200 MHz", "µs", at_200.read_s * 1e6)
+        Row::ours("time of a readout at 200 MHz", "µs", at_200.read.as_s() * 1e6)
             .remark("Through 8 pins, our choice, each with the serialiser of 8 columns."),
         Row::holds("load over readout", "", Says("never longer", 0.0, 1.0), worst)
             .remark("The greatest at the six clocks; both at gate level, at the same clock, with one pin for the load and 8 for the readout."),
-        Row::ours("pins of a readout as short as the load", "", pins * at_200.read_s / at_200.load_s)
+        Row::ours("pins of a readout as short as the load", "", pins * at_200.read.as_s() / at_200.load.as_s())
             .remark("9 bits against 16 × 14 a macropixel: a chip with more output pins than this at the same clock would wait for the load."),
     ];
     for (mhz, times) in PIN_CLOCKS_MHZ.iter().zip(&all) {
         if *mhz != 200 {
             let load = format!("time of a load at {mhz} MHz");
-            rows.push(Row::ours(load, "µs", times.load_s * 1e6));
+            rows.push(Row::ours(load, "µs", times.load.as_s() * 1e6));
             let readout = format!("time of a readout at {mhz} MHz");
-            rows.push(Row::ours(readout, "µs", times.read_s * 1e6));
+            rows.push(Row::ours(readout, "µs", times.read.as_s() * 1e6));
         }
     }
     rows
@@ -284,54 +284,6 @@ pub(super) fn load_rows() -> Vec<Row> {
 
 /// Clocks of load and readout that the whole array is run at.
 const PIN_CLOCKS_MHZ: [u32; 6] = [50, 100, 150, 200, 300, 400];
-
-/// What a load and a readout of the whole array took at gate level, at the same clock.
-struct PinTimes {
-    /// Rising LOAD_CLK edges.
-    load_bits: usize,
-    starts_right: usize,
-    counts_right: usize,
-    load_s: f64,
-    read_s: f64,
-}
-
-impl PinTimes {
-    /// With the netlists of load path and readout.
-    fn at(mhz: u32, [load_netlist, read_netlist]: &[Netlist; 2]) -> Self {
-        let clock_hz = f64::from(mhz) * 1e6;
-        let config = SensorConfig {
-            load_clk_hz: clock_hz,
-            read_clk_hz: clock_hz,
-            ..SensorConfig::default()
-        };
-        let starts: Vec<u16> = (0..config.pixels() as u32)
-            .map(|i| (i.wrapping_mul(2_654_435_761) >> 7) as u16 & config.largest_start())
-            .collect();
-        // Zeros shift as fast as anything, and cost nothing to simulate.
-        let mut counts = vec![0; config.pixels() * config.bins];
-        for index in (0..counts.len()).step_by(97) {
-            counts[index] = (index % (1 << config.bin_bits)) as u16;
-        }
-        let right = |found: &[Option<u16>], sent: &[u16]| {
-            let pairs = found.iter().zip(sent);
-            pairs.filter(|(a, b)| **a == Some(**b)).count()
-        };
-        let clk = LoadProbe::Clk.net(load_netlist);
-        let mut edges = Recorder::new([clk]);
-        let loaded = load::load(&config, load_netlist, &starts, &mut edges);
-        let load_edges = edges.rising_edges(clk);
-        let clk = ReadProbe::Clk.net(read_netlist);
-        let mut edges = Recorder::new([clk]);
-        let read = readout::read_out(&config, read_netlist, &counts, &mut edges);
-        PinTimes {
-            load_bits: load_edges.len(),
-            starts_right: right(&loaded.starts, &starts),
-            counts_right: right(&read.counts, &counts),
-            load_s: readout::clocked(&load_edges, config.load_clock()).as_s(),
-            read_s: readout::clocked(&edges.rising_edges(clk), config.read_clock()).as_s(),
-        }
-    }
-}
 
 /// A P-counter of `bits` stages.
 fn counter_of(bits: usize) -> SensorConfig {

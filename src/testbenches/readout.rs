@@ -17,16 +17,14 @@ use crate::chip::{
     probes,
 };
 use crate::engine::GateSimulation;
-use crate::engine::load::{load, load_netlist};
-use crate::engine::readout::{clocked, read_out, readout_netlist};
+use crate::engine::readout::{PinNetlists, PinTimes, sparse_counts};
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
 use crate::kernel::Recorder;
-use crate::netlist::Netlist;
 use crate::photon::SpadEvent;
 use crate::report::Checks;
 use crate::testbenches::Testbench;
-use crate::units::Time;
+use crate::units::{Frequency, Time};
 use crate::waves::{Entry, Group, Layout};
 
 /// Shown before the readout begins.
@@ -155,97 +153,55 @@ fn exposed_sensor(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     Ok(())
 }
 
-/// What a load and a readout took, first to last rising edge of its clock and a period more, and whether all was right.
-struct Times {
-    load: Time,
-    read: Time,
-    is_right: bool,
-}
-
-/// Loads and reads an array with nothing but memories and counts behind its pins.
-fn times(config: &SensorConfig, netlists: &[Netlist; 2], counts: &[u16]) -> Times {
-    let starts: Vec<u16> = (0..config.pixels() as u32)
-        .map(|i| (i.wrapping_mul(2_654_435_761) >> 7) as u16 & config.largest_start())
-        .collect();
-    let clocks = [
-        LoadProbe::Clk.net(&netlists[0]),
-        ReadProbe::Clk.net(&netlists[1]),
-    ];
-    let mut recorders = clocks.map(|clock| Recorder::new([clock]));
-    let loaded = load(config, &netlists[0], &starts, &mut recorders[0]);
-    let read = read_out(config, &netlists[1], counts, &mut recorders[1]);
-    let spans = [0, 1].map(|i| {
-        let clock = [config.load_clock(), config.read_clock()][i];
-        clocked(&recorders[i].rising_edges(clocks[i]), clock)
-    });
-    let same = |found: &[Option<u16>], wanted: &[u16]| {
-        found.iter().zip(wanted).all(|(a, b)| *a == Some(*b)) && found.len() == wanted.len()
-    };
-    Times {
-        load: spans[0],
-        read: spans[1],
-        is_right: same(&loaded.starts, &starts) && same(&read.counts, counts),
-    }
-}
-
-fn netlists(config: &SensorConfig) -> [Netlist; 2] {
-    [load_netlist(config), readout_netlist(config)]
+/// Whether every start value and every count came through.
+fn is_right(times: &PinTimes, config: &SensorConfig) -> bool {
+    times.starts_right == config.pixels() && times.counts_right == config.pixels() * config.bins
 }
 
 /// Four rows of eight columns, the columns of one pin, at every clock.
 fn clocks(checks: &mut Checks) {
-    let mut config = SensorConfig {
+    let config = SensorConfig {
         rows: 4,
         cols: 8,
         readout_pins: 1,
         ..SensorConfig::default()
     };
-    let netlists = netlists(&config);
+    let netlists = PinNetlists::of(&config);
     let most = ((1u32 << config.bin_bits) - 1) as u16;
     let counts: Vec<u16> = (0..config.pixels() * config.bins)
         .map(|i| (i as u16).wrapping_mul(0x9e37) & most)
         .collect();
     let order = ReadoutOrder::of(&config);
     for mhz in CLOCKS_MHZ {
-        config.load_clk_hz = f64::from(mhz) * 1e6;
-        config.read_clk_hz = config.load_clk_hz;
-        let found = times(&config, &netlists, &counts);
+        let found = netlists.run_at(mhz, &config, &counts);
         let (load, read) = (found.load.as_s() * 1e6, found.read.as_s() * 1e6);
-        let expected = [
-            config.load_clock().periods(config.load_bits() as i64),
-            config.read_clock().periods(order.periods() as i64),
-        ];
+        let clock = Frequency::from_hz_f64(f64::from(mhz) * 1e6).expect("a frequency");
+        let expected = [config.load_bits(), order.periods()].map(|n| clock.periods(n as i64));
         let off = |a: Time, b: Time| (a - b).as_fs().abs();
         let is_exact = off(found.load, expected[0]) <= 1 && off(found.read, expected[1]) <= 1;
         checks.that(
             format!("4 x 8, one pin, {mhz} MHz: load and readout, us"),
             "all right, a period a bit",
             format!("{load:7.2} {read:7.2}"),
-            found.is_right && is_exact,
+            is_right(&found, &config) && is_exact,
         );
     }
 }
 
-/// The whole sensor, with a count here and there: zeros cost nothing to simulate.
+/// The whole sensor, with a count here and there.
 fn whole_array(checks: &mut Checks) {
-    let mut config = SensorConfig::default();
-    let order = ReadoutOrder::of(&config);
-    let mut counts = vec![0; config.pixels() * config.bins];
-    for index in (0..counts.len()).step_by(97) {
-        counts[index] = (index % (1 << config.bin_bits)) as u16;
-    }
-    let netlists = netlists(&config);
-    let pins = order.pins();
+    let config = SensorConfig::default();
+    let counts = sparse_counts(&config);
+    let netlists = PinNetlists::of(&config);
+    let pins = ReadoutOrder::of(&config).pins();
     for mhz in CLOCKS_MHZ {
-        config.load_clk_hz = f64::from(mhz) * 1e6;
-        config.read_clk_hz = config.load_clk_hz;
-        let found = times(&config, &netlists, &counts);
+        let found = netlists.run_at(mhz, &config, &counts);
         let (load, read) = (found.load.as_s() * 1e6, found.read.as_s() * 1e6);
         checks.that(
             format!("64 x 64, {pins} pins, {mhz} MHz: load and readout, us (4.7)"),
             "all right, load shorter",
             format!("{load:7.2} {read:7.2}"),
-            found.is_right && found.load <= found.read,
+            is_right(&found, &config) && found.load <= found.read,
         );
     }
     let least = (1..=config.cols).find(|&readout_pins| {

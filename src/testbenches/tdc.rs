@@ -9,23 +9,21 @@
 //!
 //! Beside the waveform it leaves three charts with their numbers: DNL, INL, and the frequencies of a row of rings.
 
+mod rings;
+mod waveform;
+
 use std::path::Path;
 use std::sync::Arc;
 
 use crate::analysis::Linearity;
-use crate::chip::tdc::coupling::Row;
 use crate::chip::tdc::{Steps, clock_counter, delay_line, ring_oscillator};
-use crate::engine::waveform::write_waves;
 use crate::files::InputError;
-use crate::kernel::{Drive, Kernel, LANES, LaneDrive, LaneKernel, Lanes, Recorder, in_order};
+use crate::kernel::{LANES, LaneDrive, LaneKernel, Lanes};
 use crate::logic::Logic;
-use crate::netlist::{
-    CellKind, Corner, Library, Mismatch, Module, ModuleBuilder, Netlist, Timing, varied,
-};
+use crate::netlist::{CellKind, Corner, Library, Mismatch, Module, Netlist, Timing, varied};
 use crate::report::{Axis, Chart, Checks, Grid, Style};
 use crate::testbenches::Testbench;
 use crate::units::{Frequency, Time};
-use crate::waves::{Entry, Group, Layout};
 use rand_philox::{philox4x32_10, u32_to_unit_f64};
 
 /// Batches of 64 conversions: 38 400, about 1200 a code.
@@ -38,8 +36,6 @@ const BITS: usize = 6;
 const STAGES: usize = 25;
 /// Mismatch of an inverter; a buffer has 14 %, between the two of the thesis's delay line (15 %, 6.3.1) and none.
 const SIGMA: f64 = 0.2;
-/// Rings in a row.
-const RINGS: usize = 16;
 /// From a conversion's begin to its TDC_RESET's end, and to START where that is common.
 const CLEARED: Time = Time::from_ns(2);
 const BEGIN: Time = Time::from_ns(4);
@@ -58,8 +54,8 @@ fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         compare(tdc, density, checks);
     }
     charts(waves, &converters, &densities)?;
-    rings(waves, checks)?;
-    waveform(waves, checks)
+    rings::run(waves, checks)?;
+    waveform::run(waves, checks)
 }
 
 /// Which of START and STOP comes at one time in all lanes. A clock's edges are common, too.
@@ -366,244 +362,4 @@ fn charts(waves: &Path, converters: &[Tdc], densities: &[Density]) -> Result<(),
     };
     chart("DNL", |linearity| &linearity.dnl).write(&waves.with_extension("svg"))?;
     chart("INL", |linearity| &linearity.inl).write(&waves.with_file_name("tb_tdc_inl.svg"))
-}
-
-/// A row of rings that differ: each one's period at gate level, and what coupling makes of them.
-fn rings(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
-    const SHOWN: Time = Time::from_ns(100);
-    let mut m = ModuleBuilder::new("rings");
-    let pins = [
-        ("START", m.input("START")),
-        ("STOP", m.input("STOP")),
-        ("TDC_RESET", m.input("TDC_RESET")),
-    ];
-    let pins = pins.map(|(name, net)| (name, [net]));
-    let pins: Vec<_> = pins.iter().map(|(name, net)| (*name, &net[..])).collect();
-    let ring = ring_oscillator::circuit(STAGES, BITS);
-    (0..RINGS).for_each(|pixel| m.instance(&format!("pixel_{pixel}"), &ring, &pins));
-    let (netlist, timing) = made(
-        &m.finish().expect("the testbench's circuit is whole"),
-        SIGMA,
-        2,
-    );
-    let nets: Vec<_> = (0..RINGS)
-        .map(|pixel| {
-            netlist
-                .signal(&format!("pixel_{pixel}.RING"))
-                .expect("it was built above")[0]
-        })
-        .collect();
-    let mut drives: Vec<Drive> = netlist
-        .inputs()
-        .into_iter()
-        .map(|net| Drive::new(Time::ZERO, net, false))
-        .collect();
-    let start = netlist.net("START").expect("it is an input");
-    drives.push(Drive::new(BEGIN, start, true));
-    let mut recorder = Recorder::new(nets.iter().copied());
-    Kernel::new(&netlist, &timing).run(&mut in_order(drives), SHOWN, &mut recorder);
-
-    let mut free_hz = Vec::new();
-    let mut wrong = 0;
-    for (pixel, &net) in nets.iter().enumerate() {
-        let falls = recorder.falling_edges(net);
-        // The first fall is from rest.
-        let periods: Vec<Time> = falls.windows(2).map(|ends| ends[1] - ends[0]).collect();
-        let model = ring_oscillator::Model::of(&netlist, &timing, &format!("pixel_{pixel}"));
-        wrong += periods
-            .iter()
-            .filter(|&&period| period != model.period)
-            .count();
-        free_hz.push(1.0 / model.period.as_s());
-    }
-    checks.equal(
-        format!("{RINGS} rings: periods that are not the sum of their cells' delays"),
-        0,
-        wrong,
-    );
-    let spread = |hz: &[f64]| {
-        let mean = hz.iter().sum::<f64>() / hz.len() as f64;
-        let square: f64 = hz.iter().map(|hz| (hz / mean - 1.0).powi(2)).sum();
-        (square / (hz.len() - 1) as f64).sqrt()
-    };
-    let row = |pull_hz| Row {
-        free_hz: free_hz.clone(),
-        pull_hz,
-    };
-    let least = row(0.0).least_pull_hz();
-    let coupled = [0.3, 1.1].map(|share| (share, row(share * least).run(4e-6)));
-    let locked = row(least).locked_hz();
-    let mut text = format!(
-        "{RINGS} rings, {:.1} MHz on average: spread {:.2} % alone",
-        locked * 1e-6,
-        100.0 * spread(&free_hz)
-    );
-    for (share, hz) in &coupled {
-        text += &format!(
-            ", {:.4} % pulled by {:.1} MHz ({share} of what locks them)",
-            100.0 * spread(hz),
-            share * least * 1e-6
-        );
-    }
-    checks.note(text);
-    // A mean of so many delays, each with the mismatch of its cell.
-    let inverter = SIGMA / (STAGES as f64).sqrt();
-    let alone = spread(&free_hz);
-    checks.that(
-        "rings alone: spread of their periods, against an inverter's over the square root of the stages",
-        format!("{:.1} % within a half", 100.0 * inverter),
-        format!("{:.1} %", 100.0 * alone),
-        (alone / inverter - 1.0).abs() < 0.5,
-    );
-    let [(_, loose), (_, tight)] = &coupled;
-    checks.that(
-        "rings coupled by 1.1 of the least pull share one frequency, the mean",
-        format!("{:.4} MHz", locked * 1e-6),
-        format!("{:.4} MHz, spread {:.1e}", tight[0] * 1e-6, spread(tight)),
-        (tight[0] / locked - 1.0).abs() < 1e-6 && spread(tight) < 1e-6,
-    );
-    checks.that(
-        "rings coupled by 0.3 of it do not",
-        "a spread between",
-        format!("{:.2} %", 100.0 * spread(loose)),
-        spread(loose) > 1e-4 && spread(loose) < alone,
-    );
-    let points = |hz: &[f64]| -> Vec<(f64, f64)> {
-        hz.iter()
-            .enumerate()
-            .map(|(pixel, hz)| (pixel as f64, hz * 1e-6))
-            .collect()
-    };
-    let [(_, loose), (_, tight)] = &coupled;
-    Chart::new(
-        "Ring oscillators of a row of pixels",
-        Axis::linear("pixel"),
-        Axis::linear("frequency (MHz)"),
-    )
-    .with("alone, gates", Style::Points, points(&free_hz))
-    .with(
-        "coupled, 0.3 of the least pull",
-        Style::Dashed,
-        points(loose),
-    )
-    .with("coupled, 1.1 of the least pull", Style::Line, points(tight))
-    .write(&waves.with_file_name("tb_tdc_rings.svg"))
-}
-
-/// Three intervals in all converters at once.
-fn waveform(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
-    const SLOT: Time = Time::from_ns(40);
-    let clock = Frequency::from_hz_f64(384e6).expect("a frequency");
-    let intervals = [
-        Time::from_ps(600),
-        Time::from_ps(1_200),
-        Time::from_ps(15_000),
-    ];
-    let mut m = ModuleBuilder::new("tdcs");
-    let [start, stop, clear, clk] =
-        ["START", "STOP", "TDC_RESET", "CLK"].map(|name| [m.input(name)]);
-    let pins = [
-        ("START", &start[..]),
-        ("STOP", &stop),
-        ("TDC_RESET", &clear),
-    ];
-    let with_clk: Vec<_> = pins.into_iter().chain([("CLK", &clk[..])]).collect();
-    m.instance("clock_counter", &clock_counter::circuit(BITS), &with_clk);
-    m.instance("ring", &ring_oscillator::circuit(STAGES, BITS), &pins);
-    m.instance("line", &delay_line::circuit(CODES), &pins);
-    let (netlist, timing) = made(
-        &m.finish().expect("the testbench's circuit is whole"),
-        SIGMA,
-        1,
-    );
-
-    let mut drives: Vec<Drive> = netlist
-        .inputs()
-        .into_iter()
-        .map(|net| Drive::new(Time::ZERO, net, false))
-        .collect();
-    for (slot, &interval) in (0..).zip(&intervals) {
-        let at = SLOT * slot;
-        let fall = at + SLOT - Time::from_ns(5);
-        let pulses = [
-            (clear, at + Time::from_fs(1), at + CLEARED),
-            (start, at + BEGIN, fall),
-            (stop, at + BEGIN + interval, fall + Time::from_ns(2)),
-        ];
-        for (name, (_, up, down)) in ["TDC_RESET", "START", "STOP"].into_iter().zip(pulses) {
-            let net = netlist.net(name).expect("it is an input");
-            drives.extend([Drive::new(up, net, true), Drive::new(down, net, false)]);
-        }
-    }
-    let end = SLOT * intervals.len() as i64;
-    let clk = netlist.net("CLK").expect("it is an input");
-    let edges = (1..)
-        .map(|k| (clock.half_periods(k), k % 2 == 0))
-        .take_while(|edge| edge.0 < end);
-    drives.extend(edges.map(|(time, level)| Drive::new(time, clk, level)));
-    let codes = ["ring.CODE", "line.SEEN"];
-    let nets = codes.map(|path| netlist.signal(path).expect("it was built above"));
-    let models = [
-        ring_oscillator::Model::of(&netlist, &timing, "ring").steps(1 << BITS),
-        delay_line::model(&netlist, &timing, "line"),
-    ];
-    let mut kernel = Kernel::new(&netlist, &timing);
-    let mut stimulus = in_order(drives);
-    let mut found = Vec::new();
-    write_waves(waves, &netlist, &view(), |waves| {
-        for slot in 1..=intervals.len() as i64 {
-            kernel.run(&mut stimulus, SLOT * slot - Time::from_ns(6), waves);
-            found.push(nets.each_ref().map(|nets| kernel.number(nets)));
-        }
-        kernel.run(&mut stimulus, end, waves);
-        end
-    })?;
-    for (&interval, found) in intervals.iter().zip(found) {
-        let expected = models.each_ref().map(|steps| steps.code(interval));
-        let ones = found[1].map(|seen| seen.count_ones() as usize);
-        let found = [found[0].map(|code| code as usize), ones];
-        checks.that(
-            format!("{interval} in the waveform: codes of ring and line"),
-            format!("{} and {}", expected[0], expected[1]),
-            found
-                .map(|code| code.map_or("unknown".to_owned(), |n| n.to_string()))
-                .join(" and "),
-            found == expected.map(Some),
-        );
-    }
-    Ok(())
-}
-
-fn view() -> Layout {
-    let group = |title: &str, entries: &[Entry]| Group::new(title, entries.iter().cloned());
-    Layout {
-        groups: vec![
-            group(
-                "Interval",
-                &["START", "STOP", "TDC_RESET", "CLK"].map(Entry::binary),
-            ),
-            group(
-                "Clock counter",
-                &[
-                    Entry::binary("clock_counter.GATE"),
-                    Entry::binary("clock_counter.GATED_CLK"),
-                    Entry::decimal("clock_counter.CODE"),
-                ],
-            ),
-            group(
-                "Gated ring oscillator",
-                &[
-                    Entry::binary("ring.GATE"),
-                    Entry::hex("ring.RING"),
-                    Entry::decimal("ring.CODE"),
-                ],
-            ),
-            group(
-                "Delay line",
-                &[Entry::hex("line.TAP"), Entry::hex("line.SEEN")],
-            ),
-        ],
-        zoom: (BEGIN - Time::from_ns(2), BEGIN + Time::from_ns(4)),
-        marker: Some(BEGIN),
-    }
 }

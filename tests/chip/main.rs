@@ -34,5 +34,6 @@ mod tdcs_agree_with_their_models;
 mod testbenches_pass;
 mod the_sensor_keeps_its_timing_checks;
 mod timing_checks_find_violations;
+mod timing_verdicts_agree_with_gates;
 mod traces_are_deterministic;
 mod waves_read_back;

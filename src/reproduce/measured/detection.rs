@@ -120,15 +120,9 @@ fn sweep(frames: usize) -> Result<(Grid, Chart), EngineError> {
 /// Cases in which an assumption of Eq. 17 fails. Their exposures make Eq. 17 promise 90 %, where none is given.
 fn cases() -> Vec<(&'static str, Trial)> {
     let case = |signal, times_daylight: f64| Trial::new(signal, times_daylight * DAYLIGHT_HZ, 0);
-    let sensor = |trial: Trial, change: &dyn Fn(&mut crate::chip::SensorConfig)| {
-        let mut trial = trial;
-        change(&mut trial.sensor);
-        trial
-    };
-    let long = |overflow, cycles| {
-        let mut trial = case(0.3, 15.0);
-        trial.sensor.overflow = overflow;
-        Trial { cycles, ..trial }
+    let long = |overflow, cycles| Trial {
+        cycles,
+        ..case(0.3, 15.0).on(|sensor| sensor.overflow = overflow)
     };
     let cases = vec![
         ("daylight, a narrow echo", case(0.05, 1.0)),
@@ -144,15 +138,15 @@ fn cases() -> Vec<(&'static str, Trial)> {
         ("60 x daylight", case(1.0, 60.0)),
         (
             "15 x daylight, paralysable SPADs of 8 ns",
-            sensor(case(0.3, 15.0), &|s| s.paralysable = true),
+            case(0.3, 15.0).on(|sensor| sensor.paralysable = true),
         ),
         (
             "daylight, 2 SPADs at a time",
-            sensor(case(0.05, 1.0), &|s| s.threshold = 1),
+            case(0.05, 1.0).on(|sensor| sensor.threshold = 1),
         ),
         (
             "60 x daylight, 5 SPADs at a time",
-            sensor(case(1.0, 60.0), &|s| s.threshold = 4),
+            case(1.0, 60.0).on(|sensor| sensor.threshold = 4),
         ),
         (
             "15 x daylight, 40 000 cycles, saturating",

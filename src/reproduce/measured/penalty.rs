@@ -8,7 +8,6 @@ use super::detection::detected;
 use super::precision::{Estimator, by_formula, scatter};
 use super::trial::Trial;
 use super::{Study, interval_text};
-use crate::chip::Mode;
 use crate::engine::EngineError;
 use crate::numerics::intervals::Estimate;
 use crate::numerics::probit::{Point, crossing};
@@ -68,36 +67,12 @@ fn cycles_to_measure(
 
 /// The chip with bins of `bin_m`, showing an echo at the end of `system`'s range in the conventional mode.
 fn coarse(system: &System, bin_m: f64, candidates: u32, range_m: f64) -> Trial {
-    let base = Trial::new(
-        system.link.signal / (range_m * range_m),
-        system.link.background_hz,
-        1,
-    );
-    let mut trial = Trial {
-        stop_periods: candidates + 4,
-        echo_bins: f64::from(candidates) - 1.0,
-        sigma_ns: 1e9 * system.link.pulse_sigma_s,
-        ..base
-    };
-    trial.sensor.mode = Mode::Conventional;
-    trial.sensor.bins = candidates as usize;
-    trial.sensor.clk_hz = SPEED_OF_LIGHT_M_PER_S / (2.0 * bin_m);
-    trial
+    Trial::of_link(&system.link, range_m, 1).in_coarse_bins(candidates, bin_m)
 }
 
 /// The guided chip with bins of the system's measurement, an echo of `range_m` in mid-window.
 fn fine(system: &System, range_m: f64, cycles: u32) -> Trial {
-    let base = Trial::new(
-        system.link.signal / (range_m * range_m),
-        system.link.background_hz,
-        cycles,
-    );
-    let mut trial = Trial {
-        sigma_ns: 1e9 * system.link.pulse_sigma_s,
-        ..base
-    };
-    trial.sensor.clk_hz = 1.0 / system.bin_s;
-    trial
+    Trial::of_link(&system.link, range_m, cycles).on(|sensor| sensor.clk_hz = 1.0 / system.bin_s)
 }
 
 /// Eq. 17 with every photon counted, ties by lot.

@@ -219,8 +219,7 @@ fn failures(frames: usize) -> Result<Grid, EngineError> {
         "bias",
     ]);
     let mut grid = Grid::new(headings);
-    let mut narrow = trial(4.0);
-    narrow.sensor.bin_bits = 10;
+    let narrow = trial(4.0).on(|sensor| sensor.bin_bits = 10);
     let wide = Trial {
         sigma_ns: 8.0 * super::super::penalty::sigma_over_fwhm(),
         ..trial(2.0)

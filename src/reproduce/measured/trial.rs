@@ -19,13 +19,14 @@
 use rayon::prelude::*;
 
 use crate::chip::window_law::OpenWindow;
-use crate::chip::{ChipTiming, EventType, Exposure, Sensor, SensorConfig, WindowLaw, histogram};
+use crate::chip::{EventType, Exposure, Mode, Sensor, SensorConfig, WindowLaw, histogram};
 use crate::engine::{
     Cohort, CohortOptions, EngineError, Expose, Histograms, LitPixel, Window, stream_config,
 };
 use crate::photon::{PhotonStream, PixelLight, StreamConfig};
 use crate::theory::detection::PerCycle;
-use crate::units::Time;
+use crate::theory::partial::Link;
+use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
 
 /// What the formulas leave out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,7 +73,7 @@ impl Effect {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
     /// The chip.
-    pub sensor: SensorConfig,
+    pub sensor: Sensor,
     /// CLK periods in a laser cycle.
     pub stop_periods: u32,
     /// Start value of the P-counter.
@@ -131,7 +132,7 @@ impl Trial {
     /// formula asks where the window lies.
     pub fn new(signal: f64, background_hz: f64, cycles: u32) -> Self {
         Trial {
-            sensor: SensorConfig::default(),
+            sensor: Sensor::default(),
             stop_periods: 520,
             start: 100,
             echo_bins: 8.0,
@@ -143,6 +144,41 @@ impl Trial {
             wide_counters: false,
             ties_by_lot: false,
         }
+    }
+
+    /// As [`Trial::new`], with what this link receives from `range_m` away, its pulse as wide as the link's.
+    pub fn of_link(link: &Link, range_m: f64, cycles: u32) -> Self {
+        Trial {
+            sigma_ns: 1e9 * link.pulse_sigma_s,
+            ..Trial::new(
+                link.signal / (range_m * range_m),
+                link.background_hz,
+                cycles,
+            )
+        }
+    }
+
+    /// The same with `candidates` bins of `bin_m` metres, the echo in the middle of the last: CLK as slow as they are long, and
+    /// the conventional mode, whose bins end with STOP.
+    #[must_use]
+    pub fn in_coarse_bins(self, candidates: u32, bin_m: f64) -> Self {
+        Trial {
+            stop_periods: candidates + 4,
+            echo_bins: f64::from(candidates) - 1.0,
+            ..self
+        }
+        .on(|sensor| {
+            sensor.mode = Mode::Conventional;
+            sensor.bins = candidates as usize;
+            sensor.clk_hz = SPEED_OF_LIGHT_M_PER_S / (2.0 * bin_m);
+        })
+    }
+
+    /// The same on a sensor whose description is changed, of the same silicon.
+    #[must_use]
+    pub fn on(mut self, change: impl FnOnce(&mut SensorConfig)) -> Self {
+        self.sensor = changed(&self.sensor, change);
+        self
     }
 
     /// Bin interval, ns.
@@ -175,13 +211,15 @@ impl Trial {
             Effect::Ties => trial.ties_by_lot = true,
             // The shortest that the front end follows.
             Effect::DeadTime => {
-                let limits = ChipTiming::of(&trial.sensor).pulses;
-                trial.sensor.dead_time_ns = limits.shortest().as_ns();
+                let shortest = trial.sensor.timing().pulses.shortest();
+                trial = trial.on(|sensor| sensor.dead_time_ns = shortest.as_ns());
             }
             Effect::OneHit => trial.every_pulse = true,
             Effect::Threshold => {
-                trial.sensor.event_type = EventType::Greater;
-                trial.sensor.threshold = 0;
+                trial = trial.on(|sensor| {
+                    sensor.event_type = EventType::Greater;
+                    sensor.threshold = 0;
+                });
             }
             Effect::Overflow => {
                 trial.wide_counters = true;
@@ -308,6 +346,13 @@ impl Trial {
     }
 }
 
+/// A sensor of the same silicon whose description is changed; it must still be a possible one.
+fn changed(sensor: &Sensor, change: impl FnOnce(&mut SensorConfig)) -> Sensor {
+    let mut config = SensorConfig::clone(sensor);
+    change(&mut config);
+    Sensor::from(config).made_of(sensor.silicon())
+}
+
 /// What the frames of a trial share, on counters that hold all events.
 struct Frames<'t> {
     trial: &'t Trial,
@@ -320,10 +365,9 @@ struct Frames<'t> {
 
 impl<'t> Frames<'t> {
     fn new(trial: &'t Trial, seed: u64, threshold: u8) -> Self {
-        let sensor = Sensor::from(SensorConfig {
-            threshold,
-            bin_bits: 16,
-            ..trial.sensor.clone()
+        let sensor = changed(&trial.sensor, |sensor| {
+            sensor.threshold = threshold;
+            sensor.bin_bits = 16;
         });
         let exposure = Exposure::new(&sensor, trial.stop_periods, trial.cycles);
         let sigma = Time::from_s(1e-9 * trial.sigma_ns);

@@ -1,0 +1,133 @@
+//! The waveform: three intervals in clock counter, ring oscillator and delay line at once, and their codes against the models.
+//!
+//! The intervals are shorter than a step of the ring, longer than one but within the line, and far beyond the line.
+
+use std::path::Path;
+
+use super::{BEGIN, BITS, CLEARED, CODES, SIGMA, STAGES, made};
+use crate::chip::tdc::{clock_counter, delay_line, ring_oscillator};
+use crate::engine::waveform::write_waves;
+use crate::files::InputError;
+use crate::kernel::{Drive, Kernel, in_order};
+use crate::netlist::ModuleBuilder;
+use crate::report::Checks;
+use crate::units::{Frequency, Time};
+use crate::waves::{Entry, Group, Layout};
+
+/// Three intervals in all converters at once.
+pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
+    const SLOT: Time = Time::from_ns(40);
+    let clock = Frequency::from_hz_f64(384e6).expect("a frequency");
+    let intervals = [
+        Time::from_ps(600),
+        Time::from_ps(1_200),
+        Time::from_ps(15_000),
+    ];
+    let mut m = ModuleBuilder::new("tdcs");
+    let [start, stop, clear, clk] =
+        ["START", "STOP", "TDC_RESET", "CLK"].map(|name| [m.input(name)]);
+    let pins = [
+        ("START", &start[..]),
+        ("STOP", &stop),
+        ("TDC_RESET", &clear),
+    ];
+    let with_clk: Vec<_> = pins.into_iter().chain([("CLK", &clk[..])]).collect();
+    m.instance("clock_counter", &clock_counter::circuit(BITS), &with_clk);
+    m.instance("ring", &ring_oscillator::circuit(STAGES, BITS), &pins);
+    m.instance("line", &delay_line::circuit(CODES), &pins);
+    let (netlist, timing) = made(
+        &m.finish().expect("the testbench's circuit is whole"),
+        SIGMA,
+        1,
+    );
+
+    let mut drives: Vec<Drive> = netlist
+        .inputs()
+        .into_iter()
+        .map(|net| Drive::new(Time::ZERO, net, false))
+        .collect();
+    for (slot, &interval) in (0..).zip(&intervals) {
+        let at = SLOT * slot;
+        let fall = at + SLOT - Time::from_ns(5);
+        let pulses = [
+            (clear, at + Time::from_fs(1), at + CLEARED),
+            (start, at + BEGIN, fall),
+            (stop, at + BEGIN + interval, fall + Time::from_ns(2)),
+        ];
+        for (name, (_, up, down)) in ["TDC_RESET", "START", "STOP"].into_iter().zip(pulses) {
+            let net = netlist.net(name).expect("it is an input");
+            drives.extend([Drive::new(up, net, true), Drive::new(down, net, false)]);
+        }
+    }
+    let end = SLOT * intervals.len() as i64;
+    let clk = netlist.net("CLK").expect("it is an input");
+    let edges = (1..)
+        .map(|k| (clock.half_periods(k), k % 2 == 0))
+        .take_while(|edge| edge.0 < end);
+    drives.extend(edges.map(|(time, level)| Drive::new(time, clk, level)));
+    let codes = ["ring.CODE", "line.SEEN"];
+    let nets = codes.map(|path| netlist.signal(path).expect("it was built above"));
+    let models = [
+        ring_oscillator::Model::of(&netlist, &timing, "ring").steps(1 << BITS),
+        delay_line::model(&netlist, &timing, "line"),
+    ];
+    let mut kernel = Kernel::new(&netlist, &timing);
+    let mut stimulus = in_order(drives);
+    let mut found = Vec::new();
+    write_waves(waves, &netlist, &view(), |waves| {
+        for slot in 1..=intervals.len() as i64 {
+            kernel.run(&mut stimulus, SLOT * slot - Time::from_ns(6), waves);
+            found.push(nets.each_ref().map(|nets| kernel.number(nets)));
+        }
+        kernel.run(&mut stimulus, end, waves);
+        end
+    })?;
+    for (&interval, found) in intervals.iter().zip(found) {
+        let expected = models.each_ref().map(|steps| steps.code(interval));
+        let ones = found[1].map(|seen| seen.count_ones() as usize);
+        let found = [found[0].map(|code| code as usize), ones];
+        checks.that(
+            format!("{interval} in the waveform: codes of ring and line"),
+            format!("{} and {}", expected[0], expected[1]),
+            found
+                .map(|code| code.map_or("unknown".to_owned(), |n| n.to_string()))
+                .join(" and "),
+            found == expected.map(Some),
+        );
+    }
+    Ok(())
+}
+
+fn view() -> Layout {
+    let group = |title: &str, entries: &[Entry]| Group::new(title, entries.iter().cloned());
+    Layout {
+        groups: vec![
+            group(
+                "Interval",
+                &["START", "STOP", "TDC_RESET", "CLK"].map(Entry::binary),
+            ),
+            group(
+                "Clock counter",
+                &[
+                    Entry::binary("clock_counter.GATE"),
+                    Entry::binary("clock_counter.GATED_CLK"),
+                    Entry::decimal("clock_counter.CODE"),
+                ],
+            ),
+            group(
+                "Gated ring oscillator",
+                &[
+                    Entry::binary("ring.GATE"),
+                    Entry::hex("ring.RING"),
+                    Entry::decimal("ring.CODE"),
+                ],
+            ),
+            group(
+                "Delay line",
+                &[Entry::hex("line.TAP"), Entry::hex("line.SEEN")],
+            ),
+        ],
+        zoom: (BEGIN - Time::from_ns(2), BEGIN + Time::from_ns(4)),
+        marker: Some(BEGIN),
+    }
+}
