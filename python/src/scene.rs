@@ -4,9 +4,7 @@ use std::path::PathBuf;
 
 use guided_dtof::request::Sources;
 use guided_dtof::scene::{GroundTruth, Scene as World};
-use guided_dtof::settings::Document;
 use numpy::PyArray2;
-use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use toml::Table;
@@ -14,7 +12,7 @@ use toml::Table;
 use crate::arrays::map;
 use crate::background::run;
 use crate::failure::Failure;
-use crate::values::{assignments, table_to_python, to_python, value_at};
+use crate::values::{assignments, hash_of, html_of, item, reassigned, table_to_python, value_at};
 
 /// A scene: one that is built in, a file, and single keys of it.
 ///
@@ -75,13 +73,7 @@ impl Scene {
     /// The same scene with other keys.
     #[pyo3(signature = (keys, /))]
     fn with_(&self, keys: &Bound<'_, PyDict>) -> PyResult<Self> {
-        let mut document = Document::of(&self.name, self.table());
-        for assignment in assignments("", Some(keys))? {
-            let place = format!("with_({assignment})");
-            document
-                .assign(&assignment, &place)
-                .map_err(Failure::from)?;
-        }
+        let document = reassigned(&self.name, self.table(), Some(keys))?;
         Ok(Scene {
             world: World::read(&document).map_err(Failure::from)?,
             name: self.name.clone(),
@@ -117,10 +109,7 @@ impl Scene {
     }
 
     fn __getitem__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
-        match value_at(&self.table(), key) {
-            Some(value) => to_python(py, value),
-            None => Err(PyKeyError::new_err(key.to_owned())),
-        }
+        item(py, key, value_at(&self.table(), key))
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
@@ -129,7 +118,7 @@ impl Scene {
     }
 
     fn __hash__(&self) -> u64 {
-        crate::values::hash_of(&self.table())
+        hash_of(&self.table())
     }
 
     fn __repr__(&self) -> String {
@@ -138,9 +127,7 @@ impl Scene {
     }
 
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
-        let html = py.import("gdtof._html")?;
-        let arguments = (format!("Scene {}", self.name), self.to_dict(py)?);
-        html.call_method1("of_keys", arguments)?.extract()
+        html_of(py, format!("Scene {}", self.name), &self.table())
     }
 
     fn __reduce__<'py>(

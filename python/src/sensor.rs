@@ -4,14 +4,13 @@ use std::path::PathBuf;
 
 use guided_dtof::chip::{Sensor as Chip, SensorConfig};
 use guided_dtof::request::Sources;
-use guided_dtof::settings::Document;
-use pyo3::exceptions::{PyAttributeError, PyKeyError};
+use pyo3::exceptions::PyAttributeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use toml::Table;
 
 use crate::failure::Failure;
-use crate::values::{assignments, table_to_python, to_python};
+use crate::values::{assignments, hash_of, html_of, item, reassigned, table_to_python, to_python};
 
 /// A sensor: a chip by name, a file, or keys.
 ///
@@ -64,13 +63,7 @@ impl Sensor {
     /// The same sensor with other keys.
     #[pyo3(signature = (**keys))]
     fn with_(&self, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let mut document = Document::of("the sensor", self.table());
-        for assignment in assignments("", keys)? {
-            let place = format!("with_({assignment})");
-            document
-                .assign(&assignment, &place)
-                .map_err(Failure::from)?;
-        }
+        let document = reassigned("the sensor", self.table(), keys)?;
         let config = SensorConfig::read_document(&document).map_err(Failure::from)?;
         let chip = config.into();
         Ok(Sensor { chip })
@@ -104,10 +97,7 @@ impl Sensor {
     }
 
     fn __getitem__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
-        match self.table().get(key) {
-            Some(value) => to_python(py, value),
-            None => Err(PyKeyError::new_err(key.to_owned())),
-        }
+        item(py, key, self.table().get(key))
     }
 
     fn __getattr__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
@@ -133,7 +123,7 @@ impl Sensor {
     }
 
     fn __hash__(&self) -> u64 {
-        crate::values::hash_of(&self.table())
+        hash_of(&self.table())
     }
 
     fn __repr__(&self) -> String {
@@ -147,9 +137,7 @@ impl Sensor {
     }
 
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
-        let html = py.import("gdtof._html")?;
-        let arguments = ("Sensor".to_owned(), self.to_dict(py)?);
-        html.call_method1("of_keys", arguments)?.extract()
+        html_of(py, "Sensor".to_owned(), &self.table())
     }
 
     fn __reduce__<'py>(

@@ -2,12 +2,15 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
+use guided_dtof::settings::Document;
 use pyo3::IntoPyObjectExt;
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString};
 use serde::Serialize;
 use toml::{Table, Value};
+
+use crate::failure::Failure;
 
 /// A value as a settings file would have it; NumPy's scalars are numbers, too.
 ///
@@ -112,6 +115,50 @@ pub(crate) fn assignments(of: &str, dict: Option<&Bound<'_, PyDict>>) -> PyResul
         Ok(format!("{of}{key}={}", to_toml(&value)?))
     };
     dict.into_iter().flatten().map(assignment).collect()
+}
+
+/// These settings with others assigned by `with_`, in whose place errors are reported.
+///
+/// # Errors
+/// Values that are none, and keys that are not there.
+pub(crate) fn reassigned(
+    name: &str,
+    table: Table,
+    keys: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Document> {
+    let mut document = Document::of(name, table);
+    for assignment in assignments("", keys)? {
+        let place = format!("with_({assignment})");
+        document
+            .assign(&assignment, &place)
+            .map_err(Failure::from)?;
+    }
+    Ok(document)
+}
+
+/// The value that was found under `key`, as `[]` gives it.
+///
+/// # Errors
+/// KeyError where there is none.
+pub(crate) fn item<'py>(
+    py: Python<'py>,
+    key: &str,
+    value: Option<&Value>,
+) -> PyResult<Bound<'py, PyAny>> {
+    match value {
+        Some(value) => to_python(py, value),
+        None => Err(PyKeyError::new_err(key.to_owned())),
+    }
+}
+
+/// Settings as notebooks show them.
+///
+/// # Errors
+/// When there is no memory for it.
+pub(crate) fn html_of(py: Python<'_>, title: String, table: &Table) -> PyResult<String> {
+    let html = py.import("gdtof._html")?;
+    let arguments = (title, table_to_python(py, table)?);
+    html.call_method1("of_keys", arguments)?.extract()
 }
 
 /// A value of a table by its dotted name; items of lists go by their `name`, or by their number from 1.

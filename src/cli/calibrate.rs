@@ -8,6 +8,7 @@ use super::SensorArgs;
 use super::voice::{progress, tell};
 use crate::chip::{Tdc, WindowLaw};
 use crate::files::{InputError, OutputFile};
+use crate::numerics::intervals::mean_and_sigma;
 use crate::report::Table;
 use crate::request::{self, Spelling};
 use crate::system::{Calibrated, Sweep, SweepError, calibrate};
@@ -105,9 +106,7 @@ fn table(found: &Calibrated) -> Table {
             .iter()
             .flat_map(|lines| &lines[line].length_s);
         let lengths: Vec<f64> = lengths.map(|s| s * 1e12).collect();
-        let n = lengths.len() as f64;
-        let mean = lengths.iter().sum::<f64>() / n;
-        let variance = lengths.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / n;
+        let (mean, sigma) = mean_and_sigma(&lengths);
         let bound = |f: fn(f64, f64) -> f64| lengths.iter().copied().reduce(f).unwrap_or(mean);
         let of = format!("{name} windows");
         let windows = match found.windows[line] {
@@ -117,7 +116,7 @@ fn table(found: &Calibrated) -> Table {
         table.push(&of, format!("{} bins, {windows}", lengths.len()));
         table.push(
             format!("{of}, length"),
-            format!("{mean:.1} ps, σ {:.1} ps", variance.sqrt()),
+            format!("{mean:.1} ps, σ {sigma:.1} ps"),
         );
         let (least, most) = (bound(f64::min), bound(f64::max));
         table.push(

@@ -9,17 +9,15 @@ use clap::Args;
 use serde::Serialize;
 
 use super::SceneArgs;
-use super::asked::ExposureArgs;
+use super::asked::{Exposed, ExposureArgs};
 use super::foxglove::Foxglove;
 use super::voice::{note, progress, say, tell};
-use crate::chip::SensorConfig;
 use crate::engine::Work;
 use crate::files::{InputError, MANIFEST, ResultSet};
 use crate::report::{Cell, DepthMap, NpyStack, Table};
-use crate::scene::Scene;
 use crate::system::{
-    Drive, DriveFrame, DriveSettings, EngineKind, FrameClock, FrameTimes, NoDepth, Noise,
-    PhaseTimes, Reused, Summary, WindowPolicy,
+    Drive, DriveFrame, DriveSettings, FrameClock, FrameTimes, NoDepth, Noise, PhaseTimes, Reused,
+    Summary, WindowPolicy,
 };
 
 /// Arguments of `gdtof drive`.
@@ -115,13 +113,8 @@ struct Report<'a> {
 /// What was asked for.
 #[derive(Serialize)]
 struct Configuration<'a> {
-    scene_name: String,
-    scene: &'a Scene,
-    sensor: &'a SensorConfig,
-    stop_periods: u32,
-    laser_cycles: u32,
-    seed: u64,
-    engine: EngineKind,
+    #[serde(flatten)]
+    exposed: Exposed<'a>,
     /// As they were asked for; none for the camera pair.
     guides: &'a [String],
     windows: WindowPolicy,
@@ -175,13 +168,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         ..DriveSettings::new(frame)
     };
     let configuration = Configuration {
-        scene_name: scene_args.scene_name(),
-        scene: &settings.frame.scene,
-        sensor: &settings.frame.sensor,
-        stop_periods: settings.frame.exposure.stop_periods,
-        laser_cycles: asked.laser_cycles,
-        seed: asked.seed,
-        engine: asked.engine,
+        exposed: asked.exposed(scene_args.scene_name(), &settings.frame),
         guides: asked.guiding.guides(),
         windows: settings.policy,
         calibration: asked.calibration.as_deref(),
@@ -276,7 +263,7 @@ impl Report<'_> {
         let clock = self.configuration.clock;
         let mut table = Table::new(format!(
             "{} frames of {}",
-            self.frames, self.configuration.scene_name
+            self.frames, self.configuration.exposed.scene_name
         ))
         .row(
             "frame rate",

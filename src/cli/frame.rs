@@ -9,7 +9,7 @@ use clap::Args;
 use serde::Serialize;
 
 use self::pair::PairReport;
-use super::asked::ExposureArgs;
+use super::asked::{Exposed, ExposureArgs};
 use super::voice::{note, progress, say, tell};
 use super::{SceneArgs, quality};
 use crate::analysis::{TimingVerdict, VerdictReport};
@@ -22,10 +22,9 @@ use crate::guide::GuideMap;
 use crate::page::Page;
 use crate::report::{Table, write_npy_u16};
 use crate::request::FrameRequest;
-use crate::scene::Scene;
 use crate::system::{
-    DistanceLaw, EngineKind, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Probe, Summary,
-    WindowPolicy, take_frame_by,
+    DistanceLaw, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Probe, Summary, WindowPolicy,
+    take_frame_by,
 };
 use crate::units::Time;
 use crate::waves::WaveFormat;
@@ -80,7 +79,7 @@ pub(super) struct FrameArgs {
 /// Runs the command.
 ///
 /// # Errors
-/// Bad input, unwritable output, and what [`take_frame`] reports.
+/// Bad input, unwritable output, and what [`take_frame_by`] reports.
 pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     let (sensor, scene) = args.scene.read()?;
     let pair = args.pair.take(&sensor, scene.clone(), &args.out)?;
@@ -226,13 +225,8 @@ fn nearest_guided(guide: &GuideMap) -> Option<(usize, usize)> {
 /// What was asked for: in frame.json and in the manifest.
 #[derive(Serialize)]
 struct Configuration<'a> {
-    scene_name: String,
-    scene: &'a Scene,
-    sensor: &'a SensorConfig,
-    stop_periods: u32,
-    laser_cycles: u32,
-    seed: u64,
-    engine: EngineKind,
+    #[serde(flatten)]
+    exposed: Exposed<'a>,
     false_alarm_rate: f64,
     walk_correction: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -283,13 +277,7 @@ impl<'a> Report<'a> {
         Report {
             version: env!("CARGO_PKG_VERSION"),
             configuration: Configuration {
-                scene_name: scene_name(args),
-                scene: &settings.scene,
-                sensor: &settings.sensor,
-                stop_periods: settings.exposure.stop_periods,
-                laser_cycles: asked.laser_cycles,
-                seed: asked.seed,
-                engine: asked.engine,
+                exposed: asked.exposed(scene_name(args), settings),
                 false_alarm_rate: args.false_alarm_rate,
                 walk_correction: !args.no_walk_correction,
                 calibration: asked.calibration.as_ref().map(|p| p.display().to_string()),
@@ -326,7 +314,7 @@ impl<'a> Report<'a> {
 fn write_results(out: &Path, frame: &Frame, report: &Report<'_>) -> anyhow::Result<()> {
     let shape = report.histograms_shape.map(|n| n as u64);
     write_npy_u16(&out.join("histograms.npy"), &shape, &frame.histograms)?;
-    picture::depth_map(out, frame, &report.configuration)?;
+    picture::depth_map(out, frame, &report.configuration.exposed)?;
     OutputFile::write_with(&out.join("frame.json"), |w| {
         serde_json::to_writer(&mut *w, report)?;
         writeln!(w)

@@ -19,7 +19,7 @@ use crate::sweep::{
 pub(super) struct SweepArgs {
     #[command(subcommand)]
     command: Option<SweepCommand>,
-    /// Study (TOML): what varies in [vary], what does not in [fixed].
+    /// Study (TOML): what varies in `[vary]`, what does not in `[fixed]`.
     #[arg(required = true, value_name = "STUDY")]
     study: Option<PathBuf>,
     /// Take only every N-th point, from the I-th on: one of N processes, in one folder or several, which `gdtof sweep merge` joins.

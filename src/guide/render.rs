@@ -14,7 +14,24 @@ use rayon::prelude::*;
 use super::right_camera::RightCamera;
 use crate::photon::{Purpose, normal, random_stream};
 use crate::scene::{PinholeCamera, Ray, SKY_REFLECTIVITY, Scene};
+use crate::settings::{Key, Range};
 use crate::stereo::GreyImage;
+
+/// Settings of every guide that renders: camera pixels across that make one, and the grain of plain surfaces.
+pub(super) const BINNING: Key = Key {
+    name: "binning",
+    what: "Camera pixels across that are binned to one",
+    unit: "",
+    range: Range::Within(1.0, 16.0),
+    source: "thesis 6.3.2",
+};
+pub(super) const GRAIN: Key = Key {
+    name: "grain",
+    what: "Contrast of the grain that surfaces without a texture have, standard deviation",
+    unit: "",
+    range: Range::Within(0.0, 1.0),
+    source: "chosen",
+};
 
 /// Electrons of a pixel that is full, and of its readout noise: Sony's IMX273 holds some 10 000 and reads with some 2.5.
 const FULL_WELL_E: f64 = 10_000.0;

@@ -7,7 +7,7 @@
 //! As in 6.3.2, pixels are binned and only the part of the images that the lidar sees is matched.
 
 use super::mapping;
-use super::render::{Crop, pair};
+use super::render::{BINNING, Crop, GRAIN, pair};
 use super::stereo::{StereoPoint, StereoRig};
 use super::{Guide, GuideError, GuideInput, GuideMap};
 use crate::scene::{DVec3, Scene};
@@ -43,11 +43,8 @@ impl Default for MatchedStereo {
 
 pub(super) const KEYS: &[Key] = &[
     Key {
-        name: "binning",
         what: "Camera pixels across that are binned to one before matching",
-        unit: "",
-        range: Range::Within(1.0, 16.0),
-        source: "thesis 6.3.2",
+        ..BINNING
     },
     Key {
         name: "paths",
@@ -56,13 +53,7 @@ pub(super) const KEYS: &[Key] = &[
         range: Range::Within(3.0, 8.0),
         source: "chosen",
     },
-    Key {
-        name: "grain",
-        what: "Contrast of the grain that surfaces without a texture have, standard deviation",
-        unit: "",
-        range: Range::Within(0.0, 1.0),
-        source: "chosen",
-    },
+    GRAIN,
     Key {
         name: "sigma_px",
         what: "Standard deviation claimed for a disparity, in binned pixels",
@@ -199,7 +190,7 @@ impl Guide for MatchedStereo {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::guide::test_scenes::{coarse, wall_at};
+    use crate::guide::test_scenes::{coarse, depends_on_its_seed_alone, wall_at};
     use crate::scene::GroundTruth;
 
     const WHOLE: MatchedStereo = MatchedStereo {
@@ -286,17 +277,6 @@ mod tests {
 
     #[test]
     fn a_seed_gives_the_same_map_on_any_number_of_threads() {
-        let scene = coarse(Scene::outdoor());
-        let estimate = |seed| {
-            WHOLE
-                .estimate(&GuideInput::still(&scene, 16, 16, seed))
-                .unwrap()
-        };
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(1)
-            .build()
-            .unwrap();
-        assert_eq!(pool.install(|| estimate(5)), estimate(5));
-        assert_ne!(estimate(5), estimate(6));
+        depends_on_its_seed_alone(&WHOLE);
     }
 }

@@ -128,6 +128,7 @@ impl<'a> StereoRig<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::intervals::mean_and_sigma;
     use crate::scene::{Object, Shape};
 
     fn wall(z_m: f64, half_width_m: f64) -> Object {
@@ -157,13 +158,6 @@ mod tests {
             .flat_map(|row| (400..1040).step_by(4).map(move |col| (row, col)))
             .filter_map(|(row, col)| rig.measure(row, col).map(|p| p.depth_m))
             .collect()
-    }
-
-    fn mean_and_sigma(values: &[f64]) -> (f64, f64) {
-        let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
-        (mean, variance.sqrt())
     }
 
     #[test]

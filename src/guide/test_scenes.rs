@@ -33,6 +33,22 @@ pub(super) fn coarse(mut scene: Scene) -> Scene {
     scene
 }
 
+/// Holds a guide's map of the street to its seed alone: equal on any number of threads, another for another seed.
+pub(super) fn depends_on_its_seed_alone(guide: &dyn Guide) {
+    let scene = coarse(Scene::outdoor());
+    let estimate = |seed| {
+        guide
+            .estimate(&GuideInput::still(&scene, 16, 16, seed))
+            .unwrap()
+    };
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .unwrap();
+    assert_eq!(pool.install(|| estimate(5)), estimate(5));
+    assert_ne!(estimate(5), estimate(6));
+}
+
 /// Estimate less truth of every macropixel of `size`×`size`, and the standard deviation claimed for it, m.
 pub(super) fn errors_m(
     guide: &dyn Guide,

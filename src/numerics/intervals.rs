@@ -50,6 +50,14 @@ pub fn share(successes: f64, trials: f64) -> Estimate {
     }
 }
 
+/// Mean and standard deviation of all values there are, divided by their number, not by one less.
+pub(crate) fn mean_and_sigma(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+    (mean, variance.sqrt())
+}
+
 /// Mean of at least two values, with the normal interval.
 pub fn mean(values: &[f64]) -> Estimate {
     let n = values.len() as f64;

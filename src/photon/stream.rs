@@ -29,14 +29,14 @@
 //! The photons under one key are a pure function of (seed, macropixel, slot, group): their Poisson number is drawn
 //! first, then each takes 32 random bits for its cycle, SPAD and time (a signal photon 64, and 128 more for a measured
 //! pulse). So any part can be drawn on any thread in any order, and all see the same light. Only dead time,
-//! afterpulses and crosstalk tie slots and cycles together; they are applied afterwards ([`Avalanches`]).
+//! afterpulses and crosstalk tie slots and cycles together; they are applied afterwards ([`Avalanches`](super::Avalanches)).
 //!
 //! Timing jitter of a SPAD displaces the points of a Poisson process, which leaves it one: jitter of background changes
 //! nothing, and that of the signal is part of the pulse.
 //!
 //! Light that is a list ([`PixelLight`]) is drawn layer by layer: each is such a stream with a key of its own, in some laser
 //! cycles. A profile, or SPADs that differ, are drawn at their greatest rate and thinned by a random word that is a pure
-//! function of the photon's own ([`Limits`]); whatever SPADs there are, that leaves a Poisson process.
+//! function of the photon's own (`limits`); whatever SPADs there are, that leaves a Poisson process.
 //!
 //! Limits of the model: no spread of dead time between SPADs; background photons come at multiples of some 20 fs
 //! ([`Slots`]).

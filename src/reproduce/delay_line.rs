@@ -14,6 +14,7 @@ use super::claim::{Published::*, Row};
 use super::penalty::sigma_over_fwhm;
 use crate::chip::{Exposure, Sensor, SensorConfig, WindowLaw, hslidar_delay_line};
 use crate::engine::{Expose, LitPixel, Window, stream_config};
+use crate::numerics::intervals::mean_and_sigma;
 use crate::photon::{PhotonStream, PixelLight};
 use crate::ranging::{BinProfile, PeakOptions, centre_of_mass};
 use crate::report::{Axis, Chart, Style};
@@ -106,13 +107,6 @@ fn lengths_ns() -> Vec<f64> {
     lines
         .flat_map(|line| line.length_s.iter().map(|s| s * 1e9))
         .collect()
-}
-
-fn mean_and_sigma(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
-    (mean, variance.sqrt())
 }
 
 /// Claim 20: the delay lines and the plane of Fig. 92.

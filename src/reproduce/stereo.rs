@@ -6,6 +6,7 @@ use super::design::HSLIDAR_BIN_M;
 use super::guided_bins;
 use crate::chip::{SensorConfig, hslidar};
 use crate::guide::StereoRig;
+use crate::numerics::intervals::{deviation, mean};
 use crate::report::{Axis, Chart, Style};
 use crate::scene::{DVec3, Object, Scene, Shape};
 use crate::theory::design::{StereoPair, three_sigma, tolerated_sigma};
@@ -137,13 +138,6 @@ fn sampled_m(depth_m: f64, seed: u64) -> Vec<f64> {
         .collect()
 }
 
-fn mean_and_sigma(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
-    (mean, (squares / (n - 1.0)).sqrt())
-}
-
 /// Distances of the sweep, m; the thesis goes to 200 m, and says that what is nearer than about 15 m is not resolved.
 fn sweep_m() -> impl Iterator<Item = f64> {
     (2..=20).map(|i| 10.0 * f64::from(i))
@@ -153,8 +147,8 @@ fn sweep_m() -> impl Iterator<Item = f64> {
 fn sampled_sweep() -> Vec<(f64, f64, f64)> {
     sweep_m()
         .map(|z_m| {
-            let (mean_m, sigma_m) = mean_and_sigma(&sampled_m(z_m, z_m as u64));
-            (z_m, mean_m, sigma_m)
+            let sampled_m = sampled_m(z_m, z_m as u64);
+            (z_m, mean(&sampled_m).value, deviation(&sampled_m).value)
         })
         .collect()
 }
@@ -214,7 +208,7 @@ pub(super) fn figure_107() -> Vec<Chart> {
         let depths: Vec<f64> = pixels
             .filter_map(|(row, col)| Some(rig.measure(row, col)?.depth_m))
             .collect();
-        mean_and_sigma(&depths).0
+        mean(&depths).value
     };
     let guided = |yaw_deg: f64| walk_m().map(move |z_m| (z_m, mean_m(z_m, yaw_deg)));
     let step_m = HSLIDAR_STEP_BINS * HSLIDAR_BIN_M;

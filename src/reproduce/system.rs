@@ -1,5 +1,5 @@
 //! Claims 22 to 24 and 27: what formulas and budgets say of the demonstrator of chapter 6, beside what the chain gives
-//! ([`demonstrator`](super::demonstrator)).
+//! ([`mod@demonstrator`]).
 
 use super::claim::{Published::*, Row};
 use super::demonstrator::{self, swept};

@@ -40,8 +40,8 @@ impl Scene {
         Scene::read(&Document::parse(source, text)?)
     }
 
-    /// Reads a scene from its document. Keys that are left out have their default: [`Lidar::default`],
-    /// [`Stereo::default`], [`Light::default`]; a document without objects is a scene without any.
+    /// Reads a scene from its document. Keys that are left out have their default: that of
+    /// [`Lidar`](super::Lidar), [`Stereo`](super::Stereo) and [`Light`](super::Light); a document without objects is a scene without any.
     ///
     /// # Errors
     /// Syntax errors; unknown keys, keys that an object lacks, and values that cannot be, all of them at once.

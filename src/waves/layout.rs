@@ -105,7 +105,7 @@ impl Shape {
         })
     }
 
-    /// Its range as GTKWave names it, if it is a bus. GTKWave shortens the range [0:0] when it reads the file.
+    /// Its range as GTKWave names it, if it is a bus. GTKWave shortens the range `[0:0]` when it reads the file.
     pub(super) fn range(&self) -> String {
         match (self.is_bus, self.width) {
             (false, _) => String::new(),

@@ -1,6 +1,8 @@
 //! The chip and its kernel: blocks, timing, waveforms, other simulators.
 
 mod bench;
+#[path = "../shared/command.rs"]
+mod command;
 mod every_edge {
     pub mod circuit;
     mod placement;

@@ -2,6 +2,7 @@
 //! a warning, cells do what those of our kernel do, Verilator and Yosys read it all. A tool that is absent is skipped,
 //! loudly.
 
+use crate::command::gdtof;
 use crate::icarus;
 use crate::scenario;
 
@@ -9,7 +10,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
 use guided_dtof::bench::{StimulusPlan, export_netlist, export_verilog};
 use guided_dtof::chip::SensorConfig;
@@ -18,15 +19,6 @@ use guided_dtof::netlist::{CellKind, Corner, Library, write_cells, write_standar
 use icarus::Seen;
 use rand::{SeedableRng, rngs::StdRng};
 use scenario::Scenario;
-
-fn gdtof(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gdtof"));
-    command
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
 
 /// Names of a folder's files, sorted.
 fn files(folder: &Path) -> Vec<String> {

@@ -1,18 +1,14 @@
 //! `gdtof page`: one file that needs no network, whatever names the scene has, and that works in a browser.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
 use serde_json::Value;
 
+use super::tools::gdtof;
+
 /// A name that ends a script and begins another.
 const BREAKS_OUT: &str = "</script><script>document.title='broken into'</script><!--";
-
-fn gdtof(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gdtof"));
-    command.args(arguments).current_dir(folder);
-    command.output().unwrap()
-}
 
 /// A wall that has the name, in a file with a name that shells and browsers take amiss.
 fn scene_file(folder: &Path) -> PathBuf {

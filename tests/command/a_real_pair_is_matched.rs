@@ -5,7 +5,9 @@
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
+
+use super::tools::gdtof;
 
 const WIDTH: usize = 160;
 const HEIGHT: usize = 120;
@@ -14,14 +16,6 @@ left = [[300.0, 0, 80.0], [0, 300.0, 60.0], [0, 0, 1]]
 baseline_m = 1.0
 disparities = 32
 ";
-
-fn gdtof(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_gdtof"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
 
 fn disparity_px(x: usize, y: usize) -> usize {
     match (50..110).contains(&x) && (40..80).contains(&y) {

@@ -6,20 +6,13 @@ mod set_option;
 mod sources;
 
 use std::path::Path;
-use std::process::{Command, Output};
 
 use proptest::prelude::*;
 
+use super::tools::gdtof;
+
 const INITS: &str = "row,col,init\n0,0,20\n0,1,30\n";
 const EVENTS: &str = "time_fs,row,col,spad\n20000000,0,0,3\n";
-
-fn gdtof(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_gdtof"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
 
 fn refused(folder: &Path, arguments: &[&str], says: &str) {
     let before = std::fs::read_dir(folder).unwrap().count();

@@ -1,18 +1,13 @@
 //! `gdtof range --format frame`: depths from counts that are given, in the windows of a frame.
 
 use std::path::Path;
-use std::process::{Command, Output};
 
 use npyz::WriterBuilder;
 
-fn gdtof(folder: &Path, arguments: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gdtof"));
-    command.args(arguments.split(' ')).current_dir(folder);
-    command.output().unwrap()
-}
+use super::tools::gdtof_words;
 
 fn take(folder: &Path) -> serde_json::Value {
-    let frame = gdtof(
+    let frame = gdtof_words(
         folder,
         "frame --rows 8 --cols 8 --probe none --laser-cycles 400 --set scene.light.illuminance_klux=0 --set scene.lidar.pulse_energy_uj=1 --json",
     );
@@ -34,13 +29,13 @@ fn a_frame_ranged_once_more_is_the_same_and_a_table_of_it_has_every_macropixel()
     let folder = folder.path();
     let frame = take(folder);
     let range = "range --format frame --histograms out/histograms.npy";
-    let again = gdtof(folder, &format!("{range} --json"));
+    let again = gdtof_words(folder, &format!("{range} --json"));
     let again: serde_json::Value = serde_json::from_slice(&again.stdout).unwrap();
     assert_eq!(again["macropixels"], frame["macropixels"]);
     assert_eq!(again["summary"], frame["summary"]);
     assert!(frame["summary"]["depths"].as_u64() > Some(10));
 
-    let with_table = gdtof(folder, &format!("{range} --out depths.csv"));
+    let with_table = gdtof_words(folder, &format!("{range} --out depths.csv"));
     assert!(with_table.status.success());
     let table = std::fs::read_to_string(folder.join("depths.csv")).unwrap();
     assert_eq!(table.lines().count(), 65);
@@ -57,7 +52,7 @@ fn other_counts_in_the_same_windows_give_other_depths() {
     take(folder);
     write(&folder.join("dark.npy"), &[8, 8, 16], &[0; 1024]);
     let range = "range --format frame --frame out/frame.json --json --histograms";
-    let dark = gdtof(folder, &format!("{range} dark.npy"));
+    let dark = gdtof_words(folder, &format!("{range} dark.npy"));
     let dark: serde_json::Value = serde_json::from_slice(&dark.stdout).unwrap();
     assert_eq!(dark["summary"]["depths"], 0);
 
@@ -77,7 +72,7 @@ fn other_counts_in_the_same_windows_give_other_depths() {
             "frame.json",
         ),
     ] {
-        let refused = gdtof(folder, &arguments);
+        let refused = gdtof_words(folder, &arguments);
         let said = String::from_utf8(refused.stderr).unwrap();
         assert_eq!(refused.status.code(), Some(2), "{said}");
         assert!(said.contains(says), "{said}");

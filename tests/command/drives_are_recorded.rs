@@ -1,13 +1,8 @@
 //! `gdtof drive`: one recording of many frames, the same whatever is reused, and refusals.
 
 use std::path::Path;
-use std::process::{Command, Output};
 
-fn gdtof(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gdtof"));
-    command.args(arguments).current_dir(folder);
-    command.output().unwrap()
-}
+use super::tools::gdtof;
 
 /// A small array in little light: its few macropixels share the whole field of view.
 const SMALL: [&str; 17] = [

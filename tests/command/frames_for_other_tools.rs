@@ -2,16 +2,8 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
-fn gdtof(folder: &Path, arguments: &[&str]) -> std::process::Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gdtof"));
-    command
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
+use super::tools::{gdtof, python};
 
 fn done(folder: &Path, arguments: &[&str]) {
     let output = gdtof(folder, arguments);
@@ -19,29 +11,6 @@ fn done(folder: &Path, arguments: &[&str]) {
         output.status.success(),
         "{}",
         String::from_utf8_lossy(&output.stderr)
-    );
-}
-
-/// Runs a script, unless a package that it needs is missing.
-fn python(folder: &Path, packages: &[&str], script: &str) {
-    for package in packages {
-        let found = Command::new("python3")
-            .args(["-c", &format!("import {package}")])
-            .output();
-        if !found.is_ok_and(|output| output.status.success()) {
-            eprintln!("SKIPPED: no {package} to read files with; pip install {package}");
-            return;
-        }
-    }
-    let read = Command::new("python3")
-        .args(["-c", script])
-        .current_dir(folder)
-        .output()
-        .unwrap();
-    assert!(
-        read.status.success(),
-        "{}",
-        String::from_utf8_lossy(&read.stderr)
     );
 }
 

@@ -1,5 +1,9 @@
 //! The `gdtof` command as its users meet it.
 
+#[path = "../shared/command.rs"]
+mod command;
+mod tools;
+
 mod a_page_shows_a_frame;
 mod a_real_pair_is_matched;
 mod command_line_refuses_bad_input;

@@ -1,17 +1,12 @@
 //! `gdtof replay --mismatch` and the conditions: every engine writes the same file, and says how it came about.
 
 use std::path::Path;
-use std::process::{Command, Output};
 
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
-const SIDE: u32 = 6;
+use super::tools::gdtof;
 
-fn gdtof(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gdtof"));
-    command.args(arguments).current_dir(folder);
-    command.output().unwrap()
-}
+const SIDE: u32 = 6;
 
 fn folder() -> tempfile::TempDir {
     let random = &mut StdRng::seed_from_u64(5);

@@ -5,6 +5,8 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use super::tools::python;
+
 /// Far longer than any of this takes on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
 
@@ -337,13 +339,6 @@ fn the_example_studies_run() {
 /// By a reader that is not ours.
 #[test]
 fn parquet_reads_back_in_pyarrow() {
-    let has_pyarrow = Command::new("python3")
-        .args(["-c", "import pyarrow.parquet"])
-        .output();
-    if !has_pyarrow.is_ok_and(|output| output.status.success()) {
-        eprintln!("SKIPPED: no pyarrow to read Parquet files with; pip install pyarrow");
-        return;
-    }
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
     // More rows than a group has.
@@ -362,14 +357,5 @@ for name, cells in zip(rows[0], zip(*rows[1:])):
     for a, b in zip(t[name].to_pylist(), cells):
         assert ('' if a is None else a) == ('' if b == '' else type(a)(b)), (name, a, b)
 ";
-    let read = Command::new("python3")
-        .args(["-c", script])
-        .current_dir(here)
-        .output()
-        .unwrap();
-    assert!(
-        read.status.success(),
-        "{}",
-        String::from_utf8_lossy(&read.stderr)
-    );
+    python(here, &["pyarrow.parquet"], script);
 }

@@ -1,13 +1,8 @@
 //! `gdtof doctor`, `schema`, `completion` and `man`, and `--quiet` and `--threads`.
 
-use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
-fn gdtof(folder: &Path, arguments: &str) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_gdtof"));
-    command.args(arguments.split(' ')).current_dir(folder);
-    command.output().unwrap()
-}
+use super::tools::gdtof_words;
 
 fn said(output: Output) -> String {
     assert!(output.status.success(), "{output:?}");
@@ -21,7 +16,7 @@ const SMALL: &str =
 fn a_quiet_run_writes_its_files_and_says_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let quiet = gdtof(folder, &format!("{SMALL} --quiet"));
+    let quiet = gdtof_words(folder, &format!("{SMALL} --quiet"));
     assert!(quiet.status.success());
     assert_eq!(
         (quiet.stdout.len(), quiet.stderr.len()),
@@ -29,9 +24,9 @@ fn a_quiet_run_writes_its_files_and_says_nothing() {
         "{quiet:?}"
     );
     assert!(folder.join("out/frame.json").exists());
-    let json = said(gdtof(folder, &format!("--quiet {SMALL} --json")));
+    let json = said(gdtof_words(folder, &format!("--quiet {SMALL} --json")));
     assert!(serde_json::from_str::<serde_json::Value>(&json).is_ok());
-    let refused = gdtof(folder, &format!("{SMALL} --quiet --seed x"));
+    let refused = gdtof_words(folder, &format!("{SMALL} --quiet --seed x"));
     assert_eq!(refused.status.code(), Some(2));
     assert!(!refused.stderr.is_empty());
 }
@@ -40,21 +35,24 @@ fn a_quiet_run_writes_its_files_and_says_nothing() {
 fn threads_are_as_many_as_asked_for_and_change_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let doctor = said(gdtof(folder, "doctor --threads 3 --json"));
+    let doctor = said(gdtof_words(folder, "doctor --threads 3 --json"));
     let doctor: serde_json::Value = serde_json::from_str(&doctor).unwrap();
     assert_eq!(doctor["threads"], 3);
     assert_eq!(doctor["version"], env!("CARGO_PKG_VERSION"));
     let tools = doctor["tools"].as_array().unwrap();
     assert!(tools.iter().any(|tool| tool["name"] == "iverilog"));
     for threads in ["1", "3"] {
-        said(gdtof(
+        said(gdtof_words(
             folder,
             &format!("{SMALL} --threads {threads} --out {threads}"),
         ));
     }
     let counts = |name: &str| std::fs::read(folder.join(name).join("histograms.npy")).unwrap();
     assert_eq!(counts("1"), counts("3"));
-    assert_eq!(gdtof(folder, "doctor --threads 0").status.code(), Some(2));
+    assert_eq!(
+        gdtof_words(folder, "doctor --threads 0").status.code(),
+        Some(2)
+    );
 }
 
 /// Keys and limits that a schema has: those of the file that the same program prints.
@@ -62,8 +60,8 @@ fn threads_are_as_many_as_asked_for_and_change_nothing() {
 fn schemas_have_every_key_of_the_printed_files() {
     let folder = tempfile::tempdir().unwrap();
     let read = |what: &str| -> (toml::Table, serde_json::Value) {
-        let schema = said(gdtof(folder.path(), &format!("schema {what}")));
-        let file = said(gdtof(folder.path(), what));
+        let schema = said(gdtof_words(folder.path(), &format!("schema {what}")));
+        let file = said(gdtof_words(folder.path(), what));
         (
             toml::from_str(&file).unwrap(),
             serde_json::from_str(&schema).unwrap(),
@@ -97,7 +95,7 @@ fn schemas_have_every_key_of_the_printed_files() {
 fn shells_and_manuals_know_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let help = said(gdtof(folder, "--help"));
+    let help = said(gdtof_words(folder, "--help"));
     let commands = help.split("Commands:").nth(1).unwrap();
     let commands = commands.split("Options:").next().unwrap().lines();
     let commands: Vec<&str> = commands
@@ -108,8 +106,8 @@ fn shells_and_manuals_know_every_command() {
         commands.contains(&"frame") && commands.contains(&"doctor"),
         "{commands:?}"
     );
-    let script = said(gdtof(folder, "completion bash"));
-    said(gdtof(folder, "man --out pages"));
+    let script = said(gdtof_words(folder, "completion bash"));
+    said(gdtof_words(folder, "man --out pages"));
     for name in commands {
         assert!(script.contains(&format!("gdtof__subcmd__{name}")), "{name}");
         let page = folder.join(format!("pages/gdtof-{name}.1"));
@@ -119,7 +117,7 @@ fn shells_and_manuals_know_every_command() {
     assert!(folder.join("pages/gdtof-export-verilog.1").exists());
     for shell in ["zsh", "fish", "powershell", "elvish"] {
         assert!(
-            said(gdtof(folder, &format!("completion {shell}"))).contains("--laser-cycles")
+            said(gdtof_words(folder, &format!("completion {shell}"))).contains("--laser-cycles")
                 || shell == "fish"
         );
     }

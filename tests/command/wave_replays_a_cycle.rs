@@ -2,18 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::{Command, Output};
 
-fn gdtof(folder: &Path, arguments: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_gdtof"))
-        .args(arguments.split(' '))
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
+use super::tools::gdtof_words;
 
 fn succeeds(folder: &Path, arguments: &str) -> String {
-    let run = gdtof(folder, arguments);
+    let run = gdtof_words(folder, arguments);
     let error = String::from_utf8_lossy(&run.stderr).into_owned();
     assert!(run.status.success(), "{arguments}: {error}");
     String::from_utf8(run.stdout).unwrap()
@@ -200,7 +193,7 @@ fn what_is_no_such_frame_or_not_in_it_is_one_sentence_and_exit_status_2() {
     ];
     for (file, pixel, cycle, says) in cases {
         let arguments = format!("wave --frame {file} --pixel {pixel} --cycle {cycle} --out w.vcd");
-        let run = gdtof(folder.path(), &arguments);
+        let run = gdtof_words(folder.path(), &arguments);
         let error = String::from_utf8(run.stderr).unwrap();
         assert_eq!(run.status.code(), Some(2), "{arguments}: {error}");
         assert!(error.contains(says), "{arguments}: {error}");

@@ -1,5 +1,8 @@
 //! Formulas against references of many digits, and the published figures.
 
+#[path = "../shared/command.rs"]
+mod command;
+
 mod detection_probability_meets_references;
 mod functions_keep_their_promises;
 mod precision_meets_references;

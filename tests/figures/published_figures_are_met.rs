@@ -2,13 +2,13 @@
 //! modelled are the ones that are known to be, and the command says so in files, in JSON and by its exit status.
 
 use std::collections::BTreeSet;
-use std::path::Path;
-use std::process::{Command, Output};
 use std::sync::OnceLock;
 
 use guided_dtof::reproduce::{
     Report, Row, Selection, Verdict, html, markdown, overall, reproduce, tally,
 };
+
+use super::command::gdtof;
 
 /// All claims, computed once; figures and tables are left to their own test.
 fn claims() -> &'static Report {
@@ -20,14 +20,6 @@ fn claims() -> &'static Report {
         };
         reproduce(&selection, || ())
     })
-}
-
-fn gdtof(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_gdtof"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap()
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::{Probe, join, top_bus};
 use crate::chip::load_path;
 use crate::netlist::{NetId, Netlist};
 
-/// A net or bus of the load path, in a sensor or in [`load_path::with_memories`](crate::chip::load_path::with_memories).
+/// A net or bus of the load path, in a sensor or in [`load_path::with_memories`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LoadProbe {
     /// LOAD_CLK.
@@ -60,12 +60,12 @@ impl LoadProbe {
     }
 }
 
-/// Dotted path of the start value at a row and column of [`load_path::with_memories`](crate::chip::load_path::with_memories).
+/// Dotted path of the start value at a row and column of [`load_path::with_memories`].
 pub fn memory_path(row: usize, col: usize) -> String {
     join([&load_path::memory_name(row, col), Probe::Memory.name()])
 }
 
-/// Start values of [`load_path::with_memories`](crate::chip::load_path::with_memories), row-major, bit 0 first.
+/// Start values of [`load_path::with_memories`], row-major, bit 0 first.
 ///
 /// # Panics
 /// When the netlist is another.

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::Configuration;
 use crate::chip::Mode;
+use crate::cli::asked::Exposed;
 use crate::files::InputError;
 use crate::report::{Cell, DepthMap};
 use crate::system::{Frame, NoDepth};
@@ -12,11 +12,7 @@ use crate::system::{Frame, NoDepth};
 ///
 /// # Errors
 /// When it cannot be written.
-pub(super) fn depth_map(
-    out: &Path,
-    frame: &Frame,
-    asked: &Configuration<'_>,
-) -> Result<(), InputError> {
+pub(super) fn depth_map(out: &Path, frame: &Frame, asked: &Exposed<'_>) -> Result<(), InputError> {
     let mode = match asked.sensor.mode {
         Mode::Guided => "guided",
         Mode::Conventional => "conventional",

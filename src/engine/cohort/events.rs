@@ -42,7 +42,7 @@ impl EventTable {
 /// Counts of a bin that are no error.
 const MEETINGS_THAT_DO_NOT_COUNT: f64 = 0.01;
 
-/// Two pulses that meet on a photon line leave no edge ([`photon_line`]). In one bin they cancel anyway; to either side of an
+/// Two pulses that meet on a photon line leave no edge ([`photon_line`](crate::chip::photon_line)). In one bin they cancel anyway; to either side of an
 /// edge of a bin, which is all that is left out, each bin is off by a count.
 ///
 /// # Errors

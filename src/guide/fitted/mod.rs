@@ -5,7 +5,7 @@
 //!                        └─► texture ────────┴─► none? gross? ─► error, alike in neighbours ─► points ─► macropixels
 //! ```
 //!
-//! No images are matched. Every number of the default is fitted to what [`MatchedStereo`](super::MatchedStereo) does on rendered walls and posts (`vectors/stereo/errors.csv`,
+//! No images are matched. Every number of the default is fitted to what [`MatchedStereo`] does on rendered walls and posts (`vectors/stereo/errors.csv`,
 //! which `vectors/remake.sh` makes anew); tests hold both guides' errors together.
 //!
 //! Limits: errors have no bias by the fraction of a pixel (the matcher's is 0.04 px), pixels beside an edge have answers like others (of the matcher's, a
@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use self::field::Field;
 use self::texture::Law;
 use super::mapping;
-use super::render::{Crop, Exposed, exposed};
+use super::render::{BINNING, Crop, Exposed, GRAIN, exposed};
 use super::stereo::{StereoPoint, StereoRig};
 use super::{Guide, GuideError, GuideInput, GuideMap, MatchedStereo};
 use crate::scene::Scene;
@@ -83,19 +83,10 @@ impl Default for FittedStereo {
 
 pub(super) const KEYS: &[Key] = &[
     Key {
-        name: "binning",
         what: "Camera pixels across that are binned to one; all lengths here are in binned pixels",
-        unit: "",
-        range: Range::Within(1.0, 16.0),
-        source: "thesis 6.3.2",
+        ..BINNING
     },
-    Key {
-        name: "grain",
-        what: "Contrast of the grain that surfaces without a texture have, standard deviation",
-        unit: "",
-        range: Range::Within(0.0, 1.0),
-        source: "chosen",
-    },
+    GRAIN,
     Key {
         name: "sigma_px",
         what: "Standard deviation claimed for a disparity",

@@ -6,8 +6,8 @@ use std::path::Path;
 use super::FittedStereo;
 use super::statistics::{Disparities, Statistics, true_disparities_px};
 use crate::guide::render::{exposed, look};
-use crate::guide::test_scenes::{coarse, wall_at};
-use crate::guide::{Guide, GuideInput, MatchedStereo};
+use crate::guide::test_scenes::{coarse, depends_on_its_seed_alone, wall_at};
+use crate::guide::{GuideInput, MatchedStereo};
 use crate::scene::{DVec3, Object, Scene, Shape};
 
 const VECTORS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/vectors/stereo/errors.csv");
@@ -204,19 +204,7 @@ fn the_matcher_errs_as_recorded_and_the_drawn_guide_as_the_matcher() {
 
 #[test]
 fn a_thread_more_changes_nothing_and_a_seed_everything() {
-    let scene = coarse(Scene::outdoor());
-    let guide = guide_of((50.0, 1, 0.03));
-    let estimate = |seed| {
-        guide
-            .estimate(&GuideInput::still(&scene, 16, 16, seed))
-            .unwrap()
-    };
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .unwrap();
-    assert_eq!(pool.install(|| estimate(5)), estimate(5));
-    assert_ne!(estimate(5), estimate(6));
+    depends_on_its_seed_alone(&guide_of((50.0, 1, 0.03)));
 }
 
 #[test]

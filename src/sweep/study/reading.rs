@@ -99,7 +99,7 @@ enum Scale {
 }
 
 impl Study {
-    /// The JSON schema of a study file. What may stand in [fixed] and [vary] depends on the scene and its objects, and is left open.
+    /// The JSON schema of a study file. What may stand in `[fixed]` and `[vary]` depends on the scene and its objects, and is left open.
     pub fn schema() -> serde_json::Value {
         let section = Section {
             name: "study",

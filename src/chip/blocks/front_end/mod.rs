@@ -8,7 +8,7 @@
 //! | `coincidence` | pulse shapers, k of n ([`coincidence`], Fig. 22c) | 1 | what does not coincide |
 //!
 //! The chip's own is the first. The others join all SPADs on one wire, whose edges are counted asynchronously in the
-//! figure; here CLK samples them as it does a SPAD of the first ([`summation::retiming`]), so that the METDC can shift
+//! figure; here CLK samples them as it does a SPAD of the first (`summation::retiming`), so that the METDC can shift
 //! what they give, and the correlation block gets one line.
 
 pub mod coincidence;
