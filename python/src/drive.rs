@@ -3,6 +3,7 @@
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use guided_dtof::request::{Spelling, check_drive_times};
 use guided_dtof::system::{
     Drive as Frames, DriveFrame, DriveSettings, FrameClock, Noise, WindowPolicy,
 };
@@ -33,20 +34,8 @@ struct DriveKeys {
 
 impl DriveKeys {
     fn check(&self) -> Result<Noise, Failure> {
-        let Self {
-            guide_latency_ms: ms,
-            start_s,
-            segments,
-            ..
-        } = self;
-        if !(0.0..=1e5).contains(ms) {
-            let message = format!("{ms} is no latency; give milliseconds, 0 to 100000");
-            return Err(Failure::argument("guide_latency_ms", message));
-        }
-        if !(-1e5..=1e5).contains(start_s) {
-            let message = format!("{start_s} is no time; give seconds, -100000 to 100000");
-            return Err(Failure::argument("start_s", message));
-        }
+        let segments = &self.segments;
+        check_drive_times(self.guide_latency_ms, self.start_s, Spelling::Keys)?;
         if !(1..=64).contains(segments) {
             let message = format!("{segments} is impossible; give 1 to 64");
             return Err(Failure::argument("segments", message));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use guided_dtof::guide::{
-    BehaviouralStereo, FileMap, Fused, Guide as Estimates, GuideInput, options,
+    BehaviouralStereo, FileMap, Fused, Guide as Estimates, GuideInput, MOST_GUIDES, options,
 };
 use numpy::{PyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::IntoPyObjectExt;
@@ -14,9 +14,6 @@ use crate::arrays::{map, values};
 use crate::background::run;
 use crate::failure::Failure;
 use crate::scene::Scene;
-
-/// Most guides that are fused.
-const MOST: usize = 8;
 
 /// A map of one's own.
 #[derive(Clone)]
@@ -56,8 +53,8 @@ impl Guide {
     }
 
     fn of(parts: Vec<Part>) -> Result<Self, Failure> {
-        if parts.len() > MOST {
-            let message = format!("{} guides; give 1 to {MOST}", parts.len());
+        if parts.len() > MOST_GUIDES {
+            let message = format!("{} guides; give 1 to {MOST_GUIDES}", parts.len());
             return Err(Failure::argument("guide", message));
         }
         let guides = parts.iter().map(|part| match part {
@@ -160,7 +157,7 @@ impl Guide {
     /// Its estimate for an array of macropixels: distances along the ray, NaN where it has none, and the standard deviation that it
     /// claims for them, infinite there; both m, shape (rows, cols).
     #[pyo3(signature = (scene=None, rows=64, cols=64, seed=1))]
-    #[allow(clippy::type_complexity)]
+    #[expect(clippy::type_complexity, reason = "a pair of maps")]
     fn estimate<'py>(
         &self,
         py: Python<'py>,

@@ -15,6 +15,7 @@ use super::voice::{note, progress, say, tell};
 use crate::engine::Work;
 use crate::files::{InputError, MANIFEST, ResultSet};
 use crate::report::{Cell, DepthMap, NpyStack, Table};
+use crate::request::{Spelling, check_drive_times};
 use crate::system::{
     Drive, DriveFrame, DriveSettings, FrameClock, FrameTimes, NoDepth, Noise, PhaseTimes, Reused,
     Summary, WindowPolicy,
@@ -141,20 +142,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     let request = asked.request();
     let policy = request.policy(policy)?;
     let frame = request.settings_by(sensor, scene, request.guide()?, &policy)?;
-    if !(0.0..=1e5).contains(&args.guide_latency_ms) {
-        let message = format!(
-            "{} is no latency; give milliseconds, 0 to 100000",
-            args.guide_latency_ms
-        );
-        return Err(InputError::new("--guide-latency-ms", message).into());
-    }
-    if !(-1e5..=1e5).contains(&args.start_s) {
-        let message = format!(
-            "{} is no time; give seconds, -100000 to 100000",
-            args.start_s
-        );
-        return Err(InputError::new("--start-s", message).into());
-    }
+    check_drive_times(args.guide_latency_ms, args.start_s, Spelling::Options)?;
     let settings = DriveSettings {
         policy,
         clock: FrameClock {

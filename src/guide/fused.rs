@@ -19,7 +19,7 @@ use super::{Guide, GuideError, GuideInput, GuideMap};
 const AGREE_SIGMAS: f64 = 3.0;
 
 /// Most guides that are fused: all sets of them are tried.
-pub(super) const MOST_GUIDES: usize = 8;
+pub const MOST_GUIDES: usize = 8;
 
 /// Several guides as one.
 #[derive(Debug, Clone)]

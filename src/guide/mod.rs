@@ -34,7 +34,7 @@ use crate::scene::{DVec3, Scene};
 pub use behavioural::BehaviouralStereo;
 pub use fitted::FittedStereo;
 pub use from_file::FileMap;
-pub use fused::Fused;
+pub use fused::{Fused, MOST_GUIDES};
 pub use intensity::IntensityStereo;
 pub use kalman::Kalman;
 pub use map::GuideMap;

@@ -271,6 +271,27 @@ pub fn check_false_alarm_rate(rate: f64, spelling: Spelling) -> Result<(), Input
     Err(InputError::new(spelling.name("false_alarm_rate"), message))
 }
 
+/// Holds a drive's times to what they can be: how late its guide comes, ms, and when it begins, s.
+///
+/// # Errors
+/// When the latency is not 0 to 100 s, or the beginning more than 10⁵ s from the scene's.
+pub fn check_drive_times(
+    guide_latency_ms: f64,
+    start_s: f64,
+    spelling: Spelling,
+) -> Result<(), InputError> {
+    let wrong = |key: &str, message: String| Err(InputError::new(spelling.name(key), message));
+    if !(0.0..=1e5).contains(&guide_latency_ms) {
+        let message = format!("{guide_latency_ms} is no latency; give milliseconds, 0 to 100000");
+        return wrong("guide_latency_ms", message);
+    }
+    if !(-1e5..=1e5).contains(&start_s) {
+        let message = format!("{start_s} is no time; give seconds, -100000 to 100000");
+        return wrong("start_s", message);
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use toml::Table;

@@ -15,7 +15,7 @@ mod spelling;
 mod wording;
 
 pub use self::calibration::read_calibration;
-pub use self::frame::{FRAME_KEYS, FrameRequest, check_false_alarm_rate};
+pub use self::frame::{FRAME_KEYS, FrameRequest, check_drive_times, check_false_alarm_rate};
 pub use self::sources::Sources;
 pub use self::spelling::Spelling;
 pub use self::wording::{exposure, guided_exposure, is_bad_input, of_engine, of_no_aim, sentence};

@@ -1,5 +1,5 @@
 //! Which points a study takes of the space that its keys span: all, or some that fill it evenly. Point `i` is computed from `i`, so that
-//! no list of points is ever held in memory, and shards agree about them without a word.
+//! no list of points is ever held in memory, and shards agree about them.
 //!
 //! | design | point `i` |
 //! |---|---|
@@ -28,7 +28,8 @@ pub enum Design {
 /// Axes that a Sobol' sequence is given for here.
 pub(super) const MOST_SOBOL_AXES: usize = 21;
 
-/// Where point `index` lies on an axis, as a share of the way, from 0 to less than 1: `axis` counts from 0, `of` is the number of points.
+/// Where point `index` of a drawn design, which is no grid, lies on axis number `axis`, both from 0: as a share of the way, from 0 to less
+/// than 1.
 pub(super) fn share(design: Design, seed: u64, axis: usize, index: u64) -> f64 {
     let key = philox_key(seed);
     match design {

@@ -24,7 +24,7 @@
 //! the request, the seed, and the program's version. So whatever is changed in a study, rows that it shares with what was there before
 //! are reused, and no others. The journal is only appended to: a run that is killed loses the points that were being taken.
 //!
-//! Nothing is as long as the study but an index of 16 bytes a row.
+//! What grows with the study is an index, of 16 bytes a row.
 
 mod cell;
 mod design;

@@ -51,7 +51,8 @@ impl Plot {
 /// What has been seen of the columns of a plot.
 pub struct Drawing<'a> {
     plot: &'a Plot,
-    columns: [usize; 3],
+    columns: [usize; 2],
+    series_column: Option<usize>,
     x: Column,
     y: Column,
     is_log: bool,
@@ -143,10 +144,11 @@ impl<'a> Drawing<'a> {
             }
         };
         let (x, y) = (number(&plot.x)?, number(&plot.y)?);
-        let series = plot.series.as_deref().map_or(Ok(usize::MAX), find)?;
+        let series_column = plot.series.as_deref().map(find).transpose()?;
         Ok(Drawing {
             plot,
-            columns: [x, y, series],
+            columns: [x, y],
+            series_column,
             x: columns[x].clone(),
             y: columns[y].clone(),
             is_log: study.is_log(&plot.x),
@@ -156,17 +158,18 @@ impl<'a> Drawing<'a> {
 
     /// Sees a row.
     pub fn see(&mut self, cells: &[Cell]) {
-        let [x, y, series] = self.columns;
+        let [x, y] = self.columns;
         let (Some(x), Some(y)) = (cells[x].number(), cells[y].number()) else {
             return;
         };
         if !(x.is_finite() && y.is_finite()) {
             return;
         }
-        let name = cells.get(series).map_or(String::new(), |cell| match cell {
-            Cell::Number(x) => x.to_string(),
-            other => other.csv(),
-        });
+        let name = match self.series_column.map(|column| &cells[column]) {
+            None => String::new(),
+            Some(Cell::Number(x)) => x.to_string(),
+            Some(other) => other.csv(),
+        };
         if self.series.len() > MOST_SERIES {
             return;
         }

@@ -100,7 +100,8 @@ impl Row {
 #[derive(Debug, Default)]
 pub(super) struct Index {
     paths: Vec<PathBuf>,
-    /// First half of the key, number of the journal and where in it the line begins; sorted.
+    /// First half of the key, number of the journal and where in it the line begins; sorted. Of two keys that share that half, one is
+    /// not found: among 10⁸ points there is such a pair with a chance of 3·10⁻⁴.
     places: Vec<(u64, u64)>,
     /// Lines with a wrong checksum, which are of no use.
     pub(super) spoilt: usize,

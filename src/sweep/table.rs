@@ -20,7 +20,7 @@ const CHUNK: u64 = 4096;
 pub const CSV: &str = "results.csv";
 /// The table, as Parquet.
 pub const PARQUET: &str = "results.parquet";
-/// What each frame took.
+/// Run time of each frame as it was taken, s, as CSV: apart from the results, which are the same on any machine.
 pub const TIMES: &str = "times.csv";
 
 /// The columns of a study's table.
@@ -63,11 +63,10 @@ impl<'a> Results<'a> {
         self.each(|_, _| Ok(()), Path::new(""))
     }
 
-    /// Tells `found` of every point's row, in order: its number, the cells of [`columns`], and what it took. Returns how many points have
-    /// no row.
+    /// Tells `found` of every point's row, in order: the cells of [`columns`], and its run time, s. Returns how many points have no row.
     ///
     /// # Errors
-    /// When a journal cannot be read, and those of `found`.
+    /// When a journal cannot be read, and those of `found`, as ones of writing to `out`.
     pub fn each(
         &self,
         mut found: impl FnMut(Vec<Cell>, f64) -> io::Result<()>,

@@ -7,7 +7,7 @@
 use toml::Value;
 
 use super::cell::{Cell, Column, Holds};
-use crate::chip::SensorConfig;
+use crate::chip::{SensorConfig, Tdc};
 use crate::photon::PhotonBudget;
 use crate::scene::Scene;
 use crate::settings::{Key, Range};
@@ -99,7 +99,10 @@ pub(super) struct Rig {
     budget: PhotonBudget,
     dark_count_hz: f64,
     pulse_sigma_ns: f64,
-    clk_hz: f64,
+    /// A bin's length, s: a CLK period, or a delay line's element on average.
+    bin_s: f64,
+    /// From one start value's window to the next, s.
+    step_s: f64,
     bins: usize,
     counter_bits: usize,
     illuminance_klux: f64,
@@ -107,11 +110,16 @@ pub(super) struct Rig {
 
 impl Rig {
     pub(super) fn new(sensor: &SensorConfig, scene: &Scene) -> Self {
+        let clk_s = 1.0 / sensor.clk_hz;
         Rig {
             budget: scene.photon_budget(sensor.rows as u32, sensor.cols as u32),
             dark_count_hz: scene.lidar.dark_count_hz,
             pulse_sigma_ns: scene.pulse_sigma().as_s() * 1e9,
-            clk_hz: sensor.clk_hz,
+            bin_s: match sensor.tdc {
+                Tdc::Clocked => clk_s,
+                Tdc::DelayLine => sensor.delay_element().as_s(),
+            },
+            step_s: sensor.step_periods as f64 * clk_s,
             bins: sensor.bins,
             counter_bits: sensor.counter_bits,
             illuminance_klux: scene.light.illuminance_klux,
@@ -181,7 +189,7 @@ impl Wall {
     /// takes an integral, detection and the search for laser cycles a sum.
     pub(super) fn results(&self, last: &mut Last) -> Vec<Cell> {
         let Wall { rig, .. } = self;
-        let (bin_s, cycles) = (1.0 / rig.clk_hz, self.laser_cycles as f64);
+        let (bin_s, cycles) = (rig.bin_s, self.laser_cycles as f64);
         let background_hz = (rig.budget).background_hz(self.reflectivity, rig.illuminance_klux);
         let light = PerCycle {
             signal: rig.budget.signal_per_pulse(self.range_m, self.reflectivity),
@@ -229,9 +237,9 @@ impl Wall {
         let thompson_ns = thompson(bin_s * 1e9, rig.pulse_sigma_ns, background, signal);
         // No light, no precision.
         let precision = |m: f64| (light.signal > 0.0).then_some(m);
-        let bin_m = 0.5 * bin_s * SPEED_OF_LIGHT_M_PER_S;
+        let [bin_m, step_m] = [bin_s, rig.step_s].map(|s| 0.5 * s * SPEED_OF_LIGHT_M_PER_S);
         let window_m = rig.bins as f64 * bin_m;
-        let in_window = share_inside(self.guide_sigma_m, window_m, bin_m);
+        let in_window = share_inside(self.guide_sigma_m, window_m, step_m);
         [
             Some(light.signal),
             Some(light.background),
@@ -242,7 +250,7 @@ impl Wall {
             needed,
             Some(bin_m),
             Some(window_m),
-            Some((rig.counter_bits as f64).exp2() * bin_m),
+            Some((rig.counter_bits as f64).exp2() * step_m),
             Some(in_window),
             Some(in_window * detection.probability),
         ]
@@ -254,6 +262,7 @@ impl Wall {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chip::{hslidar, hslidar_delay_line};
 
     #[test]
     fn every_key_is_taken_and_every_result_has_its_column() {
@@ -303,6 +312,24 @@ mod tests {
             .position(|c| c.name == "p_detection")
             .unwrap();
         assert!(longer.results(&mut Last::default())[at].number().unwrap() >= 0.99);
+    }
+
+    /// 200 MHz and steps of four periods; elements of 2.6 ns and steps of 12.5 ns (thesis Tables 11 and 14); both of 7 bits.
+    #[test]
+    fn bins_and_steps_are_those_of_the_sensor() {
+        let scene = Scene::outdoor();
+        for (sensor, bin_ns, step_ns) in [(hslidar(), 5.0, 20.0), (hslidar_delay_line(), 2.6, 12.5)]
+        {
+            let results = Wall::new(Rig::new(&sensor, &scene)).results(&mut Last::default());
+            let of = |name: &str| {
+                let at = columns().iter().position(|c| c.name == name).unwrap();
+                results[at].number().unwrap()
+            };
+            let metres = |ns: f64| 0.5e-9 * ns * SPEED_OF_LIGHT_M_PER_S;
+            assert!((of("bin_m") - metres(bin_ns)).abs() < 1e-9);
+            assert!((of("window_m") - metres(8.0 * bin_ns)).abs() < 1e-9);
+            assert!((of("reach_m") - metres(128.0 * step_ns)).abs() < 1e-9);
+        }
     }
 
     #[test]

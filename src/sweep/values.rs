@@ -3,6 +3,7 @@
 use toml::Value;
 
 use super::cell::{Cell, Column};
+
 /// Values of one key.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Values {

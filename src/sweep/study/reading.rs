@@ -204,79 +204,11 @@ impl Study {
                 Err(message) => fault(&path, message),
             }
         });
-        let groups = match zipped {
-            None => &Vec::new(),
-            Some(Value::Array(groups)) => groups,
-            Some(_) => {
-                fault(
-                    "vary.zip",
-                    "zip is no list; write each group as a section [[vary.zip]]".into(),
-                );
-                &Vec::new()
-            }
-        };
-        for (index, group) in groups.iter().enumerate() {
-            let place = format!("vary.zip.{index}");
-            let Value::Table(group) = group else {
-                fault(
-                    &place,
-                    "this must be a section; write [[vary.zip]], and its keys below".into(),
-                );
-                continue;
-            };
-            let mut members = Vec::new();
-            flatten(
-                "",
-                group,
-                &mut |name, value| match varied(head.kind, name, value) {
-                    Ok(varied) => members.push((document.line(&format!("{place}.{name}")), varied)),
-                    Err(message) => fault(&format!("{place}.{name}"), message),
-                },
-            );
-            members.sort_by_key(|(line, _)| *line);
-            let members: Vec<Varied> = members.into_iter().map(|(_, varied)| varied).collect();
-            let Some(first) = members.first() else {
-                continue;
-            };
-            if let Some(other) = members.iter().find(|other| other.len() != first.len()) {
-                let count = |varied: &Varied| match varied.len() {
-                    Some(n) => format!("{} has {n} values", varied.name),
-                    None => format!("{} has no steps", varied.name),
-                };
-                fault(
-                    &place,
-                    format!(
-                        "{} and {}; give as many of each",
-                        count(first),
-                        count(other)
-                    ),
-                );
-                continue;
-            }
-            axes.push((document.line(&place), Axis(members)));
-        }
+        axes.extend(zipped_axes(&document, head.kind, zipped, &mut fault));
         axes.sort_by_key(|(line, _)| *line);
         let axes: Vec<Axis> = axes.into_iter().map(|(_, axis)| axis).collect();
 
-        let names: Vec<&str> = axes
-            .iter()
-            .flat_map(|a| &a.0)
-            .map(|v| v.name.as_str())
-            .collect();
-        for (index, name) in names.iter().enumerate() {
-            if names[..index].contains(name) {
-                fault(
-                    &format!("vary.{name}"),
-                    format!("{name} varies twice; leave one out"),
-                );
-            }
-            if assignments.iter().any(|(fixed, _)| fixed == name) {
-                fault(
-                    &format!("fixed.{name}"),
-                    format!("{name} is fixed and varies, too; leave one out"),
-                );
-            }
-        }
+        check_once(&assignments, &axes, &mut fault);
         let design = design_of(&head, &axes, &mut fault);
         if head.kind == Kind::Theory && head.replicas > 1 {
             fault(
@@ -320,6 +252,96 @@ impl Study {
     }
 }
 
+/// The axes of `[[vary.zip]]`, each with the line that it begins at.
+fn zipped_axes(
+    document: &Document,
+    kind: Kind,
+    zipped: Option<&Value>,
+    fault: &mut impl FnMut(&str, String),
+) -> Vec<(Option<usize>, Axis)> {
+    let mut axes = Vec::new();
+    let groups = match zipped {
+        None => &Vec::new(),
+        Some(Value::Array(groups)) => groups,
+        Some(_) => {
+            fault(
+                "vary.zip",
+                "zip is no list; write each group as a section [[vary.zip]]".into(),
+            );
+            &Vec::new()
+        }
+    };
+    for (index, group) in groups.iter().enumerate() {
+        let place = format!("vary.zip.{index}");
+        let Value::Table(group) = group else {
+            fault(
+                &place,
+                "this must be a section; write [[vary.zip]], and its keys below".into(),
+            );
+            continue;
+        };
+        let mut members = Vec::new();
+        flatten(
+            "",
+            group,
+            &mut |name, value| match varied(kind, name, value) {
+                Ok(varied) => members.push((document.line(&format!("{place}.{name}")), varied)),
+                Err(message) => fault(&format!("{place}.{name}"), message),
+            },
+        );
+        members.sort_by_key(|(line, _)| *line);
+        let members: Vec<Varied> = members.into_iter().map(|(_, varied)| varied).collect();
+        let Some(first) = members.first() else {
+            continue;
+        };
+        if let Some(other) = members.iter().find(|other| other.len() != first.len()) {
+            let count = |varied: &Varied| match varied.len() {
+                Some(n) => format!("{} has {n} values", varied.name),
+                None => format!("{} has no steps", varied.name),
+            };
+            fault(
+                &place,
+                format!(
+                    "{} and {}; give as many of each",
+                    count(first),
+                    count(other)
+                ),
+            );
+            continue;
+        }
+        axes.push((document.line(&place), Axis(members)));
+    }
+    axes
+}
+
+/// Complains of keys that have values in two places.
+fn check_once(
+    assignments: &[(String, Value)],
+    axes: &[Axis],
+    fault: &mut impl FnMut(&str, String),
+) {
+    let names: Vec<&str> = axes
+        .iter()
+        .flat_map(|a| &a.0)
+        .map(|v| v.name.as_str())
+        .collect();
+    for (index, name) in names.iter().enumerate() {
+        if names[..index].contains(name) {
+            fault(
+                &format!("vary.{name}"),
+                format!("{name} varies twice; leave one out"),
+            );
+        }
+        if assignments.iter().any(|(fixed, _)| fixed == name) {
+            fault(
+                &format!("fixed.{name}"),
+                format!("{name} is fixed and varies, too; leave one out"),
+            );
+        }
+    }
+}
+
+/// Which points are taken; a grid where that is at fault.
 fn design_of(head: &Head, axes: &[Axis], fault: &mut impl FnMut(&str, String)) -> Design {
     let drawn = match (head.design.as_str(), head.points) {
         ("grid", None) => {
