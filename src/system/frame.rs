@@ -110,11 +110,6 @@ pub fn take_guided_frame<A: Answer>(
     let truth = truth_in(sensor, exposure, scene);
     times.scene_s = clock.lap();
 
-    let starts = starts_of(sensor, wanted);
-    let load = load_starts(sensor, &load::load_netlist(sensor), &starts)?;
-    times.load_s = clock.lap();
-    go_on(exposed(0))?;
-
     let stream = photon_stream(sensor, exposure, *seed, scene);
     let light = light_in(exposure, scene, &truth, &stream);
     let pixels = lit(sensor, wanted, &light);
@@ -126,7 +121,7 @@ pub fn take_guided_frame<A: Answer>(
         .sum();
     times.light_s = clock.lap();
 
-    // A probe keeps one processor busy about as long as the engine and the ranging keep the others.
+    // A probe keeps one processor busy about as long as load, engine and ranging keep the others.
     let probes = probes(guide);
     let done = exposed;
     let by_gates = || {
@@ -137,6 +132,12 @@ pub fn take_guided_frame<A: Answer>(
         };
         let probed = probes.par_iter().map(run);
         (probed.collect::<Result<Vec<_>, _>>(), clock.lap())
+    };
+    let by_load_path = || {
+        let mut clock = Stopwatch::new();
+        let starts = starts_of(sensor, wanted);
+        let load = load_starts(sensor, &load::load_netlist(sensor), &starts);
+        (load, clock.lap())
     };
     let by_engine = || {
         let mut clock = Stopwatch::new();
@@ -165,7 +166,11 @@ pub fn take_guided_frame<A: Answer>(
         let ranged = (depths, ranger.bin_s(), remark);
         Ok::<_, FrameError>((exposed, kept, ranged, [exposure_s, clock.lap()]))
     };
-    let ((probed, probes_s), exposed) = rayon::join(by_gates, by_engine);
+    let loaded_and_exposed = || rayon::join(by_load_path, by_engine);
+    let ((probed, probes_s), ((load, load_s), exposed)) =
+        rayon::join(by_gates, loaded_and_exposed);
+    let load = load?;
+    times.load_s = load_s;
     let (exposed, kept, (depths, bin_s, remark), took_s) = exposed?;
     [times.exposure_s, times.ranging_s] = took_s;
     times.probes_s = probes_s;

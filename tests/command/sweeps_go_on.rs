@@ -335,27 +335,3 @@ fn the_example_studies_run() {
     }
     assert_eq!(studies, 4);
 }
-
-/// By a reader that is not ours.
-#[test]
-fn parquet_reads_back_in_pyarrow() {
-    let dir = tempfile::tempdir().unwrap();
-    let here = dir.path();
-    // More rows than a group has.
-    let study = "[study]\nkind = \"theory\"\n[vary]\ntheory.model = [\"bernoulli\", \"poisson\"]\n\
-        theory.guide_sigma_m = { from = 0.1, to = 9, steps = 36000 }\n[fixed]\ntheory.reflectivity = 0\n";
-    fs::write(here.join("study.toml"), study).unwrap();
-    done(here, 2, &["study.toml", "--out", "out"]);
-    let script = "\
-import csv, math, pyarrow.parquet as pq
-t = pq.read_table('out/results.parquet')
-rows = list(csv.reader(open('out/results.csv')))
-assert t.column_names == rows[0], t.column_names
-assert t.num_rows == len(rows) - 1 == 72000, t.num_rows
-assert pq.ParquetFile('out/results.parquet').num_row_groups == 2
-for name, cells in zip(rows[0], zip(*rows[1:])):
-    for a, b in zip(t[name].to_pylist(), cells):
-        assert ('' if a is None else a) == ('' if b == '' else type(a)(b)), (name, a, b)
-";
-    python(here, &["pyarrow.parquet"], script);
-}

@@ -11,22 +11,17 @@ pub fn gdtof_words(folder: &Path, arguments: &str) -> Output {
     gdtof(folder, &arguments)
 }
 
-/// Runs a script that must succeed, unless a package that it needs is missing.
-pub fn python(folder: &Path, packages: &[&str], script: &str) {
-    for package in packages {
-        let found = Command::new("python3")
-            .args(["-c", &format!("import {package}")])
-            .output();
-        if !found.is_ok_and(|output| output.status.success()) {
-            eprintln!("SKIPPED: no {package} to read files with; pip install {package}");
-            return;
-        }
-    }
+/// Runs a script that needs no package and must succeed. Skipped, loudly, where there is no Python.
+pub fn python(folder: &Path, script: &str) {
     let read = Command::new("python3")
         .args(["-c", script])
         .current_dir(folder)
-        .output()
-        .unwrap();
+        .output();
+    let Ok(read) = read else {
+        assert!(std::env::var_os("CI").is_none(), "no python3");
+        eprintln!("SKIPPED: no python3 to read files with");
+        return;
+    };
     assert!(
         read.status.success(),
         "{}",
