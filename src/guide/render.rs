@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::right_camera::RightCamera;
 use crate::photon::{Purpose, normal, random_stream};
-use crate::scene::{PinholeCamera, Ray, SKY_REFLECTIVITY, Scene};
+use crate::scene::{Bounds, PinholeCamera, Ray, SKY_REFLECTIVITY, Scene};
 use crate::settings::{Key, Range};
 use crate::stereo::GreyImage;
 
@@ -48,6 +48,9 @@ const LONGEST_EXPOSURE_S: f64 = 1.0 / 226.0;
 const EXPOSED_TO: f64 = 0.8;
 
 const BITS: u32 = 12;
+
+/// Pixels of a row that are tried on the same objects. Chosen.
+const TOGETHER: usize = 32;
 
 /// Grain of surfaces in pictures that are for people.
 const GRAIN_OF_VIEWS: f64 = 0.05;
@@ -121,26 +124,30 @@ fn radiances(
         .objects
         .iter()
         .any(|o| o.transmittance > 0.0 || o.mirror > 0.0);
-    let rows = (0..crop.height as usize).into_par_iter();
+    let (width, height) = (crop.width as usize, crop.height as usize);
+    let bounds = Bounds::of(scene, ray(crop.middle(0, 0)).origin);
+    let radiance = |ray: &Ray, candidates: &_| match has_panes {
+        false => match scene.hit_of(ray, candidates) {
+            Some(hit) => surface(scene, ray, &hit, grain, pixel_rad),
+            None => SKY_REFLECTIVITY,
+        },
+        true => {
+            let returns = scene.returns_of(ray, candidates);
+            let surfaces = returns.surfaces.iter();
+            let seen =
+                surfaces.map(|r| r.share_back * surface(scene, ray, &r.hit, grain, pixel_rad));
+            seen.sum::<f64>() + returns.sky_share * SKY_REFLECTIVITY
+        }
+    };
+    let rows = (0..height).into_par_iter();
     rows.flat_map_iter(|row| {
-        let ray = &ray;
-        (0..crop.width as usize).map(move |col| {
-            let ray = ray(crop.middle(row, col));
-            let radiance = match has_panes {
-                false => match scene.hit(&ray) {
-                    Some(hit) => surface(scene, &ray, &hit, grain, pixel_rad),
-                    None => SKY_REFLECTIVITY,
-                },
-                true => {
-                    let returns = scene.returns(&ray);
-                    let surfaces = returns
-                        .surfaces
-                        .iter()
-                        .map(|r| r.share_back * surface(scene, &ray, &r.hit, grain, pixel_rad));
-                    surfaces.sum::<f64>() + returns.sky_share * SKY_REFLECTIVITY
-                }
-            };
-            radiance as f32
+        let (ray, bounds, radiance) = (&ray, &bounds, &radiance);
+        (0..width).step_by(TOGETHER).flat_map(move |first| {
+            let cols = first..width.min(first + TOGETHER);
+            let rays: Vec<Ray> = cols.map(|col| ray(crop.middle(row, col))).collect();
+            let candidates = bounds.of_rays(&rays);
+            rays.into_iter()
+                .map(move |ray| radiance(&ray, &candidates) as f32)
         })
     })
     .collect()

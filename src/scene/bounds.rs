@@ -1,4 +1,4 @@
-//! Which objects the rays of a macropixel may meet at all.
+//! Which objects the rays of a macropixel, or of some pixels of a camera, may meet at all.
 //!
 //! ```text
 //!                 ·  ray  ╭───╮ ball around an object
@@ -6,33 +6,35 @@
 //!            α    ·       ╰───╯  β      is at most α + β
 //! ```
 //!
-//! Every ray is tried on every object otherwise, 16 to 64 rays a macropixel. What a ray meets is the same: an object that is left out
-//! meets none of them. Rays that a mirror throws elsewhere are tried on all.
+//! Every ray is tried on every object otherwise, 16 to 64 rays a macropixel and one a pixel of a camera. What a ray meets is the same: an
+//! object that is left out meets none of them. Rays that a mirror throws elsewhere are tried on all.
 
 use glam::DVec3;
 use smallvec::SmallVec;
 
 use super::settings::Scene;
+use super::vector::Ray;
 
-/// Objects that the rays of a macropixel may meet, by their index, rising.
-pub(super) type Candidates = SmallVec<[u32; 16]>;
+/// Objects that some rays may meet, by their index, rising.
+pub(crate) type Candidates = SmallVec<[u32; 16]>;
 
 /// Room for rounding, rad.
 const ROOM_RAD: f64 = 1e-6;
 
-/// Balls around the objects of a scene, as the lidar sees them.
+/// Balls around the objects of a scene, as they are seen from one place.
 #[derive(Debug)]
-pub(super) struct Bounds {
-    /// Direction of the middle and half the angle that a ball fills, rad; `None` for an object that is everywhere or about the lidar.
+pub(crate) struct Bounds {
+    /// Direction of the middle and half the angle that a ball fills, rad; `None` for an object that is everywhere or about the place.
     balls: Vec<Option<(DVec3, f64)>>,
 }
 
 impl Bounds {
-    /// Those of a scene.
-    pub(super) fn of(scene: &Scene) -> Self {
+    /// Those of a scene, from `place_m`; the lidar is at zero.
+    pub(crate) fn of(scene: &Scene, place_m: DVec3) -> Self {
         let ball = |(centre_m, radius_m): (DVec3, f64)| {
-            let away_m = centre_m.length();
-            (away_m > radius_m).then(|| (centre_m / away_m, (radius_m / away_m).asin()))
+            let offset_m = centre_m - place_m;
+            let away_m = offset_m.length();
+            (away_m > radius_m).then(|| (offset_m / away_m, (radius_m / away_m).asin()))
         };
         let objects = scene.objects.iter();
         Bounds {
@@ -42,7 +44,16 @@ impl Bounds {
         }
     }
 
-    /// Objects that rays from the lidar may meet which are at most `half_rad` away from the direction `middle`, a unit vector.
+    /// Objects that `rays` from the place may meet; none of them may look backwards from another.
+    pub(crate) fn of_rays(&self, rays: &[Ray]) -> Candidates {
+        let sum: DVec3 = rays.iter().map(|ray| ray.direction).sum();
+        let middle = sum.normalize();
+        let least = rays.iter().map(|ray| ray.direction.dot(middle));
+        let half_rad = least.fold(1.0, f64::min).acos();
+        self.about(middle, half_rad)
+    }
+
+    /// Objects that rays from the place may meet which are at most `half_rad` away from the direction `middle`, a unit vector.
     pub(super) fn about(&self, middle: DVec3, half_rad: f64) -> Candidates {
         let may_meet = |ball: &Option<(DVec3, f64)>| {
             ball.is_none_or(|(towards, fills_rad)| {
@@ -60,7 +71,7 @@ impl Bounds {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{GroundTruth, Object, Ray, Shape};
+    use crate::scene::{GroundTruth, Object, Shape};
     use proptest::prelude::*;
 
     fn point(within_m: f64) -> impl Strategy<Value = DVec3> {
@@ -109,6 +120,23 @@ mod tests {
     }
 
     proptest! {
+        /// Rays from anywhere, in groups.
+        #[test]
+        fn rays_from_elsewhere_meet_what_they_may_meet(
+            shapes in prop::collection::vec(shapes(), 1..8),
+            place_m in point(3.0),
+            towards in point(1.0).prop_filter("a direction", |towards| towards.length() > 0.1),
+            spread in prop::collection::vec(point(0.05), 1..40),
+        ) {
+            let mut scene = Scene::outdoor();
+            scene.objects = shapes.into_iter().map(|shape| Object::new("it", 0.3, shape)).collect();
+            let rays: Vec<Ray> = spread.iter().map(|beside| Ray::new(place_m, towards + *beside)).collect();
+            let candidates = Bounds::of(&scene, place_m).of_rays(&rays);
+            for ray in &rays {
+                prop_assert_eq!(scene.hit(ray), scene.hit_of(ray, &candidates));
+            }
+        }
+
         /// Every macropixel, through panes and over mirrors.
         #[test]
         fn rays_return_the_same_from_the_objects_they_may_meet(
@@ -125,7 +153,7 @@ mod tests {
                     object
                 })
                 .collect();
-            let bounds = Bounds::of(&scene);
+            let bounds = Bounds::of(&scene, DVec3::ZERO);
             let camera = scene.lidar_camera(6, 5);
             for (row, col) in (0..6).flat_map(|row| (0..5).map(move |col| (row, col))) {
                 let at = |du: f64, dv: f64| {
@@ -149,7 +177,7 @@ mod tests {
         let scene = Scene::outdoor();
         let truth = GroundTruth::render(&scene, 64, 64);
         let camera = scene.lidar_camera(64, 64);
-        let bounds = Bounds::of(&scene);
+        let bounds = Bounds::of(&scene, DVec3::ZERO);
         let mut tried = 0;
         for pixel in 0..64 * 64u32 {
             let (row, col) = (f64::from(pixel / 64), f64::from(pixel % 64));

@@ -58,14 +58,24 @@ impl Scene {
     /// The nearest opaque surface along `ray`, as if panes were not there; `None` for the sky. Of two in the same place
     /// the one listed first in the scene counts.
     pub fn hit(&self, ray: &Ray) -> Option<Hit> {
-        self.nearest(ray, self.all().filter(|&n| !self.objects[n].is_pane()))
+        self.nearest(ray, self.opaque(self.all()))
+    }
+
+    /// The same, where the ray meets no others than the `candidates`.
+    pub(crate) fn hit_of(&self, ray: &Ray, candidates: &Candidates) -> Option<Hit> {
+        self.nearest(ray, self.opaque(candidates.iter().map(|&n| n as usize)))
     }
 
     /// How far it is to that surface, m, without what is there.
     pub(crate) fn range_to_hit(&self, ray: &Ray) -> Option<f64> {
-        let opaque = self.all().filter(|&n| !self.objects[n].is_pane());
-        let (meeting, _) = self.first_meeting(ray, opaque)?;
+        let (meeting, _) = self.first_meeting(ray, self.opaque(self.all()))?;
         Some(meeting.range_m)
+    }
+
+    /// Whether there is such a surface at all.
+    pub(super) fn is_blocked(&self, ray: &Ray) -> bool {
+        let mut opaque = self.opaque(self.all());
+        opaque.any(|n| self.objects[n].shape.meet(ray).is_some())
     }
 
     /// All that sends light back along `ray`: panes themselves, what stands behind them, and what they mirror.
@@ -77,7 +87,7 @@ impl Scene {
     }
 
     /// The same, where the ray meets no others than the `candidates`.
-    pub(super) fn returns_of(&self, ray: &Ray, candidates: &Candidates) -> Returns {
+    pub(crate) fn returns_of(&self, ray: &Ray, candidates: &Candidates) -> Returns {
         self.followed(ray, Some(candidates))
     }
 
@@ -142,6 +152,11 @@ impl Scene {
 
     fn all(&self) -> Range<usize> {
         0..self.objects.len()
+    }
+
+    /// Without panes.
+    fn opaque(&self, objects: impl Iterator<Item = usize>) -> impl Iterator<Item = usize> {
+        objects.filter(|&n| !self.objects[n].is_pane())
     }
 
     /// Where `ray` meets the first of some objects, and which that is.

@@ -32,11 +32,10 @@ impl Scene {
             return from_sky;
         }
         let upwards = Ray::new(point + normal * ABOVE_M, sun);
-        let is_lit = self.hit(&upwards).is_none();
-        let from_sun = if is_lit {
-            (1.0 - self.light.sky_share) * incidence
-        } else {
+        let from_sun = if self.is_blocked(&upwards) {
             0.0
+        } else {
+            (1.0 - self.light.sky_share) * incidence
         };
         from_sky + from_sun
     }

@@ -26,6 +26,7 @@ mod texture;
 mod truth;
 mod vector;
 
+pub(crate) use bounds::Bounds;
 pub use camera::PinholeCamera;
 pub use cast::{Hit, Return, Returns};
 pub use curve::{Curve, CurveError, Measured};

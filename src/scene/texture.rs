@@ -9,13 +9,18 @@
 //! grey at 940 nm.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use crate::files::{InputError, Raster};
 
 /// Sizes of the clouds of noise: from `size_m` to a 32nd of it, so that a texture of half a metre has details of
 /// 16 mm, a pixel of the thesis's cameras at 55 m.
 const OCTAVES: u32 = 6;
+
+/// How strong the clouds of each size are: fine ones as coarse ones up to a half, because matchers live on them.
+static STRENGTHS: LazyLock<[f64; OCTAVES as usize]> = LazyLock::new(|| {
+    std::array::from_fn(|octave| 0.5f64.powf(octave as f64 / f64::from(OCTAVES - 1)))
+});
 
 /// A pattern of an object's material and a second one.
 #[derive(Debug, Clone, PartialEq)]
@@ -132,12 +137,10 @@ impl Texture {
 /// Clouds about 1/2, from 0 to 1: values at the corners of a lattice, smoothly between them, over lattices that halve.
 fn noise((u, v): (f64, f64), seed: u32) -> f64 {
     let (mut sum, mut squares) = (0.0, 0.0);
-    for octave in 0..OCTAVES {
+    for (octave, &strength) in (0..OCTAVES).zip(&*STRENGTHS) {
         let finer = f64::from(1 << octave);
         // Every lattice is shifted, so that no point is a corner of all of them.
         let shift = 0.37 * f64::from(octave);
-        // Fine clouds are as strong as coarse ones up to a half: matchers live on them.
-        let strength = 0.5f64.powf(f64::from(octave) / f64::from(OCTAVES - 1));
         let corner = |x: f64, y: f64| corner(x as i64, y as i64, octave, seed);
         let (x, y) = (u * finer + shift, v * finer + shift);
         let (left, top) = (x.floor(), y.floor());

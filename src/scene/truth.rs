@@ -95,7 +95,7 @@ impl GroundTruth {
     /// Looks out of every macropixel of a `rows` × `cols` array.
     pub fn render(scene: &Scene, rows: u32, cols: u32) -> Self {
         let camera = scene.lidar_camera(rows, cols);
-        let bounds = Bounds::of(scene);
+        let bounds = Bounds::of(scene, DVec3::ZERO);
         let views: Vec<View> = (0..rows * cols)
             .into_par_iter()
             .map(|pixel| View::of(scene, &bounds, &camera, (pixel / cols, pixel % cols)))

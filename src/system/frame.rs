@@ -167,8 +167,7 @@ pub fn take_guided_frame<A: Answer>(
         Ok::<_, FrameError>((exposed, kept, ranged, [exposure_s, clock.lap()]))
     };
     let loaded_and_exposed = || rayon::join(by_load_path, by_engine);
-    let ((probed, probes_s), ((load, load_s), exposed)) =
-        rayon::join(by_gates, loaded_and_exposed);
+    let ((probed, probes_s), ((load, load_s), exposed)) = rayon::join(by_gates, loaded_and_exposed);
     let load = load?;
     times.load_s = load_s;
     let (exposed, kept, (depths, bin_s, remark), took_s) = exposed?;

@@ -5,8 +5,6 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use super::tools::python;
-
 /// Far longer than any of this takes on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
 
