@@ -127,8 +127,7 @@ impl DelaySet {
     }
 }
 
-/// Pins of a flip-flop's data and clock.
-pub(super) const DATA: usize = 0;
+/// Pin of a flip-flop's clock.
 pub(super) const CLOCK: usize = 1;
 
 /// What hangs on each net. A flip-flop's D means nothing until it is sampled: it is in no list.
@@ -207,11 +206,6 @@ impl Loads {
         self.start[net] as usize..self.start[net + 1] as usize
     }
 
-    /// How many there are.
-    pub(super) fn len(&self) -> usize {
-        self.loads.len()
-    }
-
     /// The load at a place.
     #[inline]
     pub(super) fn at(&self, place: usize) -> Load {
@@ -238,7 +232,7 @@ pub(super) fn initial_cells(netlist: &Netlist, timing: &Timing) -> Vec<CellState
                 kind: cell.kind,
                 state: Logic::X.bits(),
                 is_dirty: false,
-                data: cell.inputs[DATA].index() as u32,
+                data: cell.inputs[0].index() as u32,
                 clock: cell.inputs[CLOCK].index() as u32,
                 delays: timing.set_of(index),
                 outputs: cell.outputs.map(|n| {

@@ -21,7 +21,6 @@
 //! their memory), nor hashes, nor touches a string.
 
 mod activity;
-mod candidates;
 mod check_banks;
 mod check_judge;
 mod check_report;

@@ -1,9 +1,9 @@
 //! The event loop.
 
 mod banks;
-mod shuffle;
 
-use super::candidates::Candidates;
+use rand_philox::splitmix64;
+
 use super::compiled::{CLOCK, CellState, DelaySet, FanOut, Tables, initial_cells};
 use super::observer::Observer;
 use super::shift_banks::ShiftBank;
@@ -13,7 +13,6 @@ use super::wheel::{Event, TimeWheel};
 use crate::logic::Logic;
 use crate::netlist::{NetId, Netlist, Timing};
 use crate::units::Time;
-use shuffle::Shuffle;
 
 /// No value is pending on a net.
 const NONE: u8 = 4;
@@ -59,8 +58,6 @@ pub struct Kernel {
     nets: Vec<NetState>,
     cells: Vec<CellState>,
     fan_out: FanOut,
-    /// By place among the clocks of `fan_out`.
-    candidates: Candidates,
     tables: Tables,
     delays: Vec<DelaySet>,
     wheel: TimeWheel,
@@ -100,14 +97,12 @@ impl Kernel {
         for net in transport.nets() {
             nets[net].pending = QUEUED;
         }
-        let fan_out = FanOut::new(netlist, &apart);
         Kernel {
             now_fs: 0,
             nets,
             cells: initial_cells(netlist, timing),
             delays: DelaySet::all(timing),
-            candidates: Candidates::new(netlist, &fan_out.clocks, &banks),
-            fan_out,
+            fan_out: FanOut::new(netlist, &apart),
             tables: Tables::new(),
             wheel: TimeWheel::new(),
             dirty: Vec::new(),
@@ -126,7 +121,10 @@ impl Kernel {
     pub fn shuffled(mut self, seed: u64) -> Self {
         // Flip-flop by flip-flop: the obvious way, to compare with.
         self.forms_banks = false;
-        self.shuffle = Some(Shuffle::new(seed));
+        self.shuffle = Some(Shuffle {
+            state: seed,
+            events: Vec::new(),
+        });
         self
     }
 
@@ -187,16 +185,16 @@ impl Kernel {
         self.wheel.advance(self.now_fs);
     }
 
-    /// Makes the state of flip-flop `index` unknown, as far as its reset and set leave it open; its outputs
+    /// Makes the state of flip-flop `cell` unknown, as far as its reset and set leave it open; its outputs
     /// follow one clock-to-output delay from now.
     ///
     /// # Panics
     /// When there is no such cell.
     #[cold]
     #[inline(never)]
-    pub fn corrupt(&mut self, index: usize) {
-        self.dissolve_bank_of(index);
-        let cell = &mut self.cells[index];
+    pub fn corrupt(&mut self, cell: usize) {
+        self.dissolve_bank_of(cell);
+        let cell = &mut self.cells[cell];
         debug_assert!(cell.kind.is_flip_flop(), "only a flip-flop has a state");
         // No pin changes: what is left is what reset and set make of an unknown state.
         let unknown = Logic::X.bits();
@@ -206,7 +204,6 @@ impl Kernel {
             return;
         }
         cell.state = state;
-        self.candidates.cell_changes(index);
         let (outputs, set) = (cell.outputs, cell.delays as usize);
         let inverted = Logic::from_bits(state).inverted().bits();
         let delays = *self.delays[set].after_pin(CLOCK);
@@ -232,7 +229,6 @@ impl Kernel {
         let mut changes: Vec<(u32, u8)> = Vec::new();
         for (cell, state) in states {
             self.dissolve_bank_of(cell);
-            self.candidates.cell_changes(cell);
             let cell = &mut self.cells[cell];
             debug_assert!(cell.kind.is_flip_flop(), "only a flip-flop has a state");
             let state = Logic::from(state);
@@ -249,7 +245,6 @@ impl Kernel {
             }
             state.value = value;
             state.clock_before = value;
-            self.candidates.data_changes(net as usize);
             let (net, value) = (NetId::new(net as usize), Logic::from_bits(value));
             observer.change(Time::from_fs(self.now_fs), net, value);
             for &load in self.fan_out.active.of(net.index()) {
@@ -330,7 +325,6 @@ impl Kernel {
     fn apply<O: Observer>(&mut self, net: usize, value: u8, observer: &mut O) {
         self.nets[net].value = value;
         self.statistics.changes += 1;
-        self.candidates.data_changes(net);
         observer.change(
             Time::from_fs(self.now_fs),
             NetId::new(net),
@@ -363,20 +357,15 @@ impl Kernel {
                 self.clock_bank(bank, observer);
             }
         }
-        let clocks = &self.fan_out.clocks;
-        let places = clocks.range_of(net);
-        self.statistics.evaluations += places.len() as u64;
+        let loads = self.fan_out.clocks.of(net);
+        self.statistics.evaluations += loads.len() as u64;
         let (cells, nets) = (&self.cells[..], &self.nets[..]);
-        self.candidates.examine(places, |place| {
-            let index = clocks.at(place).cell();
-            let cell = &cells[index];
-            let changes =
-                cell.inputs & RESET_AND_SET != 0 || nets[cell.data as usize].value != cell.state;
-            if changes {
-                self.woken.push(index);
-            }
-            changes
-        });
+        // Most hold already what they would take.
+        self.woken
+            .extend(loads.iter().map(|load| load.cell()).filter(|&cell| {
+                let cell = &cells[cell];
+                cell.inputs & RESET_AND_SET != 0 || nets[cell.data as usize].value != cell.state
+            }));
         while let Some(cell) = self.woken.pop() {
             self.evaluate_flip_flop(cell, self.cells[cell].inputs, observer);
         }
@@ -397,7 +386,6 @@ impl Kernel {
         cell.evaluated = inputs;
         if kind.is_flip_flop() {
             self.dissolve_bank_of(index);
-            self.candidates.cell_changes(index);
             self.evaluate_flip_flop(index, evaluated, observer);
         } else {
             let (output, set) = (cell.outputs[0], cell.delays);
@@ -480,6 +468,24 @@ impl Kernel {
                 net,
                 tag: QUEUED_GENERATION << 2,
             });
+        }
+    }
+}
+
+/// A random order of what happens in one instant.
+struct Shuffle {
+    state: u64,
+    /// Kept for its memory.
+    events: Vec<Event>,
+}
+
+impl Shuffle {
+    /// Fisher and Yates.
+    fn permute<T>(&mut self, items: &mut [T]) {
+        for last in (1..items.len()).rev() {
+            self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let other = splitmix64(self.state) % (last as u64 + 1);
+            items.swap(last, other as usize);
         }
     }
 }
