@@ -125,6 +125,20 @@ impl BinProfile {
         middles.map(|middle| middle + later_s).collect()
     }
 
+    /// Where the bins of a macropixel (by its number, row-major) begin in the window of a start value, and where the last one ends, after
+    /// the laser trigger, s.
+    pub fn edges_s(&self, number: usize, start: u16) -> Vec<f64> {
+        let lengths = &self.macropixels[number][usize::from(start % 2)].length_s;
+        let middles = self.middles_s(number, start);
+        let begins = middles.iter().zip(lengths);
+        let mut edges: Vec<f64> = begins
+            .map(|(middle, length)| middle - 0.5 * length)
+            .collect();
+        let last = middles.last().zip(lengths.last());
+        edges.extend(last.map(|(middle, length)| middle + 0.5 * length));
+        edges
+    }
+
     /// Lengths of the bins of a macropixel over their mean, in windows of a start value.
     pub fn shares(&self, number: usize, start: u16) -> Vec<f64> {
         let lengths = &self.macropixels[number][usize::from(start % 2)].length_s;

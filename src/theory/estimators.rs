@@ -62,12 +62,8 @@ impl Expected {
     /// A scan in steps of half a bin or half a σ, whichever is less, then a golden section around the best.
     pub fn maximum_likelihood(&self, counts: &[u32]) -> f64 {
         let step = 0.5 * self.bin_ns.min(self.pulse.sigma_ns());
-        let steps = (counts.len() as f64 * self.bin_ns / step).ceil() as usize;
-        let value = |t: f64| self.ln_likelihood(counts, t);
-        let scan = (0..=steps).map(|k| (k as f64 * step, value(k as f64 * step)));
-        let best = scan.max_by(|a, b| a.1.total_cmp(&b.1));
-        let best = best.map_or(0.0, |(t, _)| t);
-        maximum_within(value, best - step, best + step)
+        let end = counts.len() as f64 * self.bin_ns;
+        greatest(|t| self.ln_likelihood(counts, t), 0.0..end, step)
     }
 
     /// The centre of gravity of `counts` less the background, within `half_window_ns` of the fullest bin's middle; ns after
@@ -91,6 +87,53 @@ impl Expected {
             middle(peak)
         }
     }
+}
+
+/// What a histogram is made of whose bins are unequal, as those of a delay line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InEdges<'a> {
+    /// Shape of the pulse.
+    pub pulse: &'a Pulse,
+    /// Where bins begin, in ascending order, and the last one ends, ns.
+    pub edges_ns: &'a [f64],
+    /// Mean background counts per ns.
+    pub background_per_ns: f64,
+    /// Mean signal counts of the whole pulse.
+    pub signal: f64,
+}
+
+impl InEdges<'_> {
+    /// ln of how much likelier `counts`, one for each bin, are with a pulse at `position_ns` than without any. A background of zero
+    /// is taken as [`NO_BACKGROUND`].
+    pub fn ln_likelihood(&self, counts: &[u32], position_ns: f64) -> f64 {
+        let bins = self.edges_ns.windows(2).zip(counts);
+        let terms = bins.map(|(ends, &count)| {
+            let [from, to] = [ends[0], ends[1]];
+            let background = (self.background_per_ns * (to - from)).max(NO_BACKGROUND);
+            let share = self.pulse.share(from - position_ns, to - position_ns);
+            let echo = self.signal * share;
+            f64::from(count) * (echo / background).ln_1p() - echo
+        });
+        terms.sum()
+    }
+
+    /// The position of greatest likelihood between the first edge and the last, ns; found as by [`Expected::maximum_likelihood`].
+    pub fn maximum_likelihood(&self, counts: &[u32]) -> f64 {
+        let lengths = self.edges_ns.windows(2).map(|ends| ends[1] - ends[0]);
+        let step = 0.5 * lengths.fold(self.pulse.sigma_ns(), f64::min);
+        let range = self.edges_ns[0]..self.edges_ns[self.edges_ns.len() - 1];
+        greatest(|t| self.ln_likelihood(counts, t), range, step)
+    }
+}
+
+/// Where `f` is greatest: a scan of `range` in steps, then a golden section around the best.
+fn greatest(f: impl Fn(f64) -> f64, range: std::ops::Range<f64>, step: f64) -> f64 {
+    let steps = ((range.end - range.start) / step).ceil() as usize;
+    let places = (0..=steps).map(|k| range.start + k as f64 * step);
+    let scan = places.map(|t| (t, f(t)));
+    let best = scan.max_by(|a, b| a.1.total_cmp(&b.1));
+    let best = best.map_or(range.start, |(t, _)| t);
+    maximum_within(f, best - step, best + step)
 }
 
 /// Golden section: where `f` is greatest between `from` and `to`, to the limit that rounding sets.
@@ -177,6 +220,57 @@ mod tests {
             noisy > 1.2 * likelihood && noisy > bound,
             "{noisy} {likelihood} {bound}"
         );
+    }
+
+    #[test]
+    fn equal_bins_between_edges_are_those_without() {
+        let (offset_ns, e) = (40.0, expected(1.5, 10.0, 2e3));
+        let edges_ns: Vec<f64> = (0..=BINS).map(|i| offset_ns + i as f64).collect();
+        let in_edges = InEdges {
+            pulse: &e.pulse,
+            edges_ns: &edges_ns,
+            background_per_ns: e.background / e.bin_ns,
+            signal: e.signal,
+        };
+        for position in [3.2, 11.7] {
+            let counts: Vec<u32> = (e.counts(BINS, position).iter())
+                .map(|&mean| mean as u32)
+                .collect();
+            let found = in_edges.maximum_likelihood(&counts) - offset_ns;
+            assert!(
+                (found - e.maximum_likelihood(&counts)).abs() < 1e-6,
+                "{found}"
+            );
+        }
+    }
+
+    /// Counts as they are expected, of bins from 0.4 to 1.6 ns: a pulse is found where it is, and not where equal bins put it.
+    #[test]
+    fn unequal_bins_put_a_pulse_where_it_is() {
+        let lengths = (0..BINS).map(|i| 1.0 + 0.6 * (2.1 * i as f64).sin());
+        let mut edges_ns = vec![0.0];
+        edges_ns.extend(lengths.scan(0.0, |end, length| {
+            *end += length;
+            Some(*end)
+        }));
+        let pulse = Pulse::Gaussian { sigma_ns: 1.5 };
+        let in_edges = InEdges {
+            pulse: &pulse,
+            edges_ns: &edges_ns,
+            background_per_ns: 1e4,
+            signal: 1e6,
+        };
+        let position = 11.3;
+        let counts: Vec<u32> = (edges_ns.windows(2))
+            .map(|ends| {
+                let echo = 1e6 * pulse.share(ends[0] - position, ends[1] - position);
+                (1e4 * (ends[1] - ends[0]) + echo).round() as u32
+            })
+            .collect();
+        let found = in_edges.maximum_likelihood(&counts);
+        assert!((found - position).abs() < 1e-3, "{found}");
+        let equal = expected(1.5, 1e4, 1e6).maximum_likelihood(&counts);
+        assert!((equal - position).abs() > 0.1, "{equal}");
     }
 
     #[test]

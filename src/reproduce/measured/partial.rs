@@ -9,11 +9,15 @@
 //! What is to be reached, which light a step reckons with and which bins it has to choose from are those of
 //! [`theory::partial`](crate::theory::partial): a detection has the whole range in as many bins as lead up to the target, with
 //! the echo in the last of them.
+//!
+//! HSLIDAR slides in the bins of its delay lines, too, as the demonstrator ran it (`delay_line`).
 
+mod delay_line;
 mod steps;
 
 use std::sync::OnceLock;
 
+use self::delay_line::OnDelayLines;
 use self::steps::{Detection, FEWEST, Measurement, detecting, measuring};
 use super::Study;
 use super::interval_text;
@@ -22,6 +26,7 @@ use crate::chip::{Sensor, SensorConfig, hslidar};
 use crate::engine::EngineError;
 use crate::numerics::intervals::Estimate;
 use crate::report::Grid;
+use crate::reproduce::delay_line::calibrated as delay_line_calibration;
 use crate::reproduce::penalty::{demonstrator, long_range};
 use crate::theory::partial::System;
 
@@ -177,6 +182,23 @@ pub(crate) fn demonstrator_on_chip() -> &'static OnChip {
     &measured()[1]
 }
 
+/// Up to the same 75 m in HSLIDAR's delay-line bins, on the rows that claim 20 calibrates.
+fn measure_on_delay_lines(frames: usize) -> Result<OnDelayLines, EngineError> {
+    let range_m = DEMONSTRATOR_RANGES_M[2];
+    OnDelayLines::measure(
+        &demonstrator(),
+        delay_line_calibration(),
+        range_m,
+        frames / 2,
+    )
+}
+
+/// The same, measured once.
+pub(crate) fn demonstrator_on_delay_lines() -> &'static OnDelayLines {
+    static MEASURED: OnceLock<OnDelayLines> = OnceLock::new();
+    MEASURED.get_or_init(|| measure_on_delay_lines(FRAMES).expect("what the engine runs"))
+}
+
 /// An estimate with its interval, for a remark.
 pub(crate) fn with_interval(estimate: &Estimate, decimals: usize) -> String {
     format!(
@@ -222,7 +244,7 @@ fn detections(all: &[OnChip]) -> Grid {
     grid
 }
 
-fn schemes(all: &[OnChip]) -> Grid {
+fn schemes(all: &[OnChip], lines: &OnDelayLines) -> Grid {
     let mut grid = Grid::new([
         "range and scheme",
         "cycles reckoned",
@@ -268,6 +290,25 @@ fn schemes(all: &[OnChip]) -> Grid {
             }
         }
     }
+    let system = demonstrator();
+    let (name, range_m) = ("HSLIDAR, delay lines", lines.range_m);
+    let full = system.full(range_m).laser_cycles();
+    grid.push([
+        format!("{name}, {range_m} m, guided"),
+        format!("{full:.0}"),
+        with_interval(&lines.guided.cycles, 0),
+        "1.00".to_owned(),
+        "1".to_owned(),
+        with_interval(&lines.guided.found, 3),
+    ]);
+    grid.push([
+        format!("{name}, {range_m} m, sliding"),
+        format!("{:.0}", lines.reckoned),
+        with_interval(&lines.sliding(), 0),
+        format!("{:.2}", lines.reckoned / full),
+        with_interval(&lines.penalty_of_sliding(), 2),
+        String::new(),
+    ]);
     grid
 }
 
@@ -289,6 +330,7 @@ fn shown(estimate: Option<Estimate>, decimals: usize) -> String {
 /// Configurations that no engine can run.
 pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
     let all = measure_both(frames)?;
+    let lines = measure_on_delay_lines(frames)?;
     Ok(Study {
         notes: vec![
             format!("{frames} frames for each measurement, {FEWEST} at least for a detection; in brackets intervals at 95 %, those of P_D Wilson's."),
@@ -296,10 +338,12 @@ pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
                 .into(),
             "Reckoned: Eq. 17 with every photon counted; Cramér-Rao for the QuantIC4x4, Thompson for HSLIDAR, as in the thesis. A detection is split into exposures that the counters hold, and added off the chip: so it is measured. HSLIDAR's bins are CLK periods of its delay line's mean."
                 .into(),
+            "In its delay-line bins, calibrated, HSLIDAR slides by its own windows, one every 12.5 ns, which overlap by two fifths. It cannot zoom so: CLK has no part in a bin."
+                .into(),
         ],
         grids: vec![
             ("detections of zooming", detections(&all)),
-            ("laser cycles and penalty of the schemes", schemes(&all)),
+            ("laser cycles and penalty of the schemes", schemes(&all, &lines)),
         ],
         charts: Vec::new(),
     })

@@ -3,7 +3,7 @@
 use super::{demonstrator, long_range, one_hit, penalty};
 use crate::report::{Axis, Chart, Grid, Style};
 use crate::reproduce::measured::partial::{
-    AtRange, OnChip, demonstrator_on_chip, long_range_on_chip,
+    AtRange, OnChip, demonstrator_on_chip, demonstrator_on_delay_lines, long_range_on_chip,
 };
 use crate::theory::capacity::full_bins;
 use crate::theory::partial::{Purpose, System};
@@ -247,11 +247,26 @@ pub(in crate::reproduce) fn figure_45() -> Vec<Chart> {
 
 /// Fig. 108: laser cycles of the demonstrator's schemes.
 pub(in crate::reproduce) fn figure_108() -> Vec<Chart> {
-    vec![schemes(
+    let chart = schemes(
         "Laser cycles for 10 cm (Table 15, 8 bins)",
         demonstrator_on_chip(),
         80,
-    )]
+    );
+    let lines = demonstrator_on_delay_lines();
+    let at = |cycles: f64| [(lines.range_m, cycles)];
+    vec![
+        chart
+            .with(
+                "guided in delay-line bins, measured",
+                Style::Points,
+                at(lines.guided.cycles.value),
+            )
+            .with(
+                "sliding in delay-line bins, measured",
+                Style::Points,
+                at(lines.sliding().value),
+            ),
+    ]
 }
 
 /// Fig. 109: their penalties.
@@ -261,11 +276,20 @@ pub(in crate::reproduce) fn figure_109() -> Vec<Chart> {
         demonstrator_on_chip(),
         80,
     );
-    vec![chart.with(
-        "published: at least 6 at 75 m",
-        Style::Points,
-        [(75.0, 6.0)],
-    )]
+    let lines = demonstrator_on_delay_lines();
+    vec![
+        chart
+            .with(
+                "sliding in delay-line bins, measured",
+                Style::Points,
+                [(lines.range_m, lines.penalty_of_sliding().value)],
+            )
+            .with(
+                "published: at least 6 at 75 m",
+                Style::Points,
+                [(75.0, 6.0)],
+            ),
+    ]
 }
 
 /// Tables 7 and 15's systems, scheme by scheme, with overflow counted.

@@ -63,6 +63,32 @@ pub(crate) struct Measurement {
     pub frames: usize,
 }
 
+impl Measurement {
+    /// From the errors of frames of so many laser cycles, ns, and the spread that is wanted, ns.
+    pub(super) fn of(errors_ns: &[f64], cycles: u32, wanted_ns: f64) -> Self {
+        let of_the_echo = errors_ns
+            .iter()
+            .filter(|e| e.abs() <= OF_THE_ECHO * wanted_ns);
+        let of_the_echo: Vec<f64> = of_the_echo.copied().collect();
+        let spread = deviation(&of_the_echo);
+        Measurement {
+            cycles: spread.map(|s| f64::from(cycles) * (s / wanted_ns).powi(2)),
+            found: share(of_the_echo.len() as f64, errors_ns.len() as f64),
+            frames: errors_ns.len(),
+        }
+    }
+}
+
+/// The standard deviation of a time that a system is to reach, ns.
+pub(super) fn wanted_ns(system: &System) -> f64 {
+    2e9 * system.goal.precision_m / SPEED_OF_LIGHT_M_PER_S
+}
+
+/// Laser cycles of the exposures by which a measurement is judged.
+pub(super) fn measured_cycles(step: &Step) -> u32 {
+    step.laser_cycles.max(FEWEST_CYCLES) as u32
+}
+
 /// Photon light at a range, on this macropixel.
 fn lit(system: &System, sensor: &Sensor, range_m: f64, cycles: u32) -> Trial {
     Trial {
@@ -72,7 +98,7 @@ fn lit(system: &System, sensor: &Sensor, range_m: f64, cycles: u32) -> Trial {
 }
 
 /// Seeds of a step that nothing else has.
-fn seed(step: &Step) -> u64 {
+pub(super) fn seed(step: &Step) -> u64 {
     (1e4 * step.range_m) as u64 * 100
 }
 
@@ -83,22 +109,15 @@ pub(super) fn measuring(
     step: &Step,
     frames: usize,
 ) -> Result<Measurement, EngineError> {
-    let wanted_ns = 2e9 * system.goal.precision_m / SPEED_OF_LIGHT_M_PER_S;
-    let cycles = step.laser_cycles.max(FEWEST_CYCLES) as u32;
+    let wanted_ns = wanted_ns(system);
+    let cycles = measured_cycles(step);
     let trial = Trial {
         echo_bins: f64::from(system.bins / 2),
         ..lit(system, sensor, step.range_m, cycles)
     };
     let trial = trial.on(|sensor| sensor.clk_hz = 1.0 / system.bin_s);
     let all = errors_ns(&trial, frames, seed(step) + 1, Estimator::Likelihood)?;
-    let of_the_echo = all.iter().filter(|e| e.abs() <= OF_THE_ECHO * wanted_ns);
-    let of_the_echo: Vec<f64> = of_the_echo.copied().collect();
-    let spread = deviation(&of_the_echo);
-    Ok(Measurement {
-        cycles: spread.map(|s| f64::from(cycles) * (s / wanted_ns).powi(2)),
-        found: share(of_the_echo.len() as f64, all.len() as f64),
-        frames: all.len(),
-    })
+    Ok(Measurement::of(&all, cycles, wanted_ns))
 }
 
 /// A detection on the chip with a slow CLK, in the conventional mode; `None` for a step that is none.
