@@ -10,8 +10,10 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
+use smallvec::SmallVec;
 
 use super::right_camera::RightCamera;
+use crate::numerics::branchless;
 use crate::photon::{Purpose, normal, random_stream};
 use crate::scene::{Bounds, PinholeCamera, Ray, SKY_REFLECTIVITY, Scene};
 use crate::settings::{Key, Range};
@@ -139,18 +141,21 @@ fn radiances(
             seen.sum::<f64>() + returns.sky_share * SKY_REFLECTIVITY
         }
     };
-    let rows = (0..height).into_par_iter();
-    rows.flat_map_iter(|row| {
-        let (ray, bounds, radiance) = (&ray, &bounds, &radiance);
-        (0..width).step_by(TOGETHER).flat_map(move |first| {
-            let cols = first..width.min(first + TOGETHER);
-            let rays: Vec<Ray> = cols.map(|col| ray(crop.middle(row, col))).collect();
+    let mut seen = vec![0.0; width * height];
+    let rows = seen.par_chunks_mut(width.max(1)).enumerate();
+    rows.for_each(|(row, radiances)| {
+        let groups = radiances.chunks_mut(TOGETHER).enumerate();
+        for (group, radiances) in groups {
+            let cols = (TOGETHER * group..).take(radiances.len());
+            let rays: SmallVec<[Ray; TOGETHER]> =
+                cols.map(|col| ray(crop.middle(row, col))).collect();
             let candidates = bounds.of_rays(&rays);
-            rays.into_iter()
-                .map(move |ray| radiance(&ray, &candidates) as f32)
-        })
-    })
-    .collect()
+            for (seen, ray) in radiances.iter_mut().zip(&rays) {
+                *seen = radiance(ray, &candidates) as f32;
+            }
+        }
+    });
+    seen
 }
 
 fn surface(scene: &Scene, ray: &Ray, hit: &crate::scene::Hit, grain: f64, pixel_rad: f64) -> f64 {
@@ -172,36 +177,47 @@ fn grain_at(point: DVec3, finest_m: f64) -> f64 {
     let finest = finest_m.max(1e-3).log2();
     let first = finest.floor() as i32;
     let fade = 1.0 - (finest - f64::from(first));
-    let octave = |k: i32| cloud(point * (-f64::from(first + k)).exp2(), first + k);
+    let octave = |k: i32| cloud(point * power_of_two(-(first + k)), first + k);
     // Uniform numbers between −1 and 1 blended over eight corners have a standard deviation of about 0.31.
     (fade * octave(1) + octave(2) + octave(3) + (1.0 - fade) * octave(4)) / (0.31 * 3f64.sqrt())
 }
 
+/// 2 to the power of `exponent`, −1022 to 1023.
+fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(((1023 + exponent) as u64) << 52)
+}
+
 /// Random numbers from −1 to 1 on a grid of 1, smoothly between.
 fn cloud(point: DVec3, layer: i32) -> f64 {
-    let corner = point.floor();
-    let within = point - corner;
-    let smooth = within * within * (DVec3::splat(3.0) - 2.0 * within);
-    let cell = [corner.x as i64, corner.y as i64, corner.z as i64];
-    let mut sum = 0.0;
-    for bits in 0..8u64 {
-        let on = [bits & 1, bits >> 1 & 1, bits >> 2];
-        let mut hash = layer as u64;
-        let mut weight = 1.0;
-        for axis in 0..3 {
-            let at = cell[axis].wrapping_add(on[axis] as i64) as u64;
-            hash = (hash ^ at).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            hash ^= hash >> 29;
-            weight *= if on[axis] == 1 {
-                smooth[axis]
-            } else {
-                1.0 - smooth[axis]
-            };
+    let axes = point.to_array().map(|at| {
+        let corner = branchless::floor(at);
+        let within = at - corner;
+        let smooth = within * within * (3.0 - 2.0 * within);
+        let cell = corner as i64;
+        [
+            (cell as u64, 1.0 - smooth),
+            (cell.wrapping_add(1) as u64, smooth),
+        ]
+    });
+    // Corners that share coordinates share the hash so far.
+    let mixed = |hash: u64, at: u64| {
+        let hash = (hash ^ at).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        hash ^ hash >> 29
+    };
+    let mut corners = [(layer as u64, 1.0); 8];
+    for (axis, ends) in axes.iter().enumerate() {
+        for known in 0..1 << axis {
+            let (hash, weight) = corners[known];
+            for (end, (at, share)) in ends.iter().enumerate() {
+                corners[known | end << axis] = (mixed(hash, *at), weight * share);
+            }
         }
-        hash = hash.wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        sum += weight * ((hash >> 40) as f64 / f64::from(1 << 23) - 1.0);
     }
-    sum
+    let of_corner = |(hash, weight): (u64, f64)| {
+        let hash = hash.wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        weight * ((hash >> 40) as f64 / f64::from(1 << 23) - 1.0)
+    };
+    corners.into_iter().map(of_corner).sum()
 }
 
 /// What the left camera sees at a place.
