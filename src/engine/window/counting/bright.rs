@@ -94,7 +94,6 @@ impl Counting<'_> {
 
     /// Counts the window of one laser cycle.
     pub(super) fn count_bright_cycle(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32) {
-        let config = self.stream.config();
         let start = self.stream.cycle_start(laser_cycle);
         let wanted_from = start + Time::from_fs(pixel.sight.first_fs - ROUNDING_FS);
         let until = start + Time::from_fs(pixel.sight.until_fs);
@@ -102,19 +101,12 @@ impl Counting<'_> {
         let drawn = loop {
             let begin = self.beginning_before(pixel, wanted_from - back, until, laser_cycle);
             self.photons.clear();
-            let mut breeding_photons = Vec::new();
-            for part in pixel.parts {
-                if !part.breeds() {
-                    self.push_photons(part, begin, until, laser_cycle);
-                    continue;
-                }
-                std::mem::swap(&mut self.photons, &mut breeding_photons);
-                let since = begin.time.map_or(begin, |time| {
-                    let time = time - config.spads.reach();
-                    Beginning::at(time, laser_cycle, self.stream, part)
-                });
-                self.push_photons(part, since, until, laser_cycle);
-                std::mem::swap(&mut self.photons, &mut breeding_photons);
+            for part in pixel.parts.iter().filter(|part| part.breeds()) {
+                self.push_breeding(part, begin, until, laser_cycle);
+            }
+            let breeding_photons = self.photons.split_off(0);
+            for part in pixel.parts.iter().filter(|part| !part.breeds()) {
+                self.push_photons(part, begin, until, laser_cycle);
             }
             let known_from = begin.time.unwrap_or(Time::ZERO);
             self.photons.retain(|photon| photon.time >= known_from);
@@ -190,6 +182,35 @@ impl Counting<'_> {
                 None => return begin,
             }
         }
+    }
+
+    /// Whether an avalanche that breeds, or what it causes, may be in what is drawn at first for the window of a laser cycle.
+    pub(super) fn breeds_about(&mut self, pixel: &Pixel<'_>, laser_cycle: u32) -> bool {
+        let Some(breeding) = pixel.breeding else {
+            return false;
+        };
+        let until = self.stream.cycle_start(laser_cycle) + Time::from_fs(pixel.sight.until_fs);
+        let Some(begin) = self.beginning(pixel, laser_cycle) else {
+            return true;
+        };
+        self.photons.clear();
+        self.push_breeding(breeding, begin, until, laser_cycle);
+        !self.photons.is_empty()
+    }
+
+    /// Appends the photons that breed since a beginning, and before it as far as what they cause may come later.
+    fn push_breeding(
+        &mut self,
+        breeding: &PixelStream<'_>,
+        begin: Beginning,
+        until: Time,
+        laser_cycle: u32,
+    ) {
+        let since = begin.time.map_or(begin, |time| {
+            let time = time - self.stream.config().spads.reach();
+            Beginning::at(time, laser_cycle, self.stream, breeding)
+        });
+        self.push_photons(breeding, since, until, laser_cycle);
     }
 
     /// Appends the photons since a beginning.

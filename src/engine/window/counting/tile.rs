@@ -7,8 +7,8 @@
 //!   row          which SPADs fired
 //! ```
 //!
-//! A lane that depends on what came before its first block, or has a photon within a few femtoseconds of a bin's edge, is
-//! left to [`count_bright_cycle`](super::Counting::count_bright_cycle).
+//! A lane that depends on what came before its first block, has a photon within a few femtoseconds of a bin's edge, or one that
+//! breeds, is left to [`count_bright_cycle`](super::Counting::count_bright_cycle).
 
 use multiversion::multiversion;
 
@@ -208,7 +208,7 @@ impl Counting<'_> {
         let is_paralysable = config.spads.law == DeadTimeLaw::Paralysable;
         let last_cycle = config.laser_cycles.checked_sub(1)?;
         let is_packed = self.stream.spads() == SPADS && light.is_alone();
-        if !is_packed || light.has_listed_echo() || pixel.breeding.is_some() {
+        if !is_packed || light.has_listed_echo() {
             return None;
         }
         let begin = self.beginning(pixel, last_cycle)?;
@@ -276,6 +276,9 @@ impl Counting<'_> {
                 false => 0,
             }),
         );
+        for lane in 0..lanes {
+            tile.undecided |= u16::from(self.breeds_about(pixel, cycle(lane))) << lane;
+        }
         light.first_arrivals(first_cycle, &mut tile.next_fs);
         if !light.echo_fs().is_empty() {
             light.echo_words(first_cycle, 1, &mut tile.second_words);
