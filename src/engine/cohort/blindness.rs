@@ -113,6 +113,16 @@ impl Blindness {
         }
     }
 
+    /// As [`Blindness::renews`], and the probability that it makes a pulse.
+    #[inline(always)]
+    pub(super) fn hit(&self, step: usize, age: usize, p: f64) -> (f64, f64) {
+        let pulses = p * self.able(step, age);
+        match self.law {
+            DeadTimeLaw::NonParalysable => (pulses, pulses),
+            DeadTimeLaw::Paralysable => (p, pulses),
+        }
+    }
+
     /// The complement of [`Blindness::renews`]; `q` is 1 − `p`.
     fn keeps(&self, step: usize, age: usize, p: f64, q: f64) -> f64 {
         match self.law {

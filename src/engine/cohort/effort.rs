@@ -2,7 +2,7 @@
 //!
 //! Where laser cycles are pooled there is one cohort a step. Elsewhere there are as many as states that laser cycles are in:
 //! how many SPADs fired 1, 2, … steps ago. Of N cycles nearly all are within √(2 ln N) standard deviations of a state's
-//! mean along each age, and no more states are occupied than there are cycles.
+//! mean along each age, and no more states are occupied than there are cycles. A history of events costs a part of that.
 
 use super::blindness::Ages;
 use super::cycles::LikeCycles;
@@ -26,6 +26,14 @@ pub(super) fn occupied_states(ages: &Ages, spads: usize, cycles: u64) -> f64 {
         (1..=ages.aged.len()).fold(1.0, |ways, age| ways * (spads + age) as f64 / age as f64);
     let states = states.min(ways);
     states * cycles / (states + cycles)
+}
+
+/// What a history in a bin takes, its chances and how many laser cycles it has, in cohorts.
+const HISTORY: f64 = 0.02;
+
+/// What so many histories take, in cohorts, summed over the bins of a window.
+pub(super) fn of_histories(number: usize) -> f64 {
+    HISTORY * number as f64
 }
 
 /// Cohorts of laser cycles alike, summed over the steps of a window.

@@ -37,6 +37,50 @@ impl EventTable {
         let mut counts = self.0.iter().enumerate();
         counts.all(|(spads, &is_event)| is_event == (spads > 0))
     }
+
+    /// What tells bins without an event from the others, where it is so simple: events of any SPAD, and of odd numbers.
+    pub(super) fn no_event(&self) -> Option<NoEvent> {
+        let mut counts = self.0.iter().enumerate();
+        if self.is_any_spad() {
+            return Some(NoEvent {
+                always: 0.0,
+                by_pulses: 1.0,
+                weight: 0.0,
+            });
+        }
+        counts
+            .all(|(spads, &is_event)| is_event == (spads % 2 == 1))
+            .then_some(NoEvent {
+                always: 0.5,
+                by_pulses: 0.5,
+                weight: -1.0,
+            })
+    }
+}
+
+/// Of bins in which so many SPADs of a macropixel fire, those without an event: a share α + β·wᴷ, with K pulses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct NoEvent {
+    /// α.
+    always: f64,
+    /// β.
+    by_pulses: f64,
+    /// w.
+    pub(super) weight: f64,
+}
+
+impl NoEvent {
+    /// Whether [`NoEvent::expectation`] looks at what it is without.
+    #[inline(always)]
+    pub(super) fn needs_unnamed(&self) -> bool {
+        self.always != 0.0
+    }
+
+    /// Expectation of a product with this share, from that of the product without it, and with wᴷ in its place.
+    #[inline(always)]
+    pub(super) fn expectation(&self, without: f64, weighted: f64) -> f64 {
+        self.always * without + self.by_pulses * weighted
+    }
 }
 
 /// Counts of a bin that are no error.

@@ -1,11 +1,12 @@
 //! The cohort engine: histograms without photons, at a cost that does not grow with the laser cycles.
 //!
 //! Laser cycles whose SPADs are in the same state move together: a binomial draw says how many of them see what in the
-//! next step. Three ways of keeping that state share one model of light and dead time:
+//! next step. Four ways of keeping that state share one model of light and dead time:
 //!
 //! | way | state | exact | cost of a bin |
 //! |---|---|---|---|
 //! | `pooled.rs` | how many SPADs fired 1, 2, … steps ago | every bin; two bins' correlation up to [`CohortOptions::neglect`] | a few draws |
+//! | `recent.rs` | in how many cycles which of the last 4, 6 or 8 bins had an event | every bin; two bins' correlation up to [`CohortOptions::neglect`] | 16, 64 or 256 draws, most of them of nothing |
 //! | `joint.rs` | how many cycles have which of these on one macropixel | all of it | a draw for every state that occurs |
 //! | `alone.rs` | one cycle, its SPADs one by one | all of it | a random number, more if a SPAD is hit |
 //!
@@ -33,7 +34,9 @@
 //! * Bins of delay lines are the steps, unequal as they are; what is before a window is remembered in steps as long as the shortest
 //!   bin. An odd number of SPADs counts in them; light in which pulses meet on the photon line is refused (`events.rs`).
 //!
-//! So an exposure takes one step a bin, whatever light there is, and at most as many states as it has laser cycles.
+//! So an exposure takes one step a bin, whatever light there is. Where two bins' correlations may be neglected as much as the ways
+//! before it leave out, the first way in the table that does so is taken; only events of several SPADs, dead times of many bins
+//! and the brightest light are left to the joint state, which has at most as many states as there are laser cycles.
 
 mod abreast;
 mod alone;
@@ -50,9 +53,11 @@ mod overlap;
 mod period;
 mod pooled;
 mod prepare;
+mod recent;
 mod rejection;
 mod secondaries;
 mod spad_light;
+mod weighted;
 mod words;
 
 use std::borrow::Cow;
@@ -66,6 +71,7 @@ use self::cycles::LikeCycles;
 pub use self::draw::none_of;
 use self::events::EventTable;
 pub use self::hits::at_least_hit;
+use self::recent::Histories;
 use self::words::RandomWords;
 use super::{Engine, EngineError, Expose, Exposed, LitPixel, Work};
 use crate::chip::{Exposure, Sensor, WindowLaw, histogram, window_law};
@@ -229,21 +235,24 @@ impl Cohort {
         };
         let random = &mut RandomWords::new(stream.seed, pixel);
         let is_event = &self.is_event;
-        for LikeCycles {
-            cycles,
-            blindness,
-            ages,
-            steps,
-            not_compared,
-        } in &cohorts
-        {
+        for like in &cohorts {
+            let LikeCycles {
+                cycles,
+                blindness,
+                ages,
+                steps,
+                not_compared,
+            } = like;
             let counts = match cycles {
                 0 => continue,
                 1 => alone::run(blindness, ages, steps, is_event, random),
                 _ if self.is_pooled(blindness, steps, *cycles) => {
                     pooled::run(blindness, ages, steps, is_event, *cycles, random)
                 }
-                _ => joint::run(blindness, ages, steps, is_event, *cycles, random),
+                _ => match self.histories(like) {
+                    Some(histories) => histories.run(*cycles, random),
+                    None => joint::run(blindness, ages, steps, is_event, *cycles, random),
+                },
             };
             let compared = sums.iter_mut().zip(counts).skip(*not_compared);
             compared.for_each(|(sum, count)| *sum += count);
@@ -260,6 +269,11 @@ impl Cohort {
                 photons,
                 self.is_event.spads() as u64 * cycles,
             ) <= WORTH_LOOKING_AT * steps.per_period as f64
+    }
+
+    fn histories(&self, like: &LikeCycles) -> Option<Histories> {
+        let (blindness, neglect) = (&like.blindness, self.options.neglect);
+        recent::histories(blindness, &like.ages, &like.steps, &self.is_event, neglect)
     }
 
     /// Cohorts that [`Cohort::draw`] follows, summed over the steps of the window: what its time goes with, estimated.
@@ -283,7 +297,10 @@ impl Cohort {
                 0 => 0.0,
                 1 => steps.means.len() as f64,
                 _ if self.is_pooled(blindness, steps, *cycles) => steps.means.len() as f64,
-                _ => effort::of_joint_states(&like, self.is_event.spads()),
+                _ => match self.histories(&like) {
+                    Some(histories) => effort::of_histories(histories.number()),
+                    None => effort::of_joint_states(&like, self.is_event.spads()),
+                },
             }
         };
         let cohorts = self.cohorts(stream, start, light)?.unwrap_or_default();

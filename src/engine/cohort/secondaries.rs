@@ -9,6 +9,7 @@
 //! already: it blinds, and adds nothing to events of any SPAD. It is spread evenly over the SPADs, though those at the
 //! edge get less of it.
 
+use super::spad_light::absorbed;
 use crate::photon::SpadModel;
 
 /// What a hazard in a cell does.
@@ -27,7 +28,7 @@ pub(super) struct Cell {
 
 impl Cell {
     pub(super) fn new(mean: f64) -> Self {
-        let any = -libm::expm1(-mean);
+        let any = absorbed(mean);
         // Where the quotient would lose its digits, a series.
         let fire = match mean < 1e-3 {
             true => mean * (0.5 - mean * (1.0 / 6.0 - mean * (1.0 / 24.0))),
@@ -109,6 +110,10 @@ impl Secondaries {
         returning: Traps,
     ) -> Acts {
         let mut acts = Acts::default();
+        if self.are_none() {
+            [acts.pulses[0], ready[0]] = photons.take(ready[0], returning[0]);
+            return acts;
+        }
         let total = photons.and(crossing);
         let hazards = [total, total.and(self.released_per_fs * width_fs)];
         for trap in 0..2 {
