@@ -77,7 +77,7 @@ def test_players_find_every_moment_of_a_recording(recorded: Path) -> None:
             topics[channel.topic].append((schema.name, message.log_time, json.loads(message.data)))
         times = [time for _, time, _ in topics["/tf"]]
         assert times == sorted(set(times)) and len(times) == 3
-        assert len(list(reader.iter_messages(start_time=times[1]))) == 10
+        assert len(list(reader.iter_messages(starting_at=times[1]))) == 10
     assert {topic: of[0][0] for topic, of in topics.items()} == {
         "/lidar/depth": "foxglove.RawImage",
         "/lidar/picture": "foxglove.CompressedImage",
