@@ -3,9 +3,9 @@
 //! Prices are nanoseconds of processor time of one thread. `cargo bench --bench prices` measures them and prints each
 //! estimate beside what it stands for: the least of three runs of 16 macropixels, 384 MHz, 16 bins, laser cycles of 520 CLK
 //! periods, 1000 and 16 000 of them, from 0.1 to 1600 Mcounts/s of background and 0 to 60 signal photons a laser cycle.
-//! The machine was shared; only ratios matter here. Where there is a choice, estimates were 0.7 to 1.4 times (window) and 0.5
-//! to 1.3 times (cohort; 0.3 times with 1600 Mcounts/s, where both cost the same) what was measured, and the dearer engine is
-//! chosen in 5 of these 84 lights: for 8 % and 19 % more in two, and for some microseconds where both take below 20. What the
+//! The machine was shared; only ratios matter here. Where there is a choice, estimates were 0.7 to 1.4 times (window) and 0.3
+//! to 1.0 times (cohort) what was measured, and the dearer engine is chosen in 8 of these 84 lights: for 5 to 10 % more in
+//! five, four of them with 1600 Mcounts/s, and for some microseconds where both take below 20. What the
 //! window engine takes for any macropixel, some 10 µs, is left out, as is what afterpulses and crosstalk cost either.
 
 use crate::chip::SensorConfig;
