@@ -168,6 +168,7 @@ pub fn take_guided_frame<A: Answer>(
     };
     let loaded_and_exposed = || rayon::join(by_load_path, by_engine);
     let ((probed, probes_s), ((load, load_s), exposed)) = rayon::join(by_gates, loaded_and_exposed);
+    times.together_s = clock.lap();
     let load = load?;
     times.load_s = load_s;
     let (exposed, kept, (depths, bin_s, remark), took_s) = exposed?;

@@ -21,23 +21,20 @@ pub struct PhaseTimes {
     pub load_s: f64,
     /// Light on every macropixel.
     pub light_s: f64,
-    /// Photon stream and engine. Probes take a processor each meanwhile.
+    /// Photon stream and engine. The load and probes take a processor each meanwhile.
     pub exposure_s: f64,
-    /// Probed macropixels at gate level, waveforms included; beside exposure and ranging.
+    /// Probed macropixels at gate level, waveforms included.
     pub probes_s: f64,
     /// Peak interpolation.
     pub ranging_s: f64,
+    /// Load, probes, exposure and ranging together: they run beside each other as far as there are processors.
+    pub together_s: f64,
 }
 
 impl PhaseTimes {
     /// From the first phase to the last, s.
     pub fn total_s(&self) -> f64 {
-        self.scene_s
-            + self.guide_s
-            + self.windows_s
-            + self.load_s
-            + self.light_s
-            + self.probes_s.max(self.exposure_s + self.ranging_s)
+        self.scene_s + self.guide_s + self.windows_s + self.light_s + self.together_s
     }
 }
 
