@@ -19,7 +19,7 @@ pub(super) fn meet_plane(
     let normal = normal.normalize();
     let range_m = in_front((centre_m - ray.origin).dot(normal) / ray.direction.dot(normal))?;
     let offset_m = ray.at(range_m) - centre_m;
-    // Most that miss do so by far, and need no edges.
+    // Most that miss are beyond the corners, which needs no edges; a millionth is room for rounding.
     if 4.0 * offset_m.length_squared() > 1.000_001 * (width_m * width_m + height_m * height_m) {
         return None;
     }

@@ -104,7 +104,8 @@ impl Counting<'_> {
             for part in pixel.parts.iter().filter(|part| part.breeds()) {
                 self.push_breeding(part, begin, until, laser_cycle);
             }
-            let breeding_photons = self.photons.split_off(0);
+            // Mostly there are none, and nothing is allocated.
+            let breeding_photons: Vec<_> = self.photons.drain(..).collect();
             for part in pixel.parts.iter().filter(|part| !part.breeds()) {
                 self.push_photons(part, begin, until, laser_cycle);
             }
