@@ -94,7 +94,7 @@ pub(crate) fn compare(
             let salt = if fresh { n as u64 + 1 } else { 0 };
             bench.depths(part, salt, starts.len(), |_| Some(start))
         };
-        starts.iter().enumerate().map(each).collect()
+        starts.par_iter().enumerate().map(each).collect()
     };
     let full = windows(cycles, false)?;
     let sliding = windows((cycles / starts.len() as u32).max(1), true)?;

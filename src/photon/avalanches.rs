@@ -38,7 +38,7 @@ enum Source {
 }
 
 /// SPADs that need no memory of their own. Made for 64 of them, the state of 16 took 2 % of a frame's time on the window engine.
-const FEW_SPADS: usize = 16;
+pub(super) const FEW_SPADS: usize = 16;
 
 /// The SPADs of one macropixel while photons come in.
 pub struct Avalanches<'a> {

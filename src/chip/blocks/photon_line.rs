@@ -17,6 +17,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use smallvec::SmallVec;
+
 use super::{finished, front_end};
 use crate::netlist::{CellKind, Module, ModuleBuilder, OwnDelay};
 use crate::units::Time;
@@ -71,28 +73,59 @@ pub fn stage(toggle_to_photons: Time, spads: usize) -> Time {
     Time::from_fs(toggle_to_photons.as_fs() / stages)
 }
 
-/// Reference model: which of some pulses, (time, SPAD) sorted by time, leave an edge on the line of so many SPADs, whose XORs
-/// take `stage`. Edges come as many stages after their pulses.
-pub fn model(pulses: &[(Time, u8)], spads: usize, stage: Time) -> Vec<(Time, u8)> {
-    let mut left = pulses.to_vec();
-    let is_apart = |pair: &[(Time, u8)]| pair[1].0 >= pair[0].0 + stage;
-    if !pulses.windows(2).all(is_apart) {
-        left = edges(pulses, 0..spads as u8, stage);
+/// Reference model: keeps those of some pulses that leave an edge on the line of so many SPADs, whose XORs take `stage`. `of` gives the
+/// time and the SPAD of a pulse; they are sorted by both. Edges come as many stages after their pulses.
+pub fn model<P: Copy>(
+    pulses: &mut Vec<P>,
+    of: impl Fn(&P) -> (Time, u8),
+    spads: usize,
+    stage: Time,
+) {
+    let mut left = 0;
+    let mut first = 0;
+    while let Some(pulse) = pulses.get(first) {
+        let mut last_time = of(pulse).0;
+        let near = pulses[first + 1..].iter().take_while(|pulse| {
+            let time = of(pulse).0;
+            let is_near = time < last_time + stage;
+            last_time = time;
+            is_near
+        });
+        let end = first + 1 + near.count();
+        // Pulses that are no delay apart decide about each other, and about no others.
+        if end - first == 1 {
+            pulses[left] = pulses[first];
+            left += 1;
+        } else {
+            let together = (first..end).map(|at| {
+                let (time, spad) = of(&pulses[at]);
+                (time, spad, at)
+            });
+            for (_, _, at) in edges(&together.collect::<Together>(), 0..spads as u8, stage) {
+                pulses[left] = pulses[at];
+                left += 1;
+            }
+        }
+        first = end;
     }
-    left
+    pulses.truncate(left);
 }
 
+/// Time, SPAD and number of pulses; more than two are seldom together.
+type Together = SmallVec<[(Time, u8, usize); 4]>;
+
 /// Edges on the net that joins a range of SPADs.
-fn edges(pulses: &[(Time, u8)], spads: Range<u8>, stage: Time) -> Vec<(Time, u8)> {
+fn edges(pulses: &[(Time, u8, usize)], spads: Range<u8>, stage: Time) -> Together {
     if pulses.len() <= 1 || spads.len() == 1 {
-        return pulses.to_vec();
+        return pulses.into();
     }
     let middle = spads.start + (spads.end - spads.start) / 2;
-    let (low, high): (Vec<_>, Vec<_>) = pulses.iter().partition(|(_, spad)| *spad < middle);
+    let is_low = |pulse: &(Time, u8, usize)| pulse.1 < middle;
+    let (low, high): (Together, Together) = pulses.iter().copied().partition(is_low);
     let mut inputs = edges(&low, spads.start..middle, stage);
     inputs.extend(edges(&high, middle..spads.end, stage));
     inputs.sort_unstable();
-    let mut outputs: Vec<(Time, u8)> = Vec::with_capacity(inputs.len());
+    let mut outputs = Together::new();
     for input in inputs {
         // An edge that is still on its way through the XOR is taken back.
         match outputs.last() {

@@ -75,8 +75,10 @@ impl DelayLines {
     /// Those of a macropixel, by its number in the array, row-major.
     pub(crate) fn taps(&self, number: usize) -> Taps {
         let measured = || self.measure((number / self.cols, number % self.cols));
-        let known = self.of_macropixel.get(number);
-        Arc::clone(known.map_or(&measured(), |known| known.get_or_init(measured)))
+        match self.of_macropixel.get(number) {
+            Some(known) => Arc::clone(known.get_or_init(measured)),
+            None => measured(),
+        }
     }
 
     fn measure(&self, (row, col): (usize, usize)) -> Taps {

@@ -17,6 +17,7 @@
 use super::binning::{Binning, Scratch, Wanted};
 use super::codes::{Code, Codes, ROWS, SPADS};
 use super::echo_rows::EchoRows;
+use super::past::PastDraws;
 use super::sight::{Sight, Spans};
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Spacing, Tables};
 use super::{Window, Work, taken};
@@ -44,7 +45,7 @@ pub(super) struct Counting<'a> {
     breeding: ByWindow,
     /// Photons of light with several layers, one for each part.
     layers: Vec<ByWindow>,
-    extra: Draw,
+    past: PastDraws,
     /// Codes of all photons drawn for the group that do not breed. Photons are known by their index here.
     codes: Codes,
     scratch: Scratch,
@@ -162,7 +163,7 @@ impl<'a> Counting<'a> {
             plain: Drawn::default(),
             breeding: ByWindow::default(),
             layers: Vec::new(),
-            extra: Draw::default(),
+            past: PastDraws::default(),
             codes: Codes::default(),
             scratch: Scratch::default(),
             first_code: [0; 2],
@@ -211,6 +212,7 @@ impl<'a> Counting<'a> {
             work: Work::default(),
         };
         self.plain.carried.clear();
+        self.past.clear();
         self.breeding.clear();
         self.tables.clear_counts();
         if light.is_bright() {

@@ -27,7 +27,6 @@ use super::{
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, Sensor, Tdc, WindowLaw, correlation, histogram, photon_line};
 use crate::photon::{PhotonStream, PixelLight, SpadEvent};
-use crate::units::Time;
 use counting::Counting;
 use sight::Sight;
 
@@ -110,7 +109,8 @@ impl Window {
     /// Counts pulses, sorted by time, of which no bin takes two parts.
     fn count_pulses(&self, pulses: &[SpadEvent], window: &OpenWindow, hits: &mut [i64]) {
         if self.sensor.tdc == Tdc::DelayLine {
-            let edges = self.line_edges(pulses);
+            let mut edges = pulses.to_vec();
+            self.keep_line_edges(&mut edges);
             return self.count_between_edges(&edges, window, hits);
         }
         if !self.law.has_clk_bins() {
@@ -126,13 +126,11 @@ impl Window {
         }
     }
 
-    /// Those of some pulses that leave an edge on the photon line.
-    fn line_edges(&self, pulses: &[SpadEvent]) -> Vec<SpadEvent> {
-        let pulses: Vec<(Time, u8)> = pulses.iter().map(|p| (p.time, p.spad)).collect();
+    /// Keeps those of some pulses that leave an edge on the photon line.
+    fn keep_line_edges(&self, pulses: &mut Vec<SpadEvent>) {
         let stage = self.law.timing().photon_line_stage;
-        let edges = photon_line::model(&pulses, self.sensor.spads(), stage);
-        let event = |(time, spad)| SpadEvent { time, spad };
-        edges.into_iter().map(event).collect()
+        let of = |pulse: &SpadEvent| (pulse.time, pulse.spad);
+        photon_line::model(pulses, of, self.sensor.spads(), stage);
     }
 
     /// The same by the edges of the bins, whatever those are: laser cycle by laser cycle, leaving out those without pulses.

@@ -7,8 +7,11 @@
 //!
 //! What a window's photons do depends on the SPADs' state before. Where that is not known, the slot before is drawn as
 //! well, and so on, over cycles and groups, at the worst to the beginning of the exposure.
+//!
+//! A draw has the photons of a slot in all laser cycles of a group. They are kept by cycle, for the next window of the group
+//! that asks for them.
 
-use crate::photon::{Draw, Photon, PhotonStream, PixelStream, Span};
+use crate::photon::{Draw, Group, Photon, PhotonStream, PixelStream, Span};
 use crate::units::Time;
 
 /// Photons of a macropixel from some slot on, ever further back.
@@ -42,13 +45,14 @@ impl<'a> Past<'a> {
         (!self.is_everything()).then(|| start() + Time::from_fs(slot_fs))
     }
 
-    /// Draws the slot before, if there is one, and appends its photons that fall on SPADs of the set `spads`, in no
-    /// particular order. Returns how many photons were drawn.
+    /// Goes back to the slot before, if there is one, and appends those of its photons of one of the `parts` of the light that
+    /// fall on SPADs of the set `spads`, in no particular order. Returns how many photons were drawn.
     pub(super) fn extend(
         &mut self,
-        pixel: &PixelStream<'_>,
+        parts: &[PixelStream<'_>],
+        part: usize,
         spads: u64,
-        draw: &mut Draw,
+        draws: &mut PastDraws,
         photons: &mut Vec<Photon>,
     ) -> u64 {
         if self.is_everything() {
@@ -64,23 +68,31 @@ impl<'a> Past<'a> {
         }
         let slot_fs = self.stream.slots().start_fs(self.slot);
         let end_fs = (end - start(self.cycle)).as_fs();
-        let background = Span {
-            slots: self.slot..self.slot + 1,
-            within_fs: 0..0,
+        let light = &parts[part];
+        let before = draws.drawn;
+        let mut push = |cycle: u32, (_, time_fs, spad): PastPhoton| {
+            let time = start(cycle) + Time::from_fs(time_fs);
+            if time >= Time::ZERO && spads >> spad & 1 != 0 {
+                photons.push(Photon {
+                    time,
+                    spad,
+                    breeds: light.breeds(),
+                });
+            }
         };
-        let mut drawn = draw_part(pixel, self.cycle, &background, spads, draw, photons);
-        for later in pixel.echoes_within(&(slot_fs..end_fs)) {
+        for photon in draws.of(light, part, self.cycle, What::Slot(self.slot)) {
+            push(self.cycle, photon);
+        }
+        for later in light.echoes_within(&(slot_fs..end_fs)) {
             if let Some(cycle) = self.cycle_after(later) {
                 let moved_fs = (start(cycle) - start(self.cycle)).as_fs();
-                let echo = Span {
-                    slots: 0..0,
-                    within_fs: slot_fs - moved_fs..end_fs - moved_fs,
-                };
-                drawn += draw_part(pixel, cycle, &echo, spads, draw, photons);
+                let within_fs = slot_fs - moved_fs..end_fs - moved_fs;
+                let echo = draws.of(light, part, cycle, What::Echo);
+                echo.filter(|(_, time_fs, _)| within_fs.contains(time_fs))
+                    .for_each(|photon| push(cycle, photon));
             }
         }
-        photons.retain(|photon| photon.time >= Time::ZERO);
-        drawn
+        draws.drawn - before
     }
 
     /// The laser cycle so many later, if the exposure has it.
@@ -90,26 +102,104 @@ impl<'a> Past<'a> {
     }
 }
 
-/// Appends the photons in a part of one laser cycle that fall on SPADs of a set. Returns how many photons were drawn.
-fn draw_part(
-    pixel: &PixelStream<'_>,
-    cycle: u32,
-    span: &Span,
-    spads: u64,
-    draw: &mut Draw,
-    photons: &mut Vec<Photon>,
-) -> u64 {
-    let group = pixel.group_of(cycle);
-    pixel.draw(group, span, draw);
-    let start = pixel.cycle_start(cycle);
-    let wanted = cycle - group.first_cycle();
-    photons.extend(draw.photons(pixel).filter_map(|(place, time_fs)| {
-        let (cycle, spad) = group.split(place);
-        (cycle == wanted && spads >> spad & 1 != 0).then(|| Photon {
-            time: start + Time::from_fs(time_fs),
-            spad,
-            breeds: pixel.breeds(),
-        })
-    }));
-    draw.len() as u64
+/// Laser cycle in its group, time after the start of the cycle, fs, and SPAD.
+type PastPhoton = (u32, i64, u8);
+
+/// What was drawn of a macropixel's past.
+#[derive(Debug, Default)]
+pub(super) struct PastDraws {
+    draw: Draw,
+    kept: Vec<PastDraw>,
+    /// Of `kept`, the first ones; the others have room for the next.
+    in_use: usize,
+    /// Photons.
+    drawn: u64,
+}
+
+/// Photons of one part of the light in all laser cycles of a group.
+#[derive(Debug)]
+struct PastDraw {
+    key: (usize, What, Group),
+    /// By laser cycle.
+    photons: Vec<PastPhoton>,
+}
+
+/// A part of every laser cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum What {
+    /// Background photons of a slot.
+    Slot(u32),
+    /// Its own echo.
+    Echo,
+}
+
+impl PastDraws {
+    /// Forgets all, for another macropixel.
+    pub(super) fn clear(&mut self) {
+        self.in_use = 0;
+        self.drawn = 0;
+    }
+
+    /// The photons of a laser cycle. `light` is part number `part` of the macropixel's.
+    fn of(
+        &mut self,
+        light: &PixelStream<'_>,
+        part: usize,
+        cycle: u32,
+        what: What,
+    ) -> impl Iterator<Item = PastPhoton> {
+        let group = light.group_of(cycle);
+        let key = (part, what, group);
+        let known = self.kept[..self.in_use]
+            .iter()
+            .position(|draw| draw.key == key);
+        let at = match known {
+            Some(at) => at,
+            None => self.draw(light, key),
+        };
+        let wanted = cycle - group.first_cycle();
+        let photons = &self.kept[at].photons;
+        let first = photons.partition_point(|&(cycle, ..)| cycle < wanted);
+        let of_cycle = photons[first..].iter().copied();
+        of_cycle.take_while(move |&(cycle, ..)| cycle == wanted)
+    }
+
+    /// Draws photons, and returns where they are kept.
+    fn draw(&mut self, light: &PixelStream<'_>, key: (usize, What, Group)) -> usize {
+        let (_, what, group) = key;
+        let span = match what {
+            What::Slot(slot) => Span {
+                slots: slot..slot + 1,
+                within_fs: 0..0,
+            },
+            What::Echo => Span {
+                slots: 0..0,
+                within_fs: light.echo_fs(),
+            },
+        };
+        light.draw(group, &span, &mut self.draw);
+        self.drawn += self.draw.len() as u64;
+        // Windows do not come back to a group after the next one.
+        let is_over = |draw: &PastDraw| {
+            let old = draw.key.2;
+            old.first_cycle().saturating_add(old.cycles()) < group.first_cycle()
+        };
+        let over = self.kept[..self.in_use].iter().position(is_over);
+        let at = over.unwrap_or(self.in_use);
+        if at == self.kept.len() {
+            let photons = Vec::new();
+            self.kept.push(PastDraw { key, photons });
+        }
+        self.in_use = self.in_use.max(at + 1);
+        let kept = &mut self.kept[at];
+        kept.key = key;
+        kept.photons.clear();
+        let photons = self.draw.photons(light);
+        kept.photons.extend(photons.map(|(place, time_fs)| {
+            let (cycle, spad) = group.split(place);
+            (cycle, time_fs, spad)
+        }));
+        kept.photons.sort_unstable_by_key(|&(cycle, ..)| cycle);
+        at
+    }
 }

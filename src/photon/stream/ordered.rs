@@ -7,11 +7,13 @@
 //! ```
 
 use multiversion::multiversion;
+use smallvec::{SmallVec, smallvec};
 
 use super::bright::{PER_BLOCK, TILE};
 use super::{PixelStream, nearest};
 use crate::chip::MOST_SPADS;
 use crate::numerics::branchless;
+use crate::photon::avalanches::FEW_SPADS;
 use crate::photon::philox::blocks_from;
 use crate::photon::spad::{DeadTimeLaw, Photon};
 use crate::units::Time;
@@ -126,7 +128,7 @@ impl<'a> PixelStream<'a> {
         OrderedEchoes {
             pixel: self,
             end: self.stream.cycle_start(self.stream.config.laser_cycles),
-            echoes: Vec::new(),
+            echoes: SmallVec::new(),
             next: None,
             drawn: 0,
         }
@@ -138,7 +140,7 @@ pub struct OrderedEchoes<'a> {
     pixel: &'a PixelStream<'a>,
     /// End of the exposure.
     end: Time,
-    echoes: Vec<OrderedEcho>,
+    echoes: SmallVec<[OrderedEcho; 1]>,
     /// The next photon of all of them.
     next: Option<Photon>,
     drawn: u64,
@@ -149,9 +151,9 @@ struct OrderedEcho {
     cycle: u32,
     start: Time,
     /// Its next photon on each SPAD.
-    next: [Time; MOST_SPADS],
+    next: SmallVec<[Time; FEW_SPADS]>,
     /// How many have been drawn on each SPAD.
-    drawn: [u32; MOST_SPADS],
+    drawn: SmallVec<[u32; FEW_SPADS]>,
 }
 
 impl OrderedEchoes<'_> {
@@ -164,14 +166,25 @@ impl OrderedEchoes<'_> {
         let mut echo = OrderedEcho {
             cycle,
             start,
-            next: [start; MOST_SPADS],
-            drawn: [0; MOST_SPADS],
+            next: SmallVec::new(),
+            drawn: smallvec![1; self.pixel.stream.spads()],
         };
+        let mut words = [0; PER_BLOCK];
         for spad in 0..self.pixel.stream.spads() {
-            self.pixel.draw_next(&mut echo, spad, None);
+            if spad % PER_BLOCK == 0 {
+                words = self.pixel.echo_block(cycle, 0, spad);
+            }
+            let time_fs = self.pixel.arrival_fs(0.0, words[spad % PER_BLOCK]);
+            echo.next.push(start + Time::from_fs(time_fs));
+            self.pixel.skip_before_exposure(&mut echo, spad);
         }
         self.echoes.push(echo);
         self.next = self.earliest();
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.echoes.is_empty()
     }
 
     /// Forgets the echoes that are over.
@@ -193,10 +206,7 @@ impl OrderedEchoes<'_> {
     }
 
     fn earliest(&self) -> Option<Photon> {
-        let times = self
-            .echoes
-            .iter()
-            .flat_map(|echo| (0u8..).zip(&echo.next[..self.pixel.stream.spads()]));
+        let times = self.echoes.iter().flat_map(|echo| (0u8..).zip(&echo.next));
         let (&time, spad) = times.map(|(spad, time)| (time, spad)).min()?;
         let photon = Photon {
             time,
@@ -227,7 +237,7 @@ impl OrderedEchoes<'_> {
                     let of_echo = pixel.last_until(echo, spad, first, until);
                     last = last.max(Some(of_echo).filter(|&time| time > from));
                 }
-                pixel.draw_next(echo, spad, Some(until));
+                pixel.draw_next(echo, spad, until);
             }
             let Some(last) = last else {
                 if is_changed {
@@ -243,33 +253,37 @@ impl OrderedEchoes<'_> {
 impl PixelStream<'_> {
     /// The next random word of a laser cycle's echo on a SPAD, of which `drawn` have been drawn.
     pub fn echo_word(&self, cycle: u32, spad: usize, drawn: &mut u32) -> u32 {
-        let second =
-            *drawn * self.stream.spads().div_ceil(PER_BLOCK) as u32 + (spad / PER_BLOCK) as u32;
+        let words = self.echo_block(cycle, *drawn, spad);
         *drawn += 1;
-        let counter = [cycle, second, self.pixel, self.kind.bright_echo()];
-        rand_philox::philox4x32_10(counter, self.key)[spad % PER_BLOCK]
+        words[spad % PER_BLOCK]
     }
 
-    /// Draws the first photon of an echo, or the first after a time.
-    fn draw_next(&self, echo: &mut OrderedEcho, spad: usize, after: Option<Time>) {
-        let time_fs = match after {
-            None => self.arrival_fs(0.0, self.echo_word(echo.cycle, spad, &mut echo.drawn[spad])),
-            Some(time) => {
-                let after_fs = (time - echo.start).as_fs();
-                match self.is_over(after_fs) {
-                    true => NEVER_FS,
-                    false => {
-                        let word = self.echo_word(echo.cycle, spad, &mut echo.drawn[spad]);
-                        self.next_arrival_fs(after_fs, word)
-                    }
-                }
+    /// The random words of a SPAD and those that share its block, of which `drawn` have been drawn.
+    fn echo_block(&self, cycle: u32, drawn: u32, spad: usize) -> [u32; PER_BLOCK] {
+        let second =
+            drawn * self.stream.spads().div_ceil(PER_BLOCK) as u32 + (spad / PER_BLOCK) as u32;
+        let counter = [cycle, second, self.pixel, self.kind.bright_echo()];
+        rand_philox::philox4x32_10(counter, self.key)
+    }
+
+    /// Draws the first photon of an echo after a time.
+    fn draw_next(&self, echo: &mut OrderedEcho, spad: usize, after: Time) {
+        let after_fs = (after - echo.start).as_fs();
+        let time_fs = match self.is_over(after_fs) {
+            true => NEVER_FS,
+            false => {
+                let word = self.echo_word(echo.cycle, spad, &mut echo.drawn[spad]);
+                self.next_arrival_fs(after_fs, word)
             }
         };
-        let time = echo.start + Time::from_fs(time_fs);
-        // What comes before the exposure is no photon, and the SPAD waits for the next one.
-        echo.next[spad] = time;
-        if time < Time::ZERO {
-            self.draw_next(echo, spad, Some(Time::from_fs(-1)));
+        echo.next[spad] = echo.start + Time::from_fs(time_fs);
+        self.skip_before_exposure(echo, spad);
+    }
+
+    /// What comes before the exposure is no photon, and the SPAD waits for the next one.
+    fn skip_before_exposure(&self, echo: &mut OrderedEcho, spad: usize) {
+        if echo.next[spad] < Time::ZERO {
+            self.draw_next(echo, spad, Time::from_fs(-1));
         }
     }
 

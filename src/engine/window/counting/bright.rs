@@ -125,7 +125,8 @@ impl Counting<'_> {
             }
             self.events.clear();
             let (photons, events) = (&self.photons, &mut self.events);
-            let known = avalanches.run(photons, Some(&mut echoes), until, wanted_from, events);
+            let seen = Some(&mut echoes).filter(|echoes| !echoes.is_empty());
+            let known = avalanches.run(photons, seen, until, wanted_from, events);
             if known.is_ok() {
                 break self.photons.len() as u64 + echoes.drawn();
             }

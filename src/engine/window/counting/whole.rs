@@ -174,7 +174,7 @@ impl Counting<'_> {
 
     /// Counts the `events` of one laser cycle, which starts at `start`; `seen` photons in the window were drawn.
     pub(super) fn count_events(
-        &self,
+        &mut self,
         pixel: &mut Pixel<'_>,
         window: &Placed<'_>,
         start: Time,
@@ -196,17 +196,17 @@ impl Counting<'_> {
         pixel.work.lost_to_dead_time += seen.saturating_sub(pulses);
     }
 
-    /// Counts `events` where delay lines time them: bins with an odd number of edges.
+    /// Counts `events` where delay lines time them, of which it leaves the edges: bins with an odd number of those.
     fn count_line_edges(
-        &self,
+        &mut self,
         pixel: &mut Pixel<'_>,
         row_of: impl Fn(&SpadEvent) -> i64,
         seen: u64,
     ) {
         let pulses = self.events.iter().filter(|event| row_of(event) > 0).count() as u64;
         let mut counted = 0;
-        let edges = self.engine.line_edges(&self.events);
-        for of_bin in edges.chunk_by(|a, b| row_of(a) == row_of(b)) {
+        self.engine.keep_line_edges(&mut self.events);
+        for of_bin in self.events.chunk_by(|a, b| row_of(a) == row_of(b)) {
             let row = row_of(&of_bin[0]);
             if row > 0 && of_bin.len() % 2 == 1 {
                 pixel.hits[row as usize - 1] += 1;
@@ -224,15 +224,11 @@ impl Counting<'_> {
         let start = self.stream.cycle_start(laser_cycle);
         let wanted_from = start + Time::from_fs(pixel.sight.first_fs - ROUNDING_FS);
         let until = start + Time::from_fs(pixel.sight.until_fs);
-        let past = |part| (part, pixel.spans(part).past(self.stream, laser_cycle));
-        let mut pasts: SmallVec<[(&PixelStream<'_>, Past<'_>); 2]> = SmallVec::new();
-        pasts.push(past(&pixel.parts[0]));
-        for part in &pixel.parts[1..] {
-            pasts.push(past(part));
-        }
+        let past = |part| pixel.spans(part).past(self.stream, laser_cycle);
+        let mut pasts: SmallVec<[Past<'_>; 2]> = pixel.parts.iter().map(past).collect();
         loop {
             // Photons that breed are known from earlier on.
-            let known_from = pasts[0].1.known_from();
+            let known_from = pasts[0].known_from();
             self.photons.sort_unstable();
             let earlier =
                 known_from.map_or(0, |from| self.photons.partition_point(|p| p.time < from));
@@ -247,9 +243,10 @@ impl Counting<'_> {
             if known.is_ok() {
                 return;
             }
-            let (extra, photons) = (&mut self.extra, &mut self.photons);
-            for (part, past) in &mut pasts {
-                pixel.work.photons_drawn += past.extend(part, spads, extra, photons);
+            let (draws, photons) = (&mut self.past, &mut self.photons);
+            for (part, past) in pasts.iter_mut().enumerate() {
+                let drawn = past.extend(pixel.parts, part, spads, draws, photons);
+                pixel.work.photons_drawn += drawn;
             }
         }
     }
