@@ -92,11 +92,11 @@ pub fn model<P: Copy>(
             is_near
         });
         let end = first + 1 + near.count();
-        // Pulses that are no delay apart decide about each other, and about no others.
+        // Pulses that are no delay apart decide about each other, and about no others; two leave no edge.
         if end - first == 1 {
             pulses[left] = pulses[first];
             left += 1;
-        } else {
+        } else if end - first > 2 || spads == 1 {
             let together = (first..end).map(|at| {
                 let (time, spad) = of(&pulses[at]);
                 (time, spad, at)

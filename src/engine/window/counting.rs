@@ -20,7 +20,7 @@ use super::echo_rows::EchoRows;
 use super::past::PastDraws;
 use super::sight::{Sight, Spans};
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Spacing, Tables};
-use super::{Window, Work, taken};
+use super::{Window, Work};
 use crate::photon::{Draw, Group, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SpadEvent};
 use crate::units::Time;
 use by_window::ByWindow;
@@ -61,6 +61,8 @@ pub(super) struct Counting<'a> {
     /// Photons by cycle of the group, where whole cycles are settled.
     by_cycle: Vec<(u32, Photon)>,
     events: Vec<SpadEvent>,
+    /// The same with their bin + 1; 0 outside the window.
+    placed: Vec<(SpadEvent, usize)>,
     /// Laser cycles side by side, in bright light.
     tile: Option<Box<Tile>>,
 }
@@ -89,10 +91,13 @@ impl Drawn {
         if self.previous.is_empty() {
             return;
         }
-        let photons = self.previous.photons(light).filter_map(|(place, time_fs)| {
-            let (cycle, spad) = group.split(place);
-            (cycle + 1 == group.cycles()).then_some((Place::from(spad), time_fs))
-        });
+        let photons =
+            self.previous
+                .photons(light, group.cycles())
+                .filter_map(|(place, time_fs)| {
+                    let (cycle, spad) = group.split(place);
+                    (cycle + 1 == group.cycles()).then_some((Place::from(spad), time_fs))
+                });
         self.carried.extend(photons);
     }
 
@@ -110,17 +115,18 @@ impl Drawn {
             spad,
             breeds: light.breeds(),
         };
-        let own = self.own.photons(light).filter_map(move |(place, time_fs)| {
-            let (cycle, spad) = group.split(place);
-            (cycle < cycles).then(|| (cycle, photon(first + cycle, spad, time_fs)))
-        });
-        let previous = self
-            .previous
-            .photons(light)
-            .filter_map(move |(place, time_fs)| {
+        let own = self
+            .own
+            .photons(light, cycles)
+            .map(move |(place, time_fs)| {
                 let (cycle, spad) = group.split(place);
-                (cycle + 1 < cycles).then(|| (cycle + 1, photon(first + cycle, spad, time_fs)))
+                (cycle, photon(first + cycle, spad, time_fs))
             });
+        let previous = self.previous.photons(light, cycles.saturating_sub(1));
+        let previous = previous.map(move |(place, time_fs)| {
+            let (cycle, spad) = group.split(place);
+            (cycle + 1, photon(first + cycle, spad, time_fs))
+        });
         let carried = self.carried.iter();
         let carried =
             carried.map(move |&(spad, time_fs)| (0, photon(first - 1, spad as u8, time_fs)));
@@ -173,6 +179,7 @@ impl<'a> Counting<'a> {
             photons: Vec::new(),
             by_cycle: Vec::new(),
             events: Vec::new(),
+            placed: Vec::new(),
             tile: None,
         }
     }

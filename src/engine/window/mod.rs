@@ -110,7 +110,7 @@ impl Window {
     fn count_pulses(&self, pulses: &[SpadEvent], window: &OpenWindow, hits: &mut [i64]) {
         if self.sensor.tdc == Tdc::DelayLine {
             let mut edges = pulses.to_vec();
-            self.keep_line_edges(&mut edges);
+            self.keep_line_edges(&mut edges, |pulse| *pulse);
             return self.count_between_edges(&edges, window, hits);
         }
         if !self.law.has_clk_bins() {
@@ -127,9 +127,12 @@ impl Window {
     }
 
     /// Keeps those of some pulses that leave an edge on the photon line.
-    fn keep_line_edges(&self, pulses: &mut Vec<SpadEvent>) {
+    fn keep_line_edges<P: Copy>(&self, pulses: &mut Vec<P>, event_of: impl Fn(&P) -> SpadEvent) {
         let stage = self.law.timing().photon_line_stage;
-        let of = |pulse: &SpadEvent| (pulse.time, pulse.spad);
+        let of = |pulse: &P| {
+            let event = event_of(pulse);
+            (event.time, event.spad)
+        };
         photon_line::model(pulses, of, self.sensor.spads(), stage);
     }
 

@@ -194,7 +194,7 @@ impl PastDraws {
         let kept = &mut self.kept[at];
         kept.key = key;
         kept.photons.clear();
-        let photons = self.draw.photons(light);
+        let photons = self.draw.photons(light, group.cycles());
         kept.photons.extend(photons.map(|(place, time_fs)| {
             let (cycle, spad) = group.split(place);
             (cycle, time_fs, spad)

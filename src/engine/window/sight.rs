@@ -107,14 +107,15 @@ impl Rows {
     /// Bin + 1 of a time, 0 outside the window; `None` where it may be on either side of an edge.
     #[inline]
     pub(super) fn row_of(&self, time_fs: i64) -> Option<usize> {
-        let (early_fs, late_fs) = (time_fs - ROUNDING_FS, time_fs + ROUNDING_FS);
-        let (mut passed, mut perhaps) = (0, 0);
-        for &edge_fs in &self.edges_fs {
-            passed += usize::from(edge_fs <= early_fs);
-            perhaps += usize::from(edge_fs <= late_fs);
-        }
-        let is_inside = passed < self.edges_fs.len();
-        (passed == perhaps).then_some(if is_inside { passed } else { 0 })
+        let edges_fs = &self.edges_fs;
+        let passed = edges_fs.iter().filter(|edge| **edge <= time_fs).count();
+        let is_near = |at: usize| {
+            let edge_fs = edges_fs.get(at);
+            edge_fs.is_some_and(|edge_fs| (edge_fs - time_fs).abs() <= ROUNDING_FS)
+        };
+        let is_inside = passed < edges_fs.len();
+        let is_certain = !is_near(passed) && !is_near(passed.wrapping_sub(1));
+        is_certain.then_some(if is_inside { passed } else { 0 })
     }
 }
 

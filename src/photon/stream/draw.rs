@@ -192,28 +192,43 @@ impl Draw {
         self.within_fs.clone()
     }
 
-    /// Every photon, as place and time after the start of its cycle in fs, in no particular order. `pixel` is whose they
-    /// are. No background photon comes before the exposure.
-    pub fn photons(&self, pixel: &PixelStream<'_>) -> impl Iterator<Item = (Place, i64)> {
+    /// Every photon of the first `cycles` laser cycles of the group, as place and time after the start of its cycle in fs, in no
+    /// particular order. `pixel` is whose they are. No background photon comes before the exposure.
+    pub fn photons(
+        &self,
+        pixel: &PixelStream<'_>,
+        cycles: u32,
+    ) -> impl Iterator<Item = (Place, i64)> {
         let words = self.words();
         let slots = pixel.slots();
+        // Short exposures need few of a group's photons; only of those the times are worked out.
+        let is_wanted = move |word: u32| self.group.split(self.group.place(word)).0 < cycles;
         let background = self.runs.iter().flat_map(move |run| {
             let rows = run.blocks().into_iter().zip(words);
             rows.flat_map(move |(blocks, words)| {
                 let photon =
                     move |&word: &u32| (self.group.place(word), slots.time_fs(run.slot, word));
-                words[blocks].iter().map(photon)
+                let wanted = words[blocks].iter().filter(move |word| is_wanted(**word));
+                wanted.map(photon)
             })
         });
-        let signal = self
-            .echo_numbers()
+        let halves = self.echo().into_iter().zip(self.echo_photons());
+        let signal = halves
+            .enumerate()
+            .flat_map(move |(half, ([_, high], photons))| {
+                let wanted = (0..photons).filter(move |&at| is_wanted(high[at]));
+                wanted.map(move |at| half * self.half_an_echo() + at)
+            });
+        let signal = signal
             .map(|photon| pixel.signal_photon(self, photon))
             .filter(|(_, time_fs)| self.within_fs.contains(time_fs));
         let is_first_group = self.group.first_cycle() == 0;
         let background = background.filter(move |&(place, time_fs)| {
             !is_first_group || time_fs >= 0 || self.group.split(place).0 > 0
         });
-        background.chain(signal).chain(self.kept.iter().copied())
+        let kept = self.kept.iter().copied();
+        let kept = kept.filter(move |&(place, _)| self.group.split(place).0 < cycles);
+        background.chain(signal).chain(kept)
     }
 
     /// Keeps only those photons that `pixel` keeps. They are worked out here, and are no words any more.
@@ -269,7 +284,7 @@ impl ByCycle {
     pub(super) fn sort(&mut self, draw: &Draw, pixel: &PixelStream<'_>) {
         self.ends.clear();
         self.ends.resize(GROUP as usize, 0);
-        for (place, _) in draw.photons(pixel) {
+        for (place, _) in draw.photons(pixel, GROUP) {
             self.ends[draw.group.split(place).0 as usize] += 1;
         }
         let mut total = 0;
@@ -279,7 +294,7 @@ impl ByCycle {
         }
         self.photons.clear();
         self.photons.resize(total, 0);
-        for (place, time_fs) in draw.photons(pixel) {
+        for (place, time_fs) in draw.photons(pixel, GROUP) {
             let (cycle, spad) = draw.group.split(place);
             let end = &mut self.ends[cycle as usize];
             self.photons[*end] = time_fs << SPAD_SHIFT | i64::from(spad);

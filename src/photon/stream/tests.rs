@@ -178,7 +178,7 @@ fn any_part_can_be_drawn_alone() {
     for group in groups.into_iter().rev() {
         for cut in cuts.windows(2).rev() {
             pixel.draw(group, &stream.span(cut[0]..cut[1]), &mut draw);
-            parts.extend(draw.photons(pixel).filter_map(|(place, time_fs)| {
+            parts.extend(draw.photons(pixel, GROUP).filter_map(|(place, time_fs)| {
                 let (cycle, spad) = group.split(place);
                 let cycle = group.first_cycle() + cycle;
                 let time = stream.config().cycle_start(cycle) + Time::from_fs(time_fs);
@@ -292,7 +292,7 @@ fn neighbours_in_pixel_slot_group_and_seed_are_independent() {
             &mut draw,
         );
         let mut counts = vec![0.0; GROUP as usize];
-        for (place, _) in draw.photons(pixel) {
+        for (place, _) in draw.photons(pixel, GROUP) {
             counts[draw.group().split(place).0 as usize] += 1.0;
         }
         counts

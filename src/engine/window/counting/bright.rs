@@ -56,8 +56,7 @@ impl Counting<'_> {
     /// Counts a macropixel.
     pub(super) fn count_bright(&mut self, pixel: &mut Pixel<'_>) {
         let laser_cycles = self.stream.config().laser_cycles;
-        let has_clk_bins = self.engine.law.has_clk_bins();
-        let layout = self.layout(pixel).filter(|_| has_clk_bins);
+        let layout = self.layout(pixel);
         let alone = layout
             .as_ref()
             .map_or(laser_cycles, |layout| layout.first_cycle);
@@ -138,7 +137,8 @@ impl Counting<'_> {
         let seen = seen
             .filter(|photon| window.row_of(photon.time - start).is_some())
             .count();
-        self.count_events(pixel, &window, start, seen as u64);
+        let pulses = self.count_events(pixel, &window, start);
+        pixel.work.lost_to_dead_time += (seen as u64).saturating_sub(pulses);
     }
 
     /// Laser cycles whose echoes may have photons between two times about `laser_cycle`.

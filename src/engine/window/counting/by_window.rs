@@ -47,17 +47,16 @@ impl ByWindow {
         // Only what the windows of the group before left for this one.
         self.photons.retain(|&(window, _)| window >= first);
         for (draw, later) in [(&self.own, 0), (&self.previous, 1)] {
-            for (place, time_fs) in draw.photons(light) {
+            let cycles = group.cycles_in(stream.config().laser_cycles.saturating_sub(later));
+            for (place, time_fs) in draw.photons(light, cycles) {
                 let (cycle, spad) = group.split(place);
                 let cycle = group.first_cycle() + cycle;
-                if cycle + later < stream.config().laser_cycles {
-                    let photon = Photon {
-                        time: stream.cycle_start(cycle) + Time::from_fs(time_fs),
-                        spad,
-                        breeds: light.breeds(),
-                    };
-                    self.photons.push((cycle + later, photon));
-                }
+                let photon = Photon {
+                    time: stream.cycle_start(cycle) + Time::from_fs(time_fs),
+                    spad,
+                    breeds: light.breeds(),
+                };
+                self.photons.push((cycle + later, photon));
             }
         }
         self.photons.sort_unstable_by_key(|&(window, _)| window);

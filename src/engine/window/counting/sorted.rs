@@ -136,10 +136,10 @@ impl Counting<'_> {
         for part in pixel.parts {
             part.draw(group, &spans.own, draw);
             pixel.work.photons_drawn += draw.len() as u64;
-            words.extend(draw.photons(part).filter_map(|(place, time_fs)| {
+            words.extend(draw.photons(part, cycles).filter_map(|(place, time_fs)| {
                 let (cycle, spad) = group.split(place);
                 let is_before_exposure = is_first && cycle == 0 && time_fs < 0;
-                (cycle < cycles && time_fs < until_fs && !is_before_exposure)
+                (time_fs < until_fs && !is_before_exposure)
                     .then(|| times.word(cycle, time_fs, spad))
             }));
             if spans.previous.slots.is_empty() {
@@ -147,7 +147,7 @@ impl Counting<'_> {
             }
             part.draw(group, &spans.previous, draw);
             pixel.work.photons_drawn += draw.len() as u64;
-            for (place, time_fs) in draw.photons(part) {
+            for (place, time_fs) in draw.photons(part, cycles) {
                 let (cycle, spad) = group.split(place);
                 let window = cycle + 1;
                 let laser_cycle = group.first_cycle() + window;

@@ -7,6 +7,8 @@
 //!   row          which SPADs fired
 //! ```
 //!
+//! Where bins are not CLK periods, rows are not kept but the pulses themselves, and each lane's are counted in the end.
+//!
 //! A lane that depends on what came before its first block, has a photon within a few femtoseconds of a bin's edge, or one that
 //! breeds, is left to [`count_bright_cycle`](super::Counting::count_bright_cycle).
 
@@ -16,7 +18,8 @@ use super::bright::Beginning;
 use super::{Counting, Pixel};
 use crate::engine::window::codes::{ROWS, SPADS};
 use crate::engine::window::sight::ROUNDING_FS;
-use crate::photon::{DeadTimeLaw, NEVER_FS, PixelStream, TILE, spad_of};
+use crate::photon::{DeadTimeLaw, NEVER_FS, PixelStream, SpadEvent, TILE, spad_of};
+use crate::units::Time;
 
 /// Binary places of a position in CLK periods.
 const FRACTION_BITS: u32 = 20;
@@ -40,6 +43,8 @@ pub(super) struct Layout {
     /// Distance from an edge that leaves a position in doubt.
     doubt: u64,
     rows: usize,
+    /// Whether bins are CLK periods.
+    has_clk_bins: bool,
 }
 
 /// The state of all lanes. Times are fs after the start of the lane's laser cycle.
@@ -55,6 +60,8 @@ pub(super) struct Tile {
     drawn: [[u32; SPADS]; TILE],
     /// SPADs that fired, by row; twice is not at all.
     fired: [[u16; ROWS]; TILE],
+    /// Pulses of each lane, after the start of its laser cycle, where bins are not CLK periods; in no particular order.
+    pulses: [Vec<SpadEvent>; TILE],
     /// Lanes that are left to others.
     undecided: u16,
     /// Of each lane.
@@ -78,6 +85,7 @@ impl Default for Tile {
             second_words: [[0; TILE]; SPADS],
             drawn: [[0; SPADS]; TILE],
             fired: [[0; ROWS]; TILE],
+            pulses: Default::default(),
             undecided: 0,
             tally: [Tally::default(); TILE],
         }
@@ -95,6 +103,7 @@ impl Tile {
         for fired in &mut self.fired {
             fired[..=layout.rows].fill(0);
         }
+        self.pulses.iter_mut().for_each(Vec::clear);
         self.undecided = 0;
         self.tally = [Tally::default(); TILE];
     }
@@ -131,6 +140,13 @@ impl Tile {
     fn fire(&mut self, layout: &Layout, lane: usize, spad: usize, time_fs: i64) {
         self.blind_until_fs[lane][spad] = time_fs + layout.dead_fs;
         self.unknown[lane] &= !(1 << spad);
+        if !layout.has_clk_bins {
+            if time_fs >= layout.wanted_from_fs {
+                let (time, spad) = (Time::from_fs(time_fs), spad as u8);
+                self.pulses[lane].push(SpadEvent { time, spad });
+            }
+            return;
+        }
         let into_fs = time_fs - layout.origin_fs;
         if into_fs < 0 {
             return;
@@ -249,6 +265,7 @@ impl Counting<'_> {
             periods_per_fs: (2f64.powi(64) / period_fs) as u64,
             doubt: doubt.ceil() as u64 + 3,
             rows: self.engine.sensor.bins,
+            has_clk_bins: self.engine.law.has_clk_bins(),
         })
     }
 
@@ -330,6 +347,14 @@ impl Counting<'_> {
         for lane in 0..lanes {
             if tile.undecided >> lane & 1 != 0 {
                 self.count_bright_cycle(pixel, cycle(lane));
+                continue;
+            }
+            if !layout.has_clk_bins {
+                std::mem::swap(&mut self.events, &mut tile.pulses[lane]);
+                self.events.sort_unstable();
+                let window = self.window(pixel.sight, cycle(lane));
+                self.count_events(pixel, &window, Time::ZERO);
+                pixel.work.lost_to_dead_time += u64::from(tile.tally[lane].lost);
                 continue;
             }
             pixel.work.pulses += u64::from(tile.tally[lane].pulses);

@@ -4,11 +4,11 @@
 use smallvec::SmallVec;
 
 use super::by_window::ByWindow;
-use super::{Counting, Pixel, Placed, taken};
+use super::{Counting, Pixel, Placed};
 use crate::chip::Tdc;
 use crate::engine::window::past::Past;
 use crate::engine::window::sight::ROUNDING_FS;
-use crate::photon::{Draw, Group, Photon, PixelStream, SpadEvent, Span};
+use crate::photon::{Draw, Group, Photon, PixelStream, Span};
 use crate::units::Time;
 
 impl Counting<'_> {
@@ -96,7 +96,7 @@ impl Counting<'_> {
             while next < end {
                 let other = light.group_of(next as u32);
                 light.draw(other, &span, &mut draw);
-                for (place, time_fs) in draw.photons(light) {
+                for (place, time_fs) in draw.photons(light, other.cycles()) {
                     let (cycle, spad) = other.split(place);
                     let cycle = other.first_cycle() + cycle;
                     let window = i64::from(cycle) - later;
@@ -169,53 +169,52 @@ impl Counting<'_> {
         let is_seen = |photon: &&Photon| window.row_of(photon.time - start).is_some();
         let seen = self.photons.iter().filter(is_seen).count() as u64;
         self.detect(pixel, laser_cycle, u64::MAX);
-        self.count_events(pixel, &window, start, seen);
+        let pulses = self.count_events(pixel, &window, start);
+        pixel.work.lost_to_dead_time += seen.saturating_sub(pulses);
     }
 
-    /// Counts the `events` of one laser cycle, which starts at `start`; `seen` photons in the window were drawn.
+    /// Counts the `events` of one laser cycle, which starts at `start`. Returns how many are in the window.
     pub(super) fn count_events(
         &mut self,
         pixel: &mut Pixel<'_>,
         window: &Placed<'_>,
         start: Time,
-        seen: u64,
-    ) {
-        let row_of = |event: &SpadEvent| window.row_of(event.time - start).unwrap_or(0) as i64;
-        if self.engine.sensor.tdc == Tdc::DelayLine {
-            return self.count_line_edges(pixel, row_of, seen);
+    ) -> u64 {
+        self.placed.clear();
+        self.placed.extend(self.events.iter().map(|event| {
+            let row = window.row_of(event.time - start).unwrap_or(0);
+            (*event, row)
+        }));
+        let pulses = self.placed.iter().filter(|(_, row)| *row > 0).count() as u64;
+        if pulses == 0 {
+            return 0;
         }
-        let mut alone = 0;
-        for (row, spads) in taken(&self.events, row_of).filter(|(row, _)| *row > 0) {
-            alone += u64::from(spads.count_ones());
-            pixel.hits[row as usize - 1] += self.engine.adds(spads);
-            pixel.work.clk_periods_visited += 1;
-        }
-        let pulses = self.events.iter().filter(|event| row_of(event) > 0).count() as u64;
         pixel.work.pulses += pulses;
-        pixel.work.cancelled += pulses - alone;
-        pixel.work.lost_to_dead_time += seen.saturating_sub(pulses);
-    }
-
-    /// Counts `events` where delay lines time them, of which it leaves the edges: bins with an odd number of those.
-    fn count_line_edges(
-        &mut self,
-        pixel: &mut Pixel<'_>,
-        row_of: impl Fn(&SpadEvent) -> i64,
-        seen: u64,
-    ) {
-        let pulses = self.events.iter().filter(|event| row_of(event) > 0).count() as u64;
-        let mut counted = 0;
-        self.engine.keep_line_edges(&mut self.events);
-        for of_bin in self.events.chunk_by(|a, b| row_of(a) == row_of(b)) {
-            let row = row_of(&of_bin[0]);
-            if row > 0 && of_bin.len() % 2 == 1 {
-                pixel.hits[row as usize - 1] += 1;
-                counted += 1;
+        let is_line = self.engine.sensor.tdc == Tdc::DelayLine;
+        if is_line {
+            self.engine
+                .keep_line_edges(&mut self.placed, |(event, _)| *event);
+        }
+        let mut left = 0;
+        for of_bin in self.placed.chunk_by(|a, b| a.1 == b.1) {
+            let row = of_bin[0].1;
+            if row == 0 {
+                continue;
+            }
+            let spads = of_bin
+                .iter()
+                .fold(0, |spads, (event, _)| spads ^ 1 << event.spad);
+            let adds = self.engine.adds(spads);
+            pixel.hits[row - 1] += adds;
+            if is_line {
+                left += adds as u64;
+            } else {
+                left += u64::from(spads.count_ones());
+                pixel.work.clk_periods_visited += 1;
             }
         }
-        pixel.work.pulses += pulses;
-        pixel.work.cancelled += pulses - counted;
-        pixel.work.lost_to_dead_time += seen.saturating_sub(pulses);
+        pixel.work.cancelled += pulses - left;
+        pulses
     }
 
     /// Turns `photons` of the SPADs of a set, in any order, and those before them as far as it takes, into `events`: all
