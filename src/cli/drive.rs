@@ -105,6 +105,8 @@ struct Report<'a> {
     macropixels_reused: u64,
     loads_reused: u32,
     worlds_reused: u32,
+    views: u64,
+    views_reused: u64,
     depths: u64,
     outliers: u64,
     work: Work,
@@ -183,6 +185,8 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         macropixels_reused: 0,
         loads_reused: 0,
         worlds_reused: 0,
+        views: 0,
+        views_reused: 0,
         depths: 0,
         outliers: 0,
         work: Work::default(),
@@ -240,6 +244,8 @@ impl Report<'_> {
         self.macropixels_reused += frame.reused.macropixels as u64;
         self.loads_reused += u32::from(frame.reused.load);
         self.worlds_reused += u32::from(frame.reused.world);
+        self.views += (frame.worlds * frame.pixels.len()) as u64;
+        self.views_reused += frame.reused.views as u64;
         self.depths += summary.depths as u64;
         self.outliers += summary.outliers as u64;
         self.work += frame.work;
@@ -283,8 +289,8 @@ impl Report<'_> {
             of(self.loads_reused.into(), self.frames.into()),
         )
         .row(
-            "worlds not cast again",
-            of(self.worlds_reused.into(), self.frames.into()),
+            "macropixels' views not cast again",
+            of(self.views_reused, self.views),
         );
         let each = ms(self.run_time_s / f64::from(self.frames));
         table.push(

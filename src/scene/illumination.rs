@@ -8,6 +8,7 @@ use super::fog::Fog;
 use super::optics::OffAxis;
 use super::settings::Scene;
 use super::truth::{Glimpse, GroundTruth, View};
+use super::unmoved::Before;
 use crate::photon::{CROSSTALK_DELAY, Glint, PhotonBudget, PixelLight, SpadModel, merged};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
@@ -47,7 +48,7 @@ impl Scene {
     /// arrives after its time of flight. Light far beyond saturation is cut at 10⁴ photons per
     /// pulse and 10¹¹ per second.
     pub fn pixel_light(&self, truth: &GroundTruth) -> Vec<PixelLight> {
-        self.light_on(truth, &SpadModel::default())
+        self.light_on(truth, &SpadModel::default(), None)
     }
 
     /// The light of an exposure of `laser_cycles` of `cycle_s` seconds each on macropixels with these SPADs, in the order of `truth`: of
@@ -65,29 +66,19 @@ impl Scene {
     ) -> Vec<PixelLight> {
         let focal_px = self.lidar_camera(truth.rows, truth.cols).focal_px;
         let segments = self.segments(laser_cycles, cycle_s, focal_px);
-        let lights = match segments.len() {
-            1 => self.light_on(truth, spads),
-            _ => {
-                let seen = segments.iter().map(|cycles| {
-                    let middle = 0.5 * (f64::from(cycles.start) + f64::from(cycles.end));
-                    let scene = self.at(middle * cycle_s);
-                    let truth = GroundTruth::render(&scene, truth.rows, truth.cols);
-                    scene.light_on(&truth, spads)
-                });
-                let starts = segments.iter().map(|cycles| cycles.start);
-                let seen: Vec<(u32, Vec<PixelLight>)> = starts.zip(seen).collect();
-                (0..truth.views.len())
-                    .map(|pixel| timeline(&seen, pixel))
-                    .collect()
-            }
-        };
-        let of_own = |(pixel, light): (usize, PixelLight)| match self
-            .spad_spread(pixel as u32, spads.grid.spads())
-        {
-            Some(spread) => light.with_spads(spread),
-            None => light,
-        };
-        lights.into_iter().enumerate().map(of_own).collect()
+        if segments.len() == 1 {
+            return self.light_after(truth, spads, None);
+        }
+        let seen = segments.iter().map(|cycles| {
+            let middle = 0.5 * (f64::from(cycles.start) + f64::from(cycles.end));
+            let scene = self.at(middle * cycle_s);
+            let truth = GroundTruth::render(&scene, truth.rows, truth.cols);
+            scene.light_on(&truth, spads, None)
+        });
+        let starts = segments.iter().map(|cycles| cycles.start);
+        let seen: Vec<(u32, Vec<PixelLight>)> = starts.zip(seen).collect();
+        let lights = (0..truth.views.len()).map(|pixel| timeline(&seen, pixel));
+        self.on_own_spads(lights.collect(), spads)
     }
 
     /// Laser cycles in each of which the scene may be taken to stand still.
@@ -105,21 +96,68 @@ impl Scene {
         (0..count).map(|n| edge(n)..edge(n + 1)).collect()
     }
 
-    fn light_on(&self, truth: &GroundTruth, spads: &SpadModel) -> Vec<PixelLight> {
+    /// The light of a world that stands still, as [`Scene::light_during`]. A macropixel keeps its light of a world `before` where it
+    /// sees the same, but for crosstalk, which its neighbours have a part in.
+    pub(crate) fn light_after(
+        &self,
+        truth: &GroundTruth,
+        spads: &SpadModel,
+        before: Option<(Before<'_>, &[PixelLight])>,
+    ) -> Vec<PixelLight> {
+        self.on_own_spads(self.light_on(truth, spads, before), spads)
+    }
+
+    /// Light on SPADs that differ, if they do.
+    fn on_own_spads(&self, lights: Vec<PixelLight>, spads: &SpadModel) -> Vec<PixelLight> {
+        let of_own = |(pixel, light): (usize, PixelLight)| match self
+            .spad_spread(pixel as u32, spads.grid.spads())
+        {
+            Some(spread) => light.with_spads(spread),
+            None => light,
+        };
+        lights.into_iter().enumerate().map(of_own).collect()
+    }
+
+    fn light_on(
+        &self,
+        truth: &GroundTruth,
+        spads: &SpadModel,
+        before: Option<(Before<'_>, &[PixelLight])>,
+    ) -> Vec<PixelLight> {
+        let has_crosstalk = spads.crosstalk_probability > 0.0;
+        let before = before.filter(|(before, _)| {
+            let world = before.world;
+            !has_crosstalk
+                && (&world.lidar, &world.light, &world.medium)
+                    == (&self.lidar, &self.light, &self.medium)
+        });
+        let kept = |pixel: usize| {
+            let (before, light) = before?;
+            (before.truth.views[pixel] == truth.views[pixel]).then(|| &light[pixel])
+        };
         let (rows, cols) = (truth.rows, truth.cols);
         let budget = self.photon_budget(rows, cols);
         let off_axis = self.off_axis(&self.lidar_camera(rows, cols));
         let centre_fs = self.pulse_shape().map_or(0.0, |shape| shape.mean_fs());
-        let views = truth.views.par_iter().zip(&off_axis);
-        let mut falling: Vec<Falling> = views
-            .map(|(view, off_axis)| self.falling(view, &budget, off_axis, centre_fs))
-            .collect();
-        if spads.crosstalk_probability > 0.0 {
-            falling = with_crosstalk(&falling, spads, cols as usize);
+        let views = truth.views.par_iter().zip(&off_axis).enumerate();
+        let falling = views.map(|(pixel, (view, off_axis))| match kept(pixel) {
+            Some(light) => Err(light),
+            None => Ok(self.falling(view, &budget, off_axis, centre_fs)),
+        });
+        let mut falling: Vec<Result<Falling, &PixelLight>> = falling.collect();
+        if has_crosstalk {
+            let all: Vec<Falling> = falling.into_iter().flatten().collect();
+            let all = with_crosstalk(&all, spads, cols as usize);
+            falling = all.into_iter().map(Ok).collect();
         }
         let (sigma, resolution) = (self.pulse_sigma(), self.pulse_resolution());
         let fog = Fog::of(self, &budget);
-        let light = |(mut falling, (view, off_axis)): (Falling, (&View, &OffAxis))| {
+        let light = |(falling, (view, off_axis)): (Result<Falling, &PixelLight>, _)| {
+            let (view, off_axis): (&View, &OffAxis) = (view, off_axis);
+            let mut falling = match falling {
+                Ok(falling) => falling,
+                Err(kept) => return kept.clone(),
+            };
             let echoes = merged(&mut falling.glints, sigma, resolution);
             let background = PixelLight::background(falling.background_hz);
             let light = echoes.into_iter().fold(background, PixelLight::with_echo);

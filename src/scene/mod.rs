@@ -24,6 +24,7 @@ mod shape;
 mod spads;
 mod texture;
 mod truth;
+mod unmoved;
 mod vector;
 
 pub(crate) use bounds::Bounds;
@@ -39,6 +40,7 @@ pub use settings::{Lidar, Light, Scene, Stereo};
 pub use shape::{DepthMap, MapFiles, Mesh, Shape};
 pub use texture::{Pattern, Picture, Texture};
 pub use truth::{GroundTruth, Surface};
+pub(crate) use unmoved::Before;
 pub use vector::{Ray, turned};
 
 /// A point or direction, m (or without unit): x right, y down, z forward.

@@ -23,6 +23,7 @@ use super::camera::PinholeCamera;
 use super::cast::{Return, Returns};
 use super::medium::Medium;
 use super::settings::Scene;
+use super::unmoved::{Before, Moved};
 use super::vector::Ray;
 
 /// Rays of a macropixel in a row and in a column.
@@ -94,16 +95,41 @@ pub struct GroundTruth {
 impl GroundTruth {
     /// Looks out of every macropixel of a `rows` × `cols` array.
     pub fn render(scene: &Scene, rows: u32, cols: u32) -> Self {
+        Self::render_after(scene, rows, cols, None).0
+    }
+
+    /// The same, where macropixels keep what they saw of a world `before` that looks the same to them. It is of as many rows and
+    /// columns. Returns how many there are, too.
+    pub(crate) fn render_after(
+        scene: &Scene,
+        rows: u32,
+        cols: u32,
+        before: Option<Before<'_>>,
+    ) -> (Self, usize) {
+        let moved = before.and_then(|before| {
+            debug_assert_eq!((before.truth.rows, before.truth.cols), (rows, cols));
+            Some((Moved::between(before.world, scene)?, before.truth))
+        });
         let camera = scene.lidar_camera(rows, cols);
         let bounds = Bounds::of(scene, DVec3::ZERO);
-        let views: Vec<View> = (0..rows * cols)
+        let (views, kept): (Vec<View>, Vec<usize>) = (0..rows * cols)
             .into_par_iter()
-            .map(|pixel| View::of(scene, &bounds, &camera, (pixel / cols, pixel % cols)))
-            .collect();
+            .map(|pixel| {
+                let place = (pixel / cols, pixel % cols);
+                let cone = cone(&camera, place);
+                match &moved {
+                    Some((moved, before)) if moved.is_out_of_sight(cone) => {
+                        (before.views[pixel as usize].clone(), 1)
+                    }
+                    _ => (View::of(scene, &bounds, &camera, place), 0),
+                }
+            })
+            .unzip();
+        let kept = kept.iter().sum();
         let surfaces = views.iter().map(|view| view.surfaces(&scene.medium));
         let surfaces: Vec<SmallVec<[Surface; 1]>> = surfaces.collect();
         let brightest = || surfaces.iter().map(|surfaces| surfaces.first());
-        GroundTruth {
+        let truth = GroundTruth {
             rows,
             cols,
             range_m: brightest().map(|s| s.map(|s| s.range_m)).collect(),
@@ -113,7 +139,8 @@ impl GroundTruth {
             object: brightest().map(|s| s.map(|s| s.object)).collect(),
             surfaces,
             views,
-        }
+        };
+        (truth, kept)
     }
 }
 
@@ -240,7 +267,7 @@ impl View {
 }
 
 /// The middle of what a macropixel sees, and how far its corners are from it, rad.
-fn cone(camera: &PinholeCamera, (row, col): (u32, u32)) -> (DVec3, f64) {
+pub(super) fn cone(camera: &PinholeCamera, (row, col): (u32, u32)) -> (DVec3, f64) {
     let at = |du: f64, dv: f64| {
         let place = (f64::from(col) + du, f64::from(row) + dv);
         camera.at_unit_depth(place).normalize()

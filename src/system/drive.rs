@@ -14,15 +14,17 @@
 //!
 //! **What is simulated again.** Only work whose result is provably the one of the frame before is left out, so pictures are the same
 //! without ([`DriveSettings::reuse`]). Start values that are those of the frame before need no load at gate level. Ray casting and light
-//! of a world that has not moved stand. A histogram is a pure function of start value, light, macropixel and the seed of photons: with
+//! of a world that has not moved stand, and of one that has those of macropixels that see nothing of it ([`worlds`]). A histogram is a pure function of start value, light, macropixel and the seed of photons: with
 //! [`Noise::Fresh`], where every frame has photons of its own, none is reused; with [`Noise::Still`] a macropixel has the same photons in
 //! every frame, and is exposed anew only where its light or start value has changed.
+
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use super::error::FrameError;
 use super::frame::{go_on, load_starts};
-use super::light::{light_in, lit, photon_stream, starts_of};
+use super::light::{lit, photon_stream, starts_of};
 use super::pixel::PixelDepth;
 use super::policy::{Pointing, WindowPolicy};
 use super::ranger::{Known, Ranger};
@@ -30,11 +32,11 @@ use super::result::PhaseTimes;
 use super::settings::FrameSettings;
 use super::stopwatch::Stopwatch;
 use super::summary::Summary;
-use crate::chip::Exposure;
+use super::worlds::{self, LastWorld};
 use crate::engine::{Answer, Histograms, LitPixel, Work, expose, load};
 use crate::guide::{GuideInput, GuideMap, PastFrame};
 use crate::netlist::Netlist;
-use crate::photon::{PhotonStream, PixelLight};
+use crate::photon::PixelLight;
 use crate::scene::{DVec3, GroundTruth, Scene};
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
 
@@ -139,8 +141,10 @@ impl DriveSettings {
 pub struct Reused {
     /// The load at gate level.
     pub load: bool,
-    /// Ray casting and light.
+    /// Ray casting and light of all of the exposure.
     pub world: bool,
+    /// Of the views of [`DriveFrame::worlds`] from every macropixel, those that stood.
+    pub views: usize,
     /// Macropixels with the histogram and depth of the frame before.
     pub macropixels: usize,
 }
@@ -156,6 +160,8 @@ pub struct DriveFrame {
     pub guide: GuideMap,
     /// What is there in the middle of the exposure.
     pub truth: GroundTruth,
+    /// Worlds, each standing still, that the exposure was taken of.
+    pub worlds: usize,
     /// Counts.
     pub histograms: Histograms,
     /// Macropixels, row-major.
@@ -196,6 +202,8 @@ pub struct Drive<'a> {
 struct Last {
     starts: Vec<u16>,
     worlds: Vec<Scene>,
+    /// The last of them.
+    world: Arc<LastWorld>,
     truth: GroundTruth,
     light: Vec<PixelLight>,
     lit: Vec<LitPixel>,
@@ -327,21 +335,27 @@ impl<'a> Drive<'a> {
         run.windows_s = clock.lap();
 
         let stream = photon_stream(sensor, exposure, seed, scene);
-        let worlds = worlds(scene, &times, *segments);
+        let worlds = worlds::worlds(scene, &times, *segments);
+        let number_of_worlds = worlds.len();
+        let newest;
         let (truth, light) = match before.filter(|last| last.worlds == worlds) {
             Some(last) => {
                 reused.world = true;
+                reused.views = worlds.len() * last.pixels.len();
+                newest = Arc::clone(&last.world);
                 (last.truth.clone(), last.light.clone())
             }
             None => {
-                let truths: Vec<GroundTruth> = worlds
-                    .par_iter()
-                    .map(|world| GroundTruth::render(world, rows, cols))
-                    .collect();
+                let known = before.map(|last| &*last.world);
+                let (truths, views) = worlds::truths(&worlds, (rows, cols), known, *reuse);
+                reused.views = views;
                 run.scene_s = clock.lap();
-                let light = light_of(&worlds, &truths, exposure, &stream);
+                let lights = worlds::lights(&worlds, &truths, &stream, known, *reuse);
+                let light = worlds::light_of(&lights, exposure);
                 let middle = truths.len() / 2;
-                (truths.into_iter().nth(middle).expect("one"), light)
+                let truth = truths[middle].clone();
+                newest = LastWorld::of(&worlds, truths, lights);
+                (truth, light)
             }
         };
         let lit = lit(sensor, &wanted, &light);
@@ -405,6 +419,7 @@ impl<'a> Drive<'a> {
         self.last = Some(Last {
             starts,
             worlds,
+            world: newest,
             truth: truth.clone(),
             light,
             lit,
@@ -417,6 +432,7 @@ impl<'a> Drive<'a> {
             times,
             guide,
             truth,
+            worlds: number_of_worlds,
             histograms,
             pixels,
             windows_m,
@@ -447,53 +463,4 @@ fn seed_of(seed: u64, frame: u32) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
-}
-
-/// The world in the middle of each segment of an exposure; one, if it does not move.
-fn worlds(scene: &Scene, times: &FrameTimes, segments: u32) -> Vec<Scene> {
-    let length_s = (times.readout_s - times.exposure_s) / f64::from(segments);
-    let middle_s = |n: u32| times.exposure_s + (f64::from(n) + 0.5) * length_s;
-    match scene.is_still() {
-        true => vec![scene.at(0.0)],
-        false => (0..segments).map(|n| scene.at(middle_s(n))).collect(),
-    }
-}
-
-/// The light of an exposure on every macropixel: what stays the same in all worlds is the plain light of one. Light whose SPADs
-/// differ cannot change within an exposure, and is that of its middle.
-fn light_of(
-    worlds: &[Scene],
-    truths: &[GroundTruth],
-    exposure: &Exposure,
-    stream: &PhotonStream,
-) -> Vec<PixelLight> {
-    let lights: Vec<Vec<PixelLight>> = worlds
-        .iter()
-        .zip(truths)
-        .map(|(world, truth)| light_in(exposure, world, truth, stream))
-        .collect();
-    let parts = worlds.len() as u64;
-    let first_cycle = |n: usize| (n as u64 * u64::from(exposure.laser_cycles) / parts) as u32;
-    (0..lights[0].len())
-        .map(|pixel| {
-            let mut segments: Vec<(u32, PixelLight)> = Vec::new();
-            for (n, light) in lights.iter().enumerate() {
-                let is_new = segments
-                    .last()
-                    .is_none_or(|(_, last)| *last != light[pixel]);
-                // Of more segments than laser cycles some have none.
-                let begins = segments
-                    .last()
-                    .is_none_or(|&(first, _)| first < first_cycle(n));
-                if is_new && begins {
-                    segments.push((first_cycle(n), light[pixel].clone()));
-                }
-            }
-            match segments.len() {
-                1 => segments.swap_remove(0).1,
-                _ => PixelLight::timeline(segments)
-                    .unwrap_or_else(|_| lights[worlds.len() / 2][pixel].clone()),
-            }
-        })
-        .collect()
 }

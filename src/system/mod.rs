@@ -22,6 +22,7 @@ mod stopwatch;
 mod summary;
 mod taken;
 mod tolerance;
+mod worlds;
 
 pub use calibrate::{Calibrated, Sweep, SweepError, calibrate};
 pub use distance::DistanceLaw;

@@ -1,11 +1,10 @@
 //! Drives before a wall and a ball: what is reused, what the guide sees, what the light does within an exposure.
 
 use super::*;
-use crate::chip::SensorConfig;
+use crate::chip::{Exposure, SensorConfig};
 use crate::guide::NoisyTruth;
 use crate::scene::{Object, Shape};
 use proptest::prelude::*;
-use std::sync::Arc;
 
 /// A ball that crosses the field of view before a wall.
 fn crossing(speed_m_s: f64) -> Scene {
@@ -145,11 +144,9 @@ fn light_in_motion_is_a_timeline_where_something_moves_and_plain_elsewhere() {
         readout_s: 0.1,
         end_s: 0.1,
     };
-    let worlds = worlds(&settings.frame.scene, &times, 4);
-    let truths: Vec<GroundTruth> = worlds
-        .iter()
-        .map(|w| GroundTruth::render(w, 6, 8))
-        .collect();
+    let worlds = worlds::worlds(&settings.frame.scene, &times, 4);
+    let (truths, kept) = worlds::truths(&worlds, (6, 8), None, true);
+    assert!((1..3 * 48).contains(&kept), "{kept}");
     let FrameSettings {
         sensor,
         scene,
@@ -157,7 +154,8 @@ fn light_in_motion_is_a_timeline_where_something_moves_and_plain_elsewhere() {
         ..
     } = &settings.frame;
     let stream = photon_stream(sensor, exposure, 7, scene);
-    let light = light_of(&worlds, &truths, exposure, &stream);
+    let seen = worlds::lights(&worlds, &truths, &stream, None, true);
+    let light = worlds::light_of(&seen, exposure);
     let parts: Vec<usize> = light.iter().map(|light| light.segments().count()).collect();
     assert!(parts.contains(&1) && parts.iter().any(|&n| n > 1));
     let spads = &stream.config().spads;
