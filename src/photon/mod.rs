@@ -31,7 +31,7 @@ pub use spad::{
     AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, Photon, SpadEvent, SpadModel, apply_dead_time,
 };
 pub use stream::{
-    Background, Draw, GROUP, Group, LightParts, NEVER_FS, OrderedEchoes, PER_BLOCK, PLACE_BITS,
-    PhotonStream, PixelPhotons, PixelStream, Place, Run, Slots, Span, StreamConfig, TILE,
-    TIME_BITS, signal_rank, spad_of,
+    Background, Draw, GROUP, Group, LightParts, ListedEchoes, NEVER_FS, OrderedEchoes, PER_BLOCK,
+    PLACE_BITS, PhotonStream, PixelPhotons, PixelStream, Place, Run, Slots, Span, StreamConfig,
+    TILE, TIME_BITS, signal_rank, spad_of,
 };

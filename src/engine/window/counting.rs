@@ -21,7 +21,9 @@ use super::past::PastDraws;
 use super::sight::{Sight, Spans};
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Spacing, Tables};
 use super::{Window, Work};
-use crate::photon::{Draw, Group, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SpadEvent};
+use crate::photon::{
+    Draw, Group, ListedEchoes, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SpadEvent,
+};
 use crate::units::Time;
 use by_window::ByWindow;
 use tile::Tile;
@@ -63,6 +65,8 @@ pub(super) struct Counting<'a> {
     events: Vec<SpadEvent>,
     /// The same with their bin + 1; 0 outside the window.
     placed: Vec<(SpadEvent, usize)>,
+    /// Of each part of bright light.
+    listed: Vec<ListedEchoes>,
     /// Laser cycles side by side, in bright light.
     tile: Option<Box<Tile>>,
 }
@@ -180,6 +184,7 @@ impl<'a> Counting<'a> {
             by_cycle: Vec::new(),
             events: Vec::new(),
             placed: Vec::new(),
+            listed: Vec::new(),
             tile: None,
         }
     }
@@ -405,6 +410,12 @@ struct Placed<'w> {
 }
 
 impl Placed<'_> {
+    /// Whether a time relative to the start of the laser cycle is within the window.
+    fn is_seen(&self, time: Time) -> bool {
+        let is_inside = self.sight.rows.are_around(time.as_fs());
+        is_inside.unwrap_or_else(|| self.row_of(time).is_some())
+    }
+
     /// Bin + 1 of a time relative to the start of the laser cycle, if it is within the window.
     fn row_of(&self, time: Time) -> Option<usize> {
         if let Some(row) = self.sight.rows.row_of(time.as_fs()) {

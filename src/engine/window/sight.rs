@@ -104,6 +104,17 @@ impl Rows {
         }
     }
 
+    /// Whether a time is in any bin; `None` where it may be on either side of the first or the last edge.
+    #[inline]
+    pub(super) fn are_around(&self, time_fs: i64) -> Option<bool> {
+        let [first_fs, .., end_fs] = self.edges_fs[..] else {
+            return Some(false);
+        };
+        let is_near = |edge_fs: i64| (edge_fs - time_fs).abs() <= ROUNDING_FS;
+        let is_certain = !is_near(first_fs) && !is_near(end_fs);
+        is_certain.then_some(first_fs <= time_fs && time_fs < end_fs)
+    }
+
     /// Bin + 1 of a time, 0 outside the window; `None` where it may be on either side of an edge.
     #[inline]
     pub(super) fn row_of(&self, time_fs: i64) -> Option<usize> {

@@ -19,13 +19,13 @@
 //! beginning on ([`Avalanches`](crate::photon::Avalanches) tells where it does not).
 //!
 //! Echoes of measured pulses or of half a laser cycle, those of light with several layers, and photons that breed, are drawn
-//! photon by photon.
+//! photon by photon (`listed`).
 
 use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::{Kind, PixelStream, StreamConfig, nearest};
+use super::{Kind, PixelStream, StreamConfig};
 use crate::numerics::branchless;
 use crate::photon::light::PixelLight;
 use crate::photon::philox::{LANES, blocks_from};
@@ -154,9 +154,6 @@ fn add_gaps(
     }
 }
 
-/// From there on second counter words give the numbers of an echo's photons.
-const NUMBER_RUN: u32 = 1 << 31;
-
 /// Times are cut off there, fs: far beyond any block, and small enough to be counted.
 const FARTHEST: f64 = (1u64 << 50) as f64;
 
@@ -268,46 +265,6 @@ impl<'a> PixelStream<'a> {
                         breeds: self.kind == Kind::Breeding,
                     });
                 }
-            }
-        }
-    }
-
-    /// Appends the photons of one laser cycle's echo, in no particular order, where they do not depend on the SPADs' states;
-    /// those before or after the exposure are none.
-    pub fn push_listed_echo(&self, cycle: u32, photons: &mut Vec<Photon>) {
-        if !self.has_listed_echo() || !self.sends_echo_in(cycle) {
-            return;
-        }
-        let config = &self.stream.config;
-        let (start, end) = (
-            self.stream.cycle_start(cycle),
-            self.stream.cycle_start(config.laser_cycles),
-        );
-        let words = |second: u32| {
-            let counter = [cycle, second, self.pixel, self.kind.bright_echo()];
-            rand_philox::philox4x32_10(counter, self.key)
-        };
-        let per_cycle = self.signal.per_cycle();
-        let number: u32 = (0..per_cycle.words())
-            .map(|part| {
-                let [low, high, ..] = words(NUMBER_RUN + part);
-                per_cycle.part(u64::from(low) | u64::from(high) << 32)
-            })
-            .sum();
-        for photon in 0..number {
-            let [low, high, ..] = words(2 * photon);
-            let mut after_fs = self.gaussian.draw(u64::from(low) | u64::from(high) << 32);
-            if let Some(shape) = &self.shape {
-                after_fs += shape.draw(words(2 * photon + 1));
-            }
-            let time = start + Time::from_fs(self.arrival_fs + nearest(after_fs));
-            let spad = (u64::from(high) >> (u32::BITS - config.spads.grid.bits())) as u8;
-            if (Time::ZERO..end).contains(&time) && self.keeps_signal(cycle, spad, [low, high]) {
-                photons.push(Photon {
-                    time,
-                    spad,
-                    breeds: self.kind == Kind::Breeding,
-                });
             }
         }
     }

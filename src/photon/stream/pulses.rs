@@ -1,7 +1,7 @@
 //! All avalanches of a macropixel in an exposure, in their order: the whole stream and what its SPADs make of it.
 
 use super::draw::{ByCycle, SPAD_SHIFT};
-use super::{Draw, PhotonStream, PixelPhotons, PixelStream};
+use super::{Draw, ListedEchoes, PhotonStream, PixelPhotons, PixelStream};
 use crate::photon::avalanches::Avalanches;
 use crate::photon::light::PixelLight;
 use crate::photon::spad::{Photon, SpadEvent};
@@ -108,6 +108,8 @@ impl PhotonStream {
         let mut avalanches = Avalanches::in_the_dark(&config.spads, self.key, pixel);
         // Light with an ordered echo has no other layer.
         let mut echoes = parts[0].ordered_echoes();
+        let mut listed: Vec<ListedEchoes> = Vec::new();
+        listed.resize_with(parts.len(), ListedEchoes::default);
         let earliest_fs = parts.iter().map(|part| part.echo_fs.0).min();
         let earliest = Time::from_fs(earliest_fs.unwrap_or(0));
         let (mut drawn, mut next_echo) = (0, 0);
@@ -121,8 +123,8 @@ impl PhotonStream {
                 |echo: u32| self.cycle_start(echo) + earliest <= until + config.spads.dead_time;
             while next_echo < config.laser_cycles && may_begin(next_echo) {
                 echoes.add(next_echo);
-                for light in parts {
-                    light.push_listed_echo(next_echo, &mut photons);
+                for (light, listed) in parts.iter().zip(&mut listed) {
+                    photons.extend_from_slice(listed.of(light, next_echo));
                 }
                 next_echo += 1;
             }

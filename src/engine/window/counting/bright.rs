@@ -5,7 +5,7 @@
 
 use super::{Counting, Pixel};
 use crate::engine::window::sight::ROUNDING_FS;
-use crate::photon::{Photon, PhotonStream, PixelStream, TILE};
+use crate::photon::{ListedEchoes, Photon, PhotonStream, PixelStream, TILE};
 use crate::units::Time;
 
 /// The beginning of a block of photons.
@@ -56,6 +56,9 @@ impl Counting<'_> {
     /// Counts a macropixel.
     pub(super) fn count_bright(&mut self, pixel: &mut Pixel<'_>) {
         let laser_cycles = self.stream.config().laser_cycles;
+        self.listed
+            .resize_with(pixel.parts.len(), ListedEchoes::default);
+        self.listed.iter_mut().for_each(ListedEchoes::clear);
         let layout = self.layout(pixel);
         let alone = layout
             .as_ref()
@@ -100,13 +103,16 @@ impl Counting<'_> {
         let drawn = loop {
             let begin = self.beginning_before(pixel, wanted_from - back, until, laser_cycle);
             self.photons.clear();
-            for part in pixel.parts.iter().filter(|part| part.breeds()) {
-                self.push_breeding(part, begin, until, laser_cycle);
+            let parts = pixel.parts;
+            let of_kind =
+                |breeds: bool| (0..parts.len()).filter(move |&n| parts[n].breeds() == breeds);
+            for part in of_kind(true) {
+                self.push_breeding(pixel, part, begin, until, laser_cycle);
             }
             // Mostly there are none, and nothing is allocated.
             let breeding_photons: Vec<_> = self.photons.drain(..).collect();
-            for part in pixel.parts.iter().filter(|part| !part.breeds()) {
-                self.push_photons(part, begin, until, laser_cycle);
+            for part in of_kind(false) {
+                self.push_photons(pixel, part, begin, until, laser_cycle);
             }
             let known_from = begin.time.unwrap_or(Time::ZERO);
             self.photons.retain(|photon| photon.time >= known_from);
@@ -135,7 +141,7 @@ impl Counting<'_> {
         let window = self.window(pixel.sight, laser_cycle);
         let seen = self.photons.iter();
         let seen = seen
-            .filter(|photon| window.row_of(photon.time - start).is_some())
+            .filter(|photon| window.is_seen(photon.time - start))
             .count();
         let pulses = self.count_events(pixel, &window, start);
         pixel.work.lost_to_dead_time += (seen as u64).saturating_sub(pulses);
@@ -188,41 +194,44 @@ impl Counting<'_> {
 
     /// Whether an avalanche that breeds, or what it causes, may be in what is drawn at first for the window of a laser cycle.
     pub(super) fn breeds_about(&mut self, pixel: &Pixel<'_>, laser_cycle: u32) -> bool {
-        let Some(breeding) = pixel.breeding else {
+        if pixel.breeding.is_none() {
             return false;
-        };
+        }
         let until = self.stream.cycle_start(laser_cycle) + Time::from_fs(pixel.sight.until_fs);
         let Some(begin) = self.beginning(pixel, laser_cycle) else {
             return true;
         };
         self.photons.clear();
-        self.push_breeding(breeding, begin, until, laser_cycle);
+        self.push_breeding(pixel, 1, begin, until, laser_cycle);
         !self.photons.is_empty()
     }
 
-    /// Appends the photons that breed since a beginning, and before it as far as what they cause may come later.
+    /// Appends the photons of a part of the light that breed since a beginning, and before it as far as what they cause may come later.
     fn push_breeding(
         &mut self,
-        breeding: &PixelStream<'_>,
+        pixel: &Pixel<'_>,
+        part: usize,
         begin: Beginning,
         until: Time,
         laser_cycle: u32,
     ) {
         let since = begin.time.map_or(begin, |time| {
             let time = time - self.stream.config().spads.reach();
-            Beginning::at(time, laser_cycle, self.stream, breeding)
+            Beginning::at(time, laser_cycle, self.stream, &pixel.parts[part])
         });
-        self.push_photons(breeding, since, until, laser_cycle);
+        self.push_photons(pixel, part, since, until, laser_cycle);
     }
 
-    /// Appends the photons since a beginning.
+    /// Appends the photons of a part of the light since a beginning.
     fn push_photons(
         &mut self,
-        light: &PixelStream<'_>,
+        pixel: &Pixel<'_>,
+        part: usize,
         begin: Beginning,
         until: Time,
         laser_cycle: u32,
     ) {
+        let light = &pixel.parts[part];
         let config = self.stream.config();
         let Beginning {
             mut cycle,
@@ -241,7 +250,8 @@ impl Counting<'_> {
         }
         let from = begin.time.unwrap_or(Time::ZERO);
         for cycle in self.echoes(light, from, until, laser_cycle) {
-            light.push_listed_echo(cycle, &mut self.photons);
+            let echo = self.listed[part].of(light, cycle);
+            self.photons.extend_from_slice(echo);
         }
         self.photons.retain(|photon| photon.time < until);
     }

@@ -166,7 +166,7 @@ impl Counting<'_> {
     pub(super) fn settle_cycle(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32) {
         let start = self.stream.cycle_start(laser_cycle);
         let window = self.window(pixel.sight, laser_cycle);
-        let is_seen = |photon: &&Photon| window.row_of(photon.time - start).is_some();
+        let is_seen = |photon: &&Photon| window.is_seen(photon.time - start);
         let seen = self.photons.iter().filter(is_seen).count() as u64;
         self.detect(pixel, laser_cycle, u64::MAX);
         let pulses = self.count_events(pixel, &window, start);
