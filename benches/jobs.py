@@ -30,6 +30,7 @@ scene.light.illuminance_klux = [1, 10, 50, 100]
 scene.lidar.pulse_energy_uj = { from = 2, to = 200, steps = 5, scale = "log" }
 """
 POINTS = 200
+DEMOS = ["van", "fog", "glass", "sweep", "yaw", "speed", "night", "limit"]
 FRAMES = 100
 
 
@@ -87,6 +88,8 @@ def main() -> None:
         job("the same street, cohort", [*STREET, "--engine", "cohort"], runs, folder, engine)
         drive = ["drive", "street", "--frames", str(FRAMES), "--guide", "matched"]
         job(f"drive of {FRAMES} frames, matched", drive, 1, folder, {})
+        for demo in DEMOS:
+            job(f"demo {demo}", ["demo", demo], runs, folder, {})
         study = pathlib.Path(folder, "study.toml")
         study.write_text(STUDY)
         wall, cpu, peak = run(["sweep", str(study), "--out", os.path.join(folder, "sweep")])

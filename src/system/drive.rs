@@ -30,7 +30,7 @@ use super::policy::{Pointing, WindowPolicy};
 use super::ranger::{Known, Ranger};
 use super::result::PhaseTimes;
 use super::settings::FrameSettings;
-use super::stopwatch::Stopwatch;
+use super::stopwatch::{Stopwatch, timed};
 use super::summary::Summary;
 use super::worlds::{self, LastWorld};
 use crate::engine::{Answer, Histograms, LitPixel, Work, expose, load};
@@ -370,16 +370,8 @@ impl<'a> Drive<'a> {
         reused.load = before.is_some_and(|last| last.starts == starts);
         // The gates of the load path are one processor's work, and tell nothing that the exposure waits for.
         let load = || load_starts(sensor, &self.load_netlist, &starts).map(drop);
-        let by_load_path = || {
-            let mut clock = Stopwatch::new();
-            let loaded = if reused.load { Ok(()) } else { load() };
-            (loaded, clock.lap())
-        };
-        let by_engine = || {
-            let mut clock = Stopwatch::new();
-            let taken = expose(&*engine, &stream, &changed, &exposed);
-            (taken, clock.lap())
-        };
+        let by_load_path = || timed(|| if reused.load { Ok(()) } else { load() });
+        let by_engine = || timed(|| expose(&*engine, &stream, &changed, &exposed));
         let ((loaded, load_s), (taken, exposure_s)) = rayon::join(by_load_path, by_engine);
         loaded?;
         let taken = taken?;

@@ -15,7 +15,7 @@ use super::ranger::{Known, Ranger};
 use super::remark::Circumstances;
 use super::result::{Frame, PhaseTimes};
 use super::settings::{EngineKind, FrameSettings, Probe};
-use super::stopwatch::Stopwatch;
+use super::stopwatch::{Stopwatch, timed};
 use super::tolerance::{Kept, Tolerance};
 use crate::chip::{Exposure, Sensor, SensorConfig};
 use crate::engine::waveform::{self, View};
@@ -125,19 +125,15 @@ pub fn take_guided_frame<A: Answer>(
     let probes = probes(guide);
     let done = exposed;
     let by_gates = || {
-        let mut clock = Stopwatch::new();
         let run = |probe| {
             go_on(done(0))?;
             AtGates::run(sensor, exposure, &stream, &pixels, probe)
         };
-        let probed = probes.par_iter().map(run);
-        (probed.collect::<Result<Vec<_>, _>>(), clock.lap())
+        timed(|| probes.par_iter().map(run).collect::<Result<Vec<_>, _>>())
     };
     let by_load_path = || {
-        let mut clock = Stopwatch::new();
         let starts = starts_of(sensor, wanted);
-        let load = load_starts(sensor, &load::load_netlist(sensor), &starts);
-        (load, clock.lap())
+        timed(|| load_starts(sensor, &load::load_netlist(sensor), &starts))
     };
     let by_engine = || {
         let mut clock = Stopwatch::new();

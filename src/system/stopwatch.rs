@@ -2,6 +2,13 @@
 
 use std::time::Instant;
 
+/// What some work gives, and how long it took, s.
+pub(super) fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let mut clock = Stopwatch::new();
+    let given = work();
+    (given, clock.lap())
+}
+
 /// Runs from when it was made.
 pub(super) struct Stopwatch(Instant);
 

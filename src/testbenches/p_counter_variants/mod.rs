@@ -302,17 +302,18 @@ impl Bench {
         for (name, tap, _) in CHANNELS {
             let [hit, early_hit] =
                 METDCS.map(|metdc| Entry::hex(Probe::Hit.path(&format!("{name}.{metdc}"))));
-            let mut signals = vec![
+            let signals = [
                 Entry::binary(Probe::CounterReset.path(name)),
                 Entry::binary(Probe::CounterClk.path(name)),
                 Entry::decimal(Probe::CounterOut.path(name)),
                 Entry::binary(Probe::LocalStop.path(name)),
                 hit,
             ];
-            if tap == Tap::Msb {
-                signals.push(early_hit);
-            }
             groups.push(Group::new(format!("P-counter {name}"), signals));
+            if tap == Tap::Msb {
+                let name = format!("P-counter {name}, HIT cleared before STOP");
+                groups.push(Group::new(name, [early_hit]));
+            }
         }
         Layout {
             groups,
