@@ -2,7 +2,7 @@
 //! point cloud, and the histograms of some macropixels.
 
 use crate::report::picture::{INK, MARK, PAPER, Picture, TEXT_PX, VOID, colour_of, text_width};
-use crate::scene::{DVec3, Ray, Scene};
+use crate::scene::{DVec3, Ray, Scene, Stage};
 use crate::system::DriveFrame;
 
 /// Width and height of the image of a macropixel, px: those of HSLIDAR are 114 um wide and 54 um high.
@@ -107,15 +107,14 @@ impl Panel<'_> {
     fn camera(&self, rows: u32, cols: u32) -> Vec<[u8; 3]> {
         let (wide, high) = CAMERA_RAYS;
         let camera = self.world.lidar_camera(rows, cols);
+        let stage = Stage::of(self.world);
         let sun = DVec3::new(-0.3, -0.6, -0.74);
         let grey = |row: u32, col: u32| {
             let at = (
                 (f64::from(col) + 0.5) / f64::from(wide),
                 (f64::from(row) + 0.5) / f64::from(high),
             );
-            let seen = self
-                .world
-                .hit(&Ray::new(DVec3::ZERO, camera.at_unit_depth(at)));
+            let seen = stage.hit(&Ray::new(DVec3::ZERO, camera.at_unit_depth(at)));
             let light = seen.map_or(SKY_GREY, |hit| {
                 hit.grey * (0.45 + 0.55 * hit.normal.dot(sun).max(0.0))
             });

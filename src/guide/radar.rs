@@ -21,7 +21,7 @@ use rayon::prelude::*;
 
 use super::{Guide, GuideError, GuideInput, GuideMap};
 use crate::photon::{Purpose, normal, random_stream};
-use crate::scene::{DVec3, Ray, Scene};
+use crate::scene::{DVec3, Ray, Scene, Stage};
 use crate::settings::{Key, Range};
 
 /// What of a guide's random numbers tells this one's from others'.
@@ -115,7 +115,7 @@ impl Radar {
     }
 
     /// What comes back within a beam.
-    fn echoes(&self, scene: &Scene, (col, row): (i32, i32)) -> Vec<Echo> {
+    fn echoes(&self, stage: &Stage, (col, row): (i32, i32)) -> Vec<Echo> {
         let angles = |beam: i32, width_deg: f64| {
             let at = move |n: u32| (f64::from(n) + 0.5) / f64::from(RAYS_ACROSS) - 0.5;
             (0..RAYS_ACROSS).map(move |n| ((f64::from(beam) + at(n)) * width_deg).to_radians())
@@ -131,7 +131,7 @@ impl Radar {
             })
         });
         let echoes = rays.filter_map(|towards| {
-            let hit = scene.hit(&Ray::new(DVec3::ZERO, towards))?;
+            let hit = stage.hit(&Ray::new(DVec3::ZERO, towards))?;
             let incidence = hit.normal.dot(towards).abs();
             let power = (incidence / hit.range_m).powi(2);
             (hit.range_m <= self.reach_m && power > 0.0).then_some(Echo {
@@ -188,10 +188,11 @@ impl Guide for Radar {
         let mut each = beams.clone();
         each.sort_unstable();
         each.dedup();
+        let stage = Stage::of(input.scene);
         let found: Vec<Option<(f64, f64)>> = (0..each.len() as u32)
             .into_par_iter()
             .map(|number| {
-                let echoes = self.echoes(input.scene, each[number as usize]);
+                let echoes = self.echoes(&stage, each[number as usize]);
                 let (range_m, spread_m2) = self.strongest(&echoes)?;
                 let mut random = random_stream(input.seed, Purpose::Guide, number, DRAWS);
                 let measured_m = range_m + self.range_sigma_m * normal(&mut random);

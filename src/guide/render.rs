@@ -15,7 +15,7 @@ use smallvec::SmallVec;
 use super::right_camera::RightCamera;
 use crate::numerics::branchless;
 use crate::photon::{Purpose, normal, random_stream};
-use crate::scene::{Bounds, PinholeCamera, Ray, SKY_REFLECTIVITY, Scene};
+use crate::scene::{Bounds, PinholeCamera, Ray, SKY_REFLECTIVITY, Scene, Stage};
 use crate::settings::{Key, Range};
 use crate::stereo::GreyImage;
 
@@ -128,16 +128,17 @@ fn radiances(
         .any(|o| o.transmittance > 0.0 || o.mirror > 0.0);
     let (width, height) = (crop.width as usize, crop.height as usize);
     let bounds = Bounds::of(scene, ray(crop.middle(0, 0)).origin);
+    let stage = Stage::of(scene);
     let radiance = |ray: &Ray, candidates: &_| match has_panes {
-        false => match scene.hit_of(ray, candidates) {
-            Some(hit) => surface(scene, ray, &hit, grain, pixel_rad),
+        false => match stage.hit_of(ray, candidates) {
+            Some(hit) => surface(&stage, ray, &hit, grain, pixel_rad),
             None => SKY_REFLECTIVITY,
         },
         true => {
-            let returns = scene.returns_of(ray, candidates);
+            let returns = stage.returns_of(ray, candidates);
             let surfaces = returns.surfaces.iter();
             let seen =
-                surfaces.map(|r| r.share_back * surface(scene, ray, &r.hit, grain, pixel_rad));
+                surfaces.map(|r| r.share_back * surface(&stage, ray, &r.hit, grain, pixel_rad));
             seen.sum::<f64>() + returns.sky_share * SKY_REFLECTIVITY
         }
     };
@@ -158,9 +159,9 @@ fn radiances(
     seen
 }
 
-fn surface(scene: &Scene, ray: &Ray, hit: &crate::scene::Hit, grain: f64, pixel_rad: f64) -> f64 {
-    let point = ray.at(hit.range_m);
-    let mut grey = hit.grey * scene.daylight(point, hit.normal);
+fn surface(stage: &Stage, ray: &Ray, hit: &crate::scene::Hit, grain: f64, pixel_rad: f64) -> f64 {
+    let (scene, point) = (stage.scene(), ray.at(hit.range_m));
+    let mut grey = hit.grey * stage.daylight(point, hit.normal);
     if grain > 0.0 && scene.objects[hit.object].texture.is_none() {
         grey *= (1.0 + grain * grain_at(point, 2.0 * pixel_rad * hit.range_m)).max(0.0);
     }
@@ -231,22 +232,23 @@ pub(super) struct Look {
 
 /// What `camera`, the left one, sees at pixel coordinates. Textures are sampled around the place.
 pub(super) fn look(
-    scene: &Scene,
+    stage: &Stage,
     camera: &PinholeCamera,
     at: (f64, f64),
     grain: f64,
     binning: f64,
 ) -> Look {
+    let scene = stage.scene();
     let ray = |at| Ray::new(scene.stereo.position_m, camera.at_unit_depth(at));
     let middle = ray(at);
-    let Some(hit) = scene.hit(&middle) else {
+    let Some(hit) = stage.hit(&middle) else {
         return Look {
             radiance: SKY_REFLECTIVITY,
             contrast: 0.0,
         };
     };
-    let radiance = surface(scene, &middle, &hit, 0.0, binning / camera.focal_px);
-    let own = hit.grey * scene.daylight(middle.at(hit.range_m), hit.normal);
+    let radiance = surface(stage, &middle, &hit, 0.0, binning / camera.focal_px);
+    let own = hit.grey * stage.daylight(middle.at(hit.range_m), hit.normal);
     let relative = if scene.objects[hit.object].texture.is_none() {
         grain
     } else {
@@ -260,7 +262,7 @@ pub(super) fn look(
             (2.0, 2.0),
         ];
         let greys = around.into_iter().filter_map(|(du, dv)| {
-            let beside = scene.hit(&ray((at.0 + du * binning, at.1 + dv * binning)))?;
+            let beside = stage.hit(&ray((at.0 + du * binning, at.1 + dv * binning)))?;
             (beside.object == hit.object).then_some(beside.grey / hit.grey.max(1e-6))
         });
         let greys: Vec<f64> = greys.chain([1.0]).collect();

@@ -16,16 +16,16 @@ use glam::DVec3;
 
 use super::right_camera::RightCamera;
 use crate::photon::{Purpose, normal, random_stream};
-use crate::scene::{PinholeCamera, Ray, Scene};
+use crate::scene::{PinholeCamera, Ray, Scene, Stage};
 
 /// How much nearer than the expected point the right camera's view may end, as a share of the
 /// range, before the point counts as occluded: room for rounding on slanted surfaces.
 const OCCLUSION_TOLERANCE: f64 = 1e-6;
 
 /// The stereo cameras in a scene.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub struct StereoRig<'a> {
-    scene: &'a Scene,
+    stage: Stage<'a>,
     camera: PinholeCamera,
     right: RightCamera,
     seed: u64,
@@ -50,11 +50,16 @@ impl<'a> StereoRig<'a> {
     /// The rig of `scene`; equal seeds give equal errors.
     pub fn new(scene: &'a Scene, seed: u64) -> Self {
         StereoRig {
-            scene,
+            stage: Stage::of(scene),
             camera: scene.stereo.camera(),
             right: RightCamera::new(&scene.stereo),
             seed,
         }
+    }
+
+    /// The scene, made ready for many rays.
+    pub(super) fn stage(&self) -> &Stage<'a> {
+        &self.stage
     }
 
     /// Either camera, in its own coordinates.
@@ -64,13 +69,13 @@ impl<'a> StereoRig<'a> {
 
     /// Focal length times baseline, px·m: depth times disparity (Eq. 26).
     pub fn focal_baseline_px_m(&self) -> f64 {
-        self.camera.focal_px * self.scene.stereo.baseline_m
+        self.camera.focal_px * self.stage.scene().stereo.baseline_m
     }
 
     /// The standard deviation of the estimated depth at depth `depth_m`, m (Eq. 27), the
     /// rounding to sub-pixel steps (variance step²/12) included.
     pub fn depth_sigma_m(&self, depth_m: f64) -> f64 {
-        let stereo = &self.scene.stereo;
+        let stereo = &self.stage.scene().stereo;
         let step_px = 1.0 / f64::from(stereo.subpixel_steps);
         let sigma_px = (stereo.disparity_sigma_px.powi(2) + step_px * step_px / 12.0).sqrt();
         depth_m * depth_m * sigma_px / self.focal_baseline_px_m()
@@ -96,9 +101,9 @@ impl<'a> StereoRig<'a> {
 
     /// The disparity of what the principal camera sees at pixel coordinates; `None` in the sky and where the right camera does not see it.
     pub(super) fn true_disparity_px(&self, at: (f64, f64)) -> Option<f64> {
-        let stereo = &self.scene.stereo;
+        let stereo = &self.stage.scene().stereo;
         let ray = Ray::new(stereo.position_m, self.camera.at_unit_depth(at));
-        let point_m = ray.at(self.scene.range_to_hit(&ray)?);
+        let point_m = ray.at(self.stage.range_to_hit(&ray)?);
         Some(at.0 - self.seen_by_right_camera(point_m)?)
     }
 
@@ -107,14 +112,14 @@ impl<'a> StereoRig<'a> {
         let origin = self.right.origin_m();
         let towards = point_m - origin;
         let (u, _) = self.right.sees_at(point_m)?;
-        let first_m = self.scene.range_to_hit(&Ray::new(origin, towards))?;
+        let first_m = self.stage.range_to_hit(&Ray::new(origin, towards))?;
         let visible = first_m >= towards.length() * (1.0 - OCCLUSION_TOLERANCE);
         visible.then_some(u)
     }
 
     /// What the matcher makes of a true disparity.
     fn matched(&self, row: u32, col: u32, true_disparity_px: f64) -> Option<f64> {
-        let stereo = &self.scene.stereo;
+        let stereo = &self.stage.scene().stereo;
         let pixel = row * self.camera.width + col;
         let mut random = random_stream(self.seed, Purpose::Stereo, pixel, 0);
         let noisy_px = true_disparity_px + stereo.disparity_sigma_px * normal(&mut random);

@@ -27,7 +27,7 @@ use super::recording::{Recorded, Recording};
 use crate::chip::SensorConfig;
 use crate::files::InputError;
 use crate::guide::view;
-use crate::scene::{DVec3, Ray, Scene};
+use crate::scene::{DVec3, Ray, Scene, Stage};
 use crate::system::{NoDepth, Ranger, TakenSettings};
 
 /// Pixels of the camera view across a macropixel.
@@ -223,10 +223,11 @@ fn arrays(
 fn objects(scene: &Scene, sensor: &SensorConfig) -> Vec<u16> {
     let (rows, cols) = (sensor.rows, sensor.cols);
     let camera = scene.lidar_camera(rows as u32, cols as u32);
+    let stage = Stage::of(scene);
     let pixels = (0..rows * cols).into_par_iter();
     let seen = pixels.map(|pixel| {
         let at = ((pixel % cols) as f64 + 0.5, (pixel / cols) as f64 + 0.5);
-        let hit = scene.hit(&Ray::new(DVec3::ZERO, camera.at_unit_depth(at)));
+        let hit = stage.hit(&Ray::new(DVec3::ZERO, camera.at_unit_depth(at)));
         hit.map_or(0, |hit| (hit.object + 1).min(usize::from(u16::MAX)) as u16)
     });
     seen.collect()

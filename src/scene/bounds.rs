@@ -21,25 +21,62 @@ pub(crate) type Candidates = SmallVec<[u32; 16]>;
 /// Room for rounding, rad.
 const ROOM_RAD: f64 = 1e-6;
 
+/// Directions about a middle.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Cone {
+    middle: DVec3,
+    /// Half its angle with room for rounding, rad, and of that sine and cosine.
+    half_rad: f64,
+    sine_cosine: (f64, f64),
+}
+
+impl Cone {
+    /// About the direction `middle`, so wide that `others` are in it, unit vectors all.
+    pub(super) fn about(middle: DVec3, others: impl IntoIterator<Item = DVec3>) -> Self {
+        let cosines = others.into_iter().map(|other| other.dot(middle));
+        let half_rad = cosines.fold(1.0, f64::min).acos() + ROOM_RAD;
+        Cone {
+            middle,
+            half_rad,
+            sine_cosine: half_rad.sin_cos(),
+        }
+    }
+}
+
+/// A ball around an object, as it is seen from one place.
+#[derive(Debug, Clone, Copy)]
+struct Disc {
+    /// Direction of the middle.
+    towards: DVec3,
+    /// Half the angle that it fills, rad, and of that sine and cosine.
+    fills_rad: f64,
+    sine_cosine: (f64, f64),
+}
+
 /// Balls around the objects of a scene, as they are seen from one place.
 #[derive(Debug)]
 pub(crate) struct Bounds {
-    /// Direction of the middle and half the angle that a ball fills, rad; `None` for an object that is everywhere or about the place.
-    balls: Vec<Option<(DVec3, f64)>>,
+    /// `None` for an object that is everywhere or about the place.
+    discs: Vec<Option<Disc>>,
 }
 
 impl Bounds {
     /// Those of a scene, from `place_m`; the lidar is at zero.
     pub(crate) fn of(scene: &Scene, place_m: DVec3) -> Self {
-        let ball = |(centre_m, radius_m): (DVec3, f64)| {
+        let disc = |(centre_m, radius_m): (DVec3, f64)| {
             let offset_m = centre_m - place_m;
             let away_m = offset_m.length();
-            (away_m > radius_m).then(|| (offset_m / away_m, (radius_m / away_m).asin()))
+            let fills_rad = (radius_m / away_m).asin();
+            (away_m > radius_m).then(|| Disc {
+                towards: offset_m / away_m,
+                fills_rad,
+                sine_cosine: fills_rad.sin_cos(),
+            })
         };
         let objects = scene.objects.iter();
         Bounds {
-            balls: objects
-                .map(|object| object.shape.ball_around().and_then(ball))
+            discs: objects
+                .map(|object| object.shape.ball_around().and_then(disc))
                 .collect(),
         }
     }
@@ -47,23 +84,26 @@ impl Bounds {
     /// Objects that `rays` from the place may meet; none of them may look backwards from another.
     pub(crate) fn of_rays(&self, rays: &[Ray]) -> Candidates {
         let sum: DVec3 = rays.iter().map(|ray| ray.direction).sum();
-        let middle = sum.normalize();
-        let least = rays.iter().map(|ray| ray.direction.dot(middle));
-        let half_rad = least.fold(1.0, f64::min).acos();
-        self.about(middle, half_rad)
+        self.about(Cone::about(
+            sum.normalize(),
+            rays.iter().map(|ray| ray.direction),
+        ))
     }
 
-    /// Objects that rays from the place may meet which are at most `half_rad` away from the direction `middle`, a unit vector.
-    pub(super) fn about(&self, middle: DVec3, half_rad: f64) -> Candidates {
-        let may_meet = |ball: &Option<(DVec3, f64)>| {
-            ball.is_none_or(|(towards, fills_rad)| {
-                let reach_rad = half_rad + fills_rad + ROOM_RAD;
-                reach_rad >= std::f64::consts::PI || middle.dot(towards) >= reach_rad.cos()
+    /// Objects that rays from the place within a cone may meet.
+    pub(super) fn about(&self, cone: Cone) -> Candidates {
+        let (sine, cosine) = cone.sine_cosine;
+        let may_meet = |disc: &Option<Disc>| {
+            disc.is_none_or(|disc| {
+                // The cosine of both angles together.
+                let (own_sine, own_cosine) = disc.sine_cosine;
+                cone.half_rad + disc.fills_rad >= std::f64::consts::PI
+                    || cone.middle.dot(disc.towards) >= cosine * own_cosine - sine * own_sine
             })
         };
-        let balls = (0..).zip(&self.balls);
-        balls
-            .filter_map(|(index, ball)| may_meet(ball).then_some(index))
+        let discs = (0..).zip(&self.discs);
+        discs
+            .filter_map(|(index, disc)| may_meet(disc).then_some(index))
             .collect()
     }
 }
@@ -71,7 +111,7 @@ impl Bounds {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{GroundTruth, Object, Shape};
+    use crate::scene::{GroundTruth, Object, Shape, Stage};
     use proptest::prelude::*;
 
     fn point(within_m: f64) -> impl Strategy<Value = DVec3> {
@@ -132,8 +172,26 @@ mod tests {
             scene.objects = shapes.into_iter().map(|shape| Object::new("it", 0.3, shape)).collect();
             let rays: Vec<Ray> = spread.iter().map(|beside| Ray::new(place_m, towards + *beside)).collect();
             let candidates = Bounds::of(&scene, place_m).of_rays(&rays);
+            let stage = Stage::of(&scene);
             for ray in &rays {
-                prop_assert_eq!(scene.hit(ray), scene.hit_of(ray, &candidates));
+                prop_assert_eq!(scene.hit(ray), stage.hit_of(ray, &candidates));
+            }
+        }
+
+        /// Shadows: the slow way tries every shape.
+        #[test]
+        fn rays_are_blocked_by_what_they_meet(
+            shapes in prop::collection::vec(shapes(), 1..8),
+            from_m in prop::collection::vec(point(20.0), 40),
+            towards in point(1.0).prop_filter("a direction", |towards| towards.length() > 0.1),
+        ) {
+            let mut scene = Scene::outdoor();
+            scene.objects = shapes.into_iter().map(|shape| Object::new("it", 0.3, shape)).collect();
+            let stage = Stage::of(&scene);
+            for origin in from_m {
+                let ray = Ray::new(origin, towards);
+                let blocked = scene.objects.iter().any(|object| object.shape.intersect(&ray).is_some());
+                prop_assert_eq!(stage.is_blocked(&ray), blocked);
             }
         }
 
@@ -153,7 +211,7 @@ mod tests {
                     object
                 })
                 .collect();
-            let bounds = Bounds::of(&scene, DVec3::ZERO);
+            let (stage, bounds) = (Stage::of(&scene), Bounds::of(&scene, DVec3::ZERO));
             let camera = scene.lidar_camera(6, 5);
             for (row, col) in (0..6).flat_map(|row| (0..5).map(move |col| (row, col))) {
                 let at = |du: f64, dv: f64| {
@@ -161,12 +219,10 @@ mod tests {
                 };
                 let middle = at(0.5, 0.5);
                 let corners = [at(0.0, 0.0), at(0.0, 1.0), at(1.0, 0.0), at(1.0, 1.0)];
-                let half_rad = corners.map(|corner| middle.angle_between(corner));
-                let half_rad = half_rad.into_iter().fold(0.0, f64::max);
-                let candidates = bounds.about(middle, half_rad);
+                let candidates = bounds.about(Cone::about(middle, corners));
                 for direction in corners.into_iter().chain([middle, at(0.2, 0.9)]) {
                     let ray = Ray::new(DVec3::ZERO, direction);
-                    prop_assert_eq!(scene.returns(&ray), scene.returns_of(&ray, &candidates));
+                    prop_assert_eq!(scene.returns(&ray), stage.returns_of(&ray, &candidates));
                 }
             }
         }
@@ -182,8 +238,10 @@ mod tests {
         for pixel in 0..64 * 64u32 {
             let (row, col) = (f64::from(pixel / 64), f64::from(pixel % 64));
             let middle = camera.at_unit_depth((col + 0.5, row + 0.5)).normalize();
-            let corner = camera.at_unit_depth((col, row)).normalize();
-            let candidates = bounds.about(middle, 1.01 * middle.angle_between(corner));
+            let corners = [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0)];
+            let corners =
+                corners.map(|(u, v)| camera.at_unit_depth((col + u, row + v)).normalize());
+            let candidates = bounds.about(Cone::about(middle, corners));
             let seen = truth.surfaces[pixel as usize].iter();
             for surface in seen {
                 assert!(candidates.contains(&(surface.object as u32)));

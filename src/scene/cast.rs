@@ -7,7 +7,7 @@ use smallvec::SmallVec;
 
 use super::bounds::Candidates;
 use super::settings::Scene;
-use super::shape::Meeting;
+use super::shape::{Meeting, Placed, Shape};
 use super::vector::Ray;
 
 /// A surface point that a ray meets, and what its material is there.
@@ -58,12 +58,65 @@ impl Scene {
     /// The nearest opaque surface along `ray`, as if panes were not there; `None` for the sky. Of two in the same place
     /// the one listed first in the scene counts.
     pub fn hit(&self, ray: &Ray) -> Option<Hit> {
-        self.nearest(ray, self.opaque(self.all()))
+        Stage::of(self).hit(ray)
+    }
+
+    /// All that sends light back along `ray`: panes themselves, what stands behind them, and what they mirror.
+    ///
+    /// Light goes there and back the same way, so what is left of it is a share of a share. A pane's thickness and the
+    /// laser's own mirror image are left out.
+    pub fn returns(&self, ray: &Ray) -> Returns {
+        let stage = Stage::of(self);
+        stage.followed(ray, stage.first_meeting(ray, stage.all()), None)
+    }
+}
+
+/// A scene made ready for many rays.
+#[derive(Debug)]
+pub(crate) struct Stage<'a> {
+    scene: &'a Scene,
+    placed: Vec<Placed<'a>>,
+    /// Balls around the objects, for rays that do not come from one place.
+    balls: Vec<Option<Ball>>,
+    /// Towards the sun.
+    sun: Option<DVec3>,
+}
+
+/// Where a ray first meets an object, and that object's index.
+pub(super) type First = Option<(Meeting, usize)>;
+
+impl<'a> Stage<'a> {
+    pub(crate) fn of(scene: &'a Scene) -> Self {
+        let shapes = || scene.objects.iter().map(|object| &object.shape);
+        Stage {
+            scene,
+            placed: shapes().map(Shape::placed).collect(),
+            balls: shapes()
+                .map(|shape| shape.ball_around().map(Ball::from))
+                .collect(),
+            sun: scene.towards_sun(),
+        }
+    }
+
+    /// What was made ready.
+    pub(crate) fn scene(&self) -> &'a Scene {
+        self.scene
+    }
+
+    /// Unit vector towards the sun, as [`Scene::towards_sun`].
+    pub(super) fn sun(&self) -> Option<DVec3> {
+        self.sun
+    }
+
+    /// As [`Scene::hit`].
+    pub(crate) fn hit(&self, ray: &Ray) -> Option<Hit> {
+        Some(self.seen_at(ray, self.first_meeting(ray, self.opaque(self.all()))?))
     }
 
     /// The same, where the ray meets no others than the `candidates`.
     pub(crate) fn hit_of(&self, ray: &Ray, candidates: &Candidates) -> Option<Hit> {
-        self.nearest(ray, self.opaque(candidates.iter().map(|&n| n as usize)))
+        let candidates = self.opaque(candidates.iter().map(|&n| n as usize));
+        Some(self.seen_at(ray, self.first_meeting(ray, candidates)?))
     }
 
     /// How far it is to that surface, m, without what is there.
@@ -75,58 +128,57 @@ impl Scene {
     /// Whether there is such a surface at all.
     pub(super) fn is_blocked(&self, ray: &Ray) -> bool {
         let mut opaque = self.opaque(self.all());
-        opaque.any(|n| self.objects[n].shape.meet(ray).is_some())
+        opaque.any(|n| {
+            self.balls[n].is_none_or(|ball| ball.may_be_met(ray))
+                && self.placed[n].meet(ray).is_some()
+        })
     }
 
-    /// All that sends light back along `ray`: panes themselves, what stands behind them, and what they mirror.
-    ///
-    /// Light goes there and back the same way, so what is left of it is a share of a share. A pane's thickness and the
-    /// laser's own mirror image are left out.
-    pub fn returns(&self, ray: &Ray) -> Returns {
-        self.followed(ray, None)
-    }
-
-    /// The same, where the ray meets no others than the `candidates`.
+    /// As [`Scene::returns`], where the ray meets no others than the `candidates`.
     pub(crate) fn returns_of(&self, ray: &Ray, candidates: &Candidates) -> Returns {
-        self.followed(ray, Some(candidates))
+        self.returns_from(ray, self.meeting_of(ray, candidates), candidates)
     }
 
-    fn followed(&self, ray: &Ray, candidates: Option<&Candidates>) -> Returns {
+    /// The same for a ray that first meets what [`Stage::meeting_of`] says.
+    pub(super) fn returns_from(&self, ray: &Ray, first: First, candidates: &Candidates) -> Returns {
+        self.followed(ray, first, Some(candidates))
+    }
+
+    /// Whether all light that comes back along a ray with this end comes from there.
+    pub(super) fn ends_there(&self, first: &First) -> bool {
+        first.is_none_or(|(_, object)| self.scene.objects[object].ends_rays())
+    }
+
+    fn followed(&self, ray: &Ray, first: First, candidates: Option<&Candidates>) -> Returns {
         let mut returns = Returns {
             surfaces: SmallVec::new(),
             sky_share: 0.0,
         };
-        self.follow(ray, candidates, (0.0, 1.0), 0, &mut returns);
+        self.follow(ray, first, candidates, (0.0, 1.0), 0, &mut returns);
         let by_range = |a: &Return, b: &Return| a.hit.range_m.total_cmp(&b.hit.range_m);
         returns.surfaces.sort_by(by_range);
         returns
     }
 
-    /// Follows a ray that has come `so_far_m` and of whose light `share` arrives one way; it meets no others than the
-    /// `candidates`, if they are known.
+    /// Follows a ray, up to where it first meets something and from there on, that has come `so_far_m` and of whose light `share`
+    /// arrives one way; it meets no others than the `candidates`, if they are known.
     fn follow(
         &self,
         ray: &Ray,
+        first: First,
         candidates: Option<&Candidates>,
         (so_far_m, share): (f64, f64),
         mirrors: u32,
         returns: &mut Returns,
     ) {
-        let nearest = match candidates {
-            Some(candidates) => self.nearest(ray, candidates.iter().map(|&n| n as usize)),
-            None => self.nearest(ray, self.all()),
-        };
-        let Some(mut hit) = nearest else {
+        let Some(mut hit) = first.map(|first| self.seen_at(ray, first)) else {
             returns.sky_share += share;
             return;
         };
-        let object = &self.objects[hit.object];
+        let object = &self.scene.objects[hit.object];
         let point = ray.at(hit.range_m);
         hit.range_m += so_far_m;
-        if hit.reflectivity > 0.0
-            || hit.grey > 0.0
-            || (object.transmittance, object.mirror) == (0.0, 0.0)
-        {
+        if hit.reflectivity > 0.0 || hit.grey > 0.0 || object.ends_rays() {
             returns.surfaces.push(Return {
                 hit,
                 share: share * share,
@@ -139,36 +191,44 @@ impl Scene {
                 origin: point,
                 ..*ray
             };
-            self.follow(&beyond, candidates, (hit.range_m, left), mirrors, returns);
+            let next = match candidates {
+                Some(candidates) => self.meeting_of(&beyond, candidates),
+                None => self.first_meeting(&beyond, self.all()),
+            };
+            let so_far = (hit.range_m, left);
+            self.follow(&beyond, next, candidates, so_far, mirrors, returns);
         }
         if let Some(left) = onwards(object.mirror)
             && mirrors < MOST_MIRRORS
         {
             let thrown_back = ray.direction - hit.normal * (2.0 * ray.direction.dot(hit.normal));
             let reflected = Ray::new(point, thrown_back);
-            self.follow(&reflected, None, (hit.range_m, left), mirrors + 1, returns);
+            let next = self.first_meeting(&reflected, self.all());
+            let so_far = (hit.range_m, left);
+            self.follow(&reflected, next, None, so_far, mirrors + 1, returns);
         }
     }
 
     fn all(&self) -> Range<usize> {
-        0..self.objects.len()
+        0..self.placed.len()
     }
 
     /// Without panes.
     fn opaque(&self, objects: impl Iterator<Item = usize>) -> impl Iterator<Item = usize> {
-        objects.filter(|&n| !self.objects[n].is_pane())
+        objects.filter(|&n| !self.scene.objects[n].is_pane())
     }
 
-    /// Where `ray` meets the first of some objects, and which that is.
+    /// Where a ray meets the first of the `candidates`, panes among them.
+    pub(super) fn meeting_of(&self, ray: &Ray, candidates: &Candidates) -> First {
+        self.first_meeting(ray, candidates.iter().map(|&n| n as usize))
+    }
+
+    /// Where `ray` meets the first of some objects, which are given by their index, rising, and which that is.
     #[inline]
-    fn first_meeting(
-        &self,
-        ray: &Ray,
-        objects: impl Iterator<Item = usize>,
-    ) -> Option<(Meeting, usize)> {
-        let mut nearest: Option<(Meeting, usize)> = None;
+    fn first_meeting(&self, ray: &Ray, objects: impl Iterator<Item = usize>) -> First {
+        let mut nearest: First = None;
         for index in objects {
-            if let Some(meeting) = self.objects[index].shape.meet(ray)
+            if let Some(meeting) = self.placed[index].meet(ray)
                 && nearest.is_none_or(|(least, _)| meeting.range_m < least.range_m)
             {
                 nearest = Some((meeting, index));
@@ -177,14 +237,14 @@ impl Scene {
         nearest
     }
 
-    /// The nearest surface along `ray` of some objects, by their index, rising.
-    fn nearest(&self, ray: &Ray, objects: impl Iterator<Item = usize>) -> Option<Hit> {
-        let (Meeting { range_m, part }, index) = self.first_meeting(ray, objects)?;
-        let object = &self.objects[index];
+    /// The surface that `ray` meets there.
+    pub(super) fn seen_at(&self, ray: &Ray, (meeting, index): (Meeting, usize)) -> Hit {
+        let Meeting { range_m, part } = meeting;
+        let (object, placed) = (&self.scene.objects[index], &self.placed[index]);
         let point = ray.at(range_m);
-        let normal = object.shape.normal_at(point, part);
-        let (reflectivity, grey) = object.material_at(point, part);
-        Some(Hit {
+        let normal = placed.normal_at(point, part);
+        let (reflectivity, grey) = object.material_at(placed, point, part);
+        Hit {
             range_m,
             normal: if normal.dot(ray.direction) > 0.0 {
                 -normal
@@ -195,7 +255,31 @@ impl Scene {
             grey,
             retro: object.retro,
             object: index,
-        })
+        }
+    }
+}
+
+/// A ball that rays from anywhere may meet.
+#[derive(Debug, Clone, Copy)]
+struct Ball {
+    centre_m: DVec3,
+    radius_m: f64,
+}
+
+impl From<(DVec3, f64)> for Ball {
+    fn from((centre_m, radius_m): (DVec3, f64)) -> Self {
+        Ball { centre_m, radius_m }
+    }
+}
+
+impl Ball {
+    /// Whether a ray comes into it, or passes it so closely that rounding could hide it.
+    fn may_be_met(&self, ray: &Ray) -> bool {
+        let to_centre = self.centre_m - ray.origin;
+        let (away_m2, along_m) = (to_centre.length_squared(), to_centre.dot(ray.direction));
+        let room_m2 = 1e-6 * self.radius_m * self.radius_m + 1e-9 * away_m2;
+        let reach_m2 = self.radius_m * self.radius_m + room_m2;
+        away_m2 <= reach_m2 || (along_m > 0.0 && away_m2 - along_m * along_m <= reach_m2)
     }
 }
 

@@ -7,6 +7,7 @@
 
 use glam::DVec3;
 
+use super::cast::Stage;
 use super::settings::Scene;
 use super::vector::Ray;
 
@@ -23,10 +24,17 @@ impl Scene {
 
     /// Daylight on a surface at `point` that faces along `normal` (unit), as a share of the scene's illuminance, 0 to 1.
     pub fn daylight(&self, point: DVec3, normal: DVec3) -> f64 {
-        let Some(sun) = self.towards_sun() else {
+        Stage::of(self).daylight(point, normal)
+    }
+}
+
+impl Stage<'_> {
+    /// As [`Scene::daylight`].
+    pub(crate) fn daylight(&self, point: DVec3, normal: DVec3) -> f64 {
+        let (Some(sun), light) = (self.sun(), &self.scene().light) else {
             return 1.0;
         };
-        let from_sky = self.light.sky_share * (1.0 - normal.y) / 2.0;
+        let from_sky = light.sky_share * (1.0 - normal.y) / 2.0;
         let incidence = normal.dot(sun);
         if incidence <= 0.0 {
             return from_sky;
@@ -35,7 +43,7 @@ impl Scene {
         let from_sun = if self.is_blocked(&upwards) {
             0.0
         } else {
-            (1.0 - self.light.sky_share) * incidence
+            (1.0 - light.sky_share) * incidence
         };
         from_sky + from_sun
     }

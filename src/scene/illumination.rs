@@ -69,14 +69,18 @@ impl Scene {
         if segments.len() == 1 {
             return self.light_after(truth, spads, None);
         }
-        let seen = segments.iter().map(|cycles| {
+        let mut seen: Vec<(u32, Vec<PixelLight>)> = Vec::new();
+        let mut last: Option<(Scene, GroundTruth)> = None;
+        for cycles in segments {
             let middle = 0.5 * (f64::from(cycles.start) + f64::from(cycles.end));
-            let scene = self.at(middle * cycle_s);
-            let truth = GroundTruth::render(&scene, truth.rows, truth.cols);
-            scene.light_on(&truth, spads, None)
-        });
-        let starts = segments.iter().map(|cycles| cycles.start);
-        let seen: Vec<(u32, Vec<PixelLight>)> = starts.zip(seen).collect();
+            let world = self.at(middle * cycle_s);
+            let before = last.as_ref().map(|(world, truth)| Before { world, truth });
+            let (truth, _) = GroundTruth::render_after(&world, truth.rows, truth.cols, before);
+            let light = seen.last().map(|(_, light)| light.as_slice());
+            let light = world.light_on(&truth, spads, before.zip(light));
+            seen.push((cycles.start, light));
+            last = Some((world, truth));
+        }
         let lights = (0..truth.views.len()).map(|pixel| timeline(&seen, pixel));
         self.on_own_spads(lights.collect(), spads)
     }

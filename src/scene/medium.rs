@@ -52,9 +52,10 @@ impl Medium {
     ///
     /// Rain: 1.076·R^0.67 dB/km (ITU-R P.1814, Japan's and France's measurements at optical wavelengths).
     pub fn total_extinction_1_m(&self) -> f64 {
-        let rain_db_km = 1.076 * self.rain_mm_h.powf(0.67);
-        let db_km_per_1_m = 1e4 * std::f64::consts::LOG10_E;
+        // A power is dear, and most air is dry.
         let rain = if self.rain_mm_h > 0.0 {
+            let rain_db_km = 1.076 * self.rain_mm_h.powf(0.67);
+            let db_km_per_1_m = 1e4 * std::f64::consts::LOG10_E;
             rain_db_km / db_km_per_1_m
         } else {
             0.0

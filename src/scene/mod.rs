@@ -29,6 +29,7 @@ mod vector;
 
 pub(crate) use bounds::Bounds;
 pub use camera::PinholeCamera;
+pub(crate) use cast::Stage;
 pub use cast::{Hit, Return, Returns};
 pub use curve::{Curve, CurveError, Measured};
 pub use illumination::SKY_REFLECTIVITY;

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::motion::Waypoint;
-use super::shape::Shape;
+use super::shape::{Placed, Shape};
 use super::texture::Texture;
 
 /// A thing that reflects light, evenly and diffusely.
@@ -57,15 +57,20 @@ impl Object {
         self.transmittance > 0.0
     }
 
-    /// Reflectivity for the laser and for the cameras at a point of the surface.
-    pub(super) fn material_at(&self, point: DVec3, part: u32) -> (f64, f64) {
-        let (own_reflectivity, own_grey) = self.shape.own_material(point);
+    /// Whether a ray ends where it meets the object: light neither passes through nor is thrown elsewhere.
+    pub(super) fn ends_rays(&self) -> bool {
+        (self.transmittance, self.mirror) == (0.0, 0.0)
+    }
+
+    /// Reflectivity for the laser and for the cameras at a point of the surface of `placed`, the object's shape.
+    pub(super) fn material_at(&self, placed: &Placed, point: DVec3, part: u32) -> (f64, f64) {
+        let (own_reflectivity, own_grey) = placed.own_material(point);
         let reflectivity = own_reflectivity.unwrap_or(self.reflectivity);
         let grey = own_grey.or(self.grey).unwrap_or(reflectivity);
         let Some(texture) = &self.texture else {
             return (reflectivity, grey);
         };
-        let share = texture.share_at((self.shape).on_surface(point, part, texture.seen_turned_deg));
+        let share = texture.share_at(placed.on_surface(point, part, texture.seen_turned_deg));
         let second_grey = texture.second_grey.unwrap_or(texture.second_reflectivity);
         let mix = |first: f64, second: f64| second + (first - second) * share;
         (

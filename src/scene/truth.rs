@@ -18,9 +18,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 use smallvec::SmallVec;
 
-use super::bounds::{Bounds, Candidates};
+use super::bounds::{Bounds, Cone};
 use super::camera::PinholeCamera;
-use super::cast::{Return, Returns};
+use super::cast::{First, Return, Returns, Stage};
 use super::medium::Medium;
 use super::settings::Scene;
 use super::unmoved::{Before, Moved};
@@ -31,6 +31,9 @@ const RAYS: u32 = 4;
 
 /// The same where surfaces meet: an upright edge is then misplaced by at most 1/128 of the macropixel.
 const RAYS_AT_EDGES: u32 = 8;
+
+/// Rays of a macropixel.
+const RAYS_OF_ALL: usize = (RAYS * RAYS) as usize;
 
 /// The range over a ray's piece of surface is taken to change by at most this part of it. Only where a ray grazes a surface is it more.
 const MOST_SLOPE: f64 = 0.5;
@@ -111,22 +114,21 @@ impl GroundTruth {
             Some((Moved::between(before.world, scene)?, before.truth))
         });
         let camera = scene.lidar_camera(rows, cols);
-        let bounds = Bounds::of(scene, DVec3::ZERO);
-        let (views, kept): (Vec<View>, Vec<usize>) = (0..rows * cols)
-            .into_par_iter()
-            .map(|pixel| {
-                let place = (pixel / cols, pixel % cols);
-                let cone = cone(&camera, place);
-                match &moved {
-                    Some((moved, before)) if moved.is_out_of_sight(cone) => {
-                        (before.views[pixel as usize].clone(), 1)
-                    }
-                    _ => (View::of(scene, &bounds, &camera, place), 0),
-                }
-            })
-            .unzip();
-        let kept = kept.iter().sum();
-        let surfaces = views.iter().map(|view| view.surfaces(&scene.medium));
+        let (stage, bounds) = (Stage::of(scene), Bounds::of(scene, DVec3::ZERO));
+        let place = |pixel: u32| (pixel / cols, pixel % cols);
+        let is_kept = |pixel: u32| {
+            let moved = moved.as_ref();
+            moved.is_some_and(|(moved, _)| moved.is_out_of_sight(cone(&camera, place(pixel))))
+        };
+        let pixels = || (0..rows * cols).into_par_iter();
+        let is_kept: Vec<bool> = pixels().map(is_kept).collect();
+        let view = |pixel: u32| match &moved {
+            Some((_, before)) if is_kept[pixel as usize] => before.views[pixel as usize].clone(),
+            _ => View::of(&stage, &bounds, &camera, place(pixel)),
+        };
+        let views: Vec<View> = pixels().map(view).collect();
+        let kept = is_kept.iter().filter(|is_kept| **is_kept).count();
+        let surfaces = views.par_iter().map(|view| view.surfaces(&scene.medium));
         let surfaces: Vec<SmallVec<[Surface; 1]>> = surfaces.collect();
         let brightest = || surfaces.iter().map(|surfaces| surfaces.first());
         let truth = GroundTruth {
@@ -145,62 +147,108 @@ impl GroundTruth {
 }
 
 impl View {
-    fn of(scene: &Scene, bounds: &Bounds, camera: &PinholeCamera, pixel: (u32, u32)) -> Self {
-        let (middle, half_rad) = cone(camera, pixel);
-        let candidates = bounds.about(middle, half_rad);
-        let few = cast(scene, &candidates, camera, pixel, RAYS);
-        let first = |returns: &Returns| returns.surfaces.first().map(|s| s.hit.object);
-        let is_edge = few.iter().any(|(_, returns)| {
-            first(returns) != first(&few[0].1) || returns.surfaces.len() != few[0].1.surfaces.len()
-        });
-        match is_edge {
-            false => View::seen(scene, camera, RAYS, &few),
-            true => {
-                let many = cast(scene, &candidates, camera, pixel, RAYS_AT_EDGES);
-                View::seen(scene, camera, RAYS_AT_EDGES, &many)
+    fn of(stage: &Stage, bounds: &Bounds, camera: &PinholeCamera, pixel: (u32, u32)) -> Self {
+        let candidates = bounds.about(cone(camera, pixel));
+        let mut few = SmallVec::<[(Look, First); RAYS_OF_ALL]>::new();
+        for look in looks(camera, pixel, RAYS) {
+            few.push((look, stage.meeting_of(&look.ray, &candidates)));
+        }
+        let object = |(_, first): &(Look, First)| first.map(|(_, object)| object);
+        let mut view = View::default();
+        let is_edge = if few.iter().all(|(_, first)| stage.ends_there(first)) {
+            // What they end on tells, without a look at what it is made of.
+            let is_edge = few.iter().any(|ray| object(ray) != object(&few[0]));
+            if !is_edge {
+                let piece = Piece::new(camera, RAYS);
+                for (look, first) in &few {
+                    view.see_end(stage, &piece, look, first);
+                }
+            }
+            is_edge
+        } else {
+            let follow =
+                |(look, first): &(Look, First)| stage.returns_from(&look.ray, *first, &candidates);
+            let all: Vec<Returns> = few.iter().map(follow).collect();
+            let first = |returns: &Returns| returns.surfaces.first().map(|s| s.hit.object);
+            let is_edge = all.iter().any(|returns| {
+                first(returns) != first(&all[0]) || returns.surfaces.len() != all[0].surfaces.len()
+            });
+            if !is_edge {
+                let piece = Piece::new(camera, RAYS);
+                for ((look, _), returns) in few.iter().zip(&all) {
+                    view.see(stage, &piece, look, &returns.surfaces, returns.sky_share);
+                }
+            }
+            is_edge
+        };
+        if is_edge {
+            let piece = Piece::new(camera, RAYS_AT_EDGES);
+            for look in looks(camera, pixel, RAYS_AT_EDGES) {
+                let first = stage.meeting_of(&look.ray, &candidates);
+                if stage.ends_there(&first) {
+                    view.see_end(stage, &piece, &look, &first);
+                } else {
+                    let returns = stage.returns_from(&look.ray, first, &candidates);
+                    view.see(stage, &piece, &look, &returns.surfaces, returns.sky_share);
+                }
+            }
+        }
+        view
+    }
+
+    /// Adds a ray that ends where it first meets something, or in the sky.
+    fn see_end(&mut self, stage: &Stage, piece: &Piece, look: &Look, first: &First) {
+        match first {
+            None => self.see(stage, piece, look, &[], 1.0),
+            Some(first) => {
+                let surface = Return {
+                    hit: stage.seen_at(&look.ray, *first),
+                    share: 1.0,
+                    share_back: 1.0,
+                };
+                self.see(stage, piece, look, &[surface], 0.0);
             }
         }
     }
 
-    fn seen(scene: &Scene, camera: &PinholeCamera, across: u32, rays: &[(DVec3, Returns)]) -> Self {
-        let ray_share = 1.0 / rays.len() as f64;
-        let steps = [camera.focal_px, camera.focal_v_px].map(|px| 1.0 / (px * f64::from(across)));
-        let mut view = View::default();
+    /// Adds a ray with what sends light back along it, nearest first, and the share of the sky's light that arrives.
+    fn see(
+        &mut self,
+        stage: &Stage,
+        piece: &Piece,
+        look: &Look,
+        surfaces: &[Return],
+        sky_share: f64,
+    ) {
+        let (scene, ray_share) = (stage.scene(), piece.ray_share);
         let (medium, sky) = (&scene.medium, scene.light.sky_reflectivity);
-        for (direction, returns) in rays {
-            view.sunlit_reflectivity += ray_share * returns.sky_share * sky;
-            let end_m = match returns.sky_share > 0.0 {
-                true => f64::INFINITY,
-                false => returns
-                    .surfaces
-                    .last()
-                    .map_or(f64::INFINITY, |s| s.hit.range_m),
-            };
-            view.end(end_m, ray_share);
-            for surface in &returns.surfaces {
-                let Return {
-                    hit,
-                    share,
-                    share_back,
-                } = surface;
-                let ray = Ray::new(DVec3::ZERO, *direction);
-                let daylight = scene.daylight(ray.at(hit.range_m), hit.normal);
-                // Air takes the surface's light away and puts its own in the place.
-                let seen = medium.transmission(hit.range_m) * hit.reflectivity * daylight
-                    + medium.airlight(hit.range_m) * sky;
-                view.sunlit_reflectivity += ray_share * share_back * seen;
-                let cosine = cosine(*direction, hit.normal);
-                view.glimpses.push(Glimpse {
-                    object: hit.object,
-                    reflectivity: hit.reflectivity,
-                    ray_share,
-                    range_m: hit.range_m,
-                    range_m2: range_variance(*direction, hit.normal, hit.range_m, steps),
-                    frontal_reflectivity: hit.reflectivity * hit.retro * cosine * share * ray_share,
-                });
-            }
+        self.sunlit_reflectivity += ray_share * sky_share * sky;
+        let end_m = match sky_share > 0.0 {
+            true => f64::INFINITY,
+            false => surfaces.last().map_or(f64::INFINITY, |s| s.hit.range_m),
+        };
+        self.end(end_m, ray_share);
+        for surface in surfaces {
+            let Return {
+                hit,
+                share,
+                share_back,
+            } = surface;
+            let daylight = stage.daylight(look.ray.at(hit.range_m), hit.normal);
+            // Air takes the surface's light away and puts its own in the place.
+            let left = medium.transmission(hit.range_m);
+            let seen = left * hit.reflectivity * daylight + (1.0 - left) * sky;
+            self.sunlit_reflectivity += ray_share * share_back * seen;
+            let cosine = look.ray.direction.dot(hit.normal).abs();
+            self.glimpses.push(Glimpse {
+                object: hit.object,
+                reflectivity: hit.reflectivity,
+                ray_share,
+                range_m: hit.range_m,
+                range_m2: range_variance(look, hit.normal, hit.range_m, piece.steps),
+                frontal_reflectivity: hit.reflectivity * hit.retro * cosine * share * ray_share,
+            });
         }
-        view
     }
 
     /// Notes where a ray ends.
@@ -218,18 +266,17 @@ impl View {
     /// What is seen of each object through this air, that which sends back most light first.
     fn surfaces(&self, medium: &Medium) -> SmallVec<[Surface; 1]> {
         let mut surfaces = SmallVec::<[Surface; 1]>::new();
-        // Where nothing sends back any light, rays count alike.
-        let weight = |glimpse: &Glimpse, is_dark: bool| match is_dark {
-            true => glimpse.ray_share,
-            false => {
-                let way = medium.transmission(glimpse.range_m).powi(2);
-                glimpse.frontal_reflectivity * way / (glimpse.range_m * glimpse.range_m)
-            }
-        };
-        let total = |is_dark| -> f64 { self.glimpses.iter().map(|g| weight(g, is_dark)).sum() };
-        let is_dark = total(false) <= 0.0;
-        let all = total(is_dark);
-        for glimpse in &self.glimpses {
+        let light = self.glimpses.iter().map(|glimpse| {
+            let way = medium.transmission(glimpse.range_m).powi(2);
+            glimpse.frontal_reflectivity * way / (glimpse.range_m * glimpse.range_m)
+        });
+        let mut weights: SmallVec<[f64; 64]> = light.collect();
+        if weights.iter().sum::<f64>() <= 0.0 {
+            // Where nothing sends back any light, rays count alike.
+            weights = self.glimpses.iter().map(|g| g.ray_share).collect();
+        }
+        let all: f64 = weights.iter().sum();
+        for (glimpse, weight) in self.glimpses.iter().zip(weights) {
             let same = surfaces.iter().position(|s| s.object == glimpse.object);
             let at = same.unwrap_or_else(|| {
                 surfaces.push(Surface {
@@ -242,7 +289,7 @@ impl View {
                 surfaces.len() - 1
             });
             let surface = &mut surfaces[at];
-            let light = weight(glimpse, is_dark) / all;
+            let light = weight / all;
             surface.light_share += light;
             surface.ray_share += glimpse.ray_share;
             surface.range_m += light * glimpse.range_m;
@@ -266,53 +313,75 @@ impl View {
     }
 }
 
-/// The middle of what a macropixel sees, and how far its corners are from it, rad.
-pub(super) fn cone(camera: &PinholeCamera, (row, col): (u32, u32)) -> (DVec3, f64) {
+/// What a macropixel sees.
+pub(super) fn cone(camera: &PinholeCamera, (row, col): (u32, u32)) -> Cone {
     let at = |du: f64, dv: f64| {
         let place = (f64::from(col) + du, f64::from(row) + dv);
         camera.at_unit_depth(place).normalize()
     };
-    let middle = at(0.5, 0.5);
     let corners = [at(0.0, 0.0), at(0.0, 1.0), at(1.0, 0.0), at(1.0, 1.0)];
-    let away_rad = corners.map(|corner| middle.angle_between(corner));
-    (middle, away_rad.into_iter().fold(0.0, f64::max))
+    Cone::about(at(0.5, 0.5), corners)
 }
 
-/// Rays of a macropixel, `across` of them in a row and in a column, and what they meet, which is none but the `candidates`.
-fn cast(
-    scene: &Scene,
-    candidates: &Candidates,
+/// A ray of a macropixel.
+#[derive(Debug, Clone, Copy)]
+struct Look {
+    ray: Ray,
+    /// How far it is along the ray to unit depth.
+    to_unit_depth: f64,
+}
+
+impl Look {
+    fn new(at_unit_depth: DVec3) -> Self {
+        Look {
+            ray: Ray::new(DVec3::ZERO, at_unit_depth),
+            to_unit_depth: at_unit_depth.length(),
+        }
+    }
+}
+
+/// The part of a macropixel that a ray stands for.
+#[derive(Debug, Clone, Copy)]
+struct Piece {
+    ray_share: f64,
+    /// Width and height at unit depth.
+    steps: [f64; 2],
+}
+
+impl Piece {
+    fn new(camera: &PinholeCamera, across: u32) -> Self {
+        Piece {
+            ray_share: 1.0 / f64::from(across * across),
+            steps: [camera.focal_px, camera.focal_v_px].map(|px| 1.0 / (px * f64::from(across))),
+        }
+    }
+}
+
+/// Rays of a macropixel, `across` of them in a row and in a column.
+fn looks(
     camera: &PinholeCamera,
     (row, col): (u32, u32),
     across: u32,
-) -> Vec<(DVec3, Returns)> {
-    let side = f64::from(across);
-    let place = |first: u32, n: u32, other: u32| {
-        f64::from(first) + (f64::from(n) + (f64::from(other) + 0.5) / side) / side
+) -> impl Iterator<Item = Look> {
+    // Of a power of two, so that nothing is rounded.
+    let part = 1.0 / f64::from(across);
+    let place = move |first: u32, n: u32, other: u32| {
+        f64::from(first) + (f64::from(n) + (f64::from(other) + 0.5) * part) * part
     };
-    (0..across * across)
-        .map(|n| {
-            // No two rays are in one column or row, so that an upright edge is found by all of them.
-            let (x, y) = (n % across, n / across);
-            let (u, v) = (place(col, x, y), place(row, y, x));
-            let direction = camera.at_unit_depth((u, v));
-            let ray = Ray::new(DVec3::ZERO, direction);
-            (direction, scene.returns_of(&ray, candidates))
-        })
-        .collect()
-}
-
-/// Cosine of the angle between a ray and the surface's normal.
-fn cosine(direction: DVec3, normal: DVec3) -> f64 {
-    direction.normalize().dot(normal).abs()
+    (0..across * across).map(move |n| {
+        // No two rays are in one column or row, so that an upright edge is found by all of them.
+        let (x, y) = (n % across, n / across);
+        let (u, v) = (place(col, x, y), place(row, y, x));
+        Look::new(camera.at_unit_depth((u, v)))
+    })
 }
 
 /// Variance of the range over the piece of a plane that a rectangle about a ray covers, `width` × `height` at unit depth.
-fn range_variance(direction: DVec3, normal: DVec3, range_m: f64, [width, height]: [f64; 2]) -> f64 {
-    let ray = direction.normalize();
+fn range_variance(look: &Look, normal: DVec3, range_m: f64, [width, height]: [f64; 2]) -> f64 {
+    let ray = look.ray.direction;
     let across = |side: DVec3, step: f64| {
         // How the ray turns towards that side, and with it the range to a plane.
-        let turn = (side - ray * ray.dot(side)) * (step / direction.length());
+        let turn = (side - ray * ray.dot(side)) * (step / look.to_unit_depth);
         let change = turn.dot(normal) / ray.dot(normal);
         // A ray within the plane has none.
         let slope = if change.is_finite() {
@@ -412,7 +481,8 @@ mod tests {
             let mean = ranges.iter().sum::<f64>() / ranges.len() as f64;
             let exact =
                 ranges.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / ranges.len() as f64;
-            let found = range_variance(direction, normal, range_m(direction), [step; 2]);
+            let found =
+                range_variance(&Look::new(direction), normal, range_m(direction), [step; 2]);
             assert!((found / exact - 1.0).abs() < 0.01, "{found} {exact}");
         }
     }

@@ -11,7 +11,7 @@
 
 use glam::DVec3;
 
-use super::bounds::Bounds;
+use super::bounds::{Bounds, Cone};
 use super::settings::Scene;
 use super::truth::GroundTruth;
 
@@ -53,9 +53,9 @@ impl Moved {
     }
 
     /// Whether looks from the lidar within a cone meet none of them, before or now.
-    pub(super) fn is_out_of_sight(&self, (middle, half_rad): (DVec3, f64)) -> bool {
+    pub(super) fn is_out_of_sight(&self, cone: Cone) -> bool {
         self.bounds.iter().all(|bounds| {
-            let seen = bounds.about(middle, half_rad);
+            let seen = bounds.about(cone);
             let mut seen = seen.iter().map(|&object| object as usize);
             seen.all(|object| !self.is_moved[object] && !self.has_mirror[object])
         })

@@ -175,9 +175,9 @@ impl FittedStereo {
     }
 
     /// The nearest of what is seen up to `bleed_px` to either side, and the pixel's own brightness.
-    fn seen(&self, rig: &StereoRig<'_>, scene: &Scene, at: (f64, f64)) -> Seen {
+    fn seen(&self, rig: &StereoRig<'_>, at: (f64, f64)) -> Seen {
         let binning = f64::from(self.binning);
-        let look = super::render::look(scene, rig.camera(), at, self.grain, binning);
+        let look = super::render::look(rig.stage(), rig.camera(), at, self.grain, binning);
         let mut disparity_px = rig.true_disparity_px(at);
         if self.bleed_px > 0.0 {
             for side in [-1.0, 1.0] {
@@ -234,7 +234,7 @@ impl FittedStereo {
             .par_iter()
             .map(|&row| {
                 let pixels = every(crop.width).map(|col| crop.middle(row, col));
-                pixels.map(|at| self.seen(&rig, scene, at)).collect()
+                pixels.map(|at| self.seen(&rig, at)).collect()
             })
             .collect();
         let radiances: Vec<f32> = (seen.iter().flatten())

@@ -8,7 +8,7 @@ use super::statistics::{Disparities, Statistics, true_disparities_px};
 use crate::guide::render::{exposed, look};
 use crate::guide::test_scenes::{coarse, depends_on_its_seed_alone, wall_at};
 use crate::guide::{GuideInput, MatchedStereo};
-use crate::scene::{DVec3, Object, Scene, Shape};
+use crate::scene::{DVec3, Object, Scene, Shape, Stage};
 
 const VECTORS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/vectors/stereo/errors.csv");
 
@@ -111,7 +111,7 @@ fn texture(scene: &Scene, guide: FittedStereo) -> f64 {
         f64::from(camera.height) / 2.0,
     );
     let look = look(
-        scene,
+        &Stage::of(scene),
         &camera,
         middle,
         guide.grain,

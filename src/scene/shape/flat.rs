@@ -10,32 +10,57 @@ pub(super) fn meet_ground(ray: &Ray, depth_m: f64) -> Option<Meeting> {
     Some(Meeting { range_m, part: 0 })
 }
 
-pub(super) fn meet_plane(
-    ray: &Ray,
+/// A rectangle where it stands.
+#[derive(Debug)]
+pub(in crate::scene) struct Flat {
     centre_m: DVec3,
+    /// Of unit length.
     normal: DVec3,
-    (width_m, height_m): (f64, f64),
-) -> Option<Meeting> {
-    let normal = normal.normalize();
-    let range_m = in_front((centre_m - ray.origin).dot(normal) / ray.direction.dot(normal))?;
-    let offset_m = ray.at(range_m) - centre_m;
-    // Most that miss are beyond the corners, which needs no edges; a millionth is room for rounding.
-    if 4.0 * offset_m.length_squared() > 1.000_001 * (width_m * width_m + height_m * height_m) {
-        return None;
-    }
-    let (along_m, across_m) = in_plane(offset_m, normal);
-    let inside = along_m.abs() <= width_m / 2.0 && across_m.abs() <= height_m / 2.0;
-    inside.then_some(Meeting { range_m, part: 0 })
+    /// Directions of its edges. The first is horizontal; a plane that lies flat has no preferred one and takes x.
+    edges: [DVec3; 2],
+    half_m: [f64; 2],
+    /// Most of four times a square of the distance from the middle; a millionth is room for rounding.
+    reach_m2: f64,
 }
 
-/// An offset from the middle, along the plane's two edges. The first edge is horizontal; a plane that lies flat has no
-/// preferred one and takes x.
-pub(super) fn in_plane(offset: DVec3, normal: DVec3) -> (f64, f64) {
-    let horizontal = DVec3::Y.cross(normal);
-    let along = if horizontal.length() > 1e-9 {
-        horizontal.normalize()
-    } else {
-        DVec3::X
-    };
-    (offset.dot(along), offset.dot(normal.cross(along)))
+impl Flat {
+    pub(super) fn new(centre_m: DVec3, normal: DVec3, (width_m, height_m): (f64, f64)) -> Self {
+        let normal = normal.normalize();
+        let horizontal = DVec3::Y.cross(normal);
+        let along = if horizontal.length() > 1e-9 {
+            horizontal.normalize()
+        } else {
+            DVec3::X
+        };
+        Flat {
+            centre_m,
+            normal,
+            edges: [along, normal.cross(along)],
+            half_m: [width_m / 2.0, height_m / 2.0],
+            reach_m2: 1.000_001 * (width_m * width_m + height_m * height_m),
+        }
+    }
+
+    pub(super) fn normal(&self) -> DVec3 {
+        self.normal
+    }
+
+    pub(super) fn meet(&self, ray: &Ray) -> Option<Meeting> {
+        let away_m = (self.centre_m - ray.origin).dot(self.normal);
+        let range_m = in_front(away_m / ray.direction.dot(self.normal))?;
+        let point = ray.at(range_m);
+        // Most that miss are beyond the corners, which needs no edges.
+        if 4.0 * (point - self.centre_m).length_squared() > self.reach_m2 {
+            return None;
+        }
+        let (along_m, across_m) = self.on_surface(point);
+        let inside = along_m.abs() <= self.half_m[0] && across_m.abs() <= self.half_m[1];
+        inside.then_some(Meeting { range_m, part: 0 })
+    }
+
+    /// Where a point lies along the two edges, from the middle.
+    pub(super) fn on_surface(&self, point: DVec3) -> (f64, f64) {
+        let offset = point - self.centre_m;
+        (offset.dot(self.edges[0]), offset.dot(self.edges[1]))
+    }
 }

@@ -453,7 +453,7 @@ mod tests {
                 let Meeting { range_m, .. } = map.meet(&ray).unwrap();
                 prop_assert!((range_m / expected - 1.0).abs() < 1e-5, "{range_m} {expected}");
                 let normal = map.normal_at(ray.at(range_m));
-                prop_assert!(normal.dot(plane.normal_at(DVec3::ZERO, 0)).abs() > 1.0 - 1e-4);
+                prop_assert!(normal.dot(plane.placed().normal_at(DVec3::ZERO, 0)).abs() > 1.0 - 1e-4);
             }
         }
     }

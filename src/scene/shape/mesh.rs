@@ -1,11 +1,12 @@
 //! Triangle meshes from Wavefront OBJ files.
 //!
 //! ```text
-//!   OBJ ─► triangles ─► tree of boxes (obvhs, single precision) ─► candidates ─► each met in double precision
+//!   OBJ ─► triangles ─► tree of boxes (single precision) ─► candidates ─► each met in double precision
 //! ```
 //!
 //! The tree only sorts out what a ray cannot meet: a ray is brought to the mesh in double precision before it enters the
-//! tree, and boxes are a millionth of the mesh larger than their triangles, so nothing is lost by its rounding.
+//! tree, whose origin is the middle of the mesh, and boxes are a millionth of the mesh larger than their triangles, so nothing
+//! is lost by its rounding. Triangles lie in memory with their corners, in the order of the tree: neighbours are met together.
 //!
 //! An OBJ has x to the right, y up and z backwards; a model whose front looks along z there faces the lidar.
 
@@ -15,13 +16,13 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
-use obvhs::bvh2::{Bvh2, builder::build_bvh2};
-use obvhs::ray::RayHit;
-use obvhs::{Boundable, BvhBuildParams};
 
+use self::tree::{Bounds, Tree};
 use super::{Meeting, NEAREST_M, solid};
 use crate::files::InputError;
 use crate::scene::vector::Ray;
+
+mod tree;
 
 /// Most triangles of a mesh. With their tree they take about 160 bytes each.
 const MOST_TRIANGLES: usize = 4_000_000;
@@ -36,13 +37,24 @@ const ROOM: f32 = 1e-6;
 #[derive(Clone)]
 pub struct Mesh {
     path: PathBuf,
-    corners: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
-    /// Texture coordinates of each triangle's corners; empty where the file has none.
+    /// Corners of each triangle, in the tree's order.
+    triangles: Vec<[[f32; 3]; 3]>,
+    /// Texture coordinates of those corners; empty where the file has none.
     on_texture: Vec<[[f32; 2]; 3]>,
-    tree: Bvh2,
+    /// Where in the file each triangle stands.
+    numbers: Vec<u32>,
+    /// About the middle.
+    tree: Tree,
     middle: DVec3,
     size: DVec3,
+}
+
+/// The triangles of a file, as it lists them.
+#[derive(Default)]
+struct Listed {
+    corners: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    on_texture: Vec<[[f32; 2]; 3]>,
 }
 
 impl std::fmt::Debug for Mesh {
@@ -55,10 +67,12 @@ impl std::fmt::Debug for Mesh {
 /// Trees follow from triangles.
 impl PartialEq for Mesh {
     fn eq(&self, other: &Self) -> bool {
-        self.path == other.path
-            && self.corners == other.corners
-            && self.triangles == other.triangles
-            && self.on_texture == other.on_texture
+        // Worlds share meshes, and a comparison of millions of corners takes as long as a frame's rays.
+        std::ptr::eq(self, other)
+            || self.path == other.path
+                && self.triangles == other.triangles
+                && self.on_texture == other.on_texture
+                && self.numbers == other.numbers
     }
 }
 
@@ -84,15 +98,6 @@ impl<R: BufRead> BufRead for Counted<R> {
             self.lines += seen[..amount].iter().filter(|&&b| b == b'\n').count();
         }
         self.inner.consume(amount);
-    }
-}
-
-/// A triangle's box.
-struct Bounds(Aabb);
-
-impl Boundable for Bounds {
-    fn aabb(&self) -> Aabb {
-        self.0
     }
 }
 
@@ -137,82 +142,63 @@ impl Mesh {
             let message = format!("is a broken OBJ here ({e}); save it again, with its triangles");
             InputError::at(path.display(), lines.max(1), message)
         })?;
-        let mut mesh = Mesh::of_models(path, models);
-        if mesh.triangles.is_empty() {
+        let listed = Listed::of_models(models);
+        if listed.triangles.is_empty() {
             let message = "has no triangles; give an OBJ file with faces";
             return Err(complain(message.into()));
         }
-        if mesh.triangles.len() > MOST_TRIANGLES {
+        if listed.triangles.len() > MOST_TRIANGLES {
             let message = format!(
                 "has {} triangles, of which at most {MOST_TRIANGLES} are taken; make a mesh of fewer",
-                mesh.triangles.len()
+                listed.triangles.len()
             );
             return Err(complain(message));
         }
         let is_number = |corner: &[f32; 3]| corner.iter().all(|v| v.abs() < 1e6);
-        if let Some(at) = mesh.corners.iter().position(|corner| !is_number(corner)) {
+        if let Some(at) = listed.corners.iter().position(|corner| !is_number(corner)) {
             let message = format!(
                 "has its corner number {} at {:?}; give numbers below a million",
                 at + 1,
-                mesh.corners[at]
+                listed.corners[at]
             );
             return Err(complain(message));
         }
-        mesh.grow_tree();
-        Ok(mesh)
+        Ok(Mesh::of(path, listed))
     }
 
-    fn of_models(path: &Path, models: Vec<tobj::Model>) -> Self {
-        let mut mesh = Mesh {
-            path: path.to_owned(),
-            corners: Vec::new(),
-            triangles: Vec::new(),
-            on_texture: Vec::new(),
-            tree: Bvh2::default(),
-            middle: DVec3::ZERO,
-            size: DVec3::ZERO,
-        };
-        let is_textured = (models.iter())
-            .all(|model| model.mesh.texcoord_indices.len() == model.mesh.indices.len());
-        for tobj::Model { mesh: read, .. } in models {
-            let first = mesh.corners.len() as u32;
-            let corners = read.positions.as_chunks::<3>().0.iter();
-            mesh.corners.extend(corners.map(|[x, y, z]| [*x, -y, -z]));
-            let triangles = read.indices.as_chunks::<3>().0.iter();
-            mesh.triangles
-                .extend(triangles.map(|t| t.map(|corner| corner + first)));
-            if is_textured {
-                let place = |index: &u32| {
-                    let at = 2 * *index as usize;
-                    // OBJ counts v upwards.
-                    [read.texcoords[at], 1.0 - read.texcoords[at + 1]]
-                };
-                let places = read.texcoord_indices.as_chunks::<3>().0.iter();
-                mesh.on_texture
-                    .extend(places.map(|[a, b, c]| [place(a), place(b), place(c)]));
-            }
-        }
-        mesh
-    }
-
-    fn grow_tree(&mut self) {
-        let corner = |index: u32| Vec3A::from_array(self.corners[index as usize]);
-        let bounds = |[a, b, c]: [u32; 3]| Aabb::from_points(&[corner(a), corner(b), corner(c)]);
+    fn of(path: &Path, listed: Listed) -> Self {
+        let corners = |triangle: [u32; 3]| triangle.map(|corner| listed.corners[corner as usize]);
         let mut all = Aabb::empty();
-        for &triangle in &self.triangles {
-            all = all.union(&bounds(triangle));
+        for &triangle in &listed.triangles {
+            all = all.union(&Aabb::from_points(
+                &corners(triangle).map(Vec3A::from_array),
+            ));
         }
-        let room = Vec3A::splat((all.max - all.min).max_element() * ROOM);
-        let grown = |triangle: &[u32; 3]| {
-            let bounds = bounds(*triangle);
+        let room = (all.max - all.min).max_element() * ROOM;
+        let (least, most) = (all.min - room, all.max + room);
+        let middle = (least.as_dvec3() + most.as_dvec3()) / 2.0;
+        let grown = |&triangle: &[u32; 3]| {
+            let from_middle =
+                |corner: [f32; 3]| (DVec3::from_array(corner.map(f64::from)) - middle).as_vec3a();
+            let bounds = Aabb::from_points(&corners(triangle).map(from_middle));
             Bounds(Aabb::new(bounds.min - room, bounds.max + room))
         };
-        let boxes: Vec<Bounds> = self.triangles.iter().map(grown).collect();
-        let params = BvhBuildParams::fast_build();
-        self.tree = build_bvh2(&boxes, params, &mut std::time::Duration::default());
-        let (least, most) = (all.min - room, all.max + room);
-        self.middle = (least.as_dvec3() + most.as_dvec3()) / 2.0;
-        self.size = most.as_dvec3() - least.as_dvec3();
+        let bounds: Vec<Bounds> = listed.triangles.iter().map(grown).collect();
+        let (tree, numbers) = Tree::over(&bounds);
+        drop(bounds);
+        let in_order = || numbers.iter().map(|&number| number as usize);
+        Mesh {
+            path: path.to_owned(),
+            triangles: in_order().map(|n| corners(listed.triangles[n])).collect(),
+            on_texture: match listed.on_texture.is_empty() {
+                true => Vec::new(),
+                false => in_order().map(|n| listed.on_texture[n]).collect(),
+            },
+            numbers,
+            tree,
+            middle,
+            size: most.as_dvec3() - least.as_dvec3(),
+        }
     }
 
     /// The file it was read from.
@@ -226,11 +212,12 @@ impl Mesh {
     }
 
     fn corners_of(&self, triangle: u32) -> [DVec3; 3] {
-        let corner = |index: u32| DVec3::from_array(self.corners[index as usize].map(f64::from));
+        let corner = |corner: [f32; 3]| DVec3::from_array(corner.map(f64::from));
         self.triangles[triangle as usize].map(corner)
     }
 
-    /// Where a ray in the mesh's own coordinates first meets it; the part is the triangle.
+    /// Where a ray in the mesh's own coordinates first meets it; the part is the triangle's place in the tree's order. Of two in the same
+    /// place the one listed first in the file counts.
     pub(super) fn meet(&self, ray: &Ray) -> Option<Meeting> {
         let about = Ray {
             origin: ray.origin - self.middle,
@@ -241,24 +228,27 @@ impl Mesh {
             true => 0.0,
             false => solid::meet_box(&about, self.size)?.range_m,
         };
-        let start = ray.at(skipped).as_vec3a();
-        let in_tree = obvhs::ray::Ray::new_inf(start, ray.direction.as_vec3a());
+        // Rounding must not hide a nearer triangle behind this one.
+        let room = self.size.max_element() as f32 * ROOM;
         let mut nearest: Option<Meeting> = None;
-        self.tree
-            .ray_traverse(in_tree, &mut RayHit::none(), |_, leaf| {
-                let part = self.tree.primitive_indices[leaf];
-                let Some(range) = self.meet_triangle(ray, part) else {
-                    return f32::INFINITY;
-                };
-                if nearest.is_none_or(|n| range < n.range_m) {
-                    nearest = Some(Meeting {
-                        range_m: range,
-                        part,
-                    });
+        let is_before = |part: u32, range_m: f64, other: &Meeting| {
+            let number = |part: u32| self.numbers[part as usize];
+            range_m < other.range_m
+                || (range_m == other.range_m && number(part) < number(other.part))
+        };
+        let start = about.at(skipped).as_vec3a();
+        self.tree.follow(start, ray.direction.as_vec3a(), |places| {
+            for part in places.start as u32..places.end as u32 {
+                if let Some(range_m) = self.meet_triangle(ray, part)
+                    && nearest.is_none_or(|other| is_before(part, range_m, &other))
+                {
+                    nearest = Some(Meeting { range_m, part });
                 }
-                // Rounding must not hide a nearer triangle behind this one.
-                ((range - skipped) as f32) * (1.0 + 1e-6) + self.size.max_element() as f32 * ROOM
-            });
+            }
+            nearest.map_or(f32::INFINITY, |nearest| {
+                ((nearest.range_m - skipped) as f32) * (1.0 + 1e-6) + room
+            })
+        });
         nearest
     }
 
@@ -309,6 +299,33 @@ impl Mesh {
             parts.map(|(s, place)| s * f64::from(place[axis])).sum()
         };
         (mix(0), mix(1))
+    }
+}
+
+impl Listed {
+    fn of_models(models: Vec<tobj::Model>) -> Self {
+        let mut all = Listed::default();
+        let is_textured = (models.iter())
+            .all(|model| model.mesh.texcoord_indices.len() == model.mesh.indices.len());
+        for tobj::Model { mesh: read, .. } in models {
+            let first = all.corners.len() as u32;
+            let corners = read.positions.as_chunks::<3>().0.iter();
+            all.corners.extend(corners.map(|[x, y, z]| [*x, -y, -z]));
+            let triangles = read.indices.as_chunks::<3>().0.iter();
+            all.triangles
+                .extend(triangles.map(|t| t.map(|corner| corner + first)));
+            if is_textured {
+                let place = |index: &u32| {
+                    let at = 2 * *index as usize;
+                    // OBJ counts v upwards.
+                    [read.texcoords[at], 1.0 - read.texcoords[at + 1]]
+                };
+                let places = read.texcoord_indices.as_chunks::<3>().0.iter();
+                all.on_texture
+                    .extend(places.map(|[a, b, c]| [place(a), place(b), place(c)]));
+            }
+        }
+        all
     }
 }
 

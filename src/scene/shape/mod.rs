@@ -1,20 +1,22 @@
 //! Geometry: where a ray meets a shape, which way the surface faces there, and where on the surface the point is.
 //!
 //! ```text
-//!   Shape ─┬─ flat:   ground, plane         meet(ray) ─► range, part (face, limb, triangle)
-//!          ├─ solid:  box                   normal_at(point, part)
-//!          ├─ round:  sphere, cylinder      on_surface(point, part) ─► metres along the surface, for textures
+//!   Shape ─┬─ flat:   ground, plane         placed() ─► meet(ray) ─► range, part (face, limb, triangle)
+//!          ├─ solid:  box                                normal_at(point, part)
+//!          ├─ round:  sphere, cylinder                   on_surface(point, part) ─► metres along the surface, for textures
 //!          ├─ person: a body of these
 //!          ├─ mesh:   triangles of a file
 //!          └─ map:    depths that a camera has seen
 //! ```
 //!
-//! Shapes that can be turned do their geometry in coordinates of their own ([`Pose`]).
+//! Shapes that can be turned do their geometry in coordinates of their own ([`Pose`](pose::Pose)), worked out once for many rays
+//! ([`Placed`]).
 
 mod flat;
 mod map;
 mod mesh;
 mod person;
+mod placed;
 mod pose;
 mod round;
 mod solid;
@@ -26,7 +28,7 @@ use glam::DVec3;
 pub use map::{DepthMap, MapFiles};
 pub use mesh::Mesh;
 
-use self::pose::Pose;
+pub(super) use self::placed::Placed;
 use super::vector::{Ray, turned};
 
 /// Hits nearer than this are the surface on which a ray starts, m.
@@ -121,158 +123,12 @@ pub(super) struct Meeting {
 impl Shape {
     /// Distance along `ray` to the first surface point in front of its origin, m.
     pub fn intersect(&self, ray: &Ray) -> Option<f64> {
-        self.meet(ray).map(|meeting| meeting.range_m)
+        self.placed().meet(ray).map(|meeting| meeting.range_m)
     }
 
-    pub(super) fn meet(&self, ray: &Ray) -> Option<Meeting> {
-        match *self {
-            Shape::Ground { depth_m } => flat::meet_ground(ray, depth_m),
-            Shape::Plane {
-                centre_m,
-                normal,
-                width_m,
-                height_m,
-            } => flat::meet_plane(ray, centre_m, normal, (width_m, height_m)),
-            Shape::Box {
-                centre_m,
-                size_m,
-                yaw_deg,
-            } => solid::meet_box(&Pose::new(centre_m, yaw_deg).inwards(ray), size_m),
-            Shape::Sphere { centre_m, radius_m } => round::meet_sphere(ray, centre_m, radius_m),
-            Shape::Cylinder {
-                centre_m,
-                axis,
-                radius_m,
-                height_m,
-            } => round::meet_cylinder(ray, centre_m, axis.normalize(), (radius_m, height_m)),
-            Shape::Person {
-                foot_m,
-                height_m,
-                yaw_deg,
-            } => person::meet(&Pose::new(foot_m, yaw_deg).inwards(ray), height_m),
-            Shape::Mesh {
-                centre_m,
-                scale_m,
-                yaw_deg,
-                ref mesh,
-            } => {
-                let inside = Pose::new(centre_m, yaw_deg).inwards(ray);
-                let scaled = Ray {
-                    origin: inside.origin / scale_m,
-                    direction: inside.direction,
-                };
-                let meeting = mesh.meet(&scaled)?;
-                let range_m = in_front(meeting.range_m * scale_m)?;
-                Some(Meeting { range_m, ..meeting })
-            }
-            Shape::Map {
-                centre_m,
-                yaw_deg,
-                ref map,
-            } => map.meet(&Pose::new(centre_m, yaw_deg).inwards(ray)),
-        }
-    }
-
-    /// A unit vector at right angles to `part` of the surface at `point`, which lies on it; of the two it is any.
-    pub(super) fn normal_at(&self, point: DVec3, part: u32) -> DVec3 {
-        match *self {
-            Shape::Ground { .. } => DVec3::NEG_Y,
-            Shape::Plane { normal, .. } => normal.normalize(),
-            Shape::Box {
-                centre_m, yaw_deg, ..
-            } => Pose::new(centre_m, yaw_deg).outwards(solid::face_normal(part)),
-            Shape::Sphere { centre_m, .. } => (point - centre_m).normalize(),
-            Shape::Cylinder { centre_m, axis, .. } => {
-                round::cylinder_normal(point - centre_m, axis.normalize(), part)
-            }
-            Shape::Person {
-                foot_m,
-                height_m,
-                yaw_deg,
-            } => {
-                let pose = Pose::new(foot_m, yaw_deg);
-                pose.outwards(person::normal_at(pose.inside(point) / height_m, part))
-            }
-            Shape::Mesh {
-                centre_m,
-                yaw_deg,
-                ref mesh,
-                ..
-            } => Pose::new(centre_m, yaw_deg).outwards(mesh.normal(part)),
-            Shape::Map {
-                centre_m,
-                yaw_deg,
-                ref map,
-            } => {
-                let pose = Pose::new(centre_m, yaw_deg);
-                pose.outwards(map.normal_at(pose.inside(point)))
-            }
-        }
-    }
-
-    /// Where on the surface `point` lies, m, in coordinates that turn and move with the shape: right (or around) and down.
-    /// Round shapes do not know how they are turned, so it comes with the call: by `seen_turned_deg` to the left.
-    pub(super) fn on_surface(&self, point: DVec3, part: u32, seen_turned_deg: f64) -> (f64, f64) {
-        let turned_back = |vector: DVec3| {
-            let (sine, cosine) = seen_turned_deg.to_radians().sin_cos();
-            turned(vector, (cosine, sine))
-        };
-        match *self {
-            Shape::Ground { .. } => (point.x, -point.z),
-            Shape::Plane {
-                centre_m, normal, ..
-            } => flat::in_plane(point - centre_m, normal.normalize()),
-            Shape::Box {
-                centre_m, yaw_deg, ..
-            } => solid::on_face(Pose::new(centre_m, yaw_deg).inside(point), part),
-            Shape::Sphere { centre_m, radius_m } => {
-                round::on_sphere(turned_back(point - centre_m), radius_m)
-            }
-            Shape::Cylinder {
-                centre_m,
-                axis,
-                radius_m,
-                ..
-            } => {
-                let (offset, axis) = (turned_back(point - centre_m), turned_back(axis.normalize()));
-                round::on_cylinder(offset, axis, radius_m, part)
-            }
-            Shape::Person {
-                foot_m, yaw_deg, ..
-            } => {
-                // Front and back carry what hangs straight down them; no two limbs carry the same.
-                let inside = Pose::new(foot_m, yaw_deg).inside(point);
-                (inside.x + 0.7 * inside.z, inside.y)
-            }
-            Shape::Mesh {
-                centre_m,
-                scale_m,
-                yaw_deg,
-                ref mesh,
-            } => {
-                let inside = Pose::new(centre_m, yaw_deg).inside(point) / scale_m;
-                let (u, v) = mesh.on_surface(inside, part);
-                (u * scale_m, v * scale_m)
-            }
-            Shape::Map {
-                centre_m, yaw_deg, ..
-            } => {
-                let inside = Pose::new(centre_m, yaw_deg).inside(point);
-                (inside.x, inside.y)
-            }
-        }
-    }
-
-    /// Reflectivity for the laser and for the cameras, where the shape itself knows them.
-    pub(super) fn own_material(&self, point: DVec3) -> (Option<f64>, Option<f64>) {
-        match self {
-            Shape::Map {
-                centre_m,
-                yaw_deg,
-                map,
-            } => map.material_at(Pose::new(*centre_m, *yaw_deg).inside(point)),
-            _ => (None, None),
-        }
+    /// The shape made ready for many rays.
+    pub(super) fn placed(&self) -> Placed<'_> {
+        Placed::new(self)
     }
 
     /// The shape at another place.

@@ -6,7 +6,7 @@ use crate::scene::vector::{Ray, turned};
 
 /// Place and turn of a shape that has coordinates of its own.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pose {
+pub(in crate::scene) struct Pose {
     centre_m: DVec3,
     cosine_sine: (f64, f64),
 }

@@ -101,6 +101,12 @@ pub(super) fn meet_capsule(
     (from_m, to_m): (DVec3, DVec3),
     radius_m: f64,
 ) -> Option<Meeting> {
+    // Most lines that miss pass its axis too far away, which needs no roots; a ten-thousandth is room for rounding.
+    let across = ray.direction.cross(to_m - from_m);
+    let apart = (from_m - ray.origin).dot(across);
+    if apart * apart > 1.000_1 * radius_m * radius_m * across.length_squared() {
+        return None;
+    }
     let length_m = from_m.distance(to_m);
     let axis = (to_m - from_m) / length_m;
     let on_side = pierced(ray, from_m, axis, radius_m).and_then(|(enter, leave)| {

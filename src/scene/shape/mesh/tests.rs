@@ -13,14 +13,11 @@ fn read(text: &str) -> Result<Mesh, InputError> {
     Mesh::read(&path)
 }
 
-/// The slow way: every triangle.
-fn meet_all(mesh: &Mesh, ray: &Ray) -> Option<Meeting> {
-    let meeting = |part| {
-        mesh.meet_triangle(ray, part)
-            .map(|range_m| Meeting { range_m, part })
-    };
-    let all = (0..mesh.triangles() as u32).filter_map(meeting);
-    all.min_by(|a, b| a.range_m.total_cmp(&b.range_m))
+/// The slow way: every triangle, as the file lists them. The range and which it is.
+fn meet_all(mesh: &Mesh, ray: &Ray) -> Option<(f64, u32)> {
+    let met = |part: usize| Some((mesh.meet_triangle(ray, part as u32)?, mesh.numbers[part]));
+    let all = (0..mesh.triangles()).filter_map(met);
+    all.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
 }
 
 fn obj_of(corners: &[[f64; 3]], faces: impl IntoIterator<Item = Vec<usize>>) -> String {
@@ -81,6 +78,7 @@ fn a_cube_of_quadrangles_is_a_box() {
         size_m: DVec3::new(3.0, 1.5, 6.0),
         yaw_deg,
     };
+    let (mesh, cuboid) = (mesh.placed(), cuboid.placed());
     for number in 0..2000 {
         let (x, y) = (
             f64::from(number % 50) / 50.0 - 0.5,
@@ -122,7 +120,7 @@ fn a_fine_ball_of_triangles_is_a_sphere() {
             0.0,
         );
         let ray = Ray::new(DVec3::ZERO, centre_m + 3.0 * at);
-        let [a, b] = [&mesh, &sphere].map(|shape| shape.meet(&ray).map(|m| m.range_m));
+        let [a, b] = [&mesh, &sphere].map(|shape| shape.intersect(&ray));
         let (Some(a), Some(b)) = (a, b) else {
             assert_eq!(a.is_some(), b.is_some());
             continue;
@@ -180,25 +178,27 @@ fn broken_files_are_refused_with_their_line() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// A heap of random triangles, large and small, some without area.
+    /// A heap of random triangles, large and small, some without area, some twice, anywhere in the file's coordinates.
     #[test]
     fn the_tree_finds_what_every_triangle_tells(
-        spread in 0.01f64..3.0, far in 1.0f64..3000.0,
+        spread in 0.01f64..3.0, far in 1.0f64..3000.0, aside in prop::sample::select(vec![0.0, -70.0, 3000.0]),
         corners in prop::collection::vec((-2f64..2.0, -2f64..2.0, -2f64..2.0), 3..300),
         aims in prop::collection::vec((-2f64..2.0, -2f64..2.0, -2f64..2.0), 100),
     ) {
         let corners: Vec<[f64; 3]> = corners.iter().enumerate()
             .map(|(i, &(x, y, z))| if i % 3 == 0 { [x, y, z] } else { [x * spread, y * spread, z * spread] })
+            .map(|corner| corner.map(|along| along + aside))
             .collect();
-        let faces = (0..corners.len() / 3).map(|t| vec![3 * t, 3 * t + 1, 3 * t + 2]);
+        let faces = (0..corners.len() / 3).chain([0, 0]).map(|t| vec![3 * t, 3 * t + 1, 3 * t + 2]);
         let mesh = read(&obj_of(&corners, faces)).unwrap();
         for (number, &(x, y, z)) in aims.iter().enumerate() {
-            let aim = DVec3::new(x, y, z);
+            let aim = DVec3::new(x, y, z) + mesh.middle;
             // From far away, and from within.
-            let origin = if number % 4 == 0 { DVec3::new(y, z, x) * 0.3 } else { DVec3::new(y, z, x).normalize() * far };
+            let away = if number % 4 == 0 { DVec3::new(y, z, x) * 0.3 } else { DVec3::new(y, z, x).normalize() * far };
+            let origin = mesh.middle + away;
             let ray = Ray::new(origin, aim - origin);
-            let (found, expected) = (mesh.meet(&ray), meet_all(&mesh, &ray));
-            prop_assert_eq!(found.map(|m| m.range_m), expected.map(|m| m.range_m));
+            let found = mesh.meet(&ray).map(|m| (m.range_m, mesh.numbers[m.part as usize]));
+            prop_assert_eq!(found, meet_all(&mesh, &ray));
         }
     }
 

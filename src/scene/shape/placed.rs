@@ -1,0 +1,211 @@
+//! Shapes made ready for many rays: sines of their turn, edges of planes, axes of unit length are worked out once.
+
+use glam::DVec3;
+
+use super::flat::Flat;
+use super::pose::Pose;
+use super::{DepthMap, Meeting, Mesh, Shape, flat, in_front, person, round, solid};
+use crate::scene::vector::{Ray, turned};
+
+/// A [`Shape`] where it stands.
+#[derive(Debug)]
+pub(in crate::scene) enum Placed<'a> {
+    Ground {
+        depth_m: f64,
+    },
+    Plane(Flat),
+    Box {
+        pose: Pose,
+        size_m: DVec3,
+    },
+    Sphere {
+        centre_m: DVec3,
+        radius_m: f64,
+    },
+    Cylinder {
+        centre_m: DVec3,
+        /// Of unit length.
+        axis: DVec3,
+        radius_m: f64,
+        height_m: f64,
+    },
+    Person {
+        pose: Pose,
+        height_m: f64,
+    },
+    Mesh {
+        pose: Pose,
+        scale_m: f64,
+        mesh: &'a Mesh,
+    },
+    Map {
+        pose: Pose,
+        map: &'a DepthMap,
+    },
+}
+
+impl<'a> Placed<'a> {
+    pub(super) fn new(shape: &'a Shape) -> Self {
+        match *shape {
+            Shape::Ground { depth_m } => Placed::Ground { depth_m },
+            Shape::Plane {
+                centre_m,
+                normal,
+                width_m,
+                height_m,
+            } => Placed::Plane(Flat::new(centre_m, normal, (width_m, height_m))),
+            Shape::Box {
+                centre_m,
+                size_m,
+                yaw_deg,
+            } => Placed::Box {
+                pose: Pose::new(centre_m, yaw_deg),
+                size_m,
+            },
+            Shape::Sphere { centre_m, radius_m } => Placed::Sphere { centre_m, radius_m },
+            Shape::Cylinder {
+                centre_m,
+                axis,
+                radius_m,
+                height_m,
+            } => Placed::Cylinder {
+                centre_m,
+                axis: axis.normalize(),
+                radius_m,
+                height_m,
+            },
+            Shape::Person {
+                foot_m,
+                height_m,
+                yaw_deg,
+            } => Placed::Person {
+                pose: Pose::new(foot_m, yaw_deg),
+                height_m,
+            },
+            Shape::Mesh {
+                centre_m,
+                scale_m,
+                yaw_deg,
+                ref mesh,
+            } => Placed::Mesh {
+                pose: Pose::new(centre_m, yaw_deg),
+                scale_m,
+                mesh,
+            },
+            Shape::Map {
+                centre_m,
+                yaw_deg,
+                ref map,
+            } => Placed::Map {
+                pose: Pose::new(centre_m, yaw_deg),
+                map,
+            },
+        }
+    }
+
+    /// Where a ray first meets the surface.
+    pub(in crate::scene) fn meet(&self, ray: &Ray) -> Option<Meeting> {
+        match *self {
+            Placed::Ground { depth_m } => flat::meet_ground(ray, depth_m),
+            Placed::Plane(ref flat) => flat.meet(ray),
+            Placed::Box { pose, size_m } => solid::meet_box(&pose.inwards(ray), size_m),
+            Placed::Sphere { centre_m, radius_m } => round::meet_sphere(ray, centre_m, radius_m),
+            Placed::Cylinder {
+                centre_m,
+                axis,
+                radius_m,
+                height_m,
+            } => round::meet_cylinder(ray, centre_m, axis, (radius_m, height_m)),
+            Placed::Person { pose, height_m } => person::meet(&pose.inwards(ray), height_m),
+            Placed::Mesh {
+                pose,
+                scale_m,
+                mesh,
+            } => {
+                let inside = pose.inwards(ray);
+                let scaled = Ray {
+                    origin: inside.origin / scale_m,
+                    direction: inside.direction,
+                };
+                let meeting = mesh.meet(&scaled)?;
+                let range_m = in_front(meeting.range_m * scale_m)?;
+                Some(Meeting { range_m, ..meeting })
+            }
+            Placed::Map { pose, map } => map.meet(&pose.inwards(ray)),
+        }
+    }
+
+    /// A unit vector at right angles to `part` of the surface at `point`, which lies on it; of the two it is any.
+    pub(in crate::scene) fn normal_at(&self, point: DVec3, part: u32) -> DVec3 {
+        match *self {
+            Placed::Ground { .. } => DVec3::NEG_Y,
+            Placed::Plane(ref flat) => flat.normal(),
+            Placed::Box { pose, .. } => pose.outwards(solid::face_normal(part)),
+            Placed::Sphere { centre_m, .. } => (point - centre_m).normalize(),
+            Placed::Cylinder { centre_m, axis, .. } => {
+                round::cylinder_normal(point - centre_m, axis, part)
+            }
+            Placed::Person { pose, height_m } => {
+                pose.outwards(person::normal_at(pose.inside(point) / height_m, part))
+            }
+            Placed::Mesh { pose, mesh, .. } => pose.outwards(mesh.normal(part)),
+            Placed::Map { pose, map } => pose.outwards(map.normal_at(pose.inside(point))),
+        }
+    }
+
+    /// Where on the surface `point` lies, m, in coordinates that turn and move with the shape: right (or around) and down.
+    /// Round shapes do not know how they are turned, so it comes with the call: by `seen_turned_deg` to the left.
+    pub(in crate::scene) fn on_surface(
+        &self,
+        point: DVec3,
+        part: u32,
+        seen_turned_deg: f64,
+    ) -> (f64, f64) {
+        let turned_back = |vector: DVec3| {
+            let (sine, cosine) = seen_turned_deg.to_radians().sin_cos();
+            turned(vector, (cosine, sine))
+        };
+        match *self {
+            Placed::Ground { .. } => (point.x, -point.z),
+            Placed::Plane(ref flat) => flat.on_surface(point),
+            Placed::Box { pose, .. } => solid::on_face(pose.inside(point), part),
+            Placed::Sphere { centre_m, radius_m } => {
+                round::on_sphere(turned_back(point - centre_m), radius_m)
+            }
+            Placed::Cylinder {
+                centre_m,
+                axis,
+                radius_m,
+                ..
+            } => {
+                let (offset, axis) = (turned_back(point - centre_m), turned_back(axis));
+                round::on_cylinder(offset, axis, radius_m, part)
+            }
+            Placed::Person { pose, .. } => {
+                // Front and back carry what hangs straight down them; no two limbs carry the same.
+                let inside = pose.inside(point);
+                (inside.x + 0.7 * inside.z, inside.y)
+            }
+            Placed::Mesh {
+                pose,
+                scale_m,
+                mesh,
+            } => {
+                let (u, v) = mesh.on_surface(pose.inside(point) / scale_m, part);
+                (u * scale_m, v * scale_m)
+            }
+            Placed::Map { pose, .. } => {
+                let inside = pose.inside(point);
+                (inside.x, inside.y)
+            }
+        }
+    }
+
+    /// Reflectivity for the laser and for the cameras, where the shape itself knows them.
+    pub(in crate::scene) fn own_material(&self, point: DVec3) -> (Option<f64>, Option<f64>) {
+        match self {
+            Placed::Map { pose, map } => map.material_at(pose.inside(point)),
+            _ => (None, None),
+        }
+    }
+}
