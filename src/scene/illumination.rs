@@ -1,6 +1,7 @@
 //! From surfaces to light: what every macropixel detects.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -137,7 +138,8 @@ impl Scene {
         });
         let kept = |pixel: usize| {
             let (before, light) = before?;
-            (before.truth.views[pixel] == truth.views[pixel]).then(|| &light[pixel])
+            let [before, now] = [before.truth, truth].map(|truth| &truth.views[pixel]);
+            (Arc::ptr_eq(before, now) || before == now).then(|| &light[pixel])
         };
         let (rows, cols) = (truth.rows, truth.cols);
         let budget = self.photon_budget(rows, cols);
@@ -157,7 +159,7 @@ impl Scene {
         let (sigma, resolution) = (self.pulse_sigma(), self.pulse_resolution());
         let fog = Fog::of(self, &budget);
         let light = |(falling, (view, off_axis)): (Result<Falling, &PixelLight>, _)| {
-            let (view, off_axis): (&View, &OffAxis) = (view, off_axis);
+            let (view, off_axis): (&Arc<View>, &OffAxis) = (view, off_axis);
             let mut falling = match falling {
                 Ok(falling) => falling,
                 Err(kept) => return kept.clone(),

@@ -14,6 +14,8 @@
 //! A Lambertian surface sends back the cosine of the angle at which the laser meets it. The true range of a macropixel is
 //! that of the surface that sends back most of the laser's light: the mean over its rays, weighted by their light.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use rayon::prelude::*;
 use smallvec::SmallVec;
@@ -92,7 +94,8 @@ pub struct GroundTruth {
     pub object: Vec<Option<usize>>,
     /// All surfaces that a macropixel sees, that which sends back most light first. Length rows·cols.
     pub surfaces: Vec<SmallVec<[Surface; 1]>>,
-    pub(super) views: Vec<View>,
+    /// Shared with other worlds that look the same.
+    pub(super) views: Vec<Arc<View>>,
 }
 
 impl GroundTruth {
@@ -122,14 +125,20 @@ impl GroundTruth {
         };
         let pixels = || (0..rows * cols).into_par_iter();
         let is_kept: Vec<bool> = pixels().map(is_kept).collect();
-        let view = |pixel: u32| match &moved {
-            Some((_, before)) if is_kept[pixel as usize] => before.views[pixel as usize].clone(),
-            _ => View::of(&stage, &bounds, &camera, place(pixel)),
+        let seen = |pixel: u32| match &moved {
+            Some((_, before)) if is_kept[pixel as usize] => {
+                let pixel = pixel as usize;
+                (before.views[pixel].clone(), before.surfaces[pixel].clone())
+            }
+            _ => {
+                let view = View::of(&stage, &bounds, &camera, place(pixel));
+                let surfaces = view.surfaces(&scene.medium);
+                (Arc::new(view), surfaces)
+            }
         };
-        let views: Vec<View> = pixels().map(view).collect();
+        type Surfaces = Vec<SmallVec<[Surface; 1]>>;
+        let (views, surfaces): (Vec<Arc<View>>, Surfaces) = pixels().map(seen).unzip();
         let kept = is_kept.iter().filter(|is_kept| **is_kept).count();
-        let surfaces = views.par_iter().map(|view| view.surfaces(&scene.medium));
-        let surfaces: Vec<SmallVec<[Surface; 1]>> = surfaces.collect();
         let brightest = || surfaces.iter().map(|surfaces| surfaces.first());
         let truth = GroundTruth {
             rows,

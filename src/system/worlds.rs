@@ -9,6 +9,8 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::drive::FrameTimes;
 use crate::chip::Exposure;
 use crate::photon::{PhotonStream, PixelLight};
@@ -109,6 +111,7 @@ pub(super) fn light_of(lights: &[Vec<PixelLight>], exposure: &Exposure) -> Vec<P
     let parts = lights.len() as u64;
     let first_cycle = |n: usize| (n as u64 * u64::from(exposure.laser_cycles) / parts) as u32;
     (0..lights[0].len())
+        .into_par_iter()
         .map(|pixel| {
             let mut segments: Vec<(u32, PixelLight)> = Vec::new();
             for (n, light) in lights.iter().enumerate() {

@@ -60,6 +60,8 @@ pub(super) struct Counting<'a> {
     fired: [u8; ROWS],
     /// Photons of one cycle's window.
     photons: Vec<Photon>,
+    /// The same as words that sort by time.
+    keys: Vec<u64>,
     /// Photons by cycle of the group, where whole cycles are settled.
     by_cycle: Vec<(u32, Photon)>,
     events: Vec<SpadEvent>,
@@ -181,6 +183,7 @@ impl<'a> Counting<'a> {
             together: Vec::new(),
             fired: [0; ROWS],
             photons: Vec::new(),
+            keys: Vec::new(),
             by_cycle: Vec::new(),
             events: Vec::new(),
             placed: Vec::new(),
@@ -226,7 +229,6 @@ impl<'a> Counting<'a> {
         self.plain.carried.clear();
         self.past.clear();
         self.breeding.clear();
-        self.tables.clear_counts();
         if light.is_bright() {
             self.count_bright(&mut pixel);
             return (pixel.hits, pixel.work);
@@ -238,6 +240,7 @@ impl<'a> Counting<'a> {
             }
             return (pixel.hits, pixel.work);
         }
+        self.tables.clear_counts();
         let sees_own_echo_only = pixel.sees_own_echo_only();
         let before_exposure_fs = sight
             .breeding

@@ -223,6 +223,11 @@ impl Engine for Window {
     fn bins(&self) -> usize {
         self.sensor.bins
     }
+
+    /// Macropixels in bright light stand together, and take so much longer than others that in larger batches some processors wait.
+    fn batch(&self) -> usize {
+        16
+    }
 }
 
 impl Replay for Window {

@@ -195,10 +195,10 @@ impl PastDraws {
         kept.key = key;
         kept.photons.clear();
         let photons = self.draw.photons(light, group.cycles());
-        kept.photons.extend(photons.map(|(place, time_fs)| {
+        photons.for_each(|(place, time_fs)| {
             let (cycle, spad) = group.split(place);
-            (cycle, time_fs, spad)
-        }));
+            kept.photons.push((cycle, time_fs, spad));
+        });
         kept.photons.sort_unstable_by_key(|&(cycle, ..)| cycle);
         at
     }

@@ -119,7 +119,7 @@ impl Counting<'_> {
             let is_later = |photon: &&Photon| photon.time >= known_from;
             self.photons
                 .extend(breeding_photons.iter().filter(is_later));
-            self.photons.sort_unstable();
+            self.sort_photons(known_from);
             let earlier = breeding_photons
                 .iter()
                 .filter(|photon| photon.time < known_from);
@@ -145,6 +145,25 @@ impl Counting<'_> {
             .count();
         let pulses = self.count_events(pixel, &window, start);
         pixel.work.lost_to_dead_time += (seen as u64).saturating_sub(pulses);
+    }
+
+    /// Sorts `photons`, none of which comes before `from`. Those of a laser cycle, some twenty, took 8 % of the time of a drive at night
+    /// in bright macropixels when whole photons were compared.
+    fn sort_photons(&mut self, from: Time) {
+        let key = |photon: &Photon| {
+            let since_fs = (photon.time - from).as_fs() as u64;
+            since_fs << 8 | u64::from(photon.spad) << 1 | u64::from(photon.breeds)
+        };
+        self.keys.clear();
+        self.keys.extend(self.photons.iter().map(key));
+        self.keys.sort_unstable();
+        for (photon, key) in self.photons.iter_mut().zip(&self.keys) {
+            *photon = Photon {
+                time: from + Time::from_fs((key >> 8) as i64),
+                spad: (key >> 1) as u8 % 128,
+                breeds: key % 2 != 0,
+            };
+        }
     }
 
     /// Laser cycles whose echoes may have photons between two times about `laser_cycle`.

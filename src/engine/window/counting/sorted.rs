@@ -136,12 +136,13 @@ impl Counting<'_> {
         for part in pixel.parts {
             part.draw(group, &spans.own, draw);
             pixel.work.photons_drawn += draw.len() as u64;
-            words.extend(draw.photons(part, cycles).filter_map(|(place, time_fs)| {
+            draw.photons(part, cycles).for_each(|(place, time_fs)| {
                 let (cycle, spad) = group.split(place);
                 let is_before_exposure = is_first && cycle == 0 && time_fs < 0;
-                (time_fs < until_fs && !is_before_exposure)
-                    .then(|| times.word(cycle, time_fs, spad))
-            }));
+                if time_fs < until_fs && !is_before_exposure {
+                    words.push(times.word(cycle, time_fs, spad));
+                }
+            });
             if spans.previous.slots.is_empty() {
                 continue;
             }
