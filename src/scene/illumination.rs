@@ -8,8 +8,9 @@ use rayon::prelude::*;
 use super::fog::Fog;
 use super::optics::OffAxis;
 use super::settings::Scene;
-use super::truth::{Glimpse, GroundTruth, View};
+use super::truth::GroundTruth;
 use super::unmoved::Before;
+use super::view::{Glimpse, View};
 use crate::photon::{CROSSTALK_DELAY, Glint, PhotonBudget, PixelLight, SpadModel, merged};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 

@@ -26,6 +26,7 @@ mod texture;
 mod truth;
 mod unmoved;
 mod vector;
+mod view;
 
 pub(crate) use bounds::Bounds;
 pub use camera::PinholeCamera;
@@ -40,9 +41,10 @@ pub use optics::{BeamWord, FilterWord, PdeWord, PulseWord, VignettingWord};
 pub use settings::{Lidar, Light, Scene, Stereo};
 pub use shape::{DepthMap, MapFiles, Mesh, Shape};
 pub use texture::{Pattern, Picture, Texture};
-pub use truth::{GroundTruth, Surface};
+pub use truth::GroundTruth;
 pub(crate) use unmoved::Before;
 pub use vector::{Ray, turned};
+pub use view::Surface;
 
 /// A point or direction, m (or without unit): x right, y down, z forward.
 pub use glam::DVec3;

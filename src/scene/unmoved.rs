@@ -158,7 +158,7 @@ mod tests {
         let camera = now.lidar_camera(16, 16);
         let cones = (0..16).flat_map(|row| (0..16).map(move |col| (row, col)));
         let kept =
-            cones.filter(|&place| moved.is_out_of_sight(crate::scene::truth::cone(&camera, place)));
+            cones.filter(|&place| moved.is_out_of_sight(crate::scene::view::cone(&camera, place)));
         let kept = kept.count();
         assert!((150..256).contains(&kept), "{kept}");
         let [lit, sunny] = [None, Some(30.0)].map(|sun| room(&places, 0.0, sun));

@@ -1,0 +1,358 @@
+//! What one macropixel sees.
+//!
+//! Several rays look out of it, more where not all of them end on the same object:
+//!
+//! ```text
+//!   ┌───────────────┐    ┌───────────────┐
+//!   │·  ·   ·   ·   │    │· · · ·│x x x x│     16 rays on one surface; 64 where surfaces meet, so that the light of
+//!   │ ·  ·   ·   ·  │    │ · · · ·\x x x x│     each is known to a hundredth of the macropixel's, and no two in a row
+//!   │  ·  ·   ·   · │    │· · · · ·│x x x│     or column
+//!   │   ·  ·   ·   ·│    │       …       │     Each ray stands for the piece of surface about it, whose slope
+//!   └───────────────┘    └───────────────┘     tells how far its ranges are spread.
+//! ```
+//!
+//! A Lambertian surface sends back the cosine of the angle at which the laser meets it.
+
+use glam::DVec3;
+use smallvec::SmallVec;
+
+use super::bounds::{Bounds, Cone};
+use super::camera::PinholeCamera;
+use super::cast::{First, Return, Returns, Stage};
+use super::medium::Medium;
+use super::vector::Ray;
+
+/// Rays of a macropixel in a row and in a column.
+const RAYS: u32 = 4;
+
+/// The same where surfaces meet: an upright edge is then misplaced by at most 1/128 of the macropixel.
+const RAYS_AT_EDGES: u32 = 8;
+
+/// Rays of a macropixel.
+const RAYS_OF_ALL: usize = (RAYS * RAYS) as usize;
+
+/// The range over a ray's piece of surface is taken to change by at most this part of it. Only where a ray grazes a surface is it more.
+const MOST_SLOPE: f64 = 0.5;
+
+/// A surface that a macropixel sees: what its rays meet of one object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    /// Index into [`Scene::objects`].
+    pub object: usize,
+    /// Mean distance from the lidar, by the light that comes back from it, m.
+    pub range_m: f64,
+    /// Mean reflectivity, 0 to 1.
+    pub reflectivity: f64,
+    /// Share of the macropixel's echo that it sends back, 0 to 1.
+    pub light_share: f64,
+    /// Share of the macropixel's rays that meet it, 0 to 1.
+    pub ray_share: f64,
+}
+
+/// What one ray sees of a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Glimpse {
+    pub object: usize,
+    reflectivity: f64,
+    ray_share: f64,
+    pub range_m: f64,
+    /// Variance of the range over the ray's piece of the surface.
+    pub range_m2: f64,
+    /// Reflectivity of a surface that fills the macropixel and is met at a right angle, and sends back as much.
+    pub frontal_reflectivity: f64,
+}
+
+/// What all rays of a macropixel see.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct View {
+    pub glimpses: SmallVec<[Glimpse; 16]>,
+    /// Mean reflectivity in sunlight that would give as much light, that of the sky and of fog included.
+    pub sunlit_reflectivity: f64,
+    /// Where rays end, m, and their share of all; infinite for the sky.
+    pub ends_m: SmallVec<[(f64, f64); 2]>,
+}
+
+impl View {
+    /// What a macropixel, by row and column, sees.
+    pub(super) fn of(
+        stage: &Stage,
+        bounds: &Bounds,
+        camera: &PinholeCamera,
+        pixel: (u32, u32),
+    ) -> Self {
+        let candidates = bounds.about(cone(camera, pixel));
+        let mut few = SmallVec::<[(Look, First); RAYS_OF_ALL]>::new();
+        for look in looks(camera, pixel, RAYS) {
+            few.push((look, stage.meeting_of(&look.ray, &candidates)));
+        }
+        let object = |(_, first): &(Look, First)| first.map(|(_, object)| object);
+        let mut view = View::default();
+        let is_edge = if few.iter().all(|(_, first)| stage.ends_there(first)) {
+            // What they end on tells, without a look at what it is made of.
+            let is_edge = few.iter().any(|ray| object(ray) != object(&few[0]));
+            if !is_edge {
+                let piece = Piece::new(camera, RAYS);
+                for (look, first) in &few {
+                    view.see_end(stage, &piece, look, first);
+                }
+            }
+            is_edge
+        } else {
+            let follow =
+                |(look, first): &(Look, First)| stage.returns_from(&look.ray, *first, &candidates);
+            let all: Vec<Returns> = few.iter().map(follow).collect();
+            let first = |returns: &Returns| returns.surfaces.first().map(|s| s.hit.object);
+            let is_edge = all.iter().any(|returns| {
+                first(returns) != first(&all[0]) || returns.surfaces.len() != all[0].surfaces.len()
+            });
+            if !is_edge {
+                let piece = Piece::new(camera, RAYS);
+                for ((look, _), returns) in few.iter().zip(&all) {
+                    view.see(stage, &piece, look, &returns.surfaces, returns.sky_share);
+                }
+            }
+            is_edge
+        };
+        if is_edge {
+            let piece = Piece::new(camera, RAYS_AT_EDGES);
+            for look in looks(camera, pixel, RAYS_AT_EDGES) {
+                let first = stage.meeting_of(&look.ray, &candidates);
+                if stage.ends_there(&first) {
+                    view.see_end(stage, &piece, &look, &first);
+                } else {
+                    let returns = stage.returns_from(&look.ray, first, &candidates);
+                    view.see(stage, &piece, &look, &returns.surfaces, returns.sky_share);
+                }
+            }
+        }
+        view
+    }
+
+    /// Adds a ray that ends where it first meets something, or in the sky.
+    fn see_end(&mut self, stage: &Stage, piece: &Piece, look: &Look, first: &First) {
+        match first {
+            None => self.see(stage, piece, look, &[], 1.0),
+            Some(first) => {
+                let surface = Return {
+                    hit: stage.seen_at(&look.ray, *first),
+                    share: 1.0,
+                    share_back: 1.0,
+                };
+                self.see(stage, piece, look, &[surface], 0.0);
+            }
+        }
+    }
+
+    /// Adds a ray with what sends light back along it, nearest first, and the share of the sky's light that arrives.
+    fn see(
+        &mut self,
+        stage: &Stage,
+        piece: &Piece,
+        look: &Look,
+        surfaces: &[Return],
+        sky_share: f64,
+    ) {
+        let (scene, ray_share) = (stage.scene(), piece.ray_share);
+        let (medium, sky) = (&scene.medium, scene.light.sky_reflectivity);
+        self.sunlit_reflectivity += ray_share * sky_share * sky;
+        let end_m = match sky_share > 0.0 {
+            true => f64::INFINITY,
+            false => surfaces.last().map_or(f64::INFINITY, |s| s.hit.range_m),
+        };
+        self.end(end_m, ray_share);
+        for surface in surfaces {
+            let Return {
+                hit,
+                share,
+                share_back,
+            } = surface;
+            let daylight = stage.daylight(look.ray.at(hit.range_m), hit.normal);
+            // Air takes the surface's light away and puts its own in the place.
+            let left = medium.transmission(hit.range_m);
+            let seen = left * hit.reflectivity * daylight + (1.0 - left) * sky;
+            self.sunlit_reflectivity += ray_share * share_back * seen;
+            let cosine = look.ray.direction.dot(hit.normal).abs();
+            self.glimpses.push(Glimpse {
+                object: hit.object,
+                reflectivity: hit.reflectivity,
+                ray_share,
+                range_m: hit.range_m,
+                range_m2: range_variance(look, hit.normal, hit.range_m, piece.steps),
+                frontal_reflectivity: hit.reflectivity * hit.retro * cosine * share * ray_share,
+            });
+        }
+    }
+
+    /// Notes where a ray ends.
+    fn end(&mut self, end_m: f64, ray_share: f64) {
+        match self
+            .ends_m
+            .iter_mut()
+            .find(|(other_m, _)| *other_m == end_m)
+        {
+            Some((_, share)) => *share += ray_share,
+            None => self.ends_m.push((end_m, ray_share)),
+        }
+    }
+
+    /// What is seen of each object through this air, that which sends back most light first.
+    pub(super) fn surfaces(&self, medium: &Medium) -> SmallVec<[Surface; 1]> {
+        let mut surfaces = SmallVec::<[Surface; 1]>::new();
+        let light = self.glimpses.iter().map(|glimpse| {
+            let way = medium.transmission(glimpse.range_m).powi(2);
+            glimpse.frontal_reflectivity * way / (glimpse.range_m * glimpse.range_m)
+        });
+        let mut weights: SmallVec<[f64; 64]> = light.collect();
+        if weights.iter().sum::<f64>() <= 0.0 {
+            // Where nothing sends back any light, rays count alike.
+            weights = self.glimpses.iter().map(|g| g.ray_share).collect();
+        }
+        let all: f64 = weights.iter().sum();
+        for (glimpse, weight) in self.glimpses.iter().zip(weights) {
+            let same = surfaces.iter().position(|s| s.object == glimpse.object);
+            let at = same.unwrap_or_else(|| {
+                surfaces.push(Surface {
+                    object: glimpse.object,
+                    range_m: 0.0,
+                    reflectivity: 0.0,
+                    light_share: 0.0,
+                    ray_share: 0.0,
+                });
+                surfaces.len() - 1
+            });
+            let surface = &mut surfaces[at];
+            let light = weight / all;
+            surface.light_share += light;
+            surface.ray_share += glimpse.ray_share;
+            surface.range_m += light * glimpse.range_m;
+            surface.reflectivity += glimpse.ray_share * glimpse.reflectivity;
+        }
+        for surface in &mut surfaces {
+            surface.reflectivity /= surface.ray_share;
+            surface.range_m = match surface.light_share > 0.0 {
+                true => surface.range_m / surface.light_share,
+                false => self.mean_range_m(surface.object),
+            };
+        }
+        surfaces.sort_by(|a, b| b.light_share.total_cmp(&a.light_share));
+        surfaces
+    }
+
+    /// The range of an object that sends back no light, all rays alike.
+    fn mean_range_m(&self, object: usize) -> f64 {
+        let glimpses = || self.glimpses.iter().filter(|g| g.object == object);
+        glimpses().map(|g| g.range_m).sum::<f64>() / glimpses().count() as f64
+    }
+}
+
+/// What a macropixel sees.
+pub(super) fn cone(camera: &PinholeCamera, (row, col): (u32, u32)) -> Cone {
+    let at = |du: f64, dv: f64| {
+        let place = (f64::from(col) + du, f64::from(row) + dv);
+        camera.at_unit_depth(place).normalize()
+    };
+    let corners = [at(0.0, 0.0), at(0.0, 1.0), at(1.0, 0.0), at(1.0, 1.0)];
+    Cone::about(at(0.5, 0.5), corners)
+}
+
+/// A ray of a macropixel.
+#[derive(Debug, Clone, Copy)]
+struct Look {
+    ray: Ray,
+    /// How far it is along the ray to unit depth.
+    to_unit_depth: f64,
+}
+
+impl Look {
+    fn new(at_unit_depth: DVec3) -> Self {
+        Look {
+            ray: Ray::new(DVec3::ZERO, at_unit_depth),
+            to_unit_depth: at_unit_depth.length(),
+        }
+    }
+}
+
+/// The part of a macropixel that a ray stands for.
+#[derive(Debug, Clone, Copy)]
+struct Piece {
+    ray_share: f64,
+    /// Width and height at unit depth.
+    steps: [f64; 2],
+}
+
+impl Piece {
+    fn new(camera: &PinholeCamera, across: u32) -> Self {
+        Piece {
+            ray_share: 1.0 / f64::from(across * across),
+            steps: [camera.focal_px, camera.focal_v_px].map(|px| 1.0 / (px * f64::from(across))),
+        }
+    }
+}
+
+/// Rays of a macropixel, `across` of them in a row and in a column.
+fn looks(
+    camera: &PinholeCamera,
+    (row, col): (u32, u32),
+    across: u32,
+) -> impl Iterator<Item = Look> {
+    // Of a power of two, so that nothing is rounded.
+    let part = 1.0 / f64::from(across);
+    let place = move |first: u32, n: u32, other: u32| {
+        f64::from(first) + (f64::from(n) + (f64::from(other) + 0.5) * part) * part
+    };
+    (0..across * across).map(move |n| {
+        // No two rays are in one column or row, so that an upright edge is found by all of them.
+        let (x, y) = (n % across, n / across);
+        let (u, v) = (place(col, x, y), place(row, y, x));
+        Look::new(camera.at_unit_depth((u, v)))
+    })
+}
+
+/// Variance of the range over the piece of a plane that a rectangle about a ray covers, `width` × `height` at unit depth.
+fn range_variance(look: &Look, normal: DVec3, range_m: f64, [width, height]: [f64; 2]) -> f64 {
+    let ray = look.ray.direction;
+    let across = |side: DVec3, step: f64| {
+        // How the ray turns towards that side, and with it the range to a plane.
+        let turn = (side - ray * ray.dot(side)) * (step / look.to_unit_depth);
+        let change = turn.dot(normal) / ray.dot(normal);
+        // A ray within the plane has none.
+        let slope = if change.is_finite() {
+            change.abs()
+        } else {
+            MOST_SLOPE
+        };
+        range_m * slope.min(MOST_SLOPE)
+    };
+    (across(DVec3::X, width).powi(2) + across(DVec3::Y, height).powi(2)) / 12.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_spread_of_a_piece_is_that_of_its_rays() {
+        let step = 0.004;
+        for normal in [
+            DVec3::new(0.3, -0.8, -0.2),
+            DVec3::new(0.0, -1.0, -0.1),
+            -DVec3::Z,
+        ] {
+            let normal = normal.normalize();
+            let direction = DVec3::new(0.05, 0.1, 1.0);
+            let range_m = |d: DVec3| 2.0 / -normal.dot(d.normalize());
+            let fine = 100;
+            let offset = |n: i32| ((f64::from(n) + 0.5) / f64::from(fine) - 0.5) * step;
+            let ranges: Vec<f64> = (0..fine * fine)
+                .map(|n| direction + DVec3::new(offset(n % fine), offset(n / fine), 0.0))
+                .map(range_m)
+                .collect();
+            let mean = ranges.iter().sum::<f64>() / ranges.len() as f64;
+            let exact =
+                ranges.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / ranges.len() as f64;
+            let found =
+                range_variance(&Look::new(direction), normal, range_m(direction), [step; 2]);
+            assert!((found / exact - 1.0).abs() < 0.01, "{found} {exact}");
+        }
+    }
+}
