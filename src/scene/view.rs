@@ -37,7 +37,7 @@ const MOST_SLOPE: f64 = 0.5;
 /// A surface that a macropixel sees: what its rays meet of one object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Surface {
-    /// Index into [`Scene::objects`].
+    /// Index into [`Scene::objects`](crate::scene::Scene::objects).
     pub object: usize,
     /// Mean distance from the lidar, by the light that comes back from it, m.
     pub range_m: f64,
