@@ -104,9 +104,10 @@ impl Sources {
     }
 }
 
-/// Whether something is the name of what is built in rather than a file. A file of such a name comes first.
+/// Whether something is the name of what is built in rather than a file. A file of such a name comes first; a folder does not,
+/// because results of a demo stand in one with the name of its scene.
 fn is_name(path: &Path) -> bool {
-    !path.exists() && path.extension().is_none()
+    (!path.exists() || path.is_dir()) && path.extension().is_none()
 }
 
 /// A scene file, or a built-in scene.

@@ -38,6 +38,8 @@ fn built_in_scenes_go_by_name_and_a_file_of_that_name_comes_first() {
         error.contains("street or van or fog or glass or sweep or night or empty"),
         "{error}"
     );
+    fs::create_dir(folder.path().join("night")).unwrap();
+    assert!(printed("night").contains("name = \"pedestrian\""));
     fs::write(folder.path().join("van"), "[light]\nilluminance_klux = 7\n").unwrap();
     assert!(!printed("van").contains("name = \"van\""));
 }
