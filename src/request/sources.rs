@@ -107,7 +107,14 @@ impl Sources {
 /// Whether something is the name of what is built in rather than a file. A file of such a name comes first; a folder does not,
 /// because results of a demo stand in one with the name of its scene.
 fn is_name(path: &Path) -> bool {
-    (!path.exists() || path.is_dir()) && path.extension().is_none()
+    if path.is_dir() {
+        let is_scene = |name: &str| Scene::built_in().any(|(known, _)| known == name);
+        let is_chip = |name: &str| CHIPS.iter().any(|(known, _)| *known == name);
+        return path
+            .to_str()
+            .is_some_and(|name| is_scene(name) || is_chip(name));
+    }
+    !path.exists() && path.extension().is_none()
 }
 
 /// A scene file, or a built-in scene.
