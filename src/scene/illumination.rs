@@ -148,22 +148,24 @@ impl Scene {
         let centre_fs = self.pulse_shape().map_or(0.0, |shape| shape.mean_fs());
         let views = truth.views.par_iter().zip(&off_axis).enumerate();
         let falling = views.map(|(pixel, (view, off_axis))| match kept(pixel) {
-            Some(light) => Err(light),
-            None => Ok(self.falling(view, &budget, off_axis, centre_fs)),
+            Some(light) => Lit::AsBefore(light),
+            None => Lit::Anew(self.falling(view, &budget, off_axis, centre_fs)),
         });
-        let mut falling: Vec<Result<Falling, &PixelLight>> = falling.collect();
+        let mut falling: Vec<Lit<'_>> = falling.collect();
         if has_crosstalk {
-            let all: Vec<Falling> = falling.into_iter().flatten().collect();
-            let all = with_crosstalk(&all, spads, cols as usize);
-            falling = all.into_iter().map(Ok).collect();
+            let all = falling.into_iter().filter_map(|lit| match lit {
+                Lit::Anew(falling) => Some(falling),
+                Lit::AsBefore(_) => None,
+            });
+            let all = with_crosstalk(&all.collect::<Vec<_>>(), spads, cols as usize);
+            falling = all.into_iter().map(Lit::Anew).collect();
         }
         let (sigma, resolution) = (self.pulse_sigma(), self.pulse_resolution());
         let fog = Fog::of(self, &budget);
-        let light = |(falling, (view, off_axis)): (Result<Falling, &PixelLight>, _)| {
-            let (view, off_axis): (&Arc<View>, &OffAxis) = (view, off_axis);
-            let mut falling = match falling {
-                Ok(falling) => falling,
-                Err(kept) => return kept.clone(),
+        let light = |(lit, (view, off_axis)): (Lit<'_>, (&Arc<View>, &OffAxis))| {
+            let mut falling = match lit {
+                Lit::Anew(falling) => falling,
+                Lit::AsBefore(light) => return light.clone(),
             };
             let echoes = merged(&mut falling.glints, sigma, resolution);
             let background = PixelLight::background(falling.background_hz);
@@ -209,6 +211,14 @@ impl Scene {
             background_hz: (sun_hz + dark_hz).min(MOST_BACKGROUND_HZ),
         }
     }
+}
+
+/// How a macropixel comes by its light.
+#[derive(Debug)]
+enum Lit<'a> {
+    /// It sees what it saw.
+    AsBefore(&'a PixelLight),
+    Anew(Falling),
 }
 
 /// The light of a macropixel before echoes are merged.

@@ -140,6 +140,9 @@ impl Drawn {
     }
 }
 
+/// Which part of a light of one layer breeds, if one does.
+const BREEDING: usize = 1;
+
 /// One macropixel.
 struct Pixel<'p> {
     sight: &'p Sight,
@@ -200,7 +203,7 @@ impl<'a> Counting<'a> {
     /// Hits of every bin of a macropixel, and what they took. `parts` are those of its light ([`PhotonStream::parts`]).
     pub(super) fn expose(&mut self, sight: &Sight, parts: &[PixelStream<'_>]) -> (Vec<i64>, Work) {
         let light = &parts[0];
-        let breeding = parts.get(1).filter(|_| light.is_alone());
+        let breeding = parts.get(BREEDING).filter(|_| light.is_alone());
         let origins_fs = [sight.first_fs, sight.first_fs + self.stream.cycle_fs()];
         let origin_slots = origins_fs.map(|origin_fs| self.binning.slot_of(origin_fs));
         let has_slots_for_bins = origin_slots.iter().all(Option::is_some);
