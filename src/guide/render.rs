@@ -131,14 +131,14 @@ fn radiances(
     let stage = Stage::of(scene);
     let radiance = |ray: &Ray, candidates: &_| match has_panes {
         false => match stage.hit_of(ray, candidates) {
-            Some(hit) => surface(&stage, ray, &hit, grain, pixel_rad),
+            Some(hit) => surface(&stage, ray.at(hit.range_m), &hit, grain, pixel_rad),
             None => SKY_REFLECTIVITY,
         },
         true => {
             let returns = stage.returns_of(ray, candidates);
             let surfaces = returns.surfaces.iter();
-            let seen =
-                surfaces.map(|r| r.share_back * surface(&stage, ray, &r.hit, grain, pixel_rad));
+            let seen = surfaces
+                .map(|r| r.share_back * surface(&stage, r.place_m, &r.hit, grain, pixel_rad));
             seen.sum::<f64>() + returns.sky_share * SKY_REFLECTIVITY
         }
     };
@@ -159,8 +159,14 @@ fn radiances(
     seen
 }
 
-fn surface(stage: &Stage, ray: &Ray, hit: &crate::scene::Hit, grain: f64, pixel_rad: f64) -> f64 {
-    let (scene, point) = (stage.scene(), ray.at(hit.range_m));
+fn surface(
+    stage: &Stage,
+    point: DVec3,
+    hit: &crate::scene::Hit,
+    grain: f64,
+    pixel_rad: f64,
+) -> f64 {
+    let scene = stage.scene();
     let mut grey = hit.grey * stage.daylight(point, hit.normal);
     if grain > 0.0 && scene.objects[hit.object].texture.is_none() {
         grey *= (1.0 + grain * grain_at(point, 2.0 * pixel_rad * hit.range_m)).max(0.0);
@@ -247,8 +253,9 @@ pub(super) fn look(
             contrast: 0.0,
         };
     };
-    let radiance = surface(stage, &middle, &hit, 0.0, binning / camera.focal_px);
-    let own = hit.grey * stage.daylight(middle.at(hit.range_m), hit.normal);
+    let point = middle.at(hit.range_m);
+    let radiance = surface(stage, point, &hit, 0.0, binning / camera.focal_px);
+    let own = hit.grey * stage.daylight(point, hit.normal);
     let relative = if scene.objects[hit.object].texture.is_none() {
         grain
     } else {

@@ -5,6 +5,7 @@
 
 mod bounds;
 mod builtin;
+mod bundle;
 mod camera;
 mod cast;
 mod curve;
@@ -15,6 +16,8 @@ mod fog;
 mod illumination;
 mod keys;
 mod medium;
+#[cfg(test)]
+mod mirrors;
 mod motion;
 mod object;
 mod optics;

@@ -133,8 +133,11 @@ impl View {
         match first {
             None => self.see(stage, piece, look, &[], 1.0),
             Some(first) => {
+                let hit = stage.seen_at(&look.ray, *first);
                 let surface = Return {
-                    hit: stage.seen_at(&look.ray, *first),
+                    hit,
+                    place_m: look.ray.at(hit.range_m),
+                    facing: hit.normal,
                     share: 1.0,
                     share_back: 1.0,
                 };
@@ -163,21 +166,23 @@ impl View {
         for surface in surfaces {
             let Return {
                 hit,
+                place_m,
+                facing,
                 share,
                 share_back,
             } = surface;
-            let daylight = stage.daylight(look.ray.at(hit.range_m), hit.normal);
+            let daylight = stage.daylight(*place_m, hit.normal);
             // Air takes the surface's light away and puts its own in the place.
             let left = medium.transmission(hit.range_m);
             let seen = left * hit.reflectivity * daylight + (1.0 - left) * sky;
             self.sunlit_reflectivity += ray_share * share_back * seen;
-            let cosine = look.ray.direction.dot(hit.normal).abs();
+            let cosine = look.ray.direction.dot(*facing).abs();
             self.glimpses.push(Glimpse {
                 object: hit.object,
                 reflectivity: hit.reflectivity,
                 ray_share,
                 range_m: hit.range_m,
-                range_m2: range_variance(look, hit.normal, hit.range_m, piece.steps),
+                range_m2: range_variance(look, *facing, hit.range_m, piece.steps),
                 frontal_reflectivity: hit.reflectivity * hit.retro * cosine * share * ray_share,
             });
         }

@@ -153,6 +153,18 @@ impl<'a> Placed<'a> {
         }
     }
 
+    /// How that normal turns along a small step within the surface: not at all where it is flat. People and depth maps count as
+    /// made of flats.
+    pub(in crate::scene) fn bend(&self, part: u32, step_m: DVec3) -> DVec3 {
+        match *self {
+            Placed::Sphere { radius_m, .. } => step_m / radius_m,
+            Placed::Cylinder { axis, radius_m, .. } => {
+                round::cylinder_bend(step_m, axis, radius_m, part)
+            }
+            _ => DVec3::ZERO,
+        }
+    }
+
     /// Where on the surface `point` lies, m, in coordinates that turn and move with the shape: right (or around) and down.
     /// Round shapes do not know how they are turned, so it comes with the call: by `seen_turned_deg` to the left.
     pub(in crate::scene) fn on_surface(

@@ -85,6 +85,14 @@ pub(super) fn cylinder_normal(offset: DVec3, axis: DVec3, part: u32) -> DVec3 {
     }
 }
 
+/// How the normal turns along a small step within the surface.
+pub(super) fn cylinder_bend(step_m: DVec3, axis: DVec3, radius_m: f64, part: u32) -> DVec3 {
+    match part {
+        SIDE => (step_m - axis * step_m.dot(axis)) / radius_m,
+        _ => DVec3::ZERO,
+    }
+}
+
 /// Around the side and along it, or across an end.
 pub(super) fn on_cylinder(offset: DVec3, axis: DVec3, radius_m: f64, part: u32) -> (f64, f64) {
     let (side, other) = axis.any_orthonormal_pair();
