@@ -9,7 +9,7 @@ use super::config_keys::{KEYS, SECTION};
 use super::front_end::DeadTimeTooShort;
 use super::spad_grid::{SIDES, count_bits};
 use super::timing::ChipTiming;
-use crate::files::{InputError, read_text};
+use crate::files::InputError;
 use crate::settings::{Document, Fault, Key, commented, schema};
 
 /// What is impossible about a sensor, and what would be possible.
@@ -192,7 +192,7 @@ impl SensorConfig {
     /// # Errors
     /// One sentence naming file, line and cure.
     pub fn read(path: &Path) -> Result<Self, InputError> {
-        Self::parse(path.display(), &read_text(path)?)
+        Self::read_document(&Document::load(path)?)
     }
 
     /// Parses and checks TOML text; `source` names it in complaints.

@@ -67,6 +67,14 @@ fn flaw(bytes: &[u8], are_first: bool) -> Option<&'static str> {
 /// # Errors
 /// When it cannot be read, is no UTF-8 text, or is a pipe or device with more than a mebibyte.
 pub(crate) fn read_text(path: &Path) -> Result<String, InputError> {
+    read_text_within(path, usize::MAX)
+}
+
+/// The same for a file that has at most so many bytes; of another not much more is read.
+///
+/// # Errors
+/// When it has more, and as [`read_text`].
+pub(crate) fn read_text_within(path: &Path, most_bytes: usize) -> Result<String, InputError> {
     let (mut file, has_end) = open(path)?;
     let mut bytes = Vec::new();
     let mut checked = 0;
@@ -78,6 +86,9 @@ pub(crate) fn read_text(path: &Path) -> Result<String, InputError> {
         }
         if more == 0 {
             break;
+        }
+        if bytes.len() > most_bytes {
+            return Err(too_long(path.display(), most_bytes));
         }
         if !has_end && bytes.len() >= MEBIBYTE {
             let message =
@@ -100,6 +111,15 @@ pub(crate) fn read_text(path: &Path) -> Result<String, InputError> {
         let message = "ends within a character; give a whole text file, saved as UTF-8";
         InputError::new(path.display(), message)
     })
+}
+
+/// A complaint about a text with more than `most_bytes`, a number of mebibytes.
+pub(crate) fn too_long(source: impl fmt::Display, most_bytes: usize) -> InputError {
+    let mebibytes = most_bytes / MEBIBYTE;
+    let message = format!(
+        "has more than {mebibytes} MiB, the most that is read of such a file; give a shorter one"
+    );
+    InputError::new(source, message)
 }
 
 /// A text line by line, as long as it likes, in the memory of one line.
@@ -207,7 +227,10 @@ pub(crate) fn parse_toml<T: DeserializeOwned>(
     toml::from_str(text).map_err(|e| {
         let message = format!("{}; correct this entry", e.message().replace('\n', " "));
         match e.span() {
-            Some(span) => InputError::at(source, line_of(text, span.start), message),
+            Some(span) => {
+                let line = LineEnds::of(text).line_of(span.start);
+                InputError::at(source, line, message)
+            }
             None => InputError::new(source, message),
         }
     })
@@ -226,13 +249,19 @@ pub(crate) fn parse_json<T: DeserializeOwned>(
         .map_err(|e| InputError::at(source, e.line(), format!("{e}; give {wanted}")))
 }
 
-/// The one-based line of byte `offset` in `text`.
-pub(crate) fn line_of(text: &str, offset: usize) -> usize {
-    let end = offset.min(text.len());
-    1 + text.as_bytes()[..end]
-        .iter()
-        .filter(|&&b| b == b'\n')
-        .count()
+/// Where the lines of a text end.
+#[derive(Debug)]
+pub(crate) struct LineEnds(Vec<usize>);
+
+impl LineEnds {
+    pub(crate) fn of(text: &str) -> Self {
+        LineEnds(text.match_indices('\n').map(|(at, _)| at).collect())
+    }
+
+    /// The one-based line of a byte.
+    pub(crate) fn line_of(&self, offset: usize) -> usize {
+        1 + self.0.partition_point(|&end| end < offset)
+    }
 }
 
 #[cfg(test)]
@@ -263,6 +292,27 @@ mod tests {
         let path = dir.path().join("x");
         std::fs::write(&path, bytes).unwrap();
         read_text(&path)
+    }
+
+    proptest! {
+        #[test]
+        fn a_byte_is_in_the_line_after_as_many_ends(text in "[a\n€]{0,40}", offset in 0usize..100) {
+            let ends = text.bytes().take(offset).filter(|&byte| byte == b'\n').count();
+            prop_assert_eq!(LineEnds::of(&text).line_of(offset), 1 + ends);
+        }
+    }
+
+    #[test]
+    fn a_text_that_is_too_long_is_refused_before_it_is_read_whole() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("x");
+        std::fs::write(&path, vec![b'x'; 2 * MEBIBYTE + 1]).unwrap();
+        let refused = read_text_within(&path, 2 * MEBIBYTE).unwrap_err();
+        assert!(
+            refused.message.starts_with("has more than 2 MiB"),
+            "{refused}"
+        );
+        assert!(read_text_within(&path, 3 * MEBIBYTE).is_ok());
     }
 
     fn used_lines(bytes: &[u8]) -> Result<Vec<(usize, String)>, InputError> {

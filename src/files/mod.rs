@@ -25,7 +25,7 @@ mod temporary;
 pub(crate) use arrays::{read_array, read_counts};
 pub use complaint::InputError;
 pub use input::Lines;
-pub(crate) use input::{line_of, parse_json, parse_toml, read_text};
+pub(crate) use input::{LineEnds, parse_json, parse_toml, read_text, read_text_within, too_long};
 pub(crate) use interruption::clean_up_when_interrupted;
 pub(crate) use journal::{Journal, JournalReader, journal_line};
 pub use output::{OutputFile, create_folder};

@@ -8,6 +8,7 @@
 //!
 //! A file is read once, when the scene is: a scene holds, and writes into `frame.json`, what was in it.
 
+use std::io::BufRead;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -15,7 +16,7 @@ use serde::de::{DeserializeOwned, Error};
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::Value;
 
-use crate::files::{InputError, read_text};
+use crate::files::{InputError, Lines};
 
 /// Most points of a curve.
 const MOST_POINTS: usize = 65_536;
@@ -108,28 +109,30 @@ impl Curve {
     /// # Errors
     /// When it cannot be read, with the line of what is wrong.
     pub fn load(path: &Path) -> Result<Self, InputError> {
-        Self::parse(&path.display().to_string(), &read_text(path)?)
+        Self::parse(Lines::open(path)?)
     }
 
-    fn parse(source: &str, text: &str) -> Result<Self, InputError> {
+    fn parse<R: BufRead>(mut lines: Lines<R>) -> Result<Self, InputError> {
+        let source = lines.source().to_owned();
         let mut points = Vec::new();
         let mut may_be_header = true;
-        for (number, line) in (1..).zip(text.lines()) {
-            let line = line.trim();
-            if line.is_empty() || line.starts_with('#') {
-                continue;
-            }
+        while let Some((number, line)) = lines.next_used()? {
             let columns: Vec<&str> = line.split([',', ';', '\t']).map(str::trim).collect();
             let values: Vec<f64> = columns.iter().filter_map(|c| c.parse().ok()).collect();
             let is_header = std::mem::take(&mut may_be_header) && values.is_empty();
+            let complain = |message| Err(InputError::at(&source, number, message));
             match (columns.len(), <[f64; 2]>::try_from(&values[..])) {
+                (2, Ok(_)) if points.len() == MOST_POINTS => {
+                    return complain(format!(
+                        "has more than {MOST_POINTS} pairs, the most of a curve; give fewer"
+                    ));
+                }
                 (2, Ok(pair)) => points.push(pair),
                 _ if is_header => (),
                 _ => {
-                    let message = format!(
+                    return complain(format!(
                         "{line:?} is no pair of numbers; give two, with a comma between them"
-                    );
-                    return Err(InputError::at(source, number, message));
+                    ));
                 }
             }
         }
@@ -246,12 +249,15 @@ mod tests {
 
     #[test]
     fn files_have_two_columns_and_perhaps_a_header() {
-        let read = |text: &str| Curve::parse("a.csv", text);
+        let read = |text: &str| Curve::parse(Lines::new("a.csv", text.as_bytes()));
         let curve = read("time_ns,power\n0,0\n# measured\n1, 2.5\n\n3;0\n").unwrap();
         assert_eq!(curve.points(), [[0.0, 0.0], [1.0, 2.5], [3.0, 0.0]]);
         let refused = |text: &str| read(text).unwrap_err().to_string();
         assert!(refused("0,0\n1,2,3\n").starts_with("a.csv:2: \"1,2,3\" is no pair"));
         assert!(refused("x,y\nz,w\n").starts_with("a.csv:2: "));
         assert!(refused("").starts_with("a.csv: 0 points"));
+        let long: String = (0..=MOST_POINTS).map(|x| format!("{x},1\n")).collect();
+        assert!(refused(&long).starts_with("a.csv:65537: has more than 65536 pairs"));
+        assert!(read(&long[..long.len() - 8]).is_ok());
     }
 }

@@ -12,7 +12,13 @@ use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
 use super::key::Key;
-use crate::files::{InputError, line_of, read_text};
+use crate::files::{InputError, LineEnds, read_text_within, too_long};
+
+/// Most items of a list.
+const MOST_ITEMS: usize = 65_536;
+
+/// Most bytes of a file of settings.
+const MOST_BYTES: usize = 16 << 20;
 
 /// Something wrong with a setting.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -43,12 +49,17 @@ impl Document {
     /// Reads TOML text; `source` names it in complaints.
     ///
     /// # Errors
-    /// When it is no TOML, with the line.
+    /// When it is no TOML, or has a list that is too long, with the line; when the text is too long.
     pub fn parse(source: impl std::fmt::Display, text: &str) -> Result<Self, InputError> {
+        if text.len() > MOST_BYTES {
+            return Err(too_long(source, MOST_BYTES));
+        }
         let table: Table = crate::files::parse_toml(&source, text)?;
         let mut document = Self::of(source, table);
         if let Ok(spans) = DeTable::parse(text) {
-            note_lines(spans.get_ref(), "", text, &mut document.origins);
+            let (ends, mut long) = (LineEnds::of(text), Vec::new());
+            note_lines(spans.get_ref(), "", &ends, &mut document.origins, &mut long);
+            document.complain(long)?;
         }
         Ok(document)
     }
@@ -58,9 +69,17 @@ impl Document {
     /// # Errors
     /// When it cannot be read or is no TOML.
     pub fn load(path: &Path) -> Result<Self, InputError> {
-        let mut document = Self::parse(path.display(), &read_text(path)?)?;
+        let mut document = Self::parse(path.display(), &Self::text(path)?)?;
         document.folder = path.parent().unwrap_or(Path::new("")).to_owned();
         Ok(document)
+    }
+
+    /// The text of a file of settings.
+    ///
+    /// # Errors
+    /// When it cannot be read or is too long.
+    pub(crate) fn text(path: &Path) -> Result<String, InputError> {
+        read_text_within(path, MOST_BYTES)
     }
 
     /// The folder that files named in it are relative to: the file's own, or else the current one.
@@ -156,10 +175,24 @@ impl Document {
         faults: &mut Vec<Fault>,
     ) -> Table {
         let mut read = Table::new();
-        for (name, value) in given {
+        let plain = |(name, value): (&String, &Value)| {
             let key = keys.iter().find(|key| key.name == name);
             let plain = key.map_or(Ok(value.clone()), |key| key.plain(value));
+            (name.clone(), key, plain)
+        };
+        let given: Vec<_> = given.iter().map(plain).collect();
+        let mut all = rest.clone();
+        all.extend(given.iter().filter_map(|(name, _, value)| {
+            let value = value.as_ref().ok()?;
+            Some((name.clone(), value.clone()))
+        }));
+        // Where all of them fit together, each does alone: a scene of many objects is read in a third of the time.
+        let is_whole = all.try_into::<T>().is_ok();
+        for (name, key, plain) in given {
             let typed = plain.and_then(|value| {
+                if is_whole {
+                    return Ok(value);
+                }
                 let mut alone = rest.clone();
                 alone.insert(name.clone(), value.clone());
                 match alone.try_into::<T>() {
@@ -182,7 +215,7 @@ impl Document {
                 Ok(value) => drop(read.insert(name.clone(), value)),
                 Err(message) => {
                     let mut path = path.to_owned();
-                    extend(&mut path, name);
+                    extend(&mut path, &name);
                     faults.push(Fault { path, message });
                 }
             }
@@ -231,20 +264,36 @@ fn extend(path: &mut String, name: &str) {
     path.push_str(name);
 }
 
-fn note_lines(table: &DeTable<'_>, path: &str, text: &str, origins: &mut BTreeMap<String, Origin>) {
+/// Notes where values stand, and lists that are too long.
+fn note_lines(
+    table: &DeTable<'_>,
+    path: &str,
+    ends: &LineEnds,
+    origins: &mut BTreeMap<String, Origin>,
+    long: &mut Vec<Fault>,
+) {
     for (key, value) in table.iter() {
         let mut path = path.to_owned();
         extend(&mut path, key.get_ref());
-        let line = |offset| Origin::Line(line_of(text, offset));
+        let line = |offset| Origin::Line(ends.line_of(offset));
         origins.insert(path.clone(), line(key.span().start));
         match value.get_ref() {
-            DeValue::Table(inner) => note_lines(inner, &path, text, origins),
+            DeValue::Table(inner) => note_lines(inner, &path, ends, origins, long),
+            DeValue::Array(list) if list.len() > MOST_ITEMS => {
+                let message = format!(
+                    "{} is a list of {}, of which at most {MOST_ITEMS} are read; give fewer",
+                    key.get_ref(),
+                    list.len()
+                );
+                long.push(Fault { path, message });
+            }
             DeValue::Array(list) => {
                 for (index, item) in list.iter().enumerate() {
-                    let path = format!("{path}.{index}");
-                    origins.insert(path.clone(), line(item.span().start));
+                    // Other items have the line of their list.
                     if let DeValue::Table(inner) = item.get_ref() {
-                        note_lines(inner, &path, text, origins);
+                        let path = format!("{path}.{index}");
+                        origins.insert(path.clone(), line(item.span().start));
+                        note_lines(inner, &path, ends, origins, long);
                     }
                 }
             }

@@ -399,3 +399,30 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn lists_and_files_that_are_too_long_are_refused_with_their_number() {
+    let many = 65_537;
+    let pairs = "[0, 1],\n".repeat(many);
+    for (text, says) in [
+        (
+            "[light]\n".to_owned() + &"[[object]]\n".repeat(many),
+            "a.toml:2: object is a list of 65537, of which at most 65536 are read",
+        ),
+        (
+            format!("[lidar]\n\npulse = [{pairs}]"),
+            "a.toml:3: pulse is a list of 65537, ",
+        ),
+        (
+            format!("[[object]]\nname = 'it'\nwaypoints = [{pairs}]"),
+            "a.toml:3: waypoints is a list of 65537, ",
+        ),
+        (
+            format!("[lidar]\nfov_deg = {}1", " ".repeat(16 << 20)),
+            "a.toml: has more than 16 MiB, ",
+        ),
+    ] {
+        let refused = Scene::parse("a.toml", &text).unwrap_err().to_string();
+        assert!(refused.starts_with(says), "{refused}");
+    }
+}

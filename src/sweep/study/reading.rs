@@ -130,7 +130,7 @@ impl Study {
     /// # Errors
     /// As [`Study::parse`], or when it cannot be read.
     pub fn load(path: &Path) -> Result<Self, InputError> {
-        let text = crate::files::read_text(path)?;
+        let text = Document::text(path)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         Self::parse(path.display(), &text, folder, &stem)
