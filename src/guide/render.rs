@@ -131,7 +131,10 @@ fn radiances(
     let stage = Stage::of(scene);
     let radiance = |ray: &Ray, candidates: &_| match has_panes {
         false => match stage.hit_of(ray, candidates) {
-            Some(hit) => surface(&stage, ray.at(hit.range_m), &hit, grain, pixel_rad),
+            Some(hit) => {
+                let seen = surface(&stage, ray.at(hit.range_m), &hit, grain, pixel_rad);
+                seen + air(&stage, hit.range_m)
+            }
             None => SKY_REFLECTIVITY,
         },
         true => {
@@ -139,7 +142,9 @@ fn radiances(
             let surfaces = returns.surfaces.iter();
             let seen = surfaces
                 .map(|r| r.share_back * surface(&stage, r.place_m, &r.hit, grain, pixel_rad));
-            seen.sum::<f64>() + returns.sky_share * SKY_REFLECTIVITY
+            let ends = returns.ends.iter();
+            let air = ends.map(|end| end.share_back * air(&stage, end.range_m));
+            seen.sum::<f64>() + air.sum::<f64>()
         }
     };
     let mut seen = vec![0.0; width * height];
@@ -175,7 +180,12 @@ fn surface(
     if medium.is_clear() {
         return grey;
     }
-    grey * medium.transmission(hit.range_m) + medium.airlight(hit.range_m) * SKY_REFLECTIVITY
+    grey * medium.transmission(hit.range_m)
+}
+
+/// What the air before a surface, or the sky, adds to it.
+fn air(stage: &Stage, until_m: f64) -> f64 {
+    stage.scene().medium.airlight(until_m) * SKY_REFLECTIVITY
 }
 
 /// Noise of standard deviation about 1 at a point: clouds of three sizes, each half the one before, of which the smallest is at least `finest_m` and fades
@@ -254,7 +264,8 @@ pub(super) fn look(
         };
     };
     let point = middle.at(hit.range_m);
-    let radiance = surface(stage, point, &hit, 0.0, binning / camera.focal_px);
+    let surface = surface(stage, point, &hit, 0.0, binning / camera.focal_px);
+    let radiance = surface + air(stage, hit.range_m);
     let own = hit.grey * stage.daylight(point, hit.normal);
     let relative = if scene.objects[hit.object].texture.is_none() {
         grain
@@ -341,4 +352,56 @@ fn expose(
         })
         .collect();
     GreyImage::new(width, crop.height as usize, BITS, pixels).expect("held to its bits")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Object, Shape};
+
+    /// A mirror of 0.9 at 45 degrees shows a wall on the right, which the sun shines on from the left, straight but 30 degrees up.
+    #[test]
+    fn a_camera_sees_a_wall_over_a_mirror_in_the_light_it_has_in_its_place() {
+        let sheet = |centre_m, normal| Shape::Plane {
+            centre_m,
+            normal,
+            width_m: 2.0,
+            height_m: 2.0,
+        };
+        let at = DVec3::new(0.0, 0.0, 5.0);
+        let mut scene = Scene::outdoor();
+        scene.lidar.fov_deg = 1.0;
+        scene.light.sun_elevation_deg = Some(30.0);
+        scene.light.sun_azimuth_deg = -90.0;
+        scene.light.sky_share = 0.2;
+        let mirror = sheet(at, DVec3::new(1.0, 0.0, -1.0));
+        let wall = sheet(at + 7.0 * DVec3::X, DVec3::NEG_X);
+        // Where the wall's image is.
+        let behind = sheet(at + 7.0 * DVec3::Z, DVec3::Z);
+        scene.objects = vec![
+            Object {
+                mirror: 0.9,
+                ..Object::new("mirror", 0.0, mirror)
+            },
+            Object::new("wall", 0.9, wall),
+            Object::new("behind", 0.1, behind),
+        ];
+        let camera = scene.lidar_camera(4, 4);
+        let whole = Crop {
+            binning: 1,
+            left: 0,
+            top: 0,
+            width: 4,
+            height: 4,
+        };
+        let ray = |at| Ray::new(DVec3::ZERO, camera.at_unit_depth(at));
+        let daylight = 0.8 * f64::to_radians(30.0).cos() + 0.2 / 2.0;
+        for seen in radiances(&scene, whole, &camera, 0.0, ray) {
+            let expected = 0.9 * 0.9 * daylight;
+            assert!(
+                (f64::from(seen) - expected).abs() < 1e-6,
+                "{seen} {expected}"
+            );
+        }
+    }
 }

@@ -49,11 +49,24 @@ pub struct Return {
     pub share_back: f64,
 }
 
+/// Where some of a ray's light goes no further: a surface that is met, or the sky.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct End {
+    /// The whole way to it, m; infinite for the sky.
+    pub range_m: f64,
+    /// Share of the laser's light, there and back, that fog sends back before it and no longer behind it, 0 to 1.
+    pub share: f64,
+    /// The same share of light that comes back only: of daylight in the air.
+    pub share_back: f64,
+}
+
 /// All that sends light back along a ray, nearest first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Returns {
     /// Surfaces; none where there is only sky.
     pub surfaces: SmallVec<[Return; 2]>,
+    /// Where light ends; each of its shares is 1 in all.
+    pub ends: SmallVec<[End; 2]>,
     /// Share of the sky's light that arrives, 0 to 1.
     pub sky_share: f64,
 }
@@ -185,6 +198,7 @@ impl<'a> Stage<'a> {
     fn followed(&self, ray: &Ray, first: First, candidates: Option<&Candidates>) -> Returns {
         let mut returns = Returns {
             surfaces: SmallVec::new(),
+            ends: SmallVec::new(),
             sky_share: 0.0,
         };
         self.follow(ray, first, candidates, Way::default(), &mut returns);
@@ -208,6 +222,11 @@ impl<'a> Stage<'a> {
         } = way;
         let Some((meeting, index)) = first else {
             returns.sky_share += share;
+            returns.ends.push(End {
+                range_m: f64::INFINITY,
+                share: share * share,
+                share_back: share,
+            });
             return;
         };
         let mut hit = self.seen_at(ray, (meeting, index));
@@ -228,9 +247,17 @@ impl<'a> Stage<'a> {
                 share_back: share,
             });
         }
-        let onwards = |part: f64| Some(share * part).filter(|share| share * share >= LEAST_SHARE);
         let so_far_m = hit.range_m;
-        if let Some(share) = onwards(object.transmittance) {
+        let onwards = |part: f64| Some(share * part).filter(|share| share * share >= LEAST_SHARE);
+        let passed = onwards(object.transmittance);
+        let thrown = onwards(object.mirror).filter(|_| way.mirrors < MOST_MIRRORS);
+        let [passed_on, thrown_on] = [passed, thrown].map(|share| share.unwrap_or(0.0));
+        returns.ends.push(End {
+            range_m: so_far_m,
+            share: share * share - passed_on * passed_on - thrown_on * thrown_on,
+            share_back: share - passed_on - thrown_on,
+        });
+        if let Some(share) = passed {
             let beyond = Ray {
                 origin: point,
                 ..*ray
@@ -247,9 +274,7 @@ impl<'a> Stage<'a> {
             };
             self.follow(&beyond, next, candidates, onwards, returns);
         }
-        if let Some(share) = onwards(object.mirror)
-            && way.mirrors < MOST_MIRRORS
-        {
+        if let Some(share) = thrown {
             let reflected = Ray::new(point, reflected(ray.direction, hit.normal));
             let bundle = bundle.unwrap_or_else(|| Bundle::of(ray.direction).after(so_far_m));
             let placed = &self.placed[index];

@@ -107,9 +107,13 @@ impl Medium {
     }
 
     /// Share of the sky's light that fog before a surface at `range_m` has put in the place of the surface's own: what is
-    /// taken out of the way is replaced by airlight (Koschmieder), as bright as the sky at the horizon.
+    /// taken out of the way is replaced by airlight (Koschmieder), as bright as the sky at the horizon. Without a surface, at an infinite
+    /// range, it is all of it.
     pub fn airlight(&self, range_m: f64) -> f64 {
-        1.0 - self.transmission(range_m)
+        match range_m.is_finite() {
+            true => 1.0 - self.transmission(range_m),
+            false => 1.0,
+        }
     }
 }
 

@@ -186,6 +186,48 @@ fn a_pane_at_an_angle_shows_what_is_behind_it_and_what_it_mirrors() {
     }
 }
 
+/// Shares of the laser's light that end at 5 m and at 12 m.
+fn ends(scene: &Scene) -> [f64; 2] {
+    let truth = GroundTruth::render(scene, 1, 1);
+    [4.9..5.1, 11.9..12.1].map(|metres: std::ops::Range<f64>| {
+        let ends = truth.views[0].ends_m.iter();
+        let there = ends.filter(|(end_m, _)| metres.contains(end_m));
+        there.map(|(_, share)| share).sum()
+    })
+}
+
+#[test]
+fn fog_before_a_mirror_or_pane_is_there_once() {
+    let unlit = daylight_hz(&straight_ahead(0.0));
+    let mut scene = over_a_mirror(45.0, 0.0);
+    scene.medium.extinction_1_m = 0.05;
+    // Of daylight alone: the laser's glare counts as background, too.
+    scene.medium.backscatter_1_m_sr = Some(0.0);
+    let left = |range_m: f64| (-0.05 * range_m).exp();
+    let sky = scene.light.sky_reflectivity;
+    let beyond = (left(5.0) - left(12.0)) * sky + left(12.0) * 0.9;
+    let expected = (1.0 - left(5.0)) * sky + 0.9 * beyond;
+    let share = daylight_hz(&scene) / unlit * 0.9;
+    assert!((share / expected - 1.0).abs() < 1e-5, "{share} {expected}");
+    let [at_mirror, at_wall] = ends(&scene);
+    assert!((at_mirror - 0.19).abs() < 1e-9 && (at_wall - 0.81).abs() < 1e-9);
+    // What a pane passes whole changes nothing, in fog with the laser's glare as well.
+    let mut scene = straight_ahead(30.0);
+    scene.medium.extinction_1_m = 0.05;
+    let without = light(&scene);
+    let pane = sheet(DVec3::new(0.0, 0.0, 5.0), heading(160.0), 1.0);
+    scene.objects.push(Object {
+        transmittance: 1.0,
+        ..Object::new("pane", 0.0, pane)
+    });
+    are_alike(&light(&scene), &without, 1.0).unwrap();
+    let hz = [light(&scene), without].map(|light| light.background_hz());
+    assert!((hz[0] / hz[1] - 1.0).abs() < 1e-9, "{hz:?}");
+    scene.objects[1].transmittance = 0.5;
+    let [at_pane, at_wall] = ends(&scene);
+    assert!((at_pane - 0.75).abs() < 1e-9 && (at_wall - 0.25).abs() < 1e-9);
+}
+
 /// Something at the image that the lidar sees, and then what there is.
 fn thing(place: DVec3, normal: DVec3, is_ball: bool) -> Object {
     let shape = match is_ball {

@@ -34,7 +34,7 @@ mod view;
 pub(crate) use bounds::Bounds;
 pub use camera::PinholeCamera;
 pub(crate) use cast::Stage;
-pub use cast::{Hit, Return, Returns};
+pub use cast::{End, Hit, Return, Returns};
 pub use curve::{Curve, CurveError, Measured};
 pub use illumination::SKY_REFLECTIVITY;
 pub use medium::{DROPLET_LIDAR_RATIO_SR, Medium};

@@ -18,7 +18,7 @@ use smallvec::SmallVec;
 
 use super::bounds::{Bounds, Cone};
 use super::camera::PinholeCamera;
-use super::cast::{First, Return, Returns, Stage};
+use super::cast::{End, First, Return, Returns, Stage};
 use super::medium::Medium;
 use super::vector::Ray;
 
@@ -68,7 +68,7 @@ pub(super) struct View {
     pub glimpses: SmallVec<[Glimpse; 16]>,
     /// Mean reflectivity in sunlight that would give as much light, that of the sky and of fog included.
     pub sunlit_reflectivity: f64,
-    /// Where rays end, m, and their share of all; infinite for the sky.
+    /// Where light of the laser ends, m, and its share of all; infinite for the sky.
     pub ends_m: SmallVec<[(f64, f64); 2]>,
 }
 
@@ -108,7 +108,7 @@ impl View {
             if !is_edge {
                 let piece = Piece::new(camera, RAYS);
                 for ((look, _), returns) in few.iter().zip(&all) {
-                    view.see(stage, &piece, look, &returns.surfaces, returns.sky_share);
+                    view.see(stage, &piece, look, &returns.surfaces, &returns.ends);
                 }
             }
             is_edge
@@ -121,7 +121,7 @@ impl View {
                     view.see_end(stage, &piece, &look, &first);
                 } else {
                     let returns = stage.returns_from(&look.ray, first, &candidates);
-                    view.see(stage, &piece, &look, &returns.surfaces, returns.sky_share);
+                    view.see(stage, &piece, &look, &returns.surfaces, &returns.ends);
                 }
             }
         }
@@ -130,8 +130,15 @@ impl View {
 
     /// Adds a ray that ends where it first meets something, or in the sky.
     fn see_end(&mut self, stage: &Stage, piece: &Piece, look: &Look, first: &First) {
+        let end = |range_m| {
+            [End {
+                range_m,
+                share: 1.0,
+                share_back: 1.0,
+            }]
+        };
         match first {
-            None => self.see(stage, piece, look, &[], 1.0),
+            None => self.see(stage, piece, look, &[], &end(f64::INFINITY)),
             Some(first) => {
                 let hit = stage.seen_at(&look.ray, *first);
                 let surface = Return {
@@ -141,28 +148,28 @@ impl View {
                     share: 1.0,
                     share_back: 1.0,
                 };
-                self.see(stage, piece, look, &[surface], 0.0);
+                self.see(stage, piece, look, &[surface], &end(hit.range_m));
             }
         }
     }
 
-    /// Adds a ray with what sends light back along it, nearest first, and the share of the sky's light that arrives.
+    /// Adds a ray with what sends light back along it, nearest first, and where its light ends.
     fn see(
         &mut self,
         stage: &Stage,
         piece: &Piece,
         look: &Look,
         surfaces: &[Return],
-        sky_share: f64,
+        ends: &[End],
     ) {
         let (scene, ray_share) = (stage.scene(), piece.ray_share);
         let (medium, sky) = (&scene.medium, scene.light.sky_reflectivity);
-        self.sunlit_reflectivity += ray_share * sky_share * sky;
-        let end_m = match sky_share > 0.0 {
-            true => f64::INFINITY,
-            false => surfaces.last().map_or(f64::INFINITY, |s| s.hit.range_m),
-        };
-        self.end(end_m, ray_share);
+        for end in ends {
+            // The air before it has its own light.
+            let air = medium.airlight(end.range_m);
+            self.sunlit_reflectivity += ray_share * end.share_back * air * sky;
+            self.end(end.range_m, ray_share * end.share);
+        }
         for surface in surfaces {
             let Return {
                 hit,
@@ -172,9 +179,8 @@ impl View {
                 share_back,
             } = surface;
             let daylight = stage.daylight(*place_m, hit.normal);
-            // Air takes the surface's light away and puts its own in the place.
             let left = medium.transmission(hit.range_m);
-            let seen = left * hit.reflectivity * daylight + (1.0 - left) * sky;
+            let seen = left * hit.reflectivity * daylight;
             self.sunlit_reflectivity += ray_share * share_back * seen;
             let cosine = look.ray.direction.dot(*facing).abs();
             self.glimpses.push(Glimpse {

@@ -14,10 +14,11 @@ use toml::{Table, Value};
 use super::key::Key;
 use crate::files::{InputError, LineEnds, read_text_within, too_long};
 
-/// Most items of a list.
+/// Most items of a list. A scene of so many objects is read and printed in 1.1 s of processor time and 270 MB (optimised for debugging).
 const MOST_ITEMS: usize = 65_536;
 
-/// Most bytes of a file of settings.
+/// Most lines and commas of settings, and most bytes of a file: 16 MiB of `[0,1],` take 4 s and 2 GB to parse, five times the entries.
+const MOST_ENTRIES: usize = 1 << 20;
 const MOST_BYTES: usize = 16 << 20;
 
 /// Something wrong with a setting.
@@ -53,6 +54,14 @@ impl Document {
     pub fn parse(source: impl std::fmt::Display, text: &str) -> Result<Self, InputError> {
         if text.len() > MOST_BYTES {
             return Err(too_long(source, MOST_BYTES));
+        }
+        let entries = text.bytes().filter(|byte| matches!(byte, b',' | b'\n'));
+        let entries = entries.count();
+        if entries > MOST_ENTRIES {
+            let message = format!(
+                "has {entries} lines and commas, of which at most {MOST_ENTRIES} are read of settings; give fewer values"
+            );
+            return Err(InputError::new(source, message));
         }
         let table: Table = crate::files::parse_toml(&source, text)?;
         let mut document = Self::of(source, table);
@@ -186,7 +195,7 @@ impl Document {
             let value = value.as_ref().ok()?;
             Some((name.clone(), value.clone()))
         }));
-        // Where all of them fit together, each does alone: a scene of many objects is read in a third of the time.
+        // Where all of them fit together, each does alone.
         let is_whole = all.try_into::<T>().is_ok();
         for (name, key, plain) in given {
             let typed = plain.and_then(|value| {

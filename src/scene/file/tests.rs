@@ -421,6 +421,10 @@ fn lists_and_files_that_are_too_long_are_refused_with_their_number() {
             format!("[lidar]\nfov_deg = {}1", " ".repeat(16 << 20)),
             "a.toml: has more than 16 MiB, ",
         ),
+        (
+            format!("[lidar]\npulse = [{}]", "[0,1],".repeat(1_000_000)),
+            "a.toml: has 2000001 lines and commas, of which at most 1048576 ",
+        ),
     ] {
         let refused = Scene::parse("a.toml", &text).unwrap_err().to_string();
         assert!(refused.starts_with(says), "{refused}");
