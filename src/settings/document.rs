@@ -14,7 +14,7 @@ use toml::{Table, Value};
 use super::key::Key;
 use crate::files::{InputError, LineEnds, read_text_within, too_long};
 
-/// Most items of a list. A scene of so many objects is read and printed in 1.1 s of processor time and 270 MB (optimised for debugging).
+/// Most items of a list. A scene of so many objects is read and printed in 1.1 s of processor time and 270 MB (dev profile).
 const MOST_ITEMS: usize = 65_536;
 
 /// Most lines and commas of settings, and most bytes of a file: 16 MiB of `[0,1],` take 4 s and 2 GB to parse, five times the entries.
