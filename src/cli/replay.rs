@@ -128,15 +128,9 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let timing = (args.sdf.is_none() && silicon.mismatch.is_none())
         .then(|| TimingVerdict::of(&stimuli.sensor, &silicon, (0, 0)).report());
     let silicon = (silicon != Silicon::nominal(silicon.corner)).then_some(silicon);
-    let clash = [
-        (args.sdf.is_some(), "--sdf"),
-        (args.checks.is_some(), "--checks"),
-    ];
-    if let (Some(_), Some((_, option))) = (silicon, clash.iter().find(|(given, _)| *given)) {
-        let message = format!(
-            "takes delays and limits from elsewhere; leave out either {option} or process, voltage, temperature and mismatch"
-        );
-        return Err(InputError::new(*option, message).into());
+    if silicon.is_some() && args.sdf.is_some() {
+        let message = "takes delays and limits from elsewhere; leave out either --sdf or process, voltage, temperature and mismatch";
+        return Err(InputError::new("--sdf", message).into());
     }
     let needs_array =
         args.vcd.is_some() || args.saif.is_some() || args.sdf.is_some() || args.checks.is_some();
@@ -211,7 +205,10 @@ fn replay_array(
     args: &ReplayArgs,
     silicon: Option<Silicon>,
 ) -> anyhow::Result<Replayed> {
-    let sensor = &stimuli.sensor;
+    let sensor = match silicon {
+        Some(silicon) => &stimuli.sensor.made_of(&silicon),
+        None => &stimuli.sensor,
+    };
     let mut simulation = GateSimulation::new(
         sensor,
         &stimuli.exposure,
@@ -222,10 +219,6 @@ fn replay_array(
     );
     if let Some(sdf) = &args.sdf {
         let timing = annotated_timing(sdf, simulation.netlist(), sensor)?;
-        simulation = simulation.with_timing(&timing);
-    }
-    if let Some(silicon) = silicon {
-        let timing = silicon.timing(simulation.netlist());
         simulation = simulation.with_timing(&timing);
     }
     let mut events = simulation.hardware_events();
@@ -257,8 +250,8 @@ fn replay_array(
     let exposure = &stimuli.exposure;
     let cancelled = match silicon {
         _ if args.sdf.is_some() => 2 * events.count(HardwareEventKind::PulsesCancelled),
-        Some(silicon) => {
-            let timed = Timed::new(sensor.made_of(&silicon), exposure, Runner::Gate);
+        Some(_) => {
+            let timed = Timed::new(sensor, exposure, Runner::Gate);
             cancelled(&timed, sensor, &pixels)
         }
         None => cancelled(&Gate::new(sensor, exposure), sensor, &pixels),

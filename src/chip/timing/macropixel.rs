@@ -59,9 +59,14 @@ pub struct MacropixelCircuit {
 }
 
 impl MacropixelCircuit {
-    /// The macropixel at `position` (row, column) of a sensor: its cells' names, and so their mismatch, depend on that.
+    /// The macropixel at `position` (row, column) of a sensor: its cells' names, and so their mismatch, depend on that. Times are by
+    /// its own CLK and STOP, whenever they come to its column.
     pub fn new(config: &SensorConfig, position: (usize, usize)) -> Self {
-        let netlist = Netlist::elaborate(&array::subarray(config, position, (1, 1)));
+        let unskewed = SensorConfig {
+            clk_skew_ps: 0.0,
+            ..config.clone()
+        };
+        let netlist = Netlist::elaborate(&array::subarray(&unskewed, position, (1, 1)));
         let probes = Probes::of_macropixel(&netlist, position.0, position.1);
         MacropixelCircuit {
             toggles: probes.toggle_cells(&netlist),
