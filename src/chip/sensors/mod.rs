@@ -215,6 +215,7 @@ impl From<&Sensor> for Sensor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::netlist::{Corner, Mismatch};
 
     #[test]
     fn copies_share_their_delays_and_other_silicon_has_others() {
@@ -225,6 +226,33 @@ mod tests {
         let slow = sensor.made_of(&sensor.silicon().at(1.5));
         assert!(slow.timing().ripple() > sensor.timing().ripple());
         assert!(slow != sensor && copy == sensor);
+    }
+
+    /// Delays of the slow corner are 1.45 times the typical ones, of the fast one 0.72; conditions scale them, and wires do not differ.
+    #[test]
+    fn clk_comes_as_late_to_a_column_as_its_silicon_is_slow() {
+        for (corner, slower) in Corner::ALL.into_iter().zip([0.72, 1.0, 1.45]) {
+            let sensor = Sensor::from(SensorConfig {
+                corner,
+                ..(*hslidar_delay_line()).clone()
+            });
+            let mismatch = Mismatch {
+                sigma: 0.2,
+                seed: 1,
+            };
+            for factor in [1.0, 1.3] {
+                let sensor = sensor.made_of(&Silicon {
+                    factor,
+                    mismatch: Some(mismatch),
+                    ..*sensor.silicon()
+                });
+                for col in [0, 1, 39, 63, 64] {
+                    let wanted_fs = 45e3 * col as f64 * slower * factor;
+                    let found_fs = sensor.clk_skew(col).as_fs() as f64;
+                    assert!((found_fs - wanted_fs).abs() <= 2.0, "{col}: {found_fs}");
+                }
+            }
+        }
     }
 
     #[test]
