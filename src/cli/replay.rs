@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::sdf::annotated_timing;
 use super::silicon::SiliconArgs;
-use super::voice::{progress, say};
+use super::voice::{note, progress, say};
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::bench::{HardwareEventKind, HardwareEventReport};
 use crate::chip::{SensorConfig, Silicon};
@@ -187,6 +187,9 @@ impl Summary {
         }
         if let Some(timing) = self.timing.as_ref().filter(|timing| !timing.met) {
             eprintln!("gdtof: timing {}", timing.verdict);
+        }
+        for text in self.timing.iter().flat_map(|timing| &timing.notes) {
+            note(format_args!("note on timing: {text}"));
         }
         if self.photons_that_cancel > 0 {
             eprintln!(
