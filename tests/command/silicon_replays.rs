@@ -48,7 +48,9 @@ fn a_skewed_column_counts_alike_with_and_without_a_waveform() {
 
 #[test]
 fn checks_are_those_of_the_silicon() {
-    let folder = folder("0,0,30\n", "100000000,0,0,3\n");
+    // In every other CLK period of the window, so that the shift register changes when it is strobed.
+    let photons = (0..20).map(|k| format!("{},0,0,{}\n", 30_000_000 + 5_208_333 * k, k % 16));
+    let folder = folder("0,0,30\n", &photons.collect::<String>());
     let chip = "--rows 1 --cols 1 --stop-periods 60 --laser-cycles 2 --engine gate";
     let violated = |silicon: &str| {
         let more = format!("{chip} {silicon}");
