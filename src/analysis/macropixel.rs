@@ -35,6 +35,10 @@ pub struct MacropixelTiming {
     pub shortest: Path,
     /// CLK falls → COUNTER_CLK rises.
     pub counter_clk: (Time, Time),
+    /// CLK falls → LOCAL_STOP → BLOCK rises, and BLOCK rises → COUNTER_CLK falls at the earliest, where LOCAL_STOP blocks.
+    block: Option<((Time, Time), Time)>,
+    /// Shortest high pulse of COUNTER_CLK.
+    counter_clk_high: Time,
     /// STOP rises → COUNTER_RESET rises.
     pub reset: (Time, Time),
     /// STOP rises → COUNTER_RESET falls.
@@ -125,6 +129,13 @@ impl MacropixelTiming {
                 .and_then(|nets| rise.path_to(nets[0], Bound::Longest)),
             shortest: worst_path(&clk, clk_rest.iter(), CheckKind::Hold).expect(whole),
             counter_clk: counter.counter_clk,
+            block: counter.block.zip(counter.block_to_counter_clk),
+            counter_clk_high: circuit
+                .clocked_by_counter_clk()
+                .map(|cell| library.checks(netlist.cells()[cell].kind))
+                .map(|checks| Time::from_fs(checks.at(CheckKind::ClockHigh, corner).into()))
+                .max()
+                .expect("a P-counter counts"),
             reset: delays.reset,
             release: delays.release,
             reset_to_stage_clock: counter.reset_to_stage_clock.unwrap_or(Time::ZERO),
@@ -219,9 +230,11 @@ impl MacropixelTiming {
         }
     }
 
-    /// By how much STOP's strobe comes after that of LOCAL_STOP, seen from CLK's fall: earliest and latest.
+    /// By how much STOP's strobe comes after that of LOCAL_STOP, seen from CLK's fall: earliest and latest. Delay lines are sampled by
+    /// what strobes, so that it does not matter when that comes.
     fn strobe_offsets(&self, phase: Time) -> (Time, Time) {
-        self.stop_strobe.map_or((Time::ZERO, Time::ZERO), |strobe| {
+        let strobe = self.stop_strobe.filter(|_| self.shift.is_some());
+        strobe.map_or((Time::ZERO, Time::ZERO), |strobe| {
             (
                 strobe.0 + phase - self.strobe.0,
                 strobe.1 + phase - self.strobe.1,
@@ -300,6 +313,28 @@ impl MacropixelTiming {
         Some((slack, race))
     }
 
+    /// What LOCAL_STOP leaves over that blocks COUNTER_CLK: it comes before a pulse begins, or so late in one that the rest is long
+    /// enough. None where LOCAL_STOP does not block.
+    pub fn block_slack(&self, period: Time) -> Option<Time> {
+        let (block, to_counter_clk) = self.block?;
+        let (first, last) = self.counter_clk;
+        let pulses = (block.1 - first).as_fs().div_euclid(period.as_fs());
+        let before = period * (pulses + 1) + first - block.1;
+        // The first pulse is the one that made LOCAL_STOP.
+        let rest = block.0 + to_counter_clk - period * pulses - last - self.counter_clk_high;
+        Some(before.min(rest))
+    }
+
+    /// CLK periods next to `period` at which LOCAL_STOP cuts a pulse of COUNTER_CLK too short: from, until.
+    pub fn cutting(&self, period: Time) -> Option<(Time, Time)> {
+        let (block, to_counter_clk) = self.block?;
+        let (first, last) = self.counter_clk;
+        let pulses = (block.1 - first).as_fs().div_euclid(period.as_fs()).max(1);
+        let rest = block.0 + to_counter_clk - last - self.counter_clk_high;
+        let per_pulse = |time: Time| Time::from_fs(time.as_fs() / pulses);
+        Some((per_pulse(rest), per_pulse(block.1 - first)))
+    }
+
     /// What a period and phase leave over of the tightest limit, if the macropixel is to count as `aim` says.
     pub fn slack(&self, period: Time, phase: Time, aim: Aim) -> Time {
         let clk = self.clk.iter().map(|r| r.slack(period)).min();
@@ -309,7 +344,9 @@ impl MacropixelTiming {
             .map(|r| self.strobe_slack(r, period, phase, aim))
             .min();
         let first = self.first_count(period, phase, aim).map(|(slack, _)| slack);
-        let all = [clk, strobe, first].into_iter().flatten();
+        let all = [clk, strobe, first, self.block_slack(period)]
+            .into_iter()
+            .flatten();
         all.min().unwrap_or(Time::MAX)
     }
 

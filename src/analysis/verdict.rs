@@ -5,6 +5,7 @@
 //! | CLK | data and clock pulses of the flip-flops behind CLK | the CLK period |
 //! | strobe | LOCAL_STOP's strobe, a ripple after the counted CLK edge | two changes of the shift register |
 //! | first count | the release of COUNTER_RESET | the CLK edges before and after it |
+//! | blocking COUNTER_CLK | LOCAL_STOP, which ends the count | the pulses of COUNTER_CLK after it |
 //! | reset pulse | COUNTER_RESET | what it must outlast |
 //! | SPAD_RAW | pulse width, toggle rate and hold of the toggle flip-flops | the dead time |
 //! | HIT | data of the histogram's counters | the shortest laser cycle |
@@ -54,6 +55,18 @@ enum Fault {
     Slipped {
         /// By how many bins.
         bins: i64,
+    },
+    /// A piece of a pulse clocks the P-counter.
+    #[error(
+        "LOCAL_STOP blocks COUNTER_CLK within a pulse, of which it leaves too short a piece; give clk_hz below {:.2} MHz or above {:.2} MHz",
+        1e3 / until.as_ns(),
+        1e3 / from.as_ns()
+    )]
+    CutPulse {
+        /// The shortest CLK period at which it does.
+        from: Time,
+        /// And the longest.
+        until: Time,
     },
     /// SPADs are too fast for the front end.
     #[error("{0}; {cure}", cure = .0.cure())]
@@ -211,7 +224,8 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
     let bins = pixel.aim(period, phase).moved() - aim.moved();
     for mut margin in strobes {
         if margin.slack < Time::ZERO {
-            margin.fault = Some(race.map_or(Fault::Slipped { bins }, Fault::Race));
+            let slipped = (bins != 0).then_some(Fault::Slipped { bins });
+            margin.fault = race.map(Fault::Race).or(slipped);
         }
         margins.push(margin);
     }
@@ -223,6 +237,15 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
             path: path.clone(),
             slack,
             fault: (slack < Time::ZERO).then_some(Fault::Race(race)),
+        });
+    }
+    if let Some(slack) = pixel.block_slack(period) {
+        let cutting = pixel.cutting(period).filter(|_| slack < Time::ZERO);
+        margins.push(Margin {
+            check: "blocking COUNTER_CLK".to_owned(),
+            path: format!("CLK fall to {} rise", pixel.probes().path(Probe::LocalStop)),
+            slack,
+            fault: cutting.map(|(from, until)| Fault::CutPulse { from, until }),
         });
     }
     margins.push(Margin {

@@ -332,16 +332,9 @@ impl SensorConfig {
         }
     }
 
-    /// Longer than the delay lines of any macropixel: twice the average, for mismatch and slow silicon. Nothing where there are none.
-    pub fn longest_delay_line(&self) -> Time {
-        match self.tdc {
-            Tdc::Clocked => Time::ZERO,
-            Tdc::DelayLine => self.delay_element() * (2 * self.bins as i64),
-        }
-    }
-
-    /// By how much CLK and STOP come later to a column of macropixels than to column 0.
-    pub fn clk_skew(&self, col: usize) -> Time {
+    /// Delay of the wires that bring CLK and STOP to a column of macropixels, in the typical corner. What they take in the
+    /// sensor's silicon is [`Sensor::clk_skew`](super::Sensor::clk_skew).
+    pub fn clk_wire(&self, col: usize) -> Time {
         Time::from_s(self.clk_skew_ps * 1e-12 * col as f64)
     }
 

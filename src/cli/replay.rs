@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::sdf::annotated_timing;
 use super::silicon::SiliconArgs;
-use super::voice::{progress, say};
+use super::voice::{note, progress, say};
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::bench::{HardwareEventKind, HardwareEventReport};
 use crate::chip::{SensorConfig, Silicon};
@@ -128,15 +128,9 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let timing = (args.sdf.is_none() && silicon.mismatch.is_none())
         .then(|| TimingVerdict::of(&stimuli.sensor, &silicon, (0, 0)).report());
     let silicon = (silicon != Silicon::nominal(silicon.corner)).then_some(silicon);
-    let clash = [
-        (args.sdf.is_some(), "--sdf"),
-        (args.checks.is_some(), "--checks"),
-    ];
-    if let (Some(_), Some((_, option))) = (silicon, clash.iter().find(|(given, _)| *given)) {
-        let message = format!(
-            "takes delays and limits from elsewhere; leave out either {option} or process, voltage, temperature and mismatch"
-        );
-        return Err(InputError::new(*option, message).into());
+    if silicon.is_some() && args.sdf.is_some() {
+        let message = "takes delays and limits from elsewhere; leave out either --sdf or process, voltage, temperature and mismatch";
+        return Err(InputError::new("--sdf", message).into());
     }
     let needs_array =
         args.vcd.is_some() || args.saif.is_some() || args.sdf.is_some() || args.checks.is_some();
@@ -194,6 +188,9 @@ impl Summary {
         if let Some(timing) = self.timing.as_ref().filter(|timing| !timing.met) {
             eprintln!("gdtof: timing {}", timing.verdict);
         }
+        for text in self.timing.iter().flat_map(|timing| &timing.notes) {
+            note(format_args!("note on timing: {text}"));
+        }
         if self.photons_that_cancel > 0 {
             eprintln!(
                 "gdtof: {} photons cancel: two of one SPAD within a CLK period ({}) undo each other in the front end; a dead time ({}) no shorter than the period prevents it",
@@ -211,7 +208,10 @@ fn replay_array(
     args: &ReplayArgs,
     silicon: Option<Silicon>,
 ) -> anyhow::Result<Replayed> {
-    let sensor = &stimuli.sensor;
+    let sensor = match silicon {
+        Some(silicon) => &stimuli.sensor.made_of(&silicon),
+        None => &stimuli.sensor,
+    };
     let mut simulation = GateSimulation::new(
         sensor,
         &stimuli.exposure,
@@ -222,10 +222,6 @@ fn replay_array(
     );
     if let Some(sdf) = &args.sdf {
         let timing = annotated_timing(sdf, simulation.netlist(), sensor)?;
-        simulation = simulation.with_timing(&timing);
-    }
-    if let Some(silicon) = silicon {
-        let timing = silicon.timing(simulation.netlist());
         simulation = simulation.with_timing(&timing);
     }
     let mut events = simulation.hardware_events();
@@ -257,8 +253,8 @@ fn replay_array(
     let exposure = &stimuli.exposure;
     let cancelled = match silicon {
         _ if args.sdf.is_some() => 2 * events.count(HardwareEventKind::PulsesCancelled),
-        Some(silicon) => {
-            let timed = Timed::new(sensor.made_of(&silicon), exposure, Runner::Gate);
+        Some(_) => {
+            let timed = Timed::new(sensor, exposure, Runner::Gate);
             cancelled(&timed, sensor, &pixels)
         }
         None => cancelled(&Gate::new(sensor, exposure), sensor, &pixels),

@@ -11,7 +11,7 @@ use super::voice::{progress, tell};
 use crate::chip::{SensorConfig, Silicon, array};
 use crate::files::{InputError, OutputFile, read_text};
 use crate::netlist::sdf::{
-    Sdf, SdfDivider, SdfOptions, SdfTimescale, Skipped, annotate, write_sdf,
+    Sdf, SdfDivider, SdfOptions, SdfTimescale, Skipped, annotate, oddities, write_sdf,
 };
 use crate::netlist::{Corner, Netlist, Timing};
 
@@ -127,6 +127,9 @@ pub(super) fn annotated_timing(
 ) -> Result<Timing, InputError> {
     let text = read_text(path)?;
     let sdf = Sdf::parse(&path.display().to_string(), &text)?;
+    for oddity in oddities(&sdf, config.corner) {
+        eprintln!("gdtof: {}:{}: {oddity}", sdf.source, oddity.line());
+    }
     let mut timing = Silicon::of(config).timing(netlist);
     let result = annotate(&mut timing, netlist, &sdf, config.corner)?;
     let at = |skipped: &Skipped| {

@@ -4,7 +4,7 @@
 use crate::chip::front_end::{DeadTimeTooShort, PulseLimits};
 use crate::chip::race::NoAim;
 use crate::chip::window_law::Irregular;
-use crate::chip::{FrontEnd, Race, Sensor};
+use crate::chip::{FrontEnd, Race, Sensor, Tdc};
 use crate::units::Time;
 
 /// Why an engine has no answer.
@@ -77,7 +77,7 @@ pub enum EngineError {
     Mismatch,
     /// Each macropixel has a window law of its own by description, and this engine has one law.
     #[error(
-        "each macropixel has delay lines of its own, or a CLK that comes later than another's, which only the engines gate, window and cohort follow, and in the library's silicon"
+        "each macropixel has delay lines of its own, or a CLK that comes later than another's, which only the engines gate, window and cohort follow"
     )]
     OwnLaws,
     /// Light is given for SPADs one by one, but for another number of them than a macropixel has.
@@ -167,11 +167,11 @@ pub(super) fn follows(sensor: &Sensor, limits: &PulseLimits) -> Result<(), Engin
     followed.map_err(EngineError::FrontEnd)
 }
 
-/// Whether one window law describes all macropixels of this sensor.
-pub(super) fn one_law(sensor: &Sensor) -> Result<(), EngineError> {
-    match sensor.has_own_laws() {
-        true => Err(EngineError::OwnLaws),
-        false => Ok(()),
+/// Whether macropixels of this sensor differ in nothing but when CLK comes to them.
+pub(super) fn has_no_delay_lines(sensor: &Sensor) -> Result<(), EngineError> {
+    match sensor.tdc {
+        Tdc::DelayLine => Err(EngineError::OwnLaws),
+        Tdc::Clocked => Ok(()),
     }
 }
 

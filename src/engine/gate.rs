@@ -6,6 +6,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::lanes::LaneSimulation;
+use super::own_clk::by_own_clk;
 use super::readout::PinSampler;
 use super::{
     Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay, follows,
@@ -315,22 +316,6 @@ impl Gate {
         Ok(histograms)
     }
 
-    /// A macropixel's pulses by its own CLK: where that comes later to its column than to the first, which is simulated, they come
-    /// earlier.
-    fn by_own_clk<'p>(&self, pixel: &PulsedPixel<'p>) -> Cow<'p, [SpadEvent]> {
-        let skew = self
-            .sensor
-            .clk_skew(pixel.number as usize % self.sensor.cols);
-        if skew == Time::ZERO {
-            return Cow::Borrowed(pixel.pulses);
-        }
-        let earlier = pixel.pulses.iter().map(|pulse| SpadEvent {
-            time: pulse.time - skew,
-            ..*pulse
-        });
-        earlier.collect()
-    }
-
     /// At most [`LANES`] macropixels with the same delays.
     fn run_batch(
         &self,
@@ -338,8 +323,10 @@ impl Gate {
         pixels: &[PulsedPixel<'_>],
     ) -> Result<Histograms, EngineError> {
         let starts: &Vec<u16> = &pixels.iter().map(|pixel| pixel.start).collect();
-        let seen: Vec<Cow<'_, [SpadEvent]>> =
-            pixels.iter().map(|pixel| self.by_own_clk(pixel)).collect();
+        let seen = pixels
+            .iter()
+            .map(|pixel| by_own_clk(&self.sensor, pixel.number, pixel.pulses));
+        let seen: Vec<Cow<'_, [SpadEvent]>> = seen.collect();
         let pulses: &Vec<&[SpadEvent]> = &seen.iter().map(|pulses| &**pulses).collect();
         // One alone is quicker without lanes.
         if starts.len() == 1 {

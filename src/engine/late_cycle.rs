@@ -17,7 +17,7 @@
 use super::gate::GateSimulation;
 use super::{Histograms, PulsedPixel, Replay, Window};
 use crate::bench::Skip;
-use crate::chip::{Exposure, Mode, PCounter, SensorConfig};
+use crate::chip::{Exposure, Mode, PCounter, Sensor};
 use crate::photon::SpadEvent;
 
 /// Whole laser cycles that are simulated before the one that is wanted.
@@ -29,30 +29,31 @@ const LATENCY: u32 = 8;
 /// A simulation of the macropixel `at` (row, col) that is, from the STOP edge of laser cycle `cycle` on, that of the whole
 /// exposure: same changes of every net at the same times. `start` and `pulses` are those of the whole exposure as well.
 pub fn late_cycle(
-    config: &SensorConfig,
+    sensor: impl Into<Sensor>,
     exposure: &Exposure,
     at: (usize, usize),
     start: u16,
     pulses: &[SpadEvent],
     cycle: u32,
 ) -> GateSimulation {
-    let whole = GateSimulation::new(config, exposure, at, (1, 1), &[start], &[pulses]);
+    let sensor = &sensor.into();
+    let whole = GateSimulation::new(sensor, exposure, at, (1, 1), &[start], &[pulses]);
     let Some(first_cycle) = cycle.checked_sub(WARM_UP) else {
         return whole;
     };
     let pixel = PulsedPixel {
-        number: (at.0 * config.cols + at.1) as u32,
+        number: (at.0 * sensor.cols + at.1) as u32,
         start,
         pulses,
     };
-    match counted_before(config, exposure, pixel, first_cycle) {
+    match counted_before(sensor, exposure, pixel, first_cycle) {
         None => whole,
         Some(counted) => {
-            let busy = config.dead_time() + config.longest_delay_line() + config.clk_skew(at.1);
+            let busy = sensor.dead_time() + sensor.longest_delay_line() + sensor.clk_skew(at.1);
             let busy = busy.as_fs() / exposure.clock.period().as_fs() + 1;
             let skip = Skip {
                 first_cycle,
-                lead_periods: config.bins as u32 + LATENCY + busy as u32,
+                lead_periods: sensor.bins as u32 + LATENCY + busy as u32,
             };
             whole.skipping(skip, &counted)
         }
@@ -61,16 +62,16 @@ pub fn late_cycle(
 
 /// What is counted before the STOP edge of laser cycle `cycle`, where that follows from the window law.
 fn counted_before(
-    config: &SensorConfig,
+    sensor: &Sensor,
     exposure: &Exposure,
     pixel: PulsedPixel<'_>,
     cycle: u32,
 ) -> Option<Histograms> {
-    if config.p_counter == PCounter::Memoryless {
+    if sensor.p_counter == PCounter::Memoryless {
         return None;
     }
     // In the conventional mode the STOP edge that ends a laser cycle counts it.
-    let laser_cycles = match config.mode {
+    let laser_cycles = match sensor.mode {
         Mode::Guided => cycle,
         Mode::Conventional => cycle.checked_sub(1)?,
     };
@@ -82,9 +83,9 @@ fn counted_before(
         ..*exposure
     };
     // The last window of a column to which CLK comes late ends later.
-    let until = part.end() + config.clk_skew(pixel.number as usize % config.cols);
+    let until = part.end() + sensor.clk_skew(pixel.number as usize % sensor.cols);
     let end = pixel.pulses.partition_point(|pulse| pulse.time < until);
-    let window = Window::new(config, &part);
+    let window = Window::new(sensor, &part);
     let pixel = PulsedPixel {
         pulses: &pixel.pulses[..end],
         ..pixel

@@ -23,6 +23,7 @@ mod histograms;
 mod lanes;
 mod late_cycle;
 pub mod load;
+mod own_clk;
 pub mod readout;
 mod timed;
 pub mod waveform;
@@ -47,6 +48,7 @@ use std::borrow::Cow;
 use crate::chip::WindowLaw;
 use crate::photon::{PhotonStream, SpadEvent};
 use error::{follows, has_a_line_a_spad};
+use own_clk::by_own_clk;
 
 /// What every engine tells of itself. What it runs is in [`Replay`] and [`Expose`].
 pub trait Engine: Sync {
@@ -98,10 +100,9 @@ pub trait Replay: Engine {
     fn replay(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError>;
 
     /// The pulses of macropixel `number` where [`Engine::law`] must see them to take them at the CLK edges at which that
-    /// macropixel does: elsewhere only if its delays are not the library's.
+    /// macropixel does: elsewhere only if CLK comes late to it, or its delays are not the library's.
     fn as_the_law_sees<'p>(&self, number: u32, pulses: &'p [SpadEvent]) -> Cow<'p, [SpadEvent]> {
-        let _ = number;
-        Cow::Borrowed(pulses)
+        by_own_clk(self.law().sensor(), number, pulses)
     }
 
     /// Counts of every bin of the array's first macropixel. See [`PulsedPixel`] for start value and pulses.

@@ -30,6 +30,13 @@ impl InstanceLimits {
         self.0[control as usize][check as usize][edge as usize]
     }
 
+    /// Every limit times `factor`, rounded to whole femtoseconds.
+    #[must_use]
+    pub fn times(self, factor: f64) -> Self {
+        let scale = |fs: u32| (f64::from(fs) * factor).round() as u32;
+        InstanceLimits(self.0.map(|control| control.map(|check| check.map(scale))))
+    }
+
     /// Changes one limit, fs.
     pub fn set(&mut self, control: Control, check: CheckKind, edge: Edge, limit_fs: u32) {
         self.0[control as usize][check as usize][edge as usize] = limit_fs;

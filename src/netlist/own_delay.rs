@@ -18,6 +18,8 @@ pub struct OwnDelay {
     pub spread: Option<Mismatch>,
     /// What becomes of short pulses.
     pub model: DelayModel,
+    /// Whether mismatch makes the cell another than its likes.
+    pub mismatches: bool,
 }
 
 impl OwnDelay {
@@ -27,15 +29,17 @@ impl OwnDelay {
             typical_fs,
             spread: None,
             model: DelayModel::Inertial,
+            mismatches: true,
         }
     }
 
-    /// A wire.
+    /// A wire with repeaters: as fast or slow as the silicon, and too many of them to differ from another such wire.
     pub const fn wire(typical_fs: u32) -> Self {
         OwnDelay {
             typical_fs,
             spread: None,
             model: DelayModel::Transport,
+            mismatches: false,
         }
     }
 

@@ -135,6 +135,12 @@ impl Timing {
         self.own_limits.insert(cell, limits);
     }
 
+    /// Every limit times `factor`.
+    pub fn scale_limits(&mut self, factor: f64) {
+        let all = self.limits.iter_mut().chain(self.own_limits.values_mut());
+        all.for_each(|limits| *limits = limits.times(factor));
+    }
+
     /// Index of a set that is this cell's alone.
     fn own_set(&mut self, cell: usize) -> usize {
         let set = self.of_cell[cell] as usize;

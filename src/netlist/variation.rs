@@ -13,9 +13,11 @@
 //!
 //! Mismatch is Gaussian, with a standard deviation that falls with the square root of a cell's area (Pelgrom
 //! et al., IEEE JSSC 24, 1989), its transistor count standing for the area. A cell's draw depends on nothing
-//! but the seed and the cell's path, so that a macropixel is the same alone and within its array.
+//! but the seed and the cell's path, so that a macropixel is the same alone and within its array. Wires do not differ.
 //!
 //! A flip-flop's limits scale with its conditions as delays do; mismatch leaves them alone.
+
+use std::collections::BTreeSet;
 
 use rand_philox::{Philox, splitmix64, u32_to_unit_f64};
 
@@ -125,8 +127,8 @@ pub(crate) fn derated_limits(library: &Library, factor: f64) -> Library {
     derated
 }
 
-/// `nominal` with every delay times `factor` and, if asked for, every cell's own mismatch; rounded to whole
-/// femtoseconds.
+/// `nominal` with every delay and limit times `factor` and, if asked for, every cell's own mismatch on its delays; rounded to
+/// whole femtoseconds.
 pub fn varied(
     netlist: &Netlist,
     nominal: &Timing,
@@ -150,7 +152,11 @@ pub(crate) fn varied_as(
     if factor == 1.0 && mismatch.is_none() {
         return timing;
     }
+    let own_delays = netlist.own_delays().iter();
+    let wires = own_delays.filter(|(_, delay)| !delay.mismatches);
+    let wires: BTreeSet<usize> = wires.map(|&(cell, _)| cell).collect();
     for (index, cell) in netlist.cells().iter().enumerate() {
+        let mismatch = mismatch.filter(|_| !wires.contains(&index));
         let own = mismatch.map_or(1.0, |m| m.factor(&path(index), cell.kind.transistors()));
         let scale = |fs: u32| (fs as f64 * factor * own).round() as u32;
         let delays = nominal.of(index).map(|mut arc| {
@@ -160,6 +166,7 @@ pub(crate) fn varied_as(
         });
         timing.set(index, delays);
     }
+    timing.scale_limits(factor);
     timing
 }
 

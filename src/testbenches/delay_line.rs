@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::chip::{
-    Exposure, Probe, SensorConfig, SensorPins, WindowLaw, array, hslidar_delay_line, probes,
+    Exposure, Probe, Sensor, SensorConfig, SensorPins, WindowLaw, array, hslidar_delay_line, probes,
 };
 use crate::engine::GateSimulation;
 use crate::engine::waveform::write_waves;
@@ -37,27 +37,27 @@ pub(super) const TESTBENCH: Testbench = Testbench {
 };
 
 fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
-    let config = SensorConfig {
+    let sensor = Sensor::from(SensorConfig {
         rows: 1,
         ..(*hslidar_delay_line()).clone()
-    };
-    edges(waves, &config, checks)?;
-    meetings(&config, checks);
+    });
+    edges(waves, &sensor, checks)?;
+    meetings(&sensor, checks);
     Ok(())
 }
 
 /// The law of the macropixel at a column.
-fn law(config: &SensorConfig, exposure: &Exposure, col: usize) -> WindowLaw {
-    WindowLaw::new(config, exposure).of_macropixel(col as u32)
+fn law(sensor: &Sensor, exposure: &Exposure, col: usize) -> WindowLaw {
+    WindowLaw::new(sensor, exposure).of_macropixel(col as u32)
 }
 
 /// A photon in each laser cycle: at an edge of a bin, or a femtosecond before it.
-fn edges(waves: &Path, config: &SensorConfig, checks: &mut Checks) -> Result<(), InputError> {
-    let cycles = 2 * (config.bins as u32 + 1);
-    let exposure = Exposure::new(config, STOP_PERIODS, cycles);
+fn edges(waves: &Path, sensor: &Sensor, checks: &mut Checks) -> Result<(), InputError> {
+    let cycles = 2 * (sensor.bins as u32 + 1);
+    let exposure = Exposure::new(sensor, STOP_PERIODS, cycles);
     let lists: Vec<Vec<SpadEvent>> = (0..2)
         .map(|pixel| {
-            let law = law(config, &exposure, COLUMN + pixel);
+            let law = law(sensor, &exposure, COLUMN + pixel);
             let window = law.window(STARTS[pixel]).open().expect("it opens");
             let photon = |cycle: u32| SpadEvent {
                 time: law.edges(&window, i64::from(cycle)).edges()[cycle as usize / 2]
@@ -69,18 +69,18 @@ fn edges(waves: &Path, config: &SensorConfig, checks: &mut Checks) -> Result<(),
         .collect();
     let pulses: Vec<&[SpadEvent]> = lists.iter().map(Vec::as_slice).collect();
     let place = (0, COLUMN);
-    let mut gate = GateSimulation::new(config, &exposure, place, (1, 2), &STARTS, &pulses);
+    let mut gate = GateSimulation::new(sensor, &exposure, place, (1, 2), &STARTS, &pulses);
     let netlist = Arc::clone(gate.netlist());
     let local_stop = SensorPins::of(&netlist).local_stop;
     let mut recorder = Recorder::new(local_stop.iter().copied());
     let origin = gate.schedule().origin;
-    write_waves(waves, &netlist, &view(config, &exposure, origin), |waves| {
+    write_waves(waves, &netlist, &view(sensor, &exposure, origin), |waves| {
         gate.run(&mut (&mut recorder, waves));
         gate.schedule().end
     })?;
 
     // Before the first edge nothing counts, nor at the last.
-    let expected = vec![2u16; config.bins];
+    let expected = vec![2u16; sensor.bins];
     let histograms = gate.histograms().ok();
     for (pixel, start) in STARTS.into_iter().enumerate() {
         let found = histograms.as_ref().map(|h| h[pixel].to_vec());
@@ -94,16 +94,16 @@ fn edges(waves: &Path, config: &SensorConfig, checks: &mut Checks) -> Result<(),
         .iter()
         .map(|&net| recorder.rising_edges(net)[0] - origin)
         .collect();
-    let later = exposure.clock.period() + config.clk_skew(COLUMN + 1) - config.clk_skew(COLUMN);
+    let later = exposure.clock.period() + sensor.clk_skew(COLUMN + 1) - sensor.clk_skew(COLUMN);
     checks.times(
         "LOCAL_STOP, a start value and a column on",
         later,
         &[rises[1] - rises[0]],
     );
     for (pixel, start) in STARTS.into_iter().enumerate() {
-        let law = law(config, &exposure, COLUMN + pixel);
+        let law = law(sensor, &exposure, COLUMN + pixel);
         let edges = law.edges(&law.window(start).open().expect("it opens"), 0);
-        let lengths: Vec<String> = (0..config.bins)
+        let lengths: Vec<String> = (0..sensor.bins)
             .map(|bin| format!("{:.2}", edges.width(bin).as_ns()))
             .collect();
         checks.note(format!(
@@ -116,9 +116,9 @@ fn edges(waves: &Path, config: &SensorConfig, checks: &mut Checks) -> Result<(),
 }
 
 /// Two photons: in one bin, about an edge, and too close for the photon line.
-fn meetings(config: &SensorConfig, checks: &mut Checks) {
-    let exposure = Exposure::new(config, STOP_PERIODS, 1);
-    let law = law(config, &exposure, COLUMN);
+fn meetings(sensor: &Sensor, checks: &mut Checks) {
+    let exposure = Exposure::new(sensor, STOP_PERIODS, 1);
+    let law = law(sensor, &exposure, COLUMN);
     let edges = law.edges(&law.window(STARTS[0]).open().expect("it opens"), 0);
     let edge = edges.edges()[4];
     let stage = law.timing().photon_line_stage;
@@ -148,7 +148,7 @@ fn meetings(config: &SensorConfig, checks: &mut Checks) {
             .collect();
         let place = (0, COLUMN);
         let mut gate =
-            GateSimulation::new(config, &exposure, place, (1, 1), &STARTS[..1], &[&pulses]);
+            GateSimulation::new(sensor, &exposure, place, (1, 1), &STARTS[..1], &[&pulses]);
         gate.run(&mut ());
         let counts = gate.histograms().ok().map(|h| h.into_counts());
         let counts = counts.unwrap_or_default().into_iter().enumerate();
@@ -157,7 +157,7 @@ fn meetings(config: &SensorConfig, checks: &mut Checks) {
     }
 }
 
-fn view(config: &SensorConfig, exposure: &Exposure, origin: Time) -> Layout {
+fn view(sensor: &Sensor, exposure: &Exposure, origin: Time) -> Layout {
     let mut groups = vec![Group::new(
         "Global signals",
         [Entry::binary("CLK"), Entry::binary("STOP")],
@@ -180,7 +180,7 @@ fn view(config: &SensorConfig, exposure: &Exposure, origin: Time) -> Layout {
             Entry::binary(Probe::Strobe.path(&name)),
             Entry::binary(Probe::Hit.path(&name)),
         ];
-        let bins = (0..config.bins).map(|bin| Entry::decimal(probes::bin_path(&name, bin)));
+        let bins = (0..sensor.bins).map(|bin| Entry::decimal(probes::bin_path(&name, bin)));
         groups.push(Group::new(
             format!("Column {}: {start}", COLUMN + pixel),
             signals.into_iter().chain(bins),

@@ -34,19 +34,21 @@ use std::time::Instant;
 
 use every_edge::circuit::{self, Case};
 use every_edge::waves::{Figures, Waves};
-use guided_dtof::bench::{StimulusPlan, export_verilog};
-use guided_dtof::chip::{FrontEnd, SensorConfig, hslidar, hslidar_delay_line};
+use guided_dtof::bench::{StimulusPlan, export_annotated_verilog, export_verilog};
+use guided_dtof::chip::{
+    FrontEnd, Sensor, SensorConfig, Silicon, array, hslidar, hslidar_delay_line,
+};
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::kernel::{Drive, Kernel, merge};
 use guided_dtof::netlist::{
-    Direction, Module, Netlist, Timing, write_cells, write_delays, write_modules,
+    Corner, Direction, Module, Netlist, Timing, write_cells, write_delays, write_modules,
     write_parametric_cells,
 };
 use guided_dtof::units::Time;
 use guided_dtof::waves::{Selection, VcdWriter};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, FileFailurePersistence, TestCaseError, TestError, TestRunner};
-use rand::{SeedableRng, rngs::StdRng, seq::SliceRandom};
+use rand::{RngExt, SeedableRng, rngs::StdRng, seq::SliceRandom};
 use scenario::Scenario;
 
 /// Whose waves are compared.
@@ -190,6 +192,11 @@ fn compare_all(what: &str, strategy: impl Strategy<Value = Case>) {
 
 /// Runs all macropixels of a small sensor, with their load path, in both simulators.
 fn compare_sensor(scenario: &Scenario) -> Figures {
+    compare_silicon(scenario, &Silicon::of(&scenario.config))
+}
+
+/// The same with the delays of this silicon.
+fn compare_silicon(scenario: &Scenario, silicon: &Silicon) -> Figures {
     let Scenario {
         config,
         exposure,
@@ -199,13 +206,19 @@ fn compare_sensor(scenario: &Scenario) -> Figures {
     let pulses = scenario.pulses();
     let folder = tempfile::tempdir().unwrap();
     let size = (config.rows, config.cols);
-    let plan = StimulusPlan::new(config, exposure, size.1, starts, &pulses);
-    export_verilog(folder.path(), config, &plan).unwrap();
+    let sensor = Sensor::from(config).made_of(silicon);
+    let plan = StimulusPlan::new(&sensor, exposure, size.1, starts, &pulses);
+    if *silicon == Silicon::of(config) {
+        export_verilog(folder.path(), config, &plan).unwrap();
+    } else {
+        let timing = silicon.timing(&Netlist::elaborate(&array::circuit(config)));
+        export_annotated_verilog(folder.path(), config, &plan, &timing).unwrap();
+    }
     icarus::simulate(folder.path(), &["tb.v", "design.v", "cells.v"], &["+vcd"]);
     let dump = File::open(folder.path().join("dut.vcd")).unwrap();
     let theirs = Waves::read(BufReader::new(dump), "tb.dut");
 
-    let mut gate = GateSimulation::new(config, exposure, (0, 0), size, starts, &pulses);
+    let mut gate = GateSimulation::new(&sensor, exposure, (0, 0), size, starts, &pulses);
     let selection = Selection::all().with_anonymous();
     let mut writer = VcdWriter::new(Vec::new(), gate.netlist(), &selection).unwrap();
     gate.run(&mut writer);
@@ -213,7 +226,7 @@ fn compare_sensor(scenario: &Scenario) -> Figures {
     let top = gate.netlist().scopes()[0].name.clone();
     let ours = Waves::read(Cursor::new(writer.finish(end).unwrap()), &top);
     ours.compare(&theirs, NAMES, end.as_fs() as u64)
-        .unwrap_or_else(|difference| panic!("{difference}\n{config:?}"))
+        .unwrap_or_else(|difference| panic!("{difference}\n{config:?} {silicon:?}"))
 }
 
 #[test]
@@ -251,19 +264,27 @@ fn sensors_of_another_kind() {
     // Where CLK is skewed, the second column shows it.
     let sensors = [
         (wide8x8().unwrap(), 1),
-        (hslidar(), 1),
+        (hslidar(), 2),
         (hslidar_delay_line(), 2),
     ];
     let kinds = sensors.len() as u64;
     for (sensor, cols) in sensors {
-        let config = SensorConfig {
-            rows: 1,
-            cols,
-            ..(*sensor).clone()
-        };
         for seed in seeds.clone() {
-            let scenario = Scenario::of(&mut StdRng::seed_from_u64(seed), config.clone());
-            all = all + compare_sensor(&scenario);
+            let random = &mut StdRng::seed_from_u64(seed);
+            let mut config = SensorConfig {
+                rows: 1,
+                cols,
+                ..(*sensor).clone()
+            };
+            // The chip as it is, and then in any silicon.
+            let mut silicon = Silicon::of(&config);
+            if seed > 0 {
+                config.corner = Corner::ALL[random.random_range(0..3)];
+                config.clk_skew_ps = random.random_range(0.0..=200.0);
+                silicon = scenario::silicon(random, config.corner);
+            }
+            let scenario = Scenario::of(random, config);
+            all = all + compare_silicon(&scenario, &silicon);
         }
     }
     all.print("sensors of another kind", kinds * seeds.end, start);

@@ -4,6 +4,7 @@
 use guided_dtof::analysis::{TimingVerdict, corner_limits, factor_range, gate_works};
 use guided_dtof::chip::{
     AfterBorrow, Exposure, Limits, Mode, PCounter, SensorConfig, Silicon, Window, WindowLaw,
+    hslidar_delay_line,
 };
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::kernel::{CheckReport, Policy};
@@ -120,6 +121,25 @@ fn one_verdict_on_every_clock() {
             .any(|note| note.contains("the strobe comes after 1 rising"));
         assert_eq!(is_late, mhz > 423.0, "{mhz} MHz: {:?}", verdict.notes);
     }
+    // LOCAL_STOP cuts a pulse of COUNTER_CLK short, between periods that the verdict names.
+    let mut fails = 0;
+    for mhz in (820..=862).step_by(2) {
+        let config = at_mhz(f64::from(mhz));
+        let verdict = TimingVerdict::of(&config, &TYPICAL, (0, 0));
+        let found = violations(&config);
+        let says = (verdict.is_met(), mhz);
+        assert_eq!(says, (found.violated() == 0, mhz), "{verdict}\n{found}");
+        if !verdict.is_met() {
+            fails += 1;
+            let said = verdict.to_string();
+            let cure = "too short a piece; give clk_hz below 83";
+            assert!(
+                said.contains(cure) && said.contains("or above 855."),
+                "{said}"
+            );
+        }
+    }
+    assert!((5..20).contains(&fails), "{fails}");
     let slow = Silicon {
         factor: 1.3,
         ..TYPICAL
@@ -201,4 +221,24 @@ fn a_verdict_notes_photons_that_cancel_and_fails_where_the_front_end_does_not_fo
         "{said}"
     );
     assert!(said.contains("give at least 0.1214"), "{said}");
+}
+
+/// What samples delay lines also strobes: in the conventional mode it comes with STOP, whenever CLK falls.
+#[test]
+fn delay_lines_keep_their_limits_in_either_mode() {
+    for mode in [Mode::Guided, Mode::Conventional] {
+        for mhz in [60.0, 200.0, 300.0] {
+            let config = SensorConfig {
+                rows: 1,
+                cols: 1,
+                clk_hz: mhz * 1e6,
+                mode,
+                ..(*hslidar_delay_line()).clone()
+            };
+            let verdict = TimingVerdict::of(&config, &TYPICAL, (0, 0));
+            let found = violations(&config);
+            assert_eq!(found.violated(), 0, "{mode:?}, {mhz} MHz: {found}");
+            assert!(verdict.is_met(), "{mode:?}, {mhz} MHz: {verdict}");
+        }
+    }
 }

@@ -192,10 +192,6 @@ fn every_kind_of_bad_input_is_one_sentence_and_status_2() {
             "the cohort engine knows no single photons",
         ),
         (
-            replay(&["--mismatch", "0.1", "--engine", "gate", "--checks", "x"]),
-            "--checks: takes delays and limits from elsewhere",
-        ),
-        (
             replay(&["--process", "slow", "--engine", "gate", "--sdf", "d.sdf"]),
             "--sdf: takes delays and limits from elsewhere",
         ),

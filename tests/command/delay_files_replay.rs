@@ -59,6 +59,44 @@ fn an_exported_file_changes_nothing_and_a_slower_one_does() {
     }
 }
 
+#[test]
+fn delays_of_zero_and_a_cell_twice_are_told() {
+    let folder = folder();
+    let here = folder.path();
+    let cell = |name: &str, delay: &str| {
+        format!(
+            "(CELL (CELLTYPE \"DFFR\") (INSTANCE mp_r0_c0.metdc.{name})\n(DELAY (ABSOLUTE (IOPATH (posedge CK) Q ({delay})))))\n"
+        )
+    };
+    let said = |cells: &[String]| {
+        let text = format!("(DELAYFILE (TIMESCALE 1ps)\n{})", cells.concat());
+        std::fs::write(here.join("odd.sdf"), text).unwrap();
+        let output = replay(here, &["--engine", "gate", "--sdf", "odd.sdf"]);
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let [zero, some] = [("hit_0", "0"), ("hit_1", "90")].map(|(name, delay)| cell(name, delay));
+    let all = said(std::slice::from_ref(&zero));
+    assert!(
+        all.contains("odd.sdf:3: every delay is zero, so that gates switch at once"),
+        "{all}"
+    );
+    let mixed = said(&[some.clone(), zero]);
+    assert!(
+        mixed.contains("odd.sdf:5: 1 of 2 delays are zero"),
+        "{mixed}"
+    );
+    let twice = said(&[some.clone(), cell("hit_1", "80")]);
+    assert!(
+        twice.contains(
+            "odd.sdf:4: delays of a cell are given again, after line 2, and the last ones count"
+        ),
+        "{twice}"
+    );
+    let once = said(&[some]);
+    assert!(!once.contains("zero") && !once.contains("again"), "{once}");
+}
+
 /// Paths of the flip-flops that break a limit, as the JSON of the checks has them.
 fn violating(here: &Path, sdf: &[&str]) -> Vec<String> {
     let checks = ["--checks", "report", "--checks-json", "c.json"];

@@ -24,6 +24,7 @@ mod results_are_one_set;
 mod run_time_against_error;
 mod scenes_name_files;
 #[cfg(unix)]
+mod silicon_replays;
 mod sweeps_go_on;
 mod the_book_runs;
 mod the_command_explains_itself;

@@ -57,10 +57,12 @@ fn same(
     pulses: &[SpadEvent],
     cycle: u32,
 ) -> f64 {
-    let whole = GateSimulation::new(config, exposure, (0, 0), (1, 1), &[start], &[pulses]);
+    // The last column, to which CLK comes latest.
+    let at = (0, config.cols - 1);
+    let whole = GateSimulation::new(config, exposure, at, (1, 1), &[start], &[pulses]);
     let netlist = whole.netlist().clone();
     let from = exposure.stop(i64::from(cycle));
-    let late = late_cycle(config, exposure, (0, 0), start, pulses, cycle);
+    let late = late_cycle(config, exposure, at, start, pulses, cycle);
     let (whole, late) = (trace(whole, from), trace(late, from));
     for net in (0..netlist.net_count()).map(NetId::new) {
         let (a, b) = (whole.before[net.index()], late.before[net.index()]);
@@ -88,10 +90,17 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(cases(40)))]
 
     #[test]
-    fn of_any_sensor(seed: u64, cycles in 3u32..12, conventional: bool) {
+    fn of_any_sensor(
+        seed: u64,
+        cycles in 3u32..12,
+        conventional: bool,
+        cols in 1usize..6,
+        clk_skew_ps in 0f64..=200.0,
+    ) {
         let mut random = StdRng::seed_from_u64(seed);
         let mut config = Scenario::random(&mut random, 1, 1).config;
         config.bin_bits = config.bin_bits.min(4);
+        (config.cols, config.clk_skew_ps) = (cols, clk_skew_ps);
         if conventional {
             config.mode = Mode::Conventional;
         }

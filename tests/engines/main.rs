@@ -8,6 +8,7 @@ mod wide8x8;
 mod a_sensor_in_one_file;
 mod bins_lie_where_edges_say;
 mod chip_against_theory;
+mod clk_comes_late_in_any_silicon;
 mod cohort_agrees_with_window;
 mod cohort_draws_what_it_computes;
 mod cycle_agrees_with_gate;

@@ -108,7 +108,12 @@ fn compare(seed: u64, scenario: &Scenario, silicon: &Silicon) -> Tally {
     let timings: Vec<Timing> = (0..config.pixels()).map(timing).collect();
     let timings: Vec<&Timing> = timings.iter().collect();
     let pixels = PulsedPixel::array(starts, &pulses);
-    let gates = Gate::new(config, exposure).replay_with(&timings, &pixels);
+    let uniform = Silicon {
+        mismatch: None,
+        ..*silicon
+    };
+    let gates = Gate::new(Sensor::from(config).made_of(&uniform), exposure);
+    let gates = gates.replay_with(&timings, &pixels);
     let mut tally = Tally::default();
     for runner in [Runner::Window, Runner::Cycle] {
         let timed = Timed::new(Sensor::from(config).made_of(silicon), exposure, runner);

@@ -1,7 +1,9 @@
 //! Random sensors with random start values, exposures and SPAD pulses.
 
-use guided_dtof::chip::{AfterBorrow, EventType, Exposure, Mode, PCounter, SensorConfig, Tap};
-use guided_dtof::netlist::Corner;
+use guided_dtof::chip::{
+    AfterBorrow, EventType, Exposure, Mode, PCounter, SensorConfig, Silicon, Tap,
+};
+use guided_dtof::netlist::{Conditions, Corner, Mismatch};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
 use guided_dtof::units::Time;
 use rand::{RngExt, rngs::StdRng};
@@ -109,6 +111,28 @@ pub fn p_counters() -> Vec<(PCounter, Tap, AfterBorrow)> {
         }
     }
     all
+}
+
+/// What a chip of this corner is made of: any process, voltage and temperature, and mismatch now and then.
+#[allow(dead_code)]
+pub fn silicon(random: &mut StdRng, corner: Corner) -> Silicon {
+    let conditions = Conditions {
+        process: Corner::ALL[random.random_range(0..3)],
+        voltage_v: random.random_range(0.95..1.3),
+        temperature_c: random.random_range(-40.0..125.0),
+    };
+    let mismatch = Mismatch {
+        sigma: random.random_range(0.0..0.2),
+        seed: random.random(),
+    };
+    Silicon {
+        corner,
+        factor: match random.random_bool(0.3) {
+            true => 1.0,
+            false => conditions.delay_factor().expect("delays are known there"),
+        },
+        mismatch: random.random_bool(0.3).then_some(mismatch),
+    }
 }
 
 fn random_sensor(random: &mut StdRng, rows: usize, cols: usize) -> SensorConfig {

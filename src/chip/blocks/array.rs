@@ -42,6 +42,22 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     subarray(config, (0, 0), (config.rows, config.cols))
 }
 
+/// What brings CLK later to a column than to the first, and STOP and RUN alike.
+fn wire_to(config: &SensorConfig, col: usize) -> Option<OwnDelay> {
+    let typical_fs = config.clk_wire(col).as_fs() as u32;
+    (typical_fs > 0).then(|| OwnDelay::wire(typical_fs))
+}
+
+/// The wire that brings CLK to a column, by itself: CLK → CLK_C; none where it comes as to the first.
+pub(crate) fn clk_wire(config: &SensorConfig, col: usize) -> Option<Arc<Module>> {
+    let wire = wire_to(config, col)?;
+    let mut m = ModuleBuilder::new(NAME);
+    let clk = m.input("CLK");
+    let output = m.output("CLK_C");
+    m.cell_with_delay("clk_c", CellKind::Buf, &[clk], &[output], wire);
+    Some(finished(m.finish()))
+}
+
 /// A rectangle of the sensor, as a chip of its own: `size` (rows, cols) macropixels from `first`
 /// (row, col) on, with a load path of that size. Instances keep the names they have in the array.
 ///
@@ -92,27 +108,17 @@ pub fn subarray(
         [serial, load_clk, load_enable, resetb],
     );
 
-    // What comes to a column later than to the first.
-    let later = |m: &mut ModuleBuilder, name: &str, net: Net, col: usize| {
-        let skew = config.clk_skew(first.1 + col).as_fs() as u32;
-        if skew == 0 {
-            return net;
-        }
-        let output = m.wire(&format!("{name}_C{}", first.1 + col));
-        let name = format!("{}_c{}", name.to_lowercase(), first.1 + col);
-        m.cell_with_delay(
-            &name,
-            CellKind::Buf,
-            &[net],
-            &[output],
-            OwnDelay::wire(skew),
-        );
-        output
-    };
-    let columns: Vec<[Net; 3]> = (0..cols)
+    let columns: Vec<[Net; 3]> = (first.1..first.1 + cols)
         .map(|col| {
-            [("CLK", clk), ("STOP", stop), ("RUN", run)]
-                .map(|(name, net)| later(&mut m, name, net, col))
+            [("CLK", clk), ("STOP", stop), ("RUN", run)].map(|(name, net)| {
+                let Some(wire) = wire_to(config, col) else {
+                    return net;
+                };
+                let output = m.wire(&format!("{name}_C{col}"));
+                let name = format!("{}_c{col}", name.to_lowercase());
+                m.cell_with_delay(&name, CellKind::Buf, &[net], &[output], wire);
+                output
+            })
         })
         .collect();
     let read = readout::place(&mut m, order, [read_clk, read_enable, resetb], &data_out);

@@ -47,6 +47,7 @@ impl Elements {
                 seed: self.seed,
             }),
             model: DelayModel::Transport,
+            mismatches: true,
         }
     }
 }

@@ -20,8 +20,10 @@ pub use quantic4x4::quantic4x4;
 use super::config::{SensorConfig, Tdc};
 use super::sensor_file::SensorFault;
 use super::timing::ChipTiming;
+use super::timing::clk_skew::clk_skew;
 use super::timing::delay_lines::{DelayLines, Taps};
 use super::timing::silicon::Silicon;
+use crate::units::Time;
 
 /// A sensor that is possible, and what it is made of. Copies share their contents; the fields of its [`SensorConfig`] are
 /// read as its own.
@@ -34,6 +36,7 @@ struct Parts {
     silicon: Silicon,
     timing: OnceLock<ChipTiming>,
     delay_lines: OnceLock<Arc<DelayLines>>,
+    clk_skews: OnceLock<Box<[Time]>>,
     alike: OnceLock<Sensor>,
 }
 
@@ -101,6 +104,32 @@ impl Sensor {
         })
     }
 
+    /// Longer than the delay lines of any macropixel: twice the average, for mismatch and the slow corner. Nothing where there are
+    /// none.
+    pub fn longest_delay_line(&self) -> Time {
+        let typical = self.delay_element() * (2 * self.bins as i64);
+        match self.tdc {
+            Tdc::Clocked => Time::ZERO,
+            Tdc::DelayLine => Time::from_s(typical.as_s() * self.silicon().factor.max(1.0)),
+        }
+    }
+
+    /// By how much CLK, STOP and RUN come later to a column of macropixels than to column 0: what its wires take in this silicon.
+    pub fn clk_skew(&self, col: usize) -> Time {
+        let Parts {
+            config,
+            silicon,
+            clk_skews,
+            ..
+        } = &*self.0;
+        if config.clk_skew_ps == 0.0 {
+            return Time::ZERO;
+        }
+        let of_column = |col| clk_skew(config, silicon, col);
+        let known = clk_skews.get_or_init(|| (0..config.cols).map(of_column).collect());
+        known.get(col).copied().unwrap_or_else(|| of_column(col))
+    }
+
     /// Whether macropixels differ by description: each has delay lines of its own, or CLK comes later to some. One window law
     /// does not describe them all then ([`WindowLaw::of_macropixel`](crate::chip::WindowLaw::of_macropixel)).
     pub fn has_own_laws(&self) -> bool {
@@ -131,6 +160,7 @@ impl Sensor {
             silicon,
             timing: OnceLock::new(),
             delay_lines: OnceLock::new(),
+            clk_skews: OnceLock::new(),
             alike: OnceLock::new(),
         }))
     }
@@ -185,7 +215,7 @@ impl From<&Sensor> for Sensor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::Time;
+    use crate::netlist::{Corner, Mismatch};
 
     #[test]
     fn copies_share_their_delays_and_other_silicon_has_others() {
@@ -196,6 +226,33 @@ mod tests {
         let slow = sensor.made_of(&sensor.silicon().at(1.5));
         assert!(slow.timing().ripple() > sensor.timing().ripple());
         assert!(slow != sensor && copy == sensor);
+    }
+
+    /// Delays of the slow corner are 1.45 times the typical ones, of the fast one 0.72; conditions scale them, and wires do not differ.
+    #[test]
+    fn clk_comes_as_late_to_a_column_as_its_silicon_is_slow() {
+        for (corner, slower) in Corner::ALL.into_iter().zip([0.72, 1.0, 1.45]) {
+            let sensor = Sensor::from(SensorConfig {
+                corner,
+                ..(*hslidar_delay_line()).clone()
+            });
+            let mismatch = Mismatch {
+                sigma: 0.2,
+                seed: 1,
+            };
+            for factor in [1.0, 1.3] {
+                let sensor = sensor.made_of(&Silicon {
+                    factor,
+                    mismatch: Some(mismatch),
+                    ..*sensor.silicon()
+                });
+                for col in [0, 1, 39, 63, 64] {
+                    let wanted_fs = 45e3 * col as f64 * slower * factor;
+                    let found_fs = sensor.clk_skew(col).as_fs() as f64;
+                    assert!((found_fs - wanted_fs).abs() <= 2.0, "{col}: {found_fs}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -59,9 +59,14 @@ pub struct MacropixelCircuit {
 }
 
 impl MacropixelCircuit {
-    /// The macropixel at `position` (row, column) of a sensor: its cells' names, and so their mismatch, depend on that.
+    /// The macropixel at `position` (row, column) of a sensor: its cells' names, and so their mismatch, depend on that. Times are by
+    /// its own CLK and STOP, whenever they come to its column.
     pub fn new(config: &SensorConfig, position: (usize, usize)) -> Self {
-        let netlist = Netlist::elaborate(&array::subarray(config, position, (1, 1)));
+        let unskewed = SensorConfig {
+            clk_skew_ps: 0.0,
+            ..config.clone()
+        };
+        let netlist = Netlist::elaborate(&array::subarray(&unskewed, position, (1, 1)));
         let probes = Probes::of_macropixel(&netlist, position.0, position.1);
         MacropixelCircuit {
             toggles: probes.toggle_cells(&netlist),
@@ -184,6 +189,15 @@ impl<'c> MacropixelPaths<'c> {
     pub fn after_enable(&self) -> Arrivals<'c> {
         let cuts = [Probe::CounterReset, Probe::CounterClk];
         self.after(Probe::Enable, &Edge::BOTH, &cuts)
+    }
+
+    /// BLOCK rises → COUNTER_CLK falls, earliest.
+    fn block_to_counter_clk(&self) -> Option<Time> {
+        self.circuit.probes.find(Probe::Block)?;
+        let cuts = [Probe::CounterClk, Probe::Hit];
+        let blocked = self.after(Probe::Block, &[Edge::Rise], &cuts);
+        let counter_clk = self.circuit.probes.net(Probe::CounterClk);
+        Some(blocked.edge_window(counter_clk, Edge::Fall)?.0)
     }
 
     /// TOGGLE → PHOTONS, of all SPADs and either edge.
@@ -368,8 +382,10 @@ pub struct CounterDelays {
     pub strobe: Span,
     /// CLK falls → what freezes the window rises: STROBE, or SAMPLE_CLK before it.
     pub sample: Span,
-    /// CLK falls → LOCAL_STOP → BLOCK rises, latest; none where LOCAL_STOP does not block.
-    pub block: Option<Time>,
+    /// CLK falls → LOCAL_STOP → BLOCK rises; none where LOCAL_STOP does not block.
+    pub block: Option<Span>,
+    /// BLOCK rises → COUNTER_CLK falls, earliest.
+    pub block_to_counter_clk: Option<Time>,
     /// CLK falls → data of the flip-flops that COUNTER_CLK clocks settled, latest.
     pub settled: Time,
     /// COUNTER_RESET falls → the last flip-flop is released, latest.
@@ -426,7 +442,8 @@ impl CounterDelays {
             local_stop: edge(&fall, net(Probe::LocalStop), Edge::Rise),
             strobe: edge(&fall, net(Probe::Strobe), Edge::Rise),
             sample: edge(&fall, circuit.sampling(), Edge::Rise),
-            block: latest([fall.edge_window(net(Probe::Block), Edge::Rise)].into_iter()),
+            block: fall.edge_window(net(Probe::Block), Edge::Rise),
+            block_to_counter_clk: paths.block_to_counter_clk(),
             settled: settled(&fall).expect("a P-counter counts"),
             released: latest(controls.map(|&net| release.edge_window(net, Edge::Fall)))
                 .unwrap_or(Time::ZERO),

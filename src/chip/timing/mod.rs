@@ -10,11 +10,13 @@
 //! | file | what it has |
 //! |---|---|
 //! | [`silicon`] | the cell library, conditions and mismatch |
+//! | `clk_skew` | the wires of CLK to every column |
 //! | `delay_lines` | taps of the delay lines of every macropixel |
 //! | [`macropixel`] | which edges start a path, where it is cut, and what is read off |
 //!
 //! Reference models and the window law reckon with a sensor's [`ChipTiming`] instead of simulating cells.
 
+pub(crate) mod clk_skew;
 pub(crate) mod delay_lines;
 pub mod macropixel;
 pub mod silicon;

@@ -27,11 +27,13 @@ mod survey;
 mod tape;
 mod word;
 
+use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use super::error::one_law;
+use super::error::has_no_delay_lines;
+use super::own_clk::by_own_clk;
 use super::{
     Engine, EngineError, Expose, Exposed, Gate, Histograms, LitPixel, PulsedPixel, Replay, follows,
     full_stream,
@@ -279,9 +281,13 @@ impl Engine for Cycle {
 impl Replay for Cycle {
     fn replay(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError> {
         follows(&self.sensor, &self.law.timing().pulses)?;
-        one_law(&self.sensor)?;
+        has_no_delay_lines(&self.sensor)?;
         let starts: Vec<u16> = pixels.iter().map(|pixel| pixel.start).collect();
-        let pulses: Vec<&[SpadEvent]> = pixels.iter().map(|pixel| pixel.pulses).collect();
+        let seen = pixels
+            .iter()
+            .map(|pixel| by_own_clk(&self.sensor, pixel.number, pixel.pulses));
+        let seen: Vec<Cow<'_, [SpadEvent]>> = seen.collect();
+        let pulses: Vec<&[SpadEvent]> = seen.iter().map(|pulses| &**pulses).collect();
         for &start in &starts {
             if let Window::Race(why) = self.law.window(start) {
                 return Err(EngineError::Race(why));

@@ -20,6 +20,9 @@ pub enum Doubt {
     /// A front end that joins SPADs.
     #[error("SPADs that share a wire are left to the gates")]
     SharedWire,
+    /// Delay lines, where cells differ.
+    #[error("delay lines among cells that differ are left to the gates")]
+    DelayLines,
     /// Latencies of a SPAD's two edges.
     #[error("a SPAD's flip-flop rises and falls at different speeds")]
     UnevenLatency,

@@ -22,14 +22,15 @@ use rayon::prelude::*;
 
 pub use self::doubt::Doubt;
 use self::orders::{Delays, Orders, Part, Setting};
-use super::error::one_law;
+use super::error::{follows, has_no_delay_lines};
+use super::own_clk::by_own_clk;
 use super::{
     Cycle, Engine, EngineError, Expose, Exposed, Gate, Histograms, LaneSimulation, LitPixel,
     PulsedPixel, Replay, Window, full_stream,
 };
 use crate::bench::StimulusPlan;
 use crate::chip::timing::macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays};
-use crate::chip::{Exposure, Mode, PCounter, Sensor, Silicon, WindowLaw, array};
+use crate::chip::{Exposure, Mode, PCounter, Sensor, Silicon, Tdc, WindowLaw, array};
 use crate::kernel::LANES;
 use crate::netlist::Timing;
 use crate::photon::{PhotonStream, SpadEvent};
@@ -60,6 +61,8 @@ pub struct ClosedFormCoverage {
 pub struct Timed {
     setting: Setting,
     silicon: Silicon,
+    /// The sensor without differences between cells: the wires of CLK, and delay lines where other cells do not differ.
+    uniform: Sensor,
     runner: Runner,
     circuit: MacropixelCircuit,
     /// Without mismatch all macropixels are alike.
@@ -96,6 +99,10 @@ impl Timed {
                 sensor: sensor.clone(),
             },
             silicon,
+            uniform: made.made_of(&Silicon {
+                mismatch: None,
+                ..silicon
+            }),
             runner,
             alike: None,
             common: WindowLaw::new(&sensor, exposure),
@@ -103,7 +110,7 @@ impl Timed {
             arrives: Mutex::default(),
             coverage: Mutex::default(),
         };
-        if silicon.mismatch.is_none() && !made.has_own_laws() {
+        if silicon.mismatch.is_none() && made.tdc == Tdc::Clocked {
             let timing = silicon.timing(&engine.circuit.netlist);
             let orders = engine.orders(&timing);
             engine.alike = Some((timing, orders));
@@ -123,6 +130,10 @@ impl Timed {
 
     /// Counts in closed form where a macropixel's delays decide every order of events.
     fn judge(&self, pixel: &PulsedPixel<'_>) -> Result<Judged, EngineError> {
+        if self.uniform.tdc == Tdc::DelayLine {
+            return self.judge_lines(pixel);
+        }
+        let pulses = &*by_own_clk(&self.uniform, pixel.number, pixel.pulses);
         let timing = self.timing(pixel.number);
         let orders = self.orders_of(&timing);
         let parts = match orders.parts(&self.setting, pixel.start) {
@@ -133,11 +144,25 @@ impl Timed {
         let is_common = |part: &Part| part.first_edge == window.map(|w| w.first_edge);
         let is_levelled = self.runner == Runner::Cycle && self.cycle.unlevelled().is_none();
         if is_levelled && window.is_some() && parts.iter().all(is_common) {
-            let pulses = orders.shifted(&self.common, pixel.pulses);
+            let pulses = orders.shifted(&self.common, pulses);
             return Ok(Judged::ForCycle(pulses));
         }
-        let counts = self.by_laws(&orders, parts, pixel.start, pixel.pulses)?;
+        let counts = self.by_laws(&orders, parts, pixel.start, pulses)?;
         Ok(Judged::Counted(counts))
+    }
+
+    /// The same where delay lines time photons, whose law is that of their silicon.
+    fn judge_lines(&self, pixel: &PulsedPixel<'_>) -> Result<Judged, EngineError> {
+        if self.silicon.mismatch.is_some() {
+            return Ok(Judged::InDoubt(Doubt::DelayLines));
+        }
+        let window = Window::new(&self.uniform, &self.setting.exposure);
+        match window.replay(std::slice::from_ref(pixel)) {
+            Ok(counts) => Ok(Judged::Counted(counts.into_counts())),
+            Err(EngineError::Race(race)) => Ok(Judged::InDoubt(Doubt::Race(race.what))),
+            Err(EngineError::Irregular(why)) => Ok(Judged::InDoubt(Doubt::Irregular(why))),
+            Err(other) => Err(other),
+        }
     }
 
     /// Counts of one macropixel whose bins follow these laws.
@@ -172,7 +197,9 @@ impl Timed {
             .collect();
         for places in places.chunks(self.cycle.batch()) {
             let shifted = places.iter().map(|&place| match &judged[place] {
+                // By the CLK of the first column.
                 Judged::ForCycle(pulses) => PulsedPixel {
+                    number: 0,
                     pulses,
                     ..pixels[place]
                 },
@@ -189,7 +216,7 @@ impl Timed {
 
     /// Macropixels at gate level, each with its own delays.
     fn by_gates(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError> {
-        let gate = Gate::new(&self.setting.sensor, &self.setting.exposure);
+        let gate = Gate::new(&self.uniform, &self.setting.exposure);
         // Those that are alike share an event queue.
         let together = if self.alike.is_some() { LANES } else { 1 };
         let batches: Result<Vec<Histograms>, EngineError> = pixels
@@ -309,7 +336,10 @@ impl Replay for Timed {
         if self.runner == Runner::Gate {
             return self.by_gates(pixels);
         }
-        one_law(&self.setting.sensor)?;
+        if self.runner == Runner::Cycle {
+            has_no_delay_lines(&self.uniform)?;
+        }
+        follows(&self.uniform, &self.uniform.timing().pulses)?;
         let arrive = self.arrive(pixels.iter().map(|pixel| pixel.start));
         let judge = |pixel: &PulsedPixel<'_>| match arrive[&pixel.start] {
             true => self.judge(pixel),
@@ -345,11 +375,12 @@ impl Replay for Timed {
     }
 
     fn as_the_law_sees<'p>(&self, number: u32, pulses: &'p [SpadEvent]) -> Cow<'p, [SpadEvent]> {
-        if self.setting.sensor.has_own_laws() {
-            return Cow::Borrowed(pulses);
+        let pulses = by_own_clk(&self.uniform, number, pulses);
+        if self.uniform.tdc == Tdc::DelayLine {
+            return pulses;
         }
         let timing = self.timing(number);
-        Cow::Owned(self.orders_of(&timing).shifted(&self.common, pulses))
+        Cow::Owned(self.orders_of(&timing).shifted(&self.common, &pulses))
     }
 }
 

@@ -310,7 +310,7 @@ fn counter_orders(
     // From a count to its strobe, at the least.
     let to_strobe = counter.strobe.0 - counter.counter_clk.1;
     let reset_width = release.0 - reset.1;
-    let blocks_late = counter.block.is_some_and(|block| block >= period);
+    let blocks_late = counter.block.is_some_and(|block| block.1 >= period);
     [
         (config.p_counter != PCounter::Memoryless, Doubt::Memoryless),
         (

@@ -20,6 +20,7 @@ mod tables;
 use std::borrow::Cow;
 
 use super::exposing::refuse_other_spads;
+use super::own_clk::by_own_clk;
 use super::{
     Cancelling, Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay,
     Work, follows, has_a_line_a_spad,
@@ -248,6 +249,13 @@ impl Replay for Window {
             histograms.push(&self.counts(&hits));
         }
         Ok(histograms)
+    }
+
+    fn as_the_law_sees<'p>(&self, number: u32, pulses: &'p [SpadEvent]) -> Cow<'p, [SpadEvent]> {
+        match self.is_of_macropixel {
+            true => Cow::Borrowed(pulses),
+            false => by_own_clk(&self.sensor, number, pulses),
+        }
     }
 }
 

@@ -38,6 +38,7 @@
 mod annotate;
 mod entries;
 mod limits;
+mod oddities;
 mod parser;
 #[cfg(test)]
 mod tests;
@@ -47,6 +48,7 @@ mod writer;
 
 pub use annotate::{Annotation, annotate};
 pub(super) use limits::checks_of;
+pub use oddities::{Oddity, oddities};
 pub use writer::{SdfDivider, SdfOptions, SdfTimescale, write_sdf};
 
 use std::borrow::Cow;

@@ -21,7 +21,8 @@ use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
 /// Toggle of one SPAD: every pulse is an edge. Ports: SPAD_RAW, PIXEL_CLEAR → TOGGLE.
 pub(in crate::chip::blocks) fn toggle() -> Arc<Module> {
-    let mut m = ModuleBuilder::new("toggle");
+    // Icarus takes a path through an instance of the module's own name for the module itself.
+    let mut m = ModuleBuilder::new("spad_toggle");
     let raw = m.input("SPAD_RAW");
     let clear = m.input("PIXEL_CLEAR");
     let toggle = m.output("TOGGLE");
