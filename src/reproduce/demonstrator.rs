@@ -102,7 +102,7 @@ pub(super) fn error_rows() -> Vec<Row> {
     );
     vec![
         Row::holds("greatest RMS error to 50 m at 72 klux", "m", AtMost("0.15"), greatest_m).remark(counts),
-        Row::holds("σ at 50 m, share of the distance", "%", Says("around 0.1 %", 0.05, 0.15), percent(farthest))
+        Row::holds("σ at 50 m, share of the distance", "%", Says("around 0.1%", 0.05, 0.15), percent(farthest))
             .differs("The published figure's reflectivity is not known: from 10 %, that of the target by which the light was measured, σ is larger.")
             .remark(format!("{} samples; their σ is known to 8 %.", farthest.depths)),
         Row::ours(
@@ -214,12 +214,13 @@ pub(super) fn fog_rows() -> Vec<Row> {
         )
         .differs("The guide's depths at the rim of a narrow target are those of what is behind it.")
         .remark("18 m ahead. Neither his way nor his speed is published."),
-        Row::ours(
+        Row::holds(
             "the same of one who crosses at 1 m/s",
             "",
+            Says("moving pedestrian", 0.5, 1.0),
             in_window(crossing),
         )
-        .remark("The guide is 0.245 s old by the middle of the exposure: he is three macropixels on."),
+        .differs("The guide is 0.245 s old by the middle of the exposure: he is three macropixels on."),
     ]);
     rows
 }
@@ -285,7 +286,7 @@ pub(super) fn motion_rows() -> Vec<Row> {
         Row::holds(
             "share of a car's macropixels with it in their window, 65 mph at 3 fps",
             "",
-            Says("exceeding the depth window", 0.0, 0.1),
+            Says("exceeding the 3 m depth window size", 0.0, 0.1),
             share_in_window(&fast),
         )
         .remark("Four frames; 7.1 m from the images to the middle of the exposure."),

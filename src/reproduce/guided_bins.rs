@@ -9,7 +9,7 @@
 
 use super::stereo::wall_at;
 use crate::chip::{Exposure, SensorConfig, WindowLaw};
-use crate::guide::{BehaviouralStereo, Guide, GuideInput};
+use crate::guide::{BehaviouralStereo, Guide, GuideInput, MatchedStereo};
 use crate::scene::GroundTruth;
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
 
@@ -25,13 +25,13 @@ const WITHIN: f64 = 0.997_300_2;
 /// Bins are tried in steps of 1 %.
 const FINER: f64 = 1.01;
 
-/// Estimates and true ranges before walls about `depth_m`, m.
-fn estimates_m(depth_m: f64) -> Vec<(f64, f64)> {
+/// Estimates of `guide` and true ranges before walls about `depth_m`, m.
+fn estimates_m(guide: &dyn Guide, depth_m: f64) -> Vec<(f64, f64)> {
     let of_wall = |number: u32| {
         let off_m = APART_M * (f64::from(number) - 0.5 * f64::from(MAPS - 1));
         let scene = wall_at(depth_m + off_m);
         let truth = GroundTruth::render(&scene, 64, 64);
-        let map = BehaviouralStereo.estimate(&GuideInput::still(&scene, 64, 64, number.into()));
+        let map = guide.estimate(&GuideInput::still(&scene, 64, 64, number.into()));
         let map = map.expect("a camera pair always has a map");
         let pairs = map.range_m.into_iter().zip(truth.range_m);
         let pairs = pairs.filter_map(|(guide_m, true_m)| Some((guide_m?, true_m?)));
@@ -42,7 +42,7 @@ fn estimates_m(depth_m: f64) -> Vec<(f64, f64)> {
 
 /// The smallest window that is centred on every estimate and holds the truth for all but 0.27 % of them, m.
 pub(super) fn least_window_m(depth_m: f64) -> f64 {
-    let mut off_m: Vec<f64> = estimates_m(depth_m)
+    let mut off_m: Vec<f64> = estimates_m(&BehaviouralStereo, depth_m)
         .iter()
         .map(|(guide_m, true_m)| (guide_m - true_m).abs())
         .collect();
@@ -51,10 +51,17 @@ pub(super) fn least_window_m(depth_m: f64) -> f64 {
     2.0 * off_m[last]
 }
 
+/// The share of estimates by the camera pair that matches images which are off by no more than half of `window_m`.
+pub(super) fn matched_within(depth_m: f64, window_m: f64) -> f64 {
+    let estimates = estimates_m(&MatchedStereo::default(), depth_m);
+    let within = |(guide_m, true_m): &&(f64, f64)| (guide_m - true_m).abs() <= 0.5 * window_m;
+    estimates.iter().filter(within).count() as f64 / estimates.len() as f64
+}
+
 /// The smallest bin with the windows that `sensor` opens, whose bins are CLK periods: the first bin, from `from_m` on, with which its
 /// start values hold as many. CLK periods at which no window can be aimed are passed over.
 pub(super) fn least_bin_of_sensor_m(depth_m: f64, sensor: &SensorConfig, from_m: f64) -> f64 {
-    let estimates = estimates_m(depth_m);
+    let estimates = estimates_m(&BehaviouralStereo, depth_m);
     let farthest_m = estimates
         .iter()
         .fold(0.0f64, |far, e| far.max(e.0).max(e.1));

@@ -29,7 +29,7 @@ mod slips;
 mod stereo;
 mod system;
 
-pub use claim::{Claim, Published, Row, Verdict, overall};
+pub use claim::{Claim, Published, Row, Verdict, between_quotes, overall};
 pub(crate) use page::heading;
 pub use page::{SLIPS_TITLE, grid, html, markdown, slips as slips_grid, tally};
 pub use registry::{CLAIMS, FIGURES, Figure, MEASUREMENTS, Measurement, TABLES, Table};
@@ -355,6 +355,7 @@ impl Report {
                 "least": range.map(|r| r.0),
                 "greatest": range.map(|r| r.1),
                 "computed": row.computed,
+                "interval": row.interval,
                 "difference": row.difference().map(|d| d.0),
                 "verdict": row.verdict(),
                 "aside": row.is_aside,

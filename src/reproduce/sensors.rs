@@ -251,7 +251,7 @@ pub(super) fn rows() -> Vec<Row> {
         Row::holds(
             "bins that Park's 4 steps of 4 and Kim's 8 of 2 stand for",
             "",
-            Says("equivalent", 1.0, 1.0),
+            Says("effectively covers 4 histogram bins at each zoom step", 1.0, 1.0),
             4.0 * inverse(4, 4) / (2.0 * inverse(2, 8)),
         )
         .remark("Their ratio: halving the steps by doubling the bins changes nothing."),

@@ -261,6 +261,7 @@ impl PixelStream<'_> {
                 .generate(key, self.pixel, numbered(self.kind.background()));
         }
         draw.counts = numbers;
+        draw.count_exposure(group.cycles_in(self.stream.config().laser_cycles));
         if self
             .limits
             .as_ref()
