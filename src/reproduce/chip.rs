@@ -1,6 +1,7 @@
 //! Claims 2 to 6: what the thesis says of the chip, measured on its netlist.
 
-use super::claim::{Published::*, Row};
+use super::claim::Row;
+use super::published::Published::*;
 use crate::analysis::{MacropixelTiming, gate_works, phases, ripple, shortest_period};
 use crate::chip::readout::{self as readout_blocks, ReadoutOrder};
 use crate::chip::{

@@ -1,6 +1,7 @@
 //! Claims 1, 12, 13, 16 and 28: design tables, memory and silicon, and the published sensors.
 
-use super::claim::{Published::*, Row};
+use super::claim::Row;
+use super::published::Published::*;
 use crate::report::Grid;
 use crate::theory::capacity::{SRAM_CELLS, Storage, bits_for, full_bins};
 use crate::theory::design::Design;

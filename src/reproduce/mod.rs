@@ -22,6 +22,7 @@ mod page;
 mod penalty;
 mod photon_budget;
 mod precision;
+mod published;
 mod registry;
 mod sensors;
 mod silicon;
@@ -29,9 +30,10 @@ mod slips;
 mod stereo;
 mod system;
 
-pub use claim::{Claim, Published, Row, Verdict, between_quotes, overall};
+pub use claim::{Claim, Row, Verdict, between_quotes, overall};
 pub(crate) use page::heading;
 pub use page::{SLIPS_TITLE, grid, html, markdown, slips as slips_grid, tally};
+pub use published::Published;
 pub use registry::{CLAIMS, FIGURES, Figure, MEASUREMENTS, Measurement, TABLES, Table};
 
 pub use slips::{SLIPS, Slip};

@@ -1,10 +1,11 @@
 //! Claims 11, 14 and 15: laser cycles, and what zooming and sliding add to them.
 
-use super::claim::{Published::*, Row};
+use super::claim::Row;
 use super::design::{ROUNDED_LIGHT_M_PER_S, TABLE_6_BACKGROUND_HZ, TABLE_6_BIN_M, TABLE_6_BIN_S};
 use super::measured::partial::{
     AtRange, demonstrator_on_chip, demonstrator_on_delay_lines, long_range_on_chip, with_interval,
 };
+use super::published::Published::*;
 use crate::theory::detection::{Model, Ties};
 use crate::theory::partial::{Cost, Goal, Link, Models, System};
 use crate::theory::precision;
@@ -176,7 +177,7 @@ pub(super) fn long_range_rows() -> Vec<Row> {
 }
 
 /// The measured penalty of zooming.
-fn zooming_row(what: &str, at: &AtRange, published: super::claim::Published) -> Row {
+fn zooming_row(what: &str, at: &AtRange, published: super::published::Published) -> Row {
     let penalty = at.penalty_of_zooming();
     let text = penalty.map_or("never".to_owned(), |p| with_interval(&p, 2));
     let row = match penalty {

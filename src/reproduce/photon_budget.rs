@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::claim::{Published::*, Row};
+use super::claim::Row;
+use super::published::Published::*;
 use crate::photon::solar::{FULL_SUN_KLUX, band_irradiance};
 use crate::photon::{
     Convention, Filter, FilterShape, LaserDrift, PhotonBudget, Poisson, Purpose, random_stream,

@@ -1,6 +1,7 @@
 //! Claim 10: Thompson against the Cramér-Rao bound.
 
-use super::claim::{Published::*, Row};
+use super::claim::Row;
+use super::published::Published::*;
 use crate::report::{Axis, Chart, Style};
 use crate::theory::precision::{cramer_rao, thompson, thompson_best_ratio};
 
