@@ -194,7 +194,8 @@ proptest! {
         let all = full_stream(&engine, &stream, &pixels).unwrap();
         let seen = engine.expose(&stream, &pixels).unwrap();
         prop_assert_eq!(all.histograms, seen.histograms);
-        prop_assert!(seen.work.photons_drawn <= all.work.photons_drawn);
+        // Photons in the dead time before a window may be drawn for the window before as well.
+        prop_assert!(seen.work.photons_drawn <= 2 * all.work.photons_drawn);
     }
 }
 

@@ -238,9 +238,6 @@ pub fn agreed(case: &Case) -> Option<Vec<u16>> {
     assert_eq!(seen.histograms, cycle.histograms);
     assert_eq!(seen.work.cancelled, all.work.cancelled);
     assert_eq!(seen.work.cancelled, cycle.work.cancelled);
-    // A part of them, each once, whatever is looked at twice.
-    let (some, every) = (seen.work.photons_drawn, all.work.photons_drawn);
-    assert!(some <= every, "{some} drawn of {every} photons");
     Some(seen.histograms[0].to_vec())
 }
 
