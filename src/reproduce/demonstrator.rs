@@ -165,13 +165,14 @@ pub(super) fn sigma_rows(bound_m: f64) -> Vec<Row> {
     let over = |what: &str, sigma_m: f64| Row::ours(what, "", sigma_m / bound_m);
     vec![
         over("σ at 50 m over its bound", ways[0])
-            .remark(format!("Of {SWEEPS} sweeps. What it comes from is taken away below; hardly any photon is lost there to dead time or cancels.")),
-        over("the same, elements of the delay lines alike", ways[1])
-            .remark("Unequal bins hold unequal daylight."),
+            .remark(format!("Of {SWEEPS} sweeps. What it comes from is taken away below; hardly any photon is lost to dead time or cancels there.")),
+        over("the same, elements of the delay lines alike", ways[1]).remark(format!(
+            "Unequal bins hold unequal daylight. In the dark unequal elements leave {:.3} m where alike ones leave {:.3} m, windows centred on the figure.",
+            dark, dark_alike
+        )),
         over("the same, windows centred on the figure", ways[2])
-            .remark("A guide without errors, to a step of the windows: others cut off a part of the echo, and more of the daylight weighs on one side."),
-        over("the same, both", ways[3])
-            .remark(format!("What is left is the ranging's own. In the dark σ is then {:.3} m, and {:.3} m with unequal elements: it is daylight by which those err.", dark_alike, dark)),
+            .remark("To a step of the windows, by a guide without errors: other windows cut off a part of the echo."),
+        over("the same, both", ways[3]).remark("What is left is the ranging's own."),
     ]
 }
 

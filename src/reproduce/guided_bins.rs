@@ -134,8 +134,8 @@ pub(super) fn bin_rows() -> Vec<Row> {
             AtLeast("99.7"),
             100.0 * on_street,
         )
-        .differs("At edges, and where a macropixel sees several distances, the matcher's errors are not the normal ones of Eq. 25.")
-        .remark("Images of the built-in street, matched as the demonstrator does; windows are centred on the estimates of 64×64 macropixels. Eq. 25 with ⅓ px at the true range."),
+        .differs("At edges, and where a macropixel sees several distances, as on the road, the matcher's errors are not the normal ones of Eq. 25.")
+        .remark("Images of the built-in street, matched as the demonstrator does; windows are centred on the estimates of 64×64 macropixels, and hold the range of their middle or not. Eq. 25 with ⅓ px at the true range."),
         Row::holds("the same, walls about 100 m", "%", AtLeast("99.7"), 100.0 * on_walls)
             .differs("The matcher's errors are not the normal ones of Eq. 25.")
             .remark("32 768 macropixels."),

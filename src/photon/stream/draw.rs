@@ -56,7 +56,7 @@ pub struct Draw {
     pub(super) within_fs: Range<i64>,
     pub(super) group: Group,
     photons: usize,
-    /// Photons of the exposure, kept or not.
+    /// Photons of the exposure.
     of_exposure: usize,
     /// Photons that were left when some were thinned out.
     kept: Vec<(Place, i64)>,
@@ -99,7 +99,7 @@ impl Draw {
             .push_run(slot, photons.div_ceil(PER_BLOCK as u32));
     }
 
-    /// How many photons of the exposure were drawn, kept or not.
+    /// How many photons of the exposure there are.
     pub fn len(&self) -> usize {
         self.of_exposure
     }
@@ -112,7 +112,7 @@ impl Draw {
     /// Counts the photons of the first `cycles` laser cycles: the exposure may end within the group, and others are none of its photons.
     pub(super) fn count_exposure(&mut self, cycles: u32) {
         if cycles >= self.group.cycles() {
-            self.of_exposure = self.photons + self.echo_photons;
+            self.of_exposure = self.photons + self.echo_photons + self.kept.len();
             return;
         }
         let is_in = |word: &&u32| self.group.split(self.group.place(**word)).0 < cycles;
@@ -122,7 +122,9 @@ impl Draw {
         });
         let halves = self.echo().into_iter().zip(self.echo_photons());
         let echo = halves.map(|([_, high], photons)| high[..photons].iter().filter(is_in).count());
-        self.of_exposure = background.chain(echo).sum();
+        let kept = self.kept.iter();
+        let kept = kept.filter(|&&(place, _)| self.group.split(place).0 < cycles);
+        self.of_exposure = background.chain(echo).sum::<usize>() + kept.count();
     }
 
     /// The group.
@@ -282,7 +284,7 @@ impl Draw {
             }
         }
         self.runs.clear();
-        self.echo_photons = 0;
+        (self.photons, self.echo_photons) = (0, 0);
         self.kept = kept;
     }
 }

@@ -261,7 +261,6 @@ impl PixelStream<'_> {
                 .generate(key, self.pixel, numbered(self.kind.background()));
         }
         draw.counts = numbers;
-        draw.count_exposure(group.cycles_in(self.stream.config().laser_cycles));
         if self
             .limits
             .as_ref()
@@ -269,6 +268,7 @@ impl PixelStream<'_> {
         {
             draw.thin(self);
         }
+        draw.count_exposure(group.cycles_in(self.stream.config().laser_cycles));
     }
 
     /// The slots of the stream.
