@@ -129,7 +129,7 @@ fn afterpulses_and_crosstalk() {
 /// In little light, with windows longer than traps hold, nearly all is left out that can be; without afterpulses nothing is.
 #[test]
 fn the_variance_that_afterpulses_add_is_left_out_as_told() {
-    const MACROPIXELS: u32 = 6000;
+    const MACROPIXELS: u32 = 2500;
     for probability in [0.0, 0.2] {
         let sensor = SensorConfig {
             bins: 64,
