@@ -210,7 +210,7 @@ pub struct SensorConfig {
     pub clk_hz: f64,
     /// Rise of STOP after the falling edge of CLK, ps; at most half a CLK period either way.
     pub stop_phase_ps: f64,
-    /// Deserialiser clock, Hz (thesis 4.7: "a few hundred megahertz").
+    /// Deserialiser clock, Hz (thesis 4.7: “a few hundred megahertz”).
     pub load_clk_hz: f64,
     /// Whether the sensor must be reset, and stand still, before windows are written (thesis 4.9.5, Table 11).
     pub reset_to_load: bool,

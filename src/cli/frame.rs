@@ -15,16 +15,16 @@ use super::{SceneArgs, quality};
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::WindowLaw;
 use crate::chip::{Mode, SensorConfig, Silicon};
-use crate::engine::Work;
 use crate::engine::waveform::WaveCycles;
+use crate::engine::{Work, variance_left_out};
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::guide::GuideMap;
 use crate::page::Page;
 use crate::report::{Table, write_npy_u16};
 use crate::request::FrameRequest;
 use crate::system::{
-    DistanceLaw, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Probe, Summary, WindowPolicy,
-    take_frame_by,
+    DistanceLaw, EngineKind, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Probe, Summary,
+    WindowPolicy, take_frame_by,
 };
 use crate::units::Time;
 use crate::waves::WaveFormat;
@@ -249,6 +249,8 @@ struct Report<'a> {
     work: Work,
     timing: &'a VerdictReport,
     tolerance: Option<&'a Kept>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    variance_left_out: Option<f64>,
     distance: DistanceLaw,
     load_bits: usize,
     load_time_s: f64,
@@ -290,6 +292,7 @@ impl<'a> Report<'a> {
             work: frame.work,
             timing,
             tolerance: frame.kept.as_ref(),
+            variance_left_out: variance_left_out_of(settings, frame),
             distance: DistanceLaw::new(
                 // One law for all macropixels.
                 &WindowLaw::new(settings.sensor.alike(), &settings.exposure),
@@ -309,6 +312,16 @@ impl<'a> Report<'a> {
             macropixels: &frame.pixels,
         }
     }
+}
+
+/// The share of the variance of counts that may be missing, where cohorts made them of SPADs with afterpulses.
+fn variance_left_out_of(settings: &FrameSettings, frame: &Frame) -> Option<f64> {
+    let is_by_cohort = match &frame.kept {
+        Some(kept) => kept.on_cohort > 0,
+        None => settings.engine == EngineKind::Cohort,
+    };
+    let probability = settings.sensor.afterpulse_probability;
+    (is_by_cohort && probability > 0.0).then(|| variance_left_out(probability))
 }
 
 fn write_results(out: &Path, frame: &Frame, report: &Report<'_>) -> anyhow::Result<()> {
@@ -353,10 +366,9 @@ fn table(
         "photons on the array",
         format!("{:.0}", frame.photons_expected),
     );
-    table.push(
-        "simulated: photons",
-        percent(work.photons_drawn as f64, frame.photons_expected),
-    );
+    // What two windows look back on is drawn twice, and there may be a few photons more than are expected.
+    let drawn = (work.photons_drawn as f64).min(frame.photons_expected);
+    table.push("simulated: photons", percent(drawn, frame.photons_expected));
     table.push(
         "simulated: CLK periods",
         percent(work.clk_periods_visited as f64, work.clk_periods as f64),
@@ -384,6 +396,15 @@ fn table(
                 percent(kept.refused_run_time_share, 1.0),
             );
         }
+    }
+    if let Some(share) = variance_left_out_of(settings, frame) {
+        table.push(
+            "variance of counts, left out by cohort",
+            format!(
+                "up to {}: no afterpulse follows its pulse there",
+                percent(share, 1.0)
+            ),
+        );
     }
     let lost = work.lost_to_dead_time as f64;
     table.push(

@@ -37,7 +37,7 @@ pub(crate) fn van_at(
 
 /// Distances of the van when its frames begin, m.
 const VAN_LEGS_M: [f64; 5] = [22.0, 35.0, 50.0, 62.0, 72.0];
-/// Its speed, which is not published, m/s: chosen, slow enough to "gradually distance itself".
+/// Its speed, which is not published, m/s: chosen, such that it “gradually distances itself”.
 pub(crate) const VAN_M_S: f64 = 2.0;
 
 /// The same with a guide that predicts from earlier frames beside the stereo pair.

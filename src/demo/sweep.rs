@@ -5,7 +5,7 @@ use super::found::mean;
 use super::scenes::figure_at;
 use crate::report::{Axis, Chart, Style};
 use crate::scene::GroundTruth;
-use crate::system::{Drive, FrameError, PixelDepth};
+use crate::system::{Drive, FrameError, FrameSettings, PixelDepth};
 
 /// Illuminance, klux.
 pub(crate) const KLUX: f64 = 72.0;
@@ -68,6 +68,21 @@ pub(crate) fn point(
     seed: u64,
     done: impl Fn(),
 ) -> Result<SweepPoint, FrameError> {
+    point_with(demonstrator, distance_m, reflectivity, seed, |_| (), done)
+}
+
+/// As [`point`], with frames that `change` has made different.
+///
+/// # Errors
+/// What a drive reports.
+pub(crate) fn point_with(
+    demonstrator: &Demonstrator,
+    distance_m: f64,
+    reflectivity: f64,
+    seed: u64,
+    change: impl FnOnce(&mut FrameSettings),
+    done: impl Fn(),
+) -> Result<SweepPoint, FrameError> {
     let scene = figure_at(distance_m, reflectivity, KLUX);
     let camera = scene.stereo.camera();
     let focal_baseline_px_m = camera.focal_px * scene.stereo.baseline_m;
@@ -76,6 +91,7 @@ pub(crate) fn point(
     let truth = GroundTruth::render(&settings.frame.scene, rows as u32, cols as u32);
     let square = square_on(&truth);
     settings.only = Some(square.clone());
+    change(&mut settings.frame);
     let mut drive = Drive::new(&settings)?;
     let mut pixels: Vec<PixelDepth> = Vec::new();
     for _ in 0..FRAMES {

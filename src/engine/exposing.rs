@@ -56,7 +56,7 @@ pub struct Work {
     pub skipped_dark: u64,
     /// Those not simulated because their window never opens.
     pub skipped_closed: u64,
-    /// Photons and dark counts drawn.
+    /// Photons and dark counts of the exposure that were drawn; those that several windows look back on, for each of them.
     pub photons_drawn: u64,
     /// SPAD pulses that the engine looked at.
     pub pulses: u64,

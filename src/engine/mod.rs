@@ -30,7 +30,7 @@ pub mod waveform;
 mod window;
 
 pub use cancelling::{Cancelling, cancelled};
-pub use cohort::{Cohort, CohortOptions};
+pub use cohort::{Cohort, CohortOptions, variance_left_out};
 pub use cycle::{Cycle, PackedPulses, Unlevelled};
 pub use error::{EngineError, NotModelled};
 pub use exposing::{

@@ -1,4 +1,4 @@
-//! Fusion of several guides by their variances (thesis 7.4.1: "how to effectively combine different sources").
+//! Fusion of several guides by their variances (thesis 7.4.1: “how to effectively combine different sources”).
 //!
 //! ```text
 //!   agree(i, j):  |rᵢ − rⱼ| ≤ 3·√(σᵢ² + σⱼ²)

@@ -2,7 +2,7 @@
 //!
 //! Such a network puts out disparity up to scale and offset, which one point of known distance fixes. So errors are those of a
 //! disparity: of inverse depth, the same at all distances, which makes errors of depth grow with its square as they do with a camera pair.
-//! Table 13 gives words only (density high, accuracy low); 5.3.2 has the number, an RMS error "more than ten times greater" than
+//! Table 13 gives words only (density high, accuracy low); 5.3.2 has the number, an RMS error “more than ten times greater” than
 //! the camera pair's at short distances.
 //!
 //! ```text
@@ -11,7 +11,7 @@
 //!
 //! The network smooths, so most of the error is common to a patch, and some to the frame (a wrong scale). How much, the thesis does not
 //! say: the shares are chosen. Inverse depths at or beyond `farthest_m`, negative ones included, come out as `farthest_m`: the target that
-//! "disappears" into the background (Fig. 75).
+//! “disappears from the depth image” (Fig. 75).
 
 use super::{Guide, GuideError, GuideInput, GuideMap};
 use crate::guide::StereoRig;

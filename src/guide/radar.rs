@@ -1,4 +1,4 @@
-//! Radar as a guide (thesis 7.4.1): good range, coarse angle. "It could point a guided dToF system to a broad area of interest".
+//! Radar as a guide (thesis 7.4.1): good range, coarse angle: “it could point a guided dToF system to a broad area of interest”.
 //!
 //! ```text
 //!        beam (azimuth × elevation)                          power

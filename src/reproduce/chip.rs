@@ -1,6 +1,7 @@
 //! Claims 2 to 6: what the thesis says of the chip, measured on its netlist.
 
-use super::claim::{Published::*, Row};
+use super::claim::Row;
+use super::published::Published::*;
 use crate::analysis::{MacropixelTiming, gate_works, phases, ripple, shortest_period};
 use crate::chip::readout::{self as readout_blocks, ReadoutOrder};
 use crate::chip::{
@@ -115,7 +116,7 @@ pub(super) fn ripple_rows() -> Vec<Row> {
         Row::holds("twice the ripple", "ns", Exactly("2.4"), 2.0 * timing.ripple.delay().as_ns())
             .given("As the ripple."),
         Row::holds("shortest CLK period, static", "ns", Within("2.4", 0.2), ns(by_paths))
-            .remark("STOP on CLK's falling edge; \"around 2.4 ns (~400 MHz)\". The ripple is put in; that a period takes twice as long is the circuit's own."),
+            .remark("STOP on CLK's falling edge; “around 2.4 ns (~400 MHz)”. The ripple is put in; that a period takes twice as long is the circuit's own."),
         Row::holds("shortest CLK period, gate level", "ns", Within("2.4", 0.2), ns(by_gates))
             .remark("The shortest period from which on every pattern is counted as at a slow clock."),
         Row::ours("shortest CLK period at the best STOP phase", "ns", ns(any_phase))
@@ -162,9 +163,9 @@ pub(super) fn fig_54_rows() -> Vec<Row> {
         .first()
         .map_or(f64::NAN, |&t| (t - edges.stop).as_ns());
     vec![
-        Row::holds("COUNTER_CLK edges from STOP to LOCAL_STOP, start value 5", "", Says("the next edge after 0", 6.0, 6.0), edges.edges_to_local_stop())
-            .remark("The text: zero after five edges, LOCAL_STOP on the next. The figure's caption says \"after every 5 × CLK\"."),
-        Row::holds("rises of LOCAL_STOP in a laser cycle", "", Says("until the next STOP", 1.0, 1.0), edges.local_stop.len() as f64),
+        Row::holds("COUNTER_CLK edges from STOP to LOCAL_STOP, start value 5", "", Says("transitions high on the next COUNTER_CLK edge", 6.0, 6.0), edges.edges_to_local_stop())
+            .remark("The text: zero after five edges, LOCAL_STOP on the next. The figure's caption says “after every 5 × CLK cycles”."),
+        Row::holds("rises of LOCAL_STOP in a laser cycle", "", Says("The next rising edge of the global STOP signal resets the counter", 1.0, 1.0), edges.local_stop.len() as f64),
         Row::ours("first COUNTER_CLK edge that counts, after STOP", "ns", after_stop)
             .remark("COUNTER_CLK is NOT CLK: the edge that comes together with STOP is swallowed by the reset."),
     ]
@@ -257,7 +258,7 @@ pub(super) fn load_rows() -> Vec<Row> {
             Says("a few hundred microseconds", 100.0, 999.0),
             at_200.load.as_s() * 1e6,
         )
-        .remark("First to last LOAD_CLK edge, and a period. At \"a few hundred megahertz\", of which 200 is our choice."),
+        .remark("First to last LOAD_CLK edge, and a period. At “a few hundred megahertz”, of which 200 is our choice."),
         Row::ours(
             "counts that leave through the pins right, of 65536",
             "",
@@ -266,7 +267,7 @@ pub(super) fn load_rows() -> Vec<Row> {
         .remark("Bin selection, columns and serialisers of the whole array at gate level, at the worst of the six clocks."),
         Row::ours("time of a readout at 200 MHz", "µs", at_200.read.as_s() * 1e6)
             .remark("Through 8 pins, our choice, each with the serialiser of 8 columns."),
-        Row::holds("load over readout", "", Says("never longer", 0.0, 1.0), worst)
+        Row::holds("load over readout", "", Says("not expected to ever impact the time required to capture a dToF frame", 0.0, 1.0), worst)
             .remark("The greatest at the six clocks; both at gate level, at the same clock, with one pin for the load and 8 for the readout."),
         Row::ours("pins of a readout as short as the load", "", pins * at_200.read.as_s() / at_200.load.as_s())
             .remark("9 bits against 16 × 14 a macropixel: a chip with more output pins than this at the same clock would wait for the load."),

@@ -1,109 +1,12 @@
 //! A published figure beside ours, and what to make of the difference.
+//!
+//! Words in typographic quotes, and those of [`Published::Says`], are the thesis's, as they stand there; all that the project says of the
+//! thesis keeps to it, and `tests/figures/quotations_stand_in_the_thesis.rs` looks each up.
 
 use serde::Serialize;
 
-/// What the thesis prints, always as it prints it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Published {
-    /// A number, good to half a unit of its last digit.
-    Exactly(&'static str),
-    /// A number with a tolerance either way, in the same unit: where the thesis rounds to fewer digits than it
-    /// prints, or says "about".
-    Within(&'static str, f64),
-    /// "At least", "over".
-    AtLeast(&'static str),
-    /// "No more than", "under".
-    AtMost(&'static str),
-    /// A range.
-    Between(&'static str, &'static str),
-    /// No number but words, with the range that we read in them: an infinite end is open.
-    Says(&'static str, f64, f64),
-    /// Nothing: a curve without numbers, or another convention of a number that is printed elsewhere.
-    Nothing,
-}
-
-impl Published {
-    /// Least and greatest value that agrees; `None` where nothing is published.
-    pub fn range(self) -> Option<(f64, f64)> {
-        match self {
-            Published::Exactly(text) => {
-                let half = 0.5 * last_digit(text);
-                Some((number(text) - half, number(text) + half))
-            }
-            Published::Within(text, tolerance) => {
-                Some((number(text) - tolerance, number(text) + tolerance))
-            }
-            Published::AtLeast(text) => Some((number(text), f64::INFINITY)),
-            Published::AtMost(text) => Some((f64::NEG_INFINITY, number(text))),
-            Published::Between(low, high) => Some((number(low), number(high))),
-            Published::Says(_, low, high) => Some((low, high)),
-            Published::Nothing => None,
-        }
-    }
-
-    /// Whether `value` is within the tolerance, a last bit of rounding granted.
-    fn agrees(self, value: f64) -> Option<bool> {
-        let (low, high) = self.range()?;
-        let rounding = if value.is_finite() {
-            1e-12 * value.abs()
-        } else {
-            0.0
-        };
-        Some((low - rounding..=high + rounding).contains(&value))
-    }
-
-    /// How far `value` is from what is published: from the number, or from the nearer end of a range.
-    pub fn difference(self, value: f64) -> Option<f64> {
-        let nearest = match self {
-            Published::Exactly(text) | Published::Within(text, _) => number(text),
-            _ => {
-                let (low, high) = self.range()?;
-                value.clamp(low, high)
-            }
-        };
-        Some(value - nearest)
-    }
-
-    /// As the thesis prints it.
-    pub fn text(self) -> String {
-        match self {
-            Published::Exactly(text) | Published::Within(text, _) => text.to_owned(),
-            Published::AtLeast(text) => format!("≥ {text}"),
-            Published::AtMost(text) => format!("≤ {text}"),
-            Published::Between(low, high) => format!("{low} to {high}"),
-            Published::Says(words, ..) => format!("“{words}”"),
-            Published::Nothing => String::new(),
-        }
-    }
-
-    /// The tolerance either way.
-    pub fn tolerance_text(self) -> String {
-        match self {
-            Published::Exactly(text) => format!("±{}", 0.5 * last_digit(text)),
-            Published::Within(_, tolerance) => format!("±{tolerance}"),
-            Published::AtLeast(_) | Published::AtMost(_) | Published::Between(..) => "bound".into(),
-            Published::Says(_, low, f64::INFINITY) => format!("read as ≥ {low}"),
-            Published::Says(_, f64::NEG_INFINITY, high) => format!("read as ≤ {high}"),
-            Published::Says(_, low, high) if low == high => format!("read as {low}"),
-            Published::Says(_, low, high) => format!("read as {low} to {high}"),
-            Published::Nothing => String::new(),
-        }
-    }
-}
-
-fn number(text: &str) -> f64 {
-    text.parse().expect("a published number is written as one")
-}
-
-/// The value of one unit in the last digit of `text`.
-fn last_digit(text: &str) -> f64 {
-    let mantissa = text.split('e').next().unwrap_or(text);
-    let decimals = mantissa.split_once('.').map_or(0, |(_, d)| d.len());
-    let exponent = text.split_once('e').map_or(0, |(_, e)| {
-        e.parse().expect("a published number is written as one")
-    });
-    10f64.powi(exponent - decimals as i32)
-}
+use super::published::Published;
+use crate::numerics::intervals::Estimate;
 
 /// A number with four significant digits; whole numbers up to a million with all of theirs.
 pub(super) fn figure(value: f64) -> String {
@@ -125,7 +28,8 @@ pub(super) fn figure(value: f64) -> String {
 /// What became of a comparison.
 ///
 /// *Agrees* is kept for numbers that could have come out otherwise. A number that was put into the model, or takes nothing
-/// but what was put in, is *given*: that it comes out again says only that nothing was lost.
+/// but what was put in, is *given*: that it comes out again says only that nothing was lost. A measured number whose confidence interval
+/// lies partly in the tolerance and partly outside is *not shown* to do either.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -133,6 +37,8 @@ pub enum Verdict {
     Agrees,
     /// Ours is not, which is known and explained.
     Differs,
+    /// Ours is too uncertain to tell.
+    NotShown,
     /// An input that comes out again.
     Given,
     /// Ours is not, although it is expected to be: a fault.
@@ -145,9 +51,10 @@ pub enum Verdict {
 
 impl Verdict {
     /// Every verdict.
-    pub const ALL: [Verdict; 6] = [
+    pub const ALL: [Verdict; 7] = [
         Verdict::Agrees,
         Verdict::Differs,
+        Verdict::NotShown,
         Verdict::Given,
         Verdict::Fails,
         Verdict::Ours,
@@ -159,6 +66,7 @@ impl Verdict {
         match self {
             Verdict::Agrees => "agrees",
             Verdict::Differs => "differs",
+            Verdict::NotShown => "not shown",
             Verdict::Given => "given",
             Verdict::Fails => "FAILS",
             Verdict::Ours => "ours alone",
@@ -178,6 +86,8 @@ pub struct Row {
     pub published: Published,
     /// What the model gives, where it has a part that can say.
     pub computed: Option<f64>,
+    /// The 95 % interval of what is measured; `None` where chance has no part in it, or its interval is not known.
+    pub interval: Option<(f64, f64)>,
     /// Why the two are known to differ; `None` where they must agree.
     pub known_difference: Option<String>,
     /// How the published number went into the model; `None` where it did not.
@@ -201,10 +111,24 @@ impl Row {
             unit,
             published,
             computed: Some(computed),
+            interval: None,
             known_difference: None,
             input: None,
             is_aside: false,
             remark: String::new(),
+        }
+    }
+
+    /// A published number that a measurement must meet, which chance has a part in.
+    pub fn measured(
+        what: impl Into<String>,
+        unit: &'static str,
+        published: Published,
+        measured: &Estimate,
+    ) -> Self {
+        Row {
+            interval: Some((measured.low, measured.high)),
+            ..Row::holds(what, unit, published, measured.value)
         }
     }
 
@@ -260,12 +184,24 @@ impl Row {
         let Some(computed) = self.computed else {
             return Verdict::NotModelled;
         };
-        match self.published.agrees(computed) {
-            None => Verdict::Ours,
-            Some(true) if self.input.is_some() => Verdict::Given,
-            Some(true) => Verdict::Agrees,
-            Some(false) if self.known_difference.is_some() => Verdict::Differs,
-            Some(false) => Verdict::Fails,
+        let Some(mut agrees) = self.published.agrees(computed) else {
+            return Verdict::Ours;
+        };
+        let sure = self.interval.filter(|_| computed.is_finite());
+        if let (Some((low, high)), Some((least, greatest))) = (sure, self.published.range()) {
+            let ends = [low, high].map(|end| self.published.agrees(end) == Some(true));
+            let apart = high < least || low > greatest;
+            match ends {
+                [true, true] => agrees = true,
+                _ if apart => agrees = false,
+                _ => return Verdict::NotShown,
+            }
+        }
+        match agrees {
+            true if self.input.is_some() => Verdict::Given,
+            true => Verdict::Agrees,
+            false if self.known_difference.is_some() => Verdict::Differs,
+            false => Verdict::Fails,
         }
     }
 
@@ -281,15 +217,45 @@ impl Row {
 
     /// Everything there is to say about it.
     pub fn notes(&self) -> String {
-        let why = match self.verdict() {
-            Verdict::Differs => self.known_difference.as_deref(),
-            Verdict::Given => self.input.as_deref(),
+        let why = match (self.verdict(), self.interval) {
+            (Verdict::Differs, _) => self.known_difference.clone(),
+            (Verdict::Given, _) => self.input.clone(),
+            (Verdict::NotShown, Some((low, high))) => Some(format!(
+                "The 95 % interval, {} to {}, lies partly outside the tolerance.",
+                figure(low),
+                figure(high)
+            )),
             _ => None,
         };
-        let parts = why.into_iter().chain([self.remark.as_str()]);
-        let parts: Vec<&str> = parts.filter(|part| !part.is_empty()).collect();
+        let parts = why.into_iter().chain([self.remark.clone()]);
+        let parts: Vec<String> = parts.filter(|part| !part.is_empty()).collect();
         parts.join(" ")
     }
+
+    /// What the thesis is quoted with, in whatever verdict: its words as the published figure, and those between typographic quotes.
+    pub fn quoted(&self) -> Vec<&str> {
+        let texts = [
+            Some(self.what.as_str()),
+            Some(self.remark.as_str()),
+            self.known_difference.as_deref(),
+            self.input.as_deref(),
+        ];
+        let mut quoted: Vec<&str> = texts
+            .into_iter()
+            .flatten()
+            .flat_map(between_quotes)
+            .collect();
+        if let Published::Says(words, ..) = self.published {
+            quoted.push(words);
+        }
+        quoted
+    }
+}
+
+/// What stands between typographic quotes.
+pub fn between_quotes(text: &str) -> impl Iterator<Item = &str> {
+    let after = text.split('\u{201c}').skip(1);
+    after.map(|rest| rest.split('\u{201d}').next().unwrap_or(rest))
 }
 
 /// One line of the list of published claims.
@@ -305,7 +271,7 @@ pub struct Claim {
     pub compute: fn() -> Vec<Row>,
 }
 
-/// The verdict on a claim: the worst of its published rows. One headline that is not modelled, that differs or that was
+/// The verdict on a claim: the worst of its published rows. One headline that is not modelled, that differs, that is not shown or that was
 /// put in keeps the claim from being met, however many other rows agree.
 pub fn overall(rows: &[Row]) -> Verdict {
     let has = |verdict| {
@@ -318,6 +284,7 @@ pub fn overall(rows: &[Row]) -> Verdict {
         Verdict::Fails,
         Verdict::NotModelled,
         Verdict::Differs,
+        Verdict::NotShown,
         Verdict::Given,
         Verdict::Agrees,
     ];
@@ -327,22 +294,6 @@ pub fn overall(rows: &[Row]) -> Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_printed_number_is_good_to_half_its_last_digit() {
-        for (text, low, high) in [
-            ("0.43", 0.425, 0.435),
-            ("768", 767.5, 768.5),
-            ("1.2e3", 1150.0, 1250.0),
-            ("-2.0", -2.05, -1.95),
-        ] {
-            let (a, b) = Published::Exactly(text).range().unwrap();
-            assert!(
-                (a - low).abs() < 1e-9 && (b - high).abs() < 1e-9,
-                "{text}: {a} {b}"
-            );
-        }
-    }
 
     #[test]
     fn verdicts_follow_from_range_and_expectation() {
@@ -385,13 +336,42 @@ mod tests {
         assert_eq!(none.difference(), None);
     }
 
+    /// All ways in which an interval can lie to "at least 6" and to "1 to 2".
     #[test]
-    fn differences_are_from_the_number_or_the_nearer_bound() {
-        let difference = |published: Published, value| published.difference(value).unwrap();
-        assert_eq!(difference(Published::Within("10", 1.0), 12.0), 2.0);
-        assert_eq!(difference(Published::AtLeast("6"), 5.5), -0.5);
-        assert_eq!(difference(Published::AtLeast("6"), 7.0), 0.0);
-        assert_eq!(difference(Published::Between("1", "2"), 2.5), 0.5);
+    fn what_chance_could_decide_otherwise_is_not_shown() {
+        let row = |published, low, value, high| {
+            let row = Row::measured("x", "", published, &Estimate { value, low, high });
+            row.differs("why").verdict()
+        };
+        use Published::*;
+        assert_eq!(row(AtLeast("6"), 6.5, 7.1, 8.5), Verdict::Agrees);
+        assert_eq!(row(AtLeast("6"), 5.88, 7.1, 8.46), Verdict::NotShown);
+        assert_eq!(row(AtLeast("6"), 4.0, 5.3, 6.3), Verdict::NotShown);
+        assert_eq!(row(AtLeast("6"), 4.0, 5.3, 5.9), Verdict::Differs);
+        assert_eq!(row(Between("1", "2"), 0.5, 1.5, 2.5), Verdict::NotShown);
+        assert_eq!(row(Between("1", "2"), 1.1, 1.5, 1.9), Verdict::Agrees);
+        assert_eq!(row(Between("1", "2"), 2.1, 2.5, 2.9), Verdict::Differs);
+        assert_eq!(row(AtLeast("6"), 6.5, f64::NAN, 8.5), Verdict::Differs);
+        assert_eq!(row(Nothing, 0.0, 1.0, 2.0), Verdict::Ours);
+        let measured = Estimate {
+            value: 7.1,
+            low: 5.88,
+            high: 8.46,
+        };
+        let unsure = Row::measured("x", "", AtLeast("6"), &measured);
+        assert!(
+            unsure.notes().contains("5.880 to 8.460"),
+            "{}",
+            unsure.notes()
+        );
+    }
+
+    #[test]
+    fn quotes_are_found_in_whatever_is_said() {
+        let row = Row::holds("x", "", Published::Says("a b", 0.0, 1.0), 0.5)
+            .differs("it says “c” and “d e”")
+            .remark("“f”, \"not this\"");
+        assert_eq!(row.quoted(), ["f", "c", "d e", "a b"]);
     }
 
     #[test]
@@ -413,13 +393,24 @@ mod tests {
         let differs = Row::holds("b", "", Published::Exactly("1"), 2.0).differs("why");
         let given = agrees.clone().given("how");
         let ours = Row::ours("c", "", 1.0);
+        let unsure = Row::measured(
+            "f",
+            "",
+            Published::AtLeast("1"),
+            &Estimate {
+                value: 2.0,
+                low: 0.0,
+                high: 4.0,
+            },
+        );
         let gap = Row::not_modelled("d", "", Published::Exactly("1"), "why");
         let fails = Row::holds("e", "", Published::Exactly("1"), 2.0);
         for (rows, verdict) in [
             (vec![&agrees, &ours], Verdict::Agrees),
             (vec![&agrees, &given], Verdict::Given),
             (vec![&agrees, &given.clone().aside()], Verdict::Agrees),
-            (vec![&agrees, &given, &differs], Verdict::Differs),
+            (vec![&agrees, &given, &unsure], Verdict::NotShown),
+            (vec![&agrees, &given, &differs, &unsure], Verdict::Differs),
             (vec![&agrees, &differs, &gap], Verdict::NotModelled),
             (vec![&agrees, &gap, &fails.aside()], Verdict::Fails),
             (vec![&ours], Verdict::Ours),

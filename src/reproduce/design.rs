@@ -1,6 +1,7 @@
 //! Claims 1, 12, 13, 16 and 28: design tables, memory and silicon, and the published sensors.
 
-use super::claim::{Published::*, Row};
+use super::claim::Row;
+use super::published::Published::*;
 use crate::report::Grid;
 use crate::theory::capacity::{SRAM_CELLS, Storage, bits_for, full_bins};
 use crate::theory::design::Design;
@@ -231,7 +232,7 @@ pub(super) fn data_rows() -> Vec<Row> {
     vec![
         Row::holds("bins of a full histogram to 75 m", "", Says("almost 200", 190.0, 200.0), f64::from(bins)),
         Row::holds("on-chip data, full over guided", "", AtLeast("25"), ratio)
-            .differs("193 bins over 8 are 24.1; \"over 25\" takes the 193 for 200, or counts a histogram that ends beyond 75 m."),
+            .differs("193 bins over 8 are 24.1; “over 25 times” takes the 193 for 200, or counts a histogram that ends beyond 75 m."),
         Row::ours(
             "the same, full histogram one window beyond 75 m",
             "",

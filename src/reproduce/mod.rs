@@ -22,6 +22,7 @@ mod page;
 mod penalty;
 mod photon_budget;
 mod precision;
+mod published;
 mod registry;
 mod sensors;
 mod silicon;
@@ -29,9 +30,10 @@ mod slips;
 mod stereo;
 mod system;
 
-pub use claim::{Claim, Published, Row, Verdict, overall};
+pub use claim::{Claim, Row, Verdict, between_quotes, overall};
 pub(crate) use page::heading;
 pub use page::{SLIPS_TITLE, grid, html, markdown, slips as slips_grid, tally};
+pub use published::Published;
 pub use registry::{CLAIMS, FIGURES, Figure, MEASUREMENTS, Measurement, TABLES, Table};
 
 pub use slips::{SLIPS, Slip};
@@ -355,6 +357,7 @@ impl Report {
                 "least": range.map(|r| r.0),
                 "greatest": range.map(|r| r.1),
                 "computed": row.computed,
+                "interval": row.interval,
                 "difference": row.difference().map(|d| d.0),
                 "verdict": row.verdict(),
                 "aside": row.is_aside,

@@ -77,6 +77,7 @@ fn plural(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Agrees => "agree",
         Verdict::Differs => "differ",
+        Verdict::NotShown => "not shown",
         Verdict::Given => "given",
         Verdict::Fails => "FAIL",
         Verdict::Ours => "ours alone",
@@ -87,8 +88,8 @@ fn plural(verdict: Verdict) -> &'static str {
 const INTRODUCTION: &str = "Every published figure of the thesis that the model is held to, beside what the model \
 gives. A row agrees when the computed value lies within the tolerance of what is printed (half a unit of the last \
 digit, unless another is named; of words, the range that we read in them), and differs when it does not and the reason \
-is known. A number that was put into the model and comes out again is given, and shows nothing. Rows that are ours \
-alone show another convention, or what the thesis left out. A claim's verdict is the worst of its published rows, \
+is known. A measured number whose 95 % interval lies partly in the tolerance and partly outside is not shown to do \
+either. A number that was put into the model and comes out again is given, and shows nothing. Rows that are ours alone show another convention, or what the thesis left out. A claim's verdict is the worst of its published rows, \
 asides left out: it counts as met only where all of them agree.";
 
 /// What stands above the thesis's slips.
@@ -399,6 +400,7 @@ fn class(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Agrees => "agrees",
         Verdict::Differs => "differs",
+        Verdict::NotShown => "unsure",
         Verdict::Given => "given",
         Verdict::Fails => "fails",
         Verdict::Ours => "ours",
@@ -419,6 +421,7 @@ h1{margin-bottom:.2em}h2{margin:2em 0 .2em;font-size:1.15em}
 .badge{display:inline-block;border-radius:.7em;padding:0 .7em;font-size:.85em;font-weight:600;white-space:nowrap}
 .badge.agrees,.glance .agrees{background:#d3efdf;color:#0b5d36}
 .badge.differs,.glance .differs{background:#ffe7c2;color:#7a4a00}
+.badge.unsure,.glance .unsure{background:#fff6c9;color:#5f5200}
 .badge.given,.glance .given{background:#efe6f5;color:#553a6e}
 .badge.fails,.glance .fails{background:#f7c6c6;color:#8c0d0d}
 .badge.ours,.glance .ours{background:#dde9f7;color:#1d4777}

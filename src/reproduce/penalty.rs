@@ -1,10 +1,11 @@
 //! Claims 11, 14 and 15: laser cycles, and what zooming and sliding add to them.
 
-use super::claim::{Published::*, Row};
+use super::claim::Row;
 use super::design::{ROUNDED_LIGHT_M_PER_S, TABLE_6_BACKGROUND_HZ, TABLE_6_BIN_M, TABLE_6_BIN_S};
 use super::measured::partial::{
     AtRange, demonstrator_on_chip, demonstrator_on_delay_lines, long_range_on_chip, with_interval,
 };
+use super::published::Published::*;
 use crate::theory::detection::{Model, Ties};
 use crate::theory::partial::{Cost, Goal, Link, Models, System};
 use crate::theory::precision;
@@ -124,7 +125,7 @@ pub(super) fn cycles_rows() -> Vec<Row> {
             .remark(format!("{:.0} with c = 3·10⁸.", in_frame(ROUNDED_LIGHT_M_PER_S))),
         Row::holds("laser cycles for 0.1 m at 200 m, 5 ns bins", "", Within("25000", 500.0), needed)
             .differs(format!(
-                "σ = FWHM/2.355 = 3.397 ns gives fewer; the published 25 000 takes σ = {sigma_ns:.3} ns, a pulse {:.1} % wider. \"Converge to around\" is said of both this and the line above.",
+                "σ = FWHM/2.355 = 3.397 ns gives fewer; the published 25 000 takes σ = {sigma_ns:.3} ns, a pulse {:.1} % wider. That they “converge to around” it is said of both this and the line above.",
                 100.0 * (sigma_ns / (8.0 * sigma_over_fwhm()) - 1.0)
             ))
             .remark("Cramér-Rao bound, averaged over the echo's place in its bin."),
@@ -144,7 +145,7 @@ pub(super) fn long_range_rows() -> Vec<Row> {
     let on_chip = long_range_on_chip().at(200.0);
     let measured = on_chip.penalty_of_sliding();
     let mut rows = vec![
-        Row::holds("penalty of sliding, measured", "×", approaching, measured.value)
+        Row::measured("penalty of sliding, measured", "×", approaching, &measured)
             .remark(format!("{}: 16 guided windows of the chip, {} laser cycles over {}.", with_interval(&measured, 2), with_interval(&on_chip.sliding, 0), with_interval(&on_chip.guided, 0))),
         zooming_row("penalty of zooming, measured", on_chip, approaching)
             .differs("The conventional mode's bins on a CLK of 12 MHz hold 1.7 background photons a laser cycle, of which the chip counts one: they lose the echo that the thesis reckons with."),
@@ -155,7 +156,7 @@ pub(super) fn long_range_rows() -> Vec<Row> {
         Row::holds("penalty of zooming", "×", approaching, penalty(&zooming, &full))
             .remark("σ = FWHM/2.355, Cramér-Rao, exact Poisson P_D, ties by lot."),
         Row::holds("zooming over sliding at 200 m", "", Says("zooming is preferred", 0.0, 1.0), penalty(&zooming, &sliding))
-            .remark("\"At longer distances\": holds with Cramér-Rao, not with Thompson."),
+            .remark("Said of “longer distances”: holds with Cramér-Rao, not with Thompson."),
         Row::holds("windows of sliding", "", Exactly("16"), sliding.steps.len() as f64)
             .given("Table 7's 12.5 m windows and 200 m are put in.")
             .aside(),
@@ -176,16 +177,14 @@ pub(super) fn long_range_rows() -> Vec<Row> {
 }
 
 /// The measured penalty of zooming.
-fn zooming_row(what: &str, at: &AtRange, published: super::claim::Published) -> Row {
+fn zooming_row(what: &str, at: &AtRange, published: super::published::Published) -> Row {
     let penalty = at.penalty_of_zooming();
     let text = penalty.map_or("never".to_owned(), |p| with_interval(&p, 2));
-    Row::holds(
-        what,
-        "×",
-        published,
-        penalty.map_or(f64::INFINITY, |p| p.value),
-    )
-    .remark(format!(
+    let row = match penalty {
+        Some(penalty) => Row::measured(what, "×", published, &penalty),
+        None => Row::holds(what, "×", published, f64::INFINITY),
+    };
+    row.remark(format!(
         "{text}: the conventional mode's coarse bins, then a guided window."
     ))
 }
@@ -229,11 +228,11 @@ fn delay_line_rows() -> Vec<Row> {
     let (sliding, penalty) = (lines.sliding(), lines.penalty_of_sliding());
     let guided = &lines.guided;
     vec![
-        Row::holds(
+        Row::measured(
             "penalty of sliding in delay-line bins, windows every 12.5 ns, measured",
             "×",
             AtLeast("6"),
-            penalty.value,
+            &penalty,
         )
         .remark(format!(
             "{}: {} windows, of which each repeats 8.3 ns of the one before, where the thesis has none overlap; {} laser cycles over {}; {:.2} by the thesis's formula for these windows. Zooming needs bins of 20.8 and 166 ns, and elements of a delay line are 2.6 ns whatever CLK is: it is measured in CLK bins alone.",
@@ -297,15 +296,14 @@ pub(super) fn demonstrator_rows() -> Vec<Row> {
     );
     let sliding_75 = at_75.penalty_of_sliding();
     let sliding_74 = at_74.penalty_of_sliding();
-    let zooming_75 = at_75
-        .penalty_of_zooming()
-        .map_or(f64::INFINITY, |p| p.value);
+    let zooming_75 = at_75.penalty_of_zooming();
+    let better = zooming_75.filter(|zooming| zooming.value < sliding_75.value);
     let mut rows = vec![
-        Row::holds(
+        Row::measured(
             "penalty of the better partial histogram, measured",
             "×",
             AtLeast("6"),
-            sliding_75.value.min(zooming_75),
+            &better.unwrap_or(sliding_75),
         )
         .remark(format!(
             "Sliding: {}, {} laser cycles over {}; at 74 m {}.",

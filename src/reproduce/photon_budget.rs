@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::claim::{Published::*, Row};
+use super::claim::Row;
+use super::published::Published::*;
 use crate::photon::solar::{FULL_SUN_KLUX, band_irradiance};
 use crate::photon::{
     Convention, Filter, FilterShape, LaserDrift, PhotonBudget, Poisson, Purpose, random_stream,
@@ -158,11 +159,11 @@ pub(super) fn detection_rows() -> Vec<Row> {
     let lot = Model::Poisson(Ties::Random);
     let printed = worst(Model::GaussianAsPrinted, 100, &absolute);
     vec![
-        Row::holds("largest deviation from Monte Carlo, exact Poisson", "standard errors", Says("matches closely", 0.0, 4.0), worst(lot, 1, &in_sigmas))
+        Row::holds("largest deviation from Monte Carlo, exact Poisson", "standard errors", Says("match closely", 0.0, 4.0), worst(lot, 1, &in_sigmas))
             .remark("60 points of 5000 runs: M = 2, 4, 8, N = 1 to 1000. Ties by lot; 4 standard errors happen by chance once in 250 such comparisons."),
-        Row::holds("largest deviation from N = 100 on, Gaussian as meant", "", Says("matches closely", 0.0, 0.02), worst(Model::Gaussian, 100, &absolute))
+        Row::holds("largest deviation from N = 100 on, Gaussian as meant", "", Says("match closely", 0.0, 0.02), worst(Model::Gaussian, 100, &absolute))
             .remark("σ = √mean."),
-        Row::holds("largest deviation from N = 100 on, Gaussian as printed", "", Says("matches closely", 0.0, 0.02), printed)
+        Row::holds("largest deviation from N = 100 on, Gaussian as printed", "", Says("match closely", 0.0, 0.02), printed)
             .differs("Eq. 18 and 19 print the mean where σ = √mean is meant; with that the formula cannot match the Monte Carlo beside it."),
         Row::holds(
             "P_D in the limit of no counts, M = 8",
@@ -170,7 +171,7 @@ pub(super) fn detection_rows() -> Vec<Row> {
             Exactly("0.125"),
             detection::poisson(1e-9, 1e-9, 8, Ties::Random).probability,
         )
-        .remark("\"Converges to 1/M\": with ties by lot."),
+        .remark("It “converges to 1/M”: with ties by lot."),
         Row::ours("P_D after one laser cycle, M = 8", "", formula(8, 1, lot)),
         Row::ours("the same, ties lost (as the text says)", "", formula(8, 1, Model::Poisson(Ties::Strict))),
         Row::ours("the same, ties won (as Eq. 17 is printed)", "", formula(8, 1, Model::Poisson(Ties::Loose))),

@@ -1,6 +1,7 @@
 //! Claim 10: Thompson against the Cramér-Rao bound.
 
-use super::claim::{Published::*, Row};
+use super::claim::Row;
+use super::published::Published::*;
 use crate::report::{Axis, Chart, Style};
 use crate::theory::precision::{cramer_rao, thompson, thompson_best_ratio};
 
@@ -50,7 +51,7 @@ pub(super) fn rows() -> Vec<Row> {
             Within("20", 2.0),
             100.0 * deviation,
         )
-        .differs("\"As high as 20 %\" is said of Thompson against a Monte Carlo (Koerner's) \"under low SNR\" that is not named; this is against the bound, over the light of Fig. 33 (100 to 100 000 signal counts)."),
+        .differs("An error “as high as 20%” is said of Thompson against a Monte Carlo (Koerner's) “with low SNR” that is not named; this is against the bound, over the light of Fig. 33 (100 to 100 000 signal counts)."),
     );
     let faintest = 100.0 * (thompson_ns(FAINT) / bound_ns(FAINT) - 1.0).abs();
     rows.push(

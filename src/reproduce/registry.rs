@@ -2,8 +2,8 @@
 
 use super::claim::Claim;
 use super::{
-    chip, delay_line, demonstrator, design, measured, penalty, photon_budget, precision, sensors,
-    silicon, stereo, system,
+    chip, delay_line, demonstrator, design, guided_bins, measured, penalty, photon_budget,
+    precision, sensors, silicon, stereo, system,
 };
 use crate::engine::EngineError;
 use crate::report::{Chart, Grid};
@@ -175,7 +175,7 @@ pub const CLAIMS: [Claim; 28] = [
         19,
         "least bin interval for a stereo guide",
         "5.2.5, Eq. 25, Fig. 71",
-        stereo::bin_rows,
+        guided_bins::bin_rows,
     ),
     claim(
         20,
@@ -293,7 +293,7 @@ pub const FIGURES: [Figure; 34] = [
     figure(
         71,
         "least bin interval for a stereo guide",
-        stereo::figure_71,
+        guided_bins::figure_71,
     ),
     figure(
         90,

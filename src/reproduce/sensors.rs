@@ -1,7 +1,8 @@
 //! Claim 28: the published sensors of Tables 5 and 16, and what their partial histograms cost in one common light.
 
-use super::claim::{Published::*, Row};
+use super::claim::Row;
 use super::penalty::demonstrator;
+use super::published::Published::*;
 use crate::report::{Axis, Chart, Grid, Style};
 use crate::theory::partial::{System, sliding_reduction, zooming_reduction};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -251,7 +252,11 @@ pub(super) fn rows() -> Vec<Row> {
         Row::holds(
             "bins that Park's 4 steps of 4 and Kim's 8 of 2 stand for",
             "",
-            Says("equivalent", 1.0, 1.0),
+            Says(
+                "effectively covers 4 histogram bins at each zoom step",
+                1.0,
+                1.0,
+            ),
             4.0 * inverse(4, 4) / (2.0 * inverse(2, 8)),
         )
         .remark("Their ratio: halving the steps by doubling the bins changes nothing."),

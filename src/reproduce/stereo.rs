@@ -1,18 +1,17 @@
-//! Claims 17, 18, 19 and 26: the stereo pair of Table 12 as a guide.
+//! Claims 17, 18 and 26: the stereo pair of Table 12 as a guide.
 
-use super::claim::{Published::*, Row};
+use super::claim::{Row, Verdict};
 use super::demonstrator;
 use super::design::HSLIDAR_BIN_M;
-use super::guided_bins;
-use crate::chip::{SensorConfig, hslidar};
+use super::published::Published::*;
 use crate::guide::StereoRig;
 use crate::numerics::intervals::{deviation, mean};
 use crate::report::{Axis, Chart, Style};
 use crate::scene::{DVec3, Object, Scene, Shape};
-use crate::theory::design::{StereoPair, three_sigma, tolerated_sigma};
+use crate::theory::design::StereoPair;
 
 /// Table 12's pair at full resolution: 12 mm lenses, 3.45 µm pixels, 1 m apart.
-const PAIR: StereoPair = StereoPair {
+pub(super) const PAIR: StereoPair = StereoPair {
     focal_px: 12e-3 / 3.45e-6,
     baseline_m: 1.0,
 };
@@ -22,9 +21,9 @@ const BINNED: StereoPair = StereoPair {
     ..PAIR
 };
 /// Sub-pixel disparity of the theory line of Fig. 68, px.
-const THIRD_PX: f64 = 1.0 / 3.0;
+pub(super) const THIRD_PX: f64 = 1.0 / 3.0;
 /// Window step of the demonstrator in bins: 12.5 ns of 2.6 ns bins (Table 14).
-const HSLIDAR_STEP_BINS: f64 = 12.5 / 2.6;
+pub(super) const HSLIDAR_STEP_BINS: f64 = 12.5 / 2.6;
 
 /// The built-in rig before a wall across the whole view.
 pub(super) fn wall_at(depth_m: f64) -> Scene {
@@ -71,7 +70,7 @@ fn exponent(points: &[(f64, f64)]) -> f64 {
 }
 
 /// Depths at which the modelled rig is tried, m.
-const DEPTHS_M: [f64; 8] = [20.0, 30.0, 45.0, 65.0, 90.0, 120.0, 155.0, 195.0];
+pub(super) const DEPTHS_M: [f64; 8] = [20.0, 30.0, 45.0, 65.0, 90.0, 120.0, 155.0, 195.0];
 
 fn rig_errors() -> Vec<(f64, f64)> {
     DEPTHS_M.map(|z_m| (z_m, rms_error_m(z_m))).to_vec()
@@ -85,21 +84,55 @@ pub(super) fn error_rows() -> Vec<Row> {
         .map(|&(z_m, rms_m)| rms_m / PAIR.depth_error_m(z_m, THIRD_PX))
         .sum::<f64>()
         / errors.len() as f64;
-    vec![
+    let mut rows = vec![
         Row::holds("exponent of the error's growth, modelled rig", "", Within("2", 0.05), exponent(&errors))
             .given("The pair's disparity error is the same at all distances by choice, and with it the exponent.")
             .remark("RMS error of the simulated pair at eight distances from 20 to 195 m, 6400 pixels each."),
         Row::ours("modelled rig over the ⅓-pixel line of Fig. 68", "", ratio)
             .remark("The model's disparity error is ⅓ px by choice, rounding to 1/16 px added."),
         Row::ours("⅓-pixel line at 200 m", "m", PAIR.depth_error_m(200.0, THIRD_PX)),
-        Row::holds("nearest distance at 128 disparities, 2×2 binned", "m", Within("15", 1.5), BINNED.depth_m(128.0))
-            .remark("\"Around 15 m\". Binned as the demonstrator runs; unbinned pixels give twice that."),
-        Row::ours("nearest distance at 128 disparities, unbinned", "m", PAIR.depth_m(128.0)),
         Row::holds("relative error of ±1 px at 10 px", "%", Exactly("10"), 100.0 * PAIR.depth_error_m(PAIR.depth_m(10.0), 1.0) / PAIR.depth_m(10.0))
             .remark("Eq. 27 is a first derivative: in truth −9.1 and +11.1 %."),
-        Row::holds("farthest distance at 10 px, unbinned", "m", AtLeast("200"), PAIR.depth_m(10.0)),
-        Row::ours("farthest distance at 10 px, 2×2 binned", "m", BINNED.depth_m(10.0)),
-    ]
+    ];
+    rows.extend(limit_rows());
+    rows
+}
+
+/// The limits of Table 12's pair, with pixels as they are and binned. Both are published of one rig.
+fn limit_rows() -> Vec<Row> {
+    let (around_15, over_200) = (Within("15", 1.5), AtLeast("200"));
+    let pitches = [("unbinned", PAIR), ("2×2 binned", BINNED)];
+    let limits = pitches.map(|(pixels, pair)| {
+        let of = |disparity_px: f64, words: &str, published| {
+            let what = format!("{words} distance at {disparity_px} px, {pixels}");
+            let row = Row::holds(what, "m", published, pair.depth_m(disparity_px));
+            row.differs("The other limit's pixels are not these.")
+                .aside()
+        };
+        [
+            of(128.0, "nearest", around_15),
+            of(10.0, "farthest", over_200),
+        ]
+    });
+    let meet = |rig: &&[Row; 2]| rig.iter().all(|row| row.verdict() == Verdict::Agrees);
+    let both = limits.iter().filter(meet).count() as f64;
+    // Distance times disparity is the same: 200 m at 10 px are so many at 128.
+    let least_nearest_m = 200.0 * 10.0 / 128.0;
+    let widest_um = 12e3 / (least_nearest_m * 128.0);
+    let narrowest_um = 12e3 / (16.5 * 128.0);
+    let headline = Row::holds(
+        "pairs, unbinned and 2×2 binned, that meet both the nearest and the farthest distance",
+        "",
+        Says("minimum distance limit occurs at a distance of around 15 m", 1.0, 2.0),
+        both,
+    )
+    .differs("The nearest distance is that of binned pixels, the farthest that of single ones.")
+    .remark(format!(
+        "128 and 10 px of disparity are 12.8 apart, so that who sees 200 m sees nothing nearer than {least_nearest_m:.1} m. 12 mm lenses meet both with pixels of {narrowest_um:.1} to {widest_um:.1} µm; Table 12's are 3.45 and, binned, 6.9 µm."
+    ));
+    std::iter::once(headline)
+        .chain(limits.into_iter().flatten())
+        .collect()
 }
 
 /// Fig. 61: distance limits of a 1 m pair.
@@ -309,7 +342,7 @@ pub(super) fn figure_70() -> Vec<Chart> {
         let depths = measured_depths_m(&scene, 5);
         (yaw_deg, depths.iter().sum::<f64>() / depths.len() as f64)
     });
-    // "A 1-2 m error from even a 0.1° mechanical deviation" (6.4.2).
+    // “a 1-2 m error from even a 0.1° mechanical deviation” (6.4.2).
     let published = [(0.1, 38.0), (0.1, 39.0), (-0.1, 41.0), (-0.1, 42.0)];
     vec![
         Chart::new(
@@ -324,94 +357,6 @@ pub(super) fn figure_70() -> Vec<Chart> {
         )
         .with("modelled rig", Style::Points, modelled)
         .with("published, 1 to 2 m", Style::Points, published),
-    ]
-}
-
-/// Claim 19: the smallest bins that a stereo guide allows.
-pub(super) fn bin_rows() -> Vec<Row> {
-    let hslidar_sigma_m = 8.0 * HSLIDAR_BIN_M / 6.0;
-    let reach = |sigma_m: f64| (sigma_m * PAIR.focal_px * PAIR.baseline_m / THIRD_PX).sqrt();
-    let on_steps = tolerated_sigma(8.0, HSLIDAR_STEP_BINS, three_sigma());
-    let quantic = |z_m| PAIR.least_bin_m(z_m, THIRD_PX, 16);
-    let (primary, contingency) = (SensorConfig::default(), hslidar());
-    let centred = guided_bins::least_window_m(100.0) / primary.bins as f64;
-    let by_primary = guided_bins::least_bin_of_sensor_m(100.0, &primary, 0.5 * centred);
-    let by_contingency = guided_bins::least_bin_of_sensor_m(100.0, &contingency, centred);
-    // Eq. 25 takes 1/3 px; the rig's disparities are rounded to 1/16 px besides.
-    let rig_px = THIRD_PX.hypot(1.0 / 16.0 / 12f64.sqrt());
-    let on_grid = |bins, step| {
-        PAIR.least_bin_on_grid_m(100.0, rig_px, bins, step)
-            .unwrap_or(f64::INFINITY)
-    };
-    let fig_71 = "Fig. 71 is drawn from the measured spread (Fig. 67), whose values are not printed; these use ⅓ px.";
-    vec![
-        Row::holds("simulated guide at 100 m: least bin over Eq. 25's", "", Within("1", 0.05), centred / PAIR.least_bin_m(100.0, rig_px, 16))
-            .remark("Windows of 16 bins about 32 768 estimates of the modelled pair before walls about there, 99.73 % of which hold the wall."),
-        Row::ours("the same, by the windows that QuantIC4x4 opens", "m", by_primary)
-            .remark(format!("CLK period by CLK period, in steps of 1 %; with centres on the grid of bins the formula gives {:.3} m.", on_grid(16, 1.0))),
-        Row::ours("the same, by the windows that HSLIDAR opens, clocked", "m", by_contingency)
-            .remark(format!("Windows of 8 bins step by 4; with centres on that grid the formula gives {:.3} m.", on_grid(8, 4.0))),
-        Row::ours("least bin at 100 m, QuantIC4x4", "m", quantic(100.0)).remark(fig_71),
-        Row::ours("least bin at 200 m, QuantIC4x4", "m", quantic(200.0)),
-        Row::ours(
-            "least bin at 100 m, HSLIDAR",
-            "m",
-            PAIR.least_bin_m(100.0, THIRD_PX, 8),
-        ),
-        Row::ours(
-            "the same, centres on 12.5 ns steps",
-            "m",
-            PAIR.least_bin_on_grid_m(100.0, THIRD_PX, 8, HSLIDAR_STEP_BINS)
-                .unwrap_or(f64::INFINITY),
-        )
-        .remark(
-            "A step of 4.8 bins leaves a window of 8 little room for the estimate's own error.",
-        ),
-        Row::ours(
-            "distance to which 8 bins of 2.6 ns hold ±3σ",
-            "m",
-            reach(hslidar_sigma_m),
-        )
-        .remark("Eq. 25 and 27 at ⅓ px; the demonstrator tracked its target to 75 m."),
-        Row::ours(
-            "the same, centres on 12.5 ns steps",
-            "m",
-            on_steps.map_or(0.0, |bins| reach(bins * HSLIDAR_BIN_M)),
-        ),
-    ]
-}
-
-/// Fig. 71: the least bin interval against distance, both sensors.
-pub(super) fn figure_71() -> Vec<Chart> {
-    let depths = || (10..=200).step_by(2).map(f64::from);
-    let least = |bins: u32| depths().map(move |z_m| (z_m, PAIR.least_bin_m(z_m, THIRD_PX, bins)));
-    let windows = DEPTHS_M.map(|z_m| (z_m, guided_bins::least_window_m(z_m)));
-    let simulated = |bins: f64| windows.map(|(z_m, window_m)| (z_m, window_m / bins));
-    let on_grid = |bins: u32, step: f64| {
-        depths().filter_map(move |z_m| {
-            Some((z_m, PAIR.least_bin_on_grid_m(z_m, THIRD_PX, bins, step)?))
-        })
-    };
-    vec![
-        Chart::new(
-            "Least bin interval that keeps 99.7 % of stereo estimates in the window (⅓ px)",
-            Axis::linear("distance (m)"),
-            Axis::linear("bin interval (m)"),
-        )
-        .with("primary: QuantIC4x4, 16 bins", Style::Line, least(16))
-        .with("contingency: HSLIDAR, 8 bins", Style::Line, least(8))
-        .with("simulated guide, 16 bins", Style::Points, simulated(16.0))
-        .with("simulated guide, 8 bins", Style::Points, simulated(8.0))
-        .with(
-            "QuantIC4x4, centres on the bin grid",
-            Style::Dashed,
-            on_grid(16, 1.0),
-        )
-        .with(
-            "HSLIDAR clocked, steps of 4 bins",
-            Style::Dashed,
-            on_grid(8, 4.0),
-        ),
     ]
 }
 
@@ -437,7 +382,7 @@ pub(super) fn motion_rows() -> Vec<Row> {
         Row::holds(
             "way over half the window",
             "",
-            Says("exceeding", 1.0, f64::INFINITY),
+            Says("exceeding the 3 m depth window size", 1.0, f64::INFINITY),
             per_frame_m / (0.5 * window_m),
         )
         .given("The two lines above.")

@@ -1,10 +1,11 @@
 //! Claims 22 to 24 and 27: what formulas and budgets say of the demonstrator of chapter 6, beside what the chain gives
 //! ([`mod@demonstrator`]).
 
-use super::claim::{Published::*, Row};
+use super::claim::Row;
 use super::demonstrator::{self, swept};
 use super::design::HSLIDAR_BIN_M;
 use super::penalty::{demonstrator, demonstrator_light};
+use super::published::Published::*;
 use crate::chip::hslidar_delay_line;
 use crate::photon::Atmosphere;
 use crate::report::{Axis, Chart, Style};
@@ -39,6 +40,7 @@ fn bound_m(range_m: f64, klux: f64) -> f64 {
 /// Claim 22: errors to 50 m.
 pub(super) fn error_rows() -> Vec<Row> {
     let mut rows = demonstrator::error_rows();
+    rows.extend(demonstrator::sigma_rows(bound_m(50.0, 72.0)));
     rows.extend([
         Row::ours(
             "bound of σ at 50 m, share of the distance",

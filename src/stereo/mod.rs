@@ -1,4 +1,4 @@
-//! Stereo matching: disparities from a rectified pair of grey images (thesis 5.2.2, "Semi-global matching").
+//! Stereo matching: disparities from a rectified pair of grey images (semi-global matching, thesis 5.2.2).
 //!
 //! Knows images and pixels only, nothing of scenes, cameras or metres.
 //!

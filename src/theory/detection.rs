@@ -3,7 +3,7 @@
 //! Thesis 3.2.2, Eq. 17: P_D = Σ f_S(x)·F_B(x)^(M−1), with f_S the probability of x counts in
 //! the signal bin and F_B that a background bin has no more than x. The assumptions are the thesis's: the
 //! echo falls into one bin, all bins are independent and share one background. Its text wants
-//! the others "lower than x", its formula allows equal counts; [`Ties`] has both, and the fair coin
+//! the others “lower than x”, its formula allows equal counts; [`Ties`] has both, and the fair coin
 //! between them that a peak finder amounts to.
 //!
 //! Everything is a sum of positive terms, P_D and 1 − P_D alike, so that both have full relative

@@ -194,8 +194,8 @@ proptest! {
         let all = full_stream(&engine, &stream, &pixels).unwrap();
         let seen = engine.expose(&stream, &pixels).unwrap();
         prop_assert_eq!(all.histograms, seen.histograms);
-        // The last group of laser cycles reaches beyond the exposure, at most by as many as it has.
-        prop_assert!(seen.work.photons_drawn <= 2 * all.work.photons_drawn + 4096);
+        // Photons in the dead time before a window may be drawn for the window before as well.
+        prop_assert!(seen.work.photons_drawn <= 2 * all.work.photons_drawn);
     }
 }
 

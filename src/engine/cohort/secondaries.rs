@@ -12,6 +12,16 @@
 use super::spad_light::absorbed;
 use crate::photon::SpadModel;
 
+/// The largest share of the variance of a macropixel's counts that cohorts leave out, where avalanches leave a carrier with probability
+/// `afterpulse_probability` a: 2a/(1 + 3a).
+///
+/// A Poisson number of pulses that each bring another with probability a has (1 + 3a)/(1 + a) times its mean as variance, and cohorts give it
+/// its mean. It is less where dead time thins pulses out, or where afterpulses come after the window. Of 5 % of afterpulses, of which
+/// 8.7 % are left out at most, 7.5 % were measured in windows of 64 bins at 0.5 counts a window, 7 % in 16 bins at 0.3, and 4 to 5 % at 0.7 to 1.3.
+pub fn variance_left_out(afterpulse_probability: f64) -> f64 {
+    2.0 * afterpulse_probability / (1.0 + 3.0 * afterpulse_probability)
+}
+
 /// What a hazard in a cell does.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cell {

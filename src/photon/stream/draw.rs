@@ -56,6 +56,8 @@ pub struct Draw {
     pub(super) within_fs: Range<i64>,
     pub(super) group: Group,
     photons: usize,
+    /// Photons of the exposure.
+    of_exposure: usize,
     /// Photons that were left when some were thinned out.
     kept: Vec<(Place, i64)>,
 }
@@ -69,6 +71,7 @@ impl Draw {
         self.echo.clear();
         self.echo_photons = 0;
         self.photons = 0;
+        self.of_exposure = 0;
         self.kept.clear();
         self.group = group;
     }
@@ -96,14 +99,32 @@ impl Draw {
             .push_run(slot, photons.div_ceil(PER_BLOCK as u32));
     }
 
-    /// How many photons were drawn, kept or not.
+    /// How many photons of the exposure there are.
     pub fn len(&self) -> usize {
-        self.photons + self.echo_photons
+        self.of_exposure
     }
 
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
-        self.len() == 0
+        self.of_exposure == 0
+    }
+
+    /// Counts the photons of the first `cycles` laser cycles: the exposure may end within the group, and others are none of its photons.
+    pub(super) fn count_exposure(&mut self, cycles: u32) {
+        if cycles >= self.group.cycles() {
+            self.of_exposure = self.photons + self.echo_photons + self.kept.len();
+            return;
+        }
+        let is_in = |word: &&u32| self.group.split(self.group.place(**word)).0 < cycles;
+        let background = self.runs.iter().flat_map(|run| {
+            let rows = run.blocks().into_iter().zip(self.words());
+            rows.map(|(blocks, words)| words[blocks].iter().filter(is_in).count())
+        });
+        let halves = self.echo().into_iter().zip(self.echo_photons());
+        let echo = halves.map(|([_, high], photons)| high[..photons].iter().filter(is_in).count());
+        let kept = self.kept.iter();
+        let kept = kept.filter(|&&(place, _)| self.group.split(place).0 < cycles);
+        self.of_exposure = background.chain(echo).sum::<usize>() + kept.count();
     }
 
     /// The group.
@@ -263,7 +284,7 @@ impl Draw {
             }
         }
         self.runs.clear();
-        self.photons += std::mem::take(&mut self.echo_photons);
+        (self.photons, self.echo_photons) = (0, 0);
         self.kept = kept;
     }
 }

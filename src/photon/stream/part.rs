@@ -268,6 +268,7 @@ impl PixelStream<'_> {
         {
             draw.thin(self);
         }
+        draw.count_exposure(group.cycles_in(self.stream.config().laser_cycles));
     }
 
     /// The slots of the stream.

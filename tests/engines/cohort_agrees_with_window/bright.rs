@@ -2,7 +2,9 @@
 //! afterpulses and crosstalk.
 
 use guided_dtof::chip::{Exposure, SensorConfig};
-use guided_dtof::engine::{Cohort, CohortOptions, Expose, LitPixel, Window, stream_config};
+use guided_dtof::engine::{
+    Cohort, CohortOptions, Expose, LitPixel, Window, stream_config, variance_left_out,
+};
 use guided_dtof::photon::{DeadTimeLaw, PhotonStream, PixelLight};
 use guided_dtof::units::Time;
 use proptest::prelude::*;
@@ -121,6 +123,54 @@ fn afterpulses_and_crosstalk() {
             ..case()
         }
         .agrees();
+    }
+}
+
+/// In little light, with windows longer than traps hold, nearly all is left out that can be; without afterpulses nothing is.
+#[test]
+fn the_variance_that_afterpulses_add_is_left_out_as_told() {
+    const MACROPIXELS: u32 = 2500;
+    for probability in [0.0, 0.2] {
+        let sensor = SensorConfig {
+            bins: 64,
+            afterpulse_probability: probability,
+            ..SensorConfig::default()
+        };
+        let exposure = Exposure::new(&sensor, 400, 50);
+        let stream = stream_config(&sensor, &exposure, 7, Time::from_ps(1_900));
+        let light = PixelLight::background(2e6);
+        let pixels: Vec<LitPixel> = (0..MACROPIXELS)
+            .map(|number| LitPixel {
+                number,
+                start: 380,
+                light: Some(light.clone()),
+            })
+            .collect();
+        let mean_and_variance = |engine: &dyn Expose| {
+            let exposed = engine.expose(&PhotonStream::new(&stream), &pixels).unwrap();
+            let of_one = |counts: &[u16]| counts.iter().map(|&n| f64::from(n)).sum();
+            let totals: Vec<f64> = exposed.histograms.iter().map(of_one).collect();
+            let mean = totals.iter().sum::<f64>() / totals.len() as f64;
+            let squares: f64 = totals.iter().map(|n| (n - mean).powi(2)).sum();
+            (mean, squares / (totals.len() - 1) as f64)
+        };
+        let window = mean_and_variance(&Window::new(&sensor, &exposure));
+        let options = CohortOptions {
+            memory: 1.0,
+            ..CohortOptions::default()
+        };
+        let cohort = mean_and_variance(&Cohort::new(&sensor, &exposure, options));
+        let error = (2.0 / f64::from(MACROPIXELS)).sqrt();
+        assert!(
+            (cohort.0 / window.0 - 1.0).abs() < 5.0 * error * (window.1 / 2.0).sqrt() / window.0
+        );
+        let left_out = 1.0 - cohort.1 / window.1;
+        let told = variance_left_out(probability);
+        let told = 0.6 * told - 5.0 * error..=told + 5.0 * error;
+        assert!(
+            told.contains(&left_out),
+            "{left_out} of {probability}: {told:?}"
+        );
     }
 }
 
