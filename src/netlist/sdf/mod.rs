@@ -17,9 +17,9 @@
 //! NOCHANGE, LABEL, TIMINGENV. Anything else is refused.
 //!
 //! # What a cell cannot tell apart
-//! A cell has one delay for each input pin and each direction of an output. Where a file says more, the
-//! longest delay is used and the arc is counted: Q and Q̄ of a flip-flop that differ, or rising and falling
-//! inputs of a non-unate arc (XOR2, XNOR2, select of MUX2, reset of DFFSR) that differ.
+//! A cell has one delay for each pair of input and output pin and each direction of the output. Where a file says
+//! more, the longest delay is used and the arc is counted: rising and falling inputs of a non-unate arc (XOR2, XNOR2,
+//! select of MUX2, reset of DFFSR) that differ.
 //!
 //! # Wires
 //! Wire delays (INTERCONNECT, PORT) are added to the arcs of the pin they end at. That gives every change of

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::netlist::{CellKind, Library, MAX_INPUTS, ModuleBuilder, Netlist, Timing};
+use crate::netlist::{CellKind, Library, ModuleBuilder, Netlist, Timing};
 
 /// An inverter and a module of one cell of every kind, twice.
 pub(super) fn design() -> Netlist {
@@ -38,8 +38,10 @@ pub(super) fn nominal(netlist: &Netlist, corner: Corner) -> Timing {
 /// Compares the pins that cells have.
 fn same(netlist: &Netlist, a: &Timing, b: &Timing) -> bool {
     netlist.cells().iter().enumerate().all(|(cell, flat)| {
-        let pins = flat.kind.inputs().len();
-        a.of(cell)[..pins] == b.of(cell)[..pins]
+        let (inputs, outputs) = (flat.kind.inputs().len(), flat.kind.outputs().len());
+        let pins = (0..inputs).flat_map(|input| (0..outputs).map(move |output| (input, output)));
+        pins.into_iter()
+            .all(|(i, o)| a.of(cell)[i][o] == b.of(cell)[i][o])
     })
 }
 
@@ -66,11 +68,16 @@ pub(super) fn annotated(
 }
 
 fn arc(body: &str, path: &str, pin: usize) -> (u32, u32) {
+    arc_to(body, path, (pin, 0))
+}
+
+/// Rise and fall of the arc from an input pin to an output pin.
+fn arc_to(body: &str, path: &str, (pin, output): (usize, usize)) -> (u32, u32) {
     let (netlist, timing, _) = annotated(body).unwrap();
     let path = format!("chip.{path}");
     let mut cells = 0..netlist.cells().len();
     let cell = cells.find(|&c| netlist.cell_path(c) == path).unwrap();
-    let arc = timing.of(cell)[pin];
+    let arc = timing.of(cell)[pin][output];
     (arc.rise_fs, arc.fall_fs)
 }
 
@@ -109,15 +116,32 @@ fn wildcards_reach_every_instance_and_paths_only_theirs() {
 }
 
 #[test]
-fn a_flip_flop_takes_the_longer_of_q_and_qn() {
+fn a_flip_flop_has_an_arc_to_each_output() {
     let body = "(CELL (CELLTYPE \"DFFR\") (INSTANCE u1/dffr) (DELAY (INCREMENT
         (IOPATH (posedge CK) Q (1)) (IOPATH (posedge CK) QN (2)) (IOPATH R Q (1)))))";
-    assert_eq!(arc(body, "u1.dffr", 1), (77_311, 77_311));
-    assert_eq!(arc(body, "u1.dffr", 2), (82_043, 82_043));
-    let notes = annotated(body).unwrap().2.notes;
+    let (ck, r, q, qn) = (1, 2, 0, 1);
+    let to = |pins| arc_to(body, "u1.dffr", pins);
     assert_eq!(
-        (notes.len(), notes[0].count, notes[0].first_line),
-        (1, 1, 4)
+        [to((ck, q)), to((ck, qn))],
+        [(76_311, 76_311), (77_311, 77_311)]
+    );
+    assert_eq!(
+        [to((r, q)), to((r, qn))],
+        [(82_043, 82_043), (81_043, 81_043)]
+    );
+    let result = annotated(body).unwrap().2;
+    assert_eq!((result.arcs, result.notes), (3, vec![]));
+    let device = |output: &str| {
+        format!("(CELL (CELLTYPE \"DFFR\") (INSTANCE *) (DELAY (ABSOLUTE (DEVICE {output} (1)))))")
+    };
+    let qn_alone = device("QN");
+    assert_eq!(arc_to(&qn_alone, "u1.dffr", (ck, qn)), (1_000, 1_000));
+    assert_eq!(arc_to(&qn_alone, "u1.dffr", (ck, q)), (75_311, 75_311));
+    assert_eq!(arc_to(&device(""), "u1.dffr", (r, q)), (1_000, 1_000));
+    let wire = "(CELL (CELLTYPE \"DFFR\") (INSTANCE *) (DELAY (ABSOLUTE (PORT CK (1)))))";
+    assert_eq!(
+        [q, qn].map(|output| arc_to(wire, "u1.dffr", (ck, output))),
+        [(76_311, 76_311); 2]
     );
 }
 
@@ -287,8 +311,8 @@ fn randomised(netlist: &Netlist, corner: Corner, values: &[u32]) -> Timing {
     let mut values = values.iter().cycle().copied();
     for (index, cell) in netlist.cells().iter().enumerate() {
         let mut delays = *timing.of(index);
-        for (pin, delay) in delays.iter_mut().enumerate().take(MAX_INPUTS) {
-            if pin < cell.kind.inputs().len() && cell.kind.triggers(pin) {
+        for pin in (0..cell.kind.inputs().len()).filter(|&pin| cell.kind.triggers(pin)) {
+            for delay in &mut delays[pin][..cell.kind.outputs().len()] {
                 delay.rise_fs = values.next().unwrap();
                 delay.fall_fs = values.next().unwrap();
             }

@@ -117,9 +117,11 @@ impl Annotator<'_, '_, '_> {
         for ((cell, pin), wire) in wires {
             let kind = self.netlist.cells()[cell].kind;
             let mut delays = *timing.of(cell);
-            let arc = &mut delays[pin];
             let mut unequal = false;
-            for (delay, rises) in [(&mut arc.rise_fs, true), (&mut arc.fall_fs, false)] {
+            let arcs = delays[pin][..kind.outputs().len()].iter_mut();
+            for (delay, rises) in
+                arcs.flat_map(|arc| [(&mut arc.rise_fs, true), (&mut arc.fall_fs, false)])
+            {
                 let by_edge = [(Edge::Rising, wire.rise_fs), (Edge::Falling, wire.fall_fs)];
                 let causes = by_edge
                     .iter()

@@ -82,14 +82,14 @@ pub fn write_sdf(
                 if !kind.triggers(pin) {
                     continue;
                 }
-                let arcs = corners.map(|timing| timing.of(cell)[pin]);
-                let rise = arcs.map(|arc| Some(arc.rise_fs as i64));
-                let fall = arcs.map(|arc| Some(arc.fall_fs as i64));
                 let from = PinEdge {
                     edge: (kind.is_flip_flop() && pin == 1).then_some(Edge::Rising),
                     pin: (*name).into(),
                 };
-                for output in kind.outputs() {
+                for (number, output) in kind.outputs().iter().enumerate() {
+                    let arcs = corners.map(|timing| timing.of(cell)[pin][number]);
+                    let rise = arcs.map(|arc| Some(arc.rise_fs as i64));
+                    let fall = arcs.map(|arc| Some(arc.fall_fs as i64));
                     write!(out, "      (IOPATH ")?;
                     write_pin(out, &from)?;
                     write!(out, " {output} ")?;

@@ -206,10 +206,9 @@ fn write_specify(
         if !kind.triggers(pin) {
             continue;
         }
-        let arc = library.arcs(kind)[pin];
-        let [rise, fall] = [arc.rise, arc.fall]
-            .map(|delay| reader.triple(Corner::ALL.map(|corner| delay.at(corner))));
-        for output in kind.outputs() {
+        for (output, arc) in kind.outputs().iter().zip(library.arcs(kind)[pin]) {
+            let [rise, fall] = [arc.rise, arc.fall]
+                .map(|delay| reader.triple(Corner::ALL.map(|corner| delay.at(corner))));
             let path = match (*from, *output) {
                 ("CK", "Q") => "posedge CK => (Q +: D)".to_owned(),
                 // Not `-: D`, which Yosys takes for a part-select where it skips these blocks.
