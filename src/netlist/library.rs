@@ -13,6 +13,7 @@
 use super::cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
 use super::check_limits::CheckLimits;
 use super::corner::{Corner, Delay};
+use super::timing::{ArcDelay, CellDelays};
 use crate::logic::Logic;
 use crate::units::Time;
 
@@ -97,6 +98,15 @@ impl Library {
     /// Arcs of one cell.
     pub fn arcs(&self, kind: CellKind) -> &CellArcs {
         &self.cells[kind as usize]
+    }
+
+    /// Delays of one cell in a corner.
+    pub(super) fn delays(&self, kind: CellKind, corner: Corner) -> CellDelays {
+        let arc = |arc: TimingArc| ArcDelay {
+            rise_fs: arc.rise.at(corner),
+            fall_fs: arc.fall.at(corner),
+        };
+        self.arcs(kind).map(|outputs| outputs.map(arc))
     }
 
     /// Replaces the arcs of one cell.

@@ -9,7 +9,7 @@ use super::cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
 use super::corner::Corner;
 use super::flat::Netlist;
 use super::instance_limits::InstanceLimits;
-use super::library::{Library, TimingArc};
+use super::library::Library;
 use crate::logic::Logic;
 
 /// What becomes of a pulse that is shorter than the delay it meets.
@@ -82,14 +82,10 @@ impl Timing {
 
     /// Every cell as the library has it in this corner, even those with delays of their own.
     pub fn of_library(netlist: &Netlist, library: &Library, corner: Corner) -> Self {
-        let arc = |arc: TimingArc| ArcDelay {
-            rise_fs: arc.delay_fs(corner, Logic::One),
-            fall_fs: arc.delay_fs(corner, Logic::Zero),
-        };
         Timing {
             sets: CellKind::ALL
                 .iter()
-                .map(|&kind| library.arcs(kind).map(|outputs| outputs.map(arc)))
+                .map(|&kind| library.delays(kind, corner))
                 .collect(),
             models: vec![DelayModel::Inertial; CellKind::ALL.len()],
             of_cell: netlist.cells().iter().map(|c| c.kind as u32).collect(),

@@ -2,10 +2,12 @@
 
 use std::collections::HashMap;
 
+use super::stages::Stages;
 use super::wires::Wire;
 use super::{DelayPath, Edge, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance, Skipped};
 use crate::files::InputError;
 use crate::netlist::cell::{CellKind, MAX_INPUTS};
+use crate::netlist::chain::Chain;
 use crate::netlist::corner::Corner;
 use crate::netlist::flat::Netlist;
 use crate::netlist::timing::{ArcDelay, Timing};
@@ -45,11 +47,13 @@ pub fn annotate(
         sdf,
         corner,
         wires: HashMap::new(),
+        stages: Stages::new(),
         result: Annotation::default(),
     };
     for cell in &sdf.cells {
         annotator.cell(timing, cell)?;
     }
+    annotator.add_stages(timing)?;
     annotator.add_wires(timing)?;
     Ok(annotator.result)
 }
@@ -71,6 +75,7 @@ pub(super) struct Annotator<'n, 's, 'a> {
     sdf: &'s Sdf<'a>,
     pub(super) corner: Corner,
     pub(super) wires: HashMap<(usize, usize), Wire>,
+    pub(super) stages: Stages,
     pub(super) result: Annotation,
 }
 
@@ -113,6 +118,8 @@ impl Annotator<'_, '_, '_> {
                         return self.leaf(timing, entry, cell);
                     }
                     (path.as_ref(), name)
+                } else if let Some(stage) = Chain::find(self.netlist, path) {
+                    return self.stage(timing, entry, stage);
                 } else if let Some(scope) = self.netlist.scope(path) {
                     let name = self.netlist.scopes()[scope].module.name();
                     if name == entry.cell_type {

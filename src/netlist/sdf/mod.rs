@@ -21,6 +21,10 @@
 //! more, the longest delay is used and the arc is counted: rising and falling inputs of a non-unate arc (XOR2, XNOR2,
 //! select of MUX2, reset of DFFSR) that differ.
 //!
+//! # Chains
+//! A cell with transport delays is one cell of the netlist and a chain of stages for other tools
+//! ([`Chain`](super::Chain)): a file names the stages, whose delays are added up, or the cell.
+//!
 //! # Wires
 //! Wire delays (INTERCONNECT, PORT) are added to the arcs of the pin they end at. That gives every change of
 //! the cell's output the time it would have with a wire of its own, with these exceptions:
@@ -39,6 +43,7 @@ mod annotate;
 mod entries;
 mod limits;
 mod parser;
+mod stages;
 #[cfg(test)]
 mod tests;
 mod tokens;
@@ -47,11 +52,20 @@ mod writer;
 
 pub use annotate::{Annotation, annotate};
 pub(super) use limits::checks_of;
-pub use writer::{SdfDivider, SdfOptions, SdfTimescale, write_sdf};
+pub use writer::{SdfDivider, SdfOptions, SdfTimescale, write_library_sdf, write_sdf};
 
 use std::borrow::Cow;
 
 use super::corner::Corner;
+
+/// The dotted path of a name in a scope; the empty path is the top.
+fn join(path: &str, name: &str) -> String {
+    if path.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{path}.{name}")
+    }
+}
 
 /// Minimum, typical and maximum of a number, fs; members may be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

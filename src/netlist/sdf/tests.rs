@@ -3,7 +3,8 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::netlist::{CellKind, Library, ModuleBuilder, Netlist, Timing};
+use crate::files::InputError;
+use crate::netlist::{CellKind, Library, ModuleBuilder, Netlist, OwnDelay, Timing};
 
 /// An inverter and a module of one cell of every kind, twice.
 pub(super) fn design() -> Netlist {
@@ -143,6 +144,55 @@ fn a_flip_flop_has_an_arc_to_each_output() {
         [q, qn].map(|output| arc_to(wire, "u1.dffr", (ck, output))),
         [(76_311, 76_311); 2]
     );
+}
+
+#[test]
+fn stages_of_a_chain_add_up_to_its_cell() {
+    let mut m = ModuleBuilder::new("chip");
+    let (a, z) = (m.input("A"), m.output("Z"));
+    m.cell_with_delay("line", CellKind::Buf, &[a], &[z], OwnDelay::wire(2_600_001));
+    let netlist = Netlist::elaborate(&m.finish().unwrap());
+    let nominal = |corner| Timing::nominal(&netlist, &Library::default(), corner);
+    let delay = |body: &str| {
+        let mut timing = nominal(Corner::Typ);
+        let text = file(body);
+        annotate(
+            &mut timing,
+            &netlist,
+            &Sdf::parse("a.sdf", &text)?,
+            Corner::Typ,
+        )?;
+        let arc = timing.of(0)[0][0];
+        Ok::<_, InputError>((arc.rise_fs, arc.fall_fs))
+    };
+    let stage = |number: u32, cell_type: &str, entry: &str| {
+        let delays = format!("(DELAY {entry})");
+        delay(&format!(
+            "(CELL (CELLTYPE \"{cell_type}\") (INSTANCE line/s{number}) {delays})"
+        ))
+    };
+    let of_line = "STAGE_2600001_53";
+    // A stage is 49.056 ps: 2600.001 by 53, rounded down.
+    let fixed = "(ABSOLUTE (IOPATH A Z (100) (10)))";
+    assert_eq!(stage(0, of_line, fixed).unwrap(), (2_650_945, 2_560_945));
+    let more = "(INCREMENT (IOPATH A Z (1)))";
+    assert_eq!(stage(52, of_line, more).unwrap(), (2_601_001, 2_601_001));
+    let whole = "(CELL (CELLTYPE \"BUF\") (INSTANCE line) (DELAY (ABSOLUTE (IOPATH A Z (7)))))";
+    assert_eq!(delay(whole).unwrap(), (7_000, 7_000));
+    for (number, cell_type, entry, says) in [
+        (53, of_line, fixed, "no instance line.s53"),
+        (1, "BUF", fixed, "is a STAGE_2600001_53 and no BUF"),
+        (1, of_line, "(ABSOLUTE (PORT A (1)))", "has one path"),
+        (
+            1,
+            of_line,
+            "(INCREMENT (IOPATH A Z (-3000)))",
+            "between 0 and 4.29",
+        ),
+    ] {
+        let said = stage(number, cell_type, entry).unwrap_err().to_string();
+        assert!(said.contains("a.sdf:") && said.contains(says), "{said}");
+    }
 }
 
 #[test]

@@ -19,11 +19,13 @@
 //! makes them transport delays. Verilog has none of its own that keep to the active region and let a change
 //! cancel those it overtakes: a module with a queue of changes does that.
 
+use std::collections::BTreeSet;
 use std::io::{self, Write};
 
 use super::{TIMESCALE, primitive};
 use crate::logic::Logic;
 use crate::netlist::cell::CellKind;
+use crate::netlist::chain::Chain;
 use crate::netlist::corner::Corner;
 use crate::netlist::flat::Netlist;
 use crate::netlist::library::{CellArcs, Library};
@@ -87,23 +89,22 @@ pub fn write_cells(out: &mut dyn Write, library: &Library, corner: Corner) -> io
 }
 
 /// As [`write_cells`], with parameters `RISE_<input>_<output>` and `FALL_<input>_<output>` (fs) for the delays of every arc, and
-/// `TRANSPORT`, 1 for transport delays.
+/// `TRANSPORT`, 1 for transport delays; and the chains that a netlist has, as one such cell each.
 ///
 /// # Errors
 /// Those of the writer.
 pub fn write_parametric_cells(
     out: &mut dyn Write,
     library: &Library,
+    chains: &BTreeSet<Chain>,
     corner: Corner,
 ) -> io::Result<()> {
     write!(out, "{TIMESCALE}{TRANSPORT_PATH}")?;
-    for kind in CellKind::ALL {
+    let cells = CellKind::ALL.map(|kind| (kind.name().to_owned(), kind));
+    let chains = chains.iter().map(|chain| (chain.module(), CellKind::Buf));
+    for (name, kind) in cells.into_iter().chain(chains) {
         let (inputs, outputs) = (kind.inputs().join(", "), kind.outputs().join(", "));
-        writeln!(
-            out,
-            "\nmodule {}(output {outputs}, input {inputs});",
-            kind.name()
-        )?;
+        writeln!(out, "\nmodule {name}(output {outputs}, input {inputs});")?;
         for (pin, output, name) in arc_names(kind) {
             let arc = library.arcs(kind)[pin][output];
             let (rise, fall) = (arc.rise.at(corner), arc.fall.at(corner));
