@@ -236,14 +236,12 @@ fn view(
     // Where few bins leave room, the view shows all of them and opens on the windows, so that a value has its place in a CLK
     // period; else the first, the middle and the last bin, in a whole laser cycle.
     let has_room = config.bins <= 8;
-    let mut groups = vec![Group::new(
-        "Global signals",
-        [
-            Entry::binary("CLK"),
-            Entry::binary("STOP"),
-            Entry::binary("ENABLE"),
-        ],
-    )];
+    let pins = match has_room {
+        true => &["CLK", "STOP"][..],
+        false => &["CLK", "STOP", "ENABLE"],
+    };
+    let pins = pins.iter().copied().map(Entry::binary);
+    let mut groups = vec![Group::new("Global signals", pins)];
     for (col, start) in starts.into_iter().enumerate() {
         let pixel = array::pixel_name(0, col);
         let signals = [
@@ -270,12 +268,13 @@ fn view(
         ));
     }
     let shown = match edges[..] {
-        [first, .., last] if has_room => (first, last),
-        _ => (origin, end),
+        // LOCAL_STOP and the counts come some CLK periods after the last bin's photons.
+        [first, .., last] if has_room => (first, last + Time::from_s(3.0 / config.clk_hz)),
+        _ => (origin, end + Time::from_ns(5)),
     };
     Layout {
         groups,
-        zoom: (shown.0 - Time::from_ns(5), shown.1 + Time::from_ns(5)),
+        zoom: (shown.0 - Time::from_ns(5), shown.1),
         marker: Some(origin),
         marks: edges,
     }

@@ -352,6 +352,35 @@ fn without_a_stimulus_the_netlist_comes_alone() {
 }
 
 #[test]
+fn the_top_has_the_name_of_the_chip_and_a_fast_clk_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    for (sensor, name) in [
+        ("quantic4x4", "quantic4x4"),
+        ("hslidar", "hslidar"),
+        ("hslidar_delay_line", "hslidar"),
+    ] {
+        let small = ["--rows", "1", "--cols", "1", "--set"];
+        for (clk, is_told) in [("200e6", false), ("201e6", name == "hslidar")] {
+            let clk = format!("sensor.clk_hz={clk}");
+            let of = ["--sensor", sensor].into_iter().chain(small).chain([&*clk]);
+            let of: Vec<&str> = of.collect();
+            let sdf = [&["export", "sdf", "--out", "chip.sdf"], &of[..]].concat();
+            let verilog = [&["export", "verilog", "--out", "v"], &of[..]].concat();
+            for arguments in [sdf, verilog] {
+                let exported = gdtof(here, &arguments);
+                assert!(exported.status.success(), "{exported:?}");
+                let said = String::from_utf8(exported.stderr).unwrap();
+                assert_eq!(said.contains("200 MHz at most"), is_told, "{said}");
+            }
+        }
+        let read = |file: &str| fs::read_to_string(here.join(file)).unwrap();
+        assert!(read("chip.sdf").contains(&format!("(DESIGN \"{name}\")")));
+        assert!(read("v/design.v").contains(&format!("\nmodule {name}(\n")));
+    }
+}
+
+#[test]
 fn delays_of_the_whole_chip_are_written_only_when_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
