@@ -387,7 +387,7 @@ fn delays_of_the_whole_chip_are_written_only_when_asked_for() {
     let refused = gdtof(here, &["export", "sdf", "--out", "chip.sdf"]);
     let error = String::from_utf8(refused.stderr).unwrap();
     assert_eq!(refused.status.code(), Some(2), "{error}");
-    let says = "64 × 64 macropixels take about 2.06 GB";
+    let says = "64 × 64 macropixels take about 1.86 GB";
     let cure = "--rows 64 --cols 64";
     assert!(error.contains(says) && error.contains(cure), "{error}");
     assert_eq!(error.trim_end().lines().count(), 1, "{error}");
