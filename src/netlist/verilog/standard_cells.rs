@@ -185,7 +185,7 @@ fn write_chain(out: &mut dyn Write, chain: Chain) -> io::Result<()> {
     }
     writeln!(out, "`endif\nendmodule\n")?;
     writeln!(out, "module {}(output Z, input A);", chain.module())?;
-    writeln!(out, "  wire [0:{}] node;", chain.stages)?;
+    writeln!(out, "  wire [{}:0] node;", chain.stages)?;
     writeln!(
         out,
         "  assign node[0] = A;\n  assign Z = node[{}];",
