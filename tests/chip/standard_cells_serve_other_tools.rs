@@ -89,7 +89,7 @@ fn delay_lines_pass_pulses_shorter_than_their_elements() {
         return;
     }
     let mut photons = 0;
-    for (seed, corner) in (0..6).zip(Corner::ALL.into_iter().cycle()) {
+    for (seed, corner) in (0..3).zip(Corner::ALL) {
         let config = SensorConfig {
             rows: 1,
             cols: 2,
@@ -108,7 +108,7 @@ fn delay_lines_pass_pulses_shorter_than_their_elements() {
         let seen = compare(&scenario);
         photons += seen.counts.iter().map(|count| count[3]).sum::<i64>();
     }
-    assert!(photons > 20, "{photons}");
+    assert!(photons > 10, "{photons}");
 }
 
 /// What is written cell by cell is what an elaborated design has.
