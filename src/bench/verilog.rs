@@ -22,99 +22,99 @@ use crate::chip::readout::ReadoutOrder;
 use crate::chip::{ReadProbe, SensorConfig, SensorPins, Silicon, array, probes};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::netlist::{
-    Corner, Direction, Module, Netlist, Timing, write_cells, write_delays, write_modules,
+    Chain, Corner, Direction, Module, Netlist, Timing, write_cells, write_delays, write_modules,
     write_parametric_cells, write_standard_cells,
 };
 use crate::units::Time;
 
-/// Writes cells and netlist of the whole array into `folder`.
-///
-/// # Errors
-/// When the folder or a file in it cannot be written.
-pub fn export_netlist(folder: &Path, config: &SensorConfig) -> Result<(), InputError> {
-    let (library, corner) = (Silicon::library(), config.corner);
-    let netlist = Netlist::elaborate(&array::circuit(config));
-    if netlist.own_delays().is_empty() {
-        return write_netlist(folder, config, &|out| write_cells(out, library, corner));
-    }
-    write_with_delays(folder, config, &Silicon::of(config).timing(&netlist))
+/// What is exported of a sensor.
+#[derive(Clone, Copy)]
+pub struct Export<'a> {
+    /// Name of the top module.
+    pub top: &'a str,
+    /// For a testbench.
+    pub plan: Option<&'a StimulusPlan>,
+    /// Delays of [`array::circuit`]'s cells, where they are not the library's: the cells of `cells.v` take delays as parameters then,
+    /// and one more file, `delays.v`, sets those that differ from the library.
+    pub timing: Option<&'a Timing>,
 }
 
-/// As [`export_netlist`], with stimulus and testbench.
+impl Export<'_> {
+    /// Writes cells and netlist of the whole array and, for a plan, stimulus and testbench into `folder`.
+    ///
+    /// # Errors
+    /// When the folder or a file in it cannot be written.
+    pub fn write(self, folder: &Path, config: &SensorConfig) -> Result<(), InputError> {
+        let (library, corner) = (Silicon::library(), config.corner);
+        let top = array::circuit(config);
+        let netlist = Netlist::elaborate(&top);
+        let own = (!netlist.own_delays().is_empty()).then(|| Silicon::of(config).timing(&netlist));
+        let timing = self.timing.or(own.as_ref());
+        let chains = Chain::all(&netlist);
+        let top = top.renamed(self.top);
+
+        create_folder(folder)?;
+        let file = |name: &str| folder.join(name);
+        OutputFile::write_with(&file("cells.v"), |out| match timing {
+            None => write_cells(out, library, corner),
+            Some(_) => write_parametric_cells(out, library, &chains, corner),
+        })?;
+        OutputFile::write_with(&file("cells_specify.v"), |out| {
+            write_standard_cells(out, library, &chains)
+        })?;
+        OutputFile::write_with(&file("design.v"), |out| write_modules(out, &top))?;
+        if let Some(timing) = timing {
+            let nominal = Timing::of_library(&netlist, library, corner);
+            OutputFile::write_with(&file("delays.v"), |out| {
+                write_delays(out, "dut", &netlist, timing, &nominal)
+            })?;
+        }
+        if let Some(plan) = self.plan {
+            OutputFile::write_with(&file("stimulus.txt"), |out| {
+                write_stimulus(out, &netlist, plan)
+            })?;
+            OutputFile::write_with(&file("tb.v"), |out| {
+                write_testbench(out, &top, config, plan, timing.is_some())
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// [`Export::write`] of cells and netlist alone.
 ///
 /// # Errors
-/// As [`export_netlist`].
+/// As [`Export::write`].
+pub fn export_netlist(folder: &Path, config: &SensorConfig) -> Result<(), InputError> {
+    let (top, plan, timing) = (array::NAME, None, None);
+    Export { top, plan, timing }.write(folder, config)
+}
+
+/// [`Export::write`] with stimulus and testbench.
+///
+/// # Errors
+/// As [`Export::write`].
 pub fn export_verilog(
     folder: &Path,
     config: &SensorConfig,
     plan: &StimulusPlan,
 ) -> Result<(), InputError> {
-    export_netlist(folder, config)?;
-    let netlist = Netlist::elaborate(&array::circuit(config));
-    write_replay(folder, config, plan, !netlist.own_delays().is_empty())
+    let (top, plan, timing) = (array::NAME, Some(plan), None);
+    Export { top, plan, timing }.write(folder, config)
 }
 
-/// As [`export_verilog`], with the delays of `timing`, which is that of [`array::circuit`]: the cells of `cells.v` take
-/// delays as parameters, and one more file, `delays.v`, sets those that differ from the library.
+/// [`Export::write`] with stimulus, testbench and other delays than the library's.
 ///
 /// # Errors
-/// As [`export_netlist`].
+/// As [`Export::write`].
 pub fn export_annotated_verilog(
     folder: &Path,
     config: &SensorConfig,
     plan: &StimulusPlan,
     timing: &Timing,
 ) -> Result<(), InputError> {
-    write_with_delays(folder, config, timing)?;
-    write_replay(folder, config, plan, true)
-}
-
-/// Cells that take delays as parameters, and `delays.v`, which sets those that differ from the library.
-fn write_with_delays(
-    folder: &Path,
-    config: &SensorConfig,
-    timing: &Timing,
-) -> Result<(), InputError> {
-    let (library, corner) = (Silicon::library(), config.corner);
-    write_netlist(folder, config, &|out| {
-        write_parametric_cells(out, library, corner)
-    })?;
-    let netlist = Netlist::elaborate(&array::circuit(config));
-    let nominal = Timing::of_library(&netlist, library, corner);
-    OutputFile::write_with(&folder.join("delays.v"), |out| {
-        write_delays(out, "dut", &netlist, timing, &nominal)
-    })
-}
-
-fn write_netlist(
-    folder: &Path,
-    config: &SensorConfig,
-    exact_cells: &dyn Fn(&mut dyn Write) -> io::Result<()>,
-) -> Result<(), InputError> {
-    create_folder(folder)?;
-    let file = |name: &str| folder.join(name);
-    OutputFile::write_with(&file("cells.v"), exact_cells)?;
-    OutputFile::write_with(&file("cells_specify.v"), |out| {
-        write_standard_cells(out, Silicon::library())
-    })?;
-    OutputFile::write_with(&file("design.v"), |out| {
-        write_modules(out, &array::circuit(config))
-    })
-}
-
-fn write_replay(
-    folder: &Path,
-    config: &SensorConfig,
-    plan: &StimulusPlan,
-    is_annotated: bool,
-) -> Result<(), InputError> {
-    let top = array::circuit(config);
-    OutputFile::write_with(&folder.join("stimulus.txt"), |out| {
-        write_stimulus(out, &Netlist::elaborate(&top), plan)
-    })?;
-    OutputFile::write_with(&folder.join("tb.v"), |out| {
-        write_testbench(out, &top, config, plan, is_annotated)
-    })
+    let (top, plan, timing) = (array::NAME, Some(plan), Some(timing));
+    Export { top, plan, timing }.write(folder, config)
 }
 
 fn write_stimulus(out: &mut dyn Write, netlist: &Netlist, plan: &StimulusPlan) -> io::Result<()> {

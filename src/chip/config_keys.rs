@@ -93,8 +93,8 @@ pub(super) const KEYS: &[Key] = &[
         "tdc",
         "",
         Range::OneOf(&["clocked", "delay_line"]),
-        "What times photons: bins are CLK periods, or elements of delay lines",
-        "thesis 4.9.3, Table 10",
+        "What times photons: a shift register, with bins of CLK periods (HSLIDAR's clocked mode has a counter in the thesis), or delay lines, whose elements are the bins and on which photons of a bin cancel in pairs",
+        "thesis 4.9.3, Table 10; the shift register and that photons cancel are chosen",
     ),
     Key::new(
         "delay_control_v",

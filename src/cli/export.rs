@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 use super::replay::Stimuli;
 use super::voice::tell;
 use super::{SensorArgs, export_frame, sdf};
-use crate::bench::{StimulusPlan, export_annotated_verilog, export_netlist, export_verilog};
+use crate::bench::{Export, StimulusPlan};
 use crate::chip::array;
 use crate::netlist::Netlist;
 
@@ -65,6 +65,7 @@ pub(super) fn run(command: &ExportCommand) -> anyhow::Result<()> {
 
 fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
     let sensor = args.sensor.read()?;
+    let top = args.sensor.chip();
     let folder = args.out.display();
     let (Some(inits), Some(events), Some(stop_periods), Some(laser_cycles)) = (
         &args.inits,
@@ -72,7 +73,8 @@ fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
         args.stop_periods,
         args.laser_cycles,
     ) else {
-        export_netlist(&args.out, &sensor)?;
+        let (plan, timing) = (None, None);
+        Export { top, plan, timing }.write(&args.out, &sensor)?;
         tell(format_args!(
             "design.v, cells.v and cells_specify.v in {folder}; for a testbench, add --inits, --events, --stop-periods and --laser-cycles\n"
         ))?;
@@ -90,14 +92,13 @@ fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
         true => plan.with_readout(),
         false => plan,
     };
-    match &args.sdf {
-        None => export_verilog(&args.out, &stimuli.sensor, &plan)?,
-        Some(path) => {
-            let netlist = Netlist::elaborate(&array::circuit(&stimuli.sensor));
-            let timing = sdf::annotated_timing(path, &netlist, &stimuli.sensor)?;
-            export_annotated_verilog(&args.out, &stimuli.sensor, &plan, &timing)?;
-        }
-    }
+    let timing = args.sdf.as_ref().map(|path| {
+        let netlist = Netlist::elaborate(&array::circuit(&stimuli.sensor));
+        sdf::annotated_timing(path, &netlist, &stimuli.sensor)
+    });
+    let timing = timing.transpose()?;
+    let (plan, timing) = (Some(&plan), timing.as_ref());
+    Export { top, plan, timing }.write(&args.out, &stimuli.sensor)?;
     tell(format_args!(
         "cd {folder} && iverilog -g2005 -o sim tb.v design.v cells.v && vvp sim\n"
     ))?;

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::voice::say;
-use crate::chip::Sensor;
+use super::voice::{note, say};
+use crate::chip::sensors::{CHIPS, HSLIDAR_MOST_HZ};
+use crate::chip::{Sensor, SensorConfig, array};
 use crate::files::InputError;
 use crate::request::{Sources, Spelling};
 use crate::scene::Scene;
@@ -44,7 +45,27 @@ impl SensorArgs {
     /// # Errors
     /// Unreadable files, bad keys and values, and `--set` of anything but the sensor.
     pub(super) fn read(&self) -> Result<Sensor, InputError> {
-        self.sources(None).read_sensor()
+        let sensor = self.sources(None).read_sensor()?;
+        self.note_clk(&sensor);
+        Ok(sensor)
+    }
+
+    /// What the top of the exported chip is called: modes of a chip are named after it.
+    pub(super) fn chip(&self) -> &'static str {
+        let asked = self.sources(None).chip().unwrap_or(array::NAME);
+        let mut chips = CHIPS.iter().map(|(chip, _)| *chip);
+        chips.find(|chip| asked.starts_with(chip)).unwrap_or(asked)
+    }
+
+    /// Says where CLK is faster than the thesis's chip takes.
+    fn note_clk(&self, sensor: &SensorConfig) {
+        if self.chip() == "hslidar" && sensor.clk_hz > HSLIDAR_MOST_HZ {
+            note(format_args!(
+                "CLK of {} MHz: the thesis's HSLIDAR takes {} MHz at most (6.3.1), and what is modelled here is its logic in a faster library",
+                sensor.clk_hz / 1e6,
+                HSLIDAR_MOST_HZ / 1e6
+            ));
+        }
     }
 
     /// Whether rows and columns are both asked for on the command line.
@@ -82,7 +103,9 @@ impl SceneArgs {
     /// # Errors
     /// Unreadable files, bad keys and values.
     pub(super) fn read(&self) -> Result<(Sensor, Scene), InputError> {
-        self.sources().read()
+        let (sensor, scene) = self.sources().read()?;
+        self.sensor.note_clk(&sensor);
+        Ok((sensor, scene))
     }
 
     /// What reports call the scene.

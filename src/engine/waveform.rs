@@ -213,6 +213,7 @@ pub fn record<O: Observer>(
         groups: groups(&netlist, pixel),
         zoom: (marker - view.around.0, marker + view.around.1),
         marker: Some(marker),
+        marks: Vec::new(),
     };
     layout.write_beside(waves, &netlist, *span.end())
 }

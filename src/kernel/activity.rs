@@ -151,7 +151,9 @@ impl Observer for Activity {
 mod tests {
     use super::*;
     use crate::kernel::{Drive, Kernel, in_order};
-    use crate::netlist::{ArcDelay, CellKind, Corner, Library, MAX_INPUTS, ModuleBuilder, Timing};
+    use crate::netlist::{
+        ArcDelay, CellKind, Corner, Library, MAX_INPUTS, MAX_OUTPUTS, ModuleBuilder, Timing,
+    };
     use Logic::{One, X, Zero};
 
     /// Input A, output Z = A NAND (A inverted three times): low for a while where A rises.
@@ -225,7 +227,7 @@ mod tests {
             rise_fs: 500_000,
             fall_fs: 500_000,
         };
-        timing.set(nand.unwrap(), [slow; MAX_INPUTS]);
+        timing.set(nand.unwrap(), [[slow; MAX_OUTPUTS]; MAX_INPUTS]);
         assert_eq!(run(&timing), ((20, [0, 0]), (0, [0, 20])));
     }
 }

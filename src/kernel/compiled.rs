@@ -4,7 +4,9 @@
 //! evaluating a gate is one table look-up.
 
 use crate::logic::Logic;
-use crate::netlist::{ArcDelay, CellKind, FlatCell, MAX_INPUTS, Netlist, Timing, next_state};
+use crate::netlist::{
+    ArcDelay, CellDelays, CellKind, FlatCell, MAX_INPUTS, Netlist, Timing, next_state,
+};
 
 /// One entry of a net's fan-out: cell and pin in one word.
 #[derive(Clone, Copy)]
@@ -43,8 +45,8 @@ pub(super) struct CellState {
     /// The nets on a flip-flop's D and clock.
     pub data: u32,
     pub clock: u32,
-    /// Index of its delays.
-    pub delays: u32,
+    /// Index of the delays to each output.
+    pub delays: [u32; 2],
     /// Output nets, `u32::MAX` where unconnected.
     pub outputs: [u32; 2],
 }
@@ -91,17 +93,34 @@ impl Tables {
     }
 }
 
-/// Delays of one set by new value, and by pin.
-#[derive(Clone, Copy)]
+/// Delays to one output by new value, and by pin.
+#[derive(Clone, Copy, PartialEq)]
 pub(super) struct DelaySet([[u32; 4]; MAX_INPUTS]);
 
 impl DelaySet {
-    /// The sets of `timing`, in its order.
-    pub(super) fn all(timing: &Timing) -> Vec<Self> {
+    /// The sets of `timing` for the first output, in its order, and then those for a second output that differ from
+    /// the first; and, by set of `timing`, where that of each output is. Cells look up one set where both are the same.
+    pub(super) fn all(netlist: &Netlist, timing: &Timing) -> (Vec<Self>, Vec<[u32; 2]>) {
         let by_value = |arc: &ArcDelay| Logic::ALL.map(|to| arc.to(to));
-        let sets = timing.sets().iter();
-        sets.map(|set| DelaySet(set.each_ref().map(by_value)))
-            .collect()
+        let to_output = |set: &CellDelays, output: usize| {
+            DelaySet(set.each_ref().map(|outputs| by_value(&outputs[output])))
+        };
+        let sets = timing.sets();
+        let mut all: Vec<Self> = sets.iter().map(|set| to_output(set, 0)).collect();
+        let mut have_two = vec![false; sets.len()];
+        for (index, cell) in netlist.cells().iter().enumerate() {
+            have_two[timing.set_of(index) as usize] |= cell.kind.outputs().len() > 1;
+        }
+        let places = (0..).zip(sets).map(|(first, set)| {
+            let second = to_output(set, 1);
+            if !have_two[first as usize] || second == all[first as usize] {
+                return [first; 2];
+            }
+            all.push(second);
+            [first, all.len() as u32 - 1]
+        });
+        let places = places.collect();
+        (all, places)
     }
 
     /// Delays by new value from one pin.
@@ -213,8 +232,12 @@ impl Loads {
     }
 }
 
-/// Every cell with unknown inputs and state.
-pub(super) fn initial_cells(netlist: &Netlist, timing: &Timing) -> Vec<CellState> {
+/// Every cell with unknown inputs and state; `delays` are the places of [`DelaySet::all`].
+pub(super) fn initial_cells(
+    netlist: &Netlist,
+    timing: &Timing,
+    delays: &[[u32; 2]],
+) -> Vec<CellState> {
     netlist
         .cells()
         .iter()
@@ -234,7 +257,7 @@ pub(super) fn initial_cells(netlist: &Netlist, timing: &Timing) -> Vec<CellState
                 is_dirty: false,
                 data: cell.inputs[0].index() as u32,
                 clock: cell.inputs[CLOCK].index() as u32,
-                delays: timing.set_of(index),
+                delays: delays[timing.set_of(index) as usize],
                 outputs: cell.outputs.map(|n| {
                     if n.is_some() {
                         n.index() as u32
@@ -260,8 +283,9 @@ mod tests {
         m.gate(CellKind::Mux2, &[a, b, s]);
         let netlist = Netlist::elaborate(&m.finish().unwrap());
         let timing = Timing::nominal(&netlist, &library, Corner::Typ);
-        let set = DelaySet::all(&timing)[timing.set_of(0) as usize];
-        let arc = |pin: usize| library.arcs(CellKind::Mux2)[pin].delay_fs(Corner::Typ, Logic::One);
+        let set = DelaySet::all(&netlist, &timing).0[timing.set_of(0) as usize];
+        let arc =
+            |pin: usize| library.arcs(CellKind::Mux2)[pin][0].delay_fs(Corner::Typ, Logic::One);
         let by_pins = |differing: u8| set.after(differing, 0)[Logic::One as usize];
         assert_eq!(by_pins(0b00_00_01), arc(0));
         assert_eq!(by_pins(0b10_00_00), arc(2));

@@ -76,7 +76,8 @@ struct CellState {
     model: DelayModel,
     inputs: [u32; MAX_INPUTS],
     outputs: [u32; 2],
-    delays: u32,
+    /// Index of the delays to each output.
+    delays: [u32; 2],
     /// Lanes in which each pin changed since the last evaluation; a flip-flop's clock is in its net's [`ClockEdge`].
     changed: [u64; MAX_INPUTS],
     state: Lanes,
@@ -121,6 +122,7 @@ impl LaneKernel {
             target: unknown,
             groups: NONE,
         };
+        let (delays, places) = DelaySet::all(netlist, timing);
         let index = |n: NetId| if n.is_some() { n.index() as u32 } else { NONE };
         let cells = netlist
             .cells()
@@ -132,7 +134,7 @@ impl LaneKernel {
                 model: timing.model(i),
                 inputs: cell.inputs.map(index),
                 outputs: cell.outputs.map(index),
-                delays: timing.set_of(i),
+                delays: places[timing.set_of(i) as usize],
                 changed: [0; MAX_INPUTS],
                 state: unknown,
             });
@@ -141,7 +143,7 @@ impl LaneKernel {
             nets: vec![net; netlist.net_count()],
             cells: cells.collect(),
             fan_out: FanOut::new(netlist, &[]),
-            delays: DelaySet::all(timing),
+            delays,
             wheel: TimeWheel::new(),
             groups: Vec::new(),
             free_group: NONE,
@@ -327,11 +329,11 @@ impl LaneKernel {
                 next
             }
         };
-        let (outputs, delays) = (cell.outputs, (cell.model, cell.delays as usize));
+        let (outputs, model, sets) = (cell.outputs, cell.model, cell.delays);
         let changed = std::mem::take(&mut cell.changed);
-        self.schedule(outputs[0], value, delays, &changed);
+        self.schedule(outputs[0], value, (model, sets[0]), &changed);
         if outputs[1] != NONE {
-            self.schedule(outputs[1], value.not(), delays, &changed);
+            self.schedule(outputs[1], value.not(), (model, sets[1]), &changed);
         }
     }
 
@@ -339,7 +341,7 @@ impl LaneKernel {
         &mut self,
         net: u32,
         value: Lanes,
-        (model, set): (DelayModel, usize),
+        (model, set): (DelayModel, u32),
         changed: &[u64; MAX_INPUTS],
     ) {
         let Some(state) = self.nets.get_mut(net as usize) else {
@@ -373,7 +375,7 @@ impl LaneKernel {
             }
             left &= !alike;
             debug_assert!(pins != 0, "an output moved without a cause");
-            let delays_fs = self.delays[set].after(pins, 0);
+            let delays_fs = self.delays[set as usize].after(pins, 0);
             for (mask, to) in [
                 (value.one, Logic::One),
                 (value.zero, Logic::Zero),

@@ -32,7 +32,7 @@ pub(super) struct ShiftBank {
     pub cells: Vec<u32>,
     /// Their outputs, in ascending order.
     pub nets: Vec<u32>,
-    /// Delays from the clock.
+    /// Delays to Q.
     pub delays: u32,
     /// States, and what the outputs show, while it is formed.
     pub state: Vec<u64>,

@@ -93,6 +93,7 @@ impl Kernel {
         for &cell in banks.iter().flat_map(|bank| &bank.cells) {
             apart[cell as usize] = true;
         }
+        let (delays, places) = DelaySet::all(netlist, timing);
         let mut nets = vec![unknown; netlist.net_count()];
         for net in transport.nets() {
             nets[net].pending = QUEUED;
@@ -100,8 +101,8 @@ impl Kernel {
         Kernel {
             now_fs: 0,
             nets,
-            cells: initial_cells(netlist, timing),
-            delays: DelaySet::all(timing),
+            cells: initial_cells(netlist, timing, &places),
+            delays,
             fan_out: FanOut::new(netlist, &apart),
             tables: Tables::new(),
             wheel: TimeWheel::new(),
@@ -204,12 +205,12 @@ impl Kernel {
             return;
         }
         cell.state = state;
-        let (outputs, set) = (cell.outputs, cell.delays as usize);
+        let (outputs, sets) = (cell.outputs, cell.delays);
         let inverted = Logic::from_bits(state).inverted().bits();
-        let delays = *self.delays[set].after_pin(CLOCK);
+        let [to_q, to_qn] = sets.map(|set| *self.delays[set as usize].after_pin(CLOCK));
         // A value that becomes unknown is no pulse.
-        self.schedule(outputs[0], state, &delays, &mut ());
-        self.schedule(outputs[1], inverted, &delays, &mut ());
+        self.schedule(outputs[0], state, &to_q, &mut ());
+        self.schedule(outputs[1], inverted, &to_qn, &mut ());
     }
 
     /// Gives flip-flops (index of their cell) another state and lets everything that follows from it follow, without time
@@ -388,7 +389,7 @@ impl Kernel {
             self.dissolve_bank_of(index);
             self.evaluate_flip_flop(index, evaluated, observer);
         } else {
-            let (output, set) = (cell.outputs[0], cell.delays);
+            let (output, set) = (cell.outputs[0], cell.delays[0]);
             let value = self.tables.gate(kind, inputs);
             let delays = self.delays[set as usize].after(inputs, evaluated);
             self.schedule(output, value, &delays, observer);
@@ -410,10 +411,13 @@ impl Kernel {
             return;
         }
         cell.state = state;
-        let (outputs, set) = (cell.outputs, cell.delays);
+        let (outputs, [to_q, to_qn]) = (cell.outputs, cell.delays);
         let inverted = Logic::from_bits(state).inverted().bits();
-        let delays = self.delays[set as usize].after(inputs, before);
+        let mut delays = self.delays[to_q as usize].after(inputs, before);
         self.schedule(outputs[0], state, &delays, observer);
+        if to_qn != to_q {
+            delays = self.delays[to_qn as usize].after(inputs, before);
+        }
         self.schedule(outputs[1], inverted, &delays, observer);
     }
 

@@ -1,4 +1,4 @@
-//! Delays of the cell library: one arc per input pin, rise and fall, at three corners.
+//! Delays of the cell library: an arc from each input pin to each output pin, rise and fall, at three corners.
 //!
 //! An arc's delay is that from a change of the input to the change of the output it causes. The
 //! default numbers stand for a 40 nm logic process at 50 °C with extracted wiring; they are chosen
@@ -6,17 +6,18 @@
 //! the published 1.2 ns in the typical corner (thesis 4.6, Fig. 56). Fast and slow corners scale it
 //! by 0.72 and 1.45, the usual spread of such a process over voltage and temperature.
 //!
-//! A flip-flop's Q and Q̄ rise and fall equally fast: the custom cell drives both from its slave
+//! A flip-flop's Q and Q̄ have the same delays here, rising and falling: the custom cell drives both from its slave
 //! latch. Gate delays differ between rise and fall, and the numbers share no common divisor, so
 //! that two different paths almost never end in the same femtosecond.
 
-use super::cell::{CellKind, MAX_INPUTS};
+use super::cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
 use super::check_limits::CheckLimits;
 use super::corner::{Corner, Delay};
+use super::timing::{ArcDelay, CellDelays};
 use crate::logic::Logic;
 use crate::units::Time;
 
-/// Delays from one input pin to the cell's outputs, by direction of the output's change.
+/// Delays from one input pin to one output pin, by direction of the output's change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TimingArc {
     /// Output rises.
@@ -46,8 +47,8 @@ impl TimingArc {
     }
 }
 
-/// Arcs of one cell, indexed by input pin. The D pin of a flip-flop has none (all zero).
-pub type CellArcs = [TimingArc; MAX_INPUTS];
+/// Arcs of one cell, indexed by input pin and output pin. The D pin of a flip-flop has none (all zero).
+pub type CellArcs = [[TimingArc; MAX_OUTPUTS]; MAX_INPUTS];
 
 /// The delays of every cell, and the limits of every flip-flop.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -59,15 +60,18 @@ pub struct Library {
 impl Default for Library {
     /// The library described at the head of this file.
     fn default() -> Self {
-        const NONE: TimingArc = TimingArc::scaled(0, 0);
-        const fn gate(rise_fs: u32, fall_fs: u32) -> CellArcs {
-            let arc = TimingArc::scaled(rise_fs, fall_fs);
-            [arc, arc, NONE, NONE]
+        /// To every output alike.
+        const fn arcs(rise_fs: u32, fall_fs: u32) -> [TimingArc; MAX_OUTPUTS] {
+            [TimingArc::scaled(rise_fs, fall_fs); MAX_OUTPUTS]
         }
-        const CLOCK_TO_Q: TimingArc = TimingArc::scaled(75_311, 75_311);
-        const RESET_TO_Q: TimingArc = TimingArc::scaled(81_043, 81_043);
-        const MUX_DATA: TimingArc = TimingArc::scaled(45_127, 46_381);
-        const MUX_SELECT: TimingArc = TimingArc::scaled(52_919, 54_037);
+        const NONE: [TimingArc; MAX_OUTPUTS] = arcs(0, 0);
+        const fn gate(rise_fs: u32, fall_fs: u32) -> CellArcs {
+            [arcs(rise_fs, fall_fs), arcs(rise_fs, fall_fs), NONE, NONE]
+        }
+        const CLOCK_TO_Q: [TimingArc; MAX_OUTPUTS] = arcs(75_311, 75_311);
+        const RESET_TO_Q: [TimingArc; MAX_OUTPUTS] = arcs(81_043, 81_043);
+        const MUX_DATA: [TimingArc; MAX_OUTPUTS] = arcs(45_127, 46_381);
+        const MUX_SELECT: [TimingArc; MAX_OUTPUTS] = arcs(52_919, 54_037);
         let cells = CellKind::ALL.map(|kind| match kind {
             CellKind::Inv => gate(21_013, 18_979),
             CellKind::Buf => gate(46_219, 45_403),
@@ -80,8 +84,8 @@ impl Default for Library {
             CellKind::Mux2 => [MUX_DATA, MUX_DATA, MUX_SELECT, NONE],
             CellKind::Dffr => [NONE, CLOCK_TO_Q, RESET_TO_Q, NONE],
             CellKind::Dffsr => {
-                const SLOWER_CLOCK: TimingArc = TimingArc::scaled(96_181, 96_181);
-                const SLOWER_CLEAR: TimingArc = TimingArc::scaled(104_233, 104_233);
+                const SLOWER_CLOCK: [TimingArc; MAX_OUTPUTS] = arcs(96_181, 96_181);
+                const SLOWER_CLEAR: [TimingArc; MAX_OUTPUTS] = arcs(104_233, 104_233);
                 [NONE, SLOWER_CLOCK, SLOWER_CLEAR, SLOWER_CLEAR]
             }
         });
@@ -94,6 +98,15 @@ impl Library {
     /// Arcs of one cell.
     pub fn arcs(&self, kind: CellKind) -> &CellArcs {
         &self.cells[kind as usize]
+    }
+
+    /// Delays of one cell in a corner.
+    pub(super) fn delays(&self, kind: CellKind, corner: Corner) -> CellDelays {
+        let arc = |arc: TimingArc| ArcDelay {
+            rise_fs: arc.rise.at(corner),
+            fall_fs: arc.fall.at(corner),
+        };
+        self.arcs(kind).map(|outputs| outputs.map(arc))
     }
 
     /// Replaces the arcs of one cell.
@@ -111,9 +124,9 @@ impl Library {
         self.checks[kind as usize] = limits;
     }
 
-    /// Delay from input `pin` to an output changing to `to`.
+    /// Delay from input `pin` to the first output changing to `to`.
     pub fn delay(&self, kind: CellKind, pin: usize, to: Logic, corner: Corner) -> Time {
-        Time::from_fs(self.arcs(kind)[pin].delay_fs(corner, to) as i64)
+        Time::from_fs(self.arcs(kind)[pin][0].delay_fs(corner, to) as i64)
     }
 }
 

@@ -11,6 +11,7 @@
 
 mod builder;
 mod cell;
+mod chain;
 mod check_limits;
 mod corner;
 mod flat;
@@ -28,6 +29,7 @@ mod verilog;
 pub use builder::{ModuleBuilder, NetlistError};
 pub(crate) use cell::next_state;
 pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
+pub use chain::Chain;
 pub use check_limits::{CheckKind, CheckLimits, DataLimit};
 pub use corner::{Corner, Delay, Edge};
 pub use flat::{FlatCell, NetId, Netlist, Scope};

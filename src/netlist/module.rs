@@ -118,6 +118,16 @@ pub(super) struct Names {
     instances: HashMap<String, u32>,
 }
 
+impl Module {
+    /// The same module by another name.
+    pub fn renamed(&self, name: &str) -> Arc<Self> {
+        Arc::new(Module {
+            name: name.to_owned(),
+            ..self.clone()
+        })
+    }
+}
+
 impl Names {
     /// The names of a complete module.
     pub(super) fn of(module: &Module) -> Self {

@@ -4,7 +4,7 @@
 //! Elements differ at random, each by its place in the chip, as [`Mismatch`] has it for the rest of the cells. They differ in
 //! every chip, whether or not other cells are taken to.
 
-use super::cell::MAX_INPUTS;
+use super::cell::{MAX_INPUTS, MAX_OUTPUTS};
 use super::corner::{Corner, Delay};
 use super::timing::{ArcDelay, CellDelays, DelayModel};
 use super::variation::Mismatch;
@@ -53,6 +53,6 @@ impl OwnDelay {
             rise_fs: fs,
             fall_fs: fs,
         };
-        [arc; MAX_INPUTS]
+        [[arc; MAX_OUTPUTS]; MAX_INPUTS]
     }
 }

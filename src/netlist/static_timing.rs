@@ -94,6 +94,7 @@ struct ArcTo {
     to: Node,
     cell: usize,
     pin: usize,
+    output: usize,
 }
 
 impl<'n> StaticTiming<'n> {
@@ -144,6 +145,7 @@ impl<'n> StaticTiming<'n> {
                         to: node(net, edge),
                         cell,
                         pin,
+                        output,
                     })
                 })
         })
@@ -207,11 +209,11 @@ impl<'n> StaticTiming<'n> {
                 let (cell, pin) = (arc.cell, arc.pin);
                 let level = edge_of(arc.to).level();
                 let delays = self.timing.of(cell);
-                let own = delays[pin].to(level);
+                let own = delays[pin][arc.output].to(level);
                 let leaf = &self.netlist.cells()[cell];
                 let quickest = (0..leaf.kind.inputs().len())
                     .filter(|&other| leaf.kind.triggers(other) && can_change(leaf.inputs[other]))
-                    .map(|other| delays[other].to(level))
+                    .map(|other| delays[other][arc.output].to(level))
                     .fold(own, u32::min);
                 let arrival = |time_fs| Arrival {
                     time_fs,

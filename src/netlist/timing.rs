@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use super::cell::{CellKind, MAX_INPUTS};
+use super::cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
 use super::corner::Corner;
 use super::flat::Netlist;
 use super::instance_limits::InstanceLimits;
@@ -23,7 +23,7 @@ pub enum DelayModel {
     Transport,
 }
 
-/// Delays from one input pin to an output, fs.
+/// Delays from one input pin to one output pin, fs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ArcDelay {
     /// To a rising output.
@@ -44,8 +44,8 @@ impl ArcDelay {
     }
 }
 
-/// Delays of one cell by input pin.
-pub type CellDelays = [ArcDelay; MAX_INPUTS];
+/// Delays of one cell by input pin and output pin. Those to an output that a cell does not have mean nothing.
+pub type CellDelays = [[ArcDelay; MAX_OUTPUTS]; MAX_INPUTS];
 
 /// Delays of every cell of a netlist, and limits of every flip-flop.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -82,14 +82,10 @@ impl Timing {
 
     /// Every cell as the library has it in this corner, even those with delays of their own.
     pub fn of_library(netlist: &Netlist, library: &Library, corner: Corner) -> Self {
-        let arc = |kind: CellKind, pin: usize| ArcDelay {
-            rise_fs: library.arcs(kind)[pin].delay_fs(corner, Logic::One),
-            fall_fs: library.arcs(kind)[pin].delay_fs(corner, Logic::Zero),
-        };
         Timing {
             sets: CellKind::ALL
                 .iter()
-                .map(|&kind| std::array::from_fn(|pin| arc(kind, pin)))
+                .map(|&kind| library.delays(kind, corner))
                 .collect(),
             models: vec![DelayModel::Inertial; CellKind::ALL.len()],
             of_cell: netlist.cells().iter().map(|c| c.kind as u32).collect(),
@@ -178,10 +174,10 @@ mod tests {
         let netlist = Netlist::elaborate(&m.finish().unwrap());
         let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
         let nominal = *timing.of(0);
-        let slow = [ArcDelay {
+        let slow = [[ArcDelay {
             rise_fs: 9,
             fall_fs: 8,
-        }; MAX_INPUTS];
+        }; MAX_OUTPUTS]; MAX_INPUTS];
         timing.set(1, slow);
         timing.set_model(1, DelayModel::Transport);
         timing.set(1, slow);
@@ -189,6 +185,6 @@ mod tests {
         assert_eq!(timing.model(1), DelayModel::Transport);
         assert_eq!(*timing.of(0), nominal);
         assert_eq!(*timing.of(1), slow);
-        assert_eq!(timing.of(1)[0].to(Logic::X), 8);
+        assert_eq!(timing.of(1)[0][0].to(Logic::X), 8);
     }
 }

@@ -159,11 +159,11 @@ pub(crate) fn varied_as(
         let mismatch = mismatch.filter(|_| !wires.contains(&index));
         let own = mismatch.map_or(1.0, |m| m.factor(&path(index), cell.kind.transistors()));
         let scale = |fs: u32| (fs as f64 * factor * own).round() as u32;
-        let delays = nominal.of(index).map(|mut arc| {
+        let mut delays = *nominal.of(index);
+        for arc in delays.as_flattened_mut() {
             arc.rise_fs = scale(arc.rise_fs);
             arc.fall_fs = scale(arc.fall_fs);
-            arc
-        });
+        }
         timing.set(index, delays);
     }
     timing.scale_limits(factor);

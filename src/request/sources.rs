@@ -94,6 +94,13 @@ impl Sources {
         Ok(SensorConfig::read_document(&sensor)?.into())
     }
 
+    /// The built-in chip that is asked for by its name.
+    pub fn chip(&self) -> Option<&'static str> {
+        let name = self.sensor.as_ref().filter(|path| is_name(path))?.to_str();
+        let mut chips = CHIPS.iter().map(|(chip, _)| *chip);
+        chips.find(|&chip| name == Some(chip))
+    }
+
     /// What reports call the scene.
     pub fn scene_name(&self) -> String {
         match &self.scene {

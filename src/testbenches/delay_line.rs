@@ -190,5 +190,6 @@ fn view(sensor: &Sensor, exposure: &Exposure, origin: Time) -> Layout {
         groups,
         zoom: (origin, origin + exposure.stop(1)),
         marker: Some(origin),
+        marks: Vec::new(),
     }
 }

@@ -303,5 +303,6 @@ fn view() -> Layout {
         ],
         zoom: (BEGIN, BEGIN + Time::from_ns(40)),
         marker: Some(BEGIN),
+        marks: Vec::new(),
     }
 }

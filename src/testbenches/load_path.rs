@@ -391,5 +391,6 @@ fn view(config: &SensorConfig, (start, end): (Time, Time)) -> Layout {
         groups,
         zoom: (Time::ZERO, end + PAUSE),
         marker: Some(start),
+        marks: Vec::new(),
     }
 }

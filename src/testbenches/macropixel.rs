@@ -25,7 +25,7 @@ use crate::photon::SpadEvent;
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::Time;
-use crate::waves::{Entry, Group, Layout};
+use crate::waves::{Entry, Group, Layout, mark};
 
 /// Start values of Fig. 48's two macropixels, three bins apart.
 const FIG_48: [u16; 2] = [52, 49];
@@ -49,7 +49,7 @@ fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         rows: 1,
         ..(*chip::hslidar()).clone()
     };
-    two_windows(&hslidar, &chip, HSLIDAR, "HSLIDAR, 4.9.3", checks)?;
+    two_windows(&hslidar, &chip, HSLIDAR, "4.9.3", checks)?;
     bin_edge(checks);
     full_bins(checks);
     coincidences(checks);
@@ -155,7 +155,16 @@ fn two_windows(
     let local_stop = SensorPins::of(&netlist).local_stop;
     let mut recorder = Recorder::new(local_stop.iter().copied());
     let origin = gate.schedule().origin;
-    let view = view(&config, (starts, figure), origin, origin + exposure.stop(1));
+    // Edges of the bins of both windows, the earlier one's first.
+    let edges =
+        (0..=(config.bins + shift) as i64).map(|bin| law.bin_interval(&second, 0, bin).start);
+    let edges: Vec<Time> = edges.map(|edge| origin + edge).collect();
+    let view = view(
+        &config,
+        (starts, figure),
+        (origin, origin + exposure.stop(1)),
+        edges,
+    );
     write_waves(waves, &netlist, &view, |waves| {
         gate.run(&mut (&mut recorder, waves));
         gate.schedule().end
@@ -221,17 +230,18 @@ fn two_windows(
 fn view(
     config: &SensorConfig,
     (starts, figure): ([u16; 2], &str),
-    origin: Time,
-    end: Time,
+    (origin, end): (Time, Time),
+    edges: Vec<Time>,
 ) -> Layout {
-    let mut groups = vec![Group::new(
-        "Global signals",
-        [
-            Entry::binary("CLK"),
-            Entry::binary("STOP"),
-            Entry::binary("ENABLE"),
-        ],
-    )];
+    // Where few bins leave room, the view shows all of them and opens on the windows, so that a value has its place in a CLK
+    // period; else the first, the middle and the last bin, in a whole laser cycle.
+    let has_room = config.bins <= 8;
+    let pins = match has_room {
+        true => &["CLK", "STOP"][..],
+        false => &["CLK", "STOP", "ENABLE"],
+    };
+    let pins = pins.iter().copied().map(Entry::binary);
+    let mut groups = vec![Group::new("Global signals", pins)];
     for (col, start) in starts.into_iter().enumerate() {
         let pixel = array::pixel_name(0, col);
         let signals = [
@@ -243,18 +253,30 @@ fn view(
             Entry::binary(Probe::Shift.path(&pixel)),
             Entry::binary(Probe::Hit.path(&pixel)),
         ];
-        // The first, the middle and the last bin; GTKWave widens its column of names for a longer title.
-        let bins = [0, config.bins / 2, config.bins - 1];
+        let bins = match has_room {
+            true => (0..config.bins).collect(),
+            false => vec![0, config.bins / 2, config.bins - 1],
+        };
+        let bins = bins.into_iter();
         let bins = bins.map(|bin| Entry::decimal(probes::bin_path(&pixel, bin)));
+        // GTKWave widens its column of names for a longer title.
+        let first = usize::from(start - starts[1]) * config.step_periods;
+        let [from, until] = [first, first + config.bins].map(mark);
         groups.push(Group::new(
-            format!("Macropixel {}: {start} ({figure})", col + 1),
+            format!("Macropixel {}: {start} ({figure}), {from}-{until}", col + 1),
             signals.into_iter().chain(bins),
         ));
     }
+    let shown = match edges[..] {
+        // LOCAL_STOP and the counts come some CLK periods after the last bin's photons.
+        [first, .., last] if has_room => (first, last + Time::from_s(3.0 / config.clk_hz)),
+        _ => (origin, end + Time::from_ns(5)),
+    };
     Layout {
         groups,
-        zoom: (origin - Time::from_ns(5), end + Time::from_ns(5)),
+        zoom: (shown.0 - Time::from_ns(5), shown.1),
         marker: Some(origin),
+        marks: edges,
     }
 }
 

@@ -346,6 +346,7 @@ fn view(first_stop: Time, last: Time) -> Layout {
         ],
         zoom: (Time::ZERO, last),
         marker: Some(first_stop),
+        marks: Vec::new(),
     }
 }
 

@@ -260,5 +260,6 @@ fn view(config: &SensorConfig, counted: Time) -> Layout {
         groups,
         zoom: (counted - PAUSE, counted + word * 3),
         marker: Some(counted),
+        marks: Vec::new(),
     }
 }

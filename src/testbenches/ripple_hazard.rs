@@ -209,6 +209,7 @@ fn outcome(period: Time, policy: Policy) -> Outcome {
         groups: Vec::new(),
         zoom: (Time::ZERO, Time::ZERO),
         marker: None,
+        marks: Vec::new(),
     };
     expose(period, policy, None, view).expect("no file is written")
 }
@@ -384,5 +385,6 @@ fn view(stop: &dyn Fn(i64) -> Time, period: Time, sees_old: &[bool]) -> Layout {
         groups,
         zoom: (strobe - period, strobe + period),
         marker: Some(strobe),
+        marks: Vec::new(),
     }
 }

@@ -10,7 +10,7 @@
 
 use std::io::{self, Write};
 
-use super::layout::{Layout, Radix, Shape, one_line};
+use super::layout::{Layout, MARKS, Radix, Shape, one_line};
 use crate::netlist::Netlist;
 use crate::units::Time;
 
@@ -64,8 +64,10 @@ impl Layout {
         writeln!(out, "[size] {} {}", WINDOW.0, WINDOW.1)?;
         writeln!(out, "[pos] -1 -1")?;
         let marker = self.marker.map_or(-1, Time::as_fs);
-        // After the primary marker come the 26 lettered ones, all absent.
-        let lettered = " -1".repeat(26);
+        // After the primary marker come the lettered ones.
+        let marks = self.marks.iter().map(|mark| mark.as_fs());
+        let lettered = marks.chain(std::iter::repeat(-1)).take(MARKS);
+        let lettered: String = lettered.map(|fs| format!(" {fs}")).collect();
         let zoom = self.zoom_level(names_width);
         writeln!(out, "*{zoom:.6} {marker}{lettered}")?;
         for scope in self.open_scopes(top) {
@@ -147,8 +149,8 @@ mod tests {
 [timestart] 1000000
 [size] 1600 900
 [pos] -1 -1
-*-18.395516 2000000"#,
-            " -1".repeat(26),
+*-18.395516 2000000 1000000 2500000"#,
+            " -1".repeat(24),
             r#"[treeopen] top.
 [treeopen] top.inner.
 [sst_width] 220

@@ -80,6 +80,17 @@ pub struct Layout {
     pub zoom: (Time, Time),
     /// Where the marker stands.
     pub marker: Option<Time>,
+    /// Further instants, marked with the letters from A on ([`mark`]); 26 at most are shown.
+    pub marks: Vec<Time>,
+}
+
+/// Marks that a viewer has.
+pub(super) const MARKS: usize = 26;
+
+/// The letter of a mark, by its place among [`Layout::marks`].
+pub fn mark(place: usize) -> char {
+    debug_assert!(place < MARKS, "there are 26 letters");
+    char::from(b'A' + place as u8)
 }
 
 /// What a viewer has to know of a signal.
@@ -157,6 +168,7 @@ pub(super) mod sample {
             groups,
             zoom: (Time::from_ns(1), Time::from_ns(3)),
             marker: Some(Time::from_ns(2)),
+            marks: vec![Time::from_ns(1), Time::from_ps(2_500)],
         }
     }
 

@@ -45,7 +45,7 @@ mod writer;
 
 pub use file::{VIEWS, WaveFile, WaveFormat};
 pub use fst::{Fst, FstWriter};
-pub use layout::{Entry, Group, Layout, Radix};
+pub use layout::{Entry, Group, Layout, Radix, mark};
 pub use saif::write_saif;
 pub use selection::Selection;
 pub use vcd::{Vcd, VcdWriter};

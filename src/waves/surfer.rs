@@ -10,7 +10,7 @@
 
 use std::io::{self, Write};
 
-use super::layout::{Layout, Radix, Shape, one_line};
+use super::layout::{Layout, MARKS, Radix, Shape, mark, one_line};
 use crate::netlist::Netlist;
 use crate::units::Time;
 
@@ -75,6 +75,9 @@ impl Layout {
         if let Some(marker) = self.marker {
             writeln!(out, "cursor_set {}", marker.as_fs())?;
         }
+        for (place, time) in self.marks.iter().take(MARKS).enumerate() {
+            writeln!(out, "marker_set {} {}", mark(place), time.as_fs())?;
+        }
         Ok(out)
     }
 }
@@ -130,6 +133,8 @@ zoom_in
 goto_start
 cursor_set 2000000
 cursor_set 2000000
+marker_set A 1000000
+marker_set B 2500000
 ";
         assert_eq!(commands(groups()).unwrap(), expected);
     }

@@ -27,6 +27,7 @@ use crate::wide8x8::wide8x8;
 use crate::every_edge;
 
 use std::cell::Cell;
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{BufReader, Cursor};
@@ -134,7 +135,7 @@ fn compare(case: &Case) -> Result<Figures, TestCaseError> {
     if case.has_transport() {
         let nominal = Timing::nominal(&netlist, &library, corner);
         let timing = case.timing(&netlist);
-        write_parametric_cells(&mut cells, &library, corner).unwrap();
+        write_parametric_cells(&mut cells, &library, &BTreeSet::new(), corner).unwrap();
         write_delays(&mut parameters, "dut", &netlist, &timing, &nominal).unwrap();
     } else {
         write_cells(&mut cells, &library, corner).unwrap();

@@ -129,11 +129,11 @@ impl Seen {
 pub fn random_delays(netlist: &Netlist, nominal: &Timing, random: &mut StdRng) -> Timing {
     let mut timing = nominal.clone();
     for cell in 0..netlist.cells().len() {
-        let delays = nominal.of(cell).map(|mut arc| {
+        let mut delays = *nominal.of(cell);
+        for arc in delays.as_flattened_mut() {
             arc.rise_fs = (arc.rise_fs as f64 * random.random_range(0.7..1.4)) as u32;
             arc.fall_fs = (arc.fall_fs as f64 * random.random_range(0.7..1.4)) as u32;
-            arc
-        });
+        }
         timing.set(cell, delays);
     }
     timing

@@ -240,11 +240,11 @@ fn shortened(netlist: &Netlist, factor: f64) -> Timing {
     let mut timing = Timing::nominal(netlist, &Library::default(), Corner::Typ);
     for index in Probes::of_macropixel(netlist, 0, 0).timing_block_cells(netlist) {
         if netlist.cells()[index].kind == CellKind::Buf {
-            let delays = timing.of(index).map(|mut arc| {
+            let mut delays = *timing.of(index);
+            for arc in delays.as_flattened_mut() {
                 arc.rise_fs = (arc.rise_fs as f64 * factor) as u32;
                 arc.fall_fs = (arc.fall_fs as f64 * factor) as u32;
-                arc
-            });
+            }
             timing.set(index, delays);
         }
     }

@@ -429,7 +429,7 @@ proptest! {
         let hold = DataLimit { rise: hold, fall: hold_fall };
         let limits = CheckLimits { setup, hold, recovery, removal, clock_high, clock_low, control_high };
         library.set_checks(kind, limits);
-        let arc = |fs| TimingArc { rise: Delay::fixed(fs), fall: Delay::fixed(fs) };
+        let arc = |fs| [TimingArc { rise: Delay::fixed(fs), fall: Delay::fixed(fs) }; 2];
         library.set_arcs(kind, [arc(0), arc(delays[0]), arc(delays[1]), arc(delays[1])]);
         let netlist = pair(kind);
         let pins = kind.inputs();

@@ -135,7 +135,7 @@ fn coarse_library() -> Library {
             rise: Delay::fixed(fs),
             fall: Delay::fixed(fs),
         };
-        library.set_arcs(kind, [arc; 4]);
+        library.set_arcs(kind, [[arc; 2]; 4]);
     }
     library
 }

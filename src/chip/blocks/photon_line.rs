@@ -1,5 +1,6 @@
-//! Photon line: all SPADs of a macropixel on one line, on which every pulse is an edge (thesis 2.4.1, Fig. 22b; 4.9.3). It is the
-//! front end of a TDC that a delay line times, and knows no CLK.
+//! Photon line: all SPADs of a macropixel on one line, on which every pulse is an edge (thesis 2.4.1, Fig. 22b). It is the
+//! front end of a TDC that a delay line times, and knows no CLK. That HSLIDAR has it is chosen: the thesis does not say how its SPADs
+//! come together (4.9.3).
 //!
 //! ```text
 //!                 toggle

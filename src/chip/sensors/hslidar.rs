@@ -6,12 +6,20 @@
 //! | clocked | CLK period | 4 CLK periods, half a window | CLK at its most, 200 MHz (6.3.1) |
 //! | delay line | element, 2.6 ns on average, 0.4 ns σ (Fig. 91) | CLK period | CLK at 80 MHz: 12.5 ns, or 1.875 m (Table 14) |
 //!
-//! The chip has both; each is a sensor of its own here, because nothing of one is used in the other but what they share. The thesis
+//! Two things are not the thesis's. Its clocked mode times photons with a counter TDC (4.9.3, 2.4.3), of which it says no more than that
+//! a bin is a CLK period; here the QuantIC4x4's shift register does so, because nothing tells what the counter does with a second photon.
+//! And it does not say how SPADs come together on a delay line: that they toggle one line through a tree of XORs, on which two photons in
+//! the same bin cancel, is chosen.
+//!
+//! The chip has both modes; each is a sensor of its own here, because nothing of one is used in the other but what they share. The thesis
 //! gives no dead time, no load clock and no scale for the delay that Fig. 90 shows from left to right: dead time and load clock are
 //! the QuantIC4x4's, and the skew is chosen, 45 ps from column to column.
 
 use super::Sensor;
 use crate::chip::config::{PCounter, SensorConfig, Tdc};
+
+/// The fastest CLK that the chip takes (thesis 6.3.1), Hz. The model's gates are those of a faster library.
+pub const HSLIDAR_MOST_HZ: f64 = 200e6;
 
 /// The chip in its clocked, guided mode, in typical silicon.
 pub fn hslidar() -> Sensor {
@@ -24,7 +32,7 @@ pub fn hslidar() -> Sensor {
         reset_to_load: true,
         bins: 8,
         bin_bits: 12,
-        clk_hz: 200e6,
+        clk_hz: HSLIDAR_MOST_HZ,
         ..SensorConfig::default()
     };
     config.into()

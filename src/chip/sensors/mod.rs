@@ -14,7 +14,7 @@ use std::sync::{Arc, OnceLock};
 mod hslidar;
 mod quantic4x4;
 
-pub use hslidar::{hslidar, hslidar_delay_line};
+pub use hslidar::{HSLIDAR_MOST_HZ, hslidar, hslidar_delay_line};
 pub use quantic4x4::quantic4x4;
 
 use super::config::{SensorConfig, Tdc};

@@ -236,7 +236,7 @@ impl<'c> MacropixelPaths<'c> {
 
     /// Clock → Q rises, Q falls, of one flip-flop.
     fn clock_to_q(&self, cell: usize) -> (Time, Time) {
-        let clock = self.timing.of(cell)[1];
+        let clock = self.timing.of(cell)[1][0];
         let [rise, fall] = [One, Zero].map(|to| Time::from_fs(clock.to(to).into()));
         (rise, fall)
     }
@@ -286,9 +286,10 @@ impl<'c> MacropixelPaths<'c> {
             .map(|(cell, leaf)| {
                 let pins = 0..leaf.kind.inputs().len();
                 let arcs = pins.filter(|&pin| leaf.kind.triggers(pin)).flat_map(|pin| {
-                    let arc = self.timing.of(cell)[pin];
-                    [arc.rise_fs, arc.fall_fs].map(|fs| Time::from_fs(fs.into()))
+                    let arcs = &self.timing.of(cell)[pin][..leaf.kind.outputs().len()];
+                    arcs.iter().flat_map(|arc| [arc.rise_fs, arc.fall_fs])
                 });
+                let arcs = arcs.map(|fs| Time::from_fs(fs.into()));
                 arcs.map(|delay| (delay, delay)).reduce(hull)
             })
     }

@@ -2,18 +2,20 @@
 
 use std::collections::HashMap;
 
+use super::stages::Stages;
 use super::wires::Wire;
 use super::{DelayPath, Edge, PinEdge, Sdf, SdfCell, SdfDelay, SdfInstance, Skipped};
 use crate::files::InputError;
 use crate::netlist::cell::{CellKind, MAX_INPUTS};
+use crate::netlist::chain::Chain;
 use crate::netlist::corner::Corner;
 use crate::netlist::flat::Netlist;
-use crate::netlist::timing::Timing;
+use crate::netlist::timing::{ArcDelay, Timing};
 
 /// What an annotation did.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Annotation {
-    /// Arcs (input pin of a cell, both directions) that got a delay from IOPATH or DEVICE.
+    /// Arcs (input and output pin of a cell, both directions) that got a delay from IOPATH or DEVICE.
     pub arcs: usize,
     /// Input pins that a wire delay was added to.
     pub wires: usize,
@@ -45,11 +47,13 @@ pub fn annotate(
         sdf,
         corner,
         wires: HashMap::new(),
+        stages: Stages::new(),
         result: Annotation::default(),
     };
     for cell in &sdf.cells {
         annotator.cell(timing, cell)?;
     }
+    annotator.add_stages(timing)?;
     annotator.add_wires(timing)?;
     Ok(annotator.result)
 }
@@ -71,6 +75,7 @@ pub(super) struct Annotator<'n, 's, 'a> {
     sdf: &'s Sdf<'a>,
     pub(super) corner: Corner,
     pub(super) wires: HashMap<(usize, usize), Wire>,
+    pub(super) stages: Stages,
     pub(super) result: Annotation,
 }
 
@@ -113,6 +118,8 @@ impl Annotator<'_, '_, '_> {
                         return self.leaf(timing, entry, cell);
                     }
                     (path.as_ref(), name)
+                } else if let Some(stage) = Chain::find(self.netlist, path) {
+                    return self.stage(timing, entry, stage);
                 } else if let Some(scope) = self.netlist.scope(path) {
                     let name = self.netlist.scopes()[scope].module.name();
                     if name == entry.cell_type {
@@ -171,7 +178,8 @@ impl Annotator<'_, '_, '_> {
                     self.check_arc(kind, pin, from, delay.line)?;
                     let output = self.output(kind, to, delay.line)?;
                     last_line[pin] = delay.line;
-                    self.fill(timing, cell, pin, &mut slots[pin][output], from.edge, delay);
+                    let before = timing.of(cell)[pin][output];
+                    self.fill(before, &mut slots[pin][output], from.edge, delay);
                 }
                 DelayPath::Device(to) => {
                     let outputs = match to {
@@ -184,7 +192,8 @@ impl Annotator<'_, '_, '_> {
                     for pin in (0..kind.inputs().len()).filter(|&p| kind.triggers(p)) {
                         last_line[pin] = delay.line;
                         for output in outputs.clone() {
-                            self.fill(timing, cell, pin, &mut slots[pin][output], None, delay);
+                            let before = timing.of(cell)[pin][output];
+                            self.fill(before, &mut slots[pin][output], None, delay);
                         }
                     }
                 }
@@ -200,15 +209,15 @@ impl Annotator<'_, '_, '_> {
         }
         let mut delays = *timing.of(cell);
         let mut changed = false;
-        for pin in 0..kind.inputs().len() {
-            let arc = &mut delays[pin];
+        let outputs = kind.outputs().len();
+        for (pin, output) in (0..kind.inputs().len() * outputs).map(|n| (n / outputs, n % outputs))
+        {
+            let arc = &mut delays[pin][output];
             let mut ambiguous = false;
             let mut given = false;
             for (direction, delay) in [&mut arc.rise_fs, &mut arc.fall_fs].into_iter().enumerate() {
                 let all = || {
-                    slots[pin]
-                        .iter()
-                        .flat_map(|edges| edges.iter().zip([Edge::Rising, Edge::Falling]))
+                    (slots[pin][output].iter().zip([Edge::Rising, Edge::Falling]))
                         .filter(|(_, edge)| causes(kind, pin, *edge, direction == 0))
                         .filter_map(|(slot, _)| slot[direction])
                 };
@@ -235,14 +244,11 @@ impl Annotator<'_, '_, '_> {
     /// Enters one delay for the edges it is about.
     fn fill(
         &self,
-        timing: &Timing,
-        cell: usize,
-        pin: usize,
+        before: ArcDelay,
         slots: &mut [[Option<i64>; 2]; 2],
         edge: Option<Edge>,
         delay: &SdfDelay<'_>,
     ) {
-        let before = timing.of(cell)[pin];
         let values = [(delay.rise, before.rise_fs), (delay.fall, before.fall_fs)];
         for (of_edge, slot) in [Edge::Rising, Edge::Falling].into_iter().zip(slots) {
             if edge.is_some_and(|e| e != of_edge) {
@@ -334,8 +340,8 @@ impl Annotator<'_, '_, '_> {
     }
 }
 
-/// Whether an edge of an input pin can make an output of the cell rise (or fall). A flip-flop has one delay for
-/// Q and Q̄, so that each of its edges causes both.
+/// Whether the delay to a rising (or falling) output of the cell matters to an edge of an input pin. A flip-flop's
+/// outputs may become unknown with any of its edges, after the shorter of both delays.
 pub(super) fn causes(kind: CellKind, pin: usize, edge: Edge, output_rises: bool) -> bool {
     let rises = edge == Edge::Rising;
     match (kind, pin) {

@@ -17,9 +17,13 @@
 //! NOCHANGE, LABEL, TIMINGENV. Anything else is refused.
 //!
 //! # What a cell cannot tell apart
-//! A cell has one delay for each input pin and each direction of an output. Where a file says more, the
-//! longest delay is used and the arc is counted: Q and Q̄ of a flip-flop that differ, or rising and falling
-//! inputs of a non-unate arc (XOR2, XNOR2, select of MUX2, reset of DFFSR) that differ.
+//! A cell has one delay for each pair of input and output pin and each direction of the output. Where a file says
+//! more, the longest delay is used and the arc is counted: rising and falling inputs of a non-unate arc (XOR2, XNOR2,
+//! select of MUX2, reset of DFFSR) that differ.
+//!
+//! # Chains
+//! A cell with transport delays is one cell of the netlist and a chain of stages for other tools
+//! ([`Chain`](super::Chain)): a file names the stages, whose delays are added up, or the cell.
 //!
 //! # Wires
 //! Wire delays (INTERCONNECT, PORT) are added to the arcs of the pin they end at. That gives every change of
@@ -40,6 +44,7 @@ mod entries;
 mod limits;
 mod oddities;
 mod parser;
+mod stages;
 #[cfg(test)]
 mod tests;
 mod tokens;
@@ -49,11 +54,20 @@ mod writer;
 pub use annotate::{Annotation, annotate};
 pub(super) use limits::checks_of;
 pub use oddities::{Oddity, oddities};
-pub use writer::{SdfDivider, SdfOptions, SdfTimescale, write_sdf};
+pub use writer::{SdfDivider, SdfOptions, SdfTimescale, write_library_sdf, write_sdf};
 
 use std::borrow::Cow;
 
 use super::corner::Corner;
+
+/// The dotted path of a name in a scope; the empty path is the top.
+fn join(path: &str, name: &str) -> String {
+    if path.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{path}.{name}")
+    }
+}
 
 /// Minimum, typical and maximum of a number, fs; members may be missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -3,7 +3,8 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::netlist::{CellKind, Library, MAX_INPUTS, ModuleBuilder, Netlist, Timing};
+use crate::files::InputError;
+use crate::netlist::{CellKind, Library, ModuleBuilder, Netlist, OwnDelay, Timing};
 
 /// An inverter and a module of one cell of every kind, twice.
 pub(super) fn design() -> Netlist {
@@ -38,8 +39,10 @@ pub(super) fn nominal(netlist: &Netlist, corner: Corner) -> Timing {
 /// Compares the pins that cells have.
 fn same(netlist: &Netlist, a: &Timing, b: &Timing) -> bool {
     netlist.cells().iter().enumerate().all(|(cell, flat)| {
-        let pins = flat.kind.inputs().len();
-        a.of(cell)[..pins] == b.of(cell)[..pins]
+        let (inputs, outputs) = (flat.kind.inputs().len(), flat.kind.outputs().len());
+        let pins = (0..inputs).flat_map(|input| (0..outputs).map(move |output| (input, output)));
+        pins.into_iter()
+            .all(|(i, o)| a.of(cell)[i][o] == b.of(cell)[i][o])
     })
 }
 
@@ -66,11 +69,16 @@ pub(super) fn annotated(
 }
 
 fn arc(body: &str, path: &str, pin: usize) -> (u32, u32) {
+    arc_to(body, path, (pin, 0))
+}
+
+/// Rise and fall of the arc from an input pin to an output pin.
+fn arc_to(body: &str, path: &str, (pin, output): (usize, usize)) -> (u32, u32) {
     let (netlist, timing, _) = annotated(body).unwrap();
     let path = format!("chip.{path}");
     let mut cells = 0..netlist.cells().len();
     let cell = cells.find(|&c| netlist.cell_path(c) == path).unwrap();
-    let arc = timing.of(cell)[pin];
+    let arc = timing.of(cell)[pin][output];
     (arc.rise_fs, arc.fall_fs)
 }
 
@@ -109,16 +117,82 @@ fn wildcards_reach_every_instance_and_paths_only_theirs() {
 }
 
 #[test]
-fn a_flip_flop_takes_the_longer_of_q_and_qn() {
+fn a_flip_flop_has_an_arc_to_each_output() {
     let body = "(CELL (CELLTYPE \"DFFR\") (INSTANCE u1/dffr) (DELAY (INCREMENT
         (IOPATH (posedge CK) Q (1)) (IOPATH (posedge CK) QN (2)) (IOPATH R Q (1)))))";
-    assert_eq!(arc(body, "u1.dffr", 1), (77_311, 77_311));
-    assert_eq!(arc(body, "u1.dffr", 2), (82_043, 82_043));
-    let notes = annotated(body).unwrap().2.notes;
+    let (ck, r, q, qn) = (1, 2, 0, 1);
+    let to = |pins| arc_to(body, "u1.dffr", pins);
     assert_eq!(
-        (notes.len(), notes[0].count, notes[0].first_line),
-        (1, 1, 4)
+        [to((ck, q)), to((ck, qn))],
+        [(76_311, 76_311), (77_311, 77_311)]
     );
+    assert_eq!(
+        [to((r, q)), to((r, qn))],
+        [(82_043, 82_043), (81_043, 81_043)]
+    );
+    let result = annotated(body).unwrap().2;
+    assert_eq!((result.arcs, result.notes), (3, vec![]));
+    let device = |output: &str| {
+        format!("(CELL (CELLTYPE \"DFFR\") (INSTANCE *) (DELAY (ABSOLUTE (DEVICE {output} (1)))))")
+    };
+    let qn_alone = device("QN");
+    assert_eq!(arc_to(&qn_alone, "u1.dffr", (ck, qn)), (1_000, 1_000));
+    assert_eq!(arc_to(&qn_alone, "u1.dffr", (ck, q)), (75_311, 75_311));
+    assert_eq!(arc_to(&device(""), "u1.dffr", (r, q)), (1_000, 1_000));
+    let wire = "(CELL (CELLTYPE \"DFFR\") (INSTANCE *) (DELAY (ABSOLUTE (PORT CK (1)))))";
+    assert_eq!(
+        [q, qn].map(|output| arc_to(wire, "u1.dffr", (ck, output))),
+        [(76_311, 76_311); 2]
+    );
+}
+
+#[test]
+fn stages_of_a_chain_add_up_to_its_cell() {
+    let mut m = ModuleBuilder::new("chip");
+    let (a, z) = (m.input("A"), m.output("Z"));
+    m.cell_with_delay("line", CellKind::Buf, &[a], &[z], OwnDelay::wire(2_600_001));
+    let netlist = Netlist::elaborate(&m.finish().unwrap());
+    let nominal = |corner| Timing::nominal(&netlist, &Library::default(), corner);
+    let delay = |body: &str| {
+        let mut timing = nominal(Corner::Typ);
+        let text = file(body);
+        annotate(
+            &mut timing,
+            &netlist,
+            &Sdf::parse("a.sdf", &text)?,
+            Corner::Typ,
+        )?;
+        let arc = timing.of(0)[0][0];
+        Ok::<_, InputError>((arc.rise_fs, arc.fall_fs))
+    };
+    let stage = |number: u32, cell_type: &str, entry: &str| {
+        let delays = format!("(DELAY {entry})");
+        delay(&format!(
+            "(CELL (CELLTYPE \"{cell_type}\") (INSTANCE line/s{number}) {delays})"
+        ))
+    };
+    let of_line = "STAGE_2600001_53";
+    // A stage is 49.056 ps: 2600.001 by 53, rounded down.
+    let fixed = "(ABSOLUTE (IOPATH A Z (100) (10)))";
+    assert_eq!(stage(0, of_line, fixed).unwrap(), (2_650_945, 2_560_945));
+    let more = "(INCREMENT (IOPATH A Z (1)))";
+    assert_eq!(stage(52, of_line, more).unwrap(), (2_601_001, 2_601_001));
+    let whole = "(CELL (CELLTYPE \"BUF\") (INSTANCE line) (DELAY (ABSOLUTE (IOPATH A Z (7)))))";
+    assert_eq!(delay(whole).unwrap(), (7_000, 7_000));
+    for (number, cell_type, entry, says) in [
+        (53, of_line, fixed, "no instance line.s53"),
+        (1, "BUF", fixed, "is a STAGE_2600001_53 and no BUF"),
+        (1, of_line, "(ABSOLUTE (PORT A (1)))", "has one path"),
+        (
+            1,
+            of_line,
+            "(INCREMENT (IOPATH A Z (-3000)))",
+            "between 0 and 4.29",
+        ),
+    ] {
+        let said = stage(number, cell_type, entry).unwrap_err().to_string();
+        assert!(said.contains("a.sdf:") && said.contains(says), "{said}");
+    }
 }
 
 #[test]
@@ -287,8 +361,8 @@ fn randomised(netlist: &Netlist, corner: Corner, values: &[u32]) -> Timing {
     let mut values = values.iter().cycle().copied();
     for (index, cell) in netlist.cells().iter().enumerate() {
         let mut delays = *timing.of(index);
-        for (pin, delay) in delays.iter_mut().enumerate().take(MAX_INPUTS) {
-            if pin < cell.kind.inputs().len() && cell.kind.triggers(pin) {
+        for pin in (0..cell.kind.inputs().len()).filter(|&pin| cell.kind.triggers(pin)) {
+            for delay in &mut delays[pin][..cell.kind.outputs().len()] {
                 delay.rise_fs = values.next().unwrap();
                 delay.fall_fs = values.next().unwrap();
             }

@@ -1,7 +1,7 @@
 //! Wire delays: where INTERCONNECT and PORT end, and how they are added to the arcs of that pin.
 
 use super::annotate::{Annotator, causes};
-use super::{Edge, SdfDelay};
+use super::{Edge, SdfDelay, join};
 use crate::files::InputError;
 use crate::netlist::flat::NetId;
 use crate::netlist::module::Direction;
@@ -10,14 +10,6 @@ use crate::netlist::timing::Timing;
 const WIRE_TO_D: &str = "wires to D of a flip-flop";
 const WIRE_TO_OUTPUT: &str = "wires to outputs of the chip";
 const UNEQUAL_WIRE: &str = "wires that rise and fall differently into a non-unate arc";
-
-fn join(path: &str, name: &str) -> String {
-    if path.is_empty() {
-        name.to_owned()
-    } else {
-        format!("{path}.{name}")
-    }
-}
 
 /// The wire to one input pin.
 pub(super) struct Wire {
@@ -117,9 +109,11 @@ impl Annotator<'_, '_, '_> {
         for ((cell, pin), wire) in wires {
             let kind = self.netlist.cells()[cell].kind;
             let mut delays = *timing.of(cell);
-            let arc = &mut delays[pin];
             let mut unequal = false;
-            for (delay, rises) in [(&mut arc.rise_fs, true), (&mut arc.fall_fs, false)] {
+            let arcs = delays[pin][..kind.outputs().len()].iter_mut();
+            for (delay, rises) in
+                arcs.flat_map(|arc| [(&mut arc.rise_fs, true), (&mut arc.fall_fs, false)])
+            {
                 let by_edge = [(Edge::Rising, wire.rise_fs), (Edge::Falling, wire.fall_fs)];
                 let causes = by_edge
                     .iter()

@@ -1,11 +1,18 @@
 //! Delays and timing checks of a design as SDF text.
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 
 use super::limits::checks_of;
-use super::{Edge, PinEdge, SdfCheck, Triple};
+use super::{Edge, PinEdge, SdfCheck, Triple, join};
+use crate::netlist::cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
+use crate::netlist::chain::Chain;
+use crate::netlist::corner::Corner;
 use crate::netlist::flat::Netlist;
-use crate::netlist::timing::Timing;
+use crate::netlist::instance_limits::InstanceLimits;
+use crate::netlist::library::Library;
+use crate::netlist::module::{Cell, Module};
+use crate::netlist::timing::{ArcDelay, CellDelays, Timing};
 
 /// What stands between the names of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -15,6 +22,15 @@ pub enum SdfDivider {
     Dot,
     /// `a/b`
     Slash,
+}
+
+impl SdfDivider {
+    fn symbol(self) -> char {
+        match self {
+            SdfDivider::Dot => '.',
+            SdfDivider::Slash => '/',
+        }
+    }
 }
 
 /// The unit of numbers.
@@ -46,103 +62,183 @@ pub fn write_sdf(
     corners: [&Timing; 3],
     options: SdfOptions,
 ) -> io::Result<()> {
-    let divider = match options.divider {
-        SdfDivider::Dot => '.',
-        SdfDivider::Slash => '/',
-    };
-    let unit = match options.timescale {
-        SdfTimescale::Fs => "fs",
-        SdfTimescale::Ps => "ps",
-    };
     let design = netlist.scopes()[0].module.name();
-    let version = env!("CARGO_PKG_VERSION");
-    write!(
-        out,
-        "(DELAYFILE\n  (SDFVERSION \"3.0\")\n  (DESIGN \"{design}\")\n  (PROGRAM \"gdtof\")\n  (VERSION \"{version}\")\n  (DIVIDER {divider})\n  (TIMESCALE 1{unit})\n"
-    )?;
+    write_head(out, design, options)?;
     for (index, scope) in netlist.scopes().iter().enumerate() {
-        let mut path = netlist.scope_path(index);
         // Paths start below the top.
-        path = path[design.len()..].trim_start_matches('.').to_owned();
-        if !path.is_empty() {
-            path.push('.');
-        }
-        if divider != '.' {
-            path = path.replace('.', "/");
-        }
+        let path = netlist.scope_path(index);
+        let path = path[design.len()..].trim_start_matches('.');
         for (cell, leaf) in netlist.cells_of(index).zip(scope.module.cells()) {
-            write!(
-                out,
-                "  (CELL (CELLTYPE \"{}\") (INSTANCE {path}{})\n    (DELAY (ABSOLUTE\n",
-                leaf.kind.name(),
-                leaf.name
-            )?;
-            let kind = leaf.kind;
-            for (pin, name) in kind.inputs().iter().enumerate() {
-                if !kind.triggers(pin) {
-                    continue;
-                }
-                let arcs = corners.map(|timing| timing.of(cell)[pin]);
-                let rise = arcs.map(|arc| Some(arc.rise_fs as i64));
-                let fall = arcs.map(|arc| Some(arc.fall_fs as i64));
-                let from = PinEdge {
-                    edge: (kind.is_flip_flop() && pin == 1).then_some(Edge::Rising),
-                    pin: (*name).into(),
-                };
-                for output in kind.outputs() {
-                    write!(out, "      (IOPATH ")?;
-                    write_pin(out, &from)?;
-                    write!(out, " {output} ")?;
-                    write_triple(out, Triple(rise), options.timescale)?;
-                    write!(out, " ")?;
-                    write_triple(out, Triple(fall), options.timescale)?;
-                    writeln!(out, ")")?;
-                }
-            }
-            write!(out, "    ))")?;
-            if kind.is_flip_flop() {
-                let checks = checks_of(kind, corners.map(|timing| timing.limits(cell, kind)));
-                write!(out, "\n    (TIMINGCHECK\n")?;
-                for check in &checks {
-                    write!(out, "      ")?;
-                    write_check(out, check, options.timescale)?;
-                    writeln!(out)?;
-                }
-                write!(out, "    )")?;
-            }
-            writeln!(out, ")")?;
+            let delays = corners.map(|timing| *timing.of(cell));
+            let limits = corners.map(|timing| timing.limits(cell, leaf.kind));
+            write_cell(out, &join(path, &leaf.name), leaf, delays, limits, options)?;
         }
     }
     writeln!(out, ")")
 }
 
-fn write_check(
+/// Writes every cell below `top` with the library's delays and limits, or with the delays that are its own: what
+/// [`write_sdf`] writes of [`Timing::nominal`], without elaborating the design, so that memory does not grow with it.
+/// `design` is what the file calls it. Gives the number of cells.
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_library_sdf(
     out: &mut dyn Write,
-    check: &SdfCheck<'_>,
-    timescale: SdfTimescale,
+    (top, design): (&Module, &str),
+    library: &Library,
+    options: SdfOptions,
+) -> io::Result<usize> {
+    // All cells of a kind are alike: their text is made once.
+    let bodies = CellKind::ALL.map(|kind| {
+        let delays = Corner::ALL.map(|corner| library.delays(kind, corner));
+        let limits = Corner::ALL.map(|corner| InstanceLimits::of(library.checks(kind), corner));
+        body(kind, delays, Some(limits.each_ref()), options)
+    });
+    let mut cells = 0;
+    write_head(out, design, options)?;
+    write_below(top, "", &mut |path, leaf| {
+        let (kind, path) = (leaf.kind, join(path, &leaf.name));
+        cells += 1;
+        let Some(own) = leaf.own_delay else {
+            return write_entry(out, kind.name(), &path, &bodies[kind as usize], options);
+        };
+        let whole = join(top.name(), &path);
+        let delays = Corner::ALL.map(|corner| own.delays(|| whole.clone(), corner));
+        let limits = Corner::ALL.map(|corner| InstanceLimits::of(library.checks(kind), corner));
+        write_cell(out, &path, leaf, delays, limits.each_ref(), options)
+    })?;
+    writeln!(out, ")")?;
+    Ok(cells)
+}
+
+/// Hands over every cell with the path it lies in, in the order of a netlist's scopes.
+fn write_below(
+    module: &Module,
+    path: &str,
+    write: &mut dyn FnMut(&str, &Cell) -> io::Result<()>,
 ) -> io::Result<()> {
-    write!(out, "({} ", check.kind.keyword())?;
-    write_pin(out, &check.pin)?;
-    if let Some(reference) = &check.reference {
-        write!(out, " ")?;
-        write_pin(out, reference)?;
+    for cell in module.cells() {
+        write(path, cell)?;
     }
-    for &limit in &check.limits[..check.kind.limits()] {
-        write!(out, " ")?;
-        write_triple(out, limit, timescale)?;
+    for child in module.instances() {
+        write_below(&child.module, &join(path, &child.name), write)?;
     }
-    write!(out, ")")
+    Ok(())
 }
 
-fn write_pin(out: &mut dyn Write, pin: &PinEdge<'_>) -> io::Result<()> {
+fn write_head(out: &mut dyn Write, design: &str, options: SdfOptions) -> io::Result<()> {
+    let divider = options.divider.symbol();
+    let unit = match options.timescale {
+        SdfTimescale::Fs => "fs",
+        SdfTimescale::Ps => "ps",
+    };
+    let version = env!("CARGO_PKG_VERSION");
+    write!(
+        out,
+        "(DELAYFILE\n  (SDFVERSION \"3.0\")\n  (DESIGN \"{design}\")\n  (PROGRAM \"gdtof\")\n  (VERSION \"{version}\")\n  (DIVIDER {divider})\n  (TIMESCALE 1{unit})\n"
+    )
+}
+
+/// The entry of one cell at a path, or of each stage of the chain that it is.
+fn write_cell(
+    out: &mut dyn Write,
+    path: &str,
+    leaf: &Cell,
+    delays: [CellDelays; 3],
+    limits: [&InstanceLimits; 3],
+    options: SdfOptions,
+) -> io::Result<()> {
+    let kind = leaf.kind;
+    let Some(chain) = Chain::of(kind, leaf.own_delay) else {
+        let body = body(kind, delays, Some(limits), options);
+        return write_entry(out, kind.name(), path, &body, options);
+    };
+    let mut parts = delays.map(|delays| {
+        let ArcDelay { rise_fs, fall_fs } = delays[0][0];
+        chain.parts(rise_fs).zip(chain.parts(fall_fs))
+    });
+    for number in 0..chain.stages {
+        let delays = parts.each_mut().map(|parts| {
+            let (rise_fs, fall_fs) = parts.next().expect("a part for each stage");
+            [[ArcDelay { rise_fs, fall_fs }; MAX_OUTPUTS]; MAX_INPUTS]
+        });
+        let stage = join(path, &Chain::stage(number));
+        let body = body(kind, delays, None, options);
+        write_entry(out, &chain.stage_module(), &stage, &body, options)?;
+    }
+    Ok(())
+}
+
+fn write_entry(
+    out: &mut dyn Write,
+    cell_type: &str,
+    path: &str,
+    body: &str,
+    options: SdfOptions,
+) -> io::Result<()> {
+    let path = match options.divider {
+        SdfDivider::Dot => Cow::from(path),
+        SdfDivider::Slash => path.replace('.', "/").into(),
+    };
+    writeln!(
+        out,
+        "  (CELL (CELLTYPE \"{cell_type}\") (INSTANCE {path})\n{body}"
+    )
+}
+
+/// What an entry says of its cell: delays and, where it has limits, checks.
+fn body(
+    kind: CellKind,
+    delays: [CellDelays; 3],
+    limits: Option<[&InstanceLimits; 3]>,
+    options: SdfOptions,
+) -> String {
+    let timescale = options.timescale;
+    let mut text = "    (DELAY (ABSOLUTE\n".to_owned();
+    for (pin, name) in kind.inputs().iter().enumerate() {
+        if !kind.triggers(pin) {
+            continue;
+        }
+        let from = pin_edge(&PinEdge {
+            edge: (kind.is_flip_flop() && pin == 1).then_some(Edge::Rising),
+            pin: (*name).into(),
+        });
+        for (number, output) in kind.outputs().iter().enumerate() {
+            let arcs = delays.map(|delays| delays[pin][number]);
+            let rise = triple(Triple(arcs.map(|arc| Some(arc.rise_fs.into()))), timescale);
+            let fall = triple(Triple(arcs.map(|arc| Some(arc.fall_fs.into()))), timescale);
+            text += &format!("      (IOPATH {from} {output} {rise} {fall})\n");
+        }
+    }
+    text += "    ))";
+    if let Some(limits) = limits.filter(|_| kind.is_flip_flop()) {
+        text += "\n    (TIMINGCHECK\n";
+        for check in &checks_of(kind, limits) {
+            text += &format!("      {}\n", check_entry(check, timescale));
+        }
+        text += "    )";
+    }
+    text + ")"
+}
+
+fn check_entry(check: &SdfCheck<'_>, timescale: SdfTimescale) -> String {
+    let mut words = vec![check.kind.keyword().to_owned(), pin_edge(&check.pin)];
+    words.extend(check.reference.as_ref().map(pin_edge));
+    let limits = check.limits[..check.kind.limits()].iter();
+    words.extend(limits.map(|&limit| triple(limit, timescale)));
+    format!("({})", words.join(" "))
+}
+
+fn pin_edge(pin: &PinEdge<'_>) -> String {
     match pin.edge {
-        None => write!(out, "{}", pin.pin),
-        Some(Edge::Rising) => write!(out, "(posedge {})", pin.pin),
-        Some(Edge::Falling) => write!(out, "(negedge {})", pin.pin),
+        None => pin.pin.to_string(),
+        Some(Edge::Rising) => format!("(posedge {})", pin.pin),
+        Some(Edge::Falling) => format!("(negedge {})", pin.pin),
     }
 }
 
-fn write_triple(out: &mut dyn Write, triple: Triple, timescale: SdfTimescale) -> io::Result<()> {
+fn triple(triple: Triple, timescale: SdfTimescale) -> String {
     let number = |fs: Option<i64>| match (fs, timescale) {
         (None, _) => String::new(),
         (Some(fs), SdfTimescale::Fs) => fs.to_string(),
@@ -153,8 +249,8 @@ fn write_triple(out: &mut dyn Write, triple: Triple, timescale: SdfTimescale) ->
         }
     };
     match triple.0 {
-        [None, None, None] => write!(out, "()"),
-        [min, typ, max] if min == typ && typ == max => write!(out, "({})", number(typ)),
-        members => write!(out, "({})", members.map(number).join(":")),
+        [None, None, None] => "()".to_owned(),
+        [min, typ, max] if min == typ && typ == max => format!("({})", number(typ)),
+        members => format!("({})", members.map(number).join(":")),
     }
 }

@@ -3,7 +3,7 @@
 //! A cell's output passes through a continuous assignment with delays: inertial by IEEE 1364, which
 //! is the delay model of the event kernel, so both see the same glitches. A gate whose inputs all
 //! have the same delay is a Verilog primitive before it. A cell with different arcs (multiplexer,
-//! flip-flops) is a procedural model with variable delays: the delay is that of the input that
+//! flip-flops) is a procedural model with variable delays for each output: the delay is that of the input that
 //! changed and, when several change in one instant, the shortest.
 //!
 //! What happens within one instant is left to the simulator by IEEE 1364, except for one thing:
@@ -19,11 +19,13 @@
 //! makes them transport delays. Verilog has none of its own that keep to the active region and let a change
 //! cancel those it overtakes: a module with a queue of changes does that.
 
+use std::collections::BTreeSet;
 use std::io::{self, Write};
 
 use super::{TIMESCALE, primitive};
 use crate::logic::Logic;
 use crate::netlist::cell::CellKind;
+use crate::netlist::chain::Chain;
 use crate::netlist::corner::Corner;
 use crate::netlist::flat::Netlist;
 use crate::netlist::library::{CellArcs, Library};
@@ -86,34 +88,31 @@ pub fn write_cells(out: &mut dyn Write, library: &Library, corner: Corner) -> io
     Ok(())
 }
 
-/// As [`write_cells`], with parameters `RISE_<pin>` and `FALL_<pin>` (fs) for the delays of every arc, and
-/// `TRANSPORT`, 1 for transport delays.
+/// As [`write_cells`], with parameters `RISE_<input>_<output>` and `FALL_<input>_<output>` (fs) for the delays of every arc, and
+/// `TRANSPORT`, 1 for transport delays; and the chains that a netlist has, as one such cell each.
 ///
 /// # Errors
 /// Those of the writer.
 pub fn write_parametric_cells(
     out: &mut dyn Write,
     library: &Library,
+    chains: &BTreeSet<Chain>,
     corner: Corner,
 ) -> io::Result<()> {
     write!(out, "{TIMESCALE}{TRANSPORT_PATH}")?;
-    for kind in CellKind::ALL {
+    let cells = CellKind::ALL.map(|kind| (kind.name().to_owned(), kind));
+    let chains = chains.iter().map(|chain| (chain.module(), CellKind::Buf));
+    for (name, kind) in cells.into_iter().chain(chains) {
         let (inputs, outputs) = (kind.inputs().join(", "), kind.outputs().join(", "));
-        writeln!(
-            out,
-            "\nmodule {}(output {outputs}, input {inputs});",
-            kind.name()
-        )?;
-        for (pin, name) in kind.inputs().iter().enumerate() {
-            if kind.triggers(pin) {
-                let arc = library.arcs(kind)[pin];
-                let (rise, fall) = (arc.rise.at(corner), arc.fall.at(corner));
-                writeln!(out, "  parameter [31:0] RISE_{name} = {rise};")?;
-                writeln!(out, "  parameter [31:0] FALL_{name} = {fall};")?;
-            }
+        writeln!(out, "\nmodule {name}(output {outputs}, input {inputs});")?;
+        for (pin, output, name) in arc_names(kind) {
+            let arc = library.arcs(kind)[pin][output];
+            let (rise, fall) = (arc.rise.at(corner), arc.fall.at(corner));
+            writeln!(out, "  parameter [31:0] RISE_{name} = {rise};")?;
+            writeln!(out, "  parameter [31:0] FALL_{name} = {fall};")?;
         }
-        write_arc_selecting_cell(out, kind, |pin| {
-            let name = kind.inputs()[pin];
+        write_arc_selecting_cell(out, kind, |pin, output| {
+            let name = arc_name(kind, pin, output);
             (format!("RISE_{name}"), format!("FALL_{name}"))
         })?;
         writeln!(out, "  parameter TRANSPORT = 0;")?;
@@ -121,12 +120,15 @@ pub fn write_parametric_cells(
         for (output, value) in outputs_of(kind) {
             writeln!(
                 out,
-                "    TRANSPORT_PATH to_{output}({output}, {value}, rise, fall);"
+                "    TRANSPORT_PATH to_{output}({output}, {value}, rise_{output}, fall_{output});"
             )?;
         }
         writeln!(out, "  end else begin : inertial")?;
         for (output, value) in outputs_of(kind) {
-            writeln!(out, "    assign #(rise, fall) {output} = {value};")?;
+            writeln!(
+                out,
+                "    assign #(rise_{output}, fall_{output}) {output} = {value};"
+            )?;
         }
         writeln!(out, "  end endgenerate")?;
         writeln!(out, "endmodule")?;
@@ -153,14 +155,14 @@ pub fn write_delays(
             if timing.model(cell) == DelayModel::Transport {
                 writeln!(out, "  defparam {path}.{}.TRANSPORT = 1;", leaf.name)?;
             }
-            for (pin, name) in leaf.kind.inputs().iter().enumerate() {
-                let (arc, nominal) = (timing.of(cell)[pin], library.of(cell)[pin]);
+            for (pin, output, name) in arc_names(leaf.kind) {
+                let [arc, nominal] = [timing, library].map(|t| t.of(cell)[pin][output]);
                 let values = [
                     ("RISE", arc.rise_fs, nominal.rise_fs),
                     ("FALL", arc.fall_fs, nominal.fall_fs),
                 ];
                 for (direction, fs, nominal) in values {
-                    if fs != nominal && leaf.kind.triggers(pin) {
+                    if fs != nominal {
                         let cell = &leaf.name;
                         writeln!(out, "  defparam {path}.{cell}.{direction}_{name} = {fs};")?;
                     }
@@ -183,16 +185,16 @@ fn write_cell(
         "module {}(output {outputs}, input {inputs});",
         kind.name()
     )?;
-    let delays = |pin: usize| {
-        let arc = arcs[pin];
+    let delays = |pin: usize, output: usize| {
+        let arc = arcs[pin][output];
         (
             arc.delay_fs(corner, Logic::One),
             arc.delay_fs(corner, Logic::Zero),
         )
     };
-    let uniform = (1..kind.inputs().len()).all(|pin| delays(pin) == delays(0));
+    let uniform = (1..kind.inputs().len()).all(|pin| delays(pin, 0) == delays(0, 0));
     if let (Some(primitive), true) = (primitive(kind), uniform) {
-        let (rise, fall) = delays(0);
+        let (rise, fall) = delays(0, 0);
         writeln!(out, "  wire now;")?;
         writeln!(out, "  reg value;")?;
         writeln!(out, "  {primitive} g(now, {inputs});")?;
@@ -205,7 +207,10 @@ fn write_cell(
     } else {
         write_arc_selecting_cell(out, kind, delays)?;
         for (output, value) in outputs_of(kind) {
-            writeln!(out, "  assign #(rise, fall) {output} = {value};")?;
+            writeln!(
+                out,
+                "  assign #(rise_{output}, fall_{output}) {output} = {value};"
+            )?;
         }
     }
     writeln!(out, "endmodule")
@@ -215,7 +220,7 @@ fn write_cell(
 fn write_arc_selecting_cell<D: std::fmt::Display>(
     out: &mut dyn Write,
     kind: CellKind,
-    delays: impl Fn(usize) -> (D, D),
+    delays: impl Fn(usize, usize) -> (D, D),
 ) -> io::Result<()> {
     let pins = kind.inputs();
     let triggers: Vec<usize> = (0..pins.len()).filter(|&p| kind.triggers(p)).collect();
@@ -224,19 +229,29 @@ fn write_arc_selecting_cell<D: std::fmt::Display>(
         writeln!(out, "  reg was_{};", pins[pin])?;
     }
     writeln!(out, "  reg value, next;")?;
-    writeln!(out, "  reg [31:0] rise, fall;")?;
+    for output in kind.outputs() {
+        writeln!(out, "  reg [31:0] rise_{output}, fall_{output};")?;
+    }
     writeln!(out, "  always begin")?;
     writeln!(out, "    #0;")?;
-    writeln!(out, "    rise = 32'hffffffff;")?;
-    writeln!(out, "    fall = 32'hffffffff;")?;
+    for output in kind.outputs() {
+        writeln!(out, "    rise_{output} = 32'hffffffff;")?;
+        writeln!(out, "    fall_{output} = 32'hffffffff;")?;
+    }
     for &pin in &triggers {
-        let (rise, fall) = delays(pin);
         let name = pins[pin];
         // A clock going low causes nothing.
         let unless_falling = if name == "CK" { " && CK !== 1'b0" } else { "" };
         writeln!(out, "    if ({name} !== was_{name}{unless_falling}) begin")?;
-        writeln!(out, "      if (rise > {rise}) rise = {rise};")?;
-        writeln!(out, "      if (fall > {fall}) fall = {fall};")?;
+        for (number, output) in kind.outputs().iter().enumerate() {
+            let (rise, fall) = delays(pin, number);
+            for (delay, fs) in [("rise", rise), ("fall", fall)] {
+                writeln!(
+                    out,
+                    "      if ({delay}_{output} > {fs}) {delay}_{output} = {fs};"
+                )?;
+            }
+        }
         writeln!(out, "    end")?;
     }
     if kind.is_flip_flop() {
@@ -284,6 +299,19 @@ fn write_arc_selecting_cell<D: std::fmt::Display>(
     writeln!(out, "    @({});", events.join(" or "))?;
     writeln!(out, "  end")?;
     Ok(())
+}
+
+/// Every arc of a cell: numbers of its input and output pin, and its name.
+fn arc_names(kind: CellKind) -> impl Iterator<Item = (usize, usize, String)> {
+    let triggers = (0..kind.inputs().len()).filter(move |&pin| kind.triggers(pin));
+    triggers.flat_map(move |pin| {
+        let outputs = 0..kind.outputs().len();
+        outputs.map(move |output| (pin, output, arc_name(kind, pin, output)))
+    })
+}
+
+fn arc_name(kind: CellKind, pin: usize, output: usize) -> String {
+    format!("{}_{}", kind.inputs()[pin], kind.outputs()[output])
 }
 
 /// Output pins of a cell, and what each shows of the `value` that [`write_arc_selecting_cell`] computes.

@@ -8,6 +8,7 @@ use std::io::{self, Write};
 use std::sync::Arc as Shared;
 
 use super::TIMESCALE;
+use crate::netlist::chain::Chain;
 use crate::netlist::module::{Direction, Module, Net};
 
 /// What Verilator need not mention with `-Wall`.
@@ -86,7 +87,9 @@ fn write_module(out: &mut dyn Write, module: &Module) -> io::Result<()> {
             .chain(inputs)
             .map(|(pin, &net)| format!(".{pin}({})", names.expression(&[net])))
             .collect();
-        writeln!(out, "  {} {}({});", kind.name(), cell.name, pins.join(", "))?;
+        let chain = Chain::of(kind, cell.own_delay).map(Chain::module);
+        let name = chain.as_deref().unwrap_or(kind.name());
+        writeln!(out, "  {name} {}({});", cell.name, pins.join(", "))?;
     }
     for instance in module.instances() {
         let mut rest = &instance.connections[..];

@@ -14,16 +14,20 @@
 //! with the library's delays, 1 % of the value changes of nets differ so at 200 photons in 240 CLK periods, and 8 % at
 //! 2000; histograms and LOCAL_STOP times (to the femtosecond) were the same in 300 random macropixels.
 //!
+//! Cells with transport delays are modules of stages ([`Chain`]), which let short pulses through.
+//!
 //! Tools without UDPs (Verilator, Yosys) take the macro `FUNCTIONAL` for granted: a flip-flop is a process there. The
 //! set of DFFSR is masked by its reset in that process, so that a set still high when the reset goes is seen. Paths
 //! have numbers in them because Yosys reads no `specparam` there, and whole ones; it knows neither `$width` nor
 //! notifiers.
 
+use std::collections::BTreeSet;
 use std::io::{self, Write};
 
 use super::primitive;
 use crate::netlist::cell::CellKind;
-use crate::netlist::corner::Corner;
+use crate::netlist::chain::Chain;
+use crate::netlist::corner::{Corner, Delay};
 use crate::netlist::instance_limits::InstanceLimits;
 use crate::netlist::library::Library;
 use crate::netlist::sdf::{CheckKind, Edge, PinEdge, SdfCheck, checks_of};
@@ -141,16 +145,61 @@ const DFFSR_BODY: &str = "\
   not to_qn(QN, state);
 ";
 
-/// Writes the standard model of every cell with the library's delays and limits.
+/// Writes the standard model of every cell with the library's delays and limits, and modules of the chains that a netlist has.
 ///
 /// # Errors
 /// Those of the writer.
-pub fn write_standard_cells(out: &mut dyn Write, library: &Library) -> io::Result<()> {
+pub fn write_standard_cells(
+    out: &mut dyn Write,
+    library: &Library,
+    chains: &BTreeSet<Chain>,
+) -> io::Result<()> {
     out.write_all(HEAD.as_bytes())?;
     for kind in CellKind::ALL {
         write_cell(out, kind, library)?;
     }
+    for &chain in chains {
+        write_chain(out, chain)?;
+    }
     writeln!(out, "\n`endcelldefine")
+}
+
+/// A chain, and its stages with the delay that they have on average.
+fn write_chain(out: &mut dyn Write, chain: Chain) -> io::Result<()> {
+    let stage = chain.stage_module();
+    let typical_fs = chain.parts(chain.typical_fs).last().unwrap_or(0);
+    let delay = Corner::ALL.map(|corner| Delay::scaled(typical_fs).at(corner));
+    writeln!(
+        out,
+        "\nmodule {stage}(output Z, input A);\n  buf body(Z, A);"
+    )?;
+    for (reader, line) in [
+        (Reader::Synthesis, "`ifdef FUNCTIONAL"),
+        (Reader::Simulator, "`else"),
+    ] {
+        let delay = reader.triple(delay);
+        writeln!(
+            out,
+            "{line}\n  specify\n    (A => Z) = ({delay}, {delay});\n  endspecify"
+        )?;
+    }
+    writeln!(out, "`endif\nendmodule\n")?;
+    writeln!(out, "module {}(output Z, input A);", chain.module())?;
+    writeln!(out, "  wire [{}:0] node;", chain.stages)?;
+    writeln!(
+        out,
+        "  assign node[0] = A;\n  assign Z = node[{}];",
+        chain.stages
+    )?;
+    for number in 0..chain.stages {
+        let name = Chain::stage(number);
+        writeln!(
+            out,
+            "  {stage} {name}(node[{}], node[{number}]);",
+            number + 1
+        )?;
+    }
+    writeln!(out, "endmodule")
 }
 
 fn write_cell(out: &mut dyn Write, kind: CellKind, library: &Library) -> io::Result<()> {
@@ -206,10 +255,9 @@ fn write_specify(
         if !kind.triggers(pin) {
             continue;
         }
-        let arc = library.arcs(kind)[pin];
-        let [rise, fall] = [arc.rise, arc.fall]
-            .map(|delay| reader.triple(Corner::ALL.map(|corner| delay.at(corner))));
-        for output in kind.outputs() {
+        for (output, arc) in kind.outputs().iter().zip(library.arcs(kind)[pin]) {
+            let [rise, fall] = [arc.rise, arc.fall]
+                .map(|delay| reader.triple(Corner::ALL.map(|corner| delay.at(corner))));
             let path = match (*from, *output) {
                 ("CK", "Q") => "posedge CK => (Q +: D)".to_owned(),
                 // Not `-: D`, which Yosys takes for a part-select where it skips these blocks.

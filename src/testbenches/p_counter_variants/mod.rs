@@ -319,6 +319,7 @@ impl Bench {
             groups,
             zoom: (Time::ZERO, self.at(HIGH.end() + 10)),
             marker: Some(self.at(HIGH.stop(1))),
+            marks: Vec::new(),
         }
     }
 

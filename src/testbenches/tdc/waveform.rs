@@ -129,5 +129,6 @@ fn view() -> Layout {
         ],
         zoom: (BEGIN - Time::from_ns(2), BEGIN + Time::from_ns(4)),
         marker: Some(BEGIN),
+        marks: Vec::new(),
     }
 }

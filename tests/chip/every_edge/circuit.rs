@@ -199,16 +199,17 @@ impl Case {
         let mut library = Library::default();
         for kind in CellKind::ALL {
             let has = |mask: u16| mask >> kind as u16 & 1 == 1;
-            let mut arcs: CellArcs = [(); MAX_INPUTS].map(|()| TimingArc {
+            let mut arc = || TimingArc {
                 rise: delay(),
                 fall: delay(),
-            });
+            };
+            let mut arcs: CellArcs = [(); MAX_INPUTS].map(|()| [arc(), arc()]);
             for pin in 0..MAX_INPUTS {
                 if has(self.uniform) {
                     arcs[pin] = arcs[0];
                 }
-                if has(self.symmetric) {
-                    arcs[pin].fall = arcs[pin].rise;
+                for arc in arcs[pin].iter_mut().filter(|_| has(self.symmetric)) {
+                    arc.fall = arc.rise;
                 }
             }
             library.set_arcs(kind, arcs);

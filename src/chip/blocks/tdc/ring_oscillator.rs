@@ -72,7 +72,7 @@ impl Model {
         };
         let delay = |name: &str, pin: usize, to| {
             let cell = cell(name).expect("a ring has its cells");
-            Time::from_fs(timing.of(cell)[pin].to(to).into())
+            Time::from_fs(timing.of(cell)[pin][0].to(to).into())
         };
         let inverters = (1..).map(|stage| format!("ring_{stage}"));
         let inverters = inverters.take_while(|name| cell(name).is_some());

@@ -108,7 +108,7 @@ impl Leveliser<'_> {
         if !survey.netlist.cells()[register].kind.is_flip_flop() {
             return Err(Unlevelled::Structure(survey.name(data)));
         }
-        let clock_to_q = |cell: usize| i64::from(survey.timing.of(cell)[1].rise_fs);
+        let clock_to_q = |cell: usize| i64::from(survey.timing.of(cell)[1][0].rise_fs);
         let due = (cause.position_fs + arrival_fs).rem_euclid(self.period_fs);
         let after_change = due - clock_to_q(index) - self.period_fs / 2 - clock_to_q(register);
         let edges = after_change.div_euclid(self.period_fs);

@@ -77,8 +77,11 @@ impl Leveliser<'_> {
         .collect()
     }
 
+    /// To either output: a draft stands for what both of them do, and the library's flip-flops are as fast to Q̄ as to Q.
     pub(super) fn delay(&self, arc: &Arc, edge: Edge) -> i64 {
-        i64::from(self.survey.timing.of(arc.cell)[arc.pin].to(edge.level()))
+        let [to_q, to_qn] = self.survey.timing.of(arc.cell)[arc.pin];
+        debug_assert_eq!(to_q, to_qn, "outputs of one flip-flop differ");
+        i64::from(to_q.to(edge.level()))
     }
 
     /// The changes that a cause brings while these flip-flops are held.
