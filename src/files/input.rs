@@ -13,6 +13,7 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 
 use super::complaint::InputError;
+use super::misfit::{Misfit, in_plain_words};
 
 /// Longest line of a table, and most that is read of an input that need not end before it has shown its use, bytes.
 /// Lines of our tables have some fifty bytes; a scene of 1 MiB has eight thousand objects.
@@ -205,7 +206,7 @@ pub(crate) fn parse_toml<T: DeserializeOwned>(
     text: &str,
 ) -> Result<T, InputError> {
     toml::from_str(text).map_err(|e| {
-        let message = format!("{}; correct this entry", e.message().replace('\n', " "));
+        let message = in_plain_words(e.message());
         match e.span() {
             Some(span) => InputError::at(source, line_of(text, span.start), message),
             None => InputError::new(source, message),
@@ -222,8 +223,11 @@ pub(crate) fn parse_json<T: DeserializeOwned>(
     text: &str,
     wanted: &str,
 ) -> Result<T, InputError> {
-    serde_json::from_str(text)
-        .map_err(|e| InputError::at(source, e.line(), format!("{e}; give {wanted}")))
+    serde_json::from_str(text).map_err(|e| {
+        let said = e.to_string();
+        let what = Misfit::of(&said).map_or(said, |misfit| misfit.without_cure());
+        InputError::at(source, e.line(), format!("{what}; give {wanted}"))
+    })
 }
 
 /// The one-based line of byte `offset` in `text`.

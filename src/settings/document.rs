@@ -12,7 +12,7 @@ use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
 use super::key::Key;
-use crate::files::{InputError, line_of, read_text};
+use crate::files::{InputError, in_plain_words, line_of, read_text};
 
 /// Something wrong with a setting.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -165,12 +165,11 @@ impl Document {
                 match alone.try_into::<T>() {
                     Ok(_) => Ok(value),
                     Err(e) => {
-                        let message = e.message().trim().replace('\n', " ");
-                        let about = match key {
-                            Some(_) => format!("{name}: "),
-                            None => String::new(),
-                        };
-                        Err(format!("{about}{message}; correct this entry"))
+                        let said = e.message();
+                        Err(match key {
+                            Some(key) => key.misfit(said),
+                            None => in_plain_words(said),
+                        })
                     }
                 }
             });
