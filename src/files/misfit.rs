@@ -33,9 +33,13 @@ pub fn in_plain_words(said: &str) -> String {
     let said = said.trim().replace('\n', " ");
     match Misfit::of(&said) {
         Some(misfit) => misfit.to_string(),
+        None if said == NO_WORD => "a word belongs here; correct this entry".into(),
         None => format!("{said}; correct this entry"),
     }
 }
+
+/// What TOML's reader says of anything else where one of some words belongs.
+pub(crate) const NO_WORD: &str = "wanted string or table";
 
 impl Misfit {
     /// What a reader says, if it is about a value's type, size or length.
@@ -235,7 +239,10 @@ mod tests {
                 toml::<DVec3>("[1, 2]"),
                 "a list of 2 is impossible; give a list of 3 numbers".into(),
             ),
-            (toml::<Word>("3"), "3 is impossible; give a word".into()),
+            (
+                toml::<Word>("3"),
+                "a word belongs here; correct this entry".into(),
+            ),
             (
                 json::<u8>("null"),
                 "nothing is impossible; give a whole number, 0 to 255".into(),

@@ -3,7 +3,7 @@
 use toml::Value;
 
 use super::quantity;
-use crate::files::{Misfit, in_plain_words};
+use crate::files::{Misfit, NO_WORD, in_plain_words};
 
 /// A key: what it is, in which unit, what it may be, and where its default comes from.
 #[derive(Debug, Clone, Copy)]
@@ -131,10 +131,19 @@ impl Key {
 
     /// What a reader says of a value of the wrong type, in the user's words and with what may be written instead.
     pub(crate) fn misfit(&self, said: &str) -> String {
-        let Some(misfit) = Misfit::of(said.trim()) else {
-            return format!("{}: {}", self.name, in_plain_words(said));
-        };
         let range = &self.range;
+        let Some(misfit) = Misfit::of(said.trim()) else {
+            return match range {
+                Range::OneOf(words) if said.trim() == NO_WORD => {
+                    format!(
+                        "{}: a word belongs here; give {}",
+                        self.name,
+                        words.join(", ")
+                    )
+                }
+                _ => format!("{}: {}", self.name, in_plain_words(said)),
+            };
+        };
         let wanted = match range {
             Range::OneOf(_) | Range::WordOrCurve(..) | Range::Switch => range.to_string(),
             Range::Text => return format!("{} = {misfit}", self.name),
