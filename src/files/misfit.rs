@@ -33,18 +33,23 @@ pub fn in_plain_words(said: &str) -> String {
     let said = said.trim().replace('\n', " ");
     match Misfit::of(&said) {
         Some(misfit) => misfit.to_string(),
-        None if said == NO_WORD => "a word belongs here; correct this entry".into(),
+        None if is_no_word(&said) => "a word belongs here; correct this entry".into(),
         None => format!("{said}; correct this entry"),
     }
 }
 
-/// What TOML's reader says of anything else where one of some words belongs.
-pub(crate) const NO_WORD: &str = "wanted string or table";
+/// Whether a reader says that something else stands where one of some words belongs.
+pub(crate) fn is_no_word(said: &str) -> bool {
+    said == "wanted string or table" || said.starts_with("invalid type: unit variant")
+}
 
 impl Misfit {
     /// What a reader says, if it is about a value's type, size or length.
     pub(crate) fn of(said: &str) -> Option<Self> {
         let said = without_place(said);
+        if is_no_word(said) {
+            return None;
+        }
         if let Some(rest) = said.strip_prefix("invalid length ") {
             let (length, expected) = rest.split_once(", expected ")?;
             let (wanted, limits) = wanted(expected);

@@ -31,7 +31,7 @@ pub(crate) use input::{line_of, parse_json, parse_toml, read_text};
 pub(crate) use interruption::clean_up_when_interrupted;
 pub(crate) use journal::{Journal, JournalReader, journal_line};
 pub use misfit::in_plain_words;
-pub(crate) use misfit::{Misfit, NO_WORD};
+pub(crate) use misfit::{Misfit, is_no_word};
 pub use output::{OutputFile, create_folder};
 pub use raster::Raster;
 pub use result_set::{MANIFEST, ManifestFile, ResultSet};

@@ -3,7 +3,7 @@
 use toml::Value;
 
 use super::quantity;
-use crate::files::{Misfit, NO_WORD, in_plain_words};
+use crate::files::{Misfit, in_plain_words, is_no_word};
 
 /// A key: what it is, in which unit, what it may be, and where its default comes from.
 #[derive(Debug, Clone, Copy)]
@@ -134,7 +134,7 @@ impl Key {
         let range = &self.range;
         let Some(misfit) = Misfit::of(said.trim()) else {
             return match range {
-                Range::OneOf(words) if said.trim() == NO_WORD => {
+                Range::OneOf(words) if is_no_word(said.trim()) => {
                     format!(
                         "{}: a word belongs here; give {}",
                         self.name,
