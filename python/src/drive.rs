@@ -4,6 +4,7 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use guided_dtof::request::{Spelling, check_drive_times};
+use guided_dtof::scene::PinholeCamera;
 use guided_dtof::system::{
     Drive as Frames, DriveFrame, DriveSettings, FrameClock, Noise, WindowPolicy,
 };
@@ -18,7 +19,7 @@ use crate::frame::{Common, bin_edges_ns, request};
 use crate::guide::Guide;
 use crate::scene::Scene;
 use crate::sensor::Sensor;
-use crate::values::{by_json, to_table};
+use crate::values::{by_json, to_table, typed};
 
 /// What is asked of a drive beside its frames.
 #[derive(serde::Deserialize)]
@@ -69,6 +70,7 @@ pub(crate) struct Drive {
     line: Mutex<Option<Line>>,
     watch: Watch,
     shape: (usize, usize),
+    camera: PinholeCamera,
     /// From one frame to the next, s.
     #[pyo3(get)]
     period_s: f64,
@@ -80,6 +82,7 @@ pub(crate) struct Drive {
 /// What is known of a drive before its first frame.
 struct Beginning {
     shape: (usize, usize),
+    camera: PinholeCamera,
     period_s: f64,
     chip_s: (f64, f64, f64),
 }
@@ -100,8 +103,7 @@ impl Drive {
         let request = request(keys)?;
         let (sensor, world) = (Sensor::or_default(sensor), Scene::or_default(scene));
         let guide = Guide::or_default(guide);
-        let drive_keys: DriveKeys = (to_table(drive_keys)?.try_into())
-            .map_err(|e: toml::de::Error| Failure::Input(e.message().trim().replace('\n', " ")))?;
+        let drive_keys: DriveKeys = typed(to_table(drive_keys)?)?;
         let noise = drive_keys.check()?;
         let watch = Watch::default();
         let (begin, begun) = sync_channel(1);
@@ -139,6 +141,7 @@ impl Drive {
         let (_, beginning) = wait(py, begun, &watch, None);
         let Beginning {
             shape,
+            camera,
             period_s,
             chip_s,
         } = beginning?;
@@ -149,6 +152,7 @@ impl Drive {
             })),
             watch,
             shape,
+            camera,
             period_s,
             chip_s,
         })
@@ -174,7 +178,7 @@ impl Drive {
                     line.take = Some(take);
                 }
                 drop(line);
-                to_dict(py, self.shape, taken)
+                to_dict(py, (self.shape, self.camera), taken)
             }
             Err(raised) => {
                 *line = None;
@@ -215,8 +219,10 @@ fn go(
         Err(failure) => return drop(begin.send(Ok(Err(failure.into())))),
     };
     let sensor = &settings.frame.sensor;
+    let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
     let beginning = Beginning {
         shape: (sensor.rows, sensor.cols),
+        camera: settings.frame.scene.lidar_camera(rows, cols),
         period_s: drive.period_s(),
         chip_s: drive.chip_s().into(),
     };
@@ -239,7 +245,7 @@ fn go(
 
 fn to_dict<'py>(
     py: Python<'py>,
-    shape: (usize, usize),
+    (shape, camera): ((usize, usize), PinholeCamera),
     (frame, edges_ns): Taken,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (rows, cols) = shape;
@@ -262,6 +268,7 @@ fn to_dict<'py>(
         histograms: histograms.into_counts(),
         pixels,
         edges_ns,
+        camera,
     }
     .into_dict(py)?;
     let ends = windows_m.iter().flat_map(|window| {

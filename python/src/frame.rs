@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use guided_dtof::chip::{Exposure, Sensor as Chip, WindowLaw};
 use guided_dtof::engine::waveform::WaveCycles;
 use guided_dtof::request::FrameRequest;
+use guided_dtof::scene::PinholeCamera;
 use guided_dtof::system::{
     FrameSettings, NoDepth, PixelDepth, Probe, WindowPolicy, take_frame_by, take_guided_frame,
 };
@@ -20,24 +21,15 @@ use crate::failure::Failure;
 use crate::guide::Guide;
 use crate::scene::Scene;
 use crate::sensor::Sensor;
-use crate::values::{by_json, to_table};
+use crate::taken::Taken;
+use crate::values::{by_json, to_table, typed};
 
 /// The library's request from keys of its own; None is a key that is left out.
 ///
 /// # Errors
 /// Unknown keys, and values of other types.
 pub(crate) fn request(keys: &Bound<'_, PyDict>) -> PyResult<FrameRequest> {
-    let table = to_table(keys)?;
-    // One key at a time, to say which one is wrong.
-    for (key, value) in &table {
-        let alone = toml::Table::from_iter([(key.clone(), value.clone())]);
-        if let Err(e) = alone.try_into::<FrameRequest>() {
-            let message = e.message().trim().replace('\n', " ");
-            return Err(Failure::argument(key, message).into());
-        }
-    }
-    let request = table.try_into::<FrameRequest>();
-    request.map_err(|e| Failure::Input(e.message().trim().replace('\n', " ")).into())
+    Ok(typed(to_table(keys)?)?)
 }
 
 /// Edges of the bins of every macropixel in its laser cycle, ns after STOP: one more than there are bins, NaN where its window
@@ -67,6 +59,7 @@ pub(crate) struct Common {
     pub(crate) histograms: Vec<u16>,
     pub(crate) pixels: Vec<PixelDepth>,
     pub(crate) edges_ns: Vec<f64>,
+    pub(crate) camera: PinholeCamera,
 }
 
 impl Common {
@@ -80,6 +73,7 @@ impl Common {
             histograms,
             pixels,
             edges_ns,
+            camera,
         } = self;
         let (rows, cols) = shape;
         let bins = histograms.len() / (rows * cols);
@@ -87,7 +81,15 @@ impl Common {
             let values = pixels.iter().map(|pixel| of(pixel).unwrap_or(f64::NAN));
             map(py, shape, values.collect())
         };
+        let point = |(at, pixel): (usize, &PixelDepth)| {
+            let towards = camera.towards((at / cols, at % cols));
+            pixel.measured_m.map(|m| (towards * m).to_array())
+        };
+        let points: Vec<[f64; 3]> = pixels.iter().enumerate().filter_map(point).collect();
         let dict = PyDict::new(py);
+        let shape_of_points = (points.len(), 3);
+        let points = map(py, shape_of_points, points.into_flattened());
+        dict.set_item("points", points)?;
         dict.set_item("histograms", cube(py, (rows, cols, bins), histograms))?;
         dict.set_item("bin_edges_ns", cube(py, (rows, cols, bins + 1), edges_ns))?;
         dict.set_item("depth", metres(|p| p.measured_m))?;
@@ -168,11 +170,9 @@ pub(crate) fn frame<'py>(
     probes: Option<&Bound<'py, PyAny>>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let (request, sensor, world) = (
-        request(keys)?,
-        Sensor::or_default(sensor),
-        Scene::or_default(scene),
-    );
+    let (mut request, sensor) = (request(keys)?, Sensor::or_default(sensor));
+    let (scene_name, world) = (Scene::name_or_default(scene), Scene::or_default(scene));
+    let guides = guide.map_or_else(Vec::new, |guide| guide.get().texts());
     let guide = Guide::or_default(guide);
     let starts = starts.map(|starts| {
         let shape = [sensor.rows, sensor.cols];
@@ -202,22 +202,35 @@ pub(crate) fn frame<'py>(
                 take_guided_frame(&settings, &map, starts, |_| probes, done)?
             }
         };
+        // How windows were chosen, where the policy's keys do not say it all.
+        let chosen = match (&starts, tracking) {
+            (Some(_), _) => "start values of one's own".into(),
+            (None, true) => format!("tracking,{}", request.windows),
+            (None, false) => request.windows.clone(),
+        };
         let starts: Vec<Option<u16>> = frame.pixels.iter().map(|pixel| pixel.start).collect();
         let edges_ns = bin_edges_ns(&settings.sensor, &settings.exposure, &starts);
-        Ok((frame, settings.sensor, settings.exposure, edges_ns))
+        request.guides = guides;
+        request.windows = chosen;
+        Ok((frame, request, settings, edges_ns))
     })?;
-    let (mut frame, sensor, exposure, edges_ns) = taken;
+    let (mut frame, request, settings, edges_ns) = taken;
+    let exposure = settings.exposure;
     let summary = by_json(py, &frame.summary())?;
     let dict = Common {
         shape: (frame.rows, frame.cols),
         histograms: std::mem::take(&mut frame.histograms),
-        pixels: std::mem::take(&mut frame.pixels),
+        pixels: frame.pixels.clone(),
         edges_ns,
+        camera: settings
+            .scene
+            .lidar_camera(frame.rows as u32, frame.cols as u32),
     }
     .into_dict(py)?;
     let seconds = |time: Time| time.as_s();
     dict.set_item("summary", summary)?;
-    dict.set_item("sensor", Sensor { chip: sensor })?;
+    let chip = settings.sensor.clone();
+    dict.set_item("sensor", Sensor { chip })?;
     dict.set_item("stop_periods", exposure.stop_periods)?;
     dict.set_item("laser_cycles", exposure.laser_cycles)?;
     dict.set_item("bin_m", frame.bin_m)?;
@@ -225,10 +238,11 @@ pub(crate) fn frame<'py>(
     dict.set_item("work", by_json(py, &frame.work)?)?;
     dict.set_item("kept", by_json(py, &frame.kept)?)?;
     dict.set_item("run_times", by_json(py, &frame.times)?)?;
-    dict.set_item("probes", frame.probes)?;
+    dict.set_item("probes", frame.probes.clone())?;
     dict.set_item("load_s", seconds(frame.load_time))?;
     dict.set_item("exposure_s", seconds(frame.exposure_time))?;
     dict.set_item("readout_s", seconds(frame.readout_time))?;
+    dict.set_item("_taken", Taken::new(scene_name, request, settings, frame))?;
     Ok(dict)
 }
 

@@ -1,5 +1,6 @@
 //! Guides as objects of Python: by name, or maps of one's own.
 
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
 use guided_dtof::guide::{
@@ -37,6 +38,9 @@ enum Part {
 /// Guide("stereo", "radar")             several, fused by their variances
 /// Guide.from_map(metres, sigma_m=0.5)  a map of one's own
 ///
+/// Guides are equal when they say the same, however they are written: Guide() == Guide("stereo"), and a key at its default is as good as
+/// none.
+///
 /// Raises InputError for what is no guide.
 #[pyclass(frozen, module = "gdtof")]
 pub(crate) struct Guide {
@@ -50,6 +54,20 @@ impl Guide {
             || Arc::new(BehaviouralStereo) as Arc<dyn Estimates>,
             |guide| guide.get().guide.clone(),
         )
+    }
+
+    /// Its parts as frame.json has them; none for the scene's camera pair.
+    pub(crate) fn texts(&self) -> Vec<String> {
+        let text = |part: &Part| match part {
+            Part::Named(text) => text.clone(),
+            Part::Map(map) => format!("map of {}x{}", map.shape.0, map.shape.1),
+        };
+        self.parts.iter().map(text).collect()
+    }
+
+    /// All that it does follows from this: what it is, with every key, and every value of maps.
+    fn said(&self) -> String {
+        format!("{:?}", self.guide)
     }
 
     fn of(parts: Vec<Part>) -> Result<Self, Failure> {
@@ -177,6 +195,20 @@ impl Guide {
             .collect();
         let shape = (rows as usize, cols as usize);
         Ok((map(py, shape, metres), map(py, shape, found.sigma_m)))
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        let other = other.cast::<Self>();
+        other.is_ok_and(|other| {
+            let other = other.get();
+            Arc::ptr_eq(&self.guide, &other.guide) || self.said() == other.said()
+        })
+    }
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        self.said().hash(&mut hasher);
+        hasher.finish()
     }
 
     fn __repr__(&self) -> String {

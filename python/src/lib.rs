@@ -21,6 +21,7 @@ mod replay;
 mod scene;
 mod sensor;
 mod sweep;
+mod taken;
 mod theory;
 mod timing;
 mod values;
@@ -42,6 +43,8 @@ mod _gdtof {
     use super::scene::Scene;
     #[pymodule_export]
     use super::sensor::Sensor;
+    #[pymodule_export]
+    use super::taken::Taken;
 
     #[pymodule_export]
     use super::counts::range_counts;
@@ -52,7 +55,7 @@ mod _gdtof {
     #[pymodule_export]
     use super::replay::replay;
     #[pymodule_export]
-    use super::sweep::{sweep_outline, sweep_part, sweep_table};
+    use super::sweep::{sweep_outline, sweep_part, sweep_table, sweep_text};
     #[pymodule_export]
     use super::theory::{confidence, theory};
     #[pymodule_export]

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use guided_dtof::request::Sources;
 use guided_dtof::scene::{GroundTruth, Scene as World};
+use guided_dtof::settings::Document;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -12,7 +13,9 @@ use toml::Table;
 use crate::arrays::map;
 use crate::background::run;
 use crate::failure::Failure;
-use crate::values::{assignments, hash_of, html_of, item, reassigned, table_to_python, value_at};
+use crate::values::{
+    assignments, hash_of, html_of, item, reassigned, table_to_python, to_table, value_at,
+};
 
 /// A scene: one that is built in, a file, and single keys of it.
 ///
@@ -35,6 +38,12 @@ pub(crate) struct Scene {
 impl Scene {
     pub(crate) fn or_default(scene: Option<&Bound<'_, Self>>) -> World {
         scene.map_or_else(World::outdoor, |scene| scene.get().world.clone())
+    }
+
+    /// What reports call it.
+    pub(crate) fn name_or_default(scene: Option<&Bound<'_, Self>>) -> String {
+        let usual = || Sources::default().scene_name();
+        scene.map_or_else(usual, |scene| scene.get().name.clone())
     }
 
     fn table(&self) -> Table {
@@ -70,6 +79,18 @@ impl Scene {
         })
     }
 
+    /// A scene from a dict of sections, as `to_dict` gives it; keys that it leaves out have the defaults of a scene file, and files that it
+    /// names are relative to the current folder.
+    #[staticmethod]
+    #[pyo3(signature = (sections, name="scene"))]
+    fn from_dict(sections: &Bound<'_, PyDict>, name: &str) -> PyResult<Self> {
+        let document = Document::of(name, to_table(sections)?);
+        Ok(Scene {
+            world: World::read(&document).map_err(Failure::from)?,
+            name: name.to_owned(),
+        })
+    }
+
     /// The same scene with other keys.
     #[pyo3(signature = (keys, /))]
     fn with_(&self, keys: &Bound<'_, PyDict>) -> PyResult<Self> {
@@ -80,7 +101,7 @@ impl Scene {
         })
     }
 
-    /// All keys and their values, section by section.
+    /// All keys and their values, section by section; `from_dict` reads it.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         table_to_python(py, &self.table())
     }

@@ -10,7 +10,9 @@ use pyo3::types::{PyDict, PyTuple};
 use toml::Table;
 
 use crate::failure::Failure;
-use crate::values::{assignments, hash_of, html_of, item, reassigned, table_to_python, to_python};
+use crate::values::{
+    assignments, hash_of, html_of, item, reassigned, table_to_python, to_python, to_table,
+};
 
 /// A sensor: a chip by name, a file, or keys.
 ///
@@ -60,6 +62,15 @@ impl Sensor {
         Ok(Sensor { chip })
     }
 
+    /// A sensor from a dict, as `to_dict` gives it; keys that it leaves out are the QuantIC4x4's.
+    #[staticmethod]
+    fn from_dict(keys: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let document = reassigned("sensor", to_table(keys)?, None)?;
+        let config = SensorConfig::read_document(&document).map_err(Failure::from)?;
+        let chip = config.into();
+        Ok(Sensor { chip })
+    }
+
     /// The same sensor with other keys.
     #[pyo3(signature = (**keys))]
     fn with_(&self, keys: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
@@ -69,7 +80,7 @@ impl Sensor {
         Ok(Sensor { chip })
     }
 
-    /// All keys and their values.
+    /// All keys and their values; `from_dict` reads it.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         table_to_python(py, &self.table())
     }

@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use guided_dtof::files::ResultSet;
+use guided_dtof::files::{InputError, ResultSet};
 use guided_dtof::sweep::{Results, Shard, Study, SweepError, run as take_points, study_of};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::background::run;
 use crate::failure::Failure;
-use crate::values::by_json;
+use crate::values::{by_json, to_text};
 
 impl From<SweepError> for Failure {
     fn from(error: SweepError) -> Self {
@@ -21,10 +21,35 @@ impl From<SweepError> for Failure {
     }
 }
 
-/// Points of a study file, its folder for results and its name.
+/// Reads a study: the file, or `text` as if it stood there.
+///
+/// # Errors
+/// What cannot be in it; of a text without lines, which nobody has seen.
+fn read(study: &Path, text: Option<&str>) -> Result<Study, InputError> {
+    let Some(text) = text else {
+        return Study::load(study);
+    };
+    let folder = study.parent().unwrap_or(Path::new(""));
+    Study::parse("study", text, folder, "study").map_err(|mut fault| {
+        fault.line = None;
+        fault.further.iter_mut().for_each(|other| other.line = None);
+        fault
+    })
+}
+
+/// A dict as the text of a study file.
 #[pyfunction]
-pub(crate) fn sweep_outline(study: PathBuf) -> PyResult<(u64, PathBuf, String)> {
-    let study = Study::load(&study).map_err(Failure::from)?;
+pub(crate) fn sweep_text(study: &Bound<'_, PyDict>) -> PyResult<String> {
+    to_text(study)
+}
+
+/// Points of a study, its folder for results and its name.
+#[pyfunction]
+pub(crate) fn sweep_outline(
+    study: PathBuf,
+    text: Option<&str>,
+) -> PyResult<(u64, PathBuf, String)> {
+    let study = read(&study, text).map_err(Failure::from)?;
     Ok((study.len(), study.out.clone(), study.name))
 }
 
@@ -33,13 +58,14 @@ pub(crate) fn sweep_outline(study: PathBuf) -> PyResult<(u64, PathBuf, String)> 
 pub(crate) fn sweep_part<'py>(
     py: Python<'py>,
     study: PathBuf,
+    text: Option<String>,
     folder: PathBuf,
     shard: (u64, u64),
     threads: usize,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let outcome = run(py, progress, move |watch| {
-        let study = Study::load(&study)?;
+        let study = read(&study, text.as_deref())?;
         let shard = Shard {
             part: shard.0,
             of: shard.1,

@@ -2,12 +2,14 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
+use guided_dtof::files::in_plain_words;
 use guided_dtof::settings::Document;
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString};
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
 use crate::failure::Failure;
@@ -21,7 +23,9 @@ pub(crate) fn to_toml(value: &Bound<'_, PyAny>) -> PyResult<Value> {
         return Ok(Value::Boolean(flag.is_true()));
     }
     if value.is_instance_of::<PyInt>() {
-        return Ok(Value::Integer(value.extract()?));
+        let number = value.extract();
+        let too_large = || Failure::Input(format!("{value} is too large; give 64-bit numbers"));
+        return Ok(Value::Integer(number.map_err(|_: PyErr| too_large())?));
     }
     if value.is_instance_of::<PyFloat>() {
         return Ok(Value::Float(value.extract()?));
@@ -63,6 +67,79 @@ pub(crate) fn to_table(dict: &Bound<'_, PyDict>) -> PyResult<Table> {
         }
     }
     Ok(table)
+}
+
+/// A table as what it stands for.
+///
+/// # Errors
+/// Unknown keys, and values of other types, each by its key.
+pub(crate) fn typed<T: DeserializeOwned>(table: Table) -> Result<T, Failure> {
+    table.try_into().map_err(|e: toml::de::Error| {
+        let said = in_plain_words(e.message());
+        // The reader adds the key in a line of its own.
+        let whole = e.to_string();
+        let key = whole
+            .lines()
+            .find_map(|line| line.strip_prefix("in `")?.strip_suffix('`'));
+        match key {
+            Some(key) => Failure::argument(key, said),
+            None => Failure::Input(said),
+        }
+    })
+}
+
+/// A dict as TOML text: sections, and below them a value a line, in the dict's order, which tables do not keep. Keys with dots in them
+/// stay as they are, and lists of dicts come last.
+///
+/// # Errors
+/// As [`to_toml`].
+pub(crate) fn to_text(dict: &Bound<'_, PyDict>) -> PyResult<String> {
+    let (mut text, mut lists) = (String::new(), Vec::new());
+    for (section, values) in dict {
+        let section = Value::String(section.extract()?).to_string();
+        match values.cast::<PyDict>() {
+            Ok(values) => {
+                let mut lines = String::new();
+                write_lines(&mut lines, &section, "", values, &mut lists)?;
+                text += &format!("[{section}]\n{lines}");
+            }
+            // It stands before all sections.
+            Err(_) => text.insert_str(0, &format!("{section} = {}\n", to_toml(&values)?)),
+        }
+    }
+    for (path, items) in lists {
+        for item in items {
+            let mut lines = String::new();
+            write_lines(&mut lines, "", "", &item, &mut Vec::new())?;
+            text += &format!("[[{path}]]\n{lines}");
+        }
+    }
+    Ok(text)
+}
+
+/// Lists of dicts by their path.
+type Lists<'py> = Vec<(String, Vec<Bound<'py, PyDict>>)>;
+
+fn write_lines<'py>(
+    lines: &mut String,
+    section: &str,
+    prefix: &str,
+    values: &Bound<'py, PyDict>,
+    lists: &mut Lists<'py>,
+) -> PyResult<()> {
+    for (key, value) in values {
+        let key = format!("{prefix}{}", Value::String(key.extract()?));
+        if let Ok(inner) = value.cast::<PyDict>() {
+            write_lines(lines, section, &format!("{key}."), inner, lists)?;
+            continue;
+        }
+        match value.extract::<Vec<Bound<'py, PyDict>>>() {
+            Ok(items) if !items.is_empty() => lists.push((format!("{section}.{key}"), items)),
+            _ if value.is_none() => (),
+            _ => *lines += &format!("{key} = {}\n", to_toml(&value)?),
+        }
+    }
+    Ok(())
 }
 
 /// The same as an object of Python.

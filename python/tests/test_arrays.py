@@ -40,6 +40,23 @@ def test_reasons_are_the_librarys(frame: gdtof.Frame) -> None:
         assert (frame.reason == gdtof.Reason[name.upper()]).sum() == count
 
 
+def test_points_are_depths_along_rays(frame: gdtof.Frame) -> None:
+    at = np.argwhere(np.isfinite(frame.depth))
+    assert frame.points.shape == (len(at), 3) and frame.points.dtype == np.float64 and len(at) > 50
+    # The pinhole by its field of view, x right, y down, z forward.
+    lidar = gdtof.Scene().to_dict()["lidar"]
+    tangent = np.tan(np.radians(lidar["fov_deg"]) / 2) / 8
+    across, down = (at[:, 1] - 7.5) * tangent, (at[:, 0] - 7.5) * tangent * lidar["macropixel_aspect"]
+    rays = np.stack([across, down, np.ones(len(at))], axis=1)
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    expected = rays * frame.depth[np.isfinite(frame.depth)][:, None]
+    assert np.allclose(frame.points, expected, rtol=1e-12, atol=1e-12)
+    nothing = gdtof.frame(frame.sensor, "empty", laser_cycles=20)
+    assert nothing.points.shape == (0, 3)
+    moving = next(gdtof.drive("van", gdtof.Sensor(rows=8, cols=8), frames=1, laser_cycles=50))
+    assert np.allclose(np.linalg.norm(moving.points, axis=1), moving.depth[np.isfinite(moving.depth)])
+
+
 def test_edges_say_where_bins_are(frame: gdtof.Frame) -> None:
     edges = frame.bin_edges_m
     is_on = frame.start >= 0

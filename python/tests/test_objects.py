@@ -49,6 +49,71 @@ def test_scenes_come_from_names_files_and_keys(tmp_path: Path) -> None:
         street["lidar.pdee"]
 
 
+@pytest.mark.parametrize("name", ["street", "van", "fog", "glass", "sweep", "night", "empty"])
+def test_a_scene_comes_back_from_its_dict(name: str) -> None:
+    scene = gdtof.Scene(name)
+    back = gdtof.Scene.from_dict(scene.to_dict(), name=scene.name)
+    assert back == scene and hash(back) == hash(scene) and back.name == scene.name
+    assert back.to_dict() == scene.to_dict() and back.to_toml() == scene.to_toml()
+
+
+def test_a_scene_with_files_comes_back_from_its_dict(tmp_path: Path) -> None:
+    (tmp_path / "pulse.csv").write_text("0,0\n1,1\n3,0\n")
+    np.save(tmp_path / "depth.npy", np.full((4, 4), 12.5, np.float32))
+    (tmp_path / "scene.toml").write_text(
+        '[lidar]\npulse = "pulse.csv"\n[rig]\n[[object]]\nname = "seen"\nkind = "map"\nreflectivity = 0.4\n'
+        'depth_file = "depth.npy"\nfocal_px = 5\nwaypoints = [[0, 0, 0, 0], [1, 0.5, 0, 2]]\n'
+    )
+    scene = gdtof.Scene(tmp_path / "scene.toml")
+    back = gdtof.Scene.from_dict(scene.to_dict(), scene.name)
+    assert back == scene and hash(back) == hash(scene)
+    assert np.array_equal(back.truth(8, 8), scene.truth(8, 8), equal_nan=True) and np.nanmin(back.truth(8, 8)) >= 12.5
+
+
+def test_scenes_and_sensors_come_from_dicts() -> None:
+    values = gdtof.Scene("street").to_dict()
+    values["light"]["illuminance_klux"] = np.float64(1.0)
+    values["lidar"]["pde"] = "20 %"
+    values["medium"] = None
+    scene = gdtof.Scene.from_dict(values)
+    assert scene["light.illuminance_klux"] == 1.0 and scene["lidar.pde"] == 0.2 and scene.name == "scene"
+    # What is left out is as in a scene file, and a dict is read as such a file.
+    wall = {"object": [{"name": "wall", "kind": "box", "reflectivity": 0.5, "centre_m": (0, 0, 10), "size_m": np.array([30.0, 30.0, 1.0])}]}
+    text = '[[object]]\nname = "wall"\nkind = "box"\nreflectivity = 0.5\ncentre_m = [0, 0, 10]\nsize_m = [30, 30, 1]'
+    assert gdtof.Scene.from_dict(wall) == gdtof.Scene.from_toml(text)
+    for sensor in (gdtof.Sensor("hslidar_delay_line", rows=4), gdtof.Sensor()):
+        back = gdtof.Sensor.from_dict(sensor.to_dict())
+        assert back == sensor and hash(back) == hash(sensor)
+
+
+def test_guides_that_say_the_same_are_equal() -> None:
+    metres = np.array([[10.0, np.nan], [20.0, 0.0]])
+    same = [
+        [gdtof.Guide(), gdtof.Guide("stereo"), gdtof.Guide(gdtof.Guide())],
+        [gdtof.Guide("radar:range_sigma_m=0.2"), gdtof.Guide("radar:range_sigma_m=20 cm")],
+        [gdtof.Guide("radar:range_sigma_m=0.2,azimuth_beam_deg=4"), gdtof.Guide("radar:azimuth_beam_deg=4,range_sigma_m=0.2")],
+        [gdtof.Guide("matched"), gdtof.Guide("matched:")],
+        [gdtof.Guide("stereo", "radar"), gdtof.Guide("stereo", gdtof.Guide("radar"))],
+        [gdtof.Guide("radar", "stereo")],
+        [gdtof.Guide.from_map(metres), gdtof.Guide.from_map(metres.tolist(), sigma_m=1.0), gdtof.Guide.from_map([[10.0, 0.0], [20.0, np.nan]])],
+        [gdtof.Guide.from_map(metres, sigma_m=0.5)],
+        [gdtof.Guide.from_map(metres.reshape(1, 4))],
+        [gdtof.Guide.from_map(np.nextafter(metres, np.inf))],
+        [gdtof.Guide("stereo", gdtof.Guide.from_map(metres))],
+    ]
+    for group, guides in enumerate(same):
+        for other, others in enumerate(same):
+            for guide in guides:
+                for that in others:
+                    assert (guide == that) is (group == other), (guide, that)
+                    assert (guide != that) is (group != other)
+                    assert group != other or hash(guide) == hash(that)
+    assert len({guide for guides in same for guide in guides}) == len(same)
+    for guide in (guides[-1] for guides in same):
+        assert pickle.loads(pickle.dumps(guide)) == guide
+    assert gdtof.Guide() != "stereo"
+
+
 def test_copies_travel() -> None:
     guide = gdtof.Guide("radar", gdtof.Guide.from_map([[1.0, np.nan]], sigma_m=[[0.5, 1.0]]))
     alone = gdtof.Guide.from_map([[1.0, np.nan]], sigma_m=[[0.5, 1.0]])
@@ -75,7 +140,19 @@ def test_copies_travel() -> None:
         (lambda: gdtof.Guide("radar:beam=3"), "unknown field `beam`"),
         (lambda: gdtof.Guide(*["radar"] * 9), "9 guides; give 1 to 8"),
         (lambda: gdtof.frame(engine="windo"), "engine: unknown variant `windo`"),  # type: ignore[arg-type]
-        (lambda: gdtof.frame(laser_cycles=-1), "laser_cycles: "),
+        (lambda: gdtof.frame(laser_cycles=-1), "laser_cycles: -1 is impossible; give a whole number, 0 to 4294967295"),
+        (lambda: gdtof.frame(stop_periods=2.5), "stop_periods: 2.5 is impossible; give a whole number, 0 to 4294967295"),  # type: ignore[arg-type]
+        (lambda: gdtof.frame(stop_periods=520.0), "stop_periods: 520.0 is impossible; give 520, without a point"),  # type: ignore[arg-type]
+        (lambda: gdtof.frame(sub_bins=2.5), "sub_bins: 2.5 is impossible; give a whole number, 0 to 255"),  # type: ignore[arg-type]
+        (lambda: gdtof.frame(skip=1), "skip: 1 is impossible; give true or false"),  # type: ignore[arg-type]
+        (lambda: gdtof.frame(seed=2**64), "18446744073709551616 is too large; give 64-bit numbers"),
+        (lambda: gdtof.drive(segments=2.5), "segments: 2.5 is impossible; give a whole number, 0 to 4294967295"),  # type: ignore[arg-type]
+        (lambda: gdtof.Sensor(rows=2.5), "rows = 2.5 is impossible; give a whole number, 1 to 256"),
+        (lambda: gdtof.Sensor.from_dict({"rows": True}), "sensor: rows = true is impossible; give a whole number, 1 to 256"),
+        (lambda: gdtof.Scene("street", {"lidar.pde": [1]}), "pde = a list is impossible; give a number, 0 to 1"),
+        (lambda: gdtof.Scene.from_dict({"lidar": {"pde": 2}}, "mine"), "mine: in [lidar], pde = 2 is impossible; give 0 to 1"),
+        (lambda: gdtof.Scene.from_dict({"lidar": 3}), "scene: lidar: this must be a section"),
+        (lambda: gdtof.Scene.from_dict({}), "scene: has no settings"),
         (lambda: gdtof.drive(segments=0), "segments: 0 is impossible; give 1 to 64"),
         (lambda: gdtof.drive(guide_latency_ms=-1), "guide_latency_ms: -1 is no latency"),
         (lambda: gdtof.drive(frames=-1), "frames: -1 is impossible"),

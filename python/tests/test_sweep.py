@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from conftest import Command
 from distributed import Client, LocalCluster
@@ -65,6 +66,47 @@ def test_a_sweep_is_the_commands(command: Command, study: Path, table: bytes, tm
     assert len(swept.to_pandas()) == 24
 
 
+def test_a_study_comes_from_a_dict(study: Path, table: bytes, tmp_path: Path) -> None:
+    nested: dict[str, Any] = {
+        "study": {"kind": "frame", "replicas": 2},
+        "fixed": {"sensor": {"rows": 8, "cols": np.int64(8)}, "frame": {"laser_cycles": 400}, "scene": "night"},
+        "vary": {"scene": {"lidar": {"pulse_energy_uj": {"from": 5, "to": 50, "steps": 6}}}, "guide": ["stereo", "radar"]},
+    }
+    dotted: dict[str, Any] = {
+        "study": nested["study"],
+        "fixed": {"sensor.rows": 8, "sensor.cols": 8, "frame.laser_cycles": 400, "scene": "night"},
+        "vary": {"scene.lidar.pulse_energy_uj": np.linspace(5, 50, 6), "guide": ("stereo", "radar")},
+    }
+    for name, asked in (("nested", nested), ("dotted", dotted)):
+        swept = gdtof.sweep(asked, tmp_path / name)
+        assert (swept.points, swept.taken) == (24, 24)
+        assert (swept.folder / "results.csv").read_bytes() == table
+    # It goes on where a file has been, and a file where it has been.
+    assert gdtof.sweep(study, tmp_path / "nested").reused == 24
+
+
+@pytest.mark.parametrize("keys", [("sensor.bins", "scene.lidar.pde"), ("scene.lidar.pde", "sensor.bins")])
+def test_what_a_dict_varies_first_varies_slowest(keys: tuple[str, str], tmp_path: Path) -> None:
+    values: dict[str, list[Any]] = {"sensor.bins": [16, 8], "scene.lidar.pde": [0.2, 0.1]}
+    fixed = {"sensor.rows": 4, "sensor.cols": 4, "frame.laser_cycles": 20}
+    vary = {key: values[key] for key in keys}
+    table = gdtof.sweep({"study": {"kind": "frame"}, "fixed": fixed, "vary": vary}, tmp_path).to_pandas()
+    slow, fast = keys
+    assert list(table[slow]) == [value for value in values[slow] for _ in range(2)]
+    assert list(table[fast]) == values[fast] * 2
+
+
+def test_keys_that_go_together(tmp_path: Path) -> None:
+    asked = {
+        "study": {"kind": "frame", "out": "elsewhere"},
+        "fixed": {"sensor.rows": 4, "sensor.cols": 4, "frame.laser_cycles": 20},
+        "vary": {"zip": [{"sensor.bins": [8, 16], "scene.lidar.pde": [0.1, 0.2]}], "scene.light.illuminance_klux": [1, 2]},
+    }
+    table = gdtof.sweep(asked, tmp_path).to_pandas()
+    together = {(row["sensor.bins"], row["scene.lidar.pde"]) for _, row in table.iterrows()}
+    assert len(table) == 4 and together == {(8, 0.1), (16, 0.2)}
+
+
 def test_a_lost_worker_changes_nothing(client: Client, study: Path, table: bytes, tmp_path: Path) -> None:
     folder = tmp_path / "cluster"
     killed: list[int] = []
@@ -111,5 +153,12 @@ def test_what_cannot_be(study: Path, tmp_path: Path) -> None:
     bad.write_text("[vary]\nsensor.bin = [1]\n")
     with pytest.raises(gdtof.InputError, match=r"bad.toml:2: "):
         gdtof.sweep(bad)
+    with pytest.raises(gdtof.InputError, match=r"^study: .*bin"):
+        gdtof.sweep({"vary": {"sensor.bin": [1]}}, tmp_path / "none")
+    with pytest.raises(gdtof.InputError, match=r"^study: replicas = 2.5 is impossible; give a whole number"):
+        gdtof.sweep({"study": {"replicas": 2.5}, "vary": {"sensor.bins": [8]}}, tmp_path / "none")
+    with pytest.raises(gdtof.InputError, match=r"^study: frame: this must be a section|^study: frame: unknown section"):
+        gdtof.sweep({"frame": 3}, tmp_path / "none")
+    assert not (tmp_path / "none").exists()
     with pytest.raises(gdtof.InputError, match="parts: are for a client"):
         gdtof.sweep(study, tmp_path, parts=3)

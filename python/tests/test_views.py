@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 import gdtof
 
@@ -38,6 +39,28 @@ def test_datasets_have_dimensions_and_units(frame: gdtof.Frame) -> None:
     assert np.shares_memory(data["histograms"].values, frame.histograms)
     moving = next(gdtof.drive("van", gdtof.Sensor(rows=8, cols=8), frames=1, laser_cycles=50))
     assert float(moving.to_xarray()["time"]) > 0.145
+
+
+def test_datasets_go_into_netcdf_and_come_back(frame: gdtof.Frame, tmp_path: Path) -> None:
+    moving = next(gdtof.drive("van", gdtof.Sensor(rows=8, cols=8), frames=1, laser_cycles=50))
+    # None of its surfaces is reached, of which a remark tells.
+    far = gdtof.frame(gdtof.Sensor(rows=4, cols=4), stop_periods=20, laser_cycles=20)
+    assert frame.remark is None and far.remark is not None
+    for name, taken in (("still", frame), ("moving", moving), ("far", far)):
+        data = taken.to_xarray()
+        data.to_netcdf(tmp_path / f"{name}.nc")
+        with xarray.open_dataset(tmp_path / f"{name}.nc") as back:
+            xarray.testing.assert_identical(back.load(), data)
+            for key, variable in data.variables.items():
+                assert back[key].dtype == variable.dtype, key
+                assert back[key].attrs["units"] == variable.attrs["units"] and variable.attrs["long_name"]
+            assert back["depth"].attrs["units"] == back["guide"].attrs["units"] == "m"
+            assert back["bin_edges"].attrs["units"] == "ns"
+            assert back["histograms"].dtype == np.uint16 and back["in_window"].dtype == np.bool_
+            assert np.array_equal(back["histograms"], taken.histograms)
+            assert np.array_equal(back["depth"], taken.depth, equal_nan=True)
+            assert back["reason"].attrs["flag_meanings"].split()[1] == "no_surface"
+            assert back.attrs.get("remark") == getattr(taken, "remark", None)
 
 
 def test_tables_have_a_row_for_each_macropixel(frame: gdtof.Frame) -> None:

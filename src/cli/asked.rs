@@ -3,25 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use serde::Serialize;
 
 use super::guiding::GuideArgs;
-use crate::chip::SensorConfig;
 use crate::request::{FrameRequest, Spelling};
-use crate::scene::Scene;
-use crate::system::{EngineKind, FrameSettings};
-
-/// What frame.json and drive.json say of an exposure alike, first of all.
-#[derive(Serialize)]
-pub(super) struct Exposed<'a> {
-    pub(super) scene_name: String,
-    scene: &'a Scene,
-    pub(super) sensor: &'a SensorConfig,
-    stop_periods: u32,
-    pub(super) laser_cycles: u32,
-    seed: u64,
-    engine: EngineKind,
-}
+use crate::system::EngineKind;
 
 /// An exposure, and how its windows are guided.
 #[derive(Args)]
@@ -46,23 +31,6 @@ pub(super) struct ExposureArgs {
 }
 
 impl ExposureArgs {
-    /// These, with the scene and the sensor that `settings` made of them.
-    pub(super) fn exposed<'a>(
-        &self,
-        scene_name: String,
-        settings: &'a FrameSettings,
-    ) -> Exposed<'a> {
-        Exposed {
-            scene_name,
-            scene: &settings.scene,
-            sensor: &settings.sensor,
-            stop_periods: settings.exposure.stop_periods,
-            laser_cycles: self.laser_cycles,
-            seed: self.seed,
-            engine: self.engine,
-        }
-    }
-
     /// The request with all of this, and the default of everything else.
     pub(super) fn request(&self) -> FrameRequest {
         self.guiding.ask(FrameRequest {

@@ -9,13 +9,13 @@ use clap::Args;
 use serde::Serialize;
 
 use super::SceneArgs;
-use super::asked::{Exposed, ExposureArgs};
+use super::asked::ExposureArgs;
 use super::foxglove::Foxglove;
 use super::voice::{note, progress, say, tell};
 use crate::engine::Work;
 use crate::files::{InputError, MANIFEST, ResultSet};
 use crate::report::{Cell, DepthMap, NpyStack, Table};
-use crate::request::{Spelling, check_drive_times};
+use crate::request::{Exposed, Spelling, check_drive_times};
 use crate::system::{
     Drive, DriveFrame, DriveSettings, FrameClock, FrameTimes, NoDepth, Noise, PhaseTimes, Reused,
     Summary, WindowPolicy,
@@ -158,7 +158,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         ..DriveSettings::new(frame)
     };
     let configuration = Configuration {
-        exposed: asked.exposed(scene_args.scene_name(), &settings.frame),
+        exposed: request.exposed(scene_args.scene_name(), &settings.frame),
         guides: asked.guiding.guides(),
         windows: settings.policy,
         calibration: asked.calibration.as_deref(),

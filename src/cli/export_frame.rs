@@ -61,8 +61,7 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
     let points: Vec<CloudPoint> = (pixels.iter().zip(histograms.chunks_exact(bins)).enumerate())
         .filter_map(|(at, (pixel, counts))| {
             let (row, col) = (at / cols, at % cols);
-            let ray = camera.at_unit_depth((col as f64 + 0.5, row as f64 + 0.5));
-            let at_m = ray.normalize() * pixel.measured_m?;
+            let at_m = camera.towards((row, col)) * pixel.measured_m?;
             Some(CloudPoint {
                 at_m: at_m.to_array().map(|x| x as f32),
                 intensity: above_background(counts),

@@ -108,8 +108,7 @@ impl Foxglove {
         let sensor = &settings.frame.sensor;
         let (rows, cols) = (sensor.rows, sensor.cols);
         let camera = settings.frame.scene.lidar_camera(rows as u32, cols as u32);
-        let middle = |pixel: usize| ((pixel % cols) as f64 + 0.5, (pixel / cols) as f64 + 0.5);
-        let ray = |pixel| camera.at_unit_depth(middle(pixel)).normalize();
+        let ray = |pixel: usize| camera.towards((pixel / cols, pixel % cols));
         let mcap = Mcap::begin(OutputFile::create(path)?, &CHANNELS);
         Ok(Foxglove {
             mcap: mcap.map_err(|e| InputError::unwritable(path, &e))?,

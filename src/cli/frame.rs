@@ -1,31 +1,24 @@
 //! `gdtof frame`: the main job.
 
 mod pair;
-mod picture;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use serde::Serialize;
 
 use self::pair::PairReport;
-use super::asked::{Exposed, ExposureArgs};
+use super::asked::ExposureArgs;
 use super::voice::{note, progress, say, tell};
 use super::{SceneArgs, quality};
 use crate::analysis::{TimingVerdict, VerdictReport};
-use crate::chip::WindowLaw;
 use crate::chip::{Mode, SensorConfig, Silicon};
 use crate::engine::waveform::WaveCycles;
-use crate::engine::{Work, variance_left_out};
-use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
+use crate::files::{InputError, MANIFEST, ResultSet};
 use crate::guide::GuideMap;
 use crate::page::Page;
-use crate::report::{Table, write_npy_u16};
-use crate::request::FrameRequest;
-use crate::system::{
-    DistanceLaw, EngineKind, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Probe, Summary,
-    WindowPolicy, take_frame_by,
-};
+use crate::report::Table;
+use crate::request::{FrameReport, FrameRequest, variance_left_out_of, write_frame};
+use crate::system::{Frame, FrameSettings, Probe, WindowPolicy, take_frame_by};
 use crate::units::Time;
 use crate::waves::WaveFormat;
 
@@ -120,8 +113,10 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     )?;
 
     let pair_report = pair.as_ref().map(|pair| &pair.report);
-    let report = Report::new(args, &settings, &timing, &frame, pair_report);
-    write_results(results.staging(), &frame, &report)?;
+    let name = scene_name(args);
+    let report = FrameReport::new(name, &request, &settings, &timing, &frame, pair_report);
+    let text = serde_json::to_string(&report)?;
+    write_frame(results.staging(), &text, &frame.histograms)?;
     if args.page {
         let page = Page::of(results.staging(), &args.out, 1)?;
         page.write(&results.staging().join("page.html"))?;
@@ -220,119 +215,6 @@ fn nearest_guided(guide: &GuideMap) -> Option<(usize, usize)> {
             let off = |at: usize, size: u32| (2 * at as i64 + 1 - size as i64).pow(2);
             off(row, guide.rows) + off(col, guide.cols)
         })
-}
-
-/// What was asked for: in frame.json and in the manifest.
-#[derive(Serialize)]
-struct Configuration<'a> {
-    #[serde(flatten)]
-    exposed: Exposed<'a>,
-    false_alarm_rate: f64,
-    walk_correction: bool,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    calibration: Option<String>,
-    #[serde(skip_serializing_if = "<[String]>::is_empty")]
-    guides: &'a [String],
-    #[serde(skip_serializing_if = "Option::is_none")]
-    windows: Option<&'a str>,
-}
-
-/// The contents of frame.json.
-#[derive(Serialize)]
-struct Report<'a> {
-    version: &'static str,
-    #[serde(flatten)]
-    configuration: Configuration<'a>,
-    summary: Summary,
-    remark: Option<&'a str>,
-    photons_expected: f64,
-    work: Work,
-    timing: &'a VerdictReport,
-    tolerance: Option<&'a Kept>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    variance_left_out: Option<f64>,
-    distance: DistanceLaw,
-    load_bits: usize,
-    load_time_s: f64,
-    readout_time_s: f64,
-    exposure_time_s: f64,
-    frame_time_s: f64,
-    exposure_run_time_s: f64,
-    run_time_s: f64,
-    run_times: PhaseTimes,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pair: Option<&'a PairReport>,
-    probes: &'a [(usize, usize)],
-    histograms_shape: [usize; 3],
-    macropixels: &'a [PixelDepth],
-}
-
-impl<'a> Report<'a> {
-    fn new(
-        args: &'a FrameArgs,
-        settings: &'a FrameSettings,
-        timing: &'a VerdictReport,
-        frame: &'a Frame,
-        pair: Option<&'a PairReport>,
-    ) -> Self {
-        let asked = &args.exposure;
-        Report {
-            version: env!("CARGO_PKG_VERSION"),
-            configuration: Configuration {
-                exposed: asked.exposed(scene_name(args), settings),
-                false_alarm_rate: args.false_alarm_rate,
-                walk_correction: !args.no_walk_correction,
-                calibration: asked.calibration.as_ref().map(|p| p.display().to_string()),
-                guides: asked.guiding.guides(),
-                windows: asked.guiding.windows(),
-            },
-            summary: frame.summary(),
-            remark: frame.remark.as_deref(),
-            photons_expected: frame.photons_expected,
-            work: frame.work,
-            timing,
-            tolerance: frame.kept.as_ref(),
-            variance_left_out: variance_left_out_of(settings, frame),
-            distance: DistanceLaw::new(
-                // One law for all macropixels.
-                &WindowLaw::new(settings.sensor.alike(), &settings.exposure),
-                frame.pixels.iter().filter_map(|pixel| pixel.start),
-            ),
-            load_bits: frame.load_bits,
-            load_time_s: frame.load_time.as_s(),
-            readout_time_s: frame.readout_time.as_s(),
-            exposure_time_s: frame.exposure_time.as_s(),
-            frame_time_s: settings.sensor.frame_time(frame.exposure_time).as_s(),
-            exposure_run_time_s: frame.times.exposure_s,
-            run_time_s: frame.times.total_s(),
-            run_times: frame.times,
-            pair,
-            probes: &frame.probes,
-            histograms_shape: [frame.rows, frame.cols, frame.bins],
-            macropixels: &frame.pixels,
-        }
-    }
-}
-
-/// The share of the variance of counts that may be missing, where cohorts made them of SPADs with afterpulses.
-fn variance_left_out_of(settings: &FrameSettings, frame: &Frame) -> Option<f64> {
-    let is_by_cohort = match &frame.kept {
-        Some(kept) => kept.on_cohort > 0,
-        None => settings.engine == EngineKind::Cohort,
-    };
-    let probability = settings.sensor.afterpulse_probability;
-    (is_by_cohort && probability > 0.0).then(|| variance_left_out(probability))
-}
-
-fn write_results(out: &Path, frame: &Frame, report: &Report<'_>) -> anyhow::Result<()> {
-    let shape = report.histograms_shape.map(|n| n as u64);
-    write_npy_u16(&out.join("histograms.npy"), &shape, &frame.histograms)?;
-    picture::depth_map(out, frame, &report.configuration.exposed)?;
-    OutputFile::write_with(&out.join("frame.json"), |w| {
-        serde_json::to_writer(&mut *w, report)?;
-        writeln!(w)
-    })?;
-    Ok(())
 }
 
 fn table(

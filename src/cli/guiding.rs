@@ -37,11 +37,6 @@ impl GuideArgs {
     pub(super) fn guides(&self) -> &[String] {
         &self.guides
     }
-
-    /// The policy's keys as they were asked for.
-    pub(super) fn windows(&self) -> Option<&str> {
-        self.windows.as_deref()
-    }
 }
 
 fn guides_in_full() -> String {

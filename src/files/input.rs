@@ -13,6 +13,7 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 
 use super::complaint::InputError;
+use super::misfit::{Misfit, in_plain_words};
 
 /// Longest line of a table, and most that is read of an input that need not end before it has shown its use, bytes.
 /// Lines of our tables have some fifty bytes; a scene of 1 MiB has eight thousand objects.
@@ -225,7 +226,7 @@ pub(crate) fn parse_toml<T: DeserializeOwned>(
     text: &str,
 ) -> Result<T, InputError> {
     toml::from_str(text).map_err(|e| {
-        let message = format!("{}; correct this entry", e.message().replace('\n', " "));
+        let message = in_plain_words(e.message());
         match e.span() {
             Some(span) => {
                 let line = LineEnds::of(text).line_of(span.start);
@@ -245,8 +246,11 @@ pub(crate) fn parse_json<T: DeserializeOwned>(
     text: &str,
     wanted: &str,
 ) -> Result<T, InputError> {
-    serde_json::from_str(text)
-        .map_err(|e| InputError::at(source, e.line(), format!("{e}; give {wanted}")))
+    serde_json::from_str(text).map_err(|e| {
+        let said = e.to_string();
+        let what = Misfit::of(&said).map_or(said, |misfit| misfit.without_cure());
+        InputError::at(source, e.line(), format!("{what}; give {wanted}"))
+    })
 }
 
 /// Where the lines of a text end.

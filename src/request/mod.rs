@@ -3,6 +3,7 @@
 //! ```text
 //!   names, files, KEY=VALUE ──► Sources ──► Sensor, Scene ───────┐
 //!   counts, engine, guides ───► FrameRequest ────────────────────┴─► FrameSettings, WindowPolicy
+//!   a Frame of them ──────────────────────────────► FrameReport ───► frame.json, histograms.npy, depth.png
 //! ```
 //!
 //! The command line, sweeps and Python all take this road, so that the same request has the same numbers whichever way it
@@ -10,12 +11,16 @@
 
 mod calibration;
 mod frame;
+mod frame_files;
+mod picture;
 mod sources;
 mod spelling;
 mod wording;
 
 pub use self::calibration::read_calibration;
 pub use self::frame::{FRAME_KEYS, FrameRequest, check_drive_times, check_false_alarm_rate};
+pub(crate) use self::frame_files::variance_left_out_of;
+pub use self::frame_files::{Exposed, FrameConfiguration, FrameReport, write_frame};
 pub use self::sources::Sources;
 pub use self::spelling::Spelling;
 pub use self::wording::{exposure, guided_exposure, is_bad_input, of_engine, of_no_aim, sentence};

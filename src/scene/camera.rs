@@ -60,6 +60,12 @@ impl PinholeCamera {
         )
     }
 
+    /// The direction, of length 1, that the centre of the pixel in a row and column sees.
+    pub fn towards(&self, (row, col): (usize, usize)) -> DVec3 {
+        let middle = (col as f64 + 0.5, row as f64 + 0.5);
+        self.at_unit_depth(middle).normalize()
+    }
+
     /// The pixel coordinates of a world point, Eq. 32 (with R = 1, T = 0), whether inside the
     /// image or not. `None` for points that are not in front of the camera.
     pub fn project(&self, point: DVec3) -> Option<(f64, f64)> {

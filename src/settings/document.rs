@@ -12,7 +12,7 @@ use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
 use super::key::Key;
-use crate::files::{InputError, LineEnds, read_text_within, too_long};
+use crate::files::{InputError, LineEnds, in_plain_words, read_text_within, too_long};
 
 /// Most items of a list. A scene of so many objects is read and printed in 1.1 s of processor time and 270 MB (dev profile).
 const MOST_ITEMS: usize = 65_536;
@@ -207,12 +207,11 @@ impl Document {
                 match alone.try_into::<T>() {
                     Ok(_) => Ok(value),
                     Err(e) => {
-                        let message = e.message().trim().replace('\n', " ");
-                        let about = match key {
-                            Some(_) => format!("{name}: "),
-                            None => String::new(),
-                        };
-                        Err(format!("{about}{message}; correct this entry"))
+                        let said = e.message();
+                        Err(match key {
+                            Some(key) => key.misfit(said),
+                            None => in_plain_words(said),
+                        })
                     }
                 }
             });

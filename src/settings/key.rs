@@ -3,6 +3,7 @@
 use toml::Value;
 
 use super::quantity;
+use crate::files::{Misfit, in_plain_words, is_no_word};
 
 /// A key: what it is, in which unit, what it may be, and where its default comes from.
 #[derive(Debug, Clone, Copy)]
@@ -128,6 +129,43 @@ impl Key {
         }
     }
 
+    /// What a reader says of a value of the wrong type, in the user's words and with what may be written instead.
+    pub(crate) fn misfit(&self, said: &str) -> String {
+        let range = &self.range;
+        let Some(misfit) = Misfit::of(said.trim()) else {
+            return match range {
+                Range::OneOf(words) if is_no_word(said.trim()) => {
+                    format!(
+                        "{}: a word belongs here; give {}",
+                        self.name,
+                        words.join(", ")
+                    )
+                }
+                _ => format!("{}: {}", self.name, in_plain_words(said)),
+            };
+        };
+        let wanted = match range {
+            Range::OneOf(_) | Range::WordOrCurve(..) | Range::Switch => range.to_string(),
+            Range::Text => return format!("{} = {misfit}", self.name),
+            _ if misfit.wants_number() => {
+                format!("{}, {range}{}", misfit.wanted, self.after_number())
+            }
+            _ => return format!("{} = {misfit}", self.name),
+        };
+        format!(
+            "{} = {} is impossible; give {wanted}",
+            self.name, misfit.found
+        )
+    }
+
+    /// The unit as it follows a number.
+    fn after_number(&self) -> String {
+        match self.unit {
+            "" => String::new(),
+            unit => format!(" {unit}"),
+        }
+    }
+
     /// What is wrong with a plain value of the right type, if anything.
     pub fn fault(&self, value: &Value) -> Option<String> {
         let number = match value {
@@ -139,10 +177,7 @@ impl Key {
         if self.range.holds(number) {
             return None;
         }
-        let unit = match self.unit {
-            "" => String::new(),
-            unit => format!(" {unit}"),
-        };
+        let unit = self.after_number();
         let because = match self.range {
             Range::Limited(_, _, reason) if number >= 0.0 => format!(": {reason}"),
             _ => String::new(),

@@ -15,7 +15,7 @@ use super::row::{Key, Row};
 use super::study::{Kind, Point, Study};
 use super::theory::{self, Last, Rig, Wall};
 use crate::chip::{Sensor, SensorConfig};
-use crate::files::InputError;
+use crate::files::{InputError, in_plain_words};
 use crate::request::{FrameRequest, Sources, Spelling, is_bad_input, sentence};
 use crate::scene::Scene;
 use crate::system::{Frame, FrameError, NoDepth, Summary, WindowPolicy, take_frame_by};
@@ -138,9 +138,8 @@ impl<'a> Subject<'a> {
             });
         }
         let request = frame.try_into::<FrameRequest>();
-        let mut request = request.map_err(|e| {
-            InputError::new(self.study.source(), e.message().trim().replace('\n', " "))
-        })?;
+        let mut request = request
+            .map_err(|e| InputError::new(self.study.source(), in_plain_words(e.message())))?;
         request.seed = point.seed;
         request.windows = windows.join(",");
         // Settings that say the same have the same key, however they are written.

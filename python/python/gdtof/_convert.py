@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ._frame import DriveFrame, Frame, Maps, Reason
+from ._gdtof import __version__
 from ._plot import reason_name
 
 if TYPE_CHECKING:
@@ -35,23 +36,27 @@ def to_xarray(frame: Maps) -> xarray.Dataset:
         name: (("row", "col"), getattr(frame, name), {"long_name": what, "units": unit})
         for name, (what, unit) in MAPS.items()
     }
-    variables["reason"][2]["flag_values"] = [int(reason) for reason in Reason]
+    variables["reason"][2]["flag_values"] = np.array(list(Reason), np.uint8)
     variables["reason"][2]["flag_meanings"] = " ".join(reason.name.lower() for reason in Reason)
     counts = {"long_name": "counts", "units": "1"}
     variables["histograms"] = (("row", "col", "bin"), frame.histograms, counts)
     edges = {"long_name": "edges of the bins after STOP", "units": "ns"}
     variables["bin_edges"] = (("row", "col", "edge"), frame.bin_edges_ns, edges)
-    coords = {
-        "row": np.arange(rows),
-        "col": np.arange(cols),
-        "bin": np.arange(bins),
-        "edge": np.arange(bins + 1),
+    counted = {"row": (rows, "row"), "col": (cols, "column"), "bin": (bins, "bin, 0 earliest"), "edge": (bins + 1, "edge of a bin")}
+    coords: dict[str, Any] = {
+        name: (name, np.arange(count, dtype=np.int32), {"long_name": what, "units": "1"})
+        for name, (count, what) in counted.items()
     }
-    attrs: dict[str, Any] = {"bin_m": frame.bin_m}
+    # NetCDF has numbers and texts as attributes, and neither None nor truth values.
+    attrs: dict[str, Any] = {"source": f"gdtof {__version__}", "bin_m": frame.bin_m}
     if isinstance(frame, Frame):
         attrs |= {"stop_periods": frame.stop_periods, "laser_cycles": frame.laser_cycles}
+        attrs |= {"load_s": frame.load_s, "exposure_s": frame.exposure_s, "readout_s": frame.readout_s}
+        if frame.remark is not None:
+            attrs["remark"] = frame.remark
     if isinstance(frame, DriveFrame):
-        coords["time"] = np.asarray((frame.times["exposure_s"] + frame.times["readout_s"]) / 2)
+        middle = (frame.times["exposure_s"] + frame.times["readout_s"]) / 2
+        coords["time"] = ((), middle, {"long_name": "middle of the exposure on the scene's clock", "units": "s"})
         attrs["number"] = frame.number
     return xarray.Dataset(variables, coords, attrs)
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from os import PathLike, fspath
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -86,6 +88,9 @@ class Maps:
     """Start value of the P-counter; -1 where SPADs are off."""
     in_window: NDArray[np.bool_]
     """Whether the echo's centre lies in the time window."""
+    points: NDArray[np.float64]
+    """Where macropixels with a depth see their surface, m from the lidar: x right, y down, z forward, shape (depths, 3), row by row. The points
+    of `gdtof export frame`, whose files have them in float32; ``np.isfinite(depth)`` says whose they are."""
     bin_m: float
     """Light's way there and back in one bin, as a distance, m."""
     summary: dict[str, Any]
@@ -141,7 +146,8 @@ class Maps:
         return plot_histogram(self, row, col, ax)
 
     def to_xarray(self) -> xarray.Dataset:
-        """All arrays as an xarray.Dataset with dimensions row, col, bin and edge; attributes have the units."""
+        """All arrays by macropixel as an xarray.Dataset with dimensions row, col, bin and edge; attributes have the units, and its
+        `to_netcdf` writes it as it is."""
         from ._convert import to_xarray
 
         return to_xarray(self)
@@ -180,6 +186,35 @@ class Frame(Maps):
     """Time it exposes, s."""
     readout_s: float
     """Time it needs to give its histograms away, s."""
+    _taken: _gdtof.Taken
+    """What the files of a frame say of it."""
+
+    def save(self, folder: str | PathLike[str]) -> Path:
+        """Writes the frame as `gdtof frame --out` does: frame.json, histograms.npy, depth.png and manifest.json, which `gdtof export frame`,
+        `gdtof range`, `gdtof page` and others read.
+
+        All of them or none: they are written beside their places first, and take the place of the set that was there before. Files of
+        your own with such names are kept under others, of which a warning tells. The frame is written as it was taken, and of its arrays only
+        `histograms` are read again; waveforms of probes stay in the folder that :func:`frame` was given for them.
+
+        Parameters
+        ----------
+        folder
+            Where to; it is made if need be.
+
+        Returns
+        -------
+        The folder.
+
+        Raises
+        ------
+        InputError
+            Where it cannot be written.
+        """
+        path = Path(fspath(folder))
+        for sentence in self._taken.save(path, np.ascontiguousarray(self.histograms)):
+            warnings.warn(sentence, stacklevel=2)
+        return path
 
     def __repr__(self) -> str:
         return f"<Frame {_outline(self)}>"

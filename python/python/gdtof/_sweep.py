@@ -48,7 +48,7 @@ class Swept:
 
 
 def sweep(
-    study: str | PathLike[str],
+    study: str | PathLike[str] | dict[str, Any],
     folder: str | PathLike[str] | None = None,
     *,
     client: Any = None,
@@ -62,12 +62,14 @@ def sweep(
     Parameters
     ----------
     study
-        The study file (TOML).
+        The study file (TOML), or a dict of its sections: ``{"study": {"kind": "frame"}, "fixed": {"sensor.rows": 8},
+        "vary": {"scene.lidar.pde": [0.1, 0.2]}}``, as ``tomllib.load`` gives it. Keys may be nested or have dots; what varies first in the dict
+        varies slowest. Files that it names are relative to the current folder.
     folder
         Where journals and table go; what the study says, or its name, without it.
     client
         A Dask client (``distributed.Client``): the study is taken in parts on its workers, each part on one thread. Workers must see
-        the study file, the files that it names and `folder` under the paths that are given here, as on a cluster's shared file system.
+        a study file, the files that it names and `folder` under the paths that are given here, as on a cluster's shared file system.
         A part whose worker is lost goes on elsewhere from its last row. All threads of this process without a client.
     parts
         Parts of the study with a client, each a task; four for each thread of its workers without it. The same number must be given to
@@ -80,16 +82,20 @@ def sweep(
     InputError
         What cannot be in the study, all at once with their lines.
     """
-    path = Path(fspath(study)).absolute()
-    points, out, _ = _gdtof.sweep_outline(path)
+    if isinstance(study, dict):
+        # Where it would stand as a file.
+        path, text = Path("study").absolute(), _gdtof.sweep_text(study)
+    else:
+        path, text = Path(fspath(study)).absolute(), None
+    points, out, _ = _gdtof.sweep_outline(path, text)
     where = (Path(out) if folder is None else Path(fspath(folder))).absolute()
     if client is None:
         if parts is not None:
             raise InputError("parts: are for a client; leave them out")
-        outcome = _gdtof.sweep_part(path, where, (0, 1), 0, progress)
+        outcome = _gdtof.sweep_part(path, text, where, (0, 1), 0, progress)
         outcomes = [outcome]
     else:
-        outcomes = _on_cluster(client, path, where, points, parts, progress)
+        outcomes = _on_cluster(client, (path, text), where, points, parts, progress)
     written = _gdtof.sweep_table(where)
     if written["missing"]:
         raise InputError(f"{where}: {written['missing']} of {points} points have no row; sweep again")
@@ -97,14 +103,14 @@ def sweep(
     return Swept(where, points, **counts)
 
 
-def _take(study: Path, folder: Path, part: int, of: int) -> dict[str, Any]:
+def _take(study: tuple[Path, str | None], folder: Path, part: int, of: int) -> dict[str, Any]:
     """On a worker."""
-    return _gdtof.sweep_part(study, folder, (part, of), 1, None)
+    return _gdtof.sweep_part(*study, folder, (part, of), 1, None)
 
 
 def _on_cluster(
     client: Any,
-    study: Path,
+    study: tuple[Path, str | None],
     folder: Path,
     points: int,
     parts: int | None,

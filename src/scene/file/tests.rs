@@ -351,7 +351,10 @@ fn impossible_panes_and_motions_are_refused() {
             "waypoints = [[1, 0, 0, 0], [0, 0, 0, 0]]",
             "from 1 s to 0 s; give times that rise",
         ),
-        ("waypoints = [[1, 0, 0]]", "waypoints: "),
+        (
+            "waypoints = [[1, 0, 0]]",
+            "waypoints = a list of 3 is impossible; give a list of 4",
+        ),
     ] {
         let text = format!(
             "[[object]]\nname = \"it\"\nkind = \"ground\"\ndepth_m = 1\nreflectivity = 0.2\n{keys}\n"

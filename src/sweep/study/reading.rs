@@ -6,7 +6,7 @@ use serde::Deserialize;
 use toml::{Table, Value};
 
 use super::{Kind, MOST_POINTS, Study};
-use crate::files::InputError;
+use crate::files::{InputError, Misfit};
 use crate::settings::{Document, Fault, Key, Range, Section, schema};
 use crate::sweep::cell::{Column, Holds};
 use crate::sweep::design::{Design, MOST_SOBOL_AXES};
@@ -444,9 +444,10 @@ fn span(known: &Known, name: &str, range: &Table) -> Result<Span, String> {
         steps,
         scale,
     } = range.clone().try_into().map_err(|e: toml::de::Error| {
-        let message = e.message().trim().replace('\n', " ");
+        let said = e.message().trim();
+        let what = Misfit::of(said).map_or(said.into(), |misfit| misfit.without_cure());
         format!(
-            "{name}: {message}; give {{from = …, to = …, steps = …, scale = \"linear\" or \"log\"}}"
+            "{name}: {what}; give {{from = …, to = …, steps = …, scale = \"linear\" or \"log\"}}"
         )
     })?;
     let ends = [from, to].map(|end| -> Result<f64, String> {

@@ -2,35 +2,36 @@
 
 use std::path::Path;
 
+use super::frame_files::Drawn;
 use crate::chip::Mode;
-use crate::cli::asked::Exposed;
 use crate::files::InputError;
 use crate::report::{Cell, DepthMap};
-use crate::system::{Frame, NoDepth};
+use crate::system::NoDepth;
 
 /// Writes `depth.png` into `out`.
 ///
 /// # Errors
 /// When it cannot be written.
-pub(super) fn depth_map(out: &Path, frame: &Frame, asked: &Exposed<'_>) -> Result<(), InputError> {
-    let mode = match asked.sensor.mode {
+pub(super) fn depth_map(out: &Path, drawn: &Drawn) -> Result<(), InputError> {
+    let mode = match drawn.sensor.mode {
         Mode::Guided => "guided",
         Mode::Conventional => "conventional",
     };
-    let cells: Vec<Cell> = (frame.pixels.iter())
+    let [rows, cols, _] = drawn.histograms_shape;
+    let cells: Vec<Cell> = (drawn.macropixels.iter())
         .map(|pixel| match (pixel.measured_m, pixel.no_depth) {
             (_, Some(reason)) => Cell::Category(reason as usize),
             (depth_m, None) => Cell::Depth(depth_m.unwrap_or_default() as f32),
         })
         .collect();
     let map = DepthMap {
-        title: &format!("{mode} dToF depth, {} laser cycles", asked.laser_cycles),
-        cols: frame.cols,
+        title: &format!("{mode} dToF depth, {} laser cycles", drawn.laser_cycles),
+        cols,
         cells: &cells,
         range_m: depth_range(&cells),
         unit: "m",
         categories: &NoDepth::ALL.map(NoDepth::name),
-        scale: (512 / frame.rows.max(frame.cols)).max(1),
+        scale: (512 / rows.max(cols)).max(1),
     };
     map.write_png(&out.join("depth.png"))
 }

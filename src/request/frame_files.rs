@@ -1,0 +1,196 @@
+//! A frame's results as files: what `gdtof frame` writes, and Python's `Frame.save`.
+//!
+//! ```text
+//!   FrameRequest ──┐
+//!   FrameSettings ─┼─► FrameReport ─► frame.json ─► depth.png
+//!   Frame ─────────┴──────────────► histograms.npy
+//! ```
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::FrameRequest;
+use super::picture::depth_map;
+use crate::analysis::VerdictReport;
+use crate::chip::{Mode, SensorConfig, WindowLaw};
+use crate::engine::{Work, variance_left_out};
+use crate::files::{InputError, OutputFile, parse_json};
+use crate::report::write_npy_u16;
+use crate::scene::Scene;
+use crate::system::{
+    DistanceLaw, EngineKind, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Summary,
+};
+
+/// What frame.json and drive.json say of an exposure alike, first of all.
+#[derive(Debug, Serialize)]
+pub struct Exposed<'a> {
+    /// What reports call the scene.
+    pub(crate) scene_name: String,
+    scene: &'a Scene,
+    sensor: &'a SensorConfig,
+    stop_periods: u32,
+    pub(crate) laser_cycles: u32,
+    seed: u64,
+    engine: EngineKind,
+}
+
+/// What was asked for: in frame.json and in the manifest.
+#[derive(Debug, Serialize)]
+pub struct FrameConfiguration<'a> {
+    #[serde(flatten)]
+    exposed: Exposed<'a>,
+    false_alarm_rate: f64,
+    walk_correction: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    calibration: Option<String>,
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    guides: &'a [String],
+    #[serde(skip_serializing_if = "str::is_empty")]
+    windows: &'a str,
+}
+
+/// The contents of frame.json; `P` is what there is to say of a pair of pictures in the place of the scene.
+#[derive(Debug, Serialize)]
+pub struct FrameReport<'a, P = ()> {
+    version: &'static str,
+    /// What was asked for.
+    #[serde(flatten)]
+    pub configuration: FrameConfiguration<'a>,
+    summary: Summary,
+    remark: Option<&'a str>,
+    photons_expected: f64,
+    work: Work,
+    timing: &'a VerdictReport,
+    tolerance: Option<&'a Kept>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    variance_left_out: Option<f64>,
+    distance: DistanceLaw,
+    load_bits: usize,
+    load_time_s: f64,
+    readout_time_s: f64,
+    exposure_time_s: f64,
+    frame_time_s: f64,
+    exposure_run_time_s: f64,
+    run_time_s: f64,
+    run_times: PhaseTimes,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pair: Option<&'a P>,
+    probes: &'a [(usize, usize)],
+    histograms_shape: [usize; 3],
+    macropixels: &'a [PixelDepth],
+}
+
+impl FrameRequest {
+    /// What reports say of an exposure, with the scene and the sensor that `settings` made of this request.
+    pub(crate) fn exposed<'a>(
+        &self,
+        scene_name: String,
+        settings: &'a FrameSettings,
+    ) -> Exposed<'a> {
+        Exposed {
+            scene_name,
+            scene: &settings.scene,
+            sensor: &settings.sensor,
+            stop_periods: settings.exposure.stop_periods,
+            laser_cycles: self.laser_cycles,
+            seed: self.seed,
+            engine: self.engine,
+        }
+    }
+}
+
+/// The share of the variance of counts that may be missing, where cohorts made them of SPADs with afterpulses.
+pub(crate) fn variance_left_out_of(settings: &FrameSettings, frame: &Frame) -> Option<f64> {
+    let is_by_cohort = match &frame.kept {
+        Some(kept) => kept.on_cohort > 0,
+        None => settings.engine == EngineKind::Cohort,
+    };
+    let probability = settings.sensor.afterpulse_probability;
+    (is_by_cohort && probability > 0.0).then(|| variance_left_out(probability))
+}
+
+impl<'a, P> FrameReport<'a, P> {
+    /// Of a frame that was taken with the settings that `request` made.
+    pub fn new(
+        scene_name: String,
+        request: &'a FrameRequest,
+        settings: &'a FrameSettings,
+        timing: &'a VerdictReport,
+        frame: &'a Frame,
+        pair: Option<&'a P>,
+    ) -> Self {
+        FrameReport {
+            version: env!("CARGO_PKG_VERSION"),
+            configuration: FrameConfiguration {
+                exposed: request.exposed(scene_name, settings),
+                false_alarm_rate: request.false_alarm_rate,
+                walk_correction: request.correct_walk,
+                calibration: request
+                    .calibration
+                    .as_ref()
+                    .map(|p| p.display().to_string()),
+                guides: &request.guides,
+                windows: &request.windows,
+            },
+            summary: frame.summary(),
+            remark: frame.remark.as_deref(),
+            photons_expected: frame.photons_expected,
+            work: frame.work,
+            timing,
+            tolerance: frame.kept.as_ref(),
+            variance_left_out: variance_left_out_of(settings, frame),
+            distance: DistanceLaw::new(
+                // One law for all macropixels.
+                &WindowLaw::new(settings.sensor.alike(), &settings.exposure),
+                frame.pixels.iter().filter_map(|pixel| pixel.start),
+            ),
+            load_bits: frame.load_bits,
+            load_time_s: frame.load_time.as_s(),
+            readout_time_s: frame.readout_time.as_s(),
+            exposure_time_s: frame.exposure_time.as_s(),
+            frame_time_s: settings.sensor.frame_time(frame.exposure_time).as_s(),
+            exposure_run_time_s: frame.times.exposure_s,
+            run_time_s: frame.times.total_s(),
+            run_times: frame.times,
+            pair,
+            probes: &frame.probes,
+            histograms_shape: [frame.rows, frame.cols, frame.bins],
+            macropixels: &frame.pixels,
+        }
+    }
+}
+
+/// What frame.json says that is also in the other files.
+#[derive(Deserialize)]
+pub(super) struct Drawn {
+    pub(super) sensor: Chip,
+    pub(super) laser_cycles: u32,
+    pub(super) histograms_shape: [usize; 3],
+    pub(super) macropixels: Vec<PixelDepth>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Chip {
+    pub(super) mode: Mode,
+}
+
+/// Writes frame.json, histograms.npy and depth.png into `out`: `report` is a [`FrameReport`] as JSON, `histograms` are rows x cols x bins.
+///
+/// # Errors
+/// When they cannot be written, `report` is none, or there are fewer or more counts than it says.
+pub fn write_frame(out: &Path, report: &str, histograms: &[u16]) -> Result<(), InputError> {
+    let drawn: Drawn = parse_json("frame.json", report, "the report of a frame")?;
+    let [rows, cols, bins] = drawn.histograms_shape;
+    if histograms.len() != rows * cols * bins {
+        let message = format!(
+            "{} counts of a frame of {rows}x{cols} macropixels with {bins} bins; give one of each",
+            histograms.len()
+        );
+        return Err(InputError::new("histograms", message));
+    }
+    let shape = drawn.histograms_shape.map(|n| n as u64);
+    write_npy_u16(&out.join("histograms.npy"), &shape, histograms)?;
+    depth_map(out, &drawn)?;
+    OutputFile::write_with(&out.join("frame.json"), |file| writeln!(file, "{report}"))
+}
