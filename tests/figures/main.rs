@@ -7,3 +7,4 @@ mod detection_probability_meets_references;
 mod functions_keep_their_promises;
 mod precision_meets_references;
 mod published_figures_are_met;
+mod slanted_surfaces_keep_their_depth;
