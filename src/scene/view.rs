@@ -4,7 +4,7 @@
 //!
 //! ```text
 //!   ┌───────────────┐    ┌───────────────┐
-//!   │   ·   ·   ·  ·│    │· · · ·│x x x x│     16 rays on one surface; 64 where surfaces meet, so that the light of
+//!   │   ·   ·   ·  ·│    │· · · ·│x x x x│     16 rays on one surface; 64 where surfaces meet or one is deep: the light of
 //!   │  ·   ·   ·  · │    │ · · · ·\x x x x│     each is known to a hundredth of the macropixel's, and no two in a row
 //!   │ ·   ·   ·  ·  │    │· · · · ·│x x x│     or column: a square lattice, turned, in which rows and columns are not
 //!   │·   ·   ·  ·   │    │       …       │     correlated. Each ray stands for the piece of surface about it, whose
@@ -73,12 +73,13 @@ pub(super) struct View {
 }
 
 impl View {
-    /// What a macropixel, by row and column, sees.
+    /// What a macropixel, by row and column, sees. A surface is deep from `deep_m` on.
     pub(super) fn of(
         stage: &Stage,
         bounds: &Bounds,
         camera: &PinholeCamera,
         pixel: (u32, u32),
+        deep_m: f64,
     ) -> Self {
         let candidates = bounds.about(cone(camera, pixel));
         let mut few = SmallVec::<[(Look, First); RAYS_OF_ALL]>::new();
@@ -87,33 +88,41 @@ impl View {
         }
         let object = |(_, first): &(Look, First)| first.map(|(_, object)| object);
         let mut view = View::default();
-        let is_edge = if few.iter().all(|(_, first)| stage.ends_there(first)) {
+        let needs_more = if few.iter().all(|(_, first)| stage.ends_there(first)) {
             // What they end on tells, without a look at what it is made of.
-            let is_edge = few.iter().any(|ray| object(ray) != object(&few[0]));
-            if !is_edge {
+            let range_m = |(_, first): &(Look, First)| first.map(|(meeting, _)| meeting.range_m);
+            let needs_more = few.iter().any(|ray| object(ray) != object(&few[0]))
+                || is_deep(few.iter().filter_map(range_m), deep_m);
+            if !needs_more {
                 let piece = Piece::new(camera, RAYS);
                 for (look, first) in &few {
                     view.see_end(stage, &piece, look, first);
                 }
             }
-            is_edge
+            needs_more
         } else {
             let follow =
                 |(look, first): &(Look, First)| stage.returns_from(&look.ray, *first, &candidates);
             let all: Vec<Returns> = few.iter().map(follow).collect();
             let first = |returns: &Returns| returns.surfaces.first().map(|s| s.hit.object);
-            let is_edge = all.iter().any(|returns| {
+            let nth_m = |n: usize| {
+                let nth = all
+                    .iter()
+                    .filter_map(move |returns| returns.surfaces.get(n));
+                nth.map(|surface| surface.hit.range_m)
+            };
+            let needs_more = all.iter().any(|returns| {
                 first(returns) != first(&all[0]) || returns.surfaces.len() != all[0].surfaces.len()
-            });
-            if !is_edge {
+            }) || (0..all[0].surfaces.len()).any(|n| is_deep(nth_m(n), deep_m));
+            if !needs_more {
                 let piece = Piece::new(camera, RAYS);
                 for ((look, _), returns) in few.iter().zip(&all) {
                     view.see(stage, &piece, look, &returns.surfaces, returns.sky_share);
                 }
             }
-            is_edge
+            needs_more
         };
-        if is_edge {
+        if needs_more {
             let piece = Piece::new(camera, RAYS_AT_EDGES);
             for look in looks(camera, pixel, RAYS_AT_EDGES) {
                 let first = stage.meeting_of(&look.ray, &candidates);
@@ -245,6 +254,13 @@ impl View {
     }
 }
 
+/// Whether these ranges are so far apart.
+fn is_deep(ranges_m: impl Iterator<Item = f64>, deep_m: f64) -> bool {
+    let ends = |(near, far): (f64, f64), range_m: f64| (near.min(range_m), far.max(range_m));
+    let (near, far) = ranges_m.fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+    far - near > deep_m
+}
+
 /// What a macropixel sees.
 pub(super) fn cone(camera: &PinholeCamera, (row, col): (u32, u32)) -> Cone {
     let at = |du: f64, dv: f64| {
@@ -347,7 +363,9 @@ mod tests {
         let moments = |ranges: &[(f64, f64)]| {
             let all = ranges.len() as f64;
             let mean = ranges.iter().map(|(range, _)| range).sum::<f64>() / all;
-            let squares = ranges.iter().map(|(range, own)| (range - mean).powi(2) + own);
+            let squares = ranges
+                .iter()
+                .map(|(range, own)| (range - mean).powi(2) + own);
             (mean, squares.sum::<f64>() / all)
         };
         for turn_deg in (0..180).step_by(5) {
@@ -368,7 +386,10 @@ mod tests {
                 let off = (found_mean - mean).abs() / exact.sqrt();
                 assert!(off < 2e-3, "{turn_deg}: {found_mean} {mean}");
                 let ratio = found / exact;
-                assert!((ratio - 1.0).abs() < most, "{turn_deg}: {ratio} with {across}");
+                assert!(
+                    (ratio - 1.0).abs() < most,
+                    "{turn_deg}: {ratio} with {across}"
+                );
             }
         }
     }
