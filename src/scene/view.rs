@@ -4,11 +4,11 @@
 //!
 //! ```text
 //!   ┌───────────────┐    ┌───────────────┐
-//!   │   ·   ·   ·  ·│    │· · · ·│x x x x│     16 rays on one surface; 64 where surfaces meet or one is deep: the light of
-//!   │  ·   ·   ·  · │    │ · · · ·\x x x x│     each is known to a hundredth of the macropixel's, and no two in a row
-//!   │ ·   ·   ·  ·  │    │· · · · ·│x x x│     or column: a square lattice, turned, in which rows and columns are not
-//!   │·   ·   ·  ·   │    │       …       │     correlated. Each ray stands for the piece of surface about it, whose
-//!   └───────────────┘    └───────────────┘     slope tells how far its ranges are spread.
+//!   │ ·    ·   ·  · │    │· · · ·│x x x x│     16 rays on one surface; 64 where surfaces meet or one is deep: the light of
+//!   │   ·   ·    · ·│    │ · · · ·\x x x x│     each is known to a hundredth of the macropixel's, and no two in a row
+//!   │·   ·    · ·   │    │· · · · ·│x x x│     or column
+//!   │  ·   · ·    · │    │       …       │     Each ray stands for the piece of surface about it, whose slope
+//!   └───────────────┘    └───────────────┘     tells how far its ranges are spread.
 //! ```
 //!
 //! A Lambertian surface sends back the cosine of the angle at which the laser meets it.
@@ -30,6 +30,15 @@ const RAYS_AT_EDGES: u32 = 8;
 
 /// Rays of a macropixel.
 const RAYS_OF_ALL: usize = (RAYS * RAYS) as usize;
+
+/// Where within its cell's columns a ray of the n-th row of cells is, and likewise within its rows: no two rays are in one column or row,
+/// so that an upright edge is found by all of them, and rows and columns are not correlated. Were n to count up, they would be, by
+/// 0.47 with 16 rays, and the range over a surface that is slanted along a diagonal would vary by half too much.
+const PLACES: [u32; RAYS as usize] = [1, 3, 0, 2];
+
+/// The same where surfaces meet. Of the light of planes 10 standard deviations of the pulse deep, towards any side, the brightest instant
+/// is right to 1.5 %; to 5 % with a turned square lattice.
+const PLACES_AT_EDGES: [u32; RAYS_AT_EDGES as usize] = [2, 6, 4, 0, 7, 3, 1, 5];
 
 /// The range over a ray's piece of surface is taken to change by at most this part of it. Only where a ray grazes a surface is it more.
 const MOST_SLOPE: f64 = 0.5;
@@ -186,7 +195,7 @@ impl View {
                 reflectivity: hit.reflectivity,
                 ray_share,
                 range_m: hit.range_m,
-                range_m2: range_variance(look, hit.normal, hit.range_m, piece),
+                range_m2: range_variance(look, hit.normal, hit.range_m, piece.steps),
                 frontal_reflectivity: hit.reflectivity * hit.retro * cosine * share * ray_share,
             });
         }
@@ -288,22 +297,21 @@ impl Look {
     }
 }
 
-/// The part of a macropixel that a ray stands for.
+/// The part of a macropixel that a ray stands for. It is as wide and as high as rays are apart in columns and rows: their own spread is
+/// that of the whole macropixel but for as much.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
     ray_share: f64,
     /// Width and height at unit depth.
     steps: [f64; 2],
-    /// Rays in a row.
-    across: f64,
 }
 
 impl Piece {
     fn new(camera: &PinholeCamera, across: u32) -> Self {
+        let all = f64::from(across * across);
         Piece {
-            ray_share: 1.0 / f64::from(across * across),
-            steps: [camera.focal_px, camera.focal_v_px].map(|px| 1.0 / (px * f64::from(across))),
-            across: f64::from(across),
+            ray_share: 1.0 / all,
+            steps: [camera.focal_px, camera.focal_v_px].map(|px| 1.0 / (px * all)),
         }
     }
 }
@@ -316,44 +324,67 @@ fn looks(
 ) -> impl Iterator<Item = Look> {
     // Of a power of two, so that nothing is rounded.
     let part = 1.0 / f64::from(across);
+    let within = move |n: u32| match across {
+        RAYS => PLACES[n as usize],
+        _ => PLACES_AT_EDGES[n as usize],
+    };
     let place = move |first: u32, n: u32, other: u32| {
         f64::from(first) + (f64::from(n) + (f64::from(other) + 0.5) * part) * part
     };
     (0..across * across).map(move |n| {
-        // No two rays are in one column or row, so that an upright edge is found by all of them. Columns and rows are not correlated:
-        // were x to count up in both, a surface slanted along the diagonal would be deeper by a quarter, or shallower.
         let (x, y) = (n % across, n / across);
-        let (u, v) = (place(col, x, y), place(row, y, across - 1 - x));
+        let (u, v) = (place(col, x, within(y)), place(row, y, within(x)));
         Look::new(camera.at_unit_depth((u, v)))
     })
 }
 
-/// Variance of the range over the piece of a plane between a ray and those next to it: of the two steps of the lattice, the longer one
-/// is filled by rays of the shorter one, and what is left of it is the piece's.
-fn range_variance(look: &Look, normal: DVec3, range_m: f64, piece: &Piece) -> f64 {
+/// Variance of the range over the piece of a plane that a rectangle about a ray covers, `width` × `height` at unit depth.
+fn range_variance(look: &Look, normal: DVec3, range_m: f64, [width, height]: [f64; 2]) -> f64 {
     let ray = look.ray.direction;
-    let [width, height] = piece.steps;
-    let step = |side: DVec3| {
+    let across = |side: DVec3, step: f64| {
         // How the ray turns towards that side, and with it the range to a plane.
-        let turn = (side - ray * ray.dot(side)) / look.to_unit_depth;
+        let turn = (side - ray * ray.dot(side)) * (step / look.to_unit_depth);
         let change = turn.dot(normal) / ray.dot(normal);
         // A ray within the plane has none.
-        if change.is_finite() {
+        let slope = if change.is_finite() {
             change.abs()
         } else {
             MOST_SLOPE
-        }
+        };
+        range_m * slope.min(MOST_SLOPE)
     };
-    let along = step(DVec3::new(width, -height / piece.across, 0.0));
-    let across = step(DVec3::new(width / piece.across, height, 0.0));
-    let (short, long) = (along.min(across), along.max(across));
-    let slope = short.max(long - (piece.across - 1.0) * short);
-    (range_m * slope.min(MOST_SLOPE)).powi(2) / 12.0
+    (across(DVec3::X, width).powi(2) + across(DVec3::Y, height).powi(2)) / 12.0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_spread_of_a_piece_is_that_of_its_rays() {
+        let step = 0.004;
+        for normal in [
+            DVec3::new(0.3, -0.8, -0.2),
+            DVec3::new(0.0, -1.0, -0.1),
+            -DVec3::Z,
+        ] {
+            let normal = normal.normalize();
+            let direction = DVec3::new(0.05, 0.1, 1.0);
+            let range_m = |d: DVec3| 2.0 / -normal.dot(d.normalize());
+            let fine = 100;
+            let offset = |n: i32| ((f64::from(n) + 0.5) / f64::from(fine) - 0.5) * step;
+            let ranges: Vec<f64> = (0..fine * fine)
+                .map(|n| direction + DVec3::new(offset(n % fine), offset(n / fine), 0.0))
+                .map(range_m)
+                .collect();
+            let mean = ranges.iter().sum::<f64>() / ranges.len() as f64;
+            let exact =
+                ranges.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / ranges.len() as f64;
+            let found =
+                range_variance(&Look::new(direction), normal, range_m(direction), [step; 2]);
+            assert!((found / exact - 1.0).abs() < 0.01, "{found} {exact}");
+        }
+    }
 
     /// Mean and variance of the range to a plane over a macropixel, from its rays and their pieces, beside a grid of 256 × 256 rays.
     #[test]
@@ -380,7 +411,7 @@ mod tests {
                 let piece = Piece::new(&camera, across);
                 let few = looks(&camera, (0, 0), across).map(|look| {
                     let range_m = range_m(look.ray.direction);
-                    (range_m, range_variance(&look, normal, range_m, &piece))
+                    (range_m, range_variance(&look, normal, range_m, piece.steps))
                 });
                 let (found_mean, found) = moments(&few.collect::<Vec<_>>());
                 let off = (found_mean - mean).abs() / exact.sqrt();
