@@ -31,7 +31,7 @@ const RAYS_AT_EDGES: u32 = 8;
 /// Rays of a macropixel.
 const RAYS_OF_ALL: usize = (RAYS * RAYS) as usize;
 
-/// Where within its cell's columns a ray of the n-th row of cells is, and likewise within its rows: no two rays are in one column or row,
+/// Where within its cell's columns a ray of the n-th row of cells is, and within its rows one of the n-th column from the right: no two rays are in one column or row,
 /// so that an upright edge is found by all of them, and rows and columns are not correlated. Were n to count up, they would be, by
 /// 0.47 with 16 rays, and the range over a surface that is slanted along a diagonal would vary by half too much.
 const PLACES: [u32; RAYS as usize] = [1, 3, 0, 2];
@@ -333,7 +333,10 @@ fn looks(
     };
     (0..across * across).map(move |n| {
         let (x, y) = (n % across, n / across);
-        let (u, v) = (place(col, x, within(y)), place(row, y, within(x)));
+        let (u, v) = (
+            place(col, x, within(y)),
+            place(row, y, within(across - 1 - x)),
+        );
         Look::new(camera.at_unit_depth((u, v)))
     })
 }
