@@ -21,7 +21,7 @@ pub use budget::{Convention, PhotonBudget, Spot};
 pub use echo::{ECHO_REACH, EchoLaw};
 pub use gaussian::{pulse_share, pulse_shares};
 pub use light::{Echo, LightError, PixelLight, Profile, Segment, SpadSpread};
-pub use mixture::{Glint, MERGED_ERROR, SLANTED_ERROR, merged};
+pub use mixture::{DEEP, Glint, MERGED_ERROR, merged};
 pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
 pub use philox::LANES;
 pub use pulse::{PulseError, PulseShape};

@@ -14,6 +14,7 @@ use super::cast::Stage;
 use super::settings::Scene;
 use super::unmoved::{Before, Moved};
 use super::view::{Surface, View, cone};
+use crate::photon::DEEP;
 
 /// True range and reflectivity of every macropixel, row by row from the top left.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,6 +57,7 @@ impl GroundTruth {
         let camera = scene.lidar_camera(rows, cols);
         let (stage, bounds) = (Stage::of(scene), Bounds::of(scene, DVec3::ZERO));
         let place = |pixel: u32| (pixel / cols, pixel % cols);
+        let deep_m = DEEP * scene.pulse_resolution().as_range_m();
         let is_kept = |pixel: u32| {
             let moved = moved.as_ref();
             moved.is_some_and(|(moved, _)| moved.is_out_of_sight(cone(&camera, place(pixel))))
@@ -68,7 +70,7 @@ impl GroundTruth {
                 (before.views[pixel].clone(), before.surfaces[pixel].clone())
             }
             _ => {
-                let view = View::of(&stage, &bounds, &camera, place(pixel));
+                let view = View::of(&stage, &bounds, &camera, place(pixel), deep_m);
                 let surfaces = view.surfaces(&scene.medium);
                 (Arc::new(view), surfaces)
             }

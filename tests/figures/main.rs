@@ -8,3 +8,4 @@ mod functions_keep_their_promises;
 mod precision_meets_references;
 mod published_figures_are_met;
 mod quotations_stand_in_the_thesis;
+mod slanted_surfaces_keep_their_depth;

@@ -286,5 +286,5 @@ fn light_of_few_rays_is_close_to_that_of_very_many() {
         at(1.0),
         off.len()
     );
-    assert!(at(0.5) < 0.02 && at(0.9) < 0.08 && worst_photons < 0.01);
+    assert!(at(0.5) < 0.002 && at(0.9) < 0.02 && worst_photons < 0.01);
 }
