@@ -8,22 +8,41 @@
 //!
 //! Bins are equal. Times are in bins: bin i reaches from i − ½ to i + ½, as positions of peaks do. A SPAD's chance to be ready follows
 //! exactly from the light: it is, unless it fired within the last dead time (non-paralysable), or unless a photon came
-//! within it (paralysable). SPADs fire independently, so the number of those that fire in a bin is binomial. The integral
-//! over time takes steps of an eighth of a bin; tests find the means of simulated light to five standard deviations
-//! and 10⁻³ of their value.
+//! within it (paralysable). SPADs fire independently, so the number of those that fire in a bin is binomial.
 //!
-//! Assumed: a dead time of at least a bin, so that no SPAD fires twice in one; SPADs that have recovered from the echo
-//! before the next laser cycle's. Left out: afterpulses and crosstalk.
+//! Time goes in steps, over which light and recovery are taken to be even; what a step's light does to a SPAD that is ready, or that
+//! recovers within the step, is exact. So the rising edge of an echo is exact however strong it is, and what comes after
+//! the dead time is as fine as the steps. A SPAD that fires twice within a bin toggles its flip-flop back (thesis 4.2), so with a dead time below a bin
+//! it counts where it fired an odd number of times, which follows from a second, signed, state of the SPAD.
+//!
+//! Afterpulses and crosstalk come as further light: of afterpulses from what fired a dead time and more ago, of crosstalk from
+//! what fires now. Neither breeds, as in [`photon::spad`](crate::photon). This leaves out only that the SPAD which fired is the one that has the
+//! afterpulse, and squares of the two chances.
+//!
+//! Assumed: SPADs alike, and recovered from the echo before the next laser cycle's.
 
+use super::counting::Counting;
+use super::edge::{share_before, share_slope};
 use crate::chip::{EventType, SensorConfig};
-use crate::numerics::normal_above;
+use crate::numerics::Dual;
 use crate::units::Time;
 
-/// Steps to a bin.
+/// Steps to a bin, at least.
 const STEPS: usize = 8;
 
-/// Standard deviations before its centre where a pulse begins: 10⁻⁹ of it is left out.
-const PULSE_BEGINS: f64 = 6.0;
+/// Steps to a dead time, at least, and to the time in which all SPADs fire under the strongest light, where they fire again
+/// under it; and most steps to a bin. Finer ones change no chance by more than 10⁻³.
+const STEPS_OF_DEAD_TIME: f64 = 12.0;
+const MOST_STEPS: f64 = 96.0;
+
+/// Standard deviations from its centre where a pulse begins and ends: 10⁻¹¹ of it is left out, less than a photon of 10¹⁰.
+const PULSE_REACH: f64 = 6.7;
+
+/// Parameters of the light: place, ln signal, ln background, ln width.
+pub(super) const PARAMETERS: usize = 4;
+
+/// A number and its slopes with the parameters of the light.
+pub(super) type Slopes = Dual<PARAMETERS>;
 
 /// Light on a macropixel, in mean photons that its SPADs would detect without dead time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +53,8 @@ pub struct EchoLight {
     pub signal: f64,
     /// Background and dark counts in a bin and laser cycle.
     pub background_per_bin: f64,
+    /// Standard deviation of the echo, bins: that of the laser pulse with all jitter ([`Response::pulse_sigma_bins`]), or more.
+    pub sigma_bins: f64,
 }
 
 /// How a macropixel answers to light.
@@ -43,24 +64,57 @@ pub struct Response {
     dead_time_bins: f64,
     paralysable: bool,
     pulse_sigma_bins: f64,
-    event_type: EventType,
-    threshold: u8,
-    spads: usize,
+    counting: Counting,
+    afterpulses: f64,
+    afterpulse_bins: f64,
+    /// Avalanches of neighbours for each of a SPAD's, on average, if they are ready.
+    crosstalk: f64,
 }
 
 impl Response {
     /// Of a sensor's macropixels, with bins of `bin_s` seconds each, to Gaussian pulses of standard deviation `pulse_sigma`,
     /// all jitter included.
     pub fn new(config: &SensorConfig, bin_s: f64, pulse_sigma: Time) -> Self {
+        let grid = config.spad_grid();
+        // Each of four directions is as likely; at an edge there is nobody.
+        let neighbours = 2.0 * grid.neighbours() as f64 / (4 * grid.spads()) as f64;
         Response {
             bins: config.bins,
             dead_time_bins: config.dead_time().as_s() / bin_s,
             paralysable: config.paralysable,
             pulse_sigma_bins: pulse_sigma.as_s() / bin_s,
-            event_type: config.event_type,
-            threshold: config.threshold,
-            spads: config.spads(),
+            counting: Counting {
+                event_type: config.event_type,
+                threshold: usize::from(config.threshold),
+                spads: config.spads(),
+            },
+            afterpulses: config.afterpulse_probability,
+            afterpulse_bins: config.afterpulse_time_ns * 1e-9 / bin_s,
+            crosstalk: config.crosstalk_probability * neighbours,
         }
+    }
+
+    /// What counts where this does not, and the other way round; `None` where that is no TYPE and THRESHOLD. Of light that makes
+    /// this count less, the other counts more.
+    pub(super) fn complement(&self) -> Option<Self> {
+        let threshold = match (self.counting.event_type, self.counting.threshold) {
+            (EventType::Less, threshold @ 1..) => threshold - 1,
+            (EventType::Equal, 0) => 0,
+            _ => return None,
+        };
+        let mut other = *self;
+        other.counting.event_type = EventType::Greater;
+        other.counting.threshold = threshold;
+        Some(other)
+    }
+
+    pub(super) fn counting(&self) -> &Counting {
+        &self.counting
+    }
+
+    /// Histogram bins.
+    pub fn bins(&self) -> usize {
+        self.bins
     }
 
     /// Dead time, bins.
@@ -73,180 +127,334 @@ impl Response {
         self.pulse_sigma_bins
     }
 
-    /// The chance that a bin counts in which each SPAD fires with chance `fired`.
-    pub fn counts_if_fired(&self, fired: f64) -> f64 {
-        let fired = fired.clamp(0.0, 1.0);
-        if (self.event_type, self.threshold) == (EventType::Greater, 0) {
-            return -(self.spads as f64 * (-fired).ln_1p()).exp_m1();
-        }
-        let threshold = usize::from(self.threshold);
-        let mut choices = 1.0;
-        let mut chance = 0.0;
-        for n in 0..=self.spads {
-            let counts = match self.event_type {
-                EventType::Less => n < threshold,
-                EventType::Equal => n == threshold,
-                EventType::Greater => n > threshold,
-            };
-            if counts {
-                chance +=
-                    choices * fired.powi(n as i32) * (1.0 - fired).powi((self.spads - n) as i32);
-            }
-            choices *= (self.spads - n) as f64 / (n + 1) as f64;
-        }
-        chance
-    }
-
-    /// The background, photons in a bin and laser cycle, under which a bin counts with `chance`; `None` where brighter light
-    /// need not count more (TYPE other than greater) or no light counts so much.
-    pub fn background_for(&self, chance: f64) -> Option<f64> {
-        if self.event_type != EventType::Greater || usize::from(self.threshold) >= self.spads {
-            return None;
-        }
-        // A SPAD that is blind for d bins after it fired, or after a photon, fires in a bin with at most this chance.
-        let most = match self.paralysable {
-            false => 1.0 / self.dead_time_bins.max(1.0),
-            true => 1.0 / (self.dead_time_bins.max(1.0) * std::f64::consts::E),
-        };
-        if chance >= self.counts_if_fired(most) {
-            return None;
-        }
-        let (mut low, mut high) = (0.0, most);
-        for _ in 0..50 {
-            let middle = 0.5 * (low + high);
-            match self.counts_if_fired(middle) < chance {
-                true => low = middle,
-                false => high = middle,
-            }
-        }
-        let fired = 0.5 * (low + high);
-        let light = match self.paralysable {
-            false => fired / (1.0 - fired * self.dead_time_bins),
-            true => {
-                // fired = light·e^(−d·light), on its rising side.
-                let mut light = fired;
-                for _ in 0..50 {
-                    light = fired * (light * self.dead_time_bins).exp();
-                }
-                light
-            }
-        };
-        Some(light * self.spads as f64)
-    }
-
     /// The chance of every bin to count in a laser cycle.
     pub fn chances(&self, light: &EchoLight) -> Vec<f64> {
-        let sigma = self.pulse_sigma_bins;
-        let per_spad = 1.0 / self.spads as f64;
+        let parameters = [Dual::<0>::ZERO; PARAMETERS];
+        let chances = self.chances_of(light, parameters);
+        chances.iter().map(|chance| chance.value).collect()
+    }
+
+    /// The same with the slopes of each chance.
+    pub(super) fn slopes(&self, light: &EchoLight) -> Vec<Slopes> {
+        let parameter = |of| Dual::parameter(0.0, of);
+        self.chances_of(light, std::array::from_fn(parameter))
+    }
+
+    /// Steps to a bin.
+    fn steps(&self, light: &EchoLight) -> usize {
+        let sigma = light.sigma_bins.max(1e-3);
+        if self.dead_time_bins >= 2.0 * PULSE_REACH * sigma && self.dead_time_bins >= 2.0 {
+            return STEPS;
+        }
+        // Within the pulse SPADs fire again, and each firing is as sharp as the light is strong.
+        let rate = 0.4 * light.signal / (self.counting.spads as f64 * sigma);
+        let of_dead_time = STEPS_OF_DEAD_TIME / self.dead_time_bins;
+        let wanted = of_dead_time.max(2.0 * rate).min(MOST_STEPS);
+        (wanted.ceil() as usize).max(STEPS)
+    }
+
+    /// The chances, where `shifts` are what the parameters are more than those of `light`: zero, with slopes.
+    fn chances_of<const K: usize>(
+        &self,
+        light: &EchoLight,
+        shifts: [Dual<K>; PARAMETERS],
+    ) -> Vec<Dual<K>> {
+        let [by_place, by_signal, by_background, by_width] = shifts;
+        let per_spad = 1.0 / self.counting.spads as f64;
         let signal = light.signal * per_spad;
         let background = light.background_per_bin * per_spad;
-        let h = 1.0 / STEPS as f64;
-        // Before the pulse the SPADs are as the background alone leaves them.
-        let before =
-            (-0.5 - (light.position_bins - PULSE_BEGINS * sigma)).clamp(0.0, self.bins as f64);
-        let lead = (before / h).ceil() as usize;
-        let begin = -0.5 - lead as f64 * h;
-        let steps = lead + self.bins * STEPS;
+        let background = by_background.chain(background, background);
+        let sigma = light.sigma_bins.max(1e-6);
+        let steps_per_bin = self.steps(light);
+        let h = 1.0 / steps_per_bin as f64;
 
-        // Light on a SPAD from `begin` to the end of each step.
-        let seen = |time: f64| {
-            background * (time - begin) + signal * share_before(time - light.position_bins, sigma)
+        // Light of the pulse on a SPAD until a time.
+        let centre = light.position_bins;
+        let (starts, ends) = (centre - PULSE_REACH * sigma, centre + PULSE_REACH * sigma);
+        let seen = |time: f64| -> Dual<K> {
+            if time <= starts || time >= ends {
+                let value = if time <= starts { 0.0 } else { signal };
+                return by_signal.chain(value, value);
+            }
+            let z = (time - centre) / sigma;
+            let (share, density) = (share_before(z), share_slope(z));
+            let value = signal * share;
+            let by_time = signal * density / sigma;
+            by_signal.chain(value, value)
+                + by_place.chain(0.0, -by_time)
+                + by_width.chain(0.0, -by_time * z * sigma)
         };
-        let mut blinding = History::new(self.dead_time_bins / h);
-        let steady = match self.paralysable {
-            false => background / (1.0 + background * self.dead_time_bins),
-            true => background,
+        // Before the pulse the SPADs are as the background alone leaves them: nothing happens before it begins.
+        let last = self.bins as f64 - 0.5;
+        // Of an echo long before the first bin nothing is left.
+        let forgotten = -8.0 - 2.0 * self.dead_time_bins - 4.0 * PULSE_REACH * sigma;
+        let begin_bin = (starts + 0.5).clamp(forgotten, self.bins as f64).floor();
+        let begin = begin_bin - 0.5;
+        let mut chances = Vec::with_capacity(self.bins);
+        let mut spad = Spad::steady(self, background, h);
+        let steady = {
+            let mut of_bin = spad.clone();
+            of_bin.begin_bin();
+            for _ in 0..steps_per_bin {
+                of_bin.step(background * h);
+            }
+            of_bin.chance(&self.counting)
         };
-        let mut fired = vec![0.0; self.bins];
-        let mut ready = match self.paralysable {
-            false => 1.0 - steady * self.dead_time_bins,
-            true => (-background * self.dead_time_bins).exp(),
-        };
-        blinding.begin(steady * h, steps);
+        for _ in 0..begin_bin.max(0.0) as usize {
+            chances.push(steady);
+        }
+        let steps = ((last - begin) / h).round() as usize;
+        spad.reserve(steps);
         let mut seen_before = seen(begin);
         for step in 0..steps {
-            let seen_after = seen(begin + (step + 1) as f64 * h);
-            let photons = (seen_after - seen_before).max(0.0);
+            let time = begin + (step + 1) as f64 * h;
+            if step % steps_per_bin == 0 {
+                spad.begin_bin();
+            }
+            let seen_after = seen(time);
+            spad.step(background * h + (seen_after - seen_before));
             seen_before = seen_after;
-            let recovering = blinding.ending(step);
-            let hit = -(-photons).exp_m1();
-            let fires = match self.paralysable {
-                false => {
-                    // Those that recover during the step see half of it.
-                    let late = 1.0
-                        - if photons > 1e-6 {
-                            hit / photons
-                        } else {
-                            1.0 - 0.5 * photons
-                        };
-                    let fires = ready * hit + recovering * late;
-                    ready += recovering - fires;
-                    blinding.push(fires);
-                    fires
-                }
-                true => {
-                    let fires = ready * (0.5 * recovering).exp() * hit;
-                    ready *= (recovering - photons).exp();
-                    blinding.push(photons);
-                    fires
-                }
-            };
-            if step >= lead {
-                fired[(step - lead) / STEPS] += fires;
+            if (step + 1) % steps_per_bin == 0 && time > 0.0 {
+                chances.push(spad.chance(&self.counting));
             }
         }
-        fired
-            .iter()
-            .map(|&fired| self.counts_if_fired(fired))
-            .collect()
+        chances
     }
 }
 
-/// Share of a Gaussian pulse that comes before `time` relative to its centre.
-fn share_before(time: f64, sigma: f64) -> f64 {
-    let z = time / sigma;
-    match z.abs() > 8.0 || sigma == 0.0 {
-        true => f64::from(time > 0.0),
-        false => normal_above(-z),
+/// The state of a SPAD, as chances.
+#[derive(Clone)]
+struct Spad<'r, const K: usize> {
+    response: &'r Response,
+    /// Step, bins.
+    h: f64,
+    /// That it is ready.
+    ready: Dual<K>,
+    /// What blinds: avalanches, or where it is paralysable all light.
+    blinding: History<K>,
+    /// Avalanches by light, which may have afterpulses.
+    breeding: History<K>,
+    /// Afterpulses to come in SPADs that have recovered.
+    trapped: Dual<K>,
+    /// Avalanches of the bin, and those of them by crosstalk.
+    fired: Dual<K>,
+    by_crosstalk: Dual<K>,
+    parity: Option<Parity<K>>,
+}
+
+/// The same states, each with the sign of the SPAD's flip-flop since the bin began.
+#[derive(Clone)]
+struct Parity<const K: usize> {
+    ready: Dual<K>,
+    blind: Dual<K>,
+    blinding: History<K>,
+}
+
+impl<'r, const K: usize> Spad<'r, K> {
+    /// Under background alone, photons of a SPAD in a bin.
+    fn steady(response: &'r Response, background: Dual<K>, h: f64) -> Self {
+        let dead = response.dead_time_bins;
+        let (mut light, mut bred) = (background, background);
+        let (mut fired, mut ready) = (Dual::ZERO, Dual::ZERO);
+        // Afterpulses and crosstalk are few: each round has the next power of their chance.
+        for _ in 0..6 {
+            ready = match response.paralysable {
+                false => (Dual::constant(1.0) + light * dead).recip(),
+                true => (light * -dead).exp(),
+            };
+            fired = light * ready;
+            bred = background * ready;
+            light = background + bred * (response.afterpulses + response.crosstalk);
+        }
+        let blinding = match response.paralysable {
+            false => fired,
+            true => light,
+        };
+        let history = |of: Dual<K>| History::new(dead / h, of * h);
+        Spad {
+            response,
+            h,
+            ready,
+            blinding: history(blinding),
+            breeding: history(bred),
+            trapped: bred * (response.afterpulses * response.afterpulse_bins),
+            fired: Dual::ZERO,
+            by_crosstalk: Dual::ZERO,
+            parity: (dead < 1.0).then(|| Parity {
+                ready,
+                blind: Dual::constant(1.0) - ready,
+                blinding: history(blinding),
+            }),
+        }
+    }
+
+    fn reserve(&mut self, steps: usize) {
+        self.blinding.steps.reserve(steps);
+    }
+
+    fn begin_bin(&mut self) {
+        (self.fired, self.by_crosstalk) = (Dual::ZERO, Dual::ZERO);
+        if let Some(parity) = &mut self.parity {
+            parity.ready = self.ready;
+            parity.blind = Dual::constant(1.0) - self.ready;
+            parity.blinding = self.blinding.recent();
+        }
+    }
+
+    /// A step with so many photons on the SPAD.
+    #[inline]
+    fn step(&mut self, photons: Dual<K>) {
+        let response = self.response;
+        let recovering = self.blinding.ending();
+        let mut light = photons;
+        let breeds = response.afterpulses > 0.0 || response.crosstalk > 0.0;
+        if response.afterpulses > 0.0 {
+            light += self.afterpulses();
+        }
+        let mut share_of_crosstalk = Dual::ZERO;
+        if response.crosstalk > 0.0 {
+            let own = self.avalanches(light, recovering) * photons * positive(light).recip();
+            let crosstalk = own * response.crosstalk;
+            light += crosstalk;
+            share_of_crosstalk = crosstalk * positive(light).recip();
+        }
+        let fired = self.avalanches(light, recovering);
+        if let Some(parity) = &mut self.parity {
+            parity.step(response.paralysable, light, self.ready);
+        }
+        match response.paralysable {
+            false => {
+                self.ready += recovering - fired;
+                self.blinding.push(fired);
+            }
+            true => {
+                self.ready = self.ready * (recovering - light).exp();
+                self.blinding.push(light);
+            }
+        }
+        if breeds {
+            self.by_crosstalk += fired * share_of_crosstalk;
+            self.breeding
+                .push(fired * photons * positive(light).recip());
+        }
+        self.fired += fired;
+    }
+
+    /// Avalanches under so much light, while so many recover (or, where it is paralysable, so much light is forgotten).
+    #[inline]
+    fn avalanches(&self, light: Dual<K>, recovering: Dual<K>) -> Dual<K> {
+        match self.response.paralysable {
+            false => {
+                let missed = light.exprel_neg();
+                self.ready * light * missed + recovering * (Dual::constant(1.0) - missed)
+            }
+            true => self.ready * light * (light - recovering).exprel_neg(),
+        }
+    }
+
+    /// Afterpulses of this step.
+    fn afterpulses(&mut self) -> Dual<K> {
+        let spent = self.h / self.response.afterpulse_bins.max(1e-9);
+        let released = -(-spent).exp_m1();
+        let fresh = self.breeding.ending() * self.response.afterpulses;
+        // Fresh ones come evenly over the step.
+        let of_fresh = 1.0 - released / spent;
+        let now = self.trapped * released + fresh * of_fresh;
+        self.trapped += fresh - now;
+        now
+    }
+
+    /// The chance of the bin that has ended to count.
+    fn chance(&self, counting: &Counting) -> Dual<K> {
+        let fired = match &self.parity {
+            None => self.fired,
+            Some(parity) => (Dual::constant(1.0) - parity.ready - parity.blind) * 0.5,
+        };
+        if self.response.crosstalk == 0.0 {
+            return counting.chance(fired, Dual::ZERO);
+        }
+        let crosstalk = self.by_crosstalk * positive(self.fired).recip();
+        let alone = fired * (Dual::constant(1.0) - crosstalk);
+        let children = crosstalk * (Dual::constant(1.0) - crosstalk).recip();
+        counting.chance(alone, children)
     }
 }
 
-/// What blinds, step by step, and what of it ends a dead time later.
-struct History {
-    /// Dead time in steps.
-    delay: f64,
-    before: f64,
-    steps: Vec<f64>,
+/// The same, above zero, to divide by.
+#[inline]
+fn positive<const K: usize>(mut number: Dual<K>) -> Dual<K> {
+    number.value = number.value.max(1e-300);
+    number
 }
 
-impl History {
-    fn new(delay: f64) -> Self {
+impl<const K: usize> Parity<K> {
+    /// A step with so much light on a SPAD that was ready with chance `was_ready`.
+    fn step(&mut self, paralysable: bool, light: Dual<K>, was_ready: Dual<K>) {
+        let missed = light.exprel_neg();
+        let mut recovering = self.blinding.ending();
+        if paralysable {
+            // Those of them that no photon has blinded anew: as many as there are SPADs that are ready.
+            recovering = recovering * was_ready;
+        }
+        let fired =
+            self.ready * light * missed + recovering * (Dual::constant(1.0) - missed);
+        let (ready, blind) = (self.ready, self.blind);
+        self.ready += recovering - fired;
+        self.blind = blind - recovering - fired;
+        match paralysable {
+            false => self.blinding.push(Dual::ZERO - fired),
+            true => {
+                let blind = (blind + self.blind) * 0.5;
+                let ready = (ready + self.ready) * 0.5;
+                self.blinding.push(light * (blind - ready));
+            }
+        }
+    }
+}
+
+/// What happened step by step, and what of it ends a dead time later.
+#[derive(Clone)]
+struct History<const K: usize> {
+    /// Dead time in whole steps, and the rest of it.
+    whole: usize,
+    part: f64,
+    before: Dual<K>,
+    steps: Vec<Dual<K>>,
+}
+
+impl<const K: usize> History<K> {
+    /// `before` in every step until now.
+    fn new(delay: f64, before: Dual<K>) -> Self {
         History {
-            delay,
-            before: 0.0,
+            whole: delay as usize,
+            part: delay.fract(),
+            before,
             steps: Vec::new(),
         }
     }
 
-    /// `before` in every step until now; `steps` are to come.
-    fn begin(&mut self, before: f64, steps: usize) {
-        self.before = before;
-        self.steps = Vec::with_capacity(steps);
+    /// The same, as far as it still matters.
+    fn recent(&self) -> Self {
+        let kept = self.steps.len().saturating_sub(self.whole + 1);
+        History {
+            steps: self.steps[kept..].to_vec(),
+            ..*self
+        }
     }
 
-    fn push(&mut self, blinding: f64) {
-        self.steps.push(blinding);
+    #[inline]
+    fn push(&mut self, happened: Dual<K>) {
+        self.steps.push(happened);
     }
 
-    /// What ends during `step`.
-    fn ending(&self, step: usize) -> f64 {
-        let from = step as f64 - self.delay;
-        let whole = from.floor();
-        let at = |step: f64| match step >= 0.0 {
-            true => self.steps.get(step as usize).copied().unwrap_or(0.0),
-            false => self.before,
+    /// What ends during the step that comes next.
+    #[inline]
+    fn ending(&self) -> Dual<K> {
+        let now = self.steps.len();
+        let at = |ago: usize| match now.checked_sub(ago) {
+            Some(step) => self.steps.get(step).copied().unwrap_or(self.before),
+            None => self.before,
         };
-        let part = from - whole;
-        at(whole) * (1.0 - part) + at(whole + 1.0) * part
+        at(self.whole) * (1.0 - self.part) + at(self.whole + 1) * self.part
     }
 }

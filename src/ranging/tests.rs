@@ -137,6 +137,7 @@ fn the_mean_histogram_is_that_of_simulated_light() {
                 position_bins: 6.7,
                 signal,
                 background_per_bin: background_hz * bin_s,
+                sigma_bins: response.pulse_sigma_bins(),
             });
             let trials = f64::from(cycles * number);
             for (bin, chance) in chances.into_iter().enumerate() {
