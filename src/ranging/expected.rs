@@ -15,9 +15,9 @@
 //! the dead time is as fine as the steps. A SPAD that fires twice within a bin toggles its flip-flop back (thesis 4.2), so with a dead time below a bin
 //! it counts where it fired an odd number of times, which follows from a second, signed, state of the SPAD.
 //!
-//! Afterpulses and crosstalk come as further light: of afterpulses from what fired a dead time and more ago, of crosstalk from
-//! what fires now. Neither breeds, as in [`photon::spad`](crate::photon). This leaves out only that the SPAD which fired is the one that has the
-//! afterpulse, and squares of the two chances.
+//! A SPAD that recovers may have carriers trapped, which fire it once more if no photon does before. Where it is paralysable,
+//! afterpulses come as further light, because what blinds them comes after the avalanche that they are of. Crosstalk
+//! comes as further light from what fires now. Neither breeds, as in [`photon::spad`](crate::photon). This leaves out squares of the two chances.
 //!
 //! Assumed: SPADs alike, and recovered from the echo before the next laser cycle's.
 
@@ -28,11 +28,12 @@ use crate::numerics::Dual;
 use crate::units::Time;
 
 /// Steps to a bin, at least.
-const STEPS: usize = 8;
+const STEPS: usize = 4;
 
-/// Steps to a dead time, at least, and to the time in which all SPADs fire under the strongest light, where they fire again
-/// under it; and most steps to a bin. Finer ones change no chance by more than 10⁻³.
+/// Steps to a dead time, at least, and to the time in which light fires a SPAD, where SPADs fire again under a pulse; and most
+/// steps to a bin.
 const STEPS_OF_DEAD_TIME: f64 = 12.0;
+const STEPS_OF_RATE: f64 = 8.0;
 const MOST_STEPS: f64 = 96.0;
 
 /// Standard deviations from its centre where a pulse begins and ends: 10⁻¹¹ of it is left out, less than a photon of 10¹⁰.
@@ -55,6 +56,15 @@ pub struct EchoLight {
     pub background_per_bin: f64,
     /// Standard deviation of the echo, bins: that of the laser pulse with all jitter ([`Response::pulse_sigma_bins`]), or more.
     pub sigma_bins: f64,
+}
+
+/// How finely time goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Steps {
+    /// To find where to look.
+    Coarse,
+    /// As finely as the light needs.
+    Fine,
 }
 
 /// How a macropixel answers to light.
@@ -129,27 +139,37 @@ impl Response {
 
     /// The chance of every bin to count in a laser cycle.
     pub fn chances(&self, light: &EchoLight) -> Vec<f64> {
+        self.chances_in(light, Steps::Fine)
+    }
+
+    pub(super) fn chances_in(&self, light: &EchoLight, steps: Steps) -> Vec<f64> {
         let parameters = [Dual::<0>::ZERO; PARAMETERS];
-        let chances = self.chances_of(light, parameters);
+        let chances = self.chances_of(light, parameters, steps);
         chances.iter().map(|chance| chance.value).collect()
     }
 
     /// The same with the slopes of each chance.
-    pub(super) fn slopes(&self, light: &EchoLight) -> Vec<Slopes> {
+    pub(super) fn slopes(&self, light: &EchoLight, steps: Steps) -> Vec<Slopes> {
         let parameter = |of| Dual::parameter(0.0, of);
-        self.chances_of(light, std::array::from_fn(parameter))
+        self.chances_of(light, std::array::from_fn(parameter), steps)
+    }
+
+    /// Whether this light needs finer steps than the fewest.
+    pub(super) fn needs_fine_steps(&self, light: &EchoLight) -> bool {
+        self.steps(light, Steps::Fine) > self.steps(light, Steps::Coarse)
     }
 
     /// Steps to a bin.
-    fn steps(&self, light: &EchoLight) -> usize {
+    fn steps(&self, light: &EchoLight, steps: Steps) -> usize {
         let sigma = light.sigma_bins.max(1e-3);
-        if self.dead_time_bins >= 2.0 * PULSE_REACH * sigma && self.dead_time_bins >= 2.0 {
-            return STEPS;
+        let fires_once = self.dead_time_bins >= 2.0 * PULSE_REACH * sigma;
+        if steps == Steps::Coarse || fires_once && self.dead_time_bins >= 2.0 {
+            return STEPS.max((2.0 / self.dead_time_bins).min(16.0).ceil() as usize);
         }
         // Within the pulse SPADs fire again, and each firing is as sharp as the light is strong.
         let rate = 0.4 * light.signal / (self.counting.spads as f64 * sigma);
         let of_dead_time = STEPS_OF_DEAD_TIME / self.dead_time_bins;
-        let wanted = of_dead_time.max(2.0 * rate).min(MOST_STEPS);
+        let wanted = of_dead_time.max(STEPS_OF_RATE * rate).min(MOST_STEPS);
         (wanted.ceil() as usize).max(STEPS)
     }
 
@@ -158,6 +178,7 @@ impl Response {
         &self,
         light: &EchoLight,
         shifts: [Dual<K>; PARAMETERS],
+        steps: Steps,
     ) -> Vec<Dual<K>> {
         let [by_place, by_signal, by_background, by_width] = shifts;
         let per_spad = 1.0 / self.counting.spads as f64;
@@ -165,7 +186,7 @@ impl Response {
         let background = light.background_per_bin * per_spad;
         let background = by_background.chain(background, background);
         let sigma = light.sigma_bins.max(1e-6);
-        let steps_per_bin = self.steps(light);
+        let steps_per_bin = self.steps(light, steps);
         let h = 1.0 / steps_per_bin as f64;
 
         // Light of the pulse on a SPAD until a time.
@@ -228,14 +249,16 @@ struct Spad<'r, const K: usize> {
     response: &'r Response,
     /// Step, bins.
     h: f64,
-    /// That it is ready.
+    /// That it is ready, with or without trapped carriers.
     ready: Dual<K>,
     /// What blinds: avalanches, or where it is paralysable all light.
     blinding: History<K>,
-    /// Avalanches by light, which may have afterpulses.
-    breeding: History<K>,
-    /// Afterpulses to come in SPADs that have recovered.
+    /// Avalanches after which carriers are trapped; where it is paralysable, afterpulses to be released.
+    trapping: History<K>,
+    /// That it is ready and carriers are trapped; where it is paralysable, that they are.
     trapped: Dual<K>,
+    /// The share of carriers that stay trapped for a dead time.
+    kept: f64,
     /// Avalanches of the bin, and those of them by crosstalk.
     fired: Dual<K>,
     by_crosstalk: Dual<K>,
@@ -254,18 +277,40 @@ impl<'r, const K: usize> Spad<'r, K> {
     /// Under background alone, photons of a SPAD in a bin.
     fn steady(response: &'r Response, background: Dual<K>, h: f64) -> Self {
         let dead = response.dead_time_bins;
-        let (mut light, mut bred) = (background, background);
-        let (mut fired, mut ready) = (Dual::ZERO, Dual::ZERO);
+        let tau = response.afterpulse_bins.max(1e-9);
+        let kept = (-dead / tau).exp();
+        let (mut fired, mut ready, mut trapped) = (background, Dual::ZERO, Dual::ZERO);
+        let mut light = background;
         // Afterpulses and crosstalk are few: each round has the next power of their chance.
         for _ in 0..6 {
             ready = match response.paralysable {
-                false => (Dual::constant(1.0) + light * dead).recip(),
+                false => Dual::constant(1.0) - fired * dead,
                 true => (light * -dead).exp(),
             };
-            fired = light * ready;
-            bred = background * ready;
-            light = background + bred * (response.afterpulses + response.crosstalk);
+            let bred = background * ready;
+            light = background + bred * response.crosstalk;
+            let traps = bred * response.afterpulses;
+            match response.paralysable {
+                false => {
+                    // A photon before it is released leaves it trapped for another dead time.
+                    let lost = light * (1.0 - kept) + Dual::constant(1.0 / tau);
+                    trapped = traps * lost.recip();
+                    fired = (light + trapped * (1.0 / tau)) * (Dual::constant(1.0) + light * dead).recip();
+                }
+                true => {
+                    trapped = traps * tau;
+                    light += traps;
+                    fired = light * ready;
+                }
+            }
         }
+        if !response.paralysable {
+            ready = Dual::constant(1.0) - fired * dead;
+        }
+        let traps = match response.paralysable {
+            false => background * ready * response.afterpulses + trapped * light * kept,
+            true => background * ready * response.afterpulses,
+        };
         let blinding = match response.paralysable {
             false => fired,
             true => light,
@@ -276,8 +321,9 @@ impl<'r, const K: usize> Spad<'r, K> {
             h,
             ready,
             blinding: history(blinding),
-            breeding: history(bred),
-            trapped: bred * (response.afterpulses * response.afterpulse_bins),
+            trapping: history(traps),
+            trapped,
+            kept,
             fired: Dual::ZERO,
             by_crosstalk: Dual::ZERO,
             parity: (dead < 1.0).then(|| Parity {
@@ -306,21 +352,35 @@ impl<'r, const K: usize> Spad<'r, K> {
     fn step(&mut self, photons: Dual<K>) {
         let response = self.response;
         let recovering = self.blinding.ending();
+        let has_traps = response.afterpulses > 0.0;
         let mut light = photons;
-        let breeds = response.afterpulses > 0.0 || response.crosstalk > 0.0;
-        if response.afterpulses > 0.0 {
+        if has_traps && response.paralysable {
             light += self.afterpulses();
         }
-        let mut share_of_crosstalk = Dual::ZERO;
+        let mut crosstalk = Dual::ZERO;
         if response.crosstalk > 0.0 {
             let own = self.avalanches(light, recovering) * photons * positive(light).recip();
-            let crosstalk = own * response.crosstalk;
+            crosstalk = own * response.crosstalk;
             light += crosstalk;
-            share_of_crosstalk = crosstalk * positive(light).recip();
         }
-        let fired = self.avalanches(light, recovering);
+        let mut fired = self.avalanches(light, recovering);
+        // Avalanches of light, without those of afterpulses that came first.
+        let mut by_light = fired;
+        if has_traps && !response.paralysable {
+            let (released, lost) = self.released(light, photons, fired);
+            fired += released - lost;
+            by_light = fired - released;
+        }
+        if has_traps && response.paralysable {
+            let bred = fired * photons * positive(light).recip();
+            self.trapping.push(bred * response.afterpulses);
+        }
         if let Some(parity) = &mut self.parity {
-            parity.step(response.paralysable, light, self.ready);
+            let all = match fired.value > by_light.value {
+                true => light * fired * positive(by_light).recip(),
+                false => light,
+            };
+            parity.step(response.paralysable, all, self.ready);
         }
         match response.paralysable {
             false => {
@@ -332,10 +392,8 @@ impl<'r, const K: usize> Spad<'r, K> {
                 self.blinding.push(light);
             }
         }
-        if breeds {
-            self.by_crosstalk += fired * share_of_crosstalk;
-            self.breeding
-                .push(fired * photons * positive(light).recip());
+        if response.crosstalk > 0.0 {
+            self.by_crosstalk += by_light * crosstalk * positive(light).recip();
         }
         self.fired += fired;
     }
@@ -352,11 +410,33 @@ impl<'r, const K: usize> Spad<'r, K> {
         }
     }
 
-    /// Afterpulses of this step.
+    /// Afterpulses of this step, and avalanches of light that they are in place of.
+    fn released(&mut self, light: Dual<K>, photons: Dual<K>, fired: Dual<K>) -> (Dual<K>, Dual<K>) {
+        let response = self.response;
+        let release = Dual::constant(self.h / response.afterpulse_bins.max(1e-9));
+        let recovering = self.trapping.ending();
+        let both = light + release;
+        let (missed, missed_of_light) = (both.exprel_neg(), light.exprel_neg());
+        let one = Dual::constant(1.0);
+        // What fires those with trapped carriers, and what would have fired them without.
+        let gone = self.trapped * both * missed + recovering * (one - missed);
+        let of_light = self.trapped * light * missed_of_light + recovering * (one - missed_of_light);
+        let released = gone * release * both.recip();
+        let fired_trapped = gone - released;
+        self.trapped += recovering - gone;
+        // Photons, but not crosstalk, trap carriers anew.
+        let photon_share = photons * positive(light).recip();
+        let fresh = (fired - of_light + fired_trapped) * photon_share * response.afterpulses;
+        let old = fired_trapped * self.kept;
+        self.trapping.push(fresh + old * (one - photon_share * response.afterpulses));
+        (released, of_light - fired_trapped)
+    }
+
+    /// Afterpulses of this step, where they come as light.
     fn afterpulses(&mut self) -> Dual<K> {
         let spent = self.h / self.response.afterpulse_bins.max(1e-9);
         let released = -(-spent).exp_m1();
-        let fresh = self.breeding.ending() * self.response.afterpulses;
+        let fresh = self.trapping.ending();
         // Fresh ones come evenly over the step.
         let of_fresh = 1.0 - released / spent;
         let now = self.trapped * released + fresh * of_fresh;

@@ -14,7 +14,7 @@
 
 use std::ops::Range;
 
-use super::expected::{EchoLight, PARAMETERS, Response};
+use super::expected::{EchoLight, PARAMETERS, Response, Steps};
 
 /// Chances beyond which none is believed: a count that the model says never comes costs 21 in ln likelihood.
 const LEAST_CHANCE: f64 = 1e-9;
@@ -48,6 +48,8 @@ pub(super) struct Likelihood<'a> {
     /// The bins that are looked at.
     pub(super) bins: Range<usize>,
     pub(super) free: Free,
+    /// The most background that the bins beside an echo allow, photons in a bin and laser cycle.
+    pub(super) most_background: f64,
 }
 
 /// The most likely light.
@@ -64,15 +66,18 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    /// Whether counts scatter about this light's as they should: less than four standard deviations more.
+    /// Whether counts scatter about this light's as they should: less than one in 30 000 right fits would scatter more. The
+    /// deviance is χ², whose cube root is normal (Wilson and Hilferty), and four standard deviations of that are allowed.
     pub(super) fn explains(&self) -> bool {
-        self.has_converged
-            && self.deviance <= self.freedom + 4.0 * (2.0 * self.freedom.max(1.0)).sqrt()
+        let variance = 2.0 / (9.0 * self.freedom.max(1.0));
+        let most = self.freedom.max(1.0) * (1.0 - variance + 4.0 * variance.sqrt()).powi(3);
+        self.has_converged && self.deviance <= most
     }
 }
 
 /// What the histogram says at some light.
 struct Local {
+    background: f64,
     deviance: f64,
     score: [f64; PARAMETERS],
     information: [[f64; PARAMETERS]; PARAMETERS],
@@ -96,14 +101,16 @@ impl Likelihood<'_> {
             .sum::<f64>()
     }
 
-    /// The deviance of some light.
+    /// The deviance of some light, about.
     pub(super) fn deviance(&self, light: &EchoLight) -> f64 {
-        self.deviance_of(self.response.chances(light).into_iter())
+        let chances = self.response.chances_in(light, Steps::Coarse);
+        self.deviance_of(chances.into_iter())
     }
 
-    fn at(&self, light: &EchoLight) -> Local {
-        let slopes = self.response.slopes(light);
+    fn at(&self, light: &EchoLight, steps: Steps) -> Local {
+        let slopes = self.response.slopes(light, steps);
         let mut local = Local {
+            background: light.background_per_bin,
             deviance: self.deviance_of(slopes.iter().map(|chance| chance.value)),
             score: [0.0; PARAMETERS],
             information: [[0.0; PARAMETERS]; PARAMETERS],
@@ -126,8 +133,18 @@ impl Likelihood<'_> {
 
     /// The most likely light near `start`.
     pub(super) fn maximise(&self, start: &EchoLight) -> Fit {
+        match self.response.needs_fine_steps(start) {
+            false => self.maximise_in(start, Steps::Fine),
+            true => {
+                let near = self.maximise_in(start, Steps::Coarse);
+                self.maximise_in(&near.light, Steps::Fine)
+            }
+        }
+    }
+
+    fn maximise_in(&self, start: &EchoLight, steps: Steps) -> Fit {
         let mut light = *start;
-        let mut local = self.at(&light);
+        let mut local = self.at(&light, steps);
         let mut damping = 0.0;
         let mut has_converged = false;
         for _ in 0..ROUNDS {
@@ -141,7 +158,7 @@ impl Likelihood<'_> {
                 has_converged = true;
                 break;
             }
-            let there = self.at(&next);
+            let there = self.at(&next, steps);
             // As far as rounding lets it be told.
             if there.deviance <= local.deviance + 1e-9 * (1.0 + local.deviance) {
                 let enough = gain < CLOSE && local.deviance - there.deviance < CLOSE;
@@ -219,10 +236,11 @@ impl Likelihood<'_> {
                     (matrix[i][j], matrix[j][i]) = (0.0, 0.0);
                 }
                 matrix[i][i] = 1.0;
-            } else if i > 0 {
-                // A factor of e¹⁰⁰⁰ either way is not known otherwise.
-                matrix[i][i] += 1e-6;
             }
+        }
+        // Background that is too little to count is known to be between none and the most: a twelfth of its square.
+        if self.free[2] {
+            matrix[2][2] += 12.0 * (local.background / self.most_background).powi(2);
         }
         let variance = solved(matrix, [1.0, 0.0, 0.0, 0.0]).map(|column| column[0]);
         variance

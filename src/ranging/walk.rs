@@ -95,21 +95,23 @@ impl WalkCorrection {
     /// Why that is not known.
     pub fn correct(&self, counts: &[f64], peak: &Peak) -> Result<Corrected, WalkLeft> {
         let cycles = counts.iter().copied().fold(f64::from(self.laser_cycles), f64::max);
+        let [background, most_background] = self.background(counts, cycles);
         let likelihood = |free: Free| Likelihood {
             response: &self.response,
             counts,
             cycles,
             bins: 0..counts.len(),
             free,
+            most_background,
         };
-        let linear = self.linear_start(counts, cycles, peak);
+        let linear = self.linear_start(counts, cycles, (peak, background));
         let of_all = likelihood(ECHO);
         let mut best = match &linear {
             Some(start) => of_all.maximise(start),
-            None => self.of_many(&of_all, peak)?,
+            None => self.of_many(&of_all, (peak, background))?,
         };
         if !best.explains() && linear.is_some() {
-            let other = self.of_many(&of_all, peak);
+            let other = self.of_many(&of_all, (peak, background));
             best = match other {
                 Ok(other) if other.deviance < best.deviance || !best.has_converged => other,
                 _ => best,
@@ -142,16 +144,16 @@ impl WalkCorrection {
     }
 
     /// A start from the light that each bin of the peak had, if it was alone; `None` where bins do not tell.
-    fn linear_start(&self, counts: &[f64], cycles: f64, peak: &Peak) -> Option<EchoLight> {
+    fn linear_start(
+        &self,
+        counts: &[f64],
+        cycles: f64,
+        (peak, background_per_bin): (&Peak, f64),
+    ) -> Option<EchoLight> {
         let counting = self.response.counting();
         if counting.event_type != EventType::Greater {
             return None;
         }
-        let light = |counts: f64| {
-            let fired = counting.fired_for((counts / cycles).min(0.999));
-            -(counting.spads as f64) * (-fired).ln_1p()
-        };
-        let background_per_bin = light(peak.background_per_bin.max(0.1));
         let half = (2.0 * self.response.pulse_sigma_bins()).ceil().max(1.0) as usize;
         let (mut signal, mut moment) = (0.0, 0.0);
         for (bin, &counts) in counts.iter().enumerate() {
@@ -159,7 +161,7 @@ impl WalkCorrection {
                 return None;
             }
             if bin.abs_diff(peak.peak_bin) <= half {
-                let of_bin = (light(counts) - background_per_bin).max(0.0);
+                let of_bin = (self.light(counts / cycles) - background_per_bin).max(0.0);
                 signal += of_bin;
                 moment += of_bin * bin as f64;
             }
@@ -173,13 +175,21 @@ impl WalkCorrection {
     }
 
     /// The best of fits from many starts: for each of many signals the best place.
-    fn of_many(&self, likelihood: &Likelihood<'_>, peak: &Peak) -> Result<Fit, WalkLeft> {
+    fn of_many(
+        &self,
+        likelihood: &Likelihood<'_>,
+        (peak, background_per_bin): (&Peak, f64),
+    ) -> Result<Fit, WalkLeft> {
         let sigma_bins = self.response.pulse_sigma_bins();
-        let background_per_bin = background(likelihood);
         let edge = self.rising_edge(likelihood, background_per_bin);
         let mut starts: Vec<(f64, EchoLight)> = Vec::new();
-        for step in -1..=10 {
-            let signal = 10f64.powf(0.4 * f64::from(step));
+        // Where light makes bins count less, too, each light has its own places.
+        let (step, fits) = match edge {
+            Some(_) => (0.4, 2),
+            None => (0.2, 8),
+        };
+        for number in (-0.6 / step) as i32..=(4.0 / step) as i32 {
+            let signal = 10f64.powf(step * f64::from(number));
             let light = |position_bins: f64| EchoLight {
                 position_bins,
                 signal,
@@ -192,8 +202,8 @@ impl WalkCorrection {
                     let end = bin as f64 + 0.5 - sigma_bins * quantile(photons / signal);
                     [-0.3, 0.0, 0.3].map(|off| end + off).to_vec()
                 }
-                None => (-4..=16)
-                    .map(|n| peak.peak_bin as f64 + 0.25 * f64::from(n) * (1.0 + sigma_bins))
+                None => (-10..=40)
+                    .map(|n| peak.peak_bin as f64 + 0.15 * f64::from(n) * (1.0 + sigma_bins))
                     .collect(),
             };
             let judged = places.into_iter().map(light).map(|light| (likelihood.deviance(&light), light));
@@ -202,7 +212,7 @@ impl WalkCorrection {
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut fits: Vec<Fit> = starts
             .iter()
-            .take(4)
+            .take(fits)
             .map(|(_, start)| likelihood.maximise(start))
             .filter(|fit| fit.has_converged)
             .collect();
@@ -219,17 +229,39 @@ impl WalkCorrection {
         }
     }
 
+    /// The light of a bin that counts with `chance`, if SPADs are ready for it and more light makes it count more.
+    fn light(&self, chance: f64) -> f64 {
+        let counting = self.response.counting();
+        let fired = counting.fired_for(chance.min(0.999));
+        -(counting.spads as f64) * (-fired).ln_1p()
+    }
+
+    /// The background to begin with, and the most that it may be: from the third of the bins with the fewest counts, because the
+    /// median is too much where an echo is wide. Where SPADs are blind they say too little, which the fit finds out.
+    fn background(&self, counts: &[f64], cycles: f64) -> [f64; 2] {
+        if self.response.counting().event_type != EventType::Greater {
+            return [0.03, 1.0];
+        }
+        let mut sorted = counts.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let few = sorted[sorted.len() / 3];
+        // Where nothing counts, the background is some tenth of what would show.
+        let begin = match few >= 1.0 {
+            true => self.light(few / cycles),
+            false => 0.1 * self.light(0.3 / cycles),
+        };
+        // No count in a bin allows three.
+        [begin, self.light((few + 3.0) / cycles)]
+    }
+
     /// The first bin of an echo's rising edge, and the photons of the echo until its end.
     fn rising_edge(&self, likelihood: &Likelihood<'_>, background: f64) -> Option<(usize, f64)> {
         let counting = self.response.counting();
         if counting.event_type != EventType::Greater {
             return None;
         }
-        let light = |counts: f64| {
-            let fired = counting.fired_for((counts / likelihood.cycles).min(0.99));
-            -(counting.spads as f64) * (-fired).ln_1p()
-        };
-        let bins = likelihood.counts.iter().map(|&counts| light(counts) - background);
+        let light = |&counts: &f64| self.light((counts / likelihood.cycles).min(0.99)) - background;
+        let bins = likelihood.counts.iter().map(light);
         let bins: Vec<f64> = bins.collect();
         let most = bins.iter().copied().fold(0.0, f64::max);
         let bin = bins.iter().position(|&photons| photons > 0.2 * most)?;
@@ -248,20 +280,6 @@ fn quantile(share: f64) -> f64 {
         }
     }
     0.5 * (low + high)
-}
-
-/// Background of a first guess: that of the quarter of bins with the fewest counts would be too little, where SPADs are blind; the
-/// median is too much, where an echo is wide. Fits begin between them.
-fn background(likelihood: &Likelihood<'_>) -> f64 {
-    let mut sorted = likelihood.counts.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let counts = sorted[sorted.len() / 3].max(0.3);
-    let counting = likelihood.response.counting();
-    let fired = match counting.event_type {
-        EventType::Greater => counting.fired_for((counts / likelihood.cycles).min(0.9)),
-        EventType::Less | EventType::Equal => 1e-3,
-    };
-    -(counting.spads as f64) * (-fired).ln_1p()
 }
 
 impl From<Fit> for Corrected {
