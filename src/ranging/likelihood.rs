@@ -34,8 +34,6 @@ pub(super) const ECHO: Free = [true, true, true, false];
 pub(super) const WIDE_ECHO: Free = [true, true, true, true];
 /// What bins of the peak alone can tell, where the background is known from others.
 pub(super) const IN_REGION: Free = [true, true, false, false];
-/// Width besides.
-pub(super) const WIDE_IN_REGION: Free = [true, true, false, true];
 
 /// A histogram, and what may have made it.
 #[derive(Debug, Clone)]
@@ -148,11 +146,11 @@ impl Likelihood<'_> {
         let mut damping = 0.0;
         let mut has_converged = false;
         for _ in 0..ROUNDS {
-            let Some(step) = self.step(&local, damping) else {
+            let Some(step) = self.step(&light, &local, damping) else {
                 damping = f64::max(10.0 * damping, 1e-3);
                 continue;
             };
-            let gain: f64 = step.iter().zip(local.score).map(|(s, score)| s * score).sum();
+            let gain: f64 = step.iter().zip(local.score).map(|(step, score)| step * score).sum();
             let next = self.moved(&light, step);
             if damping == 0.0 && gain < CLOSE {
                 has_converged = true;
@@ -186,11 +184,24 @@ impl Likelihood<'_> {
     }
 
     /// The step that the score asks for.
-    fn step(&self, local: &Local, damping: f64) -> Option<[f64; PARAMETERS]> {
+    fn step(
+        &self,
+        light: &EchoLight,
+        local: &Local,
+        damping: f64,
+    ) -> Option<[f64; PARAMETERS]> {
         let mut matrix = local.information;
         let mut wanted = local.score;
+        // What would leave its limits stays at them.
+        let slight = self.moved(light, wanted.map(|score| 1e-6 * score.signum()));
+        let stays = [
+            slight.position_bins == light.position_bins,
+            slight.signal == light.signal,
+            slight.background_per_bin == light.background_per_bin,
+            slight.sigma_bins == light.sigma_bins,
+        ];
         for i in 0..PARAMETERS {
-            if self.free[i] {
+            if self.free[i] && !stays[i] {
                 // What nothing is known of stays as it is.
                 matrix[i][i] += damping * matrix[i][i] + 1e-6;
                 continue;

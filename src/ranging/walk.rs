@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use super::edge::share_before;
 use super::expected::{EchoLight, Response};
 use super::likelihood::{
-    ECHO, Fit, Free, IN_REGION, Likelihood, WIDE_ECHO, WIDE_IN_REGION,
+    ECHO, Fit, Free, IN_REGION, Likelihood, WIDE_ECHO,
 };
 use super::peak::Peak;
 use crate::chip::EventType;
@@ -105,37 +105,35 @@ impl WalkCorrection {
             most_background,
         };
         let linear = self.linear_start(counts, cycles, (peak, background));
-        let of_all = likelihood(ECHO);
+        let (of_all, wide) = (likelihood(ECHO), likelihood(WIDE_ECHO));
         let mut best = match &linear {
             Some(start) => of_all.maximise(start),
             None => self.of_many(&of_all, (peak, background))?,
         };
-        if !best.explains() && linear.is_some() {
-            let other = self.of_many(&of_all, (peak, background));
-            best = match other {
-                Ok(other) if other.deviance < best.deviance || !best.has_converged => other,
-                _ => best,
-            };
-        }
         if best.explains() {
             return Ok(best.into());
         }
-        let wide = likelihood(WIDE_ECHO).maximise(&best.light);
-        if wide.explains() {
-            return Ok(wide.into());
+        // Few photons are an echo in one place only.
+        let is_weak = best.has_converged && counts.iter().all(|&n| n < 0.9 * cycles);
+        if linear.is_some() && !is_weak {
+            best = self.of_many(&of_all, (peak, background))?;
+            if best.explains() {
+                return Ok(best.into());
+            }
+        }
+        let of_wide = wide.maximise(&best.light);
+        if of_wide.explains() {
+            return Ok(of_wide.into());
         }
         let half = (4.0 * self.response.pulse_sigma_bins()).ceil().max(2.0) as usize;
-        let region = peak.peak_bin.saturating_sub(half)..(peak.peak_bin + half + 1).min(counts.len());
-        for free in [IN_REGION, WIDE_IN_REGION] {
-            let of_region = Likelihood {
-                bins: region.clone(),
-                ..likelihood(free)
-            };
-            let start = linear.unwrap_or(best.light);
-            let fit = of_region.maximise(&start);
-            if fit.explains() {
-                return Ok(fit.into());
-            }
+        let first = peak.peak_bin.saturating_sub(half);
+        let of_region = Likelihood {
+            bins: first..(peak.peak_bin + half + 1).min(counts.len()),
+            ..likelihood(IN_REGION)
+        };
+        let in_region = of_region.maximise(&linear.unwrap_or(best.light));
+        if in_region.explains() {
+            return Ok(in_region.into());
         }
         match best.has_converged {
             true => Err(WalkLeft::NotOneEcho),
