@@ -159,13 +159,19 @@ impl Likelihood<'_> {
             let there = self.at(&next, steps);
             // As far as rounding lets it be told.
             if there.deviance <= local.deviance + 1e-9 * (1.0 + local.deviance) {
-                let enough = gain < CLOSE && local.deviance - there.deviance < CLOSE;
+                let gained = local.deviance - there.deviance;
+                let enough = gain < CLOSE && gained < CLOSE;
                 (light, local) = (next, there);
                 if enough {
                     has_converged = true;
                     break;
                 }
-                damping = if damping > 1e-3 { damping / 10.0 } else { 0.0 };
+                // Where much less was gained than promised, steps overshoot to and fro.
+                damping = match gained < 0.3 * gain {
+                    true => (3.0 * damping).max(0.3),
+                    false if damping > 1e-3 => damping / 10.0,
+                    false => 0.0,
+                };
             } else {
                 damping = f64::max(10.0 * damping, 1e-2);
                 if damping > 1e9 {

@@ -110,19 +110,24 @@ impl WalkCorrection {
             Some(start) => of_all.maximise(start),
             None => self.of_many(&of_all, (peak, background))?,
         };
+        // The glow after an echo that came before the window may look like a weaker one.
+        let begins_unseen = best.light.position_bins < 2.0 * best.light.sigma_bins;
+        if linear.is_some() && begins_unseen {
+            best = self.of_many(&of_all, (peak, background))?;
+        }
         if best.explains() {
             return Ok(best.into());
         }
         // Few photons are an echo in one place only.
         let is_weak = best.has_converged && counts.iter().all(|&n| n < 0.9 * cycles);
-        if linear.is_some() && !is_weak {
+        if linear.is_some() && !is_weak && !begins_unseen {
             best = self.of_many(&of_all, (peak, background))?;
             if best.explains() {
                 return Ok(best.into());
             }
         }
         let of_wide = wide.maximise(&best.light);
-        if of_wide.explains() {
+        if of_wide.explains() && of_wide.light.sigma_bins < self.widest() {
             return Ok(of_wide.into());
         }
         let half = (4.0 * self.response.pulse_sigma_bins()).ceil().max(2.0) as usize;
@@ -180,10 +185,12 @@ impl WalkCorrection {
     ) -> Result<Fit, WalkLeft> {
         let sigma_bins = self.response.pulse_sigma_bins();
         let edge = self.rising_edge(likelihood, background_per_bin);
+        let edge_is_seen = |bin: usize| bin as f64 > 1.0 + sigma_bins;
         let mut starts: Vec<(f64, EchoLight)> = Vec::new();
         // Where light makes bins count less, too, each light has its own places.
         let (step, fits) = match edge {
-            Some(_) => (0.4, 2),
+            Some((bin, _)) if edge_is_seen(bin) => (0.4, 2),
+            Some(_) => (0.4, 6),
             None => (0.2, 8),
         };
         for number in (-0.6 / step) as i32..=(4.0 / step) as i32 {
@@ -196,10 +203,11 @@ impl WalkCorrection {
             };
             let places: Vec<f64> = match edge {
                 // The light until the end of the edge's bin says how much of the pulse has come.
-                Some((bin, photons)) => {
+                Some((bin, photons)) if edge_is_seen(bin) => {
                     let end = bin as f64 + 0.5 - sigma_bins * quantile(photons / signal);
                     [-0.3, 0.0, 0.3].map(|off| end + off).to_vec()
                 }
+                Some(_) => (-12..=12).map(|n| 0.3 * f64::from(n)).collect(),
                 None => (-10..=40)
                     .map(|n| peak.peak_bin as f64 + 0.15 * f64::from(n) * (1.0 + sigma_bins))
                     .collect(),
@@ -225,6 +233,12 @@ impl WalkCorrection {
             true => Err(WalkLeft::Ambiguous),
             false => Ok(best),
         }
+    }
+
+    /// The widest echo, whose ends are to be seen either side of it.
+    fn widest(&self) -> f64 {
+        let of_bins = self.response.bins() as f64 / 8.0;
+        of_bins.max(1.5 * self.response.pulse_sigma_bins())
     }
 
     /// The light of a bin that counts with `chance`, if SPADs are ready for it and more light makes it count more.
