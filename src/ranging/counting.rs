@@ -89,10 +89,7 @@ impl Counting {
 
     /// The chance of a SPAD to fire at which a bin counts with `chance`, without crosstalk; counts must rise with it.
     pub(super) fn fired_for(&self, chance: f64) -> f64 {
-        let of = |fired: f64| {
-            self.chance(Dual::<0>::constant(fired), Dual::ZERO)
-                .value
-        };
+        let of = |fired: f64| self.chance(Dual::<0>::constant(fired), Dual::ZERO).value;
         if (self.event_type, self.threshold) == (EventType::Greater, 0) {
             return -((-chance.min(1.0 - 1e-12)).ln_1p() / self.spads as f64).exp_m1();
         }

@@ -64,7 +64,10 @@ mod tests {
             let z = -7.0 + f64::from(i) * 1e-3 + 3e-4;
             let share = normal_above(-z);
             let error = (share_before(z) - share).abs();
-            assert!(error < 3e-9 && (share < 1e-9 || error < 1e-5 * share), "{z}: {error}");
+            assert!(
+                error < 3e-9 && (share < 1e-9 || error < 1e-5 * share),
+                "{z}: {error}"
+            );
             let error = (share_slope(z) - normal_density(z)).abs();
             assert!(error < 2e-6, "{z}: slope off by {error}");
         }

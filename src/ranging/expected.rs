@@ -10,19 +10,13 @@
 //! exactly from the light: it is, unless it fired within the last dead time (non-paralysable), or unless a photon came
 //! within it (paralysable). SPADs fire independently, so the number of those that fire in a bin is binomial.
 //!
-//! Time goes in steps, over which light and recovery are taken to be even; what a step's light does to a SPAD that is ready, or that
-//! recovers within the step, is exact. So the rising edge of an echo is exact however strong it is, and what comes after
-//! the dead time is as fine as the steps. A SPAD that fires twice within a bin toggles its flip-flop back (thesis 4.2), so with a dead time below a bin
-//! it counts where it fired an odd number of times, which follows from a second, signed, state of the SPAD.
-//!
-//! A SPAD that recovers may have carriers trapped, which fire it once more if no photon does before. Where it is paralysable,
-//! afterpulses come as further light, because what blinds them comes after the avalanche that they are of. Crosstalk
-//! comes as further light from what fires now. Neither breeds, as in [`photon::spad`](crate::photon). This leaves out squares of the two chances.
+//! How a SPAD goes through a laser cycle is [`spad_state`](super::spad_state)'s.
 //!
 //! Assumed: SPADs alike, and recovered from the echo before the next laser cycle's.
 
 use super::counting::Counting;
 use super::edge::{share_before, share_slope};
+use super::spad_state::{Dead, Spad};
 use crate::chip::{EventType, SensorConfig};
 use crate::numerics::Dual;
 use crate::units::Time;
@@ -71,14 +65,9 @@ pub(super) enum Steps {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Response {
     bins: usize,
-    dead_time_bins: f64,
-    paralysable: bool,
     pulse_sigma_bins: f64,
     counting: Counting,
-    afterpulses: f64,
-    afterpulse_bins: f64,
-    /// Avalanches of neighbours for each of a SPAD's, on average, if they are ready.
-    crosstalk: f64,
+    dead: Dead,
 }
 
 impl Response {
@@ -90,17 +79,19 @@ impl Response {
         let neighbours = 2.0 * grid.neighbours() as f64 / (4 * grid.spads()) as f64;
         Response {
             bins: config.bins,
-            dead_time_bins: config.dead_time().as_s() / bin_s,
-            paralysable: config.paralysable,
             pulse_sigma_bins: pulse_sigma.as_s() / bin_s,
             counting: Counting {
                 event_type: config.event_type,
                 threshold: usize::from(config.threshold),
                 spads: config.spads(),
             },
-            afterpulses: config.afterpulse_probability,
-            afterpulse_bins: config.afterpulse_time_ns * 1e-9 / bin_s,
-            crosstalk: config.crosstalk_probability * neighbours,
+            dead: Dead {
+                time_bins: config.dead_time().as_s() / bin_s,
+                paralysable: config.paralysable,
+                afterpulses: config.afterpulse_probability,
+                afterpulse_bins: (config.afterpulse_time_ns * 1e-9 / bin_s).max(1e-9),
+                crosstalk: config.crosstalk_probability * neighbours,
+            },
         }
     }
 
@@ -129,7 +120,7 @@ impl Response {
 
     /// Dead time, bins.
     pub fn dead_time_bins(&self) -> f64 {
-        self.dead_time_bins
+        self.dead.time_bins
     }
 
     /// Standard deviation of the pulse, bins.
@@ -162,13 +153,13 @@ impl Response {
     /// Steps to a bin.
     fn steps(&self, light: &EchoLight, steps: Steps) -> usize {
         let sigma = light.sigma_bins.max(1e-3);
-        let fires_once = self.dead_time_bins >= 2.0 * PULSE_REACH * sigma;
-        if steps == Steps::Coarse || fires_once && self.dead_time_bins >= 2.0 {
-            return STEPS.max((2.0 / self.dead_time_bins).min(16.0).ceil() as usize);
+        let fires_once = self.dead.time_bins >= 2.0 * PULSE_REACH * sigma;
+        if steps == Steps::Coarse || fires_once && self.dead.time_bins >= 2.0 {
+            return STEPS.max((2.0 / self.dead.time_bins).min(16.0).ceil() as usize);
         }
         // Within the pulse SPADs fire again, and each firing is as sharp as the light is strong.
         let rate = 0.4 * light.signal / (self.counting.spads as f64 * sigma);
-        let of_dead_time = STEPS_OF_DEAD_TIME / self.dead_time_bins;
+        let of_dead_time = STEPS_OF_DEAD_TIME / self.dead.time_bins;
         let wanted = of_dead_time.max(STEPS_OF_RATE * rate).min(MOST_STEPS);
         (wanted.ceil() as usize).max(STEPS)
     }
@@ -208,11 +199,11 @@ impl Response {
         // Before the pulse the SPADs are as the background alone leaves them: nothing happens before it begins.
         let last = self.bins as f64 - 0.5;
         // Of an echo long before the first bin nothing is left.
-        let forgotten = -8.0 - 2.0 * self.dead_time_bins - 4.0 * PULSE_REACH * sigma;
+        let forgotten = -8.0 - 2.0 * self.dead.time_bins - 4.0 * PULSE_REACH * sigma;
         let begin_bin = (starts + 0.5).clamp(forgotten, self.bins as f64).floor();
         let begin = begin_bin - 0.5;
         let mut chances = Vec::with_capacity(self.bins);
-        let mut spad = Spad::steady(self, background, h);
+        let mut spad = Spad::steady(&self.dead, background, h);
         let steady = {
             let mut of_bin = spad.clone();
             of_bin.begin_bin();
@@ -225,7 +216,6 @@ impl Response {
             chances.push(steady);
         }
         let steps = ((last - begin) / h).round() as usize;
-        spad.reserve(steps);
         let mut seen_before = seen(begin);
         for step in 0..steps {
             let time = begin + (step + 1) as f64 * h;
@@ -240,301 +230,5 @@ impl Response {
             }
         }
         chances
-    }
-}
-
-/// The state of a SPAD, as chances.
-#[derive(Clone)]
-struct Spad<'r, const K: usize> {
-    response: &'r Response,
-    /// Step, bins.
-    h: f64,
-    /// That it is ready, with or without trapped carriers.
-    ready: Dual<K>,
-    /// What blinds: avalanches, or where it is paralysable all light.
-    blinding: History<K>,
-    /// Avalanches after which carriers are trapped; where it is paralysable, afterpulses to be released.
-    trapping: History<K>,
-    /// That it is ready and carriers are trapped; where it is paralysable, that they are.
-    trapped: Dual<K>,
-    /// The share of carriers that stay trapped for a dead time.
-    kept: f64,
-    /// Avalanches of the bin, and those of them by crosstalk.
-    fired: Dual<K>,
-    by_crosstalk: Dual<K>,
-    parity: Option<Parity<K>>,
-}
-
-/// The same states, each with the sign of the SPAD's flip-flop since the bin began.
-#[derive(Clone)]
-struct Parity<const K: usize> {
-    ready: Dual<K>,
-    blind: Dual<K>,
-    blinding: History<K>,
-}
-
-impl<'r, const K: usize> Spad<'r, K> {
-    /// Under background alone, photons of a SPAD in a bin.
-    fn steady(response: &'r Response, background: Dual<K>, h: f64) -> Self {
-        let dead = response.dead_time_bins;
-        let tau = response.afterpulse_bins.max(1e-9);
-        let kept = (-dead / tau).exp();
-        let (mut fired, mut ready, mut trapped) = (background, Dual::ZERO, Dual::ZERO);
-        let mut light = background;
-        // Afterpulses and crosstalk are few: each round has the next power of their chance.
-        for _ in 0..6 {
-            ready = match response.paralysable {
-                false => Dual::constant(1.0) - fired * dead,
-                true => (light * -dead).exp(),
-            };
-            let bred = background * ready;
-            light = background + bred * response.crosstalk;
-            let traps = bred * response.afterpulses;
-            match response.paralysable {
-                false => {
-                    // A photon before it is released leaves it trapped for another dead time.
-                    let lost = light * (1.0 - kept) + Dual::constant(1.0 / tau);
-                    trapped = traps * lost.recip();
-                    fired = (light + trapped * (1.0 / tau)) * (Dual::constant(1.0) + light * dead).recip();
-                }
-                true => {
-                    trapped = traps * tau;
-                    light += traps;
-                    fired = light * ready;
-                }
-            }
-        }
-        if !response.paralysable {
-            ready = Dual::constant(1.0) - fired * dead;
-        }
-        let traps = match response.paralysable {
-            false => background * ready * response.afterpulses + trapped * light * kept,
-            true => background * ready * response.afterpulses,
-        };
-        let blinding = match response.paralysable {
-            false => fired,
-            true => light,
-        };
-        let history = |of: Dual<K>| History::new(dead / h, of * h);
-        Spad {
-            response,
-            h,
-            ready,
-            blinding: history(blinding),
-            trapping: history(traps),
-            trapped,
-            kept,
-            fired: Dual::ZERO,
-            by_crosstalk: Dual::ZERO,
-            parity: (dead < 1.0).then(|| Parity {
-                ready,
-                blind: Dual::constant(1.0) - ready,
-                blinding: history(blinding),
-            }),
-        }
-    }
-
-    fn reserve(&mut self, steps: usize) {
-        self.blinding.steps.reserve(steps);
-    }
-
-    fn begin_bin(&mut self) {
-        (self.fired, self.by_crosstalk) = (Dual::ZERO, Dual::ZERO);
-        if let Some(parity) = &mut self.parity {
-            parity.ready = self.ready;
-            parity.blind = Dual::constant(1.0) - self.ready;
-            parity.blinding = self.blinding.recent();
-        }
-    }
-
-    /// A step with so many photons on the SPAD.
-    #[inline]
-    fn step(&mut self, photons: Dual<K>) {
-        let response = self.response;
-        let recovering = self.blinding.ending();
-        let has_traps = response.afterpulses > 0.0;
-        let mut light = photons;
-        if has_traps && response.paralysable {
-            light += self.afterpulses();
-        }
-        let mut crosstalk = Dual::ZERO;
-        if response.crosstalk > 0.0 {
-            let own = self.avalanches(light, recovering) * photons * positive(light).recip();
-            crosstalk = own * response.crosstalk;
-            light += crosstalk;
-        }
-        let mut fired = self.avalanches(light, recovering);
-        // Avalanches of light, without those of afterpulses that came first.
-        let mut by_light = fired;
-        if has_traps && !response.paralysable {
-            let (released, lost) = self.released(light, photons, fired);
-            fired += released - lost;
-            by_light = fired - released;
-        }
-        if has_traps && response.paralysable {
-            let bred = fired * photons * positive(light).recip();
-            self.trapping.push(bred * response.afterpulses);
-        }
-        if let Some(parity) = &mut self.parity {
-            let all = match fired.value > by_light.value {
-                true => light * fired * positive(by_light).recip(),
-                false => light,
-            };
-            parity.step(response.paralysable, all, self.ready);
-        }
-        match response.paralysable {
-            false => {
-                self.ready += recovering - fired;
-                self.blinding.push(fired);
-            }
-            true => {
-                self.ready = self.ready * (recovering - light).exp();
-                self.blinding.push(light);
-            }
-        }
-        if response.crosstalk > 0.0 {
-            self.by_crosstalk += by_light * crosstalk * positive(light).recip();
-        }
-        self.fired += fired;
-    }
-
-    /// Avalanches under so much light, while so many recover (or, where it is paralysable, so much light is forgotten).
-    #[inline]
-    fn avalanches(&self, light: Dual<K>, recovering: Dual<K>) -> Dual<K> {
-        match self.response.paralysable {
-            false => {
-                let missed = light.exprel_neg();
-                self.ready * light * missed + recovering * (Dual::constant(1.0) - missed)
-            }
-            true => self.ready * light * (light - recovering).exprel_neg(),
-        }
-    }
-
-    /// Afterpulses of this step, and avalanches of light that they are in place of.
-    fn released(&mut self, light: Dual<K>, photons: Dual<K>, fired: Dual<K>) -> (Dual<K>, Dual<K>) {
-        let response = self.response;
-        let release = Dual::constant(self.h / response.afterpulse_bins.max(1e-9));
-        let recovering = self.trapping.ending();
-        let both = light + release;
-        let (missed, missed_of_light) = (both.exprel_neg(), light.exprel_neg());
-        let one = Dual::constant(1.0);
-        // What fires those with trapped carriers, and what would have fired them without.
-        let gone = self.trapped * both * missed + recovering * (one - missed);
-        let of_light = self.trapped * light * missed_of_light + recovering * (one - missed_of_light);
-        let released = gone * release * both.recip();
-        let fired_trapped = gone - released;
-        self.trapped += recovering - gone;
-        // Photons, but not crosstalk, trap carriers anew.
-        let photon_share = photons * positive(light).recip();
-        let fresh = (fired - of_light + fired_trapped) * photon_share * response.afterpulses;
-        let old = fired_trapped * self.kept;
-        self.trapping.push(fresh + old * (one - photon_share * response.afterpulses));
-        (released, of_light - fired_trapped)
-    }
-
-    /// Afterpulses of this step, where they come as light.
-    fn afterpulses(&mut self) -> Dual<K> {
-        let spent = self.h / self.response.afterpulse_bins.max(1e-9);
-        let released = -(-spent).exp_m1();
-        let fresh = self.trapping.ending();
-        // Fresh ones come evenly over the step.
-        let of_fresh = 1.0 - released / spent;
-        let now = self.trapped * released + fresh * of_fresh;
-        self.trapped += fresh - now;
-        now
-    }
-
-    /// The chance of the bin that has ended to count.
-    fn chance(&self, counting: &Counting) -> Dual<K> {
-        let fired = match &self.parity {
-            None => self.fired,
-            Some(parity) => (Dual::constant(1.0) - parity.ready - parity.blind) * 0.5,
-        };
-        if self.response.crosstalk == 0.0 {
-            return counting.chance(fired, Dual::ZERO);
-        }
-        let crosstalk = self.by_crosstalk * positive(self.fired).recip();
-        let alone = fired * (Dual::constant(1.0) - crosstalk);
-        let children = crosstalk * (Dual::constant(1.0) - crosstalk).recip();
-        counting.chance(alone, children)
-    }
-}
-
-/// The same, above zero, to divide by.
-#[inline]
-fn positive<const K: usize>(mut number: Dual<K>) -> Dual<K> {
-    number.value = number.value.max(1e-300);
-    number
-}
-
-impl<const K: usize> Parity<K> {
-    /// A step with so much light on a SPAD that was ready with chance `was_ready`.
-    fn step(&mut self, paralysable: bool, light: Dual<K>, was_ready: Dual<K>) {
-        let missed = light.exprel_neg();
-        let mut recovering = self.blinding.ending();
-        if paralysable {
-            // Those of them that no photon has blinded anew: as many as there are SPADs that are ready.
-            recovering = recovering * was_ready;
-        }
-        let fired =
-            self.ready * light * missed + recovering * (Dual::constant(1.0) - missed);
-        let (ready, blind) = (self.ready, self.blind);
-        self.ready += recovering - fired;
-        self.blind = blind - recovering - fired;
-        match paralysable {
-            false => self.blinding.push(Dual::ZERO - fired),
-            true => {
-                let blind = (blind + self.blind) * 0.5;
-                let ready = (ready + self.ready) * 0.5;
-                self.blinding.push(light * (blind - ready));
-            }
-        }
-    }
-}
-
-/// What happened step by step, and what of it ends a dead time later.
-#[derive(Clone)]
-struct History<const K: usize> {
-    /// Dead time in whole steps, and the rest of it.
-    whole: usize,
-    part: f64,
-    before: Dual<K>,
-    steps: Vec<Dual<K>>,
-}
-
-impl<const K: usize> History<K> {
-    /// `before` in every step until now.
-    fn new(delay: f64, before: Dual<K>) -> Self {
-        History {
-            whole: delay as usize,
-            part: delay.fract(),
-            before,
-            steps: Vec::new(),
-        }
-    }
-
-    /// The same, as far as it still matters.
-    fn recent(&self) -> Self {
-        let kept = self.steps.len().saturating_sub(self.whole + 1);
-        History {
-            steps: self.steps[kept..].to_vec(),
-            ..*self
-        }
-    }
-
-    #[inline]
-    fn push(&mut self, happened: Dual<K>) {
-        self.steps.push(happened);
-    }
-
-    /// What ends during the step that comes next.
-    #[inline]
-    fn ending(&self) -> Dual<K> {
-        let now = self.steps.len();
-        let at = |ago: usize| match now.checked_sub(ago) {
-            Some(step) => self.steps.get(step).copied().unwrap_or(self.before),
-            None => self.before,
-        };
-        at(self.whole) * (1.0 - self.part) + at(self.whole + 1) * self.part
     }
 }

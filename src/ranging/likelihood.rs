@@ -121,8 +121,7 @@ impl Likelihood<'_> {
                 let slope = slopes[bin].slope[i];
                 local.score[i] += off * slope;
                 for j in 0..PARAMETERS {
-                    local.information[i][j] +=
-                        self.cycles * weight * slope * slopes[bin].slope[j];
+                    local.information[i][j] += self.cycles * weight * slope * slopes[bin].slope[j];
                 }
             }
         }
@@ -150,7 +149,11 @@ impl Likelihood<'_> {
                 damping = f64::max(10.0 * damping, 1e-3);
                 continue;
             };
-            let gain: f64 = step.iter().zip(local.score).map(|(step, score)| step * score).sum();
+            let gain: f64 = step
+                .iter()
+                .zip(local.score)
+                .map(|(step, score)| step * score)
+                .sum();
             let next = self.moved(&light, step);
             if damping == 0.0 && gain < CLOSE {
                 has_converged = true;
@@ -190,12 +193,7 @@ impl Likelihood<'_> {
     }
 
     /// The step that the score asks for.
-    fn step(
-        &self,
-        light: &EchoLight,
-        local: &Local,
-        damping: f64,
-    ) -> Option<[f64; PARAMETERS]> {
+    fn step(&self, light: &EchoLight, local: &Local, damping: f64) -> Option<[f64; PARAMETERS]> {
         let mut matrix = local.information;
         let mut wanted = local.score;
         // What would leave its limits stays at them.

@@ -9,6 +9,7 @@ mod finder;
 mod likelihood;
 mod peak;
 mod profile;
+mod spad_state;
 pub mod tmf8820;
 mod walk;
 

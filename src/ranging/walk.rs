@@ -18,9 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use super::edge::share_before;
 use super::expected::{EchoLight, Response};
-use super::likelihood::{
-    ECHO, Fit, Free, IN_REGION, Likelihood, WIDE_ECHO,
-};
+use super::likelihood::{ECHO, Fit, Free, IN_REGION, Likelihood, WIDE_ECHO};
 use super::peak::Peak;
 use crate::chip::EventType;
 
@@ -94,7 +92,10 @@ impl WalkCorrection {
     /// # Errors
     /// Why that is not known.
     pub fn correct(&self, counts: &[f64], peak: &Peak) -> Result<Corrected, WalkLeft> {
-        let cycles = counts.iter().copied().fold(f64::from(self.laser_cycles), f64::max);
+        let cycles = counts
+            .iter()
+            .copied()
+            .fold(f64::from(self.laser_cycles), f64::max);
         let [background, most_background] = self.background(counts, cycles);
         let likelihood = |free: Free| Likelihood {
             response: &self.response,
@@ -212,7 +213,10 @@ impl WalkCorrection {
                     .map(|n| peak.peak_bin as f64 + 0.15 * f64::from(n) * (1.0 + sigma_bins))
                     .collect(),
             };
-            let judged = places.into_iter().map(light).map(|light| (likelihood.deviance(&light), light));
+            let judged = places
+                .into_iter()
+                .map(light)
+                .map(|light| (likelihood.deviance(&light), light));
             starts.extend(judged.min_by(|a, b| a.0.total_cmp(&b.0)));
         }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -8,9 +8,7 @@ use super::aim::{Aims, Place, own_law};
 use super::pixel::{NoDepth, PixelDepth};
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, Sensor, WindowLaw};
-use crate::ranging::{
-    BinProfile, DepthOptions, EchoFinder, Peak, Sighting, UnequalBins, WalkLeft,
-};
+use crate::ranging::{BinProfile, DepthOptions, EchoFinder, Peak, Sighting, UnequalBins, WalkLeft};
 use crate::scene::Scene;
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
 
