@@ -28,11 +28,6 @@ impl Counting {
         }
     }
 
-    /// Whether light, however much, can make a bin count.
-    pub(super) fn is_possible(&self) -> bool {
-        (1..=self.spads).any(|n| self.counts(n))
-    }
-
     /// The chance that a bin counts in which each SPAD fires with chance `fired`, and where each that fired fires a neighbour with
     /// chance `children`.
     pub(super) fn chance<const K: usize>(&self, fired: Dual<K>, children: Dual<K>) -> Dual<K> {
