@@ -22,7 +22,8 @@ const LEAST_CHANCE: f64 = 1e-9;
 /// Rounds at most. Nine of ten fits take four.
 const ROUNDS: usize = 40;
 
-/// Where the next step would be less than so much of the parameters' standard deviations, squared.
+/// Where the next step would be less than so much of the parameters' standard deviations, squared; as many times as much as counts
+/// scatter more than they should, because a light that explains nothing need not be found exactly.
 const CLOSE: f64 = 1e-4;
 
 /// Which parameters are fitted: position, signal, background, width.
@@ -56,7 +57,7 @@ pub(super) struct Fit {
     pub(super) light: EchoLight,
     /// Twice the ln likelihood that is missing to bins that are each as likely as can be.
     pub(super) deviance: f64,
-    /// Bins less parameters.
+    /// Bins less parameters, at least 1.
     pub(super) freedom: f64,
     pub(super) has_converged: bool,
     /// Cramér-Rao bound of the position, bins.
@@ -67,9 +68,14 @@ impl Fit {
     /// Whether counts scatter about this light's as they should: less than one in 30 000 right fits would scatter more. The
     /// deviance is χ², whose cube root is normal (Wilson and Hilferty), and four standard deviations of that are allowed.
     pub(super) fn explains(&self) -> bool {
-        let variance = 2.0 / (9.0 * self.freedom.max(1.0));
-        let most = self.freedom.max(1.0) * (1.0 - variance + 4.0 * variance.sqrt()).powi(3);
-        self.has_converged && self.deviance <= most
+        self.has_converged && self.is_close()
+    }
+
+    /// The same of a light that need not be the most likely one.
+    pub(super) fn is_close(&self) -> bool {
+        let variance = 2.0 / (9.0 * self.freedom);
+        let most = self.freedom * (1.0 - variance + 4.0 * variance.sqrt()).powi(3);
+        self.deviance <= most
     }
 }
 
@@ -144,6 +150,8 @@ impl Likelihood<'_> {
         let mut local = self.at(&light, steps);
         let mut damping = 0.0;
         let mut has_converged = false;
+        let fitted = self.free.iter().filter(|free| **free).count();
+        let freedom = (self.bins.len() as f64 - fitted as f64).max(1.0);
         for _ in 0..ROUNDS {
             let Some(step) = self.step(&light, &local, damping) else {
                 damping = f64::max(10.0 * damping, 1e-3);
@@ -155,7 +163,8 @@ impl Likelihood<'_> {
                 .map(|(step, score)| step * score)
                 .sum();
             let next = self.moved(&light, step);
-            if damping == 0.0 && gain < CLOSE {
+            let close = CLOSE * (local.deviance / freedom).max(1.0);
+            if damping == 0.0 && gain < close {
                 has_converged = true;
                 break;
             }
@@ -163,7 +172,7 @@ impl Likelihood<'_> {
             // As far as rounding lets it be told.
             if there.deviance <= local.deviance + 1e-9 * (1.0 + local.deviance) {
                 let gained = local.deviance - there.deviance;
-                let enough = gain < CLOSE && gained < CLOSE;
+                let enough = gain < close && gained < close;
                 (light, local) = (next, there);
                 if enough {
                     has_converged = true;
@@ -182,11 +191,10 @@ impl Likelihood<'_> {
                 }
             }
         }
-        let fitted = self.free.iter().filter(|free| **free).count();
         Fit {
             light,
             deviance: local.deviance,
-            freedom: self.bins.len() as f64 - fitted as f64,
+            freedom,
             has_converged,
             bound_bins: self.bound_bins(&local),
         }

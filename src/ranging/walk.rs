@@ -141,9 +141,9 @@ impl WalkCorrection {
         if in_region.explains() {
             return Ok(in_region.into());
         }
-        match best.has_converged {
-            true => Err(WalkLeft::NotOneEcho),
-            false => Err(WalkLeft::NotConverged),
+        match best.is_close() {
+            false => Err(WalkLeft::NotOneEcho),
+            true => Err(WalkLeft::NotConverged),
         }
     }
 
