@@ -11,7 +11,10 @@ use crate::numerics::{normal_above, normal_density};
 const REACH: f64 = 7.0;
 const POINTS: f64 = 32.0;
 
-static TABLE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| {
+/// Share and density.
+type Point = (f64, f64);
+
+static TABLE: LazyLock<Vec<Point>> = LazyLock::new(|| {
     let points = (2.0 * REACH * POINTS) as usize;
     let at = |i: usize| i as f64 / POINTS - REACH;
     (0..=points + 1)
@@ -44,9 +47,9 @@ pub(super) fn share_slope(z: f64) -> f64 {
 
 /// How far between which two points.
 #[inline]
-fn place(z: f64) -> Option<(f64, (f64, f64), (f64, f64))> {
+fn place(z: f64) -> Option<(f64, Point, Point)> {
     let at = (z + REACH) * POINTS;
-    if !(at >= 0.0 && at < 2.0 * REACH * POINTS) {
+    if !(0.0..2.0 * REACH * POINTS).contains(&at) {
         return None;
     }
     let first = at as usize;

@@ -219,10 +219,7 @@ impl Likelihood<'_> {
                 continue;
             }
             wanted[i] = 0.0;
-            for j in 0..PARAMETERS {
-                (matrix[i][j], matrix[j][i]) = (0.0, 0.0);
-            }
-            matrix[i][i] = 1.0;
+            leave_out(&mut matrix, i);
         }
         let mut step = solved(matrix, wanted)?;
         // No farther than the slopes can be trusted: half a bin or pulse, and factors of e.
@@ -253,13 +250,8 @@ impl Likelihood<'_> {
     /// Cramér-Rao bound of the position with everything else that is free unknown.
     fn bound_bins(&self, local: &Local) -> f64 {
         let mut matrix = local.information;
-        for i in 0..PARAMETERS {
-            if !self.free[i] {
-                for j in 0..PARAMETERS {
-                    (matrix[i][j], matrix[j][i]) = (0.0, 0.0);
-                }
-                matrix[i][i] = 1.0;
-            }
+        for (i, _) in self.free.iter().enumerate().filter(|(_, free)| !**free) {
+            leave_out(&mut matrix, i);
         }
         // Background that is too little to count is known to be between none and the most: a twelfth of its square.
         if self.free[2] {
@@ -272,6 +264,13 @@ impl Likelihood<'_> {
     }
 }
 
+/// Makes parameter `i` of a symmetric matrix one that stays as it is.
+fn leave_out(matrix: &mut [[f64; PARAMETERS]; PARAMETERS], i: usize) {
+    matrix[i] = [0.0; PARAMETERS];
+    matrix.iter_mut().for_each(|row| row[i] = 0.0);
+    matrix[i][i] = 1.0;
+}
+
 /// The solution of a symmetric system; `None` where it is not positive.
 fn solved(
     mut matrix: [[f64; PARAMETERS]; PARAMETERS],
@@ -279,7 +278,7 @@ fn solved(
 ) -> Option<[f64; PARAMETERS]> {
     for i in 0..PARAMETERS {
         let pivot = matrix[i][i];
-        if !(pivot > 1e-200) {
+        if pivot.is_nan() || pivot <= 1e-200 {
             return None;
         }
         for row in i + 1..PARAMETERS {

@@ -224,16 +224,19 @@ impl WalkCorrection {
             .iter()
             .take(fits)
             .map(|(_, start)| likelihood.maximise(start))
-            .filter(|fit| fit.has_converged)
             .collect();
-        fits.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
+        // Those that have converged first, then the most likely.
+        fits.sort_by(|a, b| {
+            let converged = b.has_converged.cmp(&a.has_converged);
+            converged.then(a.deviance.total_cmp(&b.deviance))
+        });
         let best = *fits.first().ok_or(WalkLeft::NotConverged)?;
         let is_another = |fit: &Fit| {
             let off = (fit.light.position_bins - best.light.position_bins).abs();
             fit.deviance < best.deviance + AS_GOOD
                 && off > ELSEWHERE * best.bound_bins.max(fit.bound_bins)
         };
-        match fits.iter().any(is_another) {
+        match fits.iter().filter(|fit| fit.has_converged).any(is_another) {
             true => Err(WalkLeft::Ambiguous),
             false => Ok(best),
         }
