@@ -281,10 +281,11 @@ fn solved(
         if pivot.is_nan() || pivot <= 1e-200 {
             return None;
         }
+        let of_pivot = matrix[i];
         for row in i + 1..PARAMETERS {
             let factor = matrix[row][i] / pivot;
-            for col in i..PARAMETERS {
-                matrix[row][col] -= factor * matrix[i][col];
+            for (of_row, of_pivot) in matrix[row].iter_mut().zip(of_pivot) {
+                *of_row -= factor * of_pivot;
             }
             wanted[row] -= factor * wanted[i];
         }
