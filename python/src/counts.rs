@@ -67,6 +67,7 @@ pub(crate) fn range_counts<'py>(
         )
     };
     dict.set_item("depth", metres(|r| r.measured_m))?;
+    dict.set_item("bound", metres(|r| r.bound_m))?;
     dict.set_item("peak", metres(|r| r.peak_m))?;
     dict.set_item("confidence", metres(|r| r.confidence))?;
     let reasons = readings

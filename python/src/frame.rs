@@ -93,6 +93,7 @@ impl Common {
         dict.set_item("histograms", cube(py, (rows, cols, bins), histograms))?;
         dict.set_item("bin_edges_ns", cube(py, (rows, cols, bins + 1), edges_ns))?;
         dict.set_item("depth", metres(|p| p.measured_m))?;
+        dict.set_item("bound", metres(|p| p.bound_m))?;
         dict.set_item("guide", metres(|p| p.guide_m))?;
         dict.set_item("truth", metres(|p| p.true_m))?;
         dict.set_item("peak", metres(|p| p.peak_m))?;

@@ -127,6 +127,7 @@ fn whole(pixels: &[PixelDepth], histograms: &[u16], [rows, cols, bins]: [usize; 
             "depth_m",
             (|m| m.measured_m) as fn(&PixelDepth) -> Option<f64>,
         ),
+        ("bound_m", |m| m.bound_m),
         ("guide_m", |m| m.guide_m),
         ("truth_m", |m| m.true_m),
         ("peak_m", |m| m.peak_m),

@@ -34,6 +34,9 @@ pub(super) fn rows(table: &mut Table, options: &DepthOptions, summary: &Summary)
         "  without outliers",
         metres(summary.rms_error_without_outliers_m),
     );
+    if is_corrected {
+        table.push("  bound of their counts", metres(summary.rms_bound_m));
+    }
     table.push(
         "  if every peak were a depth",
         metres(summary.rms_error_of_every_peak_m),
@@ -52,6 +55,9 @@ pub(super) fn rows(table: &mut Table, options: &DepthOptions, summary: &Summary)
     );
     if is_corrected {
         table.push("  corrected for it", millimetres(summary.mean_error_m));
+    }
+    for (reason, count) in &summary.walk_left {
+        table.push(format!("  not taken out: {}", reason.name()), count);
     }
     table.push(
         "RMS error of the guide in window",

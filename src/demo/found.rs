@@ -111,6 +111,8 @@ mod tests {
             start: Some(20),
             in_window,
             measured_m,
+            bound_m: None,
+            walk_left: None,
             no_depth: measured_m.is_none().then_some(NoDepth::OutsideWindow),
             peak_m: measured_m,
             confidence: None,

@@ -2,11 +2,13 @@
 //! regression.
 
 pub mod branchless;
+mod dual;
 pub mod intervals;
 pub mod probit;
 mod quadrature;
 mod special;
 
+pub(crate) use dual::Dual;
 pub(crate) use quadrature::{gauss_legendre, integrate};
 pub(crate) use special::{
     erfcx, ln_exprel_neg, ln_normal_below, ln_sum_exp, normal_above, normal_density,

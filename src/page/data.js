@@ -20,7 +20,7 @@ function unpacked(buffer) {
     return array;
   };
   const frame = {};
-  for (const name of ["truth", "guide", "depth", "peak", "confidence", "signal", "background"]) {
+  for (const name of ["truth", "guide", "depth", "bound", "peak", "confidence", "signal", "background"]) {
     frame[name] = take(Float32Array, pixels);
   }
   frame.edges = take(Uint32Array, pixels);

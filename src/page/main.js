@@ -39,6 +39,7 @@ function showPixel() {
     ["guide", shown(f.guide[pixel], 3, "m")],
     ["start value", f.start[pixel] < 0 ? "none, SPADs off" : f.start[pixel]],
     ["depth", shown(f.depth[pixel], 3, "m")],
+    ["bound of the counts", shown(1e3 * f.bound[pixel], 1, "mm")],
     ["error", shown(1e3 * f.error[pixel], 1, "mm")],
     ["result", reasonOf(f, pixel)],
     ["confidence, −log₁₀ of a false alarm", shown(f.confidence[pixel], 1)],

@@ -3,7 +3,7 @@
 //! Arrays of a frame, one after the other, little endian; n macropixels in rows:
 //!
 //! ```text
-//!   truth, guide, depth, peak, confidence, signal, background   n × f32 each; NaN where there is none
+//!   truth, guide, depth, bound, peak, confidence, signal, background   n × f32 each; NaN where there is none
 //!   edges                                                       n × u32: which of `edges_m`, from 1; 0 where no window opens
 //!   start                                                       n × i16: −1 where SPADs are off
 //!   object                                                      n × u16: which of `objects`, from 1; 0 for the sky
@@ -193,6 +193,7 @@ fn arrays(
     floats(&|p| found[p].0.true_m);
     floats(&|p| found[p].0.guide_m);
     floats(&|p| found[p].0.measured_m);
+    floats(&|p| found[p].0.bound_m);
     floats(&|p| found[p].0.peak_m);
     floats(&|p| found[p].0.confidence);
     floats(&|p| Some(found[p].1?.signal_counts));

@@ -8,22 +8,36 @@
 //!
 //! Bins are equal. Times are in bins: bin i reaches from i − ½ to i + ½, as positions of peaks do. A SPAD's chance to be ready follows
 //! exactly from the light: it is, unless it fired within the last dead time (non-paralysable), or unless a photon came
-//! within it (paralysable). SPADs fire independently, so the number of those that fire in a bin is binomial. The integral
-//! over time takes steps of an eighth of a bin; tests find the means of simulated light to five standard deviations
-//! and 10⁻³ of their value.
+//! within it (paralysable). SPADs fire independently, so the number of those that fire in a bin is binomial.
 //!
-//! Assumed: a dead time of at least a bin, so that no SPAD fires twice in one; SPADs that have recovered from the echo
-//! before the next laser cycle's. Left out: afterpulses and crosstalk.
+//! How a SPAD goes through a laser cycle is [`spad_state`](super::spad_state)'s.
+//!
+//! Assumed: SPADs alike, and recovered from the echo before the next laser cycle's.
 
+use super::counting::Counting;
+use super::edge::{share_before, share_slope};
+use super::spad_state::{Dead, Spad};
 use crate::chip::{EventType, SensorConfig};
-use crate::numerics::normal_above;
+use crate::numerics::Dual;
 use crate::units::Time;
 
-/// Steps to a bin.
-const STEPS: usize = 8;
+/// Steps to a bin, at least.
+const STEPS: usize = 4;
 
-/// Standard deviations before its centre where a pulse begins: 10⁻⁹ of it is left out.
-const PULSE_BEGINS: f64 = 6.0;
+/// Steps to a dead time, at least, and to the time in which light fires a SPAD, where SPADs fire again under a pulse; and most
+/// steps to a bin.
+const STEPS_OF_DEAD_TIME: f64 = 12.0;
+const STEPS_OF_RATE: f64 = 8.0;
+const MOST_STEPS: f64 = 96.0;
+
+/// Standard deviations from its centre where a pulse begins and ends: 10⁻¹¹ of it is left out, less than a photon of 10¹⁰.
+const PULSE_REACH: f64 = 6.7;
+
+/// Parameters of the light: place, ln signal, ln background, ln width.
+pub(super) const PARAMETERS: usize = 4;
+
+/// A number and its slopes with the parameters of the light.
+pub(super) type Slopes = Dual<PARAMETERS>;
 
 /// Light on a macropixel, in mean photons that its SPADs would detect without dead time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,38 +48,79 @@ pub struct EchoLight {
     pub signal: f64,
     /// Background and dark counts in a bin and laser cycle.
     pub background_per_bin: f64,
+    /// Standard deviation of the echo, bins: that of the laser pulse with all jitter ([`Response::pulse_sigma_bins`]), or more.
+    pub sigma_bins: f64,
+}
+
+/// How finely time goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Steps {
+    /// To find where to look.
+    Coarse,
+    /// As finely as the light needs.
+    Fine,
 }
 
 /// How a macropixel answers to light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Response {
     bins: usize,
-    dead_time_bins: f64,
-    paralysable: bool,
     pulse_sigma_bins: f64,
-    event_type: EventType,
-    threshold: u8,
-    spads: usize,
+    counting: Counting,
+    dead: Dead,
 }
 
 impl Response {
     /// Of a sensor's macropixels, with bins of `bin_s` seconds each, to Gaussian pulses of standard deviation `pulse_sigma`,
     /// all jitter included.
     pub fn new(config: &SensorConfig, bin_s: f64, pulse_sigma: Time) -> Self {
+        let grid = config.spad_grid();
+        // Each of four directions is as likely; at an edge there is nobody.
+        let neighbours = 2.0 * grid.neighbours() as f64 / (4 * grid.spads()) as f64;
         Response {
             bins: config.bins,
-            dead_time_bins: config.dead_time().as_s() / bin_s,
-            paralysable: config.paralysable,
             pulse_sigma_bins: pulse_sigma.as_s() / bin_s,
-            event_type: config.event_type,
-            threshold: config.threshold,
-            spads: config.spads(),
+            counting: Counting {
+                event_type: config.event_type,
+                threshold: usize::from(config.threshold),
+                spads: config.spads(),
+            },
+            dead: Dead {
+                time_bins: config.dead_time().as_s() / bin_s,
+                paralysable: config.paralysable,
+                afterpulses: config.afterpulse_probability,
+                afterpulse_bins: (config.afterpulse_time_ns * 1e-9 / bin_s).max(1e-9),
+                crosstalk: config.crosstalk_probability * neighbours,
+            },
         }
+    }
+
+    /// What counts where this does not, and the other way round; `None` where that is no TYPE and THRESHOLD. Of light that makes
+    /// this count less, the other counts more.
+    pub(super) fn complement(&self) -> Option<Self> {
+        let threshold = match (self.counting.event_type, self.counting.threshold) {
+            (EventType::Less, threshold @ 1..) => threshold - 1,
+            (EventType::Equal, 0) => 0,
+            _ => return None,
+        };
+        let mut other = *self;
+        other.counting.event_type = EventType::Greater;
+        other.counting.threshold = threshold;
+        Some(other)
+    }
+
+    pub(super) fn counting(&self) -> &Counting {
+        &self.counting
+    }
+
+    /// Histogram bins.
+    pub fn bins(&self) -> usize {
+        self.bins
     }
 
     /// Dead time, bins.
     pub fn dead_time_bins(&self) -> f64 {
-        self.dead_time_bins
+        self.dead.time_bins
     }
 
     /// Standard deviation of the pulse, bins.
@@ -73,180 +128,107 @@ impl Response {
         self.pulse_sigma_bins
     }
 
-    /// The chance that a bin counts in which each SPAD fires with chance `fired`.
-    pub fn counts_if_fired(&self, fired: f64) -> f64 {
-        let fired = fired.clamp(0.0, 1.0);
-        if (self.event_type, self.threshold) == (EventType::Greater, 0) {
-            return -(self.spads as f64 * (-fired).ln_1p()).exp_m1();
-        }
-        let threshold = usize::from(self.threshold);
-        let mut choices = 1.0;
-        let mut chance = 0.0;
-        for n in 0..=self.spads {
-            let counts = match self.event_type {
-                EventType::Less => n < threshold,
-                EventType::Equal => n == threshold,
-                EventType::Greater => n > threshold,
-            };
-            if counts {
-                chance +=
-                    choices * fired.powi(n as i32) * (1.0 - fired).powi((self.spads - n) as i32);
-            }
-            choices *= (self.spads - n) as f64 / (n + 1) as f64;
-        }
-        chance
-    }
-
-    /// The background, photons in a bin and laser cycle, under which a bin counts with `chance`; `None` where brighter light
-    /// need not count more (TYPE other than greater) or no light counts so much.
-    pub fn background_for(&self, chance: f64) -> Option<f64> {
-        if self.event_type != EventType::Greater || usize::from(self.threshold) >= self.spads {
-            return None;
-        }
-        // A SPAD that is blind for d bins after it fired, or after a photon, fires in a bin with at most this chance.
-        let most = match self.paralysable {
-            false => 1.0 / self.dead_time_bins.max(1.0),
-            true => 1.0 / (self.dead_time_bins.max(1.0) * std::f64::consts::E),
-        };
-        if chance >= self.counts_if_fired(most) {
-            return None;
-        }
-        let (mut low, mut high) = (0.0, most);
-        for _ in 0..50 {
-            let middle = 0.5 * (low + high);
-            match self.counts_if_fired(middle) < chance {
-                true => low = middle,
-                false => high = middle,
-            }
-        }
-        let fired = 0.5 * (low + high);
-        let light = match self.paralysable {
-            false => fired / (1.0 - fired * self.dead_time_bins),
-            true => {
-                // fired = light·e^(−d·light), on its rising side.
-                let mut light = fired;
-                for _ in 0..50 {
-                    light = fired * (light * self.dead_time_bins).exp();
-                }
-                light
-            }
-        };
-        Some(light * self.spads as f64)
-    }
-
     /// The chance of every bin to count in a laser cycle.
     pub fn chances(&self, light: &EchoLight) -> Vec<f64> {
-        let sigma = self.pulse_sigma_bins;
-        let per_spad = 1.0 / self.spads as f64;
+        self.chances_in(light, Steps::Fine)
+    }
+
+    pub(super) fn chances_in(&self, light: &EchoLight, steps: Steps) -> Vec<f64> {
+        let parameters = [Dual::<0>::ZERO; PARAMETERS];
+        let chances = self.chances_of(light, parameters, steps);
+        chances.iter().map(|chance| chance.value).collect()
+    }
+
+    /// The same with the slopes of each chance.
+    pub(super) fn slopes(&self, light: &EchoLight, steps: Steps) -> Vec<Slopes> {
+        let parameter = |of| Dual::parameter(0.0, of);
+        self.chances_of(light, std::array::from_fn(parameter), steps)
+    }
+
+    /// Whether this light needs finer steps than the fewest.
+    pub(super) fn needs_fine_steps(&self, light: &EchoLight) -> bool {
+        self.steps(light, Steps::Fine) > self.steps(light, Steps::Coarse)
+    }
+
+    /// Steps to a bin.
+    fn steps(&self, light: &EchoLight, steps: Steps) -> usize {
+        let sigma = light.sigma_bins.max(1e-3);
+        let fires_once = self.dead.time_bins >= 2.0 * PULSE_REACH * sigma;
+        if steps == Steps::Coarse || fires_once && self.dead.time_bins >= 2.0 {
+            return STEPS.max((2.0 / self.dead.time_bins).min(16.0).ceil() as usize);
+        }
+        // Within the pulse SPADs fire again, and each firing is as sharp as the light is strong.
+        let rate = 0.4 * light.signal / (self.counting.spads as f64 * sigma);
+        let of_dead_time = STEPS_OF_DEAD_TIME / self.dead.time_bins;
+        let wanted = of_dead_time.max(STEPS_OF_RATE * rate).min(MOST_STEPS);
+        (wanted.ceil() as usize).max(STEPS)
+    }
+
+    /// The chances, where `shifts` are what the parameters are more than those of `light`: zero, with slopes.
+    fn chances_of<const K: usize>(
+        &self,
+        light: &EchoLight,
+        shifts: [Dual<K>; PARAMETERS],
+        steps: Steps,
+    ) -> Vec<Dual<K>> {
+        let [by_place, by_signal, by_background, by_width] = shifts;
+        let per_spad = 1.0 / self.counting.spads as f64;
         let signal = light.signal * per_spad;
         let background = light.background_per_bin * per_spad;
-        let h = 1.0 / STEPS as f64;
-        // Before the pulse the SPADs are as the background alone leaves them.
-        let before =
-            (-0.5 - (light.position_bins - PULSE_BEGINS * sigma)).clamp(0.0, self.bins as f64);
-        let lead = (before / h).ceil() as usize;
-        let begin = -0.5 - lead as f64 * h;
-        let steps = lead + self.bins * STEPS;
+        let background = by_background.chain(background, background);
+        let sigma = light.sigma_bins.max(1e-6);
+        let steps_per_bin = self.steps(light, steps);
+        let h = 1.0 / steps_per_bin as f64;
 
-        // Light on a SPAD from `begin` to the end of each step.
-        let seen = |time: f64| {
-            background * (time - begin) + signal * share_before(time - light.position_bins, sigma)
+        // Light of the pulse on a SPAD until a time.
+        let centre = light.position_bins;
+        let (starts, ends) = (centre - PULSE_REACH * sigma, centre + PULSE_REACH * sigma);
+        let seen = |time: f64| -> Dual<K> {
+            if time <= starts || time >= ends {
+                let value = if time <= starts { 0.0 } else { signal };
+                return by_signal.chain(value, value);
+            }
+            let z = (time - centre) / sigma;
+            let (share, density) = (share_before(z), share_slope(z));
+            let value = signal * share;
+            let by_time = signal * density / sigma;
+            by_signal.chain(value, value)
+                + by_place.chain(0.0, -by_time)
+                + by_width.chain(0.0, -by_time * z * sigma)
         };
-        let mut blinding = History::new(self.dead_time_bins / h);
-        let steady = match self.paralysable {
-            false => background / (1.0 + background * self.dead_time_bins),
-            true => background,
+        // Before the pulse the SPADs are as the background alone leaves them: nothing happens before it begins.
+        let last = self.bins as f64 - 0.5;
+        // Of an echo long before the first bin nothing is left.
+        let forgotten = -8.0 - 2.0 * self.dead.time_bins - 4.0 * PULSE_REACH * sigma;
+        let begin_bin = (starts + 0.5).clamp(forgotten, self.bins as f64).floor();
+        let begin = begin_bin - 0.5;
+        let mut chances = Vec::with_capacity(self.bins);
+        let mut spad = Spad::steady(&self.dead, background, h);
+        let steady = {
+            let mut of_bin = spad.clone();
+            of_bin.begin_bin();
+            for _ in 0..steps_per_bin {
+                of_bin.step(background * h);
+            }
+            of_bin.chance(&self.counting)
         };
-        let mut fired = vec![0.0; self.bins];
-        let mut ready = match self.paralysable {
-            false => 1.0 - steady * self.dead_time_bins,
-            true => (-background * self.dead_time_bins).exp(),
-        };
-        blinding.begin(steady * h, steps);
+        for _ in 0..begin_bin.max(0.0) as usize {
+            chances.push(steady);
+        }
+        let steps = ((last - begin) / h).round() as usize;
         let mut seen_before = seen(begin);
         for step in 0..steps {
-            let seen_after = seen(begin + (step + 1) as f64 * h);
-            let photons = (seen_after - seen_before).max(0.0);
+            let time = begin + (step + 1) as f64 * h;
+            if step % steps_per_bin == 0 {
+                spad.begin_bin();
+            }
+            let seen_after = seen(time);
+            spad.step(background * h + (seen_after - seen_before));
             seen_before = seen_after;
-            let recovering = blinding.ending(step);
-            let hit = -(-photons).exp_m1();
-            let fires = match self.paralysable {
-                false => {
-                    // Those that recover during the step see half of it.
-                    let late = 1.0
-                        - if photons > 1e-6 {
-                            hit / photons
-                        } else {
-                            1.0 - 0.5 * photons
-                        };
-                    let fires = ready * hit + recovering * late;
-                    ready += recovering - fires;
-                    blinding.push(fires);
-                    fires
-                }
-                true => {
-                    let fires = ready * (0.5 * recovering).exp() * hit;
-                    ready *= (recovering - photons).exp();
-                    blinding.push(photons);
-                    fires
-                }
-            };
-            if step >= lead {
-                fired[(step - lead) / STEPS] += fires;
+            if (step + 1) % steps_per_bin == 0 && time > 0.0 {
+                chances.push(spad.chance(&self.counting));
             }
         }
-        fired
-            .iter()
-            .map(|&fired| self.counts_if_fired(fired))
-            .collect()
-    }
-}
-
-/// Share of a Gaussian pulse that comes before `time` relative to its centre.
-fn share_before(time: f64, sigma: f64) -> f64 {
-    let z = time / sigma;
-    match z.abs() > 8.0 || sigma == 0.0 {
-        true => f64::from(time > 0.0),
-        false => normal_above(-z),
-    }
-}
-
-/// What blinds, step by step, and what of it ends a dead time later.
-struct History {
-    /// Dead time in steps.
-    delay: f64,
-    before: f64,
-    steps: Vec<f64>,
-}
-
-impl History {
-    fn new(delay: f64) -> Self {
-        History {
-            delay,
-            before: 0.0,
-            steps: Vec::new(),
-        }
-    }
-
-    /// `before` in every step until now; `steps` are to come.
-    fn begin(&mut self, before: f64, steps: usize) {
-        self.before = before;
-        self.steps = Vec::with_capacity(steps);
-    }
-
-    fn push(&mut self, blinding: f64) {
-        self.steps.push(blinding);
-    }
-
-    /// What ends during `step`.
-    fn ending(&self, step: usize) -> f64 {
-        let from = step as f64 - self.delay;
-        let whole = from.floor();
-        let at = |step: f64| match step >= 0.0 {
-            true => self.steps.get(step as usize).copied().unwrap_or(0.0),
-            false => self.before,
-        };
-        let part = from - whole;
-        at(whole) * (1.0 - part) + at(whole + 1.0) * part
+        chances
     }
 }

@@ -2,17 +2,20 @@
 //!
 //! ```text
 //!   counts ─► fullest stretch ─► chance of it without an echo ─► confidence, significant or not
-//!                   └──► peak: centre of mass about its fullest bin ─► range walk taken out ─► position
+//!                   └──► peak: centre of mass about its fullest bin ─► fit of the light ─► position and its bound
 //! ```
 //!
 //! The *confidence* is −log₁₀ of the chance that light without an echo makes as full a stretch anywhere in the histogram
 //! ([`theory::significance`](crate::theory::significance)): 0 says nothing, 3 is wrong once in a thousand dark windows. A peak
 //! is significant where that chance is at most the false-alarm rate.
+//!
+//! Where TYPE and THRESHOLD make bins count that see little light (less, or equal to none), an echo is a dip. Laser cycles in which a bin
+//! did not count are then what is looked at.
 
 use super::expected::{EchoLight, Response};
 use super::peak::{Peak, PeakOptions, interpolate_at};
-use super::walk::WalkCorrection;
-use crate::chip::{EventType, Overflow, Tdc, WindowLaw};
+use super::walk::{Corrected, WalkCorrection, WalkLeft};
+use crate::chip::{Overflow, Tdc, WindowLaw};
 use crate::theory::significance::{Scan, Stretch};
 use crate::units::Time;
 
@@ -46,11 +49,16 @@ pub struct Sighting {
     pub position_bins: f64,
     /// The light that explains the peak, if range walk is taken out.
     pub light: Option<EchoLight>,
+    /// Cramér-Rao bound of the position under this light, bins.
+    pub bound_bins: Option<f64>,
+    /// Why range walk is not taken out of a significant peak, where that was asked for.
+    pub walk_left: Option<WalkLeft>,
     /// −log₁₀ of the chance that light without an echo makes such a peak, at least 0.
     pub confidence: f64,
     /// Whether that chance is at most the false-alarm rate.
     pub is_significant: bool,
-    /// Whether a bin of the peak is full, so that neither its height nor its centre is known.
+    /// Whether a bin of the peak is full, or light so strong that its counts do not tell where it came: neither the peak's height
+    /// nor its centre is known.
     pub is_saturated: bool,
 }
 
@@ -70,14 +78,20 @@ pub struct EchoFinder {
     scan: Scan,
     /// Counts at which bins stop counting, where they can be reached. One that wraps shows nothing.
     full: Option<u32>,
-    walk: Option<WalkCorrection>,
+    walk: Option<Result<WalkCorrection, WalkLeft>>,
+    /// Laser cycles, where bins that do not count are what an echo makes.
+    uncounted_of: Option<u32>,
 }
+
+/// Where each SPAD has a photon of the echo, counts may not tell its place. From so many bins of bound on the error is
+/// no longer that of the bound (measured at 10² to 10⁴ photons).
+const MOST_BOUND_BINS: f64 = 0.25;
 
 impl EchoFinder {
     /// For the bins of `law` and Gaussian pulses of standard deviation `pulse_sigma`.
     ///
-    /// Range walk is taken out where brighter light gives more counts (TYPE greater, and THRESHOLD below the number of
-    /// SPADs) and the SPADs have recovered from one echo before the next window opens.
+    /// Range walk is taken out where bins are CLK periods, SPADs have lines of their own, and have recovered from one echo before
+    /// the next window opens.
     ///
     /// # Errors
     /// Bins of a clocked TDC that differ: pile-up moves peaks otherwise in each. Those of delay lines are told to
@@ -96,9 +110,16 @@ impl EchoFinder {
         let response = Response::new(config, bin_s, pulse_sigma);
         let laser_cycle_bins = exposure.stop(1).as_s() / bin_s;
         let recovers = response.dead_time_bins() + config.bins as f64 <= laser_cycle_bins;
-        // On a line that all SPADs share, photons cancel, and brighter light may give fewer counts.
-        let brighter_is_more =
-            config.event_type == EventType::Greater && config.tdc == Tdc::Clocked;
+        let complement = response.complement();
+        let walk = match config.tdc {
+            Tdc::DelayLine => Err(WalkLeft::DelayLine),
+            Tdc::Clocked if config.front_end.joins() => Err(WalkLeft::JoinedSpads),
+            Tdc::Clocked if !recovers => Err(WalkLeft::ShortLaserCycle),
+            Tdc::Clocked => Ok(WalkCorrection {
+                response: complement.unwrap_or(response),
+                laser_cycles,
+            }),
+        };
         let capacity = (1u32 << config.bin_bits) - 1;
         Ok(EchoFinder {
             bin_s,
@@ -107,13 +128,8 @@ impl EchoFinder {
             scan: Scan::matched(response.pulse_sigma_bins(), config.bins, laser_cycles),
             full: (config.overflow == Overflow::Saturate && capacity < laser_cycles)
                 .then_some(capacity),
-            walk: (options.correct_walk && recovers && brighter_is_more).then_some(
-                WalkCorrection {
-                    response,
-                    laser_cycles,
-                    peak: options.peak,
-                },
-            ),
+            walk: options.correct_walk.then_some(walk),
+            uncounted_of: complement.map(|_| laser_cycles),
         })
     }
 
@@ -124,7 +140,17 @@ impl EchoFinder {
 
     /// The echo in `counts`, one entry per bin, earliest first; `None` if no bin stands out at all.
     pub fn find(&self, counts: &[u32]) -> Option<Sighting> {
-        self.judge(counts, self.scan.fullest(counts))
+        let Some(cycles) = self.uncounted_of else {
+            return self.judge(counts, self.scan.fullest(counts));
+        };
+        let uncounted: Vec<u32> = counts.iter().map(|&n| cycles.saturating_sub(n)).collect();
+        let sighting = self.judge(&uncounted, self.scan.fullest(&uncounted))?;
+        // A full bin may have counted more often than it says.
+        let is_full = counts.iter().any(|&n| Some(n) == self.full);
+        Some(Sighting {
+            is_saturated: is_full || sighting.is_saturated,
+            ..sighting
+        })
     }
 
     /// The same where bins differ in length: `shares` are their lengths over the mean length.
@@ -149,17 +175,27 @@ impl EchoFinder {
         let is_significant = stretch.ln_false_alarm <= self.ln_false_alarm;
         // Where there is no depth anyway, nothing is known of the light either.
         let corrects = is_significant && !is_saturated;
-        let corrected = self
-            .walk
-            .filter(|_| corrects)
-            .and_then(|walk| walk.correct(&peak));
+        let walk = self.walk.filter(|_| corrects);
+        let fitted = walk.map(|walk| walk.and_then(|walk| walk.correct(&real, &peak)));
+        let corrected = fitted.and_then(Result::ok);
         Some(Sighting {
-            position_bins: corrected.map_or(peak.position_bins, |c| c.position_bins),
+            position_bins: corrected.map_or(peak.position_bins, |c| c.light.position_bins),
             light: corrected.map(|c| c.light),
+            bound_bins: corrected.map(|c| c.bound_bins),
+            walk_left: fitted.and_then(Result::err),
             peak,
             confidence: -stretch.ln_false_alarm / std::f64::consts::LN_10,
             is_significant,
-            is_saturated,
+            is_saturated: is_saturated || corrected.is_some_and(|c| self.is_lost(&c)),
         })
+    }
+
+    /// Whether an echo is so strong that its counts do not tell its place.
+    fn is_lost(&self, corrected: &Corrected) -> bool {
+        let Some(Ok(walk)) = self.walk else {
+            return false;
+        };
+        corrected.light.signal > walk.response.counting().spads as f64
+            && corrected.bound_bins > MOST_BOUND_BINS
     }
 }

@@ -2,10 +2,14 @@
 
 mod arrival;
 mod calibration;
+mod counting;
+mod edge;
 mod expected;
 mod finder;
+mod likelihood;
 mod peak;
 mod profile;
+mod spad_state;
 pub mod tmf8820;
 mod walk;
 
@@ -15,7 +19,7 @@ pub use expected::{EchoLight, Response};
 pub use finder::{DepthOptions, EchoFinder, Sighting, UnequalBins};
 pub use peak::{Background, CentreOfMass, Peak, PeakOptions, centre_of_mass, interpolate};
 pub use profile::{BinProfile, LineProfile, OtherSensor};
-pub use walk::{Corrected, WalkCorrection};
+pub use walk::{Corrected, WalkCorrection, WalkLeft};
 
 #[cfg(test)]
 mod tests;

@@ -2,32 +2,71 @@
 //!
 //! SPADs that fired in the early part of a strong echo are blind for its late part, and a bin counts once a laser
 //! cycle however many photons come. So the centre of mass lies before the echo's centre, the more the brighter
-//! it is. The walk is the distance between the two in the mean histogram of such an echo ([`Response`]). Its light is not
-//! known, but follows from the histogram:
+//! it is. The mean histogram of an echo is known ([`Response`]), so its place is fitted ([`likelihood`](super::likelihood)):
 //!
-//! * the background from the counts per bin outside the peak,
-//! * arrival and signal such that the mean histogram has its peak where, and with as many counts as, the measured one.
+//! ```text
+//!   centre of mass, light of its bins ─► fit over all bins ──────── explains the counts? ─► position, bound
+//!   strong light: best of many ────────────┘        no │ wider than the pulse?  ─► fit with the width
+//!                                                   no │ other echoes besides?  ─► fit of the peak's bins alone
+//!                                                   no ╰─► the reason, and the centre of mass as it is
+//! ```
 //!
-//! The same peak region and the same background estimate are used in both histograms, so that whatever else they do to
-//! the centre of mass (a tail cut off, a pulse of few bins) is taken out, too. What is left is the noise of the counts.
-//!
-//! The thesis assumes pile-up away (3.2.2); the correction is ours.
+//! Nothing is called corrected that does not explain its counts. The thesis assumes pile-up away (3.2.2); the correction
+//! is ours.
 
+use serde::{Deserialize, Serialize};
+
+use super::edge::share_before;
 use super::expected::{EchoLight, Response};
-use super::peak::{Peak, PeakOptions, interpolate_at};
+use super::likelihood::{ECHO, Fit, Free, IN_REGION, Likelihood, WIDE_ECHO};
+use super::peak::Peak;
+use crate::chip::EventType;
 
-/// Most rounds of matching arrival and signal. Most take fewer; counts that hardly rise with the signal take them all.
-const ROUNDS: usize = 12;
+/// Ambiguity: another light whose deviance is less than so much more, elsewhere by so many bounds.
+const AS_GOOD: f64 = 9.0;
+const ELSEWHERE: f64 = 4.0;
 
-/// Bins and relative counts to which arrival and signal are matched: 0.1 mm at 384 MHz, where counting noise is millimetres.
-const CLOSE: f64 = 3e-4;
+/// Range walk stays in a depth, and why.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WalkLeft {
+    /// On the line that a delay line's SPADs share photons cancel.
+    DelayLine,
+    /// The front end joins SPADs on one line.
+    JoinedSpads,
+    /// SPADs have not recovered from one echo before the window opens again.
+    ShortLaserCycle,
+    /// The counts are not those of one echo of the laser pulse.
+    NotOneEcho,
+    /// Two different lights give such counts.
+    Ambiguous,
+    /// No most likely light was found.
+    NotConverged,
+}
 
-/// Photons of an echo beyond which its counts no longer tell how many: each SPAD has fired for certain.
-const MOST_SIGNAL: f64 = 64.0;
+impl WalkLeft {
+    /// Every reason.
+    pub const ALL: [WalkLeft; 6] = [
+        WalkLeft::DelayLine,
+        WalkLeft::JoinedSpads,
+        WalkLeft::ShortLaserCycle,
+        WalkLeft::NotOneEcho,
+        WalkLeft::Ambiguous,
+        WalkLeft::NotConverged,
+    ];
 
-/// A correction is at most so many bins. Walk is below a quarter of a bin up to 12 photons an echo; what wants more is an
-/// echo that the edge of the histogram cuts in two.
-const MOST_BINS: f64 = 1.0;
+    /// In tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            WalkLeft::DelayLine => "photons cancel on a delay line's line",
+            WalkLeft::JoinedSpads => "the front end joins SPADs",
+            WalkLeft::ShortLaserCycle => "SPADs do not recover within a laser cycle",
+            WalkLeft::NotOneEcho => "counts are not those of one echo",
+            WalkLeft::Ambiguous => "two lights give such counts",
+            WalkLeft::NotConverged => "no light was found",
+        }
+    }
+}
 
 /// Takes the range walk out of peaks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,61 +75,237 @@ pub struct WalkCorrection {
     pub response: Response,
     /// Laser cycles of the exposure.
     pub laser_cycles: u32,
-    /// How the peaks were found.
-    pub peak: PeakOptions,
 }
 
 /// A peak after correction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Corrected {
-    /// Position without walk, bins.
-    pub position_bins: f64,
-    /// The light that gives such a peak.
+    /// The most likely light; its position is without walk.
     pub light: EchoLight,
+    /// Cramér-Rao bound of the position, bins: the least standard deviation of any unbiased estimate from counts of this light.
+    pub bound_bins: f64,
 }
 
 impl WalkCorrection {
-    /// Corrects a peak; `None` where no light gives such counts, or not this light alone.
-    pub fn correct(&self, measured: &Peak) -> Option<Corrected> {
-        let cycles = f64::from(self.laser_cycles);
-        let background_per_bin = self
-            .response
-            .background_for(measured.background_per_bin / cycles)?;
-        let mut light = EchoLight {
-            position_bins: measured.position_bins,
-            signal: measured.signal_counts / cycles,
-            background_per_bin,
+    /// The light that made the peak.
+    ///
+    /// # Errors
+    /// Why that is not known.
+    pub fn correct(&self, counts: &[f64], peak: &Peak) -> Result<Corrected, WalkLeft> {
+        let cycles = counts
+            .iter()
+            .copied()
+            .fold(f64::from(self.laser_cycles), f64::max);
+        let [background, most_background] = self.background(counts, cycles);
+        let likelihood = |free: Free| Likelihood {
+            response: &self.response,
+            counts,
+            cycles,
+            bins: 0..counts.len(),
+            free,
+            most_background,
         };
-        // How ln counts answer to ln signal: as 1 without pile-up.
-        let mut slope: f64 = 1.0;
-        let mut before: Option<(f64, f64)> = None;
-        for _ in 0..ROUNDS {
-            let chances = self.response.chances(&light);
-            let counts: Vec<f64> = chances.iter().map(|chance| chance * cycles).collect();
-            let modelled = interpolate_at(&counts, measured.peak_bin, &self.peak)?;
-            let off_bins = measured.position_bins - modelled.position_bins;
-            let off_counts = (measured.signal_counts / modelled.signal_counts).ln();
-            let ln_signal = light.signal.ln();
-            if let Some((signal_then, counts_then)) = before
-                && (ln_signal - signal_then).abs() > 1e-6
-            {
-                let secant =
-                    (modelled.signal_counts.ln() - counts_then) / (ln_signal - signal_then);
-                slope = secant.clamp(0.2, 1.5);
-            }
-            before = Some((ln_signal, modelled.signal_counts.ln()));
-            light.position_bins = (light.position_bins + off_bins).clamp(
-                measured.position_bins - MOST_BINS,
-                measured.position_bins + MOST_BINS,
-            );
-            light.signal = (ln_signal + off_counts / slope).exp().min(MOST_SIGNAL);
-            if off_bins.abs() < CLOSE && off_counts.abs() < CLOSE {
-                break;
+        let linear = self.linear_start(counts, cycles, (peak, background));
+        let (of_all, wide) = (likelihood(ECHO), likelihood(WIDE_ECHO));
+        let mut best = match &linear {
+            Some(start) => of_all.maximise(start),
+            None => self.of_many(&of_all, (peak, background))?,
+        };
+        // The glow after an echo that came before the window may look like a weaker one.
+        let begins_unseen = best.light.position_bins < 2.0 * best.light.sigma_bins;
+        if linear.is_some() && begins_unseen {
+            best = self.of_many(&of_all, (peak, background))?;
+        }
+        if best.explains() {
+            return Ok(best.into());
+        }
+        // Few photons are an echo in one place only.
+        let is_weak = best.has_converged && counts.iter().all(|&n| n < 0.9 * cycles);
+        if linear.is_some() && !is_weak && !begins_unseen {
+            best = self.of_many(&of_all, (peak, background))?;
+            if best.explains() {
+                return Ok(best.into());
             }
         }
-        Some(Corrected {
-            position_bins: light.position_bins,
-            light,
+        let of_wide = wide.maximise(&best.light);
+        if of_wide.explains() && of_wide.light.sigma_bins < self.widest() {
+            return Ok(of_wide.into());
+        }
+        let half = (4.0 * self.response.pulse_sigma_bins()).ceil().max(2.0) as usize;
+        let first = peak.peak_bin.saturating_sub(half);
+        let of_region = Likelihood {
+            bins: first..(peak.peak_bin + half + 1).min(counts.len()),
+            ..likelihood(IN_REGION)
+        };
+        let in_region = of_region.maximise(&linear.unwrap_or(best.light));
+        if in_region.explains() {
+            return Ok(in_region.into());
+        }
+        match best.is_close() {
+            false => Err(WalkLeft::NotOneEcho),
+            true => Err(WalkLeft::NotConverged),
+        }
+    }
+
+    /// A start from the light that each bin of the peak had, if it was alone; `None` where bins do not tell.
+    fn linear_start(
+        &self,
+        counts: &[f64],
+        cycles: f64,
+        (peak, background_per_bin): (&Peak, f64),
+    ) -> Option<EchoLight> {
+        let counting = self.response.counting();
+        if counting.event_type != EventType::Greater {
+            return None;
+        }
+        let half = (2.0 * self.response.pulse_sigma_bins()).ceil().max(1.0) as usize;
+        let (mut signal, mut moment) = (0.0, 0.0);
+        for (bin, &counts) in counts.iter().enumerate() {
+            if counts > 0.98 * cycles {
+                return None;
+            }
+            if bin.abs_diff(peak.peak_bin) <= half {
+                let of_bin = (self.light(counts / cycles) - background_per_bin).max(0.0);
+                signal += of_bin;
+                moment += of_bin * bin as f64;
+            }
+        }
+        (signal > 0.0).then(|| EchoLight {
+            position_bins: moment / signal,
+            signal,
+            background_per_bin,
+            sigma_bins: self.response.pulse_sigma_bins(),
         })
+    }
+
+    /// The best of fits from many starts: for each of many signals the best place.
+    fn of_many(
+        &self,
+        likelihood: &Likelihood<'_>,
+        (peak, background_per_bin): (&Peak, f64),
+    ) -> Result<Fit, WalkLeft> {
+        let sigma_bins = self.response.pulse_sigma_bins();
+        let edge = self.rising_edge(likelihood, background_per_bin);
+        let edge_is_seen = |bin: usize| bin as f64 > 1.0 + sigma_bins;
+        let mut starts: Vec<(f64, EchoLight)> = Vec::new();
+        // Where light makes bins count less, too, each light has its own places.
+        let (step, fits) = match edge {
+            Some((bin, _)) if edge_is_seen(bin) => (0.4, 2),
+            Some(_) => (0.4, 6),
+            None => (0.2, 8),
+        };
+        for number in (-0.6 / step) as i32..=(4.0 / step) as i32 {
+            let signal = 10f64.powf(step * f64::from(number));
+            let light = |position_bins: f64| EchoLight {
+                position_bins,
+                signal,
+                background_per_bin,
+                sigma_bins,
+            };
+            let places: Vec<f64> = match edge {
+                // The light until the end of the edge's bin says how much of the pulse has come.
+                Some((bin, photons)) if edge_is_seen(bin) => {
+                    let end = bin as f64 + 0.5 - sigma_bins * quantile(photons / signal);
+                    [-0.3, 0.0, 0.3].map(|off| end + off).to_vec()
+                }
+                Some(_) => (-12..=12).map(|n| 0.3 * f64::from(n)).collect(),
+                None => (-10..=40)
+                    .map(|n| peak.peak_bin as f64 + 0.15 * f64::from(n) * (1.0 + sigma_bins))
+                    .collect(),
+            };
+            let judged = places
+                .into_iter()
+                .map(light)
+                .map(|light| (likelihood.deviance(&light), light));
+            starts.extend(judged.min_by(|a, b| a.0.total_cmp(&b.0)));
+        }
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut fits: Vec<Fit> = starts
+            .iter()
+            .take(fits)
+            .map(|(_, start)| likelihood.maximise(start))
+            .collect();
+        // Those that have converged first, then the most likely.
+        fits.sort_by(|a, b| {
+            let converged = b.has_converged.cmp(&a.has_converged);
+            converged.then(a.deviance.total_cmp(&b.deviance))
+        });
+        let best = *fits.first().ok_or(WalkLeft::NotConverged)?;
+        let is_another = |fit: &Fit| {
+            let off = (fit.light.position_bins - best.light.position_bins).abs();
+            fit.deviance < best.deviance + AS_GOOD
+                && off > ELSEWHERE * best.bound_bins.max(fit.bound_bins)
+        };
+        match fits.iter().filter(|fit| fit.has_converged).any(is_another) {
+            true => Err(WalkLeft::Ambiguous),
+            false => Ok(best),
+        }
+    }
+
+    /// The widest echo, whose ends are to be seen either side of it.
+    fn widest(&self) -> f64 {
+        let of_bins = self.response.bins() as f64 / 8.0;
+        of_bins.max(1.5 * self.response.pulse_sigma_bins())
+    }
+
+    /// The light of a bin that counts with `chance`, if SPADs are ready for it and more light makes it count more.
+    fn light(&self, chance: f64) -> f64 {
+        let counting = self.response.counting();
+        let fired = counting.fired_for(chance.min(0.999));
+        -(counting.spads as f64) * (-fired).ln_1p()
+    }
+
+    /// The background to begin with, and the most that it may be: from the third of the bins with the fewest counts, because the
+    /// median is too much where an echo is wide. Where SPADs are blind they say too little, which the fit finds out.
+    fn background(&self, counts: &[f64], cycles: f64) -> [f64; 2] {
+        if self.response.counting().event_type != EventType::Greater {
+            return [0.03, 1.0];
+        }
+        let mut sorted = counts.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let few = sorted[sorted.len() / 3];
+        // Where nothing counts, the background is some tenth of what would show.
+        let begin = match few >= 1.0 {
+            true => self.light(few / cycles),
+            false => 0.1 * self.light(0.3 / cycles),
+        };
+        // No count in a bin allows three.
+        [begin, self.light((few + 3.0) / cycles)]
+    }
+
+    /// The first bin of an echo's rising edge, and the photons of the echo until its end.
+    fn rising_edge(&self, likelihood: &Likelihood<'_>, background: f64) -> Option<(usize, f64)> {
+        let counting = self.response.counting();
+        if counting.event_type != EventType::Greater {
+            return None;
+        }
+        let light = |&counts: &f64| self.light((counts / likelihood.cycles).min(0.99)) - background;
+        let bins = likelihood.counts.iter().map(light);
+        let bins: Vec<f64> = bins.collect();
+        let most = bins.iter().copied().fold(0.0, f64::max);
+        let bin = bins.iter().position(|&photons| photons > 0.2 * most)?;
+        Some((bin, bins[bin]))
+    }
+}
+
+/// Standard deviations before which so much of a Gaussian pulse has come; no farther than its ends.
+fn quantile(share: f64) -> f64 {
+    let (mut low, mut high) = (-6.0, 6.0);
+    for _ in 0..20 {
+        let middle = 0.5 * (low + high);
+        match share_before(middle) < share {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    0.5 * (low + high)
+}
+
+impl From<Fit> for Corrected {
+    fn from(fit: Fit) -> Self {
+        Corrected {
+            light: fit.light,
+            bound_bins: fit.bound_bins,
+        }
     }
 }

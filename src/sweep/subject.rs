@@ -303,6 +303,7 @@ fn frame_columns() -> Vec<Column> {
             "median_absolute_error_of_all_m",
             "rms_error_of_every_peak_m",
             "guide_rms_error_m",
+            "rms_bound_m",
             "bin_m",
         ]
         .map(|name| number(name, "m")),
@@ -327,6 +328,8 @@ fn frame_cells(frame: &Frame, sensor: &SensorConfig) -> Vec<Cell> {
         outliers,
         outlier_share,
         rms_error_m,
+        rms_bound_m,
+        walk_left: _,
         median_absolute_error_m,
         rms_error_without_outliers_m,
         mean_error_m,
@@ -361,6 +364,7 @@ fn frame_cells(frame: &Frame, sensor: &SensorConfig) -> Vec<Cell> {
             median_absolute_error_of_all_m,
             rms_error_of_every_peak_m,
             guide_rms_error_m,
+            rms_bound_m,
             Some(bin_m),
             Some(frame.photons_expected),
         ]

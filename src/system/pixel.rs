@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::ranging::WalkLeft;
+
 /// Why a macropixel has no depth: the first of these that holds, in this order.
 ///
 /// Two are known to the simulation alone, not to the chip: that there is no surface, and that a surface lies outside the
@@ -18,7 +20,7 @@ pub enum NoDepth {
     OutOfReach,
     /// No SPAD can fire: they detect no photons and make no dark counts.
     SpadsOff,
-    /// A bin of the peak is full.
+    /// A bin of the peak is full, or light so strong that its counts do not tell where it came.
     Saturated,
     /// The surface lies outside the window, and no peak is significant.
     OutsideWindow,
@@ -70,6 +72,12 @@ pub struct PixelDepth {
     pub in_window: bool,
     /// Depth from the histogram, where its peak is significant and not saturated.
     pub measured_m: Option<f64>,
+    /// Cramér-Rao bound of that depth: the least standard deviation that its counts allow. `None` where range walk is not taken out.
+    #[serde(default)]
+    pub bound_m: Option<f64>,
+    /// Why range walk is left in that depth; `None` where it is taken out, or was not asked to be.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub walk_left: Option<WalkLeft>,
     /// Why there is no depth; `None` exactly where there is one.
     pub no_depth: Option<NoDepth>,
     /// Distance of the histogram's peak with its range walk, significant or not.

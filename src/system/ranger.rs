@@ -8,9 +8,9 @@ use super::aim::{Aims, Place, own_law};
 use super::pixel::{NoDepth, PixelDepth};
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, Sensor, WindowLaw};
-use crate::ranging::{BinProfile, DepthOptions, EchoFinder, Peak, Sighting, UnequalBins};
+use crate::ranging::{BinProfile, DepthOptions, EchoFinder, Peak, Sighting, UnequalBins, WalkLeft};
 use crate::scene::Scene;
-use crate::units::Time;
+use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
 
 /// What is known of a macropixel beside its histogram.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,6 +82,11 @@ impl<'a> Ranger<'a> {
         self.finder.bin_s()
     }
 
+    /// Light's way there and back in a bin, as a distance, m.
+    fn bin_m(&self) -> f64 {
+        self.bin_s() * SPEED_OF_LIGHT_M_PER_S / 2.0
+    }
+
     /// The window of a macropixel with this start value, as distances in m; `None` where it never opens.
     pub(crate) fn window_m(&self, pixel: usize, start: u16) -> Option<(f64, f64)> {
         let law = own_law(&self.law, pixel);
@@ -130,6 +135,8 @@ impl<'a> Ranger<'a> {
         };
         let reading = Reading {
             measured_m: found.and_then(|s| range_m(s.position_bins, s.peak.peak_bin)),
+            bound_m: found.and_then(|s| Some(s.bound_bins? * self.bin_m())),
+            walk_left: found.and_then(|s| s.walk_left),
             no_depth,
             peak_m: sighting.and_then(|s| range_m(s.peak.position_bins, s.peak.peak_bin)),
             confidence: sighting.map(|s| s.confidence),
@@ -172,6 +179,8 @@ impl<'a> Ranger<'a> {
             start,
             in_window,
             measured_m: sight.reading.measured_m,
+            bound_m: sight.reading.bound_m,
+            walk_left: sight.reading.walk_left,
             no_depth,
             peak_m: sight.reading.peak_m,
             confidence: sight.reading.confidence,
@@ -207,6 +216,10 @@ struct Sight<'l> {
 pub struct Reading {
     /// Distance, where the peak is significant and not saturated, m.
     pub measured_m: Option<f64>,
+    /// Cramér-Rao bound of it, where range walk is taken out, m.
+    pub bound_m: Option<f64>,
+    /// Why range walk is left in it.
+    pub walk_left: Option<WalkLeft>,
     /// Why there is none: no guide (SPADs are off), saturated, or no significant peak.
     pub no_depth: Option<NoDepth>,
     /// Distance of the histogram's peak with its range walk, significant or not, m.

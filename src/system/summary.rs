@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::pixel::{NoDepth, PixelDepth};
+use crate::ranging::WalkLeft;
 
 /// A frame in a few numbers, distances in metres.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -35,6 +36,10 @@ pub struct Summary {
     pub outlier_share: Option<f64>,
     /// Root mean square error of all depths of surfaces.
     pub rms_error_m: Option<f64>,
+    /// Root mean square of what their counts allow at best (Cramér-Rao), of those whose range walk is taken out.
+    pub rms_bound_m: Option<f64>,
+    /// Depths whose range walk is not taken out, by reason.
+    pub walk_left: BTreeMap<WalkLeft, usize>,
     /// Median of their absolute error.
     pub median_absolute_error_m: Option<f64>,
     /// Root mean square error without outliers.
@@ -78,6 +83,12 @@ impl Summary {
         for reason in pixels.iter().filter_map(|p| p.no_depth) {
             *no_depth.entry(reason).or_default() += 1;
         }
+        let bounded = pixels.iter().filter(|p| p.error_m().is_some());
+        let bounds: Vec<f64> = bounded.filter_map(|p| p.bound_m).collect();
+        let mut walk_left = BTreeMap::new();
+        for reason in pixels.iter().filter_map(|p| p.walk_left) {
+            *walk_left.entry(reason).or_default() += 1;
+        }
         Summary {
             pixels: pixels.len(),
             with_target,
@@ -90,6 +101,8 @@ impl Summary {
             outliers,
             outlier_share: share(outliers, errors.len()),
             rms_error_m: rms(&errors),
+            rms_bound_m: rms(&bounds),
+            walk_left,
             median_absolute_error_m: median(errors.iter().map(|e| e.abs())),
             rms_error_without_outliers_m: rms(&without_outliers),
             mean_error_m: mean(&without_outliers),
@@ -135,6 +148,8 @@ mod tests {
             start: true_m.map(|_| 1),
             in_window: sees,
             measured_m,
+            bound_m: None,
+            walk_left: None,
             no_depth: match (measured_m, sees) {
                 (Some(_), _) => None,
                 (None, true) => Some(NoDepth::NoSignificantPeak),

@@ -74,6 +74,8 @@ class Maps:
     """Edges of the bins after STOP, ns, shape (rows, cols, bins + 1); NaN where the window does not open."""
     depth: NDArray[np.float64]
     """Measured distance, m, where a peak is significant and not saturated."""
+    bound: NDArray[np.float64]
+    """Cramér-Rao bound of the depth, m: the least standard deviation that its counts allow; NaN where range walk is left in it."""
     guide: NDArray[np.float64]
     """The guide's estimate, m."""
     truth: NDArray[np.float64]

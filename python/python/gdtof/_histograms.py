@@ -48,6 +48,8 @@ class Ranged:
 
     depth: NDArray[np.float64]
     """Distance, m, where a peak is significant and not saturated; NaN elsewhere."""
+    bound: NDArray[np.float64]
+    """Cramér-Rao bound of the depth, m: the least standard deviation that its counts allow; NaN where range walk is left in it."""
     peak: NDArray[np.float64]
     """Distance of the histogram's peak with its range walk, m, significant or not."""
     confidence: NDArray[np.float64]

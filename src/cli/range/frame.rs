@@ -70,18 +70,19 @@ fn write_csv(path: &Path, cols: usize, ranged: &Ranged) -> anyhow::Result<()> {
     OutputFile::write_with(path, |out| {
         writeln!(
             out,
-            "row,col,start,true_m,guide_m,depth_m,confidence,no_depth"
+            "row,col,start,true_m,guide_m,depth_m,bound_m,confidence,no_depth"
         )?;
         for (at, pixel) in ranged.pixels.iter().enumerate() {
             writeln!(
                 out,
-                "{},{},{},{},{},{},{},{}",
+                "{},{},{},{},{},{},{},{},{}",
                 at / cols,
                 at % cols,
                 pixel.start.map_or(String::new(), |s| s.to_string()),
                 shown(pixel.true_m),
                 shown(pixel.guide_m),
                 shown(pixel.measured_m),
+                shown(pixel.bound_m),
                 shown(pixel.confidence),
                 pixel.no_depth.map_or("", |why| why.name()),
             )?;

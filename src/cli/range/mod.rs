@@ -47,7 +47,7 @@ pub(super) struct RangeArgs {
     /// frame: leave the range walk of strong echoes in the depths.
     #[arg(long)]
     no_walk_correction: bool,
-    /// Depths as CSV. tmf8820: capture,zone,true_m,depth_m,sensor_m; frame: row,col,start,true_m,guide_m,depth_m,confidence,no_depth.
+    /// Depths as CSV. tmf8820: capture,zone,true_m,depth_m,sensor_m; frame: row,col,start,true_m,guide_m,depth_m,bound_m,confidence,no_depth.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// JSON instead of tables.
