@@ -15,6 +15,7 @@
 
 use rayon::prelude::*;
 
+use super::facet::{self, Sample};
 use super::map::GuideMap;
 use super::stereo::{StereoPoint, StereoRig};
 use crate::scene::{PinholeCamera, Scene};
@@ -29,10 +30,7 @@ const SAMPLES_ACROSS: f64 = 3.0;
 #[derive(Debug, Clone, Copy)]
 struct Landing {
     index: usize,
-    /// Squared distance from the macropixel's centre, in macropixels².
-    off_centre2: f64,
-    range_m: f64,
-    sigma_m: f64,
+    sample: Sample,
 }
 
 /// Measures with the scene's stereo rig and maps onto a `rows` × `cols` array; equal seeds
@@ -54,7 +52,7 @@ pub(super) fn of_rig(scene: &Scene, rows: u32, cols: u32, seed: u64) -> GuideMap
                 .collect()
         })
         .collect();
-    nearest_to_centres(rows, cols, landings.into_iter().flatten())
+    of_landings(&lidar, landings.into_iter().flatten())
 }
 
 /// Maps points onto a `rows` × `cols` array; `sigma_m` gives the standard deviation of a depth, m.
@@ -68,18 +66,23 @@ pub(super) fn of_points<'p>(
     let lidar = scene.lidar_camera(rows, cols);
     let landings =
         (points.into_iter()).filter_map(|point| land(scene, &lidar, point, sigma_m(point.depth_m)));
-    nearest_to_centres(rows, cols, landings)
+    of_landings(&lidar, landings)
 }
 
-fn nearest_to_centres(rows: u32, cols: u32, landings: impl Iterator<Item = Landing>) -> GuideMap {
-    let mut best: Vec<Option<Landing>> = vec![None; rows as usize * cols as usize];
-    for landing in landings {
-        let slot = &mut best[landing.index];
-        if slot.is_none_or(|b| landing.off_centre2 < b.off_centre2) {
-            *slot = Some(landing);
-        }
+/// One estimate of all that lands in a macropixel.
+fn of_landings(lidar: &PinholeCamera, landings: impl Iterator<Item = Landing>) -> GuideMap {
+    let (rows, cols) = (lidar.height, lidar.width);
+    let mut landings: Vec<Landing> = landings.collect();
+    // Stable, so that of two samples as near to a centre the one further up, then further left, comes first.
+    landings.sort_by_key(|landing| landing.index);
+    let mut estimates = vec![None; rows as usize * cols as usize];
+    let pitch = [1.0 / lidar.focal_px, 1.0 / lidar.focal_v_px];
+    let mut samples = Vec::new();
+    for of_one in landings.chunk_by(|a, b| a.index == b.index) {
+        samples.clear();
+        samples.extend(of_one.iter().map(|landing| landing.sample));
+        estimates[of_one[0].index] = facet::estimate(&mut samples, pitch);
     }
-    let estimates = best.iter().map(|b| b.map(|b| (b.range_m, b.sigma_m)));
     GuideMap::new(rows, cols, estimates)
 }
 
@@ -129,11 +132,14 @@ fn land(
     let (du, dv) = (u - f64::from(col) - 0.5, v - f64::from(row) - 0.5);
     // The error is along the camera's ray: what of it the lidar sees as range is its share along the lidar's.
     let range_per_depth = from_lidar.normalize().dot(point.point_m) / point.depth_m;
+    let range_m = from_lidar.length();
     Some(Landing {
         index: row as usize * lidar.width as usize + col as usize,
-        off_centre2: du * du + dv * dv,
-        range_m: from_lidar.length(),
-        sigma_m: sigma_m * range_per_depth.abs(),
+        sample: Sample {
+            at: [du, dv],
+            inverse: 1.0 / range_m,
+            sigma: sigma_m * range_per_depth.abs() / (range_m * range_m),
+        },
     })
 }
 
