@@ -15,6 +15,8 @@
 //! light falls with the square of the range and with the cosine that the slope tells. How much a surface reflects, depths do not say. So where
 //! another part might be as bright the claim is widened to the variance that the choice has.
 
+use crate::numerics::normal_above;
+
 /// A depth that has landed in a macropixel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sample {
@@ -53,10 +55,11 @@ pub(super) fn estimate(samples: &mut [Sample], pitch: Pitch) -> Option<(f64, f64
     let is_alone = parts.len() == 1;
     let (range_m, mut variance_m2) = brightest.range(is_alone);
     for other in parts.iter().filter(|other| other.first != brightest.first) {
-        let apart = (brightest.light / other.light).ln()
-            / LOG_REFLECTIVITY.hypot((1.0 / brightest.count() + 1.0 / other.count()).sqrt());
-        variance_m2 +=
-            crate::numerics::normal_above(apart) * (other.range(false).0 - range_m).powi(2);
+        let counting2 = 1.0 / brightest.count() + 1.0 / other.count();
+        let unknown2 = brightest.log_unknown.powi(2) + other.log_unknown.powi(2);
+        let sigma = (LOG_REFLECTIVITY * LOG_REFLECTIVITY + counting2 + unknown2).sqrt();
+        let is_other = normal_above((brightest.light / other.light).ln() / sigma);
+        variance_m2 += is_other * (other.range(false).0 - range_m).powi(2);
     }
     Some((range_m, variance_m2.sqrt()))
 }
@@ -73,7 +76,11 @@ struct Part<'s> {
     /// Variance of a sample by its residuals.
     residual: f64,
     sigma2: f64,
+    /// Variances of the slopes.
+    slope2: [f64; 2],
     light: f64,
+    /// How little the logarithm of the light is known because slopes are not.
+    log_unknown: f64,
 }
 
 /// Takes samples, sorted, apart until each part is a plane.
@@ -121,8 +128,18 @@ impl<'s> Part<'s> {
         } else {
             0.0
         };
-        let tangent = (slope[0] / pitch[0]).hypot(slope[1] / pitch[1]) / inverse;
-        let light = n * inverse * inverse / 1f64.hypot(tangent);
+        // Tangents of the incidence: what slopes there are beyond those that noise makes, and how little is known of them.
+        let [a, b, d] = moments;
+        let noise = sigma2 / (a * d - b * b);
+        let slope2 = [noise * d, noise * a];
+        let (mut tangent2, mut unknown2) = (0.0, 0.0);
+        for axis in 0..2 {
+            let of_slope = (pitch[axis] * inverse).powi(-2);
+            tangent2 += of_slope * (slope[axis] * slope[axis] - slope2[axis]).max(0.0);
+            unknown2 += of_slope * slope2[axis];
+        }
+        let log_unknown = 0.25 * ((1.0 + tangent2 + unknown2) / (1.0 + tangent2)).ln();
+        let light = n * inverse * inverse / (1.0 + tangent2).sqrt() / log_unknown.exp();
         Some(Part {
             samples,
             first,
@@ -131,7 +148,9 @@ impl<'s> Part<'s> {
             moments,
             residual,
             sigma2,
+            slope2,
             light,
+            log_unknown,
         })
     }
 
@@ -141,8 +160,8 @@ impl<'s> Part<'s> {
 
     /// Range and variance, m and m²; over the whole macropixel, if the part fills it.
     fn range(&self, is_alone: bool) -> (f64, f64) {
-        let fills = is_alone && self.middle.iter().all(|at| at.abs() < OFF_CENTRE);
-        let place = if fills { [0.0; 2] } else { self.middle };
+        let fills = |axis: usize| is_alone && self.middle[axis].abs() < OFF_CENTRE;
+        let place = [0, 1].map(|axis| if fills(axis) { 0.0 } else { self.middle[axis] });
         let from = |s: &Sample| [place[0] - s.at[0], place[1] - s.at[1]];
         let distance2 = |s: &Sample| {
             let [x, y] = from(s);
@@ -160,6 +179,14 @@ impl<'s> Part<'s> {
             carried[0] * (kept.at[0] - self.middle[0]) + carried[1] * (kept.at[1] - self.middle[1]);
         let along = carried[0] * way[0] + carried[1] * way[1];
         let variance = self.sigma2 * (1.0 + 2.0 * beside + along).max(0.0);
+        // Where samples are missing, the part may reach on as far again.
+        let mut variance = variance;
+        if is_alone {
+            for axis in 0..2 {
+                let slope2 = self.slope[axis].powi(2) + self.slope2[axis];
+                variance += slope2 * place[axis].powi(2) / 3.0;
+            }
+        }
         let spread = self.slope.iter().map(|g| g * g / 12.0).sum::<f64>();
         let square = inverse * inverse;
         let range_m = (square + spread) / (square + 3.0 * spread) / inverse;
