@@ -33,6 +33,9 @@ pub(super) type Pitch = [f64; 2];
 /// Slopes of inverse range that are expected before any is seen, 1/m per rad: ground seen from 1.5 m has 1/1.5.
 const SLOPE: f64 = 0.7;
 
+/// Steeper by so much than expected is no surface but two, of which samples on either side are missing.
+const STEEPEST: f64 = 3.0 * SLOPE;
+
 /// Residuals over what the rig claims, as a variance, beyond which samples are not of one plane: one in 1000 by chance where nine samples leave six
 /// degrees of freedom.
 const NOT_PLANE: f64 = 3.7;
@@ -91,7 +94,7 @@ fn split<'s>(samples: &'s [Sample], pitch: Pitch, parts: &mut Vec<Part<'s>>) {
     let gap = |at: usize| samples[at].inverse - samples[at - 1].inverse;
     let widest = (1..samples.len()).max_by(|&a, &b| gap(a).total_cmp(&gap(b)));
     match widest {
-        Some(at) if part.residual > NOT_PLANE * part.sigma2 => {
+        Some(at) if part.residual > NOT_PLANE * part.sigma2 || part.is_too_steep(pitch) => {
             split(&samples[..at], pitch, parts);
             split(&samples[at..], pitch, parts);
         }
@@ -151,6 +154,14 @@ impl<'s> Part<'s> {
             slope2,
             light,
             log_unknown,
+        })
+    }
+
+    /// Beyond four standard deviations of the slope.
+    fn is_too_steep(&self, pitch: Pitch) -> bool {
+        (0..2).any(|axis| {
+            let least = self.slope[axis].abs() - 4.0 * self.slope2[axis].sqrt();
+            least > STEEPEST * pitch[axis]
         })
     }
 

@@ -31,9 +31,9 @@ const DRAWS: u32 = 5;
 /// Rays across a beam, either way: surfaces of a sixteenth of a beam are found.
 const RAYS_ACROSS: u32 = 16;
 
-/// Cells follow each other when they are nearer to each other than this part of twice their range: rays of a beam of 4 degrees meet a road at steps
-/// of a quarter of that where it is seen at 1 degree.
-const SAME_RUN: f64 = 0.1;
+/// Cells are of one run when they are nearer to each other than this part of twice their range. Farther road falls into several runs, which makes claims wider:
+/// of a street and a van's road like the built-in ones 3 σ hold 0.999 and 1.000 with it, with 0.1 and more 0.977 and 0.989.
+const SAME_RUN: f64 = 0.05;
 
 /// A radar that looks where the lidar looks.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
