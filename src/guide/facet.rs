@@ -210,3 +210,138 @@ fn solve([a, b, d]: [f64; 3], [x, y]: [f64; 2]) -> [f64; 2] {
     let determinant = a * d - b * b;
     [(d * x - b * y) / determinant, (a * y - b * x) / determinant]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::photon::{Purpose, normal, random_stream};
+    use proptest::prelude::*;
+
+    const PITCH: Pitch = [4.4e-3; 2];
+
+    /// Three samples either way, off the centre by `phase`, on a plane of inverse range `middle` at the centre.
+    fn on_plane(
+        middle: f64,
+        slope: [f64; 2],
+        phase: [f64; 2],
+        sigma: f64,
+        seed: u64,
+    ) -> Vec<Sample> {
+        let places = (0..9u32).map(|n| [f64::from(n % 3), f64::from(n / 3)]);
+        let samples = (0..).zip(places).map(|(n, place)| {
+            let at = [0, 1].map(|axis| (place[axis] - 1.0) / 3.0 + phase[axis]);
+            let error = sigma * normal(&mut random_stream(seed, Purpose::Guide, n, 98));
+            Sample {
+                at,
+                inverse: middle + slope[0] * at[0] + slope[1] * at[1] + error,
+                sigma,
+            }
+        });
+        samples.collect()
+    }
+
+    /// The mean range by light over a plane, slowly: light goes with the cosine, which goes with q, and with q².
+    fn mean_range_m(middle: f64, slope: [f64; 2]) -> f64 {
+        const N: u32 = 200;
+        let at = |n: u32| (f64::from(n) + 0.5) / f64::from(N) - 0.5;
+        let places = (0..N).flat_map(|x| (0..N).map(move |y| (at(x), at(y))));
+        let (light, moment) = places.fold((0.0, 0.0), |(light, moment), (x, y)| {
+            let q = middle + slope[0] * x + slope[1] * y;
+            (light + q.powi(3), moment + q.powi(2))
+        });
+        moment / light
+    }
+
+    proptest! {
+        #[test]
+        fn a_plane_is_as_far_as_its_light_says(
+            range_m in 15.0f64..120.0, slope in (-0.6f64..0.6, -0.6f64..0.6), phase in (-0.16f64..0.16, -0.16f64..0.16),
+        ) {
+            let middle = 1.0 / range_m;
+            // No steeper than a plane that ends in the macropixel.
+            let slope = [slope.0, slope.1].map(|s| (s * PITCH[0]).clamp(-0.6 * middle, 0.6 * middle));
+            let mut samples = on_plane(middle, slope, [phase.0, phase.1], 1e-9, 0);
+            let (found_m, sigma_m) = estimate(&mut samples, PITCH).unwrap();
+            let expected_m = mean_range_m(middle, slope);
+            prop_assert!((found_m / expected_m - 1.0).abs() < 2e-3, "{found_m} {expected_m}");
+            prop_assert!(sigma_m < 1e-4 * range_m);
+        }
+    }
+
+    /// A road at 40 m, which is 2.5 m deep in a macropixel, and a wall: shares within 1, 2 and 3 σ are those of a normal distribution.
+    #[test]
+    fn what_is_claimed_of_a_plane_holds() {
+        const SEEDS: u64 = 3000;
+        for slope in [
+            [0.0, 0.0],
+            [0.0, 0.5 * PITCH[1]],
+            [0.4 * PITCH[0], 0.3 * PITCH[1]],
+        ] {
+            let (middle, sigma) = (0.025, 1e-4);
+            let expected_m = mean_range_m(middle, slope);
+            let errors: Vec<f64> = (0..SEEDS)
+                .map(|seed| {
+                    let phase = [7, 11].map(|n| ((seed % n) as f64 / n as f64 - 0.5) / 3.0);
+                    let mut samples = on_plane(middle, slope, phase, sigma, seed);
+                    let (range_m, sigma_m) = estimate(&mut samples, PITCH).unwrap();
+                    (range_m - expected_m).abs() / sigma_m
+                })
+                .collect();
+            for (sigmas, promised) in [(1.0, 0.6827), (2.0, 0.9545), (3.0, 0.9973f64)] {
+                let inside = errors.iter().filter(|e| **e <= sigmas).count() as f64;
+                let share = inside / SEEDS as f64;
+                // Four standard errors, and as much again as depths are not linear in disparities.
+                let give = 4.0 * (promised * (1.0 - promised) / SEEDS as f64).sqrt() + 0.005;
+                assert!(
+                    (share - promised).abs() < give,
+                    "{slope:?} {sigmas}: {share}"
+                );
+            }
+        }
+    }
+
+    /// Columns of samples at these distances, m, one after the other.
+    fn columns(ranges_m: [Option<f64>; 3]) -> Vec<Sample> {
+        let mut samples = on_plane(0.0, [0.0; 2], [0.0; 2], 1e-4, 1);
+        let mut number = 0;
+        samples.retain_mut(|sample| {
+            let range_m = ranges_m[number % 3];
+            number += 1;
+            range_m.inspect(|m| sample.inverse += 1.0 / m).is_some()
+        });
+        samples
+    }
+
+    #[test]
+    fn of_two_surfaces_the_brighter_one_is_meant_and_doubt_is_told() {
+        let of = |ranges_m| estimate(&mut columns(ranges_m), PITCH).unwrap();
+        // Nine times as much light from the near one.
+        let (range_m, sigma_m) = of([Some(20.0), Some(20.0), Some(40.0)]);
+        assert!(
+            (range_m - 20.0).abs() < 0.3 && sigma_m > 1.0,
+            "{range_m} {sigma_m}"
+        );
+        // Twice as much from the far one.
+        let (range_m, sigma_m) = of([Some(100.0), Some(100.0), Some(80.0)]);
+        assert!((range_m - 100.0).abs() < 4.0, "{range_m}");
+        assert!(3.0 * sigma_m > 20.0, "{sigma_m}");
+        // A post before a house that the right camera does not see beside it is no steep plane.
+        let (range_m, _) = of([Some(45.0), None, Some(180.0)]);
+        assert!((range_m - 45.0).abs() < 1.0, "{range_m}");
+    }
+
+    #[test]
+    fn one_sample_is_what_it_is_and_none_is_nothing() {
+        let mut one = vec![Sample {
+            at: [0.0; 2],
+            inverse: 0.02,
+            sigma: 1e-4,
+        }];
+        let (range_m, sigma_m) = estimate(&mut one, PITCH).unwrap();
+        assert!(
+            (range_m - 50.0).abs() < 1e-9 && (sigma_m - 0.25).abs() < 1e-3,
+            "{range_m} {sigma_m}"
+        );
+        assert_eq!(estimate(&mut [], PITCH), None);
+    }
+}

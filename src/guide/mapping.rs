@@ -4,10 +4,9 @@
 //! into the lidar's image (Eq. 32). Lidar and cameras look the same way, so R_L = 1 and T_L is
 //! the camera's position.
 //!
-//! Several camera pixels land in one macropixel. The thesis mentions taking the most frequent
-//! value and itself discards duplicates for speed, without saying which one it keeps. Here the
-//! one that lands nearest to the macropixel's centre is kept, because that is where the lidar's
-//! range is wanted; of two as near, the one further up, then further left in the camera's image.
+//! Several camera pixels land in one macropixel. The thesis mentions taking the most frequent value and itself discards duplicates for speed, without
+//! saying which one it keeps. Here the one nearest to the macropixel's centre is kept, and the others tell the slope along which it is moved there,
+//! and whether there are two surfaces (`facet`).
 //!
 //! Camera and lidar stand in different places, so the camera may see what an edge hides from the
 //! lidar, and such a point can be the one kept. Guides of macropixels on the rim of near objects
