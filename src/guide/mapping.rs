@@ -54,17 +54,16 @@ pub(super) fn of_rig(scene: &Scene, rows: u32, cols: u32, seed: u64) -> GuideMap
     of_landings(&lidar, landings.into_iter().flatten())
 }
 
-/// Maps points onto a `rows` × `cols` array; `sigma_m` gives the standard deviation of a depth, m.
+/// Maps points, each with the standard deviation of its depth, m, onto a `rows` × `cols` array.
 pub(super) fn of_points<'p>(
     scene: &Scene,
     rows: u32,
     cols: u32,
-    points: impl IntoIterator<Item = &'p StereoPoint>,
-    sigma_m: impl Fn(f64) -> f64,
+    points: impl IntoIterator<Item = (&'p StereoPoint, f64)>,
 ) -> GuideMap {
     let lidar = scene.lidar_camera(rows, cols);
-    let landings =
-        (points.into_iter()).filter_map(|point| land(scene, &lidar, point, sigma_m(point.depth_m)));
+    let points = points.into_iter();
+    let landings = points.filter_map(|(point, sigma_m)| land(scene, &lidar, point, sigma_m));
     of_landings(&lidar, landings)
 }
 

@@ -269,9 +269,9 @@ mod tests {
         assert!((0.85..1.15).contains(&variance), "{variance}");
     }
 
-    /// What faces the radar has the error that is claimed. The road, which it does not see, is given the range of what stands on it.
+    /// Of the road, which radar hardly sees, macropixels are given the range of what stands on it; the claim holds them all the same.
     #[test]
-    fn over_the_street_what_faces_it_has_the_error_that_is_claimed() {
+    fn over_the_street_claims_hold_what_faces_it_and_what_it_grazes() {
         let scene = Scene::outdoor();
         let radar = Radar::default();
         let lidar = scene.lidar_camera(64, 64);
@@ -294,16 +294,15 @@ mod tests {
                 }
             }
         }
-        let within = |errors: &[f64], k: f64| {
-            errors.iter().filter(|e| **e <= k).count() as f64 / errors.len() as f64
-        };
-        let shares = [
-            within(&facing, 1.0),
-            within(&facing, 3.0),
-            within(&grazing, 3.0),
-        ];
-        assert!(shares[0] > 0.6 && shares[1] > 0.9, "{shares:?}");
-        assert!(shares[2] < 0.9, "{shares:?}");
+        // The normal share of 3 standard deviations less a hundredth.
+        for errors in [facing, grazing] {
+            let held = errors.iter().filter(|e| **e <= 3.0).count();
+            assert!(
+                held as f64 >= 0.987 * errors.len() as f64,
+                "{held} of {}",
+                errors.len()
+            );
+        }
     }
 
     #[test]
