@@ -5,7 +5,7 @@
 
 use std::fmt::Write;
 
-use super::{Guide, GuideError, GuideInput, GuideMap, PastFrame};
+use super::{GuideError, GuideInput, GuideMap, PastFrame};
 use crate::photon::{Purpose, normal, random_stream};
 use crate::scene::{GroundTruth, Scene};
 
