@@ -13,21 +13,32 @@
 //! everywhere. Images are as coarse as the sensor, or `finer` times as fine for a pair of short-range lidars with more pixels: at
 //! 64 columns over 16° and a baseline of 1 m a pixel of disparity is 4 m at 30 m.
 //!
-//! What has no pattern cannot be matched: of the built-in street, whose surfaces are plain, next to nothing is found.
+//! What has no pattern cannot be matched: of the built-in street, whose surfaces are plain, next to nothing is found, and nothing is told where the pattern
+//! does not stand out of the counts' noise, as in fog, or where a pixel of disparity is more than a tenth of the distance.
 //!
 //! Both lidars stand still, look straight ahead and see the scene at the same time; SPADs' dead time is left out, so that very bright
 //! pixels are not compressed.
 
 use rayon::prelude::*;
 
+use super::facet::{self, Sample};
 use super::{Guide, GuideError, GuideInput, GuideMap};
 use crate::photon::{PixelLight, Poisson, Purpose, normal, random_stream};
 use crate::scene::{DVec3, GroundTruth, Scene};
 use crate::settings::{Key, Range};
-use crate::stereo::{Census, GreyImage, Matcher};
+use crate::stereo::{Census, GreyImage, Matcher, Paths};
 
 /// What of a guide's random numbers tells this one's from others': the counts of either lidar.
 const DRAWS: [u32; 2] = [6, 7];
+
+/// Pixels to either side that are compared.
+const AROUND: usize = 2;
+
+/// Pattern over noise below which a pixel has no estimate: the matcher's errors are 0.6 px at 1.8 and it answers anything at 0.9 (DESIGN.md).
+const LEAST_TEXTURE: f64 = 2.0;
+
+/// Smallest disparity that is told, px: a whole pixel is then 10 % of the distance (thesis 5.2.1).
+const LEAST_DISPARITY_PX: f64 = 10.0;
 
 /// Counts from which a Poisson number is drawn as a normal one: their skewness is below 0.03.
 const MANY: f64 = 1000.0;
@@ -146,10 +157,21 @@ fn seen_from(scene: &Scene, from_m: DVec3) -> Scene {
     moved.at(1.0)
 }
 
-/// The middle one of some numbers, the lower of two; `None` of none.
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len().checked_sub(1)? / 2).copied()
+/// Whether the pattern about a pixel stands out of the counts' noise, whose standard deviation is ½ after the root.
+fn textured(counts: &[f64], width: usize) -> Vec<bool> {
+    let height = counts.len() / width;
+    let about = |at: usize, size: usize| at.saturating_sub(AROUND)..(at + AROUND + 1).min(size);
+    let is_textured = |pixel: usize| {
+        let rows = about(pixel / width, height);
+        let roots = rows
+            .flat_map(|y| about(pixel % width, width).map(move |x| counts[y * width + x].sqrt()));
+        let (n, sum, squares) = roots.fold((0.0, 0.0, 0.0), |(n, sum, squares), root| {
+            (n + 1.0, sum + root, squares + root * root)
+        });
+        let variance = (squares - sum * sum / n) / (n - 1.0);
+        variance > 0.25 * (1.0 + LEAST_TEXTURE * LEAST_TEXTURE)
+    };
+    (0..counts.len()).into_par_iter().map(is_textured).collect()
 }
 
 impl Guide for IntensityStereo {
@@ -171,6 +193,7 @@ impl Guide for IntensityStereo {
         if most < 1.0 {
             return Ok(nothing());
         }
+        let is_textured = textured(&left, (cols * self.finer) as usize);
         let images = [left, right].map(|counts| self.image(input, &counts, most));
         let [Some(left), Some(right)] = images else {
             return Ok(nothing());
@@ -178,10 +201,15 @@ impl Guide for IntensityStereo {
         // Disparities that leave half of the image to be matched.
         let widest = (cols * self.finer / 2).clamp(1, 255);
         let matcher = Matcher {
-            min_disparity: 1,
-            disparities: ((metre_pixels / self.nearest_m).ceil() as usize)
+            // From infinity on, lest what is farther than is told be matched wrongly.
+            min_disparity: 0,
+            disparities: ((metre_pixels / self.nearest_m).ceil() as usize + 1)
                 .clamp(1, widest as usize),
-            census: Census { cols: 5, rows: 5 },
+            census: Census {
+                cols: 2 * AROUND + 1,
+                rows: 2 * AROUND + 1,
+            },
+            paths: Paths::Four,
             speckle_px: 16,
             ..Matcher::default()
         };
@@ -189,16 +217,25 @@ impl Guide for IntensityStereo {
             return Ok(nothing());
         };
         let estimates = (0..rows).flat_map(|row| (0..cols).map(move |col| (row, col)));
+        let finer = f64::from(self.finer);
+        let pitch = [finer / lidar.focal_px, finer / lidar.focal_v_px];
         let estimates = estimates.map(|(row, col)| {
             let within = |at: u32| (at * self.finer..(at + 1) * self.finer).map(|at| at as usize);
-            let disparities = within(row).flat_map(|row| within(col).map(move |col| (row, col)));
-            let disparities = disparities.filter_map(|(row, col)| found.at(row, col));
-            let disparity_px = median(disparities.map(f64::from).collect())?;
-            let depth_m = metre_pixels / disparity_px;
-            let centre = [col, row].map(|at| (f64::from(at) + 0.5) * f64::from(self.finer));
-            let range_per_depth = lidar.at_unit_depth((centre[0], centre[1])).length();
-            let sigma_m = depth_m * depth_m * self.disparity_sigma_px / metre_pixels;
-            Some((depth_m * range_per_depth, sigma_m * range_per_depth))
+            let pixels = within(row).flat_map(|row| within(col).map(move |col| (row, col)));
+            let samples = pixels.filter_map(|(y, x)| {
+                let disparity_px = f64::from(found.at(y, x)?);
+                let is_told =
+                    disparity_px >= LEAST_DISPARITY_PX && is_textured[y * found.width() + x];
+                let at = [x as f64 + 0.5, y as f64 + 0.5];
+                let metre_pixels = metre_pixels * lidar.at_unit_depth((at[0], at[1])).length();
+                let off = |axis: usize, first: u32| at[axis] / finer - f64::from(first) - 0.5;
+                is_told.then_some(Sample {
+                    at: [off(0, col), off(1, row)],
+                    inverse: disparity_px / metre_pixels,
+                    sigma: self.disparity_sigma_px / metre_pixels,
+                })
+            });
+            facet::estimate(&mut samples.collect::<Vec<_>>(), pitch)
         });
         Ok(GuideMap::new(rows, cols, estimates))
     }

@@ -4,10 +4,9 @@
 //! into the lidar's image (Eq. 32). Lidar and cameras look the same way, so R_L = 1 and T_L is
 //! the camera's position.
 //!
-//! Several camera pixels land in one macropixel. The thesis mentions taking the most frequent
-//! value and itself discards duplicates for speed, without saying which one it keeps. Here the
-//! one that lands nearest to the macropixel's centre is kept, because that is where the lidar's
-//! range is wanted; of two as near, the one further up, then further left in the camera's image.
+//! Several camera pixels land in one macropixel. The thesis mentions taking the most frequent value and itself discards duplicates for speed, without
+//! saying which one it keeps. Here the one nearest to the macropixel's centre is kept, and the others tell the slope along which it is moved there,
+//! and whether there are two surfaces (`facet`).
 //!
 //! Camera and lidar stand in different places, so the camera may see what an edge hides from the
 //! lidar, and such a point can be the one kept. Guides of macropixels on the rim of near objects
@@ -15,6 +14,7 @@
 
 use rayon::prelude::*;
 
+use super::facet::{self, Sample};
 use super::map::GuideMap;
 use super::stereo::{StereoPoint, StereoRig};
 use crate::scene::{PinholeCamera, Scene};
@@ -29,10 +29,7 @@ const SAMPLES_ACROSS: f64 = 3.0;
 #[derive(Debug, Clone, Copy)]
 struct Landing {
     index: usize,
-    /// Squared distance from the macropixel's centre, in macropixels².
-    off_centre2: f64,
-    range_m: f64,
-    sigma_m: f64,
+    sample: Sample,
 }
 
 /// Measures with the scene's stereo rig and maps onto a `rows` × `cols` array; equal seeds
@@ -54,32 +51,36 @@ pub(super) fn of_rig(scene: &Scene, rows: u32, cols: u32, seed: u64) -> GuideMap
                 .collect()
         })
         .collect();
-    nearest_to_centres(rows, cols, landings.into_iter().flatten())
+    of_landings(&lidar, landings.into_iter().flatten())
 }
 
-/// Maps points onto a `rows` × `cols` array; `sigma_m` gives the standard deviation of a depth, m.
+/// Maps points, each with the standard deviation of its depth, m, onto a `rows` × `cols` array.
 pub(super) fn of_points<'p>(
     scene: &Scene,
     rows: u32,
     cols: u32,
-    points: impl IntoIterator<Item = &'p StereoPoint>,
-    sigma_m: impl Fn(f64) -> f64,
+    points: impl IntoIterator<Item = (&'p StereoPoint, f64)>,
 ) -> GuideMap {
     let lidar = scene.lidar_camera(rows, cols);
-    let landings =
-        (points.into_iter()).filter_map(|point| land(scene, &lidar, point, sigma_m(point.depth_m)));
-    nearest_to_centres(rows, cols, landings)
+    let points = points.into_iter();
+    let landings = points.filter_map(|(point, sigma_m)| land(scene, &lidar, point, sigma_m));
+    of_landings(&lidar, landings)
 }
 
-fn nearest_to_centres(rows: u32, cols: u32, landings: impl Iterator<Item = Landing>) -> GuideMap {
-    let mut best: Vec<Option<Landing>> = vec![None; rows as usize * cols as usize];
-    for landing in landings {
-        let slot = &mut best[landing.index];
-        if slot.is_none_or(|b| landing.off_centre2 < b.off_centre2) {
-            *slot = Some(landing);
-        }
+/// One estimate of all that lands in a macropixel.
+fn of_landings(lidar: &PinholeCamera, landings: impl Iterator<Item = Landing>) -> GuideMap {
+    let (rows, cols) = (lidar.height, lidar.width);
+    let mut landings: Vec<Landing> = landings.collect();
+    // Stable, so that of two samples as near to a centre the one further up, then further left, comes first.
+    landings.sort_by_key(|landing| landing.index);
+    let mut estimates = vec![None; rows as usize * cols as usize];
+    let pitch = [1.0 / lidar.focal_px, 1.0 / lidar.focal_v_px];
+    let mut samples = Vec::new();
+    for of_one in landings.chunk_by(|a, b| a.index == b.index) {
+        samples.clear();
+        samples.extend(of_one.iter().map(|landing| landing.sample));
+        estimates[of_one[0].index] = facet::estimate(&mut samples, pitch);
     }
-    let estimates = best.iter().map(|b| b.map(|b| (b.range_m, b.sigma_m)));
     GuideMap::new(rows, cols, estimates)
 }
 
@@ -129,11 +130,14 @@ fn land(
     let (du, dv) = (u - f64::from(col) - 0.5, v - f64::from(row) - 0.5);
     // The error is along the camera's ray: what of it the lidar sees as range is its share along the lidar's.
     let range_per_depth = from_lidar.normalize().dot(point.point_m) / point.depth_m;
+    let range_m = from_lidar.length();
     Some(Landing {
         index: row as usize * lidar.width as usize + col as usize,
-        off_centre2: du * du + dv * dv,
-        range_m: from_lidar.length(),
-        sigma_m: sigma_m * range_per_depth.abs(),
+        sample: Sample {
+            at: [du, dv],
+            inverse: 1.0 / range_m,
+            sigma: sigma_m * range_per_depth.abs() / (range_m * range_m),
+        },
     })
 }
 

@@ -8,7 +8,8 @@
 //! claim, which the windows rely on (Eq. 25) and which may be wrong as the range may be.
 
 mod behavioural;
-mod fitted;
+pub mod claims;
+mod facet;
 mod from_file;
 mod fused;
 mod intensity;
@@ -32,7 +33,6 @@ use std::fmt::Debug;
 use crate::scene::{DVec3, Scene};
 
 pub use behavioural::BehaviouralStereo;
-pub use fitted::FittedStereo;
 pub use from_file::FileMap;
 pub use fused::{Fused, MOST_GUIDES};
 pub use intensity::IntensityStereo;

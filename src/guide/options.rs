@@ -9,10 +9,9 @@ use toml::Table;
 use super::from_file::{FileMap, FileSigma};
 use super::fused::{Fused, MOST_GUIDES};
 use super::{
-    BehaviouralStereo, FittedStereo, Guide, IntensityStereo, Kalman, MatchedStereo, Monocular,
-    NoisyTruth, Radar,
+    BehaviouralStereo, Guide, IntensityStereo, Kalman, MatchedStereo, Monocular, NoisyTruth, Radar,
 };
-use super::{fitted, intensity, kalman, monocular, noisy_truth, radar, rendered};
+use super::{intensity, kalman, monocular, noisy_truth, radar, rendered};
 use crate::files::InputError;
 use crate::settings::{Document, Key, Range};
 
@@ -53,12 +52,6 @@ pub const KINDS: &[Kind] = &[
         what: "The scene's camera pair: rendered images, semi-global matching",
         keys: rendered::KEYS,
         make: |document, keys| Ok(Arc::new(read::<MatchedStereo>(document, keys)?)),
-    },
-    Kind {
-        name: "fitted",
-        what: "The scene's camera pair with errors drawn as the matcher makes them",
-        keys: fitted::KEYS,
-        make: |document, keys| Ok(Arc::new(read::<FittedStereo>(document, keys)?)),
     },
     Kind {
         name: "monocular",
@@ -237,7 +230,6 @@ mod tests {
             (monocular::KEYS, Table::try_from(Monocular::default())),
             (radar::KEYS, Table::try_from(Radar::default())),
             (rendered::KEYS, Table::try_from(MatchedStereo::default())),
-            (fitted::KEYS, Table::try_from(FittedStereo::default())),
             (intensity::KEYS, Table::try_from(IntensityStereo::default())),
             (kalman::KEYS, Table::try_from(Kalman::default())),
         ];

@@ -13,9 +13,10 @@
 //! clutter, no multipath, no Doppler.
 //!
 //! A beam's range is one for all of its macropixels, and which of the surfaces in the beam one of them sees, radar does not know. Its
-//! claim says so: the variance is that of the range itself and the spread of the beam's profile about it, each cell weighted by the
-//! solid angle that its power stands for (power·r²). What sends nothing back is in no profile: where a beam sees a car and the road
-//! before it, macropixels that see the road get the car's range and claim, which only the lidar itself or another guide can correct.
+//! claim says so: the variance is that of the range itself and the spread of the beam's profile about it. Power alone tells little of how much
+//! of the beam a surface fills: a road that is met at 3 degrees sends back a 400th of what a car does. But it fills a run of cells, and a plane that crosses
+//! the beam has in each of them a solid angle that goes as 1/r². So a cell counts with the solid angle that its power would stand for if it faced the radar
+//! (power·r²), and every run once more as a plane that crosses the whole beam.
 
 use rayon::prelude::*;
 
@@ -29,6 +30,10 @@ const DRAWS: u32 = 5;
 
 /// Rays across a beam, either way: surfaces of a sixteenth of a beam are found.
 const RAYS_ACROSS: u32 = 16;
+
+/// Cells are of one run when they are nearer to each other than this part of twice their range. Farther road falls into several runs, which makes claims wider:
+/// of a street and a van's road like the built-in ones 3 σ hold 0.999 and 1.000 with it, with 0.1 and more 0.977 and 0.989.
+const SAME_RUN: f64 = 0.05;
 
 /// A radar that looks where the lidar looks.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -103,6 +108,21 @@ struct Echo {
     power: f64,
 }
 
+/// A range cell in which something is.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    number: i64,
+    power: f64,
+    /// Power times range, m.
+    moment: f64,
+}
+
+impl Cell {
+    fn range_m(&self) -> f64 {
+        self.moment / self.power
+    }
+}
+
 impl Radar {
     /// The beam, counted from the one about the axis, that a direction is in: column and row.
     fn beam_of(&self, towards: DVec3) -> (i32, i32) {
@@ -144,28 +164,44 @@ impl Radar {
 
     /// Range of the strongest cell, and its variance as the range of any surface of the beam, m and m².
     fn strongest(&self, echoes: &[Echo]) -> Option<(f64, f64)> {
-        let cell = |echo: &Echo| (echo.range_m / self.resolution_m).floor() as i64;
-        let mut cells: Vec<(i64, f64, f64)> = Vec::new();
         let mut sorted = echoes.to_vec();
         sorted.sort_by(|a, b| a.range_m.total_cmp(&b.range_m));
+        let number = |range_m: f64| (range_m / self.resolution_m).floor() as i64;
+        let mut cells: Vec<Cell> = Vec::new();
         for echo in &sorted {
             let moment = echo.power * echo.range_m;
             match cells.last_mut() {
-                Some((last, power, sum)) if *last == cell(echo) => {
-                    *power += echo.power;
-                    *sum += moment;
+                Some(last) if last.number == number(echo.range_m) => {
+                    last.power += echo.power;
+                    last.moment += moment;
                 }
-                _ => cells.push((cell(echo), echo.power, moment)),
+                _ => cells.push(Cell {
+                    number: number(echo.range_m),
+                    power: echo.power,
+                    moment,
+                }),
             }
         }
-        let (_, power, sum) = cells.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let range_m = sum / power;
-        let weights = echoes
-            .iter()
-            .map(|e| (e.power * e.range_m.powi(2), e.range_m));
-        let (total, spread) = weights.fold((0.0, 0.0), |(total, spread), (w, r)| {
-            (total + w, spread + w * (r - range_m).powi(2))
-        });
+        let strongest = (cells.iter()).max_by(|a, b| a.power.total_cmp(&b.power))?;
+        let range_m = strongest.range_m();
+        let (mut total, mut spread) = (0.0, 0.0);
+        let mut add = |share: f64, cell: &Cell| {
+            total += share;
+            spread += share * (cell.range_m() - range_m).powi(2);
+        };
+        for run in cells
+            .chunk_by(|a, b| (a.range_m() + b.range_m()) * SAME_RUN > b.range_m() - a.range_m())
+        {
+            let of_cell = |cell: &Cell| cell.range_m().powi(-2);
+            let all: f64 = run.iter().map(of_cell).sum();
+            for cell in run {
+                add(cell.power * cell.range_m().powi(2), cell);
+                add(
+                    f64::from(RAYS_ACROSS * RAYS_ACROSS) * of_cell(cell) / all,
+                    cell,
+                );
+            }
+        }
         Some((range_m, spread / total))
     }
 }
@@ -233,9 +269,9 @@ mod tests {
         assert!((0.85..1.15).contains(&variance), "{variance}");
     }
 
-    /// What faces the radar has the error that is claimed. The road, which it does not see, is given the range of what stands on it.
+    /// Of the road, which radar hardly sees, macropixels are given the range of what stands on it; the claim holds them all the same.
     #[test]
-    fn over_the_street_what_faces_it_has_the_error_that_is_claimed() {
+    fn over_the_street_claims_hold_what_faces_it_and_what_it_grazes() {
         let scene = Scene::outdoor();
         let radar = Radar::default();
         let lidar = scene.lidar_camera(64, 64);
@@ -258,16 +294,15 @@ mod tests {
                 }
             }
         }
-        let within = |errors: &[f64], k: f64| {
-            errors.iter().filter(|e| **e <= k).count() as f64 / errors.len() as f64
-        };
-        let shares = [
-            within(&facing, 1.0),
-            within(&facing, 3.0),
-            within(&grazing, 3.0),
-        ];
-        assert!(shares[0] > 0.6 && shares[1] > 0.9, "{shares:?}");
-        assert!(shares[2] < 0.9, "{shares:?}");
+        // The normal share of 3 standard deviations less a hundredth.
+        for errors in [facing, grazing] {
+            let held = errors.iter().filter(|e| **e <= 3.0).count();
+            assert!(
+                held as f64 >= 0.987 * errors.len() as f64,
+                "{held} of {}",
+                errors.len()
+            );
+        }
     }
 
     #[test]

@@ -57,11 +57,6 @@ impl<'a> StereoRig<'a> {
         }
     }
 
-    /// The scene, made ready for many rays.
-    pub(super) fn stage(&self) -> &Stage<'a> {
-        &self.stage
-    }
-
     /// Either camera, in its own coordinates.
     pub fn camera(&self) -> &PinholeCamera {
         &self.camera
@@ -100,7 +95,7 @@ impl<'a> StereoRig<'a> {
     }
 
     /// The disparity of what the principal camera sees at pixel coordinates; `None` in the sky and where the right camera does not see it.
-    pub(super) fn true_disparity_px(&self, at: (f64, f64)) -> Option<f64> {
+    fn true_disparity_px(&self, at: (f64, f64)) -> Option<f64> {
         let stereo = &self.stage.scene().stereo;
         let ray = Ray::new(stereo.position_m, self.camera.at_unit_depth(at));
         let point_m = ray.at(self.stage.range_to_hit(&ray)?);

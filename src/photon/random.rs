@@ -45,8 +45,6 @@ pub enum Purpose {
     SpadSpread = 21,
     /// Which points a study takes.
     Sweep = 22,
-    /// Errors of the fitted camera pair, alike in neighbouring pixels.
-    StereoField = 23,
 }
 
 /// The stream of random words for (`seed`, `purpose`, `index`, `sub_index`).

@@ -6,14 +6,14 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::{Spelling, guided_exposure, read_calibration};
-use crate::chip::{Sensor, Tdc};
+use crate::chip::Sensor;
 use crate::engine::CohortOptions;
 use crate::files::InputError;
 use crate::guide::{BehaviouralStereo, Guide, GuideInput, options};
 use crate::ranging::DepthOptions;
 use crate::scene::Scene;
 use crate::settings::{Key, Range};
-use crate::system::{EngineKind, FrameError, FrameSettings, WindowPolicy};
+use crate::system::{EngineKind, FrameError, FrameSettings, NoBins, WindowPolicy};
 
 /// What is asked of a frame beside its sensor and scene ([`Sources`](super::Sources)). Defaults are those of `gdtof frame`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -244,17 +244,16 @@ impl FrameRequest {
         let input = GuideInput::still(scene, sensor.rows as u32, sensor.cols as u32, self.seed);
         let map = guide.estimate(&input)?;
         let slowed = policy.slowed(&map, &sensor, self.stop_periods);
-        Ok(slowed.ok_or_else(|| {
-            let message = match sensor.tdc {
-                Tdc::DelayLine => {
-                    "bins of delay lines do not follow CLK; leave it out".to_owned()
-                }
-                Tdc::Clocked => format!(
-                    "no CLK makes bins that hold what this guide claims; give another guide or a smaller {} within",
+        Ok(slowed.map_err(|no_bins| {
+            let cure = match no_bins {
+                NoBins::DelayLines => String::new(),
+                NoBins::Unsure { .. } => format!(
+                    "; give another guide or a smaller {} within",
                     self.spelling.name("windows")
                 ),
             };
-            InputError::new(self.spelling.name("bins_from_guide"), message)
+            let name = self.spelling.name("bins_from_guide");
+            InputError::new(name, format!("{no_bins}{cure}"))
         })?)
     }
 }

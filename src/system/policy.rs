@@ -35,7 +35,7 @@ use crate::numerics::normal_above;
 use crate::ranging::BinProfile;
 use crate::units::Time;
 
-pub use bins::share_held;
+pub use bins::{NoBins, share_held};
 pub use options::POLICY_KEYS;
 
 /// What a macropixel does of which the guide says nothing.
