@@ -190,7 +190,10 @@ impl WalkCorrection {
         let mut starts: Vec<(f64, EchoLight)> = Vec::new();
         // Where light makes bins count less, too, each light has its own places.
         let (step, fits) = match edge {
-            Some((bin, _)) if edge_is_seen(bin) => (0.4, 2),
+            // With a THRESHOLD few bins count, and several lights may explain them.
+            Some((bin, _)) if edge_is_seen(bin) && self.response.counting().threshold == 0 => {
+                (0.4, 2)
+            }
             Some(_) => (0.4, 6),
             None => (0.2, 8),
         };
