@@ -113,6 +113,10 @@ impl WalkCorrection {
         };
         // The glow after an echo that came before the window may look like a weaker one.
         let begins_unseen = best.light.position_bins < 2.0 * best.light.sigma_bins;
+        // So may the few bins in which enough SPADs fire, before all are blind.
+        let counting = self.response.counting();
+        let is_edge = counting.threshold > 0 && best.light.signal > counting.spads as f64;
+        let begins_unseen = begins_unseen || is_edge;
         if linear.is_some() && begins_unseen {
             best = self.of_many(&of_all, (peak, background))?;
         }
@@ -194,7 +198,7 @@ impl WalkCorrection {
             Some((bin, _)) if edge_is_seen(bin) && self.response.counting().threshold == 0 => {
                 (0.4, 2)
             }
-            Some(_) => (0.4, 6),
+            Some(_) => (0.2, 24),
             None => (0.2, 8),
         };
         for number in (-0.6 / step) as i32..=(4.0 / step) as i32 {
