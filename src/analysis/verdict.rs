@@ -80,6 +80,8 @@ pub struct TimingVerdict {
     pub margins: Vec<Margin>,
     /// What should be known beside them.
     pub notes: Vec<String>,
+    /// The one among the notes that says by how many bins windows end later, where they do.
+    pub later_windows: Option<String>,
 }
 
 /// The verdict as JSON: times in picoseconds.
@@ -97,6 +99,9 @@ pub struct VerdictReport {
     pub verdict: String,
     /// What should be known beside it.
     pub notes: Vec<String>,
+    /// The one among the notes that says by how many bins windows end later, where they do.
+    #[serde(skip)]
+    pub later_windows: Option<String>,
 }
 
 impl TimingVerdict {
@@ -128,8 +133,12 @@ impl TimingVerdict {
             });
         }
         margins.sort_by_key(|margin| margin.slack);
+        let later_windows = is_met.then(|| later_windows(config, &pixel, aim)).flatten();
         TimingVerdict {
-            notes: notes(config, is_met.then_some((&pixel, aim))),
+            notes: (later_windows.iter().cloned())
+                .chain(cancelling_photons(config))
+                .collect(),
+            later_windows,
             margins,
         }
     }
@@ -154,6 +163,7 @@ impl TimingVerdict {
             path: worst.path.clone(),
             verdict: self.to_string(),
             notes: self.notes.clone(),
+            later_windows: self.later_windows.clone(),
         }
     }
 }
@@ -322,31 +332,32 @@ fn law_race(config: &SensorConfig) -> Option<Race> {
     }
 }
 
-/// What should be known of a sensor; `met` is the macropixel and its aim if all limits are kept.
-fn notes(config: &SensorConfig, met: Option<(&MacropixelTiming, Aim)>) -> Vec<String> {
-    let period = config.clock().period();
-    let mut notes = Vec::new();
-    let is_clocked = config.tdc == Tdc::Clocked;
-    if let Some((pixel, aim)) = met.filter(|(_, aim)| is_clocked && aim.edges > 0) {
-        let earlier = aim.earlier();
-        let hold = pixel.hits.iter().filter(|r| r.kind == CheckKind::Hold);
-        let slack = hold
-            .map(|r| pixel.strobe_slack(r, period, config.stop_phase(), earlier))
-            .min();
-        notes.push(format!(
-            "the strobe comes after {} that it precedes at a slow clock, and windows end {} later, as the window law has it; the hold slack of {} before that edge is of a path that nothing exercises",
-            plural(aim.edges, "rising CLK edge"),
-            plural(aim.moved(), "bin"),
-            slack.unwrap_or_default()
-        ));
+/// By how many bins windows end later, where the strobe comes after CLK edges that it precedes at a slow clock.
+fn later_windows(config: &SensorConfig, pixel: &MacropixelTiming, aim: Aim) -> Option<String> {
+    if config.tdc != Tdc::Clocked || aim.edges <= 0 {
+        return None;
     }
-    if is_clocked && config.dead_time() <= period {
-        notes.push(format!(
-            "two photons of a SPAD within a CLK period ({period}) cancel, as the dead time ({}) lets them",
-            config.dead_time()
-        ));
-    }
-    notes
+    let (period, earlier) = (config.clock().period(), aim.earlier());
+    let hold = pixel.hits.iter().filter(|r| r.kind == CheckKind::Hold);
+    let slack = hold
+        .map(|r| pixel.strobe_slack(r, period, config.stop_phase(), earlier))
+        .min();
+    Some(format!(
+        "the strobe comes after {} that it precedes at a slow clock, and windows end {} later, as the window law has it; the hold slack of {} before that edge is of a path that nothing exercises",
+        plural(aim.edges, "rising CLK edge"),
+        plural(aim.moved(), "bin"),
+        slack.unwrap_or_default()
+    ))
+}
+
+/// Whether photons can cancel in a front end that CLK samples.
+fn cancelling_photons(config: &SensorConfig) -> Option<String> {
+    let (period, dead_time) = (config.clock().period(), config.dead_time());
+    (config.tdc == Tdc::Clocked && dead_time <= period).then(|| {
+        format!(
+            "two photons of a SPAD within a CLK period ({period}) cancel, as the dead time ({dead_time}) lets them"
+        )
+    })
 }
 
 fn plural(count: i64, what: &str) -> String {

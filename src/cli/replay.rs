@@ -188,7 +188,8 @@ impl Summary {
         if let Some(timing) = self.timing.as_ref().filter(|timing| !timing.met) {
             eprintln!("gdtof: timing {}", timing.verdict);
         }
-        for text in self.timing.iter().flat_map(|timing| &timing.notes) {
+        let later_windows = |timing: &VerdictReport| timing.later_windows.clone();
+        if let Some(text) = self.timing.as_ref().and_then(later_windows) {
             note(format_args!("note on timing: {text}"));
         }
         if self.photons_that_cancel > 0 {
