@@ -189,14 +189,15 @@ impl<'s> Part<'s> {
         let beside =
             carried[0] * (kept.at[0] - self.middle[0]) + carried[1] * (kept.at[1] - self.middle[1]);
         let along = carried[0] * way[0] + carried[1] * way[1];
-        let variance = self.sigma2 * (1.0 + 2.0 * beside + along).max(0.0);
+        let mut variance = self.sigma2 * (1.0 + 2.0 * beside + along).max(0.0);
         // Where samples are missing, the part may reach on as far again.
-        let mut variance = variance;
         if is_alone {
-            for axis in 0..2 {
-                let slope2 = self.slope[axis].powi(2) + self.slope2[axis];
-                variance += slope2 * place[axis].powi(2) / 3.0;
-            }
+            let slopes2 =
+                (self.slope.iter().zip(self.slope2)).map(|(slope, own)| slope * slope + own);
+            let reaches = slopes2
+                .zip(place)
+                .map(|(slope2, way)| slope2 * way * way / 3.0);
+            variance += reaches.sum::<f64>();
         }
         let spread = self.slope.iter().map(|g| g * g / 12.0).sum::<f64>();
         let square = inverse * inverse;
