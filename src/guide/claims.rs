@@ -202,7 +202,7 @@ mod tests {
             let short_by = match guide {
                 "matched" => 0.016,
                 "intensity" => 0.23,
-                "monocular" | "stereo+radar+monocular" => 0.014,
+                "stereo+radar+monocular" => 0.014,
                 _ => 0.01,
             };
             assert!(
