@@ -199,9 +199,9 @@ impl<'s> Part<'s> {
         // Where samples are missing, the part may reach on as far again.
         let mut variance = variance;
         if is_alone {
-            for axis in 0..2 {
+            for (axis, place) in place.iter().enumerate() {
                 let slope2 = self.slope[axis].powi(2) + self.slope2[axis];
-                variance += slope2 * place[axis].powi(2) / 3.0;
+                variance += slope2 * place.powi(2) / 3.0;
             }
         }
         let spread = self.slope.iter().map(|g| g * g / 12.0).sum::<f64>();

@@ -63,7 +63,7 @@ impl DisparityMap {
     /// Which answers may be a nearer surface's that begins up to `reach_px` beside them: costs compare neighbourhoods, so its edge is found anywhere
     /// within half of one. Length width·height, row by row.
     ///
-    /// Along a row or a column a surface ends where the next answer differs by more than [`STEP_PX`], however many are missing between, for the
+    /// Along a row or a column a surface ends where the next answer differs by more than a pixel, however many are missing between, for the
     /// right camera does not see what a near surface hides. The middle of one that is narrower than both of its rims stays. With `gaps_end`, for
     /// images of which edges alone have answers, surfaces end where answers are missing, too, and no middle stays.
     pub fn rims(&self, reach_px: usize, gaps_end: bool) -> Vec<bool> {
