@@ -25,6 +25,8 @@ pub(super) struct Sample {
     /// Inverse distance from the lidar, 1/m, and its standard deviation as the rig tells.
     pub(super) inverse: f64,
     pub(super) sigma: f64,
+    /// Whether its depth may be that of a nearer surface beside it, as a matcher's is at rims ([`crate::stereo::DisparityMap::rims`]).
+    pub(super) is_rim: bool,
 }
 
 /// A macropixel's width and height as the lidar sees them, rad.
@@ -46,7 +48,7 @@ const OFF_CENTRE: f64 = 0.2;
 /// Standard deviation of the logarithm of two surfaces' reflectivities over each other: from a tenth to a half is 1.6 of it.
 const LOG_REFLECTIVITY: f64 = 1.0;
 
-/// Range and its standard deviation, m; `None` without samples.
+/// Range and its standard deviation, m; `None` without samples, or where all of those that are meant may be of a surface beside.
 pub(super) fn estimate(samples: &mut [Sample], pitch: Pitch) -> Option<(f64, f64)> {
     samples.sort_by(|a, b| a.inverse.total_cmp(&b.inverse));
     let mut parts = Vec::new();
@@ -55,6 +57,10 @@ pub(super) fn estimate(samples: &mut [Sample], pitch: Pitch) -> Option<(f64, f64
         .iter()
         .copied()
         .reduce(|a, b| if b.light > a.light { b } else { a })?;
+    // The rest may be brighter or not: what is at the rim says neither.
+    if brightest.samples.iter().all(|sample| sample.is_rim) {
+        return None;
+    }
     let is_alone = parts.len() == 1;
     let (range_m, mut variance_m2) = brightest.range(is_alone);
     for other in parts.iter().filter(|other| other.first != brightest.first) {
@@ -189,15 +195,14 @@ impl<'s> Part<'s> {
         let beside =
             carried[0] * (kept.at[0] - self.middle[0]) + carried[1] * (kept.at[1] - self.middle[1]);
         let along = carried[0] * way[0] + carried[1] * way[1];
-        let mut variance = self.sigma2 * (1.0 + 2.0 * beside + along).max(0.0);
+        let variance = self.sigma2 * (1.0 + 2.0 * beside + along).max(0.0);
         // Where samples are missing, the part may reach on as far again.
+        let mut variance = variance;
         if is_alone {
-            let slopes2 =
-                (self.slope.iter().zip(self.slope2)).map(|(slope, own)| slope * slope + own);
-            let reaches = slopes2
-                .zip(place)
-                .map(|(slope2, way)| slope2 * way * way / 3.0);
-            variance += reaches.sum::<f64>();
+            for (axis, place) in place.iter().enumerate() {
+                let slope2 = self.slope[axis].powi(2) + self.slope2[axis];
+                variance += slope2 * place.powi(2) / 3.0;
+            }
         }
         let spread = self.slope.iter().map(|g| g * g / 12.0).sum::<f64>();
         let square = inverse * inverse;
@@ -236,6 +241,7 @@ mod tests {
                 at,
                 inverse: middle + slope[0] * at[0] + slope[1] * at[1] + error,
                 sigma,
+                is_rim: false,
             }
         });
         samples.collect()
@@ -332,11 +338,30 @@ mod tests {
     }
 
     #[test]
+    fn what_may_be_a_surface_beside_is_not_told() {
+        let of = |ranges_m, rims: &[usize]| {
+            let mut samples = columns(ranges_m);
+            for (number, sample) in samples.iter_mut().enumerate() {
+                sample.is_rim = rims.contains(&(number % 3));
+            }
+            estimate(&mut samples, PITCH)
+        };
+        let mixed = [Some(20.0), Some(20.0), Some(110.0)];
+        // The near one is sure in one of its columns.
+        assert_eq!(of(mixed, &[1]), of(mixed, &[]));
+        assert_eq!(of(mixed, &[0, 1]), None);
+        let plane = [Some(20.0); 3];
+        assert_eq!(of(plane, &[0, 1, 2]), None);
+        assert_eq!(of(plane, &[0, 1]), of(plane, &[]));
+    }
+
+    #[test]
     fn one_sample_is_what_it_is_and_none_is_nothing() {
         let mut one = vec![Sample {
             at: [0.0; 2],
             inverse: 0.02,
             sigma: 1e-4,
+            is_rim: false,
         }];
         let (range_m, sigma_m) = estimate(&mut one, PITCH).unwrap();
         assert!(

@@ -213,9 +213,13 @@ impl Guide for IntensityStereo {
             speckle_px: 16,
             ..Matcher::default()
         };
-        let Ok(found) = matcher.match_pair(&left, &right) else {
+        let Ok(mut found) = matcher.match_pair(&left, &right) else {
             return Ok(nothing());
         };
+        found.keep(|at, px| is_textured[at] && f64::from(px) >= LEAST_DISPARITY_PX);
+        // What has no pattern has no answer, so a surface before it ends where answers do. With the middle of narrow ones 0.047 of the street's targets have an
+        // estimate, and 0.81 of them are within 3 σ; without it 0.005, all of which are.
+        let rims = found.rims(AROUND, true);
         let estimates = (0..rows).flat_map(|row| (0..cols).map(move |col| (row, col)));
         let finer = f64::from(self.finer);
         let pitch = [finer / lidar.focal_px, finer / lidar.focal_v_px];
@@ -224,15 +228,14 @@ impl Guide for IntensityStereo {
             let pixels = within(row).flat_map(|row| within(col).map(move |col| (row, col)));
             let samples = pixels.filter_map(|(y, x)| {
                 let disparity_px = f64::from(found.at(y, x)?);
-                let is_told =
-                    disparity_px >= LEAST_DISPARITY_PX && is_textured[y * found.width() + x];
                 let at = [x as f64 + 0.5, y as f64 + 0.5];
                 let metre_pixels = metre_pixels * lidar.at_unit_depth((at[0], at[1])).length();
                 let off = |axis: usize, first: u32| at[axis] / finer - f64::from(first) - 0.5;
-                is_told.then_some(Sample {
+                Some(Sample {
                     at: [off(0, col), off(1, row)],
                     inverse: disparity_px / metre_pixels,
                     sigma: self.disparity_sigma_px / metre_pixels,
+                    is_rim: rims[y * found.width() + x],
                 })
             });
             facet::estimate(&mut samples.collect::<Vec<_>>(), pitch)

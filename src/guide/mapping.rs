@@ -54,16 +54,20 @@ pub(super) fn of_rig(scene: &Scene, rows: u32, cols: u32, seed: u64) -> GuideMap
     of_landings(&lidar, landings.into_iter().flatten())
 }
 
-/// Maps points, each with the standard deviation of its depth, m, onto a `rows` × `cols` array.
+/// Maps points, each with the standard deviation of its depth, m, and whether it is at the rim of a near surface, onto a `rows` × `cols` array.
 pub(super) fn of_points<'p>(
     scene: &Scene,
     rows: u32,
     cols: u32,
-    points: impl IntoIterator<Item = (&'p StereoPoint, f64)>,
+    points: impl IntoIterator<Item = (&'p StereoPoint, f64, bool)>,
 ) -> GuideMap {
     let lidar = scene.lidar_camera(rows, cols);
     let points = points.into_iter();
-    let landings = points.filter_map(|(point, sigma_m)| land(scene, &lidar, point, sigma_m));
+    let landings = points.filter_map(|(point, sigma_m, is_rim)| {
+        let mut landing = land(scene, &lidar, point, sigma_m)?;
+        landing.sample.is_rim = is_rim;
+        Some(landing)
+    });
     of_landings(&lidar, landings)
 }
 
@@ -137,6 +141,7 @@ fn land(
             at: [du, dv],
             inverse: 1.0 / range_m,
             sigma: sigma_m * range_per_depth.abs() / (range_m * range_m),
+            is_rim: false,
         },
     })
 }

@@ -25,9 +25,13 @@ const DRAWS: [u32; 3] = [2, 3, 4];
 /// Shares of the error's variance that are common to the frame, to a patch, and a macropixel's own; chosen.
 const SHARES: [f64; 3] = [0.2, 0.7, 0.1];
 
+/// Standard deviations that must hold the target: the windows' (Eq. 25).
+const WINDOW_SIGMAS: f64 = 3.0;
+
 /// A learned depth map with the errors of thesis 5.3.
 ///
-/// The claimed standard deviation is that of inverse depth, σ, turned into range at the estimate: z²·σ along the axis.
+/// The claim holds three standard deviations of inverse depth, which is what errs normally, on the far side, where they are longer: a third of
+/// 1/(1/ẑ − 3σ) − ẑ, which is ẑ²·σ where that is small. What lies beyond `farthest_m` is not told apart, so the far side ends there, but ẑ²·σ is the least.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Monocular {
@@ -74,6 +78,14 @@ pub(super) const KEYS: &[Key] = &[
 ];
 
 impl Monocular {
+    /// The standard deviation claimed of a depth, m, when that of inverse depth is `sigma_per_m`.
+    fn claim_m(&self, depth_m: f64, sigma_per_m: f64) -> f64 {
+        let least_per_m = 1.0 / depth_m - WINDOW_SIGMAS * sigma_per_m;
+        let far_m = 1.0 / least_per_m.max(1.0 / self.farthest_m);
+        let far_side_m = (far_m - depth_m) / WINDOW_SIGMAS;
+        far_side_m.max(depth_m * depth_m * sigma_per_m)
+    }
+
     /// The error of a macropixel in standard deviations.
     fn error(&self, seed: u64, row: u32, col: u32) -> f64 {
         let draw = |what: usize, row: u32, col: u32| {
@@ -115,7 +127,7 @@ impl Guide for Monocular {
             let inverse = range_per_depth / (*range_m)?;
             let estimated = inverse + sigma_per_m * self.error(input.seed, row, col);
             let depth_m = 1.0 / estimated.max(1.0 / self.farthest_m);
-            let sigma_m = depth_m * depth_m * sigma_per_m;
+            let sigma_m = self.claim_m(depth_m, sigma_per_m);
             Some((depth_m * range_per_depth, sigma_m * range_per_depth))
         });
         Ok(GuideMap::new(rows, cols, estimates))
@@ -127,6 +139,7 @@ mod tests {
     use super::*;
     use crate::guide::BehaviouralStereo;
     use crate::guide::test_scenes::{rms_error_m, wall_at};
+    use proptest::prelude::*;
 
     #[test]
     fn inverse_depths_have_the_claimed_error_and_neighbours_share_most_of_it() {
@@ -143,6 +156,27 @@ mod tests {
         assert!((variance - 1.0).abs() < 4.0 * standard_error, "{variance}");
         // All but the macropixel's own share, less what the patch changes over one macropixel.
         assert!((0.8..0.95).contains(&correlation), "{correlation}");
+    }
+
+    proptest! {
+        #[test]
+        fn three_sigma_of_inverse_depth_are_within_three_of_depth(
+            depth_m in 5.0f64..150.0, error in -3.0f64..3.0, times in 0.01f64..1.0,
+        ) {
+            let guide = Monocular::default();
+            // Up to what reaches as far as anything is told.
+            let sigma_per_m = times * (1.0 / depth_m - 1.0 / guide.farthest_m) / 3.0;
+            let claim_m = guide.claim_m(depth_m, sigma_per_m);
+            let true_m = 1.0 / (1.0 / depth_m + error * sigma_per_m);
+            prop_assert!((true_m - depth_m).abs() <= 3.0 * claim_m * (1.0 + 1e-9));
+            // No wider than the far side asks.
+            let far_m = 1.0 / (1.0 / depth_m - 3.0 * sigma_per_m);
+            prop_assert!((depth_m + 3.0 * claim_m - far_m).abs() < 1e-9 * far_m);
+            // Nothing is told of what is beyond.
+            let of_far_m = guide.claim_m(guide.farthest_m, sigma_per_m);
+            let linear_m = guide.farthest_m * guide.farthest_m * sigma_per_m;
+            prop_assert!((of_far_m - linear_m).abs() < 1e-9 * linear_m);
+        }
     }
 
     #[test]

@@ -62,7 +62,7 @@ impl Guide for MatchedPair {
 
     fn estimate(&self, input: &GuideInput<'_>) -> Result<GuideMap, GuideError> {
         let sigma_m = |depth_m: f64| depth_m * depth_m * self.sigma_px / self.focal_baseline_px_m;
-        let points = (self.points.iter()).map(|point| (point, sigma_m(point.depth_m)));
+        let points = (self.points.iter()).map(|point| (point, sigma_m(point.depth_m), false));
         Ok(mapping::of_points(
             input.scene,
             input.rows,
