@@ -39,8 +39,8 @@ def of_macropixels(report: dict[str, Any], key: str) -> NDArray[np.float64]:
             },
         ),
         (
-            ("--bins-from-guide", "--no-walk-correction", "--laser-cycles", 200),
-            {"bins_from_guide": True, "correct_walk": False, "laser_cycles": 200},
+            ("--bins-from-guide", "--windows", "within=0.8", "--no-walk-correction", "--laser-cycles", 200),
+            {"bins_from_guide": True, "windows": {"within": 0.8}, "correct_walk": False, "laser_cycles": 200},
         ),
         (("--tolerance", 0.05, "--laser-cycles", 200), {"tolerance_m": 0.05, "laser_cycles": 200}),
         (("--no-skip", "--laser-cycles", 50), {"skip": False, "laser_cycles": 50}),

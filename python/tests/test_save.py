@@ -31,8 +31,13 @@ def told(folder: Path, file: str = "frame.json") -> dict[str, Any]:
         (("--laser-cycles", 200), {"laser_cycles": 200}),
         (("--scene", "fog", "--seed", 7, "--laser-cycles", 50), {"scene": "fog", "seed": 7, "laser_cycles": 50}),
         (
-            ("--guide", "radar", "--guide", "stereo", "--windows", "unguided=neighbour", "--bins-from-guide", "--laser-cycles", 50),
-            {"guide": ["radar", "stereo"], "windows": {"unguided": "neighbour"}, "bins_from_guide": True, "laser_cycles": 50},
+            (*"--guide radar --guide stereo --windows unguided=neighbour,within=0.8 --bins-from-guide --laser-cycles".split(), 50),
+            {
+                "guide": ["radar", "stereo"],
+                "windows": {"unguided": "neighbour", "within": 0.8},
+                "bins_from_guide": True,
+                "laser_cycles": 50,
+            },
         ),
         (
             ("--tolerance", 0.05, "--false-alarm-rate", 0.01, "--no-walk-correction", "--laser-cycles", 50),
