@@ -26,6 +26,10 @@ use crate::chip::EventType;
 const AS_GOOD: f64 = 9.0;
 const ELSEWHERE: f64 = 4.0;
 
+/// The best of many fits under a THRESHOLD that are tried again with less background, and so much of it.
+const AGAIN: usize = 8;
+const DARKER: f64 = 0.03;
+
 /// Range walk stays in a depth, and why.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -232,6 +236,17 @@ impl WalkCorrection {
             .take(fits)
             .map(|(_, start)| likelihood.maximise(start))
             .collect();
+        // Under a THRESHOLD bins without an echo say next to nothing of the background, and fits stay where it is too much.
+        if self.response.counting().threshold > 0 {
+            let darker = |fit: &Fit| EchoLight {
+                background_per_bin: DARKER * fit.light.background_per_bin,
+                ..fit.light
+            };
+            let again: Vec<Fit> = (fits.iter().take(AGAIN))
+                .map(|fit| likelihood.maximise(&darker(fit)))
+                .collect();
+            fits.extend(again);
+        }
         // Those that have converged first, then the most likely.
         fits.sort_by(|a, b| {
             let converged = b.has_converged.cmp(&a.has_converged);
