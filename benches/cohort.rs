@@ -29,14 +29,8 @@ fn frame(c: &mut Criterion) {
         b.iter(|| expose(&cohort, black_box(&stream), &pixels, |_| ()).unwrap());
     });
     group.throughput(Throughput::Elements(1));
-    let ways = [
-        ("pool", 1, 1e-4),
-        ("joint state", 1, 0.0),
-        ("joint state, 4 steps", 4, 0.0),
-    ];
-    for (name, sub_bins, neglect) in ways {
+    for (name, neglect) in [("pool", 1e-4), ("joint state", 0.0)] {
         let options = CohortOptions {
-            sub_bins: Some(sub_bins),
             neglect,
             ..CohortOptions::default()
         };

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Measures anew every figure of speed that the README states, on this machine, which should be quiet: the engines by
-# themselves, against Verilator and against Icarus Verilog.
+# Measures anew how fast the engines are by themselves, against Verilator and against Icarus Verilog: the figures of
+# the README and of the book's chapter Performance. The machine should be quiet.
 #
 #   benches/measure.sh [RUNS]
 set -euo pipefail

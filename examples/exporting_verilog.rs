@@ -5,10 +5,10 @@
 
 use std::path::PathBuf;
 
-use guided_dtof::bench::{StimulusPlan, export_verilog};
 use guided_dtof::chip::{Exposure, SensorConfig};
 use guided_dtof::files::InputError;
 use guided_dtof::photon::SpadEvent;
+use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
 
 fn main() -> Result<(), InputError> {

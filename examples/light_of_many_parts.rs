@@ -5,7 +5,7 @@
 use guided_dtof::chip::{Exposure, SensorConfig};
 use guided_dtof::engine::{Engine, LitPixel, Window, expose, stream_config};
 use guided_dtof::photon::{Echo, PhotonStream, PixelLight, Profile, SpadSpread};
-use guided_dtof::units::Time;
+use guided_dtof::units::{Time, TimeOfFlight};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let config = SensorConfig::default();

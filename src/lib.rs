@@ -2,7 +2,7 @@
 #![doc = include_str!("tutorial.md")]
 //! # Modules
 //!
-//! The folders follow the data's road, and lower ones never import higher ones:
+//! They follow the data from the circuit and the scene to the depth map:
 //!
 //! | module | what lives there |
 //! |---|---|
@@ -16,7 +16,7 @@
 //! | [`waves`] | VCD and FST, views for GTKWave and Surfer |
 //! | [`chip`] | the circuits beside their reference models, the window law |
 //! | [`photon`] | photon budget, SPADs, the photon stream |
-//! | [`bench`](mod@bench) | stimulus, recordings, hardware events, Verilog testbench |
+//! | [`stimulus`] | stimulus, recordings, hardware events, Verilog testbench |
 //! | [`engine`] | the ways to run an exposure |
 //! | [`analysis`] | the periods, corners and spread that static timing allows |
 //! | [`stereo`] | semi-global matching of two grey images |
@@ -34,30 +34,19 @@
 //! | [`sweep`] | studies: a row of results for each of many frames |
 //! | [`cli`] | the `gdtof` command |
 
-pub mod analysis;
-pub mod bench;
-pub mod chip;
 pub mod cli;
 mod demo;
-pub mod engine;
-pub mod files;
-pub mod guide;
-pub mod kernel;
-pub mod logic;
-pub mod netlist;
-pub mod numerics;
 mod page;
-pub mod photon;
-pub mod ranging;
 pub mod report;
 pub mod reproduce;
 pub mod request;
-pub mod scene;
-pub mod settings;
-pub mod stereo;
 pub mod sweep;
 pub mod system;
 pub mod testbenches;
-pub mod theory;
-pub mod units;
-pub mod waves;
+
+pub use guided_dtof_light::{
+    files, guide, numerics, photon, scene, settings, stereo, theory, units,
+};
+pub use guided_dtof_sensor::{
+    analysis, chip, engine, kernel, logic, netlist, ranging, stimulus, waves,
+};

@@ -11,6 +11,8 @@ GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
     golden_vectors_hold::in_the_delays_of_every_p_counter
 GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
     real_histograms_are_ranged::the_sample_captures_are_ranged
+GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
+    the_book_lists_every_key::with_its_unit_range_and_source
 cd vectors/replay
 cargo run --release --quiet -- replay --sensor sensor.toml --inits inits.csv --events events.csv \
     --stop-periods 80 --laser-cycles 40 --engine gate --out histograms.csv

@@ -63,7 +63,7 @@ pub(crate) fn starts(
             None => Err(Failure::argument(
                 "starts",
                 format!(
-                    "{start} of macropixel {at} is no start value; give 0 to {largest}, or -1 where SPADs are off"
+                    "{start} of macropixel {at} is not a start value; give 0 to {largest}, or -1 where SPADs are off"
                 ),
             )),
         },

@@ -115,7 +115,7 @@ struct Probes {
     places: Vec<(usize, usize)>,
     folder: PathBuf,
     format: String,
-    /// The first so many laser cycles; all, if −1; those about the first count, if it is left out.
+    /// Number of laser cycles from the first; −1 keeps all, and without it those about the first count are kept.
     cycles: Option<i64>,
 }
 

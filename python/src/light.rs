@@ -25,7 +25,7 @@ use crate::values::by_json;
 pub(crate) fn engine_named(name: &str) -> Result<EngineKind, Failure> {
     let name = toml::Value::from(name);
     EngineKind::deserialize(name.clone()).map_err(|_| {
-        let message = format!("{name} is no engine; give gate, cycle, window or cohort");
+        let message = format!("{name} is not an engine; give gate, cycle, window or cohort");
         Failure::argument("engine", message)
     })
 }

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use guided_dtof::bench::recording::Recording;
 use guided_dtof::chip::{Exposure, SensorConfig};
 use guided_dtof::engine::waveform::{View, record};
 use guided_dtof::engine::{GateSimulation, Histograms, PulsedPixel, Replay, cancelled};
 use guided_dtof::photon::SpadEvent;
 use guided_dtof::request::{Spelling, exposure};
+use guided_dtof::stimulus::recording::Recording;
 use guided_dtof::units::Time;
 use guided_dtof::waves::WaveFormat;
 use numpy::{PyReadonlyArray1, PyReadonlyArrayDyn};

@@ -53,7 +53,7 @@ pub(crate) fn sweep_outline(
     Ok((study.len(), study.out.clone(), study.name))
 }
 
-/// Takes a part of a study on so many threads, 0 for all; see `gdtof.sweep`.
+/// Takes a part of a study on `threads` threads, 0 for all; see `gdtof.sweep`.
 #[pyfunction]
 pub(crate) fn sweep_part<'py>(
     py: Python<'py>,

@@ -4,7 +4,7 @@ use guided_dtof::analysis::TimingVerdict;
 use guided_dtof::chip::{ChipTiming, Exposure, SensorConfig, Silicon, WindowLaw};
 use guided_dtof::netlist::{Conditions, Corner};
 use guided_dtof::request::{Spelling, exposure, of_no_aim};
-use guided_dtof::units::Time;
+use guided_dtof::units::{Time, TimeOfFlight};
 use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -90,7 +90,7 @@ def test_start_values_of_ones_own(sensor: gdtof.Sensor, frame: gdtof.Frame) -> N
     off = gdtof.frame(sensor, starts=-1, laser_cycles=200)
     assert off.histograms.sum() == 0 and (off.start == -1).all()
     bads: list[tuple[ArrayLike, str]] = [
-        (512, "no start value; give 0 to 511"),
+        (512, "not a start value; give 0 to 511"),
         (np.zeros((3, 3)), "shape"),
         (0.5, "whole"),
     ]
@@ -175,7 +175,7 @@ def test_light_of_ones_own(sensor: gdtof.Sensor) -> None:
         ({"signal": np.ones((3, 3))}, r"signal: is an array of shape \[3, 3\]"),
         ({"profile_hz": [1.0]}, "needs profile_edges_ns"),
         ({"profile_hz": [1.0, 2.0], "profile_edges_ns": [5.0, 1.0, 2.0]}, "edges of a profile rise"),
-        ({"engine": "windo"}, "is no engine; give gate, cycle, window or cohort"),
+        ({"engine": "windo"}, "is not an engine; give gate, cycle, window or cohort"),
         ({"laser_cycles": 0}, "laser_cycles: an exposure needs a laser cycle"),
     ],
 )

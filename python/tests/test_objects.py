@@ -154,7 +154,7 @@ def test_copies_travel() -> None:
         (lambda: gdtof.Scene.from_dict({"lidar": 3}), "scene: lidar: this must be a section"),
         (lambda: gdtof.Scene.from_dict({}), "scene: has no settings"),
         (lambda: gdtof.drive(segments=0), "segments: 0 is impossible; give 1 to 64"),
-        (lambda: gdtof.drive(guide_latency_ms=-1), "guide_latency_ms: -1 is no latency"),
+        (lambda: gdtof.drive(guide_latency_ms=-1), "guide_latency_ms: -1 is not a latency"),
         (lambda: gdtof.drive(frames=-1), "frames: -1 is impossible"),
         (lambda: gdtof.timing(process="best"), "give slow, typ or fast"),  # type: ignore[arg-type]
         (lambda: gdtof.timing("hslidar", voltage_v=5.0), "no delays are known there"),

@@ -26,7 +26,7 @@ def test_pictures_are_drawn(frame: gdtof.Frame, tmp_path: Path) -> None:
     assert "SPADs are off" in frame.plot_histogram(int(off[0]), int(off[1])).texts[0].get_text()
     with pytest.raises(gdtof.InputError, match="outside the 16x16 array"):
         frame.plot_histogram(16, 0)
-    with pytest.raises(gdtof.InputError, match="is no map; give depth"):
+    with pytest.raises(gdtof.InputError, match="is not a map; give depth"):
         frame.plot("dept")  # type: ignore[arg-type]
 
 

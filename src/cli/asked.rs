@@ -1,4 +1,4 @@
-//! What `gdtof frame` and `gdtof drive` ask of an exposure alike.
+//! Options about the exposure that `gdtof frame` and `gdtof drive` share.
 
 use std::path::PathBuf;
 
@@ -22,16 +22,16 @@ pub(super) struct ExposureArgs {
     /// Seed of photons and guide errors.
     #[arg(long, default_value_t = 1)]
     pub(super) seed: u64,
-    /// Engine of the macropixels that are not probed.
+    /// Engine that runs the macropixels.
     #[arg(long, value_enum, default_value_t)]
     pub(super) engine: EngineKind,
-    /// When the bins of the sensor's delay lines are, as `gdtof calibrate` has measured it; without it, all are taken to be alike.
+    /// Bins of the sensor's delay lines as `gdtof calibrate` has measured them. Without it all are taken to be equal.
     #[arg(long, value_name = "FILE")]
     pub(super) calibration: Option<PathBuf>,
 }
 
 impl ExposureArgs {
-    /// The request with all of this, and the default of everything else.
+    /// The request with these options, and defaults for everything else.
     pub(super) fn request(&self) -> FrameRequest {
         self.guiding.ask(FrameRequest {
             stop_periods: self.stop_periods,

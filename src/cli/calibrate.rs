@@ -19,7 +19,7 @@ use crate::units::Time;
 pub(super) struct CalibrateArgs {
     #[command(flatten)]
     sensor: SensorArgs,
-    /// File for the profile (JSON), which `gdtof frame --calibration` reads.
+    /// File for the bin profile (JSON), to be read by `gdtof frame --calibration`.
     #[arg(long, value_name = "FILE", default_value = "calibration.json")]
     out: PathBuf,
     /// CLK periods in a laser cycle.
@@ -28,13 +28,14 @@ pub(super) struct CalibrateArgs {
     /// Delay of the laser from one step to the next, ps.
     #[arg(long, value_name = "PS", default_value_t = 10.0)]
     step_ps: f64,
-    /// Laser cycles of a step.
+    /// Laser cycles in each step.
     #[arg(long, value_name = "N", default_value_t = Sweep::default().laser_cycles, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     laser_cycles: u32,
-    /// Detected photons of a macropixel in a laser cycle, on average.
+    /// Average number of detected photons in a macropixel and laser cycle.
     #[arg(long, value_name = "N", default_value_t = Sweep::default().photons_per_cycle)]
     photons_per_cycle: f64,
-    /// Sweep every window, not one even and one odd one, and take the mean; also says how far windows of a line differ.
+    /// Sweep every window, not just one even and one odd one, and take the mean. Also reports how far the windows of
+    /// a line differ.
     #[arg(long)]
     every_window: bool,
     /// Seed of the photons.

@@ -1,4 +1,4 @@
-//! `gdtof demo`: the demonstrator before the scenes of the thesis.
+//! `gdtof demo`: the experiments of the thesis's demonstrator.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -14,7 +14,7 @@ use crate::guide::{BehaviouralStereo, Guide, options};
 use crate::report::Grid;
 use crate::units::Time;
 
-/// What the demonstrator is shown.
+/// The experiments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
 enum Demo {
@@ -24,28 +24,28 @@ enum Demo {
     Fog,
     /// A figure behind a glass door (Fig. 102).
     Glass,
-    /// A street without light: no guide, windows that step and hold.
+    /// A street without light and without a guide: windows step until they find a target, and hold it.
     Night,
-    /// A pedestrian comes nearer while the right camera has turned (Fig. 70, 107).
+    /// A pedestrian comes nearer, and the right camera is misaligned (Fig. 70, 107).
     Yaw,
     /// A car drives away at up to 65 mph while frames come three times a second (6.5.3).
     Speed,
-    /// The QuantIC4x4 at 200 m and 25 frames a second (7.3.3): what it takes.
+    /// What the QuantIC4x4 needs for 200 m at 25 frames a second (7.3.3).
     Limit,
-    /// A figure stands at steps to 50 m under 72 klux (Fig. 103 to 105).
+    /// A figure stands at several distances up to 50 m, under 72 klux (Fig. 103 to 105).
     Sweep,
 }
 
 /// Arguments of `gdtof demo`.
 #[derive(Args)]
 pub(super) struct DemoArgs {
-    /// What is shown.
+    /// Experiment to run.
     #[arg(value_enum)]
     demo: Demo,
-    /// Folder for the results; it is made if need be. Without it, one named after the demo.
+    /// Folder for the results; created if missing [default: the name of the demo].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// What guides instead of the behavioural stereo pair, as in `gdtof drive`; several are fused.
+    /// Guide to use instead of the stereo pair, as in `gdtof drive`; several are fused.
     #[arg(long, value_name = "GUIDE")]
     guide: Vec<String>,
     /// Seed of photons and guide errors.
@@ -56,7 +56,7 @@ pub(super) struct DemoArgs {
     calibration_step_ps: f64,
 }
 
-/// What was asked for, in the manifest.
+/// The request, for the manifest.
 #[derive(Serialize)]
 struct Configuration {
     demo: Demo,
@@ -214,16 +214,9 @@ fn write_shown(folder: &Path, show: &Show, shown: &Shown) -> anyhow::Result<Stri
 fn write_limits(folder: &Path, limits: &[limit::Limit]) -> anyhow::Result<String> {
     let json = serde_json::to_string_pretty(limits)?;
     std::fs::write(folder.join("limit.json"), json + "\n")?;
-    let mut grid = Grid::new([
-        "laser",
-        "cycles",
-        "energy",
-        "stereo error",
-        "in window",
-        "right to a bin",
-        "wrong",
-        "no peak",
-    ]);
+    let mut grid = Grid::headed(
+        "laser | cycles | energy | stereo error | in window | right to a bin | wrong | no peak",
+    );
     for at in limits {
         let clock_hz = 384e6 / f64::from(at.stop_periods);
         let found = &at.found;
@@ -255,15 +248,9 @@ fn write_sweep(folder: &Path, points: &[sweep::SweepPoint]) -> anyhow::Result<St
     }
     let json = serde_json::to_string_pretty(points)?;
     std::fs::write(folder.join("sweep.json"), json + "\n")?;
-    let mut grid = Grid::new([
-        "distance, m",
-        "depths",
-        "in window",
-        "mean error, m",
-        "sigma, m",
-        "RMS, m",
-        "guide RMS, m",
-    ]);
+    let mut grid = Grid::headed(
+        "distance, m | depths | in window | mean error, m | sigma, m | RMS, m | guide RMS, m",
+    );
     for p in points {
         grid.push([
             format!("{:.0}", p.distance_m),

@@ -1,17 +1,17 @@
-//! `gdtof doctor`: what this machine gives the program, and which other tools are there.
+//! `gdtof doctor`: what the program uses of this machine, and which other tools it found.
 
 use std::process::{Command, Stdio};
 
 use clap::Args;
 use serde::Serialize;
 
-use super::voice::say;
+use super::voice::{say, say_json};
 use crate::report::Table;
 
 /// Arguments of `gdtof doctor`.
 #[derive(Args)]
 pub(super) struct DoctorArgs {
-    /// JSON instead of the table.
+    /// Print JSON instead of the table.
     #[arg(long)]
     json: bool,
 }
@@ -35,7 +35,7 @@ const TOOLS: [(&str, &str, &str); 8] = [
 #[derive(Serialize)]
 struct Tool {
     name: &'static str,
-    /// First line that it says of itself; `None` where it is not to be had.
+    /// First line that it prints about itself; `None` if it is not installed.
     version: Option<String>,
     used_for: &'static str,
 }
@@ -76,8 +76,7 @@ pub(super) fn run(args: &DoctorArgs) -> anyhow::Result<()> {
             .into(),
     };
     if args.json {
-        say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
-        return Ok(());
+        return say_json(&report);
     }
     let mut table = Table::new(format!("gdtof {}", report.version))
         .row("built", report.built)
@@ -94,7 +93,7 @@ pub(super) fn run(args: &DoctorArgs) -> anyhow::Result<()> {
     Ok(say(table)?)
 }
 
-/// What a tool says of its version; that it is there, where it says nothing of the kind.
+/// The version that a tool prints, or just that it is there.
 fn version(name: &str, option: &str) -> Option<String> {
     let output = Command::new(name).arg(option).stdin(Stdio::null()).output();
     let output = output.ok()?;

@@ -1,4 +1,4 @@
-//! `gdtof drive`: frame after frame of a world in motion.
+//! `gdtof drive`: frame after frame while the world moves.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -32,22 +32,22 @@ pub(super) struct DriveArgs {
     /// Frames to take.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: u32,
-    /// Folder for the results; it is made if need be.
+    /// Folder for the results; created if missing.
     #[arg(long, value_name = "DIR", default_value = "drive")]
     out: PathBuf,
     #[command(flatten)]
     exposure: ExposureArgs,
-    /// From the cameras' images to the guide's map, ms.
+    /// Time from the cameras' images to the guide's map, ms.
     #[arg(long, value_name = "MS", default_value_t = 145.0)]
     guide_latency_ms: f64,
-    /// The guide works on the next frame while this one is loaded, exposed and read out.
+    /// Let the guide work on the next frame while this one is loaded, exposed and read out.
     #[arg(long)]
     pipelined: bool,
-    /// Begin with the window policy for sequences, which --windows changes: macropixels hold the peak that they have found, step
-    /// their window in doubt, and take over estimates of neighbours.
+    /// Start from the window policy for sequences, which --windows can change: macropixels hold the peak that they
+    /// have found, step their window in doubt, and take over estimates from neighbours.
     #[arg(long)]
     tracking: bool,
-    /// Time of the scene at which the first images are taken, s.
+    /// Scene time at which the first images are taken, s.
     #[arg(
         long,
         value_name = "S",
@@ -55,17 +55,17 @@ pub(super) struct DriveArgs {
         allow_hyphen_values = true
     )]
     start_s: f64,
-    /// Parts of an exposure in which the world stands still.
+    /// Number of parts of an exposure; the world stands still within each.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
     segments: u32,
-    /// `fresh` photons in every frame, or `still` ones: a macropixel whose light and start value have not changed then keeps its
+    /// Photons of the frames. With `still`, a macropixel whose light and start value have not changed keeps its
     /// histogram.
     #[arg(long, value_enum, default_value_t)]
     noise: Noise,
     /// Simulate everything anew in every frame: same results, more work.
     #[arg(long)]
     no_skip: bool,
-    /// Write no picture of each frame.
+    /// Do not write a picture of each frame.
     #[arg(long)]
     no_pictures: bool,
     /// Also record drive.mcap for Foxglove: points, depths, pictures and windows.
@@ -325,7 +325,7 @@ struct Recording {
 impl Recording {
     fn begin(folder: &Path, settings: &DriveSettings, frames: u32) -> Result<Self, InputError> {
         let sensor = &settings.frame.sensor;
-        let shape = [u64::from(frames), sensor.rows as u64, sensor.cols as u64];
+        let shape = [frames as usize, sensor.rows, sensor.cols];
         let [frames, rows, cols] = shape;
         let index = File::create(folder.join("frames.jsonl"));
         Ok(Recording {
@@ -335,7 +335,7 @@ impl Recording {
             starts: NpyStack::begin(&folder.join("starts.npy"), &shape)?,
             histograms: NpyStack::begin(
                 &folder.join("histograms.npy"),
-                &[frames, rows, cols, sensor.bins as u64],
+                &[frames, rows, cols, sensor.bins],
             )?,
             index: BufWriter::new(index.map_err(|e| InputError::unwritable(folder, &e))?),
             folder: folder.to_owned(),

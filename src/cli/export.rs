@@ -7,18 +7,18 @@ use clap::{Args, Subcommand};
 use super::replay::Stimuli;
 use super::voice::tell;
 use super::{SensorArgs, export_frame, sdf};
-use crate::bench::{Export, StimulusPlan};
 use crate::chip::array;
 use crate::netlist::Netlist;
+use crate::stimulus::{Export, StimulusPlan};
 
 /// What to export.
 #[derive(Subcommand)]
 pub(super) enum ExportCommand {
-    /// Structural Verilog with two sets of cell models and, for a stimulus, a testbench that replays it.
+    /// Write structural Verilog, two sets of cell models and, for a stimulus, a testbench that replays it.
     Verilog(VerilogArgs),
-    /// The delay of every cell, min:typ:max, as SDF (IEEE 1497).
+    /// Write the delays of all cells, min:typ:max, as SDF (IEEE 1497).
     Sdf(sdf::SdfArgs),
-    /// A frame that was taken: point clouds (PLY, PCD), arrays (NPY, NPZ), a picture of 16 bits.
+    /// Write a frame as point clouds (PLY, PCD), arrays (NPY, NPZ) and a 16-bit picture.
     Frame(export_frame::FrameExportArgs),
 }
 
@@ -27,10 +27,10 @@ pub(super) enum ExportCommand {
 pub(super) struct VerilogArgs {
     #[command(flatten)]
     sensor: SensorArgs,
-    /// For a testbench: start values, CSV `row,col,init`, one line for every macropixel.
+    /// Start values for a testbench: CSV `row,col,init`, one line for every macropixel.
     #[arg(long, value_name = "FILE", requires_all = ["events", "stop_periods", "laser_cycles"])]
     inits: Option<PathBuf>,
-    /// Rising edges of SPAD_RAW: CSV `time_fs,row,col,spad` from the first rising edge of STOP.
+    /// Rising edges of SPAD_RAW for a testbench: CSV `time_fs,row,col,spad`, from the first rising edge of STOP.
     #[arg(long, value_name = "FILE", requires = "inits")]
     events: Option<PathBuf>,
     /// CLK periods in a laser cycle.
@@ -39,14 +39,13 @@ pub(super) struct VerilogArgs {
     /// Laser cycles of the exposure.
     #[arg(long, value_name = "N", requires = "inits")]
     laser_cycles: Option<u32>,
-    /// Folder for design.v, cells.v, cells_specify.v and, with a stimulus, stimulus.txt and tb.v; it is made if need
-    /// be.
+    /// Folder for design.v, cells.v, cells_specify.v and, with a stimulus, stimulus.txt and tb.v; created if missing.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The testbench also reads the histograms through the pins, into readout.csv.
+    /// Let the testbench also read the histograms through the pins, into readout.csv.
     #[arg(long, requires = "inits")]
     readout: bool,
-    /// Delays that replace the library's (SDF); they go into delays.v, which tb.v includes.
+    /// Delays to use instead of the library's (SDF); they go into delays.v, which tb.v includes.
     #[arg(long, value_name = "FILE", requires = "inits")]
     sdf: Option<PathBuf>,
 }

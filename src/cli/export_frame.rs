@@ -1,4 +1,4 @@
-//! `gdtof export frame`: a frame that was taken, as point clouds and arrays.
+//! `gdtof export frame`: a frame as point clouds and arrays.
 
 use std::path::{Path, PathBuf};
 
@@ -15,10 +15,10 @@ pub(super) struct FrameExportArgs {
     /// Folder that `gdtof frame` has written.
     #[arg(value_name = "DIR")]
     frame: PathBuf,
-    /// What to write: frame.ply, frame.pcd, depth.npy, frame.npz, depth16.png; several with commas between. All, without it.
+    /// What to write, separated by commas [default: all].
     #[arg(long, value_name = "FORMAT,…", value_delimiter = ',', value_enum)]
     format: Vec<Format>,
-    /// Folder for the files; it is made if need be.
+    /// Folder for the files; created if missing.
     #[arg(long, value_name = "DIR", default_value = "export")]
     out: PathBuf,
 }
@@ -26,15 +26,15 @@ pub(super) struct FrameExportArgs {
 /// What a frame is written as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
-    /// Point cloud, binary PLY: x right, y down, z forward, intensity, confidence, row, col.
+    /// frame.ply: point cloud, binary PLY: x right, y down, z forward, intensity, confidence, row, col.
     Ply,
-    /// Point cloud, binary PCD 0.7, with the same fields.
+    /// frame.pcd: point cloud, binary PCD 0.7, with the same fields.
     Pcd,
-    /// Depths along the rays, rows x cols, m, float32; NaN where there is none.
+    /// depth.npy: depths along the rays, rows x cols, m, float32; NaN where there is none.
     Npy,
-    /// Everything: histograms, depths, guide, truth, peaks, confidence, start values, reasons.
+    /// frame.npz: everything: histograms, depths, guide, truth, peaks, confidence, start values, reasons.
     Npz,
-    /// Depths as a picture of 16 bits, in steps of 1/256 m; 0 where there is none (as KITTI's).
+    /// depth16.png: depths as a 16-bit picture, in steps of 1/256 m; 0 where there is none (as in KITTI).
     Png16,
 }
 
@@ -53,7 +53,7 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
     let is_frame = |folder: &Path| folder.canonicalize().ok() == args.frame.canonicalize().ok();
     if is_frame(&args.out) {
         let message =
-            "is the folder of the frame itself, whose files would make room; give another one";
+            "is the folder of the frame itself, whose files would be replaced; give another one";
         return Err(InputError::new("--out", message).into());
     }
 
@@ -92,7 +92,7 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
         match format {
             Format::Ply => write_ply(&path, &points)?,
             Format::Pcd => write_pcd(&path, &points)?,
-            Format::Npy => write_npy_f32(&path, &[rows as u64, cols as u64], &depths)?,
+            Format::Npy => write_npy_f32(&path, &[rows, cols], &depths)?,
             Format::Npz => whole(&pixels, &histograms, shape).write(&path)?,
             Format::Png16 => write_depth_png(&path, cols, &depths)?,
         }

@@ -15,72 +15,24 @@ const DEPTHS: usize = 2;
 const PICTURE: usize = 3;
 const WINDOWS: usize = 4;
 
+/// A topic with the schema of one of Foxglove's messages.
+macro_rules! channel {
+    ($topic:literal, $schema:literal) => {
+        Channel {
+            topic: $topic,
+            schema: concat!("foxglove.", $schema),
+            json_schema: include_str!(concat!("foxglove/", $schema, ".json")),
+        }
+    };
+}
+
+/// What a recording has, with the schemas of Foxglove's messages.
 const CHANNELS: [Channel; 5] = [
-    Channel {
-        topic: "/tf",
-        schema: "foxglove.FrameTransform",
-        json_schema: r#"{"title":"foxglove.FrameTransform","type":"object","properties":{
-            "timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
-            "parent_frame_id":{"type":"string"},"child_frame_id":{"type":"string"},
-            "translation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}},
-            "rotation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"},"w":{"type":"number"}}}}}"#,
-    },
-    Channel {
-        topic: "/lidar/points",
-        schema: "foxglove.PointCloud",
-        json_schema: r#"{"title":"foxglove.PointCloud","type":"object","properties":{
-            "timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
-            "frame_id":{"type":"string"},
-            "pose":{"type":"object","properties":{
-                "position":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}},
-                "orientation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"},"w":{"type":"number"}}}}},
-            "point_stride":{"type":"integer"},
-            "fields":{"type":"array","items":{"type":"object","properties":{"name":{"type":"string"},"offset":{"type":"integer"},"type":{"type":"integer"}}}},
-            "data":{"type":"string","contentEncoding":"base64"}}}"#,
-    },
-    Channel {
-        topic: "/lidar/depth",
-        schema: "foxglove.RawImage",
-        json_schema: r#"{"title":"foxglove.RawImage","type":"object","properties":{
-            "timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
-            "frame_id":{"type":"string"},"width":{"type":"integer"},"height":{"type":"integer"},
-            "encoding":{"type":"string"},"step":{"type":"integer"},
-            "data":{"type":"string","contentEncoding":"base64"}}}"#,
-    },
-    Channel {
-        topic: "/lidar/picture",
-        schema: "foxglove.CompressedImage",
-        json_schema: r#"{"title":"foxglove.CompressedImage","type":"object","properties":{
-            "timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
-            "frame_id":{"type":"string"},
-            "data":{"type":"string","contentEncoding":"base64"},"format":{"type":"string"}}}"#,
-    },
-    Channel {
-        topic: "/lidar/windows",
-        schema: "foxglove.SceneUpdate",
-        json_schema: r#"{"title":"foxglove.SceneUpdate","type":"object","properties":{
-            "deletions":{"type":"array","items":{"type":"object","properties":{}}},
-            "entities":{"type":"array","items":{"type":"object","properties":{
-                "timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
-                "frame_id":{"type":"string"},"id":{"type":"string"},
-                "lifetime":{"type":"object","title":"duration","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer"}}},
-                "frame_locked":{"type":"boolean"},
-                "metadata":{"type":"array","items":{"type":"object","properties":{"key":{"type":"string"},"value":{"type":"string"}}}},
-                "arrows":{"type":"array","items":{"type":"object"}},"cubes":{"type":"array","items":{"type":"object"}},
-                "spheres":{"type":"array","items":{"type":"object"}},"cylinders":{"type":"array","items":{"type":"object"}},
-                "lines":{"type":"array","items":{"type":"object","properties":{
-                    "type":{"type":"integer"},
-                    "pose":{"type":"object","properties":{
-                        "position":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}},
-                        "orientation":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"},"w":{"type":"number"}}}}},
-                    "thickness":{"type":"number"},"scale_invariant":{"type":"boolean"},
-                    "points":{"type":"array","items":{"type":"object","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}}}},
-                    "color":{"type":"object","properties":{"r":{"type":"number"},"g":{"type":"number"},"b":{"type":"number"},"a":{"type":"number"}}},
-                    "colors":{"type":"array","items":{"type":"object","properties":{"r":{"type":"number"},"g":{"type":"number"},"b":{"type":"number"},"a":{"type":"number"}}}},
-                    "indices":{"type":"array","items":{"type":"integer"}}}}},
-                "triangles":{"type":"array","items":{"type":"object"}},"texts":{"type":"array","items":{"type":"object"}},
-                "models":{"type":"array","items":{"type":"object"}}}}}}}"#,
-    },
+    channel!("/tf", "FrameTransform"),
+    channel!("/lidar/points", "PointCloud"),
+    channel!("/lidar/depth", "RawImage"),
+    channel!("/lidar/picture", "CompressedImage"),
+    channel!("/lidar/windows", "SceneUpdate"),
 ];
 
 /// Windows are drawn of every fourth macropixel of every fourth row: all of them hide what they are about.

@@ -8,7 +8,8 @@ use clap::Args;
 
 use self::pair::PairReport;
 use super::asked::ExposureArgs;
-use super::voice::{note, progress, say, tell};
+use super::voice::{note, progress, say_json, tell};
+use super::wave_format::WaveFormatOption;
 use super::{SceneArgs, quality};
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::{Mode, SensorConfig, Silicon};
@@ -31,37 +32,36 @@ pub(super) struct FrameArgs {
     pair: pair::PairArgs,
     #[command(flatten)]
     exposure: ExposureArgs,
-    /// Folder for the results; it is made if need be.
+    /// Folder for the results; created if missing.
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
-    /// Macropixel to run at gate level with its waveform, as row,col or `none`; may be repeated. Without
-    /// it, the guided macropixel nearest to the centre.
+    /// Macropixel to run at gate level with a waveform, as row,col or `none`; may be repeated [default: the guided
+    /// macropixel nearest to the centre].
     #[arg(long, value_name = "R,C")]
     probe: Vec<String>,
-    /// What the waveforms of probes keep: the first N laser cycles, or `all`. Without it, the first that counts, one
-    /// before it and two after it.
+    /// Laser cycles in the waveforms of probes: the first N, or `all` [default: the first that counts, one before it
+    /// and two after it].
     #[arg(long, value_name = "N|all", value_parser = wave_cycles)]
     wave_cycles: Option<WaveCycles>,
     /// Format of the waveforms of probes.
     #[arg(long, value_enum, default_value_t)]
-    wave_format: WaveFormat,
-    /// Steps to a CLK period in which the cohort engine follows the dead time. Without it, as finely as it takes to keep
-    /// each bin's mean within a tenth of its counting noise.
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u8).range(1..=64))]
+    wave_format: WaveFormatOption,
+    /// Gone, and refused: the cohort engine chooses its steps itself.
+    #[arg(long, value_name = "K", hide = true)]
     sub_bins: Option<u8>,
-    /// Let every macropixel have the cheapest engine that adds at most M metres of depth error on average.
+    /// Run every macropixel on the cheapest engine that adds at most M metres of depth error on average.
     #[arg(long, value_name = "M", conflicts_with_all = ["engine", "sub_bins", "no_skip"])]
     tolerance: Option<f64>,
-    /// Draw and run everything, also what the engine could leave out: same histograms, more work.
+    /// Draw and run everything, even what the engine could leave out: same histograms, more work.
     #[arg(long)]
     no_skip: bool,
-    /// Share of macropixels without an echo that may be given a depth; 1 takes every peak for one.
+    /// Share of macropixels without an echo that may get a depth. With 1 every peak gives a depth.
     #[arg(long, value_name = "P", default_value_t = 1e-3)]
     false_alarm_rate: f64,
-    /// Leave the range walk of strong echoes in the depths.
+    /// Do not correct depths for the range walk of strong echoes.
     #[arg(long)]
     no_walk_correction: bool,
-    /// Also write page.html: one file to look at the frame in a browser (gdtof page makes one later).
+    /// Also write page.html, to look at the frame in a browser (gdtof page makes one later).
     #[arg(long)]
     page: bool,
     /// Print frame.json instead of the table.
@@ -128,7 +128,7 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
         note(sentence);
     }
     if args.json {
-        say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
+        say_json(&report)?;
     } else {
         let mut table = table(args, &settings, &timing, &frame);
         if let Some(pair) = pair_report {
@@ -181,10 +181,13 @@ fn scene_name(args: &FrameArgs) -> String {
 
 /// File name of a probe's waveform.
 fn wave_name(args: &FrameArgs, (row, col): (usize, usize)) -> String {
-    format!("probe_r{row}_c{col}.{}", args.wave_format.extension())
+    format!(
+        "probe_r{row}_c{col}.{}",
+        WaveFormat::from(args.wave_format).extension()
+    )
 }
 
-/// `None` where the choice is left to the guide.
+/// `None` if the guide chooses.
 fn chosen_probes(
     texts: &[String],
     sensor: &SensorConfig,
@@ -248,9 +251,11 @@ fn table(
         "photons on the array",
         format!("{:.0}", frame.photons_expected),
     );
-    // What two windows look back on is drawn twice, and there may be a few photons more than are expected.
-    let drawn = (work.photons_drawn as f64).min(frame.photons_expected);
-    table.push("simulated: photons", percent(drawn, frame.photons_expected));
+    // More than are expected where several windows look back on the same photons, or by chance where all are drawn.
+    table.push(
+        "simulated: photons, each time they are drawn",
+        percent(work.photons_drawn as f64, frame.photons_expected),
+    );
     table.push(
         "simulated: CLK periods",
         percent(work.clk_periods_visited as f64, work.clk_periods as f64),

@@ -1,5 +1,5 @@
-//! The command line. Bad input ends with one sentence on standard error and exit status 2; anything
-//! else that goes wrong with exit status 1.
+//! The command line. Bad input gives one sentence on standard error and exit status 2. Any other failure gives exit
+//! status 1.
 
 mod asked;
 mod calibrate;
@@ -10,6 +10,7 @@ mod export;
 mod export_frame;
 mod foxglove;
 mod frame;
+mod groups;
 mod guiding;
 mod page;
 mod pareto;
@@ -29,26 +30,28 @@ mod tb;
 mod timing;
 mod voice;
 mod wave;
+mod wave_format;
 mod wording;
 
 pub use tb::testbench;
 
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use self::settings::{SceneArgs, SensorArgs};
 use crate::chip::SensorConfig;
 use crate::files::{InputError, clean_up_when_interrupted};
+use crate::request::sign_files;
 
-/// A guided direct time-of-flight lidar chip, simulated down to gates and flip-flops.
+/// Simulate a guided direct time-of-flight lidar chip, from the scene down to gates and flip-flops.
 #[derive(Parser)]
-#[command(name = "gdtof", version, about)]
+#[command(name = "gdtof", version)]
 struct Cli {
-    /// Threads at most. Without it, one for each processor.
+    /// Number of threads [default: one for each processor].
     #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Say nothing but errors and what was asked for by --json: no table of what was done, no progress, no notes.
+    /// Print only errors and what --json asks for: no table, no progress, no notes.
     #[arg(long, global = true)]
     quiet: bool,
     #[command(subcommand)]
@@ -59,48 +62,48 @@ struct Cli {
 enum Command {
     /// Take one guided frame of a scene: depth map, histograms, waveform.
     Frame(frame::FrameArgs),
-    /// Take frame after frame of a world in motion: depth maps, and one recording.
+    /// Take frame after frame while the world moves: depth maps, and one recording.
     Drive(drive::DriveArgs),
-    /// Show the thesis's demonstrator a scene, and say what it found.
+    /// Repeat an experiment of the thesis's demonstrator, and say whether it finds the target.
     Demo(demo::DemoArgs),
     /// Run recorded SPAD events through the chip.
     Replay(replay::ReplayArgs),
-    /// Print the thesis's figures, published beside computed.
+    /// Compare the thesis's published figures with what the model computes.
     Reproduce(reproduce::ReproduceArgs),
-    /// Depths from histograms that are given: a real sensor's, beside its own, or a frame's.
+    /// Find depths in histograms that you have: a frame's, your chip's or those of a real sensor.
     Range(range::RangeArgs),
-    /// Sweep a picosecond laser over the bins of a sensor with delay lines, and keep when they are.
+    /// Measure the bins of a sensor with delay lines, by sweeping a picosecond laser over them.
     Calibrate(calibrate::CalibrateArgs),
-    /// Disparities of a rectified pair of pictures, by semi-global matching.
+    /// Find the disparities of a rectified pair of pictures, by semi-global matching.
     Stereo(stereo::StereoArgs),
-    /// How fast the fast engines are, by size of the array and threads, and the memory they take.
+    /// Measure how fast the engines are on this machine, and how much memory they take.
     Speed(speed::SpeedArgs),
-    /// How fast the chip can be clocked: ripple, periods, margins.
+    /// Say how fast the chip can be clocked: verdict, ripple, periods, margins.
     Timing(timing::TimingArgs),
-    /// What the blocks of a macropixel take from the supply, by the toggles of a gate-level run.
+    /// Estimate the power of each block of a macropixel, from the toggles of a gate-level run.
     Power(power::PowerArgs),
-    /// A table of frames, or of what theory says, over any settings: lists, ranges, grids, samples.
+    /// Make a table of frames, or of what theory says, over any settings.
     Sweep(sweep::SweepArgs),
-    /// Run time against error.
+    /// Compare run time with error for every engine.
     Pareto(pareto::ParetoArgs),
     /// Print the sensor as a commented file: every key with its unit, range and source.
     Sensor(SensorArgs),
     /// Print the scene as a commented file: every key with its unit, range and source.
     Scene(SceneArgs),
-    /// Make one HTML file to look at a frame or a drive: maps, histograms, points in space.
+    /// Write one HTML file to look at a frame or a drive: maps, histograms, points in space.
     Page(page::PageArgs),
-    /// Replay one laser cycle of one macropixel of a frame that was taken, as a waveform.
+    /// Write one laser cycle of one macropixel as a waveform, after the frame has been taken.
     Wave(wave::WaveArgs),
-    /// Run the testbenches of the chip's blocks, all or those named.
+    /// Run the testbenches of the chip's blocks.
     Tb(tb::TbArgs),
-    /// Write the chip, or a frame that was taken, for other tools.
+    /// Write the chip, or a frame, for other tools.
     #[command(subcommand)]
     Export(export::ExportCommand),
-    /// Say what this machine gives the program, and which other tools are there.
+    /// Say what the program uses of this machine, and which other tools it found.
     Doctor(doctor::DoctorArgs),
-    /// Print the JSON schema of a kind of file, for editors.
+    /// Print the JSON schema of sensor, scene or study files, for editors.
     Schema(shell::SchemaArgs),
-    /// Print a script with which a shell completes options.
+    /// Print a script with which your shell completes commands and options.
     Completion(shell::CompletionArgs),
     /// Write manual pages.
     Man(shell::ManArgs),
@@ -108,12 +111,14 @@ enum Command {
 
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
+    sign_files();
     if let Err(error) = clean_up_when_interrupted() {
         eprintln!(
             "gdtof: signals cannot be watched ({error}); an interrupted run will leave its files"
         );
     }
-    let cli = Cli::parse();
+    let matches = groups::grouped(Cli::command()).get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     if cli.quiet {
         voice::be_quiet();
     }
@@ -167,7 +172,7 @@ fn finish(result: anyhow::Result<ExitCode>) -> ExitCode {
 /// The macropixel that an option names as row,col.
 ///
 /// # Errors
-/// When it is none of the array.
+/// When the array has no such macropixel.
 fn pixel(option: &str, text: &str, sensor: &SensorConfig) -> Result<(usize, usize), InputError> {
     let place = text
         .split_once(',')
@@ -181,7 +186,7 @@ fn pixel(option: &str, text: &str, sensor: &SensorConfig) -> Result<(usize, usiz
             sensor.rows - 1,
             sensor.cols - 1
         ),
-        None => format!("{text:?} is no macropixel; give row,col such as 10,20"),
+        None => format!("{text:?} is not a macropixel; give row,col such as 10,20"),
     };
     Err(InputError::new(option, message))
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::voice::{say, tell};
+use super::voice::{say_json, tell};
 use crate::page::Page;
 use crate::report::Table;
 
@@ -18,7 +18,7 @@ pub(super) struct PageArgs {
     /// File to write.
     #[arg(long, short, value_name = "FILE", default_value = "page.html")]
     out: PathBuf,
-    /// Of a drive, show each N-th frame: the page grows by about 0.2 MB with each.
+    /// Show every N-th frame of a drive; each adds about 0.2 MB to the page.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
     /// Print JSON instead of the table.
@@ -47,10 +47,7 @@ pub(super) fn run(args: &PageArgs) -> anyhow::Result<()> {
         bytes: page.size(),
     };
     if args.json {
-        return Ok(say(format_args!(
-            "{}\n",
-            serde_json::to_string_pretty(&report)?
-        ))?);
+        return say_json(&report);
     }
     let table = Table::new(format!("Page of {}", args.folder.display()))
         .row("frames", report.frames)

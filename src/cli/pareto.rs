@@ -10,9 +10,9 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::SceneArgs;
-use super::voice::{progress, say, tell};
+use super::voice::{progress, say_json, tell};
 use crate::files::{InputError, OutputFile, create_folder};
-use crate::report::{Axis, Chart, Grid, Style, aligned, width};
+use crate::report::{Axis, Chart, Grid, aligned, width};
 use crate::request::{self, Spelling};
 use crate::system::pareto::{Done, GATE_CYCLES, Method, ParetoSettings, Point, Summary, summarise};
 
@@ -22,17 +22,17 @@ pub(super) struct ParetoArgs {
     /// Of the scene, optics and laser are used.
     #[command(flatten)]
     scene: SceneArgs,
-    /// Ranges of the walls that are looked at, m; those out of the P-counter's reach are left out (9 bits at 384 MHz:
-    /// beyond about 197 m).
+    /// Distances of the walls, m. Those beyond the P-counter's reach are left out (9 bits at 384 MHz: beyond about
+    /// 197 m).
     #[arg(long, value_name = "M,…", value_delimiter = ',', default_values_t = [5.0, 20.0, 50.0, 100.0, 195.0])]
     ranges: Vec<f64>,
-    /// Sunlight on them, klux.
+    /// Sunlight on the walls, klux.
     #[arg(long, value_name = "KLUX,…", value_delimiter = ',', default_values_t = [0.0, 1.0, 10.0, 100.0])]
     klux: Vec<f64>,
     /// Reflectivity of the walls.
     #[arg(long, value_name = "R", default_value_t = 0.3)]
     reflectivity: f64,
-    /// Macropixels that see a wall.
+    /// Macropixels that see each wall.
     #[arg(long, value_name = "N", default_value_t = 512)]
     macropixels: usize,
     /// CLK periods in a laser cycle.
@@ -41,19 +41,19 @@ pub(super) struct ParetoArgs {
     /// Laser cycles of an exposure.
     #[arg(long, value_name = "N", default_value_t = 1000)]
     laser_cycles: u32,
-    /// Timed runs of each engine on each wall; the median counts.
+    /// Timed runs of each engine on each wall, of which the median is used.
     #[arg(long, value_name = "N", default_value_t = 3)]
     repeats: usize,
     /// Seed of the photons.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Leave the gate level out, which takes most of the time.
+    /// Leave out the gate level, which takes most of the time.
     #[arg(long)]
     no_gate: bool,
-    /// Folder for pareto.svg, pareto.csv and pareto_cells.csv; it is made if need be.
+    /// Folder for pareto.svg, pareto.csv and pareto_cells.csv; created if missing.
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
-    /// JSON instead of the table.
+    /// Print JSON instead of the table.
     #[arg(long)]
     json: bool,
 }
@@ -113,7 +113,7 @@ pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
             methods: &summaries,
             cells: &points,
         };
-        say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
+        say_json(&report)?;
     } else {
         tell(foot(args, &settings))?;
     }
@@ -160,18 +160,10 @@ fn settings(args: &ParetoArgs) -> Result<ParetoSettings, InputError> {
 
 fn write_cells(path: &Path, points: &[Point]) -> Result<(), InputError> {
     OutputFile::write_with(path, |out| {
-        let mut cells = Grid::new([
-            "method",
-            "against_cycle",
-            "range_m",
-            "illuminance_klux",
-            "run_time_ns",
-            "speed_up",
-            "mismatch",
-            "mean_shift",
-            "depth_rms_m",
-            "depth_mean_m",
-        ]);
+        let mut cells = Grid::headed(
+            "method | against_cycle | range_m | illuminance_klux | run_time_ns | speed_up \
+        | mismatch | mean_shift | depth_rms_m | depth_mean_m",
+        );
         for point in points {
             let metres = |value: Option<f64>| value.map_or(String::new(), |m| m.to_string());
             let errors = &point.errors;
@@ -207,7 +199,7 @@ fn chart(settings: &ParetoSettings, summaries: &[Summary]) -> Chart {
         .fold(Chart::new(title, time, error), |chart, summary| {
             let error_m = summary.depth_rms_m.unwrap_or(0.0).max(FLOOR_M);
             let point = (summary.run_time_ns, error_m);
-            chart.with(summary.method.name(), Style::Points, [point])
+            chart.points(summary.method.name(), [point])
         })
 }
 

@@ -1,9 +1,9 @@
-//! `gdtof power`: what a macropixel's blocks take from the supply, by the toggles of a gate-level run.
+//! `gdtof power`: the power of a macropixel's blocks, from the toggles of a gate-level run.
 
 use clap::Args;
 
 use super::SensorArgs;
-use super::voice::say;
+use super::voice::{say, say_json};
 use crate::analysis::{Capacitances, MacropixelPower};
 use crate::chip::{Exposure, Mode, PCounter, SensorConfig};
 use crate::files::InputError;
@@ -20,19 +20,19 @@ const LASER_HZ: f64 = 80e3;
 pub(super) struct PowerArgs {
     #[command(flatten)]
     sensor: SensorArgs,
-    /// CLK periods in a laser cycle; without it as many as 80 kHz allow.
+    /// CLK periods in a laser cycle [default: as many as 80 kHz allow].
     #[arg(long, value_name = "P")]
     stop_periods: Option<u32>,
-    /// Laser cycles that are simulated.
+    /// Laser cycles to simulate.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..))]
     laser_cycles: u32,
-    /// Start value of the P-counter; without it half of the largest.
+    /// Start value of the P-counter [default: half of the largest].
     #[arg(long, value_name = "CODE")]
     start: Option<u16>,
-    /// Counts of the macropixel's SPADs a second, evenly spread over them.
+    /// Counts a second of all SPADs of the macropixel together.
     #[arg(long, value_name = "HZ", default_value_t = 20e6)]
     counts_hz: f64,
-    /// Supply, V.
+    /// Supply voltage, V.
     #[arg(long, value_name = "V", default_value_t = Capacitances::default().supply_v)]
     supply_v: f64,
     /// Capacitance of the gates of a transistor pair, fF.
@@ -44,7 +44,7 @@ pub(super) struct PowerArgs {
     /// Capacitance of the drains at an output, fF.
     #[arg(long, value_name = "FF", default_value_t = 0.6)]
     drain_ff: f64,
-    /// Print as JSON.
+    /// Print JSON instead of the table.
     #[arg(long)]
     json: bool,
 }
@@ -83,9 +83,11 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
     let capacitances = capacitances(args)?;
     let stop_periods = match args.stop_periods {
         Some(0) => {
-            return Err(
-                InputError::new("--stop-periods 0", "is no laser cycle; give 1 or more").into(),
-            );
+            return Err(InputError::new(
+                "--stop-periods 0",
+                "is not a laser cycle; give 1 or more",
+            )
+            .into());
         }
         Some(periods) => periods,
         None => (config.clk_hz / LASER_HZ).round() as u32,
@@ -132,10 +134,7 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
         });
     }
     if args.json {
-        return Ok(say(format_args!(
-            "{}\n",
-            serde_json::to_string_pretty(&variants)?
-        ))?);
+        return say_json(&variants);
     }
     say(format_args!(
         "Switching energy of a macropixel in a laser cycle of {stop_periods} CLK periods at {} MHz, pJ (share)\n{}",

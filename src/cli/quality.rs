@@ -4,7 +4,7 @@ use crate::ranging::DepthOptions;
 use crate::report::Table;
 use crate::system::Summary;
 
-/// How good the depths are, and why there are no others.
+/// How good the depths are, and why macropixels have none.
 pub(super) fn rows(table: &mut Table, options: &DepthOptions, summary: &Summary) {
     let metres = |value: Option<f64>| match value {
         Some(m) => format!("{m:.3} m"),

@@ -11,9 +11,9 @@ use rayon::prelude::*;
 
 use super::sdf::annotated_timing;
 use super::silicon::SiliconArgs;
-use super::voice::{note, progress, say};
+use super::voice::{note, progress, say_json};
+use super::wave_format::WaveFormatOption;
 use crate::analysis::{TimingVerdict, VerdictReport};
-use crate::bench::{HardwareEventKind, HardwareEventReport};
 use crate::chip::{SensorConfig, Silicon};
 use crate::engine::waveform::{self, View};
 use crate::engine::{
@@ -23,6 +23,7 @@ use crate::engine::{
 use crate::files::{InputError, OutputFile};
 use crate::kernel::{Activity, CheckReport, Observer, Policy};
 use crate::report::Table;
+use crate::stimulus::{HardwareEventKind, HardwareEventReport};
 use crate::system::EngineKind;
 use crate::units::Time;
 use crate::waves::{WaveFormat, write_saif};
@@ -40,34 +41,36 @@ pub(super) struct ReplayArgs {
     engine: EngineKind,
     #[command(flatten)]
     silicon: SiliconArgs,
-    /// Histograms: `.npy` (uint16, rows × cols × bins) or `.csv` (row,col,bin,count). Without it, CSV on
-    /// standard output.
+    /// File for the histograms: `.npy` (uint16, rows × cols × bins) or `.csv` (row,col,bin,count) [default: CSV on
+    /// standard output].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Waveform of every named net (needs --engine gate), as FST if its name ends in .fst, else as VCD; views for GTKWave
-    /// and Surfer go beside it.
+    /// Waveform of every named net: FST if its name ends in .fst, else VCD. Views for GTKWave and Surfer go beside
+    /// it. Needs --engine gate.
     #[arg(long, value_name = "FILE")]
     vcd: Option<PathBuf>,
-    /// Switching activity of every net, from power-up to the end, as SAIF 2.0 for power tools (needs --engine gate).
+    /// File for the switching activity of every net, from power-up to the end, as SAIF 2.0 for power tools. Needs
+    /// --engine gate.
     #[arg(long, value_name = "FILE")]
     saif: Option<PathBuf>,
-    /// Count transport glitches in that file, too (TG), which some readers refuse.
+    /// Also count transport glitches (TG) in the SAIF file; some readers refuse these.
     #[arg(long, requires = "saif")]
     saif_glitches: bool,
-    /// Format of the waveform, whatever its name.
+    /// Format of the waveform, whatever its file is called.
     #[arg(long, value_enum, requires = "vcd")]
-    wave_format: Option<WaveFormat>,
-    /// Delays that replace the library's (SDF, in the sensor's corner; needs --engine gate).
+    wave_format: Option<WaveFormatOption>,
+    /// Delays to use instead of the library's (SDF, in the sensor's corner). Needs --engine gate.
     #[arg(long, value_name = "FILE")]
     sdf: Option<PathBuf>,
-    /// Check setup, hold, recovery, removal and pulse widths of every flip-flop, and watch for hardware events (needs
-    /// --engine gate): a summary on standard error.
+    /// Check setup, hold, recovery, removal and pulse widths of every flip-flop, watch for hardware events, and print
+    /// a summary on standard error. Needs --engine gate.
     #[arg(long, value_enum, value_name = "POLICY")]
     checks: Option<Checks>,
-    /// The timing checks' violations, summary and slack histograms, and the hardware events, as JSON (needs --checks).
+    /// File for violations, summary and slack histograms of the timing checks, and hardware events, as JSON. Needs
+    /// --checks.
     #[arg(long, value_name = "FILE")]
     checks_json: Option<PathBuf>,
-    /// Print as JSON what became of the events, on any engine, with the timing verdict (needs --out).
+    /// Print what became of the events, and the timing verdict, as JSON. Works on any engine; needs --out.
     #[arg(long, requires = "out")]
     json: bool,
 }
@@ -75,9 +78,9 @@ pub(super) struct ReplayArgs {
 /// What a timing violation does.
 #[derive(Clone, Copy, clap::ValueEnum)]
 enum Checks {
-    /// It is reported.
+    /// Report it.
     Report,
-    /// It is reported, and the flip-flop's state becomes X.
+    /// Report it, and set the flip-flop to X.
     X,
 }
 
@@ -152,10 +155,7 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let out = args.out.as_deref();
     write(&stimuli.sensor, &replayed.histograms, out, format)?;
     if args.json {
-        say(format_args!(
-            "{}\n",
-            serde_json::to_string_pretty(&summary)?
-        ))?;
+        say_json(&summary)?;
     }
     Ok(())
 }
@@ -180,7 +180,7 @@ struct Summary {
 }
 
 impl Summary {
-    /// Says on standard error what the chip loses without a word.
+    /// Says on standard error what the chip loses silently.
     fn tell(&self, config: &SensorConfig) {
         if let Some(coverage) = &self.time_keeping {
             eprint!("{}", table(coverage));
@@ -315,11 +315,13 @@ fn record<O: Observer>(
     let pixels = (0..sensor.rows).flat_map(|row| (0..sensor.cols).map(move |col| (row, col)));
     let start = *starts.first().expect("a sensor has a macropixel");
     let view = View::of_array(pixels.collect(), sensor, exposure, start);
-    let format = args.wave_format.unwrap_or(WaveFormat::of(waves));
+    let format = args
+        .wave_format
+        .map_or(WaveFormat::of(waves), WaveFormat::from);
     waveform::record(simulation, waves, format, &view, observer)
 }
 
-/// Which macropixels kept time, and why the others did not.
+/// Which macropixels met timing, and why the others did not.
 fn table(coverage: &ClosedFormCoverage) -> Table {
     let mut table = Table::new("Time keeping")
         .row("macropixels in closed form", coverage.decided)

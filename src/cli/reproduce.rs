@@ -12,7 +12,7 @@ use crate::reproduce::{self, Report, Selection};
 /// Arguments of `gdtof reproduce`.
 #[derive(Args)]
 pub(super) struct ReproduceArgs {
-    /// Only this claim of the list; may be repeated. Without any choice, everything.
+    /// Only this claim of the list; may be repeated [default: everything].
     #[arg(long, value_name = "N")]
     claim: Vec<u32>,
     /// Only this figure of the thesis; may be repeated.
@@ -21,19 +21,18 @@ pub(super) struct ReproduceArgs {
     /// Only this table of the thesis; may be repeated.
     #[arg(long, value_name = "N")]
     table: Vec<u32>,
-    /// Only this measurement of the chip against its theory: 1 probability of detection, 2 precision, 3 penalty, 4 zooming and
-    /// sliding at 200 m and 75 m; may be
-    /// repeated.
+    /// Only this measurement of the chip beside its theory: 1 probability of detection, 2 precision, 3 penalty, 4
+    /// zooming and sliding at 200 m and 75 m; may be repeated.
     #[arg(long, value_name = "N")]
     measurement: Vec<u32>,
-    /// Frames behind each measured number, at least 100; without it 300.
+    /// Frames behind each measured number, at least 100 [default: 300].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
     frames: Option<u32>,
-    /// Folder for the page (report.md, report.html, report.json), the figures as SVG and their numbers as CSV; made
-    /// if it is not there.
+    /// Folder for the page (report.md, report.html, report.json), the figures as SVG and their numbers as CSV;
+    /// created if missing.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// JSON instead of tables.
+    /// Print JSON instead of tables.
     #[arg(long)]
     json: bool,
 }
@@ -109,7 +108,7 @@ fn print(report: &Report, folder: Option<&Path>) -> std::io::Result<()> {
     for table in &report.tables {
         say(format_args!(
             "Table {}: {}\n{}\n",
-            table.number, table.title, table.grid
+            table.number, table.title, table.it
         ))?;
     }
     for figure in &report.figures {
@@ -120,7 +119,7 @@ fn print(report: &Report, folder: Option<&Path>) -> std::io::Result<()> {
     }
     for result in &report.measurements {
         say(format_args!("{}\n", reproduce::heading(result)))?;
-        for note in &result.found.notes {
+        for note in &result.it.notes {
             say(format_args!("  {note}\n"))?;
         }
         for (_, title, grid) in result.tables() {
@@ -153,13 +152,12 @@ fn print(report: &Report, folder: Option<&Path>) -> std::io::Result<()> {
 /// The page, the figures and the tables as files.
 fn write(report: &Report, folder: &Path) -> Result<(), InputError> {
     for figure in &report.figures {
-        for (name, chart) in figure.files() {
-            chart.write(&folder.join(format!("{name}.svg")))?;
-        }
+        let name = format!("{}.svg", figure.file());
+        figure.it.write(&folder.join(name))?;
     }
     for table in &report.tables {
         let path = folder.join(format!("table_{:03}.csv", table.number));
-        OutputFile::write_with(&path, |out| table.grid.write_csv(out))?;
+        OutputFile::write_with(&path, |out| table.it.write_csv(out))?;
     }
     for result in &report.measurements {
         for (name, _, grid) in result.tables() {

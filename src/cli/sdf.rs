@@ -40,10 +40,10 @@ const LARGEST_UNASKED: u64 = 100_000_000;
 pub(super) struct SdfArgs {
     #[command(flatten)]
     sensor: SensorArgs,
-    /// The delay file.
+    /// Delay file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// What stands between names in paths.
+    /// Separator between names in paths.
     #[arg(long, value_enum, default_value = "dot")]
     divider: Divider,
     /// Unit of delays.

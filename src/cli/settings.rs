@@ -14,17 +14,18 @@ use crate::scene::Scene;
 /// Which sensor.
 #[derive(Args)]
 pub(super) struct SensorArgs {
-    /// Sensor configuration (TOML), or one of the chips quantic4x4 (without it), hslidar and hslidar_delay_line.
+    /// Sensor: a file (TOML), or quantic4x4 (the default), hslidar or hslidar_delay_line.
     #[arg(long, value_name = "FILE")]
     sensor: Option<PathBuf>,
-    /// Macropixel rows, instead of the configuration's.
+    /// Rows of macropixels, instead of the sensor's.
     #[arg(long, value_name = "R")]
     rows: Option<usize>,
-    /// Macropixel columns, instead of the configuration's.
+    /// Columns of macropixels, instead of the sensor's.
     #[arg(long, value_name = "C")]
     cols: Option<usize>,
-    /// Set one key of the sensor or scene, whatever its file says, as sensor.clk_hz=300e6, \"sensor.clk_hz=300 MHz\" or
-    /// scene.lidar.pde=0.2; may be repeated, and the last one counts. `gdtof sensor` and `gdtof scene` list the keys.
+    /// Set one key of the sensor or scene, whatever its file says, for example sensor.clk_hz=300e6,
+    /// "sensor.clk_hz=300 MHz" or scene.lidar.pde=0.2. May be repeated; the last value wins. `gdtof sensor` and
+    /// `gdtof scene` list the keys.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
@@ -34,7 +35,7 @@ pub(super) struct SensorArgs {
 pub(super) struct SceneArgs {
     #[command(flatten)]
     sensor: SensorArgs,
-    /// Scene (TOML), or one of the built-in street (without it), van, fog, glass, sweep, night and empty.
+    /// Scene: a file (TOML), or street (the default), van, fog, glass, sweep, night or empty.
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
 }
@@ -57,7 +58,7 @@ impl SensorArgs {
         chips.find(|chip| asked.starts_with(chip)).unwrap_or(asked)
     }
 
-    /// Says where CLK is faster than the thesis's chip takes.
+    /// Notes if CLK is faster than the thesis's chip takes.
     fn note_clk(&self, sensor: &SensorConfig) {
         if self.chip() == "hslidar" && sensor.clk_hz > HSLIDAR_MOST_HZ {
             note(format_args!(

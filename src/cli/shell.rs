@@ -1,4 +1,5 @@
-//! `gdtof completion`, `gdtof man` and `gdtof schema`: what shells, readers and editors want to know of the command and its files.
+//! `gdtof completion`, `gdtof man` and `gdtof schema`: the command and its files, described for shells, readers and
+//! editors.
 
 use std::path::PathBuf;
 
@@ -14,7 +15,7 @@ use crate::sweep::Study;
 /// Arguments of `gdtof completion`.
 #[derive(Args)]
 pub(super) struct CompletionArgs {
-    /// Shell that is to complete options of gdtof.
+    /// Shell to write the script for.
     #[arg(value_enum)]
     shell: Shell,
 }
@@ -22,7 +23,7 @@ pub(super) struct CompletionArgs {
 /// Arguments of `gdtof man`.
 #[derive(Args)]
 pub(super) struct ManArgs {
-    /// Folder for gdtof.1 and a page for each command; it is made if need be.
+    /// Folder for gdtof.1 and a page for each command; created if missing.
     #[arg(long, value_name = "DIR", default_value = "man")]
     out: PathBuf,
 }

@@ -14,10 +14,11 @@ use crate::netlist::{Conditions, Corner, Mismatch};
 /// Silicon and its conditions.
 #[derive(Args)]
 pub(super) struct SiliconArgs {
-    /// Silicon, slow, typ or fast: like voltage and temperature it scales the delays of the sensor's corner.
+    /// Speed of the silicon: slow, typ or fast. Like voltage and temperature it scales the delays of the sensor's
+    /// corner.
     #[arg(long, value_name = "SPEED", default_value = "typ")]
     process: Corner,
-    /// Supply, V.
+    /// Supply voltage, V.
     #[arg(long, value_name = "V", default_value_t = 1.1)]
     voltage: f64,
     /// Junction temperature, °C.
@@ -28,7 +29,7 @@ pub(super) struct SiliconArgs {
         allow_negative_numbers = true
     )]
     temperature: f64,
-    /// Random mismatch: standard deviation of an inverter's delay, relative.
+    /// Random mismatch: relative standard deviation of an inverter's delay.
     #[arg(long, value_name = "SIGMA", default_value_t = 0.0)]
     mismatch: f64,
     /// Seed of the mismatch.
@@ -47,7 +48,7 @@ impl SiliconArgs {
             InputError::new("--voltage, --temperature", message)
         })?;
         if !(0.0..=0.5).contains(&self.mismatch) {
-            let message = format!("{} is no relative spread; give 0 to 0.5", self.mismatch);
+            let message = format!("{} is not a relative spread; give 0 to 0.5", self.mismatch);
             return Err(InputError::new("--mismatch", message));
         }
         let mismatch = (self.mismatch > 0.0).then_some(Mismatch {

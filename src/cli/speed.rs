@@ -1,8 +1,8 @@
-//! `gdtof speed`: how fast the fast engines are, what of an exposure each figure leaves out, what the worst frames cost,
-//! how all that grows with the array and with threads, and the memory it takes.
+//! `gdtof speed`: how fast the engines are, which part of an exposure each figure leaves out, what the worst frames
+//! cost, how time grows with the array and with threads, and the memory it takes.
 //!
 //! Every figure is taken in a process of its own, so that its peak memory and its number of threads are its own, as
-//! often as asked, after one run that is not counted. Runs of one thread are told by its processor time, which
+//! often as asked, after one run that is not counted. Runs of one thread are timed by its processor time, which
 //! neighbours disturb little; more threads only by the wall clock, which knows how they wait for each other. Both
 //! clocks count nanoseconds.
 
@@ -14,7 +14,7 @@ use clap::Args;
 use cpu_time::ProcessTime;
 use serde::{Deserialize, Serialize};
 
-use super::voice::{progress, say};
+use super::voice::{progress, say, say_json};
 use crate::engine::{Cohort, CohortOptions, Cycle, Expose, Replay, Window};
 use crate::photon::SpadEvent;
 use crate::report::Grid;
@@ -29,8 +29,8 @@ const CYCLE_STOP_PERIODS: u32 = 520;
 /// Macropixels of the array on which engines are compared.
 const ARRAY: (usize, usize) = (64, 64);
 
-/// Macropixels that the cycle engine takes in one word. With so many of them, every start value is in that word; in
-/// [`ARRAY`] it sorts them into words of 64 values each.
+/// Macropixels that the cycle engine takes in one word. An array of this size has all start values in that word; in
+/// [`ARRAY`] the engine sorts them into words of 64 values each.
 const ONE_WORD: (usize, usize) = (16, 32);
 
 /// What is run between the two readings of the clock.
@@ -139,13 +139,13 @@ impl Subject {
 /// Arguments of `gdtof speed`.
 #[derive(Args)]
 pub(super) struct SpeedArgs {
-    /// Timed runs of each figure: the table gives least, median and most.
+    /// Timed runs for each figure; the table gives least, median and most.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1000))]
     runs: u16,
-    /// Largest array, macropixels to a side.
+    /// Side of the largest array, in macropixels.
     #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u16).range(1..=256))]
     largest: u16,
-    /// JSON instead of the table.
+    /// Print JSON instead of the table.
     #[arg(long)]
     json: bool,
     /// One figure only, as JSON: what its own process does.
@@ -222,10 +222,7 @@ pub(super) fn run(args: &SpeedArgs) -> anyhow::Result<()> {
     }
     progress.finish_and_clear();
     if args.json {
-        say(format_args!(
-            "{}\n",
-            serde_json::to_string_pretty(&figures)?
-        ))?;
+        say_json(&figures)?;
     } else {
         say(table(&figures))?;
     }
@@ -369,19 +366,10 @@ fn peak_kib() -> Option<u64> {
 }
 
 fn table(figures: &[Figure]) -> String {
-    let mut grid = Grid::new([
-        "engine, what is timed",
-        "left out",
-        "frame",
-        "array",
-        "threads",
-        "exposure",
-        "least (ms)",
-        "median (ms)",
-        "most (ms)",
-        "G macropixel-CLK/s",
-        "peak (MiB)",
-    ]);
+    let mut grid = Grid::headed(
+        "engine, what is timed | left out | frame | array | threads | exposure | least (ms) \
+        | median (ms) | most (ms) | G macropixel-CLK/s | peak (MiB)",
+    );
     for figure in figures {
         let subject = &figure.subject;
         let peak = figure

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::voice::{say, tell};
+use super::voice::{say_json, tell};
 use crate::files::{InputError, MANIFEST, OutputFile, Raster, ResultSet};
 use crate::report::{Cell, DepthMap, Table, write_npy_f32};
 use crate::stereo::{Census, DisparityMap, GreyImage, MatchError, Matcher, Paths, Workspace};
@@ -16,20 +16,20 @@ use crate::stereo::{Census, DisparityMap, GreyImage, MatchError, Matcher, Paths,
 pub(super) struct StereoArgs {
     /// Left picture (PNG), rectified.
     left: PathBuf,
-    /// Right picture (PNG), rectified: points stand in the same row as in the left one.
+    /// Right picture (PNG), rectified: a point is in the same row as in the left picture.
     right: PathBuf,
     #[command(flatten)]
     matching: MatchingArgs,
-    /// True disparities of the left picture (.npy, rows x columns; NaN or infinite where not known) to compare with.
+    /// True disparities of the left picture to compare with (.npy, rows x columns; NaN or infinite where unknown).
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
-    /// Folder for results.
+    /// Folder for the results; created if missing.
     #[arg(long, short, value_name = "FOLDER", default_value = "stereo")]
     out: PathBuf,
-    /// Match so many times and tell the least and the middle run time.
+    /// Match N times, and report the least and the median run time.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     repeat: u32,
-    /// Print as JSON.
+    /// Print JSON instead of the table.
     #[arg(long)]
     json: bool,
 }
@@ -37,10 +37,10 @@ pub(super) struct StereoArgs {
 /// How to match.
 #[derive(Args)]
 struct MatchingArgs {
-    /// Disparities searched, 1 to 256.
+    /// Number of disparities to search, 1 to 256.
     #[arg(long, value_name = "N", default_value_t = Matcher::default().disparities)]
     disparities: usize,
-    /// Least disparity searched, px.
+    /// Smallest disparity to search, px.
     #[arg(
         long,
         value_name = "PX",
@@ -48,25 +48,25 @@ struct MatchingArgs {
         allow_negative_numbers = true
     )]
     min_disparity: i32,
-    /// Paths along which costs are gathered.
+    /// Number of paths along which costs are summed.
     #[arg(long, value_enum, default_value = "5")]
     paths: PathsArg,
-    /// Neighbourhood of the census, columns x rows.
+    /// Size of the census neighbourhood, columns x rows.
     #[arg(long, value_name = "COLSxROWS", default_value = "7x7")]
     census: String,
-    /// Penalty of a step of one disparity.
+    /// Penalty for a step of one disparity.
     #[arg(long, value_name = "P", default_value_t = Matcher::default().p1)]
     p1: u8,
-    /// Penalty of a greater step where the image is even.
+    /// Penalty for a larger step where the image is uniform.
     #[arg(long, value_name = "P", default_value_t = Matcher::default().p2)]
     p2: u8,
-    /// By how much the second best disparity must be worse, per cent.
+    /// How much worse the second-best disparity must be, per cent.
     #[arg(long, value_name = "PERCENT", default_value_t = Matcher::default().uniqueness_percent)]
     uniqueness: u32,
-    /// By how much left and right may disagree, px; "none" does not ask.
+    /// How far left and right may disagree, px; "none" turns the check off.
     #[arg(long, value_name = "PX", default_value = "1")]
     left_right: String,
-    /// Patches of fewer pixels are taken out.
+    /// Remove patches with fewer pixels than this.
     #[arg(long, value_name = "PX", default_value_t = Matcher::default().speckle_px)]
     speckle: usize,
     /// Leave out the median filter.
@@ -92,7 +92,7 @@ impl MatchingArgs {
             .and_then(|(cols, rows)| Some((cols.parse().ok()?, rows.parse().ok()?)));
         let Some((cols, rows)) = census else {
             let message = format!(
-                "{:?} is no neighbourhood; give columns x rows such as 7x7",
+                "{:?} is not a neighbourhood; give columns x rows such as 7x7",
                 self.census
             );
             return Err(InputError::new("--census", message));
@@ -100,7 +100,7 @@ impl MatchingArgs {
         let left_right_px = match self.left_right.as_str() {
             "none" => None,
             px => Some(px.parse().map_err(|_| {
-                let message = format!("{px:?} is no number of pixels; give 0, 1, ... or none");
+                let message = format!("{px:?} is not a number of pixels; give 0, 1, ... or none");
                 InputError::new("--left-right", message)
             })?),
         };
@@ -131,7 +131,7 @@ impl MatchingArgs {
     }
 }
 
-/// What is wrong, and with which option it is mended.
+/// What is wrong, and which option corrects it.
 pub(super) fn cannot_match(left: &Path, right: &Path, error: &MatchError) -> InputError {
     let (what, cure) = match error {
         MatchError::Sizes { .. } => {
@@ -158,11 +158,11 @@ pub(super) fn read_image(path: &Path) -> Result<GreyImage, InputError> {
     let bits = match raster.white {
         255.0 => 8,
         65_535.0 => 16,
-        _ => return Err(complain("is no PNG; give a picture".into())),
+        _ => return Err(complain("is not a PNG; give a picture".into())),
     };
     let pixels = raster.values.iter().map(|v| v.round() as u16).collect();
     GreyImage::new(raster.width, raster.height, bits, pixels)
-        .map_err(|error| complain(format!("is no picture: {error}; give another")))
+        .map_err(|error| complain(format!("is not a picture: {error}; give another")))
 }
 
 /// Errors of disparities against the truth, where that is known.
@@ -276,7 +276,7 @@ pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
         errors: truth.map(|truth| Errors::of(&map, &truth)),
     };
     let set = ResultSet::begin(&args.out)?;
-    let shape = [map.height() as u64, map.width() as u64];
+    let shape = [map.height(), map.width()];
     write_npy_f32(
         &set.staging().join("disparity.npy"),
         &shape,
@@ -291,7 +291,7 @@ pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
         super::voice::note(note);
     }
     match args.json {
-        true => say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?,
+        true => say_json(&report)?,
         false => tell(table(args, &report))?,
     }
     Ok(())

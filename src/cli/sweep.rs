@@ -19,10 +19,11 @@ use crate::sweep::{
 pub(super) struct SweepArgs {
     #[command(subcommand)]
     command: Option<SweepCommand>,
-    /// Study (TOML): what varies in `[vary]`, what does not in `[fixed]`.
+    /// Study (TOML): keys that vary in `[vary]`, fixed ones in `[fixed]`.
     #[arg(required = true, value_name = "STUDY")]
     study: Option<PathBuf>,
-    /// Take only every N-th point, from the I-th on: one of N processes, in one folder or several, which `gdtof sweep merge` joins.
+    /// Take only every N-th point, from the I-th on. N processes can share a study this way, in one folder or in
+    /// several; `gdtof sweep merge` joins the results.
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<Shard>,
     #[command(flatten)]
@@ -31,7 +32,7 @@ pub(super) struct SweepArgs {
 
 #[derive(Subcommand)]
 enum SweepCommand {
-    /// Make one table of the rows in several folders.
+    /// Make one table from the rows in several folders.
     Merge(MergeArgs),
 }
 
@@ -41,7 +42,7 @@ struct MergeArgs {
     /// Folders that `gdtof sweep` has written, all of one study.
     #[arg(required = true, value_name = "DIR")]
     folders: Vec<PathBuf>,
-    /// Make a table of the points that are there, if not all are.
+    /// Make the table even if points are missing.
     #[arg(long)]
     partial: bool,
     #[command(flatten)]
@@ -51,10 +52,10 @@ struct MergeArgs {
 /// What becomes of the rows.
 #[derive(Args)]
 struct ResultArgs {
-    /// Folder for the results, whatever the study says; of merged folders the first one, without it.
+    /// Folder for the results, instead of the study's. `merge` without it uses the first of its folders.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Draw a column over another one, if wished a line for each value of a third; may be repeated.
+    /// Plot column Y over column X, with a line for each value of SERIES if given; may be repeated.
     #[arg(long = "plot", value_name = "X,Y[,SERIES]")]
     plots: Vec<String>,
 }
@@ -160,7 +161,7 @@ fn plots(args: &ResultArgs, study: &Study) -> Result<Vec<Plot>, InputError> {
         let plot = Plot::parse(text).ok_or_else(|| {
             InputError::new(
                 "--plot",
-                format!("{text:?} is no pair of columns; give X,Y or X,Y,SERIES"),
+                format!("{text:?} is not a pair of columns; give X,Y or X,Y,SERIES"),
             )
         })?;
         Drawing::new(&plot, study, &columns, "--plot")?;

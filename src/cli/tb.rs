@@ -8,26 +8,28 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::voice::say;
+use super::voice::{say, say_json};
+use super::wave_format::WaveFormatOption;
 use crate::files::{InputError, clean_up_when_interrupted, create_folder};
 use crate::report::{Checks, Grid};
+use crate::request::sign_files;
 use crate::testbenches::{TESTBENCHES, Testbench};
 use crate::waves::WaveFormat;
 
 /// Where waveforms go.
 #[derive(Args)]
 struct WaveArgs {
-    /// Folder for waveforms and their views for GTKWave and Surfer, made if it is not there.
+    /// Folder for waveforms and their views for GTKWave and Surfer; created if missing.
     #[arg(long, value_name = "DIR", default_value = "waves")]
     out: PathBuf,
     /// Format of the waveforms.
     #[arg(long, value_enum, default_value_t)]
-    wave_format: WaveFormat,
+    wave_format: WaveFormatOption,
 }
 
 impl WaveArgs {
     fn path(&self, testbench: &Testbench) -> PathBuf {
-        let extension = self.wave_format.extension();
+        let extension = WaveFormat::from(self.wave_format).extension();
         self.out.join(format!("{}.{extension}", testbench.name))
     }
 }
@@ -35,10 +37,10 @@ impl WaveArgs {
 /// Arguments of `gdtof tb`.
 #[derive(Args)]
 pub(super) struct TbArgs {
-    /// Testbenches to run, with or without their `tb_`; without any, all of them.
+    /// Testbenches to run, with or without `tb_` [default: all of them].
     #[arg(value_name = "NAME")]
     names: Vec<String>,
-    /// Only list them.
+    /// List the testbenches, and run none.
     #[arg(long, conflicts_with_all = ["out", "wave_format", "verbose"])]
     list: bool,
     /// Print every check, not only those that fail.
@@ -95,8 +97,7 @@ pub(super) fn run(args: &TbArgs) -> anyhow::Result<ExitCode> {
     let entries = entries?;
     let results = || entries.iter().filter_map(|entry| entry.result.as_ref());
     if args.json {
-        let text = serde_json::to_string_pretty(&entries)?;
-        say(format_args!("{text}\n"))?;
+        say_json(&entries)?;
     } else {
         for entry in &entries {
             let Some(result) = &entry.result else {
@@ -129,7 +130,7 @@ fn chosen(names: &[String]) -> Result<Vec<Testbench>, InputError> {
     for name in names {
         let testbench = Testbench::named(name).ok_or_else(|| {
             let all: Vec<&str> = TESTBENCHES.iter().map(|tb| tb.name).collect();
-            InputError::new(name, format!("is no testbench; give {}", all.join(", ")))
+            InputError::new(name, format!("is not a testbench; give {}", all.join(", ")))
         })?;
         if chosen.iter().all(|other| other.name != testbench.name) {
             chosen.push(testbench);
@@ -186,6 +187,7 @@ struct OneArgs {
 /// # Panics
 /// When there is no testbench of this name.
 pub fn testbench(name: &'static str) -> ExitCode {
+    sign_files();
     let testbench = Testbench::named(name).expect("a testbench for each tb_* binary");
     let command = OneArgs::command().name(name).about(testbench.about);
     let args = OneArgs::from_arg_matches(&command.get_matches());

@@ -7,6 +7,7 @@ use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
 
 static IS_QUIET: AtomicBool = AtomicBool::new(false);
 
@@ -24,6 +25,15 @@ pub(super) fn say(text: impl Display) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     write!(out, "{text}")?;
     out.flush()
+}
+
+/// Writes data as JSON, for a machine to read.
+///
+/// # Errors
+/// Those of standard output.
+pub(super) fn say_json(data: &(impl Serialize + ?Sized)) -> anyhow::Result<()> {
+    let text = serde_json::to_string_pretty(data)?;
+    Ok(say(format_args!("{text}\n"))?)
 }
 
 /// Writes to standard output what was done, where the results are files.

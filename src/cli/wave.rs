@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::voice::{note, say};
+use super::voice::{note, say, say_json};
 use crate::engine::late_cycle;
 use crate::engine::waveform::{self, View};
 use crate::files::InputError;
@@ -16,16 +16,16 @@ use crate::waves::WaveFormat;
 /// Arguments of `gdtof wave`.
 #[derive(Args)]
 pub(super) struct WaveArgs {
-    /// The frame.json of a frame.
+    /// The frame.json of the frame.
     #[arg(long, value_name = "FILE", default_value = "out/frame.json")]
     frame: PathBuf,
-    /// Macropixel, as row,col.
+    /// Macropixel, as row,col; the upper left one is 0,0.
     #[arg(long, value_name = "R,C")]
     pixel: String,
-    /// Laser cycle, from 0.
+    /// Laser cycle; the first one is 0.
     #[arg(long, value_name = "K")]
     cycle: u32,
-    /// Waveform to write: FST if its name ends so, else VCD. Without it, a VCD beside the frame.
+    /// Waveform to write: FST if its name ends in .fst, else VCD [default: a VCD beside the frame].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print JSON instead of the table.
@@ -100,10 +100,7 @@ pub(super) fn run(args: &WaveArgs) -> anyhow::Result<()> {
         );
     }
     if args.json {
-        return Ok(say(format_args!(
-            "{}\n",
-            serde_json::to_string_pretty(&report)?
-        ))?);
+        return say_json(&report);
     }
     let start = report
         .start

@@ -41,7 +41,7 @@ pub(crate) struct Limit {
     pub(crate) found: Found,
 }
 
-/// Two frames for every laser, energy and guide; `done` is told of each pair.
+/// Two frames for every laser, energy and guide; `done` is called after each pair.
 ///
 /// # Errors
 /// What a drive reports.

@@ -22,7 +22,7 @@ use crate::photon::PixelLight;
 use crate::ranging::DepthOptions;
 use crate::scene::{GroundTruth, Scene};
 use crate::system::{FrameError, Known, PixelDepth, Pointing, Ranger, WindowPolicy, photon_stream};
-use crate::units::Time;
+use crate::units::{Time, TimeOfFlight};
 
 /// How far full, sliding and zooming histograms look, m: the demonstrator's 75 m and a little.
 pub(crate) const REACH_M: f64 = 80.0;

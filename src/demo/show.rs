@@ -108,7 +108,7 @@ pub(crate) struct Shown {
 const COMPARED: usize = 48;
 
 impl Show {
-    /// Runs it; `done` is told of every frame.
+    /// Runs it; `done` is called after every frame.
     ///
     /// # Errors
     /// What a drive reports.

@@ -3,7 +3,7 @@
 use super::Demonstrator;
 use super::found::mean;
 use super::scenes::figure_at;
-use crate::report::{Axis, Chart, Style};
+use crate::report::{Axis, Chart};
 use crate::scene::GroundTruth;
 use crate::system::{Drive, FrameError, FrameSettings, PixelDepth};
 
@@ -41,7 +41,7 @@ pub(crate) struct SweepPoint {
     pub(crate) guide_theory_m: f64,
 }
 
-/// The sweep; `done` is told of every frame.
+/// The sweep; `done` is called after every frame.
 ///
 /// # Errors
 /// What a drive reports.
@@ -57,7 +57,7 @@ pub(crate) fn sweep(
         .collect()
 }
 
-/// The figure at one distance; `done` is told of every frame.
+/// The figure at one distance; `done` is called after every frame.
 ///
 /// # Errors
 /// What a drive reports.
@@ -134,33 +134,25 @@ pub(crate) fn charts(points: &[SweepPoint]) -> [(u32, Chart); 3] {
         Axis::linear("true distance (m)"),
         Axis::linear("measured distance (m)"),
     )
-    .with("3 σ", Style::Whiskers, whiskers)
-    .with("mean", Style::Points, at(|p| p.distance_m + p.mean_error_m))
-    .with("true", Style::Dashed, at(|p| p.distance_m));
+    .whiskers("3 σ", whiskers)
+    .points("mean", at(|p| p.distance_m + p.mean_error_m))
+    .dashed("true", at(|p| p.distance_m));
     let sigma = Chart::new(
         format!("Standard deviation, {title}"),
         Axis::linear("distance (m)"),
         Axis::linear("σ (m)"),
     )
-    .with("measured on the model", Style::Points, at(|p| p.sigma_m))
-    .with(
-        "0.1 % of the distance",
-        Style::Dashed,
-        at(|p| 1e-3 * p.distance_m),
-    );
+    .points("measured on the model", at(|p| p.sigma_m))
+    .dashed("0.1 % of the distance", at(|p| 1e-3 * p.distance_m));
     let rms = Chart::new(
         format!("RMS error, {title}"),
         Axis::linear("distance (m)"),
         Axis::log("RMS error (m)"),
     )
-    .with("guided lidar", Style::Points, at(|p| p.rms_m))
-    .with("its stereo guide", Style::Points, at(|p| p.guide_rms_m))
-    .with(
-        "a quarter of a pixel, Eq. 27",
-        Style::Dashed,
-        at(|p| p.guide_theory_m),
-    )
-    .with("published, at most 0.15 m", Style::Line, at(|_| 0.15));
+    .points("guided lidar", at(|p| p.rms_m))
+    .points("its stereo guide", at(|p| p.guide_rms_m))
+    .dashed("a quarter of a pixel, Eq. 27", at(|p| p.guide_theory_m))
+    .line("published, at most 0.15 m", at(|_| 0.15));
     [(103, mean), (104, sigma), (105, rms)]
 }
 

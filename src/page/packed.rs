@@ -29,6 +29,7 @@ use crate::files::InputError;
 use crate::guide::view;
 use crate::scene::{DVec3, Ray, Scene, Stage};
 use crate::system::{NoDepth, Ranger, TakenSettings};
+use crate::units::TimeOfFlight;
 
 /// Pixels of the camera view across a macropixel.
 const ACROSS: u32 = 4;

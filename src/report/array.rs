@@ -1,12 +1,11 @@
 //! Arrays for NumPy and MATLAB: the NPY format, version 1.0, little endian, C order.
 
 use std::fs::File;
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, Write};
+use std::marker::PhantomData;
 use std::path::Path;
 
-use npyz::{AutoSerialize, NpyWriter, WriterBuilder};
-
-use crate::files::{InputError, OutputFile};
+use crate::files::{Element, InputError, OutputFile, write_npy_elements, write_npy_head};
 
 /// Writes `data` as a `uint16` array of `shape`, last axis fastest.
 ///
@@ -15,7 +14,7 @@ use crate::files::{InputError, OutputFile};
 ///
 /// # Panics
 /// When `shape` does not have as many elements as `data`.
-pub(crate) fn write_npy_u16(path: &Path, shape: &[u64], data: &[u16]) -> Result<(), InputError> {
+pub(crate) fn write_npy_u16(path: &Path, shape: &[usize], data: &[u16]) -> Result<(), InputError> {
     write_npy(path, shape, data)
 }
 
@@ -26,31 +25,12 @@ pub(crate) fn write_npy_u16(path: &Path, shape: &[u64], data: &[u16]) -> Result<
 ///
 /// # Panics
 /// When `shape` does not have as many elements as `data`.
-pub(crate) fn write_npy_f32(path: &Path, shape: &[u64], data: &[f32]) -> Result<(), InputError> {
+pub(crate) fn write_npy_f32(path: &Path, shape: &[usize], data: &[f32]) -> Result<(), InputError> {
     write_npy(path, shape, data)
 }
 
-fn write_npy<T: npyz::AutoSerialize + Copy>(
-    path: &Path,
-    shape: &[u64],
-    data: &[T],
-) -> Result<(), InputError> {
-    let elements: u64 = shape.iter().product();
-    assert_eq!(
-        elements,
-        data.len() as u64,
-        "shape {shape:?} does not fit the data"
-    );
-    OutputFile::write_with(path, |file| {
-        let mut writer = npyz::WriteOptions::new()
-            .default_dtype()
-            .shape(shape)
-            .writer(file)
-            .begin_nd()?;
-        writer.extend(data.iter().copied())?;
-        writer.finish()?;
-        io::Result::Ok(())
-    })
+fn write_npy<T: Element>(path: &Path, shape: &[usize], data: &[T]) -> Result<(), InputError> {
+    OutputFile::write_with(path, |file| crate::files::write_npy(file, shape, data))
 }
 
 /// Steps of a metre in pictures of depths: 256 m are as far as they go (as in KITTI's).
@@ -82,39 +62,52 @@ pub(crate) fn write_depth_png(path: &Path, cols: usize, depths: &[f32]) -> Resul
 }
 
 /// An array that is written piece by piece along its first axis.
-pub(crate) struct NpyStack<T: AutoSerialize>(NpyWriter<T, BufWriter<File>>);
+pub(crate) struct NpyStack<T> {
+    out: BufWriter<File>,
+    /// Elements that are still to come.
+    left: usize,
+    _of: PhantomData<T>,
+}
 
-impl<T: AutoSerialize> NpyStack<T> {
+impl<T: Element> NpyStack<T> {
     /// Begins an array of `shape`, last axis fastest.
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub(crate) fn begin(path: &Path, shape: &[u64]) -> Result<Self, InputError> {
+    pub(crate) fn begin(path: &Path, shape: &[usize]) -> Result<Self, InputError> {
         let begun = File::create(path).and_then(|file| {
-            npyz::WriteOptions::new()
-                .default_dtype()
-                .shape(shape)
-                .writer(BufWriter::new(file))
-                .begin_nd()
+            let mut out = BufWriter::new(file);
+            write_npy_head::<T>(&mut out, shape)?;
+            Ok(out)
         });
-        let writer = begun.map_err(|e| InputError::unwritable(path, &e))?;
-        Ok(NpyStack(writer))
+        Ok(NpyStack {
+            out: begun.map_err(|e| InputError::unwritable(path, &e))?,
+            left: shape.iter().product(),
+            _of: PhantomData,
+        })
     }
 
     /// Writes the next elements.
     ///
     /// # Errors
-    /// When they cannot be written.
+    /// When they cannot be written, or are more than the array has.
     pub(crate) fn extend(&mut self, elements: impl IntoIterator<Item = T>) -> io::Result<()> {
-        self.0.extend(elements)
+        let written = write_npy_elements(&mut self.out, elements)?;
+        let left = self.left.checked_sub(written);
+        self.left = left.ok_or_else(|| io::Error::other("more elements than the array has"))?;
+        Ok(())
     }
 
     /// Ends the array, which must have all its elements.
     ///
     /// # Errors
     /// When they cannot be written, or there are fewer.
-    pub(crate) fn finish(self) -> io::Result<()> {
-        self.0.finish()
+    pub(crate) fn finish(mut self) -> io::Result<()> {
+        self.out.flush()?;
+        match self.left {
+            0 => Ok(()),
+            left => Err(io::Error::other(format!("{left} elements are missing"))),
+        }
     }
 }
 
@@ -132,10 +125,10 @@ mod tests {
         }
         stack.finish().unwrap();
         let bytes = std::fs::read(&path).unwrap();
-        let read = npyz::NpyFile::new(&bytes[..]).unwrap();
-        assert_eq!(read.shape(), [3, 2]);
-        let values = read.into_vec::<f32>().unwrap();
-        assert!(values[4] == 2.0 && values[5].is_nan());
+        let mut pieces = Vec::new();
+        let whole = [0.0, f32::NAN, 1.0, f32::NAN, 2.0, f32::NAN];
+        crate::files::write_npy(&mut pieces, &[3, 2], &whole).unwrap();
+        assert_eq!(bytes, pieces);
         let mut short = NpyStack::begin(&path, &[2]).unwrap();
         short.extend([1u16]).unwrap();
         assert!(short.finish().is_err());
@@ -147,11 +140,10 @@ mod tests {
         let path = dir.path().join("a.npy");
         let data: Vec<u16> = (0..24).map(|i| i * 2_730).collect();
         write_npy_u16(&path, &[2, 3, 4], &data).unwrap();
-        let bytes = std::fs::read(&path).unwrap();
-        let read = npyz::NpyFile::new(&bytes[..]).unwrap();
-        assert_eq!(read.shape(), [2, 3, 4]);
-        assert_eq!(read.order(), npyz::Order::C);
-        assert_eq!(read.into_vec::<u16>().unwrap(), data);
+        assert_eq!(
+            crate::files::read_array::<u16>(&path, &[2, 3, 4]).unwrap(),
+            data
+        );
     }
 
     #[test]
@@ -159,8 +151,11 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("empty.npy");
         write_npy_u16(&path, &[0, 16], &[]).unwrap();
-        let bytes = std::fs::read(&path).unwrap();
-        assert_eq!(npyz::NpyFile::new(&bytes[..]).unwrap().shape(), [0, 16]);
+        assert!(
+            crate::files::read_array::<u16>(&path, &[0, 16])
+                .unwrap()
+                .is_empty()
+        );
     }
 
     #[test]

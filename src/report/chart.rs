@@ -9,13 +9,15 @@ use std::path::Path;
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
+use serde::Deserialize;
 
 use super::legend::{self, looks};
 use super::series::{Series, Style};
 use crate::files::{InputError, OutputFile};
 
 /// How an axis is divided.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Scale {
     /// Equal steps.
     #[default]
@@ -25,7 +27,8 @@ pub enum Scale {
 }
 
 /// One axis: its label, with the unit, its scale, and its range where the data should not choose it.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Axis {
     /// Quantity and unit, for example `range (m)`.
     pub label: String,
@@ -37,7 +40,7 @@ pub struct Axis {
 
 impl Axis {
     /// A linear axis that fits the data.
-    pub fn linear(label: impl Into<String>) -> Self {
+    pub(crate) fn linear(label: impl Into<String>) -> Self {
         Axis {
             label: label.into(),
             ..Axis::default()
@@ -45,7 +48,7 @@ impl Axis {
     }
 
     /// A logarithmic axis that fits the data.
-    pub fn log(label: impl Into<String>) -> Self {
+    pub(crate) fn log(label: impl Into<String>) -> Self {
         Axis {
             scale: Scale::Log,
             ..Self::linear(label)
@@ -54,7 +57,7 @@ impl Axis {
 
     /// The same axis from `least` to `greatest`.
     #[must_use]
-    pub fn between(mut self, least: f64, greatest: f64) -> Self {
+    pub(crate) fn between(mut self, least: f64, greatest: f64) -> Self {
         self.range = Some((least, greatest));
         self
     }
@@ -89,7 +92,8 @@ impl Axis {
 }
 
 /// A chart of one or more series over two axes.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Chart {
     /// What the chart shows.
     pub title: String,
@@ -98,6 +102,7 @@ pub struct Chart {
     /// Vertical axis.
     pub y: Axis,
     /// The data, in legend order.
+    #[serde(skip)]
     pub series: Vec<Series>,
 }
 
@@ -106,7 +111,7 @@ const SIZE: (u32, u32) = (900, 560);
 
 impl Chart {
     /// An empty chart.
-    pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
+    pub(crate) fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
         Chart {
             title: title.into(),
             x,
@@ -117,7 +122,7 @@ impl Chart {
 
     /// Adds a series and returns the chart, for chaining.
     #[must_use]
-    pub fn with(
+    pub(crate) fn with(
         mut self,
         name: impl Into<String>,
         style: Style,
@@ -131,8 +136,58 @@ impl Chart {
         self
     }
 
+    /// As [`Chart::with`], with a line through `points`.
+    #[must_use]
+    pub(crate) fn line(
+        self,
+        name: impl Into<String>,
+        points: impl IntoIterator<Item = (f64, f64)>,
+    ) -> Self {
+        self.with(name, Style::Line, points)
+    }
+
+    /// As [`Chart::with`], with a dashed line through `points`.
+    #[must_use]
+    pub(crate) fn dashed(
+        self,
+        name: impl Into<String>,
+        points: impl IntoIterator<Item = (f64, f64)>,
+    ) -> Self {
+        self.with(name, Style::Dashed, points)
+    }
+
+    /// As [`Chart::with`], with a dot at each of `points`.
+    #[must_use]
+    pub(crate) fn points(
+        self,
+        name: impl Into<String>,
+        points: impl IntoIterator<Item = (f64, f64)>,
+    ) -> Self {
+        self.with(name, Style::Points, points)
+    }
+
+    /// As [`Chart::with`], with a stroke between every two of `points`.
+    #[must_use]
+    pub(crate) fn whiskers(
+        self,
+        name: impl Into<String>,
+        points: impl IntoIterator<Item = (f64, f64)>,
+    ) -> Self {
+        self.with(name, Style::Whiskers, points)
+    }
+
+    /// As [`Chart::with`], with a bar to each of `points`.
+    #[must_use]
+    pub(crate) fn bars(
+        self,
+        name: impl Into<String>,
+        points: impl IntoIterator<Item = (f64, f64)>,
+    ) -> Self {
+        self.with(name, Style::Bars, points)
+    }
+
     /// The chart as an SVG document.
-    pub fn svg(&self) -> String {
+    pub(crate) fn svg(&self) -> String {
         let mut text = String::new();
         let area = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
         let xs = self.series.iter().flat_map(|s| &s.points).map(|p| p.0);
@@ -233,7 +288,7 @@ impl Chart {
     ///
     /// # Errors
     /// When one of the files cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), InputError> {
+    pub(crate) fn write(&self, path: &Path) -> Result<(), InputError> {
         OutputFile::write_with(path, |out| out.write_all(self.svg().as_bytes()))?;
         OutputFile::write_with(&path.with_extension("csv"), |out| self.write_csv(out))
     }
@@ -289,18 +344,10 @@ mod tests {
 
     fn chart(x: Axis, y: Axis) -> Chart {
         Chart::new("Squares & more", x, y)
-            .with(
-                "x², <exact>",
-                Style::Line,
-                (0..20).map(|i| (i as f64, (i * i) as f64)),
-            )
-            .with(
-                "dots",
-                Style::Points,
-                [(1.0, 2.0), (f64::NAN, 3.0), (4.0, f64::INFINITY)],
-            )
-            .with("bars", Style::Bars, [(1.0, 2.0), (2.0, 8.0)])
-            .with("", Style::Dashed, [(1.0, 1.0), (19.0, 300.0)])
+            .line("x², <exact>", (0..20).map(|i| (i as f64, (i * i) as f64)))
+            .points("dots", [(1.0, 2.0), (f64::NAN, 3.0), (4.0, f64::INFINITY)])
+            .bars("bars", [(1.0, 2.0), (2.0, 8.0)])
+            .dashed("", [(1.0, 1.0), (19.0, 300.0)])
     }
 
     #[test]

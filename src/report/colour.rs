@@ -1,4 +1,4 @@
-//! The colours of depth pictures: a scale for depths, and colours that are none of its own for the rest.
+//! The colours of depth pictures: a scale for depths, and colours outside that scale for the rest.
 //!
 //! Near is yellow, far is dark violet. The scale runs through a few hand-picked colours whose
 //! CIE L* lightness falls in even steps, so that equal steps of depth look about equally large,

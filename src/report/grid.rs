@@ -21,6 +21,11 @@ impl Grid {
         }
     }
 
+    /// An empty table under one line of headings, with ` | ` between them.
+    pub(crate) fn headed(headings: &str) -> Self {
+        Self::new(headings.split(" | "))
+    }
+
     /// Adds a row, which must have a cell for every heading.
     pub fn push<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
         let row: Vec<String> = cells.into_iter().map(Into::into).collect();
@@ -29,7 +34,7 @@ impl Grid {
     }
 
     /// The headings, then every row.
-    pub fn lines(&self) -> impl Iterator<Item = &[String]> {
+    pub(crate) fn lines(&self) -> impl Iterator<Item = &[String]> {
         std::iter::once(&self.headings)
             .chain(&self.rows)
             .map(Vec::as_slice)
@@ -52,7 +57,7 @@ impl Grid {
     ///
     /// # Errors
     /// Those of `out`.
-    pub fn write_csv(&self, out: &mut dyn Write) -> std::io::Result<()> {
+    pub(crate) fn write_csv(&self, out: &mut dyn Write) -> std::io::Result<()> {
         for row in std::iter::once(&self.headings).chain(&self.rows) {
             let cells: Vec<String> = row.iter().map(|cell| quoted(cell)).collect();
             writeln!(out, "{}", cells.join(","))?;
@@ -78,7 +83,7 @@ pub fn width<'c>(cells: impl Iterator<Item = &'c String>) -> usize {
 }
 
 /// A line of cells, columns of these widths two spaces apart. The first column aligns left, all others right.
-pub(crate) fn aligned(cells: &[String], widths: &[usize]) -> String {
+pub fn aligned(cells: &[String], widths: &[usize]) -> String {
     let mut line = String::new();
     for (column, (cell, &width)) in cells.iter().zip(widths).enumerate() {
         line += &match column {

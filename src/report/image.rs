@@ -85,7 +85,7 @@ impl DepthMap<'_> {
     /// # Panics
     /// When the cells do not fill rows of `cols`, there are none, `scale` is zero, a category has no name or colour, or the range's
     /// ends are equal.
-    pub fn write_png(&self, path: &Path) -> Result<(), InputError> {
+    pub(crate) fn write_png(&self, path: &Path) -> Result<(), InputError> {
         let canvas = self.draw();
         OutputFile::write_with(path, |file| encode(file, &canvas))
     }

@@ -2,12 +2,9 @@
 //!
 //! Source: APPNOTE.TXT of PKWARE, 4.3; `numpy.lib.format`.
 
-use std::io;
 use std::path::Path;
 
-use npyz::{AutoSerialize, WriterBuilder};
-
-use crate::files::{InputError, OutputFile};
+use crate::files::{Element, InputError, OutputFile, write_npy};
 
 /// An archive that is put together in memory.
 #[derive(Debug, Default)]
@@ -27,21 +24,9 @@ impl Npz {
     ///
     /// # Panics
     /// When `shape` does not have as many elements as `data`, or the archive exceeds 4 GiB.
-    pub(crate) fn add<T: AutoSerialize + Copy>(&mut self, name: &str, shape: &[usize], data: &[T]) {
-        assert_eq!(shape.iter().product::<usize>(), data.len());
-        let shape: Vec<u64> = shape.iter().map(|&n| n as u64).collect();
+    pub(crate) fn add<T: Element>(&mut self, name: &str, shape: &[usize], data: &[T]) {
         let mut array = Vec::new();
-        let mut write = || -> io::Result<()> {
-            let mut writer = npyz::WriteOptions::new()
-                .default_dtype()
-                .shape(&shape)
-                .writer(&mut array)
-                .begin_nd()?;
-            writer.extend(data.iter().copied())?;
-            writer.finish()
-        };
-        let written = write();
-        written.expect("memory takes what is written");
+        write_npy(&mut array, shape, data).expect("memory takes what is written");
         let name = format!("{name}.npy");
         let offset = u32::try_from(self.bytes.len()).expect("below 4 GiB");
         let size = u32::try_from(array.len()).expect("below 4 GiB");

@@ -13,7 +13,7 @@ pub struct Table {
 
 impl Table {
     /// An empty table; an empty title is not printed.
-    pub fn new(title: impl Into<String>) -> Self {
+    pub(crate) fn new(title: impl Into<String>) -> Self {
         Table {
             title: title.into(),
             rows: Vec::new(),
@@ -22,13 +22,13 @@ impl Table {
 
     /// Adds a row and returns the table, for chaining.
     #[must_use]
-    pub fn row(mut self, name: impl Into<String>, value: impl fmt::Display) -> Self {
+    pub(crate) fn row(mut self, name: impl Into<String>, value: impl fmt::Display) -> Self {
         self.push(name, value);
         self
     }
 
     /// Adds a row.
-    pub fn push(&mut self, name: impl Into<String>, value: impl fmt::Display) {
+    pub(crate) fn push(&mut self, name: impl Into<String>, value: impl fmt::Display) {
         self.rows.push([name.into(), value.to_string()]);
     }
 }

@@ -21,12 +21,12 @@ struct Line {
 
 impl Checks {
     /// No checks yet.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self::default()
     }
 
     /// Checks that a value is the expected one.
-    pub fn equal<T: PartialEq + fmt::Display>(
+    pub(crate) fn equal<T: PartialEq + fmt::Display>(
         &mut self,
         what: impl Into<String>,
         expected: T,
@@ -37,19 +37,19 @@ impl Checks {
     }
 
     /// Checks that a time is the expected one, to the femtosecond; printed in nanoseconds.
-    pub fn time(&mut self, what: impl Into<String>, expected: Time, found: Time) {
+    pub(crate) fn time(&mut self, what: impl Into<String>, expected: Time, found: Time) {
         let holds = expected == found;
         self.that(what, exact(expected), exact(found), holds);
     }
 
     /// Checks that all times are the expected one; prints the extremes of those found.
-    pub fn times(&mut self, what: impl Into<String>, expected: Time, found: &[Time]) {
+    pub(crate) fn times(&mut self, what: impl Into<String>, expected: Time, found: &[Time]) {
         let holds = !found.is_empty() && found.iter().all(|&t| t == expected);
         self.that(what, exact(expected), range(found), holds);
     }
 
     /// A check whose verdict the caller has reached: `expected` says what was wanted.
-    pub fn that(
+    pub(crate) fn that(
         &mut self,
         what: impl Into<String>,
         expected: impl fmt::Display,
@@ -65,22 +65,22 @@ impl Checks {
     }
 
     /// Text to be printed before the checks: a table of what was found, say.
-    pub fn note(&mut self, text: impl Into<String>) {
+    pub(crate) fn note(&mut self, text: impl Into<String>) {
         self.notes.push(text.into());
     }
 
     /// How many checks were made.
-    pub fn made(&self) -> usize {
+    pub(crate) fn made(&self) -> usize {
         self.lines.len()
     }
 
     /// How many checks failed.
-    pub fn failed(&self) -> usize {
+    pub(crate) fn failed(&self) -> usize {
         self.lines.iter().filter(|line| !line.holds).count()
     }
 
     /// Whether something was checked and nothing failed.
-    pub fn passed(&self) -> bool {
+    pub(crate) fn passed(&self) -> bool {
         self.failed() == 0 && !self.lines.is_empty()
     }
 }

@@ -1,7 +1,7 @@
 //! Claims 2 to 6: what the thesis says of the chip, measured on its netlist.
 
 use super::claim::Row;
-use super::published::Published::*;
+use super::thesis::{chart, claim};
 use crate::analysis::{MacropixelTiming, gate_works, phases, ripple, shortest_period};
 use crate::chip::readout::{self as readout_blocks, ReadoutOrder};
 use crate::chip::{
@@ -12,7 +12,7 @@ use crate::engine::{GateSimulation, Histograms};
 use crate::kernel::Recorder;
 use crate::netlist::{CellKind, Corner};
 use crate::photon::SpadEvent;
-use crate::report::{Axis, Chart, Style};
+use crate::report::Chart;
 use crate::units::Time;
 
 /// CLK periods in a laser cycle of the gate-level runs.
@@ -91,6 +91,7 @@ impl Edges {
 
 /// Claim 2: the ripple, and the CLK period it allows.
 pub(super) fn ripple_rows() -> Vec<Row> {
+    let claim = claim(2);
     let config = SensorConfig::default();
     let timing = MacropixelTiming::of(&config, &NOMINAL, Limits::Ignored, (0, 0));
     let starts = [0, 1, 5, 21, 31, 42, 52, 60];
@@ -107,25 +108,17 @@ pub(super) fn ripple_rows() -> Vec<Row> {
     let below = timing.forbidden(0).0 - Time::from_ps(2);
     let any_phase = shortest_period(below, |p| phases(p).any(|phase| timing.works(p, phase)));
     vec![
-        Row::holds("worst ripple, longest path", "ns", Exactly("1.2"), timing.ripple.delay().as_ns())
-            .given("The library's delays are chosen to meet it.")
-            .remark("CLK falling to LOCAL_STOP, typical, 50 °C."),
-        Row::holds("worst ripple, gate level", "ns", Exactly("1.2"), simulated)
-            .given("The same delays, simulated.")
-            .remark("The worst of eight start values; rolling over toggles every stage of each."),
-        Row::holds("twice the ripple", "ns", Exactly("2.4"), 2.0 * timing.ripple.delay().as_ns())
-            .given("As the ripple."),
-        Row::holds("shortest CLK period, static", "ns", Within("2.4", 0.2), ns(by_paths))
-            .remark("STOP on CLK's falling edge; “around 2.4 ns (~400 MHz)”. The ripple is put in; that a period takes twice as long is the circuit's own."),
-        Row::holds("shortest CLK period, gate level", "ns", Within("2.4", 0.2), ns(by_gates))
-            .remark("The shortest period from which on every pattern is counted as at a slow clock."),
-        Row::ours("shortest CLK period at the best STOP phase", "ns", ns(any_phase))
-            .remark("Static; beyond the crossing near the period above, which no phase moves."),
+        claim.row("longest_path", timing.ripple.delay().as_ns()),
+        claim.row("gate_level", simulated),
+        claim.row("twice", 2.0 * timing.ripple.delay().as_ns()),
+        claim.row("period_static", ns(by_paths)),
+        claim.row("period_gate_level", ns(by_gates)),
+        claim.row("period_best_phase", ns(any_phase)),
     ]
 }
 
 /// Fig. 56's question: the ripple against the number of stages.
-pub(super) fn figure_56() -> Vec<Chart> {
+pub(super) fn figure_56() -> Chart {
     let delays: Vec<(usize, Time, Time)> = (1..=12)
         .map(|bits| {
             let (longest, simulated) = ripple(&counter_of(bits), &NOMINAL);
@@ -139,40 +132,30 @@ pub(super) fn figure_56() -> Vec<Chart> {
             .collect();
         points
     };
-    vec![
-        Chart::new(
-            "Ripple from COUNTER_CLK to LOCAL_STOP, typical corner, 50 °C",
-            Axis::linear("programmable stages").between(0.0, 13.0),
-            Axis::linear("delay (ns)").between(0.0, 1.6),
-        )
-        .with("longest path", Style::Line, points(|d| d.1))
-        .with("simulated", Style::Points, points(|d| d.2))
-        .with(
-            "published worst case (from CLK)",
-            Style::Dashed,
-            [(0.0, 1.2), (13.0, 1.2)],
-        ),
-    ]
+    chart(56)
+        .line("longest path", points(|d| d.1))
+        .points("simulated", points(|d| d.2))
+        .dashed("published worst case (from CLK)", [(0.0, 1.2), (13.0, 1.2)])
 }
 
 /// Claim 3: Fig. 54.
 pub(super) fn fig_54_rows() -> Vec<Row> {
+    let claim = claim(3);
     let edges = Edges::of(5);
     let after_stop = edges
         .counter_clk
         .first()
         .map_or(f64::NAN, |&t| (t - edges.stop).as_ns());
     vec![
-        Row::holds("COUNTER_CLK edges from STOP to LOCAL_STOP, start value 5", "", Says("transitions high on the next COUNTER_CLK edge", 6.0, 6.0), edges.edges_to_local_stop())
-            .remark("The text: zero after five edges, LOCAL_STOP on the next. The figure's caption says “after every 5 × CLK cycles”."),
-        Row::holds("rises of LOCAL_STOP in a laser cycle", "", Says("The next rising edge of the global STOP signal resets the counter", 1.0, 1.0), edges.local_stop.len() as f64),
-        Row::ours("first COUNTER_CLK edge that counts, after STOP", "ns", after_stop)
-            .remark("COUNTER_CLK is NOT CLK: the edge that comes together with STOP is swallowed by the reset."),
+        claim.row("edges_to_local_stop", edges.edges_to_local_stop()),
+        claim.row("rises", edges.local_stop.len() as f64),
+        claim.row("first_edge", after_stop),
     ]
 }
 
 /// Claim 4: Fig. 48.
 pub(super) fn fig_48_rows() -> Vec<Row> {
+    let claim = claim(4);
     let period = SensorConfig::default().clock().period();
     let [first, second] = [52, 49].map(|start| {
         let edges = Edges::of(start);
@@ -187,19 +170,8 @@ pub(super) fn fig_48_rows() -> Vec<Row> {
             .map_or(f64::NAN, |bin| bin as f64)
     };
     vec![
-        Row::holds(
-            "LOCAL_STOP of start value 49 before that of 52",
-            "CLK periods",
-            Within("3", 1e-6),
-            first - second,
-        ),
-        Row::holds(
-            "bins by which the same photon moves",
-            "",
-            Exactly("3"),
-            peak(&bins[1]) - peak(&bins[0]),
-        )
-        .remark("One photon in both macropixels, histograms read at gate level."),
+        claim.row("earlier", first - second),
+        claim.row("bins_moved", peak(&bins[1]) - peak(&bins[0])),
     ]
 }
 
@@ -229,6 +201,7 @@ fn fig_48_bins() -> Histograms {
 
 /// Claim 5: the serial load, and the readout that it must not outlast.
 pub(super) fn load_rows() -> Vec<Row> {
+    let claim = claim(5);
     let config = SensorConfig::default();
     let netlists = PinNetlists::of(&config);
     let counts = sparse_counts(&config);
@@ -243,41 +216,26 @@ pub(super) fn load_rows() -> Vec<Row> {
     debug_assert_eq!(PIN_CLOCKS_MHZ[3], 200);
 
     let mut rows = vec![
-        Row::holds("bits of a load", "kbit", Exactly("36.9"), at_200.load_bits as f64 / 1e3)
-            .remark("Rising LOAD_CLK edges at gate level."),
-        Row::holds(
-            "start values that arrive",
-            "",
-            Says("all pixel counters", 4096.0, 4096.0),
+        claim.row("bits", at_200.load_bits as f64 / 1e3),
+        claim.row(
+            "starts_right",
             fewest_right(|times| times.starts_right) as f64,
-        )
-        .remark("Through deserialiser, row scanner and memories at gate level, at the worst of six clocks from 50 to 400 MHz."),
-        Row::holds(
-            "time of a load at 200 MHz",
-            "µs",
-            Says("a few hundred microseconds", 100.0, 999.0),
-            at_200.load.as_s() * 1e6,
-        )
-        .remark("First to last LOAD_CLK edge, and a period. At “a few hundred megahertz”, of which 200 is our choice."),
-        Row::ours(
-            "counts that leave through the pins right, of 65536",
-            "",
+        ),
+        claim.row("load_200_mhz", at_200.load.as_s() * 1e6),
+        claim.row(
+            "counts_right",
             fewest_right(|times| times.counts_right) as f64,
-        )
-        .remark("Bin selection, columns and serialisers of the whole array at gate level, at the worst of the six clocks."),
-        Row::ours("time of a readout at 200 MHz", "µs", at_200.read.as_s() * 1e6)
-            .remark("Through 8 pins, our choice, each with the serialiser of 8 columns."),
-        Row::holds("load over readout", "", Says("not expected to ever impact the time required to capture a dToF frame", 0.0, 1.0), worst)
-            .remark("The greatest at the six clocks; both at gate level, at the same clock, with one pin for the load and 8 for the readout."),
-        Row::ours("pins of a readout as short as the load", "", pins * at_200.read.as_s() / at_200.load.as_s())
-            .remark("9 bits against 16 × 14 a macropixel: a chip with more output pins than this at the same clock would wait for the load."),
+        ),
+        claim.row("readout_200_mhz", at_200.read.as_s() * 1e6),
+        claim.row("load_over_readout", worst),
+        claim.row("pins", pins * at_200.read.as_s() / at_200.load.as_s()),
     ];
     for (mhz, times) in PIN_CLOCKS_MHZ.iter().zip(&all) {
         if *mhz != 200 {
-            let load = format!("time of a load at {mhz} MHz");
-            rows.push(Row::ours(load, "µs", times.load.as_s() * 1e6));
-            let readout = format!("time of a readout at {mhz} MHz");
-            rows.push(Row::ours(readout, "µs", times.read.as_s() * 1e6));
+            let load = times.load.as_s() * 1e6;
+            rows.push(claim.row(&format!("load_{mhz}_mhz"), load));
+            let readout = times.read.as_s() * 1e6;
+            rows.push(claim.row(&format!("readout_{mhz}_mhz"), readout));
         }
     }
     rows
@@ -294,22 +252,19 @@ fn counter_of(bits: usize) -> SensorConfig {
     }
 }
 
-/// Transistors that one more stage of a P-counter takes.
-fn stage_transistors(p_counter: PCounter) -> f64 {
-    let of = |bits| {
-        let config = SensorConfig {
-            p_counter,
-            ..counter_of(bits)
-        };
-        p_counter::circuit(&config).transistors() as f64
-    };
-    of(9) - of(8)
-}
-
 /// Claim 6: transistors.
 pub(super) fn area_rows() -> Vec<Row> {
+    let claim = claim(6);
     let flip_flop = f64::from(CellKind::Dffr.transistors());
-    let stage = stage_transistors(PCounter::Ripple);
+    let stage = PCounter::Ripple.stage_transistors() as f64;
+    let stages = PCounter::ALL.map(|p_counter| {
+        let what = format!("transistors of {}", p_counter.row().stage);
+        let found = Row::ours(what, "", p_counter.stage_transistors() as f64);
+        match p_counter {
+            PCounter::SetReset => found.remark("Fig. 51b, the HSLIDAR's."),
+            _ => found,
+        }
+    });
     let config = SensorConfig {
         rows: 1,
         cols: 1,
@@ -320,23 +275,16 @@ pub(super) fn area_rows() -> Vec<Row> {
     let timing = p_counter_timing::circuit(config.after_borrow).transistors() as f64;
     let selection = readout_blocks::bin_select(config.bins, config.bin_bits).transistors() as f64;
     let library = f64::from(CellKind::Dffsr.transistors());
-    vec![
-        Row::holds("transistors of a stage beyond its two flip-flops", "", Exactly("4"), stage - 2.0 * flip_flop)
-            .given("The library's mux has 4 transistors.")
-            .remark("The difference between P-counters of nine and eight stages: nothing but the mux comes on top."),
-        Row::holds("transistors of an OR gate that the mux replaces", "", Exactly("6"), f64::from(CellKind::Or2.transistors()))
-            .given("A number of the library's table."),
-        Row::ours("transistors of a stage", "", stage),
-        Row::ours("transistors of a stage of set/reset flip-flops", "", stage_transistors(PCounter::SetReset))
-            .remark("Fig. 51b, the HSLIDAR's."),
-        Row::ours("transistors of a synchronous stage", "", stage_transistors(PCounter::Synchronous)),
-        Row::ours("transistors of a stage with a comparator", "", stage_transistors(PCounter::Comparator)),
-        Row::holds("library flip-flop over the custom one", "", Within("3", 0.5), library / flip_flop)
-            .differs("The published ratio is one of layout areas (Fig. 52); in transistors it is 36 to 24, and the model has no layout."),
-        Row::holds("P-counter and its timing, share of the macropixel", "%", AtMost("5"), 100.0 * (counter + timing) / macropixel)
-            .differs("By transistors of the modelled macropixel; the published share is one of layout area (Fig. 55), and the model has no layout.")
-            .remark("By transistors of the netlist, the macropixel's part of the readout among them; the published share is one of layout area (Fig. 55)."),
-        Row::ours("the same without the macropixel's part of the readout", "%", 100.0 * (counter + timing) / (macropixel - selection))
-            .remark("Gates select a bin here, where a chip may have fewer transistors on a bus."),
-    ]
+    let mut rows = vec![
+        claim.row("beyond_flip_flops", stage - 2.0 * flip_flop),
+        claim.row("or_gate", f64::from(CellKind::Or2.transistors())),
+    ];
+    rows.extend(stages);
+    let without_readout = 100.0 * (counter + timing) / (macropixel - selection);
+    rows.extend([
+        claim.row("library_flip_flop", library / flip_flop),
+        claim.row("share", 100.0 * (counter + timing) / macropixel),
+        claim.row("share_without_readout", without_readout),
+    ]);
+    rows
 }

@@ -6,7 +6,6 @@
 use serde::Serialize;
 
 use super::published::Published;
-use crate::numerics::intervals::Estimate;
 
 /// A number with four significant digits; whole numbers up to a million with all of theirs.
 pub(super) fn figure(value: f64) -> String {
@@ -62,7 +61,7 @@ impl Verdict {
     ];
 
     /// In words.
-    pub fn text(self) -> &'static str {
+    pub(crate) fn text(self) -> &'static str {
         match self {
             Verdict::Agrees => "agrees",
             Verdict::Differs => "differs",
@@ -99,17 +98,12 @@ pub struct Row {
 }
 
 impl Row {
-    /// A published number that the model must meet.
-    pub fn holds(
-        what: impl Into<String>,
-        unit: &'static str,
-        published: Published,
-        computed: f64,
-    ) -> Self {
+    /// A number of ours beside which nothing is published, and which no list names.
+    pub(super) fn ours(what: impl Into<String>, unit: &'static str, computed: f64) -> Self {
         Row {
             what: what.into(),
             unit,
-            published,
+            published: Published::Nothing,
             computed: Some(computed),
             interval: None,
             known_difference: None,
@@ -119,62 +113,16 @@ impl Row {
         }
     }
 
-    /// A published number that a measurement must meet, which chance has a part in.
-    pub fn measured(
-        what: impl Into<String>,
-        unit: &'static str,
-        published: Published,
-        measured: &Estimate,
-    ) -> Self {
-        Row {
-            interval: Some((measured.low, measured.high)),
-            ..Row::holds(what, unit, published, measured.value)
-        }
-    }
-
-    /// A number of ours beside which nothing is published.
-    pub fn ours(what: impl Into<String>, unit: &'static str, computed: f64) -> Self {
-        Row::holds(what, unit, Published::Nothing, computed)
-    }
-
-    /// A published number that the model has no part for.
-    pub fn not_modelled(
-        what: impl Into<String>,
-        unit: &'static str,
-        published: Published,
-        why: impl Into<String>,
-    ) -> Self {
-        Row {
-            computed: None,
-            remark: why.into(),
-            ..Row::holds(what, unit, published, 0.0)
-        }
-    }
-
     /// Says that this difference is known, and why.
     #[must_use]
-    pub fn differs(mut self, why: impl Into<String>) -> Self {
+    pub(crate) fn differs(mut self, why: impl Into<String>) -> Self {
         self.known_difference = Some(why.into());
-        self
-    }
-
-    /// Says that the published number was put into the model, and how: coming out again, it is *given*.
-    #[must_use]
-    pub fn given(mut self, how: impl Into<String>) -> Self {
-        self.input = Some(how.into());
-        self
-    }
-
-    /// Says that the claim is about something else: the row's verdict, unless it fails, is not the claim's.
-    #[must_use]
-    pub fn aside(mut self) -> Self {
-        self.is_aside = true;
         self
     }
 
     /// Adds a remark.
     #[must_use]
-    pub fn remark(mut self, remark: impl Into<String>) -> Self {
+    pub(crate) fn remark(mut self, remark: impl Into<String>) -> Self {
         self.remark = remark.into();
         self
     }
@@ -206,7 +154,7 @@ impl Row {
     }
 
     /// Computed less published, in the row's unit and, where that is a number other than zero, relative to it.
-    pub fn difference(&self) -> Option<(f64, Option<f64>)> {
+    pub(crate) fn difference(&self) -> Option<(f64, Option<f64>)> {
         let computed = self.computed?;
         let difference = self.published.difference(computed)?;
         let published = computed - difference;
@@ -267,8 +215,6 @@ pub struct Claim {
     pub title: &'static str,
     /// Section, equation, figure or table of the thesis.
     pub source: &'static str,
-    /// Computes it.
-    pub compute: fn() -> Vec<Row>,
 }
 
 /// The verdict on a claim: the worst of its published rows. One headline that is not modelled, that differs, that is not shown or that was
@@ -294,6 +240,43 @@ pub fn overall(rows: &[Row]) -> Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::intervals::Estimate;
+
+    impl Row {
+        fn holds(what: &str, unit: &'static str, published: Published, computed: f64) -> Self {
+            Row {
+                published,
+                ..Row::ours(what, unit, computed)
+            }
+        }
+
+        fn measured(published: Published, measured: &Estimate) -> Self {
+            Row {
+                published,
+                interval: Some((measured.low, measured.high)),
+                ..Row::ours("x", "", measured.value)
+            }
+        }
+
+        fn not_modelled(published: Published) -> Self {
+            Row {
+                published,
+                computed: None,
+                remark: "why".into(),
+                ..Row::ours("x", "m", 0.0)
+            }
+        }
+
+        fn given(mut self, how: &str) -> Self {
+            self.input = Some(how.into());
+            self
+        }
+
+        fn aside(mut self) -> Self {
+            self.is_aside = true;
+            self
+        }
+    }
 
     #[test]
     fn verdicts_follow_from_range_and_expectation() {
@@ -331,7 +314,7 @@ mod tests {
             "an input that is lost on the way"
         );
         assert_eq!(input(1.2).notes(), "chosen");
-        let none = Row::not_modelled("x", "m", Exactly("1"), "why");
+        let none = Row::not_modelled(Exactly("1"));
         assert_eq!(none.verdict(), Verdict::NotModelled);
         assert_eq!(none.difference(), None);
     }
@@ -340,7 +323,7 @@ mod tests {
     #[test]
     fn what_chance_could_decide_otherwise_is_not_shown() {
         let row = |published, low, value, high| {
-            let row = Row::measured("x", "", published, &Estimate { value, low, high });
+            let row = Row::measured(published, &Estimate { value, low, high });
             row.differs("why").verdict()
         };
         use Published::*;
@@ -358,7 +341,7 @@ mod tests {
             low: 5.88,
             high: 8.46,
         };
-        let unsure = Row::measured("x", "", AtLeast("6"), &measured);
+        let unsure = Row::measured(AtLeast("6"), &measured);
         assert!(
             unsure.notes().contains("5.880 to 8.460"),
             "{}",
@@ -394,8 +377,6 @@ mod tests {
         let given = agrees.clone().given("how");
         let ours = Row::ours("c", "", 1.0);
         let unsure = Row::measured(
-            "f",
-            "",
             Published::AtLeast("1"),
             &Estimate {
                 value: 2.0,
@@ -403,7 +384,7 @@ mod tests {
                 high: 4.0,
             },
         );
-        let gap = Row::not_modelled("d", "", Published::Exactly("1"), "why");
+        let gap = Row::not_modelled(Published::Exactly("1"));
         let fails = Row::holds("e", "", Published::Exactly("1"), 2.0);
         for (rows, verdict) in [
             (vec![&agrees, &ours], Verdict::Agrees),

@@ -12,15 +12,15 @@ use std::sync::OnceLock;
 
 use super::claim::Row;
 use super::penalty::sigma_over_fwhm;
-use super::published::Published::*;
+use super::thesis::{chart, claim};
 use crate::chip::{Exposure, Sensor, SensorConfig, WindowLaw, hslidar_delay_line};
 use crate::engine::{Expose, LitPixel, Window, stream_config};
 use crate::numerics::intervals::mean_and_sigma;
 use crate::photon::{PhotonStream, PixelLight};
 use crate::ranging::{BinProfile, PeakOptions, centre_of_mass};
-use crate::report::{Axis, Chart, Style};
+use crate::report::Chart;
 use crate::system::{Sweep, calibrate};
-use crate::units::Time;
+use crate::units::{Time, TimeOfFlight};
 
 /// CLK periods of a laser cycle: a little more than the P-counter reaches.
 const STOP_PERIODS: u32 = 140;
@@ -125,38 +125,17 @@ fn lengths_ns() -> Vec<f64> {
 
 /// Claim 20: the delay lines and the plane of Fig. 92.
 pub(super) fn rows() -> Vec<Row> {
+    let claim = claim(20);
     let (mean_ns, spread_ns) = mean_and_sigma(&lengths_ns());
     let (_, before_m) = mean_and_sigma(&measured().before_m);
     let (mean_m, after_m) = mean_and_sigma(&measured().after_m);
     vec![
-        Row::holds(
-            "mean bin interval found by the 10 ps sweep",
-            "ns",
-            Exactly("2.6"),
-            mean_ns,
-        )
-        .given("The elements' mean is put into the netlist; the sweep finds it again in 4096 bins, even and odd windows."),
-        Row::holds(
-            "spread of the bin intervals",
-            "ns",
-            Exactly("0.4"),
-            spread_ns,
-        )
-        .given("Put in as well."),
-        Row::holds(
-            "spread of a plane at 2.5 m before calibration",
-            "m",
-            Exactly("0.175"),
-            before_m,
-        )
-        .differs("Measured on the chip. The skew of CLK is chosen, 45 ps from column to column (Fig. 90 has no scale), and makes most of it beside the elements."),
-        Row::holds("spread after calibration", "m", Exactly("0.029"), after_m).differs(
-            "Measured on the chip with 1600 signal photons and no background; the exposure behind the published number is not known, and fewer photons spread more.",
-        ),
-        Row::ours("factor that calibration gains", "", before_m / after_m)
-            .remark("0.175 over 0.029 is 6.0."),
-        Row::ours("mean range of the plane after calibration", "m", mean_m)
-            .remark("At 2.5 m; no offset is taken out."),
+        claim.row("mean", mean_ns),
+        claim.row("spread", spread_ns),
+        claim.row("plane_before", before_m),
+        claim.row("plane_after", after_m),
+        claim.row("gain", before_m / after_m),
+        claim.row("plane_mean", mean_m),
     ]
 }
 
@@ -164,6 +143,7 @@ pub(super) fn rows() -> Vec<Row> {
 ///
 /// Nine macropixels, 20 acquisitions of 4000 laser cycles each, from 10 to 30 m; the light is the published one. That tells counts to 0.3 %.
 pub(super) fn light_rows() -> Vec<Row> {
+    let claim = claim(21);
     const SIGNAL_M2: f64 = 89.0;
     const BACKGROUND_HZ: f64 = 4.8e6;
     const ACQUISITIONS: u64 = 20;
@@ -222,37 +202,22 @@ pub(super) fn light_rows() -> Vec<Row> {
     }
     let cancels = "Photons of a laser cycle that come in the same bin cancel in pairs on the line that all SPADs share, and SPADs are dead for 8 ns after a pulse.";
     vec![
-        Row::holds(
-            "background that the chip counts with its laser off",
-            "Mcounts/s",
-            Exactly("4.8"),
-            background.0 / background.1 / 1e6,
-        )
-        .differs(cancels)
-        .remark("Measured on the chip in light of 4.8 Mcounts/s."),
-        Row::holds(
-            "signal photons per pulse times z² that the chip counts, fitted from 10 to 30 m",
-            "m²",
-            Exactly("89"),
-            moment / square,
-        )
-        .differs(cancels)
-        .remark("Measured on the chip in light of 89 z⁻²: the published trend is counted, not what arrives."),
-        Row::ours("the same at 30 m", "m²", farthest)
-            .remark("Where less than a tenth of a photon comes in a laser cycle."),
+        claim
+            .row("background_counted", background.0 / background.1 / 1e6)
+            .differs(cancels),
+        claim
+            .row("signal_counted", moment / square)
+            .differs(cancels),
+        claim.row("signal_at_30_m", farthest),
     ]
 }
 
 /// Fig. 90: the fullest bin of every column at some delays of the laser.
-pub(super) fn figure_90() -> Vec<Chart> {
+pub(super) fn figure_90() -> Chart {
     let Measured { calibrated, .. } = measured();
     let cols = calibrated.sensor.cols;
     let first_ns = calibrated.macropixels[0][0].middle_s[0] * 1e9;
-    let mut chart = Chart::new(
-        "Fullest bin of even windows while the laser is delayed, mean of four rows",
-        Axis::linear("column"),
-        Axis::linear("bin"),
-    );
+    let mut chart = chart(90);
     for step in 0..4 {
         let delay_ns = first_ns + 4.0 + 4.0 * f64::from(step);
         let of = |pixel: usize| {
@@ -265,25 +230,18 @@ pub(super) fn figure_90() -> Vec<Chart> {
         let mean =
             |col: usize| (0..rows).map(|row| of(row * cols + col)).sum::<f64>() / rows as f64;
         let points: Vec<(f64, f64)> = (0..cols).map(|col| (col as f64, mean(col))).collect();
-        chart = chart.with(format!("{delay_ns:.0} ns"), Style::Line, points);
+        chart = chart.line(format!("{delay_ns:.0} ns"), points);
     }
-    vec![chart]
+    chart
 }
 
 /// Fig. 91: bin intervals.
-pub(super) fn figure_91() -> Vec<Chart> {
-    vec![
-        Chart::new(
-            "Bin intervals of 256 macropixels, even and odd windows, found by a 10 ps sweep",
-            Axis::linear("bin interval (ns)"),
-            Axis::linear("bins"),
-        )
-        .with("", Style::Bars, histogram(&lengths_ns(), 1.0, 4.2, 64)),
-    ]
+pub(super) fn figure_91() -> Chart {
+    chart(91).bars("", histogram(&lengths_ns(), 1.0, 4.2, 64))
 }
 
 /// Fig. 92: the plane, by column.
-pub(super) fn figure_92() -> Vec<Chart> {
+pub(super) fn figure_92() -> Chart {
     let Measured {
         calibrated,
         before_m,
@@ -296,37 +254,17 @@ pub(super) fn figure_92() -> Vec<Chart> {
             .map(|(pixel, &m)| ((pixel % cols) as f64, m))
             .collect()
     };
-    vec![
-        Chart::new(
-            "A plane at 2.5 m, every macropixel of four rows",
-            Axis::linear("column"),
-            Axis::linear("measured range (m)"),
-        )
-        .with(
-            "before calibration (Eq. 28)",
-            Style::Points,
-            points(before_m),
-        )
-        .with("after (Eq. 29)", Style::Points, points(after_m)),
-    ]
+    chart(92)
+        .points("before calibration (Eq. 28)", points(before_m))
+        .points("after (Eq. 29)", points(after_m))
 }
 
 /// Fig. 93: the plane before and after calibration.
-pub(super) fn figure_93() -> Vec<Chart> {
+pub(super) fn figure_93() -> Chart {
     let outline = |values: &[f64]| histogram(values, 1.8, 3.2, 140);
-    vec![
-        Chart::new(
-            "A plane at 2.5 m through HSLIDAR's delay lines",
-            Axis::linear("measured range (m)"),
-            Axis::linear("macropixels"),
-        )
-        .with(
-            "before calibration (Eq. 28)",
-            Style::Bars,
-            outline(&measured().before_m),
-        )
-        .with("after (Eq. 29)", Style::Line, outline(&measured().after_m)),
-    ]
+    chart(93)
+        .bars("before calibration (Eq. 28)", outline(&measured().before_m))
+        .line("after (Eq. 29)", outline(&measured().after_m))
 }
 
 /// Counts of `values` in `bins` equal bins from `from` to `to`, at the bins' middles.

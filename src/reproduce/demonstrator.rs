@@ -11,7 +11,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::claim::Row;
 use super::delay_line;
-use super::published::Published::*;
+use super::thesis::claim;
 use crate::demo::found::{Found, mean};
 use crate::demo::schemes::Outcome;
 use crate::demo::show::{Show, Shown};
@@ -34,9 +34,6 @@ const LOWER_M: f64 = 0.6;
 
 /// Reflectivity of a figure brighter than that of the sweep.
 const BRIGHTER: f64 = 0.25;
-
-/// Where less than this can be seen, there is fog (WMO), m.
-const FOG_BELOW_M: f64 = 1000.0;
 
 /// The demonstrator, of four rows.
 fn chain() -> Demonstrator {
@@ -144,8 +141,10 @@ fn sigma_m(otherwise: Otherwise) -> f64 {
     (square_m2 - mean_m * mean_m).sqrt()
 }
 
-/// What makes σ at the sweep's end so many times `bound_m`, its Cramér-Rao bound: one thing after the other taken away.
+/// Why σ at the end of the sweep is several times `bound_m`, its Cramér-Rao bound: one cause after the other is taken
+/// away.
 pub(super) fn sigma_rows(bound_m: f64) -> Vec<Row> {
+    let claim = claim(22);
     let (alike, centred) = (
         Otherwise {
             alike: true,
@@ -162,22 +161,22 @@ pub(super) fn sigma_rows(bound_m: f64) -> Vec<Row> {
     };
     let ways = [AS_IT_IS, alike, centred, both].map(sigma_m);
     let [dark, dark_alike] = [centred, both].map(|way| sigma_m(Otherwise { dark: true, ..way }));
-    let over = |what: &str, sigma_m: f64| Row::ours(what, "", sigma_m / bound_m);
+    let over = |row: &str, sigma_m: f64| claim.row(row, sigma_m / bound_m);
     vec![
-        over("σ at 50 m over its bound", ways[0])
+        over("over_bound", ways[0])
             .remark(format!("Of {SWEEPS} sweeps. What it comes from is taken away below; hardly any photon is lost to dead time or cancels there.")),
-        over("the same, elements of the delay lines alike", ways[1]).remark(format!(
+        over("over_bound_alike", ways[1]).remark(format!(
             "Unequal bins hold unequal daylight. In the dark unequal elements leave {:.3} m where alike ones leave {:.3} m, windows centred on the figure.",
             dark, dark_alike
         )),
-        over("the same, windows centred on the figure", ways[2])
-            .remark("To a step of the windows, by a guide without errors: other windows cut off a part of the echo."),
-        over("the same, both", ways[3]).remark("What is left is the ranging's own."),
+        over("over_bound_centred", ways[2]),
+        over("over_bound_both", ways[3]),
     ]
 }
 
 /// Claim 22: errors to 50 m.
 pub(super) fn error_rows() -> Vec<Row> {
+    let claim = claim(22);
     let points = swept();
     let greatest_m = points.iter().map(|p| p.rms_m).fold(0.0, f64::max);
     let farthest = &points[points.len() - 1];
@@ -194,27 +193,24 @@ pub(super) fn error_rows() -> Vec<Row> {
         points[0].distance_m,
     );
     vec![
-        Row::holds("greatest RMS error to 50 m at 72 klux", "m", AtMost("0.15"), greatest_m).remark(counts),
-        Row::holds("σ at 50 m, share of the distance", "%", Says("around 0.1%", 0.05, 0.15), percent(farthest))
-            .differs("The published figure's reflectivity is not known: from 10 %, that of the target by which the light was measured, σ is larger. What it comes from is measured below.")
+        claim.row("rms_error", greatest_m).remark(counts),
+        claim
+            .row("sigma", percent(farthest))
             .remark(format!("{} samples, of nine macropixels.", farthest.depths)),
-        Row::ours(
-            format!("the same from a figure of {:.0} %", 100.0 * BRIGHTER),
-            "%",
-            percent(&brighter),
-        ),
-        Row::ours("RMS error of the stereo guide at 50 m", "m", farthest.guide_rms_m),
+        claim.row("brighter", percent(&brighter)),
+        claim.row("guide_error", farthest.guide_rms_m),
     ]
 }
 
 /// Fig. 103: the sweep's means.
-pub(super) fn figure_103() -> Vec<Chart> {
+pub(super) fn figure_103() -> Chart {
     let [(_, means), ..] = sweep::charts(swept());
-    vec![means]
+    means
 }
 
 /// Claim 23: the van.
 pub(super) fn tracking_rows() -> Vec<Row> {
+    let claim = claim(23);
     let from = |from_m: f64| found(shows::van_at(&chain(), shows::VAN_M_S, from_m, SEED));
     let legs = VAN_FROM_M.map(from);
     let frames = legs.concat();
@@ -224,41 +220,25 @@ pub(super) fn tracking_rows() -> Vec<Row> {
     let missed: Vec<String> = missed.map(ToString::to_string).collect();
     let fast = found(shows::van_at(&chain(), 5.0, 70.0, SEED));
     let mut rows = vec![
-        Row::holds(
-            "share of frames in which most of the van's macropixels are right to a bin, 22 to 75 m, 15 klux",
-            "",
-            Says("successfully tracked and resolved", 1.0, 1.0),
-            where_found.count() as f64 / frames.len() as f64,
-        )
-        .differs("Near by, bins of 12 bits are full in most macropixels of the van's middle, which four rows see; the demo's 32 rows find it in all of 20 frames.")
-        .remark(format!(
+        claim.row("found", where_found.count() as f64 / frames.len() as f64).remark(format!(
             "{} frames, four from each of 22, 35, 50 and 72 m on; the van drives away at 2 m/s, which is chosen. {}",
             frames.len(),
             missed.join(" ")
         )),
-        Row::holds(
-            "farthest distance at which it is found",
-            "m",
-            Within("75", 1.0),
-            farthest_m.fold(0.0, f64::max),
-        )
-        .remark("There it ends."),
+        claim.row("farthest", farthest_m.fold(0.0, f64::max)),
     ];
-    rows.extend(VAN_FROM_M.iter().zip(&legs).map(|(from_m, frames)| {
-        let what = format!("share of the van's macropixels right to a bin from {from_m} m on");
-        Row::ours(what, "", share_right(frames))
-    }));
-    rows.extend([Row::ours(
-        "the same of a van at 5 m/s, from 70 m on",
-        "",
-        share_right(&fast),
-    )
-    .remark("From the images to the middle of the exposure it moves 1.2 m of a window of 3.1 m.")]);
+    rows.extend(
+        VAN_FROM_M.iter().zip(&legs).map(|(from_m, frames)| {
+            claim.row(&format!("right_from_{from_m}_m"), share_right(frames))
+        }),
+    );
+    rows.push(claim.row("fast_van", share_right(&fast)));
     rows
 }
 
 /// Claim 24: a pedestrian and a car in fog.
 pub(super) fn fog_rows() -> Vec<Row> {
+    let claim = claim(24);
     let lower = |mut show: Show| {
         show.settings.frame.scene.rig.waypoints = vec![[0.0, 0.0, LOWER_M, 0.0, 0.0].into()];
         show
@@ -280,46 +260,24 @@ pub(super) fn fog_rows() -> Vec<Row> {
     }
     let in_window = |show: Show| share_in_window(&found(show));
     let mut rows = vec![
-        Row::holds(
-            "least visibility, of 400, 300, 200 and 150 m, in which the car is found in both of two frames",
-            "m",
-            Says("foggy conditions", 0.0, FOG_BELOW_M),
-            least_m.fold(f64::INFINITY, f64::min),
-        )
-        .differs("In none of them.")
-        .remark(format!(
+        claim.row("least_visibility", least_m.fold(f64::INFINITY, f64::min)).remark(format!(
             "At {:.1} m; published: up to 60 m, without the fog's visibility. Fog is what one sees less than a kilometre through (WMO). 5 klux, car of 35 %.",
             mean(places_m).unwrap_or(f64::NAN)
         )),
     ];
     rows.extend(cars.iter().map(|(visibility_m, frames)| {
-        let what = format!(
-            "share of the car's macropixels right to a bin, {visibility_m} m of visibility"
-        );
-        Row::ours(what, "", share_right(frames))
+        claim.row(&format!("right_in_{visibility_m}_m"), share_right(frames))
     }));
     rows.extend([
-        Row::holds(
-            "share of a pedestrian's macropixels with him in their window, who walks away at 1 m/s, 150 m of visibility",
-            "",
-            Says("accurately updating", 0.5, 1.0),
-            in_window(walking),
-        )
-        .differs("The guide's depths at the rim of a narrow target are those of what is behind it.")
-        .remark("18 m ahead. Neither his way nor his speed is published."),
-        Row::holds(
-            "the same of one who crosses at 1 m/s",
-            "",
-            Says("moving pedestrian", 0.5, 1.0),
-            in_window(crossing),
-        )
-        .differs("The guide is 0.245 s old by the middle of the exposure: he is three macropixels on."),
+        claim.row("walking", in_window(walking)),
+        claim.row("crossing", in_window(crossing)),
     ]);
     rows
 }
 
 /// Claim 25: a figure behind a glass door.
 pub(super) fn glass_rows() -> Vec<Row> {
+    let claim = claim(25);
     let mut shows = shows::glass(&chain(), SEED);
     let mut show = shows.swap_remove(0);
     show.frames = 1;
@@ -332,57 +290,28 @@ pub(super) fn glass_rows() -> Vec<Row> {
     let pixels = outcome("guided").found.seen_by;
     let one = |found: &Found| share_right(std::slice::from_ref(found));
     vec![
-        Row::holds(
-            "share of the figure's macropixels right to a bin in guided windows",
-            "",
-            Says("revealed", 0.5, 1.0),
-            one(&outcome("guided").found),
-        )
-        .remark(format!(
-            "{pixels} macropixels in one frame; door at 14 m, figure at 17 m, both chosen."
-        )),
-        Row::holds(
-            "the same by the first peak of a full histogram",
-            "",
-            Says("obscured", 0.0, 0.1),
-            one(&outcome("full, first peak").found),
-        )
-        .remark("The same laser cycles in every window of the chip at once."),
-        Row::ours(
-            "the same by the most significant peak of a full histogram",
-            "",
-            one(&outcome("full").found),
-        ),
-        Row::ours(
-            "the same by zooming, at the laser energy of the guided windows",
-            "",
-            one(&outcome("zooming").found),
-        ),
+        claim
+            .row("guided", one(&outcome("guided").found))
+            .remark(format!(
+                "{pixels} macropixels in one frame; door at 14 m, figure at 17 m, both chosen."
+            )),
+        claim.row("first_peak", one(&outcome("full, first peak").found)),
+        claim.row("full", one(&outcome("full").found)),
+        claim.row("zooming", one(&outcome("zooming").found)),
     ]
 }
 
 /// Claim 26: what throws a target out of its window.
 pub(super) fn motion_rows() -> Vec<Row> {
+    let claim = claim(26);
     let slipped = found(shows::pedestrian(&chain(), -0.1, SEED));
     let straight = found(shows::pedestrian(&chain(), 0.0, SEED));
     let fast = found(shows::car(&chain(), 65.0, SEED));
     let slow = found(shows::car(&chain(), 5.0, SEED));
     vec![
-        Row::holds(
-            "share of a pedestrian's macropixels at 42 m that are right to a bin, a camera turned by 0.1°",
-            "",
-            Says("disappears between frames", 0.0, 0.1),
-            share_right(&slipped),
-        )
-        .remark("Four frames; the cameras over-estimate, as in Fig. 107."),
-        Row::ours("the same without the turn", "", share_right(&straight)),
-        Row::holds(
-            "share of a car's macropixels with it in their window, 65 mph at 3 fps",
-            "",
-            Says("exceeding the 3 m depth window size", 0.0, 0.1),
-            share_in_window(&fast),
-        )
-        .remark("Four frames; 7.1 m from the images to the middle of the exposure."),
-        Row::ours("the same at 5 mph", "", share_in_window(&slow)),
+        claim.row("slipped", share_right(&slipped)),
+        claim.row("straight", share_right(&straight)),
+        claim.row("fast_car", share_in_window(&fast)),
+        claim.row("slow_car", share_in_window(&slow)),
     ]
 }

@@ -9,14 +9,14 @@
 
 use super::claim::Row;
 use super::design::HSLIDAR_BIN_M;
-use super::published::Published::*;
 use super::stereo::{DEPTHS_M, HSLIDAR_STEP_BINS, PAIR, THIRD_PX, wall_at};
+use super::thesis::{chart, claim};
 use crate::chip::{Exposure, SensorConfig, WindowLaw, hslidar};
 use crate::guide::{BehaviouralStereo, Guide, GuideInput, MatchedStereo};
-use crate::report::{Axis, Chart, Style};
+use crate::report::Chart;
 use crate::scene::{GroundTruth, Scene};
 use crate::theory::design::{three_sigma, tolerated_sigma};
-use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
+use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time, TimeOfFlight};
 
 /// Maps behind each number: 32 768 estimates, of which 88 may be outside, give or take 9.
 const MAPS: u32 = 8;
@@ -111,6 +111,7 @@ fn least_bin_of_sensor_m(depth_m: f64, sensor: &SensorConfig, from_m: f64) -> f6
 
 /// Claim 19: the smallest bins that a stereo guide allows.
 pub(super) fn bin_rows() -> Vec<Row> {
+    let claim = claim(19);
     let hslidar_sigma_m = 8.0 * HSLIDAR_BIN_M / 6.0;
     let reach = |sigma_m: f64| (sigma_m * PAIR.focal_px * PAIR.baseline_m / THIRD_PX).sqrt();
     let on_steps = tolerated_sigma(8.0, HSLIDAR_STEP_BINS, three_sigma());
@@ -128,57 +129,23 @@ pub(super) fn bin_rows() -> Vec<Row> {
     let [on_walls, on_street] = matched_within(100.0, |z_m| 16.0 * quantic(z_m));
     let fig_71 = "Fig. 71 is drawn from the measured spread (Fig. 67), whose values are not printed; these use ⅓ px.";
     vec![
-        Row::holds(
-            "share of matched estimates in a window of Eq. 25's 16 least bins, street",
-            "%",
-            AtLeast("99.7"),
-            100.0 * on_street,
-        )
-        .differs("At edges, and where a macropixel sees several distances, as on the road, the matcher's errors are not the normal ones of Eq. 25.")
-        .remark("Images of the built-in street, matched as the demonstrator does; windows are centred on the estimates of 64×64 macropixels, and hold the range of their middle or not. Eq. 25 with ⅓ px at the true range."),
-        Row::holds("the same, walls about 100 m", "%", AtLeast("99.7"), 100.0 * on_walls)
-            .differs("The matcher's errors are not the normal ones of Eq. 25.")
-            .remark("32 768 macropixels."),
-        Row::holds("simulated guide at 100 m: least bin over Eq. 25's", "", Within("1", 0.05), centred / PAIR.least_bin_m(100.0, rig_px, 16))
-            .given("The guide's errors are drawn from the normal distribution that Eq. 25 is made of.")
-            .aside()
-            .remark("Windows of 16 bins about 32 768 estimates of the modelled pair before walls about there, 99.73 % of which hold the wall."),
-        Row::ours("the same, by the windows that QuantIC4x4 opens", "m", by_primary)
-            .remark(format!("CLK period by CLK period, in steps of 1 %; with centres on the grid of bins the formula gives {:.3} m.", on_grid(16, 1.0))),
-        Row::ours("the same, by the windows that HSLIDAR opens, clocked", "m", by_contingency)
-            .remark(format!("Windows of 8 bins step by 4; with centres on that grid the formula gives {:.3} m.", on_grid(8, 4.0))),
-        Row::ours("least bin at 100 m, QuantIC4x4", "m", quantic(100.0)).remark(fig_71),
-        Row::ours("least bin at 200 m, QuantIC4x4", "m", quantic(200.0)),
-        Row::ours(
-            "least bin at 100 m, HSLIDAR",
-            "m",
-            PAIR.least_bin_m(100.0, THIRD_PX, 8),
-        ),
-        Row::ours(
-            "the same, centres on 12.5 ns steps",
-            "m",
-            PAIR.least_bin_on_grid_m(100.0, THIRD_PX, 8, HSLIDAR_STEP_BINS)
-                .unwrap_or(f64::INFINITY),
-        )
-        .remark(
-            "A step of 4.8 bins leaves a window of 8 little room for the estimate's own error.",
-        ),
-        Row::ours(
-            "distance to which 8 bins of 2.6 ns hold ±3σ",
-            "m",
-            reach(hslidar_sigma_m),
-        )
-        .remark("Eq. 25 and 27 at ⅓ px; the demonstrator tracked its target to 75 m."),
-        Row::ours(
-            "the same, centres on 12.5 ns steps",
-            "m",
-            on_steps.map_or(0.0, |bins| reach(bins * HSLIDAR_BIN_M)),
-        ),
+        claim.row("matched_street", 100.0 * on_street),
+        claim.row("matched_walls", 100.0 * on_walls),
+        claim.row("simulated", centred / PAIR.least_bin_m(100.0, rig_px, 16)),
+        claim.row("simulated_quantic", by_primary).remark(format!("CLK period by CLK period, in steps of 1 %; with centres on the grid of bins the formula gives {:.3} m.", on_grid(16, 1.0))),
+        claim.row("simulated_hslidar", by_contingency).remark(format!("Windows of 8 bins step by 4; with centres on that grid the formula gives {:.3} m.", on_grid(8, 4.0))),
+        claim.row("quantic_100_m", quantic(100.0)).remark(fig_71),
+        claim.row("quantic_200_m", quantic(200.0)),
+        claim.row("hslidar_100_m", PAIR.least_bin_m(100.0, THIRD_PX, 8)),
+        claim.row("hslidar_100_m_on_steps", PAIR.least_bin_on_grid_m(100.0, THIRD_PX, 8, HSLIDAR_STEP_BINS)
+                .unwrap_or(f64::INFINITY)),
+        claim.row("reach", reach(hslidar_sigma_m)),
+        claim.row("reach_on_steps", on_steps.map_or(0.0, |bins| reach(bins * HSLIDAR_BIN_M))),
     ]
 }
 
 /// Fig. 71: the least bin interval against distance, both sensors.
-pub(super) fn figure_71() -> Vec<Chart> {
+pub(super) fn figure_71() -> Chart {
     let depths = || (10..=200).step_by(2).map(f64::from);
     let least = |bins: u32| depths().map(move |z_m| (z_m, PAIR.least_bin_m(z_m, THIRD_PX, bins)));
     let windows = DEPTHS_M.map(|z_m| (z_m, least_window_m(z_m)));
@@ -188,25 +155,11 @@ pub(super) fn figure_71() -> Vec<Chart> {
             Some((z_m, PAIR.least_bin_on_grid_m(z_m, THIRD_PX, bins, step)?))
         })
     };
-    vec![
-        Chart::new(
-            "Least bin interval that keeps 99.7 % of stereo estimates in the window (⅓ px)",
-            Axis::linear("distance (m)"),
-            Axis::linear("bin interval (m)"),
-        )
-        .with("primary: QuantIC4x4, 16 bins", Style::Line, least(16))
-        .with("contingency: HSLIDAR, 8 bins", Style::Line, least(8))
-        .with("simulated guide, 16 bins", Style::Points, simulated(16.0))
-        .with("simulated guide, 8 bins", Style::Points, simulated(8.0))
-        .with(
-            "QuantIC4x4, centres on the bin grid",
-            Style::Dashed,
-            on_grid(16, 1.0),
-        )
-        .with(
-            "HSLIDAR clocked, steps of 4 bins",
-            Style::Dashed,
-            on_grid(8, 4.0),
-        ),
-    ]
+    chart(71)
+        .line("primary: QuantIC4x4, 16 bins", least(16))
+        .line("contingency: HSLIDAR, 8 bins", least(8))
+        .points("simulated guide, 16 bins", simulated(16.0))
+        .points("simulated guide, 8 bins", simulated(8.0))
+        .dashed("QuantIC4x4, centres on the bin grid", on_grid(16, 1.0))
+        .dashed("HSLIDAR clocked, steps of 4 bins", on_grid(8, 4.0))
 }

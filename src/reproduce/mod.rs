@@ -7,6 +7,9 @@
 //!   MEASUREMENTS ─► the chip against its theory ──┘
 //! ```
 //!
+//! What the thesis prints and what is said of it is data, in `thesis.toml`; the files here compute a number for each of its rows. A new
+//! row is a line there, and its name with a number in the claim's function.
+//!
 //! A claim that the model must meet and does not is a fault, and `gdtof reproduce` fails. One that no honest
 //! convention meets says so and why; it is never bent. Where the thesis's convention and the physically right one
 //! part, both are shown.
@@ -26,22 +29,23 @@ mod published;
 mod registry;
 mod sensors;
 mod silicon;
-mod slips;
 mod stereo;
 mod system;
+mod thesis;
 
 pub use claim::{Claim, Row, Verdict, between_quotes, overall};
 pub(crate) use page::heading;
 pub use page::{SLIPS_TITLE, grid, html, markdown, slips as slips_grid, tally};
 pub use published::Published;
-pub use registry::{CLAIMS, FIGURES, Figure, MEASUREMENTS, Measurement, TABLES, Table};
-
-pub use slips::{SLIPS, Slip};
+pub use registry::{CLAIMS, FIGURES, Listed, MEASUREMENTS, TABLES};
+pub use thesis::Slip;
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use crate::report::{Chart, Grid};
+use crate::settings::words;
+use thesis::THESIS;
 
 /// Which numbers to reproduce: claims of the list, figures and tables of the thesis.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -71,32 +75,20 @@ impl Selection {
     }
 
     /// Whether nothing is chosen.
-    pub fn is_empty(&self) -> bool {
-        let chosen = [
-            &self.claims,
-            &self.figures,
-            &self.tables,
-            &self.measurements,
-        ];
-        chosen.into_iter().all(Vec::is_empty)
+    pub(crate) fn is_empty(&self) -> bool {
+        self.parts() == 0
     }
 
     /// How many parts are chosen.
-    pub fn parts(&self) -> usize {
-        let chosen = [
-            &self.claims,
-            &self.figures,
-            &self.tables,
-            &self.measurements,
-        ];
-        chosen.into_iter().map(Vec::len).sum()
+    pub(crate) fn parts(&self) -> usize {
+        self.claims.len() + self.figures.len() + self.tables.len() + self.measurements.len()
     }
 
     /// Whether everything that is chosen exists.
     ///
     /// # Errors
     /// The first that does not.
-    pub fn check(&self) -> Result<(), NothingThere> {
+    pub(crate) fn check(&self) -> Result<(), NothingThere> {
         let known = Selection::all();
         let parts = [
             (Part::Claim, &self.claims, known.claims),
@@ -117,28 +109,17 @@ impl Selection {
     }
 }
 
-/// What can be reproduced.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
-    /// A claim of the thesis.
-    Claim,
-    /// A figure of it.
-    Figure,
-    /// A table of it.
-    Table,
-    /// One of our own measurements.
-    Measurement,
-}
-
-impl Part {
-    /// What it is called.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Part::Claim => "claim",
-            Part::Figure => "figure",
-            Part::Table => "table",
-            Part::Measurement => "measurement",
-        }
+words! {
+    /// What can be reproduced.
+    pub enum Part {
+        /// A claim of the thesis.
+        Claim = "claim",
+        /// A figure of it.
+        Figure = "figure",
+        /// A table of it.
+        Table = "table",
+        /// One of our own measurements.
+        Measurement = "measurement",
     }
 }
 
@@ -167,63 +148,25 @@ pub struct ClaimResult {
     pub rows: Vec<Row>,
 }
 
-/// A table of the thesis, computed.
-pub struct TableResult {
-    /// Its number in the thesis.
-    pub number: u32,
-    /// What it shows.
-    pub title: &'static str,
-    /// The computed table.
-    pub grid: Grid,
-}
-
-/// A figure of the thesis, computed.
-pub struct FigureResult {
-    /// Its number in the thesis.
-    pub number: u32,
-    /// What it shows.
-    pub title: &'static str,
-    /// Its charts.
-    pub charts: Vec<Chart>,
-}
-
-impl FigureResult {
-    /// File names without extension, each with its chart.
-    pub fn files(&self) -> impl Iterator<Item = (String, &Chart)> {
-        let several = self.charts.len() > 1;
-        self.charts.iter().zip('a'..).map(move |(chart, letter)| {
-            let letter = if several {
-                letter.to_string()
-            } else {
-                String::new()
-            };
-            (format!("fig_{:03}{letter}", self.number), chart)
-        })
+impl Listed<Chart> {
+    /// The file's name without extension.
+    pub(crate) fn file(&self) -> String {
+        format!("fig_{:03}", self.number)
     }
 }
 
-/// The chip, measured against its theory.
-pub struct MeasurementResult {
-    /// Its number.
-    pub number: u32,
-    /// What it shows.
-    pub title: &'static str,
-    /// What was found.
-    pub found: measured::Study,
-}
-
-impl MeasurementResult {
+impl Listed<measured::Study> {
     /// File names without extension, each with its table.
-    pub fn tables(&self) -> impl Iterator<Item = (String, &'static str, &Grid)> {
-        let lettered = self.found.grids.iter().zip('a'..);
+    pub(crate) fn tables(&self) -> impl Iterator<Item = (String, &'static str, &Grid)> {
+        let lettered = self.it.grids.iter().zip('a'..);
         lettered.map(|((title, grid), letter)| {
             (format!("measured_{}{letter}", self.number), *title, grid)
         })
     }
 
     /// File names without extension, each with its chart.
-    pub fn files(&self) -> impl Iterator<Item = (String, &Chart)> {
-        let charts = self.found.charts.iter().zip('a'..);
+    pub(crate) fn files(&self) -> impl Iterator<Item = (String, &Chart)> {
+        let charts = self.it.charts.iter().zip('a'..);
         charts.map(|(chart, letter)| (format!("measured_{}{letter}_chart", self.number), chart))
     }
 }
@@ -236,98 +179,73 @@ pub struct Report {
     /// The thesis's slips, where every claim is chosen.
     pub slips: Vec<Slip>,
     /// Tables.
-    pub tables: Vec<TableResult>,
+    pub tables: Vec<Listed<Grid>>,
     /// Figures.
-    pub figures: Vec<FigureResult>,
+    pub figures: Vec<Listed<Chart>>,
     /// Measurements of the chip.
-    pub measurements: Vec<MeasurementResult>,
+    pub measurements: Vec<Listed<measured::Study>>,
 }
 
-/// One thing to compute, so that all of them share the threads.
-enum Job {
-    Claim(Claim),
-    Table(Table),
-    Figure(Figure),
-    Measurement(Measurement, usize),
-}
-
-/// What it gives.
-enum Done {
-    Claim(ClaimResult),
-    Table(TableResult),
-    Figure(FigureResult),
-    Measurement(MeasurementResult),
-}
-
-impl Job {
-    fn run(self) -> Done {
-        match self {
-            Job::Claim(claim) => Done::Claim(ClaimResult {
-                claim,
-                rows: (claim.compute)(),
-            }),
-            Job::Table(table) => Done::Table(TableResult {
-                number: table.number,
-                title: table.title,
-                grid: (table.make)(),
-            }),
-            Job::Figure(figure) => Done::Figure(FigureResult {
-                number: figure.number,
-                title: figure.title,
-                charts: (figure.draw)(),
-            }),
-            Job::Measurement(measurement, frames) => Done::Measurement(MeasurementResult {
-                number: measurement.number,
-                title: measurement.title,
-                found: (measurement.measure)(frames).expect("configurations that the engines run"),
-            }),
-        }
-    }
-}
-
-/// Computes what is chosen, on all threads; `done` is told of each claim, table and figure as it is finished.
+/// Computes what is chosen, on all threads; `done` is told of each claim, table, figure and measurement as it is finished.
 pub fn reproduce(selection: &Selection, done: impl Fn() + Sync) -> Report {
-    let claims = CLAIMS
-        .iter()
-        .filter(|c| selection.claims.contains(&c.number));
-    let tables = TABLES
-        .iter()
-        .filter(|t| selection.tables.contains(&t.number));
-    let figures = FIGURES
-        .iter()
-        .filter(|f| selection.figures.contains(&f.number));
-    let measurements = MEASUREMENTS
-        .iter()
-        .filter(|m| selection.measurements.contains(&m.number));
     let frames = selection.frames.unwrap_or(measured::FRAMES);
-    let jobs: Vec<Job> = claims
-        .map(|&c| Job::Claim(c))
-        .chain(tables.map(|&t| Job::Table(t)))
-        .chain(figures.map(|&f| Job::Figure(f)))
-        .chain(measurements.map(|&m| Job::Measurement(m, frames)))
-        .collect();
-    let results: Vec<Done> = jobs
-        .into_par_iter()
-        .with_max_len(1)
-        .map(|job| {
-            let result = job.run();
-            done();
-            result
-        })
-        .collect();
-    let mut report = Report::default();
-    if CLAIMS.iter().all(|c| selection.claims.contains(&c.number)) {
-        report.slips = SLIPS.to_vec();
+    let claims = || {
+        let made = made(&CLAIMS, &selection.claims, &done, |rows| rows());
+        let made = made.into_iter().map(|Listed { number, title, it }| {
+            let text = thesis::claim(number);
+            debug_assert!(
+                it.len() >= text.rows.len(),
+                "claim {number} has rows without numbers"
+            );
+            let claim = Claim {
+                number,
+                title,
+                source: &text.source,
+            };
+            ClaimResult { claim, rows: it }
+        });
+        made.collect::<Vec<_>>()
+    };
+    let tables = || made(&TABLES, &selection.tables, &done, |grid| grid());
+    let figures = || made(&FIGURES, &selection.figures, &done, |chart| chart());
+    let study = |measure: registry::Measure| measure(frames).expect("what the engines run");
+    let measurements = || made(&MEASUREMENTS, &selection.measurements, &done, study);
+    let ((claims, tables), (figures, measurements)) = rayon::join(
+        || rayon::join(claims, tables),
+        || rayon::join(figures, measurements),
+    );
+    let slips = match claims.len() == CLAIMS.len() {
+        true => THESIS.slips.clone(),
+        false => Vec::new(),
+    };
+    Report {
+        claims,
+        slips,
+        tables,
+        figures,
+        measurements,
     }
-    for result in results {
-        match result {
-            Done::Claim(claim) => report.claims.push(claim),
-            Done::Table(table) => report.tables.push(table),
-            Done::Figure(figure) => report.figures.push(figure),
-            Done::Measurement(measurement) => report.measurements.push(measurement),
+}
+
+/// Makes those of these numbers, each by itself, in the order of `all`.
+fn made<F: Copy + Sync, T: Send>(
+    all: &[Listed<F>],
+    numbers: &[u32],
+    done: &(impl Fn() + Sync),
+    make: impl Fn(F) -> T + Sync,
+) -> Vec<Listed<T>> {
+    let chosen = all.iter().filter(|listed| numbers.contains(&listed.number));
+    let chosen: Vec<&Listed<F>> = chosen.collect();
+    let made = chosen.into_par_iter().with_max_len(1).map(|listed| {
+        let it = make(listed.it);
+        done();
+        Listed {
+            number: listed.number,
+            title: listed.title,
+            it,
         }
-    }
-    report
+    });
+    made.collect()
 }
 
 impl Report {
@@ -373,27 +291,26 @@ impl Report {
                 "rows": result.rows.iter().map(row).collect::<Vec<_>>(),
             })
         };
-        let table = |table: &TableResult| json!({"table": table.number, "title": table.title, "rows": table.grid.lines().collect::<Vec<_>>()});
+        let table = |table: &Listed<Grid>| json!({"table": table.number, "title": table.title, "rows": table.it.lines().collect::<Vec<_>>()});
         let series = |chart: &Chart| {
             let series = chart.series.iter();
             series
                 .map(|s| json!({"name": s.name, "points": s.points}))
                 .collect::<Vec<_>>()
         };
-        let figure = |figure: &FigureResult| {
-            let charts = figure.charts.iter().map(|chart| {
-                json!({"title": chart.title, "x": chart.x.label, "y": chart.y.label, "series": series(chart)})
-            });
-            json!({"figure": figure.number, "title": figure.title, "charts": charts.collect::<Vec<_>>()})
+        let figure = |figure: &Listed<Chart>| {
+            let chart = &figure.it;
+            let chart = json!({"title": chart.title, "x": chart.x.label, "y": chart.y.label, "series": series(chart)});
+            json!({"figure": figure.number, "title": figure.title, "charts": [chart]})
         };
-        let measurement = |result: &MeasurementResult| {
+        let measurement = |result: &Listed<measured::Study>| {
             let tables = result.tables().map(|(_, title, grid)| {
                 json!({"title": title, "rows": grid.lines().collect::<Vec<_>>()})
             });
             json!({
                 "measurement": result.number,
                 "title": result.title,
-                "notes": result.found.notes,
+                "notes": result.it.notes,
                 "tables": tables.collect::<Vec<_>>(),
             })
         };
@@ -420,10 +337,7 @@ mod tests {
                 "{numbers:?}"
             );
         }
-        assert_eq!(
-            CLAIMS.map(|c| c.number).to_vec(),
-            (1..=28).collect::<Vec<_>>()
-        );
+        assert_eq!(Selection::all().claims, (1..=28).collect::<Vec<_>>());
     }
 
     #[test]

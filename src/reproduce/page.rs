@@ -3,7 +3,8 @@
 use std::fmt::Write;
 
 use super::claim::{Row, Verdict, figure, overall};
-use super::{FigureResult, MeasurementResult, Report, Slip, TableResult};
+use super::measured::Study;
+use super::{Listed, Report, Slip};
 use crate::report::Grid;
 
 /// The headings of a claim's table.
@@ -129,23 +130,16 @@ pub fn markdown(report: &Report) -> String {
         let slips = slips(&report.slips).markdown();
         let _ = writeln!(out, "## {SLIPS_TITLE}\n\n{slips}");
     }
-    for TableResult {
-        number,
-        title,
-        grid,
-    } in &report.tables
-    {
-        let _ = writeln!(out, "## Table {number}: {title}\n\n{}", grid.markdown());
+    for Listed { number, title, it } in &report.tables {
+        let _ = writeln!(out, "## Table {number}: {title}\n\n{}", it.markdown());
     }
     for result in &report.figures {
         let _ = write!(out, "## Fig. {}: {}\n\n", result.number, result.title);
-        for (file, chart) in result.files() {
-            let _ = write!(out, "![{}]({file}.svg)\n\n", chart.title);
-        }
+        let _ = write!(out, "![{}]({}.svg)\n\n", result.it.title, result.file());
     }
     for result in &report.measurements {
         let _ = write!(out, "## {}\n\n", heading(result));
-        for note in &result.found.notes {
+        for note in &result.it.notes {
             let _ = writeln!(out, "* {note}");
         }
         for (_, title, grid) in result.tables() {
@@ -162,13 +156,13 @@ pub fn markdown(report: &Report) -> String {
 pub fn slips(slips: &[Slip]) -> Grid {
     let mut grid = Grid::new(["where", "what is printed", "against", "what the model does"]);
     for slip in slips {
-        grid.push([slip.place, slip.printed, slip.against, slip.model]);
+        grid.push([&slip.place, &slip.printed, &slip.against, &slip.model]);
     }
     grid
 }
 
 /// What stands above a measurement.
-pub(crate) fn heading(result: &MeasurementResult) -> String {
+pub(crate) fn heading(result: &Listed<Study>) -> String {
     format!(
         "The chip against its theory {}: {}",
         result.number, result.title
@@ -208,34 +202,21 @@ pub fn html(report: &Report) -> String {
             grid_html(&slips(&report.slips))
         );
     }
-    for TableResult {
-        number,
-        title,
-        grid,
-    } in &report.tables
-    {
+    for Listed { number, title, it } in &report.tables {
         let _ = writeln!(
             body,
             "<section id=t{number}><h2>Table {number}: {}</h2>\n{}</section>",
             escaped(title),
-            grid_html(grid)
+            grid_html(it)
         );
     }
-    for FigureResult {
-        number,
-        title,
-        charts,
-    } in &report.figures
-    {
+    for Listed { number, title, it } in &report.figures {
         let _ = writeln!(
             body,
-            "<section id=f{number}><h2>Fig. {number}: {}</h2>",
-            escaped(title)
+            "<section id=f{number}><h2>Fig. {number}: {}</h2>\n<figure>{}</figure>\n</section>",
+            escaped(title),
+            scalable(&it.svg())
         );
-        charts.iter().for_each(|chart| {
-            let _ = writeln!(body, "<figure>{}</figure>", scalable(&chart.svg()));
-        });
-        body += "</section>\n";
     }
     for result in &report.measurements {
         let _ = writeln!(
@@ -244,7 +225,7 @@ pub fn html(report: &Report) -> String {
             result.number,
             escaped(&heading(result))
         );
-        for note in &result.found.notes {
+        for note in &result.it.notes {
             let _ = writeln!(body, "<li>{}</li>", escaped(note));
         }
         body += "</ul>\n";
@@ -263,7 +244,7 @@ pub fn html(report: &Report) -> String {
     }
     format!(
         "<!DOCTYPE html>\n<html lang=en>\n<head>\n<meta charset=utf-8>\n<meta name=viewport content='width=device-width'>\n\
-         <title>Published and computed</title>\n<style>{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
+         <title>Published and computed</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
     )
 }
 
@@ -414,27 +395,4 @@ fn escaped(text: &str) -> String {
         .replace('>', "&gt;")
 }
 
-const STYLE: &str = "
-body{font:15px/1.45 system-ui,sans-serif;color:#222;max-width:1080px;margin:2em auto;padding:0 1em}
-h1{margin-bottom:.2em}h2{margin:2em 0 .2em;font-size:1.15em}
-.lead{max-width:48em}.source{margin:.1em 0 .6em;color:#666}
-.badge{display:inline-block;border-radius:.7em;padding:0 .7em;font-size:.85em;font-weight:600;white-space:nowrap}
-.badge.agrees,.glance .agrees{background:#d3efdf;color:#0b5d36}
-.badge.differs,.glance .differs{background:#ffe7c2;color:#7a4a00}
-.badge.unsure,.glance .unsure{background:#fff6c9;color:#5f5200}
-.badge.given,.glance .given{background:#efe6f5;color:#553a6e}
-.badge.fails,.glance .fails{background:#f7c6c6;color:#8c0d0d}
-.badge.ours,.glance .ours{background:#dde9f7;color:#1d4777}
-.badge.none,.glance .none{background:#e8e8e8;color:#555}
-.glance{display:grid;grid-template-columns:repeat(auto-fill,minmax(200px,1fr));gap:6px;margin:1.2em 0}
-.glance a{border-radius:6px;padding:6px 9px;text-decoration:none;font-size:.9em}
-.glance i{display:block;font-style:normal;font-size:.82em;opacity:.8}
-.links a{margin-right:.5em;white-space:nowrap}
-table{border-collapse:collapse;width:100%;font-size:.92em}
-th,td{padding:3px 8px;text-align:right;border-bottom:1px solid #e6e6e6}
-th:first-child,td:first-child{text-align:left}th{color:#666;font-weight:600}
-tr.note td{text-align:left;color:#666;font-size:.9em;border-bottom:1px solid #e6e6e6;padding:0 8px 5px 20px}
-div.words td{text-align:left;vertical-align:top}
-h3{font-size:1em;margin:1em 0 .2em}.wide{overflow-x:auto}
-figure{margin:.5em 0}svg.chart{width:100%;height:auto}
-";
+const STYLE: &str = include_str!("page.css");

@@ -1,8 +1,8 @@
 //! Claim 10: Thompson against the Cramér-Rao bound.
 
 use super::claim::Row;
-use super::published::Published::*;
-use crate::report::{Axis, Chart, Style};
+use super::thesis::{chart, claim};
+use crate::report::Chart;
 use crate::theory::precision::{cramer_rao, thompson, thompson_best_ratio};
 
 /// Bin interval and pulse σ (ns), and background counts per bin, of Fig. 33.
@@ -32,58 +32,33 @@ const KNOWN_BOUNDS_NS: [(f64, f64); 3] = [(100.0, 0.536543), (1e3, 0.075241), (1
 
 /// Claim 10.
 pub(super) fn rows() -> Vec<Row> {
+    let claim = claim(10);
     let mut rows: Vec<Row> = KNOWN_BOUNDS_NS
         .into_iter()
         .map(|(signal, reference_ns)| {
             let bound_ns = bound_ns(signal);
             let off = 100.0 * (bound_ns / reference_ns - 1.0).abs();
-            Row::ours(format!("bound at {signal} signal counts"), "ns", bound_ns)
+            claim.row(&format!("bound_{signal}"), bound_ns)
                 .remark(format!("Fig. 33 prints no numbers. {off:.4} % from our own reference of many digits, {reference_ns}."))
         })
         .collect();
-    let deviation = signals()
-        .map(|s| (thompson_ns(s) / bound_ns(s) - 1.0).abs())
-        .fold(0.0, f64::max);
-    rows.push(
-        Row::holds(
-            "largest deviation of Thompson from the bound",
-            "%",
-            Within("20", 2.0),
-            100.0 * deviation,
-        )
-        .differs("An error “as high as 20%” is said of Thompson against a Monte Carlo (Koerner's) “with low SNR” that is not named; this is against the bound, over the light of Fig. 33 (100 to 100 000 signal counts)."),
-    );
-    let faintest = 100.0 * (thompson_ns(FAINT) / bound_ns(FAINT) - 1.0).abs();
-    rows.push(
-        Row::ours(
-            "the same for an echo that is lost in the background",
-            "%",
-            faintest,
-        )
-        .remark("The limit of a signal far below Fig. 33's."),
-    );
-    rows.push(Row::ours(
-        "Thompson at 100 signal counts",
-        "ns",
-        thompson_ns(100.0),
-    ));
-    rows.push(
-        Row::ours("best bin over σ by Eq. 20 at µ_B/µ_S = 0.08", "", thompson_best_ratio(0.08, 1.0))
-            .remark("Eq. 21's rule of thumb is 1.5; by Thompson's formula it belongs to one signal-to-background ratio."),
-    );
+    let off_percent = |s| 100.0 * (thompson_ns(s) / bound_ns(s) - 1.0).abs();
+    rows.extend([
+        claim.row(
+            "thompson_off",
+            signals().map(off_percent).fold(0.0, f64::max),
+        ),
+        claim.row("thompson_off_faint", off_percent(FAINT)),
+        claim.row("thompson", thompson_ns(100.0)),
+        claim.row("best_bin", thompson_best_ratio(0.08, 1.0)),
+    ]);
     rows
 }
 
 /// Fig. 33.
-pub(super) fn figure_33() -> Vec<Chart> {
-    vec![
-        Chart::new(
-            "Precision: Thompson and the Cramér-Rao bound (a = 1 ns, σ = 1.5 ns, 100 background counts per bin)",
-            Axis::log("signal counts"),
-            Axis::log("δ (ns)"),
-        )
-        .with("Cramér-Rao", Style::Line, signals().map(|s| (s, bound_ns(s))))
-        .with("Thompson", Style::Dashed, signals().map(|s| (s, thompson_ns(s))))
-        .with("our references of many digits", Style::Points, KNOWN_BOUNDS_NS),
-    ]
+pub(super) fn figure_33() -> Chart {
+    chart(33)
+        .line("Cramér-Rao", signals().map(|s| (s, bound_ns(s))))
+        .dashed("Thompson", signals().map(|s| (s, thompson_ns(s))))
+        .points("our references of many digits", KNOWN_BOUNDS_NS)
 }

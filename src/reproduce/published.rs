@@ -21,6 +21,34 @@ pub enum Published {
 }
 
 impl Published {
+    /// What `thesis.toml` says, in the notation at its head.
+    ///
+    /// # Panics
+    /// When it is in no such notation.
+    pub(super) fn parse(text: &'static str) -> Self {
+        if let Some((words, read)) = text.strip_prefix('“').and_then(|t| t.split_once("” ")) {
+            let (low, high) = match (read.strip_prefix("≥ "), read.split_once(" to ")) {
+                (Some(low), _) => (number(low), f64::INFINITY),
+                (None, Some((low, high))) => (number(low), number(high)),
+                (None, None) => (number(read), number(read)),
+            };
+            return Published::Says(words, low, high);
+        }
+        if let Some((value, tolerance)) = text.split_once(" ± ") {
+            Published::Within(value, number(tolerance))
+        } else if let Some((low, high)) = text.split_once(" to ") {
+            Published::Between(low, high)
+        } else if let Some(least) = text.strip_prefix("≥ ") {
+            Published::AtLeast(least)
+        } else if let Some(most) = text.strip_prefix("≤ ") {
+            Published::AtMost(most)
+        } else if text.is_empty() {
+            Published::Nothing
+        } else {
+            Published::Exactly(text)
+        }
+    }
+
     /// Least and greatest value that agrees; `None` where nothing is published.
     pub fn range(self) -> Option<(f64, f64)> {
         match self {
@@ -51,7 +79,7 @@ impl Published {
     }
 
     /// How far `value` is from what is published: from the number, or from the nearer end of a range.
-    pub fn difference(self, value: f64) -> Option<f64> {
+    pub(crate) fn difference(self, value: f64) -> Option<f64> {
         let nearest = match self {
             Published::Exactly(text) | Published::Within(text, _) => number(text),
             _ => {
@@ -63,7 +91,7 @@ impl Published {
     }
 
     /// As the thesis prints it.
-    pub fn text(self) -> String {
+    pub(crate) fn text(self) -> String {
         match self {
             Published::Exactly(text) | Published::Within(text, _) => text.to_owned(),
             Published::AtLeast(text) => format!("≥ {text}"),
@@ -75,7 +103,7 @@ impl Published {
     }
 
     /// The tolerance either way.
-    pub fn tolerance_text(self) -> String {
+    pub(crate) fn tolerance_text(self) -> String {
         match self {
             Published::Exactly(text) => format!("±{}", 0.5 * last_digit(text)),
             Published::Within(_, tolerance) => format!("±{tolerance}"),
@@ -120,6 +148,24 @@ mod tests {
                 (a - low).abs() < 1e-9 && (b - high).abs() < 1e-9,
                 "{text}: {a} {b}"
             );
+        }
+    }
+
+    #[test]
+    fn every_notation_is_read() {
+        use Published::*;
+        for (text, published) in [
+            ("", Nothing),
+            ("-1.2e3", Exactly("-1.2e3")),
+            ("2.4 ± 0.2", Within("2.4", 0.2)),
+            ("≥ 6", AtLeast("6")),
+            ("≤ 5", AtMost("5")),
+            ("1 to 2", Between("1", "2")),
+            ("“a to b” 1 to 2", Says("a to b", 1.0, 2.0)),
+            ("“at all” 4096", Says("at all", 4096.0, 4096.0)),
+            ("“far” ≥ 1", Says("far", 1.0, f64::INFINITY)),
+        ] {
+            assert_eq!(Published::parse(text), published);
         }
     }
 

@@ -1,28 +1,33 @@
 //! Claim 28: the published sensors of Tables 5 and 16, and what their partial histograms cost in one common light.
 
+use serde::Deserialize;
+
 use super::claim::Row;
 use super::penalty::demonstrator;
-use super::published::Published::*;
-use crate::report::{Axis, Chart, Grid, Style};
+use super::thesis::{THESIS, chart, claim, grid};
+use crate::report::{Chart, Grid};
 use crate::theory::partial::{System, sliding_reduction, zooming_reduction};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// How a sensor makes do with its bins.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 enum Scheme {
     /// All bins at once, or no histogram at all.
     Full,
-    /// Zooming over so many steps.
+    /// Zooming, with this number of steps.
     Zooming(u32),
-    /// Sliding over so many windows that share so many bins.
+    /// Sliding: the number of windows, and the bins that neighbours share.
     Sliding(u32, u32),
     /// One window that a guide chooses.
     Guided,
 }
 
 /// A line of Tables 5 and 16.
-struct Sensor {
-    author: &'static str,
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Sensor {
+    author: String,
     year: u32,
     /// Rows and columns of ToF pixels.
     pixels: (u32, u32),
@@ -31,147 +36,6 @@ struct Sensor {
     scheme: Scheme,
     stacked: bool,
 }
-
-const fn sensor(
-    author: &'static str,
-    year: u32,
-    pixels: (u32, u32),
-    max_range_m: f64,
-    bins: Option<u32>,
-    scheme: Scheme,
-    stacked: bool,
-) -> Sensor {
-    Sensor {
-        author,
-        year,
-        pixels,
-        max_range_m,
-        bins,
-        scheme,
-        stacked,
-    }
-}
-
-/// Tables 5 and 16. Steps are those of section 2.5.2; Taloud's windows are not disclosed and taken as Stoppa's.
-const SENSORS: [Sensor; 13] = [
-    sensor(
-        "Ximenes [139]",
-        2018,
-        (64, 128),
-        300.0,
-        None,
-        Scheme::Full,
-        true,
-    ),
-    sensor(
-        "Henderson [108]",
-        2019,
-        (64, 64),
-        50.0,
-        Some(16),
-        Scheme::Full,
-        true,
-    ),
-    sensor(
-        "Zhang [52]",
-        2019,
-        (144, 252),
-        50.0,
-        Some(8),
-        Scheme::Zooming(3),
-        false,
-    ),
-    sensor(
-        "Okino [148]",
-        2020,
-        (900, 1200),
-        250.0,
-        None,
-        Scheme::Full,
-        false,
-    ),
-    sensor(
-        "Kim [53]",
-        2021,
-        (40, 48),
-        45.0,
-        Some(2),
-        Scheme::Zooming(8),
-        false,
-    ),
-    sensor(
-        "Kumagai [55]",
-        2021,
-        (63, 168),
-        200.0,
-        None,
-        Scheme::Full,
-        true,
-    ),
-    sensor(
-        "Preethi [109]",
-        2021,
-        (128, 256),
-        100.0,
-        None,
-        Scheme::Full,
-        true,
-    ),
-    sensor(
-        "Gyongy [146]",
-        2021,
-        (32, 64),
-        50.0,
-        Some(8),
-        Scheme::Sliding(16, 0),
-        false,
-    ),
-    sensor(
-        "Stoppa [54]",
-        2021,
-        (60, 80),
-        4.4,
-        Some(32),
-        Scheme::Sliding(16, 6),
-        true,
-    ),
-    sensor(
-        "Zhang [143]",
-        2021,
-        (160, 240),
-        9.5,
-        Some(32),
-        Scheme::Zooming(2),
-        true,
-    ),
-    sensor(
-        "Park [145]",
-        2022,
-        (60, 80),
-        45.0,
-        Some(4),
-        Scheme::Zooming(4),
-        false,
-    ),
-    sensor(
-        "Taloud [144]",
-        2022,
-        (32, 42),
-        8.2,
-        Some(59),
-        Scheme::Sliding(16, 6),
-        true,
-    ),
-    sensor(
-        "this work",
-        2023,
-        (32, 64),
-        75.0,
-        Some(8),
-        Scheme::Guided,
-        false,
-    ),
-];
 
 impl Sensor {
     /// Bins of the full histogram that it stands for.
@@ -227,9 +91,11 @@ impl Sensor {
 
 /// Claim 28: histogram reduction ratios, and the place of the demonstrator.
 pub(super) fn rows() -> Vec<Row> {
+    let claim = claim(28);
     let inverse = |bins, steps| 1.0 / zooming_reduction(bins, steps);
     let widest = |stacked: bool| {
-        let bins = SENSORS
+        let bins = THESIS
+            .sensors
             .iter()
             .filter(|s| s.stacked == stacked)
             .filter_map(|s| s.bins);
@@ -237,66 +103,24 @@ pub(super) fn rows() -> Vec<Row> {
     };
     let span = 1.0 / sliding_reduction(32, 16, 6) * 32.0;
     vec![
-        Row::holds(
-            "1/HRR of Zhang 2019: 8 bins, 3 steps",
-            "",
-            Exactly("64"),
-            inverse(8, 3),
-        ),
-        Row::holds(
-            "1/HRR of Kim 2021: 2 bins, 8 steps",
-            "",
-            Exactly("128"),
-            inverse(2, 8),
-        ),
-        Row::holds(
-            "bins that Park's 4 steps of 4 and Kim's 8 of 2 stand for",
-            "",
-            Says(
-                "effectively covers 4 histogram bins at each zoom step",
-                1.0,
-                1.0,
-            ),
-            4.0 * inverse(4, 4) / (2.0 * inverse(2, 8)),
-        )
-        .remark("Their ratio: halving the steps by doubling the bins changes nothing."),
-        Row::ours(
-            "bins that Stoppa's 16 windows of 32, 6 shared, stand for",
-            "",
-            span,
-        ),
-        Row::holds(
-            "most bins of a sensor that is not stacked",
-            "",
-            AtMost("8"),
-            widest(false),
-        )
-        .given("Read from the same Table 5.")
-        .aside(),
-        Row::ours("most bins of a stacked sensor", "", widest(true)),
+        claim.row("zhang", inverse(8, 3)),
+        claim.row("kim", inverse(2, 8)),
+        claim.row("park_over_kim", 4.0 * inverse(4, 4) / (2.0 * inverse(2, 8))),
+        claim.row("stoppa", span),
+        claim.row("widest_single", widest(false)),
+        claim.row("widest_stacked", widest(true)),
     ]
 }
 
 /// Tables 5 and 16 through the same theory.
 pub(super) fn table() -> Grid {
-    let mut grid = Grid::new([
-        "sensor",
-        "year",
-        "ToF pixels",
-        "range (m)",
-        "bins",
-        "stacked",
-        "partial histogram",
-        "stands for bins",
-        "bin (m)",
-        "penalty (×)",
-    ]);
+    let mut grid = grid(16);
     let show = |value: Option<f64>, decimals: usize| {
         value.map_or("-".to_owned(), |v| format!("{v:.decimals$}"))
     };
-    for sensor in &SENSORS {
+    for sensor in &THESIS.sensors {
         grid.push([
-            sensor.author.to_owned(),
+            sensor.author.clone(),
             sensor.year.to_string(),
             format!("{} × {}", sensor.pixels.0, sensor.pixels.1),
             sensor.max_range_m.to_string(),
@@ -312,18 +136,12 @@ pub(super) fn table() -> Grid {
 }
 
 /// Fig. 28: bins per pixel by year.
-pub(super) fn figure_28() -> Vec<Chart> {
+pub(super) fn figure_28() -> Chart {
     let bins = |stacked: bool| {
-        let of_kind = SENSORS.iter().filter(move |s| s.stacked == stacked);
+        let of_kind = THESIS.sensors.iter().filter(move |s| s.stacked == stacked);
         of_kind.filter_map(|s| Some((f64::from(s.year), f64::from(s.bins?))))
     };
-    vec![
-        Chart::new(
-            "Histogram bins per ToF pixel of published sensors",
-            Axis::linear("year").between(2018.0, 2024.0),
-            Axis::linear("bins").between(0.0, 64.0),
-        )
-        .with("stacked", Style::Points, bins(true))
-        .with("one tier", Style::Points, bins(false)),
-    ]
+    chart(28)
+        .points("stacked", bins(true))
+        .points("one tier", bins(false))
 }

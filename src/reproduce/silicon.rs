@@ -1,7 +1,8 @@
 //! Fig. 36 to 41: how large histograms are, and what they cost in silicon.
 
 use super::design::{QUARTER_PIXEL_UM2, TABLE_6_BACKGROUND_HZ, TABLE_6_CYCLES, full_histogram};
-use crate::report::{Axis, Chart, Style};
+use super::thesis::chart;
+use crate::report::Chart;
 use crate::theory::capacity::{SRAM_CELLS, Storage, bins_within, bits_for, full_bins};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
@@ -20,52 +21,36 @@ fn intervals_ns() -> impl Iterator<Item = f64> + Clone {
 }
 
 /// Fig. 36: counts that a bin must hold.
-pub(super) fn figure_36() -> Vec<Chart> {
-    let mut chart = Chart::new(
-        "Background counts in a bin after 25 000 laser cycles",
-        Axis::linear("bin interval (ns)"),
-        Axis::log("counts"),
-    );
+pub(super) fn figure_36() -> Chart {
+    let mut chart = chart(36);
     for hz in BACKGROUNDS_HZ {
         let counts = intervals_ns().map(move |ns| (ns, hz * ns * 1e-9 * TABLE_6_CYCLES));
-        chart = chart.with(format!("{} Mcounts/s", hz / 1e6), Style::Line, counts);
+        chart = chart.line(format!("{} Mcounts/s", hz / 1e6), counts);
     }
     let capacity = |bits: i32| f64::from(bits).exp2() - 1.0;
     for bits in [8, 12, 14] {
         let level = [(0.5, capacity(bits)), (20.0, capacity(bits))];
-        chart = chart.with(format!("{bits} bits hold"), Style::Dashed, level);
+        chart = chart.dashed(format!("{bits} bits hold"), level);
     }
-    vec![chart]
+    chart
 }
 
 /// Fig. 37: bins of a full histogram.
-pub(super) fn figure_37() -> Vec<Chart> {
-    let mut chart = Chart::new(
-        "Bins of a full histogram",
-        Axis::linear("maximum distance (m)"),
-        Axis::linear("bins"),
-    );
+pub(super) fn figure_37() -> Chart {
+    let mut chart = chart(37);
     for ns in BINS_NS {
         let bins = (1..=50).map(move |i| {
             let z_m = f64::from(i) * 6.0;
             (z_m, f64::from(full_bins(z_m, bin_m(ns))))
         });
-        chart = chart.with(format!("{ns} ns"), Style::Line, bins);
+        chart = chart.line(format!("{ns} ns"), bins);
     }
-    vec![chart.with(
-        "published: 256 at 200 m, 5 ns",
-        Style::Points,
-        [(200.0, 256.0)],
-    )]
+    chart.points("published: 256 at 200 m, 5 ns", [(200.0, 256.0)])
 }
 
 /// Fig. 38: bits of a full histogram to 200 m.
-pub(super) fn figure_38() -> Vec<Chart> {
-    let mut chart = Chart::new(
-        "Memory of a full histogram to 200 m, 25 000 laser cycles",
-        Axis::linear("bin interval (ns)"),
-        Axis::log("bits per pixel"),
-    );
+pub(super) fn figure_38() -> Chart {
+    let mut chart = chart(38);
     for hz in BACKGROUNDS_HZ {
         let bits = intervals_ns().map(move |ns| {
             let storage = Storage {
@@ -74,66 +59,40 @@ pub(super) fn figure_38() -> Vec<Chart> {
             };
             (ns, storage.bits() as f64)
         });
-        chart = chart.with(format!("{} Mcounts/s", hz / 1e6), Style::Line, bits);
+        chart = chart.line(format!("{} Mcounts/s", hz / 1e6), bits);
     }
-    vec![chart.with(
-        "published: over 3 kbit at 5 ns",
-        Style::Points,
-        [(5.0, 3072.0)],
-    )]
+    chart.points("published: over 3 kbit at 5 ns", [(5.0, 3072.0)])
 }
 
 /// Fig. 39: area of a bit.
-pub(super) fn figure_39() -> Vec<Chart> {
+pub(super) fn figure_39() -> Chart {
     let cells = SRAM_CELLS
         .iter()
         .map(|c| (f64::from(c.node_nm), c.area_um2));
-    vec![
-        Chart::new(
-            "Area of a static RAM cell by process node (sources in table 39)",
-            Axis::log("node (nm)"),
-            Axis::log("area (µm²)"),
-        )
-        .with("published cells", Style::Points, cells),
-    ]
+    chart(39).points("published cells", cells)
 }
 
 /// Fig. 40: area of the full histogram against that of the pixel.
-pub(super) fn figure_40() -> Vec<Chart> {
+pub(super) fn figure_40() -> Chart {
     let area = |storage: Storage| {
         let nodes = SRAM_CELLS.iter();
         nodes.map(move |cell| (f64::from(cell.node_nm), storage.area_um2(cell)))
     };
     let full = full_histogram();
     let level = |um2: f64| [(5.0, um2), (130.0, um2)];
-    vec![
-        Chart::new(
-            "Area of a histogram of 12-bit bins by process node",
-            Axis::log("node (nm)"),
-            Axis::log("area (µm²)"),
-        )
-        .with("256 bins (full)", Style::Line, area(full))
-        .with(
+    chart(40)
+        .line("256 bins (full)", area(full))
+        .line(
             "16 bins (guided, partial)",
-            Style::Line,
             area(Storage { bins: 16, ..full }),
         )
-        .with(
-            "the pixel, 30 µm square",
-            Style::Dashed,
-            level(4.0 * QUARTER_PIXEL_UM2),
-        )
-        .with("a quarter of it", Style::Dashed, level(QUARTER_PIXEL_UM2)),
-    ]
+        .dashed("the pixel, 30 µm square", level(4.0 * QUARTER_PIXEL_UM2))
+        .dashed("a quarter of it", level(QUARTER_PIXEL_UM2))
 }
 
 /// Fig. 41: bins and bits that fit a quarter of the pixel.
-pub(super) fn figure_41() -> Vec<Chart> {
-    let mut chart = Chart::new(
-        "Bins that fit a quarter of the pixel (225 µm²)",
-        Axis::linear("bits of a bin"),
-        Axis::log("bins"),
-    );
+pub(super) fn figure_41() -> Chart {
+    let mut chart = chart(41);
     for cell in SRAM_CELLS
         .iter()
         .filter(|c| [130, 90, 65, 40, 28, 16, 7].contains(&c.node_nm))
@@ -144,11 +103,10 @@ pub(super) fn figure_41() -> Vec<Chart> {
                 f64::from(bins_within(QUARTER_PIXEL_UM2, bits, cell)),
             )
         });
-        chart = chart.with(format!("{} nm", cell.node_nm), Style::Line, bins);
+        chart = chart.line(format!("{} nm", cell.node_nm), bins);
     }
-    vec![chart.with(
+    chart.points(
         "full: 256 × 12; reduced: 16 × 12",
-        Style::Points,
         [(12.0, 256.0), (12.0, 16.0)],
-    )]
+    )
 }

@@ -3,10 +3,10 @@
 use super::claim::{Row, Verdict};
 use super::demonstrator;
 use super::design::HSLIDAR_BIN_M;
-use super::published::Published::*;
+use super::thesis::{chart, claim};
 use crate::guide::StereoRig;
 use crate::numerics::intervals::{deviation, mean};
-use crate::report::{Axis, Chart, Style};
+use crate::report::Chart;
 use crate::scene::{DVec3, Object, Scene, Shape};
 use crate::theory::design::StereoPair;
 
@@ -78,6 +78,7 @@ fn rig_errors() -> Vec<(f64, f64)> {
 
 /// Claim 17: error against distance, and the nearest distance.
 pub(super) fn error_rows() -> Vec<Row> {
+    let claim = claim(17);
     let errors = rig_errors();
     let ratio = errors
         .iter()
@@ -85,14 +86,13 @@ pub(super) fn error_rows() -> Vec<Row> {
         .sum::<f64>()
         / errors.len() as f64;
     let mut rows = vec![
-        Row::holds("exponent of the error's growth, modelled rig", "", Within("2", 0.05), exponent(&errors))
-            .given("The pair's disparity error is the same at all distances by choice, and with it the exponent.")
-            .remark("RMS error of the simulated pair at eight distances from 20 to 195 m, 6400 pixels each."),
-        Row::ours("modelled rig over the ⅓-pixel line of Fig. 68", "", ratio)
-            .remark("The model's disparity error is ⅓ px by choice, rounding to 1/16 px added."),
-        Row::ours("⅓-pixel line at 200 m", "m", PAIR.depth_error_m(200.0, THIRD_PX)),
-        Row::holds("relative error of ±1 px at 10 px", "%", Exactly("10"), 100.0 * PAIR.depth_error_m(PAIR.depth_m(10.0), 1.0) / PAIR.depth_m(10.0))
-            .remark("Eq. 27 is a first derivative: in truth −9.1 and +11.1 %."),
+        claim.row("exponent", exponent(&errors)),
+        claim.row("rig_over_line", ratio),
+        claim.row("line_200_m", PAIR.depth_error_m(200.0, THIRD_PX)),
+        claim.row(
+            "one_px",
+            100.0 * PAIR.depth_error_m(PAIR.depth_m(10.0), 1.0) / PAIR.depth_m(10.0),
+        ),
     ];
     rows.extend(limit_rows());
     rows
@@ -100,34 +100,20 @@ pub(super) fn error_rows() -> Vec<Row> {
 
 /// The limits of Table 12's pair, with pixels as they are and binned. Both are published of one rig.
 fn limit_rows() -> Vec<Row> {
-    let (around_15, over_200) = (Within("15", 1.5), AtLeast("200"));
-    let pitches = [("unbinned", PAIR), ("2×2 binned", BINNED)];
-    let limits = pitches.map(|(pixels, pair)| {
-        let of = |disparity_px: f64, words: &str, published| {
-            let what = format!("{words} distance at {disparity_px} px, {pixels}");
-            let row = Row::holds(what, "m", published, pair.depth_m(disparity_px));
-            row.differs("The other limit's pixels are not these.")
-                .aside()
-        };
-        [
-            of(128.0, "nearest", around_15),
-            of(10.0, "farthest", over_200),
-        ]
+    let claim = claim(17);
+    let limits = [("unbinned", PAIR), ("binned", BINNED)].map(|(pixels, pair)| {
+        [("nearest", 128.0), ("farthest", 10.0)].map(|(end, disparity_px)| {
+            let name = format!("{end}_{pixels}");
+            claim.row(&name, pair.depth_m(disparity_px))
+        })
     });
     let meet = |rig: &&[Row; 2]| rig.iter().all(|row| row.verdict() == Verdict::Agrees);
     let both = limits.iter().filter(meet).count() as f64;
-    // Distance times disparity is the same: 200 m at 10 px are so many at 128.
+    // Distance times disparity is constant, so 200 m at 10 px give the least distance, at 128 px.
     let least_nearest_m = 200.0 * 10.0 / 128.0;
     let widest_um = 12e3 / (least_nearest_m * 128.0);
     let narrowest_um = 12e3 / (16.5 * 128.0);
-    let headline = Row::holds(
-        "pairs, unbinned and 2×2 binned, that meet both the nearest and the farthest distance",
-        "",
-        Says("minimum distance limit occurs at a distance of around 15 m", 1.0, 2.0),
-        both,
-    )
-    .differs("The nearest distance is that of binned pixels, the farthest that of single ones.")
-    .remark(format!(
+    let headline = claim.row("both_limits", both).remark(format!(
         "128 and 10 px of disparity are 12.8 apart, so that who sees 200 m sees nothing nearer than {least_nearest_m:.1} m. 12 mm lenses meet both with pixels of {narrowest_um:.1} to {widest_um:.1} µm; Table 12's are 3.45 and, binned, 6.9 µm."
     ));
     std::iter::once(headline)
@@ -136,7 +122,7 @@ fn limit_rows() -> Vec<Row> {
 }
 
 /// Fig. 61: distance limits of a 1 m pair.
-pub(super) fn figure_61() -> Vec<Chart> {
+pub(super) fn figure_61() -> Chart {
     let focal_mm = || (4..=100).map(|i| f64::from(i) * 0.5);
     let limit = |disparity_px: f64, pitch_um: f64| {
         focal_mm().map(move |f| {
@@ -147,18 +133,12 @@ pub(super) fn figure_61() -> Vec<Chart> {
             (f, pair.depth_m(disparity_px))
         })
     };
-    vec![
-        Chart::new(
-            "Distance limits of a stereo pair 1 m apart: 128 to 10 px of disparity",
-            Axis::linear("focal length (mm)"),
-            Axis::log("distance (m)"),
-        )
-        .with("farthest, 3.45 µm pixels", Style::Line, limit(10.0, 3.45))
-        .with("nearest, 3.45 µm pixels", Style::Line, limit(128.0, 3.45))
-        .with("farthest, 2×2 binned", Style::Dashed, limit(10.0, 6.9))
-        .with("nearest, 2×2 binned", Style::Dashed, limit(128.0, 6.9))
-        .with("published nearest, 12 mm", Style::Points, [(12.0, 15.0)]),
-    ]
+    chart(61)
+        .line("farthest, 3.45 µm pixels", limit(10.0, 3.45))
+        .line("nearest, 3.45 µm pixels", limit(128.0, 3.45))
+        .dashed("farthest, 2×2 binned", limit(10.0, 6.9))
+        .dashed("nearest, 2×2 binned", limit(128.0, 6.9))
+        .points("published nearest, 12 mm", [(12.0, 15.0)])
 }
 
 /// Estimates of a window of 5×5 pixels in the middle of the image before a wall, as Fig. 66 samples them, m.
@@ -187,51 +167,35 @@ fn sampled_sweep() -> Vec<(f64, f64, f64)> {
 }
 
 /// Fig. 66: mean and three standard deviations of 5×5 pixels against distance.
-pub(super) fn figure_66() -> Vec<Chart> {
+pub(super) fn figure_66() -> Chart {
     let sweep = sampled_sweep();
     let line = |sigmas: f64| sweep.iter().map(move |(z, m, s)| (*z, m + sigmas * s));
-    vec![
-        Chart::new(
-            "Stereo depth of 5×5 pixels: mean and three standard deviations (one sample a distance)",
-            Axis::linear("distance (m)"),
-            Axis::linear("estimated distance (m)"),
-        )
-        .with("mean, modelled rig", Style::Points, line(0.0))
-        .with("mean + 3 σ", Style::Dashed, line(3.0))
-        .with("mean − 3 σ", Style::Dashed, line(-3.0))
-        .with("true", Style::Line, sweep_m().map(|z| (z, z))),
-    ]
+    chart(66)
+        .points("mean, modelled rig", line(0.0))
+        .dashed("mean + 3 σ", line(3.0))
+        .dashed("mean − 3 σ", line(-3.0))
+        .line("true", sweep_m().map(|z| (z, z)))
 }
 
 /// Fig. 67: standard deviation of 5×5 pixels, and three of the squared fit.
-pub(super) fn figure_67() -> Vec<Chart> {
+pub(super) fn figure_67() -> Chart {
     let sweep = sampled_sweep();
     // Least squares of σ = a·z²: the fit of Fig. 67 without the terms that Eq. 27 does not have.
     let squares: f64 = sweep.iter().map(|(z, _, _)| z.powi(4)).sum();
     let fit = sweep.iter().map(|(z, _, s)| s * z * z).sum::<f64>() / squares;
     let of_fit = |sigmas: f64| sweep_m().map(move |z| (z, sigmas * fit * z * z));
     let expected = |sigma_px| sweep_m().map(move |z| (z, PAIR.depth_error_m(z, sigma_px)));
-    vec![
-        Chart::new(
-            "Standard deviation of the stereo depth of 5×5 pixels",
-            Axis::linear("distance (m)"),
-            Axis::linear("σ (m)"),
-        )
-        .with(
-            "modelled rig",
-            Style::Points,
-            sweep.iter().map(|(z, _, s)| (*z, *s)),
-        )
-        .with("squared fit", Style::Line, of_fit(1.0))
-        .with("three times that", Style::Dashed, of_fit(3.0))
-        .with("Eq. 27, ⅓ px", Style::Dashed, expected(THIRD_PX)),
-    ]
+    chart(67)
+        .points("modelled rig", sweep.iter().map(|(z, _, s)| (*z, *s)))
+        .line("squared fit", of_fit(1.0))
+        .dashed("three times that", of_fit(3.0))
+        .dashed("Eq. 27, ⅓ px", expected(THIRD_PX))
 }
 
 /// Fig. 107: a pedestrian who comes nearer, his guide and his window with cameras that have turned towards each other by 0.1°.
 ///
 /// The window is the demonstrator's: 8 bins, its centre on the next step of 12.5 ns.
-pub(super) fn figure_107() -> Vec<Chart> {
+pub(super) fn figure_107() -> Chart {
     let walk_m = || (60..=100).map(|i| 0.5 * f64::from(i));
     let mean_m = |z_m: f64, yaw_error_deg: f64| {
         let mut scene = wall_at(z_m);
@@ -252,42 +216,31 @@ pub(super) fn figure_107() -> Vec<Chart> {
             .iter()
             .map(move |&(z_m, guide_m)| (z_m, centre_m(guide_m) + bins * HSLIDAR_BIN_M))
     };
-    vec![
-        Chart::new(
-            "A pedestrian walks towards cameras that have turned towards each other by 0.1°",
-            Axis::linear("true distance (m)"),
-            Axis::linear("distance (m)"),
-        )
-        .with("true", Style::Line, walk_m().map(|z| (z, z)))
-        .with("guide, calibrated", Style::Points, guided(0.0))
-        .with("guide, 0.1° off", Style::Points, slipped.iter().copied())
-        .with("window's near edge", Style::Dashed, edge(-4.0))
-        .with("window's far edge", Style::Dashed, edge(4.0)),
-    ]
+    chart(107)
+        .line("true", walk_m().map(|z| (z, z)))
+        .points("guide, calibrated", guided(0.0))
+        .points("guide, 0.1° off", slipped.iter().copied())
+        .dashed("window's near edge", edge(-4.0))
+        .dashed("window's far edge", edge(4.0))
 }
 
 /// Fig. 68 and 105: error against distance.
-pub(super) fn figure_68() -> Vec<Chart> {
+pub(super) fn figure_68() -> Chart {
     let line = |sigma_px: f64| {
         (10..=200).step_by(2).map(move |z| {
             let z_m = f64::from(z);
             (z_m, PAIR.depth_error_m(z_m, sigma_px))
         })
     };
-    vec![
-        Chart::new(
-            "Stereo depth error grows with the square of distance (Table 12's pair)",
-            Axis::linear("distance (m)"),
-            Axis::linear("RMS error (m)"),
-        )
-        .with("Eq. 27, ⅓ px (Fig. 68)", Style::Line, line(THIRD_PX))
-        .with("Eq. 27, ¼ px (Fig. 105)", Style::Dashed, line(0.25))
-        .with("modelled rig", Style::Points, rig_errors()),
-    ]
+    chart(68)
+        .line("Eq. 27, ⅓ px (Fig. 68)", line(THIRD_PX))
+        .dashed("Eq. 27, ¼ px (Fig. 105)", line(0.25))
+        .points("modelled rig", rig_errors())
 }
 
 /// Claim 18: a yaw of 0.1° at 40 m.
 pub(super) fn yaw_rows() -> Vec<Row> {
+    let claim = claim(18);
     let depth_m = 40.0;
     let mut scene = wall_at(depth_m);
     scene.stereo.yaw_error_deg = 0.1;
@@ -303,37 +256,15 @@ pub(super) fn yaw_rows() -> Vec<Row> {
         degrees(2.0)
     );
     vec![
-        Row::holds(
-            "error of 0.1° away from each other, formula",
-            "m",
-            Between("1", "2"),
-            away_m,
-        )
-        .differs(&why),
-        Row::holds(
-            "the same, modelled rig",
-            "m",
-            Between("1", "2"),
-            depth_m - mean_m,
-        )
-        .differs(&why),
-        Row::holds(
-            "error of 0.1° towards each other, formula",
-            "m",
-            Between("1", "2"),
-            towards_m,
-        )
-        .differs(&why),
-        Row::ours(
-            "error of 0.05° away from each other",
-            "m",
-            -PAIR.yaw_error_m(depth_m, 0.05),
-        ),
+        claim.row("away", away_m).differs(&why),
+        claim.row("away_rig", depth_m - mean_m).differs(&why),
+        claim.row("towards", towards_m).differs(&why),
+        claim.row("half_as_far", -PAIR.yaw_error_m(depth_m, 0.05)),
     ]
 }
 
 /// Fig. 70: a yaw after calibration at 40 m.
-pub(super) fn figure_70() -> Vec<Chart> {
+pub(super) fn figure_70() -> Chart {
     let angles = || (-20..=20).map(|i| f64::from(i) * 0.01);
     let modelled = (-4..=4).map(|i| {
         let yaw_deg = f64::from(i) * 0.05;
@@ -344,62 +275,29 @@ pub(super) fn figure_70() -> Vec<Chart> {
     });
     // “a 1-2 m error from even a 0.1° mechanical deviation” (6.4.2).
     let published = [(0.1, 38.0), (0.1, 39.0), (-0.1, 41.0), (-0.1, 42.0)];
-    vec![
-        Chart::new(
-            "A target at 40 m after one camera turned (positive: away from the other)",
-            Axis::linear("yaw (°)"),
-            Axis::linear("measured distance (m)"),
-        )
-        .with(
+    chart(70)
+        .line(
             "formula",
-            Style::Line,
             angles().map(|a| (a, 40.0 + PAIR.yaw_error_m(40.0, a))),
         )
-        .with("modelled rig", Style::Points, modelled)
-        .with("published, 1 to 2 m", Style::Points, published),
-    ]
+        .points("modelled rig", modelled)
+        .points("published, 1 to 2 m", published)
 }
 
 /// Claim 26: what throws a target out of its window.
 pub(super) fn motion_rows() -> Vec<Row> {
+    let claim = claim(26);
     let window_m = 8.0 * HSLIDAR_BIN_M;
     let metres_per_mile = 1609.344;
     let per_frame_m = 65.0 * metres_per_mile / 3600.0 / 3.0;
     let slip_m = -PAIR.yaw_error_m(40.0, 0.1);
     let mut rows = demonstrator::motion_rows();
     rows.extend([
-        Row::holds(
-            "way of a car at 65 mph per frame at 3 fps",
-            "m",
-            Exactly("10"),
-            per_frame_m,
-        )
-        .given("65 mph over 3 fps, both published.")
-        .aside(),
-        Row::holds("depth window", "m", Exactly("3"), window_m)
-            .given("8 bins of 2.6 ns, both published.")
-            .aside(),
-        Row::holds(
-            "way over half the window",
-            "",
-            Says("exceeding the 3 m depth window size", 1.0, f64::INFINITY),
-            per_frame_m / (0.5 * window_m),
-        )
-        .given("The two lines above.")
-        .aside()
-        .remark("Above 1 the car has left a window that was centred on it."),
-        Row::holds(
-            "error of a 0.1° slip at 40 m over half the window",
-            "",
-            Says("incorrect depth window", 1.0, f64::INFINITY),
-            slip_m / (0.5 * window_m),
-        )
-        .remark("The pedestrian of Fig. 107 disappears."),
-        Row::ours(
-            "speed that stays within half the window at 3 fps",
-            "m/s",
-            3.0 * 0.5 * window_m,
-        ),
+        claim.row("way_per_frame", per_frame_m),
+        claim.row("window", window_m),
+        claim.row("way_over_half_window", per_frame_m / (0.5 * window_m)),
+        claim.row("slip_over_half_window", slip_m / (0.5 * window_m)),
+        claim.row("greatest_speed", 3.0 * 0.5 * window_m),
     ]);
     rows
 }

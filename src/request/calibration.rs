@@ -13,7 +13,7 @@ use crate::ranging::BinProfile;
 pub fn read_calibration(path: &Path, sensor: &SensorConfig) -> Result<BinProfile, InputError> {
     let text = read_text(path)?;
     let profile: BinProfile = serde_json::from_str(&text).map_err(|error| {
-        let message = format!("this is no bin profile ({error}); make one with gdtof calibrate");
+        let message = format!("this is not a bin profile ({error}); make one with gdtof calibrate");
         InputError::at(path.display(), error.line(), message)
     })?;
     let is_whole = profile.macropixels.len() == profile.sensor.pixels()

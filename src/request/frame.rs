@@ -1,9 +1,7 @@
-//! A frame as it is asked for, with a default for everything.
+//! The request for a frame, with a default for everything.
 
 use std::path::PathBuf;
 use std::sync::Arc;
-
-use serde::{Deserialize, Serialize};
 
 use super::{Spelling, guided_exposure, read_calibration};
 use crate::chip::Sensor;
@@ -12,143 +10,55 @@ use crate::files::InputError;
 use crate::guide::{BehaviouralStereo, Guide, GuideInput, options};
 use crate::ranging::DepthOptions;
 use crate::scene::Scene;
-use crate::settings::{Key, Range};
+use crate::settings::Range::{Above, Within};
+use crate::settings::keys;
 use crate::system::{EngineKind, FrameError, FrameSettings, NoBins, WindowPolicy};
 
-/// What is asked of a frame beside its sensor and scene ([`Sources`](super::Sources)). Defaults are those of `gdtof frame`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct FrameRequest {
-    /// CLK periods in a laser cycle.
-    pub stop_periods: u32,
-    /// Laser cycles of the exposure.
-    pub laser_cycles: u32,
-    /// Seed of photons and guide errors.
-    pub seed: u64,
-    /// Engine of the macropixels.
-    pub engine: EngineKind,
-    /// Steps to a CLK period of the cohort engine, 1 to 64; without it, as fine as its error needs.
-    pub sub_bins: Option<u8>,
-    /// Depth error that a cheaper engine may add on average, m; without it, `engine` takes all macropixels.
-    pub tolerance_m: Option<f64>,
-    /// Leave out what the engine can do without, for the same histograms.
-    pub skip: bool,
-    /// Share of macropixels without an echo that may be given a depth.
-    pub false_alarm_rate: f64,
-    /// Mend the range walk of strong echoes.
-    pub correct_walk: bool,
-    /// File of a bin profile, for sensors with delay lines.
-    pub calibration: Option<PathBuf>,
-    /// What guides the windows, as `radar` or `radar:range_sigma_m=0.2` ([`options::KINDS`]); several are fused, and without
-    /// any it is the scene's camera pair with drawn errors.
-    pub guides: Vec<String>,
-    /// What is changed in the window policy, as `unguided=neighbour,overlap=0.3`.
-    pub windows: String,
-    /// Slow CLK down until windows hold what the guide claims of its errors.
-    pub bins_from_guide: bool,
-    /// What complaints call these settings.
-    #[serde(skip)]
-    pub spelling: Spelling,
-}
-
-impl Default for FrameRequest {
-    fn default() -> Self {
-        FrameRequest {
-            stop_periods: 520,
-            laser_cycles: 1000,
-            seed: 1,
-            engine: EngineKind::default(),
-            sub_bins: None,
-            tolerance_m: None,
-            skip: true,
-            false_alarm_rate: 1e-3,
-            correct_walk: true,
-            calibration: None,
-            guides: Vec::new(),
-            windows: String::new(),
-            bins_from_guide: false,
-            spelling: Spelling::default(),
+keys! {
+    /// Settings of a frame besides its sensor and scene ([`Sources`](super::Sources)). Defaults are those of `gdtof frame`.
+    pub struct FrameRequest {
+        /// CLK periods in a laser cycle.
+        stop_periods: u32 = 520, in Within(1.0, u32::MAX as f64);
+        /// Laser cycles of the exposure.
+        laser_cycles: u32 = 1000, in Within(1.0, u32::MAX as f64);
+        /// Seed of photons and guide errors.
+        seed: u64 = 1, in Within(0.0, f64::MAX);
+        /// Engine of the macropixels.
+        engine: EngineKind = EngineKind::default();
+        /// Gone, and refused: the cohort engine chooses its steps itself.
+        sub_bins: Option<u8> = None, in Within(1.0, 64.0);
+        /// Depth error that a cheaper engine may add on average; one engine takes all macropixels, if left out.
+        tolerance_m: Option<f64> ["m"] = None, in Within(0.0, f64::MAX);
+        /// Leave out what the engine can do without, for the same histograms.
+        skip: bool = true;
+        /// Share of macropixels without an echo that may get a depth.
+        false_alarm_rate: f64 = 1e-3, in Above(0.0, 1.0);
+        /// Correct the range walk of strong echoes.
+        correct_walk: bool = true;
+        /// File of a bin profile, for sensors with delay lines.
+        calibration: Option<PathBuf> = None;
+        /// List of guides, such as "radar:range_sigma_m=0.2"; the scene's camera pair, if empty.
+        ///
+        /// [`options::KINDS`] lists them. Several are fused.
+        guides: Vec<String> = Vec::new();
+        /// Changes of the window policy, such as "unguided=neighbour,overlap=0.3".
+        windows: String = String::new();
+        /// Slow CLK down until windows are as long as the guide's claimed errors require.
+        bins_from_guide: bool = false;
+        .. {
+            /// What complaints call these settings.
+            #[serde(skip)]
+            spelling: Spelling = Spelling::default();
         }
     }
 }
-
-/// What can be asked of a frame, for files that ask for one.
-pub const FRAME_KEYS: &[Key] = &[
-    Key::chosen(
-        "stop_periods",
-        Range::Within(1.0, u32::MAX as f64),
-        "CLK periods in a laser cycle",
-    ),
-    Key::chosen(
-        "laser_cycles",
-        Range::Within(1.0, u32::MAX as f64),
-        "Laser cycles of the exposure",
-    ),
-    Key::chosen(
-        "seed",
-        Range::Within(0.0, f64::MAX),
-        "Seed of photons and guide errors",
-    ),
-    Key::chosen(
-        "engine",
-        Range::OneOf(&["gate", "cycle", "window", "cohort"]),
-        "Engine of the macropixels",
-    ),
-    Key::chosen(
-        "sub_bins",
-        Range::Within(1.0, 64.0),
-        "Steps to a CLK period of the cohort engine; as fine as its error needs, if left out",
-    ),
-    Key::new(
-        "tolerance_m",
-        "m",
-        Range::Within(0.0, f64::MAX),
-        "Depth error that a cheaper engine may add on average; one engine takes all macropixels, if left out",
-        "chosen",
-    ),
-    Key::chosen(
-        "skip",
-        Range::Switch,
-        "Leave out what the engine can do without, for the same histograms",
-    ),
-    Key::chosen(
-        "false_alarm_rate",
-        Range::Above(0.0, 1.0),
-        "Share of macropixels without an echo that may be given a depth",
-    ),
-    Key::chosen(
-        "correct_walk",
-        Range::Switch,
-        "Mend the range walk of strong echoes",
-    ),
-    Key::chosen(
-        "calibration",
-        Range::Text,
-        "File of a bin profile, for sensors with delay lines",
-    ),
-    Key::chosen(
-        "guides",
-        Range::Text,
-        "List of what guides the windows, as \"radar:range_sigma_m=0.2\"; the scene's camera pair, if empty",
-    ),
-    Key::chosen(
-        "windows",
-        Range::Text,
-        "What is changed in the window policy, as \"unguided=neighbour,overlap=0.3\"",
-    ),
-    Key::chosen(
-        "bins_from_guide",
-        Range::Switch,
-        "Slow CLK down until windows hold what the guide claims of its errors",
-    ),
-];
 
 impl FrameRequest {
     /// The guide that is asked for.
     ///
     /// # Errors
     /// Unknown guides, bad keys and values, unreadable maps.
-    pub fn guide(&self) -> Result<Arc<dyn Guide>, InputError> {
+    pub(crate) fn guide(&self) -> Result<Arc<dyn Guide>, InputError> {
         if self.guides.is_empty() {
             return Ok(Arc::new(BehaviouralStereo));
         }
@@ -167,8 +77,8 @@ impl FrameRequest {
     /// Everything that a frame depends on, and how its windows are chosen. Of a calibration the file is read.
     ///
     /// # Errors
-    /// What cannot be, by the setting at fault; a guide without a map, where bins are to follow it.
-    pub fn settings(
+    /// Impossible values, named by the setting at fault; a guide without a map, if bins are to follow it.
+    pub(crate) fn settings(
         &self,
         sensor: Sensor,
         scene: Scene,
@@ -178,10 +88,10 @@ impl FrameRequest {
         Ok((self.settings_by(sensor, scene, guide, &policy)?, policy))
     }
 
-    /// As [`FrameRequest::settings`], with a guide and a policy of the caller's own.
+    /// As `FrameRequest::settings`, with a guide and a policy of the caller's own.
     ///
     /// # Errors
-    /// As those of [`FrameRequest::settings`].
+    /// As those of `FrameRequest::settings`.
     pub fn settings_by(
         &self,
         sensor: Sensor,
@@ -198,16 +108,14 @@ impl FrameRequest {
         };
         let exposure = guided_exposure(&sensor, stop_periods, self.laser_cycles, self.spelling)?;
         if let Some(metres) = self.tolerance_m.filter(|m| !(m.is_finite() && *m >= 0.0)) {
-            let message = format!("{metres} is no depth error; give metres, 0 or more");
+            let message = format!("{metres} is not a depth error; give metres, 0 or more");
             return Err(wrong("tolerance", message));
         }
         let rate = self.false_alarm_rate;
         check_false_alarm_rate(rate, self.spelling)?;
-        if let Some(steps) = self.sub_bins.filter(|steps| !(1..=64).contains(steps)) {
-            return Err(wrong(
-                "sub_bins",
-                format!("{steps} is impossible; give 1 to 64"),
-            ));
+        if self.sub_bins.is_some() {
+            let message = "is gone: the cohort engine chooses its steps itself; leave it out, and use the window engine where cohort refuses";
+            return Err(wrong("sub_bins", message.into()));
         }
         let calibration = match &self.calibration {
             Some(path) => Some(read_calibration(path, &sensor)?),
@@ -216,10 +124,7 @@ impl FrameRequest {
         Ok(FrameSettings {
             seed: self.seed,
             engine: self.engine,
-            cohort: CohortOptions {
-                sub_bins: self.sub_bins.map(usize::from),
-                ..CohortOptions::default()
-            },
+            cohort: CohortOptions::default(),
             tolerance_m: self.tolerance_m,
             skip: self.skip,
             depth: DepthOptions {
@@ -266,7 +171,7 @@ pub fn check_false_alarm_rate(rate: f64, spelling: Spelling) -> Result<(), Input
     if rate > 0.0 && rate <= 1.0 {
         return Ok(());
     }
-    let message = format!("{rate} is no share of macropixels; give a number above 0, up to 1");
+    let message = format!("{rate} is not a share of macropixels; give a number above 0, up to 1");
     Err(InputError::new(spelling.name("false_alarm_rate"), message))
 }
 
@@ -281,11 +186,12 @@ pub fn check_drive_times(
 ) -> Result<(), InputError> {
     let wrong = |key: &str, message: String| Err(InputError::new(spelling.name(key), message));
     if !(0.0..=1e5).contains(&guide_latency_ms) {
-        let message = format!("{guide_latency_ms} is no latency; give milliseconds, 0 to 100000");
+        let message =
+            format!("{guide_latency_ms} is not a latency; give milliseconds, 0 to 100000");
         return wrong("guide_latency_ms", message);
     }
     if !(-1e5..=1e5).contains(&start_s) {
-        let message = format!("{start_s} is no time; give seconds, -100000 to 100000");
+        let message = format!("{start_s} is not a time; give seconds, -100000 to 100000");
         return wrong("start_s", message);
     }
     Ok(())
@@ -296,10 +202,10 @@ mod tests {
     use toml::Table;
 
     use super::*;
+    use crate::settings::Settings;
 
-    /// Keys of the table are those of the struct, with defaults within their ranges.
     #[test]
-    fn the_table_of_keys_is_whole() {
+    fn defaults_are_within_their_ranges_and_read_back() {
         let all = FrameRequest {
             sub_bins: Some(4),
             tolerance_m: Some(0.01),
@@ -307,8 +213,7 @@ mod tests {
             ..FrameRequest::default()
         };
         let table = Table::try_from(&all).unwrap();
-        assert_eq!(table.len(), FRAME_KEYS.len());
-        for key in FRAME_KEYS {
+        for key in FrameRequest::KEYS {
             assert_eq!(key.fault(&table[key.name]), None, "{}", key.name);
         }
         assert_eq!(table.try_into::<FrameRequest>().unwrap(), all);

@@ -189,7 +189,7 @@ pub fn write_frame(out: &Path, report: &str, histograms: &[u16]) -> Result<(), I
         );
         return Err(InputError::new("histograms", message));
     }
-    let shape = drawn.histograms_shape.map(|n| n as u64);
+    let shape = drawn.histograms_shape;
     write_npy_u16(&out.join("histograms.npy"), &shape, histograms)?;
     depth_map(out, &drawn)?;
     OutputFile::write_with(&out.join("frame.json"), |file| writeln!(file, "{report}"))

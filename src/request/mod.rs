@@ -13,14 +13,16 @@ mod calibration;
 mod frame;
 mod frame_files;
 mod picture;
+mod signature;
 mod sources;
 mod spelling;
 mod wording;
 
 pub use self::calibration::read_calibration;
-pub use self::frame::{FRAME_KEYS, FrameRequest, check_drive_times, check_false_alarm_rate};
+pub use self::frame::{FrameRequest, check_drive_times, check_false_alarm_rate};
 pub(crate) use self::frame_files::variance_left_out_of;
 pub use self::frame_files::{Exposed, FrameConfiguration, FrameReport, write_frame};
+pub use self::signature::sign_files;
 pub use self::sources::Sources;
 pub use self::spelling::Spelling;
 pub use self::wording::{exposure, guided_exposure, is_bad_input, of_engine, of_no_aim, sentence};

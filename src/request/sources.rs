@@ -76,12 +76,12 @@ impl Sources {
                 sensor.assign(rest, &option)?;
             } else if let Some(rest) = assignment.strip_prefix("scene.") {
                 let Some(scene) = &mut scene else {
-                    let message = "no scene is read here; leave it out";
+                    let message = "this command reads no scene; leave it out";
                     return Err(InputError::new(option, message));
                 };
                 scene.assign(rest, &option)?;
             } else {
-                let message = "is no key of the sensor or scene; give sensor.KEY=VALUE or scene.SECTION.KEY=VALUE";
+                let message = "is not a key of the sensor or scene; give sensor.KEY=VALUE or scene.SECTION.KEY=VALUE";
                 return Err(InputError::new(option, message));
             }
         }
@@ -95,7 +95,7 @@ impl Sources {
     }
 
     /// The built-in chip that is asked for by its name.
-    pub fn chip(&self) -> Option<&'static str> {
+    pub(crate) fn chip(&self) -> Option<&'static str> {
         let name = self.sensor.as_ref().filter(|path| is_name(path))?.to_str();
         let mut chips = CHIPS.iter().map(|(chip, _)| *chip);
         chips.find(|&chip| name == Some(chip))
@@ -133,7 +133,7 @@ fn scene_document(path: &Path) -> Result<Document, InputError> {
     named.ok_or_else(|| {
         let names: Vec<&str> = Scene::built_in().map(|(name, _)| name).collect();
         let message = format!(
-            "is no file and no built-in scene; give {}, or a file",
+            "is neither a file nor a built-in scene; give {}, or a file",
             names.join(" or ")
         );
         InputError::new(path.display(), message)
@@ -149,7 +149,7 @@ fn described(path: &Path) -> Result<Document, InputError> {
         let names = CHIPS.map(|(name, _)| name).join(" or ");
         InputError::new(
             path.display(),
-            format!("is no file and no chip; give {names}, or a file"),
+            format!("is neither a file nor a chip; give {names}, or a file"),
         )
     })?;
     let table = toml::Table::try_from(&*chip).expect("numbers and words");

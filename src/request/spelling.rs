@@ -1,8 +1,8 @@
-//! What complaints call a setting.
+//! How messages name a setting.
 
 use std::fmt::Display;
 
-/// How settings are written by whoever asks.
+/// How the caller writes settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Spelling {
     /// Options of the command line: `--laser-cycles 1000`.
@@ -14,7 +14,7 @@ pub enum Spelling {
 
 impl Spelling {
     /// A setting by name; `key` has underscores.
-    pub fn name(self, key: &str) -> String {
+    pub(crate) fn name(self, key: &str) -> String {
         match self {
             Spelling::Options => format!("--{}", key.replace('_', "-")),
             Spelling::Keys => key.to_owned(),
@@ -22,7 +22,7 @@ impl Spelling {
     }
 
     /// A setting with a value, a word.
-    pub fn with(self, key: &str, value: impl Display) -> String {
+    pub(crate) fn with(self, key: &str, value: impl Display) -> String {
         match self {
             Spelling::Options => format!("{} {value}", self.name(key)),
             Spelling::Keys => format!("{key} = \"{value}\""),

@@ -1,8 +1,8 @@
 //! What users read of an error: what the library says, and the cure in the settings that they gave.
 
 use super::Spelling;
+use crate::chip::Irregular;
 use crate::chip::race::{Cure, NoAim};
-use crate::chip::window_law::Irregular;
 use crate::chip::{Exposure, ExposureError, Sensor, SensorConfig, WindowLaw};
 use crate::engine::EngineError;
 use crate::files::InputError;
@@ -54,18 +54,13 @@ fn cure(error: &EngineError, spelling: Spelling) -> Option<String> {
             engine("gate")
         ),
         EngineError::FrontEnd(too_short) => too_short.cure(),
-        EngineError::NoPhotons | EngineError::NotInCohorts(_) => {
-            format!("use {}", engine("window"))
-        }
+        EngineError::NoPhotons
+        | EngineError::NotInCohorts(_)
+        | EngineError::CoarseCohorts { .. } => format!("use {}", engine("window")),
         EngineError::CyclesNotIndependent { .. } => format!(
             "use {}, a longer laser cycle ({}) or less light",
             engine("window"),
             spelling.name("stop_periods")
-        ),
-        EngineError::CoarseCohorts { .. } => format!(
-            "use {}, or {} with less exactness",
-            engine("window"),
-            spelling.name("sub_bins")
         ),
         EngineError::Blinding { most_hz, .. } => format!(
             "give less than {:.1} Mcounts/s (less light, a smaller or darker lens, a narrower filter, a shorter dead time), or fewer macropixels or laser cycles",
@@ -110,10 +105,10 @@ fn of_irregular(why: &Irregular, spelling: Spelling) -> String {
     }
 }
 
-/// An exposure of so many laser cycles of so many CLK periods.
+/// An exposure of `laser_cycles` laser cycles of `stop_periods` CLK periods.
 ///
 /// # Errors
-/// A length that cannot be, by the setting at fault.
+/// An impossible length, named by the setting at fault.
 pub fn exposure(
     config: &SensorConfig,
     stop_periods: u32,

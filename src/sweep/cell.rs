@@ -28,7 +28,7 @@ pub struct Column {
 
 impl Column {
     /// A column.
-    pub fn new(name: impl Into<String>, unit: &'static str, holds: Holds) -> Self {
+    pub(crate) fn new(name: impl Into<String>, unit: &'static str, holds: Holds) -> Self {
         Column {
             name: name.into(),
             unit,
@@ -37,7 +37,7 @@ impl Column {
     }
 
     /// Heading and unit, for an axis.
-    pub fn label(&self) -> String {
+    pub(crate) fn label(&self) -> String {
         match self.unit {
             "" => self.name.clone(),
             unit => format!("{} ({unit})", self.name),
@@ -62,12 +62,12 @@ pub enum Cell {
 
 impl Cell {
     /// A number, where there is one.
-    pub fn maybe(number: Option<f64>) -> Self {
+    pub(crate) fn maybe(number: Option<f64>) -> Self {
         number.map_or(Cell::Empty, Cell::Number)
     }
 
     /// A count.
-    pub fn count(count: usize) -> Self {
+    pub(crate) fn count(count: usize) -> Self {
         Cell::Whole(count as i64)
     }
 
@@ -129,7 +129,7 @@ impl Cell {
     }
 
     /// The number in it, if it is one.
-    pub fn number(&self) -> Option<f64> {
+    pub(crate) fn number(&self) -> Option<f64> {
         match self {
             Cell::Whole(n) => Some(*n as f64),
             Cell::Number(x) => Some(*x),

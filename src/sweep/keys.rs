@@ -4,12 +4,12 @@ use toml::{Table, Value};
 
 use super::Kind;
 use super::cell::Holds;
-use super::theory;
+use super::theory::Asked;
 use crate::chip::SensorConfig;
-use crate::request::{FRAME_KEYS, FrameRequest};
+use crate::request::FrameRequest;
 use crate::scene::Scene;
-use crate::settings::{Key, Range};
-use crate::system::{POLICY_KEYS, WindowPolicy};
+use crate::settings::{Key, Range, Settings};
+use crate::system::WindowPolicy;
 
 const SENSOR: Key = Key::chosen("sensor", Range::Text, "Chip or sensor file");
 const SCENE: Key = Key::chosen("scene", Range::Text, "Built-in scene or scene file");
@@ -33,7 +33,7 @@ pub(super) struct Known {
 /// There is none: what there is instead.
 pub(super) fn find(kind: Kind, name: &str) -> Result<Known, String> {
     let (group, rest) = name.split_once('.').unwrap_or((name, ""));
-    let none = |there_are: String| Err(format!("{name} is no key of a study; {there_are}"));
+    let none = |there_are: String| Err(format!("{name} is not a key of a study; {there_are}"));
     let all = |keys: &[Key]| -> String {
         let names: Vec<String> = keys.iter().map(|k| format!("{group}.{}", k.name)).collect();
         format!("give {}", names.join(", "))
@@ -60,8 +60,8 @@ pub(super) fn find(kind: Kind, name: &str) -> Result<Known, String> {
             let defaults = defaults.get(section).and_then(Value::as_table);
             (Some(found), defaults.cloned().unwrap_or_default())
         }
-        ("windows", _, Kind::Frame) => match among(POLICY_KEYS) {
-            None => return none(all(POLICY_KEYS)),
+        ("windows", _, Kind::Frame) => match among(WindowPolicy::KEYS) {
+            None => return none(all(WindowPolicy::KEYS)),
             found => {
                 let defaults = Table::try_from(WindowPolicy::for_sequences());
                 (found, defaults.expect("numbers and words"))
@@ -73,8 +73,8 @@ pub(super) fn find(kind: Kind, name: &str) -> Result<Known, String> {
         ("frame", "guides" | "windows", _) => {
             return none("guide and windows stand for themselves".into());
         }
-        ("frame", _, Kind::Frame) => match among(FRAME_KEYS) {
-            None => return none(all(FRAME_KEYS)),
+        ("frame", _, Kind::Frame) => match among(FrameRequest::KEYS) {
+            None => return none(all(FrameRequest::KEYS)),
             found => {
                 let all = FrameRequest {
                     sub_bins: Some(1),
@@ -83,17 +83,12 @@ pub(super) fn find(kind: Kind, name: &str) -> Result<Known, String> {
                 (found, Table::try_from(all).expect("numbers and words"))
             }
         },
-        ("theory", _, Kind::Theory) => match among(theory::KEYS) {
-            None => return none(all(theory::KEYS)),
-            found => {
-                let whole = theory::WHOLE.iter();
-                (
-                    found,
-                    whole
-                        .map(|name| ((*name).to_owned(), Value::from(1)))
-                        .collect(),
-                )
-            }
+        ("theory", _, Kind::Theory) => match among(Asked::KEYS) {
+            None => return none(all(Asked::KEYS)),
+            found => (
+                found,
+                Table::try_from(Asked::default()).expect("numbers and words"),
+            ),
         },
         (_, _, Kind::Frame) => {
             return none("give one that begins with sensor, scene, guide, windows or frame".into());
@@ -120,7 +115,10 @@ pub(super) fn find(kind: Kind, name: &str) -> Result<Known, String> {
 /// What is wrong with it: nothing that depends on other keys.
 pub(super) fn checked(known: &Known, value: &Value) -> Result<Value, String> {
     let Known { key, holds } = known;
-    let plain = key.plain(value)?;
+    let plain = match key.plain(value)? {
+        Value::Float(x) if *holds == Holds::Whole && x.fract() == 0.0 => Value::Integer(x as i64),
+        plain => plain,
+    };
     let wrong = |wanted: &str| {
         Err(format!(
             "{} = {value} is impossible; give {wanted}",
@@ -128,7 +126,7 @@ pub(super) fn checked(known: &Known, value: &Value) -> Result<Value, String> {
         ))
     };
     match (&plain, holds, key.range) {
-        (Value::Float(x), Holds::Whole, _) if x.fract() != 0.0 => return wrong("a whole number"),
+        (Value::Float(_), Holds::Whole, _) => return wrong("a whole number"),
         (Value::Integer(_) | Value::Float(_), Holds::Whole | Holds::Number, _) => {}
         // Positions and such: lists of numbers.
         (Value::Array(items), Holds::Number, _)

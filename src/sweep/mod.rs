@@ -53,7 +53,7 @@ pub use table::{CSV, PARQUET, Results, TIMES, columns};
 /// Why a sweep ended.
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
-    /// Something the user gave cannot be, or a file cannot be written.
+    /// Something in the input is impossible, or a file cannot be written.
     #[error(transparent)]
     Input(#[from] InputError),
     /// The program failed at a frame.

@@ -23,7 +23,7 @@ pub struct Plot {
 
 impl Plot {
     /// From `x,y` or `x,y,series`.
-    pub fn parse(text: &str) -> Option<Self> {
+    pub(crate) fn parse(text: &str) -> Option<Self> {
         let mut parts = text.split(',').map(|part| part.trim().to_owned());
         let plot = Plot {
             x: parts.next()?,
@@ -34,7 +34,7 @@ impl Plot {
     }
 
     /// Name of its files, without an extension.
-    pub fn file_name(&self) -> String {
+    pub(crate) fn file_name(&self) -> String {
         let plain = |c: char| {
             if c.is_alphanumeric() || "._-".contains(c) {
                 c
@@ -111,7 +111,7 @@ impl<'a> Drawing<'a> {
     ///
     /// # Errors
     /// When there are no such columns, or they hold no numbers.
-    pub fn new(
+    pub(crate) fn new(
         plot: &'a Plot,
         study: &Study,
         columns: &[Column],
@@ -125,7 +125,7 @@ impl<'a> Drawing<'a> {
                     let names: Vec<&str> =
                         columns.iter().map(|column| column.name.as_str()).collect();
                     let message = format!(
-                        "{name:?} is no column; give two or three of {}",
+                        "{name:?} is not a column; give two or three of {}",
                         names.join(", ")
                     );
                     InputError::new(option, message)
@@ -137,7 +137,7 @@ impl<'a> Drawing<'a> {
                 Holds::Whole | Holds::Number => Ok(column),
                 _ => {
                     let message = format!(
-                        "{name} holds no numbers, so that there is no axis for it; give it as the series, the third column"
+                        "{name} holds no numbers, so it cannot be an axis; give it as the series, the third column"
                     );
                     Err(InputError::new(option, message))
                 }
@@ -157,7 +157,7 @@ impl<'a> Drawing<'a> {
     }
 
     /// Sees a row.
-    pub fn see(&mut self, cells: &[Cell]) {
+    pub(crate) fn see(&mut self, cells: &[Cell]) {
         let [x, y] = self.columns;
         let (Some(x), Some(y)) = (cells[x].number(), cells[y].number()) else {
             return;
@@ -186,7 +186,7 @@ impl<'a> Drawing<'a> {
     ///
     /// # Errors
     /// More series than a chart tells apart.
-    pub fn chart(self, study: &Study, option: &str) -> Result<Chart, InputError> {
+    pub(crate) fn chart(self, study: &Study, option: &str) -> Result<Chart, InputError> {
         if self.series.len() > MOST_SERIES {
             let series = self.plot.series.as_deref().unwrap_or_default();
             let message = format!(
@@ -221,7 +221,7 @@ impl<'a> Drawing<'a> {
                 let ends = at
                     .iter()
                     .map(|(x, seen)| [(x.0, seen.least), (x.0, seen.most)]);
-                chart = chart.with("", Style::Whiskers, ends.flatten());
+                chart = chart.whiskers("", ends.flatten());
             }
         }
         Ok(chart)

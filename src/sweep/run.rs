@@ -13,7 +13,7 @@ use super::subject::{Scratch, Subject};
 use crate::engine::Answer;
 use crate::files::{InputError, Journal, OutputFile, create_folder, parse_json, read_text};
 
-/// One of so many parts of a study: the points whose number leaves `part` when divided by `of`.
+/// One of `of` parts of a study: the points whose number leaves `part` when divided by `of`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     /// From 0.
@@ -34,7 +34,7 @@ impl Shard {
     }
 
     /// How many of `points` points are its own.
-    pub fn share(self, points: u64) -> u64 {
+    pub(crate) fn share(self, points: u64) -> u64 {
         points.saturating_sub(self.part).div_ceil(self.of)
     }
 }
@@ -66,8 +66,8 @@ struct Kept {
 /// Where it is kept.
 const STUDY: &str = "study.json";
 
-/// Takes what is missing of a study, or of its shard, in `folder`, and adds it to the journal there. `done` is told of points as they are
-/// done, those that were there included.
+/// Takes the missing points of a study, or of its shard, in `folder`, and adds them to the journal there. `done` is
+/// called with points as they are done, those that were there included.
 ///
 /// With one thread to a point where there are more points than threads: the frames of a study need no help from each other. `done` may stop
 /// the sweep by its [`Answer`]; points that are being taken are finished.

@@ -2,23 +2,24 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
 use toml::Value;
 
 use super::design::{self, Design};
 use super::values::{Axis, Values, Varied};
+use crate::settings::words;
 
 mod reading;
 
-/// What is made of each point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Kind {
-    /// A guided frame.
-    #[default]
-    Frame,
-    /// What theory says of one macropixel.
-    Theory,
+words! {
+    /// What is made of each point.
+    #[derive(Default)]
+    pub enum Kind {
+        /// A guided frame.
+        #[default]
+        Frame = "frame",
+        /// What theory says of one macropixel.
+        Theory = "theory",
+    }
 }
 
 /// Points of a study at most: a study of more is a slip of the pen.
@@ -86,12 +87,12 @@ impl Study {
     }
 
     /// What complaints call it.
-    pub fn source(&self) -> &str {
+    pub(crate) fn source(&self) -> &str {
         &self.source
     }
 
     /// What files that it names are relative to.
-    pub fn folder(&self) -> &Path {
+    pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
 

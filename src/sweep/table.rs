@@ -59,7 +59,7 @@ impl<'a> Results<'a> {
     ///
     /// # Errors
     /// As those of [`Results::each`].
-    pub fn missing(&self) -> Result<u64, SweepError> {
+    pub(crate) fn missing(&self) -> Result<u64, SweepError> {
         self.each(|_, _| Ok(()), Path::new(""))
     }
 
@@ -67,7 +67,7 @@ impl<'a> Results<'a> {
     ///
     /// # Errors
     /// When a journal cannot be read, and those of `found`, as ones of writing to `out`.
-    pub fn each(
+    pub(crate) fn each(
         &self,
         mut found: impl FnMut(Vec<Cell>, f64) -> io::Result<()>,
         out: &Path,
@@ -131,7 +131,7 @@ impl<'a> Results<'a> {
     /// Writes [`CSV`], [`PARQUET`] and, of frames, [`TIMES`] into `folder`; `also` sees every row. Returns how many points have no row.
     ///
     /// # Errors
-    /// As those of [`Results::each`].
+    /// As those of `Results::each`.
     pub fn write(&self, folder: &Path, mut also: impl FnMut(&[Cell])) -> Result<u64, SweepError> {
         let columns = columns(self.study);
         let mut csv = OutputFile::create(&folder.join(CSV))?;

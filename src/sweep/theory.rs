@@ -1,77 +1,56 @@
-//! What chapter 3 of the thesis says of one macropixel: [`theory`](crate::theory) at a point of a study.
+//! What chapter 3 of the thesis says about one macropixel: [`theory`](crate::theory) at a point of a study.
 //!
 //! Light and clocks are those of sensor and scene; the target is a wall at a range of its own. Assumptions are the formulas' own: the whole
 //! echo in one bin for detection, a Gaussian pulse for precision, a Gaussian error of the guide, a window centred on its estimate as
 //! nearly as start values allow.
 
-use toml::Value;
-
 use super::cell::{Cell, Column, Holds};
 use crate::chip::{SensorConfig, Tdc};
 use crate::photon::PhotonBudget;
 use crate::scene::Scene;
-use crate::settings::{Key, Range};
+use crate::settings::Range::{Above, Within};
+use crate::settings::{keys, words};
 use crate::theory::cycles::laser_cycles_for;
 use crate::theory::design::share_inside;
 use crate::theory::detection::{Detection, Model, PerCycle, Ties, probability};
 use crate::theory::precision::{cramer_rao, range_m, thompson};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
-/// Keys of `theory`.
-pub(super) const KEYS: &[Key] = &[
-    Key::new(
-        "range_m",
-        "m",
-        Range::Above(0.0, 1e5),
-        "Range of the wall; 50 if left out",
-        "chosen",
-    ),
-    Key::new(
-        "reflectivity",
-        "",
-        Range::Within(0.0, 1.0),
-        "Its reflectivity; 0.3 if left out",
-        "chosen",
-    ),
-    Key::new(
-        "illuminance_klux",
-        "klux",
-        Range::Within(0.0, 200.0),
-        "Sunlight on it; the scene's if left out",
-        "chosen",
-    ),
-    Key::new(
-        "laser_cycles",
-        "",
-        Range::Within(1.0, 1e9),
-        "Laser cycles of the exposure; 1000 if left out",
-        "chosen",
-    ),
-    Key::new(
-        "guide_sigma_m",
-        "m",
-        Range::Above(0.0, 1e5),
-        "Standard deviation of the guide's estimate; 1 if left out",
-        "chosen",
-    ),
-    Key::new(
-        "model",
-        "",
-        Range::OneOf(&["bernoulli", "poisson", "gaussian", "gaussian_as_printed"]),
-        "How counts are distributed; bernoulli, one hit a bin and laser cycle, if left out",
-        "thesis 3.2.2",
-    ),
-    Key::new(
-        "goal_detection",
-        "",
-        Range::Within(0.5, 0.999_999_999),
-        "Probability of detection that laser cycles are found for; they are not looked for if left out",
-        "chosen",
-    ),
-];
+words! {
+    /// How counts are distributed.
+    #[derive(Default)]
+    pub(super) enum Counts {
+        /// One hit a bin and laser cycle.
+        #[default]
+        Bernoulli = "bernoulli",
+        /// Every photon.
+        Poisson = "poisson",
+        /// As many photons that they are normal.
+        Gaussian = "gaussian",
+        /// The same, as the thesis prints it.
+        GaussianAsPrinted = "gaussian_as_printed",
+    }
+}
 
-/// Those that count.
-pub(super) const WHOLE: &[&str] = &["laser_cycles"];
+keys! {
+    /// Settings of theory.
+    pub(super) struct Asked {
+        /// Range of the wall; 50 if left out.
+        range_m: f64 ["m"] = 50.0, in Above(0.0, 1e5);
+        /// Its reflectivity; 0.3 if left out.
+        reflectivity: f64 = 0.3, in Within(0.0, 1.0);
+        /// Sunlight on it; the scene's if left out.
+        illuminance_klux: Option<f64> ["klux"] = None, in Within(0.0, 200.0);
+        /// Laser cycles of the exposure; 1000 if left out.
+        laser_cycles: u64 = 1000, in Within(1.0, 1e9);
+        /// Standard deviation of the guide's estimate; 1 if left out.
+        guide_sigma_m: f64 ["m"] = 1.0, in Above(0.0, 1e5);
+        /// How counts are distributed; bernoulli, one hit a bin and laser cycle, if left out.
+        model: Counts = Counts::Bernoulli, from "thesis 3.2.2";
+        /// Probability of detection for which the number of laser cycles is computed, if given.
+        goal_detection: Option<f64> = None, in Within(0.5, 0.999_999_999);
+    }
+}
 
 /// Results, in order.
 pub(super) fn columns() -> Vec<Column> {
@@ -149,39 +128,21 @@ pub(super) struct Wall {
 }
 
 impl Wall {
-    /// Everything left out.
-    pub(super) fn new(rig: Rig) -> Self {
+    pub(super) fn new(mut rig: Rig, asked: &Asked) -> Self {
+        rig.illuminance_klux = asked.illuminance_klux.unwrap_or(rig.illuminance_klux);
         Wall {
             rig,
-            range_m: 50.0,
-            reflectivity: 0.3,
-            laser_cycles: 1000,
-            guide_sigma_m: 1.0,
-            model: Model::Bernoulli(Ties::Random),
-            goal_detection: None,
-        }
-    }
-
-    /// Takes a checked value of a key of [`KEYS`].
-    pub(super) fn set(&mut self, key: &str, value: &Value) {
-        let number = || value.as_float().or(value.as_integer().map(|n| n as f64));
-        let number = || number().expect("checked");
-        match key {
-            "range_m" => self.range_m = number(),
-            "reflectivity" => self.reflectivity = number(),
-            "illuminance_klux" => self.rig.illuminance_klux = number(),
-            "laser_cycles" => self.laser_cycles = number() as u64,
-            "guide_sigma_m" => self.guide_sigma_m = number(),
-            "goal_detection" => self.goal_detection = Some(number()),
-            "model" => {
-                self.model = match value.as_str().expect("checked") {
-                    "bernoulli" => Model::Bernoulli(Ties::Random),
-                    "poisson" => Model::Poisson(Ties::Random),
-                    "gaussian" => Model::Gaussian,
-                    _ => Model::GaussianAsPrinted,
-                }
-            }
-            _ => unreachable!("{key} is no key of theory"),
+            range_m: asked.range_m,
+            reflectivity: asked.reflectivity,
+            laser_cycles: asked.laser_cycles,
+            guide_sigma_m: asked.guide_sigma_m,
+            model: match asked.model {
+                Counts::Bernoulli => Model::Bernoulli(Ties::Random),
+                Counts::Poisson => Model::Poisson(Ties::Random),
+                Counts::Gaussian => Model::Gaussian,
+                Counts::GaussianAsPrinted => Model::GaussianAsPrinted,
+            },
+            goal_detection: asked.goal_detection,
         }
     }
 
@@ -263,33 +224,34 @@ impl Wall {
 mod tests {
     use super::*;
     use crate::chip::{hslidar, hslidar_delay_line};
+    use crate::settings::Settings;
 
     #[test]
     fn every_key_is_taken_and_every_result_has_its_column() {
-        let rig = Rig::new(&SensorConfig::default(), &Scene::outdoor());
-        let mut wall = Wall::new(rig);
-        for key in KEYS {
-            let value = match key.name {
-                "model" => Value::from("poisson"),
-                _ => Value::from(1),
+        let wall = |asked: &str| {
+            let rig = Rig::new(&SensorConfig::default(), &Scene::outdoor());
+            Wall::new(rig, &toml::from_str(asked).unwrap())
+        };
+        let usual = wall("");
+        for key in Asked::KEYS {
+            let asked = match key.name {
+                "model" => "model = \"poisson\"".to_owned(),
+                name => format!("{name} = 0.9").replace("laser_cycles = 0.9", "laser_cycles = 9"),
             };
-            let before = format!("{wall:?}");
-            match key.name {
-                "goal_detection" => wall.set(key.name, &Value::from(0.9)),
-                "guide_sigma_m" => wall.set(key.name, &Value::from(2.5)),
-                _ => wall.set(key.name, &value),
-            }
-            assert_ne!(format!("{wall:?}"), before, "{} changes nothing", key.name);
+            assert_ne!(wall(&asked), usual, "{} changes nothing", key.name);
         }
-        assert_eq!(wall.results(&mut Last::default()).len(), columns().len());
+        assert_eq!(usual.results(&mut Last::default()).len(), columns().len());
     }
 
     #[test]
     fn results_are_those_of_the_formulas() {
         let (sensor, scene) = (SensorConfig::default(), Scene::outdoor());
-        let mut wall = Wall::new(Rig::new(&sensor, &scene));
-        wall.set("range_m", &Value::from(120.0));
-        wall.set("goal_detection", &Value::from(0.99));
+        let asked = Asked {
+            range_m: 120.0,
+            goal_detection: Some(0.99),
+            ..Asked::default()
+        };
+        let wall = Wall::new(Rig::new(&sensor, &scene), &asked);
         let results = wall.results(&mut Last::default());
         let of = |name: &str| {
             let at = columns().iter().position(|c| c.name == name).unwrap();
@@ -302,11 +264,10 @@ mod tests {
         assert!(of("precision_thompson_m") > 0.0 && of("precision_bound_m") > 0.0);
         assert!((of("window_m") - 16.0 * of("bin_m")).abs() < 1e-12);
 
-        let mut longer = wall;
-        longer.set(
-            "laser_cycles",
-            &Value::from(of("laser_cycles_for_goal") as i64),
-        );
+        let longer = Wall {
+            laser_cycles: of("laser_cycles_for_goal") as u64,
+            ..wall
+        };
         let at = columns()
             .iter()
             .position(|c| c.name == "p_detection")
@@ -320,7 +281,8 @@ mod tests {
         let scene = Scene::outdoor();
         for (sensor, bin_ns, step_ns) in [(hslidar(), 5.0, 20.0), (hslidar_delay_line(), 2.6, 12.5)]
         {
-            let results = Wall::new(Rig::new(&sensor, &scene)).results(&mut Last::default());
+            let results = Wall::new(Rig::new(&sensor, &scene), &Asked::default())
+                .results(&mut Last::default());
             let of = |name: &str| {
                 let at = columns().iter().position(|c| c.name == name).unwrap();
                 results[at].number().unwrap()
@@ -337,14 +299,17 @@ mod tests {
         let mut last = Last::default();
         let rig = Rig::new(&SensorConfig::default(), &Scene::outdoor());
         for range_m in [20.0, 150.0] {
-            for cycles in [100, 1000] {
-                for model in ["bernoulli", "gaussian"] {
-                    for sigma_m in [0.5, 2.0] {
-                        let mut wall = Wall::new(rig);
-                        wall.set("range_m", &Value::from(range_m));
-                        wall.set("laser_cycles", &Value::from(cycles));
-                        wall.set("model", &Value::from(model));
-                        wall.set("guide_sigma_m", &Value::from(sigma_m));
+            for laser_cycles in [100, 1000] {
+                for model in [Counts::Bernoulli, Counts::Gaussian] {
+                    for guide_sigma_m in [0.5, 2.0] {
+                        let asked = Asked {
+                            range_m,
+                            laser_cycles,
+                            model,
+                            guide_sigma_m,
+                            ..Asked::default()
+                        };
+                        let wall = Wall::new(rig, &asked);
                         assert_eq!(wall.results(&mut last), wall.results(&mut Last::default()));
                     }
                 }
@@ -354,8 +319,12 @@ mod tests {
 
     #[test]
     fn a_black_wall_has_no_precision_and_is_found_by_chance() {
-        let mut wall = Wall::new(Rig::new(&SensorConfig::default(), &Scene::outdoor()));
-        wall.set("reflectivity", &Value::from(0));
+        let asked = Asked {
+            reflectivity: 0.0,
+            ..Asked::default()
+        };
+        let rig = Rig::new(&SensorConfig::default(), &Scene::outdoor());
+        let wall = Wall::new(rig, &asked);
         let results = wall.results(&mut Last::default());
         assert_eq!(results[4], Cell::Empty);
         assert!((results[2].number().unwrap() - 1.0 / 16.0).abs() < 1e-9);

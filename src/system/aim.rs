@@ -1,5 +1,5 @@
-//! What the guide and the ranging take windows and bins to be: the window law where all macropixels follow it, and where each has delay
-//! lines of its own, the bin profile, calibrated or ideal (thesis 6.3.1, Eq. 28 and 29).
+//! Where guide and ranging assume windows and bins. If all macropixels follow the window law, that is it; if each has
+//! delay lines of its own, it is the bin profile, calibrated or ideal (thesis 6.3.1, Eq. 28 and 29).
 //!
 //! The chip itself always does what its netlist says. What is assumed of it and wrong shows in the depths.
 
@@ -9,7 +9,7 @@ use std::ops::Range;
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, Mode, Sensor, Tdc, WindowLaw};
 use crate::ranging::{BinProfile, EchoFinder, PeakOptions, Sighting, centre_of_mass};
-use crate::units::Time;
+use crate::units::{Time, TimeOfFlight};
 
 /// The law of a macropixel by its number, given that of the first.
 pub(super) fn own_law(law: &WindowLaw, pixel: usize) -> Cow<'_, WindowLaw> {

@@ -1,5 +1,5 @@
-//! Calibration of delay lines as it was done (thesis 6.3.1, Fig. 89 to 91): a picosecond laser on all macropixels, delayed step by
-//! step over a window, and for each step the bin that is fullest.
+//! Calibration of delay lines as it was done on the chip (thesis 6.3.1, Fig. 89 to 91): a picosecond laser on all
+//! macropixels, delayed step by step over a window, and for each step the bin that is fullest.
 //!
 //! ```text
 //!   laser delay ├┤10 ps
@@ -61,8 +61,8 @@ impl Default for Sweep {
     }
 }
 
-/// Sweeps all macropixels of a sensor with delay lines, in laser cycles of `stop_periods` CLK periods; `swept` is told of every
-/// macropixel.
+/// Sweeps all macropixels of a sensor with delay lines, in laser cycles of `stop_periods` CLK periods; `swept` is
+/// called for every macropixel.
 ///
 /// # Errors
 /// What the window engine refuses, and laser cycles without a window of either kind that can be swept.

@@ -30,7 +30,7 @@ const OF_EDGES: &str = "peak_m = speed_of_light_m_per_s / 2 * (bin_edges_s[start
 
 impl DistanceLaw {
     /// The law for macropixels with these start values. Those whose window never opens are left out.
-    pub fn new(law: &WindowLaw, starts: impl IntoIterator<Item = u16>) -> Self {
+    pub(crate) fn new(law: &WindowLaw, starts: impl IntoIterator<Item = u16>) -> Self {
         let bin_width_s = law.bin_width_s();
         let (mut window_opens_s, mut bin_edges_s) = (BTreeMap::new(), BTreeMap::new());
         for start in starts {
@@ -60,7 +60,7 @@ impl DistanceLaw {
 mod tests {
     use super::*;
     use crate::chip::{Exposure, SensorConfig};
-    use crate::units::Time;
+    use crate::units::{Time, TimeOfFlight};
 
     fn window_law() -> WindowLaw {
         let sensor = SensorConfig::default();

@@ -19,30 +19,28 @@
 //! none is reused; with [`Noise::Still`] a macropixel has the same photons in every frame, and is exposed anew only where its light or
 //! start value has changed.
 
-use std::sync::Arc;
-
 use rayon::prelude::*;
 
 use super::error::FrameError;
-use super::frame::{go_on, load_starts};
-use super::light::{lit, photon_stream, starts_of};
+use super::frame::go_on;
 use super::pixel::PixelDepth;
 use super::policy::{Pointing, WindowPolicy};
-use super::ranger::{Known, Ranger};
+use super::ranger::Ranger;
 use super::result::PhaseTimes;
 use super::settings::FrameSettings;
-use super::stopwatch::{Stopwatch, timed};
+use super::stopwatch::Stopwatch;
 use super::summary::Summary;
-use super::worlds::{self, LastWorld};
-use crate::engine::{Answer, Histograms, LitPixel, Work, expose, load};
-use crate::guide::{GuideInput, GuideMap, PastFrame};
+use crate::engine::{Answer, Histograms, Work, load};
+use crate::guide::{GuideMap, PastFrame};
 use crate::netlist::Netlist;
-use crate::photon::PixelLight;
-use crate::scene::{DVec3, GroundTruth, Scene};
+use crate::scene::GroundTruth;
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
 
+mod stages;
 #[cfg(test)]
 mod tests;
+
+use self::stages::{Light, Same, Spent};
 
 /// Frames that a guide may look back on.
 const REMEMBERED: usize = 4;
@@ -51,10 +49,10 @@ const REMEMBERED: usize = 4;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Noise {
-    /// Every frame has photons and guide errors of its own.
+    /// Every frame has its own photons and guide errors.
     #[default]
     Fresh,
-    /// A macropixel has the same photons in every frame, as long as its light and start value are the same.
+    /// A macropixel has the same photons in every frame, as long as its light and start value stay the same.
     Still,
 }
 
@@ -94,7 +92,7 @@ pub struct FrameTimes {
 
 impl FrameTimes {
     /// The middle of the exposure, for which depths hold, s.
-    pub fn middle_s(&self) -> f64 {
+    pub(crate) fn middle_s(&self) -> f64 {
         0.5 * (self.exposure_s + self.readout_s)
     }
 }
@@ -202,12 +200,7 @@ pub struct Drive<'a> {
 #[derive(Debug)]
 struct Last {
     starts: Vec<u16>,
-    worlds: Vec<Scene>,
-    /// The last of them.
-    world: Arc<LastWorld>,
-    truth: GroundTruth,
-    light: Vec<PixelLight>,
-    lit: Vec<LitPixel>,
+    light: Light,
     histograms: Histograms,
     pixels: Vec<PixelDepth>,
 }
@@ -275,8 +268,8 @@ impl<'a> Drive<'a> {
         }
     }
 
-    /// Takes the next frame; `exposed` is told of macropixels as they are done, and may stop the frame by its answer. After a frame
-    /// that fails, the next one has nothing to reuse.
+    /// Takes the next frame; `exposed` is called with macropixels as they are done, and may stop the frame by its
+    /// answer. After a frame that fails, the next one has nothing to reuse.
     ///
     /// # Errors
     /// What the guide, the engine and the load path report, and that it was stopped.
@@ -284,156 +277,53 @@ impl<'a> Drive<'a> {
         &mut self,
         exposed: impl Fn(usize) -> A + Sync,
     ) -> Result<DriveFrame, FrameError> {
-        let DriveSettings {
-            frame,
-            segments,
-            noise,
-            reuse,
-            only,
-            ..
-        } = self.settings;
-        let FrameSettings {
-            sensor,
-            scene,
-            exposure,
-            ..
-        } = frame;
-        let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
-        let number = self.next;
-        let times = self.times(number);
-        let seed = match noise {
-            Noise::Fresh => seed_of(frame.seed, number),
-            Noise::Still => frame.seed,
-        };
-        let mut clock = Stopwatch::new();
-        let mut run = PhaseTimes::default();
-        let mut reused = Reused::default();
         let last = self.last.take();
-        let before = last.as_ref().filter(|_| *reuse);
+        let before = last.as_ref().filter(|_| self.settings.reuse);
+        let mut spent = Spent::default();
+        let plan = self.plan(last.as_ref(), &exposed, &mut spent)?;
+        let light = self.light(&plan, before, &mut spent);
 
-        let input = GuideInput {
-            scene: &scene.at(times.images_s),
-            rows,
-            cols,
-            seed,
-            time_s: times.middle_s(),
-            earlier: &self.past,
-            velocity_m_s: DVec3::ZERO,
-        };
-        let guide = frame.guide.estimate(&input)?;
-        run.guide_s = clock.lap();
-        go_on(exposed(0))?;
-
-        let seen: Vec<Option<f64>> = last
-            .as_ref()
-            .map(|last| last.pixels.iter().map(|p| p.measured_m).collect())
-            .unwrap_or_default();
-        let mut wanted = self.pointing.windows(&guide, &seen);
-        for (start, is_on) in wanted.iter_mut().zip(only.iter().flatten()) {
-            *start = start.filter(|_| *is_on);
-        }
-        let starts = starts_of(sensor, &wanted);
-        run.windows_s = clock.lap();
-
-        let stream = photon_stream(sensor, exposure, seed, scene);
-        let worlds = worlds::worlds(scene, &times, *segments);
-        let number_of_worlds = worlds.len();
-        let newest;
-        let (truth, light) = match before.filter(|last| last.worlds == worlds) {
-            Some(last) => {
-                reused.world = true;
-                reused.views = worlds.len() * last.pixels.len();
-                newest = Arc::clone(&last.world);
-                (last.truth.clone(), last.light.clone())
-            }
-            None => {
-                let known = before.map(|last| &*last.world);
-                let (truths, views) = worlds::truths(&worlds, (rows, cols), known, *reuse);
-                reused.views = views;
-                run.scene_s = clock.lap();
-                let lights = worlds::lights(&worlds, &truths, &stream, known, *reuse);
-                let light = worlds::light_of(&lights, exposure);
-                let middle = truths.len() / 2;
-                let truth = truths[middle].clone();
-                newest = LastWorld::of(&worlds, truths, lights);
-                (truth, light)
-            }
-        };
-        let lit = lit(sensor, &wanted, &light);
-        run.light_s = clock.lap();
-
-        let same = before.filter(|_| *noise == Noise::Still);
-        let is_same = |pixel: usize| same.is_some_and(|last| last.lit[pixel] == lit[pixel]);
-        let (old, new): (Vec<usize>, Vec<usize>) = (0..lit.len()).partition(|&p| is_same(p));
-        let changed: Vec<LitPixel> = new.iter().map(|&pixel| lit[pixel].clone()).collect();
-        go_on(exposed(old.len()))?;
-        let engine = frame.engine.expose(sensor, exposure, frame.cohort);
-        reused.load = before.is_some_and(|last| last.starts == starts);
-        // The gates of the load path are one processor's work, and tell nothing that the exposure waits for.
-        let load = || load_starts(sensor, &self.load_netlist, &starts).map(drop);
-        let by_load_path = || timed(|| if reused.load { Ok(()) } else { load() });
-        let by_engine = || timed(|| expose(&*engine, &stream, &changed, &exposed));
-        let ((loaded, load_s), (taken, exposure_s)) = rayon::join(by_load_path, by_engine);
-        loaded?;
-        let taken = taken?;
-        (run.load_s, run.exposure_s) = (load_s, exposure_s);
-        let mut histograms = Histograms::empty(lit.len(), sensor.bins);
-        for (&pixel, counts) in new.iter().zip(&taken.histograms) {
-            histograms[pixel].copy_from_slice(counts);
-        }
-        if let Some(last) = same {
-            for &pixel in &old {
-                histograms[pixel].copy_from_slice(&last.histograms[pixel]);
-            }
-        }
-        reused.macropixels = old.len();
-
+        let mut clock = Stopwatch::new();
+        let same = Same::of(
+            before.filter(|_| self.settings.noise == Noise::Still),
+            &light,
+        );
+        go_on(exposed(same.number()))?;
+        spent.reused.load = before.is_some_and(|last| last.starts == plan.starts);
+        spent.reused.macropixels = same.number();
+        let (histograms, work) =
+            self.load_and_expose(&plan, &light, &same, &exposed, &mut spent)?;
         let mut ranging = Stopwatch::new();
-        let pixels = self.ranger.of_array(histograms.counts(), |pixel, counts| {
-            let known = Known {
-                pixel,
-                start: wanted[pixel],
-                true_m: truth.range_m[pixel],
-                guide_m: guide.range_m[pixel],
-            };
-            let before = same.filter(|_| is_same(pixel));
-            match before.map(|last| last.pixels[pixel]) {
-                Some(before) if known.is_of(&before) => before,
-                _ => self.ranger.depth(&known, counts),
-            }
-        });
-        let windows_m = (wanted.par_iter().enumerate())
+        let pixels = self.range(&plan, &light, &same, &histograms);
+        let windows_m = (plan.wanted.par_iter().enumerate())
             .map(|(pixel, start)| self.ranger.window_m(pixel, (*start)?))
             .collect();
-        run.ranging_s = ranging.lap();
-        run.together_s = clock.lap();
+        spent.run.ranging_s = ranging.lap();
+        spent.run.together_s = clock.lap();
 
-        self.remember(&times, &pixels, &histograms);
-        self.last = Some(Last {
-            starts,
-            worlds,
-            world: newest,
-            truth: truth.clone(),
-            light,
-            lit,
+        self.remember(&plan.times, &pixels, &histograms);
+        self.next += 1;
+        let frame = DriveFrame {
+            number: plan.number,
+            times: plan.times,
+            guide: plan.guide,
+            truth: light.truth.clone(),
+            worlds: light.worlds.len(),
             histograms: histograms.clone(),
             pixels: pixels.clone(),
-        });
-        self.next += 1;
-        Ok(DriveFrame {
-            number,
-            times,
-            guide,
-            truth,
-            worlds: number_of_worlds,
-            histograms,
-            pixels,
             windows_m,
             bin_m: self.ranger.bin_s() * SPEED_OF_LIGHT_M_PER_S / 2.0,
-            work: taken.work,
-            reused,
-            run_times: run,
-        })
+            work,
+            reused: spent.reused,
+            run_times: spent.run,
+        };
+        self.last = Some(Last {
+            starts: plan.starts,
+            light,
+            histograms,
+            pixels,
+        });
+        Ok(frame)
     }
 
     fn remember(&mut self, times: &FrameTimes, pixels: &[PixelDepth], histograms: &Histograms) {

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::error::FrameError;
 use super::light::{light_in, lit, photon_stream, starts_of, truth_in};
+use super::pixel::PixelDepth;
 use super::policy::{Pointing, WindowPolicy};
 use super::ranger::{Known, Ranger};
 use super::remark::Circumstances;
@@ -25,13 +26,17 @@ use crate::engine::{
 };
 use crate::guide::{GuideInput, GuideMap};
 use crate::netlist::Netlist;
-use crate::photon::{PhotonStream, SpadEvent};
+use crate::photon::{PhotonStream, PixelLight, SpadEvent};
+use crate::scene::GroundTruth;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 use crate::waves::WaveFormat;
 
-/// Takes a frame, every window in the middle of the guide's estimate. `probes` chooses the macropixels to run at gate level once the
-/// guide is known; `exposed` is told of macropixels as they are done, of none between the steps of the frame, and may stop it by its
-/// [`Answer`].
+#[cfg(test)]
+mod tests;
+
+/// Takes a frame, every window in the middle of the guide's estimate. `probes` chooses the macropixels to run at gate
+/// level once the guide is known; `exposed` is called with the number of macropixels as they are done, with none
+/// between the steps of the frame, and may stop it by its [`Answer`].
 ///
 /// # Errors
 /// A guide without a map, and what [`take_guided_frame`] reports.
@@ -91,120 +96,249 @@ pub fn take_guided_frame<A: Answer>(
     probes: impl FnOnce(&GuideMap) -> Vec<Probe>,
     exposed: impl Fn(usize) -> A + Sync,
 ) -> Result<Frame, FrameError> {
-    let FrameSettings {
-        sensor,
-        scene,
-        exposure,
-        seed,
-        engine: engine_kind,
-        depth,
-        calibration,
-        guide: source,
-        ..
-    } = settings;
+    let sensor = &settings.sensor;
     assert_eq!(wanted.len(), sensor.pixels());
     assert_eq!(guide.range_m.len(), sensor.pixels());
+    let plan = Plan {
+        settings,
+        guide,
+        wanted,
+    };
     let mut clock = Stopwatch::new();
-    let mut times = PhaseTimes::default();
-
-    let truth = truth_in(sensor, exposure, scene);
-    times.scene_s = clock.lap();
-
-    let stream = photon_stream(sensor, exposure, *seed, scene);
-    let light = light_in(exposure, scene, &truth, &stream);
-    let pixels = lit(sensor, wanted, &light);
-    let photons_expected = light
-        .iter()
-        .map(|light| {
-            stream.config().most_photons_per_cycle(light) * f64::from(exposure.laser_cycles)
-        })
-        .sum();
-    times.light_s = clock.lap();
+    let truth = truth_in(sensor, &settings.exposure, &settings.scene);
+    let scene_s = clock.lap();
+    let light = plan.light(truth);
+    let light_s = clock.lap();
 
     // A probe keeps one processor busy about as long as load, engine and ranging keep the others.
     let probes = probes(guide);
-    let done = exposed;
-    let by_gates = || {
-        let run = |probe| {
-            go_on(done(0))?;
-            AtGates::run(sensor, exposure, &stream, &pixels, probe)
-        };
-        timed(|| probes.par_iter().map(run).collect::<Result<Vec<_>, _>>())
-    };
-    let by_load_path = || {
-        let starts = starts_of(sensor, wanted);
-        timed(|| load_starts(sensor, &load::load_netlist(sensor), &starts))
-    };
+    let by_gates = || timed(|| plan.probe(&light, &probes, &exposed));
+    let by_load_path = || timed(|| plan.load());
     let by_engine = || {
-        let mut clock = Stopwatch::new();
-        let (exposed, kept) = expose_array(settings, &stream, &pixels, &done)?;
-        let exposure_s = clock.lap();
-        let ranger = Ranger::new(sensor, exposure, scene, depth, calibration.as_ref())?;
-        let depths = ranger.of_array(exposed.histograms.counts(), |pixel, counts| {
-            let known = Known {
-                pixel,
-                start: wanted[pixel],
-                true_m: truth.range_m[pixel],
-                guide_m: guide.range_m[pixel],
-            };
-            ranger.depth(&known, counts)
-        });
-        let circumstances = Circumstances {
-            sensor,
-            exposure,
-            bin_s: ranger.bin_s(),
-            scene,
-            guide: &**source,
-            light: &light,
-            pixels: &depths,
-        };
-        let remark = circumstances.remark();
-        let ranged = (depths, ranger.bin_s(), remark);
-        Ok::<_, FrameError>((exposed, kept, ranged, [exposure_s, clock.lap()]))
+        let counted = plan.count(&light, &exposed)?;
+        let ranged = plan.range(&light, &counted)?;
+        Ok::<_, FrameError>((counted, ranged))
     };
-    let loaded_and_exposed = || rayon::join(by_load_path, by_engine);
-    let ((probed, probes_s), ((load, load_s), exposed)) = rayon::join(by_gates, loaded_and_exposed);
-    times.together_s = clock.lap();
+    let ((probed, probes_s), ((load, load_s), measured)) =
+        rayon::join(by_gates, || rayon::join(by_load_path, by_engine));
+    let together_s = clock.lap();
     let load = load?;
-    times.load_s = load_s;
-    let (exposed, kept, (depths, bin_s, remark), took_s) = exposed?;
-    [times.exposure_s, times.ranging_s] = took_s;
-    times.probes_s = probes_s;
-    for probed in probed? {
-        let engine = engine_kind.of_probes(kept.is_some());
-        let model = match kept.is_some() || engine != *engine_kind {
-            true => Window::new(sensor, exposure).histogram(probed.start, &probed.events)?,
-            false => exposed.histograms[probed.pixel].to_vec(),
-        };
-        if probed.counts != model {
-            return Err(FrameError::Disagreement {
-                row: probed.pixel / sensor.cols,
-                col: probed.pixel % sensor.cols,
-                engine,
-                gate: probed.counts,
-                model,
-            });
-        }
-    }
+    let (counted, ranged) = measured?;
+    plan.judge(&counted, probed?)?;
 
     Ok(Frame {
         rows: sensor.rows,
         cols: sensor.cols,
         bins: sensor.bins,
-        bin_m: bin_s * SPEED_OF_LIGHT_M_PER_S / 2.0,
-        histograms: exposed.histograms.into_counts(),
-        pixels: depths,
-        remark,
-        photons_expected,
-        work: exposed.work,
-        kept,
+        bin_m: ranged.bin_s * SPEED_OF_LIGHT_M_PER_S / 2.0,
+        histograms: counted.exposed.histograms.into_counts(),
+        pixels: ranged.depths,
+        remark: ranged.remark,
+        photons_expected: light.photons_expected(&settings.exposure),
+        work: counted.exposed.work,
+        kept: counted.kept,
         load_bits: sensor.load_bits(),
         load_time: load.duration,
         readout_time: sensor.readout_time(),
-        exposure_time: exposure.end(),
+        exposure_time: settings.exposure.end(),
         probes: probes.iter().map(|p| (p.row, p.col)).collect(),
-        times,
+        times: PhaseTimes {
+            scene_s,
+            load_s,
+            light_s,
+            exposure_s: counted.took_s,
+            probes_s,
+            ranging_s: ranged.took_s,
+            together_s,
+            ..PhaseTimes::default()
+        },
     })
+}
+
+/// A frame whose windows are chosen.
+struct Plan<'a> {
+    settings: &'a FrameSettings,
+    guide: &'a GuideMap,
+    wanted: &'a [Option<u16>],
+}
+
+/// What is there, and what of it falls on the array.
+struct Light {
+    truth: GroundTruth,
+    stream: PhotonStream,
+    each: Vec<PixelLight>,
+    pixels: Vec<LitPixel>,
+}
+
+/// What an engine counted, what a tolerance kept to, and how long it took.
+struct Counted {
+    exposed: Exposed,
+    kept: Option<Kept>,
+    took_s: f64,
+}
+
+/// What the counts say, and how long it took to tell.
+struct Ranged {
+    depths: Vec<PixelDepth>,
+    bin_s: f64,
+    remark: Option<String>,
+    took_s: f64,
+}
+
+impl Light {
+    /// Photons and dark counts of the whole array on average.
+    fn photons_expected(&self, exposure: &Exposure) -> f64 {
+        let config = self.stream.config();
+        let cycles = f64::from(exposure.laser_cycles);
+        let photons = |light| config.most_photons_per_cycle(light) * cycles;
+        self.each.iter().map(photons).sum()
+    }
+}
+
+impl Plan<'_> {
+    fn light(&self, truth: GroundTruth) -> Light {
+        let s = self.settings;
+        let stream = photon_stream(&s.sensor, &s.exposure, s.seed, &s.scene);
+        let each = light_in(&s.exposure, &s.scene, &truth, &stream);
+        Light {
+            truth,
+            pixels: lit(&s.sensor, self.wanted, &each),
+            stream,
+            each,
+        }
+    }
+
+    fn load(&self) -> Result<load::Load, FrameError> {
+        let sensor = &self.settings.sensor;
+        let starts = starts_of(sensor, self.wanted);
+        load_starts(sensor, &load::load_netlist(sensor), &starts)
+    }
+
+    /// The histograms of all macropixels by the engine that the settings ask for.
+    fn count<A: Answer>(
+        &self,
+        light: &Light,
+        done: &(impl Fn(usize) -> A + Sync),
+    ) -> Result<Counted, FrameError> {
+        let FrameSettings {
+            sensor,
+            exposure,
+            engine,
+            cohort,
+            depth,
+            tolerance_m,
+            skip,
+            ..
+        } = self.settings;
+        let (stream, pixels) = (&light.stream, &light.pixels[..]);
+        let mut clock = Stopwatch::new();
+        let mut kept = None;
+        let exposed = match (tolerance_m, skip) {
+            (Some(tolerance_m), _) => {
+                let tolerance = Tolerance {
+                    tolerance_m: *tolerance_m,
+                    sensor,
+                    exposure,
+                    peak: &depth.peak,
+                };
+                let (exposed, bound) = tolerance.expose(stream, pixels, done)?;
+                kept = Some(bound);
+                exposed
+            }
+            (None, true) if *engine == EngineKind::Cohort => {
+                let cohort = Cohort::new(sensor, exposure, *cohort);
+                let refused = |why| refused_by(&cohort, stream, pixels, why);
+                expose(&cohort, stream, pixels, done).map_err(refused)?
+            }
+            (None, true) => {
+                let engine = engine.expose(sensor, exposure, *cohort);
+                expose(&*engine, stream, pixels, done)?
+            }
+            (None, false) => {
+                let engine = engine.replay(sensor, exposure)?;
+                expose_without_skipping(&*engine, stream, pixels, done)?
+            }
+        };
+        Ok(Counted {
+            exposed,
+            kept,
+            took_s: clock.lap(),
+        })
+    }
+
+    fn range(&self, light: &Light, counted: &Counted) -> Result<Ranged, FrameError> {
+        let s = self.settings;
+        let mut clock = Stopwatch::new();
+        let calibration = s.calibration.as_ref();
+        let ranger = Ranger::new(&s.sensor, &s.exposure, &s.scene, &s.depth, calibration)?;
+        let counts = counted.exposed.histograms.counts();
+        let depths = ranger.of_array(counts, |pixel, counts| {
+            let known = Known {
+                pixel,
+                start: self.wanted[pixel],
+                true_m: light.truth.range_m[pixel],
+                guide_m: self.guide.range_m[pixel],
+            };
+            ranger.depth(&known, counts)
+        });
+        let circumstances = Circumstances {
+            sensor: &s.sensor,
+            exposure: &s.exposure,
+            bin_s: ranger.bin_s(),
+            scene: &s.scene,
+            guide: &*s.guide,
+            light: &light.each,
+            pixels: &depths,
+        };
+        Ok(Ranged {
+            remark: circumstances.remark(),
+            bin_s: ranger.bin_s(),
+            depths,
+            took_s: clock.lap(),
+        })
+    }
+
+    fn probe<A: Answer>(
+        &self,
+        light: &Light,
+        probes: &[Probe],
+        done: &(impl Fn(usize) -> A + Sync),
+    ) -> Result<Vec<AtGates>, FrameError> {
+        let s = self.settings;
+        let run = |probe| {
+            go_on(done(0))?;
+            AtGates::run(&s.sensor, &s.exposure, &light.stream, &light.pixels, probe)
+        };
+        probes.par_iter().map(run).collect()
+    }
+
+    /// Compares every probe with the frame's counts, or with those of the `window` engine where the frame's engine has no photons.
+    ///
+    /// # Errors
+    /// The first disagreement.
+    fn judge(&self, counted: &Counted, probed: Vec<AtGates>) -> Result<(), FrameError> {
+        let s = self.settings;
+        let has_tolerance = counted.kept.is_some();
+        let engine = s.engine.of_probes(has_tolerance);
+        for probed in probed {
+            let model = match has_tolerance || engine != s.engine {
+                true => {
+                    Window::new(&s.sensor, &s.exposure).histogram(probed.start, &probed.events)?
+                }
+                false => counted.exposed.histograms[probed.pixel].to_vec(),
+            };
+            if probed.counts != model {
+                return Err(FrameError::Disagreement {
+                    row: probed.pixel / s.sensor.cols,
+                    col: probed.pixel % s.sensor.cols,
+                    engine,
+                    gate: probed.counts,
+                    model,
+                });
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Whether a frame is still wanted.
@@ -266,49 +400,6 @@ fn refused_by(
     }
 }
 
-/// The histograms of all macropixels by the engine that the settings ask for, and what a tolerance kept to.
-fn expose_array<A: Answer>(
-    settings: &FrameSettings,
-    stream: &PhotonStream,
-    pixels: &[LitPixel],
-    done: &(impl Fn(usize) -> A + Sync),
-) -> Result<(Exposed, Option<Kept>), FrameError> {
-    let FrameSettings {
-        sensor,
-        exposure,
-        engine,
-        cohort,
-        ..
-    } = settings;
-    match (settings.tolerance_m, settings.skip) {
-        (Some(tolerance_m), _) => {
-            let tolerance = Tolerance {
-                tolerance_m,
-                sensor,
-                exposure,
-                peak: &settings.depth.peak,
-            };
-            let (exposed, kept) = tolerance.expose(stream, pixels, done)?;
-            Ok((exposed, Some(kept)))
-        }
-        (None, true) if *engine == EngineKind::Cohort => {
-            let cohort = Cohort::new(sensor, exposure, *cohort);
-            let refused = |why| refused_by(&cohort, stream, pixels, why);
-            let exposed = expose(&cohort, stream, pixels, done).map_err(refused)?;
-            Ok((exposed, None))
-        }
-        (None, true) => {
-            let engine = engine.expose(sensor, exposure, *cohort);
-            Ok((expose(&*engine, stream, pixels, done)?, None))
-        }
-        (None, false) => {
-            let engine = engine.replay(sensor, exposure)?;
-            let exposed = expose_without_skipping(&*engine, stream, pixels, done)?;
-            Ok((exposed, None))
-        }
-    }
-}
-
 /// A macropixel as its gates counted.
 struct AtGates {
     pixel: usize,
@@ -348,86 +439,5 @@ impl AtGates {
             counts: simulation.histograms()?.into_counts(),
             events,
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::ops::ControlFlow;
-    use std::sync::atomic::{AtomicUsize, Ordering};
-
-    use super::*;
-    use crate::scene::Scene;
-    use crate::system::range_counts;
-
-    fn settings() -> FrameSettings {
-        let sensor = SensorConfig {
-            rows: 16,
-            cols: 16,
-            ..SensorConfig::default()
-        };
-        let exposure = Exposure::new(&sensor, 520, 200);
-        FrameSettings::new(sensor, Scene::outdoor(), exposure)
-    }
-
-    #[test]
-    fn a_frame_that_is_no_longer_wanted_begins_no_other_batch() {
-        let settings = settings();
-        let exposed = AtomicUsize::new(0);
-        let stop_at_first = |macropixels| {
-            let before = exposed.fetch_add(macropixels, Ordering::Relaxed);
-            match before + macropixels > 0 {
-                true => ControlFlow::Break(()),
-                false => ControlFlow::Continue(()),
-            }
-        };
-        let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-        let refused = alone
-            .unwrap()
-            .install(|| take_frame(&settings, |_| Vec::new(), stop_at_first));
-        assert!(matches!(
-            refused,
-            Err(FrameError::Engine(EngineError::Stopped))
-        ));
-        let engine = Window::new(&settings.sensor, &settings.exposure);
-        assert_eq!(
-            exposed.load(Ordering::Relaxed),
-            crate::engine::Engine::batch(&engine)
-        );
-        // Nobody's cohorts were at fault.
-        let cohort = FrameSettings {
-            engine: EngineKind::Cohort,
-            ..settings
-        };
-        let refused = take_frame(&cohort, |_| Vec::new(), |_| ControlFlow::Break(()));
-        assert!(matches!(
-            refused,
-            Err(FrameError::Engine(EngineError::Stopped))
-        ));
-    }
-
-    #[test]
-    fn a_frames_own_counts_have_its_depths() {
-        let settings = settings();
-        let frame = take_frame(&settings, |_| Vec::new(), |_| {}).unwrap();
-        let starts: Vec<Option<u16>> = frame.pixels.iter().map(|pixel| pixel.start).collect();
-        let readings = range_counts(
-            (&settings.sensor, &settings.exposure),
-            &settings.scene,
-            &settings.depth,
-            None,
-            &starts,
-            &frame.histograms,
-        )
-        .unwrap();
-        assert!(readings.iter().any(|reading| reading.no_depth.is_none()));
-        for (reading, pixel) in readings.iter().zip(&frame.pixels) {
-            assert_eq!(reading.measured_m, pixel.measured_m);
-            assert_eq!(reading.peak_m, pixel.peak_m);
-            assert_eq!(reading.confidence, pixel.confidence);
-            assert_eq!(reading.no_depth.is_none(), pixel.no_depth.is_none());
-            let is_off = reading.no_depth == Some(crate::system::NoDepth::NoGuide);
-            assert!(!is_off || pixel.start.is_none());
-        }
     }
 }

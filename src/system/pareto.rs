@@ -5,7 +5,7 @@
 //! steps the netlist through every CLK period, is what the others are held against. Run times are wall-clock
 //! medians of some runs on all threads, method after method, so that only their ratios should be quoted.
 //!
-//! What a difference from `cycle` means depends on what the method was given ([`Method::against_cycle`]). One that
+//! What a difference from `cycle` means depends on what the method was given (`Method::against_cycle`). One that
 //! simulates the same photons is right or wrong count by count ([`Errors::mismatch`]). One that has photons of its own, or
 //! none, is right if its histograms have the same distribution: its means must agree ([`Errors::mean_shift`]), while
 //! count by count it differs as much as the exact engine with another seed does, which is why [`Method::AnotherSeed`]
@@ -30,7 +30,7 @@ use crate::engine::{
 };
 use crate::photon::{PhotonStream, PixelLight};
 use crate::scene::Scene;
-use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
+use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time, TimeOfFlight};
 
 /// What [`ParetoSettings::compare`] has done.
 #[derive(Debug, Clone, Copy)]
@@ -179,16 +179,8 @@ impl ParetoSettings {
             Method::Window | Method::AnotherSeed | Method::FewerCycles(_) => {
                 expose(&windows(&exposure), &stream, pixels, silent)
             }
-            Method::Cohort | Method::CohortInSteps(_) => {
-                let sub_bins = match method {
-                    Method::CohortInSteps(steps) => Some(steps),
-                    _ => None,
-                };
-                let options = CohortOptions {
-                    sub_bins,
-                    ..CohortOptions::default()
-                };
-                let cohort = Cohort::new(sensor, &exposure, options);
+            Method::Cohort => {
+                let cohort = Cohort::new(sensor, &exposure, CohortOptions::default());
                 expose(&cohort, &stream, pixels, silent)
             }
         }
@@ -202,13 +194,13 @@ impl ParetoSettings {
         }
     }
 
-    /// How often [`Done::Wall`] is told: once for each method and wall, the reference included.
+    /// How often [`Done::Wall`] is reported: once for each method and wall, the reference included.
     pub fn run_count(&self, methods: &[Method]) -> usize {
         let others = methods.iter().filter(|&&m| m != Method::Cycle).count();
         self.cell_count() * (others + 1)
     }
 
-    /// Runs every method on every cell, method after method; `done` is told of each wall and each method.
+    /// Runs every method on every cell, method after method; `done` is called after each wall and each method.
     ///
     /// # Errors
     /// Configurations that an engine refuses.

@@ -97,12 +97,12 @@ pub(crate) fn above_background(counts: &[u16]) -> f32 {
 
 impl PixelDepth {
     /// Measured less true distance, m.
-    pub fn error_m(&self) -> Option<f64> {
+    pub(crate) fn error_m(&self) -> Option<f64> {
         Some(self.measured_m? - self.true_m?)
     }
 
     /// The peak's less the true distance, m: the error with range walk, and before peaks are judged.
-    pub fn peak_error_m(&self) -> Option<f64> {
+    pub(crate) fn peak_error_m(&self) -> Option<f64> {
         Some(self.peak_m? - self.true_m?)
     }
 }

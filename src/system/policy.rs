@@ -33,62 +33,51 @@ use crate::chip::{Exposure, Mode, Sensor};
 use crate::guide::GuideMap;
 use crate::numerics::normal_above;
 use crate::ranging::BinProfile;
-use crate::units::Time;
+use crate::settings::Range::Within;
+use crate::settings::{keys, words};
+use crate::units::{Time, TimeOfFlight};
 
 pub use bins::{NoBins, share_held};
-pub use options::POLICY_KEYS;
 
-/// What a macropixel does of which the guide says nothing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Unguided {
-    /// Its SPADs are off.
-    #[default]
-    Off,
-    /// It keeps the window that it had last, if any.
-    Keep,
-    /// It steps its window over the whole reach, and holds a peak that it finds.
-    Sweep,
-    /// It takes the estimate of the nearest macropixel that has one, of several as near the farthest: what has no estimate is mostly
-    /// background that an edge hides from one of two cameras.
-    Neighbour,
+words! {
+    /// What a macropixel does if the guide has no estimate for it.
+    #[derive(Default)]
+    pub enum Unguided {
+        /// Its SPADs are off.
+        #[default]
+        Off = "off",
+        /// It keeps the window that it had last, if any.
+        Keep = "keep",
+        /// It steps its window over the whole reach, and holds a peak that it finds.
+        Sweep = "sweep",
+        /// It takes the estimate of the nearest macropixel that has one, of several as near the farthest: what has no estimate is mostly
+        /// background that an edge hides from one of two cameras.
+        Neighbour = "neighbour",
+    }
 }
 
-/// How windows are chosen. The default is that of a single frame: one window in the middle of the guide's estimate, whatever
-/// its uncertainty.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct WindowPolicy {
-    /// What macropixels without an estimate do.
-    pub unguided: Unguided,
-    /// Whether a macropixel steps its window when one holds less than `within` of the guide's uncertainty.
-    pub steps_in_doubt: bool,
-    /// Exposures without a peak after which a macropixel steps its window although the guide is sure; `None`: it never does.
-    pub patience: Option<u32>,
-    /// Share of the estimates that a window must hold for the guide to be sure.
-    pub within: f64,
-    /// Share of a window that the next one has in common with it when windows are stepped.
-    pub overlap: f64,
-    /// Chance that a target within a window makes a significant peak.
-    pub detection: f64,
-    /// Share of the guide's estimates that are altogether wrong.
-    pub gross: f64,
-    /// Macropixels from which an estimate is taken over, at most.
-    pub neighbour_px: u32,
-}
-
-impl Default for WindowPolicy {
-    fn default() -> Self {
-        WindowPolicy {
-            unguided: Unguided::Off,
-            steps_in_doubt: false,
-            patience: None,
-            within: 0.997,
-            overlap: 0.25,
-            detection: 0.9,
-            gross: 0.01,
-            neighbour_px: 3,
-        }
+keys! {
+    /// How windows are chosen. The default is that of a single frame: one window in the middle of the guide's estimate, whatever
+    /// its uncertainty.
+    #[derive(Copy)]
+    pub struct WindowPolicy {
+        /// What macropixels without an estimate do.
+        unguided: Unguided = Unguided::Off, from "thesis 4.9 for sweep, else chosen";
+        /// Step the window if one does not hold the guide's uncertainty.
+        steps_in_doubt: bool = false;
+        /// Exposures without a peak after which the window steps although the guide is sure; never, if left out.
+        patience: Option<u32> = None, in Within(0.0, 1e6);
+        /// Share of the estimate's distribution that a window must hold for the guide to be sure.
+        within: f64 = 0.997, in Within(0.5, 0.999_999), from "thesis Eq. 25";
+        /// Share by which successive windows overlap.
+        overlap: f64 = 0.25, in Within(0.0, 0.9),
+            from "chosen: a pulse of 4.5 ns and as much again of a window of 41.7 ns";
+        /// Probability that a target within a window makes a significant peak.
+        detection: f64 = 0.9, in Within(0.01, 0.999);
+        /// Share of the guide's estimates that are completely wrong.
+        gross: f64 = 0.01, in Within(0.0, 1.0);
+        /// Largest distance, in macropixels, from which an estimate is taken over.
+        neighbour_px: u32 = 3, in Within(0.0, 64.0);
     }
 }
 
@@ -177,7 +166,7 @@ pub struct Pointing<'p> {
 
 impl<'p> Pointing<'p> {
     /// Before the first frame; `calibration` is that of delay lines.
-    pub fn new(
+    pub(crate) fn new(
         policy: WindowPolicy,
         sensor: &Sensor,
         exposure: &Exposure,
@@ -215,7 +204,7 @@ impl<'p> Pointing<'p> {
     ///
     /// # Panics
     /// When the map or `seen_m` is of another array.
-    pub fn windows(&mut self, guide: &GuideMap, seen_m: &[Option<f64>]) -> Vec<Option<u16>> {
+    pub(crate) fn windows(&mut self, guide: &GuideMap, seen_m: &[Option<f64>]) -> Vec<Option<u16>> {
         assert_eq!(guide.range_m.len(), self.pixels.len());
         assert!(seen_m.is_empty() || seen_m.len() == self.pixels.len());
         let mut pixels = std::mem::take(&mut self.pixels);

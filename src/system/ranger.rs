@@ -10,7 +10,7 @@ use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, Sensor, WindowLaw};
 use crate::ranging::{BinProfile, DepthOptions, EchoFinder, Peak, Sighting, UnequalBins, WalkLeft};
 use crate::scene::Scene;
-use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
+use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time, TimeOfFlight};
 
 /// What is known of a macropixel beside its histogram.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,7 +6,7 @@ use crate::guide::Guide;
 use crate::photon::PixelLight;
 use crate::ranging::{EchoLight, Response};
 use crate::scene::Scene;
-use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
+use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time, TimeOfFlight};
 
 /// A frame's circumstances.
 pub(super) struct Circumstances<'a> {
@@ -90,7 +90,7 @@ impl Circumstances<'_> {
         let wanted = self.span_m(NoDepth::OutOfReach, |p| p.guide_m);
         let (bits, periods) = (self.sensor.counter_bits, self.exposure.stop_periods);
         format!(
-            "start values of {bits} bits (counter_bits) and a STOP every {periods} CLK periods open windows {} away, and the guide's estimates lie {wanted}; give more of the one or the other",
+            "start values of {bits} bits (counter_bits) and a STOP every {periods} CLK periods open windows {} away, and the guide's estimates lie {wanted}; give more counter_bits or a longer laser cycle",
             span(&ends)
         )
     }

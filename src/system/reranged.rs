@@ -1,4 +1,4 @@
-//! Depths from histograms that are given: a frame's own once more, or those that a real chip counted in the same windows.
+//! Depths from existing histograms: a frame's own once more, or those that a real chip counted in the same windows.
 
 use super::pixel::PixelDepth;
 use super::ranger::{Known, Ranger};
@@ -18,7 +18,7 @@ pub struct Ranged {
 
 impl Ranged {
     /// In a few numbers.
-    pub fn summary(&self) -> Summary {
+    pub(crate) fn summary(&self) -> Summary {
         Summary::new(&self.pixels, self.bin_m)
     }
 }
@@ -32,7 +32,7 @@ impl TakenFrame {
     ///
     /// # Panics
     /// When there is not a count for every bin of the array.
-    pub fn range(
+    pub(crate) fn range(
         &self,
         counts: &[u16],
         options: &DepthOptions,

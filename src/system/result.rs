@@ -33,7 +33,7 @@ pub struct PhaseTimes {
 
 impl PhaseTimes {
     /// From the first phase to the last, s.
-    pub fn total_s(&self) -> f64 {
+    pub(crate) fn total_s(&self) -> f64 {
         self.scene_s + self.guide_s + self.windows_s + self.light_s + self.together_s
     }
 }

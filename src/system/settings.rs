@@ -1,4 +1,4 @@
-//! What is asked of a frame: the chip, the world, the clocks, and which engine runs it.
+//! The settings of a frame: the chip, the world, the clocks, and which engine runs it.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -9,36 +9,28 @@ use crate::engine::{Cohort, CohortOptions, Cycle, EngineError, Expose, Gate, Rep
 use crate::guide::{BehaviouralStereo, Guide};
 use crate::ranging::{BinProfile, DepthOptions};
 use crate::scene::Scene;
+use crate::settings::words;
 
-/// Which engine runs the macropixels that are not probed.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Default,
-    serde::Serialize,
-    serde::Deserialize,
-    clap::ValueEnum,
-)]
-#[serde(rename_all = "lowercase")]
-pub enum EngineKind {
-    /// Event-driven simulation of the netlist with its delays.
-    Gate,
-    /// The levelised netlist, every CLK period.
-    Cycle,
-    /// The window law: only the CLK periods a window can see.
-    #[default]
-    Window,
-    /// No photons: histograms from their distribution, laser cycles in the same state together.
-    Cohort,
+words! {
+    /// Which engine runs the macropixels that are not probed.
+    #[derive(Default, clap::ValueEnum)]
+    pub enum EngineKind {
+        /// Event-driven simulation of the netlist with its delays.
+        Gate = "gate",
+        /// The netlist as word operations, for every CLK period in which anything can change.
+        Cycle = "cycle",
+        /// Only the photons and CLK periods that a window can see.
+        #[default]
+        Window = "window",
+        /// No photons: histograms are drawn from their distribution, for all laser cycles in the same state at once.
+        Cohort = "cohort",
+    }
 }
 
 impl EngineKind {
     /// The engine that probes at gate level are compared with when this one is asked for: `window` in the place of
     /// `cohort`, which has no photons, and of what a tolerance chooses.
-    pub fn of_probes(self, has_tolerance: bool) -> Self {
+    pub(crate) fn of_probes(self, has_tolerance: bool) -> Self {
         match self {
             EngineKind::Cohort => EngineKind::Window,
             _ if has_tolerance => EngineKind::Window,

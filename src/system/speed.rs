@@ -1,4 +1,4 @@
-//! The frames on which speed is stated: one such as a street gives, and the worst that an engine can be given.
+//! The frames on which speed is stated: a typical one, and the worst cases of the engines.
 
 use serde::{Deserialize, Serialize};
 
@@ -101,12 +101,12 @@ impl SpeedFrame {
     }
 
     /// Start values, in the macropixels' order.
-    pub fn starts(&self) -> Vec<u16> {
+    pub(crate) fn starts(&self) -> Vec<u16> {
         self.pixels.iter().map(|pixel| pixel.start).collect()
     }
 
     /// Every pulse of every macropixel: those of [`SpeedFrame::expose`], but for [`SpeedCase::EverySpadEveryClk`].
-    pub fn pulses(&self) -> Vec<Vec<SpadEvent>> {
+    pub(crate) fn pulses(&self) -> Vec<Vec<SpadEvent>> {
         if self.case == SpeedCase::EverySpadEveryClk {
             return vec![self.every_spad_every_clk(); self.pixels.len()];
         }

@@ -147,6 +147,7 @@ mod tests {
     use crate::chip::{Exposure, Sensor, SensorConfig, hslidar, hslidar_delay_line};
     use crate::engine::{Expose, LitPixel, Window, stream_config};
     use crate::photon::{PhotonStream, PixelLight};
+    use crate::units::TimeOfFlight;
 
     const OPTIONS: LockOptions = LockOptions {
         false_alarm_rate: 1e-6,
@@ -156,7 +157,8 @@ mod tests {
         farthest: 40,
     };
 
-    /// Runs exposures in which macropixel `pixel` has its target at `range_m(pixel, exposure)`; tells of the trackers after each.
+    /// Runs exposures in which macropixel `pixel` has its target at `range_m(pixel, exposure)`; reports the trackers
+    /// after each.
     fn run(
         sensor: &Sensor,
         exposures: u32,

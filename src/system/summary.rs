@@ -62,7 +62,7 @@ pub struct Summary {
 
 impl Summary {
     /// Of macropixels with bins of `bin_m`.
-    pub fn new(pixels: &[PixelDepth], bin_m: f64) -> Self {
+    pub(crate) fn new(pixels: &[PixelDepth], bin_m: f64) -> Self {
         let count = |f: &dyn Fn(&PixelDepth) -> bool| pixels.iter().filter(|p| f(p)).count();
         let errors: Vec<f64> = pixels.iter().filter_map(PixelDepth::error_m).collect();
         let is_inlier = |error: f64| error.abs() <= bin_m;

@@ -166,7 +166,7 @@ impl TakenFrame {
     ///
     /// # Errors
     /// When it cannot be read, is none, comes from another version of this program, or contradicts itself.
-    pub fn read(path: &Path) -> Result<Self, InputError> {
+    pub(crate) fn read(path: &Path) -> Result<Self, InputError> {
         let wanted = "the frame.json of a frame that `gdtof frame` has taken";
         let (settings, file) = TakenSettings::read::<FrameFile>(path, wanted)?;
         let pixels = file.macropixels;
@@ -200,7 +200,7 @@ impl TakenFrame {
     ///
     /// # Panics
     /// When the array has no such macropixel.
-    pub fn pixel(
+    pub(crate) fn pixel(
         &self,
         (row, col): (usize, usize),
         laser_cycles: u32,

@@ -24,6 +24,7 @@ use crate::engine::{
 };
 use crate::photon::{PhotonStream, PixelLight};
 use crate::ranging::{PeakOptions, interpolate};
+use crate::units::TimeOfFlight;
 
 /// The part of a bin's counting noise to which its mean is known for the bound.
 const BOUND_ERROR: f64 = 0.001;
@@ -51,7 +52,7 @@ pub enum OnWindow {
 
 impl OnWindow {
     /// What stands behind a refusal of the cohort engine, in words; `None` where it did not refuse.
-    pub fn refusal(self) -> Option<&'static str> {
+    pub(crate) fn refusal(self) -> Option<&'static str> {
         match self {
             OnWindow::NoChoice | OnWindow::Cheaper | OnWindow::BeyondTolerance => None,
             OnWindow::CyclesDepend => Some("laser cycles may depend on each other"),
@@ -88,7 +89,7 @@ pub struct Kept {
 
 impl Kept {
     /// Macropixels that the cohort engine refused, by the reason in words.
-    pub fn refused(&self) -> impl Iterator<Item = (&'static str, usize)> {
+    pub(crate) fn refused(&self) -> impl Iterator<Item = (&'static str, usize)> {
         let reasons = self.on_window_by_reason.iter();
         reasons.filter_map(|(why, &pixels)| Some((why.refusal()?, pixels)))
     }
@@ -109,7 +110,7 @@ pub struct Tolerance<'a> {
 
 impl Tolerance<'_> {
     /// Exposes `pixels`, each on the cheapest engine that keeps its depth within the tolerance of the exact one's on
-    /// average. `done` is told of macropixels as they are finished, and may stop the exposure as in [`expose`].
+    /// average. `done` is called with macropixels as they are finished, and may stop the exposure as in [`expose`].
     ///
     /// # Errors
     /// Configurations that the window engine refuses, and [`EngineError::Stopped`].

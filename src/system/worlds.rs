@@ -1,4 +1,4 @@
-//! The world during an exposure: a row of worlds that stand still, what the array sees of each, and its light.
+//! The world during an exposure: a sequence of worlds that stand still, what the array sees of each, and its light.
 //!
 //! ```text
 //!   exposure   ├────────┬────────┬────────┬────────┤

@@ -83,23 +83,15 @@ impl Bench {
             ..SensorConfig::default()
         };
         let mut m = ModuleBuilder::new("front_ends");
-        let raw = m.input_bus("SPAD_RAW", SPADS as usize);
-        let clk = [m.input("CLK")];
-        let clear = [m.input("PIXEL_CLEAR")];
+        m.input_bus("SPAD_RAW", SPADS as usize);
+        m.input("CLK");
+        m.input("PIXEL_CLEAR");
         for kind in FrontEnd::ALL {
             let config = config(kind);
             let timed = format!("{}_TIMED", kind.name().to_uppercase());
             let timed = m.wire_bus(&timed, config.lines());
-            m.instance(
-                kind.name(),
-                &front_end::circuit(&config),
-                &[
-                    ("SPAD_RAW", &raw),
-                    ("CLK", &clk),
-                    ("PIXEL_CLEAR", &clear),
-                    ("SPAD_TIMED", &timed),
-                ],
-            );
+            let ports = [("SPAD_TIMED", &timed[..])];
+            m.instance_by_names(kind.name(), &front_end::circuit(&config), &ports);
         }
         let netlist = Netlist::elaborate(&m.finish().expect("the testbench's circuit is whole"));
         Bench {

@@ -44,7 +44,7 @@ pub const TESTBENCHES: &[Testbench] = &[
 
 impl Testbench {
     /// The testbench of this name, with or without its `tb_`.
-    pub fn named(name: &str) -> Option<Self> {
+    pub(crate) fn named(name: &str) -> Option<Self> {
         let is_named =
             |tb: &&Testbench| name == tb.name || Some(name) == tb.name.strip_prefix("tb_");
         TESTBENCHES.iter().find(is_named).copied()

@@ -124,42 +124,18 @@ impl Bench {
 /// P-counter and timing block, connected as in a macropixel.
 fn circuit(config: &SensorConfig) -> Netlist {
     let mut m = ModuleBuilder::new("tb_p_counter");
-    let clk = [m.input("CLK")];
-    let stop = [m.input("STOP")];
-    let resetb = [m.input("RESETB")];
-    let enable = [m.input("ENABLE")];
-    let init = m.input_bus("COUNTER_INIT", config.counter_bits);
-    let load = [m.input("MEMORY_LOAD")];
-    let local_stop = [m.output("LOCAL_STOP")];
-    let counter_clk = [m.wire("COUNTER_CLK")];
-    let counter_reset = [m.wire("COUNTER_RESET")];
-    let memory_reset = [m.wire("MEMORY_RESET")];
-    m.instance(
-        "p_counter_timing",
-        &p_counter_timing::circuit(config.after_borrow),
-        &[
-            ("CLK", &clk),
-            ("STOP", &stop),
-            ("RESETB", &resetb),
-            ("ENABLE", &enable),
-            ("LOCAL_STOP", &local_stop),
-            ("COUNTER_CLK", &counter_clk),
-            ("COUNTER_RESET", &counter_reset),
-            ("MEMORY_RESET", &memory_reset),
-        ],
-    );
-    m.instance(
-        "p_counter",
-        &p_counter::circuit(config),
-        &[
-            ("COUNTER_INIT", &init),
-            ("MEMORY_LOAD", &load),
-            ("MEMORY_RESET", &memory_reset),
-            ("COUNTER_CLK", &counter_clk),
-            ("COUNTER_RESET", &counter_reset),
-            ("LOCAL_STOP", &local_stop),
-        ],
-    );
+    for pin in ["CLK", "STOP", "RESETB", "ENABLE"] {
+        m.input(pin);
+    }
+    m.input_bus("COUNTER_INIT", config.counter_bits);
+    m.input("MEMORY_LOAD");
+    m.output("LOCAL_STOP");
+    for wire in ["COUNTER_CLK", "COUNTER_RESET", "MEMORY_RESET"] {
+        m.wire(wire);
+    }
+    let timing = p_counter_timing::circuit(config.after_borrow);
+    m.instance_by_names("p_counter_timing", &timing, &[]);
+    m.instance_by_names("p_counter", &p_counter::circuit(config), &[]);
     Netlist::elaborate(&m.finish().expect("the testbench's circuit is whole"))
 }
 

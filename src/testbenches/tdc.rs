@@ -21,7 +21,7 @@ use crate::files::InputError;
 use crate::kernel::{LANES, LaneDrive, LaneKernel, Lanes};
 use crate::logic::Logic;
 use crate::netlist::{CellKind, Corner, Library, Mismatch, Module, Netlist, Timing, varied};
-use crate::report::{Axis, Chart, Checks, Grid, Style};
+use crate::report::{Axis, Chart, Checks, Grid};
 use crate::testbenches::Testbench;
 use crate::units::{Frequency, Time};
 use rand_philox::{philox4x32_10, u32_to_unit_f64};
@@ -265,16 +265,10 @@ impl Tdc {
 }
 
 fn table(converters: &[Tdc], densities: &[Density]) -> String {
-    let mut grid = Grid::new([
-        "converter",
-        "transistors",
-        "step (ps)",
-        "DNL expected",
-        "DNL measured",
-        "INL expected",
-        "INL measured",
-        "noise of DNL",
-    ]);
+    let mut grid = Grid::headed(
+        "converter | transistors | step (ps) | DNL expected | DNL measured | INL expected \
+        | INL measured | noise of DNL",
+    );
     for (tdc, density) in converters.iter().zip(densities) {
         let (expected, found) = (tdc.expected(), &density.linearity);
         let transistors = tdc
@@ -347,16 +341,8 @@ fn charts(waves: &Path, converters: &[Tdc], densities: &[Density]) -> Result<(),
                     .collect()
             };
             chart = chart
-                .with(
-                    format!("{}, gates", tdc.name),
-                    Style::Points,
-                    points(&density.linearity),
-                )
-                .with(
-                    format!("{}, delays", tdc.name),
-                    Style::Line,
-                    points(&tdc.expected()),
-                );
+                .points(format!("{}, gates", tdc.name), points(&density.linearity))
+                .line(format!("{}, delays", tdc.name), points(&tdc.expected()));
         }
         chart
     };

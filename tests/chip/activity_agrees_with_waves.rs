@@ -13,11 +13,11 @@ use std::process::{Command, Output};
 
 use every_edge::circuit::{self, Case};
 use every_edge::waves::Waves;
-use guided_dtof::bench::{StimulusPlan, export_verilog};
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::kernel::{Activity, Kernel, in_order};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{DelayModel, NetId, Netlist, Timing};
+use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
 use guided_dtof::waves::{Selection, VcdWriter, write_saif};
 use proptest::prelude::*;

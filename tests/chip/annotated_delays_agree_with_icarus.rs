@@ -6,12 +6,12 @@ use crate::icarus;
 
 use std::collections::HashSet;
 
-use guided_dtof::bench::{StimulusPlan, export_annotated_verilog};
 use guided_dtof::chip::{Exposure, SensorConfig, array};
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::netlist::sdf::{Sdf, SdfOptions, annotate, write_sdf};
 use guided_dtof::netlist::{Corner, Library, Netlist, Timing};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
+use guided_dtof::stimulus::{StimulusPlan, export_annotated_verilog};
 use guided_dtof::units::Time;
 use icarus::{Seen, random_delays};
 use rand::{RngExt, SeedableRng, rngs::StdRng};

@@ -35,7 +35,6 @@ use std::time::Instant;
 
 use every_edge::circuit::{self, Case};
 use every_edge::waves::{Figures, Waves};
-use guided_dtof::bench::{StimulusPlan, export_annotated_verilog, export_verilog};
 use guided_dtof::chip::{
     FrontEnd, Sensor, SensorConfig, Silicon, array, hslidar, hslidar_delay_line,
 };
@@ -45,6 +44,7 @@ use guided_dtof::netlist::{
     Corner, Direction, Module, Netlist, Timing, write_cells, write_delays, write_modules,
     write_parametric_cells,
 };
+use guided_dtof::stimulus::{StimulusPlan, export_annotated_verilog, export_verilog};
 use guided_dtof::units::Time;
 use guided_dtof::waves::{Selection, VcdWriter};
 use proptest::prelude::*;

@@ -84,8 +84,8 @@ fn cases() -> impl Strategy<Value = Case> {
             |(config, (stop_periods, other), laser_cycles, start, photons)| {
                 // Without memory a counter should come round with STOP.
                 let wider = usize::from(config.tap == Tap::Borrow);
-                let stop_periods = match config.p_counter {
-                    PCounter::Memoryless if other > 0 => 1 << (config.counter_bits + wider),
+                let stop_periods = match config.p_counter.row().has_memory {
+                    false if other > 0 => 1 << (config.counter_bits + wider),
                     _ => stop_periods,
                 };
                 let exposure = Exposure::new(&config, stop_periods, laser_cycles);
@@ -136,7 +136,7 @@ proptest! {
         let local_stop = gate.probes()[0].net(Probe::LocalStop);
         let mut recorder = Recorder::new([local_stop]);
         gate.run(&mut recorder);
-        let has_memory = config.p_counter != PCounter::Memoryless;
+        let has_memory = config.p_counter.row().has_memory;
         prop_assert_eq!(gate.loaded(), vec![has_memory.then_some(*start)]);
         let by_gates = gate.histograms().unwrap().into_counts();
 
@@ -159,24 +159,27 @@ proptest! {
             let mut expected = Vec::new();
             let pulses = case.pulses.iter().map(|p| (p.time, p.spad));
             Model::new(config, &exposure).run(*start, pulses, |cause, _| expected.push(cause));
+            // A reset may raise LOCAL_STOP, too, while HIT is in reset.
+            let in_reset = |t: &Time| {
+                let mut cycles = 0..=i64::from(case.laser_cycles);
+                cycles.any(|c| (exposure.stop(c)..exposure.stop(c) + law.timing().stop_to_hit_release).contains(t))
+            };
+            let may_rise_in_reset = starts_high(config, *start) && has_memory;
+            let is_false = |t: &Time| may_rise_in_reset && in_reset(t);
+            let without_resets = |rises: Vec<Time>| -> Vec<Time> { rises.into_iter().filter(|t| !is_false(t)).collect() };
             match window {
                 LawWindow::Open(open) => {
                     prop_assert_eq!(&rises, &expected);
-                    // A reset may raise LOCAL_STOP, too, while HIT is in reset.
-                    let in_reset = |t: &Time| {
-                        let mut cycles = 0..=i64::from(case.laser_cycles);
-                        cycles.any(|c| (exposure.stop(c)..exposure.stop(c) + law.timing().stop_to_hit_release).contains(t))
-                    };
-                    let may_rise_in_reset = starts_high(config, *start) && config.p_counter != PCounter::Memoryless;
-                    let is_false = |t: &Time| may_rise_in_reset && in_reset(t);
-                    let rises: Vec<Time> = rises.into_iter().filter(|t| !is_false(t)).collect();
+                    let rises = without_resets(rises);
                     prop_assert_eq!(rises.len(), case.laser_cycles as usize);
                     for (cycle, &rise) in rises.iter().enumerate() {
                         let by_law = exposure.stop(cycle as i64) + open.strobe_cause;
                         prop_assert!((rise - by_law).as_fs().abs() <= 1, "{} {}", rise, by_law);
                     }
                 }
-                LawWindow::Irregular(_) => prop_assert_eq!(&rises, &expected),
+                // A count that comes with STOP has not reached the MSB when the reset holds it high: the model, which has no
+                // delays, sees it fall and rise.
+                LawWindow::Irregular(_) => prop_assert_eq!(without_resets(rises), without_resets(expected)),
                 _ => prop_assert!(by_gates.iter().all(|&n| n == 0)),
             }
         }
@@ -199,12 +202,9 @@ proptest! {
             clk_hz: clk_mhz * 1e6,
             stop_phase_ps: phase * 0.5e6 / clk_mhz,
             counter_bits: 6,
-            p_counter,
-            tap: if p_counter == PCounter::Memoryless { Tap::Msb } else { Tap::Borrow },
-            after_borrow: if p_counter == PCounter::Memoryless { AfterBorrow::Wrap } else { AfterBorrow::Hold },
-            ..SensorConfig::default()
+            ..p_counter.sensor()
         };
-        let stop_periods = if p_counter == PCounter::Memoryless { 64 } else { 50 };
+        let stop_periods = if p_counter.row().has_memory { 50 } else { 64 };
         let exposure = Exposure::new(&config, stop_periods, 4);
         let law = WindowLaw::new(&config, &exposure);
         let Some(window) = law.window(start).open() else { return Ok(()) };

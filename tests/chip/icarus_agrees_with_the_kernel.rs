@@ -4,8 +4,8 @@
 use crate::icarus;
 use crate::scenario;
 
-use guided_dtof::bench::{StimulusPlan, export_verilog};
 use guided_dtof::engine::GateSimulation;
+use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use icarus::Seen;
 use rand::{SeedableRng, rngs::StdRng};
 use scenario::Scenario;

@@ -1,12 +1,12 @@
 //! What may go wrong between the clocks either does no harm or is reported: loading while counting, a STOP edge
 //! anywhere in the CLK period, a reset pulse too short, two pulses of a SPAD within a period.
 
-use guided_dtof::bench::{HardwareEventKind, HardwareEvents};
 use guided_dtof::chip::{Exposure, Probe, Probes, SensorConfig, Window, WindowLaw, macropixel};
 use guided_dtof::engine::{self as fast, Cancelling, Cycle, Gate, GateSimulation, Replay};
 use guided_dtof::kernel::{Drive, Kernel, Policy, Recorder, TimingChecks, clock, in_order};
 use guided_dtof::netlist::{CellKind, Corner, Library, NetId, Netlist, Timing};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
+use guided_dtof::stimulus::{HardwareEventKind, HardwareEvents};
 use guided_dtof::units::{Frequency, Time};
 use proptest::prelude::*;
 

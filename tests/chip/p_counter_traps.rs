@@ -2,6 +2,7 @@
 //! from it. Each trap is shown to be one: a test here fails if the circuit stops falling into it.
 
 use crate::bench;
+use crate::scenario;
 
 use bench::{Bench, SETTLING};
 use guided_dtof::chip::window_law::Window as LawWindow;
@@ -15,23 +16,23 @@ use guided_dtof::logic::Logic::One;
 use guided_dtof::netlist::{CellKind, Corner, ModuleBuilder};
 use guided_dtof::photon::SpadEvent;
 use guided_dtof::units::Time;
+use scenario::p_counters;
 
 /// Half of [`SETTLING`].
 const HALF: Time = Time::from_ps(2500);
 
 fn sensor(p_counter: PCounter) -> SensorConfig {
-    let (tap, after_borrow) = match p_counter {
-        PCounter::Memoryless => (Tap::Msb, AfterBorrow::Wrap),
-        _ => (Tap::Borrow, AfterBorrow::Hold),
-    };
     SensorConfig {
         rows: 1,
         cols: 1,
-        p_counter,
-        tap,
-        after_borrow,
-        ..SensorConfig::default()
+        ..p_counter.sensor()
     }
+}
+
+/// P-counters that each STOP resets.
+fn with_memory() -> impl Iterator<Item = PCounter> {
+    let all = PCounter::ALL.into_iter();
+    all.filter(|p_counter| p_counter.row().has_memory)
 }
 
 /// A P-counter alone, out of reset with start value 0 at `SETTLING * 2`.
@@ -107,49 +108,22 @@ fn a_counter_is_unknown_until_its_first_reset() {
 /// Timing block and P-counter, with the pins of both.
 fn timed_counter(config: &SensorConfig) -> Bench {
     let mut m = ModuleBuilder::new("timed_counter");
-    let pins = ["CLK", "STOP", "RESETB", "ENABLE", "MEMORY_LOAD"].map(|name| [m.input(name)]);
-    let [clk, stop, resetb, enable, load] = &pins;
-    let init = m.input_bus("COUNTER_INIT", config.counter_bits);
-    let wires =
-        ["LOCAL_STOP", "COUNTER_CLK", "COUNTER_RESET", "MEMORY_RESET"].map(|name| [m.wire(name)]);
-    let [local_stop, counter_clk, counter_reset, memory_reset] = &wires;
-    m.instance(
-        "p_counter_timing",
-        &p_counter_timing::circuit(config.after_borrow),
-        &[
-            ("CLK", clk),
-            ("STOP", stop),
-            ("RESETB", resetb),
-            ("ENABLE", enable),
-            ("LOCAL_STOP", local_stop),
-            ("COUNTER_CLK", counter_clk),
-            ("COUNTER_RESET", counter_reset),
-            ("MEMORY_RESET", memory_reset),
-        ],
-    );
-    m.instance(
-        "p_counter",
-        &p_counter::circuit(config),
-        &[
-            ("COUNTER_INIT", &init),
-            ("MEMORY_LOAD", load),
-            ("MEMORY_RESET", memory_reset),
-            ("COUNTER_CLK", counter_clk),
-            ("COUNTER_RESET", counter_reset),
-            ("LOCAL_STOP", local_stop),
-        ],
-    );
+    for pin in ["CLK", "STOP", "RESETB", "ENABLE", "MEMORY_LOAD"] {
+        m.input(pin);
+    }
+    m.input_bus("COUNTER_INIT", config.counter_bits);
+    for wire in ["LOCAL_STOP", "COUNTER_CLK", "COUNTER_RESET", "MEMORY_RESET"] {
+        m.wire(wire);
+    }
+    let timing = p_counter_timing::circuit(config.after_borrow);
+    m.instance_by_names("p_counter_timing", &timing, &[]);
+    m.instance_by_names("p_counter", &p_counter::circuit(config), &[]);
     Bench::new(&m.finish().unwrap(), Corner::Typ)
 }
 
 #[test]
 fn releasing_the_chips_reset_while_enabled_gives_one_false_local_stop() {
-    for p_counter in [
-        PCounter::Ripple,
-        PCounter::SetReset,
-        PCounter::Synchronous,
-        PCounter::Comparator,
-    ] {
+    for p_counter in with_memory() {
         for enabled in [false, true] {
             let mut bench = timed_counter(&sensor(p_counter));
             bench.drive(Time::ZERO, "ENABLE", enabled);
@@ -241,12 +215,7 @@ fn local_stops(config: &SensorConfig, exposure: &Exposure, start: u16) -> Vec<Ti
 
 #[test]
 fn a_start_value_beyond_the_laser_cycle_never_stops() {
-    for p_counter in [
-        PCounter::Ripple,
-        PCounter::SetReset,
-        PCounter::Synchronous,
-        PCounter::Comparator,
-    ] {
+    for p_counter in with_memory() {
         let config = sensor(p_counter);
         let exposure = Exposure::new(&config, 60, 3);
         let law = WindowLaw::new(&config, &exposure);
@@ -267,13 +236,12 @@ fn a_start_value_beyond_the_laser_cycle_never_stops() {
 
 #[test]
 fn a_counter_that_wraps_stops_again_and_again() {
-    for (p_counter, tap, every) in [
-        (PCounter::Ripple, Tap::Borrow, 32),
-        (PCounter::Ripple, Tap::Msb, 16),
-        (PCounter::SetReset, Tap::Borrow, 32),
-        (PCounter::Synchronous, Tap::Msb, 16),
-        (PCounter::Comparator, Tap::Borrow, 16),
-    ] {
+    for (p_counter, tap, after_borrow) in p_counters() {
+        let is_bit = p_counter.row().no_msb.is_none();
+        if !p_counter.row().has_memory || after_borrow == AfterBorrow::Hold {
+            continue;
+        }
+        let every = if is_bit && tap == Tap::Borrow { 32 } else { 16 };
         let config = SensorConfig {
             tap,
             after_borrow: AfterBorrow::Wrap,
@@ -410,7 +378,7 @@ fn the_msb_tap_with_hold_is_dead_for_the_upper_half() {
 /// time, so that the window law does not rely on it.)
 #[test]
 fn the_msb_taps_rise_at_stop_is_not_counted() {
-    for p_counter in [PCounter::Ripple, PCounter::SetReset, PCounter::Synchronous] {
+    for p_counter in with_memory().filter(|p_counter| p_counter.row().no_msb.is_none()) {
         for corner in Corner::ALL {
             let config = SensorConfig {
                 tap: Tap::Msb,

@@ -6,6 +6,7 @@ use crate::bench;
 use bench::{Bench, SETTLING, corners};
 use guided_dtof::chip::p_counter::{self, starts_high};
 use guided_dtof::chip::{AfterBorrow, ChipTiming, PCounter, Probe, Probes, SensorConfig, Tap};
+use guided_dtof::kernel::Recorder;
 use guided_dtof::logic::Logic::One;
 use guided_dtof::netlist::{CellKind, Corner};
 use guided_dtof::units::Time;
@@ -34,8 +35,8 @@ fn actions() -> impl Strategy<Value = Vec<Action>> {
 
 fn sensors() -> impl Strategy<Value = SensorConfig> {
     let p_counter = prop::sample::select(PCounter::ALL.to_vec());
-    let tap = prop::sample::select(vec![Tap::Borrow, Tap::Msb]);
-    let after_borrow = prop::sample::select(vec![AfterBorrow::Hold, AfterBorrow::Wrap]);
+    let tap = prop::sample::select(Tap::ALL.to_vec());
+    let after_borrow = prop::sample::select(AfterBorrow::ALL.to_vec());
     let step_periods = prop::sample::select(vec![1usize, 1, 2, 4, 8]);
     let sensor =
         |(p_counter, tap, after_borrow, step_periods, counter_bits, corner)| SensorConfig {
@@ -62,13 +63,16 @@ fn sensors() -> impl Strategy<Value = SensorConfig> {
 /// What lies between the last flip-flop and LOCAL_STOP: a rise that has left the flip-flop comes, whatever is reset
 /// behind it.
 fn behind_the_last_flip_flop(bench: &Bench) -> Time {
-    let rise = |kind| bench.delay(kind, 0, One);
-    match (bench.config.tap, bench.config.p_counter) {
-        (Tap::Borrow, _) | (_, PCounter::Comparator) => Time::ZERO,
-        (Tap::Msb, PCounter::Ripple | PCounter::Synchronous) => {
-            rise(CellKind::Mux2) + rise(CellKind::Buf)
+    let (mut net, mut behind) = (bench.net("LOCAL_STOP"), Time::ZERO);
+    loop {
+        let mut cells = bench.netlist.cells().iter();
+        let driver = cells.find(|cell| cell.outputs.contains(&net));
+        let driver = driver.expect("LOCAL_STOP has a driver");
+        if driver.kind.is_flip_flop() {
+            return behind;
         }
-        (Tap::Msb, PCounter::SetReset | PCounter::Memoryless) => rise(CellKind::Buf),
+        behind += bench.delay(driver.kind, 0, One);
+        net = driver.inputs[0];
     }
 }
 
@@ -89,7 +93,7 @@ proptest! {
         let timing = bench.timing();
         let counter = timing.counter;
         let pulse = timing.stop_to_reset_release - timing.stop_to_reset;
-        let has_memory = config.p_counter != PCounter::Memoryless;
+        let has_memory = config.p_counter.row().has_memory;
         // After a reset, how long until a count may come.
         let ready = (counter.release + counter.recovery).max(counter.settle - pulse);
         bench.drive(Time::ZERO, "MEMORY_RESET", true);
@@ -182,6 +186,7 @@ fn the_ripple_is_the_sum_of_its_stages() {
                 library_cell * 9 + buffer,
             ),
             (PCounter::Synchronous, custom, custom + mux + buffer),
+            (PCounter::Gray, custom, custom + mux + buffer),
             (
                 PCounter::Memoryless,
                 library_cell * 9 + custom,
@@ -198,6 +203,43 @@ fn the_ripple_is_the_sum_of_its_stages() {
                 let timing = ChipTiming::of(&config).counter;
                 assert_eq!(timing.clk_to_local_stop, expected, "{p_counter:?} {tap:?}");
             }
+        }
+    }
+}
+
+/// Whoever reads the count with another clock is wrong by one at most.
+#[test]
+fn a_gray_count_changes_in_one_bit_at_a_time() {
+    for tap in Tap::ALL {
+        let config = SensorConfig {
+            tap,
+            after_borrow: AfterBorrow::Wrap,
+            counter_bits: 6,
+            ..PCounter::Gray.sensor()
+        };
+        let mut bench = Bench::new(&p_counter::circuit(&config), config.corner);
+        bench.pulse(Time::ZERO, SETTLING, "MEMORY_RESET");
+        bench.pulse(Time::ZERO, SETTLING * 4, "COUNTER_RESET");
+        bench.number(SETTLING, "COUNTER_INIT", 37);
+        bench.pulse(SETTLING * 2, SETTLING, "MEMORY_LOAD");
+        let edges: Vec<Time> = (5..300).map(|edge| SETTLING * edge).collect();
+        for &edge in &edges {
+            bench.pulse(edge, Time::from_ns(2), "COUNTER_CLK");
+        }
+        let mut nets = Probes::of_block(&bench.netlist)
+            .bus(Probe::CounterOut)
+            .to_vec();
+        if tap == Tap::Borrow {
+            nets.push(bench.net("LOCAL_STOP"));
+        }
+        let mut run = bench.start(&[]);
+        run.recorder = Recorder::new(nets);
+        run.until(SETTLING * 300);
+        let changes = run.recorder.changes().iter().map(|change| change.0);
+        let counted: Vec<Time> = changes.filter(|&time| time >= edges[0]).collect();
+        assert_eq!(counted.len(), edges.len());
+        for (change, &edge) in counted.into_iter().zip(&edges) {
+            assert!((edge..edge + SETTLING).contains(&change), "{change}");
         }
     }
 }

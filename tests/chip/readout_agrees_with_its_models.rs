@@ -11,7 +11,6 @@ use std::io::{BufReader, Cursor};
 
 use bench::{Bench, SETTLING, corners};
 use every_edge::waves::Waves;
-use guided_dtof::bench::{StimulusPlan, export_verilog};
 use guided_dtof::chip::readout::{self, ReadoutOrder, Scanner, Serialiser};
 use guided_dtof::chip::{SensorConfig, SensorPins};
 use guided_dtof::engine::GateSimulation;
@@ -19,6 +18,7 @@ use guided_dtof::engine::readout::{PinSampler, read_out, readout_netlist};
 use guided_dtof::kernel::{Drive, Kernel, Observer, in_order};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::NetId;
+use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
 use guided_dtof::waves::{Selection, VcdWriter};
 use icarus::Seen;

@@ -3,8 +3,7 @@
 
 use guided_dtof::analysis::{TimingVerdict, corner_limits, factor_range, gate_works};
 use guided_dtof::chip::{
-    AfterBorrow, Exposure, Limits, Mode, PCounter, SensorConfig, Silicon, Window, WindowLaw,
-    hslidar_delay_line,
+    Exposure, Limits, Mode, PCounter, SensorConfig, Silicon, Window, WindowLaw, hslidar_delay_line,
 };
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::kernel::{CheckReport, Policy};
@@ -174,10 +173,7 @@ fn the_verdict_is_that_of_the_window_law_in_every_mode_and_with_every_p_counter(
             } else {
                 Mode::Guided
             },
-            after_borrow: match p_counter {
-                PCounter::Memoryless => AfterBorrow::Wrap,
-                _ => AfterBorrow::Hold,
-            },
+            after_borrow: p_counter.sensor().after_borrow,
             stop_phase_ps: random.random_range(-0.99..0.99) * 0.5e6 / mhz,
             counter_bits: random.random_range(4..10),
             corner: Corner::ALL[random.random_range(0..3)],

@@ -40,13 +40,10 @@ fn write_png(path: &Path, (width, height): (usize, usize), pixels: &[u8]) {
     writer.finish().unwrap();
 }
 
-fn write_npy(path: &Path, shape: [u64; 2], values: impl Iterator<Item = f32>) {
-    use npyz::WriterBuilder;
-    let file = std::fs::File::create(path).unwrap();
-    let options = npyz::WriteOptions::new().default_dtype().shape(&shape);
-    let mut writer = options.writer(file).begin_nd().unwrap();
-    writer.extend(values).unwrap();
-    writer.finish().unwrap();
+fn write_npy(path: &Path, shape: [usize; 2], values: impl Iterator<Item = f32>) {
+    let mut file = std::fs::File::create(path).unwrap();
+    let values: Vec<f32> = values.collect();
+    guided_dtof::files::write_npy(&mut file, &shape, &values).unwrap();
 }
 
 /// A folder with left.png, right.png, truth.npy and calib.toml.
@@ -62,11 +59,7 @@ fn pair() -> tempfile::TempDir {
     write_png(&dir.path().join("left.png"), size, &left);
     write_png(&dir.path().join("right.png"), size, &right);
     let truth = all().map(|(x, y)| disparity_px(x, y) as f32);
-    write_npy(
-        &dir.path().join("truth.npy"),
-        [HEIGHT as u64, WIDTH as u64],
-        truth,
-    );
+    write_npy(&dir.path().join("truth.npy"), [HEIGHT, WIDTH], truth);
     std::fs::write(dir.path().join("calib.toml"), CALIBRATION).unwrap();
     dir
 }
@@ -177,7 +170,7 @@ fn what_is_no_pair_is_refused_in_one_sentence() {
     write_npy(&at("small.npy"), [2, 2], [1.0; 4].into_iter());
     write_npy(
         &at("none.npy"),
-        [HEIGHT as u64, WIDTH as u64],
+        [HEIGHT, WIDTH],
         std::iter::repeat_n(f32::NAN, WIDTH * HEIGHT),
     );
     // The head of a picture of 60000 x 60000 pixels, with its checksum.
@@ -228,9 +221,9 @@ fn what_is_no_pair_is_refused_in_one_sentence() {
     );
     refused(&with(2, "broken.png"), "broken.png: ");
     refused(&with(2, "bomb.png"), "60000 x 60000 pixels");
-    refused(&with(2, "truth.npy"), "is no PNG");
+    refused(&with(2, "truth.npy"), "is not a PNG");
     refused(&with(6, "singular.toml"), "are singular; give [[f, 0, u]");
-    refused(&with(6, "skewed.toml"), "none of a rectified camera");
+    refused(&with(6, "skewed.toml"), "not those of a rectified camera");
     refused(
         &with(6, "beside.toml"),
         "puts every pixel of the pair outside",
@@ -249,7 +242,7 @@ fn what_is_no_pair_is_refused_in_one_sentence() {
     );
     refused(
         &["stereo", "left.png", "right.png", "--disparities", "0"],
-        "none of 1 to 256",
+        "are impossible; give 1 to 256",
     );
     refused(
         &["stereo", "left.png", "right.png", "--census", "8x8"],
@@ -257,7 +250,7 @@ fn what_is_no_pair_is_refused_in_one_sentence() {
     );
     refused(
         &["stereo", "left.png", "right.png", "--p1", "99"],
-        "must not fall",
+        "must not decrease",
     );
 }
 

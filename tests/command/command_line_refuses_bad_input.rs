@@ -181,7 +181,7 @@ fn every_kind_of_bad_input_is_one_sentence_and_status_2() {
         ),
         (
             replay(&["--mismatch", "0.7"]),
-            "--mismatch: 0.7 is no relative spread",
+            "--mismatch: 0.7 is not a relative spread",
         ),
         (
             replay(&["--voltage", "0.3"]),
@@ -209,7 +209,7 @@ fn every_kind_of_bad_input_is_one_sentence_and_status_2() {
         ),
         (
             vec!["frame", "--probe", "centre"],
-            "--probe: \"centre\" is no macropixel",
+            "--probe: \"centre\" is not a macropixel",
         ),
         (
             vec!["frame", "--out", "inits.csv/x"],

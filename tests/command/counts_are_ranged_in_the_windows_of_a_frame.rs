@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use npyz::WriterBuilder;
+use guided_dtof::files::write_npy;
 
 use super::tools::gdtof_words;
 
@@ -15,12 +15,9 @@ fn take(folder: &Path) -> serde_json::Value {
     serde_json::from_slice(&frame.stdout).unwrap()
 }
 
-fn write(path: &Path, shape: &[u64], counts: &[i64]) {
+fn write(path: &Path, shape: &[usize], counts: &[i64]) {
     let mut file = std::fs::File::create(path).unwrap();
-    let options = npyz::WriteOptions::new().default_dtype().shape(shape);
-    let mut writer = options.writer(&mut file).begin_nd().unwrap();
-    writer.extend(counts.iter().copied()).unwrap();
-    writer.finish().unwrap();
+    write_npy(&mut file, shape, counts).unwrap();
 }
 
 #[test]
@@ -65,7 +62,7 @@ fn other_counts_in_the_same_windows_give_other_depths() {
         ),
         (
             format!("{range} dark.npy --false-alarm-rate 0"),
-            "--false-alarm-rate: 0 is no share",
+            "--false-alarm-rate: 0 is not a share",
         ),
         (
             "range --format frame --histograms dark.npy".into(),

@@ -68,11 +68,11 @@ fn a_calibration_makes_depths_better_and_belongs_to_its_sensor() {
     for (arguments, says) in [
         (
             "--set sensor.delay_control_v=0.72",
-            "it is of a sensor with delay_control_v = 0.7, and this one has delay_control_v = 0.72; make one",
+            "it was measured on a sensor with delay_control_v = 0.7, but this one has delay_control_v = 0.72; make one",
         ),
         (
             "--set sensor.delay_seed=2",
-            "it is of a sensor with delay_seed = 1, and this one",
+            "it was measured on a sensor with delay_seed = 1, but this one",
         ),
         (
             "--set sensor.clk_skew_ps=-1",
@@ -107,7 +107,7 @@ fn what_cannot_be_calibrated_is_refused() {
         ),
         (
             "frame --sensor hslidar_delay_line --stop-periods 140 --calibration text.json",
-            "text.json:1: this is no bin profile",
+            "text.json:1: this is not a bin profile",
         ),
         (
             "frame --sensor hslidar_delay_line --stop-periods 140 --engine cycle",

@@ -1,5 +1,6 @@
 //! `gdtof drive`: one recording of many frames, the same whatever is reused, and refusals.
 
+use guided_dtof::files::NpyHead;
 use std::path::Path;
 
 use super::tools::gdtof;
@@ -49,8 +50,8 @@ fn a_drive_is_one_recording_whatever_is_reused() {
         assert_eq!(read(&with, &name), read(&without, &name), "{name}");
     }
     let stack = read(&with, "histograms.npy");
-    let stack = npyz::NpyFile::new(&stack[..]).unwrap();
-    assert_eq!(stack.shape(), [3, 4, 6, 16]);
+    let stack = NpyHead::read(&mut &stack[..]).unwrap();
+    assert_eq!(stack.shape, [3, 4, 6, 16]);
     assert!(with.join("depth_00002.png").exists() && !without.join("depth_00002.png").exists());
 
     let json = |folder: &Path| -> serde_json::Value {
@@ -73,8 +74,8 @@ fn what_a_drive_cannot_do_is_refused_in_one_sentence() {
     for (arguments, wanted) in [
         (&["drive", "no_such.toml"][..], "no_such.toml"),
         (&["drive", "--guide", "owl"], "owl"),
-        (&["drive", "--guide-latency-ms=-1"], "-1 is no latency"),
-        (&["drive", "--start-s", "1e9"], "1000000000 is no time"),
+        (&["drive", "--guide-latency-ms=-1"], "-1 is not a latency"),
+        (&["drive", "--start-s", "1e9"], "1000000000 is not a time"),
         (&["drive", "--laser-cycles", "0"], "at least 1"),
         (
             &["demo", "sweep", "--calibration-step-ps", "0"],

@@ -102,7 +102,7 @@ fn a_folder_without_a_frame_is_refused() {
     fs::write(&histograms, &bytes[..40]).unwrap();
     refused(
         &["export", "frame", "out"],
-        "histograms.npy: is no NumPy file",
+        "histograms.npy: is not a NumPy file",
     );
     assert!(!here.join("export").exists());
 }

@@ -89,8 +89,8 @@ fn delays(timing: &ChipTiming) -> [(&'static str, Option<Time>); 27] {
 fn sensors() -> Vec<SensorConfig> {
     let mut sensors = Vec::new();
     for p_counter in PCounter::ALL {
-        for tap in [Tap::Borrow, Tap::Msb] {
-            for after_borrow in [AfterBorrow::Hold, AfterBorrow::Wrap] {
+        for tap in Tap::ALL {
+            for after_borrow in AfterBorrow::ALL {
                 for corner in Corner::ALL {
                     sensors.push(SensorConfig {
                         p_counter,

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use npyz::WriterBuilder;
+use guided_dtof::files::write_npy;
 
 /// A small frame of the street with these further arguments.
 fn frame(folder: &Path, out: &str, further: &[&str]) -> Output {
@@ -38,14 +38,8 @@ fn guided(frame: &serde_json::Value) -> usize {
 }
 
 fn write_map(path: &Path, rows: usize, cols: usize, range_m: f64) {
-    let mut writer = npyz::WriteOptions::new()
-        .default_dtype()
-        .shape(&[rows as u64, cols as u64])
-        .writer(std::fs::File::create(path).unwrap())
-        .begin_nd()
-        .unwrap();
-    writer.extend(vec![range_m; rows * cols]).unwrap();
-    writer.finish().unwrap();
+    let mut file = std::fs::File::create(path).unwrap();
+    write_npy(&mut file, &[rows, cols], &vec![range_m; rows * cols]).unwrap();
 }
 
 #[test]
@@ -111,7 +105,7 @@ fn guides_that_cannot_be_are_refused_in_one_sentence() {
     for (further, says) in [
         (
             ["--guide", "sonar"],
-            "--guide: \"sonar\" is no guide; give stereo, truth",
+            "--guide: \"sonar\" is not a guide; give stereo, truth",
         ),
         (
             ["--guide", "file:path=small.npy"],
@@ -123,7 +117,7 @@ fn guides_that_cannot_be_are_refused_in_one_sentence() {
         ),
         (
             ["--guide", "file:path=text.npy"],
-            "text.npy: is no PNG, .npy, PFM or EXR",
+            "text.npy: is not a PNG, .npy, PFM or EXR",
         ),
         (["--guide", "file"], "names no file"),
         (["--guide", "radar:reach_m=0"], "reach_m = 0 is impossible"),

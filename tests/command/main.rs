@@ -26,6 +26,7 @@ mod scenes_name_files;
 #[cfg(unix)]
 mod silicon_replays;
 mod sweeps_go_on;
+mod the_book_lists_every_key;
 mod the_book_runs;
 mod the_command_explains_itself;
 mod wave_replays_a_cycle;

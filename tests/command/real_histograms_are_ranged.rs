@@ -13,6 +13,7 @@ use guided_dtof::chip::{Exposure, SensorConfig, WindowLaw};
 use guided_dtof::engine::{LitPixel, Window, expose, stream_config};
 use guided_dtof::photon::PhotonStream;
 use guided_dtof::scene::{DVec3, GroundTruth, Object, Scene, Shape};
+use guided_dtof::units::TimeOfFlight;
 
 fn range(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_gdtof"))

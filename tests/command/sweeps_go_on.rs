@@ -218,11 +218,11 @@ fn studies_that_cannot_be_are_refused_with_their_lines() {
     for (text, says) in [
         (
             "[vary]\nsensor.colour = [1]\n",
-            "study.toml:2: sensor.colour is no key of a study; `gdtof sensor` lists",
+            "study.toml:2: sensor.colour is not a key of a study; `gdtof sensor` lists",
         ),
         (
             "[vary]\nscene.lidar.pdx = [1]\n",
-            "study.toml:2: scene.lidar.pdx is no key",
+            "study.toml:2: scene.lidar.pdx is not a key",
         ),
         (
             "[vary]\nsensor.rows = []\n",
@@ -251,7 +251,7 @@ fn studies_that_cannot_be_are_refused_with_their_lines() {
         ),
         (
             "[vary]\nsensor.clk_hz = {from=1e8, to=2e8}\n",
-            "a grid goes in steps",
+            "a grid needs steps",
         ),
         (
             "[vary]\nsensor.clk_hz = {from=1e8, to=2e8, step=3}\n",
@@ -272,7 +272,7 @@ fn studies_that_cannot_be_are_refused_with_their_lines() {
         ),
         (
             "[study]\nkind=\"theory\"\n[vary]\nguide=[\"radar\"]\n",
-            "guide is no key of a study",
+            "guide is not a key of a study",
         ),
         ("[vary]\nframe.seed=[1]\n", "seeds are those of [study]"),
         (
@@ -302,13 +302,15 @@ fn studies_that_cannot_be_are_refused_with_their_lines() {
     fs::write(here.join("study.toml"), THEORY).unwrap();
     assert!(
         refused(here, &["study.toml", "--plot", "colour,p_miss"])
-            .contains("\"colour\" is no column")
+            .contains("\"colour\" is not a column")
     );
     assert!(
         refused(here, &["study.toml", "--plot", "theory.model,p_miss"])
             .contains("holds no numbers")
     );
-    assert!(refused(here, &["study.toml", "--plot", "p_miss"]).contains("no pair of columns"));
+    assert!(
+        refused(here, &["study.toml", "--plot", "p_miss"]).contains("is not a pair of columns")
+    );
     assert!(refused(here, &["study.toml", "--shard", "4/3"]).contains("as 3/16"));
     assert!(refused(here, &["no.toml"]).contains("no.toml: cannot be read"));
 }

@@ -20,12 +20,12 @@ fn chapters() -> Vec<String> {
 
 /// What stands between lines of ```sh and ```.
 fn commands(text: &str) -> String {
-    let mut of_block = false;
+    let mut in_block = false;
     let mut commands = String::new();
     for line in text.lines() {
-        match (of_block, line) {
-            (false, "```sh") => of_block = true,
-            (true, "```") => of_block = false,
+        match (in_block, line) {
+            (false, "```sh") => in_block = true,
+            (true, "```") => in_block = false,
             (true, line) => commands += &format!("{line}\n"),
             (false, _) => {}
         }
@@ -89,7 +89,7 @@ fn every_command_is_in_the_book() {
         .output()
         .unwrap();
     let help = String::from_utf8(help.stdout).unwrap();
-    let listed = help.split("Commands:").nth(1).unwrap();
+    let listed = help.split("<COMMAND>").nth(1).unwrap();
     let listed = listed.split("Options:").next().unwrap().lines();
     let all: String = (chapters().iter())
         .map(|chapter| std::fs::read_to_string(book().join(chapter)).unwrap())

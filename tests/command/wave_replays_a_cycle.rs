@@ -139,7 +139,7 @@ fn what_is_no_such_frame_or_not_in_it_is_one_sentence_and_exit_status_2() {
             "0",
             "outside the 8x8 array",
         ),
-        ("out/frame.json".to_owned(), "8", "0", "is no macropixel"),
+        ("out/frame.json".to_owned(), "8", "0", "is not a macropixel"),
         (
             "out/frame.json".to_owned(),
             "0,0",

@@ -20,7 +20,6 @@ fn paralysable_spads_follow_their_closed_form() {
     let light = DARK.with_background(200e6);
     stream.spads.law = DeadTimeLaw::Paralysable;
     let options = CohortOptions {
-        sub_bins: Some(32),
         neglect: 0.0,
         ..CohortOptions::default()
     };

@@ -1,7 +1,7 @@
 //! A laser cycle that is simulated without most of those before it is, net for net and change for change, that of the whole
 //! exposure, and so is what comes after it.
 
-use guided_dtof::chip::{Exposure, Mode, Overflow, PCounter, SensorConfig};
+use guided_dtof::chip::{Exposure, Mode, Overflow, SensorConfig};
 use guided_dtof::engine::{GateSimulation, late_cycle};
 use guided_dtof::kernel::Observer;
 use guided_dtof::logic::Logic;
@@ -104,7 +104,7 @@ proptest! {
         if conventional {
             config.mode = Mode::Conventional;
         }
-        let memoryless = config.p_counter == PCounter::Memoryless;
+        let memoryless = !config.p_counter.row().has_memory;
         let round = 1 << (config.counter_bits + 1);
         let stop_periods = if memoryless && round < 200 { round } else { 40 };
         let exposure = Exposure::new(&config, stop_periods, cycles);

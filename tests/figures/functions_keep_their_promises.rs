@@ -35,7 +35,7 @@ enum Measure {
 #[derive(Debug, Clone, Copy)]
 struct References {
     csv: &'static str,
-    /// Its last columns hold the references of so many functions; those before are arguments.
+    /// Number of functions. Its last columns hold their references, those before are arguments.
     functions: usize,
     /// Which of them is meant.
     function: usize,

@@ -177,8 +177,8 @@ fn the_tally_counts_every_row_and_claim_once() {
         .filter(|c| overall(&c.rows) == Verdict::Agrees);
     let agree = agree.count();
     assert_eq!(lines[0][1], agree, "{text}");
-    let readme = include_str!("../../README.md").replace('\n', " ");
-    assert!(readme.contains(&format!(
+    let chapter = include_str!("../../docs/src/commands/reproduce.md").replace('\n', " ");
+    assert!(chapter.contains(&format!(
         "all that is published of it agrees: {agree} of 28 are,"
     )));
 }

@@ -57,7 +57,7 @@ fn texts_below(folder: &Path, found: &mut Vec<PathBuf>) {
             texts_below(&path, found);
         } else if path
             .extension()
-            .is_some_and(|ending| ending == "rs" || ending == "md")
+            .is_some_and(|ending| ending == "rs" || ending == "md" || ending == "toml")
         {
             found.push(path);
         }
@@ -95,7 +95,7 @@ fn quoted_in_files() -> Vec<(String, String)> {
     let mut files = ["README.md", "DESIGN.md", "COMPARE.md"]
         .map(|name| here().join(name))
         .to_vec();
-    ["src", "docs/src"]
+    ["src", "crates", "docs/src"]
         .iter()
         .for_each(|folder| texts_below(&here().join(folder), &mut files));
     for file in files {
@@ -107,7 +107,7 @@ fn quoted_in_files() -> Vec<(String, String)> {
     quoted
 }
 
-/// Looks up quotations, of which at least so many are expected.
+/// Looks up quotations, of which there must be `at_least`.
 fn look_up(at_least: usize, quoted: impl FnOnce() -> Vec<(String, String)>) {
     let Some(thesis) = thesis() else {
         // Not eprintln, which cargo hides where a test passes.

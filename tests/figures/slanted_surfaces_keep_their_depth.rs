@@ -6,10 +6,11 @@ use guided_dtof::photon::PixelLight;
 use guided_dtof::ranging::{DepthOptions, EchoFinder};
 use guided_dtof::scene::{DVec3, GroundTruth, Object, Ray, Scene, Shape};
 use guided_dtof::units::SPEED_OF_LIGHT_M_PER_S;
+use guided_dtof::units::TimeOfFlight;
 
 const FINE: u32 = 64;
 const BINS: usize = 16;
-/// Of the finder: so many that no bin is filled twice in one.
+/// Laser cycles that the finder is told: enough that no bin is filled twice in one.
 const LASER_CYCLES: u32 = 16_000;
 
 /// Light of Gaussian pulses: photons, range and standard deviation of each, m.
@@ -84,8 +85,8 @@ impl Errors {
         self.beyond / self.number
     }
 
-    /// Adds the depths of `trials` histograms of so many counts of `pulses` and background counts a bin, about the range `true_m`,
-    /// which lies anywhere relative to the bins.
+    /// Adds the depths of `trials` histograms with `counts` counts of `pulses` and `background` counts a bin, about
+    /// the range `true_m`, which lies anywhere relative to the bins.
     fn add(&mut self, pulses: &Pulses, true_m: f64, [counts, background]: [f64; 2], trials: u32) {
         let sensor = Sensor::from(SensorConfig::default());
         let law = WindowLaw::new(&sensor, &Exposure::new(&sensor, 520, LASER_CYCLES));

@@ -32,8 +32,8 @@ impl Scenario {
         // Without memory a counter must come round with STOP, or no two laser cycles are alike.
         let wider = usize::from(config.tap == Tap::Borrow);
         let round = 1 << (config.counter_bits + wider);
-        let stop_periods = match config.p_counter {
-            PCounter::Memoryless if round <= 128 => round,
+        let stop_periods = match config.p_counter.row().has_memory {
+            false if round <= 128 => round,
             _ => random.random_range(20..80),
         };
         let exposure = Exposure::new(&config, stop_periods, random.random_range(1..8));
@@ -71,7 +71,7 @@ impl Scenario {
     /// What the P-counters' memories hold after the load, if they have any.
     #[allow(dead_code)]
     pub fn loaded(&self) -> Vec<Option<u16>> {
-        let has_memory = self.config.p_counter != PCounter::Memoryless;
+        let has_memory = self.config.p_counter.row().has_memory;
         self.starts
             .iter()
             .map(|&start| has_memory.then_some(start))
@@ -96,8 +96,8 @@ pub fn cases(usual: u32) -> u32 {
 pub fn p_counters() -> Vec<(PCounter, Tap, AfterBorrow)> {
     let mut all = Vec::new();
     for p_counter in PCounter::ALL {
-        for tap in [Tap::Borrow, Tap::Msb] {
-            for after_borrow in [AfterBorrow::Hold, AfterBorrow::Wrap] {
+        for tap in Tap::ALL {
+            for after_borrow in AfterBorrow::ALL {
                 let config = SensorConfig {
                     p_counter,
                     tap,
@@ -137,9 +137,11 @@ pub fn silicon(random: &mut StdRng, corner: Corner) -> Silicon {
 
 fn random_sensor(random: &mut StdRng, rows: usize, cols: usize) -> SensorConfig {
     let clk_hz = random.random_range(100e6..500e6);
+    // Each as often as the others, however many there are, and whatever it can do.
+    let p_counter = PCounter::ALL[random.random_range(0..PCounter::ALL.len())];
     let mut p_counters = p_counters();
-    let (p_counter, tap, after_borrow) =
-        p_counters.remove(random.random_range(0..p_counters.len()));
+    p_counters.retain(|of| of.0 == p_counter);
+    let (_, tap, after_borrow) = p_counters[random.random_range(0..p_counters.len())];
     // Every other macropixel is the QuantIC4x4's.
     const GRIDS: [(usize, usize); 5] = [(2, 2), (8, 8), (1, 1), (2, 4), (8, 1)];
     let (spad_rows, spad_cols) = match random.random_bool(0.5) {
@@ -153,9 +155,9 @@ fn random_sensor(random: &mut StdRng, rows: usize, cols: usize) -> SensorConfig 
         tap,
         after_borrow,
         // Without a reset there is no divider.
-        step_periods: match p_counter {
-            PCounter::Memoryless => 1,
-            _ => [1, 1, 1, 2, 4, 8][random.random_range(0..6)],
+        step_periods: match p_counter.row().has_memory {
+            false => 1,
+            true => [1, 1, 1, 2, 4, 8][random.random_range(0..6)],
         },
         rows,
         cols,

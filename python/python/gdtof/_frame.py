@@ -128,7 +128,7 @@ class Maps:
         """One of the maps by name."""
         if name not in ("depth", "guide", "truth", "peak", "error", "confidence", "reason", "counts"):
             raise InputError(
-                f"{name!r} is no map; give depth, guide, truth, peak, error, confidence, reason or counts"
+                f"{name!r} is not a map; give depth, guide, truth, peak, error, confidence, reason or counts"
             )
         array: NDArray[Any] = getattr(self, name)
         return array
@@ -202,7 +202,7 @@ class Frame(Maps):
         Parameters
         ----------
         folder
-            Where to; it is made if need be.
+            Where to; created if missing.
 
         Returns
         -------
@@ -306,19 +306,19 @@ def frame(
     engine
         Engine of the macropixels: gate, cycle, window or cohort.
     sub_bins
-        Steps to a CLK period of the cohort engine, 1 to 64; without it, as fine as its error needs.
+        Gone, and refused: the cohort engine chooses its steps itself.
     tolerance_m
         Depth error that a cheaper engine may add on average, m.
     skip
         Leave out what the engine can do without, for the same histograms.
     false_alarm_rate
-        Share of macropixels without an echo that may be given a depth.
+        Share of macropixels without an echo that may get a depth.
     correct_walk
         Take the range walk of strong echoes out.
     calibration
         File of a bin profile, for sensors with delay lines.
     bins_from_guide
-        Slow CLK down until windows hold what the guide claims of its errors.
+        Slow CLK down until windows are as long as the guide's claimed errors require.
     probes
         Macropixels (row, col) to run at gate level, too: they must agree to the count, and leave waveforms.
     waves

@@ -31,17 +31,18 @@ const DEPTH_FILE: &str = "depth_map.npy";
 /// A pair of pictures.
 #[derive(Args)]
 pub(super) struct PairArgs {
-    /// Left picture of a real, rectified camera pair that stands in for the scene (PNG); with --right and --calib.
+    /// Left picture (PNG) of a real, rectified camera pair to use in place of a scene; needs --right and --calib.
     #[arg(long, value_name = "FILE", requires_all = ["right", "calib"], conflicts_with = "scene")]
     left: Option<PathBuf>,
-    /// Its right picture.
+    /// Right picture of that pair (PNG).
     #[arg(long, value_name = "FILE", requires = "left")]
     right: Option<PathBuf>,
-    /// Its calibration (TOML): left and right (3x3 intrinsics, px), baseline_m; also disparities, min_disparity,
-    /// lidar_position_m (from the left camera) and lidar_fov_deg.
+    /// Calibration of that pair (TOML): left and right (3x3 intrinsics, px) and baseline_m; optionally disparities,
+    /// min_disparity, lidar_position_m (from the left camera) and lidar_fov_deg.
     #[arg(long, value_name = "FILE", requires = "left")]
     calib: Option<PathBuf>,
-    /// True disparities of the left picture (.npy, px), from which the light comes; without it, it comes from the pair's own depths.
+    /// True disparities of the left picture (.npy, px), from which the light is computed. Without them it is computed
+    /// from the pair's own depths.
     #[arg(long, value_name = "FILE", requires = "left")]
     truth: Option<PathBuf>,
 }
@@ -99,7 +100,7 @@ impl PairArgs {
     /// Reads and matches the pair. `optics` is the scene whose lidar, light and air stay.
     ///
     /// # Errors
-    /// Files that cannot be read or are none of a pair; a calibration that cannot be, or that leads nowhere.
+    /// Files that cannot be read or do not make a pair; a calibration that is impossible or gives no depth.
     pub(super) fn take(
         &self,
         sensor: &SensorConfig,
@@ -218,7 +219,7 @@ impl Taken {
     /// # Errors
     /// When a file cannot be written.
     pub(super) fn write(&self, out: &Path) -> Result<(), InputError> {
-        let shape = [self.map.height() as u64, self.map.width() as u64];
+        let shape = [self.map.height(), self.map.width()];
         write_npy_f32(&out.join(DEPTH_FILE), &shape, &self.depths_m)?;
         write_npy_f32(&out.join("disparity.npy"), &shape, self.map.values_px())?;
         disparity_picture(&self.matcher, &self.map, &out.join("disparity.png"))
@@ -226,7 +227,7 @@ impl Taken {
 }
 
 impl PairReport {
-    /// Adds what there is to say to a frame's table.
+    /// Adds the pair's rows to a frame's table.
     pub(super) fn rows(&self, table: &mut Table) {
         table.push("light from", self.light_from);
         table.push("pixels matched", self.matched);
@@ -235,7 +236,7 @@ impl PairReport {
         }
     }
 
-    /// What must be known to read the errors.
+    /// A note on how to read the errors.
     pub(super) fn note(&self) -> Option<&'static str> {
         self.disparity_errors.is_none().then_some(
             "Light comes from the depths that the pair itself has matched: errors of the guide are in both and are not seen. --truth gives other light.",
@@ -254,7 +255,7 @@ fn intrinsics(name: &str, matrix: [[f64; 3]; 3]) -> Result<Intrinsics, String> {
     let plain = fx > 0.0 && skew == 0.0 && zero == 0.0 && last == [0.0, 0.0, 1.0];
     if !plain || (fy / fx - 1.0).abs() > 0.01 {
         return Err(format!(
-            "the {name} intrinsics {matrix:?} are none of a rectified camera with square pixels; give [[f, 0, u], [0, f, v], [0, 0, 1]]"
+            "the {name} intrinsics {matrix:?} are not those of a rectified camera with square pixels; give [[f, 0, u], [0, f, v], [0, 0, 1]]"
         ));
     }
     Ok(Intrinsics {

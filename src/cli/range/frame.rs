@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::RangeArgs;
 use crate::cli::quality;
-use crate::cli::voice::{say, tell};
+use crate::cli::voice::{say, say_json, tell};
 use crate::files::{OutputFile, read_counts};
 use crate::ranging::DepthOptions;
 use crate::report::Table;
@@ -53,8 +53,7 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
             bin_m: ranged.bin_m,
             macropixels: &ranged.pixels,
         };
-        say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
-        return Ok(());
+        return say_json(&report);
     }
     let mut table = Table::new(format!("Depths of {}", args.histograms.display()));
     quality::rows(&mut table, &options, &ranged.summary());

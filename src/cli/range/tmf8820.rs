@@ -4,7 +4,7 @@ use clap::ValueEnum;
 use serde::Serialize;
 
 use super::RangeArgs;
-use crate::cli::voice::say;
+use crate::cli::voice::{say, say_json};
 use crate::files::{InputError, OutputFile, parse_json, read_text};
 use crate::ranging::tmf8820::{self, Capture};
 use crate::ranging::{ArrivalOptions, Calibration, Echo, arrival};
@@ -271,20 +271,14 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
         calibration,
     };
     if args.json {
-        say(format_args!("{}\n", serde_json::to_string_pretty(&report)?))?;
-        return Ok(());
+        return say_json(&report);
     }
     say(table(&report))?;
     Ok(())
 }
 
 fn table(report: &Report) -> String {
-    let mut errors = Grid::new([
-        "depth to the plane",
-        "RMS (mm)",
-        "mean (mm)",
-        "largest (mm)",
-    ]);
+    let mut errors = Grid::headed("depth to the plane | RMS (mm) | mean (mm) | largest (mm)");
     errors.push(report.depths.row("gdtof"));
     errors.push(report.sensor.row("the sensor's own"));
     if let Some(refitted) = &report.sensor_refitted {

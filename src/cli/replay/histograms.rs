@@ -53,7 +53,7 @@ pub(super) fn write(
         (None, _) => csv(&mut std::io::stdout().lock())?,
         (Some(path), Format::Csv) => OutputFile::write_with(path, csv)?,
         (Some(path), Format::Npy) => {
-            let shape = [config.rows, config.cols, config.bins].map(|n| n as u64);
+            let shape = [config.rows, config.cols, config.bins];
             write_npy_u16(path, &shape, histograms.counts())?;
         }
     }

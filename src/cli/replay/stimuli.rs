@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::bench::recording::{Recording, read_events, read_starts};
 use crate::chip::{Exposure, Sensor};
 use crate::cli::SensorArgs;
 use crate::files::InputError;
 use crate::photon::SpadEvent;
 use crate::request::{self, Spelling};
+use crate::stimulus::recording::{Recording, read_events, read_starts};
 
-/// What is replayed.
+/// The stimulus.
 #[derive(Args)]
 pub(super) struct StimulusArgs {
     #[command(flatten)]
@@ -19,7 +19,7 @@ pub(super) struct StimulusArgs {
     /// Start values: CSV `row,col,init`, one line for every macropixel.
     #[arg(long, value_name = "FILE")]
     inits: PathBuf,
-    /// Rising edges of SPAD_RAW: CSV `time_fs,row,col,spad` from the first rising edge of STOP.
+    /// Rising edges of SPAD_RAW: CSV `time_fs,row,col,spad`, with times from the first rising edge of STOP.
     #[arg(long, value_name = "FILE")]
     events: PathBuf,
     /// CLK periods in a laser cycle.
@@ -30,7 +30,7 @@ pub(super) struct StimulusArgs {
     laser_cycles: u32,
 }
 
-/// What is replayed, read and checked: shared with `gdtof export verilog`.
+/// The stimulus, read and checked; shared with `gdtof export verilog`.
 pub(crate) struct Stimuli {
     /// The chip.
     pub sensor: Sensor,
@@ -46,7 +46,7 @@ impl StimulusArgs {
     /// Reads and checks everything.
     ///
     /// # Errors
-    /// One sentence about the first thing that cannot be.
+    /// One sentence about the first thing that is wrong.
     pub(super) fn read(&self) -> Result<Stimuli, InputError> {
         let periods = (self.stop_periods, self.laser_cycles);
         Stimuli::read(self.sensor.read()?, &self.inits, &self.events, periods)
@@ -57,7 +57,7 @@ impl Stimuli {
     /// Reads start values and events of a sensor; `periods` are CLK periods in a laser cycle and laser cycles.
     ///
     /// # Errors
-    /// One sentence about the first thing that cannot be.
+    /// One sentence about the first thing that is wrong.
     pub(crate) fn read(
         sensor: Sensor,
         inits: &Path,

@@ -8,7 +8,7 @@ use crate::analysis::{Spread, spread};
 use crate::chip::{SensorConfig, Silicon};
 use crate::cli::voice::progress;
 use crate::files::InputError;
-use crate::report::{Axis, Chart, Style};
+use crate::report::{Axis, Chart};
 
 /// Bars of the plot.
 const BARS: usize = 48;
@@ -88,11 +88,10 @@ pub(super) fn plot(config: &SensorConfig, found: &Spread, path: &Path) -> Result
     );
     let x = Axis::linear("CLK fall to LOCAL_STOP (ps)");
     Chart::new(title, x, Axis::linear("macropixels"))
-        .with(
+        .bars(
             "macropixels",
-            Style::Bars,
             (0..BARS).map(|bar| (centre(bar), counts[bar])),
         )
-        .with("normal", Style::Line, curve.map(|x| (x, normal(x))))
+        .line("normal", curve.map(|x| (x, normal(x))))
         .write(path)
 }

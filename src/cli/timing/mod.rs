@@ -25,13 +25,13 @@ pub(super) struct TimingArgs {
     sensor: SensorArgs,
     #[command(flatten)]
     silicon: SiliconArgs,
-    /// Distribution of the ripple over the array's macropixels (SVG, with its numbers as CSV beside it; needs --mismatch).
+    /// Plot the distribution of the ripple over the array (SVG, with its numbers as CSV beside it; needs --mismatch).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
-    /// Every step of the longest and shortest paths.
+    /// Print every step of the longest and shortest paths.
     #[arg(long)]
     paths: bool,
-    /// JSON instead of tables; times in picoseconds.
+    /// Print JSON instead of tables; times are in picoseconds.
     #[arg(long)]
     json: bool,
 }

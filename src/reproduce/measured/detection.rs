@@ -5,7 +5,8 @@ use super::{Study, interval_text};
 use crate::chip::Overflow;
 use crate::engine::EngineError;
 use crate::numerics::intervals::{Estimate, share};
-use crate::report::{Axis, Chart, Grid, Style};
+use crate::report::{Chart, Grid};
+use crate::reproduce::thesis::measurement;
 use crate::theory::cycles::laser_cycles_for;
 use crate::theory::detection::{Model, PerCycle, Ties, probability};
 
@@ -56,22 +57,8 @@ const LEVELS: [f64; 6] = [0.1, 0.3, 0.6, 0.8, 0.95, 0.997];
 
 /// P_D against laser cycles.
 fn sweep(frames: usize) -> Result<(Grid, Chart), EngineError> {
-    let mut grid = Grid::new([
-        "light",
-        "laser cycles",
-        "Eq. 17",
-        "one hit a bin and cycle",
-        "chip",
-        "95 % interval",
-        "chip - Eq. 17",
-        "thin light",
-        "its interval",
-    ]);
-    let mut chart = Chart::new(
-        "Probability of detection: Eq. 17 and the modelled chip (16 bins of 2.6 ns, one of them the echo's)",
-        Axis::log("laser cycles"),
-        Axis::linear("P_D").between(0.0, 1.02),
-    );
+    let mut grid = measurement(1).grid(0);
+    let mut chart = measurement(1).chart();
     for (name, signal, background_hz) in LIGHTS {
         let trial = Trial::new(signal, background_hz, 1);
         let light = trial.per_cycle();
@@ -110,9 +97,9 @@ fn sweep(frames: usize) -> Result<(Grid, Chart), EngineError> {
             (cycles, by_formula(&light, cycles as u32, EQ_17))
         });
         chart = chart
-            .with(format!("Eq. 17, {name}"), Style::Line, curve)
-            .with(format!("chip, {name}"), Style::Points, measured)
-            .with("", Style::Whiskers, ends);
+            .line(format!("Eq. 17, {name}"), curve)
+            .points(format!("chip, {name}"), measured)
+            .whiskers("", ends);
     }
     Ok((grid, chart))
 }
@@ -277,21 +264,6 @@ fn failures(frames: usize) -> Result<Grid, EngineError> {
 /// Configurations that no engine can run.
 pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
     let (sweep, chart) = sweep(frames)?;
-    Ok(Study {
-        notes: vec![
-            format!("{frames} frames for each number, fewer where an exposure takes very many photons; intervals are Wilson's at 95 %, so that one in twenty misses."),
-            "The echo lies in the middle of one bin but in the case of a wide pulse; the sweep decides ties by lot, as the formula does. \
-             Daylight is 20 Mcounts/s on a macropixel (Table 6), the chip the QuantIC4x4 with 8 ns of dead time."
-                .into(),
-            "Thin light: the same photons in 256 times the laser cycles, where none of the effects is left.".into(),
-            "Each column of the second table takes one effect alone out of the chip; \"-\" where it plays no part, and for dead time and single hits in the two long exposures, where overflow is the matter. \"No dead time\" leaves the toggle front end, \
-             which loses two pulses of one SPAD in one CLK period."
-                .into(),
-        ],
-        grids: vec![
-            ("P_D against laser cycles", sweep),
-            ("where Eq. 17 fails, by how much, and what mends it", failures(frames)?),
-        ],
-        charts: vec![chart],
-    })
+    let grids = [sweep, failures(frames)?];
+    Ok(measurement(1).study(&[("frames", frames)], grids, Some(chart)))
 }

@@ -28,6 +28,7 @@ use crate::numerics::intervals::Estimate;
 use crate::report::Grid;
 use crate::reproduce::delay_line::calibrated as delay_line_calibration;
 use crate::reproduce::penalty::{demonstrator, long_range};
+use crate::reproduce::thesis::measurement;
 use crate::theory::partial::System;
 
 /// Frames with which claims and figures are measured, half of a study's: a few seconds.
@@ -209,17 +210,7 @@ pub(crate) fn with_interval(estimate: &Estimate, decimals: usize) -> String {
 }
 
 fn detections(all: &[OnChip]) -> Grid {
-    let mut grid = Grid::new([
-        "zooming's detection",
-        "cycles reckoned",
-        "P_D of the chip in them",
-        "frames",
-        "cycles of the chip",
-        "exposures, 12 bit",
-        "14 bit",
-        "12-bit bin full in one",
-        "14-bit",
-    ]);
+    let mut grid = measurement(4).grid(0);
     for (name, at) in each(all) {
         for detection in &at.detections {
             let mut cells = vec![
@@ -245,14 +236,7 @@ fn detections(all: &[OnChip]) -> Grid {
 }
 
 fn schemes(all: &[OnChip], lines: &OnDelayLines) -> Grid {
-    let mut grid = Grid::new([
-        "range and scheme",
-        "cycles reckoned",
-        "cycles of the chip",
-        "penalty reckoned",
-        "penalty of the chip",
-        "measured within 0.5 m",
-    ]);
+    let mut grid = measurement(4).grid(1);
     for on_chip in all {
         let system = &on_chip.system;
         for at in &on_chip.ranges {
@@ -331,20 +315,6 @@ fn shown(estimate: Option<Estimate>, decimals: usize) -> String {
 pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
     let all = measure_both(frames)?;
     let lines = measure_on_delay_lines(frames)?;
-    Ok(Study {
-        notes: vec![
-            format!("{frames} frames for each measurement, {FEWEST} at least for a detection; in brackets intervals at 95 %, those of P_D Wilson's."),
-            "Sliding's windows are the guided mode's. Zooming's coarse bins are the conventional mode's on a CLK as slow as they are long, where a bin counts one hit a laser cycle and a SPAD fires several times in a CLK period, of which the toggle front end loses pairs."
-                .into(),
-            "Reckoned: Eq. 17 with every photon counted; Cramér-Rao for the QuantIC4x4, Thompson for HSLIDAR, as in the thesis. A detection is split into exposures that the counters hold, and added off the chip: so it is measured. HSLIDAR's bins are CLK periods of its delay line's mean."
-                .into(),
-            "In its delay-line bins, calibrated, HSLIDAR slides by its own windows, one every 12.5 ns, which overlap by two fifths. It cannot zoom so: CLK has no part in a bin."
-                .into(),
-        ],
-        grids: vec![
-            ("detections of zooming", detections(&all)),
-            ("laser cycles and penalty of the schemes", schemes(&all, &lines)),
-        ],
-        charts: Vec::new(),
-    })
+    let grids = [detections(&all), schemes(&all, &lines)];
+    Ok(measurement(4).study(&[("frames", frames), ("fewest", FEWEST)], grids, None))
 }

@@ -13,6 +13,7 @@ use crate::numerics::intervals::Estimate;
 use crate::numerics::probit::{Point, crossing};
 use crate::report::Grid;
 use crate::reproduce::penalty::long_range;
+use crate::reproduce::thesis::measurement;
 use crate::theory::cycles::laser_cycles_for;
 use crate::theory::detection::{Model, PerCycle, Ties};
 use crate::theory::partial::{Purpose, System};
@@ -177,15 +178,7 @@ pub(super) fn ratio(a: &Estimate, b: &Estimate) -> Estimate {
 const RANGES_M: [f64; 3] = [50.0, 75.0, 100.0];
 
 fn schemes(measured: &[Schemes]) -> Grid {
-    let mut grid = Grid::new([
-        "range and scheme",
-        "cycles by formula",
-        "cycles of the chip",
-        "95 % interval",
-        "penalty by formula",
-        "penalty of the chip",
-        "95 % interval",
-    ]);
+    let mut grid = measurement(3).grid(1);
     for schemes in measured {
         let (guided_formula, guided) = schemes.measuring;
         let zooming = schemes.coarse.iter().try_fold(guided, |all, step| {
@@ -239,15 +232,7 @@ fn guided(wanted: f64, frames: usize) -> Result<Vec<Detection>, EngineError> {
 
 /// Laser cycles to the wanted P_D.
 fn detections<'a>(wanted: f64, all: impl Iterator<Item = &'a Detection>) -> Grid {
-    let mut grid = Grid::new([
-        "detection",
-        "P_D",
-        "Eq. 17",
-        "one hit a bin and cycle",
-        "chip",
-        "95 % interval",
-        "chip / Eq. 17",
-    ]);
+    let mut grid = measurement(3).grid(0);
     for Detection { name, light, chip } in all {
         let by = |model| {
             laser_cycles_for(wanted, light, model).map_or(f64::INFINITY, |cycles| cycles as f64)
@@ -289,19 +274,6 @@ pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
     let guided = guided(wanted, frames)?;
     let zooming = measured.iter().flat_map(|schemes| &schemes.coarse);
     let detections = detections(wanted, guided.iter().chain(zooming));
-    Ok(Study {
-        notes: vec![
-            format!("{frames} frames for each number, fewer where an exposure is long; intervals at 95 %."),
-            "Table 6's light and Table 7's schemes: bins of 5 ns for the measurement to 0.1 m, detection to 99.7 % in bins of 12.5 m. \
-             Zooming's coarse bins are the same chip on a CLK of 12 MHz in the conventional mode, where a SPAD fires several times in a CLK period and the toggle front end loses pairs."
-                .into(),
-            "Formulas: Eq. 17 with every photon counted, Cramér-Rao. On the chip the P_D must cross 99.7 %, and the maximum-likelihood time must scatter by no more than 0.1 m."
-                .into(),
-        ],
-        grids: vec![
-            ("laser cycles for a detection", detections),
-            ("laser cycles and penalty of the schemes", schemes(&measured)),
-        ],
-        charts: Vec::new(),
-    })
+    let grids = [detections, schemes(&measured)];
+    Ok(measurement(3).study(&[("frames", frames)], grids, None))
 }

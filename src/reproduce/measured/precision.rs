@@ -7,7 +7,8 @@ use rayon::prelude::*;
 use crate::engine::EngineError;
 use crate::numerics::intervals::{Estimate, deviation, mean};
 use crate::ranging::{PeakOptions, interpolate};
-use crate::report::{Axis, Chart, Grid, Style};
+use crate::report::{Chart, Grid};
+use crate::reproduce::thesis::measurement;
 use crate::theory::Pulse;
 use crate::theory::estimators::Expected;
 use crate::theory::precision::{cramer_rao, thompson};
@@ -130,22 +131,7 @@ pub fn by_formula(trial: &Trial) -> (f64, f64) {
 }
 
 fn sweep(frames: usize) -> Result<(Grid, Chart), EngineError> {
-    let mut grid = Grid::new([
-        "signal photons a pulse",
-        "in all",
-        "Thompson (ns)",
-        "bound (ns)",
-        "chip, likelihood (ns)",
-        "95 % interval",
-        "over the bound",
-        "bias (ns)",
-        "chip, Eq. 28 (ns)",
-        "95 % interval",
-        "over Thompson",
-        "bias (ns)",
-        "thin light, likelihood (ns)",
-        "95 % interval",
-    ]);
+    let mut grid = measurement(2).grid(0);
     let mut points: [Vec<(f64, f64)>; 7] = Default::default();
     for (number, signal) in SIGNALS.into_iter().enumerate() {
         let trial = trial(signal);
@@ -189,36 +175,22 @@ fn sweep(frames: usize) -> Result<(Grid, Chart), EngineError> {
         peak_ends,
         bias,
     ] = points;
-    let chart = Chart::new(
-        "Precision: formulas and the modelled chip (bins of 2.6 ns, pulse of 4.5 ns, daylight, 2000 laser cycles)",
-        Axis::log("signal photons"),
-        Axis::log("standard deviation (ns)"),
-    )
-    .with("Thompson", Style::Dashed, thompson)
-    .with("Cramér-Rao", Style::Line, bound)
-    .with("chip, likelihood", Style::Points, likelihood)
-    .with("", Style::Whiskers, likelihood_ends)
-    .with("chip, Eq. 28", Style::Points, peak)
-    .with("", Style::Whiskers, peak_ends)
-    .with("chip, likelihood: bias", Style::Dashed, bias);
+    let chart = measurement(2)
+        .chart()
+        .dashed("Thompson", thompson)
+        .line("Cramér-Rao", bound)
+        .points("chip, likelihood", likelihood)
+        .whiskers("", likelihood_ends)
+        .points("chip, Eq. 28", peak)
+        .whiskers("", peak_ends)
+        .dashed("chip, likelihood: bias", bias);
     Ok((grid, chart))
 }
 
 /// Spread and bias of the likelihood estimate with each effect taken out alone.
 fn failures(frames: usize) -> Result<Grid, EngineError> {
     let effects = [Effect::DeadTime, Effect::OneHit, Effect::Overflow];
-    let mut headings = vec!["case", "bound (ns)", "chip: spread (ns)", "bias (ns)"];
-    headings.extend([
-        "no dead time: spread",
-        "bias",
-        "every pulse counts: spread",
-        "bias",
-        "wide counters: spread",
-        "bias",
-        "thin light: spread",
-        "bias",
-    ]);
-    let mut grid = Grid::new(headings);
+    let mut grid = measurement(2).grid(1);
     let narrow = trial(4.0).on(|sensor| sensor.bin_bits = 10);
     let wide = Trial {
         sigma_ns: 8.0 * super::super::penalty::sigma_over_fwhm(),
@@ -266,16 +238,6 @@ fn failures(frames: usize) -> Result<Grid, EngineError> {
 /// Configurations that no engine can run.
 pub(crate) fn study(frames: usize) -> Result<Study, EngineError> {
     let (sweep, chart) = sweep(frames)?;
-    Ok(Study {
-        notes: vec![
-            format!("{frames} frames for each number, echoes evenly over their bin; intervals of a spread are chi-square's at 95 %, their degrees of freedom from the sample's fourth moment."),
-            "Likelihood: the maximum-likelihood time under the formulas' histogram (Gaussian pulse, flat background, Poisson counts, their means as measured), which is to reach the bound. Eq. 28: the centre of mass two bins either side of the fullest, the median of the rest taken off.".into(),
-            "A spread says nothing of the bias beside it: photons that others hide are the late ones, and the echo seems early.".into(),
-        ],
-        grids: vec![
-            ("spread of the measured time against signal", sweep),
-            ("where the bound fails, by how much, and what mends it", failures(frames)?),
-        ],
-        charts: vec![chart],
-    })
+    let grids = [sweep, failures(frames)?];
+    Ok(measurement(2).study(&[("frames", frames)], grids, Some(chart)))
 }

@@ -57,7 +57,7 @@ impl Effect {
     ];
 
     /// As a column's heading, taken out.
-    pub fn absent(self) -> &'static str {
+    pub(crate) fn absent(self) -> &'static str {
         match self {
             Effect::Spread => "narrow echo",
             Effect::Ties => "ties by lot",
@@ -147,7 +147,7 @@ impl Trial {
     }
 
     /// As [`Trial::new`], with what this link receives from `range_m` away, its pulse as wide as the link's.
-    pub fn of_link(link: &Link, range_m: f64, cycles: u32) -> Self {
+    pub(crate) fn of_link(link: &Link, range_m: f64, cycles: u32) -> Self {
         Trial {
             sigma_ns: 1e9 * link.pulse_sigma_s,
             ..Trial::new(
@@ -161,7 +161,7 @@ impl Trial {
     /// The same with `candidates` bins of `bin_m` metres, the echo in the middle of the last: CLK as slow as they are long, and
     /// the conventional mode, whose bins end with STOP.
     #[must_use]
-    pub fn in_coarse_bins(self, candidates: u32, bin_m: f64) -> Self {
+    pub(crate) fn in_coarse_bins(self, candidates: u32, bin_m: f64) -> Self {
         Trial {
             stop_periods: candidates + 4,
             echo_bins: f64::from(candidates) - 1.0,
@@ -176,18 +176,18 @@ impl Trial {
 
     /// The same on a sensor whose description is changed, of the same silicon.
     #[must_use]
-    pub fn on(mut self, change: impl FnOnce(&mut SensorConfig)) -> Self {
+    pub(crate) fn on(mut self, change: impl FnOnce(&mut SensorConfig)) -> Self {
         self.sensor = changed(&self.sensor, change);
         self
     }
 
     /// Bin interval, ns.
-    pub fn bin_ns(&self) -> f64 {
+    pub(crate) fn bin_ns(&self) -> f64 {
         1e9 / self.sensor.clk_hz
     }
 
     /// Background photons in a bin and laser cycle.
-    pub fn background(&self) -> f64 {
+    pub(crate) fn background(&self) -> f64 {
         self.background_hz / self.sensor.clk_hz
     }
 
@@ -201,7 +201,7 @@ impl Trial {
     }
 
     /// The same without `effect`; `None` where it plays no part.
-    pub fn without(&self, effect: Effect) -> Option<Self> {
+    pub(crate) fn without(&self, effect: Effect) -> Option<Self> {
         let mut trial = self.clone();
         match effect {
             Effect::Spread => {
@@ -231,7 +231,7 @@ impl Trial {
         (trial != *self).then_some(trial)
     }
 
-    /// The same photons in so many more laser cycles that they never meet, on counters that hold them.
+    /// The same photons spread over enough laser cycles that two never meet, with counters that can hold them.
     pub fn in_thin_light(&self) -> Self {
         let thin = self.without(Effect::Threshold);
         Trial {
@@ -267,7 +267,7 @@ impl Trial {
     }
 
     /// How many of `frames` frames to afford: fewer where an exposure takes very many photons.
-    pub fn affordable(&self, frames: usize) -> usize {
+    pub(crate) fn affordable(&self, frames: usize) -> usize {
         let cost_us = match self.maker() {
             Maker::Window => DRAWN_US * self.photons(),
             Maker::Cohort => COHORT_US * self.cohorts().unwrap_or(0.0),
@@ -285,7 +285,7 @@ impl Trial {
     ///
     /// # Errors
     /// Configurations that no engine can run.
-    pub fn histograms(
+    pub(crate) fn histograms(
         &self,
         frames: usize,
         seed: u64,

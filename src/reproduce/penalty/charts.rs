@@ -1,10 +1,11 @@
 //! Figures of laser cycles and penalties, and table 7.
 
 use super::{demonstrator, long_range, one_hit, penalty};
-use crate::report::{Axis, Chart, Grid, Style};
+use crate::report::{Chart, Grid};
 use crate::reproduce::measured::partial::{
     AtRange, OnChip, demonstrator_on_chip, demonstrator_on_delay_lines, long_range_on_chip,
 };
+use crate::reproduce::thesis::{chart, grid};
 use crate::theory::capacity::full_bins;
 use crate::theory::partial::{Purpose, System};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -85,58 +86,35 @@ impl Curves {
 }
 
 /// Fig. 35: laser cycles of a full histogram.
-pub(in crate::reproduce) fn figure_35() -> Vec<Chart> {
+pub(in crate::reproduce) fn figure_35() -> Chart {
     let fits = |z_m: f64| SPEED_OF_LIGHT_M_PER_S / (2.0 * z_m * 30.0);
     let needed = Curves::of(long_range(), 200).full();
-    vec![
-        Chart::new(
-            "Laser cycles for 0.1 m (Table 6, 5 ns bins), and what a frame at 30 fps holds",
-            Axis::linear("distance (m)").between(0.0, 205.0),
-            Axis::log("laser cycles").between(1.0, 1e6),
-        )
-        .with("needed, Cramér-Rao", Style::Line, needed)
-        .with(
+    chart(35)
+        .line("needed, Cramér-Rao", needed)
+        .line(
             "that fit a frame",
-            Style::Line,
             (5..=200).map(|z| (f64::from(z), fits(f64::from(z)))),
         )
-        .with(
-            "published, both at 200 m",
-            Style::Points,
-            [(200.0, 25_000.0)],
-        ),
-    ]
+        .points("published, both at 200 m", [(200.0, 25_000.0)])
 }
 
 /// Fig. 42: laser cycles of the detection step.
-pub(in crate::reproduce) fn figure_42() -> Vec<Chart> {
+pub(in crate::reproduce) fn figure_42() -> Chart {
     let detecting = |system: System| Curves::of(system, 200).detecting();
-    vec![
-        Chart::new(
-            "Laser cycles of zooming's detection step (16 bins of 12.5 m, P_D 99.7 %)",
-            Axis::linear("distance (m)").between(0.0, 205.0),
-            Axis::linear("laser cycles"),
-        )
-        .with(
-            "every photon counts (thesis)",
-            Style::Line,
-            detecting(long_range()),
-        )
-        .with(
+    chart(42)
+        .line("every photon counts (thesis)", detecting(long_range()))
+        .dashed(
             "one hit per bin and cycle (this chip)",
-            Style::Dashed,
             detecting(one_hit(long_range())),
         )
-        .with(
+        .points(
             "measured on the chip",
-            Style::Points,
             points(long_range_on_chip(), |at| Some(at.detecting()?.value)),
-        ),
-    ]
+        )
 }
 
 /// Fig. 43: laser cycles of each window of sliding.
-pub(in crate::reproduce) fn figure_43() -> Vec<Chart> {
+pub(in crate::reproduce) fn figure_43() -> Chart {
     let steps = long_range().sliding(200.0, 0).steps;
     let each: Points = steps
         .iter()
@@ -150,16 +128,10 @@ pub(in crate::reproduce) fn figure_43() -> Vec<Chart> {
     let total: Points = total.collect();
     let windows = &long_range_on_chip().windows;
     let measured: Points = windows.iter().map(|(end_m, n)| (*end_m, n.value)).collect();
-    vec![
-        Chart::new(
-            "Sliding: laser cycles of each window, and of all up to it",
-            Axis::linear("end of the window (m)"),
-            Axis::linear("laser cycles"),
-        )
-        .with("all windows so far", Style::Line, total)
-        .with("this window", Style::Bars, each)
-        .with("this window, measured on the chip", Style::Points, measured),
-    ]
+    chart(43)
+        .line("all windows so far", total)
+        .bars("this window", each)
+        .points("this window, measured on the chip", measured)
 }
 
 /// What was measured, against range.
@@ -170,138 +142,84 @@ fn points(on_chip: &OnChip, of: impl Fn(&AtRange) -> Option<f64>) -> Points {
         .collect()
 }
 
-fn schemes(title: &str, on_chip: &OnChip, to_m: u32) -> Chart {
+fn schemes(figure: u32, on_chip: &OnChip, to_m: u32) -> Chart {
     let curves = Curves::of(on_chip.system, to_m);
     let measured = |of: fn(&AtRange) -> Option<f64>| points(on_chip, of);
-    Chart::new(
-        title,
-        Axis::linear("distance (m)"),
-        Axis::log("laser cycles"),
-    )
-    .with("full and guided", Style::Line, curves.full())
-    .with("zooming", Style::Line, curves.zooming())
-    .with("sliding", Style::Line, curves.sliding())
-    .with(
-        "guided, measured",
-        Style::Points,
-        measured(|at| Some(at.guided.value)),
-    )
-    .with(
-        "zooming, measured",
-        Style::Points,
-        measured(|at| Some(at.zooming()?.value)),
-    )
-    .with(
-        "sliding, measured",
-        Style::Points,
-        measured(|at| Some(at.sliding.value)),
-    )
+    chart(figure)
+        .line("full and guided", curves.full())
+        .line("zooming", curves.zooming())
+        .line("sliding", curves.sliding())
+        .points("guided, measured", measured(|at| Some(at.guided.value)))
+        .points(
+            "zooming, measured",
+            measured(|at| Some(at.zooming()?.value)),
+        )
+        .points("sliding, measured", measured(|at| Some(at.sliding.value)))
 }
 
-fn penalties(title: &str, on_chip: &OnChip, to_m: u32) -> Chart {
+fn penalties(figure: u32, on_chip: &OnChip, to_m: u32) -> Chart {
     let curves = Curves::of(on_chip.system, to_m);
     let chip = Curves::of(one_hit(on_chip.system), to_m);
-    Chart::new(
-        title,
-        Axis::linear("distance (m)"),
-        Axis::log("penalty (×)"),
-    )
-    .with("guided", Style::Line, [(1.0, 1.0), (f64::from(to_m), 1.0)])
-    .with("zooming", Style::Line, curves.penalty_of_zooming())
-    .with("sliding", Style::Line, curves.penalty_of_sliding())
-    .with(
-        "zooming, one hit per bin and cycle",
-        Style::Dashed,
-        chip.penalty_of_zooming(),
-    )
-    .with(
-        "zooming, measured",
-        Style::Points,
-        points(on_chip, |at| Some(at.penalty_of_zooming()?.value)),
-    )
-    .with(
-        "sliding, measured",
-        Style::Points,
-        points(on_chip, |at| Some(at.penalty_of_sliding().value)),
-    )
+    chart(figure)
+        .line("guided", [(1.0, 1.0), (f64::from(to_m), 1.0)])
+        .line("zooming", curves.penalty_of_zooming())
+        .line("sliding", curves.penalty_of_sliding())
+        .dashed(
+            "zooming, one hit per bin and cycle",
+            chip.penalty_of_zooming(),
+        )
+        .points(
+            "zooming, measured",
+            points(on_chip, |at| Some(at.penalty_of_zooming()?.value)),
+        )
+        .points(
+            "sliding, measured",
+            points(on_chip, |at| Some(at.penalty_of_sliding().value)),
+        )
 }
 
 /// Fig. 44: laser cycles of the three schemes.
-pub(in crate::reproduce) fn figure_44() -> Vec<Chart> {
-    vec![schemes(
-        "Laser cycles for Table 6's goals (16-bin schemes of Table 7)",
-        long_range_on_chip(),
-        200,
-    )]
+pub(in crate::reproduce) fn figure_44() -> Chart {
+    schemes(44, long_range_on_chip(), 200)
 }
 
 /// Fig. 45: their penalties.
-pub(in crate::reproduce) fn figure_45() -> Vec<Chart> {
-    let chart = penalties(
-        "Laser power penalty of 16-bin partial histograms (Table 6)",
-        long_range_on_chip(),
-        200,
-    );
-    vec![chart.with("published: approaching 4", Style::Points, [(200.0, 4.0)])]
+pub(in crate::reproduce) fn figure_45() -> Chart {
+    let chart = penalties(45, long_range_on_chip(), 200);
+    chart.points("published: approaching 4", [(200.0, 4.0)])
 }
 
 /// Fig. 108: laser cycles of the demonstrator's schemes.
-pub(in crate::reproduce) fn figure_108() -> Vec<Chart> {
-    let chart = schemes(
-        "Laser cycles for 10 cm (Table 15, 8 bins)",
-        demonstrator_on_chip(),
-        80,
-    );
+pub(in crate::reproduce) fn figure_108() -> Chart {
+    let chart = schemes(108, demonstrator_on_chip(), 80);
     let lines = demonstrator_on_delay_lines();
     let at = |cycles: f64| [(lines.range_m, cycles)];
-    vec![
-        chart
-            .with(
-                "guided in delay-line bins, measured",
-                Style::Points,
-                at(lines.guided.cycles.value),
-            )
-            .with(
-                "sliding in delay-line bins, measured",
-                Style::Points,
-                at(lines.sliding().value),
-            ),
-    ]
+    chart
+        .points(
+            "guided in delay-line bins, measured",
+            at(lines.guided.cycles.value),
+        )
+        .points(
+            "sliding in delay-line bins, measured",
+            at(lines.sliding().value),
+        )
 }
 
 /// Fig. 109: their penalties.
-pub(in crate::reproduce) fn figure_109() -> Vec<Chart> {
-    let chart = penalties(
-        "Laser power penalty of 8-bin partial histograms (Table 15)",
-        demonstrator_on_chip(),
-        80,
-    );
+pub(in crate::reproduce) fn figure_109() -> Chart {
+    let chart = penalties(109, demonstrator_on_chip(), 80);
     let lines = demonstrator_on_delay_lines();
-    vec![
-        chart
-            .with(
-                "sliding in delay-line bins, measured",
-                Style::Points,
-                [(lines.range_m, lines.penalty_of_sliding().value)],
-            )
-            .with(
-                "published: at least 6 at 75 m",
-                Style::Points,
-                [(75.0, 6.0)],
-            ),
-    ]
+    chart
+        .points(
+            "sliding in delay-line bins, measured",
+            [(lines.range_m, lines.penalty_of_sliding().value)],
+        )
+        .points("published: at least 6 at 75 m", [(75.0, 6.0)])
 }
 
 /// Tables 7 and 15's systems, scheme by scheme, with overflow counted.
 pub(in crate::reproduce) fn table_7() -> Grid {
-    let mut grid = Grid::new([
-        "system, scheme",
-        "steps",
-        "laser cycles",
-        "penalty (×)",
-        "exposures, 12 bit",
-        "exposures, 14 bit",
-    ]);
+    let mut grid = grid(7);
     let systems = [
         ("Table 6 at 200 m", long_range(), 200.0),
         ("Table 15 at 75 m", demonstrator(), 75.0),

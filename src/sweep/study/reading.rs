@@ -7,75 +7,40 @@ use toml::{Table, Value};
 
 use super::{Kind, MOST_POINTS, Study};
 use crate::files::{InputError, Misfit};
-use crate::settings::{Document, Fault, Key, Range, Section, schema};
+use crate::settings::Range::Within;
+use crate::settings::{Document, Fault, Section, Settings, keys, schema, words};
 use crate::sweep::cell::{Column, Holds};
 use crate::sweep::design::{Design, MOST_SOBOL_AXES};
-use crate::sweep::keys::{self, Known};
+use crate::sweep::keys::{self as names, Known};
+use crate::sweep::theory::Asked;
 use crate::sweep::values::{Axis, Span, Values, Varied};
 
-/// Keys of `[study]`.
-const STUDY: &[Key] = &[
-    Key::chosen(
-        "name",
-        Range::Text,
-        "What reports call it; the file's name without it",
-    ),
-    Key::chosen(
-        "kind",
-        Range::OneOf(&["frame", "theory"]),
-        "What is made of each point",
-    ),
-    Key::chosen(
-        "out",
-        Range::Text,
-        "Folder of its results; `sweep-` and the name without it",
-    ),
-    Key::chosen(
-        "design",
-        Range::OneOf(&["grid", "latin", "sobol"]),
-        "Which points are taken",
-    ),
-    Key::chosen(
-        "points",
-        Range::Within(1.0, MOST_POINTS as f64),
-        "How many, of a latin hypercube or a sobol sequence",
-    ),
-    Key::chosen(
-        "seed",
-        Range::Within(0.0, 9e15),
-        "Seed of the first replica, and of the design",
-    ),
-    Key::chosen(
-        "replicas",
-        Range::Within(1.0, 1e6),
-        "Times that each point is taken, with seeds one after the other",
-    ),
-];
-
-/// `[study]`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct Head {
-    name: String,
-    kind: Kind,
-    out: PathBuf,
-    design: String,
-    points: Option<u64>,
-    seed: u64,
-    replicas: u64,
+words! {
+    /// Words for [`Design`].
+    enum DesignWord {
+        Grid = "grid",
+        Latin = "latin",
+        Sobol = "sobol",
+    }
 }
 
-impl Default for Head {
-    fn default() -> Self {
-        Head {
-            name: String::new(),
-            kind: Kind::Frame,
-            out: PathBuf::new(),
-            design: "grid".into(),
-            points: None,
-            seed: 1,
-            replicas: 1,
-        }
+keys! {
+    /// `[study]`.
+    struct Head {
+        /// Name of the study in reports; the file's name if left out.
+        name: String = String::new();
+        /// What is made of each point.
+        kind: Kind = Kind::Frame;
+        /// Folder for the results; `sweep-` and the name if left out.
+        out: PathBuf = PathBuf::new();
+        /// Which points are taken.
+        design: DesignWord = DesignWord::Grid;
+        /// How many, of a latin hypercube or a sobol sequence.
+        points: Option<u64> = None, in Within(1.0, MOST_POINTS as f64);
+        /// Seed of the first replica, and of the design.
+        seed: u64 = 1, in Within(0.0, 9e15);
+        /// How often each point is taken, with successive seeds.
+        replicas: u64 = 1, in Within(1.0, 1e6);
     }
 }
 
@@ -99,16 +64,25 @@ enum Scale {
 }
 
 impl Study {
-    /// The JSON schema of a study file. What may stand in `[fixed]` and `[vary]` depends on the scene and its objects, and is left open.
-    pub fn schema() -> serde_json::Value {
-        let section = Section {
+    /// Keys of a study file that are no other file's: of `[study]`, and of what theory is asked.
+    pub const SECTIONS: [Section; 2] = [
+        Section {
             name: "study",
-            what: "What is made of each point, and which points are taken",
-            keys: STUDY,
-        };
+            what: "What is computed for each point, and which points are taken",
+            keys: Head::KEYS,
+        },
+        Section {
+            name: "theory",
+            what: "Settings of theory",
+            keys: Asked::KEYS,
+        },
+    ];
+
+    /// The JSON schema of a study file. What may stand in `[fixed]` and `[vary]` depends on the scene and its objects, and is left open.
+    pub(crate) fn schema() -> serde_json::Value {
         let numbers = ["points", "seed", "replicas"].map(|key| (key.to_owned(), Value::from(1)));
         let values = Table::from_iter([("study".to_owned(), Table::from_iter(numbers).into())]);
-        let mut schema = schema("A study of gdtof", &[section], &values);
+        let mut schema = schema("A study of gdtof", &Self::SECTIONS[..1], &values);
         for (name, what) in [
             (
                 "fixed",
@@ -178,13 +152,13 @@ impl Study {
         });
         let [study, fixed, vary] = &mut sections;
         let mut study_faults = Vec::new();
-        let head = document.section::<Head>("study", study, STUDY, &nothing, &mut study_faults);
+        let head = document.section::<Head>("study", study, &mut study_faults);
         let head: Head = head.try_into().expect("every value has been tried");
 
         let mut assignments = Vec::new();
         flatten("", fixed, &mut |name, value| {
             let path = format!("fixed.{name}");
-            match keys::find(head.kind, name).and_then(|known| keys::checked(&known, value)) {
+            match names::find(head.kind, name).and_then(|known| names::checked(&known, value)) {
                 Ok(value) => assignments.push((name.to_owned(), value)),
                 Err(message) => fault(&path, message),
             }
@@ -213,7 +187,7 @@ impl Study {
         if head.kind == Kind::Theory && head.replicas > 1 {
             fault(
                 "study.replicas",
-                "replicas: theory has no chance in it, and replicas would be alike; leave it out"
+                "replicas: theory has no random numbers, so replicas would be equal; leave it out"
                     .into(),
             );
         }
@@ -266,7 +240,7 @@ fn zipped_axes(
         Some(_) => {
             fault(
                 "vary.zip",
-                "zip is no list; write each group as a section [[vary.zip]]".into(),
+                "zip is not a list; write each group as a section [[vary.zip]]".into(),
             );
             &Vec::new()
         }
@@ -343,12 +317,12 @@ fn check_once(
 
 /// Which points are taken; a grid where that is at fault.
 fn design_of(head: &Head, axes: &[Axis], fault: &mut impl FnMut(&str, String)) -> Design {
-    let drawn = match (head.design.as_str(), head.points) {
-        ("grid", None) => {
+    let drawn = match (head.design, head.points) {
+        (DesignWord::Grid, None) => {
             for varied in axes.iter().flat_map(|axis| &axis.0) {
                 if varied.len().is_none() {
                     let message = format!(
-                        "{}: a grid goes in steps; give steps, or design = \"latin\" or \"sobol\"",
+                        "{}: a grid needs steps; give steps, or design = \"latin\" or \"sobol\"",
                         varied.name
                     );
                     fault(&format!("vary.{}", varied.name), message);
@@ -356,20 +330,23 @@ fn design_of(head: &Head, axes: &[Axis], fault: &mut impl FnMut(&str, String)) -
             }
             return Design::Grid;
         }
-        ("grid", Some(_)) => {
-            let message = "points: a grid has as many as its values make; leave it out, or give design = \"latin\" or \"sobol\"";
+        (DesignWord::Grid, Some(_)) => {
+            let message = "points: the values determine the number of points of a grid; leave it out, or give design = \"latin\" or \"sobol\"";
             fault("study.points", message.into());
             return Design::Grid;
         }
         (design, None) => {
             fault(
                 "study.design",
-                format!("design = \"{design}\" takes so many points as it is told; give points"),
+                format!(
+                    "design = {:?} needs the number of points; give points",
+                    design.name()
+                ),
             );
             return Design::Grid;
         }
-        ("latin", Some(points)) => Design::Latin(points),
-        (_, Some(points)) => Design::Sobol(points),
+        (DesignWord::Latin, Some(points)) => Design::Latin(points),
+        (DesignWord::Sobol, Some(points)) => Design::Sobol(points),
     };
     if axes.is_empty() {
         fault(
@@ -405,7 +382,7 @@ fn flatten(prefix: &str, table: &Table, found: &mut dyn FnMut(&str, &Value)) {
 
 /// What `[vary]` says of a key.
 fn varied(kind: Kind, name: &str, value: &Value) -> Result<Varied, String> {
-    let known = keys::find(kind, name)?;
+    let known = names::find(kind, name)?;
     let values = match value {
         Value::Array(list) if list.is_empty() => {
             return Err(format!("{name} has no values; give at least one"));
@@ -413,7 +390,7 @@ fn varied(kind: Kind, name: &str, value: &Value) -> Result<Varied, String> {
         Value::Array(list) => {
             let list: Result<_, String> = list
                 .iter()
-                .map(|value| keys::checked(&known, value))
+                .map(|value| names::checked(&known, value))
                 .collect();
             Values::List(list?)
         }
@@ -451,20 +428,20 @@ fn span(known: &Known, name: &str, range: &Table) -> Result<Span, String> {
         )
     })?;
     let ends = [from, to].map(|end| -> Result<f64, String> {
-        let end = keys::checked(known, &end)?;
+        let end = names::checked(known, &end)?;
         let number = end.as_integer().map(|n| n as f64).or(end.as_float());
-        number.ok_or_else(|| format!("{name} takes no numbers; give a list of its values"))
+        number.ok_or_else(|| format!("{name} does not take numbers; give a list of its values"))
     });
     let [from, to] = ends;
     let (from, to) = (from?, to?);
     if steps == Some(0) || (steps == Some(1) && from != to) {
         return Err(format!(
-            "{name}: a range has 2 steps at least, its ends; give steps"
+            "{name}: a range needs at least 2 steps, its ends; give steps"
         ));
     }
     if scale == Scale::Log && !(from > 0.0 && to > 0.0) {
         return Err(format!(
-            "{name}: equal ratios never come to {}; give ends above 0, or scale = \"linear\"",
+            "{name}: equal ratios never reach {}; give ends above 0, or scale = \"linear\"",
             from.min(to)
         ));
     }
@@ -484,7 +461,7 @@ mod tests {
     #[test]
     fn the_schema_has_every_key_of_a_study() {
         let schema = Study::schema();
-        for key in STUDY {
+        for key in Head::KEYS {
             assert!(schema["properties"]["study"]["properties"][key.name].is_object());
         }
         assert!(schema["properties"]["vary"].is_object());

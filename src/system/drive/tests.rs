@@ -1,9 +1,14 @@
 //! Drives before a wall and a ball: what is reused, what the guide sees, what the light does within an exposure.
 
+use std::sync::Arc;
+
 use super::*;
 use crate::chip::{Exposure, SensorConfig};
 use crate::guide::NoisyTruth;
-use crate::scene::{Object, Shape};
+use crate::photon::PixelLight;
+use crate::scene::{DVec3, Object, Scene, Shape};
+use crate::system::light::photon_stream;
+use crate::system::worlds;
 use proptest::prelude::*;
 
 /// A ball that crosses the field of view before a wall.

@@ -5,6 +5,7 @@ use serde::Serialize;
 use crate::chip::WindowLaw;
 use crate::engine::{Exposed, LitPixel};
 use crate::ranging::{PeakOptions, interpolate};
+use crate::units::TimeOfFlight;
 
 /// How far a method is from the `cycle` engine, over the macropixels of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -18,10 +18,8 @@ pub enum Method {
     AnotherSeed,
     /// The window engine on one laser cycle in this many, counts multiplied.
     FewerCycles(u32),
-    /// The cohort engine, as finely as it chooses.
+    /// The cohort engine.
     Cohort,
-    /// The cohort engine in this many steps to a CLK period.
-    CohortInSteps(usize),
 }
 
 /// Laser cycles that are run at gate level at most.
@@ -29,7 +27,7 @@ pub const GATE_CYCLES: u32 = 20;
 
 impl Method {
     /// Every method of the comparison: the one that the others are held against, and last the one that takes longest.
-    pub const ALL: [Method; 12] = [
+    pub const ALL: [Method; 9] = [
         Method::Cycle,
         Method::WindowWithoutSkipping,
         Method::Window,
@@ -37,15 +35,12 @@ impl Method {
         Method::FewerCycles(2),
         Method::FewerCycles(8),
         Method::FewerCycles(32),
-        Method::CohortInSteps(8),
-        Method::CohortInSteps(4),
-        Method::CohortInSteps(1),
         Method::Cohort,
         Method::Gate,
     ];
 
     /// Engine and knob, as tables name them.
-    pub fn name(self) -> String {
+    pub(crate) fn name(self) -> String {
         match self {
             Method::Gate => "gate".into(),
             Method::Cycle => "cycle".into(),
@@ -54,21 +49,17 @@ impl Method {
             Method::AnotherSeed => "window, another seed".into(),
             Method::FewerCycles(n) => format!("window, 1/{n} of the laser cycles"),
             Method::Cohort => "cohort".into(),
-            Method::CohortInSteps(1) => "cohort, 1 step a bin".into(),
-            Method::CohortInSteps(n) => format!("cohort, {n} steps a bin"),
         }
     }
 
     /// What makes its counts differ from those of the `cycle` engine, in a few words.
-    pub fn against_cycle(self) -> String {
+    pub(crate) fn against_cycle(self) -> String {
         match self {
             Method::Cycle => "the reference".into(),
             Method::Gate | Method::WindowWithoutSkipping | Method::Window => "same photons".into(),
             Method::AnotherSeed => "another seed".into(),
             Method::FewerCycles(n) => format!("1/{n} of the photons"),
             Method::Cohort => "own draws".into(),
-            Method::CohortInSteps(1) => "own draws, 1 step".into(),
-            Method::CohortInSteps(n) => format!("own draws, {n} steps"),
         }
     }
 }

@@ -11,7 +11,7 @@ use super::{WindowPolicy, normal_between};
 use crate::chip::{Exposure, Sensor, SensorConfig, Tdc, WindowLaw};
 use crate::guide::GuideMap;
 use crate::theory::design::share_inside;
-use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
+use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time, TimeOfFlight};
 
 /// By how much CLK slows down from one attempt to the next.
 const FINER: f64 = 1.005;
@@ -24,7 +24,7 @@ pub enum NoBins {
     DelayLines,
     /// Not even the longest bins worth having are enough.
     #[error(
-        "windows hold at most {:.1} % of what this guide claims, with bins of {bin_m:.2} m, and longer ones would tell less than the guide", 100.0 * share
+        "windows hold at most {:.1} % of what this guide claims, with bins of {bin_m:.2} m, and longer bins would be less precise than the guide", 100.0 * share
     )]
     Unsure {
         /// Share that is held.
@@ -83,7 +83,7 @@ impl WindowPolicy {
     ///
     /// # Errors
     /// Where bins are no CLK periods, and where none that is worth having is long enough.
-    pub fn slowed(
+    pub(crate) fn slowed(
         &self,
         guide: &GuideMap,
         sensor: &Sensor,

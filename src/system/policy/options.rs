@@ -4,79 +4,21 @@ use toml::Table;
 
 use super::WindowPolicy;
 use crate::files::InputError;
-use crate::settings::{Document, Key, Range};
-
-const fn key(name: &'static str, range: Range, what: &'static str, source: &'static str) -> Key {
-    Key::new(name, "", range, what, source)
-}
-
-/// What can be set.
-pub const POLICY_KEYS: &[Key] = &[
-    key(
-        "unguided",
-        Range::OneOf(&["off", "keep", "sweep", "neighbour"]),
-        "What macropixels without an estimate do",
-        "thesis 4.9 for sweep, else chosen",
-    ),
-    key(
-        "steps_in_doubt",
-        Range::Switch,
-        "Step the window where one does not hold the guide's uncertainty",
-        "chosen",
-    ),
-    key(
-        "patience",
-        Range::Within(0.0, 1e6),
-        "Exposures without a peak after which windows step although the guide is sure; never, if left out",
-        "chosen",
-    ),
-    key(
-        "within",
-        Range::Within(0.5, 0.999_999),
-        "Share of the estimates that a window must hold for the guide to be sure",
-        "thesis Eq. 25",
-    ),
-    key(
-        "overlap",
-        Range::Within(0.0, 0.9),
-        "Share of a window that the next one has in common with it",
-        "chosen: a pulse of 4.5 ns and as much again of a window of 41.7 ns",
-    ),
-    key(
-        "detection",
-        Range::Within(0.01, 0.999),
-        "Chance that a target within a window makes a significant peak",
-        "chosen",
-    ),
-    key(
-        "gross",
-        Range::Within(0.0, 1.0),
-        "Share of the guide's estimates that are altogether wrong",
-        "chosen",
-    ),
-    key(
-        "neighbour_px",
-        Range::Within(0.0, 64.0),
-        "Macropixels from which an estimate is taken over, at most",
-        "chosen",
-    ),
-];
+use crate::settings::Document;
 
 impl WindowPolicy {
     /// This policy with what `text` changes in it; `source` is what complaints call the place where it stands.
     ///
     /// # Errors
-    /// Keys and values that cannot be.
-    pub fn with(self, text: &str, source: &str) -> Result<Self, InputError> {
+    /// Unknown keys and impossible values.
+    pub(crate) fn with(self, text: &str, source: &str) -> Result<Self, InputError> {
         let option = format!("{source} {text}");
         let mut document = Document::of(&option, Table::new());
         for assignment in text.split(',').filter(|part| !part.trim().is_empty()) {
             document.assign(assignment, &option)?;
         }
         let mut faults = Vec::new();
-        let given = document.table();
-        let read =
-            document.section::<WindowPolicy>("", given, POLICY_KEYS, &Table::new(), &mut faults);
+        let read = document.section::<WindowPolicy>("", document.table(), &mut faults);
         document.complain(faults)?;
         let mut table = Table::try_from(self).expect("numbers and words");
         table.extend(read);
@@ -88,6 +30,7 @@ impl WindowPolicy {
 mod tests {
     use super::super::Unguided;
     use super::*;
+    use crate::settings::Settings;
 
     #[test]
     fn what_is_not_said_stays() {
@@ -109,10 +52,9 @@ mod tests {
     }
 
     #[test]
-    fn keys_are_those_of_the_policy() {
+    fn defaults_are_within_their_ranges() {
         let table = Table::try_from(WindowPolicy::for_sequences()).unwrap();
-        assert_eq!(table.len(), POLICY_KEYS.len());
-        for key in POLICY_KEYS {
+        for key in WindowPolicy::KEYS {
             assert_eq!(key.fault(&table[key.name]), None);
         }
     }

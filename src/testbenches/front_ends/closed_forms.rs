@@ -7,7 +7,7 @@ use crate::chip::{ChipTiming, FrontEnd};
 use crate::files::InputError;
 use crate::logic::Logic;
 use crate::netlist::{CellKind, Corner, Library};
-use crate::report::{Axis, Chart, Checks, Grid, Style};
+use crate::report::{Axis, Chart, Checks, Grid};
 use crate::theory::front_ends::{
     Meeting, any_periods_hz, coincidences_hz, fold_hz, non_paralysable_hz, odd_periods_hz,
     paralysable_hz, xor_edges_hz,
@@ -98,17 +98,10 @@ fn mega(hz: f64) -> String {
 
 /// What was counted, rate by rate.
 pub(super) fn table(points: &[Point]) -> String {
-    let mut grid = Grid::new([
-        "in",
-        "avalanches",
-        "OR wire",
-        "XOR wire",
-        "coincidence wire",
-        "summation sampled",
-        "OR sampled",
-        "XOR sampled",
-        "coincidence sampled",
-    ]);
+    let mut grid = Grid::headed(
+        "in | avalanches | OR wire | XOR wire | coincidence wire | summation sampled \
+        | OR sampled | XOR sampled | coincidence sampled",
+    );
     for point in points {
         let numbers = [point.photons_hz, point.avalanches];
         let numbers = numbers.iter().chain(&point.wires).chain(&point.sampled);
@@ -188,7 +181,7 @@ pub(super) fn folds(points: &[Point], laws: &Laws, checks: &mut Checks) {
             FrontEnd::Coincidence => Some(TOGETHER),
             _ => None,
         };
-        // Light in which so many avalanches come.
+        // The rate of avalanches that the closed form gives for this light.
         let computed = together.map(|together| {
             let fold = fold_hz(SPADS, together, laws.or.joined_s);
             fold / (1.0 - fold * DEAD_TIME_NS * 1e-9)
@@ -242,43 +235,18 @@ pub(super) fn charts(waves: &Path, points: &[Point], laws: &Laws) -> Result<(), 
     let (x, y) = axes("counts of the macropixel (1/s)");
     let title = format!("Fig. 22 without a clock: {SPADS} SPADs, dead time {DEAD_TIME_NS} ns");
     Chart::new(title, x, y.between(1e6, 1e10))
-        .with("avalanches", Style::Points, measured(&|p| p.avalanches))
-        .with(
-            "n φ / (1 + φ D)",
-            Style::Line,
-            law(&|hz| all * laws.avalanches_hz(hz)),
-        )
-        .with(
-            "(a) OR tree, gates",
-            Style::Points,
-            measured(&|p| p.wires[0]),
-        )
-        .with(
-            "n m (1 − m τ)ⁿ⁻¹",
-            Style::Line,
-            law(&|hz| laws.wire_hz(0, hz)),
-        )
-        .with(
+        .points("avalanches", measured(&|p| p.avalanches))
+        .line("n φ / (1 + φ D)", law(&|hz| all * laws.avalanches_hz(hz)))
+        .points("(a) OR tree, gates", measured(&|p| p.wires[0]))
+        .line("n m (1 − m τ)ⁿ⁻¹", law(&|hz| laws.wire_hz(0, hz)))
+        .dashed(
             "Λ exp(−Λ τ)",
-            Style::Dashed,
             law(&|hz| paralysable_hz(all * laws.avalanches_hz(hz), laws.width_s)),
         )
-        .with(
-            "(b) XOR tree, gates",
-            Style::Points,
-            measured(&|p| p.wires[1]),
-        )
-        .with(
-            "Λ / (2 exp(Λ δ) − 1)",
-            Style::Line,
-            law(&|hz| laws.wire_hz(1, hz)),
-        )
-        .with(
-            "(c) 2 of 16, gates",
-            Style::Points,
-            measured(&|p| p.wires[2]),
-        )
-        .with("coincidences", Style::Line, law(&|hz| laws.wire_hz(2, hz)))
+        .points("(b) XOR tree, gates", measured(&|p| p.wires[1]))
+        .line("Λ / (2 exp(Λ δ) − 1)", law(&|hz| laws.wire_hz(1, hz)))
+        .points("(c) 2 of 16, gates", measured(&|p| p.wires[2]))
+        .line("coincidences", law(&|hz| laws.wire_hz(2, hz)))
         .write(&waves.with_extension("svg"))?;
     let (x, y) = axes("sampled by CLK (1/s)");
     let title = format!(
@@ -287,36 +255,15 @@ pub(super) fn charts(waves: &Path, points: &[Point], laws: &Laws) -> Result<(), 
     );
     let sampled = |kind| law(&|hz| laws.sampled_hz(kind, hz).expect("it has a closed form"));
     Chart::new(title, x, y.between(1e5, 1e10))
-        .with(
-            "(d) summation, gates: SPADs",
-            Style::Points,
-            measured(&|p| p.sampled[0]),
-        )
-        .with("n m", Style::Line, sampled(FrontEnd::Summation))
-        .with(
+        .points("(d) summation, gates: SPADs", measured(&|p| p.sampled[0]))
+        .line("n m", sampled(FrontEnd::Summation))
+        .dashed(
             "any SPAD: f (1 − (1 − m T)ⁿ)",
-            Style::Dashed,
             law(&|hz| any_periods_hz(SPADS, laws.avalanches_hz(hz), laws.clk_hz)),
         )
-        .with(
-            "(a) OR tree, gates",
-            Style::Points,
-            measured(&|p| p.sampled[1]),
-        )
-        .with(
-            "(b) XOR tree, gates",
-            Style::Points,
-            measured(&|p| p.sampled[2]),
-        )
-        .with(
-            "f (1 − (1 − 2 m T)ⁿ) / 2",
-            Style::Line,
-            sampled(FrontEnd::XorTree),
-        )
-        .with(
-            "(c) 2 of 16, gates",
-            Style::Points,
-            measured(&|p| p.sampled[3]),
-        )
+        .points("(a) OR tree, gates", measured(&|p| p.sampled[1]))
+        .points("(b) XOR tree, gates", measured(&|p| p.sampled[2]))
+        .line("f (1 − (1 − 2 m T)ⁿ) / 2", sampled(FrontEnd::XorTree))
+        .points("(c) 2 of 16, gates", measured(&|p| p.sampled[3]))
         .write(&waves.with_file_name("tb_front_ends_sampled.svg"))
 }

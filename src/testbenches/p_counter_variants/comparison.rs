@@ -2,8 +2,7 @@
 
 use crate::analysis::{MacropixelTiming, gate_works, ripple, shortest_period};
 use crate::chip::{
-    AfterBorrow, Limits, PCounter, Probe, Probes, SensorConfig, Silicon, Tap, macropixel,
-    p_counter, p_counter_timing,
+    Limits, PCounter, Probe, Probes, SensorConfig, Silicon, macropixel, p_counter, p_counter_timing,
 };
 use crate::kernel::{Drive, Kernel, Recorder, in_order};
 use crate::netlist::{CellKind, Corner, Edge, NetId, Netlist, StaticTiming};
@@ -13,19 +12,12 @@ use crate::units::Time;
 /// Longest CLK period that is tried.
 const SLOW: Time = Time::from_ns(20);
 
-/// A sensor of one macropixel with this P-counter, LOCAL_STOP taken where it suits.
+/// A sensor of one macropixel with this P-counter.
 pub(super) fn sensor(p_counter: PCounter) -> SensorConfig {
-    let (tap, after_borrow) = match p_counter {
-        PCounter::Memoryless => (Tap::Msb, AfterBorrow::Wrap),
-        _ => (Tap::Borrow, AfterBorrow::Hold),
-    };
     SensorConfig {
         rows: 1,
         cols: 1,
-        p_counter,
-        tap,
-        after_borrow,
-        ..SensorConfig::default()
+        ..p_counter.sensor()
     }
 }
 
@@ -34,33 +26,21 @@ const TYPICAL: Silicon = Silicon::nominal(Corner::Typ);
 
 /// Compares the variants.
 pub(super) fn compare(checks: &mut Checks) -> Grid {
-    let mut grid = Grid::new([
-        "P-counter",
-        "T/stage",
-        "T, with timing",
-        "share",
-        "by area",
-        "LOCAL_STOP static",
-        "event",
-        "settled static",
-        "event",
-        "changes/count",
-        "glitches/count",
-        "LOCAL_STOP's",
-        "CLK period static",
-        "event",
-    ]);
+    let mut grid = Grid::headed(
+        "P-counter | T/stage | T, with timing | share | by area | LOCAL_STOP static | event \
+        | settled static | event | changes/count | glitches/count | LOCAL_STOP's \
+        | CLK period static | event",
+    );
     let custom = CellKind::Dffr;
-    let stage = |p_counter| stage(&sensor(p_counter));
     checks.equal(
         "ripple: transistors a stage, 2 flip-flops + 4 (thesis 4.5)",
         u64::from(2 * custom.transistors() + 4),
-        stage(PCounter::Ripple),
+        PCounter::Ripple.stage_transistors(),
     );
     checks.equal(
         "set_reset against ripple: a 6-transistor gate instead of 4 (4.4.4), and the larger flip-flop",
         u64::from(6 - 4 + CellKind::Dffsr.transistors() - custom.transistors()),
-        stage(PCounter::SetReset) - stage(PCounter::Ripple),
+        PCounter::SetReset.stage_transistors() - PCounter::Ripple.stage_transistors(),
     );
     checks.equal(
         "set/reset flip-flop's layout over the custom one's (Fig. 52)",
@@ -82,15 +62,6 @@ pub(super) fn compare(checks: &mut Checks) -> Grid {
         synchronous < periods[0],
     );
     grid
-}
-
-/// Transistors that one more bit costs.
-fn stage(config: &SensorConfig) -> u64 {
-    let shorter = SensorConfig {
-        counter_bits: config.counter_bits - 1,
-        ..config.clone()
-    };
-    p_counter::circuit(config).transistors() - p_counter::circuit(&shorter).transistors()
 }
 
 /// One variant's figures; pairs are by static timing and as simulated.
@@ -125,7 +96,7 @@ impl Row {
         let activity = Activity::of(&config, &netlist);
         let by_paths = MacropixelTiming::of(&config, &TYPICAL, Limits::Ignored, (0, 0));
         Row {
-            stage: stage(&config),
+            stage: p_counter.stage_transistors(),
             transistors,
             share: transistors as f64 / macropixel.transistors() as f64,
             area_share: area as f64 / macropixel.area() as f64,
@@ -225,7 +196,7 @@ impl Activity {
     /// count has come round.
     fn of(config: &SensorConfig, netlist: &Netlist) -> Self {
         const GAP: Time = Time::from_ns(10);
-        let pin = |name| netlist.net(name).expect("a pin of the P-counter");
+        let pin = |name| netlist.net(name).expect("a net of the P-counter");
         let counts = usize::from(config.largest_start()) + 3;
         let pulses = [
             ("MEMORY_RESET", 0, 1),
@@ -253,7 +224,8 @@ impl Activity {
 
         let probes = Probes::of_block(netlist);
         let local_stop = probes.net(Probe::LocalStop);
-        let equal = probes.find(Probe::Equal).map(|nets| nets[0]);
+        let compares = config.p_counter == PCounter::Comparator;
+        let equal = compares.then(|| pin(config.p_counter.row().nets[0]));
         let mut of = Activity {
             counts,
             changes: 0,

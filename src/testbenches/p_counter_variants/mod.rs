@@ -7,26 +7,27 @@
 //!   four channels:  borrow_hold (the default)   borrow_wrap   msb_wrap (the literal reading)   msb_hold
 //! ```
 //!
-//! The waveform has two scenes. First a start value beyond 255, whose most significant bit is high from the reset
+//! A second waveform, `tb_p_counters`, has every variant on the same pins. The first has two scenes. First a start value beyond 255, whose most significant bit is high from the reset
 //! on: with the tap `msb` LOCAL_STOP rises at STOP, too, and a METDC that is ready by then counts the tail of the
 //! laser cycle before. Then a laser rate of 80 kHz, at which a counter that runs on comes round again and again in each
 //! laser cycle.
 
 mod comparison;
 mod memoryless;
+mod side_by_side;
 
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::chip::window_law::{Irregular, Window};
 use crate::chip::{
     AfterBorrow, ChipTiming, Exposure, Probe, SensorConfig, Silicon, Tap, WindowLaw, metdc,
     p_counter, p_counter_timing,
 };
+use crate::chip::{Irregular, Window};
 use crate::engine::waveform::write_waves;
 use crate::files::{InputError, OutputFile};
 use crate::kernel::{Drive, Kernel, Recorder, clock, in_order};
-use crate::netlist::{Module, ModuleBuilder, NetId, Netlist, Timing};
+use crate::netlist::{Module, ModuleBuilder, Net, NetId, Netlist, Timing};
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::Time;
@@ -36,7 +37,7 @@ use crate::waves::{Entry, Group, Layout};
 const ORIGIN: Time = Time::from_ns(60);
 /// When the chip comes out of reset.
 const RESET_END: Time = Time::from_ns(2);
-/// The first scene: a start value with its most significant bit high, in laser cycles of so many CLK periods.
+/// The first scene: a start value with its most significant bit high.
 const HIGH: Scene = Scene {
     from: 0,
     start: 300,
@@ -76,7 +77,7 @@ fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     false_capture(&bench, &seen, checks);
     repeated_capture(&bench, &seen, checks);
     memoryless::coming_round(checks);
-    Ok(())
+    side_by_side::run(waves, checks)
 }
 
 /// Some laser cycles with one start value.
@@ -129,72 +130,34 @@ const PINS: [&str; 9] = [
     "HIT_CLEAR",
 ];
 
+/// Places a P-counter and its timing block among pins of their names; returns COUNTER_RESET.
+fn place_counter(m: &mut ModuleBuilder, config: &SensorConfig) -> Net {
+    m.input_bus("COUNTER_INIT", config.counter_bits);
+    m.wire("LOCAL_STOP");
+    m.wire("COUNTER_CLK");
+    let counter_reset = m.wire("COUNTER_RESET");
+    m.wire("MEMORY_RESET");
+    m.wire("STOP_D");
+    let timing = p_counter_timing::circuit(config.after_borrow);
+    m.instance_by_names("p_counter_timing", &timing, &[]);
+    m.instance_by_names("p_counter", &p_counter::circuit(config), &[]);
+    counter_reset
+}
+
+fn finished(m: ModuleBuilder) -> Arc<Module> {
+    m.finish().expect("the testbench's circuit is whole")
+}
+
 /// P-counter, timing block and the two METDCs.
 fn channel(name: &str, config: &SensorConfig) -> Arc<Module> {
     let mut m = ModuleBuilder::new(name);
-    let pins = PINS.map(|name| m.input(name));
-    let [
-        clk,
-        stop,
-        resetb,
-        enable,
-        load,
-        event,
-        conventional,
-        clear,
-        early_clear,
-    ] = pins.map(|net| [net]);
-    let init = m.input_bus("COUNTER_INIT", config.counter_bits);
-    let wire = |m: &mut ModuleBuilder, name| [m.wire(name)];
-    let local_stop = wire(&mut m, "LOCAL_STOP");
-    let counter_clk = wire(&mut m, "COUNTER_CLK");
-    let counter_reset = wire(&mut m, "COUNTER_RESET");
-    let memory_reset = wire(&mut m, "MEMORY_RESET");
-    let stop_d = wire(&mut m, "STOP_D");
-    m.instance(
-        "p_counter_timing",
-        &p_counter_timing::circuit(config.after_borrow),
-        &[
-            ("CLK", &clk),
-            ("STOP", &stop),
-            ("RESETB", &resetb),
-            ("ENABLE", &enable),
-            ("LOCAL_STOP", &local_stop),
-            ("COUNTER_CLK", &counter_clk),
-            ("COUNTER_RESET", &counter_reset),
-            ("MEMORY_RESET", &memory_reset),
-            ("STOP_D", &stop_d),
-        ],
-    );
-    m.instance(
-        "p_counter",
-        &p_counter::circuit(config),
-        &[
-            ("COUNTER_INIT", &init),
-            ("MEMORY_LOAD", &load),
-            ("MEMORY_RESET", &memory_reset),
-            ("COUNTER_CLK", &counter_clk),
-            ("COUNTER_RESET", &counter_reset),
-            ("LOCAL_STOP", &local_stop),
-        ],
-    );
+    let [.., early_clear] = PINS.map(|name| [m.input(name)]);
+    let counter_reset = [place_counter(&mut m, config)];
     for (name, hit_clear) in METDCS.into_iter().zip([&counter_reset, &early_clear]) {
-        m.instance(
-            name,
-            &metdc::circuit(config.bins),
-            &[
-                ("CLK", &clk),
-                ("SPAD_EVENT", &event),
-                ("LOCAL_STOP", &local_stop),
-                ("STOP", &stop),
-                ("STOP_D", &stop_d),
-                ("COUNTER_RESET", hit_clear),
-                ("CONVENTIONAL", &conventional),
-                ("PIXEL_CLEAR", &clear),
-            ],
-        );
+        let metdc = metdc::circuit(config.bins);
+        m.instance_by_names(name, &metdc, &[("COUNTER_RESET", hit_clear)]);
     }
-    m.finish().expect("the channel is whole")
+    finished(m)
 }
 
 /// The four channels side by side, and their clocks.
@@ -207,15 +170,15 @@ impl Bench {
     fn new() -> Self {
         let bits = SensorConfig::default().counter_bits;
         let mut m = ModuleBuilder::new("tb_p_counter_variants");
-        let pins = PINS.map(|name| [m.input(name)]);
-        let init = m.input_bus("COUNTER_INIT", bits);
+        for pin in PINS {
+            m.input(pin);
+        }
+        m.input_bus("COUNTER_INIT", bits);
         for (name, tap, after_borrow) in CHANNELS {
-            let mut ports: Vec<(&str, &[_])> = vec![("COUNTER_INIT", &init)];
-            ports.extend(PINS.iter().zip(&pins).map(|(&name, net)| (name, &net[..])));
-            m.instance(name, &channel(name, &config(tap, after_borrow)), &ports);
+            m.instance_by_names(name, &channel(name, &config(tap, after_borrow)), &[]);
         }
         Bench {
-            netlist: Netlist::elaborate(&m.finish().expect("the testbench's circuit is whole")),
+            netlist: Netlist::elaborate(&finished(m)),
             exposure: Exposure::new(&SensorConfig::default(), 2, 1),
         }
     }

@@ -17,7 +17,7 @@ use crate::chip::tdc::ring_oscillator;
 use crate::files::InputError;
 use crate::kernel::{Drive, Kernel, Recorder, in_order};
 use crate::netlist::ModuleBuilder;
-use crate::report::{Axis, Chart, Checks, Style};
+use crate::report::{Axis, Chart, Checks};
 use crate::units::Time;
 
 /// Rings in a row.
@@ -101,7 +101,7 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         );
     }
     checks.note(text);
-    // A mean of so many delays, each with the mismatch of its cell.
+    // The mean of one delay for each stage, each with the mismatch of its cell.
     let inverter = SIGMA / (STAGES as f64).sqrt();
     let alone = spread(&free_hz);
     checks.that(
@@ -135,12 +135,8 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
         Axis::linear("pixel"),
         Axis::linear("frequency (MHz)"),
     )
-    .with("alone, gates", Style::Points, points(&free_hz))
-    .with(
-        "coupled, 0.3 of the least pull",
-        Style::Dashed,
-        points(loose),
-    )
-    .with("coupled, 1.1 of the least pull", Style::Line, points(tight))
+    .points("alone, gates", points(&free_hz))
+    .dashed("coupled, 0.3 of the least pull", points(loose))
+    .line("coupled, 1.1 of the least pull", points(tight))
     .write(&waves.with_file_name("tb_tdc_rings.svg"))
 }

@@ -163,8 +163,10 @@ impl<'a> Placement<'a> {
         let widths = self.output_widths(item);
         let mut places = Vec::new();
         for (port, &width) in widths.iter().enumerate() {
+            // A nested module may have more ports than the recipe has bits: the rest stay open.
+            let recipe = item.outputs.checked_shr(port as u32).unwrap_or(0) & 7;
             for bit in 0..width {
-                places.push(match item.outputs >> port & 7 {
+                places.push(match recipe {
                     0 if widths.len() > 1 => Output::Open,
                     1 if bit % 2 == 1 => Output::Open,
                     0 | 1 => Output::Wire,

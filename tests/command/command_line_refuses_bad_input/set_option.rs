@@ -37,7 +37,7 @@ fn chips_are_known_by_name_and_files_come_first() {
     refused(
         dir,
         &["sensor", "--sensor", "hsl"],
-        "hsl: is no file and no chip; give quantic4x4 or hslidar",
+        "hsl: is neither a file nor a chip; give quantic4x4 or hslidar",
     );
     std::fs::write(dir.join("hslidar"), "bins = 5\n").unwrap();
     assert_eq!(printed(&["sensor", "--sensor", "hslidar"]).bins, 5);
@@ -126,7 +126,7 @@ fn set_changes_single_keys_and_names_itself_in_complaints() {
             timing("clk_hz=3e8"),
             "give sensor.KEY=VALUE or scene.SECTION.KEY=VALUE",
         ),
-        (timing("scene.lidar.pde=0.1"), "no scene is read here"),
+        (timing("scene.lidar.pde=0.1"), "this command reads no scene"),
         (
             vec!["scene", "--set", "scene.object.bus.reflectivity=1"],
             "there is no object \"bus\"",

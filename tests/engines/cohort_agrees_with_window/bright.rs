@@ -8,53 +8,8 @@ use guided_dtof::engine::{
 use guided_dtof::photon::{DeadTimeLaw, PhotonStream, PixelLight};
 use guided_dtof::units::Time;
 use proptest::prelude::*;
-use rayon::prelude::*;
 
 use super::comparison::{Case, case, seeds};
-
-#[test]
-fn finer_steps_come_nearer_to_the_window_engine() {
-    let light = PixelLight::background(600e6);
-    let (sensor, seeds) = (SensorConfig::default(), seeds() / 8);
-    let exposure = Exposure::new(&sensor, 400, 30);
-    let stream = |seed| stream_config(&sensor, &exposure, seed, Time::from_ps(1_900));
-    let window = Window::new(&sensor, &exposure);
-    let pixels = [LitPixel {
-        number: 0,
-        start: 380,
-        light: Some(light.clone()),
-    }];
-    // The light is even, so all bins share one mean.
-    let counts: u64 = (0..seeds)
-        .into_par_iter()
-        .map(|seed| {
-            let stream = PhotonStream::new(&stream(seed));
-            let exposed = window.expose(&stream, &pixels).unwrap();
-            exposed.histograms[0]
-                .iter()
-                .map(|&n| u64::from(n))
-                .sum::<u64>()
-        })
-        .sum();
-    let trials = seeds as f64 * 30.0 * 16.0;
-    let by_photons = counts as f64 / trials;
-    let error = (by_photons * (1.0 - by_photons) / trials).sqrt();
-    let mean = |sub_bins| {
-        let options = CohortOptions {
-            sub_bins: Some(sub_bins),
-            ..CohortOptions::default()
-        };
-        let expected = Cohort::new(&sensor, &exposure, options).expected(&stream(0), 380, &light);
-        expected.unwrap()[8] / 30.0
-    };
-    let finest = mean(64);
-    let offs = [1, 2, 4, 8].map(|sub_bins| (mean(sub_bins) - finest).abs());
-    println!(
-        "an event: {by_photons:.6} ± {error:.6}, in 64 steps {finest:.6}; 1, 2, 4, 8 off by {offs:.7?}"
-    );
-    assert!((finest - by_photons).abs() < 5.0 * error);
-    assert!(offs.windows(2).all(|o| o[1] < 0.6 * o[0]), "{offs:?}");
-}
 
 /// The light in which steps of a CLK period are farthest from the truth.
 #[test]

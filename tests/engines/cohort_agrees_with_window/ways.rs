@@ -1,4 +1,4 @@
-//! The ways of keeping the SPADs' state, in one step a CLK period and in finer ones, for both laws of dead time.
+//! The ways of keeping the SPADs' state, for both laws of dead time.
 
 use guided_dtof::engine::CohortOptions;
 use guided_dtof::photon::{DeadTimeLaw, PixelLight};
@@ -28,21 +28,12 @@ fn the_pool_of_spads() {
 
 #[test]
 fn the_joint_state() {
-    for (name, sub_bins) in [
-        ("joint state, 40 Mcounts/s", 1),
-        ("joint state in 4 steps", 4),
-    ] {
-        let options = CohortOptions {
-            sub_bins: Some(sub_bins),
-            ..options(0.0)
-        };
-        Case {
-            name,
-            options,
-            ..case()
-        }
-        .agrees();
+    Case {
+        name: "joint state, 40 Mcounts/s",
+        options: options(0.0),
+        ..case()
     }
+    .agrees();
 }
 
 #[test]
@@ -63,37 +54,13 @@ fn paralysable_spads_in_both_ways() {
 }
 
 #[test]
-fn the_pool_in_finer_steps() {
-    for (name, law) in [
-        ("pool in 4 steps", DeadTimeLaw::NonParalysable),
-        ("paralysable, pool in 4 steps", DeadTimeLaw::Paralysable),
-    ] {
-        let options = CohortOptions {
-            sub_bins: Some(4),
-            ..options(1.0)
-        };
-        Case {
-            name,
-            law,
-            options,
-            ..case()
-        }
-        .agrees();
-    }
-}
-
-#[test]
-fn much_light_in_finer_steps() {
+fn much_light() {
     let light = PixelLight::echo(10.0, case().light.arrival()).with_background(400e6);
-    let options = CohortOptions {
-        sub_bins: Some(4),
-        ..options(0.0)
-    };
     let name = "joint state, 400 Mcounts/s";
     Case {
         name,
         light,
-        options,
+        options: options(0.0),
         stop_periods: 200,
         laser_cycles: 30,
         ..case()

@@ -23,7 +23,7 @@ use crate::reproduce::measured::penalty::{ratio, sum};
 use crate::theory::Pulse;
 use crate::theory::estimators::InEdges;
 use crate::theory::partial::{Step, System};
-use crate::units::Time;
+use crate::units::{Time, TimeOfFlight};
 
 /// Seeds of a step from here on are free: those before are of measurements and exposures of detections ([`steps`](super::steps)).
 const FIRST_SEED: u64 = 80;
@@ -167,8 +167,7 @@ impl Chip<'_> {
         1e9 * self.system.link.pulse_sigma_s
     }
 
-    /// Frames of so many laser cycles, on one macropixel after the other; their echoes lie evenly about the middle of the bin in
-    /// mid-window.
+    /// Frames on one macropixel after the other. Their echoes lie evenly about the middle of the bin in mid-window.
     fn frames(
         &self,
         start: u16,

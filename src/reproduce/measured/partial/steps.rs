@@ -24,8 +24,8 @@ const PHOTONS: f64 = 1e7;
 /// Frames of a detection, at least, whatever they cost.
 pub(super) const FEWEST: usize = 16;
 
-/// Errors within so many times the wanted spread are those of the echo's peak; others took one of the background for it.
-/// Chosen: a Gaussian error of that spread is farther off one time in a million.
+/// Errors within this multiple of the wanted spread belong to the echo's peak; beyond it a peak of the background was
+/// taken for the echo. Chosen: a Gaussian error of that spread is farther off one time in a million.
 const OF_THE_ECHO: f64 = 5.0;
 
 /// Laser cycles of an exposure at least, so that a spread means something where very few are needed.
@@ -64,7 +64,7 @@ pub(crate) struct Measurement {
 }
 
 impl Measurement {
-    /// From the errors of frames of so many laser cycles, ns, and the spread that is wanted, ns.
+    /// From the errors of frames of `cycles` laser cycles, ns, and the spread that is wanted, ns.
     pub(super) fn of(errors_ns: &[f64], cycles: u32, wanted_ns: f64) -> Self {
         let of_the_echo = errors_ns
             .iter()

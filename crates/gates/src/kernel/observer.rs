@@ -1,0 +1,129 @@
+//! Who watches the simulation: anything that wants to hear of every value change.
+
+use crate::logic::Logic;
+use crate::netlist::NetId;
+use crate::units::Time;
+
+/// Hears of every net change, in time order.
+pub trait Observer {
+    /// `net` took `value` at `time`.
+    fn change(&mut self, time: Time, net: NetId, value: Logic);
+
+    /// A flip-flop (index of its cell) whose state is in doubt. The kernel asks after every instant, and makes
+    /// the state unknown, until there is none. An observer that only watches leaves this as it is, at no cost.
+    #[inline]
+    fn doubtful(&mut self) -> Option<usize> {
+        None
+    }
+
+    /// `net`'s driver went to another value and back in less than its delay, so that `pulses` pulses never come.
+    /// Nothing changes.
+    #[inline]
+    fn swallowed(&mut self, _: Time, _: NetId, _pulses: u32) {}
+}
+
+/// Watches nothing, at no cost.
+impl Observer for () {
+    #[inline]
+    fn change(&mut self, _: Time, _: NetId, _: Logic) {}
+}
+
+/// Two observers see the same changes.
+impl<A: Observer, B: Observer> Observer for (A, B) {
+    #[inline]
+    fn change(&mut self, time: Time, net: NetId, value: Logic) {
+        self.0.change(time, net, value);
+        self.1.change(time, net, value);
+    }
+
+    #[inline]
+    fn doubtful(&mut self) -> Option<usize> {
+        self.0.doubtful().or_else(|| self.1.doubtful())
+    }
+
+    #[inline]
+    fn swallowed(&mut self, time: Time, net: NetId, pulses: u32) {
+        self.0.swallowed(time, net, pulses);
+        self.1.swallowed(time, net, pulses);
+    }
+}
+
+impl<O: Observer> Observer for &mut O {
+    #[inline]
+    fn change(&mut self, time: Time, net: NetId, value: Logic) {
+        (**self).change(time, net, value);
+    }
+
+    #[inline]
+    fn doubtful(&mut self) -> Option<usize> {
+        (**self).doubtful()
+    }
+
+    #[inline]
+    fn swallowed(&mut self, time: Time, net: NetId, pulses: u32) {
+        (**self).swallowed(time, net, pulses);
+    }
+}
+
+/// Keeps every change of a few nets.
+#[derive(Debug, Clone, Default)]
+pub struct Recorder {
+    nets: Vec<NetId>,
+    changes: Vec<(Time, NetId, Logic)>,
+}
+
+impl Recorder {
+    /// Records these nets.
+    pub fn new(nets: impl IntoIterator<Item = NetId>) -> Self {
+        Recorder {
+            nets: nets.into_iter().collect(),
+            changes: Vec::new(),
+        }
+    }
+
+    /// Everything recorded, in time order.
+    pub fn changes(&self) -> &[(Time, NetId, Logic)] {
+        &self.changes
+    }
+
+    /// Times at which `net` rose to 1.
+    pub fn rising_edges(&self, net: NetId) -> Vec<Time> {
+        self.edges(net, Logic::One)
+    }
+
+    /// Times at which `net` fell to 0.
+    pub fn falling_edges(&self, net: NetId) -> Vec<Time> {
+        self.edges(net, Logic::Zero)
+    }
+
+    /// The value of a recorded net at `time`, changes at that instant included; X before its first change.
+    pub fn value_at(&self, net: NetId, time: Time) -> Logic {
+        let until = self.changes.partition_point(|(t, _, _)| *t <= time);
+        let last = self.changes[..until].iter().rev().find(|c| c.1 == net);
+        last.map_or(Logic::X, |&(_, _, value)| value)
+    }
+
+    /// The number on a recorded bus (bit 0 first, at most 64 bits) at `time`, where all bits are known.
+    pub fn number_at(&self, nets: &[NetId], time: Time) -> Option<u64> {
+        nets.iter().rev().try_fold(0, |number, &net| {
+            Some(number << 1 | self.value_at(net, time).to_bool()? as u64)
+        })
+    }
+
+    fn edges(&self, net: NetId, to: Logic) -> Vec<Time> {
+        self.changes
+            .iter()
+            .filter(|(_, n, v)| *n == net && *v == to)
+            .map(|(t, _, _)| *t)
+            .collect()
+    }
+}
+
+impl Observer for Recorder {
+    #[inline]
+    fn change(&mut self, time: Time, net: NetId, value: Logic) {
+        if self.nets.contains(&net) {
+            self.changes.push((time, net, value));
+        }
+    }
+}

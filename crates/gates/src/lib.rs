@@ -1,0 +1,13 @@
+#![cfg_attr(not(test), warn(unreachable_pub))]
+#![doc = include_str!("../README.md")]
+
+mod complaint;
+pub mod kernel;
+pub mod logic;
+pub mod netlist;
+mod origin;
+pub mod units;
+pub mod waves;
+
+pub use complaint::InputError;
+pub use origin::Origin;

@@ -1,0 +1,110 @@
+//! Cells with transport delays as standard cells have them: chains of stages.
+//!
+//! ```text
+//!   A ─► STAGE s0 ─► STAGE s1 ─► … ─► Z        each a part of the delay, all alike to the femtosecond
+//! ```
+//!
+//! The paths of `specify` blocks swallow pulses shorter than they are long (IEEE 1364, 14.6), and an element of a delay line
+//! passes them: it is itself a chain, much faster than it is long. So in the netlist, which engines run, it is one cell, and for
+//! other tools a module of stages, each of them an instance that SDF names. A stage passes
+//! pulses of 57.6 ps in the typical corner, and in proportion in the others.
+
+use std::collections::BTreeSet;
+
+use super::cell::CellKind;
+use super::delay::DelayModel;
+use super::flat::Netlist;
+use super::own_delay::OwnDelay;
+
+/// Longest stage in the typical corner, fs: shorter than the shortest pulse that gates of this library leave, 57.6 ps.
+const LONGEST_STAGE_FS: f64 = 50_000.0;
+
+/// Standard deviations by which an element may be slower than the mean and still have stages that short.
+const SLOWEST_SIGMAS: f64 = 5.0;
+
+/// A kind of chain: what its cells are on average.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Chain {
+    /// Delay of all stages in the typical corner, fs.
+    pub typical_fs: u32,
+    /// Number of stages.
+    pub stages: usize,
+}
+
+impl Chain {
+    /// The chain that a cell is; none where it delays as gates do.
+    pub(super) fn of(kind: CellKind, own: Option<OwnDelay>) -> Option<Self> {
+        let own = own.filter(|own| own.model == DelayModel::Transport)?;
+        debug_assert_eq!(kind, CellKind::Buf, "only wires have transport delays");
+        let sigma = own.spread.map_or(0.0, |spread| spread.sigma);
+        let slowest_fs = f64::from(own.typical_fs) * (1.0 + SLOWEST_SIGMAS * sigma);
+        Some(Chain {
+            typical_fs: own.typical_fs,
+            stages: (slowest_fs / LONGEST_STAGE_FS).ceil().max(1.0) as usize,
+        })
+    }
+
+    /// The chain that a cell of a netlist is.
+    pub(super) fn of_cell(netlist: &Netlist, cell: usize) -> Option<Self> {
+        let own = netlist.own_delays();
+        let at = own.binary_search_by_key(&cell, |own| own.0).ok()?;
+        Chain::of(netlist.cells()[cell].kind, Some(own[at].1))
+    }
+
+    /// The kinds of chain in a netlist.
+    pub fn all(netlist: &Netlist) -> BTreeSet<Self> {
+        let own = netlist.own_delays().iter();
+        own.filter_map(|&(cell, own)| Chain::of(netlist.cells()[cell].kind, Some(own)))
+            .collect()
+    }
+
+    /// Name of its module in Verilog.
+    pub(super) fn module(self) -> String {
+        format!("DELAY_{}_{}", self.typical_fs, self.stages)
+    }
+
+    /// Name of its stages' module in Verilog and SDF.
+    pub(super) fn stage_module(self) -> String {
+        format!("STAGE_{}_{}", self.typical_fs, self.stages)
+    }
+
+    /// Name of one of its stages.
+    pub(super) fn stage(number: usize) -> String {
+        format!("s{number}")
+    }
+
+    /// The stage of a chain at a dotted path: its cell, and its number.
+    pub(super) fn find(netlist: &Netlist, path: &str) -> Option<(usize, Self, usize)> {
+        let (element, stage) = path.rsplit_once('.')?;
+        let cell = netlist.cell(element)?;
+        let chain = Chain::of_cell(netlist, cell)?;
+        let number = (0..chain.stages).find(|&number| Chain::stage(number) == stage)?;
+        Some((cell, chain, number))
+    }
+
+    /// Parts of a delay, one for each stage.
+    pub(super) fn parts(self, fs: u32) -> impl Iterator<Item = u32> {
+        let stages = self.stages as u64;
+        let until = move |stage: u64| u64::from(fs) * stage / stages;
+        (0..stages).map(move |stage| (until(stage + 1) - until(stage)) as u32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn stages_are_alike_and_add_up(fs: u32, typical_fs in 1u32..10_000_000) {
+            let chain = Chain::of(CellKind::Buf, Some(OwnDelay::wire(typical_fs))).unwrap();
+            let parts: Vec<u32> = chain.parts(fs).collect();
+            prop_assert_eq!(parts.len(), chain.stages);
+            prop_assert_eq!(parts.iter().map(|&fs| u64::from(fs)).sum::<u64>(), u64::from(fs));
+            let (least, most) = (parts.iter().min().unwrap(), parts.iter().max().unwrap());
+            prop_assert!(most - least <= 1);
+            prop_assert!(chain.parts(typical_fs).all(|fs| fs <= 50_000));
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! What delays and limits are given for: three corners of silicon, two directions of a change.
+
+use crate::logic::Logic;
+
+/// Which of the three characterised delays applies: of slow, typical or fast silicon. SDF calls the delays max, typ and
+/// min, and configurations may, too.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum Corner {
+    /// Fastest silicon, highest voltage: shortest delays.
+    #[serde(alias = "min")]
+    Fast,
+    /// Typical silicon, 50 °C.
+    #[default]
+    Typ,
+    /// Slowest silicon, lowest voltage: longest delays.
+    #[serde(alias = "max")]
+    Slow,
+}
+
+impl Corner {
+    /// All corners, fastest first.
+    pub const ALL: [Corner; 3] = [Corner::Fast, Corner::Typ, Corner::Slow];
+
+    /// Name in files, tables and JSON.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Corner::Fast => "fast",
+            Corner::Typ => "typ",
+            Corner::Slow => "slow",
+        }
+    }
+}
+
+impl std::str::FromStr for Corner {
+    type Err = String;
+
+    /// A name, or SDF's.
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "fast" | "min" => Ok(Corner::Fast),
+            "typ" => Ok(Corner::Typ),
+            "slow" | "max" => Ok(Corner::Slow),
+            _ => Err(format!(
+                "{text:?} is not a speed of silicon; give slow, typ or fast"
+            )),
+        }
+    }
+}
+
+/// Minimum, typical and maximum of one delay.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Delay {
+    /// Fast corner, fs.
+    pub min_fs: u32,
+    /// Typical corner, fs.
+    pub typ_fs: u32,
+    /// Slow corner, fs.
+    pub max_fs: u32,
+}
+
+impl Delay {
+    /// The same delay in every corner.
+    pub const fn fixed(fs: u32) -> Self {
+        Delay {
+            min_fs: fs,
+            typ_fs: fs,
+            max_fs: fs,
+        }
+    }
+
+    /// Fast and slow corners scaled from the typical delay.
+    pub const fn scaled(typ_fs: u32) -> Self {
+        Delay {
+            min_fs: (typ_fs as u64 * 72 / 100) as u32,
+            typ_fs,
+            max_fs: (typ_fs as u64 * 145 / 100) as u32,
+        }
+    }
+
+    /// Every corner times `factor`, rounded to whole femtoseconds.
+    pub fn times(self, factor: f64) -> Self {
+        let scale = |fs: u32| (fs as f64 * factor).round() as u32;
+        Delay {
+            min_fs: scale(self.min_fs),
+            typ_fs: scale(self.typ_fs),
+            max_fs: scale(self.max_fs),
+        }
+    }
+
+    /// The delay of one corner, fs.
+    pub const fn at(self, corner: Corner) -> u32 {
+        match corner {
+            Corner::Fast => self.min_fs,
+            Corner::Typ => self.typ_fs,
+            Corner::Slow => self.max_fs,
+        }
+    }
+}
+
+/// Direction of a change.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Edge {
+    /// To 1.
+    Rise,
+    /// To 0.
+    Fall,
+}
+
+impl Edge {
+    /// Either direction.
+    pub const BOTH: [Edge; 2] = [Edge::Rise, Edge::Fall];
+
+    /// The direction of a change to `value`, if it is to a known level.
+    pub fn to(value: Logic) -> Option<Self> {
+        match value {
+            Logic::One => Some(Edge::Rise),
+            Logic::Zero => Some(Edge::Fall),
+            Logic::X | Logic::Z => None,
+        }
+    }
+
+    /// The level after the edge.
+    pub const fn level(self) -> Logic {
+        match self {
+            Edge::Rise => Logic::One,
+            Edge::Fall => Logic::Zero,
+        }
+    }
+
+    pub(super) const fn opposite(self) -> Self {
+        match self {
+            Edge::Rise => Edge::Fall,
+            Edge::Fall => Edge::Rise,
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! The one description of the chip: cells, nets and hierarchy, read by every engine and exporter.
+//!
+//! ```text
+//!   ModuleBuilder ──finish──► Module (hierarchical, shared) ──elaborate──► Netlist (flat)
+//!                                │                                           │
+//!                                └─► Verilog                                 └─► simulation kernels
+//! ```
+//!
+//! A [`Module`] is written once and instantiated many times; [`Netlist::elaborate`] stamps it out
+//! into flat arrays in time linear in the number of cells.
+
+mod builder;
+mod cell;
+mod chain;
+mod check_limits;
+mod corner;
+mod delay;
+mod error;
+mod flat;
+mod instance_limits;
+mod library;
+mod mismatch;
+mod module;
+mod own_delay;
+mod requirements;
+pub mod sdf;
+mod static_timing;
+mod timing;
+mod variation;
+mod verilog;
+
+pub use builder::ModuleBuilder;
+pub(crate) use cell::next_state;
+pub use cell::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
+pub use chain::Chain;
+pub use check_limits::{CheckKind, CheckLimits, DataLimit};
+pub use corner::{Corner, Delay, Edge};
+pub use delay::{ArcDelay, CellDelays, DelayModel};
+pub use error::NetlistError;
+pub use flat::{FlatCell, NetId, Netlist, Scope};
+pub use instance_limits::{Control, InstanceLimits};
+pub use library::{CellArcs, Library, TimingArc};
+pub use mismatch::Mismatch;
+pub use module::{Cell, Direction, Instance, Module, Net, Port, Signal};
+pub use own_delay::OwnDelay;
+pub use requirements::{Requirement, Requirements};
+pub use static_timing::caused;
+pub use static_timing::{Arrivals, Bound, Path, StaticTiming, Step, TimingLoop};
+pub use timing::Timing;
+pub use variation::{Conditions, derated_limits, varied, varied_as};
+pub use verilog::{
+    write_cells, write_delays, write_modules, write_parametric_cells, write_standard_cells,
+};

@@ -1,0 +1,157 @@
+//! The delays and limits of an elaborated design in one corner: those of the library, or of each instance by itself.
+//!
+//! Nominal designs share one set of delays per kind of cell. A cell whose delays are changed (mismatch,
+//! back-annotation) gets a set of its own. So does one that delays as a wire does ([`DelayModel`]).
+
+use std::collections::BTreeMap;
+
+use super::cell::CellKind;
+use super::corner::Corner;
+use super::delay::{CellDelays, DelayModel};
+use super::flat::Netlist;
+use super::instance_limits::InstanceLimits;
+use super::library::Library;
+
+/// Delays of every cell of a netlist, and limits of every flip-flop.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Timing {
+    sets: Vec<CellDelays>,
+    /// By index into `sets`.
+    models: Vec<DelayModel>,
+    of_cell: Vec<u32>,
+    /// The library's limits by kind of cell, and those of single cells.
+    limits: Vec<InstanceLimits>,
+    own_limits: BTreeMap<usize, InstanceLimits>,
+}
+
+impl Timing {
+    /// Every cell as the library has it in this corner, or with the delay that is its own.
+    pub fn nominal(netlist: &Netlist, library: &Library, corner: Corner) -> Self {
+        Self::nominal_as(netlist, library, corner, |cell| netlist.cell_path(cell))
+    }
+
+    /// The same where each cell is the one at `path` of its index, which says what elements of delay lines it has.
+    pub fn nominal_as(
+        netlist: &Netlist,
+        library: &Library,
+        corner: Corner,
+        path: impl Fn(usize) -> String,
+    ) -> Self {
+        let mut timing = Self::of_library(netlist, library, corner);
+        for &(cell, delay) in netlist.own_delays() {
+            timing.set(cell, delay.delays(|| path(cell), corner));
+            timing.set_model(cell, delay.model);
+        }
+        timing
+    }
+
+    /// Every cell as the library has it in this corner, even those with delays of their own.
+    pub fn of_library(netlist: &Netlist, library: &Library, corner: Corner) -> Self {
+        Timing {
+            sets: CellKind::ALL
+                .iter()
+                .map(|&kind| library.delays(kind, corner))
+                .collect(),
+            models: vec![DelayModel::Inertial; CellKind::ALL.len()],
+            of_cell: netlist.cells().iter().map(|c| c.kind as u32).collect(),
+            limits: CellKind::ALL
+                .map(|kind| InstanceLimits::of(library.checks(kind), corner))
+                .into(),
+            own_limits: BTreeMap::new(),
+        }
+    }
+
+    /// Delays of one cell.
+    #[inline]
+    pub fn of(&self, cell: usize) -> &CellDelays {
+        &self.sets[self.of_cell[cell] as usize]
+    }
+
+    /// Gives one cell delays of its own.
+    pub fn set(&mut self, cell: usize, delays: CellDelays) {
+        let own = self.own_set(cell);
+        self.sets[own] = delays;
+    }
+
+    /// How one cell delays: all its arcs alike, because a change of its output cancels one from any arc.
+    #[inline]
+    pub fn model(&self, cell: usize) -> DelayModel {
+        self.models[self.of_cell[cell] as usize]
+    }
+
+    /// Makes one cell delay in this way.
+    pub fn set_model(&mut self, cell: usize, model: DelayModel) {
+        let own = self.own_set(cell);
+        self.models[own] = model;
+    }
+
+    /// Limits of one cell, which is of this kind.
+    pub fn limits(&self, cell: usize, kind: CellKind) -> &InstanceLimits {
+        let own = self.own_limits.get(&cell);
+        own.unwrap_or(&self.limits[kind as usize])
+    }
+
+    /// Gives one cell limits of its own.
+    pub fn set_limits(&mut self, cell: usize, limits: InstanceLimits) {
+        self.own_limits.insert(cell, limits);
+    }
+
+    /// Every limit times `factor`.
+    pub fn scale_limits(&mut self, factor: f64) {
+        let all = self.limits.iter_mut().chain(self.own_limits.values_mut());
+        all.for_each(|limits| *limits = limits.times(factor));
+    }
+
+    /// Index of a set that is this cell's alone.
+    fn own_set(&mut self, cell: usize) -> usize {
+        let set = self.of_cell[cell] as usize;
+        if set >= CellKind::ALL.len() {
+            return set;
+        }
+        self.of_cell[cell] = self.sets.len() as u32;
+        self.sets.push(self.sets[set]);
+        self.models.push(self.models[set]);
+        self.sets.len() - 1
+    }
+
+    /// Distinct sets of delays.
+    pub(crate) fn sets(&self) -> &[CellDelays] {
+        &self.sets
+    }
+
+    /// Index into [`Timing::sets`] by cell.
+    pub(crate) fn set_of(&self, cell: usize) -> u32 {
+        self.of_cell[cell]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::logic::Logic;
+    use crate::netlist::ModuleBuilder;
+    use crate::netlist::{ArcDelay, MAX_INPUTS, MAX_OUTPUTS};
+
+    #[test]
+    fn a_changed_cell_leaves_its_siblings_alone() {
+        let mut m = ModuleBuilder::new("pair");
+        let a = m.input("A");
+        let b = m.gate(CellKind::Inv, &[a]);
+        m.gate(CellKind::Inv, &[b]);
+        let netlist = Netlist::elaborate(&m.finish().unwrap());
+        let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let nominal = *timing.of(0);
+        let slow = [[ArcDelay {
+            rise_fs: 9,
+            fall_fs: 8,
+        }; MAX_OUTPUTS]; MAX_INPUTS];
+        timing.set(1, slow);
+        timing.set_model(1, DelayModel::Transport);
+        timing.set(1, slow);
+        assert_eq!(timing.model(0), DelayModel::Inertial);
+        assert_eq!(timing.model(1), DelayModel::Transport);
+        assert_eq!(*timing.of(0), nominal);
+        assert_eq!(*timing.of(1), slow);
+        assert_eq!(timing.of(1)[0][0].to(Logic::X), 8);
+    }
+}

@@ -1,0 +1,115 @@
+//! Time as a signed count of femtoseconds.
+//!
+//! An `i64` spans ±9223 s, five orders beyond any exposure. Signed, because what is
+//! timed may begin before the edge that it belongs to.
+
+use std::fmt;
+use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+
+/// A point in time or a duration, in whole femtoseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct Time(i64);
+
+impl Time {
+    /// Time zero.
+    pub const ZERO: Time = Time(0);
+    /// The latest representable time.
+    pub const MAX: Time = Time(i64::MAX);
+
+    /// From femtoseconds.
+    pub const fn from_fs(fs: i64) -> Self {
+        Time(fs)
+    }
+
+    /// From picoseconds.
+    pub const fn from_ps(ps: i64) -> Self {
+        Time(ps * 1_000)
+    }
+
+    /// From nanoseconds.
+    pub const fn from_ns(ns: i64) -> Self {
+        Time(ns * 1_000_000)
+    }
+
+    /// From seconds, rounded to the nearest femtosecond (saturating; NaN becomes zero).
+    pub fn from_s(s: f64) -> Self {
+        Time((s * 1e15).round() as i64)
+    }
+
+    /// In femtoseconds.
+    pub const fn as_fs(self) -> i64 {
+        self.0
+    }
+
+    /// In seconds.
+    pub fn as_s(self) -> f64 {
+        self.0 as f64 * 1e-15
+    }
+
+    /// In nanoseconds.
+    pub fn as_ns(self) -> f64 {
+        self.0 as f64 * 1e-6
+    }
+}
+
+impl Add for Time {
+    type Output = Time;
+    fn add(self, rhs: Time) -> Time {
+        Time(self.0 + rhs.0)
+    }
+}
+
+impl AddAssign for Time {
+    fn add_assign(&mut self, rhs: Time) {
+        self.0 += rhs.0;
+    }
+}
+
+impl Sub for Time {
+    type Output = Time;
+    fn sub(self, rhs: Time) -> Time {
+        Time(self.0 - rhs.0)
+    }
+}
+
+impl Neg for Time {
+    type Output = Time;
+    fn neg(self) -> Time {
+        Time(-self.0)
+    }
+}
+
+impl Mul<i64> for Time {
+    type Output = Time;
+    fn mul(self, rhs: i64) -> Time {
+        Time(self.0 * rhs)
+    }
+}
+
+impl fmt::Display for Time {
+    /// Prints with the largest unit that leaves at least one digit before the point.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let fs = self.0 as f64;
+        let (value, unit) = match self.0.unsigned_abs() {
+            0..1_000 => return write!(f, "{} fs", self.0),
+            1_000..1_000_000 => (fs * 1e-3, "ps"),
+            1_000_000..1_000_000_000 => (fs * 1e-6, "ns"),
+            1_000_000_000..1_000_000_000_000 => (fs * 1e-9, "us"),
+            1_000_000_000_000..1_000_000_000_000_000 => (fs * 1e-12, "ms"),
+            _ => (fs * 1e-15, "s"),
+        };
+        write!(f, "{value:.3} {unit}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prints_with_a_readable_unit() {
+        assert_eq!(Time::from_fs(12).to_string(), "12 fs");
+        assert_eq!(Time::from_fs(1_200_000).to_string(), "1.200 ns");
+        assert_eq!(Time::from_ns(-2_500).to_string(), "-2.500 us");
+    }
+}

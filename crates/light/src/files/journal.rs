@@ -1,0 +1,250 @@
+//! A journal: lines that are only ever appended, each with a checksum, so that a run that is killed loses at most what it had
+//! not appended yet.
+//!
+//! ```text
+//!   3f09c2aa text of a line␊          8 hexadecimal digits of the text's SHA-256, a blank, the text
+//! ```
+//!
+//! One process appends to a journal at a time (a lock that the kernel drops however the process ends); anybody may read meanwhile. A line
+//! goes out in one write. What a kill or a full disk leaves of one at the end of the file is cut off by the next process that appends;
+//! readers pass over it, and over any line whose checksum is wrong.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use super::temporary::lock;
+use femtogate::InputError;
+
+/// Bytes of a line before its text.
+const HEAD: usize = 9;
+
+/// The line that says `text`, with its end.
+///
+/// `text` has no line feed.
+pub fn journal_line(text: &str) -> String {
+    debug_assert!(!text.contains('\n'));
+    format!("{:08x} {text}\n", check(text))
+}
+
+fn check(text: &str) -> u32 {
+    let hash = Sha256::digest(text);
+    u32::from_be_bytes(hash[..4].try_into().expect("4 of 32 bytes"))
+}
+
+/// The text of a line without its end, if its checksum is right.
+fn text_of(line: &[u8]) -> Option<&str> {
+    let line = std::str::from_utf8(line).ok()?;
+    let (head, text) = line.split_at_checked(HEAD)?;
+    let said = u32::from_str_radix(head.strip_suffix(' ')?, 16).ok()?;
+    (said == check(text)).then_some(text)
+}
+
+/// A journal that this process appends to.
+#[derive(Debug)]
+pub struct Journal {
+    path: PathBuf,
+    file: File,
+}
+
+impl Journal {
+    /// Opens a journal, created if missing, and cuts off an unfinished line; `None` where another process appends to
+    /// it.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn open(path: &Path) -> Result<Option<Self>, InputError> {
+        let unwritable = |e: io::Error| InputError::unwritable(path, &e);
+        let mut options = File::options();
+        options.read(true).append(true).create(true);
+        let mut file = options.open(path).map_err(unwritable)?;
+        if lock::is_held_elsewhere(&file) {
+            return Ok(None);
+        }
+        let whole = end_of_last_line(&mut file).map_err(unwritable)?;
+        file.set_len(whole).map_err(unwritable)?;
+        let path = path.to_owned();
+        Ok(Some(Journal { path, file }))
+    }
+
+    /// Appends lines of [`journal_line`].
+    ///
+    /// # Errors
+    /// When the disk is full.
+    pub fn append(&mut self, lines: &str) -> Result<(), InputError> {
+        let written = self.file.write_all(lines.as_bytes());
+        written.map_err(|e| InputError::unwritable(&self.path, &e))
+    }
+}
+
+/// Where what is no whole line begins.
+fn end_of_last_line(file: &mut File) -> io::Result<u64> {
+    let mut end = file.metadata()?.len();
+    let mut chunk = vec![0; 1 << 16];
+    while end > 0 {
+        let length = chunk.len().min(usize::try_from(end).unwrap_or(usize::MAX));
+        let begin = end - length as u64;
+        file.seek(SeekFrom::Start(begin))?;
+        file.read_exact(&mut chunk[..length])?;
+        if let Some(at) = chunk[..length].iter().rposition(|&b| b == b'\n') {
+            return Ok(begin + at as u64 + 1);
+        }
+        end = begin;
+    }
+    Ok(0)
+}
+
+/// A journal that is read.
+#[derive(Debug)]
+pub struct JournalReader {
+    path: PathBuf,
+    reader: BufReader<File>,
+    at: u64,
+    line: Vec<u8>,
+}
+
+impl JournalReader {
+    /// Opens a journal.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn open(path: &Path) -> Result<Self, InputError> {
+        let file = File::open(path).map_err(|e| InputError::unreadable(path, &e))?;
+        Ok(JournalReader {
+            path: path.to_owned(),
+            reader: BufReader::with_capacity(1 << 16, file),
+            at: 0,
+            line: Vec::new(),
+        })
+    }
+
+    /// Tells `found` of every whole line from here on whose checksum is right, with where it begins. Returns how many had a wrong
+    /// one; what the file ends with, if no whole line, is none of them.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn scan(&mut self, mut found: impl FnMut(u64, &str)) -> Result<usize, InputError> {
+        let mut wrong = 0;
+        loop {
+            let begin = self.at;
+            if !self.read_line()? {
+                return Ok(wrong);
+            }
+            match text_of(&self.line) {
+                Some(text) => found(begin, text),
+                None => wrong += 1,
+            }
+        }
+    }
+
+    /// The text of the line that begins there; `None` if it is not right, or no longer there.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn at(&mut self, begin: u64) -> Result<Option<&str>, InputError> {
+        let by = begin as i64 - self.at as i64;
+        let moved = self.reader.seek_relative(by);
+        moved.map_err(|e| InputError::unreadable(&self.path, &e))?;
+        self.at = begin;
+        Ok(match self.read_line()? {
+            true => text_of(&self.line),
+            false => None,
+        })
+    }
+
+    /// Reads a line without its end; `false` where there is no whole one any more.
+    fn read_line(&mut self) -> Result<bool, InputError> {
+        self.line.clear();
+        let read = self.reader.read_until(b'\n', &mut self.line);
+        self.at += read.map_err(|e| InputError::unreadable(&self.path, &e))? as u64;
+        Ok(self.line.pop_if(|&mut b| b == b'\n').is_some())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn texts(path: &Path) -> (Vec<String>, usize) {
+        let mut found = Vec::new();
+        let mut reader = JournalReader::open(path).unwrap();
+        let wrong = reader.scan(|_, text| found.push(text.to_owned())).unwrap();
+        (found, wrong)
+    }
+
+    proptest! {
+        /// Wherever a run is killed, and whatever byte of a line is spoilt, the other lines stand, and the next run appends to them.
+        #[test]
+        fn a_journal_is_good_for_its_whole_lines(
+            lines in prop::collection::vec("[^\n]{0,40}", 1..6),
+            cut in 0usize..400,
+            spoilt in prop::option::of((0usize..400, 1u8..)),
+        ) {
+            let dir = tempfile::tempdir().unwrap();
+            let path = dir.path().join("x");
+            let mut bytes: Vec<u8> = lines.iter().flat_map(|l| journal_line(l).into_bytes()).collect();
+            bytes.truncate(cut.max(1));
+            let whole = bytes.iter().filter(|&&b| b == b'\n').count();
+            let mut good = vec![true; whole];
+            if let Some((at, by)) = spoilt.map(|(at, by)| (at % bytes.len(), by)) {
+                let line = bytes[..at].iter().filter(|&&b| b == b'\n').count();
+                // A line feed more or less would make other lines of it.
+                if bytes[at] != b'\n' && bytes[at] ^ by != b'\n' {
+                    let hex = |b: u8| (b as char).to_digit(16);
+                    let same_number = hex(bytes[at]).is_some() && hex(bytes[at]) == hex(bytes[at] ^ by);
+                    bytes[at] ^= by;
+                    if line < whole && !same_number {
+                        good[line] = false;
+                    }
+                }
+            }
+            std::fs::write(&path, &bytes).unwrap();
+            let mut expected: Vec<String> =
+                lines.iter().zip(&good).filter(|(_, good)| **good).map(|(l, _)| l.clone()).collect();
+            prop_assert_eq!(texts(&path), (expected.clone(), good.iter().filter(|g| !**g).count()));
+
+            let mut journal = Journal::open(&path).unwrap().unwrap();
+            journal.append(&journal_line("next")).unwrap();
+            expected.push("next".into());
+            prop_assert_eq!(texts(&path).0, expected);
+        }
+    }
+
+    #[test]
+    fn lines_are_found_again_where_they_were() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("x");
+        let mut journal = Journal::open(&path).unwrap().unwrap();
+        let lines: Vec<String> = (0..5000).map(|i| format!("line {}", i * i)).collect();
+        for line in &lines {
+            journal.append(&journal_line(line)).unwrap();
+        }
+        let mut places = Vec::new();
+        let mut reader = JournalReader::open(&path).unwrap();
+        reader.scan(|begin, _| places.push(begin)).unwrap();
+        for (place, line) in places
+            .iter()
+            .zip(&lines)
+            .rev()
+            .step_by(7)
+            .chain(places.iter().zip(&lines))
+        {
+            assert_eq!(reader.at(*place).unwrap(), Some(line.as_str()));
+        }
+        assert_eq!(reader.at(3).unwrap(), None);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn one_process_appends_at_a_time() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("x");
+        let first = Journal::open(&path).unwrap().unwrap();
+        assert!(Journal::open(&path).unwrap().is_none());
+        drop(first);
+        assert!(Journal::open(&path).unwrap().is_some());
+    }
+}

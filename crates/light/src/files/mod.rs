@@ -1,0 +1,38 @@
+//! Files in and out: user's input read with line numbers, output written whole or not at all.
+//!
+//! | file | what |
+//! |---|---|
+//! | `input.rs` | texts, read whole or line by line, and what is no text refused |
+//! | `arrays.rs` | NumPy files of known shape: results that are read again, users' counts |
+//! | `npy.rs` | NumPy files: head and elements |
+//! | `misfit.rs` | values of the wrong type, without the names of types |
+//! | `raster.rs` | pictures and maps: PNG, `.npy`, PFM, EXR |
+//! | `output.rs` | output files: beside the target first, then renamed over it |
+//! | `temporary.rs` | what stands there meanwhile, and what killed runs left of it |
+//! | `interruption.rs` | signals that end the program |
+//! | `journal.rs` | lines with checksums that are only appended |
+//! | `result_set.rs` | the results of a run as one set with a manifest |
+
+mod arrays;
+mod input;
+mod interruption;
+mod journal;
+mod misfit;
+mod npy;
+mod output;
+mod raster;
+mod result_set;
+mod temporary;
+
+pub use arrays::{read_array, read_counts};
+pub use femtogate::InputError;
+pub use input::Lines;
+pub use input::{LineEnds, parse_json, parse_toml, read_text, read_text_within, too_long};
+pub use interruption::clean_up_when_interrupted;
+pub use journal::{Journal, JournalReader, journal_line};
+pub use misfit::in_plain_words;
+pub use misfit::{Misfit, is_no_word};
+pub use npy::{Element, NpyHead, Number, write_npy, write_npy_elements, write_npy_head};
+pub use output::{OutputFile, create_folder};
+pub use raster::Raster;
+pub use result_set::{MANIFEST, ManifestFile, ResultSet};

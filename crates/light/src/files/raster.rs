@@ -1,0 +1,390 @@
+//! Pictures and maps that users give: one number a pixel, from PNG (8 or 16 bit), NumPy (`.npy`), PFM or OpenEXR
+//! (one channel).
+//!
+//! How large a raster is stands in its header, and is held to a limit before anything is unpacked: a PNG of some
+//! kilobytes can unpack to gigabytes.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read, Seek};
+use std::path::Path;
+
+use super::npy::{NpyHead, Number};
+use femtogate::InputError;
+
+/// Most pixels of a raster: four times those of a camera of 16 megapixels, 256 MiB as numbers.
+const MOST_PIXELS: u64 = 1 << 26;
+
+/// One number a pixel, row by row from the top left.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Raster {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Values as they stand in the file: whole numbers of a PNG, whatever else holds. Length width·height.
+    pub values: Vec<f32>,
+    /// The value of white: 255 or 65535 for PNG, 1 for others.
+    pub white: f32,
+}
+
+impl Raster {
+    /// Reads a file; what it is stands in its first bytes. Colours of a PNG become the grey of ITU-R BT.601; what is
+    /// transparent in it stays what it is beneath.
+    ///
+    /// # Errors
+    /// When it cannot be read, is none of the kinds, is broken, or has more than 2²⁶ pixels.
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        let complain = |message: String| InputError::new(path.display(), message);
+        let unreadable = |e| InputError::unreadable(path, &e);
+        if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
+            return Err(complain(
+                "is not a file; give a PNG, .npy, PFM or EXR".into(),
+            ));
+        }
+        let mut reader = BufReader::new(File::open(path).map_err(unreadable)?);
+        let first = reader.fill_buf().map_err(unreadable)?;
+        let read = match first {
+            [0x89, b'P', b'N', b'G', ..] => read_png(reader),
+            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => read_npy(reader),
+            [b'P', b'f' | b'F', ..] => read_pfm(reader),
+            [0x76, 0x2f, 0x31, 0x01, ..] => read_exr(reader),
+            _ => Err("is not a PNG, .npy, PFM or EXR; convert it to one of them".into()),
+        };
+        read.map_err(complain)
+    }
+
+    /// The value at a pixel.
+    pub(crate) fn at(&self, row: usize, col: usize) -> f32 {
+        self.values[row * self.width + col]
+    }
+}
+
+/// Refuses what is too large to unpack.
+fn check_size(width: u64, height: u64) -> Result<(), String> {
+    match width.checked_mul(height) {
+        Some(0) => Err("has no pixels; give another file".into()),
+        Some(pixels) if pixels <= MOST_PIXELS => Ok(()),
+        _ => Err(format!(
+            "has {width} x {height} pixels, of which at most {MOST_PIXELS} are read; make it smaller"
+        )),
+    }
+}
+
+fn broken(what: &str, error: impl std::fmt::Display) -> String {
+    let error = error.to_string().replace('\n', " ");
+    format!(
+        "is a broken {what} ({}); save it again",
+        error.trim_end_matches('.')
+    )
+}
+
+fn read_png(reader: BufReader<File>) -> Result<Raster, String> {
+    let broken = |e| broken("PNG", e);
+    let mut decoder = png::Decoder::new_with_limits(reader, png::Limits { bytes: 1 << 30 });
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_transformations(png::Transformations::EXPAND);
+    let info = decoder.read_header_info().map_err(broken)?;
+    let (width, height) = (info.width, info.height);
+    check_size(width.into(), height.into())?;
+    let mut reader = decoder.read_info().map_err(broken)?;
+    let too_large = || "does not fit into memory; make it smaller".to_owned();
+    let mut bytes = vec![0; reader.output_buffer_size().ok_or_else(too_large)?];
+    reader.next_frame(&mut bytes).map_err(broken)?;
+    let (colour, depth) = reader.output_color_type();
+    let (channels, wide) = (colour.samples(), depth == png::BitDepth::Sixteen);
+    let sample = |pixel: &[u8], channel: usize| match wide {
+        true => f32::from(u16::from_be_bytes([
+            pixel[2 * channel],
+            pixel[2 * channel + 1],
+        ])),
+        false => f32::from(pixel[channel]),
+    };
+    let grey = |pixel: &[u8]| match channels {
+        3 | 4 => 0.299 * sample(pixel, 0) + 0.587 * sample(pixel, 1) + 0.114 * sample(pixel, 2),
+        _ => sample(pixel, 0),
+    };
+    let pixel_bytes = channels * if wide { 2 } else { 1 };
+    Ok(Raster {
+        width: width as usize,
+        height: height as usize,
+        values: bytes.chunks_exact(pixel_bytes).map(grey).collect(),
+        white: if wide { 65_535.0 } else { 255.0 },
+    })
+}
+
+fn read_npy(mut reader: BufReader<File>) -> Result<Raster, String> {
+    let head = NpyHead::read(&mut reader).map_err(|e| broken("NumPy file", e))?;
+    let [height, width] = head.shape[..] else {
+        let shape = head.shape;
+        return Err(format!(
+            "is an array of shape {shape:?}; give one with two axes, rows and columns"
+        ));
+    };
+    check_size(width as u64, height as u64)?;
+    let numbers = head.numbers(&mut reader).ok_or_else(|| {
+        let kind = &head.descr;
+        format!("has elements of type {kind}; save it as float32, float64 or whole numbers")
+    })?;
+    let numbers = numbers.map_err(|e| broken("NumPy file", e))?;
+    let value = |at: usize| match numbers[at] {
+        Number::Whole(value) => value as f32,
+        Number::Float(value) => value as f32,
+    };
+    let place = |at: usize| match head.is_fortran {
+        true => (at % width) * height + at / width,
+        false => at,
+    };
+    Ok(Raster {
+        width,
+        height,
+        values: (0..width * height).map(place).map(value).collect(),
+        white: 1.0,
+    })
+}
+
+/// Portable float map: a text header of kind, size and scale, then rows from the bottom; a negative scale says
+/// little-endian.
+fn read_pfm(mut reader: BufReader<File>) -> Result<Raster, String> {
+    let mut words = Vec::new();
+    while words.len() < 4 {
+        let mut line = Vec::new();
+        let read = (&mut reader).take(200).read_until(b'\n', &mut line);
+        if read.map_err(|e| broken("PFM", e))? == 0 {
+            return Err(broken("PFM", "its header ends early"));
+        }
+        let line = String::from_utf8_lossy(&line).into_owned();
+        words.extend(line.split_whitespace().map(str::to_owned));
+    }
+    let number = |word: &str| word.parse::<u64>().map_err(|e| broken("PFM", e));
+    let (width, height) = (number(&words[1])?, number(&words[2])?);
+    let scale: f32 = words[3].parse().map_err(|e| broken("PFM", e))?;
+    if words.len() > 4 || words[0] != "Pf" {
+        return Err("is a PFM in colour; save it with one channel, as Pf".into());
+    }
+    check_size(width, height)?;
+    let (width, height) = (width as usize, height as usize);
+    let mut bytes = vec![0; 4 * width * height];
+    reader
+        .read_exact(&mut bytes)
+        .map_err(|e| broken("PFM", e))?;
+    let from_bytes = if scale < 0.0 {
+        f32::from_le_bytes
+    } else {
+        f32::from_be_bytes
+    };
+    let rows = bytes.chunks_exact(4 * width).rev();
+    let values = rows.flat_map(|row| row.as_chunks::<4>().0.iter().map(|b| from_bytes(*b)));
+    Ok(Raster {
+        width,
+        height,
+        values: values.collect(),
+        white: 1.0,
+    })
+}
+
+/// The first layer's channel Z, or else V, Y or its only one.
+fn read_exr(mut reader: BufReader<File>) -> Result<Raster, String> {
+    use exr::prelude::{MetaData, ReadChannels, ReadLayers, read};
+    let broken = |e: exr::error::Error| broken("EXR", e);
+    let about = MetaData::read_from_buffered(&mut reader, false).map_err(broken)?;
+    let layer = about.headers.first();
+    let size = layer.ok_or("has no layer; save it again")?.layer_size;
+    check_size(size.width() as u64, size.height() as u64)?;
+    reader.rewind().map_err(|e| e.to_string())?;
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(reader)
+        .map_err(broken)?;
+    let channels = &image.layer_data.channel_data.list;
+    let named = |name: &str| channels.iter().find(|channel| channel.name.eq(name));
+    let chosen = ["Z", "V", "Y"].into_iter().find_map(named);
+    let only = channels.first().filter(|_| channels.len() == 1);
+    let Some(channel) = chosen.or(only) else {
+        let names: Vec<String> = channels.iter().map(|c| c.name.to_string()).collect();
+        return Err(format!(
+            "has the channels {}; save one of them, as Z or Y",
+            names.join(", ")
+        ));
+    };
+    if channel.sampling.0 != 1 || channel.sampling.1 != 1 {
+        return Err("has a channel of fewer pixels than the picture; save it in full".into());
+    }
+    let size = image.layer_data.size;
+    Ok(Raster {
+        width: size.width(),
+        height: size.height(),
+        values: channel.sample_data.values_as_f32().collect(),
+        white: 1.0,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::npy::{Element, write_npy};
+    use proptest::prelude::*;
+
+    fn read(bytes: &[u8]) -> Result<Raster, InputError> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("x");
+        std::fs::write(&path, bytes).unwrap();
+        Raster::read(&path)
+    }
+
+    fn png_of(
+        width: u32,
+        height: u32,
+        colour: png::ColorType,
+        depth: png::BitDepth,
+        data: &[u8],
+    ) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
+        encoder.set_color(colour);
+        encoder.set_depth(depth);
+        encoder
+            .write_header()
+            .unwrap()
+            .write_image_data(data)
+            .unwrap();
+        bytes
+    }
+
+    fn npy_of<T: Element>(shape: &[usize], values: &[T]) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        write_npy(&mut bytes, shape, values).unwrap();
+        bytes
+    }
+
+    /// Floats under these names.
+    fn exr_of(width: usize, channels: &[(&str, &[f32])]) -> Vec<u8> {
+        use exr::prelude::*;
+        let channel = |(name, values): &(&str, &[f32])| {
+            AnyChannel::new(*name, FlatSamples::F32(values.to_vec()))
+        };
+        let list: SmallVec<[_; 4]> = channels.iter().map(channel).collect();
+        let size = (width, channels[0].1.len() / width);
+        let encoding = Encoding {
+            compression: Compression::ZIP16,
+            ..Encoding::default()
+        };
+        let layer = Layer::new(
+            size,
+            LayerAttributes::default(),
+            encoding,
+            AnyChannels::sort(list),
+        );
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        Image::from_layer(layer)
+            .write()
+            .non_parallel()
+            .to_buffered(&mut bytes)
+            .unwrap();
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn all_kinds_hold_the_same_numbers() {
+        use png::{BitDepth, ColorType};
+        let expected = [[1.0, 2.0, 3.0], [4.0, 5.0, 60000.0]].concat();
+        let wide: Vec<u8> = expected
+            .iter()
+            .flat_map(|&v| (v as u16).to_be_bytes())
+            .collect();
+        let floats = |v: &f32| v.to_le_bytes();
+        let upside_down = [&expected[3..], &expected[..3]].concat();
+        let pfm: Vec<u8> = upside_down.iter().flat_map(floats).collect();
+        let doubles: Vec<f64> = expected.iter().map(|&v| v.into()).collect();
+        let columns: Vec<u16> = [0, 3, 1, 4, 2, 5].map(|at| expected[at] as u16).to_vec();
+        let mut in_columns = npy_of(&[2, 3], &columns);
+        let order = in_columns.windows(5).position(|w| w == b"False").unwrap();
+        in_columns[order..order + 5].copy_from_slice(b"True ");
+        for bytes in [
+            png_of(3, 2, ColorType::Grayscale, BitDepth::Sixteen, &wide),
+            [b"Pf\n3 2\n-1.0\n".to_vec(), pfm].concat(),
+            exr_of(3, &[("B", &[0.0; 6]), ("Z", &expected)]),
+            exr_of(3, &[("depth", &expected)]),
+            npy_of(&[2, 3], &expected),
+            npy_of(&[2, 3], &doubles),
+            in_columns,
+        ] {
+            let raster = read(&bytes).unwrap();
+            assert_eq!((raster.width, raster.height), (3, 2));
+            assert_eq!(raster.values, expected);
+            assert_eq!(raster.at(1, 2), 60000.0);
+        }
+        let colours = png_of(1, 1, ColorType::Rgb, BitDepth::Eight, &[200, 100, 50]);
+        let grey = read(&colours).unwrap();
+        assert!((grey.values[0] - 124.2).abs() < 0.1 && grey.white == 255.0);
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_named_and_nothing_large_is_unpacked() {
+        use png::{BitDepth, ColorType};
+        let fine = png_of(40, 40, ColorType::Grayscale, BitDepth::Eight, &[7; 1600]);
+        // The same header with 100 000 x 100 000 pixels; its checksum follows the 13 bytes of IHDR.
+        let mut bomb = fine.clone();
+        bomb[16..24].copy_from_slice(&[0, 1, 0x86, 0xa0, 0, 1, 0x86, 0xa0]);
+        let sum = crc32(&bomb[12..29]);
+        bomb[29..33].copy_from_slice(&sum.to_be_bytes());
+        let header = b"{'descr': '<f4', 'fortran_order': False, 'shape': (99999999, 99999999)}\n";
+        let mut huge = b"\x93NUMPY\x01\x00".to_vec();
+        huge.extend((header.len() as u16).to_le_bytes());
+        huge.extend(header);
+        let mut of_truths = npy_of(&[1, 1], &[1u8]);
+        let kind = of_truths.windows(3).position(|w| w == b"|u1").unwrap();
+        of_truths[kind..kind + 3].copy_from_slice(b"|b1");
+        for (bytes, says) in [
+            (bomb, "100000 x 100000 pixels"),
+            (fine[..fine.len() / 2].to_vec(), "broken PNG"),
+            (b"P5 3 3 255\n123456789".to_vec(), "is not a PNG"),
+            (b"PF\n3 2\n-1.0\n".to_vec(), "in colour"),
+            (b"Pf\n3 2\n-1.0\n1234".to_vec(), "broken PFM"),
+            (b"Pf\n0 2\n-1.0\n1234".to_vec(), "no pixels"),
+            (b"Pf\n3".to_vec(), "header ends"),
+            (b"Pf\n99999999 99999999 1\n".to_vec(), "99999999 x 99999999"),
+            (huge[..40].to_vec(), "broken NumPy file"),
+            (huge, "99999999 x 99999999"),
+            (npy_of(&[6], &[0f32; 6]), "[6]"),
+            (of_truths, "type"),
+            (vec![], "is not a PNG"),
+            (
+                exr_of(2, &[("R", &[0.0; 4]), ("G", &[0.0; 4])]),
+                "channels G, R",
+            ),
+            (exr_of(2, &[("Z", &[0.0; 4])])[..90].to_vec(), "broken EXR"),
+        ] {
+            let error = read(&bytes).unwrap_err().to_string();
+            assert!(error.contains(says), "{error}");
+        }
+        assert!(Raster::read(Path::new("/")).is_err());
+    }
+
+    /// The checksum of a PNG chunk.
+    fn crc32(bytes: &[u8]) -> u32 {
+        !bytes.iter().fold(!0, |crc, &byte| {
+            (0..8).fold(crc ^ u32::from(byte), |crc, _| {
+                (crc >> 1) ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 }
+            })
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn garbage_is_refused_without_a_panic(kind in 0..5, rest in prop::collection::vec(any::<u8>(), 0..300)) {
+            let start: &[u8] = match kind {
+                0 => &[0x89, b'P', b'N', b'G', 0x0d, 0x0a, 0x1a, 0x0a, 0, 0, 0, 13, b'I', b'H', b'D', b'R'],
+                1 => b"\x93NUMPY\x01\x00\x76\x00{'descr': '<f4', 'fortran_order': ",
+                2 => b"Pf\n",
+                3 => b"\x76\x2f\x31\x01\x02\0\0\0channels\0chlist\0",
+                _ => b"",
+            };
+            let _ = read(&[start, &rest].concat());
+        }
+    }
+}

@@ -1,0 +1,225 @@
+//! Guides by name: `NAME` or `NAME:KEY=VALUE,KEY=VALUE`, as users write them.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use toml::Table;
+
+use super::from_file::{FileMap, FileSigma};
+use super::fused::{Fused, MOST_GUIDES};
+use super::{
+    BehaviouralStereo, Guide, IntensityStereo, Kalman, MatchedStereo, Monocular, NoisyTruth, Radar,
+};
+use crate::files::InputError;
+use crate::settings::Range::Within;
+use crate::settings::{Document, Key, Settings, keys};
+
+/// A guide that goes by a name.
+#[derive(Debug)]
+pub struct Kind {
+    /// Name.
+    pub name: &'static str,
+    /// What it is, without a full stop.
+    pub what: &'static str,
+    /// What can be set.
+    pub keys: &'static [Key],
+    make: fn(&Document) -> Result<Arc<dyn Guide>, InputError>,
+}
+
+impl Kind {
+    /// A guide that is its own settings.
+    const fn of<G: Guide + Settings + 'static>(name: &'static str, what: &'static str) -> Self {
+        Kind {
+            name,
+            what,
+            keys: G::KEYS,
+            make: |document| Ok(Arc::new(read::<G>(document)?)),
+        }
+    }
+}
+
+/// All guides.
+pub const KINDS: &[Kind] = &[
+    Kind {
+        name: "stereo",
+        what: "The scene's camera pair, with errors drawn at random; its keys are the scene's",
+        keys: Nothing::KEYS,
+        make: |document| read::<Nothing>(document).map(|_| Arc::new(BehaviouralStereo) as _),
+    },
+    Kind::of::<NoisyTruth>("truth", "The true distance with a Gaussian error"),
+    Kind::of::<MatchedStereo>(
+        "matched",
+        "The scene's camera pair: images are rendered and matched",
+    ),
+    Kind::of::<Monocular>(
+        "monocular",
+        "Depth from one image: everywhere, but with large errors",
+    ),
+    Kind::of::<Radar>("radar", "Good range, coarse angle"),
+    Kind::of::<IntensityStereo>("intensity", "The intensity images of two lidars, matched"),
+    Kind::of::<Kalman>(
+        "kalman",
+        "Prediction from earlier frames; has no estimate in the first",
+    ),
+    Kind {
+        name: "file",
+        what: "A map of distances from a .npy file",
+        keys: FileOptions::KEYS,
+        make: |document| {
+            let FileOptions {
+                path,
+                sigma_m,
+                sigma_path,
+            } = read(document)?;
+            let sigma = match &sigma_path {
+                Some(path) => FileSigma::Map(path),
+                None => FileSigma::Same(sigma_m),
+            };
+            Ok(Arc::new(FileMap::read(&path, sigma)?))
+        },
+    },
+];
+
+keys! {
+    /// No keys at all.
+    struct Nothing {}
+}
+
+keys! {
+    /// Those of a map from a file.
+    struct FileOptions {
+        /// File with distances along the ray, rows x cols, m; 0 where there is no estimate.
+        path: PathBuf = PathBuf::new(), from "-";
+        /// Standard deviation of all distances.
+        sigma_m: f64 ["m"] = 1.0, in Within(0.0, 1e4);
+        /// File with standard deviations, rows x cols, m, instead of sigma_m.
+        sigma_path: Option<PathBuf> = None, from "-";
+    }
+}
+
+/// The guide that `text` describes; `source` is what complaints call the place where it stands.
+///
+/// # Errors
+/// When there is no such guide, its keys or values are wrong, or its files cannot be read.
+pub fn parse(text: &str, source: &str) -> Result<Arc<dyn Guide>, InputError> {
+    let (name, settings) = text.split_once(':').unwrap_or((text, ""));
+    let Some(kind) = KINDS.iter().find(|kind| kind.name == name) else {
+        let names: Vec<&str> = KINDS.iter().map(|kind| kind.name).collect();
+        let message = format!("{name:?} is not a guide; give {}", names.join(", "));
+        return Err(InputError::new(source, message));
+    };
+    let option = format!("{source} {text}");
+    let mut document = Document::of(&option, Table::new());
+    for assignment in settings.split(',').filter(|part| !part.is_empty()) {
+        document.assign(assignment, &option)?;
+    }
+    if kind.name == "file" && !document.table().contains_key("path") {
+        return Err(InputError::new(
+            option,
+            "names no file; give file:path=MAP.npy",
+        ));
+    }
+    (kind.make)(&document)
+}
+
+/// Several guides, fused where there are more than one.
+///
+/// # Errors
+/// As [`parse`], and when there are none or more than eight.
+pub fn parse_all<'t>(
+    texts: impl IntoIterator<Item = &'t str>,
+    source: &str,
+) -> Result<Arc<dyn Guide>, InputError> {
+    let guides = texts.into_iter().map(|text| parse(text, source));
+    let mut guides: Vec<_> = guides.collect::<Result<_, _>>()?;
+    if guides.is_empty() || guides.len() > MOST_GUIDES {
+        let message = format!("{} guides; give 1 to {MOST_GUIDES}", guides.len());
+        return Err(InputError::new(source, message));
+    }
+    match guides.len() {
+        1 => Ok(guides.remove(0)),
+        _ => Ok(Arc::new(Fused::new(guides))),
+    }
+}
+
+/// Settings with their defaults, checked.
+fn read<T: Settings>(document: &Document) -> Result<T, InputError> {
+    let mut faults = Vec::new();
+    let table = document.section::<T>("", document.table(), &mut faults);
+    document.complain(faults)?;
+    Ok(table.try_into().expect("every value has been tried"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn every_kind_goes_by_its_name_with_and_without_settings() {
+        for kind in KINDS.iter().filter(|kind| kind.name != "file") {
+            assert_eq!(parse(kind.name, "guide").unwrap().name(), kind.name);
+        }
+        let radar = parse("radar:azimuth_beam_deg=4°,range_sigma_m=20 cm", "guide").unwrap();
+        assert_eq!(
+            format!("{radar:?}"),
+            format!(
+                "{:?}",
+                Radar {
+                    azimuth_beam_deg: 4.0,
+                    range_sigma_m: 0.2,
+                    ..Radar::default()
+                }
+            )
+        );
+        let fused = parse_all(["stereo", "radar"], "guide").unwrap();
+        assert_eq!(fused.name(), "stereo + radar");
+    }
+
+    #[test]
+    fn defaults_are_within_their_ranges() {
+        fn check<T: Settings + serde::Serialize>() {
+            let table = Table::try_from(T::default()).unwrap();
+            for key in T::KEYS {
+                assert_eq!(key.fault(&table[key.name]), None);
+            }
+        }
+        check::<NoisyTruth>();
+        check::<Monocular>();
+        check::<Radar>();
+        check::<MatchedStereo>();
+        check::<IntensityStereo>();
+        check::<Kalman>();
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_in_one_sentence() {
+        for (text, says) in [
+            ("lidar", "\"lidar\" is not a guide; give stereo, truth"),
+            ("radar:beam=3", "unknown field `beam`"),
+            (
+                "radar:resolution_m=-1",
+                "resolution_m = -1 is impossible; give 0.01 to 100 m",
+            ),
+            ("radar:resolution_m=4 ns", "is a time; give a length"),
+            ("truth:sigma_m", "has no value; give key=value"),
+            ("stereo:x=1", "unknown field `x`"),
+            ("file", "give file:path=MAP.npy"),
+            ("file:path=/nonexistent.npy", "/nonexistent.npy"),
+            ("truth:sigma_m=nan", "sigma_m = NaN is impossible"),
+        ] {
+            let error = parse(text, "guide").unwrap_err().to_string();
+            assert!(error.contains(says), "{text}: {error}");
+            assert_eq!(error.lines().count(), 1, "{error}");
+        }
+        assert!(parse_all([], "guide").is_err());
+        assert!(parse_all(["stereo"; 9], "guide").is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_a_guide_or_a_complaint(text in "(truth|radar|kalman|file)?:?\\PC{0,30}") {
+            let _ = parse(&text, "guide");
+        }
+    }
+}

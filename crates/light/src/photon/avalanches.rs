@@ -1,0 +1,292 @@
+//! From photons to rising edges of the SPAD wires, from a known state of the SPADs or from an unknown one.
+//!
+//! A SPAD that is ready makes an avalanche of a photon, and is blind for the dead time. Where the photons are known only
+//! from some time on, each SPAD begins as unknown: an avalanche just before that time may still blind it. It becomes known
+//! with the first photon that comes after all that may blind it:
+//!
+//! ```text
+//!   known from │         ╭ may be lost      ╭ fires for certain
+//!              │   dead  ↓   dead           ↓
+//!   SPAD       │?????????????????????????   ▔▔▔▔▔▔▔▔▁▁▁▁
+//!              ╰─────────┴─────────────┴ ready at the latest
+//! ```
+//!
+//! So whatever comes out for certain is what the whole past would give, and [`Unknown`] says that more of it is needed.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use smallvec::{SmallVec, smallvec};
+
+use super::spad::{DeadTimeLaw, Photon, SpadEvent, SpadModel};
+use super::stream::OrderedEchoes;
+use crate::units::Time;
+
+/// What is asked for depends on the time before the photons are known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Unknown;
+
+/// Where a photon comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Source {
+    /// It comes for certain, whatever the SPADs did before.
+    Known,
+    /// The avalanche that may cause it is not known to have happened.
+    Possible,
+    /// It comes for certain if its SPAD was ready for it.
+    Echo,
+}
+
+/// SPADs that need no memory of their own. Made for 64 of them, the state of 16 took 2 % of a frame's time on the window engine.
+pub(super) const FEW_SPADS: usize = 16;
+
+/// The SPADs of one macropixel while photons come in.
+pub struct Avalanches<'a> {
+    model: &'a SpadModel,
+    key: [u32; 2],
+    pixel: u32,
+    /// Until when each SPAD is blind, at the latest.
+    blind_until: SmallVec<[Time; FEW_SPADS]>,
+    /// SPADs that may be ready before that.
+    unknown: u64,
+    /// Afterpulses and crosstalk to come, and whether they come for certain.
+    pending: BinaryHeap<Reverse<(SpadEvent, bool)>>,
+    lost: u64,
+}
+
+impl<'a> Avalanches<'a> {
+    /// SPADs that were in the dark before the first photon. `key` is that of the photon stream, `pixel` the number of the
+    /// macropixel in it.
+    pub(crate) fn in_the_dark(model: &'a SpadModel, key: [u32; 2], pixel: u32) -> Self {
+        Avalanches {
+            model,
+            key,
+            pixel,
+            blind_until: smallvec![Time::from_fs(i64::MIN / 2); model.grid.spads()],
+            unknown: 0,
+            pending: BinaryHeap::new(),
+            lost: 0,
+        }
+    }
+
+    /// SPADs whose photons are known from `time` on. `breeding` are the photons before it that trigger others, since
+    /// [`SpadModel::reach`] at least.
+    pub(crate) fn known_from(
+        model: &'a SpadModel,
+        key: [u32; 2],
+        pixel: u32,
+        time: Time,
+        breeding: impl Iterator<Item = Photon>,
+    ) -> Self {
+        let mut avalanches = Self::in_the_dark(model, key, pixel);
+        let blind_until = time - Time::from_fs(1) + model.dead_time;
+        avalanches.blind_until.fill(blind_until);
+        avalanches.unknown = u64::MAX;
+        for photon in breeding {
+            avalanches.breed(photon, false);
+        }
+        avalanches
+            .pending
+            .retain(|Reverse((child, _))| child.time >= time);
+        avalanches
+    }
+
+    /// How many avalanches have met a blind SPAD.
+    pub(crate) fn lost(&self) -> u64 {
+        self.lost
+    }
+
+    /// Runs all `photons`, sorted, and what they cause; appends the rising edges to `edges` and returns how many avalanches
+    /// met a blind SPAD. The state must be known.
+    pub(crate) fn run_to_the_end(mut self, photons: &[Photon], edges: &mut Vec<SpadEvent>) -> u64 {
+        let forever = Time::from_fs(i64::MAX);
+        let known = self.run(photons, None, forever, forever, edges);
+        debug_assert!(known.is_ok(), "nothing is unknown from the beginning on");
+        self.lost
+    }
+
+    /// Runs `photons`, sorted and all before `until`, and what they cause before that time, and the photons of `echoes`.
+    /// Appends the rising edges to `edges`; those before `wanted_from` may be missing.
+    ///
+    /// # Errors
+    /// Where an edge from `wanted_from` on, or a photon of `echoes`, depends on a SPAD whose state is not known.
+    pub fn run(
+        &mut self,
+        photons: &[Photon],
+        mut echoes: Option<&mut OrderedEchoes<'_>>,
+        until: Time,
+        wanted_from: Time,
+        edges: &mut Vec<SpadEvent>,
+    ) -> Result<(), Unknown> {
+        if echoes.is_none() && self.pending.is_empty() && !self.model.has_secondaries() {
+            // Nothing comes in between.
+            return photons.iter().try_for_each(|photon| {
+                self.one(*photon, Source::Known, &mut None, wanted_from, edges)
+            });
+        }
+        let mut photons = photons.iter().copied().peekable();
+        loop {
+            let of_echo = echoes.as_ref().and_then(|echoes| echoes.next());
+            let of_echo = of_echo.filter(|photon| photon.time < until);
+            let is_of_echo = match (photons.peek(), of_echo) {
+                (Some(photon), Some(of_echo)) => of_echo < *photon,
+                (_, of_echo) => of_echo.is_some(),
+            };
+            let photon = if is_of_echo {
+                of_echo
+            } else {
+                photons.peek().copied()
+            };
+            let child = self.pending.peek().map(|&Reverse(child)| child);
+            let child = child.filter(|(child, _)| child.time < until);
+            let (photon, source) = match (photon, child) {
+                (None, None) => return Ok(()),
+                (photon, Some((child, is_certain)))
+                    // At the same instant the photon comes first.
+                    if photon.is_none_or(|photon| (child.time, child.spad) < (photon.time, photon.spad)) =>
+                {
+                    self.pending.pop();
+                    let source = if is_certain { Source::Known } else { Source::Possible };
+                    (child.into(), source)
+                }
+                (Some(photon), _) if is_of_echo => (photon, Source::Echo),
+                (Some(_), _) => (photons.next().expect("it was seen"), Source::Known),
+                (None, Some(_)) => unreachable!("a child without a photon before it comes"),
+            };
+            self.one(photon, source, &mut echoes, wanted_from, edges)?;
+        }
+    }
+
+    /// One photon, afterpulse or crosstalk.
+    #[inline]
+    fn one(
+        &mut self,
+        photon: Photon,
+        source: Source,
+        echoes: &mut Option<&mut OrderedEchoes<'_>>,
+        wanted_from: Time,
+        edges: &mut Vec<SpadEvent>,
+    ) -> Result<(), Unknown> {
+        let Photon { time, spad, breeds } = photon;
+        let is_paralysable = self.model.law == DeadTimeLaw::Paralysable;
+        let before = self.blind_until[usize::from(spad)];
+        let is_ready = time > before;
+        let is_unknown = self.unknown >> spad & 1 != 0;
+        let is_certain = source != Source::Possible;
+        if is_certain && (is_ready || !is_unknown) {
+            if is_ready {
+                edges.push(SpadEvent { time, spad });
+                self.unknown &= !(1 << spad);
+            } else {
+                self.lost += 1;
+            }
+            if is_ready || is_paralysable {
+                let mut until = before.max(time + self.model.dead_time);
+                if let Some(echoes) = echoes {
+                    until = echoes.blind(spad, before.max(time), until);
+                }
+                self.blind_until[usize::from(spad)] = until;
+            }
+            if is_ready && breeds {
+                self.breed(photon, true);
+            }
+            return Ok(());
+        }
+        if !is_certain && !is_unknown && !is_ready && !is_paralysable {
+            return Ok(());
+        }
+        // Whether it comes, or whether the SPAD is ready, is not known. An echo's next photon depends on what was before.
+        if time >= wanted_from || source == Source::Echo {
+            return Err(Unknown);
+        }
+        self.blind_until[usize::from(spad)] = before.max(time + self.model.dead_time);
+        self.unknown |= 1 << spad;
+        if breeds {
+            self.breed(photon, false);
+        }
+        Ok(())
+    }
+
+    /// Notes what an avalanche causes.
+    fn breed(&mut self, parent: Photon, is_certain: bool) {
+        let parent = SpadEvent {
+            time: parent.time,
+            spad: parent.spad,
+        };
+        let children = self.model.children(self.key, self.pixel, parent);
+        self.pending
+            .extend(children.map(|child| Reverse((child, is_certain))));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// What is known without the past is what the past gives.
+        #[test]
+        fn whatever_is_certain_without_the_past_is_so_with_it(
+            raw in prop::collection::vec((0i64..100_000, 0u8..16, prop::bool::weighted(0.1)), 1..120),
+            from_fs in 0i64..60_000,
+            wait_fs in 0i64..40_000,
+            dead_fs in 0i64..9_000,
+            afterpulse_probability in 0.0f64..1.0,
+            crosstalk_probability in 0.0f64..1.0,
+            paralysable: bool,
+        ) {
+            let law = if paralysable { DeadTimeLaw::Paralysable } else { DeadTimeLaw::NonParalysable };
+            let model = SpadModel {
+                law,
+                afterpulse_probability,
+                afterpulse_time: Time::from_fs(500),
+                crosstalk_probability,
+                ..SpadModel::with_dead_time(Time::from_fs(dead_fs))
+            };
+            let mut photons: Vec<Photon> = raw
+                .into_iter()
+                .map(|(time_fs, spad, breeds)| Photon { time: Time::from_fs(time_fs), spad, breeds })
+                .collect();
+            photons.sort();
+            let (from, wanted_from) = (Time::from_fs(from_fs), Time::from_fs(from_fs + wait_fs));
+            let mut all = Vec::new();
+            Avalanches::in_the_dark(&model, [7, 8], 1).run_to_the_end(&photons, &mut all);
+            let (before, known) = photons.split_at(photons.partition_point(|p| p.time < from));
+            let since = from - model.reach();
+            let breeding = before.iter().filter(|p| p.breeds && p.time >= since).copied();
+            let mut avalanches = Avalanches::known_from(&model, [7, 8], 1, from, breeding);
+            let mut edges = Vec::new();
+            let forever = Time::from_fs(i64::MAX);
+            if avalanches.run(known, None, forever, wanted_from, &mut edges).is_ok() {
+                all.retain(|edge| edge.time >= wanted_from);
+                edges.retain(|edge| edge.time >= wanted_from);
+                prop_assert_eq!(all, edges);
+            }
+        }
+    }
+
+    #[test]
+    fn a_photon_after_a_dead_time_of_darkness_is_known() {
+        let model = SpadModel::with_dead_time(Time::from_fs(100));
+        let at = |time_fs| Photon {
+            time: Time::from_fs(time_fs),
+            spad: 3,
+            breeds: false,
+        };
+        let run = |photons: &[Photon], wanted_from| {
+            let from = Time::from_fs(1_000);
+            let mut avalanches =
+                Avalanches::known_from(&model, [0; 2], 0, from, std::iter::empty());
+            let (forever, wanted) = (Time::from_fs(i64::MAX), Time::from_fs(wanted_from));
+            let mut edges = Vec::new();
+            let known = avalanches.run(photons, None, forever, wanted, &mut edges);
+            known.map(|()| edges.len())
+        };
+        assert_eq!(run(&[at(1_100)], 0), Ok(1));
+        assert_eq!(run(&[at(1_099)], 0), Err(Unknown));
+        // The second one is lost or not, the third one comes late enough.
+        assert_eq!(run(&[at(1_050), at(1_120), at(1_221)], 1_200), Ok(1));
+        assert_eq!(run(&[at(1_050), at(1_120), at(1_220)], 1_200), Err(Unknown));
+    }
+}

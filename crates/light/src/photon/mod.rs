@@ -1,0 +1,39 @@
+//! Light and the SPADs that see it: photon budget (thesis 3.2.1), sunlight, lens and filter, dead time,
+//! and the random-access photon stream that drives every engine.
+
+mod avalanches;
+mod budget;
+mod echo;
+mod gaussian;
+mod light;
+mod mixture;
+mod optics;
+pub mod philox;
+mod pulse;
+mod quantile;
+mod random;
+pub mod solar;
+mod spad;
+mod spad_grid;
+mod stream;
+
+pub use avalanches::{Avalanches, Unknown};
+pub use budget::{Convention, PhotonBudget, Spot};
+pub use echo::{ECHO_REACH, EchoLaw};
+pub use gaussian::{pulse_share, pulse_shares};
+pub use light::{Echo, LightError, PixelLight, Profile, Segment, SpadSpread};
+pub use mixture::{DEEP, Glint, MERGED_ERROR, merged};
+pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
+pub use philox::LANES;
+pub use pulse::{PulseError, PulseShape};
+pub use quantile::{NormalSampler, RANKS};
+pub use random::{Poisson, Purpose, normal, philox_key, random_stream};
+pub use spad::{
+    AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, Photon, SpadEvent, SpadModel, apply_dead_time,
+};
+pub use spad_grid::{MOST_SPADS, SIDES, SpadGrid, count_bits};
+pub use stream::{
+    Background, Draw, GROUP, Group, LightParts, ListedEchoes, NEVER_FS, OrderedEchoes, PER_BLOCK,
+    PLACE_BITS, PhotonStream, PixelPhotons, PixelStream, Place, Run, Slots, Span, StreamConfig,
+    TILE, TIME_BITS, signal_rank, spad_of,
+};

@@ -1,0 +1,286 @@
+//! What stands between the SPADs and the scene: lens, band-pass filter, the laser's drift, the air.
+//!
+//! Lens: thesis 2.3.2, Eq. 3. Filter and drift: 2.3.3 and Fig. 20. A laser (a VCSEL: 0.08 nm/°C, ±10 nm from
+//! one piece to the next) wanders over 30 nm between −40 °C and 105 °C (the minus sign is lost in
+//! print), and the filter has to let it through without letting in the sun.
+
+use std::f64::consts::{LN_2, PI};
+
+/// A lens.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lens {
+    /// Diameter of the aperture, m (D, d_lens).
+    pub diameter_m: f64,
+    /// Focal length over diameter (f#).
+    pub f_number: f64,
+}
+
+impl Lens {
+    /// Focal length, m (Eq. 3).
+    pub(crate) fn focal_m(&self) -> f64 {
+        self.f_number * self.diameter_m
+    }
+
+    /// Full angle of view, degrees, of `pixels` of `pitch_m` in a row.
+    pub fn field_of_view_deg(&self, pixels: u32, pitch_m: f64) -> f64 {
+        let half_m = 0.5 * f64::from(pixels) * pitch_m;
+        2.0 * (half_m / self.focal_m()).atan().to_degrees()
+    }
+}
+
+/// Transmission of a filter against wavelength; all are 1 at the centre.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum FilterShape {
+    /// 1 inside the band, 0 outside.
+    TopHat,
+    /// A Gaussian.
+    Gaussian,
+    /// One period of a raised cosine, 0 beyond one FWHM from the centre.
+    Cosine,
+    /// One resonance of a Fabry-Pérot cavity, with its long wings.
+    Lorentz,
+}
+
+impl FilterShape {
+    /// Every shape.
+    pub const ALL: [FilterShape; 4] = [
+        FilterShape::TopHat,
+        FilterShape::Gaussian,
+        FilterShape::Cosine,
+        FilterShape::Lorentz,
+    ];
+}
+
+/// A band-pass filter of peak transmission 1; losses belong to the budget's transmittance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Filter {
+    /// Centre of the band, nm.
+    pub centre_nm: f64,
+    /// Full width at half maximum, nm, > 0.
+    pub fwhm_nm: f64,
+    /// Shape of the band.
+    pub shape: FilterShape,
+}
+
+impl Filter {
+    /// A filter of the given centre, width (> 0) and shape.
+    pub fn new(centre_nm: f64, fwhm_nm: f64, shape: FilterShape) -> Self {
+        debug_assert!(fwhm_nm > 0.0, "{fwhm_nm}");
+        Filter {
+            centre_nm,
+            fwhm_nm,
+            shape,
+        }
+    }
+
+    /// Transmission at `wavelength_nm`, 0 to 1.
+    pub(crate) fn transmission(&self, wavelength_nm: f64) -> f64 {
+        // In half widths: every shape has fallen to 1/2 at x = 1.
+        let x = 2.0 * (wavelength_nm - self.centre_nm).abs() / self.fwhm_nm;
+        match self.shape {
+            FilterShape::TopHat => f64::from(u8::from(x <= 1.0)),
+            FilterShape::Gaussian => (-LN_2 * x * x).exp(),
+            FilterShape::Cosine if x < 2.0 => 0.5 + 0.5 * (0.5 * PI * x).cos(),
+            FilterShape::Cosine => 0.0,
+            FilterShape::Lorentz => 1.0 / (1.0 + x * x),
+        }
+    }
+
+    /// Wavelengths outside of which the transmission is nothing (below 10⁻³⁰), nm.
+    pub(crate) fn passband_nm(&self) -> (f64, f64) {
+        let half_widths = match self.shape {
+            FilterShape::TopHat => 1.0,
+            FilterShape::Gaussian => 10.0,
+            FilterShape::Cosine => 2.0,
+            FilterShape::Lorentz => f64::INFINITY,
+        };
+        let reach_nm = half_widths * self.fwhm_nm / 2.0;
+        (self.centre_nm - reach_nm, self.centre_nm + reach_nm)
+    }
+
+    /// Width of the top hat that passes as much of white light, nm.
+    pub fn equivalent_width_nm(&self) -> f64 {
+        self.fwhm_nm
+            * match self.shape {
+                FilterShape::TopHat | FilterShape::Cosine => 1.0,
+                FilterShape::Gaussian => 0.5 * (PI / LN_2).sqrt(),
+                FilterShape::Lorentz => 0.5 * PI,
+            }
+    }
+
+    /// This filter warmed by `degrees_c`, its centre drifting by `nm_per_c` (interference filters: about 0.03).
+    pub fn warmed(&self, degrees_c: f64, nm_per_c: f64) -> Self {
+        Filter {
+            centre_nm: self.centre_nm + nm_per_c * degrees_c,
+            ..*self
+        }
+    }
+
+    /// This filter under light that comes in at `angle_rad`: an interference filter of effective index `index`
+    /// moves to λ·√(1 − sin²θ/n²).
+    pub fn tilted(&self, angle_rad: f64, index: f64) -> Self {
+        let sine = angle_rad.sin() / index;
+        Filter {
+            centre_nm: self.centre_nm * (1.0 - sine * sine).sqrt(),
+            ..*self
+        }
+    }
+}
+
+/// A laser whose wavelength depends on temperature and on the piece at hand (2.3.3, Fig. 20).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LaserDrift {
+    /// Wavelength of a typical piece at `reference_c`, nm.
+    pub nominal_nm: f64,
+    /// Temperature of the nominal wavelength, °C.
+    pub reference_c: f64,
+    /// Drift, nm/°C.
+    pub nm_per_c: f64,
+    /// How far a piece may lie from the typical one, nm.
+    pub process_nm: f64,
+}
+
+impl LaserDrift {
+    /// The VCSEL of Fig. 20: 0.08 nm/°C, ±10 nm, nominal at 25 °C.
+    pub fn vcsel(nominal_nm: f64) -> Self {
+        LaserDrift {
+            nominal_nm,
+            reference_c: 25.0,
+            nm_per_c: 0.08,
+            process_nm: 10.0,
+        }
+    }
+
+    /// Wavelength at `temperature_c` of a piece `offset_nm` from the typical one, nm.
+    pub fn wavelength_nm(&self, temperature_c: f64, offset_nm: f64) -> f64 {
+        self.nominal_nm + offset_nm + self.nm_per_c * (temperature_c - self.reference_c)
+    }
+
+    /// Shortest and longest wavelength over all pieces from `coldest_c` to `hottest_c`, nm.
+    pub fn span_nm(&self, coldest_c: f64, hottest_c: f64) -> (f64, f64) {
+        let ends = [coldest_c, hottest_c].map(|c| self.wavelength_nm(c, 0.0));
+        let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+        (low - self.process_nm, high + self.process_nm)
+    }
+}
+
+/// Air that takes light away as Beer and Lambert say: e^(−αz) over z metres.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Atmosphere {
+    /// Extinction coefficient α at the laser's wavelength, 1/m. Zero is vacuum.
+    pub extinction_per_m: f64,
+}
+
+impl Atmosphere {
+    /// Nothing in the way.
+    pub const CLEAR: Atmosphere = Atmosphere {
+        extinction_per_m: 0.0,
+    };
+
+    /// Air in which a black object can just be told from the sky (contrast 2 %, 550 nm) at `visibility_m`.
+    ///
+    /// α = 3.912/V · (λ/550 nm)^(−q), the law of Koschmieder and Kruse with Kim's exponents for haze
+    /// and fog (Kim, McArthur and Korevaar, Proc. SPIE 4214, 2001); below 500 m q = 0.
+    pub fn from_visibility(visibility_m: f64, wavelength_nm: f64) -> Self {
+        let km = visibility_m * 1e-3;
+        let exponent = match km {
+            v if v > 50.0 => 1.6,
+            v if v > 6.0 => 1.3,
+            v if v > 1.0 => 0.16 * v + 0.34,
+            v if v > 0.5 => v - 0.5,
+            _ => 0.0,
+        };
+        let koschmieder = (1.0f64 / 0.02).ln();
+        Atmosphere {
+            extinction_per_m: koschmieder / visibility_m * (wavelength_nm / 550.0).powf(-exponent),
+        }
+    }
+
+    /// Share of the laser's light that survives the way to a target at `range_m` and back.
+    pub fn round_trip(&self, range_m: f64) -> f64 {
+        (-2.0 * self.extinction_per_m * range_m).exp()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lens_of_table_6_sees_26_by_8_degrees() {
+        let lens = Lens {
+            diameter_m: 6e-3,
+            f_number: 2.2,
+        };
+        assert!((lens.focal_m() - 13.2e-3).abs() < 1e-15);
+        let (h, v) = (
+            lens.field_of_view_deg(200, 30e-6),
+            lens.field_of_view_deg(63, 30e-6),
+        );
+        assert!((h - 26.0).abs() < 0.5 && (v - 8.0).abs() < 0.5, "{h} {v}");
+    }
+
+    #[test]
+    fn every_shape_is_one_at_the_centre_and_half_at_its_width() {
+        for shape in FilterShape::ALL {
+            let filter = Filter::new(940.0, 8.0, shape);
+            assert_eq!(filter.transmission(940.0), 1.0);
+            let (inside, outside) = (filter.transmission(943.9999), filter.transmission(944.0001));
+            assert!((0.5 * (inside + outside) - 0.5).abs() < 1e-4, "{shape:?}");
+            let (from, to) = filter.passband_nm();
+            assert!(
+                filter.transmission(from - 1e-6) < 1e-29 && filter.transmission(to + 1e-6) < 1e-29
+            );
+        }
+    }
+
+    #[test]
+    fn equivalent_widths_are_the_areas() {
+        for shape in FilterShape::ALL {
+            let filter = Filter::new(0.0, 2.0, shape);
+            let sum: f64 = (-1_000_000..1_000_000)
+                .map(|k| filter.transmission((f64::from(k) + 0.5) * 1e-3) * 1e-3)
+                .sum();
+            // The Lorentzian has 2 nm²/x beyond x = 1000 nm, both sides together.
+            let beyond = if shape == FilterShape::Lorentz {
+                2e-3
+            } else {
+                0.0
+            };
+            assert!(
+                (sum + beyond - filter.equivalent_width_nm()).abs() < 1e-5,
+                "{shape:?}: {sum}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_vcsel_wanders_over_30_nm_in_a_car() {
+        let (low, high) = LaserDrift::vcsel(940.0).span_nm(-40.0, 105.0);
+        assert!(
+            (high - low - (145.0 * 0.08 + 20.0)).abs() < 1e-9,
+            "{low} {high}"
+        );
+        assert!(high - low > 30.0);
+    }
+
+    #[test]
+    fn filters_go_red_with_heat_and_blue_with_tilt() {
+        let filter = Filter::new(940.0, 10.0, FilterShape::TopHat);
+        assert!((filter.warmed(50.0, 0.03).centre_nm - 941.5).abs() < 1e-12);
+        let tilted = filter.tilted(0.2, 2.0).centre_nm;
+        assert!((tilted / 940.0 - (1.0 - (0.2f64.sin() / 2.0).powi(2)).sqrt()).abs() < 1e-15);
+        assert_eq!(filter.tilted(0.0, 2.0), filter);
+    }
+
+    #[test]
+    fn fog_leaves_two_percent_of_contrast_at_its_visibility() {
+        for visibility_m in [50.0, 200.0, 499.0] {
+            let fog = Atmosphere::from_visibility(visibility_m, 905.0);
+            assert!((fog.round_trip(visibility_m / 2.0) - 0.02).abs() < 1e-12);
+        }
+        let haze = |nm| Atmosphere::from_visibility(10e3, nm).extinction_per_m;
+        assert!(haze(905.0) < haze(550.0), "haze scatters the infrared less");
+        assert_eq!(Atmosphere::CLEAR.round_trip(200.0), 1.0);
+    }
+}

@@ -1,0 +1,340 @@
+//! What a SPAD does with photons: an edge, then blindness for the dead time; at times an afterpulse or crosstalk.
+//!
+//! The SPADs of a macropixel share its photons evenly. Each drives one wire of SPAD_RAW, which rises with
+//! an avalanche and stays high for the dead time. An avalanche exactly at the end of a pulse makes no edge, because the
+//! wire falls and rises in the same instant.
+//!
+//! ```text
+//!   photon      ↓     ↓          ↓          ↓
+//!   SPAD_RAW  ▁▁▔▔▔▔▔▔▔▔▁▁▁▁▁▁▁▁▁▔▔▔▔▔▔▔▔▁▁▁▔▔   non-paralysable: the second photon is lost
+//!                                       ╰─ carriers trapped by an avalanche release an afterpulse later
+//! ```
+//!
+//! An afterpulse comes from the same SPAD after its dead time, with an exponential delay that is cut at
+//! [`AFTERPULSE_REACH`] time constants. Crosstalk fires a direct neighbour within the macropixel after
+//! [`CROSSTALK_DELAY`]; what leaves the macropixel is lost. Neither triggers further ones: probabilities are those of
+//! one generation. Which photons trigger others, should they make an avalanche, is drawn with the photons
+//! ([`Photon::breeds`]). What they trigger is drawn from their own time, SPAD and macropixel, so that code which
+//! starts from a known state sees the same.
+
+use super::avalanches::Avalanches;
+use super::random::Purpose;
+use crate::photon::SpadGrid;
+use crate::units::Time;
+
+/// Longest delay of an afterpulse after the dead time, in time constants; e⁻⁸ of the exponential lie beyond.
+pub const AFTERPULSE_REACH: i64 = 8;
+
+/// The share of the exponential within them: 1 − e⁻⁸.
+const AFTERPULSE_REACHED: f64 = 0.999_664_537_372_097_5;
+
+/// How long after an avalanche crosstalk fires a neighbour.
+pub const CROSSTALK_DELAY: Time = Time::from_ps(10);
+
+/// A rising edge of one SPAD's wire. Ordered by time, then SPAD.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SpadEvent {
+    /// When, counted from the first rising edge of STOP of the exposure.
+    pub time: Time,
+    /// Which SPAD_RAW wire.
+    pub spad: u8,
+}
+
+/// A photon or dark count on one SPAD, seen or not. Ordered by time, then SPAD.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Photon {
+    /// When, counted from the first rising edge of STOP of the exposure.
+    pub time: Time,
+    /// Which SPAD.
+    pub spad: u8,
+    /// Whether its avalanche, if it makes one, has an afterpulse or crosstalk.
+    pub breeds: bool,
+}
+
+impl From<SpadEvent> for Photon {
+    /// A photon that triggers no other avalanche.
+    fn from(event: SpadEvent) -> Self {
+        Photon {
+            time: event.time,
+            spad: event.spad,
+            breeds: false,
+        }
+    }
+}
+
+/// What an avalanche in a blind SPAD does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum DeadTimeLaw {
+    /// Nothing (active recharge).
+    #[default]
+    NonParalysable,
+    /// It begins the dead time anew (passive quenching).
+    Paralysable,
+}
+
+/// How SPADs answer to photons.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SpadModel {
+    /// The SPADs of a macropixel.
+    pub grid: SpadGrid,
+    /// How long a SPAD stays blind after an avalanche.
+    pub dead_time: Time,
+    /// What an avalanche during that time does.
+    pub law: DeadTimeLaw,
+    /// Probability that an avalanche has an afterpulse, 0 to 1.
+    pub afterpulse_probability: f64,
+    /// Time constant of afterpulses.
+    pub afterpulse_time: Time,
+    /// Chance that an avalanche fires one of four neighbours, 0 to 1.
+    pub crosstalk_probability: f64,
+}
+
+impl SpadModel {
+    /// Nothing but a non-paralysable dead time.
+    pub fn with_dead_time(dead_time: Time) -> Self {
+        SpadModel {
+            dead_time,
+            ..SpadModel::default()
+        }
+    }
+
+    /// Whether avalanches cause others.
+    pub fn has_secondaries(&self) -> bool {
+        self.afterpulse_probability > 0.0 || self.crosstalk_probability > 0.0
+    }
+
+    /// Probability that an avalanche triggers others: an afterpulse, crosstalk, or both.
+    pub(crate) fn breeding_probability(&self) -> f64 {
+        let (afterpulse, crosstalk) = (self.afterpulse_probability, self.crosstalk_probability);
+        afterpulse + crosstalk - afterpulse * crosstalk
+    }
+
+    /// Longest time from an avalanche to the last one that it triggers; zero if none does.
+    pub fn reach(&self) -> Time {
+        let mut reach = Time::ZERO;
+        if self.afterpulse_probability > 0.0 {
+            reach = self.dead_time + self.afterpulse_time * AFTERPULSE_REACH + Time::from_fs(2);
+        }
+        if self.crosstalk_probability > 0.0 {
+            reach = reach.max(CROSSTALK_DELAY);
+        }
+        reach
+    }
+
+    /// The avalanches that the avalanche `parent` of macropixel `pixel` triggers, if it is one that does. `key` is
+    /// that of the photon stream.
+    pub(super) fn children(
+        &self,
+        key: [u32; 2],
+        pixel: u32,
+        parent: SpadEvent,
+    ) -> impl Iterator<Item = SpadEvent> {
+        let time_fs = parent.time.as_fs() as u64;
+        let purpose = Purpose::Avalanches as u32 | u32::from(parent.spad) << 8;
+        let counter = [time_fs as u32, (time_fs >> 32) as u32, pixel, purpose];
+        let words = rand_philox::philox4x32_10(counter, key);
+        // One word tells which of the two it causes, given that it causes something.
+        let (afterpulse, crosstalk) = (self.afterpulse_probability, self.crosstalk_probability);
+        let choice = rand_philox::u32_to_unit_f64(words[0]) * self.breeding_probability();
+        let has_afterpulse = choice < afterpulse;
+        let has_crosstalk = choice < afterpulse * crosstalk || choice >= afterpulse;
+        let afterpulse = has_afterpulse.then(|| {
+            let share = AFTERPULSE_REACHED * rand_philox::u32_to_unit_f64(words[1]);
+            let delay_fs = -libm::log1p(-share) * self.afterpulse_time.as_fs() as f64;
+            SpadEvent {
+                time: parent.time + self.dead_time + Time::from_fs(1 + delay_fs.round() as i64),
+                spad: parent.spad,
+            }
+        });
+        let neighbour = has_crosstalk.then(|| self.grid.neighbour(parent.spad, words[3] >> 30));
+        let crosstalk = neighbour.flatten().map(|spad| SpadEvent {
+            time: parent.time + CROSSTALK_DELAY,
+            spad,
+        });
+        afterpulse.into_iter().chain(crosstalk)
+    }
+}
+
+/// Removes the events that fall into the (non-paralysable) dead time of their SPAD; returns how many.
+///
+/// `events` must be sorted by (time, SPAD) with times from 0 on. An event stays if and only if it
+/// is strictly later than the SPAD's last kept event plus `dead_time`. With a dead time of zero
+/// only exact coincidences on one SPAD are removed.
+pub fn apply_dead_time(events: &mut Vec<SpadEvent>, dead_time: Time) -> u64 {
+    let model = SpadModel {
+        // Events may be of any SPADs there are.
+        grid: SpadGrid::new(8, 8),
+        ..SpadModel::with_dead_time(dead_time)
+    };
+    let photons: Vec<Photon> = events.iter().map(|&event| event.into()).collect();
+    events.clear();
+    Avalanches::in_the_dark(&model, [0; 2], 0).run_to_the_end(&photons, events)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn event(time_fs: i64, spad: u8) -> SpadEvent {
+        SpadEvent {
+            time: Time::from_fs(time_fs),
+            spad,
+        }
+    }
+
+    /// The rules, one SPAD at a time, straight from their wording.
+    fn slow_reference(events: &[SpadEvent], dead_time: Time, law: DeadTimeLaw) -> Vec<SpadEvent> {
+        let mut kept = Vec::new();
+        for spad in 0..16u8 {
+            let mut last: Option<Time> = None;
+            for e in events.iter().filter(|e| e.spad == spad) {
+                let ready = last.is_none_or(|l| e.time > l + dead_time);
+                if ready {
+                    kept.push(*e);
+                }
+                if ready || law == DeadTimeLaw::Paralysable {
+                    last = Some(e.time);
+                }
+            }
+        }
+        kept.sort();
+        kept
+    }
+
+    /// Edges of photons that trigger no others, and how many were lost.
+    fn detected(model: &SpadModel, photons: &[SpadEvent]) -> (Vec<SpadEvent>, u64) {
+        let photons: Vec<Photon> = photons.iter().map(|&event| event.into()).collect();
+        let mut edges = Vec::new();
+        let lost = Avalanches::in_the_dark(model, [0; 2], 0).run_to_the_end(&photons, &mut edges);
+        (edges, lost)
+    }
+
+    #[test]
+    fn an_avalanche_at_the_very_end_of_a_pulse_makes_no_edge() {
+        let mut events = vec![event(0, 3), event(10, 3), event(11, 3)];
+        assert_eq!(apply_dead_time(&mut events, Time::from_fs(10)), 1);
+        assert_eq!(events, [event(0, 3), event(11, 3)]);
+    }
+
+    #[test]
+    fn a_suppressed_avalanche_prolongs_the_pulse_only_if_paralysable() {
+        let photons = [event(0, 0), event(6, 0), event(12, 0)];
+        let mut model = SpadModel::with_dead_time(Time::from_fs(10));
+        assert_eq!(
+            detected(&model, &photons),
+            (vec![event(0, 0), event(12, 0)], 1)
+        );
+        model.law = DeadTimeLaw::Paralysable;
+        assert_eq!(detected(&model, &photons), (vec![event(0, 0)], 2));
+    }
+
+    #[test]
+    fn spads_do_not_blind_each_other() {
+        let mut events = vec![event(5, 0), event(5, 1), event(6, 2)];
+        assert_eq!(apply_dead_time(&mut events, Time::from_ns(10)), 0);
+        assert_eq!(events.len(), 3);
+    }
+
+    /// What isolated avalanches of SPAD 5 trigger: SPAD, and time since the avalanche.
+    fn children(model: &SpadModel, lonely: i64) -> Vec<Vec<(Time, u8)>> {
+        let apart = Time::from_ns(10_000);
+        let parents = (0..lonely).map(|n| event((apart * n).as_fs(), 5));
+        let since = |parent: SpadEvent, child: SpadEvent| (child.time - parent.time, child.spad);
+        parents
+            .map(|parent| {
+                let children = model.children([1, 2], 3, parent);
+                children.map(|child| since(parent, child)).collect()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn afterpulses_have_their_delay() {
+        let model = SpadModel {
+            afterpulse_probability: 0.2,
+            afterpulse_time: Time::from_ns(5),
+            ..SpadModel::with_dead_time(Time::from_ns(8))
+        };
+        let n = 5_000;
+        let delays = children(&model, n).into_iter().map(|caused| {
+            let [(since, 5)] = caused[..] else {
+                panic!("one afterpulse, not {caused:?}");
+            };
+            assert!(since > model.dead_time && since <= model.reach());
+            (since - model.dead_time).as_ns()
+        });
+        let mean = delays.sum::<f64>() / n as f64;
+        assert_eq!(AFTERPULSE_REACHED, -libm::expm1(-AFTERPULSE_REACH as f64));
+        // Mean of an exponential cut at 8 time constants.
+        let expected = 5.0 * (1.0 - 8.0 / (8f64.exp() - 1.0));
+        assert!((mean - expected).abs() < 5.0 * 5.0 / (n as f64).sqrt());
+    }
+
+    #[test]
+    fn crosstalk_goes_to_every_neighbour_alike() {
+        let model = SpadModel {
+            crosstalk_probability: 0.5,
+            ..SpadModel::with_dead_time(Time::from_ns(8))
+        };
+        let n = 4_000;
+        let caused: Vec<_> = children(&model, n).concat();
+        for neighbour in [1, 4, 6, 9] {
+            let hits = caused.iter().filter(|&&(_, spad)| spad == neighbour);
+            let (hits, expected) = (hits.count() as f64, n as f64 / 4.0);
+            assert!(
+                (hits - expected).abs() < 5.0 * expected.sqrt(),
+                "{hits} {expected}"
+            );
+        }
+        assert!(caused.iter().all(|&(since, _)| since == CROSSTALK_DELAY));
+        assert_eq!(caused.len() as i64, n);
+        let inside = |spad| (0..4).filter_map(|d| model.grid.neighbour(spad, d)).count();
+        assert_eq!([0, 1, 5].map(inside), [2, 3, 4]);
+    }
+
+    #[test]
+    fn avalanches_that_breed_cause_one_or_the_other_or_both() {
+        let model = SpadModel {
+            afterpulse_probability: 0.3,
+            afterpulse_time: Time::from_ns(5),
+            crosstalk_probability: 0.1,
+            ..SpadModel::with_dead_time(Time::from_ns(8))
+        };
+        let breeding = model.breeding_probability();
+        assert!((breeding - 0.37).abs() < 1e-12);
+        let n = 20_000;
+        let mut counts = [0; 3];
+        for caused in children(&model, n) {
+            let has_afterpulse = caused.iter().any(|&(_, spad)| spad == 5);
+            counts[0] += i64::from(has_afterpulse);
+            counts[1] += i64::from(caused.len() == 2);
+            counts[2] += i64::from(caused.is_empty());
+        }
+        for (count, expected) in counts.into_iter().zip([0.3 / 0.37, 0.03 / 0.37, 0.0]) {
+            let found = count as f64 / n as f64;
+            assert!(
+                (found - expected).abs() < 5.0 * 0.5 / (n as f64).sqrt(),
+                "{found} {expected}"
+            );
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn equals_the_slow_reference(
+            raw in prop::collection::vec((0i64..500, 0u8..16), 0..200),
+            dead_fs in 0i64..100,
+            paralysable: bool,
+        ) {
+            let law = if paralysable { DeadTimeLaw::Paralysable } else { DeadTimeLaw::NonParalysable };
+            let model = SpadModel { law, ..SpadModel::with_dead_time(Time::from_fs(dead_fs)) };
+            let mut events: Vec<_> = raw.into_iter().map(|(t, s)| event(t, s)).collect();
+            events.sort();
+            let expected = slow_reference(&events, Time::from_fs(dead_fs), law);
+            let (edges, lost) = detected(&model, &events);
+            prop_assert_eq!(events.len() as u64 - lost, expected.len() as u64);
+            prop_assert_eq!(edges, expected);
+        }
+    }
+}

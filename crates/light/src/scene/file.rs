@@ -1,0 +1,243 @@
+//! Scene files: reading them, all faults at once, and printing them.
+
+use std::path::Path;
+
+use toml::{Table, Value};
+
+use super::curve::read_file;
+use super::entry::ObjectEntry;
+use super::object::Object;
+use super::rules::{check_object, check_rig, check_stereo};
+use super::settings::{Lidar, Scene};
+use crate::files::InputError;
+use crate::settings::{Document, Fault, Key, Range, Settings, commented, schema};
+
+impl Scene {
+    /// The built-in street, from 15 to 180 m, 50 klux.
+    pub fn outdoor() -> Self {
+        Scene::named("street").expect("the street is built in")
+    }
+
+    /// The file of the built-in street, to be changed by `--set`.
+    pub fn outdoor_document() -> Document {
+        Scene::built_in_document("street").expect("the street is built in")
+    }
+
+    /// Reads a scene file. Files that it names are relative to its folder.
+    ///
+    /// # Errors
+    /// As [`Scene::read`], or when the file cannot be read.
+    pub fn load(path: &Path) -> Result<Self, InputError> {
+        Scene::read(&Document::load(path)?)
+    }
+
+    /// Reads a scene from TOML text; `source` names it in complaints.
+    ///
+    /// # Errors
+    /// As [`Scene::read`], each fault with its line.
+    pub fn parse(source: &str, text: &str) -> Result<Self, InputError> {
+        Scene::read(&Document::parse(source, text)?)
+    }
+
+    /// Reads a scene from its document. Keys that are left out have their default: that of
+    /// [`Lidar`](super::Lidar), [`Stereo`](super::Stereo) and [`Light`](super::Light); a document without objects is a scene without any.
+    ///
+    /// # Errors
+    /// Syntax errors; unknown keys, keys that an object lacks, and impossible values, all of them at once.
+    pub fn read(document: &Document) -> Result<Self, InputError> {
+        if document.is_empty() {
+            let message = "has no settings; give at least one, or leave the scene out for the built-in street";
+            document.complain(vec![Fault {
+                path: String::new(),
+                message: message.into(),
+            }])?;
+        }
+        let mut faults = Vec::new();
+        let mut scene = Scene::default();
+        for (name, value) in document.table() {
+            let faults = &mut faults;
+            let wrong = |message: &str| Fault {
+                path: name.clone(),
+                message: format!("{name}: {message}"),
+            };
+            match (name.as_str(), value) {
+                ("lidar", Value::Table(given)) => {
+                    let given = with_curves(document, name, given, faults);
+                    let before = faults.len();
+                    scene.lidar = section(document, name, &given, faults);
+                    if faults.len() == before {
+                        faults.extend(scene.lidar.fault());
+                    }
+                }
+                ("stereo", Value::Table(given)) => {
+                    scene.stereo = section(document, name, given, faults);
+                }
+                ("light", Value::Table(given)) => {
+                    scene.light = section(document, name, given, faults);
+                }
+                ("medium", Value::Table(given)) => {
+                    scene.medium = section(document, name, given, faults);
+                }
+                ("rig", Value::Table(given)) => {
+                    scene.rig = section(document, name, given, faults);
+                }
+                ("object", Value::Array(items)) => {
+                    for (index, item) in items.iter().enumerate() {
+                        let path = format!("object.{index}");
+                        scene.objects.extend(object(document, &path, item, faults));
+                    }
+                }
+                ("object", _) => faults.push(wrong(
+                    "object is not a list; write each object as a section [[object]]",
+                )),
+                ("lidar" | "stereo" | "light" | "medium" | "rig", _) => faults.push(wrong(
+                    "this must be a section; write its name in brackets, and its keys below",
+                )),
+                _ => faults.push(wrong(
+                    "unknown section; give [lidar], [stereo], [light], [medium], [rig] or [[object]]",
+                )),
+            }
+        }
+        if !faults.iter().any(|fault| fault.path.starts_with("stereo.")) {
+            faults.extend(check_stereo(&scene.stereo));
+        }
+        faults.extend(check_rig(&scene.rig));
+        for fault in &mut faults {
+            fault.message = place(document, &fault.path) + &fault.message;
+        }
+        document.complain(faults)?;
+        Ok(scene)
+    }
+
+    /// What there is to know of a key, by section and name as `lidar.pde`, or of an object as `object.car.reflectivity`; nothing if it is
+    /// no key.
+    pub fn key(path: &str) -> Option<Key> {
+        let (section, name) = path.split_once('.')?;
+        let name = match section {
+            "object" => name.rsplit_once('.')?.1,
+            _ => name,
+        };
+        let section = Scene::SECTIONS.iter().find(|known| known.name == section)?;
+        section.keys.iter().find(|key| key.name == name).copied()
+    }
+
+    /// All values as a TOML table.
+    pub(super) fn table(&self) -> Table {
+        Table::try_from(self).expect("a scene is numbers and texts")
+    }
+
+    /// The scene as a commented file, which [`Scene::parse`] reads back.
+    pub fn commented(&self) -> String {
+        let left_out = Scene::default();
+        commented(Scene::SECTIONS, &self.table(), &left_out.table())
+    }
+
+    /// The JSON schema of a scene file.
+    pub fn schema() -> serde_json::Value {
+        schema(
+            "A scene of gdtof",
+            Scene::SECTIONS,
+            &Scene::default().table(),
+        )
+    }
+}
+
+/// The lidar's section with what is in the files that it names, in the place of their names.
+fn with_curves(document: &Document, name: &str, given: &Table, faults: &mut Vec<Fault>) -> Table {
+    let mut read = given.clone();
+    let is_curve = |key: &&Key| matches!(key.range, Range::WordOrCurve(..));
+    for key in Lidar::KEYS.iter().filter(is_curve) {
+        let path = format!("{name}.{}", key.name);
+        let Some(value) = given.get(key.name) else {
+            continue;
+        };
+        match read_file(value, document.folder()) {
+            Ok(None) => (),
+            Ok(Some(curve)) => drop(read.insert(key.name.into(), curve)),
+            Err(why) => {
+                read.remove(key.name);
+                let message = format!("{}: {why}", key.name);
+                faults.push(Fault { path, message });
+            }
+        }
+    }
+    read
+}
+
+/// A section whose keys all have defaults.
+fn section<T: Settings>(
+    document: &Document,
+    name: &str,
+    given: &Table,
+    faults: &mut Vec<Fault>,
+) -> T {
+    let read = document.section::<T>(name, given, faults);
+    read.try_into().unwrap_or_default()
+}
+
+/// The object at `path`, if it has no fault.
+fn object(
+    document: &Document,
+    path: &str,
+    item: &Value,
+    faults: &mut Vec<Fault>,
+) -> Option<Object> {
+    let mut complain = |message: String| {
+        let path = path.to_owned();
+        faults.push(Fault { path, message });
+    };
+    let Value::Table(given) = item else {
+        complain("this must be a section [[object]]; write its keys below".into());
+        return None;
+    };
+    let needed = ["name", "kind", "reflectivity"];
+    let lacks = needed.iter().find(|key| !given.contains_key(**key));
+    if let Some(key) = lacks {
+        complain(format!("lacks `{key}`; add it"));
+    }
+    let before = faults.len();
+    let read = document.section::<ObjectEntry>(path, given, faults);
+    if lacks.is_some() || faults.len() > before {
+        return None;
+    }
+    let entry = read.try_into::<ObjectEntry>();
+    let told = |e: toml::de::Error| e.message().trim().to_owned();
+    let entry = entry
+        .map_err(told)
+        .and_then(|e| e.object(document.folder()));
+    match entry {
+        Ok(object) => {
+            let fault = check_object(path, &object);
+            let is_fine = fault.is_none();
+            faults.extend(fault);
+            is_fine.then_some(object)
+        }
+        Err(message) => {
+            let path = path.to_owned();
+            faults.push(Fault { path, message });
+            None
+        }
+    }
+}
+
+/// Where a fault is, as the beginning of a sentence.
+fn place(document: &Document, path: &str) -> String {
+    let mut names = path.split('.');
+    match (names.next(), names.next()) {
+        (Some("object"), Some(index)) => {
+            let index: usize = index.parse().unwrap_or(0);
+            let item = document
+                .table()
+                .get("object")
+                .and_then(|list| list.get(index));
+            let name = item.and_then(|item| item.get("name")?.as_str());
+            let name = name.map_or(String::new(), |name| format!(" ({name})"));
+            format!("in [[object]] number {}{name}, ", index + 1)
+        }
+        (Some(section), Some(_)) => format!("in [{section}], "),
+        _ => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

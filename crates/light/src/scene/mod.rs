@@ -1,0 +1,54 @@
+//! What the lidar looks at: surfaces, sunlight, the lidar's and the stereo camera's optics, and
+//! the true distance of every macropixel.
+//!
+//! Coordinates in metres: x to the right, y down, z forward, the lidar at the origin.
+
+mod bounds;
+mod builtin;
+mod bundle;
+mod camera;
+mod cast;
+mod curve;
+mod daylight;
+mod entry;
+mod file;
+mod fog;
+mod illumination;
+mod keys;
+mod medium;
+#[cfg(test)]
+mod mirrors;
+mod motion;
+mod object;
+mod optics;
+mod ranges;
+mod rules;
+mod settings;
+mod shape;
+mod spads;
+mod texture;
+mod truth;
+mod unmoved;
+mod vector;
+mod view;
+
+pub(crate) use bounds::Bounds;
+pub use camera::PinholeCamera;
+pub use cast::Stage;
+pub use cast::{End, Hit, Return, Returns};
+pub use curve::{Curve, CurveError, Measured};
+pub use illumination::SKY_REFLECTIVITY;
+pub use medium::{DROPLET_LIDAR_RATIO_SR, Medium};
+pub use motion::{Rig, RigWaypoint, Waypoint};
+pub use object::Object;
+pub use optics::{BeamWord, FilterWord, PdeWord, PulseWord, VignettingWord};
+pub use settings::{Lidar, Light, Scene, Stereo};
+pub use shape::{DepthMap, MapFiles, Mesh, Shape};
+pub use texture::{Pattern, Picture, Texture};
+pub use truth::GroundTruth;
+pub use unmoved::Before;
+pub use vector::{Ray, turned};
+pub use view::Surface;
+
+/// A point or direction, m (or without unit): x right, y down, z forward.
+pub use glam::DVec3;

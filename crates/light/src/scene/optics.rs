@@ -1,0 +1,485 @@
+//! The lidar's laser, lens, filter and SPADs as its file describes them, from words or from measured curves.
+//!
+//! ```text
+//!   laser ──► beam: how much of a pulse goes into which macropixel ──► surface ──► lens: vignetting ──► filter ──► SPAD
+//!     └─ pulse: its power over time                     sun ───────────┘              (wavelengths)    (PDE over wavelength)
+//! ```
+//!
+//! A signal photon has the laser's wavelength. Of the sun all wavelengths count that filter and SPAD let through, each by its
+//! photons: the thesis's 13.8 W/m² are those of a top hat, all taken for 905 nm (Eq. 10 and 14).
+//!
+//! *Vignetting* is the relative illumination of a lens's data sheet: what an evenly bright scene gives a macropixel off the axis,
+//! relative to the middle. The cosine to the fourth of a plain lens is one cosine each for the lens and the macropixel, which
+//! are seen at an angle, and two for the distance. A uniform laser (Eq. 7) sends all macropixels the same energy, also those
+//! that see a smaller solid angle, so that of the signal only the lens's cosine is lost.
+
+use std::f64::consts::PI;
+
+use super::camera::PinholeCamera;
+use super::curve::{Curve, Measured};
+use super::settings::{Lidar, Scene};
+use crate::numerics::integrate;
+use crate::photon::solar::{spectral_irradiance, spectrum};
+use crate::photon::{Filter, FilterShape, PulseShape, StreamConfig};
+use crate::settings::{Fault, words};
+use crate::units::Time;
+
+/// Samples of a measured pulse whose own are not equally far apart.
+const PULSE_SAMPLES: usize = 4096;
+
+words! {
+    /// Laser pulses without a measurement.
+    #[derive(Default)]
+    pub enum PulseWord {
+        /// A Gaussian of `pulse_fwhm_ns`.
+        #[default]
+        Gaussian = "gaussian",
+    }
+}
+
+words! {
+    /// Lenses without a measurement.
+    #[derive(Default)]
+    pub enum VignettingWord {
+        /// None, as in the thesis.
+        #[default]
+        None = "none",
+        /// That of a plain lens.
+        Cos4 = "cos4",
+    }
+}
+
+words! {
+    /// Laser beams without a measurement.
+    #[derive(Default)]
+    pub enum BeamWord {
+        /// The same energy for every macropixel (Eq. 7 and 8, [`Spot`](crate::photon::Spot)).
+        #[default]
+        Uniform = "uniform",
+        /// A Gaussian of `beam_fwhm_deg`.
+        Gaussian = "gaussian",
+    }
+}
+
+words! {
+    /// Filters without a measurement.
+    #[derive(Default)]
+    pub enum FilterWord {
+        /// Any that lets `solar_irradiance_w_m2` through.
+        #[default]
+        Irradiance = "irradiance",
+        /// A top hat.
+        TopHat = "top_hat",
+        /// A Gaussian.
+        Gaussian = "gaussian",
+        /// One period of a raised cosine.
+        Cosine = "cosine",
+        /// One resonance of a Fabry-Pérot cavity.
+        Lorentz = "lorentz",
+    }
+}
+
+impl FilterWord {
+    fn shape(self) -> Option<FilterShape> {
+        match self {
+            FilterWord::Irradiance => None,
+            FilterWord::TopHat => Some(FilterShape::TopHat),
+            FilterWord::Gaussian => Some(FilterShape::Gaussian),
+            FilterWord::Cosine => Some(FilterShape::Cosine),
+            FilterWord::Lorentz => Some(FilterShape::Lorentz),
+        }
+    }
+}
+
+words! {
+    /// Detection efficiencies without a measurement.
+    #[derive(Default)]
+    pub enum PdeWord {
+        /// The same at all wavelengths.
+        #[default]
+        Flat = "flat",
+    }
+}
+
+/// How the light of a macropixel differs from that of one on the axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct OffAxis {
+    /// Of the laser's echo.
+    pub signal: f64,
+    /// Of the sunlight.
+    pub background: f64,
+}
+
+impl Lidar {
+    /// Share of the light of `wavelength_nm` that passes the filter, relative to its transmittance; `None` where only the
+    /// sun's irradiance is known.
+    fn filter_at(&self, wavelength_nm: f64) -> Option<f64> {
+        match &self.filter {
+            Measured::Curve(curve) => Some(curve.at(wavelength_nm).unwrap_or(0.0)),
+            Measured::Word(word) => {
+                let filter = self.filter_of(word.shape()?);
+                Some(filter.transmission(wavelength_nm))
+            }
+        }
+    }
+
+    fn filter_of(&self, shape: FilterShape) -> Filter {
+        Filter::new(self.filter_centre_nm, self.filter_fwhm_nm, shape)
+    }
+
+    /// Detection efficiency at a wavelength, relative to that at the laser's.
+    fn relative_pde(&self, wavelength_nm: f64) -> f64 {
+        match &self.pde_curve {
+            Measured::Word(PdeWord::Flat) => 1.0,
+            Measured::Curve(curve) => {
+                let own = curve.at(self.wavelength_nm).unwrap_or(0.0);
+                curve.at(wavelength_nm).unwrap_or(0.0) / own
+            }
+        }
+    }
+
+    /// Share of the laser's light that passes the filter.
+    pub(super) fn laser_transmission(&self) -> f64 {
+        self.filter_at(self.wavelength_nm).unwrap_or(1.0)
+    }
+
+    /// Sunlight in full sun (100 klux), W/m²: as much of the laser's wavelength gives as many detected photons.
+    pub(super) fn effective_irradiance_w_m2(&self) -> f64 {
+        let (from, to) = match &self.filter {
+            Measured::Curve(curve) => curve.ends(),
+            Measured::Word(word) => match word.shape() {
+                None => return self.solar_irradiance_w_m2,
+                Some(shape) => self.filter_of(shape).passband_nm(),
+            },
+        };
+        let table = spectrum();
+        let (from, to) = (from.max(table[0].0), to.min(table[table.len() - 1].0));
+        if from >= to {
+            return 0.0;
+        }
+        let mut breaks = vec![from, to];
+        breaks.extend(table.iter().map(|&(nm, _)| nm));
+        let (centre_nm, fwhm_nm) = (self.filter_centre_nm, self.filter_fwhm_nm);
+        breaks.extend((-16..=16).map(|k| centre_nm + f64::from(k) * fwhm_nm / 4.0));
+        let own =
+            |curve: &Curve| -> Vec<f64> { curve.points().iter().map(|[nm, _]| *nm).collect() };
+        if let Measured::Curve(curve) = &self.filter {
+            breaks.extend(own(curve));
+        }
+        if let Measured::Curve(curve) = &self.pde_curve {
+            breaks.extend(own(curve));
+        }
+        breaks.retain(|nm| (from..=to).contains(nm));
+        breaks.sort_by(f64::total_cmp);
+        let density = |nm: f64| {
+            let passed = self.filter_at(nm).unwrap_or(0.0) * self.relative_pde(nm);
+            spectral_irradiance(nm) * passed * nm / self.wavelength_nm
+        };
+        integrate(density, &breaks, 1e-10)
+    }
+
+    /// What a file may not ask for, beyond the range of each key.
+    pub(super) fn fault(&self) -> Option<Fault> {
+        let fault = |key: &str, message: String| {
+            Some(Fault {
+                path: format!("lidar.{key}"),
+                message,
+            })
+        };
+        let nm = self.wavelength_nm;
+        if self.laser_transmission() <= 0.0 {
+            let message = format!(
+                "filter lets nothing of the laser's {nm} nm through; give a filter that does, or another wavelength_nm"
+            );
+            return fault("filter", message);
+        }
+        if let Measured::Curve(curve) = &self.filter
+            && curve.greatest() > 1.0
+        {
+            let message = format!(
+                "filter has a transmittance of {}; give 0 to 1",
+                curve.greatest()
+            );
+            return fault("filter", message);
+        }
+        if let Measured::Curve(curve) = &self.pde_curve
+            && curve.at(nm).unwrap_or(0.0) <= 0.0
+        {
+            let message = format!(
+                "pde_curve has no detection efficiency at the laser's {nm} nm; give a curve that does"
+            );
+            return fault("pde_curve", message);
+        }
+        for (key, curve) in [
+            ("beam", self.beam.curve()),
+            ("vignetting", self.vignetting.curve()),
+        ] {
+            if let Some(curve) = curve
+                && !(curve.ends().0 == 0.0 && curve.ends().1 <= 90.0)
+            {
+                let message = format!(
+                    "{key} has angles from {} to {} degrees; give them from 0, the axis, to at most 90",
+                    curve.ends().0,
+                    curve.ends().1
+                );
+                return fault(key, message);
+            }
+        }
+        if let Some(curve) = self.pulse.curve() {
+            let (first, last) = curve.ends();
+            if !(1e-3..=1e6).contains(&(last - first)) {
+                let message = format!("pulse lasts {} ns; give 0.001 to 1e6 ns", last - first);
+                return fault("pulse", message);
+            }
+        }
+        None
+    }
+
+    /// Intensity of the beam at an angle off the axis, in any unit; `None` for one that gives all macropixels the same.
+    fn beam_at(&self, angle_rad: f64) -> Option<f64> {
+        match &self.beam {
+            Measured::Word(BeamWord::Uniform) => None,
+            Measured::Word(BeamWord::Gaussian) => {
+                let half_widths = 2.0 * angle_rad.to_degrees() / self.beam_fwhm_deg;
+                Some((-std::f64::consts::LN_2 * half_widths * half_widths).exp())
+            }
+            Measured::Curve(curve) => Some(curve.at(angle_rad.to_degrees()).unwrap_or(0.0)),
+        }
+    }
+
+    /// The whole beam: its intensity over all directions.
+    fn beam_total(&self) -> f64 {
+        let mut breaks = vec![0.0, PI / 2.0];
+        match self.beam.curve() {
+            Some(curve) => breaks.extend(curve.points().iter().map(|[deg, _]| deg.to_radians())),
+            None => {
+                breaks.extend((1..16).map(|k| f64::from(k) * self.beam_fwhm_deg.to_radians() / 4.0))
+            }
+        }
+        breaks.retain(|angle| (0.0..=PI / 2.0).contains(angle));
+        breaks.sort_by(f64::total_cmp);
+        let ring = |angle: f64| self.beam_at(angle).unwrap_or(0.0) * 2.0 * PI * angle.sin();
+        integrate(ring, &breaks, 1e-10)
+    }
+
+    /// Relative illumination at an angle off the axis.
+    fn illumination_at(&self, cosine: f64) -> Option<f64> {
+        match &self.vignetting {
+            Measured::Word(VignettingWord::None) => None,
+            Measured::Word(VignettingWord::Cos4) => Some(cosine.powi(4)),
+            Measured::Curve(curve) => {
+                let [[_, middle], ..] = curve.points() else {
+                    return Some(0.0);
+                };
+                let at = curve.at(cosine.acos().to_degrees()).unwrap_or(0.0);
+                Some(at / middle.max(f64::MIN_POSITIVE))
+            }
+        }
+    }
+}
+
+impl Scene {
+    /// The light of every macropixel of `camera` relative to one on the axis of a uniform beam, row by row.
+    pub(super) fn off_axis(&self, camera: &PinholeCamera) -> Vec<OffAxis> {
+        let lidar = &self.lidar;
+        let pitch = [1.0 / camera.focal_px, 1.0 / camera.focal_v_px];
+        let uniform = lidar
+            .spot
+            .share_per_pixel(camera.height, camera.width, pitch);
+        let total = lidar.beam.curve().is_some() || lidar.beam != Measured::default();
+        let total = total.then(|| lidar.beam_total());
+        let pixels =
+            (0..camera.height).flat_map(|row| (0..camera.width).map(move |col| (row, col)));
+        let of = |(row, col): (u32, u32)| {
+            let ray = camera.at_unit_depth((f64::from(col) + 0.5, f64::from(row) + 0.5));
+            let cosine = 1.0 / ray.length();
+            let cube = cosine.powi(3);
+            let beam = total.map_or(1.0, |total| {
+                let solid_angle = cube * pitch[0] * pitch[1];
+                lidar.beam_at(cosine.acos()).unwrap_or(1.0) * solid_angle / total / uniform
+            });
+            let lens = lidar.illumination_at(cosine);
+            OffAxis {
+                signal: beam * lens.map_or(1.0, |lens| lens / cube),
+                background: lens.unwrap_or(1.0),
+            }
+        };
+        pixels.map(of).collect()
+    }
+
+    /// The measured laser pulse, whose times add to those of the Gaussian; `None` for a Gaussian alone.
+    pub(crate) fn pulse_shape(&self) -> Option<PulseShape> {
+        let curve = self.lidar.pulse.curve()?;
+        let (first, last) = curve.ends();
+        let points = curve.points();
+        let step_ns = points[1][0] - points[0][0];
+        let is_even = points.windows(2).all(|pair| {
+            let own = pair[1][0] - pair[0][0];
+            (own - step_ns).abs() <= 1e-6 * step_ns
+        });
+        let samples = if is_even { points.len() } else { PULSE_SAMPLES };
+        let step_ns = (last - first) / (samples - 1) as f64;
+        let at = |n: usize| {
+            curve
+                .at((first + n as f64 * step_ns).min(last))
+                .unwrap_or(0.0)
+        };
+        let powers: Vec<f64> = (0..samples).map(at).collect();
+        let step = Time::from_s(step_ns * 1e-9);
+        PulseShape::new(step, &powers).ok()
+    }
+
+    /// A photon stream with the measured laser pulse, if there is one.
+    pub fn with_pulse(&self, config: StreamConfig) -> StreamConfig {
+        let pulse_shape = self.pulse_shape();
+        StreamConfig {
+            pulse_shape,
+            ..config
+        }
+    }
+
+    /// Standard deviation of the whole laser pulse, measured shape and all.
+    pub fn pulse_resolution(&self) -> Time {
+        let sigma_fs = self.pulse_sigma().as_fs() as f64;
+        let own_fs2 = self.pulse_shape().map_or(0.0, |shape| shape.variance_fs2());
+        Time::from_fs((sigma_fs * sigma_fs + own_fs2).sqrt().round() as i64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::photon::PixelLight;
+    use crate::scene::{DVec3, GroundTruth, Object, Shape};
+    use crate::units::TimeOfFlight;
+
+    /// The street's optics with these keys, before a white sphere about the lidar, which every ray meets at a right angle.
+    fn sphere(lidar: &str) -> Scene {
+        let mut scene = Scene::parse("test", &format!("[lidar]\n{lidar}\n")).unwrap();
+        let shape = Shape::Sphere {
+            centre_m: DVec3::ZERO,
+            radius_m: 30.0,
+        };
+        scene.objects = vec![Object::new("sphere", 1.0, shape)];
+        // Little enough for one macropixel.
+        scene.lidar.pulse_energy_uj = 1e-3;
+        scene.light.illuminance_klux = 1e-6;
+        scene
+    }
+
+    fn lights(scene: &Scene, across: u32) -> Vec<PixelLight> {
+        scene.pixel_light(&GroundTruth::render(scene, across, across))
+    }
+
+    fn curve(points: &[[f64; 2]]) -> Curve {
+        Curve::new(points).unwrap()
+    }
+
+    #[test]
+    fn a_lens_loses_light_off_the_axis() {
+        let (plain, cos4) = (
+            sphere("fov_deg = 60"),
+            sphere("fov_deg = 60\nvignetting = \"cos4\""),
+        );
+        let (plain, cos4) = (lights(&plain, 5), lights(&cos4, 5));
+        let tangent = 30f64.to_radians().tan() * 4.0 / 5.0;
+        let cosine = 1.0 / (1.0 + 2.0 * tangent * tangent).sqrt();
+        let signal = cos4[0].signal_per_cycle() / plain[0].signal_per_cycle();
+        let background = cos4[0].background_hz() / plain[0].background_hz();
+        assert!((signal / cosine - 1.0).abs() < 1e-9, "{signal} {cosine}");
+        assert!(
+            (background / cosine.powi(4) - 1.0).abs() < 1e-9,
+            "{background}"
+        );
+        assert_eq!(cos4[12], plain[12]);
+    }
+
+    #[test]
+    fn a_beam_has_its_energy_whatever_its_shape() {
+        // A narrow beam lies within the field of view, and a sphere sends back the same from everywhere.
+        let sum = |scene: &Scene| -> f64 {
+            lights(scene, 64)
+                .iter()
+                .map(PixelLight::signal_per_cycle)
+                .sum()
+        };
+        let uniform = sum(&sphere("fov_deg = 30"));
+        let gaussian = sum(&sphere(
+            "fov_deg = 30\nbeam = \"gaussian\"\nbeam_fwhm_deg = 8",
+        ));
+        let measured = sum(&sphere(
+            "fov_deg = 30\nbeam = [[0, 3.0], [4, 3.0], [9, 0.0]]",
+        ));
+        assert!(
+            (gaussian / uniform - 1.0).abs() < 1e-3,
+            "{gaussian} {uniform}"
+        );
+        assert!(
+            (measured / uniform - 1.0).abs() < 1e-3,
+            "{measured} {uniform}"
+        );
+        // One of the field of view's width sends part of it beside, and is brightest in the middle.
+        let wide = lights(
+            &sphere("fov_deg = 30\nbeam = \"gaussian\"\nbeam_fwhm_deg = 30"),
+            3,
+        );
+        let (corner, middle) = (wide[0].signal_per_cycle(), wide[4].signal_per_cycle());
+        let tangent = 15f64.to_radians().tan() * 2.0 / 3.0 * 2f64.sqrt();
+        let angle_deg = tangent.atan().to_degrees();
+        let expected =
+            0.5f64.powf((angle_deg / 15.0).powi(2)) / (1.0 + tangent * tangent).powf(1.5);
+        assert!(
+            (corner / middle / expected - 1.0).abs() < 1e-9,
+            "{corner} {middle}"
+        );
+    }
+
+    #[test]
+    fn sunlight_is_that_of_the_filter_and_of_the_efficiency() {
+        let irradiance = |keys: &str| sphere(keys).lidar.effective_irradiance_w_m2();
+        assert_eq!(irradiance("solar_irradiance_w_m2 = 4.5"), 4.5);
+        // The street's number is that of 935 to 945 nm; photons instead of joules change it by a part in a thousand.
+        let street = irradiance("filter = \"top_hat\"");
+        assert!((street / 3.047 - 1.0).abs() < 2e-3, "{street}");
+        let pairs = irradiance("filter = [[934.999, 0.0], [935, 1.0], [945, 1.0], [945.001, 0.0]]");
+        assert!((pairs / street - 1.0).abs() < 1e-3, "{pairs} {street}");
+        let wide = "filter = \"gaussian\"\nfilter_fwhm_nm = 60";
+        let flat = irradiance(wide);
+        let falling = irradiance(&format!(
+            "{wide}\npde_curve = [[700, 0.4], [940, 0.1], [1200, 0.0]]"
+        ));
+        assert!(falling > 1.02 * flat, "{falling} {flat}");
+        // Twice the curve is the same curve.
+        let twice = irradiance(&format!(
+            "{wide}\npde_curve = [[700, 0.8], [940, 0.2], [1200, 0.0]]"
+        ));
+        assert!((twice / falling - 1.0).abs() < 1e-9);
+        // The laser loses what the filter takes at its wavelength, the sun what it takes of the band.
+        let (half, whole) = (
+            sphere("filter = [[935, 0.5], [945, 0.5]]"),
+            sphere("filter = [[935, 1.0], [945, 1.0]]"),
+        );
+        let (half, whole) = (&lights(&half, 2)[0], &lights(&whole, 2)[0]);
+        assert!((half.signal_per_cycle() / whole.signal_per_cycle() - 0.5).abs() < 1e-9);
+        assert!((half.background_hz() / whole.background_hz() - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_measured_pulse_comes_when_its_centre_has_flown() {
+        let scene = sphere("pulse_fwhm_ns = 0.5\npulse = [[0, 0.0], [1, 1.0], [5, 0.0]]");
+        let shape = scene.pulse_shape().unwrap();
+        // A triangle's centre is the mean of its corners.
+        assert!((shape.mean_fs() / 2e6 - 1.0).abs() < 1e-3);
+        let light = &lights(&scene, 1)[0];
+        let centre_fs = light.arrival().as_fs() as f64 + shape.mean_fs();
+        assert!((centre_fs - Time::of_flight(30.0).as_fs() as f64).abs() < 1e3);
+        let triangle_ns2: f64 = (0.0 + 1.0 + 25.0 - 0.0 - 0.0 - 5.0) / 18.0;
+        let jitter_ns = 0.5 / 2.354_820_045;
+        let expected = (triangle_ns2 + jitter_ns * jitter_ns).sqrt();
+        assert!((scene.pulse_resolution().as_ns() / expected - 1.0).abs() < 1e-3);
+        assert_eq!(
+            curve(&[[0.0, 0.0], [1.0, 1.0], [5.0, 0.0]]),
+            *scene.lidar.pulse.curve().unwrap()
+        );
+    }
+}

@@ -1,0 +1,321 @@
+//! A scene as its file describes it: lidar optics, stereo rig, sunlight, objects.
+
+use std::f64::consts::LN_2;
+
+use glam::DVec3;
+
+use super::camera::PinholeCamera;
+use super::curve::Measured;
+use super::illumination::SKY_REFLECTIVITY;
+use super::medium::Medium;
+use super::motion::Rig;
+use super::object::Object;
+use super::optics::{BeamWord, FilterWord, PdeWord, PulseWord, VignettingWord};
+use super::ranges::{CHOSEN, LENGTH, POSITION, SHARE, TABLE_12};
+use crate::photon::{Atmosphere, Convention, PhotonBudget, Spot};
+use crate::settings::Range::{Above, Limited, Within, WordOrCurve};
+use crate::settings::keys;
+use crate::units::Time;
+
+/// A world and the optics through which it is seen. By default there is nothing in it.
+///
+/// What moves is described where it is at time 0; [`Scene::at`] gives the scene at other times.
+///
+/// Read one with [`Scene::parse`] or [`Scene::load`], or take [`Scene::outdoor`]. After changing
+/// fields call [`Scene::validate`].
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
+pub struct Scene {
+    /// Laser, lens and SPADs of the lidar.
+    pub lidar: Lidar,
+    /// The camera pair that guides the lidar; the thesis's rig unless given.
+    pub stereo: Stereo,
+    /// Sunlight.
+    pub light: Light,
+    /// Fog and rain; clear air unless given.
+    pub medium: Medium,
+    /// Motion of lidar and cameras; none unless given.
+    pub rig: Rig,
+    /// What there is to see.
+    #[serde(rename = "object")]
+    pub objects: Vec<Object>,
+}
+
+keys! {
+    /// The lidar's optics. Rows and columns are the sensor's business, not the scene's.
+    /// What a file leaves out is the built-in street's, but for dark counts: none.
+    pub struct Lidar {
+        /// Horizontal field of view; the vertical one follows from the sensor's rows and the shape of its macropixels.
+        fov_deg: f64 ["deg"] = 16.0, in Within(0.1, 150.0),
+            from "chosen: 64 columns of 0.25 degrees";
+        /// Height of a macropixel over its width; HSLIDAR's are 54 um over 114 um.
+        macropixel_aspect: f64 = 1.0, in Within(0.01, 100.0), from "chosen: square";
+        /// Laser wavelength.
+        wavelength_nm: f64 ["nm"] = 940.0, in Within(100.0, 1e4),
+            from "thesis 3.2, a dip of the solar spectrum";
+        /// Energy of one laser pulse over the whole field of view.
+        pulse_energy_uj: f64 ["uJ"] = 20.0,
+            in Limited(0.0, 1e6, "lasers of flash lidars stay below 1 J a pulse"),
+            from CHOSEN;
+        /// Full width at half maximum of the Gaussian pulse, jitter included; with a measured pulse, of the jitter
+        /// alone.
+        pulse_fwhm_ns: f64 ["ns"] = 4.5, in Within(0.0, 1e6), from "thesis 6.4.2";
+        /// Laser pulse.
+        ///
+        /// The centre of mass of a measured one leaves with the STOP edge.
+        pulse: Measured<PulseWord> = Measured::default(),
+            in WordOrCurve(PulseWord::NAMES, "time in ns and power"),
+            from "thesis 6.4.2";
+        /// Where the laser's energy goes: uniform is as spot says.
+        beam: Measured<BeamWord> = Measured::default(),
+            in WordOrCurve(BeamWord::NAMES, "degrees off the axis and intensity"),
+            from "thesis Eq. 7";
+        /// Full width at half maximum of a Gaussian beam.
+        beam_fwhm_deg: f64 ["deg"] = 16.0, in Above(0.0, 180.0), from "chosen: the field of view";
+        /// Photon detection efficiency of the SPADs at the laser's wavelength.
+        pde: f64 = 0.185, in SHARE, from "thesis Table 6";
+        /// Photon detection efficiency over wavelength, for sunlight.
+        pde_curve: Measured<PdeWord> = Measured::default(),
+            in WordOrCurve(
+                PdeWord::NAMES,
+                "wavelength in nm and efficiency, of which only the shape counts",
+            ),
+            from "thesis Eq. 14";
+        /// Standard deviation of a SPAD's detection efficiency, relative to the mean; window takes some 12 times as long with it.
+        pde_spread: f64 = 0.0, in Within(0.0, 1.0), from "none in the thesis";
+        /// Diameter of the lens aperture.
+        lens_diameter_mm: f64 ["mm"] = 4.0, in Above(0.0, f64::MAX), from CHOSEN;
+        /// Focal length over diameter of the lens.
+        lens_f_number: f64 = 2.2, in Above(0.0, f64::MAX), from CHOSEN;
+        /// Share of the light that lens and filter let through.
+        transmittance: f64 = 1.0, in SHARE, from "thesis Eq. 15, where it is left out";
+        /// Illumination off the axis by an evenly bright scene.
+        vignetting: Measured<VignettingWord> = Measured::default(),
+            in WordOrCurve(
+                VignettingWord::NAMES,
+                "degrees off the axis and illumination of the array",
+            ),
+            from "thesis Eq. 12, which has none";
+        /// Band-pass filter, through which ASTM G173 sunlight comes; irradiance is one that lets solar_irradiance_w_m2 through.
+        filter: Measured<FilterWord> = Measured::default(),
+            in WordOrCurve(FilterWord::NAMES, "wavelength in nm and transmittance"),
+            from "thesis 2.3.3";
+        /// Centre of the filter, if it is given as a shape.
+        filter_centre_nm: f64 ["nm"] = 940.0, in Within(100.0, 1e4), from "the laser";
+        /// Full width at half maximum of the filter, if it is given as a shape.
+        filter_fwhm_nm: f64 ["nm"] = 10.0, in Above(0.0, 1e4);
+        /// Solar irradiance within the filter's band at 100 klux, where filter is irradiance.
+        solar_irradiance_w_m2: f64 ["W/m2"] = 3.047,
+            in Limited(
+                0.0,
+                1361.0,
+                "the sun has no more outside the atmosphere, at all wavelengths together",
+            ),
+            from "ASTM G173 global tilt, 935 to 945 nm";
+        /// Dark counts of one macropixel, all its SPADs together.
+        ///
+        /// The mean where they differ.
+        dark_count_hz: f64 ["Hz"] = 0.0, in Limited(0.0, 1.6e8, "16 hot SPADs have 10 MHz each"),
+            from "chosen: 1.25 kHz for each of 16 SPADs";
+        /// Standard deviation of the natural logarithm of a SPAD's dark count rate; the mean rate stays the same.
+        dark_count_spread: f64 = 0.0, in Within(0.0, 5.0), from "none in the thesis";
+        /// Share of SPADs that are hot.
+        hot_spad_share: f64 = 0.0, in SHARE, from "none in the thesis";
+        /// Dark counts of a hot SPAD.
+        hot_spad_hz: f64 ["Hz"] = 1e6,
+            in Limited(0.0, 1e7, "a SPAD that fires more often is to be switched off");
+        /// Seed that decides which SPADs are hot, dark or insensitive.
+        spad_seed: u32 = 1, in Within(0.0, 4_294_967_295.0);
+        /// What the laser lights up: the field of view, or the circle around it.
+        spot: Spot = Spot::default(), from "thesis Eq. 7";
+        /// Constant of the photon budget: Lambertian radiometry, or 1/pi of it, as printed in the thesis.
+        convention: Convention = Convention::default(),
+            from "radiometry: a Lambertian surface sends the share sin2(alpha) of its light into a cone";
+    }
+}
+
+impl Lidar {
+    /// The optics of the thesis's demonstrator, before HSLIDAR's 64×32 macropixels (4.9, 6.3.1, Table 14).
+    ///
+    /// Published: macropixels of 114 µm × 54 µm, 25 mm focal length, 940 nm with a pulse of 4.5 ns, a filter of 10 nm, 3.5 % PDE, and
+    /// what a target of 10 % gives: 89 z⁻² counts a pulse, 4.8 Mcounts/s at 60 klux (Fig. 94). Aperture, transmittance and the
+    /// laser's energy are not. An aperture of f/1.4 is chosen, and the transmittance (which also stands for a PDE that is lower at 940 nm
+    /// than at 850 nm) is what gives the background; only their product counts. The energy, 0.68 µJ, is what then gives the signal,
+    /// whatever the aperture.
+    pub fn demonstrator() -> Self {
+        Lidar {
+            fov_deg: 16.604,
+            macropixel_aspect: 54.0 / 114.0,
+            wavelength_nm: 940.0,
+            pulse_energy_uj: 0.6838,
+            pulse_fwhm_ns: 4.5,
+            pde: 0.035,
+            lens_diameter_mm: 25.0 / 1.4,
+            lens_f_number: 1.4,
+            transmittance: 0.2019,
+            solar_irradiance_w_m2: 3.047,
+            dark_count_hz: 0.0,
+            spot: Spot::Rectangle,
+            convention: Convention::Lambertian,
+            ..Lidar::default()
+        }
+    }
+}
+
+keys! {
+    /// The stereo camera rig of thesis 5.2.2 (Table 12), whose values are the default of every field.
+    #[derive(Copy)]
+    pub struct Stereo {
+        /// Distance from the principal (left) to the right camera.
+        baseline_m: f64 ["m"] = 1.0, in LENGTH, from TABLE_12;
+        /// Focal length of both lenses.
+        focal_mm: f64 ["mm"] = 12.0, in Above(0.0, f64::MAX), from TABLE_12;
+        /// Pixel pitch of both cameras.
+        pixel_pitch_um: f64 ["um"] = 3.45, in Above(0.0, f64::MAX), from TABLE_12;
+        /// Columns of an image.
+        width: u32 ["px"] = 1440, in Within(1.0, 16_384.0), from TABLE_12;
+        /// Rows of an image.
+        height: u32 ["px"] = 1080, in Within(1.0, 16_384.0), from TABLE_12;
+        /// Standard deviation of the matched disparity.
+        disparity_sigma_px: f64 ["px"] = 1.0 / 3.0, in Within(0.0, f64::MAX),
+            from "thesis Fig. 68, where 1/3 px is overlaid";
+        /// Disparities are multiples of one over this many pixels.
+        subpixel_steps: u32 = 16, in Within(1.0, 65_536.0),
+            from "chosen: what semi-global matching gives";
+        /// Smallest disparity accepted.
+        min_disparity_px: f64 ["px"] = 10.0, in Above(0.0, f64::MAX),
+            from "thesis 5.2.1, an error below 10 % for a whole pixel";
+        /// Largest disparity searched.
+        ///
+        /// 5.2.1 speaks of 128 px as customary, but at 1 m and 12 mm that would end the view at 27 m, while the rig is reported to see
+        /// down to about 15 m. 232 px is the disparity at 15 m.
+        max_disparity_px: f64 ["px"] = 232.0, in Above(0.0, f64::MAX),
+            from "chosen: the disparity at 15 m, where the thesis's rig begins to see";
+        /// Place of the principal camera, [right, down, forward] of the lidar.
+        position_m: DVec3 ["m"] = DVec3::ZERO, in POSITION, from CHOSEN;
+        /// By how much the right camera has turned outwards since calibration.
+        yaw_error_deg: f64 ["deg"] = 0.0, in Within(-45.0, 45.0), from "thesis Fig. 70; none";
+        /// By how much the right camera has turned upwards.
+        pitch_error_deg: f64 ["deg"] = 0.0, in Within(-45.0, 45.0), from "none";
+        /// By how much the right camera has turned clockwise about its axis.
+        roll_error_deg: f64 ["deg"] = 0.0, in Within(-45.0, 45.0), from "none";
+        /// By how much the right camera has moved outwards.
+        baseline_error_m: f64 ["m"] = 0.0, in Within(-10.0, 10.0), from "none";
+        /// By how much the right camera's focal length has grown, per cent.
+        focal_error_percent: f64 = 0.0, in Within(-50.0, 50.0), from "none";
+    }
+}
+
+impl Stereo {
+    /// Either camera, in its own coordinates.
+    pub fn camera(&self) -> PinholeCamera {
+        let focal_px = self.focal_mm * 1e-3 / (self.pixel_pitch_um * 1e-6);
+        PinholeCamera::centred(focal_px, self.width, self.height)
+    }
+}
+
+keys! {
+    /// Sunlight on the scene; what a file leaves out is the built-in street's.
+    #[derive(Copy)]
+    pub struct Light {
+        /// Illuminance of the scene by the sun.
+        ///
+        /// 100 klux is full sun. With a place for the sun, that of a surface that faces it.
+        illuminance_klux: f64 ["klux"] = 50.0,
+            in Limited(0.0, 200.0, "the sun with bright clouds about it stays below 150 klux"),
+            from CHOSEN;
+        /// Height of the sun above the horizon, for shadows and slopes; light from everywhere if left out.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        sun_elevation_deg: Option<f64> ["deg"] = None, in Within(-90.0, 90.0),
+            from "thesis Eq. 16, where surfaces face the sun";
+        /// Direction of the sun, to the right of forward.
+        sun_azimuth_deg: f64 ["deg"] = 0.0, in Within(-360.0, 360.0);
+        /// Share of the illuminance that comes from the sky, where the sun has a place.
+        sky_share: f64 = 0.2, in SHARE, from "chosen: a clear day; 1 is an overcast one";
+        /// What a surface in the sun's light would reflect to be as bright as the sky.
+        sky_reflectivity: f64 = SKY_REFLECTIVITY, in Within(0.0, 10.0),
+            from "chosen: a clear sky in the near infrared; haze is brighter";
+    }
+}
+
+impl Scene {
+    /// The lidar as a camera of `rows` × `cols` macropixels.
+    pub fn lidar_camera(&self, rows: u32, cols: u32) -> PinholeCamera {
+        PinholeCamera::with_horizontal_fov(self.lidar.fov_deg, cols, rows)
+            .with_pixel_aspect(self.lidar.macropixel_aspect)
+    }
+
+    /// The photon budget of one macropixel of a `rows` × `cols` array behind this lens.
+    ///
+    /// The pitch is the one that fits the array into the field of view.
+    pub fn photon_budget(&self, rows: u32, cols: u32) -> PhotonBudget {
+        let lidar = &self.lidar;
+        let lens_diameter_m = lidar.lens_diameter_mm * 1e-3;
+        let lens_focal_m = lens_diameter_m * lidar.lens_f_number;
+        let camera = self.lidar_camera(rows, cols);
+        PhotonBudget {
+            pde: lidar.pde,
+            wavelength_nm: lidar.wavelength_nm,
+            transmittance: lidar.transmittance * lidar.laser_transmission(),
+            pulse_energy_j: lidar.pulse_energy_uj * 1e-6,
+            lens_diameter_m,
+            lens_focal_m,
+            pixel_pitch_m: [camera.focal_px, camera.focal_v_px].map(|px| lens_focal_m / px),
+            rows,
+            cols,
+            // The transmittance above is for signal and background alike.
+            solar_irradiance_w_m2: lidar.effective_irradiance_w_m2() / lidar.laser_transmission(),
+            spot: lidar.spot,
+            atmosphere: Atmosphere::CLEAR,
+            convention: lidar.convention,
+        }
+    }
+
+    /// Standard deviation of the laser pulse: its width at half maximum over 2·√(2·ln 2).
+    pub fn pulse_sigma(&self) -> Time {
+        Time::from_s(self.lidar.pulse_fwhm_ns * 1e-9 / (8.0 * LN_2).sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_thesis_rig_sees_from_15_to_beyond_200_m() {
+        let stereo = Stereo::default();
+        let focal_times_baseline = stereo.camera().focal_px * stereo.baseline_m;
+        assert!((focal_times_baseline / stereo.max_disparity_px - 15.0).abs() < 0.01);
+        assert!(focal_times_baseline / stereo.min_disparity_px > 200.0);
+    }
+
+    #[test]
+    fn the_array_fills_the_field_of_view() {
+        let scene = Scene::outdoor();
+        let budget = scene.photon_budget(64, 64);
+        let half_width_m = 32.0 * budget.pixel_pitch_m[0];
+        let fov_deg = 2.0 * (half_width_m / budget.lens_focal_m).atan().to_degrees();
+        assert!((fov_deg - scene.lidar.fov_deg).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_demonstrator_has_the_published_pitch_and_light() {
+        let mut scene = Scene::outdoor();
+        scene.lidar = Lidar::demonstrator();
+        let budget = scene.photon_budget(32, 64);
+        let [x_m, y_m] = budget.pixel_pitch_m;
+        assert!((x_m - 114e-6).abs() < 1e-8 && (y_m - 54e-6).abs() < 1e-8);
+        assert!((budget.lens_focal_m - 25e-3).abs() < 1e-12);
+        // Fig. 94: its digits are good to half of the last one.
+        let signal = budget.signal_per_pulse_far_field(30.0, 0.1) * 900.0;
+        let background_hz = budget.background_hz(0.1, 60.0);
+        assert!((signal - 89.0).abs() < 0.1, "{signal}");
+        assert!((background_hz - 4.8e6).abs() < 0.01e6, "{background_hz}");
+    }
+
+    #[test]
+    fn pulse_sigma_follows_from_the_width() {
+        let mut scene = Scene::outdoor();
+        scene.lidar.pulse_fwhm_ns = 2.354_820_045;
+        assert!((scene.pulse_sigma().as_ns() - 1.0).abs() < 1e-6);
+    }
+}

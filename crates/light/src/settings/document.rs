@@ -1,0 +1,338 @@
+//! A settings file and what `--set` changes in it, with the place of every value for complaints.
+//!
+//! `--set sensor.KEY=VALUE` and `--set scene.SECTION.KEY=VALUE` write as a line `KEY = VALUE` of that section would; a value
+//! that is no TOML is taken as text, so that words and quantities need no quotes. Later ones win, and all win over the
+//! file. An object goes by its name or its number from 1: `--set scene.object.car.reflectivity=0.5`.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use toml::de::{DeTable, DeValue};
+use toml::{Table, Value};
+
+use super::declare::Settings;
+use crate::files::{InputError, LineEnds, in_plain_words, read_text_within, too_long};
+
+/// Most items of a list. A scene with this many objects is read and printed in 1.1 s of processor time and 270 MB
+/// (dev profile).
+const MOST_ITEMS: usize = 65_536;
+
+/// Most lines and commas of settings, and most bytes of a file: 16 MiB of `[0,1],` take 4 s and 2 GB to parse, five times the entries.
+const MOST_ENTRIES: usize = 1 << 20;
+const MOST_BYTES: usize = 16 << 20;
+
+/// Something wrong with a setting.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fault {
+    /// Names from the root to the value, lists counted from 0, joined by dots.
+    pub path: String,
+    /// What is wrong and what to do about it.
+    pub message: String,
+}
+
+/// Where a value comes from.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+enum Origin {
+    Line(usize),
+    Option(String),
+}
+
+/// Settings as given, not yet checked.
+#[derive(Debug, Clone)]
+pub struct Document {
+    source: String,
+    folder: PathBuf,
+    table: Table,
+    origins: BTreeMap<String, Origin>,
+}
+
+impl Document {
+    /// Reads TOML text; `source` names it in complaints.
+    ///
+    /// # Errors
+    /// When it is no TOML, or has a list that is too long, with the line; when the text is too long.
+    pub fn parse(source: impl std::fmt::Display, text: &str) -> Result<Self, InputError> {
+        if text.len() > MOST_BYTES {
+            return Err(too_long(source, MOST_BYTES));
+        }
+        let entries = text.bytes().filter(|byte| matches!(byte, b',' | b'\n'));
+        let entries = entries.count();
+        if entries > MOST_ENTRIES {
+            let message = format!(
+                "has {entries} lines and commas, of which at most {MOST_ENTRIES} are read of settings; give fewer values"
+            );
+            return Err(InputError::new(source, message));
+        }
+        let table: Table = crate::files::parse_toml(&source, text)?;
+        let mut document = Self::of(source, table);
+        if let Ok(spans) = DeTable::parse(text) {
+            let (ends, mut long) = (LineEnds::of(text), Vec::new());
+            note_lines(spans.get_ref(), "", &ends, &mut document.origins, &mut long);
+            document.complain(long)?;
+        }
+        Ok(document)
+    }
+
+    /// Reads a TOML file.
+    ///
+    /// # Errors
+    /// When it cannot be read or is no TOML.
+    pub fn load(path: &Path) -> Result<Self, InputError> {
+        let mut document = Self::parse(path.display(), &Self::text(path)?)?;
+        document.folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        Ok(document)
+    }
+
+    /// The text of a file of settings.
+    ///
+    /// # Errors
+    /// When it cannot be read or is too long.
+    pub fn text(path: &Path) -> Result<String, InputError> {
+        read_text_within(path, MOST_BYTES)
+    }
+
+    /// The folder that files named in it are relative to: the file's own, or else the current one.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Settings that stand in no file.
+    pub fn of(source: impl std::fmt::Display, table: Table) -> Self {
+        Document {
+            source: source.to_string(),
+            folder: PathBuf::new(),
+            table,
+            origins: BTreeMap::new(),
+        }
+    }
+
+    /// All values.
+    pub fn table(&self) -> &Table {
+        &self.table
+    }
+
+    /// Whether there is no value at all.
+    pub fn is_empty(&self) -> bool {
+        self.table.is_empty()
+    }
+
+    /// Writes a value of the root, as the command-line option `option` asks.
+    pub fn set_value(&mut self, key: &str, value: Value, option: &str) {
+        self.table.insert(key.into(), value);
+        self.origins
+            .insert(key.into(), Origin::Option(option.into()));
+    }
+
+    /// Writes what `--set` asks, `assignment` without its first name (`sensor.`, `scene.`); `option` is the whole option.
+    ///
+    /// # Errors
+    /// When it is no assignment, or there is no such object.
+    pub fn assign(&mut self, assignment: &str, option: &str) -> Result<(), InputError> {
+        let complain = |message: String| Err(InputError::new(option, message));
+        let Some((names, value)) = assignment.split_once('=') else {
+            return complain("has no value; give key=value".into());
+        };
+        let Some(names) = names_of(names) else {
+            return complain(format!(
+                "{names:?} is not a key; give names with dots between them"
+            ));
+        };
+        let (last, folders) = names.split_last().expect("a key has a name");
+        let mut path = String::new();
+        let mut table = &mut self.table;
+        let mut folders = folders.iter();
+        while let Some(name) = folders.next() {
+            extend(&mut path, name);
+            let entry = table
+                .entry(name.as_str())
+                .or_insert_with(|| Table::new().into());
+            table = match entry {
+                Value::Table(inner) => inner,
+                Value::Array(list) => {
+                    let Some(which) = folders.next() else {
+                        let message = format!(
+                            "{name} is a list; give {name}.NAME.key=value or {name}.NUMBER.key=value, counted from 1"
+                        );
+                        return complain(message);
+                    };
+                    let Some(index) = index_in(list, which) else {
+                        return complain(format!(
+                            "there is no {name} {which:?}; give the name of one, or its number from 1 to {}",
+                            list.len()
+                        ));
+                    };
+                    extend(&mut path, &index.to_string());
+                    list[index].as_table_mut().expect("index_in finds tables")
+                }
+                _ => return complain(format!("{name} is not a section; give another key")),
+            };
+        }
+        extend(&mut path, last);
+        table.insert(last.clone(), value_of(value));
+        self.origins.insert(path, Origin::Option(option.into()));
+        Ok(())
+    }
+
+    /// Reads a section: quantities to plain numbers, then types, then ranges. Faults are added to `faults`, and their values
+    /// left out.
+    pub fn section<T: Settings>(
+        &self,
+        path: &str,
+        given: &Table,
+        faults: &mut Vec<Fault>,
+    ) -> Table {
+        let mut read = Table::new();
+        let plain = |(name, value): (&String, &Value)| {
+            let key = T::KEYS.iter().find(|key| key.name == name);
+            let plain = key.map_or(Ok(value.clone()), |key| key.plain(value));
+            (name.clone(), key, plain)
+        };
+        let given: Vec<_> = given.iter().map(plain).collect();
+        let all = given.iter().filter_map(|(name, _, value)| {
+            let value = value.as_ref().ok()?;
+            Some((name.clone(), value.clone()))
+        });
+        // Where all of them fit together, each does alone.
+        let is_whole = all.collect::<Table>().try_into::<T>().is_ok();
+        for (name, key, plain) in given {
+            let typed = plain.and_then(|value| {
+                if is_whole {
+                    return Ok(value);
+                }
+                let alone = Table::from_iter([(name.clone(), value.clone())]);
+                match alone.try_into::<T>() {
+                    Ok(_) => Ok(value),
+                    Err(e) => {
+                        let said = e.message();
+                        Err(match key {
+                            Some(key) => key.misfit(said),
+                            None => in_plain_words(said),
+                        })
+                    }
+                }
+            });
+            let checked = typed.and_then(|value| match key.and_then(|key| key.fault(&value)) {
+                None => Ok(value),
+                Some(message) => Err(message),
+            });
+            match checked {
+                Ok(value) => drop(read.insert(name.clone(), value)),
+                Err(message) => {
+                    let mut path = path.to_owned();
+                    extend(&mut path, &name);
+                    faults.push(Fault { path, message });
+                }
+            }
+        }
+        read
+    }
+
+    /// All faults as one complaint, in the order of the file.
+    ///
+    /// # Errors
+    /// When there is any.
+    pub fn complain(&self, faults: Vec<Fault>) -> Result<(), InputError> {
+        let mut placed: Vec<_> = faults
+            .into_iter()
+            .map(|fault| (self.origin(&fault.path).cloned(), fault.message))
+            .collect();
+        placed.sort_by(|a, b| a.0.cmp(&b.0));
+        InputError::all(placed.into_iter().map(|(origin, message)| match origin {
+            Some(Origin::Line(line)) => InputError::at(&self.source, line, message),
+            Some(Origin::Option(option)) => InputError::new(option, message),
+            None => InputError::new(&self.source, message),
+        }))
+    }
+
+    /// The line of a value, if it stands in a file.
+    pub fn line(&self, path: &str) -> Option<usize> {
+        match self.origins.get(path) {
+            Some(Origin::Line(line)) => Some(*line),
+            _ => None,
+        }
+    }
+
+    /// Where a value stands, or else its section.
+    fn origin(&self, path: &str) -> Option<&Origin> {
+        self.origins.get(path).or_else(|| {
+            let (section, _) = path.rsplit_once('.')?;
+            self.origin(section)
+        })
+    }
+}
+
+fn extend(path: &mut String, name: &str) {
+    if !path.is_empty() {
+        path.push('.');
+    }
+    path.push_str(name);
+}
+
+/// Notes where values stand, and lists that are too long.
+fn note_lines(
+    table: &DeTable<'_>,
+    path: &str,
+    ends: &LineEnds,
+    origins: &mut BTreeMap<String, Origin>,
+    long: &mut Vec<Fault>,
+) {
+    for (key, value) in table.iter() {
+        let mut path = path.to_owned();
+        extend(&mut path, key.get_ref());
+        let line = |offset| Origin::Line(ends.line_of(offset));
+        origins.insert(path.clone(), line(key.span().start));
+        match value.get_ref() {
+            DeValue::Table(inner) => note_lines(inner, &path, ends, origins, long),
+            DeValue::Array(list) if list.len() > MOST_ITEMS => {
+                let message = format!(
+                    "{} is a list of {}, of which at most {MOST_ITEMS} are read; give fewer",
+                    key.get_ref(),
+                    list.len()
+                );
+                long.push(Fault { path, message });
+            }
+            DeValue::Array(list) => {
+                for (index, item) in list.iter().enumerate() {
+                    // Other items have the line of their list.
+                    if let DeValue::Table(inner) = item.get_ref() {
+                        let path = format!("{path}.{index}");
+                        origins.insert(path.clone(), line(item.span().start));
+                        note_lines(inner, &path, ends, origins, long);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The names of a dotted key, as TOML reads it.
+fn names_of(key: &str) -> Option<Vec<String>> {
+    let mut value: Value = one_value(&format!("{key} = 0"))?.into();
+    let mut names = Vec::new();
+    while let Value::Table(table) = value {
+        let (name, inner) = table.into_iter().next()?;
+        names.push(name);
+        value = inner;
+    }
+    (!names.is_empty()).then_some(names)
+}
+
+fn value_of(text: &str) -> Value {
+    let table = one_value(&format!("x = {text}"));
+    let value = table.and_then(|mut table| table.remove("x"));
+    value.unwrap_or_else(|| Value::String(text.trim().into()))
+}
+
+/// A table with a single value.
+fn one_value(text: &str) -> Option<Table> {
+    let table: Table = toml::from_str(text).ok()?;
+    (table.len() == 1).then_some(table)
+}
+
+fn index_in(list: &[Value], which: &str) -> Option<usize> {
+    let has_name = |item: &Value| item.get("name").and_then(Value::as_str) == Some(which);
+    let number = || which.parse::<usize>().ok()?.checked_sub(1);
+    let index = list.iter().position(has_name).or_else(number)?;
+    list.get(index)?.is_table().then_some(index)
+}

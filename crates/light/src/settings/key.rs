@@ -1,0 +1,190 @@
+//! One key of a settings file.
+
+use toml::Value;
+
+use super::quantity;
+use crate::files::{Misfit, in_plain_words, is_no_word};
+
+/// A key: what it is, in which unit, what it may be, and where its default comes from.
+#[derive(Debug, Clone, Copy)]
+pub struct Key {
+    /// Name in files.
+    pub name: &'static str,
+    /// What it is, without a full stop.
+    pub what: &'static str,
+    /// Symbol of the unit that plain numbers have; empty for numbers without one and for words.
+    pub unit: &'static str,
+    /// What it may be.
+    pub range: Range,
+    /// Where its default comes from.
+    pub source: &'static str,
+}
+
+/// What a key may be. Of a list of numbers, each is held to it.
+#[derive(Debug, Clone, Copy)]
+pub enum Range {
+    /// From the first number to the second, both included.
+    Within(f64, f64),
+    /// Above the first number, up to the second.
+    Above(f64, f64),
+    /// As [`Range::Within`], with the reason for the upper limit.
+    Limited(f64, f64, &'static str),
+    /// One of these words.
+    OneOf(&'static [&'static str]),
+    /// One of these words, or a measured curve of such pairs, in the file or in a CSV file.
+    WordOrCurve(&'static [&'static str], &'static str),
+    /// true or false.
+    Switch,
+    /// Any text.
+    Text,
+}
+
+impl Range {
+    fn holds(self, value: f64) -> bool {
+        match self {
+            Range::Within(least, most) | Range::Limited(least, most, _) => {
+                (least..=most).contains(&value)
+            }
+            Range::Above(below, most) => value > below && value <= most,
+            Range::OneOf(_) | Range::WordOrCurve(..) | Range::Switch | Range::Text => true,
+        }
+    }
+}
+
+impl std::fmt::Display for Range {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let short = |x: f64| match x.abs() {
+            a if a != 0.0 && !(1e-3..1e5).contains(&a) => format!("{x:e}"),
+            _ => format!("{x}"),
+        };
+        match *self {
+            Range::Within(least, f64::MAX) => write!(f, "{} or more", short(least)),
+            Range::Above(below, f64::MAX) => write!(f, "above {}", short(below)),
+            Range::Within(least, most) | Range::Limited(least, most, _) => {
+                write!(f, "{} to {}", short(least), short(most))
+            }
+            Range::Above(below, most) => {
+                write!(f, "above {}, up to {}", short(below), short(most))
+            }
+            Range::OneOf(words) => write!(f, "{}", words.join(", ")),
+            Range::WordOrCurve(words, of) => write!(
+                f,
+                "{}, pairs of {of}, or a .csv file of two such columns",
+                words.join(", ")
+            ),
+            Range::Switch => write!(f, "true or false"),
+            Range::Text => write!(f, "any text"),
+        }
+    }
+}
+
+impl Key {
+    /// A key; see its fields.
+    pub const fn new(
+        name: &'static str,
+        unit: &'static str,
+        range: Range,
+        what: &'static str,
+        source: &'static str,
+    ) -> Self {
+        Key {
+            name,
+            what,
+            unit,
+            range,
+            source,
+        }
+    }
+
+    /// A key without a unit, whose default is chosen.
+    pub const fn chosen(name: &'static str, range: Range, what: &'static str) -> Self {
+        Key::new(name, "", range, what, "chosen")
+    }
+
+    /// The same value as a plain number (or list of numbers) in the key's unit, where it is a number with a unit as text.
+    ///
+    /// # Errors
+    /// What is wrong with the text, and the cure.
+    pub fn plain(&self, value: &Value) -> Result<Value, String> {
+        let is_number = !matches!(
+            self.range,
+            Range::OneOf(_) | Range::WordOrCurve(..) | Range::Switch | Range::Text
+        );
+        match value {
+            Value::String(text) if is_number => {
+                let number = quantity::in_unit(text, self.unit)
+                    .map_err(|message| format!("{} = {text:?} {message}", self.name))?;
+                // Whole numbers stay whole, for keys that count.
+                Ok(if number.fract() == 0.0 && number.abs() < 1e15 {
+                    Value::Integer(number as i64)
+                } else {
+                    Value::Float(number)
+                })
+            }
+            Value::Array(values) => {
+                let values: Result<_, String> = values.iter().map(|v| self.plain(v)).collect();
+                Ok(Value::Array(values?))
+            }
+            other => Ok(other.clone()),
+        }
+    }
+
+    /// What a reader says of a value of the wrong type, in the user's words and with what may be written instead.
+    pub(crate) fn misfit(&self, said: &str) -> String {
+        let range = &self.range;
+        let Some(misfit) = Misfit::of(said.trim()) else {
+            return match range {
+                Range::OneOf(words) if is_no_word(said.trim()) => {
+                    format!(
+                        "{}: a word belongs here; give {}",
+                        self.name,
+                        words.join(", ")
+                    )
+                }
+                _ => format!("{}: {}", self.name, in_plain_words(said)),
+            };
+        };
+        let wanted = match range {
+            Range::OneOf(_) | Range::WordOrCurve(..) | Range::Switch => range.to_string(),
+            Range::Text => return format!("{} = {misfit}", self.name),
+            _ if misfit.wants_number() => {
+                format!("{}, {range}{}", misfit.wanted, self.after_number())
+            }
+            _ => return format!("{} = {misfit}", self.name),
+        };
+        format!(
+            "{} = {} is impossible; give {wanted}",
+            self.name, misfit.found
+        )
+    }
+
+    /// The unit as it follows a number.
+    fn after_number(&self) -> String {
+        match self.unit {
+            "" => String::new(),
+            unit => format!(" {unit}"),
+        }
+    }
+
+    /// What is wrong with a plain value of the right type, if anything.
+    pub fn fault(&self, value: &Value) -> Option<String> {
+        let number = match value {
+            Value::Integer(number) => *number as f64,
+            Value::Float(number) => *number,
+            Value::Array(values) => return values.iter().find_map(|v| self.fault(v)),
+            _ => return None,
+        };
+        if self.range.holds(number) {
+            return None;
+        }
+        let unit = self.after_number();
+        let because = match self.range {
+            Range::Limited(_, _, reason) if number >= 0.0 => format!(": {reason}"),
+            _ => String::new(),
+        };
+        Some(format!(
+            "{} = {number} is impossible; give {}{unit}{because}",
+            self.name, self.range
+        ))
+    }
+}

@@ -1,0 +1,24 @@
+//! Settings that a user writes: TOML files and `--set`, read against tables of their keys.
+//!
+//! ```text
+//!   file ─► Document ◄─ --set key=value         Key: unit, range, source
+//!              └──► quantities to plain numbers ─► types ─► ranges ─► struct, or all faults at once
+//! ```
+//!
+//! A struct of settings is declared by [`keys!`](crate::keys), a word of them by [`words!`](crate::words): each key stands once, with its
+//! unit, its range, its default and where that comes from, for reading, for rules, and for the commented file that `commented` prints.
+
+mod declare;
+mod document;
+mod key;
+mod print;
+mod quantity;
+mod schema;
+
+pub use crate::{keys, words};
+pub use declare::{Setting, Settings, help};
+pub use document::{Document, Fault};
+pub use key::{Key, Range};
+pub use print::Section;
+pub use print::commented;
+pub use schema::schema;

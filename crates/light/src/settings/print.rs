@@ -1,0 +1,79 @@
+//! Settings as a commented TOML file, which reads back as they are.
+
+use std::fmt::Write;
+
+use toml::{Table, Value};
+
+use super::key::Key;
+
+/// A section of a settings file.
+#[derive(Debug, Clone, Copy)]
+pub struct Section {
+    /// Name in brackets; empty for the root.
+    pub name: &'static str,
+    /// What it describes.
+    pub what: &'static str,
+    /// Its keys, in order.
+    pub keys: &'static [Key],
+}
+
+/// All of `values`, by `sections`, every key with what it is, its unit, range and source. What a key is where a file
+/// leaves it out is added where that is another value (`left_out` has these). A list gets its keys explained once, before
+/// its items.
+pub fn commented(sections: &[Section], values: &Table, left_out: &Table) -> String {
+    let mut text = String::new();
+    for section in sections {
+        if !text.is_empty() {
+            text.push('\n');
+        }
+        let _ = writeln!(text, "# {}.", section.what);
+        if section.name.is_empty() {
+            write_keys(&mut text, section.keys, values, left_out);
+            continue;
+        }
+        let nothing = Table::new();
+        match values.get(section.name) {
+            Some(Value::Array(items)) => {
+                for key in section.keys {
+                    let _ = writeln!(text, "#   {}: {}", key.name, explained(key));
+                }
+                for item in items.iter().filter_map(Value::as_table) {
+                    let _ = writeln!(text, "\n[[{}]]", section.name);
+                    for key in section.keys {
+                        if let Some(value) = item.get(key.name) {
+                            let _ = writeln!(text, "{} = {value}", key.name);
+                        }
+                    }
+                }
+            }
+            Some(Value::Table(table)) => {
+                let left_out = left_out.get(section.name).and_then(Value::as_table);
+                let _ = writeln!(text, "[{}]", section.name);
+                write_keys(&mut text, section.keys, table, left_out.unwrap_or(&nothing));
+            }
+            _ => {}
+        }
+    }
+    text
+}
+
+fn write_keys(text: &mut String, keys: &[Key], values: &Table, left_out: &Table) {
+    for key in keys {
+        let Some(value) = values.get(key.name) else {
+            continue;
+        };
+        let _ = write!(text, "\n# {}", explained(key));
+        if let Some(other) = left_out.get(key.name).filter(|other| *other != value) {
+            let _ = write!(text, " {other} where a file leaves it out.");
+        }
+        let _ = writeln!(text, "\n{} = {value}", key.name);
+    }
+}
+
+fn explained(key: &Key) -> String {
+    let unit = match key.unit {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    format!("{}; {}{unit}. Source: {}.", key.what, key.range, key.source)
+}

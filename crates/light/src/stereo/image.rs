@@ -1,0 +1,177 @@
+//! Grey images of 8 to 16 bits a pixel.
+
+/// An image row by row from the top left.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GreyImage {
+    width: usize,
+    height: usize,
+    bits: u32,
+    pixels: Vec<u16>,
+}
+
+/// Why pixels are no image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ImageError {
+    /// Too few or too many pixels, or none.
+    #[error("{pixels} pixels do not make {width} x {height}")]
+    Size {
+        /// Columns asked for.
+        width: usize,
+        /// Rows asked for.
+        height: usize,
+        /// Pixels given.
+        pixels: usize,
+    },
+    /// Neither 8 nor 16 bits nor between.
+    #[error("{bits} bits a pixel are impossible; give 8 to 16")]
+    Bits {
+        /// Bits asked for.
+        bits: u32,
+    },
+    /// A pixel brighter than its bits can say.
+    #[error("pixel value {value} does not fit into {bits} bits")]
+    Value {
+        /// The first such value.
+        value: u16,
+        /// Bits of the image.
+        bits: u32,
+    },
+}
+
+impl GreyImage {
+    /// An image of `width` × `height` pixels of `bits` bits (8 to 16).
+    ///
+    /// # Errors
+    /// When the pixels are not width × height, or more than that many bits.
+    pub fn new(
+        width: usize,
+        height: usize,
+        bits: u32,
+        pixels: Vec<u16>,
+    ) -> Result<Self, ImageError> {
+        if pixels.is_empty() || Some(pixels.len()) != width.checked_mul(height) {
+            let pixels = pixels.len();
+            return Err(ImageError::Size {
+                width,
+                height,
+                pixels,
+            });
+        }
+        if !(8..=16).contains(&bits) {
+            return Err(ImageError::Bits { bits });
+        }
+        match pixels.iter().find(|&&v| u32::from(v) >> bits != 0) {
+            Some(&value) => Err(ImageError::Value { value, bits }),
+            None => Ok(GreyImage {
+                width,
+                height,
+                bits,
+                pixels,
+            }),
+        }
+    }
+
+    /// Columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Bits a pixel, 8 to 16.
+    pub fn bits(&self) -> u32 {
+        self.bits
+    }
+
+    /// All pixels, row by row.
+    pub(crate) fn pixels(&self) -> &[u16] {
+        &self.pixels
+    }
+
+    /// The pixels of row `y`.
+    pub(crate) fn row(&self, y: usize) -> &[u16] {
+        &self.pixels[y * self.width..(y + 1) * self.width]
+    }
+
+    /// The eight highest bits of every pixel.
+    pub(crate) fn as_8_bit(&self) -> Vec<u8> {
+        let shift = self.bits - 8;
+        self.pixels.iter().map(|v| (v >> shift) as u8).collect()
+    }
+
+    /// The mean of every `factor` × `factor` pixels, as on-chip binning gives it; columns and rows that are left over are dropped.
+    /// Fractions are kept as further bits as far as 16 bits reach. `None` if nothing is left.
+    pub fn binned(&self, factor: usize) -> Option<GreyImage> {
+        let (width, height) = (
+            self.width.checked_div(factor)?,
+            self.height.checked_div(factor)?,
+        );
+        if width == 0 || height == 0 {
+            return None;
+        }
+        let bits = (self.bits + 2 * factor.ilog2()).min(16);
+        let scale = f64::from(1u32 << (bits - self.bits)) / (factor * factor) as f64;
+        let most = ((1u32 << bits) - 1) as f64;
+        let mut pixels = Vec::with_capacity(width * height);
+        let mut sums = vec![0u32; width];
+        for y in 0..height {
+            sums.fill(0);
+            for row in y * factor..(y + 1) * factor {
+                for (sum, block) in sums.iter_mut().zip(self.row(row).chunks_exact(factor)) {
+                    *sum += block.iter().map(|&v| u32::from(v)).sum::<u32>();
+                }
+            }
+            pixels.extend(
+                sums.iter()
+                    .map(|&s| (f64::from(s) * scale).round().min(most) as u16),
+            );
+        }
+        Some(GreyImage {
+            width,
+            height,
+            bits,
+            pixels,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_that_are_no_image_are_refused() {
+        let size = ImageError::Size {
+            width: 2,
+            height: 2,
+            pixels: 3,
+        };
+        assert_eq!(GreyImage::new(2, 2, 8, vec![0; 3]), Err(size));
+        assert!(GreyImage::new(0, 2, 8, vec![]).is_err());
+        assert!(GreyImage::new(usize::MAX, 2, 8, vec![0; 2]).is_err());
+        let bits = ImageError::Bits { bits: 17 };
+        assert_eq!(GreyImage::new(1, 1, 17, vec![0]), Err(bits));
+        let value = ImageError::Value {
+            value: 256,
+            bits: 8,
+        };
+        assert_eq!(GreyImage::new(1, 1, 8, vec![256]), Err(value));
+    }
+
+    #[test]
+    fn binning_keeps_the_mean_and_its_fraction() {
+        let image = GreyImage::new(5, 2, 8, vec![1, 2, 9, 9, 7, 3, 4, 9, 8, 7]).unwrap();
+        let binned = image.binned(2).unwrap();
+        assert_eq!((binned.width(), binned.height(), binned.bits()), (2, 1, 10));
+        // 10/4 and 35/4 in quarters.
+        assert_eq!(binned.pixels(), [10, 35]);
+        assert_eq!(image.binned(3), None);
+        assert_eq!(image.binned(0), None);
+        let white = GreyImage::new(2, 2, 16, vec![u16::MAX; 4]).unwrap();
+        assert_eq!(white.binned(2).unwrap().pixels(), [u16::MAX]);
+        assert_eq!(white.as_8_bit(), [255; 4]);
+    }
+}

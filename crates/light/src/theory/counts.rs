@@ -1,0 +1,242 @@
+//! How many counts a histogram bin holds: Poisson, or binomial where a bin takes one hit a cycle.
+//!
+//! Point probabilities follow Loader: Stirling's errors and deviances instead of factorials, so
+//! that a probability of 10⁻³⁰⁰ keeps as many digits as one of 0.1. [`Tails`] adds them up from
+//! both ends, never as 1 − p.
+
+use std::f64::consts::PI;
+
+use crate::numerics::{poisson_deviance, stirling_error};
+
+/// Below this logarithm a probability is zero in `f64`.
+const LN_TINY: f64 = -745.0;
+
+/// Distribution of the counts of one bin after an exposure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Counts {
+    /// Every photon counts. The mean is `mean + rest`, `rest` far below `mean`'s last digit.
+    Poisson {
+        /// Mean number of counts, ≥ 0.
+        mean: f64,
+        /// What rounding took from `mean`.
+        rest: f64,
+    },
+    /// One hit a cycle at most: binomial with `cycles` trials.
+    Bernoulli {
+        /// Laser cycles.
+        cycles: u64,
+        /// Mean photons per cycle γ: a cycle counts with probability 1 − e^(−γ).
+        photons_per_cycle: f64,
+    },
+}
+
+impl Counts {
+    /// Poisson counts of mean `a` + `b`, keeping what the sum of the two would round away.
+    pub(crate) fn poisson(a: f64, b: f64) -> Self {
+        let mean = a + b;
+        let (small, large) = if a < b { (a, b) } else { (b, a) };
+        Counts::Poisson {
+            mean,
+            rest: small - (mean - large),
+        }
+    }
+
+    /// Mean counts.
+    pub(crate) fn mean(&self) -> f64 {
+        match *self {
+            Counts::Poisson { mean, .. } => mean,
+            Counts::Bernoulli {
+                cycles,
+                photons_per_cycle,
+            } => cycles as f64 * -(-photons_per_cycle).exp_m1(),
+        }
+    }
+
+    /// Standard deviation of the counts.
+    pub(crate) fn sigma(&self) -> f64 {
+        match *self {
+            Counts::Poisson { mean, .. } => mean.sqrt(),
+            Counts::Bernoulli {
+                photons_per_cycle, ..
+            } => (self.mean() * (-photons_per_cycle).exp()).sqrt(),
+        }
+    }
+
+    /// ln P(N = k).
+    pub(crate) fn ln_probability(&self, k: u64) -> f64 {
+        let x = k as f64;
+        match *self {
+            Counts::Poisson { mean: 0.0, .. } => certain(k == 0),
+            Counts::Poisson { mean, rest } if k == 0 => -mean - rest,
+            Counts::Poisson { mean, rest } => {
+                let shift = rest * (x - mean) / mean;
+                shift - stirling_error(k) - poisson_deviance(x, mean) - 0.5 * (2.0 * PI * x).ln()
+            }
+            Counts::Bernoulli {
+                cycles,
+                photons_per_cycle,
+            } => ln_binomial(k, cycles, photons_per_cycle),
+        }
+    }
+
+    /// P(N = k); zero below 10⁻³²³.
+    pub(crate) fn probability(&self, k: u64) -> f64 {
+        self.ln_probability(k).exp()
+    }
+
+    /// P(N = k + 1) / P(N = k).
+    fn ratio(&self, k: u64) -> f64 {
+        match *self {
+            Counts::Poisson { mean, .. } => mean / (k + 1) as f64,
+            Counts::Bernoulli {
+                cycles,
+                photons_per_cycle,
+            } => cycles.saturating_sub(k) as f64 / (k + 1) as f64 * photons_per_cycle.exp_m1(),
+        }
+    }
+
+    /// P(N > k), summed upwards from k: quick where k is not far below the mean.
+    pub(crate) fn above(&self, k: u64) -> f64 {
+        sum_outwards(self.probability(k), k.., |k| self.ratio(k))
+    }
+
+    /// Smallest and largest count whose probability `f64` can hold.
+    pub(crate) fn support(&self) -> (u64, u64) {
+        let possible = |k: u64| self.ln_probability(k) > LN_TINY;
+        let most = match *self {
+            Counts::Poisson { .. } => u64::MAX >> 2,
+            Counts::Bernoulli { cycles, .. } => cycles,
+        };
+        let mode = (self.mean() as u64).min(most);
+        let mut reach = 1;
+        while mode + reach < most && possible(mode + reach) {
+            reach *= 2;
+        }
+        let above = (mode + reach).min(most);
+        let last = mode + count_leading(above - mode, |d| possible(mode + 1 + d));
+        let first = mode - count_leading(mode, |d| possible(mode - 1 - d));
+        (first, last)
+    }
+}
+
+fn certain(yes: bool) -> f64 {
+    if yes { 0.0 } else { f64::NEG_INFINITY }
+}
+
+/// For how many of 0, 1, …, `n` − 1 `holds` is true, when it is true for the first ones only.
+fn count_leading(n: u64, holds: impl Fn(u64) -> bool) -> u64 {
+    let (mut low, mut high) = (0, n);
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if holds(middle) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+fn ln_binomial(k: u64, n: u64, photons: f64) -> f64 {
+    let hit = -(-photons).exp_m1();
+    if k > n {
+        return f64::NEG_INFINITY;
+    }
+    if k == 0 {
+        return -photons * n as f64;
+    }
+    if k == n {
+        return n as f64 * hit.ln();
+    }
+    if hit == 0.0 {
+        return f64::NEG_INFINITY;
+    }
+    let (x, y, n_f) = (k as f64, (n - k) as f64, n as f64);
+    stirling_error(n)
+        - stirling_error(k)
+        - stirling_error(n - k)
+        - poisson_deviance(x, n_f * hit)
+        - poisson_deviance(y, n_f * (-photons).exp())
+        - 0.5 * (2.0 * PI * x * (y / n_f)).ln()
+}
+
+/// A distribution on the counts `first`, `first + stride`, … up to `last` or just beyond.
+#[derive(Debug, Clone)]
+pub struct Tails {
+    /// P(N = k).
+    pub at: Vec<f64>,
+    /// P(N < k).
+    pub below: Vec<f64>,
+    /// P(N > k).
+    pub above: Vec<f64>,
+}
+
+impl Tails {
+    /// Tabulates `counts`. The points between two grid points are summed by recurrence from the
+    /// lower one, so no rounding travels further than one stride.
+    pub(crate) fn new(counts: &Counts, first: u64, last: u64, stride: u64) -> Self {
+        let grid = |i: usize| first + i as u64 * stride;
+        let points = ((last - first).div_ceil(stride) + 1) as usize;
+        let at: Vec<f64> = (0..points).map(|i| counts.probability(grid(i))).collect();
+        let between: Vec<f64> = (0..points)
+            .map(|i| {
+                let mut term = at[i];
+                (grid(i)..grid(i) + stride - 1)
+                    .map(|k| {
+                        term *= counts.ratio(k);
+                        term
+                    })
+                    .sum()
+            })
+            .collect();
+        let mut below = vec![0.0; points];
+        below[0] = sum_outwards(at[0], (0..first).rev(), |k| 1.0 / counts.ratio(k));
+        for i in 1..points {
+            below[i] = below[i - 1] + at[i - 1] + between[i - 1];
+        }
+        let end = points - 1;
+        let mut above = vec![0.0; points];
+        above[end] = counts.above(grid(end));
+        for i in (0..end).rev() {
+            above[i] = above[i + 1] + at[i + 1] + between[i];
+        }
+        Tails { at, below, above }
+    }
+
+    /// ln P(N ≤ k) at grid point `i`, accurate near 0 and near 1.
+    pub(crate) fn ln_at_most(&self, i: usize) -> f64 {
+        ln_of(self.below[i] + self.at[i], self.above[i])
+    }
+
+    /// ln P(N < k) at grid point `i`, accurate near 0 and near 1.
+    pub(crate) fn ln_below(&self, i: usize) -> f64 {
+        ln_of(self.below[i], self.above[i] + self.at[i])
+    }
+}
+
+/// ln p of a probability known together with its complement.
+fn ln_of(p: f64, complement: f64) -> f64 {
+    if complement < 0.5 {
+        (-complement).ln_1p()
+    } else {
+        p.ln()
+    }
+}
+
+/// Sums `term`·ratio, ·ratio², … over `steps` until it no longer matters. Stops before denormal numbers, which
+/// a ratio just below 1 would never shrink to nothing.
+fn sum_outwards(
+    mut term: f64,
+    steps: impl Iterator<Item = u64>,
+    ratio: impl Fn(u64) -> f64,
+) -> f64 {
+    let mut sum = 0.0;
+    for k in steps {
+        term *= ratio(k);
+        sum += term;
+        if term <= (1e-18 * sum).max(f64::MIN_POSITIVE) {
+            break;
+        }
+    }
+    sum
+}

@@ -1,0 +1,296 @@
+//! Macropixel: its SPADs, their time window and their histogram (thesis 4.2, 4.3, Fig. 47, 48, 55).
+//!
+//! ```text
+//!   SPAD_RAW ─► front_end ─► correlation ─► metdc ─HIT─► histogram
+//!                                             ▲ LOCAL_STOP
+//!   STOP, CLK ─► p_counter_timing ──────► p_counter ◄── COUNTER_INIT, MEMORY_LOAD
+//!                    ▲                        │
+//!                    └──────── LOCAL_STOP ────┘
+//!   ROW_READ, BIN_READ ─► bin_select ◄── counts of the histogram
+//!                             └─► WORD
+//! ```
+//!
+//! Where delay lines time photons, `photon_line` is the front end and `metdc_delay_line` the METDC, and nothing is correlated:
+//!
+//! ```text
+//!   SPAD_RAW ─► photon_line ─PHOTONS─► metdc_delay_line ─HIT─► histogram
+//! ```
+//!
+//! [`Model`] is the clocked one circuit in plain Rust, stepped edge by edge through its blocks' models; only
+//! the arrival of the strobe, of the reset and of the SPAD pulses is timed ([`ChipTiming`]).
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use super::{
+    correlation, finished, front_end, histogram, metdc, metdc_delay_line, p_counter,
+    p_counter_timing, photon_line, readout,
+};
+use crate::chip::config::{Mode, SensorConfig, Tdc};
+use crate::chip::exposure::Exposure;
+use crate::chip::timing::ChipTiming;
+use crate::netlist::{Module, ModuleBuilder};
+use crate::units::Time;
+
+/// One macropixel.
+///
+/// Ports: CLK, STOP, RESETB, ENABLE, PIXEL_CLEAR, CONVENTIONAL, TYPE\<2\>, THRESHOLD\<bits\>,
+/// COUNTER_INIT\<bits\>, MEMORY_LOAD, SPAD_RAW\<SPADs\>, ROW_READ, BIN_READ\<bins\> → LOCAL_STOP, WORD\<bin bits\>.
+pub fn circuit(config: &SensorConfig) -> Arc<Module> {
+    let mut m = ModuleBuilder::new("macropixel");
+    for pin in [
+        "CLK",
+        "STOP",
+        "RESETB",
+        "ENABLE",
+        "PIXEL_CLEAR",
+        "CONVENTIONAL",
+    ] {
+        m.input(pin);
+    }
+    m.input_bus("TYPE", 2);
+    m.input_bus("THRESHOLD", config.threshold_bits());
+    let init = m.input_bus("COUNTER_INIT", config.counter_bits);
+    m.input("MEMORY_LOAD");
+    m.input_bus("SPAD_RAW", config.spads());
+    m.input("ROW_READ");
+    m.input_bus("BIN_READ", config.bins);
+    m.output("LOCAL_STOP");
+    m.output_bus("WORD", config.bin_bits);
+
+    for wire in ["COUNTER_CLK", "COUNTER_RESET", "MEMORY_RESET", "STOP_D"] {
+        m.wire(wire);
+    }
+    match config.tdc {
+        Tdc::Clocked => {
+            m.wire_bus("SPAD_TIMED", config.lines());
+            m.wire("SPAD_EVENT");
+        }
+        Tdc::DelayLine => {
+            m.wire("PHOTONS");
+        }
+    }
+    m.wire_bus("HIT", config.bins);
+    let counts = m.wire_bus("COUNT", config.bins * config.bin_bits);
+
+    let timing = p_counter_timing::circuit(config.after_borrow);
+    m.instance_by_names("p_counter_timing", &timing, &[]);
+    m.instance_by_names("p_counter", &p_counter::circuit(config), &[]);
+    match config.tdc {
+        Tdc::Clocked => {
+            m.instance_by_names("front_end", &front_end::circuit(config), &[]);
+            let correlation = correlation::circuit(config.lines());
+            m.instance_by_names("correlation", &correlation, &[]);
+            m.instance_by_names("metdc", &metdc::circuit(config.bins), &[]);
+        }
+        Tdc::DelayLine => {
+            let front_end = photon_line::circuit(config.spads());
+            m.instance_by_names("front_end", &front_end, &[]);
+            let lines = metdc_delay_line::circuit(config.bins, &config.delay_elements());
+            m.instance_by_names("metdc", &lines, &[("COUNTER_INIT", &init[..1])]);
+        }
+    }
+    let bins: Vec<String> = (0..config.bins).map(histogram::bin_name).collect();
+    let of_bins = bins.iter().zip(counts.chunks(config.bin_bits));
+    let of_bins: Vec<_> = of_bins
+        .map(|(name, count)| (name.as_str(), count))
+        .collect();
+    let histogram = histogram::circuit(config.bins, config.bin_bits, config.overflow);
+    m.instance_by_names("histogram", &histogram, &of_bins);
+    let bin_select = readout::bin_select(config.bins, config.bin_bits);
+    m.instance_by_names("bin_select", &bin_select, &[]);
+    finished(m.finish())
+}
+
+/// Reference model of a macropixel during one exposure.
+#[derive(Debug, Clone)]
+pub struct Model<'a> {
+    config: &'a SensorConfig,
+    exposure: &'a Exposure,
+    timing: ChipTiming,
+}
+
+impl<'a> Model<'a> {
+    /// A macropixel of this sensor in this exposure.
+    pub fn new(config: &'a SensorConfig, exposure: &'a Exposure) -> Self {
+        Model {
+            config,
+            exposure,
+            timing: ChipTiming::of(config),
+        }
+    }
+
+    /// Histogram after the exposure, `bins` counts, for a start value and the rising edges of
+    /// SPAD_RAW as (time, SPAD), sorted by time.
+    pub fn histogram(&self, start: u16, pulses: impl IntoIterator<Item = (Time, u8)>) -> Vec<u16> {
+        let mut hits = vec![0u64; self.config.bins];
+        self.run(start, pulses, |_, latched| {
+            for (bin, count) in hits.iter_mut().enumerate() {
+                *count += latched >> bin & 1;
+            }
+        });
+        let (bits, overflow) = (self.config.bin_bits as u32, self.config.overflow);
+        hits.iter()
+            .map(|&n| histogram::model(n, bits, overflow))
+            .collect()
+    }
+
+    /// Runs the exposure; `strobe` is told the time of every strobe (LOCAL_STOP's rise in the guided
+    /// mode) and the HIT bits that rise with it.
+    pub fn run(
+        &self,
+        start: u16,
+        pulses: impl IntoIterator<Item = (Time, u8)>,
+        mut strobe: impl FnMut(Time, u64),
+    ) {
+        let (config, exposure, timing) = (self.config, self.exposure, &self.timing);
+        let periods = exposure.stop_periods as i64;
+        let cycles = exposure.laser_cycles as i64;
+        let guided = config.mode == Mode::Guided;
+        let has_memory = config.p_counter.row().has_memory;
+        let mut pulses = pulses.into_iter().peekable();
+        let mut counter = p_counter::Model::new(config, start);
+        let mut front_end = front_end::Model::new(config, timing);
+        let mut metdc = metdc::Model::new(config.bins as u32);
+        let mut hit = Hit::new(self);
+        let mut pending: VecDeque<Strobe> = VecDeque::new();
+        let by_local_stop = |local_stop, deadline| Strobe {
+            cause: local_stop,
+            arrival: local_stop + timing.local_stop_to_strobe,
+            deadline,
+        };
+        let by_reset = |stop| {
+            let reset_to_local_stop = timing.counter.reset_to_local_stop;
+            let delay = reset_to_local_stop.expect("no other counter rises at its reset");
+            by_local_stop(stop + timing.stop_to_reset + delay, Time::MAX)
+        };
+        // STOP edge number `cycle` is the next whose reset has not been released yet.
+        let mut cycle = 0;
+        let mut stop = exposure.stop(0);
+        let mut ticks = exposure.clock.ticks(0).map(|t| t - exposure.stop_phase);
+
+        for edge in 0..=cycles * periods {
+            let (fall, rise) = (
+                ticks.next().expect("endless"),
+                ticks.next().expect("endless"),
+            );
+            if guided {
+                let counter_clk = fall + timing.clk_to_counter_clk;
+                while cycle <= cycles && stop + timing.stop_to_reset_release <= counter_clk {
+                    if counter.reset() {
+                        pending.push_back(by_reset(stop));
+                    }
+                    cycle += 1;
+                    stop = exposure.stop(cycle);
+                }
+                let counts = if has_memory {
+                    cycle > 0 && cycle <= cycles && stop + timing.stop_to_reset >= counter_clk
+                } else {
+                    rise > timing.stop_to_enabled && edge < cycles * periods
+                };
+                if counts && counter.clock() {
+                    let local_stop = counter_clk + timing.counter.clk_to_local_stop;
+                    // The next reset takes back what still ripples.
+                    let deadline = if has_memory {
+                        stop + timing.stop_to_hit_reset - timing.strobe_to_hit
+                    } else {
+                        Time::MAX
+                    };
+                    pending.push_back(by_local_stop(local_stop, deadline));
+                }
+            } else if edge % periods == 0 {
+                let stop = exposure.stop(edge / periods);
+                pending.push_back(Strobe {
+                    cause: stop,
+                    arrival: stop + timing.stop_to_strobe,
+                    deadline: Time::MAX,
+                });
+            }
+
+            // A strobe that comes before the shift register changes sees it as it was.
+            while let Some(&s) = pending.front()
+                && s.arrival < rise + timing.clk_to_shift
+            {
+                hit.latch(s, metdc.hits(), &mut strobe);
+                pending.pop_front();
+            }
+            let timed = front_end.spad_timed();
+            metdc.clock(correlation::model(
+                timed,
+                config.event_type,
+                config.threshold,
+            ));
+            while let Some((time, spad)) =
+                pulses.next_if(|(t, _)| *t + timing.spad_to_sampled <= rise)
+            {
+                front_end.pulse(time, spad);
+            }
+            front_end.clock();
+        }
+        if guided && cycle <= cycles && counter.reset() {
+            pending.push_back(by_reset(stop));
+        }
+        for s in pending {
+            hit.latch(s, metdc.hits(), &mut strobe);
+        }
+    }
+}
+
+/// A strobe on its way to the HIT flip-flops.
+#[derive(Debug, Clone, Copy)]
+struct Strobe {
+    /// When LOCAL_STOP (or STOP) rose.
+    cause: Time,
+    /// When it clocks HIT.
+    arrival: Time,
+    /// The last arrival that a reset of the P-counter does not forestall.
+    deadline: Time,
+}
+
+/// The HIT flip-flops, which a laser cycle's first strobe finds at zero and a second one does not.
+struct Hit<'m> {
+    model: &'m Model<'m>,
+    held: u64,
+    /// STOP edge whose reset of HIT comes next.
+    next_stop: i64,
+}
+
+impl<'m> Hit<'m> {
+    fn new(model: &'m Model<'m>) -> Self {
+        Hit {
+            model,
+            held: 0,
+            next_stop: 0,
+        }
+    }
+
+    /// Latches `hits`, unless HIT is in reset, and tells `strobe` which bits rise.
+    fn latch(&mut self, s: Strobe, hits: u64, strobe: &mut impl FnMut(Time, u64)) {
+        let Model {
+            config,
+            exposure,
+            timing,
+        } = self.model;
+        if config.mode == Mode::Conventional {
+            // NOT STOP has cleared HIT.
+            strobe(s.cause, hits);
+            return;
+        }
+        if s.arrival > s.deadline {
+            return;
+        }
+        let cycles = i64::from(exposure.laser_cycles);
+        let resets_at = |stop| exposure.stop(stop) + timing.stop_to_hit_reset;
+        while self.next_stop <= cycles && resets_at(self.next_stop) <= s.arrival {
+            self.next_stop += 1;
+            self.held = 0;
+        }
+        let last_release = exposure.stop(self.next_stop - 1) + timing.stop_to_hit_release;
+        if self.next_stop == 0 || self.next_stop > cycles || s.arrival < last_release {
+            strobe(s.cause, 0);
+        } else if s.arrival <= resets_at(self.next_stop) - timing.strobe_to_hit {
+            strobe(s.cause, hits & !self.held);
+            self.held = hits;
+        }
+    }
+}

@@ -1,0 +1,314 @@
+//! Sensor configuration: what a user may set. `sensor_file` checks that it is possible. Keys that a file leaves out
+//! are those of the QuantIC4x4.
+
+pub use super::blocks::front_end::FrontEnd;
+use super::blocks::metdc_delay_line::Elements;
+pub use super::blocks::p_counter::PCounter;
+use super::blocks::readout::ReadoutOrder;
+use crate::netlist::Corner;
+use crate::photon::{MOST_SPADS, SpadGrid, count_bits};
+use crate::settings::Range::{Above, OneOf, Within};
+use crate::settings::{keys, words};
+use crate::units::{Frequency, Time};
+
+words! {
+    /// TYPE: how the number of fired SPADs is compared with THRESHOLD.
+    pub enum EventType {
+        /// Fewer SPADs than THRESHOLD. True of an empty pixel in every CLK period.
+        Less = "less",
+        /// Exactly THRESHOLD SPADs.
+        Equal = "equal",
+        /// More SPADs than THRESHOLD.
+        Greater = "greater",
+    }
+}
+
+impl EventType {
+    /// TYPE\<1:0\> as the correlation block decodes it: they are declared in its order.
+    pub(crate) const fn code(self) -> u8 {
+        self as u8
+    }
+}
+
+words! {
+    /// What a full histogram bin does.
+    pub enum Overflow {
+        /// Stays full.
+        Saturate = "saturate",
+        /// Starts again from zero.
+        Wrap = "wrap",
+    }
+}
+
+words! {
+    /// Which edge freezes the METDC.
+    pub enum Mode {
+        /// Each macropixel's own LOCAL_STOP (thesis 4.3).
+        Guided = "guided",
+        /// The global STOP: the last CLK periods of the laser cycle (thesis 4.2).
+        Conventional = "conventional",
+    }
+}
+
+words! {
+    /// Where the P-counter's LOCAL_STOP comes from.
+    pub enum Tap {
+        /// One stage more than is programmed: it rises when the counter rolls over past zero.
+        Borrow = "borrow",
+        /// The most significant programmed bit, as the thesis has it (4.5). It is high from the reset on for start
+        /// values of 2ⁿ⁻¹ and more.
+        Msb = "msb",
+    }
+}
+
+words! {
+    /// What the P-counter does once LOCAL_STOP has risen.
+    #[derive(Default)]
+    pub enum AfterBorrow {
+        /// Waits for the next reset: LOCAL_STOP blocks COUNTER_CLK.
+        #[default]
+        Hold = "hold",
+        /// Counts on, and raises LOCAL_STOP again whenever it comes round.
+        Wrap = "wrap",
+    }
+}
+
+words! {
+    /// What times photons within a window (thesis 4.9.3, Table 10).
+    #[derive(Default)]
+    pub enum Tdc {
+        /// A shift register that CLK clocks: bins are CLK periods.
+        #[default]
+        Clocked = "clocked",
+        /// Delay lines, whose elements are the bins. SPADs come together in a tree of XORs, so that TYPE and THRESHOLD have
+        /// nothing to compare.
+        DelayLine = "delay_line",
+    }
+}
+
+const CHIP: &str = "the QuantIC4x4, thesis Table 11";
+
+keys! {
+    /// A sensor, as its TOML file describes it. Keys that are left out take the QuantIC4x4's value.
+    pub struct SensorConfig {
+        /// Macropixel rows.
+        rows: usize = 64, in Within(1.0, 256.0), from CHIP;
+        /// Macropixel columns.
+        cols: usize = 64, in Within(1.0, 256.0), from CHIP;
+        /// Rows of a macropixel's SPADs: 1, 2, 4 or 8.
+        spad_rows: usize = 4, in Within(1.0, 8.0), from "thesis 4.2";
+        /// Columns of a macropixel's SPADs: 1, 2, 4 or 8.
+        spad_cols: usize = 4, in Within(1.0, 8.0), from "thesis 4.2";
+        /// How SPADs' pulses become events; all but the first join them on one line, for the gate engine.
+        front_end: FrontEnd = FrontEnd::Summation, from "thesis 2.4.1, Fig. 22";
+        /// SPADs that must fire together with front_end = "coincidence".
+        coincident_spads: usize = 2, in Within(1.0, MOST_SPADS as f64);
+        /// Programmable bits of the P-counter.
+        counter_bits: usize = 9, in Within(2.0, 12.0), from "thesis 4.5";
+        /// How the P-counter is built.
+        p_counter: PCounter = PCounter::Ripple, from "thesis 4.4, Fig. 53";
+        /// Bit that LOCAL_STOP comes from; the comparator has no msb.
+        tap: Tap = Tap::Borrow,
+            from "chosen: the thesis's msb (4.5) is high from the reset on for start values of 2^(n-1) and more";
+        /// What the P-counter does after LOCAL_STOP; without memory it must wrap.
+        after_borrow: AfterBorrow = AfterBorrow::Hold, from "thesis 4.5";
+        /// CLK periods from a start value's window to the next one's: 1, 2, 4 or 8; without memory 1.
+        step_periods: usize = 1, in Within(1.0, 8.0), from "thesis 4.9.3, Table 10";
+        /// What times photons: a shift register, with bins of CLK periods (HSLIDAR's clocked mode has a counter in the thesis), or delay lines, whose
+        /// elements are the bins and on which photons of a bin cancel in pairs.
+        tdc: Tdc = Tdc::Clocked,
+            from "thesis 4.9.3, Table 10; the shift register and that photons cancel are chosen";
+        /// Control voltage of the delay lines: 0.7 V makes elements of 2.6 ns.
+        ///
+        /// [`SensorConfig::delay_element`] is the law.
+        delay_control_v: f64 ["V"] = 0.70, in Within(0.5, 1.1),
+            from "chosen: the thesis has the delay, not the voltage (6.3.1)";
+        /// How the delay lines' elements differ, relative to their mean.
+        ///
+        /// Their standard deviation.
+        delay_sigma: f64 = 0.154, in Within(0.0, 0.25),
+            from "thesis 6.3.1, Fig. 91: 0.4 ns of 2.6 ns";
+        /// Number of the chip, which decides how its elements differ.
+        delay_seed: u32 = 1, in Within(0.0, u32::MAX as f64);
+        /// How much later CLK and STOP come to each column than to the one left of it.
+        clk_skew_ps: f64 ["ps"] = 0.0, in Within(0.0, 200.0),
+            from "chosen: Fig. 90 shows it without a scale";
+        /// Histogram bins.
+        bins: usize = 16, in Within(1.0, 64.0), from CHIP;
+        /// Bits of each bin.
+        bin_bits: usize = 14, in Within(1.0, 16.0), from CHIP;
+        /// CLK frequency; its period is one histogram bin of a clocked TDC.
+        clk_hz: f64 ["Hz"] = 384e6, in Within(1e6, 2e9), from "thesis 4.8";
+        /// Rise of STOP after the falling edge of CLK; at most half a CLK period either way.
+        stop_phase_ps: f64 ["ps"] = 0.0, in Within(-5e5, 5e5);
+        /// Deserialiser clock.
+        load_clk_hz: f64 ["Hz"] = 200e6, in Within(1e6, 1e9),
+            from "thesis 4.7, a few hundred megahertz";
+        /// Whether the sensor must be reset and idle before windows are written.
+        reset_to_load: bool = false, from "thesis 4.9.5, Table 11: no, but HSLIDAR must";
+        /// Pins through which histograms leave, each with a serialiser for its share of the columns.
+        ///
+        /// No more are used than there are columns.
+        readout_pins: usize = 8, in Within(1.0, 256.0);
+        /// Serialiser clock.
+        read_clk_hz: f64 ["Hz"] = 200e6, in Within(1e6, 1e9),
+            from "chosen: that of the deserialiser";
+        /// SPAD dead time and width of a SPAD_RAW pulse.
+        ///
+        /// No shorter than the front end follows, and longer than a CLK period if no photons are to cancel.
+        dead_time_ns: f64 ["ns"] = 8.0, in Above(0.0, 1e6);
+        /// Whether a photon during the dead time restarts it.
+        paralysable: bool = false;
+        /// Probability that an avalanche has an afterpulse.
+        afterpulse_probability: f64 = 0.0, in Within(0.0, 1.0), from "chosen: none";
+        /// Time constant of afterpulses after the dead time.
+        afterpulse_time_ns: f64 ["ns"] = 5.0, in Within(0.0, 1e6);
+        /// Probability that an avalanche fires one of its SPAD's four neighbours.
+        crosstalk_probability: f64 = 0.0, in Within(0.0, 1.0), from "chosen: none";
+        /// TYPE: how the number of fired SPADs is compared with THRESHOLD.
+        event_type: EventType = EventType::Greater, from "thesis 4.2";
+        /// THRESHOLD: SPADs; at most 31 with 4x4 of them.
+        ///
+        /// Lines of a front end that joins SPADs. One that TYPE can meet.
+        threshold: u8 = 0, in Within(0.0, ((1 << count_bits(MOST_SPADS)) - 1) as f64),
+            from "chosen: any photon counts";
+        /// What a full bin does.
+        overflow: Overflow = Overflow::Saturate;
+        /// Which STOP counts: each macropixel's own, or the global one.
+        mode: Mode = Mode::Guided, from "thesis 4.3 and 4.2";
+        /// Silicon corner of the cells' delays; min and max mean fast and slow.
+        corner: Corner = Corner::Typ, in OneOf(&["slow", "typ", "fast"]);
+    }
+}
+
+impl SensorConfig {
+    /// CLK. The configuration must have passed [`SensorConfig::check`].
+    pub fn clock(&self) -> Frequency {
+        Frequency::from_hz_f64(self.clk_hz).expect("checked")
+    }
+
+    /// Deserialiser clock. The configuration must have passed [`SensorConfig::check`].
+    pub fn load_clock(&self) -> Frequency {
+        Frequency::from_hz_f64(self.load_clk_hz).expect("checked")
+    }
+
+    /// Serialiser clock. The configuration must have passed [`SensorConfig::check`].
+    pub fn read_clock(&self) -> Frequency {
+        Frequency::from_hz_f64(self.read_clk_hz).expect("checked")
+    }
+
+    /// Rise of STOP after CLK's fall.
+    pub fn stop_phase(&self) -> Time {
+        Time::from_s(self.stop_phase_ps * 1e-12)
+    }
+
+    /// SPAD dead time.
+    pub fn dead_time(&self) -> Time {
+        Time::from_s(self.dead_time_ns * 1e-9)
+    }
+
+    /// Largest start value, 2ⁿ − 1.
+    pub fn largest_start(&self) -> u16 {
+        ((1u32 << self.counter_bits) - 1) as u16
+    }
+
+    /// The SPADs of a macropixel. The configuration must have passed [`SensorConfig::check`].
+    pub fn spad_grid(&self) -> SpadGrid {
+        SpadGrid::new(self.spad_rows, self.spad_cols)
+    }
+
+    /// SPADs of a macropixel.
+    pub fn spads(&self) -> usize {
+        self.spad_rows * self.spad_cols
+    }
+
+    /// Lines of SPAD_TIMED, which the correlation block counts: one a SPAD, or one for all.
+    pub fn lines(&self) -> usize {
+        match self.front_end.joins() {
+            false => self.spads(),
+            true => 1,
+        }
+    }
+
+    /// SPADs that must fire together to raise a line of SPAD_TIMED.
+    pub(crate) fn spads_of_an_event(&self) -> usize {
+        (self.front_end.row().together)(self)
+    }
+
+    /// Bits of THRESHOLD.
+    pub(crate) fn threshold_bits(&self) -> usize {
+        count_bits(self.lines())
+    }
+
+    /// k, where windows step by 2ᵏ CLK periods. The configuration must have passed [`SensorConfig::check`].
+    pub(crate) fn step_bits(&self) -> u32 {
+        self.step_periods.trailing_zeros()
+    }
+
+    /// Delay of a delay line's element on average, in typical silicon: T_DL of Table 10.
+    ///
+    /// The thesis says that no formula leads from control voltage to delay (6.3.1), and gives none of its measurements. Here the
+    /// voltage drives transistors that starve the elements' current: the alpha-power law with α = 1.3 and a threshold of
+    /// 0.40 V, as for the other cells, and 0.70 V for the 2.6 ns that the demonstrator had.
+    pub fn delay_element(&self) -> Time {
+        const REFERENCE_V: f64 = 0.70;
+        const REFERENCE_S: f64 = 2.6e-9;
+        const THRESHOLD_V: f64 = 0.40;
+        const ALPHA: f64 = 1.3;
+        let overdrive = (self.delay_control_v - THRESHOLD_V) / (REFERENCE_V - THRESHOLD_V);
+        Time::from_s(REFERENCE_S * libm::pow(overdrive, -ALPHA))
+    }
+
+    /// The elements of its delay lines.
+    pub(super) fn delay_elements(&self) -> Elements {
+        Elements {
+            mean_fs: self.delay_element().as_fs() as u32,
+            sigma: self.delay_sigma,
+            seed: self.delay_seed.into(),
+        }
+    }
+
+    /// Delay of the wires that bring CLK and STOP to a column of macropixels, in the typical corner. What they take in the
+    /// sensor's silicon is [`Sensor::clk_skew`](super::Sensor::clk_skew).
+    pub(crate) fn clk_wire(&self, col: usize) -> Time {
+        Time::from_s(self.clk_skew_ps * 1e-12 * col as f64)
+    }
+
+    /// Macropixels.
+    pub fn pixels(&self) -> usize {
+        self.rows * self.cols
+    }
+
+    /// Bits of one serial load (thesis 4.7: 36.9 kbit).
+    pub fn load_bits(&self) -> usize {
+        self.pixels() * self.counter_bits
+    }
+
+    /// Bits of all histograms.
+    pub fn histogram_bits(&self) -> usize {
+        self.pixels() * self.bins * self.bin_bits
+    }
+
+    /// Time of one readout.
+    pub fn readout_time(&self) -> Time {
+        let periods = ReadoutOrder::of(self).periods();
+        self.read_clock().periods(periods as i64)
+    }
+
+    /// Time of one serial load.
+    pub fn load_time(&self) -> Time {
+        self.load_clock()
+            .half_periods(2 * self.load_bits() as i64 + 1)
+    }
+
+    /// Time from one frame to the next one with windows of its own, of an exposure that ends `exposed` after it began: the load
+    /// goes on while the frame before is exposed and read out, and is hidden behind them, unless the sensor has to be reset for
+    /// it (thesis 4.9.5). Guide and ranging take none of it.
+    pub fn frame_time(&self, exposed: Time) -> Time {
+        let counted = exposed + self.readout_time();
+        match self.reset_to_load {
+            true => counted + self.load_time(),
+            false => counted.max(self.load_time()),
+        }
+    }
+}

@@ -1,0 +1,412 @@
+//! Where the nets and cells inside the chip are: the only place that knows their names, besides the files that build the
+//! circuits.
+//!
+//! ```text
+//!   Probes::of_macropixel(netlist, row, col) ─┬─► probes.net(Probe::LocalStop)  ─► NetId
+//!                                             ├─► probes.bus(Probe::Shift)      ─► NetIds, bit 0 first
+//!   LoadProbe::Write.net(netlist)             ├─► probes.bin(3)                 ─► NetIds of a bin's count
+//!   SensorPins::of(netlist)                   └─► probes.path(Probe::Strobe)    ─► dotted path, for viewers
+//! ```
+//!
+//! | file | what it has |
+//! |---|---|
+//! | this | [`Probes`] of a macropixel |
+//! | `readout` | [`ReadProbe`]s of the readout |
+//! | `load_path` | [`LoadProbe`]s and memories of the load path |
+//! | `pins` | [`SensorPins`], [`LoadPins`] and [`ReadPins`], which a tester drives |
+//!
+//! Handles are resolved once, by a hash look-up for each part of a path. A circuit that has only some of a macropixel's
+//! blocks (a P-counter on a test bench) has only some of the probes; asking for another is a bug of ours, and panics.
+
+mod load_path;
+mod pins;
+mod readout;
+#[cfg(test)]
+mod tests;
+
+pub use load_path::{LoadProbe, memories, memory_path};
+pub use pins::{LoadPins, ReadPins, SensorPins};
+pub use readout::ReadProbe;
+
+use super::{array, front_end, histogram};
+use crate::netlist::{CellKind, NetId, Netlist};
+
+/// A net or bus of a macropixel that something outside the circuits looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Probe {
+    /// CLK.
+    Clk,
+    /// STOP.
+    Stop,
+    /// ENABLE, the sensor's RUN.
+    Enable,
+    /// PIXEL_CLEAR.
+    PixelClear,
+    /// MEMORY_LOAD of its row.
+    MemoryLoad,
+    /// MEMORY_RESET.
+    MemoryReset,
+    /// COUNTER_INIT of its column.
+    CounterInit,
+    /// SPAD_RAW, one bit a SPAD.
+    SpadRaw,
+    /// Shaped pulses, one bit a SPAD; only front ends with pulse shapers have them.
+    Shaped,
+    /// The wire that all SPADs share; only front ends that join them have one.
+    Wire,
+    /// SPAD_TIMED, one bit a SPAD, or one for all.
+    SpadTimed,
+    /// SPAD_EVENT.
+    SpadEvent,
+    /// LOCAL_STOP.
+    LocalStop,
+    /// COUNTER_CLK.
+    CounterClk,
+    /// COUNTER_RESET.
+    CounterReset,
+    /// The part of COUNTER_RESET that STOP's rising edge makes.
+    ResetPulse,
+    /// What keeps CLK from COUNTER_CLK.
+    Block,
+    /// The start value; a P-counter without memory has none.
+    Memory,
+    /// COUNTER_CLK divided; only where windows step by several CLK periods.
+    StepClk,
+    /// The count.
+    CounterOut,
+    /// The METDC's shift register, newest event first.
+    Shift,
+    /// All SPADs on one line; only where delay lines time it.
+    Photons,
+    /// Clock of the flip-flops that sample the delay lines; only there.
+    SampleClk,
+    /// Taps of the delay line of even start values, behind the first element first; only there.
+    EvenTap,
+    /// Those of odd start values.
+    OddTap,
+    /// Clock of the HIT flip-flops.
+    Strobe,
+    /// Reset of the HIT flip-flops.
+    HitReset,
+    /// HIT, one bit a bin.
+    Hit,
+}
+
+impl Probe {
+    /// Every probe, in the order of their declaration.
+    pub const ALL: [Probe; 28] = [
+        Probe::Clk,
+        Probe::Stop,
+        Probe::Enable,
+        Probe::PixelClear,
+        Probe::MemoryLoad,
+        Probe::MemoryReset,
+        Probe::CounterInit,
+        Probe::SpadRaw,
+        Probe::Shaped,
+        Probe::Wire,
+        Probe::SpadTimed,
+        Probe::SpadEvent,
+        Probe::LocalStop,
+        Probe::CounterClk,
+        Probe::CounterReset,
+        Probe::ResetPulse,
+        Probe::Block,
+        Probe::Memory,
+        Probe::StepClk,
+        Probe::CounterOut,
+        Probe::Shift,
+        Probe::Photons,
+        Probe::SampleClk,
+        Probe::EvenTap,
+        Probe::OddTap,
+        Probe::Strobe,
+        Probe::HitReset,
+        Probe::Hit,
+    ];
+
+    /// Block of the macropixel whose inner net it is (none: the macropixel's own), and its name there.
+    const fn place(self) -> (Option<&'static str>, &'static str) {
+        match self {
+            Probe::Clk => (None, "CLK"),
+            Probe::Stop => (None, "STOP"),
+            Probe::Enable => (None, "ENABLE"),
+            Probe::PixelClear => (None, "PIXEL_CLEAR"),
+            Probe::MemoryLoad => (None, "MEMORY_LOAD"),
+            Probe::MemoryReset => (None, "MEMORY_RESET"),
+            Probe::CounterInit => (None, "COUNTER_INIT"),
+            Probe::SpadRaw => (None, "SPAD_RAW"),
+            Probe::Shaped => (Some(FRONT_END), "SHAPED"),
+            Probe::Wire => (Some(FRONT_END), "WIRE"),
+            Probe::SpadTimed => (None, "SPAD_TIMED"),
+            Probe::SpadEvent => (None, "SPAD_EVENT"),
+            Probe::LocalStop => (None, "LOCAL_STOP"),
+            Probe::CounterClk => (None, "COUNTER_CLK"),
+            Probe::CounterReset => (None, "COUNTER_RESET"),
+            Probe::ResetPulse => (Some(P_COUNTER_TIMING), "PULSE"),
+            Probe::Block => (Some(P_COUNTER_TIMING), "BLOCK"),
+            Probe::Memory => (Some(P_COUNTER), "MEMORY"),
+            Probe::StepClk => (Some(P_COUNTER), "STEP_CLK"),
+            Probe::CounterOut => (Some(P_COUNTER), "COUNTER_OUT"),
+            Probe::Shift => (Some(METDC), "SHIFT"),
+            Probe::Photons => (None, "PHOTONS"),
+            Probe::SampleClk => (Some(METDC), "SAMPLE_CLK"),
+            Probe::EvenTap => (Some(METDC), "EVEN_TAP"),
+            Probe::OddTap => (Some(METDC), "ODD_TAP"),
+            Probe::Strobe => (Some(METDC), "STROBE"),
+            Probe::HitReset => (Some(METDC), "HIT_RESET"),
+            Probe::Hit => (None, "HIT"),
+        }
+    }
+
+    /// The signal's name, as in the thesis where that has one.
+    pub const fn name(self) -> &'static str {
+        self.place().1
+    }
+
+    /// Dotted path of the signal in the macropixel at `macropixel` (empty: at the top).
+    pub fn path(self, macropixel: &str) -> String {
+        let (block, name) = self.place();
+        join([macropixel, block.unwrap_or(""), name])
+    }
+}
+
+const FRONT_END: &str = "front_end";
+const P_COUNTER_TIMING: &str = "p_counter_timing";
+const P_COUNTER: &str = "p_counter";
+const METDC: &str = "metdc";
+
+/// A dotted path of parts, of which empty ones are left out.
+fn join<const N: usize>(parts: [&str; N]) -> String {
+    let parts: Vec<&str> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+    parts.join(".")
+}
+
+/// Dotted path of the retiming of a SPAD in the macropixel at `macropixel`.
+pub(crate) fn spad_path(macropixel: &str, spad: usize) -> String {
+    join([macropixel, FRONT_END, &format!("spad_{spad}")])
+}
+
+/// Dotted path of a bin's count in the macropixel at `macropixel`.
+pub fn bin_path(macropixel: &str, bin: usize) -> String {
+    join([macropixel, "histogram", &histogram::bin_name(bin)])
+}
+
+/// Handles of one macropixel.
+#[derive(Debug, Clone)]
+pub struct Probes {
+    path: String,
+    /// By probe; empty where the circuit has none.
+    nets: Vec<Vec<NetId>>,
+    /// Toggle flip-flop's output by SPAD; none where SPADs share the wire before it.
+    toggles: Vec<NetId>,
+    bins: Vec<Vec<NetId>>,
+}
+
+impl Probes {
+    /// Handles of the macropixel at a row and column of an elaborated sensor, or of a part of one.
+    ///
+    /// # Panics
+    /// When the netlist has no such macropixel.
+    pub fn of_macropixel(netlist: &Netlist, row: usize, col: usize) -> Self {
+        let name = array::pixel_name(row, col);
+        assert!(netlist.scope(&name).is_some(), "no macropixel {name}");
+        Self::at(netlist, &name)
+    }
+
+    /// Handles of what there is of a macropixel below the instance at `path`; an empty path is the top itself.
+    pub fn at(netlist: &Netlist, path: &str) -> Self {
+        Self::resolve(netlist, path, |probe| probe.path(path))
+    }
+
+    /// Handles in a netlist whose top is one block of a macropixel, such as a P-counter: its pins and inner nets.
+    pub fn of_block(netlist: &Netlist) -> Self {
+        Self::resolve(netlist, "", |probe| probe.name().to_owned())
+    }
+
+    fn resolve(netlist: &Netlist, path: &str, place: impl Fn(Probe) -> String) -> Self {
+        let nets = |probe| netlist.signal(&place(probe)).unwrap_or_default();
+        let toggle = |spad| netlist.net(&join([&spad_path(path, spad), "TOGGLE"]));
+        let bin = |bin| netlist.signal(&bin_path(path, bin));
+        Probes {
+            nets: Probe::ALL.into_iter().map(nets).collect(),
+            toggles: (0..).map_while(toggle).collect(),
+            bins: (0..).map_while(bin).collect(),
+            path: path.to_owned(),
+        }
+    }
+
+    /// Dotted path of the macropixel.
+    pub(crate) fn macropixel(&self) -> &str {
+        &self.path
+    }
+
+    /// Dotted path of a probe.
+    pub fn path(&self, probe: Probe) -> String {
+        probe.path(&self.path)
+    }
+
+    /// Dotted path of a bin's count.
+    pub(crate) fn bin_path(&self, bin: usize) -> String {
+        bin_path(&self.path, bin)
+    }
+
+    /// Nets of a probe, bit 0 first, if the circuit has it.
+    pub fn find(&self, probe: Probe) -> Option<&[NetId]> {
+        let nets = self.nets[probe as usize].as_slice();
+        (!nets.is_empty()).then_some(nets)
+    }
+
+    /// Nets of a probe, bit 0 first.
+    ///
+    /// # Panics
+    /// When the circuit does not have it.
+    pub fn bus(&self, probe: Probe) -> &[NetId] {
+        let missing = || panic!("the circuit has no {}", self.path(probe));
+        self.find(probe).unwrap_or_else(missing)
+    }
+
+    /// The net of a probe of one bit, or the first of several.
+    ///
+    /// # Panics
+    /// When the circuit does not have it.
+    pub fn net(&self, probe: Probe) -> NetId {
+        self.bus(probe)[0]
+    }
+
+    /// Output of the toggle flip-flop of each SPAD; none where SPADs share the wire before it.
+    pub(crate) fn toggles(&self) -> &[NetId] {
+        &self.toggles
+    }
+
+    /// Count of each bin, bin 0 earliest, bit 0 first.
+    pub fn bins(&self) -> &[Vec<NetId>] {
+        &self.bins
+    }
+
+    /// Count of a bin, bit 0 first.
+    pub(crate) fn bin(&self, bin: usize) -> &[NetId] {
+        &self.bins[bin]
+    }
+
+    /// The flip-flops of a bin's count, bit 0 first.
+    ///
+    /// # Panics
+    /// When the circuit does not have it.
+    pub(crate) fn bin_cells(&self, netlist: &Netlist, bin: usize) -> Vec<usize> {
+        let cell = |bit| {
+            join([
+                &self.path,
+                "histogram",
+                &format!("bin_{bin}"),
+                &format!("bit_{bit}"),
+            ])
+        };
+        cells(netlist, (0..self.bin(bin).len()).map(cell))
+    }
+
+    /// The toggle flip-flop of each SPAD.
+    pub(crate) fn toggle_cells(&self, netlist: &Netlist) -> Vec<usize> {
+        let cell = |spad| spad_path(&self.path, spad) + ".toggle";
+        cells(netlist, (0..self.toggles.len()).map(cell))
+    }
+
+    /// What CLK samples where SPADs share a wire: D of the first sampler.
+    pub(crate) fn joined_sample(&self, netlist: &Netlist) -> Option<NetId> {
+        let first = netlist.cell(&join([&self.path, FRONT_END, front_end::JOINED, "first"]))?;
+        Some(netlist.cells()[first].inputs[0])
+    }
+
+    /// The end of each pulse shaper's delay chain, by SPAD.
+    pub(crate) fn shaper_ends(&self, netlist: &Netlist) -> Vec<NetId> {
+        let late = |spad| {
+            let shaper = format!("shaper_{spad}");
+            netlist.net(&join([&self.path, FRONT_END, &shaper, "LATE"]))
+        };
+        (0..).map_while(late).collect()
+    }
+
+    /// The stages of the METDC's shift register, the first one first.
+    pub(crate) fn shift_cells(&self, netlist: &Netlist) -> Vec<usize> {
+        let cell = |stage| join([&self.path, METDC, &format!("shift_{stage}")]);
+        cells(netlist, (0..self.bus(Probe::Shift).len()).map(cell))
+    }
+
+    /// The HIT flip-flop of each bin.
+    pub fn hit_cells(&self, netlist: &Netlist) -> Vec<usize> {
+        let cell = |bin| join([&self.path, METDC, &format!("hit_{bin}")]);
+        cells(netlist, (0..self.bus(Probe::Hit).len()).map(cell))
+    }
+
+    /// Every cell of the P-counter timing block.
+    ///
+    /// # Panics
+    /// When the circuit has none.
+    pub fn timing_block_cells(&self, netlist: &Netlist) -> std::ops::Range<usize> {
+        cells_of(netlist, &join([&self.path, P_COUNTER_TIMING]))
+    }
+
+    /// The flip-flops of the P-counter, its memory excepted.
+    ///
+    /// # Panics
+    /// When the circuit has no P-counter.
+    pub(crate) fn counter_cells(&self, netlist: &Netlist) -> Vec<usize> {
+        let cells = cells_of(netlist, &self.p_counter());
+        let is_flip_flop = |&cell: &usize| netlist.cells()[cell].kind.is_flip_flop();
+        cells.filter(is_flip_flop).collect()
+    }
+
+    /// Dotted path of the P-counter.
+    pub fn p_counter(&self) -> String {
+        join([&self.path, P_COUNTER])
+    }
+
+    /// The inverse of ENABLE, which resets the P-counter and keeps CLK from it.
+    ///
+    /// # Panics
+    /// When the circuit has no P-counter timing block.
+    pub(crate) fn disabled(&self, netlist: &Netlist) -> NetId {
+        let enable = self.net(Probe::Enable);
+        let mut cells = self
+            .timing_block_cells(netlist)
+            .map(|c| &netlist.cells()[c]);
+        let inverter = cells.find(|cell| cell.kind == CellKind::Inv && cell.inputs[0] == enable);
+        inverter.expect("ENABLE has an inverter").outputs[0]
+    }
+
+    /// What makes COUNTER_RESET besides the pulse at STOP: reset and ENABLE.
+    ///
+    /// # Panics
+    /// When the circuit has no P-counter timing block.
+    pub(crate) fn counter_clear(&self, netlist: &Netlist) -> NetId {
+        let (reset, pulse) = (self.net(Probe::CounterReset), self.net(Probe::ResetPulse));
+        let mut drivers = self
+            .timing_block_cells(netlist)
+            .map(|c| &netlist.cells()[c]);
+        let or = drivers.find(|cell| cell.outputs[0] == reset);
+        let inputs = or.expect("COUNTER_RESET has a driver").inputs;
+        if inputs[0] == pulse {
+            inputs[1]
+        } else {
+            inputs[0]
+        }
+    }
+}
+
+fn cells(netlist: &Netlist, paths: impl Iterator<Item = String>) -> Vec<usize> {
+    let cell = |path: String| {
+        let cell = netlist.cell(&path);
+        cell.unwrap_or_else(|| panic!("the circuit has no {path}"))
+    };
+    paths.map(cell).collect()
+}
+
+fn cells_of(netlist: &Netlist, path: &str) -> std::ops::Range<usize> {
+    let scope = netlist.scope(path);
+    netlist.cells_of(scope.unwrap_or_else(|| panic!("the circuit has no {path}")))
+}
+
+fn top_bus(netlist: &Netlist, path: &str) -> Vec<NetId> {
+    let nets = netlist.signal(path);
+    nets.unwrap_or_else(|| panic!("the netlist has no {path}"))
+}

@@ -1,0 +1,271 @@
+//! Two signals too close to call: what they are, how close they come, and what keeps them apart.
+
+use std::fmt;
+
+use crate::units::Time;
+
+/// What a cure adds to the end of a forbidden time: clock edges are rounded to whole femtoseconds, each by itself.
+const ROUNDING: Time = Time::from_fs(4);
+
+/// What meets what. The first is the one that comes at the wrong time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+pub enum Conflict {
+    /// Data and clock of the METDC's shift register.
+    #[error("the correlation block is slower than a CLK period")]
+    SlowCorrelation,
+    /// One count and the next.
+    #[error("the P-counter is slower than a CLK period")]
+    SlowCounter,
+    /// Data and CLK of some flip-flop.
+    #[error("a path is slower than a CLK period")]
+    SlowPath,
+    /// STROBE after LOCAL_STOP and the shift register.
+    #[error("the strobe meets a change of the shift register")]
+    StrobeAtShift,
+    /// The shift register and STROBE after STOP, in the conventional mode.
+    #[error("a change of the shift register meets the strobe")]
+    ShiftAtStrobe,
+    /// COUNTER_CLK and COUNTER_RESET.
+    #[error("a CLK edge meets the end of the reset pulse")]
+    ClkAtResetEnd,
+    /// STROBE and HIT's reset at the end of its laser cycle.
+    #[error("the strobe meets the next laser cycle's reset")]
+    StrobeAtNextReset,
+    /// STROBE of a P-counter that nothing resets, and HIT's reset.
+    #[error("the strobe meets a laser cycle's reset")]
+    StrobeAtReset,
+    /// STROBE where COUNTER_RESET raises LOCAL_STOP, and HIT's reset.
+    #[error("the strobe that the reset makes meets the end of HIT's reset")]
+    ResetStrobeAtHitReset,
+    /// CLK and ENABLE of a P-counter that nothing resets.
+    #[error("CLK rises as ENABLE lets it through")]
+    ClkAtEnable,
+    /// LOCAL_STOP of a P-counter that nothing resets, and ENABLE.
+    #[error("LOCAL_STOP rises as ENABLE changes")]
+    LocalStopAtEnable,
+}
+
+/// The event that the times of a race are counted from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Origin {
+    /// CLK's fall that the P-counter counts.
+    #[error("CLK falls")]
+    ClkFalls,
+    /// The edge of CLK that launches the signal.
+    #[error("CLK's edge")]
+    ClkEdge,
+    /// The laser cycle's STOP edge.
+    #[error("STOP rises")]
+    StopRises,
+    /// The exposure's first STOP edge.
+    #[error("the first STOP edge")]
+    FirstStop,
+}
+
+/// Why the histogram is not latched once in every laser cycle, in the same CLK period of each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+pub enum Irregular {
+    /// The P-counter wraps within the laser cycle.
+    #[error("LOCAL_STOP rises more than once in a laser cycle ({rises} times)")]
+    LocalStopRepeats {
+        /// Rising edges of LOCAL_STOP in a laser cycle.
+        rises: usize,
+    },
+    /// A P-counter without memory, which STOP does not reset, comes round in another time than STOP does.
+    #[error(
+        "STOP comes every {stop_periods} CLK periods and the P-counter without memory comes round in {round}, so windows drift"
+    )]
+    OutOfStep {
+        /// CLK periods from one STOP edge to the next.
+        stop_periods: i64,
+        /// CLK periods in which the P-counter comes round.
+        round: i64,
+    },
+}
+
+/// Why windows cannot be aimed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NoAim {
+    /// Two signals are too close to call.
+    #[error("{0}")]
+    Race(Race),
+    /// No single window describes what is counted.
+    #[error("{0}")]
+    Irregular(Irregular),
+}
+
+/// A signal that comes when it must not: a flip-flop's setup, hold, recovery or removal time is broken, or may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Race {
+    /// What meets what.
+    pub what: Conflict,
+    /// The event that times are counted from.
+    pub after: Origin,
+    /// When it comes.
+    pub comes: Time,
+    /// From when on it must not …
+    pub from: Time,
+    /// … until it may again, if ever.
+    pub to: Option<Time>,
+    /// What keeps them apart.
+    pub cure: Cure,
+}
+
+/// What to change of a sensor or exposure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cure {
+    /// The CLK period.
+    Period {
+        /// Long enough from here on.
+        at_least: Time,
+        /// Where one shorter will do, too, up to here.
+        at_most: Option<Time>,
+    },
+    /// STOP's rise after CLK's fall.
+    Phase {
+        /// Early enough up to here.
+        at_most: Option<Time>,
+        /// Late enough from here on.
+        at_least: Option<Time>,
+    },
+    /// The length of a laser cycle against the start value.
+    LaserCycle,
+    /// The tap `msb`.
+    Tap,
+}
+
+impl Race {
+    /// What is missing to the nearer end of the forbidden time: negative.
+    pub(crate) fn slack(&self) -> Time {
+        let before = self.comes - self.from;
+        let after = self.to.map_or(before, |to| to - self.comes);
+        -before.min(after)
+    }
+
+    /// The strobe of the HIT flip-flops near a change of the shift register, `edges` rising CLK edges after the first that
+    /// follows the counted fall; all times from CLK's fall. `shift` is CLK's rise to the change, and `shortest` the shortest
+    /// CLK period that everything else allows.
+    pub(crate) fn strobe_at_shift(
+        period: Time,
+        edges: i64,
+        (strobe, shift): (Time, Time),
+        (setup, hold): (Time, Time),
+        shortest: Time,
+    ) -> Self {
+        let odd = 2 * edges + 1;
+        let change = Time::from_fs(period.as_fs() * odd / 2) + shift;
+        let band = |offset: Time, odd: i64| 2 * offset.as_fs() / odd;
+        let upper = |odd| Time::from_fs(band(strobe - shift + hold, odd)) + ROUNDING;
+        let at_most = Time::from_fs(band(strobe - shift - setup, odd)) - ROUNDING;
+        let is_possible = at_most > shortest && at_most > upper(odd + 2);
+        Race {
+            what: Conflict::StrobeAtShift,
+            after: Origin::ClkFalls,
+            comes: strobe,
+            from: change - hold,
+            to: Some(change + setup),
+            cure: Cure::Period {
+                at_least: upper(odd),
+                at_most: is_possible.then_some(at_most),
+            },
+        }
+    }
+
+    /// A signal that CLK launches (so that it comes earlier after STOP where STOP comes later) in a time that STOP forbids.
+    pub(crate) fn with_stop(
+        what: Conflict,
+        comes: Time,
+        (from, to): (Time, Time),
+        phase: Time,
+        period: Time,
+    ) -> Self {
+        let within = |p: &Time| p.as_fs().abs() <= period.as_fs() / 2;
+        Race {
+            what,
+            after: Origin::StopRises,
+            comes,
+            from,
+            to: Some(to),
+            cure: Cure::Phase {
+                at_most: Some(phase - (to - comes) - ROUNDING).filter(within),
+                at_least: Some(phase + (comes - from) + ROUNDING).filter(within),
+            },
+        }
+    }
+
+    /// A path that takes `comes` from CLK's edge where the period allows `until`.
+    pub(crate) fn too_slow(what: Conflict, comes: Time, until: Time) -> Self {
+        Race {
+            what,
+            after: Origin::ClkEdge,
+            comes,
+            from: until,
+            to: None,
+            cure: Cure::Period {
+                at_least: comes + ROUNDING,
+                at_most: None,
+            },
+        }
+    }
+}
+
+impl fmt::Display for Race {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Race {
+            what,
+            after,
+            comes,
+            from,
+            to,
+            ..
+        } = self;
+        match to {
+            Some(to) => write!(
+                f,
+                "{what} (it comes {comes} after {after}, and must not from {from} to {to})"
+            ),
+            None => write!(
+                f,
+                "{what} (it takes {comes} after {after}, and must not take more than {from})"
+            ),
+        }
+    }
+}
+
+impl fmt::Display for Cure {
+    /// Rounded to what is sure to help.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // 0.1 MHz and 1 ps are finer than anybody sets them.
+        let mhz_below = |t: &Time| (1e-5 / t.as_s()).floor() / 10.0;
+        let mhz_above = |t: &Time| (1e-5 / t.as_s()).ceil() / 10.0;
+        let (floor, ceil) = (
+            |t: &Time| (t.as_ns() * 1e3).floor(),
+            |t: &Time| (t.as_ns() * 1e3).ceil(),
+        );
+        match self {
+            Cure::Period { at_least, at_most } => {
+                write!(f, "give clk_hz of at most {:.1} MHz", mhz_below(at_least))?;
+                match at_most {
+                    Some(at_most) => write!(f, ", or of at least {:.1} MHz", mhz_above(at_most)),
+                    None => Ok(()),
+                }
+            }
+            Cure::Phase { at_most, at_least } => match (at_most, at_least) {
+                (Some(most), Some(least)) => write!(
+                    f,
+                    "give stop_phase_ps of at most {}, or of at least {}",
+                    floor(most),
+                    ceil(least)
+                ),
+                (Some(most), None) => write!(f, "give stop_phase_ps of at most {}", floor(most)),
+                (None, Some(least)) => write!(f, "give stop_phase_ps of at least {}", ceil(least)),
+                (None, None) => write!(f, "give a lower clk_hz"),
+            },
+            Cure::LaserCycle => write!(
+                f,
+                "give another length of the laser cycle, or start values whose windows end elsewhere in it"
+            ),
+            Cure::Tap => write!(f, "give tap = \"borrow\""),
+        }
+    }
+}

@@ -1,0 +1,487 @@
+//! When the signals of one macropixel change, earliest and latest, by static timing of its netlist.
+//!
+//! ```text
+//!   CLK rises ──► SHIFT, SPAD_EVENT            STOP rises ──► COUNTER_RESET rises ──► stages, LOCAL_STOP, HIT fall
+//!   CLK falls ──► COUNTER_CLK ─► LOCAL_STOP ─► STROBE    └──► COUNTER_RESET falls ──► HIT's reset ends
+//!                                    └─► BLOCK           └──► RUN ──► ENABLE, COUNTER_CLK    (first and last cycle)
+//! ```
+//!
+//! The netlist is the one that the gate engine simulates. Static timing knows of no values: its bounds hold whatever the
+//! values are, so an order that they decide is the order of the simulated events. What a question is *not* about is cut
+//! from the graph, and each cut says why:
+//!
+//! * HIT: a bin that is full blocks its own clock, a loop within the histogram that leads nowhere else.
+//! * BLOCK: LOCAL_STOP blocks COUNTER_CLK, which is the next question, not this one.
+//! * RUN (the macropixels' ENABLE): it changes with STOP, but only before the first and after the last laser cycle.
+//! * Clocks of the P-counter's stages during a reset: the flip-flops behind them are held.
+
+use std::sync::OnceLock;
+
+use super::silicon::Silicon;
+use crate::chip::{Probe, Probes, SensorConfig, array};
+use crate::logic::Logic::{One, Zero};
+use crate::netlist::{Arrivals, CellKind, Edge, NetId, Netlist, StaticTiming, Timing};
+use crate::units::Time;
+
+/// Earliest and latest.
+pub type Span = (Time, Time);
+
+/// The width of a span.
+pub fn spread(span: Span) -> Time {
+    span.1 - span.0
+}
+
+/// The span from the earlier beginning to the later end.
+pub(crate) fn hull(a: Span, b: Span) -> Span {
+    (a.0.min(b.0), a.1.max(b.1))
+}
+
+/// A macropixel with its load path, as the gate engine has it, and its nets and cells, found once.
+pub struct MacropixelCircuit {
+    /// The netlist.
+    pub netlist: Netlist,
+    /// Handles of its nets.
+    pub probes: Probes,
+    toggles: Vec<usize>,
+    /// What CLK samples where SPADs share a wire.
+    joined: Option<NetId>,
+    /// Ends of the pulse shapers' delay chains.
+    late: Vec<NetId>,
+    hits: Vec<usize>,
+    /// The P-counter's flip-flops, memory excepted.
+    counting: Vec<usize>,
+    /// COUNTER_RESET's cause besides STOP.
+    clear: NetId,
+    /// The inverse of ENABLE.
+    disabled: NetId,
+    /// Path of each cell before and, where the macropixel is in it, after its name.
+    cell_paths: OnceLock<Vec<(String, Option<String>)>>,
+}
+
+impl MacropixelCircuit {
+    /// The macropixel at `position` (row, column) of a sensor: its cells' names, and so their mismatch, depend on that. Times are by
+    /// its own CLK and STOP, whenever they come to its column.
+    pub(crate) fn new(config: &SensorConfig, position: (usize, usize)) -> Self {
+        let unskewed = SensorConfig {
+            clk_skew_ps: 0.0,
+            ..config.clone()
+        };
+        let netlist = Netlist::elaborate(&array::subarray(&unskewed, position, (1, 1)));
+        let probes = Probes::of_macropixel(&netlist, position.0, position.1);
+        MacropixelCircuit {
+            toggles: probes.toggle_cells(&netlist),
+            joined: probes.joined_sample(&netlist),
+            late: probes.shaper_ends(&netlist),
+            hits: probes.hit_cells(&netlist),
+            counting: probes.counter_cells(&netlist),
+            clear: probes.counter_clear(&netlist),
+            disabled: probes.disabled(&netlist),
+            cell_paths: OnceLock::new(),
+            probes,
+            netlist,
+        }
+    }
+
+    /// Delays in this silicon of the macropixel at another `position` (row, column), which differs in the names of its cells only.
+    pub(crate) fn timing_at(&self, silicon: &Silicon, position: (usize, usize)) -> Timing {
+        let split = |cell| {
+            let path = self.netlist.cell_path(cell);
+            match path.split_once(self.probes.macropixel()) {
+                Some((before, after)) => (before.to_owned(), Some(after.to_owned())),
+                None => (path, None),
+            }
+        };
+        let paths = self.cell_paths.get_or_init(|| {
+            let cells = 0..self.netlist.cells().len();
+            cells.map(split).collect()
+        });
+        let name = array::pixel_name(position.0, position.1);
+        let path = |cell: usize| match &paths[cell] {
+            (path, None) => path.clone(),
+            (before, Some(after)) => [before, name.as_str(), after].concat(),
+        };
+        silicon.timing_as(&self.netlist, path)
+    }
+
+    /// Dotted path of the macropixel, the top's name first.
+    pub(crate) fn path(&self) -> String {
+        let scope = self.netlist.scope(self.probes.macropixel());
+        self.netlist.scope_path(scope.expect("it has been found"))
+    }
+
+    /// Its paths with these delays, which must be of its netlist.
+    pub(crate) fn paths<'c>(&'c self, timing: &'c Timing) -> MacropixelPaths<'c> {
+        MacropixelPaths {
+            circuit: self,
+            timing,
+            analysis: StaticTiming::new(&self.netlist, timing),
+        }
+    }
+
+    /// The P-counter's flip-flops whose clock is COUNTER_CLK itself, or what a divider leaves of it: of a ripple counter the
+    /// first one, and of the divider.
+    pub(crate) fn clocked_by_counter_clk(&self) -> impl Iterator<Item = usize> + '_ {
+        let counter_clk = self.probes.net(Probe::CounterClk);
+        let divided = self.probes.find(Probe::StepClk).map(|nets| nets[0]);
+        let all = self.counting.iter().copied();
+        all.filter(move |&cell| {
+            let clock = self.pin(cell, 1);
+            clock == counter_clk || Some(clock) == divided
+        })
+    }
+
+    /// The clock that freezes the window: of the delay lines' samples, or of the HIT flip-flops.
+    fn sampling(&self) -> NetId {
+        let sample_clk = self.probes.find(Probe::SampleClk);
+        sample_clk.map_or_else(|| self.probes.net(Probe::Strobe), |nets| nets[0])
+    }
+
+    fn pin(&self, cell: usize, pin: usize) -> NetId {
+        self.netlist.cells()[cell].inputs[pin]
+    }
+}
+
+/// One macropixel with its delays, to be asked what follows an edge.
+pub struct MacropixelPaths<'c> {
+    circuit: &'c MacropixelCircuit,
+    timing: &'c Timing,
+    analysis: StaticTiming<'c>,
+}
+
+impl<'c> MacropixelPaths<'c> {
+    /// The static timing of the whole netlist, for other questions.
+    pub(crate) fn analysis(&self) -> &StaticTiming<'c> {
+        &self.analysis
+    }
+
+    /// What an edge of CLK changes.
+    pub(crate) fn after_clk(&self, edge: Edge) -> Arrivals<'c> {
+        self.after(
+            Probe::Clk,
+            &[edge],
+            &[Probe::Hit, Probe::Block, Probe::Enable],
+        )
+    }
+
+    /// What STOP's rise changes, up to the resets that it makes and the strobe of the conventional mode.
+    pub(crate) fn after_stop(&self) -> Arrivals<'c> {
+        let cuts = [
+            Probe::Hit,
+            Probe::Enable,
+            Probe::CounterReset,
+            Probe::Strobe,
+            Probe::HitReset,
+        ];
+        self.after(Probe::Stop, &[Edge::Rise], &cuts)
+    }
+
+    /// What an edge of COUNTER_RESET changes. LOCAL_STOP, which falls, may let COUNTER_CLK rise.
+    pub(crate) fn after_counter_reset(&self, edge: Edge) -> Arrivals<'c> {
+        let reset = (self.circuit.probes.net(Probe::CounterReset), edge);
+        let cuts = [Probe::Hit, Probe::Strobe];
+        let cuts = cuts.iter().flat_map(|&cut| self.circuit.probes.bus(cut));
+        let cuts: Vec<NetId> = cuts.copied().chain(self.stage_clocks()).collect();
+        let arrivals = self.analysis.arrivals(&[reset], &cuts);
+        arrivals.expect("every loop is cut")
+    }
+
+    /// What a change of RUN, the macropixels' ENABLE, changes.
+    pub(crate) fn after_enable(&self) -> Arrivals<'c> {
+        let cuts = [Probe::CounterReset, Probe::CounterClk];
+        self.after(Probe::Enable, &Edge::BOTH, &cuts)
+    }
+
+    /// BLOCK rises → COUNTER_CLK falls, earliest.
+    fn block_to_counter_clk(&self) -> Option<Time> {
+        self.circuit.probes.find(Probe::Block)?;
+        let cuts = [Probe::CounterClk, Probe::Hit];
+        let blocked = self.after(Probe::Block, &[Edge::Rise], &cuts);
+        let counter_clk = self.circuit.probes.net(Probe::CounterClk);
+        Some(blocked.edge_window(counter_clk, Edge::Fall)?.0)
+    }
+
+    /// TOGGLE → PHOTONS, of all SPADs and either edge.
+    fn joining(&self) -> Option<Span> {
+        let probes = &self.circuit.probes;
+        let photons = probes.find(Probe::Photons)?[0];
+        let of = |&toggle: &NetId| {
+            let starts = Edge::BOTH.map(|edge| (toggle, edge));
+            let arrivals = self
+                .analysis
+                .arrivals(&starts, &[Probe::Hit].map(|p| probes.bus(p)).concat());
+            arrivals.expect("every loop is cut").window(photons)
+        };
+        probes.toggles().iter().filter_map(of).reduce(hull)
+    }
+
+    fn after(&self, from: Probe, edges: &[Edge], cuts: &[Probe]) -> Arrivals<'c> {
+        let probes = &self.circuit.probes;
+        let starts: Vec<(NetId, Edge)> =
+            edges.iter().map(|&edge| (probes.net(from), edge)).collect();
+        let cuts: Vec<NetId> = cuts
+            .iter()
+            .flat_map(|&cut| probes.bus(cut))
+            .copied()
+            .collect();
+        self.analysis
+            .arrivals(&starts, &cuts)
+            .expect("every loop is cut")
+    }
+
+    /// Clocks of the P-counter's flip-flops.
+    fn stage_clocks(&self) -> impl Iterator<Item = NetId> + '_ {
+        let counting = self.circuit.counting.iter();
+        counting.map(|&cell| self.circuit.pin(cell, 1))
+    }
+
+    /// Clock → Q rises, Q falls, of one flip-flop.
+    fn clock_to_q(&self, cell: usize) -> (Time, Time) {
+        let clock = self.timing.of(cell)[1][0];
+        let [rise, fall] = [One, Zero].map(|to| Time::from_fs(clock.to(to).into()));
+        (rise, fall)
+    }
+
+    /// SPAD_RAW rises → what CLK samples, of each SPAD.
+    fn front_end_latency(&self) -> Vec<Span> {
+        let Some(sampled) = self.circuit.joined else {
+            let toggles = self.circuit.toggles.iter();
+            return toggles.map(|&toggle| self.clock_to_q(toggle)).collect();
+        };
+        let raw = self.circuit.probes.bus(Probe::SpadRaw).iter();
+        raw.map(|&raw| changes(&self.after_spad(raw, Edge::Rise), sampled))
+            .collect()
+    }
+
+    /// Delays of the slowest pulse shaper.
+    fn shaper_delays(&self) -> Option<ShaperDelays> {
+        let probes = &self.circuit.probes;
+        let shaped = probes.find(Probe::Shaped)?.iter();
+        let raw = probes.bus(Probe::SpadRaw).iter();
+        let of_spad = |(&raw, (&shaped, &late)): (&NetId, (&NetId, &NetId))| {
+            let rise = self.after_spad(raw, Edge::Rise);
+            let fall = self.after_spad(raw, Edge::Fall);
+            ShaperDelays {
+                width: edge(&rise, shaped, Edge::Fall).1 - edge(&rise, shaped, Edge::Rise).0,
+                recovery: edge(&fall, late, Edge::Rise).1,
+            }
+        };
+        let all = raw.zip(shaped.zip(&self.circuit.late)).map(of_spad);
+        all.reduce(|a, b| ShaperDelays {
+            width: a.width.max(b.width),
+            recovery: a.recovery.max(b.recovery),
+        })
+    }
+
+    /// What an edge of one SPAD changes.
+    fn after_spad(&self, raw: NetId, edge: Edge) -> Arrivals<'c> {
+        let arrivals = self.analysis.arrivals(&[(raw, edge)], &[]);
+        arrivals.expect("a front end has no loops")
+    }
+
+    /// Fastest and slowest arc of every cell of some kinds.
+    fn arcs(&self, is: impl Fn(CellKind) -> bool) -> impl Iterator<Item = Option<Span>> {
+        let cells = self.circuit.netlist.cells().iter().enumerate();
+        cells
+            .filter(move |(_, leaf)| is(leaf.kind))
+            .map(|(cell, leaf)| {
+                let pins = 0..leaf.kind.inputs().len();
+                let arcs = pins.filter(|&pin| leaf.kind.triggers(pin)).flat_map(|pin| {
+                    let arcs = &self.timing.of(cell)[pin][..leaf.kind.outputs().len()];
+                    arcs.iter().flat_map(|arc| [arc.rise_fs, arc.fall_fs])
+                });
+                let arcs = arcs.map(|fs| Time::from_fs(fs.into()));
+                arcs.map(|delay| (delay, delay)).reduce(hull)
+            })
+    }
+}
+
+/// Delays of pulse shapers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ShaperDelays {
+    /// How long a shaped pulse is, longest.
+    pub width: Time,
+    /// SPAD_RAW falls → the delay chain is ready for the next pulse, latest.
+    pub recovery: Time,
+}
+
+/// Delays of one macropixel, its P-counter left out.
+#[derive(Debug, Clone)]
+pub struct MacropixelDelays {
+    /// SPAD_RAW rises → TOGGLE rises, falls; of each SPAD. Where SPADs share a wire: → what CLK samples, earliest and latest.
+    pub latency: Vec<(Time, Time)>,
+    /// The slowest pulse shaper, where there are any.
+    pub shaper: Option<ShaperDelays>,
+    /// TOGGLE → PHOTONS, where delay lines time what SPADs have in common.
+    pub joining: Option<Span>,
+    /// CLK rises → SPAD_EVENT settled, latest; nothing where delay lines time photons. A path that no values excite may be longer than any that they do: see
+    /// the timing analysis of the correlation block.
+    pub event: Time,
+    /// CLK rises → the stage of SHIFT changes that each bin's HIT takes, bin 0 first; none where delay lines time photons.
+    pub shift: Vec<Span>,
+    /// STOP rises → COUNTER_RESET rises.
+    pub reset: Span,
+    /// STOP rises → COUNTER_RESET falls.
+    pub release: Span,
+    /// STOP rises → RUN changes.
+    pub run: Span,
+    /// STOP rises → STROBE rises, where STOP makes the strobe: in the conventional mode.
+    pub stop_strobe: Span,
+    /// STOP rises → what freezes the window rises, conventional mode: STROBE, or SAMPLE_CLK before it.
+    pub stop_sample: Span,
+    /// STOP rises → HIT's reset ends, conventional mode.
+    pub stop_hit_release: Span,
+    /// STROBE rises → HIT rises, latest.
+    pub strobe_to_hit: Time,
+    /// The slowest arc of any cell.
+    pub slowest: Time,
+    /// The slowest arc of an AND.
+    pub slowest_and: Time,
+    /// The fastest arc of a flip-flop.
+    pub fastest_flip_flop: Time,
+}
+
+impl MacropixelDelays {
+    /// Measures them.
+    pub(crate) fn of(paths: &MacropixelPaths<'_>) -> Self {
+        let circuit = paths.circuit;
+        let net = |probe| circuit.probes.net(probe);
+        let rise = paths.after_clk(Edge::Rise);
+        let stop = paths.after_stop();
+        // The newest event is in the first stage and goes into the last bin.
+        let shift = circuit.probes.find(Probe::Shift).unwrap_or_default();
+        let shift = shift.iter().rev();
+        let event = circuit.probes.find(Probe::SpadEvent);
+        let hits = circuit.hits.iter().map(|&cell| paths.clock_to_q(cell).0);
+        MacropixelDelays {
+            latency: paths.front_end_latency(),
+            shaper: paths.shaper_delays(),
+            joining: paths.joining(),
+            event: event.map_or(Time::ZERO, |nets| changes(&rise, nets[0]).1),
+            shift: shift.map(|&bit| changes(&rise, bit)).collect(),
+            reset: edge(&stop, net(Probe::CounterReset), Edge::Rise),
+            release: edge(&stop, net(Probe::CounterReset), Edge::Fall),
+            run: changes(&stop, net(Probe::Enable)),
+            stop_strobe: edge(&stop, net(Probe::Strobe), Edge::Rise),
+            stop_sample: edge(&stop, circuit.sampling(), Edge::Rise),
+            stop_hit_release: edge(&stop, net(Probe::HitReset), Edge::Fall),
+            strobe_to_hit: hits.max().expect("a METDC has bins"),
+            slowest: latest(paths.arcs(|_| true)).unwrap_or(Time::ZERO),
+            slowest_and: latest(paths.arcs(|kind| kind == CellKind::And2)).unwrap_or(Time::ZERO),
+            fastest_flip_flop: earliest(paths.arcs(CellKind::is_flip_flop)).unwrap_or(Time::ZERO),
+        }
+    }
+}
+
+/// Delays of a P-counter with its timing block, and of the strobe that it makes.
+#[derive(Debug, Clone)]
+pub struct CounterDelays {
+    /// CLK falls → COUNTER_CLK rises.
+    pub counter_clk: Span,
+    /// CLK falls → LOCAL_STOP rises. Every stage is taken to toggle, as it does when the counter rolls over.
+    pub local_stop: Span,
+    /// CLK falls → STROBE rises.
+    pub strobe: Span,
+    /// CLK falls → what freezes the window rises: STROBE, or SAMPLE_CLK before it.
+    pub sample: Span,
+    /// CLK falls → LOCAL_STOP → BLOCK rises; none where LOCAL_STOP does not block.
+    pub block: Option<Span>,
+    /// BLOCK rises → COUNTER_CLK falls, earliest.
+    pub block_to_counter_clk: Option<Time>,
+    /// CLK falls → data of the flip-flops that COUNTER_CLK clocks settled, latest.
+    pub settled: Time,
+    /// COUNTER_RESET falls → the last flip-flop is released, latest.
+    pub released: Time,
+    /// COUNTER_RESET rises → the last edge at the clock of a stage behind another, latest.
+    pub reset_to_stage_clock: Option<Time>,
+    /// COUNTER_RESET rises → LOCAL_STOP falls → COUNTER_CLK rises, latest; none where LOCAL_STOP does not block.
+    pub reset_to_counter_clk: Option<Time>,
+    /// COUNTER_RESET rises → data of the flip-flops that COUNTER_CLK clocks settled, latest; none where nothing resets
+    /// them.
+    pub reset_settled: Option<Time>,
+    /// COUNTER_RESET rises → LOCAL_STOP rises, latest, where a start value can make it.
+    pub reset_to_local_stop: Option<Time>,
+    /// COUNTER_RESET rises → HIT's reset begins.
+    pub hit_reset: Span,
+    /// COUNTER_RESET falls → HIT's reset ends.
+    pub hit_release: Span,
+    /// COUNTER_RESET rises → HIT has fallen, latest.
+    pub hit_falls: Time,
+    /// STOP rises → RUN changes → COUNTER_RESET's other cause changes.
+    pub clear: Span,
+    /// STOP rises → RUN changes → COUNTER_CLK changes, latest.
+    pub enabled: Time,
+    /// STOP rises → RUN rises → the inverse of ENABLE falls, latest.
+    pub enable: Time,
+}
+
+impl CounterDelays {
+    /// Measures them; `delays` are those of the same paths.
+    pub(crate) fn of(paths: &MacropixelPaths<'_>, delays: &MacropixelDelays) -> Self {
+        let (circuit, run) = (paths.circuit, delays.run);
+        let net = |probe| circuit.probes.net(probe);
+        let fall = paths.after_clk(Edge::Fall);
+        let reset = paths.after_counter_reset(Edge::Rise);
+        let release = paths.after_counter_reset(Edge::Fall);
+        let enable = paths.after_enable();
+        let after_run = |net| {
+            let (first, last) = changes(&enable, net);
+            (run.0 + first, run.1 + last)
+        };
+        let counter_clk = net(Probe::CounterClk);
+        let data = circuit.clocked_by_counter_clk();
+        let data: Vec<NetId> = data.map(|cell| circuit.pin(cell, 0)).collect();
+        let settled = |arrivals: &Arrivals<'_>| latest(data.iter().map(|&d| arrivals.window(d)));
+        let later_stages = paths.stage_clocks().filter(|&clock| clock != counter_clk);
+        let controls = circuit.counting.iter().flat_map(|&cell| {
+            let leaf = &circuit.netlist.cells()[cell];
+            leaf.inputs[2..leaf.kind.inputs().len()].iter()
+        });
+        let hits = circuit.probes.bus(Probe::Hit).iter();
+        let rises_after_reset = |net| reset.edge_window(net, Edge::Rise);
+        CounterDelays {
+            counter_clk: edge(&fall, counter_clk, Edge::Rise),
+            local_stop: edge(&fall, net(Probe::LocalStop), Edge::Rise),
+            strobe: edge(&fall, net(Probe::Strobe), Edge::Rise),
+            sample: edge(&fall, circuit.sampling(), Edge::Rise),
+            block: fall.edge_window(net(Probe::Block), Edge::Rise),
+            block_to_counter_clk: paths.block_to_counter_clk(),
+            settled: settled(&fall).expect("a P-counter counts"),
+            released: latest(controls.map(|&net| release.edge_window(net, Edge::Fall)))
+                .unwrap_or(Time::ZERO),
+            reset_to_stage_clock: latest(later_stages.map(rises_after_reset)),
+            reset_to_counter_clk: latest([rises_after_reset(counter_clk)].into_iter()),
+            reset_settled: settled(&reset),
+            reset_to_local_stop: latest([rises_after_reset(net(Probe::LocalStop))].into_iter()),
+            hit_reset: edge(&reset, net(Probe::HitReset), Edge::Rise),
+            hit_release: edge(&release, net(Probe::HitReset), Edge::Fall),
+            hit_falls: latest(hits.map(|&hit| reset.edge_window(hit, Edge::Fall)))
+                .expect("COUNTER_RESET resets HIT"),
+            clear: after_run(circuit.clear),
+            enabled: after_run(counter_clk).1,
+            enable: run.1 + edge(&enable, circuit.disabled, Edge::Fall).1,
+        }
+    }
+
+    /// COUNTER_RESET rises → the last edge at the clock of any stage, latest.
+    pub(crate) fn reset_edges(&self) -> Time {
+        let edges = self.reset_to_stage_clock.max(self.reset_to_counter_clk);
+        edges.unwrap_or(Time::ZERO)
+    }
+}
+
+fn edge(arrivals: &Arrivals<'_>, net: NetId, edge: Edge) -> Span {
+    let window = arrivals.edge_window(net, edge);
+    window.expect("the macropixel connects these")
+}
+
+fn changes(arrivals: &Arrivals<'_>, net: NetId) -> Span {
+    arrivals.window(net).expect("the macropixel connects these")
+}
+
+fn latest(windows: impl Iterator<Item = Option<Span>>) -> Option<Time> {
+    windows.flatten().map(|window| window.1).max()
+}
+
+fn earliest(windows: impl Iterator<Item = Option<Span>>) -> Option<Time> {
+    windows.flatten().map(|window| window.0).min()
+}

@@ -1,0 +1,113 @@
+//! What a chip is made of: a cell library in one corner, its conditions, and the mismatch of its cells.
+
+use std::sync::LazyLock;
+
+use crate::chip::SensorConfig;
+use crate::netlist::{Corner, Library, Mismatch, Netlist, Timing, derated_limits, varied_as};
+
+/// What the chip is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Silicon {
+    /// Corner of the library.
+    pub corner: Corner,
+    /// Factor on every delay and limit: process, voltage, temperature.
+    pub factor: f64,
+    /// Random differences between cells, on delays only.
+    pub mismatch: Option<Mismatch>,
+}
+
+/// Whether flip-flops' limits count, or only what they capture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Limits {
+    /// Setup, hold, recovery, removal and pulse widths must be kept.
+    Kept,
+    /// A flip-flop captures what is at D in the instant of its clock edge.
+    Ignored,
+}
+
+impl Silicon {
+    /// The cell library that every chip is made of.
+    pub fn library() -> &'static Library {
+        static LIBRARY: LazyLock<Library> = LazyLock::new(Library::default);
+        &LIBRARY
+    }
+
+    /// The library as it stands, without mismatch.
+    pub const fn nominal(corner: Corner) -> Self {
+        Silicon {
+            corner,
+            factor: 1.0,
+            mismatch: None,
+        }
+    }
+
+    /// That of a sensor without mismatch: the library in the sensor's corner.
+    pub const fn of(config: &SensorConfig) -> Self {
+        Silicon::nominal(config.corner)
+    }
+
+    /// The same chip with every delay and limit times `factor`, instead of its own.
+    #[must_use]
+    pub const fn at(mut self, factor: f64) -> Self {
+        self.factor = factor;
+        self
+    }
+
+    /// Delays of a netlist.
+    pub fn timing(&self, netlist: &Netlist) -> Timing {
+        self.timing_as(netlist, |cell| netlist.cell_path(cell))
+    }
+
+    /// Delays of another netlist that differs from this one in names only: there each cell is at `path` of its index.
+    pub(crate) fn timing_as(&self, netlist: &Netlist, path: impl Fn(usize) -> String) -> Timing {
+        let nominal = Timing::nominal_as(netlist, Self::library(), self.corner, &path);
+        varied_as(netlist, &nominal, self.factor, self.mismatch, path)
+    }
+
+    /// The library with this silicon's limits (and nominal delays).
+    pub(crate) fn limits(&self, limits: Limits) -> Library {
+        let factor = match limits {
+            Limits::Kept => self.factor,
+            Limits::Ignored => 0.0,
+        };
+        derated_limits(Self::library(), factor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    /// Lines of code that ask for the default library, in all files below a folder: tests and comments left out.
+    fn users(folder: &Path, found: &mut Vec<String>) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                // A testbench of one block makes that of the library itself.
+                if !path.ends_with("testbenches") {
+                    users(&path, found);
+                }
+                continue;
+            }
+            let text = std::fs::read_to_string(&path).unwrap();
+            let code = text.split("#[cfg(test)]").next().unwrap();
+            let mut lines = code
+                .lines()
+                .filter(|line| !line.trim_start().starts_with("//"));
+            if !path.ends_with("tests.rs") && lines.any(|line| line.contains("Library::default")) {
+                found.push(path.display().to_string());
+            }
+        }
+    }
+
+    #[test]
+    fn one_place_says_which_library_chips_are_made_of() {
+        let mut found = Vec::new();
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        for folder in ["src", "crates/light/src", "crates/sensor/src"] {
+            users(&root.join(folder), &mut found);
+        }
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].ends_with("silicon.rs"), "{found:?}");
+    }
+}

@@ -1,0 +1,422 @@
+//! The window law: which photons a start value selects.
+//!
+//! ```text
+//!   STOP  ─┐0                                                      time →
+//!   CLK    └──┐  ┌──┐  ┌──┐  ┌──      falling edge k at k·T − phase, rising edge half a period on
+//!   COUNTER_CLK  counts falling edges from the first one after the reset pulse, f₀
+//!   LOCAL_STOP   rises a ripple after falling edge f₀ + start
+//!   STROBE       sees the shift register as rising edge m left it: the last with e_m + clk-to-Q ≤ strobe
+//!   bin b        holds the photons that rising edge m − M + b took: (e − T − d, e − d], d = pulse → toggle
+//! ```
+//!
+//! So bin b covers `[first_edge + b − 1, first_edge + b)` in rising edges, shifted by the front-end latency
+//! d, with `first_edge = m − M`. At 384 MHz and phase 0, m = start: the start value counts CLK periods from
+//! STOP to the end of the window, less one and a half. Windows of small start values begin before the STOP
+//! edge, in the tail of the previous laser cycle.
+//!
+//! So it is with the sensor's own P-counter and the variants that are reset as it is. One without memory counts from
+//! the first falling edge that ENABLE lets through. One that wraps may raise LOCAL_STOP again in the same laser
+//! cycle, where HIT still holds what it latched before: no single window describes that, and the law says so.
+//!
+//! Which photon times the bins of a window collect stands in [`bin_edges`](super::bin_edges), and what they count without photons in
+//! [`empty_pixel`](super::empty_pixel).
+//!
+//! Where delay lines time photons, LOCAL_STOP freezes the lines as soon as it comes: CLK has no part in the bins, only in where
+//! windows end.
+//!
+//! [`ChipTiming`] has the delays of the paths concerned, measured on the netlist; tests hold the law against it.
+
+use super::bins::Bins;
+use super::config::{Mode, Tdc};
+use super::exposure::Exposure;
+use super::p_counter::{Rises, starts_high};
+use super::race::{Conflict, Cure, Irregular, NoAim, Origin, Race};
+use super::sensors::Sensor;
+use super::timing::ChipTiming;
+use crate::units::Time;
+
+/// What the law adds to the flip-flops' limits: one femtosecond of rounding on either edge.
+const ROUNDING: Time = Time::from_fs(2);
+
+/// What becomes of a start value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Window {
+    /// The histogram is latched once in every laser cycle.
+    Open(OpenWindow),
+    /// LOCAL_STOP does not come within the laser cycle: nothing is ever counted.
+    Never,
+    /// The histogram is latched several times in a laser cycle, or not in the same CLK period of every one. What is
+    /// counted then depends on what HIT still holds, and only an engine that goes through every CLK period can tell.
+    Irregular(Irregular),
+    /// Two signals come closer than a flip-flop's setup, hold, recovery or removal time allows: the circuit
+    /// promises nothing, and only the gate-level engine shows what its model makes of it.
+    Race(Race),
+}
+
+impl Window {
+    /// The open window, or `None` where it never opens.
+    ///
+    /// # Errors
+    /// What keeps the law from telling.
+    pub fn settled(self) -> Result<Option<OpenWindow>, NoAim> {
+        match self {
+            Window::Open(window) => Ok(Some(window)),
+            Window::Never => Ok(None),
+            Window::Irregular(why) => Err(NoAim::Irregular(why)),
+            Window::Race(race) => Err(NoAim::Race(race)),
+        }
+    }
+
+    /// The open window, if it is one.
+    pub fn open(self) -> Option<OpenWindow> {
+        match self {
+            Window::Open(window) => Some(window),
+            Window::Never | Window::Irregular(_) | Window::Race(_) => None,
+        }
+    }
+}
+
+/// A window relative to the STOP edge of its laser cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OpenWindow {
+    /// The start value that opens it.
+    pub start: u16,
+    /// The rising CLK edge that takes the photons of bin 0 (edge 0 is the first after STOP at phase 0), where CLK does.
+    pub first_edge: i64,
+    /// Rise of LOCAL_STOP (guided) or STOP (conventional) after the laser cycle's STOP edge.
+    pub strobe_cause: Time,
+    /// The falling CLK edge whose count raises LOCAL_STOP, guided mode.
+    pub(super) count_edge: i64,
+    /// What the strobe has left of setup after one change of the shift register, and of hold before the next,
+    /// whichever is smaller: the margin that a shorter CLK period or a slower ripple eats up. Means nothing where delay lines
+    /// time photons.
+    pub slack: Time,
+}
+
+/// Where LOCAL_STOP rises first.
+struct LocalStop {
+    /// After its laser cycle's STOP edge.
+    time: Time,
+    /// The falling CLK edge that makes it.
+    edge: i64,
+    /// What keeps it from rising once in every laser cycle at this place, if anything.
+    irregular: Option<Irregular>,
+}
+
+/// The law for one sensor and exposure.
+#[derive(Debug, Clone)]
+pub struct WindowLaw {
+    pub(super) sensor: Sensor,
+    pub(super) exposure: Exposure,
+    pub(super) timing: ChipTiming,
+    pub(super) bins: i64,
+    pub(super) edges: Bins,
+    pub(super) period_fs: f64,
+    /// From a SPAD's pulse to what is sampled, less what CLK and STOP come later to the macropixel than to column 0.
+    pub(super) latency: Time,
+}
+
+impl WindowLaw {
+    /// The law for this sensor in this exposure.
+    pub fn new(sensor: impl Into<Sensor>, exposure: &Exposure) -> Self {
+        let sensor = sensor.into();
+        let timing = *sensor.timing();
+        Self::with_timing(sensor, exposure, timing)
+    }
+
+    /// The law for a macropixel with delays of its own. Where they are known between bounds only, `timing` has the
+    /// latest, and limits that are wider by the distance of the bounds.
+    pub(crate) fn with_timing(
+        sensor: impl Into<Sensor>,
+        exposure: &Exposure,
+        timing: ChipTiming,
+    ) -> Self {
+        let sensor = sensor.into();
+        let edges = match sensor.tdc {
+            Tdc::Clocked => Bins::Clk,
+            Tdc::DelayLine => Bins::of_delay_lines(&sensor, 0),
+        };
+        WindowLaw {
+            bins: sensor.bins as i64,
+            sensor,
+            exposure: *exposure,
+            timing,
+            edges,
+            period_fs: 1e15 / exposure.clock.as_hz(),
+            latency: timing.spad_to_sampled,
+        }
+    }
+
+    /// The law of a macropixel, by its number in the array, row-major, where that has delay lines of its own, or CLK comes later to it
+    /// than to column 0. Otherwise this one.
+    #[must_use]
+    pub fn of_macropixel(&self, number: u32) -> Self {
+        let mut law = self.clone();
+        let number = number as usize;
+        if self.sensor.tdc == Tdc::DelayLine {
+            law.edges = Bins::of_delay_lines(&self.sensor, number);
+        }
+        law.latency = self.timing.spad_to_sampled - self.sensor.clk_skew(number % self.sensor.cols);
+        law
+    }
+
+    /// The sensor.
+    pub fn sensor(&self) -> &Sensor {
+        &self.sensor
+    }
+
+    /// Its clocks.
+    pub fn exposure(&self) -> &Exposure {
+        &self.exposure
+    }
+
+    /// The delays the law is computed from.
+    pub fn timing(&self) -> &ChipTiming {
+        &self.timing
+    }
+
+    /// Where the window of a start value lies.
+    pub fn window(&self, start: u16) -> Window {
+        let (exposure, timing) = (&self.exposure, &self.timing);
+        let end = exposure.clock.periods(exposure.stop_periods as i64);
+        let period = exposure.clock.period();
+        let is_clocked = self.sensor.tdc == Tdc::Clocked;
+        let to_shift = timing.clk_to_event + timing.setup + ROUNDING;
+        if is_clocked && period <= to_shift {
+            let what = Conflict::SlowCorrelation;
+            return Window::Race(Race::too_slow(what, to_shift, period));
+        }
+        let (cause, arrival, count_edge, irregular) = match self.sensor.mode {
+            // A laser cycle is counted by the STOP edge that ends it.
+            Mode::Conventional => (end, end + timing.stop_to_strobe, 0, None),
+            Mode::Guided => {
+                let is_reset = self.sensor.p_counter.row().has_memory;
+                let found = if is_reset {
+                    self.with_reset(start)
+                } else {
+                    self.coming_round(start)
+                };
+                match found {
+                    Ok(LocalStop {
+                        time,
+                        edge,
+                        irregular,
+                    }) => (time, time + timing.local_stop_to_strobe, edge, irregular),
+                    Err(window) => return window,
+                }
+            }
+        };
+        let last = exposure.rising_until(arrival - timing.clk_to_shift);
+        let after = arrival - (exposure.rising(last) + timing.clk_to_shift);
+        let before = exposure.rising(last + 1) + timing.clk_to_shift - arrival;
+        let slack = (after - timing.setup).min(before - timing.hold);
+        if is_clocked && slack <= ROUNDING {
+            let change = if after < before {
+                arrival - after
+            } else {
+                arrival + before
+            };
+            return Window::Race(self.strobe_race(cause, arrival, change));
+        }
+        if let Some(why) = irregular {
+            return Window::Irregular(why);
+        }
+        Window::Open(OpenWindow {
+            start,
+            first_edge: last - self.bins,
+            strobe_cause: cause,
+            count_edge,
+            slack,
+        })
+    }
+
+    /// A strobe at `arrival`, for this `cause`, too near a `change` of the shift register.
+    fn strobe_race(&self, cause: Time, arrival: Time, change: Time) -> Race {
+        let (exposure, timing) = (&self.exposure, &self.timing);
+        let period = exposure.clock.period();
+        let (setup, hold) = (timing.setup + ROUNDING, timing.hold + ROUNDING);
+        match self.sensor.mode {
+            Mode::Guided => {
+                let strobe = timing.ripple() + timing.local_stop_to_strobe;
+                let edge = exposure.rising_until(change - timing.clk_to_shift);
+                let fall = exposure.rising_until(arrival - strobe) + 1;
+                let shortest = timing.clk_to_event.max(timing.counter.period) + setup;
+                let signals = (strobe, timing.clk_to_shift);
+                Race::strobe_at_shift(period, edge - fall, signals, (setup, hold), shortest)
+            }
+            // The shift register comes earlier after STOP where STOP comes later.
+            Mode::Conventional => {
+                let what = Conflict::ShiftAtStrobe;
+                let strobe = arrival - cause;
+                let forbidden = (strobe - setup, strobe + hold);
+                Race::with_stop(what, change - cause, forbidden, exposure.stop_phase, period)
+            }
+        }
+    }
+
+    /// LOCAL_STOP of a counter that each STOP resets.
+    fn with_reset(&self, start: u16) -> Result<LocalStop, Window> {
+        let (exposure, timing) = (&self.exposure, &self.timing);
+        let counter = &timing.counter;
+        let (period, phase) = (exposure.clock.period(), exposure.stop_phase);
+        let count = counter.period + ROUNDING;
+        if period <= count {
+            let what = Conflict::SlowCounter;
+            return Err(Window::Race(Race::too_slow(what, count, period)));
+        }
+        let Some(rises) = Rises::of(&self.sensor, start) else {
+            return Err(Window::Never);
+        };
+        let released = timing.stop_to_reset_release + counter.release + counter.recovery;
+        let in_doubt = timing.stop_to_reset_release - counter.removal - ROUNDING
+            ..=released.max(timing.stop_to_reset + counter.settle) + ROUNDING;
+        let counter_clk = |edge| exposure.falling(edge) + timing.clk_to_counter_clk;
+        let mut first = 0;
+        while counter_clk(first) <= *in_doubt.end() {
+            first += 1;
+        }
+        let edge = counter_clk(first - 1);
+        if in_doubt.contains(&edge) {
+            let what = Conflict::ClkAtResetEnd;
+            let race = Race::with_stop(what, edge, in_doubt.into_inner(), phase, period);
+            return Err(Window::Race(race));
+        }
+
+        // Later than the counts that the next reset forestalls.
+        let end = exposure.clock.periods(exposure.stop_periods as i64);
+        let edges = (0..).map(|n| first + rises.first + n * rises.every.unwrap_or(i64::MAX / 2));
+        let edges = edges.take_while(|&edge| counter_clk(edge) < end + timing.stop_to_reset);
+        let edges: Vec<i64> = edges
+            .take(if rises.every.is_some() { usize::MAX } else { 1 })
+            .collect();
+        let (Some(&edge), Some(&last)) = (edges.first(), edges.last()) else {
+            return Err(Window::Never);
+        };
+        let deadline = end + timing.stop_to_hit_reset - timing.strobe_to_hit;
+        let strobe = exposure.falling(last) + timing.ripple() + timing.local_stop_to_strobe;
+        let margin = deadline - strobe;
+        if margin < -ROUNDING && rises.every.is_none() {
+            return Err(Window::Never);
+        }
+        if margin <= ROUNDING {
+            return Err(Window::Race(Race {
+                what: Conflict::StrobeAtNextReset,
+                after: Origin::StopRises,
+                comes: strobe,
+                from: deadline - ROUNDING,
+                to: rises.every.is_none().then_some(deadline + ROUNDING),
+                cure: Cure::LaserCycle,
+            }));
+        }
+        if rises.every.is_some() && starts_high(&self.sensor, start) {
+            let delay = counter
+                .reset_to_local_stop
+                .expect("the tap msb rises at a reset");
+            let arrival = timing.stop_to_reset + delay + timing.local_stop_to_strobe;
+            let until = timing.stop_to_hit_release - timing.removal - ROUNDING;
+            if arrival >= until {
+                return Err(Window::Race(Race {
+                    what: Conflict::ResetStrobeAtHitReset,
+                    after: Origin::StopRises,
+                    comes: arrival,
+                    from: until,
+                    to: None,
+                    cure: Cure::Tap,
+                }));
+            }
+        }
+        Ok(LocalStop {
+            time: exposure.falling(edge) + timing.ripple(),
+            edge,
+            irregular: (edges.len() > 1)
+                .then_some(Irregular::LocalStopRepeats { rises: edges.len() }),
+        })
+    }
+
+    /// LOCAL_STOP of a counter that nothing resets.
+    fn coming_round(&self, start: u16) -> Result<LocalStop, Window> {
+        let (exposure, timing) = (&self.exposure, &self.timing);
+        let counter = &timing.counter;
+        let enabled = timing.stop_to_enabled;
+        let first = exposure.rising_until(enabled) + 1;
+        let shortest = counter.clock_high + timing.clk_to_counter_clk + ROUNDING;
+        let in_doubt = (enabled - ROUNDING, enabled + shortest);
+        let meets = [first, first - 1].map(|edge| exposure.rising(edge));
+        let meets = meets
+            .into_iter()
+            .find(|t| (in_doubt.0..=in_doubt.1).contains(t));
+        if let Some(edge) = meets {
+            let what = Conflict::ClkAtEnable;
+            let (phase, period) = (exposure.stop_phase, exposure.clock.period());
+            let race = Race::with_stop(what, edge, in_doubt, phase, period);
+            return Err(Window::Race(race));
+        }
+        let rises = Rises::of(&self.sensor, start).expect("a counter without memory wraps");
+        let every = rises.every.expect("a counter without memory wraps");
+        let periods = exposure.stop_periods as i64;
+        let last = periods * exposure.laser_cycles as i64;
+        let edge = first + rises.first;
+        let is_first_count = rises.first == 0 && exposure.falling(first) <= enabled + ROUNDING;
+        if is_first_count || (last >= edge && (last - edge) % every == 0) {
+            let comes = exposure.falling(if is_first_count { first } else { last });
+            return Err(Window::Race(Race {
+                what: Conflict::LocalStopAtEnable,
+                after: Origin::FirstStop,
+                comes,
+                from: comes.min(enabled),
+                to: Some(comes.max(if is_first_count {
+                    enabled
+                } else {
+                    exposure.end() + enabled
+                })),
+                cure: Cure::LaserCycle,
+            }));
+        }
+        // STOP also resets HIT.
+        let end = exposure.clock.periods(periods);
+        let in_doubt = timing.stop_to_hit_reset - timing.strobe_to_hit - ROUNDING
+            ..=timing.stop_to_hit_release + timing.recovery + ROUNDING;
+        let meets_reset = |edge: i64| {
+            let place = exposure.falling(edge.rem_euclid(periods));
+            let arrival = place + timing.ripple() + timing.local_stop_to_strobe;
+            [arrival, arrival - end]
+                .into_iter()
+                .find(|t| in_doubt.contains(t))
+        };
+        let mut edges = (edge..last).step_by(every as usize).take(periods as usize);
+        if let Some(strobe) = edges.find_map(meets_reset) {
+            return Err(Window::Race(Race {
+                what: Conflict::StrobeAtReset,
+                after: Origin::StopRises,
+                comes: strobe,
+                from: *in_doubt.start(),
+                to: Some(*in_doubt.end()),
+                cure: Cure::LaserCycle,
+            }));
+        }
+        Ok(LocalStop {
+            time: exposure.falling(edge) + timing.ripple(),
+            edge,
+            irregular: (periods != every).then_some(Irregular::OutOfStep {
+                stop_periods: periods,
+                round: every,
+            }),
+        })
+    }
+
+    /// Why no window can be aimed, if so: the reason for which start values do not open one.
+    pub fn refusal(&self) -> Option<NoAim> {
+        let reason = |start| self.window(start).settled().err();
+        let mut reasons = self.samples().into_iter().map(reason);
+        reasons.try_fold(None, |_, why| why.map(Some))?
+    }
+
+    /// A few start values, one of which opens a window if most do.
+    pub(super) fn samples(&self) -> [u16; 4] {
+        let largest = self.sensor.largest_start();
+        [0, 1, 16.min(largest), largest / 2]
+    }
+}
+
+#[cfg(test)]
+mod tests;

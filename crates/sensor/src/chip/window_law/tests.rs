@@ -1,0 +1,133 @@
+//! The window law, against the ripple and against every start value.
+
+use super::*;
+use crate::chip::PCounter;
+use crate::chip::SensorConfig;
+use crate::netlist::Corner;
+use proptest::prelude::*;
+
+fn law(config: &SensorConfig) -> WindowLaw {
+    WindowLaw::new(config, &Exposure::new(config, 520, 1))
+}
+
+#[test]
+fn the_typical_ripple_is_the_published_one() {
+    let ripple = ChipTiming::of(&SensorConfig::default()).ripple();
+    assert!((ripple.as_ns() - 1.2).abs() < 0.01, "{ripple}");
+}
+
+#[test]
+fn at_384_mhz_the_window_ends_one_and_a_half_periods_before_the_start_value() {
+    let config = SensorConfig::default();
+    let law = law(&config);
+    let window = law.window(100).open().unwrap();
+    assert_eq!(window.first_edge, 100 - 16);
+    let end = law.interval(&window).end;
+    let expected = config.clock().half_periods(2 * 99 + 1) - law.timing().spad_to_sampled;
+    assert!((end - expected).as_fs().abs() <= 2);
+}
+
+#[test]
+fn a_start_value_beyond_the_laser_cycle_never_opens() {
+    let config = SensorConfig::default();
+    let short = WindowLaw::new(&config, &Exposure::new(&config, 100, 1));
+    assert!(short.window(98).open().is_some());
+    assert_eq!(short.window(99), Window::Never);
+    assert_eq!(short.window(511), Window::Never);
+}
+
+proptest! {
+    #[test]
+    fn a_cure_keeps_the_two_signals_apart(
+        clk_mhz in 150f64..900.0,
+        phase in -1f64..1.0,
+        corner in prop::sample::select(Corner::ALL.to_vec()),
+        mode in prop::sample::select(vec![Mode::Guided, Mode::Conventional]),
+        p_counter in prop::sample::select(PCounter::ALL.to_vec()),
+    ) {
+        let after_borrow = p_counter.sensor().after_borrow;
+        let config = SensorConfig {
+            clk_hz: clk_mhz * 1e6,
+            stop_phase_ps: phase * 0.5e6 / clk_mhz,
+            corner,
+            mode,
+            p_counter,
+            after_borrow,
+            ..SensorConfig::default()
+        };
+        let window = |config: &SensorConfig| {
+            WindowLaw::new(config, &Exposure::new(config, 1024, 1)).window(100)
+        };
+        if let Window::Race(race) = window(&config) {
+            prop_assert!(race.slack() <= ROUNDING, "{race}");
+            let mut cured = Vec::new();
+            let mut push = |change: &dyn Fn(&mut SensorConfig)| {
+                let mut config = config.clone();
+                change(&mut config);
+                cured.push(config);
+            };
+            match race.cure {
+                Cure::Period { at_least, at_most } => {
+                    for period in [Some(at_least), at_most].into_iter().flatten() {
+                        push(&|config| config.clk_hz = 1.0 / period.as_s());
+                    }
+                }
+                Cure::Phase { at_most, at_least } => {
+                    for phase in [at_most, at_least].into_iter().flatten() {
+                        push(&|config| config.stop_phase_ps = phase.as_ns() * 1e3);
+                    }
+                }
+                Cure::LaserCycle | Cure::Tap => {}
+            }
+            for config in cured {
+                let again = window(&config);
+                let is_same = matches!(again, Window::Race(r) if r.what == race.what);
+                prop_assert!(!is_same, "{race}; {}: {again:?}", race.cure);
+            }
+        }
+    }
+
+    #[test]
+    fn bins_tile_time(start in 0u16..512, cycle in 0i64..1000, clk_mhz in 100f64..420.0) {
+        let config = SensorConfig { clk_hz: clk_mhz * 1e6, ..SensorConfig::default() };
+        let law = law(&config);
+        if let Some(window) = law.window(start).open() {
+            for bin in 0..15 {
+                let here = law.bin_interval(&window, cycle, bin);
+                let next = law.bin_interval(&window, cycle, bin + 1);
+                prop_assert_eq!(here.end, next.start);
+                let width = here.end - here.start;
+                prop_assert!((width - config.clock().period()).as_fs().abs() <= 1);
+            }
+        }
+    }
+
+    #[test]
+    fn the_chosen_start_value_is_the_best_of_all(
+        ns in 0.0f64..1400.0,
+        clk_mhz in 200f64..400.0,
+        step in 0u32..4,
+    ) {
+        let config = SensorConfig {
+            clk_hz: clk_mhz * 1e6,
+            step_periods: 1 << step,
+            ..SensorConfig::default()
+        };
+        let law = law(&config);
+        let time = Time::from_s(ns * 1e-9);
+        let centre_distance = |start| {
+            let interval = law.interval(&law.window(start).open()?);
+            interval.contains(&time).then(|| {
+                let centre = (interval.start.as_fs() + interval.end.as_fs()) / 2;
+                ((centre - time.as_fs()).abs(), start)
+            })
+        };
+        let best = (0..512).filter_map(centre_distance).min();
+        let chosen = law.start_for(time);
+        prop_assert_eq!(chosen.is_some(), best.is_some());
+        if let (Some(chosen), Some((distance, _))) = (chosen, best) {
+            let got = centre_distance(chosen).unwrap().0;
+            prop_assert!(got <= distance + 1, "{got} {distance}");
+        }
+    }
+}

@@ -1,0 +1,349 @@
+//! The cohort engine: histograms without photons, at a cost that does not grow with the laser cycles.
+//!
+//! Laser cycles whose SPADs are in the same state move together: a binomial draw says how many of them see what in the
+//! next step. Four ways of keeping that state share one model of light and dead time:
+//!
+//! | way | state | exact | cost of a bin |
+//! |---|---|---|---|
+//! | `pooled.rs` | how many SPADs fired 1, 2, … steps ago | every bin; two bins' correlation up to [`CohortOptions::neglect`] | a few draws |
+//! | `recent.rs` | in how many cycles which of the last 4, 6 or 8 bins had an event | every bin; two bins' correlation up to [`CohortOptions::neglect`] | 16, 64 or 256 draws, most of them of nothing |
+//! | `joint.rs` | how many cycles have which of these on one macropixel | all of it | a draw for every state that occurs |
+//! | `alone.rs` | one cycle, its SPADs one by one | all of it | a random number, more if a SPAD is hit |
+//!
+//! What they share, and what it costs in exactness:
+//!
+//! * **Dead time** (`fine.rs`): cohorts move in steps of a CLK period. How able a SPAD is to fire in one, by the step
+//!   of its last avalanche, is computed from the light on cells that are halved until the mean of every bin is known
+//!   to within [`CohortOptions::error`] of its counting noise, and refused where 256 cells to a CLK period do not do.
+//!   In little light it is as in even light, which a bound shows first (`is_even_enough`). So means and each two
+//!   successive pulses of a SPAD have their probabilities; how three in successive dead times depend on each other
+//!   within a period is left out.
+//! * **Start.** A window begins with every SPAD in the state that the light before it leaves behind: the steady state
+//!   of the background, carried through an echo where one comes before the window. It is a
+//!   probability for each age of one SPAD, computed, not drawn.
+//! * **Memory.** Laser cycles are taken to be independent (`cycles.rs`). They are unless a SPAD stays busy from one window
+//!   to the next; the probability of that, over all SPADs and cycles, is bounded, and beyond [`CohortOptions::memory`]
+//!   the engine refuses.
+//! * **Afterpulses and crosstalk** enter the light as probabilities of one SPAD among its neighbours (`fine.rs`): means are
+//!   kept, but how an afterpulse follows its own pulse is remembered for a dead time only, so that the variance of a macropixel's counts is
+//!   small by up to [`variance_left_out`] (8.7 % with 5 % of afterpulses), which `frame` says in its table. Crosstalk,
+//!   which blinds a SPAD of a cycle that has its event already, hits any SPAD. So crosstalk is refused where an event
+//!   takes several SPADs, as both are for paralysable SPADs.
+//! * A SPAD is to fire at most once in a bin: a shorter dead time is refused. So are measured laser pulses, and SPADs that
+//!   differ.
+//! * Bins of delay lines are the steps, unequal as they are; what is before a window is remembered in steps as long as the shortest
+//!   bin. An odd number of SPADs counts in them; light in which pulses meet on the photon line is refused (`events.rs`).
+//!
+//! So an exposure takes one step a bin, whatever light there is. Where two bins' correlations may be neglected as much as the ways
+//! before it leave out, the first way in the table that does so is taken; only events of several SPADs, dead times of many bins
+//! and the brightest light are left to the joint state, which has at most as many states as there are laser cycles.
+
+mod abreast;
+mod alone;
+mod blindness;
+mod cycles;
+mod draw;
+mod effort;
+mod events;
+mod fine;
+mod grid;
+mod hits;
+mod joint;
+mod overlap;
+mod pooled;
+mod prepare;
+mod recent;
+mod rejection;
+mod secondaries;
+mod spad_light;
+mod weighted;
+mod words;
+
+use std::borrow::Cow;
+use std::sync::OnceLock;
+
+use smallvec::{SmallVec, smallvec};
+
+pub use self::blindness::BlindSpad;
+use self::cycles::LikeCycles;
+pub use self::draw::none_of;
+use self::events::EventTable;
+pub use self::hits::at_least_hit;
+use self::recent::Histories;
+pub use self::secondaries::variance_left_out;
+use self::words::RandomWords;
+use super::{Engine, EngineError, Expose, Exposed, LitPixel, Work};
+use crate::chip::{Exposure, Sensor, WindowLaw, histogram, window_law};
+use crate::photon::{PhotonStream, PixelLight, StreamConfig};
+
+/// Steps of a window that need no memory of their own.
+const FEW_STEPS: usize = 16;
+
+/// Laser cycles with an event, for every bin of a window.
+type Counts = SmallVec<[u64; FEW_STEPS]>;
+
+/// Mean photons on one SPAD in every bin of a window.
+type Means = SmallVec<[f64; FEW_STEPS]>;
+
+/// The engine's knobs: what may be left out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CohortOptions {
+    /// Largest error of a bin's mean, in standard deviations of its count over the exposure.
+    pub error: f64,
+    /// Largest correlation between two bins that may be neglected to save time; 0 never neglects any.
+    pub neglect: f64,
+    /// Largest probability, for a whole exposure of a macropixel, that laser cycles depend on each other.
+    pub memory: f64,
+}
+
+impl Default for CohortOptions {
+    fn default() -> Self {
+        CohortOptions {
+            error: 0.1,
+            neglect: 1e-4,
+            memory: 1e-6,
+        }
+    }
+}
+
+/// SPADs that are worth following one by one in a CLK period before [`joint`] is the cheaper way.
+const WORTH_LOOKING_AT: f64 = 200.0;
+
+/// Draws histograms from their distribution.
+#[derive(Clone)]
+pub struct Cohort {
+    sensor: Sensor,
+    law: WindowLaw,
+    /// What the law says of each start value, once it has been asked.
+    windows: Vec<OnceLock<Opening>>,
+    options: CohortOptions,
+    /// Photons on a SPAD in a CLK period up to which cycles may be pooled.
+    most_photons: f64,
+    is_event: EventTable,
+    /// Whether the law is that of one macropixel, where each has its own.
+    is_of_macropixel: bool,
+}
+
+/// How the state of laser cycles alike is kept.
+enum Way {
+    Alone,
+    Pooled,
+    Recent(Histories),
+    Joint,
+}
+
+/// A start value's window, and the beginning of the photon times it collects, in femtoseconds after STOP.
+#[derive(Debug, Clone, Copy)]
+struct Opening {
+    window: window_law::Window,
+    from_fs: f64,
+}
+
+impl Cohort {
+    /// An engine for this sensor and exposure.
+    pub fn new(sensor: impl Into<Sensor>, exposure: &Exposure, options: CohortOptions) -> Self {
+        Self::with_law(WindowLaw::new(sensor, exposure), options)
+    }
+
+    /// An engine for macropixels with a law of their own.
+    pub fn with_law(law: WindowLaw, options: CohortOptions) -> Self {
+        let sensor = law.sensor().clone();
+        let is_event = EventTable::of(&sensor);
+        Cohort {
+            law,
+            windows: vec![OnceLock::new(); usize::from(sensor.largest_start()) + 1],
+            options,
+            most_photons: pooled::most_photons(options.neglect),
+            is_event,
+            sensor,
+            is_of_macropixel: false,
+        }
+    }
+
+    /// This engine with the law of a macropixel, where each has its own: what [`Cohort::expected`] and
+    /// [`Cohort::cohorts_in_steps`] are asked of there.
+    pub fn of_macropixel(&self, number: u32) -> Cow<'_, Self> {
+        match self.sensor.has_own_laws() && !self.is_of_macropixel {
+            true => Cow::Owned(Cohort {
+                is_of_macropixel: true,
+                ..Self::with_law(self.law.of_macropixel(number), self.options)
+            }),
+            false => Cow::Borrowed(self),
+        }
+    }
+
+    fn opening(&self, start: u16) -> Opening {
+        let of_law = || {
+            let window = self.law.window(start);
+            let from_fs = window.open().map_or(0.0, |window| {
+                self.law.interval(&window).start.as_fs() as f64
+            });
+            Opening { window, from_fs }
+        };
+        *self.windows[usize::from(start)].get_or_init(of_law)
+    }
+
+    /// A histogram of macropixel `pixel` under `light`, bin 0 earliest: a pure function of the stream's seed and
+    /// everything given.
+    ///
+    /// # Errors
+    /// Races of the window law, a dead time below a CLK period, laser cycles that depend on each other, and light in which
+    /// [`CohortOptions::error`] cannot be kept.
+    pub fn draw(
+        &self,
+        stream: &StreamConfig,
+        pixel: u32,
+        start: u16,
+        light: &PixelLight,
+    ) -> Result<Vec<u16>, EngineError> {
+        let (bits, overflow) = (self.sensor.bin_bits as u32, self.sensor.overflow);
+        let sums = self.sums(stream, pixel, start, light)?;
+        let counts = sums.iter().map(|&n| histogram::model(n, bits, overflow));
+        Ok(counts.collect())
+    }
+
+    /// As [`Cohort::draw`], before counters saturate or wrap.
+    ///
+    /// # Errors
+    /// As [`Cohort::draw`].
+    pub fn hits(
+        &self,
+        stream: &StreamConfig,
+        pixel: u32,
+        start: u16,
+        light: &PixelLight,
+    ) -> Result<Vec<u64>, EngineError> {
+        Ok(self.sums(stream, pixel, start, light)?.to_vec())
+    }
+
+    fn sums(
+        &self,
+        stream: &StreamConfig,
+        pixel: u32,
+        start: u16,
+        light: &PixelLight,
+    ) -> Result<Counts, EngineError> {
+        let mut sums: Counts = smallvec![0; self.sensor.bins];
+        let engine = self.of_macropixel(pixel);
+        let Some(cohorts) = engine.cohorts(stream, start, light)? else {
+            return Ok(sums);
+        };
+        let random = &mut RandomWords::new(stream.seed, pixel);
+        let is_event = &self.is_event;
+        for like in &cohorts {
+            let LikeCycles {
+                cycles,
+                blindness,
+                ages,
+                means,
+                not_compared,
+            } = like;
+            let counts = match self.way(like) {
+                Way::Alone => alone::run(blindness, ages, means, is_event, random),
+                Way::Pooled => pooled::run(blindness, ages, means, is_event, *cycles, random),
+                Way::Recent(histories) => histories.run(*cycles, random),
+                Way::Joint => joint::run(blindness, ages, means, is_event, *cycles, random),
+            };
+            let compared = sums.iter_mut().zip(counts).skip(*not_compared);
+            compared.for_each(|(sum, count)| *sum += count);
+        }
+        Ok(sums)
+    }
+
+    /// The cheapest way that neglects no more than it may.
+    fn way(&self, like: &LikeCycles) -> Way {
+        if like.cycles == 1 {
+            return Way::Alone;
+        }
+        let (blindness, neglect) = (&like.blindness, self.options.neglect);
+        let photons = pooled::largest(&like.means);
+        let spads = self.is_event.spads() as u64 * like.cycles;
+        if photons <= self.most_photons
+            && pooled::looked_at(blindness, photons, spads) <= WORTH_LOOKING_AT
+        {
+            return Way::Pooled;
+        }
+        recent::histories(blindness, &like.ages, &like.means, &self.is_event, neglect)
+            .map_or(Way::Joint, Way::Recent)
+    }
+
+    /// Cohorts that [`Cohort::draw`] follows, summed over the steps of the window: what its time goes with, estimated.
+    ///
+    /// # Errors
+    /// As [`Cohort::draw`].
+    pub fn cohorts_in_steps(
+        &self,
+        stream: &StreamConfig,
+        start: u16,
+        light: &PixelLight,
+    ) -> Result<f64, EngineError> {
+        let of = |like: LikeCycles| match self.way(&like) {
+            Way::Alone | Way::Pooled => like.means.len() as f64,
+            Way::Recent(histories) => effort::of_histories(histories.number()),
+            Way::Joint => effort::of_joint_states(&like, self.is_event.spads()),
+        };
+        let cohorts = self.cohorts(stream, start, light)?.unwrap_or_default();
+        Ok(cohorts.into_iter().map(of).sum())
+    }
+
+    /// Mean of every bin of [`Cohort::hits`], computed.
+    ///
+    /// # Errors
+    /// As [`Cohort::draw`].
+    pub fn expected(
+        &self,
+        stream: &StreamConfig,
+        start: u16,
+        light: &PixelLight,
+    ) -> Result<Vec<f64>, EngineError> {
+        let mut sums = vec![0.0; self.sensor.bins];
+        let Some(cohorts) = self.cohorts(stream, start, light)? else {
+            return Ok(sums);
+        };
+        for like in &cohorts {
+            let mut ages = like.ages.clone();
+            for ((bin, &mean), sum) in like.means.iter().enumerate().zip(&mut sums) {
+                let pulse = ages.pulse(&like.blindness, bin, mean);
+                ages.step(&like.blindness, bin, mean);
+                if bin >= like.not_compared {
+                    let [event, _] = fine::event(&self.is_event, pulse);
+                    *sum += like.cycles as f64 * event;
+                }
+            }
+        }
+        Ok(sums)
+    }
+}
+
+impl Engine for Cohort {
+    fn law(&self) -> WindowLaw {
+        self.law.clone()
+    }
+
+    fn bins(&self) -> usize {
+        self.sensor.bins
+    }
+}
+
+impl Expose for Cohort {
+    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+        let dark = PixelLight::dark();
+        let config = stream.config();
+        let mut exposed = Exposed::new(self.sensor.bins);
+        for pixel in pixels {
+            let light = pixel.light.as_ref().unwrap_or(&dark);
+            let counts = self.draw(config, pixel.number, pixel.start, light)?;
+            exposed.histograms.push(&counts);
+            let closed = self.opening(pixel.start).window.open().is_none();
+            let periods = u64::from(config.stop_periods) * u64::from(config.laser_cycles);
+            exposed.work += Work {
+                macropixels: 1,
+                skipped_closed: u64::from(closed),
+                clk_periods: periods,
+                clk_periods_visited: if closed { 0 } else { self.sensor.bins as u64 },
+                ..Work::default()
+            };
+        }
+        Ok(exposed)
+    }
+}

@@ -1,0 +1,309 @@
+//! The cycle engine: the netlist itself, levelised into tapes of word operations, 512 macropixels to a word.
+//!
+//! ```text
+//!                 ┌ survey ──► expression ──► stream   photons to SPAD_EVENT, 16 CLK periods at a time
+//!   netlist ──────┤
+//!                 └ levelise ───────────────► tape     counters, strobe, histogram, pass by pass
+//!
+//!   SPAD pulses ──► packing ──► stream ──► tape ──► counts          (a block of 512 macropixels, a thread each)
+//! ```
+//!
+//! Every CLK period of the exposure is stepped. Time enters twice, exactly: in which CLK edge takes a pulse, and in
+//! the order in which the edges of one period arrive. Otherwise there is no delay and, after the reset that the
+//! event kernel simulates, no X. What is run is what the netlist says; of the macropixel only pins and bins are named.
+//!
+//! Macropixels go into blocks by their start values, so that a block's windows are open in the same CLK periods, and
+//! its counters at rest in the others, which are skipped where nothing would change. A netlist, or a configuration, for
+//! which no tape can be made is run by the gate engine, and so is a block in which a lane does what a tape cannot follow.
+
+mod expression;
+mod levelise;
+mod packing;
+mod parts;
+mod passes;
+mod schedule;
+mod stream;
+mod survey;
+mod tape;
+mod word;
+
+use std::borrow::Cow;
+use std::sync::OnceLock;
+
+use rayon::prelude::*;
+
+use super::error::has_no_delay_lines;
+use super::own_clk::by_own_clk;
+use super::{
+    Engine, EngineError, Expose, Exposed, Gate, Histograms, LitPixel, PulsedPixel, Replay, follows,
+    full_stream,
+};
+use crate::chip::window_law::{Window, WindowLaw};
+use crate::chip::{Exposure, Sensor};
+use crate::photon::{PhotonStream, SpadEvent};
+use levelise::Levelised;
+use packing::{PERIODS, Packed};
+use schedule::Schedule;
+use stream::Flow;
+use survey::Survey;
+use tape::Block;
+use word::{WORD_LANES, Word, inversion};
+
+/// Why a netlist has no tape.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Unlevelled {
+    /// A net is X when the exposure starts.
+    #[error("{0} is unknown when the exposure starts")]
+    Unknown(String),
+    /// A register of the stream starts with a value that its neighbours rule out.
+    #[error("{0} does not start at 0")]
+    Start(String),
+    /// An edge arrives by paths of different length.
+    #[error("edges reach {net} after {shortest_fs} to {longest_fs} fs")]
+    Ambiguous {
+        /// Where.
+        net: String,
+        /// Shortest path.
+        shortest_fs: i64,
+        /// Longest path.
+        longest_fs: i64,
+    },
+    /// A lane did what the tape cannot tell the outcome of: two edges too close to call, or one round a loop.
+    #[error("the next change of {0} is too close to call")]
+    Trapped(String),
+    /// A reset or set ends before what it does is done.
+    #[error("the reset or set of {0} ends before what it does has settled")]
+    Clear(String),
+    /// Something the tapes have no operation for.
+    #[error("{0} has no place on a tape")]
+    Structure(String),
+}
+
+/// A netlist that can be run.
+struct Machine {
+    survey: Survey,
+    levelised: Levelised,
+}
+
+/// Runs the levelised netlist.
+pub struct Cycle {
+    sensor: Sensor,
+    exposure: Exposure,
+    law: WindowLaw,
+    replays_control: bool,
+    machine: OnceLock<Result<Machine, Unlevelled>>,
+}
+
+/// Pulses, sorted for [`Cycle::run`].
+pub struct PackedPulses {
+    /// Macropixels of each block, by their index in the caller's order.
+    blocks: Vec<(Vec<usize>, Packed)>,
+}
+
+impl Cycle {
+    /// An engine for this sensor and exposure. The netlist is levelised when it is first needed.
+    pub fn new(sensor: impl Into<Sensor>, exposure: &Exposure) -> Self {
+        let sensor = sensor.into();
+        Cycle {
+            law: WindowLaw::new(&sensor, exposure),
+            sensor,
+            exposure: *exposure,
+            replays_control: true,
+            machine: OnceLock::new(),
+        }
+    }
+
+    /// The same engine with control simulated in every laser cycle, where otherwise one that repeats is recorded once and
+    /// replayed. Histograms are the same; the time that it takes shows what the recording saves.
+    #[must_use]
+    pub fn with_live_control(self) -> Self {
+        Cycle {
+            replays_control: false,
+            ..self
+        }
+    }
+
+    fn machine(&self) -> Result<&Machine, &Unlevelled> {
+        let machine = self.machine.get_or_init(|| {
+            if self.sensor.front_end.joins() {
+                let wire = "the wire that all SPADs share".to_owned();
+                return Err(Unlevelled::Structure(wire));
+            }
+            let survey = Survey::new(&self.sensor, &self.exposure);
+            let levelised = Levelised::new(&survey, &self.sensor, &self.exposure)?;
+            Ok(Machine { survey, levelised })
+        });
+        machine.as_ref()
+    }
+
+    /// Why this sensor's macropixels cannot be levelised and are left to the gate engine, if so.
+    pub fn unlevelled(&self) -> Option<&Unlevelled> {
+        self.machine().err()
+    }
+
+    /// CLK periods with clock edges, as the stimulus of the gate engine has them.
+    fn clocked(&self) -> usize {
+        self.exposure.stop_periods as usize * self.exposure.laser_cycles as usize + 2
+    }
+
+    fn chunks(&self) -> usize {
+        self.clocked().div_ceil(PERIODS)
+    }
+
+    /// Sorts pulses (one list per macropixel, by time) for [`Cycle::run`].
+    pub fn pack(&self, starts: &[u16], pulses: &[&[SpadEvent]]) -> PackedPulses {
+        let mut order: Vec<usize> = (0..starts.len()).collect();
+        // Counters that start alike open their windows, and come to rest, together.
+        order.sort_by_key(|&pixel| (starts[pixel], pixel));
+        let chunks = self.chunks();
+        let blocks = order.par_chunks(WORD_LANES).map(|pixels| {
+            let lanes = pixels.iter().map(|&pixel| pulses[pixel]);
+            (pixels.to_vec(), Packed::new(&self.law, chunks, lanes))
+        });
+        PackedPulses {
+            blocks: blocks.collect(),
+        }
+    }
+
+    /// Histograms of packed macropixels, in the caller's order: the logic alone.
+    ///
+    /// # Errors
+    /// As [`Cycle::unlevelled`], or when an edge goes where the tape has no place for it.
+    pub fn run(&self, starts: &[u16], packed: &PackedPulses) -> Result<Histograms, Unlevelled> {
+        let machine = self.machine().map_err(Unlevelled::clone)?;
+        let blocks: Result<Vec<_>, Unlevelled> = packed
+            .blocks
+            .par_iter()
+            .map(|(pixels, pulses)| {
+                let starts: Vec<u16> = pixels.iter().map(|&pixel| starts[pixel]).collect();
+                let schedule =
+                    Schedule::new(&machine.levelised.causes, &self.exposure, self.clocked());
+                machine.run(schedule, self.replays_control, &starts, pulses)
+            })
+            .collect();
+        let mut histograms = Histograms::empty(starts.len(), self.sensor.bins);
+        for ((pixels, _), block) in packed.blocks.iter().zip(blocks?) {
+            for (&pixel, histogram) in pixels.iter().zip(&block) {
+                histograms[pixel].copy_from_slice(histogram);
+            }
+        }
+        Ok(histograms)
+    }
+}
+
+impl Machine {
+    /// Histograms of one block.
+    fn run(
+        &self,
+        schedule: Schedule<'_>,
+        replays_control: bool,
+        starts: &[u16],
+        pulses: &Packed,
+    ) -> Result<Histograms, Unlevelled> {
+        let Levelised {
+            stream,
+            passes: tape,
+            parts,
+            ..
+        } = &self.levelised;
+        let mut block = Block::new(tape, self.start(starts)?);
+        let mut flow = Flow::new(stream, pulses);
+        passes::run(
+            tape,
+            parts,
+            &mut block,
+            &mut flow,
+            schedule,
+            replays_control,
+        );
+        if let Some(place) = block.trapped {
+            return Err(Unlevelled::Trapped(self.name(place)));
+        }
+        if !block.is_settled() {
+            return Err(Unlevelled::Trapped("a net that does not settle".to_owned()));
+        }
+        Ok(self.counts(&block, starts.len()))
+    }
+
+    /// Every place of a block when the exposure starts. Lanes that are left over repeat the last start value.
+    fn start(&self, starts: &[u16]) -> Result<Vec<Word>, Unlevelled> {
+        let mut words = vec![Word::ZERO; self.levelised.places];
+        let last = *starts.last().expect("a block has a macropixel");
+        for &(place, net, inverted) in &self.levelised.initial {
+            let word = &mut words[usize::from(place)];
+            if let Some(value) = self.survey.shared_initial(net) {
+                *word = Word::all(value ^ inverted);
+                continue;
+            }
+            for lane in 0..WORD_LANES {
+                let start = starts.get(lane).copied().unwrap_or(last);
+                word.set(lane, self.survey.initial(net, start)? ^ inverted);
+            }
+        }
+        Ok(words)
+    }
+
+    /// The net at a place.
+    fn name(&self, place: u16) -> String {
+        let net = self.levelised.initial.iter().find(|(p, ..)| *p == place);
+        net.map_or_else(String::new, |&(_, net, _)| self.survey.name(net))
+    }
+
+    fn counts(&self, block: &Block, lanes: usize) -> Histograms {
+        let bins = &self.levelised.bins;
+        let mut counts = Histograms::empty(lanes, bins.len());
+        for (bin, bits) in bins.iter().enumerate() {
+            for (weight, &(place, inverted)) in bits.iter().enumerate() {
+                let word = block.words[usize::from(place)] ^ inversion(inverted);
+                for lane in 0..lanes {
+                    counts[lane][bin] |= u16::from(word.lane(lane)) << weight;
+                }
+            }
+        }
+        counts
+    }
+}
+
+impl Engine for Cycle {
+    fn law(&self) -> WindowLaw {
+        self.law.clone()
+    }
+
+    fn bins(&self) -> usize {
+        self.sensor.bins
+    }
+
+    fn batch(&self) -> usize {
+        8 * WORD_LANES
+    }
+}
+
+impl Replay for Cycle {
+    fn replay(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError> {
+        follows(&self.sensor, &self.law.timing().pulses)?;
+        has_no_delay_lines(&self.sensor)?;
+        let starts: Vec<u16> = pixels.iter().map(|pixel| pixel.start).collect();
+        let seen = pixels
+            .iter()
+            .map(|pixel| by_own_clk(&self.sensor, pixel.number, pixel.pulses));
+        let seen: Vec<Cow<'_, [SpadEvent]>> = seen.collect();
+        let pulses: Vec<&[SpadEvent]> = seen.iter().map(|pulses| &**pulses).collect();
+        for &start in &starts {
+            if let Window::Race(why) = self.law.window(start) {
+                return Err(EngineError::Race(why));
+            }
+        }
+        if self.unlevelled().is_none()
+            && let Ok(histograms) = self.run(&starts, &self.pack(&starts, &pulses))
+        {
+            return Ok(histograms);
+        }
+        Gate::new(&self.sensor, &self.exposure).replay(pixels)
+    }
+}
+
+impl Expose for Cycle {
+    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+        full_stream(self, stream, pixels)
+    }
+}

@@ -1,0 +1,218 @@
+//! Why an engine has no answer: facts and numbers. What may be done about it depends on who asked; the command line words
+//! its cures itself.
+
+use crate::chip::Irregular;
+use crate::chip::front_end::{DeadTimeTooShort, PulseLimits};
+use crate::chip::race::NoAim;
+use crate::chip::{FrontEnd, Race, Sensor, Tdc};
+use crate::units::Time;
+
+/// Why an engine has no answer.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EngineError {
+    /// The window law finds two signals too close to call.
+    #[error("{0}, so only the gate engine can tell what is counted")]
+    Race(Race),
+    /// The window law has no single window for this start value.
+    #[error("{0}, so the window law cannot tell what is counted")]
+    Irregular(Irregular),
+    /// Pulses are shorter, or follow each other faster, than the front end's flip-flops.
+    #[error("{0}")]
+    FrontEnd(DeadTimeTooShort),
+    /// SPADs share a wire, and what a pulse does depends on those of others.
+    #[error(
+        "front_end = {:?} joins all SPADs on one wire, on which the delays of gates decide what is counted, so only the gate engine can tell",
+        .0.name()
+    )]
+    Joined(FrontEnd),
+    /// The cohort engine works without photons.
+    #[error("the cohort engine knows no single photons and cannot replay recorded ones")]
+    NoPhotons,
+    /// The cohort engine's model of light and SPADs leaves this out.
+    #[error("the cohort engine cannot follow {0}")]
+    NotInCohorts(NotModelled),
+    /// Laser cycles depend on each other: a bound on the probability, over a macropixel's exposure.
+    #[error(
+        "SPADs may stay busy from one laser cycle's window to the next (probability up to {bound:.1e}), which the cohort engine cannot follow"
+    )]
+    CyclesNotIndependent {
+        /// The bound.
+        bound: f64,
+    },
+    /// The finest cells of the cohort engine do not keep its error.
+    #[error(
+        "the cohort engine, with {cells} cells to a CLK period, may put the mean of bin {bin} off by {off:.2e} counts where its counting noise is {noise:.2e}"
+    )]
+    CoarseCohorts {
+        /// First bin concerned.
+        bin: usize,
+        /// What its mean may be off, counts.
+        off: f64,
+        /// Standard deviation of its count.
+        noise: f64,
+        /// Cells of a CLK period at least.
+        cells: u32,
+    },
+    /// Background light blinds SPADs more than half of the time, and there are too many such photons to follow.
+    #[error(
+        "background light of {:.1} Mcounts/s a SPAD keeps it blind for {:.0} % of the time, which it does for more than half of it from {:.1} Mcounts/s on, and the exposure has {photons:.1e} such photons, of which {most_photons:.0e} are simulated",
+        background_hz / 1e6,
+        100.0 * background_hz / (background_hz + most_hz),
+        most_hz / 1e6,
+    )]
+    Blinding {
+        /// Background photons and dark counts of a SPAD, 1/s, where there are most.
+        background_hz: f64,
+        /// From that rate on a SPAD is blind more than half of the time, 1/s.
+        most_hz: f64,
+        /// Photons of all macropixels in such light in the exposure.
+        photons: f64,
+        /// As many are simulated.
+        most_photons: f64,
+    },
+    /// Each macropixel has delays of its own, and this engine has one set of them.
+    #[error(
+        "cells differ at random (mismatch), so that each macropixel has delays of its own, which only the engine with per-macropixel delays follows"
+    )]
+    Mismatch,
+    /// Each macropixel has a window law of its own by description, and this engine has one law.
+    #[error(
+        "each macropixel has delay lines of its own, or a CLK that comes later than another's, which only the engines gate, window and cohort follow"
+    )]
+    OwnLaws,
+    /// Light is given for SPADs one by one, but for another number of them than a macropixel has.
+    #[error("light is given for {given} SPADs, but a macropixel has {spads}; give as many")]
+    OtherSpads {
+        /// SPADs that light is given for.
+        given: usize,
+        /// SPADs of a macropixel.
+        spads: usize,
+    },
+    /// Who was told of its progress wanted no more of it.
+    #[error("the exposure was stopped before its end")]
+    Stopped,
+    /// A histogram bin of the netlist holds X.
+    #[error("bin {bin} of {macropixel} is unknown (X) at the end of the exposure")]
+    Unknown {
+        /// Name of the macropixel, or its lane.
+        macropixel: String,
+        /// First unknown bin.
+        bin: usize,
+    },
+}
+
+/// What the cohort engine's model of light and SPADs leaves out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NotModelled {
+    /// Bins have a length.
+    #[error("bins without length")]
+    EmptyBins,
+    /// Two pulses of a SPAD may fall into one bin.
+    #[error("a dead time ({dead_time}) shorter than a bin ({bin})")]
+    ShortDeadTime {
+        /// The SPADs' dead time.
+        dead_time: Time,
+        /// The longest bin of the window.
+        bin: Time,
+    },
+    /// Pulses that leave no edge on a photon line because they are closer than an XOR's delay.
+    #[error("light in which many pulses meet on the photon line at an edge of bin {bin}")]
+    Meetings {
+        /// First bin concerned.
+        bin: usize,
+    },
+    /// Avalanches that prolong a dead time and breed others.
+    #[error("afterpulses and crosstalk of paralysable SPADs")]
+    SecondariesOfParalysable,
+    /// Neighbours that fire together, where events depend on how many do.
+    #[error("crosstalk where an event takes more than one SPAD")]
+    CrosstalkInCoincidence,
+    /// A laser pulse that is not Gaussian.
+    #[error("a measured laser pulse")]
+    MeasuredPulse,
+    /// SPADs with a detection efficiency or dark count rate of their own.
+    #[error("SPADs that differ")]
+    SpadsThatDiffer,
+}
+
+impl EngineError {
+    /// Whether the user asked for what this engine cannot do, and another can.
+    pub fn is_refusal(&self) -> bool {
+        !matches!(self, EngineError::Unknown { .. } | EngineError::Stopped)
+    }
+}
+
+impl From<NoAim> for EngineError {
+    fn from(why: NoAim) -> Self {
+        match why {
+            NoAim::Race(race) => EngineError::Race(race),
+            NoAim::Irregular(why) => EngineError::Irregular(why),
+        }
+    }
+}
+
+/// Whether one set of delays describes all macropixels of this sensor, and its front end, with these limits, follows the pulses of
+/// its SPADs.
+pub(super) fn follows(sensor: &Sensor, limits: &PulseLimits) -> Result<(), EngineError> {
+    if sensor.silicon().mismatch.is_some() {
+        return Err(EngineError::Mismatch);
+    }
+    let followed = limits.follow(sensor.dead_time_ns);
+    followed.map_err(EngineError::FrontEnd)
+}
+
+/// Whether macropixels of this sensor differ in nothing but when CLK comes to them.
+pub(super) fn has_no_delay_lines(sensor: &Sensor) -> Result<(), EngineError> {
+    match sensor.tdc {
+        Tdc::DelayLine => Err(EngineError::OwnLaws),
+        Tdc::Clocked => Ok(()),
+    }
+}
+
+/// Whether each SPAD has a line of its own, as engines without gates take it.
+pub(super) fn has_a_line_a_spad(sensor: &Sensor) -> Result<(), EngineError> {
+    match sensor.front_end.joins() {
+        false => Ok(()),
+        true => Err(EngineError::Joined(sensor.front_end)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chip::{Exposure, quantic4x4};
+    use crate::engine::{Cycle, Gate, PulsedPixel, Replay, Runner, Timed, Window};
+    use crate::netlist::Mismatch;
+
+    #[test]
+    fn engines_with_one_set_of_delays_refuse_mismatch_by_name() {
+        let nominal = quantic4x4();
+        let mismatch = Some(Mismatch {
+            sigma: 0.02,
+            seed: 1,
+        });
+        let sensor = nominal.made_of(&crate::chip::Silicon {
+            mismatch,
+            ..*nominal.silicon()
+        });
+        let exposure = Exposure::new(&sensor, 60, 2);
+        let pixel = PulsedPixel {
+            number: 0,
+            start: 30,
+            pulses: &[],
+        };
+        let engines: [&dyn Replay; 3] = [
+            &Gate::new(&sensor, &exposure),
+            &Cycle::new(&sensor, &exposure),
+            &Window::new(&sensor, &exposure),
+        ];
+        for engine in engines {
+            assert_eq!(engine.replay(&[pixel]), Err(EngineError::Mismatch));
+        }
+        assert!(
+            Timed::new(&sensor, &exposure, Runner::Window)
+                .replay(&[pixel])
+                .is_ok()
+        );
+    }
+}

@@ -1,0 +1,169 @@
+//! The gate engine for many macropixels at once: 64 of them in one lane-parallel event queue.
+//!
+//! Each lane is a macropixel with a load path of its own, as in [`Gate`](super::Gate); they share clocks and
+//! control pins and differ in the serial bits and the photons.
+
+use bitvec::vec::BitVec;
+
+use super::{EngineError, Histograms};
+use crate::chip::{Exposure, Probe, Probes, Sensor, SensorPins, array, load_path};
+use crate::kernel::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
+use crate::netlist::{NetId, Netlist, Timing};
+use crate::photon::SpadEvent;
+use crate::stimulus::{Schedule, StimulusPlan};
+use crate::units::Time;
+
+/// Up to 64 macropixels at gate level, loaded and exposed together.
+pub struct LaneSimulation {
+    sensor: Sensor,
+    netlist: Netlist,
+    probes: Probes,
+    kernel: LaneKernel,
+    shared: StimulusPlan,
+    serial: Vec<BitVec>,
+    pulses: Vec<(usize, SpadEvent)>,
+}
+
+impl LaneSimulation {
+    /// Prepares one lane for each start value and its pulses.
+    ///
+    /// # Panics
+    /// When there are more than [`LANES`], or lists of different lengths.
+    pub fn new(
+        sensor: impl Into<Sensor>,
+        exposure: &Exposure,
+        starts: &[u16],
+        pulses: &[&[SpadEvent]],
+    ) -> Self {
+        assert!(starts.len() <= LANES && starts.len() == pulses.len());
+        let sensor = sensor.into();
+        let netlist = Netlist::elaborate(&array::subarray(&sensor, (0, 0), (1, 1)));
+        let timing = sensor.silicon().timing(&netlist);
+        let kernel = LaneKernel::new(&netlist, &timing);
+        let end = exposure.end();
+        let mut all: Vec<(usize, SpadEvent)> = pulses
+            .iter()
+            .enumerate()
+            .flat_map(|(lane, list)| list.iter().map(move |&pulse| (lane, pulse)))
+            .filter(|(_, pulse)| pulse.time < end)
+            .collect();
+        all.sort_unstable_by_key(|(lane, pulse)| (pulse.time, *lane, pulse.spad));
+        LaneSimulation {
+            probes: Probes::of_macropixel(&netlist, 0, 0),
+            netlist,
+            kernel,
+            shared: StimulusPlan::new(&sensor, exposure, 1, &[0], &[&[]]),
+            serial: starts
+                .iter()
+                .map(|&start| load_path::stream(&[start], 1, sensor.counter_bits))
+                .collect(),
+            pulses: all,
+            sensor,
+        }
+    }
+
+    /// The same simulation with other delays than the library's, those of every lane. Call it before
+    /// [`LaneSimulation::run`]; `timing` must be of the same netlist.
+    pub(crate) fn with_timing(mut self, timing: &Timing) -> Self {
+        self.kernel = LaneKernel::new(&self.netlist, timing);
+        self
+    }
+
+    /// Where load and exposure lie in simulation time.
+    pub(crate) fn schedule(&self) -> Schedule {
+        self.shared.schedule()
+    }
+
+    /// The kernel, for what it counted.
+    pub fn kernel(&self) -> &LaneKernel {
+        &self.kernel
+    }
+
+    /// Simulates load and exposure to the end.
+    pub fn run<O: LaneObserver>(&mut self, observer: &mut O) {
+        self.run_until(self.schedule().end, observer);
+    }
+
+    /// Simulates from power-up to `end`, in simulation time.
+    pub(super) fn run_until<O: LaneObserver>(&mut self, end: Time, observer: &mut O) {
+        let pins = SensorPins::of(&self.netlist);
+        let mut stimulus = self.stimulus(&pins).peekable();
+        self.kernel.run(&mut stimulus, end, observer);
+    }
+
+    fn stimulus(&self, pins: &SensorPins) -> impl Iterator<Item = LaneDrive> + use<> {
+        let serial = pins.load.serial;
+        let everyone = |time, net, values| LaneDrive {
+            time,
+            net,
+            mask: u64::MAX,
+            values,
+        };
+        let mut drives: Vec<LaneDrive> = Vec::new();
+        let mut bit = 0;
+        for drive in self.shared.stimulus(pins) {
+            if drive.net != serial {
+                drives.push(everyone(drive.time, drive.net, Lanes::all(drive.value)));
+            } else if drive.time == Time::ZERO {
+                drives.push(everyone(drive.time, serial, Lanes::all(drive.value)));
+            } else {
+                let bits = self.serial.iter().enumerate();
+                let word = bits.fold(0, |word, (lane, bits)| word | u64::from(bits[bit]) << lane);
+                drives.push(everyone(drive.time, serial, Lanes::known(word)));
+                bit += 1;
+            }
+        }
+        let (origin, dead_time) = (self.schedule().origin, self.sensor.dead_time());
+        for &(lane, pulse) in &self.pulses {
+            let net = pins.spad_raw[usize::from(pulse.spad)];
+            let time = origin + pulse.time;
+            let mask = 1 << lane;
+            let (rise, fall) = (Lanes::known(u64::MAX), Lanes::known(0));
+            drives.push(LaneDrive {
+                time,
+                net,
+                mask,
+                values: rise,
+            });
+            drives.push(LaneDrive {
+                time: time + dead_time,
+                net,
+                mask,
+                values: fall,
+            });
+        }
+        drives.sort_by_key(|d| d.time);
+        drives.into_iter()
+    }
+
+    /// Start value in the P-counter's memory of each lane; `None` where a bit is unknown, and without memory.
+    pub fn loaded(&self) -> Vec<Option<u16>> {
+        let memory = self.probes.find(Probe::Memory);
+        self.lanes(|lane| self.kernel.number(memory?, lane).map(|code| code as u16))
+    }
+
+    /// Counts of each lane, bin 0 earliest.
+    ///
+    /// # Errors
+    /// When a bit of a count is unknown; the lane stands for the column.
+    pub fn histograms(&self) -> Result<Histograms, EngineError> {
+        let counts = self.lanes(|lane| {
+            let count = |(bin, nets): (usize, &Vec<NetId>)| {
+                let number = self.kernel.number(nets, lane).map(|n| n as u16);
+                number.ok_or_else(|| EngineError::Unknown {
+                    macropixel: format!("the macropixel in lane {lane}"),
+                    bin,
+                })
+            };
+            let counts: Result<Vec<u16>, _> =
+                self.probes.bins().iter().enumerate().map(count).collect();
+            counts
+        });
+        let counts = counts.into_iter().collect::<Result<Vec<_>, _>>()?;
+        Ok(Histograms::from_rows(self.probes.bins().len(), counts))
+    }
+
+    fn lanes<T>(&self, f: impl Fn(usize) -> T) -> Vec<T> {
+        (0..self.serial.len()).map(f).collect()
+    }
+}

@@ -1,0 +1,435 @@
+//! Counting a macropixel's photons, a group of laser cycles at a time.
+//!
+//! ```text
+//!   photon ──► counts by row (bin)                             ──► hits
+//!         └──► SPADs and rows by cycle ── one of them twice? ──► history: the cycle's photons, dead time
+//! ```
+//!
+//! Nearly every photon is alone in its cycle with its SPAD, from the SPADs' memory before the window to its end, and with
+//! its bin: it makes a pulse, and its CLK period has one. Where two photons of a cycle share a SPAD or a bin, or one comes
+//! too close to an edge, photons are taken out again, and what the dead time leaves of them is counted bin by bin. The
+//! times of photons are worked out only there.
+//!
+//! Cycles with photons that breed are settled as a whole; so are all cycles of a group where photons are many, or where
+//! echoes of other cycles are seen ([`whole`]). Light with several layers, and bins that are not CLK periods, are sorted
+//! ([`sorted`]).
+
+use super::binning::{Binning, Scratch};
+use super::codes::{Code, Codes, ROWS, SPADS};
+use super::echo_rows::EchoRows;
+use super::past::PastDraws;
+use super::sight::{Sight, Spans};
+use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Tables};
+use super::wanted::Wanted;
+use super::{Window, Work};
+use crate::photon::{
+    Draw, Group, ListedEchoes, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SpadEvent,
+};
+use crate::units::Time;
+use by_window::ByWindow;
+use settling::Spacing;
+use tile::Tile;
+
+mod bright;
+mod by_window;
+mod settling;
+mod sorted;
+mod tile;
+mod whole;
+
+/// Counts macropixels; keeps its tables from one to the next.
+pub(super) struct Counting<'a> {
+    engine: &'a Window,
+    stream: &'a PhotonStream,
+    binning: Binning,
+    /// What a CLK period adds to its bin, by the number of SPADs that fired.
+    adds: [i64; SPADS + 1],
+    spacing: Spacing,
+    plain: Drawn,
+    breeding: ByWindow,
+    /// Photons of light with several layers, one for each part.
+    layers: Vec<ByWindow>,
+    past: PastDraws,
+    /// Codes of all photons drawn for the group that do not breed. Photons are known by their index here.
+    codes: Codes,
+    scratch: Scratch,
+    /// Where the codes of `plain.previous` and `plain.carried` begin.
+    first_code: [usize; 2],
+    tables: Tables,
+    /// Photons of one cycle: index, row and SPAD.
+    together: Vec<(usize, Code)>,
+    /// SPADs that fired by row, in one cycle.
+    fired: [u8; ROWS],
+    /// Photons of one cycle's window.
+    photons: Vec<Photon>,
+    /// The same as words that sort by time.
+    keys: Vec<u64>,
+    /// Photons by cycle of the group, where whole cycles are settled.
+    by_cycle: Vec<(u32, Photon)>,
+    events: Vec<SpadEvent>,
+    /// The same with their bin + 1; 0 outside the window.
+    placed: Vec<(SpadEvent, usize)>,
+    /// Of each part of bright light.
+    listed: Vec<ListedEchoes>,
+    /// Laser cycles side by side, in bright light.
+    tile: Option<Box<Tile>>,
+}
+
+/// What was drawn of a group.
+#[derive(Debug, Default)]
+struct Drawn {
+    /// Photons of the windows' own cycles.
+    own: Draw,
+    /// Photons of the group's cycles for the windows of the next cycles.
+    previous: Draw,
+    /// Photons of the last cycle of the group before, for the window of the first cycle; all in cycle 0.
+    carried: Vec<(Place, i64)>,
+}
+
+impl Drawn {
+    fn draw(&mut self, light: &PixelStream<'_>, group: Group, spans: &Spans) -> u64 {
+        light.draw(group, &spans.own, &mut self.own);
+        light.draw(group, &spans.previous, &mut self.previous);
+        (self.own.len() + self.previous.len()) as u64
+    }
+
+    /// Keeps what the first window of the next group may see.
+    fn carry(&mut self, light: &PixelStream<'_>, group: Group) {
+        self.carried.clear();
+        if self.previous.is_empty() {
+            return;
+        }
+        let photons =
+            self.previous
+                .photons(light, group.cycles())
+                .filter_map(|(place, time_fs)| {
+                    let (cycle, spad) = group.split(place);
+                    (cycle + 1 == group.cycles()).then_some((Place::from(spad), time_fs))
+                });
+        self.carried.extend(photons);
+    }
+
+    /// All photons by the cycle of the group whose window they are drawn for, the first `cycles` of them.
+    fn photons<'d>(
+        &'d self,
+        light: &'d PixelStream<'d>,
+        stream: &'d PhotonStream,
+        group: Group,
+        cycles: u32,
+    ) -> impl Iterator<Item = (u32, Photon)> + 'd {
+        let first = group.first_cycle();
+        let photon = move |cycle: u32, spad: u8, time_fs: i64| Photon {
+            time: stream.cycle_start(cycle) + Time::from_fs(time_fs),
+            spad,
+            breeds: light.breeds(),
+        };
+        let own = self
+            .own
+            .photons(light, cycles)
+            .map(move |(place, time_fs)| {
+                let (cycle, spad) = group.split(place);
+                (cycle, photon(first + cycle, spad, time_fs))
+            });
+        let previous = self.previous.photons(light, cycles.saturating_sub(1));
+        let previous = previous.map(move |(place, time_fs)| {
+            let (cycle, spad) = group.split(place);
+            (cycle + 1, photon(first + cycle, spad, time_fs))
+        });
+        let carried = self.carried.iter();
+        let carried =
+            carried.map(move |&(spad, time_fs)| (0, photon(first - 1, spad as u8, time_fs)));
+        own.chain(previous).chain(carried)
+    }
+}
+
+/// Which part of a light of one layer breeds, if one does.
+const BREEDING: usize = 1;
+
+/// One macropixel.
+struct Pixel<'p> {
+    sight: &'p Sight,
+    /// All parts of the light.
+    parts: &'p [PixelStream<'p>],
+    /// The first of them, which does not breed.
+    light: &'p PixelStream<'p>,
+    /// The photons that do, where there is but one layer.
+    breeding: Option<&'p PixelStream<'p>>,
+    /// Photons of `plain.own` and `plain.previous`.
+    wanted: [Wanted; 2],
+    echo: Option<EchoRows>,
+    hits: Vec<i64>,
+    work: Work,
+}
+
+impl<'a> Counting<'a> {
+    /// For macropixels of `engine` in the light of `stream`.
+    pub(super) fn new(engine: &'a Window, stream: &'a PhotonStream) -> Self {
+        let bins = engine.sensor.bins;
+        let dead_s = stream.config().spads.dead_time.as_s();
+        let dead_rows = (dead_s * engine.exposure.clock.as_hz()) as usize;
+        Counting {
+            engine,
+            stream,
+            binning: Binning::new(bins, engine.exposure.clock.as_hz(), stream.slots()),
+            spacing: Spacing {
+                bins,
+                far: dead_rows + 2,
+                blind: dead_rows,
+            },
+            adds: std::array::from_fn(|spads| engine.adds((1 << spads) - 1)),
+            plain: Drawn::default(),
+            breeding: ByWindow::default(),
+            layers: Vec::new(),
+            past: PastDraws::default(),
+            codes: Codes::default(),
+            scratch: Scratch::default(),
+            first_code: [0; 2],
+            tables: Tables::take(),
+            together: Vec::new(),
+            fired: [0; ROWS],
+            photons: Vec::new(),
+            keys: Vec::new(),
+            by_cycle: Vec::new(),
+            events: Vec::new(),
+            placed: Vec::new(),
+            listed: Vec::new(),
+            tile: None,
+        }
+    }
+
+    /// Keeps its tables for who counts next on this thread.
+    pub(super) fn finish(self) {
+        self.tables.keep();
+    }
+
+    /// Hits of every bin of a macropixel, and what they took. `parts` are those of its light ([`PhotonStream::parts`]).
+    pub(super) fn expose(&mut self, sight: &Sight, parts: &[PixelStream<'_>]) -> (Vec<i64>, Work) {
+        let light = &parts[0];
+        let breeding = parts.get(BREEDING).filter(|_| light.is_alone());
+        let origins_fs = [sight.first_fs, sight.first_fs + self.stream.cycle_fs()];
+        let origin_slots = origins_fs.map(|origin_fs| self.binning.slot_of(origin_fs));
+        let has_slots_for_bins = origin_slots.iter().all(Option::is_some);
+        let has_marks = self.stream.spads() == SPADS;
+        let wanted = [0, 1].map(|later| Wanted {
+            cycles: 0,
+            later,
+            origin_fs: origins_fs[later as usize],
+            origin_slot: origin_slots[later as usize].unwrap_or(0),
+        });
+        let (bins, clk_hz) = (self.engine.sensor.bins, self.engine.exposure.clock.as_hz());
+        let has_clk_bins = self.engine.law.has_clk_bins();
+        let within_fs = sight.plain.own.within_fs.clone();
+        let mut pixel = Pixel {
+            sight,
+            parts,
+            light,
+            breeding,
+            wanted,
+            echo: has_clk_bins
+                .then(|| EchoRows::new(light, bins, 1e15 / clk_hz, origins_fs[0], within_fs))
+                .flatten(),
+            hits: self.engine.law.empty_hits(&sight.window),
+            work: Work::default(),
+        };
+        self.plain.carried.clear();
+        self.past.clear();
+        self.breeding.clear();
+        if light.is_bright() {
+            self.count_bright(&mut pixel);
+            return (pixel.hits, pixel.work);
+        }
+        if !light.is_alone() || !has_clk_bins {
+            match self.can_sort(&pixel) {
+                true => self.count_sorted(&mut pixel),
+                false => self.count_layers(&mut pixel),
+            }
+            return (pixel.hits, pixel.work);
+        }
+        self.tables.clear_counts();
+        let sees_own_echo_only = pixel.sees_own_echo_only();
+        let before_exposure_fs = sight
+            .breeding
+            .own
+            .within_fs
+            .start
+            .min(light.echo_fs().start);
+        let sees_before = sight.sees_the_beginning() || before_exposure_fs < 0;
+        for group in self.stream.groups() {
+            let cycles = group.cycles_in(self.stream.config().laser_cycles);
+            pixel.work.photons_drawn += self.plain.draw(light, group, &sight.plain);
+            if let Some(breeding) = breeding {
+                let (first, spans) = (group.first_cycle(), &sight.breeding);
+                pixel.work.photons_drawn += self.breeding.draw(breeding, self.stream, first, spans);
+            }
+            // Photons that come before the exposure are left out there.
+            let is_first = group.first_cycle() == 0 && sees_before;
+            let is_simple = has_marks && has_slots_for_bins && !is_first && sees_own_echo_only;
+            if is_simple && self.encode(&mut pixel, cycles) <= MOST_PHOTONS {
+                self.count_cells(&mut pixel, group);
+            } else {
+                self.count_whole(&mut pixel, group, cycles);
+            }
+            self.plain.carry(light, group);
+        }
+        for (row, hits) in (1..).zip(&mut pixel.hits) {
+            let photons = u64::from(self.tables.count(row));
+            *hits += self.adds[1] * photons as i64;
+            pixel.work.clk_periods_visited += photons;
+            pixel.work.pulses += photons;
+        }
+        (pixel.hits, pixel.work)
+    }
+
+    /// Encodes all photons that the windows of a group may see and that do not breed; returns how many codes there are.
+    fn encode(&mut self, pixel: &mut Pixel<'_>, cycles: u32) -> usize {
+        self.codes.clear();
+        let [own, previous] = &mut pixel.wanted;
+        own.cycles = cycles;
+        previous.cycles = cycles - 1;
+        let draws = [&self.plain.own, &self.plain.previous];
+        for (part, draw) in draws.into_iter().enumerate() {
+            let (wanted, echo) = (&pixel.wanted[part], pixel.echo.as_ref());
+            let scratch = &mut self.scratch;
+            self.binning
+                .encode(pixel.light, draw, wanted, echo, scratch, &mut self.codes);
+            self.first_code[part] = self.codes.len();
+        }
+        let wanted = Wanted {
+            cycles: 1,
+            later: 0,
+            ..pixel.wanted[1]
+        };
+        for &photon in &self.plain.carried {
+            self.binning.push(&wanted, Some(photon), &mut self.codes);
+        }
+        self.codes.fill_up(SIDE_BY_SIDE);
+        self.codes.len()
+    }
+
+    fn count_cells(&mut self, pixel: &mut Pixel<'_>, group: Group) {
+        let own = pixel.wanted[0];
+        // Where all background photons of the cycles are wanted, their slots tell how many there are in each bin.
+        let mut counted = 0;
+        if own.cycles == group.cycles() {
+            counted = self.plain.own.words()[0].len() * PER_BLOCK;
+            for run in self.plain.own.runs() {
+                let row = self.binning.row_of(&own, run.slot);
+                self.tables.add(row, run.photons);
+            }
+        }
+        self.tables
+            .put(&self.codes, group.cycles() as usize, counted);
+        if pixel.breeding.is_some() {
+            self.count_breeding_cycles(pixel, group);
+        }
+        let mut index = 0;
+        while let Some(special) = self.tables.special(index, &self.codes) {
+            self.settle(pixel, special, group);
+            index += 1;
+        }
+    }
+
+    /// When a photon came, relative to the start of the laser cycle of its window.
+    fn time_of(&self, light: &PixelStream<'_>, photon: usize, laser_cycle: u32) -> Time {
+        let Drawn {
+            own,
+            previous,
+            carried,
+        } = &self.plain;
+        let time_fs = if photon < self.first_code[0] {
+            return Time::from_fs(in_draw(light, own, photon));
+        } else if photon < self.first_code[1] {
+            in_draw(light, previous, photon - self.first_code[0])
+        } else {
+            carried[photon - self.first_code[1]].1
+        };
+        Time::from_fs(time_fs) - self.before(laser_cycle)
+    }
+
+    /// Whether a photon, perhaps of the echo, is one of those drawn.
+    fn is_drawn(&self, light: &PixelStream<'_>, photon: usize) -> bool {
+        let own = &self.plain.own;
+        let is_of_echo = photon < self.first_code[0] && photon >= PER_BLOCK * own.slots().len();
+        !is_of_echo || own.within_fs().contains(&in_draw(light, own, photon))
+    }
+
+    /// The window of a laser cycle.
+    fn window<'w>(&self, sight: &'w Sight, laser_cycle: u32) -> Placed<'w>
+    where
+        'a: 'w,
+    {
+        Placed {
+            engine: self.engine,
+            sight,
+            laser_cycle,
+        }
+    }
+
+    /// How long before a laser cycle the one before it starts.
+    fn before(&self, laser_cycle: u32) -> Time {
+        let start = |cycle| self.stream.cycle_start(cycle);
+        start(laser_cycle) - start(laser_cycle - 1)
+    }
+}
+
+impl Pixel<'_> {
+    /// What is drawn of a part of the light.
+    fn spans(&self, part: &PixelStream<'_>) -> &Spans {
+        match part.breeds() {
+            true => &self.sight.breeding,
+            false => &self.sight.plain,
+        }
+    }
+
+    /// Whether windows see no echo of another cycle than their own.
+    fn sees_own_echo_only(&self) -> bool {
+        let sees_own_only = |light: &PixelStream<'_>, spans: &Spans| {
+            light
+                .echoes_within(&(spans.from_fs..self.sight.until_fs))
+                .all(|later| later == 0)
+        };
+        let breeding = self.breeding;
+        sees_own_only(self.light, &self.sight.plain)
+            && breeding.is_none_or(|light| sees_own_only(light, &self.sight.breeding))
+    }
+}
+
+/// When the photon of the `at`-th code of a draw came after the start of its cycle, fs.
+fn in_draw(light: &PixelStream<'_>, draw: &Draw, at: usize) -> i64 {
+    let blocks = draw.slots().len();
+    match at.checked_sub(PER_BLOCK * blocks) {
+        Some(signal) => light.signal_photon(draw, signal).1,
+        None => {
+            let row = (1..PER_BLOCK).filter(|row| at >= row * blocks).count();
+            let block = at - row * blocks;
+            let word = draw.words()[row][block];
+            light.slots().time_fs(draw.slots()[block], word)
+        }
+    }
+}
+
+/// The window of one laser cycle.
+struct Placed<'w> {
+    engine: &'w Window,
+    sight: &'w Sight,
+    laser_cycle: u32,
+}
+
+impl Placed<'_> {
+    /// Whether a time relative to the start of the laser cycle is within the window.
+    fn is_seen(&self, time: Time) -> bool {
+        let is_inside = self.sight.rows.are_around(time.as_fs());
+        is_inside.unwrap_or_else(|| self.row_of(time).is_some())
+    }
+
+    /// Bin + 1 of a time relative to the start of the laser cycle, if it is within the window.
+    fn row_of(&self, time: Time) -> Option<usize> {
+        if let Some(row) = self.sight.rows.row_of(time.as_fs()) {
+            return Some(row).filter(|&row| row > 0);
+        }
+        let (law, cycle) = (&self.engine.law, i64::from(self.laser_cycle));
+        let pulse = self.engine.exposure.stop(cycle) + time;
+        let bin = law.bin_of(&self.sight.window, cycle, pulse)?;
+        Some(bin + 1)
+    }
+}

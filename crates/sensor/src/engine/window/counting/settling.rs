@@ -1,0 +1,293 @@
+//! Settling the few laser cycles in which counting every photon is wrong.
+//!
+//! ```text
+//!   one special photon  ── shares its bin               ──► the bin's CLK period has two SPADs
+//!        │              ── shares its SPAD, farther apart than the memory ──► both count
+//!        │              ── shares its SPAD, closer      ──► the second is lost, if the first was seen for certain
+//!        ╰─ else, more of them, or one near an edge     ──► SPAD by SPAD, with as much of the past as it takes
+//! ```
+//!
+//! What other photons the cycle has does not matter in the first three cases: whoever shared a SPAD or a bin with
+//! them, too, would be special as well.
+
+use super::{Counting, Pixel, in_draw};
+use crate::engine::window::codes::{Code, SPAD_MARKS};
+use crate::engine::window::tables::Special;
+use crate::photon::{Group, Photon};
+
+/// What the rows of a SPAD's only two photons tell, neither of which is doubtful.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Spacing {
+    /// Rows of bins, 1 to this.
+    pub bins: usize,
+    /// Farther apart than the SPADs' memory, if by more.
+    pub far: usize,
+    /// Closer than it, if by less and both in bins.
+    pub blind: usize,
+}
+
+impl Spacing {
+    /// Whether both make pulses as far as anybody can see: nothing is counted outside the window, and photons far apart do
+    /// not meet. `first` is the lower row.
+    #[inline(always)]
+    pub(super) fn both_fire(&self, first: usize, second: usize) -> bool {
+        (second == 0) | (first > self.bins) | ((first > 0) & (second - first > self.far))
+    }
+
+    /// Whether the photon in the `second` row meets the blindness that the `first` one leaves, the lower row.
+    #[inline(always)]
+    pub(super) fn one_fires(&self, first: usize, second: usize) -> bool {
+        let apart = second - first;
+        (first > 0) & (second <= self.bins) & (apart > 0) & (apart < self.blind)
+    }
+}
+
+impl Counting<'_> {
+    /// Settles the cycle of a special photon.
+    pub(super) fn settle(&mut self, pixel: &mut Pixel<'_>, special: Special, group: Group) {
+        let Special { photon, shared, .. } = special;
+        let code = self.codes.codes()[photon];
+        let is_settled = special.is_only
+            && match (shared & SPAD_MARKS != 0, shared & !SPAD_MARKS != 0) {
+                (false, _) => {
+                    self.settle_bin(pixel, photon, code);
+                    true
+                }
+                (true, false) => self.settle_partner(pixel, photon, code),
+                (true, true) => false,
+            };
+        if is_settled {
+            return;
+        }
+        if let Some(last) = self.tables.take_last(code.cycle()) {
+            self.settle_all(pixel, last, group.first_cycle() + code.cycle() as u32);
+        }
+    }
+
+    /// Settles a photon that shares its bin's mark, and where several bins have one mark perhaps its bin, with one of
+    /// another SPAD.
+    fn settle_bin(&mut self, pixel: &mut Pixel<'_>, photon: usize, code: Code) {
+        let row = code.row();
+        if self
+            .find_before(photon, |other| other.row() == row)
+            .is_some()
+        {
+            self.tables.remove(row);
+            self.tables.remove(row);
+            self.fire(pixel, row, 2);
+        }
+    }
+
+    /// Settles a photon that shares its SPAD with one of another bin, if what was before them does not matter, as it
+    /// mostly does not. Returns whether it did.
+    fn settle_partner(&mut self, pixel: &mut Pixel<'_>, photon: usize, code: Code) -> bool {
+        let Some(partner) = self.find_before(photon, |other| other.spad() == code.spad()) else {
+            debug_assert!(false, "a photon that shares its SPAD has a partner");
+            return false;
+        };
+        let photons = [partner, (photon, code)];
+        let Some(fired) = self.pair(pixel, photons) else {
+            return false;
+        };
+        for ((_, code), fired) in photons.into_iter().zip(fired) {
+            if fired == 0 {
+                self.tables.remove(code.row());
+            }
+        }
+        true
+    }
+
+    /// The last photon of the same cycle before this one that is like that.
+    fn find_before(&self, photon: usize, is_like: impl Fn(Code) -> bool) -> Option<(usize, Code)> {
+        let before = std::iter::successors(self.tables.before(photon), |&photon| {
+            self.tables.before(photon)
+        });
+        before
+            .map(|photon| (photon, self.codes.codes()[photon]))
+            .find(|&(_, code)| is_like(code))
+    }
+
+    /// Settles the `last` photon of a cycle and those before it.
+    fn settle_all(&mut self, pixel: &mut Pixel<'_>, last: usize, laser_cycle: u32) {
+        self.together.clear();
+        let (mut once, mut several, mut is_doubtful) = (0u64, 0u64, false);
+        let mut next = Some(last);
+        while let Some(photon) = next {
+            let code = self.codes.codes()[photon];
+            let spad = 1 << code.spad();
+            several |= once & spad;
+            if code.is_doubtful() {
+                several |= spad;
+                is_doubtful = true;
+            }
+            once |= spad;
+            self.together.push((photon, code));
+            next = self.tables.before(photon);
+        }
+        let work = pixel.work;
+        let mut left = several;
+        if !is_doubtful {
+            left = self.settle_pairs(pixel, several);
+        }
+        if left != 0 && pixel.breeding.is_some() {
+            // Photons that breed did not matter to the window so far, but may when it is looked back.
+            pixel.work = work;
+            for (_, code) in &self.together {
+                self.fired[code.row()] = 0;
+            }
+            let photons = self.breeding.of(laser_cycle..laser_cycle + 1).iter();
+            self.photons.clear();
+            self.photons.extend(photons.map(|&(_, photon)| photon));
+            self.take_cycle(pixel, Some(last), laser_cycle);
+            self.settle_cycle(pixel, laser_cycle);
+            return;
+        }
+        for (_, code) in &self.together {
+            self.tables.remove(code.row());
+            let alone = several >> code.spad() & 1 == 0;
+            self.fired[code.row()] += u8::from(alone);
+        }
+        while left != 0 {
+            let spad = left.trailing_zeros() as u8;
+            left &= left - 1;
+            self.settle_spad(pixel, laser_cycle, spad);
+        }
+        if is_doubtful {
+            for row in 0..=pixel.hits.len() {
+                self.tell(pixel, row);
+            }
+        }
+        for index in 0..self.together.len() {
+            let row = self.together[index].1.row();
+            self.tell(pixel, row);
+        }
+    }
+
+    /// Settles those of some SPADs that have just two photons and need no look back; returns the others.
+    fn settle_pairs(&mut self, pixel: &mut Pixel<'_>, spads: u64) -> u64 {
+        let mut left = spads;
+        let mut next = spads;
+        while next != 0 {
+            let spad = next.trailing_zeros() as u8;
+            next &= next - 1;
+            if self.settle_pair(pixel, spad) {
+                left &= !(1 << spad);
+            }
+        }
+        left
+    }
+
+    /// Adds what fired in a CLK period to its bin.
+    fn tell(&mut self, pixel: &mut Pixel<'_>, row: usize) {
+        let spads = std::mem::take(&mut self.fired[row]);
+        self.fire(pixel, row, spads);
+    }
+
+    /// Adds a CLK period in which `spads` SPADs fired to its bin.
+    #[inline]
+    fn fire(&self, pixel: &mut Pixel<'_>, row: usize, spads: u8) {
+        if let Some(hits) = pixel.hits.get_mut(row.wrapping_sub(1)) {
+            *hits += self.adds[usize::from(spads)];
+            pixel.work.clk_periods_visited += u64::from(spads > 0);
+            pixel.work.pulses += u64::from(spads);
+        }
+    }
+
+    /// Settles the photons of one SPAD if they are just two; neither is doubtful. Returns whether it did.
+    fn settle_pair(&mut self, pixel: &mut Pixel<'_>, spad: u8) -> bool {
+        let mut photons = self.together.iter().filter(|(_, code)| code.spad() == spad);
+        let (Some(&a), Some(&b), None) = (photons.next(), photons.next(), photons.next()) else {
+            return false;
+        };
+        let Some(fired) = self.pair(pixel, [a, b]) else {
+            return false;
+        };
+        for ((_, code), fired) in [a, b].into_iter().zip(fired) {
+            self.fired[code.row()] += fired;
+        }
+        true
+    }
+
+    /// Which of a SPAD's only two photons make pulses that are counted, if what was before them does not matter, as it
+    /// mostly is; neither is doubtful.
+    #[inline]
+    fn pair(&self, pixel: &mut Pixel<'_>, photons: [(usize, Code); 2]) -> Option<[u8; 2]> {
+        let [(photon, code), (other, other_code)] = photons;
+        let (row, other_row) = (code.row(), other_code.row());
+        let bins = pixel.hits.len();
+        let (first, second) = (row.min(other_row), row.max(other_row));
+        if self.spacing.both_fire(first, second) {
+            return Some([1; 2]);
+        }
+        if self.spacing.one_fires(first, second) {
+            pixel.work.lost_to_dead_time += 1;
+            let is_first = u8::from(row < other_row);
+            return Some([is_first, 1 - is_first]);
+        }
+        if photon.max(other) >= self.first_code[0] {
+            return None;
+        }
+        let time_fs = |photon| in_draw(pixel.light, &self.plain.own, photon);
+        let times_fs = [time_fs(photon), time_fs(other)];
+        let memory_fs = self.stream.config().spads.dead_time.as_fs();
+        let is_blind = (times_fs[0] - times_fs[1]).abs() <= memory_fs;
+        let is_seen = u64::from((1..=bins).contains(&second));
+        if is_blind {
+            // A photon in the window has been preceded by all the memory, in which there was none.
+            let first_fs = times_fs[0].min(times_fs[1]);
+            if first == 0 && first_fs - pixel.sight.plain.from_fs <= memory_fs {
+                return None;
+            }
+            pixel.work.lost_to_dead_time += is_seen;
+            let is_first = u8::from(times_fs[0] <= times_fs[1]);
+            return Some([is_first, 1 - is_first]);
+        } else if first == second {
+            // Two pulses within one CLK period cancel.
+            pixel.work.pulses += 2 * is_seen;
+            pixel.work.cancelled += 2 * is_seen;
+            return Some([0; 2]);
+        }
+        Some([1; 2])
+    }
+
+    /// Settles the photons of one SPAD among those `together`.
+    fn settle_spad(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spad: u8) {
+        let window = self.window(pixel.sight, laser_cycle);
+        let start = self.stream.cycle_start(laser_cycle);
+        self.photons.clear();
+        let mut seen = 0;
+        for &(photon, code) in &self.together {
+            if code.spad() == spad && self.is_drawn(pixel.light, photon) {
+                let time = self.time_of(pixel.light, photon, laser_cycle);
+                seen += u64::from(window.row_of(time).is_some());
+                self.photons.push(Photon {
+                    time: start + time,
+                    spad,
+                    breeds: false,
+                });
+            }
+        }
+        if seen == 0 {
+            return;
+        }
+        self.detect(pixel, laser_cycle, 1 << spad);
+        let mut last = None;
+        for event in &self.events {
+            let Some(row) = window.row_of(event.time - start) else {
+                continue;
+            };
+            seen -= 1;
+            // Two pulses within one CLK period cancel.
+            if last == Some(row) {
+                self.fired[row] -= 1;
+                pixel.work.pulses += 2;
+                pixel.work.cancelled += 2;
+                last = None;
+            } else {
+                self.fired[row] += 1;
+                last = Some(row);
+            }
+        }
+        pixel.work.lost_to_dead_time += seen;
+    }
+}

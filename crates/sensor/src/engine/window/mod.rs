@@ -1,0 +1,336 @@
+//! The window engine: only what a start value can see.
+//!
+//! The window law gives the rising CLK edges whose photons reach a bin. Each pulse is taken by one edge;
+//! the pulses of one edge that lies in the window of some laser cycle are summed, compared and counted.
+//! CLK periods without photons are never visited: what an empty period does is the same for all of them
+//! and is added in one step.
+//!
+//! In the light of a photon stream it draws only the slots that a window can see and those before it that may have
+//! blinded a SPAD ([`sight`]), and counts them a group of laser cycles at a time ([`counting`]). Macropixels whose
+//! SPADs are off or whose window never opens are left out.
+
+mod binning;
+mod codes;
+mod counting;
+mod echo_rows;
+mod past;
+mod sight;
+mod tables;
+mod wanted;
+
+use std::borrow::Cow;
+
+use super::exposing::refuse_other_spads;
+use super::own_clk::by_own_clk;
+use super::{
+    Cancelling, Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay,
+    Work, follows, has_a_line_a_spad,
+};
+use crate::chip::window_law::OpenWindow;
+use crate::chip::{Exposure, Sensor, Tdc, WindowLaw, correlation, histogram, photon_line};
+use crate::photon::{PhotonStream, PixelLight, SpadEvent};
+use counting::Counting;
+use sight::Sight;
+
+/// A window that opens, and what decides its histogram where that is a part of every laser cycle.
+type Opened = (OpenWindow, Option<Sight>);
+
+/// Counts through the window law.
+#[derive(Clone)]
+pub struct Window {
+    sensor: Sensor,
+    exposure: Exposure,
+    law: WindowLaw,
+    /// Whether `law` is that of one macropixel, where each has its own.
+    is_of_macropixel: bool,
+}
+
+impl Window {
+    /// An engine for this sensor and exposure.
+    pub fn new(sensor: impl Into<Sensor>, exposure: &Exposure) -> Self {
+        Self::with_law(WindowLaw::new(sensor, exposure))
+    }
+
+    /// An engine for macropixels with delays, or edges of bins, of their own, which `law` is made of.
+    pub fn with_law(law: WindowLaw) -> Self {
+        Window {
+            sensor: law.sensor().clone(),
+            exposure: *law.exposure(),
+            law,
+            is_of_macropixel: false,
+        }
+    }
+
+    /// An engine for any number of exposures of the one macropixel that `law` is of, whatever their numbers.
+    pub fn of_one(law: WindowLaw) -> Self {
+        Window {
+            is_of_macropixel: true,
+            ..Self::with_law(law)
+        }
+    }
+
+    /// This engine with the law of a macropixel.
+    fn of_macropixel(&self, number: u32) -> Cow<'_, Self> {
+        match self.sensor.has_own_laws() && !self.is_of_macropixel {
+            true => Cow::Owned(Self::of_one(self.law.of_macropixel(number))),
+            false => Cow::Borrowed(self),
+        }
+    }
+
+    /// The window of a start value, if it opens.
+    fn window(&self, start: u16) -> Result<Option<OpenWindow>, EngineError> {
+        follows(&self.sensor, &self.law.timing().pulses)?;
+        has_a_line_a_spad(&self.sensor)?;
+        Ok(self.law.window(start).settled()?)
+    }
+
+    /// Whether all photons of a macropixel are drawn, and not only those that its window may see: laser cycles hardly
+    /// longer than the window, SPADs that are blind nearly all the time, or bins that are not CLK periods.
+    pub fn draws_whole_cycles(&self, stream: &PhotonStream, pixel: &LitPixel) -> bool {
+        let window = self.law.window(pixel.start).open();
+        window
+            .zip(pixel.light.as_ref())
+            .is_some_and(|(window, light)| {
+                sight::is_blinding(stream, light)
+                    || Sight::new(&self.law, &window, stream).is_none()
+            })
+    }
+
+    fn is_event(&self, spads: u64) -> bool {
+        correlation::model(spads, self.sensor.event_type, self.sensor.threshold)
+    }
+
+    /// What the SPADs that fire in a bin add to its hits, beyond those of an empty macropixel.
+    fn adds(&self, spads: u64) -> i64 {
+        if self.sensor.tdc == Tdc::DelayLine {
+            return i64::from(spads.count_ones() % 2);
+        }
+        i64::from(self.is_event(spads)) - i64::from(self.is_event(0))
+    }
+
+    /// Counts pulses, sorted by time, of which no bin takes two parts.
+    fn count_pulses(&self, pulses: &[SpadEvent], window: &OpenWindow, hits: &mut [i64]) {
+        if self.sensor.tdc == Tdc::DelayLine {
+            let mut edges = pulses.to_vec();
+            self.keep_line_edges(&mut edges, |pulse| *pulse);
+            return self.count_between_edges(&edges, window, hits);
+        }
+        if !self.law.has_clk_bins() {
+            return self.count_between_edges(pulses, window, hits);
+        }
+        for (edge, spads) in taken(pulses, |pulse| self.law.edge_of(pulse.time)) {
+            let adds = self.adds(spads);
+            if adds != 0 {
+                for bin in self.law.bins_of_edge(window, edge) {
+                    hits[bin] += adds;
+                }
+            }
+        }
+    }
+
+    /// Keeps those of some pulses that leave an edge on the photon line.
+    fn keep_line_edges<P: Copy>(&self, pulses: &mut Vec<P>, event_of: impl Fn(&P) -> SpadEvent) {
+        let stage = self.law.timing().photon_line_stage;
+        let of = |pulse: &P| {
+            let event = event_of(pulse);
+            (event.time, event.spad)
+        };
+        photon_line::model(pulses, of, self.sensor.spads(), stage);
+    }
+
+    /// The same by the edges of the bins, whatever those are: laser cycle by laser cycle, leaving out those without pulses.
+    fn count_between_edges(&self, pulses: &[SpadEvent], window: &OpenWindow, hits: &mut [i64]) {
+        let cycles = self.law.latched_cycles();
+        let mut cycle = cycles.start;
+        let mut pulses = pulses;
+        while cycle < cycles.end {
+            let seen = self.law.interval_in(window, cycle);
+            // The next laser cycle's window may begin before this one's has ended.
+            pulses = &pulses[pulses.partition_point(|pulse| pulse.time < seen.start)..];
+            let Some(next) = pulses.first() else {
+                return;
+            };
+            if next.time < seen.end {
+                let within = pulses.partition_point(|pulse| pulse.time < seen.end);
+                let edges = self.law.edges(window, cycle);
+                let bin_of = |pulse: &SpadEvent| edges.bin_of(pulse.time);
+                for (bin, spads) in taken(&pulses[..within], bin_of) {
+                    let bin = bin.expect("a window is its bins");
+                    hits[bin] += self.adds(spads);
+                }
+                cycle += 1;
+            } else {
+                // Laser cycles are equal but for a femtosecond: at the latest in the one after these the pulse may be seen.
+                let cycle_fs = self.exposure.stop(1).as_fs();
+                let without = (next.time - seen.end).as_fs() / cycle_fs;
+                cycle += without.max(1);
+            }
+        }
+    }
+
+    /// Counts all pulses of a macropixel, part by part.
+    fn count_stream(
+        &self,
+        stream: &PhotonStream,
+        pixel: &LitPixel,
+        light: &PixelLight,
+        window: &OpenWindow,
+    ) -> (Vec<i64>, Work) {
+        let config = stream.config();
+        let cancelling = Cancelling::of(config.spads.dead_time, config.clock, || self.law.clone());
+        let mut hits = self.law.empty_hits(window);
+        let mut work = Work::default();
+        let mut cancelled = 0;
+        let mut count = |pulses: &[SpadEvent]| {
+            self.count_pulses(pulses, window, &mut hits);
+            let seen = cancelling
+                .as_ref()
+                .map(|cancelling| cancelling.seen(pixel.start, pulses));
+            cancelled += seen.unwrap_or(0);
+        };
+        // Pulses that the next ones may share a bin with.
+        let mut waiting: Vec<SpadEvent> = Vec::new();
+        let photons = stream.pixel_pulses(pixel.number, light, |pulses| {
+            work.pulses += pulses.len() as u64;
+            waiting.extend_from_slice(pulses);
+            let Some(last) = waiting.last().filter(|_| self.law.has_clk_bins()) else {
+                return;
+            };
+            let last_edge = self.law.edge_of(last.time);
+            let done = waiting.partition_point(|pulse| self.law.edge_of(pulse.time) < last_edge);
+            count(&waiting[..done]);
+            waiting.drain(..done);
+        });
+        count(&waiting);
+        work.cancelled = cancelled;
+        work.photons_drawn = photons.drawn;
+        work.lost_to_dead_time = photons.lost_to_dead_time;
+        work.clk_periods_visited = u64::from(config.stop_periods) * u64::from(config.laser_cycles);
+        (hits, work)
+    }
+
+    fn counts(&self, hits: &[i64]) -> Vec<u16> {
+        let (bits, overflow) = (self.sensor.bin_bits as u32, self.sensor.overflow);
+        hits.iter()
+            .map(|&n| histogram::model(n as u64, bits, overflow))
+            .collect()
+    }
+}
+
+impl Engine for Window {
+    fn law(&self) -> WindowLaw {
+        self.law.clone()
+    }
+
+    fn bins(&self) -> usize {
+        self.sensor.bins
+    }
+
+    /// Macropixels in bright light stand together, and take so much longer than others that in larger batches some processors wait.
+    fn batch(&self) -> usize {
+        16
+    }
+}
+
+impl Replay for Window {
+    fn replay(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError> {
+        let mut histograms = Histograms::new(self.sensor.bins);
+        for &PulsedPixel {
+            number,
+            start,
+            pulses,
+        } in pixels
+        {
+            let engine = self.of_macropixel(number);
+            let mut hits = vec![0; self.sensor.bins];
+            if let Some(window) = engine.window(start)? {
+                hits = engine.law.empty_hits(&window);
+                engine.count_pulses(pulses, &window, &mut hits);
+            }
+            histograms.push(&self.counts(&hits));
+        }
+        Ok(histograms)
+    }
+
+    fn as_the_law_sees<'p>(&self, number: u32, pulses: &'p [SpadEvent]) -> Cow<'p, [SpadEvent]> {
+        match self.is_of_macropixel {
+            true => Cow::Borrowed(pulses),
+            false => by_own_clk(&self.sensor, number, pulses),
+        }
+    }
+}
+
+impl Expose for Window {
+    fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
+        refuse_other_spads(stream, pixels)?;
+        if self.sensor.has_own_laws() && !self.is_of_macropixel {
+            let mut exposed = Exposed::new(self.sensor.bins);
+            for pixel in pixels {
+                let engine = self.of_macropixel(pixel.number);
+                let alone = engine.expose(stream, std::slice::from_ref(pixel))?;
+                exposed.histograms.append(&alone.histograms);
+                exposed.work += alone.work;
+            }
+            return Ok(exposed);
+        }
+        let mut counting = Counting::new(self, stream);
+        let mut exposed = Exposed::new(self.sensor.bins);
+        // Many exposures of one macropixel, as a sweep takes them, are in one window.
+        let mut last: Option<(u16, Option<Opened>)> = None;
+        let clk_periods =
+            u64::from(self.exposure.stop_periods) * u64::from(self.exposure.laser_cycles);
+        for pixel in pixels {
+            let Some(light) = &pixel.light else {
+                exposed.histograms.push(&self.histogram(pixel.start, &[])?);
+                exposed.work.skipped_dark += 1;
+                continue;
+            };
+            let seen = match last.take() {
+                Some((start, seen)) if start == pixel.start => seen,
+                _ => self
+                    .window(pixel.start)?
+                    .map(|window| (window, Sight::new(&self.law, &window, stream))),
+            };
+            let (_, seen) = last.insert((pixel.start, seen));
+            let Some((window, sight)) = seen else {
+                exposed.histograms.push(&vec![0; self.sensor.bins]);
+                exposed.work.skipped_closed += 1;
+                continue;
+            };
+            let sight = sight.as_ref();
+            let sight = sight.filter(|_| !sight::is_blinding(stream, light));
+            let (hits, work) = match sight {
+                Some(sight) => {
+                    let parts = stream.parts(pixel.number, light);
+                    counting.expose(sight, &parts)
+                }
+                None => self.count_stream(stream, pixel, light, window),
+            };
+            exposed.histograms.push(&self.counts(&hits));
+            exposed.work += work;
+        }
+        counting.finish();
+        exposed.work.macropixels += pixels.len() as u64;
+        exposed.work.clk_periods += pixels.len() as u64 * clk_periods;
+        Ok(exposed)
+    }
+}
+
+/// Pulses grouped by what takes them, a CLK edge or a bin, and the SPADs with an odd number of them.
+fn taken<'p, K: PartialEq + 'p>(
+    pulses: &'p [SpadEvent],
+    taker_of: impl Fn(&SpadEvent) -> K + 'p,
+) -> impl Iterator<Item = (K, u64)> + 'p {
+    let mut pulses = pulses
+        .iter()
+        .map(move |pulse| (taker_of(pulse), pulse.spad))
+        .peekable();
+    std::iter::from_fn(move || {
+        let (taker, spad) = pulses.next()?;
+        let mut spads = 1 << spad;
+        while let Some((_, spad)) = pulses.next_if(|(other, _)| *other == taker) {
+            spads ^= 1 << spad;
+        }
+        Some((taker, spads))
+    })
+}

@@ -1,0 +1,21 @@
+#![cfg_attr(not(test), warn(unreachable_pub))]
+//! The chip, the ways to run it, and depth from what it counts.
+//!
+//! | module | what lives there |
+//! |---|---|
+//! | [`chip`] | the circuits beside their reference models, the window law |
+//! | [`stimulus`] | stimulus, recordings, hardware events, Verilog testbench |
+//! | [`engine`] | the ways to run an exposure |
+//! | [`analysis`] | the periods, corners and spread that static timing allows |
+//! | [`waves`] | waveforms as files, with views beside them |
+//! | [`ranging`] | depth from histograms |
+
+pub mod analysis;
+pub mod chip;
+pub mod engine;
+pub mod ranging;
+pub mod stimulus;
+pub mod waves;
+
+pub use femtogate::{Origin, kernel, logic, netlist};
+pub use guided_dtof_light::{files, numerics, photon, settings, theory, units};

@@ -1,0 +1,223 @@
+//! The mean histogram of an echo: what dead time and one count a bin make of a known pulse.
+//!
+//! ```text
+//!   light      signal·(Gaussian about the arrival) + background, shared evenly by the SPADs
+//!   SPAD       fires with rate light × chance that it is ready; then it is blind for the dead time
+//!   bin        counts in a laser cycle if as many SPADs fired in it as TYPE and THRESHOLD ask for
+//! ```
+//!
+//! Bins are equal. Times are in bins: bin i reaches from i − ½ to i + ½, as positions of peaks do. A SPAD's chance to be ready follows
+//! exactly from the light: it is, unless it fired within the last dead time (non-paralysable), or unless a photon came
+//! within it (paralysable). SPADs fire independently, so the number of those that fire in a bin is binomial.
+//!
+//! How a SPAD goes through a laser cycle is [`spad_state`](super::spad_state)'s.
+//!
+//! Assumed: SPADs alike, and recovered from the echo before the next laser cycle's.
+
+use super::counting::Counting;
+use super::edge::share_before;
+use super::spad_state::{Dead, Spad};
+use crate::chip::{EventType, SensorConfig};
+use crate::numerics::Dual;
+use crate::units::Time;
+
+/// Steps to a bin, at least.
+const STEPS: usize = 4;
+
+/// Steps to a dead time, at least, and to the time in which light fires a SPAD, where SPADs fire again under a pulse; and most
+/// steps to a bin.
+const STEPS_OF_DEAD_TIME: f64 = 12.0;
+const STEPS_OF_RATE: f64 = 8.0;
+const MOST_STEPS: f64 = 96.0;
+
+/// Standard deviations from its centre where a pulse begins and ends: 10⁻¹¹ of it is left out, less than a photon of 10¹⁰.
+const PULSE_REACH: f64 = 6.7;
+
+/// Parameters of the light: place, ln signal, ln background, ln width.
+pub(super) const PARAMETERS: usize = 4;
+
+/// Light on a macropixel, in mean photons that its SPADs would detect without dead time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EchoLight {
+    /// Centre of the echo, bins.
+    pub position_bins: f64,
+    /// Photons of the echo in a laser cycle.
+    pub signal: f64,
+    /// Background and dark counts in a bin and laser cycle.
+    pub background_per_bin: f64,
+    /// Standard deviation of the echo, bins: that of the laser pulse with all jitter ([`Response::pulse_sigma_bins`]), or more.
+    pub sigma_bins: f64,
+}
+
+/// How finely time goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Steps {
+    /// To find where to look.
+    Coarse,
+    /// As finely as the light needs.
+    Fine,
+}
+
+/// How a macropixel answers to light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Response {
+    bins: usize,
+    pulse_sigma_bins: f64,
+    counting: Counting,
+    dead: Dead,
+}
+
+impl Response {
+    /// Of a sensor's macropixels, with bins of `bin_s` seconds each, to Gaussian pulses of standard deviation `pulse_sigma`,
+    /// all jitter included.
+    pub fn new(config: &SensorConfig, bin_s: f64, pulse_sigma: Time) -> Self {
+        let grid = config.spad_grid();
+        // Each of four directions is as likely; at an edge there is nobody.
+        let neighbours = 2.0 * grid.neighbours() as f64 / (4 * grid.spads()) as f64;
+        Response {
+            bins: config.bins,
+            pulse_sigma_bins: pulse_sigma.as_s() / bin_s,
+            counting: Counting {
+                event_type: config.event_type,
+                threshold: usize::from(config.threshold),
+                spads: config.spads(),
+            },
+            dead: Dead {
+                time_bins: config.dead_time().as_s() / bin_s,
+                paralysable: config.paralysable,
+                afterpulses: config.afterpulse_probability,
+                afterpulse_bins: (config.afterpulse_time_ns * 1e-9 / bin_s).max(1e-9),
+                crosstalk: config.crosstalk_probability * neighbours,
+            },
+        }
+    }
+
+    /// What counts where this does not, and the other way round; `None` where that is no TYPE and THRESHOLD. Of light that makes
+    /// this count less, the other counts more.
+    pub(super) fn complement(&self) -> Option<Self> {
+        let threshold = match (self.counting.event_type, self.counting.threshold) {
+            (EventType::Less, threshold @ 1..) => threshold - 1,
+            (EventType::Equal, 0) => 0,
+            _ => return None,
+        };
+        let mut other = *self;
+        other.counting.event_type = EventType::Greater;
+        other.counting.threshold = threshold;
+        Some(other)
+    }
+
+    pub(super) fn counting(&self) -> &Counting {
+        &self.counting
+    }
+
+    /// Histogram bins.
+    pub(crate) fn bins(&self) -> usize {
+        self.bins
+    }
+
+    /// Dead time, bins.
+    pub(crate) fn dead_time_bins(&self) -> f64 {
+        self.dead.time_bins
+    }
+
+    /// Standard deviation of the pulse, bins.
+    pub fn pulse_sigma_bins(&self) -> f64 {
+        self.pulse_sigma_bins
+    }
+
+    /// The chance of every bin to count in a laser cycle.
+    pub fn chances(&self, light: &EchoLight) -> Vec<f64> {
+        self.chances_in(light, Steps::Fine)
+    }
+
+    pub(super) fn chances_in(&self, light: &EchoLight, steps: Steps) -> Vec<f64> {
+        let chances = self.chances_of::<0>(light, steps);
+        chances.iter().map(|chance| chance.value).collect()
+    }
+
+    /// Whether this light needs finer steps than the fewest.
+    pub(super) fn needs_fine_steps(&self, light: &EchoLight) -> bool {
+        self.steps(light, Steps::Fine) > self.steps(light, Steps::Coarse)
+    }
+
+    /// Steps to a bin.
+    fn steps(&self, light: &EchoLight, steps: Steps) -> usize {
+        let sigma = light.sigma_bins.max(1e-3);
+        let fires_once = self.dead.time_bins >= 2.0 * PULSE_REACH * sigma;
+        if steps == Steps::Coarse || fires_once && self.dead.time_bins >= 2.0 {
+            return STEPS.max((2.0 / self.dead.time_bins).min(16.0).ceil() as usize);
+        }
+        // Within the pulse SPADs fire again, and each firing is as sharp as the light is strong.
+        let rate = 0.4 * light.signal / (self.counting.spads as f64 * sigma);
+        let of_dead_time = STEPS_OF_DEAD_TIME / self.dead.time_bins;
+        let wanted = of_dead_time.max(STEPS_OF_RATE * rate).min(MOST_STEPS);
+        (wanted.ceil() as usize).max(STEPS)
+    }
+
+    /// The chances with their slopes with the first K parameters.
+    pub(super) fn chances_of<const K: usize>(
+        &self,
+        light: &EchoLight,
+        steps: Steps,
+    ) -> Vec<Dual<K>> {
+        let dual = |value: f64, slopes: [f64; PARAMETERS]| Dual {
+            value,
+            slope: std::array::from_fn(|parameter| slopes[parameter]),
+        };
+        let per_spad = 1.0 / self.counting.spads as f64;
+        let signal = light.signal * per_spad;
+        let background = light.background_per_bin * per_spad;
+        let background = dual(background, [0.0, 0.0, background, 0.0]);
+        let sigma = light.sigma_bins.max(1e-6);
+        let steps_per_bin = self.steps(light, steps);
+        let h = 1.0 / steps_per_bin as f64;
+
+        // Light of the pulse on a SPAD until a time.
+        let centre = light.position_bins;
+        let (starts, ends) = (centre - PULSE_REACH * sigma, centre + PULSE_REACH * sigma);
+        let seen = |time: f64| -> Dual<K> {
+            if time <= starts || time >= ends {
+                let value = if time <= starts { 0.0 } else { signal };
+                return dual(value, [0.0, value, 0.0, 0.0]);
+            }
+            let z = (time - centre) / sigma;
+            let (share, density) = share_before(z);
+            let (value, by_place) = (signal * share, -signal * density / sigma);
+            dual(value, [by_place, value, 0.0, by_place * z * sigma])
+        };
+        // Before the pulse the SPADs are as the background alone leaves them: nothing happens before it begins.
+        let last = self.bins as f64 - 0.5;
+        // Of an echo long before the first bin nothing is left.
+        let forgotten = -8.0 - 2.0 * self.dead.time_bins - 4.0 * PULSE_REACH * sigma;
+        let begin_bin = (starts + 0.5).clamp(forgotten, self.bins as f64).floor();
+        let begin = begin_bin - 0.5;
+        let mut chances = Vec::with_capacity(self.bins);
+        let mut spad = Spad::steady(&self.dead, background, h);
+        let steady = {
+            let mut of_bin = spad.clone();
+            of_bin.begin_bin();
+            for _ in 0..steps_per_bin {
+                of_bin.step(background * h);
+            }
+            of_bin.chance(&self.counting)
+        };
+        for _ in 0..begin_bin.max(0.0) as usize {
+            chances.push(steady);
+        }
+        let steps = ((last - begin) / h).round() as usize;
+        let mut seen_before = seen(begin);
+        for step in 0..steps {
+            let time = begin + (step + 1) as f64 * h;
+            if step % steps_per_bin == 0 {
+                spad.begin_bin();
+            }
+            let seen_after = seen(time);
+            spad.step(background * h + (seen_after - seen_before));
+            seen_before = seen_after;
+            if (step + 1) % steps_per_bin == 0 && time > 0.0 {
+                chances.push(spad.chance(&self.counting));
+            }
+        }
+        chances
+    }
+}

@@ -1,0 +1,151 @@
+//! Bin profiles: when the bins of every macropixel begin and end, for a TDC with delay lines (thesis 6.3.1, Eq. 29,
+//! Fig. 88 to 93).
+//!
+//! ```text
+//!   laser trigger │                C_0   C_1    C_2        C_i: middle of bin i
+//!                 ├─────────────── · ┼── · ──┼── · ──┼ …   even windows; odd ones have a line of their own
+//! ```
+//!
+//! A profile is measured on one window of either kind; others come a whole number of steps later. What a calibration does not know
+//! is [`BinProfile::ideal`]: elements that are all alike, and a CLK that comes everywhere at once.
+
+use serde::{Deserialize, Serialize};
+
+use crate::chip::{Exposure, Sensor, SensorConfig, WindowLaw};
+
+/// Bins of one delay line.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LineProfile {
+    /// Middle of each bin after the laser trigger, s: C_i of Eq. 29.
+    pub middle_s: Vec<f64>,
+    /// Length of each bin, s.
+    pub length_s: Vec<f64>,
+}
+
+/// Bins of a whole sensor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BinProfile {
+    /// The sensor that they belong to.
+    pub sensor: SensorConfig,
+    /// The start values of the windows that were measured, an even and an odd one.
+    pub starts: [u16; 2],
+    /// The lines of every macropixel, row-major: that of even start values, that of odd ones.
+    pub macropixels: Vec<[LineProfile; 2]>,
+}
+
+/// A profile that is another sensor's.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "it was measured on a sensor with {key} = {calibrated}, but this one has {key} = {present}"
+)]
+pub struct OtherSensor {
+    /// The first key that differs.
+    pub key: String,
+    /// What the profile's sensor has.
+    pub calibrated: String,
+    /// What this one has.
+    pub present: String,
+}
+
+/// Keys on which bins do not depend.
+const FREE: [&str; 13] = [
+    "bin_bits",
+    "overflow",
+    "dead_time_ns",
+    "paralysable",
+    "afterpulse_probability",
+    "afterpulse_time_ns",
+    "crosstalk_probability",
+    "event_type",
+    "threshold",
+    "load_clk_hz",
+    "reset_to_load",
+    "readout_pins",
+    "read_clk_hz",
+];
+
+impl BinProfile {
+    /// What is assumed without a calibration: elements of the mean delay, and no skew.
+    pub fn ideal(sensor: &Sensor, exposure: &Exposure) -> Self {
+        let law = WindowLaw::new(sensor.alike(), exposure);
+        let opens = |parity: u16| {
+            let mut starts = (parity..=sensor.largest_start()).step_by(2);
+            starts.find_map(|start| law.window(start).open())
+        };
+        let windows = [0, 1].map(opens);
+        let line = |window: &Option<_>| match window {
+            Some(window) => {
+                let edges = law.edges(window, 0);
+                let bins = (0..edges.bins()).map(|bin| edges.bin(bin));
+                let length = |bin: usize| edges.width(bin).as_s();
+                LineProfile {
+                    middle_s: bins
+                        .map(|b| (b.start.as_s() + b.end.as_s()) / 2.0)
+                        .collect(),
+                    length_s: (0..edges.bins()).map(length).collect(),
+                }
+            }
+            None => LineProfile {
+                middle_s: vec![0.0; sensor.bins],
+                length_s: vec![sensor.delay_element().as_s(); sensor.bins],
+            },
+        };
+        let lines = [line(&windows[0]), line(&windows[1])];
+        BinProfile {
+            sensor: SensorConfig::clone(sensor),
+            starts: [0, 1].map(|parity| windows[parity].map_or(parity as u16, |w| w.start)),
+            macropixels: vec![lines; sensor.pixels()],
+        }
+    }
+
+    /// Whether it is of this sensor, at this control voltage.
+    ///
+    /// # Errors
+    /// The first key on which bins depend and that differs.
+    pub fn check(&self, sensor: &SensorConfig) -> Result<(), OtherSensor> {
+        let table = |config| toml::Table::try_from(config).expect("numbers and words");
+        let (calibrated, present) = (table(&self.sensor), table(sensor));
+        let differs =
+            |key: &&String| !FREE.contains(&key.as_str()) && calibrated[*key] != present[*key];
+        match present.keys().find(differs) {
+            None => Ok(()),
+            Some(key) => Err(OtherSensor {
+                key: key.clone(),
+                calibrated: calibrated[key].to_string(),
+                present: present[key].to_string(),
+            }),
+        }
+    }
+
+    /// Middles of the bins of a macropixel (by its number, row-major) in the window of a start value, after the laser trigger, s.
+    pub fn middles_s(&self, number: usize, start: u16) -> Vec<f64> {
+        let parity = usize::from(start % 2);
+        let step_s = self.sensor.step_periods as f64 / self.sensor.clk_hz;
+        let later_s = (f64::from(start) - f64::from(self.starts[parity])) * step_s;
+        let middles = self.macropixels[number][parity].middle_s.iter();
+        middles.map(|middle| middle + later_s).collect()
+    }
+
+    /// Where the bins of a macropixel (by its number, row-major) begin in the window of a start value, and where the last one ends, after
+    /// the laser trigger, s.
+    pub fn edges_s(&self, number: usize, start: u16) -> Vec<f64> {
+        let lengths = &self.macropixels[number][usize::from(start % 2)].length_s;
+        let middles = self.middles_s(number, start);
+        let begins = middles.iter().zip(lengths);
+        let mut edges: Vec<f64> = begins
+            .map(|(middle, length)| middle - 0.5 * length)
+            .collect();
+        let last = middles.last().zip(lengths.last());
+        edges.extend(last.map(|(middle, length)| middle + 0.5 * length));
+        edges
+    }
+
+    /// Lengths of the bins of a macropixel over their mean, in windows of a start value.
+    pub fn shares(&self, number: usize, start: u16) -> Vec<f64> {
+        let lengths = &self.macropixels[number][usize::from(start % 2)].length_s;
+        let mean_s = lengths.iter().sum::<f64>() / lengths.len() as f64;
+        lengths.iter().map(|length| length / mean_s).collect()
+    }
+}

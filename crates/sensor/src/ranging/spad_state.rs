@@ -1,0 +1,334 @@
+//! Probabilities of a SPAD's states through a laser cycle: ready, blind, carriers trapped, and how often it fired in
+//! a bin.
+//!
+//! Time goes in steps, over which light and recovery are taken to be even; what a step's light does to a SPAD that is ready, or that
+//! recovers within the step, is exact. So the rising edge of an echo is exact however strong it is, and what comes after
+//! the dead time is as fine as the steps. A SPAD that fires twice within a bin toggles its flip-flop back (thesis 4.2), so with a dead time below a bin
+//! it counts where it fired an odd number of times, which follows from a second, signed, state of the SPAD.
+//!
+//! A SPAD that recovers may have carriers trapped, which fire it once more if no photon does before. Where it is paralysable,
+//! afterpulses come as further light, because what blinds them comes after the avalanche that they are of. Crosstalk
+//! comes as further light from what fires now. Neither breeds, as in [`photon::spad`](crate::photon). This leaves out squares of the two chances.
+
+use super::counting::Counting;
+use crate::numerics::Dual;
+
+/// What blinds SPADs and what avalanches cause; times in bins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Dead {
+    pub(super) time_bins: f64,
+    pub(super) paralysable: bool,
+    /// Afterpulses of an avalanche by light, and their time constant.
+    pub(super) afterpulses: f64,
+    pub(super) afterpulse_bins: f64,
+    /// Avalanches of neighbours for each by light, on average, if they are ready.
+    pub(super) crosstalk: f64,
+}
+
+/// The state of a SPAD, as chances.
+#[derive(Clone)]
+pub(super) struct Spad<'r, const K: usize> {
+    dead: &'r Dead,
+    /// Step, bins.
+    h: f64,
+    /// That it is ready, with or without trapped carriers.
+    ready: Dual<K>,
+    /// What blinds: avalanches, or where it is paralysable all light.
+    blinding: History<K>,
+    /// Avalanches after which carriers are trapped; where it is paralysable, afterpulses to be released.
+    trapping: History<K>,
+    /// That it is ready and carriers are trapped; where it is paralysable, that they are.
+    trapped: Dual<K>,
+    /// The share of carriers that stay trapped for a dead time.
+    kept: f64,
+    /// Avalanches of the bin, and those of them by crosstalk.
+    fired: Dual<K>,
+    by_crosstalk: Dual<K>,
+    parity: Option<Parity<K>>,
+    /// Whether a SPAD fires by light alone, and at most once in a bin.
+    is_plain: bool,
+}
+
+/// The same states, each with the sign of the SPAD's flip-flop since the bin began.
+#[derive(Clone)]
+struct Parity<const K: usize> {
+    ready: Dual<K>,
+    blind: Dual<K>,
+    blinding: History<K>,
+}
+
+impl<'r, const K: usize> Spad<'r, K> {
+    /// Under background alone, photons of a SPAD in a bin.
+    pub(super) fn steady(law: &'r Dead, background: Dual<K>, h: f64) -> Self {
+        let dead = law.time_bins;
+        let tau = law.afterpulse_bins;
+        let kept = (-dead / tau).exp();
+        let (mut fired, mut ready, mut trapped) = (background, Dual::ZERO, Dual::ZERO);
+        let mut light = background;
+        // Afterpulses and crosstalk are few: each round has the next power of their chance.
+        for _ in 0..6 {
+            ready = match law.paralysable {
+                false => Dual::constant(1.0) - fired * dead,
+                true => (light * -dead).exp(),
+            };
+            let bred = background * ready;
+            light = background + bred * law.crosstalk;
+            let traps = bred * law.afterpulses;
+            match law.paralysable {
+                false => {
+                    // A photon before it is released leaves it trapped for another dead time.
+                    let lost = light * (1.0 - kept) + Dual::constant(1.0 / tau);
+                    trapped = traps * lost.recip();
+                    fired = (light + trapped * (1.0 / tau))
+                        * (Dual::constant(1.0) + light * dead).recip();
+                }
+                true => {
+                    trapped = traps * tau;
+                    light += traps;
+                    fired = light * ready;
+                }
+            }
+        }
+        if !law.paralysable {
+            ready = Dual::constant(1.0) - fired * dead;
+        }
+        let traps = match law.paralysable {
+            false => background * ready * law.afterpulses + trapped * light * kept,
+            true => background * ready * law.afterpulses,
+        };
+        let blinding = match law.paralysable {
+            false => fired,
+            true => light,
+        };
+        let history = |of: Dual<K>| History::new(dead / h, of * h);
+        Spad {
+            dead: law,
+            h,
+            ready,
+            blinding: history(blinding),
+            trapping: history(traps),
+            trapped,
+            kept,
+            fired: Dual::ZERO,
+            by_crosstalk: Dual::ZERO,
+            is_plain: dead >= 1.0
+                && !law.paralysable
+                && law.afterpulses == 0.0
+                && law.crosstalk == 0.0,
+            parity: (dead < 1.0).then(|| Parity {
+                ready,
+                blind: Dual::constant(1.0) - ready,
+                blinding: history(blinding),
+            }),
+        }
+    }
+
+    pub(super) fn begin_bin(&mut self) {
+        (self.fired, self.by_crosstalk) = (Dual::ZERO, Dual::ZERO);
+        if let Some(parity) = &mut self.parity {
+            parity.ready = self.ready;
+            parity.blind = Dual::constant(1.0) - self.ready;
+            parity.blinding = self.blinding.clone();
+        }
+    }
+
+    /// A step with `photons` photons on the SPAD.
+    #[inline]
+    pub(super) fn step(&mut self, photons: Dual<K>) {
+        if !self.is_plain {
+            return self.step_bred(photons);
+        }
+        let (hit, late) = photons.hits();
+        let fired = self.ready * hit + self.blinding.ending() * late;
+        self.ready += self.blinding.ending() - fired;
+        self.blinding.push(fired);
+        self.fired += fired;
+    }
+
+    /// The same where avalanches may breed, where light blinds, or where a flip-flop may toggle back.
+    fn step_bred(&mut self, photons: Dual<K>) {
+        let dead = self.dead;
+        let recovering = self.blinding.ending();
+        let has_traps = dead.afterpulses > 0.0;
+        let mut light = photons;
+        if has_traps && dead.paralysable {
+            light += self.afterpulses();
+        }
+        let mut crosstalk = Dual::ZERO;
+        if dead.crosstalk > 0.0 {
+            let own = self.avalanches(light, recovering) * photons * positive(light).recip();
+            crosstalk = own * dead.crosstalk;
+            light += crosstalk;
+        }
+        let mut fired = self.avalanches(light, recovering);
+        // Avalanches of light, without those of afterpulses that came first.
+        let mut by_light = fired;
+        if has_traps && !dead.paralysable {
+            let (released, lost) = self.released(light, photons, fired);
+            fired += released - lost;
+            by_light = fired - released;
+        }
+        if has_traps && dead.paralysable {
+            let bred = fired * photons * positive(light).recip();
+            self.trapping.push(bred * dead.afterpulses);
+        }
+        if let Some(parity) = &mut self.parity {
+            let all = match fired.value > by_light.value {
+                true => light * fired * positive(by_light).recip(),
+                false => light,
+            };
+            parity.step(dead.paralysable, all, self.ready);
+        }
+        match dead.paralysable {
+            false => {
+                self.ready += recovering - fired;
+                self.blinding.push(fired);
+            }
+            true => {
+                self.ready = self.ready * (recovering - light).exp();
+                self.blinding.push(light);
+            }
+        }
+        if dead.crosstalk > 0.0 {
+            self.by_crosstalk += by_light * crosstalk * positive(light).recip();
+        }
+        self.fired += fired;
+    }
+
+    /// Avalanches under `light` while `recovering` SPADs recover; if the SPAD is paralysable, `recovering` is the
+    /// light that is forgotten.
+    #[inline]
+    fn avalanches(&self, light: Dual<K>, recovering: Dual<K>) -> Dual<K> {
+        match self.dead.paralysable {
+            false => {
+                let (hit, late) = light.hits();
+                self.ready * hit + recovering * late
+            }
+            true => self.ready * light * (light - recovering).exprel_neg(),
+        }
+    }
+
+    /// Afterpulses of this step, and avalanches of light that they are in place of.
+    fn released(&mut self, light: Dual<K>, photons: Dual<K>, fired: Dual<K>) -> (Dual<K>, Dual<K>) {
+        let dead = self.dead;
+        let release = Dual::constant(self.h / dead.afterpulse_bins);
+        let recovering = self.trapping.ending();
+        let both = light + release;
+        let (missed, missed_of_light) = (both.exprel_neg(), light.exprel_neg());
+        let one = Dual::constant(1.0);
+        // What fires those with trapped carriers, and what would have fired them without.
+        let gone = self.trapped * both * missed + recovering * (one - missed);
+        let of_light =
+            self.trapped * light * missed_of_light + recovering * (one - missed_of_light);
+        let released = gone * release * both.recip();
+        let fired_trapped = gone - released;
+        self.trapped += recovering - gone;
+        // Photons, but not crosstalk, trap carriers anew.
+        let photon_share = photons * positive(light).recip();
+        let fresh = (fired - of_light + fired_trapped) * photon_share * dead.afterpulses;
+        let old = fired_trapped * self.kept;
+        self.trapping
+            .push(fresh + old * (one - photon_share * dead.afterpulses));
+        (released, of_light - fired_trapped)
+    }
+
+    /// Afterpulses of this step, where they come as light.
+    fn afterpulses(&mut self) -> Dual<K> {
+        let spent = self.h / self.dead.afterpulse_bins;
+        let released = -(-spent).exp_m1();
+        let fresh = self.trapping.ending();
+        // Fresh ones come evenly over the step.
+        let of_fresh = 1.0 - released / spent;
+        let now = self.trapped * released + fresh * of_fresh;
+        self.trapped += fresh - now;
+        now
+    }
+
+    /// The chance of the bin that has ended to count.
+    pub(super) fn chance(&self, counting: &Counting) -> Dual<K> {
+        let fired = match &self.parity {
+            None => self.fired,
+            Some(parity) => (Dual::constant(1.0) - parity.ready - parity.blind) * 0.5,
+        };
+        if self.dead.crosstalk == 0.0 {
+            return counting.chance(fired, Dual::ZERO);
+        }
+        let crosstalk = self.by_crosstalk * positive(self.fired).recip();
+        let alone = fired * (Dual::constant(1.0) - crosstalk);
+        let children = crosstalk * (Dual::constant(1.0) - crosstalk).recip();
+        counting.chance(alone, children)
+    }
+}
+
+/// The same, above zero, to divide by.
+#[inline]
+fn positive<const K: usize>(mut number: Dual<K>) -> Dual<K> {
+    number.value = number.value.max(1e-300);
+    number
+}
+
+impl<const K: usize> Parity<K> {
+    /// A step with so much light on a SPAD that was ready with chance `was_ready`.
+    fn step(&mut self, paralysable: bool, light: Dual<K>, was_ready: Dual<K>) {
+        let missed = light.exprel_neg();
+        let mut recovering = self.blinding.ending();
+        if paralysable {
+            // Those of them that no photon has blinded anew: as many as there are SPADs that are ready.
+            recovering = recovering * was_ready;
+        }
+        let fired = self.ready * light * missed + recovering * (Dual::constant(1.0) - missed);
+        let (ready, blind) = (self.ready, self.blind);
+        self.ready += recovering - fired;
+        self.blind = blind - recovering - fired;
+        match paralysable {
+            false => self.blinding.push(Dual::ZERO - fired),
+            true => {
+                let blind = (blind + self.blind) * 0.5;
+                let ready = (ready + self.ready) * 0.5;
+                self.blinding.push(light * (blind - ready));
+            }
+        }
+    }
+}
+
+/// What happened step by step for a dead time, and what of it ends.
+#[derive(Clone)]
+struct History<const K: usize> {
+    /// The rest of the dead time beside whole steps, of which there is at least one.
+    part: f64,
+    /// In a ring, whose oldest entry is the next to be overwritten.
+    steps: Vec<Dual<K>>,
+    oldest: usize,
+}
+
+impl<const K: usize> History<K> {
+    /// `before` in every step until now.
+    fn new(delay: f64, before: Dual<K>) -> Self {
+        let delay = delay.max(1.0);
+        History {
+            part: delay.fract(),
+            steps: vec![before; delay as usize + 1],
+            oldest: 0,
+        }
+    }
+
+    #[inline]
+    fn push(&mut self, happened: Dual<K>) {
+        self.steps[self.oldest] = happened;
+        self.oldest = self.second();
+    }
+
+    /// What ends during the step that comes next.
+    #[inline]
+    fn ending(&self) -> Dual<K> {
+        self.steps[self.second()] * (1.0 - self.part) + self.steps[self.oldest] * self.part
+    }
+
+    #[inline]
+    fn second(&self) -> usize {
+        match self.oldest + 1 {
+            end if end == self.steps.len() => 0,
+            next => next,
+        }
+    }
+}

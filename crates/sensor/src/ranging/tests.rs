@@ -1,0 +1,490 @@
+//! Depths from simulated light: false alarms as often as stated, mean histograms as computed, range walk taken out to the
+//! bound of the counts, and reasons where it is not.
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::chip::hslidar_delay_line;
+use crate::chip::window_law::OpenWindow;
+use crate::chip::{EventType, Exposure, FrontEnd, SensorConfig, WindowLaw};
+use crate::engine::{LitPixel, Window, expose, stream_config};
+use crate::photon::{PhotonStream, PixelLight};
+use crate::units::{Time, TimeOfFlight};
+
+const PULSE_SIGMA: Time = Time::from_ps(1_911);
+
+/// A start value, and the chip that counts with it.
+struct Bench {
+    config: SensorConfig,
+    exposure: Exposure,
+    law: WindowLaw,
+    start: u16,
+    window: OpenWindow,
+}
+
+impl Bench {
+    /// Windows about a surface at `range_m`.
+    fn new(config: SensorConfig, laser_cycles: u32, range_m: f64) -> Self {
+        let exposure = Exposure::new(&config, 520, laser_cycles);
+        let law = WindowLaw::new(&config, &exposure);
+        let start = law.start_for(Time::of_flight(range_m)).unwrap();
+        let window = law.window(start).open().unwrap();
+        Bench {
+            config,
+            exposure,
+            law,
+            start,
+            window,
+        }
+    }
+
+    /// Histograms of `number` macropixels under the light of each.
+    fn expose(&self, seed: u64, number: u32, light: impl Fn(u32) -> PixelLight) -> Vec<Vec<u32>> {
+        let stream = stream_config(&self.config, &self.exposure, seed, PULSE_SIGMA);
+        let pixels: Vec<LitPixel> = (0..number)
+            .map(|number| LitPixel {
+                number,
+                start: self.start,
+                light: Some(light(number)),
+            })
+            .collect();
+        let engine = Window::new(&self.config, &self.exposure);
+        let exposed = expose(&engine, &PhotonStream::new(&stream), &pixels, |_| {}).unwrap();
+        let real = |counts: &[u16]| counts.iter().copied().map(u32::from).collect();
+        exposed.histograms.iter().map(real).collect()
+    }
+
+    fn echo(&self, position_bins: f64, signal_per_cycle: f64, background_hz: f64) -> PixelLight {
+        PixelLight::echo(
+            signal_per_cycle,
+            self.law.time_of(&self.window, position_bins),
+        )
+        .with_background(background_hz)
+    }
+}
+
+#[test]
+fn dark_windows_alarm_as_often_as_stated() {
+    // Counts a bin: 0.05, 2, 10, 60 and 130 of 200 laser cycles.
+    for (background_hz, laser_cycles, windows) in [
+        (2e4, 1000, 16_384),
+        (8e5, 1000, 16_384),
+        (8e6, 500, 16_384),
+        (8e7, 300, 16_384),
+        (4e8, 200, 2_048),
+    ] {
+        let bench = Bench::new(SensorConfig::default(), laser_cycles, 60.0);
+        let dark = bench.echo(0.0, 0.0, background_hz);
+        let options = DepthOptions::default();
+        let finder = EchoFinder::new(&bench.law, PULSE_SIGMA, &options).unwrap();
+        let histograms = bench.expose(3, windows, |_| dark.clone());
+        let sightings: Vec<Sighting> = histograms.iter().filter_map(|h| finder.find(h)).collect();
+        for rate in [1e-2, 1e-3] {
+            let alarms = sightings
+                .iter()
+                .filter(|s| s.confidence >= -f64::log10(rate));
+            let alarms = alarms.count() as f64;
+            let stated = rate * f64::from(windows);
+            // Three standard deviations and a bit for the smallest numbers.
+            assert!(
+                alarms <= stated + 3.0 * stated.sqrt() + 1.0,
+                "{background_hz}: {alarms} of {stated}"
+            );
+            // Two counts or three in a bin can hardly meet a rate; and of two expected alarms there may be none.
+            if background_hz > 1e5 && stated > 10.0 {
+                assert!(
+                    alarms >= 0.3 * stated,
+                    "{background_hz}: {alarms} of {stated}"
+                );
+            }
+        }
+        let significant = sightings.iter().filter(|s| s.is_significant).count();
+        let confident = sightings.iter().filter(|s| s.confidence >= 3.0).count();
+        assert_eq!(significant, confident);
+    }
+}
+
+#[test]
+fn the_mean_histogram_is_that_of_simulated_light() {
+    let default = SensorConfig::default;
+    let configs = [
+        default(),
+        SensorConfig {
+            paralysable: true,
+            ..default()
+        },
+        SensorConfig {
+            threshold: 2,
+            ..default()
+        },
+        SensorConfig {
+            event_type: EventType::Equal,
+            threshold: 1,
+            dead_time_ns: 21.3,
+            ..default()
+        },
+        SensorConfig {
+            event_type: EventType::Less,
+            threshold: 2,
+            ..default()
+        },
+        SensorConfig {
+            threshold: 1,
+            afterpulse_probability: 0.05,
+            crosstalk_probability: 0.05,
+            ..default()
+        },
+        SensorConfig {
+            paralysable: true,
+            afterpulse_probability: 0.05,
+            ..default()
+        },
+        // Shorter than a bin: SPADs that fire twice count nothing.
+        SensorConfig {
+            dead_time_ns: 1.0,
+            ..default()
+        },
+        SensorConfig {
+            dead_time_ns: 1.3,
+            paralysable: true,
+            ..default()
+        },
+    ];
+    for config in configs {
+        for (signal, background_hz, number) in [(0.3, 4e6, 60), (6.0, 1e8, 40), (120.0, 8e6, 10)] {
+            let cycles = 2000;
+            let bench = Bench::new(config.clone(), cycles, 60.0);
+            let light = bench.echo(6.7, signal, background_hz);
+            let histograms = bench.expose(5, number, |_| light.clone());
+            let bin_s = bench.law.bin_width_s().unwrap();
+            let response = Response::new(&bench.config, bin_s, PULSE_SIGMA);
+            let chances = response.chances(&EchoLight {
+                position_bins: 6.7,
+                signal,
+                background_per_bin: background_hz * bin_s,
+                sigma_bins: response.pulse_sigma_bins(),
+            });
+            let trials = f64::from(cycles * number);
+            for (bin, chance) in chances.into_iter().enumerate() {
+                let counts: u32 = histograms.iter().map(|counts| counts[bin]).sum();
+                let mean = f64::from(counts) / trials;
+                // Five standard deviations, four counts where hardly any are expected, and the steps' error.
+                let sigma = (chance * (1.0 - chance) / trials).sqrt();
+                let secondary = config.afterpulse_probability + config.crosstalk_probability;
+                // Squares of the chances of afterpulses and crosstalk are left out.
+                let left_out = (1e-3 + 2.0 * secondary * secondary) * chance;
+                let most = 5.0 * sigma + 4.0 / trials + left_out;
+                assert!(
+                    (mean - chance).abs() <= most,
+                    "{config:?}, {signal} photons, bin {bin}: {mean} and {chance}"
+                );
+            }
+        }
+    }
+}
+
+/// Errors of many echoes, mm.
+#[derive(Debug)]
+struct Errors {
+    without_reason: usize,
+    mean: f64,
+    rms: f64,
+    bound: f64,
+}
+
+/// Of `number` echoes over four bins.
+fn errors(config: &SensorConfig, cycles: u32, signal: f64, number: u32) -> Errors {
+    let bench = Bench::new(config.clone(), cycles, 60.0);
+    let position = |n: u32| 5.0 + 4.0 * (f64::from(n) + 0.5) / f64::from(number);
+    let histograms = bench.expose(7, number, |n| bench.echo(position(n), signal, 8e6));
+    let finder = EchoFinder::new(&bench.law, PULSE_SIGMA, &DepthOptions::default()).unwrap();
+    let bin_mm = 1e3 * Time::from_s(bench.law.bin_width_s().unwrap()).as_range_m();
+    let sightings = (0..number).zip(&histograms);
+    let depths = sightings.filter_map(|(n, counts)| {
+        let found = finder.find(counts)?;
+        let is_depth = found.is_significant && !found.is_saturated;
+        is_depth.then_some((found, position(n)))
+    });
+    let depths: Vec<(Sighting, f64)> = depths.collect();
+    let told = |(found, _): &&(Sighting, f64)| found.walk_left.is_none();
+    let square = |x: f64| bin_mm * bin_mm * x * x;
+    let (mut sum, mut squares, mut bounds) = (0.0, 0.0, 0.0);
+    for (found, position) in depths.iter().filter(told) {
+        let error = found.position_bins - position;
+        sum += bin_mm * error;
+        squares += square(error);
+        bounds += square(found.bound_bins.unwrap());
+    }
+    let without_reason = depths.iter().filter(told).count();
+    let n = without_reason as f64;
+    Errors {
+        without_reason,
+        mean: sum / n,
+        rms: (squares / n).sqrt(),
+        bound: (bounds / n).sqrt(),
+    }
+}
+
+/// Asserts that what is called corrected is right to the bound of its counts, and hardly anything is not.
+fn assert_right(config: &SensorConfig, cycles: u32, signal: f64, number: u32) {
+    let errors = errors(config, cycles, signal, number);
+    let n = errors.without_reason as f64;
+    let case = format!("{signal} photons: {errors:?}, {config:?}");
+    assert!(n > 0.95 * f64::from(number), "{case}");
+    // Three standard deviations of the mean of `n` errors, and of their root mean square.
+    assert!(
+        errors.mean.abs() < 3.0 + 3.0 * errors.rms / n.sqrt(),
+        "{case}"
+    );
+    assert!(
+        errors.rms < (1.3 + 3.0 / (2.0 * n).sqrt()) * errors.bound,
+        "{case}"
+    );
+}
+
+#[test]
+fn range_walk_is_taken_out_to_the_bound_of_the_counts() {
+    let default = SensorConfig::default();
+    for signal in [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 60.0, 120.0, 300.0] {
+        assert_right(&default, 1000, signal, 80);
+    }
+    assert_right(&default, 1000, 1000.0, 30);
+}
+
+#[test]
+fn range_walk_is_taken_out_whatever_the_threshold() {
+    for (threshold, signal) in [
+        (1, 1.0),
+        (2, 2.0),
+        (2, 5.0),
+        (3, 5.0),
+        (3, 10.0),
+        (4, 10.0),
+        (8, 30.0),
+    ] {
+        let config = SensorConfig {
+            threshold,
+            ..SensorConfig::default()
+        };
+        assert_right(&config, 4000, signal, 60);
+    }
+    let config = |event_type, threshold| SensorConfig {
+        event_type,
+        threshold,
+        ..SensorConfig::default()
+    };
+    for signal in [0.3, 3.0, 30.0] {
+        assert_right(&config(EventType::Less, 1), 1000, signal, 60);
+        assert_right(&config(EventType::Equal, 0), 1000, signal, 60);
+    }
+    assert_right(&config(EventType::Less, 3), 1000, 5.0, 60);
+    assert_right(&config(EventType::Equal, 1), 1000, 3.0, 20);
+}
+
+#[test]
+fn range_walk_is_taken_out_whatever_the_spads() {
+    let default = SensorConfig::default;
+    for config in [
+        SensorConfig {
+            dead_time_ns: 1.0,
+            ..default()
+        },
+        SensorConfig {
+            dead_time_ns: 100.0,
+            ..default()
+        },
+        SensorConfig {
+            dead_time_ns: 2.0,
+            paralysable: true,
+            ..default()
+        },
+        SensorConfig {
+            dead_time_ns: 50.0,
+            paralysable: true,
+            ..default()
+        },
+        SensorConfig {
+            afterpulse_probability: 0.05,
+            crosstalk_probability: 0.05,
+            ..default()
+        },
+        SensorConfig {
+            spad_rows: 1,
+            spad_cols: 1,
+            ..default()
+        },
+    ] {
+        for signal in [3.0, 30.0] {
+            assert_right(&config, 1000, signal, 60);
+        }
+    }
+    let noisy = SensorConfig {
+        threshold: 1,
+        afterpulse_probability: 0.05,
+        crosstalk_probability: 0.05,
+        ..default()
+    };
+    assert_right(&noisy, 4000, 3.0, 60);
+}
+
+/// A finder for the default exposure of 1000 laser cycles.
+fn finder(config: &SensorConfig, stop_periods: u32) -> EchoFinder {
+    let law = WindowLaw::new(config, &Exposure::new(config, stop_periods, 1000));
+    EchoFinder::new(&law, PULSE_SIGMA, &DepthOptions::default()).unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// The mean histogram of a light, as counts, is explained by that light or not at all.
+    #[test]
+    fn a_fit_finds_the_light_of_its_mean_histogram(
+        threshold in 0u8..9,
+        dead_time_ns in 1.0f64..100.0,
+        paralysable: bool,
+        afterpulse_probability in 0.0f64..0.05,
+        crosstalk_probability in 0.0f64..0.05,
+        ln_signal in -2.3f64..7.0,
+        position_bins in 4.0f64..11.0,
+    ) {
+        let config = SensorConfig {
+            threshold,
+            dead_time_ns,
+            paralysable,
+            afterpulse_probability,
+            crosstalk_probability,
+            ..SensorConfig::default()
+        };
+        let bin_s = 1.0 / config.clk_hz;
+        let response = Response::new(&config, bin_s, PULSE_SIGMA);
+        let light = EchoLight {
+            position_bins,
+            signal: ln_signal.exp(),
+            background_per_bin: 0.02,
+            sigma_bins: response.pulse_sigma_bins(),
+        };
+        let cycles = 100_000;
+        let counts: Vec<f64> = response.chances(&light).iter().map(|p| p * f64::from(cycles)).collect();
+        let whole: Vec<u32> = counts.iter().map(|&n| n.round() as u32).collect();
+        let Some(peak) = interpolate(&whole, &PeakOptions::default()) else {
+            return Ok(());
+        };
+        let walk = WalkCorrection { response, laser_cycles: cycles };
+        if let Ok(found) = walk.correct(&counts, &peak) {
+            let off = (found.light.position_bins - position_bins).abs();
+            prop_assert!(off < 1e-3 + 0.5 * found.bound_bins, "{light:?} {found:?}");
+        }
+    }
+}
+
+#[test]
+fn echoes_that_are_no_pulse_are_wide_or_told() {
+    let config = SensorConfig::default();
+    let finder = finder(&config, 520);
+    let response = Response::new(&config, finder.bin_s(), PULSE_SIGMA);
+    let of = |light: EchoLight| -> Vec<u32> {
+        response
+            .chances(&light)
+            .iter()
+            .map(|p| (1000.0 * p).round() as u32)
+            .collect()
+    };
+    let sigma_bins = response.pulse_sigma_bins();
+    let echo = EchoLight {
+        position_bins: 6.3,
+        signal: 2.0,
+        background_per_bin: 0.02,
+        sigma_bins,
+    };
+    let found = finder
+        .find(&of(EchoLight {
+            sigma_bins: 2.0 * sigma_bins,
+            ..echo
+        }))
+        .unwrap();
+    let light = found.light.expect("a wide echo");
+    assert!(
+        (light.sigma_bins / sigma_bins - 2.0).abs() < 0.1,
+        "{light:?}"
+    );
+    assert!((light.position_bins - 6.3).abs() < 0.02, "{light:?}");
+    // Another echo besides is not the first one's.
+    let both: Vec<u32> = of(echo)
+        .iter()
+        .zip(of(EchoLight {
+            position_bins: 12.5,
+            signal: 0.5,
+            ..echo
+        }))
+        .map(|(a, b)| a + b - 20)
+        .collect();
+    let found = finder.find(&both).unwrap();
+    assert!(
+        (found.position_bins - 6.3).abs() < 0.03 && found.bound_bins.is_some(),
+        "{found:?}"
+    );
+    // A road deeper than the window is no echo.
+    let mut deep = [20u32; 16];
+    deep[3..10].fill(400);
+    let found = finder.find(&deep).unwrap();
+    assert_eq!(
+        (found.walk_left, found.bound_bins),
+        (Some(WalkLeft::NotOneEcho), None)
+    );
+    assert_eq!(found.position_bins, found.peak.position_bins);
+    // What is left of a strong echo that came before the window looks like a weak one.
+    let before = of(EchoLight {
+        position_bins: -1.4,
+        signal: 100.0,
+        ..echo
+    });
+    let found = finder.find(&before).unwrap();
+    let is_right = (found.position_bins + 1.4).abs() < 4.0 * found.bound_bins.unwrap_or(0.0);
+    assert!(
+        is_right || found.walk_left == Some(WalkLeft::Ambiguous),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn what_keeps_range_walk_in_is_named() {
+    let mut counts = [20u32; 16];
+    counts[6..9].copy_from_slice(&[150, 400, 150]);
+    let default = SensorConfig::default;
+    let joined = SensorConfig {
+        front_end: FrontEnd::OrTree,
+        ..default()
+    };
+    let walk_left = |config: &SensorConfig, stop_periods| {
+        finder(config, stop_periods)
+            .find(&counts)
+            .unwrap()
+            .walk_left
+    };
+    assert_eq!(walk_left(&default(), 520), None);
+    assert_eq!(walk_left(&joined, 520), Some(WalkLeft::JoinedSpads));
+    assert_eq!(walk_left(&default(), 18), Some(WalkLeft::ShortLaserCycle));
+    let sensor = hslidar_delay_line();
+    let mut counts = [20u32; 8];
+    counts[3..5].copy_from_slice(&[300, 200]);
+    let found = finder(&sensor, 520).find_in(&counts, &[1.0; 8]).unwrap();
+    assert_eq!(found.walk_left, Some(WalkLeft::DelayLine));
+}
+
+#[test]
+fn full_bins_are_told_from_peaks() {
+    let config = SensorConfig {
+        bin_bits: 5,
+        ..SensorConfig::default()
+    };
+    let bench = Bench::new(config, 1000, 60.0);
+    let finder = EchoFinder::new(&bench.law, PULSE_SIGMA, &DepthOptions::default()).unwrap();
+    let saturated = |counts: &[u32]| finder.find(counts).unwrap().is_saturated;
+    assert!(saturated(&[31; 16]));
+    let mut counts = [2; 16];
+    counts[7..10].copy_from_slice(&[20, 31, 18]);
+    assert!(saturated(&counts));
+    counts[8] = 30;
+    assert!(!saturated(&counts));
+    assert_eq!(finder.find(&[0; 16]), None);
+}

@@ -1,0 +1,238 @@
+//! The stages of a frame of a drive: plan, light, load and exposure, ranging.
+
+use std::sync::Arc;
+
+use super::{Drive, DriveSettings, FrameTimes, Last, Noise, Reused, seed_of};
+use crate::engine::{Answer, Histograms, LitPixel, Work, expose};
+use crate::guide::{GuideInput, GuideMap};
+use crate::photon::{PhotonStream, PixelLight};
+use crate::scene::{DVec3, GroundTruth, Scene};
+use crate::system::error::FrameError;
+use crate::system::frame::{go_on, load_starts};
+use crate::system::light::{lit, photon_stream, starts_of};
+use crate::system::pixel::PixelDepth;
+use crate::system::ranger::Known;
+use crate::system::result::PhaseTimes;
+use crate::system::settings::FrameSettings;
+use crate::system::stopwatch::{Stopwatch, timed};
+use crate::system::worlds::{self, LastWorld};
+
+/// A frame whose windows are chosen.
+pub(super) struct Plan {
+    pub(super) number: u32,
+    pub(super) times: FrameTimes,
+    pub(super) seed: u64,
+    pub(super) guide: GuideMap,
+    pub(super) wanted: Vec<Option<u16>>,
+    pub(super) starts: Vec<u16>,
+}
+
+/// What is there during an exposure, and what of it falls on the array.
+#[derive(Debug)]
+pub(super) struct Light {
+    pub(super) stream: PhotonStream,
+    pub(super) worlds: Vec<Scene>,
+    /// The last of them.
+    pub(super) newest: Arc<LastWorld>,
+    /// In the middle of the exposure.
+    pub(super) truth: GroundTruth,
+    pub(super) each: Vec<PixelLight>,
+    pub(super) pixels: Vec<LitPixel>,
+}
+
+/// Macropixels that have the light, start value and photons of the frame before.
+pub(super) struct Same<'l> {
+    pub(super) last: Option<&'l Last>,
+    pub(super) is_same: Vec<bool>,
+}
+
+impl<'l> Same<'l> {
+    pub(super) fn of(last: Option<&'l Last>, light: &Light) -> Self {
+        let is_same = match last {
+            None => vec![false; light.pixels.len()],
+            Some(last) => {
+                let pairs = last.light.pixels.iter().zip(&light.pixels);
+                pairs.map(|(before, now)| before == now).collect()
+            }
+        };
+        Same { last, is_same }
+    }
+
+    pub(super) fn number(&self) -> usize {
+        self.is_same.iter().filter(|&&is_same| is_same).count()
+    }
+
+    /// The frame before, if this macropixel is the same in it.
+    pub(super) fn last_of(&self, pixel: usize) -> Option<&'l Last> {
+        self.last.filter(|_| self.is_same[pixel])
+    }
+}
+
+/// What a frame took and left out.
+#[derive(Default)]
+pub(super) struct Spent {
+    pub(super) run: PhaseTimes,
+    pub(super) reused: Reused,
+}
+
+impl Drive<'_> {
+    /// Asks the guide, and points the windows.
+    pub(super) fn plan<A: Answer>(
+        &mut self,
+        last: Option<&Last>,
+        exposed: &impl Fn(usize) -> A,
+        spent: &mut Spent,
+    ) -> Result<Plan, FrameError> {
+        let DriveSettings {
+            frame, noise, only, ..
+        } = self.settings;
+        let FrameSettings { sensor, scene, .. } = frame;
+        let number = self.next;
+        let times = self.times(number);
+        let seed = match noise {
+            Noise::Fresh => seed_of(frame.seed, number),
+            Noise::Still => frame.seed,
+        };
+        let mut clock = Stopwatch::new();
+        let input = GuideInput {
+            scene: &scene.at(times.images_s),
+            rows: sensor.rows as u32,
+            cols: sensor.cols as u32,
+            seed,
+            time_s: times.middle_s(),
+            earlier: &self.past,
+            velocity_m_s: DVec3::ZERO,
+        };
+        let guide = frame.guide.estimate(&input)?;
+        spent.run.guide_s = clock.lap();
+        go_on(exposed(0))?;
+
+        let seen: Vec<Option<f64>> = last
+            .map(|last| last.pixels.iter().map(|p| p.measured_m).collect())
+            .unwrap_or_default();
+        let mut wanted = self.pointing.windows(&guide, &seen);
+        for (start, is_on) in wanted.iter_mut().zip(only.iter().flatten()) {
+            *start = start.filter(|_| *is_on);
+        }
+        let starts = starts_of(sensor, &wanted);
+        spent.run.windows_s = clock.lap();
+        Ok(Plan {
+            number,
+            times,
+            seed,
+            guide,
+            wanted,
+            starts,
+        })
+    }
+
+    /// The worlds of the exposure and their light, anew where they are not those of `before`.
+    pub(super) fn light(&self, plan: &Plan, before: Option<&Last>, spent: &mut Spent) -> Light {
+        let FrameSettings {
+            sensor,
+            scene,
+            exposure,
+            ..
+        } = &self.settings.frame;
+        let reuse = self.settings.reuse;
+        let mut clock = Stopwatch::new();
+        let stream = photon_stream(sensor, exposure, plan.seed, scene);
+        let worlds = worlds::worlds(scene, &plan.times, self.settings.segments);
+        let before = before.map(|last| &last.light);
+        let (truth, each, newest) = match before.filter(|last| last.worlds == worlds) {
+            Some(last) => {
+                spent.reused.world = true;
+                spent.reused.views = worlds.len() * last.pixels.len();
+                (
+                    last.truth.clone(),
+                    last.each.clone(),
+                    Arc::clone(&last.newest),
+                )
+            }
+            None => {
+                let known = before.map(|last| &*last.newest);
+                let array = (sensor.rows as u32, sensor.cols as u32);
+                let (truths, views) = worlds::truths(&worlds, array, known, reuse);
+                spent.reused.views = views;
+                spent.run.scene_s = clock.lap();
+                let lights = worlds::lights(&worlds, &truths, &stream, known, reuse);
+                let each = worlds::light_of(&lights, exposure);
+                let truth = truths[truths.len() / 2].clone();
+                (truth, each, LastWorld::of(&worlds, truths, lights))
+            }
+        };
+        let pixels = lit(sensor, &plan.wanted, &each);
+        spent.run.light_s = clock.lap();
+        Light {
+            stream,
+            worlds,
+            newest,
+            truth,
+            each,
+            pixels,
+        }
+    }
+
+    /// The histograms of all macropixels, beside the load of their start values where they are other ones.
+    pub(super) fn load_and_expose<A: Answer>(
+        &self,
+        plan: &Plan,
+        light: &Light,
+        same: &Same,
+        exposed: &(impl Fn(usize) -> A + Sync),
+        spent: &mut Spent,
+    ) -> Result<(Histograms, Work), FrameError> {
+        let FrameSettings {
+            sensor,
+            exposure,
+            engine,
+            cohort,
+            ..
+        } = &self.settings.frame;
+        let changed = light.pixels.iter().enumerate();
+        let changed = changed.filter(|(pixel, _)| same.last_of(*pixel).is_none());
+        let changed: Vec<LitPixel> = changed.map(|(_, lit)| lit.clone()).collect();
+        let engine = engine.expose(sensor, exposure, *cohort);
+        // The gates of the load path are one processor's work, and tell nothing that the exposure waits for.
+        let load = || load_starts(sensor, &self.load_netlist, &plan.starts).map(drop);
+        let is_loaded = spent.reused.load;
+        let by_load_path = || timed(|| if is_loaded { Ok(()) } else { load() });
+        let by_engine = || timed(|| expose(&*engine, &light.stream, &changed, exposed));
+        let ((loaded, load_s), (taken, exposure_s)) = rayon::join(by_load_path, by_engine);
+        (spent.run.load_s, spent.run.exposure_s) = (load_s, exposure_s);
+        loaded?;
+        let taken = taken?;
+        let mut histograms = Histograms::empty(light.pixels.len(), sensor.bins);
+        let mut new = taken.histograms.iter();
+        for pixel in 0..light.pixels.len() {
+            let counts = match same.last_of(pixel) {
+                Some(last) => &last.histograms[pixel],
+                None => new.next().expect("one for each that has changed"),
+            };
+            histograms[pixel].copy_from_slice(counts);
+        }
+        Ok((histograms, taken.work))
+    }
+
+    /// Depths, those of the frame before where nothing of what they follow from is new.
+    pub(super) fn range(
+        &self,
+        plan: &Plan,
+        light: &Light,
+        same: &Same,
+        histograms: &Histograms,
+    ) -> Vec<PixelDepth> {
+        self.ranger.of_array(histograms.counts(), |pixel, counts| {
+            let known = Known {
+                pixel,
+                start: plan.wanted[pixel],
+                true_m: light.truth.range_m[pixel],
+                guide_m: plan.guide.range_m[pixel],
+            };
+            match same.last_of(pixel).map(|last| last.pixels[pixel]) {
+                Some(before) if known.is_of(&before) => before,
+                _ => self.ranger.depth(&known, counts),
+            }
+        })
+    }
+}
