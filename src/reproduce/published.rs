@@ -26,7 +26,10 @@ impl Published {
     /// # Panics
     /// When it is in no such notation.
     pub(super) fn parse(text: &'static str) -> Self {
-        if let Some((words, read)) = text.strip_prefix('“').and_then(|t| t.split_once("” ")) {
+        if let Some((words, read)) = text
+            .strip_prefix('\u{201c}')
+            .and_then(|t| t.split_once("\u{201d} "))
+        {
             let (low, high) = match (read.strip_prefix("≥ "), read.split_once(" to ")) {
                 (Some(low), _) => (number(low), f64::INFINITY),
                 (None, Some((low, high))) => (number(low), number(high)),
