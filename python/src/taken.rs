@@ -35,7 +35,7 @@ impl Taken {
         frame: Frame,
     ) -> Self {
         let report = move || {
-            let silicon = Silicon::nominal(settings.sensor.corner);
+            let silicon = Silicon::of(&settings.sensor);
             let timing = TimingVerdict::of(&settings.sensor, &silicon, (0, 0)).report();
             let of = (&request, &settings, &timing, &frame);
             let report = FrameReport::<()>::new(scene_name, of.0, of.1, of.2, of.3, None);

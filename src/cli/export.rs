@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 
 use super::replay::Stimuli;
 use super::voice::tell;
-use super::{SensorArgs, export_frame, sdf};
+use super::{SensorArgs, export_frame, mapped, sdf};
 use crate::chip::array;
 use crate::netlist::Netlist;
 use crate::stimulus::{Export, StimulusPlan};
@@ -16,6 +16,8 @@ use crate::stimulus::{Export, StimulusPlan};
 pub(super) enum ExportCommand {
     /// Write structural Verilog, two sets of cell models and, for a stimulus, a testbench that replays it.
     Verilog(VerilogArgs),
+    /// Write clocks and slews of a macropixel in a library's cells, as SDC.
+    Sdc(mapped::SdcArgs),
     /// Write the delays of all cells, min:typ:max, as SDF (IEEE 1497).
     Sdf(sdf::SdfArgs),
     /// Write a frame as point clouds (PLY, PCD), arrays (NPY, NPZ) and a 16-bit picture.
@@ -48,6 +50,9 @@ pub(super) struct VerilogArgs {
     /// Delays to use instead of the library's (SDF); they go into delays.v, which tb.v includes.
     #[arg(long, value_name = "FILE", requires = "inits")]
     sdf: Option<PathBuf>,
+    /// Write one macropixel in the cells of --liberty instead: mapped.v with mapped.sdf and mapped.sdc.
+    #[arg(long, conflicts_with = "inits")]
+    mapped: bool,
 }
 
 /// Runs the command.
@@ -57,6 +62,7 @@ pub(super) struct VerilogArgs {
 pub(super) fn run(command: &ExportCommand) -> anyhow::Result<()> {
     match command {
         ExportCommand::Verilog(args) => run_verilog(args),
+        ExportCommand::Sdc(args) => mapped::run_sdc(args),
         ExportCommand::Sdf(args) => sdf::run(args),
         ExportCommand::Frame(args) => export_frame::run(args),
     }
@@ -64,6 +70,9 @@ pub(super) fn run(command: &ExportCommand) -> anyhow::Result<()> {
 
 fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
     let sensor = args.sensor.read()?;
+    if args.mapped {
+        return mapped::write(&args.out, &sensor);
+    }
     let top = args.sensor.chip();
     let folder = args.out.display();
     let (Some(inits), Some(events), Some(stop_periods), Some(laser_cycles)) = (

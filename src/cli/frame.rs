@@ -85,7 +85,7 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     };
     let chosen = chosen_probes(&args.probe, &sensor)?;
     let settings = request.settings_by(sensor, scene, guide, &policy)?;
-    let silicon = Silicon::nominal(settings.sensor.corner);
+    let silicon = Silicon::of(&settings.sensor);
     let timing = TimingVerdict::of(&settings.sensor, &silicon, (0, 0)).report();
     let results = ResultSet::begin(&args.out)?;
     let probe_at = |(row, col)| Probe {

@@ -12,6 +12,7 @@ mod foxglove;
 mod frame;
 mod groups;
 mod guiding;
+mod mapped;
 mod page;
 mod pareto;
 mod power;

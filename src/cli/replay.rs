@@ -126,11 +126,11 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         return Err(InputError::new(format!("--checks-json {}", json.display()), message).into());
     }
     let stimuli = args.stimuli.read()?;
-    let silicon = args.silicon.read(stimuli.sensor.corner)?;
+    let silicon = args.silicon.read(&stimuli.sensor)?;
     // Delays of a file are the gates' to judge, and mismatched macropixels each their own (`gdtof timing --mismatch`).
     let timing = (args.sdf.is_none() && silicon.mismatch.is_none())
         .then(|| TimingVerdict::of(&stimuli.sensor, &silicon, (0, 0)).report());
-    let silicon = (silicon != Silicon::nominal(silicon.corner)).then_some(silicon);
+    let silicon = (silicon != Silicon::of(&stimuli.sensor)).then_some(silicon);
     if silicon.is_some() && args.sdf.is_some() {
         let message = "takes delays and limits from elsewhere; leave out either --sdf or process, voltage, temperature and mismatch";
         return Err(InputError::new("--sdf", message).into());

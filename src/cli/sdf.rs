@@ -12,6 +12,7 @@ use crate::chip::{SensorConfig, Silicon, array};
 use crate::files::{InputError, OutputFile, read_text};
 use crate::netlist::sdf::{
     Sdf, SdfDivider, SdfOptions, SdfTimescale, Skipped, annotate, oddities, write_library_sdf,
+    write_sdf,
 };
 use crate::netlist::{Netlist, Timing};
 
@@ -98,7 +99,8 @@ pub(super) fn run(args: &SdfArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes the library's delays of the whole array; gives the number of cells.
+/// Writes the library's delays of the whole array; gives the number of cells. Those of a Liberty file are each cell's own, in the one
+/// corner that the file is of.
 fn write_library(
     out: &mut dyn Write,
     config: &SensorConfig,
@@ -106,7 +108,14 @@ fn write_library(
     options: SdfOptions,
 ) -> std::io::Result<usize> {
     let top = array::circuit(config);
-    write_library_sdf(out, (&top, design), Silicon::library(), options)
+    let silicon = Silicon::of(config);
+    if silicon.library.from_file().is_some() {
+        let netlist = Netlist::elaborate(&top.renamed(design));
+        let timing = silicon.timing(&netlist);
+        write_sdf(out, &netlist, [&timing; 3], options)?;
+        return Ok(netlist.cells().len());
+    }
+    write_library_sdf(out, (&top, design), silicon.library.cells(), options)
 }
 
 /// About how many bytes the file will have: its size grows with the number of macropixels, as that of a corner of the array. From

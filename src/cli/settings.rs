@@ -28,6 +28,13 @@ pub(super) struct SensorArgs {
     /// `gdtof scene` list the keys.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Cell library that the chip is made of (Liberty: .lib or .lib.gz), instead of the built-in delays: short for
+    /// --set sensor.liberty=FILE.
+    #[arg(long, value_name = "FILE")]
+    liberty: Option<PathBuf>,
+    /// Cell of the library to take for a kind, for example DFFR=dfrtp_2. May be repeated.
+    #[arg(long, value_name = "KIND=NAME", requires = "liberty")]
+    cell: Vec<String>,
 }
 
 /// Which sensor, and which scene before it.
@@ -78,13 +85,24 @@ impl SensorArgs {
         (self.rows.is_some() || is_set("rows")) && (self.cols.is_some() || is_set("cols"))
     }
 
+    /// What `--liberty` and `--cell` set.
+    fn library_set(&self) -> impl Iterator<Item = String> {
+        let file = self.liberty.as_ref().map(|file| {
+            let file = std::path::absolute(file).unwrap_or_else(|_| file.clone());
+            format!("sensor.liberty={}", file.display())
+        });
+        let cells = (!self.cell.is_empty())
+            .then(|| format!("sensor.liberty_cells={}", self.cell.join(", ")));
+        file.into_iter().chain(cells)
+    }
+
     fn sources(&self, scene: Option<PathBuf>) -> Sources {
         Sources {
             sensor: self.sensor.clone(),
             scene,
             rows: self.rows,
             cols: self.cols,
-            set: self.set.clone(),
+            set: self.library_set().chain(self.set.iter().cloned()).collect(),
             spelling: Spelling::Options,
         }
     }

@@ -7,7 +7,7 @@
 
 use clap::Args;
 
-use crate::chip::Silicon;
+use crate::chip::{SensorConfig, Silicon};
 use crate::files::InputError;
 use crate::netlist::{Conditions, Corner, Mismatch};
 
@@ -38,11 +38,19 @@ pub(super) struct SiliconArgs {
 }
 
 impl SiliconArgs {
-    /// The silicon, in this corner of the library.
+    /// The silicon: a sensor's library in its corner.
     ///
     /// # Errors
     /// Conditions and mismatch for which no delays are known.
-    pub(super) fn read(&self, corner: Corner) -> Result<Silicon, InputError> {
+    pub(super) fn read(&self, config: &SensorConfig) -> Result<Silicon, InputError> {
+        let silicon = Silicon::of(config);
+        if silicon.library.from_file().is_some() && self.conditions() != Conditions::default() {
+            let message = "a library is characterised at conditions of its own; give its file of other conditions as sensor.liberty_slow or sensor.liberty_fast, and --set sensor.corner=slow or fast";
+            return Err(InputError::new(
+                "--process, --voltage, --temperature",
+                message,
+            ));
+        }
         let factor = self.conditions().delay_factor().ok_or_else(|| {
             let message = "no delays are known there; give -55 to 150 °C and a supply up to 2 V at least 0.2 V above the threshold of about 0.4 V";
             InputError::new("--voltage, --temperature", message)
@@ -56,9 +64,9 @@ impl SiliconArgs {
             seed: self.mismatch_seed,
         });
         Ok(Silicon {
-            corner,
             factor,
             mismatch,
+            ..silicon
         })
     }
 

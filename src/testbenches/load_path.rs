@@ -9,7 +9,7 @@
 
 use std::path::Path;
 
-use crate::chip::{LoadPins, LoadProbe, Probe, SensorConfig, Silicon, load_path, probes};
+use crate::chip::{CellLibrary, LoadPins, LoadProbe, Probe, SensorConfig, load_path, probes};
 use crate::engine::load::{load, load_netlist};
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
@@ -178,7 +178,7 @@ fn small_array(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
 
     let mut kernel = Kernel::new(
         &bench.netlist,
-        &Timing::nominal(&bench.netlist, Silicon::library(), config.corner),
+        &Timing::nominal(&bench.netlist, CellLibrary::BUILT_IN.cells(), config.corner),
     );
     let mut stimulus = in_order(std::mem::take(&mut bench.drives));
     let mut recorder = Recorder::new((0..bench.netlist.net_count()).map(NetId::new));
@@ -245,7 +245,7 @@ fn small_array(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
 
 /// Widths of MEMORY_LOAD and its distances to COUNTER_INIT_ROW, against the delays of the cells on their paths.
 fn timing(bench: &Bench, recorder: &Recorder, all: &[Pulse], checks: &mut Checks) {
-    let library = Silicon::library();
+    let library = CellLibrary::BUILT_IN.cells();
     let delay = |kind, to| library.delay(kind, 0, to, bench.config.corner);
     let clock_to_q = library.delay(CellKind::Dffr, 1, One, bench.config.corner);
     let half = bench.clock().half_periods(1);

@@ -12,7 +12,7 @@
 use std::path::Path;
 
 use crate::chip::{
-    ChipTiming, Exposure, Probe, Probes, SensorConfig, Silicon, p_counter, p_counter_timing,
+    CellLibrary, ChipTiming, Exposure, Probe, Probes, SensorConfig, p_counter, p_counter_timing,
 };
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
@@ -95,7 +95,11 @@ impl Bench {
     fn kernel(&self) -> Kernel {
         Kernel::new(
             &self.netlist,
-            &Timing::nominal(&self.netlist, Silicon::library(), self.config.corner),
+            &Timing::nominal(
+                &self.netlist,
+                CellLibrary::BUILT_IN.cells(),
+                self.config.corner,
+            ),
         )
     }
 
@@ -222,7 +226,10 @@ fn figure_54(bench: &Bench, waves: &Path, checks: &mut Checks) -> Result<(), Inp
     let found = clocked.iter().filter(disabled).count();
     checks.equal("COUNTER_CLK rises while disabled", 0, found);
 
-    let reset_to_q = Silicon::library().delay(CellKind::Dffr, 2, Logic::Zero, bench.config.corner);
+    let reset_to_q =
+        CellLibrary::BUILT_IN
+            .cells()
+            .delay(CellKind::Dffr, 2, Logic::Zero, bench.config.corner);
     let rises = recorder.rising_edges(bench.counter_reset);
     let releases = recorder.falling_edges(bench.counter_reset);
     let half_period = exposure.clock.half_periods(1);

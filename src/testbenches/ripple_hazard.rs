@@ -20,7 +20,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::analysis::{MacropixelTiming, shortest_period};
-use crate::chip::{Exposure, Limits, Probe, Probes, SensorConfig, Silicon, array, probes};
+use crate::chip::{
+    CellLibrary, Exposure, Limits, Probe, Probes, SensorConfig, Silicon, array, probes,
+};
 use crate::engine::GateSimulation;
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
@@ -107,7 +109,7 @@ impl Outcome {
 
 /// The library's delays, and in the second macropixel its mismatch.
 fn delays(netlist: &Netlist) -> Timing {
-    let nominal = Timing::nominal(netlist, Silicon::library(), Corner::Typ);
+    let nominal = Timing::nominal(netlist, CellLibrary::BUILT_IN.cells(), Corner::Typ);
     let mismatched = varied(netlist, &nominal, 1.0, Some(MISMATCH));
     let second = format!(".{}.", array::pixel_name(0, 1));
     let mut timing = nominal;

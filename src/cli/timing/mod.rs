@@ -42,7 +42,7 @@ pub(super) struct TimingArgs {
 /// Bad input.
 pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
     let config = args.sensor.read()?;
-    let silicon = args.silicon.read(config.corner)?;
+    let silicon = args.silicon.read(&config)?;
     if config.tdc == Tdc::DelayLine {
         let message = "the tables are those of a clocked TDC, and this sensor has delay lines; frame states whether its timing is met, and calibrate measures its bins";
         return Err(InputError::new("--sensor", message).into());

@@ -20,7 +20,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::chip::{
-    AfterBorrow, ChipTiming, Exposure, Probe, SensorConfig, Silicon, Tap, WindowLaw, metdc,
+    AfterBorrow, CellLibrary, ChipTiming, Exposure, Probe, SensorConfig, Tap, WindowLaw, metdc,
     p_counter, p_counter_timing,
 };
 use crate::chip::{Irregular, Window};
@@ -245,7 +245,7 @@ impl Bench {
         });
         let mut recorder = Recorder::new(nets.flatten());
         let corner = SensorConfig::default().corner;
-        let timing = Timing::nominal(&self.netlist, Silicon::library(), corner);
+        let timing = Timing::nominal(&self.netlist, CellLibrary::BUILT_IN.cells(), corner);
         let mut kernel = Kernel::new(&self.netlist, &timing);
         let end = self.at(SLOW_LASER.end() + 40);
         write_waves(waves, &self.netlist, &self.view(), |waves| {

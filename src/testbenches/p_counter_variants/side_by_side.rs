@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::chip::{
-    ChipTiming, Exposure, PCounter, Probe, Probes, SensorConfig, Silicon, p_counter,
+    CellLibrary, ChipTiming, Exposure, PCounter, Probe, Probes, SensorConfig, p_counter,
 };
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
@@ -54,7 +54,7 @@ pub(super) fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let end = fall(exposure.stop_periods as i64 * i64::from(CYCLES));
     let mut recorder = Recorder::new((0..netlist.net_count()).map(NetId::new));
     let corner = SensorConfig::default().corner;
-    let timing = Timing::nominal(&netlist, Silicon::library(), corner);
+    let timing = Timing::nominal(&netlist, CellLibrary::BUILT_IN.cells(), corner);
     let mut kernel = Kernel::new(&netlist, &timing);
     let file = waves
         .with_file_name("tb_p_counters")

@@ -14,8 +14,7 @@
 //! scale as the delays do.
 
 use super::cell::CellKind;
-use super::corner::Edge;
-use super::corner::{Corner, Delay};
+use super::corner::{Corner, Delay, Edge};
 
 /// A limit on D, by the direction in which it changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -1,8 +1,7 @@
 //! The limits of one flip-flop in one corner: those of the library, or its own from a delay file.
 
-use super::check_limits::{CheckKind, CheckLimits};
-use super::corner::Corner;
-use super::corner::Edge;
+use super::check_limits::{CheckKind, CheckLimits, DataLimit};
+use super::corner::{Corner, Delay, Edge};
 
 /// Which of a flip-flop's controls a check is about. D and CK have no such choice and are under `Reset`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,6 +17,45 @@ pub enum Control {
 pub struct InstanceLimits([[[u32; 2]; CheckKind::ALL.len()]; 2]);
 
 impl InstanceLimits {
+    /// Limits that everything keeps.
+    pub(super) const fn none() -> Self {
+        InstanceLimits([[[0; 2]; CheckKind::ALL.len()]; 2])
+    }
+
+    /// The larger of each limit.
+    pub(super) fn larger(self, other: &Self) -> Self {
+        let mut larger = self;
+        let (all, others) = (larger.0.as_flattened_mut(), other.0.as_flattened());
+        let (all, others) = (all.as_flattened_mut(), others.as_flattened());
+        for (limit, &other) in all.iter_mut().zip(others) {
+            *limit = (*limit).max(other);
+        }
+        larger
+    }
+
+    /// Limits of one flip-flop as those of its kind, the same in every corner; of set and reset the larger.
+    pub(super) fn of_kind(&self) -> CheckLimits {
+        let of = |check, edge| {
+            let controls = [Control::Reset, Control::Set];
+            let limits = controls.map(|control| self.at(control, check, edge));
+            Delay::fixed(limits[0].max(limits[1]))
+        };
+        let data = |check| DataLimit {
+            rise: of(check, Edge::Rise),
+            fall: of(check, Edge::Fall),
+        };
+        let either = |check| of(check, Edge::Rise);
+        CheckLimits {
+            setup: data(CheckKind::Setup),
+            hold: data(CheckKind::Hold),
+            recovery: either(CheckKind::Recovery),
+            removal: either(CheckKind::Removal),
+            clock_high: either(CheckKind::ClockHigh),
+            clock_low: either(CheckKind::ClockLow),
+            control_high: either(CheckKind::ControlHigh),
+        }
+    }
+
     /// What the library says in one corner.
     pub fn of(limits: &CheckLimits, corner: Corner) -> Self {
         let by_edge = |check| Edge::BOTH.map(|edge| limits.toward(check, edge, corner));

@@ -35,6 +35,14 @@ impl TimingArc {
         }
     }
 
+    /// The same in every corner.
+    pub(super) const fn fixed(delay: ArcDelay) -> Self {
+        TimingArc {
+            rise: Delay::fixed(delay.rise_fs),
+            fall: Delay::fixed(delay.fall_fs),
+        }
+    }
+
     /// Delay of an output change to `to` in one corner, fs. A change to X takes the shorter of the
     /// two, as in IEEE 1364 for gates without a third delay.
     pub fn delay_fs(self, corner: Corner, to: Logic) -> u32 {

@@ -18,6 +18,7 @@ mod delay;
 mod error;
 mod flat;
 mod instance_limits;
+pub mod liberty;
 mod library;
 mod mismatch;
 mod module;

@@ -10,7 +10,7 @@
 //!
 //! Launch and capture are edges of the same clock net. Between equal edges lies a whole period, between opposite
 //! ones half a period: data launched by one edge is captured by the next edge of the capturing kind, and must hold
-//! until that edge is past. Flip-flops whose clock or data the clock does not reach ask nothing.
+//! until that edge is past. What a flip-flop changes at its own D is told from the edge that clocked it. Flip-flops whose clock or data the clock does not reach ask nothing.
 //!
 //! As [`StaticTiming`] does, this knows of no values: a flip-flop is asked for what no stimulus may ever do.
 
@@ -153,7 +153,13 @@ impl<'n> Requirements<'n> {
                         if let Some((first, last)) = window(launch, data, edge) {
                             let need = last + limit(CheckKind::Setup, edge) - early;
                             push(CheckKind::Setup, edge, 1 + same as i64, need);
-                            let need = late + limit(CheckKind::Hold, edge) - first;
+                            // D of a toggle flip-flop follows the very edge that clocked it, early or late.
+                            let own = self.arrivals[launch as usize].own_data(cell, edge);
+                            let apart = match own.filter(|_| same) {
+                                Some(own) => -own,
+                                None => late - first,
+                            };
+                            let need = apart + limit(CheckKind::Hold, edge);
                             push(CheckKind::Hold, edge, 1 - same as i64, need);
                         }
                     }

@@ -241,6 +241,7 @@ impl<'n> StaticTiming<'n> {
         }
         Ok(Arrivals {
             netlist: self.netlist,
+            timing: self.timing,
             shortest,
             longest,
         })
@@ -270,11 +271,22 @@ impl Arrival {
 /// When every net can change after the starts.
 pub struct Arrivals<'n> {
     netlist: &'n Netlist,
+    timing: &'n Timing,
     shortest: Vec<Option<Arrival>>,
     longest: Vec<Option<Arrival>>,
 }
 
 impl Arrivals<'_> {
+    /// How long after its clock a flip-flop changes its own D, in the direction of `edge`, where D is one of its outputs.
+    pub(super) fn own_data(&self, cell: usize, edge: Edge) -> Option<Time> {
+        const CLOCK: usize = 1;
+        let leaf = &self.netlist.cells()[cell];
+        let [data, ..] = leaf.inputs;
+        let output = leaf.outputs.iter().position(|&net| net == data)?;
+        let delay = self.timing.of(cell)[CLOCK][output].to(edge.level());
+        Some(Time::from_fs(delay.into()))
+    }
+
     /// Earliest and latest change of `net` in the direction of `edge`; `None` where there can be none.
     pub fn edge_window(&self, net: NetId, edge: Edge) -> Option<(Time, Time)> {
         let time = |arrival: Arrival| Time::from_fs(arrival.time_fs);

@@ -16,6 +16,8 @@ use super::library::Library;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Timing {
     sets: Vec<CellDelays>,
+    /// Whether a set is that of one cell alone.
+    is_own: Vec<bool>,
     /// By index into `sets`.
     models: Vec<DelayModel>,
     of_cell: Vec<u32>,
@@ -37,12 +39,41 @@ impl Timing {
         corner: Corner,
         path: impl Fn(usize) -> String,
     ) -> Self {
-        let mut timing = Self::of_library(netlist, library, corner);
+        Self::of_library(netlist, library, corner).with_own_delays(netlist, corner, path)
+    }
+
+    /// The same where cells with delays of their own have these.
+    #[must_use]
+    pub fn with_own_delays(
+        mut self,
+        netlist: &Netlist,
+        corner: Corner,
+        path: impl Fn(usize) -> String,
+    ) -> Self {
         for &(cell, delay) in netlist.own_delays() {
-            timing.set(cell, delay.delays(|| path(cell), corner));
-            timing.set_model(cell, delay.model);
+            self.set(cell, delay.delays(|| path(cell), corner));
+            self.set_model(cell, delay.model);
         }
-        timing
+        self
+    }
+
+    /// Gives the cells from `first` on the delays and limits of a block's, which is of as many cells. `known` is what this gave
+    /// for the same block before: its sets are shared.
+    pub(super) fn adopt(&mut self, first: usize, block: &Timing, known: Option<u32>) -> u32 {
+        let base = known.unwrap_or_else(|| {
+            let base = self.sets.len() as u32;
+            self.sets.extend(&block.sets);
+            self.models.extend(&block.models);
+            self.is_own.resize(self.sets.len(), false);
+            base
+        });
+        for (cell, &set) in block.of_cell.iter().enumerate() {
+            self.of_cell[first + cell] = base + set;
+        }
+        let limits = block.own_limits.iter();
+        self.own_limits
+            .extend(limits.map(|(&cell, &own)| (first + cell, own)));
+        base
     }
 
     /// Every cell as the library has it in this corner, even those with delays of their own.
@@ -52,6 +83,7 @@ impl Timing {
                 .iter()
                 .map(|&kind| library.delays(kind, corner))
                 .collect(),
+            is_own: vec![false; CellKind::ALL.len()],
             models: vec![DelayModel::Inertial; CellKind::ALL.len()],
             of_cell: netlist.cells().iter().map(|c| c.kind as u32).collect(),
             limits: CellKind::ALL
@@ -105,12 +137,13 @@ impl Timing {
     /// Index of a set that is this cell's alone.
     fn own_set(&mut self, cell: usize) -> usize {
         let set = self.of_cell[cell] as usize;
-        if set >= CellKind::ALL.len() {
+        if self.is_own[set] {
             return set;
         }
         self.of_cell[cell] = self.sets.len() as u32;
         self.sets.push(self.sets[set]);
         self.models.push(self.models[set]);
+        self.is_own.push(true);
         self.sets.len() - 1
     }
 

@@ -8,7 +8,7 @@
 use std::fmt;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
@@ -61,6 +61,12 @@ fn flaw(bytes: &[u8], are_first: bool) -> Option<&'static str> {
         }
         _ => None,
     }
+}
+
+/// A file that settings in `folder` name. It keeps its place when they are printed elsewhere.
+pub fn placed(folder: &Path, file: &Path) -> PathBuf {
+    let joined = folder.join(file);
+    std::path::absolute(&joined).unwrap_or(joined)
 }
 
 /// Reads a text file as a whole.

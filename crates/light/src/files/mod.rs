@@ -27,7 +27,7 @@ mod temporary;
 pub use arrays::{read_array, read_counts};
 pub use femtogate::InputError;
 pub use input::Lines;
-pub use input::{LineEnds, parse_json, parse_toml, read_text, read_text_within, too_long};
+pub use input::{LineEnds, parse_json, parse_toml, placed, read_text, read_text_within, too_long};
 pub use interruption::clean_up_when_interrupted;
 pub use journal::{Journal, JournalReader, journal_line};
 pub use misfit::in_plain_words;

@@ -10,6 +10,7 @@ use super::object::Object;
 use super::ranges::{LENGTH, PLACES, POSITION, SHARE, SPEED};
 use super::shape::{DepthMap, MapFiles, Mesh, Shape};
 use super::texture::{Pattern, Picture, Texture};
+use crate::files::placed;
 use crate::settings::Range::{Above, Within};
 use crate::settings::{keys, words};
 
@@ -335,12 +336,6 @@ impl ObjectEntry {
             ..Texture::new(pattern, size_m, second_reflectivity)
         }))
     }
-}
-
-/// A file that a scene in `folder` names. It keeps its place when the scene is printed elsewhere.
-fn placed(folder: &Path, file: &Path) -> PathBuf {
-    let joined = folder.join(file);
-    std::path::absolute(&joined).unwrap_or(joined)
 }
 
 impl From<Object> for ObjectEntry {

@@ -109,7 +109,7 @@ impl TimingVerdict {
     pub fn of(config: &SensorConfig, silicon: &Silicon, position: (usize, usize)) -> Self {
         let (period, phase) = (config.clock().period(), config.stop_phase());
         let pixel = MacropixelTiming::of(config, silicon, Limits::Kept, position);
-        let library = Silicon::nominal(silicon.corner);
+        let library = Silicon::of(config);
         let is_library = *silicon == library;
         let aim = match is_library {
             true => pixel.aim(period, phase),

@@ -1,6 +1,8 @@
 //! Sensor configuration: what a user may set. `sensor_file` checks that it is possible. Keys that a file leaves out
 //! are those of the QuantIC4x4.
 
+use std::path::PathBuf;
+
 pub use super::blocks::front_end::FrontEnd;
 use super::blocks::metdc_delay_line::Elements;
 pub use super::blocks::p_counter::PCounter;
@@ -178,6 +180,20 @@ keys! {
         mode: Mode = Mode::Guided, from "thesis 4.3 and 4.2";
         /// Silicon corner of the cells' delays; min and max mean fast and slow.
         corner: Corner = Corner::Typ, in OneOf(&["slow", "typ", "fast"]);
+        /// Cell library, a Liberty file (.lib or .lib.gz), instead of the built-in delays; without one in the slow and fast corner only
+        /// corner = "typ" is possible.
+        liberty: PathBuf = PathBuf::new(), from "chosen: the built-in cells, which take the thesis's 1.2 ns (4.6)";
+        /// The library in the slow corner.
+        liberty_slow: PathBuf = PathBuf::new(), from "chosen: none";
+        /// The library in the fast corner.
+        liberty_fast: PathBuf = PathBuf::new(), from "chosen: none";
+        /// Cells of the library to take for a kind, "DFFR=NAME, INV=NAME", instead of those of least area and the drive that
+        /// the load asks for.
+        liberty_cells: String = String::new(), from "chosen: none";
+        /// Slew of a macropixel's inputs with a library; 0 is that of its smallest inverter which drives four of its kind.
+        input_slew_ps: f64 ["ps"] = 0.0, in Within(0.0, 1e5);
+        /// Capacitance of wires with a library, for each pin that a net leads to.
+        wire_ff: f64 ["fF"] = 0.0, in Within(0.0, 1e4), from "chosen: pins only, as before layout";
     }
 }
 

@@ -6,7 +6,8 @@ use std::ops::RangeInclusive;
 use super::config::{AfterBorrow, EventType, FrontEnd, PCounter, SensorConfig, Tap, Tdc};
 use super::front_end::DeadTimeTooShort;
 use super::timing::ChipTiming;
-use crate::files::InputError;
+use super::timing::cell_library::CellLibrary;
+use crate::files::{InputError, placed};
 use crate::photon::{SIDES, count_bits};
 use crate::settings::{Document, Fault, Key, Section, Settings, commented, schema};
 
@@ -97,6 +98,14 @@ pub enum SensorFault {
         .0.name()
     )]
     HoldWithoutMemory(PCounter),
+    /// A cell library that cannot be used.
+    #[error("{why}")]
+    Liberty {
+        /// The key at fault.
+        key: &'static str,
+        /// What is wrong with it.
+        why: String,
+    },
     /// SPADs are too fast for the front end.
     #[error("{0}; {cure}", cure = .0.cure())]
     DeadTime(#[from] DeadTimeTooShort),
@@ -188,7 +197,9 @@ impl SensorFault {
             SensorFault::StepPeriods(_) | SensorFault::StepsWithoutReset { .. } => "step_periods",
             SensorFault::Threshold { .. } | SensorFault::NeverMet(_) => "threshold",
             SensorFault::FrontEndOfDelayLine(_) => "front_end",
-            SensorFault::CorrelationOfDelayLine { key, .. } => key,
+            SensorFault::CorrelationOfDelayLine { key, .. } | SensorFault::Liberty { key, .. } => {
+                key
+            }
             SensorFault::CoincidentSpads { .. } => "coincident_spads",
             SensorFault::NoMsb { .. } => "tap",
             SensorFault::HoldWithoutMemory(_) => "p_counter",
@@ -221,7 +232,16 @@ impl SensorConfig {
     pub fn read_document(document: &Document) -> Result<Self, InputError> {
         let mut faults = Vec::new();
         let read = document.section::<Self>("", document.table(), &mut faults);
-        let config: Self = read.try_into().unwrap_or_default();
+        let mut config: Self = read.try_into().unwrap_or_default();
+        for file in [
+            &mut config.liberty,
+            &mut config.liberty_slow,
+            &mut config.liberty_fast,
+        ] {
+            if !file.as_os_str().is_empty() {
+                *file = placed(document.folder(), file);
+            }
+        }
         if faults.is_empty() {
             let fault = config.check().err();
             faults.extend(fault.map(|fault| Fault {
@@ -320,6 +340,9 @@ impl SensorConfig {
         }
         if !variant.has_memory && self.after_borrow == AfterBorrow::Hold {
             return Err(SensorFault::HoldWithoutMemory(p_counter));
+        }
+        if let Err((key, why)) = CellLibrary::of(self) {
+            return Err(SensorFault::Liberty { key, why });
         }
         ChipTiming::of(self).pulses.follow(self.dead_time_ns)?;
         let half_period_ps = 0.5e12 / self.clk_hz;

@@ -14,8 +14,8 @@ use super::{
 };
 use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::{
-    Exposure, LoadPins, Probe, Probes, ReadPins, Sensor, SensorPins, Silicon, Tdc, WindowLaw,
-    array, front_end, load_path, metdc_delay_line,
+    Exposure, LoadPins, Probe, Probes, ReadPins, Sensor, SensorPins, Tdc, WindowLaw, array,
+    front_end, load_path, metdc_delay_line,
 };
 use crate::kernel::{
     Drive, Kernel, LANES, Observer, Policy, Statistics, Stimulus, TimingChecks, merge,
@@ -129,7 +129,8 @@ impl GateSimulation {
     /// Timing checks of this netlist in the sensor's corner, from the end of the power-up reset on, to run it with. The
     /// front ends' first samplers count as asynchronous.
     pub fn timing_checks(&self, policy: Policy) -> TimingChecks {
-        TimingChecks::new(&self.netlist, Silicon::library(), self.sensor.corner)
+        let library = self.sensor.silicon().library.cells();
+        TimingChecks::new(&self.netlist, library, self.sensor.corner)
             .limits(&self.netlist, &self.timing)
             .policy(policy)
             .not_before(self.schedule().reset_end)

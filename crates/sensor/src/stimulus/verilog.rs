@@ -45,10 +45,12 @@ impl Export<'_> {
     /// # Errors
     /// When the folder or a file in it cannot be written.
     pub fn write(self, folder: &Path, config: &SensorConfig) -> Result<(), InputError> {
-        let (library, corner) = (Silicon::library(), config.corner);
+        let (silicon, corner) = (Silicon::of(config), config.corner);
+        let library = silicon.library.cells();
         let top = array::circuit(config);
         let netlist = Netlist::elaborate(&top);
-        let own = (!netlist.own_delays().is_empty()).then(|| Silicon::of(config).timing(&netlist));
+        let has_own = !netlist.own_delays().is_empty() || silicon.library.from_file().is_some();
+        let own = has_own.then(|| silicon.timing(&netlist));
         let timing = self.timing.or(own.as_ref());
         let chains = Chain::all(&netlist);
         let top = top.renamed(self.top);

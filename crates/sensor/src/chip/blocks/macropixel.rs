@@ -32,12 +32,15 @@ use crate::chip::timing::ChipTiming;
 use crate::netlist::{Module, ModuleBuilder};
 use crate::units::Time;
 
+/// Name of the module.
+pub(crate) const NAME: &str = "macropixel";
+
 /// One macropixel.
 ///
 /// Ports: CLK, STOP, RESETB, ENABLE, PIXEL_CLEAR, CONVENTIONAL, TYPE\<2\>, THRESHOLD\<bits\>,
 /// COUNTER_INIT\<bits\>, MEMORY_LOAD, SPAD_RAW\<SPADs\>, ROW_READ, BIN_READ\<bins\> → LOCAL_STOP, WORD\<bin bits\>.
 pub fn circuit(config: &SensorConfig) -> Arc<Module> {
-    let mut m = ModuleBuilder::new("macropixel");
+    let mut m = ModuleBuilder::new(NAME);
     for pin in [
         "CLK",
         "STOP",

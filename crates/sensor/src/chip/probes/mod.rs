@@ -356,6 +356,13 @@ impl Probes {
         cells.filter(is_flip_flop).collect()
     }
 
+    /// The P-counter's flip-flops in the netlist of a macropixel alone, in the order in which they are described.
+    pub fn p_counter_cells(macropixel: &Netlist) -> Vec<usize> {
+        let cells = cells_of(macropixel, P_COUNTER);
+        let is_flip_flop = |&cell: &usize| macropixel.cells()[cell].kind.is_flip_flop();
+        cells.filter(is_flip_flop).collect()
+    }
+
     /// Dotted path of the P-counter.
     pub fn p_counter(&self) -> String {
         join([&self.path, P_COUNTER])

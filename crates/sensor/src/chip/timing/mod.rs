@@ -9,6 +9,7 @@
 //!
 //! | file | what it has |
 //! |---|---|
+//! | [`cell_library`] | the cells, built in or of a Liberty file |
 //! | [`silicon`] | the cell library, conditions and mismatch |
 //! | `clk_skew` | the wires of CLK to every column |
 //! | `delay_lines` | taps of the delay lines of every macropixel |
@@ -16,6 +17,7 @@
 //!
 //! Reference models and the window law use a sensor's [`ChipTiming`] instead of simulating cells.
 
+pub mod cell_library;
 pub(crate) mod clk_skew;
 pub(crate) mod delay_lines;
 pub mod macropixel;
@@ -29,6 +31,7 @@ use super::front_end::PulseLimits;
 use super::photon_line;
 use crate::netlist::{CellKind, CheckKind, Corner};
 use crate::units::Time;
+use cell_library::CellLibrary;
 use macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays};
 use silicon::Silicon;
 
@@ -214,6 +217,7 @@ struct Circuit {
     bin_bits: usize,
     overflow: Overflow,
     corner: Corner,
+    library: CellLibrary,
 }
 
 impl Circuit {
@@ -232,6 +236,7 @@ impl Circuit {
             bin_bits: config.bin_bits,
             overflow: config.overflow,
             corner: config.corner,
+            library: CellLibrary::of(config).expect("checked"),
         }
     }
 }

@@ -1,7 +1,6 @@
 //! What a chip is made of: a cell library in one corner, its conditions, and the mismatch of its cells.
 
-use std::sync::LazyLock;
-
+use super::cell_library::CellLibrary;
 use crate::chip::SensorConfig;
 use crate::netlist::{Corner, Library, Mismatch, Netlist, Timing, derated_limits, varied_as};
 
@@ -14,6 +13,8 @@ pub struct Silicon {
     pub factor: f64,
     /// Random differences between cells, on delays only.
     pub mismatch: Option<Mismatch>,
+    /// The cells themselves.
+    pub library: CellLibrary,
 }
 
 /// Whether flip-flops' limits count, or only what they capture.
@@ -26,24 +27,23 @@ pub enum Limits {
 }
 
 impl Silicon {
-    /// The cell library that every chip is made of.
-    pub fn library() -> &'static Library {
-        static LIBRARY: LazyLock<Library> = LazyLock::new(Library::default);
-        &LIBRARY
-    }
-
     /// The library as it stands, without mismatch.
     pub const fn nominal(corner: Corner) -> Self {
         Silicon {
             corner,
             factor: 1.0,
             mismatch: None,
+            library: CellLibrary::BUILT_IN,
         }
     }
 
-    /// That of a sensor without mismatch: the library in the sensor's corner.
-    pub const fn of(config: &SensorConfig) -> Self {
-        Silicon::nominal(config.corner)
+    /// That of a sensor without mismatch: its library in its corner. The description must have passed
+    /// [`SensorConfig::check`].
+    pub fn of(config: &SensorConfig) -> Self {
+        Silicon {
+            library: CellLibrary::of(config).expect("checked"),
+            ..Silicon::nominal(config.corner)
+        }
     }
 
     /// The same chip with every delay and limit times `factor`, instead of its own.
@@ -60,7 +60,7 @@ impl Silicon {
 
     /// Delays of another netlist that differs from this one in names only: there each cell is at `path` of its index.
     pub(crate) fn timing_as(&self, netlist: &Netlist, path: impl Fn(usize) -> String) -> Timing {
-        let nominal = Timing::nominal_as(netlist, Self::library(), self.corner, &path);
+        let nominal = self.library.timing(netlist, self.corner, &path);
         varied_as(netlist, &nominal, self.factor, self.mismatch, path)
     }
 
@@ -70,7 +70,7 @@ impl Silicon {
             Limits::Kept => self.factor,
             Limits::Ignored => 0.0,
         };
-        derated_limits(Self::library(), factor)
+        derated_limits(self.library.cells(), factor)
     }
 }
 
@@ -108,6 +108,6 @@ mod tests {
             users(&root.join(folder), &mut found);
         }
         assert_eq!(found.len(), 1, "{found:?}");
-        assert!(found[0].ends_with("silicon.rs"), "{found:?}");
+        assert!(found[0].ends_with("cell_library.rs"), "{found:?}");
     }
 }

@@ -1,0 +1,45 @@
+//! Real cell libraries: Liberty files, as every foundry gives them and every synthesis and timing tool reads them.
+//!
+//! ```text
+//!   .lib ─► group ─► cell ─► mapping: kind → cells ─┐
+//!   netlist ─► loads, drives, slews ────────────────┴─► characterised: Timing of every instance, area, leakage, mapped Verilog
+//! ```
+//!
+//! Each kind of cell ([`CellKind`](super::CellKind)) is mapped to cells of the library by its *function*. Then every instance gets delays of its
+//! own from the library's tables, by its load and by the slews at its pins. Non-linear delay models are read; current-source models
+//! in the same file are passed over.
+//!
+//! What a kernel with one delay an arc and output edge cannot say is taken at its worst: of conditions (`when`), and of the two input
+//! edges of an exclusive OR or a multiplexer's select. Negative limits count as zero.
+//!
+//! | file | what it has |
+//! |---|---|
+//! | `group` | the syntax |
+//! | `function` | Boolean expressions as truth tables |
+//! | `table` | delays, slews and limits over slew and load |
+//! | `cell` | which cells may be chosen, and their tables |
+//! | `mapping` | what stands for each kind |
+//! | `read` | a file as a whole |
+//! | `characterised` | loads, drives and slews of a netlist, and what follows |
+//! | `composite` | one instance: from the slews at its pins to its delays and limits |
+//! | `mapped_verilog` | the netlist of library cells, for other tools |
+//! | `mapped_timing` | its delays and clocks for them |
+
+mod cell;
+mod characterised;
+mod composite;
+mod error;
+mod function;
+mod group;
+mod mapped_timing;
+mod mapped_verilog;
+mod mapping;
+mod read;
+mod table;
+
+pub use characterised::{Characterised, Environment};
+pub use error::LibertyError;
+pub use mapped_timing::{Clocking, write_constraints, write_mapped_sdf};
+pub use mapped_verilog::write_mapped;
+pub use mapping::CellMap;
+pub use read::Liberty;

@@ -1,0 +1,100 @@
+//! A Liberty file: its units, and what its cells are mapped to.
+
+use super::cell::Candidate;
+use super::error::{LibertyError, Units};
+use super::group::{self, Group};
+use super::mapping::{CellMap, Maker};
+use super::table::Templates;
+use crate::netlist::CellKind;
+
+/// A library whose cells stand for every [`CellKind`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Liberty {
+    /// Its name.
+    pub name: String,
+    /// Supply and temperature it is characterised at, as the file says: V, °C.
+    pub conditions: [Option<f64>; 2],
+    /// Cells in the file, those that are not used here included.
+    pub cells: usize,
+    /// What stands for each kind.
+    pub map: CellMap,
+}
+
+impl Liberty {
+    /// Reads a library of non-linear delay tables. `wanted` names cells that are to stand for a kind instead of those of least area.
+    ///
+    /// # Errors
+    /// What is no Liberty, units that are not known, and a library from which the cells here cannot be made.
+    pub fn read(text: &str, wanted: &[(CellKind, String)]) -> Result<Self, LibertyError> {
+        let library = group::read(text)?;
+        let fault = |message: String| LibertyError {
+            line: library.line,
+            message,
+        };
+        let model = library.value("delay_model").unwrap_or("table_lookup");
+        if model != "table_lookup" {
+            return Err(fault(format!(
+                "its delay_model is {model}; give a library with table_lookup"
+            )));
+        }
+        let units = Units {
+            time_fs: match library.value("time_unit") {
+                None | Some("1ns") => 1e6,
+                Some("100ps") => 1e5,
+                Some("10ps") => 1e4,
+                Some("1ps") => 1e3,
+                Some(other) => {
+                    return Err(fault(format!(
+                        "its time_unit is {other:?}; 1ns, 100ps, 10ps and 1ps are known"
+                    )));
+                }
+            },
+            load_ff: load_unit(&library)
+                .ok_or_else(|| fault("it has no capacitive_load_unit of ff or pf".to_owned()))?,
+        };
+        let leakage_unit_w = match library.value("leakage_power_unit") {
+            Some("1uW") => 1e-6,
+            Some("1pW") => 1e-12,
+            Some("1mW") => 1e-3,
+            Some("100pW") => 1e-10,
+            Some("10pW") => 1e-11,
+            Some("10nW") => 1e-8,
+            Some("100nW") => 1e-7,
+            _ => 1e-9,
+        };
+        let templates = Templates::of(&library);
+        let mut candidates = Vec::new();
+        for group in library.of_kind("cell") {
+            candidates.extend(Candidate::of(group)?);
+        }
+        let maker = Maker {
+            candidates: &candidates,
+            templates: &templates,
+            units,
+            leakage_unit_w,
+            wanted,
+        };
+        Ok(Liberty {
+            name: library.name().to_owned(),
+            conditions: [
+                library.number("nom_voltage")?,
+                library.number("nom_temperature")?,
+            ],
+            cells: library.of_kind("cell").count(),
+            map: maker.make(&library)?,
+        })
+    }
+}
+
+/// fF of the file's unit of capacitance.
+fn load_unit(library: &Group<'_>) -> Option<f64> {
+    let [number, unit] = library.values("capacitive_load_unit")? else {
+        return None;
+    };
+    let unit = match unit.to_ascii_lowercase().as_str() {
+        "ff" => 1.0,
+        "pf" => 1e3,
+        _ => return None,
+    };
+    Some(number.parse::<f64>().ok()? * unit)
+}

@@ -1,0 +1,201 @@
+//! Tables of delays, slews and limits over two axes, interpolated linearly and continued linearly beyond their ends, as
+//! timing analysers do.
+
+use std::collections::HashMap;
+
+use super::error::{LibertyError, Units};
+use super::group::Group;
+
+/// What an axis is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Axis {
+    /// Slew of the input, or of the clock in a limit's table.
+    Related,
+    /// Load of the output, or slew of the data in a limit's table.
+    Other,
+}
+
+/// A function of two variables; a table without an axis does not depend on it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Table {
+    /// Slews of the input or clock, fs.
+    related: Vec<f64>,
+    /// Loads, fF, or slews of the data, fs.
+    other: Vec<f64>,
+    /// By `related`, then `other`, fs.
+    values: Vec<f64>,
+}
+
+impl Table {
+    /// The same value everywhere, fs.
+    pub(super) fn fixed(value_fs: f64) -> Self {
+        Table {
+            related: Vec::new(),
+            other: Vec::new(),
+            values: vec![value_fs],
+        }
+    }
+
+    /// The value, fs: `related` is the slew of the input or the clock, fs; `other` the load, fF, or the data's slew, fs.
+    pub(super) fn at(&self, related: f64, other: f64) -> f64 {
+        let (row, along_row) = place(&self.related, related);
+        let (col, along_col) = place(&self.other, other);
+        let cols = self.other.len().max(1);
+        let value = |r: usize, c: usize| self.values[r * cols + c];
+        let in_row = |r: usize| match self.other.len() {
+            0 | 1 => value(r, 0),
+            _ => value(r, col) + (value(r, col + 1) - value(r, col)) * along_col,
+        };
+        match self.related.len() {
+            0 | 1 => in_row(0),
+            _ => {
+                let (low, high) = (in_row(row), in_row(row + 1));
+                low + (high - low) * along_row
+            }
+        }
+    }
+}
+
+/// The stretch of an axis that `x` lies in or nearest to, and how far along it, beyond 0 and 1 outside the axis.
+fn place(axis: &[f64], x: f64) -> (usize, f64) {
+    if axis.len() < 2 {
+        return (0, 0.0);
+    }
+    let above = axis.partition_point(|&mark| mark <= x);
+    let low = above.clamp(1, axis.len() - 1) - 1;
+    (low, (x - axis[low]) / (axis[low + 1] - axis[low]))
+}
+
+/// Tables' templates by name.
+pub(super) struct Templates<'g, 't>(HashMap<&'t str, &'g Group<'t>>);
+
+impl<'g, 't> Templates<'g, 't> {
+    pub(super) fn of(library: &'g Group<'t>) -> Self {
+        let templates = library.of_kind("lu_table_template");
+        Templates(
+            templates
+                .map(|template| (template.name(), template))
+                .collect(),
+        )
+    }
+
+    /// Reads one table.
+    ///
+    /// # Errors
+    /// Axes or values that do not fit each other, and axes of something else than slews and loads.
+    pub(super) fn table(&self, group: &Group<'t>, units: Units) -> Result<Table, LibertyError> {
+        let fault = |message: String| LibertyError {
+            line: group.line,
+            message,
+        };
+        let numbers = group.numbers("values")?;
+        let mut values = numbers.ok_or_else(|| fault(format!("{} has no values", group.kind)))?;
+        let template = self.0.get(group.name());
+        let mut axes: [(Option<Axis>, Vec<f64>); 2] = Default::default();
+        for (index, axis) in axes.iter_mut().enumerate() {
+            let variable = template.and_then(|t| t.value(["variable_1", "variable_2"][index]));
+            let Some(variable) = variable else { continue };
+            let (of, unit) = match variable {
+                "input_net_transition" | "related_pin_transition" => (Axis::Related, units.time_fs),
+                "constrained_pin_transition" => (Axis::Other, units.time_fs),
+                "total_output_net_capacitance" => (Axis::Other, units.load_ff),
+                _ => {
+                    return Err(fault(format!(
+                        "the table {} is over {variable}; tables over slews and loads are read",
+                        group.name()
+                    )));
+                }
+            };
+            let name = ["index_1", "index_2"][index];
+            let marks = match group.numbers(name)? {
+                Some(marks) => marks,
+                None => template
+                    .map(|t| t.numbers(name))
+                    .transpose()?
+                    .flatten()
+                    .unwrap_or_default(),
+            };
+            if marks.is_empty() || marks.windows(2).any(|pair| pair[0] >= pair[1]) {
+                return Err(fault(format!("{name} of {} does not rise", group.kind)));
+            }
+            *axis = (
+                Some(of),
+                marks.into_iter().map(|mark| mark * unit).collect(),
+            );
+        }
+        let wants: usize = axes.iter().map(|(_, marks)| marks.len().max(1)).product();
+        if values.len() != wants || axes[0].0.is_some() && axes[0].0 == axes[1].0 {
+            return Err(fault(format!(
+                "{} has {} values, and its axes want {wants}",
+                group.kind,
+                values.len()
+            )));
+        }
+        values.iter_mut().for_each(|value| *value *= units.time_fs);
+        let [first, second] = axes;
+        if first.0 == Some(Axis::Other) {
+            let (rows, cols) = (second.1.len().max(1), first.1.len());
+            let turned = (0..rows * cols).map(|i| values[i % cols * rows + i / cols]);
+            return Ok(Table {
+                values: turned.collect(),
+                related: second.1,
+                other: first.1,
+            });
+        }
+        Ok(Table {
+            related: first.1,
+            other: second.1,
+            values,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::group::read;
+    use super::*;
+
+    const UNITS: Units = Units {
+        time_fs: 1e6,
+        load_ff: 1e3,
+    };
+
+    fn table(text: &str) -> Result<Table, LibertyError> {
+        let text = format!(
+            "library (l) {{ lu_table_template (t) {{ variable_1 : total_output_net_capacitance; variable_2 : input_net_transition; index_1 (\"1, 3\"); index_2 (\"0, 10\"); }}\n lu_table_template (c) {{ variable_1 : input_voltage; }}\n {text} }}"
+        );
+        let library = read(&text).unwrap();
+        Templates::of(&library).table(&library.groups[2], UNITS)
+    }
+
+    #[test]
+    fn values_between_and_beyond_the_marks_are_on_straight_lines() {
+        let delay = table("cell_rise (t) { values (\"1, 2\", \"3, 6\"); }").unwrap();
+        let at = |slew_ns: f64, load_pf: f64| delay.at(slew_ns * 1e6, load_pf * 1e3) / 1e6;
+        assert_eq!((at(0.0, 1.0), at(10.0, 1.0), at(0.0, 3.0)), (1.0, 2.0, 3.0));
+        assert_eq!(at(5.0, 2.0), 3.0);
+        assert_eq!(at(0.0, 5.0), 5.0);
+        assert_eq!(at(-10.0, 1.0), 0.0);
+        let one = table("cell_rise (scalar) { values (\"7\"); }").unwrap();
+        assert_eq!(one.at(3.0, 4.0), 7e6);
+    }
+
+    #[test]
+    fn tables_that_do_not_fit_are_refused() {
+        for (text, says) in [
+            ("cell_rise (t) { values (\"1, 2, 3\"); }", "want 4"),
+            (
+                "cell_rise (t) { index_1 (\"2, 1\"); values (\"1,2,3,4\"); }",
+                "rise",
+            ),
+            (
+                "cell_rise (c) { index_1 (\"1\"); values (\"1\"); }",
+                "input_voltage",
+            ),
+            ("cell_rise (t) { }", "no values"),
+        ] {
+            let message = table(text).unwrap_err().message;
+            assert!(message.contains(says), "{message}");
+        }
+    }
+}

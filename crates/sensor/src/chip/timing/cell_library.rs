@@ -1,0 +1,217 @@
+//! The cells that a chip is made of: the built-in ones with their chosen delays, or those of a Liberty file.
+//!
+//! ```text
+//!   sensor.liberty, .liberty_cells, .input_slew_ps, .wire_ff ─► read once a process ─► delays of every instance, limits, area, leakage
+//! ```
+//!
+//! A macropixel is sized and timed by itself and then placed everywhere, as a block that is laid out once: its delays are the same alone
+//! and in the array, so that all engines follow one window law. What lies around the macropixels (loading, readout, CLK's wires) is sized
+//! around them. Cells with delays of their own (delay lines, wires, the balanced gates of a photon line) keep these.
+
+use std::collections::HashMap;
+use std::hash::{Hash, Hasher};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::{LazyLock, Mutex, PoisonError};
+
+use flate2::read::GzDecoder;
+
+use crate::chip::SensorConfig;
+use crate::chip::blocks::macropixel;
+use crate::netlist::liberty::{Characterised, Environment, Liberty};
+use crate::netlist::{CellKind, Corner, Library, Netlist, Timing};
+
+/// Most bytes of a library: the largest open ones have 60 MB a corner.
+const MOST_BYTES: u64 = 512 << 20;
+
+/// The cells that a chip is made of. Copies are the same; a file is read once a process.
+#[derive(Debug, Clone, Copy)]
+pub struct CellLibrary(Option<&'static FromFile>);
+
+/// A Liberty file, read.
+#[derive(Debug)]
+pub struct FromFile {
+    /// Its cells.
+    pub liberty: Liberty,
+    /// Slews and wires that they are timed with.
+    pub environment: Environment,
+    /// Delays and limits of each kind by itself.
+    nominal: Library,
+}
+
+/// Everything that decides what a file becomes.
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct Wanted {
+    path: PathBuf,
+    cells: String,
+    input_slew_ps: u64,
+    wire_ff: u64,
+}
+
+impl CellLibrary {
+    /// The built-in cells.
+    pub const BUILT_IN: Self = CellLibrary(None);
+
+    /// What a sensor is made of.
+    ///
+    /// # Errors
+    /// The key at fault and what is wrong: a file that cannot be read or is no library, a corner without one, cells that are not there.
+    pub fn of(config: &SensorConfig) -> Result<Self, (&'static str, String)> {
+        let (key, path) = match config.corner {
+            Corner::Typ => ("liberty", &config.liberty),
+            Corner::Slow => ("liberty_slow", &config.liberty_slow),
+            Corner::Fast => ("liberty_fast", &config.liberty_fast),
+        };
+        if path.as_os_str().is_empty() {
+            let others = [&config.liberty, &config.liberty_slow, &config.liberty_fast];
+            if others.iter().all(|other| other.as_os_str().is_empty()) {
+                return Ok(Self::BUILT_IN);
+            }
+            let corner = config.corner.name();
+            let message =
+                format!("corner = {corner:?} with a library in another corner; give {key}, too");
+            return Err((key, message));
+        }
+        let wanted = Wanted {
+            path: path.clone(),
+            cells: config.liberty_cells.clone(),
+            input_slew_ps: config.input_slew_ps.to_bits(),
+            wire_ff: config.wire_ff.to_bits(),
+        };
+        static READ: LazyLock<Mutex<HashMap<Wanted, &'static FromFile>>> =
+            LazyLock::new(Mutex::default);
+        let mut read = READ.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = read.get(&wanted) {
+            return Ok(CellLibrary(Some(known)));
+        }
+        let cells =
+            wanted_cells(&config.liberty_cells).map_err(|message| ("liberty_cells", message))?;
+        let text =
+            text_of(path).map_err(|message| (key, format!("{}: {message}", path.display())))?;
+        let liberty = Liberty::read(&text, &cells)
+            .map_err(|e| (key, format!("{}:{}: {e}", path.display(), e.line)))?;
+        let mut environment = Environment::of(&liberty);
+        if config.input_slew_ps > 0.0 {
+            environment.input_slew_fs = config.input_slew_ps * 1e3;
+        }
+        environment.wire_ff = config.wire_ff;
+        // A kind's limits are the largest that any flip-flop of the QuantIC4x4's macropixel has.
+        let mut nominal = liberty.nominal(&environment);
+        let pixel = Netlist::elaborate(&macropixel::circuit(&SensorConfig::default()));
+        let placed = Characterised::of(&pixel, &liberty, &environment);
+        for kind in CellKind::ALL {
+            if let Some(limits) = placed.largest_limits(&pixel, kind) {
+                nominal.set_checks(kind, limits);
+            }
+        }
+        // As long as the process: a sensor's copies share it, and a process has few libraries.
+        let from_file: &'static FromFile = Box::leak(Box::new(FromFile {
+            liberty,
+            environment,
+            nominal,
+        }));
+        read.insert(wanted, from_file);
+        Ok(CellLibrary(Some(from_file)))
+    }
+
+    /// Delays and limits of each kind of cell.
+    pub fn cells(self) -> &'static Library {
+        static BUILT_IN: LazyLock<Library> = LazyLock::new(Library::default);
+        self.0.map_or(&*BUILT_IN, |from_file| &from_file.nominal)
+    }
+
+    /// What was read, if not the built-in cells.
+    pub fn from_file(self) -> Option<&'static FromFile> {
+        self.0
+    }
+
+    /// Delays of a netlist in a corner, where each cell is the one at `path` of its index.
+    pub(super) fn timing(
+        self,
+        netlist: &Netlist,
+        corner: Corner,
+        path: impl Fn(usize) -> String,
+    ) -> Timing {
+        match self.0 {
+            None => Timing::nominal_as(netlist, self.cells(), corner, path),
+            Some(from_file) => {
+                let timing = from_file.characterised(netlist).timing;
+                timing.with_own_delays(netlist, corner, path)
+            }
+        }
+    }
+}
+
+impl FromFile {
+    /// A netlist in its cells, each macropixel by itself.
+    pub fn characterised(&self, netlist: &Netlist) -> Characterised {
+        Characterised::by_blocks(netlist, &self.liberty, &self.environment, |module| {
+            module.name() == macropixel::NAME
+        })
+    }
+}
+
+/// Two are equal if they come from one reading.
+impl PartialEq for CellLibrary {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.map(std::ptr::from_ref) == other.0.map(std::ptr::from_ref)
+    }
+}
+
+impl Eq for CellLibrary {}
+
+impl Hash for CellLibrary {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.0.map(std::ptr::from_ref).hash(state);
+    }
+}
+
+/// `KIND=NAME` pairs.
+fn wanted_cells(text: &str) -> Result<Vec<(CellKind, String)>, String> {
+    let pairs = text
+        .split(',')
+        .map(str::trim)
+        .filter(|pair| !pair.is_empty());
+    let pair = |pair: &str| {
+        let kinds = CellKind::ALL.into_iter();
+        let found = pair.split_once('=').and_then(|(kind, name)| {
+            let kind = kinds
+                .clone()
+                .find(|k| k.name().eq_ignore_ascii_case(kind.trim()))?;
+            Some((kind, name.trim().to_owned()))
+        });
+        found.ok_or_else(|| {
+            let names: Vec<&str> = kinds.clone().map(CellKind::name).collect();
+            format!(
+                "{pair:?} is not KIND=NAME with a kind among {}",
+                names.join(", ")
+            )
+        })
+    };
+    pairs.map(pair).collect()
+}
+
+/// The text of a library, packed by gzip or not.
+fn text_of(path: &Path) -> Result<String, String> {
+    let file = std::fs::File::open(path).map_err(|e| format!("cannot be read: {e}"))?;
+    let mut bytes = Vec::new();
+    let mut read = |from: &mut dyn Read| {
+        from.take(MOST_BYTES + 1)
+            .read_to_end(&mut bytes)
+            .map(|_| ())
+    };
+    let is_packed = path.extension().is_some_and(|ending| ending == "gz");
+    let done = match is_packed {
+        true => read(&mut GzDecoder::new(file)),
+        false => read(&mut &file),
+    };
+    done.map_err(|e| format!("cannot be read: {e}"))?;
+    if bytes.len() as u64 > MOST_BYTES {
+        return Err(format!(
+            "has more than {} MB; give a library of one corner",
+            MOST_BYTES >> 20
+        ));
+    }
+    String::from_utf8(bytes)
+        .map_err(|_| "is not text; give a Liberty file, .lib or .lib.gz".to_owned())
+}

@@ -1,0 +1,112 @@
+//! `gdtof export verilog --mapped` and `gdtof export sdc`: a macropixel in the cells of a Liberty file, for timing analysis and layout.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::SensorArgs;
+use super::voice::{note, tell};
+use crate::chip::{CellLibrary, FromFile, Probes, SensorConfig, macropixel};
+use crate::files::{InputError, OutputFile, create_folder};
+use crate::netlist::Netlist;
+use crate::netlist::liberty::{
+    Characterised, Clocking, write_constraints, write_mapped, write_mapped_sdf,
+};
+
+/// Arguments of `gdtof export sdc`.
+#[derive(Args)]
+pub(super) struct SdcArgs {
+    #[command(flatten)]
+    sensor: SensorArgs,
+    /// Constraints to write, for the mapped.v of `gdtof export verilog --mapped`.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+/// A macropixel, sized and timed.
+struct Mapped<'c> {
+    config: &'c SensorConfig,
+    library: &'static FromFile,
+    netlist: Netlist,
+    characterised: Characterised,
+}
+
+impl<'c> Mapped<'c> {
+    /// # Errors
+    /// A sensor of the built-in cells.
+    fn of(config: &'c SensorConfig, option: &str) -> Result<Self, InputError> {
+        let library = CellLibrary::of(config)
+            .ok()
+            .and_then(CellLibrary::from_file);
+        let Some(library) = library else {
+            let message = "the built-in cells are no library's; add --liberty FILE";
+            return Err(InputError::new(option, message));
+        };
+        let netlist = Netlist::elaborate(&macropixel::circuit(config));
+        let characterised = library.characterised(&netlist);
+        for sentence in &library.liberty.map.notes {
+            note(sentence);
+        }
+        Ok(Mapped {
+            config,
+            library,
+            netlist,
+            characterised,
+        })
+    }
+
+    fn write_sdc(&self, path: &Path) -> Result<(), InputError> {
+        let ripple = Probes::p_counter_cells(&self.netlist);
+        let clocking = Clocking {
+            port: "CLK",
+            period: self.config.clock().period(),
+            ripple: &ripple,
+        };
+        OutputFile::write_with(path, |out| {
+            let sized = (&self.characterised, &self.library.environment);
+            write_constraints(out, &self.netlist, &self.library.liberty, sized, clocking)
+        })
+    }
+}
+
+/// Runs `gdtof export sdc`.
+///
+/// # Errors
+/// Bad input and unwritable output.
+pub(super) fn run_sdc(args: &SdcArgs) -> anyhow::Result<()> {
+    let config = args.sensor.read()?;
+    Mapped::of(&config, "export sdc")?.write_sdc(&args.out)?;
+    tell(format_args!("{}\n", args.out.display()))?;
+    Ok(())
+}
+
+/// Writes mapped.v, mapped.sdf and mapped.sdc into `folder`.
+///
+/// # Errors
+/// A sensor of the built-in cells, and unwritable output.
+pub(super) fn write(folder: &Path, config: &SensorConfig) -> anyhow::Result<()> {
+    let mapped = Mapped::of(config, "--mapped")?;
+    let Mapped {
+        library,
+        netlist,
+        characterised,
+        ..
+    } = &mapped;
+    create_folder(folder)?;
+    OutputFile::write_with(&folder.join("mapped.v"), |out| {
+        write_mapped(out, netlist, &library.liberty, characterised)
+    })?;
+    OutputFile::write_with(&folder.join("mapped.sdf"), |out| {
+        write_mapped_sdf(out, netlist, &library.liberty, characterised)
+    })?;
+    mapped.write_sdc(&folder.join("mapped.sdc"))?;
+    tell(format_args!(
+        "mapped.v, mapped.sdf and mapped.sdc in {}: a macropixel of {} in {}, area {:.0}, leakage {:.3} nW\n",
+        folder.display(),
+        netlist.cells().len(),
+        library.liberty.name,
+        characterised.area,
+        characterised.leakage_w * 1e9
+    ))?;
+    Ok(())
+}
