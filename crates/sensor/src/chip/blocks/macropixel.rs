@@ -28,7 +28,7 @@ use super::{
 };
 use crate::chip::config::{Mode, SensorConfig, Tdc};
 use crate::chip::exposure::Exposure;
-use crate::chip::timing::ChipTiming;
+use crate::chip::timing::chip_timing::ChipTiming;
 use crate::netlist::{Module, ModuleBuilder};
 use crate::units::Time;
 
@@ -111,12 +111,12 @@ pub struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    /// A macropixel of this sensor in this exposure.
-    pub fn new(config: &'a SensorConfig, exposure: &'a Exposure) -> Self {
+    /// A macropixel of this sensor, with these delays, in this exposure.
+    pub fn new(config: &'a SensorConfig, timing: ChipTiming, exposure: &'a Exposure) -> Self {
         Model {
             config,
             exposure,
-            timing: ChipTiming::of(config),
+            timing,
         }
     }
 
