@@ -4,9 +4,10 @@
 //! number, and those after it are asked one by one.
 
 use super::blindness::{Ages, Blindness};
+use super::events::EventTable;
 use super::spad_light::absorbed;
+use super::steps::{Counts, Means};
 use super::words::RandomWords;
-use super::{Counts, EventTable, Means};
 use crate::photon::DeadTimeLaw;
 use smallvec::{SmallVec, smallvec};
 

@@ -13,8 +13,9 @@
 use smallvec::SmallVec;
 
 use super::blindness::{Ages, Blindness};
+use super::options::CohortOptions;
 use super::spad_light::{Extent, SpadLight, absorbed};
-use super::{CohortOptions, Means};
+use super::steps::Means;
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{SensorConfig, WindowLaw};
 use crate::engine::EngineError;

@@ -18,9 +18,10 @@ use smallvec::SmallVec;
 
 use super::blindness::{Ages, Blindness};
 use super::draw::binomial;
+use super::events::EventTable;
 use super::hits::Hits;
+use super::steps::{Counts, Means};
 use super::words::RandomWords;
-use super::{Counts, EventTable, Means};
 use crate::chip::MOST_SPADS;
 use crate::photon::DeadTimeLaw;
 

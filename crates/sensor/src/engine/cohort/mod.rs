@@ -49,6 +49,7 @@ mod fine;
 mod grid;
 mod hits;
 mod joint;
+mod options;
 mod overlap;
 mod pooled;
 mod prepare;
@@ -56,55 +57,28 @@ mod recent;
 mod rejection;
 mod secondaries;
 mod spad_light;
+mod steps;
 mod weighted;
 mod words;
 
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
-use smallvec::{SmallVec, smallvec};
+use smallvec::smallvec;
 
 pub use self::blindness::BlindSpad;
 use self::cycles::LikeCycles;
 pub use self::draw::none_of;
 use self::events::EventTable;
 pub use self::hits::at_least_hit;
+pub use self::options::CohortOptions;
 use self::recent::Histories;
 pub use self::secondaries::variance_left_out;
+use self::steps::Counts;
 use self::words::RandomWords;
 use super::{Engine, EngineError, Expose, Exposed, LitPixel, Work};
 use crate::chip::{Exposure, Sensor, WindowLaw, histogram, window_law};
 use crate::photon::{PhotonStream, PixelLight, StreamConfig};
-
-/// Steps of a window that need no memory of their own.
-const FEW_STEPS: usize = 16;
-
-/// Laser cycles with an event, for every bin of a window.
-type Counts = SmallVec<[u64; FEW_STEPS]>;
-
-/// Mean photons on one SPAD in every bin of a window.
-type Means = SmallVec<[f64; FEW_STEPS]>;
-
-/// The engine's knobs: what may be left out.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CohortOptions {
-    /// Largest error of a bin's mean, in standard deviations of its count over the exposure.
-    pub error: f64,
-    /// Largest correlation between two bins that may be neglected to save time; 0 never neglects any.
-    pub neglect: f64,
-    /// Largest probability, for a whole exposure of a macropixel, that laser cycles depend on each other.
-    pub memory: f64,
-}
-
-impl Default for CohortOptions {
-    fn default() -> Self {
-        CohortOptions {
-            error: 0.1,
-            neglect: 1e-4,
-            memory: 1e-6,
-        }
-    }
-}
 
 /// SPADs that are worth following one by one in a CLK period before [`joint`] is the cheaper way.
 const WORTH_LOOKING_AT: f64 = 200.0;

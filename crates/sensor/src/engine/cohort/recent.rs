@@ -23,9 +23,9 @@ use super::abreast::{LANES, Lanes, binomials};
 use super::blindness::{Ages, Blindness};
 use super::draw::binomial;
 use super::events::{EventTable, NoEvent};
+use super::steps::{Counts, Means};
 use super::weighted::Weighted;
 use super::words::RandomWords;
-use super::{Counts, Means};
 
 /// Bins that a history may tell of; of the fewest, all histories go abreast.
 const KNOWN: [u32; 3] = [4, 6, 8];
