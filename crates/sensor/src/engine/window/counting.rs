@@ -18,22 +18,24 @@ use super::binning::{Binning, Scratch};
 use super::codes::{Code, Codes, ROWS, SPADS};
 use super::echo_rows::EchoRows;
 use super::past::PastDraws;
+use super::pulses::Window;
 use super::sight::{Sight, Spans};
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Tables};
 use super::wanted::Wanted;
-use super::{Window, Work};
+use crate::engine::Work;
 use crate::photon::{
     Draw, Group, ListedEchoes, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SpadEvent,
 };
 use crate::units::Time;
 use by_window::ByWindow;
-use settling::Spacing;
+use spacing::Spacing;
 use tile::Tile;
 
 mod bright;
 mod by_window;
 mod settling;
 mod sorted;
+mod spacing;
 mod tile;
 mod whole;
 
