@@ -37,6 +37,20 @@ pub(super) struct LikeCycles {
     pub not_compared: usize,
 }
 
+#[cfg(test)]
+impl LikeCycles {
+    /// Cycles in whose bins there are `means` photons on a SPAD, after much light of `before` photons in each step.
+    pub(super) fn of(cycles: u64, blindness: Blindness, before: f64, means: &[f64]) -> Self {
+        LikeCycles {
+            cycles,
+            ages: Ages::steady(&blindness, before),
+            blindness,
+            means: means.into(),
+            not_compared: 0,
+        }
+    }
+}
+
 /// Light and dead time around one macropixel's window. Times in femtoseconds from its laser cycle's STOP edge.
 pub(super) struct Scene {
     pub light: SpadLight,

@@ -17,26 +17,20 @@
 use smallvec::SmallVec;
 
 use super::blindness::{Ages, Blindness};
+use super::cycles::LikeCycles;
 use super::draw::binomial;
 use super::events::EventTable;
 use super::hits::Hits;
-use super::steps::{Counts, Means};
+use super::steps::Counts;
 use super::words::RandomWords;
 use crate::chip::MOST_SPADS;
 use crate::photon::DeadTimeLaw;
 
-/// Counts of every bin after `cycles` laser cycles that begin in the state `ages`.
-pub(super) fn run(
-    blindness: &Blindness,
-    ages: &Ages,
-    means: &Means,
-    is_event: &EventTable,
-    cycles: u64,
-    random: &mut RandomWords,
-) -> Counts {
-    let mut tree = Tree::new(blindness, is_event.spads(), cycles);
-    tree.age(ages, random);
-    means
+/// Counts of every bin after these laser cycles.
+pub(super) fn run(like: &LikeCycles, is_event: &EventTable, random: &mut RandomWords) -> Counts {
+    let mut tree = Tree::new(&like.blindness, is_event.spads(), like.cycles);
+    tree.age(&like.ages, random);
+    like.means
         .iter()
         .map(|&mean| {
             tree.advance(mean, random);

@@ -205,20 +205,13 @@ impl Cohort {
         let random = &mut RandomWords::new(stream.seed, pixel);
         let is_event = &self.is_event;
         for like in &cohorts {
-            let LikeCycles {
-                cycles,
-                blindness,
-                ages,
-                means,
-                not_compared,
-            } = like;
             let counts = match self.way(like) {
-                Way::Alone => alone::run(blindness, ages, means, is_event, random),
-                Way::Pooled => pooled::run(blindness, ages, means, is_event, *cycles, random),
-                Way::Recent(histories) => histories.run(*cycles, random),
-                Way::Joint => joint::run(blindness, ages, means, is_event, *cycles, random),
+                Way::Alone => alone::run(like, is_event, random),
+                Way::Pooled => pooled::run(like, is_event, random),
+                Way::Recent(histories) => histories.run(like.cycles, random),
+                Way::Joint => joint::run(like, is_event, random),
             };
-            let compared = sums.iter_mut().zip(counts).skip(*not_compared);
+            let compared = sums.iter_mut().zip(counts).skip(like.not_compared);
             compared.for_each(|(sum, count)| *sum += count);
         }
         Ok(sums)
@@ -229,15 +222,14 @@ impl Cohort {
         if like.cycles == 1 {
             return Way::Alone;
         }
-        let (blindness, neglect) = (&like.blindness, self.options.neglect);
         let photons = pooled::largest(&like.means);
         let spads = self.is_event.spads() as u64 * like.cycles;
         if photons <= self.most_photons
-            && pooled::looked_at(blindness, photons, spads) <= WORTH_LOOKING_AT
+            && pooled::looked_at(&like.blindness, photons, spads) <= WORTH_LOOKING_AT
         {
             return Way::Pooled;
         }
-        recent::histories(blindness, &like.ages, &like.means, &self.is_event, neglect)
+        recent::histories(like, &self.is_event, self.options.neglect)
             .map_or(Way::Joint, Way::Recent)
     }
 
