@@ -294,6 +294,11 @@ impl SensorConfig {
         self.rows * self.cols
     }
 
+    /// Row and column of a macropixel, by its number in the array, row-major.
+    pub(crate) fn position(&self, number: usize) -> (usize, usize) {
+        (number / self.cols, number % self.cols)
+    }
+
     /// Bits of one serial load (thesis 4.7: 36.9 kbit).
     pub fn load_bits(&self) -> usize {
         self.pixels() * self.counter_bits

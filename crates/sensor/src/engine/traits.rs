@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::own_clk::by_own_clk;
 use super::{EngineError, Histograms, Work};
-use crate::chip::WindowLaw;
+use crate::chip::{Sensor, WindowLaw};
 use crate::photon::{PhotonStream, PixelLight, SpadEvent};
 
 /// What every engine tells of itself. What it runs is in [`Replay`] and [`Expose`].
@@ -44,6 +44,12 @@ impl<'p> PulsedPixel<'p> {
                 pulses,
             })
             .collect()
+    }
+
+    /// The pulses of each of these macropixels as one sees them to whose column CLK comes as to the first.
+    pub(super) fn all_by_own_clk(pixels: &[Self], sensor: &Sensor) -> Vec<Cow<'p, [SpadEvent]>> {
+        let seen = |pixel: &Self| by_own_clk(sensor, pixel.number, pixel.pulses);
+        pixels.iter().map(seen).collect()
     }
 }
 

@@ -28,13 +28,11 @@ mod tape;
 mod unlevelled;
 mod word;
 
-use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
 use super::error::has_no_delay_lines;
-use super::own_clk::by_own_clk;
 use super::{
     Engine, EngineError, Expose, Exposed, Gate, Histograms, LitPixel, PulsedPixel, Replay, follows,
     full_stream,
@@ -255,10 +253,7 @@ impl Replay for Cycle {
         follows(&self.sensor, &self.law.timing().pulses)?;
         has_no_delay_lines(&self.sensor)?;
         let starts: Vec<u16> = pixels.iter().map(|pixel| pixel.start).collect();
-        let seen = pixels
-            .iter()
-            .map(|pixel| by_own_clk(&self.sensor, pixel.number, pixel.pulses));
-        let seen: Vec<Cow<'_, [SpadEvent]>> = seen.collect();
+        let seen = PulsedPixel::all_by_own_clk(pixels, &self.sensor);
         let pulses: Vec<&[SpadEvent]> = seen.iter().map(|pulses| &**pulses).collect();
         for &start in &starts {
             if let Window::Race(why) = self.law.window(start) {
