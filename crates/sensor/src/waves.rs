@@ -108,7 +108,7 @@ impl Observer for WaveFile {
 ///
 /// # Errors
 /// When a file cannot be written, or `netlist` has not a signal of the layout.
-pub fn write_views(
+pub(crate) fn write_views(
     layout: &Layout,
     path: &Path,
     netlist: &Netlist,

@@ -77,14 +77,6 @@ impl BinEdges {
         let width_fs = self.width(bin).as_fs() as f64;
         self.0[bin] + Time::from_fs((within * width_fs).round() as i64)
     }
-
-    /// The position of a photon time, as `BinEdges::time_of` has it.
-    pub fn position_of(&self, time: Time) -> f64 {
-        let edges_passed = self.0.partition_point(|&edge| edge <= time);
-        let bin = edges_passed.saturating_sub(1).min(self.bins() - 1);
-        let within_fs = (time - self.0[bin]).as_fs() as f64;
-        bin as f64 - 0.5 + within_fs / self.width(bin).as_fs() as f64
-    }
 }
 
 impl WindowLaw {
@@ -359,7 +351,6 @@ mod tests {
             if let Some(bin) = edges.bin_of(time) {
                 let a_femtosecond = 1.0 / edges.width(bin).as_fs() as f64;
                 prop_assert!((bin as f64 - position).abs() <= 0.5 + a_femtosecond);
-                prop_assert!((edges.position_of(time) - position).abs() <= a_femtosecond);
             }
         }
     }

@@ -26,7 +26,7 @@ pub use variant::Variant;
 
 impl FrontEnd {
     /// What other files ask of it.
-    pub fn row(self) -> &'static Variant {
+    pub(crate) fn row(self) -> &'static Variant {
         match self {
             FrontEnd::Summation => &summation::VARIANT,
             FrontEnd::OrTree => &or_tree::VARIANT,
