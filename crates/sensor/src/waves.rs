@@ -15,6 +15,7 @@ use crate::units::Time;
 
 /// How a waveform is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum WaveFormat {
     /// Value change dump: text that every tool reads.
     #[default]

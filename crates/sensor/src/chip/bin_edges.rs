@@ -339,7 +339,7 @@ mod tests {
         }
 
         #[test]
-        fn positions_and_times_are_each_others_inverse(taps in taps(12), position in -3f64..15.0) {
+        fn the_time_of_a_position_lies_in_its_bin(taps in taps(12), position in -3f64..15.0) {
             // Bins of picoseconds: in one of a femtosecond no time is at its centre.
             let edges = BinEdges::new(taps.into_iter().map(|tap| tap * 1000).collect());
             for bin in 0..12 {

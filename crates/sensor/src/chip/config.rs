@@ -67,6 +67,7 @@ words! {
     /// How the P-counter is built (thesis 4.4). All have the same pins. Those with a memory open the same time windows where the
     /// counter holds after LOCAL_STOP. Where it wraps, LOCAL_STOP comes again after 2ⁿ⁺¹ counts of a counter of n bits with
     /// its borrow, and after 2ⁿ of one without: of the comparator, and of all with the tap `msb`.
+    #[non_exhaustive]
     pub enum PCounter {
         /// Ripple down counter of reset-only flip-flops, Q or Q̄ chosen by the memory bit (Fig. 51c, 53).
         Ripple = "ripple",

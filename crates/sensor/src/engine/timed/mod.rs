@@ -37,6 +37,7 @@ use crate::stimulus::StimulusPlan;
 
 /// What runs the macropixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Runner {
     /// Those whose orders are decided: the levelised netlist where windows lie as the library has them, and the window law
     /// elsewhere. The others: the gates.
