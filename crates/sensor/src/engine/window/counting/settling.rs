@@ -226,15 +226,14 @@ impl Counting<'_> {
     /// Settles the photons of one SPAD among those `together`.
     fn settle_spad(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spad: u8) {
         let window = self.window(pixel.sight, laser_cycle);
-        let start = self.stream.cycle_start(laser_cycle);
         self.photons.clear();
         let mut seen = 0;
         for &(photon, code) in &self.together {
             if code.spad() == spad && self.is_drawn(pixel.light, photon) {
-                let time = self.time_of(pixel.light, photon, laser_cycle);
+                let time = window.start + self.time_of(pixel.light, photon, laser_cycle);
                 seen += u64::from(window.row_of(time).is_some());
                 self.photons.push(Photon {
-                    time: start + time,
+                    time,
                     spad,
                     breeds: false,
                 });
@@ -243,10 +242,10 @@ impl Counting<'_> {
         if seen == 0 {
             return;
         }
-        self.detect(pixel, laser_cycle, 1 << spad);
+        self.detect(pixel, &window, 1 << spad);
         let mut last = None;
         for event in &self.events {
-            let Some(row) = window.row_of(event.time - start) else {
+            let Some(row) = window.row_of(event.time) else {
                 continue;
             };
             seen -= 1;

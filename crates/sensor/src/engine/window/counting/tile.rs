@@ -15,7 +15,7 @@
 use multiversion::multiversion;
 
 use super::bright::Beginning;
-use super::{Counting, Pixel};
+use super::{Counting, Pixel, Placed};
 use crate::engine::window::codes::{ROWS, SPADS};
 use crate::engine::window::sight::ROUNDING_FS;
 use crate::photon::{DeadTimeLaw, NEVER_FS, PixelStream, SpadEvent, TILE, spad_of};
@@ -352,8 +352,11 @@ impl Counting<'_> {
             if !layout.has_clk_bins {
                 std::mem::swap(&mut self.events, &mut tile.pulses[lane]);
                 self.events.sort_unstable();
-                let window = self.window(pixel.sight, cycle(lane));
-                self.count_events(pixel, &window, Time::ZERO);
+                let window = Placed {
+                    start: Time::ZERO,
+                    ..self.window(pixel.sight, cycle(lane))
+                };
+                self.count_events(pixel, &window);
                 pixel.work.lost_to_dead_time += u64::from(tile.tally[lane].lost);
                 continue;
             }
