@@ -34,6 +34,7 @@ use tile::Tile;
 mod bright;
 mod by_window;
 mod settling;
+mod side_by_side;
 mod sorted;
 mod spacing;
 mod tile;
