@@ -129,10 +129,7 @@ impl<'a> Model<'a> {
                 *count += latched >> bin & 1;
             }
         });
-        let (bits, overflow) = (self.config.bin_bits as u32, self.config.overflow);
-        hits.iter()
-            .map(|&n| histogram::model(n, bits, overflow))
-            .collect()
+        histogram::counts(self.config, hits)
     }
 
     /// Runs the exposure; `strobe` is told the time of every strobe (LOCAL_STOP's rise in the guided

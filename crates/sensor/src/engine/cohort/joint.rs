@@ -177,11 +177,7 @@ impl<'a> Tree<'a> {
     fn age(&mut self, ages: &Ages, random: &mut RandomWords) {
         let mut younger: f64 = 1.0;
         for &share in ages.aged.iter().rev() {
-            let p = if share > 0.0 {
-                (share / younger).min(1.0)
-            } else {
-                0.0
-            };
+            let p = Ages::among(share, younger);
             younger -= share;
             self.laws.forget();
             self.each_node(|tree, node| {

@@ -170,10 +170,8 @@ impl Cohort {
         start: u16,
         light: &PixelLight,
     ) -> Result<Vec<u16>, EngineError> {
-        let (bits, overflow) = (self.sensor.bin_bits as u32, self.sensor.overflow);
         let sums = self.sums(stream, pixel, start, light)?;
-        let counts = sums.iter().map(|&n| histogram::model(n, bits, overflow));
-        Ok(counts.collect())
+        Ok(histogram::counts(&self.sensor, sums))
     }
 
     /// As [`Cohort::draw`], before counters saturate or wrap.

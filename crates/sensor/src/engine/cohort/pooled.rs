@@ -240,11 +240,7 @@ const FEW: usize = 2 * LANES;
 fn fired_before(ages: &Ages, spads: u64, random: &mut RandomWords) -> SmallVec<[u64; FEW]> {
     let (mut left, mut share_left) = (spads, 1.0);
     let aged = ages.aged.iter().map(|&share| {
-        let p = if share > 0.0 {
-            (share / share_left).min(1.0)
-        } else {
-            0.0
-        };
+        let p = Ages::among(share, share_left);
         let count = binomial(left, p, 1.0 - p, random);
         left -= count;
         share_left -= share;

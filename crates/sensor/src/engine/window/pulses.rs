@@ -139,10 +139,7 @@ impl Window {
     }
 
     pub(super) fn counts(&self, hits: &[i64]) -> Vec<u16> {
-        let (bits, overflow) = (self.sensor.bin_bits as u32, self.sensor.overflow);
-        hits.iter()
-            .map(|&n| histogram::model(n as u64, bits, overflow))
-            .collect()
+        histogram::counts(&self.sensor, hits.iter().map(|&n| n as u64))
     }
 }
 
