@@ -137,7 +137,7 @@ proptest! {
         let pulses = pulses.into_iter().map(|(spad, share)| (at(share), spad));
         let pulses = clear(pulses.collect(), &timing, config.dead_time(), to_next_edge);
         let events: Vec<SpadEvent> = pulses.iter().map(|&(time, spad)| SpadEvent { time, spad }).collect();
-        let by_model = macropixel::Model::new(&config, &exposure).histogram(start, pulses);
+        let by_model = macropixel::Model::new(&config, timing, &exposure).histogram(start, pulses);
         let by_gates = Gate::new(&config, &exposure).histogram(start, &events);
         prop_assert_eq!(by_gates.as_ref(), Ok(&by_model));
         let refused = Window::new(&config, &exposure).histogram(start, &events);

@@ -5,7 +5,8 @@ use guided_dtof::chip::macropixel::Model;
 use guided_dtof::chip::p_counter::starts_high;
 use guided_dtof::chip::window_law::{Window as LawWindow, WindowLaw};
 use guided_dtof::chip::{
-    AfterBorrow, EventType, Exposure, Mode, Overflow, PCounter, Probe, SensorConfig, Tap,
+    AfterBorrow, ChipTiming, EventType, Exposure, Mode, Overflow, PCounter, Probe, SensorConfig,
+    Tap,
 };
 use guided_dtof::engine::{Cycle, EngineError, GateSimulation, Replay, Window};
 use guided_dtof::kernel::Recorder;
@@ -143,7 +144,7 @@ proptest! {
         let by_cycles = Cycle::new(config, &exposure).histogram(*start, &case.pulses).unwrap();
         prop_assert_eq!(&by_gates, &by_cycles);
         let pulses = case.pulses.iter().map(|p| (p.time, p.spad));
-        let by_model = Model::new(config, &exposure).histogram(*start, pulses);
+        let by_model = Model::new(config, ChipTiming::of(config), &exposure).histogram(*start, pulses);
         prop_assert_eq!(&by_gates, &by_model);
         let by_window = Window::new(config, &exposure).histogram(*start, &case.pulses);
         match window {
@@ -158,7 +159,7 @@ proptest! {
             let rises: Vec<Time> = rises.filter(|&t| t > Time::ZERO).collect();
             let mut expected = Vec::new();
             let pulses = case.pulses.iter().map(|p| (p.time, p.spad));
-            Model::new(config, &exposure).run(*start, pulses, |cause, _| expected.push(cause));
+            Model::new(config, ChipTiming::of(config), &exposure).run(*start, pulses, |cause, _| expected.push(cause));
             // A reset may raise LOCAL_STOP, too, while HIT is in reset.
             let in_reset = |t: &Time| {
                 let mut cycles = 0..=i64::from(case.laser_cycles);

@@ -6,6 +6,7 @@ use std::path::Path;
 
 /// What is wrong with something the user gave us, and the cure.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub struct InputError {
     /// File (or command-line option) at fault.
     pub source_name: String,

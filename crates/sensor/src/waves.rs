@@ -15,6 +15,7 @@ use crate::units::Time;
 
 /// How a waveform is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum WaveFormat {
     /// Value change dump: text that every tool reads.
     #[default]
@@ -108,7 +109,7 @@ impl Observer for WaveFile {
 ///
 /// # Errors
 /// When a file cannot be written, or `netlist` has not a signal of the layout.
-pub fn write_views(
+pub(crate) fn write_views(
     layout: &Layout,
     path: &Path,
     netlist: &Netlist,

@@ -28,6 +28,7 @@ pub(super) fn slack_bin(slack_fs: i64) -> usize {
 /// What a violation does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Policy {
     /// It is reported.
     #[default]

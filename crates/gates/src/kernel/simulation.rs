@@ -193,7 +193,7 @@ impl Kernel {
     /// When there is no such cell.
     #[cold]
     #[inline(never)]
-    pub fn corrupt(&mut self, cell: usize) {
+    pub(crate) fn corrupt(&mut self, cell: usize) {
         self.dissolve_bank_of(cell);
         let cell = &mut self.cells[cell];
         debug_assert!(cell.kind.is_flip_flop(), "only a flip-flop has a state");

@@ -208,7 +208,7 @@ impl TimingChecks {
     }
 
     /// Memory of the tables, bytes; kept violations come on top.
-    pub fn memory_bytes(&self) -> usize {
+    pub(crate) fn memory_bytes(&self) -> usize {
         let members: usize = self.banks.iter().map(|b| size_of_val(&b.members[..])).sum();
         size_of_val(&self.nets[..])
             + size_of_val(&self.flip_flops[..])

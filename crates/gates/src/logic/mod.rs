@@ -41,7 +41,7 @@ impl Logic {
 
     /// The two bits that encode this value in packed words.
     #[inline]
-    pub const fn bits(self) -> u8 {
+    pub(crate) const fn bits(self) -> u8 {
         self as u8
     }
 

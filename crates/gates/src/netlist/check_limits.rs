@@ -118,7 +118,7 @@ impl CheckKind {
     }
 
     /// Whether breaking it leaves the flip-flop's state in doubt: the checks that relate two pins do.
-    pub const fn spoils_state(self) -> bool {
+    pub(crate) const fn spoils_state(self) -> bool {
         matches!(
             self,
             CheckKind::Setup | CheckKind::Hold | CheckKind::Recovery | CheckKind::Removal

@@ -81,7 +81,7 @@ impl Delay {
     }
 
     /// Every corner times `factor`, rounded to whole femtoseconds.
-    pub fn times(self, factor: f64) -> Self {
+    pub(crate) fn times(self, factor: f64) -> Self {
         let scale = |fs: u32| (fs as f64 * factor).round() as u32;
         Delay {
             min_fs: scale(self.min_fs),

@@ -2,6 +2,7 @@
 
 /// What is wrong with a circuit description.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NetlistError {
     /// Two outputs drive one net.
     #[error(

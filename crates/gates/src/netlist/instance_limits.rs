@@ -57,7 +57,7 @@ impl InstanceLimits {
     }
 
     /// What the library says in one corner.
-    pub fn of(limits: &CheckLimits, corner: Corner) -> Self {
+    pub(crate) fn of(limits: &CheckLimits, corner: Corner) -> Self {
         let by_edge = |check| Edge::BOTH.map(|edge| limits.toward(check, edge, corner));
         InstanceLimits([CheckKind::ALL.map(by_edge); 2])
     }
@@ -70,13 +70,13 @@ impl InstanceLimits {
 
     /// Every limit times `factor`, rounded to whole femtoseconds.
     #[must_use]
-    pub fn times(self, factor: f64) -> Self {
+    pub(crate) fn times(self, factor: f64) -> Self {
         let scale = |fs: u32| (f64::from(fs) * factor).round() as u32;
         InstanceLimits(self.0.map(|control| control.map(|check| check.map(scale))))
     }
 
     /// Changes one limit, fs.
-    pub fn set(&mut self, control: Control, check: CheckKind, edge: Edge, limit_fs: u32) {
+    pub(crate) fn set(&mut self, control: Control, check: CheckKind, edge: Edge, limit_fs: u32) {
         self.0[control as usize][check as usize][edge as usize] = limit_fs;
     }
 }

@@ -18,7 +18,7 @@ pub struct Mismatch {
 impl Mismatch {
     /// Factor on the delays of the cell at this dotted path with this many transistors; never below 0.1, so that
     /// causes stay before their effects.
-    pub fn factor(&self, path: &str, transistors: u32) -> f64 {
+    pub(crate) fn factor(&self, path: &str, transistors: u32) -> f64 {
         const INVERTER: f64 = 2.0;
         let key = splitmix64(self.seed);
         let block = (hash(path) as u128) << 64;

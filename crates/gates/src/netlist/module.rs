@@ -17,7 +17,7 @@ impl Net {
     pub const NONE: Net = Net(u32::MAX);
 
     /// Index into the module's nets.
-    pub const fn index(self) -> usize {
+    pub(crate) const fn index(self) -> usize {
         self.0 as usize
     }
 
@@ -204,7 +204,7 @@ impl Module {
     }
 
     /// This module and every instance below it.
-    pub fn total_scopes(&self) -> usize {
+    pub(crate) fn total_scopes(&self) -> usize {
         let below = self.instances.iter().map(|i| i.module.total_scopes());
         1 + below.sum::<usize>()
     }

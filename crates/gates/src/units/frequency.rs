@@ -17,6 +17,7 @@ pub struct Frequency {
 
 /// Why a number is no clock frequency.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FrequencyError {
     /// Zero, negative, infinite or NaN.
     #[error("{0} Hz is not a clock frequency: give a positive, finite number of hertz")]

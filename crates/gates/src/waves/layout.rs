@@ -11,6 +11,7 @@ use crate::units::Time;
 
 /// How a signal's value is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Radix {
     /// Bits; also for scalars.
     #[default]

@@ -56,7 +56,7 @@ pub fn spread(config: &SensorConfig, silicon: &Silicon, done: impl Fn() + Sync) 
     let library = MacropixelTiming::of(config, &library, Limits::Kept, (0, 0));
     let aim = library.aim(period, phase);
     let pixel = |index: usize| {
-        let position = (index / config.cols, index % config.cols);
+        let position = config.position(index);
         let kept = MacropixelTiming::of(config, silicon, Limits::Kept, position);
         let slack = kept.slack(period, phase, aim);
         let keeps_limits = slack >= Time::ZERO;

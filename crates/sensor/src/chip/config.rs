@@ -3,10 +3,7 @@
 
 use std::path::PathBuf;
 
-pub use super::blocks::front_end::FrontEnd;
 use super::blocks::metdc_delay_line::Elements;
-pub use super::blocks::p_counter::PCounter;
-use super::blocks::readout::ReadoutOrder;
 use crate::netlist::Corner;
 use crate::photon::{MOST_SPADS, SpadGrid, count_bits};
 use crate::settings::Range::{Above, OneOf, Within};
@@ -49,6 +46,43 @@ words! {
         Guided = "guided",
         /// The global STOP: the last CLK periods of the laser cycle (thesis 4.2).
         Conventional = "conventional",
+    }
+}
+
+words! {
+    /// How the pulses of a macropixel's SPADs become SPAD_TIMED (thesis 2.4.1, Fig. 22).
+    pub enum FrontEnd {
+        /// A toggle flip-flop and two samplers for each SPAD, whose events the correlation block sums up (Fig. 22d). Two pulses
+        /// of one SPAD in a CLK period are lost.
+        Summation = "summation",
+        /// Pulse shapers and an OR tree (Fig. 22a). Pulses that overlap are lost, and two that are sampled together.
+        OrTree = "or_tree",
+        /// Toggle flip-flops and an XOR tree (Fig. 22b). Two pulses in a CLK period are lost.
+        XorTree = "xor_tree",
+        /// Pulse shapers, and an event where `coincident_spads` SPADs fire within a shaped pulse (Fig. 22c). What
+        /// does not coincide is lost.
+        Coincidence = "coincidence",
+    }
+}
+
+words! {
+    /// How the P-counter is built (thesis 4.4). All have the same pins. Those with a memory open the same time windows where the
+    /// counter holds after LOCAL_STOP. Where it wraps, LOCAL_STOP comes again after 2ⁿ⁺¹ counts of a counter of n bits with
+    /// its borrow, and after 2ⁿ of one without: of the comparator, and of all with the tap `msb`.
+    #[non_exhaustive]
+    pub enum PCounter {
+        /// Ripple down counter of reset-only flip-flops, Q or Q̄ chosen by the memory bit (Fig. 51c, 53).
+        Ripple = "ripple",
+        /// Ripple down counter of set/reset flip-flops and a delayed reset (Fig. 51b), the HSLIDAR's (4.9.2).
+        SetReset = "set_reset",
+        /// Synchronous down counter (Fig. 50a).
+        Synchronous = "synchronous",
+        /// Up counter from zero and a comparator (Fig. 49a).
+        Comparator = "comparator",
+        /// Ripple down counter without memory, loaded once, never reset: it comes round with STOP (4.4.3).
+        Memoryless = "memoryless",
+        /// Synchronous down counter in Gray code, of which one bit changes with each count.
+        Gray = "gray",
     }
 }
 
@@ -238,24 +272,6 @@ impl SensorConfig {
         self.spad_rows * self.spad_cols
     }
 
-    /// Lines of SPAD_TIMED, which the correlation block counts: one a SPAD, or one for all.
-    pub fn lines(&self) -> usize {
-        match self.front_end.joins() {
-            false => self.spads(),
-            true => 1,
-        }
-    }
-
-    /// SPADs that must fire together to raise a line of SPAD_TIMED.
-    pub(crate) fn spads_of_an_event(&self) -> usize {
-        (self.front_end.row().together)(self)
-    }
-
-    /// Bits of THRESHOLD.
-    pub(crate) fn threshold_bits(&self) -> usize {
-        count_bits(self.lines())
-    }
-
     /// k, where windows step by 2ᵏ CLK periods. The configuration must have passed [`SensorConfig::check`].
     pub(crate) fn step_bits(&self) -> u32 {
         self.step_periods.trailing_zeros()
@@ -295,6 +311,11 @@ impl SensorConfig {
         self.rows * self.cols
     }
 
+    /// Row and column of a macropixel, by its number in the array, row-major.
+    pub(crate) fn position(&self, number: usize) -> (usize, usize) {
+        (number / self.cols, number % self.cols)
+    }
+
     /// Bits of one serial load (thesis 4.7: 36.9 kbit).
     pub fn load_bits(&self) -> usize {
         self.pixels() * self.counter_bits
@@ -303,28 +324,5 @@ impl SensorConfig {
     /// Bits of all histograms.
     pub fn histogram_bits(&self) -> usize {
         self.pixels() * self.bins * self.bin_bits
-    }
-
-    /// Time of one readout.
-    pub fn readout_time(&self) -> Time {
-        let periods = ReadoutOrder::of(self).periods();
-        self.read_clock().periods(periods as i64)
-    }
-
-    /// Time of one serial load.
-    pub fn load_time(&self) -> Time {
-        self.load_clock()
-            .half_periods(2 * self.load_bits() as i64 + 1)
-    }
-
-    /// Time from one frame to the next one with windows of its own, of an exposure that ends `exposed` after it began: the load
-    /// goes on while the frame before is exposed and read out, and is hidden behind them, unless the sensor has to be reset for
-    /// it (thesis 4.9.5). Guide and ranging take none of it.
-    pub fn frame_time(&self, exposed: Time) -> Time {
-        let counted = exposed + self.readout_time();
-        match self.reset_to_load {
-            true => counted + self.load_time(),
-            false => counted.max(self.load_time()),
-        }
     }
 }

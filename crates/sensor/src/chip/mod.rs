@@ -19,6 +19,7 @@ mod blocks;
 pub mod config;
 pub mod empty_pixel;
 pub mod exposure;
+mod frame_time;
 pub mod probes;
 pub mod race;
 mod sensor_file;

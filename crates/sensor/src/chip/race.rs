@@ -9,6 +9,7 @@ const ROUNDING: Time = Time::from_fs(4);
 
 /// What meets what. The first is the one that comes at the wrong time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+#[non_exhaustive]
 pub enum Conflict {
     /// Data and clock of the METDC's shift register.
     #[error("the correlation block is slower than a CLK period")]

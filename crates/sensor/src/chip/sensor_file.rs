@@ -13,6 +13,7 @@ use crate::settings::{Document, Fault, Key, Section, Settings, commented, schema
 
 /// What is impossible about a sensor, and what would be possible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SensorFault {
     /// A value that its key does not take.
     #[error("{why}")]

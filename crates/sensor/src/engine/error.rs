@@ -103,6 +103,7 @@ pub enum EngineError {
 
 /// What the cohort engine's model of light and SPADs leaves out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NotModelled {
     /// Bins have a length.
     #[error("bins without length")]

@@ -1,97 +1,21 @@
-//! Exposing macropixels to light: the request to an engine, and its report on the work.
+//! Exposing macropixels to light, on all threads.
 //!
 //! An engine takes macropixels with their start values and the light on them and gives histograms. How it comes by
 //! photons is its own business: [`full_stream`] draws every photon of the exposure and hands the pulses to the engine;
 //! an engine that needs fewer photons, or none, has a way of its own ([`Expose::expose`]).
 
-use std::iter::Sum;
-use std::ops::{AddAssign, ControlFlow};
+use std::ops::ControlFlow;
 
 use rayon::prelude::*;
-use serde::Serialize;
 
-use super::{Cancelling, Engine, EngineError, Expose, Histograms, PulsedPixel, Replay};
+use super::{
+    Cancelling, Engine, EngineError, Expose, Exposed, LitPixel, PulsedPixel, Replay, Work,
+};
 use crate::chip::{Exposure, Sensor, WindowLaw};
 use crate::photon::{
     DeadTimeLaw, PhotonStream, PixelLight, PixelPhotons, SpadEvent, SpadModel, StreamConfig,
 };
 use crate::units::Time;
-
-/// A macropixel and the light on it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LitPixel {
-    /// Its number in the array, row-major: the key of its photons.
-    pub number: u32,
-    /// The start value in its P-counter.
-    pub start: u16,
-    /// What shines on it; `None` where its SPADs are switched off, as they are without a guide.
-    pub light: Option<PixelLight>,
-}
-
-/// Histograms, and what they took.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Exposed {
-    /// Counts of every macropixel and bin.
-    pub histograms: Histograms,
-    /// What was simulated.
-    pub work: Work,
-}
-
-impl Exposed {
-    /// Of no macropixel.
-    pub(crate) fn new(bins: usize) -> Self {
-        Exposed {
-            histograms: Histograms::new(bins),
-            work: Work::default(),
-        }
-    }
-}
-
-/// What an engine did, and what it had no need to do. Sums over macropixels.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct Work {
-    /// Macropixels asked for.
-    pub macropixels: u64,
-    /// Those not simulated because their SPADs are switched off.
-    pub skipped_dark: u64,
-    /// Those not simulated because their window never opens.
-    pub skipped_closed: u64,
-    /// Photons and dark counts of the exposure that were drawn; those that several windows look back on, for each of them.
-    pub photons_drawn: u64,
-    /// SPAD pulses that the engine looked at.
-    pub pulses: u64,
-    /// Drawn photons that would have been such pulses, had they not met a blind SPAD.
-    pub lost_to_dead_time: u64,
-    /// Those pulses in time windows that cancel in their SPAD's flip-flop, two at a time ([`Cancelling`]).
-    pub cancelled: u64,
-    /// CLK periods of the exposure, over all macropixels.
-    pub clk_periods: u64,
-    /// Those that were simulated, one by one or because a photon fell into them.
-    pub clk_periods_visited: u64,
-}
-
-impl AddAssign for Work {
-    fn add_assign(&mut self, other: Self) {
-        self.macropixels += other.macropixels;
-        self.skipped_dark += other.skipped_dark;
-        self.skipped_closed += other.skipped_closed;
-        self.photons_drawn += other.photons_drawn;
-        self.pulses += other.pulses;
-        self.lost_to_dead_time += other.lost_to_dead_time;
-        self.cancelled += other.cancelled;
-        self.clk_periods += other.clk_periods;
-        self.clk_periods_visited += other.clk_periods_visited;
-    }
-}
-
-impl Sum for Work {
-    fn sum<I: Iterator<Item = Self>>(iter: I) -> Self {
-        iter.fold(Work::default(), |mut sum, work| {
-            sum += work;
-            sum
-        })
-    }
-}
 
 /// The stream of light for a sensor in an exposure, with its slots where the sensor's bins are. `pulse_sigma` is that of
 /// the laser pulse with all jitter.

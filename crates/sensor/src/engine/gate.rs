@@ -1,12 +1,10 @@
 //! The gate engine: the netlist itself, event by event.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use super::lanes::LaneSimulation;
-use super::own_clk::by_own_clk;
 use super::readout::PinSampler;
 use super::{
     Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay, follows,
@@ -208,14 +206,7 @@ impl GateSimulation {
         let mut histograms = Histograms::new(self.sensor.bins);
         let counts = sampler.counts(&order);
         for (probes, counts) in self.probes.iter().zip(counts.chunks(self.sensor.bins)) {
-            let known = |(bin, &count): (usize, &Option<u16>)| {
-                count.ok_or_else(|| EngineError::Unknown {
-                    macropixel: probes.macropixel().to_owned(),
-                    bin,
-                })
-            };
-            let counts: Result<Vec<u16>, _> = counts.iter().enumerate().map(known).collect();
-            histograms.push(&counts?);
+            histograms.push_known(counts.iter().copied(), || probes.macropixel().to_owned())?;
         }
         Ok(histograms)
     }
@@ -244,20 +235,11 @@ impl GateSimulation {
     /// # Errors
     /// When a bit of a count is unknown.
     pub fn histograms(&self) -> Result<Histograms, EngineError> {
-        let histogram = |probes: &Probes| {
-            let count = |(bin, nets): (usize, &Vec<NetId>)| {
-                let count = self.kernel.number(nets).map(|n| n as u16);
-                count.ok_or_else(|| EngineError::Unknown {
-                    macropixel: probes.macropixel().to_owned(),
-                    bin,
-                })
-            };
-            let counts: Result<Vec<u16>, _> = probes.bins().iter().enumerate().map(count).collect();
-            counts
-        };
+        let count = |nets: &Vec<NetId>| self.kernel.number(nets).map(|n| n as u16);
         let mut histograms = Histograms::new(self.sensor.bins);
         for probes in &self.probes {
-            histograms.push(&histogram(probes)?);
+            let counts = probes.bins().iter().map(count);
+            histograms.push_known(counts, || probes.macropixel().to_owned())?;
         }
         Ok(histograms)
     }
@@ -326,10 +308,7 @@ impl Gate {
         pixels: &[PulsedPixel<'_>],
     ) -> Result<Histograms, EngineError> {
         let starts: &Vec<u16> = &pixels.iter().map(|pixel| pixel.start).collect();
-        let seen = pixels
-            .iter()
-            .map(|pixel| by_own_clk(&self.sensor, pixel.number, pixel.pulses));
-        let seen: Vec<Cow<'_, [SpadEvent]>> = seen.collect();
+        let seen = PulsedPixel::all_by_own_clk(pixels, &self.sensor);
         let pulses: &Vec<&[SpadEvent]> = &seen.iter().map(|pulses| &**pulses).collect();
         // One alone is quicker without lanes.
         if starts.len() == 1 {
@@ -365,8 +344,7 @@ impl Replay for Gate {
         }
         let circuit = MacropixelCircuit::new(&self.sensor, (0, 0));
         let alone = pixels.par_iter().map(|pixel| {
-            let number = pixel.number as usize;
-            let position = (number / self.sensor.cols, number % self.sensor.cols);
+            let position = self.sensor.position(pixel.number as usize);
             let timing = circuit.timing_at(self.sensor.silicon(), position);
             self.replay_with(&[&timing], std::slice::from_ref(pixel))
         });

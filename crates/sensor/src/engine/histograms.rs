@@ -3,6 +3,8 @@
 use std::ops::{Index, IndexMut};
 use std::slice::ChunksExact;
 
+use super::EngineError;
+
 /// Counts of macropixels, in the order they were asked for, and their bins, bin 0 earliest: shape (macropixels, bins), row
 /// after row in one array.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -72,6 +74,30 @@ impl Histograms {
     pub(crate) fn push(&mut self, counts: &[u16]) {
         assert_eq!(counts.len(), self.bins, "bins of a macropixel");
         self.counts.extend_from_slice(counts);
+    }
+
+    /// Adds a macropixel whose counts are `None` where a bit of them is unknown.
+    ///
+    /// # Errors
+    /// [`EngineError::Unknown`], with what `macropixel` says, of the first unknown one.
+    ///
+    /// # Panics
+    /// As `Histograms::push`.
+    pub(super) fn push_known(
+        &mut self,
+        counts: impl IntoIterator<Item = Option<u16>>,
+        macropixel: impl Fn() -> String,
+    ) -> Result<(), EngineError> {
+        let known = |(bin, count): (usize, Option<u16>)| {
+            let macropixel = &macropixel;
+            count.ok_or_else(|| EngineError::Unknown {
+                macropixel: macropixel(),
+                bin,
+            })
+        };
+        let counts = counts.into_iter().enumerate().map(known);
+        self.push(&counts.collect::<Result<Vec<u16>, _>>()?);
+        Ok(())
     }
 
     /// Adds macropixels.

@@ -139,7 +139,8 @@ impl LaneSimulation {
     /// Start value in the P-counter's memory of each lane; `None` where a bit is unknown, and without memory.
     pub fn loaded(&self) -> Vec<Option<u16>> {
         let memory = self.probes.find(Probe::Memory);
-        self.lanes(|lane| self.kernel.number(memory?, lane).map(|code| code as u16))
+        let loaded = |lane| self.kernel.number(memory?, lane).map(|code| code as u16);
+        (0..self.serial.len()).map(loaded).collect()
     }
 
     /// Counts of each lane, bin 0 earliest.
@@ -147,23 +148,13 @@ impl LaneSimulation {
     /// # Errors
     /// When a bit of a count is unknown; the lane stands for the column.
     pub fn histograms(&self) -> Result<Histograms, EngineError> {
-        let counts = self.lanes(|lane| {
-            let count = |(bin, nets): (usize, &Vec<NetId>)| {
-                let number = self.kernel.number(nets, lane).map(|n| n as u16);
-                number.ok_or_else(|| EngineError::Unknown {
-                    macropixel: format!("the macropixel in lane {lane}"),
-                    bin,
-                })
-            };
-            let counts: Result<Vec<u16>, _> =
-                self.probes.bins().iter().enumerate().map(count).collect();
-            counts
-        });
-        let counts = counts.into_iter().collect::<Result<Vec<_>, _>>()?;
-        Ok(Histograms::from_rows(self.probes.bins().len(), counts))
-    }
-
-    fn lanes<T>(&self, f: impl Fn(usize) -> T) -> Vec<T> {
-        (0..self.serial.len()).map(f).collect()
+        let bins = self.probes.bins();
+        let mut histograms = Histograms::new(bins.len());
+        for lane in 0..self.serial.len() {
+            let count = |nets: &Vec<NetId>| self.kernel.number(nets, lane).map(|n| n as u16);
+            let macropixel = || format!("the macropixel in lane {lane}");
+            histograms.push_known(bins.iter().map(count), macropixel)?;
+        }
+        Ok(histograms)
     }
 }

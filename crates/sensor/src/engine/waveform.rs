@@ -25,6 +25,7 @@ const KEPT_AROUND: (i64, i64) = (1, 2);
 
 /// Which laser cycles a waveform keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum WaveCycles {
     /// The first laser cycle that counts, one before it (the load, if there is none) and two after it. Where nothing is
     /// ever counted, the first laser cycles.

@@ -12,6 +12,7 @@ use super::peak::{Peak, median};
 
 /// The region and fraction that define an arrival.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct ArrivalOptions {
     /// Bins taken before the fullest one.
     pub before: usize,

@@ -50,6 +50,7 @@ pub struct Calibration {
 
 /// Why a calibration cannot be fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CalibrationError {
     /// A zone saw the target fewer than three times, or always at one distance.
     #[error("zone {0} saw the target at fewer than three distances")]

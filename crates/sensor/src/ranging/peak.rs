@@ -11,6 +11,7 @@ use std::ops::Range;
 
 /// What to take off the counts before interpolating.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Background {
     /// Nothing: Eq. 28 to the letter.
     None,
@@ -22,6 +23,7 @@ pub enum Background {
 
 /// How to interpolate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PeakOptions {
     /// Bins taken either side of the fullest one.
     pub half_width: usize,

@@ -40,6 +40,7 @@ const FAR: f64 = 30.0;
 /// Range walk stays in a depth, and why.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum WalkLeft {
     /// On the line that a delay line's SPADs share photons cancel.
     DelayLine,

@@ -27,6 +27,7 @@ const MOST_EVENTS: usize = 10_000;
 words! {
     /// What happened.
     #[derive(PartialOrd, Ord)]
+    #[non_exhaustive]
     pub enum HardwareEventKind {
         /// A start value changed while its counter was not held in reset.
         MemoryWrittenWhileCounting = "memory_written_while_counting",

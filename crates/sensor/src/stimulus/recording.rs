@@ -60,10 +60,9 @@ fn starts_of<R: BufRead>(lines: Lines<R>, config: &SensorConfig) -> Result<Vec<u
         starts[pixel] = Some(init as u16);
     }
     if let Some(pixel) = starts.iter().position(Option::is_none) {
+        let (r, c) = config.position(pixel);
         let message = format!(
-            "macropixel ({}, {}) has no start value; add a line for it or shrink the array (rows, cols)",
-            pixel / config.cols,
-            pixel % config.cols
+            "macropixel ({r}, {c}) has no start value; add a line for it or shrink the array (rows, cols)"
         );
         return Err(InputError::new(source, message));
     }

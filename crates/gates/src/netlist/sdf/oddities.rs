@@ -8,6 +8,7 @@ use crate::netlist::corner::Corner;
 
 /// One of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Oddity {
     /// Arcs without delay.
     Zeros {

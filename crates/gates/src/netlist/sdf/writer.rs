@@ -17,6 +17,7 @@ use crate::netlist::{ArcDelay, CellDelays, Timing};
 
 /// What stands between the names of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum SdfDivider {
     /// `a.b`
     #[default]
@@ -36,6 +37,7 @@ impl SdfDivider {
 
 /// The unit of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum SdfTimescale {
     /// Femtoseconds, whole numbers.
     Fs,

@@ -15,7 +15,7 @@
 use std::sync::Arc;
 
 use super::finished;
-use crate::chip::config::Overflow;
+use crate::chip::config::{Overflow, SensorConfig};
 use crate::netlist::{CellKind, Module, ModuleBuilder};
 
 /// One bin. Ports: HIT, PIXEL_CLEAR → COUNT\<bits\>.
@@ -64,6 +64,13 @@ pub fn circuit(bins: usize, bits: usize, overflow: Overflow) -> Arc<Module> {
         m.instance_by_names(&format!("bin_{bin}"), &counter, &ports);
     }
     finished(m.finish())
+}
+
+/// Reference model: counts of a sensor's bins after these hits of them.
+pub(crate) fn counts(config: &SensorConfig, hits: impl IntoIterator<Item = u64>) -> Vec<u16> {
+    let bits = config.bin_bits as u32;
+    let counts = hits.into_iter().map(|n| model(n, bits, config.overflow));
+    counts.collect()
 }
 
 /// Reference model: a bin's count after `hits` hits.

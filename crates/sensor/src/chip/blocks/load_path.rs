@@ -50,7 +50,7 @@ pub fn deserialiser(cols: usize, bits: usize) -> Arc<Module> {
 }
 
 /// A synchronous counter modulo `length`; returns the net that is high at its last count.
-pub fn bit_counter(m: &mut ModuleBuilder, clk: Net, reset: Net, length: usize) -> Net {
+pub(crate) fn bit_counter(m: &mut ModuleBuilder, clk: Net, reset: Net, length: usize) -> Net {
     let width = (usize::BITS - (length - 1).leading_zeros()).max(1) as usize;
     let count = m.wire_bus("BIT", width);
     let count_n = m.wire_bus("BIT_N", width);

@@ -28,7 +28,7 @@ use super::{
 };
 use crate::chip::config::{Mode, SensorConfig, Tdc};
 use crate::chip::exposure::Exposure;
-use crate::chip::timing::ChipTiming;
+use crate::chip::timing::chip_timing::ChipTiming;
 use crate::netlist::{Module, ModuleBuilder};
 use crate::units::Time;
 
@@ -114,12 +114,12 @@ pub struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    /// A macropixel of this sensor in this exposure.
-    pub fn new(config: &'a SensorConfig, exposure: &'a Exposure) -> Self {
+    /// A macropixel of this sensor, with these delays, in this exposure.
+    pub fn new(config: &'a SensorConfig, timing: ChipTiming, exposure: &'a Exposure) -> Self {
         Model {
             config,
             exposure,
-            timing: ChipTiming::of(config),
+            timing,
         }
     }
 
@@ -132,10 +132,7 @@ impl<'a> Model<'a> {
                 *count += latched >> bin & 1;
             }
         });
-        let (bits, overflow) = (self.config.bin_bits as u32, self.config.overflow);
-        hits.iter()
-            .map(|&n| histogram::model(n, bits, overflow))
-            .collect()
+        histogram::counts(self.config, hits)
     }
 
     /// Runs the exposure; `strobe` is told the time of every strobe (LOCAL_STOP's rise in the guided

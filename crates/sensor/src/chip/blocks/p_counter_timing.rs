@@ -27,7 +27,7 @@ use std::sync::Arc;
 
 use super::finished;
 use crate::chip::config::AfterBorrow;
-use crate::chip::timing::ChipTiming;
+use crate::chip::timing::chip_timing::ChipTiming;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 use crate::units::Time;
 

@@ -15,7 +15,7 @@
 //! gives no dead time, no load clock and no scale for the delay that Fig. 90 shows from left to right: dead time and load clock are
 //! the QuantIC4x4's, and the skew is chosen, 45 ps from column to column.
 
-use super::Sensor;
+use super::sensor::Sensor;
 use crate::chip::config::{PCounter, SensorConfig, Tdc};
 
 /// The fastest CLK that the chip takes (thesis 6.3.1), Hz. The model's gates are those of a faster library.

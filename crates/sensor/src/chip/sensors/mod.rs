@@ -8,37 +8,13 @@
 //!
 //! A [`Sensor`] is a value: engines keep one, and copies share what is in it.
 
-use std::ops::Deref;
-use std::sync::{Arc, OnceLock};
-
 mod hslidar;
 mod quantic4x4;
+mod sensor;
 
 pub use hslidar::{HSLIDAR_MOST_HZ, hslidar, hslidar_delay_line};
 pub use quantic4x4::quantic4x4;
-
-use super::config::{SensorConfig, Tdc};
-use super::sensor_file::SensorFault;
-use super::timing::ChipTiming;
-use super::timing::clk_skew::clk_skew;
-use super::timing::delay_lines::{DelayLines, Taps};
-use super::timing::silicon::Silicon;
-use crate::units::Time;
-
-/// A sensor that is possible, and what it is made of. Copies share their contents; the fields of its [`SensorConfig`] are
-/// read as its own.
-#[derive(Debug, Clone)]
-pub struct Sensor(Arc<Parts>);
-
-#[derive(Debug)]
-struct Parts {
-    config: SensorConfig,
-    silicon: Silicon,
-    timing: OnceLock<ChipTiming>,
-    delay_lines: OnceLock<Arc<DelayLines>>,
-    clk_skews: OnceLock<Box<[Time]>>,
-    alike: OnceLock<Sensor>,
-}
+pub use sensor::Sensor;
 
 /// A chip's name, and what makes its [`Sensor`].
 pub type Chip = (&'static str, fn() -> Sensor);
@@ -56,130 +32,6 @@ impl Sensor {
         let chip = CHIPS.iter().find(|(known, _)| *known == name);
         chip.map(|(_, chip)| chip())
     }
-
-    /// A sensor of this description, made of the library in its corner.
-    ///
-    /// # Errors
-    /// What [`SensorConfig::check`] finds.
-    pub fn new(config: SensorConfig) -> Result<Self, SensorFault> {
-        config.check()?;
-        Ok(config.into())
-    }
-
-    /// The same sensor made of other silicon: other conditions, mismatch of its cells.
-    pub fn made_of(&self, silicon: &Silicon) -> Self {
-        Self::from_parts(self.0.config.clone(), *silicon)
-    }
-
-    /// What it is made of.
-    pub fn silicon(&self) -> &Silicon {
-        &self.0.silicon
-    }
-
-    /// Delays of macropixel (0, 0), measured once. Where cells have mismatch, others have others.
-    pub fn timing(&self) -> &ChipTiming {
-        let Parts {
-            config,
-            silicon,
-            timing,
-            ..
-        } = &*self.0;
-        timing.get_or_init(|| match *silicon == Silicon::of(config) {
-            true => ChipTiming::of(config),
-            false => ChipTiming::measure(config, silicon),
-        })
-    }
-
-    /// Taps of a macropixel's delay lines, by its number in the array, row-major; `None` where the TDC is clocked.
-    pub(super) fn taps(&self, number: usize) -> Option<Taps> {
-        let Parts {
-            config,
-            silicon,
-            delay_lines,
-            ..
-        } = &*self.0;
-        (config.tdc == Tdc::DelayLine).then(|| {
-            let lines = delay_lines.get_or_init(|| DelayLines::of(config, silicon));
-            lines.taps(number)
-        })
-    }
-
-    /// Longer than the delay lines of any macropixel: twice the average, for mismatch and the slow corner. Nothing where there are
-    /// none.
-    pub fn longest_delay_line(&self) -> Time {
-        let typical = self.delay_element() * (2 * self.bins as i64);
-        match self.tdc {
-            Tdc::Clocked => Time::ZERO,
-            Tdc::DelayLine => Time::from_s(typical.as_s() * self.silicon().factor.max(1.0)),
-        }
-    }
-
-    /// By how much CLK, STOP and RUN come later to a column of macropixels than to column 0: what its wires take in this silicon.
-    pub fn clk_skew(&self, col: usize) -> Time {
-        let Parts {
-            config,
-            silicon,
-            clk_skews,
-            ..
-        } = &*self.0;
-        if config.clk_skew_ps == 0.0 {
-            return Time::ZERO;
-        }
-        let of_column = |col| clk_skew(config, silicon, col);
-        let known = clk_skews.get_or_init(|| (0..config.cols).map(of_column).collect());
-        known.get(col).copied().unwrap_or_else(|| of_column(col))
-    }
-
-    /// Whether macropixels differ by description: each has delay lines of its own, or CLK comes later to some. One window law
-    /// does not describe them all then ([`WindowLaw::of_macropixel`](crate::chip::WindowLaw::of_macropixel)).
-    pub fn has_own_laws(&self) -> bool {
-        self.tdc == Tdc::DelayLine || self.clk_skew_ps > 0.0
-    }
-
-    /// This sensor of the library's own silicon with delay lines whose elements are all alike, and a CLK that comes everywhere at once:
-    /// what is assumed of one that has not been calibrated. A copy, where it is such a sensor.
-    #[must_use]
-    pub fn alike(&self) -> Self {
-        let config = SensorConfig {
-            delay_sigma: 0.0,
-            clk_skew_ps: 0.0,
-            ..self.0.config.clone()
-        };
-        let silicon = Silicon::of(&config);
-        let is_alike = config == self.0.config || !self.has_own_laws();
-        if is_alike && silicon == self.0.silicon {
-            return self.clone();
-        }
-        let alike = || Self::from_parts(config, silicon);
-        self.0.alike.get_or_init(alike).clone()
-    }
-
-    fn from_parts(config: SensorConfig, silicon: Silicon) -> Self {
-        Sensor(Arc::new(Parts {
-            config,
-            silicon,
-            timing: OnceLock::new(),
-            delay_lines: OnceLock::new(),
-            clk_skews: OnceLock::new(),
-            alike: OnceLock::new(),
-        }))
-    }
-}
-
-impl Deref for Sensor {
-    type Target = SensorConfig;
-
-    fn deref(&self) -> &SensorConfig {
-        &self.0.config
-    }
-}
-
-/// Sensors are equal if they are described alike and made of the same.
-impl PartialEq for Sensor {
-    fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.0, &other.0)
-            || self.0.config == other.0.config && self.0.silicon == other.0.silicon
-    }
 }
 
 impl Default for Sensor {
@@ -189,33 +41,12 @@ impl Default for Sensor {
     }
 }
 
-impl From<SensorConfig> for Sensor {
-    /// A sensor of this description, made of the library in its corner. The description must have passed
-    /// [`SensorConfig::check`].
-    fn from(config: SensorConfig) -> Self {
-        let silicon = Silicon::of(&config);
-        Self::from_parts(config, silicon)
-    }
-}
-
-impl From<&SensorConfig> for Sensor {
-    /// As from the [`SensorConfig`] itself.
-    fn from(config: &SensorConfig) -> Self {
-        config.clone().into()
-    }
-}
-
-impl From<&Sensor> for Sensor {
-    /// A copy, which shares its contents.
-    fn from(sensor: &Sensor) -> Self {
-        sensor.clone()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chip::{ChipTiming, SensorConfig, Silicon};
     use crate::netlist::{Corner, Mismatch};
+    use crate::units::Time;
 
     #[test]
     fn copies_share_their_delays_and_other_silicon_has_others() {

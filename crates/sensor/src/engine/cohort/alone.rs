@@ -3,25 +3,22 @@
 //! In most steps no SPAD is hit, which one random number tells. Otherwise the first one that is hit follows from that
 //! number, and those after it are asked one by one.
 
-use super::blindness::{Ages, Blindness};
+use super::blindness::Ages;
+use super::cycles::LikeCycles;
+use super::events::EventTable;
 use super::spad_light::absorbed;
+use super::steps::Counts;
 use super::words::RandomWords;
-use super::{Counts, EventTable, Means};
 use crate::photon::DeadTimeLaw;
 use smallvec::{SmallVec, smallvec};
 
-/// Events of every bin of a laser cycle that begins in the state `ages`.
-pub(super) fn run(
-    blindness: &Blindness,
-    ages: &Ages,
-    means: &Means,
-    is_event: &EventTable,
-    random: &mut RandomWords,
-) -> Counts {
+/// Events of every bin of one of these laser cycles.
+pub(super) fn run(like: &LikeCycles, is_event: &EventTable, random: &mut RandomWords) -> Counts {
+    let blindness = &like.blindness;
     let spads = is_event.spads();
-    let mut fired = fired_before(ages, spads, random);
+    let mut fired = fired_before(&like.ages, spads, random);
     (0..)
-        .zip(means)
+        .zip(&like.means)
         .map(|(step, &mean)| {
             let mut pulses = 0;
             each_hit(absorbed(mean), spads, random, |spad, random| {
@@ -94,6 +91,7 @@ fn each_hit(
 
 #[cfg(test)]
 mod tests {
+    use super::super::blindness::Blindness;
     use super::super::joint;
     use super::*;
 
@@ -102,17 +100,17 @@ mod tests {
     fn one_cycle_is_like_a_cohort_of_one() {
         const TRIALS: u32 = 60_000;
         const BINS: usize = 4;
-        let means: Means = [0.03, 0.05, 0.2, 0.02][..].into();
+        let means = [0.03, 0.05, 0.2, 0.02];
         for law in [DeadTimeLaw::NonParalysable, DeadTimeLaw::Paralysable] {
             for least in [1, 2] {
                 let blindness = Blindness::new(law, 1.6);
-                let ages = Ages::steady(&blindness, 0.1);
+                let like = LikeCycles::of(1, blindness, 0.1, &means);
                 let is_event = EventTable::new(16, |spads| spads >= least);
                 let mut random = RandomWords::new(5, 0);
                 let mut both = [[[0u32; BINS]; BINS]; 2];
                 for _ in 0..TRIALS {
-                    let alone = run(&blindness, &ages, &means, &is_event, &mut random);
-                    let tree = joint::run(&blindness, &ages, &means, &is_event, 1, &mut random);
+                    let alone = run(&like, &is_event, &mut random);
+                    let tree = joint::run(&like, &is_event, &mut random);
                     for (both, counts) in both.iter_mut().zip([alone, tree]) {
                         for (a, both) in both.iter_mut().enumerate() {
                             for (b, both) in both.iter_mut().enumerate() {

@@ -104,15 +104,7 @@ impl Blindness {
         (9.0 * able.min(1.0 - able)).min(able.max(1.0 - able))
     }
 
-    /// Probability that a photon, present with probability `p`, takes a SPAD of `age` back to age 0.
-    fn renews(&self, step: usize, age: usize, p: f64) -> f64 {
-        match self.law {
-            DeadTimeLaw::NonParalysable => p * self.able(step, age),
-            DeadTimeLaw::Paralysable => p,
-        }
-    }
-
-    /// As [`Blindness::renews`], and the probability that it makes a pulse.
+    /// Probabilities that a photon, present with probability `p`, takes a SPAD of `age` back to age 0, and that it makes a pulse.
     #[inline(always)]
     pub(super) fn hit(&self, step: usize, age: usize, p: f64) -> (f64, f64) {
         let pulses = p * self.able(step, age);
@@ -122,7 +114,7 @@ impl Blindness {
         }
     }
 
-    /// The complement of [`Blindness::renews`]; `q` is 1 − `p`.
+    /// The complement of the first of [`Blindness::hit`]; `q` is 1 − `p`.
     fn keeps(&self, step: usize, age: usize, p: f64, q: f64) -> f64 {
         match self.law {
             DeadTimeLaw::NonParalysable => q + p * (1.0 - self.able(step, age)),
@@ -177,6 +169,14 @@ impl Ages {
         }
     }
 
+    /// The probability `share` of an age, in one of those SPADs, the part `left`, that are of no age looked at before.
+    pub(super) fn among(share: f64, left: f64) -> f64 {
+        match share > 0.0 {
+            true => (share / left).min(1.0),
+            false => 0.0,
+        }
+    }
+
     /// Makes those free that have no age.
     pub(super) fn fill_up(&mut self) {
         self.free = (1.0 - self.aged.iter().sum::<f64>()).max(0.0);
@@ -207,7 +207,8 @@ impl Ages {
         let mut renewed = p * self.free;
         self.free *= q;
         for (index, age) in self.aged.iter_mut().enumerate() {
-            renewed += *age * blindness.renews(step, index + 1, p);
+            let (renews, _) = blindness.hit(step, index + 1, p);
+            renewed += *age * renews;
             *age *= blindness.keeps(step, index + 1, p, q);
         }
         match self.aged.last_mut() {

@@ -13,8 +13,9 @@
 use smallvec::SmallVec;
 
 use super::blindness::{Ages, Blindness};
+use super::options::CohortOptions;
 use super::spad_light::{Extent, SpadLight, absorbed};
-use super::{CohortOptions, Means};
+use super::steps::Means;
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{SensorConfig, WindowLaw};
 use crate::engine::EngineError;
@@ -34,6 +35,20 @@ pub(super) struct LikeCycles {
     pub means: Means,
     /// First bins that the pipeline has not reached yet.
     pub not_compared: usize,
+}
+
+#[cfg(test)]
+impl LikeCycles {
+    /// Cycles in whose bins there are `means` photons on a SPAD, after much light of `before` photons in each step.
+    pub(super) fn of(cycles: u64, blindness: Blindness, before: f64, means: &[f64]) -> Self {
+        LikeCycles {
+            cycles,
+            ages: Ages::steady(&blindness, before),
+            blindness,
+            means: means.into(),
+            not_compared: 0,
+        }
+    }
 }
 
 /// Light and dead time around one macropixel's window. Times in femtoseconds from its laser cycle's STOP edge.

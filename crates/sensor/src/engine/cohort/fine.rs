@@ -29,11 +29,12 @@ use smallvec::{SmallVec, smallvec};
 
 use super::blindness::{Ages, Blindness};
 use super::cycles::{Before, Class, Scene};
+use super::events::EventTable;
 use super::grid::{CELLS, Grid};
 use super::hits::Hits;
 use super::secondaries::{Acts, Cell, Secondaries};
 use super::spad_light::absorbed;
-use super::{EventTable, FEW_STEPS};
+use super::steps::FEW_STEPS;
 use crate::engine::EngineError;
 use crate::photon::DeadTimeLaw;
 

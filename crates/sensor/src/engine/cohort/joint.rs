@@ -17,25 +17,20 @@
 use smallvec::SmallVec;
 
 use super::blindness::{Ages, Blindness};
+use super::cycles::LikeCycles;
 use super::draw::binomial;
+use super::events::EventTable;
 use super::hits::Hits;
+use super::steps::Counts;
 use super::words::RandomWords;
-use super::{Counts, EventTable, Means};
 use crate::chip::MOST_SPADS;
 use crate::photon::DeadTimeLaw;
 
-/// Counts of every bin after `cycles` laser cycles that begin in the state `ages`.
-pub(super) fn run(
-    blindness: &Blindness,
-    ages: &Ages,
-    means: &Means,
-    is_event: &EventTable,
-    cycles: u64,
-    random: &mut RandomWords,
-) -> Counts {
-    let mut tree = Tree::new(blindness, is_event.spads(), cycles);
-    tree.age(ages, random);
-    means
+/// Counts of every bin after these laser cycles.
+pub(super) fn run(like: &LikeCycles, is_event: &EventTable, random: &mut RandomWords) -> Counts {
+    let mut tree = Tree::new(&like.blindness, is_event.spads(), like.cycles);
+    tree.age(&like.ages, random);
+    like.means
         .iter()
         .map(|&mean| {
             tree.advance(mean, random);
@@ -182,11 +177,7 @@ impl<'a> Tree<'a> {
     fn age(&mut self, ages: &Ages, random: &mut RandomWords) {
         let mut younger: f64 = 1.0;
         for &share in ages.aged.iter().rev() {
-            let p = if share > 0.0 {
-                (share / younger).min(1.0)
-            } else {
-                0.0
-            };
+            let p = Ages::among(share, younger);
             younger -= share;
             self.laws.forget();
             self.each_node(|tree, node| {

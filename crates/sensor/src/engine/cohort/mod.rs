@@ -49,6 +49,7 @@ mod fine;
 mod grid;
 mod hits;
 mod joint;
+mod options;
 mod overlap;
 mod pooled;
 mod prepare;
@@ -56,55 +57,28 @@ mod recent;
 mod rejection;
 mod secondaries;
 mod spad_light;
+mod steps;
 mod weighted;
 mod words;
 
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
-use smallvec::{SmallVec, smallvec};
+use smallvec::smallvec;
 
 pub use self::blindness::BlindSpad;
 use self::cycles::LikeCycles;
 pub use self::draw::none_of;
 use self::events::EventTable;
 pub use self::hits::at_least_hit;
+pub use self::options::CohortOptions;
 use self::recent::Histories;
 pub use self::secondaries::variance_left_out;
+use self::steps::Counts;
 use self::words::RandomWords;
 use super::{Engine, EngineError, Expose, Exposed, LitPixel, Work};
 use crate::chip::{Exposure, Sensor, WindowLaw, histogram, window_law};
 use crate::photon::{PhotonStream, PixelLight, StreamConfig};
-
-/// Steps of a window that need no memory of their own.
-const FEW_STEPS: usize = 16;
-
-/// Laser cycles with an event, for every bin of a window.
-type Counts = SmallVec<[u64; FEW_STEPS]>;
-
-/// Mean photons on one SPAD in every bin of a window.
-type Means = SmallVec<[f64; FEW_STEPS]>;
-
-/// The engine's knobs: what may be left out.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CohortOptions {
-    /// Largest error of a bin's mean, in standard deviations of its count over the exposure.
-    pub error: f64,
-    /// Largest correlation between two bins that may be neglected to save time; 0 never neglects any.
-    pub neglect: f64,
-    /// Largest probability, for a whole exposure of a macropixel, that laser cycles depend on each other.
-    pub memory: f64,
-}
-
-impl Default for CohortOptions {
-    fn default() -> Self {
-        CohortOptions {
-            error: 0.1,
-            neglect: 1e-4,
-            memory: 1e-6,
-        }
-    }
-}
 
 /// SPADs that are worth following one by one in a CLK period before [`joint`] is the cheaper way.
 const WORTH_LOOKING_AT: f64 = 200.0;
@@ -196,10 +170,8 @@ impl Cohort {
         start: u16,
         light: &PixelLight,
     ) -> Result<Vec<u16>, EngineError> {
-        let (bits, overflow) = (self.sensor.bin_bits as u32, self.sensor.overflow);
         let sums = self.sums(stream, pixel, start, light)?;
-        let counts = sums.iter().map(|&n| histogram::model(n, bits, overflow));
-        Ok(counts.collect())
+        Ok(histogram::counts(&self.sensor, sums))
     }
 
     /// As [`Cohort::draw`], before counters saturate or wrap.
@@ -231,20 +203,13 @@ impl Cohort {
         let random = &mut RandomWords::new(stream.seed, pixel);
         let is_event = &self.is_event;
         for like in &cohorts {
-            let LikeCycles {
-                cycles,
-                blindness,
-                ages,
-                means,
-                not_compared,
-            } = like;
             let counts = match self.way(like) {
-                Way::Alone => alone::run(blindness, ages, means, is_event, random),
-                Way::Pooled => pooled::run(blindness, ages, means, is_event, *cycles, random),
-                Way::Recent(histories) => histories.run(*cycles, random),
-                Way::Joint => joint::run(blindness, ages, means, is_event, *cycles, random),
+                Way::Alone => alone::run(like, is_event, random),
+                Way::Pooled => pooled::run(like, is_event, random),
+                Way::Recent(histories) => histories.run(like.cycles, random),
+                Way::Joint => joint::run(like, is_event, random),
             };
-            let compared = sums.iter_mut().zip(counts).skip(*not_compared);
+            let compared = sums.iter_mut().zip(counts).skip(like.not_compared);
             compared.for_each(|(sum, count)| *sum += count);
         }
         Ok(sums)
@@ -255,15 +220,14 @@ impl Cohort {
         if like.cycles == 1 {
             return Way::Alone;
         }
-        let (blindness, neglect) = (&like.blindness, self.options.neglect);
         let photons = pooled::largest(&like.means);
         let spads = self.is_event.spads() as u64 * like.cycles;
         if photons <= self.most_photons
-            && pooled::looked_at(blindness, photons, spads) <= WORTH_LOOKING_AT
+            && pooled::looked_at(&like.blindness, photons, spads) <= WORTH_LOOKING_AT
         {
             return Way::Pooled;
         }
-        recent::histories(blindness, &like.ages, &like.means, &self.is_event, neglect)
+        recent::histories(like, &self.is_event, self.options.neglect)
             .map_or(Way::Joint, Way::Recent)
     }
 

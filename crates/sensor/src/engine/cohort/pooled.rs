@@ -20,11 +20,13 @@ use smallvec::{SmallVec, smallvec};
 
 use super::abreast::{LANES, binomials};
 use super::blindness::{Ages, Blindness};
+use super::cycles::LikeCycles;
 use super::draw::binomial;
+use super::events::EventTable;
 use super::overlap::Overlap;
 use super::spad_light::{DIM, absorbed, absorbed_dim};
+use super::steps::{Counts, Means};
 use super::words::RandomWords;
-use super::{Counts, EventTable, Means};
 use crate::chip::MOST_SPADS;
 use crate::numerics::branchless::{VECTOR, count, real};
 use crate::photon::DeadTimeLaw;
@@ -46,21 +48,15 @@ pub(super) fn looked_at(blindness: &Blindness, photons: f64, spads: u64) -> f64 
     spads as f64 * blindness.memory() as f64 * photons * photons
 }
 
-/// Counts of every bin after `cycles` laser cycles that begin in the state `ages`.
+/// Counts of every bin after these laser cycles.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(crate) fn run(
-    blindness: &Blindness,
-    ages: &Ages,
-    means: &Means,
-    is_event: &EventTable,
-    cycles: u64,
-    random: &mut RandomWords,
-) -> Counts {
-    let odds = odds(means);
+pub(crate) fn run(like: &LikeCycles, is_event: &EventTable, random: &mut RandomWords) -> Counts {
+    let odds = odds(&like.means);
+    let cycles = like.cycles;
     let spads = is_event.spads() as u64 * cycles;
-    let mut fired = fired_before(ages, spads, random);
-    fired.resize(fired.len() + means.len(), 0);
-    let pool = Pool::new(blindness, spads, &mut fired);
+    let mut fired = fired_before(&like.ages, spads, random);
+    fired.resize(fired.len() + odds.len(), 0);
+    let pool = Pool::new(&like.blindness, spads, &mut fired);
     match is_event.spads() {
         // The same, for the compiler to unroll.
         16 => follow::<16>(16, &odds, pool, is_event, cycles, random),
@@ -244,11 +240,7 @@ const FEW: usize = 2 * LANES;
 fn fired_before(ages: &Ages, spads: u64, random: &mut RandomWords) -> SmallVec<[u64; FEW]> {
     let (mut left, mut share_left) = (spads, 1.0);
     let aged = ages.aged.iter().map(|&share| {
-        let p = if share > 0.0 {
-            (share / share_left).min(1.0)
-        } else {
-            0.0
-        };
+        let p = Ages::among(share, share_left);
         let count = binomial(left, p, 1.0 - p, random);
         left -= count;
         share_left -= share;

@@ -20,12 +20,12 @@
 use multiversion::multiversion;
 
 use super::abreast::{LANES, Lanes, binomials};
-use super::blindness::{Ages, Blindness};
+use super::cycles::LikeCycles;
 use super::draw::binomial;
 use super::events::{EventTable, NoEvent};
+use super::steps::Counts;
 use super::weighted::Weighted;
 use super::words::RandomWords;
-use super::{Counts, Means};
 
 /// Bins that a history may tell of; of the fewest, all histories go abreast.
 const KNOWN: [u32; 3] = [4, 6, 8];
@@ -46,12 +46,16 @@ pub(super) struct Histories {
 /// where nothing is to be left out, or where events are of a kind that probabilities of a single SPAD do not tell.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(crate) fn histories(
-    blindness: &Blindness,
-    ages: &Ages,
-    means: &Means,
+    like: &LikeCycles,
     is_event: &EventTable,
     neglect: f64,
 ) -> Option<Histories> {
+    let LikeCycles {
+        blindness,
+        ages,
+        means,
+        ..
+    } = like;
     let no_event = is_event.no_event().filter(|_| neglect > 0.0)?;
     let spads = (no_event.weight, is_event.spads());
     let rows = means.len().div_ceil(LANES);
@@ -321,6 +325,8 @@ const ROUNDING: f64 = 1e-13;
 #[cfg(test)]
 mod tests {
     use super::super::alone;
+    use super::super::blindness::{Ages, Blindness};
+    use super::super::steps::Means;
     use super::*;
     use crate::photon::DeadTimeLaw;
 
@@ -347,16 +353,15 @@ mod tests {
         for law in [DeadTimeLaw::NonParalysable, DeadTimeLaw::Paralysable] {
             for is_event in events() {
                 let blindness = Blindness::new(law, 2.6);
-                let ages = Ages::steady(&blindness, 0.1);
-                let means = light();
+                let like = LikeCycles::of(1, blindness, 0.1, &light());
                 let no_event = is_event.no_event().unwrap();
                 let spads = (no_event.weight, is_event.spads());
-                let spads = Weighted::new(&blindness, &ages, spads, 1);
-                let (histories, _) = Histories::new(spads, &no_event, 4, &means);
+                let spads = Weighted::new(&like.blindness, &like.ages, spads, 1);
+                let (histories, _) = Histories::new(spads, &no_event, 4, &like.means);
                 let mut random = RandomWords::new(6, 0);
                 let mut seen = [vec![[0u32; 32]; BINS - 4], vec![[0u32; 32]; BINS - 4]];
                 for _ in 0..TRIALS {
-                    let alone = alone::run(&blindness, &ages, &means, &is_event, &mut random);
+                    let alone = alone::run(&like, &is_event, &mut random);
                     for (seen, counts) in
                         seen.iter_mut().zip([alone, histories.run(1, &mut random)])
                     {
@@ -444,11 +449,11 @@ mod tests {
     #[test]
     fn the_least_histories_that_do_are_taken() {
         let is_event = EventTable::new(16, |spads| spads > 0);
-        let blindness = Blindness::new(DeadTimeLaw::NonParalysable, 3.07);
         let found = |neglect, mean: f64, is_event: &EventTable| {
-            let ages = Ages::steady(&blindness, 0.01);
-            let means = light().iter().map(|light| light * mean).collect();
-            histories(&blindness, &ages, &means, is_event, neglect).map(|found| found.known)
+            let blindness = Blindness::new(DeadTimeLaw::NonParalysable, 3.07);
+            let means: Means = light().iter().map(|light| light * mean).collect();
+            let like = LikeCycles::of(1, blindness, 0.01, &means);
+            histories(&like, is_event, neglect).map(|found| found.known)
         };
         assert_eq!(found(1e-4, 0.02, &is_event), Some(4));
         assert!(found(1e-4, 1.0, &is_event) > Some(4));

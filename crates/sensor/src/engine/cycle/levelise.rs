@@ -26,17 +26,16 @@ mod holds;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use super::Unlevelled;
 use super::expression::Expressions;
 use super::parts::Parts;
 use super::stream::StreamTape;
 use super::survey::{Class, Survey, output};
 use super::tape::{Action, Code, PassTape, SINK, ZERO};
+use super::unlevelled::Unlevelled;
 use super::word::inversion;
 use crate::chip::{Exposure, SensorConfig, Silicon};
 use crate::netlist::{CellKind, DataLimit, Edge, FlatCell, Library, NetId, caused};
 use crate::units::Time;
-use arrivals::Reach;
 
 /// A net and the direction of its change.
 type Node = (NetId, Edge);
@@ -75,6 +74,19 @@ impl Cause {
     fn node(self) -> Node {
         (self.net, if self.value { Edge::Rise } else { Edge::Fall })
     }
+}
+
+/// Where a cause goes.
+struct Reach {
+    cause: Cause,
+    /// Changes, causes before effects, loops apart.
+    order: Vec<Node>,
+    /// Place of each change in the order.
+    rank: HashMap<Node, usize>,
+    /// Earliest and latest arrival of each.
+    arrival: HashMap<Node, (i64, i64)>,
+    /// Flip-flops whose clock means nothing, as they are held.
+    held: BTreeSet<usize>,
 }
 
 /// An action before it has its place on the tape.

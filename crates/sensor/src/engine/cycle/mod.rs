@@ -25,15 +25,14 @@ mod schedule;
 mod stream;
 mod survey;
 mod tape;
+mod unlevelled;
 mod word;
 
-use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
 use super::error::has_no_delay_lines;
-use super::own_clk::by_own_clk;
 use super::{
     Engine, EngineError, Expose, Exposed, Gate, Histograms, LitPixel, PulsedPixel, Replay, follows,
     full_stream,
@@ -47,37 +46,8 @@ use schedule::Schedule;
 use stream::Flow;
 use survey::Survey;
 use tape::Block;
+pub use unlevelled::Unlevelled;
 use word::{WORD_LANES, Word, inversion};
-
-/// Why a netlist has no tape.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Unlevelled {
-    /// A net is X when the exposure starts.
-    #[error("{0} is unknown when the exposure starts")]
-    Unknown(String),
-    /// A register of the stream starts with a value that its neighbours rule out.
-    #[error("{0} does not start at 0")]
-    Start(String),
-    /// An edge arrives by paths of different length.
-    #[error("edges reach {net} after {shortest_fs} to {longest_fs} fs")]
-    Ambiguous {
-        /// Where.
-        net: String,
-        /// Shortest path.
-        shortest_fs: i64,
-        /// Longest path.
-        longest_fs: i64,
-    },
-    /// A lane did what the tape cannot tell the outcome of: two edges too close to call, or one round a loop.
-    #[error("the next change of {0} is too close to call")]
-    Trapped(String),
-    /// A reset or set ends before what it does is done.
-    #[error("the reset or set of {0} ends before what it does has settled")]
-    Clear(String),
-    /// Something the tapes have no operation for.
-    #[error("{0} has no place on a tape")]
-    Structure(String),
-}
 
 /// A netlist that can be run.
 struct Machine {
@@ -283,10 +253,7 @@ impl Replay for Cycle {
         follows(&self.sensor, &self.law.timing().pulses)?;
         has_no_delay_lines(&self.sensor)?;
         let starts: Vec<u16> = pixels.iter().map(|pixel| pixel.start).collect();
-        let seen = pixels
-            .iter()
-            .map(|pixel| by_own_clk(&self.sensor, pixel.number, pixel.pulses));
-        let seen: Vec<Cow<'_, [SpadEvent]>> = seen.collect();
+        let seen = PulsedPixel::all_by_own_clk(pixels, &self.sensor);
         let pulses: Vec<&[SpadEvent]> = seen.iter().map(|pulses| &**pulses).collect();
         for &start in &starts {
             if let Window::Race(why) = self.law.window(start) {

@@ -13,9 +13,9 @@ use std::cell::Cell;
 
 use multiversion::multiversion;
 
-use super::Unlevelled;
 use super::expression::{Expressions, Literal, Node};
 use super::packing::{PERIODS, Packed, Pulse};
+use super::unlevelled::Unlevelled;
 use super::word::{Word, inversion};
 use crate::netlist::NetId;
 

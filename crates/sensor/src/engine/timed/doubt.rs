@@ -7,6 +7,7 @@ use crate::chip::race::{Conflict, NoAim};
 
 /// Why a macropixel is replayed at gate level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+#[non_exhaustive]
 pub enum Doubt {
     /// The serial load does not bring this start value into the P-counter.
     #[error("the load leaves another start value")]

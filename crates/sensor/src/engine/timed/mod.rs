@@ -37,6 +37,7 @@ use crate::stimulus::StimulusPlan;
 
 /// What runs the macropixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Runner {
     /// Those whose orders are decided: the levelised netlist where windows lie as the library has them, and the window law
     /// elsewhere. The others: the gates.
@@ -237,8 +238,8 @@ impl Timed {
     }
 
     fn name(&self, number: u32) -> String {
-        let (number, cols) = (number as usize, self.setting.sensor.cols);
-        array::pixel_name(number / cols, number % cols)
+        let (row, col) = self.setting.sensor.position(number as usize);
+        array::pixel_name(row, col)
     }
 
     /// Whether the load brings each of these start values into the P-counters. Its delays are the same for every macropixel.
@@ -278,11 +279,7 @@ impl Timed {
         if let Some((timing, _)) = &self.alike {
             return Cow::Borrowed(timing);
         }
-        let number = number as usize;
-        let position = (
-            number / self.setting.sensor.cols,
-            number % self.setting.sensor.cols,
-        );
+        let position = self.setting.sensor.position(number as usize);
         Cow::Owned(self.circuit.timing_at(&self.silicon, position))
     }
 

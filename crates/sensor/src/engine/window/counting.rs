@@ -18,22 +18,25 @@ use super::binning::{Binning, Scratch};
 use super::codes::{Code, Codes, ROWS, SPADS};
 use super::echo_rows::EchoRows;
 use super::past::PastDraws;
-use super::sight::{Sight, Spans};
+use super::pulses::Window;
+use super::sight::{ROUNDING_FS, Sight, Spans};
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Tables};
 use super::wanted::Wanted;
-use super::{Window, Work};
+use crate::engine::Work;
 use crate::photon::{
     Draw, Group, ListedEchoes, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SpadEvent,
 };
 use crate::units::Time;
 use by_window::ByWindow;
-use settling::Spacing;
+use spacing::Spacing;
 use tile::Tile;
 
 mod bright;
 mod by_window;
 mod settling;
+mod side_by_side;
 mod sorted;
+mod spacing;
 mod tile;
 mod whole;
 
@@ -362,6 +365,7 @@ impl<'a> Counting<'a> {
             engine: self.engine,
             sight,
             laser_cycle,
+            start: self.stream.cycle_start(laser_cycle),
         }
     }
 
@@ -413,17 +417,30 @@ struct Placed<'w> {
     engine: &'w Window,
     sight: &'w Sight,
     laser_cycle: u32,
+    /// When the laser cycle starts, which all times are counted with.
+    start: Time,
 }
 
 impl Placed<'_> {
-    /// Whether a time relative to the start of the laser cycle is within the window.
+    /// From when on pulses are wanted.
+    fn wanted_from(&self) -> Time {
+        self.start + Time::from_fs(self.sight.first_fs - ROUNDING_FS)
+    }
+
+    /// When the last bin is over for certain.
+    fn until(&self) -> Time {
+        self.start + Time::from_fs(self.sight.until_fs)
+    }
+
+    /// Whether a time is within the window.
     fn is_seen(&self, time: Time) -> bool {
-        let is_inside = self.sight.rows.are_around(time.as_fs());
+        let is_inside = self.sight.rows.are_around((time - self.start).as_fs());
         is_inside.unwrap_or_else(|| self.row_of(time).is_some())
     }
 
-    /// Bin + 1 of a time relative to the start of the laser cycle, if it is within the window.
+    /// Bin + 1 of a time, if it is within the window.
     fn row_of(&self, time: Time) -> Option<usize> {
+        let time = time - self.start;
         if let Some(row) = self.sight.rows.row_of(time.as_fs()) {
             return Some(row).filter(|&row| row > 0);
         }

@@ -14,6 +14,7 @@ mod codes;
 mod counting;
 mod echo_rows;
 mod past;
+mod pulses;
 mod sight;
 mod tables;
 mod wanted;
@@ -24,66 +25,19 @@ use super::exposing::refuse_other_spads;
 use super::own_clk::by_own_clk;
 use super::{
     Cancelling, Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay,
-    Work, follows, has_a_line_a_spad,
+    Work,
 };
+use crate::chip::WindowLaw;
 use crate::chip::window_law::OpenWindow;
-use crate::chip::{Exposure, Sensor, Tdc, WindowLaw, correlation, histogram, photon_line};
 use crate::photon::{PhotonStream, PixelLight, SpadEvent};
 use counting::Counting;
+pub use pulses::Window;
 use sight::Sight;
 
 /// A window that opens, and what decides its histogram where that is a part of every laser cycle.
 type Opened = (OpenWindow, Option<Sight>);
 
-/// Counts through the window law.
-#[derive(Clone)]
-pub struct Window {
-    sensor: Sensor,
-    exposure: Exposure,
-    law: WindowLaw,
-    /// Whether `law` is that of one macropixel, where each has its own.
-    is_of_macropixel: bool,
-}
-
 impl Window {
-    /// An engine for this sensor and exposure.
-    pub fn new(sensor: impl Into<Sensor>, exposure: &Exposure) -> Self {
-        Self::with_law(WindowLaw::new(sensor, exposure))
-    }
-
-    /// An engine for macropixels with delays, or edges of bins, of their own, which `law` is made of.
-    pub fn with_law(law: WindowLaw) -> Self {
-        Window {
-            sensor: law.sensor().clone(),
-            exposure: *law.exposure(),
-            law,
-            is_of_macropixel: false,
-        }
-    }
-
-    /// An engine for any number of exposures of the one macropixel that `law` is of, whatever their numbers.
-    pub fn of_one(law: WindowLaw) -> Self {
-        Window {
-            is_of_macropixel: true,
-            ..Self::with_law(law)
-        }
-    }
-
-    /// This engine with the law of a macropixel.
-    fn of_macropixel(&self, number: u32) -> Cow<'_, Self> {
-        match self.sensor.has_own_laws() && !self.is_of_macropixel {
-            true => Cow::Owned(Self::of_one(self.law.of_macropixel(number))),
-            false => Cow::Borrowed(self),
-        }
-    }
-
-    /// The window of a start value, if it opens.
-    fn window(&self, start: u16) -> Result<Option<OpenWindow>, EngineError> {
-        follows(&self.sensor, &self.law.timing().pulses)?;
-        has_a_line_a_spad(&self.sensor)?;
-        Ok(self.law.window(start).settled()?)
-    }
-
     /// Whether all photons of a macropixel are drawn, and not only those that its window may see: laser cycles hardly
     /// longer than the window, SPADs that are blind nearly all the time, or bins that are not CLK periods.
     pub fn draws_whole_cycles(&self, stream: &PhotonStream, pixel: &LitPixel) -> bool {
@@ -94,78 +48,6 @@ impl Window {
                 sight::is_blinding(stream, light)
                     || Sight::new(&self.law, &window, stream).is_none()
             })
-    }
-
-    fn is_event(&self, spads: u64) -> bool {
-        correlation::model(spads, self.sensor.event_type, self.sensor.threshold)
-    }
-
-    /// What the SPADs that fire in a bin add to its hits, beyond those of an empty macropixel.
-    fn adds(&self, spads: u64) -> i64 {
-        if self.sensor.tdc == Tdc::DelayLine {
-            return i64::from(spads.count_ones() % 2);
-        }
-        i64::from(self.is_event(spads)) - i64::from(self.is_event(0))
-    }
-
-    /// Counts pulses, sorted by time, of which no bin takes two parts.
-    fn count_pulses(&self, pulses: &[SpadEvent], window: &OpenWindow, hits: &mut [i64]) {
-        if self.sensor.tdc == Tdc::DelayLine {
-            let mut edges = pulses.to_vec();
-            self.keep_line_edges(&mut edges, |pulse| *pulse);
-            return self.count_between_edges(&edges, window, hits);
-        }
-        if !self.law.has_clk_bins() {
-            return self.count_between_edges(pulses, window, hits);
-        }
-        for (edge, spads) in taken(pulses, |pulse| self.law.edge_of(pulse.time)) {
-            let adds = self.adds(spads);
-            if adds != 0 {
-                for bin in self.law.bins_of_edge(window, edge) {
-                    hits[bin] += adds;
-                }
-            }
-        }
-    }
-
-    /// Keeps those of some pulses that leave an edge on the photon line.
-    fn keep_line_edges<P: Copy>(&self, pulses: &mut Vec<P>, event_of: impl Fn(&P) -> SpadEvent) {
-        let stage = self.law.timing().photon_line_stage;
-        let of = |pulse: &P| {
-            let event = event_of(pulse);
-            (event.time, event.spad)
-        };
-        photon_line::model(pulses, of, self.sensor.spads(), stage);
-    }
-
-    /// The same by the edges of the bins, whatever those are: laser cycle by laser cycle, leaving out those without pulses.
-    fn count_between_edges(&self, pulses: &[SpadEvent], window: &OpenWindow, hits: &mut [i64]) {
-        let cycles = self.law.latched_cycles();
-        let mut cycle = cycles.start;
-        let mut pulses = pulses;
-        while cycle < cycles.end {
-            let seen = self.law.interval_in(window, cycle);
-            // The next laser cycle's window may begin before this one's has ended.
-            pulses = &pulses[pulses.partition_point(|pulse| pulse.time < seen.start)..];
-            let Some(next) = pulses.first() else {
-                return;
-            };
-            if next.time < seen.end {
-                let within = pulses.partition_point(|pulse| pulse.time < seen.end);
-                let edges = self.law.edges(window, cycle);
-                let bin_of = |pulse: &SpadEvent| edges.bin_of(pulse.time);
-                for (bin, spads) in taken(&pulses[..within], bin_of) {
-                    let bin = bin.expect("a window is its bins");
-                    hits[bin] += self.adds(spads);
-                }
-                cycle += 1;
-            } else {
-                // Laser cycles are equal but for a femtosecond: at the latest in the one after these the pulse may be seen.
-                let cycle_fs = self.exposure.stop(1).as_fs();
-                let without = (next.time - seen.end).as_fs() / cycle_fs;
-                cycle += without.max(1);
-            }
-        }
     }
 
     /// Counts all pulses of a macropixel, part by part.
@@ -207,13 +89,6 @@ impl Window {
         work.lost_to_dead_time = photons.lost_to_dead_time;
         work.clk_periods_visited = u64::from(config.stop_periods) * u64::from(config.laser_cycles);
         (hits, work)
-    }
-
-    fn counts(&self, hits: &[i64]) -> Vec<u16> {
-        let (bits, overflow) = (self.sensor.bin_bits as u32, self.sensor.overflow);
-        hits.iter()
-            .map(|&n| histogram::model(n as u64, bits, overflow))
-            .collect()
     }
 }
 
@@ -314,23 +189,4 @@ impl Expose for Window {
         exposed.work.clk_periods += pixels.len() as u64 * clk_periods;
         Ok(exposed)
     }
-}
-
-/// Pulses grouped by what takes them, a CLK edge or a bin, and the SPADs with an odd number of them.
-fn taken<'p, K: PartialEq + 'p>(
-    pulses: &'p [SpadEvent],
-    taker_of: impl Fn(&SpadEvent) -> K + 'p,
-) -> impl Iterator<Item = (K, u64)> + 'p {
-    let mut pulses = pulses
-        .iter()
-        .map(move |pulse| (taker_of(pulse), pulse.spad))
-        .peekable();
-    std::iter::from_fn(move || {
-        let (taker, spad) = pulses.next()?;
-        let mut spads = 1 << spad;
-        while let Some((_, spad)) = pulses.next_if(|(other, _)| *other == taker) {
-            spads ^= 1 << spad;
-        }
-        Some((taker, spads))
-    })
 }

@@ -22,7 +22,8 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::or_tree::shapers;
-use super::{Variant, pins, retime};
+use super::summation::retime;
+use super::variant::{Variant, pins};
 use crate::chip::blocks::finished;
 use crate::netlist::{CellKind, Module, ModuleBuilder};
 use crate::units::Time;

@@ -16,7 +16,9 @@
 
 use std::sync::Arc;
 
-use super::{Variant, pins, pulse_shaper, retime};
+use super::pulse_shaper;
+use super::summation::retime;
+use super::variant::{Variant, pins};
 use crate::chip::blocks::finished;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 

@@ -19,9 +19,12 @@
 
 use std::sync::Arc;
 
-use super::Variant;
+use super::variant::Variant;
 use crate::chip::blocks::finished;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
+
+/// The instance that retimes the one wire of a front end that joins its SPADs.
+pub(crate) const JOINED: &str = "joined";
 
 pub(super) const VARIANT: Variant = Variant {
     circuit: |config| circuit(config.spads()),
@@ -52,6 +55,13 @@ pub(super) fn retiming() -> Arc<Module> {
     }
     m.gate_into(CellKind::Xor2, &[first, second], timed);
     finished(m.finish())
+}
+
+/// SPAD_TIMED of one line, from the rising edges of `joined`.
+pub(super) fn retime(m: &mut ModuleBuilder, joined: Net) {
+    m.output_bus("SPAD_TIMED", 1);
+    let retiming = retiming();
+    m.instance_by_names(JOINED, &retiming, &[("SPAD_RAW", &[joined])]);
 }
 
 /// The front end of a macropixel with `spads` SPADs.

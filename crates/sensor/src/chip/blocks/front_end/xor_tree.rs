@@ -15,7 +15,8 @@
 
 use std::sync::Arc;
 
-use super::{JOINED, Variant, pins};
+use super::summation::JOINED;
+use super::variant::{Variant, pins};
 use crate::chip::blocks::finished;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 

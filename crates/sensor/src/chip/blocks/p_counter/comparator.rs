@@ -16,7 +16,9 @@
 
 use std::sync::Arc;
 
-use super::{Counter, Pins, Variant, finished};
+use super::pins::Pins;
+use super::variant::{Counter, Variant};
+use crate::chip::blocks::finished;
 use crate::chip::config::SensorConfig;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 

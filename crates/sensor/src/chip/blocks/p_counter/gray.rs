@@ -28,7 +28,9 @@
 
 use std::sync::Arc;
 
-use super::{Pins, Variant, finished};
+use super::pins::Pins;
+use super::variant::Variant;
+use crate::chip::blocks::finished;
 use crate::chip::config::{SensorConfig, Tap};
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 

@@ -19,86 +19,34 @@
 mod comparator;
 mod gray;
 mod memoryless;
+mod pins;
 mod ripple;
 mod set_reset;
 mod step_divider;
 mod synchronous;
+mod variant;
 
 use std::sync::Arc;
 
-use super::finished;
-use crate::chip::config::{AfterBorrow, SensorConfig, Tap};
-use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
-use crate::settings::words;
+use crate::chip::config::{AfterBorrow, PCounter, SensorConfig, Tap};
+use crate::netlist::Module;
 
-words! {
-    /// How the P-counter is built (thesis 4.4). All have the same pins. Those with a memory open the same time windows where the
-    /// counter holds after LOCAL_STOP. Where it wraps, LOCAL_STOP comes again after 2ⁿ⁺¹ counts of a counter of n bits with
-    /// its borrow, and after 2ⁿ of one without: of the comparator, and of all with the tap `msb`.
-    pub enum PCounter: Variant {
-        /// Ripple down counter of reset-only flip-flops, Q or Q̄ chosen by the memory bit (Fig. 51c, 53).
-        Ripple = "ripple": ripple::VARIANT,
-        /// Ripple down counter of set/reset flip-flops and a delayed reset (Fig. 51b), the HSLIDAR's (4.9.2).
-        SetReset = "set_reset": set_reset::VARIANT,
-        /// Synchronous down counter (Fig. 50a).
-        Synchronous = "synchronous": synchronous::VARIANT,
-        /// Up counter from zero and a comparator (Fig. 49a).
-        Comparator = "comparator": comparator::VARIANT,
-        /// Ripple down counter without memory, loaded once, never reset: it comes round with STOP (4.4.3).
-        Memoryless = "memoryless": memoryless::VARIANT,
-        /// Synchronous down counter in Gray code, of which one bit changes with each count.
-        Gray = "gray": gray::VARIANT,
-    }
-}
-
-/// What other files ask of a variant.
-#[derive(Debug)]
-pub struct Variant {
-    /// Its circuit; ports as in [`circuit`].
-    pub circuit: fn(&SensorConfig) -> Arc<Module>,
-    /// Its reference model, holding this start value.
-    pub model: fn(&SensorConfig, u32) -> Box<dyn Counter>,
-    /// How COUNTER_OUT shows a count.
-    pub code: fn(u32) -> u32,
-    /// What a bit more of it is called.
-    pub stage: &'static str,
-    /// What that costs, transistors; a test counts them ([`PCounter::stage_transistors`]).
-    pub transistors: u64,
-    /// Nets that no other variant has, for viewers.
-    pub nets: &'static [&'static str],
-    /// Whether it keeps the start value in a memory, from which each STOP resets it. Without one it must come round with STOP,
-    /// and has no step divider.
-    pub has_memory: bool,
-    /// Why no bit of the count can be LOCAL_STOP, if none can. The tap `borrow` is no bit more, then.
-    pub no_msb: Option<&'static str>,
-    /// Whether a reset clears bits that it then sets, so that an `msb` that is high falls and rises at STOP.
-    pub clears_first: bool,
-}
-
-impl Variant {
-    /// A down counter with a memory, in plain binary.
-    const fn down_counter(
-        circuit: fn(&SensorConfig) -> Arc<Module>,
-        stage: &'static str,
-        transistors: u64,
-    ) -> Self {
-        Variant {
-            circuit,
-            model: |config, start| {
-                Box::new(DownCounter::new(config.counter_bits, config.tap, start))
-            },
-            code: |count| count,
-            stage,
-            transistors,
-            nets: &[],
-            has_memory: true,
-            no_msb: None,
-            clears_first: false,
-        }
-    }
-}
+pub(crate) use pins::memory;
+pub use variant::{Counter, DownCounter, Variant};
 
 impl PCounter {
+    /// What other files ask of it.
+    pub fn row(self) -> &'static Variant {
+        match self {
+            PCounter::Ripple => &ripple::VARIANT,
+            PCounter::SetReset => &set_reset::VARIANT,
+            PCounter::Synchronous => &synchronous::VARIANT,
+            PCounter::Comparator => &comparator::VARIANT,
+            PCounter::Memoryless => &memoryless::VARIANT,
+            PCounter::Gray => &gray::VARIANT,
+        }
+    }
+
     /// The QuantIC4x4 with this P-counter, LOCAL_STOP taken where it suits.
     pub fn sensor(self) -> SensorConfig {
         let (tap, after_borrow) = match self.row().has_memory {
@@ -132,125 +80,6 @@ impl PCounter {
 /// is COUNTER_OUT\<bits\> and the start value, where there is a memory, MEMORY\<bits\>.
 pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     (config.p_counter.row().circuit)(config)
-}
-
-/// The memory that keeps a start value: `bits` flip-flops clocked by MEMORY_LOAD.
-///
-/// Ports: COUNTER_INIT\<bits\>, MEMORY_LOAD, MEMORY_RESET → MEMORY\<bits\>.
-pub(crate) fn memory(bits: usize) -> Arc<Module> {
-    let mut m = ModuleBuilder::new("p_counter_memory");
-    let init = m.input_bus("COUNTER_INIT", bits);
-    let load = m.input("MEMORY_LOAD");
-    let reset = m.input("MEMORY_RESET");
-    let memory = m.output_bus("MEMORY", bits);
-    for bit in 0..bits {
-        m.cell(
-            &format!("memory_{bit}"),
-            CellKind::Dffr,
-            &[init[bit], load, reset],
-            &[memory[bit], Net::NONE],
-        );
-    }
-    finished(m.finish())
-}
-
-/// The pins that every variant has.
-struct Pins {
-    init: Vec<Net>,
-    load: Net,
-    memory_reset: Net,
-    /// What clocks the counter: COUNTER_CLK, divided where windows step by several CLK periods.
-    clk: Net,
-    reset: Net,
-    local_stop: Net,
-}
-
-impl Pins {
-    fn declare(m: &mut ModuleBuilder, config: &SensorConfig) -> Self {
-        let mut pins = Pins {
-            init: m.input_bus("COUNTER_INIT", config.counter_bits),
-            load: m.input("MEMORY_LOAD"),
-            memory_reset: m.input("MEMORY_RESET"),
-            clk: m.input("COUNTER_CLK"),
-            reset: m.input("COUNTER_RESET"),
-            local_stop: m.output("LOCAL_STOP"),
-        };
-        pins.clk = step_divider::place(m, pins.clk, pins.reset, config.step_bits());
-        pins
-    }
-
-    /// Places the memory; returns MEMORY.
-    fn memory(&self, m: &mut ModuleBuilder) -> Vec<Net> {
-        let bits = self.init.len();
-        let memory = m.wire_bus("MEMORY", bits);
-        m.instance_by_names("memory", &self::memory(bits), &[]);
-        memory
-    }
-
-    /// LOCAL_STOP of a ripple counter whose last output is `last`: a toggle flip-flop more, or that output.
-    fn ripple_tap(&self, m: &mut ModuleBuilder, tap: Tap, last: Net, reset: Net) {
-        match tap {
-            Tap::Borrow => {
-                let borrow_n = m.wire("BORROW_N");
-                m.cell(
-                    "borrow",
-                    CellKind::Dffr,
-                    &[borrow_n, last, reset],
-                    &[self.local_stop, borrow_n],
-                );
-            }
-            Tap::Msb => m.gate_into(CellKind::Buf, &[last], self.local_stop),
-        }
-    }
-}
-
-/// Reference model of a counter behind its clock: what it does, in numbers.
-pub trait Counter: std::fmt::Debug {
-    /// Back to where it counts from.
-    fn reset(&mut self);
-    /// A rising edge of its clock.
-    fn clock(&mut self);
-    /// The count, of which COUNTER_OUT shows the lower bits.
-    fn count(&self) -> u32;
-    /// LOCAL_STOP.
-    fn local_stop(&self) -> bool;
-}
-
-/// Reference model of a down counter. The tap `borrow` makes it one bit wider than the start value; LOCAL_STOP is its top bit.
-#[derive(Debug)]
-pub struct DownCounter {
-    start: u32,
-    value: u32,
-    width: usize,
-}
-
-impl DownCounter {
-    /// A counter that has just taken its start value.
-    pub(crate) fn new(bits: usize, tap: Tap, start: u32) -> Self {
-        DownCounter {
-            start,
-            value: start,
-            width: bits + usize::from(tap == Tap::Borrow),
-        }
-    }
-}
-
-impl Counter for DownCounter {
-    fn reset(&mut self) {
-        self.value = self.start;
-    }
-
-    fn clock(&mut self) {
-        self.value = self.value.wrapping_sub(1) & ((1 << self.width) - 1);
-    }
-
-    fn count(&self) -> u32 {
-        self.value
-    }
-
-    fn local_stop(&self) -> bool {
-        self.value >> (self.width - 1) & 1 == 1
-    }
 }
 
 /// Reference model of a P-counter together with what the timing block makes of its LOCAL_STOP.
@@ -348,6 +177,7 @@ pub fn starts_high(config: &SensorConfig, start: u16) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::netlist::CellKind;
     use proptest::prelude::*;
 
     #[test]

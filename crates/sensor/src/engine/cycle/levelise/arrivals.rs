@@ -2,19 +2,6 @@
 
 use super::*;
 
-/// Where a cause goes.
-pub(super) struct Reach {
-    pub cause: Cause,
-    /// Changes, causes before effects, loops apart.
-    pub order: Vec<Node>,
-    /// Place of each change in the order.
-    rank: HashMap<Node, usize>,
-    /// Earliest and latest arrival of each.
-    pub arrival: HashMap<Node, (i64, i64)>,
-    /// Flip-flops whose clock means nothing, as they are held.
-    pub held: BTreeSet<usize>,
-}
-
 /// Lanes in which a clock rises.
 #[derive(Default)]
 struct ClockMasks {

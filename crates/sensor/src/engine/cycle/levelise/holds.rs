@@ -13,7 +13,6 @@
 //! A flip-flop looks at reset and set in the instant of its clock's edge, but the tape changes it clk-to-Q later. Where
 //! it may have been released by then, the instant has actions of its own ([`Leveliser::unheld`]).
 
-use super::arrivals::Reach;
 use super::*;
 
 impl Leveliser<'_> {

@@ -3,8 +3,7 @@
 //! Each window begins some blocks of photons before its first bin, with SPADs of which nothing is known. Where that was
 //! not enough to know them in the window, it begins anew twice as far back.
 
-use super::{BREEDING, Counting, Pixel};
-use crate::engine::window::sight::ROUNDING_FS;
+use super::{BREEDING, Counting, Pixel, Placed};
 use crate::photon::{ListedEchoes, Photon, PhotonStream, PixelStream, TILE};
 use crate::units::Time;
 
@@ -75,11 +74,9 @@ impl Counting<'_> {
 
     /// Where photons of the window of a laser cycle are drawn from at first; `None` if that is the whole exposure.
     pub(super) fn beginning(&self, pixel: &Pixel<'_>, laser_cycle: u32) -> Option<Beginning> {
-        let start = self.stream.cycle_start(laser_cycle);
-        let from = start + Time::from_fs(pixel.sight.first_fs - ROUNDING_FS);
-        let until = start + Time::from_fs(pixel.sight.until_fs);
-        let back = self.first_look_back(pixel);
-        let begin = self.beginning_before(pixel, from - back, until, laser_cycle);
+        let window = self.window(pixel.sight, laser_cycle);
+        let from = window.wanted_from() - self.first_look_back(pixel);
+        let begin = self.beginning_before(pixel, from, &window);
         begin.time.is_some().then_some(begin)
     }
 
@@ -96,23 +93,22 @@ impl Counting<'_> {
 
     /// Counts the window of one laser cycle.
     pub(super) fn count_bright_cycle(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32) {
-        let start = self.stream.cycle_start(laser_cycle);
-        let wanted_from = start + Time::from_fs(pixel.sight.first_fs - ROUNDING_FS);
-        let until = start + Time::from_fs(pixel.sight.until_fs);
+        let window = self.window(pixel.sight, laser_cycle);
+        let (wanted_from, until) = (window.wanted_from(), window.until());
         let mut back = self.first_look_back(pixel);
         let drawn = loop {
-            let begin = self.beginning_before(pixel, wanted_from - back, until, laser_cycle);
+            let begin = self.beginning_before(pixel, wanted_from - back, &window);
             self.photons.clear();
             let parts = pixel.parts;
             let of_kind =
                 |breeds: bool| (0..parts.len()).filter(move |&n| parts[n].breeds() == breeds);
             for part in of_kind(true) {
-                self.push_breeding(pixel, part, begin, until, laser_cycle);
+                self.push_breeding(pixel, part, begin, &window);
             }
             // Mostly there are none, and nothing is allocated.
             let breeding_photons: Vec<_> = self.photons.drain(..).collect();
             for part in of_kind(false) {
-                self.push_photons(pixel, part, begin, until, laser_cycle);
+                self.push_photons(pixel, part, begin, &window);
             }
             let known_from = begin.time.unwrap_or(Time::ZERO);
             self.photons.retain(|photon| photon.time >= known_from);
@@ -125,7 +121,7 @@ impl Counting<'_> {
                 .filter(|photon| photon.time < known_from);
             let mut avalanches = pixel.light.avalanches(begin.time, earlier.copied());
             let mut echoes = pixel.light.ordered_echoes();
-            for cycle in self.echoes(pixel.light, known_from, until, laser_cycle) {
+            for cycle in self.echoes(pixel.light, known_from, &window) {
                 echoes.add(cycle);
             }
             self.events.clear();
@@ -138,12 +134,9 @@ impl Counting<'_> {
             back = back * 2;
         };
         pixel.work.photons_drawn += drawn;
-        let window = self.window(pixel.sight, laser_cycle);
         let seen = self.photons.iter();
-        let seen = seen
-            .filter(|photon| window.is_seen(photon.time - start))
-            .count();
-        let pulses = self.count_events(pixel, &window, start);
+        let seen = seen.filter(|photon| window.is_seen(photon.time)).count();
+        let pulses = self.count_events(pixel, &window);
         pixel.work.lost_to_dead_time += (seen as u64).saturating_sub(pulses);
     }
 
@@ -166,18 +159,16 @@ impl Counting<'_> {
         }
     }
 
-    /// Laser cycles whose echoes may have photons between two times about `laser_cycle`.
+    /// Laser cycles whose echoes may have photons between a time and the end of a window.
     fn echoes(
         &self,
         light: &PixelStream<'_>,
         from: Time,
-        until: Time,
-        laser_cycle: u32,
+        window: &Placed<'_>,
     ) -> impl Iterator<Item = u32> + use<> {
-        let config = self.stream.config();
-        let start = self.stream.cycle_start(laser_cycle);
-        let within_fs = (from - start).as_fs()..(until - start).as_fs();
-        let cycles = config.laser_cycles;
+        let within_fs = (from - window.start).as_fs()..window.sight.until_fs;
+        let cycles = self.stream.config().laser_cycles;
+        let laser_cycle = window.laser_cycle;
         light.echoes_within(&within_fs).filter_map(move |later| {
             let cycle = u32::try_from(i64::from(laser_cycle) + later).ok()?;
             (cycle < cycles).then_some(cycle)
@@ -185,24 +176,18 @@ impl Counting<'_> {
     }
 
     /// Where photons have to be known from: `from` or before it, and before any ordered echo that is seen.
-    fn beginning_before(
-        &self,
-        pixel: &Pixel<'_>,
-        from: Time,
-        until: Time,
-        laser_cycle: u32,
-    ) -> Beginning {
+    fn beginning_before(&self, pixel: &Pixel<'_>, from: Time, window: &Placed<'_>) -> Beginning {
         let echo_from = Time::from_fs(pixel.light.echo_fs().start);
         let mut from = from.max(Time::ZERO);
         loop {
-            let begin = Beginning::at(from, laser_cycle, self.stream, pixel.light);
+            let begin = Beginning::at(from, window.laser_cycle, self.stream, pixel.light);
             let Some(known_from) = begin.time else {
                 return begin;
             };
             if !pixel.light.has_ordered_echo() {
                 return begin;
             }
-            let echoes = self.echoes(pixel.light, known_from, until, laser_cycle);
+            let echoes = self.echoes(pixel.light, known_from, window);
             let first = echoes.map(|cycle| self.stream.cycle_start(cycle) + echo_from);
             match first.min().filter(|&first| first < known_from) {
                 Some(first) => from = first.max(Time::ZERO),
@@ -216,12 +201,12 @@ impl Counting<'_> {
         if pixel.breeding.is_none() {
             return false;
         }
-        let until = self.stream.cycle_start(laser_cycle) + Time::from_fs(pixel.sight.until_fs);
         let Some(begin) = self.beginning(pixel, laser_cycle) else {
             return true;
         };
         self.photons.clear();
-        self.push_breeding(pixel, BREEDING, begin, until, laser_cycle);
+        let window = self.window(pixel.sight, laser_cycle);
+        self.push_breeding(pixel, BREEDING, begin, &window);
         !self.photons.is_empty()
     }
 
@@ -231,14 +216,13 @@ impl Counting<'_> {
         pixel: &Pixel<'_>,
         part: usize,
         begin: Beginning,
-        until: Time,
-        laser_cycle: u32,
+        window: &Placed<'_>,
     ) {
         let since = begin.time.map_or(begin, |time| {
             let time = time - self.stream.config().spads.reach();
-            Beginning::at(time, laser_cycle, self.stream, &pixel.parts[part])
+            Beginning::at(time, window.laser_cycle, self.stream, &pixel.parts[part])
         });
-        self.push_photons(pixel, part, since, until, laser_cycle);
+        self.push_photons(pixel, part, since, window);
     }
 
     /// Appends the photons of a part of the light since a beginning.
@@ -247,11 +231,10 @@ impl Counting<'_> {
         pixel: &Pixel<'_>,
         part: usize,
         begin: Beginning,
-        until: Time,
-        laser_cycle: u32,
+        window: &Placed<'_>,
     ) {
         let light = &pixel.parts[part];
-        let config = self.stream.config();
+        let (laser_cycles, until) = (self.stream.config().laser_cycles, window.until());
         let Beginning {
             mut cycle,
             mut block,
@@ -260,7 +243,7 @@ impl Counting<'_> {
         let begins = |cycle, block| {
             self.stream.cycle_start(cycle) + Time::from_fs(light.block_fs(block).start)
         };
-        while cycle < config.laser_cycles && begins(cycle, block) < until {
+        while cycle < laser_cycles && begins(cycle, block) < until {
             light.push_block(cycle, block, &mut self.photons);
             block += 1;
             if block == light.blocks() {
@@ -268,7 +251,7 @@ impl Counting<'_> {
             }
         }
         let from = begin.time.unwrap_or(Time::ZERO);
-        for cycle in self.echoes(light, from, until, laser_cycle) {
+        for cycle in self.echoes(light, from, window) {
             let echo = self.listed[part].of(light, cycle);
             self.photons.extend_from_slice(echo);
         }

@@ -15,33 +15,6 @@ use crate::engine::window::codes::{Code, SPAD_MARKS};
 use crate::engine::window::tables::Special;
 use crate::photon::{Group, Photon};
 
-/// What the rows of a SPAD's only two photons tell, neither of which is doubtful.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Spacing {
-    /// Rows of bins, 1 to this.
-    pub bins: usize,
-    /// Farther apart than the SPADs' memory, if by more.
-    pub far: usize,
-    /// Closer than it, if by less and both in bins.
-    pub blind: usize,
-}
-
-impl Spacing {
-    /// Whether both make pulses as far as anybody can see: nothing is counted outside the window, and photons far apart do
-    /// not meet. `first` is the lower row.
-    #[inline(always)]
-    pub(super) fn both_fire(&self, first: usize, second: usize) -> bool {
-        (second == 0) | (first > self.bins) | ((first > 0) & (second - first > self.far))
-    }
-
-    /// Whether the photon in the `second` row meets the blindness that the `first` one leaves, the lower row.
-    #[inline(always)]
-    pub(super) fn one_fires(&self, first: usize, second: usize) -> bool {
-        let apart = second - first;
-        (first > 0) & (second <= self.bins) & (apart > 0) & (apart < self.blind)
-    }
-}
-
 impl Counting<'_> {
     /// Settles the cycle of a special photon.
     pub(super) fn settle(&mut self, pixel: &mut Pixel<'_>, special: Special, group: Group) {
@@ -253,15 +226,14 @@ impl Counting<'_> {
     /// Settles the photons of one SPAD among those `together`.
     fn settle_spad(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spad: u8) {
         let window = self.window(pixel.sight, laser_cycle);
-        let start = self.stream.cycle_start(laser_cycle);
         self.photons.clear();
         let mut seen = 0;
         for &(photon, code) in &self.together {
             if code.spad() == spad && self.is_drawn(pixel.light, photon) {
-                let time = self.time_of(pixel.light, photon, laser_cycle);
+                let time = window.start + self.time_of(pixel.light, photon, laser_cycle);
                 seen += u64::from(window.row_of(time).is_some());
                 self.photons.push(Photon {
-                    time: start + time,
+                    time,
                     spad,
                     breeds: false,
                 });
@@ -270,10 +242,10 @@ impl Counting<'_> {
         if seen == 0 {
             return;
         }
-        self.detect(pixel, laser_cycle, 1 << spad);
+        self.detect(pixel, &window, 1 << spad);
         let mut last = None;
         for event in &self.events {
-            let Some(row) = window.row_of(event.time - start) else {
+            let Some(row) = window.row_of(event.time) else {
                 continue;
             };
             seen -= 1;

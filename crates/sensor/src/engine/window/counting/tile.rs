@@ -9,42 +9,39 @@
 //!
 //! Where bins are not CLK periods, rows are not kept but the pulses themselves, and each lane's are counted in the end.
 //!
-//! A lane that depends on what came before its first block, has a photon within a few femtoseconds of a bin's edge, or one that
-//! breeds, is left to [`count_bright_cycle`](super::Counting::count_bright_cycle).
+//! A lane that depends on what came before its first block, or has a photon within a few femtoseconds of a bin's edge, is undecided:
+//! left to who counts laser cycle by laser cycle.
 
 use multiversion::multiversion;
 
-use super::bright::Beginning;
-use super::{Counting, Pixel};
 use crate::engine::window::codes::{ROWS, SPADS};
-use crate::engine::window::sight::ROUNDING_FS;
-use crate::photon::{DeadTimeLaw, NEVER_FS, PixelStream, SpadEvent, TILE, spad_of};
+use crate::photon::{NEVER_FS, PixelStream, SpadEvent, TILE};
 use crate::units::Time;
 
 /// Binary places of a position in CLK periods.
-const FRACTION_BITS: u32 = 20;
+pub(super) const FRACTION_BITS: u32 = 20;
 
 /// What the windows of all laser cycles but the first ones have in common. Times are fs after the start of the window's
 /// cycle.
 pub(super) struct Layout {
     /// Blocks of photons that are drawn, in their order, with their laser cycle relative to the window's.
-    blocks: Vec<(i64, u32)>,
+    pub blocks: Vec<(i64, u32)>,
     /// The first laser cycle that is like that.
     pub first_cycle: u32,
-    until_fs: i64,
-    dead_fs: i64,
+    pub until_fs: i64,
+    pub dead_fs: i64,
     /// From then on what is not known matters.
-    wanted_from_fs: i64,
-    is_paralysable: bool,
+    pub wanted_from_fs: i64,
+    pub is_paralysable: bool,
     /// A CLK period before bin 0 begins.
-    origin_fs: i64,
+    pub origin_fs: i64,
     /// CLK periods of a femtosecond, in 2⁻⁶⁴.
-    periods_per_fs: u64,
+    pub periods_per_fs: u64,
     /// Distance from an edge that leaves a position in doubt.
-    doubt: u64,
-    rows: usize,
+    pub doubt: u64,
+    pub rows: usize,
     /// Whether bins are CLK periods.
-    has_clk_bins: bool,
+    pub has_clk_bins: bool,
 }
 
 /// The state of all lanes. Times are fs after the start of the lane's laser cycle.
@@ -53,27 +50,27 @@ pub(super) struct Tile {
     /// SPADs that may be ready before that.
     unknown: [u16; TILE],
     /// The next photon of the echo.
-    next_fs: [[i64; TILE]; SPADS],
+    pub next_fs: [[i64; TILE]; SPADS],
     /// Random words for the photon after that.
-    second_words: [[u32; TILE]; SPADS],
+    pub second_words: [[u32; TILE]; SPADS],
     /// How many random words have been used.
     drawn: [[u32; SPADS]; TILE],
     /// SPADs that fired, by row; twice is not at all.
-    fired: [[u16; ROWS]; TILE],
+    pub fired: [[u16; ROWS]; TILE],
     /// Pulses of each lane, after the start of its laser cycle, where bins are not CLK periods; in no particular order.
-    pulses: [Vec<SpadEvent>; TILE],
+    pub pulses: [Vec<SpadEvent>; TILE],
     /// Lanes that are left to others.
-    undecided: u16,
+    pub undecided: u16,
     /// Of each lane.
-    tally: [Tally; TILE],
+    pub tally: [Tally; TILE],
 }
 
 /// What became of photons in a window.
 #[derive(Debug, Clone, Copy, Default)]
-struct Tally {
-    pulses: u32,
-    cancelled: u32,
-    lost: u32,
+pub(super) struct Tally {
+    pub pulses: u32,
+    pub cancelled: u32,
+    pub lost: u32,
 }
 
 impl Default for Tile {
@@ -94,7 +91,8 @@ impl Default for Tile {
 
 impl Tile {
     /// Begins a tile; `known_from_fs` is when the first block of each lane begins.
-    fn begin(&mut self, layout: &Layout, known_from_fs: [i64; TILE]) {
+    #[inline]
+    pub(super) fn begin(&mut self, layout: &Layout, known_from_fs: [i64; TILE]) {
         for (spads, from_fs) in self.blind_until_fs.iter_mut().zip(known_from_fs) {
             *spads = [from_fs - 1 + layout.dead_fs; SPADS];
         }
@@ -110,7 +108,7 @@ impl Tile {
 
     /// A background photon.
     #[inline(always)]
-    fn photon(
+    pub(super) fn photon(
         &mut self,
         layout: &Layout,
         light: &PixelStream<'_>,
@@ -167,7 +165,8 @@ impl Tile {
     }
 
     /// The photons of the echo on a SPAD until a time.
-    fn echo_until(
+    #[inline]
+    pub(super) fn echo_until(
         &mut self,
         layout: &Layout,
         light: &PixelStream<'_>,
@@ -208,161 +207,11 @@ impl Tile {
 
 /// Adds what each row's SPADs add to its hits; returns how many rows have a SPAD.
 #[multiversion(targets("x86_64+avx2+popcnt"))]
-fn count_rows(fired: &[u16], adds: &[i64; SPADS + 1], hits: &mut [i64]) -> u64 {
+pub(super) fn count_rows(fired: &[u16], adds: &[i64; SPADS + 1], hits: &mut [i64]) -> u64 {
     let mut visited = 0;
     for (hits, spads) in hits.iter_mut().zip(fired) {
         *hits += adds[spads.count_ones() as usize % (SPADS + 1)];
         visited += u64::from(*spads != 0);
     }
     visited
-}
-
-impl Counting<'_> {
-    /// How windows of a macropixel are counted side by side; `None` where they are not.
-    pub(super) fn layout(&self, pixel: &Pixel<'_>) -> Option<Layout> {
-        let (config, light, sight) = (self.stream.config(), pixel.light, pixel.sight);
-        let is_paralysable = config.spads.law == DeadTimeLaw::Paralysable;
-        let last_cycle = config.laser_cycles.checked_sub(1)?;
-        let is_packed = self.stream.spads() == SPADS && light.is_alone();
-        if !is_packed || light.has_listed_echo() {
-            return None;
-        }
-        let begin = self.beginning(pixel, last_cycle)?;
-        let begins_fs = begin.begins_fs(self.stream, light, last_cycle);
-        let echoes = light.echoes_within(&(begins_fs - ROUNDING_FS..sight.until_fs + ROUNDING_FS));
-        let has_echo = !echoes.is_empty();
-        if (has_echo && is_paralysable) || echoes.into_iter().any(|later| later != 0) {
-            return None;
-        }
-        let relative = |cycle: u32| i64::from(cycle) - i64::from(last_cycle);
-        let first_cycle = u32::try_from(1 - relative(begin.cycle)).ok()?;
-        let mut blocks = Vec::new();
-        let Beginning {
-            mut cycle,
-            mut block,
-            ..
-        } = begin;
-        while cycle < last_cycle || light.block_fs(block).start < sight.until_fs {
-            blocks.push((relative(cycle), block));
-            block += 1;
-            if block == light.blocks() {
-                (cycle, block) = (cycle + 1, 0);
-                if cycle > last_cycle {
-                    break;
-                }
-            }
-        }
-        let period_fs = 1e15 / self.engine.exposure.clock.as_hz();
-        let doubt = (ROUNDING_FS + 3) as f64 / period_fs * f64::from(1 << FRACTION_BITS);
-        Some(Layout {
-            blocks,
-            first_cycle,
-            until_fs: sight.until_fs,
-            dead_fs: config.spads.dead_time.as_fs(),
-            wanted_from_fs: sight.first_fs - ROUNDING_FS,
-            is_paralysable,
-            origin_fs: sight.first_fs - period_fs as i64,
-            periods_per_fs: (2f64.powi(64) / period_fs) as u64,
-            doubt: doubt.ceil() as u64 + 3,
-            rows: self.engine.sensor.bins,
-            has_clk_bins: self.engine.law.has_clk_bins(),
-        })
-    }
-
-    /// Counts the windows of [`TILE`] laser cycles, or those that are left of the exposure.
-    pub(super) fn count_tile(&mut self, pixel: &mut Pixel<'_>, layout: &Layout, first_cycle: u32) {
-        let config = self.stream.config();
-        let light = pixel.light;
-        let lanes = (config.laser_cycles - first_cycle).min(TILE as u32) as usize;
-        let cycle = |lane: usize| first_cycle + lane as u32;
-        let moved_fs = |relative: i64, lane: usize| match relative {
-            0 => 0,
-            _ => {
-                let own = cycle(lane);
-                let other = (i64::from(own) + relative) as u32;
-                (self.stream.cycle_start(other) - self.stream.cycle_start(own)).as_fs()
-            }
-        };
-        let mut tile = self.tile.take().unwrap_or_default();
-        let (relative, block) = layout.blocks[0];
-        let start_fs = light.block_fs(block).start;
-        tile.begin(
-            layout,
-            std::array::from_fn(|lane| match lane < lanes {
-                true => start_fs + moved_fs(relative, lane),
-                false => 0,
-            }),
-        );
-        for lane in 0..lanes {
-            tile.undecided |= u16::from(self.breeds_about(pixel, cycle(lane))) << lane;
-        }
-        light.first_arrivals(first_cycle, &mut tile.next_fs);
-        if !light.echo_fs().is_empty() {
-            light.echo_words(first_cycle, 1, &mut tile.second_words);
-        }
-        let mut drawn = 0;
-        for &(relative, block) in &layout.blocks {
-            let first_other = (i64::from(first_cycle) + relative) as u32;
-            let mut background = light.background(
-                first_other,
-                block,
-                layout.until_fs - relative * self.stream.cycle_fs() + ROUNDING_FS,
-            );
-            let end_fs = background.end_fs();
-            let moved_fs: [i64; TILE] = std::array::from_fn(|lane| match lane < lanes {
-                true => moved_fs(relative, lane),
-                false => 0,
-            });
-            while background.draw() {
-                for lane in 0..lanes {
-                    for (times_fs, words) in background.times_fs.iter().zip(&background.words) {
-                        let time_fs = times_fs[lane];
-                        if time_fs >= end_fs {
-                            break;
-                        }
-                        drawn += 1;
-                        let time_fs = time_fs + moved_fs[lane];
-                        if time_fs < layout.until_fs {
-                            tile.photon(
-                                layout,
-                                light,
-                                cycle(lane),
-                                lane,
-                                spad_of(words[lane], SPADS),
-                                time_fs,
-                            );
-                        }
-                    }
-                }
-            }
-        }
-        for spad in 0..SPADS {
-            for lane in 0..lanes {
-                if tile.next_fs[spad][lane] < layout.until_fs {
-                    tile.echo_until(layout, light, cycle(lane), lane, spad, layout.until_fs - 1);
-                }
-            }
-        }
-        pixel.work.photons_drawn += drawn;
-        for lane in 0..lanes {
-            if tile.undecided >> lane & 1 != 0 {
-                self.count_bright_cycle(pixel, cycle(lane));
-                continue;
-            }
-            if !layout.has_clk_bins {
-                std::mem::swap(&mut self.events, &mut tile.pulses[lane]);
-                self.events.sort_unstable();
-                let window = self.window(pixel.sight, cycle(lane));
-                self.count_events(pixel, &window, Time::ZERO);
-                pixel.work.lost_to_dead_time += u64::from(tile.tally[lane].lost);
-                continue;
-            }
-            pixel.work.pulses += u64::from(tile.tally[lane].pulses);
-            pixel.work.cancelled += u64::from(tile.tally[lane].cancelled);
-            pixel.work.lost_to_dead_time += u64::from(tile.tally[lane].lost);
-            let fired = &tile.fired[lane][1..=layout.rows];
-            pixel.work.clk_periods_visited += count_rows(fired, &self.adds, &mut pixel.hits);
-        }
-        self.tile = Some(tile);
-    }
 }

@@ -164,25 +164,19 @@ impl Counting<'_> {
 
     /// Counts the window of a laser cycle with `photons`, in any order.
     pub(super) fn settle_cycle(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32) {
-        let start = self.stream.cycle_start(laser_cycle);
         let window = self.window(pixel.sight, laser_cycle);
-        let is_seen = |photon: &&Photon| window.is_seen(photon.time - start);
+        let is_seen = |photon: &&Photon| window.is_seen(photon.time);
         let seen = self.photons.iter().filter(is_seen).count() as u64;
-        self.detect(pixel, laser_cycle, u64::MAX);
-        let pulses = self.count_events(pixel, &window, start);
+        self.detect(pixel, &window, u64::MAX);
+        let pulses = self.count_events(pixel, &window);
         pixel.work.lost_to_dead_time += seen.saturating_sub(pulses);
     }
 
-    /// Counts the `events` of one laser cycle, which starts at `start`. Returns how many are in the window.
-    pub(super) fn count_events(
-        &mut self,
-        pixel: &mut Pixel<'_>,
-        window: &Placed<'_>,
-        start: Time,
-    ) -> u64 {
+    /// Counts the `events` of one laser cycle. Returns how many are in its window.
+    pub(super) fn count_events(&mut self, pixel: &mut Pixel<'_>, window: &Placed<'_>) -> u64 {
         self.placed.clear();
         self.placed.extend(self.events.iter().map(|event| {
-            let row = window.row_of(event.time - start).unwrap_or(0);
+            let row = window.row_of(event.time).unwrap_or(0);
             (*event, row)
         }));
         let pulses = self.placed.iter().filter(|(_, row)| *row > 0).count() as u64;
@@ -219,11 +213,9 @@ impl Counting<'_> {
 
     /// Turns `photons` of the SPADs of a set, in any order, and those before them as far as it takes, into `events`: all
     /// rising edges in the window of a laser cycle, and perhaps some before.
-    pub(super) fn detect(&mut self, pixel: &mut Pixel<'_>, laser_cycle: u32, spads: u64) {
-        let start = self.stream.cycle_start(laser_cycle);
-        let wanted_from = start + Time::from_fs(pixel.sight.first_fs - ROUNDING_FS);
-        let until = start + Time::from_fs(pixel.sight.until_fs);
-        let past = |part| pixel.spans(part).past(self.stream, laser_cycle);
+    pub(super) fn detect(&mut self, pixel: &mut Pixel<'_>, window: &Placed<'_>, spads: u64) {
+        let (wanted_from, until) = (window.wanted_from(), window.until());
+        let past = |part| pixel.spans(part).past(self.stream, window.laser_cycle);
         let mut pasts: SmallVec<[Past<'_>; 2]> = pixel.parts.iter().map(past).collect();
         loop {
             // Photons that breed are known from earlier on.
