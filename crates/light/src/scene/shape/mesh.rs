@@ -18,7 +18,8 @@ use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
 
 use self::tree::{Bounds, Tree};
-use super::{Meeting, NEAREST_M, solid};
+use super::meeting::{Meeting, NEAREST_M};
+use super::solid;
 use crate::files::InputError;
 use crate::scene::vector::Ray;
 
