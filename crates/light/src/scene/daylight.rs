@@ -15,13 +15,6 @@ use super::vector::Ray;
 const ABOVE_M: f64 = 1e-4;
 
 impl Scene {
-    /// Unit vector towards the sun; `None` where light comes from everywhere.
-    pub(crate) fn towards_sun(&self) -> Option<DVec3> {
-        let (sine, cosine) = self.light.sun_elevation_deg?.to_radians().sin_cos();
-        let (right, forward) = self.light.sun_azimuth_deg.to_radians().sin_cos();
-        Some(DVec3::new(right * cosine, -sine, forward * cosine))
-    }
-
     /// Daylight on a surface at `point` that faces along `normal` (unit), as a share of the scene's illuminance, 0 to 1.
     pub fn daylight(&self, point: DVec3, normal: DVec3) -> f64 {
         Stage::of(self).daylight(point, normal)

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::motion::Waypoint;
 use super::object::Object;
 use super::ranges::{LENGTH, PLACES, POSITION, SHARE, SPEED};
+use super::rig::Waypoint;
 use super::shape::{DepthMap, MapFiles, Mesh, Shape};
 use super::texture::{Pattern, Picture, Texture};
 use crate::settings::Range::{Above, Within};
@@ -341,6 +341,13 @@ impl ObjectEntry {
 fn placed(folder: &Path, file: &Path) -> PathBuf {
     let joined = folder.join(file);
     std::path::absolute(&joined).unwrap_or(joined)
+}
+
+/// An object is written as its file has it.
+impl serde::Serialize for Object {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        ObjectEntry::from(self.clone()).serialize(serializer)
+    }
 }
 
 impl From<Object> for ObjectEntry {
