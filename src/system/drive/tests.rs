@@ -7,6 +7,7 @@ use crate::chip::{Exposure, SensorConfig};
 use crate::guide::NoisyTruth;
 use crate::photon::PixelLight;
 use crate::scene::{DVec3, Object, Scene, Shape};
+use crate::system::FrameSettings;
 use crate::system::light::photon_stream;
 use crate::system::worlds;
 use proptest::prelude::*;
