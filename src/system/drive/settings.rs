@@ -1,5 +1,7 @@
 //! What a drive depends on, and when the parts of its frames begin and end.
 
+use std::ops::Range;
+
 use crate::system::policy::WindowPolicy;
 use crate::system::settings::FrameSettings;
 
@@ -49,6 +51,11 @@ pub struct FrameTimes {
 }
 
 impl FrameTimes {
+    /// From when until when it is exposed, s.
+    pub(crate) fn exposed_s(&self) -> Range<f64> {
+        self.exposure_s..self.readout_s
+    }
+
     /// The middle of the exposure, for which depths hold, s.
     pub(crate) fn middle_s(&self) -> f64 {
         0.5 * (self.exposure_s + self.readout_s)

@@ -89,7 +89,7 @@ impl Drive<'_> {
         let reuse = self.settings.reuse;
         let mut clock = Stopwatch::new();
         let stream = photon_stream(sensor, exposure, plan.seed, scene);
-        let worlds = worlds::worlds(scene, &plan.times, self.settings.segments);
+        let worlds = worlds::worlds(scene, plan.times.exposed_s(), self.settings.segments);
         let before = before.map(|last| &last.light);
         let (truth, each, newest) = match before.filter(|last| last.worlds == worlds) {
             Some(last) => {

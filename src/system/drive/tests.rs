@@ -150,7 +150,7 @@ fn light_in_motion_is_a_timeline_where_something_moves_and_plain_elsewhere() {
         readout_s: 0.1,
         end_s: 0.1,
     };
-    let worlds = worlds::worlds(&settings.frame.scene, &times, 4);
+    let worlds = worlds::worlds(&settings.frame.scene, times.exposed_s(), 4);
     let (truths, kept) = worlds::truths(&worlds, (6, 8), None, true);
     assert!((1..3 * 48).contains(&kept), "{kept}");
     let FrameSettings {
