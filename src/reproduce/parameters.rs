@@ -26,6 +26,7 @@ pub(super) fn sigma_over_fwhm() -> f64 {
 
 /// Eq. 17 as one peak finder sees it: every photon counted, ties by lot.
 const EVERY_PHOTON: Model = Model::Poisson(Ties::Random);
+
 /// Table 6's system with 16 bins (Table 7).
 pub(super) fn long_range() -> System {
     System {
