@@ -14,7 +14,7 @@ pub struct Selection {
     pub tables: Vec<u32>,
     /// Numbers of measurements of the chip against its theory.
     pub measurements: Vec<u32>,
-    /// Frames behind each measured number; [`measured::FRAMES`] where none is given.
+    /// Frames behind each measured number; [`FRAMES`](super::measured::FRAMES) where none is given.
     pub frames: Option<usize>,
 }
 

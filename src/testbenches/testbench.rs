@@ -21,7 +21,7 @@ impl Testbench {
     ///
     /// # Errors
     /// When a file cannot be written.
-    pub fn run(&self, waves: &Path) -> Result<Checks, InputError> {
+    pub(crate) fn run(&self, waves: &Path) -> Result<Checks, InputError> {
         let mut checks = Checks::new();
         (self.run)(waves, &mut checks)?;
         Ok(checks)

@@ -16,7 +16,7 @@ pub struct Reused {
     pub load: bool,
     /// Ray casting and light of all of the exposure.
     pub world: bool,
-    /// Of the views of [`DriveFrame::worlds`] from every macropixel, those that stood.
+    /// Of the views of [`DriveFrame::worlds`](super::DriveFrame::worlds) from every macropixel, those that stood.
     pub views: usize,
     /// Macropixels with the histogram and depth of the frame before.
     pub macropixels: usize,

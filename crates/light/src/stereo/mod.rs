@@ -10,7 +10,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `image.rs` | grey images of 8 to 16 bits, binning |
+//! | `image.rs` | grey images of 8 to 16 bits |
 //! | `settings.rs` | what a matcher can be told |
 //! | `census.rs` | a pixel's neighbourhood as bits |
 //! | `cost.rs` | how unlike two pixels are, for all disparities of a row |

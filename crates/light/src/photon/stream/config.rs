@@ -41,8 +41,8 @@ pub struct StreamConfig {
 
 impl StreamConfig {
     /// Start of laser cycle `cycle`, exact to the femtosecond.
-    #[inline]
-    pub fn cycle_start(&self, cycle: u32) -> Time {
+    #[cfg(test)]
+    pub(crate) fn cycle_start(&self, cycle: u32) -> Time {
         self.clock
             .periods(i64::from(cycle) * i64::from(self.stop_periods))
     }

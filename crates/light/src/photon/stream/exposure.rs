@@ -66,7 +66,7 @@ impl PhotonStream {
         self.config.spads.grid.spads()
     }
 
-    /// [`StreamConfig::cycle_start`].
+    /// Start of laser cycle `cycle`, exact to the femtosecond.
     #[inline]
     pub fn cycle_start(&self, cycle: u32) -> Time {
         self.starts.at(cycle)

@@ -164,11 +164,6 @@ impl PixelStream<'_> {
         }
     }
 
-    /// Start of a laser cycle.
-    pub fn cycle_start(&self, cycle: u32) -> Time {
-        self.stream.cycle_start(cycle)
-    }
-
     /// Whether the light has no other layer, and all that is drawn is kept: only then random words tell all of it.
     pub fn is_alone(&self) -> bool {
         self.is_alone

@@ -208,7 +208,8 @@ impl Mesh {
     }
 
     /// Number of triangles.
-    pub fn triangles(&self) -> usize {
+    #[cfg(test)]
+    pub(crate) fn triangles(&self) -> usize {
         self.triangles.len()
     }
 
@@ -269,7 +270,7 @@ impl Mesh {
         (inside && range > NEAREST_M && range.is_finite()).then_some(range)
     }
 
-    pub fn normal(&self, triangle: u32) -> DVec3 {
+    pub(crate) fn normal(&self, triangle: u32) -> DVec3 {
         let [a, b, c] = self.corners_of(triangle);
         (b - a).cross(c - a).normalize()
     }

@@ -50,7 +50,8 @@ pub(in crate::scene) enum Placed<'a> {
 
 impl Shape {
     /// Distance along `ray` to the first surface point in front of its origin, m.
-    pub fn intersect(&self, ray: &Ray) -> Option<f64> {
+    #[cfg(test)]
+    pub(crate) fn intersect(&self, ray: &Ray) -> Option<f64> {
         self.placed().meet(ray).map(|meeting| meeting.range_m)
     }
 
