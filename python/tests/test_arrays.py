@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 import gdtof
 from gdtof import _gdtof
-from gdtof._plot import reason_name
+from gdtof._arrays import reason_name
 
 
 def test_arrays_have_their_shapes_and_types(frame: gdtof.Frame) -> None:

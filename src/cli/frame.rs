@@ -10,7 +10,7 @@ use self::pair::PairReport;
 use super::asked::ExposureArgs;
 use super::voice::{note, progress, say_json, tell};
 use super::wave_format::WaveFormatOption;
-use super::{SceneArgs, quality};
+use super::{SceneArgs, pixel, quality};
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::{Mode, SensorConfig, Silicon};
 use crate::engine::waveform::WaveCycles;
@@ -197,7 +197,7 @@ fn chosen_probes(
     }
     let mut probes = Vec::new();
     for text in texts.iter().filter(|text| *text != "none") {
-        let place = super::pixel("--probe", text, sensor)?;
+        let place = pixel::pixel("--probe", text, sensor)?;
         if !probes.contains(&place) {
             probes.push(place);
         }

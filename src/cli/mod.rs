@@ -15,6 +15,7 @@ mod guiding;
 mod mapped;
 mod page;
 mod pareto;
+mod pixel;
 mod power;
 mod quality;
 mod range;
@@ -41,8 +42,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use self::settings::{SceneArgs, SensorArgs};
-use crate::chip::SensorConfig;
-use crate::files::{InputError, clean_up_when_interrupted};
+use crate::files::clean_up_when_interrupted;
 use crate::request::sign_files;
 
 /// Simulate a guided direct time-of-flight lidar chip, from the scene down to gates and flip-flops.
@@ -168,28 +168,6 @@ fn finish(result: anyhow::Result<ExitCode>) -> ExitCode {
             ExitCode::from(if wording::is_bad_input(&error) { 2 } else { 1 })
         }
     }
-}
-
-/// The macropixel that an option names as row,col.
-///
-/// # Errors
-/// When the array has no such macropixel.
-fn pixel(option: &str, text: &str, sensor: &SensorConfig) -> Result<(usize, usize), InputError> {
-    let place = text
-        .split_once(',')
-        .and_then(|(row, col)| Some((row.trim().parse().ok()?, col.trim().parse().ok()?)));
-    let message = match place {
-        Some((row, col)) if row < sensor.rows && col < sensor.cols => return Ok((row, col)),
-        Some((row, col)) => format!(
-            "macropixel ({row}, {col}) is outside the {}x{} array; give rows 0 to {} and columns 0 to {}",
-            sensor.rows,
-            sensor.cols,
-            sensor.rows - 1,
-            sensor.cols - 1
-        ),
-        None => format!("{text:?} is not a macropixel; give row,col such as 10,20"),
-    };
-    Err(InputError::new(option, message))
 }
 
 /// A reader such as `head` that has seen enough is no failure.

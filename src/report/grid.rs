@@ -41,7 +41,7 @@ impl Grid {
     }
 
     /// The table in GitHub's Markdown.
-    pub fn markdown(&self) -> String {
+    pub(crate) fn markdown(&self) -> String {
         let line = |cells: &[String]| {
             let cells: Vec<String> = cells.iter().map(|c| c.replace('|', "\\|")).collect();
             format!("| {} |\n", cells.join(" | "))
@@ -83,7 +83,7 @@ pub fn width<'c>(cells: impl Iterator<Item = &'c String>) -> usize {
 }
 
 /// A line of cells, columns of these widths two spaces apart. The first column aligns left, all others right.
-pub fn aligned(cells: &[String], widths: &[usize]) -> String {
+pub(crate) fn aligned(cells: &[String], widths: &[usize]) -> String {
     let mut line = String::new();
     for (column, (cell, &width)) in cells.iter().zip(widths).enumerate() {
         line += &match column {

@@ -19,7 +19,7 @@ pub(crate) use array::write_depth_png;
 pub(crate) use array::{NpyStack, write_npy_f32, write_npy_u16};
 pub use chart::{Axis, Chart, Scale};
 pub(crate) use cloud::{CloudPoint, write_pcd, write_ply};
-pub use grid::aligned;
+pub(crate) use grid::aligned;
 pub use grid::{Grid, width};
 pub use image::{Cell, DepthMap};
 pub(crate) use mcap::{Channel, Mcap};

@@ -11,7 +11,7 @@
 use std::sync::OnceLock;
 
 use super::claim::Row;
-use super::penalty::sigma_over_fwhm;
+use super::parameters::sigma_over_fwhm;
 use super::thesis::{chart, claim};
 use crate::chip::{Exposure, Sensor, SensorConfig, WindowLaw, hslidar_delay_line};
 use crate::engine::{Expose, LitPixel, Window, stream_config};

@@ -1,14 +1,15 @@
 //! Claims 1, 12, 13, 16 and 28: design tables, memory and silicon, and the published sensors.
 
 use super::claim::Row;
+use super::parameters::{
+    HSLIDAR_BIN_M, ROUNDED_LIGHT_M_PER_S, TABLE_6_BACKGROUND_HZ, TABLE_6_BIN_M, TABLE_6_BIN_S,
+    TABLE_6_CYCLES,
+};
 use super::thesis::{claim, grid};
 use crate::report::Grid;
 use crate::theory::capacity::{SRAM_CELLS, Storage, bits_for, full_bins};
 use crate::theory::design::Design;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
-
-/// The speed of light as the thesis rounds it, m/s.
-pub(super) const ROUNDED_LIGHT_M_PER_S: f64 = 3e8;
 
 /// Clocks of Table 9 and of its example, MHz.
 const TABLE_9_MHZ: [f64; 8] = [100.0, 150.0, 200.0, 250.0, 300.0, 350.0, 400.0, 384.0];
@@ -61,14 +62,6 @@ pub(super) fn table_9() -> Grid {
     grid
 }
 
-/// Background rate (counts/s) and laser cycles that size the histogram of Table 6's system (3.3.2, 3.3.3).
-pub(super) const TABLE_6_BACKGROUND_HZ: f64 = 20e6;
-/// See [`TABLE_6_BACKGROUND_HZ`].
-pub(super) const TABLE_6_CYCLES: f64 = 25_000.0;
-/// Bin interval of Table 6's system: what the thesis calls 5 ns and 0.8 m.
-pub(super) const TABLE_6_BIN_S: f64 = 5e-9;
-/// See [`TABLE_6_BIN_S`].
-pub(super) const TABLE_6_BIN_M: f64 = 0.8;
 /// A quarter of a 30 µm pixel, µm² (3.3.5).
 pub(super) const QUARTER_PIXEL_UM2: f64 = 225.0;
 
@@ -129,9 +122,6 @@ pub(super) fn table_39() -> Grid {
     }
     grid
 }
-
-/// The demonstrator's bin interval, 2.6 ns, in metres.
-pub(super) const HSLIDAR_BIN_M: f64 = 2.6e-9 * SPEED_OF_LIGHT_M_PER_S / 2.0;
 
 /// Claim 16: on-chip data of the demonstrator.
 pub(super) fn data_rows() -> Vec<Row> {

@@ -8,7 +8,7 @@
 //! ```
 
 use super::claim::Row;
-use super::design::HSLIDAR_BIN_M;
+use super::parameters::HSLIDAR_BIN_M;
 use super::stereo::{DEPTHS_M, HSLIDAR_STEP_BINS, PAIR, THIRD_PX, wall_at};
 use super::thesis::{chart, claim};
 use crate::chip::{Exposure, SensorConfig, WindowLaw, hslidar};

@@ -4,7 +4,9 @@ use std::fmt::Write;
 
 use super::claim::{Row, Verdict, figure, overall};
 use super::measured::Study;
-use super::{Listed, Report, Slip};
+use super::registry::Listed;
+use super::report::Report;
+use super::thesis::Slip;
 use crate::report::Grid;
 
 /// The headings of a claim's table.

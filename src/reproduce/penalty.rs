@@ -1,73 +1,22 @@
 //! Claims 11, 14 and 15: laser cycles, and what zooming and sliding add to them.
 
 use super::claim::Row;
-use super::design::{ROUNDED_LIGHT_M_PER_S, TABLE_6_BACKGROUND_HZ, TABLE_6_BIN_M, TABLE_6_BIN_S};
 use super::measured::partial::{
     AtRange, demonstrator_on_chip, demonstrator_on_delay_lines, long_range_on_chip, with_interval,
 };
+use super::parameters::{
+    ROUNDED_LIGHT_M_PER_S, TABLE_6_BIN_M, demonstrator, long_range, sigma_over_fwhm,
+};
 use super::thesis::{ClaimText, claim};
 use crate::theory::detection::{Model, Ties};
-use crate::theory::partial::{Cost, Goal, Link, Models, System};
+use crate::theory::partial::{Cost, Models, System};
 use crate::theory::precision;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 pub(super) mod charts;
 
-/// σ of a Gaussian pulse over its full width at half maximum, 1/√(8 ln 2).
-pub(super) fn sigma_over_fwhm() -> f64 {
-    1.0 / (8.0 * std::f64::consts::LN_2).sqrt()
-}
-
-/// Eq. 17 as one peak finder sees it: every photon counted, ties by lot.
-const EVERY_PHOTON: Model = Model::Poisson(Ties::Random);
 /// As this chip counts: one hit per bin and cycle.
 const ONE_HIT: Model = Model::Bernoulli(Ties::Random);
-
-/// Table 6's system with 16 bins (Table 7).
-pub(super) fn long_range() -> System {
-    System {
-        link: Link {
-            signal: 1140.0,
-            background_hz: TABLE_6_BACKGROUND_HZ,
-            pulse_sigma_s: 8e-9 * sigma_over_fwhm(),
-        },
-        goal: Goal {
-            precision_m: 0.1,
-            detection: 0.997,
-        },
-        models: Models {
-            precision: precision::cramer_rao,
-            detection: EVERY_PHOTON,
-        },
-        bins: 16,
-        bin_s: TABLE_6_BIN_S,
-        // 16 windows of 12.5 m make 200 m, where 16 bins of 0.8 m are 12.8 m.
-        window_m: 12.5,
-    }
-}
-
-/// Background rate of the demonstrator at an illuminance, counts/s: 4.8 Mcounts/s at 60 klux (Fig. 94).
-pub(super) fn demonstrator_light(klux: f64) -> f64 {
-    4.8e6 * klux / 60.0
-}
-
-/// The demonstrator (Table 15).
-pub(super) fn demonstrator() -> System {
-    let link = Link {
-        signal: 89.0,
-        background_hz: 8e6,
-        pulse_sigma_s: 4.5e-9 * sigma_over_fwhm(),
-    };
-    let goal = Goal {
-        precision_m: 0.1,
-        detection: 0.997,
-    };
-    let models = Models {
-        precision: precision::thompson,
-        detection: EVERY_PHOTON,
-    };
-    System::new(link, goal, models, 8, 2.6e-9)
-}
 
 /// The same system, counting as this chip does in its detection steps.
 fn one_hit(system: System) -> System {

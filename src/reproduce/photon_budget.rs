@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::claim::Row;
+use super::parameters;
 use super::thesis::{chart, claim};
 use crate::photon::solar::{FULL_SUN_KLUX, band_irradiance};
 use crate::photon::{
@@ -54,10 +55,10 @@ pub(super) fn background_rows() -> Vec<Row> {
 /// Claim 21: the demonstrator's measured light.
 pub(super) fn demonstrator_rows() -> Vec<Row> {
     let claim = claim(21);
-    let scaled = super::penalty::demonstrator_light(100.0) / 1e6;
+    let scaled = parameters::demonstrator_light(100.0) / 1e6;
     vec![
         claim.row("background", scaled),
-        claim.row("signal", super::penalty::demonstrator().link.signal),
+        claim.row("signal", parameters::demonstrator().link.signal),
     ]
     .into_iter()
     .chain(super::delay_line::light_rows())
@@ -185,7 +186,7 @@ pub(super) fn figure_34() -> Chart {
 /// Fig. 94b: the demonstrator's budget.
 pub(super) fn figure_94() -> Chart {
     let signal = (2..=75).map(|z| (f64::from(z), 89.0 / f64::from(z * z)));
-    let background = |klux: f64| super::penalty::demonstrator_light(klux) * 2.6e-9;
+    let background = |klux: f64| parameters::demonstrator_light(klux) * 2.6e-9;
     let level = |klux: f64| [(2.0, background(klux)), (75.0, background(klux))];
     chart(94)
         .line("signal", signal)

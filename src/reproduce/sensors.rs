@@ -1,41 +1,11 @@
 //! Claim 28: the published sensors of Tables 5 and 16, and what their partial histograms cost in one common light.
 
-use serde::Deserialize;
-
 use super::claim::Row;
-use super::penalty::demonstrator;
-use super::thesis::{THESIS, chart, claim, grid};
+use super::parameters::{HSLIDAR_BIN_M, demonstrator};
+use super::thesis::{Scheme, Sensor, THESIS, chart, claim, grid};
 use crate::report::{Chart, Grid};
 use crate::theory::partial::{System, sliding_reduction, zooming_reduction};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
-
-/// How a sensor makes do with its bins.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum Scheme {
-    /// All bins at once, or no histogram at all.
-    Full,
-    /// Zooming, with this number of steps.
-    Zooming(u32),
-    /// Sliding: the number of windows, and the bins that neighbours share.
-    Sliding(u32, u32),
-    /// One window that a guide chooses.
-    Guided,
-}
-
-/// A line of Tables 5 and 16.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Sensor {
-    author: String,
-    year: u32,
-    /// Rows and columns of ToF pixels.
-    pixels: (u32, u32),
-    max_range_m: f64,
-    bins: Option<u32>,
-    scheme: Scheme,
-    stacked: bool,
-}
 
 impl Sensor {
     /// Bins of the full histogram that it stands for.
@@ -47,7 +17,7 @@ impl Sensor {
             Scheme::Sliding(windows, overlap) => {
                 Some(bins / sliding_reduction(self.bins?, windows, overlap))
             }
-            Scheme::Guided => Some((self.max_range_m / super::design::HSLIDAR_BIN_M).ceil()),
+            Scheme::Guided => Some((self.max_range_m / HSLIDAR_BIN_M).ceil()),
         }
     }
 

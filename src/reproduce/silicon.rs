@@ -1,6 +1,7 @@
 //! Fig. 36 to 41: how large histograms are, and what they cost in silicon.
 
-use super::design::{QUARTER_PIXEL_UM2, TABLE_6_BACKGROUND_HZ, TABLE_6_CYCLES, full_histogram};
+use super::design::{QUARTER_PIXEL_UM2, full_histogram};
+use super::parameters::{TABLE_6_BACKGROUND_HZ, TABLE_6_CYCLES};
 use super::thesis::chart;
 use crate::report::Chart;
 use crate::theory::capacity::{SRAM_CELLS, Storage, bins_within, bits_for, full_bins};

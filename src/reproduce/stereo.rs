@@ -2,7 +2,7 @@
 
 use super::claim::{Row, Verdict};
 use super::demonstrator;
-use super::design::HSLIDAR_BIN_M;
+use super::parameters::HSLIDAR_BIN_M;
 use super::thesis::{chart, claim};
 use crate::guide::StereoRig;
 use crate::numerics::intervals::{deviation, mean};

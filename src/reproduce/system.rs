@@ -3,8 +3,7 @@
 
 use super::claim::Row;
 use super::demonstrator::{self, swept};
-use super::design::HSLIDAR_BIN_M;
-use super::penalty::{demonstrator, demonstrator_light};
+use super::parameters::{HSLIDAR_BIN_M, demonstrator, demonstrator_light};
 use super::thesis::{chart, claim};
 use crate::chip::hslidar_delay_line;
 use crate::photon::Atmosphere;

@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 use super::claim::Row;
 use super::measured::Study;
 use super::published::Published;
-use super::sensors::Sensor;
 use crate::numerics::intervals::Estimate;
 use crate::report::{Chart, Grid};
 
@@ -88,6 +87,34 @@ pub struct Slip {
     pub against: String,
     /// What the model does.
     pub model: String,
+}
+
+/// How a sensor makes do with its bins.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Scheme {
+    /// All bins at once, or no histogram at all.
+    Full,
+    /// Zooming, with this number of steps.
+    Zooming(u32),
+    /// Sliding: the number of windows, and the bins that neighbours share.
+    Sliding(u32, u32),
+    /// One window that a guide chooses.
+    Guided,
+}
+
+/// A line of Tables 5 and 16.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Sensor {
+    pub author: String,
+    pub year: u32,
+    /// Rows and columns of ToF pixels.
+    pub pixels: (u32, u32),
+    pub max_range_m: f64,
+    pub bins: Option<u32>,
+    pub scheme: Scheme,
+    pub stacked: bool,
 }
 
 #[derive(Deserialize)]

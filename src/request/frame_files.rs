@@ -8,12 +8,12 @@
 
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::FrameRequest;
-use super::picture::depth_map;
+use super::picture::{Drawn, depth_map};
 use crate::analysis::VerdictReport;
-use crate::chip::{Mode, SensorConfig, WindowLaw};
+use crate::chip::{SensorConfig, WindowLaw};
 use crate::engine::{Work, variance_left_out};
 use crate::files::{InputError, OutputFile, parse_json};
 use crate::report::write_npy_u16;
@@ -159,20 +159,6 @@ impl<'a, P> FrameReport<'a, P> {
             macropixels: &frame.pixels,
         }
     }
-}
-
-/// What frame.json says that is also in the other files.
-#[derive(Deserialize)]
-pub(super) struct Drawn {
-    pub(super) sensor: Chip,
-    pub(super) laser_cycles: u32,
-    pub(super) histograms_shape: [usize; 3],
-    pub(super) macropixels: Vec<PixelDepth>,
-}
-
-#[derive(Deserialize)]
-pub(super) struct Chip {
-    pub(super) mode: Mode,
 }
 
 /// Writes frame.json, histograms.npy and depth.png into `out`: `report` is a [`FrameReport`] as JSON, `histograms` are rows x cols x bins.

@@ -2,11 +2,26 @@
 
 use std::path::Path;
 
-use super::frame_files::Drawn;
+use serde::Deserialize;
+
 use crate::chip::Mode;
 use crate::files::InputError;
 use crate::report::{Cell, DepthMap};
-use crate::system::NoDepth;
+use crate::system::{NoDepth, PixelDepth};
+
+/// What frame.json says that is also in the other files.
+#[derive(Deserialize)]
+pub(super) struct Drawn {
+    sensor: Chip,
+    laser_cycles: u32,
+    pub(super) histograms_shape: [usize; 3],
+    macropixels: Vec<PixelDepth>,
+}
+
+#[derive(Deserialize)]
+struct Chip {
+    mode: Mode,
+}
 
 /// Writes `depth.png` into `out`.
 ///

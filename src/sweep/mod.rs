@@ -28,6 +28,7 @@
 
 mod cell;
 mod design;
+mod error;
 mod keys;
 mod parquet;
 mod plot;
@@ -39,27 +40,11 @@ mod table;
 mod theory;
 mod values;
 
-use crate::files::InputError;
-use crate::system::FrameError;
-
 pub use cell::{Cell, Column, Holds};
 pub use design::Design;
+pub use error::SweepError;
 pub use plot::{Drawing, Plot};
 pub use row::Row;
 pub use run::{Outcome, Shard, run, study_of};
 pub use study::{Kind, MOST_POINTS, Study};
 pub use table::{CSV, PARQUET, Results, TIMES, columns};
-
-/// Why a sweep ended.
-#[derive(Debug, thiserror::Error)]
-pub enum SweepError {
-    /// Something in the input is impossible, or a file cannot be written.
-    #[error(transparent)]
-    Input(#[from] InputError),
-    /// The program failed at a frame.
-    #[error(transparent)]
-    Frame(#[from] FrameError),
-    /// Who was told of its progress wanted no more of it.
-    #[error("the sweep was stopped before its end; it goes on from there when it is started again")]
-    Stopped,
-}

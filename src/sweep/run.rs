@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use serde::{Deserialize, Serialize};
 
-use super::SweepError;
+use super::error::SweepError;
 use super::row::{Index, journals_in};
 use super::study::{Kind, Study};
 use super::subject::{Scratch, Subject};

@@ -9,8 +9,8 @@ use serde_json::Value as Json;
 use sha2::{Digest, Sha256};
 use toml::{Table, Value};
 
-use super::SweepError;
 use super::cell::{Cell, Column, Holds};
+use super::error::SweepError;
 use super::row::{Key, Row};
 use super::study::{Kind, Point, Study};
 use super::theory::{self, Last, Rig, Wall};

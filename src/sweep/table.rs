@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::SweepError;
 use super::cell::{Cell, Column, Holds};
+use super::error::SweepError;
 use super::parquet::Parquet;
 use super::row::{Index, Row, journals_in};
 use super::study::{Kind, Study};

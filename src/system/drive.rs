@@ -19,134 +19,33 @@
 //! none is reused; with [`Noise::Still`] a macropixel has the same photons in every frame, and is exposed anew only where its light or
 //! start value has changed.
 
-use rayon::prelude::*;
-
-use super::error::FrameError;
-use super::frame::go_on;
-use super::pixel::PixelDepth;
-use super::policy::{Pointing, WindowPolicy};
-use super::ranger::Ranger;
-use super::result::PhaseTimes;
-use super::settings::FrameSettings;
-use super::stopwatch::Stopwatch;
-use super::summary::Summary;
-use crate::engine::{Answer, Histograms, Work, load};
-use crate::guide::{GuideMap, PastFrame};
-use crate::netlist::Netlist;
-use crate::scene::GroundTruth;
-use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
-
+mod reuse;
+mod settings;
 mod stages;
+mod state;
 #[cfg(test)]
 mod tests;
 
-use self::stages::{Light, Same, Spent};
+pub use reuse::Reused;
+pub use settings::{DriveSettings, FrameClock, FrameTimes, Noise};
+pub use state::Drive;
+
+use rayon::prelude::*;
+
+use self::reuse::{Last, Same, Spent};
+use super::error::FrameError;
+use super::frame::go_on;
+use super::pixel::PixelDepth;
+use super::result::PhaseTimes;
+use super::stopwatch::Stopwatch;
+use super::summary::Summary;
+use crate::engine::{Answer, Histograms, Work};
+use crate::guide::{GuideMap, PastFrame};
+use crate::scene::GroundTruth;
+use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Frames that a guide may look back on.
 const REMEMBERED: usize = 4;
-
-/// Where the photons of a frame come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Noise {
-    /// Every frame has its own photons and guide errors.
-    #[default]
-    Fresh,
-    /// A macropixel has the same photons in every frame, as long as its light and start value stay the same.
-    Still,
-}
-
-/// When the parts of a frame begin and end.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct FrameClock {
-    /// From the cameras' exposure to the guide's map, s.
-    pub guide_latency_s: f64,
-    /// The guide works on the next frame while this one is loaded, exposed and read out.
-    pub pipelined: bool,
-}
-
-impl Default for FrameClock {
-    /// The demonstrator's: 145 ms for everything before the exposure, one after the other (Fig. 106).
-    fn default() -> Self {
-        FrameClock {
-            guide_latency_s: 0.145,
-            pipelined: false,
-        }
-    }
-}
-
-/// When what happened in a frame, s on the scene's clock.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct FrameTimes {
-    /// The cameras see the world.
-    pub images_s: f64,
-    /// The guide's map is there, and the load begins.
-    pub load_s: f64,
-    /// The first laser cycle begins.
-    pub exposure_s: f64,
-    /// The last one has ended, and the readout begins.
-    pub readout_s: f64,
-    /// The histograms are out.
-    pub end_s: f64,
-}
-
-impl FrameTimes {
-    /// The middle of the exposure, for which depths hold, s.
-    pub(crate) fn middle_s(&self) -> f64 {
-        0.5 * (self.exposure_s + self.readout_s)
-    }
-}
-
-/// Everything that a drive depends on.
-#[derive(Debug, Clone)]
-pub struct DriveSettings {
-    /// What each frame depends on; its scene is the one at time 0, its seed that of the drive.
-    pub frame: FrameSettings,
-    /// How windows follow from the guide.
-    pub policy: WindowPolicy,
-    /// How long the parts of a frame take.
-    pub clock: FrameClock,
-    /// Parts of an exposure in which the world stands still, at least 1.
-    pub segments: u32,
-    /// Where photons come from.
-    pub noise: Noise,
-    /// Leave out what is provably the same as in the frame before; without it everything is simulated anew, for the same pictures.
-    pub reuse: bool,
-    /// Macropixels whose SPADs may be on, row-major; `None` for all.
-    pub only: Option<Vec<bool>>,
-    /// The time of the scene at which the first images are taken, s.
-    pub start_s: f64,
-}
-
-impl DriveSettings {
-    /// A drive of such frames from time 0 on, all macropixels lit, windows in the middle of the guide's estimates and the demonstrator's
-    /// clock; exposures have four segments, every frame its own photons, and what is the same as before is not simulated again.
-    pub fn new(frame: FrameSettings) -> Self {
-        DriveSettings {
-            frame,
-            policy: WindowPolicy::default(),
-            clock: FrameClock::default(),
-            segments: 4,
-            noise: Noise::default(),
-            reuse: true,
-            only: None,
-            start_s: 0.0,
-        }
-    }
-}
-
-/// What was not simulated again in a frame.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
-pub struct Reused {
-    /// The load at gate level.
-    pub load: bool,
-    /// Ray casting and light of all of the exposure.
-    pub world: bool,
-    /// Of the views of [`DriveFrame::worlds`] from every macropixel, those that stood.
-    pub views: usize,
-    /// Macropixels with the histogram and depth of the frame before.
-    pub macropixels: usize,
-}
 
 /// A frame of a drive.
 #[derive(Debug, Clone, PartialEq)]
@@ -184,90 +83,7 @@ impl DriveFrame {
     }
 }
 
-/// A drive that goes on from frame to frame; its memory does not grow.
-#[derive(Debug)]
-pub struct Drive<'a> {
-    settings: &'a DriveSettings,
-    pointing: Pointing<'a>,
-    ranger: Ranger<'a>,
-    load_netlist: Netlist,
-    next: u32,
-    past: Vec<PastFrame>,
-    last: Option<Last>,
-}
-
-/// What the next frame may reuse.
-#[derive(Debug)]
-struct Last {
-    starts: Vec<u16>,
-    light: Light,
-    histograms: Histograms,
-    pixels: Vec<PixelDepth>,
-}
-
-impl<'a> Drive<'a> {
-    /// Before the first frame.
-    ///
-    /// # Errors
-    /// Bins in which no depths are found.
-    pub fn new(settings: &'a DriveSettings) -> Result<Self, FrameError> {
-        debug_assert!(settings.segments > 0);
-        let FrameSettings {
-            sensor,
-            scene,
-            exposure,
-            depth,
-            calibration,
-            ..
-        } = &settings.frame;
-        let calibration = calibration.as_ref();
-        Ok(Drive {
-            settings,
-            pointing: Pointing::new(settings.policy, sensor, exposure, calibration),
-            ranger: Ranger::new(sensor, exposure, scene, depth, calibration)?,
-            load_netlist: load::load_netlist(sensor),
-            next: 0,
-            past: Vec::new(),
-            last: None,
-        })
-    }
-
-    /// From one frame to the next, s.
-    pub fn period_s(&self) -> f64 {
-        let FrameClock {
-            guide_latency_s,
-            pipelined,
-        } = self.settings.clock;
-        let chip_s = self.chip_s().iter().sum::<f64>();
-        match pipelined {
-            true => guide_latency_s.max(chip_s),
-            false => guide_latency_s + chip_s,
-        }
-    }
-
-    /// What load, exposure and readout take, s.
-    pub fn chip_s(&self) -> [f64; 3] {
-        let FrameSettings {
-            sensor, exposure, ..
-        } = &self.settings.frame;
-        [sensor.load_time(), exposure.end(), sensor.readout_time()].map(Time::as_s)
-    }
-
-    fn times(&self, number: u32) -> FrameTimes {
-        let [load_s, exposure_s, readout_s] = self.chip_s();
-        let images = self.settings.start_s + f64::from(number) * self.period_s();
-        let loads = images + self.settings.clock.guide_latency_s;
-        let exposes = loads + load_s;
-        let reads = exposes + exposure_s;
-        FrameTimes {
-            images_s: images,
-            load_s: loads,
-            exposure_s: exposes,
-            readout_s: reads,
-            end_s: reads + readout_s,
-        }
-    }
-
+impl Drive<'_> {
     /// Takes the next frame; `exposed` is called with macropixels as they are done, and may stop the frame by its
     /// answer. After a frame that fails, the next one has nothing to reuse.
     ///
@@ -338,12 +154,4 @@ impl<'a> Drive<'a> {
                 .collect(),
         });
     }
-}
-
-/// The seed of a frame's photons and guide errors: SplitMix64 of the drive's, so that no frame has those of another drive's next one.
-fn seed_of(seed: u64, frame: u32) -> u64 {
-    let mut z = seed ^ u64::from(frame).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }

@@ -37,7 +37,7 @@ use crate::settings::Range::Within;
 use crate::settings::{keys, words};
 use crate::units::{Time, TimeOfFlight};
 
-pub use bins::{NoBins, share_held};
+pub use bins::NoBins;
 
 words! {
     /// What a macropixel does if the guide has no estimate for it.
@@ -90,12 +90,6 @@ impl WindowPolicy {
             patience: Some(2),
             ..WindowPolicy::default()
         }
-    }
-
-    /// The smallest bin of `bins` with which a window about the estimate holds `within` of the errors of `sigma_m`, m: Eq. 25, for
-    /// any share.
-    pub fn least_bin_m(&self, sigma_m: f64, bins: usize) -> f64 {
-        2.0 * sigmas_holding(self.within) * sigma_m / bins as f64
     }
 }
 

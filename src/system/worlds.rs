@@ -7,11 +7,11 @@
 //!   next frame  moved ─► …                      ◄─┘     view keeps its light
 //! ```
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::drive::FrameTimes;
 use crate::chip::Exposure;
 use crate::photon::{PhotonStream, PixelLight};
 use crate::scene::{Before, GroundTruth, Scene};
@@ -24,10 +24,10 @@ pub(super) struct LastWorld {
     light: Vec<PixelLight>,
 }
 
-/// The world in the middle of each segment of an exposure; one, if it does not move.
-pub(super) fn worlds(scene: &Scene, times: &FrameTimes, segments: u32) -> Vec<Scene> {
-    let length_s = (times.readout_s - times.exposure_s) / f64::from(segments);
-    let middle_s = |n: u32| times.exposure_s + (f64::from(n) + 0.5) * length_s;
+/// The world in the middle of each segment of an exposure, s on the scene's clock; one, if it does not move.
+pub(super) fn worlds(scene: &Scene, exposure_s: Range<f64>, segments: u32) -> Vec<Scene> {
+    let length_s = (exposure_s.end - exposure_s.start) / f64::from(segments);
+    let middle_s = |n: u32| exposure_s.start + (f64::from(n) + 0.5) * length_s;
     match scene.is_still() {
         true => vec![scene.at(0.0)],
         false => (0..segments).map(|n| scene.at(middle_s(n))).collect(),

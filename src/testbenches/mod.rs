@@ -12,22 +12,9 @@ mod p_counter_variants;
 mod readout;
 mod ripple_hazard;
 mod tdc;
+mod testbench;
 
-use std::path::Path;
-
-use crate::files::InputError;
-use crate::report::Checks;
-
-/// A testbench.
-#[derive(Debug, Clone, Copy)]
-pub struct Testbench {
-    /// Its name, which is also its waveform's.
-    pub name: &'static str,
-    /// What it is about, in a line.
-    pub about: &'static str,
-    /// Fills in the checks and writes the waveform to the path it is given, with the views beside it.
-    run: fn(&Path, &mut Checks) -> Result<(), InputError>,
-}
+pub use testbench::Testbench;
 
 /// All of them, simplest block first.
 pub const TESTBENCHES: &[Testbench] = &[
@@ -48,16 +35,6 @@ impl Testbench {
         let is_named =
             |tb: &&Testbench| name == tb.name || Some(name) == tb.name.strip_prefix("tb_");
         TESTBENCHES.iter().find(is_named).copied()
-    }
-
-    /// Runs it. The waveform goes to `waves`, in the format of its name; what belongs to it goes beside it.
-    ///
-    /// # Errors
-    /// When a file cannot be written.
-    pub fn run(&self, waves: &Path) -> Result<Checks, InputError> {
-        let mut checks = Checks::new();
-        (self.run)(waves, &mut checks)?;
-        Ok(checks)
     }
 }
 

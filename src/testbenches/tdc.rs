@@ -9,18 +9,19 @@
 //!
 //! Beside the waveform it leaves three charts with their numbers: DNL, INL, and the frequencies of a row of rings.
 
+mod converter;
 mod rings;
 mod waveform;
 
 use std::path::Path;
-use std::sync::Arc;
 
+use self::converter::{BEGIN, BITS, CLEARED, CODES, SIGMA, STAGES, made};
 use crate::analysis::Linearity;
 use crate::chip::tdc::{Steps, clock_counter, delay_line, ring_oscillator};
 use crate::files::InputError;
 use crate::kernel::{LANES, LaneDrive, LaneKernel, Lanes};
 use crate::logic::Logic;
-use crate::netlist::{CellKind, Corner, Library, Mismatch, Module, Netlist, Timing, varied};
+use crate::netlist::{CellKind, Netlist, Timing};
 use crate::report::{Axis, Chart, Checks, Grid};
 use crate::testbenches::Testbench;
 use crate::units::{Frequency, Time};
@@ -28,18 +29,6 @@ use rand_philox::{philox4x32_10, u32_to_unit_f64};
 
 /// Batches of 64 conversions: 38 400, about 1200 a code.
 const BATCHES: i64 = 600;
-/// Codes of each converter, those at the ends among them.
-const CODES: usize = 32;
-/// Bits of the counters.
-const BITS: usize = 6;
-/// Stages of a ring: a period of 1 ns.
-const STAGES: usize = 25;
-/// Mismatch of an inverter; a buffer has 14 %, between the two of the thesis's delay line (15 %, 6.3.1) and none.
-const SIGMA: f64 = 0.2;
-/// From a conversion's begin to its TDC_RESET's end, and to START where that is common.
-const CLEARED: Time = Time::from_ns(2);
-const BEGIN: Time = Time::from_ns(4);
-
 pub(super) const TESTBENCH: Testbench = Testbench {
     name: "tb_tdc",
     about: "Clock counter, gated ring oscillator and delay line: DNL and INL by code density; coupled rings",
@@ -79,14 +68,6 @@ struct Tdc {
     steps: Steps,
     /// Longest interval.
     range: Time,
-}
-
-fn made(module: &Arc<Module>, sigma: f64, seed: u64) -> (Netlist, Timing) {
-    let netlist = Netlist::elaborate(module);
-    let nominal = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
-    let mismatch = Mismatch { sigma, seed };
-    let timing = varied(&netlist, &nominal, 1.0, Some(mismatch));
-    (netlist, timing)
 }
 
 fn clocked() -> Tdc {

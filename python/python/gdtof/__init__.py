@@ -10,7 +10,8 @@ Distances are metres along the ray, NaN where there is none; arrays by macropixe
 """
 
 from . import errors, theory, waves
-from ._frame import Drive, DriveFrame, Frame, Maps, Reason, drive, frame
+from ._arrays import Reason
+from ._frame import Drive, DriveFrame, Frame, Maps, drive, frame
 from ._gdtof import Guide, Scene, Sensor, __version__
 from ._histograms import Exposed, Ranged, Replayed, expose, range, replay
 from ._sweep import Swept, sweep

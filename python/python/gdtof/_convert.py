@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ._frame import DriveFrame, Frame, Maps, Reason
+from ._arrays import FrameArrays, Reason, reason_name
 from ._gdtof import __version__
-from ._plot import reason_name
 
 if TYPE_CHECKING:
     import pandas
@@ -27,7 +26,8 @@ MAPS = {
 }
 
 
-def to_xarray(frame: Maps) -> xarray.Dataset:
+def to_xarray(frame: FrameArrays, described: dict[str, Any], placed: dict[str, Any]) -> xarray.Dataset:
+    """The arrays of a frame, with what else is said of it as attributes and as coordinates."""
     try:
         import xarray
     except ImportError as error:
@@ -49,20 +49,11 @@ def to_xarray(frame: Maps) -> xarray.Dataset:
         for name, (count, what) in counted.items()
     }
     # NetCDF has numbers and texts as attributes, and neither None nor truth values.
-    attrs: dict[str, Any] = {"source": f"gdtof {__version__}", "bin_m": frame.bin_m}
-    if isinstance(frame, Frame):
-        attrs |= {"stop_periods": frame.stop_periods, "laser_cycles": frame.laser_cycles}
-        attrs |= {"load_s": frame.load_s, "exposure_s": frame.exposure_s, "readout_s": frame.readout_s}
-        if frame.remark is not None:
-            attrs["remark"] = frame.remark
-    if isinstance(frame, DriveFrame):
-        middle = (frame.times["exposure_s"] + frame.times["readout_s"]) / 2
-        coords["time"] = ((), middle, {"long_name": "middle of the exposure on the scene's clock", "units": "s"})
-        attrs["number"] = frame.number
-    return xarray.Dataset(variables, coords, attrs)
+    attrs: dict[str, Any] = {"source": f"gdtof {__version__}", "bin_m": frame.bin_m} | described
+    return xarray.Dataset(variables, coords | placed, attrs)
 
 
-def to_pandas(frame: Maps) -> pandas.DataFrame:
+def to_pandas(frame: FrameArrays) -> pandas.DataFrame:
     try:
         import pandas
     except ImportError as error:

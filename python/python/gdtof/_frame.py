@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from os import PathLike, fspath
 from pathlib import Path
 from types import TracebackType
@@ -26,6 +25,7 @@ from ._arguments import (
     sensor_of,
     starts_of,
 )
+from ._arrays import FrameArrays, Map
 from .errors import InputError
 
 if TYPE_CHECKING:
@@ -35,103 +35,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Engine: TypeAlias = Literal["gate", "cycle", "window", "cohort"]
-Map: TypeAlias = Literal["depth", "guide", "truth", "peak", "error", "confidence", "reason", "counts"]
-
-SPEED_OF_LIGHT_M_PER_S = 299_792_458.0
-
-
-class Reason(IntEnum):
-    """Why a macropixel has no depth: the first of these that holds."""
-
-    DEPTH = 0
-    """It has one."""
-    NO_SURFACE = 1
-    """It sees the sky."""
-    NO_GUIDE = 2
-    """The guide has no estimate; its SPADs are off."""
-    OUT_OF_REACH = 3
-    """No start value opens a window on the guide's estimate; its SPADs are off."""
-    SPADS_OFF = 4
-    """No SPAD can fire."""
-    SATURATED = 5
-    """A bin of the peak is full."""
-    OUTSIDE_WINDOW = 6
-    """The surface lies outside the window, and no peak is significant."""
-    NO_SIGNIFICANT_PEAK = 7
-    """The surface lies in the window, and no peak is significant."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Maps:
+class Maps(FrameArrays):
     """What frames and frames of drives hold: arrays by macropixel, shape (rows, cols) if not said otherwise.
 
     Arrays own what the simulation made; nothing was copied. Distances are along the ray (not z), in metres, NaN where there is none.
     """
-
-    histograms: NDArray[np.uint16]
-    """Counts, shape (rows, cols, bins), bin 0 earliest."""
-    bin_edges_ns: NDArray[np.float64]
-    """Edges of the bins after STOP, ns, shape (rows, cols, bins + 1); NaN where the window does not open."""
-    depth: NDArray[np.float64]
-    """Measured distance, m, where a peak is significant and not saturated."""
-    bound: NDArray[np.float64]
-    """Cramér-Rao bound of the depth, m: the least standard deviation that its counts allow; NaN where range walk is left in it."""
-    guide: NDArray[np.float64]
-    """The guide's estimate, m."""
-    truth: NDArray[np.float64]
-    """True distance, m; NaN for the sky."""
-    peak: NDArray[np.float64]
-    """Distance of the histogram's peak with its range walk, m, significant or not."""
-    confidence: NDArray[np.float64]
-    """-log10 of the chance that light without an echo makes such a peak; NaN where there is no peak."""
-    reason: NDArray[np.uint8]
-    """Why there is no depth, a :class:`Reason`; 0 where there is one."""
-    start: NDArray[np.int32]
-    """Start value of the P-counter; -1 where SPADs are off."""
-    in_window: NDArray[np.bool_]
-    """Whether the echo's centre lies in the time window."""
-    points: NDArray[np.float64]
-    """Where macropixels with a depth see their surface, m from the lidar: x right, y down, z forward, shape (depths, 3), row by row. The points
-    of `gdtof export frame`, whose files have them in float32; ``np.isfinite(depth)`` says whose they are."""
-    bin_m: float
-    """Light's way there and back in one bin, as a distance, m."""
-    summary: dict[str, Any]
-    """The frame in a few numbers, as in frame.json; distances in m."""
-    work: dict[str, int]
-    """What the engine did, and what it left out."""
-    run_times: dict[str, float]
-    """Wall-clock seconds of each phase of the simulation."""
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Rows, columns and bins."""
-        rows, cols, bins = self.histograms.shape
-        return rows, cols, bins
-
-    @property
-    def error(self) -> NDArray[np.float64]:
-        """Measured less true distance, m; NaN where one of them is missing."""
-        return self.depth - self.truth
-
-    @property
-    def counts(self) -> NDArray[np.uint32]:
-        """Counts of all bins together."""
-        counts: NDArray[np.uint32] = self.histograms.sum(axis=2, dtype=np.uint32)
-        return counts
-
-    @property
-    def bin_edges_m(self) -> NDArray[np.float64]:
-        """Edges of the bins as distances, m, shape (rows, cols, bins + 1)."""
-        return self.bin_edges_ns * (SPEED_OF_LIGHT_M_PER_S / 2.0 * 1e-9)
-
-    def map(self, name: Map) -> NDArray[Any]:
-        """One of the maps by name."""
-        if name not in ("depth", "guide", "truth", "peak", "error", "confidence", "reason", "counts"):
-            raise InputError(
-                f"{name!r} is not a map; give depth, guide, truth, peak, error, confidence, reason or counts"
-            )
-        array: NDArray[Any] = getattr(self, name)
-        return array
 
     def plot(
         self, maps: Map | Sequence[Map] = ("depth", "guide", "truth", "reason"), title: str | None = None
@@ -147,12 +58,16 @@ class Maps:
 
         return plot_histogram(self, row, col, ax)
 
+    def _described(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """What a dataset says of it besides its arrays: attributes, and coordinates without dimensions."""
+        return {}, {}
+
     def to_xarray(self) -> xarray.Dataset:
         """All arrays by macropixel as an xarray.Dataset with dimensions row, col, bin and edge; attributes have the units, and its
         `to_netcdf` writes it as it is."""
         from ._convert import to_xarray
 
-        return to_xarray(self)
+        return to_xarray(self, *self._described())
 
     def to_pandas(self) -> pandas.DataFrame:
         """A row for each macropixel, indexed by row and col; without histograms."""
@@ -218,6 +133,18 @@ class Frame(Maps):
             warnings.warn(sentence, stacklevel=2)
         return path
 
+    def _described(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        attrs: dict[str, Any] = {
+            "stop_periods": self.stop_periods,
+            "laser_cycles": self.laser_cycles,
+            "load_s": self.load_s,
+            "exposure_s": self.exposure_s,
+            "readout_s": self.readout_s,
+        }
+        if self.remark is not None:
+            attrs["remark"] = self.remark
+        return attrs, {}
+
     def __repr__(self) -> str:
         return f"<Frame {_outline(self)}>"
 
@@ -236,6 +163,11 @@ class DriveFrame(Maps):
     """From where to where windows see, m, shape (rows, cols, 2)."""
     reused: dict[str, Any]
     """What was not simulated again, because it is provably that of the frame before."""
+
+    def _described(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        middle = (self.times["exposure_s"] + self.times["readout_s"]) / 2
+        said = {"long_name": "middle of the exposure on the scene's clock", "units": "s"}
+        return {"number": self.number}, {"time": ((), middle, said)}
 
     def __repr__(self) -> str:
         return f"<DriveFrame {self.number}, {_outline(self)}>"

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from html import escape
 from typing import Any
 
-from ._frame import Maps
+from ._arrays import FrameArrays
 
 
 def _table(caption: str, rows: Iterable[tuple[str, str]]) -> str:
@@ -28,7 +28,7 @@ def of_keys(caption: str, keys: dict[str, Any]) -> str:
     return _table(caption, ((key, text(value)) for key, value in keys.items()))
 
 
-def of_frame(frame: Maps) -> str:
+def of_frame(frame: FrameArrays) -> str:
     summary = frame.summary
 
     def metres(name: str) -> str:

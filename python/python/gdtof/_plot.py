@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ._frame import Map, Maps, Reason
+from ._arrays import FrameArrays, Map, Reason, reason_name
 from .errors import InputError
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def _pyplot() -> Any:
     return plt
 
 
-def plot_maps(frame: Maps, maps: list[Map], title: str | None) -> Figure:
+def plot_maps(frame: FrameArrays, maps: list[Map], title: str | None) -> Figure:
     plt = _pyplot()
     if not 1 <= len(maps) <= MOST_BY_DEFAULT:
         raise InputError(f"maps: {len(maps)} maps; give 1 to {MOST_BY_DEFAULT}")
@@ -111,13 +111,7 @@ def _reasons(ax: Any, array: Any) -> None:
     ax.legend(handles=patches, loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=7, frameon=False)
 
 
-def reason_name(reason: Reason) -> str:
-    """As the tables of `gdtof frame` have it."""
-    words = {Reason.DEPTH: "depth", Reason.SPADS_OFF: "SPADs off", Reason.OUTSIDE_WINDOW: "target outside window"}
-    return words.get(reason, reason.name.lower().replace("_", " "))
-
-
-def plot_histogram(frame: Maps, row: int, col: int, ax: Axes | None) -> Axes:
+def plot_histogram(frame: FrameArrays, row: int, col: int, ax: Axes | None) -> Axes:
     rows, cols, _ = frame.shape
     if not (0 <= row < rows and 0 <= col < cols):
         raise InputError(

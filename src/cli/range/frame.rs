@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::RangeArgs;
+use super::args::RangeArgs;
 use crate::cli::quality;
 use crate::cli::voice::{say, say_json, tell};
 use crate::files::{OutputFile, read_counts};

@@ -1,60 +1,13 @@
 //! `gdtof range`: depths from histograms that the user has.
 
+mod args;
 mod frame;
 mod tmf8820;
 
-use std::path::PathBuf;
+pub(super) use self::args::RangeArgs;
 
-use clap::{Args, ValueEnum};
-
-use self::tmf8820::Fit;
+use self::args::Format;
 use crate::files::InputError;
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// JSON captures of an ams TMF8820.
-    Tmf8820,
-    /// Counts of a sensor like ours, rows x columns x bins (.npy), in the windows of a frame.json.
-    Frame,
-}
-
-/// Arguments of `gdtof range`.
-#[derive(Args)]
-pub(super) struct RangeArgs {
-    /// File with the histograms.
-    #[arg(long, value_name = "FILE")]
-    histograms: PathBuf,
-    /// Format of the file.
-    #[arg(long, value_enum)]
-    format: Format,
-    /// tmf8820: captures to calibrate on, by their true distances; depths and errors are given for the others
-    /// [default: even].
-    #[arg(long, value_enum, conflicts_with = "calibration")]
-    fit: Option<Fit>,
-    /// tmf8820: calibration to use instead, on all captures. frame: bin profile of the sensor's delay lines, from
-    /// `gdtof calibrate`.
-    #[arg(long, value_name = "FILE")]
-    calibration: Option<PathBuf>,
-    /// tmf8820: file to save the calibration to (JSON).
-    #[arg(long, value_name = "FILE", conflicts_with = "calibration")]
-    save_calibration: Option<PathBuf>,
-    /// frame: frame.json with sensor, scene, exposure and start values [default: the one beside the histograms].
-    #[arg(long, value_name = "FILE")]
-    frame: Option<PathBuf>,
-    /// frame: share of macropixels without an echo that may get a depth [default: 0.001].
-    #[arg(long, value_name = "P")]
-    false_alarm_rate: Option<f64>,
-    /// frame: do not correct depths for the range walk of strong echoes.
-    #[arg(long)]
-    no_walk_correction: bool,
-    /// File for the depths (CSV). tmf8820: capture,zone,true_m,depth_m,sensor_m; frame:
-    /// row,col,start,true_m,guide_m,depth_m,bound_m,confidence,no_depth.
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// Print JSON instead of tables.
-    #[arg(long)]
-    json: bool,
-}
 
 /// Runs the command.
 ///

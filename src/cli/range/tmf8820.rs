@@ -1,28 +1,13 @@
 //! `gdtof range --format tmf8820`: depths from a real sensor's histograms, beside those it computed itself.
 
-use clap::ValueEnum;
 use serde::Serialize;
 
-use super::RangeArgs;
+use super::args::{Fit, RangeArgs};
 use crate::cli::voice::{say, say_json};
 use crate::files::{InputError, OutputFile, parse_json, read_text};
 use crate::ranging::tmf8820::{self, Capture};
 use crate::ranging::{ArrivalOptions, Calibration, Echo, arrival};
 use crate::report::Grid;
-
-/// Captures that a calibration is fitted on; the others are reported.
-#[derive(Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Fit {
-    /// Every second capture, from the first.
-    Even,
-    /// Every second capture, from the second.
-    Odd,
-    /// The nearer half.
-    Near,
-    /// The farther half.
-    Far,
-}
 
 /// Fewest counts above background that are taken for a pulse.
 const LEAST_SIGNAL: f64 = 100.0;

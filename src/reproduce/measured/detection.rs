@@ -6,6 +6,7 @@ use crate::chip::Overflow;
 use crate::engine::EngineError;
 use crate::numerics::intervals::{Estimate, share};
 use crate::report::{Chart, Grid};
+use crate::reproduce::parameters::sigma_over_fwhm;
 use crate::reproduce::thesis::measurement;
 use crate::theory::cycles::laser_cycles_for;
 use crate::theory::detection::{Model, PerCycle, Ties, probability};
@@ -117,7 +118,7 @@ fn cases() -> Vec<(&'static str, Trial)> {
         (
             "Table 6's pulse of 8 ns over bins of 2.6 ns",
             Trial {
-                sigma_ns: 8.0 * super::super::penalty::sigma_over_fwhm(),
+                sigma_ns: 8.0 * sigma_over_fwhm(),
                 ..case(0.05, 1.0)
             },
         ),

@@ -27,7 +27,7 @@ use crate::engine::EngineError;
 use crate::numerics::intervals::Estimate;
 use crate::report::Grid;
 use crate::reproduce::delay_line::calibrated as delay_line_calibration;
-use crate::reproduce::penalty::{demonstrator, long_range};
+use crate::reproduce::parameters::{demonstrator, long_range};
 use crate::reproduce::thesis::measurement;
 use crate::theory::partial::System;
 

@@ -12,7 +12,7 @@ use crate::engine::EngineError;
 use crate::numerics::intervals::Estimate;
 use crate::numerics::probit::{Point, crossing};
 use crate::report::Grid;
-use crate::reproduce::penalty::long_range;
+use crate::reproduce::parameters::long_range;
 use crate::reproduce::thesis::measurement;
 use crate::theory::cycles::laser_cycles_for;
 use crate::theory::detection::{Model, PerCycle, Ties};

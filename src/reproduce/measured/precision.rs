@@ -8,6 +8,7 @@ use crate::engine::EngineError;
 use crate::numerics::intervals::{Estimate, deviation, mean};
 use crate::ranging::{PeakOptions, interpolate};
 use crate::report::{Chart, Grid};
+use crate::reproduce::parameters::sigma_over_fwhm;
 use crate::reproduce::thesis::measurement;
 use crate::theory::Pulse;
 use crate::theory::estimators::Expected;
@@ -115,7 +116,7 @@ const SIGNALS: [f64; 8] = [0.02, 0.05, 0.15, 0.5, 1.0, 2.0, 4.0, 10.0];
 /// The demonstrator's pulse in the QuantIC4x4's bins, in daylight.
 fn trial(signal: f64) -> Trial {
     Trial {
-        sigma_ns: 4.5 * super::super::penalty::sigma_over_fwhm(),
+        sigma_ns: 4.5 * sigma_over_fwhm(),
         ..Trial::new(signal, 20e6, CYCLES)
     }
 }
@@ -193,7 +194,7 @@ fn failures(frames: usize) -> Result<Grid, EngineError> {
     let mut grid = measurement(2).grid(1);
     let narrow = trial(4.0).on(|sensor| sensor.bin_bits = 10);
     let wide = Trial {
-        sigma_ns: 8.0 * super::super::penalty::sigma_over_fwhm(),
+        sigma_ns: 8.0 * sigma_over_fwhm(),
         ..trial(2.0)
     };
     let dazzled = Trial {

@@ -1,10 +1,11 @@
 //! Figures of laser cycles and penalties, and table 7.
 
-use super::{demonstrator, long_range, one_hit, penalty};
+use super::{one_hit, penalty};
 use crate::report::{Chart, Grid};
 use crate::reproduce::measured::partial::{
     AtRange, OnChip, demonstrator_on_chip, demonstrator_on_delay_lines, long_range_on_chip,
 };
+use crate::reproduce::parameters::{demonstrator, long_range};
 use crate::reproduce::thesis::{chart, grid};
 use crate::theory::capacity::full_bins;
 use crate::theory::partial::{Purpose, System};

@@ -2,17 +2,17 @@
 
 use std::sync::Arc;
 
-use super::{Drive, DriveSettings, FrameTimes, Last, Noise, Reused, seed_of};
+use super::reuse::{Last, Light, Same, Spent};
+use super::settings::{DriveSettings, FrameTimes, Noise};
+use super::state::Drive;
 use crate::engine::{Answer, Histograms, LitPixel, Work, expose};
 use crate::guide::{GuideInput, GuideMap};
-use crate::photon::{PhotonStream, PixelLight};
-use crate::scene::{DVec3, GroundTruth, Scene};
+use crate::scene::DVec3;
 use crate::system::error::FrameError;
 use crate::system::frame::{go_on, load_starts};
 use crate::system::light::{lit, photon_stream, starts_of};
 use crate::system::pixel::PixelDepth;
 use crate::system::ranger::Known;
-use crate::system::result::PhaseTimes;
 use crate::system::settings::FrameSettings;
 use crate::system::stopwatch::{Stopwatch, timed};
 use crate::system::worlds::{self, LastWorld};
@@ -25,54 +25,6 @@ pub(super) struct Plan {
     pub(super) guide: GuideMap,
     pub(super) wanted: Vec<Option<u16>>,
     pub(super) starts: Vec<u16>,
-}
-
-/// What is there during an exposure, and what of it falls on the array.
-#[derive(Debug)]
-pub(super) struct Light {
-    pub(super) stream: PhotonStream,
-    pub(super) worlds: Vec<Scene>,
-    /// The last of them.
-    pub(super) newest: Arc<LastWorld>,
-    /// In the middle of the exposure.
-    pub(super) truth: GroundTruth,
-    pub(super) each: Vec<PixelLight>,
-    pub(super) pixels: Vec<LitPixel>,
-}
-
-/// Macropixels that have the light, start value and photons of the frame before.
-pub(super) struct Same<'l> {
-    pub(super) last: Option<&'l Last>,
-    pub(super) is_same: Vec<bool>,
-}
-
-impl<'l> Same<'l> {
-    pub(super) fn of(last: Option<&'l Last>, light: &Light) -> Self {
-        let is_same = match last {
-            None => vec![false; light.pixels.len()],
-            Some(last) => {
-                let pairs = last.light.pixels.iter().zip(&light.pixels);
-                pairs.map(|(before, now)| before == now).collect()
-            }
-        };
-        Same { last, is_same }
-    }
-
-    pub(super) fn number(&self) -> usize {
-        self.is_same.iter().filter(|&&is_same| is_same).count()
-    }
-
-    /// The frame before, if this macropixel is the same in it.
-    pub(super) fn last_of(&self, pixel: usize) -> Option<&'l Last> {
-        self.last.filter(|_| self.is_same[pixel])
-    }
-}
-
-/// What a frame took and left out.
-#[derive(Default)]
-pub(super) struct Spent {
-    pub(super) run: PhaseTimes,
-    pub(super) reused: Reused,
 }
 
 impl Drive<'_> {
@@ -137,7 +89,7 @@ impl Drive<'_> {
         let reuse = self.settings.reuse;
         let mut clock = Stopwatch::new();
         let stream = photon_stream(sensor, exposure, plan.seed, scene);
-        let worlds = worlds::worlds(scene, &plan.times, self.settings.segments);
+        let worlds = worlds::worlds(scene, plan.times.exposed_s(), self.settings.segments);
         let before = before.map(|last| &last.light);
         let (truth, each, newest) = match before.filter(|last| last.worlds == worlds) {
             Some(last) => {
@@ -235,4 +187,12 @@ impl Drive<'_> {
             }
         })
     }
+}
+
+/// The seed of a frame's photons and guide errors: SplitMix64 of the drive's, so that no frame has those of another drive's next one.
+fn seed_of(seed: u64, frame: u32) -> u64 {
+    let mut z = seed ^ u64::from(frame).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
 }

@@ -7,6 +7,7 @@ use crate::chip::{Exposure, SensorConfig};
 use crate::guide::NoisyTruth;
 use crate::photon::PixelLight;
 use crate::scene::{DVec3, Object, Scene, Shape};
+use crate::system::FrameSettings;
 use crate::system::light::photon_stream;
 use crate::system::worlds;
 use proptest::prelude::*;
@@ -149,7 +150,7 @@ fn light_in_motion_is_a_timeline_where_something_moves_and_plain_elsewhere() {
         readout_s: 0.1,
         end_s: 0.1,
     };
-    let worlds = worlds::worlds(&settings.frame.scene, &times, 4);
+    let worlds = worlds::worlds(&settings.frame.scene, times.exposed_s(), 4);
     let (truths, kept) = worlds::truths(&worlds, (6, 8), None, true);
     assert!((1..3 * 48).contains(&kept), "{kept}");
     let FrameSettings {

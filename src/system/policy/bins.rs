@@ -35,7 +35,7 @@ pub enum NoBins {
 }
 
 /// Share of a map's estimates whose targets the windows of a law hold, if the guide errs as it claims; 1 without estimates.
-pub fn share_held(guide: &GuideMap, law: &WindowLaw) -> f64 {
+fn share_held(guide: &GuideMap, law: &WindowLaw) -> f64 {
     let held = estimates(guide).map(|(range_m, sigma_m)| {
         let start = law.start_for(Time::of_flight(range_m));
         let Some(window) = start.and_then(|start| law.window(start).open()) else {

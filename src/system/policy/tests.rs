@@ -243,17 +243,6 @@ fn the_conventional_mode_has_one_window() {
     assert!(starts[0].is_some() && starts.iter().all(|start| *start == starts[0]));
 }
 
-#[test]
-fn the_least_bin_is_that_of_equation_25() {
-    let policy = WindowPolicy {
-        within: 0.997_300_203_936_739_8,
-        ..WindowPolicy::default()
-    };
-    let sensor = sensor();
-    let bin_m = policy.least_bin_m(1.0, sensor.bins);
-    assert!((bin_m - 6.0 / 16.0).abs() < 1e-9, "{bin_m}");
-}
-
 /// The whole chain, photons and ranging included: a guide that errs by a window and says so, before a wall.
 #[test]
 fn stepped_windows_find_the_wall_that_one_window_misses() {

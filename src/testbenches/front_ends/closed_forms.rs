@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Bench, DEAD_TIME_NS, Point, SPADS, STEPS, TOGETHER, WIRES};
+use super::bench::{Bench, DEAD_TIME_NS, Point, SPADS, STEPS, TOGETHER, WIRES};
 use crate::chip::{ChipTiming, FrontEnd};
 use crate::files::InputError;
 use crate::logic::Logic;

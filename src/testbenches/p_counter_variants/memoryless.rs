@@ -7,7 +7,7 @@ use crate::report::Checks;
 use crate::units::Time;
 
 use super::comparison::sensor;
-use super::numbers;
+use super::text::numbers;
 
 /// The P-counter without memory: STOP every 512 CLK periods, and eight too many.
 pub(super) fn coming_round(checks: &mut Checks) {

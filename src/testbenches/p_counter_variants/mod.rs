@@ -12,31 +12,30 @@
 //! laser cycle before. Then a laser rate of 80 kHz, at which a counter that runs on comes round again and again in each
 //! laser cycle.
 
+mod circuit;
 mod comparison;
 mod memoryless;
 mod side_by_side;
+mod text;
 
 use std::path::Path;
 use std::sync::Arc;
 
+use self::circuit::{ORIGIN, RESET_END, finished, place_counter};
+use self::text::{listed, numbers};
 use crate::chip::{
     AfterBorrow, CellLibrary, ChipTiming, Exposure, Probe, SensorConfig, Tap, WindowLaw, metdc,
-    p_counter, p_counter_timing,
 };
 use crate::chip::{Irregular, Window};
 use crate::engine::waveform::write_waves;
 use crate::files::{InputError, OutputFile};
 use crate::kernel::{Drive, Kernel, Recorder, clock, in_order};
-use crate::netlist::{Module, ModuleBuilder, Net, NetId, Netlist, Timing};
+use crate::netlist::{Module, ModuleBuilder, NetId, Netlist, Timing};
 use crate::report::Checks;
 use crate::testbenches::Testbench;
 use crate::units::Time;
 use crate::waves::{Entry, Group, Layout};
 
-/// First STOP edge.
-const ORIGIN: Time = Time::from_ns(60);
-/// When the chip comes out of reset.
-const RESET_END: Time = Time::from_ns(2);
 /// The first scene: a start value with its most significant bit high.
 const HIGH: Scene = Scene {
     from: 0,
@@ -129,24 +128,6 @@ const PINS: [&str; 9] = [
     "PIXEL_CLEAR",
     "HIT_CLEAR",
 ];
-
-/// Places a P-counter and its timing block among pins of their names; returns COUNTER_RESET.
-fn place_counter(m: &mut ModuleBuilder, config: &SensorConfig) -> Net {
-    m.input_bus("COUNTER_INIT", config.counter_bits);
-    m.wire("LOCAL_STOP");
-    m.wire("COUNTER_CLK");
-    let counter_reset = m.wire("COUNTER_RESET");
-    m.wire("MEMORY_RESET");
-    m.wire("STOP_D");
-    let timing = p_counter_timing::circuit(config.after_borrow);
-    m.instance_by_names("p_counter_timing", &timing, &[]);
-    m.instance_by_names("p_counter", &p_counter::circuit(config), &[]);
-    counter_reset
-}
-
-fn finished(m: ModuleBuilder) -> Arc<Module> {
-    m.finish().expect("the testbench's circuit is whole")
-}
 
 /// P-counter, timing block and the two METDCs.
 fn channel(name: &str, config: &SensorConfig) -> Arc<Module> {
@@ -441,22 +422,4 @@ fn repeated_capture(bench: &Bench, seen: &Recorder, checks: &mut Checks) {
             &law,
         );
     }
-}
-
-/// Times in nanoseconds, to the picosecond.
-fn listed(times: &[Time]) -> String {
-    let times: Vec<String> = times.iter().map(|t| format!("{:.3}", t.as_ns())).collect();
-    if times.is_empty() {
-        "none".to_owned()
-    } else {
-        times.join(" ")
-    }
-}
-
-fn numbers(numbers: &[usize]) -> String {
-    numbers
-        .iter()
-        .map(usize::to_string)
-        .collect::<Vec<_>>()
-        .join(" ")
 }

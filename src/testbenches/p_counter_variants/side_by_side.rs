@@ -13,7 +13,8 @@ use crate::report::Checks;
 use crate::units::Time;
 use crate::waves::{Entry, Group, Layout};
 
-use super::{ORIGIN, RESET_END, finished, listed, numbers, place_counter};
+use super::circuit::{ORIGIN, RESET_END, finished, place_counter};
+use super::text::{listed, numbers};
 
 const START: u16 = 5;
 /// Bits of the counters, and CLK periods of a laser cycle, after which the counter without memory comes round.

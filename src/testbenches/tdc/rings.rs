@@ -11,7 +11,7 @@
 
 use std::path::Path;
 
-use super::{BEGIN, BITS, SIGMA, STAGES, made};
+use super::converter::{BEGIN, BITS, SIGMA, STAGES, made};
 use crate::chip::tdc::coupling::Row;
 use crate::chip::tdc::ring_oscillator;
 use crate::files::InputError;

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use super::{BEGIN, BITS, CLEARED, CODES, SIGMA, STAGES, made};
+use super::converter::{BEGIN, BITS, CLEARED, CODES, SIGMA, STAGES, made};
 use crate::chip::tdc::{clock_counter, delay_line, ring_oscillator};
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;

@@ -39,7 +39,7 @@ pub fn in_plain_words(said: &str) -> String {
 }
 
 /// Whether a reader says that something else stands where one of some words belongs.
-pub fn is_no_word(said: &str) -> bool {
+pub(crate) fn is_no_word(said: &str) -> bool {
     said == "wanted string or table" || said.starts_with("invalid type: unit variant")
 }
 

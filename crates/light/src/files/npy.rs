@@ -194,7 +194,7 @@ impl NpyHead {
     }
 
     /// Whether elements are of type `T`.
-    pub fn is_of<T: Element>(&self) -> bool {
+    pub(crate) fn is_of<T: Element>(&self) -> bool {
         let same = |descr: &str| {
             descr
                 .trim_matches('\'')
@@ -209,7 +209,7 @@ impl NpyHead {
     }
 
     /// Reads the elements, in their order in the file; `None` if they are neither whole numbers nor floats.
-    pub fn numbers(&self, reader: &mut impl Read) -> Option<io::Result<Vec<Number>>> {
+    pub(crate) fn numbers(&self, reader: &mut impl Read) -> Option<io::Result<Vec<Number>>> {
         let kind = self.descr.trim_matches(['\'', '<', '>', '|', '=']);
         let (sort, width) = kind.split_at_checked(1)?;
         let width = match (sort, width) {

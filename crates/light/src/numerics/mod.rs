@@ -10,7 +10,8 @@ mod special;
 
 pub use dual::Dual;
 pub(crate) use quadrature::{gauss_legendre, integrate};
-pub use special::{
-    erfcx, ln_exprel_neg, ln_normal_below, ln_sum_exp, normal_above, normal_density,
-    poisson_deviance, stirling_error, stirling_series,
-};
+pub(crate) use special::erfcx;
+pub(crate) use special::ln_exprel_neg;
+pub(crate) use special::ln_sum_exp;
+pub(crate) use special::poisson_deviance;
+pub use special::{ln_normal_below, normal_above, normal_density, stirling_error, stirling_series};

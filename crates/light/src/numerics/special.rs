@@ -30,7 +30,7 @@ pub fn ln_normal_below(z: f64) -> f64 {
 }
 
 /// exp(x²)·erfc(x) for x ≥ 0, which never underflows.
-pub fn erfcx(x: f64) -> f64 {
+pub(crate) fn erfcx(x: f64) -> f64 {
     debug_assert!(x >= 0.0, "{x}");
     if x < 5.0 {
         // x² is rounded; what the rounding lost is put back to first order.
@@ -46,7 +46,7 @@ pub fn erfcx(x: f64) -> f64 {
 }
 
 /// ln((1 − e^(−t))/t) for t ≥ 0: about −t/2 near 0, −ln t far away, 0 at 0.
-pub fn ln_exprel_neg(t: f64) -> f64 {
+pub(crate) fn ln_exprel_neg(t: f64) -> f64 {
     debug_assert!(t >= 0.0, "{t}");
     if t > 1.0 {
         return (-(-t).exp()).ln_1p() - t.ln();
@@ -71,7 +71,7 @@ pub fn ln_exprel_neg(t: f64) -> f64 {
 }
 
 /// ln(eᵃ + eᵇ); either may be −∞.
-pub fn ln_sum_exp(a: f64, b: f64) -> f64 {
+pub(crate) fn ln_sum_exp(a: f64, b: f64) -> f64 {
     let (small, large) = if a < b { (a, b) } else { (b, a) };
     if small == f64::NEG_INFINITY {
         return large;
@@ -110,7 +110,7 @@ pub fn stirling_series(n: f64) -> f64 {
 ///
 /// Loader's trick (C. Loader, Fast and accurate computation of binomial probabilities, 2000):
 /// with v = (x − µ)/(x + µ) the logarithm is 2 artanh v, and the leading terms cancel by algebra.
-pub fn poisson_deviance(x: f64, mean: f64) -> f64 {
+pub(crate) fn poisson_deviance(x: f64, mean: f64) -> f64 {
     let difference = x - mean;
     if difference.abs() >= 0.1 * (x + mean) {
         return if x == 0.0 {

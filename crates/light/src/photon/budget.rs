@@ -118,12 +118,6 @@ impl PhotonBudget {
         self.background_per_m2(reflectivity, illuminance_klux) * etendue_m2
     }
 
-    /// The same for a target as near as `range_m`: R·A_scene of Eq. 13 before the shortcut 4z² ≫ d².
-    pub fn background_hz_at(&self, range_m: f64, reflectivity: f64, illuminance_klux: f64) -> f64 {
-        self.background_per_m2(reflectivity, illuminance_klux)
-            * (self.lens_share(range_m) * self.scene_area_m2(range_m))
-    }
-
     /// sin²α of Eq. 6: the lens's share of what a target at `range_m` sends back.
     pub(crate) fn lens_share(&self, range_m: f64) -> f64 {
         let d2 = self.lens_diameter_m * self.lens_diameter_m;
@@ -135,21 +129,10 @@ impl PhotonBudget {
         (0.5 * self.lens_diameter_m / range_m).powi(2)
     }
 
-    /// A_scene of Eq. 11: what one macropixel sees of a target at `range_m`, m².
-    pub fn scene_area_m2(&self, range_m: f64) -> f64 {
-        self.solid_angle_sr() * range_m * range_m
-    }
-
     /// What one macropixel sees, sr: A_pix over f².
     fn solid_angle_sr(&self) -> f64 {
         let [x_m, y_m] = self.pixel_pitch_m;
         x_m * y_m / self.lens_focal_m.powi(2)
-    }
-
-    /// M_target,source of Eq. 7 and 8, per pulse instead of per second: the laser's energy on the target at
-    /// `range_m`, J/m². What Eq. 9 makes of it is [`PhotonBudget::signal_per_pulse`].
-    pub fn target_exposure_j_m2(&self, range_m: f64) -> f64 {
-        self.pixel_energy_j() / self.scene_area_m2(range_m)
     }
 
     /// What would be detected of one pulse if the lens took all that the pixel's target sends back.
@@ -254,7 +237,9 @@ mod tests {
             let excess = (budget.lens_diameter_m / (2.0 * z_m)).powi(2);
             let signal =
                 budget.signal_per_pulse_far_field(z_m, 0.1) / budget.signal_per_pulse(z_m, 0.1);
-            let exact_hz = budget.background_hz_at(z_m, 0.1, 100.0);
+            // R·A_scene of Eq. 13 before the shortcut 4z² ≫ d².
+            let scene_m2 = budget.solid_angle_sr() * z_m * z_m;
+            let exact_hz = budget.background_per_m2(0.1, 100.0) * budget.lens_share(z_m) * scene_m2;
             let background = budget.background_hz(0.1, 100.0) / exact_hz;
             for ratio in [signal, background] {
                 assert!(
@@ -273,8 +258,11 @@ mod tests {
                 ..PhotonBudget::table_6()
             };
             let z_m = 37.0;
-            let radiance = budget.target_exposure_j_m2(z_m) * 0.1 * budget.transmittance / PI;
-            let pixel_j = budget.lens_share(z_m) * radiance * budget.scene_area_m2(z_m);
+            // A_scene of Eq. 11, and M_target,source of Eq. 7 and 8, per pulse instead of per second.
+            let scene_m2 = budget.solid_angle_sr() * z_m * z_m;
+            let exposure_j_m2 = budget.pixel_energy_j() / scene_m2;
+            let radiance = exposure_j_m2 * 0.1 * budget.transmittance / PI;
+            let pixel_j = budget.lens_share(z_m) * radiance * scene_m2;
             let photon_j = PLANCK_J_S * SPEED_OF_LIGHT_M_PER_S / 905e-9;
             let got = budget.signal_per_pulse(z_m, 0.1);
             assert!(

@@ -10,6 +10,7 @@ mod mixture;
 mod optics;
 pub mod philox;
 mod pulse;
+mod pulses;
 mod quantile;
 mod random;
 pub mod solar;
@@ -17,7 +18,7 @@ mod spad;
 mod spad_grid;
 mod stream;
 
-pub use avalanches::{Avalanches, Unknown};
+pub use avalanches::{Avalanches, Unknown, apply_dead_time};
 pub use budget::{Convention, PhotonBudget, Spot};
 pub use echo::{ECHO_REACH, EchoLaw};
 pub use gaussian::{pulse_share, pulse_shares};
@@ -26,14 +27,13 @@ pub use mixture::{DEEP, Glint, MERGED_ERROR, merged};
 pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
 pub use philox::LANES;
 pub use pulse::{PulseError, PulseShape};
+pub use pulses::PixelPhotons;
 pub use quantile::{NormalSampler, RANKS};
 pub use random::{Poisson, Purpose, normal, philox_key, random_stream};
-pub use spad::{
-    AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, Photon, SpadEvent, SpadModel, apply_dead_time,
-};
+pub use spad::{AFTERPULSE_REACH, CROSSTALK_DELAY, DeadTimeLaw, Photon, SpadEvent, SpadModel};
 pub use spad_grid::{MOST_SPADS, SIDES, SpadGrid, count_bits};
 pub use stream::{
     Background, Draw, GROUP, Group, LightParts, ListedEchoes, NEVER_FS, OrderedEchoes, PER_BLOCK,
-    PLACE_BITS, PhotonStream, PixelPhotons, PixelStream, Place, Run, Slots, Span, StreamConfig,
-    TILE, TIME_BITS, signal_rank, spad_of,
+    PLACE_BITS, PhotonStream, PixelStream, Place, Run, Slots, Span, StreamConfig, TILE, TIME_BITS,
+    signal_rank, spad_of,
 };

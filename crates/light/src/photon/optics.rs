@@ -20,12 +20,6 @@ impl Lens {
     pub(crate) fn focal_m(&self) -> f64 {
         self.f_number * self.diameter_m
     }
-
-    /// Full angle of view, degrees, of `pixels` of `pitch_m` in a row.
-    pub fn field_of_view_deg(&self, pixels: u32, pitch_m: f64) -> f64 {
-        let half_m = 0.5 * f64::from(pixels) * pitch_m;
-        2.0 * (half_m / self.focal_m()).atan().to_degrees()
-    }
 }
 
 /// Transmission of a filter against wavelength; all are 1 at the centre.
@@ -97,34 +91,6 @@ impl Filter {
         let reach_nm = half_widths * self.fwhm_nm / 2.0;
         (self.centre_nm - reach_nm, self.centre_nm + reach_nm)
     }
-
-    /// Width of the top hat that passes as much of white light, nm.
-    pub fn equivalent_width_nm(&self) -> f64 {
-        self.fwhm_nm
-            * match self.shape {
-                FilterShape::TopHat | FilterShape::Cosine => 1.0,
-                FilterShape::Gaussian => 0.5 * (PI / LN_2).sqrt(),
-                FilterShape::Lorentz => 0.5 * PI,
-            }
-    }
-
-    /// This filter warmed by `degrees_c`, its centre drifting by `nm_per_c` (interference filters: about 0.03).
-    pub fn warmed(&self, degrees_c: f64, nm_per_c: f64) -> Self {
-        Filter {
-            centre_nm: self.centre_nm + nm_per_c * degrees_c,
-            ..*self
-        }
-    }
-
-    /// This filter under light that comes in at `angle_rad`: an interference filter of effective index `index`
-    /// moves to λ·√(1 − sin²θ/n²).
-    pub fn tilted(&self, angle_rad: f64, index: f64) -> Self {
-        let sine = angle_rad.sin() / index;
-        Filter {
-            centre_nm: self.centre_nm * (1.0 - sine * sine).sqrt(),
-            ..*self
-        }
-    }
 }
 
 /// A laser whose wavelength depends on temperature and on the piece at hand (2.3.3, Fig. 20).
@@ -154,13 +120,6 @@ impl LaserDrift {
     /// Wavelength at `temperature_c` of a piece `offset_nm` from the typical one, nm.
     pub fn wavelength_nm(&self, temperature_c: f64, offset_nm: f64) -> f64 {
         self.nominal_nm + offset_nm + self.nm_per_c * (temperature_c - self.reference_c)
-    }
-
-    /// Shortest and longest wavelength over all pieces from `coldest_c` to `hottest_c`, nm.
-    pub fn span_nm(&self, coldest_c: f64, hottest_c: f64) -> (f64, f64) {
-        let ends = [coldest_c, hottest_c].map(|c| self.wavelength_nm(c, 0.0));
-        let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-        (low - self.process_nm, high + self.process_nm)
     }
 }
 
@@ -213,10 +172,11 @@ mod tests {
             f_number: 2.2,
         };
         assert!((lens.focal_m() - 13.2e-3).abs() < 1e-15);
-        let (h, v) = (
-            lens.field_of_view_deg(200, 30e-6),
-            lens.field_of_view_deg(63, 30e-6),
-        );
+        let angle_deg = |pixels: f64| {
+            let half_m = 0.5 * pixels * 30e-6;
+            2.0 * (half_m / lens.focal_m()).atan().to_degrees()
+        };
+        let (h, v) = (angle_deg(200.0), angle_deg(63.0));
         assert!((h - 26.0).abs() < 0.5 && (v - 8.0).abs() < 0.5, "{h} {v}");
     }
 
@@ -232,45 +192,6 @@ mod tests {
                 filter.transmission(from - 1e-6) < 1e-29 && filter.transmission(to + 1e-6) < 1e-29
             );
         }
-    }
-
-    #[test]
-    fn equivalent_widths_are_the_areas() {
-        for shape in FilterShape::ALL {
-            let filter = Filter::new(0.0, 2.0, shape);
-            let sum: f64 = (-1_000_000..1_000_000)
-                .map(|k| filter.transmission((f64::from(k) + 0.5) * 1e-3) * 1e-3)
-                .sum();
-            // The Lorentzian has 2 nm²/x beyond x = 1000 nm, both sides together.
-            let beyond = if shape == FilterShape::Lorentz {
-                2e-3
-            } else {
-                0.0
-            };
-            assert!(
-                (sum + beyond - filter.equivalent_width_nm()).abs() < 1e-5,
-                "{shape:?}: {sum}"
-            );
-        }
-    }
-
-    #[test]
-    fn a_vcsel_wanders_over_30_nm_in_a_car() {
-        let (low, high) = LaserDrift::vcsel(940.0).span_nm(-40.0, 105.0);
-        assert!(
-            (high - low - (145.0 * 0.08 + 20.0)).abs() < 1e-9,
-            "{low} {high}"
-        );
-        assert!(high - low > 30.0);
-    }
-
-    #[test]
-    fn filters_go_red_with_heat_and_blue_with_tilt() {
-        let filter = Filter::new(940.0, 10.0, FilterShape::TopHat);
-        assert!((filter.warmed(50.0, 0.03).centre_nm - 941.5).abs() < 1e-12);
-        let tilted = filter.tilted(0.2, 2.0).centre_nm;
-        assert!((tilted / 940.0 - (1.0 - (0.2f64.sin() / 2.0).powi(2)).sqrt()).abs() < 1e-15);
-        assert_eq!(filter.tilted(0.0, 2.0), filter);
     }
 
     #[test]

@@ -70,11 +70,6 @@ impl SpadGrid {
         (self.row_bits + self.col_bits) as u32
     }
 
-    /// A bit for every SPAD.
-    pub const fn all(self) -> u64 {
-        u64::MAX >> (MOST_SPADS - self.spads())
-    }
-
     /// The neighbour of a SPAD to the left (0), right (1), top (2) or bottom (3), if there is one.
     pub(crate) fn neighbour(self, spad: u8, direction: u32) -> Option<u8> {
         let (rows, cols) = (self.rows() as u8, self.cols() as u8);
@@ -104,7 +99,6 @@ mod tests {
             for cols in SIDES {
                 let grid = SpadGrid::new(rows, cols);
                 assert_eq!(grid.spads(), rows * cols);
-                assert_eq!(grid.all().count_ones() as usize, rows * cols);
                 let mut found = 0;
                 for spad in 0..grid.spads() as u8 {
                     for direction in 0..4 {

@@ -89,7 +89,8 @@ impl Scene {
     ///
     /// Light goes there and back the same way, so what is left of it is a share of a share: a plane mirror shows what stands before
     /// it as far behind it. A pane's thickness, and light that goes one way over a mirror and the other past it, are left out.
-    pub fn returns(&self, ray: &Ray) -> Returns {
+    #[cfg(test)]
+    pub(crate) fn returns(&self, ray: &Ray) -> Returns {
         let stage = Stage::of(self);
         stage.followed(ray, stage.first_meeting(ray, stage.all()), None)
     }

@@ -8,29 +8,14 @@
 use glam::DVec3;
 
 use super::cast::Stage;
-use super::settings::Scene;
 use super::vector::Ray;
 
 /// How far above a surface the ray to the sun begins, m, so that it does not meet the surface itself.
 const ABOVE_M: f64 = 1e-4;
 
-impl Scene {
-    /// Unit vector towards the sun; `None` where light comes from everywhere.
-    pub(crate) fn towards_sun(&self) -> Option<DVec3> {
-        let (sine, cosine) = self.light.sun_elevation_deg?.to_radians().sin_cos();
-        let (right, forward) = self.light.sun_azimuth_deg.to_radians().sin_cos();
-        Some(DVec3::new(right * cosine, -sine, forward * cosine))
-    }
-
-    /// Daylight on a surface at `point` that faces along `normal` (unit), as a share of the scene's illuminance, 0 to 1.
-    pub fn daylight(&self, point: DVec3, normal: DVec3) -> f64 {
-        Stage::of(self).daylight(point, normal)
-    }
-}
-
 impl Stage<'_> {
-    /// As [`Scene::daylight`].
-    pub fn daylight(&self, point: DVec3, normal: DVec3) -> f64 {
+    /// Daylight on a surface at `point` that faces along `normal` (unit), as a share of the scene's illuminance, 0 to 1.
+    pub(crate) fn daylight(&self, point: DVec3, normal: DVec3) -> f64 {
         let (Some(sun), light) = (self.sun(), &self.scene().light) else {
             return 1.0;
         };
@@ -52,7 +37,7 @@ impl Stage<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Object, Shape};
+    use crate::scene::{Object, Scene, Shape};
 
     /// A pole on the ground, and the sun behind the lidar on the right at 45 degrees.
     fn scene() -> Scene {
@@ -81,16 +66,16 @@ mod tests {
         assert!((sun - DVec3::new(0.5f64.sqrt(), -(0.5f64.sqrt()), 0.0)).length() < 1e-12);
         let far = DVec3::new(50.0, 0.0, 10.0);
         let ground = 0.8 * 0.5f64.sqrt() + 0.2;
-        assert!((scene.daylight(far, DVec3::NEG_Y) - ground).abs() < 1e-12);
-        assert!((scene.daylight(far, DVec3::NEG_X) - 0.1).abs() < 1e-12);
+        assert!((Stage::of(&scene).daylight(far, DVec3::NEG_Y) - ground).abs() < 1e-12);
+        assert!((Stage::of(&scene).daylight(far, DVec3::NEG_X) - 0.1).abs() < 1e-12);
         let facing = 0.8 + 0.2 * (1.0 + 0.5f64.sqrt()) / 2.0;
-        assert!((scene.daylight(far, sun) - facing).abs() < 1e-12);
+        assert!((Stage::of(&scene).daylight(far, sun) - facing).abs() < 1e-12);
     }
 
     #[test]
     fn a_pole_throws_its_shadow_away_from_the_sun() {
         let scene = scene();
-        let on_ground = |x: f64| scene.daylight(DVec3::new(x, 2.0, 10.0), DVec3::NEG_Y);
+        let on_ground = |x: f64| Stage::of(&scene).daylight(DVec3::new(x, 2.0, 10.0), DVec3::NEG_Y);
         assert!((on_ground(-1.0) - 0.2).abs() < 1e-12);
         assert!(on_ground(1.0) > 0.7 && on_ground(-2.5) > 0.7);
     }
@@ -99,6 +84,9 @@ mod tests {
     fn without_a_place_for_the_sun_all_surfaces_are_alike() {
         let mut scene = scene();
         scene.light.sun_elevation_deg = None;
-        assert_eq!(scene.daylight(DVec3::new(-1.0, 2.0, 10.0), DVec3::X), 1.0);
+        assert_eq!(
+            Stage::of(&scene).daylight(DVec3::new(-1.0, 2.0, 10.0), DVec3::X),
+            1.0
+        );
     }
 }

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::motion::Waypoint;
 use super::object::Object;
 use super::ranges::{LENGTH, PLACES, POSITION, SHARE, SPEED};
+use super::rig::Waypoint;
 use super::shape::{DepthMap, MapFiles, Mesh, Shape};
 use super::texture::{Pattern, Picture, Texture};
 use crate::files::placed;
@@ -335,6 +335,13 @@ impl ObjectEntry {
             turn_deg: self.texture_turn_deg.unwrap_or(0.0),
             ..Texture::new(pattern, size_m, second_reflectivity)
         }))
+    }
+}
+
+/// An object is written as its file has it.
+impl serde::Serialize for Object {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        ObjectEntry::from(self.clone()).serialize(serializer)
     }
 }
 

@@ -8,8 +8,7 @@ use rayon::prelude::*;
 use super::fog::Fog;
 use super::optics::OffAxis;
 use super::settings::Scene;
-use super::truth::GroundTruth;
-use super::unmoved::Before;
+use super::truth::{Before, GroundTruth};
 use super::view::{Glimpse, View};
 use crate::photon::{CROSSTALK_DELAY, Glint, PhotonBudget, PixelLight, SpadModel, merged};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -17,11 +16,6 @@ use crate::units::TimeOfFlight;
 
 #[cfg(test)]
 mod tests;
-
-/// The sky has no reflectivity, but it is not dark: it counts as a surface of this reflectivity
-/// in sunlight that returns no echo. A tenth of a white wall is of the order of a clear sky in
-/// the near infrared; haze is brighter.
-pub const SKY_REFLECTIVITY: f64 = 0.1;
 
 /// Most signal photons per cycle that are modelled. Sixteen SPADs saturate long before, and a
 /// surface right before the lens would ask for 10¹⁰.

@@ -2,7 +2,7 @@
 
 use super::entry::ObjectEntry;
 use super::medium::Medium;
-use super::motion::Rig;
+use super::rig::Rig;
 use super::settings::{Lidar, Light, Scene, Stereo};
 use crate::settings::{Section, Settings};
 

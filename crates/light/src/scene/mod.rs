@@ -22,6 +22,7 @@ mod motion;
 mod object;
 mod optics;
 mod ranges;
+mod rig;
 mod rules;
 mod settings;
 mod shape;
@@ -31,24 +32,23 @@ mod truth;
 mod unmoved;
 mod vector;
 mod view;
+mod words;
 
 pub(crate) use bounds::Bounds;
 pub use camera::PinholeCamera;
 pub use cast::Stage;
 pub use cast::{End, Hit, Return, Returns};
 pub use curve::{Curve, CurveError, Measured};
-pub use illumination::SKY_REFLECTIVITY;
 pub use medium::{DROPLET_LIDAR_RATIO_SR, Medium};
-pub use motion::{Rig, RigWaypoint, Waypoint};
 pub use object::Object;
-pub use optics::{BeamWord, FilterWord, PdeWord, PulseWord, VignettingWord};
-pub use settings::{Lidar, Light, Scene, Stereo};
+pub use rig::{Rig, RigWaypoint, Waypoint};
+pub use settings::{Lidar, Light, SKY_REFLECTIVITY, Scene, Stereo};
 pub use shape::{DepthMap, MapFiles, Mesh, Shape};
 pub use texture::{Pattern, Picture, Texture};
-pub use truth::GroundTruth;
-pub use unmoved::Before;
+pub use truth::{Before, GroundTruth};
 pub use vector::{Ray, turned};
 pub use view::Surface;
+pub use words::{BeamWord, FilterWord, PdeWord, PulseWord, VignettingWord};
 
 /// A point or direction, m (or without unit): x right, y down, z forward.
 pub use glam::DVec3;

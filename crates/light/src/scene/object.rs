@@ -2,15 +2,14 @@
 
 use glam::DVec3;
 
-use super::motion::Waypoint;
+use super::rig::Waypoint;
 use super::shape::{Placed, Shape};
 use super::texture::Texture;
 
 /// A thing that reflects light, evenly and diffusely.
 ///
 /// Make one with [`Object::new`], then change what is to differ.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-#[serde(into = "super::entry::ObjectEntry")]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Object {
     /// Name for reports and complaints.
     pub name: String,

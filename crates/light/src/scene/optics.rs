@@ -18,88 +18,15 @@ use std::f64::consts::PI;
 use super::camera::PinholeCamera;
 use super::curve::{Curve, Measured};
 use super::settings::{Lidar, Scene};
+use super::words::{BeamWord, PdeWord, VignettingWord};
 use crate::numerics::integrate;
 use crate::photon::solar::{spectral_irradiance, spectrum};
-use crate::photon::{Filter, FilterShape, PulseShape, StreamConfig};
-use crate::settings::{Fault, words};
+use crate::photon::{Atmosphere, Filter, FilterShape, PhotonBudget, PulseShape, StreamConfig};
+use crate::settings::Fault;
 use crate::units::Time;
 
 /// Samples of a measured pulse whose own are not equally far apart.
 const PULSE_SAMPLES: usize = 4096;
-
-words! {
-    /// Laser pulses without a measurement.
-    #[derive(Default)]
-    pub enum PulseWord {
-        /// A Gaussian of `pulse_fwhm_ns`.
-        #[default]
-        Gaussian = "gaussian",
-    }
-}
-
-words! {
-    /// Lenses without a measurement.
-    #[derive(Default)]
-    pub enum VignettingWord {
-        /// None, as in the thesis.
-        #[default]
-        None = "none",
-        /// That of a plain lens.
-        Cos4 = "cos4",
-    }
-}
-
-words! {
-    /// Laser beams without a measurement.
-    #[derive(Default)]
-    pub enum BeamWord {
-        /// The same energy for every macropixel (Eq. 7 and 8, [`Spot`](crate::photon::Spot)).
-        #[default]
-        Uniform = "uniform",
-        /// A Gaussian of `beam_fwhm_deg`.
-        Gaussian = "gaussian",
-    }
-}
-
-words! {
-    /// Filters without a measurement.
-    #[derive(Default)]
-    pub enum FilterWord {
-        /// Any that lets `solar_irradiance_w_m2` through.
-        #[default]
-        Irradiance = "irradiance",
-        /// A top hat.
-        TopHat = "top_hat",
-        /// A Gaussian.
-        Gaussian = "gaussian",
-        /// One period of a raised cosine.
-        Cosine = "cosine",
-        /// One resonance of a Fabry-Pérot cavity.
-        Lorentz = "lorentz",
-    }
-}
-
-impl FilterWord {
-    fn shape(self) -> Option<FilterShape> {
-        match self {
-            FilterWord::Irradiance => None,
-            FilterWord::TopHat => Some(FilterShape::TopHat),
-            FilterWord::Gaussian => Some(FilterShape::Gaussian),
-            FilterWord::Cosine => Some(FilterShape::Cosine),
-            FilterWord::Lorentz => Some(FilterShape::Lorentz),
-        }
-    }
-}
-
-words! {
-    /// Detection efficiencies without a measurement.
-    #[derive(Default)]
-    pub enum PdeWord {
-        /// The same at all wavelengths.
-        #[default]
-        Flat = "flat",
-    }
-}
 
 /// How the light of a macropixel differs from that of one on the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -279,6 +206,32 @@ impl Lidar {
 }
 
 impl Scene {
+    /// The photon budget of one macropixel of a `rows` × `cols` array behind this lens.
+    ///
+    /// The pitch is the one that fits the array into the field of view.
+    pub fn photon_budget(&self, rows: u32, cols: u32) -> PhotonBudget {
+        let lidar = &self.lidar;
+        let lens_diameter_m = lidar.lens_diameter_mm * 1e-3;
+        let lens_focal_m = lens_diameter_m * lidar.lens_f_number;
+        let camera = self.lidar_camera(rows, cols);
+        PhotonBudget {
+            pde: lidar.pde,
+            wavelength_nm: lidar.wavelength_nm,
+            transmittance: lidar.transmittance * lidar.laser_transmission(),
+            pulse_energy_j: lidar.pulse_energy_uj * 1e-6,
+            lens_diameter_m,
+            lens_focal_m,
+            pixel_pitch_m: [camera.focal_px, camera.focal_v_px].map(|px| lens_focal_m / px),
+            rows,
+            cols,
+            // The transmittance above is for signal and background alike.
+            solar_irradiance_w_m2: lidar.effective_irradiance_w_m2() / lidar.laser_transmission(),
+            spot: lidar.spot,
+            atmosphere: Atmosphere::CLEAR,
+            convention: lidar.convention,
+        }
+    }
+
     /// The light of every macropixel of `camera` relative to one on the axis of a uniform beam, row by row.
     pub(super) fn off_axis(&self, camera: &PinholeCamera) -> Vec<OffAxis> {
         let lidar = &self.lidar;
@@ -373,6 +326,30 @@ mod tests {
 
     fn curve(points: &[[f64; 2]]) -> Curve {
         Curve::new(points).unwrap()
+    }
+
+    #[test]
+    fn the_array_fills_the_field_of_view() {
+        let scene = Scene::outdoor();
+        let budget = scene.photon_budget(64, 64);
+        let half_width_m = 32.0 * budget.pixel_pitch_m[0];
+        let fov_deg = 2.0 * (half_width_m / budget.lens_focal_m).atan().to_degrees();
+        assert!((fov_deg - scene.lidar.fov_deg).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_demonstrator_has_the_published_pitch_and_light() {
+        let mut scene = Scene::outdoor();
+        scene.lidar = Lidar::demonstrator();
+        let budget = scene.photon_budget(32, 64);
+        let [x_m, y_m] = budget.pixel_pitch_m;
+        assert!((x_m - 114e-6).abs() < 1e-8 && (y_m - 54e-6).abs() < 1e-8);
+        assert!((budget.lens_focal_m - 25e-3).abs() < 1e-12);
+        // Fig. 94: its digits are good to half of the last one.
+        let signal = budget.signal_per_pulse_far_field(30.0, 0.1) * 900.0;
+        let background_hz = budget.background_hz(0.1, 60.0);
+        assert!((signal - 89.0).abs() < 0.1, "{signal}");
+        assert!((background_hz - 4.8e6).abs() < 0.01e6, "{background_hz}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What makes a scene possible, beyond the range of each key; the same rules for files and for scenes built in code.
 
-use super::motion::Rig;
 use super::object::Object;
+use super::rig::Rig;
 use super::settings::{Scene, Stereo};
 use super::shape::Shape;
 use crate::files::InputError;

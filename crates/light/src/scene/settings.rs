@@ -6,16 +6,20 @@ use glam::DVec3;
 
 use super::camera::PinholeCamera;
 use super::curve::Measured;
-use super::illumination::SKY_REFLECTIVITY;
 use super::medium::Medium;
-use super::motion::Rig;
 use super::object::Object;
-use super::optics::{BeamWord, FilterWord, PdeWord, PulseWord, VignettingWord};
 use super::ranges::{CHOSEN, LENGTH, POSITION, SHARE, TABLE_12};
-use crate::photon::{Atmosphere, Convention, PhotonBudget, Spot};
+use super::rig::Rig;
+use super::words::{BeamWord, FilterWord, PdeWord, PulseWord, VignettingWord};
+use crate::photon::{Convention, Spot};
 use crate::settings::Range::{Above, Limited, Within, WordOrCurve};
 use crate::settings::keys;
 use crate::units::Time;
+
+/// The sky has no reflectivity, but it is not dark: it counts as a surface of this reflectivity
+/// in sunlight that returns no echo. A tenth of a white wall is of the order of a clear sky in
+/// the near infrared; haze is brighter.
+pub const SKY_REFLECTIVITY: f64 = 0.1;
 
 /// A world and the optics through which it is seen. By default there is nothing in it.
 ///
@@ -244,30 +248,11 @@ impl Scene {
             .with_pixel_aspect(self.lidar.macropixel_aspect)
     }
 
-    /// The photon budget of one macropixel of a `rows` × `cols` array behind this lens.
-    ///
-    /// The pitch is the one that fits the array into the field of view.
-    pub fn photon_budget(&self, rows: u32, cols: u32) -> PhotonBudget {
-        let lidar = &self.lidar;
-        let lens_diameter_m = lidar.lens_diameter_mm * 1e-3;
-        let lens_focal_m = lens_diameter_m * lidar.lens_f_number;
-        let camera = self.lidar_camera(rows, cols);
-        PhotonBudget {
-            pde: lidar.pde,
-            wavelength_nm: lidar.wavelength_nm,
-            transmittance: lidar.transmittance * lidar.laser_transmission(),
-            pulse_energy_j: lidar.pulse_energy_uj * 1e-6,
-            lens_diameter_m,
-            lens_focal_m,
-            pixel_pitch_m: [camera.focal_px, camera.focal_v_px].map(|px| lens_focal_m / px),
-            rows,
-            cols,
-            // The transmittance above is for signal and background alike.
-            solar_irradiance_w_m2: lidar.effective_irradiance_w_m2() / lidar.laser_transmission(),
-            spot: lidar.spot,
-            atmosphere: Atmosphere::CLEAR,
-            convention: lidar.convention,
-        }
+    /// Unit vector towards the sun; `None` where light comes from everywhere.
+    pub(crate) fn towards_sun(&self) -> Option<DVec3> {
+        let (sine, cosine) = self.light.sun_elevation_deg?.to_radians().sin_cos();
+        let (right, forward) = self.light.sun_azimuth_deg.to_radians().sin_cos();
+        Some(DVec3::new(right * cosine, -sine, forward * cosine))
     }
 
     /// Standard deviation of the laser pulse: its width at half maximum over 2·√(2·ln 2).
@@ -286,30 +271,6 @@ mod tests {
         let focal_times_baseline = stereo.camera().focal_px * stereo.baseline_m;
         assert!((focal_times_baseline / stereo.max_disparity_px - 15.0).abs() < 0.01);
         assert!(focal_times_baseline / stereo.min_disparity_px > 200.0);
-    }
-
-    #[test]
-    fn the_array_fills_the_field_of_view() {
-        let scene = Scene::outdoor();
-        let budget = scene.photon_budget(64, 64);
-        let half_width_m = 32.0 * budget.pixel_pitch_m[0];
-        let fov_deg = 2.0 * (half_width_m / budget.lens_focal_m).atan().to_degrees();
-        assert!((fov_deg - scene.lidar.fov_deg).abs() < 1e-9);
-    }
-
-    #[test]
-    fn the_demonstrator_has_the_published_pitch_and_light() {
-        let mut scene = Scene::outdoor();
-        scene.lidar = Lidar::demonstrator();
-        let budget = scene.photon_budget(32, 64);
-        let [x_m, y_m] = budget.pixel_pitch_m;
-        assert!((x_m - 114e-6).abs() < 1e-8 && (y_m - 54e-6).abs() < 1e-8);
-        assert!((budget.lens_focal_m - 25e-3).abs() < 1e-12);
-        // Fig. 94: its digits are good to half of the last one.
-        let signal = budget.signal_per_pulse_far_field(30.0, 0.1) * 900.0;
-        let background_hz = budget.background_hz(0.1, 60.0);
-        assert!((signal - 89.0).abs() < 0.1, "{signal}");
-        assert!((background_hz - 4.8e6).abs() < 0.01e6, "{background_hz}");
     }
 
     #[test]

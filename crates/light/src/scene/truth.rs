@@ -12,7 +12,7 @@ use smallvec::SmallVec;
 use super::bounds::Bounds;
 use super::cast::Stage;
 use super::settings::Scene;
-use super::unmoved::{Before, Moved};
+use super::unmoved::Moved;
 use super::view::{Surface, View, cone};
 use crate::photon::DEEP;
 use crate::units::TimeOfFlight;
@@ -35,6 +35,15 @@ pub struct GroundTruth {
     pub surfaces: Vec<SmallVec<[Surface; 1]>>,
     /// Shared with other worlds that look the same.
     pub(super) views: Vec<Arc<View>>,
+}
+
+/// A world that stands still, and what was seen of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Before<'a> {
+    /// The world.
+    pub world: &'a Scene,
+    /// What was seen of it.
+    pub truth: &'a GroundTruth,
 }
 
 impl GroundTruth {

@@ -13,14 +13,6 @@ use glam::DVec3;
 
 use super::bounds::{Bounds, Cone};
 use super::settings::Scene;
-use super::truth::GroundTruth;
-
-/// A world that stands still, and what was seen of it.
-#[derive(Debug, Clone, Copy)]
-pub struct Before<'a> {
-    pub world: &'a Scene,
-    pub truth: &'a GroundTruth,
-}
 
 /// Objects that are not the same in two worlds.
 #[derive(Debug)]
@@ -66,7 +58,7 @@ impl Moved {
 mod tests {
     use super::*;
     use crate::photon::SpadModel;
-    use crate::scene::{Object, Shape};
+    use crate::scene::{Before, GroundTruth, Object, Shape};
     use crate::units::Time;
     use proptest::prelude::*;
 

@@ -92,7 +92,7 @@ impl Document {
     }
 
     /// The folder that files named in it are relative to: the file's own, or else the current one.
-    pub fn folder(&self) -> &Path {
+    pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
 
@@ -112,7 +112,7 @@ impl Document {
     }
 
     /// Whether there is no value at all.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.table.is_empty()
     }
 

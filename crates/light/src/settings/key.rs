@@ -80,7 +80,7 @@ impl std::fmt::Display for Range {
 
 impl Key {
     /// A key; see its fields.
-    pub const fn new(
+    pub(crate) const fn new(
         name: &'static str,
         unit: &'static str,
         range: Range,

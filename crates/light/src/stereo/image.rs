@@ -81,11 +81,6 @@ impl GreyImage {
         self.height
     }
 
-    /// Bits a pixel, 8 to 16.
-    pub fn bits(&self) -> u32 {
-        self.bits
-    }
-
     /// All pixels, row by row.
     pub(crate) fn pixels(&self) -> &[u16] {
         &self.pixels
@@ -100,41 +95,6 @@ impl GreyImage {
     pub(crate) fn as_8_bit(&self) -> Vec<u8> {
         let shift = self.bits - 8;
         self.pixels.iter().map(|v| (v >> shift) as u8).collect()
-    }
-
-    /// The mean of every `factor` × `factor` pixels, as on-chip binning gives it; columns and rows that are left over are dropped.
-    /// Fractions are kept as further bits as far as 16 bits reach. `None` if nothing is left.
-    pub fn binned(&self, factor: usize) -> Option<GreyImage> {
-        let (width, height) = (
-            self.width.checked_div(factor)?,
-            self.height.checked_div(factor)?,
-        );
-        if width == 0 || height == 0 {
-            return None;
-        }
-        let bits = (self.bits + 2 * factor.ilog2()).min(16);
-        let scale = f64::from(1u32 << (bits - self.bits)) / (factor * factor) as f64;
-        let most = ((1u32 << bits) - 1) as f64;
-        let mut pixels = Vec::with_capacity(width * height);
-        let mut sums = vec![0u32; width];
-        for y in 0..height {
-            sums.fill(0);
-            for row in y * factor..(y + 1) * factor {
-                for (sum, block) in sums.iter_mut().zip(self.row(row).chunks_exact(factor)) {
-                    *sum += block.iter().map(|&v| u32::from(v)).sum::<u32>();
-                }
-            }
-            pixels.extend(
-                sums.iter()
-                    .map(|&s| (f64::from(s) * scale).round().min(most) as u16),
-            );
-        }
-        Some(GreyImage {
-            width,
-            height,
-            bits,
-            pixels,
-        })
     }
 }
 
@@ -162,16 +122,8 @@ mod tests {
     }
 
     #[test]
-    fn binning_keeps_the_mean_and_its_fraction() {
-        let image = GreyImage::new(5, 2, 8, vec![1, 2, 9, 9, 7, 3, 4, 9, 8, 7]).unwrap();
-        let binned = image.binned(2).unwrap();
-        assert_eq!((binned.width(), binned.height(), binned.bits()), (2, 1, 10));
-        // 10/4 and 35/4 in quarters.
-        assert_eq!(binned.pixels(), [10, 35]);
-        assert_eq!(image.binned(3), None);
-        assert_eq!(image.binned(0), None);
+    fn the_highest_bits_are_kept() {
         let white = GreyImage::new(2, 2, 16, vec![u16::MAX; 4]).unwrap();
-        assert_eq!(white.binned(2).unwrap().pixels(), [u16::MAX]);
         assert_eq!(white.as_8_bit(), [255; 4]);
     }
 }

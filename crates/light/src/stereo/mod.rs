@@ -10,7 +10,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `image.rs` | grey images of 8 to 16 bits, binning |
+//! | `image.rs` | grey images of 8 to 16 bits |
 //! | `settings.rs` | what a matcher can be told |
 //! | `census.rs` | a pixel's neighbourhood as bits |
 //! | `cost.rs` | how unlike two pixels are, for all disparities of a row |
@@ -19,6 +19,7 @@
 //! | `winner.rs` | the best disparity of a pixel, and whether to believe it |
 //! | `filter.rs` | median and speckle filter |
 //! | `disparity.rs` | the result |
+//! | `matching.rs` | all of it together |
 //!
 //! H. Hirschmüller, "Stereo Processing by Semiglobal Matching and Mutual Information", IEEE TPAMI 30(2), 2008, gives the paths'
 //! recursion (Eq. 13); R. Zabih and J. Woodfill, "Non-parametric Local Transforms for Computing Visual Correspondence", ECCV 1994, the census.
@@ -28,6 +29,7 @@ mod cost;
 mod disparity;
 mod filter;
 mod image;
+mod matching;
 mod path;
 #[cfg(test)]
 mod reference;

@@ -1,11 +1,14 @@
 //! The settings of a matcher, and which of them are impossible.
 
-use super::disparity::DisparityMap;
 use super::image::GreyImage;
-use super::sweep;
 
 /// Most disparities that are searched: a lane's number is a byte.
 pub(super) const MOST_DISPARITIES: usize = 256;
+
+/// Lanes for `disparities` disparities, rounded up to whole vectors.
+pub(super) fn lanes(disparities: usize) -> usize {
+    disparities.next_power_of_two().max(32)
+}
 
 /// Cost of a pixel without partner, and the most that a path can say.
 pub(super) const NO_PARTNER: u8 = u8::MAX;
@@ -184,34 +187,11 @@ pub enum MatchError {
 }
 
 impl Matcher {
-    /// The disparity of every pixel of `left`, at column x, whose partner in `right` is at column x minus the disparity in the same row.
-    /// Runs on rayon's threads; their number changes nothing in the result.
+    /// Refuses images and settings that cannot be matched.
     ///
     /// # Errors
     /// Images of different size, or impossible settings.
-    pub fn match_pair(
-        &self,
-        left: &GreyImage,
-        right: &GreyImage,
-    ) -> Result<DisparityMap, MatchError> {
-        self.match_pair_in(&mut Workspace::default(), left, right)
-    }
-
-    /// As [`Matcher::match_pair`], with memory that is kept for the next pair.
-    ///
-    /// # Errors
-    /// As [`Matcher::match_pair`].
-    pub fn match_pair_in(
-        &self,
-        workspace: &mut Workspace,
-        left: &GreyImage,
-        right: &GreyImage,
-    ) -> Result<DisparityMap, MatchError> {
-        self.check(left, right)?;
-        Ok(sweep::run(self, workspace, left, right))
-    }
-
-    fn check(&self, left: &GreyImage, right: &GreyImage) -> Result<(), MatchError> {
+    pub(super) fn check(&self, left: &GreyImage, right: &GreyImage) -> Result<(), MatchError> {
         let size = |image: &GreyImage| (image.width(), image.height());
         let &Matcher {
             disparities,
@@ -254,7 +234,7 @@ impl Matcher {
             return Err(MatchError::SpeckleStep(self.speckle_step_px));
         }
         let sums = (left.pixels().len())
-            .saturating_mul(sweep::lanes(disparities))
+            .saturating_mul(lanes(disparities))
             .saturating_mul(size_of::<u16>());
         if self.paths.upward() && sums > MOST_SUMS_BYTES {
             return Err(MatchError::Memory {

@@ -23,17 +23,12 @@ use super::disparity::DisparityMap;
 use super::filter;
 use super::image::GreyImage;
 use super::path::{add, slot, step};
-use super::settings::{Matcher, NO_PARTNER, Workspace};
+use super::settings::{Matcher, NO_PARTNER, Workspace, lanes};
 use super::winner::Winners;
 
 /// Rows at once: costs and sums of four rows of 741 pixels and 64 disparities take 0.6 MB of a second-level cache of 1 MB
 /// (chosen by that).
 const ROWS_AT_ONCE: usize = 4;
-
-/// Lanes for `disparities` disparities, rounded up to whole vectors.
-pub(super) fn lanes(disparities: usize) -> usize {
-    disparities.next_power_of_two().max(32)
-}
 
 /// What does not change during a run.
 struct Job<'a> {

@@ -1,8 +1,6 @@
-//! Estimators of the pulse's position in a histogram, whose spread the bounds of [`super::precision`] foretell.
+//! Estimates of the pulse's position in a histogram, whose spread the bounds of [`super::precision`] foretell.
 //!
-//! Maximum likelihood knows shape, signal and background and reaches the Cramér-Rao bound when the signal is
-//! strong. The centroid knows the background only; it is what small hardware does, pays for every
-//! background count in its window, and is what Thompson's formula is about.
+//! Maximum likelihood knows shape, signal and background and reaches the Cramér-Rao bound when the signal is strong.
 
 use super::pulse::Pulse;
 
@@ -24,7 +22,8 @@ pub struct Expected {
 
 impl Expected {
     /// Mean counts of each of `bins` bins when the pulse lies `position_ns` after the first bin's beginning.
-    pub fn counts(&self, bins: usize, position_ns: f64) -> Vec<f64> {
+    #[cfg(test)]
+    pub(crate) fn counts(&self, bins: usize, position_ns: f64) -> Vec<f64> {
         (0..bins)
             .map(|i| self.background + self.echo(i, position_ns))
             .collect()
@@ -64,28 +63,6 @@ impl Expected {
         let step = 0.5 * self.bin_ns.min(self.pulse.sigma_ns());
         let end = counts.len() as f64 * self.bin_ns;
         greatest(|t| self.ln_likelihood(counts, t), 0.0..end, step)
-    }
-
-    /// The centre of gravity of `counts` less the background, within `half_window_ns` of the fullest bin's middle; ns after
-    /// the beginning of the first bin. The fullest bin's middle when nothing is left.
-    pub fn centroid(&self, counts: &[u32], half_window_ns: f64) -> f64 {
-        let middle = |i: usize| (i as f64 + 0.5) * self.bin_ns;
-        let Some(peak) = (0..counts.len()).rev().max_by_key(|&i| counts[i]) else {
-            return 0.0;
-        };
-        let reach = (half_window_ns / self.bin_ns) as usize;
-        let window = peak.saturating_sub(reach)..(peak + reach + 1).min(counts.len());
-        let (mut weight, mut moment) = (0.0, 0.0);
-        for i in window {
-            let signal = f64::from(counts[i]) - self.background;
-            weight += signal;
-            moment += signal * (middle(i) - middle(peak));
-        }
-        if weight > 0.0 {
-            middle(peak) + moment / weight
-        } else {
-            middle(peak)
-        }
     }
 }
 
@@ -160,13 +137,13 @@ fn maximum_within(f: impl Fn(f64) -> f64, mut from: f64, mut to: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::photon::{Poisson, Purpose, random_stream};
-    use crate::theory::precision::{cramer_rao, thompson};
+    use crate::theory::precision::cramer_rao;
 
     const BINS: usize = 24;
 
-    /// RMS errors of (maximum likelihood, centroid) over random positions in mid-histogram.
-    fn spread(expected: &Expected, runs: u32, half_window_ns: f64) -> (f64, f64) {
-        let (mut likelihood, mut centroid) = (0.0, 0.0);
+    /// RMS error of the maximum likelihood over random positions in mid-histogram.
+    fn spread(expected: &Expected, runs: u32) -> f64 {
+        let mut squares = 0.0;
         for run in 0..runs {
             let mut random = random_stream(21, Purpose::Photons, run, 0);
             let phase = f64::from(run) / f64::from(runs);
@@ -174,11 +151,9 @@ mod tests {
             let counts: Vec<u32> = (expected.counts(BINS, position).iter())
                 .map(|&mean| Poisson::new(mean).draw(&mut random))
                 .collect();
-            likelihood += (expected.maximum_likelihood(&counts) - position).powi(2);
-            centroid += (expected.centroid(&counts, half_window_ns) - position).powi(2);
+            squares += (expected.maximum_likelihood(&counts) - position).powi(2);
         }
-        let rms = |sum: f64| (sum / f64::from(runs)).sqrt();
-        (rms(likelihood), rms(centroid))
+        (squares / f64::from(runs)).sqrt()
     }
 
     fn expected(sigma_ns: f64, background: f64, signal: f64) -> Expected {
@@ -197,29 +172,13 @@ mod tests {
         let error = 4.0 / (2.0 * f64::from(runs)).sqrt();
         for (sigma, background, signal) in [(1.5, 100.0, 3e3), (1.5, 0.5, 300.0), (0.7, 10.0, 2e3)]
         {
-            let (rms, _) = spread(&expected(sigma, background, signal), runs, 4.0);
+            let rms = spread(&expected(sigma, background, signal), runs);
             let ratio = rms / cramer_rao(1.0, sigma, background, signal);
             assert!(
                 (ratio - 1.0).abs() < error,
                 "{sigma} {background} {signal}: {ratio}"
             );
         }
-    }
-
-    #[test]
-    fn the_centroid_pays_for_its_window_and_never_beats_the_bound() {
-        let (runs, sigma, signal) = (1_000, 1.5, 2e3);
-        let error = 4.0 / (2.0 * f64::from(runs)).sqrt();
-        // Without background a wide window is Thompson's first term.
-        let (_, clean) = spread(&expected(sigma, 0.0, signal), runs, 9.0);
-        let ratio = clean / thompson(1.0, sigma, 0.0, signal);
-        assert!((ratio - 1.0).abs() < error, "{ratio}");
-        let (likelihood, noisy) = spread(&expected(sigma, 50.0, signal), runs, 6.0);
-        let bound = cramer_rao(1.0, sigma, 50.0, signal);
-        assert!(
-            noisy > 1.2 * likelihood && noisy > bound,
-            "{noisy} {likelihood} {bound}"
-        );
     }
 
     #[test]
@@ -274,12 +233,10 @@ mod tests {
     }
 
     #[test]
-    fn a_lone_count_is_where_the_estimators_put_the_pulse() {
+    fn a_lone_count_is_where_the_estimator_puts_the_pulse() {
         let e = expected(1.0, 0.0, 1.0);
         let mut counts = [0; BINS];
         counts[7] = 1;
         assert!((e.maximum_likelihood(&counts) - 7.5).abs() < 1e-6);
-        assert_eq!(e.centroid(&counts, 3.0), 7.5);
-        assert_eq!(e.centroid(&[], 3.0), 0.0);
     }
 }

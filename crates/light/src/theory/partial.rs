@@ -123,11 +123,6 @@ impl Cost {
         let of_step = |step: &Step| (step.laser_cycles * step.fullest / most).ceil().max(1.0);
         self.steps.iter().map(of_step).sum()
     }
-
-    /// Whether no step overflows bins of `bin_bits`.
-    pub fn fits(&self, bin_bits: u32) -> bool {
-        self.exposures(bin_bits) <= self.steps.len() as f64
-    }
 }
 
 /// The greatest mean of a Poisson count that exceeds a counter of `bin_bits` with no more than `chance`.
@@ -376,7 +371,6 @@ mod tests {
             overflow_chance: 0.003,
         };
         assert_eq!(cost.exposures(8), 4.0);
-        assert!(!cost.fits(8) && cost.fits(16));
     }
 
     proptest! {

@@ -246,7 +246,8 @@ impl Chip<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reproduce::{delay_line, penalty};
+    use crate::reproduce::delay_line;
+    use crate::reproduce::parameters::demonstrator;
 
     fn chip<'a>(system: &'a System, calibration: &'a BinProfile) -> Chip<'a> {
         Chip {
@@ -259,7 +260,7 @@ mod tests {
     /// Steps of 12.5 ns are 1.874 m, windows of 20.8 ns 3.118 m.
     #[test]
     fn windows_lead_to_the_range_without_a_gap() {
-        let system = penalty::demonstrator();
+        let system = demonstrator();
         let windows = chip(&system, delay_line::calibrated()).windows_to(75.0);
         assert!(windows[0].1 <= 3.118 + 1.874, "{:?}", windows[0]);
         for pair in windows.windows(2) {
@@ -275,7 +276,7 @@ mod tests {
     /// The same frames with edges that are all alike: elements of 0.4 ns σ and skew are errors then.
     #[test]
     fn calibrated_edges_take_fewer_laser_cycles_than_assumed_ones() {
-        let system = penalty::demonstrator();
+        let system = demonstrator();
         let calibrated = delay_line::calibrated();
         let sensor = Sensor::from(&calibrated.sensor);
         let ideal = BinProfile::ideal(&sensor, &Exposure::new(&sensor, STOP_PERIODS, 1));

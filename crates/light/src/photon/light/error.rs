@@ -1,5 +1,10 @@
 //! What makes light impossible.
 
+/// Whether this may be a mean number or a rate.
+pub(super) const fn is_amount(number: f64) -> bool {
+    number.is_finite() && number >= 0.0
+}
+
 /// Why light cannot be as described.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LightError {

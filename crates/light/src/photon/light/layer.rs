@@ -3,7 +3,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::{Echo, Profile};
+use super::echo::Echo;
+use super::profile::Profile;
 
 /// A part of light that is drawn by itself: constant background and an echo in some laser cycles, of which only some
 /// photons are kept.

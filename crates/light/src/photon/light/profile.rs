@@ -1,6 +1,6 @@
 //! Background that depends on the time in the laser cycle, for example what fog sends back.
 
-use super::{LightError, is_amount};
+use super::error::{LightError, is_amount};
 use crate::units::Time;
 
 /// Background that changes within the laser cycle, and is the same in each.

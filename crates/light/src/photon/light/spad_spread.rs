@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use super::error::{LightError, is_amount};
 use super::layer::Layer;
-use super::{LightError, is_amount};
 
 /// How the SPADs of a macropixel differ.
 #[derive(Debug, Clone, PartialEq)]

@@ -25,9 +25,9 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::{Kind, PixelStream, StreamConfig};
+use super::kind::Kind;
+use super::part::PixelStream;
 use crate::numerics::branchless;
-use crate::photon::light::PixelLight;
 use crate::photon::philox::{LANES, blocks_from};
 use crate::photon::spad::Photon;
 use crate::units::Time;
@@ -49,27 +49,6 @@ fn chunk_word(block: u32, chunk: u32) -> u32 {
     chunk >> LOW_BITS << (LOW_BITS + BLOCK_BITS)
         | block << LOW_BITS
         | (chunk & ((1 << LOW_BITS) - 1))
-}
-
-/// Background photons of a macropixel per second from which on a light is drawn by laser cycle. Time of 4096 windows
-/// of 16 bins in 1600 laser cycles with 8 ns of dead time, by slots and groups | by laser cycle: 0.5 | 1.9 s at 80
-/// Mcounts/s, 9.3 | 3.6 s at 400, on a busy machine; between them it is a guess.
-const BRIGHT_BACKGROUND_HZ: f64 = 160e6;
-
-/// The same for signal photons a laser cycle: 1.0 | 2.0 s at 5, 52 | 3.6 s at 60.
-const BRIGHT_SIGNAL: f64 = 8.0;
-
-/// And where a SPAD is blind for more than this share of the time, so that its state before a window is often unknown: as
-/// much as by the background above.
-const BRIGHT_BLIND_SHARE: f64 = 0.08;
-
-/// Whether this light is drawn by laser cycle, all parts of it.
-pub(super) fn is_bright(light: &PixelLight, config: &StreamConfig) -> bool {
-    let background_hz = light.background_hz();
-    let blind = background_hz / config.spads.grid.spads() as f64 * config.spads.dead_time.as_s();
-    background_hz > BRIGHT_BACKGROUND_HZ
-        || light.signal_per_cycle() > BRIGHT_SIGNAL
-        || blind > BRIGHT_BLIND_SHARE
 }
 
 /// Random words of a gap: the highest 28 bits make a number strictly between 0 and 1, the lowest ones the SPAD: 4, or a few

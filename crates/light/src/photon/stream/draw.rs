@@ -2,13 +2,8 @@
 
 use std::ops::Range;
 
-use super::PixelStream;
-use super::group::{GROUP, Group};
-use crate::photon::MOST_SPADS;
+use super::group::{Group, Place};
 use crate::photon::philox::{Blocks, LANES};
-
-/// Where in its group a photon falls: cycle within the group and, in the lowest bits, SPAD ([`Group::split`]).
-pub type Place = u16;
 
 /// Photons that one block of random words makes.
 pub const PER_BLOCK: usize = 4;
@@ -49,17 +44,17 @@ pub struct Draw {
     pub(super) counts: Blocks,
     pub(super) background: Blocks,
     pub(super) echo: Blocks,
-    runs: Vec<Run>,
+    pub(super) runs: Vec<Run>,
     /// Photons of the whole echo.
-    echo_photons: usize,
+    pub(super) echo_photons: usize,
     /// What the drawn slots are, fs after the start of the cycle.
     pub(super) within_fs: Range<i64>,
     pub(super) group: Group,
-    photons: usize,
+    pub(super) photons: usize,
     /// Photons of the exposure.
     of_exposure: usize,
     /// Photons that were left when some were thinned out.
-    kept: Vec<(Place, i64)>,
+    pub(super) kept: Vec<(Place, i64)>,
 }
 
 impl Draw {
@@ -157,7 +152,7 @@ impl Draw {
     }
 
     /// The random words of the echo's photons, low and high, by halves: [`Group::place`] of the high word, and
-    /// [`PixelStream::signal_photon`]. Some may come outside [`Draw::within_fs`], and are no photons of these slots. Behind
+    /// [`PixelStream::signal_photon`](super::PixelStream::signal_photon). Some may come outside [`Draw::within_fs`], and are no photons of these slots. Behind
     /// [`Draw::echo_photons`] of either half comes what fills it up to a multiple of [`LANES`].
     pub fn echo(&self) -> [[&[u32]; 2]; 2] {
         let filled_up = self.half_an_echo();
@@ -176,7 +171,7 @@ impl Draw {
     }
 
     /// Numbers of the echo's photons.
-    fn echo_numbers(&self) -> impl Iterator<Item = usize> {
+    pub(super) fn echo_numbers(&self) -> impl Iterator<Item = usize> {
         let [first, second] = self.echo_photons();
         let half = self.half_an_echo();
         (0..first).chain(half..half + second)
@@ -211,126 +206,5 @@ impl Draw {
     /// From when until when the drawn slots last, fs after the start of their cycle.
     pub fn within_fs(&self) -> Range<i64> {
         self.within_fs.clone()
-    }
-
-    /// Every photon of the first `cycles` laser cycles of the group, as place and time after the start of its cycle in fs, in no
-    /// particular order. `pixel` is whose they are. No background photon comes before the exposure.
-    pub fn photons(
-        &self,
-        pixel: &PixelStream<'_>,
-        cycles: u32,
-    ) -> impl Iterator<Item = (Place, i64)> {
-        let words = self.words();
-        let slots = pixel.slots();
-        // Short exposures need few of a group's photons; only of those the times are worked out.
-        let is_wanted = move |word: u32| self.group.split(self.group.place(word)).0 < cycles;
-        let background = self.runs.iter().flat_map(move |run| {
-            let rows = run.blocks().into_iter().zip(words);
-            rows.flat_map(move |(blocks, words)| {
-                let photon =
-                    move |&word: &u32| (self.group.place(word), slots.time_fs(run.slot, word));
-                let wanted = words[blocks].iter().filter(move |word| is_wanted(**word));
-                wanted.map(photon)
-            })
-        });
-        let halves = self.echo().into_iter().zip(self.echo_photons());
-        let signal = halves
-            .enumerate()
-            .flat_map(move |(half, ([_, high], photons))| {
-                let wanted = (0..photons).filter(move |&at| is_wanted(high[at]));
-                wanted.map(move |at| half * self.half_an_echo() + at)
-            });
-        let signal = signal
-            .map(|photon| pixel.signal_photon(self, photon))
-            .filter(|(_, time_fs)| self.within_fs.contains(time_fs));
-        let is_first_group = self.group.first_cycle() == 0;
-        let background = background.filter(move |&(place, time_fs)| {
-            !is_first_group || time_fs >= 0 || self.group.split(place).0 > 0
-        });
-        let kept = self.kept.iter().copied();
-        let kept = kept.filter(move |&(place, _)| self.group.split(place).0 < cycles);
-        background.chain(signal).chain(kept)
-    }
-
-    /// Keeps only those photons that `pixel` keeps. They are worked out here, and are no words any more.
-    pub(super) fn thin(&mut self, pixel: &PixelStream<'_>) {
-        let mut kept = std::mem::take(&mut self.kept);
-        let first_cycle = self.group.first_cycle();
-        let slots = pixel.slots();
-        for run in &self.runs {
-            for (blocks, words) in run.blocks().into_iter().zip(self.words()) {
-                for &word in &words[blocks] {
-                    let (place, time_fs) = (self.group.place(word), slots.time_fs(run.slot, word));
-                    let (cycle, spad) = self.group.split(place);
-                    let cycle = first_cycle + cycle;
-                    let is_before_exposure = cycle == 0 && time_fs < 0;
-                    if !is_before_exposure
-                        && pixel.keeps_background(cycle, spad, time_fs, [word, run.slot])
-                    {
-                        kept.push((place, time_fs));
-                    }
-                }
-            }
-        }
-        for number in self.echo_numbers() {
-            let (place, time_fs) = pixel.signal_photon(self, number);
-            let (cycle, spad) = self.group.split(place);
-            let word = self.echo_word(number);
-            let words = [word as u32, (word >> 32) as u32];
-            if self.within_fs.contains(&time_fs)
-                && pixel.keeps_signal(first_cycle + cycle, spad, words)
-            {
-                kept.push((place, time_fs));
-            }
-        }
-        self.runs.clear();
-        (self.photons, self.echo_photons) = (0, 0);
-        self.kept = kept;
-    }
-}
-
-/// Bits of a SPAD's number below a time.
-pub(super) const SPAD_SHIFT: u32 = MOST_SPADS.trailing_zeros();
-
-/// Photons of a group sorted by cycle, then time, then SPAD.
-#[derive(Debug, Clone, Default)]
-pub(super) struct ByCycle {
-    /// Time after the start of the cycle in fs and SPAD, as `time << SPAD_SHIFT | SPAD`.
-    photons: Vec<i64>,
-    /// Where each cycle's photons end.
-    ends: Vec<usize>,
-}
-
-impl ByCycle {
-    pub(super) fn sort(&mut self, draw: &Draw, pixel: &PixelStream<'_>) {
-        self.ends.clear();
-        self.ends.resize(GROUP as usize, 0);
-        for (place, _) in draw.photons(pixel, GROUP) {
-            self.ends[draw.group.split(place).0 as usize] += 1;
-        }
-        let mut total = 0;
-        for end in &mut self.ends {
-            // Where the cycle begins, until its photons have moved it to where it ends.
-            total += std::mem::replace(end, total);
-        }
-        self.photons.clear();
-        self.photons.resize(total, 0);
-        for (place, time_fs) in draw.photons(pixel, GROUP) {
-            let (cycle, spad) = draw.group.split(place);
-            let end = &mut self.ends[cycle as usize];
-            self.photons[*end] = time_fs << SPAD_SHIFT | i64::from(spad);
-            *end += 1;
-        }
-        let mut start = 0;
-        for &end in &self.ends {
-            self.photons[start..end].sort_unstable();
-            start = end;
-        }
-    }
-
-    pub(super) fn of(&self, cycle: u32) -> &[i64] {
-        let cycle = cycle as usize;
-        let start = cycle.checked_sub(1).map_or(0, |before| self.ends[before]);
-        &self.photons[start..self.ends[cycle]]
     }
 }

@@ -12,7 +12,6 @@
 //! shorter, because cycle and SPAD share [`PLACE_BITS`]. Photons that trigger others and are rare have long groups
 //! only.
 
-use super::draw::Place;
 use super::slot::TIME_BITS;
 use crate::photon::SpadGrid;
 
@@ -23,6 +22,9 @@ const GROUP_BITS: u32 = 11;
 /// Laser cycles of the shortest groups.
 pub(super) const FIRST: u32 = 1 << FIRST_BITS;
 const FIRST_BITS: u32 = 7;
+
+/// Where in its group a photon falls: cycle within the group and, in the lowest bits, SPAD ([`Group::split`]).
+pub type Place = u16;
 
 /// Most bits of a [`Place`], the highest ones of a random word: 2048 cycles and 16 SPADs.
 pub const PLACE_BITS: u32 = GROUP_BITS + 4;

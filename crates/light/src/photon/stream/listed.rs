@@ -8,7 +8,7 @@
 //! ```
 
 use super::bright::{PER_BLOCK, TILE};
-use super::{PixelStream, nearest};
+use super::part::{PixelStream, nearest};
 use crate::photon::philox::blocks_from;
 use crate::photon::spad::Photon;
 use crate::units::Time;

@@ -10,12 +10,11 @@ use multiversion::multiversion;
 use smallvec::{SmallVec, smallvec};
 
 use super::bright::{PER_BLOCK, TILE};
-use super::{PixelStream, nearest};
+use super::part::{PixelStream, nearest};
 use crate::numerics::branchless;
-use crate::photon::MOST_SPADS;
-use crate::photon::avalanches::FEW_SPADS;
 use crate::photon::philox::blocks_from;
-use crate::photon::spad::{DeadTimeLaw, Photon};
+use crate::photon::spad::{DeadTimeLaw, FEW_SPADS, Photon};
+use crate::photon::spad_grid::MOST_SPADS;
 use crate::units::Time;
 
 /// An exponential number of mean 1.
@@ -35,10 +34,7 @@ fn exponentials(words: &[u32; TILE], numbers: &mut [f64; TILE]) {
     }
 }
 
-/// So few photons left in an echo, on average, are mostly none.
-const LATE: f64 = 0.01;
-
-/// Smaller words are exponential numbers above [`LATE`]: e⁻⁰·⁰¹ is 0.99005.
+/// Smaller words are exponential numbers above [`LATE`](super::part::LATE): e⁻⁰·⁰¹ is 0.99005.
 const LATE_WORD: u32 = (0.99 * 4294967296.0) as u32;
 
 /// No photon comes: later than all that do.
@@ -66,17 +62,6 @@ impl<'a> PixelStream<'a> {
     #[inline]
     pub fn is_over(&self, after_fs: i64) -> bool {
         after_fs >= self.echo_fs.1
-    }
-
-    /// From when on a SPAD's part of an echo has no more than [`LATE`] photons left, fs after the start of its cycle.
-    pub(super) fn late_fs(&self) -> i64 {
-        match self.signal_per_spad > LATE {
-            true => {
-                let after_fs = self.gaussian.quantile(1.0 - LATE / self.signal_per_spad);
-                self.arrival_fs + after_fs.ceil() as i64
-            }
-            false => i64::MIN,
-        }
     }
 
     /// The intensity of the echo on a SPAD until `time_fs` after the start of its cycle, photons.

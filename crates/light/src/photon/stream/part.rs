@@ -2,25 +2,23 @@
 //! rest.
 //!
 //! What a part's photons are follows from its key, its macropixel and what [`PixelStream`] knows of light and slots; nothing is
-//! remembered between draws. A [`Draw`] takes a group of laser cycles and a span of each: first the Poisson numbers of all
-//! slots and of the echo, then as many words as that makes photons. `limits` thins what was drawn at its greatest rate,
-//! `ordered` and `bright` draw laser cycle by laser cycle instead.
+//! remembered between draws. `dim` draws groups of laser cycles, `bright`, `ordered` and `listed` draw laser cycle by laser cycle.
 
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::draw::{Draw, Place};
+use smallvec::SmallVec;
+
+use super::exposure::{FAR_FS, PhotonStream, sampler};
 use super::group::{FIRST, Group, PLACE_BITS};
 use super::kind::Kind;
 use super::limits::Limits;
-use super::numbers::{Counts, Numbers};
+use super::numbers::Numbers;
 use super::slot::Slots;
-use super::{FAR_FS, PhotonStream, Span};
-use crate::photon::avalanches::Avalanches;
-use crate::photon::light::Layer;
-use crate::photon::pulse::{PulseSampler, PulseShape};
+use crate::photon::light::{Layer, PixelLight};
+use crate::photon::pulse::PulseSampler;
 use crate::photon::quantile::{NORMAL_BITS, NormalSampler};
-use crate::photon::random::Purpose;
+use crate::photon::random::layer_key;
 use crate::photon::spad::{Photon, SpadEvent};
 use crate::units::Time;
 
@@ -33,17 +31,17 @@ const _: () = assert!(PLACE_BITS + NORMAL_BITS <= u64::BITS);
 /// mostly 0 take longer to draw than the photons. Chosen; 8 Mcounts/s with 1 % of afterpulses and of crosstalk have 0.05.
 const RARE: f64 = 1.0;
 
-/// Second counter word of the number of signal photons; slots are below it.
-const SIGNAL_RUN: u32 = u32::MAX;
+/// So few photons left in an echo, on average, are mostly none.
+pub(super) const LATE: f64 = 0.01;
 
 /// The photons of one part of a macropixel's light before dead time: those of a layer whose avalanches trigger
 /// others, or the rest.
 #[derive(Debug, Clone)]
 pub struct PixelStream<'a> {
-    pub(super) stream: &'a PhotonStream,
+    pub(in crate::photon) stream: &'a PhotonStream,
     /// Of the layer.
     pub(super) key: [u32; 2],
-    pub(super) pixel: u32,
+    pub(in crate::photon) pixel: u32,
     pub(super) kind: Kind,
     /// All parts of a macropixel's light are, or none is.
     pub(super) is_bright: bool,
@@ -55,9 +53,9 @@ pub struct PixelStream<'a> {
     pub(super) shape: Option<Arc<PulseSampler>>,
     pub(super) arrival_fs: i64,
     /// Earliest and latest time of a signal photon in its cycle.
-    pub(super) echo_fs: (i64, i64),
+    pub(in crate::photon) echo_fs: (i64, i64),
     /// Photons in a slot.
-    background: Numbers,
+    pub(super) background: Numbers,
     /// Photons in all slots.
     pub(super) signal: Numbers,
     /// Mean time between background photons; infinite in the dark.
@@ -70,16 +68,42 @@ pub struct PixelStream<'a> {
     pub(super) late_fs: i64,
 }
 
+/// The parts of a macropixel's light. The first has the photons that trigger no others. Light of one echo has that
+/// part and one with those that do.
+pub type LightParts<'a> = SmallVec<[PixelStream<'a>; 2]>;
+
 impl PhotonStream {
+    /// The photons of macropixel number `pixel` under `light`, by parts that are drawn independently.
+    pub fn parts(&self, pixel: u32, light: &PixelLight) -> LightParts<'_> {
+        debug_assert!(
+            light
+                .spads()
+                .is_none_or(|spads| spads.spads() == self.spads()),
+            "engines refuse light for other SPADs"
+        );
+        let breeding = self.config.spads.breeding_probability();
+        let is_bright = self.config.is_bright(light);
+        let mut parts = LightParts::new();
+        for (number, layer) in (0..).zip(light.layers()) {
+            let key = layer_key(self.key, number);
+            // The first layer is there even if it is dark: it is what SPADs are asked of.
+            if number > 0 && layer.background_hz == 0.0 && layer.signal_per_cycle == 0.0 {
+                continue;
+            }
+            for (kind, share) in [(Kind::Plain, 1.0 - breeding), (Kind::Breeding, breeding)] {
+                if kind == Kind::Plain || share > 0.0 {
+                    let mut part = self.part(pixel, &layer, kind, share);
+                    (part.key, part.is_bright, part.is_alone) = (key, is_bright, light.is_plain());
+                    parts.push(part);
+                }
+            }
+        }
+        parts
+    }
+
     /// One part of a layer of light: the photons of `kind`, which are `share` of all. Of a light's only layer, in dim light;
     /// [`PhotonStream::parts`] says what else it is.
-    pub(super) fn part(
-        &self,
-        pixel: u32,
-        layer: &Layer<'_>,
-        kind: Kind,
-        share: f64,
-    ) -> PixelStream<'_> {
+    fn part(&self, pixel: u32, layer: &Layer<'_>, kind: Kind, share: f64) -> PixelStream<'_> {
         let echo = layer.echo;
         let gaussian = match echo.and_then(|echo| echo.sigma) {
             Some(sigma) => {
@@ -131,20 +155,6 @@ impl PhotonStream {
 }
 
 impl PixelStream<'_> {
-    /// The SPADs of this macropixel, where its photons are known from `time` on, or from the beginning. `breeding` are the
-    /// photons before `time` that breed, since [`SpadModel::reach`](crate::photon::SpadModel::reach) at least.
-    pub fn avalanches(
-        &self,
-        time: Option<Time>,
-        breeding: impl Iterator<Item = Photon>,
-    ) -> Avalanches<'_> {
-        let (model, key) = (&self.stream.config.spads, self.stream.key);
-        match time {
-            Some(time) => Avalanches::known_from(model, key, self.pixel, time, breeding),
-            None => Avalanches::in_the_dark(model, key, self.pixel),
-        }
-    }
-
     /// The group of a laser cycle.
     pub fn group_of(&self, cycle: u32) -> Group {
         let grid = self.stream.config.spads.grid;
@@ -152,11 +162,6 @@ impl PixelStream<'_> {
             true => Group::long(cycle, grid),
             false => Group::of_cycle(cycle, grid),
         }
-    }
-
-    /// Start of a laser cycle.
-    pub fn cycle_start(&self, cycle: u32) -> Time {
-        self.stream.cycle_start(cycle)
     }
 
     /// Whether the light has no other layer, and all that is drawn is kept: only then random words tell all of it.
@@ -208,87 +213,25 @@ impl PixelStream<'_> {
     }
 
     /// No photon comes earlier than that after the start of its cycle.
-    pub(super) fn earliest(&self) -> Time {
+    pub(in crate::photon) fn earliest(&self) -> Time {
         let background_fs = self.stream.ends_fs().start;
         Time::from_fs(self.echo_fs().start.min(background_fs))
     }
 
-    /// Draws all photons of `group` in a part of its cycles.
-    pub fn draw(&self, group: Group, span: &Span, draw: &mut Draw) {
-        let key = self.key;
-        let numbered = |purpose: Purpose| purpose as u32 | group.number() << 8;
-        debug_assert!(!self.is_bright, "bright light is drawn by laser cycle");
-        draw.begin(group);
-        if self
-            .limits
-            .as_ref()
-            .is_some_and(|limits| limits.is_outside(group))
-        {
-            return;
-        }
-
-        draw.within_fs = span.within_fs.clone();
-        let (background, parts) = self.background.of(group);
-        let (signal, signal_parts) = self.signal.of(group);
-        let has_echo = !signal.is_zero()
-            && !draw.within_fs.is_empty()
-            && self.echo_fs.0 < draw.within_fs.end
-            && self.echo_fs.1 >= draw.within_fs.start;
-        if has_echo {
-            let words = signal.words() * signal_parts;
-            draw.counts.push_run(SIGNAL_RUN, words.div_ceil(2));
-        }
-        let words = background.words() * parts;
-        if !background.is_zero() {
-            for slot in span.slots.clone() {
-                draw.counts.push_run(slot, words.div_ceil(2));
+    /// From when on a SPAD's part of an echo has no more than [`LATE`] photons left, fs after the start of its cycle.
+    fn late_fs(&self) -> i64 {
+        match self.signal_per_spad > LATE {
+            true => {
+                let after_fs = self.gaussian.quantile(1.0 - LATE / self.signal_per_spad);
+                self.arrival_fs + after_fs.ceil() as i64
             }
+            false => i64::MIN,
         }
-        let mut numbers = std::mem::take(&mut draw.counts);
-        numbers.generate(key, self.pixel, numbered(self.kind.counts()));
-
-        let mut counts = Counts::new(&numbers);
-        if has_echo {
-            let photons = counts.next(signal, signal_parts);
-            draw.push_echo(photons, self.shape.is_some());
-            draw.echo
-                .generate(key, self.pixel, numbered(self.kind.echo()));
-        }
-        if !background.is_zero() {
-            for slot in span.slots.clone() {
-                let photons = counts.next(background, parts);
-                draw.push_run(slot, photons);
-            }
-            draw.background
-                .generate(key, self.pixel, numbered(self.kind.background()));
-        }
-        draw.counts = numbers;
-        if self
-            .limits
-            .as_ref()
-            .is_some_and(|limits| !limits.keep_all_of(group, self.stream))
-        {
-            draw.thin(self);
-        }
-        draw.count_exposure(group.cycles_in(self.stream.config().laser_cycles));
     }
 
     /// The slots of the stream.
     pub fn slots(&self) -> Slots {
         self.stream.slots
-    }
-
-    /// Place of an echo's photon of this number in `draw` ([`Draw::half_an_echo`]), and its time after the start of its
-    /// cycle, fs.
-    #[inline]
-    pub fn signal_photon(&self, draw: &Draw, number: usize) -> (Place, i64) {
-        let word = draw.echo_word(number);
-        let mut after_fs = self.gaussian.draw(word);
-        if let Some(shape) = &self.shape {
-            after_fs += shape.draw(draw.echo_words(number));
-        }
-        let place = draw.group.place((word >> 32) as u32);
-        (place, self.arrival_fs + nearest(after_fs))
     }
 
     /// The first rank ([`signal_rank`]) of signal photons that may come within `tolerance_fs` of `time_fs` or later, and
@@ -312,9 +255,4 @@ pub fn signal_rank(low: u32, high: u32) -> i16 {
 #[inline]
 pub(super) fn nearest(value: f64) -> i64 {
     ((value + ROUNDER).to_bits() as i64) - ROUNDER.to_bits() as i64
-}
-
-/// Draws times of a measured pulse.
-pub(super) fn sampler(shape: &PulseShape) -> Arc<PulseSampler> {
-    Arc::new(PulseSampler::measured(shape))
 }

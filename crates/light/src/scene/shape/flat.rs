@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Meeting, in_front};
+use super::meeting::{Meeting, in_front};
 use crate::scene::vector::Ray;
 
 pub(super) fn meet_ground(ray: &Ray, depth_m: f64) -> Option<Meeting> {

@@ -14,9 +14,9 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::Meeting;
+use super::meeting::{Meeting, in_front};
 use crate::files::{InputError, Raster};
-use crate::scene::PinholeCamera;
+use crate::scene::camera::PinholeCamera;
 use crate::scene::vector::Ray;
 
 /// Depths of neighbouring pixels that differ by more than this share belong to two surfaces.
@@ -195,7 +195,7 @@ impl DepthMap {
         };
         let meeting = |w: f64| {
             let range_m = (1.0 / w - origin.z) / direction.z;
-            super::in_front(range_m).map(|range_m| Meeting { range_m, part: 0 })
+            in_front(range_m).map(|range_m| Meeting { range_m, part: 0 })
         };
         if start.length() < 1e-9 {
             return Some(self.inverse_at(pixel(0.0)))

@@ -18,7 +18,8 @@ use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
 
 use self::tree::{Bounds, Tree};
-use super::{Meeting, NEAREST_M, solid};
+use super::meeting::{Meeting, NEAREST_M};
+use super::solid;
 use crate::files::InputError;
 use crate::scene::vector::Ray;
 
@@ -207,7 +208,8 @@ impl Mesh {
     }
 
     /// Number of triangles.
-    pub fn triangles(&self) -> usize {
+    #[cfg(test)]
+    pub(crate) fn triangles(&self) -> usize {
         self.triangles.len()
     }
 
@@ -268,7 +270,7 @@ impl Mesh {
         (inside && range > NEAREST_M && range.is_finite()).then_some(range)
     }
 
-    pub fn normal(&self, triangle: u32) -> DVec3 {
+    pub(crate) fn normal(&self, triangle: u32) -> DVec3 {
         let [a, b, c] = self.corners_of(triangle);
         (b - a).cross(c - a).normalize()
     }

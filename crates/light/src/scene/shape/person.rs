@@ -12,7 +12,8 @@
 
 use glam::DVec3;
 
-use super::{Meeting, NEAREST_M, round, solid};
+use super::meeting::{Meeting, NEAREST_M};
+use super::{round, solid};
 use crate::scene::vector::Ray;
 
 enum Limb {

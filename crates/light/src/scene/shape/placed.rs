@@ -3,8 +3,12 @@
 use glam::DVec3;
 
 use super::flat::Flat;
+use super::kinds::Shape;
+use super::map::DepthMap;
+use super::meeting::{Meeting, in_front};
+use super::mesh::Mesh;
 use super::pose::Pose;
-use super::{DepthMap, Meeting, Mesh, Shape, flat, in_front, person, round, solid};
+use super::{flat, person, round, solid};
 use crate::scene::vector::{Ray, turned};
 
 /// A [`Shape`] where it stands.
@@ -42,6 +46,19 @@ pub(in crate::scene) enum Placed<'a> {
         pose: Pose,
         map: &'a DepthMap,
     },
+}
+
+impl Shape {
+    /// Distance along `ray` to the first surface point in front of its origin, m.
+    #[cfg(test)]
+    pub(crate) fn intersect(&self, ray: &Ray) -> Option<f64> {
+        self.placed().meet(ray).map(|meeting| meeting.range_m)
+    }
+
+    /// The shape made ready for many rays.
+    pub(in crate::scene) fn placed(&self) -> Placed<'_> {
+        Placed::new(self)
+    }
 }
 
 impl<'a> Placed<'a> {

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Meeting, in_front};
+use super::meeting::{Meeting, in_front};
 use crate::scene::vector::Ray;
 
 /// Slab method; `ray` is in the box's own coordinates. The part is the axis that the face looks along.

@@ -1,16 +1,25 @@
 //! All avalanches of a macropixel in an exposure, in their order: the whole stream and what its SPADs make of it.
 
-use super::draw::{ByCycle, SPAD_SHIFT};
-use super::{Draw, ListedEchoes, PhotonStream, PixelPhotons, PixelStream};
-use crate::photon::avalanches::Avalanches;
-use crate::photon::light::PixelLight;
-use crate::photon::spad::{Photon, SpadEvent};
+use super::light::PixelLight;
+use super::spad::{Photon, SpadEvent};
+use super::stream::{ByCycle, Draw, ListedEchoes, PhotonStream, PixelStream, SPAD_SHIFT};
 use crate::units::Time;
+
+/// The avalanches of one macropixel in one exposure.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct PixelPhotons {
+    /// Rising edges of the SPAD wires, sorted by (time, SPAD).
+    pub events: Vec<SpadEvent>,
+    /// Photons and dark counts that fell into the exposure, seen or not.
+    pub drawn: u64,
+    /// Avalanches, afterpulses and crosstalk among them, that met a blind SPAD.
+    pub lost_to_dead_time: u64,
+}
 
 impl PhotonStream {
     /// All avalanches of macropixel number `pixel` under `light` in the exposure.
     pub fn pixel_events(&self, pixel: u32, light: &PixelLight) -> PixelPhotons {
-        let expected = self.config.most_edges(light);
+        let expected = self.config().most_edges(light);
         // Five standard deviations of room; the cap keeps a huge request from failing up front.
         let room = (expected + 5.0 * expected.sqrt() + 16.0).min(1e7);
         let mut events = Vec::with_capacity(room as usize);
@@ -27,7 +36,7 @@ impl PhotonStream {
         pulses: impl FnMut(&[SpadEvent]),
     ) -> PixelPhotons {
         let parts = self.parts(pixel, light);
-        match parts[0].is_bright {
+        match parts[0].is_bright() {
             true => self.bright_pulses(&parts, pulses),
             false => self.dim_pulses(&parts, pulses),
         }
@@ -40,12 +49,11 @@ impl PhotonStream {
     ) -> PixelPhotons {
         let mut draw = Draw::default();
         let mut by_cycle = ByCycle::default();
-        let all = self.span(0..self.slots.count());
-        let end = self.cycle_start(self.config.laser_cycles);
+        let all = self.span(0..self.slots().count());
+        let end = self.cycle_start(self.config().laser_cycles);
         let mut photons: Vec<Photon> = Vec::new();
         let mut edges = Vec::new();
-        let pixel = parts[0].pixel;
-        let mut avalanches = Avalanches::in_the_dark(&self.config.spads, self.key, pixel);
+        let mut avalanches = parts[0].avalanches(None, std::iter::empty());
         let are_sorted = parts.len() == 1 && parts[0].stays_in_its_cycle();
         let earliest = parts.iter().map(PixelStream::earliest).min();
         let earliest = earliest.unwrap_or(Time::ZERO);
@@ -58,7 +66,7 @@ impl PhotonStream {
                     // It came with one of the groups before.
                     continue;
                 }
-                let cycles = group_of_light.cycles_in(self.config.laser_cycles);
+                let cycles = group_of_light.cycles_in(self.config().laser_cycles);
                 light.draw(group_of_light, &all, &mut draw);
                 by_cycle.sort(&draw, light);
                 for cycle in 0..cycles {
@@ -76,7 +84,7 @@ impl PhotonStream {
             }
             // Photons of the next groups come from then on.
             let next = group.first_cycle().saturating_add(group.cycles());
-            let until = match next < self.config.laser_cycles {
+            let until = match next < self.config().laser_cycles {
                 true => self.cycle_start(next) + earliest,
                 false => end,
             };
@@ -100,12 +108,11 @@ impl PhotonStream {
         parts: &[PixelStream<'_>],
         mut pulses: impl FnMut(&[SpadEvent]),
     ) -> PixelPhotons {
-        let config = &self.config;
+        let config = self.config();
         let end = self.cycle_start(config.laser_cycles);
         let mut photons: Vec<Photon> = Vec::new();
         let mut edges = Vec::new();
-        let pixel = parts[0].pixel;
-        let mut avalanches = Avalanches::in_the_dark(&config.spads, self.key, pixel);
+        let mut avalanches = parts[0].avalanches(None, std::iter::empty());
         // Light with an ordered echo has no other layer.
         let mut echoes = parts[0].ordered_echoes();
         let mut listed: Vec<ListedEchoes> = Vec::new();
@@ -115,7 +122,7 @@ impl PhotonStream {
         let (mut drawn, mut next_echo) = (0, 0);
         for cycle in 0..config.laser_cycles {
             let until = match cycle + 1 < config.laser_cycles {
-                true => self.cycle_start(cycle + 1) - Time::from_fs(self.slots.lead_fs()),
+                true => self.cycle_start(cycle + 1) - Time::from_fs(self.slots().lead_fs()),
                 false => end,
             };
             // Whatever may blind a SPAD for an echo must find it.
@@ -152,3 +159,6 @@ impl PhotonStream {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

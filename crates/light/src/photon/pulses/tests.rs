@@ -3,8 +3,11 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::photon::SpadGrid;
-use crate::photon::{CROSSTALK_DELAY, DeadTimeLaw, EchoLaw};
+use crate::photon::{
+    CROSSTALK_DELAY, DeadTimeLaw, EchoLaw, GROUP, Group, PulseShape, SpadGrid, SpadModel,
+    StreamConfig,
+};
+use crate::units::Frequency;
 
 fn config() -> StreamConfig {
     StreamConfig {

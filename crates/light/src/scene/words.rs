@@ -1,0 +1,79 @@
+//! Words that stand in a scene file where no curve has been measured.
+
+use crate::photon::FilterShape;
+use crate::settings::words;
+
+words! {
+    /// Laser pulses without a measurement.
+    #[derive(Default)]
+    pub enum PulseWord {
+        /// A Gaussian of `pulse_fwhm_ns`.
+        #[default]
+        Gaussian = "gaussian",
+    }
+}
+
+words! {
+    /// Lenses without a measurement.
+    #[derive(Default)]
+    pub enum VignettingWord {
+        /// None, as in the thesis.
+        #[default]
+        None = "none",
+        /// That of a plain lens.
+        Cos4 = "cos4",
+    }
+}
+
+words! {
+    /// Laser beams without a measurement.
+    #[derive(Default)]
+    pub enum BeamWord {
+        /// The same energy for every macropixel (Eq. 7 and 8, [`Spot`](crate::photon::Spot)).
+        #[default]
+        Uniform = "uniform",
+        /// A Gaussian of `beam_fwhm_deg`.
+        Gaussian = "gaussian",
+    }
+}
+
+words! {
+    /// Filters without a measurement.
+    #[derive(Default)]
+    pub enum FilterWord {
+        /// Any that lets `solar_irradiance_w_m2` through.
+        #[default]
+        Irradiance = "irradiance",
+        /// A top hat.
+        TopHat = "top_hat",
+        /// A Gaussian.
+        Gaussian = "gaussian",
+        /// One period of a raised cosine.
+        Cosine = "cosine",
+        /// One resonance of a Fabry-Pérot cavity.
+        Lorentz = "lorentz",
+    }
+}
+
+impl FilterWord {
+    /// The shape that it stands for; `None` where only the irradiance is known.
+    pub(super) fn shape(self) -> Option<FilterShape> {
+        match self {
+            FilterWord::Irradiance => None,
+            FilterWord::TopHat => Some(FilterShape::TopHat),
+            FilterWord::Gaussian => Some(FilterShape::Gaussian),
+            FilterWord::Cosine => Some(FilterShape::Cosine),
+            FilterWord::Lorentz => Some(FilterShape::Lorentz),
+        }
+    }
+}
+
+words! {
+    /// Detection efficiencies without a measurement.
+    #[derive(Default)]
+    pub enum PdeWord {
+        /// The same at all wavelengths.
+        #[default]
+        Flat = "flat",
+    }
+}

@@ -1,0 +1,66 @@
+//! Arguments of `gdtof range`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Format {
+    /// JSON captures of an ams TMF8820.
+    Tmf8820,
+    /// Counts of a sensor like ours, rows x columns x bins (.npy), in the windows of a frame.json.
+    Frame,
+}
+
+/// Captures that a calibration is fitted on; the others are reported.
+#[derive(Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Fit {
+    /// Every second capture, from the first.
+    Even,
+    /// Every second capture, from the second.
+    Odd,
+    /// The nearer half.
+    Near,
+    /// The farther half.
+    Far,
+}
+
+/// Arguments of `gdtof range`.
+#[derive(Args)]
+pub(in crate::cli) struct RangeArgs {
+    /// File with the histograms.
+    #[arg(long, value_name = "FILE")]
+    pub(super) histograms: PathBuf,
+    /// Format of the file.
+    #[arg(long, value_enum)]
+    pub(super) format: Format,
+    /// tmf8820: captures to calibrate on, by their true distances; depths and errors are given for the others
+    /// [default: even].
+    #[arg(long, value_enum, conflicts_with = "calibration")]
+    pub(super) fit: Option<Fit>,
+    /// tmf8820: calibration to use instead, on all captures. frame: bin profile of the sensor's delay lines, from
+    /// `gdtof calibrate`.
+    #[arg(long, value_name = "FILE")]
+    pub(super) calibration: Option<PathBuf>,
+    /// tmf8820: file to save the calibration to (JSON).
+    #[arg(long, value_name = "FILE", conflicts_with = "calibration")]
+    pub(super) save_calibration: Option<PathBuf>,
+    /// frame: frame.json with sensor, scene, exposure and start values [default: the one beside the histograms].
+    #[arg(long, value_name = "FILE")]
+    pub(super) frame: Option<PathBuf>,
+    /// frame: share of macropixels without an echo that may get a depth [default: 0.001].
+    #[arg(long, value_name = "P")]
+    pub(super) false_alarm_rate: Option<f64>,
+    /// frame: do not correct depths for the range walk of strong echoes.
+    #[arg(long)]
+    pub(super) no_walk_correction: bool,
+    /// File for the depths (CSV). tmf8820: capture,zone,true_m,depth_m,sensor_m; frame:
+    /// row,col,start,true_m,guide_m,depth_m,bound_m,confidence,no_depth.
+    #[arg(long, value_name = "FILE")]
+    pub(super) out: Option<PathBuf>,
+    /// Print JSON instead of tables.
+    #[arg(long)]
+    pub(super) json: bool,
+}
