@@ -237,31 +237,27 @@ impl Block {
     }
 }
 
-/// A line of the netlist with another cell, where it is one: its gate's counterpart, a multiplexer whose inputs are swapped, or a
-/// flip-flop that is never reset.
+/// A line of the netlist with another cell, where it is one: its gate's counterpart, a multiplexer whose inputs are swapped, a
+/// buffer or inverter whose input is stuck at 0, or a flip-flop that is never reset.
 fn mutant(line: &str) -> Option<String> {
-    const GATES: [(&str, &str); 4] = [
-        ("INV", "BUF"),
-        ("AND2", "OR2"),
-        ("NAND2", "NOR2"),
-        ("XOR2", "XNOR2"),
-    ];
+    const GATES: [(&str, &str); 3] = [("AND2", "OR2"), ("NAND2", "NOR2"), ("XOR2", "XNOR2")];
     let cell = line.trim_start().split(' ').next()?;
     let both_ways = GATES.into_iter().flat_map(|(a, b)| [(a, b), (b, a)]);
-    let mut counterparts = both_ways.filter(|gate| gate.0 == cell);
-    match (counterparts.next(), cell) {
-        (Some((_, other)), _) => Some(line.replacen(cell, other, 1)),
-        (None, "MUX2") => Some(
-            line.replace(".A(", ".?(")
-                .replace(".B(", ".A(")
-                .replace(".?(", ".B("),
-        ),
-        (None, "DFFR" | "DFFSR") => {
-            let (before, reset) = line.split_once(".R(")?;
-            let (_, after) = reset.split_once(')')?;
-            Some(format!("{before}.R(1'b0){after}"))
+    let counterpart = both_ways.filter(|gate| gate.0 == cell).map(|gate| gate.1);
+    let tied = |pin: &str| {
+        let (before, net) = line.split_once(pin)?;
+        let (_, after) = net.split_once(')')?;
+        Some(format!("{before}{pin}1'b0){after}"))
+    };
+    match cell {
+        "MUX2" => {
+            let names = [(".A(", ".?("), (".B(", ".A("), (".?(", ".B(")];
+            let swap = |line: String, (from, to)| line.replace(from, to);
+            Some(names.into_iter().fold(line.to_owned(), swap))
         }
-        _ => None,
+        "INV" | "BUF" => tied(".A("),
+        "DFFR" | "DFFSR" => tied(".R("),
+        _ => Some(line.replacen(cell, counterpart.last()?, 1)),
     }
 }
 
@@ -383,6 +379,7 @@ fn no_cell_of_correlation_metdc_and_histogram_can_be_exchanged() {
 fn mutants_are_what_they_are_said_to_be() {
     let and = "  AND2 u0(.Z(n1), .A(AND2), .B(b));";
     let mux = "  MUX2 m(.Z(z), .A(a), .B(b), .S(s));";
+    let inv = "  INV u1(.Z(n2), .A(n1));";
     let dffr = "  DFFR d(.Q(q), .QN(), .D(d), .CK(c), .R(r));";
     let cases = [
         (and, Some("  OR2 u0(.Z(n1), .A(AND2), .B(b));")),
