@@ -1,7 +1,8 @@
 //! What the comparisons with Icarus Verilog share: running it, with random delays, too, and reading what its testbench
 //! and our kernel found.
 
-use std::io::Write;
+use crate::tool;
+
 use std::path::Path;
 use std::process::Command;
 
@@ -13,16 +14,7 @@ use rand::{RngExt, rngs::StdRng};
 
 /// Whether Icarus is installed; says so loudly where it is not, and fails where it must be.
 pub fn is_here() -> bool {
-    if Command::new("iverilog").arg("-V").output().is_ok() {
-        return true;
-    }
-    // Not eprintln, which cargo hides where a test passes.
-    let _ = writeln!(
-        std::io::stderr(),
-        "SKIPPED: iverilog is not installed, so nothing was compared with Icarus Verilog (apt-get install iverilog)"
-    );
-    assert!(std::env::var_os("CI").is_none(), "CI must have iverilog");
-    false
+    tool::is_here("iverilog", "nothing was compared with Icarus Verilog")
 }
 
 /// Compiles `sources` (and options) in `folder` without a word of warning, and simulates them there; gives what was

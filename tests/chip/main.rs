@@ -11,12 +11,14 @@ mod every_edge {
 mod icarus;
 #[path = "../shared/scenario.rs"]
 mod scenario;
+mod tool;
 #[path = "../shared/wide8x8.rs"]
 mod wide8x8;
 
 mod activity_agrees_with_waves;
 mod annotated_delays_agree_with_icarus;
 mod blocks_agree_with_their_models;
+mod blocks_are_proven;
 mod clock_period_limits;
 mod every_edge_agrees_with_icarus;
 mod front_ends_agree_with_their_models;
