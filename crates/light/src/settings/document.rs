@@ -92,7 +92,7 @@ impl Document {
     }
 
     /// The folder that files named in it are relative to: the file's own, or else the current one.
-    pub(crate) fn folder(&self) -> &Path {
+    pub fn folder(&self) -> &Path {
         &self.folder
     }
 
