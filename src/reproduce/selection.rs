@@ -67,6 +67,7 @@ impl Selection {
 
 words! {
     /// What can be reproduced.
+    #[non_exhaustive]
     pub enum Part {
         /// A claim of the thesis.
         Claim = "claim",

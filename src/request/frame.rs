@@ -16,6 +16,7 @@ use crate::system::{EngineKind, FrameError, FrameSettings, NoBins, WindowPolicy}
 
 keys! {
     /// Settings of a frame besides its sensor and scene ([`Sources`](super::Sources)). Defaults are those of `gdtof frame`.
+    #[non_exhaustive]
     pub struct FrameRequest {
         /// CLK periods in a laser cycle.
         stop_periods: u32 = 520, in Within(1.0, u32::MAX as f64);

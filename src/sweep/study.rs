@@ -13,6 +13,7 @@ mod reading;
 words! {
     /// What is made of each point.
     #[derive(Default)]
+    #[non_exhaustive]
     pub enum Kind {
         /// A guided frame.
         #[default]

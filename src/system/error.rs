@@ -8,6 +8,7 @@ use crate::ranging::UnequalBins;
 
 /// Why there is no frame.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FrameError {
     /// Something the user gave cannot be.
     #[error(transparent)]

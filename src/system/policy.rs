@@ -42,6 +42,7 @@ pub use bins::NoBins;
 words! {
     /// What a macropixel does if the guide has no estimate for it.
     #[derive(Default)]
+    #[non_exhaustive]
     pub enum Unguided {
         /// Its SPADs are off.
         #[default]
@@ -60,6 +61,7 @@ keys! {
     /// How windows are chosen. The default is that of a single frame: one window in the middle of the guide's estimate, whatever
     /// its uncertainty.
     #[derive(Copy)]
+    #[non_exhaustive]
     pub struct WindowPolicy {
         /// What macropixels without an estimate do.
         unguided: Unguided = Unguided::Off, from "thesis 4.9 for sweep, else chosen";

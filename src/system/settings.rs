@@ -14,6 +14,7 @@ use crate::settings::words;
 words! {
     /// Which engine runs the macropixels that are not probed.
     #[derive(Default, clap::ValueEnum)]
+    #[non_exhaustive]
     pub enum EngineKind {
         /// Event-driven simulation of the netlist with its delays.
         Gate = "gate",

@@ -20,6 +20,7 @@ use crate::settings::Document;
 
 /// What a frame or a drive was asked for.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct TakenSettings {
     /// What reports call the scene.
     pub scene_name: String,

@@ -8,6 +8,7 @@ use crate::system::settings::FrameSettings;
 /// Where the photons of a frame come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Noise {
     /// Every frame has its own photons and guide errors.
     #[default]

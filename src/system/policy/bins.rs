@@ -18,6 +18,7 @@ const FINER: f64 = 1.005;
 
 /// Why a guide's claims make no bins.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NoBins {
     /// Bins are those of delay lines.
     #[error("bins of delay lines do not follow CLK; leave it out")]

@@ -48,6 +48,7 @@ const MANY: f64 = 1000.0;
 keys! {
     /// Two lidars' intensity images, matched.
     #[derive(Copy)]
+    #[non_exhaustive]
     pub struct IntensityStereo {
         /// Distance of the second lidar, to the right.
         baseline_m: f64 ["m"] = 1.0, in Within(0.01, 10.0), from "thesis 5.4.1: up to 1 m";

@@ -24,6 +24,7 @@ keys! {
     ///
     /// It claims the filter's standard deviation, which is right as far as targets move as assumed.
     #[derive(Copy)]
+    #[non_exhaustive]
     pub struct Kalman {
         /// Standard deviation of a measured distance.
         measured_sigma_m: f64 ["m"] = 0.1, in Above(0.0, 1e4),

@@ -94,6 +94,7 @@ impl<'a> GuideInput<'a> {
 
 /// Why a guide has no map.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum GuideError {
     /// A map is for another array.
     #[error(

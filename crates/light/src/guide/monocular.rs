@@ -35,6 +35,7 @@ keys! {
     /// The claim holds three standard deviations of inverse depth, which is what errs normally, on the far side, where they are longer: a third of
     /// 1/(1/ẑ − 3σ) − ẑ, which is ẑ²·σ where that is small. What lies beyond `farthest_m` is not told apart, so the far side ends there, but ẑ²·σ is the least.
     #[derive(Copy)]
+    #[non_exhaustive]
     pub struct Monocular {
         /// Error as a multiple of the scene's camera pair's.
         times_stereo: f64 = 10.0, in Within(0.0, 1e4), from "thesis 5.3.2: more than ten times";

@@ -16,6 +16,7 @@ use crate::settings::{Document, Key, Settings, keys};
 
 /// A guide that goes by a name.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Kind {
     /// Name.
     pub name: &'static str,

@@ -39,6 +39,7 @@ const SAME_RUN: f64 = 0.05;
 keys! {
     /// A radar that looks where the lidar looks.
     #[derive(Copy)]
+    #[non_exhaustive]
     pub struct Radar {
         /// Width of a beam.
         azimuth_beam_deg: f64 ["deg"] = 2.0, in Within(0.1, 90.0),

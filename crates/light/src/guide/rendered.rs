@@ -23,6 +23,7 @@ keys! {
     ///
     /// Its standard deviation is Eq. 27's with `sigma_px` binned pixels, more where pixels about have no answer.
     #[derive(Copy)]
+    #[non_exhaustive]
     pub struct MatchedStereo {
         /// Camera pixels across that are binned to one before matching.
         binning: u32 = 2, in Within(1.0, 16.0), from "thesis 6.3.2";

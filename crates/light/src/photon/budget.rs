@@ -24,6 +24,7 @@ use crate::units::{PLANCK_J_S, SPEED_OF_LIGHT_M_PER_S};
 words! {
     /// How a target's exitance becomes power on the pixel.
     #[derive(Default)]
+    #[non_exhaustive]
     pub enum Convention {
         /// As printed in Equations 9 to 16, with the factor 1/π.
         Thesis = "thesis",
@@ -45,6 +46,7 @@ impl Convention {
 words! {
     /// What the laser lights up (Fig. 30).
     #[derive(Default)]
+    #[non_exhaustive]
     pub enum Spot {
         /// The projected sensor area and nothing else (Eq. 7).
         #[default]

@@ -24,6 +24,7 @@ impl Lens {
 
 /// Transmission of a filter against wavelength; all are 1 at the centre.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum FilterShape {
     /// 1 inside the band, 0 outside.
     TopHat,

@@ -23,6 +23,7 @@ pub struct PulseShape {
 
 /// Why samples are no laser pulse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PulseError {
     /// Fewer than two samples, or far too many.
     #[error("a pulse of {0} samples has no shape; give 2 to 65536")]

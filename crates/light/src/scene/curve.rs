@@ -30,6 +30,7 @@ pub struct Curve {
 
 /// Why points make no curve.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CurveError {
     /// One point, none, or far too many.
     #[error("{0} points make no curve; give 2 to {MOST_POINTS} pairs of numbers")]

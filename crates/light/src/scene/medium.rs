@@ -20,6 +20,7 @@ pub const DROPLET_LIDAR_RATIO_SR: f64 = 18.8;
 keys! {
     /// The air. Clear unless given.
     #[derive(Copy)]
+    #[non_exhaustive]
     pub struct Medium {
         /// Share of light that fog takes away per metre: 3.912 over the visibility.
         ///

@@ -30,6 +30,7 @@ pub struct RigWaypoint {
 
 keys! {
     /// Motion of lidar and cameras together.
+    #[non_exhaustive]
     pub struct Rig {
         /// Velocity of lidar and cameras in the world, [right, down, forward] of how they look at time 0.
         velocity_m_s: DVec3 ["m/s"] = DVec3::ZERO, in SPEED, from "at rest";

@@ -47,6 +47,7 @@ pub struct Scene {
 keys! {
     /// The lidar's optics. Rows and columns are the sensor's business, not the scene's.
     /// What a file leaves out is the built-in street's, but for dark counts: none.
+    #[non_exhaustive]
     pub struct Lidar {
         /// Horizontal field of view; the vertical one follows from the sensor's rows and the shape of its macropixels.
         fov_deg: f64 ["deg"] = 16.0, in Within(0.1, 150.0),
@@ -220,6 +221,7 @@ impl Stereo {
 keys! {
     /// Sunlight on the scene; what a file leaves out is the built-in street's.
     #[derive(Copy)]
+    #[non_exhaustive]
     pub struct Light {
         /// Illuminance of the scene by the sun.
         ///

@@ -6,6 +6,7 @@ use crate::settings::words;
 words! {
     /// Laser pulses without a measurement.
     #[derive(Default)]
+    #[non_exhaustive]
     pub enum PulseWord {
         /// A Gaussian of `pulse_fwhm_ns`.
         #[default]
@@ -16,6 +17,7 @@ words! {
 words! {
     /// Lenses without a measurement.
     #[derive(Default)]
+    #[non_exhaustive]
     pub enum VignettingWord {
         /// None, as in the thesis.
         #[default]
@@ -28,6 +30,7 @@ words! {
 words! {
     /// Laser beams without a measurement.
     #[derive(Default)]
+    #[non_exhaustive]
     pub enum BeamWord {
         /// The same energy for every macropixel (Eq. 7 and 8, [`Spot`](crate::photon::Spot)).
         #[default]
@@ -40,6 +43,7 @@ words! {
 words! {
     /// Filters without a measurement.
     #[derive(Default)]
+    #[non_exhaustive]
     pub enum FilterWord {
         /// Any that lets `solar_irradiance_w_m2` through.
         #[default]
@@ -71,6 +75,7 @@ impl FilterWord {
 words! {
     /// Detection efficiencies without a measurement.
     #[derive(Default)]
+    #[non_exhaustive]
     pub enum PdeWord {
         /// The same at all wavelengths.
         #[default]

@@ -11,6 +11,7 @@ pub struct GreyImage {
 
 /// Why pixels are no image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ImageError {
     /// Too few or too many pixels, or none.
     #[error("{pixels} pixels do not make {width} x {height}")]

@@ -19,6 +19,7 @@ const MOST_SUMS_BYTES: usize = 1 << 30;
 
 /// Along which ways costs are gathered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Paths {
     /// From the left, the right and above.
     Three,

@@ -109,6 +109,7 @@ pub struct MeasuredPulse {
 
 /// Why samples make no pulse.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PulseError {
     /// Too few samples, or no spacing.
     #[error("a measured pulse needs at least three samples and a positive time step between them")]

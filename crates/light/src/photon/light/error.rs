@@ -7,6 +7,7 @@ pub(super) const fn is_amount(number: f64) -> bool {
 
 /// Why light cannot be as described.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LightError {
     /// No segment.
     #[error("a timeline needs at least one segment of light")]
