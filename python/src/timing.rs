@@ -41,9 +41,8 @@ pub(crate) fn timing<'py>(
         Failure::argument("voltage_v, temperature_c", message)
     })?;
     let silicon = Silicon {
-        corner: sensor.corner,
         factor,
-        mismatch: None,
+        ..Silicon::of(&sensor)
     };
     let (verdict, chip, clk_period) = run(py, None, move |_| {
         let verdict = TimingVerdict::of(&sensor, &silicon, (0, 0));

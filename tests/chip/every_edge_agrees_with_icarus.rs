@@ -282,7 +282,7 @@ fn sensors_of_another_kind() {
             if seed > 0 {
                 config.corner = Corner::ALL[random.random_range(0..3)];
                 config.clk_skew_ps = random.random_range(0.0..=200.0);
-                silicon = scenario::silicon(random, config.corner);
+                silicon = scenario::silicon(random, &config);
             }
             let scenario = Scenario::of(random, config);
             all = all + compare_silicon(&scenario, &silicon);

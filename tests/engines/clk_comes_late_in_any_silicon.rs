@@ -35,7 +35,7 @@ fn any(random: &mut StdRng) -> (Scenario, Silicon) {
         },
         ..config
     };
-    let silicon = scenario::silicon(random, config.corner);
+    let silicon = scenario::silicon(random, &config);
     (Scenario::of(random, config), silicon)
 }
 

@@ -49,12 +49,12 @@ enum Clock {
 fn silicon(random: &mut StdRng, config: &SensorConfig) -> Silicon {
     let sigma = random.random_range(0.0..0.3);
     Silicon {
-        corner: config.corner,
         factor: [1.0, random.random_range(0.7..1.5)][random.random_range(0..2)],
         mismatch: random.random_bool(0.8).then(|| Mismatch {
             sigma,
             seed: random.random(),
         }),
+        ..Silicon::of(config)
     }
 }
 

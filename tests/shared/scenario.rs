@@ -1,9 +1,11 @@
 //! Random sensors with random start values, exposures and SPAD pulses.
 
+use std::path::{Path, PathBuf};
+
 use guided_dtof::chip::{
     AfterBorrow, EventType, Exposure, Mode, PCounter, SensorConfig, Silicon, Tap,
 };
-use guided_dtof::netlist::{Conditions, Corner, Mismatch};
+use guided_dtof::netlist::{Conditions, Mismatch};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
 use guided_dtof::units::Time;
 use rand::{RngExt, rngs::StdRng};
@@ -113,9 +115,9 @@ pub fn p_counters() -> Vec<(PCounter, Tap, AfterBorrow)> {
     all
 }
 
-/// What a chip of this corner is made of: any process, voltage and temperature, and mismatch now and then.
+/// What a chip of this description is made of, its library in any conditions: any process, voltage and temperature, and mismatch now and then.
 #[allow(dead_code)]
-pub fn silicon(random: &mut StdRng, corner: Corner) -> Silicon {
+pub fn silicon(random: &mut StdRng, config: &SensorConfig) -> Silicon {
     let conditions = Conditions {
         process: Corner::ALL[random.random_range(0..3)],
         voltage_v: random.random_range(0.95..1.3),
@@ -126,13 +128,18 @@ pub fn silicon(random: &mut StdRng, corner: Corner) -> Silicon {
         seed: random.random(),
     };
     Silicon {
-        corner,
         factor: match random.random_bool(0.3) {
             true => 1.0,
             false => conditions.delay_factor().expect("delays are known there"),
         },
         mismatch: random.random_bool(0.3).then_some(mismatch),
+        ..Silicon::of(config)
     }
+}
+
+/// The library of invented numbers.
+pub fn example_library() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("vectors/liberty/example.lib")
 }
 
 fn random_sensor(random: &mut StdRng, rows: usize, cols: usize) -> SensorConfig {
@@ -185,5 +192,15 @@ fn random_sensor(random: &mut StdRng, rows: usize, cols: usize) -> SensorConfig 
         EventType::Greater => 0..=config.spads() as u8 - 1,
     };
     config.threshold = config.threshold.clamp(*possible.start(), *possible.end());
+    // One in six is made of a library, by a bit that no other draw sees.
+    if clk_hz.to_bits() % 6 == 0 {
+        for file in [
+            &mut config.liberty,
+            &mut config.liberty_slow,
+            &mut config.liberty_fast,
+        ] {
+            *file = example_library();
+        }
+    }
     config
 }
