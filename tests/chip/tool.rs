@@ -8,11 +8,10 @@ pub fn is_here(program: &str, so: &str) -> bool {
     if Command::new(program).arg("-V").output().is_ok() {
         return true;
     }
-    // Not eprintln, which cargo hides where a test passes.
-    let _ = writeln!(
-        std::io::stderr(),
-        "SKIPPED: {program} is not installed, so {so} (apt-get install {program})"
-    );
+    let said =
+        format!("SKIPPED: {program} is not installed, so {so} (apt-get install {program})\n");
+    // Not eprintln, which cargo hides where a test passes; at once, beside other tests.
+    let _ = std::io::stderr().write_all(said.as_bytes());
     assert!(std::env::var_os("CI").is_none(), "CI must have {program}");
     false
 }
