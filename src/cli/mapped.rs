@@ -100,13 +100,13 @@ pub(super) fn write(folder: &Path, config: &SensorConfig) -> anyhow::Result<()> 
         write_mapped_sdf(out, netlist, &library.liberty, characterised)
     })?;
     mapped.write_sdc(&folder.join("mapped.sdc"))?;
+    let (area, leakage_w) = characterised.silicon(netlist, &library.liberty, 0);
     tell(format_args!(
-        "mapped.v, mapped.sdf and mapped.sdc in {}: a macropixel of {} in {}, area {:.0}, leakage {:.3} nW\n",
+        "mapped.v, mapped.sdf and mapped.sdc in {}: a macropixel of {} in {}, area {area:.0}, leakage {:.3} nW\n",
         folder.display(),
         netlist.cells().len(),
         library.liberty.name,
-        characterised.area,
-        characterised.leakage_w * 1e9
+        leakage_w * 1e9
     ))?;
     Ok(())
 }

@@ -5,8 +5,9 @@ use clap::Args;
 use super::SensorArgs;
 use super::voice::{say, say_json};
 use crate::analysis::{Capacitances, MacropixelPower};
-use crate::chip::{Exposure, Mode, PCounter, SensorConfig};
+use crate::chip::{CellLibrary, Exposure, Mode, PCounter, SensorConfig, macropixel};
 use crate::files::InputError;
+use crate::netlist::Netlist;
 use crate::photon::{SpadEvent, apply_dead_time};
 use crate::report::Grid;
 use crate::units::Time;
@@ -59,6 +60,39 @@ struct Variant {
     mean_w: f64,
     #[serde(flatten)]
     power: MacropixelPower,
+    /// Area and leakage by block, in a library's cells.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    silicon: Vec<BlockSilicon>,
+}
+
+/// A block in a library's cells.
+#[derive(serde::Serialize)]
+struct BlockSilicon {
+    block: String,
+    /// In the library's unit, which for most is µm².
+    area: f64,
+    leakage_w: f64,
+}
+
+/// The blocks of a macropixel, the whole last; none with the built-in cells.
+fn silicon(config: &SensorConfig) -> Vec<BlockSilicon> {
+    let Some(library) = CellLibrary::of(config)
+        .ok()
+        .and_then(CellLibrary::from_file)
+    else {
+        return Vec::new();
+    };
+    let netlist = Netlist::elaborate(&macropixel::circuit(config));
+    let characterised = library.characterised(&netlist);
+    let of = |scope: usize| {
+        let (area, leakage_w) = characterised.silicon(&netlist, &library.liberty, scope);
+        BlockSilicon {
+            block: netlist.scopes()[scope].name.clone(),
+            area,
+            leakage_w,
+        }
+    };
+    netlist.children(0).chain([0]).map(of).collect()
 }
 
 impl Variant {
@@ -131,6 +165,7 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
             cycle_j: power.cycle_j(),
             mean_w: power.mean_w(),
             power,
+            silicon: silicon(&config),
         });
     }
     if args.json {
@@ -141,7 +176,36 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
         config.clk_hz / 1e6,
         table(&variants, config.pixels())
     ))?;
+    if let Some(library) = CellLibrary::of(&config)
+        .ok()
+        .and_then(CellLibrary::from_file)
+    {
+        say(format_args!(
+            "\nArea in the unit of {} (leakage, nW)\n{}",
+            library.liberty.name,
+            silicon_table(&variants)
+        ))?;
+    }
     Ok(())
+}
+
+fn silicon_table(variants: &[Variant]) -> Grid {
+    let headings = variants.iter().map(Variant::heading);
+    let mut grid = Grid::new(["block".to_owned()].into_iter().chain(headings));
+    for block in &variants[0].silicon {
+        let cell = |variant: &Variant| {
+            let found = variant
+                .silicon
+                .iter()
+                .find(|other| other.block == block.block);
+            found.map_or("-".to_owned(), |of| {
+                format!("{:.1} ({:.4})", of.area, of.leakage_w * 1e9)
+            })
+        };
+        let cells = variants.iter().map(cell);
+        grid.push([block.block.clone()].into_iter().chain(cells));
+    }
+    grid
 }
 
 fn capacitances(args: &PowerArgs) -> Result<Capacitances, InputError> {

@@ -59,10 +59,6 @@ impl Environment {
 pub struct Characterised {
     /// Delays and limits of every cell; those of cells with delays of their own are the library's, too.
     pub timing: Timing,
-    /// Area, in the library's unit, which for most is µm².
-    pub area: f64,
-    /// Leakage, W.
-    pub leakage_w: f64,
     /// Which drive of each stage, by cell.
     drives: Vec<[u8; MOST_STAGES]>,
     nets: Nets,
@@ -173,6 +169,21 @@ impl Characterised {
         }
         work.settle();
         work.finish()
+    }
+
+    /// Area (in the library's unit) and leakage (W) of the cells below a scope of `netlist`.
+    pub fn silicon(&self, netlist: &Netlist, library: &Liberty, scope: usize) -> (f64, f64) {
+        let first = netlist.cells_of(scope).start;
+        let cells = first..first + netlist.scopes()[scope].module.total_cells();
+        let (mut area, mut leakage_w) = (0.0, 0.0);
+        for cell in cells {
+            let (composite, _) = self.instance(netlist, &library.map, cell);
+            for stage in composite.used() {
+                area += composite.cell(stage).area;
+                leakage_w += composite.cell(stage).leakage_w;
+            }
+        }
+        (area, leakage_w)
     }
 
     /// The largest limits of any flip-flop of a kind in `netlist`, the same in every corner; none if there is none.
@@ -387,14 +398,11 @@ impl<'w> Work<'w> {
 
     fn finish(self) -> Characterised {
         let mut timing = Timing::of_library(self.netlist, &Library::default(), Corner::Typ);
-        let (mut area, mut leakage_w) = (0.0, 0.0);
         let mut adopted = HashMap::new();
         for block in &self.blocks {
             let alone = &block.alone.1;
             let at = adopted.entry(Arc::as_ptr(&block.alone)).or_insert(None);
             *at = Some(timing.adopt(block.cells.start, &alone.timing, *at));
-            area += alone.area;
-            leakage_w += alone.leakage_w;
         }
         for &index in &self.outside {
             let cell = &self.netlist.cells()[index];
@@ -404,15 +412,9 @@ impl<'w> Work<'w> {
             if cell.kind.is_flip_flop() {
                 timing.set_limits(index, limits);
             }
-            for stage in composite.used() {
-                area += composite.cell(stage).area;
-                leakage_w += composite.cell(stage).leakage_w;
-            }
         }
         Characterised {
             timing,
-            area,
-            leakage_w,
             drives: self.drives,
             nets: self.nets,
             blocks: self.blocks,

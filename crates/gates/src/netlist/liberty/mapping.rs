@@ -400,3 +400,6 @@ fn order(own: TruthTable, wanted: TruthTable) -> Option<Vec<usize>> {
     };
     orders.iter().find(fits).map(|order| order.to_vec())
 }
+
+#[cfg(test)]
+mod tests;
