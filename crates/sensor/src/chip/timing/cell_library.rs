@@ -125,19 +125,11 @@ impl CellLibrary {
         self.0
     }
 
-    /// Delays of a netlist in a corner, where each cell is the one at `path` of its index.
-    pub(super) fn timing(
-        self,
-        netlist: &Netlist,
-        corner: Corner,
-        path: impl Fn(usize) -> String,
-    ) -> Timing {
+    /// Delays of a netlist in a corner; cells with delays of their own have the library's.
+    pub(super) fn timing(self, netlist: &Netlist, corner: Corner) -> Timing {
         match self.0 {
-            None => Timing::nominal_as(netlist, self.cells(), corner, path),
-            Some(from_file) => {
-                let timing = from_file.characterised(netlist).timing;
-                timing.with_own_delays(netlist, corner, path)
-            }
+            None => Timing::of_library(netlist, self.cells(), corner),
+            Some(from_file) => from_file.characterised(netlist).timing,
         }
     }
 }

@@ -17,10 +17,11 @@
 
 use std::sync::OnceLock;
 
+use super::cell_library::CellLibrary;
 use super::silicon::Silicon;
 use crate::chip::{Probe, Probes, SensorConfig, array};
 use crate::logic::Logic::{One, Zero};
-use crate::netlist::{Arrivals, CellKind, Edge, NetId, Netlist, StaticTiming, Timing};
+use crate::netlist::{Arrivals, CellKind, Corner, Edge, NetId, Netlist, StaticTiming, Timing};
 use crate::units::Time;
 
 /// Earliest and latest.
@@ -56,6 +57,8 @@ pub struct MacropixelCircuit {
     disabled: NetId,
     /// Path of each cell before and, where the macropixel is in it, after its name.
     cell_paths: OnceLock<Vec<(String, Option<String>)>>,
+    /// Delays of the library's cells: a macropixel in a Liberty file's takes milliseconds.
+    library_timing: OnceLock<(CellLibrary, Corner, Timing)>,
 }
 
 impl MacropixelCircuit {
@@ -77,6 +80,7 @@ impl MacropixelCircuit {
             clear: probes.counter_clear(&netlist),
             disabled: probes.disabled(&netlist),
             cell_paths: OnceLock::new(),
+            library_timing: OnceLock::new(),
             probes,
             netlist,
         }
@@ -100,7 +104,16 @@ impl MacropixelCircuit {
             (path, None) => path.clone(),
             (before, Some(after)) => [before, name.as_str(), after].concat(),
         };
-        silicon.timing_as(&self.netlist, path)
+        let of_library = || silicon.library_timing(&self.netlist);
+        let cells = (silicon.library, silicon.corner);
+        let (library, corner, known) = self
+            .library_timing
+            .get_or_init(|| (cells.0, cells.1, of_library()));
+        let timing = match (*library, *corner) == cells {
+            true => known.clone(),
+            false => of_library(),
+        };
+        silicon.timing_of(&self.netlist, timing, path)
     }
 
     /// Dotted path of the macropixel, the top's name first.

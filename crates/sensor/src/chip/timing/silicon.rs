@@ -60,7 +60,22 @@ impl Silicon {
 
     /// Delays of another netlist that differs from this one in names only: there each cell is at `path` of its index.
     pub(crate) fn timing_as(&self, netlist: &Netlist, path: impl Fn(usize) -> String) -> Timing {
-        let nominal = self.library.timing(netlist, self.corner, &path);
+        self.timing_of(netlist, self.library_timing(netlist), path)
+    }
+
+    /// Delays of the library's cells in a netlist, whatever they are called.
+    pub(crate) fn library_timing(&self, netlist: &Netlist) -> Timing {
+        self.library.timing(netlist, self.corner)
+    }
+
+    /// [`Silicon::timing_as`] where the library's delays are known.
+    pub(crate) fn timing_of(
+        &self,
+        netlist: &Netlist,
+        library: Timing,
+        path: impl Fn(usize) -> String,
+    ) -> Timing {
+        let nominal = library.with_own_delays(netlist, self.corner, &path);
         varied_as(netlist, &nominal, self.factor, self.mismatch, path)
     }
 
