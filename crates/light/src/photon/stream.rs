@@ -24,7 +24,7 @@
 //! next one; none comes before the exposure.
 //!
 //! Macropixels in bright light are drawn by laser cycle instead (`bright`). Photons whose avalanches trigger others
-//! ([`SpadModel`]) are a stream of their own: parts of a Poisson process chosen by chance are independent.
+//! ([`SpadModel`](super::SpadModel)) are a stream of their own: parts of a Poisson process chosen by chance are independent.
 //!
 //! The photons under one key are a pure function of (seed, macropixel, slot, group): their Poisson number is drawn
 //! first, then each takes 32 random bits for its cycle, SPAD and time (a signal photon 64, and 128 more for a measured
@@ -34,9 +34,9 @@
 //! Timing jitter of a SPAD displaces the points of a Poisson process, which leaves it one: jitter of background changes
 //! nothing, and that of the signal is part of the pulse.
 //!
-//! Light that is a list ([`PixelLight`]) is drawn layer by layer: each is such a stream with a key of its own, in some laser
+//! Light that is a list ([`PixelLight`](super::PixelLight)) is drawn layer by layer: each is such a stream with a key of its own, in some laser
 //! cycles. A profile, or SPADs that differ, are drawn at their greatest rate and thinned by a random word that is a pure
-//! function of the photon's own (`limits`); whatever SPADs there are, that leaves a Poisson process.
+//! function of the photon's own (`thinning`); whatever SPADs there are, that leaves a Poisson process.
 //!
 //! Limits of the model: no spread of dead time between SPADs; background photons come at multiples of some 20 fs
 //! ([`Slots`]).
