@@ -69,6 +69,7 @@ impl Block {
             ),
             PCounter::Comparator => ("up_counter.v", vec![("STEP", config.step_periods)]),
             PCounter::Memoryless => ("memoryless_counter.v", vec![("BORROW", has_borrow)]),
+            other => panic!("{other:?} has no RTL in vectors/formal"),
         };
         parameters.extend(own);
         let has_pulse = config.p_counter == PCounter::Memoryless;

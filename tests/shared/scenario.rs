@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use guided_dtof::chip::{
     AfterBorrow, EventType, Exposure, Mode, PCounter, SensorConfig, Silicon, Tap,
 };
-use guided_dtof::netlist::{Conditions, Mismatch};
+use guided_dtof::netlist::{Conditions, Corner, Mismatch};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
 use guided_dtof::units::Time;
 use rand::{RngExt, rngs::StdRng};
