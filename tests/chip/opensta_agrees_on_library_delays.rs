@@ -44,7 +44,8 @@ fn arcs(text: &str, unit_ps: f64) -> Arcs {
             last.parse::<f64>().ok().map(|value| value * unit_ps)
         });
         let values: Vec<Option<f64>> = values.collect();
-        let edges = [values[0], *values.get(1).unwrap_or(&values[0])];
+        // OpenSTA writes a preset's arc with a rise alone.
+        let edges = [values[0], values.get(1).copied().flatten()];
         let known = found
             .entry((instance.clone(), from.to_owned(), to.to_owned()))
             .or_default();
