@@ -46,7 +46,7 @@ impl Bench {
         let drives: Vec<Drive> = inputs
             .iter()
             .map(|&(name, value)| {
-                time = time + Time::from_ps(1000);
+                time += Time::from_ps(1000);
                 let net = self.netlist.net(name).unwrap();
                 let value = if value { Logic::One } else { Logic::Zero };
                 Drive { time, net, value }
