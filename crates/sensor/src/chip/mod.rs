@@ -19,6 +19,7 @@ mod blocks;
 pub mod config;
 pub mod empty_pixel;
 pub mod exposure;
+pub mod own_block;
 pub mod probes;
 pub mod race;
 mod sensor_file;
@@ -36,6 +37,7 @@ pub use config::{
     AfterBorrow, EventType, FrontEnd, Mode, Overflow, PCounter, SensorConfig, Tap, Tdc,
 };
 pub use exposure::{Exposure, ExposureError};
+pub use own_block::OwnBlock;
 pub use probes::{LoadPins, LoadProbe, Probe, Probes, ReadPins, ReadProbe, SensorPins};
 pub use race::{Conflict, Cure, Irregular, NoAim, Race};
 pub use sensor_file::{Lines, NeverMet, SensorFault};

@@ -221,7 +221,13 @@ impl SensorConfig {
     pub fn read_document(document: &Document) -> Result<Self, InputError> {
         let mut faults = Vec::new();
         let read = document.section::<Self>("", document.table(), &mut faults);
-        let config: Self = read.try_into().unwrap_or_default();
+        let mut config: Self = read.try_into().unwrap_or_default();
+        if let Some(block) = &mut config.p_counter_block
+            && let Err(message) = block.load(document.folder())
+        {
+            let path = "p_counter_block".to_owned();
+            faults.push(Fault { path, message });
+        }
         if faults.is_empty() {
             let fault = config.check().err();
             faults.extend(fault.map(|fault| Fault {
@@ -320,6 +326,13 @@ impl SensorConfig {
         }
         if !variant.has_memory && self.after_borrow == AfterBorrow::Hold {
             return Err(SensorFault::HoldWithoutMemory(p_counter));
+        }
+        if let Some(block) = &self.p_counter_block {
+            let fits = block.check_counter(&(variant.circuit)(self));
+            fits.map_err(|why| SensorFault::Value {
+                key: "p_counter_block".to_owned(),
+                why,
+            })?;
         }
         ChipTiming::of(self).pulses.follow(self.dead_time_ns)?;
         let half_period_ps = 0.5e12 / self.clk_hz;

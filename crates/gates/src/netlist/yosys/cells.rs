@@ -38,6 +38,16 @@ pub(super) struct Placing<'d> {
 struct Given<'d> {
     name: &'d str,
     of: &'d Placed,
+    inverses: &'d HashMap<u64, u64>,
+}
+
+impl Given<'_> {
+    fn inverse_of_q(&self) -> Option<u64> {
+        match self.of.connections.get("Q")?.as_slice() {
+            [Bit::Net(q)] => self.inverses.get(q).copied(),
+            _ => None,
+        }
+    }
 }
 
 impl<'d> Placing<'d> {
@@ -62,12 +72,17 @@ impl<'d> Placing<'d> {
         self.m.finish()
     }
 
-    /// Places what a cell is made of.
-    pub(super) fn cell(&mut self, name: &str, of: &Placed) -> Result<(), YosysError> {
+    /// Places what a cell is made of; `inverses` has the nets that are inverses of a flip-flop's Q.
+    pub(super) fn cell(
+        &mut self,
+        name: &str,
+        of: &Placed,
+        inverses: &HashMap<u64, u64>,
+    ) -> Result<(), YosysError> {
         if of.kind == "$scopeinfo" {
             return Ok(());
         }
-        match place(self, &Given { name, of })? {
+        match place(self, &Given { name, of, inverses })? {
             true => Ok(()),
             false => Err(YosysError::Cell {
                 module: self.module.to_owned(),
@@ -213,7 +228,7 @@ fn cure(kind: &str) -> &'static str {
 
 /// What a generic flip-flop has besides D and Q; whether it is active high.
 #[derive(Default)]
-struct FlipFlop {
+pub(super) struct FlipFlop {
     clock: bool,
     enable: Option<bool>,
     /// With the value that it makes.
@@ -229,7 +244,7 @@ struct FlipFlop {
 
 impl FlipFlop {
     /// What the name of a cell says, if it is a flip-flop's.
-    fn of(kind: &str) -> Option<Self> {
+    pub(super) fn of(kind: &str) -> Option<Self> {
         let (family, letters) = kind
             .strip_prefix("$_")?
             .strip_suffix('_')?
@@ -296,6 +311,8 @@ impl FlipFlop {
     fn place(&self, to: &mut Placing<'_>, given: &Given<'_>) -> Result<(), YosysError> {
         let mut data = to.pin(given, "D")?;
         let q = to.pin(given, "Q")?;
+        let qn = given.inverse_of_q().and_then(|n| to.nets.get(&n).copied());
+        let qn = qn.unwrap_or(Net::NONE);
         let clock = to.pin(given, "C")?;
         let clock = to.high(clock, self.clock);
         let is_enabled_first = !self.enable_wins;
@@ -325,17 +342,17 @@ impl FlipFlop {
             let zero = to.not(value);
             let set = to.gate(And2, &[load, value]);
             let reset = to.gate(And2, &[load, zero]);
-            to.add(Dffsr, &[data, clock, reset, set], &[q, Net::NONE]);
+            to.add(Dffsr, &[data, clock, reset, set], &[q, qn]);
         } else if let Some((set, reset)) = self.set_and_reset {
             let set = active(to, "S", set)?;
             let reset = active(to, "R", reset)?;
-            to.add(Dffsr, &[data, clock, reset, set], &[q, Net::NONE]);
+            to.add(Dffsr, &[data, clock, reset, set], &[q, qn]);
         } else if let Some((is_high, value)) = self.reset {
             let reset = active(to, "R", is_high)?;
             // The library's flip-flop resets to 0: for 1 it holds the inverse.
             let (data, outputs) = match value {
-                false => (data, [q, Net::NONE]),
-                true => (to.not(data), [Net::NONE, q]),
+                false => (data, [q, qn]),
+                true => (to.not(data), [qn, q]),
             };
             to.add(Dffr, &[data, clock, reset], &outputs);
         } else {
@@ -347,7 +364,7 @@ impl FlipFlop {
                 pin: "R",
                 problem: "must be 0, which takes an input of the module; give it one",
             })?;
-            to.add(Dffr, &[data, clock, never], &[q, Net::NONE]);
+            to.add(Dffr, &[data, clock, never], &[q, qn]);
         }
         Ok(())
     }

@@ -5,7 +5,8 @@
 //! ```
 //!
 //! Ports and nets keep their names and order. Yosys names most cells by where it made them, so cells get numbers. Flip-flops
-//! power up unknown, as in silicon: initial values are not read. What is don't-care in Yosys is 0.
+//! power up unknown, as in silicon: initial values are not read. What is don't-care in Yosys is 0. An inverter behind a flip-flop
+//! is its output QN.
 //!
 //! The crate `yosys-netlist-json` keeps ports and cells in hash maps, which have no order; so the few fields that matter are read here.
 
@@ -25,7 +26,7 @@ use serde::de::{Deserializer, MapAccess, Visitor};
 use super::builder::is_identifier;
 use super::module::{Module, Net};
 use super::{CellKind, ModuleBuilder};
-use cells::Placing;
+use cells::{FlipFlop, Placing};
 pub use error::YosysError;
 
 /// Most bytes of a file: a macropixel has 1.2 MB, a block a tenth of that.
@@ -216,9 +217,22 @@ impl Described {
                 }
             }
         }
+        let kinds: HashMap<&str, &Placed> = self.cells.0.iter().map(|(n, of)| (&**n, of)).collect();
+        let inverses = self.cells.0.iter().filter_map(|(_, of)| {
+            let (from, to) = of.inverts()?;
+            let driver = kinds.get(driven.get(&from)?)?;
+            driver.is_flip_flop().then_some((from, to))
+        });
+        // Yosys has merged inverters of one net; of others the last one counts.
+        let inverses: HashMap<u64, u64> = inverses.collect();
         let mut placing = Placing::new(m, nets, tie, name);
         for (cell, of) in &self.cells.0 {
-            placing.cell(cell, of)?;
+            let is_qn = of
+                .inverts()
+                .is_some_and(|(from, to)| inverses.get(&from) == Some(&to));
+            if !is_qn {
+                placing.cell(cell, of, &inverses)?;
+            }
         }
         for (bit, port) in joined {
             let from = placing.net(bit).ok_or_else(|| YosysError::Undriven {
@@ -288,6 +302,19 @@ fn is_ours(name: &str) -> bool {
 }
 
 impl Placed {
+    fn is_flip_flop(&self) -> bool {
+        FlipFlop::of(&self.kind).is_some()
+    }
+
+    /// The nets of an inverter.
+    fn inverts(&self) -> Option<(u64, u64)> {
+        let net = |pin| match self.connections.get(pin).map(Vec::as_slice) {
+            Some([Bit::Net(n)]) => Some(*n),
+            _ => None,
+        };
+        (self.kind == "$_NOT_").then_some((net("A")?, net("Y")?))
+    }
+
     /// Pins that drive nets.
     fn outputs(&self) -> impl Iterator<Item = &(String, Vec<Bit>)> {
         self.connections.0.iter().filter(|(pin, _)| {

@@ -350,3 +350,21 @@ fn of_several_modules_one_is_the_top() {
         "has no module c; give a or b"
     );
 }
+
+#[test]
+fn an_inverter_behind_a_flip_flop_is_its_other_output() {
+    let ports = r#""C": {"direction": "input", "bits": [2]}, "R": {"direction": "input", "bits": [3]}, "Q": {"direction": "output", "bits": [4]}"#;
+    let toggle = |to: char| {
+        format!(
+            r#""n": {{"type": "$_NOT_", "connections": {{"A": [4], "Y": [5]}}}},
+            "f": {{"type": "$_DFF_PP{to}_", "connections": {{"C": [2], "D": [5], "R": [3], "Q": [4]}}}}"#
+        )
+    };
+    let kinds = |to| {
+        let read = Module::from_yosys(&module(ports, &toggle(to), ""), None).unwrap();
+        read.cells().iter().map(|c| c.kind).collect::<Vec<_>>()
+    };
+    assert_eq!(kinds('0'), [CellKind::Dffr]);
+    // The flip-flop holds the inverse, whose inverse is what it takes.
+    assert_eq!(kinds('1'), [CellKind::Inv, CellKind::Dffr]);
+}

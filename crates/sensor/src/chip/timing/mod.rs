@@ -26,6 +26,7 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 
 use super::config::{AfterBorrow, FrontEnd, Overflow, PCounter, SensorConfig, Tap, Tdc};
 use super::front_end::PulseLimits;
+use super::own_block::OwnBlock;
 use super::photon_line;
 use crate::netlist::{CellKind, CheckKind, Corner};
 use crate::units::Time;
@@ -206,6 +207,7 @@ struct Circuit {
     coincident_spads: usize,
     counter_bits: usize,
     p_counter: PCounter,
+    own: Option<u64>,
     tap: Tap,
     after_borrow: AfterBorrow,
     step_periods: usize,
@@ -224,6 +226,7 @@ impl Circuit {
             coincident_spads: config.coincident_spads,
             counter_bits: config.counter_bits,
             p_counter: config.p_counter,
+            own: config.p_counter_block.as_ref().and_then(OwnBlock::hash),
             tap: config.tap,
             after_borrow: config.after_borrow,
             step_periods: config.step_periods,
