@@ -146,10 +146,13 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
             wanted.push(variant);
         }
     }
+    // The first is the sensor's own; what it is compared with is built in.
+    let mut own = config.p_counter_block.clone();
     for (p_counter, mode) in wanted {
         let config = SensorConfig {
             p_counter,
             mode,
+            p_counter_block: own.take(),
             ..SensorConfig::clone(&config)
         };
         if config.check().is_err() {
@@ -159,7 +162,10 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
         let pulses = pulses(&config, &exposure, args.counts_hz);
         let power = MacropixelPower::of(&config, &exposure, start, &pulses, &capacitances);
         variants.push(Variant {
-            p_counter: p_counter.name(),
+            p_counter: match config.p_counter_block {
+                Some(_) => "own block",
+                None => p_counter.name(),
+            },
             mode,
             p_counter_share: power.of_blocks_j(&P_COUNTER_BLOCKS) / power.cycle_j(),
             cycle_j: power.cycle_j(),

@@ -23,6 +23,9 @@ pub(super) struct SensorArgs {
     /// Columns of macropixels, instead of the sensor's.
     #[arg(long, value_name = "C")]
     cols: Option<usize>,
+    /// Netlist (JSON of Yosys) in the place of a built-in block: p_counter=FILE, or p_counter=FILE:MODULE.
+    #[arg(long, value_name = "BLOCK=FILE")]
+    block: Vec<String>,
     /// Set one key of the sensor or scene, whatever its file says, for example sensor.clk_hz=300e6,
     /// "sensor.clk_hz=300 MHz" or scene.lidar.pde=0.2. May be repeated; the last value wins. `gdtof sensor` and
     /// `gdtof scene` list the keys.
@@ -102,6 +105,7 @@ impl SensorArgs {
             scene,
             rows: self.rows,
             cols: self.cols,
+            block: self.block.clone(),
             set: self.library_set().chain(self.set.iter().cloned()).collect(),
             spelling: Spelling::Options,
         }

@@ -3,7 +3,7 @@
 //! ```text
 //!   sensor ────────┐                      scene ─────────┐
 //!   set sensor.… ──┼─► Sensor             set scene.… ───┴─► Scene
-//!   rows, cols ────┘
+//!   rows, cols, block ─┘
 //! ```
 
 use std::path::{Path, PathBuf};
@@ -29,6 +29,8 @@ pub struct Sources {
     pub rows: Option<usize>,
     /// Macropixel columns, instead of the sensor's.
     pub cols: Option<usize>,
+    /// Netlists in the place of built-in blocks, as `p_counter=my.json`, relative to the current folder.
+    pub block: Vec<String>,
     /// Single keys, as `sensor.clk_hz=300e6`, `sensor.clk_hz=300 MHz` or `scene.lidar.pde=0.2`; the last one counts.
     pub set: Vec<String>,
     /// What complaints call these settings.
@@ -90,6 +92,20 @@ impl Sources {
                 let value = i64::try_from(value).unwrap_or(i64::MAX);
                 sensor.set_value(key, value.into(), &self.spelling.name(key));
             }
+        }
+        for block in &self.block {
+            let option = format!("{} {block}", self.spelling.name("block"));
+            let Some(file) = block.strip_prefix("p_counter=") else {
+                let message = "is no block; give p_counter=FILE";
+                return Err(InputError::new(option, message));
+            };
+            // A path in a sensor file is relative to that.
+            let file = match sensor.folder() == Path::new("") {
+                true => PathBuf::from(file),
+                false => std::path::absolute(file).unwrap_or_else(|_| file.into()),
+            };
+            let file = file.to_string_lossy().into_owned();
+            sensor.set_value("p_counter_block", file.into(), &option);
         }
         Ok(SensorConfig::read_document(&sensor)?.into())
     }

@@ -99,6 +99,11 @@ fn of_irregular(why: &Irregular, spelling: Spelling) -> String {
         Irregular::LocalStopRepeats { .. } => {
             format!("give after_borrow = \"hold\", or other {periods}")
         }
+        Irregular::OwnCounter(_) => {
+            "give a P-counter that raises LOCAL_STOP once, a step later from each start value on"
+                .to_owned()
+        }
+        Irregular::OwnCodes => "give tdc = \"clocked\"".to_owned(),
         Irregular::OutOfStep { round, .. } => {
             format!("give {periods} {round}, or another p_counter")
         }

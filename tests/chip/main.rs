@@ -42,3 +42,4 @@ mod timing_checks_find_violations;
 mod timing_verdicts_agree_with_gates;
 mod traces_are_deterministic;
 mod waves_read_back;
+mod yosys_gives_back_what_it_was_given;

@@ -4,6 +4,8 @@
 mod scenario;
 #[path = "../shared/wide8x8.rs"]
 mod wide8x8;
+#[path = "../shared/yosys.rs"]
+mod yosys;
 
 mod a_sensor_in_one_file;
 mod bins_lie_where_edges_say;
@@ -15,6 +17,7 @@ mod cycle_agrees_with_gate;
 mod delay_lines_time_photons;
 mod late_cycle_is_that_of_the_whole_run;
 mod light_is_a_list;
+mod own_p_counters_agree_with_built_in_ones;
 mod photons_drawn_are_those_of_the_exposure;
 mod timed_agrees_with_gate;
 mod window_sees_what_the_full_stream_shows;

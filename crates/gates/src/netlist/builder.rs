@@ -206,7 +206,8 @@ impl ModuleBuilder {
         output
     }
 
-    fn unnamed(&mut self) -> Net {
+    /// A new net without a name of its own.
+    pub(super) fn unnamed(&mut self) -> Net {
         let name = format!("n{}", self.module.net_count);
         self.declare(name, 1, false, false)[0]
     }
@@ -359,7 +360,7 @@ impl ModuleBuilder {
     }
 }
 
-fn is_identifier(name: &str) -> bool {
+pub(super) fn is_identifier(name: &str) -> bool {
     let mut bytes = name.bytes();
     bytes
         .next()

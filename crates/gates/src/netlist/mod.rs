@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   ModuleBuilder ──finish──► Module (hierarchical, shared) ──elaborate──► Netlist (flat)
-//!                                │                                           │
+//!   JSON of Yosys ──────────────►│                                           │
 //!                                └─► Verilog                                 └─► simulation kernels
 //! ```
 //!
@@ -29,6 +29,7 @@ mod static_timing;
 mod timing;
 mod variation;
 mod verilog;
+mod yosys;
 
 pub use builder::ModuleBuilder;
 pub(crate) use cell::next_state;
@@ -52,3 +53,4 @@ pub use variation::{Conditions, derated_limits, varied, varied_as};
 pub use verilog::{
     write_cells, write_delays, write_modules, write_parametric_cells, write_standard_cells,
 };
+pub use yosys::YosysError;

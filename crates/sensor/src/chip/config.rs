@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 
 use super::blocks::metdc_delay_line::Elements;
+use super::own_block::OwnBlock;
 use crate::netlist::Corner;
 use crate::photon::{MOST_SPADS, SpadGrid, count_bits};
 use crate::settings::Range::{Above, OneOf, Within};
@@ -143,6 +144,11 @@ keys! {
         counter_bits: usize = 9, in Within(2.0, 12.0), from "thesis 4.5";
         /// How the P-counter is built.
         p_counter: PCounter = PCounter::Ripple, from "thesis 4.4, Fig. 53";
+        /// Netlist that takes the P-counter's place: JSON of Yosys, as FILE or FILE:MODULE.
+        ///
+        /// Relative to the sensor file.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        p_counter_block: Option<OwnBlock> = None, from "none: the built-in p_counter";
         /// Bit that LOCAL_STOP comes from; the comparator has no msb.
         tap: Tap = Tap::Borrow,
             from "chosen: the thesis's msb (4.5) is high from the reset on for start values of 2^(n-1) and more";

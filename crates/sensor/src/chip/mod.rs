@@ -20,6 +20,7 @@ pub mod config;
 pub mod empty_pixel;
 pub mod exposure;
 mod frame_time;
+pub mod own_block;
 pub mod probes;
 pub mod race;
 mod sensor_file;
@@ -37,6 +38,7 @@ pub use config::{
     AfterBorrow, EventType, FrontEnd, Mode, Overflow, PCounter, SensorConfig, Tap, Tdc,
 };
 pub use exposure::{Exposure, ExposureError};
+pub use own_block::OwnBlock;
 pub use probes::{LoadPins, LoadProbe, Probe, Probes, ReadPins, ReadProbe, SensorPins};
 pub use race::{Conflict, Cure, Irregular, NoAim, Race};
 pub use sensor_file::{Lines, NeverMet, SensorFault};

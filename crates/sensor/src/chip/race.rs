@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::own_block::Uneven;
 use crate::units::Time;
 
 /// What a cure adds to the end of a forbidden time: clock edges are rounded to whole femtoseconds, each by itself.
@@ -72,6 +73,14 @@ pub enum Irregular {
         /// Rising edges of LOCAL_STOP in a laser cycle.
         rises: usize,
     },
+    /// A P-counter of one's own that no line describes.
+    #[error("{0}, so no window law describes this P-counter")]
+    OwnCounter(Uneven),
+    /// A P-counter of one's own whose start values are not loaded as they are.
+    #[error(
+        "delay lines take the lowest bit of COUNTER_INIT for that of the start value, and this P-counter has codes of its own"
+    )]
+    OwnCodes,
     /// A P-counter without memory, which STOP does not reset, comes round in another time than STOP does.
     #[error(
         "STOP comes every {stop_periods} CLK periods and the P-counter without memory comes round in {round}, so windows drift"

@@ -243,6 +243,12 @@ impl SensorConfig {
                 *file = placed(document.folder(), file);
             }
         }
+        if let Some(block) = &mut config.p_counter_block
+            && let Err(message) = block.load(document.folder())
+        {
+            let path = "p_counter_block".to_owned();
+            faults.push(Fault { path, message });
+        }
         if faults.is_empty() {
             let fault = config.check().err();
             faults.extend(fault.map(|fault| Fault {
@@ -341,6 +347,13 @@ impl SensorConfig {
         }
         if !variant.has_memory && self.after_borrow == AfterBorrow::Hold {
             return Err(SensorFault::HoldWithoutMemory(p_counter));
+        }
+        if let Some(block) = &self.p_counter_block {
+            let fits = block.check_counter(&(variant.circuit)(self));
+            fits.map_err(|why| SensorFault::Value {
+                key: "p_counter_block".to_owned(),
+                why,
+            })?;
         }
         if let Err((key, why)) = CellLibrary::of(self) {
             return Err(SensorFault::Liberty { key, why });

@@ -196,12 +196,19 @@ impl WindowLaw {
                 } else {
                     self.coming_round(start)
                 };
+                let unknown = self.own_counter();
                 match found {
                     Ok(LocalStop {
                         time,
                         edge,
                         irregular,
-                    }) => (time, time + timing.local_stop_to_strobe, edge, irregular),
+                    }) => {
+                        let irregular = unknown.or(irregular);
+                        (time, time + timing.local_stop_to_strobe, edge, irregular)
+                    }
+                    Err(Window::Never) if unknown.is_some() => {
+                        return Window::Irregular(unknown.expect("it is some"));
+                    }
                     Err(window) => return window,
                 }
             }
@@ -252,6 +259,14 @@ impl WindowLaw {
                 Race::with_stop(what, change - cause, forbidden, exposure.stop_phase, period)
             }
         }
+    }
+
+    /// What keeps a P-counter of one's own from having a law, if anything.
+    fn own_counter(&self) -> Option<Irregular> {
+        let law = self.sensor.counter_law()?;
+        let is_coded = self.sensor.tdc == Tdc::DelayLine && !law.is_plain();
+        let uneven = law.uneven().map(Irregular::OwnCounter);
+        uneven.or(is_coded.then_some(Irregular::OwnCodes))
     }
 
     /// LOCAL_STOP of a counter that each STOP resets.
@@ -309,9 +324,7 @@ impl WindowLaw {
             }));
         }
         if rises.every.is_some() && starts_high(&self.sensor, start) {
-            let delay = counter
-                .reset_to_local_stop
-                .expect("the tap msb rises at a reset");
+            let delay = counter.reset_to_local_stop.unwrap_or_default();
             let arrival = timing.stop_to_reset + delay + timing.local_stop_to_strobe;
             let until = timing.stop_to_hit_release - timing.removal - ROUNDING;
             if arrival >= until {
@@ -351,8 +364,13 @@ impl WindowLaw {
             let race = Race::with_stop(what, edge, in_doubt, phase, period);
             return Err(Window::Race(race));
         }
-        let rises = Rises::of(&self.sensor, start).expect("a counter without memory wraps");
-        let every = rises.every.expect("a counter without memory wraps");
+        // A built-in counter without memory wraps.
+        let Some(rises) = Rises::of(&self.sensor, start) else {
+            return Err(Window::Never);
+        };
+        let Some(every) = rises.every else {
+            return Err(Window::Never);
+        };
         let periods = exposure.stop_periods as i64;
         let last = periods * exposure.laser_cycles as i64;
         let edge = first + rises.first;

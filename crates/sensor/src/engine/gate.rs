@@ -179,7 +179,8 @@ impl GateSimulation {
     ) -> Result<Histograms, EngineError> {
         debug_assert_eq!(starts.len(), self.probes.len());
         let cols = self.plan.order().cols;
-        let stream = load_path::stream(starts, cols, self.sensor.counter_bits);
+        let codes = self.sensor.load_codes(starts);
+        let stream = load_path::stream(&codes, cols, self.sensor.counter_bits);
         let clock = self.sensor.load_clock();
         let times = (self.kernel.now(), self.kernel.now() + clock.period());
         let (end, load) = reload_stimulus(LoadPins::of(&self.netlist), clock, times, &stream);

@@ -53,9 +53,10 @@ impl LaneSimulation {
             netlist,
             kernel,
             shared: StimulusPlan::new(&sensor, exposure, 1, &[0], &[&[]]),
-            serial: starts
+            serial: sensor
+                .load_codes(starts)
                 .iter()
-                .map(|&start| load_path::stream(&[start], 1, sensor.counter_bits))
+                .map(|&code| load_path::stream(&[code], 1, sensor.counter_bits))
                 .collect(),
             pulses: all,
             sensor,

@@ -17,7 +17,7 @@ pub struct Load {
     pub statistics: Statistics,
 }
 
-/// Sends `starts` (row-major, one for every macropixel) through the serial pin; `observer` sees the netlist
+/// Sends `starts` (row-major, one for every macropixel), as their codes where the P-counter has such, through the serial pin; `observer` sees the netlist
 /// that `netlist` elaborates.
 pub fn load<O: Observer>(
     config: &SensorConfig,
@@ -26,7 +26,8 @@ pub fn load<O: Observer>(
     observer: &mut O,
 ) -> Load {
     debug_assert_eq!(starts.len(), config.pixels());
-    let stream = load_path::stream(starts, config.cols, config.counter_bits);
+    let codes = config.load_codes(starts);
+    let stream = load_path::stream(&codes, config.cols, config.counter_bits);
     let (end, mut stimulus) = load_stimulus(LoadPins::of(netlist), config.load_clock(), &stream);
     let timing = Silicon::of(config).timing(netlist);
     let mut kernel = Kernel::new(netlist, &timing);

@@ -279,7 +279,8 @@ fn groups(netlist: &Netlist, (row, col): (usize, usize)) -> Vec<Group> {
     let binary = |probe| Entry::binary(probes.path(probe));
     let decimal = |probe| Entry::decimal(probes.path(probe));
     let hex = |probe| Entry::hex(probes.path(probe));
-    let memory = probes.find(Probe::Memory).map(|_| decimal(Probe::Memory));
+    let [memory, count] =
+        [Probe::Memory, Probe::CounterOut].map(|probe| probes.find(probe).map(|_| decimal(probe)));
     let loaded = [
         // Names that the sensor's pins have, too.
         Entry::binary(Probe::Clk.name()),
@@ -288,12 +289,9 @@ fn groups(netlist: &Netlist, (row, col): (usize, usize)) -> Vec<Group> {
         binary(Probe::MemoryLoad),
         decimal(Probe::CounterInit),
     ];
-    let counted = [
-        binary(Probe::CounterReset),
-        binary(Probe::CounterClk),
-        decimal(Probe::CounterOut),
-        binary(Probe::LocalStop),
-    ];
+    let counted = [binary(Probe::CounterReset), binary(Probe::CounterClk)];
+    let counted = counted.into_iter().chain(count);
+    let counted = counted.chain([binary(Probe::LocalStop)]);
     // Either TDC has some of them.
     let events = [
         (Probe::SpadRaw, hex(Probe::SpadRaw)),

@@ -155,6 +155,7 @@ impl HardwareEvents {
         not_before: Time,
     ) -> Self {
         let judges_counts = config.p_counter == PCounter::Ripple
+            && config.p_counter_block.is_none()
             && config.tap == Tap::Borrow
             && config.mode == Mode::Guided;
         let mut roles = vec![Vec::new(); netlist.net_count()];

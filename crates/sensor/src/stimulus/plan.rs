@@ -169,7 +169,7 @@ impl StimulusPlan {
     ) -> Self {
         debug_assert_eq!(starts.len(), pulses.len());
         let sensor = sensor.into();
-        let stream = load_path::stream(starts, cols, sensor.counter_bits);
+        let stream = load_path::stream(&sensor.load_codes(starts), cols, sensor.counter_bits);
         let half = |k| LOAD_START + sensor.load_clock().half_periods(k);
         let load_end = half(2 * stream.len() as i64 + 1);
         // On a whole nanosecond, so that edges are easy to read off.

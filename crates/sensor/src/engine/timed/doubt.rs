@@ -42,6 +42,9 @@ pub enum Doubt {
     /// Nothing resets it in a laser cycle.
     #[error("a P-counter without memory is left to the gates")]
     Memoryless,
+    /// Nobody wrote down what it does between edges.
+    #[error("a P-counter of one's own is left to the gates")]
+    OwnCounter,
     /// Width of COUNTER_RESET.
     #[error("the reset pulse is too short")]
     ShortReset,

@@ -304,7 +304,7 @@ fn counter_orders(
     delays: &MacropixelDelays,
     counter: &CounterDelays,
     period: Time,
-) -> [(bool, Doubt); 6] {
+) -> [(bool, Doubt); 7] {
     let MacropixelDelays { reset, release, .. } = *delays;
     let clear = counter.clear;
     // From a count to its strobe, at the least.
@@ -313,6 +313,7 @@ fn counter_orders(
     let blocks_late = counter.block.is_some_and(|block| block.1 >= period);
     [
         (config.p_counter.row().has_memory, Doubt::Memoryless),
+        (config.p_counter_block.is_none(), Doubt::OwnCounter),
         (
             counter.reset_edges() + MARGIN < reset_width && release.1 < period,
             Doubt::ShortReset,

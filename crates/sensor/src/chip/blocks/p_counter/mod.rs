@@ -79,7 +79,10 @@ impl PCounter {
 /// Ports: COUNTER_INIT\<bits\>, MEMORY_LOAD, MEMORY_RESET, COUNTER_CLK, COUNTER_RESET → LOCAL_STOP. Inside, the count
 /// is COUNTER_OUT\<bits\> and the start value, where there is a memory, MEMORY\<bits\>.
 pub fn circuit(config: &SensorConfig) -> Arc<Module> {
-    (config.p_counter.row().circuit)(config)
+    match &config.p_counter_block {
+        Some(own) => own.circuit("p_counter"),
+        None => (config.p_counter.row().circuit)(config),
+    }
 }
 
 /// Reference model of a P-counter together with what the timing block makes of its LOCAL_STOP.
@@ -153,6 +156,9 @@ impl Rises {
     /// When a sensor's LOCAL_STOP rises from this start value; `None` where it is high from the reset on and blocks
     /// the counter for good.
     pub(crate) fn of(config: &SensorConfig, start: u16) -> Option<Self> {
+        if let Some(law) = config.counter_law() {
+            return law.rises(start);
+        }
         let (bits, step) = (config.counter_bits, config.step_bits());
         let first = i64::from(start) << step;
         match config.after_borrow {
@@ -171,6 +177,9 @@ impl Rises {
 
 /// Whether LOCAL_STOP is high already when the counter holds its start value.
 pub fn starts_high(config: &SensorConfig, start: u16) -> bool {
+    if let Some(law) = config.counter_law() {
+        return law.starts_high(start);
+    }
     config.tap == Tap::Msb && start >> (config.counter_bits - 1) & 1 == 1
 }
 

@@ -1,0 +1,415 @@
+//! What a P-counter of one's own does, measured on its gates: with which COUNTER_CLK edge each COUNTER_INIT raises LOCAL_STOP.
+//!
+//! ```text
+//!   code (COUNTER_INIT)   edge of the first rise, E             start value s of the code
+//!     0 … 2ⁿ − 1     ──►   distinct, on a line     ──sort──►    E = step · s + offset
+//! ```
+//!
+//! 64 codes at a time are loaded, reset and clocked, slowly, in the lanes of one event queue, with the library's typical delays.
+//! A counter that is not binary, such as a shift register with feedback, so gets its map from start values to codes. Where no line
+//! goes through the edges, where LOCAL_STOP is not one clean edge, or where a reset does not bring a start value back, the law is
+//! [`Uneven`]: start values are codes, then, and only the gates say what is counted.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::Expected;
+use crate::chip::config::AfterBorrow;
+use crate::chip::p_counter::Rises;
+use crate::chip::timing::silicon::Silicon;
+use crate::kernel::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
+use crate::netlist::{Corner, Module, NetId, Netlist};
+use crate::units::Time;
+
+/// Half a period of COUNTER_CLK, and every pause: long enough for ten thousand gates one after the other.
+const PAUSE: Time = Time::from_ns(500);
+
+/// Why start values open no windows that a line describes. Codes are values of COUNTER_INIT.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
+pub enum Uneven {
+    /// LOCAL_STOP is unknown.
+    #[error("LOCAL_STOP is unknown from COUNTER_INIT {0} on")]
+    Unknown(u16),
+    /// LOCAL_STOP moves more than once with an edge of COUNTER_CLK, or with a falling one.
+    #[error("LOCAL_STOP is not one clean edge from COUNTER_INIT {0} on")]
+    Glitch(u16),
+    /// LOCAL_STOP rises with other edges after the next reset.
+    #[error("COUNTER_RESET does not bring COUNTER_INIT {0} back")]
+    Forgets(u16),
+    /// LOCAL_STOP never rises.
+    #[error("LOCAL_STOP does not rise from any COUNTER_INIT")]
+    Never,
+    /// Two codes raise LOCAL_STOP with the same edge.
+    #[error("COUNTER_INIT {0} and {1} raise LOCAL_STOP with the same edge of COUNTER_CLK")]
+    Same(u16, u16),
+    /// An edge off the line.
+    #[error(
+        "the edges that raise LOCAL_STOP are not {step} apart: COUNTER_INIT {code} is off the line"
+    )]
+    OffLine {
+        /// The code.
+        code: u16,
+        /// Edges from one start value's to the next one's.
+        step: usize,
+    },
+    /// A counter that wraps, without one time of coming round.
+    #[error(
+        "LOCAL_STOP comes again after another number of counts from COUNTER_INIT {0} on than from others"
+    )]
+    Round(u16),
+}
+
+/// What one code does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Counted {
+    starts_high: bool,
+    /// Edges of COUNTER_CLK that raise LOCAL_STOP, the first one being 0: the first two.
+    rises: [Option<u32>; 2],
+}
+
+/// What a P-counter of one's own does.
+#[derive(Debug)]
+pub struct CounterLaw {
+    /// By start value.
+    codes: Vec<u16>,
+    /// By start value.
+    counted: Vec<Counted>,
+    offset: u32,
+    uneven: Option<Uneven>,
+}
+
+impl CounterLaw {
+    /// COUNTER_INIT for a start value.
+    pub fn code(&self, start: u16) -> u16 {
+        self.codes[usize::from(start)]
+    }
+
+    /// Whether start values are loaded as they are.
+    pub fn is_plain(&self) -> bool {
+        (0..).zip(&self.codes).all(|(start, &code)| start == code)
+    }
+
+    /// The COUNTER_CLK edge that raises LOCAL_STOP from start value 0.
+    pub fn offset(&self) -> u32 {
+        self.offset
+    }
+
+    /// Why no line describes it, if none does.
+    pub fn uneven(&self) -> Option<Uneven> {
+        self.uneven
+    }
+
+    /// Whether LOCAL_STOP is high already after the reset.
+    pub(crate) fn starts_high(&self, start: u16) -> bool {
+        self.counted[usize::from(start)].starts_high
+    }
+
+    /// When LOCAL_STOP rises; `None` where it does not.
+    pub(crate) fn rises(&self, start: u16) -> Option<Rises> {
+        let [first, second] = self.counted[usize::from(start)].rises;
+        let first = i64::from(first?);
+        let every = second.map(|second| i64::from(second) - first);
+        Some(Rises { first, every })
+    }
+
+    /// Measures it on the gates.
+    pub(super) fn measure(module: &Arc<Module>, expected: Expected) -> Self {
+        let netlist = Netlist::elaborate(module);
+        let bits = netlist.signal("COUNTER_INIT").map_or(0, |nets| nets.len());
+        let codes: Vec<u16> = (0..1u32 << bits).map(|code| code as u16).collect();
+        let parts = codes.par_chunks(LANES);
+        let parts = parts.map(|codes| Bench::new(&netlist, codes, expected).measure());
+        let parts: Result<Vec<Vec<Counted>>, Uneven> = parts.collect();
+        let straight = parts.map(|parts| parts.concat());
+        let plain = |counted: Vec<Counted>, uneven| CounterLaw {
+            codes: codes.clone(),
+            counted,
+            offset: 0,
+            uneven: Some(uneven),
+        };
+        let never = Counted {
+            starts_high: false,
+            rises: [None; 2],
+        };
+        match straight {
+            Err(why) => plain(vec![never; codes.len()], why),
+            Ok(counted) => match line(&counted, expected) {
+                Err(why) => plain(counted, why),
+                Ok((codes, offset)) => CounterLaw {
+                    counted: codes
+                        .iter()
+                        .map(|&code| counted[usize::from(code)])
+                        .collect(),
+                    codes,
+                    offset,
+                    uneven: None,
+                },
+            },
+        }
+    }
+}
+
+/// The codes by start value, and the offset, of a line through the edges of all codes that raise LOCAL_STOP.
+fn line(counted: &[Counted], expected: Expected) -> Result<(Vec<u16>, u32), Uneven> {
+    let step = expected.step_periods;
+    let rising = (0u16..).zip(counted);
+    let rising = rising.filter_map(|(code, of)| Some((of.rises[0]?, code)));
+    let mut rising: Vec<(u32, u16)> = rising.collect();
+    rising.sort_unstable();
+    let &(offset, first) = rising.first().ok_or(Uneven::Never)?;
+    let round = |code: u16| {
+        let [first, second] = counted[usize::from(code)].rises;
+        Some(second? - first?)
+    };
+    let mut codes = vec![None; counted.len()];
+    for &(edge, code) in &rising {
+        let counts = (edge - offset) as usize;
+        let place = codes.get_mut(counts / step);
+        match place.filter(|_| counts.is_multiple_of(step)) {
+            Some(Some(other)) => return Err(Uneven::Same(*other, code)),
+            Some(place) => *place = Some(code),
+            None => return Err(Uneven::OffLine { code, step }),
+        }
+        let wraps = expected.after_borrow == AfterBorrow::Wrap;
+        if wraps && (round(code).is_none() || round(code) != round(first)) {
+            return Err(Uneven::Round(code));
+        }
+    }
+    let mut others = (0u16..)
+        .zip(counted)
+        .filter(|(_, of)| of.rises[0].is_none());
+    let codes = codes.into_iter().map(|code| {
+        let other = || others.next().expect("each code has one place").0;
+        code.unwrap_or_else(other)
+    });
+    Ok((codes.collect(), offset))
+}
+
+/// Up to 64 codes in one counter's lanes.
+struct Bench<'n> {
+    netlist: &'n Netlist,
+    kernel: LaneKernel,
+    codes: &'n [u16],
+    expected: Expected,
+    local_stop: NetId,
+    now: Time,
+}
+
+/// Changes of LOCAL_STOP since it was looked at last: lanes with one, and with more.
+struct Watch {
+    net: NetId,
+    once: u64,
+    again: u64,
+}
+
+impl LaneObserver for Watch {
+    fn change(&mut self, _: Time, net: NetId, mask: u64, _: Lanes) {
+        if net == self.net {
+            self.again |= self.once & mask;
+            self.once |= mask;
+        }
+    }
+}
+
+impl<'n> Bench<'n> {
+    fn new(netlist: &'n Netlist, codes: &'n [u16], expected: Expected) -> Self {
+        let timing = Silicon::nominal(Corner::Typ).timing(netlist);
+        Bench {
+            kernel: LaneKernel::new(netlist, &timing),
+            local_stop: netlist.net("LOCAL_STOP").expect("it has been checked"),
+            netlist,
+            codes,
+            expected,
+            now: Time::ZERO,
+        }
+    }
+
+    /// Drives inputs in some lanes, waits, and tells what LOCAL_STOP did meanwhile.
+    fn drive(&mut self, drives: &[(NetId, Lanes)], mask: u64) -> Watch {
+        let time = self.now;
+        let drives = drives.iter().map(|&(net, values)| LaneDrive {
+            time,
+            net,
+            mask,
+            values,
+        });
+        let mut watch = Watch {
+            net: self.local_stop,
+            once: 0,
+            again: 0,
+        };
+        self.now += PAUSE;
+        self.kernel
+            .run(&mut drives.peekable(), self.now, &mut watch);
+        watch
+    }
+
+    fn set(&mut self, name: &str, value: bool) {
+        let net = self.netlist.net(name).expect("it has been checked");
+        self.drive(&[(net, all(value))], u64::MAX);
+    }
+
+    /// Loads the codes and counts from them, after another reset too where that must bring them back.
+    fn measure(mut self) -> Result<Vec<Counted>, Uneven> {
+        let inputs: Vec<_> = self
+            .netlist
+            .inputs()
+            .iter()
+            .map(|&n| (n, all(false)))
+            .collect();
+        self.drive(&inputs, u64::MAX);
+        for (name, value) in [
+            ("MEMORY_RESET", true),
+            ("COUNTER_RESET", true),
+            ("MEMORY_RESET", false),
+        ] {
+            self.set(name, value);
+        }
+        let init = self
+            .netlist
+            .signal("COUNTER_INIT")
+            .expect("it has been checked");
+        let bits = (0..).zip(init).map(|(bit, net)| {
+            let lanes = (0..).zip(self.codes);
+            let word = lanes.fold(0, |word, (lane, code)| {
+                word | u64::from(code >> bit & 1) << lane
+            });
+            (net, Lanes::known(word))
+        });
+        let bits: Vec<_> = bits.collect();
+        self.drive(&bits, u64::MAX);
+        for (name, value) in [
+            ("MEMORY_LOAD", true),
+            ("MEMORY_LOAD", false),
+            ("COUNTER_RESET", false),
+        ] {
+            self.set(name, value);
+        }
+        let counted = self.count()?;
+        if self.expected.has_memory {
+            self.set("COUNTER_RESET", true);
+            self.set("COUNTER_RESET", false);
+            let again = self.count()?;
+            let mut lanes = counted.iter().zip(&again).zip(self.codes);
+            if let Some((_, &code)) = lanes.find(|((one, other), _)| one != other) {
+                return Err(Uneven::Forgets(code));
+            }
+        }
+        Ok(counted)
+    }
+
+    /// Clocks the counter until LOCAL_STOP has risen, or come round where it wraps, as the timing block lets it.
+    fn count(&mut self) -> Result<Vec<Counted>, Uneven> {
+        let holds = self.expected.after_borrow == AfterBorrow::Hold;
+        let clk = self
+            .netlist
+            .net("COUNTER_CLK")
+            .expect("it has been checked");
+        let bits = self
+            .netlist
+            .signal("COUNTER_INIT")
+            .map_or(0, |nets| nets.len());
+        // The tap `borrow` makes the round of a counter twice as long; and twice more for one that takes its time.
+        let most = (self.expected.step_periods as u32) << (bits + 2);
+        let used = u64::MAX >> (LANES - self.codes.len());
+        let code = |lanes: u64| self.codes[lanes.trailing_zeros() as usize];
+        let mut high = self.kernel.value(self.local_stop).one;
+        let starts_high = high;
+        let mut rises = vec![[None; 2]; self.codes.len()];
+        let mut awaited = if holds { used & !high } else { used };
+        for edge in 0..most {
+            if awaited == 0 {
+                break;
+            }
+            let counting = if holds { awaited } else { used };
+            let moved = self.drive(&[(clk, all(true))], counting);
+            let level = self.kernel.value(self.local_stop);
+            let late = self.drive(&[(clk, all(false))], counting);
+            let unknown = !(level.one | level.zero) & used;
+            if unknown != 0 {
+                return Err(Uneven::Unknown(code(unknown)));
+            }
+            let unclean = (moved.again | late.once) & used;
+            if unclean != 0 {
+                return Err(Uneven::Glitch(code(unclean)));
+            }
+            let mut rose = level.one & !high & used;
+            high = level.one;
+            while rose != 0 {
+                let lane = rose.trailing_zeros() as usize;
+                rose &= rose - 1;
+                let place = rises[lane].iter_mut().find(|place| place.is_none());
+                if let Some(place) = place {
+                    *place = Some(edge);
+                }
+                if holds || rises[lane][1].is_some() {
+                    awaited &= !(1 << lane);
+                }
+            }
+        }
+        let counted = rises.into_iter().enumerate().map(|(lane, rises)| Counted {
+            starts_high: starts_high >> lane & 1 == 1,
+            rises,
+        });
+        Ok(counted.collect())
+    }
+}
+
+fn all(value: bool) -> Lanes {
+    Lanes::known(if value { u64::MAX } else { 0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chip::p_counter::{self, starts_high};
+    use crate::chip::{PCounter, SensorConfig, Tap};
+
+    /// The measured law of every built-in counter is the one that its row says.
+    #[test]
+    fn what_is_measured_of_built_in_counters_is_what_is_known_of_them() {
+        for p_counter in PCounter::ALL {
+            for tap in Tap::ALL {
+                for (after_borrow, step_periods) in [
+                    (AfterBorrow::Hold, 1),
+                    (AfterBorrow::Hold, 4),
+                    (AfterBorrow::Wrap, 1),
+                    (AfterBorrow::Wrap, 2),
+                ] {
+                    let config = SensorConfig {
+                        p_counter,
+                        tap,
+                        after_borrow,
+                        step_periods,
+                        counter_bits: 5,
+                        ..SensorConfig::default()
+                    };
+                    if config.check().is_err() {
+                        continue;
+                    }
+                    let expected = Expected {
+                        has_memory: p_counter.row().has_memory,
+                        after_borrow,
+                        step_periods,
+                    };
+                    let law = CounterLaw::measure(&p_counter::circuit(&config), expected);
+                    assert_eq!((law.uneven(), law.offset()), (None, 0), "{config:?}");
+                    assert!(law.is_plain(), "{config:?}");
+                    for start in 0..=config.largest_start() {
+                        assert_eq!(
+                            law.starts_high(start),
+                            starts_high(&config, start),
+                            "{config:?} {start}"
+                        );
+                        assert_eq!(
+                            law.rises(start),
+                            Rises::of(&config, start),
+                            "{config:?} {start}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,311 @@
+//! Blocks of one's own: a netlist that Yosys wrote takes the place of a built-in block.
+//!
+//! ```text
+//!   p_counter_block = "my.json" ─read─► Module ─ports─► held against the built-in block's ─► in its place in the macropixel
+//!                                          └─► CounterLaw: what each COUNTER_INIT does, measured on the gates
+//! ```
+//!
+//! The key `p_counter` still says what is expected of a P-counter: whether COUNTER_RESET brings its start value back (all but
+//! `memoryless`). What the counter does besides is measured ([`CounterLaw`]), because nobody wrote it down.
+
+mod law;
+
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use serde::{Deserialize, Serialize};
+
+pub use law::{CounterLaw, Uneven};
+
+use super::config::{AfterBorrow, SensorConfig};
+use super::timing::silicon::Silicon;
+use crate::files::read_text;
+use crate::netlist::{Corner, Direction, Edge, Module, NetId, Netlist, StaticTiming};
+use crate::settings::{Range, Setting};
+
+/// A netlist in the place of a built-in block, by the file that it is read from: FILE, or FILE:MODULE.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(from = "PathBuf", into = "PathBuf")]
+pub struct OwnBlock {
+    file: PathBuf,
+    read: Option<Arc<Read>>,
+}
+
+#[derive(Debug)]
+struct Read {
+    module: Arc<Module>,
+    /// Of the file's text and the module's name.
+    hash: u64,
+    laws: Mutex<HashMap<Expected, Arc<CounterLaw>>>,
+}
+
+/// What the measured law of a counter depends on besides the netlist.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct Expected {
+    /// COUNTER_RESET brings the start value back.
+    has_memory: bool,
+    after_borrow: AfterBorrow,
+    step_periods: usize,
+}
+
+impl From<PathBuf> for OwnBlock {
+    fn from(file: PathBuf) -> Self {
+        OwnBlock { file, read: None }
+    }
+}
+
+impl From<OwnBlock> for PathBuf {
+    fn from(block: OwnBlock) -> Self {
+        block.file
+    }
+}
+
+/// Blocks are equal if they come from the same file, which said the same.
+impl PartialEq for OwnBlock {
+    fn eq(&self, other: &Self) -> bool {
+        self.file == other.file && self.hash() == other.hash()
+    }
+}
+
+impl Setting for OwnBlock {
+    const RANGE: Range = Range::Text;
+}
+
+impl OwnBlock {
+    /// A block that is read already.
+    pub fn of(file: impl Into<PathBuf>, module: Arc<Module>, text: &str) -> Self {
+        let mut hasher = DefaultHasher::new();
+        (text, module.name()).hash(&mut hasher);
+        let read = Read {
+            module,
+            hash: hasher.finish(),
+            laws: Mutex::default(),
+        };
+        OwnBlock {
+            file: file.into(),
+            read: Some(Arc::new(read)),
+        }
+    }
+
+    /// Reads its file, which is relative to `folder`.
+    ///
+    /// # Errors
+    /// What is wrong with the file, with its name.
+    pub(super) fn load(&mut self, folder: &Path) -> Result<(), String> {
+        let asked = folder.join(&self.file);
+        let name = asked.to_string_lossy().into_owned();
+        let (file, top) = match name.rsplit_once(':') {
+            Some((file, top)) if !asked.exists() => (Path::new(file), Some(top)),
+            _ => (&*asked, None),
+        };
+        let text = read_text(file).map_err(|e| e.to_string())?;
+        let module = Module::from_yosys(&text, top);
+        let module = module.map_err(|e| format!("{}: {e}", file.display()))?;
+        *self = OwnBlock::of(asked, module, &text);
+        Ok(())
+    }
+
+    /// Where it comes from.
+    pub fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// Tells netlists apart, where the block has been read.
+    pub fn hash(&self) -> Option<u64> {
+        self.read.as_ref().map(|read| read.hash)
+    }
+
+    /// Its circuit under the name of the block that it replaces.
+    pub(super) fn circuit(&self, name: &str) -> Arc<Module> {
+        let read = self.read.as_ref().expect("it has been checked");
+        read.module.renamed(name)
+    }
+
+    /// What it does as the P-counter of this sensor; measured once.
+    fn law(&self, config: &SensorConfig) -> Arc<CounterLaw> {
+        let read = self.read.as_ref().expect("it has been checked");
+        let expected = Expected {
+            has_memory: config.p_counter.row().has_memory,
+            after_borrow: config.after_borrow,
+            step_periods: config.step_periods,
+        };
+        let mut laws = read.laws.lock().unwrap_or_else(PoisonError::into_inner);
+        let law = laws.entry(expected);
+        Arc::clone(law.or_insert_with(|| Arc::new(CounterLaw::measure(&read.module, expected))))
+    }
+
+    /// Whether it can be a P-counter in the place of `built_in`.
+    ///
+    /// # Errors
+    /// What is missing, what is too much, and what differs.
+    pub(super) fn check_counter(&self, built_in: &Module) -> Result<(), String> {
+        let file = self.file.display();
+        let Some(read) = &self.read else {
+            return Err(format!(
+                "{file} has not been read; give it in a sensor file"
+            ));
+        };
+        let name = read.module.name();
+        let faults = misfits(&read.module, built_in);
+        if !faults.is_empty() {
+            return Err(format!(
+                "{file}: module {name} has other ports than {}: {}",
+                built_in.name(),
+                faults.join(", ")
+            ));
+        }
+        let netlist = Netlist::elaborate(&read.module);
+        let timing = Silicon::nominal(Corner::Typ).timing(&netlist);
+        let paths = StaticTiming::new(&netlist, &timing);
+        let inputs = netlist.inputs().into_iter();
+        let starts: Vec<(NetId, Edge)> = inputs.flat_map(|n| Edge::BOTH.map(|e| (n, e))).collect();
+        if let Err(found) = paths.arrivals(&starts, &[]) {
+            return Err(format!(
+                "{file}: module {name} has a loop of gates at {}, where time cannot be added up; break it with a flip-flop",
+                found.net
+            ));
+        }
+        let net = |name| netlist.net(name).expect("the ports are there");
+        let clk = net("COUNTER_CLK");
+        let after = paths.arrivals(&[(clk, Edge::Rise)], &[]);
+        let after = after.expect("there is no loop");
+        let counts = netlist.cells().iter().any(|cell| {
+            cell.kind.is_flip_flop()
+                && cell.inputs[1] == clk
+                && after.window(cell.inputs[0]).is_some()
+        });
+        let stops = after.edge_window(net("LOCAL_STOP"), Edge::Rise).is_some();
+        match counts && stops {
+            true => Ok(()),
+            false => Err(format!(
+                "{file}: module {name} does not count rising edges of COUNTER_CLK up to LOCAL_STOP; clock it with posedge COUNTER_CLK"
+            )),
+        }
+    }
+}
+
+/// What is wrong with the ports of `own` in the place of `built_in`.
+fn misfits(own: &Module, built_in: &Module) -> Vec<String> {
+    let word = |direction| match direction {
+        Direction::Input => "input",
+        Direction::Output => "output",
+    };
+    let bits = |width| {
+        if width == 1 {
+            "1 bit".to_owned()
+        } else {
+            format!("{width} bits")
+        }
+    };
+    let mut faults = Vec::new();
+    for (direction, wanted) in built_in.port_signals() {
+        let mut ports = own.port_signals();
+        let (name, width) = (&wanted.name, wanted.width());
+        match ports.find(|(_, port)| port.name == *name) {
+            None => faults.push(format!(
+                "{} {name} of {} is missing",
+                word(direction),
+                bits(width)
+            )),
+            Some((found, _)) if found != direction => {
+                faults.push(format!(
+                    "{name} is an {} instead of an {}",
+                    word(found),
+                    word(direction)
+                ));
+            }
+            Some((_, port)) if port.width() != width => {
+                faults.push(format!(
+                    "{name} has {} instead of {width}",
+                    bits(port.width())
+                ));
+            }
+            Some(_) => {}
+        }
+    }
+    for (direction, port) in own.port_signals() {
+        if !built_in
+            .port_signals()
+            .any(|(_, wanted)| wanted.name == port.name)
+        {
+            faults.push(format!("{} {} is too much", word(direction), port.name));
+        }
+    }
+    faults
+}
+
+impl SensorConfig {
+    /// What a P-counter of one's own does; `None` for the built-in ones. The configuration must have passed [`SensorConfig::check`].
+    pub fn counter_law(&self) -> Option<Arc<CounterLaw>> {
+        Some(self.p_counter_block.as_ref()?.law(self))
+    }
+
+    /// What is loaded into the P-counters for these start values. The configuration must have passed [`SensorConfig::check`].
+    pub fn load_codes(&self, starts: &[u16]) -> Vec<u16> {
+        match self.counter_law() {
+            None => starts.to_vec(),
+            Some(law) => starts.iter().map(|&start| law.code(start)).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chip::p_counter;
+    use crate::netlist::{CellKind, ModuleBuilder};
+
+    #[test]
+    fn ports_are_held_against_the_built_in_ones() {
+        let built_in = p_counter::circuit(&SensorConfig::default());
+        assert_eq!(misfits(&built_in, &built_in), [""; 0]);
+        let mut m = ModuleBuilder::new("mine");
+        let init = m.input_bus("COUNTER_INIT", 8);
+        m.input("LOCAL_STOP");
+        let more = m.output("MORE");
+        m.gate_into(CellKind::Inv, &init[..1], more);
+        let block = OwnBlock::of("mine.json", m.finish().unwrap(), "");
+        assert_eq!(
+            block.check_counter(&built_in).unwrap_err(),
+            "mine.json: module mine has other ports than p_counter: COUNTER_INIT has 8 bits instead of 9, \
+             input MEMORY_LOAD of 1 bit is missing, input MEMORY_RESET of 1 bit is missing, input COUNTER_CLK of 1 bit is missing, \
+             input COUNTER_RESET of 1 bit is missing, LOCAL_STOP is an input instead of an output, output MORE is too much"
+        );
+    }
+
+    /// A module with the ports of a P-counter, with LOCAL_STOP clocked by `clock` and, beside it, a loop of gates if asked for.
+    fn counter(clock: &str, loops: bool) -> Result<(), String> {
+        let built_in = p_counter::circuit(&SensorConfig::default());
+        let mut m = ModuleBuilder::new("mine");
+        m.input_bus("COUNTER_INIT", 9);
+        for pin in ["MEMORY_LOAD", "MEMORY_RESET"] {
+            m.input(pin);
+        }
+        let [clk, reset] = ["COUNTER_CLK", "COUNTER_RESET"].map(|pin| m.input(pin));
+        let (stop, not) = (m.output("LOCAL_STOP"), m.wire("NOT"));
+        let clk = if clock == "COUNTER_CLK" { clk } else { reset };
+        m.cell("stop", CellKind::Dffr, &[not, clk, reset], &[stop, not]);
+        if loops {
+            let [a, b] = ["A", "B"].map(|name| m.wire(name));
+            m.gate_into(CellKind::Nand2, &[clk, b], a);
+            m.gate_into(CellKind::Buf, &[a], b);
+        }
+        OwnBlock::of("mine.json", m.finish().unwrap(), "").check_counter(&built_in)
+    }
+
+    #[test]
+    fn a_counter_counts_clk_and_has_no_loop_of_gates() {
+        assert_eq!(counter("COUNTER_CLK", false), Ok(()));
+        assert_eq!(
+            counter("COUNTER_RESET", false).unwrap_err(),
+            "mine.json: module mine does not count rising edges of COUNTER_CLK up to LOCAL_STOP; clock it with posedge COUNTER_CLK"
+        );
+        let looping = counter("COUNTER_CLK", true).unwrap_err();
+        assert!(
+            looping.starts_with("mine.json: module mine has a loop of gates at "),
+            "{looping}"
+        );
+    }
+}

@@ -1,0 +1,170 @@
+//! Built-in blocks go to Yosys as Verilog and come back as its netlists, of other gates that do the same. Skipped, loudly, without
+//! Yosys.
+
+use crate::bench;
+use crate::scenario;
+
+use std::collections::BTreeSet;
+use std::io::Write as _;
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+
+use bench::{Bench, SETTLING};
+use guided_dtof::chip::p_counter::{self, starts_high};
+use guided_dtof::chip::{Exposure, PCounter};
+use guided_dtof::chip::{
+    Overflow, OwnBlock, SensorConfig, Window, WindowLaw, correlation, histogram, metdc, readout,
+};
+use guided_dtof::netlist::{Corner, Library, Module, write_modules, write_standard_cells};
+use guided_dtof::units::Time;
+use rand::{RngExt, SeedableRng, rngs::StdRng};
+
+/// What Yosys writes of a netlist of generic gates in `folder/block.v`; none where it is not installed.
+fn synthesised(folder: &Path, top: &str) -> Option<String> {
+    let script = format!("read_verilog block.v; synth -flatten -top {top}; write_json block.json");
+    let Ok(output) = Command::new("yosys")
+        .args(["-q", "-p", &script])
+        .current_dir(folder)
+        .output()
+    else {
+        assert!(std::env::var_os("CI").is_none(), "no yosys");
+        // Not eprintln, which cargo hides where a test passes.
+        let _ = writeln!(
+            std::io::stderr(),
+            "SKIPPED: yosys is not installed, so it has synthesised no block (apt-get install yosys)"
+        );
+        return None;
+    };
+    assert!(output.status.success(), "{output:?}");
+    Some(std::fs::read_to_string(folder.join("block.json")).unwrap())
+}
+
+/// A module after a journey through Yosys, with the JSON that it was read from.
+fn there_and_back(module: &Arc<Module>) -> Option<(Arc<Module>, String)> {
+    let folder = tempfile::tempdir().unwrap();
+    let mut verilog = Vec::new();
+    write_modules(&mut verilog, module).unwrap();
+    write_standard_cells(&mut verilog, &Library::default(), &BTreeSet::new()).unwrap();
+    std::fs::write(folder.path().join("block.v"), verilog).unwrap();
+    let json = synthesised(folder.path(), module.name())?;
+    let read = Module::from_yosys(&json, None).unwrap();
+    let ports = |m: &Module| -> Vec<_> {
+        let ports = m.port_signals();
+        ports
+            .map(|(d, s)| (format!("{d:?}"), s.name.clone(), s.width()))
+            .collect()
+    };
+    assert_eq!(ports(&read), ports(module));
+    Some((read, json))
+}
+
+/// Those with a memory: the pulse that loads the other one is a delay, which logic synthesis takes away.
+#[test]
+fn p_counters_open_the_same_windows() {
+    for (p_counter, tap, after_borrow) in scenario::p_counters() {
+        for step_periods in [1, 2] {
+            let config = SensorConfig {
+                p_counter,
+                tap,
+                after_borrow,
+                step_periods,
+                counter_bits: 5,
+                ..SensorConfig::default()
+            };
+            if p_counter == PCounter::Memoryless || config.check().is_err() {
+                continue;
+            }
+            let Some((module, json)) = there_and_back(&p_counter::circuit(&config)) else {
+                return;
+            };
+            let own = SensorConfig {
+                p_counter_block: Some(OwnBlock::of("block.json", module, &json)),
+                ..config.clone()
+            };
+            own.check().unwrap();
+            let law = own.counter_law().unwrap();
+            assert_eq!((law.uneven(), law.is_plain()), (None, true), "{config:?}");
+            // A slow clock, at which a few gates more move no window.
+            let slow = |config: &SensorConfig| {
+                let config = SensorConfig {
+                    clk_hz: 2e7,
+                    ..config.clone()
+                };
+                let exposure = Exposure::new(&config, 300, 2);
+                WindowLaw::new(&config, &exposure)
+            };
+            let laws = [slow(&config), slow(&own)];
+            for start in 0..=config.largest_start() {
+                assert_eq!(starts_high(&own, start), starts_high(&config, start));
+                let windows = laws.each_ref().map(|law| match law.window(start) {
+                    Window::Open(open) => Ok(open.first_edge),
+                    other => Err(other),
+                });
+                assert_eq!(windows[0].is_ok(), windows[1].is_ok(), "{config:?} {start}");
+                if let [Ok(built_in), Ok(own)] = windows {
+                    assert_eq!(built_in, own, "{config:?} {start}");
+                }
+            }
+        }
+    }
+}
+
+/// Blocks that have no delays of their own, on random changes of one input at a time.
+#[test]
+fn other_blocks_do_the_same() {
+    let random = &mut StdRng::seed_from_u64(1);
+    for block in [
+        correlation::circuit(4),
+        correlation::circuit(16),
+        metdc::circuit(5),
+        histogram::circuit(2, 3, Overflow::Wrap),
+        readout::bin_select(5, 4),
+    ] {
+        let Some((read, _)) = there_and_back(&block) else {
+            return;
+        };
+        let mut benches = [&block, &read].map(|module| Bench::new(module, Corner::Typ));
+        let inputs: Vec<String> = block
+            .port_signals()
+            .filter(|(d, _)| *d == guided_dtof::netlist::Direction::Input)
+            .flat_map(|(_, s)| {
+                let width = s.width();
+                (0..width).map(move |bit| match s.is_bus {
+                    true => format!("{}[{bit}]", s.name),
+                    false => s.name.clone(),
+                })
+            })
+            .collect();
+        let outputs = block.port_signals();
+        let outputs: Vec<String> = outputs
+            .filter(|(d, _)| *d == guided_dtof::netlist::Direction::Output)
+            .map(|(_, s)| s.name.clone())
+            .collect();
+        let steps = 400;
+        for step in 1..steps {
+            let input = &inputs[random.random_range(0..inputs.len())];
+            let value = random.random_bool(0.5);
+            for bench in &mut benches {
+                bench.drive(SETTLING * step, input, value);
+            }
+        }
+        let buses = benches.each_ref().map(|bench| {
+            let nets = outputs.iter().map(|name| bench.bus(name));
+            nets.collect::<Vec<_>>()
+        });
+        let [mut ours, mut theirs] = benches.map(|mut bench| bench.start(&[]));
+        let mut known = 0;
+        for step in 2..steps {
+            let time = SETTLING * step - Time::from_ps(1);
+            for (bus, other) in buses[0].iter().zip(&buses[1]) {
+                let values = (ours.number_at(time, bus), theirs.number_at(time, other));
+                if let (Some(ours), Some(theirs)) = values {
+                    assert_eq!(ours, theirs, "{} {step}", block.name());
+                    known += 1;
+                }
+            }
+        }
+        assert!(known > 100, "{}: {known}", block.name());
+    }
+}

@@ -1,0 +1,89 @@
+//! A module as Yosys would write it, of its generic cells, without Yosys.
+
+use std::fmt::Write;
+use std::sync::Arc;
+
+use guided_dtof::netlist::{CellKind, Direction, Module, NetId, Netlist};
+
+/// The netlist as JSON. Each of our cells is one generic cell; an output QN is an inverter.
+pub fn json(module: &Arc<Module>) -> String {
+    let netlist = Netlist::elaborate(module);
+    // Yosys counts from 2 on.
+    let bits = |nets: &[NetId]| {
+        let numbers: Vec<String> = nets.iter().map(|n| (n.index() + 2).to_string()).collect();
+        format!("[{}]", numbers.join(", "))
+    };
+    let signal = |name: &str| bits(&netlist.signal(name).unwrap());
+    let ports = module.port_signals().map(|(direction, s)| {
+        let word = if direction == Direction::Input {
+            "input"
+        } else {
+            "output"
+        };
+        format!(
+            r#""{}": {{"direction": "{word}", "bits": {}}}"#,
+            s.name,
+            signal(&s.name)
+        )
+    });
+    let names = module.signals().iter().filter(|s| s.is_named);
+    let names = names.map(|s| {
+        format!(
+            r#""{}": {{"hide_name": 0, "bits": {}}}"#,
+            s.name,
+            signal(&s.name)
+        )
+    });
+    let mut next = netlist.net_count() + 2;
+    let mut cells = Vec::new();
+    for (index, cell) in netlist.cells().iter().enumerate() {
+        let kind = match cell.kind {
+            CellKind::Inv => "$_NOT_",
+            CellKind::Buf => "$_BUF_",
+            CellKind::Nand2 => "$_NAND_",
+            CellKind::Nor2 => "$_NOR_",
+            CellKind::And2 => "$_AND_",
+            CellKind::Or2 => "$_OR_",
+            CellKind::Xor2 => "$_XOR_",
+            CellKind::Xnor2 => "$_XNOR_",
+            CellKind::Mux2 => "$_MUX_",
+            CellKind::Dffr => "$_DFF_PP0_",
+            CellKind::Dffsr => "$_DFFSR_PPP_",
+        };
+        let mut pins = String::new();
+        for (pin, net) in cell.kind.inputs().iter().zip(cell.inputs) {
+            let pin = if *pin == "CK" { "C" } else { pin };
+            write!(pins, r#""{pin}": {}, "#, bits(&[net])).unwrap();
+        }
+        let out = match cell.outputs[0].is_some() {
+            true => cell.outputs[0].index() + 2,
+            false => {
+                next += 1;
+                next - 1
+            }
+        };
+        let pin = if cell.kind.is_flip_flop() { "Q" } else { "Y" };
+        let mut add = |name: String, kind: &str, pins: String| {
+            cells.push(format!(
+                r#""{name}": {{"type": "{kind}", "connections": {{{pins}}}}}"#
+            ));
+        };
+        add(
+            format!("$cell${index}"),
+            kind,
+            format!(r#"{pins}"{pin}": [{out}]"#),
+        );
+        if cell.outputs[1].is_some() {
+            let pins = format!(r#""A": [{out}], "Y": {}"#, bits(&cell.outputs[1..2]));
+            add(format!("$qn${index}"), "$_NOT_", pins);
+        }
+    }
+    let list = |entries: Vec<String>| entries.join(",\n");
+    format!(
+        "{{\"modules\": {{\"{}\": {{\"ports\": {{{}}},\n\"cells\": {{{}}},\n\"netnames\": {{{}}}}}}}}}",
+        module.name(),
+        list(ports.collect()),
+        list(cells),
+        list(names.collect())
+    )
+}
