@@ -148,7 +148,9 @@ mod tests {
                 let by_children = (of(fired, children + h).value - of(fired, children - h).value) / (2.0 * h);
                 prop_assert!((chance.slope[1] - by_children).abs() < 1e-6, "{:?} {by_children}", chance.slope);
             }
-            if event_type == EventType::Greater && children == 0.0 && threshold < 5 {
+            // Nearer to 1 a chance no longer tells how likely one SPAD is.
+            let tells = chance.value < 1.0 - 1e-12;
+            if event_type == EventType::Greater && children == 0.0 && threshold < 5 && tells {
                 prop_assert!((counting.fired_for(chance.value) - fired).abs() < 1e-6);
             }
         }
