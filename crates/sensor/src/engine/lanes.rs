@@ -140,7 +140,10 @@ impl LaneSimulation {
     /// Start value in the P-counter's memory of each lane; `None` where a bit is unknown, and without memory.
     pub fn loaded(&self) -> Vec<Option<u16>> {
         let memory = self.probes.find(Probe::Memory);
-        self.lanes(|lane| self.kernel.number(memory?, lane).map(|code| code as u16))
+        self.lanes(|lane| {
+            let code = self.kernel.number(memory?, lane)? as u16;
+            Some(self.sensor.start_of_code(code))
+        })
     }
 
     /// Counts of each lane, bin 0 earliest.
