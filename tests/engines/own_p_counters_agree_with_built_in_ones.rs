@@ -144,6 +144,6 @@ fn without_a_line_the_gates_and_the_cycles_count_and_the_law_refuses() {
         .unwrap();
     assert_eq!(
         why.to_string(),
-        "COUNTER_INIT 0 and 1 raise LOCAL_STOP with the same edge of COUNTER_CLK, so no window law describes this P-counter"
+        "COUNTER_INIT 0 and 1 raise LOCAL_STOP with the same edge of COUNTER_CLK: no window law describes this P-counter"
     );
 }

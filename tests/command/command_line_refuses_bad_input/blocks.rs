@@ -117,10 +117,14 @@ fn a_counter_without_a_law_is_replayed_by_gates_and_cycles_and_aims_nothing() {
     refused(
         dir,
         &["frame", "--block", "p_counter=doubled.json"],
-        "COUNTER_INIT 0 and 2 raise LOCAL_STOP with the same edge of COUNTER_CLK, so no window law describes this P-counter, so the guide cannot aim time windows; give a P-counter that raises LOCAL_STOP once, a step later from each start value on",
+        "COUNTER_INIT 0 and 2 raise LOCAL_STOP with the same edge of COUNTER_CLK: no window law describes this P-counter, so the guide cannot aim time windows; give a P-counter that raises LOCAL_STOP once, a step later from each start value on",
     );
     let replay = |engine| {
-        let out = if engine == "gate" { "gate.csv" } else { "cycle.csv" };
+        let out = if engine == "gate" {
+            "gate.csv"
+        } else {
+            "cycle.csv"
+        };
         let own = ["--block", "p_counter=doubled.json"];
         replay(&[&own[..], &["--engine", engine, "--out", out]].concat())
     };
