@@ -23,6 +23,7 @@
 use crate::icarus;
 use crate::scenario;
 use crate::wide8x8::wide8x8;
+use crate::yosys;
 
 use crate::every_edge;
 
@@ -267,6 +268,7 @@ fn sensors_of_another_kind() {
         (wide8x8().unwrap(), 1),
         (hslidar(), 2),
         (hslidar_delay_line(), 2),
+        (yosys::lfsr().into(), 1),
     ];
     let kinds = sensors.len() as u64;
     for (sensor, cols) in sensors {

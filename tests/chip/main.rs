@@ -14,6 +14,8 @@ mod scenario;
 mod tool;
 #[path = "../shared/wide8x8.rs"]
 mod wide8x8;
+#[path = "../shared/yosys.rs"]
+mod yosys;
 
 mod activity_agrees_with_waves;
 mod annotated_delays_agree_with_icarus;

@@ -1,6 +1,7 @@
 //! Bad input to the command line: one sentence on standard error that names what is wrong, exit status 2, no
 //! output file, no panic.
 
+mod blocks;
 mod results;
 mod set_option;
 mod sources;

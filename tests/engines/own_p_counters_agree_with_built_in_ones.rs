@@ -4,8 +4,6 @@
 use crate::scenario;
 use crate::yosys;
 
-use std::path::Path;
-
 use guided_dtof::chip::own_block::Uneven;
 use guided_dtof::chip::{
     ChipTiming, Exposure, Irregular, Mode, OwnBlock, PCounter, SensorConfig, Window, WindowLaw,
@@ -13,7 +11,6 @@ use guided_dtof::chip::{
 };
 use guided_dtof::engine::{self, Cycle, Gate, Histograms, Replay};
 use guided_dtof::netlist::Module;
-use guided_dtof::settings::Document;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use scenario::{Scenario, cases};
 
@@ -70,18 +67,9 @@ fn every_built_in_counter_read_back_counts_the_same_on_every_engine() {
     assert!(ran.iter().all(|&ran| ran >= 6), "{ran:?}");
 }
 
-/// The counter of the book's chapter.
-fn lfsr() -> SensorConfig {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/blocks/lfsr_p_counter.json");
-    let mut document = Document::of("a test", toml::Table::new());
-    let file = file.to_str().unwrap().into();
-    document.set_value("p_counter_block", file, "the option");
-    SensorConfig::read_document(&document).unwrap()
-}
-
 #[test]
 fn a_counter_that_is_not_binary_gets_its_codes_and_the_law_of_the_others() {
-    let config = lfsr();
+    let config = yosys::lfsr();
     let law = config.counter_law().unwrap();
     assert_eq!(
         (law.uneven(), law.offset(), law.is_plain()),
@@ -156,6 +144,6 @@ fn without_a_line_the_gates_and_the_cycles_count_and_the_law_refuses() {
         .unwrap();
     assert_eq!(
         why.to_string(),
-        "COUNTER_INIT 0 and 1 raise LOCAL_STOP with the same edge of COUNTER_CLK, so no window law describes this P-counter"
+        "COUNTER_INIT 0 and 1 raise LOCAL_STOP with the same edge of COUNTER_CLK: no window law describes this P-counter"
     );
 }

@@ -1,9 +1,24 @@
-//! A module as Yosys would write it, of its generic cells, without Yosys.
+//! A module as Yosys would write it, of its generic cells, without Yosys; and one that Yosys has written.
+
+// Each binary uses its own part of this.
+#![allow(dead_code)]
 
 use std::fmt::Write;
+use std::path::Path;
 use std::sync::Arc;
 
+use guided_dtof::chip::SensorConfig;
 use guided_dtof::netlist::{CellKind, Direction, Module, NetId, Netlist};
+use guided_dtof::settings::Document;
+
+/// The QuantIC4x4 with the counter of the book's chapter.
+pub fn lfsr() -> SensorConfig {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/blocks/lfsr_p_counter.json");
+    let mut document = Document::of("a test", toml::Table::new());
+    let file = file.to_str().unwrap().into();
+    document.set_value("p_counter_block", file, "the option");
+    SensorConfig::read_document(&document).unwrap()
+}
 
 /// The netlist as JSON. Each of our cells is one generic cell; an output QN is an inverter.
 pub fn json(module: &Arc<Module>) -> String {

@@ -77,6 +77,7 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
         tables::ripples(&config, &silicon),
         tables::corners(&config, &silicon),
     ];
+    sections.extend(tables::own_counter(&config));
     if args.paths {
         sections.push(tables::paths(&subject, &load));
     }

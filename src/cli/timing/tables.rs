@@ -6,7 +6,7 @@ use crate::analysis::{
     corner_limits, factor_range, gate_works, load_works, longest, phases, read_works, reset,
     ripple, shortest_period,
 };
-use crate::chip::{Limits, Probe, SensorConfig, Silicon};
+use crate::chip::{Limits, Probe, SensorConfig, Silicon, p_counter};
 use crate::netlist::{CheckKind, Netlist, Path, Requirement};
 use crate::units::Time;
 
@@ -279,16 +279,69 @@ pub(super) fn flip_flops(subject: &Subject<'_>, load: &LoadTiming, read: &ReadTi
     section
 }
 
+/// A P-counter of one's own beside the built-in one.
+pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
+    let block = config.p_counter_block.as_ref()?;
+    let law = config.counter_law()?;
+    let built_in = SensorConfig {
+        p_counter_block: None,
+        ..config.clone()
+    };
+    let [own, built_in] = [config, &built_in].map(p_counter::circuit);
+    let stops = match law.uneven() {
+        Some(why) => why.to_string(),
+        None => format!("{} x start value + {}", config.step_periods, law.offset()),
+    };
+    let codes = match law.is_plain() {
+        true => "the start value",
+        false => "a code for each start value",
+    };
+    let number = |n: u64| Cell::Number(Some(n as f64), 0);
+    let title = format!("P-counter: {}", block.file().display());
+    let headings = &["what", "this one", "built-in"];
+    let mut section = Section::new("p_counter", title, headings);
+    section.push([
+        "transistors".into(),
+        number(own.transistors()),
+        number(built_in.transistors()),
+    ]);
+    section.push(["area".into(), number(own.area()), number(built_in.area())]);
+    let edge = "COUNTER_CLK edge of LOCAL_STOP".into();
+    section.push([
+        edge,
+        stops.into(),
+        format!("{} x start value + 0", config.step_periods).into(),
+    ]);
+    section.push([
+        "COUNTER_INIT".into(),
+        codes.into(),
+        "the start value".into(),
+    ]);
+    Some(section)
+}
+
+/// Whether there is a start value whose window a simulation can be held to.
+fn has_windows(config: &SensorConfig) -> bool {
+    let law = config.counter_law();
+    law.is_none_or(|law| law.uneven().is_none())
+}
+
 /// Ripple by number of stages.
 pub(super) fn ripples(config: &SensorConfig, silicon: &Silicon) -> Section {
     let title = "Ripple COUNTER_CLK to LOCAL_STOP";
     let mut section = Section::new("ripples", title, &["stages", "static", "event-driven"]);
-    for counter_bits in 2..=12 {
+    // A netlist has the bits that it has.
+    let bits = match config.p_counter_block {
+        Some(_) => config.counter_bits..=config.counter_bits,
+        None => 2..=12,
+    };
+    for counter_bits in bits {
         let config = SensorConfig {
             counter_bits,
             ..config.clone()
         };
         let (paths, gates) = ripple(&config, silicon);
+        let gates = has_windows(&config).then_some(gates);
         section.push([counter_bits.to_string().into(), paths.into(), gates.into()]);
     }
     section
@@ -315,6 +368,7 @@ pub(super) fn corners(config: &SensorConfig, silicon: &Silicon) -> Section {
                 gate_works(config, &silicon, Limits::Kept, at, range.moved)
             };
             let gates = |works_at: f64, fails_at: f64| match (works(works_at), works(fails_at)) {
+                _ if !has_windows(config) => "not simulated",
                 (true, false) => "simulation agrees",
                 (true, true) => "simulation still works there",
                 (false, _) => "SIMULATION FAILS ALREADY",

@@ -74,7 +74,7 @@ pub enum Irregular {
         rises: usize,
     },
     /// A P-counter of one's own that no line describes.
-    #[error("{0}, so no window law describes this P-counter")]
+    #[error("{0}: no window law describes this P-counter")]
     OwnCounter(Uneven),
     /// A P-counter of one's own whose start values are not loaded as they are.
     #[error(

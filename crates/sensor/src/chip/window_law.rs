@@ -206,9 +206,7 @@ impl WindowLaw {
                         let irregular = unknown.or(irregular);
                         (time, time + timing.local_stop_to_strobe, edge, irregular)
                     }
-                    Err(Window::Never) if unknown.is_some() => {
-                        return Window::Irregular(unknown.expect("it is some"));
-                    }
+                    Err(Window::Never) => return unknown.map_or(Window::Never, Window::Irregular),
                     Err(window) => return window,
                 }
             }

@@ -226,7 +226,8 @@ impl GateSimulation {
     pub fn loaded(&self) -> Vec<Option<u16>> {
         let loaded = |probes: &Probes| {
             let memory = probes.find(Probe::Memory)?;
-            self.kernel.number(memory).map(|code| code as u16)
+            let code = self.kernel.number(memory)? as u16;
+            Some(self.sensor.start_of_code(code))
         };
         self.probes.iter().map(loaded).collect()
     }

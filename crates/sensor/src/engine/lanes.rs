@@ -140,7 +140,10 @@ impl LaneSimulation {
     /// Start value in the P-counter's memory of each lane; `None` where a bit is unknown, and without memory.
     pub fn loaded(&self) -> Vec<Option<u16>> {
         let memory = self.probes.find(Probe::Memory);
-        let loaded = |lane| self.kernel.number(memory?, lane).map(|code| code as u16);
+        let loaded = |lane| {
+            let code = self.kernel.number(memory?, lane)? as u16;
+            Some(self.sensor.start_of_code(code))
+        };
         (0..self.serial.len()).map(loaded).collect()
     }
 

@@ -34,7 +34,10 @@ pub fn load<O: Observer>(
     let settled = end + config.load_clock().periods(1);
     kernel.run(&mut stimulus, settled, observer);
     let memories = probes::memories(netlist, config.rows, config.cols);
-    let start = |nets: &Vec<_>| kernel.number(nets).map(|code| code as u16);
+    let start = |nets: &Vec<_>| {
+        let code = kernel.number(nets)? as u16;
+        Some(config.start_of_code(code))
+    };
     Load {
         starts: memories.iter().map(start).collect(),
         duration: config.load_time(),

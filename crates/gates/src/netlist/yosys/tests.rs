@@ -1,5 +1,7 @@
 //! Hand-written netlists; none needs Yosys. What Yosys itself writes is read in `tests/chip`.
 
+use proptest::prelude::*;
+
 use super::*;
 use crate::kernel::{Drive, Kernel, merge};
 use crate::logic::Logic;
@@ -367,4 +369,24 @@ fn an_inverter_behind_a_flip_flop_is_its_other_output() {
     assert_eq!(kinds('0'), [CellKind::Dffr]);
     // The flip-flop holds the inverse, whose inverse is what it takes.
     assert_eq!(kinds('1'), [CellKind::Inv, CellKind::Dffr]);
+}
+
+proptest! {
+    /// Whatever becomes of a file, it is read or refused.
+    #[test]
+    fn spoilt_text_is_read_or_refused(edits in prop::collection::vec((0usize..2000, "[0-9xz\"{}\\[\\],: AYQDCR]"), 1..6)) {
+        let ports = r#""C": {"direction": "input", "bits": [2, 3]}, "Q": {"direction": "output", "bits": [4, 5]}"#;
+        let cells = r#""n": {"type": "$_NOT_", "connections": {"A": [4], "Y": [5]}},
+            "g": {"type": "$_MUX_", "connections": {"A": [5], "B": ["1"], "S": [3], "Y": [6]}},
+            "f": {"type": "$_SDFFE_PN0P_", "connections": {"C": [2], "D": [6], "R": [3], "E": ["x"], "Q": [4]}}"#;
+        let mut text = module(ports, cells, r#""Q": {"bits": [4, 5]}, "W": {"bits": [6]}"#);
+        prop_assert!(Module::from_yosys(&text, None).is_ok());
+        for (at, with) in edits {
+            let at = at % text.len();
+            text.replace_range(at..=at, &with);
+        }
+        if let Ok(read) = Module::from_yosys(&text, None) {
+            Netlist::elaborate(&read);
+        }
+    }
 }

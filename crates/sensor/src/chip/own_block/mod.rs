@@ -249,6 +249,11 @@ impl SensorConfig {
             Some(law) => starts.iter().map(|&start| law.code(start)).collect(),
         }
     }
+
+    /// The start value that is loaded as `code`. The configuration must have passed [`SensorConfig::check`].
+    pub fn start_of_code(&self, code: u16) -> u16 {
+        self.counter_law().map_or(code, |law| law.start(code))
+    }
 }
 
 #[cfg(test)]
