@@ -12,14 +12,14 @@ use std::collections::HashMap;
 use std::hash::{Hash, Hasher};
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::sync::{LazyLock, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 use flate2::read::GzDecoder;
 
 use crate::chip::SensorConfig;
-use crate::chip::blocks::macropixel;
+use crate::chip::blocks::{front_end, macropixel};
 use crate::netlist::liberty::{Characterised, Environment, Liberty};
-use crate::netlist::{CellKind, Corner, Library, Netlist, Timing};
+use crate::netlist::{CellKind, Corner, Library, Module, Netlist, Timing};
 
 /// Most bytes of a library: the largest open ones have 60 MB a corner.
 const MOST_BYTES: u64 = 512 << 20;
@@ -129,12 +129,33 @@ impl CellLibrary {
     pub(super) fn timing(self, netlist: &Netlist, corner: Corner) -> Timing {
         match self.0 {
             None => Timing::of_library(netlist, self.cells(), corner),
-            Some(from_file) => from_file.characterised(netlist).timing,
+            Some(from_file) => from_file.timing(netlist),
         }
     }
 }
 
 impl FromFile {
+    /// Delays of a netlist. A SPAD's toggle flip-flop takes the slower of its two delays either way: which way a photon turns it depends on
+    /// all photons before, which the fast engines do not draw.
+    fn timing(&self, netlist: &Netlist) -> Timing {
+        let mut timing = self.characterised(netlist).timing;
+        let mut toggles: HashMap<*const Module, Option<usize>> = HashMap::new();
+        for (index, scope) in netlist.scopes().iter().enumerate() {
+            let toggle = toggles
+                .entry(Arc::as_ptr(&scope.module))
+                .or_insert_with(|| scope.module.cell(front_end::TOGGLE));
+            let Some(toggle) = *toggle else { continue };
+            let cell = netlist.cells_of(index).start + toggle;
+            let mut delays = *timing.of(cell);
+            for arc in delays.as_flattened_mut() {
+                let slower = arc.rise_fs.max(arc.fall_fs);
+                (arc.rise_fs, arc.fall_fs) = (slower, slower);
+            }
+            timing.set(cell, delays);
+        }
+        timing
+    }
+
     /// A netlist in its cells, each macropixel by itself.
     pub fn characterised(&self, netlist: &Netlist) -> Characterised {
         Characterised::by_blocks(netlist, &self.liberty, &self.environment, |module| {

@@ -21,7 +21,7 @@ use crate::photon::count_bits;
 use crate::units::Time;
 
 pub use pulse_limits::{DeadTimeTooShort, PulseLimits};
-pub(crate) use summation::JOINED;
+pub(crate) use summation::{JOINED, TOGGLE};
 pub use variant::Variant;
 
 impl FrontEnd {

@@ -23,6 +23,9 @@ use super::variant::Variant;
 use crate::chip::blocks::finished;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
+/// Name of the cell that a SPAD's pulses toggle.
+pub(crate) const TOGGLE: &str = "toggle";
+
 /// The instance that retimes the one wire of a front end that joins its SPADs.
 pub(crate) const JOINED: &str = "joined";
 
@@ -45,7 +48,7 @@ pub(super) fn retiming() -> Arc<Module> {
     let first = m.wire("FIRST");
     let second = m.wire("SECOND");
     m.cell(
-        "toggle",
+        TOGGLE,
         CellKind::Dffr,
         &[toggle_n, raw, clear],
         &[toggle, toggle_n],

@@ -15,7 +15,7 @@
 
 use std::sync::Arc;
 
-use super::summation::JOINED;
+use super::summation::{JOINED, TOGGLE};
 use super::variant::{Variant, pins};
 use crate::chip::blocks::finished;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
@@ -36,7 +36,7 @@ pub(in crate::chip::blocks) fn toggle() -> Arc<Module> {
     let toggle = m.output("TOGGLE");
     let toggle_n = m.wire("TOGGLE_N");
     let pins = [toggle_n, raw, clear];
-    m.cell("toggle", CellKind::Dffr, &pins, &[toggle, toggle_n]);
+    m.cell(TOGGLE, CellKind::Dffr, &pins, &[toggle, toggle_n]);
     finished(m.finish())
 }
 
