@@ -17,6 +17,9 @@ use crate::files::InputError;
 use crate::scene::Scene;
 use crate::settings::Document;
 
+/// Blocks that a netlist can take the place of.
+const BLOCKS: [&str; 2] = ["p_counter", "correlation"];
+
 /// Where a sensor and a scene come from. The default is QuantIC4x4 before the street.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -95,8 +98,9 @@ impl Sources {
         }
         for block in &self.block {
             let option = format!("{} {block}", self.spelling.name("block"));
-            let Some(file) = block.strip_prefix("p_counter=") else {
-                let message = "is no block; give p_counter=FILE";
+            let given = block.split_once('=');
+            let Some((name, file)) = given.filter(|(name, _)| BLOCKS.contains(name)) else {
+                let message = "is no block; give p_counter=FILE or correlation=FILE";
                 return Err(InputError::new(option, message));
             };
             // A path in a sensor file is relative to that.
@@ -105,7 +109,7 @@ impl Sources {
                 false => std::path::absolute(file).unwrap_or_else(|_| file.into()),
             };
             let file = file.to_string_lossy().into_owned();
-            sensor.set_value("p_counter_block", file.into(), &option);
+            sensor.set_value(&format!("{name}_block"), file.into(), &option);
         }
         Ok(SensorConfig::read_document(&sensor)?.into())
     }

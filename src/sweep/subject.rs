@@ -14,7 +14,7 @@ use super::error::SweepError;
 use super::row::{Key, Row};
 use super::study::{Kind, Point, Study};
 use super::theory::{self, Last, Rig, Wall};
-use crate::chip::{OwnBlock, Sensor, SensorConfig};
+use crate::chip::{Sensor, SensorConfig};
 use crate::files::{InputError, in_plain_words};
 use crate::request::{FrameRequest, Sources, Spelling, is_bad_input, sentence};
 use crate::scene::Scene;
@@ -179,8 +179,8 @@ impl<'a> Subject<'a> {
         let json = serde_json::to_value((&*sensor, &scene)).expect("numbers and words");
         let mut content = json.to_string();
         self.files_in(&json[1]["object"], &mut content);
-        let block = sensor.p_counter_block.as_ref();
-        content.extend(block.and_then(OwnBlock::hash).map(|hash| hash.to_string()));
+        let blocks = sensor.own_hashes().into_iter().flatten();
+        content.extend(blocks.map(|hash| hash.to_string()));
         Ok(World {
             rig: Rig::new(&sensor, &scene),
             sources,

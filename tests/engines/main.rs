@@ -17,7 +17,7 @@ mod cycle_agrees_with_gate;
 mod delay_lines_time_photons;
 mod late_cycle_is_that_of_the_whole_run;
 mod light_is_a_list;
-mod own_p_counters_agree_with_built_in_ones;
+mod own_blocks_agree_with_built_in_ones;
 mod photons_drawn_are_those_of_the_exposure;
 mod timed_agrees_with_gate;
 mod window_sees_what_the_full_stream_shows;

@@ -323,7 +323,7 @@ pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
 /// Whether there is a start value whose window a simulation can be held to.
 fn has_windows(config: &SensorConfig) -> bool {
     let law = config.counter_law();
-    law.is_none_or(|law| law.uneven().is_none())
+    config.correlation_block.is_none() && law.is_none_or(|law| law.uneven().is_none())
 }
 
 /// Ripple by number of stages.
@@ -341,7 +341,10 @@ pub(super) fn ripples(config: &SensorConfig, silicon: &Silicon) -> Section {
             ..config.clone()
         };
         let (paths, gates) = ripple(&config, silicon);
-        let gates = has_windows(&config).then_some(gates);
+        let is_even = config
+            .counter_law()
+            .is_none_or(|law| law.uneven().is_none());
+        let gates = is_even.then_some(gates);
         section.push([counter_bits.to_string().into(), paths.into(), gates.into()]);
     }
     section

@@ -29,11 +29,11 @@ fn netlists_are_refused_with_file_and_cure() {
     for (block, says) in [
         (
             "metdc=lfsr.json",
-            "--block metdc=lfsr.json: is no block; give p_counter=FILE",
+            "--block metdc=lfsr.json: is no block; give p_counter=FILE or correlation=FILE",
         ),
         (
             "lfsr.json",
-            "--block lfsr.json: is no block; give p_counter=FILE",
+            "--block lfsr.json: is no block; give p_counter=FILE or correlation=FILE",
         ),
         (
             "p_counter=gone.json",
@@ -66,6 +66,10 @@ fn netlists_are_refused_with_file_and_cure() {
         (
             "p_counter=latch.json",
             "is a $_DLATCH_P_, a latch, which has no counterpart here; write it as a flip-flop",
+        ),
+        (
+            "correlation=lfsr.json",
+            "lfsr.json: module lfsr_p_counter has other ports than correlation: input SPAD_TIMED of 16 bits is missing, ",
         ),
     ] {
         refused(dir, &["timing", "--block", block], says);

@@ -81,7 +81,7 @@ pub fn read_text(path: &Path) -> Result<String, InputError> {
 ///
 /// # Errors
 /// When it has more, and as [`read_text`].
-pub(crate) fn read_text_within(path: &Path, most_bytes: usize) -> Result<String, InputError> {
+pub fn read_text_within(path: &Path, most_bytes: usize) -> Result<String, InputError> {
     let (mut file, has_end) = open(path)?;
     let mut bytes = Vec::new();
     let mut checked = 0;

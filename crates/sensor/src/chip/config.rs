@@ -207,6 +207,9 @@ keys! {
         afterpulse_time_ns: f64 ["ns"] = 5.0, in Within(0.0, 1e6);
         /// Probability that an avalanche fires one of its SPAD's four neighbours.
         crosstalk_probability: f64 = 0.0, in Within(0.0, 1.0), from "chosen: none";
+        /// Netlist that takes the correlation block's place, as p_counter_block; for the engines gate and cycle.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        correlation_block: Option<OwnBlock> = None, from "none: the built-in correlation";
         /// TYPE: how the number of fired SPADs is compared with THRESHOLD.
         event_type: EventType = EventType::Greater, from "thesis 4.2";
         /// THRESHOLD: SPADs; at most 31 with 4x4 of them.

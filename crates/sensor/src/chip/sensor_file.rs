@@ -4,6 +4,7 @@ use std::fmt;
 use std::ops::RangeInclusive;
 
 use super::config::{AfterBorrow, EventType, FrontEnd, PCounter, SensorConfig, Tap, Tdc};
+use super::correlation;
 use super::front_end::DeadTimeTooShort;
 use super::timing::ChipTiming;
 use super::timing::cell_library::CellLibrary;
@@ -243,11 +244,13 @@ impl SensorConfig {
                 *file = placed(document.folder(), file);
             }
         }
-        if let Some(block) = &mut config.p_counter_block
-            && let Err(message) = block.load(document.folder())
-        {
-            let path = "p_counter_block".to_owned();
-            faults.push(Fault { path, message });
+        for (key, block) in config.own_blocks() {
+            if let Some(block) = block
+                && let Err(message) = block.load(document.folder())
+            {
+                let path = key.to_owned();
+                faults.push(Fault { path, message });
+            }
         }
         if faults.is_empty() {
             let fault = config.check().err();
@@ -348,12 +351,20 @@ impl SensorConfig {
         if !variant.has_memory && self.after_borrow == AfterBorrow::Hold {
             return Err(SensorFault::HoldWithoutMemory(p_counter));
         }
+        let fault = |key: &str| {
+            let key = key.to_owned();
+            move |why| SensorFault::Value { key, why }
+        };
         if let Some(block) = &self.p_counter_block {
             let fits = block.check_counter(&(variant.circuit)(self));
-            fits.map_err(|why| SensorFault::Value {
-                key: "p_counter_block".to_owned(),
-                why,
-            })?;
+            fits.map_err(fault("p_counter_block"))?;
+        }
+        if let Some(block) = &self.correlation_block {
+            let fits = match self.tdc {
+                Tdc::Clocked => block.check_correlation(&correlation::circuit(self.lines())),
+                Tdc::DelayLine => Err("correlation_block is impossible with tdc = \"delay_line\", which correlates nothing; leave it out".to_owned()),
+            };
+            fits.map_err(fault("correlation_block"))?;
         }
         if let Err((key, why)) = CellLibrary::of(self) {
             return Err(SensorFault::Liberty { key, why });

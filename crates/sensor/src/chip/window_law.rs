@@ -223,7 +223,8 @@ impl WindowLaw {
             };
             return Window::Race(self.strobe_race(cause, arrival, change));
         }
-        if let Some(why) = irregular {
+        let own = self.sensor.correlation_block.is_some();
+        if let Some(why) = irregular.or(own.then_some(Irregular::OwnCorrelation)) {
             return Window::Irregular(why);
         }
         Window::Open(OpenWindow {

@@ -82,7 +82,10 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     match config.tdc {
         Tdc::Clocked => {
             m.instance_by_names("front_end", &front_end::circuit(config), &[]);
-            let correlation = correlation::circuit(config.lines());
+            let correlation = match &config.correlation_block {
+                Some(own) => own.circuit("correlation"),
+                None => correlation::circuit(config.lines()),
+            };
             m.instance_by_names("correlation", &correlation, &[]);
             m.instance_by_names("metdc", &metdc::circuit(config.bins), &[]);
         }

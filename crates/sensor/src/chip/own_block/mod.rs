@@ -7,6 +7,8 @@
 //!
 //! The key `p_counter` still says what is expected of a P-counter: whether COUNTER_RESET brings its start value back (all but
 //! `memoryless`). What the counter does besides is measured ([`CounterLaw`]), because nobody wrote it down.
+//!
+//! What another correlation block counts, no law says: `gate` and `cycle` run it.
 
 mod law;
 
@@ -21,9 +23,12 @@ pub use law::{CounterLaw, Uneven};
 
 use super::config::{AfterBorrow, SensorConfig};
 use super::timing::silicon::Silicon;
-use crate::files::read_text;
+use crate::files::read_text_within;
 use crate::netlist::{Corner, Direction, Edge, Module, NetId, Netlist, StaticTiming};
 use crate::settings::{Range, Setting};
+
+/// Most bytes of a file: more than [`Module::from_yosys`] takes, which then says so.
+const MOST_BYTES: usize = 32 << 20;
 
 /// A netlist in the place of a built-in block, by the file that it is read from: FILE, or FILE:MODULE.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -100,7 +105,7 @@ impl OwnBlock {
             Some((file, top)) if !asked.exists() => (Path::new(file), Some(top)),
             _ => (&*asked, None),
         };
-        let text = read_text(file).map_err(|e| e.to_string())?;
+        let text = read_text_within(file, MOST_BYTES).map_err(|e| e.to_string())?;
         let module = Module::from_yosys(&text, top);
         let module = module.map_err(|e| format!("{}: {e}", file.display()))?;
         *self = OwnBlock::of(asked, module, &text);
@@ -141,6 +146,44 @@ impl OwnBlock {
     /// # Errors
     /// What is missing, what is too much, and what differs.
     pub(super) fn check_counter(&self, built_in: &Module) -> Result<(), String> {
+        self.check(built_in, |netlist, paths| {
+            let net = |name| netlist.net(name).expect("the ports are there");
+            let clk = net("COUNTER_CLK");
+            let after = paths.arrivals(&[(clk, Edge::Rise)], &[]);
+            let after = after.expect("there is no loop");
+            let counts = netlist.cells().iter().any(|cell| {
+                cell.kind.is_flip_flop()
+                    && cell.inputs[1] == clk
+                    && after.window(cell.inputs[0]).is_some()
+            });
+            let stops = after.edge_window(net("LOCAL_STOP"), Edge::Rise).is_some();
+            let flaw = "does not count rising edges of COUNTER_CLK up to LOCAL_STOP; clock it with posedge COUNTER_CLK";
+            (!counts || !stops).then_some(flaw)
+        })
+    }
+
+    /// Whether it can be a correlation block in the place of `built_in`.
+    ///
+    /// # Errors
+    /// As [`OwnBlock::check_counter`].
+    pub(super) fn check_correlation(&self, built_in: &Module) -> Result<(), String> {
+        self.check(built_in, |netlist, paths| {
+            let timed = netlist.signal("SPAD_TIMED").expect("the ports are there");
+            let starts = timed.into_iter().flat_map(|n| Edge::BOTH.map(|e| (n, e)));
+            let starts: Vec<(NetId, Edge)> = starts.collect();
+            let after = paths.arrivals(&starts, &[]).expect("there is no loop");
+            let event = netlist.net("SPAD_EVENT").expect("the ports are there");
+            let flaw = "has a SPAD_EVENT that no SPAD_TIMED changes; make it of gates behind them";
+            after.window(event).is_none().then_some(flaw)
+        })
+    }
+
+    /// Whether its ports are those of `built_in`, and its gates make no loop and have no `flaw`.
+    fn check(
+        &self,
+        built_in: &Module,
+        flaw: impl Fn(&Netlist, &StaticTiming<'_>) -> Option<&'static str>,
+    ) -> Result<(), String> {
         let file = self.file.display();
         let Some(read) = &self.read else {
             return Err(format!(
@@ -167,21 +210,9 @@ impl OwnBlock {
                 found.net
             ));
         }
-        let net = |name| netlist.net(name).expect("the ports are there");
-        let clk = net("COUNTER_CLK");
-        let after = paths.arrivals(&[(clk, Edge::Rise)], &[]);
-        let after = after.expect("there is no loop");
-        let counts = netlist.cells().iter().any(|cell| {
-            cell.kind.is_flip_flop()
-                && cell.inputs[1] == clk
-                && after.window(cell.inputs[0]).is_some()
-        });
-        let stops = after.edge_window(net("LOCAL_STOP"), Edge::Rise).is_some();
-        match counts && stops {
-            true => Ok(()),
-            false => Err(format!(
-                "{file}: module {name} does not count rising edges of COUNTER_CLK up to LOCAL_STOP; clock it with posedge COUNTER_CLK"
-            )),
+        match flaw(&netlist, &paths) {
+            None => Ok(()),
+            Some(flaw) => Err(format!("{file}: module {name} {flaw}")),
         }
     }
 }
@@ -237,6 +268,20 @@ fn misfits(own: &Module, built_in: &Module) -> Vec<String> {
 }
 
 impl SensorConfig {
+    /// Keys of blocks of one's own, with those that there are.
+    pub(super) fn own_blocks(&mut self) -> [(&'static str, &mut Option<OwnBlock>); 2] {
+        [
+            ("p_counter_block", &mut self.p_counter_block),
+            ("correlation_block", &mut self.correlation_block),
+        ]
+    }
+
+    /// What tells the netlists of its own blocks apart.
+    pub fn own_hashes(&self) -> [Option<u64>; 2] {
+        [&self.p_counter_block, &self.correlation_block]
+            .map(|block| block.as_ref().and_then(OwnBlock::hash))
+    }
+
     /// What a P-counter of one's own does; `None` for the built-in ones. The configuration must have passed [`SensorConfig::check`].
     pub fn counter_law(&self) -> Option<Arc<CounterLaw>> {
         Some(self.p_counter_block.as_ref()?.law(self))

@@ -9,7 +9,6 @@ use super::macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays};
 use super::silicon::{Limits, Silicon};
 use crate::chip::config::{AfterBorrow, FrontEnd, Overflow, PCounter, SensorConfig, Tap, Tdc};
 use crate::chip::front_end::PulseLimits;
-use crate::chip::own_block::OwnBlock;
 use crate::chip::photon_line;
 use crate::netlist::{CellKind, CheckKind, Corner};
 use crate::units::Time;
@@ -114,7 +113,7 @@ struct Circuit {
     coincident_spads: usize,
     counter_bits: usize,
     p_counter: PCounter,
-    own: Option<u64>,
+    own: [Option<u64>; 2],
     tap: Tap,
     after_borrow: AfterBorrow,
     step_periods: usize,
@@ -134,7 +133,7 @@ impl Circuit {
             coincident_spads: config.coincident_spads,
             counter_bits: config.counter_bits,
             p_counter: config.p_counter,
-            own: config.p_counter_block.as_ref().and_then(OwnBlock::hash),
+            own: config.own_hashes(),
             tap: config.tap,
             after_borrow: config.after_borrow,
             step_periods: config.step_periods,

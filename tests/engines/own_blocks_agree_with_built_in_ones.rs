@@ -7,7 +7,7 @@ use crate::yosys;
 use guided_dtof::chip::own_block::Uneven;
 use guided_dtof::chip::{
     ChipTiming, Exposure, Irregular, Mode, OwnBlock, PCounter, SensorConfig, Window, WindowLaw,
-    p_counter,
+    correlation, p_counter,
 };
 use guided_dtof::engine::{self, Cycle, Gate, Histograms, Replay};
 use guided_dtof::netlist::Module;
@@ -146,4 +146,31 @@ fn without_a_line_the_gates_and_the_cycles_count_and_the_law_refuses() {
         why.to_string(),
         "COUNTER_INIT 0 and 1 raise LOCAL_STOP with the same edge of COUNTER_CLK: no window law describes this P-counter"
     );
+}
+
+#[test]
+fn a_correlation_block_of_ones_own_is_counted_by_gates_and_cycles() {
+    let mut ran = 0;
+    for seed in 0..20 {
+        let random = &mut StdRng::seed_from_u64(seed);
+        let scenario = Scenario::random(random, 1, 6);
+        let config = &scenario.config;
+        let json = yosys::json(&correlation::circuit(config.lines()));
+        let module = Module::from_yosys(&json, None).unwrap();
+        let own = SensorConfig {
+            correlation_block: Some(OwnBlock::of("built_in.json", module, &json)),
+            ..config.clone()
+        };
+        own.check().unwrap();
+        assert_eq!(ChipTiming::of(&own), ChipTiming::of(config));
+        let (windows, found) = counted(&own, &scenario);
+        assert_eq!(found[..2], counted(config, &scenario).1[..2], "seed {seed}");
+        let opens = windows
+            .iter()
+            .any(|window| matches!(window, Window::Open(_)));
+        assert!(!opens, "{windows:?}");
+        let why = Window::Irregular(Irregular::OwnCorrelation);
+        ran += windows.iter().filter(|window| **window == why).count();
+    }
+    assert!(ran > 40, "{ran}");
 }
