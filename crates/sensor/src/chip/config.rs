@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use super::blocks::metdc_delay_line::Elements;
-use super::own_block::OwnBlock;
+use super::own_block::block::OwnBlock;
 use crate::netlist::Corner;
 use crate::photon::{MOST_SPADS, SpadGrid, count_bits};
 use crate::settings::Range::{Above, OneOf, Within};

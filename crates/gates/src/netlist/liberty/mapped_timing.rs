@@ -9,7 +9,7 @@ use super::read::Liberty;
 use crate::netlist::{Edge, NetId, Netlist};
 use crate::units::Time;
 
-/// Writes the delays of every library cell's arcs as SDF, for the netlist of [`write_mapped`]: ps, one value.
+/// Writes the delays of every library cell's arcs as SDF, for the netlist of [`write_mapped`](super::write_mapped): ps, one value.
 ///
 /// # Errors
 /// Those of the writer.

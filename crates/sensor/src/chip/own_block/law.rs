@@ -12,7 +12,6 @@
 
 use std::sync::Arc;
 
-use super::Expected;
 use crate::chip::config::AfterBorrow;
 use crate::chip::p_counter::Rises;
 use crate::chip::timing::silicon::Silicon;
@@ -22,6 +21,15 @@ use crate::units::Time;
 
 /// Half a period of COUNTER_CLK, and every pause: long enough for ten thousand gates one after the other.
 const PAUSE: Time = Time::from_ns(500);
+
+/// What the measured law of a counter depends on besides the netlist.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct Expected {
+    /// COUNTER_RESET brings the start value back.
+    pub has_memory: bool,
+    pub after_borrow: AfterBorrow,
+    pub step_periods: usize,
+}
 
 /// Why start values open no windows that a line describes. Codes are values of COUNTER_INIT.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]

@@ -10,135 +10,37 @@
 //!
 //! What another correlation block counts, no law says: `gate` and `cycle` run it.
 
+pub(crate) mod block;
 mod law;
 
 use std::collections::HashMap;
-use std::hash::{DefaultHasher, Hash, Hasher};
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
-use serde::{Deserialize, Serialize};
-
+pub use block::OwnBlock;
+use law::Expected;
 pub use law::{CounterLaw, Uneven};
 
-use super::config::{AfterBorrow, SensorConfig};
+use super::config::SensorConfig;
 use super::timing::silicon::Silicon;
-use crate::files::read_text_within;
 use crate::netlist::{Corner, Direction, Edge, Module, NetId, Netlist, StaticTiming};
-use crate::settings::{Range, Setting};
 
-/// Most bytes of a file: more than [`Module::from_yosys`] takes, which then says so.
-const MOST_BYTES: usize = 32 << 20;
-
-/// A netlist in the place of a built-in block, by the file that it is read from: FILE, or FILE:MODULE.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(from = "PathBuf", into = "PathBuf")]
-pub struct OwnBlock {
-    file: PathBuf,
-    read: Option<Arc<Read>>,
-}
-
-#[derive(Debug)]
-struct Read {
-    module: Arc<Module>,
-    /// Of the file's text and the module's name.
-    hash: u64,
-    laws: Mutex<HashMap<Expected, Arc<CounterLaw>>>,
-}
-
-/// What the measured law of a counter depends on besides the netlist.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-struct Expected {
-    /// COUNTER_RESET brings the start value back.
-    has_memory: bool,
-    after_borrow: AfterBorrow,
-    step_periods: usize,
-}
-
-impl From<PathBuf> for OwnBlock {
-    fn from(file: PathBuf) -> Self {
-        OwnBlock { file, read: None }
-    }
-}
-
-impl From<OwnBlock> for PathBuf {
-    fn from(block: OwnBlock) -> Self {
-        block.file
-    }
-}
-
-/// Blocks are equal if they come from the same file, which said the same.
-impl PartialEq for OwnBlock {
-    fn eq(&self, other: &Self) -> bool {
-        self.file == other.file && self.hash() == other.hash()
-    }
-}
-
-impl Setting for OwnBlock {
-    const RANGE: Range = Range::Text;
-}
+/// Laws that have been measured, by netlist and what is expected of it.
+type Laws = HashMap<(u64, Expected), Arc<CounterLaw>>;
 
 impl OwnBlock {
-    /// A block that is read already.
-    pub fn of(file: impl Into<PathBuf>, module: Arc<Module>, text: &str) -> Self {
-        let mut hasher = DefaultHasher::new();
-        (text, module.name()).hash(&mut hasher);
-        let read = Read {
-            module,
-            hash: hasher.finish(),
-            laws: Mutex::default(),
-        };
-        OwnBlock {
-            file: file.into(),
-            read: Some(Arc::new(read)),
-        }
-    }
-
-    /// Reads its file, which is relative to `folder`.
-    ///
-    /// # Errors
-    /// What is wrong with the file, with its name.
-    pub(super) fn load(&mut self, folder: &Path) -> Result<(), String> {
-        let asked = folder.join(&self.file);
-        let name = asked.to_string_lossy().into_owned();
-        let (file, top) = match name.rsplit_once(':') {
-            Some((file, top)) if !asked.exists() => (Path::new(file), Some(top)),
-            _ => (&*asked, None),
-        };
-        let text = read_text_within(file, MOST_BYTES).map_err(|e| e.to_string())?;
-        let module = Module::from_yosys(&text, top);
-        let module = module.map_err(|e| format!("{}: {e}", file.display()))?;
-        *self = OwnBlock::of(asked, module, &text);
-        Ok(())
-    }
-
-    /// Where it comes from.
-    pub fn file(&self) -> &Path {
-        &self.file
-    }
-
-    /// Tells netlists apart, where the block has been read.
-    pub fn hash(&self) -> Option<u64> {
-        self.read.as_ref().map(|read| read.hash)
-    }
-
-    /// Its circuit under the name of the block that it replaces.
-    pub(super) fn circuit(&self, name: &str) -> Arc<Module> {
-        let read = self.read.as_ref().expect("it has been checked");
-        read.module.renamed(name)
-    }
-
-    /// What it does as the P-counter of this sensor; measured once.
+    /// What it does as the P-counter of this sensor; measured once a process.
     fn law(&self, config: &SensorConfig) -> Arc<CounterLaw> {
-        let read = self.read.as_ref().expect("it has been checked");
+        static LAWS: LazyLock<Mutex<Laws>> = LazyLock::new(Mutex::default);
+        let module = self.module().expect("it has been checked");
+        let hash = self.hash().expect("it has been checked");
         let expected = Expected {
             has_memory: config.p_counter.row().has_memory,
             after_borrow: config.after_borrow,
             step_periods: config.step_periods,
         };
-        let mut laws = read.laws.lock().unwrap_or_else(PoisonError::into_inner);
-        let law = laws.entry(expected);
-        Arc::clone(law.or_insert_with(|| Arc::new(CounterLaw::measure(&read.module, expected))))
+        let mut laws = LAWS.lock().unwrap_or_else(PoisonError::into_inner);
+        let law = laws.entry((hash, expected));
+        Arc::clone(law.or_insert_with(|| Arc::new(CounterLaw::measure(module, expected))))
     }
 
     /// Whether it can be a P-counter in the place of `built_in`.
@@ -184,14 +86,14 @@ impl OwnBlock {
         built_in: &Module,
         flaw: impl Fn(&Netlist, &StaticTiming<'_>) -> Option<&'static str>,
     ) -> Result<(), String> {
-        let file = self.file.display();
-        let Some(read) = &self.read else {
+        let file = self.file().display();
+        let Some(module) = self.module() else {
             return Err(format!(
                 "{file} has not been read; give it in a sensor file"
             ));
         };
-        let name = read.module.name();
-        let faults = misfits(&read.module, built_in);
+        let name = module.name();
+        let faults = misfits(module, built_in);
         if !faults.is_empty() {
             return Err(format!(
                 "{file}: module {name} has other ports than {}: {}",
@@ -199,7 +101,7 @@ impl OwnBlock {
                 faults.join(", ")
             ));
         }
-        let netlist = Netlist::elaborate(&read.module);
+        let netlist = Netlist::elaborate(module);
         let timing = Silicon::nominal(Corner::Typ).timing(&netlist);
         let paths = StaticTiming::new(&netlist, &timing);
         let inputs = netlist.inputs().into_iter();

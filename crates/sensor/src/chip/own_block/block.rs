@@ -1,0 +1,108 @@
+//! A netlist that stands in the place of a built-in block, by the file that it is read from. What it must be, and what it does, is told
+//! by what stands above it.
+
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use crate::files::read_text_within;
+use crate::netlist::Module;
+use crate::settings::{Range, Setting};
+
+/// Most bytes of a file: more than [`Module::from_yosys`] takes, which then says so.
+const MOST_BYTES: usize = 32 << 20;
+
+/// A netlist in the place of a built-in block, by the file that it is read from: FILE, or FILE:MODULE.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(from = "PathBuf", into = "PathBuf")]
+pub struct OwnBlock {
+    file: PathBuf,
+    read: Option<Arc<Read>>,
+}
+
+#[derive(Debug)]
+struct Read {
+    module: Arc<Module>,
+    /// Of the file's text and the module's name.
+    hash: u64,
+}
+
+impl From<PathBuf> for OwnBlock {
+    fn from(file: PathBuf) -> Self {
+        OwnBlock { file, read: None }
+    }
+}
+
+impl From<OwnBlock> for PathBuf {
+    fn from(block: OwnBlock) -> Self {
+        block.file
+    }
+}
+
+/// Blocks are equal if they come from the same file, which said the same.
+impl PartialEq for OwnBlock {
+    fn eq(&self, other: &Self) -> bool {
+        self.file == other.file && self.hash() == other.hash()
+    }
+}
+
+impl Setting for OwnBlock {
+    const RANGE: Range = Range::Text;
+}
+
+impl OwnBlock {
+    /// A block that is read already.
+    pub fn of(file: impl Into<PathBuf>, module: Arc<Module>, text: &str) -> Self {
+        let mut hasher = DefaultHasher::new();
+        (text, module.name()).hash(&mut hasher);
+        let read = Read {
+            module,
+            hash: hasher.finish(),
+        };
+        OwnBlock {
+            file: file.into(),
+            read: Some(Arc::new(read)),
+        }
+    }
+
+    /// Reads its file, which is relative to `folder`.
+    ///
+    /// # Errors
+    /// What is wrong with the file, with its name.
+    pub(in crate::chip) fn load(&mut self, folder: &Path) -> Result<(), String> {
+        let asked = folder.join(&self.file);
+        let name = asked.to_string_lossy().into_owned();
+        let (file, top) = match name.rsplit_once(':') {
+            Some((file, top)) if !asked.exists() => (Path::new(file), Some(top)),
+            _ => (&*asked, None),
+        };
+        let text = read_text_within(file, MOST_BYTES).map_err(|e| e.to_string())?;
+        let module = Module::from_yosys(&text, top);
+        let module = module.map_err(|e| format!("{}: {e}", file.display()))?;
+        *self = OwnBlock::of(asked, module, &text);
+        Ok(())
+    }
+
+    /// Where it comes from.
+    pub fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// Tells netlists apart, where the block has been read.
+    pub fn hash(&self) -> Option<u64> {
+        self.read.as_ref().map(|read| read.hash)
+    }
+
+    /// Its circuit under the name of the block that it replaces.
+    pub(in crate::chip) fn circuit(&self, name: &str) -> Arc<Module> {
+        let read = self.read.as_ref().expect("it has been checked");
+        read.module.renamed(name)
+    }
+
+    /// Its circuit, once it has been read.
+    pub(super) fn module(&self) -> Option<&Arc<Module>> {
+        self.read.as_ref().map(|read| &read.module)
+    }
+}
