@@ -15,6 +15,7 @@ mod engines_are_chosen_from_the_command_line;
 mod frames_for_other_tools;
 mod golden_vectors_hold;
 mod guides_from_the_command_line;
+mod libraries_make_the_chip;
 mod mismatch_replays;
 mod one_window_for_all;
 mod probes_keep_their_first_hits;

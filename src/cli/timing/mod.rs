@@ -113,11 +113,18 @@ fn condition_table(args: &SiliconArgs, silicon: &Silicon) -> Section {
         "delay factor",
     ];
     let mut section = Section::new("conditions", "Conditions", headings);
+    let (process, [voltage_v, temperature_c]) = match silicon.library.from_file() {
+        Some(library) => (library.liberty.name.as_str(), library.liberty.conditions),
+        None => (
+            conditions.process.name(),
+            [Some(conditions.voltage_v), Some(conditions.temperature_c)],
+        ),
+    };
     section.push([
         silicon.corner.name().into(),
-        conditions.process.name().into(),
-        Cell::Number(Some(conditions.voltage_v), 3),
-        Cell::Number(Some(conditions.temperature_c), 1),
+        process.into(),
+        Cell::Number(voltage_v, 3),
+        Cell::Number(temperature_c, 1),
         Cell::Number(Some(silicon.factor), 4),
     ]);
     section

@@ -101,13 +101,11 @@ pub fn write_constraints(
         period.as_ns()
     )?;
     writeln!(out, "set_propagated_clock [get_clocks {port}]")?;
-    let clocks: BTreeSet<NetId> = clocking
-        .ripple
-        .iter()
-        .map(|&cell| netlist.cells()[cell].inputs[1])
-        .collect();
     let mut divided: Vec<(NetId, String)> = Vec::new();
-    for &cell in clocking.ripple {
+    for (index, &cell) in clocking.ripple.iter().enumerate() {
+        // What comes back to an earlier one, as LOCAL_STOP does to block COUNTER_CLK, gates a clock and is none.
+        let later = clocking.ripple[index + 1..].iter();
+        let later: BTreeSet<NetId> = later.map(|&cell| netlist.cells()[cell].inputs[1]).collect();
         let leaf = &netlist.cells()[cell];
         let (composite, _) = characterised.instance(netlist, &library.map, cell);
         let path = netlist.cell_path(cell);
@@ -133,7 +131,7 @@ pub fn write_constraints(
             let Source::Stage(stage, pin) = output else {
                 continue;
             };
-            if !clocks.iter().any(|&clock| reaches(netlist, net, clock)) {
+            if !later.iter().any(|&clock| reaches(netlist, net, clock)) {
                 continue;
             }
             let at = format!(

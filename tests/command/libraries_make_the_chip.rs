@@ -1,0 +1,128 @@
+//! `--liberty` and what follows from it, as one gives them on the command line.
+
+use crate::command::gdtof;
+
+use std::path::Path;
+
+/// The library of invented numbers.
+fn example() -> String {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let file = here.join("vectors/liberty/example.lib");
+    file.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn gates_and_window_count_alike_in_a_librarys_cells() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments =
+        "frame --rows 4 --cols 4 --laser-cycles 60 --probe 1,2 --quiet --out frame --liberty";
+    let mut arguments: Vec<&str> = arguments.split(' ').collect();
+    let library = example();
+    arguments.push(&library);
+    let output = gdtof(folder.path(), &arguments);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let written = std::fs::read_to_string(folder.path().join("frame/frame.json")).unwrap();
+    assert!(written.contains("example.lib"));
+    // The waveform of a later cycle is made of the same cells.
+    let wave = [
+        "wave",
+        "--frame",
+        "frame/frame.json",
+        "--pixel",
+        "1,2",
+        "--cycle",
+        "40",
+    ];
+    let output = gdtof(folder.path(), &wave);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+}
+
+#[test]
+fn a_macropixel_is_exported_in_library_cells() {
+    let folder = tempfile::tempdir().unwrap();
+    let library = example();
+    let arguments = [
+        "export",
+        "verilog",
+        "--mapped",
+        "--out",
+        "m",
+        "--liberty",
+        &library,
+    ];
+    let output = gdtof(folder.path(), &arguments);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let read = |name: &str| std::fs::read_to_string(folder.path().join("m").join(name)).unwrap();
+    assert!(read("mapped.v").contains("DFFRN_1"));
+    assert!(read("mapped.sdf").contains("(IOPATH CK Q"));
+    // CLK, and a clock at each of the nine stages that clock the next one.
+    assert_eq!(
+        read("mapped.sdc").matches("create_generated_clock").count(),
+        18
+    );
+}
+
+#[test]
+fn what_is_no_library_is_refused_in_a_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let library = example();
+    std::fs::write(
+        folder.path().join("cut.lib"),
+        "library (cut) {\n  cell (INV) {\n",
+    )
+    .unwrap();
+    std::fs::write(
+        folder.path().join("empty.lib"),
+        "library (none) { capacitive_load_unit (1, pf); }\n",
+    )
+    .unwrap();
+    let voltage: &[&str] = &["--liberty", &library, "--voltage", "1.0"];
+    for (arguments, says) in [
+        (
+            &["--liberty", "nothing.lib"][..],
+            "nothing.lib: cannot be read",
+        ),
+        (
+            &["--liberty", "cut.lib"],
+            "cut.lib:3: the cell INV of line 2 has no closing brace",
+        ),
+        (
+            &["--liberty", "empty.lib"],
+            "empty.lib:1: the library none has nothing to make a INV from",
+        ),
+        (
+            &["--liberty", &library, "--cell", "DFFR=foo"],
+            "has no cell foo that does what DFFR does",
+        ),
+        (
+            &["--liberty", &library, "--cell", "FOO=INV_1"],
+            "is not KIND=NAME",
+        ),
+        (
+            &["--liberty", &library, "--set", "sensor.corner=slow"],
+            "give liberty_slow, too",
+        ),
+        (
+            voltage,
+            "a library is characterised at conditions of its own",
+        ),
+    ] {
+        let output = gdtof(folder.path(), &[&["timing"], arguments].concat());
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(said.contains(says), "{arguments:?}: {said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+    }
+    let output = gdtof(folder.path(), &["export", "sdc", "--out", "a.sdc"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(!folder.path().join("a.sdc").exists());
+}
