@@ -44,12 +44,13 @@ fn every_command_runs() {
             let text = std::fs::read_to_string(book().join(chapter)).unwrap();
             let empty = tempfile::tempdir().unwrap();
             // What a chapter names of the repository.
-            let blocks = Path::new("examples/blocks");
             let [from, to] = [Path::new(env!("CARGO_MANIFEST_DIR")), empty.path()];
-            std::fs::create_dir_all(to.join(blocks)).unwrap();
-            for entry in std::fs::read_dir(from.join(blocks)).unwrap() {
-                let name = blocks.join(entry.unwrap().file_name());
-                std::fs::copy(from.join(&name), to.join(name)).unwrap();
+            for folder in ["examples/blocks", "vectors/liberty"].map(Path::new) {
+                std::fs::create_dir_all(to.join(folder)).unwrap();
+                for entry in std::fs::read_dir(from.join(folder)).unwrap() {
+                    let name = folder.join(entry.unwrap().file_name());
+                    std::fs::copy(from.join(&name), to.join(name)).unwrap();
+                }
             }
             let output = Command::new("bash")
                 .args(["-euo", "pipefail", "-c", &commands(&text)])
