@@ -313,7 +313,7 @@ pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
         format!("{} x start value + 0", config.step_periods).into(),
     ]);
     section.push([
-        "COUNTER_INIT".into(),
+        Probe::CounterInit.name().into(),
         codes.into(),
         "the start value".into(),
     ]);

@@ -20,7 +20,7 @@ fn netlists_are_refused_with_file_and_cure() {
         ("no.json", "module m; endmodule".to_owned()),
         ("none.json", r#"{"modules": {}}"#.to_owned()),
         ("two.json", two("")),
-        ("ports.json", LFSR.replacen("MEMORY_RESET", "CLEAR", 1)),
+        ("ports.json", LFSR.replacen("MEMORY_RESET", "MINE", 1)),
         ("latch.json", LFSR.replacen("$_ANDNOT_", "$_DLATCH_P_", 1)),
         ("lfsr.json", LFSR.to_owned()),
     ] {
@@ -61,7 +61,7 @@ fn netlists_are_refused_with_file_and_cure() {
         ),
         (
             "p_counter=ports.json",
-            "ports.json: module lfsr_p_counter has other ports than p_counter: input MEMORY_RESET of 1 bit is missing, input CLEAR is too much",
+            "ports.json: module lfsr_p_counter has other ports than p_counter: input MEMORY_RESET of 1 bit is missing, input MINE is too much",
         ),
         (
             "p_counter=latch.json",

@@ -15,6 +15,7 @@ use std::sync::Arc;
 use crate::chip::config::AfterBorrow;
 use crate::chip::p_counter::Rises;
 use crate::chip::timing::silicon::Silicon;
+use crate::chip::{Probe, Probes};
 use crate::kernel::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
 use crate::netlist::{Corner, Module, NetId, Netlist};
 use crate::units::Time;
@@ -128,11 +129,12 @@ impl CounterLaw {
     /// Measures it on the gates.
     pub(super) fn measure(module: &Arc<Module>, expected: Expected) -> Self {
         let netlist = Netlist::elaborate(module);
-        let bits = netlist.signal("COUNTER_INIT").map_or(0, |nets| nets.len());
+        let probes = &Probes::of_block(&netlist);
+        let bits = probes.bus(Probe::CounterInit).len();
         let codes: Vec<u16> = (0..1u32 << bits).map(|code| code as u16).collect();
         // On this thread: whoever else wants the law waits for it, and may be next in this thread's own queue.
         let parts = codes.chunks(LANES);
-        let parts = parts.map(|codes| Bench::new(&netlist, codes, expected).measure());
+        let parts = parts.map(|codes| Bench::new((&netlist, probes), codes, expected).measure());
         let parts: Result<Vec<Vec<Counted>>, Uneven> = parts.collect();
         let straight = parts.map(|parts| parts.concat());
         let plain = |counted: Vec<Counted>, uneven| CounterLaw {
@@ -202,6 +204,7 @@ fn line(counted: &[Counted], expected: Expected) -> Result<(Vec<u16>, u32), Unev
 /// Up to 64 codes in one counter's lanes.
 struct Bench<'n> {
     netlist: &'n Netlist,
+    probes: &'n Probes,
     kernel: LaneKernel,
     codes: &'n [u16],
     expected: Expected,
@@ -226,12 +229,17 @@ impl LaneObserver for Watch {
 }
 
 impl<'n> Bench<'n> {
-    fn new(netlist: &'n Netlist, codes: &'n [u16], expected: Expected) -> Self {
+    fn new(
+        (netlist, probes): (&'n Netlist, &'n Probes),
+        codes: &'n [u16],
+        expected: Expected,
+    ) -> Self {
         let timing = Silicon::nominal(Corner::Typ).timing(netlist);
         Bench {
             kernel: LaneKernel::new(netlist, &timing),
-            local_stop: netlist.net("LOCAL_STOP").expect("it has been checked"),
+            local_stop: probes.net(Probe::LocalStop),
             netlist,
+            probes,
             codes,
             expected,
             now: Time::ZERO,
@@ -258,8 +266,8 @@ impl<'n> Bench<'n> {
         watch
     }
 
-    fn set(&mut self, name: &str, value: bool) {
-        let net = self.netlist.net(name).expect("it has been checked");
+    fn set(&mut self, pin: Probe, value: bool) {
+        let net = self.probes.net(pin);
         self.drive(&[(net, all(value))], u64::MAX);
     }
 
@@ -272,18 +280,15 @@ impl<'n> Bench<'n> {
             .map(|&n| (n, all(false)))
             .collect();
         self.drive(&inputs, u64::MAX);
-        for (name, value) in [
-            ("MEMORY_RESET", true),
-            ("COUNTER_RESET", true),
-            ("MEMORY_RESET", false),
+        for (pin, value) in [
+            (Probe::MemoryReset, true),
+            (Probe::CounterReset, true),
+            (Probe::MemoryReset, false),
         ] {
-            self.set(name, value);
+            self.set(pin, value);
         }
-        let init = self
-            .netlist
-            .signal("COUNTER_INIT")
-            .expect("it has been checked");
-        let bits = (0..).zip(init).map(|(bit, net)| {
+        let init = self.probes.bus(Probe::CounterInit);
+        let bits = (0..).zip(init).map(|(bit, &net)| {
             let lanes = (0..).zip(self.codes);
             let word = lanes.fold(0, |word, (lane, code)| {
                 word | u64::from(code >> bit & 1) << lane
@@ -292,17 +297,17 @@ impl<'n> Bench<'n> {
         });
         let bits: Vec<_> = bits.collect();
         self.drive(&bits, u64::MAX);
-        for (name, value) in [
-            ("MEMORY_LOAD", true),
-            ("MEMORY_LOAD", false),
-            ("COUNTER_RESET", false),
+        for (pin, value) in [
+            (Probe::MemoryLoad, true),
+            (Probe::MemoryLoad, false),
+            (Probe::CounterReset, false),
         ] {
-            self.set(name, value);
+            self.set(pin, value);
         }
         let counted = self.count()?;
         if self.expected.has_memory {
-            self.set("COUNTER_RESET", true);
-            self.set("COUNTER_RESET", false);
+            self.set(Probe::CounterReset, true);
+            self.set(Probe::CounterReset, false);
             let again = self.count()?;
             let mut lanes = counted.iter().zip(&again).zip(self.codes);
             if let Some((_, &code)) = lanes.find(|((one, other), _)| one != other) {
@@ -315,14 +320,8 @@ impl<'n> Bench<'n> {
     /// Clocks the counter until LOCAL_STOP has risen, or come round where it wraps, as the timing block lets it.
     fn count(&mut self) -> Result<Vec<Counted>, Uneven> {
         let holds = self.expected.after_borrow == AfterBorrow::Hold;
-        let clk = self
-            .netlist
-            .net("COUNTER_CLK")
-            .expect("it has been checked");
-        let bits = self
-            .netlist
-            .signal("COUNTER_INIT")
-            .map_or(0, |nets| nets.len());
+        let clk = self.probes.net(Probe::CounterClk);
+        let bits = self.probes.bus(Probe::CounterInit).len();
         // The tap `borrow` makes the round of a counter twice as long; and twice more for one that takes its time.
         let most = (self.expected.step_periods as u32) << (bits + 2);
         let used = u64::MAX >> (LANES - self.codes.len());

@@ -21,6 +21,7 @@ use law::Expected;
 pub use law::{CounterLaw, Uneven};
 
 use super::config::SensorConfig;
+use super::probes::{Probe, Probes};
 use super::timing::silicon::Silicon;
 use crate::netlist::{Corner, Direction, Edge, Module, NetId, Netlist, StaticTiming};
 
@@ -49,8 +50,8 @@ impl OwnBlock {
     /// What is missing, what is too much, and what differs.
     pub(super) fn check_counter(&self, built_in: &Module) -> Result<(), String> {
         self.check(built_in, |netlist, paths| {
-            let net = |name| netlist.net(name).expect("the ports are there");
-            let clk = net("COUNTER_CLK");
+            let probes = Probes::of_block(netlist);
+            let clk = probes.net(Probe::CounterClk);
             let after = paths.arrivals(&[(clk, Edge::Rise)], &[]);
             let after = after.expect("there is no loop");
             let counts = netlist.cells().iter().any(|cell| {
@@ -58,7 +59,7 @@ impl OwnBlock {
                     && cell.inputs[1] == clk
                     && after.window(cell.inputs[0]).is_some()
             });
-            let stops = after.edge_window(net("LOCAL_STOP"), Edge::Rise).is_some();
+            let stops = after.edge_window(probes.net(Probe::LocalStop), Edge::Rise).is_some();
             let flaw = "does not count rising edges of COUNTER_CLK up to LOCAL_STOP; clock it with posedge COUNTER_CLK";
             (!counts || !stops).then_some(flaw)
         })
@@ -70,11 +71,12 @@ impl OwnBlock {
     /// As [`OwnBlock::check_counter`].
     pub(super) fn check_correlation(&self, built_in: &Module) -> Result<(), String> {
         self.check(built_in, |netlist, paths| {
-            let timed = netlist.signal("SPAD_TIMED").expect("the ports are there");
-            let starts = timed.into_iter().flat_map(|n| Edge::BOTH.map(|e| (n, e)));
+            let probes = Probes::of_block(netlist);
+            let timed = probes.bus(Probe::SpadTimed).iter();
+            let starts = timed.flat_map(|&n| Edge::BOTH.map(|e| (n, e)));
             let starts: Vec<(NetId, Edge)> = starts.collect();
             let after = paths.arrivals(&starts, &[]).expect("there is no loop");
-            let event = netlist.net("SPAD_EVENT").expect("the ports are there");
+            let event = probes.net(Probe::SpadEvent);
             let flaw = "has a SPAD_EVENT that no SPAD_TIMED changes; make it of gates behind them";
             after.window(event).is_none().then_some(flaw)
         })

@@ -153,7 +153,11 @@ fn every_key_is_explained_and_has_its_range() {
             "{}",
             key.name
         );
-        let line = format!("{} = {}", key.name, table[key.name]);
+        let Some(value) = table.get(key.name) else {
+            assert!(key.name.ends_with("_block"), "{}", key.name);
+            continue;
+        };
+        let line = format!("{} = {value}", key.name);
         assert!(text.lines().any(|l| l == line), "{line}");
         // Units stand in names, too, and are understood.
         let suffix = format!("_{}", key.unit.to_lowercase());

@@ -64,11 +64,24 @@ impl Leveliser<'_> {
         .collect()
     }
 
-    /// To either output: a draft stands for what both of them do, and the library's flip-flops are as fast to Q̄ as to Q.
-    pub(super) fn delay(&self, arc: &Arc, edge: Edge) -> i64 {
-        let [to_q, to_qn] = self.survey.timing.of(arc.cell)[arc.pin];
-        debug_assert_eq!(to_q, to_qn, "outputs of one flip-flop differ");
-        i64::from(to_q.to(edge.level()))
+    /// Delay to one change of an output.
+    fn delay(&self, arc: &Arc, to: Node) -> i64 {
+        let outputs = self.survey.netlist.cells()[arc.cell].outputs;
+        let output = outputs.iter().position(|&net| net == to.0);
+        let output = output.expect("an arc leads to an output");
+        i64::from(self.survey.timing.of(arc.cell)[arc.pin][output].to(to.1.level()))
+    }
+
+    /// The longest delay to any output: a draft of a flip-flop stands for what both of them do.
+    fn longest_delay(&self, arc: &Arc) -> i64 {
+        let leaf = &self.survey.netlist.cells()[arc.cell];
+        let arcs = &self.survey.timing.of(arc.cell)[arc.pin];
+        let connected = arcs
+            .iter()
+            .zip(leaf.outputs)
+            .filter(|(_, net)| net.is_some());
+        let longest = connected.map(|(arc, _)| arc.rise_fs.max(arc.fall_fs)).max();
+        longest.unwrap_or_default().into()
     }
 
     /// The changes that a cause brings while these flip-flops are held.
@@ -84,7 +97,7 @@ impl Leveliser<'_> {
             let (early, late) = arrival[from];
             for arc in self.arcs(&held, *from) {
                 for to in arc.to.iter().filter(|to| rank[*to] > rank[from]) {
-                    let delay = self.delay(&arc, to.1);
+                    let delay = self.delay(&arc, *to);
                     let window = arrival.entry(*to).or_insert((i64::MAX, i64::MIN));
                     *window = (window.0.min(early + delay), window.1.max(late + delay));
                 }
@@ -168,7 +181,7 @@ impl Leveliser<'_> {
     ) -> Result<usize, Unlevelled> {
         let cell = self.survey.netlist.cells()[arc.cell];
         let (early, late) = reach.arrival[&node];
-        let delay = self.delay(arc, Edge::Rise);
+        let delay = self.longest_delay(arc);
         let is_released = self.may_be_released(reach.cause, &cell, late, delay);
         let mask = if arc.pin == CLOCK {
             let all = *clock.all.get_or_insert_with(|| self.new_place());
