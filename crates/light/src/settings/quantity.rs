@@ -14,6 +14,7 @@ enum Dimension {
     Angle,
     Energy,
     Voltage,
+    Capacitance,
     Illuminance,
     Irradiance,
     Pixels,
@@ -34,6 +35,7 @@ impl Dimension {
             Dimension::Angle => "an angle",
             Dimension::Energy => "an energy",
             Dimension::Voltage => "a voltage",
+            Dimension::Capacitance => "a capacitance",
             Dimension::Illuminance => "an illuminance",
             Dimension::Irradiance => "an irradiance",
             Dimension::Pixels => "a number of pixels",
@@ -43,7 +45,7 @@ impl Dimension {
 }
 
 /// Symbol, what it measures, and its power of ten of the dimension's base unit.
-const UNITS: [(&str, Dimension, i32); 51] = [
+const UNITS: [(&str, Dimension, i32); 53] = [
     ("s", Dimension::Time, 0),
     ("ms", Dimension::Time, -3),
     ("us", Dimension::Time, -6),
@@ -79,6 +81,8 @@ const UNITS: [(&str, Dimension, i32); 51] = [
     ("pJ", Dimension::Energy, -12),
     ("V", Dimension::Voltage, 0),
     ("mV", Dimension::Voltage, -3),
+    ("pF", Dimension::Capacitance, -12),
+    ("fF", Dimension::Capacitance, -15),
     ("lx", Dimension::Illuminance, 0),
     ("lux", Dimension::Illuminance, 0),
     ("klx", Dimension::Illuminance, 3),
