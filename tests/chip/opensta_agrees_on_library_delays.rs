@@ -192,6 +192,7 @@ fn of_every_arc_of_a_macropixel() {
             }
         }
         println!("{name}: {compared} delays compared, {slower} of them ours alone slower");
+        // Up to 2.3 % are.
         assert!(
             slower * 20 < compared,
             "{name}: {slower} of {compared} delays are slower"

@@ -8,7 +8,7 @@ use super::error::{LibertyError, Units};
 use super::function::{TruthTable, truth_table};
 use super::group::Group;
 use super::table::{Table, Templates};
-use crate::netlist::{CheckKind, Edge};
+use crate::netlist::{CheckKind, Edge, MAX_OUTPUTS};
 
 /// What a cell does, told without a look at its tables.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,7 +130,8 @@ fn flip_flop(
         qn: shows(true),
     };
     let pins = 2 + usize::from(clear.is_some()) + usize::from(preset.is_some());
-    (inputs.len() == pins && (found.q.is_some() || found.qn.is_some())).then_some(found)
+    let fits = inputs.len() == pins && outputs.len() <= MAX_OUTPUTS;
+    (fits && (found.q.is_some() || found.qn.is_some())).then_some(found)
 }
 
 /// An input pin.
