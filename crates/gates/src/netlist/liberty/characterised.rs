@@ -163,7 +163,7 @@ impl Characterised {
             scope += at.subtree;
         }
         let mut work = Work::new(netlist, &library.map, environment, blocks);
-        // Stronger drives load what is before them: three rounds settle all but the last per cent.
+        // Stronger drives load what is before them, which may then need to be stronger, too. Three rounds are chosen.
         for _ in 0..3 {
             work.size();
         }
