@@ -372,7 +372,9 @@ proptest! {
         let walk = WalkCorrection { response, laser_cycles: cycles };
         if let Ok(found) = walk.correct(&counts, &peak) {
             let off = (found.light.position_bins - position_bins).abs();
-            prop_assert!(off < 1e-3 + 0.5 * found.bound_bins, "{light:?} {found:?}");
+            // Under a THRESHOLD two lights may give the same counts; the bound reaches from one to the other.
+            let share = if threshold == 0 { 0.5 } else { 1.0 };
+            prop_assert!(off < 1e-3 + share * found.bound_bins, "{light:?} {found:?}");
         }
     }
 }
