@@ -55,21 +55,16 @@ impl Block {
         let has_borrow = usize::from(config.tap == Tap::Borrow);
         let mut parameters = vec![("BITS", config.counter_bits)];
         let (rtl, own) = match config.p_counter {
-            PCounter::Ripple | PCounter::SetReset | PCounter::Synchronous => (
-                "down_counter.v",
-                vec![("BORROW", has_borrow), ("STEP", config.step_periods)],
-            ),
-            PCounter::Gray => (
+            PCounter::Comparator => ("up_counter.v", vec![("STEP", config.step_periods)]),
+            PCounter::Memoryless => ("memoryless_counter.v", vec![("BORROW", has_borrow)]),
+            other => (
                 "down_counter.v",
                 vec![
                     ("BORROW", has_borrow),
                     ("STEP", config.step_periods),
-                    ("GRAY", 1),
+                    ("GRAY", usize::from((other.row().code)(2) != 2)),
                 ],
             ),
-            PCounter::Comparator => ("up_counter.v", vec![("STEP", config.step_periods)]),
-            PCounter::Memoryless => ("memoryless_counter.v", vec![("BORROW", has_borrow)]),
-            other => panic!("{other:?} has no RTL in vectors/formal"),
         };
         parameters.extend(own);
         let has_pulse = config.p_counter == PCounter::Memoryless;
@@ -356,7 +351,8 @@ fn no_cell_of_a_p_counter_can_be_exchanged() {
     for p_counter in PCounter::ALL {
         let sensor = p_counter.sensor();
         let config = SensorConfig {
-            counter_bits: 3,
+            // One more than synchronous segments have.
+            counter_bits: 4,
             step_periods: if p_counter.row().has_memory { 2 } else { 1 },
             ..sensor
         };

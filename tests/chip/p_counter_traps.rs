@@ -71,9 +71,12 @@ fn loads(p_counter: PCounter, holds_reset: bool) -> (usize, usize) {
 
 #[test]
 fn a_memory_bit_that_changes_clocks_the_next_stage_unless_the_reset_is_held() {
-    assert_eq!(loads(PCounter::Ripple, true), (0, 0));
-    let (wrong, local_stops) = loads(PCounter::Ripple, false);
-    assert!(wrong > 150 && local_stops > 50, "{wrong} {local_stops}");
+    // Nine bits clock others, or three.
+    for (p_counter, least) in [(PCounter::Ripple, 150), (PCounter::Segmented, 80)] {
+        assert_eq!(loads(p_counter, true), (0, 0));
+        let (wrong, local_stops) = loads(p_counter, false);
+        assert!(wrong > least && local_stops > 50, "{wrong} {local_stops}");
+    }
     // Nothing ripples in a synchronous counter: only its own bits are taken for others.
     assert_eq!(loads(PCounter::Synchronous, false).1, 0);
     // Set/reset flip-flops take the memory at the reset only, and so does the memory's absence.
@@ -186,18 +189,21 @@ fn pulse_resets(config: &SensorConfig, width: Time) -> bool {
 
 #[test]
 fn the_reset_pulse_must_outlast_the_way_to_the_next_stages_clock() {
-    let config = SensorConfig {
-        counter_bits: 3,
-        ..sensor(PCounter::Ripple)
-    };
-    let bench = counter(&config);
-    let way = bench.delay(CellKind::Dffr, 2, One) + bench.delay(CellKind::Mux2, 0, One);
-    assert!((way.as_ns() - 0.126).abs() < 0.001, "{way}");
-    let ps = Time::from_ps(1);
-    assert!(!pulse_resets(&config, way - ps));
-    assert!(pulse_resets(&config, way + ps));
-    let timing = bench.timing();
-    assert!(timing.stop_to_reset_release - timing.stop_to_reset > way * 2);
+    // Small ones, of two segments where there are any.
+    for (p_counter, counter_bits) in [(PCounter::Ripple, 3), (PCounter::Segmented, 4)] {
+        let config = SensorConfig {
+            counter_bits,
+            ..sensor(p_counter)
+        };
+        let bench = counter(&config);
+        let way = bench.delay(CellKind::Dffr, 2, One) + bench.delay(CellKind::Mux2, 0, One);
+        assert!((way.as_ns() - 0.126).abs() < 0.001, "{way}");
+        let ps = Time::from_ps(1);
+        assert!(!pulse_resets(&config, way - ps), "{p_counter:?}");
+        assert!(pulse_resets(&config, way + ps), "{p_counter:?}");
+        let timing = bench.timing();
+        assert!(timing.stop_to_reset_release - timing.stop_to_reset > way * 2);
+    }
 }
 
 fn local_stops(config: &SensorConfig, exposure: &Exposure, start: u16) -> Vec<Time> {

@@ -1,7 +1,7 @@
 //! Every variant of the P-counter, elaborated alone and driven at random, counts as its plain-Rust model does and
 //! raises LOCAL_STOP at the femtosecond that static timing says.
 
-use crate::bench;
+use crate::{bench, scenario};
 
 use bench::{Bench, SETTLING, corners};
 use guided_dtof::chip::p_counter::{self, starts_high};
@@ -174,58 +174,58 @@ fn the_ripple_is_the_sum_of_its_stages() {
         let delay = |kind, pin| library.delay(kind, pin, One, corner);
         let (custom, library_cell) = (delay(CellKind::Dffr, 1), delay(CellKind::Dffsr, 1));
         let (mux, buffer) = (delay(CellKind::Mux2, 0), delay(CellKind::Buf, 0));
-        for (p_counter, borrow, msb) in [
-            (
-                PCounter::Ripple,
-                (custom + mux) * 9 + custom,
-                (custom + mux) * 9 + buffer,
-            ),
-            (
-                PCounter::SetReset,
-                library_cell * 9 + custom,
-                library_cell * 9 + buffer,
-            ),
-            (PCounter::Synchronous, custom, custom + mux + buffer),
-            (PCounter::Gray, custom, custom + mux + buffer),
-            (
-                PCounter::Memoryless,
-                library_cell * 9 + custom,
-                library_cell * 9 + buffer,
-            ),
-        ] {
-            for (tap, expected) in [(Tap::Borrow, borrow), (Tap::Msb, msb)] {
-                let config = SensorConfig {
-                    p_counter,
-                    tap,
-                    corner,
-                    ..SensorConfig::default()
-                };
-                let timing = ChipTiming::of(&config).counter;
-                assert_eq!(timing.clk_to_local_stop, expected, "{p_counter:?} {tap:?}");
-            }
+        for (p_counter, tap, _) in scenario::p_counters() {
+            // What the borrow's clock or the buffer waits for.
+            let ripple = match p_counter {
+                PCounter::Ripple => (custom + mux) * 9,
+                PCounter::SetReset | PCounter::Memoryless => library_cell * 9,
+                PCounter::Segmented => (custom + mux) * 3,
+                PCounter::Synchronous | PCounter::Gray if tap == Tap::Msb => custom + mux,
+                PCounter::Synchronous | PCounter::Gray | PCounter::Comparator => Time::ZERO,
+                other => panic!("{other:?} has no sum here"),
+            };
+            let last = match tap {
+                Tap::Borrow => custom,
+                Tap::Msb => buffer,
+            };
+            let config = SensorConfig {
+                p_counter,
+                tap,
+                corner,
+                ..SensorConfig::default()
+            };
+            let timing = ChipTiming::of(&config).counter;
+            let expected = ripple + last;
+            assert_eq!(timing.clk_to_local_stop, expected, "{p_counter:?} {tap:?}");
         }
     }
+}
+
+/// A counter that is loaded with 37, as far as it goes, and then counts so often; with the edges that do so.
+fn counting(config: &SensorConfig) -> (Bench, Vec<Time>) {
+    let mut bench = Bench::new(&p_counter::circuit(config), config.corner);
+    let start = 37 & config.largest_start();
+    bench.pulse(Time::ZERO, SETTLING, "MEMORY_RESET");
+    bench.pulse(Time::ZERO, SETTLING * 4, "COUNTER_RESET");
+    bench.number(SETTLING, "COUNTER_INIT", start.into());
+    bench.pulse(SETTLING * 2, SETTLING, "MEMORY_LOAD");
+    let edges: Vec<Time> = (5..300).map(|edge| SETTLING * edge).collect();
+    for &edge in &edges {
+        bench.pulse(edge, Time::from_ns(2), "COUNTER_CLK");
+    }
+    (bench, edges)
 }
 
 /// Whoever reads the count with another clock is wrong by one at most.
 #[test]
 fn a_gray_count_changes_in_one_bit_at_a_time() {
     for tap in Tap::ALL {
-        let config = SensorConfig {
+        let (mut bench, edges) = counting(&SensorConfig {
             tap,
             after_borrow: AfterBorrow::Wrap,
             counter_bits: 6,
             ..PCounter::Gray.sensor()
-        };
-        let mut bench = Bench::new(&p_counter::circuit(&config), config.corner);
-        bench.pulse(Time::ZERO, SETTLING, "MEMORY_RESET");
-        bench.pulse(Time::ZERO, SETTLING * 4, "COUNTER_RESET");
-        bench.number(SETTLING, "COUNTER_INIT", 37);
-        bench.pulse(SETTLING * 2, SETTLING, "MEMORY_LOAD");
-        let edges: Vec<Time> = (5..300).map(|edge| SETTLING * edge).collect();
-        for &edge in &edges {
-            bench.pulse(edge, Time::from_ns(2), "COUNTER_CLK");
-        }
+        });
         let mut nets = Probes::of_block(&bench.netlist)
             .bus(Probe::CounterOut)
             .to_vec();
@@ -240,6 +240,40 @@ fn a_gray_count_changes_in_one_bit_at_a_time() {
         assert_eq!(counted.len(), edges.len());
         for (change, &edge) in counted.into_iter().zip(&edges) {
             assert!((edge..edge + SETTLING).contains(&change), "{change}");
+        }
+    }
+}
+
+/// The bits of a segment rise in one instant, a stage after the last bit of the segment below.
+#[test]
+fn a_segmented_count_ripples_from_segment_to_segment_only() {
+    for counter_bits in 2..=12 {
+        let (mut bench, edges) = counting(&SensorConfig {
+            counter_bits,
+            after_borrow: AfterBorrow::Wrap,
+            ..PCounter::Segmented.sensor()
+        });
+        let last = bench.delay(CellKind::Dffr, 1, One);
+        let stage = last + bench.delay(CellKind::Mux2, 0, One);
+        let out = Probes::of_block(&bench.netlist)
+            .bus(Probe::CounterOut)
+            .to_vec();
+        let local_stop = bench.net("LOCAL_STOP");
+        let mut run = bench.start(&[]);
+        run.recorder = Recorder::new(out.iter().copied().chain([local_stop]));
+        run.until(SETTLING * 300);
+        let segments = |bits: usize| stage * bits.div_ceil(3) as i64;
+        let bits = (0..counter_bits).map(|bit| (out[bit], segments(bit + 1)));
+        for (net, after) in bits.chain([(local_stop, segments(counter_bits) + last)]) {
+            let mut rises = run.recorder.rising_edges(net);
+            rises.retain(|&rise| rise >= edges[0]);
+            assert!(!rises.is_empty(), "{counter_bits} bits");
+            for rise in rises {
+                assert!(
+                    edges.contains(&(rise - after)),
+                    "{counter_bits} bits: {rise}"
+                );
+            }
         }
     }
 }

@@ -1,4 +1,4 @@
-// P-counters with a memory that count down: ripple, set_reset, synchronous, and gray with GRAY = 1 (thesis 4.4, Fig. 50a, 51, 53).
+// P-counters with a memory that count down, all but comparator: gray with GRAY = 1 (thesis 4.4, Fig. 50a, 51, 53).
 //
 // MEMORY_LOAD takes the start value. While COUNTER_RESET is high the count is the start value. After it, every STEP-th rising
 // edge of COUNTER_CLK, the first one among them, takes one off. LOCAL_STOP is the count's top bit. With the tap borrow

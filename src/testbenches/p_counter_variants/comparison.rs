@@ -47,19 +47,38 @@ pub(super) fn compare(checks: &mut Checks) -> Grid {
         3,
         CellKind::Dffsr.area() / custom.area(),
     );
-    let mut periods = Vec::new();
-    for p_counter in PCounter::ALL {
-        let row = Row::of(p_counter);
+    let rows = PCounter::ALL.map(Row::of);
+    for (p_counter, row) in PCounter::ALL.into_iter().zip(&rows) {
         row.check(p_counter.name(), checks);
         grid.push(row.cells(p_counter.name()));
-        periods.push(row.period.0);
     }
-    let synchronous = periods[PCounter::Synchronous as usize];
+    let of = |p_counter: PCounter| &rows[p_counter as usize];
+    let ripple = of(PCounter::Ripple);
+    let synchronous = of(PCounter::Synchronous);
+    let segmented = of(PCounter::Segmented);
     checks.that(
         "a synchronous counter avoids the ripple's limit (4.6): shortest CLK period",
-        format!("below {}, ripple's", shown(periods[0])),
-        shown(synchronous),
-        synchronous < periods[0],
+        format!("below {}, ripple's", shown(ripple.period.0)),
+        shown(synchronous.period.0),
+        synchronous.period.0 < ripple.period.0,
+    );
+    let nine_stages = ripple.local_stop.1 - synchronous.local_stop.1;
+    checks.time(
+        "segmented: LOCAL_STOP comes three stages after a synchronous counter's, ripple's nine",
+        synchronous.local_stop.1 + Time::from_fs(nine_stages.as_fs() / 3),
+        segmented.local_stop.1,
+    );
+    checks.that(
+        "segmented: shortest CLK period",
+        format!("below {}, ripple's", shown(ripple.period.1)),
+        shown(segmented.period.1),
+        segmented.period.1 < ripple.period.1,
+    );
+    checks.that(
+        "segmented: transistors, with timing",
+        format!("below {}, a synchronous counter's", synchronous.transistors),
+        segmented.transistors,
+        segmented.transistors < synchronous.transistors,
     );
     grid
 }

@@ -3,8 +3,8 @@
 use crate::chip::p_counter::Rises;
 use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::{
-    ChipTiming, Exposure, Limits, PCounter, Probe, Probes, Sensor, SensorConfig, Silicon,
-    WindowLaw, front_end, p_counter,
+    ChipTiming, Exposure, Limits, Probe, Probes, Sensor, SensorConfig, Silicon, WindowLaw,
+    front_end, p_counter,
 };
 use crate::engine::GateSimulation;
 use crate::kernel::{Drive, Kernel, Policy, Recorder, TimingChecks, in_order};
@@ -55,8 +55,8 @@ pub fn gate_works(
     let exposure = Exposure {
         clock,
         stop_phase: phase,
-        stop_periods: match (config.p_counter, every) {
-            (PCounter::Memoryless, Some(every)) => every as u32,
+        stop_periods: match (config.p_counter.row().has_memory, every) {
+            (false, Some(every)) => every as u32,
             _ => u32::from(start) * config.step_periods as u32 + 12,
         },
         laser_cycles: 1,

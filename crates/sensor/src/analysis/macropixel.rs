@@ -11,7 +11,7 @@
 
 use crate::chip::front_end;
 use crate::chip::timing::macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays, hull};
-use crate::chip::{Conflict, Limits, Mode, PCounter, Probe, Probes, Race, SensorConfig, Silicon};
+use crate::chip::{Conflict, Limits, Mode, Probe, Probes, Race, SensorConfig, Silicon};
 use crate::netlist::{
     Bound, CellKind, CheckKind, Edge, NetId, Netlist, Path, Requirement, Requirements,
 };
@@ -141,7 +141,7 @@ impl MacropixelTiming {
             reset_to_stage_clock: counter.reset_to_stage_clock.unwrap_or(Time::ZERO),
             reset_to_counter_clk: counter.reset_to_counter_clk.unwrap_or(Time::ZERO),
             stop_strobe: (config.mode == Mode::Conventional).then_some(delays.stop_strobe),
-            counts_at_once: config.p_counter == PCounter::Memoryless,
+            counts_at_once: !config.p_counter.row().has_memory,
             hits,
             clk: clk_rest
                 .into_iter()

@@ -84,6 +84,8 @@ words! {
         Memoryless = "memoryless",
         /// Synchronous down counter in Gray code, of which one bit changes with each count.
         Gray = "gray",
+        /// Down counter of three-bit segments: synchronous within a segment, a ripple from one to the next.
+        Segmented = "segmented",
     }
 }
 

@@ -408,8 +408,7 @@ pub struct CounterDelays {
     pub reset_to_stage_clock: Option<Time>,
     /// COUNTER_RESET rises → LOCAL_STOP falls → COUNTER_CLK rises, latest; none where LOCAL_STOP does not block.
     pub reset_to_counter_clk: Option<Time>,
-    /// COUNTER_RESET rises → data of the flip-flops that COUNTER_CLK clocks settled, latest; none where nothing resets
-    /// them.
+    /// COUNTER_RESET rises → data of the counting flip-flops settled, latest; none where nothing resets them.
     pub reset_settled: Option<Time>,
     /// COUNTER_RESET rises → LOCAL_STOP rises, latest, where a start value can make it.
     pub reset_to_local_stop: Option<Time>,
@@ -442,8 +441,8 @@ impl CounterDelays {
         };
         let counter_clk = net(Probe::CounterClk);
         let data = circuit.clocked_by_counter_clk();
-        let data: Vec<NetId> = data.map(|cell| circuit.pin(cell, 0)).collect();
-        let settled = |arrivals: &Arrivals<'_>| latest(data.iter().map(|&d| arrivals.window(d)));
+        let data = data.map(|cell| fall.window(circuit.pin(cell, 0)));
+        let all_data = circuit.counting.iter().map(|&cell| circuit.pin(cell, 0));
         let later_stages = paths.stage_clocks().filter(|&clock| clock != counter_clk);
         let controls = circuit.counting.iter().flat_map(|&cell| {
             let leaf = &circuit.netlist.cells()[cell];
@@ -458,12 +457,12 @@ impl CounterDelays {
             sample: edge(&fall, circuit.sampling(), Edge::Rise),
             block: fall.edge_window(net(Probe::Block), Edge::Rise),
             block_to_counter_clk: paths.block_to_counter_clk(),
-            settled: settled(&fall).expect("a P-counter counts"),
+            settled: latest(data).expect("a P-counter counts"),
             released: latest(controls.map(|&net| release.edge_window(net, Edge::Fall)))
                 .unwrap_or(Time::ZERO),
             reset_to_stage_clock: latest(later_stages.map(rises_after_reset)),
             reset_to_counter_clk: latest([rises_after_reset(counter_clk)].into_iter()),
-            reset_settled: settled(&reset),
+            reset_settled: latest(all_data.map(|data| reset.window(data))),
             reset_to_local_stop: latest([rises_after_reset(net(Probe::LocalStop))].into_iter()),
             hit_reset: edge(&reset, net(Probe::HitReset), Edge::Rise),
             hit_release: edge(&release, net(Probe::HitReset), Edge::Fall),

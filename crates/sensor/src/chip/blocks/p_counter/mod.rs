@@ -21,6 +21,7 @@ mod gray;
 mod memoryless;
 mod pins;
 mod ripple;
+mod segmented;
 mod set_reset;
 mod step_divider;
 mod synchronous;
@@ -44,6 +45,7 @@ impl PCounter {
             PCounter::Comparator => &comparator::VARIANT,
             PCounter::Memoryless => &memoryless::VARIANT,
             PCounter::Gray => &gray::VARIANT,
+            PCounter::Segmented => &segmented::VARIANT,
         }
     }
 
