@@ -1,7 +1,9 @@
 //! Timing and windows of a sensor.
 
 use guided_dtof::analysis::TimingVerdict;
-use guided_dtof::chip::{ChipTiming, Exposure, SensorConfig, Silicon, WindowLaw};
+use guided_dtof::chip::{
+    ChipTiming, Exposure, SensorConfig, Silicon, UnknownConditions, WindowLaw,
+};
 use guided_dtof::netlist::{Conditions, Corner};
 use guided_dtof::request::{Spelling, exposure, of_no_aim};
 use guided_dtof::units::{Time, TimeOfFlight};
@@ -36,14 +38,14 @@ pub(crate) fn timing<'py>(
         voltage_v,
         temperature_c,
     };
-    let factor = conditions.delay_factor().ok_or_else(|| {
-        let message = "no delays are known there; give -55 to 150 °C and a supply up to 2 V at least 0.2 V above the threshold of about 0.4 V";
-        Failure::argument("voltage_v, temperature_c", message)
+    let silicon = Silicon::of(&sensor).in_conditions(conditions);
+    let silicon = silicon.map_err(|why| {
+        let arguments = match why {
+            UnknownConditions::OfLibrary => "process, voltage_v, temperature_c",
+            UnknownConditions::Far => "voltage_v, temperature_c",
+        };
+        Failure::argument(arguments, why.to_string())
     })?;
-    let silicon = Silicon {
-        factor,
-        ..Silicon::of(&sensor)
-    };
     let (verdict, chip, clk_period) = run(py, None, move |_| {
         let verdict = TimingVerdict::of(&sensor, &silicon, (0, 0));
         Ok((

@@ -11,6 +11,8 @@ import pytest
 
 import gdtof
 
+LIBRARY = Path(__file__).parents[2] / "vectors/liberty/example.lib"
+
 
 def test_sensors_come_from_names_files_and_keys(tmp_path: Path) -> None:
     assert gdtof.Sensor() == gdtof.Sensor("quantic4x4")
@@ -158,6 +160,7 @@ def test_copies_travel() -> None:
         (lambda: gdtof.drive(frames=-1), "frames: -1 is impossible"),
         (lambda: gdtof.timing(process="best"), "give slow, typ or fast"),  # type: ignore[arg-type]
         (lambda: gdtof.timing("hslidar", voltage_v=5.0), "no delays are known there"),
+        (lambda: gdtof.timing(gdtof.Sensor(liberty=str(LIBRARY)), voltage_v=0.9), "a library is characterised at conditions of its own"),
     ],
 )
 def test_what_cannot_be_is_said_in_a_sentence(ask: object, says: str) -> None:

@@ -23,7 +23,8 @@ pub(super) struct SensorArgs {
     /// Columns of macropixels, instead of the sensor's.
     #[arg(long, value_name = "C")]
     cols: Option<usize>,
-    /// Netlist (JSON of Yosys) in the place of a built-in block: p_counter=FILE or correlation=FILE (or FILE:MODULE).
+    /// Netlist (JSON of Yosys) in the place of a built-in block: p_counter=FILE (or FILE:MODULE); also correlation,
+    /// front_end, metdc and histogram.
     #[arg(long, value_name = "BLOCK=FILE")]
     block: Vec<String>,
     /// Set one key of the sensor or scene, whatever its file says, for example sensor.clk_hz=300e6,

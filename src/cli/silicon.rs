@@ -7,7 +7,7 @@
 
 use clap::Args;
 
-use crate::chip::{SensorConfig, Silicon};
+use crate::chip::{SensorConfig, Silicon, UnknownConditions};
 use crate::files::InputError;
 use crate::netlist::{Conditions, Corner, Mismatch};
 
@@ -43,17 +43,13 @@ impl SiliconArgs {
     /// # Errors
     /// Conditions and mismatch for which no delays are known.
     pub(super) fn read(&self, config: &SensorConfig) -> Result<Silicon, InputError> {
-        let silicon = Silicon::of(config);
-        if silicon.library.from_file().is_some() && self.conditions() != Conditions::default() {
-            let message = "a library is characterised at conditions of its own; give its file of other conditions as sensor.liberty_slow or sensor.liberty_fast, and --set sensor.corner=slow or fast";
-            return Err(InputError::new(
-                "--process, --voltage, --temperature",
-                message,
-            ));
-        }
-        let factor = self.conditions().delay_factor().ok_or_else(|| {
-            let message = "no delays are known there; give -55 to 150 °C and a supply up to 2 V at least 0.2 V above the threshold of about 0.4 V";
-            InputError::new("--voltage, --temperature", message)
+        let silicon = Silicon::of(config).in_conditions(self.conditions());
+        let silicon = silicon.map_err(|why| {
+            let options = match why {
+                UnknownConditions::OfLibrary => "--process, --voltage, --temperature",
+                UnknownConditions::Far => "--voltage, --temperature",
+            };
+            InputError::new(options, why.to_string())
         })?;
         if !(0.0..=0.5).contains(&self.mismatch) {
             let message = format!("{} is not a relative spread; give 0 to 0.5", self.mismatch);
@@ -64,7 +60,6 @@ impl SiliconArgs {
             seed: self.mismatch_seed,
         });
         Ok(Silicon {
-            factor,
             mismatch,
             ..silicon
         })

@@ -10,9 +10,10 @@ use serde::Serialize;
 
 use super::voice::{say, say_json};
 use super::wave_format::WaveFormatOption;
+use crate::chip::SensorConfig;
 use crate::files::{InputError, clean_up_when_interrupted, create_folder};
 use crate::report::{Checks, Grid};
-use crate::request::sign_files;
+use crate::request::{Sources, Spelling, sign_files};
 use crate::testbenches::{TESTBENCHES, Testbench};
 use crate::waves::WaveFormat;
 
@@ -40,6 +41,9 @@ pub(super) struct TbArgs {
     /// Testbenches to run, with or without `tb_` [default: all of them].
     #[arg(value_name = "NAME")]
     names: Vec<String>,
+    /// Netlist (JSON of Yosys) in the place of a block, as p_counter=FILE; the default is then the testbenches that drive it.
+    #[arg(long, value_name = "BLOCK=FILE", conflicts_with = "list")]
+    block: Vec<String>,
     /// List the testbenches, and run none.
     #[arg(long, conflicts_with_all = ["out", "wave_format", "verbose"])]
     list: bool,
@@ -78,14 +82,20 @@ struct RunResult {
 /// # Errors
 /// Unknown names and files that cannot be written.
 pub(super) fn run(args: &TbArgs) -> anyhow::Result<ExitCode> {
-    let testbenches = chosen(&args.names)?;
+    let sources = Sources {
+        block: args.block.clone(),
+        spelling: Spelling::Options,
+        ..Sources::default()
+    };
+    let sensor = sources.read_sensor()?;
+    let testbenches = chosen(&args.names, &sensor)?;
     if !args.list {
         create_folder(&args.waves.out)?;
     }
     let entry = |testbench: &Testbench| {
         let result = match args.list {
             true => None,
-            false => Some(run_one(testbench, &args.waves.path(testbench))?),
+            false => Some(run_one(testbench, &sensor, &args.waves.path(testbench))?),
         };
         Ok(Entry {
             name: testbench.name,
@@ -122,9 +132,20 @@ pub(super) fn run(args: &TbArgs) -> anyhow::Result<ExitCode> {
     })
 }
 
-fn chosen(names: &[String]) -> Result<Vec<Testbench>, InputError> {
+fn chosen(names: &[String], sensor: &SensorConfig) -> Result<Vec<Testbench>, InputError> {
+    let driving = TESTBENCHES.iter().filter(|tb| tb.drives(sensor));
+    let driving: Vec<Testbench> = driving.copied().collect();
+    let any = driving
+        .iter()
+        .map(|tb| tb.name)
+        .collect::<Vec<_>>()
+        .join(" or ");
+    if driving.is_empty() {
+        let message = "no testbench drives all of these; give one at a time";
+        return Err(InputError::new("--block", message));
+    }
     if names.is_empty() {
-        return Ok(TESTBENCHES.to_vec());
+        return Ok(driving);
     }
     let mut chosen: Vec<Testbench> = Vec::new();
     for name in names {
@@ -132,6 +153,10 @@ fn chosen(names: &[String]) -> Result<Vec<Testbench>, InputError> {
             let all: Vec<&str> = TESTBENCHES.iter().map(|tb| tb.name).collect();
             InputError::new(name, format!("is not a testbench; give {}", all.join(", ")))
         })?;
+        if !testbench.drives(sensor) {
+            let message = format!("does not drive the block of --block; give {any}");
+            return Err(InputError::new(name, message));
+        }
         if chosen.iter().all(|other| other.name != testbench.name) {
             chosen.push(testbench);
         }
@@ -139,9 +164,13 @@ fn chosen(names: &[String]) -> Result<Vec<Testbench>, InputError> {
     Ok(chosen)
 }
 
-fn run_one(testbench: &Testbench, waves: &Path) -> Result<RunResult, InputError> {
+fn run_one(
+    testbench: &Testbench,
+    sensor: &SensorConfig,
+    waves: &Path,
+) -> Result<RunResult, InputError> {
     let begin = Instant::now();
-    let checks = testbench.run(waves)?;
+    let checks = testbench.run(sensor, waves)?;
     Ok(RunResult {
         passed: checks.passed(),
         checked: checks.made(),
@@ -196,7 +225,8 @@ pub fn testbench(name: &'static str) -> ExitCode {
         eprintln!("{name}: signals cannot be watched ({error})");
     }
     let waves = args.path(&testbench);
-    let result = create_folder(&args.out).and_then(|()| testbench.run(&waves));
+    let result =
+        create_folder(&args.out).and_then(|()| testbench.run(&SensorConfig::default(), &waves));
     match result {
         Ok(checks) => {
             let view = waves.with_extension("gtkw");

@@ -6,9 +6,11 @@
 //!   Frame ─────────┴──────────────► histograms.npy
 //! ```
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 
 use super::FrameRequest;
 use super::picture::{Drawn, depth_map};
@@ -29,6 +31,9 @@ pub struct Exposed<'a> {
     pub(crate) scene_name: String,
     scene: &'a Scene,
     sensor: &'a SensorConfig,
+    /// SHA-256 of the library and netlists that the sensor names, by their files.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    sha256: BTreeMap<String, String>,
     stop_periods: u32,
     pub(crate) laser_cycles: u32,
     seed: u64,
@@ -92,12 +97,28 @@ impl FrameRequest {
             scene_name,
             scene: &settings.scene,
             sensor: &settings.sensor,
+            sha256: hashes(&settings.sensor),
             stop_periods: settings.exposure.stop_periods,
             laser_cycles: self.laser_cycles,
             seed: self.seed,
             engine: self.engine,
         }
     }
+}
+
+/// The hash of a file, SHA-256 in hexadecimal digits, if it can be read.
+pub(crate) fn file_hash(path: &Path) -> Option<String> {
+    let digest = Sha256::digest(std::fs::read(path).ok()?);
+    Some(digest.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// Hashes of the files that a sensor is made of.
+fn hashes(sensor: &SensorConfig) -> BTreeMap<String, String> {
+    let libraries = [&sensor.liberty, &sensor.liberty_slow, &sensor.liberty_fast];
+    let libraries = libraries.into_iter().map(PathBuf::as_path);
+    let files = libraries.chain(sensor.own_files().map(|(_, own)| own.path()));
+    let hash = |file: &Path| Some((file.display().to_string(), file_hash(file)?));
+    files.filter_map(hash).collect()
 }
 
 /// The share of the variance of counts that may be missing, where cohorts made them of SPADs with afterpulses.

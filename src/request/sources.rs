@@ -11,14 +11,12 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::Spelling;
+use crate::chip::own_block::replaceable;
 use crate::chip::sensors::CHIPS;
 use crate::chip::{Sensor, SensorConfig};
 use crate::files::InputError;
 use crate::scene::Scene;
 use crate::settings::Document;
-
-/// Blocks that a netlist can take the place of.
-const BLOCKS: [&str; 2] = ["p_counter", "correlation"];
 
 /// Where a sensor and a scene come from. The default is QuantIC4x4 before the street.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -99,8 +97,11 @@ impl Sources {
         for block in &self.block {
             let option = format!("{} {block}", self.spelling.name("block"));
             let given = block.split_once('=');
-            let Some((name, file)) = given.filter(|(name, _)| BLOCKS.contains(name)) else {
-                let message = "is no block; give p_counter=FILE or correlation=FILE";
+            let Some((name, file)) =
+                given.filter(|(name, _)| replaceable().any(|block| block == *name))
+            else {
+                let all: Vec<String> = replaceable().map(|name| format!("{name}=FILE")).collect();
+                let message = format!("is no block; give {}", all.join(" or "));
                 return Err(InputError::new(option, message));
             };
             // A path in a sensor file is relative to that.

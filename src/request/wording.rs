@@ -103,7 +103,7 @@ fn of_irregular(why: &Irregular, spelling: Spelling) -> String {
             "give a P-counter that raises LOCAL_STOP once, a step later from each start value on"
                 .to_owned()
         }
-        Irregular::OwnCorrelation => "leave out correlation_block".to_owned(),
+        Irregular::OwnBlock(key) => format!("leave out {key}"),
         Irregular::OwnCodes => "give tdc = \"clocked\"".to_owned(),
         Irregular::OutOfStep { round, .. } => {
             format!("give {periods} {round}, or another p_counter")

@@ -6,7 +6,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use serde_json::Value as Json;
-use sha2::{Digest, Sha256};
 use toml::{Table, Value};
 
 use super::cell::{Cell, Column, Holds};
@@ -16,7 +15,7 @@ use super::study::{Kind, Point, Study};
 use super::theory::{self, Last, Rig, Wall};
 use crate::chip::{Sensor, SensorConfig};
 use crate::files::{InputError, in_plain_words};
-use crate::request::{FrameRequest, Sources, Spelling, is_bad_input, sentence};
+use crate::request::{FrameRequest, Sources, Spelling, file_hash, is_bad_input, sentence};
 use crate::scene::Scene;
 use crate::system::{Frame, FrameError, NoDepth, Summary, WindowPolicy, take_frame_by};
 
@@ -221,13 +220,9 @@ impl<'a> Subject<'a> {
             return String::new();
         }
         let mut hashes = self.hashes.lock().unwrap_or_else(PoisonError::into_inner);
-        let hash = hashes.entry(path.to_owned()).or_insert_with(|| {
-            let bytes = std::fs::read(path).unwrap_or_default();
-            Sha256::digest(bytes)
-                .iter()
-                .map(|b| format!("{b:02x}"))
-                .collect()
-        });
+        let hash = hashes
+            .entry(path.to_owned())
+            .or_insert_with(|| file_hash(path).unwrap_or_default());
         hash.clone()
     }
 

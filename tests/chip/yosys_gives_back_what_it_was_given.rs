@@ -3,6 +3,7 @@
 
 use crate::bench;
 use crate::scenario;
+use crate::yosys;
 
 use std::collections::BTreeSet;
 use std::io::Write as _;
@@ -17,12 +18,14 @@ use guided_dtof::chip::{
     Overflow, OwnBlock, SensorConfig, Window, WindowLaw, correlation, histogram, metdc, readout,
 };
 use guided_dtof::netlist::{Corner, Library, Module, write_modules, write_standard_cells};
+use guided_dtof::settings::Document;
 use guided_dtof::units::Time;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
-/// What Yosys writes of a netlist of generic gates in `folder/block.v`; none where it is not installed.
-fn synthesised(folder: &Path, top: &str) -> Option<String> {
-    let script = format!("read_verilog block.v; synth -flatten -top {top}; write_json block.json");
+/// What Yosys writes of the Verilog in `folder/block.v` as generic gates, or what `mapping` makes of them; none where it is not installed.
+fn synthesised(folder: &Path, top: &str, mapping: &str) -> Option<String> {
+    let script =
+        format!("read_verilog block.v; synth -flatten -top {top}; {mapping}write_json block.json");
     let Ok(output) = Command::new("yosys")
         .args(["-q", "-p", &script])
         .current_dir(folder)
@@ -46,7 +49,7 @@ fn there_and_back(module: &Arc<Module>) -> Option<(Arc<Module>, String)> {
     write_modules(&mut verilog, module).unwrap();
     write_standard_cells(&mut verilog, &Library::default(), &BTreeSet::new()).unwrap();
     std::fs::write(folder.path().join("block.v"), verilog).unwrap();
-    let json = synthesised(folder.path(), module.name())?;
+    let json = synthesised(folder.path(), module.name(), "")?;
     let read = Module::from_yosys(&json, None).unwrap();
     let ports = |m: &Module| -> Vec<_> {
         let ports = m.port_signals();
@@ -107,6 +110,50 @@ fn p_counters_open_the_same_windows() {
             }
         }
     }
+}
+
+/// The counter of the book's chapter, in cells of the example library.
+#[test]
+fn a_librarys_cells_count_as_generic_gates_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/examples/blocks/lfsr_p_counter.v"
+    );
+    std::fs::copy(source, folder.path().join("block.v")).unwrap();
+    let library = scenario::example_library();
+    let library = library.to_str().unwrap();
+    let mapping = format!("dfflibmap -liberty {library}; abc -liberty {library}; opt_clean; ");
+    let Some(json) = synthesised(folder.path(), "lfsr_p_counter", &mapping) else {
+        return;
+    };
+    assert!(
+        json.contains("\"DFFRN_1\"") && !json.contains("\"$_"),
+        "{json}"
+    );
+    let read = |library: &str| {
+        let mut document = Document::of("a test", toml::Table::new());
+        let block = folder.path().join("block.json");
+        for (key, value) in [
+            ("p_counter_block", block.to_str().unwrap()),
+            ("liberty", library),
+        ] {
+            document.set_value(key, value.into(), "the option");
+        }
+        SensorConfig::read_document(&document)
+    };
+    let (own, generic) = (read(library).unwrap(), yosys::lfsr());
+    let laws = [&own, &generic].map(|config| config.counter_law().unwrap());
+    assert_eq!(laws[0].uneven(), None);
+    for start in 0..=generic.largest_start() {
+        assert_eq!(laws[0].code(start), laws[1].code(start));
+        assert_eq!(laws[0].rises(start), laws[1].rises(start));
+    }
+    let complaint = read("").unwrap_err().to_string();
+    assert!(
+        complaint.contains("_1, which is no gate or flip-flop of the sensor's library"),
+        "{complaint}"
+    );
 }
 
 /// Blocks that have no delays of their own, on random changes of one input at a time.

@@ -320,12 +320,6 @@ pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
     Some(section)
 }
 
-/// Whether there is a start value whose window a simulation can be held to.
-fn has_windows(config: &SensorConfig) -> bool {
-    let law = config.counter_law();
-    config.correlation_block.is_none() && law.is_none_or(|law| law.uneven().is_none())
-}
-
 /// Ripple by number of stages.
 pub(super) fn ripples(config: &SensorConfig, silicon: &Silicon) -> Section {
     let title = "Ripple COUNTER_CLK to LOCAL_STOP";
@@ -371,7 +365,7 @@ pub(super) fn corners(config: &SensorConfig, silicon: &Silicon) -> Section {
                 gate_works(config, &silicon, Limits::Kept, at, range.moved)
             };
             let gates = |works_at: f64, fails_at: f64| match (works(works_at), works(fails_at)) {
-                _ if !has_windows(config) => "not simulated",
+                _ if !config.may_have_law() => "not simulated",
                 (true, false) => "simulation agrees",
                 (true, true) => "simulation still works there",
                 (false, _) => "SIMULATION FAILS ALREADY",

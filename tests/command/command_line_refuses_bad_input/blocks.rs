@@ -4,7 +4,78 @@ use super::{folder, gdtof, refused, replay};
 
 use std::path::Path;
 
+use sha2::{Digest, Sha256};
+
 const LFSR: &str = include_str!("../../../examples/blocks/lfsr_p_counter.json");
+
+/// The counter with so many more cells.
+fn with_inverters(number: usize) -> String {
+    let cell = |n| format!(r#""{n}":{{"type":"$_NOT_","connections":{{"A":[2],"Y":[{n}]}}}},"#);
+    let cells: String = (1000..1000 + number).map(cell).collect();
+    LFSR.replacen(r#""cells": {"#, &format!(r#""cells": {{{cells}"#), 1)
+}
+
+/// The same testbench drives a netlist of one's own; it fails, with its waveform, where the netlist does something else.
+#[test]
+fn testbenches_drive_blocks_of_ones_own() {
+    let folder = folder();
+    let dir = folder.path();
+    std::fs::write(dir.join("lfsr.json"), LFSR).unwrap();
+    // The start value is counted from is another one.
+    std::fs::write(
+        dir.join("doubled.json"),
+        LFSR.replace(r#""D": [ 3 ]"#, r#""D": [ 2 ]"#),
+    )
+    .unwrap();
+    for (file, passes) in [("lfsr.json", true), ("doubled.json", false)] {
+        let output = gdtof(
+            dir,
+            &[
+                "tb",
+                "--verbose",
+                "--out",
+                file.trim_end_matches(".json"),
+                "--block",
+                &format!("p_counter={file}"),
+            ],
+        );
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(output.status.code(), Some(i32::from(!passes)), "{said}");
+        assert!(
+            said.contains("tb_p_counter") && !said.contains("tb_readout"),
+            "{said}"
+        );
+        let wave = dir
+            .join(file.trim_end_matches(".json"))
+            .join("tb_p_counter.vcd");
+        assert!(
+            std::fs::read_to_string(wave)
+                .unwrap()
+                .contains("COUNTER_CLK")
+        );
+    }
+    let other = ["tb", "readout", "--block", "p_counter=lfsr.json"];
+    refused(
+        dir,
+        &other,
+        "readout: does not drive the block of --block; give tb_p_counter",
+    );
+}
+
+#[test]
+fn frames_say_what_was_in_the_netlist() {
+    let folder = folder();
+    let dir = folder.path();
+    std::fs::write(dir.join("lfsr.json"), LFSR).unwrap();
+    let arguments = "frame --rows 2 --cols 2 --laser-cycles 5 --block p_counter=lfsr.json:lfsr_p_counter --out mine";
+    let output = gdtof(dir, &arguments.split(' ').collect::<Vec<_>>());
+    assert!(output.status.success(), "{output:?}");
+    let report = std::fs::read_to_string(dir.join("mine/frame.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let digest = Sha256::digest(LFSR);
+    let digest: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+    assert_eq!(report["sha256"], serde_json::json!({ "lfsr.json": digest }));
+}
 
 #[test]
 fn netlists_are_refused_with_file_and_cure() {
@@ -22,18 +93,21 @@ fn netlists_are_refused_with_file_and_cure() {
         ("two.json", two("")),
         ("ports.json", LFSR.replacen("MEMORY_RESET", "MINE", 1)),
         ("latch.json", LFSR.replacen("$_ANDNOT_", "$_DLATCH_P_", 1)),
+        ("tristate.json", LFSR.replacen("$_ANDNOT_", "$_TBUF_", 1)),
+        ("million.json", with_inverters(1_000_000)),
+        ("many.json", with_inverters(100_000)),
         ("lfsr.json", LFSR.to_owned()),
     ] {
         write(name, &text);
     }
     for (block, says) in [
         (
-            "metdc=lfsr.json",
-            "--block metdc=lfsr.json: is no block; give p_counter=FILE or correlation=FILE",
+            "tdc=lfsr.json",
+            "--block tdc=lfsr.json: is no block; give p_counter=FILE or correlation=FILE or front_end=FILE or metdc=FILE or histogram=FILE",
         ),
         (
             "lfsr.json",
-            "--block lfsr.json: is no block; give p_counter=FILE or correlation=FILE",
+            "--block lfsr.json: is no block; give p_counter=FILE or correlation=FILE or ",
         ),
         (
             "p_counter=gone.json",
@@ -70,6 +144,27 @@ fn netlists_are_refused_with_file_and_cure() {
         (
             "correlation=lfsr.json",
             "lfsr.json: module lfsr_p_counter has other ports than correlation: input SPAD_TIMED of 16 bits is missing, ",
+        ),
+        (
+            "front_end=lfsr.json",
+            "lfsr.json: module lfsr_p_counter has other ports than front_end: input SPAD_RAW of 16 bits is missing, ",
+        ),
+        (
+            "metdc=lfsr.json",
+            "lfsr.json: module lfsr_p_counter has other ports than metdc: input CLK of 1 bit is missing, input SPAD_EVENT of 1 bit is missing, LOCAL_STOP is an output instead of an input, ",
+        ),
+        (
+            "histogram=lfsr.json",
+            "lfsr.json: module lfsr_p_counter has other ports than histogram: input HIT of 16 bits is missing, ",
+        ),
+        (
+            "p_counter=tristate.json",
+            "is a $_TBUF_, which has no counterpart here; run synth -flatten; abc -g simple",
+        ),
+        ("p_counter=million.json", "million.json: has 16"),
+        (
+            "p_counter=many.json",
+            "many.json: module lfsr_p_counter has 100",
         ),
     ] {
         refused(dir, &["timing", "--block", block], says);

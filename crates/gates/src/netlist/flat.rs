@@ -168,6 +168,12 @@ impl Netlist {
         scope.first_cell..scope.first_cell + scope.module.cells().len()
     }
 
+    /// Indices of the leaf cells in scope `index` and in all scopes below it.
+    pub fn cells_below(&self, index: usize) -> std::ops::Range<usize> {
+        let scope = &self.scopes[index];
+        scope.first_cell..scope.first_cell + scope.module.total_cells()
+    }
+
     /// Number of nets.
     pub fn net_count(&self) -> usize {
         self.net_count

@@ -118,6 +118,10 @@ fn take(
     photons: &Photons,
 ) -> Option<Taken> {
     const FIRST: i64 = 6;
+    if config.metdc_block.is_some() {
+        // Which of its flip-flops holds an event, and how, is its own.
+        return None;
+    }
     let exposure = Exposure {
         clock: Frequency::from_period(period).ok()?,
         stop_phase: Time::ZERO,

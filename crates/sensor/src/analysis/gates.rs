@@ -4,7 +4,7 @@ use crate::chip::p_counter::Rises;
 use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::{
     ChipTiming, Exposure, Limits, Probe, Probes, Sensor, SensorConfig, Silicon, WindowLaw,
-    front_end, p_counter,
+    p_counter,
 };
 use crate::engine::GateSimulation;
 use crate::kernel::{Drive, Kernel, Policy, Recorder, TimingChecks, in_order};
@@ -32,10 +32,11 @@ pub(super) fn simulation(
 /// Timing checks with this silicon's limits, SPAD samplers excepted.
 pub(super) fn checks(silicon: &Silicon, gate: &GateSimulation) -> TimingChecks {
     let library = silicon.limits(Limits::Kept);
+    let samplers = gate.samplers();
     TimingChecks::new(gate.netlist(), &library, silicon.corner)
         .policy(Policy::ReportOnly)
         .not_before(gate.schedule().reset_end)
-        .asynchronous(gate.netlist(), front_end::is_asynchronous_sampler)
+        .asynchronous(gate.netlist(), |cell| samplers.contains(cell))
 }
 
 /// Whether a gate-level macropixel counts a pattern of photons into the bins of a slow clock, or as many bins later, and,

@@ -9,7 +9,6 @@
 //! All flip-flops of the macropixel count, with setup, hold, recovery, removal and pulse widths. Left out are, by
 //! design, the sixteen that sample SPADs. The histogram's counters run on HIT, once in a laser cycle.
 
-use crate::chip::front_end;
 use crate::chip::timing::macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays, hull};
 use crate::chip::{Conflict, Limits, Mode, Probe, Probes, Race, SensorConfig, Silicon};
 use crate::netlist::{
@@ -109,9 +108,9 @@ impl MacropixelTiming {
 
         let hit_cells = probes.hit_cells(netlist);
         let is_hit = |r: &Requirement| hit_cells.contains(&r.cell);
-        let of_first_sampler = |r: &Requirement| {
-            r.kind.concerns_data() && front_end::is_asynchronous_sampler(&netlist.cell_path(r.cell))
-        };
+        let samplers: Vec<usize> = probes.samplers(netlist).collect();
+        let of_first_sampler =
+            |r: &Requirement| r.kind.concerns_data() && samplers.contains(&r.cell);
         let (hits, clk_rest): (Vec<_>, Vec<_>) = clk.all().iter().copied().partition(is_hit);
         let limit = |kind: CheckKind| {
             let limits = library.checks(CellKind::Dffr);
@@ -179,8 +178,8 @@ impl MacropixelTiming {
 
     /// Shortest CLK period of the path CLK → SPAD_EVENT → shift register.
     pub fn correlation_period(&self) -> Option<Time> {
-        let stages = self.probes.shift_cells(&self.netlist);
-        let first = |r: &&Requirement| r.cell == stages[0];
+        let stages: Vec<usize> = self.probes.event_stages(&self.netlist).collect();
+        let first = |r: &&Requirement| stages.contains(&r.cell);
         let setups = self.clk.iter().filter(|r| r.kind == CheckKind::Setup);
         longest(setups.filter(first))
     }
@@ -400,16 +399,18 @@ impl LocalClocks {
             let found = Requirements::of(netlist, analysis, clock, cuts, &library, corner);
             found.expect("every loop is cut").all().to_vec()
         };
-        // A count's Q only tells whether the bin is full.
-        let hits = probes.bus(Probe::Hit).iter().zip(probes.bins());
+        // A count's Q only tells whether the bin is full; what else one's own histogram does with it, nobody knows.
+        let hits = probes.bus(Probe::Hit);
+        let of_hits = hits.iter().zip(probes.bins());
+        let of_hits = of_hits.filter(|_| config.histogram_block.is_none());
         let raw = probes.bus(Probe::SpadRaw).iter();
         LocalClocks {
-            counts: hits
+            counts: of_hits
                 .flat_map(|(&hit, count)| requirements(hit, count))
                 .collect(),
             // The flip-flop behind a toggle has CLK for its clock. One behind a wire that SPADs share is none of a SPAD.
             toggles: raw
-                .flat_map(|&raw| requirements(raw, &[]))
+                .flat_map(|&raw| requirements(raw, hits))
                 .filter(|r| toggles.contains(&r.cell))
                 .collect(),
             netlist: circuit.netlist,

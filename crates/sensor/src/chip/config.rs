@@ -212,6 +212,15 @@ keys! {
         /// Netlist that takes the correlation block's place, as p_counter_block; for the engines gate and cycle.
         #[serde(skip_serializing_if = "Option::is_none")]
         correlation_block: Option<OwnBlock> = None, from "none: the built-in correlation";
+        /// Netlist that takes the front end's place, as correlation_block.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        front_end_block: Option<OwnBlock> = None, from "none: the built-in front_end";
+        /// Netlist that takes the METDC's place, as correlation_block.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        metdc_block: Option<OwnBlock> = None, from "none: the built-in METDC";
+        /// Netlist that takes the histogram's place, as correlation_block.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        histogram_block: Option<OwnBlock> = None, from "none: the built-in histogram";
         /// TYPE: how the number of fired SPADs is compared with THRESHOLD.
         event_type: EventType = EventType::Greater, from "thesis 4.2";
         /// THRESHOLD: SPADs; at most 31 with 4x4 of them.

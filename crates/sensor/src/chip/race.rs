@@ -81,9 +81,9 @@ pub enum Irregular {
         "delay lines take the lowest bit of COUNTER_INIT for that of the start value, and this P-counter has codes of its own"
     )]
     OwnCodes,
-    /// A correlation block of one's own.
-    #[error("no window law describes a correlation block of one's own")]
-    OwnCorrelation,
+    /// Another block of one's own, by its key.
+    #[error("no window law describes the netlist of {0}")]
+    OwnBlock(&'static str),
     /// A P-counter without memory, which STOP does not reset, comes round in another time than STOP does.
     #[error(
         "STOP comes every {stop_periods} CLK periods and the P-counter without memory comes round in {round}, so windows drift"

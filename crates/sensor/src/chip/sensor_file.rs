@@ -4,8 +4,8 @@ use std::fmt;
 use std::ops::RangeInclusive;
 
 use super::config::{AfterBorrow, EventType, FrontEnd, PCounter, SensorConfig, Tap, Tdc};
-use super::correlation;
 use super::front_end::DeadTimeTooShort;
+use super::own_block::CONTRACTS;
 use super::timing::ChipTiming;
 use super::timing::cell_library::CellLibrary;
 use crate::files::{InputError, placed};
@@ -244,11 +244,15 @@ impl SensorConfig {
                 *file = placed(document.folder(), file);
             }
         }
-        for (key, block) in config.own_blocks() {
-            if let Some(block) = block
-                && let Err(message) = block.load(document.folder())
+        // A library that cannot be read is complained of below.
+        let library = CellLibrary::of(&config).ok();
+        let library = library.and_then(CellLibrary::from_file);
+        let library = library.map(|read| &read.liberty);
+        for contract in &CONTRACTS {
+            if let Some(block) = (contract.own_mut)(&mut config)
+                && let Err(message) = block.load(document.folder(), library)
             {
-                let path = key.to_owned();
+                let path = contract.key.to_owned();
                 faults.push(Fault { path, message });
             }
         }
@@ -351,20 +355,11 @@ impl SensorConfig {
         if !variant.has_memory && self.after_borrow == AfterBorrow::Hold {
             return Err(SensorFault::HoldWithoutMemory(p_counter));
         }
-        let fault = |key: &str| {
-            let key = key.to_owned();
-            move |why| SensorFault::Value { key, why }
-        };
-        if let Some(block) = &self.p_counter_block {
-            let fits = block.check_counter(&(variant.circuit)(self));
-            fits.map_err(fault("p_counter_block"))?;
-        }
-        if let Some(block) = &self.correlation_block {
-            let fits = match self.tdc {
-                Tdc::Clocked => block.check_correlation(&correlation::circuit(self.lines())),
-                Tdc::DelayLine => Err("correlation_block is impossible with tdc = \"delay_line\", which correlates nothing; leave it out".to_owned()),
-            };
-            fits.map_err(fault("correlation_block"))?;
+        for contract in &CONTRACTS {
+            contract.check(self).map_err(|why| {
+                let key = contract.key.to_owned();
+                SensorFault::Value { key, why }
+            })?;
         }
         if let Err((key, why)) = CellLibrary::of(self) {
             return Err(SensorFault::Liberty { key, why });

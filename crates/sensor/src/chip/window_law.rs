@@ -183,7 +183,11 @@ impl WindowLaw {
         let is_clocked = self.sensor.tdc == Tdc::Clocked;
         let to_shift = timing.clk_to_event + timing.setup + ROUNDING;
         if is_clocked && period <= to_shift {
-            let what = Conflict::SlowCorrelation;
+            let own = &self.sensor;
+            let what = match own.front_end_block.is_some() || own.metdc_block.is_some() {
+                true => Conflict::SlowPath,
+                false => Conflict::SlowCorrelation,
+            };
             return Window::Race(Race::too_slow(what, to_shift, period));
         }
         let (cause, arrival, count_edge, irregular) = match self.sensor.mode {
@@ -223,8 +227,7 @@ impl WindowLaw {
             };
             return Window::Race(self.strobe_race(cause, arrival, change));
         }
-        let own = self.sensor.correlation_block.is_some();
-        if let Some(why) = irregular.or(own.then_some(Irregular::OwnCorrelation)) {
+        if let Some(why) = irregular.or(self.sensor.lawless_block().map(Irregular::OwnBlock)) {
             return Window::Irregular(why);
         }
         Window::Open(OpenWindow {

@@ -25,10 +25,12 @@ pub struct Cancelling {
 
 impl Cancelling {
     /// `None` where the dead time keeps the pulses of a SPAD farther apart than CLK edges; `law` is not asked for then. Nor is
-    /// anything told of bins that are not CLK periods, and of SPADs that share a wire.
+    /// anything told of bins that are not CLK periods, of SPADs that share a wire, and of a front end or METDC of one's own.
     pub fn of(dead_time: Time, clock: Frequency, law: impl FnOnce() -> WindowLaw) -> Option<Self> {
         let law = (dead_time <= clock.period()).then(law)?;
-        let tells = law.has_clk_bins() && !law.sensor().front_end.joins();
+        let sensor = law.sensor();
+        let is_built_in = sensor.front_end_block.is_none() && sensor.metdc_block.is_none();
+        let tells = law.has_clk_bins() && !sensor.front_end.joins() && is_built_in;
         tells.then_some(Cancelling { law })
     }
 

@@ -1,5 +1,6 @@
 //! The gate engine: the netlist itself, event by event.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -13,7 +14,7 @@ use super::{
 use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::{
     Exposure, LoadPins, Probe, Probes, ReadPins, Sensor, SensorPins, Tdc, WindowLaw, array,
-    front_end, load_path, metdc_delay_line,
+    load_path, metdc_delay_line,
 };
 use crate::kernel::{
     Drive, Kernel, LANES, Observer, Policy, Statistics, Stimulus, TimingChecks, merge,
@@ -128,14 +129,23 @@ impl GateSimulation {
     /// front ends' first samplers count as asynchronous.
     pub fn timing_checks(&self, policy: Policy) -> TimingChecks {
         let library = self.sensor.silicon().library.cells();
+        let samplers = self.samplers();
         TimingChecks::new(&self.netlist, library, self.sensor.corner)
             .limits(&self.netlist, &self.timing)
             .policy(policy)
             .not_before(self.schedule().reset_end)
             .asynchronous(&self.netlist, |cell| {
-                front_end::is_asynchronous_sampler(cell)
-                    || metdc_delay_line::is_asynchronous_sampler(cell)
+                samplers.contains(cell) || metdc_delay_line::is_asynchronous_sampler(cell)
             })
+    }
+
+    /// Paths of the front ends' first samplers, which count as asynchronous.
+    pub(crate) fn samplers(&self) -> HashSet<String> {
+        let cells = self
+            .probes
+            .iter()
+            .flat_map(|probes| probes.samplers(&self.netlist));
+        cells.map(|cell| self.netlist.cell_path(cell)).collect()
     }
 
     /// A watch for hardware events in every macropixel, from the end of the power-up reset on, to run it with.

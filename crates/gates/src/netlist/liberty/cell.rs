@@ -12,7 +12,7 @@ use crate::netlist::{CheckKind, Edge, MAX_OUTPUTS};
 
 /// What a cell does, told without a look at its tables.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Role {
+pub(in crate::netlist) enum Role {
     /// One output that is a function of the inputs, in the order of [`Candidate::inputs`].
     Gate(TruthTable),
     /// A flip-flop whose next state is its data.
@@ -21,7 +21,7 @@ pub(super) enum Role {
 
 /// Pins of a flip-flop: indices of inputs, each with whether it is inverted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct FlipFlop {
+pub(in crate::netlist) struct FlipFlop {
     pub data: (usize, bool),
     pub clock: (usize, bool),
     pub clear: Option<(usize, bool)>,
@@ -29,6 +29,14 @@ pub(super) struct FlipFlop {
     /// Outputs that show the state, and its inverse.
     pub q: Option<usize>,
     pub qn: Option<usize>,
+}
+
+/// What a cell of the library does, for netlists that are mapped to it.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::netlist) struct CellFunction {
+    pub inputs: Vec<String>,
+    pub outputs: Vec<String>,
+    pub role: Role,
 }
 
 /// A cell that may be chosen.
@@ -75,7 +83,7 @@ impl<'g, 't> Candidate<'g, 't> {
         }
         let role = match group.of_kind("ff").next() {
             Some(ff) => flip_flop(group, ff, &inputs, &outputs).map(Role::FlipFlop),
-            None if outputs.len() == 1 && (1..=3).contains(&inputs.len()) => {
+            None if outputs.len() == 1 && (1..=TruthTable::MOST).contains(&inputs.len()) => {
                 let output = pins().find(|pin| pin.name() == outputs[0]);
                 let function = output.and_then(|pin| pin.value("function"));
                 function
@@ -96,6 +104,16 @@ impl<'g, 't> Candidate<'g, 't> {
     /// The cell's name.
     pub(super) fn name(&self) -> &'t str {
         self.group.name()
+    }
+
+    /// What it does.
+    pub(super) fn function(&self) -> CellFunction {
+        let owned = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+        CellFunction {
+            inputs: owned(&self.inputs),
+            outputs: owned(&self.outputs),
+            role: self.role.clone(),
+        }
     }
 }
 

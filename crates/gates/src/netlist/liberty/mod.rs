@@ -37,8 +37,10 @@ mod mapping;
 mod read;
 mod table;
 
+pub(in crate::netlist) use cell::{CellFunction, Role};
 pub use characterised::{Characterised, Environment};
 pub use error::LibertyError;
+pub(in crate::netlist) use function::TruthTable;
 pub use mapped_timing::{Clocking, write_constraints, write_mapped_sdf};
 pub use mapped_verilog::write_mapped;
 pub use mapping::CellMap;

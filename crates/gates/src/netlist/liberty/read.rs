@@ -1,6 +1,8 @@
 //! A Liberty file: its units, and what its cells are mapped to.
 
-use super::cell::Candidate;
+use std::collections::HashMap;
+
+use super::cell::{Candidate, CellFunction};
 use super::error::{LibertyError, Units};
 use super::group::{self, Group};
 use super::mapping::{CellMap, Maker};
@@ -18,9 +20,16 @@ pub struct Liberty {
     pub cells: usize,
     /// What stands for each kind.
     pub map: CellMap,
+    /// Its gates and flip-flops by name.
+    functions: HashMap<String, CellFunction>,
 }
 
 impl Liberty {
+    /// What a cell does, if it is a gate of up to six inputs or a flip-flop.
+    pub(in crate::netlist) fn function(&self, cell: &str) -> Option<&CellFunction> {
+        self.functions.get(cell)
+    }
+
     /// Reads a library of non-linear delay tables. `wanted` names cells that are to stand for a kind instead of those of least area.
     ///
     /// # Errors
@@ -82,6 +91,10 @@ impl Liberty {
             ],
             cells: library.of_kind("cell").count(),
             map: maker.make(&library)?,
+            functions: candidates
+                .iter()
+                .map(|c| (c.name().to_owned(), c.function()))
+                .collect(),
         })
     }
 }

@@ -1,5 +1,7 @@
 //! Yosys's generic cells as cells of the library: [`place`] is the one function that knows cell types.
 
+mod library;
+
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -146,7 +148,47 @@ impl<'d> Placing<'d> {
         if is_high { net } else { self.not(net) }
     }
 
-    fn pin(&mut self, given: &Given<'_>, pin: &'static str) -> Result<Net, YosysError> {
+    /// A flip-flop with reset and set, active high, where it has them.
+    fn flip_flop(
+        &mut self,
+        given: &Given<'_>,
+        [data, clock]: [Net; 2],
+        controls: [Option<Net>; 2],
+        [q, qn]: [Net; 2],
+    ) -> Result<(), YosysError> {
+        match controls {
+            [Some(reset), Some(set)] => self.add(Dffsr, &[data, clock, reset, set], &[q, qn]),
+            // The flip-flop here resets to 0: for 1 it holds the inverse.
+            [None, Some(set)] => {
+                let data = self.not(data);
+                self.add(Dffr, &[data, clock, set], &[qn, q]);
+            }
+            [Some(reset), None] => self.add(Dffr, &[data, clock, reset], &[q, qn]),
+            [None, None] => {
+                let never = self.constant_for(given, "R", false)?;
+                self.add(Dffr, &[data, clock, never], &[q, qn]);
+            }
+        }
+        Ok(())
+    }
+
+    /// A constant that a cell needs at a pin.
+    fn constant_for(
+        &mut self,
+        given: &Given<'_>,
+        pin: &str,
+        value: bool,
+    ) -> Result<Net, YosysError> {
+        self.constant(value).ok_or_else(|| YosysError::Pin {
+            module: self.module.to_owned(),
+            cell: given.name.to_owned(),
+            kind: given.of.kind.clone(),
+            pin: pin.to_owned(),
+            problem: "must be constant, which takes an input of the module; give it one",
+        })
+    }
+
+    fn pin(&mut self, given: &Given<'_>, pin: &str) -> Result<Net, YosysError> {
         let problem = match given.of.connections.get(pin).map(Vec::as_slice) {
             Some([bit]) => match self.net(bit) {
                 Some(net) => return Ok(net),
@@ -159,7 +201,7 @@ impl<'d> Placing<'d> {
             module: self.module.to_owned(),
             cell: given.name.to_owned(),
             kind: given.of.kind.clone(),
-            pin,
+            pin: pin.to_owned(),
             problem,
         })
     }
@@ -172,6 +214,10 @@ impl<'d> Placing<'d> {
 /// Places the cells that do what a cell of this type does; false where there are none.
 fn place(to: &mut Placing<'_>, given: &Given<'_>) -> Result<bool, YosysError> {
     let kind = given.of.kind.as_str();
+    if let Some(function) = &given.of.of_library {
+        library::place(to, given, function)?;
+        return Ok(true);
+    }
     if let Some(flip_flop) = FlipFlop::of(kind) {
         flip_flop.place(to, given)?;
         return Ok(true);
@@ -222,7 +268,9 @@ fn cure(kind: &str) -> &'static str {
             "which has no counterpart here; run synth -flatten; abc -g simple"
         }
         _ if kind.starts_with('$') => "which is not mapped to gates; run synth -flatten; techmap",
-        _ => "which is another module or a library's cell; run synth -flatten",
+        _ => {
+            "which is no gate or flip-flop of the sensor's library; run synth -flatten, or give the library (liberty) whose cell it is"
+        }
     }
 }
 
@@ -342,31 +390,17 @@ impl FlipFlop {
             let zero = to.not(value);
             let set = to.gate(And2, &[load, value]);
             let reset = to.gate(And2, &[load, zero]);
-            to.add(Dffsr, &[data, clock, reset, set], &[q, qn]);
-        } else if let Some((set, reset)) = self.set_and_reset {
-            let set = active(to, "S", set)?;
-            let reset = active(to, "R", reset)?;
-            to.add(Dffsr, &[data, clock, reset, set], &[q, qn]);
-        } else if let Some((is_high, value)) = self.reset {
-            let reset = active(to, "R", is_high)?;
-            // The library's flip-flop resets to 0: for 1 it holds the inverse.
-            let (data, outputs) = match value {
-                false => (data, [q, qn]),
-                true => (to.not(data), [qn, q]),
-            };
-            to.add(Dffr, &[data, clock, reset], &outputs);
-        } else {
-            let never = to.net(&Bit::Constant("0".into()));
-            let never = never.ok_or_else(|| YosysError::Pin {
-                module: to.module.to_owned(),
-                cell: given.name.to_owned(),
-                kind: given.of.kind.clone(),
-                pin: "R",
-                problem: "must be 0, which takes an input of the module; give it one",
-            })?;
-            to.add(Dffr, &[data, clock, never], &[q, qn]);
+            return to.flip_flop(given, [data, clock], [Some(reset), Some(set)], [q, qn]);
         }
-        Ok(())
+        let (mut reset, mut set) = (None, None);
+        if let Some((set_high, reset_high)) = self.set_and_reset {
+            set = Some(active(to, "S", set_high)?);
+            reset = Some(active(to, "R", reset_high)?);
+        } else if let Some((is_high, value)) = self.reset {
+            let net = active(to, "R", is_high)?;
+            *(if value { &mut set } else { &mut reset }) = Some(net);
+        }
+        to.flip_flop(given, [data, clock], [reset, set], [q, qn])
     }
 
     /// D, or Q where an enable is off.

@@ -56,7 +56,7 @@ pub enum YosysError {
         /// Its type.
         kind: String,
         /// Pin at fault.
-        pin: &'static str,
+        pin: String,
         /// What is wrong with it, and the cure.
         problem: &'static str,
     },

@@ -6,7 +6,7 @@
 //!
 //! Ports and nets keep their names and order. Yosys names most cells by where it made them, so cells get numbers. Flip-flops
 //! power up unknown, as in silicon: initial values are not read. What is don't-care in Yosys is 0. An inverter behind a flip-flop
-//! is its output QN.
+//! is its output QN. A library's cell (`dfflibmap`, `abc -liberty`) becomes what has its function.
 //!
 //! The crate `yosys-netlist-json` keeps ports and cells in hash maps, which have no order; so the few fields that matter are read here.
 
@@ -24,6 +24,7 @@ use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, Visitor};
 
 use super::builder::is_identifier;
+use super::liberty::{CellFunction, Liberty};
 use super::module::{Module, Net};
 use super::{CellKind, ModuleBuilder};
 use cells::{FlipFlop, Placing};
@@ -93,6 +94,9 @@ struct PortBits {
 
 #[derive(Deserialize)]
 struct Placed {
+    /// What it does, where it is a library's.
+    #[serde(skip)]
+    of_library: Option<CellFunction>,
     #[serde(rename = "type")]
     kind: String,
     #[serde(default)]
@@ -122,12 +126,30 @@ impl Module {
     /// Text that is no such netlist, modules that there are not or among which none is the top, cells that have no counterpart
     /// here, nets that nothing or more than one cell drives, names that are no identifiers.
     pub fn from_yosys(text: &str, top: Option<&str>) -> Result<Arc<Self>, YosysError> {
+        Self::from_yosys_of(text, top, None)
+    }
+
+    /// Reads a netlist of Yosys's generic gates and of a library's cells, which `abc` and `dfflibmap` put there.
+    ///
+    /// # Errors
+    /// As [`Module::from_yosys`].
+    pub fn from_yosys_of(
+        text: &str,
+        top: Option<&str>,
+        library: Option<&Liberty>,
+    ) -> Result<Arc<Self>, YosysError> {
         if text.len() > MOST_BYTES {
             return Err(YosysError::TooLong(text.len()));
         }
         let design: Design =
             serde_json::from_str(text).map_err(|e| YosysError::NoNetlist(e.to_string()))?;
-        let modules = design.modules.0;
+        let mut modules = design.modules.0;
+        let cells = modules.iter_mut().flat_map(|(_, of)| &mut of.cells.0);
+        for (_, cell) in cells {
+            cell.of_library = library
+                .and_then(|library| library.function(&cell.kind))
+                .cloned();
+        }
         let is_top = |of: &Described| {
             let top = of.attributes.get("top").map(ToString::to_string);
             top.is_some_and(|value| value.contains('1'))
@@ -318,6 +340,10 @@ impl Placed {
     /// Pins that drive nets.
     fn outputs(&self) -> impl Iterator<Item = &(String, Vec<Bit>)> {
         self.connections.0.iter().filter(|(pin, _)| {
+            if let Some(of) = &self.of_library {
+                // Yosys says no directions of cells that it has not read.
+                return of.outputs.contains(pin);
+            }
             let said = self.port_directions.get(pin).map(String::as_str);
             said.map_or(matches!(&**pin, "Y" | "Q"), |said| said != "input")
         })

@@ -35,7 +35,11 @@ struct Bench {
 
 impl Bench {
     fn new(text: &str) -> Self {
-        let module = Module::from_yosys(text, None).unwrap();
+        Self::of(text, None)
+    }
+
+    fn of(text: &str, library: Option<&Liberty>) -> Self {
+        let module = Module::from_yosys_of(text, None, library).unwrap();
         let netlist = Netlist::elaborate(&module);
         let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
         let kernel = Kernel::new(&netlist, &timing);
@@ -214,6 +218,101 @@ fn module(ports: &str, cells: &str, names: &str) -> String {
 
 const PORTS: &str = r#""Z_FIRST": {"direction": "input", "bits": [2, 3]}, "A": {"direction": "output", "bits": [4, 2, "1"]}"#;
 
+/// The library of invented numbers, and cells that nothing here is made of.
+fn library() -> Liberty {
+    let file = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../vectors/liberty/example.lib"
+    );
+    let text = std::fs::read_to_string(file).unwrap();
+    let gate = |name: &str, inputs: &[&str], function: &str| {
+        let pins = inputs
+            .iter()
+            .map(|pin| format!("pin ({pin}) {{ direction : input; }}"));
+        let pins: String = pins.collect();
+        format!(
+            "cell ({name}) {{ area : 99; {pins} pin (Z) {{ direction : output; function : \"{function}\"; }} }}\n"
+        )
+    };
+    let more = [
+        gate("AOI22_1", &["A1", "A2", "B1", "B2"], "!((A1 A2) + (B1 B2))"),
+        gate("NAND4_1", &["A", "B", "C", "D"], "!(A B C D)"),
+        gate("MUXI_1", &["S", "A", "B"], "!((A !S) + (B S))"),
+        gate("XNOR3_1", &["A", "B", "C"], "!(A ^ B ^ C)"),
+        gate("MAJ_1", &["A", "B", "C"], "(A B) + (B C) + (A C)"),
+        gate("ONE_1", &["A"], "A + !A"),
+        "cell (DFFNS_1) { area : 99; ff (IQ, IQN) { clocked_on : \"!CKN\"; next_state : \"D\"; preset : \"!SN\"; }
+            pin (CKN) { direction : input; } pin (D) { direction : input; } pin (SN) { direction : input; }
+            pin (Q) { direction : output; function : \"IQ\"; } pin (QN) { direction : output; function : \"IQN\"; } }"
+            .to_owned(),
+    ];
+    let end = text.rfind('}').unwrap();
+    let text = format!("{}{}}}\n", &text[..end], more.concat());
+    Liberty::read(&text, &[]).unwrap()
+}
+
+#[test]
+fn cells_of_a_library_do_what_it_says() {
+    type Law = fn(&[bool]) -> bool;
+    let gates: [(&str, &[&str], Law); 7] = [
+        ("AOI22_1", &["A1", "A2", "B1", "B2"], |i| {
+            !(i[0] & i[1] | i[2] & i[3])
+        }),
+        ("NAND4_1", &["A", "B", "C", "D"], |i| {
+            !(i[0] & i[1] & i[2] & i[3])
+        }),
+        (
+            "MUXI_1",
+            &["S", "A", "B"],
+            |i| if i[0] { !i[2] } else { !i[1] },
+        ),
+        ("XNOR3_1", &["A", "B", "C"], |i| !(i[0] ^ i[1] ^ i[2])),
+        ("MAJ_1", &["A", "B", "C"], |i| {
+            i[0] & i[1] | i[1] & i[2] | i[0] & i[2]
+        }),
+        ("ONE_1", &["A"], |_| true),
+        ("NAND2_4", &["A", "B"], |i| !(i[0] & i[1])),
+    ];
+    let library = &library();
+    for (kind, pins, law) in gates {
+        let output = if kind == "NAND2_4" { "Y" } else { "Z" };
+        let mut bench = Bench::of(&cell(kind, pins, output), Some(library));
+        for bits in 0..1u32 << pins.len() {
+            let values: Vec<bool> = (0..pins.len()).map(|pin| bits >> pin & 1 == 1).collect();
+            let inputs: Vec<_> = pins.iter().copied().zip(values.iter().copied()).collect();
+            let wanted = if law(&values) {
+                Logic::One
+            } else {
+                Logic::Zero
+            };
+            assert_eq!(bench.set(&inputs, output), wanted, "{kind} {values:?}");
+        }
+    }
+    for (output, inverts) in [("Q", false), ("QN", true)] {
+        let mut bench = Bench::of(&cell("DFFNS_1", &["CKN", "D", "SN"], output), Some(library));
+        let mut is = |inputs: &[(&str, bool)], state: bool| {
+            let wanted = if state != inverts {
+                Logic::One
+            } else {
+                Logic::Zero
+            };
+            assert_eq!(bench.set(inputs, output), wanted, "{output} {inputs:?}");
+        };
+        is(&[("CKN", true), ("D", false), ("SN", false)], true);
+        is(&[("SN", true)], true);
+        is(&[("CKN", false)], false);
+        is(&[("D", true), ("CKN", true)], false);
+        is(&[("CKN", false)], true);
+    }
+    let unknown = Module::from_yosys_of(&cell("NAND9_1", &["A"], "Y"), None, Some(library));
+    assert!(
+        unknown
+            .unwrap_err()
+            .to_string()
+            .contains("cell it is a NAND9_1, which is no gate")
+    );
+}
+
 #[test]
 fn ports_and_nets_keep_their_names_and_order() {
     let cells = r#"
@@ -264,7 +363,7 @@ fn what_is_wrong_is_said_with_its_place_and_cure() {
         ),
         (
             "other",
-            "which is another module or a library's cell; run synth -flatten",
+            "which is no gate or flip-flop of the sensor's library; run synth -flatten, or give the library (liberty) whose cell it is",
         ),
     ] {
         let wanted = format!("module m: cell it is a {kind}, {cure}");

@@ -28,6 +28,7 @@ use super::{
 };
 use crate::chip::config::{Mode, SensorConfig, Tdc};
 use crate::chip::exposure::Exposure;
+use crate::chip::own_block::block::OwnBlock;
 use crate::chip::timing::chip_timing::ChipTiming;
 use crate::netlist::{Module, ModuleBuilder};
 use crate::units::Time;
@@ -73,6 +74,9 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
             m.wire("PHOTONS");
         }
     }
+    let placed = |name: &str, own: &Option<OwnBlock>, built_in: &dyn Fn() -> Arc<Module>| {
+        OwnBlock::or(own.as_ref(), name, built_in)
+    };
     m.wire_bus("HIT", config.bins);
     let counts = m.wire_bus("COUNT", config.bins * config.bin_bits);
 
@@ -81,13 +85,18 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     m.instance_by_names("p_counter", &p_counter::circuit(config), &[]);
     match config.tdc {
         Tdc::Clocked => {
-            m.instance_by_names("front_end", &front_end::circuit(config), &[]);
-            let correlation = match &config.correlation_block {
-                Some(own) => own.circuit("correlation"),
-                None => correlation::circuit(config.lines()),
-            };
+            let front_end = placed("front_end", &config.front_end_block, &|| {
+                front_end::circuit(config)
+            });
+            m.instance_by_names("front_end", &front_end, &[]);
+            let correlation = placed("correlation", &config.correlation_block, &|| {
+                correlation::circuit(config.lines())
+            });
             m.instance_by_names("correlation", &correlation, &[]);
-            m.instance_by_names("metdc", &metdc::circuit(config.bins), &[]);
+            let metdc = placed("metdc", &config.metdc_block, &|| {
+                metdc::circuit(config.bins)
+            });
+            m.instance_by_names("metdc", &metdc, &[]);
         }
         Tdc::DelayLine => {
             let front_end = photon_line::circuit(config.spads());
@@ -101,7 +110,9 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     let of_bins: Vec<_> = of_bins
         .map(|(name, count)| (name.as_str(), count))
         .collect();
-    let histogram = histogram::circuit(config.bins, config.bin_bits, config.overflow);
+    let histogram = placed("histogram", &config.histogram_block, &|| {
+        histogram::circuit(config.bins, config.bin_bits, config.overflow)
+    });
     m.instance_by_names("histogram", &histogram, &of_bins);
     let bin_select = readout::bin_select(config.bins, config.bin_bits);
     m.instance_by_names("bin_select", &bin_select, &[]);

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::files::read_text_within;
 use crate::netlist::Module;
+use crate::netlist::liberty::Liberty;
 use crate::settings::{Range, Setting};
 
 /// Most bytes of a file: more than [`Module::from_yosys`] takes, which then says so.
@@ -48,6 +49,14 @@ impl PartialEq for OwnBlock {
     }
 }
 
+/// FILE and MODULE.
+fn parts(asked: &Path) -> (&Path, Option<&str>) {
+    match asked.to_str().and_then(|asked| asked.rsplit_once(':')) {
+        Some((file, top)) if !asked.exists() => (Path::new(file), Some(top)),
+        _ => (asked, None),
+    }
+}
+
 impl Setting for OwnBlock {
     const RANGE: Range = Range::Text;
 }
@@ -67,27 +76,34 @@ impl OwnBlock {
         }
     }
 
-    /// Reads its file, which is relative to `folder`.
+    /// Reads its file, which is relative to `folder`; its cells may be those of a library.
     ///
     /// # Errors
     /// What is wrong with the file, with its name.
-    pub(in crate::chip) fn load(&mut self, folder: &Path) -> Result<(), String> {
+    pub(in crate::chip) fn load(
+        &mut self,
+        folder: &Path,
+        library: Option<&Liberty>,
+    ) -> Result<(), String> {
         let asked = folder.join(&self.file);
-        let name = asked.to_string_lossy().into_owned();
-        let (file, top) = match name.rsplit_once(':') {
-            Some((file, top)) if !asked.exists() => (Path::new(file), Some(top)),
-            _ => (&*asked, None),
-        };
+        let (file, top) = parts(&asked);
         let text = read_text_within(file, MOST_BYTES).map_err(|e| e.to_string())?;
-        let module = Module::from_yosys(&text, top);
+        let module = Module::from_yosys_of(&text, top, library);
         let module = module.map_err(|e| format!("{}: {e}", file.display()))?;
-        *self = OwnBlock::of(asked, module, &text);
+        // What cells of a library do, the library says.
+        let of = library.map_or(String::new(), |library| library.name.clone());
+        *self = OwnBlock::of(asked, module, &(text + &of));
         Ok(())
     }
 
-    /// Where it comes from.
+    /// Where it comes from: FILE, or FILE:MODULE.
     pub fn file(&self) -> &Path {
         &self.file
+    }
+
+    /// The file alone.
+    pub fn path(&self) -> &Path {
+        parts(&self.file).0
     }
 
     /// Tells netlists apart, where the block has been read.
@@ -95,10 +111,16 @@ impl OwnBlock {
         self.read.as_ref().map(|read| read.hash)
     }
 
-    /// Its circuit under the name of the block that it replaces.
-    pub(in crate::chip) fn circuit(&self, name: &str) -> Arc<Module> {
-        let read = self.read.as_ref().expect("it has been checked");
-        read.module.renamed(name)
+    /// The circuit of the block called `name`: that of `own`, or else the built-in one.
+    pub(in crate::chip) fn or(
+        own: Option<&Self>,
+        name: &str,
+        built_in: impl FnOnce() -> Arc<Module>,
+    ) -> Arc<Module> {
+        own.map_or_else(built_in, |own| {
+            let read = own.read.as_ref().expect("it has been checked");
+            read.module.renamed(name)
+        })
     }
 
     /// Its circuit, once it has been read.

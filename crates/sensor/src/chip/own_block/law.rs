@@ -20,6 +20,9 @@ use crate::kernel::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
 use crate::netlist::{Corner, Module, NetId, Netlist};
 use crate::units::Time;
 
+/// Most cells of a block: its law is measured while somebody waits, and [`PAUSE`] lets them settle one after the other.
+pub(super) const MOST_CELLS: usize = 10_000;
+
 /// Half a period of COUNTER_CLK, and every pause: long enough for ten thousand gates one after the other.
 const PAUSE: Time = Time::from_ns(500);
 
@@ -119,7 +122,7 @@ impl CounterLaw {
     }
 
     /// When LOCAL_STOP rises; `None` where it does not.
-    pub(crate) fn rises(&self, start: u16) -> Option<Rises> {
+    pub fn rises(&self, start: u16) -> Option<Rises> {
         let [first, second] = self.counted[usize::from(start)].rises;
         let first = i64::from(first?);
         let every = second.map(|second| i64::from(second) - first);

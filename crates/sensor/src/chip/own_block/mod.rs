@@ -1,29 +1,29 @@
 //! Blocks of one's own: a netlist that Yosys wrote takes the place of a built-in block.
 //!
 //! ```text
-//!   p_counter_block = "my.json" ─read─► Module ─ports─► held against the built-in block's ─► in its place in the macropixel
+//!   p_counter_block = "my.json" ─read─► Module ─► held against its contract ─► in the built-in block's place in the macropixel
 //!                                          └─► CounterLaw: what each COUNTER_INIT does, measured on the gates
 //! ```
 //!
 //! The key `p_counter` still says what is expected of a P-counter: whether COUNTER_RESET brings its start value back (all but
 //! `memoryless`). What the counter does besides is measured ([`CounterLaw`]), because nobody wrote it down.
 //!
-//! What another correlation block counts, no law says: `gate` and `cycle` run it.
+//! What other blocks count, no law says: `gate` and `cycle` run them.
 
 pub(crate) mod block;
+mod contract;
 mod law;
 
 use std::collections::HashMap;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 pub use block::OwnBlock;
+pub(crate) use contract::CONTRACTS;
+pub use contract::replaceable;
 use law::Expected;
 pub use law::{CounterLaw, Uneven};
 
 use super::config::SensorConfig;
-use super::probes::{Probe, Probes};
-use super::timing::silicon::Silicon;
-use crate::netlist::{Corner, Direction, Edge, Module, NetId, Netlist, StaticTiming};
 
 /// Laws that have been measured, by netlist and what is expected of it.
 type Laws = HashMap<(u64, Expected), Arc<CounterLaw>>;
@@ -43,149 +43,9 @@ impl OwnBlock {
         let law = laws.entry((hash, expected));
         Arc::clone(law.or_insert_with(|| Arc::new(CounterLaw::measure(module, expected))))
     }
-
-    /// Whether it can be a P-counter in the place of `built_in`.
-    ///
-    /// # Errors
-    /// What is missing, what is too much, and what differs.
-    pub(super) fn check_counter(&self, built_in: &Module) -> Result<(), String> {
-        self.check(built_in, |netlist, paths| {
-            let probes = Probes::of_block(netlist);
-            let clk = probes.net(Probe::CounterClk);
-            let after = paths.arrivals(&[(clk, Edge::Rise)], &[]);
-            let after = after.expect("there is no loop");
-            let counts = netlist.cells().iter().any(|cell| {
-                cell.kind.is_flip_flop()
-                    && cell.inputs[1] == clk
-                    && after.window(cell.inputs[0]).is_some()
-            });
-            let stops = after.edge_window(probes.net(Probe::LocalStop), Edge::Rise).is_some();
-            let flaw = "does not count rising edges of COUNTER_CLK up to LOCAL_STOP; clock it with posedge COUNTER_CLK";
-            (!counts || !stops).then_some(flaw)
-        })
-    }
-
-    /// Whether it can be a correlation block in the place of `built_in`.
-    ///
-    /// # Errors
-    /// As [`OwnBlock::check_counter`].
-    pub(super) fn check_correlation(&self, built_in: &Module) -> Result<(), String> {
-        self.check(built_in, |netlist, paths| {
-            let probes = Probes::of_block(netlist);
-            let timed = probes.bus(Probe::SpadTimed).iter();
-            let starts = timed.flat_map(|&n| Edge::BOTH.map(|e| (n, e)));
-            let starts: Vec<(NetId, Edge)> = starts.collect();
-            let after = paths.arrivals(&starts, &[]).expect("there is no loop");
-            let event = probes.net(Probe::SpadEvent);
-            let flaw = "has a SPAD_EVENT that no SPAD_TIMED changes; make it of gates behind them";
-            after.window(event).is_none().then_some(flaw)
-        })
-    }
-
-    /// Whether its ports are those of `built_in`, and its gates make no loop and have no `flaw`.
-    fn check(
-        &self,
-        built_in: &Module,
-        flaw: impl Fn(&Netlist, &StaticTiming<'_>) -> Option<&'static str>,
-    ) -> Result<(), String> {
-        let file = self.file().display();
-        let Some(module) = self.module() else {
-            return Err(format!(
-                "{file} has not been read; give it in a sensor file"
-            ));
-        };
-        let name = module.name();
-        let faults = misfits(module, built_in);
-        if !faults.is_empty() {
-            return Err(format!(
-                "{file}: module {name} has other ports than {}: {}",
-                built_in.name(),
-                faults.join(", ")
-            ));
-        }
-        let netlist = Netlist::elaborate(module);
-        let timing = Silicon::nominal(Corner::Typ).timing(&netlist);
-        let paths = StaticTiming::new(&netlist, &timing);
-        let inputs = netlist.inputs().into_iter();
-        let starts: Vec<(NetId, Edge)> = inputs.flat_map(|n| Edge::BOTH.map(|e| (n, e))).collect();
-        if let Err(found) = paths.arrivals(&starts, &[]) {
-            return Err(format!(
-                "{file}: module {name} has a loop of gates at {}, where time cannot be added up; break it with a flip-flop",
-                found.net
-            ));
-        }
-        match flaw(&netlist, &paths) {
-            None => Ok(()),
-            Some(flaw) => Err(format!("{file}: module {name} {flaw}")),
-        }
-    }
-}
-
-/// What is wrong with the ports of `own` in the place of `built_in`.
-fn misfits(own: &Module, built_in: &Module) -> Vec<String> {
-    let word = |direction| match direction {
-        Direction::Input => "input",
-        Direction::Output => "output",
-    };
-    let bits = |width| {
-        if width == 1 {
-            "1 bit".to_owned()
-        } else {
-            format!("{width} bits")
-        }
-    };
-    let mut faults = Vec::new();
-    for (direction, wanted) in built_in.port_signals() {
-        let mut ports = own.port_signals();
-        let (name, width) = (&wanted.name, wanted.width());
-        match ports.find(|(_, port)| port.name == *name) {
-            None => faults.push(format!(
-                "{} {name} of {} is missing",
-                word(direction),
-                bits(width)
-            )),
-            Some((found, _)) if found != direction => {
-                faults.push(format!(
-                    "{name} is an {} instead of an {}",
-                    word(found),
-                    word(direction)
-                ));
-            }
-            Some((_, port)) if port.width() != width => {
-                faults.push(format!(
-                    "{name} has {} instead of {width}",
-                    bits(port.width())
-                ));
-            }
-            Some(_) => {}
-        }
-    }
-    for (direction, port) in own.port_signals() {
-        if !built_in
-            .port_signals()
-            .any(|(_, wanted)| wanted.name == port.name)
-        {
-            faults.push(format!("{} {} is too much", word(direction), port.name));
-        }
-    }
-    faults
 }
 
 impl SensorConfig {
-    /// Keys of blocks of one's own, with those that there are.
-    pub(super) fn own_blocks(&mut self) -> [(&'static str, &mut Option<OwnBlock>); 2] {
-        [
-            ("p_counter_block", &mut self.p_counter_block),
-            ("correlation_block", &mut self.correlation_block),
-        ]
-    }
-
-    /// What tells the netlists of its own blocks apart.
-    pub fn own_hashes(&self) -> [Option<u64>; 2] {
-        [&self.p_counter_block, &self.correlation_block]
-            .map(|block| block.as_ref().and_then(OwnBlock::hash))
-    }
-
     /// What a P-counter of one's own does; `None` for the built-in ones. The configuration must have passed [`SensorConfig::check`].
     pub fn counter_law(&self) -> Option<Arc<CounterLaw>> {
         Some(self.p_counter_block.as_ref()?.law(self))
@@ -208,13 +68,13 @@ impl SensorConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chip::p_counter;
-    use crate::netlist::{CellKind, ModuleBuilder};
+    use crate::chip::config::AfterBorrow;
+    use crate::chip::{front_end, metdc, p_counter};
+    use crate::netlist::{CellKind, Direction, Module, ModuleBuilder, Net};
 
     #[test]
     fn ports_are_held_against_the_built_in_ones() {
         let built_in = p_counter::circuit(&SensorConfig::default());
-        assert_eq!(misfits(&built_in, &built_in), [""; 0]);
         let mut m = ModuleBuilder::new("mine");
         let init = m.input_bus("COUNTER_INIT", 8);
         m.input("LOCAL_STOP");
@@ -222,7 +82,7 @@ mod tests {
         m.gate_into(CellKind::Inv, &init[..1], more);
         let block = OwnBlock::of("mine.json", m.finish().unwrap(), "");
         assert_eq!(
-            block.check_counter(&built_in).unwrap_err(),
+            CONTRACTS[0].holds(&block, &built_in).unwrap_err(),
             "mine.json: module mine has other ports than p_counter: COUNTER_INIT has 8 bits instead of 9, \
              input MEMORY_LOAD of 1 bit is missing, input MEMORY_RESET of 1 bit is missing, input COUNTER_CLK of 1 bit is missing, \
              input COUNTER_RESET of 1 bit is missing, LOCAL_STOP is an input instead of an output, output MORE is too much"
@@ -246,7 +106,8 @@ mod tests {
             m.gate_into(CellKind::Nand2, &[clk, b], a);
             m.gate_into(CellKind::Buf, &[a], b);
         }
-        OwnBlock::of("mine.json", m.finish().unwrap(), "").check_counter(&built_in)
+        let own = OwnBlock::of("mine.json", m.finish().unwrap(), "");
+        CONTRACTS[0].holds(&own, &built_in)
     }
 
     #[test]
@@ -261,5 +122,155 @@ mod tests {
             looping.starts_with("mine.json: module mine has a loop of gates at "),
             "{looping}"
         );
+    }
+
+    /// Laws that are none: no window, no clean one, one that depends on the last, one that nobody knows, the same for all codes.
+    #[test]
+    fn what_is_no_law_is_told() {
+        let law = |stop: fn(&mut ModuleBuilder, [Net; 4]) -> Net| {
+            let mut m = ModuleBuilder::new("mine");
+            m.input_bus("COUNTER_INIT", 3);
+            m.input("MEMORY_LOAD");
+            let pins = ["MEMORY_RESET", "COUNTER_CLK", "COUNTER_RESET"].map(|pin| m.input(pin));
+            let [memory_reset, clk, reset] = pins;
+            let local_stop = m.output("LOCAL_STOP");
+            let one = m.gate(CellKind::Xnor2, &[clk, clk]);
+            let stop = stop(&mut m, [one, memory_reset, clk, reset]);
+            m.gate_into(CellKind::Buf, &[stop], local_stop);
+            let expected = Expected {
+                has_memory: true,
+                after_borrow: AfterBorrow::Hold,
+                step_periods: 1,
+            };
+            CounterLaw::measure(&m.finish().unwrap(), expected).uneven()
+        };
+        fn flip_flop(m: &mut ModuleBuilder, name: &str, inputs: [Net; 3]) -> Net {
+            let [q, qn] = ["Q", "QN"].map(|pin| m.wire(&format!("{name}_{pin}")));
+            m.cell(name, CellKind::Dffr, &inputs, &[q, qn]);
+            q
+        }
+        let same = law(|m, [one, _, clk, reset]| flip_flop(m, "stop", [one, clk, reset]));
+        assert_eq!(same, Some(Uneven::Same(0, 1)));
+        let never = law(|m, [one, _, clk, reset]| {
+            let zero = m.gate(CellKind::Inv, &[one]);
+            flip_flop(m, "stop", [zero, clk, reset])
+        });
+        assert_eq!(never, Some(Uneven::Never));
+        let twice = law(|m, [one, _, clk, reset]| {
+            let stop = flip_flop(m, "stop", [one, clk, reset]);
+            m.gate(CellKind::And2, &[stop, clk])
+        });
+        assert_eq!(twice, Some(Uneven::Glitch(0)));
+        let forgets = law(|m, [one, memory_reset, clk, reset]| {
+            let [odd, even] = ["ODD", "EVEN"].map(|name| m.wire(name));
+            m.cell(
+                "odd",
+                CellKind::Dffr,
+                &[even, reset, memory_reset],
+                &[odd, even],
+            );
+            let first = flip_flop(m, "first", [one, clk, reset]);
+            let sooner = m.gate(CellKind::Or2, &[first, odd]);
+            flip_flop(m, "stop", [sooner, clk, reset])
+        });
+        assert_eq!(forgets, Some(Uneven::Forgets(0)));
+        let unknown = law(|m, [one, _, clk, _]| {
+            let zero = m.gate(CellKind::Inv, &[one]);
+            let [state, inverse] = ["STATE", "INVERSE"].map(|name| m.wire(name));
+            m.cell(
+                "stop",
+                CellKind::Dffr,
+                &[inverse, clk, zero],
+                &[state, inverse],
+            );
+            state
+        });
+        assert_eq!(unknown, Some(Uneven::Unknown(0)));
+    }
+
+    /// Ports are those of the built-in block, and edges go where delays are measured.
+    #[test]
+    fn a_metdc_a_front_end_and_a_histogram_lead_edges_on() {
+        let config = SensorConfig::default();
+        let complaint = |name: &str, built_in: Arc<Module>, through: CellKind| {
+            // Every output is a gate behind the first input.
+            let mut m = ModuleBuilder::new("mine");
+            let mut first = None;
+            for (direction, port) in built_in.port_signals() {
+                let (name, width) = (port.name.as_str(), port.width());
+                if direction == Direction::Input {
+                    let nets = if port.is_bus {
+                        m.input_bus(name, width)
+                    } else {
+                        vec![m.input(name)]
+                    };
+                    first = first.or(Some(nets[0]));
+                    continue;
+                }
+                let first = first.unwrap();
+                let nets = if port.is_bus {
+                    m.output_bus(name, width)
+                } else {
+                    vec![m.output(name)]
+                };
+                for net in nets {
+                    match through {
+                        CellKind::Dffr => m.cell(
+                            &format!("of_{net:?}").replace(['(', ')'], "_"),
+                            through,
+                            &[first; 3],
+                            &[net, Net::NONE],
+                        ),
+                        _ => m.gate_into(through, &[first], net),
+                    }
+                }
+            }
+            let own = OwnBlock::of("mine.json", m.finish().unwrap(), "");
+            let mut contracts = CONTRACTS.iter();
+            let contract = contracts.find(|contract| contract.name == name).unwrap();
+            contract.holds(&own, &built_in).unwrap_err()
+        };
+        for (name, built_in, through, says) in [
+            (
+                "metdc",
+                metdc::circuit(16),
+                CellKind::Buf,
+                "has a HIT that no flip-flop drives, ",
+            ),
+            (
+                "metdc",
+                metdc::circuit(16),
+                CellKind::Dffr,
+                "has a HIT whose clock never rises when LOCAL_STOP rises; ",
+            ),
+            (
+                "front_end",
+                front_end::circuit(&config),
+                CellKind::Buf,
+                "has a SPAD_RAW[0] that no flip-flop samples; ",
+            ),
+            (
+                "histogram",
+                bin_first(),
+                CellKind::Buf,
+                "has a BIN_0 that no HIT changes; ",
+            ),
+        ] {
+            let said = complaint(name, built_in, through);
+            assert!(
+                said.starts_with("mine.json: module mine ") && said.contains(says),
+                "{said}"
+            );
+        }
+    }
+
+    /// The pins of a histogram, PIXEL_CLEAR first.
+    fn bin_first() -> Arc<Module> {
+        let mut m = ModuleBuilder::new("histogram");
+        let clear = m.input("PIXEL_CLEAR");
+        m.input_bus("HIT", 1);
+        let bin = m.output("BIN_0");
+        m.gate_into(CellKind::Buf, &[clear], bin);
+        m.finish().unwrap()
     }
 }

@@ -28,8 +28,11 @@ pub use load_path::{LoadProbe, memories, memory_path};
 pub use pins::{LoadPins, ReadPins, SensorPins};
 pub use readout::ReadProbe;
 
-use super::{array, front_end, histogram};
-use crate::netlist::{CellKind, NetId, Netlist};
+use std::collections::HashSet;
+use std::ops::Range;
+
+use super::{array, histogram};
+use crate::netlist::{CellKind, FlatCell, NetId, Netlist};
 
 /// A net or bus of a macropixel that something outside the circuits looks at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,6 +41,8 @@ pub enum Probe {
     Clk,
     /// STOP.
     Stop,
+    /// STOP after the timing block's chain, which strobes the METDC in the conventional mode.
+    StopD,
     /// ENABLE, the sensor's RUN.
     Enable,
     /// PIXEL_CLEAR.
@@ -94,9 +99,10 @@ pub enum Probe {
 
 impl Probe {
     /// Every probe, in the order of their declaration.
-    pub const ALL: [Probe; 28] = [
+    pub const ALL: [Probe; 29] = [
         Probe::Clk,
         Probe::Stop,
+        Probe::StopD,
         Probe::Enable,
         Probe::PixelClear,
         Probe::MemoryLoad,
@@ -130,6 +136,7 @@ impl Probe {
         match self {
             Probe::Clk => (None, "CLK"),
             Probe::Stop => (None, "STOP"),
+            Probe::StopD => (None, "STOP_D"),
             Probe::Enable => (None, "ENABLE"),
             Probe::PixelClear => (None, "PIXEL_CLEAR"),
             Probe::MemoryLoad => (None, "MEMORY_LOAD"),
@@ -311,10 +318,44 @@ impl Probes {
         cells(netlist, (0..self.toggles.len()).map(cell))
     }
 
-    /// What CLK samples where SPADs share a wire: D of the first sampler.
-    pub(crate) fn joined_sample(&self, netlist: &Netlist) -> Option<NetId> {
-        let first = netlist.cell(&join([&self.path, FRONT_END, front_end::JOINED, "first"]))?;
-        Some(netlist.cells()[first].inputs[0])
+    /// The front end's first samplers: flip-flops that CLK clocks and whose D follows SPADs, so that it breaks setup and hold by
+    /// design; a second one gives them a period to make up their minds.
+    pub(crate) fn samplers<'n>(
+        &self,
+        netlist: &'n Netlist,
+    ) -> impl Iterator<Item = usize> + use<'n> {
+        self.clocked_behind(netlist, FRONT_END, Probe::SpadRaw)
+    }
+
+    /// The stages of the METDC that take SPAD_EVENT.
+    pub(crate) fn event_stages<'n>(
+        &self,
+        netlist: &'n Netlist,
+    ) -> impl Iterator<Item = usize> + use<'n> {
+        self.clocked_behind(netlist, METDC, Probe::SpadEvent)
+    }
+
+    /// Flip-flops of a block that CLK clocks and whose D edges of `from` reach.
+    fn clocked_behind<'n>(
+        &self,
+        netlist: &'n Netlist,
+        block: &str,
+        from: Probe,
+    ) -> impl Iterator<Item = usize> + use<'n> {
+        let cells = self.block_cells(netlist, block);
+        let from = self.find(from).unwrap_or_default();
+        let reached = reached(netlist, cells.clone(), from);
+        let clk = self.net(Probe::Clk);
+        cells.filter(move |&cell| {
+            let FlatCell { kind, inputs, .. } = &netlist.cells()[cell];
+            kind.is_flip_flop() && inputs[1] == clk && reached.contains(&inputs[0])
+        })
+    }
+
+    /// The cells of a block of the macropixel, or all of those of a block alone.
+    fn block_cells(&self, netlist: &Netlist, block: &str) -> Range<usize> {
+        let scope = netlist.scope(&join([&self.path, block]));
+        scope.map_or(0..netlist.cells().len(), |scope| netlist.cells_below(scope))
     }
 
     /// The end of each pulse shaper's delay chain, by SPAD.
@@ -333,9 +374,24 @@ impl Probes {
     }
 
     /// The HIT flip-flop of each bin.
+    ///
+    /// # Panics
+    /// When something else drives a HIT.
     pub fn hit_cells(&self, netlist: &Netlist) -> Vec<usize> {
-        let cell = |bin| join([&self.path, METDC, &format!("hit_{bin}")]);
-        cells(netlist, (0..self.bus(Probe::Hit).len()).map(cell))
+        let cells = self.find_hit_cells(netlist);
+        cells.expect("a METDC of one's own has been checked")
+    }
+
+    /// The HIT flip-flop of each bin, if each is one's output.
+    pub(crate) fn find_hit_cells(&self, netlist: &Netlist) -> Option<Vec<usize>> {
+        let cells = self.block_cells(netlist, METDC);
+        let drives = |cell: &FlatCell, hit| cell.kind.is_flip_flop() && cell.outputs.contains(hit);
+        let of_hit = |hit| {
+            cells
+                .clone()
+                .find(|&cell| drives(&netlist.cells()[cell], hit))
+        };
+        self.bus(Probe::Hit).iter().map(of_hit).collect()
     }
 
     /// Every cell of the P-counter timing block.
@@ -396,6 +452,23 @@ impl Probes {
             inputs[1]
         } else {
             inputs[0]
+        }
+    }
+}
+
+/// Nets that edges of these come to within some cells, through gates, clocks, resets and sets.
+pub(crate) fn reached(netlist: &Netlist, cells: Range<usize>, from: &[NetId]) -> HashSet<NetId> {
+    let mut reached: HashSet<NetId> = from.iter().copied().collect();
+    loop {
+        let before = reached.len();
+        for cell in &netlist.cells()[cells.clone()] {
+            let mut pins = (0..cell.kind.inputs().len()).filter(|&pin| cell.kind.triggers(pin));
+            if pins.any(|pin| reached.contains(&cell.inputs[pin])) {
+                reached.extend(cell.outputs.iter().filter(|net| net.is_some()));
+            }
+        }
+        if reached.len() == before {
+            return reached;
         }
     }
 }

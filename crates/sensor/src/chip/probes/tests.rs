@@ -70,6 +70,21 @@ fn cells_drive_the_nets_that_they_are_named_after() {
         probes.bus(Probe::Shift)
     );
     assert_eq!(outputs(probes.hit_cells(&netlist)), probes.bus(Probe::Hit));
+    // One of each SPAD, of the retiming below the front end; and the first of the shift register.
+    let paths = |cells: Vec<usize>| -> Vec<String> {
+        let path = |cell| netlist.cell_path(cell);
+        cells.into_iter().map(path).collect()
+    };
+    let samplers = paths(probes.samplers(&netlist).collect());
+    assert_eq!(samplers.len(), config.spads());
+    assert!(
+        samplers.iter().all(|path| path.ends_with(".first")),
+        "{samplers:?}"
+    );
+    assert_eq!(
+        probes.event_stages(&netlist).collect::<Vec<_>>(),
+        probes.shift_cells(&netlist)[..1]
+    );
     // The borrow is a flip-flop more.
     assert_eq!(
         probes.counter_cells(&netlist).len(),

@@ -15,14 +15,19 @@
 //! * RUN (the macropixels' ENABLE): it changes with STOP, but only before the first and after the last laser cycle.
 //! * Clocks of the P-counter's stages during a reset: the flip-flops behind them are held.
 
+mod counter;
+
 use std::sync::OnceLock;
 
 use super::cell_library::CellLibrary;
 use super::silicon::Silicon;
 use crate::chip::{Probe, Probes, SensorConfig, array};
 use crate::logic::Logic::{One, Zero};
-use crate::netlist::{Arrivals, CellKind, Corner, Edge, NetId, Netlist, StaticTiming, Timing};
+use crate::netlist::{
+    Arrivals, CellKind, Corner, Edge, FlatCell, NetId, Netlist, StaticTiming, Timing,
+};
 use crate::units::Time;
+pub use counter::CounterDelays;
 
 /// Earliest and latest.
 pub type Span = (Time, Time);
@@ -44,11 +49,15 @@ pub struct MacropixelCircuit {
     /// Handles of its nets.
     pub probes: Probes,
     toggles: Vec<usize>,
-    /// What CLK samples where SPADs share a wire.
-    joined: Option<NetId>,
+    /// What CLK samples of SPADs where a toggle flip-flop of each does not say it: on a wire that they share, in a front end of one's own.
+    sampled: Vec<NetId>,
+    /// Whether SPADs share a wire.
+    joins: bool,
     /// Ends of the pulse shapers' delay chains.
     late: Vec<NetId>,
     hits: Vec<usize>,
+    /// Data of which a CLK edge takes what the last one made: SPAD_EVENT, and all that CLK samples where blocks are one's own.
+    clocked: Vec<NetId>,
     /// The P-counter's flip-flops, memory excepted.
     counting: Vec<usize>,
     /// COUNTER_RESET's cause besides STOP.
@@ -71,9 +80,27 @@ impl MacropixelCircuit {
         };
         let netlist = Netlist::elaborate(&array::subarray(&unskewed, position, (1, 1)));
         let probes = Probes::of_macropixel(&netlist, position.0, position.1);
+        let clk = probes.net(Probe::Clk);
+        let data = |cell: &FlatCell| {
+            let is_clocked = cell.kind.is_flip_flop() && cell.inputs[1] == clk;
+            is_clocked.then_some(cell.inputs[0])
+        };
+        let has_own = config.front_end_block.is_some() || config.metdc_block.is_some();
+        let event = probes.find(Probe::SpadEvent).unwrap_or_default();
         MacropixelCircuit {
+            clocked: match has_own {
+                true => netlist.cells().iter().filter_map(data).collect(),
+                false => event.to_vec(),
+            },
             toggles: probes.toggle_cells(&netlist),
-            joined: probes.joined_sample(&netlist),
+            joins: config.front_end.joins(),
+            sampled: match config.front_end.joins() || config.front_end_block.is_some() {
+                true => probes
+                    .samplers(&netlist)
+                    .map(|cell| netlist.cells()[cell].inputs[0])
+                    .collect(),
+                false => Vec::new(),
+            },
             late: probes.shaper_ends(&netlist),
             hits: probes.hit_cells(&netlist),
             counting: probes.counter_cells(&netlist),
@@ -145,8 +172,20 @@ impl MacropixelCircuit {
 
     /// The clock that freezes the window: of the delay lines' samples, or of the HIT flip-flops.
     fn sampling(&self) -> NetId {
-        let sample_clk = self.probes.find(Probe::SampleClk);
-        sample_clk.map_or_else(|| self.probes.net(Probe::Strobe), |nets| nets[0])
+        match self.is_clocked() {
+            true => self.hit_pin(1),
+            false => self.probes.net(Probe::SampleClk),
+        }
+    }
+
+    /// Whether a shift register, not delay lines, times photons.
+    fn is_clocked(&self) -> bool {
+        self.probes.find(Probe::SpadEvent).is_some()
+    }
+
+    /// An input that the HIT flip-flops share: STROBE, their clock, or HIT_RESET.
+    fn hit_pin(&self, pin: usize) -> NetId {
+        self.pin(self.hits[0], pin)
     }
 
     fn pin(&self, cell: usize, pin: usize) -> NetId {
@@ -178,22 +217,24 @@ impl<'c> MacropixelPaths<'c> {
 
     /// What STOP's rise changes, up to the resets that it makes and the strobe of the conventional mode.
     pub(crate) fn after_stop(&self) -> Arrivals<'c> {
-        let cuts = [
-            Probe::Hit,
-            Probe::Enable,
-            Probe::CounterReset,
-            Probe::Strobe,
-            Probe::HitReset,
-        ];
-        self.after(Probe::Stop, &[Edge::Rise], &cuts)
+        let cuts = [Probe::Hit, Probe::Enable, Probe::CounterReset];
+        let cuts = cuts
+            .iter()
+            .flat_map(|&cut| self.circuit.probes.bus(cut))
+            .copied();
+        let of_hit = [1, 2].map(|pin| self.circuit.hit_pin(pin));
+        let cuts: Vec<NetId> = cuts.chain(of_hit).collect();
+        let stop = (self.circuit.probes.net(Probe::Stop), Edge::Rise);
+        let arrivals = self.analysis.arrivals(&[stop], &cuts);
+        arrivals.expect("every loop is cut")
     }
 
     /// What an edge of COUNTER_RESET changes. LOCAL_STOP, which falls, may let COUNTER_CLK rise.
     pub(crate) fn after_counter_reset(&self, edge: Edge) -> Arrivals<'c> {
         let reset = (self.circuit.probes.net(Probe::CounterReset), edge);
-        let cuts = [Probe::Hit, Probe::Strobe];
-        let cuts = cuts.iter().flat_map(|&cut| self.circuit.probes.bus(cut));
-        let cuts: Vec<NetId> = cuts.copied().chain(self.stage_clocks()).collect();
+        let hit = self.circuit.probes.bus(Probe::Hit).iter().copied();
+        let cuts = hit.chain([self.circuit.hit_pin(1)]);
+        let cuts: Vec<NetId> = cuts.chain(self.stage_clocks()).collect();
         let arrivals = self.analysis.arrivals(&[reset], &cuts);
         arrivals.expect("every loop is cut")
     }
@@ -247,22 +288,39 @@ impl<'c> MacropixelPaths<'c> {
         counting.map(|&cell| self.circuit.pin(cell, 1))
     }
 
-    /// Clock → Q rises, Q falls, of one flip-flop.
-    fn clock_to_q(&self, cell: usize) -> (Time, Time) {
-        let clock = self.timing.of(cell)[1][0];
+    /// Clock → an output rises, falls, of one flip-flop.
+    fn clock_to_q(&self, cell: usize, output: usize) -> (Time, Time) {
+        let clock = self.timing.of(cell)[1][output];
         let [rise, fall] = [One, Zero].map(|to| Time::from_fs(clock.to(to).into()));
         (rise, fall)
     }
 
     /// SPAD_RAW rises → what CLK samples, of each SPAD.
-    fn front_end_latency(&self) -> Vec<Span> {
-        let Some(sampled) = self.circuit.joined else {
+    pub(crate) fn front_end_latency(&self) -> Vec<Span> {
+        if self.circuit.sampled.is_empty() {
             let toggles = self.circuit.toggles.iter();
-            return toggles.map(|&toggle| self.clock_to_q(toggle)).collect();
-        };
+            return toggles.map(|&toggle| self.clock_to_q(toggle, 0)).collect();
+        }
         let raw = self.circuit.probes.bus(Probe::SpadRaw).iter();
-        raw.map(|&raw| changes(&self.after_spad(raw, Edge::Rise), sampled))
-            .collect()
+        let of_spad = |&raw: &NetId| {
+            let after = self.after_spad(raw, Edge::Rise);
+            let sampled = self.circuit.sampled.iter();
+            let of_edges = Edge::BOTH.map(|edge| {
+                let spans = sampled
+                    .clone()
+                    .filter_map(|&net| after.edge_window(net, edge));
+                spans.reduce(hull)
+            });
+            let [rise, fall] = of_edges;
+            let either = of_edges.into_iter().flatten().reduce(hull);
+            let either = either.expect("CLK samples every SPAD");
+            // Of toggle flip-flops the first is the rise, as above.
+            match (rise, fall) {
+                (Some(rise), Some(fall)) if !self.circuit.joins => (rise.0, fall.1),
+                _ => either,
+            }
+        };
+        raw.map(of_spad).collect()
     }
 
     /// Delays of the slowest pulse shaper.
@@ -287,7 +345,8 @@ impl<'c> MacropixelPaths<'c> {
 
     /// What an edge of one SPAD changes.
     fn after_spad(&self, raw: NetId, edge: Edge) -> Arrivals<'c> {
-        let arrivals = self.analysis.arrivals(&[(raw, edge)], &[]);
+        let hit = self.circuit.probes.bus(Probe::Hit);
+        let arrivals = self.analysis.arrivals(&[(raw, edge)], hit);
         arrivals.expect("a front end has no loops")
     }
 
@@ -326,8 +385,8 @@ pub struct MacropixelDelays {
     pub shaper: Option<ShaperDelays>,
     /// TOGGLE → PHOTONS, where delay lines time what SPADs have in common.
     pub joining: Option<Span>,
-    /// CLK rises → SPAD_EVENT settled, latest; nothing where delay lines time photons. A path that no values excite may be longer than any that they do: see
-    /// the timing analysis of the correlation block.
+    /// CLK rises → all that CLK samples has settled, latest, which of built-in blocks is SPAD_EVENT; nothing where delay lines time
+    /// photons. A path that no values excite may be longer than any that they do: see the timing analysis of the correlation block.
     pub event: Time,
     /// CLK rises → the stage of SHIFT changes that each bin's HIT takes, bin 0 first; none where delay lines time photons.
     pub shift: Vec<Span>,
@@ -360,124 +419,33 @@ impl MacropixelDelays {
         let net = |probe| circuit.probes.net(probe);
         let rise = paths.after_clk(Edge::Rise);
         let stop = paths.after_stop();
-        // The newest event is in the first stage and goes into the last bin.
-        let shift = circuit.probes.find(Probe::Shift).unwrap_or_default();
-        let shift = shift.iter().rev();
-        let event = circuit.probes.find(Probe::SpadEvent);
-        let hits = circuit.hits.iter().map(|&cell| paths.clock_to_q(cell).0);
+        let hits = circuit.hits.iter();
+        let shift = hits.clone().filter(|_| circuit.is_clocked());
+        let hits = hits.zip(circuit.probes.bus(Probe::Hit));
+        let hits = hits.map(|(&cell, &hit)| {
+            let outputs = &circuit.netlist.cells()[cell].outputs;
+            paths.clock_to_q(cell, usize::from(outputs[0] != hit)).0
+        });
         MacropixelDelays {
             latency: paths.front_end_latency(),
             shaper: paths.shaper_delays(),
             joining: paths.joining(),
-            event: event.map_or(Time::ZERO, |nets| changes(&rise, nets[0]).1),
-            shift: shift.map(|&bit| changes(&rise, bit)).collect(),
+            event: latest(circuit.clocked.iter().map(|&net| rise.window(net)))
+                .unwrap_or(Time::ZERO),
+            shift: shift
+                .map(|&cell| changes(&rise, circuit.pin(cell, 0)))
+                .collect(),
             reset: edge(&stop, net(Probe::CounterReset), Edge::Rise),
             release: edge(&stop, net(Probe::CounterReset), Edge::Fall),
             run: changes(&stop, net(Probe::Enable)),
-            stop_strobe: edge(&stop, net(Probe::Strobe), Edge::Rise),
+            stop_strobe: edge(&stop, circuit.hit_pin(1), Edge::Rise),
             stop_sample: edge(&stop, circuit.sampling(), Edge::Rise),
-            stop_hit_release: edge(&stop, net(Probe::HitReset), Edge::Fall),
+            stop_hit_release: edge(&stop, circuit.hit_pin(2), Edge::Fall),
             strobe_to_hit: hits.max().expect("a METDC has bins"),
             slowest: latest(paths.arcs(|_| true)).unwrap_or(Time::ZERO),
             slowest_and: latest(paths.arcs(|kind| kind == CellKind::And2)).unwrap_or(Time::ZERO),
             fastest_flip_flop: earliest(paths.arcs(CellKind::is_flip_flop)).unwrap_or(Time::ZERO),
         }
-    }
-}
-
-/// Delays of a P-counter with its timing block, and of the strobe that it makes.
-#[derive(Debug, Clone)]
-pub struct CounterDelays {
-    /// CLK falls → COUNTER_CLK rises.
-    pub counter_clk: Span,
-    /// CLK falls → LOCAL_STOP rises. Every stage is taken to toggle, as it does when the counter rolls over.
-    pub local_stop: Span,
-    /// CLK falls → STROBE rises.
-    pub strobe: Span,
-    /// CLK falls → what freezes the window rises: STROBE, or SAMPLE_CLK before it.
-    pub sample: Span,
-    /// CLK falls → LOCAL_STOP → BLOCK rises; none where LOCAL_STOP does not block.
-    pub block: Option<Span>,
-    /// BLOCK rises → COUNTER_CLK falls, earliest.
-    pub block_to_counter_clk: Option<Time>,
-    /// CLK falls → data of the flip-flops that COUNTER_CLK clocks settled, latest.
-    pub settled: Time,
-    /// COUNTER_RESET falls → the last flip-flop is released, latest.
-    pub released: Time,
-    /// COUNTER_RESET rises → the last edge at the clock of a stage behind another, latest.
-    pub reset_to_stage_clock: Option<Time>,
-    /// COUNTER_RESET rises → LOCAL_STOP falls → COUNTER_CLK rises, latest; none where LOCAL_STOP does not block.
-    pub reset_to_counter_clk: Option<Time>,
-    /// COUNTER_RESET rises → data of the counting flip-flops settled, latest; none where nothing resets them.
-    pub reset_settled: Option<Time>,
-    /// COUNTER_RESET rises → LOCAL_STOP rises, latest, where a start value can make it.
-    pub reset_to_local_stop: Option<Time>,
-    /// COUNTER_RESET rises → HIT's reset begins.
-    pub hit_reset: Span,
-    /// COUNTER_RESET falls → HIT's reset ends.
-    pub hit_release: Span,
-    /// COUNTER_RESET rises → HIT has fallen, latest.
-    pub hit_falls: Time,
-    /// STOP rises → RUN changes → COUNTER_RESET's other cause changes.
-    pub clear: Span,
-    /// STOP rises → RUN changes → COUNTER_CLK changes, latest.
-    pub enabled: Time,
-    /// STOP rises → RUN rises → the inverse of ENABLE falls, latest.
-    pub enable: Time,
-}
-
-impl CounterDelays {
-    /// Measures them; `delays` are those of the same paths.
-    pub(crate) fn of(paths: &MacropixelPaths<'_>, delays: &MacropixelDelays) -> Self {
-        let (circuit, run) = (paths.circuit, delays.run);
-        let net = |probe| circuit.probes.net(probe);
-        let fall = paths.after_clk(Edge::Fall);
-        let reset = paths.after_counter_reset(Edge::Rise);
-        let release = paths.after_counter_reset(Edge::Fall);
-        let enable = paths.after_enable();
-        let after_run = |net| {
-            let (first, last) = changes(&enable, net);
-            (run.0 + first, run.1 + last)
-        };
-        let counter_clk = net(Probe::CounterClk);
-        let data = circuit.clocked_by_counter_clk();
-        let data = data.map(|cell| fall.window(circuit.pin(cell, 0)));
-        let all_data = circuit.counting.iter().map(|&cell| circuit.pin(cell, 0));
-        let later_stages = paths.stage_clocks().filter(|&clock| clock != counter_clk);
-        let controls = circuit.counting.iter().flat_map(|&cell| {
-            let leaf = &circuit.netlist.cells()[cell];
-            leaf.inputs[2..leaf.kind.inputs().len()].iter()
-        });
-        let hits = circuit.probes.bus(Probe::Hit).iter();
-        let rises_after_reset = |net| reset.edge_window(net, Edge::Rise);
-        CounterDelays {
-            counter_clk: edge(&fall, counter_clk, Edge::Rise),
-            local_stop: edge(&fall, net(Probe::LocalStop), Edge::Rise),
-            strobe: edge(&fall, net(Probe::Strobe), Edge::Rise),
-            sample: edge(&fall, circuit.sampling(), Edge::Rise),
-            block: fall.edge_window(net(Probe::Block), Edge::Rise),
-            block_to_counter_clk: paths.block_to_counter_clk(),
-            settled: latest(data).expect("a P-counter counts"),
-            released: latest(controls.map(|&net| release.edge_window(net, Edge::Fall)))
-                .unwrap_or(Time::ZERO),
-            reset_to_stage_clock: latest(later_stages.map(rises_after_reset)),
-            reset_to_counter_clk: latest([rises_after_reset(counter_clk)].into_iter()),
-            reset_settled: latest(all_data.map(|data| reset.window(data))),
-            reset_to_local_stop: latest([rises_after_reset(net(Probe::LocalStop))].into_iter()),
-            hit_reset: edge(&reset, net(Probe::HitReset), Edge::Rise),
-            hit_release: edge(&release, net(Probe::HitReset), Edge::Fall),
-            hit_falls: latest(hits.map(|&hit| reset.edge_window(hit, Edge::Fall)))
-                .expect("COUNTER_RESET resets HIT"),
-            clear: after_run(circuit.clear),
-            enabled: after_run(counter_clk).1,
-            enable: run.1 + edge(&enable, circuit.disabled, Edge::Fall).1,
-        }
-    }
-
-    /// COUNTER_RESET rises → the last edge at the clock of any stage, latest.
-    pub(crate) fn reset_edges(&self) -> Time {
-        let edges = self.reset_to_stage_clock.max(self.reset_to_counter_clk);
-        edges.unwrap_or(Time::ZERO)
     }
 }
 

@@ -113,7 +113,7 @@ struct Circuit {
     coincident_spads: usize,
     counter_bits: usize,
     p_counter: PCounter,
-    own: [Option<u64>; 2],
+    own: [Option<u64>; 5],
     tap: Tap,
     after_borrow: AfterBorrow,
     step_periods: usize,

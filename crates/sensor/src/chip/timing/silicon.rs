@@ -2,7 +2,9 @@
 
 use super::cell_library::CellLibrary;
 use crate::chip::SensorConfig;
-use crate::netlist::{Corner, Library, Mismatch, Netlist, Timing, derated_limits, varied_as};
+use crate::netlist::{
+    Conditions, Corner, Library, Mismatch, Netlist, Timing, derated_limits, varied_as,
+};
 
 /// What the chip is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,6 +55,18 @@ impl Silicon {
         self
     }
 
+    /// The same chip in other conditions.
+    ///
+    /// # Errors
+    /// Conditions for which no delays are known.
+    pub fn in_conditions(self, conditions: Conditions) -> Result<Self, UnknownConditions> {
+        if self.library.from_file().is_some() && conditions != Conditions::default() {
+            return Err(UnknownConditions::OfLibrary);
+        }
+        let factor = conditions.delay_factor();
+        Ok(self.at(factor.ok_or(UnknownConditions::Far)?))
+    }
+
     /// Delays of a netlist.
     pub fn timing(&self, netlist: &Netlist) -> Timing {
         self.timing_as(netlist, |cell| netlist.cell_path(cell))
@@ -87,6 +101,21 @@ impl Silicon {
         };
         derated_limits(self.library.cells(), factor)
     }
+}
+
+/// Conditions for which no delays are known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum UnknownConditions {
+    /// Any but its own, with a library.
+    #[error(
+        "a library is characterised at conditions of its own; give its file of other conditions as liberty_slow or liberty_fast, and corner = \"slow\" or \"fast\""
+    )]
+    OfLibrary,
+    /// Too far away.
+    #[error(
+        "no delays are known there; give -55 to 150 °C and a supply up to 2 V at least 0.2 V above the threshold of about 0.4 V"
+    )]
+    Far,
 }
 
 #[cfg(test)]

@@ -37,6 +37,7 @@ use super::{
     Engine, EngineError, Expose, Exposed, Gate, Histograms, LitPixel, PulsedPixel, Replay, follows,
     full_stream,
 };
+use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::window_law::{Window, WindowLaw};
 use crate::chip::{Exposure, Sensor};
 use crate::photon::{PhotonStream, SpadEvent};
@@ -98,6 +99,20 @@ impl Cycle {
             if self.sensor.front_end.joins() {
                 let wire = "the wire that all SPADs share".to_owned();
                 return Err(Unlevelled::Structure(wire));
+            }
+            if self.sensor.front_end_block.is_some() {
+                let circuit = MacropixelCircuit::new(&self.sensor, (0, 0));
+                let timing = self.sensor.silicon().timing(&circuit.netlist);
+                let latency = circuit.paths(&timing).front_end_latency();
+                // Packing knows one.
+                if latency
+                    .iter()
+                    .any(|of_spad| *of_spad != (latency[0].0, latency[0].0))
+                {
+                    let what =
+                        "a front end in which CLK sees SPADs after different times".to_owned();
+                    return Err(Unlevelled::Structure(what));
+                }
             }
             let survey = Survey::new(&self.sensor, &self.exposure);
             let levelised = Levelised::new(&survey, &self.sensor, &self.exposure)?;

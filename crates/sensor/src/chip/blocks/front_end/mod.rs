@@ -21,7 +21,7 @@ use crate::photon::count_bits;
 use crate::units::Time;
 
 pub use pulse_limits::{DeadTimeTooShort, PulseLimits};
-pub(crate) use summation::{JOINED, TOGGLE};
+pub(crate) use summation::TOGGLE;
 pub use variant::Variant;
 
 impl FrontEnd {
@@ -66,17 +66,6 @@ impl SensorConfig {
 /// Ports: SPAD_RAW\<SPADs\>, CLK, PIXEL_CLEAR → SPAD_TIMED\<lines\>.
 pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     (config.front_end.row().circuit)(config)
-}
-
-/// Whether the cell at this dotted path is a front end's first sampling flip-flop. Its D follows SPADs, not CLK, so that
-/// it breaks setup and hold by design; the second one gives it a period to make up its mind.
-pub(crate) fn is_asynchronous_sampler(cell_path: &str) -> bool {
-    let mut parts = cell_path.rsplit('.');
-    parts.next() == Some("first")
-        && parts
-            .next()
-            .is_some_and(|retiming| retiming.starts_with("spad_") || retiming == JOINED)
-        && parts.next() == Some("front_end")
 }
 
 /// Reference model of any front end.

@@ -30,6 +30,7 @@ mod variant;
 use std::sync::Arc;
 
 use crate::chip::config::{AfterBorrow, PCounter, SensorConfig, Tap};
+use crate::chip::own_block::block::OwnBlock;
 use crate::netlist::Module;
 
 pub(crate) use pins::memory;
@@ -81,10 +82,10 @@ impl PCounter {
 /// Ports: COUNTER_INIT\<bits\>, MEMORY_LOAD, MEMORY_RESET, COUNTER_CLK, COUNTER_RESET → LOCAL_STOP. Inside, the count
 /// is COUNTER_OUT\<bits\> and the start value, where there is a memory, MEMORY\<bits\>.
 pub fn circuit(config: &SensorConfig) -> Arc<Module> {
-    match &config.p_counter_block {
-        Some(own) => own.circuit("p_counter"),
-        None => (config.p_counter.row().circuit)(config),
-    }
+    let own = config.p_counter_block.as_ref();
+    OwnBlock::or(own, "p_counter", || {
+        (config.p_counter.row().circuit)(config)
+    })
 }
 
 /// Reference model of a P-counter together with what the timing block makes of its LOCAL_STOP.
