@@ -9,6 +9,7 @@ mod every_edge {
     pub mod waves;
 }
 mod icarus;
+mod library_chips;
 #[path = "../shared/scenario.rs"]
 mod scenario;
 mod tool;
@@ -29,6 +30,7 @@ mod icarus_agrees_with_the_kernel;
 mod lanes_agree_with_single_pixels;
 mod load_path_agrees_with_its_models;
 mod loading_and_stop_edges_are_safe;
+mod mapped_netlists_agree_with_icarus;
 mod opensta_agrees_on_library_delays;
 mod p_counter_traps;
 mod p_counters_agree_with_their_models;

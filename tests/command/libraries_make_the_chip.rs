@@ -64,10 +64,11 @@ fn a_macropixel_is_exported_in_library_cells() {
     let read = |name: &str| std::fs::read_to_string(folder.path().join("m").join(name)).unwrap();
     assert!(read("mapped.v").contains("DFFRN_1"));
     assert!(read("mapped.sdf").contains("(IOPATH CK Q"));
-    // CLK, and a clock at each of the nine stages that clock the next one.
+    assert!(read("mapped_cells.v").contains("module DFFRN_1(output Q, input CK, D, RN);"));
+    // A clock at both outputs of each of the nine stages that clock the next one, and LOCAL_STOP.
     assert_eq!(
         read("mapped.sdc").matches("create_generated_clock").count(),
-        18
+        19
     );
 }
 

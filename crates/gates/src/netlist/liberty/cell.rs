@@ -29,6 +29,8 @@ pub(super) struct FlipFlop {
     /// Outputs that show the state, and its inverse.
     pub q: Option<usize>,
     pub qn: Option<usize>,
+    /// Whether the preset wins where clear and preset are both active.
+    pub preset_wins: bool,
 }
 
 /// A cell that may be chosen.
@@ -128,6 +130,7 @@ fn flip_flop(
         preset,
         q: shows(false),
         qn: shows(true),
+        preset_wins: ff.value("clear_preset_var1") == Some("H"),
     };
     let pins = 2 + usize::from(clear.is_some()) + usize::from(preset.is_some());
     let fits = inputs.len() == pins && outputs.len() <= MAX_OUTPUTS;
@@ -168,6 +171,7 @@ pub(super) struct CellCheck {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct CellModel {
     pub name: String,
+    pub role: Role,
     pub area: f64,
     /// Leakage, W.
     pub leakage_w: f64,
@@ -195,6 +199,7 @@ impl CellModel {
         };
         let mut model = CellModel {
             name: candidate.name().to_owned(),
+            role: candidate.role.clone(),
             area: candidate.area,
             leakage_w: candidate.group.number("cell_leakage_power")?.unwrap_or(0.0)
                 * leakage_unit_w,
@@ -328,6 +333,12 @@ impl CellModel {
             }
             _ => return Ok(()),
         };
+        // Some libraries also relate clear and preset to each other.
+        let related = timing.value("related_pin").unwrap_or_default();
+        let is_clock = |roles: &FlipFlop| candidate.inputs[roles.clock.0] == related.trim();
+        if !matches!(&candidate.role, Role::FlipFlop(roles) if is_clock(roles)) {
+            return Ok(());
+        }
         for (edge, table) in [
             (Edge::Rise, "rise_constraint"),
             (Edge::Fall, "fall_constraint"),

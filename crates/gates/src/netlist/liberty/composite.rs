@@ -74,11 +74,12 @@ impl<'m> Composite<'m> {
                 .any(|(stage, made)| made.sources.contains(&of) && self.is_used(stage))
     }
 
-    /// What the cell of a stage is called, of the instance at `path`.
+    /// What the cell of a stage is called, of the instance at `path`: without dots, at which some readers of SDF cut names.
     pub(super) fn instance_name(&self, path: &str, stage: usize) -> String {
+        let path = path.replace('.', "__");
         match self.recipe.stages.len() {
-            1 => path.to_owned(),
-            _ => format!("{path}.{stage}"),
+            1 => path,
+            _ => format!("{path}__{stage}"),
         }
     }
 
