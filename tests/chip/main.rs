@@ -32,6 +32,7 @@ mod load_path_agrees_with_its_models;
 mod loading_and_stop_edges_are_safe;
 mod mapped_netlists_agree_with_icarus;
 mod opensta_agrees_on_library_delays;
+mod opensta_agrees_on_slacks;
 mod p_counter_traps;
 mod p_counters_agree_with_their_models;
 mod readout_agrees_with_its_models;
