@@ -28,6 +28,7 @@ mod front_ends_agree_with_their_models;
 mod gate_level_agrees_with_reference;
 mod icarus_agrees_with_the_kernel;
 mod lanes_agree_with_single_pixels;
+mod library_energies;
 mod load_path_agrees_with_its_models;
 mod loading_and_stop_edges_are_safe;
 mod mapped_netlists_agree_with_icarus;

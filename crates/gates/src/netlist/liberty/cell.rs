@@ -167,6 +167,17 @@ pub(super) struct CellCheck {
     pub limit: Table,
 }
 
+/// Energy within a cell when a pin changes, besides that of the loads at its outputs.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CellEnergy {
+    /// Output; none where an input takes it by itself.
+    pub to: Option<usize>,
+    /// The input that changes, or is behind the output's change; any where the file does not say.
+    pub from: Option<usize>,
+    /// Of the pin's rise and fall, fJ over the input's slew and the output's load.
+    pub of: [Table; 2],
+}
+
 /// A chosen cell with its tables.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct CellModel {
@@ -179,6 +190,7 @@ pub(super) struct CellModel {
     pub outputs: Vec<String>,
     pub arcs: Vec<CellArc>,
     pub checks: Vec<CellCheck>,
+    pub energies: Vec<CellEnergy>,
 }
 
 impl CellModel {
@@ -211,6 +223,7 @@ impl CellModel {
                 .collect(),
             arcs: Vec::new(),
             checks: Vec::new(),
+            energies: Vec::new(),
         };
         for (index, &name) in candidate.inputs.iter().enumerate() {
             let group = pin(name);
@@ -232,13 +245,41 @@ impl CellModel {
             for timing in group.of_kind("timing") {
                 model.add_checks(candidate, index, timing, templates, units)?;
             }
+            for power in group.of_kind("internal_power") {
+                model.add_energy((None, Some(index)), power, templates, units);
+            }
         }
         for (index, &name) in candidate.outputs.iter().enumerate() {
             for timing in pin(name).of_kind("timing") {
                 model.add_arcs(candidate, index, timing, templates, units)?;
             }
+            for power in pin(name).of_kind("internal_power") {
+                let related = power.value("related_pin").unwrap_or_default();
+                let from = |name| candidate.inputs.iter().position(|input| *input == name);
+                let from = related.split_whitespace().next().and_then(from);
+                model.add_energy((Some(index), from), power, templates, units);
+            }
         }
         Ok(model)
+    }
+
+    /// Tables over anything but slews and loads are passed over.
+    fn add_energy(
+        &mut self,
+        (to, from): (Option<usize>, Option<usize>),
+        power: &Group<'_>,
+        templates: &Templates<'_, '_>,
+        units: Units,
+    ) {
+        let table = |kind: &str| {
+            let mut groups = power.of_kind(kind).chain(power.of_kind("power"));
+            let read = |group| templates.table_in(group, units, units.energy_fj);
+            groups.next().map_or(Ok(Table::fixed(0.0)), read)
+        };
+        if let (Ok(rise), Ok(fall)) = (table("rise_power"), table("fall_power")) {
+            let of = [rise, fall];
+            self.energies.push(CellEnergy { to, from, of });
+        }
     }
 
     fn add_arcs(
