@@ -50,7 +50,7 @@ pub(super) struct VerilogArgs {
     /// Delays to use instead of the library's (SDF); they go into delays.v, which tb.v includes.
     #[arg(long, value_name = "FILE", requires = "inits")]
     sdf: Option<PathBuf>,
-    /// Write one macropixel in the cells of --liberty instead: mapped.v with mapped.sdf and mapped.sdc.
+    /// Write one macropixel in the cells of --liberty instead: mapped.v with mapped_cells.v, mapped.sdf and mapped.sdc.
     #[arg(long, conflicts_with = "inits")]
     mapped: bool,
 }

@@ -10,7 +10,7 @@ use crate::chip::{CellLibrary, FromFile, Probes, SensorConfig, macropixel};
 use crate::files::{InputError, OutputFile, create_folder};
 use crate::netlist::Netlist;
 use crate::netlist::liberty::{
-    Characterised, Clocking, write_constraints, write_mapped, write_mapped_sdf,
+    Characterised, Clocking, write_constraints, write_mapped, write_mapped_cells, write_mapped_sdf,
 };
 
 /// Arguments of `gdtof export sdc`.
@@ -61,6 +61,7 @@ impl<'c> Mapped<'c> {
             port: "CLK",
             period: self.config.clock().period(),
             ripple: &ripple,
+            after_fall: &[("STOP", self.config.stop_phase())],
         };
         OutputFile::write_with(path, |out| {
             let sized = (&self.characterised, &self.library.environment);
@@ -80,7 +81,7 @@ pub(super) fn run_sdc(args: &SdcArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes mapped.v, mapped.sdf and mapped.sdc into `folder`.
+/// Writes mapped.v, mapped_cells.v, mapped.sdf and mapped.sdc into `folder`.
 ///
 /// # Errors
 /// A sensor of the built-in cells, and unwritable output.
@@ -96,13 +97,16 @@ pub(super) fn write(folder: &Path, config: &SensorConfig) -> anyhow::Result<()> 
     OutputFile::write_with(&folder.join("mapped.v"), |out| {
         write_mapped(out, netlist, &library.liberty, characterised)
     })?;
+    OutputFile::write_with(&folder.join("mapped_cells.v"), |out| {
+        write_mapped_cells(out, netlist, &library.liberty, characterised)
+    })?;
     OutputFile::write_with(&folder.join("mapped.sdf"), |out| {
         write_mapped_sdf(out, netlist, &library.liberty, characterised)
     })?;
     mapped.write_sdc(&folder.join("mapped.sdc"))?;
     let (area, leakage_w) = characterised.silicon(netlist, &library.liberty, 0);
     tell(format_args!(
-        "mapped.v, mapped.sdf and mapped.sdc in {}: a macropixel of {} in {}, area {area:.0}, leakage {:.3} nW\n",
+        "mapped.v, mapped_cells.v, mapped.sdf and mapped.sdc in {}: a macropixel of {} in {}, area {area:.0}, leakage {:.3} nW\n",
         folder.display(),
         netlist.cells().len(),
         library.liberty.name,

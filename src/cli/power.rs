@@ -5,9 +5,8 @@ use clap::Args;
 use super::SensorArgs;
 use super::voice::{say, say_json};
 use crate::analysis::{Capacitances, MacropixelPower};
-use crate::chip::{CellLibrary, Exposure, Mode, PCounter, SensorConfig, macropixel};
+use crate::chip::{CellLibrary, Exposure, Mode, PCounter, SensorConfig};
 use crate::files::InputError;
-use crate::netlist::Netlist;
 use crate::photon::{SpadEvent, apply_dead_time};
 use crate::report::Grid;
 use crate::units::Time;
@@ -60,39 +59,6 @@ struct Variant {
     mean_w: f64,
     #[serde(flatten)]
     power: MacropixelPower,
-    /// Area and leakage by block, in a library's cells.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    silicon: Vec<BlockSilicon>,
-}
-
-/// A block in a library's cells.
-#[derive(serde::Serialize)]
-struct BlockSilicon {
-    block: String,
-    /// In the library's unit, which for most is µm².
-    area: f64,
-    leakage_w: f64,
-}
-
-/// The blocks of a macropixel, the whole last; none with the built-in cells.
-fn silicon(config: &SensorConfig) -> Vec<BlockSilicon> {
-    let Some(library) = CellLibrary::of(config)
-        .ok()
-        .and_then(CellLibrary::from_file)
-    else {
-        return Vec::new();
-    };
-    let netlist = Netlist::elaborate(&macropixel::circuit(config));
-    let characterised = library.characterised(&netlist);
-    let of = |scope: usize| {
-        let (area, leakage_w) = characterised.silicon(&netlist, &library.liberty, scope);
-        BlockSilicon {
-            block: netlist.scopes()[scope].name.clone(),
-            area,
-            leakage_w,
-        }
-    };
-    netlist.children(0).chain([0]).map(of).collect()
 }
 
 impl Variant {
@@ -171,7 +137,6 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
             cycle_j: power.cycle_j(),
             mean_w: power.mean_w(),
             power,
-            silicon: silicon(&config),
         });
     }
     if args.json {
@@ -187,7 +152,7 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
         .and_then(CellLibrary::from_file)
     {
         say(format_args!(
-            "\nArea in the unit of {} (leakage, nW)\n{}",
+            "\nArea in the unit of {} (leakage, nW; energy of a laser cycle within cells + in what they drive, pJ)\n{}",
             library.liberty.name,
             silicon_table(&variants)
         ))?;
@@ -198,14 +163,14 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
 fn silicon_table(variants: &[Variant]) -> Grid {
     let headings = variants.iter().map(Variant::heading);
     let mut grid = Grid::new(["block".to_owned()].into_iter().chain(headings));
-    for block in &variants[0].silicon {
+    for block in &variants[0].power.silicon {
         let cell = |variant: &Variant| {
-            let found = variant
-                .silicon
-                .iter()
-                .find(|other| other.block == block.block);
+            let mut blocks = variant.power.silicon.iter();
+            let found = blocks.find(|other| other.block == block.block);
             found.map_or("-".to_owned(), |of| {
-                format!("{:.1} ({:.4})", of.area, of.leakage_w * 1e9)
+                let (nw, [within, loads]) = (of.leakage_w * 1e9, [of.internal_j, of.loads_j]);
+                let (within, loads) = (within * 1e12, loads * 1e12);
+                format!("{:.1} ({nw:.4}; {within:.3} + {loads:.3})", of.area)
             })
         };
         let cells = variants.iter().map(cell);

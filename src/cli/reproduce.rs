@@ -25,6 +25,9 @@ pub(super) struct ReproduceArgs {
     /// zooming and sliding at 200 m and 75 m; may be repeated.
     #[arg(long, value_name = "N")]
     measurement: Vec<u32>,
+    /// What this Liberty file says of the thesis's chip, beside the built-in cells; may be repeated, and nothing else is reproduced then.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["claim", "figure", "table", "measurement", "frames", "json"])]
+    liberty: Vec<PathBuf>,
     /// Frames behind each measured number, at least 100 [default: 300].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
     frames: Option<u32>,
@@ -42,6 +45,14 @@ pub(super) struct ReproduceArgs {
 /// # Errors
 /// Numbers that do not exist, unwritable output, and claims that leave their tolerance.
 pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
+    if !args.liberty.is_empty() {
+        let table = reproduce::libraries(&args.liberty)?;
+        if let Some(folder) = &args.out {
+            create_folder(folder)?;
+            OutputFile::write_with(&folder.join("libraries.csv"), |out| table.write_csv(out))?;
+        }
+        return Ok(say(table)?);
+    }
     let chosen = Selection {
         claims: args.claim.clone(),
         figures: args.figure.clone(),

@@ -20,6 +20,7 @@ mod delay_line;
 mod demonstrator;
 mod design;
 mod guided_bins;
+mod libraries;
 pub mod measured;
 mod page;
 mod parameters;
@@ -37,6 +38,7 @@ mod system;
 mod thesis;
 
 pub use claim::{Claim, Row, Verdict, between_quotes, overall};
+pub use libraries::libraries;
 pub(crate) use page::heading;
 pub use page::{SLIPS_TITLE, grid, html, markdown, slips as slips_grid, tally};
 pub use published::Published;

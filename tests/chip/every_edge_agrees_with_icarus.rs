@@ -59,7 +59,7 @@ const NAMES: [&str; 2] = ["the kernel", "Icarus"];
 const SETTLING: Time = Time::from_ns(2);
 
 /// A testbench that replays `drives` into `top` and dumps everything below it until `end`.
-fn testbench(
+pub fn testbench(
     top: &Module,
     netlist: &Netlist,
     drives: &[Drive],

@@ -9,6 +9,7 @@ mod every_edge {
     pub mod waves;
 }
 mod icarus;
+mod library_chips;
 #[path = "../shared/scenario.rs"]
 mod scenario;
 mod tool;
@@ -27,9 +28,12 @@ mod front_ends_agree_with_their_models;
 mod gate_level_agrees_with_reference;
 mod icarus_agrees_with_the_kernel;
 mod lanes_agree_with_single_pixels;
+mod library_energies;
 mod load_path_agrees_with_its_models;
 mod loading_and_stop_edges_are_safe;
+mod mapped_netlists_agree_with_icarus;
 mod opensta_agrees_on_library_delays;
+mod opensta_agrees_on_slacks;
 mod p_counter_traps;
 mod p_counters_agree_with_their_models;
 mod readout_agrees_with_its_models;

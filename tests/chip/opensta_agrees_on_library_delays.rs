@@ -6,22 +6,12 @@
 //! | arcs of which both edges of the input make the same edge of the output (exclusive ORs, a multiplexer's select) | OpenSTA writes one of them into SDF; ours, the slower, is no faster |
 //! | arcs that OpenSTA cuts to open a loop, and of pins at a constant | not compared: OpenSTA has none |
 //!
-//! Chips: the QuantIC4x4 with every P-counter, HSLIDAR in both modes. Libraries: `vectors/liberty/example.lib`, osu018 and osu035 where Debian has put them, and
-//! sky130_fd_sc_hd where `shared/data` beside the checkout has it. OpenSTA applies a library's default wire load, with resistances; we leave
-//! wires out, so that attribute is taken out of its copy.
+//! Chips and libraries are those of `library_chips`.
 
-use crate::{scenario, tool};
+use crate::library_chips::{self, Mapped};
+use crate::tool;
 
 use std::collections::BTreeMap;
-use std::io::Read;
-use std::path::Path;
-use std::process::Command;
-
-use guided_dtof::chip::{
-    AfterBorrow, CellLibrary, PCounter, SensorConfig, hslidar, hslidar_delay_line, macropixel,
-};
-use guided_dtof::netlist::Netlist;
-use guided_dtof::netlist::liberty::{write_mapped, write_mapped_sdf};
 
 /// Rise and fall delay of each arc (instance, from, to), ps; the later where a file has several.
 type Arcs = BTreeMap<(String, String, String), [Option<f64>; 2]>;
@@ -59,112 +49,28 @@ fn arcs(text: &str, unit_ps: f64) -> Arcs {
     found
 }
 
-fn text_of(path: &Path) -> Option<String> {
-    let bytes = std::fs::read(path).ok()?;
-    let mut text = String::new();
-    match path.extension().is_some_and(|e| e == "gz") {
-        true => flate2::read::GzDecoder::new(&bytes[..])
-            .read_to_string(&mut text)
-            .ok()?,
-        false => (&bytes[..]).read_to_string(&mut text).ok()?,
-    };
-    Some(text.replace("default_wire_load :", "default_wire_load_left_out :"))
-}
-
-/// Libraries that are here: name and text.
-fn libraries() -> Vec<(&'static str, String)> {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let files = [
-        ("example", scenario::example_library()),
-        (
-            "osu018",
-            "/usr/share/qflow/tech/osu018/osu018_stdcells.lib".into(),
-        ),
-        (
-            "osu035",
-            "/usr/share/qflow/tech/osu035/osu035_stdcells.lib".into(),
-        ),
-        (
-            "sky130",
-            here.join("../shared/data/sky130_fd_sc_hd_tt.lib.gz"),
-        ),
-    ];
-    let found = files
-        .into_iter()
-        .filter_map(|(name, file)| Some((name, text_of(&file)?)));
-    found.collect()
-}
-
-fn chips() -> Vec<SensorConfig> {
-    let of = |p_counter: PCounter| SensorConfig {
-        p_counter,
-        after_borrow: match p_counter.row().has_memory {
-            true => AfterBorrow::Hold,
-            false => AfterBorrow::Wrap,
-        },
-        ..SensorConfig::default()
-    };
-    let mut chips: Vec<SensorConfig> = PCounter::ALL.into_iter().map(of).collect();
-    chips.extend([hslidar(), hslidar_delay_line()].map(|chip| SensorConfig::clone(&chip)));
-    chips
-}
-
-/// What OpenSTA makes of the macropixel in `folder`, as SDF.
-fn opensta(folder: &Path, slew_ns: f64) -> String {
-    let script = format!(
-        "set sta_preset_clear_arcs_enabled 1
-read_liberty cells.lib
-read_verilog mapped.v
-link_design macropixel
-set_input_transition {slew_ns:.9} [all_inputs]
-create_clock -name CLK -period 100 [get_ports CLK]
-set_propagated_clock [get_clocks CLK]
-write_sdf -digits 6 sta.sdf
-"
-    );
-    std::fs::write(folder.join("run.tcl"), script).unwrap();
-    let output = Command::new("sta")
-        .args(["-no_splash", "-exit", "run.tcl"])
-        .current_dir(folder)
-        .output()
-        .unwrap();
-    let sdf = std::fs::read_to_string(folder.join("sta.sdf"));
-    sdf.unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&output.stdout)))
-}
-
 #[test]
 fn of_every_arc_of_a_macropixel() {
     if !tool::is_here("sta", "no library's delays were compared with OpenSTA") {
         return;
     }
-    let libraries = libraries();
+    let libraries = library_chips::libraries();
     for (name, text) in &libraries {
         let (mut compared, mut slower) = (0, 0);
-        for chip in chips() {
-            let folder = tempfile::tempdir().unwrap();
-            let file = folder.path().join("cells.lib");
-            std::fs::write(&file, text).unwrap();
-            let config = SensorConfig {
-                liberty: file,
-                // Slow enough for any library.
-                clk_hz: 10e6,
-                dead_time_ns: 120.0,
-                stop_phase_ps: 0.0,
-                ..chip
-            };
-            config.check().unwrap_or_else(|e| panic!("{name}: {e}"));
-            let library = CellLibrary::of(&config).unwrap().from_file().unwrap();
-            let netlist = Netlist::elaborate(&macropixel::circuit(&config));
-            let characterised = library.characterised(&netlist);
-            let (mut verilog, mut sdf) = (Vec::new(), Vec::new());
-            write_mapped(&mut verilog, &netlist, &library.liberty, &characterised).unwrap();
-            write_mapped_sdf(&mut sdf, &netlist, &library.liberty, &characterised).unwrap();
-            std::fs::write(folder.path().join("mapped.v"), verilog).unwrap();
-            let slew_ns = library.environment.input_slew_fs / 1e6;
-            let theirs = opensta(folder.path(), slew_ns);
+        for chip in library_chips::chips() {
+            let mapped = Mapped::of(text, chip);
+            let slew_ns = mapped.library.environment.input_slew_fs / 1e6;
+            mapped.opensta(&format!(
+                "set sta_preset_clear_arcs_enabled 1
+set_input_transition {slew_ns:.9} [all_inputs]
+create_clock -name CLK -period 100 [get_ports CLK]
+set_propagated_clock [get_clocks CLK]
+write_sdf -digits 6 sta.sdf
+"
+            ));
             let (ours, theirs) = (
-                arcs(&String::from_utf8(sdf).unwrap(), 1.0),
-                arcs(&theirs, 1e3),
+                arcs(&mapped.text("mapped.sdf"), 1.0),
+                arcs(&mapped.text("sta.sdf"), 1e3),
             );
             assert!(ours.len() > 1000, "{name}: {} arcs", ours.len());
             for (arc, own) in &ours {
@@ -185,7 +91,7 @@ fn of_every_arc_of_a_macropixel() {
                         assert!(
                             apart > 0.0,
                             "{name}, {:?}: {arc:?} {own} ps, OpenSTA {other}",
-                            config.p_counter
+                            mapped.config.p_counter
                         );
                     }
                 }

@@ -64,10 +64,56 @@ fn a_macropixel_is_exported_in_library_cells() {
     let read = |name: &str| std::fs::read_to_string(folder.path().join("m").join(name)).unwrap();
     assert!(read("mapped.v").contains("DFFRN_1"));
     assert!(read("mapped.sdf").contains("(IOPATH CK Q"));
-    // CLK, and a clock at each of the nine stages that clock the next one.
+    assert!(read("mapped_cells.v").contains("module DFFRN_1(output Q, input CK, D, RN);"));
+    // A clock at both outputs of each of the nine stages that clock the next one, and LOCAL_STOP.
     assert_eq!(
         read("mapped.sdc").matches("create_generated_clock").count(),
-        18
+        19
+    );
+}
+
+#[test]
+fn libraries_stand_beside_the_thesis() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["reproduce", "--liberty", &example(), "--out", "here"];
+    let output = gdtof(folder.path(), &arguments);
+    let said = String::from_utf8_lossy(&output.stdout);
+    let row = said.lines().nth(1).unwrap_or_default();
+    let cells: Vec<&str> = row.rsplit("  ").filter(|cell| !cell.is_empty()).collect();
+    assert_eq!(
+        cells
+            .iter()
+            .map(|cell| cell.trim())
+            .take(3)
+            .collect::<Vec<_>>(),
+        ["1.11", "1.20", "1.2"]
+    );
+    let written = std::fs::read_to_string(folder.path().join("here/libraries.csv")).unwrap();
+    assert_eq!(written.lines().count(), said.lines().count());
+    // Energies of the same library, of every block.
+    let output = gdtof(
+        folder.path(),
+        &[
+            "power",
+            "--json",
+            "--laser-cycles",
+            "1",
+            "--liberty",
+            &example(),
+        ],
+    );
+    let said = String::from_utf8_lossy(&output.stdout);
+    let first: serde_json::Value = serde_json::from_str(&said).unwrap();
+    let blocks = first[0]["silicon"].as_array().unwrap();
+    let energy = |block: &serde_json::Value| {
+        block["internal_j"].as_f64().unwrap() + block["loads_j"].as_f64().unwrap()
+    };
+    let (whole, parts) = blocks.split_last().unwrap();
+    let sum: f64 = parts.iter().map(energy).sum();
+    assert_eq!(whole["block"], "macropixel");
+    assert!(
+        sum > 1e-12 && (sum / energy(whole) - 1.0).abs() < 1e-9,
+        "{blocks:?}"
     );
 }
 

@@ -9,11 +9,11 @@ SLEWS = [0.005, 0.02, 0.08, 0.3]  # ns
 LOADS = [0.0005, 0.002, 0.008, 0.04]  # pF
 
 
-def table(kind, base, per_pf, per_slew):
+def table(kind, base, per_pf, per_slew, template="delay"):
     values = ", \\\n        ".join(
         '"' + ", ".join(f"{base + per_pf * load + per_slew * slew:.6f}" for load in LOADS) + '"' for slew in SLEWS
     )
-    return f"      {kind} (delay) {{\n        values ({values});\n      }}\n"
+    return f"      {kind} ({template}) {{\n        values ({values});\n      }}\n"
 
 
 def arc(related, kind, sense, delay, drive, outputs=("rise", "fall")):
@@ -27,6 +27,16 @@ def arc(related, kind, sense, delay, drive, outputs=("rise", "fall")):
     return text + "    }\n"
 
 
+def energy(related, pj):
+    text = f"    internal_power () {{\n      related_pin : \"{related}\";\n" if related else "    internal_power () {\n"
+    for edge, more in (("rise", 1.2), ("fall", 0.8)):
+        if related:
+            text += table(f"{edge}_power", pj * more, 0.01, 0.001, "energy")
+        else:
+            text += f"      {edge}_power (scalar) {{ values (\"{pj * more:.6f}\"); }}\n"
+    return text + "    }\n"
+
+
 def pin(name, load, more=""):
     return f"    pin ({name}) {{ direction : input; capacitance : {load:.5f}; {more}}}\n"
 
@@ -36,6 +46,7 @@ def gate(name, drive, area, inputs, function, senses, delay, load):
     text += "".join(pin(i, load * drive) for i in inputs)
     text += f"    pin (Y) {{\n    direction : output;\n    function : \"{function}\";\n"
     text += "".join(arc(i, None, s, delay, drive) for i, s in zip(inputs, senses))
+    text += "".join(energy(i, 0.0006 * area) for i in inputs)
     return text + "    }\n  }\n"
 
 
@@ -51,7 +62,7 @@ def flip_flop(name, area, preset):
     text = f"  cell ({name}_1) {{\n    area : {area};\n    cell_leakage_power : {area * 0.5:.3f};\n"
     text += '    ff (IQ, IQN) { clocked_on : "CK"; next_state : "D"; clear : "!RN"; '
     text += 'preset : "!SN"; clear_preset_var1 : L; clear_preset_var2 : L; }\n' if preset else "}\n"
-    text += pin("CK", 0.001, "clock : true; min_pulse_width_high : 0.040; min_pulse_width_low : 0.045; ")
+    text += pin("CK", 0.001, "clock : true; min_pulse_width_high : 0.040; min_pulse_width_low : 0.045; \n" + energy(None, 0.0012))
     text += pin("D", 0.0009, "\n" + limit("setup", 0.025, 0.030) + limit("hold", 0.004, 0.002))
     control = "min_pulse_width_low : 0.040; \n" + limit("recovery", 0.020, None) + limit("removal", 0.015, None)
     text += pin("RN", 0.0012, control)
@@ -60,6 +71,7 @@ def flip_flop(name, area, preset):
     text += arc("CK", "rising_edge", "non_unate", 0.055, 1)
     text += arc("RN", "clear", "positive_unate", 0.045, 1, ("fall",))
     text += arc("SN", "preset", "negative_unate", 0.045, 1, ("rise",)) if preset else ""
+    text += energy("CK", 0.003) + energy("RN", 0.002) + (energy("SN", 0.002) if preset else "")
     return text + "    }\n  }\n"
 
 
@@ -86,9 +98,11 @@ library (example) {
 NEGATIVE, POSITIVE, NEITHER = "negative_unate", "positive_unate", "non_unate"
 
 if __name__ == "__main__":
-    text = HEAD + "  lu_table_template (delay) {\n    variable_1 : input_net_transition;\n"
-    text += "    variable_2 : total_output_net_capacitance;\n"
-    text += f"    index_1 (\"{', '.join(map(str, SLEWS))}\");\n    index_2 (\"{', '.join(map(str, LOADS))}\");\n  }}\n"
+    text = HEAD
+    for kind, name, slew in (("lu_table", "delay", "input_net_transition"), ("power_lut", "energy", "input_transition_time")):
+        text += f"  {kind}_template ({name}) {{\n    variable_1 : {slew};\n"
+        text += "    variable_2 : total_output_net_capacitance;\n"
+        text += f"    index_1 (\"{', '.join(map(str, SLEWS))}\");\n    index_2 (\"{', '.join(map(str, LOADS))}\");\n  }}\n"
     for drive in (1, 2, 4, 8):
         text += gate("INV", drive, 0.5 * drive + 0.2, "A", "!A", [NEGATIVE], 0.006, 0.0008)
     for drive in (1, 4, 16):

@@ -37,7 +37,7 @@ pub use correlation::CorrelationTiming;
 pub use gates::{ResetTiming, gate_works, reset, ripple};
 pub use load::{LoadTiming, load_works};
 pub use macropixel::{Aim, LocalClocks, MacropixelTiming, longest};
-pub use power::{Capacitances, MacropixelPower};
+pub use power::{BlockSilicon, Capacitances, MacropixelPower};
 pub use readout::{ReadTiming, read_works};
 pub use spread::{PixelTiming, Spread, spread};
 pub use verdict::{Margin, TimingVerdict, VerdictReport};

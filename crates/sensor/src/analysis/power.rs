@@ -12,9 +12,9 @@
 //!
 //! Capacitances stand for a 40 nm logic process like the delays do (`netlist/library`): about those of the smallest cells of
 //! open libraries of that generation, a femtofarad or two a pin. The thesis gives none. Shares and ratios depend little on
-//! them, absolute figures in proportion.
+//! them, absolute figures in proportion. With a Liberty file the same toggles are charged by its tables, too ([`BlockSilicon`]).
 
-use crate::chip::{Exposure, SensorConfig};
+use crate::chip::{CellLibrary, Exposure, SensorConfig};
 use crate::engine::GateSimulation;
 use crate::kernel::{Activity, NetActivity};
 use crate::netlist::{CellKind, NetId, Netlist};
@@ -120,6 +120,24 @@ pub struct MacropixelPower {
     pub toggles: f64,
     /// A laser cycle, s.
     pub cycle_s: f64,
+    /// The same blocks in a library's cells, the whole last; none with the built-in cells.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub silicon: Vec<BlockSilicon>,
+}
+
+/// A block in a library's cells.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct BlockSilicon {
+    /// Name of its instance.
+    pub block: String,
+    /// In the library's unit, which for most is µm².
+    pub area: f64,
+    /// W.
+    pub leakage_w: f64,
+    /// Energy within its cells in a laser cycle, by the library's `internal_power`, J.
+    pub internal_j: f64,
+    /// Energy of what its cells' outputs drive in a laser cycle, J: pins and `wire_ff` at the library's voltage.
+    pub loads_j: f64,
 }
 
 impl MacropixelPower {
@@ -151,7 +169,32 @@ impl MacropixelPower {
             .filter(|net| net.is_some())
             .map(|net| nets[net.index()].toggles)
             .sum();
+        let library = CellLibrary::of(config)
+            .ok()
+            .and_then(CellLibrary::from_file);
+        let silicon = library.map(|library| {
+            let characterised = library.characterised(&netlist);
+            let volt = library.liberty.conditions[0].unwrap_or(capacitances.supply_v);
+            let of = |block: usize| {
+                let (area, leakage_w) = characterised.silicon(&netlist, &library.liberty, block);
+                let changes = |net: NetId| nets[net.index()].toggles as f64 / cycles;
+                let energy =
+                    characterised.energy_j((&netlist, block), &library.liberty, volt, changes);
+                BlockSilicon {
+                    block: match block == scope {
+                        true => "macropixel".to_owned(),
+                        false => netlist.scopes()[block].name.clone(),
+                    },
+                    area,
+                    leakage_w,
+                    internal_j: energy[0],
+                    loads_j: energy[1],
+                }
+            };
+            netlist.children(scope).chain([scope]).map(of).collect()
+        });
         MacropixelPower {
+            silicon: silicon.unwrap_or_default(),
             blocks_j: blocks.map(|(name, j)| (name, j / cycles)).collect(),
             toggles: toggles as f64 / cycles,
             cycle_s: exposure.stop(1).as_s(),

@@ -29,6 +29,8 @@ pub(in crate::netlist) struct FlipFlop {
     /// Outputs that show the state, and its inverse.
     pub q: Option<usize>,
     pub qn: Option<usize>,
+    /// Whether the preset wins where clear and preset are both active.
+    pub preset_wins: bool,
 }
 
 /// What a cell of the library does, for netlists that are mapped to it.
@@ -146,6 +148,7 @@ fn flip_flop(
         preset,
         q: shows(false),
         qn: shows(true),
+        preset_wins: ff.value("clear_preset_var1") == Some("H"),
     };
     let pins = 2 + usize::from(clear.is_some()) + usize::from(preset.is_some());
     let fits = inputs.len() == pins && outputs.len() <= MAX_OUTPUTS;
@@ -182,10 +185,22 @@ pub(super) struct CellCheck {
     pub limit: Table,
 }
 
+/// Energy within a cell when a pin changes, besides that of the loads at its outputs.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CellEnergy {
+    /// Output; none where an input takes it by itself.
+    pub to: Option<usize>,
+    /// The input that changes, or is behind the output's change; any where the file does not say.
+    pub from: Option<usize>,
+    /// Of the pin's rise and fall, fJ over the input's slew and the output's load.
+    pub of: [Table; 2],
+}
+
 /// A chosen cell with its tables.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct CellModel {
     pub name: String,
+    pub role: Role,
     pub area: f64,
     /// Leakage, W.
     pub leakage_w: f64,
@@ -193,6 +208,7 @@ pub(super) struct CellModel {
     pub outputs: Vec<String>,
     pub arcs: Vec<CellArc>,
     pub checks: Vec<CellCheck>,
+    pub energies: Vec<CellEnergy>,
 }
 
 impl CellModel {
@@ -213,6 +229,7 @@ impl CellModel {
         };
         let mut model = CellModel {
             name: candidate.name().to_owned(),
+            role: candidate.role.clone(),
             area: candidate.area,
             leakage_w: candidate.group.number("cell_leakage_power")?.unwrap_or(0.0)
                 * leakage_unit_w,
@@ -224,6 +241,7 @@ impl CellModel {
                 .collect(),
             arcs: Vec::new(),
             checks: Vec::new(),
+            energies: Vec::new(),
         };
         for (index, &name) in candidate.inputs.iter().enumerate() {
             let group = pin(name);
@@ -245,13 +263,41 @@ impl CellModel {
             for timing in group.of_kind("timing") {
                 model.add_checks(candidate, index, timing, templates, units)?;
             }
+            for power in group.of_kind("internal_power") {
+                model.add_energy((None, Some(index)), power, templates, units);
+            }
         }
         for (index, &name) in candidate.outputs.iter().enumerate() {
             for timing in pin(name).of_kind("timing") {
                 model.add_arcs(candidate, index, timing, templates, units)?;
             }
+            for power in pin(name).of_kind("internal_power") {
+                let related = power.value("related_pin").unwrap_or_default();
+                let from = |name| candidate.inputs.iter().position(|input| *input == name);
+                let from = related.split_whitespace().next().and_then(from);
+                model.add_energy((Some(index), from), power, templates, units);
+            }
         }
         Ok(model)
+    }
+
+    /// Tables over anything but slews and loads are passed over.
+    fn add_energy(
+        &mut self,
+        (to, from): (Option<usize>, Option<usize>),
+        power: &Group<'_>,
+        templates: &Templates<'_, '_>,
+        units: Units,
+    ) {
+        let table = |kind: &str| {
+            let mut groups = power.of_kind(kind).chain(power.of_kind("power"));
+            let read = |group| templates.table_in(group, units, units.energy_fj);
+            groups.next().map_or(Ok(Table::fixed(0.0)), read)
+        };
+        if let (Ok(rise), Ok(fall)) = (table("rise_power"), table("fall_power")) {
+            let of = [rise, fall];
+            self.energies.push(CellEnergy { to, from, of });
+        }
     }
 
     fn add_arcs(
@@ -346,6 +392,12 @@ impl CellModel {
             }
             _ => return Ok(()),
         };
+        // Some libraries also relate clear and preset to each other.
+        let related = timing.value("related_pin").unwrap_or_default();
+        let is_clock = |roles: &FlipFlop| candidate.inputs[roles.clock.0] == related.trim();
+        if !matches!(&candidate.role, Role::FlipFlop(roles) if is_clock(roles)) {
+            return Ok(());
+        }
         for (edge, table) in [
             (Edge::Rise, "rise_constraint"),
             (Edge::Fall, "fall_constraint"),

@@ -186,6 +186,27 @@ impl Characterised {
         (area, leakage_w)
     }
 
+    /// Energy within the cells below a scope of `netlist`, by the library's tables, and of the loads at their outputs with a supply of `volt`, J, when
+    /// each net changes as often as `changes` says.
+    pub fn energy_j(
+        &self,
+        (netlist, scope): (&Netlist, usize),
+        library: &Liberty,
+        volt: f64,
+        changes: impl Fn(NetId) -> f64,
+    ) -> [f64; 2] {
+        let first = netlist.cells_of(scope).start;
+        let cells = first..first + netlist.scopes()[scope].module.total_cells();
+        let of = |net: NetId| if net.is_some() { changes(net) } else { 0.0 };
+        let each = cells.map(|cell| {
+            let (composite, conditions) = self.instance(netlist, &library.map, cell);
+            let leaf = &netlist.cells()[cell];
+            composite.energy_fj(&conditions, leaf.inputs.map(of), leaf.outputs.map(of))
+        });
+        let sum = each.fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+        [sum[0] * 1e-15, sum[1] * volt * volt * 1e-15]
+    }
+
     /// The largest limits of any flip-flop of a kind in `netlist`, the same in every corner; none if there is none.
     pub fn largest_limits(&self, netlist: &Netlist, kind: CellKind) -> Option<CheckLimits> {
         let cells = netlist.cells().iter().enumerate();

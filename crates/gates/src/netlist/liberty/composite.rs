@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use super::cell::{CellModel, FlipFlop};
+use super::cell::{CellEnergy, CellModel, FlipFlop};
 use super::mapping::{Recipe, Source};
 use crate::netlist::{
     ArcDelay, CellDelays, CellKind, CheckKind, Control, Edge, InstanceLimits, MAX_INPUTS,
@@ -74,11 +74,12 @@ impl<'m> Composite<'m> {
                 .any(|(stage, made)| made.sources.contains(&of) && self.is_used(stage))
     }
 
-    /// What the cell of a stage is called, of the instance at `path`.
+    /// What the cell of a stage is called, of the instance at `path`: without dots, at which some readers of SDF cut names.
     pub(super) fn instance_name(&self, path: &str, stage: usize) -> String {
+        let path = path.replace('.', "__");
         match self.recipe.stages.len() {
-            1 => path.to_owned(),
-            _ => format!("{path}.{stage}"),
+            1 => path,
+            _ => format!("{path}__{stage}"),
         }
     }
 
@@ -227,6 +228,74 @@ impl<'m> Composite<'m> {
             *slowest = slowest.max(delay);
         }
         delays
+    }
+
+    /// Energy within the cells, and of the loads at their outputs for 1 V, fJ, when nets at the pins change so often. Conditions (`when`) are
+    /// averaged, and of an output's energies those of the pins that change more often count more. What changes within is taken from
+    /// the input of a single one, and else from the outputs.
+    pub(super) fn energy_fj(
+        &self,
+        conditions: &Conditions,
+        inputs: [f64; MAX_INPUTS],
+        outputs: [f64; MAX_OUTPUTS],
+    ) -> [f64; 2] {
+        let (slews, mut changes) = (self.slews(conditions), [0.0; PLACES]);
+        changes[..MAX_INPUTS].copy_from_slice(&inputs);
+        let shown = outputs.into_iter().fold(0.0, f64::max);
+        let (mut within, mut loads) = (0.0, 0.0);
+        for stage in self.used() {
+            let (cell, sources) = (self.cell(stage), &self.recipe.stages[stage].sources);
+            // Changes of a pin, and its slew.
+            let at = |pin: usize, changes: &[f64; PLACES]| {
+                let place = place(sources[pin]);
+                let slew = place.and_then(|at| slews[at]).unwrap_or_default();
+                (
+                    place.map_or(0.0, |at| changes[at]),
+                    0.5 * (slew[0] + slew[1]),
+                )
+            };
+            let mean = |to, only: Option<usize>, load, changes: &[f64; PLACES]| {
+                let ours = |e: &&CellEnergy| e.to == to && (only.is_none() || e.from == only);
+                let each = cell.energies.iter().filter(ours).map(|energy| {
+                    let (weight, slew) = at(energy.from.unwrap_or(0), changes);
+                    let [rise, fall] = energy.of.each_ref().map(|table| table.at(slew, load));
+                    (weight, 0.5 * (rise + fall))
+                });
+                let (mut sum, mut weights, mut plain, mut count) = (0.0, 0.0, 0.0, 0.0);
+                for (weight, fj) in each {
+                    (sum, weights) = (sum + weight * fj, weights + weight);
+                    (plain, count) = (plain + fj, count + 1.0);
+                }
+                match weights > 0.0 {
+                    true => sum / weights,
+                    false => plain / f64::max(count, 1.0),
+                }
+            };
+            for output in 0..cell.outputs.len() {
+                let from = Source::Stage(stage, output);
+                let mut pins = self
+                    .recipe
+                    .outputs
+                    .iter()
+                    .zip(self.is_connected)
+                    .zip(outputs);
+                let pin = pins.find(|((source, connected), _)| **source == from && *connected);
+                let count = match pin {
+                    Some((_, count)) => count,
+                    None if sources.len() == 1 => at(0, &changes).0,
+                    None => shown,
+                };
+                let load = self.output_load(stage, output, &conditions.loads);
+                let load = 0.5 * (load[0] + load[1]);
+                within += count * mean(Some(output), None, load, &changes);
+                loads += count * 0.5 * load;
+                changes[MAX_INPUTS + 2 * stage + output] = count;
+            }
+            for pin in 0..sources.len() {
+                within += at(pin, &changes).0 * mean(None, Some(pin), 0.0, &changes);
+            }
+        }
+        [within, loads]
     }
 
     /// Delays of this instance, which is of `kind`, and its limits.

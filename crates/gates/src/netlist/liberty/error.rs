@@ -15,4 +15,6 @@ pub struct LibertyError {
 pub(super) struct Units {
     pub time_fs: f64,
     pub load_ff: f64,
+    /// Of internal energy: a load's, at the unit of voltage squared.
+    pub energy_fj: f64,
 }

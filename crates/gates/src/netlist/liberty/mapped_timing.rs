@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use super::characterised::{Characterised, Environment};
 use super::mapping::Source;
 use super::read::Liberty;
-use crate::netlist::{Edge, NetId, Netlist};
+use crate::netlist::{Edge, NetId, Netlist, caused};
 use crate::units::Time;
 
 /// Writes the delays of every library cell's arcs as SDF, for the netlist of [`write_mapped`](super::write_mapped): ps, one value.
@@ -72,10 +72,12 @@ pub struct Clocking<'c> {
     pub period: Time,
     /// Flip-flops that may clock each other, such as a ripple counter's, from the first on.
     pub ripple: &'c [usize],
+    /// Input ports whose rise follows the clock's fall, and by how much.
+    pub after_fall: &'c [(&'c str, Time)],
 }
 
-/// Writes constraints (SDC) for the netlist of [`write_mapped`](super::write_mapped): the clock, a generated clock at each flip-flop that clocks another, and the
-/// slew of every input.
+/// Writes constraints (SDC) for the netlist of [`write_mapped`](super::write_mapped): the clock, a generated clock at each flip-flop that clocks another, when
+/// inputs come, and their slew. Of a ripple's flip-flops one whose output is a port may clock others outside.
 ///
 /// # Errors
 /// Those of the writer.
@@ -101,7 +103,26 @@ pub fn write_constraints(
         period.as_ns()
     )?;
     writeln!(out, "set_propagated_clock [get_clocks {port}]")?;
+    for (input, after) in clocking.after_fall {
+        let after = after.as_ns();
+        writeln!(
+            out,
+            "set_input_delay {after:.9} -rise -clock {port} -clock_fall [get_ports {input}]"
+        )?;
+    }
+    let top = &netlist.scopes()[0];
+    let ports = top
+        .module
+        .port_signals()
+        .flat_map(|(_, signal)| netlist.signal_nets(top, signal));
+    let ports: BTreeSet<NetId> = ports.collect();
+    let others = netlist.cells().iter().enumerate();
+    let others =
+        others.filter(|(cell, leaf)| leaf.kind.is_flip_flop() && !clocking.ripple.contains(cell));
+    let outside: BTreeSet<NetId> = others.map(|(_, leaf)| leaf.inputs[1]).collect();
     let mut divided: Vec<(NetId, String)> = Vec::new();
+    // Second outputs of flip-flops: what the first one clocks does not meet them.
+    let mut second: Vec<usize> = Vec::new();
     for (index, &cell) in clocking.ripple.iter().enumerate() {
         // What comes back to an earlier one, as LOCAL_STOP does to block COUNTER_CLK, gates a clock and is none.
         let later = clocking.ripple[index + 1..].iter();
@@ -112,26 +133,45 @@ pub fn write_constraints(
         let Some((stage, pin)) = composite.pin_behind(Source::Input(1)) else {
             continue;
         };
-        let source = format!(
-            "{}/{}",
-            composite.instance_name(&path, stage),
-            composite.cell(stage).inputs[pin].name
-        );
-        let from: Vec<&str> = divided
-            .iter()
-            .filter(|(net, _)| reaches(netlist, *net, leaf.inputs[1]))
-            .map(|(_, name)| name.as_str())
-            .collect();
-        let master = match from.first() {
-            Some(master) => format!(" -master_clock [get_clocks {{{master}}}]"),
-            None => String::new(),
+        let made = divided.iter().find(|(net, _)| {
+            Edge::BOTH
+                .iter()
+                .any(|&edge| reaches(netlist, (*net, edge), leaf.inputs[1]))
+        });
+        let (from, at, master) = match made {
+            Some((net, name)) => {
+                let master = format!(" -master_clock [get_clocks {{{name}}}]");
+                (*net, format!("[get_pins {{{name}}}]"), master)
+            }
+            None => {
+                let from = netlist.net(port).expect("the clock's port");
+                (from, format!("[get_ports {port}]"), String::new())
+            }
         };
-        let outputs = leaf.outputs.iter().zip(&composite.recipe.outputs);
+        // Timing analysers take the edges of the source as they are there, whatever inverts them on the way.
+        let source = match reaches(netlist, (from, Edge::Rise), leaf.inputs[1]) {
+            true => format!(
+                "-source [get_pins {{{}/{}}}]{master} -divide_by 2",
+                composite.instance_name(&path, stage),
+                composite.cell(stage).inputs[pin].name
+            ),
+            false => format!("-source {at}{master} -edges {{2 4 6}}"),
+        };
+        let (before, outputs) = (
+            divided.len(),
+            leaf.outputs.iter().zip(&composite.recipe.outputs),
+        );
         for (&net, &output) in outputs.filter(|(net, _)| net.is_some()) {
             let Source::Stage(stage, pin) = output else {
                 continue;
             };
-            if !later.iter().any(|&clock| reaches(netlist, net, clock)) {
+            let clocks = |clock: &NetId| {
+                Edge::BOTH
+                    .iter()
+                    .any(|&edge| reaches(netlist, (net, edge), *clock))
+            };
+            let clocks_outside = ports.contains(&net) && outside.iter().any(clocks);
+            if !(clocks_outside || later.iter().any(clocks)) {
                 continue;
             }
             let at = format!(
@@ -141,33 +181,46 @@ pub fn write_constraints(
             );
             writeln!(
                 out,
-                "create_generated_clock -name {{{at}}} -source [get_pins {{{source}}}]{master} -divide_by 2 [get_pins {{{at}}}]"
+                "create_generated_clock -name {{{at}}} {source} [get_pins {{{at}}}]"
             )?;
             writeln!(out, "set_propagated_clock [get_clocks {{{at}}}]")?;
             divided.push((net, at));
+            if divided.len() > before + 1 {
+                second.push(divided.len() - 1);
+            }
         }
+    }
+    for index in second {
+        let others = divided.iter().enumerate().skip(index - 1);
+        let others = others.filter(|(other, _)| *other != index);
+        let others: Vec<&str> = others.map(|(_, (_, name))| name.as_str()).collect();
+        let (own, others) = (&divided[index].1, others.join(" "));
+        writeln!(
+            out,
+            "set_clock_groups -physically_exclusive -group [get_clocks {{{own}}}] -group [get_clocks {{{others}}}]"
+        )?;
     }
     Ok(())
 }
 
-/// Whether a change of `from` comes to `to` through gates.
-fn reaches(netlist: &Netlist, from: NetId, to: NetId) -> bool {
+/// Whether an edge of `from` makes `to` rise, through gates.
+fn reaches(netlist: &Netlist, from: (NetId, Edge), to: NetId) -> bool {
     let mut behind = vec![from];
-    let mut seen = BTreeSet::from([from]);
-    while let Some(net) = behind.pop() {
-        if net == to {
+    let mut seen = BTreeSet::from([(from.0, from.1 as usize)]);
+    while let Some((net, edge)) = behind.pop() {
+        if (net, edge) == (to, Edge::Rise) {
             return true;
         }
         for cell in netlist
             .cells()
             .iter()
-            .filter(|cell| !cell.kind.is_flip_flop() && cell.inputs.contains(&net))
+            .filter(|cell| !cell.kind.is_flip_flop())
         {
-            behind.extend(
-                cell.outputs
-                    .iter()
-                    .filter(|net| net.is_some() && seen.insert(**net)),
-            );
+            for pin in (0..cell.kind.inputs().len()).filter(|&pin| cell.inputs[pin] == net) {
+                let after = caused(cell.kind, pin, edge, 0).iter();
+                let after = after.map(|&edge| (cell.outputs[0], edge));
+                behind.extend(after.filter(|&(net, edge)| seen.insert((net, edge as usize))));
+            }
         }
     }
     false

@@ -1,6 +1,6 @@
 //! The netlist in a library's cells, as flat structural Verilog for synthesis, place-and-route and timing tools.
 //!
-//! Instances are named by their path in the hierarchy, `\path ` where one cell stands for one of ours and `\path.0 `, `\path.1 `, … where
+//! Instances are named by their path in the hierarchy, `a__b` where one cell stands for one of ours and `a__b__0`, `a__b__1`, … where
 //! several do. Cells with delays of their own (elements of delay lines, wires) are what their kind is mapped to.
 
 use std::io::{self, Write};

@@ -23,6 +23,7 @@
 //! | `characterised` | loads, drives and slews of a netlist, and what follows |
 //! | `composite` | one instance: from the slews at its pins to its delays and limits |
 //! | `mapped_verilog` | the netlist of library cells, for other tools |
+//! | `mapped_models` | what its cells do, for simulators |
 //! | `mapped_timing` | its delays and clocks for them |
 
 mod cell;
@@ -31,6 +32,7 @@ mod composite;
 mod error;
 mod function;
 mod group;
+mod mapped_models;
 mod mapped_timing;
 mod mapped_verilog;
 mod mapping;
@@ -41,6 +43,7 @@ pub(in crate::netlist) use cell::{CellFunction, Role};
 pub use characterised::{Characterised, Environment};
 pub use error::LibertyError;
 pub(in crate::netlist) use function::TruthTable;
+pub use mapped_models::write_mapped_cells;
 pub use mapped_timing::{Clocking, write_constraints, write_mapped_sdf};
 pub use mapped_verilog::write_mapped;
 pub use mapping::CellMap;

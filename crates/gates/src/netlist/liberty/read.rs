@@ -46,6 +46,14 @@ impl Liberty {
                 "its delay_model is {model}; give a library with table_lookup"
             )));
         }
+        let load_ff = load_unit(&library)
+            .ok_or_else(|| fault("it has no capacitive_load_unit of ff or pf".to_owned()))?;
+        let volt = match library.value("voltage_unit") {
+            Some("1mV") => 1e-3,
+            Some("10mV") => 1e-2,
+            Some("100mV") => 0.1,
+            _ => 1.0,
+        };
         let units = Units {
             time_fs: match library.value("time_unit") {
                 None | Some("1ns") => 1e6,
@@ -58,8 +66,8 @@ impl Liberty {
                     )));
                 }
             },
-            load_ff: load_unit(&library)
-                .ok_or_else(|| fault("it has no capacitive_load_unit of ff or pf".to_owned()))?,
+            load_ff,
+            energy_fj: load_ff * volt * volt,
         };
         let leakage_unit_w = match library.value("leakage_power_unit") {
             Some("1uW") => 1e-6,
@@ -96,6 +104,14 @@ impl Liberty {
                 .map(|c| (c.name().to_owned(), c.function()))
                 .collect(),
         })
+    }
+}
+
+impl Liberty {
+    /// Area of the weakest cells that stand for a kind, in the library's unit.
+    pub fn area(&self, kind: CellKind) -> f64 {
+        let stages = self.map.recipe(kind).stages.iter();
+        stages.map(|stage| stage.drives[0].area).sum()
     }
 }
 

@@ -1,4 +1,4 @@
-//! Tables of delays, slews and limits over two axes, interpolated linearly and continued linearly beyond their ends, as
+//! Tables of delays, slews, limits and energies over two axes, interpolated linearly and continued linearly beyond their ends, as
 //! timing analysers do.
 
 use std::collections::HashMap;
@@ -22,7 +22,7 @@ pub(super) struct Table {
     related: Vec<f64>,
     /// Loads, fF, or slews of the data, fs.
     other: Vec<f64>,
-    /// By `related`, then `other`, fs.
+    /// By `related`, then `other`, fs; fJ of energies.
     values: Vec<f64>,
 }
 
@@ -71,7 +71,8 @@ pub(super) struct Templates<'g, 't>(HashMap<&'t str, &'g Group<'t>>);
 
 impl<'g, 't> Templates<'g, 't> {
     pub(super) fn of(library: &'g Group<'t>) -> Self {
-        let templates = library.of_kind("lu_table_template");
+        let kinds = ["lu_table_template", "power_lut_template"];
+        let templates = kinds.into_iter().flat_map(|kind| library.of_kind(kind));
         Templates(
             templates
                 .map(|template| (template.name(), template))
@@ -79,11 +80,21 @@ impl<'g, 't> Templates<'g, 't> {
         )
     }
 
-    /// Reads one table.
+    /// Reads one table of times.
     ///
     /// # Errors
     /// Axes or values that do not fit each other, and axes of something else than slews and loads.
     pub(super) fn table(&self, group: &Group<'t>, units: Units) -> Result<Table, LibertyError> {
+        self.table_in(group, units, units.time_fs)
+    }
+
+    /// The same of values in a `unit`.
+    pub(super) fn table_in(
+        &self,
+        group: &Group<'t>,
+        units: Units,
+        unit: f64,
+    ) -> Result<Table, LibertyError> {
         let fault = |message: String| LibertyError {
             line: group.line,
             message,
@@ -96,7 +107,9 @@ impl<'g, 't> Templates<'g, 't> {
             let variable = template.and_then(|t| t.value(["variable_1", "variable_2"][index]));
             let Some(variable) = variable else { continue };
             let (of, unit) = match variable {
-                "input_net_transition" | "related_pin_transition" => (Axis::Related, units.time_fs),
+                "input_net_transition" | "related_pin_transition" | "input_transition_time" => {
+                    (Axis::Related, units.time_fs)
+                }
                 "constrained_pin_transition" => (Axis::Other, units.time_fs),
                 "total_output_net_capacitance" => (Axis::Other, units.load_ff),
                 _ => {
@@ -131,7 +144,7 @@ impl<'g, 't> Templates<'g, 't> {
                 values.len()
             )));
         }
-        values.iter_mut().for_each(|value| *value *= units.time_fs);
+        values.iter_mut().for_each(|value| *value *= unit);
         let [first, second] = axes;
         if first.0 == Some(Axis::Other) {
             let (rows, cols) = (second.1.len().max(1), first.1.len());
@@ -158,6 +171,7 @@ mod tests {
     const UNITS: Units = Units {
         time_fs: 1e6,
         load_ff: 1e3,
+        energy_fj: 1e3,
     };
 
     fn table(text: &str) -> Result<Table, LibertyError> {

@@ -79,7 +79,7 @@ endprimitive
 ";
 
 /// Transitions of DFFSR; the reset wins.
-const DFFSR_STATE: &str = "
+pub(in crate::netlist) const DFFSR_STATE: &str = "
 `ifndef FUNCTIONAL
 primitive DFFSR_STATE(q, d, ck, r, s, notifier);
   output q;

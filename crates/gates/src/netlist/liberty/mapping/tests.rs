@@ -6,6 +6,7 @@ use crate::netlist::liberty::group::read;
 const UNITS: Units = Units {
     time_fs: 1e6,
     load_ff: 1e3,
+    energy_fj: 1e3,
 };
 
 fn gate_text(name: &str, area: f64, inputs: &[&str], function: &str) -> String {

@@ -1,0 +1,136 @@
+//! Behavioural Verilog of the library cells in a mapped netlist, for simulators: the delays come from the SDF file beside it.
+//!
+//! A gate is a user-defined primitive of its truth table, whose output is unknown where unknown inputs leave it open. Flip-flops have
+//! the state of the standard cells (`verilog/standard_cells`), with inverters at pins that are active low; where a library does not say
+//! which of clear and preset wins, it is the clear. A path without a delay from a file takes 1 ps. Limits are not checked.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::{self, Write};
+
+use super::cell::{CellModel, FlipFlop, Role};
+use super::characterised::Characterised;
+use super::function::TruthTable;
+use super::read::Liberty;
+use crate::netlist::Netlist;
+use crate::netlist::verilog::DFFSR_STATE;
+
+/// Writes a module for every library cell and drive in the netlist of [`write_mapped`](super::write_mapped).
+///
+/// # Errors
+/// Those of the writer.
+pub fn write_mapped_cells(
+    out: &mut dyn Write,
+    netlist: &Netlist,
+    library: &Liberty,
+    characterised: &Characterised,
+) -> io::Result<()> {
+    let mut models = BTreeMap::new();
+    for index in 0..netlist.cells().len() {
+        let (composite, _) = characterised.instance(netlist, &library.map, index);
+        for stage in composite.used() {
+            let model = composite.cell(stage);
+            models.insert(model.name.as_str(), model);
+        }
+    }
+    writeln!(out, "`timescale 1ps/1fs\n`celldefine\n{DFFSR_STATE}")?;
+    for (name, model) in models {
+        if let Role::Gate(function) = model.role {
+            write_primitive(out, name, function)?;
+        }
+        let (inputs, outputs) = (input_names(model), model.outputs.join(", "));
+        writeln!(
+            out,
+            "module {name}(output {outputs}, input {});",
+            inputs.join(", ")
+        )?;
+        match &model.role {
+            Role::Gate(_) => writeln!(
+                out,
+                "  {name}_FUNCTION body({outputs}, {});",
+                inputs.join(", ")
+            )?,
+            Role::FlipFlop(roles) => write_flip_flop(out, model, roles)?,
+        }
+        writeln!(out, "  specify")?;
+        let paths: BTreeSet<_> = model.arcs.iter().map(|arc| (arc.from, arc.to)).collect();
+        for (from, to) in paths {
+            writeln!(
+                out,
+                "    ({} => {}) = (1, 1);",
+                inputs[from], model.outputs[to]
+            )?;
+        }
+        writeln!(out, "  endspecify\nendmodule\n")?;
+    }
+    writeln!(out, "`endcelldefine")
+}
+
+fn input_names(model: &CellModel) -> Vec<&str> {
+    model.inputs.iter().map(|pin| pin.name.as_str()).collect()
+}
+
+/// Rows for all levels of the inputs that leave one value.
+fn write_primitive(out: &mut dyn Write, name: &str, function: TruthTable) -> io::Result<()> {
+    let pins: Vec<String> = (0..function.inputs).map(|pin| format!("a{pin}")).collect();
+    let pins = pins.join(", ");
+    writeln!(
+        out,
+        "primitive {name}_FUNCTION(y, {pins});\n  output y;\n  input {pins};\n  table"
+    )?;
+    for row in 0..3_u32.pow(function.inputs) {
+        let level = |pin: u32| row / 3_u32.pow(pin) % 3;
+        let fits = |packed: &u32| {
+            (0..function.inputs).all(|pin| level(pin) == 2 || level(pin) == packed >> pin & 1)
+        };
+        let values: BTreeSet<bool> = (0..1 << function.inputs)
+            .filter(fits)
+            .map(|packed| function.at(packed))
+            .collect();
+        if let (1, Some(&value)) = (values.len(), values.first()) {
+            let levels = (0..function.inputs).map(|pin| ["0 ", "1 ", "x "][level(pin) as usize]);
+            writeln!(
+                out,
+                "    {}: {};",
+                levels.collect::<String>(),
+                u8::from(value)
+            )?;
+        }
+    }
+    writeln!(out, "  endtable\nendprimitive\n")
+}
+
+/// The primitive's reset wins: where the preset does, the state is kept inverted.
+fn write_flip_flop(out: &mut dyn Write, model: &CellModel, roles: &FlipFlop) -> io::Result<()> {
+    let inverts = |inverted: bool| if inverted { "not" } else { "buf" };
+    let (strong, weak) = match roles.preset_wins {
+        true => (roles.preset, roles.clear),
+        false => (roles.clear, roles.preset),
+    };
+    let data = (roles.data.0, roles.data.1 != roles.preset_wins);
+    writeln!(out, "  wire state, d, ck, r, s;\n  reg notifier;")?;
+    let pins = [
+        ("d", Some(data)),
+        ("ck", Some(roles.clock)),
+        ("r", strong),
+        ("s", weak),
+    ];
+    for (wire, pin) in pins {
+        match pin {
+            Some((pin, inverted)) => {
+                writeln!(
+                    out,
+                    "  {} at_{wire}({wire}, {});",
+                    inverts(inverted),
+                    model.inputs[pin].name
+                )?;
+            }
+            None => writeln!(out, "  assign {wire} = 1'b0;")?,
+        }
+    }
+    writeln!(out, "  DFFSR_STATE memory(state, d, ck, r, s, notifier);")?;
+    for (index, output) in model.outputs.iter().enumerate() {
+        let inverted = (roles.q != Some(index)) != roles.preset_wins;
+        writeln!(out, "  {} to_{output}({output}, state);", inverts(inverted))?;
+    }
+    Ok(())
+}
