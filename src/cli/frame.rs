@@ -18,7 +18,8 @@ use crate::files::{InputError, MANIFEST, ResultSet};
 use crate::guide::GuideMap;
 use crate::page::Page;
 use crate::report::Table;
-use crate::request::{FrameReport, FrameRequest, variance_left_out_of, write_frame};
+use crate::request::{FrameReport, FrameRequest, eye_safety_of, variance_left_out_of, write_frame};
+use crate::scene::EyeSafety;
 use crate::system::{Frame, FrameSettings, Probe, WindowPolicy, take_frame_by};
 use crate::units::Time;
 use crate::waves::WaveFormat;
@@ -322,6 +323,10 @@ fn table(
             settings.sensor.frame_time(frame.exposure_time)
         ),
     );
+    table.push(
+        "laser, beside class 1",
+        eye_safety(settings, settings.exposure.laser_cycles, frame),
+    );
     let left_over = Time::from_s(timing.slack_ps * 1e-12);
     let met = if timing.met { "met" } else { "FAILS" };
     table.push("timing, slack", format!("{met}, {left_over}"));
@@ -351,6 +356,28 @@ fn table(
     let names: Vec<String> = names.into_iter().chain(page).chain(waves).collect();
     table.push(format!("in {}", args.out.display()), names.join(" "));
     table
+}
+
+/// How far the laser is from the limit of class 1, and what limits it.
+fn eye_safety(settings: &FrameSettings, laser_cycles: u32, frame: &Frame) -> String {
+    match eye_safety_of(&settings.sensor, &settings.scene, laser_cycles, frame) {
+        None => "not judged at this wavelength".to_owned(),
+        Some(EyeSafety {
+            times_class_1,
+            rule,
+            ..
+        }) => {
+            let is_above = if times_class_1 > 1.0 {
+                "ABOVE"
+            } else {
+                "within"
+            };
+            format!(
+                "{is_above}, {times_class_1:.2} of the limit ({})",
+                rule.name()
+            )
+        }
+    }
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ use crate::chip::{SensorConfig, WindowLaw};
 use crate::engine::{Work, variance_left_out};
 use crate::files::{InputError, OutputFile, parse_json};
 use crate::report::write_npy_u16;
-use crate::scene::Scene;
+use crate::scene::{EyeSafety, Scene};
 use crate::system::{
     DistanceLaw, EngineKind, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Summary,
 };
@@ -76,6 +76,7 @@ pub struct FrameReport<'a, P = ()> {
     readout_time_s: f64,
     exposure_time_s: f64,
     frame_time_s: f64,
+    eye_safety: Option<EyeSafety>,
     exposure_run_time_s: f64,
     run_time_s: f64,
     run_times: PhaseTimes,
@@ -131,6 +132,20 @@ pub(crate) fn variance_left_out_of(settings: &FrameSettings, frame: &Frame) -> O
     (is_by_cohort && probability > 0.0).then(|| variance_left_out(probability))
 }
 
+/// The laser beside class 1, for frame after frame: pulses come once a laser cycle, and none while a frame waits for its readout and load.
+pub(crate) fn eye_safety_of(
+    sensor: &SensorConfig,
+    scene: &Scene,
+    laser_cycles: u32,
+    frame: &Frame,
+) -> Option<EyeSafety> {
+    let pulses = f64::from(laser_cycles);
+    let rate_hz = pulses / frame.exposure_time.as_s();
+    let mean_rate_hz = pulses / sensor.frame_time(frame.exposure_time).as_s();
+    let emission = scene.emission(frame.rows as u32, frame.cols as u32, rate_hz, mean_rate_hz);
+    emission.beside_class_1()
+}
+
 impl<'a, P> FrameReport<'a, P> {
     /// Of a frame that was taken with the settings that `request` made.
     pub fn new(
@@ -171,6 +186,12 @@ impl<'a, P> FrameReport<'a, P> {
             readout_time_s: frame.readout_time.as_s(),
             exposure_time_s: frame.exposure_time.as_s(),
             frame_time_s: settings.sensor.frame_time(frame.exposure_time).as_s(),
+            eye_safety: eye_safety_of(
+                &settings.sensor,
+                &settings.scene,
+                request.laser_cycles,
+                frame,
+            ),
             exposure_run_time_s: frame.times.exposure_s,
             run_time_s: frame.times.total_s(),
             run_times: frame.times,

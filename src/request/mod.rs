@@ -21,7 +21,7 @@ mod wording;
 pub use self::calibration::read_calibration;
 pub use self::frame::{FrameRequest, check_drive_times, check_false_alarm_rate};
 pub use self::frame_files::{Exposed, FrameConfiguration, FrameReport, write_frame};
-pub(crate) use self::frame_files::{file_hash, variance_left_out_of};
+pub(crate) use self::frame_files::{eye_safety_of, file_hash, variance_left_out_of};
 pub use self::signature::sign_files;
 pub use self::sources::Sources;
 pub use self::spelling::Spelling;

@@ -15,8 +15,10 @@ use super::study::{Kind, Point, Study};
 use super::theory::{self, Last, Rig, Wall};
 use crate::chip::{Sensor, SensorConfig};
 use crate::files::{InputError, in_plain_words};
-use crate::request::{FrameRequest, Sources, Spelling, file_hash, is_bad_input, sentence};
-use crate::scene::Scene;
+use crate::request::{
+    FrameRequest, Sources, Spelling, eye_safety_of, file_hash, is_bad_input, sentence,
+};
+use crate::scene::{EyeSafety, Scene};
 use crate::system::{Frame, FrameError, NoDepth, Summary, WindowPolicy, take_frame_by};
 
 /// A study's points as they are taken.
@@ -245,7 +247,7 @@ impl<'a> Subject<'a> {
                     Ok(frame) => Ok(Row {
                         run_time_s,
                         error: None,
-                        cells: frame_cells(&frame, &world.sensor),
+                        cells: frame_cells(&frame, &world, &request),
                     }),
                     Err(why) if is_bad_input(&why) => Ok(Row {
                         run_time_s,
@@ -269,6 +271,7 @@ struct Taken<'a> {
     summary: Summary,
     frame: &'a Frame,
     sensor: &'a SensorConfig,
+    eye_safety: Option<EyeSafety>,
 }
 
 impl Taken<'_> {
@@ -331,6 +334,9 @@ fn results() -> Vec<(String, Of)> {
             Some(t.frame.exposure_time.as_s())
         }),
         number("frame_time_s", "s", |t| Some(t.frame_time_s())),
+        number("times_class_1", "", |t| {
+            t.eye_safety.map(|eye| eye.times_class_1)
+        }),
     ]);
     all
 }
@@ -343,11 +349,13 @@ fn frame_columns() -> Vec<Column> {
     results().into_iter().map(column).collect()
 }
 
-fn frame_cells(frame: &Frame, sensor: &SensorConfig) -> Vec<Cell> {
+fn frame_cells(frame: &Frame, world: &World, request: &FrameRequest) -> Vec<Cell> {
+    let sensor = &world.sensor;
     let taken = Taken {
         summary: frame.summary(),
         frame,
         sensor,
+        eye_safety: eye_safety_of(sensor, &world.scene, request.laser_cycles, frame),
     };
     let cell = |(_, of)| match of {
         Of::Whole(of) => Cell::count(of(&taken)),

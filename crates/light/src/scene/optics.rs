@@ -175,7 +175,7 @@ impl Lidar {
     }
 
     /// The whole beam: its intensity over all directions.
-    fn beam_total(&self) -> f64 {
+    pub(super) fn beam_total(&self) -> f64 {
         let mut breaks = vec![0.0, PI / 2.0];
         match self.beam.curve() {
             Some(curve) => breaks.extend(curve.points().iter().map(|[deg, _]| deg.to_radians())),

@@ -76,6 +76,8 @@ keys! {
             from "thesis Eq. 7";
         /// Full width at half maximum of a Gaussian beam.
         beam_fwhm_deg: f64 ["deg"] = 16.0, in Above(0.0, 180.0), from "chosen: the field of view";
+        /// Width of the laser's apparent source, for the safety of eyes; 0 is a point, the worst.
+        laser_source_mm: f64 ["mm"] = 0.0, in Within(0.0, 1000.0), from "chosen: unknown";
         /// Photon detection efficiency of the SPADs at the laser's wavelength.
         pde: f64 = 0.185, in SHARE, from "thesis Table 6";
         /// Photon detection efficiency over wavelength, for sunlight.
