@@ -66,10 +66,10 @@ fn it_is_the_same_stretch_of_the_whole_waveform() {
         ),
     ] {
         let frame = format!(
-            "frame --rows 8 --cols 8 --laser-cycles 12 --seed 3 --probe 4,3 --wave-cycles all {options}"
+            "frame --rows 8 --cols 8 --laser-cycles 6 --seed 3 --probe 4,3 --wave-cycles all {options}"
         );
         succeeds(folder.path(), frame.trim_end());
-        for cycle in [0, 8, 11] {
+        for cycle in [0, 3, 5] {
             let wave = format!("wave --pixel 4,3 --cycle {cycle} --out {file} --json");
             let report = succeeds(folder.path(), &wave);
             let report: serde_json::Value = serde_json::from_str(&report).unwrap();
@@ -78,7 +78,7 @@ fn it_is_the_same_stretch_of_the_whole_waveform() {
             } else {
                 report["from_fs"].as_u64().unwrap()
             };
-            let to = if cycle == 11 {
+            let to = if cycle == 5 {
                 u64::MAX
             } else {
                 report["to_fs"].as_u64().unwrap()

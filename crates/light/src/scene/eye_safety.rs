@@ -270,7 +270,7 @@ mod tests {
         within(into_eye, APERTURE_SR / (side * side), 0.07);
         assert!(into_eye > APERTURE_SR / (side * side));
         let narrow = Scene::parse("test", "[lidar]\nfov_deg = 0.2\n").unwrap();
-        assert_eq!(narrow.emission(64, 64, 1.0, 1.0).pulse_j, 20e-6);
+        within(narrow.emission(64, 64, 1.0, 1.0).pulse_j, 20e-6, 1e-12);
         // A Gaussian beam has 4 ln 2 / pi of its pulse in a square of its width, at most.
         let gaussian = "[lidar]\nbeam = \"gaussian\"\nbeam_fwhm_deg = 10\n";
         let gaussian = Scene::parse("test", gaussian).unwrap();
