@@ -60,6 +60,11 @@ impl OwnBlock {
                     && after.window(cell.inputs[0]).is_some()
             });
             let stops = after.edge_window(probes.net(Probe::LocalStop), Edge::Rise).is_some();
+            let reset = probes.net(Probe::CounterReset);
+            let mut flip_flops = netlist.cells().iter().filter(|cell| cell.kind.is_flip_flop());
+            if flip_flops.any(|cell| cell.inputs[1] == reset) {
+                return Some("clocks a flip-flop with COUNTER_RESET; reset it by that instead");
+            }
             let flaw = "does not count rising edges of COUNTER_CLK up to LOCAL_STOP; clock it with posedge COUNTER_CLK";
             (!counts || !stops).then_some(flaw)
         })
