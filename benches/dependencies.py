@@ -2,8 +2,8 @@
 
     cargo build --release --timings && python3 benches/dependencies.py
 
-Seconds are those of `cargo build --timings`, on a busy machine more than on a quiet one: the crate's own, and with the crates that nothing else
-draws in. Reasons are the comments in the manifests.
+Times are shares of all that `cargo build --timings` measures for dependencies: the crate's own, and with the crates that nothing else draws in.
+Reasons are the comments in the manifests.
 """
 
 import json
@@ -55,13 +55,13 @@ for member, manifest in MANIFESTS.items():
                 reasons.setdefault(name, why[1])
 
 everything = reached()
-print("| crate | in | s | with its own | crates | why it stays |\n|---|---|---:|---:|---:|---|")
+third = sum(cost[id] for id in everything - ours)
+print("| crate | in | time, % | with its own, % | crates | why it stays |\n|---|---|---:|---:|---:|---|")
 rows = []
 for name, of in members.items():
     package = next(id for id in everything if name_of[id] == name and any(id in edges[our] for our in ours))
     alone = everything - reached(package)
-    rows.append((sum(cost[id] for id in alone), name, of, cost[package], len(alone), reasons[name]))
+    rows.append((100 * sum(cost[id] for id in alone) / third, name, of, 100 * cost[package] / third, len(alone), reasons[name]))
 for total, name, of, own, count, why in sorted(rows, reverse=True):
     print(f"| `{name}` | {', '.join(of)} | {own:.1f} | {total:.1f} | {count} | {why} |")
-third = sum(cost[id] for id in everything - ours)
 print(f"\n{len(everything - ours)} crates, {third:.0f} s; ours {sum(cost[id] for id in ours):.0f} s.")
