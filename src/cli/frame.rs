@@ -1,6 +1,6 @@
 //! `gdtof frame`: the main job.
 
-mod pair;
+pub(super) mod pair;
 
 use std::path::PathBuf;
 

@@ -19,6 +19,7 @@ mod pixel;
 mod power;
 mod quality;
 mod range;
+mod readers;
 mod replay;
 mod reproduce;
 mod sdf;
@@ -35,6 +36,8 @@ mod wave;
 mod wave_format;
 mod wording;
 
+#[doc(hidden)]
+pub use readers::{READERS, Reader};
 pub use tb::testbench;
 
 use std::process::ExitCode;

@@ -5,6 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::marker::PhantomData;
 use std::path::Path;
 
+use super::image::of_png;
 use crate::files::{Element, InputError, OutputFile, write_npy_elements, write_npy_head};
 
 /// Writes `data` as a `uint16` array of `shape`, last axis fastest.
@@ -54,9 +55,9 @@ pub(crate) fn write_depth_png(path: &Path, cols: usize, depths: &[f32]) -> Resul
         let mut encoder = png::Encoder::new(out, cols as u32, (depths.len() / cols) as u32);
         encoder.set_color(png::ColorType::Grayscale);
         encoder.set_depth(png::BitDepth::Sixteen);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(&bytes)?;
-        writer.finish()?;
+        let mut writer = encoder.write_header().map_err(of_png)?;
+        writer.write_image_data(&bytes).map_err(of_png)?;
+        writer.finish().map_err(of_png)?;
         Ok(())
     })
 }

@@ -246,10 +246,18 @@ fn encode(file: &mut dyn Write, canvas: &Canvas) -> io::Result<()> {
     encoder.set_color(png::ColorType::Indexed);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_palette(palette);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(canvas.pixels())?;
-    writer.finish()?;
+    let mut writer = encoder.write_header().map_err(of_png)?;
+    writer.write_image_data(canvas.pixels()).map_err(of_png)?;
+    writer.finish().map_err(of_png)?;
     Ok(())
+}
+
+/// An error of writing a picture, which keeps its kind: a full disk stays one.
+pub(super) fn of_png(error: png::EncodingError) -> io::Error {
+    match error {
+        png::EncodingError::IoError(error) => error,
+        other => other.into(),
+    }
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use std::path::Path;
 
 use super::canvas::{CHARACTER_WIDTH_PX, LINE_PX, letters};
 use super::colour::{Rgb, scale_colour};
+use super::image::of_png;
 use crate::files::{InputError, OutputFile};
 
 /// Background of pictures.
@@ -167,9 +168,11 @@ impl Picture {
         let mut encoder = png::Encoder::new(file, width, height);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(self.pixels.as_flattened())?;
-        writer.finish()?;
+        let mut writer = encoder.write_header().map_err(of_png)?;
+        writer
+            .write_image_data(self.pixels.as_flattened())
+            .map_err(of_png)?;
+        writer.finish().map_err(of_png)?;
         Ok(())
     }
 }

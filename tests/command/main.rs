@@ -15,7 +15,10 @@ mod engines_are_chosen_from_the_command_line;
 mod frames_for_other_tools;
 mod golden_vectors_hold;
 mod guides_from_the_command_line;
+mod kept_inputs_are_read;
 mod libraries_make_the_chip;
+#[cfg(unix)]
+mod long_runs_keep_their_memory;
 mod mismatch_replays;
 mod one_window_for_all;
 mod probes_keep_their_first_hits;
@@ -23,6 +26,8 @@ mod real_histograms_are_ranged;
 #[cfg(unix)]
 mod results_are_one_set;
 mod run_time_against_error;
+#[cfg(unix)]
+mod runs_survive_faults;
 mod scenes_name_files;
 #[cfg(unix)]
 mod silicon_replays;

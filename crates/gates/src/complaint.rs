@@ -71,9 +71,14 @@ impl InputError {
     }
 
     pub fn unwritable(path: &Path, error: &io::Error) -> Self {
+        use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+        let cure = match error.kind() {
+            FileTooLarge | QuotaExceeded | StorageFull => "free some space",
+            _ => "choose a folder that exists and is writable",
+        };
         Self::new(
             path.display(),
-            format!("cannot be written ({error}); choose a folder that exists and is writable"),
+            format!("cannot be written ({error}); {cure}"),
         )
     }
 }

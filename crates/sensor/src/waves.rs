@@ -1,7 +1,6 @@
 //! A waveform in a file of its own, in the format that its name asks for.
 
 use std::ffi::OsStr;
-use std::io;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -65,7 +64,7 @@ impl WaveFile {
         selection: &Selection,
         span: RangeInclusive<Time>,
     ) -> Result<Self, InputError> {
-        let failed = |e| unwritten(path, &e);
+        let failed = |e| InputError::unwritable(path, &e);
         let file = OutputFile::create(path)?;
         let writer = match format {
             WaveFormat::Vcd => {
@@ -90,7 +89,8 @@ impl WaveFile {
             Writer::Vcd(writer) => writer.finish(end),
             Writer::Fst(writer) => writer.finish(end),
         };
-        file.map_err(|e| unwritten(&self.path, &e))?.commit()
+        file.map_err(|e| InputError::unwritable(&self.path, &e))?
+            .commit()
     }
 }
 
@@ -126,8 +126,3 @@ pub(crate) fn write_views(
 
 /// Extensions of the files beside a waveform: GTKWave's save file, Surfer's command file.
 pub const VIEWS: [&str; 2] = ["gtkw", "sucl"];
-
-fn unwritten(path: &Path, error: &io::Error) -> InputError {
-    let message = format!("cannot be written ({error}); free some space");
-    InputError::new(path.display(), message)
-}

@@ -50,7 +50,7 @@ pub(super) struct PairArgs {
 /// What a calibration file holds.
 #[derive(Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Calibration {
+pub(in crate::cli) struct Calibration {
     left: [[f64; 3]; 3],
     right: Option<[[f64; 3]; 3]>,
     baseline_m: f64,
@@ -62,7 +62,7 @@ struct Calibration {
 
 /// Focal length and principal point, px.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Intrinsics {
+pub(in crate::cli) struct Intrinsics {
     focal_px: f64,
     principal_px: (f64, f64),
 }
@@ -113,13 +113,7 @@ impl PairArgs {
             return Ok(None);
         };
         let complain = |message: String| InputError::new(calib_path.display(), message);
-        let calibration: Calibration = parse_toml(calib_path.display(), &read_text(calib_path)?)?;
-        let own = intrinsics("left", calibration.left).map_err(complain)?;
-        let other = match calibration.right {
-            Some(right) => intrinsics("right", right).map_err(complain)?,
-            None => own,
-        };
-        check(&calibration, own, other).map_err(complain)?;
+        let (calibration, [own, other]) = read_calibration(calib_path)?;
         let (left, right) = (read_image(left_path)?, read_image(right_path)?);
         let default = Matcher::default();
         let matcher = Matcher {
@@ -242,6 +236,24 @@ impl PairReport {
             "Light comes from the depths that the pair itself has matched: errors of the guide are in both and are not seen. --truth gives other light.",
         )
     }
+}
+
+/// What a calibration file holds, and the intrinsics of left and right camera, px.
+///
+/// # Errors
+/// A file that cannot be read, or whose pair is impossible.
+pub(in crate::cli) fn read_calibration(
+    path: &Path,
+) -> Result<(Calibration, [Intrinsics; 2]), InputError> {
+    let complain = |message: String| InputError::new(path.display(), message);
+    let calibration: Calibration = parse_toml(path.display(), &read_text(path)?)?;
+    let own = intrinsics("left", calibration.left).map_err(complain)?;
+    let other = match calibration.right {
+        Some(right) => intrinsics("right", right).map_err(complain)?,
+        None => own,
+    };
+    check(&calibration, own, other).map_err(complain)?;
+    Ok((calibration, [own, other]))
 }
 
 fn intrinsics(name: &str, matrix: [[f64; 3]; 3]) -> Result<Intrinsics, String> {

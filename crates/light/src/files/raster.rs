@@ -1,8 +1,8 @@
 //! Pictures and maps that users give: one number a pixel, from PNG (8 or 16 bit), NumPy (`.npy`), PFM or OpenEXR
 //! (one channel).
 //!
-//! How large a raster is stands in its header, and is held to a limit before anything is unpacked: a PNG of some
-//! kilobytes can unpack to gigabytes.
+//! How large a raster is stands in its header, and is held to a limit, and to what a file of its length can unpack to, before anything is
+//! unpacked: a PNG of some kilobytes can unpack to gigabytes, and one of some bytes can say so.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek};
@@ -13,6 +13,9 @@ use femtogate::InputError;
 
 /// Most pixels of a raster: four times those of a camera of 16 megapixels, 256 MiB as numbers.
 const MOST_PIXELS: u64 = 1 << 26;
+
+/// Most bytes that one byte of a file unpacks to: those of deflate, which no other packing here reaches.
+const MOST_UNPACKED: u64 = 1032;
 
 /// One number a pixel, row by row from the top left.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,13 +44,15 @@ impl Raster {
                 "is not a file; give a PNG, .npy, PFM or EXR".into(),
             ));
         }
-        let mut reader = BufReader::new(File::open(path).map_err(unreadable)?);
+        let file = File::open(path).map_err(unreadable)?;
+        let length = file.metadata().map_err(unreadable)?.len();
+        let mut reader = BufReader::new(file);
         let first = reader.fill_buf().map_err(unreadable)?;
         let read = match first {
-            [0x89, b'P', b'N', b'G', ..] => read_png(reader),
+            [0x89, b'P', b'N', b'G', ..] => read_png(reader, length),
             [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => read_npy(reader),
             [b'P', b'f' | b'F', ..] => read_pfm(reader),
-            [0x76, 0x2f, 0x31, 0x01, ..] => read_exr(reader),
+            [0x76, 0x2f, 0x31, 0x01, ..] => read_exr(reader, length),
             _ => Err("is not a PNG, .npy, PFM or EXR; convert it to one of them".into()),
         };
         read.map_err(complain)
@@ -70,6 +75,14 @@ fn check_size(width: u64, height: u64) -> Result<(), String> {
     }
 }
 
+/// Refuses a header that promises more than `length` bytes of a file unpack to.
+fn check_length(what: &str, pixels: u64, pixel_bytes: usize, length: u64) -> Result<(), String> {
+    match pixels.saturating_mul(pixel_bytes as u64) > length.saturating_mul(MOST_UNPACKED) {
+        true => Err(broken(what, "it ends early")),
+        false => Ok(()),
+    }
+}
+
 fn broken(what: &str, error: impl std::fmt::Display) -> String {
     let error = error.to_string().replace('\n', " ");
     format!(
@@ -78,8 +91,8 @@ fn broken(what: &str, error: impl std::fmt::Display) -> String {
     )
 }
 
-fn read_png(reader: BufReader<File>) -> Result<Raster, String> {
-    let broken = |e| broken("PNG", e);
+fn read_png(reader: BufReader<File>, length: u64) -> Result<Raster, String> {
+    let broken = |e: png::DecodingError| broken("PNG", e);
     let mut decoder = png::Decoder::new_with_limits(reader, png::Limits { bytes: 1 << 30 });
     decoder.set_ignore_text_chunk(true);
     decoder.set_transformations(png::Transformations::EXPAND);
@@ -88,6 +101,7 @@ fn read_png(reader: BufReader<File>) -> Result<Raster, String> {
     check_size(width.into(), height.into())?;
     let mut reader = decoder.read_info().map_err(broken)?;
     let too_large = || "does not fit into memory; make it smaller".to_owned();
+    check_length("PNG", reader.info().raw_bytes() as u64, 1, length)?;
     let mut bytes = vec![0; reader.output_buffer_size().ok_or_else(too_large)?];
     reader.next_frame(&mut bytes).map_err(broken)?;
     let (colour, depth) = reader.output_color_type();
@@ -163,10 +177,12 @@ fn read_pfm(mut reader: BufReader<File>) -> Result<Raster, String> {
     }
     check_size(width, height)?;
     let (width, height) = (width as usize, height as usize);
-    let mut bytes = vec![0; 4 * width * height];
-    reader
-        .read_exact(&mut bytes)
-        .map_err(|e| broken("PFM", e))?;
+    let mut bytes = Vec::new();
+    let wanted = 4 * width * height;
+    let read = reader.take(wanted as u64).read_to_end(&mut bytes);
+    if read.map_err(|e| broken("PFM", e))? < wanted {
+        return Err(broken("PFM", "it ends early"));
+    }
     let from_bytes = if scale < 0.0 {
         f32::from_le_bytes
     } else {
@@ -183,13 +199,26 @@ fn read_pfm(mut reader: BufReader<File>) -> Result<Raster, String> {
 }
 
 /// The first layer's channel Z, or else V, Y or its only one.
-fn read_exr(mut reader: BufReader<File>) -> Result<Raster, String> {
+fn read_exr(mut reader: BufReader<File>, length: u64) -> Result<Raster, String> {
     use exr::prelude::{MetaData, ReadChannels, ReadLayers, read};
-    let broken = |e: exr::error::Error| broken("EXR", e);
-    let about = MetaData::read_from_buffered(&mut reader, false).map_err(broken)?;
-    let layer = about.headers.first();
-    let size = layer.ok_or("has no layer; save it again")?.layer_size;
-    check_size(size.width() as u64, size.height() as u64)?;
+    let told = |e: exr::error::Error| broken("EXR", e);
+    let about = MetaData::read_from_buffered(&mut reader, false).map_err(told)?;
+    if about.headers.is_empty() {
+        return Err("has no layer; save it again".into());
+    }
+    for layer in &about.headers {
+        let (width, height) = (
+            layer.layer_size.width() as u64,
+            layer.layer_size.height() as u64,
+        );
+        check_size(width, height)?;
+        check_length(
+            "EXR",
+            width * height,
+            layer.channels.bytes_per_pixel,
+            length,
+        )?;
+    }
     reader.rewind().map_err(|e| e.to_string())?;
     let image = read()
         .no_deep_data()
@@ -199,7 +228,7 @@ fn read_exr(mut reader: BufReader<File>) -> Result<Raster, String> {
         .all_attributes()
         .non_parallel()
         .from_buffered(reader)
-        .map_err(broken)?;
+        .map_err(told)?;
     let channels = &image.layer_data.channel_data.list;
     let named = |name: &str| channels.iter().find(|channel| channel.name.eq(name));
     let chosen = ["Z", "V", "Y"].into_iter().find_map(named);
@@ -327,11 +356,14 @@ mod tests {
     fn what_cannot_be_read_is_named_and_nothing_large_is_unpacked() {
         use png::{BitDepth, ColorType};
         let fine = png_of(40, 40, ColorType::Grayscale, BitDepth::Eight, &[7; 1600]);
-        // The same header with 100 000 x 100 000 pixels; its checksum follows the 13 bytes of IHDR.
-        let mut bomb = fine.clone();
-        bomb[16..24].copy_from_slice(&[0, 1, 0x86, 0xa0, 0, 1, 0x86, 0xa0]);
-        let sum = crc32(&bomb[12..29]);
-        bomb[29..33].copy_from_slice(&sum.to_be_bytes());
+        // The same header with other sizes; its checksum follows the 13 bytes of IHDR.
+        let of_size = |side: u32| {
+            let mut bomb = fine.clone();
+            bomb[16..24].copy_from_slice(&[side.to_be_bytes(); 2].concat());
+            let sum = crc32(&bomb[12..29]);
+            bomb[29..33].copy_from_slice(&sum.to_be_bytes());
+            bomb
+        };
         let header = b"{'descr': '<f4', 'fortran_order': False, 'shape': (99999999, 99999999)}\n";
         let mut huge = b"\x93NUMPY\x01\x00".to_vec();
         huge.extend((header.len() as u16).to_le_bytes());
@@ -340,11 +372,16 @@ mod tests {
         let kind = of_truths.windows(3).position(|w| w == b"|u1").unwrap();
         of_truths[kind..kind + 3].copy_from_slice(b"|b1");
         for (bytes, says) in [
-            (bomb, "100000 x 100000 pixels"),
+            (of_size(100_000), "100000 x 100000 pixels"),
+            (of_size(8000), "broken PNG (it ends early)"),
             (fine[..fine.len() / 2].to_vec(), "broken PNG"),
             (b"P5 3 3 255\n123456789".to_vec(), "is not a PNG"),
             (b"PF\n3 2\n-1.0\n".to_vec(), "in colour"),
             (b"Pf\n3 2\n-1.0\n1234".to_vec(), "broken PFM"),
+            (
+                b"Pf\n8000 8000 1\n1234".to_vec(),
+                "broken PFM (it ends early)",
+            ),
             (b"Pf\n0 2\n-1.0\n1234".to_vec(), "no pixels"),
             (b"Pf\n3".to_vec(), "header ends"),
             (b"Pf\n99999999 99999999 1\n".to_vec(), "99999999 x 99999999"),

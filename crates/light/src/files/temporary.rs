@@ -116,10 +116,17 @@ impl Drop for Temporary {
 
 /// Nothing can be done about one that resists; the next run tries again.
 fn remove(path: &Path) {
-    let _ = match path.is_dir() {
-        true => fs::remove_dir_all(path),
-        false => fs::remove_file(path),
+    if !path.is_dir() {
+        let _ = fs::remove_file(path);
+        return;
+    }
+    // Another thread may be writing into it: under another name nobody finds it, and what was about to be made there is soon made.
+    let hidden = path.with_file_name(fresh_name());
+    let hidden = match fs::rename(path, &hidden) {
+        Ok(()) => &*hidden,
+        Err(_) => path,
     };
+    let _ = (0..100).any(|_| fs::remove_dir_all(hidden).is_ok());
 }
 
 fn fresh_name() -> String {
@@ -234,6 +241,34 @@ mod tests {
         ] {
             assert!(!is_ours(name), "{name}");
         }
+    }
+
+    #[test]
+    fn a_folder_goes_while_others_write_into_it() {
+        use std::sync::atomic::{AtomicBool, Ordering};
+        let dir = tempfile::tempdir().unwrap();
+        let is_over = AtomicBool::new(false);
+        let folder = Mutex::new(dir.path().join("x"));
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                for number in (0..1000)
+                    .cycle()
+                    .take_while(|_| !is_over.load(Ordering::Relaxed))
+                {
+                    let place = folder.lock().unwrap().join(number.to_string());
+                    let _ = fs::write(place, "half");
+                }
+            });
+            for number in 0..200 {
+                let path = dir.path().join(format!("folder {number}"));
+                fs::create_dir(&path).unwrap();
+                folder.lock().unwrap().clone_from(&path);
+                while fs::read_dir(&path).unwrap().count() < 10 {}
+                remove(&path);
+                assert_eq!(names(dir.path()), [""; 0]);
+            }
+            is_over.store(true, Ordering::Relaxed);
+        });
     }
 
     #[test]

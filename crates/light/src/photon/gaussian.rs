@@ -4,6 +4,11 @@
 //! near 0 or 1, and in stretches much shorter than the pulse. The first is avoided by keeping the smaller tail of
 //! each edge, the second by expanding the density about the middle of the stretch.
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use multiversion::multiversion;

@@ -13,6 +13,11 @@
 //! Within one surface it is the depth that decides ([`DEEP`]). The light of a slanted surface is a box, and its peak may be anywhere on the
 //! flat top; that of a Gaussian is in the middle. So a deep surface becomes slices, short enough that their sum has a flat top.
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use multiversion::multiversion;
 use smallvec::SmallVec;
 

@@ -3,6 +3,11 @@
 //! One block of four words per counter, [`LANES`] counters side by side in plain arrays, so that the compiler can use
 //! the widest vectors the machine has. The words are those of the crate `rand_philox`, which tests hold it to.
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use multiversion::multiversion;
 
 /// Counters that go through the rounds together, and of which rows of blocks are filled up to a multiple.

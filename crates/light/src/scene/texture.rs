@@ -8,6 +8,11 @@
 //! cameras see the same pattern, each with its own two reflectivities: what is black and white to a camera may be one
 //! grey at 940 nm.
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 

@@ -3,6 +3,11 @@
 //! Bits are kept eight to a byte, and the same byte of all pixels of a row stands in a row of its own (a plane), so that costs are counted in bytes,
 //! as many at once as a vector holds. Beyond the border, the image continues with the border's pixels.
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use multiversion::multiversion;
 use rayon::prelude::*;
 

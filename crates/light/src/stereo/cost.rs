@@ -7,6 +7,11 @@
 //!  right   … x−min−2  x−min−1  x−min …   reversed   x−min x−min−1 x−min−2 …
 //! ```
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use multiversion::multiversion;
 
 use super::census::{Layout, Signatures};

@@ -1,6 +1,10 @@
 //! Filters that disparities pass once they are found.
 
 #![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+#![allow(
     clippy::needless_range_loop,
     reason = "several arrays by one number, which the compiler makes vectors of"
 )]

@@ -15,6 +15,11 @@
 //!
 //! What is computed is the same in any order, and so on any number of threads.
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use multiversion::multiversion;
 use rayon::prelude::*;
 

@@ -4,6 +4,10 @@
 //! disparity by the same sums. Between disparities, sums on either side of the best one say where the least would lie.
 
 #![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+#![allow(
     clippy::needless_range_loop,
     reason = "several arrays by one number, which the compiler makes vectors of"
 )]

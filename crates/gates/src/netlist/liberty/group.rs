@@ -146,7 +146,8 @@ impl<'t> Reader<'t> {
         while let Some(&byte) = bytes.get(self.at) {
             match byte {
                 b'\n' => self.line += 1,
-                b' ' | b'\t' | b'\r' | b'\\' => {}
+                b'\\' => {}
+                blank if blank.is_ascii_whitespace() => {}
                 b'/' if bytes.get(self.at + 1) == Some(&b'*') => {
                     let rest = &self.text[self.at + 2..];
                     let Some(end) = rest.find("*/") else {
@@ -186,7 +187,8 @@ impl<'t> Reader<'t> {
             self.at += 1;
             return Ok(Some(Token::Mark(first)));
         }
-        let ends = |c: char| c.is_whitespace() || "(){}:;,\"\\".contains(c);
+        // What ends a word is passed over by `blanks` or a token itself, so that there is no empty word.
+        let ends = |c: char| c.is_ascii_whitespace() || "(){}:;,\"\\".contains(c);
         let end = rest.find(ends).unwrap_or(rest.len());
         self.at += end;
         Ok(Some(Token::Word(&rest[..end])))
@@ -319,6 +321,9 @@ mod tests {
             ("library (l) { }\n}", 2),
             ("library (l) { a (1 ; }", 1),
             ("", 1),
+            // A vertical tab and another alphabet's blank are no blanks here, and end no word.
+            ("library (l) { a (\u{b}", 1),
+            ("library (l) { a (\u{2003}", 1),
         ] {
             assert_eq!(read(text).unwrap_err().line, line, "{text}");
         }

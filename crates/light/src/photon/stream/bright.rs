@@ -21,6 +21,11 @@
 //! Echoes of measured pulses or of half a laser cycle, those of light with several layers, and photons whose
 //! avalanches trigger others, are drawn photon by photon (`listed`).
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use std::ops::Range;
 
 use multiversion::multiversion;

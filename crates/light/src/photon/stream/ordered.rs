@@ -6,6 +6,11 @@
 //!                     ╰ dead    ╰ ready   ready has grown by an exponential number
 //! ```
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use multiversion::multiversion;
 use smallvec::{SmallVec, smallvec};
 

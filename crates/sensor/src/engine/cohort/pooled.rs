@@ -15,6 +15,11 @@
 //! bins' counts then lose the part of their correlation that passes through coincidences within a cycle: at most
 //! ρ² of their variance, where ρ = p/(1 − p) for the probability p of a photon on a SPAD in a period.
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use multiversion::multiversion;
 use smallvec::{SmallVec, smallvec};
 

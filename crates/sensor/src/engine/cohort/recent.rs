@@ -17,6 +17,11 @@
 //! correlation of each two bins, from the SPADs and from the histories; k is 4, 6 or 8, the least with which
 //! they differ by no more than is to be neglected ([`CohortOptions::neglect`](super::CohortOptions)).
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use multiversion::multiversion;
 
 use super::abreast::{LANES, Lanes, binomials};

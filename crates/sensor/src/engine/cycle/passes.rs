@@ -12,6 +12,11 @@
 //!   first such cycle's effects on photonic actions are written down, and repeated in the cycles that follow.
 //! * What follows a sample waits until another cause is due, and is then done for all lanes at once.
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use multiversion::multiversion;
 
 use super::parts::{Parts, Run};

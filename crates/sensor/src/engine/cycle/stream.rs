@@ -9,6 +9,11 @@
 //! only used within a chunk lives in few, reused places, so that a block's working set stays in the first-level
 //! cache.
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use std::cell::Cell;
 
 use multiversion::multiversion;

@@ -10,6 +10,11 @@
 //!   word       cycle, SPAD │ time in the slot: in doubt in its first and last steps only
 //! ```
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use multiversion::multiversion;
 
 use super::codes::{Code, Codes, SPAD_BITS, bin_mark, spad_mark};

@@ -10,6 +10,11 @@
 //!          └─────────┴──────┴──┴─────────┴────────┘                └──────┴──────┘
 //! ```
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use multiversion::multiversion;
 
 use crate::photon::GROUP;

@@ -8,6 +8,11 @@
 //!   row       0   ┊ ?  ┊       1      ┊ ?  ┊       2      ┊ ?  ┊   …
 //! ```
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use std::ops::Range;
 
 use multiversion::multiversion;

@@ -1,5 +1,10 @@
 //! The tables in which photons of a group are counted. Their lengths are powers of two, so that an index needs no check.
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use std::cell::Cell;
 
 use multiversion::multiversion;

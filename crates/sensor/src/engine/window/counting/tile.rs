@@ -12,6 +12,11 @@
 //! A lane that depends on what came before its first block, or has a photon within a few femtoseconds of a bin's edge, is undecided:
 //! left to who counts laser cycle by laser cycle.
 
+#![allow(
+    unsafe_code,
+    reason = "multiversion calls what the processor was asked for"
+)]
+
 use multiversion::multiversion;
 
 use crate::engine::window::codes::{ROWS, SPADS};

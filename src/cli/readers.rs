@@ -1,0 +1,184 @@
+//! Every reader of files that users give, by name, as the fuzzer (`fuzz`) and the test of the inputs that it kept (`vectors/fuzz`) call them.
+
+use std::fs;
+use std::path::Path;
+use std::sync::LazyLock;
+
+use toml::Table;
+
+use super::frame::pair;
+use crate::chip::{Exposure, SensorConfig, Silicon, hslidar_delay_line, macropixel};
+use crate::files::{
+    Journal, JournalReader, MANIFEST, Raster, ResultSet, journal_line, parse_json, read_counts,
+    read_text, write_npy,
+};
+use crate::guide::options;
+use crate::netlist::liberty::Liberty;
+use crate::netlist::sdf::{Sdf, annotate, oddities};
+use crate::netlist::{Module, Netlist, Timing};
+use crate::page::Page;
+use crate::ranging::{Calibration, tmf8820};
+use crate::request::read_calibration;
+use crate::scene::{Mesh, Scene};
+use crate::settings::Document;
+use crate::stimulus::recording::{read_events, read_starts};
+use crate::sweep::{Study, study_of};
+use crate::system::WindowPolicy;
+
+/// Reads a file, which it may change, and says what is wrong with it. Other files in its folder may be made.
+pub type Reader = fn(&Path) -> Result<(), String>;
+
+/// Of one macropixel, so that files are short.
+static SENSOR: LazyLock<SensorConfig> = LazyLock::new(|| SensorConfig {
+    rows: 1,
+    cols: 1,
+    ..SensorConfig::default()
+});
+
+/// The same with delay lines, whose bins are measured.
+static DELAY_LINES: LazyLock<SensorConfig> = LazyLock::new(|| SensorConfig {
+    rows: 1,
+    cols: 1,
+    ..SensorConfig::clone(&hslidar_delay_line())
+});
+
+/// A macropixel and its delays.
+static MACROPIXEL: LazyLock<(Netlist, Timing)> = LazyLock::new(|| {
+    let netlist = Netlist::elaborate(&macropixel::circuit(&SENSOR));
+    let timing = Silicon::of(&SENSOR).timing(&netlist);
+    (netlist, timing)
+});
+
+/// The readers; the corpus of each is the folder of its name.
+pub const READERS: &[(&str, Reader)] = &[
+    ("sensor", |path| {
+        said(SensorConfig::read_document(&document(path)?))
+    }),
+    ("scene", |path| said(Scene::read(&document(path)?))),
+    ("study", |path| said(Study::load(path))),
+    ("kept_study", |path| beside(path, "study.json", study_of)),
+    ("options", read_options),
+    ("starts", |path| said(read_starts(path, &SENSOR))),
+    ("events", |path| {
+        let exposure = Exposure::new(&SENSOR, 100, 10);
+        said(read_events(path, &SENSOR, &exposure))
+    }),
+    ("curve", |path| {
+        let (mut scene, csv) = (
+            Document::of("curve", Table::new()),
+            path.with_extension("csv"),
+        );
+        fs::write(&csv, fs::read(path).expect("a file of ours")).expect("a file of ours");
+        said(scene.assign(&format!("lidar.pulse={:?}", csv.display()), "--set"))?;
+        said(Scene::read(&scene))
+    }),
+    ("sdf", |path| {
+        let text = text(path)?;
+        let sdf = Sdf::parse("SDF", &text).map_err(|e| e.to_string())?;
+        let (netlist, timing) = &*MACROPIXEL;
+        oddities(&sdf, SENSOR.corner);
+        said(annotate(&mut timing.clone(), netlist, &sdf, SENSOR.corner))
+    }),
+    ("liberty", |path| said(Liberty::read(&text(path)?, &[]))),
+    ("yosys", |path| {
+        let module = Module::from_yosys(&text(path)?, None);
+        said(module.map(|module| Netlist::elaborate(&module)))
+    }),
+    ("block", |path| {
+        let file = path.display().to_string().into();
+        let table = Table::from_iter([("p_counter_block".to_owned(), file)]);
+        said(SensorConfig::read_document(&Document::of("block", table)))
+    }),
+    ("captures", |path| said(tmf8820::read(path))),
+    ("zones", |path| {
+        said(parse_json::<Calibration>("zones", &text(path)?, "zones"))
+    }),
+    ("bin_profile", |path| {
+        said(read_calibration(path, &DELAY_LINES))
+    }),
+    ("pair", |path| said(pair::read_calibration(path))),
+    ("frame", |path| {
+        beside(path, "frame.json", |folder| {
+            let mut counts = Vec::new();
+            write_npy(&mut counts, &[1, 1, 16], &[1u16; 16]).expect("it is in memory");
+            fs::write(folder.join("histograms.npy"), counts).expect("a folder of ours");
+            Page::of(folder, folder, 1)
+        })
+    }),
+    ("counts", |path| said(read_counts(path, &[1, 1, 16]))),
+    ("npy", |path| said(Raster::read(path))),
+    ("png", |path| said(Raster::read(path))),
+    ("pfm", |path| said(Raster::read(path))),
+    ("exr", |path| said(Raster::read(path))),
+    ("obj", |path| said(Mesh::read(path))),
+    ("journal", read_journal),
+    ("manifest", |path| {
+        beside(path, MANIFEST, |folder| {
+            let set = ResultSet::begin(folder)?;
+            fs::write(set.staging().join("result"), "new").expect("a folder of ours");
+            set.commit("fuzz", ())
+        })
+    }),
+];
+
+fn said<T, E: ToString>(read: Result<T, E>) -> Result<(), String> {
+    read.map(drop).map_err(|error| error.to_string())
+}
+
+fn text(path: &Path) -> Result<String, String> {
+    read_text(path).map_err(|error| error.to_string())
+}
+
+fn document(path: &Path) -> Result<Document, String> {
+    Document::load(path).map_err(|error| error.to_string())
+}
+
+/// What reads a file by its folder reads it in one of its own.
+fn beside<T, E: ToString>(
+    path: &Path,
+    name: &str,
+    read: impl FnOnce(&Path) -> Result<T, E>,
+) -> Result<(), String> {
+    let folder = path.with_extension("folder");
+    fs::create_dir_all(&folder).expect("a folder of ours");
+    fs::write(folder.join(name), fs::read(path).expect("a file of ours")).expect("a file of ours");
+    let read = said(read(&folder));
+    fs::remove_dir_all(&folder).expect("a folder of ours");
+    read
+}
+
+/// Options as users write them, one a line: `guide=GUIDE`, `windows=POLICY`, `sensor.KEY=VALUE`, `scene.SECTION.KEY=VALUE`.
+fn read_options(path: &Path) -> Result<(), String> {
+    let (mut sensor, mut scene) = (
+        Document::of("--set", Table::new()),
+        Scene::outdoor_document(),
+    );
+    for line in text(path)?.lines() {
+        match line.split_once(['=', '.']) {
+            Some(("guide", guide)) => said(options::parse_all(guide.split(' '), "--guide"))?,
+            Some(("windows", policy)) => {
+                said(WindowPolicy::default().with(policy, "--windows"))?;
+            }
+            Some(("sensor", assignment)) => said(sensor.assign(assignment, "--set"))?,
+            Some(("scene", assignment)) => said(scene.assign(assignment, "--set"))?,
+            _ => return Err(format!("{line} is no option")),
+        }
+    }
+    said(SensorConfig::read_document(&sensor))?;
+    said(Scene::read(&scene))
+}
+
+/// Whole lines stay, whatever they are, and what is appended is read.
+fn read_journal(path: &Path) -> Result<(), String> {
+    let count = || {
+        let mut lines = 0;
+        let wrong = JournalReader::open(path)?.scan(|_, _| lines += 1)?;
+        Ok::<_, crate::files::InputError>((lines, wrong))
+    };
+    let before = count().map_err(|error| error.to_string())?;
+    let mut journal = Journal::open(path).map_err(|error| error.to_string())?;
+    let journal = journal.as_mut().expect("nobody else has it");
+    said(journal.append(&journal_line("next")))?;
+    assert_eq!(count(), Ok((before.0 + 1, before.1)));
+    Ok(())
+}
