@@ -41,6 +41,7 @@ use guided_dtof::chip::{
 };
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::kernel::{Drive, Kernel, merge};
+use guided_dtof::netlist::sdf::{Sdf, SdfOptions, annotate, write_sdf};
 use guided_dtof::netlist::{
     Corner, Direction, Module, Netlist, Timing, write_cells, write_delays, write_modules,
     write_parametric_cells,
@@ -55,17 +56,15 @@ use scenario::Scenario;
 
 /// Whose waves are compared.
 const NAMES: [&str; 2] = ["the kernel", "Icarus"];
+/// Circuits in one run of Icarus, on average, where there are more than in a usual test.
+const BATCH: u32 = 50;
+/// Random circuits in a usual test.
+const USUAL: u32 = 500;
 /// How long the circuits go on after the last drive.
 const SETTLING: Time = Time::from_ns(2);
 
-/// A testbench that replays `drives` into `top` and dumps everything below it until `end`.
-pub fn testbench(
-    top: &Module,
-    netlist: &Netlist,
-    drives: &[Drive],
-    end: Time,
-    parameters: &str,
-) -> String {
+/// A testbench that replays `drives` into `top`.
+pub fn testbench(top: &Module, netlist: &Netlist, drives: &[Drive], parameters: &str) -> String {
     let mut text = format!("module tb;\n{parameters}");
     let mut ports = Vec::new();
     let mut pins = Vec::new();
@@ -87,8 +86,6 @@ pub fn testbench(
     }
     writeln!(text, "  {} dut({});", top.name(), ports.join(", ")).unwrap();
     writeln!(text, "  initial begin").unwrap();
-    writeln!(text, "    $dumpfile(\"icarus.vcd\");").unwrap();
-    writeln!(text, "    $dumpvars(0, dut);").unwrap();
     let inputs = netlist.inputs();
     let mut now = Time::ZERO;
     for drive in drives {
@@ -99,66 +96,132 @@ pub fn testbench(
         let pin = inputs.iter().position(|&net| net == drive.net).unwrap();
         writeln!(text, "    {} = 1'b{};", pins[pin], drive.value).unwrap();
     }
-    writeln!(text, "    #{} $finish;", (end - now).as_fs()).unwrap();
     writeln!(text, "  end\nendmodule").unwrap();
     text
 }
 
 /// What our kernel makes of `drives`, in the selected signals.
 fn simulate(
-    case: &Case,
+    timing: &Timing,
     netlist: &Netlist,
     drives: Vec<Drive>,
     end: Time,
     selection: &Selection,
 ) -> Waves {
     let mut writer = VcdWriter::new(Vec::new(), netlist, selection).unwrap();
-    let mut kernel = Kernel::new(netlist, &case.timing(netlist));
+    let mut kernel = Kernel::new(netlist, timing);
     let mut stimulus = merge([Box::new(drives.into_iter()) as Box<_>]);
     kernel.run(&mut stimulus, end, &mut writer);
     let top = &netlist.scopes()[0].name;
     Waves::read(Cursor::new(writer.finish(end).unwrap()), top)
 }
 
-/// Runs one case in both simulators.
-fn compare(case: &Case) -> Result<Figures, TestCaseError> {
+/// `timing` with the delays of an SDF file, in all corners, which holds those of `drawn`.
+fn through_sdf(drawn: &Timing, timing: &Timing, netlist: &Netlist, corner: Corner) -> Timing {
+    let mut text = Vec::new();
+    write_sdf(&mut text, netlist, [drawn; 3], SdfOptions::default()).unwrap();
+    let text = String::from_utf8(text).unwrap();
+    let sdf = Sdf::parse("case.sdf", &text).unwrap();
+    let mut annotated = timing.clone();
+    annotate(&mut annotated, netlist, &sdf, corner).unwrap();
+    annotated
+}
+
+/// One of the cases that Icarus simulates at once: its Verilog, whose modules end in `_{index}`, and our waves until `end`.
+struct Prepared {
+    verilog: String,
+    ours: Waves,
+    end: Time,
+}
+
+fn prepared(case: &Case, index: usize) -> Prepared {
     let top = case.circuit();
     let netlist = Netlist::elaborate(&top);
     let drives = case.drives(&netlist);
     let end = drives.last().map_or(Time::ZERO, |d| d.time) + SETTLING;
 
-    let mut design = Vec::new();
-    write_modules(&mut design, &top).unwrap();
-    let design = String::from_utf8(design).unwrap();
-    let mut cells = Vec::new();
+    let mut verilog = Vec::new();
     let mut parameters = Vec::new();
     let (library, corner) = (case.cell_library(), case.corner());
-    if case.has_transport() {
+    // Icarus is given the delays themselves, our kernel those of an SDF file, in some cases.
+    let mut timing = case.timing(&netlist);
+    let mut ours = timing.clone();
+    if let Some(seed) = case.sdf_seed() {
+        let random = &mut StdRng::seed_from_u64(seed);
+        timing = icarus::random_delays(&netlist, &timing, random);
+        ours = through_sdf(&timing, &ours, &netlist, corner);
+    }
+    if case.has_transport() || case.sdf_seed().is_some() {
         let nominal = Timing::nominal(&netlist, &library, corner);
-        let timing = case.timing(&netlist);
-        write_parametric_cells(&mut cells, &library, &BTreeSet::new(), corner).unwrap();
+        write_parametric_cells(&mut verilog, &library, &BTreeSet::new(), corner).unwrap();
         write_delays(&mut parameters, "dut", &netlist, &timing, &nominal).unwrap();
     } else {
-        write_cells(&mut cells, &library, corner).unwrap();
+        write_cells(&mut verilog, &library, corner).unwrap();
     }
+    write_modules(&mut verilog, &top).unwrap();
     let parameters = String::from_utf8(parameters).unwrap();
-    let bench = testbench(&top, &netlist, &drives, end, &parameters);
-    let folder = tempfile::tempdir().unwrap();
-    let all = [&cells[..], design.as_bytes(), bench.as_bytes()].concat();
-    std::fs::write(folder.path().join("case.v"), all).unwrap();
-    icarus::simulate(folder.path(), &["case.v"], &[]);
-    let dump = File::open(folder.path().join("icarus.vcd")).unwrap();
-    let theirs = Waves::read(BufReader::new(dump), "tb.dut");
-
+    let bench = testbench(&top, &netlist, &drives, &parameters);
+    let verilog = String::from_utf8(verilog).unwrap() + &bench;
     let selection = Selection::all().with_anonymous();
-    let ours = simulate(case, &netlist, drives, end, &selection);
-    ours.compare(&theirs, NAMES, end.as_fs() as u64)
-        .map_err(|difference| TestCaseError::fail(format!("{difference}\n{design}\n{bench}")))
+    Prepared {
+        verilog: with_modules_numbered(&verilog, index),
+        ours: simulate(&ours, &netlist, drives, end, &selection),
+        end,
+    }
+}
+
+/// `verilog` with `_{index}` after the name of every module.
+fn with_modules_numbered(verilog: &str, index: usize) -> String {
+    let is_other = |c: char| !c.is_ascii_alphanumeric() && c != '_';
+    let words = |text: &str| text.split(is_other).map(str::to_owned).collect::<Vec<_>>();
+    let modules: BTreeSet<String> = verilog
+        .lines()
+        .filter_map(|line| words(line.strip_prefix("module ")?).into_iter().next())
+        .collect();
+    let mut numbered = String::new();
+    for piece in verilog.split_inclusive(is_other) {
+        let word = piece.trim_end_matches(is_other);
+        numbered += word;
+        if modules.contains(word) {
+            write!(numbered, "_{index}").unwrap();
+        }
+        numbered += &piece[word.len()..];
+    }
+    numbered
+}
+
+/// Runs some cases in both simulators, in one run of Icarus.
+fn compare(cases: &[Case]) -> Result<Figures, TestCaseError> {
+    let cases = cases.iter().enumerate();
+    let cases: Vec<_> = cases.map(|(index, case)| prepared(case, index)).collect();
+    let mut all: String = cases.iter().map(|case| case.verilog.as_str()).collect();
+    let duts: Vec<_> = (0..cases.len()).map(|i| format!("tb_{i}.dut")).collect();
+    let last = cases
+        .iter()
+        .map(|case| case.end)
+        .max()
+        .unwrap_or(Time::ZERO);
+    let (scopes, fs) = (duts.join(", "), last.as_fs());
+    let dump = format!("$dumpfile(\"icarus.vcd\"); $dumpvars(0, {scopes}); #{fs} $finish;");
+    writeln!(all, "module run; initial begin {dump} end endmodule").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("cases.v"), all).unwrap();
+    icarus::simulate(folder.path(), &["cases.v"], &[]);
+    let dump = std::fs::read(folder.path().join("icarus.vcd")).unwrap();
+    let mut figures = Figures::default();
+    for (case, theirs) in cases.iter().zip(Waves::read_each(Cursor::new(dump), &duts)) {
+        figures = figures
+            + case
+                .ours
+                .compare(&theirs, NAMES, case.end.as_fs() as u64)
+                .map_err(|why| TestCaseError::fail(format!("{why}\n{}", case.verilog)))?;
+    }
+    Ok(figures)
 }
 
 /// Cases to run in each of the two tests with random netlists.
 fn cases() -> u32 {
-    scenario::cases(500).div_ceil(2)
+    scenario::cases(USUAL).div_ceil(2)
 }
 
 /// How proptest goes about it. Shrinking is cut short: every step runs Icarus.
@@ -174,22 +237,36 @@ fn config(cases: u32) -> Config {
 }
 
 /// Compares random cases until one differs, and then prints the smallest like it, as Verilog.
-fn compare_all(what: &str, strategy: impl Strategy<Value = Case>) {
+fn compare_all(what: &str, strategy: impl Strategy<Value = Case> + 'static) {
     if !icarus::is_here() {
         return;
     }
     let start = Instant::now();
-    let all = Cell::new(Figures::default());
-    let result = TestRunner::new(config(cases())).run(&strategy, |case| {
-        all.set(all.get() + compare(&case)?);
+    let all = Cell::new((0, Figures::default()));
+    // Starting Icarus takes longer than simulating one. Seeds that are kept are those of single cases.
+    let (runs, strategy, persistence) = if cases() > USUAL / 2 {
+        let batches = prop::collection::vec(strategy, 1..=BATCH as usize * 2 - 1);
+        (cases().div_ceil(BATCH), batches.boxed(), None)
+    } else {
+        let single = strategy.prop_map(|case| vec![case]);
+        (cases(), single.boxed(), config(0).failure_persistence)
+    };
+    let config = Config {
+        failure_persistence: persistence,
+        ..config(runs)
+    };
+    let result = TestRunner::new(config).run(&strategy, |cases| {
+        let (number, figures) = all.get();
+        all.set((number + cases.len() as u64, figures + compare(&cases)?));
         Ok(())
     });
     match result {
         Ok(()) => {}
-        Err(TestError::Fail(reason, case)) => panic!("{reason}\n{case:#?}"),
+        Err(TestError::Fail(reason, cases)) => panic!("{reason}\n{cases:#?}"),
         Err(TestError::Abort(reason)) => panic!("{reason}"),
     }
-    all.get().print(what, cases() as u64, start);
+    let (number, figures) = all.get();
+    figures.print(what, number, start);
 }
 
 /// Runs all macropixels of a small sensor, with their load path, in both simulators.
@@ -348,8 +425,9 @@ fn compare_shuffled(case: &Case, seed: u64) -> Result<Figures, TestCaseError> {
     shuffled.sort_by_key(|drive| drive.time);
     // Numbers of unnamed nets depend on the order, too.
     let named = Selection::all();
-    let waves = simulate(case, &netlists[0], drives, end, &named);
-    let shuffled = simulate(case, &netlists[1], shuffled, end, &named);
+    let timing = netlists.each_ref().map(|netlist| case.timing(netlist));
+    let waves = simulate(&timing[0], &netlists[0], drives, end, &named);
+    let shuffled = simulate(&timing[1], &netlists[1], shuffled, end, &named);
     waves
         .compare(&shuffled, ["the circuit", "its shuffle"], u64::MAX)
         .map_err(TestCaseError::fail)

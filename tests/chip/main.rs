@@ -47,5 +47,6 @@ mod the_sensor_keeps_its_timing_checks;
 mod timing_checks_find_violations;
 mod timing_verdicts_agree_with_gates;
 mod traces_are_deterministic;
+mod violations_are_those_of_the_definitions;
 mod waves_read_back;
 mod yosys_gives_back_what_it_was_given;

@@ -93,9 +93,14 @@ fn compare(mapped: &Mapped, seed: u64) -> (usize, usize) {
 
     let top = &netlist.scopes()[0].module;
     let annotated = "  initial $sdf_annotate(\"mapped.sdf\", dut);\n";
-    let bench = testbench(top, netlist, &drives, end, annotated);
+    let bench = testbench(top, netlist, &drives, annotated);
+    let dump = format!(
+        "$dumpfile(\"icarus.vcd\"); $dumpvars(0, tb.dut); #{} $finish;",
+        end.as_fs()
+    );
+    let run = format!("module run; initial begin {dump} end endmodule\n");
     let (cells, netlist) = (mapped.text("mapped_cells.v"), mapped.text("mapped.v"));
-    let all = format!("{cells}\n{netlist}\n`timescale 1fs/1fs\n{bench}");
+    let all = format!("{cells}\n{netlist}\n`timescale 1fs/1fs\n{bench}{run}");
     let folder = mapped.folder.path();
     std::fs::write(folder.join("case.v"), all).unwrap();
     let said = icarus::simulate(folder, &["-gspecify", "case.v"], &["-sdf-warn"]);

@@ -156,6 +156,11 @@ impl Case {
         self.transport > 0
     }
 
+    /// For one case in four: the seed of delays of each instance's own, for an SDF file.
+    pub fn sdf_seed(&self) -> Option<u64> {
+        self.delay_seed.is_multiple_of(4).then_some(self.delay_seed)
+    }
+
     /// The circuit's top module.
     pub fn circuit(&self) -> Arc<Module> {
         self.build(None)

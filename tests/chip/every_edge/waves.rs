@@ -60,7 +60,23 @@ impl Waves {
 
     /// Reads the signals of the scope at a dotted path and of the scopes below it.
     pub fn read(dump: impl BufRead + Seek + Send + Sync + 'static, scope: &str) -> Self {
+        let mut read = Self::read_each(dump, &[scope.to_owned()]);
+        read.pop().expect("a scope was asked for")
+    }
+
+    /// The same of several scopes.
+    pub fn read_each(
+        dump: impl BufRead + Seek + Send + Sync + 'static,
+        scopes: &[String],
+    ) -> Vec<Self> {
         let mut waves = wellen::simple::read_from_reader(dump).unwrap();
+        scopes
+            .iter()
+            .map(|scope| Self::of_scope(&mut waves, scope))
+            .collect()
+    }
+
+    fn of_scope(waves: &mut wellen::simple::Waveform, scope: &str) -> Self {
         let hierarchy = waves.hierarchy();
         let prefix = format!("{scope}.");
         let signals: Vec<(String, wellen::SignalRef)> = hierarchy
