@@ -1,8 +1,7 @@
-"""What direct dependencies cost to build, and why each stays: the table of docs/src/hardened.md.
+"""Direct dependencies, how many crates each alone draws in, and why it stays: the table of docs/src/hardened.md.
 
-    cargo build --release --timings && python3 benches/dependencies.py
+    python3 benches/dependencies.py
 
-Times are shares of all that `cargo build --timings` measures for dependencies: the crate's own, and with the crates that nothing else draws in.
 Reasons are the comments in the manifests.
 """
 
@@ -22,13 +21,6 @@ name_of = {package["id"]: package["name"] for package in metadata["packages"]}
 edges = {node["id"]: [dep["pkg"] for dep in node["deps"] if any(kind["kind"] != "dev" for kind in dep["dep_kinds"])]
          for node in metadata["resolve"]["nodes"]}
 ours = set(metadata["workspace_members"])
-
-page = max((ROOT / "target/cargo-timings").glob("*.html"), key=lambda path: path.stat().st_mtime).read_text()
-units = json.loads(re.search(r"const UNIT_DATA = (\[.*?\]);\n", page, re.S)[1])
-seconds = {}
-for unit in units:
-    seconds[unit["name"], unit["version"]] = seconds.get((unit["name"], unit["version"]), 0) + unit["duration"]
-cost = {package["id"]: seconds.get((package["name"], package["version"]), 0) for package in metadata["packages"]}
 
 
 def reached(without=None):
@@ -55,13 +47,11 @@ for member, manifest in MANIFESTS.items():
                 reasons.setdefault(name, why[1])
 
 everything = reached()
-third = sum(cost[id] for id in everything - ours)
-print("| crate | in | time, % | with its own, % | crates | why it stays |\n|---|---|---:|---:|---:|---|")
 rows = []
 for name, of in members.items():
     package = next(id for id in everything if name_of[id] == name and any(id in edges[our] for our in ours))
-    alone = everything - reached(package)
-    rows.append((100 * sum(cost[id] for id in alone) / third, name, of, 100 * cost[package] / third, len(alone), reasons[name]))
-for total, name, of, own, count, why in sorted(rows, reverse=True):
-    print(f"| `{name}` | {', '.join(of)} | {own:.1f} | {total:.1f} | {count} | {why} |")
-print(f"\n{len(everything - ours)} crates, {third:.0f} s; ours {sum(cost[id] for id in ours):.0f} s.")
+    rows.append((len(everything - reached(package)), name, of, reasons[name]))
+print("| crate | in | crates that it alone draws in, itself among them | why it stays |\n|---|---|---:|---|")
+for count, name, of, why in sorted(rows, key=lambda row: (-row[0], row[1])):
+    print(f"| `{name}` | {', '.join(of)} | {count} | {why} |")
+print(f"\n{len(everything - ours)} crates in all, without those that only tests use.")
