@@ -13,6 +13,8 @@ GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
     real_histograms_are_ranged::the_sample_captures_are_ranged
 GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
     the_book_lists_every_key::with_its_unit_range_and_source
+GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
+    the_same_everywhere::with_any_number_of_threads
 cd vectors/replay
 cargo run --release --quiet -- replay --sensor sensor.toml --inits inits.csv --events events.csv \
     --stop-periods 80 --laser-cycles 40 --engine gate --out histograms.csv
@@ -37,3 +39,4 @@ python3 ../stability/make.py
 cd ../theory
 python3 detection.py
 python3 precision.py
+GDTOF_REMAKE=1 cargo test --quiet --test figures -- --exact functions_keep_their_promises::every_function_keeps_its_promise

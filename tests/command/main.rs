@@ -35,4 +35,5 @@ mod sweeps_go_on;
 mod the_book_lists_every_key;
 mod the_book_runs;
 mod the_command_explains_itself;
+mod the_same_everywhere;
 mod wave_replays_a_cycle;

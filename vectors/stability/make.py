@@ -14,13 +14,13 @@ mp.dps = 60
 HERE = Path(__file__).parent
 
 
-def write(name, header, rows):
+def write(name, header, rows, functions=1):
     with open(HERE / f"{name}.csv", "w") as out:
-        print(",".join(header) + ",reference", file=out)
-        for *arguments, reference in rows:
-            texts = [repr(float(a)) for a in arguments]
-            reference = str(reference) if isinstance(reference, (int, str)) else mp.nstr(reference, 25)
-            print(",".join(texts) + "," + reference, file=out)
+        print(",".join(header) + ",reference" * functions, file=out)
+        for row in rows:
+            texts = [repr(float(a)) for a in row[:-functions]]
+            texts += [str(r) if isinstance(r, (int, str)) else mp.nstr(r, 25) for r in row[-functions:]]
+            print(",".join(texts), file=out)
 
 
 def normal_below(z):
@@ -192,6 +192,107 @@ def thompson():
                     yield bin_ns, sigma, background, signal, mp.sqrt(variance)
 
 
+def normal_tails():
+    """P(Z > z) and ln P(Z < z): both ends, where either is near 1 and where it is all but 0, and the branches at ±1."""
+    for z in [-1e5, -37.5, -20.0, -8.3, -3.0, -1.0000001, -1.0, -0.9999, -0.3, -1e-9, -1e-300, 0.0, 1e-300, 1e-9, 0.3, 0.9999,
+              1.0, 1.0001, 2.5, 4.9, 7.07, 7.08, 12.0, 20.0, 30.0, 37.0]:
+        below = normal_below(mpf(z))
+        yield z, normal_below(-mpf(z)), mp.log(below) if z < 0 else mp.log1p(-normal_below(-mpf(z)))
+
+
+def stirling_errors():
+    """ln n! less Stirling's formula, whose leading terms cancel to 1/(12 n)."""
+    for n in [1, 2, 3, 7, 15, 16, 17, 50, 1000, 123_457, 10**9, 10**15, 2**53]:
+        yield n, mp.loggamma(n + 1) - (n * mp.log(n) - n + mp.log(2 * mp.pi * n) / 2)
+
+
+def windows():
+    """Share of normal errors inside a window whose centre is uniformly off by up to half a step."""
+    for sigma in [1e-3, 0.05, 0.4, 1.04, 6.0, 1e3]:
+        for window in [0.01, 1.0, 6.25, 100.0]:
+            for ratio in [0.0, 1e-9, 1e-6, 1.1e-6, 1e-4, 1e-2, 0.5, 1.0]:
+                step = min(ratio * sigma, window) if ratio < 0.5 else ratio * window
+                s, half, width = mpf(sigma), mpf(window) / 2, mpf(step)
+
+                def below(t):  # the integral of normal_below
+                    return t * normal_below(t) + mp.npdf(t)
+
+                if step == 0:
+                    share = mp.erf(half / s / mp.sqrt(2))
+                else:
+                    low, high = (half - width / 2) / s, (half + width / 2) / s
+                    share = 2 * s / width * (below(high) - below(low)) - 1
+                yield sigma, window, step, share
+
+
+def periods():
+    """CLK periods in which any of n SPADs fire, or an odd number: 1e-15 to 1/2 avalanches of each in a period."""
+    for spads in [1, 2, 16, 1000]:
+        for chance in [1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 0.25, 0.49, 0.5, 0.75, 1.0]:
+            rate, clk = chance * 384e6, 384e6
+            p = mpf(rate) / mpf(clk)
+            any_of = clk * (1 - (1 - p) ** spads)
+            yield spads, rate, clk, any_of, clk * (1 - (1 - 2 * p) ** spads) / 2
+
+
+def hits():
+    """(1 - exp(-x))/x, its slope, and 1 less it: about the seam at 0.01, at both ends."""
+    for x in [1e-15, 1e-9, 1e-6, 1e-4, 5e-3, 9.999e-3, 1e-2, 1.0001e-2, 0.1, 1.0, 7.5, 40.0, 700.0]:
+        t = mpf(x)
+        missed = -mp.expm1(-t) / t
+        yield x, missed, (mp.exp(-t) - missed) / t, 1 - missed
+
+
+def false_alarms():
+    """ln of the chance that some bin of 16 is as full as the fullest, where the counts fall into any cycle of any bin alike."""
+    for cycles in [100, 16_000, 1_000_000]:
+        for background in [0, 1, 30, 900]:
+            for extra in [1, 2, 10, 60]:
+                counts = [background] * 16
+                counts[5] += extra
+                if counts[5] > cycles:
+                    continue
+                k, marked, drawn, cells = counts[5], sum(counts), cycles, 16 * cycles
+                term = mp.mpf(1) * mp.binomial(drawn, k) * mp.binomial(cells - drawn, marked - k) / mp.binomial(cells, marked)
+                tail, x = mpf(0), k
+                while x <= min(marked, drawn) and term > mpf(10) ** -70 * tail:
+                    tail += term
+                    term *= mpf(marked - x) * (drawn - x) / (mpf(x + 1) * (cells - marked - drawn + x + 1))
+                    x += 1
+                yield background, extra, cycles, min(mp.log(16 * tail), mpf(0))
+
+
+def shares():
+    """Ends of Wilson's 95 % interval, which are within 1e-9 of 0 and 1 and of each other."""
+    z = mpf(1.959_963_984_540_054)
+    for trials in [1.0, 3.0, 40.0, 1000.0, 1e6, 1e9]:
+        for p in [0.0, 1e-9, 1e-6, 0.01, 0.3, 0.5, 0.99, 1.0]:
+            successes = p * trials
+            n, q = mpf(trials), mpf(successes) / mpf(trials)
+            middle = (q + z**2 / (2 * n)) / (1 + z**2 / n)
+            half = z / (1 + z**2 / n) * mp.sqrt(q * (1 - q) / n + z**2 / (4 * n * n))
+            yield successes, trials, middle - half if q else mpf(0), middle + half if q < 1 else mpf(1)
+
+
+def arrivals():
+    """Place by which half of a pulse's counts had come: 3 bins before the fullest to 6 after, less the median of the others."""
+    for counts, *_ in [(row[:16],) for row in peak_positions()]:
+        top = max(range(16), key=lambda i: (counts[i], -i))
+        first, end = max(top - 3, 0), min(top + 7, 16)
+        others = sorted(Fraction(c) for c in counts[:first] + counts[end:])
+        median = (others[(len(others) - 1) // 2] + others[len(others) // 2]) / 2
+        signal = [max(c - median, Fraction(0)) for c in counts[first:end]]
+        if sum(signal) == 0:
+            yield *counts, "nan"
+            continue
+        wanted, bin = sum(signal) / 2, 0
+        while signal[bin] < wanted and first + bin + 1 < end:
+            wanted -= signal[bin]
+            bin += 1
+        place = first + bin - Fraction(1, 2) + wanted / signal[bin]
+        yield *counts, mpf(place.numerator) / place.denominator
+
+
 write("pulse_share", ["from", "to", "sigma"], pulse_share())
 write("normal_draws", ["word"], normal_draws())
 write("hit_tails", ["k", "mean"], hit_tails())
@@ -203,3 +304,11 @@ write("counters", ["bits", "overflow", "hits"], counters())
 write("window_edges", ["start", "cycle", "bin"], window_edges())
 write("peak_positions", [f"bin_{i}" for i in range(16)], peak_positions())
 write("thompson", ["bin_ns", "sigma_ns", "background", "signal"], thompson())
+write("normal_tails", ["z"], normal_tails(), 2)
+write("stirling_errors", ["n"], stirling_errors())
+write("windows", ["sigma", "window", "step"], windows())
+write("periods", ["spads", "avalanches_hz", "clk_hz"], periods(), 2)
+write("hits", ["x"], hits(), 3)
+write("false_alarms", ["background", "extra", "cycles"], false_alarms())
+write("shares", ["successes", "trials"], shares(), 2)
+write("arrivals", [f"bin_{i}" for i in range(16)], arrivals())

@@ -182,6 +182,8 @@ mod tests {
     fn bits_round_trip() {
         for v in Logic::ALL {
             assert_eq!(Logic::from_bits(v.bits()), v);
+            assert_eq!(v.to_string(), v.to_char().to_string());
         }
+        assert_eq!([false, true].map(Logic::from), [Zero, One]);
     }
 }

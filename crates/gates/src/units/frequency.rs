@@ -213,10 +213,20 @@ mod tests {
 
     #[test]
     fn impossible_frequencies_are_refused() {
-        for hz in [0.0, -1.0, f64::NAN, f64::INFINITY, 0.5, 2e12] {
-            assert!(Frequency::from_hz_f64(hz).is_err(), "{hz}");
+        use FrequencyError::{NotPositive, OutOfRange};
+        for hz in [0.0, -1.0, f64::INFINITY] {
+            assert_eq!(Frequency::from_hz_f64(hz), Err(NotPositive(hz)));
         }
-        assert!(Frequency::from_period(Time::ZERO).is_err());
+        let nan = Frequency::from_hz_f64(f64::NAN);
+        assert!(matches!(nan, Err(NotPositive(_))));
+        for hz in [0.5, 2e12] {
+            assert_eq!(Frequency::from_hz_f64(hz), Err(OutOfRange(hz)));
+        }
+        let of = |fs| Frequency::from_period(Time::from_fs(fs));
+        assert_eq!(of(0), Err(NotPositive(f64::INFINITY)));
+        assert_eq!(of(-4), Err(NotPositive(-2.5e14)));
+        assert_eq!(of(500), Err(OutOfRange(2e12)));
+        assert_eq!(Frequency::from_hz_f64(1.5).unwrap().as_hz(), 1.5);
     }
 
     proptest! {
@@ -250,9 +260,24 @@ mod tests {
         #[test]
         fn ticks_are_the_half_periods(hz in 1e6f64..2e9, first in -1_000_000_000i64..1_000_000_000) {
             let f = Frequency::from_hz_f64(hz).unwrap();
-            for (k, tick) in (first..).zip(f.ticks(first).take(10_000)) {
-                prop_assert_eq!(tick, f.half_periods(k));
+            let mut ticks = f.ticks(first);
+            for k in first..first + 10_000 {
+                prop_assert_eq!(ticks.next(), Some(f.half_periods(k)));
             }
+        }
+
+        #[test]
+        fn a_part_is_that_of_a_long_division(hz in 1.0f64..1e12, bits in 0u32..=30) {
+            let f = Frequency::from_hz_f64(hz).unwrap();
+            let step = FS_PER_S as u128 * u128::from(f.denominator);
+            let parts = u128::from(f.numerator) << bits;
+            let (mut rest, mut digits) = (step % parts, 0);
+            for _ in 0..64 {
+                rest *= 2;
+                digits = 2 * digits + u64::from(rest >= parts);
+                rest -= if rest >= parts { parts } else { 0 };
+            }
+            prop_assert_eq!(f.part_fs(bits), ((step / parts) as u64, digits));
         }
 
         #[test]

@@ -107,6 +107,30 @@ mod tests {
     use super::*;
 
     #[test]
+    fn units_and_operations_are_those_of_whole_femtoseconds() {
+        let time = Time::from_fs(2_500_000);
+        assert_eq!([Time::from_ps(2_500), Time::from_s(2.5e-9)], [time; 2]);
+        assert_eq!([time.as_s(), time.as_ns()], [2.5e-9, 2.5]);
+        let mut sum = time + Time::from_fs(7);
+        sum += Time::from_fs(5);
+        assert_eq!(sum - time, Time::from_fs(12));
+        assert_eq!([-sum, sum * 3].map(Time::as_fs), [-2_500_012, 7_500_036]);
+    }
+
+    #[test]
+    fn prints_with_the_largest_unit_below() {
+        for (power, unit) in [(3, "ps"), (6, "ns"), (9, "us"), (12, "ms"), (15, "s")] {
+            let fs = 10i64.pow(power);
+            assert_eq!(Time::from_fs(fs).to_string(), format!("1.000 {unit}"));
+            assert!(
+                !Time::from_fs(fs - 1)
+                    .to_string()
+                    .ends_with(&format!(" {unit}"))
+            );
+        }
+    }
+
+    #[test]
     fn prints_with_a_readable_unit() {
         assert_eq!(Time::from_fs(12).to_string(), "12 fs");
         assert_eq!(Time::from_fs(1_200_000).to_string(), "1.200 ns");

@@ -1,10 +1,14 @@
 //! Special functions that keep their digits where the obvious formula loses them.
+//!
+//! Exponentials and logarithms are those of `libm`: the last digit of the system's depends on the processor.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
+use libm::{exp, log, log1p};
+
 /// Density of the standard normal distribution.
 pub fn normal_density(z: f64) -> f64 {
-    (-0.5 * z * z).exp() / (2.0 * PI).sqrt()
+    exp(-0.5 * z * z) / (2.0 * PI).sqrt()
 }
 
 /// P(Z > z) of the standard normal distribution, with relative accuracy in the upper tail.
@@ -18,14 +22,14 @@ pub fn normal_above(z: f64) -> f64 {
     // erfc alone would magnify the rounding of z/√2 by z².
     let square = z * z;
     let lost = z.mul_add(z, -square);
-    0.5 * (-0.5 * square).exp() * (1.0 - 0.5 * lost) * erfcx(z * FRAC_1_SQRT_2)
+    0.5 * exp(-0.5 * square) * (1.0 - 0.5 * lost) * erfcx(z * FRAC_1_SQRT_2)
 }
 
 /// ln P(Z < z), with relative accuracy where the probability is near 1 and where it is near 0.
 pub fn ln_normal_below(z: f64) -> f64 {
     match z {
-        z if z > -1.0 => (-normal_above(z)).ln_1p(),
-        z => -0.5 * z * z + (0.5 * erfcx(-z * FRAC_1_SQRT_2)).ln(),
+        z if z > -1.0 => log1p(-normal_above(z)),
+        z => -0.5 * z * z + log(0.5 * erfcx(-z * FRAC_1_SQRT_2)),
     }
 }
 
@@ -36,7 +40,7 @@ pub(crate) fn erfcx(x: f64) -> f64 {
         // x² is rounded; what the rounding lost is put back to first order.
         let square = x * x;
         let lost = x.mul_add(x, -square);
-        return square.exp() * (1.0 + lost) * libm::erfc(x);
+        return exp(square) * (1.0 + lost) * libm::erfc(x);
     }
     // Laplace's continued fraction, from a depth that suffices at x = 5.
     let tail = (1..=40)
@@ -49,7 +53,7 @@ pub(crate) fn erfcx(x: f64) -> f64 {
 pub(crate) fn ln_exprel_neg(t: f64) -> f64 {
     debug_assert!(t >= 0.0, "{t}");
     if t > 1.0 {
-        return (-(-t).exp()).ln_1p() - t.ln();
+        return log1p(-exp(-t)) - log(t);
     }
     // ln(sinh(t/2)/(t/2)) = Σ B₂ₙ t²ⁿ / (2n (2n)!), B₂ₙ the Bernoulli numbers.
     const COEFFICIENTS: [f64; 8] = [
@@ -76,7 +80,7 @@ pub(crate) fn ln_sum_exp(a: f64, b: f64) -> f64 {
     if small == f64::NEG_INFINITY {
         return large;
     }
-    large + (small - large).exp().ln_1p()
+    large + log1p(exp(small - large))
 }
 
 /// ln n! − (n ln n − n + ½ ln 2πn), the error of Stirling's formula, for n ≥ 1.
@@ -84,7 +88,7 @@ pub fn stirling_error(n: u64) -> f64 {
     if n < 16 {
         let factorial: f64 = (2..=n).map(|k| k as f64).product();
         let n = n as f64;
-        return factorial.ln() - (n * n.ln() - n + 0.5 * (2.0 * PI * n).ln());
+        return log(factorial) - (n * log(n) - n + 0.5 * log(2.0 * PI * n));
     }
     stirling_series(n as f64)
 }
@@ -116,7 +120,7 @@ pub(crate) fn poisson_deviance(x: f64, mean: f64) -> f64 {
         return if x == 0.0 {
             mean
         } else {
-            x * (x / mean).ln() - difference
+            x * log(x / mean) - difference
         };
     }
     let v = difference / (x + mean);

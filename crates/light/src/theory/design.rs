@@ -12,6 +12,8 @@
 //! window can only be put on a grid of steps, so its centre is off by up to half a step: counted here as an
 //! error of its own, uniform and independent of the estimate's.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use libm::erf;
 
 use crate::numerics::{normal_above, normal_density};
@@ -67,16 +69,23 @@ impl Design {
 ///
 /// All three in the same unit; `sigma` and `window` above 0.
 pub fn share_inside(sigma: f64, window: f64, step: f64) -> f64 {
-    let half = 0.5 * window;
-    if step <= 1e-6 * sigma {
-        return erf(half / (sigma * std::f64::consts::SQRT_2));
+    let [middle, width] = [0.5 * window / sigma, step / sigma];
+    if width <= 1e-3 {
+        // Two terms of the mean's series in the step.
+        let bend = middle * normal_density(middle) * width * width / 12.0;
+        return erf(middle * FRAC_1_SQRT_2) - bend;
     }
-    // The mean of the outside share over the offset u: ∫ Q((half + u)/σ) du from −step/2 to step/2, both sides
-    // alike; ∫ Q is t·Q(t) − φ(t).
-    let outside = |t: f64| t * normal_above(t) - normal_density(t);
-    let low = (half - 0.5 * step) / sigma;
-    let high = (half + 0.5 * step) / sigma;
-    1.0 - 2.0 * sigma / step * (outside(high) - outside(low))
+    // The mean over the offset is a difference of integrals from the window's end nearest to the target to the farthest.
+    let (low, high) = (middle - 0.5 * width, middle + 0.5 * width);
+    if low > 1.0 {
+        // Of the little outside; ∫ Q is t·Q(t) − φ(t).
+        let outside = |t: f64| t * normal_above(t) - normal_density(t);
+        return 1.0 - 2.0 / width * (outside(high) - outside(low));
+    }
+    // Of the inside: ∫ (½ − Q).
+    let inside =
+        |t: f64| 0.5 * t * erf(t * FRAC_1_SQRT_2) + normal_density(0.0) * (-0.5 * t * t).exp_m1();
+    2.0 / width * (inside(high) - inside(low))
 }
 
 /// The greatest `sigma` for which [`share_inside`] is at least `share` (0 to 1, exclusive); `None` where even a

@@ -54,12 +54,20 @@ pub fn xor_edges_hz(toggles_hz: f64, gate_delay_s: f64) -> f64 {
 /// CLK periods, 1/s, in which an odd number of `spads` SPADs fire, which is what a sampled XOR tree tells:
 /// (1 − (1 − 2 m T)ⁿ) / 2 of all, half of them at most where many fire.
 pub fn odd_periods_hz(spads: u32, avalanches_hz: f64, clk_hz: f64) -> f64 {
-    0.5 * clk_hz * (1.0 - (1.0 - 2.0 * avalanches_hz / clk_hz).powi(spads as i32))
+    0.5 * clk_hz * any_of(spads, 2.0 * avalanches_hz / clk_hz)
 }
 
 /// CLK periods, 1/s, in which any SPAD fires: what synchronous summation with THRESHOLD 0 counts, 1 − (1 − m T)ⁿ of all.
 pub fn any_periods_hz(spads: u32, avalanches_hz: f64, clk_hz: f64) -> f64 {
-    clk_hz * (1.0 - (1.0 - avalanches_hz / clk_hz).powi(spads as i32))
+    clk_hz * any_of(spads, avalanches_hz / clk_hz)
+}
+
+/// 1 − (1 − x)ⁿ, with its digits where x is small.
+fn any_of(n: u32, x: f64) -> f64 {
+    match x < 0.5 {
+        true => -(f64::from(n) * (-x).ln_1p()).exp_m1(),
+        false => 1.0 - (1.0 - x).powi(n as i32),
+    }
 }
 
 #[cfg(test)]

@@ -12,6 +12,8 @@
 //!
 //! Both µ grow with the number of laser cycles N, and FI with them: δ = δ(1 cycle)/√N without search.
 
+use libm::{exp, log};
+
 use super::pulse::Pulse;
 use crate::numerics::{integrate, ln_sum_exp};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -48,9 +50,7 @@ pub fn thompson_best_ratio(background: f64, signal: f64) -> f64 {
 ///
 /// Always finite: values beyond `f64` (σ below about a/100) are returned as the largest one.
 pub fn cramer_rao(bin_ns: f64, sigma_ns: f64, background: f64, signal: f64) -> f64 {
-    ln_cramer_rao(bin_ns, sigma_ns, background, signal)
-        .exp()
-        .min(f64::MAX)
+    exp(ln_cramer_rao(bin_ns, sigma_ns, background, signal)).min(f64::MAX)
 }
 
 /// ln of [`cramer_rao`], which never overflows.
@@ -61,7 +61,7 @@ pub fn ln_cramer_rao(bin_ns: f64, sigma_ns: f64, background: f64, signal: f64) -
 /// The Cramér-Rao bound, ns, for a `pulse` of any shape; infinite when the pulse fits into a bin with room to
 /// spare, because such a pulse tells nothing of its place. `background` µ_B per bin, `signal` µ_S.
 pub fn bound(pulse: &Pulse, bin_ns: f64, background: f64, signal: f64) -> f64 {
-    ln_bound(pulse, bin_ns, background, signal).exp()
+    exp(ln_bound(pulse, bin_ns, background, signal))
 }
 
 fn ln_bound(pulse: &Pulse, bin_ns: f64, background: f64, signal: f64) -> f64 {
@@ -78,7 +78,7 @@ fn ln_bound(pulse: &Pulse, bin_ns: f64, background: f64, signal: f64) -> f64 {
             let from = (i as f64 - 0.5) * bin_ns - position;
             ln_information(pulse, from, from + bin_ns, background, signal)
         });
-        terms.fold(f64::NEG_INFINITY, ln_sum_exp) + (stride as f64).ln()
+        terms.fold(f64::NEG_INFINITY, ln_sum_exp) + log(stride as f64)
     };
     let edge = |i: i64| (i as f64 - 0.5) * bin_ns;
     let bins = (first..=last).map(|i| (edge(i), edge(i + 1)));
@@ -117,7 +117,10 @@ pub fn bound_in_bins(
         terms.fold(f64::NEG_INFINITY, ln_sum_exp)
     };
     let bins = edges_ns.windows(2).map(|bin| (bin[0], bin[1]));
-    ln_root_mean(information, &position_breaks(pulse, bins, from_ns, to_ns)).exp()
+    exp(ln_root_mean(
+        information,
+        &position_breaks(pulse, bins, from_ns, to_ns),
+    ))
 }
 
 /// ln of what one bin contributes to the information about the pulse's position: ln((µ_S·slope)²/(µ_B + µ_S·share)).
@@ -126,7 +129,7 @@ fn ln_information(pulse: &Pulse, from: f64, to: f64, background: f64, signal: f6
     if bin.slope == f64::NEG_INFINITY {
         return f64::NEG_INFINITY;
     }
-    2.0 * (signal.ln() + bin.slope) - ln_sum_exp(background.ln(), signal.ln() + bin.share)
+    2.0 * (log(signal) + bin.slope) - ln_sum_exp(log(background), log(signal) + bin.share)
 }
 
 /// Pulse positions in \[`first`, `last`\] between which 1/FI is smooth: halving steps towards the middle of each of
@@ -170,8 +173,8 @@ fn ln_root_mean(ln_information: impl Fn(f64) -> f64, breaks: &[f64]) -> f64 {
     let span = breaks[breaks.len() - 1] - breaks[0];
     // Logarithms are rounded in proportion to their size, which no quadrature gets below.
     let tolerance = 1e-15 * (1.0 + least.abs());
-    let mean = integrate(|t| (least - ln_information(t)).exp(), breaks, tolerance) / span;
-    0.5 * (mean.ln() - least)
+    let mean = integrate(|t| exp(least - ln_information(t)), breaks, tolerance) / span;
+    0.5 * (log(mean) - least)
 }
 
 /// Laser cycles for a precision of `target_ns` by the Cramér-Rao bound, when one cycle brings `background` counts

@@ -6,6 +6,8 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, LN_2, PI};
 
+use libm::{exp, expm1, log};
+
 use crate::numerics::{erfcx, gauss_legendre};
 
 /// Shape of the pulse, normalised to one photon.
@@ -58,15 +60,15 @@ impl Pulse {
         match self {
             Pulse::Gaussian { sigma_ns } => gaussian_bin(*sigma_ns, from_ns, to_ns),
             Pulse::Measured(pulse) => LnBin {
-                share: (pulse.below(to_ns) - pulse.below(from_ns)).max(0.0).ln(),
-                slope: (pulse.density(from_ns) - pulse.density(to_ns)).abs().ln(),
+                share: log((pulse.below(to_ns) - pulse.below(from_ns)).max(0.0)),
+                slope: log((pulse.density(from_ns) - pulse.density(to_ns)).abs()),
             },
         }
     }
 
     /// Share of the photons between `from_ns` and `to_ns` after the pulse's position.
     pub(crate) fn share(&self, from_ns: f64, to_ns: f64) -> f64 {
-        self.ln_bin(from_ns, to_ns).share.exp()
+        exp(self.ln_bin(from_ns, to_ns).share)
     }
 }
 
@@ -79,18 +81,18 @@ fn gaussian_bin(sigma_ns: f64, from_ns: f64, to_ns: f64) -> LnBin {
         (from, to)
     };
     let width = (to_ns - from_ns) / sigma_ns;
-    let ln_near = -0.5 * near * near - 0.5 * (2.0 * PI).ln();
+    let ln_near = -0.5 * near * near - 0.5 * log(2.0 * PI);
     // φ(far)/φ(near) = e^(−fall)
     let fall = 0.5 * (near + far) * width;
     let mills = |z: f64| (0.5 * PI).sqrt() * erfcx(z * FRAC_1_SQRT_2);
     let share = if width < 0.5 && near.abs() * width < 4.0 {
-        ln_near + gauss_legendre(|s| (-s * (near + 0.5 * s)).exp(), 0.0, width).ln()
+        ln_near + log(gauss_legendre(|s| exp(-s * (near + 0.5 * s)), 0.0, width))
     } else if near < 0.0 {
-        (0.5 * (libm::erf(far * FRAC_1_SQRT_2) + libm::erf(-near * FRAC_1_SQRT_2))).ln()
+        log(0.5 * (libm::erf(far * FRAC_1_SQRT_2) + libm::erf(-near * FRAC_1_SQRT_2)))
     } else {
-        ln_near + (mills(near) - (-fall).exp() * mills(far)).ln()
+        ln_near + log(mills(near) - exp(-fall) * mills(far))
     };
-    let slope = ln_near + (-(-fall).exp_m1()).ln() - sigma_ns.ln();
+    let slope = ln_near + log(-expm1(-fall)) - log(sigma_ns);
     LnBin { share, slope }
 }
 
