@@ -205,16 +205,19 @@ fn p_counter(found: &Found<'_>) -> Option<String> {
         let is_clocked = cell.kind.is_flip_flop() && cell.inputs[1] == clk;
         is_clocked && after.window(cell.inputs[0]).is_some()
     });
+    let stop = found.probes.net(Probe::LocalStop);
+    let stops = after.edge_window(stop, Edge::Rise).is_some();
+    let flaw = "does not count rising edges of COUNTER_CLK up to LOCAL_STOP; clock it with posedge COUNTER_CLK";
+    if !counts || !stops {
+        return Some(flaw.to_owned());
+    }
     // Its timing would have no path behind a reset that is cut at its start.
     let reset = found.probes.net(Probe::CounterReset);
     let mut flip_flops = (found.netlist.cells().iter()).filter(|cell| cell.kind.is_flip_flop());
     if flip_flops.any(|cell| cell.inputs[1] == reset) {
         return Some("clocks a flip-flop with COUNTER_RESET; reset it by that instead".to_owned());
     }
-    let stop = found.probes.net(Probe::LocalStop);
-    let stops = after.edge_window(stop, Edge::Rise).is_some();
-    let flaw = "does not count rising edges of COUNTER_CLK up to LOCAL_STOP; clock it with posedge COUNTER_CLK";
-    (!counts || !stops).then(|| flaw.to_owned())
+    None
 }
 
 fn correlation(found: &Found<'_>) -> Option<String> {
