@@ -109,13 +109,13 @@ fn write_library(
 ) -> std::io::Result<usize> {
     let top = array::circuit(config);
     let silicon = Silicon::of(config);
-    if silicon.library.from_file().is_some() {
+    if silicon.cell_library.from_file().is_some() {
         let netlist = Netlist::elaborate(&top.renamed(design));
         let timing = silicon.timing(&netlist);
         write_sdf(out, &netlist, [&timing; 3], options)?;
         return Ok(netlist.cells().len());
     }
-    write_library_sdf(out, (&top, design), silicon.library.cells(), options)
+    write_library_sdf(out, (&top, design), silicon.cell_library.cells(), options)
 }
 
 /// About how many bytes the file will have: its size grows with the number of macropixels, as that of a corner of the array. From

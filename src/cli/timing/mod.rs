@@ -113,7 +113,7 @@ fn condition_table(args: &SiliconArgs, silicon: &Silicon) -> Section {
         "delay factor",
     ];
     let mut section = Section::new("conditions", "Conditions", headings);
-    let (process, [voltage_v, temperature_c]) = match silicon.library.from_file() {
+    let (process, [voltage_v, temperature_c]) = match silicon.cell_library.from_file() {
         Some(library) => (library.liberty.name.as_str(), library.liberty.conditions),
         None => (
             conditions.process.name(),

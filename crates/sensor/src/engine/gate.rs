@@ -128,7 +128,7 @@ impl GateSimulation {
     /// Timing checks of this netlist in the sensor's corner, from the end of the power-up reset on, to run it with. The
     /// front ends' first samplers count as asynchronous.
     pub fn timing_checks(&self, policy: Policy) -> TimingChecks {
-        let library = self.sensor.silicon().library.cells();
+        let library = self.sensor.silicon().cell_library.cells();
         let samplers = self.samplers();
         TimingChecks::new(&self.netlist, library, self.sensor.corner)
             .limits(&self.netlist, &self.timing)

@@ -68,7 +68,7 @@ fn counted_before(
     cycle: u32,
 ) -> Option<Histograms> {
     // Random chips in a library's cells, near their limits, had another HIT before the cycle than in the whole run.
-    let is_of_library = sensor.silicon().library.from_file().is_some();
+    let is_of_library = sensor.silicon().cell_library.from_file().is_some();
     if !sensor.p_counter.row().has_memory || is_of_library {
         return None;
     }

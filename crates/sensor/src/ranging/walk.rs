@@ -260,7 +260,12 @@ impl WalkCorrection {
         let mut fits: Vec<Fit> = (near.iter().filter(may_win))
             .map(|near| likelihood.refined(near))
             .collect();
-        fits.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
+        // Those that have converged first, then the most likely. Under a THRESHOLD the most likely may converge slowly.
+        let is_behind = |fit: &Fit| !has_threshold && !fit.has_converged;
+        fits.sort_by(|a, b| {
+            let behind = is_behind(a).cmp(&is_behind(b));
+            behind.then(a.deviance.total_cmp(&b.deviance))
+        });
         let best = *fits.first().ok_or(WalkLeft::NotConverged)?;
         let is_another = |fit: &Fit| {
             let off = (fit.light.position_bins - best.light.position_bins).abs();

@@ -46,10 +46,11 @@ impl Export<'_> {
     /// When the folder or a file in it cannot be written.
     pub fn write(self, folder: &Path, config: &SensorConfig) -> Result<(), InputError> {
         let (silicon, corner) = (Silicon::of(config), config.corner);
-        let library = silicon.library.cells();
+        let library = silicon.cell_library.cells();
         let top = array::circuit(config);
         let netlist = Netlist::elaborate(&top);
-        let has_own = !netlist.own_delays().is_empty() || silicon.library.from_file().is_some();
+        let has_own =
+            !netlist.own_delays().is_empty() || silicon.cell_library.from_file().is_some();
         let own = has_own.then(|| silicon.timing(&netlist));
         let timing = self.timing.or(own.as_ref());
         let chains = Chain::all(&netlist);

@@ -67,7 +67,7 @@ pub struct MacropixelCircuit {
     /// Path of each cell before and, where the macropixel is in it, after its name.
     cell_paths: OnceLock<Vec<(String, Option<String>)>>,
     /// Delays of the library's cells: a macropixel in a Liberty file's takes milliseconds.
-    library_timing: OnceLock<(CellLibrary, Corner, Timing)>,
+    cell_timing: OnceLock<(CellLibrary, Corner, Timing)>,
 }
 
 impl MacropixelCircuit {
@@ -107,7 +107,7 @@ impl MacropixelCircuit {
             clear: probes.counter_clear(&netlist),
             disabled: probes.disabled(&netlist),
             cell_paths: OnceLock::new(),
-            library_timing: OnceLock::new(),
+            cell_timing: OnceLock::new(),
             probes,
             netlist,
         }
@@ -131,10 +131,10 @@ impl MacropixelCircuit {
             (path, None) => path.clone(),
             (before, Some(after)) => [before, name.as_str(), after].concat(),
         };
-        let of_library = || silicon.library_timing(&self.netlist);
-        let cells = (silicon.library, silicon.corner);
+        let of_library = || silicon.cell_timing(&self.netlist);
+        let cells = (silicon.cell_library, silicon.corner);
         let (library, corner, known) = self
-            .library_timing
+            .cell_timing
             .get_or_init(|| (cells.0, cells.1, of_library()));
         let timing = match (*library, *corner) == cells {
             true => known.clone(),

@@ -16,7 +16,7 @@ pub struct Silicon {
     /// Random differences between cells, on delays only.
     pub mismatch: Option<Mismatch>,
     /// The cells themselves.
-    pub library: CellLibrary,
+    pub cell_library: CellLibrary,
 }
 
 /// Whether flip-flops' limits count, or only what they capture.
@@ -35,7 +35,7 @@ impl Silicon {
             corner,
             factor: 1.0,
             mismatch: None,
-            library: CellLibrary::BUILT_IN,
+            cell_library: CellLibrary::BUILT_IN,
         }
     }
 
@@ -43,7 +43,7 @@ impl Silicon {
     /// [`SensorConfig::check`].
     pub fn of(config: &SensorConfig) -> Self {
         Silicon {
-            library: CellLibrary::of(config).expect("checked"),
+            cell_library: CellLibrary::of(config).expect("checked"),
             ..Silicon::nominal(config.corner)
         }
     }
@@ -60,7 +60,7 @@ impl Silicon {
     /// # Errors
     /// Conditions for which no delays are known.
     pub fn in_conditions(self, conditions: Conditions) -> Result<Self, UnknownConditions> {
-        if self.library.from_file().is_some() && conditions != Conditions::default() {
+        if self.cell_library.from_file().is_some() && conditions != Conditions::default() {
             return Err(UnknownConditions::OfLibrary);
         }
         let factor = conditions.delay_factor();
@@ -74,12 +74,12 @@ impl Silicon {
 
     /// Delays of another netlist that differs from this one in names only: there each cell is at `path` of its index.
     pub(crate) fn timing_as(&self, netlist: &Netlist, path: impl Fn(usize) -> String) -> Timing {
-        self.timing_of(netlist, self.library_timing(netlist), path)
+        self.timing_of(netlist, self.cell_timing(netlist), path)
     }
 
     /// Delays of the library's cells in a netlist, whatever they are called.
-    pub(crate) fn library_timing(&self, netlist: &Netlist) -> Timing {
-        self.library.timing(netlist, self.corner)
+    pub(crate) fn cell_timing(&self, netlist: &Netlist) -> Timing {
+        self.cell_library.timing(netlist, self.corner)
     }
 
     /// [`Silicon::timing_as`] where the library's delays are known.
@@ -99,7 +99,7 @@ impl Silicon {
             Limits::Kept => self.factor,
             Limits::Ignored => 0.0,
         };
-        derated_limits(self.library.cells(), factor)
+        derated_limits(self.cell_library.cells(), factor)
     }
 }
 
