@@ -6,8 +6,8 @@ use guided_dtof::engine::{
     Cohort, CohortOptions, EngineError, Expose, LitPixel, Window, full_stream, stream_config,
 };
 use guided_dtof::photon::{
-    Echo, LightError, PhotonStream, PixelLight, Profile, PulseShape, SpadModel, SpadSpread,
-    StreamConfig,
+    Echo, LightError, OtherLaser, PhotonStream, PixelLight, Profile, PulseShape, PulseTrain,
+    SpadModel, SpadSpread, StreamConfig,
 };
 use guided_dtof::units::{Frequency, Time};
 use proptest::prelude::*;
@@ -23,6 +23,8 @@ struct More {
     echoes: Vec<(f64, Arrival, Option<Sigma>, bool)>,
     /// Edges as shares of 1.2 laser cycles, and rates relative to the background with 1 Mcount/s more.
     profile: Option<Vec<(f64, f64)>>,
+    /// Photons, period and delay in laser cycles, standard deviation, and what both lasers wait at most in periods.
+    trains: Vec<(f64, f64, f64, Sigma, [f64; 2])>,
     /// Where the light changes, as shares of the exposure.
     changes: Vec<f64>,
     /// Factors and dark counts of SPADs, which are repeated.
@@ -38,15 +40,25 @@ fn more() -> impl Strategy<Value = More> {
     );
     let profile = prop::collection::vec((0.01f64..1.0, 0.0f64..3.0), 1..5);
     let spads = prop::collection::vec((0.0f64..2.0, 0.0f64..1e6), 1..7);
+    let dither = prop_oneof![Just(0.0), 0.0f64..0.9];
+    let train = (
+        prop_oneof![0.0f64..3.0, 0.0f64..1e4],
+        0.05f64..5.0,
+        0.0f64..3.0,
+        sigmas(),
+        [dither.clone(), dither],
+    );
     (
         prop::collection::vec(echo, 0..3),
         prop::option::of(profile),
+        prop::collection::vec(train, 0..3),
         prop::collection::vec(0.0f64..1.0, 0..3),
         prop::option::of(spads),
     )
-        .prop_map(|(echoes, profile, changes, spads)| More {
+        .prop_map(|(echoes, profile, trains, changes, spads)| More {
             echoes,
             profile,
+            trains,
             changes,
             spads,
         })
@@ -87,6 +99,22 @@ fn with_more(case: Case, more: &More) -> Case {
         let rates: Vec<f64> = pieces.iter().map(|(_, rate)| rate * rate_hz).collect();
         let profile = Profile::new(&edges, &rates[..edges.len() - 1]).unwrap();
         light = light.with_profile(profile);
+    }
+    for (number, &(photons, period, delay, sigma, dither)) in (0..).zip(&more.trains) {
+        let period_s = period * cycle_fs * 1e-15;
+        let [dither_s, own_dither_s] = dither.map(|share| share * period_s);
+        light = light.with_train(PulseTrain {
+            laser: OtherLaser {
+                number,
+                period_s,
+                phase: None,
+                dither_s,
+                own_dither_s,
+            },
+            photons,
+            delay: Time::from_fs((delay * cycle_fs) as i64),
+            sigma: Time::from_fs(sigma.fs(clk_fs)),
+        });
     }
     let mut segments = vec![(0, light.clone())];
     let mut changes = more.changes.clone();
@@ -310,6 +338,31 @@ fn photons_fall_where_and_as_often_as_described() {
             even(1e6, 41.3, 300.0),
         ];
         fall_as_described(&name("fog"), &fog, &all(&of_fog), &EVEN, &NONE);
+
+        let laser = OtherLaser {
+            number: 3,
+            period_s: 171e-9,
+            phase: Some(0.3),
+            dither_s: 0.0,
+            own_dither_s: 0.0,
+        };
+        let train = PulseTrain {
+            laser,
+            photons: 0.7 * bright,
+            delay: ns(33.0),
+            sigma: ns(2.0),
+        };
+        let other = PixelLight::echo(0.3 * bright, ns(20.0))
+            .with_background(1e6 * bright)
+            .with_train(train);
+        let pulse = |pulse: u32| {
+            let sent_ns = (f64::from(pulse) + 0.3) * 171.0;
+            (0..1, vec![gaussian(0.7 * bright, sent_ns + 33.0, 2.0)])
+        };
+        let mut of_other: Vec<_> = (0..22).map(pulse).collect();
+        let own = vec![gaussian(0.3 * bright, 20.0, 1.0), constant(1e6 * bright)];
+        of_other.push((0..30, own));
+        fall_as_described(&name("another laser"), &other, &of_other, &EVEN, &NONE);
 
         let moving = [
             (0, fog.clone()),

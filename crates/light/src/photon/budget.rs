@@ -120,6 +120,19 @@ impl PhotonBudget {
         self.background_per_m2(reflectivity, illuminance_klux) * etendue_m2
     }
 
+    /// Detected photons of one macropixel where each square metre that it sees, if white, has got this energy of the laser's
+    /// wavelength: as Eq. 16, for a pulse.
+    pub(crate) fn photons_of_exposure(&self, exposure_j_m2: f64) -> f64 {
+        let etendue_m2 = self.solid_angle_sr() * (self.lens_diameter_m / 2.0).powi(2);
+        self.counts_per_joule(1.0) * exposure_j_m2 * etendue_m2
+    }
+
+    /// Detected photons of what falls on the lens, J/m², all of which goes into one macropixel.
+    pub(crate) fn photons_through_lens(&self, exposure_j_m2: f64) -> f64 {
+        let aperture_m2 = PI * (self.lens_diameter_m / 2.0).powi(2);
+        self.counts_per_joule(1.0) / self.convention.factor() * exposure_j_m2 * aperture_m2
+    }
+
     /// sin²α of Eq. 6: the lens's share of what a target at `range_m` sends back.
     pub(crate) fn lens_share(&self, range_m: f64) -> f64 {
         let d2 = self.lens_diameter_m * self.lens_diameter_m;

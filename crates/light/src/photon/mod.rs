@@ -22,7 +22,9 @@ pub use avalanches::{Avalanches, Unknown, apply_dead_time};
 pub use budget::{Convention, PhotonBudget, Spot};
 pub use echo::{ECHO_REACH, EchoLaw};
 pub use gaussian::{pulse_share, pulse_shares};
-pub use light::{Echo, LightError, PixelLight, Profile, Segment, SpadSpread};
+pub use light::{
+    Echo, LightError, OtherLaser, PixelLight, Profile, PulseTrain, Segment, SpadSpread,
+};
 pub use mixture::{DEEP, Glint, MERGED_ERROR, merged};
 pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
 pub use philox::LANES;

@@ -38,6 +38,9 @@
 //! cycles. A profile, or SPADs that differ, are drawn at their greatest rate and thinned by a random word that is a pure
 //! function of the photon's own (`thinning`); whatever SPADs there are, that leaves a Poisson process.
 //!
+//! Another laser's pulses ([`PulseTrain`](super::PulseTrain)) come at other times of each laser cycle; only those that are asked for are drawn
+//! (`schedule`, `foreign`).
+//!
 //! Limits of the model: no spread of dead time between SPADs; background photons come at multiples of some 20 fs
 //! ([`Slots`]).
 
@@ -46,6 +49,7 @@ mod config;
 mod dim;
 mod draw;
 mod exposure;
+mod foreign;
 mod group;
 mod kind;
 mod limits;
@@ -53,6 +57,7 @@ mod listed;
 mod numbers;
 mod ordered;
 mod part;
+mod schedule;
 mod slot;
 mod thinning;
 

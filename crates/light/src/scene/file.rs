@@ -6,6 +6,7 @@ use toml::{Table, Value};
 
 use super::curve::read_file;
 use super::entry::ObjectEntry;
+use super::interferer::Interferer;
 use super::object::Object;
 use super::rules::{check_object, check_rig, check_stereo};
 use super::settings::{Lidar, Scene};
@@ -87,14 +88,21 @@ impl Scene {
                         scene.objects.extend(object(document, &path, item, faults));
                     }
                 }
-                ("object", _) => faults.push(wrong(
-                    "object is not a list; write each object as a section [[object]]",
-                )),
+                ("interferer", Value::Array(items)) => {
+                    for (index, item) in items.iter().enumerate() {
+                        let path = format!("interferer.{index}");
+                        let read = interferer(document, &path, item, faults);
+                        scene.interferers.extend(read);
+                    }
+                }
+                ("object" | "interferer", _) => faults.push(wrong(&format!(
+                    "{name} is not a list; write each as a section [[{name}]]",
+                ))),
                 ("lidar" | "stereo" | "light" | "medium" | "rig", _) => faults.push(wrong(
                     "this must be a section; write its name in brackets, and its keys below",
                 )),
                 _ => faults.push(wrong(
-                    "unknown section; give [lidar], [stereo], [light], [medium], [rig] or [[object]]",
+                    "unknown section; give [lidar], [stereo], [light], [medium], [rig], [[object]] or [[interferer]]",
                 )),
             }
         }
@@ -114,7 +122,7 @@ impl Scene {
     pub fn key(path: &str) -> Option<Key> {
         let (section, name) = path.split_once('.')?;
         let name = match section {
-            "object" => name.rsplit_once('.')?.1,
+            "object" | "interferer" => name.rsplit_once('.')?.1,
             _ => name,
         };
         let section = Scene::SECTIONS.iter().find(|known| known.name == section)?;
@@ -220,19 +228,46 @@ fn object(
     }
 }
 
+/// The lidar of another at `path`, if it has no fault.
+fn interferer(
+    document: &Document,
+    path: &str,
+    item: &Value,
+    faults: &mut Vec<Fault>,
+) -> Option<Interferer> {
+    let before = faults.len();
+    let complaint = match item {
+        Value::Table(given)
+            if ["name", "place_m"]
+                .iter()
+                .all(|key| given.contains_key(*key)) =>
+        {
+            let other: Interferer = section(document, path, given, faults);
+            if faults.len() == before {
+                faults.extend(other.fault(path));
+            }
+            return (faults.len() == before).then_some(other);
+        }
+        Value::Table(_) => "lacks `name` or `place_m`; add both",
+        _ => "this must be a section [[interferer]]; write its keys below",
+    };
+    faults.push(Fault {
+        path: path.to_owned(),
+        message: complaint.into(),
+    });
+    None
+}
+
 /// Where a fault is, as the beginning of a sentence.
 fn place(document: &Document, path: &str) -> String {
     let mut names = path.split('.');
     match (names.next(), names.next()) {
-        (Some("object"), Some(index)) => {
+        (Some(list @ ("object" | "interferer")), Some(index)) => {
             let index: usize = index.parse().unwrap_or(0);
-            let item = document
-                .table()
-                .get("object")
-                .and_then(|list| list.get(index));
+            let item = document.table().get(list).and_then(|list| list.get(index));
             let name = item.and_then(|item| item.get("name")?.as_str());
             let name = name.map_or(String::new(), |name| format!(" ({name})"));
-            format!("in [[object]] number {}{name}, ", index + 1)
+            format!("in [[{list}]] number {}{name}, ", index + 1)
         }
         (Some(section), Some(_)) => format!("in [{section}], "),
         _ => String::new(),

@@ -165,10 +165,13 @@ impl Scene {
             let echoes = merged(&mut falling.glints, sigma, resolution);
             let background = PixelLight::background(falling.background_hz);
             let light = echoes.into_iter().fold(background, PixelLight::with_echo);
-            match &fog {
+            let light = match &fog {
                 Some(fog) => fog.onto(light, &view.ends_m, off_axis.signal, sigma, centre_fs),
                 None => light,
-            }
+            };
+            let strays = view.strays.iter();
+            let trains = strays.filter_map(|stray| stray.train(self, &budget, off_axis.background));
+            trains.fold(light, PixelLight::with_train)
         };
         let views = truth.views.par_iter().zip(&off_axis);
         falling.into_par_iter().zip(views).map(light).collect()

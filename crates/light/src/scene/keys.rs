@@ -1,6 +1,7 @@
 //! The sections of a scene file.
 
 use super::entry::ObjectEntry;
+use super::interferer::Interferer;
 use super::medium::Medium;
 use super::rig::Rig;
 use super::settings::{Lidar, Light, Scene, Stereo};
@@ -38,6 +39,11 @@ impl Scene {
             name: "object",
             what: "What there is to see: any number of objects, none if left out. Metres; x right, y down, z forward; the lidar is at the origin",
             keys: ObjectEntry::KEYS,
+        },
+        Section {
+            name: "interferer",
+            what: "Lidars of other vehicles: any number, none if left out",
+            keys: Interferer::KEYS,
         },
     ];
 }

@@ -15,6 +15,7 @@ mod eye_safety;
 mod file;
 mod fog;
 mod illumination;
+mod interferer;
 mod keys;
 mod medium;
 #[cfg(test)]
@@ -41,6 +42,7 @@ pub use cast::Stage;
 pub use cast::{End, Hit, Return, Returns};
 pub use curve::{Curve, CurveError, Measured};
 pub use eye_safety::{Emission, EyeRule, EyeSafety};
+pub use interferer::Interferer;
 pub use medium::{DROPLET_LIDAR_RATIO_SR, Medium};
 pub use object::Object;
 pub use rig::{Rig, RigWaypoint, Waypoint};

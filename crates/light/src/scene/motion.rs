@@ -44,6 +44,9 @@ impl Scene {
             object.velocity_m_s = DVec3::ZERO;
             object.waypoints.clear();
         }
+        for other in &mut scene.interferers {
+            *other = other.seen_from(time_s, position_m, yaw_deg);
+        }
         scene.light.sun_azimuth_deg -= yaw_deg;
         scene.rig = Rig::default();
         scene
@@ -74,13 +77,18 @@ impl Scene {
                 .map(|pair| (pair[1] - pair[0]).length())
                 .sum()
         };
-        (self.objects.iter().map(way_m).fold(0.0, f64::max), turn_deg)
+        let others = self.interferers.iter();
+        let other_m = others.map(|other| other.velocity_m_s.length() * duration_s);
+        let ways_m = self.objects.iter().map(way_m).chain(other_m);
+        (ways_m.fold(0.0, f64::max), turn_deg)
     }
 
     /// Whether the scene is the same at all times.
     pub fn is_still(&self) -> bool {
         let mut objects = self.objects.iter();
+        let mut others = self.interferers.iter();
         self.rig.is_still()
+            && others.all(|other| other.velocity_m_s == DVec3::ZERO)
             && objects.all(|o| o.velocity_m_s == DVec3::ZERO && o.waypoints.is_empty())
     }
 }

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::camera::PinholeCamera;
 use super::curve::Measured;
+use super::interferer::Interferer;
 use super::medium::Medium;
 use super::object::Object;
 use super::ranges::{CHOSEN, LENGTH, POSITION, SHARE, TABLE_12};
@@ -42,6 +43,9 @@ pub struct Scene {
     /// What there is to see.
     #[serde(rename = "object")]
     pub objects: Vec<Object>,
+    /// Lidars of others; none unless given.
+    #[serde(rename = "interferer", skip_serializing_if = "Vec::is_empty")]
+    pub interferers: Vec<Interferer>,
 }
 
 keys! {
@@ -76,6 +80,8 @@ keys! {
             from "thesis Eq. 7";
         /// Full width at half maximum of a Gaussian beam.
         beam_fwhm_deg: f64 ["deg"] = 16.0, in Above(0.0, 180.0), from "chosen: the field of view";
+        /// Longest random wait before each laser pulse, against other lidars.
+        dither_ns: f64 ["ns"] = 0.0, in Within(0.0, 1e9), from "none";
         /// Width of the laser's apparent source, for the safety of eyes; 0 is a point, the worst.
         laser_source_mm: f64 ["mm"] = 0.0, in Within(0.0, 1000.0), from "chosen: unknown";
         /// Photon detection efficiency of the SPADs at the laser's wavelength.

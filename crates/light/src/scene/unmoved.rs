@@ -7,7 +7,7 @@
 //! ```
 //!
 //! All that a view follows from is compared, so that it is the same to the bit as if it were looked at again. Mirrors throw rays
-//! anywhere, and where the sun has a place anything may throw a shadow on anything: those are looked at again.
+//! anywhere, and where the sun has a place anything may throw a shadow on anything, as in the light of other lidars: those are looked at again.
 
 use glam::DVec3;
 
@@ -30,6 +30,8 @@ impl Moved {
         let has_one_look = before.lidar == now.lidar
             && before.light == now.light
             && before.medium == now.medium
+            && before.interferers.is_empty()
+            && now.interferers.is_empty()
             && before.objects.len() == now.objects.len();
         if !has_one_look {
             return None;

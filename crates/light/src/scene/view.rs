@@ -19,6 +19,7 @@ use smallvec::SmallVec;
 use super::bounds::{Bounds, Cone};
 use super::camera::PinholeCamera;
 use super::cast::{End, First, Return, Returns, Stage};
+use super::interferer::Stray;
 use super::medium::Medium;
 use super::vector::Ray;
 
@@ -79,6 +80,8 @@ pub(super) struct View {
     pub sunlit_reflectivity: f64,
     /// Where light of the laser ends, m, and its share of all; infinite for the sky.
     pub ends_m: SmallVec<[(f64, f64); 2]>,
+    /// Light of other lidars.
+    pub strays: Vec<Stray>,
 }
 
 impl View {
@@ -143,6 +146,11 @@ impl View {
                 }
             }
         }
+        let is_here = |place_m: DVec3| {
+            let at = camera.project(place_m);
+            at.and_then(|at| camera.pixel_at(at)) == Some(pixel)
+        };
+        stage.straight(is_here, &mut view.strays);
         view
     }
 
@@ -200,6 +208,9 @@ impl View {
             let left = medium.transmission(hit.range_m);
             let seen = left * hit.reflectivity * daylight;
             self.sunlit_reflectivity += ray_share * share_back * seen;
+            let reflected = ray_share * share_back * left * hit.reflectivity;
+            let place = (*place_m, hit.normal);
+            stage.stray_from(place, hit.object, reflected, hit.range_m, &mut self.strays);
             let cosine = look.ray.direction.dot(*facing).abs();
             self.glimpses.push(Glimpse {
                 object: hit.object,

@@ -134,6 +134,9 @@ pub enum NotModelled {
     /// SPADs with a detection efficiency or dark count rate of their own.
     #[error("SPADs that differ")]
     SpadsThatDiffer,
+    /// Pulses of other lasers, which come at another time of each laser cycle.
+    #[error("other lidars")]
+    OtherLasers,
 }
 
 impl EngineError {

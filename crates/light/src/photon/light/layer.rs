@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::echo::Echo;
 use super::profile::Profile;
+use super::train::PulseTrain;
 
 /// A part of light that is drawn by itself: constant background and an echo in some laser cycles, of which only some
 /// photons are kept.
@@ -14,6 +15,8 @@ pub(crate) struct Layer<'a> {
     pub background_hz: f64,
     pub signal_per_cycle: f64,
     pub echo: Option<&'a Echo>,
+    /// Its signal is that of another laser's pulses, and not of each laser cycle.
+    pub train: Option<&'a PulseTrain>,
     /// A background photon is kept with the rate at its time relative to the greatest one.
     pub profile: Option<&'a Arc<Profile>>,
     /// And any photon with that of its SPAD.
@@ -28,6 +31,7 @@ impl<'a> Layer<'a> {
             background_hz,
             signal_per_cycle: 0.0,
             echo: None,
+            train: None,
             profile: None,
             by_spad: None,
         }
@@ -37,6 +41,14 @@ impl<'a> Layer<'a> {
         Layer {
             signal_per_cycle: echo.photons,
             echo: Some(echo),
+            ..Self::constant(0.0)
+        }
+    }
+
+    pub(crate) fn of_train(train: &'a PulseTrain) -> Self {
+        Layer {
+            signal_per_cycle: train.photons,
+            train: Some(train),
             ..Self::constant(0.0)
         }
     }

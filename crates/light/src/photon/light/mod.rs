@@ -6,6 +6,7 @@
 //!   within a      ▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂▂  background: constant
 //!   laser cycle   ▇▅▃▂▁                                              profile: e.g. what fog sends back
 //!                      ▁█▁            ▂▅█▅▂                          echoes: a pane of glass, a slanted wall
+//!   in some of them       ▁█▁  …  ▁█▁  …                              trains: pulses of other lidars
 //! ```
 //!
 //! Each part is a Poisson process of its own, so the light is their sum. Mean numbers are of *detected* photons of all
@@ -21,12 +22,14 @@ use error::is_amount;
 pub(super) use layer::Layer;
 pub use profile::Profile;
 pub use spad_spread::SpadSpread;
+pub use train::{OtherLaser, PulseTrain};
 
 mod echo;
 mod error;
 mod layer;
 mod profile;
 mod spad_spread;
+mod train;
 
 /// The light of some successive laser cycles.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,6 +42,7 @@ pub struct Segment {
     pub profile: Option<Arc<Profile>>,
     echo: Echo,
     further: Vec<Echo>,
+    trains: Vec<PulseTrain>,
 }
 
 impl Segment {
@@ -62,7 +66,9 @@ impl Segment {
             ..Layer::constant(profile.greatest_hz())
         });
         let further = self.further.iter().map(Layer::of_echo);
-        std::iter::once(first).chain(further).chain(profile)
+        let trains = self.trains.iter().map(Layer::of_train);
+        let layers = std::iter::once(first).chain(further).chain(profile);
+        layers.chain(trains)
     }
 }
 
@@ -111,6 +117,7 @@ impl PixelLight {
                 profile: None,
                 echo: Echo::new(photons_per_cycle, arrival),
                 further: Vec::new(),
+                trains: Vec::new(),
             },
             later: Vec::new(),
             spads: None,
@@ -177,6 +184,28 @@ impl PixelLight {
         self
     }
 
+    /// The same with these pulses of another laser in all segments.
+    pub fn with_train(mut self, train: PulseTrain) -> Self {
+        for segment in self.segments_mut() {
+            segment.trains.push(train);
+        }
+        self
+    }
+
+    /// Whether another laser shines on it.
+    pub fn has_trains(&self) -> bool {
+        self.segments().any(|segment| !segment.trains.is_empty())
+    }
+
+    /// Greatest mean rate of photons of other lasers, per second, where each pulse blinds all SPADs at most some times.
+    pub(crate) fn trains_hz(&self) -> f64 {
+        let of = |train: &PulseTrain| train.photons.min(1e4) / train.laser.period_s;
+        let each = self
+            .segments()
+            .map(|segment| segment.trains.iter().map(of).sum());
+        each.fold(0.0, f64::max)
+    }
+
     /// The same with this profile on top of the background in all segments.
     pub fn with_profile(mut self, profile: Profile) -> Self {
         let profile = Arc::new(profile);
@@ -213,6 +242,7 @@ impl PixelLight {
         self.later.is_empty()
             && self.first.further.is_empty()
             && self.first.profile.is_none()
+            && self.first.trains.is_empty()
             && self.spads.is_none()
     }
 

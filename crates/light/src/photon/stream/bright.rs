@@ -167,7 +167,8 @@ impl<'a> PixelStream<'a> {
 
     /// Whether there is an echo whose photons are drawn one by one, whatever the SPADs do.
     pub fn has_listed_echo(&self) -> bool {
-        self.signal_per_spad > 0.0 && !self.has_ordered_echo()
+        let is_echo = self.signal_per_spad > 0.0 && !self.has_ordered_echo();
+        is_echo || self.foreign.is_some()
     }
 
     /// The block of background photons that is running `time_fs` after the start of a cycle.

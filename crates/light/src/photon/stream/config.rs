@@ -59,7 +59,8 @@ impl StreamConfig {
     /// Mean number of photons and dark counts that are drawn for a laser cycle, at most: of the brightest segment, and before
     /// any are thinned.
     pub fn most_photons_per_cycle(&self, light: &PixelLight) -> f64 {
-        light.signal_per_cycle() + light.background_hz() * self.cycle_s()
+        let others = light.trains_hz() * self.cycle_s();
+        light.signal_per_cycle() + light.background_hz() * self.cycle_s() + others
     }
 
     /// Nominal length of a cycle, s.

@@ -29,6 +29,11 @@ impl PixelStream<'_> {
             return;
         }
 
+        if let Some(foreign) = &self.foreign {
+            self.push_foreign(foreign, group, span.slots.clone(), &mut draw.kept);
+            draw.count_exposure(group.cycles_in(self.stream.config().laser_cycles));
+            return;
+        }
         draw.within_fs = span.within_fs.clone();
         let (background, parts) = self.background.of(group);
         let (signal, signal_parts) = self.signal.of(group);

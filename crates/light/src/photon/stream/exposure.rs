@@ -1,11 +1,13 @@
 //! What the photons of all macropixels of an exposure have in common: its laser cycles, their slots, and the laser pulse.
 
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use super::config::StreamConfig;
 use super::group::Group;
+use super::schedule::Schedule;
 use super::slot::Slots;
+use crate::photon::light::OtherLaser;
 use crate::photon::pulse::{PulseSampler, PulseShape};
 use crate::photon::quantile::NormalSampler;
 use crate::photon::random::philox_key;
@@ -33,6 +35,8 @@ pub struct PhotonStream {
     pub(super) slots: Slots,
     pub(super) gaussian: NormalSampler,
     pub(super) shape: Option<Arc<PulseSampler>>,
+    /// Of other lasers, which all macropixels see.
+    schedules: Arc<Mutex<Vec<(OtherLaser, Arc<Schedule>)>>>,
 }
 
 impl PhotonStream {
@@ -46,8 +50,20 @@ impl PhotonStream {
             slots: Slots::new(config.clock, config.stop_periods, config.lead),
             gaussian: NormalSampler::new(config.pulse_sigma.as_fs() as f64),
             shape: config.pulse_shape.as_ref().map(sampler),
+            schedules: Arc::default(),
             config: config.clone(),
         }
+    }
+
+    /// When another laser sends its pulses.
+    pub(super) fn schedule(&self, laser: &OtherLaser) -> Arc<Schedule> {
+        let mut known = self.schedules.lock().expect("nobody panics with it");
+        if let Some((_, schedule)) = known.iter().find(|(other, _)| other == laser) {
+            return Arc::clone(schedule);
+        }
+        let schedule = Arc::new(Schedule::new(laser, self));
+        known.push((*laser, Arc::clone(&schedule)));
+        schedule
     }
 
     /// What it was made of.

@@ -131,6 +131,11 @@ impl Group {
         (word >> self.place_shift()) as Place
     }
 
+    /// The place of a SPAD in a cycle within the group.
+    pub(super) fn place_of(self, cycle: u32, spad: u8) -> Place {
+        (cycle << self.spad_bits) as Place | Place::from(spad)
+    }
+
     /// The cycle within the group, and the SPAD, of a place.
     #[inline]
     pub fn split(self, place: Place) -> (u32, u8) {

@@ -48,6 +48,17 @@ impl ListedEchoes {
 
     fn draw(&mut self, light: &PixelStream<'_>, first_cycle: u32) {
         let (stream, config) = (light.stream, &light.stream.config);
+        if let Some(foreign) = &light.foreign {
+            self.photons.iter_mut().for_each(Vec::clear);
+            light.strays_in(foreign, first_cycle..first_cycle + TILE as u32, |stray| {
+                self.photons[(stray.cycle - first_cycle) as usize].push(Photon {
+                    time: stream.cycle_start(stray.cycle) + Time::from_fs(stray.time_fs),
+                    spad: stray.spad,
+                    breeds: light.breeds(),
+                });
+            });
+            return;
+        }
         let draw = |second: u32| {
             let mut words = [[0; TILE]; PER_BLOCK];
             let others = [second, light.pixel, light.kind.bright_echo()];

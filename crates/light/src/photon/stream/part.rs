@@ -10,6 +10,7 @@ use std::sync::Arc;
 use smallvec::SmallVec;
 
 use super::exposure::{FAR_FS, PhotonStream, sampler};
+use super::foreign::Foreign;
 use super::group::{FIRST, Group, PLACE_BITS};
 use super::kind::Kind;
 use super::limits::Limits;
@@ -51,6 +52,8 @@ pub struct PixelStream<'a> {
     pub(super) limits: Option<Limits>,
     pub(super) gaussian: NormalSampler,
     pub(super) shape: Option<Arc<PulseSampler>>,
+    /// Pulses of another laser, which are its signal.
+    pub(super) foreign: Option<Foreign>,
     pub(super) arrival_fs: i64,
     /// Earliest and latest time of a signal photon in its cycle.
     pub(in crate::photon) echo_fs: (i64, i64),
@@ -105,7 +108,11 @@ impl PhotonStream {
     /// [`PhotonStream::parts`] says what else it is.
     fn part(&self, pixel: u32, layer: &Layer<'_>, kind: Kind, share: f64) -> PixelStream<'_> {
         let echo = layer.echo;
-        let gaussian = match echo.and_then(|echo| echo.sigma) {
+        let sigma = match layer.train {
+            Some(train) => Some(train.sigma),
+            None => echo.and_then(|echo| echo.sigma),
+        };
+        let gaussian = match sigma {
             Some(sigma) => {
                 debug_assert!(sigma >= Time::ZERO, "a standard deviation");
                 NormalSampler::new(sigma.as_fs() as f64)
@@ -114,9 +121,19 @@ impl PhotonStream {
         };
         let shape = match echo.and_then(|echo| echo.shape.as_ref()) {
             Some(shape) => Some(sampler(shape)),
+            None if layer.train.is_some() => None,
             None => self.shape.clone(),
         };
         let reach_fs = gaussian.reach();
+        let photons = layer.signal_per_cycle * share;
+        let foreign = layer
+            .train
+            .map(|train| Foreign::of(train, self, photons, reach_fs));
+        let per_spad = match foreign {
+            Some(_) => 0.0,
+            None => photons / self.spads() as f64,
+        };
+        let (foreign, drawn) = foreign.unzip();
         let (mut first_fs, mut last_fs) = (-reach_fs, reach_fs);
         if let Some(shape) = &shape {
             first_fs += shape.range_fs().0;
@@ -136,19 +153,24 @@ impl PhotonStream {
             limits: Limits::of(layer, self),
             gaussian,
             shape,
+            foreign,
             arrival_fs,
             echo_fs: (
                 arrival_fs + first_fs.floor() as i64,
                 arrival_fs + last_fs.ceil() as i64,
             ),
             background: Numbers::new(background_hz * self.slots.length_s()),
-            signal: Numbers::new(layer.signal_per_cycle * share),
+            signal: Numbers::new(drawn.unwrap_or(photons)),
             gap_fs: 1e15 / background_hz,
-            signal_per_spad: layer.signal_per_cycle * share / self.spads() as f64,
+            signal_per_spad: per_spad,
             has_long_groups: kind == Kind::Breeding
                 && background_hz * self.slots.length_s() * f64::from(FIRST) < RARE,
             late_fs: 0,
         };
+        if part.foreign.is_some() {
+            let ends_fs = self.ends_fs();
+            part.echo_fs = (ends_fs.start, ends_fs.end);
+        }
         part.late_fs = part.late_fs();
         part
     }
@@ -185,8 +207,11 @@ impl PixelStream<'_> {
     }
 
     /// Earliest time of a photon of the echo and later than the last one, fs after the start of its cycle; both 0 where there
-    /// is none.
+    /// is none. Other lasers' photons are background, and in bright light a list for each laser cycle.
     pub fn echo_fs(&self) -> Range<i64> {
+        if self.foreign.is_some() && self.is_bright {
+            return self.stream.ends_fs();
+        }
         match self.signal_per_spad > 0.0 {
             true => self.echo_fs.0..self.echo_fs.1 + 1,
             false => 0..0,

@@ -110,6 +110,7 @@ impl Cohort {
                 NotModelled::MeasuredPulse,
             ),
             (light.spads().is_some(), NotModelled::SpadsThatDiffer),
+            (light.has_trains(), NotModelled::OtherLasers),
         ];
         let refusal = refusals.into_iter().find(|(refuses, _)| *refuses);
         refusal.map(|(_, what)| what)
