@@ -22,6 +22,8 @@ pub(crate) struct Found {
     pub(crate) true_m: Option<f64>,
     /// Mean of the depths that are right, m.
     pub(crate) measured_m: Option<f64>,
+    /// Mean of their errors, m.
+    pub(crate) mean_error_m: Option<f64>,
     /// Root mean square of their errors, m.
     pub(crate) rms_m: Option<f64>,
     /// Root mean square error of the guide, m.
@@ -53,6 +55,7 @@ impl Found {
         }
         found.true_m = mean(truths.iter().copied());
         found.measured_m = mean(depths.iter().map(|d| d.0));
+        found.mean_error_m = mean(depths.iter().map(|d| d.1));
         found.rms_m = mean(depths.iter().map(|d| d.1 * d.1)).map(f64::sqrt);
         found.guide_rms_m = mean(guides.iter().map(|g| g * g)).map(f64::sqrt);
         found

@@ -8,6 +8,7 @@
 //! Every demo is a drive ([`Drive`](crate::system::Drive)) of the whole chain, with what is asked of it measured at the end: whether a
 //! target was found, and if not, why not.
 
+pub(crate) mod disturbed;
 pub(crate) mod found;
 pub(crate) mod limit;
 pub(crate) mod panel;

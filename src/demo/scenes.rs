@@ -1,6 +1,6 @@
 //! Worlds of the demos that have a size of their own: a figure at a distance, a van, a pedestrian, a car.
 
-use crate::scene::{DVec3, Lidar, Object, Scene, Shape, Stereo};
+use crate::scene::{DVec3, Interferer, Lidar, Object, Scene, Shape, Stereo};
 
 /// Height of the lidar above the road, m.
 const LIDAR_HEIGHT_M: f64 = 1.2;
@@ -113,5 +113,79 @@ pub(crate) fn fog(visibility_m: f64) -> Scene {
     let mut scene = built_in("fog");
     // Koschmieder: the contrast of black on the sky is 2 % at the visibility.
     scene.medium.extinction_1_m = (1.0f64 / 0.02).ln() / visibility_m;
+    scene
+}
+
+/// Three pedestrians and ten vehicles, each with the demonstrator's lidar above its windscreen, under 30 klux: five oncoming in the
+/// next lane, five that go our way, two of them behind us. Our lens scatters half a per cent, as a good one does.
+pub(crate) fn busy_street() -> Scene {
+    const CAR_M: [f64; 3] = [1.8, 1.45, 4.3];
+    let pedestrians = [(-1.4, 20.0), (1.7, 30.0), (-0.6, 42.0)];
+    let oncoming = [28.0, 37.0, 46.0, 55.0, 64.0].map(|z_m| (-3.4, z_m, 180.0));
+    let our_way = [
+        (3.4, -9.0),
+        (-0.2, -14.0),
+        (3.4, 33.0),
+        (3.4, 48.0),
+        (0.2, 60.0),
+    ];
+    let our_way = our_way.map(|(x_m, z_m)| (x_m, z_m, 0.0));
+    let cars = || oncoming.into_iter().chain(our_way);
+    let objects = pedestrians
+        .map(|at| standing("pedestrian", 0.2, [0.6, 1.75, 0.3], at, 0.0))
+        .into_iter()
+        .chain(cars().map(|(x_m, z_m, _)| standing("car", 0.2, CAR_M, (x_m, z_m), 0.0)));
+    let mut scene = on_a_road(30.0, objects);
+    scene.lidar.stray_share = 0.005;
+    let Lidar {
+        fov_deg,
+        pulse_energy_uj,
+        pulse_fwhm_ns,
+        ..
+    } = scene.lidar;
+    scene.interferers = cars()
+        .enumerate()
+        .map(|(n, (x_m, z_m, yaw_deg))| Interferer {
+            name: format!("car {}", n + 1),
+            // On the edge of the roof at the front.
+            place_m: DVec3::new(
+                x_m,
+                -0.35,
+                z_m + if yaw_deg == 0.0 { CAR_M[2] } else { 0.0 },
+            ),
+            yaw_deg,
+            beam_width_deg: fov_deg,
+            beam_height_deg: 0.25 * fov_deg,
+            pulse_energy_uj,
+            pulse_fwhm_ns,
+            ..Interferer::default()
+        })
+        .collect();
+    scene
+}
+
+/// A pedestrian 30 m ahead, and at `sign_m` a road sign that shines past him, under 30 klux; the lens scatters this share.
+pub(crate) fn sign(sign_m: f64, stray_share: f64) -> Scene {
+    let pedestrian = standing("pedestrian", 0.2, [0.6, 1.75, 0.3], (-0.5, 30.0), 0.0);
+    let mut scene = on_a_road(30.0, [pedestrian]);
+    let shape = Shape::Plane {
+        centre_m: DVec3::new(0.02 * sign_m, -0.01 * sign_m, sign_m),
+        normal: DVec3::NEG_Z,
+        width_m: 0.6,
+        height_m: 0.6,
+    };
+    let mut sign = Object::new("sign", 0.5, shape);
+    sign.retro = 500.0;
+    scene.objects.push(sign);
+    scene.lidar.stray_share = stray_share;
+    scene
+}
+
+/// A target of 10 % 30 m ahead, and a white wall that leads up to it on the right, under 30 klux; so many rays look for bounced light.
+pub(crate) fn corner(bounce_rays: u32) -> Scene {
+    let mut scene = target_at(30.0, 0.1, 30.0);
+    let wall = standing("wall", 0.8, [0.3, 4.0, 12.0], (1.5, 18.0), 0.0);
+    scene.objects.push(wall);
+    scene.lidar.bounce_rays = bounce_rays;
     scene
 }

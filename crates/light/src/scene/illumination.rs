@@ -8,9 +8,12 @@ use rayon::prelude::*;
 use super::fog::Fog;
 use super::optics::OffAxis;
 use super::settings::Scene;
+use super::stray_light::with_stray_light;
 use super::truth::{Before, GroundTruth};
 use super::view::{Glimpse, View};
-use crate::photon::{CROSSTALK_DELAY, Glint, PhotonBudget, PixelLight, SpadModel, merged};
+use crate::photon::{
+    CROSSTALK_DELAY, Glint, PhotonBudget, PixelLight, PulseTrain, SpadModel, merged,
+};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 use crate::units::TimeOfFlight;
 
@@ -126,9 +129,11 @@ impl Scene {
         before: Option<(Before<'_>, &[PixelLight])>,
     ) -> Vec<PixelLight> {
         let has_crosstalk = spads.crosstalk_probability > 0.0;
+        let has_stray_light = self.lidar.stray_share > 0.0;
         let before = before.filter(|(before, _)| {
             let world = before.world;
             !has_crosstalk
+                && !has_stray_light
                 && (&world.lidar, &world.light, &world.medium)
                     == (&self.lidar, &self.light, &self.medium)
         });
@@ -147,12 +152,18 @@ impl Scene {
             None => Lit::Anew(self.falling(view, &budget, off_axis, centre_fs)),
         });
         let mut falling: Vec<Lit<'_>> = falling.collect();
-        if has_crosstalk {
+        if has_crosstalk || has_stray_light {
             let all = falling.into_iter().filter_map(|lit| match lit {
                 Lit::Anew(falling) => Some(falling),
                 Lit::AsBefore(_) => None,
             });
-            let all = with_crosstalk(&all.collect::<Vec<_>>(), spads, cols as usize);
+            let (mut all, cols): (Vec<_>, _) = (all.collect(), cols as usize);
+            if has_stray_light {
+                all = with_stray_light(&self.lidar, &all, cols, self.dark_hz());
+            }
+            if has_crosstalk {
+                all = with_crosstalk(&all, spads, cols);
+            }
             falling = all.into_iter().map(Lit::Anew).collect();
         }
         let (sigma, resolution) = (self.pulse_sigma(), self.pulse_resolution());
@@ -169,8 +180,7 @@ impl Scene {
                 Some(fog) => fog.onto(light, &view.ends_m, off_axis.signal, sigma, centre_fs),
                 None => light,
             };
-            let strays = view.strays.iter();
-            let trains = strays.filter_map(|stray| stray.train(self, &budget, off_axis.background));
+            let trains = falling.trains.into_iter();
             trains.fold(light, PixelLight::with_train)
         };
         let views = truth.views.par_iter().zip(&off_axis);
@@ -187,10 +197,6 @@ impl Scene {
     ) -> Falling {
         let klux = self.light.illuminance_klux;
         let sun_hz = budget.background_hz(view.sunlit_reflectivity, klux) * off_axis.background;
-        let dark_hz = match self.lidar.has_spread() {
-            true => 0.0,
-            false => self.lidar.dark_count_hz,
-        };
         let glint = |glimpse: &Glimpse| Glint {
             photons: budget.signal_per_pulse(glimpse.range_m, glimpse.frontal_reflectivity)
                 * self.medium.transmission(glimpse.range_m).powi(2)
@@ -199,14 +205,32 @@ impl Scene {
             arrival_fs: glimpse.range_m * FLIGHT_FS_PER_M - centre_fs,
             variance_fs2: glimpse.range_m2 * FLIGHT_FS_PER_M * FLIGHT_FS_PER_M,
         };
-        let mut glints: Vec<Glint> = view.glimpses.iter().map(glint).collect();
+        let bounced = view.bounced.iter().map(|bounce| Glint {
+            photons: budget.photons_of_exposure(bounce.exposure_j_m2) * off_axis.background,
+            // Beyond the surfaces that are seen.
+            surface: self.objects.len() + bounce.object,
+            arrival_fs: 0.5 * bounce.way_m * FLIGHT_FS_PER_M - centre_fs,
+            variance_fs2: 0.0,
+        });
+        let mut glints: Vec<Glint> = view.glimpses.iter().map(glint).chain(bounced).collect();
         let all: f64 = glints.iter().map(|glint| glint.photons).sum();
         for glint in &mut glints {
             glint.photons *= (MOST_SIGNAL_PER_CYCLE / all).min(1.0);
         }
         Falling {
             glints,
-            background_hz: (sun_hz + dark_hz).min(MOST_BACKGROUND_HZ),
+            background_hz: (sun_hz + self.dark_hz()).min(MOST_BACKGROUND_HZ),
+            trains: (view.others.iter())
+                .filter_map(|other| other.train(self, budget, off_axis.background))
+                .collect(),
+        }
+    }
+
+    /// Dark counts of a macropixel, unless its SPADs have their own, per second.
+    fn dark_hz(&self) -> f64 {
+        match self.lidar.has_spread() {
+            true => 0.0,
+            false => self.lidar.dark_count_hz,
         }
     }
 }
@@ -221,9 +245,11 @@ enum Lit<'a> {
 
 /// The light of a macropixel before echoes are merged.
 #[derive(Debug, Clone)]
-struct Falling {
-    glints: Vec<Glint>,
-    background_hz: f64,
+pub(super) struct Falling {
+    pub glints: Vec<Glint>,
+    pub background_hz: f64,
+    /// Of other lidars.
+    pub trains: Vec<PulseTrain>,
 }
 
 /// The same with what crosses over from the neighbours. Of the avalanches of a SPAD at a side, a fourth of those with crosstalk

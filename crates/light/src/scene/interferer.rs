@@ -9,7 +9,8 @@
 //! It sends the same energy into every direction within its beam, a pyramid, and nothing beyond: E/Ω joules a steradian with
 //! Ω = 4 asin(sin(w/2) sin(h/2)) for a beam of w by h. A surface that it lights at a distance d gets E/Ω · cos θ / d², and the lens as
 //! much over its aperture. Its wavelength is taken to be ours, so that no filter helps: the worst case. Mirrors and retroreflectors do
-//! not send its light to us, panes between stop it, and neighbouring macropixels' crosstalk of it is left out.
+//! not send its light to us, panes between stop it, and neighbouring macropixels' crosstalk of it is left out; stray light
+//! ([`stray_light`](super::stray_light)) is not.
 //!
 //! That guiding and dithering mitigate this interference is claimed at the end of the thesis (8.2), and not measured there.
 
@@ -35,7 +36,6 @@ const LEAST_PHOTONS: f64 = 1e-10;
 
 keys! {
     /// An `[[interferer]]` entry: the lidar of another vehicle.
-    #[non_exhaustive]
     pub struct Interferer {
         /// Name in messages and for --set.
         name: String = String::new(), from "-";
@@ -71,7 +71,7 @@ keys! {
 
 /// What a macropixel gets of each pulse of another lidar by way of one object, or straight into the lens.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Stray {
+pub(super) struct OtherLight {
     interferer: u32,
     /// `None` for the way straight into the lens.
     object: Option<usize>,
@@ -151,13 +151,13 @@ impl Interferer {
 impl Stage<'_> {
     /// Adds what a surface at `place_m` that faces along `normal` (unit) reflects of others' pulses. `reflected` of the light that
     /// it reflects arrives after `range_m` more.
-    pub(super) fn stray_from(
+    pub(super) fn add_others(
         &self,
         (place_m, normal): (DVec3, DVec3),
         object: usize,
         reflected: f64,
         range_m: f64,
-        strays: &mut Vec<Stray>,
+        others: &mut Vec<OtherLight>,
     ) {
         for (interferer, other) in (0..).zip(&self.scene().interferers) {
             let to = other.place_m - place_m;
@@ -171,10 +171,10 @@ impl Stage<'_> {
             let exposure_j_m2 = reflected * left * sent * incidence / (distance_m * distance_m);
             let way_m = range_m + distance_m;
             let object = Some(object);
-            let same = |s: &&mut Stray| s.interferer == interferer && s.object == object;
-            match strays.iter_mut().find(same) {
-                Some(stray) => stray.add(exposure_j_m2, way_m),
-                None => strays.push(Stray {
+            let same = |s: &&mut OtherLight| s.interferer == interferer && s.object == object;
+            match others.iter_mut().find(same) {
+                Some(other_light) => other_light.add(exposure_j_m2, way_m),
+                None => others.push(OtherLight {
                     interferer,
                     object,
                     exposure_j_m2,
@@ -185,7 +185,11 @@ impl Stage<'_> {
     }
 
     /// What of others' pulses comes straight into the lens and falls where `is_here` says.
-    pub(super) fn straight(&self, is_here: impl Fn(DVec3) -> bool, strays: &mut Vec<Stray>) {
+    pub(super) fn add_straight(
+        &self,
+        is_here: impl Fn(DVec3) -> bool,
+        others: &mut Vec<OtherLight>,
+    ) {
         for (interferer, other) in (0..).zip(&self.scene().interferers) {
             let sent = other.intensity_j_sr(DVec3::ZERO);
             if sent == 0.0 || !is_here(other.place_m) || self.is_between(DVec3::ZERO, other.place_m)
@@ -195,7 +199,7 @@ impl Stage<'_> {
             let way_m = other.place_m.length();
             let left = self.scene().medium.transmission(way_m);
             let cosine = other.place_m.z / way_m;
-            strays.push(Stray {
+            others.push(OtherLight {
                 interferer,
                 object: None,
                 exposure_j_m2: left * sent * cosine / (way_m * way_m),
@@ -212,7 +216,7 @@ impl Stage<'_> {
     }
 }
 
-impl Stray {
+impl OtherLight {
     fn add(&mut self, exposure_j_m2: f64, way_m: f64) {
         self.exposure_j_m2 += exposure_j_m2;
         let share = exposure_j_m2 / self.exposure_j_m2;
@@ -271,12 +275,12 @@ mod tests {
         scene
     }
 
-    fn strays(scene: &Scene, across: u32) -> Vec<Vec<PulseTrain>> {
+    fn others(scene: &Scene, across: u32) -> Vec<Vec<PulseTrain>> {
         let truth = GroundTruth::render(scene, across, across);
         let budget = scene.photon_budget(across, across);
         let of = |view: &std::sync::Arc<crate::scene::view::View>| {
-            let strays = view.strays.iter();
-            strays
+            let others = view.others.iter();
+            others
                 .filter_map(|s| s.train(scene, &budget, 1.0))
                 .collect()
         };
@@ -322,7 +326,7 @@ mod tests {
         let lights = scene.pixel_light(&truth);
         let middle = 8 * 16 + 8;
         let own = lights[middle].signal_per_cycle();
-        let [train] = strays(&scene, 16)[middle][..] else {
+        let [train] = others(&scene, 16)[middle][..] else {
             panic!("one train");
         };
         // A uniform beam fills the plane field of view, and a pyramid its solid angle: 0.7 % less on the axis.
@@ -338,7 +342,7 @@ mod tests {
     #[test]
     fn a_lidar_that_looks_at_us_shines_into_one_macropixel_as_its_intensity_says() {
         let scene = before_a_wall(0.3, "place_m = [1.0, 0.5, 30]");
-        let all = strays(&scene, 16);
+        let all = others(&scene, 16);
         let lit: Vec<_> = all.iter().flatten().collect();
         // The wall is behind it.
         let [train] = lit[..] else {
@@ -359,9 +363,9 @@ mod tests {
         assert!((train.delay.as_s() * 299_792_458.0 - range_m).abs() < 1e-6);
         let mut hidden = scene.clone();
         hidden.interferers[0].place_m.z = 41.0;
-        assert!(strays(&hidden, 16).iter().all(Vec::is_empty));
+        assert!(others(&hidden, 16).iter().all(Vec::is_empty));
         hidden.interferers[0] = other("place_m = [1.0, 0.5, 30]\nyaw_deg = 90");
-        assert!(strays(&hidden, 16).iter().all(Vec::is_empty));
+        assert!(others(&hidden, 16).iter().all(Vec::is_empty));
     }
 
     /// Arrivals in the laser cycle of a laser of our rate, of one whose clock is fast, and where either laser dithers.

@@ -3,6 +3,7 @@
 //!
 //! Coordinates in metres: x to the right, y down, z forward, the lidar at the origin.
 
+mod bounce;
 mod bounds;
 mod builtin;
 mod bundle;
@@ -29,6 +30,7 @@ mod rules;
 mod settings;
 mod shape;
 mod spads;
+mod stray_light;
 mod texture;
 mod truth;
 mod unmoved;
@@ -52,7 +54,7 @@ pub use texture::{Pattern, Picture, Texture};
 pub use truth::{Before, GroundTruth};
 pub use vector::{Ray, turned};
 pub use view::Surface;
-pub use words::{BeamWord, FilterWord, PdeWord, PulseWord, VignettingWord};
+pub use words::{BeamWord, FilterWord, PdeWord, PulseWord, StrayWord, VignettingWord};
 
 /// A point or direction, m (or without unit): x right, y down, z forward.
 pub use glam::DVec3;

@@ -11,7 +11,7 @@ use super::medium::Medium;
 use super::object::Object;
 use super::ranges::{CHOSEN, LENGTH, POSITION, SHARE, TABLE_12};
 use super::rig::Rig;
-use super::words::{BeamWord, FilterWord, PdeWord, PulseWord, VignettingWord};
+use super::words::{BeamWord, FilterWord, PdeWord, PulseWord, StrayWord, VignettingWord};
 use crate::photon::{Convention, Spot};
 use crate::settings::Range::{Above, Limited, Within, WordOrCurve};
 use crate::settings::keys;
@@ -108,6 +108,21 @@ keys! {
                 "degrees off the axis and illumination of the array",
             ),
             from "thesis Eq. 12, which has none";
+        /// Rays that look from every place for laser light that other surfaces throw there; 0 is none.
+        bounce_rays: u32 = 0, in Within(0.0, 4096.0), from "none in the thesis; 16 are right to some per cent";
+        /// Share of the light that lens and filter scatter over other macropixels.
+        stray_share: f64 = 0.0, in SHARE, from "none in the thesis; lenses scatter 0.1 to 5 %";
+        /// Distance within which stray light is even.
+        ///
+        /// In widths of a macropixel.
+        stray_radius: f64 = 2.0, in Above(0.0, 100.0), from "chosen";
+        /// How stray light falls off with the distance.
+        stray: Measured<StrayWord> = Measured::default(),
+            in WordOrCurve(
+                StrayWord::NAMES,
+                "widths of a macropixel and light, of which only the shape counts",
+            ),
+            from "chosen: a cube, as of surfaces that scatter little";
         /// Band-pass filter, through which ASTM G173 sunlight comes; irradiance is one that lets solar_irradiance_w_m2 through.
         filter: Measured<FilterWord> = Measured::default(),
             in WordOrCurve(FilterWord::NAMES, "wavelength in nm and transmittance"),

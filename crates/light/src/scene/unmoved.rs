@@ -30,6 +30,7 @@ impl Moved {
         let has_one_look = before.lidar == now.lidar
             && before.light == now.light
             && before.medium == now.medium
+            && now.lidar.bounce_rays == 0
             && before.interferers.is_empty()
             && now.interferers.is_empty()
             && before.objects.len() == now.objects.len();

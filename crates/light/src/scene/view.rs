@@ -16,10 +16,11 @@
 use glam::DVec3;
 use smallvec::SmallVec;
 
+use super::bounce::Bounce;
 use super::bounds::{Bounds, Cone};
 use super::camera::PinholeCamera;
 use super::cast::{End, First, Return, Returns, Stage};
-use super::interferer::Stray;
+use super::interferer::OtherLight;
 use super::medium::Medium;
 use super::vector::Ray;
 
@@ -81,7 +82,9 @@ pub(super) struct View {
     /// Where light of the laser ends, m, and its share of all; infinite for the sky.
     pub ends_m: SmallVec<[(f64, f64); 2]>,
     /// Light of other lidars.
-    pub strays: Vec<Stray>,
+    pub others: Vec<OtherLight>,
+    /// Laser light by way of other surfaces.
+    pub bounced: Vec<Bounce>,
 }
 
 impl View {
@@ -150,7 +153,7 @@ impl View {
             let at = camera.project(place_m);
             at.and_then(|at| camera.pixel_at(at)) == Some(pixel)
         };
-        stage.straight(is_here, &mut view.strays);
+        stage.add_straight(is_here, &mut view.others);
         view
     }
 
@@ -210,7 +213,9 @@ impl View {
             self.sunlit_reflectivity += ray_share * share_back * seen;
             let reflected = ray_share * share_back * left * hit.reflectivity;
             let place = (*place_m, hit.normal);
-            stage.stray_from(place, hit.object, reflected, hit.range_m, &mut self.strays);
+            stage.add_others(place, hit.object, reflected, hit.range_m, &mut self.others);
+            let (camera, bounced) = (&piece.camera, &mut self.bounced);
+            stage.add_bounced(camera, place, reflected, hit.range_m, bounced);
             let cosine = look.ray.direction.dot(*facing).abs();
             self.glimpses.push(Glimpse {
                 object: hit.object,
@@ -323,6 +328,8 @@ impl Look {
 /// that of the whole macropixel but for as much.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
+    /// The lidar's.
+    camera: PinholeCamera,
     ray_share: f64,
     /// Width and height at unit depth.
     steps: [f64; 2],
@@ -332,6 +339,7 @@ impl Piece {
     fn new(camera: &PinholeCamera, across: u32) -> Self {
         let all = f64::from(across * across);
         Piece {
+            camera: *camera,
             ray_share: 1.0 / all,
             steps: [camera.focal_px, camera.focal_v_px].map(|px| 1.0 / (px * all)),
         }

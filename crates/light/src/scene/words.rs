@@ -28,6 +28,17 @@ words! {
 }
 
 words! {
+    /// Stray light without a measurement.
+    #[derive(Default)]
+    #[non_exhaustive]
+    pub enum StrayWord {
+        /// A halo of `stray_radius` that falls off with the cube of the distance.
+        #[default]
+        Halo = "halo",
+    }
+}
+
+words! {
     /// Laser beams without a measurement.
     #[derive(Default)]
     #[non_exhaustive]

@@ -25,6 +25,9 @@ pub struct Span {
     pub within_fs: Range<i64>,
 }
 
+/// Another laser, and when it sends its pulses.
+type KnownLaser = (OtherLaser, Arc<Schedule>);
+
 /// The photons of a whole array in an exposure.
 #[derive(Debug, Clone)]
 pub struct PhotonStream {
@@ -36,7 +39,7 @@ pub struct PhotonStream {
     pub(super) gaussian: NormalSampler,
     pub(super) shape: Option<Arc<PulseSampler>>,
     /// Of other lasers, which all macropixels see.
-    schedules: Arc<Mutex<Vec<(OtherLaser, Arc<Schedule>)>>>,
+    schedules: Arc<Mutex<Vec<KnownLaser>>>,
 }
 
 impl PhotonStream {

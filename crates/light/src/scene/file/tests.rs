@@ -212,6 +212,11 @@ foot_m = [0, 2, 9]
 height_m = 1.2
 reflectivity = 0.5
 waypoints = [[0, 0, 0, 0], [2, 1, 0, 0]]
+
+[[interferer]]
+name = "oncoming"
+place_m = [-3, 0, 40]
+phase = 0.5
 "#;
 
 #[test]

@@ -166,10 +166,12 @@ fn crosstalk_into_a_neighbour_is_that_of_the_avalanches_at_its_side() {
                 surface: 0,
             }],
             background_hz: 20e6,
+            trains: Vec::new(),
         };
         let dark = Falling {
             glints: Vec::new(),
             background_hz: 0.0,
+            trains: Vec::new(),
         };
         let crossed = with_crosstalk(&[bright, dark], &spads, 2).swap_remove(1);
         let stream = PhotonStream::new(&StreamConfig {
