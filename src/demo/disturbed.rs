@@ -236,7 +236,9 @@ mod tests {
         };
         let outcomes = disturbance.outcomes(&demonstrator, 1, || ()).unwrap();
         let wrong = |case: &str, scheme: &str| {
-            let mut of = outcomes.iter().filter(|o| o.case == case && o.scheme == scheme);
+            let mut of = outcomes
+                .iter()
+                .filter(|o| o.case == case && o.scheme == scheme);
             of.next().unwrap().wrong[0]
         };
         assert!(wrong("still", "full") > 0.2, "{outcomes:#?}");

@@ -128,9 +128,7 @@ macro_rules! keys {
 /// Variant = "word",
 /// ```
 ///
-/// It reads and writes itself as its word by serde, and gets `ALL`, `NAMES` and `name`. A key of this type takes its words. Where the enum names
-/// a type of rows (`enum Name: Row`), each word is followed by a row of what others ask of the variant (`Variant = "word": row`), which
-/// `row` gives.
+/// It reads and writes itself as its word by serde, and gets `ALL`, `NAMES` and `name`. A key of this type takes its words.
 #[macro_export]
 macro_rules! words {
     (
@@ -161,25 +159,6 @@ macro_rules! words {
 
         impl $crate::settings::Setting for $name {
             const RANGE: $crate::settings::Range = $crate::settings::Range::OneOf($name::NAMES);
-        }
-    };
-    (
-        $(#[$of:meta])*
-        $vis:vis enum $name:ident: $row:ty {
-            $($(#[$each:meta])* $variant:ident = $word:literal: $its_row:expr,)+
-        }
-    ) => {
-        $crate::words! {
-            $(#[$of])*
-            $vis enum $name { $($(#[$each])* $variant = $word,)+ }
-        }
-
-        impl $name {
-            /// What other files ask of it.
-            $vis fn row(self) -> &'static $row {
-                static ROWS: [$row; $name::ALL.len()] = [$($its_row),+];
-                &ROWS[self as usize]
-            }
         }
     };
 }

@@ -60,6 +60,22 @@ impl Pins {
         memory
     }
 
+    /// Places stage number `bit`: a flip-flop that can only be reset, and the multiplexer by which its bit of the memory inverts it. `state` is
+    /// Q, QN and COUNTER_OUT.
+    pub(super) fn stage(
+        &self,
+        m: &mut ModuleBuilder,
+        bit: usize,
+        [data, clock]: [Net; 2],
+        memory: Net,
+        [q, qn, out]: [Net; 3],
+    ) {
+        let inputs = [data, clock, self.reset];
+        m.cell(&format!("counter_{bit}"), CellKind::Dffr, &inputs, &[q, qn]);
+        let inputs = [q, qn, memory];
+        m.cell(&format!("mux_{bit}"), CellKind::Mux2, &inputs, &[out]);
+    }
+
     /// LOCAL_STOP of a ripple counter whose last output is `last`: a toggle flip-flop more, or that output.
     pub(super) fn ripple_tap(&self, m: &mut ModuleBuilder, tap: Tap, last: Net, reset: Net) {
         match tap {

@@ -28,7 +28,7 @@ use super::pins::Pins;
 use super::variant::Variant;
 use crate::chip::blocks::finished;
 use crate::chip::config::SensorConfig;
-use crate::netlist::{CellKind, Module, ModuleBuilder};
+use crate::netlist::{Module, ModuleBuilder};
 
 pub(super) const VARIANT: Variant = Variant::down_counter(circuit, "a stage", 52);
 
@@ -43,18 +43,8 @@ fn circuit(config: &SensorConfig) -> Arc<Module> {
     let out = m.wire_bus("COUNTER_OUT", bits);
     let mut clock = pins.clk;
     for bit in 0..bits {
-        m.cell(
-            &format!("counter_{bit}"),
-            CellKind::Dffr,
-            &[qn[bit], clock, pins.reset],
-            &[q[bit], qn[bit]],
-        );
-        m.cell(
-            &format!("mux_{bit}"),
-            CellKind::Mux2,
-            &[q[bit], qn[bit], memory[bit]],
-            &[out[bit]],
-        );
+        let state = [q[bit], qn[bit], out[bit]];
+        pins.stage(&mut m, bit, [qn[bit], clock], memory[bit], state);
         clock = out[bit];
     }
     pins.ripple_tap(&mut m, config.tap, clock, pins.reset);

@@ -59,18 +59,8 @@ fn circuit(config: &SensorConfig) -> Arc<Module> {
                 m.gate(CellKind::Xor2, &[q[bit], are_zero])
             }
         };
-        m.cell(
-            &format!("counter_{bit}"),
-            CellKind::Dffr,
-            &[data, clock, pins.reset],
-            &[q[bit], qn[bit]],
-        );
-        m.cell(
-            &format!("mux_{bit}"),
-            CellKind::Mux2,
-            &[q[bit], qn[bit], memory[bit]],
-            &[out[bit]],
-        );
+        let state = [q[bit], qn[bit], out[bit]];
+        pins.stage(&mut m, bit, [data, clock], memory[bit], state);
     }
     pins.ripple_tap(&mut m, config.tap, out[bits - 1], pins.reset);
     finished(m.finish())

@@ -51,18 +51,8 @@ fn circuit(config: &SensorConfig) -> Arc<Module> {
                 next[bit - 1]
             }
         };
-        m.cell(
-            &format!("counter_{bit}"),
-            CellKind::Dffr,
-            &[data, pins.clk, pins.reset],
-            &[q[bit], qn[bit]],
-        );
-        m.cell(
-            &format!("mux_{bit}"),
-            CellKind::Mux2,
-            &[q[bit], qn[bit], memory[bit]],
-            &[out[bit]],
-        );
+        let state = [q[bit], qn[bit], out[bit]];
+        pins.stage(&mut m, bit, [data, pins.clk], memory[bit], state);
         if config.tap == Tap::Borrow || bit + 1 < bits {
             let is_zero = m.gate(CellKind::Inv, &[out[bit]]);
             toggle = Some(match toggle {
