@@ -39,6 +39,8 @@ pub enum Purpose {
     BrightBreedingSignal = 12,
     /// Which photons of a layer of light are kept.
     Thinning = 13,
+    /// Energies of laser pulses.
+    PulseEnergy = 14,
     /// Errors of guides other than the camera pair.
     Guide = 20,
     /// How SPADs of the array differ.

@@ -186,7 +186,7 @@ impl Scene {
         let sun_hz = budget.background_hz(view.sunlit_reflectivity, klux) * off_axis.background;
         let dark_hz = match self.lidar.has_spread() {
             true => 0.0,
-            false => self.lidar.dark_count_hz,
+            false => self.lidar.dark_counts_hz(),
         };
         let glint = |glimpse: &Glimpse| Glint {
             photons: budget.signal_per_pulse(glimpse.range_m, glimpse.frontal_reflectivity)

@@ -14,6 +14,7 @@ mod entry;
 mod eye_safety;
 mod file;
 mod fog;
+mod heat;
 mod illumination;
 mod keys;
 mod medium;

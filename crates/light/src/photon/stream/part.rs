@@ -93,7 +93,8 @@ impl PhotonStream {
             for (kind, share) in [(Kind::Plain, 1.0 - breeding), (Kind::Breeding, breeding)] {
                 if kind == Kind::Plain || share > 0.0 {
                     let mut part = self.part(pixel, &layer, kind, share);
-                    (part.key, part.is_bright, part.is_alone) = (key, is_bright, light.is_plain());
+                    (part.key, part.is_bright) = (key, is_bright);
+                    part.is_alone = light.is_plain() && self.config.energy_spread == 0.0;
                     parts.push(part);
                 }
             }
@@ -126,6 +127,7 @@ impl PhotonStream {
         let arrival_fs = echo.map_or(0, |echo| echo.arrival.as_fs());
         let arrival_fs = arrival_fs.clamp(-FAR_FS / 2, FAR_FS / 2);
         let background_hz = layer.background_hz * share;
+        let signal = layer.signal_per_cycle * self.config.greatest_energy() * share;
         let mut part = PixelStream {
             stream: self,
             key: self.key,
@@ -142,9 +144,9 @@ impl PhotonStream {
                 arrival_fs + last_fs.ceil() as i64,
             ),
             background: Numbers::new(background_hz * self.slots.length_s()),
-            signal: Numbers::new(layer.signal_per_cycle * share),
+            signal: Numbers::new(signal),
             gap_fs: 1e15 / background_hz,
-            signal_per_spad: layer.signal_per_cycle * share / self.spads() as f64,
+            signal_per_spad: signal / self.spads() as f64,
             has_long_groups: kind == Kind::Breeding
                 && background_hz * self.slots.length_s() * f64::from(FIRST) < RARE,
             late_fs: 0,
