@@ -24,7 +24,7 @@ pub(crate) fn timing<'py>(
     sensor: Option<&Bound<'py, Sensor>>,
     process: &str,
     voltage_v: f64,
-    temperature_c: f64,
+    temperature_c: Option<f64>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let sensor = Sensor::or_default(sensor);
     let corners = [Corner::Slow, Corner::Typ, Corner::Fast];
@@ -36,7 +36,7 @@ pub(crate) fn timing<'py>(
     let conditions = Conditions {
         process,
         voltage_v,
-        temperature_c,
+        temperature_c: temperature_c.unwrap_or(sensor.conditions().temperature_c),
     };
     let silicon = Silicon::of(&sensor).in_conditions(conditions);
     let silicon = silicon.map_err(|why| {

@@ -21,14 +21,9 @@ pub(super) struct SiliconArgs {
     /// Supply voltage, V.
     #[arg(long, value_name = "V", default_value_t = 1.1)]
     voltage: f64,
-    /// Junction temperature, °C.
-    #[arg(
-        long,
-        value_name = "C",
-        default_value_t = 50.0,
-        allow_negative_numbers = true
-    )]
-    temperature: f64,
+    /// Junction temperature, °C, instead of the sensor's [default: sensor.temperature_c, or 50].
+    #[arg(long, value_name = "C", allow_negative_numbers = true)]
+    temperature: Option<f64>,
     /// Random mismatch: relative standard deviation of an inverter's delay.
     #[arg(long, value_name = "SIGMA", default_value_t = 0.0)]
     mismatch: f64,
@@ -43,7 +38,7 @@ impl SiliconArgs {
     /// # Errors
     /// Conditions and mismatch for which no delays are known.
     pub(super) fn read(&self, config: &SensorConfig) -> Result<Silicon, InputError> {
-        let silicon = Silicon::of(config).in_conditions(self.conditions());
+        let silicon = Silicon::of(config).in_conditions(self.conditions(config));
         let silicon = silicon.map_err(|why| {
             let options = match why {
                 UnknownConditions::OfLibrary => "--process, --voltage, --temperature",
@@ -66,11 +61,12 @@ impl SiliconArgs {
     }
 
     /// Process, supply and temperature.
-    pub(super) fn conditions(&self) -> Conditions {
+    pub(super) fn conditions(&self, config: &SensorConfig) -> Conditions {
+        let usual = config.conditions();
         Conditions {
             process: self.process,
             voltage_v: self.voltage,
-            temperature_c: self.temperature,
+            temperature_c: self.temperature.unwrap_or(usual.temperature_c),
         }
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::{Spelling, guided_exposure, read_calibration};
-use crate::chip::Sensor;
+use crate::chip::{Sensor, SensorConfig};
 use crate::engine::CohortOptions;
 use crate::files::InputError;
 use crate::guide::{BehaviouralStereo, Guide, GuideInput, options};
@@ -103,6 +103,7 @@ impl FrameRequest {
         let wrong = |key: &str, message: String| {
             FrameError::Input(InputError::new(self.spelling.name(key), message))
         };
+        let sensor = as_warm_as(&scene, sensor)?;
         let (sensor, stop_periods) = match self.bins_from_guide {
             true => self.with_bins(sensor, &scene, &*guide, policy)?,
             false => (sensor, self.stop_periods),
@@ -162,6 +163,21 @@ impl FrameRequest {
             InputError::new(name, format!("{no_bins}{cure}"))
         })?)
     }
+}
+
+/// The sensor in the scene's lidar: at its temperature, unless it has one of its own.
+fn as_warm_as(scene: &Scene, sensor: Sensor) -> Result<Sensor, InputError> {
+    let (None, Some(junction_c)) = (sensor.temperature_c, scene.lidar.junction_c()) else {
+        return Ok(sensor);
+    };
+    let warm = Sensor::new(SensorConfig {
+        temperature_c: Some(junction_c),
+        ..(*sensor).clone()
+    });
+    warm.map_err(|fault| {
+        let message = format!("{fault}; or give sensor.temperature_c = 50, to leave the chip out");
+        InputError::new("scene.lidar.temperature_c", message)
+    })
 }
 
 /// Holds a share of false alarms to what it can be.

@@ -92,7 +92,7 @@ impl Rig {
         let clk_s = 1.0 / sensor.clk_hz;
         Rig {
             budget: scene.photon_budget(sensor.rows as u32, sensor.cols as u32),
-            dark_count_hz: scene.lidar.dark_count_hz,
+            dark_count_hz: scene.lidar.dark_counts_hz(),
             pulse_sigma_ns: scene.pulse_sigma().as_s() * 1e9,
             bin_s: match sensor.tdc {
                 Tdc::Clocked => clk_s,

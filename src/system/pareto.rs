@@ -136,7 +136,7 @@ impl ParetoSettings {
                             )
                             .with_background(
                                 budget.background_hz(self.reflectivity, illuminance_klux)
-                                    + self.scene.lidar.dark_count_hz,
+                                    + self.scene.lidar.dark_counts_hz(),
                             ),
                         ),
                     })

@@ -15,6 +15,7 @@ mod engines_are_chosen_from_the_command_line;
 mod frames_for_other_tools;
 mod golden_vectors_hold;
 mod guides_from_the_command_line;
+mod heat_reaches_the_chip;
 mod kept_inputs_are_read;
 mod libraries_make_the_chip;
 #[cfg(unix)]

@@ -201,6 +201,7 @@ fn stream(spads: SpadModel, laser_cycles: u32) -> StreamConfig {
         lead: Time::from_ps(700),
         pulse_sigma: Time::from_ns(1),
         pulse_shape: None,
+        energy_spread: 0.0,
         spads,
     }
 }

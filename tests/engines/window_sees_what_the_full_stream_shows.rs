@@ -196,6 +196,7 @@ pub fn cases(most_periods: u32, slowest_mhz: f64) -> impl Strategy<Value = Case>
                         ..spads
                     },
                     pulse_shape: measured.then(|| shape.unwrap()),
+                    energy_spread: if number % 4 == 0 { 0.3 } else { 0.0 },
                     ..stream_config(&config, &exposure, seed, Time::from_fs(sigma_fs))
                 };
                 let light = Some(

@@ -45,7 +45,7 @@ def timing(
     *,
     process: Literal["slow", "typ", "fast"] = "typ",
     voltage_v: float = 1.1,
-    temperature_c: float = 50.0,
+    temperature_c: float | None = None,
 ) -> Timing:
     """Static timing of a sensor's macropixel and load path, as `gdtof timing` has it.
 
@@ -58,7 +58,7 @@ def timing(
     voltage_v
         Supply, V.
     temperature_c
-        Junction temperature, °C.
+        Junction temperature, °C; the sensor's ``temperature_c``, or 50, unless given.
     """
     return Timing(**_gdtof.timing(sensor_of(sensor), process, voltage_v, temperature_c))
 

@@ -15,7 +15,7 @@ use super::SensorArgs;
 use super::silicon::SiliconArgs;
 use super::voice::say;
 use crate::analysis::{LoadTiming, ReadTiming, TimingVerdict};
-use crate::chip::{Limits, Silicon, Tdc};
+use crate::chip::{Limits, SensorConfig, Silicon, Tdc};
 use crate::files::InputError;
 
 /// Arguments of `gdtof timing`.
@@ -65,7 +65,7 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
     });
     let verdict = TimingVerdict::of(&config, &silicon, position);
     let mut sections = vec![
-        condition_table(&args.silicon, &silicon),
+        condition_table(&args.silicon, &config, &silicon),
         tables::verdict(&verdict),
         tables::windows(&subject),
         tables::reset_pulse(&subject),
@@ -103,8 +103,8 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn condition_table(args: &SiliconArgs, silicon: &Silicon) -> Section {
-    let conditions = args.conditions();
+fn condition_table(args: &SiliconArgs, config: &SensorConfig, silicon: &Silicon) -> Section {
+    let conditions = args.conditions(config);
     let headings = &[
         "corner",
         "process",

@@ -156,6 +156,14 @@ fn set_changes_single_keys_and_names_itself_in_complaints() {
             "lasers of flash lidars stay below 1 J a pulse",
         ),
         (
+            vec!["frame", "--set", "scene.lidar.temperature_c=2000"],
+            "its delays are known up to 150 degC",
+        ),
+        (
+            vec!["frame", "--set", "scene.lidar.temperature_c=300 K"],
+            "give a temperature such as",
+        ),
+        (
             replay(&["--set", "sensor.bins=0"]),
             "bins = 0 is impossible",
         ),

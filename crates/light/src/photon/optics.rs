@@ -6,6 +6,8 @@
 
 use std::f64::consts::{LN_2, PI};
 
+use crate::numerics::normal_above;
+
 /// A lens.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lens {
@@ -78,6 +80,25 @@ impl Filter {
             FilterShape::Cosine if x < 2.0 => 0.5 + 0.5 * (0.5 * PI * x).cos(),
             FilterShape::Cosine => 0.0,
             FilterShape::Lorentz => 1.0 / (1.0 + x * x),
+        }
+    }
+
+    /// Share that passes of a Gaussian line of this width (full, at half maximum, > 0): the overlap of two Gaussians, or of a Gaussian and
+    /// a top hat; `None` for shapes without such a closed form.
+    pub(crate) fn transmission_of(&self, wavelength_nm: f64, line_fwhm_nm: f64) -> Option<f64> {
+        let off_nm = wavelength_nm - self.centre_nm;
+        match self.shape {
+            FilterShape::Gaussian => {
+                let fwhm_nm = libm::hypot(self.fwhm_nm, line_fwhm_nm);
+                let joint = Filter { fwhm_nm, ..*self };
+                Some(self.fwhm_nm / fwhm_nm * joint.transmission(wavelength_nm))
+            }
+            FilterShape::TopHat => {
+                let sigma_nm = line_fwhm_nm / (8.0 * LN_2).sqrt();
+                let above = |edge_nm: f64| normal_above((edge_nm - off_nm) / sigma_nm);
+                Some(above(-0.5 * self.fwhm_nm) - above(0.5 * self.fwhm_nm))
+            }
+            FilterShape::Cosine | FilterShape::Lorentz => None,
         }
     }
 

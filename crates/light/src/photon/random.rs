@@ -40,7 +40,9 @@ pub enum Purpose {
     /// Which photons of a layer of light are kept.
     Thinning = 13,
     /// Phases and dithers of other lasers, and waits before our own laser's pulses.
-    OtherLaser = 14,
+    OtherLaser = 15,
+    /// Energies of laser pulses.
+    PulseEnergy = 14,
     /// Errors of guides other than the camera pair.
     Guide = 20,
     /// How SPADs of the array differ.

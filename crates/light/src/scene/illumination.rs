@@ -230,7 +230,7 @@ impl Scene {
     fn dark_hz(&self) -> f64 {
         match self.lidar.has_spread() {
             true => 0.0,
-            false => self.lidar.dark_count_hz,
+            false => self.lidar.dark_counts_hz(),
         }
     }
 }

@@ -15,6 +15,7 @@ mod entry;
 mod eye_safety;
 mod file;
 mod fog;
+mod heat;
 mod illumination;
 mod interferer;
 mod keys;

@@ -46,7 +46,10 @@ impl Lidar {
     /// sun's irradiance is known.
     fn filter_at(&self, wavelength_nm: f64) -> Option<f64> {
         match &self.filter {
-            Measured::Curve(curve) => Some(curve.at(wavelength_nm).unwrap_or(0.0)),
+            Measured::Curve(curve) => {
+                let cold_nm = wavelength_nm - self.filter_shift_nm();
+                Some(curve.at(cold_nm).unwrap_or(0.0))
+            }
             Measured::Word(word) => {
                 let filter = self.filter_of(word.shape()?);
                 Some(filter.transmission(wavelength_nm))
@@ -55,7 +58,8 @@ impl Lidar {
     }
 
     fn filter_of(&self, shape: FilterShape) -> Filter {
-        Filter::new(self.filter_centre_nm, self.filter_fwhm_nm, shape)
+        let centre_nm = self.filter_centre_nm + self.filter_shift_nm();
+        Filter::new(centre_nm, self.filter_fwhm_nm, shape)
     }
 
     /// Detection efficiency at a wavelength, relative to that at the laser's.
@@ -63,21 +67,56 @@ impl Lidar {
         match &self.pde_curve {
             Measured::Word(PdeWord::Flat) => 1.0,
             Measured::Curve(curve) => {
-                let own = curve.at(self.wavelength_nm).unwrap_or(0.0);
+                let own = curve.at(self.warm_wavelength_nm()).unwrap_or(0.0);
                 curve.at(wavelength_nm).unwrap_or(0.0) / own
             }
         }
     }
 
-    /// Share of the laser's light that passes the filter.
-    pub(super) fn laser_transmission(&self) -> f64 {
-        self.filter_at(self.wavelength_nm).unwrap_or(1.0)
+    /// Share of the laser's light that passes the filter, at its temperature.
+    pub fn laser_transmission(&self) -> f64 {
+        let (nm, fwhm_nm) = (self.warm_wavelength_nm(), self.laser_fwhm_nm);
+        if fwhm_nm == 0.0 {
+            return self.filter_at(nm).unwrap_or(1.0);
+        }
+        let breaks = match &self.filter {
+            Measured::Word(word) => match word.shape() {
+                None => return 1.0,
+                Some(shape) => {
+                    let filter = self.filter_of(shape);
+                    if let Some(share) = filter.transmission_of(nm, fwhm_nm) {
+                        return share;
+                    }
+                    let edge = |k: i32| filter.centre_nm + f64::from(k) * 0.5 * filter.fwhm_nm;
+                    (-2..=2).map(edge).collect()
+                }
+            },
+            Measured::Curve(curve) => {
+                let points = curve.points().iter();
+                points.map(|[at, _]| at + self.filter_shift_nm()).collect()
+            }
+        };
+        let line = Filter::new(nm, fwhm_nm, FilterShape::Gaussian);
+        self.through(breaks, line)
+    }
+
+    /// Share of a Gaussian line that passes the filter, by its integral; `breaks` are where the filter has kinks.
+    fn through(&self, mut breaks: Vec<f64>, line: Filter) -> f64 {
+        breaks.extend((-12..=12).map(|k| line.centre_nm + f64::from(k) * 0.25 * line.fwhm_nm));
+        let reach_nm = 3.0 * line.fwhm_nm;
+        breaks.retain(|nm| (nm - line.centre_nm).abs() <= reach_nm);
+        breaks.sort_by(f64::total_cmp);
+        let density = |nm: f64| self.filter_at(nm).unwrap_or(0.0) * line.transmission(nm);
+        integrate(density, &breaks, 1e-10) / integrate(|nm| line.transmission(nm), &breaks, 1e-10)
     }
 
     /// Sunlight in full sun (100 klux), W/m²: as much of the laser's wavelength gives as many detected photons.
     pub(super) fn effective_irradiance_w_m2(&self) -> f64 {
         let (from, to) = match &self.filter {
-            Measured::Curve(curve) => curve.ends(),
+            Measured::Curve(curve) => {
+                let (from, to) = curve.ends();
+                (from + self.filter_shift_nm(), to + self.filter_shift_nm())
+            }
             Measured::Word(word) => match word.shape() {
                 None => return self.solar_irradiance_w_m2,
                 Some(shape) => self.filter_of(shape).passband_nm(),
@@ -90,12 +129,13 @@ impl Lidar {
         }
         let mut breaks = vec![from, to];
         breaks.extend(table.iter().map(|&(nm, _)| nm));
-        let (centre_nm, fwhm_nm) = (self.filter_centre_nm, self.filter_fwhm_nm);
+        let shift_nm = self.filter_shift_nm();
+        let (centre_nm, fwhm_nm) = (self.filter_centre_nm + shift_nm, self.filter_fwhm_nm);
         breaks.extend((-16..=16).map(|k| centre_nm + f64::from(k) * fwhm_nm / 4.0));
         let own =
             |curve: &Curve| -> Vec<f64> { curve.points().iter().map(|[nm, _]| *nm).collect() };
         if let Measured::Curve(curve) = &self.filter {
-            breaks.extend(own(curve));
+            breaks.extend(own(curve).iter().map(|nm| nm + shift_nm));
         }
         if let Measured::Curve(curve) = &self.pde_curve {
             breaks.extend(own(curve));
@@ -104,7 +144,7 @@ impl Lidar {
         breaks.sort_by(f64::total_cmp);
         let density = |nm: f64| {
             let passed = self.filter_at(nm).unwrap_or(0.0) * self.relative_pde(nm);
-            spectral_irradiance(nm) * passed * nm / self.wavelength_nm
+            spectral_irradiance(nm) * passed * nm / self.warm_wavelength_nm()
         };
         integrate(density, &breaks, 1e-10)
     }
@@ -117,7 +157,7 @@ impl Lidar {
                 message,
             })
         };
-        let nm = self.wavelength_nm;
+        let nm = self.warm_wavelength_nm();
         if self.laser_transmission() <= 0.0 {
             let message = format!(
                 "filter lets nothing of the laser's {nm} nm through; give a filter that does, or another wavelength_nm"
@@ -134,7 +174,9 @@ impl Lidar {
             return fault("filter", message);
         }
         if let Measured::Curve(curve) = &self.pde_curve
-            && curve.at(nm).unwrap_or(0.0) <= 0.0
+            && let Some(nm) = [self.wavelength_nm, nm]
+                .into_iter()
+                .find(|&nm| curve.at(nm).unwrap_or(0.0) <= 0.0)
         {
             let message = format!(
                 "pde_curve has no detection efficiency at the laser's {nm} nm; give a curve that does"
@@ -228,8 +270,8 @@ impl Scene {
         let lens_focal_m = lens_diameter_m * lidar.lens_f_number;
         let camera = self.lidar_camera(rows, cols);
         PhotonBudget {
-            pde: lidar.pde,
-            wavelength_nm: lidar.wavelength_nm,
+            pde: lidar.warm_pde(),
+            wavelength_nm: lidar.warm_wavelength_nm(),
             transmittance: lidar.transmittance * lidar.laser_transmission(),
             pulse_energy_j: lidar.pulse_energy_uj * 1e-6,
             lens_diameter_m,
@@ -327,11 +369,12 @@ impl Scene {
         PulseShape::new(step, &powers).ok()
     }
 
-    /// A photon stream with the measured laser pulse, if there is one.
+    /// A photon stream with the measured laser pulse, if there is one, and the spread of its energy.
     pub fn with_pulse(&self, config: StreamConfig) -> StreamConfig {
         let pulse_shape = self.pulse_shape();
         StreamConfig {
             pulse_shape,
+            energy_spread: self.lidar.pulse_energy_spread,
             ..config
         }
     }

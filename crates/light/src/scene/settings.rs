@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::camera::PinholeCamera;
 use super::curve::Measured;
+use super::heat::REFERENCE_C;
 use super::interferer::Interferer;
 use super::medium::Medium;
 use super::object::Object;
@@ -61,13 +62,22 @@ keys! {
         /// Laser wavelength.
         wavelength_nm: f64 ["nm"] = 940.0, in Within(100.0, 1e4),
             from "thesis 3.2, a dip of the solar spectrum";
+        /// Full width at half maximum of the laser's Gaussian spectrum; 0 is a line.
+        laser_fwhm_nm: f64 ["nm"] = 0.0, in Within(0.0, 1000.0), from "chosen: a line";
+        /// Growth of the laser's wavelength with temperature; edge emitters have 0.3 nm/K.
+        laser_drift_nm_per_k: f64 ["nm/K"] = 0.08, in Within(-10.0, 10.0),
+            from "thesis Table 4, a VCSEL";
         /// Energy of one laser pulse over the whole field of view.
         pulse_energy_uj: f64 ["uJ"] = 20.0,
             in Limited(0.0, 1e6, "lasers of flash lidars stay below 1 J a pulse"),
             from CHOSEN;
+        /// Standard deviation of a pulse's energy, relative to the mean; window takes some twice as long with it.
+        pulse_energy_spread: f64 = 0.0, in Within(0.0, 0.5), from "none in the thesis";
         /// Full width at half maximum of the Gaussian pulse, jitter included; with a measured pulse, of the jitter
         /// alone.
         pulse_fwhm_ns: f64 ["ns"] = 4.5, in Within(0.0, 1e6), from "thesis 6.4.2";
+        /// Standard deviation of the laser's delay after STOP, on top of the pulse's width.
+        trigger_jitter_ps: f64 ["ps"] = 0.0, in Within(0.0, 1e6), from "none in the thesis";
         /// Laser pulse.
         ///
         /// The centre of mass of a measured one leaves with the STOP edge.
@@ -131,6 +141,9 @@ keys! {
         filter_centre_nm: f64 ["nm"] = 940.0, in Within(100.0, 1e4), from "the laser";
         /// Full width at half maximum of the filter, if it is given as a shape.
         filter_fwhm_nm: f64 ["nm"] = 10.0, in Above(0.0, 1e4);
+        /// Growth of the filter's wavelengths with temperature.
+        filter_drift_nm_per_k: f64 ["nm/K"] = 0.02, in Within(-10.0, 10.0),
+            from "chosen: a hard-coated filter has 0.01 to 0.03";
         /// Solar irradiance within the filter's band at 100 klux, where filter is irradiance.
         solar_irradiance_w_m2: f64 ["W/m2"] = 3.047,
             in Limited(
@@ -146,6 +159,17 @@ keys! {
             from "chosen: 1.25 kHz for each of 16 SPADs";
         /// Standard deviation of the natural logarithm of a SPAD's dark count rate; the mean rate stays the same.
         dark_count_spread: f64 = 0.0, in Within(0.0, 5.0), from "none in the thesis";
+        /// Energy by which dark counts grow with temperature: exp(-energy/kT).
+        dark_count_activation_ev: f64 ["eV"] = 0.56, in Within(0.0, 2.0),
+            from "generation at traps in the middle of silicon's band gap (Shockley, Read, Hall): twice as much every 9.8 K";
+        /// Bias of the SPADs above their breakdown voltage at 25 degC, which detects 90 % of what it could.
+        excess_bias_v: f64 ["V"] = 3.0, in Above(0.0, 100.0), from "chosen";
+        /// Growth of the breakdown voltage with temperature, while the bias stays.
+        breakdown_drift_mv_per_k: f64 ["mV/K"] = 21.5, in Within(0.0, 1000.0),
+            from "arXiv:2007.02444, SensL MicroFJ; thinner junctions have less";
+        /// Temperature of the lidar, at which all its other keys have their values if it is 25 degC; the chip's junction is 25 K above it.
+        temperature_c: f64 ["degC"] = REFERENCE_C, in Limited(-55.0, 125.0, "the chip is 25 K warmer, and its delays are known up to 150 degC"),
+            from "chosen";
         /// Share of SPADs that are hot.
         hot_spad_share: f64 = 0.0, in SHARE, from "none in the thesis";
         /// Dark counts of a hot SPAD.
@@ -280,9 +304,11 @@ impl Scene {
         Some(DVec3::new(right * cosine, -sine, forward * cosine))
     }
 
-    /// Standard deviation of the laser pulse: its width at half maximum over 2·√(2·ln 2).
+    /// Standard deviation of the laser pulse: its width at half maximum over 2·√(2·ln 2), and the trigger's jitter, whose variances
+    /// add.
     pub fn pulse_sigma(&self) -> Time {
-        Time::from_s(self.lidar.pulse_fwhm_ns * 1e-9 / (8.0 * LN_2).sqrt())
+        let pulse_s = self.lidar.pulse_fwhm_ns * 1e-9 / (8.0 * LN_2).sqrt();
+        Time::from_s(libm::hypot(pulse_s, self.lidar.trigger_jitter_ps * 1e-12))
     }
 }
 
@@ -303,5 +329,7 @@ mod tests {
         let mut scene = Scene::outdoor();
         scene.lidar.pulse_fwhm_ns = 2.354_820_045;
         assert!((scene.pulse_sigma().as_ns() - 1.0).abs() < 1e-6);
+        scene.lidar.trigger_jitter_ps = 750.0;
+        assert!((scene.pulse_sigma().as_ns() - 1.25).abs() < 1e-6);
     }
 }

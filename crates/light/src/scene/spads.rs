@@ -21,7 +21,8 @@ impl Scene {
         if !lidar.has_spread() {
             return None;
         }
-        let mean_hz = lidar.dark_count_hz / spads as f64;
+        let heat = lidar.dark_count_factor();
+        let mean_hz = lidar.dark_counts_hz() / spads as f64;
         let (mut factors, mut dark_hz) = (Vec::new(), Vec::new());
         for spad in 0..spads as u32 {
             let mut random =
@@ -31,7 +32,7 @@ impl Scene {
             let spread = lidar.dark_count_spread;
             let log = spread * normal(&mut random) - 0.5 * spread * spread;
             dark_hz.push(if is_hot {
-                lidar.hot_spad_hz
+                lidar.hot_spad_hz * heat
             } else {
                 mean_hz * log.exp()
             });

@@ -13,7 +13,11 @@ enum Dimension {
     AngularSpeed,
     Angle,
     Energy,
+    CarrierEnergy,
     Voltage,
+    VoltagePerKelvin,
+    LengthPerKelvin,
+    Temperature,
     Capacitance,
     Illuminance,
     Irradiance,
@@ -34,7 +38,11 @@ impl Dimension {
             Dimension::AngularSpeed => "an angular velocity",
             Dimension::Angle => "an angle",
             Dimension::Energy => "an energy",
+            Dimension::CarrierEnergy => "the energy of a carrier",
             Dimension::Voltage => "a voltage",
+            Dimension::VoltagePerKelvin => "a voltage per kelvin",
+            Dimension::LengthPerKelvin => "a length per kelvin",
+            Dimension::Temperature => "a temperature",
             Dimension::Capacitance => "a capacitance",
             Dimension::Illuminance => "an illuminance",
             Dimension::Irradiance => "an irradiance",
@@ -45,7 +53,7 @@ impl Dimension {
 }
 
 /// Symbol, what it measures, and its power of ten of the dimension's base unit.
-const UNITS: [(&str, Dimension, i32); 53] = [
+const UNITS: [(&str, Dimension, i32); 60] = [
     ("s", Dimension::Time, 0),
     ("ms", Dimension::Time, -3),
     ("us", Dimension::Time, -6),
@@ -79,8 +87,15 @@ const UNITS: [(&str, Dimension, i32); 53] = [
     ("µJ", Dimension::Energy, -6),
     ("nJ", Dimension::Energy, -9),
     ("pJ", Dimension::Energy, -12),
+    ("eV", Dimension::CarrierEnergy, 0),
+    ("meV", Dimension::CarrierEnergy, -3),
     ("V", Dimension::Voltage, 0),
     ("mV", Dimension::Voltage, -3),
+    ("mV/K", Dimension::VoltagePerKelvin, -3),
+    ("nm/K", Dimension::LengthPerKelvin, -9),
+    ("pm/K", Dimension::LengthPerKelvin, -12),
+    ("degC", Dimension::Temperature, 0),
+    ("°C", Dimension::Temperature, 0),
     ("pF", Dimension::Capacitance, -12),
     ("fF", Dimension::Capacitance, -15),
     ("lx", Dimension::Illuminance, 0),

@@ -52,7 +52,7 @@ impl Spread {
 pub fn spread(config: &SensorConfig, silicon: &Silicon, done: impl Fn() + Sync) -> Spread {
     let (period, phase) = (config.clock().period(), config.stop_phase());
     // As the window law has it, which knows of the library's delays only.
-    let library = Silicon::nominal(silicon.corner);
+    let library = Silicon::of(config);
     let library = MacropixelTiming::of(config, &library, Limits::Kept, (0, 0));
     let aim = library.aim(period, phase);
     let pixel = |index: usize| {

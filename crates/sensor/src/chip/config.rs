@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::blocks::metdc_delay_line::Elements;
 use super::own_block::block::OwnBlock;
-use crate::netlist::Corner;
+use crate::netlist::{Conditions, Corner};
 use crate::photon::{MOST_SPADS, SpadGrid, count_bits};
 use crate::settings::Range::{Above, OneOf, Within};
 use crate::settings::{keys, words};
@@ -234,6 +234,10 @@ keys! {
         mode: Mode = Mode::Guided, from "thesis 4.3 and 4.2";
         /// Silicon corner of the cells' delays; min and max mean fast and slow.
         corner: Corner = Corner::Typ, in OneOf(&["slow", "typ", "fast"]);
+        /// Junction temperature, to which delays belong; 25 K above the scene's lidar.temperature_c, if left out.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        temperature_c: Option<f64> ["degC"] = None, in Within(-55.0, 150.0),
+            from "chosen: 50 degC, where the built-in cells are characterised";
         /// Cell library, a Liberty file (.lib or .lib.gz), instead of the built-in delays; without one in the slow and fast corner only
         /// corner = "typ" is possible.
         liberty: PathBuf = PathBuf::new(), from "chosen: the built-in cells, which take the thesis's 1.2 ns (4.6)";
@@ -255,6 +259,15 @@ impl SensorConfig {
     /// CLK. The configuration must have passed [`SensorConfig::check`].
     pub fn clock(&self) -> Frequency {
         Frequency::from_hz_f64(self.clk_hz).expect("checked")
+    }
+
+    /// Where its cells are operated: in typical silicon, at their own supply.
+    pub fn conditions(&self) -> Conditions {
+        let usual = Conditions::default();
+        Conditions {
+            temperature_c: self.temperature_c.unwrap_or(usual.temperature_c),
+            ..usual
+        }
     }
 
     /// Deserialiser clock. The configuration must have passed [`SensorConfig::check`].

@@ -8,6 +8,7 @@ use super::front_end::DeadTimeTooShort;
 use super::own_block::CONTRACTS;
 use super::timing::ChipTiming;
 use super::timing::cell_library::CellLibrary;
+use super::timing::silicon::Silicon;
 use crate::files::{InputError, placed};
 use crate::photon::{SIDES, count_bits};
 use crate::settings::{Document, Fault, Key, Section, Settings, commented, schema};
@@ -361,9 +362,12 @@ impl SensorConfig {
                 SensorFault::Value { key, why }
             })?;
         }
-        if let Err((key, why)) = CellLibrary::of(self) {
-            return Err(SensorFault::Liberty { key, why });
-        }
+        let library =
+            CellLibrary::of(self).map_err(|(key, why)| SensorFault::Liberty { key, why })?;
+        Silicon::at_temperature(library, self).map_err(|why| SensorFault::Liberty {
+            key: "temperature_c",
+            why: why.to_string(),
+        })?;
         ChipTiming::of(self).pulses.follow(self.dead_time_ns)?;
         let half_period_ps = 0.5e12 / self.clk_hz;
         if self.stop_phase_ps.is_nan() || self.stop_phase_ps.abs() > half_period_ps {

@@ -34,6 +34,7 @@ pub fn stream_config(
         lead: WindowLaw::new(&sensor, exposure).lead(),
         pulse_sigma,
         pulse_shape: None,
+        energy_spread: 0.0,
         spads: SpadModel {
             grid: sensor.spad_grid(),
             dead_time: sensor.dead_time(),

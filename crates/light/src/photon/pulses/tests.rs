@@ -18,6 +18,7 @@ fn config() -> StreamConfig {
         lead: Time::from_ps(1_100),
         pulse_sigma: Time::from_ps(1_700),
         pulse_shape: None,
+        energy_spread: 0.0,
         spads: SpadModel::default(),
     }
 }
@@ -147,6 +148,7 @@ fn a_measured_pulse_adds_to_the_jitter() {
     let shape = PulseShape::new(Time::from_ns(2), &[0.0, 3.0, 1.0, 0.5, 0.0]).unwrap();
     let config = StreamConfig {
         pulse_shape: Some(shape.clone()),
+        energy_spread: 0.0,
         ..config()
     };
     let light = PixelLight::echo(5.0, LIGHT.arrival());
@@ -400,6 +402,7 @@ proptest! {
             lead: Time::ZERO,
             pulse_sigma: Time::from_ns(2),
             pulse_shape: None,
+            energy_spread: 0.0,
             spads: SpadModel {
                 afterpulse_probability,
                 afterpulse_time: Time::from_ns(10),
@@ -418,6 +421,43 @@ proptest! {
             let times: Vec<_> =
                 photons.events.iter().filter(|e| e.spad == spad).map(|e| e.time).collect();
             prop_assert!(times.windows(2).all(|w| w[1] > w[0] + config.spads.dead_time));
+        }
+    }
+}
+
+/// Counts of a laser cycle are Poisson about its energy, which all macropixels share.
+#[test]
+fn pulses_differ_in_energy() {
+    const CYCLES: u32 = 2000;
+    // Drawn by groups, and by laser cycle.
+    for photons in [4.0, 12.0] {
+        let light = PixelLight::echo(photons, Time::from_ns(400));
+        let counts = |energy_spread: f64, pixel: u32| {
+            let stream = PhotonStream::new(&StreamConfig {
+                energy_spread,
+                ..config()
+            });
+            let mut counts = vec![0.0; CYCLES as usize];
+            for event in stream.pixel_events(pixel, &light).events {
+                counts[(event.time.as_ns() / (500.0 / 0.384)) as usize] += 1.0;
+            }
+            counts
+        };
+        let covariance = |a: &[f64], b: &[f64]| {
+            let products = a.iter().zip(b).map(|(a, b)| (a - photons) * (b - photons));
+            products.sum::<f64>() / f64::from(CYCLES)
+        };
+        for spread in [0.0, 0.3] {
+            let (one, other) = (counts(spread, 1), counts(spread, 2));
+            let (of_energy, of_all) = ((spread * photons).powi(2), photons);
+            let error = 5.0 * (of_all + of_energy) * (2.0 / f64::from(CYCLES)).sqrt();
+            let mean = one.iter().sum::<f64>() / f64::from(CYCLES);
+            let mean_error = 5.0 * ((of_all + of_energy) / f64::from(CYCLES)).sqrt();
+            assert!((mean - photons).abs() < mean_error, "{spread} {mean}");
+            let variance = covariance(&one, &one);
+            assert!((variance - of_all - of_energy).abs() < error, "{variance}");
+            let shared = covariance(&one, &other);
+            assert!((shared - of_energy).abs() < error, "{shared} {of_energy}");
         }
     }
 }

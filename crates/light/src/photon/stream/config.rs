@@ -35,6 +35,9 @@ pub struct StreamConfig {
     pub pulse_sigma: Time,
     /// A measured laser pulse, whose times add to those of the Gaussian; its time 0 comes at the echo's arrival.
     pub pulse_shape: Option<PulseShape>,
+    /// Standard deviation of a pulse's energy relative to the mean, 0 to 0.5. Energies are uniform within √3 times as much: bounded, so
+    /// that photons can be drawn at the greatest one and thinned.
+    pub energy_spread: f64,
     /// How the SPADs answer.
     pub spads: SpadModel,
 }
@@ -45,6 +48,11 @@ impl StreamConfig {
     pub(crate) fn cycle_start(&self, cycle: u32) -> Time {
         self.clock
             .periods(i64::from(cycle) * i64::from(self.stop_periods))
+    }
+
+    /// The greatest energy of a pulse, relative to the mean.
+    pub(super) fn greatest_energy(&self) -> f64 {
+        1.0 + 3f64.sqrt() * self.energy_spread
     }
 
     /// Rising edges of a macropixel's SPADs to be expected in the exposure, at most: as many as photons, and as dead times.
@@ -60,7 +68,8 @@ impl StreamConfig {
     /// any are thinned.
     pub fn most_photons_per_cycle(&self, light: &PixelLight) -> f64 {
         let others = light.trains_hz() * self.cycle_s();
-        light.signal_per_cycle() + light.background_hz() * self.cycle_s() + others
+        let signal = light.signal_per_cycle() * self.greatest_energy();
+        signal + light.background_hz() * self.cycle_s() + others
     }
 
     /// Nominal length of a cycle, s.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::exposure::PhotonStream;
 use super::group::Group;
 use crate::photon::light::{Layer, Profile};
+use crate::photon::random::Purpose;
 use crate::units::Time;
 
 /// What is kept of a layer.
@@ -17,6 +18,8 @@ pub(super) struct Limits {
     pub(super) lit: Range<Time>,
     pub(super) profile: Option<Arc<Profile>>,
     pub(super) by_spad: Option<Arc<[f64]>>,
+    /// Whether laser cycles' echoes differ in energy.
+    has_energies: bool,
 }
 
 impl Limits {
@@ -24,13 +27,19 @@ impl Limits {
     pub(super) fn of(layer: &Layer<'_>, stream: &PhotonStream) -> Option<Self> {
         let laser_cycles = stream.config.laser_cycles;
         let cycles = layer.cycles.start.min(laser_cycles)..layer.cycles.end.min(laser_cycles);
-        let is_everything =
-            layer.profile.is_none() && layer.by_spad.is_none() && cycles == (0..laser_cycles);
+        let has_energies = stream.config.energy_spread > 0.0
+            && layer.signal_per_cycle > 0.0
+            && layer.train.is_none();
+        let is_everything = !has_energies
+            && layer.profile.is_none()
+            && layer.by_spad.is_none()
+            && cycles == (0..laser_cycles);
         (!is_everything).then(|| Limits {
             lit: stream.cycle_start(cycles.start)..stream.cycle_start(cycles.end),
             cycles,
             profile: layer.profile.cloned(),
             by_spad: layer.by_spad.cloned(),
+            has_energies,
         })
     }
 
@@ -55,7 +64,20 @@ impl Limits {
         let begins_before = start == 0 || start < first;
         let ends_after =
             end >= first.saturating_add(group.cycles()) || end == stream.config.laser_cycles;
-        self.profile.is_none() && self.by_spad.is_none() && begins_before && ends_after
+        let has_all = self.profile.is_none() && self.by_spad.is_none() && !self.has_energies;
+        has_all && begins_before && ends_after
+    }
+
+    /// Energy of a laser cycle's pulse, relative to the greatest one; the same for all macropixels.
+    pub(super) fn energy(&self, cycle: u32, stream: &PhotonStream) -> f64 {
+        if !self.has_energies {
+            return 1.0;
+        }
+        let counter = [cycle, 0, 0, Purpose::PulseEnergy as u32];
+        let word = rand_philox::philox4x32_10(counter, stream.key)[0];
+        let greatest = stream.config.greatest_energy();
+        let least = 2.0 - greatest;
+        (least + (greatest - least) * rand_philox::u32_to_unit_f64(word)) / greatest
     }
 
     /// The chance of a photon of this SPAD.

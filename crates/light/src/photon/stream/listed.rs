@@ -174,6 +174,7 @@ mod tests {
                 lead: Time::ZERO,
                 pulse_sigma: Time::from_ps(800),
                 pulse_shape: is_measured.then_some(shape),
+                energy_spread: 0.0,
                 spads: SpadModel { afterpulse_probability, ..SpadModel::default() },
             });
             let mut light = PixelLight::background(8e6);

@@ -96,7 +96,8 @@ impl PhotonStream {
             for (kind, share) in [(Kind::Plain, 1.0 - breeding), (Kind::Breeding, breeding)] {
                 if kind == Kind::Plain || share > 0.0 {
                     let mut part = self.part(pixel, &layer, kind, share);
-                    (part.key, part.is_bright, part.is_alone) = (key, is_bright, light.is_plain());
+                    (part.key, part.is_bright) = (key, is_bright);
+                    part.is_alone = light.is_plain() && self.config.energy_spread == 0.0;
                     parts.push(part);
                 }
             }
@@ -125,7 +126,11 @@ impl PhotonStream {
             None => self.shape.clone(),
         };
         let reach_fs = gaussian.reach();
-        let photons = layer.signal_per_cycle * share;
+        let greatest_energy = match layer.train {
+            Some(_) => 1.0,
+            None => self.config.greatest_energy(),
+        };
+        let photons = layer.signal_per_cycle * greatest_energy * share;
         let foreign = layer
             .train
             .map(|train| Foreign::of(train, self, photons, reach_fs));

@@ -57,7 +57,11 @@ impl PixelStream<'_> {
         match &self.limits {
             None => true,
             Some(limits) => {
-                limits.cycles.contains(&cycle) && self.is_kept(limits.chance(spad), words)
+                limits.cycles.contains(&cycle)
+                    && self.is_kept(
+                        limits.chance(spad) * limits.energy(cycle, self.stream),
+                        words,
+                    )
             }
         }
     }

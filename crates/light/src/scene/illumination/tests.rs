@@ -182,6 +182,7 @@ fn crosstalk_into_a_neighbour_is_that_of_the_avalanches_at_its_side() {
             lead: Time::ZERO,
             pulse_sigma: Time::from_ns(1),
             pulse_shape: None,
+            energy_spread: 0.0,
             spads: SpadModel {
                 crosstalk_probability: 0.0,
                 ..spads

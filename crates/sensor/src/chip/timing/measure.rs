@@ -14,7 +14,7 @@ use crate::netlist::{CellKind, CheckKind, Corner};
 use crate::units::Time;
 
 impl ChipTiming {
-    /// The timing of a sensor without mismatch, in its corner.
+    /// The timing of a sensor without mismatch, in its corner at its temperature.
     ///
     /// Measured once for every circuit and corner, and remembered: a measurement takes 0.6 ms, four times as long as
     /// elaborating the macropixel, a look-up 60 ns; and window laws are asked for by the thousand.
@@ -122,6 +122,8 @@ struct Circuit {
     bin_bits: usize,
     overflow: Overflow,
     corner: Corner,
+    /// Its bits.
+    temperature: Option<u64>,
     library: CellLibrary,
 }
 
@@ -142,6 +144,7 @@ impl Circuit {
             bin_bits: config.bin_bits,
             overflow: config.overflow,
             corner: config.corner,
+            temperature: config.temperature_c.map(f64::to_bits),
             library: CellLibrary::of(config).expect("checked"),
         }
     }

@@ -39,13 +39,26 @@ impl Silicon {
         }
     }
 
-    /// That of a sensor without mismatch: its library in its corner. The description must have passed
+    /// That of a sensor without mismatch: its library in its corner at its temperature. The description must have passed
     /// [`SensorConfig::check`].
     pub fn of(config: &SensorConfig) -> Self {
-        Silicon {
-            cell_library: CellLibrary::of(config).expect("checked"),
+        let cell_library = CellLibrary::of(config).expect("checked");
+        Silicon::at_temperature(cell_library, config).expect("checked")
+    }
+
+    /// The silicon of a sensor whose library has been read.
+    ///
+    /// # Errors
+    /// Temperatures for which no delays are known.
+    pub(in crate::chip) fn at_temperature(
+        cell_library: CellLibrary,
+        config: &SensorConfig,
+    ) -> Result<Self, UnknownConditions> {
+        let silicon = Silicon {
+            cell_library,
             ..Silicon::nominal(config.corner)
-        }
+        };
+        silicon.in_conditions(config.conditions())
     }
 
     /// The same chip with every delay and limit times `factor`, instead of its own.

@@ -381,6 +381,7 @@ mod tests {
             lead: Time::ZERO,
             pulse_sigma: Time::from_ns(2),
             pulse_shape: None,
+            energy_spread: 0.0,
             spads: SpadModel::with_dead_time(Time::from_ns(30)),
         }
     }

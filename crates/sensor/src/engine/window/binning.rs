@@ -263,6 +263,7 @@ mod tests {
             lead,
             pulse_sigma: Time::ZERO,
             pulse_shape: None,
+            energy_spread: 0.0,
             spads: SpadModel::default(),
         };
         PhotonStream::new(&config).slots()

@@ -1,0 +1,185 @@
+//! What temperature does to the lidar: dark counts, detection efficiency, the laser's line in the filter.
+//!
+//! ```text
+//!   T ──┬─► breakdown voltage rises, the bias stays ─► avalanches are rarer ─┬─► PDE
+//!       ├─► carriers are generated: exp(-E/kT) ──────────────────────────────┴─► dark counts
+//!       ├─► laser's wavelength ─┬─► share of the signal within the filter
+//!       ├─► filter's centre ────┘
+//!       └─► junction, 25 K above ─► delays of the chip (`SensorConfig::temperature_c`)
+//! ```
+//!
+//! An excess bias V makes an avalanche of a carrier with the probability 1 − exp(−V/V₀): Otte et al., arXiv:1606.05186, who operate at
+//! 90 % of what can be had. That and all keys hold at 25 °C, where every factor here is exactly 1.
+
+use super::curve::Measured;
+use super::settings::Lidar;
+
+/// Temperature of the lidar at which its keys hold, °C.
+pub(super) const REFERENCE_C: f64 = 25.0;
+
+/// The chip's junction is so much warmer, K. Chosen: the built-in library, whose delays the default scene has, is of 50 °C.
+const JUNCTION_RISE_K: f64 = 25.0;
+
+/// Boltzmann's constant, eV/K (exact in the SI).
+const BOLTZMANN_EV_PER_K: f64 = 8.617_333_262e-5;
+
+const ZERO_CELSIUS_K: f64 = 273.15;
+
+/// What the excess bias at 25 °C detects of what it could.
+const TRIGGERED: f64 = 0.9;
+
+impl Lidar {
+    /// How much warmer it is than 25 °C, K.
+    fn warmer_k(&self) -> f64 {
+        self.temperature_c - REFERENCE_C
+    }
+
+    /// Temperature of the chip's junction, °C; `None` where the lidar is at 25 °C.
+    pub fn junction_c(&self) -> Option<f64> {
+        (self.temperature_c != REFERENCE_C).then_some(self.temperature_c + JUNCTION_RISE_K)
+    }
+
+    /// Probability that a carrier makes an avalanche, relative to that at 25 °C.
+    fn triggering(&self) -> f64 {
+        let lost_v = self.breakdown_drift_mv_per_k * 1e-3 * self.warmer_k();
+        let excess = (1.0 - lost_v / self.excess_bias_v).max(0.0);
+        -libm::expm1(excess * libm::log1p(-TRIGGERED)) / -libm::expm1(libm::log1p(-TRIGGERED))
+    }
+
+    /// Dark counts relative to those at 25 °C, of every SPAD.
+    pub(super) fn dark_count_factor(&self) -> f64 {
+        let inverse = |celsius: f64| 1.0 / (BOLTZMANN_EV_PER_K * (celsius + ZERO_CELSIUS_K));
+        let colder = inverse(REFERENCE_C) - inverse(self.temperature_c);
+        libm::exp(self.dark_count_activation_ev * colder) * self.triggering()
+    }
+
+    /// Dark counts of one macropixel at its temperature, all its SPADs together, Hz.
+    pub fn dark_counts_hz(&self) -> f64 {
+        self.dark_count_hz * self.dark_count_factor()
+    }
+
+    /// Detection efficiency at its temperature and its laser's wavelength, 0 to 1.
+    pub(super) fn warm_pde(&self) -> f64 {
+        let of_wavelength = match &self.pde_curve {
+            Measured::Word(_) => 1.0,
+            Measured::Curve(curve) => {
+                let at = |nm| curve.at(nm).unwrap_or(0.0);
+                at(self.warm_wavelength_nm()) / at(self.wavelength_nm)
+            }
+        };
+        (self.pde * self.triggering() * of_wavelength).min(1.0)
+    }
+
+    /// The laser's wavelength at its temperature, nm.
+    pub(super) fn warm_wavelength_nm(&self) -> f64 {
+        self.wavelength_nm + self.laser_drift_nm_per_k * self.warmer_k()
+    }
+
+    /// By how much the filter's wavelengths have grown, nm.
+    pub(super) fn filter_shift_nm(&self) -> f64 {
+        self.filter_drift_nm_per_k * self.warmer_k()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::photon::{Filter, FilterShape};
+    use crate::scene::Scene;
+
+    fn at(celsius: f64) -> Lidar {
+        let keys = format!("[lidar]\ntemperature_c = {celsius}\ndark_count_hz = 2e4\n");
+        Scene::parse("test", &keys).unwrap().lidar
+    }
+
+    #[test]
+    fn nothing_changes_at_25_degrees() {
+        let (given, lidar) = (Lidar::default(), at(25.0));
+        assert_eq!(lidar.dark_counts_hz(), 2e4);
+        assert_eq!(lidar.warm_pde(), given.pde);
+        assert_eq!(lidar.warm_wavelength_nm(), given.wavelength_nm);
+        assert_eq!((lidar.filter_shift_nm(), lidar.junction_c()), (0.0, None));
+    }
+
+    #[test]
+    fn heat_acts_as_its_closed_forms_say() {
+        let near = |value: f64, expected: f64| {
+            assert!((value / expected - 1.0).abs() < 1e-9, "{value} {expected}");
+        };
+        let hot = at(105.0);
+        // 80 K take 1.72 V of 3 V, of which 1 V loses a factor of 10^(1/3).
+        let triggered = (1.0 - 10f64.powf(-(3.0 - 1.72) / 3.0)) / 0.9;
+        near(hot.warm_pde(), 0.185 * triggered);
+        let generated = f64::exp(0.56 / 8.617_333_262e-5 * (1.0 / 298.15 - 1.0 / 378.15));
+        near(hot.dark_counts_hz(), 2e4 * generated * triggered);
+        near(hot.warm_wavelength_nm(), 946.4);
+        near(hot.filter_shift_nm(), 1.6);
+        assert_eq!(hot.junction_c(), Some(130.0));
+        // Generation doubles every 9.8 K.
+        let steady = |celsius| Lidar {
+            breakdown_drift_mv_per_k: 0.0,
+            ..at(celsius)
+        };
+        let doubled = steady(34.8).dark_counts_hz() / steady(25.0).dark_counts_hz();
+        assert!((doubled - 2.0).abs() < 0.02, "{doubled}");
+    }
+
+    #[test]
+    fn the_warmer_the_more_dark_counts_and_the_fewer_photons() {
+        let all: Vec<Lidar> = (-55..=125).step_by(5).map(|c| at(f64::from(c))).collect();
+        for pair in all.windows(2) {
+            assert!(pair[1].dark_counts_hz() > pair[0].dark_counts_hz());
+            assert!(pair[1].warm_pde() < pair[0].warm_pde());
+        }
+        // Without any bias left there are neither.
+        let dead = Lidar {
+            breakdown_drift_mv_per_k: 1000.0,
+            ..at(60.0)
+        };
+        assert_eq!((dead.dark_counts_hz(), dead.warm_pde()), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_line_drifts_out_of_its_filter() {
+        let share = |keys: &str| {
+            let scene = Scene::parse("test", &format!("[lidar]\n{keys}\n")).unwrap();
+            scene.lidar.laser_transmission()
+        };
+        // 4.8 nm off the middle of 10 nm, at 105 degC.
+        let hot = share("filter = \"gaussian\"\ntemperature_c = 105");
+        assert!((hot - 0.5f64.powf(0.96 * 0.96)).abs() < 1e-12, "{hot}");
+        assert_eq!(share("filter = \"top_hat\"\ntemperature_c = 105"), 1.0);
+        let of_curve = share("filter = [[930, 0.0], [940, 1.0], [950, 0.0]]\ntemperature_c = 105");
+        assert!((of_curve - 0.52).abs() < 1e-9, "{of_curve}");
+        // The line's own width: closed forms are the integral's.
+        let integral = |shape: FilterShape, lidar: &Lidar| {
+            let line = Filter::new(lidar.warm_wavelength_nm(), 2.0, FilterShape::Gaussian);
+            let filter = Filter::new(940.0 + lidar.filter_shift_nm(), 10.0, shape);
+            let (mut sum, mut all) = (0.0, 0.0);
+            for n in -40_000..40_000 {
+                let nm = line.centre_nm + (f64::from(n) + 0.5) * 2e-4;
+                sum += line.transmission(nm) * filter.transmission(nm);
+                all += line.transmission(nm);
+            }
+            sum / all
+        };
+        for (shape, word) in [
+            (FilterShape::TopHat, "top_hat"),
+            (FilterShape::Gaussian, "gaussian"),
+            (FilterShape::Cosine, "cosine"),
+            (FilterShape::Lorentz, "lorentz"),
+        ] {
+            let keys =
+                format!("[lidar]\nfilter = \"{word}\"\nlaser_fwhm_nm = 2\ntemperature_c = 105");
+            let lidar = Scene::parse("test", &keys).unwrap().lidar;
+            let (found, expected) = (lidar.laser_transmission(), integral(shape, &lidar));
+            assert!(
+                (found - expected).abs() < 2e-5,
+                "{word}: {found} {expected}"
+            );
+        }
+        let edge = "[lidar]\nfilter = \"top_hat\"\nlaser_drift_nm_per_k = 0.3\ntemperature_c = 105";
+        let fault = Scene::parse("test", edge).unwrap_err().to_string();
+        assert!(fault.contains("nothing of the laser's 964 nm"), "{fault}");
+    }
+}
