@@ -62,6 +62,9 @@ pub(super) struct DriveArgs {
     /// histogram.
     #[arg(long, value_enum, default_value_t)]
     noise: Noise,
+    /// Learn from depths how far the right camera has turned (scene.stereo.yaw_error_deg), and correct the guide from frame to frame.
+    #[arg(long)]
+    self_calibrate: bool,
     /// Simulate everything anew in every frame: same results, more work.
     #[arg(long)]
     no_skip: bool,
@@ -85,6 +88,9 @@ struct FrameLine<'a> {
     reused: Reused,
     work: Work,
     run_times: PhaseTimes,
+    /// Degrees outwards.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    camera_turn_deg: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     picture: Option<&'a str>,
 }
@@ -127,6 +133,7 @@ struct Configuration<'a> {
     segments: u32,
     noise: Noise,
     skip: bool,
+    self_calibrates: bool,
 }
 
 /// Runs the command.
@@ -154,6 +161,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         segments: args.segments,
         noise: args.noise,
         reuse: !args.no_skip,
+        self_calibrates: args.self_calibrate,
         start_s: args.start_s,
         ..DriveSettings::new(frame)
     };
@@ -167,6 +175,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         segments: args.segments,
         noise: args.noise,
         skip: settings.reuse,
+        self_calibrates: settings.self_calibrates,
     };
     let results = ResultSet::begin(&args.out)?;
     let began = Instant::now();
@@ -320,6 +329,7 @@ struct Recording {
     histograms: NpyStack<u16>,
     index: BufWriter<File>,
     folder: PathBuf,
+    self_calibrates: bool,
 }
 
 impl Recording {
@@ -339,6 +349,7 @@ impl Recording {
             )?,
             index: BufWriter::new(index.map_err(|e| InputError::unwritable(folder, &e))?),
             folder: folder.to_owned(),
+            self_calibrates: settings.self_calibrates,
         })
     }
 
@@ -350,6 +361,7 @@ impl Recording {
             reused: frame.reused,
             work: frame.work,
             run_times: frame.run_times,
+            camera_turn_deg: self.self_calibrates.then_some(frame.camera_turn_deg),
             picture,
         };
         let metres = |m: Option<f64>| m.map_or(f32::NAN, |m| m as f32);

@@ -20,6 +20,7 @@
 //! start value has changed.
 
 mod reuse;
+mod self_calibration;
 mod settings;
 mod stages;
 mod state;
@@ -58,6 +59,8 @@ pub struct DriveFrame {
     pub guide: GuideMap,
     /// What is there in the middle of the exposure.
     pub truth: GroundTruth,
+    /// By how much the right camera was taken to have turned outwards since calibration, degrees; 0 without self-calibration.
+    pub camera_turn_deg: f64,
     /// Worlds, each standing still, that the exposure was taken of.
     pub worlds: usize,
     /// Counts.
@@ -118,11 +121,16 @@ impl Drive<'_> {
         spent.run.together_s = clock.lap();
 
         self.remember(&plan.times, &pixels, &histograms);
+        let camera_turn_deg = self.self_calibration.as_ref().map_or(0.0, |c| c.turn_deg());
+        if let Some(calibration) = &mut self.self_calibration {
+            calibration.learn(&pixels);
+        }
         self.next += 1;
         let frame = DriveFrame {
             number: plan.number,
             times: plan.times,
             guide: plan.guide,
+            camera_turn_deg,
             truth: light.truth.clone(),
             worlds: light.worlds.len(),
             histograms: histograms.clone(),

@@ -78,6 +78,8 @@ pub struct DriveSettings {
     pub noise: Noise,
     /// Leave out what is provably the same as in the frame before; without it everything is simulated anew, for the same pictures.
     pub reuse: bool,
+    /// Learn from depths how far the right camera has turned, and rectify the guide's images by it from frame to frame.
+    pub self_calibrates: bool,
     /// Macropixels whose SPADs may be on, row-major; `None` for all.
     pub only: Option<Vec<bool>>,
     /// The time of the scene at which the first images are taken, s.
@@ -95,6 +97,7 @@ impl DriveSettings {
             segments: 4,
             noise: Noise::default(),
             reuse: true,
+            self_calibrates: false,
             only: None,
             start_s: 0.0,
         }

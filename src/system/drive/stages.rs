@@ -46,8 +46,12 @@ impl Drive<'_> {
             Noise::Still => frame.seed,
         };
         let mut clock = Stopwatch::new();
+        let mut world = scene.at(times.images_s);
+        if let Some(calibration) = &self.self_calibration {
+            world = calibration.rectified(world);
+        }
         let input = GuideInput {
-            scene: &scene.at(times.images_s),
+            scene: &world,
             rows: sensor.rows as u32,
             cols: sensor.cols as u32,
             seed,
@@ -62,7 +66,8 @@ impl Drive<'_> {
         let seen: Vec<Option<f64>> = last
             .map(|last| last.pixels.iter().map(|p| p.measured_m).collect())
             .unwrap_or_default();
-        let mut wanted = self.pointing.windows(&guide, &seen);
+        let aimed = (self.self_calibration.as_ref()).map(|c| c.aimed(&guide, number));
+        let mut wanted = (self.pointing).windows(aimed.as_ref().unwrap_or(&guide), &seen);
         for (start, is_on) in wanted.iter_mut().zip(only.iter().flatten()) {
             *start = start.filter(|_| *is_on);
         }

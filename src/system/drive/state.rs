@@ -1,6 +1,7 @@
 //! A drive between two frames.
 
 use super::reuse::Last;
+use super::self_calibration::SelfCalibration;
 use super::settings::{DriveSettings, FrameClock, FrameTimes};
 use crate::engine::load;
 use crate::guide::PastFrame;
@@ -21,6 +22,7 @@ pub struct Drive<'a> {
     pub(super) next: u32,
     pub(super) past: Vec<PastFrame>,
     pub(super) last: Option<Last>,
+    pub(super) self_calibration: Option<SelfCalibration>,
 }
 
 impl<'a> Drive<'a> {
@@ -47,6 +49,8 @@ impl<'a> Drive<'a> {
             next: 0,
             past: Vec::new(),
             last: None,
+            self_calibration: (settings.self_calibrates)
+                .then(|| SelfCalibration::new(scene, sensor.rows as u32, sensor.cols as u32)),
         })
     }
 

@@ -46,6 +46,12 @@ impl GuideMap {
         Some((self.range_m[pixel]?, self.sigma_m[pixel]))
     }
 
+    /// This map, with another's estimates where it has none.
+    pub(super) fn or(&self, other: &GuideMap) -> Self {
+        let either = |pixel| self.estimate_of(pixel).or(other.estimate_of(pixel));
+        GuideMap::new(self.rows, self.cols, (0..self.range_m.len()).map(either))
+    }
+
     /// How many macropixels have an estimate.
     pub fn guided(&self) -> usize {
         self.range_m.iter().flatten().count()

@@ -28,6 +28,7 @@ mod right_camera;
 mod stereo;
 #[cfg(test)]
 mod test_scenes;
+mod third_camera;
 
 use std::fmt::Debug;
 

@@ -12,6 +12,7 @@
 use super::mapping;
 use super::render::{Crop, pair};
 use super::stereo::{StereoPoint, StereoRig};
+use super::third_camera::with_third_camera;
 use super::{Guide, GuideError, GuideInput, GuideMap};
 use crate::scene::{DVec3, Scene};
 use crate::settings::Range::Within;
@@ -185,18 +186,15 @@ impl Guide for MatchedStereo {
     }
 
     fn estimate(&self, input: &GuideInput<'_>) -> Result<GuideMap, GuideError> {
-        let rig = StereoRig::new(input.scene, input.seed);
-        let points = self.points(input);
-        let points = points.iter().map(|(point, sigma_px, is_rim)| {
-            let sigma_m = point.depth_m * point.depth_m * sigma_px / rig.focal_baseline_px_m();
-            (point, sigma_m, *is_rim)
-        });
-        Ok(mapping::of_points(
-            input.scene,
-            input.rows,
-            input.cols,
-            points,
-        ))
+        Ok(with_third_camera(input, |input| {
+            let rig = StereoRig::new(input.scene, input.seed);
+            let points = self.points(input);
+            let points = points.iter().map(|(point, sigma_px, is_rim)| {
+                let sigma_m = point.depth_m * point.depth_m * sigma_px / rig.focal_baseline_px_m();
+                (point, sigma_m, *is_rim)
+            });
+            mapping::of_points(input.scene, input.rows, input.cols, points)
+        }))
     }
 
     fn reach(&self, scene: &Scene) -> Option<String> {

@@ -164,7 +164,7 @@ impl Scene {
         let lidar = &self.lidar;
         let per_sr = self.brightest_per_sr(&self.lidar_camera(rows, cols));
         Emission {
-            wavelength_nm: lidar.wavelength_nm,
+            wavelength_nm: lidar.warm_wavelength_nm(),
             pulse_j: lidar.pulse_energy_uj * 1e-6 * (per_sr * APERTURE_SR).min(1.0),
             rate_hz,
             mean_rate_hz,
@@ -259,6 +259,44 @@ mod tests {
         let pulses = 6.0 * 2e-9 / (0.4 * 0.198e-6 * 5.0 / 1.5);
         within(judged(wide).times_class_1, f64::max(average, pulses), 0.02);
         assert_eq!(emission(1550.0, 1.0).beside_class_1(), None);
+    }
+
+    /// A published example: pulses of 1.55 nJ at 80.1 MHz and 784 nm from a diffusing sphere 2 mm wide, judged by EN 60825-1:2014 in the
+    /// repository github.com/akufcsak/laser_safety. Its two figures are those of LaserBee: what reaches 100 mm within 100 s, and how
+    /// much may; limits of the source's width are reckoned by its tables.
+    #[test]
+    fn a_published_example_is_met() {
+        let (power_w, rate_hz, pupil_m2) = (0.124, 80.1e6, PI * 3.5e-3 * 3.5e-3);
+        let point = Emission {
+            rate_hz,
+            mean_rate_hz: rate_hz,
+            ..emission(784.0, power_w / rate_hz * APERTURE_SR / (4.0 * PI))
+        };
+        let wide = Emission {
+            source_mrad: 2.0 / 0.101,
+            ..point
+        };
+        let judged = |light: Emission| light.beside_class_1().unwrap();
+        within(
+            judged(point).power_into_eye_w * 100.0 / pupil_m2,
+            98.678,
+            1e-4,
+        );
+        let limit_w = |found: EyeSafety| found.power_into_eye_w / found.times_class_1;
+        // AELs are rounded MPEs: 3.9e-4 W for 10 W/m2 within the pupil.
+        within(limit_w(judged(point)) / pupil_m2, 14.72, 0.015);
+        // C4 is 1.4723, C6 19.8/1.5, T2 15.34 s.
+        within(
+            limit_w(judged(wide)),
+            7e-4 * 1.4723 * 13.201 * 15.34f64.powf(-0.25),
+            1e-3,
+        );
+        for found in [point, wide].map(judged) {
+            assert!(
+                found.rule == EyeRule::Average && found.times_class_1 < 1.0,
+                "{found:?}"
+            );
+        }
     }
 
     /// What goes into the aperture, by hand: a field of 16 x 16 degrees, bright alike.

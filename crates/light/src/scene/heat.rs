@@ -13,6 +13,8 @@
 
 use super::curve::Measured;
 use super::settings::Lidar;
+use crate::numerics::integrate;
+use crate::photon::{Filter, FilterShape};
 
 /// Temperature of the lidar at which its keys hold, °C.
 pub(super) const REFERENCE_C: f64 = 25.0;
@@ -41,7 +43,7 @@ impl Lidar {
 
     /// Probability that a carrier makes an avalanche, relative to that at 25 °C.
     fn triggering(&self) -> f64 {
-        let lost_v = self.breakdown_drift_mv_per_k * 1e-3 * self.warmer_k();
+        let lost_v = self.breakdown_drift_mv_k * 1e-3 * self.warmer_k();
         let excess = (1.0 - lost_v / self.excess_bias_v).max(0.0);
         -libm::expm1(excess * libm::log1p(-TRIGGERED)) / -libm::expm1(libm::log1p(-TRIGGERED))
     }
@@ -72,19 +74,55 @@ impl Lidar {
 
     /// The laser's wavelength at its temperature, nm.
     pub(super) fn warm_wavelength_nm(&self) -> f64 {
-        self.wavelength_nm + self.laser_drift_nm_per_k * self.warmer_k()
+        self.wavelength_nm + self.laser_drift_nm_k * self.warmer_k()
+    }
+
+    /// Share of the laser's light that passes the filter, at its temperature.
+    pub fn laser_transmission(&self) -> f64 {
+        let (nm, fwhm_nm) = (self.warm_wavelength_nm(), self.laser_fwhm_nm);
+        if fwhm_nm == 0.0 {
+            return self.filter_at(nm).unwrap_or(1.0);
+        }
+        let breaks = match &self.filter {
+            Measured::Word(word) => match word.shape() {
+                None => return 1.0,
+                Some(shape) => {
+                    let filter = self.filter_of(shape);
+                    if let Some(share) = filter.transmission_of(nm, fwhm_nm) {
+                        return share;
+                    }
+                    let edge = |k: i32| filter.centre_nm + f64::from(k) * 0.5 * filter.fwhm_nm;
+                    (-2..=2).map(edge).collect()
+                }
+            },
+            Measured::Curve(curve) => {
+                let points = curve.points().iter();
+                points.map(|[at, _]| at + self.filter_shift_nm()).collect()
+            }
+        };
+        let line = Filter::new(nm, fwhm_nm, FilterShape::Gaussian);
+        self.through(breaks, line)
+    }
+
+    /// Share of a Gaussian line that passes the filter, by its integral; `breaks` are where the filter has kinks.
+    fn through(&self, mut breaks: Vec<f64>, line: Filter) -> f64 {
+        breaks.extend((-12..=12).map(|k| line.centre_nm + f64::from(k) * 0.25 * line.fwhm_nm));
+        let reach_nm = 3.0 * line.fwhm_nm;
+        breaks.retain(|nm| (nm - line.centre_nm).abs() <= reach_nm);
+        breaks.sort_by(f64::total_cmp);
+        let density = |nm: f64| self.filter_at(nm).unwrap_or(0.0) * line.transmission(nm);
+        integrate(density, &breaks, 1e-10) / integrate(|nm| line.transmission(nm), &breaks, 1e-10)
     }
 
     /// By how much the filter's wavelengths have grown, nm.
     pub(super) fn filter_shift_nm(&self) -> f64 {
-        self.filter_drift_nm_per_k * self.warmer_k()
+        self.filter_drift_nm_k * self.warmer_k()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photon::{Filter, FilterShape};
     use crate::scene::Scene;
 
     fn at(celsius: f64) -> Lidar {
@@ -117,7 +155,7 @@ mod tests {
         assert_eq!(hot.junction_c(), Some(130.0));
         // Generation doubles every 9.8 K.
         let steady = |celsius| Lidar {
-            breakdown_drift_mv_per_k: 0.0,
+            breakdown_drift_mv_k: 0.0,
             ..at(celsius)
         };
         let doubled = steady(34.8).dark_counts_hz() / steady(25.0).dark_counts_hz();
@@ -133,7 +171,7 @@ mod tests {
         }
         // Without any bias left there are neither.
         let dead = Lidar {
-            breakdown_drift_mv_per_k: 1000.0,
+            breakdown_drift_mv_k: 1000.0,
             ..at(60.0)
         };
         assert_eq!((dead.dark_counts_hz(), dead.warm_pde()), (0.0, 0.0));
@@ -178,7 +216,7 @@ mod tests {
                 "{word}: {found} {expected}"
             );
         }
-        let edge = "[lidar]\nfilter = \"top_hat\"\nlaser_drift_nm_per_k = 0.3\ntemperature_c = 105";
+        let edge = "[lidar]\nfilter = \"top_hat\"\nlaser_drift_nm_k = 0.3\ntemperature_c = 105";
         let fault = Scene::parse("test", edge).unwrap_err().to_string();
         assert!(fault.contains("nothing of the laser's 964 nm"), "{fault}");
     }

@@ -44,7 +44,7 @@ pub(super) struct OffAxis {
 impl Lidar {
     /// Share of the light of `wavelength_nm` that passes the filter, relative to its transmittance; `None` where only the
     /// sun's irradiance is known.
-    fn filter_at(&self, wavelength_nm: f64) -> Option<f64> {
+    pub(super) fn filter_at(&self, wavelength_nm: f64) -> Option<f64> {
         match &self.filter {
             Measured::Curve(curve) => {
                 let cold_nm = wavelength_nm - self.filter_shift_nm();
@@ -57,7 +57,7 @@ impl Lidar {
         }
     }
 
-    fn filter_of(&self, shape: FilterShape) -> Filter {
+    pub(super) fn filter_of(&self, shape: FilterShape) -> Filter {
         let centre_nm = self.filter_centre_nm + self.filter_shift_nm();
         Filter::new(centre_nm, self.filter_fwhm_nm, shape)
     }
@@ -71,43 +71,6 @@ impl Lidar {
                 curve.at(wavelength_nm).unwrap_or(0.0) / own
             }
         }
-    }
-
-    /// Share of the laser's light that passes the filter, at its temperature.
-    pub fn laser_transmission(&self) -> f64 {
-        let (nm, fwhm_nm) = (self.warm_wavelength_nm(), self.laser_fwhm_nm);
-        if fwhm_nm == 0.0 {
-            return self.filter_at(nm).unwrap_or(1.0);
-        }
-        let breaks = match &self.filter {
-            Measured::Word(word) => match word.shape() {
-                None => return 1.0,
-                Some(shape) => {
-                    let filter = self.filter_of(shape);
-                    if let Some(share) = filter.transmission_of(nm, fwhm_nm) {
-                        return share;
-                    }
-                    let edge = |k: i32| filter.centre_nm + f64::from(k) * 0.5 * filter.fwhm_nm;
-                    (-2..=2).map(edge).collect()
-                }
-            },
-            Measured::Curve(curve) => {
-                let points = curve.points().iter();
-                points.map(|[at, _]| at + self.filter_shift_nm()).collect()
-            }
-        };
-        let line = Filter::new(nm, fwhm_nm, FilterShape::Gaussian);
-        self.through(breaks, line)
-    }
-
-    /// Share of a Gaussian line that passes the filter, by its integral; `breaks` are where the filter has kinks.
-    fn through(&self, mut breaks: Vec<f64>, line: Filter) -> f64 {
-        breaks.extend((-12..=12).map(|k| line.centre_nm + f64::from(k) * 0.25 * line.fwhm_nm));
-        let reach_nm = 3.0 * line.fwhm_nm;
-        breaks.retain(|nm| (nm - line.centre_nm).abs() <= reach_nm);
-        breaks.sort_by(f64::total_cmp);
-        let density = |nm: f64| self.filter_at(nm).unwrap_or(0.0) * line.transmission(nm);
-        integrate(density, &breaks, 1e-10) / integrate(|nm| line.transmission(nm), &breaks, 1e-10)
     }
 
     /// Sunlight in full sun (100 klux), W/m²: as much of the laser's wavelength gives as many detected photons.

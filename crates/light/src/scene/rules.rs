@@ -17,8 +17,17 @@ impl Scene {
     }
 }
 
-/// Disparities from least to most.
+/// Disparities from least to most, and a third camera between the others.
 pub(super) fn check_stereo(stereo: &Stereo) -> Option<Fault> {
+    if stereo.third_camera_baseline_m >= stereo.baseline_m {
+        return Some(Fault {
+            path: "stereo.third_camera_baseline_m".into(),
+            message: format!(
+                "third_camera_baseline_m = {} is impossible; give less than baseline_m, {}",
+                stereo.third_camera_baseline_m, stereo.baseline_m
+            ),
+        });
+    }
     (stereo.max_disparity_px < stereo.min_disparity_px).then(|| Fault {
         path: "stereo.max_disparity_px".into(),
         message: format!(

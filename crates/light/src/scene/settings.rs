@@ -65,7 +65,7 @@ keys! {
         /// Full width at half maximum of the laser's Gaussian spectrum; 0 is a line.
         laser_fwhm_nm: f64 ["nm"] = 0.0, in Within(0.0, 1000.0), from "chosen: a line";
         /// Growth of the laser's wavelength with temperature; edge emitters have 0.3 nm/K.
-        laser_drift_nm_per_k: f64 ["nm/K"] = 0.08, in Within(-10.0, 10.0),
+        laser_drift_nm_k: f64 ["nm/K"] = 0.08, in Within(-10.0, 10.0),
             from "thesis Table 4, a VCSEL";
         /// Energy of one laser pulse over the whole field of view.
         pulse_energy_uj: f64 ["uJ"] = 20.0,
@@ -142,7 +142,7 @@ keys! {
         /// Full width at half maximum of the filter, if it is given as a shape.
         filter_fwhm_nm: f64 ["nm"] = 10.0, in Above(0.0, 1e4);
         /// Growth of the filter's wavelengths with temperature.
-        filter_drift_nm_per_k: f64 ["nm/K"] = 0.02, in Within(-10.0, 10.0),
+        filter_drift_nm_k: f64 ["nm/K"] = 0.02, in Within(-10.0, 10.0),
             from "chosen: a hard-coated filter has 0.01 to 0.03";
         /// Solar irradiance within the filter's band at 100 klux, where filter is irradiance.
         solar_irradiance_w_m2: f64 ["W/m2"] = 3.047,
@@ -165,10 +165,10 @@ keys! {
         /// Bias of the SPADs above their breakdown voltage at 25 degC, which detects 90 % of what it could.
         excess_bias_v: f64 ["V"] = 3.0, in Above(0.0, 100.0), from "chosen";
         /// Growth of the breakdown voltage with temperature, while the bias stays.
-        breakdown_drift_mv_per_k: f64 ["mV/K"] = 21.5, in Within(0.0, 1000.0),
+        breakdown_drift_mv_k: f64 ["mV/K"] = 21.5, in Within(0.0, 1000.0),
             from "arXiv:2007.02444, SensL MicroFJ; thinner junctions have less";
         /// Temperature of the lidar, at which all its other keys have their values if it is 25 degC; the chip's junction is 25 K above it.
-        temperature_c: f64 ["degC"] = REFERENCE_C, in Limited(-55.0, 125.0, "the chip is 25 K warmer, and its delays are known up to 150 degC"),
+        temperature_c: f64 ["C"] = REFERENCE_C, in Limited(-55.0, 125.0, "the chip is 25 K warmer, and its delays are known up to 150 degC"),
             from "chosen";
         /// Share of SPADs that are hot.
         hot_spad_share: f64 = 0.0, in SHARE, from "none in the thesis";
@@ -219,6 +219,9 @@ keys! {
     pub struct Stereo {
         /// Distance from the principal (left) to the right camera.
         baseline_m: f64 ["m"] = 1.0, in LENGTH, from TABLE_12;
+        /// Distance from the principal to a third camera, between the two, that is like them: for what the pair has no estimate of. 0 is
+        /// none.
+        third_camera_baseline_m: f64 ["m"] = 0.0, in Within(0.0, 1e6), from "none in Table 12; thesis 7.3.1 proposes one";
         /// Focal length of both lenses.
         focal_mm: f64 ["mm"] = 12.0, in Above(0.0, f64::MAX), from TABLE_12;
         /// Pixel pitch of both cameras.

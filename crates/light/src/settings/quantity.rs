@@ -53,7 +53,7 @@ impl Dimension {
 }
 
 /// Symbol, what it measures, and its power of ten of the dimension's base unit.
-const UNITS: [(&str, Dimension, i32); 60] = [
+const UNITS: [(&str, Dimension, i32); 61] = [
     ("s", Dimension::Time, 0),
     ("ms", Dimension::Time, -3),
     ("us", Dimension::Time, -6),
@@ -94,6 +94,7 @@ const UNITS: [(&str, Dimension, i32); 60] = [
     ("mV/K", Dimension::VoltagePerKelvin, -3),
     ("nm/K", Dimension::LengthPerKelvin, -9),
     ("pm/K", Dimension::LengthPerKelvin, -12),
+    ("C", Dimension::Temperature, 0),
     ("degC", Dimension::Temperature, 0),
     ("°C", Dimension::Temperature, 0),
     ("pF", Dimension::Capacitance, -12),

@@ -236,7 +236,7 @@ keys! {
         corner: Corner = Corner::Typ, in OneOf(&["slow", "typ", "fast"]);
         /// Junction temperature, to which delays belong; 25 K above the scene's lidar.temperature_c, if left out.
         #[serde(skip_serializing_if = "Option::is_none")]
-        temperature_c: Option<f64> ["degC"] = None, in Within(-55.0, 150.0),
+        temperature_c: Option<f64> ["C"] = None, in Within(-55.0, 150.0),
             from "chosen: 50 degC, where the built-in cells are characterised";
         /// Cell library, a Liberty file (.lib or .lib.gz), instead of the built-in delays; without one in the slow and fast corner only
         /// corner = "typ" is possible.
