@@ -142,9 +142,11 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
     tell(sentences(&problem, &found, &corners, area))?;
     let (laser, design) = (1e2 * proposed.times_class_1, &proposed.design);
     tell(format_args!(
-        "Every chip on the front meets its static timing. The balanced one's laser has {laser:.0} % of what class 1 allows; one of its macropixels,\n\
-         simulated gate by gate, counts as the window engine in {cycles} laser cycles. In {out}: designs.csv front.svg front.csv sensor.toml scene.toml {MANIFEST}\n\n  \
+        "Every chip on the front meets its static timing. The balanced one's laser has {laser:.0} % of what class 1 allows at {} frames a second\n\
+         (`gdtof frame` judges frames without a pause); one of its macropixels, simulated gate by gate, counts as the window engine in {cycles} laser cycles.\n\
+         In {out}: designs.csv front.svg front.csv sensor.toml scene.toml {MANIFEST}\n\n  \
          gdtof frame --sensor {out}/sensor.toml --scene {out}/scene.toml --stop-periods {} --laser-cycles {} --guide truth:sigma_m={}\n",
+        goal.fps,
         design.stop_periods,
         design.laser_cycles,
         design.guide_sigma_m,
@@ -191,7 +193,12 @@ fn space(args: &ProposeArgs) -> Result<Space, InputError> {
     held("--clk", &args.clk, is_clk, "1 to 2000 MHz")?;
     held("--thresholds", &args.thresholds, |n| n < 16, "0 to 15")?;
     let is_sigma = |m: f64| (1e-3..=1000.0).contains(&m);
-    held("--guide-sigma", &args.guide_sigma, is_sigma, "0.001 to 1000 m")?;
+    held(
+        "--guide-sigma",
+        &args.guide_sigma,
+        is_sigma,
+        "0.001 to 1000 m",
+    )?;
     Ok(Space {
         bins: args.bins.clone(),
         clk_hz: args.clk.iter().map(|mhz| mhz * 1e6).collect(),
@@ -219,7 +226,13 @@ fn corners(problem: &Problem, found: &Found, seed: u64) -> anyhow::Result<Vec<Co
         let mut points = found.front.iter();
         let first = points.next().expect("a front has a point");
         let order = |p: &Point| (cost(p), p.ln_cost());
-        *points.fold(first, |best, next| if order(next) < order(best) { next } else { best })
+        *points.fold(first, |best, next| {
+            if order(next) < order(best) {
+                next
+            } else {
+                best
+            }
+        })
     };
     let mut chosen = vec![("balanced", least(&Point::ln_cost))];
     for (at, name) in CORNERS.into_iter().enumerate() {
@@ -228,11 +241,18 @@ fn corners(problem: &Problem, found: &Found, seed: u64) -> anyhow::Result<Vec<Co
             chosen.push((name, point));
         }
     }
+    let bar = progress(
+        chosen.len() as u64,
+        "checking {bar:40} {pos}/{len} designs on cohort",
+    );
     let check = |(name, point): (&'static str, Point)| {
         let check = check(problem, &point, seed)?;
+        bar.inc(1);
         Ok(Corner { name, point, check })
     };
-    chosen.into_iter().map(check).collect()
+    let corners = chosen.into_iter().map(check).collect();
+    bar.finish_and_clear();
+    corners
 }
 
 /// Columns of costs and design that the table and the CSV share.
@@ -249,7 +269,10 @@ fn cells(point: &Point) -> [String; 12] {
         format!("{}", (design.clk_hz * 1e-6 * 1e3).round() * 1e-3),
         design.threshold.to_string(),
         format!("{:.4}", design.pulse_energy_uj),
-        format!("{:.1}", 1e-3 * design.clk_hz / f64::from(design.stop_periods)),
+        format!(
+            "{:.1}",
+            1e-3 * design.clk_hz / f64::from(design.stop_periods)
+        ),
         design.laser_cycles.to_string(),
     ]
 }
@@ -307,7 +330,15 @@ fn sentences(problem: &Problem, found: &Found, corners: &[Corner], area: &str) -
     }
     let sensor = problem.sensor();
     let usual = SensorConfig::default();
-    let of = |s: &SensorConfig| (s.bins, s.bin_bits, s.counter_bits, s.clk_hz as u64, s.threshold);
+    let of = |s: &SensorConfig| {
+        (
+            s.bins,
+            s.bin_bits,
+            s.counter_bits,
+            s.clk_hz as u64,
+            s.threshold,
+        )
+    };
     let name = match of(sensor) == of(&usual) {
         true => "The QuantIC4x4",
         false => "The sensor itself",
@@ -318,10 +349,18 @@ fn sentences(problem: &Problem, found: &Found, corners: &[Corner], area: &str) -
         Own::Beaten(own, better) => {
             let best = &better[0];
             let [mine, theirs] = [own, best].map(Point::costs);
-            let what = ["laser power", area, "data", "time of a frame", "exactness of the guide"];
+            let what = [
+                "laser power",
+                area,
+                "data",
+                "time of a frame",
+                "exactness of the guide",
+            ];
             let less = (what.iter().zip(mine.iter().zip(&theirs)))
                 .filter(|(_, (mine, theirs))| theirs < mine)
-                .map(|(what, (mine, theirs))| format!("{:.0} % of its {what}", 1e2 * theirs / mine));
+                .map(|(what, (mine, theirs))| {
+                    format!("{:.0} % of its {what}", 1e2 * theirs / mine)
+                });
             let less: Vec<String> = less.collect();
             let design = &best.design;
             format!(

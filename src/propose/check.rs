@@ -3,9 +3,7 @@
 use super::point::Point;
 use super::problem::Problem;
 use crate::chip::{Exposure, Sensor, WindowLaw};
-use crate::engine::{
-    Cohort, CohortOptions, EngineError, Expose, Gate, LitPixel, Window, expose,
-};
+use crate::engine::{Cohort, CohortOptions, EngineError, Expose, Gate, LitPixel, Window, expose};
 use crate::files::InputError;
 use crate::numerics::intervals::{Estimate, deviation, mean, share};
 use crate::photon::{PhotonStream, PixelLight, Purpose, normal, random_stream};
@@ -14,6 +12,9 @@ use crate::request::{Spelling, guided_exposure};
 use crate::scene::Scene;
 use crate::system::{FrameError, photon_stream, range_counts};
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time, TimeOfFlight};
+
+/// Rows and columns of the array that is checked, at most.
+const CHECKED: (usize, usize) = (16, 64);
 
 /// Laser cycles of the macropixel at the gates.
 const GATE_CYCLES: u32 = 50;
@@ -48,7 +49,10 @@ struct Bench {
 impl Bench {
     fn new(problem: &Problem, point: &Point, most: u32, seed: u64) -> Result<Self, InputError> {
         let design = &point.design;
-        let sensor = Sensor::from(problem.config_of(design));
+        let mut config = problem.config_of(design);
+        config.rows = config.rows.min(CHECKED.0);
+        config.cols = config.cols.min(CHECKED.1);
+        let sensor = Sensor::from(config);
         let cycles = design.laser_cycles.min(most);
         let exposure = guided_exposure(&sensor, design.stop_periods, cycles, Spelling::Options)?;
         let scene = problem.scene_of(design);
@@ -83,7 +87,7 @@ impl Bench {
     }
 }
 
-/// A point on `cohort`, in all macropixels of the array, or on `window` where `cohort` refuses.
+/// A point on `cohort`, in up to 1024 macropixels, or on `window` where `cohort` refuses.
 ///
 /// # Errors
 /// What an engine refuses.
@@ -122,8 +126,16 @@ pub fn check(problem: &Problem, point: &Point, seed: u64) -> Result<Check, Frame
     let is_enough = errors_m.len() > 1;
     Ok(Check {
         detection: share(errors_m.len() as f64, ranges_m.len() as f64),
-        precision_m: if is_enough { deviation(&errors_m) } else { nothing },
-        bias_m: if is_enough { mean(&errors_m).value } else { f64::NAN },
+        precision_m: if is_enough {
+            deviation(&errors_m)
+        } else {
+            nothing
+        },
+        bias_m: if is_enough {
+            mean(&errors_m).value
+        } else {
+            f64::NAN
+        },
     })
 }
 

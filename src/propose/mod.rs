@@ -27,6 +27,8 @@ mod goal;
 mod point;
 mod problem;
 mod search;
+#[cfg(test)]
+mod tests;
 
 pub use check::{Check, check, gates_agree};
 pub use front::{dominates, front};

@@ -141,7 +141,9 @@ pub enum Limit {
         detection: f64,
     },
     /// No number of laser cycles finds the target.
-    #[error("light: {most} laser cycles of any energy up to 1000 times class 1 do not find the target")]
+    #[error(
+        "light: {most} laser cycles of any energy up to 1000 times class 1 do not find the target"
+    )]
     Light {
         /// Laser cycles that were tried.
         most: u32,

@@ -7,9 +7,7 @@ use super::echo::{Echo, Seen};
 use super::goal::Goal;
 use super::point::{Candidate, Choice, Design, Limit, Point};
 use crate::analysis::TimingVerdict;
-use crate::chip::{
-    CellLibrary, EventType, Mode, Sensor, SensorConfig, Silicon, Tdc, macropixel,
-};
+use crate::chip::{CellLibrary, EventType, Mode, Sensor, SensorConfig, Silicon, Tdc, macropixel};
 use crate::files::InputError;
 use crate::netlist::Netlist;
 use crate::scene::{Emission, EyeRule, Object, Scene, Shape};
@@ -64,7 +62,9 @@ impl Problem {
         let refused = |what: &str| {
             Err(InputError::new(
                 "the sensor",
-                format!("{what}; propose varies guided sensors with a clocked TDC, summation and event_type = \"greater\""),
+                format!(
+                    "{what}; propose varies guided sensors with a clocked TDC, summation and event_type = \"greater\""
+                ),
             ))
         };
         match &sensor {
@@ -151,7 +151,10 @@ impl Problem {
     /// The most energy that a single pulse may have, uJ.
     pub(super) fn most_energy_uj(&self) -> f64 {
         let alone = self.emission.with(1.0, 1e-9, 1e-9);
-        1.0 / alone.beside_class_1().expect("a judged wavelength").times_class_1
+        1.0 / alone
+            .beside_class_1()
+            .expect("a judged wavelength")
+            .times_class_1
     }
 
     /// Whether a design's chip meets its timing, and what it fails by.
@@ -194,7 +197,12 @@ impl Problem {
             ..SensorConfig::clone(&self.sensor)
         };
         let (signal, background_hz) = self.light(pulse_energy_uj);
-        Echo::new(&config, self.scene.pulse_resolution(), signal, background_hz)
+        Echo::new(
+            &config,
+            self.scene.pulse_resolution(),
+            signal,
+            background_hz,
+        )
     }
 
     /// CLK periods to the end of the last window that is needed, and the bits of a P-counter that counts them.
@@ -258,9 +266,8 @@ impl Problem {
             .flatten();
         let laser_cycles = cycles.ok_or(Limit::Light { most })?;
         let counts = f64::from(laser_cycles) * seen.fullest;
-        let holds = |bits: &usize| {
-            counts <= self.most_counts[*bits] || u64::from(laser_cycles) < 1 << bits
-        };
+        let holds =
+            |bits: &usize| counts <= self.most_counts[*bits] || u64::from(laser_cycles) < 1 << bits;
         let bin_bits = window.bits.or((1..=MOST_BIN_BITS).find(holds));
         let bin_bits = bin_bits.unwrap_or(MOST_BIN_BITS);
         let counts = match holds(&bin_bits) {
@@ -353,9 +360,16 @@ impl Problem {
         let mut found = None;
         let rates = [choice.rate_hz];
         let cycles = (1, super::search::MOST_CYCLES);
-        self.designs(&window, &seen, choice.guide_sigma_m, cycles, &rates, |one| {
-            found = Some(one);
-        })?;
+        self.designs(
+            &window,
+            &seen,
+            choice.guide_sigma_m,
+            cycles,
+            &rates,
+            |one| {
+                found = Some(one);
+            },
+        )?;
         Ok(found.expect("a design at one rate"))
     }
 }

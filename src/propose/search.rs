@@ -94,7 +94,11 @@ impl Gathered {
             Limit::Guide { share, .. } => 1.0 + share,
             _ => 0.0,
         };
-        if self.limit.as_ref().is_none_or(|known| rank(known) < rank(&limit)) {
+        if self
+            .limit
+            .as_ref()
+            .is_none_or(|known| rank(known) < rank(&limit))
+        {
             self.limit = Some(limit);
         }
     }
@@ -207,9 +211,13 @@ fn gather(
     all.into_iter().fold(Gathered::default(), Gathered::and)
 }
 
-/// What makes all designs of a space impossible.
+/// What makes all designs of a space impossible, the guide being as good as any that is tried.
 fn limit_of(problem: &Problem, space: &Space, own: bool) -> Limit {
-    let gathered = gather(problem, space, own, ABOVE, &|| ());
+    let space = Space {
+        guide_sigma_m: space.guide_sigma_m[..1].to_vec(),
+        ..space.clone()
+    };
+    let gathered = gather(problem, &space, own, ABOVE, &|| ());
     let [of_eyes, other] = gathered.nearest;
     let frame_ms = 1e3 / problem.goal().fps;
     match (of_eyes, other) {
@@ -289,9 +297,7 @@ pub fn search(problem: &Problem, space: &Space, done: impl Fn() + Sync) -> Resul
             mhz: sensor.clk_hz * 1e-6,
             why,
         }),
-        Ok(()) if of_own.points.is_empty() => {
-            Own::Impossible(limit_of(problem, &own_space, true))
-        }
+        Ok(()) if of_own.points.is_empty() => Own::Impossible(limit_of(problem, &own_space, true)),
         Ok(()) => beside(&front, of_own.points),
     };
     Ok(Found {
@@ -335,8 +341,11 @@ fn beside(best: &[Point], mut own: Vec<Point>) -> Own {
     own.sort_by(|a, b| a.ln_cost().total_cmp(&b.ln_cost()));
     let beats = |point: &Point| {
         let own = point.costs();
-        let mut better: Vec<Point> =
-            best.iter().filter(|p| dominates(&p.costs(), &own)).copied().collect();
+        let mut better: Vec<Point> = best
+            .iter()
+            .filter(|p| dominates(&p.costs(), &own))
+            .copied()
+            .collect();
         better.sort_by(|a, b| a.ln_cost().total_cmp(&b.ln_cost()));
         better
     };

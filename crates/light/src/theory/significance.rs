@@ -339,7 +339,10 @@ mod tests {
             let share = found.count() as f64 / f64::from(runs);
             let error = (power * (1.0 - power) / f64::from(runs)).sqrt();
             assert!((0.05..0.999).contains(&power), "{power}");
-            assert!((share - power).abs() < 4.0 * error + 0.01, "{bins}: {share} {power}");
+            assert!(
+                (share - power).abs() < 4.0 * error + 0.01,
+                "{bins}: {share} {power}"
+            );
         }
     }
 

@@ -244,7 +244,11 @@ mod tests {
     /// In light so little that SPADs never meet, what counts tell of a place is the Cramér-Rao bound of theory.
     #[test]
     fn little_light_tells_as_much_of_its_place_as_theory_has_it() {
-        for (clk_hz, signal, background) in [(384e6, 2e-3, 3e-3), (200e6, 1e-3, 2e-4), (800e6, 1e-4, 1e-3)] {
+        for (clk_hz, signal, background) in [
+            (384e6, 2e-3, 3e-3),
+            (200e6, 1e-3, 2e-4),
+            (800e6, 1e-4, 1e-3),
+        ] {
             let config = SensorConfig {
                 clk_hz,
                 bins: 64,
@@ -264,7 +268,10 @@ mod tests {
             });
             let bound_ns = mean.sum::<f64>().sqrt() * 1e9 / clk_hz;
             let theory_ns = cramer_rao(1e9 / clk_hz, PULSE_SIGMA.as_ns(), background, signal);
-            assert!((bound_ns / theory_ns - 1.0).abs() < 0.01, "{bound_ns} {theory_ns}");
+            assert!(
+                (bound_ns / theory_ns - 1.0).abs() < 0.01,
+                "{bound_ns} {theory_ns}"
+            );
         }
     }
 }
