@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use serde::Serialize;
 
 use super::SceneArgs;
 use super::voice::{note, progress, tell};
@@ -58,14 +57,6 @@ pub(super) struct ProposeArgs {
     out: PathBuf,
 }
 
-/// What was asked for, in the manifest.
-#[derive(Serialize)]
-struct Asked<'a> {
-    goal: &'a Goal,
-    sensor: &'a SensorConfig,
-    seed: u64,
-}
-
 /// A point of the front that stands for something, and what `cohort` says of it.
 struct Corner {
     name: &'static str,
@@ -88,8 +79,7 @@ const CORNERS: [&str; 5] = [
 /// Bad input, a goal that no design reaches, unwritable output.
 pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
     let (sensor, scene) = args.scene.read()?;
-    let goal = goal(args)?;
-    let space = space(args)?;
+    let (goal, space) = asked(args)?;
     let problem = Problem::new(goal, sensor, &scene)?;
     let results = ResultSet::begin(&args.out)?;
     let clocks = space.clk_hz.len() * space.thresholds.len();
@@ -99,7 +89,7 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
     );
     let begin = Instant::now();
     let found = search(&problem, &space, || bar.inc(1))
-        .map_err(|limit| InputError::new("no design does it", limit.to_string()))?;
+        .map_err(|limit| InputError::new("no chip does it", limit.to_string()))?;
     let took_s = begin.elapsed().as_secs_f64();
     bar.finish_and_clear();
     let corners = corners(&problem, &found, args.seed)?;
@@ -112,18 +102,16 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
 
     let staging = results.staging();
     let area = area_unit(problem.sensor());
-    write_designs(&staging.join("designs.csv"), &found, &corners, area)?;
+    write_designs(&staging.join("designs.csv"), &found, &corners)?;
     chart(&problem, &found, proposed, area).write(&staging.join("front.svg"))?;
     let chip = Sensor::from(problem.config_of(&proposed.design));
     write_text(&staging.join("sensor.toml"), &chip.commented())?;
     let target = problem.scene_of(&proposed.design);
     write_text(&staging.join("scene.toml"), &target.commented())?;
-    let asked = Asked {
-        goal: &goal,
-        sensor: problem.sensor(),
-        seed: args.seed,
-    };
-    for sentence in results.commit("propose", &asked)? {
+    for sentence in results.commit(
+        "propose",
+        (goal, args.seed, SensorConfig::clone(problem.sensor())),
+    )? {
         note(sentence);
     }
     tell(format_args!(
@@ -155,7 +143,8 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn goal(args: &ProposeArgs) -> Result<Goal, InputError> {
+/// What is asked for, and what is tried.
+fn asked(args: &ProposeArgs) -> Result<(Goal, Space), InputError> {
     let goal = Goal {
         range_m: args.range,
         reflectivity: args.reflectivity,
@@ -164,47 +153,16 @@ fn goal(args: &ProposeArgs) -> Result<Goal, InputError> {
         detection: args.detection,
         precision_m: args.precision,
     };
-    match goal.fault() {
-        None => Ok(goal),
-        Some((name, value, give)) => {
-            let message = format!("is impossible; give {give}");
-            Err(InputError::new(format!("--{name} {value}"), message))
-        }
-    }
-}
-
-fn space(args: &ProposeArgs) -> Result<Space, InputError> {
-    fn held<T: Copy + std::fmt::Display>(
-        option: &str,
-        values: &[T],
-        holds: impl Fn(T) -> bool,
-        give: &str,
-    ) -> Result<(), InputError> {
-        match values.iter().find(|value| !holds(**value)) {
-            None => Ok(()),
-            Some(bad) => {
-                let message = format!("is impossible; give {give}");
-                Err(InputError::new(format!("{option} {bad}"), message))
-            }
-        }
-    }
-    held("--bins", &args.bins, |n| (2..=64).contains(&n), "2 to 64")?;
-    let is_clk = |mhz: f64| (1.0..=2000.0).contains(&mhz);
-    held("--clk", &args.clk, is_clk, "1 to 2000 MHz")?;
-    held("--thresholds", &args.thresholds, |n| n < 16, "0 to 15")?;
-    let is_sigma = |m: f64| (1e-3..=1000.0).contains(&m);
-    held(
-        "--guide-sigma",
-        &args.guide_sigma,
-        is_sigma,
-        "0.001 to 1000 m",
-    )?;
-    Ok(Space {
+    let space = Space {
         bins: args.bins.clone(),
         clk_hz: args.clk.iter().map(|mhz| mhz * 1e6).collect(),
         thresholds: args.thresholds.clone(),
         guide_sigma_m: args.guide_sigma.clone(),
-    })
+    };
+    match goal.fault().or_else(|| space.fault()) {
+        Some(fault) => Err(InputError::new("what is asked", fault)),
+        None => Ok((goal, space)),
+    }
 }
 
 fn write_text(path: &Path, text: &str) -> Result<(), InputError> {
@@ -300,7 +258,7 @@ fn grid(corners: &[Corner], found: &Found, area: &str) -> Grid {
             beside(point.precision_m, &check.precision_m, 3),
         ]));
     }
-    if let Own::OnFront(point) | Own::Beaten(point, _) = &found.own {
+    if let Some(point) = found.own.point() {
         let own = ["this sensor".to_owned()].into_iter().chain(cells(point));
         let checked = [
             format!("{:.2}", 100.0 * point.detection),
@@ -379,57 +337,30 @@ fn sentences(problem: &Problem, found: &Found, corners: &[Corner], area: &str) -
     }
 }
 
-/// All of the front and the sensor itself, with what was measured of the corners.
-fn write_designs(
-    path: &Path,
-    found: &Found,
-    corners: &[Corner],
-    area: &str,
-) -> Result<(), InputError> {
-    let more = "counter_bits|stop_periods|in_window|detection|precision_m|times_class_1|cohort_detection|low|high|cohort_precision_m|low|high|cohort_bias_m";
-    let headings = headings(area).into_iter();
-    let mut grid = Grid::new(headings.chain(more.split('|').map(str::to_owned)));
-    let mut push = |name: &str, point: &Point, check: Option<&Check>| {
-        let design = &point.design;
-        let theory = [
-            design.counter_bits.to_string(),
-            design.stop_periods.to_string(),
-            point.in_window.to_string(),
-            point.detection.to_string(),
-            point.precision_m.to_string(),
-            point.times_class_1.to_string(),
-        ];
-        let measured = check.map_or([f64::NAN; 7], |check| {
-            let [share, sigma] = [check.detection, check.precision_m];
-            [
-                share.value,
-                share.low,
-                share.high,
-                sigma.value,
-                sigma.low,
-                sigma.high,
-                check.bias_m,
-            ]
+/// All of the front and the sensor itself by their numbers, with what was measured of the corners.
+fn write_designs(path: &Path, found: &Found, corners: &[Corner]) -> anyhow::Result<()> {
+    let numbers = |point: &Point| toml::Table::try_from(point);
+    let keys = numbers(&found.front[0])?;
+    let measured = "cohort_detection | cohort_detection_low | cohort_detection_high | cohort_precision_m | cohort_precision_low_m | cohort_precision_high_m";
+    let headings = ["corner"]
+        .into_iter()
+        .chain(keys.keys().map(String::as_str));
+    let mut grid = Grid::new(headings.chain(measured.split(" | ")));
+    let own = found.own.point().map(|point| ("this sensor", point));
+    for (name, point) in found.front.iter().map(|point| ("", point)).chain(own) {
+        let corner = corners
+            .iter()
+            .find(|corner| corner.point == *point && name.is_empty());
+        let name = corner.map_or(name, |corner| corner.name).to_owned();
+        let numbers = numbers(point)?;
+        let measured = corner.map_or([const { String::new() }; 6], |corner| {
+            let [a, b] = [corner.check.detection, corner.check.precision_m];
+            [a.value, a.low, a.high, b.value, b.low, b.high].map(|value| value.to_string())
         });
-        let measured = measured.map(|value| match value.is_nan() {
-            true => String::new(),
-            false => value.to_string(),
-        });
-        let own = [name.to_owned()].into_iter().chain(cells(point));
-        grid.push(own.chain(theory).chain(measured));
-    };
-    for point in &found.front {
-        let corner = corners.iter().find(|corner| corner.point == *point);
-        push(
-            corner.map_or("", |corner| corner.name),
-            point,
-            corner.map(|corner| &corner.check),
-        );
+        let numbers = numbers.values().map(ToString::to_string);
+        grid.push([name].into_iter().chain(numbers).chain(measured));
     }
-    if let Own::OnFront(point) | Own::Beaten(point, _) = &found.own {
-        push("this sensor", point, None);
-    }
-    OutputFile::write_with(path, |out| grid.write_csv(out))
+    Ok(OutputFile::write_with(path, |out| grid.write_csv(out))?)
 }
 
 /// Laser power over area; how fast chips are by their marks.
@@ -461,7 +392,7 @@ fn chart(problem: &Problem, found: &Found, proposed: &Point, area: &str) -> Char
             chart = chart.points(name, points);
         }
     }
-    if let Own::OnFront(point) | Own::Beaten(point, _) = &found.own {
+    if let Some(point) = found.own.point() {
         chart = chart.points("this sensor", [at(point)]);
     }
     chart.points("balanced: sensor.toml", [at(proposed)])

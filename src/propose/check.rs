@@ -5,7 +5,7 @@ use super::problem::Problem;
 use crate::chip::{Exposure, Sensor, WindowLaw};
 use crate::engine::{Cohort, CohortOptions, EngineError, Expose, Gate, LitPixel, Window, expose};
 use crate::files::InputError;
-use crate::numerics::intervals::{Estimate, deviation, mean, share};
+use crate::numerics::intervals::{Estimate, deviation, share};
 use crate::photon::{PhotonStream, PixelLight, Purpose, normal, random_stream};
 use crate::ranging::DepthOptions;
 use crate::request::{Spelling, guided_exposure};
@@ -26,8 +26,6 @@ pub struct Check {
     pub detection: Estimate,
     /// Standard deviation of their distances, m.
     pub precision_m: Estimate,
-    /// Mean error of their distances, m.
-    pub bias_m: f64,
 }
 
 impl Check {
@@ -118,23 +116,16 @@ pub fn check(problem: &Problem, point: &Point, seed: u64) -> Result<Check, Frame
         .filter_map(|(reading, range_m)| Some(reading.measured_m? - range_m))
         .filter(|error_m| error_m.abs() <= farthest_m)
         .collect();
-    let nothing = Estimate {
-        value: f64::NAN,
-        low: 0.0,
-        high: f64::INFINITY,
-    };
-    let is_enough = errors_m.len() > 1;
+    let none = [f64::NAN, 0.0, f64::INFINITY];
     Ok(Check {
         detection: share(errors_m.len() as f64, ranges_m.len() as f64),
-        precision_m: if is_enough {
-            deviation(&errors_m)
-        } else {
-            nothing
-        },
-        bias_m: if is_enough {
-            mean(&errors_m).value
-        } else {
-            f64::NAN
+        precision_m: match errors_m.len() {
+            0 | 1 => Estimate {
+                value: none[0],
+                low: none[1],
+                high: none[2],
+            },
+            _ => deviation(&errors_m),
         },
     })
 }

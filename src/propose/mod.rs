@@ -32,7 +32,7 @@ mod tests;
 
 pub use check::{Check, check, gates_agree};
 pub use front::{dominates, front};
-pub use goal::{Goal, Space};
-pub use point::{Candidate, Choice, Costs, Design, Limit, Point};
+pub use goal::{Choice, Goal, Space};
+pub use point::{Candidate, Costs, Design, Limit, Point};
 pub use problem::Problem;
 pub use search::{Found, Own, search};

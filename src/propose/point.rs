@@ -4,25 +4,6 @@ use serde::Serialize;
 
 use crate::scene::EyeRule;
 
-/// What may be chosen; laser cycles and counter bits follow from it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Choice {
-    /// Histogram bins.
-    pub bins: usize,
-    /// Bits of a bin; as few as hold the counts, if left out.
-    pub bin_bits: Option<usize>,
-    /// CLK, Hz.
-    pub clk_hz: f64,
-    /// THRESHOLD.
-    pub threshold: u8,
-    /// Energy of a laser pulse over the whole field of view, uJ.
-    pub pulse_energy_uj: f64,
-    /// Laser pulses a second during an exposure; as many as the range allows, if that is fewer.
-    pub rate_hz: f64,
-    /// Standard deviation of the guide's estimate, m.
-    pub guide_sigma_m: f64,
-}
-
 /// A chip, its laser and its guide.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Design {
@@ -106,9 +87,29 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// Whether it keeps everything.
-    pub fn is_possible(&self) -> bool {
-        self.eye.0 <= 1.0 && self.time <= 1.0 && self.counts <= 1.0
+    /// What it breaks, if anything.
+    pub fn limit(&self) -> Option<Limit> {
+        let Point { design, .. } = self.point;
+        let needed_uj = design.pulse_energy_uj;
+        match self {
+            Candidate { time: times, .. } if *times > 1.0 => Some(Limit::Time {
+                times: *times,
+                laser_cycles: design.laser_cycles,
+            }),
+            Candidate { counts: times, .. } if *times > 1.0 => Some(Limit::Counts {
+                times: *times,
+                bits: design.bin_bits,
+            }),
+            Candidate {
+                eye: (times, rule), ..
+            } if *times > 1.0 => Some(Limit::Eye {
+                rule: rule.name(),
+                allowed_uj: needed_uj / times,
+                needed_uj,
+                times: *times,
+            }),
+            _ => None,
+        }
     }
 }
 
@@ -116,83 +117,41 @@ impl Candidate {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Limit {
     /// The P-counter does not reach so far.
-    #[error("a P-counter of {bits} bits ends at {reach_m:.1} m, {:.1} m short of the target and its window", needed_m - reach_m)]
-    Reach {
-        /// Its bits.
-        bits: usize,
-        /// Where its last window ends, m.
-        reach_m: f64,
-        /// Where it would have to, m.
-        needed_m: f64,
-    },
+    #[error("a P-counter of {bits} bits ends {short_m:.1} m short of the target and its window")]
+    Reach { bits: usize, short_m: f64 },
     /// The best window holds the target too seldom.
     #[error(
-        "the guide: its error of {guide_sigma_m} m leaves the target in a window of {window_m:.1} m in {:.2} % of frames where more than {:.2} % are asked for",
+        "the guide: its error of {guide_sigma_m} m leaves the target in a window of {window_m:.1} m in {:.2} % of frames, where more than {:.2} % are asked for",
         100.0 * share, 100.0 * detection
     )]
     Guide {
-        /// The smallest error that is tried, m.
         guide_sigma_m: f64,
-        /// The longest window, m.
         window_m: f64,
-        /// Share of frames in which it holds the target.
         share: f64,
-        /// Probability of detection that is wanted.
         detection: f64,
     },
     /// No number of laser cycles finds the target.
-    #[error(
-        "light: {most} laser cycles of any energy up to 1000 times class 1 do not find the target"
-    )]
-    Light {
-        /// Laser cycles that were tried.
-        most: u32,
-    },
-    /// No CLK that is tried meets the timing.
-    #[error("static timing: CLK {mhz:.0} MHz, the slowest of those tried, {why}")]
-    Timing {
-        /// The slowest CLK, MHz.
-        mhz: f64,
-        /// The verdict.
-        why: String,
-    },
+    #[error("light: {most} laser cycles do not find the target")]
+    Light { most: u32 },
+    /// The chip is too slow, or its verdict says what else.
+    #[error("static timing at {mhz} MHz {why}")]
+    Timing { mhz: f64, why: String },
     /// Eyes.
     #[error(
-        "the safety of eyes: class 1 ({rule}) allows {allowed_uj:.3} uJ a pulse where {needed_uj:.3} uJ are needed, {times:.1} times as much ({power_mw:.0} mW on average); a wider lens (scene.lidar.lens_diameter_mm) needs less, and a wider source (scene.lidar.laser_source_mm, {source_mm} now) is allowed more"
+        "the safety of eyes: class 1 ({rule}) allows {allowed_uj:.3} uJ a pulse where {needed_uj:.3} uJ are needed, {times:.1} times as much; a wider lens (scene.lidar.lens_diameter_mm) needs less, and a wider source (scene.lidar.laser_source_mm) is allowed more"
     )]
     Eye {
-        /// The rule that limits.
         rule: &'static str,
-        /// Energy of a pulse that it allows, uJ.
         allowed_uj: f64,
-        /// Energy of a pulse that is needed, uJ.
         needed_uj: f64,
-        /// One over the other.
         times: f64,
-        /// Mean power that is needed, mW.
-        power_mw: f64,
-        /// Width of the laser's source, mm.
-        source_mm: f64,
     },
     /// Frames are too short.
     #[error(
-        "time: a frame of {frame_ms:.3} ms is {times:.1} times too short for the {laser_cycles} laser cycles and the readout of the quickest design, {:.3} ms",
-        times * frame_ms
+        "time: a frame is {times:.1} times too short for {laser_cycles} laser cycles and the readout"
     )]
-    Time {
-        /// What the frame rate leaves, ms.
-        frame_ms: f64,
-        /// By how much that is too little.
-        times: f64,
-        /// Laser cycles.
-        laser_cycles: u32,
-    },
+    Time { times: f64, laser_cycles: u32 },
     /// Bins overflow.
     #[error("bins: the fullest has {times:.1} times the counts that {bits} bits hold")]
-    Counts {
-        /// By how much.
-        times: f64,
-        /// Bits of a bin.
-        bits: usize,
-    },
+    Counts { times: f64, bits: usize },
 }

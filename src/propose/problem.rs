@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
 use super::echo::{Echo, Seen};
-use super::goal::Goal;
-use super::point::{Candidate, Choice, Design, Limit, Point};
+use super::goal::{Choice, Goal};
+use super::point::{Candidate, Design, Limit, Point};
 use crate::analysis::TimingVerdict;
 use crate::chip::{CellLibrary, EventType, Mode, Sensor, SensorConfig, Silicon, Tdc, macropixel};
 use crate::files::InputError;
@@ -14,6 +14,9 @@ use crate::scene::{Emission, EyeRule, Object, Scene, Shape};
 use crate::theory::design::share_inside;
 use crate::theory::partial::largest_mean;
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
+
+/// Laser cycles beyond which nobody looks.
+pub(super) const MOST_CYCLES: u32 = 10_000_000;
 
 /// Most bits of a bin and of a P-counter that sensors may have.
 const MOST_BIN_BITS: usize = 16;
@@ -39,18 +42,6 @@ pub struct Problem {
     /// Counts that bins of 0, 1, … bits may have on average.
     most_counts: Vec<f64>,
     areas: Mutex<HashMap<[usize; 3], f64>>,
-}
-
-/// A window before its laser cycles are known.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Window {
-    pub(super) bins: usize,
-    pub(super) clk_hz: f64,
-    pub(super) threshold: u8,
-    pub(super) pulse_energy_uj: f64,
-    /// Bits of a bin and of the P-counter; as few as do, if left out.
-    pub(super) bits: Option<usize>,
-    pub(super) counter_bits: Option<usize>,
 }
 
 impl Problem {
@@ -157,10 +148,18 @@ impl Problem {
             .times_class_1
     }
 
-    /// Whether a design's chip meets its timing, and what it fails by.
-    pub(super) fn timing(&self, config: &SensorConfig) -> Result<(), String> {
-        let sensor = config.check().map_err(|fault| fault.to_string());
-        sensor?;
+    /// Whether a chip meets its timing.
+    ///
+    /// # Errors
+    /// What it fails by, or what makes it no chip.
+    pub fn timing(&self, config: &SensorConfig) -> Result<(), String> {
+        config.check().map_err(|fault| fault.to_string())?;
+        let (period, dead_time) = (config.clock().period(), config.dead_time());
+        if dead_time <= period {
+            return Err(format!(
+                "has periods of {period}, in which photons of a SPAD cancel, as its dead time is {dead_time}"
+            ));
+        }
         let verdict = TimingVerdict::of(config, &Silicon::of(config), (0, 0));
         match verdict.is_met() {
             true => Ok(()),
@@ -206,9 +205,10 @@ impl Problem {
     }
 
     /// CLK periods to the end of the last window that is needed, and the bits of a P-counter that counts them.
-    fn reach(&self, window: &Window, guide_sigma_m: f64) -> Result<(u32, usize), Limit> {
+    fn reach(&self, window: &Choice) -> Result<(u32, usize), Limit> {
         let bin_m = 0.5 * SPEED_OF_LIGHT_M_PER_S / window.clk_hz;
-        let needed_m = self.goal.range_m + 3.0 * guide_sigma_m + 0.5 * window.bins as f64 * bin_m;
+        let needed_m =
+            self.goal.range_m + 3.0 * window.guide_sigma_m + 0.5 * window.bins as f64 * bin_m;
         let step = self.sensor.step_periods as f64;
         let steps = (needed_m / bin_m / step).ceil() + 1.0;
         let bits = window.counter_bits.unwrap_or(MOST_COUNTER_BITS);
@@ -217,25 +217,20 @@ impl Problem {
             Some(own) => Some(own).filter(reaches),
             None => (2..=MOST_COUNTER_BITS).find(reaches),
         };
-        let reach_m = (bits as f64).exp2() * step * bin_m;
-        let limit = Limit::Reach {
-            bits,
-            reach_m,
-            needed_m,
-        };
+        let short_m = needed_m - (bits as f64).exp2() * step * bin_m;
+        let limit = Limit::Reach { bits, short_m };
         found.map(|bits| ((steps * step) as u32, bits)).ok_or(limit)
     }
 
-    /// What this window takes with a guide of this error at each of `rates` (pulses a second; the range allows no more than some), told to
+    /// What a choice takes at each of `rates` (pulses a second; the range allows no more than some), told to
     /// `offer`. Laser cycles are sought from `least`, up to `most`; returns how many it takes.
     ///
     /// # Errors
     /// What makes it impossible whatever the rate.
     pub(super) fn designs(
         &self,
-        window: &Window,
+        window: &Choice,
         seen: &Seen,
-        guide_sigma_m: f64,
         (least, most): (u32, u32),
         rates_hz: &[f64],
         mut offer: impl FnMut(Candidate),
@@ -246,14 +241,14 @@ impl Problem {
             fps,
             ..
         } = self.goal;
-        let (periods, counter_bits) = self.reach(window, guide_sigma_m)?;
+        let (periods, counter_bits) = self.reach(window)?;
         let bin_m = 0.5 * SPEED_OF_LIGHT_M_PER_S / window.clk_hz;
         let window_m = seen.usable_bins() as f64 * bin_m;
         let step_m = self.sensor.step_periods as f64 * bin_m;
-        let in_window = share_inside(guide_sigma_m, window_m, step_m);
+        let in_window = share_inside(window.guide_sigma_m, window_m, step_m);
         if in_window <= detection {
             return Err(Limit::Guide {
-                guide_sigma_m,
+                guide_sigma_m: window.guide_sigma_m,
                 window_m,
                 share: in_window,
                 detection,
@@ -268,7 +263,7 @@ impl Problem {
         let counts = f64::from(laser_cycles) * seen.fullest;
         let holds =
             |bits: &usize| counts <= self.most_counts[*bits] || u64::from(laser_cycles) < 1 << bits;
-        let bin_bits = window.bits.or((1..=MOST_BIN_BITS).find(holds));
+        let bin_bits = window.bin_bits.or((1..=MOST_BIN_BITS).find(holds));
         let bin_bits = bin_bits.unwrap_or(MOST_BIN_BITS);
         let counts = match holds(&bin_bits) {
             true => counts.min(self.most_counts[bin_bits]) / self.most_counts[bin_bits],
@@ -283,7 +278,7 @@ impl Problem {
             pulse_energy_uj: window.pulse_energy_uj,
             stop_periods: 0,
             laser_cycles,
-            guide_sigma_m,
+            guide_sigma_m: window.guide_sigma_m,
         };
         let config = self.config_of(&design);
         let area = self.area(&config);
@@ -342,34 +337,17 @@ impl Problem {
         Ok(laser_cycles)
     }
 
-    /// One design by theory, with as many laser cycles as it takes; whether it keeps everything is in the answer.
+    /// One design by theory, with as many laser cycles as it takes, whether it keeps everything or not.
     ///
     /// # Errors
     /// What makes it impossible whatever the laser cycles.
     pub fn judge(&self, choice: &Choice) -> Result<Candidate, Limit> {
-        let window = Window {
-            bins: choice.bins,
-            clk_hz: choice.clk_hz,
-            threshold: choice.threshold,
-            pulse_energy_uj: choice.pulse_energy_uj,
-            bits: choice.bin_bits,
-            counter_bits: None,
-        };
         let echo = self.echo(choice.clk_hz, choice.threshold, choice.pulse_energy_uj);
-        let seen = echo.through(choice.bins);
+        let (seen, cycles) = (echo.through(choice.bins), (1, MOST_CYCLES));
         let mut found = None;
-        let rates = [choice.rate_hz];
-        let cycles = (1, super::search::MOST_CYCLES);
-        self.designs(
-            &window,
-            &seen,
-            choice.guide_sigma_m,
-            cycles,
-            &rates,
-            |one| {
-                found = Some(one);
-            },
-        )?;
+        self.designs(choice, &seen, cycles, &[choice.rate_hz], |one| {
+            found = Some(one)
+        })?;
         Ok(found.expect("a design at one rate"))
     }
 }

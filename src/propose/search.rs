@@ -8,13 +8,11 @@ use std::collections::HashSet;
 use rayon::prelude::*;
 
 use super::front::{dominates, front};
-use super::goal::Space;
+use super::goal::{Choice, Space};
 use super::point::{Candidate, Limit, Point};
-use super::problem::{Problem, Window};
+use super::problem::{MOST_CYCLES, Problem};
 use crate::chip::SensorConfig;
-
-/// Laser cycles beyond which nobody looks.
-pub(super) const MOST_CYCLES: u32 = 10_000_000;
+use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Pulses a second that are tried below the most that the range allows, 1/s: of 200 kHz and its multiples fewer pulses
 /// count as one for eyes (IEC 60825-1).
@@ -62,6 +60,16 @@ pub enum Own {
     Impossible(Limit),
 }
 
+impl Own {
+    /// The sensor with its laser and guide, where it can do it.
+    pub fn point(&self) -> Option<&Point> {
+        match self {
+            Own::OnFront(point) | Own::Beaten(point, _) => Some(point),
+            Own::Impossible(_) => None,
+        }
+    }
+}
+
 /// What some designs came to.
 #[derive(Debug, Default)]
 struct Gathered {
@@ -75,7 +83,7 @@ struct Gathered {
 impl Gathered {
     fn take(&mut self, candidate: Candidate) {
         self.tried += 1;
-        if candidate.is_possible() {
+        if candidate.limit().is_none() {
             return self.points.push(candidate.point);
         }
         let excess = |c: &Candidate| c.time.max(c.counts);
@@ -140,7 +148,7 @@ fn of_clock(
     // What a frame leaves at the most pulses a second, which the target's range allows at best; no limit where limits are sought.
     let most = match above {
         0 => {
-            let round_trip_s = 2.0 * problem.goal().range_m / crate::units::SPEED_OF_LIGHT_M_PER_S;
+            let round_trip_s = 2.0 * problem.goal().range_m / SPEED_OF_LIGHT_M_PER_S;
             let most = 1.0 / problem.goal().fps / round_trip_s;
             most.min(f64::from(MOST_CYCLES)) as u32
         }
@@ -160,20 +168,25 @@ fn of_clock(
                 continue;
             }
             let seen = echo.through(bins);
-            let window = Window {
+            let choice = Choice {
                 bins,
                 clk_hz,
                 threshold,
                 pulse_energy_uj,
-                bits: own.then_some(sensor.bin_bits),
+                bin_bits: own.then_some(sensor.bin_bits),
                 counter_bits: own.then_some(sensor.counter_bits),
+                ..Choice::default()
             };
             let mut least = 1;
             let mut found = false;
             // From the best guide on: a worse one takes as many laser cycles or more.
-            for &sigma_m in &space.guide_sigma_m {
+            for &guide_sigma_m in &space.guide_sigma_m {
+                let choice = Choice {
+                    guide_sigma_m,
+                    ..choice
+                };
                 let take = |candidate| gathered.take(candidate);
-                match problem.designs(&window, &seen, sigma_m, (least, most), &RATES_HZ, take) {
+                match problem.designs(&choice, &seen, (least, most), &RATES_HZ, take) {
                     Ok(cycles) => (least, found) = (cycles, true),
                     Err(limit) => {
                         gathered.limited(limit);
@@ -218,28 +231,11 @@ fn limit_of(problem: &Problem, space: &Space, own: bool) -> Limit {
         ..space.clone()
     };
     let gathered = gather(problem, &space, own, ABOVE, &|| ());
-    let [of_eyes, other] = gathered.nearest;
-    let frame_ms = 1e3 / problem.goal().fps;
-    match (of_eyes, other) {
-        (Some(Candidate { point, eye, .. }), _) => Limit::Eye {
-            rule: eye.1.name(),
-            allowed_uj: point.design.pulse_energy_uj / eye.0,
-            needed_uj: point.design.pulse_energy_uj,
-            times: eye.0,
-            power_mw: 1e3 * point.power_w,
-            source_mm: problem.scene_of(&point.design).lidar.laser_source_mm,
-        },
-        (None, Some(Candidate { point, time, .. })) if time > 1.0 => Limit::Time {
-            frame_ms,
-            times: time,
-            laser_cycles: point.design.laser_cycles,
-        },
-        (None, Some(Candidate { point, counts, .. })) => Limit::Counts {
-            times: counts,
-            bits: point.design.bin_bits,
-        },
-        (None, None) => gathered.limit.unwrap_or(Limit::Light { most: MOST_CYCLES }),
-    }
+    let nearest = gathered.nearest.into_iter().flatten();
+    let limit = nearest.filter_map(|candidate| candidate.limit()).next();
+    limit
+        .or(gathered.limit)
+        .unwrap_or(Limit::Light { most: MOST_CYCLES })
 }
 
 /// The best of a space, by theory and with their timing met. `done` is told of each pair of CLK and THRESHOLD.
@@ -253,31 +249,20 @@ pub fn search(problem: &Problem, space: &Space, done: impl Fn() + Sync) -> Resul
         values.dedup();
     }
     let sensor = problem.sensor();
-    let middle = space.bins[space.bins.len() / 2];
-    let mut too_fast = None;
-    // Two photons of a SPAD in a CLK period cancel.
-    let dead_s = sensor.dead_time().as_s();
+    let (bins, mut too_fast) = (space.bins[space.bins.len() / 2], None);
     space.clk_hz.retain(|&clk_hz| {
         let config = SensorConfig {
             clk_hz,
-            bins: middle,
+            bins,
             ..SensorConfig::clone(sensor)
         };
-        let met = match clk_hz * dead_s > 1.0 {
-            true => problem.timing(&config),
-            false => Err("has periods longer than the dead time, in which photons cancel".into()),
-        };
-        let is_met = met.is_ok();
-        if let (Err(why), None) = (met, &too_fast) {
-            too_fast = Some(Limit::Timing {
-                mhz: clk_hz * 1e-6,
-                why,
-            });
-        }
+        let timing = timed(problem, &config);
+        let is_met = timing.is_ok();
+        too_fast = too_fast.take().or(timing.err());
         is_met
     });
-    if space.clk_hz.is_empty() {
-        return Err(too_fast.unwrap_or(Limit::Light { most: 0 }));
+    if let (true, Some(limit)) = (space.clk_hz.is_empty(), too_fast) {
+        return Err(limit);
     }
     let gathered = gather(problem, &space, false, 0, &done);
     let own_space = Space {
@@ -287,16 +272,12 @@ pub fn search(problem: &Problem, space: &Space, done: impl Fn() + Sync) -> Resul
         ..space.clone()
     };
     let of_own = gather(problem, &own_space, true, 0, &|| ());
-    let own_timing = problem.timing(sensor);
     let front = met(problem, gathered.points);
     if front.is_empty() {
         return Err(limit_of(problem, &space, false));
     }
-    let own = match own_timing {
-        Err(why) => Own::Impossible(Limit::Timing {
-            mhz: sensor.clk_hz * 1e-6,
-            why,
-        }),
+    let own = match timed(problem, sensor) {
+        Err(limit) => Own::Impossible(limit),
         Ok(()) if of_own.points.is_empty() => Own::Impossible(limit_of(problem, &own_space, true)),
         Ok(()) => beside(&front, of_own.points),
     };
@@ -305,6 +286,14 @@ pub fn search(problem: &Problem, space: &Space, done: impl Fn() + Sync) -> Resul
         front,
         own,
     })
+}
+
+/// A chip's timing as a limit.
+fn timed(problem: &Problem, config: &SensorConfig) -> Result<(), Limit> {
+    let mhz = config.clk_hz * 1e-6;
+    problem
+        .timing(config)
+        .map_err(|why| Limit::Timing { mhz, why })
 }
 
 /// The front of those whose chips meet their timing.

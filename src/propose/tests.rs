@@ -1,10 +1,9 @@
 //! Designs beside closed forms, the thesis and engines; limits that are named.
 
-use super::problem::Window;
 use super::*;
 use crate::chip::{Sensor, SensorConfig};
 use crate::scene::{Lidar, Scene};
-use crate::theory::precision::{cramer_rao, range_m, thompson, time_ns};
+use crate::theory::precision::{cramer_rao, cramer_rao_laser_cycles, range_m, thompson, time_ns};
 
 /// A dark wall not far away.
 const NEAR: Goal = Goal {
@@ -100,7 +99,6 @@ fn the_front_keeps_its_promises() {
         );
         let ratio = check.precision_m.value / point.precision_m;
         assert!((0.9..1.2).contains(&ratio), "{check:?} {point:?}");
-        assert!(check.bias_m.abs() < 0.2 * point.precision_m);
         assert_eq!(gates_agree(&problem, &point, 3).unwrap(), (true, 50));
     }
 }
@@ -133,7 +131,7 @@ fn the_quantic4x4_needs_fewer_bits_before_a_wall_not_far_away() {
 }
 
 /// Table 15: 8 bins of 2.6 ns, 4.5 ns FWHM, 89 z⁻² counts a pulse and 8 Mcounts/s at 100 klux, 10 cm at 75 m: Eq. 20 has 4151 laser
-/// cycles (`theory::partial`). Precision is the same here but for what Eq. 20 takes for a bin's length.
+/// cycles (`theory::partial`), and the Cramér-Rao bound, which is followed here, 5411: an echo's own counts are noise, too.
 #[test]
 fn the_demonstrators_precision_is_that_of_the_thesis() {
     let goal = Goal {
@@ -157,7 +155,15 @@ fn the_demonstrators_precision_is_that_of_the_thesis() {
     let bin_ns = 2.6;
     let seen = problem.echo(1e9 / bin_ns, 0, 0.6838).through(8);
     let cycles = seen.cycles_for_sigma(time_ns(0.1) / bin_ns);
-    assert!((cycles / 4151.0 - 1.0).abs() < 0.08, "{cycles}");
+    let sigma_ns = scene.pulse_sigma().as_ns();
+    let bound = cramer_rao_laser_cycles(
+        time_ns(0.1),
+        bin_ns,
+        sigma_ns,
+        background_hz * 2.6e-9,
+        signal,
+    );
+    assert!((cycles / bound - 1.0).abs() < 0.03, "{cycles} {bound}");
     let by_thompson = thompson(
         bin_ns,
         scene.pulse_sigma().as_ns(),
@@ -165,9 +171,10 @@ fn the_demonstrators_precision_is_that_of_the_thesis() {
         signal,
     );
     let theirs = (by_thompson / time_ns(0.1)).powi(2);
-    assert!((theirs - 4151.0).abs() < 100.0, "{theirs}");
-    // Its exposures of 16 000 laser cycles find it, in a window that is right.
-    assert!(seen.detection(16_000) > 0.997);
+    assert!(
+        (theirs - 4151.0).abs() < 100.0 && cycles > theirs,
+        "{theirs} {cycles}"
+    );
 }
 
 /// What stands in the way is named, with figures that hold.
@@ -189,25 +196,16 @@ fn what_makes_a_goal_impossible_is_named() {
         other => panic!("{other}"),
     }
     // 64 x 64 macropixels of 8 bins and a bit take 20.5 us through 8 pins at 200 MHz; a frame of 10 us has none of it.
-    let quick = Goal {
-        fps: 100_000.0,
-        ..NEAR
-    };
-    match limit(quick, small()) {
-        Limit::Time {
-            frame_ms, times, ..
-        } => assert!(frame_ms == 0.01 && times > 2.0),
-        other => panic!("{other}"),
-    }
+    let quick = Goal { fps: 1e5, ..NEAR };
+    let quick = limit(quick, small());
+    assert!(matches!(quick, Limit::Time { times: 2.0.., .. }), "{quick}");
     let beyond = Goal {
         range_m: 9000.0,
         ..NEAR
     };
     match limit(beyond, small()) {
-        // 2¹² periods of 200 MHz.
-        Limit::Reach {
-            bits: 12, reach_m, ..
-        } => assert!(reach_m < 4096.0 * 0.75),
+        // 2¹² periods of 200 MHz are 3070 m.
+        Limit::Reach { bits: 12, short_m } => assert!(short_m > 5900.0),
         other => panic!("{other}"),
     }
     let lost = Space {
@@ -242,6 +240,7 @@ fn a_design_by_itself_is_judged_as_among_others() {
     let choice = Choice {
         bins: design.bins,
         bin_bits: None,
+        counter_bits: None,
         clk_hz: design.clk_hz,
         threshold: design.threshold,
         pulse_energy_uj: design.pulse_energy_uj,
@@ -249,7 +248,7 @@ fn a_design_by_itself_is_judged_as_among_others() {
         guide_sigma_m: design.guide_sigma_m,
     };
     let candidate = problem.judge(&choice).unwrap();
-    assert!(candidate.is_possible());
+    assert!(candidate.limit().is_none());
     let own = candidate.point.design;
     assert_eq!(
         (own.bin_bits, own.stop_periods, own.counter_bits),
@@ -267,19 +266,31 @@ fn a_design_by_itself_is_judged_as_among_others() {
         ..choice
     };
     assert!(matches!(problem.judge(&weak), Err(Limit::Light { .. })));
-    let window = Window {
-        bins: 8,
-        clk_hz: 384e6,
-        threshold: 0,
-        pulse_energy_uj: 1.0,
-        bits: Some(3),
-        counter_bits: Some(9),
+    let narrow = Choice {
+        bin_bits: Some(1),
+        ..choice
     };
-    let seen = problem.echo(384e6, 0, 1.0).through(8);
-    let mut over = 0.0;
-    let tell = |candidate: Candidate| over = candidate.counts;
-    problem
-        .designs(&window, &seen, 0.3, (1, 100_000), &[1e5], tell)
-        .unwrap();
-    assert!(over > 1.0, "bins of three bits hold seven counts: {over}");
+    let limit = problem.judge(&narrow).unwrap().limit();
+    assert!(
+        matches!(limit, Some(Limit::Counts { bits: 1, .. })),
+        "{limit:?}"
+    );
+}
+
+#[test]
+fn values_are_held_to_their_ranges() {
+    assert_eq!(Goal::default().fault(), None);
+    assert_eq!(Choice::default().fault(), None);
+    assert_eq!(Space::default().fault(), None);
+    let goal = Goal {
+        fps: f64::NAN,
+        ..NEAR
+    };
+    let fault = goal.fault().unwrap();
+    assert_eq!(fault, "fps = NaN is impossible; give 0.2 to 1e5 Hz");
+    let space = Space {
+        bins: vec![16, 65],
+        ..Space::default()
+    };
+    assert!(space.fault().unwrap().starts_with("bins = 65 "));
 }

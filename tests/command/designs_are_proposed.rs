@@ -79,21 +79,20 @@ fn what_cannot_be_is_refused_in_a_sentence() {
     let folder = tempfile::tempdir().unwrap();
     let more = format!("{ASKED}{FEW}");
     for (from, to, says) in [
-        ("--range 20", "--range 0", "--range 0: is impossible"),
-        ("--range 20", "--range NaN", "--range NaN: is impossible"),
+        ("--range 20", "--range 0", "range_m = 0 is impossible"),
+        ("--range 20", "--range NaN", "range_m = NaN is impossible"),
         (
             "--reflectivity 0.1",
             "--reflectivity 1.5",
-            "--reflectivity 1.5: ",
+            "reflectivity = 1.5",
         ),
-        ("--klux 1", "--klux -1", "'-1'"),
-        ("--klux 1", "--klux=-1", "--klux -1: "),
-        ("--fps 50", "--fps 0", "--fps 0: "),
-        ("--detection 0.95", "--detection 1", "--detection 1: "),
-        ("--precision 0.1", "--precision inf", "--precision inf: "),
-        ("--bins 8,16", "--bins 8,65", "--bins 65: "),
-        ("--clk 200,384", "--clk NaN", "--clk NaN: "),
-        ("--guide-sigma 0.3", "--guide-sigma 0", "--guide-sigma 0: "),
+        ("--klux 1", "--klux=-1", "illuminance_klux = -1"),
+        ("--fps 50", "--fps 0", "fps = 0"),
+        ("--detection 0.95", "--detection 1", "detection = 1"),
+        ("--precision 0.1", "--precision inf", "precision_m = inf"),
+        ("--bins 8,16", "--bins 8,65", "bins = 65"),
+        ("--clk 200,384", "--clk NaN", "clk_hz = NaN"),
+        ("--guide-sigma 0.3", "--guide-sigma 0", "guide_sigma_m = 0"),
         (
             "--guide-sigma 0.3",
             "--guide-sigma 50",
@@ -101,7 +100,7 @@ fn what_cannot_be_is_refused_in_a_sentence() {
         ),
         ("--klux 1", "--klux 150", "class 1"),
         ("--fps 50", "--fps 90000", "times too short"),
-        ("--clk 200,384", "--clk 1500", "static timing: CLK 1500 MHz"),
+        ("--clk 200,384", "--clk 1500", "static timing at 1500 MHz"),
         (
             "--range 20",
             "--range 20 --sensor hslidar_delay_line",
