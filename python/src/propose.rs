@@ -73,6 +73,7 @@ impl Problem {
         let choice = Choice {
             bins,
             bin_bits,
+            counter_bits: None,
             clk_hz,
             threshold,
             pulse_energy_uj,
