@@ -31,12 +31,14 @@
 //! | [`reproduce`] | the thesis's figures, published beside computed |
 //! | `page` | one HTML file to look at a frame or a drive |
 //! | [`testbenches`] | the chip's blocks driven and checked at gate level, with waveforms |
+//! | [`propose`] | which chip to build: designs by theory, the front of them, on engines |
 //! | [`sweep`] | studies: a row of results for each of many frames |
 //! | [`cli`] | the `gdtof` command |
 
 pub mod cli;
 mod demo;
 mod page;
+pub mod propose;
 pub mod report;
 pub mod reproduce;
 pub mod request;

@@ -17,6 +17,7 @@ mod failure;
 mod frame;
 mod guide;
 mod light;
+mod propose;
 mod replay;
 mod scene;
 mod sensor;
@@ -39,6 +40,8 @@ mod _gdtof {
     use super::drive::Drive;
     #[pymodule_export]
     use super::guide::Guide;
+    #[pymodule_export]
+    use super::propose::Problem;
     #[pymodule_export]
     use super::scene::Scene;
     #[pymodule_export]

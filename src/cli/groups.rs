@@ -15,7 +15,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
         "Look into the chip",
         &["replay", "timing", "power", "calibrate"],
     ),
-    ("Study", &["sweep", "pareto", "speed"]),
+    ("Study", &["propose", "sweep", "pareto", "speed"]),
     ("Check", &["tb", "reproduce"]),
     (
         "Settings and help",

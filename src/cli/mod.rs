@@ -17,6 +17,7 @@ mod page;
 mod pareto;
 mod pixel;
 mod power;
+mod propose;
 mod quality;
 mod range;
 mod readers;
@@ -88,6 +89,8 @@ enum Command {
     Power(power::PowerArgs),
     /// Make a table of frames, or of what theory says, over any settings.
     Sweep(sweep::SweepArgs),
+    /// Say which chip to build: the best designs that find and measure a target.
+    Propose(propose::ProposeArgs),
     /// Compare run time with error for every engine.
     Pareto(pareto::ParetoArgs),
     /// Print the sensor as a commented file: every key with its unit, range and source.
@@ -148,6 +151,7 @@ pub fn main() -> ExitCode {
         Command::Timing(args) => timing::run(&args),
         Command::Power(args) => power::run(&args),
         Command::Sweep(args) => sweep::run(&args),
+        Command::Propose(args) => propose::run(&args),
         Command::Pareto(args) => pareto::run(&args),
         Command::Sensor(args) => settings::print_sensor(&args),
         Command::Scene(args) => settings::print_scene(&args),

@@ -10,6 +10,7 @@ mod command_line_refuses_bad_input;
 mod counts_are_ranged_in_the_windows_of_a_frame;
 mod delay_files_replay;
 mod delay_lines_are_calibrated;
+mod designs_are_proposed;
 mod drives_are_recorded;
 mod engines_are_chosen_from_the_command_line;
 mod frames_for_other_tools;

@@ -12,7 +12,7 @@ Distances are metres along the ray, NaN where there is none; arrays by macropixe
 from . import errors, theory, waves
 from ._arrays import Reason
 from ._frame import Drive, DriveFrame, Frame, Maps, drive, frame
-from ._gdtof import Guide, Scene, Sensor, __version__
+from ._gdtof import Guide, Problem, Scene, Sensor, __version__
 from ._histograms import Exposed, Ranged, Replayed, expose, range, replay
 from ._sweep import Swept, sweep
 from ._timing import Timing, bin_edges, starts_for, timing, windows
@@ -28,6 +28,7 @@ __all__ = [
     "Guide",
     "InputError",
     "Maps",
+    "Problem",
     "Ranged",
     "Reason",
     "Replayed",

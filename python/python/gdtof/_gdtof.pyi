@@ -10,6 +10,7 @@ __all__ = [
     "REASONS",
     "Drive",
     "Guide",
+    "Problem",
     "Scene",
     "Sensor",
     "Taken",
@@ -32,6 +33,34 @@ __all__ = [
 
 __version__: str
 REASONS: tuple[str, ...]
+
+@final
+class Problem:
+    """What a chip has to do, and what all designs have in common."""
+
+    def __new__(
+        cls,
+        sensor: Sensor | None = None,
+        scene: Scene | None = None,
+        *,
+        range_m: float,
+        reflectivity: float,
+        illuminance_klux: float,
+        fps: float,
+        detection: float = 0.99,
+        precision_m: float = 0.1,
+    ) -> Problem: ...
+    def judge(
+        self,
+        *,
+        bins: int,
+        clk_hz: float,
+        pulse_energy_uj: float,
+        rate_hz: float,
+        guide_sigma_m: float,
+        threshold: int = 0,
+        bin_bits: int | None = None,
+    ) -> dict[str, Any]: ...
 
 @final
 class Sensor:

@@ -87,6 +87,17 @@ pub struct EyeSafety {
 }
 
 impl Emission {
+    /// The same laser with `times` the energy in a pulse and other rates, pulses a second during an exposure and on average.
+    #[must_use]
+    pub fn with(self, times: f64, rate_hz: f64, mean_rate_hz: f64) -> Self {
+        Emission {
+            pulse_j: times * self.pulse_j,
+            rate_hz,
+            mean_rate_hz,
+            ..self
+        }
+    }
+
     /// The limit that is nearest; `None` at wavelengths that are not judged.
     pub fn beside_class_1(&self) -> Option<EyeSafety> {
         if !JUDGED_NM.contains(&self.wavelength_nm) {

@@ -22,6 +22,7 @@
 
 use std::f64::consts::PI;
 
+use super::Counts;
 use crate::numerics::{normal_above, poisson_deviance, stirling_error};
 
 /// The search for the fullest stretch.
@@ -114,6 +115,74 @@ impl Scan {
         stretches
             .min_by(by_chance)
             .expect("a histogram has a stretch")
+    }
+}
+
+/// Where counts come from, as means of bins: the chance of one to count in a laser cycle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Chances {
+    /// Histogram bins M.
+    pub bins: usize,
+    /// Of the stretch that holds the echo.
+    pub stretch: f64,
+    /// Of all bins beside it.
+    pub beside: f64,
+}
+
+/// Standard deviations beyond which a count is taken for certain.
+const CERTAIN_SIGMA: f64 = 12.0;
+
+impl Scan {
+    /// The power of the test: the chance that the stretch which holds an echo is found, at a false-alarm rate e^`ln_false_alarm`.
+    ///
+    /// The stretch's counts are binomial. How many it takes follows from the counts beside it, which are taken at their mean; that these
+    /// scatter, too, is added to the stretch's standard deviation. Other stretches that the echo fills are left out, so that a
+    /// little more is found.
+    pub fn power(&self, chances: &Chances, ln_false_alarm: f64) -> f64 {
+        let cells = |bins: usize| bins as u64 * u64::from(self.laser_cycles);
+        let (inside, outside) = (cells(self.width), cells(chances.bins - self.width));
+        let p = chances.stretch.clamp(0.0, 1.0 - 1e-12);
+        let q = chances.beside.clamp(0.0, 1.0);
+        let rest = (q * outside as f64).round();
+        let ln_positions = ((chances.bins - self.width + 1) as f64).ln();
+        let is_significant = |k: u64| {
+            let ln_one = ln_hypergeometric_tail(k, k + rest as u64, inside, inside + outside);
+            ln_one + ln_positions <= ln_false_alarm
+        };
+        // Up to what the others have on average nothing is.
+        let share = inside as f64 / outside as f64;
+        let (mut failed, mut reach) = ((rest * share) as u64, 4 + (rest * share).sqrt() as u64);
+        while !is_significant((failed + reach).min(inside)) {
+            if failed + reach >= inside {
+                return 0.0;
+            }
+            failed += reach;
+            reach *= 2;
+        }
+        let mut enough = (failed + reach).min(inside);
+        while enough - failed > 1 {
+            let middle = failed + (enough - failed) / 2;
+            match is_significant(middle) {
+                true => enough = middle,
+                false => failed = middle,
+            }
+        }
+        let own = inside as f64 * p * (1.0 - p);
+        let others = outside as f64 * q * (1.0 - q) * share * share;
+        let mean = inside as f64 * p;
+        let wider = (own / (own + others)).sqrt();
+        let least = (mean - (mean - enough as f64) * if own > 0.0 { wider } else { 1.0 }).ceil();
+        if mean - least > CERTAIN_SIGMA * own.sqrt() + CERTAIN_SIGMA {
+            return 1.0;
+        }
+        let counts = Counts::Bernoulli {
+            cycles: inside,
+            photons_per_cycle: -(-p).ln_1p(),
+        };
+        match least < 1.0 {
+            true => 1.0,
+            false => counts.above(least as u64 - 1).min(1.0),
+        }
     }
 }
 
@@ -230,6 +299,71 @@ mod tests {
         for nothing in [[0; 8], [10; 8]] {
             assert_eq!(scan.fullest(&nothing).ln_false_alarm, 0.0);
         }
+    }
+
+    /// The power beside the test itself on histograms that are drawn: four standard errors of 4000, and as much again of the
+    /// stretches that are left out.
+    #[test]
+    fn the_power_is_how_often_drawn_echoes_are_found() {
+        use crate::photon::{Poisson, Purpose, random_stream};
+        let ln_false_alarm = 1e-3f64.ln();
+        for (bins, stretch, beside, laser_cycles) in [
+            (16, 0.049, 0.04, 8000u32),
+            (16, 0.0008, 0.0, 6000),
+            (8, 0.0125, 0.01, 20_000),
+            (64, 0.024, 0.02, 15_000),
+            (4, 0.024, 0.02, 30_000),
+        ] {
+            let scan = Scan {
+                width: 2,
+                laser_cycles,
+            };
+            let chances = Chances {
+                bins,
+                stretch,
+                beside,
+            };
+            let power = scan.power(&chances, ln_false_alarm);
+            let runs = 4000;
+            let found = (0..runs).filter(|&run| {
+                let mut random = random_stream(5, Purpose::Photons, run, 0);
+                let counts: Vec<u32> = (0..bins)
+                    .map(|bin| {
+                        let chance = if bin / 2 == 1 { stretch } else { beside };
+                        Poisson::new(chance * f64::from(laser_cycles)).draw(&mut random)
+                    })
+                    .collect();
+                let fullest = scan.fullest(&counts);
+                fullest.first == 2 && fullest.ln_false_alarm <= ln_false_alarm
+            });
+            let share = found.count() as f64 / f64::from(runs);
+            let error = (power * (1.0 - power) / f64::from(runs)).sqrt();
+            assert!((0.05..0.999).contains(&power), "{power}");
+            assert!(
+                (share - power).abs() < 4.0 * error + 0.01,
+                "{bins}: {share} {power}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_echo_that_is_none_is_not_found_and_a_strong_one_always() {
+        let scan = Scan {
+            width: 2,
+            laser_cycles: 10_000,
+        };
+        let power = |stretch, beside| {
+            let chances = Chances {
+                bins: 16,
+                stretch,
+                beside,
+            };
+            scan.power(&chances, 1e-3f64.ln())
+        };
+        assert!(power(0.02, 0.02) < 1e-3);
+        assert_eq!(power(0.0, 0.0), 0.0);
+        assert_eq!(power(0.5, 0.02), 1.0);
+        assert_eq!(power(1.0, 1.0), 0.0);
     }
 
     #[test]

@@ -130,6 +130,18 @@ impl Response {
         self.chances_in(light, Steps::Fine)
     }
 
+    /// The chance of every bin to count in a laser cycle, and what a laser cycle's count tells of the echo's place: Fisher's information,
+    /// 1/bins². The least variance of a place after N laser cycles is 1 over N times their sum.
+    pub fn information(&self, light: &EchoLight) -> Vec<(f64, f64)> {
+        let of_bin = |chance: &Dual<1>| {
+            let spread = chance.value * (1.0 - chance.value);
+            let told = chance.slope[0] * chance.slope[0] / spread;
+            (chance.value, if spread > 0.0 { told } else { 0.0 })
+        };
+        let chances = self.chances_of::<1>(light, Steps::Fine);
+        chances.iter().map(of_bin).collect()
+    }
+
     pub(super) fn chances_in(&self, light: &EchoLight, steps: Steps) -> Vec<f64> {
         let chances = self.chances_of::<0>(light, steps);
         chances.iter().map(|chance| chance.value).collect()
@@ -219,5 +231,47 @@ impl Response {
             }
         }
         chances
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::theory::precision::cramer_rao;
+
+    const PULSE_SIGMA: Time = Time::from_ps(1_911);
+
+    /// In light so little that SPADs never meet, what counts tell of a place is the Cramér-Rao bound of theory.
+    #[test]
+    fn little_light_tells_as_much_of_its_place_as_theory_has_it() {
+        for (clk_hz, signal, background) in [
+            (384e6, 2e-3, 3e-3),
+            (200e6, 1e-3, 2e-4),
+            (800e6, 1e-4, 1e-3),
+        ] {
+            let config = SensorConfig {
+                clk_hz,
+                bins: 64,
+                ..SensorConfig::default()
+            };
+            let response = Response::new(&config, 1.0 / clk_hz, PULSE_SIGMA);
+            const PHASES: usize = 16;
+            let mean = (0..PHASES).map(|phase| {
+                let light = EchoLight {
+                    position_bins: 32.0 + (phase as f64 + 0.5) / PHASES as f64,
+                    signal,
+                    background_per_bin: background,
+                    sigma_bins: response.pulse_sigma_bins(),
+                };
+                let told: f64 = response.information(&light).iter().map(|bin| bin.1).sum();
+                1.0 / told / PHASES as f64
+            });
+            let bound_ns = mean.sum::<f64>().sqrt() * 1e9 / clk_hz;
+            let theory_ns = cramer_rao(1e9 / clk_hz, PULSE_SIGMA.as_ns(), background, signal);
+            assert!(
+                (bound_ns / theory_ns - 1.0).abs() < 0.01,
+                "{bound_ns} {theory_ns}"
+            );
+        }
     }
 }

@@ -1,0 +1,399 @@
+//! `gdtof propose`: which chip to build.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::Args;
+
+use super::SceneArgs;
+use super::voice::{note, progress, tell};
+use crate::chip::{CellLibrary, Sensor, SensorConfig};
+use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
+use crate::numerics::intervals::Estimate;
+use crate::propose::{Check, Found, Goal, Own, Point, Problem, Space, check, gates_agree, search};
+use crate::report::{Axis, Chart, Grid};
+
+/// Arguments of `gdtof propose`.
+#[derive(Args)]
+pub(super) struct ProposeArgs {
+    /// What designs have in common: array, SPADs, dead time and cell library of the sensor; optics and laser of the scene, but for its energy.
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Distance of the target, m.
+    #[arg(long, value_name = "M")]
+    range: f64,
+    /// Reflectivity of the target.
+    #[arg(long, value_name = "R")]
+    reflectivity: f64,
+    /// Sunlight on the target, klux.
+    #[arg(long, value_name = "KLUX")]
+    klux: f64,
+    /// Frames per second.
+    #[arg(long, value_name = "HZ")]
+    fps: f64,
+    /// Probability that the target is in the window and found.
+    #[arg(long, value_name = "P", default_value_t = 0.99)]
+    detection: f64,
+    /// Standard deviation of the distance, m.
+    #[arg(long, value_name = "M", default_value_t = 0.1)]
+    precision: f64,
+    /// Histogram bins to try, 2 to 64.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = Space::default().bins)]
+    bins: Vec<usize>,
+    /// CLK to try, MHz.
+    #[arg(long, value_name = "MHZ,…", value_delimiter = ',', default_values_t = Space::default().clk_hz.into_iter().map(|hz| hz * 1e-6))]
+    clk: Vec<f64>,
+    /// THRESHOLD to try.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = Space::default().thresholds)]
+    thresholds: Vec<u8>,
+    /// Errors of the guide to try, standard deviation in m.
+    #[arg(long, value_name = "M,…", value_delimiter = ',', default_values_t = Space::default().guide_sigma_m)]
+    guide_sigma: Vec<f64>,
+    /// Seed of the photons of checks.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder for designs.csv, front.svg, sensor.toml and scene.toml; created if missing.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+}
+
+/// A point of the front that stands for something, and what `cohort` says of it.
+struct Corner {
+    name: &'static str,
+    point: Point,
+    check: Check,
+}
+
+/// What corners have least of, in the order of [`Point::costs`].
+const CORNERS: [&str; 5] = [
+    "least laser power",
+    "smallest macropixel",
+    "least data",
+    "most frames",
+    "worst guide",
+];
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, a goal that no design reaches, unwritable output.
+pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
+    let (sensor, scene) = args.scene.read()?;
+    let (goal, space) = asked(args)?;
+    let problem = Problem::new(goal, sensor, &scene)?;
+    let results = ResultSet::begin(&args.out)?;
+    let clocks = space.clk_hz.len() * space.thresholds.len();
+    let bar = progress(
+        clocks as u64,
+        "judging {bar:40} {pos}/{len} clocks, {eta} left",
+    );
+    let begin = Instant::now();
+    let found = search(&problem, &space, || bar.inc(1))
+        .map_err(|limit| InputError::new("no chip does it", limit.to_string()))?;
+    let took_s = begin.elapsed().as_secs_f64();
+    bar.finish_and_clear();
+    let corners = corners(&problem, &found, args.seed)?;
+    let proposed = &corners[0].point;
+    let (agree, cycles) = gates_agree(&problem, proposed, args.seed)?;
+    anyhow::ensure!(
+        agree,
+        "the gates of the balanced design count otherwise than the window engine: a fault of this program"
+    );
+
+    let staging = results.staging();
+    let area = area_unit(problem.sensor());
+    write_designs(&staging.join("designs.csv"), &found, &corners)?;
+    chart(&problem, &found, proposed, area).write(&staging.join("front.svg"))?;
+    let chip = Sensor::from(problem.config_of(&proposed.design));
+    write_text(&staging.join("sensor.toml"), &chip.commented())?;
+    let target = problem.scene_of(&proposed.design);
+    write_text(&staging.join("scene.toml"), &target.commented())?;
+    for sentence in results.commit(
+        "propose",
+        (goal, args.seed, SensorConfig::clone(problem.sensor())),
+    )? {
+        note(sentence);
+    }
+    tell(format_args!(
+        "A target of {} % at {} m under {} klux, in {} % of {} frames a second and to {} m:\n\
+         {} designs by theory in {took_s:.1} s, {} of them on the front, whose corners are\n\n{}\n",
+        100.0 * goal.reflectivity,
+        goal.range_m,
+        goal.illuminance_klux,
+        100.0 * goal.detection,
+        goal.fps,
+        goal.precision_m,
+        found.tried,
+        found.front.len(),
+        grid(&corners, &found, area),
+    ))?;
+    tell(sentences(&problem, &found, &corners, area))?;
+    let (laser, design) = (1e2 * proposed.times_class_1, &proposed.design);
+    tell(format_args!(
+        "Every chip on the front meets its static timing. The balanced one's laser has {laser:.0} % of what class 1 allows at {} frames a second\n\
+         (`gdtof frame` judges frames without a pause); one of its macropixels, simulated gate by gate, counts as the window engine in {cycles} laser cycles.\n\
+         In {out}: designs.csv front.svg front.csv sensor.toml scene.toml {MANIFEST}\n\n  \
+         gdtof frame --sensor {out}/sensor.toml --scene {out}/scene.toml --stop-periods {} --laser-cycles {} --guide truth:sigma_m={}\n",
+        goal.fps,
+        design.stop_periods,
+        design.laser_cycles,
+        design.guide_sigma_m,
+        out = args.out.display(),
+    ))?;
+    Ok(())
+}
+
+/// What is asked for, and what is tried.
+fn asked(args: &ProposeArgs) -> Result<(Goal, Space), InputError> {
+    let goal = Goal {
+        range_m: args.range,
+        reflectivity: args.reflectivity,
+        illuminance_klux: args.klux,
+        fps: args.fps,
+        detection: args.detection,
+        precision_m: args.precision,
+    };
+    let space = Space {
+        bins: args.bins.clone(),
+        clk_hz: args.clk.iter().map(|mhz| mhz * 1e6).collect(),
+        thresholds: args.thresholds.clone(),
+        guide_sigma_m: args.guide_sigma.clone(),
+    };
+    match goal.fault().or_else(|| space.fault()) {
+        Some(fault) => Err(InputError::new("what is asked", fault)),
+        None => Ok((goal, space)),
+    }
+}
+
+fn write_text(path: &Path, text: &str) -> Result<(), InputError> {
+    OutputFile::write_with(path, |out| out.write_all(text.as_bytes()))
+}
+
+/// In what areas are.
+fn area_unit(sensor: &SensorConfig) -> &'static str {
+    let library = CellLibrary::of(sensor).ok();
+    match library.and_then(CellLibrary::from_file) {
+        Some(_) => "um2",
+        None => "transistors",
+    }
+}
+
+/// The balanced design, then those with the least of something, each once, on `cohort`.
+fn corners(problem: &Problem, found: &Found, seed: u64) -> anyhow::Result<Vec<Corner>> {
+    let least = |cost: &dyn Fn(&Point) -> f64| -> Point {
+        let mut points = found.front.iter();
+        let first = points.next().expect("a front has a point");
+        let order = |p: &Point| (cost(p), p.ln_cost());
+        *points.fold(first, |best, next| {
+            if order(next) < order(best) {
+                next
+            } else {
+                best
+            }
+        })
+    };
+    let mut chosen = vec![("balanced", least(&Point::ln_cost))];
+    for (at, name) in CORNERS.into_iter().enumerate() {
+        let point = least(&|point| point.costs()[at]);
+        if !chosen.iter().any(|(_, known)| *known == point) {
+            chosen.push((name, point));
+        }
+    }
+    let bar = progress(
+        chosen.len() as u64,
+        "checking {bar:40} {pos}/{len} designs on cohort",
+    );
+    let check = |(name, point): (&'static str, Point)| {
+        let check = check(problem, &point, seed)?;
+        bar.inc(1);
+        Ok(Corner { name, point, check })
+    };
+    let corners = chosen.into_iter().map(check).collect();
+    bar.finish_and_clear();
+    corners
+}
+
+/// Columns of costs and design that the table and the CSV share.
+fn cells(point: &Point) -> [String; 12] {
+    let design = &point.design;
+    [
+        format!("{:.3}", 1e3 * point.power_w),
+        format!("{:.0}", point.area),
+        format!("{:.2}", 1e-6 * point.data_bit_s),
+        format!("{:.1}", point.fps),
+        design.guide_sigma_m.to_string(),
+        design.bins.to_string(),
+        design.bin_bits.to_string(),
+        format!("{}", (design.clk_hz * 1e-6 * 1e3).round() * 1e-3),
+        design.threshold.to_string(),
+        format!("{:.4}", design.pulse_energy_uj),
+        format!(
+            "{:.1}",
+            1e-3 * design.clk_hz / f64::from(design.stop_periods)
+        ),
+        design.laser_cycles.to_string(),
+    ]
+}
+
+fn headings(area: &str) -> Vec<String> {
+    format!("|laser mW|{area}|Mbit/s|frames/s|guide m|bins|bits|CLK MHz|THRESHOLD|pulse uJ|kHz|laser cycles")
+        .split('|')
+        .map(str::to_owned)
+        .collect()
+}
+
+/// A measurement beside its theory.
+fn beside(theory: f64, measured: &Estimate, decimals: usize) -> String {
+    format!("{theory:.decimals$} / {:.decimals$}", measured.value)
+}
+
+fn grid(corners: &[Corner], found: &Found, area: &str) -> Grid {
+    let checked = ["found, % (theory / cohort)", "sigma, m"].map(str::to_owned);
+    let mut grid = Grid::new(headings(area).into_iter().chain(checked));
+    for Corner { name, point, check } in corners {
+        let own = [(*name).to_owned()].into_iter().chain(cells(point));
+        let share = check.detection.map(|share| 100.0 * share);
+        grid.push(own.chain([
+            beside(100.0 * point.detection, &share, 2),
+            beside(point.precision_m, &check.precision_m, 3),
+        ]));
+    }
+    if let Some(point) = found.own.point() {
+        let own = ["this sensor".to_owned()].into_iter().chain(cells(point));
+        let checked = [
+            format!("{:.2}", 100.0 * point.detection),
+            format!("{:.3}", point.precision_m),
+        ];
+        grid.push(own.chain(checked));
+    }
+    grid
+}
+
+/// What to know beside the table: where theory and engine differ, and what becomes of the sensor as it is.
+fn sentences(problem: &Problem, found: &Found, corners: &[Corner], area: &str) -> String {
+    let mut text = String::new();
+    for Corner { name, point, check } in corners.iter().filter(|c| !c.check.agrees(&c.point)) {
+        let [share, sigma] = [check.detection.map(|s| 100.0 * s), check.precision_m];
+        text += &format!(
+            "{name}: theory and cohort differ: found {:.2} % by theory, {:.2} % ({:.2} to {:.2}) on cohort; sigma {:.4} m, {:.4} m ({:.4} to {:.4})\n",
+            100.0 * point.detection,
+            share.value,
+            share.low,
+            share.high,
+            point.precision_m,
+            sigma.value,
+            sigma.low,
+            sigma.high,
+        );
+    }
+    let sensor = problem.sensor();
+    let usual = SensorConfig::default();
+    let of = |s: &SensorConfig| {
+        (
+            s.bins,
+            s.bin_bits,
+            s.counter_bits,
+            s.clk_hz as u64,
+            s.threshold,
+        )
+    };
+    let name = match of(sensor) == of(&usual) {
+        true => "The QuantIC4x4",
+        false => "The sensor itself",
+    };
+    text + &match &found.own {
+        Own::OnFront(_) => format!("{name} is on the front.\n\n"),
+        Own::Impossible(limit) => format!("{name} cannot do it: {limit}.\n\n"),
+        Own::Beaten(own, better) => {
+            let best = &better[0];
+            let [mine, theirs] = [own, best].map(Point::costs);
+            let what = [
+                "laser power",
+                area,
+                "data",
+                "time of a frame",
+                "exactness of the guide",
+            ];
+            let less = (what.iter().zip(mine.iter().zip(&theirs)))
+                .filter(|(_, (mine, theirs))| theirs < mine)
+                .map(|(what, (mine, theirs))| {
+                    format!("{:.0} % of its {what}", 1e2 * theirs / mine)
+                });
+            let less: Vec<String> = less.collect();
+            let design = &best.design;
+            format!(
+                "{name} is not on the front: {} of its points beat it, best {} bins of {} bits at {} MHz with THRESHOLD {}, {:.4} uJ at {:.1} kHz\nand a guide of {} m, which take {}, and no more of anything else.\n\n",
+                better.len(),
+                design.bins,
+                design.bin_bits,
+                design.clk_hz * 1e-6,
+                design.threshold,
+                design.pulse_energy_uj,
+                1e-3 * design.clk_hz / f64::from(design.stop_periods),
+                design.guide_sigma_m,
+                less.join(", "),
+            )
+        }
+    }
+}
+
+/// All of the front and the sensor itself by their numbers, with what was measured of the corners.
+fn write_designs(path: &Path, found: &Found, corners: &[Corner]) -> anyhow::Result<()> {
+    let numbers = |point: &Point| toml::Table::try_from(point);
+    let keys = numbers(&found.front[0])?;
+    let measured = "cohort_detection | cohort_detection_low | cohort_detection_high | cohort_precision_m | cohort_precision_low_m | cohort_precision_high_m";
+    let headings = ["corner"]
+        .into_iter()
+        .chain(keys.keys().map(String::as_str));
+    let mut grid = Grid::new(headings.chain(measured.split(" | ")));
+    let own = found.own.point().map(|point| ("this sensor", point));
+    for (name, point) in found.front.iter().map(|point| ("", point)).chain(own) {
+        let corner = corners
+            .iter()
+            .find(|corner| corner.point == *point && name.is_empty());
+        let name = corner.map_or(name, |corner| corner.name).to_owned();
+        let numbers = numbers(point)?;
+        let measured = corner.map_or([const { String::new() }; 6], |corner| {
+            let [a, b] = [corner.check.detection, corner.check.precision_m];
+            [a.value, a.low, a.high, b.value, b.low, b.high].map(|value| value.to_string())
+        });
+        let numbers = numbers.values().map(ToString::to_string);
+        grid.push([name].into_iter().chain(numbers).chain(measured));
+    }
+    Ok(OutputFile::write_with(path, |out| grid.write_csv(out))?)
+}
+
+/// Laser power over area; how fast chips are by their marks.
+fn chart(problem: &Problem, found: &Found, proposed: &Point, area: &str) -> Chart {
+    let goal = problem.goal();
+    let title = format!(
+        "Designs for {} % at {} m, {} klux, {} frames/s that nothing beats",
+        100.0 * goal.reflectivity,
+        goal.range_m,
+        goal.illuminance_klux,
+        goal.fps
+    );
+    let at = |point: &Point| (point.area, 1e3 * point.power_w);
+    let axes = (
+        Axis::linear(format!("macropixel ({area})")),
+        Axis::log("mean laser power (mW)"),
+    );
+    let mut chart = Chart::new(title, axes.0, axes.1);
+    let ends = [1.0, 2.0, 5.0, f64::INFINITY];
+    for pair in ends.windows(2) {
+        let [from, to] = [pair[0] * goal.fps, pair[1] * goal.fps];
+        let within = |point: &&Point| (from..to).contains(&point.fps.max(goal.fps));
+        let points: Vec<(f64, f64)> = found.front.iter().filter(within).map(at).collect();
+        let name = match to.is_finite() {
+            true => format!("{from:.0} to {to:.0} frames/s"),
+            false => format!("{from:.0} frames/s and more"),
+        };
+        if !points.is_empty() {
+            chart = chart.points(name, points);
+        }
+    }
+    if let Some(point) = found.own.point() {
+        chart = chart.points("this sensor", [at(point)]);
+    }
+    chart.points("balanced: sensor.toml", [at(proposed)])
+}

@@ -1,0 +1,160 @@
+//! What a macropixel sees of the target through windows of any number of bins, and how many laser cycles it takes to find and to
+//! measure it.
+
+use crate::chip::SensorConfig;
+use crate::ranging::{DepthOptions, EchoLight, Response};
+use crate::theory::significance::{Chances, Scan};
+use crate::units::Time;
+
+/// Bins that are looked at: more than any window and pulse have.
+const BINS: usize = 96;
+
+/// Places of the echo relative to the bins, over which precision is averaged, and every second of which detection.
+const PHASES: usize = 8;
+
+/// Laser cycles are found to this share of their number.
+const CLOSE: f64 = 2e-3;
+
+/// An echo under one THRESHOLD, in bins of one length.
+#[derive(Debug, Clone)]
+pub(super) struct Echo {
+    /// At every phase, chance and information of every bin.
+    phases: Vec<Vec<(f64, f64)>>,
+    sigma_bins: f64,
+}
+
+/// The same through a window in whose middle it is.
+#[derive(Debug, Clone)]
+pub(super) struct Seen {
+    bins: usize,
+    /// Neighbouring bins that are tested together.
+    pub(super) width: usize,
+    /// At every second phase.
+    chances: Vec<Chances>,
+    /// Least variance of the place after one laser cycle, bins².
+    variance: f64,
+    /// The greatest chance of a bin to count in a laser cycle.
+    pub(super) fullest: f64,
+}
+
+impl Echo {
+    /// Of `signal` photons a laser cycle before `background_hz`, for a sensor's macropixels.
+    pub(super) fn new(
+        config: &SensorConfig,
+        pulse_sigma: Time,
+        signal: f64,
+        background_hz: f64,
+    ) -> Self {
+        let wide = SensorConfig {
+            bins: BINS,
+            ..config.clone()
+        };
+        let response = Response::new(&wide, 1.0 / config.clk_hz, pulse_sigma);
+        let sigma_bins = response.pulse_sigma_bins();
+        let at = |phase: usize| {
+            let offset = (phase as f64 + 0.5) / PHASES as f64 - 0.5;
+            response.information(&EchoLight {
+                position_bins: (BINS / 2) as f64 + offset,
+                signal,
+                background_per_bin: background_hz / config.clk_hz,
+                sigma_bins,
+            })
+        };
+        Echo {
+            phases: (0..PHASES).map(at).collect(),
+            sigma_bins,
+        }
+    }
+
+    /// Through a window of `bins` bins.
+    pub(super) fn through(&self, bins: usize) -> Seen {
+        let first = BINS / 2 - bins / 2;
+        let windows = || self.phases.iter().map(|phase| &phase[first..first + bins]);
+        let width = Scan::matched(self.sigma_bins, bins, 1).width;
+        let sum = |bins: &[(f64, f64)]| bins.iter().map(|bin| bin.0).sum::<f64>();
+        let chances = windows().step_by(2).map(|window| {
+            let fullest = window.windows(width).map(sum).fold(0.0, f64::max);
+            Chances {
+                bins,
+                stretch: fullest / width as f64,
+                beside: (sum(window) - fullest).max(0.0) / (bins - width) as f64,
+            }
+        });
+        let told = windows().map(|window| window.iter().map(|bin| bin.1).sum::<f64>());
+        let all = windows().flatten().map(|bin| bin.0);
+        Seen {
+            bins,
+            width,
+            chances: chances.collect(),
+            variance: told.map(|told| 1.0 / told).sum::<f64>() / PHASES as f64,
+            fullest: all.fold(0.0, f64::max),
+        }
+    }
+}
+
+impl Seen {
+    /// How often the target is found after `laser_cycles` where the window holds it.
+    pub(super) fn detection(&self, laser_cycles: u32) -> f64 {
+        let scan = Scan {
+            width: self.width,
+            laser_cycles,
+        };
+        let ln_false_alarm = DepthOptions::default().false_alarm_rate.ln();
+        let powers = self.chances.iter().map(|c| scan.power(c, ln_false_alarm));
+        powers.sum::<f64>() / self.chances.len() as f64
+    }
+
+    /// Standard deviation of the place after `laser_cycles`, bins.
+    pub(super) fn sigma_bins(&self, laser_cycles: u32) -> f64 {
+        (self.variance / f64::from(laser_cycles)).sqrt()
+    }
+
+    /// The fewest laser cycles, from `from` to `most`, that find it with this probability, about: the last steps are of [`CLOSE`].
+    pub(super) fn cycles_for(&self, detection: f64, from: u32, most: u32) -> Option<u32> {
+        // What is missed falls about exponentially with the laser cycles.
+        let excess = |n: u32| {
+            let miss = (1.0 - self.detection(n)).max(1e-15);
+            (miss / (1.0 - detection)).ln()
+        };
+        let (mut low, mut high) = (from.max(1), from.max(1));
+        let (mut at_low, mut at_high) = (excess(low), f64::NAN);
+        if at_low <= 0.0 {
+            return Some(low);
+        }
+        while !(at_high <= 0.0) {
+            if high >= most {
+                return None;
+            }
+            (low, at_low) = (high, if at_high.is_nan() { at_low } else { at_high });
+            high = high.saturating_mul(2).min(most);
+            at_high = excess(high);
+        }
+        for round in 0..30 {
+            let gap = high - low;
+            if f64::from(gap) <= (CLOSE * f64::from(high)).max(1.0) {
+                break;
+            }
+            let share = match round % 3 {
+                2 => 0.5,
+                _ => (at_low / (at_low - at_high)).clamp(0.02, 0.98),
+            };
+            let middle = (low + (share * f64::from(gap)) as u32).clamp(low + 1, high - 1);
+            let at_middle = excess(middle);
+            match at_middle <= 0.0 {
+                true => (high, at_high) = (middle, at_middle),
+                false => (low, at_low) = (middle, at_middle),
+            }
+        }
+        Some(high)
+    }
+
+    /// The fewest laser cycles for a standard deviation of the place, bins; not a number that any integer holds where nothing is told.
+    pub(super) fn cycles_for_sigma(&self, sigma_bins: f64) -> f64 {
+        (self.variance / (sigma_bins * sigma_bins)).ceil().max(1.0)
+    }
+
+    /// Bins of the window that may hold the echo's centre if the tested stretch is to be in it.
+    pub(super) fn usable_bins(&self) -> usize {
+        self.bins + 1 - self.width
+    }
+}

@@ -1,0 +1,345 @@
+//! All designs of a space by theory: the best of them, the sensor itself among them, and what is wrong where none will do.
+//!
+//! For each CLK, THRESHOLD and energy the echo is computed once, and seen through windows of any number of bins. Left out is what
+//! cannot be on the front: bins of more bits than the counts need, and energies below one that needs more laser cycles than a frame has.
+
+use std::collections::HashSet;
+
+use rayon::prelude::*;
+
+use super::front::{dominates, front};
+use super::goal::{Choice, Space};
+use super::point::{Candidate, Limit, Point};
+use super::problem::{MOST_CYCLES, Problem};
+use crate::chip::SensorConfig;
+use crate::units::SPEED_OF_LIGHT_M_PER_S;
+
+/// Pulses a second that are tried below the most that the range allows, 1/s: of 200 kHz and its multiples fewer pulses
+/// count as one for eyes (IEC 60825-1).
+const RATES_HZ: [f64; 14] = [
+    f64::MAX,
+    1000e3,
+    800e3,
+    600e3,
+    400e3,
+    300e3,
+    200e3,
+    140e3,
+    100e3,
+    80e3,
+    50e3,
+    30e3,
+    20e3,
+    10e3,
+];
+
+/// Energies of a decade, and decades below the most that a single pulse may have (and above, where nothing else will do).
+const A_DECADE: i32 = 8;
+const BELOW: i32 = 5;
+const ABOVE: i32 = 3;
+
+/// The best designs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// What nothing beats, the least laser power first.
+    pub front: Vec<Point>,
+    /// Designs that were judged.
+    pub tried: u64,
+    /// The sensor that all were made from.
+    pub own: Own,
+}
+
+/// What becomes of the sensor as it is, with the laser and guide that suit it best.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Own {
+    /// It is on the front.
+    OnFront(Point),
+    /// Points of the front beat it, the best first.
+    Beaten(Point, Vec<Point>),
+    /// It cannot do it.
+    Impossible(Limit),
+}
+
+impl Own {
+    /// The sensor with its laser and guide, where it can do it.
+    pub fn point(&self) -> Option<&Point> {
+        match self {
+            Own::OnFront(point) | Own::Beaten(point, _) => Some(point),
+            Own::Impossible(_) => None,
+        }
+    }
+}
+
+/// What some designs came to.
+#[derive(Debug, Default)]
+struct Gathered {
+    points: Vec<Point>,
+    tried: u64,
+    /// Of those that only eyes forbid, the nearest to what is allowed; and of the others.
+    nearest: [Option<Candidate>; 2],
+    limit: Option<Limit>,
+}
+
+impl Gathered {
+    fn take(&mut self, candidate: Candidate) {
+        self.tried += 1;
+        if candidate.limit().is_none() {
+            return self.points.push(candidate.point);
+        }
+        let excess = |c: &Candidate| c.time.max(c.counts);
+        let is_of_eyes = excess(&candidate) <= 1.0;
+        let over = |c: &Candidate| if is_of_eyes { c.eye.0 } else { excess(c) };
+        let nearest = &mut self.nearest[usize::from(!is_of_eyes)];
+        if nearest.is_none_or(|best| over(&candidate) < over(&best)) {
+            *nearest = Some(candidate);
+        }
+    }
+
+    /// Of two limits the one that is nearer to a design.
+    fn limited(&mut self, limit: Limit) {
+        let rank = |limit: &Limit| match *limit {
+            Limit::Light { .. } => 2.0,
+            Limit::Guide { share, .. } => 1.0 + share,
+            _ => 0.0,
+        };
+        if self
+            .limit
+            .as_ref()
+            .is_none_or(|known| rank(known) < rank(&limit))
+        {
+            self.limit = Some(limit);
+        }
+    }
+
+    fn and(mut self, other: Self) -> Self {
+        self.points.extend(other.points);
+        let possible = self.points.len();
+        let tried = self.tried + other.tried;
+        for candidate in other.nearest.into_iter().flatten() {
+            self.take(candidate);
+        }
+        debug_assert_eq!(self.points.len(), possible);
+        self.tried = tried;
+        if let Some(limit) = other.limit {
+            self.limited(limit);
+        }
+        self
+    }
+}
+
+/// Energies, uJ, the most first.
+fn energies_uj(problem: &Problem, above: i32) -> Vec<f64> {
+    let steps = -above * A_DECADE..=BELOW * A_DECADE;
+    let energy =
+        |step| problem.most_energy_uj() * 10f64.powf(-f64::from(step) / f64::from(A_DECADE));
+    steps.map(energy).collect()
+}
+
+/// Designs of one CLK and THRESHOLD; `own` keeps the bits of the sensor.
+fn of_clock(
+    problem: &Problem,
+    space: &Space,
+    (clk_hz, threshold): (f64, u8),
+    own: bool,
+    above: i32,
+) -> Gathered {
+    let sensor = problem.sensor();
+    let mut gathered = Gathered::default();
+    // What a frame leaves at the most pulses a second, which the target's range allows at best; no limit where limits are sought.
+    let most = match above {
+        0 => {
+            let round_trip_s = 2.0 * problem.goal().range_m / SPEED_OF_LIGHT_M_PER_S;
+            let most = 1.0 / problem.goal().fps / round_trip_s;
+            most.min(f64::from(MOST_CYCLES)) as u32
+        }
+        _ => MOST_CYCLES,
+    };
+    // Windows that were wide enough before, and those of which less light is too little.
+    let mut seen_before = vec![false; space.bins.len()];
+    let mut is_done = vec![false; space.bins.len()];
+    for pulse_energy_uj in energies_uj(problem, above) {
+        if is_done.iter().all(|done| *done) {
+            break;
+        }
+        let echo = problem.echo(clk_hz, threshold, pulse_energy_uj);
+        let mut points = Vec::new();
+        for (at, &bins) in space.bins.iter().enumerate() {
+            if is_done[at] {
+                continue;
+            }
+            let seen = echo.through(bins);
+            let choice = Choice {
+                bins,
+                clk_hz,
+                threshold,
+                pulse_energy_uj,
+                bin_bits: own.then_some(sensor.bin_bits),
+                counter_bits: own.then_some(sensor.counter_bits),
+                ..Choice::default()
+            };
+            let mut least = 1;
+            let mut found = false;
+            // From the best guide on: a worse one takes as many laser cycles or more.
+            for &guide_sigma_m in &space.guide_sigma_m {
+                let choice = Choice {
+                    guide_sigma_m,
+                    ..choice
+                };
+                let take = |candidate| gathered.take(candidate);
+                match problem.designs(&choice, &seen, (least, most), &RATES_HZ, take) {
+                    Ok(cycles) => (least, found) = (cycles, true),
+                    Err(limit) => {
+                        gathered.limited(limit);
+                        break;
+                    }
+                }
+            }
+            is_done[at] = seen_before[at] && !found;
+            seen_before[at] |= found;
+        }
+        points.append(&mut gathered.points);
+        gathered.points = front(points, Point::costs);
+    }
+    gathered
+}
+
+/// All designs of a space; `done` is told of each CLK and THRESHOLD.
+fn gather(
+    problem: &Problem,
+    space: &Space,
+    own: bool,
+    above: i32,
+    done: &(impl Fn() + Sync),
+) -> Gathered {
+    let clocks = space.clk_hz.iter();
+    let clocks = clocks.flat_map(|&clk| space.thresholds.iter().map(move |&t| (clk, t)));
+    let clocks: Vec<(f64, u8)> = clocks.collect();
+    let all: Vec<Gathered> = (clocks.par_iter())
+        .map(|&clock| {
+            let gathered = of_clock(problem, space, clock, own, above);
+            done();
+            gathered
+        })
+        .collect();
+    all.into_iter().fold(Gathered::default(), Gathered::and)
+}
+
+/// What makes all designs of a space impossible, the guide being as good as any that is tried.
+fn limit_of(problem: &Problem, space: &Space, own: bool) -> Limit {
+    let space = Space {
+        guide_sigma_m: space.guide_sigma_m[..1].to_vec(),
+        ..space.clone()
+    };
+    let gathered = gather(problem, &space, own, ABOVE, &|| ());
+    let nearest = gathered.nearest.into_iter().flatten();
+    let limit = nearest.filter_map(|candidate| candidate.limit()).next();
+    limit
+        .or(gathered.limit)
+        .unwrap_or(Limit::Light { most: MOST_CYCLES })
+}
+
+/// The best of a space, by theory and with their timing met. `done` is told of each pair of CLK and THRESHOLD.
+///
+/// # Errors
+/// What makes all of them impossible.
+pub fn search(problem: &Problem, space: &Space, done: impl Fn() + Sync) -> Result<Found, Limit> {
+    let mut space = space.clone();
+    for values in [&mut space.clk_hz, &mut space.guide_sigma_m] {
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+    }
+    let sensor = problem.sensor();
+    let (bins, mut too_fast) = (space.bins[space.bins.len() / 2], None);
+    space.clk_hz.retain(|&clk_hz| {
+        let config = SensorConfig {
+            clk_hz,
+            bins,
+            ..SensorConfig::clone(sensor)
+        };
+        let timing = timed(problem, &config);
+        let is_met = timing.is_ok();
+        too_fast = too_fast.take().or(timing.err());
+        is_met
+    });
+    if let (true, Some(limit)) = (space.clk_hz.is_empty(), too_fast) {
+        return Err(limit);
+    }
+    let gathered = gather(problem, &space, false, 0, &done);
+    let own_space = Space {
+        bins: vec![sensor.bins],
+        clk_hz: vec![sensor.clk_hz],
+        thresholds: vec![sensor.threshold],
+        ..space.clone()
+    };
+    let of_own = gather(problem, &own_space, true, 0, &|| ());
+    let front = met(problem, gathered.points);
+    if front.is_empty() {
+        return Err(limit_of(problem, &space, false));
+    }
+    let own = match timed(problem, sensor) {
+        Err(limit) => Own::Impossible(limit),
+        Ok(()) if of_own.points.is_empty() => Own::Impossible(limit_of(problem, &own_space, true)),
+        Ok(()) => beside(&front, of_own.points),
+    };
+    Ok(Found {
+        tried: gathered.tried + of_own.tried,
+        front,
+        own,
+    })
+}
+
+/// A chip's timing as a limit.
+fn timed(problem: &Problem, config: &SensorConfig) -> Result<(), Limit> {
+    let mhz = config.clk_hz * 1e-6;
+    problem
+        .timing(config)
+        .map_err(|why| Limit::Timing { mhz, why })
+}
+
+/// The front of those whose chips meet their timing.
+fn met(problem: &Problem, mut points: Vec<Point>) -> Vec<Point> {
+    let key = |point: &Point| {
+        let design = &point.design;
+        (
+            design.bins,
+            design.bin_bits,
+            design.counter_bits,
+            design.clk_hz.to_bits(),
+        )
+    };
+    let mut known = HashSet::new();
+    loop {
+        let best = front(points.clone(), Point::costs);
+        let mut chips: Vec<&Point> = best.iter().filter(|p| !known.contains(&key(p))).collect();
+        chips.sort_by_key(|point| key(point));
+        chips.dedup_by_key(|point| key(point));
+        let failed: HashSet<_> = (chips.par_iter())
+            .filter(|p| problem.timing(&problem.config_of(&p.design)).is_err())
+            .map(|p| key(p))
+            .collect();
+        known.extend(chips.iter().map(|p| key(p)));
+        if failed.is_empty() {
+            return best;
+        }
+        points.retain(|point| !failed.contains(&key(point)));
+    }
+}
+
+/// The sensor's own designs beside the front.
+fn beside(best: &[Point], mut own: Vec<Point>) -> Own {
+    own.sort_by(|a, b| a.ln_cost().total_cmp(&b.ln_cost()));
+    let beats = |point: &Point| {
+        let own = point.costs();
+        let mut better: Vec<Point> = best
+            .iter()
+            .filter(|p| dominates(&p.costs(), &own))
+            .copied()
+            .collect();
+        better.sort_by(|a, b| a.ln_cost().total_cmp(&b.ln_cost()));
+        better
+    };
+    match own.iter().find(|point| beats(point).is_empty()) {
+        Some(point) => Own::OnFront(*point),
+        None => Own::Beaten(own[0], beats(&own[0])),
+    }
+}
