@@ -266,6 +266,14 @@ fn a_design_by_itself_is_judged_as_among_others() {
         ..choice
     };
     assert!(matches!(problem.judge(&weak), Err(Limit::Light { .. })));
+    let blinding = Choice {
+        pulse_energy_uj: 100.0,
+        ..choice
+    };
+    assert!(matches!(
+        problem.judge(&blinding),
+        Err(Limit::Blinding { .. })
+    ));
     let narrow = Choice {
         bin_bits: Some(1),
         ..choice
