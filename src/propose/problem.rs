@@ -262,7 +262,8 @@ impl Problem {
                 detection,
             });
         }
-        let of_precision = seen.cycles_for_sigma(precision_m / bin_m);
+        let variance_m2 = seen.variance(window.guide_sigma_m / bin_m) * bin_m * bin_m;
+        let of_precision = (variance_m2 / (precision_m * precision_m)).ceil();
         let from = (of_precision as u32).max(least);
         let cycles = (of_precision <= f64::from(most))
             .then(|| seen.cycles_for(detection / in_window, from, most))
@@ -334,7 +335,7 @@ impl Problem {
                     fps: allowed.max(fps.min(fastest)),
                     detection: found,
                     in_window,
-                    precision_m: bin_m * seen.sigma_bins(laser_cycles),
+                    precision_m: (variance_m2 / pulses).sqrt(),
                     times_class_1: at_goal.0,
                 },
                 eye: at_goal,
