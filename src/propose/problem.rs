@@ -320,19 +320,28 @@ impl Problem {
             };
             let at_goal = eye(fps);
             let fastest = 1.0 / frame_s;
-            // Where eyes would have too much of it, as many frames as keep the mean power, if that is enough.
-            let fps_of_eyes = fastest / eye(fastest).0.max(1.0);
-            let allowed = match eye(fps_of_eyes).0 <= 1.0 + 1e-9 {
-                true => fps_of_eyes,
-                false => fps,
-            };
+            // Where eyes would have too much of it, as many as they may have.
+            let (mut allowed, mut forbidden) = (fps, pulse_hz / pulses);
+            if eye(fastest).0 <= 1.0 {
+                allowed = fastest;
+            } else {
+                for _ in 0..40 {
+                    let middle = 0.5 * (allowed + forbidden);
+                    let end = if eye(middle).0 <= 1.0 {
+                        &mut allowed
+                    } else {
+                        &mut forbidden
+                    };
+                    *end = middle;
+                }
+            }
             offer(Candidate {
                 point: Point {
                     design,
                     power_w: pulse_j * pulses * fps,
                     area,
                     data_bit_s: config.histogram_bits() as f64 * fps,
-                    fps: allowed.max(fps.min(fastest)),
+                    fps: allowed.min(fastest),
                     detection: found,
                     in_window,
                     precision_m: (variance_m2 / pulses).sqrt(),
