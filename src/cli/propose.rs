@@ -374,11 +374,14 @@ fn chart(problem: &Problem, found: &Found, proposed: &Point, area: &str) -> Char
         goal.fps
     );
     let at = |point: &Point| (point.area, 1e3 * point.power_w);
-    let axes = (
-        Axis::linear(format!("macropixel ({area})")),
-        Axis::log("mean laser power (mW)"),
-    );
-    let mut chart = Chart::new(title, axes.0, axes.1);
+    let powers = found.front.iter().map(|point| point.power_w);
+    let [least, most] = [f64::min, f64::max].map(|of| powers.clone().reduce(of).unwrap_or(1.0));
+    let power = match most > 10.0 * least {
+        true => Axis::log("mean laser power (mW)"),
+        false => Axis::linear("mean laser power (mW)"),
+    };
+    let area = Axis::linear(format!("macropixel ({area})"));
+    let mut chart = Chart::new(title, area, power);
     let ends = [1.0, 2.0, 5.0, f64::INFINITY];
     for pair in ends.windows(2) {
         let [from, to] = [pair[0] * goal.fps, pair[1] * goal.fps];

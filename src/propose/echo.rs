@@ -2,6 +2,7 @@
 //! measure it.
 
 use crate::chip::SensorConfig;
+use crate::numerics::{normal_above, normal_density};
 use crate::ranging::{DepthOptions, EchoLight, Response};
 use crate::theory::significance::{Chances, Scan};
 use crate::units::Time;
@@ -31,8 +32,8 @@ pub(super) struct Seen {
     pub(super) width: usize,
     /// At every second phase.
     chances: Vec<Chances>,
-    /// Least variance of the place after one laser cycle, bins².
-    variance: f64,
+    /// Least variances of the place after one laser cycle, bins², where the window is 0, 1, … bins off.
+    variances: Vec<f64>,
     /// The greatest chance of a bin to count in a laser cycle.
     pub(super) fullest: f64,
 }
@@ -80,13 +81,26 @@ impl Echo {
                 beside: (sum(window) - fullest).max(0.0) / (bins - width) as f64,
             }
         });
-        let told = windows().map(|window| window.iter().map(|bin| bin.1).sum::<f64>());
+        // Bins that are not looked at tell nothing.
+        let told = |phase: &Vec<(f64, f64)>, off: isize| -> f64 {
+            let end = |at: usize| at.saturating_add_signed(off).min(BINS);
+            let seen = &phase[end(first)..end(first + bins)];
+            seen.iter().map(|bin| bin.1).sum()
+        };
+        let variance = |off: usize| {
+            let both = [1, -1].map(|side| off as isize * side);
+            let each = self
+                .phases
+                .iter()
+                .flat_map(|phase| both.map(|off| 1.0 / told(phase, off)));
+            each.sum::<f64>() / (2 * PHASES) as f64
+        };
         let all = windows().flatten().map(|bin| bin.0);
         Seen {
             bins,
             width,
             chances: chances.collect(),
-            variance: told.map(|told| 1.0 / told).sum::<f64>() / PHASES as f64,
+            variances: (0..=(bins - width) / 2).map(variance).collect(),
             fullest: all.fold(0.0, f64::max),
         }
     }
@@ -104,9 +118,23 @@ impl Seen {
         powers.sum::<f64>() / self.chances.len() as f64
     }
 
-    /// Standard deviation of the place after `laser_cycles`, bins.
-    pub(super) fn sigma_bins(&self, laser_cycles: u32) -> f64 {
-        (self.variance / f64::from(laser_cycles)).sqrt()
+    /// Variance of the place after one laser cycle, bins², in windows that a guide with an error of `guide_bins` (standard deviation) puts
+    /// where they hold the tested stretch.
+    pub(super) fn variance(&self, guide_bins: f64) -> f64 {
+        // A window is off by the error and a part of a bin, rounded: the second difference of the integral of the error's distribution.
+        let integral = |t: f64| {
+            let x = t / guide_bins;
+            t * (1.0 - normal_above(x)) + guide_bins * normal_density(x)
+        };
+        let (mut weights, mut sum) = (0.0, 0.0);
+        for (off, variance) in self.variances.iter().enumerate() {
+            let t = off as f64;
+            let one = (integral(t + 1.0) - 2.0 * integral(t) + integral(t - 1.0)).max(0.0);
+            let weight = if off == 0 { one } else { 2.0 * one };
+            weights += weight;
+            sum += weight * variance;
+        }
+        sum / weights
     }
 
     /// The fewest laser cycles, from `from` to `most`, that find it with this probability, about: the last steps are of [`CLOSE`].
@@ -146,11 +174,6 @@ impl Seen {
             }
         }
         Some(high)
-    }
-
-    /// The fewest laser cycles for a standard deviation of the place, bins; not a number that any integer holds where nothing is told.
-    pub(super) fn cycles_for_sigma(&self, sigma_bins: f64) -> f64 {
-        (self.variance / (sigma_bins * sigma_bins)).ceil().max(1.0)
     }
 
     /// Bins of the window that may hold the echo's centre if the tested stretch is to be in it.

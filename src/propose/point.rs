@@ -133,6 +133,11 @@ pub enum Limit {
     /// No number of laser cycles finds the target.
     #[error("light: {most} laser cycles do not find the target")]
     Light { most: u32 },
+    /// A pulse blinds the SPADs.
+    #[error(
+        "light: {photons:.2} signal photons a pulse for each SPAD leave too few that see where the target is; give less energy"
+    )]
+    Blinding { photons: f64 },
     /// The chip is too slow, or its verdict says what else.
     #[error("static timing at {mhz} MHz {why}")]
     Timing { mhz: f64, why: String },

@@ -112,18 +112,15 @@ impl Gathered {
     }
 
     fn and(mut self, other: Self) -> Self {
-        self.points.extend(other.points);
-        let possible = self.points.len();
         let tried = self.tried + other.tried;
-        for candidate in other.nearest.into_iter().flatten() {
-            self.take(candidate);
-        }
-        debug_assert_eq!(self.points.len(), possible);
-        self.tried = tried;
-        if let Some(limit) = other.limit {
-            self.limited(limit);
-        }
-        self
+        self.points.extend(other.points);
+        let nearest = other.nearest.into_iter().flatten();
+        nearest.for_each(|candidate| self.take(candidate));
+        other
+            .limit
+            .into_iter()
+            .for_each(|limit| self.limited(limit));
+        Gathered { tried, ..self }
     }
 }
 
@@ -162,7 +159,6 @@ fn of_clock(
             break;
         }
         let echo = problem.echo(clk_hz, threshold, pulse_energy_uj);
-        let mut points = Vec::new();
         for (at, &bins) in space.bins.iter().enumerate() {
             if is_done[at] {
                 continue;
@@ -197,8 +193,6 @@ fn of_clock(
             is_done[at] = seen_before[at] && !found;
             seen_before[at] |= found;
         }
-        points.append(&mut gathered.points);
-        gathered.points = front(points, Point::costs);
     }
     gathered
 }
@@ -309,8 +303,9 @@ fn met(problem: &Problem, mut points: Vec<Point>) -> Vec<Point> {
     };
     let mut known = HashSet::new();
     loop {
-        let best = front(points.clone(), Point::costs);
-        let mut chips: Vec<&Point> = best.iter().filter(|p| !known.contains(&key(p))).collect();
+        let best = front(points.iter().collect(), |point| point.costs());
+        let mut chips = best.clone();
+        chips.retain(|point| !known.contains(&key(point)));
         chips.sort_by_key(|point| key(point));
         chips.dedup_by_key(|point| key(point));
         let failed: HashSet<_> = (chips.par_iter())
@@ -319,7 +314,7 @@ fn met(problem: &Problem, mut points: Vec<Point>) -> Vec<Point> {
             .collect();
         known.extend(chips.iter().map(|p| key(p)));
         if failed.is_empty() {
-            return best;
+            return best.into_iter().copied().collect();
         }
         points.retain(|point| !failed.contains(&key(point)));
     }

@@ -154,7 +154,7 @@ fn the_demonstrators_precision_is_that_of_the_thesis() {
     assert!((background_hz / 8e6 - 1.0).abs() < 0.01, "{background_hz}");
     let bin_ns = 2.6;
     let seen = problem.echo(1e9 / bin_ns, 0, 0.6838).through(8);
-    let cycles = seen.cycles_for_sigma(time_ns(0.1) / bin_ns);
+    let cycles = seen.variance(0.1) * (bin_ns / time_ns(0.1)).powi(2);
     let sigma_ns = scene.pulse_sigma().as_ns();
     let bound = cramer_rao_laser_cycles(
         time_ns(0.1),
@@ -266,6 +266,14 @@ fn a_design_by_itself_is_judged_as_among_others() {
         ..choice
     };
     assert!(matches!(problem.judge(&weak), Err(Limit::Light { .. })));
+    let blinding = Choice {
+        pulse_energy_uj: 100.0,
+        ..choice
+    };
+    assert!(matches!(
+        problem.judge(&blinding),
+        Err(Limit::Blinding { .. })
+    ));
     let narrow = Choice {
         bin_bits: Some(1),
         ..choice
