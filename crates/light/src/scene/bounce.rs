@@ -15,7 +15,9 @@ use glam::DVec3;
 
 use super::camera::PinholeCamera;
 use super::cast::Stage;
+use super::settings::Scene;
 use super::vector::Ray;
+use crate::photon::Spot;
 
 /// How far above a surface a ray begins, m, so that it does not meet the surface itself.
 const ABOVE_M: f64 = 1e-4;
@@ -32,6 +34,40 @@ pub(super) struct Bounce {
     pub exposure_j_m2: f64,
     /// Its whole way.
     pub way_m: f64,
+}
+
+impl Scene {
+    /// Energy that a pulse sends into a direction, J/sr, where `camera` is the lidar's.
+    fn sent_j_sr(&self, camera: &PinholeCamera, towards: DVec3) -> f64 {
+        let Some((u, v)) = camera.project(towards) else {
+            return 0.0;
+        };
+        let (lidar, cosine) = (&self.lidar, towards.z / towards.length());
+        let pitch = [1.0 / camera.focal_px, 1.0 / camera.focal_v_px];
+        let pulse_j = lidar.pulse_energy_uj * 1e-6;
+        if let Some(beam) = lidar.beam_at(cosine.acos()) {
+            return pulse_j * beam / lidar.beam_total();
+        }
+        let [x, y] = [
+            (u - camera.centre.0) * pitch[0],
+            (v - camera.centre.1) * pitch[1],
+        ];
+        let [half_x, half_y] = [(camera.width, pitch[0]), (camera.height, pitch[1])]
+            .map(|(n, p)| 0.5 * f64::from(n) * p);
+        let is_lit = match lidar.spot {
+            Spot::Rectangle => x.abs() <= half_x && y.abs() <= half_y,
+            Spot::Round => x.hypot(y) <= half_x.hypot(half_y),
+        };
+        let share = lidar
+            .spot
+            .share_per_pixel(camera.height, camera.width, pitch);
+        let solid_angle_sr = cosine.powi(3) * pitch[0] * pitch[1];
+        if is_lit {
+            pulse_j * share / solid_angle_sr
+        } else {
+            0.0
+        }
+    }
 }
 
 impl Stage<'_> {
@@ -95,7 +131,7 @@ impl Stage<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{GroundTruth, Object, Scene, Shape};
+    use crate::scene::{GroundTruth, Object, Shape};
 
     /// Bounced and direct photons of every macropixel, and the mean way of the bounced ones, m.
     fn bounced(scene: &Scene, across: u32) -> Vec<(f64, f64, f64)> {

@@ -15,17 +15,13 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
-
 use super::camera::PinholeCamera;
 use super::curve::{Curve, Measured};
 use super::settings::{Lidar, Scene};
 use super::words::{BeamWord, PdeWord, VignettingWord};
 use crate::numerics::integrate;
 use crate::photon::solar::{spectral_irradiance, spectrum};
-use crate::photon::{
-    Atmosphere, Filter, FilterShape, PhotonBudget, PulseShape, Spot, StreamConfig,
-};
+use crate::photon::{Atmosphere, Filter, FilterShape, PhotonBudget, PulseShape, StreamConfig};
 use crate::settings::Fault;
 use crate::units::Time;
 
@@ -181,7 +177,7 @@ impl Lidar {
     }
 
     /// Intensity of the beam at an angle off the axis, in any unit; `None` for one that gives all macropixels the same.
-    fn beam_at(&self, angle_rad: f64) -> Option<f64> {
+    pub(super) fn beam_at(&self, angle_rad: f64) -> Option<f64> {
         match &self.beam {
             Measured::Word(BeamWord::Uniform) => None,
             Measured::Word(BeamWord::Gaussian) => {
@@ -247,38 +243,6 @@ impl Scene {
             spot: lidar.spot,
             atmosphere: Atmosphere::CLEAR,
             convention: lidar.convention,
-        }
-    }
-
-    /// Energy that a pulse sends into a direction, J/sr, where `camera` is the lidar's.
-    pub(super) fn sent_j_sr(&self, camera: &PinholeCamera, towards: DVec3) -> f64 {
-        let Some((u, v)) = camera.project(towards) else {
-            return 0.0;
-        };
-        let (lidar, cosine) = (&self.lidar, towards.z / towards.length());
-        let pitch = [1.0 / camera.focal_px, 1.0 / camera.focal_v_px];
-        let pulse_j = lidar.pulse_energy_uj * 1e-6;
-        if let Some(beam) = lidar.beam_at(cosine.acos()) {
-            return pulse_j * beam / lidar.beam_total();
-        }
-        let [x, y] = [
-            (u - camera.centre.0) * pitch[0],
-            (v - camera.centre.1) * pitch[1],
-        ];
-        let [half_x, half_y] = [(camera.width, pitch[0]), (camera.height, pitch[1])]
-            .map(|(n, p)| 0.5 * f64::from(n) * p);
-        let is_lit = match lidar.spot {
-            Spot::Rectangle => x.abs() <= half_x && y.abs() <= half_y,
-            Spot::Round => x.hypot(y) <= half_x.hypot(half_y),
-        };
-        let share = lidar
-            .spot
-            .share_per_pixel(camera.height, camera.width, pitch);
-        let solid_angle_sr = cosine.powi(3) * pitch[0] * pitch[1];
-        if is_lit {
-            pulse_j * share / solid_angle_sr
-        } else {
-            0.0
         }
     }
 
