@@ -108,10 +108,13 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
     write_text(&staging.join("sensor.toml"), &chip.commented())?;
     let target = problem.scene_of(&proposed.design);
     write_text(&staging.join("scene.toml"), &target.commented())?;
-    for sentence in results.commit(
-        "propose",
-        (goal, args.seed, SensorConfig::clone(problem.sensor())),
-    )? {
+    let asked = serde_json::json!({
+        "goal": goal,
+        "sensor": SensorConfig::clone(problem.sensor()),
+        "lidar": target.lidar,
+        "seed": args.seed,
+    });
+    for sentence in results.commit("propose", asked)? {
         note(sentence);
     }
     tell(format_args!(
