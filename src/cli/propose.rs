@@ -108,26 +108,29 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
     write_text(&staging.join("sensor.toml"), &chip.commented())?;
     let target = problem.scene_of(&proposed.design);
     write_text(&staging.join("scene.toml"), &target.commented())?;
-    for sentence in results.commit(
-        "propose",
-        (goal, args.seed, SensorConfig::clone(problem.sensor())),
-    )? {
+    let asked = serde_json::json!({
+        "goal": goal,
+        "sensor": SensorConfig::clone(problem.sensor()),
+        "lidar": target.lidar,
+        "seed": args.seed,
+    });
+    for sentence in results.commit("propose", asked)? {
         note(sentence);
     }
     tell(format_args!(
-        "A target of {} % at {} m under {} klux, in {} % of {} frames a second and to {} m:\n\
+        "A target of reflectivity {} at {} m under {} klux, found with probability {} in {} frames a second, to {} m:\n\
          {} designs by theory in {took_s:.1} s, {} of them on the front, whose corners are\n\n{}\n",
-        100.0 * goal.reflectivity,
+        goal.reflectivity,
         goal.range_m,
         goal.illuminance_klux,
-        100.0 * goal.detection,
+        goal.detection,
         goal.fps,
         goal.precision_m,
         found.tried,
         found.front.len(),
         grid(&corners, &found, area),
     ))?;
-    tell(sentences(&problem, &found, &corners, area))?;
+    tell(sentences(&problem, &found, &corners))?;
     let (laser, design) = (1e2 * proposed.times_class_1, &proposed.design);
     tell(format_args!(
         "Every chip on the front meets its static timing. The balanced one's laser has {laser:.0} % of what class 1 allows at {} frames a second\n\
@@ -270,7 +273,7 @@ fn grid(corners: &[Corner], found: &Found, area: &str) -> Grid {
 }
 
 /// What to know beside the table: where theory and engine differ, and what becomes of the sensor as it is.
-fn sentences(problem: &Problem, found: &Found, corners: &[Corner], area: &str) -> String {
+fn sentences(problem: &Problem, found: &Found, corners: &[Corner]) -> String {
     let mut text = String::new();
     for Corner { name, point, check } in corners.iter().filter(|c| !c.check.agrees(&c.point)) {
         let [share, sigma] = [check.detection.map(|s| 100.0 * s), check.precision_m];
@@ -309,7 +312,7 @@ fn sentences(problem: &Problem, found: &Found, corners: &[Corner], area: &str) -
             let [mine, theirs] = [own, best].map(Point::costs);
             let what = [
                 "laser power",
-                area,
+                "macropixel",
                 "data",
                 "time of a frame",
                 "exactness of the guide",
@@ -367,11 +370,8 @@ fn write_designs(path: &Path, found: &Found, corners: &[Corner]) -> anyhow::Resu
 fn chart(problem: &Problem, found: &Found, proposed: &Point, area: &str) -> Chart {
     let goal = problem.goal();
     let title = format!(
-        "Designs for {} % at {} m, {} klux, {} frames/s that nothing beats",
-        100.0 * goal.reflectivity,
-        goal.range_m,
-        goal.illuminance_klux,
-        goal.fps
+        "Designs for reflectivity {} at {} m, {} klux, {} frames/s that nothing beats",
+        goal.reflectivity, goal.range_m, goal.illuminance_klux, goal.fps
     );
     let at = |point: &Point| (point.area, 1e3 * point.power_w);
     let powers = found.front.iter().map(|point| point.power_w);

@@ -149,7 +149,7 @@ impl Seen {
         if at_low <= 0.0 {
             return Some(low);
         }
-        while !(at_high <= 0.0) {
+        while at_high.is_nan() || at_high > 0.0 {
             if high >= most {
                 return None;
             }
