@@ -72,7 +72,7 @@ impl<'a> Ranger<'a> {
             aims: Aims::new(sensor, exposure, calibration),
             finder,
             options,
-            spads_fire: scene.lidar.pde > 0.0 || scene.lidar.dark_count_hz > 0.0,
+            spads_fire: scene.lidar.warm_pde() > 0.0 || scene.lidar.dark_counts_hz() > 0.0,
             farthest: sensor.largest_start(),
         })
     }

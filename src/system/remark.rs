@@ -46,7 +46,7 @@ impl Circumstances<'_> {
             NoDepth::NoGuide => self.no_guide(),
             NoDepth::OutOfReach => self.out_of_reach(),
             NoDepth::SpadsOff => {
-                "with pde = 0 and dark_count_hz = 0 no SPAD ever fires; give pde above 0".to_owned()
+                "with pde = 0 and dark_count_hz = 0, or without excess bias in the heat, no SPAD ever fires; give pde above 0".to_owned()
             }
             NoDepth::Saturated => self.saturated(),
             NoDepth::OutsideWindow => self.outside_window(),

@@ -50,6 +50,10 @@ impl Lidar {
 
     /// Dark counts relative to those at 25 °C, of every SPAD.
     pub(super) fn dark_count_factor(&self) -> f64 {
+        // Asked for every macropixel.
+        if self.temperature_c == REFERENCE_C {
+            return 1.0;
+        }
         let inverse = |celsius: f64| 1.0 / (BOLTZMANN_EV_PER_K * (celsius + ZERO_CELSIUS_K));
         let colder = inverse(REFERENCE_C) - inverse(self.temperature_c);
         libm::exp(self.dark_count_activation_ev * colder) * self.triggering()
@@ -61,7 +65,7 @@ impl Lidar {
     }
 
     /// Detection efficiency at its temperature and its laser's wavelength, 0 to 1.
-    pub(super) fn warm_pde(&self) -> f64 {
+    pub fn warm_pde(&self) -> f64 {
         let of_wavelength = match &self.pde_curve {
             Measured::Word(_) => 1.0,
             Measured::Curve(curve) => {
@@ -218,6 +222,9 @@ mod tests {
         }
         let edge = "[lidar]\nfilter = \"top_hat\"\nlaser_drift_nm_k = 0.3\ntemperature_c = 105";
         let fault = Scene::parse("test", edge).unwrap_err().to_string();
-        assert!(fault.contains("nothing of the laser's 964 nm"), "{fault}");
+        assert!(
+            fault.contains("nothing of the laser's 964 nm through at 105 C"),
+            "{fault}"
+        );
     }
 }

@@ -119,7 +119,8 @@ impl Lidar {
         let nm = self.warm_wavelength_nm();
         if self.laser_transmission() <= 0.0 {
             let message = format!(
-                "filter lets nothing of the laser's {nm} nm through; give a filter that does, or another wavelength_nm"
+                "filter lets nothing of the laser's {nm} nm through at {} C; give a filter that does, or another wavelength_nm",
+                self.temperature_c
             );
             return fault("filter", message);
         }
