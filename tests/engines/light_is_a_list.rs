@@ -428,7 +428,23 @@ fn cohorts_follow_echoes_profiles_and_timelines() {
         let segments = [(0, early.clone()), (25, late.clone()), (26, early.clone())];
         PixelLight::timeline(segments).unwrap()
     };
+    let other = |photons: f64| PulseTrain {
+        laser: OtherLaser {
+            number: 0,
+            period_s: 131.7e-9,
+            phase: Some(0.2),
+            dither_s: 0.0,
+            own_dither_s: 0.0,
+        },
+        photons,
+        delay: ns(400.0),
+        sigma: ns(1.5),
+    };
+    let disturbed = |photons: f64| glass.clone().with_train(other(photons));
     let lights = [
+        ("another laser", disturbed(3.0), 40),
+        ("another laser, stronger", disturbed(4.0), 40),
+        ("another laser over STOP", disturbed(1.0), 4),
         ("glass", glass.clone(), 40),
         ("fog", fog.clone(), 40),
         ("much light", bright.clone(), 40),

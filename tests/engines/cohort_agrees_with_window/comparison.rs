@@ -123,9 +123,12 @@ impl Case<'_> {
         let exposure = Exposure::new(&self.sensor, self.stop_periods, self.laser_cycles);
         let window = Window::new(&self.sensor, &exposure);
         let cohort = Cohort::new(&self.sensor, &exposure, self.options);
+        // Other lasers' pulses come at the same times for all seeds.
+        let light = PhotonStream::new(&self.stream(0))
+            .with_trains_as_echoes(&self.light, 0..exposure.stop(1).as_fs());
         let expected = cohort
             .of_macropixel(5)
-            .expected(&self.stream(0), self.start, &self.light)
+            .expected(&self.stream(0), self.start, &light)
             .unwrap();
         let empty = Moments::new(&expected);
         let pixels = [LitPixel {
@@ -149,8 +152,9 @@ impl Case<'_> {
             .fold(
                 || empty.clone(),
                 |moments, seed| {
-                    let stream = self.stream(seed);
-                    moments.add(&cohort.draw(&stream, 5, self.start, &self.light).unwrap())
+                    let stream = PhotonStream::new(&self.stream(seed));
+                    let exposed = cohort.expose(&stream, &pixels).unwrap();
+                    moments.add(&exposed.histograms[0])
                 },
             )
             .reduce(|| empty.clone(), Moments::merge);

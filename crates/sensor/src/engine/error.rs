@@ -134,7 +134,7 @@ pub enum NotModelled {
     /// SPADs with a detection efficiency or dark count rate of their own.
     #[error("SPADs that differ")]
     SpadsThatDiffer,
-    /// Pulses of other lasers, which come at another time of each laser cycle.
+    /// Pulses of other lasers, which come at another time of each laser cycle, where no stream tells when.
     #[error("other lidars")]
     OtherLasers,
 }

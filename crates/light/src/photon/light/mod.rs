@@ -13,6 +13,7 @@
 //! SPADs of the macropixel: photons times the detection efficiency, each SPAD having the same share. Where SPADs differ,
 //! [`SpadSpread`] says how.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::units::Time;
@@ -190,6 +191,45 @@ impl PixelLight {
             segment.trains.push(train);
         }
         self
+    }
+
+    /// The same without other lasers, but for pulses that `arrivals` tells of a train: laser cycle, and when after its start. Each is an echo of
+    /// that laser cycle, which is a segment of its own.
+    pub(super) fn with_trains_as_echoes(
+        &self,
+        arrivals: impl Fn(&PulseTrain) -> Vec<(u32, Time)>,
+    ) -> Self {
+        let mut segments: Vec<Segment> = Vec::new();
+        let ends = self.later.iter().map(|segment| segment.first_cycle);
+        for (segment, end) in self.segments().zip(ends.chain([u32::MAX])) {
+            let mut by_cycle: BTreeMap<u32, Segment> = BTreeMap::new();
+            let since = |first_cycle: u32| Segment {
+                first_cycle,
+                trains: Vec::new(),
+                ..segment.clone()
+            };
+            for train in &segment.trains {
+                let within = arrivals(train).into_iter();
+                for (cycle, at) in within.filter(|at| (segment.first_cycle..end).contains(&at.0)) {
+                    let lit = by_cycle.entry(cycle).or_insert_with(|| since(cycle));
+                    lit.further
+                        .push(Echo::new(train.photons, at).with_sigma(train.sigma));
+                }
+            }
+            let mut next = segment.first_cycle;
+            for (cycle, lit) in by_cycle {
+                segments.extend((next < cycle).then(|| since(next)));
+                segments.push(lit);
+                next = cycle + 1;
+            }
+            segments.extend((next < end).then(|| since(next)));
+        }
+        let mut segments = segments.into_iter();
+        PixelLight {
+            first: segments.next().expect("each has one at least"),
+            later: segments.collect(),
+            spads: self.spads.clone(),
+        }
     }
 
     /// Whether another laser shines on it.

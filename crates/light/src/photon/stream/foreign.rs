@@ -10,7 +10,9 @@ use super::exposure::PhotonStream;
 use super::group::{Group, Place};
 use super::part::{PixelStream, nearest};
 use super::schedule::Schedule;
-use crate::photon::light::PulseTrain;
+use crate::photon::light::{PixelLight, PulseTrain};
+use crate::photon::quantile::NormalSampler;
+use crate::units::Time;
 
 /// Mean photons of a SPAD in a pulse beyond which those that come later are not drawn: e⁻⁴⁰ of the SPADs would have seen none
 /// before them, and all others are blind by then.
@@ -52,6 +54,37 @@ impl Foreign {
             share,
         };
         (foreign, drawn)
+    }
+}
+
+impl PhotonStream {
+    /// Light in which pulses of other lasers are echoes of single laser cycles, for those who see only what comes `within_fs` after the start
+    /// of each; pulses at other times are left out. The times may begin before the cycle, by less than its length.
+    pub fn with_trains_as_echoes(&self, light: &PixelLight, within_fs: Range<i64>) -> PixelLight {
+        light.with_trains_as_echoes(|train| {
+            let (schedule, delay_fs) = (self.schedule(&train.laser), train.delay.as_fs());
+            let reach_fs = NormalSampler::new(train.sigma.as_fs() as f64)
+                .reach()
+                .ceil() as i64;
+            let mut seen = Vec::new();
+            // As the laser cycle itself has them, and the one before.
+            for moved_fs in [0, self.cycle_fs] {
+                let from_fs = within_fs.start + moved_fs - reach_fs;
+                let until_fs = (within_fs.end + moved_fs + reach_fs).min(self.cycle_fs + 2);
+                if from_fs < until_fs {
+                    let pulses = schedule.arriving_within(self, from_fs.max(0)..until_fs, delay_fs);
+                    seen.extend(pulses);
+                }
+            }
+            seen.sort_unstable();
+            seen.dedup();
+            let arrivals = seen
+                .into_iter()
+                .filter_map(|pulse| schedule.arrival(self, pulse, delay_fs));
+            arrivals
+                .map(|(cycle, at_fs)| (cycle, Time::from_fs(at_fs)))
+                .collect()
+        })
     }
 }
 

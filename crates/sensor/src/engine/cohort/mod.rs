@@ -62,6 +62,7 @@ mod weighted;
 mod words;
 
 use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use smallvec::smallvec;
@@ -79,6 +80,10 @@ use self::words::RandomWords;
 use super::{Engine, EngineError, Expose, Exposed, LitPixel, Work};
 use crate::chip::{Exposure, Sensor, WindowLaw, histogram, window_law};
 use crate::photon::{PhotonStream, PixelLight, StreamConfig};
+
+/// Dead times before a window from which on another laser's pulses are followed: what came before them has blinded its SPADs only by way
+/// of four others.
+const REMEMBERED: i64 = 4;
 
 /// SPADs that are worth following one by one in a CLK period before [`joint`] is the cheaper way.
 const WORTH_LOOKING_AT: f64 = 200.0;
@@ -155,6 +160,19 @@ impl Cohort {
             Opening { window, from_fs }
         };
         *self.windows[usize::from(start)].get_or_init(of_law)
+    }
+
+    /// When another laser's pulses matter to the window of a start value, fs after the start of the laser cycle: from [`REMEMBERED`] dead times before
+    /// it on.
+    fn sight_fs(&self, stream: &StreamConfig, start: u16) -> Range<i64> {
+        let window = self.opening(start).window.open();
+        window.map_or(0..0, |window| {
+            let seen = self.law.interval(&window);
+            // Macropixels' own laws differ by less than a CLK period.
+            let room = stream.clock.period();
+            let before = room + stream.spads.dead_time * REMEMBERED;
+            (seen.start - before).as_fs()..(seen.end + room).as_fs()
+        })
     }
 
     /// A histogram of macropixel `pixel` under `light`, bin 0 earliest: a pure function of the stream's seed and
@@ -296,6 +314,10 @@ impl Expose for Cohort {
         let mut exposed = Exposed::new(self.sensor.bins);
         for pixel in pixels {
             let light = pixel.light.as_ref().unwrap_or(&dark);
+            let light = match light.has_trains() {
+                true => &stream.with_trains_as_echoes(light, self.sight_fs(config, pixel.start)),
+                false => light,
+            };
             let counts = self.draw(config, pixel.number, pixel.start, light)?;
             exposed.histograms.push(&counts);
             let closed = self.opening(pixel.start).window.open().is_none();
