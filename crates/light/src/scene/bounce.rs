@@ -132,6 +132,7 @@ impl Stage<'_> {
 mod tests {
     use super::*;
     use crate::scene::{GroundTruth, Object, Shape};
+    use crate::units::TimeOfFlight;
 
     /// Bounced and direct photons of every macropixel, and the mean way of the bounced ones, m.
     fn bounced(scene: &Scene, across: u32) -> Vec<(f64, f64, f64)> {
@@ -245,5 +246,29 @@ mod tests {
             assert!((mean_m - way_m / exposure).abs() < 20.0 * most, "{mean_m}");
             assert!(photons < 0.3 * direct && photons > 0.005 * direct);
         }
+        // The first return comes late by what is bounced of its light, times how much later that is.
+        let mut centre_m = |rays: u32| {
+            scene.lidar.bounce_rays = rays;
+            let light = &scene.pixel_light(&GroundTruth::render(&scene, 32, 32))[row * 32 + col];
+            let all = light.segments().flat_map(|segment| segment.echoes());
+            let all: Vec<_> = all
+                .map(|e| (e.photons, e.photons * e.arrival.as_range_m()))
+                .collect();
+            let sum = |of: fn(&(f64, f64)) -> f64| all.iter().map(of).sum::<f64>();
+            (sum(|e| e.0), sum(|e| e.1) / sum(|e| e.0))
+        };
+        let ((direct, direct_m), (_, centre_m)) = (centre_m(0), centre_m(1024));
+        let late_m = 0.5 * way_m / exposure - direct_m;
+        let closed_m = expected * late_m / (direct + expected);
+        let found_m = centre_m - direct_m;
+        println!(
+            "{:.0} mm late, {:.0} by the integral",
+            1e3 * found_m,
+            1e3 * closed_m
+        );
+        assert!(
+            (found_m / closed_m - 1.0).abs() < 0.05,
+            "{found_m} {closed_m}"
+        );
     }
 }
