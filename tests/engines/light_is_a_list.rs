@@ -442,8 +442,7 @@ fn cohorts_follow_echoes_profiles_and_timelines() {
     };
     let disturbed = |photons: f64| glass.clone().with_train(other(photons));
     let lights = [
-        ("another laser", disturbed(3.0), 40),
-        ("another laser, stronger", disturbed(4.0), 40),
+        ("another laser", disturbed(4.0), 40),
         ("another laser over STOP", disturbed(1.0), 4),
         ("glass", glass.clone(), 40),
         ("fog", fog.clone(), 40),
