@@ -26,7 +26,7 @@ pub(super) struct SdcArgs {
 /// A macropixel, sized and timed.
 struct Mapped<'c> {
     config: &'c SensorConfig,
-    library: &'static FromFile,
+    cells: &'static FromFile,
     netlist: Netlist,
     characterised: Characterised,
 }
@@ -35,21 +35,21 @@ impl<'c> Mapped<'c> {
     /// # Errors
     /// A sensor of the built-in cells.
     fn of(config: &'c SensorConfig, option: &str) -> Result<Self, InputError> {
-        let library = CellLibrary::of(config)
+        let cells = CellLibrary::of(config)
             .ok()
             .and_then(CellLibrary::from_file);
-        let Some(library) = library else {
+        let Some(cells) = cells else {
             let message = "the built-in cells are no library's; add --liberty FILE";
             return Err(InputError::new(option, message));
         };
         let netlist = Netlist::elaborate(&macropixel::circuit(config));
-        let characterised = library.characterised(&netlist);
-        for sentence in &library.liberty.map.notes {
+        let characterised = cells.characterised(&netlist);
+        for sentence in &cells.liberty.map.notes {
             note(sentence);
         }
         Ok(Mapped {
             config,
-            library,
+            cells,
             netlist,
             characterised,
         })
@@ -64,8 +64,8 @@ impl<'c> Mapped<'c> {
             after_fall: &[("STOP", self.config.stop_phase())],
         };
         OutputFile::write_with(path, |out| {
-            let sized = (&self.characterised, &self.library.environment);
-            write_constraints(out, &self.netlist, &self.library.liberty, sized, clocking)
+            let sized = (&self.characterised, &self.cells.environment);
+            write_constraints(out, &self.netlist, &self.cells.liberty, sized, clocking)
         })
     }
 }
@@ -88,28 +88,28 @@ pub(super) fn run_sdc(args: &SdcArgs) -> anyhow::Result<()> {
 pub(super) fn write(folder: &Path, config: &SensorConfig) -> anyhow::Result<()> {
     let mapped = Mapped::of(config, "--mapped")?;
     let Mapped {
-        library,
+        cells,
         netlist,
         characterised,
         ..
     } = &mapped;
     create_folder(folder)?;
     OutputFile::write_with(&folder.join("mapped.v"), |out| {
-        write_mapped(out, netlist, &library.liberty, characterised)
+        write_mapped(out, netlist, &cells.liberty, characterised)
     })?;
     OutputFile::write_with(&folder.join("mapped_cells.v"), |out| {
-        write_mapped_cells(out, netlist, &library.liberty, characterised)
+        write_mapped_cells(out, netlist, &cells.liberty, characterised)
     })?;
     OutputFile::write_with(&folder.join("mapped.sdf"), |out| {
-        write_mapped_sdf(out, netlist, &library.liberty, characterised)
+        write_mapped_sdf(out, netlist, &cells.liberty, characterised)
     })?;
     mapped.write_sdc(&folder.join("mapped.sdc"))?;
-    let (area, leakage_w) = characterised.silicon(netlist, &library.liberty, 0);
+    let (area, leakage_w) = characterised.silicon(netlist, &cells.liberty, 0);
     tell(format_args!(
         "mapped.v, mapped_cells.v, mapped.sdf and mapped.sdc in {}: a macropixel of {} in {}, area {area:.0}, leakage {:.3} nW\n",
         folder.display(),
         netlist.cells().len(),
-        library.liberty.name,
+        cells.liberty.name,
         leakage_w * 1e9
     ))?;
     Ok(())

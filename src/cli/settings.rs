@@ -90,7 +90,7 @@ impl SensorArgs {
     }
 
     /// What `--liberty` and `--cell` set.
-    fn library_set(&self) -> impl Iterator<Item = String> {
+    fn set_of_cells(&self) -> impl Iterator<Item = String> {
         let file = self.liberty.as_ref().map(|file| {
             let file = std::path::absolute(file).unwrap_or_else(|_| file.clone());
             format!("sensor.liberty={}", file.display())
@@ -107,7 +107,10 @@ impl SensorArgs {
             rows: self.rows,
             cols: self.cols,
             block: self.block.clone(),
-            set: self.library_set().chain(self.set.iter().cloned()).collect(),
+            set: self
+                .set_of_cells()
+                .chain(self.set.iter().cloned())
+                .collect(),
             spelling: Spelling::Options,
         }
     }

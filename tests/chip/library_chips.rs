@@ -68,7 +68,7 @@ pub fn chips() -> Vec<SensorConfig> {
 pub struct Mapped {
     pub folder: tempfile::TempDir,
     pub config: SensorConfig,
-    pub library: &'static FromFile,
+    pub cells: &'static FromFile,
     pub netlist: Netlist,
     pub characterised: Characterised,
 }
@@ -87,10 +87,10 @@ impl Mapped {
             ..chip
         };
         config.check().unwrap_or_else(|e| panic!("{e}"));
-        let library = CellLibrary::of(&config).unwrap().from_file().unwrap();
+        let of_library = CellLibrary::of(&config).unwrap().from_file().unwrap();
         let netlist = Netlist::elaborate(&macropixel::circuit(&config));
-        let characterised = library.characterised(&netlist);
-        let cells = &library.liberty;
+        let characterised = of_library.characterised(&netlist);
+        let cells = &of_library.liberty;
         let mut files: [Vec<u8>; 4] = Default::default();
         let [verilog, models, sdf, sdc] = &mut files;
         write_mapped(verilog, &netlist, cells, &characterised).unwrap();
@@ -102,7 +102,7 @@ impl Mapped {
             ripple: &Probes::p_counter_cells(&netlist),
             after_fall: &[("STOP", Time::ZERO)],
         };
-        let sized = (&characterised, &library.environment);
+        let sized = (&characterised, &of_library.environment);
         write_constraints(sdc, &netlist, cells, sized, clocking).unwrap();
         let names = ["mapped.v", "mapped_cells.v", "mapped.sdf", "mapped.sdc"];
         for (name, file) in names.into_iter().zip(files) {
@@ -111,7 +111,7 @@ impl Mapped {
         Mapped {
             folder,
             config,
-            library,
+            cells: of_library,
             netlist,
             characterised,
         }

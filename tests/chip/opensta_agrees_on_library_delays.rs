@@ -59,7 +59,7 @@ fn of_every_arc_of_a_macropixel() {
         let (mut compared, mut slower) = (0, 0);
         for chip in library_chips::chips() {
             let mapped = Mapped::of(text, chip);
-            let slew_ns = mapped.library.environment.input_slew_fs / 1e6;
+            let slew_ns = mapped.cells.environment.input_slew_fs / 1e6;
             mapped.opensta(&format!(
                 "set sta_preset_clear_arcs_enabled 1
 set_input_transition {slew_ns:.9} [all_inputs]

@@ -15,6 +15,7 @@ mod cohort_agrees_with_window;
 mod cohort_draws_what_it_computes;
 mod cycle_agrees_with_gate;
 mod delay_lines_time_photons;
+mod impossible_light_is_refused;
 mod late_cycle_is_that_of_the_whole_run;
 mod light_is_a_list;
 mod own_blocks_agree_with_built_in_ones;

@@ -15,12 +15,10 @@ use glam::DVec3;
 
 use super::camera::PinholeCamera;
 use super::cast::Stage;
+use super::daylight::ABOVE_M;
 use super::settings::Scene;
 use super::vector::Ray;
 use crate::photon::Spot;
-
-/// How far above a surface a ray begins, m, so that it does not meet the surface itself.
-const ABOVE_M: f64 = 1e-4;
 
 /// How much before a surface light must have come, m, not to be stopped before it.
 const THERE_M: f64 = 1e-3;

@@ -10,8 +10,8 @@ use glam::DVec3;
 use super::cast::Stage;
 use super::vector::Ray;
 
-/// How far above a surface the ray to the sun begins, m, so that it does not meet the surface itself.
-const ABOVE_M: f64 = 1e-4;
+/// How far above a surface the ray to a light begins, m, so that it does not meet the surface itself.
+pub(super) const ABOVE_M: f64 = 1e-4;
 
 impl Stage<'_> {
     /// Daylight on a surface at `point` that faces along `normal` (unit), as a share of the scene's illuminance, 0 to 1.

@@ -17,6 +17,7 @@
 use glam::DVec3;
 
 use super::cast::Stage;
+use super::daylight::ABOVE_M;
 use super::ranges::{POSITION, SPEED};
 use super::settings::Scene;
 use super::vector::{Ray, turned};
@@ -24,9 +25,6 @@ use crate::photon::{OtherLaser, PhotonBudget, PulseTrain};
 use crate::settings::Range::{Above, Limited, Within};
 use crate::settings::{Fault, keys};
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
-
-/// How far above a surface the ray to a laser begins, m, so that it does not meet the surface itself.
-const ABOVE_M: f64 = 1e-4;
 
 /// No lidar is nearer to ours than that, m: it would be in its lens.
 const NEAREST_M: f64 = 0.05;

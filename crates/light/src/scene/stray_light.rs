@@ -7,7 +7,7 @@
 //!
 //! The halo is that of a lens that scatters little, falling off with the cube of the distance (Harvey's law for surfaces has powers of 2 to
 //! 3); a measured one may be given as a curve. It has all that comes through the lens: echoes, sunlight, pulses of other lidars. Light
-//! from outside the field of view throws none in. Twelve macropixels beside a retroreflector of 1000 photons a pulse, a halo of
+//! from outside the field of view throws none in. Six macropixels beside a retroreflector of 1000 photons a pulse, a halo of
 //! one per cent is another echo of 0.01: what *blooming* is called where it hides what stands there.
 
 use rayon::prelude::*;

@@ -23,6 +23,7 @@ use error::is_amount;
 pub(super) use layer::Layer;
 pub use profile::Profile;
 pub use spad_spread::SpadSpread;
+pub(super) use train::MOST_PER_PULSE;
 pub use train::{OtherLaser, PulseTrain};
 
 mod echo;
@@ -239,7 +240,7 @@ impl PixelLight {
 
     /// Greatest mean rate of photons of other lasers, per second, where each pulse blinds all SPADs at most some times.
     pub(crate) fn trains_hz(&self) -> f64 {
-        let of = |train: &PulseTrain| train.photons.min(1e4) / train.laser.period_s;
+        let of = |train: &PulseTrain| train.photons.min(MOST_PER_PULSE) / train.laser.period_s;
         let each = self
             .segments()
             .map(|segment| segment.trains.iter().map(of).sum());

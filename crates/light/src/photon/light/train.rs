@@ -10,6 +10,9 @@
 
 use crate::units::Time;
 
+/// Mean photons of a pulse that are drawn, at most, where SPADs are ready again within it.
+pub(in crate::photon) const MOST_PER_PULSE: f64 = 1e4;
+
 /// When another laser sends its pulses, beside our own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OtherLaser {

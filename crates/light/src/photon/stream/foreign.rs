@@ -10,16 +10,13 @@ use super::exposure::PhotonStream;
 use super::group::{Group, Place};
 use super::part::{PixelStream, nearest};
 use super::schedule::Schedule;
-use crate::photon::light::{PixelLight, PulseTrain};
+use crate::photon::light::{MOST_PER_PULSE, PixelLight, PulseTrain};
 use crate::photon::quantile::NormalSampler;
 use crate::units::Time;
 
 /// Mean photons of a SPAD in a pulse beyond which those that come later are not drawn: e⁻⁴⁰ of the SPADs would have seen none
 /// before them, and all others are blind by then.
 const MOST_PER_SPAD: f64 = 40.0;
-
-/// Mean photons of a pulse that are drawn where SPADs are ready again within it.
-const MOST_PER_PULSE: f64 = 1e4;
 
 /// From there on second counter words give the number of a pulse's photons.
 const NUMBER_RUN: u32 = 1 << 31;
