@@ -292,7 +292,7 @@ fn icarus_reads_the_same_through_the_exported_pins() {
     if !icarus::is_here() {
         return;
     }
-    for (seed, (rows, cols)) in [(1, 1), (2, 3), (3, 2), (1, 4)].into_iter().enumerate() {
+    for (seed, (rows, cols)) in [(1, 1), (2, 2), (1, 3)].into_iter().enumerate() {
         let (scenario, mut gate) = exposed(seed as u64 + 40, rows, cols);
         let Scenario {
             config,

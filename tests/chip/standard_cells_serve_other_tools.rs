@@ -92,7 +92,7 @@ fn delay_lines_pass_pulses_shorter_than_their_elements() {
     for (seed, corner) in (0..3).zip(Corner::ALL) {
         let config = SensorConfig {
             rows: 1,
-            cols: 2,
+            cols: 1,
             corner,
             ..(*hslidar_delay_line()).clone()
         };
@@ -319,13 +319,12 @@ const DFFSR: &str = "Warning: Complex async reset for dff `\\state'.";
 #[test]
 fn yosys_reads_it() {
     with_every_p_counter(|folder| {
-        for option in ["", "-specify"] {
-            let script = format!(
-                "read_verilog {option} design.v cells_specify.v; hierarchy -check -top quantic4x4; proc; \
-                 check -assert; flatten; check -assert; select -assert-none t:$dlatch t:$sr"
-            );
-            is_silent(folder, "yosys", &["-q", "-p", &script], DFFSR);
-        }
+        let script = "read_verilog design.v cells_specify.v; hierarchy -check -top quantic4x4; proc; \
+                      check -assert; flatten; check -assert; select -assert-none t:$dlatch t:$sr";
+        is_silent(folder, "yosys", &["-q", "-p", script], DFFSR);
+        // The same cells in every chip: their timing is read without the rest.
+        let cells = "read_verilog -specify cells_specify.v; hierarchy -check; proc; check -assert";
+        is_silent(folder, "yosys", &["-q", "-p", cells], DFFSR);
     });
 }
 

@@ -73,14 +73,13 @@ fn a_probe_names_the_engine_it_is_compared_with() {
 
 #[test]
 fn a_tolerance_is_kept_and_its_bound_reported() {
-    let at = |tolerance: &str| frame(&["--tolerance", tolerance]).1["tolerance"].clone();
-    for tolerance in ["0", "0.001", "0.1"] {
-        let report = at(tolerance);
+    let on_window = ["0", "0.001", "0.1"].map(|tolerance| {
+        let report = &frame(&["--tolerance", tolerance]).1["tolerance"];
         let bound = report["bound_m"].as_f64().unwrap();
         assert!(bound <= tolerance.parse().unwrap(), "{report}");
-    }
-    let on_window = |report: Value| report["on_window"].as_u64().unwrap();
-    assert!(on_window(at("0")) > on_window(at("0.1")));
+        report["on_window"].as_u64().unwrap()
+    });
+    assert!(on_window[0] > on_window[2]);
 }
 
 /// A wall so near that its echo saturates SPADs, seen by a compact sensor indoors.

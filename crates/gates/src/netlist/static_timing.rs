@@ -166,7 +166,11 @@ impl<'n> StaticTiming<'n> {
         for &(net, edge) in starts {
             is_start[node(net, edge)] = true;
         }
-        let leaves = |from: Node| !barriers.contains(&net_of(from));
+        let mut is_barrier = vec![false; self.netlist.net_count()];
+        for net in barriers {
+            is_barrier[net.index()] = true;
+        }
+        let leaves = |from: Node| !is_barrier[net_of(from).index()];
         let arcs = |from: Node| {
             let is_start = &is_start;
             let arcs = leaves(from).then(|| self.arcs_from(from));
