@@ -159,7 +159,7 @@ impl Kernel {
     ///
     /// # Panics
     /// When a loop of zero-delay cells oscillates within one instant.
-    pub fn run<O: Observer>(&mut self, stimulus: &mut Stimulus<'_>, until: Time, observer: &mut O) {
+    pub fn run(&mut self, stimulus: &mut Stimulus<'_>, until: Time, observer: &mut dyn Observer) {
         let until_fs = until.as_fs();
         loop {
             let drive_fs = stimulus.peek().map_or(i64::MAX, |d| d.time.as_fs());
@@ -218,10 +218,10 @@ impl Kernel {
     /// of the nets that changed.
     ///
     /// Only at rest: no change may be on its way, and what follows must not reach a reset or set.
-    pub fn preset<O: Observer>(
+    pub fn preset(
         &mut self,
         states: impl IntoIterator<Item = (usize, bool)>,
-        observer: &mut O,
+        observer: &mut dyn Observer,
     ) {
         debug_assert!(
             self.wheel.next_time(i64::MAX).is_none(),
@@ -259,7 +259,7 @@ impl Kernel {
         }
     }
 
-    fn settle<O: Observer>(&mut self, observer: &mut O) {
+    fn settle(&mut self, observer: &mut dyn Observer) {
         for _ in 0..MOST_DELTA_CYCLES {
             if self.shuffle.is_some() {
                 self.arrive_shuffled(observer);
@@ -291,7 +291,7 @@ impl Kernel {
     }
 
     #[inline]
-    fn arrive<O: Observer>(&mut self, event: Event, observer: &mut O) {
+    fn arrive(&mut self, event: Event, observer: &mut dyn Observer) {
         let index = event.net as usize;
         let net = &mut self.nets[index];
         if net.generation == event.tag >> 2 {
@@ -307,7 +307,7 @@ impl Kernel {
     }
 
     #[cold]
-    fn arrive_shuffled<O: Observer>(&mut self, observer: &mut O) {
+    fn arrive_shuffled(&mut self, observer: &mut dyn Observer) {
         let Some(mut shuffle) = self.shuffle.take() else {
             return;
         };
@@ -323,7 +323,7 @@ impl Kernel {
     }
 
     #[inline]
-    fn apply<O: Observer>(&mut self, net: usize, value: u8, observer: &mut O) {
+    fn apply(&mut self, net: usize, value: u8, observer: &mut dyn Observer) {
         self.nets[net].value = value;
         self.statistics.changes += 1;
         observer.change(
@@ -352,7 +352,7 @@ impl Kernel {
 
     /// The flip-flops on a clock that has risen look at D.
     #[inline]
-    fn clock<O: Observer>(&mut self, net: usize, observer: &mut O) {
+    fn clock(&mut self, net: usize, observer: &mut dyn Observer) {
         for bank in 0..self.banks.len() {
             if self.banks[bank].clock as usize == net {
                 self.clock_bank(bank, observer);
@@ -376,7 +376,7 @@ impl Kernel {
     }
 
     #[inline]
-    fn evaluate<O: Observer>(&mut self, index: usize, observer: &mut O) {
+    fn evaluate(&mut self, index: usize, observer: &mut dyn Observer) {
         let cell = &mut self.cells[index];
         cell.is_dirty = false;
         // An input that changed and changed back within the instant did nothing.
@@ -398,7 +398,7 @@ impl Kernel {
 
     /// With its reset and set before.
     #[inline]
-    fn evaluate_flip_flop<O: Observer>(&mut self, index: usize, evaluated: u8, observer: &mut O) {
+    fn evaluate_flip_flop(&mut self, index: usize, evaluated: u8, observer: &mut dyn Observer) {
         let cell = &mut self.cells[index];
         let clock = &self.nets[cell.clock as usize];
         let data = self.nets[cell.data as usize].value;
@@ -422,13 +422,7 @@ impl Kernel {
     }
 
     #[inline]
-    fn schedule<O: Observer>(
-        &mut self,
-        net: u32,
-        value: u8,
-        delays_fs: &[u32; 4],
-        observer: &mut O,
-    ) {
+    fn schedule(&mut self, net: u32, value: u8, delays_fs: &[u32; 4], observer: &mut dyn Observer) {
         let Some(state) = self.nets.get_mut(net as usize) else {
             return;
         };
@@ -459,7 +453,7 @@ impl Kernel {
 
     /// [`Kernel::schedule`] with a transport delay.
     #[inline(never)]
-    fn send<O: Observer>(&mut self, net: u32, value: u8, time_fs: i64, observer: &mut O) {
+    fn send(&mut self, net: u32, value: u8, time_fs: i64, observer: &mut dyn Observer) {
         let present = self.nets[net as usize].value;
         let sent = self.transport.send(net as usize, present, value, time_fs);
         if sent.swallowed > 0 {

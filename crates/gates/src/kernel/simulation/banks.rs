@@ -17,7 +17,7 @@ impl Kernel {
 
     /// A clock edge at a bank: one shift if it is formed or can be, otherwise flip-flop by flip-flop.
     #[inline]
-    pub(super) fn clock_bank<O: Observer>(&mut self, index: usize, observer: &mut O) {
+    pub(super) fn clock_bank(&mut self, index: usize, observer: &mut dyn Observer) {
         self.statistics.evaluations += self.banks[index].cells.len() as u64;
         let bank = &self.banks[index];
         let clock = &self.nets[bank.clock as usize];
@@ -80,7 +80,7 @@ impl Kernel {
     }
 
     /// The changes of a bank come, in the order of its nets.
-    pub(super) fn arrive_bank<O: Observer>(&mut self, first: usize, observer: &mut O) {
+    pub(super) fn arrive_bank(&mut self, first: usize, observer: &mut dyn Observer) {
         let is_its = |bank: &&mut ShiftBank| {
             bank.nets[0] as usize == first && bank.arrives_fs == Some(self.now_fs)
         };
