@@ -15,7 +15,7 @@
 //! time must exceed the CLK period. PIXEL_CLEAR forgets everything.
 //!
 //! Timing: a pulse is taken by the first rising CLK edge at or after pulse + clk-to-Q. A pulse lasts the dead time, which
-//! must not be shorter than the toggle flip-flop can follow ([`PulseLimits`](super::PulseLimits)).
+//! must not be shorter than the toggle flip-flop can follow ([`PulseLimits`](crate::chip::front_end::PulseLimits)).
 
 use std::sync::Arc;
 
