@@ -53,21 +53,23 @@ enum Verdict {
 impl Block {
     fn p_counter(config: SensorConfig) -> Self {
         let has_borrow = usize::from(config.tap == Tap::Borrow);
-        let mut parameters = vec![("BITS", config.counter_bits)];
-        let (rtl, own) = match config.p_counter {
-            PCounter::Comparator => ("up_counter.v", vec![("STEP", config.step_periods)]),
-            PCounter::Memoryless => ("memoryless_counter.v", vec![("BORROW", has_borrow)]),
-            other => (
+        let row = config.p_counter.row();
+        let is_gray = usize::from((row.code)(2) != 2);
+        let (rtl, own): (_, &[_]) = match (row.has_memory, row.no_msb) {
+            (false, _) => ("memoryless_counter.v", &[("BORROW", has_borrow)]),
+            (true, None) => (
                 "down_counter.v",
-                vec![
+                &[
                     ("BORROW", has_borrow),
                     ("STEP", config.step_periods),
-                    ("GRAY", usize::from((other.row().code)(2) != 2)),
+                    ("GRAY", is_gray),
                 ],
             ),
+            (true, Some(_)) => ("up_counter.v", &[("STEP", config.step_periods)]),
         };
+        let mut parameters = vec![("BITS", config.counter_bits)];
         parameters.extend(own);
-        let has_pulse = config.p_counter == PCounter::Memoryless;
+        let has_pulse = !row.has_memory;
         Block {
             config,
             module: "p_counter",

@@ -5,7 +5,7 @@ use guided_dtof::analysis::{
     CorrelationTiming, LoadTiming, LocalClocks, MacropixelTiming, ReadTiming, gate_works,
     load_works, phases, read_works, reset, ripple, shortest_period, spread,
 };
-use guided_dtof::chip::{Limits, SensorConfig, Silicon};
+use guided_dtof::chip::{Limits, PCounter, SensorConfig, Silicon, Tap};
 use guided_dtof::logic::Logic;
 use guided_dtof::netlist::{CellKind, Corner, Library, Mismatch};
 use guided_dtof::units::Time;
@@ -303,14 +303,17 @@ fn a_macropixels_mismatch_is_its_own_and_the_spread_is_that_of_its_cells() {
 
 #[test]
 fn the_ripple_is_reached_for_every_number_of_stages() {
-    for counter_bits in 2..=12 {
-        let config = SensorConfig {
-            counter_bits,
-            ..SensorConfig::default()
-        };
-        for silicon in [TYPICAL, mismatched(counter_bits as u64)] {
-            let (paths, gates) = ripple(&config, &silicon);
-            assert_eq!(paths, gates, "{counter_bits} stages");
+    for p_counter in PCounter::ALL {
+        for counter_bits in 2..=12 {
+            let config = SensorConfig {
+                counter_bits,
+                tap: Tap::Borrow,
+                ..p_counter.sensor()
+            };
+            for silicon in [TYPICAL, mismatched(counter_bits as u64)] {
+                let (paths, gates) = ripple(&config, &silicon);
+                assert_eq!(paths, gates, "{p_counter:?}, {counter_bits} stages");
+            }
         }
     }
 }

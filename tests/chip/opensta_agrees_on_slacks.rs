@@ -346,8 +346,8 @@ fn of_every_endpoint_of_a_macropixel() {
         if name == "sky130" {
             continue;
         }
-        // Of each check: agree; ours asks more; OpenSTA asks more.
-        let mut counted: BTreeMap<&str, [usize; 3]> = BTreeMap::new();
+        // Of each check, and whether no divided clock takes part: agree; ours asks more; OpenSTA asks more.
+        let mut counted: BTreeMap<(&str, bool), [usize; 3]> = BTreeMap::new();
         for chip in library_chips::chips() {
             let mapped = Mapped::of(&text, chip);
             let p_counter = mapped.config.p_counter;
@@ -381,7 +381,8 @@ fn of_every_endpoint_of_a_macropixel() {
                     assert!(*check == "hold" && (theirs.own || by_arrival), "{both}");
                     2
                 };
-                counted.entry(check).or_default()[more] += 1;
+                let of = (*check, theirs.is_plain);
+                counted.entry(of).or_default()[more] += 1;
                 let longer = theirs.halves - ours.halves;
                 match *check {
                     "recovery" | "removal" => {}
@@ -392,12 +393,21 @@ fn of_every_endpoint_of_a_macropixel() {
             }
         }
         println!("{name}: {counted:?}");
-        let sum = |which: usize| counted.values().map(|counts| counts[which]).sum::<usize>();
-        let all = sum(0) + sum(1) + sum(2);
-        assert!(all > 2500 && counted.len() == 6, "{name}: {counted:?}");
-        // 88 % agree at least, and of 2.3 % at most OpenSTA asks more.
+        let sum = |which: usize, is_plain: bool| {
+            let of = counted.iter().filter(|(key, _)| key.1 == is_plain);
+            of.map(|(_, counts)| counts[which]).sum::<usize>()
+        };
+        let [divided, plain] =
+            [false, true].map(|is_plain| [0, 1, 2].map(|which| sum(which, is_plain)));
+        let [all_divided, all_plain] = [divided, plain].map(|of| of.iter().sum::<usize>());
+        let all = all_divided + all_plain;
+        assert!(all > 2500 && counted.len() == 12, "{name}: {counted:?}");
+        // Of plain clocks 97 % agree at least. Behind divided ones 76 % do, how many depends on how many P-counters of the list ripple.
+        // Of all, OpenSTA asks more of 2.3 % at most.
         assert!(
-            sum(0) * 100 > all * 87 && sum(2) * 40 < all,
+            plain[0] * 100 > all_plain * 96
+                && divided[0] * 2 > all_divided
+                && (divided[2] + plain[2]) * 40 < all,
             "{name}: {counted:?}"
         );
     }

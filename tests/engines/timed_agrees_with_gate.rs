@@ -65,9 +65,16 @@ fn scenario(random: &mut StdRng, clock: Clock) -> (Scenario, Silicon) {
     if clock != Clock::Any {
         if clock == Clock::NearLimit {
             config.counter_bits = random.random_range(8..13);
-            config.p_counter = PCounter::Ripple;
             config.tap = Tap::Borrow;
             config.mode = Mode::Guided;
+            // One that is reset, and ripples for longer than it takes to count.
+            let mut p_counters = PCounter::ALL.to_vec();
+            p_counters.retain(|&p_counter| {
+                config.p_counter = p_counter;
+                let timing = ChipTiming::of(&config);
+                p_counter.row().has_memory && timing.counter.period < timing.ripple()
+            });
+            config.p_counter = p_counters[random.random_range(0..p_counters.len())];
         }
         let timing = ChipTiming::of(&config);
         let strobe = timing.ripple() + timing.local_stop_to_strobe - timing.clk_to_shift;

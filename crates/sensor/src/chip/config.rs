@@ -11,6 +11,8 @@ use crate::settings::Range::{Above, OneOf, Within};
 use crate::settings::{keys, words};
 use crate::units::{Frequency, Time};
 
+pub use super::blocks::{front_end::variants::FrontEnd, p_counter::variants::PCounter};
+
 words! {
     /// TYPE: how the number of fired SPADs is compared with THRESHOLD.
     pub enum EventType {
@@ -47,45 +49,6 @@ words! {
         Guided = "guided",
         /// The global STOP: the last CLK periods of the laser cycle (thesis 4.2).
         Conventional = "conventional",
-    }
-}
-
-words! {
-    /// How the pulses of a macropixel's SPADs become SPAD_TIMED (thesis 2.4.1, Fig. 22).
-    pub enum FrontEnd {
-        /// A toggle flip-flop and two samplers for each SPAD, whose events the correlation block sums up (Fig. 22d). Two pulses
-        /// of one SPAD in a CLK period are lost.
-        Summation = "summation",
-        /// Pulse shapers and an OR tree (Fig. 22a). Pulses that overlap are lost, and two that are sampled together.
-        OrTree = "or_tree",
-        /// Toggle flip-flops and an XOR tree (Fig. 22b). Two pulses in a CLK period are lost.
-        XorTree = "xor_tree",
-        /// Pulse shapers, and an event where `coincident_spads` SPADs fire within a shaped pulse (Fig. 22c). What
-        /// does not coincide is lost.
-        Coincidence = "coincidence",
-    }
-}
-
-words! {
-    /// How the P-counter is built (thesis 4.4). All have the same pins. Those with a memory open the same time windows where the
-    /// counter holds after LOCAL_STOP. Where it wraps, LOCAL_STOP comes again after 2ⁿ⁺¹ counts of a counter of n bits with
-    /// its borrow, and after 2ⁿ of one without: of the comparator, and of all with the tap `msb`.
-    #[non_exhaustive]
-    pub enum PCounter {
-        /// Ripple down counter of reset-only flip-flops, Q or Q̄ chosen by the memory bit (Fig. 51c, 53).
-        Ripple = "ripple",
-        /// Ripple down counter of set/reset flip-flops and a delayed reset (Fig. 51b), the HSLIDAR's (4.9.2).
-        SetReset = "set_reset",
-        /// Synchronous down counter (Fig. 50a).
-        Synchronous = "synchronous",
-        /// Up counter from zero and a comparator (Fig. 49a).
-        Comparator = "comparator",
-        /// Ripple down counter without memory, loaded once, never reset: it comes round with STOP (4.4.3).
-        Memoryless = "memoryless",
-        /// Synchronous down counter in Gray code, of which one bit changes with each count.
-        Gray = "gray",
-        /// Down counter of three-bit segments: synchronous within a segment, a ripple from one to the next.
-        Segmented = "segmented",
     }
 }
 

@@ -1,6 +1,29 @@
 //! The circuits of the chip, one file for each block of its diagram (thesis Fig. 46 to 59), each beside its plain-Rust
 //! reference model.
 
+/// Declares the variants of a block, each with its file beside the list. For what their rows need more than the list does,
+/// `rows!` gives these to the block: `VARIANT` of each file, in order.
+macro_rules! variants {
+    (
+        $(#[$of:meta])*
+        pub enum $name:ident {
+            $($(#[$each:meta])* $file:ident: $variant:ident = $word:literal,)+
+        }
+    ) => {
+        crate::settings::words! {
+            $(#[$of])*
+            pub enum $name {
+                $($(#[$each])* $variant = $word,)+
+            }
+        }
+
+        macro_rules! rows {
+            () => { [$(&variants::$file::VARIANT),+] };
+        }
+        pub(super) use rows;
+    };
+}
+
 pub mod array;
 pub mod correlation;
 pub mod front_end;

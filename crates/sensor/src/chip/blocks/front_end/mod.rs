@@ -4,13 +4,10 @@
 //! figure; here CLK samples them as it does a SPAD of the first (`summation::retiming`), so that the METDC can shift
 //! what they give, and the correlation block gets one line.
 
-pub mod coincidence;
-pub mod or_tree;
 mod pulse_limits;
-pub mod pulse_shaper;
-pub mod summation;
+mod pulse_shaper;
 mod variant;
-pub mod xor_tree;
+pub(in crate::chip) mod variants;
 
 use std::sync::Arc;
 
@@ -21,18 +18,17 @@ use crate::photon::count_bits;
 use crate::units::Time;
 
 pub use pulse_limits::{DeadTimeTooShort, PulseLimits};
-pub(crate) use summation::TOGGLE;
 pub use variant::Variant;
+use variants::coincidence::Wire;
+pub use variants::summation;
+pub(crate) use variants::summation::TOGGLE;
+pub(super) use variants::xor_tree;
 
 impl FrontEnd {
     /// What other files ask of it.
     pub(crate) fn row(self) -> &'static Variant {
-        match self {
-            FrontEnd::Summation => &summation::VARIANT,
-            FrontEnd::OrTree => &or_tree::VARIANT,
-            FrontEnd::XorTree => &xor_tree::VARIANT,
-            FrontEnd::Coincidence => &coincidence::VARIANT,
-        }
+        const ROWS: [&Variant; FrontEnd::ALL.len()] = variants::rows!();
+        ROWS[self as usize]
     }
 
     /// Whether all SPADs share one line, whose edges depend on more than one SPAD.
@@ -72,7 +68,7 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Model {
     kind: FrontEnd,
-    wire: coincidence::Wire,
+    wire: Wire,
     retiming: summation::Model,
 }
 
@@ -82,7 +78,7 @@ impl Model {
         let together = config.spads_of_an_event();
         Model {
             kind: config.front_end,
-            wire: coincidence::Wire::new(together, timing.pulses.shaped.unwrap_or_default()),
+            wire: Wire::new(together, timing.pulses.shaped.unwrap_or_default()),
             retiming: summation::Model::default(),
         }
     }

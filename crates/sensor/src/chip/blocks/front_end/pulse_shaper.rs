@@ -21,10 +21,10 @@ use crate::chip::blocks::finished;
 use crate::netlist::{CellKind, Module, ModuleBuilder};
 
 /// Stages of the delay chain, the buffer included.
-pub const STAGES: usize = 23;
+pub(super) const STAGES: usize = 23;
 
 /// A pulse shaper. Ports: SPAD_RAW → SHAPED.
-pub fn circuit() -> Arc<Module> {
+pub(super) fn circuit() -> Arc<Module> {
     let mut m = ModuleBuilder::new("pulse_shaper");
     let raw = m.input("SPAD_RAW");
     let shaped = m.output("SHAPED");

@@ -16,16 +16,10 @@
 //! blocks COUNTER_CLK; the timing block sees to it. A step divider before the first stage lets windows step by several
 //! CLK periods.
 
-mod comparator;
-mod gray;
-mod memoryless;
 mod pins;
-mod ripple;
-mod segmented;
-mod set_reset;
 mod step_divider;
-mod synchronous;
 mod variant;
+pub(in crate::chip) mod variants;
 
 use std::sync::Arc;
 
@@ -39,15 +33,8 @@ pub use variant::{Counter, DownCounter, Variant};
 impl PCounter {
     /// What other files ask of it.
     pub fn row(self) -> &'static Variant {
-        match self {
-            PCounter::Ripple => &ripple::VARIANT,
-            PCounter::SetReset => &set_reset::VARIANT,
-            PCounter::Synchronous => &synchronous::VARIANT,
-            PCounter::Comparator => &comparator::VARIANT,
-            PCounter::Memoryless => &memoryless::VARIANT,
-            PCounter::Gray => &gray::VARIANT,
-            PCounter::Segmented => &segmented::VARIANT,
-        }
+        const ROWS: [&Variant; PCounter::ALL.len()] = variants::rows!();
+        ROWS[self as usize]
     }
 
     /// The QuantIC4x4 with this P-counter, LOCAL_STOP taken where it suits.

@@ -16,11 +16,11 @@
 use std::sync::Arc;
 
 use super::summation::{JOINED, TOGGLE};
-use super::variant::{Variant, pins};
 use crate::chip::blocks::finished;
+use crate::chip::blocks::front_end::variant::{Variant, pins};
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
-pub(super) const VARIANT: Variant = Variant {
+pub(crate) const VARIANT: Variant = Variant {
     circuit: |config| circuit(config.spads()),
     joins: true,
     shapes: false,
@@ -59,7 +59,7 @@ fn sampler() -> Arc<Module> {
 /// The front end of `spads` SPADs.
 ///
 /// Ports: SPAD_RAW\<SPADs\>, CLK, PIXEL_CLEAR → SPAD_TIMED\<1\>.
-pub fn circuit(spads: usize) -> Arc<Module> {
+fn circuit(spads: usize) -> Arc<Module> {
     let mut m = ModuleBuilder::new("front_end_xor_tree");
     let raw = pins(&mut m, spads);
     m.output_bus("SPAD_TIMED", 1);

@@ -16,13 +16,13 @@
 
 use std::sync::Arc;
 
-use super::pulse_shaper;
 use super::summation::retime;
-use super::variant::{Variant, pins};
 use crate::chip::blocks::finished;
+use crate::chip::blocks::front_end::pulse_shaper;
+use crate::chip::blocks::front_end::variant::{Variant, pins};
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
-pub(super) const VARIANT: Variant = Variant {
+pub(crate) const VARIANT: Variant = Variant {
     circuit: |config| circuit(config.spads()),
     joins: true,
     shapes: true,
@@ -32,7 +32,7 @@ pub(super) const VARIANT: Variant = Variant {
 /// The front end of `spads` SPADs.
 ///
 /// Ports: SPAD_RAW\<SPADs\>, CLK, PIXEL_CLEAR → SPAD_TIMED\<1\>.
-pub fn circuit(spads: usize) -> Arc<Module> {
+fn circuit(spads: usize) -> Arc<Module> {
     let mut m = ModuleBuilder::new("front_end_or_tree");
     let raw = pins(&mut m, spads);
     let shaped = shapers(&mut m, &raw);

@@ -26,20 +26,20 @@
 
 use std::sync::Arc;
 
-use super::pins::Pins;
-use super::variant::Variant;
 use crate::chip::blocks::finished;
+use crate::chip::blocks::p_counter::pins::Pins;
+use crate::chip::blocks::p_counter::variant::Variant;
 use crate::chip::config::SensorConfig;
 use crate::chip::p_counter_timing::DELAY_CHAIN;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
-pub(super) const VARIANT: Variant = Variant {
+pub(crate) const VARIANT: Variant = Variant {
     nets: &["LOAD_PULSE"],
     has_memory: false,
     ..Variant::down_counter(circuit, "a stage without memory", 42)
 };
 
-/// The counter with `bits` stages; ports as in [`super::circuit`].
+/// The counter with `bits` stages; ports as in [`circuit`](crate::chip::p_counter::circuit).
 fn circuit(config: &SensorConfig) -> Arc<Module> {
     let bits = config.counter_bits;
     let mut m = ModuleBuilder::new("p_counter");

@@ -24,15 +24,15 @@
 
 use std::sync::Arc;
 
-use super::pins::Pins;
-use super::variant::Variant;
 use crate::chip::blocks::finished;
+use crate::chip::blocks::p_counter::pins::Pins;
+use crate::chip::blocks::p_counter::variant::Variant;
 use crate::chip::config::SensorConfig;
 use crate::netlist::{Module, ModuleBuilder};
 
-pub(super) const VARIANT: Variant = Variant::down_counter(circuit, "a stage", 52);
+pub(crate) const VARIANT: Variant = Variant::down_counter(circuit, "a stage", 52);
 
-/// The counter with `bits` programmable stages; ports as in [`super::circuit`].
+/// The counter with `bits` programmable stages; ports as in [`circuit`](crate::chip::p_counter::circuit).
 fn circuit(config: &SensorConfig) -> Arc<Module> {
     let bits = config.counter_bits;
     let mut m = ModuleBuilder::new("p_counter");

@@ -16,20 +16,20 @@
 
 use std::sync::Arc;
 
-use super::pins::Pins;
-use super::variant::{Counter, Variant};
 use crate::chip::blocks::finished;
+use crate::chip::blocks::p_counter::pins::Pins;
+use crate::chip::blocks::p_counter::variant::{Counter, Variant};
 use crate::chip::config::SensorConfig;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
-pub(super) const VARIANT: Variant = Variant {
+pub(crate) const VARIANT: Variant = Variant {
     model: |config, start| Box::new(Model::new(config.counter_bits, start)),
     nets: &["EQUAL"],
     no_msb: Some("counts up"),
     ..Variant::down_counter(circuit, "a stage with a comparator", 62)
 };
 
-/// The counter and comparator of `bits` bits, at least 2; ports as in [`super::circuit`].
+/// The counter and comparator of `bits` bits, at least 2; ports as in [`circuit`](crate::chip::p_counter::circuit).
 fn circuit(config: &SensorConfig) -> Arc<Module> {
     let bits = config.counter_bits;
     let mut m = ModuleBuilder::new("p_counter");

@@ -15,12 +15,12 @@
 //! time must exceed the CLK period. PIXEL_CLEAR forgets everything.
 //!
 //! Timing: a pulse is taken by the first rising CLK edge at or after pulse + clk-to-Q. A pulse lasts the dead time, which
-//! must not be shorter than the toggle flip-flop can follow ([`PulseLimits`](super::PulseLimits)).
+//! must not be shorter than the toggle flip-flop can follow ([`PulseLimits`](crate::chip::front_end::PulseLimits)).
 
 use std::sync::Arc;
 
-use super::variant::Variant;
 use crate::chip::blocks::finished;
+use crate::chip::blocks::front_end::variant::Variant;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
 /// Name of the cell that a SPAD's pulses toggle.
@@ -29,7 +29,7 @@ pub(crate) const TOGGLE: &str = "toggle";
 /// The instance that retimes the one wire of a front end that joins its SPADs.
 pub(crate) const JOINED: &str = "joined";
 
-pub(super) const VARIANT: Variant = Variant {
+pub(crate) const VARIANT: Variant = Variant {
     circuit: |config| circuit(config.spads()),
     joins: false,
     shapes: false,

@@ -23,12 +23,12 @@ use std::sync::Arc;
 
 use super::or_tree::shapers;
 use super::summation::retime;
-use super::variant::{Variant, pins};
 use crate::chip::blocks::finished;
+use crate::chip::blocks::front_end::variant::{Variant, pins};
 use crate::netlist::{CellKind, Module, ModuleBuilder};
 use crate::units::Time;
 
-pub(super) const VARIANT: Variant = Variant {
+pub(crate) const VARIANT: Variant = Variant {
     circuit: |config| circuit(config.spads(), config.coincident_spads),
     joins: true,
     shapes: true,
@@ -38,7 +38,7 @@ pub(super) const VARIANT: Variant = Variant {
 /// The front end of `spads` SPADs, a power of two, of which `together` must fire.
 ///
 /// Ports: SPAD_RAW\<SPADs\>, CLK, PIXEL_CLEAR → SPAD_TIMED\<1\>.
-pub fn circuit(spads: usize, together: usize) -> Arc<Module> {
+fn circuit(spads: usize, together: usize) -> Arc<Module> {
     debug_assert!((1..=spads).contains(&together));
     let mut m = ModuleBuilder::new("front_end_coincidence");
     let raw = pins(&mut m, spads);
@@ -109,7 +109,7 @@ fn needed(pairs: &[(usize, usize)], output: usize, lines: usize) -> Vec<Comparat
 
 /// Reference model of the wire on which shaped pulses meet; an OR tree's is that of one SPAD.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Wire {
+pub(crate) struct Wire {
     together: usize,
     width: Time,
     /// When the pulses end that are high.
