@@ -167,7 +167,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     };
     let configuration = Configuration {
         exposed: request.exposed(scene_args.scene_name(), &settings.frame),
-        guides: asked.guiding.guides(),
+        guides: &asked.guiding.guides,
         windows: settings.policy,
         calibration: asked.calibration.as_deref(),
         start_s: args.start_s,

@@ -242,7 +242,7 @@ fn table(
             of(summary.guided, summary.pixels),
         )
         .row("surface in window", of(summary.in_window, summary.guided));
-    if !args.exposure.guiding.guides().is_empty() {
+    if !args.exposure.guiding.guides.is_empty() {
         table.push("guide", settings.guide.name());
     }
     quality::rows(&mut table, &settings.depth, &summary);

@@ -13,7 +13,8 @@ pub(super) struct GuideArgs {
     /// Guide for the windows, such as radar or radar:range_sigma_m=0.2,azimuth_beam_deg=4 [default: stereo, the
     /// scene's camera pair]. Several are fused by their variances. `--help` lists all guides with their keys.
     #[arg(long = "guide", value_name = "NAME[:KEY=VALUE,…]", long_help = guides_in_full())]
-    guides: Vec<String>,
+    /// Guides as they were given; none for the camera pair.
+    pub(super) guides: Vec<String>,
     /// How windows are chosen, such as unguided=neighbour. `--help` lists all keys.
     #[arg(long, value_name = "KEY=VALUE,…", long_help = policy_in_full())]
     windows: Option<String>,
@@ -32,11 +33,6 @@ impl GuideArgs {
             bins_from_guide: self.bins_from_guide,
             ..request
         }
-    }
-
-    /// Guides as they were given; none for the camera pair.
-    pub(super) fn guides(&self) -> &[String] {
-        &self.guides
     }
 }
 

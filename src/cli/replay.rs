@@ -240,7 +240,7 @@ fn replay_array(
             )?;
             let report = Report {
                 checks: checks.report(simulation.netlist()),
-                events: events.report(),
+                events: &events.report,
             };
             eprint!("{}{}", report.checks, report.events);
             // Before the histograms, which unknown states may have spoilt: this says why.

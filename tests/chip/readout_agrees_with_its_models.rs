@@ -369,7 +369,7 @@ fn a_reading_during_the_exposure_leaves_the_counts_as_they_are() {
         let netlist = gate.netlist();
         let pins = SensorPins::of(netlist);
         let mut drives: Vec<Drive> = plan.stimulus(&pins).collect();
-        let schedule = plan.schedule();
+        let schedule = plan.schedule;
         let mut now = schedule.origin;
         drives.push(Drive::new(now, pins.read.enable, true));
         while now + HALF * 4 < schedule.counted {

@@ -38,11 +38,11 @@ pub(super) fn of_rig(scene: &Scene, rows: u32, cols: u32, seed: u64) -> GuideMap
     let rig = StereoRig::new(scene, seed);
     let lidar = scene.lidar_camera(rows, cols);
     let stride = stride(&rig, &lidar);
-    let image_rows: Vec<u32> = offsets(rig.camera().height, stride).collect();
+    let image_rows: Vec<u32> = offsets(rig.camera.height, stride).collect();
     let landings: Vec<Vec<Landing>> = image_rows
         .par_iter()
         .map(|&row| {
-            offsets(rig.camera().width, stride)
+            offsets(rig.camera.width, stride)
                 .filter(|&col| may_land(scene, &lidar, &rig, (row, col)))
                 .filter_map(|col| {
                     let point = rig.measure(row, col)?;
@@ -90,7 +90,7 @@ fn of_landings(lidar: &PinholeCamera, landings: impl Iterator<Item = Landing>) -
 
 /// Camera pixels from one measurement to the next.
 pub(super) fn stride(rig: &StereoRig, lidar: &PinholeCamera) -> u32 {
-    let camera_px_per_macropixel = rig.camera().focal_px / lidar.focal_px.max(lidar.focal_v_px);
+    let camera_px_per_macropixel = rig.camera.focal_px / lidar.focal_px.max(lidar.focal_v_px);
     (camera_px_per_macropixel / SAMPLES_ACROSS).floor().max(1.0) as u32
 }
 
@@ -110,7 +110,7 @@ fn may_land(
     /// As good as endless.
     const FAR_M: f64 = 1e9;
     let pixel = (f64::from(col) + 0.5, f64::from(row) + 0.5);
-    let direction = rig.camera().at_unit_depth(pixel);
+    let direction = rig.camera.at_unit_depth(pixel);
     let nearest_m = rig.focal_baseline_px_m() / scene.stereo.max_disparity_px;
     let ends = [nearest_m, FAR_M]
         .map(|depth_m| lidar.project(direction * depth_m + scene.stereo.position_m));

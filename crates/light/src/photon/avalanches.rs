@@ -49,7 +49,8 @@ pub struct Avalanches<'a> {
     unknown: u64,
     /// Afterpulses and crosstalk to come, and whether they come for certain.
     pending: BinaryHeap<Reverse<(SpadEvent, bool)>>,
-    lost: u64,
+    /// How many avalanches have met a blind SPAD.
+    pub(crate) lost: u64,
 }
 
 impl<'a> Avalanches<'a> {
@@ -87,11 +88,6 @@ impl<'a> Avalanches<'a> {
             .pending
             .retain(|Reverse((child, _))| child.time >= time);
         avalanches
-    }
-
-    /// How many avalanches have met a blind SPAD.
-    pub(crate) fn lost(&self) -> u64 {
-        self.lost
     }
 
     /// Runs all `photons`, sorted, and what they cause; appends the rising edges to `edges` and returns how many avalanches

@@ -36,7 +36,7 @@ impl PhotonStream {
         pulses: impl FnMut(&[SpadEvent]),
     ) -> PixelPhotons {
         let parts = self.parts(pixel, light);
-        match parts[0].is_bright() {
+        match parts[0].is_bright {
             true => self.bright_pulses(&parts, pulses),
             false => self.dim_pulses(&parts, pulses),
         }
@@ -49,7 +49,7 @@ impl PhotonStream {
     ) -> PixelPhotons {
         let mut draw = Draw::default();
         let mut by_cycle = ByCycle::default();
-        let all = self.span(0..self.slots().count());
+        let all = self.span(0..self.slots.count);
         let end = self.cycle_start(self.config().laser_cycles);
         let mut photons: Vec<Photon> = Vec::new();
         let mut edges = Vec::new();
@@ -99,7 +99,7 @@ impl PhotonStream {
         PixelPhotons {
             events: Vec::new(),
             drawn,
-            lost_to_dead_time: avalanches.lost(),
+            lost_to_dead_time: avalanches.lost,
         }
     }
 
@@ -122,7 +122,7 @@ impl PhotonStream {
         let (mut drawn, mut next_echo) = (0, 0);
         for cycle in 0..config.laser_cycles {
             let until = match cycle + 1 < config.laser_cycles {
-                true => self.cycle_start(cycle + 1) - Time::from_fs(self.slots().lead_fs()),
+                true => self.cycle_start(cycle + 1) - Time::from_fs(self.slots.lead_fs),
                 false => end,
             };
             // Whatever may blind a SPAD for an echo must find it.
@@ -154,8 +154,8 @@ impl PhotonStream {
         }
         PixelPhotons {
             events: Vec::new(),
-            drawn: drawn + echoes.drawn(),
-            lost_to_dead_time: avalanches.lost(),
+            drawn: drawn + echoes.drawn,
+            lost_to_dead_time: avalanches.lost,
         }
     }
 }

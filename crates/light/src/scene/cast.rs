@@ -99,12 +99,13 @@ impl Scene {
 /// A scene made ready for many rays.
 #[derive(Debug)]
 pub struct Stage<'a> {
-    scene: &'a Scene,
+    /// What was made ready.
+    pub(crate) scene: &'a Scene,
     placed: Vec<Placed<'a>>,
     /// Balls around the objects, for rays that do not come from one place.
     balls: Vec<Option<Ball>>,
     /// Towards the sun.
-    sun: Option<DVec3>,
+    pub(super) sun: Option<DVec3>,
 }
 
 /// How far light has come along a ray.
@@ -143,16 +144,6 @@ impl<'a> Stage<'a> {
                 .collect(),
             sun: scene.towards_sun(),
         }
-    }
-
-    /// What was made ready.
-    pub(crate) fn scene(&self) -> &'a Scene {
-        self.scene
-    }
-
-    /// Unit vector towards the sun, as [`Scene::towards_sun`].
-    pub(super) fn sun(&self) -> Option<DVec3> {
-        self.sun
     }
 
     /// As [`Scene::hit`].

@@ -450,14 +450,14 @@ impl ObjectEntry {
                 self.centre_m = Some(centre_m);
                 self.scale_m = Some(scale_m);
                 self.yaw_deg = Some(yaw_deg);
-                self.file = Some(mesh.path().to_owned());
+                self.file = Some(mesh.path.to_owned());
             }
             Shape::Map {
                 centre_m,
                 yaw_deg,
                 map,
             } => {
-                let files = map.files().clone();
+                let files = map.files.clone();
                 self.kind = Kind::Map;
                 self.centre_m = Some(centre_m);
                 self.yaw_deg = Some(yaw_deg);

@@ -55,7 +55,7 @@ impl Scene {
         }
         let mut faults = Vec::new();
         let mut scene = Scene::default();
-        for (name, value) in document.table() {
+        for (name, value) in &document.table {
             let faults = &mut faults;
             let wrong = |message: &str| Fault {
                 path: name.clone(),
@@ -159,7 +159,7 @@ fn with_curves(document: &Document, name: &str, given: &Table, faults: &mut Vec<
         let Some(value) = given.get(key.name) else {
             continue;
         };
-        match read_file(value, document.folder()) {
+        match read_file(value, &document.folder) {
             Ok(None) => (),
             Ok(Some(curve)) => drop(read.insert(key.name.into(), curve)),
             Err(why) => {
@@ -210,9 +210,7 @@ fn object(
     }
     let entry = read.try_into::<ObjectEntry>();
     let told = |e: toml::de::Error| e.message().trim().to_owned();
-    let entry = entry
-        .map_err(told)
-        .and_then(|e| e.object(document.folder()));
+    let entry = entry.map_err(told).and_then(|e| e.object(&document.folder));
     match entry {
         Ok(object) => {
             let fault = check_object(path, &object);
@@ -264,7 +262,7 @@ fn place(document: &Document, path: &str) -> String {
     match (names.next(), names.next()) {
         (Some(list @ ("object" | "interferer")), Some(index)) => {
             let index: usize = index.parse().unwrap_or(0);
-            let item = document.table().get(list).and_then(|list| list.get(index));
+            let item = document.table.get(list).and_then(|list| list.get(index));
             let name = item.and_then(|item| item.get("name")?.as_str());
             let name = name.map_or(String::new(), |name| format!(" ({name})"));
             format!("in [[{list}]] number {}{name}, ", index + 1)

@@ -122,7 +122,7 @@ impl GateSimulation {
 
     /// Where load and exposure lie in simulation time.
     pub fn schedule(&self) -> Schedule {
-        self.plan.schedule()
+        self.plan.schedule
     }
 
     /// Timing checks of this netlist in the sensor's corner, from the end of the power-up reset on, to run it with. The
@@ -156,7 +156,7 @@ impl GateSimulation {
 
     /// Simulates load and exposure to the end.
     pub fn run<O: Observer>(&mut self, observer: &mut O) {
-        self.run_until(self.plan.schedule().end, observer);
+        self.run_until(self.plan.schedule.end, observer);
     }
 
     /// Simulates from power-up to `until`.
@@ -188,7 +188,7 @@ impl GateSimulation {
         observer: &mut O,
     ) -> Result<Histograms, EngineError> {
         debug_assert_eq!(starts.len(), self.probes.len());
-        let cols = self.plan.order().cols;
+        let cols = self.plan.order.cols;
         let codes = self.sensor.load_codes(starts);
         let stream = load_path::stream(&codes, cols, self.sensor.counter_bits);
         let clock = self.sensor.load_clock();
@@ -203,7 +203,7 @@ impl GateSimulation {
         others: Stimulus<'_>,
         observer: &mut O,
     ) -> Result<Histograms, EngineError> {
-        let order = self.plan.order();
+        let order = self.plan.order;
         let pins = ReadPins::of(&self.netlist);
         let (clock, start) = (self.sensor.read_clock(), self.kernel.now());
         let (end, read) = read_stimulus(&pins, clock, start, order.periods());

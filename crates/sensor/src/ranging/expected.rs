@@ -61,9 +61,11 @@ pub(super) enum Steps {
 /// How a macropixel answers to light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Response {
-    bins: usize,
-    pulse_sigma_bins: f64,
-    counting: Counting,
+    /// Histogram bins.
+    pub(crate) bins: usize,
+    /// Standard deviation of the pulse, bins.
+    pub pulse_sigma_bins: f64,
+    pub(super) counting: Counting,
     dead: Dead,
 }
 
@@ -106,23 +108,9 @@ impl Response {
         Some(other)
     }
 
-    pub(super) fn counting(&self) -> &Counting {
-        &self.counting
-    }
-
-    /// Histogram bins.
-    pub(crate) fn bins(&self) -> usize {
-        self.bins
-    }
-
     /// Dead time, bins.
     pub(crate) fn dead_time_bins(&self) -> f64 {
         self.dead.time_bins
-    }
-
-    /// Standard deviation of the pulse, bins.
-    pub fn pulse_sigma_bins(&self) -> f64 {
-        self.pulse_sigma_bins
     }
 
     /// The chance of every bin to count in a laser cycle.
@@ -261,7 +249,7 @@ mod tests {
                     position_bins: 32.0 + (phase as f64 + 0.5) / PHASES as f64,
                     signal,
                     background_per_bin: background,
-                    sigma_bins: response.pulse_sigma_bins(),
+                    sigma_bins: response.pulse_sigma_bins,
                 };
                 let told: f64 = response.information(&light).iter().map(|bin| bin.1).sum();
                 1.0 / told / PHASES as f64

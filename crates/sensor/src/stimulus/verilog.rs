@@ -144,7 +144,7 @@ fn write_testbench(
     } else {
         ""
     };
-    let schedule = plan.schedule();
+    let schedule = plan.schedule;
     let name = top.name();
     let mut pins = 0;
     let (mut ports, mut outputs) = (Vec::new(), Vec::new());

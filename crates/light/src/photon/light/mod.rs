@@ -65,7 +65,7 @@ impl Segment {
         };
         let profile = self.profile.as_ref().map(|profile| Layer {
             profile: Some(profile),
-            ..Layer::constant(profile.greatest_hz())
+            ..Layer::constant(profile.greatest_hz)
         });
         let further = self.further.iter().map(Layer::of_echo);
         let trains = self.trains.iter().map(Layer::of_train);
@@ -298,7 +298,7 @@ impl PixelLight {
     pub fn background_hz(&self) -> f64 {
         let rate_hz = |segment: &Segment| {
             let profile = segment.profile.as_ref();
-            segment.background_hz + profile.map_or(0.0, |profile| profile.greatest_hz())
+            segment.background_hz + profile.map_or(0.0, |profile| profile.greatest_hz)
         };
         let rates_hz = self.segments().map(rate_hz);
         let dark_hz = self

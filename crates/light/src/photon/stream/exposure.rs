@@ -34,8 +34,10 @@ pub struct PhotonStream {
     pub(super) config: StreamConfig,
     pub(super) key: [u32; 2],
     starts: Every,
-    pub(super) cycle_fs: i64,
-    pub(super) slots: Slots,
+    /// The whole femtoseconds of a laser cycle.
+    pub cycle_fs: i64,
+    /// Slots of a laser cycle.
+    pub slots: Slots,
     pub(super) gaussian: NormalSampler,
     pub(super) shape: Option<Arc<PulseSampler>>,
     /// Of other lasers, which all macropixels see.
@@ -91,19 +93,9 @@ impl PhotonStream {
         self.starts.at(cycle)
     }
 
-    /// The whole femtoseconds of a laser cycle.
-    pub fn cycle_fs(&self) -> i64 {
-        self.cycle_fs
-    }
-
-    /// Slots of a laser cycle.
-    pub fn slots(&self) -> Slots {
-        self.slots
-    }
-
     /// When the photons of a cycle begin and end, fs after its start.
     pub fn ends_fs(&self) -> Range<i64> {
-        -self.slots.lead_fs()..self.cycle_fs - self.slots.lead_fs()
+        -self.slots.lead_fs..self.cycle_fs - self.slots.lead_fs
     }
 
     /// What these slots are. Of the cycle's own echo, all that comes before the cycle begins with the first slot, and all
@@ -113,7 +105,7 @@ impl PhotonStream {
             0 => -FAR_FS,
             first => self.slots.start_fs(first),
         };
-        let until_fs = match slots.end == self.slots.count() {
+        let until_fs = match slots.end == self.slots.count {
             true => FAR_FS,
             false => self.slots.start_fs(slots.end),
         };

@@ -71,7 +71,7 @@ impl<'a> PixelStream<'a> {
 
     /// The intensity of the echo on a SPAD until `time_fs` after the start of its cycle, photons.
     fn passed_until(&self, time_fs: i64) -> f64 {
-        let (after_fs, sigma_fs) = ((time_fs - self.arrival_fs) as f64, self.gaussian.sigma());
+        let (after_fs, sigma_fs) = ((time_fs - self.arrival_fs) as f64, self.gaussian.sigma);
         if sigma_fs == 0.0 {
             return if after_fs >= 0.0 {
                 self.signal_per_spad
@@ -133,7 +133,8 @@ pub struct OrderedEchoes<'a> {
     echoes: SmallVec<[OrderedEcho; 1]>,
     /// The next photon of all of them.
     next: Option<Photon>,
-    drawn: u64,
+    /// Photons that made avalanches so far.
+    pub drawn: u64,
 }
 
 /// The echo of one laser cycle.
@@ -182,11 +183,6 @@ impl OrderedEchoes<'_> {
         let last_fs = self.pixel.echo_fs.1;
         self.echoes
             .retain(|echo| echo.start + Time::from_fs(last_fs) >= time);
-    }
-
-    /// Photons that made avalanches so far.
-    pub fn drawn(&self) -> u64 {
-        self.drawn
     }
 
     /// The next photon of all echoes and SPADs that is within the exposure.

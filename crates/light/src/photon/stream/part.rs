@@ -45,9 +45,9 @@ pub struct PixelStream<'a> {
     pub(in crate::photon) pixel: u32,
     pub(super) kind: Kind,
     /// All parts of a macropixel's light are, or none is.
-    pub(super) is_bright: bool,
+    pub is_bright: bool,
     /// Whether the light has one layer, all photons of which are kept.
-    pub(super) is_alone: bool,
+    pub is_alone: bool,
     /// Which photons are kept, if not all.
     pub(super) limits: Option<Limits>,
     pub(super) gaussian: NormalSampler,
@@ -164,12 +164,12 @@ impl PhotonStream {
                 arrival_fs + first_fs.floor() as i64,
                 arrival_fs + last_fs.ceil() as i64,
             ),
-            background: Numbers::new(background_hz * self.slots.length_s()),
+            background: Numbers::new(background_hz * self.slots.length_s),
             signal: Numbers::new(drawn.unwrap_or(photons)),
             gap_fs: 1e15 / background_hz,
             signal_per_spad: per_spad,
             has_long_groups: kind == Kind::Breeding
-                && background_hz * self.slots.length_s() * f64::from(FIRST) < RARE,
+                && background_hz * self.slots.length_s * f64::from(FIRST) < RARE,
             late_fs: 0,
         };
         if part.foreign.is_some() {
@@ -189,11 +189,6 @@ impl PixelStream<'_> {
             true => Group::long(cycle, grid),
             false => Group::of_cycle(cycle, grid),
         }
-    }
-
-    /// Whether the light has no other layer, and all that is drawn is kept: only then random words tell all of it.
-    pub fn is_alone(&self) -> bool {
-        self.is_alone
     }
 
     /// Whether these are the photons whose avalanches trigger others.

@@ -46,7 +46,7 @@ impl PixelStream<'_> {
                 Some(before) if time_fs < 0 => (time - self.stream.cycle_start(before)).as_fs(),
                 _ => time_fs,
             };
-            chance *= profile.rate_hz(since_fs) / profile.greatest_hz();
+            chance *= profile.rate_hz(since_fs) / profile.greatest_hz;
         }
         self.is_kept(chance, words)
     }

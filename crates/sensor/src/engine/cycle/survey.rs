@@ -342,7 +342,7 @@ fn initial_values(
             }
         };
         let nets = (0..netlist.net_count()).map(|net| {
-            let value = lanes.kernel().value(NetId::new(net));
+            let value = lanes.kernel.value(NetId::new(net));
             (fill(value.one), fill(value.zero))
         });
         nets.collect()

@@ -96,7 +96,7 @@ impl Timed {
             setting: Setting {
                 exposure: *exposure,
                 nominal: *sensor.timing(),
-                schedule: StimulusPlan::new(&sensor, exposure, 1, &[0], &[&[]]).schedule(),
+                schedule: StimulusPlan::new(&sensor, exposure, 1, &[0], &[&[]]).schedule,
                 sensor: sensor.clone(),
             },
             silicon,

@@ -129,7 +129,7 @@ impl Counting<'_> {
             let seen = Some(&mut echoes).filter(|echoes| !echoes.is_empty());
             let known = avalanches.run(photons, seen, until, wanted_from, events);
             if known.is_ok() {
-                break self.photons.len() as u64 + echoes.drawn();
+                break self.photons.len() as u64 + echoes.drawn;
             }
             back = back * 2;
         };
