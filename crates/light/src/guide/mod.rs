@@ -9,7 +9,6 @@
 //! claim, which the windows rely on (Eq. 25) and which may be wrong as the range may be.
 
 mod behavioural;
-pub mod claims;
 mod facet;
 mod from_file;
 mod fused;
@@ -27,6 +26,7 @@ mod rendered;
 mod right_camera;
 mod stereo;
 #[cfg(test)]
+#[path = "tests/test_scenes.rs"]
 mod test_scenes;
 mod third_camera;
 

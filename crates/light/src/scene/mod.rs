@@ -21,6 +21,7 @@ mod interferer;
 mod keys;
 mod medium;
 #[cfg(test)]
+#[path = "tests/mirrors.rs"]
 mod mirrors;
 mod motion;
 mod object;

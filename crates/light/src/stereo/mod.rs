@@ -32,6 +32,7 @@ mod image;
 mod matching;
 mod path;
 #[cfg(test)]
+#[path = "tests/reference.rs"]
 mod reference;
 mod settings;
 mod sweep;
