@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::SceneArgs;
 use super::asked::ExposureArgs;
 use super::foxglove::Foxglove;
-use super::voice::{note, progress, say, tell};
+use super::voice::{notes, progress, say, tell};
 use crate::engine::Work;
 use crate::files::{InputError, MANIFEST, ResultSet};
 use crate::report::{Cell, DepthMap, NpyStack, Table};
@@ -237,9 +237,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     let unwritable = |e| InputError::unwritable(&args.out, &e);
     std::fs::write(results.staging().join("drive.json"), format!("{json}\n"))
         .map_err(unwritable)?;
-    for sentence in results.commit("drive", &configuration)? {
-        note(sentence);
-    }
+    notes(results.commit("drive", &configuration)?);
     match args.json {
         true => Ok(say(format_args!("{json}\n"))?),
         false => Ok(tell(report.table(&args.out))?),

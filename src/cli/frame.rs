@@ -8,7 +8,7 @@ use clap::Args;
 
 use self::pair::PairReport;
 use super::asked::ExposureArgs;
-use super::voice::{note, progress, say_json, tell};
+use super::voice::{notes, progress, say_json, tell};
 use super::wave_format::WaveFormatOption;
 use super::{SceneArgs, pixel, quality};
 use crate::analysis::{TimingVerdict, VerdictReport};
@@ -125,9 +125,7 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     if let Some(pair) = &pair {
         pair.write(results.staging())?;
     }
-    for sentence in results.commit("frame", &report.configuration)? {
-        note(sentence);
-    }
+    notes(results.commit("frame", &report.configuration)?);
     if args.json {
         say_json(&report)?;
     } else {

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::voice::{say_json, tell};
+use super::voice::{notes, say_json, tell};
 use crate::files::{InputError, MANIFEST, OutputFile, Raster, ResultSet};
 use crate::report::{Cell, DepthMap, Table, write_npy_f32};
 use crate::stereo::{Census, DisparityMap, GreyImage, MatchError, Matcher, Paths, Workspace};
@@ -287,9 +287,7 @@ pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
         serde_json::to_writer_pretty(&mut *w, &report)?;
         writeln!(w)
     })?;
-    for note in set.commit("stereo", [&args.left, &args.right])? {
-        super::voice::note(note);
-    }
+    notes(set.commit("stereo", [&args.left, &args.right])?);
     match args.json {
         true => say_json(&report)?,
         false => tell(table(args, &report))?,

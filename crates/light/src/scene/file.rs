@@ -70,18 +70,10 @@ impl Scene {
                         faults.extend(scene.lidar.fault());
                     }
                 }
-                ("stereo", Value::Table(given)) => {
-                    scene.stereo = section(document, name, given, faults);
-                }
-                ("light", Value::Table(given)) => {
-                    scene.light = section(document, name, given, faults);
-                }
-                ("medium", Value::Table(given)) => {
-                    scene.medium = section(document, name, given, faults);
-                }
-                ("rig", Value::Table(given)) => {
-                    scene.rig = section(document, name, given, faults);
-                }
+                ("stereo", Value::Table(given)) => scene.stereo = section(document, name, given, faults),
+                ("light", Value::Table(given)) => scene.light = section(document, name, given, faults),
+                ("medium", Value::Table(given)) => scene.medium = section(document, name, given, faults),
+                ("rig", Value::Table(given)) => scene.rig = section(document, name, given, faults),
                 ("object", Value::Array(items)) => {
                     for (index, item) in items.iter().enumerate() {
                         let path = format!("object.{index}");
@@ -190,40 +182,29 @@ fn object(
     item: &Value,
     faults: &mut Vec<Fault>,
 ) -> Option<Object> {
-    let mut complain = |message: String| {
-        let path = path.to_owned();
-        faults.push(Fault { path, message });
+    let fault = |message: String| Fault {
+        path: path.to_owned(),
+        message,
     };
     let Value::Table(given) = item else {
-        complain("this must be a section [[object]]; write its keys below".into());
+        let message = "this must be a section [[object]]; write its keys below";
+        faults.push(fault(message.into()));
         return None;
     };
     let needed = ["name", "kind", "reflectivity"];
     let lacks = needed.iter().find(|key| !given.contains_key(**key));
-    if let Some(key) = lacks {
-        complain(format!("lacks `{key}`; add it"));
-    }
+    faults.extend(lacks.map(|key| fault(format!("lacks `{key}`; add it"))));
     let before = faults.len();
     let read = document.section::<ObjectEntry>(path, given, faults);
     if lacks.is_some() || faults.len() > before {
         return None;
     }
     let entry = read.try_into::<ObjectEntry>();
-    let told = |e: toml::de::Error| e.message().trim().to_owned();
-    let entry = entry.map_err(told).and_then(|e| e.object(&document.folder));
-    match entry {
-        Ok(object) => {
-            let fault = check_object(path, &object);
-            let is_fine = fault.is_none();
-            faults.extend(fault);
-            is_fine.then_some(object)
-        }
-        Err(message) => {
-            let path = path.to_owned();
-            faults.push(Fault { path, message });
-            None
-        }
-    }
+    let entry = entry.map_err(|e: toml::de::Error| e.message().trim().to_owned());
+    let object = entry.and_then(|e| e.object(&document.folder));
+    let object = object.map_err(fault);
+    let checked = object.and_then(|o| check_object(path, &o).map_or(Ok(o), Err));
+    checked.map_err(|fault| faults.push(fault)).ok()
 }
 
 /// The lidar of another at `path`, if it has no fault.

@@ -342,10 +342,6 @@ impl Engine for Gate {
     fn law(&self) -> WindowLaw {
         WindowLaw::new(&self.sensor, &self.exposure)
     }
-
-    fn bins(&self) -> usize {
-        self.sensor.bins
-    }
 }
 
 impl Replay for Gate {

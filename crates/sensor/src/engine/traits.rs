@@ -13,7 +13,9 @@ pub trait Engine: Sync {
     fn law(&self) -> WindowLaw;
 
     /// Bins of a macropixel.
-    fn bins(&self) -> usize;
+    fn bins(&self) -> usize {
+        self.law().sensor().bins
+    }
 
     /// How many macropixels are best given to this engine at once.
     fn batch(&self) -> usize {

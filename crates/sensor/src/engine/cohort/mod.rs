@@ -301,10 +301,6 @@ impl Engine for Cohort {
     fn law(&self) -> WindowLaw {
         self.law.clone()
     }
-
-    fn bins(&self) -> usize {
-        self.sensor.bins
-    }
 }
 
 impl Expose for Cohort {

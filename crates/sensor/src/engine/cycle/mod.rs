@@ -254,10 +254,6 @@ impl Engine for Cycle {
         self.law.clone()
     }
 
-    fn bins(&self) -> usize {
-        self.sensor.bins
-    }
-
     fn batch(&self) -> usize {
         8 * WORD_LANES
     }

@@ -309,10 +309,6 @@ impl Engine for Timed {
         self.common.clone()
     }
 
-    fn bins(&self) -> usize {
-        self.setting.sensor.bins
-    }
-
     fn batch(&self) -> usize {
         match self.runner {
             Runner::Cycle => self.cycle.batch(),

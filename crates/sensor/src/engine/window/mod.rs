@@ -97,10 +97,6 @@ impl Engine for Window {
         self.law.clone()
     }
 
-    fn bins(&self) -> usize {
-        self.sensor.bins
-    }
-
     /// Macropixels in bright light stand together, and take so much longer than others that in larger batches some processors wait.
     fn batch(&self) -> usize {
         16
