@@ -55,10 +55,8 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
     let subject = Subject::new(&config, &silicon);
     let load = LoadTiming::of(&config, &silicon, Limits::Kept);
     let read = ReadTiming::of(&config, &silicon, Limits::Kept);
-    let spread = match silicon.mismatch {
-        Some(_) => Some(distribution::analyse(&config, &silicon)?),
-        None => None,
-    };
+    let mismatched = silicon.mismatch.is_some();
+    let spread = mismatched.then(|| distribution::analyse(&config, &silicon));
     let position = spread.as_ref().map_or((0, 0), |spread| {
         let tightest = spread.tightest();
         (tightest.row, tightest.col)
