@@ -6,10 +6,10 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::object::Object;
-use super::ranges::{LENGTH, PLACES, POSITION, SHARE, SPEED};
 use super::rig::Waypoint;
 use super::shape::{DepthMap, MapFiles, Mesh, Shape};
 use super::texture::{Pattern, Picture, Texture};
+use super::words::{LENGTH, PLACES, POSITION, SHARE, SPEED};
 use crate::files::placed;
 use crate::settings::Range::{Above, Within};
 use crate::settings::{Settings, keys, words};

@@ -7,11 +7,13 @@ use toml::{Table, Value};
 use super::curve::read_file;
 use super::entry::ObjectEntry;
 use super::interferer::Interferer;
+use super::medium::Medium;
 use super::object::Object;
+use super::rig::Rig;
 use super::rules::{check_object, check_rig, check_stereo};
-use super::settings::{Lidar, Scene};
+use super::settings::{Lidar, Light, Scene, Stereo};
 use crate::files::InputError;
-use crate::settings::{Document, Fault, Key, Range, Settings, commented, schema};
+use crate::settings::{Document, Fault, Key, Range, Section, Settings, commented, schema};
 
 impl Scene {
     /// The built-in street, from 15 to 180 m, 50 klux.
@@ -255,3 +257,44 @@ fn place(document: &Document, path: &str) -> String {
 
 #[cfg(test)]
 mod tests;
+
+impl Scene {
+    /// The sections of a scene file.
+    pub const SECTIONS: &'static [Section] = &[
+        Section {
+            name: "lidar",
+            what: "Laser, lens and SPADs of the lidar",
+            keys: Lidar::KEYS,
+        },
+        Section {
+            name: "stereo",
+            what: "The camera pair that guides the lidar",
+            keys: Stereo::KEYS,
+        },
+        Section {
+            name: "light",
+            what: "Sunlight",
+            keys: Light::KEYS,
+        },
+        Section {
+            name: "medium",
+            what: "What is in the air",
+            keys: Medium::KEYS,
+        },
+        Section {
+            name: "rig",
+            what: "Motion of lidar and cameras together; the scene is described at time 0",
+            keys: Rig::KEYS,
+        },
+        Section {
+            name: "object",
+            what: "What there is to see: any number of objects, none if left out. Metres; x right, y down, z forward; the lidar is at the origin",
+            keys: ObjectEntry::KEYS,
+        },
+        Section {
+            name: "interferer",
+            what: "Lidars of other vehicles: any number, none if left out",
+            keys: Interferer::KEYS,
+        },
+    ];
+}

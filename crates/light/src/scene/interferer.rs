@@ -18,9 +18,9 @@ use glam::DVec3;
 
 use super::cast::Stage;
 use super::daylight::ABOVE_M;
-use super::ranges::{POSITION, SPEED};
 use super::settings::Scene;
 use super::vector::{Ray, turned};
+use super::words::{POSITION, SPEED};
 use crate::photon::{OtherLaser, PhotonBudget, PulseTrain};
 use crate::settings::Range::{Above, Limited, Within};
 use crate::settings::{Fault, keys};

@@ -16,8 +16,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::edge::share_before;
-use super::expected::{EchoLight, Response};
+use super::expected::{EchoLight, Response, share_before};
 use super::likelihood::{BESIDE, ECHO, Fit, Free, IN_REGION, Likelihood, WIDE_ECHO};
 use super::peak::Peak;
 use crate::chip::EventType;

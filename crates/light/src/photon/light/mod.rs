@@ -17,21 +17,19 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::units::Time;
-pub use echo::Echo;
+pub(super) use echo::MOST_PER_PULSE;
+pub use echo::{Echo, OtherLaser, PulseTrain};
 pub use error::LightError;
 use error::is_amount;
 pub(super) use layer::Layer;
 pub use profile::Profile;
 pub use spad_spread::SpadSpread;
-pub(super) use train::MOST_PER_PULSE;
-pub use train::{OtherLaser, PulseTrain};
 
 mod echo;
 mod error;
 mod layer;
 mod profile;
 mod spad_spread;
-mod train;
 
 /// The light of some successive laser cycles.
 #[derive(Debug, Clone, PartialEq)]

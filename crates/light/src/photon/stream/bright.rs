@@ -30,8 +30,7 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::kind::Kind;
-use super::part::PixelStream;
+use super::part::{Kind, PixelStream};
 use crate::numerics::branchless;
 use crate::photon::philox::{LANES, blocks_from};
 use crate::photon::spad::Photon;

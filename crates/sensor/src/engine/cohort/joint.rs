@@ -16,12 +16,12 @@
 
 use smallvec::SmallVec;
 
+use super::Counts;
 use super::blindness::{Ages, Blindness};
 use super::cycles::LikeCycles;
 use super::draw::binomial;
 use super::events::EventTable;
 use super::hits::Hits;
-use super::steps::Counts;
 use super::words::RandomWords;
 use crate::chip::MOST_SPADS;
 use crate::photon::DeadTimeLaw;

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use smallvec::{SmallVec, smallvec};
 
-use super::steps::FEW_STEPS;
+use super::FEW_STEPS;
 use crate::photon::{
     ECHO_REACH, Echo, EchoLaw, PixelLight, Profile, StreamConfig, pulse_share, pulse_shares,
 };

@@ -23,7 +23,7 @@ use rayon::prelude::*;
 pub use self::doubt::Doubt;
 use self::orders::{Delays, Orders, Part, Setting};
 use super::error::{follows, has_no_delay_lines};
-use super::own_clk::by_own_clk;
+use super::traits::by_own_clk;
 use super::{
     Cycle, Engine, EngineError, Expose, Exposed, Gate, Histograms, LaneSimulation, LitPixel,
     PulsedPixel, Replay, Window, full_stream,

@@ -14,25 +14,23 @@
 //! echoes of other cycles are seen ([`whole`]). Light with several layers, and bins that are not CLK periods, are sorted
 //! ([`sorted`]).
 
-use super::binning::{Binning, Scratch};
+use super::binning::{Binning, Scratch, Wanted};
 use super::codes::{Code, Codes, ROWS, SPADS};
 use super::echo_rows::EchoRows;
 use super::past::PastDraws;
 use super::pulses::Window;
 use super::sight::{ROUNDING_FS, Sight, Spans};
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Tables};
-use super::wanted::Wanted;
 use crate::engine::Work;
 use crate::photon::{
     Draw, Group, ListedEchoes, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SpadEvent,
 };
 use crate::units::Time;
-use by_window::ByWindow;
 use spacing::Spacing;
 use tile::Tile;
+use whole::ByWindow;
 
 mod bright;
-mod by_window;
 mod settling;
 mod side_by_side;
 mod sorted;

@@ -17,12 +17,11 @@ mod past;
 mod pulses;
 mod sight;
 mod tables;
-mod wanted;
 
 use std::borrow::Cow;
 
 use super::exposing::refuse_other_spads;
-use super::own_clk::by_own_clk;
+use super::traits::by_own_clk;
 use super::{
     Cancelling, Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay,
     Work,
