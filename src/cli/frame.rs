@@ -7,10 +7,9 @@ use std::path::PathBuf;
 use clap::Args;
 
 use self::pair::PairReport;
-use super::asked::ExposureArgs;
+use super::asked::{ExposureArgs, WaveFormatOption};
 use super::voice::{notes, progress, say_json, tell};
-use super::wave_format::WaveFormatOption;
-use super::{SceneArgs, pixel, quality};
+use super::{SceneArgs, asked, quality};
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::{Mode, SensorConfig, Silicon};
 use crate::engine::waveform::WaveCycles;
@@ -196,7 +195,7 @@ fn chosen_probes(
     }
     let mut probes = Vec::new();
     for text in texts.iter().filter(|text| *text != "none") {
-        let place = pixel::pixel("--probe", text, sensor)?;
+        let place = asked::pixel("--probe", text, sensor)?;
         if !probes.contains(&place) {
             probes.push(place);
         }

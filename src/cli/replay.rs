@@ -9,10 +9,10 @@ use std::sync::Arc;
 use clap::Args;
 use rayon::prelude::*;
 
+use super::asked::WaveFormatOption;
 use super::sdf::annotated_timing;
-use super::silicon::SiliconArgs;
+use super::settings::SiliconArgs;
 use super::voice::{note, progress, say_json};
-use super::wave_format::WaveFormatOption;
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::{SensorConfig, Silicon};
 use crate::engine::waveform::{self, View};

@@ -12,7 +12,7 @@ use clap::Args;
 use self::section::{Cell, Section};
 use self::tables::Subject;
 use super::SensorArgs;
-use super::silicon::SiliconArgs;
+use super::settings::SiliconArgs;
 use super::voice::say;
 use crate::analysis::{LoadTiming, ReadTiming, TimingVerdict};
 use crate::chip::{Limits, SensorConfig, Silicon, Tdc};
