@@ -203,10 +203,7 @@ impl<'a> Avalanches<'a> {
 
     /// Notes what an avalanche causes.
     fn breed(&mut self, parent: Photon, is_certain: bool) {
-        let parent = SpadEvent {
-            time: parent.time,
-            spad: parent.spad,
-        };
+        let parent = SpadEvent::new(parent.time, parent.spad);
         let children = self.model.children(self.key, self.pixel, parent);
         self.pending
             .extend(children.map(|child| Reverse((child, is_certain))));
@@ -251,10 +248,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn event(time_fs: i64, spad: u8) -> SpadEvent {
-        SpadEvent {
-            time: Time::from_fs(time_fs),
-            spad,
-        }
+        SpadEvent::new(Time::from_fs(time_fs), spad)
     }
 
     proptest! {
@@ -302,11 +296,7 @@ mod tests {
     #[test]
     fn a_photon_after_a_dead_time_of_darkness_is_known() {
         let model = SpadModel::with_dead_time(Time::from_fs(100));
-        let at = |time_fs| Photon {
-            time: Time::from_fs(time_fs),
-            spad: 3,
-            breeds: false,
-        };
+        let at = |time_fs| Photon::new(Time::from_fs(time_fs), 3, false);
         let run = |photons: &[Photon], wanted_from| {
             let from = Time::from_fs(1_000);
             let mut avalanches =

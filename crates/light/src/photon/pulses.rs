@@ -71,10 +71,12 @@ impl PhotonStream {
                 by_cycle.sort(&draw, light);
                 for cycle in 0..cycles {
                     let start = self.cycle_start(group.first_cycle() + cycle);
-                    photons.extend(by_cycle.of(cycle).iter().map(|&photon| Photon {
-                        time: start + Time::from_fs(photon >> SPAD_SHIFT),
-                        spad: (photon & ((1 << SPAD_SHIFT) - 1)) as u8,
-                        breeds: light.breeds(),
+                    photons.extend(by_cycle.of(cycle).iter().map(|&photon| {
+                        Photon::new(
+                            start + Time::from_fs(photon >> SPAD_SHIFT),
+                            (photon & ((1 << SPAD_SHIFT) - 1)) as u8,
+                            light.breeds(),
+                        )
                     }));
                 }
             }

@@ -50,19 +50,13 @@ impl Scene {
     pub fn read(document: &Document) -> Result<Self, InputError> {
         if document.is_empty() {
             let message = "has no settings; give at least one, or leave the scene out for the built-in street";
-            document.complain(vec![Fault {
-                path: String::new(),
-                message: message.into(),
-            }])?;
+            document.complain(vec![Fault::new("", message)])?;
         }
         let mut faults = Vec::new();
         let mut scene = Scene::default();
         for (name, value) in &document.table {
             let faults = &mut faults;
-            let wrong = |message: &str| Fault {
-                path: name.clone(),
-                message: format!("{name}: {message}"),
-            };
+            let wrong = |message: &str| Fault::new(name, format!("{name}: {message}"));
             match (name.as_str(), value) {
                 ("lidar", Value::Table(given)) => {
                     let given = with_curves(document, name, given, faults);
@@ -184,10 +178,7 @@ fn object(
     item: &Value,
     faults: &mut Vec<Fault>,
 ) -> Option<Object> {
-    let fault = |message: String| Fault {
-        path: path.to_owned(),
-        message,
-    };
+    let fault = |message: String| Fault::new(path, message);
     let Value::Table(given) = item else {
         let message = "this must be a section [[object]]; write its keys below";
         faults.push(fault(message.into()));
@@ -232,10 +223,7 @@ fn interferer(
         Value::Table(_) => "lacks `name` or `place_m`; add both",
         _ => "this must be a section [[interferer]]; write its keys below",
     };
-    faults.push(Fault {
-        path: path.to_owned(),
-        message: complaint.into(),
-    });
+    faults.push(Fault::new(path, complaint));
     None
 }
 
@@ -261,40 +249,28 @@ mod tests;
 impl Scene {
     /// The sections of a scene file.
     pub const SECTIONS: &'static [Section] = &[
-        Section {
-            name: "lidar",
-            what: "Laser, lens and SPADs of the lidar",
-            keys: Lidar::KEYS,
-        },
-        Section {
-            name: "stereo",
-            what: "The camera pair that guides the lidar",
-            keys: Stereo::KEYS,
-        },
-        Section {
-            name: "light",
-            what: "Sunlight",
-            keys: Light::KEYS,
-        },
-        Section {
-            name: "medium",
-            what: "What is in the air",
-            keys: Medium::KEYS,
-        },
-        Section {
-            name: "rig",
-            what: "Motion of lidar and cameras together; the scene is described at time 0",
-            keys: Rig::KEYS,
-        },
-        Section {
-            name: "object",
-            what: "What there is to see: any number of objects, none if left out. Metres; x right, y down, z forward; the lidar is at the origin",
-            keys: ObjectEntry::KEYS,
-        },
-        Section {
-            name: "interferer",
-            what: "Lidars of other vehicles: any number, none if left out",
-            keys: Interferer::KEYS,
-        },
+        Section::new("lidar", "Laser, lens and SPADs of the lidar", Lidar::KEYS),
+        Section::new(
+            "stereo",
+            "The camera pair that guides the lidar",
+            Stereo::KEYS,
+        ),
+        Section::new("light", "Sunlight", Light::KEYS),
+        Section::new("medium", "What is in the air", Medium::KEYS),
+        Section::new(
+            "rig",
+            "Motion of lidar and cameras together; the scene is described at time 0",
+            Rig::KEYS,
+        ),
+        Section::new(
+            "object",
+            "What there is to see: any number of objects, none if left out. Metres; x right, y down, z forward; the lidar is at the origin",
+            ObjectEntry::KEYS,
+        ),
+        Section::new(
+            "interferer",
+            "Lidars of other vehicles: any number, none if left out",
+            Interferer::KEYS,
+        ),
     ];
 }

@@ -109,12 +109,7 @@ impl Lidar {
 
     /// What a file may not ask for, beyond the range of each key.
     pub(super) fn fault(&self) -> Option<Fault> {
-        let fault = |key: &str, message: String| {
-            Some(Fault {
-                path: format!("lidar.{key}"),
-                message,
-            })
-        };
+        let fault = |key: &str, message: String| Some(Fault::new(format!("lidar.{key}"), message));
         let nm = self.warm_wavelength_nm();
         if self.laser_transmission() <= 0.0 {
             let message = format!(

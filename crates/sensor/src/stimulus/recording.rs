@@ -174,10 +174,7 @@ fn events_of<R: BufRead>(
             );
             return Err(InputError::at(source, line, message));
         }
-        let event = SpadEvent {
-            time: Time::from_fs(time_fs),
-            spad: spad as u8,
-        };
+        let event = SpadEvent::new(Time::from_fs(time_fs), spad as u8);
         recording.push(pixel, event, exposure);
     }
     recording.settle(config);

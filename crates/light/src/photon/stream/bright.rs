@@ -238,11 +238,7 @@ impl<'a> PixelStream<'a> {
                     self.keeps_background(cycle, spad, time_fs, words)
                 };
                 if time >= Time::ZERO && is_kept {
-                    photons.push(Photon {
-                        time,
-                        spad,
-                        breeds: self.kind == Kind::Breeding,
-                    });
+                    photons.push(Photon::new(time, spad, self.kind == Kind::Breeding));
                 }
             }
         }

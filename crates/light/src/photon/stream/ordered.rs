@@ -194,11 +194,7 @@ impl OrderedEchoes<'_> {
     fn earliest(&self) -> Option<Photon> {
         let times = self.echoes.iter().flat_map(|echo| (0u8..).zip(&echo.next));
         let (&time, spad) = times.map(|(spad, time)| (time, spad)).min()?;
-        let photon = Photon {
-            time,
-            spad,
-            breeds: false,
-        };
+        let photon = Photon::new(time, spad, false);
         (time < self.end).then_some(photon)
     }
 

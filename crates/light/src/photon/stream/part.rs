@@ -197,10 +197,7 @@ impl PixelStream<'_> {
 
     /// The avalanches that a photon of the triggering kind causes, if it makes one itself.
     pub fn children(&self, photon: Photon) -> impl Iterator<Item = SpadEvent> {
-        let parent = SpadEvent {
-            time: photon.time,
-            spad: photon.spad,
-        };
+        let parent = SpadEvent::new(photon.time, photon.spad);
         let spads = &self.stream.config.spads;
         spads.children(self.stream.key, self.pixel, parent)
     }

@@ -119,10 +119,12 @@ impl Drawn {
         cycles: u32,
     ) -> impl Iterator<Item = (u32, Photon)> + 'd {
         let first = group.first_cycle();
-        let photon = move |cycle: u32, spad: u8, time_fs: i64| Photon {
-            time: stream.cycle_start(cycle) + Time::from_fs(time_fs),
-            spad,
-            breeds: light.breeds(),
+        let photon = move |cycle: u32, spad: u8, time_fs: i64| {
+            Photon::new(
+                stream.cycle_start(cycle) + Time::from_fs(time_fs),
+                spad,
+                light.breeds(),
+            )
         };
         let own = self
             .own

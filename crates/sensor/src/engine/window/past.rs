@@ -73,11 +73,7 @@ impl<'a> Past<'a> {
         let mut push = |cycle: u32, (_, time_fs, spad): PastPhoton| {
             let time = start(cycle) + Time::from_fs(time_fs);
             if time >= Time::ZERO && spads >> spad & 1 != 0 {
-                photons.push(Photon {
-                    time,
-                    spad,
-                    breeds: light.breeds(),
-                });
+                photons.push(Photon::new(time, spad, light.breeds()));
             }
         };
         for photon in draws.of(light, part, self.cycle, What::Slot(self.slot)) {

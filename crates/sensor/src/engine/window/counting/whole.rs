@@ -100,11 +100,11 @@ impl Counting<'_> {
                     let cycle = other.first_cycle() + cycle;
                     let window = i64::from(cycle) - later;
                     if cycle < config.laser_cycles && of_windows.contains(&window) {
-                        let photon = Photon {
-                            time: self.stream.cycle_start(cycle) + Time::from_fs(time_fs),
+                        let photon = Photon::new(
+                            self.stream.cycle_start(cycle) + Time::from_fs(time_fs),
                             spad,
-                            breeds: light.breeds(),
-                        };
+                            light.breeds(),
+                        );
                         by_cycle.push(((window - of_windows.start) as u32, photon));
                     }
                 }
@@ -151,11 +151,7 @@ impl Counting<'_> {
             self.tables.remove(code.row());
             if self.is_drawn(pixel.light, photon) {
                 let time = start + self.time_of(pixel.light, photon, laser_cycle);
-                self.photons.push(Photon {
-                    time,
-                    spad: code.spad(),
-                    breeds: false,
-                });
+                self.photons.push(Photon::new(time, code.spad(), false));
             }
             next = self.tables.before(photon);
         }
@@ -291,11 +287,11 @@ impl ByWindow {
             for (place, time_fs) in draw.photons(light, cycles) {
                 let (cycle, spad) = group.split(place);
                 let cycle = group.first_cycle() + cycle;
-                let photon = Photon {
-                    time: stream.cycle_start(cycle) + Time::from_fs(time_fs),
+                let photon = Photon::new(
+                    stream.cycle_start(cycle) + Time::from_fs(time_fs),
                     spad,
-                    breeds: light.breeds(),
-                };
+                    light.breeds(),
+                );
                 self.photons.push((cycle + later, photon));
             }
         }
