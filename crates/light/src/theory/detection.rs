@@ -89,6 +89,10 @@ impl Detection {
 pub fn probability(light: &PerCycle, cycles: u64, model: Model) -> Detection {
     let n = cycles as f64;
     let (signal, background) = (n * light.signal, n * light.background);
+    let known = |probability: f64| Detection {
+        probability,
+        miss: 1.0 - probability,
+    };
     match model {
         Model::Poisson(ties) => poisson(signal, background, light.bins, ties),
         Model::Bernoulli(ties) => {
@@ -99,20 +103,8 @@ pub fn probability(light: &PerCycle, cycles: u64, model: Model) -> Detection {
             let signal_bin = counts(light.signal + light.background);
             compare(&signal_bin, &counts(light.background), light.bins, ties)
         }
-        Model::Gaussian => {
-            let p = gaussian::as_meant(signal, background, light.bins);
-            Detection {
-                probability: p,
-                miss: 1.0 - p,
-            }
-        }
-        Model::GaussianAsPrinted => {
-            let p = gaussian::as_printed(signal, background, light.bins);
-            Detection {
-                probability: p,
-                miss: 1.0 - p,
-            }
-        }
+        Model::Gaussian => known(gaussian::as_meant(signal, background, light.bins)),
+        Model::GaussianAsPrinted => known(gaussian::as_printed(signal, background, light.bins)),
     }
 }
 
