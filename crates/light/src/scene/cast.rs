@@ -103,7 +103,7 @@ pub struct Stage<'a> {
     pub(crate) scene: &'a Scene,
     placed: Vec<Placed<'a>>,
     /// Balls around the objects, for rays that do not come from one place.
-    balls: Vec<Option<Ball>>,
+    balls: Vec<Option<(DVec3, f64)>>,
     /// Towards the sun.
     pub(super) sun: Option<DVec3>,
 }
@@ -139,9 +139,7 @@ impl<'a> Stage<'a> {
         Stage {
             scene,
             placed: shapes().map(Shape::placed).collect(),
-            balls: shapes()
-                .map(|shape| shape.ball_around().map(Ball::from))
-                .collect(),
+            balls: shapes().map(Shape::ball_around).collect(),
             sun: scene.towards_sun(),
         }
     }
@@ -167,7 +165,7 @@ impl<'a> Stage<'a> {
     pub(super) fn is_blocked(&self, ray: &Ray) -> bool {
         let mut opaque = self.opaque(self.all());
         opaque.any(|n| {
-            self.balls[n].is_none_or(|ball| ball.may_be_met(ray))
+            self.balls[n].is_none_or(|ball| may_be_met(ball, ray))
                 && self.placed[n].meet(ray).is_some()
         })
     }
@@ -333,26 +331,11 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// A ball that rays from anywhere may meet.
-#[derive(Debug, Clone, Copy)]
-struct Ball {
-    centre_m: DVec3,
-    radius_m: f64,
-}
-
-impl From<(DVec3, f64)> for Ball {
-    fn from((centre_m, radius_m): (DVec3, f64)) -> Self {
-        Ball { centre_m, radius_m }
-    }
-}
-
-impl Ball {
-    /// Whether a ray comes into it, or passes it so closely that rounding could hide it.
-    fn may_be_met(&self, ray: &Ray) -> bool {
-        let to_centre = self.centre_m - ray.origin;
-        let (away_m2, along_m) = (to_centre.length_squared(), to_centre.dot(ray.direction));
-        let room_m2 = 1e-6 * self.radius_m * self.radius_m + 1e-9 * away_m2;
-        let reach_m2 = self.radius_m * self.radius_m + room_m2;
-        away_m2 <= reach_m2 || (along_m > 0.0 && away_m2 - along_m * along_m <= reach_m2)
-    }
+/// Whether a ray comes into a ball, or passes it so closely that rounding could hide it.
+fn may_be_met((centre_m, radius_m): (DVec3, f64), ray: &Ray) -> bool {
+    let to_centre = centre_m - ray.origin;
+    let (away_m2, along_m) = (to_centre.length_squared(), to_centre.dot(ray.direction));
+    let room_m2 = 1e-6 * radius_m * radius_m + 1e-9 * away_m2;
+    let reach_m2 = radius_m * radius_m + room_m2;
+    away_m2 <= reach_m2 || (along_m > 0.0 && away_m2 - along_m * along_m <= reach_m2)
 }

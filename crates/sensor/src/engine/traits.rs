@@ -1,7 +1,6 @@
 //! What an engine is: the traits that all implement, what they are given and what they give.
 
 use std::borrow::Cow;
-use std::iter::Sum;
 use std::ops::AddAssign;
 
 use serde::Serialize;
@@ -196,14 +195,5 @@ impl AddAssign for Work {
         self.cancelled += other.cancelled;
         self.clk_periods += other.clk_periods;
         self.clk_periods_visited += other.clk_periods_visited;
-    }
-}
-
-impl Sum for Work {
-    fn sum<I: Iterator<Item = Self>>(iter: I) -> Self {
-        iter.fold(Work::default(), |mut sum, work| {
-            sum += work;
-            sum
-        })
     }
 }
