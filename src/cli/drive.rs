@@ -364,22 +364,20 @@ impl Recording {
         };
         let metres = |m: Option<f64>| m.map_or(f32::NAN, |m| m as f32);
         let pixels = &frame.pixels;
-        let written = self
-            .depth
-            .extend(pixels.iter().map(|p| metres(p.measured_m)))
-            .and_then(|()| self.guide.extend(pixels.iter().map(|p| metres(p.guide_m))))
-            .and_then(|()| self.truth.extend(pixels.iter().map(|p| metres(p.true_m))))
-            .and_then(|()| {
-                let starts = pixels.iter().map(|p| p.start.map_or(-1, |s| s as i16));
-                self.starts.extend(starts)
-            })
-            .and_then(|()| {
-                self.histograms
-                    .extend(frame.histograms.counts().iter().copied())
-            })
-            .and_then(|()| Ok(serde_json::to_writer(&mut self.index, &line)?))
-            .and_then(|()| writeln!(self.index));
-        written.map_err(|e| InputError::unwritable(&self.folder, &e))
+        let starts = pixels.iter().map(|p| p.start.map_or(-1, |s| s as i16));
+        let mut write = || -> std::io::Result<()> {
+            self.depth
+                .extend(pixels.iter().map(|p| metres(p.measured_m)))?;
+            self.guide
+                .extend(pixels.iter().map(|p| metres(p.guide_m)))?;
+            self.truth.extend(pixels.iter().map(|p| metres(p.true_m)))?;
+            self.starts.extend(starts)?;
+            self.histograms
+                .extend(frame.histograms.counts().iter().copied())?;
+            serde_json::to_writer(&mut self.index, &line)?;
+            writeln!(self.index)
+        };
+        write().map_err(|e| InputError::unwritable(&self.folder, &e))
     }
 
     fn finish(mut self) -> Result<(), InputError> {

@@ -33,7 +33,7 @@ pub struct Hit {
 
 /// A surface that sends light back along a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Return {
+pub(crate) struct Return {
     /// The surface; its range is the whole way to it, its normal is turned against the light that meets it.
     pub hit: Hit,
     /// Where the ray meets it, m: over a mirror not on the ray's own line.
@@ -51,7 +51,7 @@ pub struct Return {
 
 /// Where some of a ray's light goes no further: a surface that is met, or the sky.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct End {
+pub(crate) struct End {
     /// The whole way to it, m; infinite for the sky.
     pub range_m: f64,
     /// Share of the laser's light, there and back, that fog sends back before it and no longer behind it, 0 to 1.
@@ -62,7 +62,7 @@ pub struct End {
 
 /// All that sends light back along a ray, nearest first.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Returns {
+pub(crate) struct Returns {
     /// Surfaces; none where there is only sky.
     pub surfaces: SmallVec<[Return; 2]>,
     /// Where light ends; each of its shares is 1 in all.

@@ -40,7 +40,7 @@ mod words;
 
 pub(crate) use bounds::Bounds;
 pub use camera::PinholeCamera;
-pub use cast::{End, Hit, Return, Returns, Stage};
+pub use cast::{Hit, Stage};
 pub use curve::{Curve, CurveError, Measured};
 pub use eye_safety::{Emission, EyeRule, EyeSafety};
 pub use interferer::Interferer;

@@ -125,10 +125,7 @@ pub(crate) fn compare(signal: &Counts, background: &Counts, bins: u32, ties: Tie
     let last = last_signal.min(background.support().1);
     if bins <= 1 || last < first {
         // Nobody to lose against, or out of everyone's reach.
-        return Detection {
-            probability: 1.0,
-            miss: 0.0,
-        };
+        return Detection::new(1.0, 0.0);
     }
     let sigma = signal.sigma().min(background.sigma());
     let stride = ((sigma / POINTS_PER_SIGMA) as u64).max(1);
