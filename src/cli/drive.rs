@@ -365,7 +365,7 @@ impl Recording {
         let metres = |m: Option<f64>| m.map_or(f32::NAN, |m| m as f32);
         let pixels = &frame.pixels;
         let starts = pixels.iter().map(|p| p.start.map_or(-1, |s| s as i16));
-        let mut write = || -> std::io::Result<()> {
+        let write = || -> std::io::Result<()> {
             self.depth
                 .extend(pixels.iter().map(|p| metres(p.measured_m)))?;
             self.guide
