@@ -91,7 +91,7 @@ fn main() {
     let together = || LaneSimulation::new(&config, &exposure, &starts, &photons);
     let mut once = together();
     once.run(&mut ());
-    let changes = once.kernel().lane_changes() as f64;
+    let changes = once.kernel.lane_changes() as f64;
     let together = seconds(together, |lanes| lanes.run(&mut ()));
     print(
         "64 macropixels in lanes, M net changes/s",

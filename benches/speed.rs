@@ -54,12 +54,12 @@ fn kernel(c: &mut Criterion) {
     let prepare = || LaneSimulation::new(&config, &exposure, &starts, &lanes);
     let mut once = prepare();
     once.run(&mut ());
-    group.throughput(Throughput::Elements(once.kernel().lane_changes()));
+    group.throughput(Throughput::Elements(once.kernel.lane_changes()));
     group.bench_function("64 macropixels in lanes, net changes", |b| {
         b.iter(|| {
             let mut simulation = prepare();
             simulation.run(&mut ());
-            black_box(simulation.kernel().events())
+            black_box(simulation.kernel.events())
         });
     });
     group.finish();

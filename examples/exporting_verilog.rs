@@ -28,7 +28,7 @@ fn main() -> Result<(), InputError> {
     let events = [pulses(20), pulses(45), pulses(70), pulses(95)];
     let events = events.each_ref().map(|events| &events[..]);
     let plan = StimulusPlan::new(&config, &exposure, config.cols, &[10, 20, 30, 40], &events);
-    export_verilog(&PathBuf::from(&folder), &config, &plan)?;
+    export_verilog(&PathBuf::from(&folder), &config, Some(&plan), None)?;
     println!("{folder}: design.v, cells.v, cells_specify.v, tb.v, stimulus.txt");
     Ok(())
 }

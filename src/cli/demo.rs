@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::voice::{note, progress, tell};
+use super::voice::{notes, progress, tell};
 use crate::demo::disturbed::{Disturbance, Outcome};
 use crate::demo::show::{Show, Shown, write_ply};
 use crate::demo::{Demonstrator, limit, shows, sweep};
@@ -178,9 +178,7 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
         calibration_step_ps: args.calibration_step_ps,
     };
     let names = file_names(results.staging())?;
-    for sentence in results.commit("demo", &configuration)? {
-        note(sentence);
-    }
+    notes(results.commit("demo", &configuration)?);
     text += &format!(
         "run time {:.1} s\nin {}: {names} {MANIFEST}\n",
         began.elapsed().as_secs_f64(),

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::SceneArgs;
 use super::asked::ExposureArgs;
 use super::foxglove::Foxglove;
-use super::voice::{note, progress, say, tell};
+use super::voice::{notes, progress, say, tell};
 use crate::engine::Work;
 use crate::files::{InputError, MANIFEST, ResultSet};
 use crate::report::{Cell, DepthMap, NpyStack, Table};
@@ -167,7 +167,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     };
     let configuration = Configuration {
         exposed: request.exposed(scene_args.scene_name(), &settings.frame),
-        guides: asked.guiding.guides(),
+        guides: &asked.guiding.guides,
         windows: settings.policy,
         calibration: asked.calibration.as_deref(),
         start_s: args.start_s,
@@ -237,9 +237,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     let unwritable = |e| InputError::unwritable(&args.out, &e);
     std::fs::write(results.staging().join("drive.json"), format!("{json}\n"))
         .map_err(unwritable)?;
-    for sentence in results.commit("drive", &configuration)? {
-        note(sentence);
-    }
+    notes(results.commit("drive", &configuration)?);
     match args.json {
         true => Ok(say(format_args!("{json}\n"))?),
         false => Ok(tell(report.table(&args.out))?),
@@ -366,22 +364,20 @@ impl Recording {
         };
         let metres = |m: Option<f64>| m.map_or(f32::NAN, |m| m as f32);
         let pixels = &frame.pixels;
-        let written = self
-            .depth
-            .extend(pixels.iter().map(|p| metres(p.measured_m)))
-            .and_then(|()| self.guide.extend(pixels.iter().map(|p| metres(p.guide_m))))
-            .and_then(|()| self.truth.extend(pixels.iter().map(|p| metres(p.true_m))))
-            .and_then(|()| {
-                let starts = pixels.iter().map(|p| p.start.map_or(-1, |s| s as i16));
-                self.starts.extend(starts)
-            })
-            .and_then(|()| {
-                self.histograms
-                    .extend(frame.histograms.counts().iter().copied())
-            })
-            .and_then(|()| Ok(serde_json::to_writer(&mut self.index, &line)?))
-            .and_then(|()| writeln!(self.index));
-        written.map_err(|e| InputError::unwritable(&self.folder, &e))
+        let starts = pixels.iter().map(|p| p.start.map_or(-1, |s| s as i16));
+        let write = || -> std::io::Result<()> {
+            self.depth
+                .extend(pixels.iter().map(|p| metres(p.measured_m)))?;
+            self.guide
+                .extend(pixels.iter().map(|p| metres(p.guide_m)))?;
+            self.truth.extend(pixels.iter().map(|p| metres(p.true_m)))?;
+            self.starts.extend(starts)?;
+            self.histograms
+                .extend(frame.histograms.counts().iter().copied())?;
+            serde_json::to_writer(&mut self.index, &line)?;
+            writeln!(self.index)
+        };
+        write().map_err(|e| InputError::unwritable(&self.folder, &e))
     }
 
     fn finish(mut self) -> Result<(), InputError> {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use super::voice::{note, tell};
+use super::voice::{notes, tell};
 use crate::files::{InputError, ResultSet, read_counts};
 use crate::report::{CloudPoint, Npz, write_depth_png, write_npy_f32, write_pcd, write_ply};
 use crate::system::{NoDepth, PixelDepth, TakenFrame, above_background};
@@ -99,9 +99,7 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
         names.push(name);
     }
     let frame = args.frame.display().to_string();
-    for sentence in results.commit("export frame", serde_json::json!({ "frame": frame }))? {
-        note(sentence);
-    }
+    notes(results.commit("export frame", serde_json::json!({ "frame": frame }))?);
     tell(format_args!(
         "{} in {}: {} of {} macropixels have a depth\n",
         names.join(", "),

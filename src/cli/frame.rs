@@ -7,10 +7,9 @@ use std::path::PathBuf;
 use clap::Args;
 
 use self::pair::PairReport;
-use super::asked::ExposureArgs;
-use super::voice::{note, progress, say_json, tell};
-use super::wave_format::WaveFormatOption;
-use super::{SceneArgs, pixel, quality};
+use super::asked::{ExposureArgs, WaveFormatOption};
+use super::voice::{notes, progress, say_json, tell};
+use super::{SceneArgs, asked, quality};
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::{Mode, SensorConfig, Silicon};
 use crate::engine::waveform::WaveCycles;
@@ -125,9 +124,7 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     if let Some(pair) = &pair {
         pair.write(results.staging())?;
     }
-    for sentence in results.commit("frame", &report.configuration)? {
-        note(sentence);
-    }
+    notes(results.commit("frame", &report.configuration)?);
     if args.json {
         say_json(&report)?;
     } else {
@@ -198,7 +195,7 @@ fn chosen_probes(
     }
     let mut probes = Vec::new();
     for text in texts.iter().filter(|text| *text != "none") {
-        let place = pixel::pixel("--probe", text, sensor)?;
+        let place = asked::pixel("--probe", text, sensor)?;
         if !probes.contains(&place) {
             probes.push(place);
         }
@@ -242,7 +239,7 @@ fn table(
             of(summary.guided, summary.pixels),
         )
         .row("surface in window", of(summary.in_window, summary.guided));
-    if !args.exposure.guiding.guides().is_empty() {
+    if !args.exposure.guiding.guides.is_empty() {
         table.push("guide", settings.guide.name());
     }
     quality::rows(&mut table, &settings.depth, &summary);

@@ -11,11 +11,9 @@ mod export_frame;
 mod foxglove;
 mod frame;
 mod groups;
-mod guiding;
 mod mapped;
 mod page;
 mod pareto;
-mod pixel;
 mod power;
 mod propose;
 mod quality;
@@ -26,7 +24,6 @@ mod reproduce;
 mod sdf;
 mod settings;
 mod shell;
-mod silicon;
 mod speed;
 mod stereo;
 mod sweep;
@@ -34,20 +31,20 @@ mod tb;
 mod timing;
 mod voice;
 mod wave;
-mod wave_format;
-mod wording;
-
-#[doc(hidden)]
-pub use readers::{READERS, Reader};
-pub use tb::testbench;
 
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
+#[doc(hidden)]
+pub use readers::{READERS, Reader};
+pub use tb::testbench;
+
 use self::settings::{SceneArgs, SensorArgs};
-use crate::files::clean_up_when_interrupted;
-use crate::request::sign_files;
+use crate::engine::EngineError;
+use crate::files::{InputError, clean_up_when_interrupted};
+use crate::request::{self, Spelling, sign_files};
+use crate::system::FrameError;
 
 /// Simulate a guided direct time-of-flight lidar chip, from the scene down to gates and flip-flops.
 #[derive(Parser)]
@@ -169,10 +166,10 @@ fn finish(result: anyhow::Result<ExitCode>) -> ExitCode {
         Ok(status) => status,
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            for line in wording::sentence(&error).lines() {
+            for line in sentence(&error).lines() {
                 eprintln!("gdtof: {line}");
             }
-            ExitCode::from(if wording::is_bad_input(&error) { 2 } else { 1 })
+            ExitCode::from(if is_bad_input(&error) { 2 } else { 1 })
         }
     }
 }
@@ -181,4 +178,22 @@ fn finish(result: anyhow::Result<ExitCode>) -> ExitCode {
 fn is_closed_pipe(error: &anyhow::Error) -> bool {
     let io_error = error.downcast_ref::<std::io::Error>();
     io_error.is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+}
+
+/// The sentence for standard error.
+fn sentence(error: &anyhow::Error) -> String {
+    if let Some(error) = error.downcast_ref::<EngineError>() {
+        return request::of_engine(error, Spelling::Options);
+    }
+    match error.downcast_ref::<FrameError>() {
+        Some(error) => request::sentence(error, Spelling::Options),
+        None => format!("{error:#}"),
+    }
+}
+
+/// Whether the user can mend it.
+fn is_bad_input(error: &anyhow::Error) -> bool {
+    error.is::<InputError>()
+        || matches!(error.downcast_ref::<EngineError>(), Some(e) if e.is_refusal())
+        || matches!(error.downcast_ref::<FrameError>(), Some(e) if request::is_bad_input(e))
 }

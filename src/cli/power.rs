@@ -207,9 +207,11 @@ fn pulses(config: &SensorConfig, exposure: &Exposure, counts_hz: f64) -> Vec<Spa
     let end_fs = exposure.end().as_fs() as u64;
     let pulses = 0..(counts_hz * exposure.end().as_s()).round() as u64;
     let mut pulses: Vec<SpadEvent> = pulses
-        .map(|index| SpadEvent {
-            time: Time::from_fs((splitmix64(2 * index) % end_fs) as i64),
-            spad: (splitmix64(2 * index + 1) % config.spads() as u64) as u8,
+        .map(|index| {
+            SpadEvent::new(
+                Time::from_fs((splitmix64(2 * index) % end_fs) as i64),
+                (splitmix64(2 * index + 1) % config.spads() as u64) as u8,
+            )
         })
         .collect();
     pulses.sort_unstable();

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 
 use super::SceneArgs;
-use super::voice::{note, progress, tell};
+use super::voice::{notes, progress, tell};
 use crate::chip::{CellLibrary, Sensor, SensorConfig};
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::numerics::intervals::Estimate;
@@ -114,9 +114,7 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
         "lidar": target.lidar,
         "seed": args.seed,
     });
-    for sentence in results.commit("propose", asked)? {
-        note(sentence);
-    }
+    notes(results.commit("propose", asked)?);
     tell(format_args!(
         "A target of reflectivity {} at {} m under {} klux, found with probability {} in {} frames a second, to {} m:\n\
          {} designs by theory in {took_s:.1} s, {} of them on the front, whose corners are\n\n{}\n",

@@ -9,10 +9,10 @@ use std::sync::Arc;
 use clap::Args;
 use rayon::prelude::*;
 
+use super::asked::WaveFormatOption;
 use super::sdf::annotated_timing;
-use super::silicon::SiliconArgs;
+use super::settings::SiliconArgs;
 use super::voice::{note, progress, say_json};
-use super::wave_format::WaveFormatOption;
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::{SensorConfig, Silicon};
 use crate::engine::waveform::{self, View};
@@ -102,24 +102,22 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         None => Format::Csv,
         Some(path) => Format::of(path)?,
     };
-    if let (Some(vcd), true) = (&args.vcd, args.engine != EngineKind::Gate) {
-        let message = "only the gate engine has waveforms; add --engine gate or leave --vcd out";
-        return Err(InputError::new(format!("--vcd {}", vcd.display()), message).into());
-    }
-    if let (Some(sdf), true) = (&args.sdf, args.engine != EngineKind::Gate) {
-        let message =
-            "only the gate engine has delays of single cells; add --engine gate or leave --sdf out";
-        return Err(InputError::new(format!("--sdf {}", sdf.display()), message).into());
-    }
-    if let (Some(saif), true) = (&args.saif, args.engine != EngineKind::Gate) {
-        let message =
-            "only the gate engine has nets that toggle; add --engine gate or leave --saif out";
-        return Err(InputError::new(format!("--saif {}", saif.display()), message).into());
-    }
-    if args.checks.is_some() && args.engine != EngineKind::Gate {
-        let message =
-            "only the gate engine has timing checks; add --engine gate or leave --checks out";
-        return Err(InputError::new("--checks", message).into());
+    let file = |path: &Option<PathBuf>| Some(format!(" {}", path.as_ref()?.display()));
+    for (option, given, what) in [
+        ("--vcd", file(&args.vcd), "waveforms"),
+        ("--sdf", file(&args.sdf), "delays of single cells"),
+        ("--saif", file(&args.saif), "nets that toggle"),
+        (
+            "--checks",
+            args.checks.map(|_| String::new()),
+            "timing checks",
+        ),
+    ] {
+        if let (Some(file), true) = (given, args.engine != EngineKind::Gate) {
+            let message =
+                format!("only the gate engine has {what}; add --engine gate or leave {option} out");
+            return Err(InputError::new(option.to_owned() + &file, message).into());
+        }
     }
     if let (Some(json), None) = (&args.checks_json, args.checks) {
         let message = "there are no timing checks to write; add --checks report";
@@ -240,7 +238,7 @@ fn replay_array(
             )?;
             let report = Report {
                 checks: checks.report(simulation.netlist()),
-                events: events.report(),
+                events: &events.report,
             };
             eprint!("{}{}", report.checks, report.events);
             // Before the histograms, which unknown states may have spoilt: this says why.

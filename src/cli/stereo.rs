@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 
-use super::voice::{say_json, tell};
+use super::voice::{notes, say_json, tell};
 use crate::files::{InputError, MANIFEST, OutputFile, Raster, ResultSet};
 use crate::report::{Cell, DepthMap, Table, write_npy_f32};
 use crate::stereo::{Census, DisparityMap, GreyImage, MatchError, Matcher, Paths, Workspace};
@@ -49,8 +50,8 @@ struct MatchingArgs {
     )]
     min_disparity: i32,
     /// Number of paths along which costs are summed.
-    #[arg(long, value_enum, default_value = "5")]
-    paths: PathsArg,
+    #[arg(long, value_parser = paths_parser(), default_value = "5")]
+    paths: Paths,
     /// Size of the census neighbourhood, columns x rows.
     #[arg(long, value_name = "COLSxROWS", default_value = "7x7")]
     census: String,
@@ -74,16 +75,13 @@ struct MatchingArgs {
     no_median: bool,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum PathsArg {
-    #[value(name = "3")]
-    Three,
-    #[value(name = "4")]
-    Four,
-    #[value(name = "5")]
-    Five,
-    #[value(name = "8")]
-    Eight,
+/// One of the numbers of paths.
+fn paths_parser() -> impl TypedValueParser<Value = Paths> {
+    PossibleValuesParser::new(["3", "4", "5", "8"]).map(|number| {
+        let mut all = Paths::ALL.into_iter();
+        let paths = all.find(|paths| paths.number().to_string() == number);
+        paths.expect("the same numbers")
+    })
 }
 
 impl MatchingArgs {
@@ -107,12 +105,7 @@ impl MatchingArgs {
         let matcher = Matcher {
             min_disparity: self.min_disparity,
             disparities: self.disparities,
-            paths: match self.paths {
-                PathsArg::Three => Paths::Three,
-                PathsArg::Four => Paths::Four,
-                PathsArg::Five => Paths::Five,
-                PathsArg::Eight => Paths::Eight,
-            },
+            paths: self.paths,
             census: Census { cols, rows },
             p1: self.p1,
             p2: self.p2,
@@ -248,10 +241,8 @@ struct Report {
 pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
     let matcher = args.matching.matcher()?;
     let (left, right) = (read_image(&args.left)?, read_image(&args.right)?);
-    let truth = match &args.truth {
-        Some(path) => Some(read_truth(path, &left)?),
-        None => None,
-    };
+    let truth = args.truth.as_ref().map(|path| read_truth(path, &left));
+    let truth = truth.transpose()?;
     let mut workspace = Workspace::default();
     let mut times_s = Vec::new();
     let mut matched = || {
@@ -287,9 +278,7 @@ pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
         serde_json::to_writer_pretty(&mut *w, &report)?;
         writeln!(w)
     })?;
-    for note in set.commit("stereo", [&args.left, &args.right])? {
-        super::voice::note(note);
-    }
+    notes(set.commit("stereo", [&args.left, &args.right])?);
     match args.json {
         true => say_json(&report)?,
         false => tell(table(args, &report))?,

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
-use super::voice::{note, progress, tell};
+use super::voice::{note, notes, progress, tell};
 use crate::files::{InputError, ResultSet};
 use crate::report::Table;
 use crate::sweep::{
@@ -198,9 +198,7 @@ fn write(
         points: study.len() - missing,
         outcome,
     };
-    for sentence in set.commit("sweep", configuration)? {
-        note(sentence);
-    }
+    notes(set.commit("sweep", configuration)?);
     Ok(missing)
 }
 

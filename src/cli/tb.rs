@@ -8,8 +8,8 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::asked::WaveFormatOption;
 use super::voice::{say, say_json};
-use super::wave_format::WaveFormatOption;
 use crate::chip::SensorConfig;
 use crate::files::{InputError, clean_up_when_interrupted, create_folder};
 use crate::report::{Checks, Grid};

@@ -51,6 +51,11 @@ pub(super) fn note(text: impl Display) {
     }
 }
 
+/// Notes on standard error, a line each.
+pub(super) fn notes(sentences: Vec<String>) {
+    sentences.iter().for_each(note);
+}
+
 /// A bar of `length` steps, in a template of `indicatif`.
 pub(super) fn progress(length: u64, template: &str) -> ProgressBar {
     let style = ProgressStyle::with_template(template).expect("a template that indicatif knows");

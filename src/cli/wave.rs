@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::pixel;
+use super::asked;
 use super::voice::{note, say, say_json};
 use crate::engine::late_cycle;
 use crate::engine::waveform::{self, View};
@@ -56,7 +56,7 @@ struct Report {
 pub(super) fn run(args: &WaveArgs) -> anyhow::Result<()> {
     let frame = TakenFrame::read(&args.frame)?;
     let (sensor, exposure) = (&frame.settings.sensor, &frame.settings.exposure);
-    let at = pixel::pixel("--pixel", &args.pixel, sensor)?;
+    let at = asked::pixel("--pixel", &args.pixel, sensor)?;
     if args.cycle >= exposure.laser_cycles {
         let message = format!(
             "the exposure has {} laser cycles; give 0 to {}",

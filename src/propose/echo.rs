@@ -51,7 +51,7 @@ impl Echo {
             ..config.clone()
         };
         let response = Response::new(&wide, 1.0 / config.clk_hz, pulse_sigma);
-        let sigma_bins = response.pulse_sigma_bins();
+        let sigma_bins = response.pulse_sigma_bins;
         let at = |phase: usize| {
             let offset = (phase as f64 + 0.5) / PHASES as f64 - 0.5;
             response.information(&EchoLight {

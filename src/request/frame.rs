@@ -1,14 +1,14 @@
 //! The request for a frame, with a default for everything.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{Spelling, guided_exposure, read_calibration};
-use crate::chip::{Sensor, SensorConfig};
+use super::{Spelling, guided_exposure};
+use crate::chip::{Sensor, SensorConfig, Tdc};
 use crate::engine::CohortOptions;
-use crate::files::InputError;
+use crate::files::{InputError, read_text};
 use crate::guide::{BehaviouralStereo, Guide, GuideInput, options};
-use crate::ranging::DepthOptions;
+use crate::ranging::{BinProfile, DepthOptions};
 use crate::scene::Scene;
 use crate::settings::Range::{Above, Within};
 use crate::settings::keys;
@@ -212,6 +212,43 @@ pub fn check_drive_times(
         return wrong("start_s", message);
     }
     Ok(())
+}
+
+/// Reads a profile (JSON, as `gdtof calibrate` writes it), which must be of this sensor.
+///
+/// # Errors
+/// A file that is none, and another sensor's.
+pub fn read_calibration(path: &Path, sensor: &SensorConfig) -> Result<BinProfile, InputError> {
+    let text = read_text(path)?;
+    let profile: BinProfile = serde_json::from_str(&text).map_err(|error| {
+        let message = format!("this is not a bin profile ({error}); make one with gdtof calibrate");
+        InputError::at(path.display(), error.line(), message)
+    })?;
+    let is_whole = profile.macropixels.len() == profile.sensor.pixels()
+        && profile.macropixels.iter().flatten().all(|line| {
+            let lengths = [line.middle_s.len(), line.length_s.len()];
+            lengths == [profile.sensor.bins; 2]
+                && line
+                    .length_s
+                    .iter()
+                    .chain(&line.middle_s)
+                    .all(|s| s.is_finite())
+        });
+    let refused = match profile.check(sensor) {
+        Ok(()) if sensor.tdc == Tdc::Clocked => {
+            Some("it is of delay lines, and this sensor's TDC is clocked".to_owned())
+        }
+        Ok(()) if is_whole => None,
+        Ok(()) => Some("it does not have every bin of every macropixel".to_owned()),
+        Err(other) => Some(other.to_string()),
+    };
+    match refused {
+        None => Ok(profile),
+        Some(why) => {
+            let message = format!("{why}; make one for this sensor with gdtof calibrate");
+            Err(InputError::new(path.display(), message))
+        }
+    }
 }
 
 #[cfg(test)]

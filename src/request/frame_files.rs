@@ -9,19 +9,18 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::FrameRequest;
-use super::picture::{Drawn, depth_map};
 use crate::analysis::VerdictReport;
-use crate::chip::{SensorConfig, WindowLaw};
+use crate::chip::{Mode, SensorConfig, WindowLaw};
 use crate::engine::{Work, variance_left_out};
 use crate::files::{InputError, OutputFile, parse_json};
-use crate::report::write_npy_u16;
+use crate::report::{Cell, DepthMap, write_npy_u16};
 use crate::scene::{EyeSafety, Scene};
 use crate::system::{
-    DistanceLaw, EngineKind, Frame, FrameSettings, Kept, PhaseTimes, PixelDepth, Summary,
+    DistanceLaw, EngineKind, Frame, FrameSettings, Kept, NoDepth, PhaseTimes, PixelDepth, Summary,
 };
 
 /// What frame.json and drive.json say of an exposure alike, first of all.
@@ -221,4 +220,63 @@ pub fn write_frame(out: &Path, report: &str, histograms: &[u16]) -> Result<(), I
     write_npy_u16(&out.join("histograms.npy"), &shape, histograms)?;
     depth_map(out, &drawn)?;
     OutputFile::write_with(&out.join("frame.json"), |file| writeln!(file, "{report}"))
+}
+
+/// What frame.json says that is also in the other files.
+#[derive(Deserialize)]
+pub(super) struct Drawn {
+    sensor: Chip,
+    laser_cycles: u32,
+    pub(super) histograms_shape: [usize; 3],
+    macropixels: Vec<PixelDepth>,
+}
+
+#[derive(Deserialize)]
+struct Chip {
+    mode: Mode,
+}
+
+/// Writes `depth.png` into `out`.
+///
+/// # Errors
+/// When it cannot be written.
+pub(super) fn depth_map(out: &Path, drawn: &Drawn) -> Result<(), InputError> {
+    let mode = match drawn.sensor.mode {
+        Mode::Guided => "guided",
+        Mode::Conventional => "conventional",
+    };
+    let [rows, cols, _] = drawn.histograms_shape;
+    let cells: Vec<Cell> = (drawn.macropixels.iter())
+        .map(|pixel| match (pixel.measured_m, pixel.no_depth) {
+            (_, Some(reason)) => Cell::Category(reason as usize),
+            (depth_m, None) => Cell::Depth(depth_m.unwrap_or_default() as f32),
+        })
+        .collect();
+    let map = DepthMap {
+        title: &format!("{mode} dToF depth, {} laser cycles", drawn.laser_cycles),
+        cols,
+        cells: &cells,
+        range_m: depth_range(&cells),
+        unit: "m",
+        categories: &NoDepth::ALL.map(NoDepth::name),
+        scale: (512 / rows.max(cols)).max(1),
+    };
+    map.write_png(&out.join("depth.png"))
+}
+
+/// Shortest and longest depth, a little apart even if all are the same.
+fn depth_range(cells: &[Cell]) -> (f32, f32) {
+    let known = || {
+        cells.iter().filter_map(|cell| match *cell {
+            Cell::Depth(depth_m) => Some(depth_m),
+            Cell::Category(_) => None,
+        })
+    };
+    let shortest = known().fold(f32::INFINITY, f32::min);
+    let longest = known().fold(f32::NEG_INFINITY, f32::max);
+    if shortest.is_finite() && longest.is_finite() {
+        (shortest.floor(), longest.ceil().max(shortest.floor() + 1.0))
+    } else {
+        (0.0, 1.0)
+    }
 }

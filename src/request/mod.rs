@@ -9,20 +9,25 @@
 //! The command line, sweeps and Python all take this road, so that the same request has the same numbers whichever way it
 //! comes. What complaints call a setting is the [`Spelling`] of the way it came.
 
-mod calibration;
 mod frame;
 mod frame_files;
-mod picture;
-mod signature;
 mod sources;
 mod spelling;
 mod wording;
 
-pub use self::calibration::read_calibration;
-pub use self::frame::{FrameRequest, check_drive_times, check_false_alarm_rate};
+pub use self::frame::{FrameRequest, check_drive_times, check_false_alarm_rate, read_calibration};
 pub use self::frame_files::{Exposed, FrameConfiguration, FrameReport, write_frame};
 pub(crate) use self::frame_files::{eye_safety_of, file_hash, variance_left_out_of};
-pub use self::signature::sign_files;
 pub use self::sources::Sources;
 pub use self::spelling::Spelling;
 pub use self::wording::{exposure, guided_exposure, is_bad_input, of_engine, of_no_aim, sentence};
+
+/// From now on waveforms, their layouts, activity and delay files name this program as their writer.
+pub fn sign_files() {
+    let origin = guided_dtof_sensor::Origin {
+        vendor: "guided-dtof",
+        program: "gdtof",
+        version: env!("CARGO_PKG_VERSION"),
+    };
+    origin.sign_files();
+}

@@ -105,7 +105,7 @@ impl Sources {
                 return Err(InputError::new(option, message));
             };
             // A path in a sensor file is relative to that.
-            let file = match sensor.folder() == Path::new("") {
+            let file = match sensor.folder == Path::new("") {
                 true => PathBuf::from(file),
                 false => std::path::absolute(file).unwrap_or_else(|_| file.into()),
             };

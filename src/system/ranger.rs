@@ -79,7 +79,7 @@ impl<'a> Ranger<'a> {
 
     /// Length of a bin, s.
     pub(crate) fn bin_s(&self) -> f64 {
-        self.finder.bin_s()
+        self.finder.bin_s
     }
 
     /// Light's way there and back in a bin, as a distance, m.

@@ -188,7 +188,7 @@ impl Circumstances<'_> {
             position_bins: (self.sensor.bins / 2) as f64,
             signal: light.signal_per_cycle(),
             background_per_bin: light.background_hz() * self.bin_s,
-            sigma_bins: response.pulse_sigma_bins(),
+            sigma_bins: response.pulse_sigma_bins,
         });
         chances.into_iter().fold(0.0, f64::max)
     }

@@ -98,7 +98,7 @@ fn exposed_sensor(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     write_waves(waves, &netlist, &view, |waves| {
         gate.run(&mut (&mut *waves, &mut recorder));
         let mut observers = (&mut *waves, &mut recorder);
-        read = Some(gate.read_out_while_loading(&next, &mut observers));
+        read = Some(gate.read_out(Some(&next), &mut observers));
         gate.now()
     })?;
 

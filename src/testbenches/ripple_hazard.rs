@@ -287,7 +287,7 @@ fn between() -> (Time, Vec<bool>) {
         ..Silicon::nominal(Corner::Typ)
     };
     let paths = MacropixelTiming::of(&config(), &silicon, Limits::Ignored, (0, 1));
-    let hit_cells = paths.probes().hit_cells(&paths.netlist);
+    let hit_cells = paths.probes.hit_cells(&paths.netlist);
     let strobe_after_shift = |bin: usize| {
         let of_hit = paths.hits.iter().filter(|r| r.kind == CheckKind::Hold);
         let mut of_hit = of_hit.filter(|r| r.cell == hit_cells[bin]);

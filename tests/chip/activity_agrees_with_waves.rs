@@ -350,7 +350,7 @@ fn in_an_exposed_sensor() {
         if seed == 0 && icarus::is_here() {
             let folder = tempfile::tempdir().unwrap();
             let plan = StimulusPlan::new(config, exposure, 2, starts, &pulses);
-            export_verilog(folder.path(), config, &plan).unwrap();
+            export_verilog(folder.path(), config, Some(&plan), None).unwrap();
             icarus::simulate(folder.path(), &["tb.v", "design.v", "cells.v"], &["+vcd"]);
             let dump = File::open(folder.path().join("dut.vcd")).unwrap();
             compare(&Waves::read(BufReader::new(dump), "tb.dut"));

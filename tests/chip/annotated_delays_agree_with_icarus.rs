@@ -11,7 +11,7 @@ use guided_dtof::engine::GateSimulation;
 use guided_dtof::netlist::sdf::{Sdf, SdfOptions, annotate, write_sdf};
 use guided_dtof::netlist::{Corner, Library, Netlist, Timing};
 use guided_dtof::photon::{SpadEvent, apply_dead_time};
-use guided_dtof::stimulus::{StimulusPlan, export_annotated_verilog};
+use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
 use icarus::{Seen, random_delays};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
@@ -47,7 +47,7 @@ fn compare(seed: u64, sdf: impl FnOnce(&Netlist, &Timing, &mut StdRng) -> String
 
     let folder = tempfile::tempdir().unwrap();
     let plan = StimulusPlan::new(&config, &exposure, 1, &starts, &pulses);
-    export_annotated_verilog(folder.path(), &config, &plan, &timing).unwrap();
+    export_verilog(folder.path(), &config, Some(&plan), Some(&timing)).unwrap();
     icarus::simulate(folder.path(), &["tb.v", "design.v", "cells.v"], &[]);
     let exact = Seen::by_testbench(folder.path());
     std::fs::write(folder.path().join("chip.sdf"), &text).unwrap();

@@ -28,7 +28,7 @@ use std::path::Path;
 use std::process::Command;
 
 use guided_dtof::chip::{Overflow, PCounter, SensorConfig, Tap, count_bits};
-use guided_dtof::stimulus::export_netlist;
+use guided_dtof::stimulus::export_verilog;
 
 /// A module of the exported netlist and the RTL that it is to be equal to.
 struct Block {
@@ -129,7 +129,7 @@ impl Block {
             cols: 1,
             ..self.config.clone()
         };
-        export_netlist(folder, &config).unwrap();
+        export_verilog(folder, &config, None, None).unwrap();
         for file in [self.rtl, "a_step_later.v"] {
             let from = Path::new("vectors/formal").join(file);
             fs::copy(from, folder.join(file)).unwrap();

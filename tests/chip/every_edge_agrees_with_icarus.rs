@@ -46,7 +46,7 @@ use guided_dtof::netlist::{
     Corner, Direction, Module, Netlist, Timing, write_cells, write_delays, write_modules,
     write_parametric_cells,
 };
-use guided_dtof::stimulus::{StimulusPlan, export_annotated_verilog, export_verilog};
+use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
 use guided_dtof::waves::{Selection, VcdWriter};
 use proptest::prelude::*;
@@ -288,10 +288,10 @@ fn compare_silicon(scenario: &Scenario, silicon: &Silicon) -> Figures {
     let sensor = Sensor::from(config).made_of(silicon);
     let plan = StimulusPlan::new(&sensor, exposure, size.1, starts, &pulses);
     if *silicon == Silicon::of(config) {
-        export_verilog(folder.path(), config, &plan).unwrap();
+        export_verilog(folder.path(), config, Some(&plan), None).unwrap();
     } else {
         let timing = silicon.timing(&Netlist::elaborate(&array::circuit(config)));
-        export_annotated_verilog(folder.path(), config, &plan, &timing).unwrap();
+        export_verilog(folder.path(), config, Some(&plan), Some(&timing)).unwrap();
     }
     icarus::simulate(folder.path(), &["tb.v", "design.v", "cells.v"], &["+vcd"]);
     let dump = File::open(folder.path().join("dut.vcd")).unwrap();

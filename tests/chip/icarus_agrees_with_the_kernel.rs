@@ -22,7 +22,7 @@ fn compare(random: &mut StdRng, rows: usize, cols: usize) {
 
     let folder = tempfile::tempdir().unwrap();
     let plan = StimulusPlan::new(config, exposure, cols, starts, &pulses);
-    export_verilog(folder.path(), config, &plan).unwrap();
+    export_verilog(folder.path(), config, Some(&plan), None).unwrap();
     icarus::simulate(folder.path(), &["tb.v", "design.v", "cells.v"], &[]);
 
     let mut gate = GateSimulation::new(config, exposure, (0, 0), (rows, cols), starts, &pulses);

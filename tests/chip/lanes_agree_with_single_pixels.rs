@@ -58,7 +58,7 @@ fn change_by_change() {
         let mut traces = LaneTraces(vec![Vec::new(); lanes]);
         together.run(&mut traces);
         let counts = together.histograms().unwrap();
-        assert!(together.kernel().lane_changes() > together.kernel().events());
+        assert!(together.kernel.lane_changes() > together.kernel.events());
 
         for lane in 0..lanes {
             let (start, pulses) = (&starts[lane..=lane], &pulses[lane..=lane]);

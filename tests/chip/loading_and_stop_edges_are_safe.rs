@@ -77,7 +77,7 @@ impl Bench {
             end,
             &mut (&mut recorder, (&mut events, &mut checks)),
         );
-        let found = events.report().hardware_events.iter();
+        let found = events.report.hardware_events.iter();
         Bench {
             exposure,
             local_stops: recorder.rising_edges(local_stop),
@@ -224,7 +224,7 @@ fn captured(config: &SensorConfig, exposure: &Exposure, start: u16, chain: Optio
     let mut checks = gate.timing_checks(Policy::ReportOnly);
     gate.run(&mut (&mut recorder, (&mut events, &mut checks)));
     let origin = gate.schedule().origin;
-    let found = events.report().hardware_events.iter();
+    let found = events.report.hardware_events.iter();
     Found {
         local_stops: recorder
             .rising_edges(local_stop)
@@ -295,7 +295,7 @@ fn two_pulses_of_a_spad_within_a_clk_period_are_reported() {
         let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 1), &[20], &[&pulses]);
         let mut events = gate.hardware_events();
         gate.run(&mut events);
-        let report = events.report();
+        let report = events.report;
         let kinds: Vec<_> = report.hardware_events.iter().map(|e| e.kind).collect();
         assert_eq!(kinds, expected, "{report}");
         for event in &report.hardware_events {
@@ -341,7 +341,7 @@ proptest! {
             .collect();
         let mut events = gate.hardware_events();
         gate.run(&mut events);
-        let of_kind = events.report().hardware_events.iter();
+        let of_kind = events.report.hardware_events.iter();
         let of_kind = of_kind.filter(|e| e.kind == HardwareEventKind::PulsesCancelled);
         let seen: Vec<_> = of_kind.map(|e| (e.time_fs, e.instance.clone())).collect();
         prop_assert_eq!(events.count(HardwareEventKind::PulsesCancelled), seen.len() as u64);

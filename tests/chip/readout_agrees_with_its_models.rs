@@ -237,7 +237,11 @@ fn what_the_pins_tell_of_an_exposed_sensor_is_what_its_counters_hold() {
         counted += counters.counts().iter().filter(|&&count| count > 0).count();
         // Reading takes nothing away.
         for _ in 0..2 {
-            assert_eq!(gate.read_out(&mut ()).unwrap(), counters, "seed {seed}");
+            assert_eq!(
+                gate.read_out(None, &mut ()).unwrap(),
+                counters,
+                "seed {seed}"
+            );
         }
         assert_eq!(gate.histograms().unwrap(), counters);
     }
@@ -303,7 +307,7 @@ fn icarus_reads_the_same_through_the_exported_pins() {
         let plan = StimulusPlan::new(config, exposure, cols, starts, &scenario.pulses());
         let plan = plan.with_readout();
         let folder = tempfile::tempdir().unwrap();
-        export_verilog(folder.path(), config, &plan).unwrap();
+        export_verilog(folder.path(), config, Some(&plan), None).unwrap();
         icarus::simulate(folder.path(), &["tb.v", "design.v", "cells.v"], &["+vcd"]);
         let seen = Seen::by_testbench(folder.path());
         let pins = fs::read_to_string(folder.path().join("readout.csv")).unwrap();
@@ -342,7 +346,7 @@ fn start_values_are_loaded_while_histograms_are_read() {
         gate.run(&mut ());
         let counters = gate.histograms().unwrap();
         let next: Vec<u16> = starts.iter().map(|s| config.largest_start() - s).collect();
-        let read = gate.read_out_while_loading(&next, &mut ()).unwrap();
+        let read = gate.read_out(Some(&next), &mut ()).unwrap();
         assert_eq!(read, counters, "{config:?}");
         assert_eq!(gate.histograms().unwrap(), counters);
         scenario.starts = next;
@@ -369,7 +373,7 @@ fn a_reading_during_the_exposure_leaves_the_counts_as_they_are() {
         let netlist = gate.netlist();
         let pins = SensorPins::of(netlist);
         let mut drives: Vec<Drive> = plan.stimulus(&pins).collect();
-        let schedule = plan.schedule();
+        let schedule = plan.schedule;
         let mut now = schedule.origin;
         drives.push(Drive::new(now, pins.read.enable, true));
         while now + HALF * 4 < schedule.counted {

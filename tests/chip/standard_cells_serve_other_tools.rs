@@ -19,7 +19,7 @@ use guided_dtof::netlist::sdf::{Sdf, SdfOptions, annotate, write_library_sdf, wr
 use guided_dtof::netlist::{
     CellKind, Corner, Library, Netlist, Timing, write_cells, write_standard_cells,
 };
-use guided_dtof::stimulus::{StimulusPlan, export_netlist, export_verilog};
+use guided_dtof::stimulus::{StimulusPlan, export_verilog};
 use guided_dtof::units::Time;
 use icarus::Seen;
 use rand::{SeedableRng, rngs::StdRng};
@@ -47,7 +47,7 @@ fn compare(scenario: &Scenario) -> Seen {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let plan = StimulusPlan::new(config, exposure, cols, starts, &pulses);
-    export_verilog(here, config, &plan).unwrap();
+    export_verilog(here, config, Some(&plan), None).unwrap();
     fs::write(here.join("chip.toml"), toml::to_string(config).unwrap()).unwrap();
     let exported = gdtof(
         here,
@@ -290,7 +290,7 @@ fn with_every_p_counter(mut check: impl FnMut(&Path)) {
             ..SensorConfig::default()
         };
         let folder = tempfile::tempdir().unwrap();
-        export_netlist(folder.path(), &config).unwrap();
+        export_verilog(folder.path(), &config, None, None).unwrap();
         check(folder.path());
     }
 }
@@ -308,7 +308,7 @@ fn verilator_has_nothing_to_say() {
         ..(*hslidar_delay_line()).clone()
     };
     let folder = tempfile::tempdir().unwrap();
-    export_netlist(folder.path(), &config).unwrap();
+    export_verilog(folder.path(), &config, None, None).unwrap();
     lint(folder.path());
 }
 

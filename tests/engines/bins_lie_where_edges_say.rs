@@ -174,7 +174,7 @@ fn depths_are_found_in_bins_of_half_a_clk_period() {
     let law = law(&config, &exposure, &[halves]);
     let sigma = Time::from_ps(500);
     let finder = EchoFinder::new(&law, sigma, &DepthOptions::default()).unwrap();
-    assert!((finder.bin_s() * config.clk_hz - 0.5).abs() < 1e-6);
+    assert!((finder.bin_s * config.clk_hz - 0.5).abs() < 1e-6);
     let stream = PhotonStream::new(&stream_config(&config, &exposure, 1, sigma));
     let engine = Window::with_law(law.clone());
     let window = law.window(200).open().unwrap();

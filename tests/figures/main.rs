@@ -5,6 +5,7 @@ mod command;
 
 mod detection_probability_meets_references;
 mod functions_keep_their_promises;
+mod guides_keep_their_claims;
 mod precision_meets_references;
 mod published_figures_are_met;
 mod quotations_stand_in_the_thesis;

@@ -92,7 +92,7 @@ impl Errors {
         let law = WindowLaw::new(&sensor, &Exposure::new(&sensor, 520, LASER_CYCLES));
         let sigma = Scene::outdoor().pulse_sigma();
         let finder = EchoFinder::new(&law, sigma, &DepthOptions::default()).unwrap();
-        let bin_m = finder.bin_s() * SPEED_OF_LIGHT_M_PER_S / 2.0;
+        let bin_m = finder.bin_s * SPEED_OF_LIGHT_M_PER_S / 2.0;
         let all = photons(pulses);
         let mut random = Random(5);
         const PLACES: u32 = 20;

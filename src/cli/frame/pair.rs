@@ -123,10 +123,8 @@ impl PairArgs {
         };
         let map = (matcher.match_pair(&left, &right))
             .map_err(|error| cannot_match(left_path, right_path, &error))?;
-        let truth = match &self.truth {
-            Some(path) => Some(read_truth(path, &left)?),
-            None => None,
-        };
+        let truth = self.truth.as_ref().map(|path| read_truth(path, &left));
+        let truth = truth.transpose()?;
 
         let mut camera =
             PinholeCamera::centred(own.focal_px, left.width() as u32, left.height() as u32);

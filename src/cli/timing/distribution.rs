@@ -14,12 +14,12 @@ use crate::report::{Axis, Chart};
 const BARS: usize = 48;
 
 /// Analyses all macropixels, with a bar on a terminal.
-pub(super) fn analyse(config: &SensorConfig, silicon: &Silicon) -> anyhow::Result<Spread> {
+pub(super) fn analyse(config: &SensorConfig, silicon: &Silicon) -> Spread {
     let template = "analysing {bar:40} {pos}/{len} macropixels";
     let progress = progress(config.pixels() as u64, template);
     let found = spread(config, silicon, || progress.inc(1));
     progress.finish_and_clear();
-    Ok(found)
+    found
 }
 
 /// Statistics and how many macropixels fail.

@@ -12,7 +12,7 @@ use clap::Args;
 use self::section::{Cell, Section};
 use self::tables::Subject;
 use super::SensorArgs;
-use super::silicon::SiliconArgs;
+use super::settings::SiliconArgs;
 use super::voice::say;
 use crate::analysis::{LoadTiming, ReadTiming, TimingVerdict};
 use crate::chip::{Limits, SensorConfig, Silicon, Tdc};
@@ -55,10 +55,8 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
     let subject = Subject::new(&config, &silicon);
     let load = LoadTiming::of(&config, &silicon, Limits::Kept);
     let read = ReadTiming::of(&config, &silicon, Limits::Kept);
-    let spread = match silicon.mismatch {
-        Some(_) => Some(distribution::analyse(&config, &silicon)?),
-        None => None,
-    };
+    let mismatched = silicon.mismatch.is_some();
+    let spread = mismatched.then(|| distribution::analyse(&config, &silicon));
     let position = spread.as_ref().map_or((0, 0), |spread| {
         let tightest = spread.tightest();
         (tightest.row, tightest.col)

@@ -119,16 +119,9 @@ pub(super) fn periods(subject: &Subject<'_>) -> Section {
         config, silicon, ..
     } = subject;
     let title = "Shortest CLK period";
-    let headings = &["limited by", "static", "event-driven", "static (MHz)"];
-    let mut section = Section::new("periods", title, headings);
+    let mut section = Section::new("periods", title, PERIODS);
     let mut push = |name: &str, paths: Option<Time>, gates: Option<Time>| {
-        let mhz = paths.map(|t| 1e-6 / t.as_s());
-        section.push([
-            name.into(),
-            paths.into(),
-            gates.into(),
-            Cell::Number(mhz, 1),
-        ]);
+        section.push(period_row(name, paths, gates));
     };
     push(
         "twice the ripple (thesis 4.6)",
@@ -178,42 +171,48 @@ pub(super) fn forbidden(subject: &Subject<'_>) -> Section {
 
 /// How fast start values can be loaded.
 pub(super) fn load_clk(subject: &Subject<'_>, load: &LoadTiming) -> Section {
-    let Subject {
-        config, silicon, ..
-    } = subject;
-    let title = "Shortest LOAD_CLK period";
-    let headings = &["limited by", "static", "event-driven", "static (MHz)"];
-    let mut section = Section::new("load_clk", title, headings);
+    let (config, silicon) = (subject.config, subject.silicon);
     let ignored = LoadTiming::of(config, silicon, Limits::Ignored).period();
-    for (name, limits, paths) in [
-        ("what is loaded", Limits::Ignored, ignored),
-        ("setup, hold, widths", Limits::Kept, load.period()),
-    ] {
-        let gates = shortest_period(SLOW, |p| load_works(config, silicon, limits, p));
-        let mhz = Cell::Number(paths.map(|t| 1e-6 / t.as_s()), 1);
-        section.push([name.into(), paths.into(), gates.into(), mhz]);
-    }
-    section
+    let names = ["load_clk", "Shortest LOAD_CLK period", "what is loaded"];
+    serial_clk(names, [ignored, load.period()], |limits, period| {
+        load_works(config, silicon, limits, period)
+    })
 }
 
 /// How fast histograms can be read.
 pub(super) fn read_clk(subject: &Subject<'_>, read: &ReadTiming) -> Section {
-    let Subject {
-        config, silicon, ..
-    } = subject;
-    let title = "Shortest READ_CLK period";
-    let headings = &["limited by", "static", "event-driven", "static (MHz)"];
-    let mut section = Section::new("read_clk", title, headings);
+    let (config, silicon) = (subject.config, subject.silicon);
     let ignored = ReadTiming::of(config, silicon, Limits::Ignored).period();
-    for (name, limits, paths) in [
-        ("what is read", Limits::Ignored, ignored),
-        ("setup, hold, widths", Limits::Kept, read.period()),
-    ] {
-        let gates = shortest_period(SLOW, |p| read_works(config, silicon, limits, p));
-        let mhz = Cell::Number(paths.map(|t| 1e-6 / t.as_s()), 1);
-        section.push([name.into(), paths.into(), gates.into(), mhz]);
+    let names = ["read_clk", "Shortest READ_CLK period", "what is read"];
+    serial_clk(names, [ignored, read.period()], |limits, period| {
+        read_works(config, silicon, limits, period)
+    })
+}
+
+/// A clock's shortest periods, limits ignored and kept: static ones, and those at which the gates work.
+fn serial_clk(
+    [key, title, what]: [&'static str; 3],
+    paths: [Option<Time>; 2],
+    works: impl Fn(Limits, Time) -> bool,
+) -> Section {
+    let mut section = Section::new(key, title, PERIODS);
+    let names = [
+        (what, Limits::Ignored),
+        ("setup, hold, widths", Limits::Kept),
+    ];
+    for ((name, limits), paths) in names.into_iter().zip(paths) {
+        let gates = shortest_period(SLOW, |period| works(limits, period));
+        section.push(period_row(name, paths, gates));
     }
     section
+}
+
+/// Headings of [`period_row`].
+const PERIODS: &[&str] = &["limited by", "static", "event-driven", "static (MHz)"];
+
+fn period_row(name: &str, paths: Option<Time>, gates: Option<Time>) -> [Cell; 4] {
+    let mhz = Cell::Number(paths.map(|t| 1e-6 / t.as_s()), 1);
+    [name.into(), paths.into(), gates.into(), mhz]
 }
 
 /// The tightest flip-flop of every clock and check.

@@ -129,14 +129,14 @@ impl Study {
             faults.push(Fault { path, message });
         };
         let nothing = Table::new();
-        let section = |name: &str| match document.table().get(name) {
+        let section = |name: &str| match document.table.get(name) {
             None => Ok(&nothing),
             Some(Value::Table(table)) => Ok(table),
             Some(_) => Err(format!(
                 "{name}: this must be a section; write its name in brackets, and its keys below"
             )),
         };
-        for name in document.table().keys() {
+        for name in document.table.keys() {
             if !["study", "fixed", "vary"].contains(&name.as_str()) {
                 fault(
                     name,

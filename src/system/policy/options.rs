@@ -18,7 +18,7 @@ impl WindowPolicy {
             document.assign(assignment, &option)?;
         }
         let mut faults = Vec::new();
-        let read = document.section::<WindowPolicy>("", document.table(), &mut faults);
+        let read = document.section::<WindowPolicy>("", &document.table, &mut faults);
         document.complain(faults)?;
         let mut table = Table::try_from(self).expect("numbers and words");
         table.extend(read);

@@ -131,7 +131,8 @@ pub fn too_long(source: impl fmt::Display, most_bytes: usize) -> InputError {
 
 /// A text line by line, as long as it likes, in the memory of one line.
 pub struct Lines<R> {
-    source: String,
+    /// What complaints call the text.
+    pub source: String,
     reader: R,
     has_end: bool,
     number: usize,
@@ -163,11 +164,6 @@ impl<R: BufRead> Lines<R> {
             number: 0,
             bytes: Vec::new(),
         }
-    }
-
-    /// What complaints call the text.
-    pub fn source(&self) -> &str {
-        &self.source
     }
 
     /// The next line that is neither blank nor starts with `#`, without spaces around it, and its number from 1.

@@ -148,7 +148,7 @@ impl ResultSet {
 
     /// The folder to write the results into, each under its own name.
     pub fn staging(&self) -> &Path {
-        self.staging.path()
+        &self.staging.path
     }
 
     /// Puts everything in the staging folder into the place of the set before. `command` and `configuration` say in
@@ -170,7 +170,7 @@ impl ResultSet {
     }
 
     fn switch(&self, command: &str, configuration: serde_json::Value) -> io::Result<Vec<String>> {
-        let staging = self.staging.path();
+        let staging = &self.staging.path;
         let mut names = Vec::new();
         for entry in fs::read_dir(staging)? {
             let name = entry?.file_name().into_string();

@@ -44,7 +44,8 @@ impl Registry {
 /// A temporary of this process; it is removed when dropped.
 #[derive(Debug)]
 pub(super) struct Temporary {
-    path: PathBuf,
+    /// Where it stands.
+    pub(super) path: PathBuf,
     /// Holds the lock.
     _lock: File,
 }
@@ -89,11 +90,6 @@ impl Temporary {
                 return Ok(Temporary { path, _lock: file });
             }
         }
-    }
-
-    /// Where it stands.
-    pub(super) fn path(&self) -> &Path {
-        &self.path
     }
 
     /// Gives a file its final name, whatever had that name before.
@@ -277,7 +273,7 @@ mod tests {
         let here = dir.path();
         let (live, _file) = Temporary::file_in(here).unwrap();
         let live_folder = Temporary::folder_in(here).unwrap();
-        fs::write(live_folder.path().join("half"), "x").unwrap();
+        fs::write(live_folder.path.join("half"), "x").unwrap();
         let stays = [".gdtof-notes", ".gdtof-0-0", "data.csv"];
         for name in stays {
             fs::write(here.join(name), "mine").unwrap();
@@ -292,7 +288,7 @@ mod tests {
         let mut left = names(here);
         left.sort();
         let mut expected: Vec<String> = stays.map(String::from).to_vec();
-        for path in [live.path(), live_folder.path()] {
+        for path in [&live.path, &live_folder.path] {
             expected.push(path.file_name().unwrap().to_str().unwrap().to_owned());
         }
         expected.sort();

@@ -15,8 +15,9 @@
 use rayon::prelude::*;
 
 use super::facet::{self, Sample};
-use super::map::GuideMap;
 use super::stereo::{StereoPoint, StereoRig};
+use super::third_camera::{nearer_pair, with_third_camera};
+use super::{Guide, GuideError, GuideInput, GuideMap};
 use crate::scene::{PinholeCamera, Scene};
 
 /// About this many camera pixels are measured across one macropixel.
@@ -38,11 +39,11 @@ pub(super) fn of_rig(scene: &Scene, rows: u32, cols: u32, seed: u64) -> GuideMap
     let rig = StereoRig::new(scene, seed);
     let lidar = scene.lidar_camera(rows, cols);
     let stride = stride(&rig, &lidar);
-    let image_rows: Vec<u32> = offsets(rig.camera().height, stride).collect();
+    let image_rows: Vec<u32> = offsets(rig.camera.height, stride).collect();
     let landings: Vec<Vec<Landing>> = image_rows
         .par_iter()
         .map(|&row| {
-            offsets(rig.camera().width, stride)
+            offsets(rig.camera.width, stride)
                 .filter(|&col| may_land(scene, &lidar, &rig, (row, col)))
                 .filter_map(|col| {
                     let point = rig.measure(row, col)?;
@@ -90,7 +91,7 @@ fn of_landings(lidar: &PinholeCamera, landings: impl Iterator<Item = Landing>) -
 
 /// Camera pixels from one measurement to the next.
 pub(super) fn stride(rig: &StereoRig, lidar: &PinholeCamera) -> u32 {
-    let camera_px_per_macropixel = rig.camera().focal_px / lidar.focal_px.max(lidar.focal_v_px);
+    let camera_px_per_macropixel = rig.camera.focal_px / lidar.focal_px.max(lidar.focal_v_px);
     (camera_px_per_macropixel / SAMPLES_ACROSS).floor().max(1.0) as u32
 }
 
@@ -110,7 +111,7 @@ fn may_land(
     /// As good as endless.
     const FAR_M: f64 = 1e9;
     let pixel = (f64::from(col) + 0.5, f64::from(row) + 0.5);
-    let direction = rig.camera().at_unit_depth(pixel);
+    let direction = rig.camera.at_unit_depth(pixel);
     let nearest_m = rig.focal_baseline_px_m() / scene.stereo.max_disparity_px;
     let ends = [nearest_m, FAR_M]
         .map(|depth_m| lidar.project(direction * depth_m + scene.stereo.position_m));
@@ -144,6 +145,35 @@ fn land(
             is_rim: false,
         },
     })
+}
+
+/// The scene's stereo rig with the errors of [`StereoRig`](super::StereoRig).
+///
+/// The standard deviation of a range is Eq. 27's at the estimated depth, rounding to sub-pixel steps included.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct BehaviouralStereo;
+
+impl Guide for BehaviouralStereo {
+    fn name(&self) -> &str {
+        "stereo"
+    }
+
+    fn estimate(&self, input: &GuideInput<'_>) -> Result<GuideMap, GuideError> {
+        Ok(with_third_camera(input, |input| {
+            of_rig(input.scene, input.rows, input.cols, input.seed)
+        }))
+    }
+
+    fn reach(&self, scene: &Scene) -> Option<String> {
+        let stereo = &scene.stereo;
+        let metre_pixels = stereo.camera().focal_px * stereo.baseline_m;
+        let shortest_m = nearer_pair(stereo).map_or(stereo.baseline_m, |pair| pair.baseline_m);
+        Some(format!(
+            "the camera pair measures from {:.1} m to {:.1} m, where both cameras see the same",
+            stereo.camera().focal_px * shortest_m / stereo.max_disparity_px,
+            metre_pixels / stereo.min_disparity_px,
+        ))
+    }
 }
 
 #[cfg(test)]

@@ -8,8 +8,6 @@
 //! A guide makes errors as the instrument it stands for does, and says how large it takes them to be: `sigma_m` is the guide's own
 //! claim, which the windows rely on (Eq. 25) and which may be wrong as the range may be.
 
-mod behavioural;
-pub mod claims;
 mod facet;
 mod from_file;
 mod fused;
@@ -27,6 +25,7 @@ mod rendered;
 mod right_camera;
 mod stereo;
 #[cfg(test)]
+#[path = "tests/test_scenes.rs"]
 mod test_scenes;
 mod third_camera;
 
@@ -34,12 +33,12 @@ use std::fmt::Debug;
 
 use crate::scene::{DVec3, Scene};
 
-pub use behavioural::BehaviouralStereo;
 pub use from_file::FileMap;
 pub use fused::{Fused, MOST_GUIDES};
 pub use intensity::IntensityStereo;
 pub use kalman::Kalman;
 pub use map::GuideMap;
+pub use mapping::BehaviouralStereo;
 pub use monocular::Monocular;
 pub use noisy_truth::NoisyTruth;
 pub use pair::MatchedPair;

@@ -114,7 +114,7 @@ pub fn parse(text: &str, source: &str) -> Result<Arc<dyn Guide>, InputError> {
     for assignment in settings.split(',').filter(|part| !part.is_empty()) {
         document.assign(assignment, &option)?;
     }
-    if kind.name == "file" && !document.table().contains_key("path") {
+    if kind.name == "file" && !document.table.contains_key("path") {
         return Err(InputError::new(
             option,
             "names no file; give file:path=MAP.npy",
@@ -146,7 +146,7 @@ pub fn parse_all<'t>(
 /// Settings with their defaults, checked.
 fn read<T: Settings>(document: &Document) -> Result<T, InputError> {
     let mut faults = Vec::new();
-    let table = document.section::<T>("", document.table(), &mut faults);
+    let table = document.section::<T>("", &document.table, &mut faults);
     document.complain(faults)?;
     Ok(table.try_into().expect("every value has been tried"))
 }

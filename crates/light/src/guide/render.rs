@@ -154,7 +154,7 @@ fn surface(
     grain: f64,
     pixel_rad: f64,
 ) -> f64 {
-    let scene = stage.scene();
+    let scene = stage.scene;
     let mut grey = hit.grey * stage.daylight(point, hit.normal);
     if grain > 0.0 && scene.objects[hit.object].texture.is_none() {
         grey *= (1.0 + grain * grain_at(point, 2.0 * pixel_rad * hit.range_m)).max(0.0);
@@ -168,7 +168,7 @@ fn surface(
 
 /// What the air before a surface, or the sky, adds to it.
 fn air(stage: &Stage, until_m: f64) -> f64 {
-    stage.scene().medium.airlight(until_m) * SKY_REFLECTIVITY
+    stage.scene.medium.airlight(until_m) * SKY_REFLECTIVITY
 }
 
 /// Noise of standard deviation about 1 at a point: clouds of three sizes, each half the one before, of which the smallest is at least `finest_m` and fades

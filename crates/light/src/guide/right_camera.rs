@@ -7,7 +7,8 @@ use crate::scene::{PinholeCamera, Ray, Stereo};
 /// The right camera in the lidar's coordinates.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RightCamera {
-    origin_m: DVec3,
+    /// Where it stands, m.
+    pub(super) origin_m: DVec3,
     camera: PinholeCamera,
     to_world: DMat3,
 }
@@ -34,11 +35,6 @@ impl RightCamera {
                 * DMat3::from_rotation_x(pitch)
                 * DMat3::from_rotation_z(roll),
         }
-    }
-
-    /// Where it stands, m.
-    pub(super) fn origin_m(&self) -> DVec3 {
-        self.origin_m
     }
 
     /// The pixel coordinates at which it sees a point of the world; `None` outside of its image.

@@ -26,7 +26,8 @@ const OCCLUSION_TOLERANCE: f64 = 1e-6;
 #[derive(Debug)]
 pub struct StereoRig<'a> {
     stage: Stage<'a>,
-    camera: PinholeCamera,
+    /// Either camera, in its own coordinates.
+    pub(crate) camera: PinholeCamera,
     right: RightCamera,
     seed: u64,
 }
@@ -57,20 +58,15 @@ impl<'a> StereoRig<'a> {
         }
     }
 
-    /// Either camera, in its own coordinates.
-    pub(crate) fn camera(&self) -> &PinholeCamera {
-        &self.camera
-    }
-
     /// Focal length times baseline, px·m: depth times disparity (Eq. 26).
     pub(crate) fn focal_baseline_px_m(&self) -> f64 {
-        self.camera.focal_px * self.stage.scene().stereo.baseline_m
+        self.camera.focal_px * self.stage.scene.stereo.baseline_m
     }
 
     /// The standard deviation of the estimated depth at depth `depth_m`, m (Eq. 27), the
     /// rounding to sub-pixel steps (variance step²/12) included.
     pub(crate) fn depth_sigma_m(&self, depth_m: f64) -> f64 {
-        let stereo = &self.stage.scene().stereo;
+        let stereo = &self.stage.scene.stereo;
         let step_px = 1.0 / f64::from(stereo.subpixel_steps);
         let sigma_px = (stereo.disparity_sigma_px.powi(2) + step_px * step_px / 12.0).sqrt();
         depth_m * depth_m * sigma_px / self.focal_baseline_px_m()
@@ -96,7 +92,7 @@ impl<'a> StereoRig<'a> {
 
     /// The disparity of what the principal camera sees at pixel coordinates; `None` in the sky and where the right camera does not see it.
     fn true_disparity_px(&self, at: (f64, f64)) -> Option<f64> {
-        let stereo = &self.stage.scene().stereo;
+        let stereo = &self.stage.scene.stereo;
         let ray = Ray::new(stereo.position_m, self.camera.at_unit_depth(at));
         let point_m = ray.at(self.stage.range_to_hit(&ray)?);
         Some(at.0 - self.seen_by_right_camera(point_m)?)
@@ -104,7 +100,7 @@ impl<'a> StereoRig<'a> {
 
     /// The image column at which the right camera sees `point_m`; `None` if it does not.
     fn seen_by_right_camera(&self, point_m: DVec3) -> Option<f64> {
-        let origin = self.right.origin_m();
+        let origin = self.right.origin_m;
         let towards = point_m - origin;
         let (u, _) = self.right.sees_at(point_m)?;
         let first_m = self.stage.range_to_hit(&Ray::new(origin, towards))?;
@@ -114,7 +110,7 @@ impl<'a> StereoRig<'a> {
 
     /// What the matcher makes of a true disparity.
     fn matched(&self, row: u32, col: u32, true_disparity_px: f64) -> Option<f64> {
-        let stereo = &self.stage.scene().stereo;
+        let stereo = &self.stage.scene.stereo;
         let pixel = row * self.camera.width + col;
         let mut random = random_stream(self.seed, Purpose::Stereo, pixel, 0);
         let noisy_px = true_disparity_px + stereo.disparity_sigma_px * normal(&mut random);
@@ -205,7 +201,7 @@ mod tests {
         scene.stereo.disparity_sigma_px = 0.0;
         let rig = StereoRig::new(&scene, 0);
         let depth_at = |x_m: f64, z_m: f64| {
-            let (u, v) = rig.camera().project(DVec3::new(x_m, 0.0, z_m)).unwrap();
+            let (u, v) = rig.camera.project(DVec3::new(x_m, 0.0, z_m)).unwrap();
             rig.measure(v as u32, u as u32).map(|p| p.depth_m.round())
         };
         assert_eq!(depth_at(0.0, 20.0), Some(20.0));

@@ -49,7 +49,8 @@ pub struct Avalanches<'a> {
     unknown: u64,
     /// Afterpulses and crosstalk to come, and whether they come for certain.
     pending: BinaryHeap<Reverse<(SpadEvent, bool)>>,
-    lost: u64,
+    /// How many avalanches have met a blind SPAD.
+    pub(crate) lost: u64,
 }
 
 impl<'a> Avalanches<'a> {
@@ -87,11 +88,6 @@ impl<'a> Avalanches<'a> {
             .pending
             .retain(|Reverse((child, _))| child.time >= time);
         avalanches
-    }
-
-    /// How many avalanches have met a blind SPAD.
-    pub(crate) fn lost(&self) -> u64 {
-        self.lost
     }
 
     /// Runs all `photons`, sorted, and what they cause; appends the rising edges to `edges` and returns how many avalanches
@@ -207,10 +203,7 @@ impl<'a> Avalanches<'a> {
 
     /// Notes what an avalanche causes.
     fn breed(&mut self, parent: Photon, is_certain: bool) {
-        let parent = SpadEvent {
-            time: parent.time,
-            spad: parent.spad,
-        };
+        let parent = SpadEvent::new(parent.time, parent.spad);
         let children = self.model.children(self.key, self.pixel, parent);
         self.pending
             .extend(children.map(|child| Reverse((child, is_certain))));
@@ -255,10 +248,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn event(time_fs: i64, spad: u8) -> SpadEvent {
-        SpadEvent {
-            time: Time::from_fs(time_fs),
-            spad,
-        }
+        SpadEvent::new(Time::from_fs(time_fs), spad)
     }
 
     proptest! {
@@ -306,11 +296,7 @@ mod tests {
     #[test]
     fn a_photon_after_a_dead_time_of_darkness_is_known() {
         let model = SpadModel::with_dead_time(Time::from_fs(100));
-        let at = |time_fs| Photon {
-            time: Time::from_fs(time_fs),
-            spad: 3,
-            breeds: false,
-        };
+        let at = |time_fs| Photon::new(Time::from_fs(time_fs), 3, false);
         let run = |photons: &[Photon], wanted_from| {
             let from = Time::from_fs(1_000);
             let mut avalanches =

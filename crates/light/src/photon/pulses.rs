@@ -36,7 +36,7 @@ impl PhotonStream {
         pulses: impl FnMut(&[SpadEvent]),
     ) -> PixelPhotons {
         let parts = self.parts(pixel, light);
-        match parts[0].is_bright() {
+        match parts[0].is_bright {
             true => self.bright_pulses(&parts, pulses),
             false => self.dim_pulses(&parts, pulses),
         }
@@ -49,7 +49,7 @@ impl PhotonStream {
     ) -> PixelPhotons {
         let mut draw = Draw::default();
         let mut by_cycle = ByCycle::default();
-        let all = self.span(0..self.slots().count());
+        let all = self.span(0..self.slots.count);
         let end = self.cycle_start(self.config().laser_cycles);
         let mut photons: Vec<Photon> = Vec::new();
         let mut edges = Vec::new();
@@ -71,10 +71,12 @@ impl PhotonStream {
                 by_cycle.sort(&draw, light);
                 for cycle in 0..cycles {
                     let start = self.cycle_start(group.first_cycle() + cycle);
-                    photons.extend(by_cycle.of(cycle).iter().map(|&photon| Photon {
-                        time: start + Time::from_fs(photon >> SPAD_SHIFT),
-                        spad: (photon & ((1 << SPAD_SHIFT) - 1)) as u8,
-                        breeds: light.breeds(),
+                    photons.extend(by_cycle.of(cycle).iter().map(|&photon| {
+                        Photon::new(
+                            start + Time::from_fs(photon >> SPAD_SHIFT),
+                            (photon & ((1 << SPAD_SHIFT) - 1)) as u8,
+                            light.breeds(),
+                        )
                     }));
                 }
             }
@@ -99,7 +101,7 @@ impl PhotonStream {
         PixelPhotons {
             events: Vec::new(),
             drawn,
-            lost_to_dead_time: avalanches.lost(),
+            lost_to_dead_time: avalanches.lost,
         }
     }
 
@@ -122,7 +124,7 @@ impl PhotonStream {
         let (mut drawn, mut next_echo) = (0, 0);
         for cycle in 0..config.laser_cycles {
             let until = match cycle + 1 < config.laser_cycles {
-                true => self.cycle_start(cycle + 1) - Time::from_fs(self.slots().lead_fs()),
+                true => self.cycle_start(cycle + 1) - Time::from_fs(self.slots.lead_fs),
                 false => end,
             };
             // Whatever may blind a SPAD for an echo must find it.
@@ -154,8 +156,8 @@ impl PhotonStream {
         }
         PixelPhotons {
             events: Vec::new(),
-            drawn: drawn + echoes.drawn(),
-            lost_to_dead_time: avalanches.lost(),
+            drawn: drawn + echoes.drawn,
+            lost_to_dead_time: avalanches.lost,
         }
     }
 }

@@ -83,7 +83,8 @@ fn quantile(p: f64, near: f64) -> f64 {
 /// Draws of a normal distribution of mean 0.
 #[derive(Debug, Clone, Copy)]
 pub struct NormalSampler {
-    sigma: f64,
+    /// The standard deviation.
+    pub(crate) sigma: f64,
     cubics: &'static [[f64; 4]; ROOM],
 }
 
@@ -94,11 +95,6 @@ impl NormalSampler {
             sigma,
             cubics: &CUBICS,
         }
-    }
-
-    /// The standard deviation.
-    pub(crate) fn sigma(&self) -> f64 {
-        self.sigma
     }
 
     /// The value below which a share `p` of all draws lies, 0 ≤ `p` ≤ 1; at most as far out as draws are.

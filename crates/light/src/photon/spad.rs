@@ -53,14 +53,24 @@ pub struct Photon {
     pub breeds: bool,
 }
 
+impl SpadEvent {
+    /// A pulse at a time.
+    pub const fn new(time: Time, spad: u8) -> Self {
+        SpadEvent { time, spad }
+    }
+}
+
+impl Photon {
+    /// A photon at a time.
+    pub const fn new(time: Time, spad: u8, breeds: bool) -> Self {
+        Photon { time, spad, breeds }
+    }
+}
+
 impl From<SpadEvent> for Photon {
     /// A photon that triggers no other avalanche.
     fn from(event: SpadEvent) -> Self {
-        Photon {
-            time: event.time,
-            spad: event.spad,
-            breeds: false,
-        }
+        Photon::new(event.time, event.spad, false)
     }
 }
 
@@ -143,16 +153,15 @@ impl SpadModel {
         let afterpulse = has_afterpulse.then(|| {
             let share = AFTERPULSE_REACHED * rand_philox::u32_to_unit_f64(words[1]);
             let delay_fs = -libm::log1p(-share) * self.afterpulse_time.as_fs() as f64;
-            SpadEvent {
-                time: parent.time + self.dead_time + Time::from_fs(1 + delay_fs.round() as i64),
-                spad: parent.spad,
-            }
+            SpadEvent::new(
+                parent.time + self.dead_time + Time::from_fs(1 + delay_fs.round() as i64),
+                parent.spad,
+            )
         });
         let neighbour = has_crosstalk.then(|| self.grid.neighbour(parent.spad, words[3] >> 30));
-        let crosstalk = neighbour.flatten().map(|spad| SpadEvent {
-            time: parent.time + CROSSTALK_DELAY,
-            spad,
-        });
+        let crosstalk = neighbour
+            .flatten()
+            .map(|spad| SpadEvent::new(parent.time + CROSSTALK_DELAY, spad));
         afterpulse.into_iter().chain(crosstalk)
     }
 }
@@ -162,10 +171,7 @@ mod tests {
     use super::*;
 
     fn event(time_fs: i64, spad: u8) -> SpadEvent {
-        SpadEvent {
-            time: Time::from_fs(time_fs),
-            spad,
-        }
+        SpadEvent::new(Time::from_fs(time_fs), spad)
     }
 
     /// What isolated avalanches of SPAD 5 trigger: SPAD, and time since the avalanche.

@@ -45,13 +45,11 @@
 //! ([`Slots`]).
 
 mod bright;
-mod config;
 mod dim;
 mod draw;
 mod exposure;
 mod foreign;
 mod group;
-mod kind;
 mod limits;
 mod listed;
 mod numbers;
@@ -59,13 +57,11 @@ mod ordered;
 mod part;
 mod schedule;
 mod slot;
-mod thinning;
 
 pub use bright::{Background, TILE, spad_of};
-pub use config::StreamConfig;
 pub(super) use dim::{ByCycle, SPAD_SHIFT};
 pub use draw::{Draw, PER_BLOCK, Run};
-pub use exposure::{PhotonStream, Span};
+pub use exposure::{PhotonStream, Span, StreamConfig};
 pub use group::{GROUP, Group, PLACE_BITS, Place};
 pub use listed::ListedEchoes;
 pub use ordered::{NEVER_FS, OrderedEchoes};

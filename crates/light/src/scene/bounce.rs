@@ -79,7 +79,7 @@ impl Stage<'_> {
         range_m: f64,
         bounced: &mut Vec<Bounce>,
     ) {
-        let rays = self.scene().lidar.bounce_rays;
+        let rays = self.scene.lidar.bounce_rays;
         if rays == 0 || reflected == 0.0 {
             return;
         }
@@ -106,7 +106,7 @@ impl Stage<'_> {
             let second_m = look.at(hit.range_m);
             let lit_m = second_m.length();
             let incidence = -hit.normal.dot(second_m) / lit_m;
-            let sent_j_sr = self.scene().sent_j_sr(camera, second_m);
+            let sent_j_sr = self.scene.sent_j_sr(camera, second_m);
             if incidence <= 0.0 || sent_j_sr == 0.0 {
                 continue;
             }
@@ -114,7 +114,7 @@ impl Stage<'_> {
             if met_m.is_some_and(|met_m| met_m < lit_m - THERE_M) {
                 continue;
             }
-            let left = self.scene().medium.transmission(lit_m + hit.range_m);
+            let left = self.scene.medium.transmission(lit_m + hit.range_m);
             let exposure_j_m2 = sent_j_sr * incidence / (lit_m * lit_m);
             bounced.push(Bounce {
                 object: hit.object,

@@ -33,7 +33,7 @@ pub struct Hit {
 
 /// A surface that sends light back along a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Return {
+pub(crate) struct Return {
     /// The surface; its range is the whole way to it, its normal is turned against the light that meets it.
     pub hit: Hit,
     /// Where the ray meets it, m: over a mirror not on the ray's own line.
@@ -51,7 +51,7 @@ pub struct Return {
 
 /// Where some of a ray's light goes no further: a surface that is met, or the sky.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct End {
+pub(crate) struct End {
     /// The whole way to it, m; infinite for the sky.
     pub range_m: f64,
     /// Share of the laser's light, there and back, that fog sends back before it and no longer behind it, 0 to 1.
@@ -62,7 +62,7 @@ pub struct End {
 
 /// All that sends light back along a ray, nearest first.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Returns {
+pub(crate) struct Returns {
     /// Surfaces; none where there is only sky.
     pub surfaces: SmallVec<[Return; 2]>,
     /// Where light ends; each of its shares is 1 in all.
@@ -99,12 +99,13 @@ impl Scene {
 /// A scene made ready for many rays.
 #[derive(Debug)]
 pub struct Stage<'a> {
-    scene: &'a Scene,
+    /// What was made ready.
+    pub(crate) scene: &'a Scene,
     placed: Vec<Placed<'a>>,
     /// Balls around the objects, for rays that do not come from one place.
-    balls: Vec<Option<Ball>>,
+    balls: Vec<Option<(DVec3, f64)>>,
     /// Towards the sun.
-    sun: Option<DVec3>,
+    pub(super) sun: Option<DVec3>,
 }
 
 /// How far light has come along a ray.
@@ -138,21 +139,9 @@ impl<'a> Stage<'a> {
         Stage {
             scene,
             placed: shapes().map(Shape::placed).collect(),
-            balls: shapes()
-                .map(|shape| shape.ball_around().map(Ball::from))
-                .collect(),
+            balls: shapes().map(Shape::ball_around).collect(),
             sun: scene.towards_sun(),
         }
-    }
-
-    /// What was made ready.
-    pub(crate) fn scene(&self) -> &'a Scene {
-        self.scene
-    }
-
-    /// Unit vector towards the sun, as [`Scene::towards_sun`].
-    pub(super) fn sun(&self) -> Option<DVec3> {
-        self.sun
     }
 
     /// As [`Scene::hit`].
@@ -176,7 +165,7 @@ impl<'a> Stage<'a> {
     pub(super) fn is_blocked(&self, ray: &Ray) -> bool {
         let mut opaque = self.opaque(self.all());
         opaque.any(|n| {
-            self.balls[n].is_none_or(|ball| ball.may_be_met(ray))
+            self.balls[n].is_none_or(|ball| may_be_met(ball, ray))
                 && self.placed[n].meet(ray).is_some()
         })
     }
@@ -342,26 +331,11 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// A ball that rays from anywhere may meet.
-#[derive(Debug, Clone, Copy)]
-struct Ball {
-    centre_m: DVec3,
-    radius_m: f64,
-}
-
-impl From<(DVec3, f64)> for Ball {
-    fn from((centre_m, radius_m): (DVec3, f64)) -> Self {
-        Ball { centre_m, radius_m }
-    }
-}
-
-impl Ball {
-    /// Whether a ray comes into it, or passes it so closely that rounding could hide it.
-    fn may_be_met(&self, ray: &Ray) -> bool {
-        let to_centre = self.centre_m - ray.origin;
-        let (away_m2, along_m) = (to_centre.length_squared(), to_centre.dot(ray.direction));
-        let room_m2 = 1e-6 * self.radius_m * self.radius_m + 1e-9 * away_m2;
-        let reach_m2 = self.radius_m * self.radius_m + room_m2;
-        away_m2 <= reach_m2 || (along_m > 0.0 && away_m2 - along_m * along_m <= reach_m2)
-    }
+/// Whether a ray comes into a ball, or passes it so closely that rounding could hide it.
+fn may_be_met((centre_m, radius_m): (DVec3, f64), ray: &Ray) -> bool {
+    let to_centre = centre_m - ray.origin;
+    let (away_m2, along_m) = (to_centre.length_squared(), to_centre.dot(ray.direction));
+    let room_m2 = 1e-6 * radius_m * radius_m + 1e-9 * away_m2;
+    let reach_m2 = radius_m * radius_m + room_m2;
+    away_m2 <= reach_m2 || (along_m > 0.0 && away_m2 - along_m * along_m <= reach_m2)
 }

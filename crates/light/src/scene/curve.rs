@@ -25,7 +25,8 @@ const MOST_POINTS: usize = 65_536;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<[f64; 2]>", into = "Vec<[f64; 2]>")]
 pub struct Curve {
-    points: Arc<[[f64; 2]]>,
+    /// Its points.
+    pub(crate) points: Arc<[[f64; 2]]>,
 }
 
 /// Why points make no curve.
@@ -76,11 +77,6 @@ impl Curve {
         })
     }
 
-    /// Its points.
-    pub(crate) fn points(&self) -> &[[f64; 2]] {
-        &self.points
-    }
-
     /// The first and the last place.
     pub(crate) fn ends(&self) -> (f64, f64) {
         (self.points[0][0], self.points[self.points.len() - 1][0])
@@ -114,7 +110,7 @@ impl Curve {
     }
 
     fn parse<R: BufRead>(mut lines: Lines<R>) -> Result<Self, InputError> {
-        let source = lines.source().to_owned();
+        let source = lines.source.to_owned();
         let mut points = Vec::new();
         let mut may_be_header = true;
         while let Some((number, line)) = lines.next_used()? {
@@ -252,7 +248,7 @@ mod tests {
     fn files_have_two_columns_and_perhaps_a_header() {
         let read = |text: &str| Curve::parse(Lines::new("a.csv", text.as_bytes()));
         let curve = read("time_ns,power\n0,0\n# measured\n1, 2.5\n\n3;0\n").unwrap();
-        assert_eq!(curve.points(), [[0.0, 0.0], [1.0, 2.5], [3.0, 0.0]]);
+        assert_eq!(*curve.points, [[0.0, 0.0], [1.0, 2.5], [3.0, 0.0]]);
         let refused = |text: &str| read(text).unwrap_err().to_string();
         assert!(refused("0,0\n1,2,3\n").starts_with("a.csv:2: \"1,2,3\" is not a pair"));
         assert!(refused("x,y\nz,w\n").starts_with("a.csv:2: "));

@@ -16,7 +16,7 @@ pub(super) const ABOVE_M: f64 = 1e-4;
 impl Stage<'_> {
     /// Daylight on a surface at `point` that faces along `normal` (unit), as a share of the scene's illuminance, 0 to 1.
     pub(crate) fn daylight(&self, point: DVec3, normal: DVec3) -> f64 {
-        let (Some(sun), light) = (self.sun(), &self.scene().light) else {
+        let (Some(sun), light) = (self.sun, &self.scene.light) else {
             return 1.0;
         };
         let from_sky = light.sky_share * (1.0 - normal.y) / 2.0;

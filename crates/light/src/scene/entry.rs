@@ -6,13 +6,13 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::object::Object;
-use super::ranges::{LENGTH, PLACES, POSITION, SHARE, SPEED};
 use super::rig::Waypoint;
 use super::shape::{DepthMap, MapFiles, Mesh, Shape};
 use super::texture::{Pattern, Picture, Texture};
+use super::words::{LENGTH, PLACES, POSITION, SHARE, SPEED};
 use crate::files::placed;
 use crate::settings::Range::{Above, Within};
-use crate::settings::{keys, words};
+use crate::settings::{Settings, keys, words};
 
 /// Height of a person that a file gives none, m: about the mean of adults in Europe.
 const PERSON_M: f64 = 1.72;
@@ -158,25 +158,10 @@ entry! {
     principal_px: (f64, f64) ["px"], in Within(-1e6, 1e6);
 }
 
-/// Keys that every kind of object may have.
-const OF_ALL: &[&str] = &[
-    "grey",
-    "retro",
-    "transmittance",
-    "mirror",
-    "texture",
-    "texture_file",
-    "texture_size_m",
-    "texture_seed",
-    "texture_shift_m",
-    "texture_turn_deg",
-    "second_reflectivity",
-    "second_grey",
-    "velocity_m_s",
-    "waypoints",
-];
+/// The first key that not every kind of object may have.
+const FIRST_OF_SOME: &str = "depth_m";
 
-/// Keys that maps have beside these.
+/// Keys that maps have beside those of all.
 const OF_MAPS: &[&str] = &[
     "depth_file",
     "reflectivity_file",
@@ -189,6 +174,44 @@ const OF_MAPS: &[&str] = &[
     "yaw_deg",
 ];
 
+/// Shapes whose fields are keys of the same names, with what a field is where a file gives none: how they are read and written.
+macro_rules! plain_shapes {
+    ($($kind:ident { $($key:ident $(= $usual:expr)?),+ })+) => {
+        impl ObjectEntry {
+            fn plain_shape(&self) -> Result<Option<Shape>, String> {
+                Ok(Some(match self.kind {
+                    $(Kind::$kind => {
+                        self.refuse_others(&[$(stringify!($key)),+])?;
+                        Shape::$kind { $($key: plain_shapes!(@read self $key $($usual)?)),+ }
+                    })+
+                    Kind::Mesh | Kind::Map => return Ok(None),
+                }))
+            }
+
+            fn write_plain_shape(&mut self, shape: Shape) {
+                match shape {
+                    $(Shape::$kind { $($key),+ } => {
+                        self.kind = Kind::$kind;
+                        $(self.$key = Some($key);)+
+                    })+
+                    Shape::Mesh { .. } | Shape::Map { .. } => {}
+                }
+            }
+        }
+    };
+    (@read $entry:ident $key:ident) => { $entry.need(stringify!($key), $entry.$key)? };
+    (@read $entry:ident $key:ident $usual:expr) => { $entry.$key.unwrap_or($usual) };
+}
+
+plain_shapes! {
+    Ground { depth_m }
+    Plane { centre_m, normal = DVec3::NEG_Z, width_m, height_m }
+    Box { centre_m, size_m, yaw_deg = 0.0 }
+    Sphere { centre_m, radius_m }
+    Cylinder { centre_m, axis = DVec3::NEG_Y, radius_m, height_m }
+    Person { foot_m, height_m = PERSON_M, yaw_deg = 0.0 }
+}
+
 impl ObjectEntry {
     /// The value of a key that this kind of object needs.
     fn need<T>(&self, key: &str, value: Option<T>) -> Result<T, String> {
@@ -197,8 +220,10 @@ impl ObjectEntry {
 
     /// Complains about keys that mean nothing for this kind of object.
     fn refuse_others(&self, allowed: &[&str]) -> Result<(), String> {
-        let is_other = |key: &&str| !allowed.contains(key) && !OF_ALL.contains(key);
-        match self.given().find(is_other) {
+        let of_some = Self::KEYS.iter().map(|key| key.name);
+        let of_some = of_some.skip_while(|key| *key != FIRST_OF_SOME);
+        let mut others = of_some.filter(|key| !allowed.contains(key));
+        match others.find(|key| self.given().any(|given| given == *key)) {
             None => Ok(()),
             Some(key) => Err(format!(
                 "object \"{}\" has `{key}`, which its kind does not use; remove it",
@@ -227,54 +252,10 @@ impl ObjectEntry {
     }
 
     fn shape(&self, folder: &Path) -> Result<Shape, String> {
+        if let Some(plain) = self.plain_shape()? {
+            return Ok(plain);
+        }
         Ok(match self.kind {
-            Kind::Ground => {
-                self.refuse_others(&["depth_m"])?;
-                Shape::Ground {
-                    depth_m: self.need("depth_m", self.depth_m)?,
-                }
-            }
-            Kind::Plane => {
-                self.refuse_others(&["centre_m", "normal", "width_m", "height_m"])?;
-                Shape::Plane {
-                    centre_m: self.need("centre_m", self.centre_m)?,
-                    normal: self.normal.unwrap_or(DVec3::NEG_Z),
-                    width_m: self.need("width_m", self.width_m)?,
-                    height_m: self.need("height_m", self.height_m)?,
-                }
-            }
-            Kind::Box => {
-                self.refuse_others(&["centre_m", "size_m", "yaw_deg"])?;
-                Shape::Box {
-                    centre_m: self.need("centre_m", self.centre_m)?,
-                    size_m: self.need("size_m", self.size_m)?,
-                    yaw_deg: self.yaw_deg.unwrap_or(0.0),
-                }
-            }
-            Kind::Sphere => {
-                self.refuse_others(&["centre_m", "radius_m"])?;
-                Shape::Sphere {
-                    centre_m: self.need("centre_m", self.centre_m)?,
-                    radius_m: self.need("radius_m", self.radius_m)?,
-                }
-            }
-            Kind::Cylinder => {
-                self.refuse_others(&["centre_m", "axis", "radius_m", "height_m"])?;
-                Shape::Cylinder {
-                    centre_m: self.need("centre_m", self.centre_m)?,
-                    axis: self.axis.unwrap_or(DVec3::NEG_Y),
-                    radius_m: self.need("radius_m", self.radius_m)?,
-                    height_m: self.need("height_m", self.height_m)?,
-                }
-            }
-            Kind::Person => {
-                self.refuse_others(&["foot_m", "height_m", "yaw_deg"])?;
-                Shape::Person {
-                    foot_m: self.need("foot_m", self.foot_m)?,
-                    height_m: self.height_m.unwrap_or(PERSON_M),
-                    yaw_deg: self.yaw_deg.unwrap_or(0.0),
-                }
-            }
             Kind::Mesh => {
                 self.refuse_others(&["file", "centre_m", "scale_m", "yaw_deg"])?;
                 let file = placed(folder, self.need("file", self.file.as_ref())?);
@@ -285,7 +266,7 @@ impl ObjectEntry {
                     mesh: Arc::new(Mesh::read(&file).map_err(|e| e.to_string())?),
                 }
             }
-            Kind::Map => {
+            _ => {
                 self.refuse_others(OF_MAPS)?;
                 let at = |file: &PathBuf| placed(folder, file);
                 let files = MapFiles {
@@ -390,56 +371,6 @@ impl ObjectEntry {
 
     fn write_shape(&mut self, shape: Shape) {
         match shape {
-            Shape::Ground { depth_m } => self.depth_m = Some(depth_m),
-            Shape::Plane {
-                centre_m,
-                normal,
-                width_m,
-                height_m,
-            } => {
-                self.kind = Kind::Plane;
-                self.centre_m = Some(centre_m);
-                self.normal = Some(normal);
-                self.width_m = Some(width_m);
-                self.height_m = Some(height_m);
-            }
-            Shape::Box {
-                centre_m,
-                size_m,
-                yaw_deg,
-            } => {
-                self.kind = Kind::Box;
-                self.centre_m = Some(centre_m);
-                self.size_m = Some(size_m);
-                self.yaw_deg = Some(yaw_deg);
-            }
-            Shape::Sphere { centre_m, radius_m } => {
-                self.kind = Kind::Sphere;
-                self.centre_m = Some(centre_m);
-                self.radius_m = Some(radius_m);
-            }
-            Shape::Cylinder {
-                centre_m,
-                axis,
-                radius_m,
-                height_m,
-            } => {
-                self.kind = Kind::Cylinder;
-                self.centre_m = Some(centre_m);
-                self.axis = Some(axis);
-                self.radius_m = Some(radius_m);
-                self.height_m = Some(height_m);
-            }
-            Shape::Person {
-                foot_m,
-                height_m,
-                yaw_deg,
-            } => {
-                self.kind = Kind::Person;
-                self.foot_m = Some(foot_m);
-                self.height_m = Some(height_m);
-                self.yaw_deg = Some(yaw_deg);
-            }
             Shape::Mesh {
                 centre_m,
                 scale_m,
@@ -450,14 +381,14 @@ impl ObjectEntry {
                 self.centre_m = Some(centre_m);
                 self.scale_m = Some(scale_m);
                 self.yaw_deg = Some(yaw_deg);
-                self.file = Some(mesh.path().to_owned());
+                self.file = Some(mesh.path.to_owned());
             }
             Shape::Map {
                 centre_m,
                 yaw_deg,
                 map,
             } => {
-                let files = map.files().clone();
+                let files = map.files.clone();
                 self.kind = Kind::Map;
                 self.centre_m = Some(centre_m);
                 self.yaw_deg = Some(yaw_deg);
@@ -472,6 +403,7 @@ impl ObjectEntry {
                 self.focal_px = Some(files.focal_px);
                 self.principal_px = files.principal_px;
             }
+            plain => self.write_plain_shape(plain),
         }
     }
 }

@@ -7,11 +7,13 @@ use toml::{Table, Value};
 use super::curve::read_file;
 use super::entry::ObjectEntry;
 use super::interferer::Interferer;
+use super::medium::Medium;
 use super::object::Object;
+use super::rig::Rig;
 use super::rules::{check_object, check_rig, check_stereo};
-use super::settings::{Lidar, Scene};
+use super::settings::{Lidar, Light, Scene, Stereo};
 use crate::files::InputError;
-use crate::settings::{Document, Fault, Key, Range, Settings, commented, schema};
+use crate::settings::{Document, Fault, Key, Range, Section, Settings, commented, schema};
 
 impl Scene {
     /// The built-in street, from 15 to 180 m, 50 klux.
@@ -48,19 +50,13 @@ impl Scene {
     pub fn read(document: &Document) -> Result<Self, InputError> {
         if document.is_empty() {
             let message = "has no settings; give at least one, or leave the scene out for the built-in street";
-            document.complain(vec![Fault {
-                path: String::new(),
-                message: message.into(),
-            }])?;
+            document.complain(vec![Fault::new("", message)])?;
         }
         let mut faults = Vec::new();
         let mut scene = Scene::default();
-        for (name, value) in document.table() {
+        for (name, value) in &document.table {
             let faults = &mut faults;
-            let wrong = |message: &str| Fault {
-                path: name.clone(),
-                message: format!("{name}: {message}"),
-            };
+            let wrong = |message: &str| Fault::new(name, format!("{name}: {message}"));
             match (name.as_str(), value) {
                 ("lidar", Value::Table(given)) => {
                     let given = with_curves(document, name, given, faults);
@@ -70,18 +66,10 @@ impl Scene {
                         faults.extend(scene.lidar.fault());
                     }
                 }
-                ("stereo", Value::Table(given)) => {
-                    scene.stereo = section(document, name, given, faults);
-                }
-                ("light", Value::Table(given)) => {
-                    scene.light = section(document, name, given, faults);
-                }
-                ("medium", Value::Table(given)) => {
-                    scene.medium = section(document, name, given, faults);
-                }
-                ("rig", Value::Table(given)) => {
-                    scene.rig = section(document, name, given, faults);
-                }
+                ("stereo", Value::Table(given)) => scene.stereo = section(document, name, given, faults),
+                ("light", Value::Table(given)) => scene.light = section(document, name, given, faults),
+                ("medium", Value::Table(given)) => scene.medium = section(document, name, given, faults),
+                ("rig", Value::Table(given)) => scene.rig = section(document, name, given, faults),
                 ("object", Value::Array(items)) => {
                     for (index, item) in items.iter().enumerate() {
                         let path = format!("object.{index}");
@@ -159,7 +147,7 @@ fn with_curves(document: &Document, name: &str, given: &Table, faults: &mut Vec<
         let Some(value) = given.get(key.name) else {
             continue;
         };
-        match read_file(value, document.folder()) {
+        match read_file(value, &document.folder) {
             Ok(None) => (),
             Ok(Some(curve)) => drop(read.insert(key.name.into(), curve)),
             Err(why) => {
@@ -190,42 +178,26 @@ fn object(
     item: &Value,
     faults: &mut Vec<Fault>,
 ) -> Option<Object> {
-    let mut complain = |message: String| {
-        let path = path.to_owned();
-        faults.push(Fault { path, message });
-    };
+    let fault = |message: String| Fault::new(path, message);
     let Value::Table(given) = item else {
-        complain("this must be a section [[object]]; write its keys below".into());
+        let message = "this must be a section [[object]]; write its keys below";
+        faults.push(fault(message.into()));
         return None;
     };
     let needed = ["name", "kind", "reflectivity"];
     let lacks = needed.iter().find(|key| !given.contains_key(**key));
-    if let Some(key) = lacks {
-        complain(format!("lacks `{key}`; add it"));
-    }
+    faults.extend(lacks.map(|key| fault(format!("lacks `{key}`; add it"))));
     let before = faults.len();
     let read = document.section::<ObjectEntry>(path, given, faults);
     if lacks.is_some() || faults.len() > before {
         return None;
     }
     let entry = read.try_into::<ObjectEntry>();
-    let told = |e: toml::de::Error| e.message().trim().to_owned();
-    let entry = entry
-        .map_err(told)
-        .and_then(|e| e.object(document.folder()));
-    match entry {
-        Ok(object) => {
-            let fault = check_object(path, &object);
-            let is_fine = fault.is_none();
-            faults.extend(fault);
-            is_fine.then_some(object)
-        }
-        Err(message) => {
-            let path = path.to_owned();
-            faults.push(Fault { path, message });
-            None
-        }
-    }
+    let entry = entry.map_err(|e: toml::de::Error| e.message().trim().to_owned());
+    let object = entry.and_then(|e| e.object(&document.folder));
+    let object = object.map_err(fault);
+    let checked = object.and_then(|o| check_object(path, &o).map_or(Ok(o), Err));
+    checked.map_err(|fault| faults.push(fault)).ok()
 }
 
 /// The lidar of another at `path`, if it has no fault.
@@ -251,10 +223,7 @@ fn interferer(
         Value::Table(_) => "lacks `name` or `place_m`; add both",
         _ => "this must be a section [[interferer]]; write its keys below",
     };
-    faults.push(Fault {
-        path: path.to_owned(),
-        message: complaint.into(),
-    });
+    faults.push(Fault::new(path, complaint));
     None
 }
 
@@ -264,7 +233,7 @@ fn place(document: &Document, path: &str) -> String {
     match (names.next(), names.next()) {
         (Some(list @ ("object" | "interferer")), Some(index)) => {
             let index: usize = index.parse().unwrap_or(0);
-            let item = document.table().get(list).and_then(|list| list.get(index));
+            let item = document.table.get(list).and_then(|list| list.get(index));
             let name = item.and_then(|item| item.get("name")?.as_str());
             let name = name.map_or(String::new(), |name| format!(" ({name})"));
             format!("in [[{list}]] number {}{name}, ", index + 1)
@@ -276,3 +245,32 @@ fn place(document: &Document, path: &str) -> String {
 
 #[cfg(test)]
 mod tests;
+
+impl Scene {
+    /// The sections of a scene file.
+    pub const SECTIONS: &'static [Section] = &[
+        Section::new("lidar", "Laser, lens and SPADs of the lidar", Lidar::KEYS),
+        Section::new(
+            "stereo",
+            "The camera pair that guides the lidar",
+            Stereo::KEYS,
+        ),
+        Section::new("light", "Sunlight", Light::KEYS),
+        Section::new("medium", "What is in the air", Medium::KEYS),
+        Section::new(
+            "rig",
+            "Motion of lidar and cameras together; the scene is described at time 0",
+            Rig::KEYS,
+        ),
+        Section::new(
+            "object",
+            "What there is to see: any number of objects, none if left out. Metres; x right, y down, z forward; the lidar is at the origin",
+            ObjectEntry::KEYS,
+        ),
+        Section::new(
+            "interferer",
+            "Lidars of other vehicles: any number, none if left out",
+            Interferer::KEYS,
+        ),
+    ];
+}

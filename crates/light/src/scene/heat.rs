@@ -100,7 +100,7 @@ impl Lidar {
                 }
             },
             Measured::Curve(curve) => {
-                let points = curve.points().iter();
+                let points = curve.points.iter();
                 points.map(|[at, _]| at + self.filter_shift_nm()).collect()
             }
         };

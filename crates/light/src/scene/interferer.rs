@@ -18,9 +18,9 @@ use glam::DVec3;
 
 use super::cast::Stage;
 use super::daylight::ABOVE_M;
-use super::ranges::{POSITION, SPEED};
 use super::settings::Scene;
 use super::vector::{Ray, turned};
+use super::words::{POSITION, SPEED};
 use crate::photon::{OtherLaser, PhotonBudget, PulseTrain};
 use crate::settings::Range::{Above, Limited, Within};
 use crate::settings::{Fault, keys};
@@ -157,7 +157,7 @@ impl Stage<'_> {
         range_m: f64,
         others: &mut Vec<OtherLight>,
     ) {
-        for (interferer, other) in (0..).zip(&self.scene().interferers) {
+        for (interferer, other) in (0..).zip(&self.scene.interferers) {
             let to = other.place_m - place_m;
             let (distance_m, incidence) = (to.length(), normal.dot(to.normalize_or_zero()));
             let sent = other.intensity_j_sr(place_m);
@@ -165,7 +165,7 @@ impl Stage<'_> {
             if incidence <= 0.0 || sent == 0.0 || self.is_between(from, other.place_m) {
                 continue;
             }
-            let left = self.scene().medium.transmission(distance_m);
+            let left = self.scene.medium.transmission(distance_m);
             let exposure_j_m2 = reflected * left * sent * incidence / (distance_m * distance_m);
             let way_m = range_m + distance_m;
             let object = Some(object);
@@ -188,14 +188,14 @@ impl Stage<'_> {
         is_here: impl Fn(DVec3) -> bool,
         others: &mut Vec<OtherLight>,
     ) {
-        for (interferer, other) in (0..).zip(&self.scene().interferers) {
+        for (interferer, other) in (0..).zip(&self.scene.interferers) {
             let sent = other.intensity_j_sr(DVec3::ZERO);
             if sent == 0.0 || !is_here(other.place_m) || self.is_between(DVec3::ZERO, other.place_m)
             {
                 continue;
             }
             let way_m = other.place_m.length();
-            let left = self.scene().medium.transmission(way_m);
+            let left = self.scene.medium.transmission(way_m);
             let cosine = other.place_m.z / way_m;
             others.push(OtherLight {
                 interferer,

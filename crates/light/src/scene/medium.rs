@@ -10,7 +10,7 @@
 
 use std::f64::consts::PI;
 
-use super::ranges::LENGTH;
+use super::words::LENGTH;
 use crate::settings::Range::Within;
 use crate::settings::keys;
 

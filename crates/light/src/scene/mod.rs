@@ -18,14 +18,13 @@ mod fog;
 mod heat;
 mod illumination;
 mod interferer;
-mod keys;
 mod medium;
 #[cfg(test)]
+#[path = "tests/mirrors.rs"]
 mod mirrors;
 mod motion;
 mod object;
 mod optics;
-mod ranges;
 mod rig;
 mod rules;
 mod settings;
@@ -41,8 +40,7 @@ mod words;
 
 pub(crate) use bounds::Bounds;
 pub use camera::PinholeCamera;
-pub use cast::Stage;
-pub use cast::{End, Hit, Return, Returns};
+pub use cast::{Hit, Stage};
 pub use curve::{Curve, CurveError, Measured};
 pub use eye_safety::{Emission, EyeRule, EyeSafety};
 pub use interferer::Interferer;

@@ -91,8 +91,7 @@ impl Lidar {
         let shift_nm = self.filter_shift_nm();
         let (centre_nm, fwhm_nm) = (self.filter_centre_nm + shift_nm, self.filter_fwhm_nm);
         breaks.extend((-16..=16).map(|k| centre_nm + f64::from(k) * fwhm_nm / 4.0));
-        let own =
-            |curve: &Curve| -> Vec<f64> { curve.points().iter().map(|[nm, _]| *nm).collect() };
+        let own = |curve: &Curve| -> Vec<f64> { curve.points.iter().map(|[nm, _]| *nm).collect() };
         if let Measured::Curve(curve) = &self.filter {
             breaks.extend(own(curve).iter().map(|nm| nm + shift_nm));
         }
@@ -110,12 +109,7 @@ impl Lidar {
 
     /// What a file may not ask for, beyond the range of each key.
     pub(super) fn fault(&self) -> Option<Fault> {
-        let fault = |key: &str, message: String| {
-            Some(Fault {
-                path: format!("lidar.{key}"),
-                message,
-            })
-        };
+        let fault = |key: &str, message: String| Some(Fault::new(format!("lidar.{key}"), message));
         let nm = self.warm_wavelength_nm();
         if self.laser_transmission() <= 0.0 {
             let message = format!(
@@ -159,7 +153,7 @@ impl Lidar {
             }
         }
         if let Some(curve) = self.stray.curve()
-            && (curve.ends().0 != 0.0 || curve.points()[0][1] <= 0.0)
+            && (curve.ends().0 != 0.0 || curve.points[0][1] <= 0.0)
         {
             let (first, last) = curve.ends();
             let message = format!(
@@ -193,7 +187,7 @@ impl Lidar {
     pub(super) fn beam_total(&self) -> f64 {
         let mut breaks = vec![0.0, PI / 2.0];
         match self.beam.curve() {
-            Some(curve) => breaks.extend(curve.points().iter().map(|[deg, _]| deg.to_radians())),
+            Some(curve) => breaks.extend(curve.points.iter().map(|[deg, _]| deg.to_radians())),
             None => {
                 breaks.extend((1..16).map(|k| f64::from(k) * self.beam_fwhm_deg.to_radians() / 4.0))
             }
@@ -210,7 +204,7 @@ impl Lidar {
             Measured::Word(VignettingWord::None) => None,
             Measured::Word(VignettingWord::Cos4) => Some(cosine.powi(4)),
             Measured::Curve(curve) => {
-                let [[_, middle], ..] = curve.points() else {
+                let [[_, middle], ..] = curve.points[..] else {
                     return Some(0.0);
                 };
                 let at = curve.at(cosine.acos().to_degrees()).unwrap_or(0.0);
@@ -279,7 +273,7 @@ impl Scene {
     pub(crate) fn pulse_shape(&self) -> Option<PulseShape> {
         let curve = self.lidar.pulse.curve()?;
         let (first, last) = curve.ends();
-        let points = curve.points();
+        let points = &curve.points;
         let step_ns = points[1][0] - points[0][0];
         let is_even = points.windows(2).all(|pair| {
             let own = pair[1][0] - pair[0][0];

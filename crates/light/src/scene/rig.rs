@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::ranges::{PLACES, SPEED};
+use super::words::{PLACES, SPEED};
 use crate::settings::Range::Within;
 use crate::settings::keys;
 

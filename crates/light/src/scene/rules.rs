@@ -28,12 +28,14 @@ pub(super) fn check_stereo(stereo: &Stereo) -> Option<Fault> {
             ),
         });
     }
-    (stereo.max_disparity_px < stereo.min_disparity_px).then(|| Fault {
-        path: "stereo.max_disparity_px".into(),
-        message: format!(
-            "max_disparity_px = {} is impossible; give a number not below min_disparity_px, {}",
-            stereo.max_disparity_px, stereo.min_disparity_px
-        ),
+    (stereo.max_disparity_px < stereo.min_disparity_px).then(|| {
+        Fault::new(
+            "stereo.max_disparity_px",
+            format!(
+                "max_disparity_px = {} is impossible; give a number not below min_disparity_px, {}",
+                stereo.max_disparity_px, stereo.min_disparity_px
+            ),
+        )
     })
 }
 
@@ -84,10 +86,7 @@ pub(super) fn check_rig(rig: &Rig) -> Option<Fault> {
     } else {
         times_fall(rig.waypoints.iter().map(|at| at.time_s))
     };
-    message.map(|message| Fault {
-        path: "rig.waypoints".into(),
-        message,
-    })
+    message.map(|message| Fault::new("rig.waypoints", message))
 }
 
 /// What is wrong with the times of waypoints, if anything.

@@ -10,9 +10,11 @@ use super::heat::REFERENCE_C;
 use super::interferer::Interferer;
 use super::medium::Medium;
 use super::object::Object;
-use super::ranges::{CHOSEN, LENGTH, POSITION, SHARE, TABLE_12};
 use super::rig::Rig;
-use super::words::{BeamWord, FilterWord, PdeWord, PulseWord, StrayWord, VignettingWord};
+use super::words::{
+    BeamWord, CHOSEN, FilterWord, LENGTH, POSITION, PdeWord, PulseWord, SHARE, StrayWord, TABLE_12,
+    VignettingWord,
+};
 use crate::photon::{Convention, Spot};
 use crate::settings::Range::{Above, Limited, Within, WordOrCurve};
 use crate::settings::keys;

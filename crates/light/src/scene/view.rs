@@ -191,7 +191,7 @@ impl View {
         surfaces: &[Return],
         ends: &[End],
     ) {
-        let (scene, ray_share) = (stage.scene(), piece.ray_share);
+        let (scene, ray_share) = (stage.scene, piece.ray_share);
         let (medium, sky) = (&scene.medium, scene.light.sky_reflectivity);
         for end in ends {
             // The air before it has its own light.

@@ -30,6 +30,13 @@ pub struct Fault {
     pub message: String,
 }
 
+impl Fault {
+    pub(crate) fn new(path: impl Into<String>, message: impl Into<String>) -> Self {
+        let (path, message) = (path.into(), message.into());
+        Fault { path, message }
+    }
+}
+
 /// Where a value comes from.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 enum Origin {
@@ -41,8 +48,10 @@ enum Origin {
 #[derive(Debug, Clone)]
 pub struct Document {
     source: String,
-    folder: PathBuf,
-    table: Table,
+    /// The folder that files named in it are relative to: the file's own, or else the current one.
+    pub folder: PathBuf,
+    /// All values.
+    pub table: Table,
     origins: BTreeMap<String, Origin>,
 }
 
@@ -91,11 +100,6 @@ impl Document {
         read_text_within(path, MOST_BYTES)
     }
 
-    /// The folder that files named in it are relative to: the file's own, or else the current one.
-    pub fn folder(&self) -> &Path {
-        &self.folder
-    }
-
     /// Settings that stand in no file.
     pub fn of(source: impl std::fmt::Display, table: Table) -> Self {
         Document {
@@ -104,11 +108,6 @@ impl Document {
             table,
             origins: BTreeMap::new(),
         }
-    }
-
-    /// All values.
-    pub fn table(&self) -> &Table {
-        &self.table
     }
 
     /// Whether there is no value at all.

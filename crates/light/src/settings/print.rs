@@ -17,6 +17,12 @@ pub struct Section {
     pub keys: &'static [Key],
 }
 
+impl Section {
+    pub(crate) const fn new(name: &'static str, what: &'static str, keys: &'static [Key]) -> Self {
+        Section { name, what, keys }
+    }
+}
+
 /// All of `values`, by `sections`, every key with what it is, its unit, range and source. What a key is where a file
 /// leaves it out is added where that is another value (`left_out` has these). A list gets its keys explained once, before
 /// its items.

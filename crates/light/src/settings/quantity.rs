@@ -1,127 +1,88 @@
 //! Numbers with units as text: `"384 MHz"`, `"8 ns"`, `"20 %"`.
 
-/// What a unit measures, in words for complaints, with an example.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Dimension {
-    Time,
-    Frequency,
-    Length,
-    Speed,
-    PerLength,
-    PerLengthAndAngle,
-    Rain,
-    AngularSpeed,
-    Angle,
-    Energy,
-    CarrierEnergy,
-    Voltage,
-    VoltagePerKelvin,
-    LengthPerKelvin,
-    Temperature,
-    Capacitance,
-    Illuminance,
-    Irradiance,
-    Pixels,
-    Share,
-}
-
-impl Dimension {
-    fn words(self) -> &'static str {
-        match self {
-            Dimension::Time => "a time",
-            Dimension::Frequency => "a frequency",
-            Dimension::Length => "a length",
-            Dimension::Speed => "a velocity",
-            Dimension::PerLength => "a share per length",
-            Dimension::PerLengthAndAngle => "a share per length and solid angle",
-            Dimension::Rain => "an amount of rain",
-            Dimension::AngularSpeed => "an angular velocity",
-            Dimension::Angle => "an angle",
-            Dimension::Energy => "an energy",
-            Dimension::CarrierEnergy => "the energy of a carrier",
-            Dimension::Voltage => "a voltage",
-            Dimension::VoltagePerKelvin => "a voltage per kelvin",
-            Dimension::LengthPerKelvin => "a length per kelvin",
-            Dimension::Temperature => "a temperature",
-            Dimension::Capacitance => "a capacitance",
-            Dimension::Illuminance => "an illuminance",
-            Dimension::Irradiance => "an irradiance",
-            Dimension::Pixels => "a number of pixels",
-            Dimension::Share => "a plain number",
-        }
-    }
-}
-
-/// Symbol, what it measures, and its power of ten of the dimension's base unit.
-const UNITS: [(&str, Dimension, i32); 61] = [
-    ("s", Dimension::Time, 0),
-    ("ms", Dimension::Time, -3),
-    ("us", Dimension::Time, -6),
-    ("µs", Dimension::Time, -6),
-    ("ns", Dimension::Time, -9),
-    ("ps", Dimension::Time, -12),
-    ("fs", Dimension::Time, -15),
-    ("Hz", Dimension::Frequency, 0),
-    ("kHz", Dimension::Frequency, 3),
-    ("MHz", Dimension::Frequency, 6),
-    ("GHz", Dimension::Frequency, 9),
-    ("km", Dimension::Length, 3),
-    ("m", Dimension::Length, 0),
-    ("cm", Dimension::Length, -2),
-    ("mm", Dimension::Length, -3),
-    ("um", Dimension::Length, -6),
-    ("µm", Dimension::Length, -6),
-    ("nm", Dimension::Length, -9),
-    ("m/s", Dimension::Speed, 0),
-    ("km/s", Dimension::Speed, 3),
-    ("1/m", Dimension::PerLength, 0),
-    ("1/km", Dimension::PerLength, -3),
-    ("1/m/sr", Dimension::PerLengthAndAngle, 0),
-    ("mm/h", Dimension::Rain, 0),
-    ("deg/s", Dimension::AngularSpeed, 0),
-    ("deg", Dimension::Angle, 0),
-    ("°", Dimension::Angle, 0),
-    ("J", Dimension::Energy, 0),
-    ("mJ", Dimension::Energy, -3),
-    ("uJ", Dimension::Energy, -6),
-    ("µJ", Dimension::Energy, -6),
-    ("nJ", Dimension::Energy, -9),
-    ("pJ", Dimension::Energy, -12),
-    ("eV", Dimension::CarrierEnergy, 0),
-    ("meV", Dimension::CarrierEnergy, -3),
-    ("V", Dimension::Voltage, 0),
-    ("mV", Dimension::Voltage, -3),
-    ("mV/K", Dimension::VoltagePerKelvin, -3),
-    ("nm/K", Dimension::LengthPerKelvin, -9),
-    ("pm/K", Dimension::LengthPerKelvin, -12),
-    ("C", Dimension::Temperature, 0),
-    ("degC", Dimension::Temperature, 0),
-    ("°C", Dimension::Temperature, 0),
-    ("pF", Dimension::Capacitance, -12),
-    ("fF", Dimension::Capacitance, -15),
-    ("lx", Dimension::Illuminance, 0),
-    ("lux", Dimension::Illuminance, 0),
-    ("klx", Dimension::Illuminance, 3),
-    ("klux", Dimension::Illuminance, 3),
-    ("W/m2", Dimension::Irradiance, 0),
-    ("W/m²", Dimension::Irradiance, 0),
-    ("W/m^2", Dimension::Irradiance, 0),
-    ("mW/m2", Dimension::Irradiance, -3),
-    ("mW/m²", Dimension::Irradiance, -3),
-    ("mW/m^2", Dimension::Irradiance, -3),
-    ("kW/m2", Dimension::Irradiance, 3),
-    ("kW/m²", Dimension::Irradiance, 3),
-    ("kW/m^2", Dimension::Irradiance, 3),
-    ("px", Dimension::Pixels, 0),
-    ("%", Dimension::Share, -2),
-    ("", Dimension::Share, 0),
+/// What units measure, in words for complaints: symbols, each with its power of ten of the base unit.
+const UNITS: [(&str, &[(&str, i32)]); 20] = [
+    (
+        "a time",
+        &[
+            ("s", 0),
+            ("ms", -3),
+            ("us", -6),
+            ("µs", -6),
+            ("ns", -9),
+            ("ps", -12),
+            ("fs", -15),
+        ],
+    ),
+    (
+        "a frequency",
+        &[("Hz", 0), ("kHz", 3), ("MHz", 6), ("GHz", 9)],
+    ),
+    (
+        "a length",
+        &[
+            ("km", 3),
+            ("m", 0),
+            ("cm", -2),
+            ("mm", -3),
+            ("um", -6),
+            ("µm", -6),
+            ("nm", -9),
+        ],
+    ),
+    ("a velocity", &[("m/s", 0), ("km/s", 3)]),
+    ("a share per length", &[("1/m", 0), ("1/km", -3)]),
+    ("a share per length and solid angle", &[("1/m/sr", 0)]),
+    ("an amount of rain", &[("mm/h", 0)]),
+    ("an angular velocity", &[("deg/s", 0)]),
+    ("an angle", &[("deg", 0), ("°", 0)]),
+    (
+        "an energy",
+        &[
+            ("J", 0),
+            ("mJ", -3),
+            ("uJ", -6),
+            ("µJ", -6),
+            ("nJ", -9),
+            ("pJ", -12),
+        ],
+    ),
+    ("the energy of a carrier", &[("eV", 0), ("meV", -3)]),
+    ("a voltage", &[("V", 0), ("mV", -3)]),
+    ("a voltage per kelvin", &[("mV/K", -3)]),
+    ("a length per kelvin", &[("nm/K", -9), ("pm/K", -12)]),
+    ("a temperature", &[("C", 0), ("degC", 0), ("°C", 0)]),
+    ("a capacitance", &[("pF", -12), ("fF", -15)]),
+    (
+        "an illuminance",
+        &[("lx", 0), ("lux", 0), ("klx", 3), ("klux", 3)],
+    ),
+    (
+        "an irradiance",
+        &[
+            ("W/m2", 0),
+            ("W/m²", 0),
+            ("W/m^2", 0),
+            ("mW/m2", -3),
+            ("mW/m²", -3),
+            ("mW/m^2", -3),
+            ("kW/m2", 3),
+            ("kW/m²", 3),
+            ("kW/m^2", 3),
+        ],
+    ),
+    ("a number of pixels", &[("px", 0)]),
+    ("a plain number", &[("%", -2), ("", 0)]),
 ];
 
-fn unit(symbol: &str) -> Option<(Dimension, i32)> {
+/// What a unit measures, and its power.
+fn unit(symbol: &str) -> Option<(&'static str, i32)> {
     // The Greek letter is written for the micro sign, too.
     let symbol = symbol.replace('μ', "µ");
-    let found = UNITS.iter().find(|(name, _, _)| *name == symbol);
-    found.map(|&(_, dimension, power)| (dimension, power))
+    UNITS.iter().find_map(|(dimension, units)| {
+        let (_, power) = units.iter().find(|(name, _)| *name == symbol)?;
+        Some((*dimension, *power))
+    })
 }
 
 /// The number in `text` in the unit `wanted`, exact as the decimal fraction that it is. A number without a unit is in the
@@ -133,17 +94,14 @@ pub(super) fn in_unit(text: &str, wanted: &str) -> Result<f64, String> {
     let (dimension, wanted_power) = unit(wanted).expect("keys have units of the table");
     let cure = match wanted {
         "" => "give a plain number".to_owned(),
-        _ => format!(
-            "give {} such as \"1 {wanted}\", or a plain number of {wanted}",
-            dimension.words()
-        ),
+        _ => format!("give {dimension} such as \"1 {wanted}\", or a plain number of {wanted}"),
     };
     let (number, symbol) = split(text);
     let power = match symbol {
         "" => wanted_power,
         _ => match unit(symbol) {
             Some((found, power)) if found == dimension => power,
-            Some((found, _)) => return Err(format!("is {}; {cure}", found.words())),
+            Some((found, _)) => return Err(format!("is {found}; {cure}")),
             None => return Err(format!("has an unknown unit; {cure}")),
         },
     };

@@ -14,7 +14,6 @@
 //! | `settings.rs` | what a matcher can be told |
 //! | `census.rs` | a pixel's neighbourhood as bits |
 //! | `cost.rs` | how unlike two pixels are, for all disparities of a row |
-//! | `path.rs` | one step of a path's minimisation |
 //! | `sweep.rs` | rows in their order, paths up and down, threads |
 //! | `winner.rs` | the best disparity of a pixel, and whether to believe it |
 //! | `filter.rs` | median and speckle filter |
@@ -30,8 +29,8 @@ mod disparity;
 mod filter;
 mod image;
 mod matching;
-mod path;
 #[cfg(test)]
+#[path = "tests/reference.rs"]
 mod reference;
 mod settings;
 mod sweep;

@@ -22,13 +22,13 @@ const MOST_SUMS_BYTES: usize = 1 << 30;
 #[non_exhaustive]
 pub enum Paths {
     /// From the left, the right and above.
-    Three,
+    Three = 3,
     /// From the left, the right, above and below.
-    Four,
+    Four = 4,
     /// From the left, the right, above and both corners above.
-    Five,
+    Five = 5,
     /// From the left, the right, above, below and all corners.
-    Eight,
+    Eight = 8,
 }
 
 impl Paths {
@@ -37,12 +37,7 @@ impl Paths {
 
     /// How many.
     pub fn number(self) -> usize {
-        match self {
-            Paths::Three => 3,
-            Paths::Four => 4,
-            Paths::Five => 5,
-            Paths::Eight => 8,
-        }
+        self as usize
     }
 
     pub(super) fn diagonals(self) -> bool {

@@ -15,60 +15,42 @@ pub struct SramCell {
     pub source: &'static str,
 }
 
+impl SramCell {
+    const fn new(node_nm: u32, area_um2: f64, source: &'static str) -> Self {
+        SramCell {
+            node_nm,
+            area_um2,
+            source,
+        }
+    }
+}
+
 /// Published high-density cells, oldest first. The thesis's own values (Fig. 39, after its reference 154) are
 /// only drawn, not printed. Those of 90, 65, 22, 16, 7 and 5 nm agree with the makers' announcements; the others are cited
 /// as they are commonly quoted and were not compared with anything.
 pub const SRAM_CELLS: [SramCell; 10] = [
-    SramCell {
-        node_nm: 130,
-        area_um2: 2.45,
-        source: "Tyagi, IEDM 2000 (Intel), as commonly quoted",
-    },
-    SramCell {
-        node_nm: 90,
-        area_um2: 1.0,
-        source: "Thompson, IEDM 2002 (Intel)",
-    },
-    SramCell {
-        node_nm: 65,
-        area_um2: 0.57,
-        source: "Bai, IEDM 2004 (Intel)",
-    },
-    SramCell {
-        node_nm: 40,
-        area_um2: 0.242,
-        source: "Cheng, IEDM 2007 (TSMC 45/40 nm), as commonly quoted",
-    },
-    SramCell {
-        node_nm: 32,
-        area_um2: 0.171,
-        source: "Natarajan, IEDM 2008 (Intel), as commonly quoted",
-    },
-    SramCell {
-        node_nm: 28,
-        area_um2: 0.127,
-        source: "Wu, VLSI Technology 2009 (TSMC), as commonly quoted",
-    },
-    SramCell {
-        node_nm: 22,
-        area_um2: 0.1,
-        source: "Haran, IEDM 2008 (IBM)",
-    },
-    SramCell {
-        node_nm: 16,
-        area_um2: 0.07,
-        source: "Wu, IEDM 2013 (TSMC)",
-    },
-    SramCell {
-        node_nm: 7,
-        area_um2: 0.027,
-        source: "Wu, IEDM 2016 (TSMC)",
-    },
-    SramCell {
-        node_nm: 5,
-        area_um2: 0.021,
-        source: "Yeap, IEDM 2019 (TSMC)",
-    },
+    SramCell::new(130, 2.45, "Tyagi, IEDM 2000 (Intel), as commonly quoted"),
+    SramCell::new(90, 1.0, "Thompson, IEDM 2002 (Intel)"),
+    SramCell::new(65, 0.57, "Bai, IEDM 2004 (Intel)"),
+    SramCell::new(
+        40,
+        0.242,
+        "Cheng, IEDM 2007 (TSMC 45/40 nm), as commonly quoted",
+    ),
+    SramCell::new(
+        32,
+        0.171,
+        "Natarajan, IEDM 2008 (Intel), as commonly quoted",
+    ),
+    SramCell::new(
+        28,
+        0.127,
+        "Wu, VLSI Technology 2009 (TSMC), as commonly quoted",
+    ),
+    SramCell::new(22, 0.1, "Haran, IEDM 2008 (IBM)"),
+    SramCell::new(16, 0.07, "Wu, IEDM 2013 (TSMC)"),
+    SramCell::new(7, 0.027, "Wu, IEDM 2016 (TSMC)"),
+    SramCell::new(5, 0.021, "Yeap, IEDM 2019 (TSMC)"),
 ];
 
 /// The memory of one pixel's histogram.

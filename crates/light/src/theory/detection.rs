@@ -89,6 +89,10 @@ impl Detection {
 pub fn probability(light: &PerCycle, cycles: u64, model: Model) -> Detection {
     let n = cycles as f64;
     let (signal, background) = (n * light.signal, n * light.background);
+    let known = |probability: f64| Detection {
+        probability,
+        miss: 1.0 - probability,
+    };
     match model {
         Model::Poisson(ties) => poisson(signal, background, light.bins, ties),
         Model::Bernoulli(ties) => {
@@ -99,20 +103,8 @@ pub fn probability(light: &PerCycle, cycles: u64, model: Model) -> Detection {
             let signal_bin = counts(light.signal + light.background);
             compare(&signal_bin, &counts(light.background), light.bins, ties)
         }
-        Model::Gaussian => {
-            let p = gaussian::as_meant(signal, background, light.bins);
-            Detection {
-                probability: p,
-                miss: 1.0 - p,
-            }
-        }
-        Model::GaussianAsPrinted => {
-            let p = gaussian::as_printed(signal, background, light.bins);
-            Detection {
-                probability: p,
-                miss: 1.0 - p,
-            }
-        }
+        Model::Gaussian => known(gaussian::as_meant(signal, background, light.bins)),
+        Model::GaussianAsPrinted => known(gaussian::as_printed(signal, background, light.bins)),
     }
 }
 
@@ -133,10 +125,7 @@ pub(crate) fn compare(signal: &Counts, background: &Counts, bins: u32, ties: Tie
     let last = last_signal.min(background.support().1);
     if bins <= 1 || last < first {
         // Nobody to lose against, or out of everyone's reach.
-        return Detection {
-            probability: 1.0,
-            miss: 0.0,
-        };
+        return Detection::new(1.0, 0.0);
     }
     let sigma = signal.sigma().min(background.sigma());
     let stride = ((sigma / POINTS_PER_SIGMA) as u64).max(1);

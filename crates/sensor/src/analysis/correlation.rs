@@ -142,10 +142,7 @@ fn take(
                 .filter(move |s| word >> s & 1 == 1)
                 .map(move |s| (edge, s))
         })
-        .map(|(edge, spad)| SpadEvent {
-            time: exposure.rising(edge) - half,
-            spad,
-        })
+        .map(|(edge, spad)| SpadEvent::new(exposure.rising(edge) - half, spad))
         .collect();
     let mut gate = simulation(&config, silicon, &exposure, 2, &pulses);
     let probes = &gate.probes()[0];

@@ -164,19 +164,12 @@ pub fn reset(config: &SensorConfig, silicon: &Silicon) -> ResetTiming {
     let interrupted = after_reset(config, silicon, config.largest_start(), PERIODS);
     let stopped = after_reset(config, silicon, 1, PERIODS);
     ResetTiming {
-        width: interrupted.width,
-        to_stage_clock: interrupted.last_stage_rise,
-        to_counter_clk: stopped.counter_clk,
+        to_counter_clk: stopped.to_counter_clk,
+        ..interrupted
     }
 }
 
-struct AfterReset {
-    width: Time,
-    last_stage_rise: Time,
-    counter_clk: Time,
-}
-
-fn after_reset(config: &SensorConfig, silicon: &Silicon, start: u16, periods: u32) -> AfterReset {
+fn after_reset(config: &SensorConfig, silicon: &Silicon, start: u16, periods: u32) -> ResetTiming {
     let mut config = config.clone();
     config.stop_phase_ps = 0.0;
     let exposure = Exposure::new(&config, periods, 2);
@@ -196,12 +189,10 @@ fn after_reset(config: &SensorConfig, silicon: &Silicon, start: u16, periods: u3
     let fall = first_after(recorder.falling_edges(reset), rise);
     let within = |t: &Time| (rise..fall).contains(t);
     let stage_rises = stages.iter().flat_map(|&net| recorder.rising_edges(net));
-    AfterReset {
+    let last_rise = stage_rises.filter(within).max();
+    ResetTiming {
         width: fall - rise,
-        last_stage_rise: stage_rises
-            .filter(within)
-            .max()
-            .map_or(Time::ZERO, |t| t - rise),
-        counter_clk: first_after(recorder.rising_edges(clk), rise) - rise,
+        to_stage_clock: last_rise.map_or(Time::ZERO, |t| t - rise),
+        to_counter_clk: first_after(recorder.rising_edges(clk), rise) - rise,
     }
 }

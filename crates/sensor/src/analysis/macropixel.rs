@@ -21,7 +21,8 @@ use crate::units::Time;
 pub struct MacropixelTiming {
     /// The netlist that is analysed, which names the nets of the paths.
     pub netlist: Netlist,
-    probes: Probes,
+    /// Handles of the macropixel's nets.
+    pub probes: Probes,
     /// CLK falls → LOCAL_STOP rises: the ripple delay of the thesis (4.6, Fig. 56).
     pub ripple: Path,
     /// CLK falls → STROBE rises.
@@ -200,11 +201,6 @@ impl MacropixelTiming {
     /// register's change.
     pub fn strobe_period(&self) -> Time {
         self.forbidden(0).1
-    }
-
-    /// Handles of the macropixel's nets.
-    pub fn probes(&self) -> &Probes {
-        &self.probes
     }
 
     /// Between which edges this macropixel strobes and counts first: by the middle of what is certain, whatever limits say.

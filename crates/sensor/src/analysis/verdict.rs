@@ -126,7 +126,7 @@ impl TimingVerdict {
         if let Some(race) = race {
             margins.push(Margin {
                 check: "window law".to_owned(),
-                path: pixel.probes().p_counter(),
+                path: pixel.probes.p_counter(),
                 // Where the law rounds to the safe side, too.
                 slack: race.slack().min(Time::from_fs(-1)),
                 fault: Some(Fault::Race(race)),
@@ -239,7 +239,7 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
         }
         margins.push(margin);
     }
-    let counter_reset = pixel.probes().path(Probe::CounterReset);
+    let counter_reset = pixel.probes.path(Probe::CounterReset);
     let path = format!("STOP rise to {counter_reset} fall");
     if let Some((slack, race)) = pixel.first_count(period, phase, aim) {
         margins.push(Margin {
@@ -253,7 +253,7 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
         let cutting = pixel.cutting(period).filter(|_| slack < Time::ZERO);
         margins.push(Margin {
             check: "blocking COUNTER_CLK".to_owned(),
-            path: format!("CLK fall to {} rise", pixel.probes().path(Probe::LocalStop)),
+            path: format!("CLK fall to {} rise", pixel.probes.path(Probe::LocalStop)),
             slack,
             fault: cutting.map(|(from, until)| Fault::CutPulse { from, until }),
         });

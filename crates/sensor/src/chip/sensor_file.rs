@@ -234,7 +234,7 @@ impl SensorConfig {
     /// Unknown keys, wrong types and impossible values, all of them at once.
     pub fn read_document(document: &Document) -> Result<Self, InputError> {
         let mut faults = Vec::new();
-        let read = document.section::<Self>("", document.table(), &mut faults);
+        let read = document.section::<Self>("", &document.table, &mut faults);
         let mut config: Self = read.try_into().unwrap_or_default();
         for file in [
             &mut config.liberty,
@@ -242,7 +242,7 @@ impl SensorConfig {
             &mut config.liberty_fast,
         ] {
             if !file.as_os_str().is_empty() {
-                *file = placed(document.folder(), file);
+                *file = placed(&document.folder, file);
             }
         }
         // A library that cannot be read is complained of below.
@@ -251,7 +251,7 @@ impl SensorConfig {
         let library = library.map(|read| &read.liberty);
         for contract in &CONTRACTS {
             if let Some(block) = (contract.own_mut)(&mut config)
-                && let Err(message) = block.load(document.folder(), library)
+                && let Err(message) = block.load(&document.folder, library)
             {
                 let path = contract.key.to_owned();
                 faults.push(Fault { path, message });

@@ -16,9 +16,7 @@ use crate::chip::{
     Exposure, LoadPins, Probe, Probes, ReadPins, Sensor, SensorPins, Tdc, WindowLaw, array,
     load_path, metdc_delay_line,
 };
-use crate::kernel::{
-    Drive, Kernel, LANES, Observer, Policy, Statistics, Stimulus, TimingChecks, merge,
-};
+use crate::kernel::{Drive, Kernel, LANES, Observer, Policy, Statistics, TimingChecks, merge};
 use crate::netlist::{NetId, Netlist, Timing};
 use crate::photon::{PhotonStream, SpadEvent};
 use crate::stimulus::{
@@ -122,7 +120,7 @@ impl GateSimulation {
 
     /// Where load and exposure lie in simulation time.
     pub fn schedule(&self) -> Schedule {
-        self.plan.schedule()
+        self.plan.schedule
     }
 
     /// Timing checks of this netlist in the sensor's corner, from the end of the power-up reset on, to run it with. The
@@ -156,7 +154,7 @@ impl GateSimulation {
 
     /// Simulates load and exposure to the end.
     pub fn run<O: Observer>(&mut self, observer: &mut O) {
-        self.run_until(self.plan.schedule().end, observer);
+        self.run_until(self.plan.schedule.end, observer);
     }
 
     /// Simulates from power-up to `until`.
@@ -170,40 +168,31 @@ impl GateSimulation {
         self.kernel.run(&mut stimulus, until, observer);
     }
 
-    /// Reads all counts through the pins, after [`GateSimulation::run`] and as often as one likes.
+    /// Reads all counts through the pins, after [`GateSimulation::run`] and as often as one likes; at the same time the start values
+    /// of the next exposure (row-major) are loaded, if there are any, which takes its own time.
     ///
     /// # Errors
     /// When a bit of a count is unknown.
-    pub fn read_out<O: Observer>(&mut self, observer: &mut O) -> Result<Histograms, EngineError> {
-        self.read_out_with(self.kernel.now(), merge([]), observer)
-    }
-
-    /// The same while the start values of the next exposure (row-major) are loaded, which takes its own time.
-    ///
-    /// # Errors
-    /// As [`GateSimulation::read_out`].
-    pub fn read_out_while_loading<O: Observer>(
+    pub fn read_out<O: Observer>(
         &mut self,
-        starts: &[u16],
+        next: Option<&[u16]>,
         observer: &mut O,
     ) -> Result<Histograms, EngineError> {
-        debug_assert_eq!(starts.len(), self.probes.len());
-        let cols = self.plan.order().cols;
-        let codes = self.sensor.load_codes(starts);
-        let stream = load_path::stream(&codes, cols, self.sensor.counter_bits);
-        let clock = self.sensor.load_clock();
-        let times = (self.kernel.now(), self.kernel.now() + clock.period());
-        let (end, load) = reload_stimulus(LoadPins::of(&self.netlist), clock, times, &stream);
-        self.read_out_with(end, load, observer)
-    }
-
-    fn read_out_with<O: Observer>(
-        &mut self,
-        others_end: Time,
-        others: Stimulus<'_>,
-        observer: &mut O,
-    ) -> Result<Histograms, EngineError> {
-        let order = self.plan.order();
+        let now = self.kernel.now();
+        let stream = next.map(|starts| {
+            debug_assert_eq!(starts.len(), self.probes.len());
+            let codes = self.sensor.load_codes(starts);
+            load_path::stream(&codes, self.plan.order.cols, self.sensor.counter_bits)
+        });
+        let (others_end, others) = match &stream {
+            None => (now, merge([])),
+            Some(stream) => {
+                let clock = self.sensor.load_clock();
+                let times = (now, now + clock.period());
+                reload_stimulus(LoadPins::of(&self.netlist), clock, times, stream)
+            }
+        };
+        let order = self.plan.order;
         let pins = ReadPins::of(&self.netlist);
         let (clock, start) = (self.sensor.read_clock(), self.kernel.now());
         let (end, read) = read_stimulus(&pins, clock, start, order.periods());
@@ -341,10 +330,6 @@ impl Gate {
 impl Engine for Gate {
     fn law(&self) -> WindowLaw {
         WindowLaw::new(&self.sensor, &self.exposure)
-    }
-
-    fn bins(&self) -> usize {
-        self.sensor.bins
     }
 }
 

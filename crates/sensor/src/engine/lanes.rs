@@ -18,7 +18,8 @@ pub struct LaneSimulation {
     sensor: Sensor,
     netlist: Netlist,
     probes: Probes,
-    kernel: LaneKernel,
+    /// The kernel, for what it counted.
+    pub kernel: LaneKernel,
     shared: StimulusPlan,
     serial: Vec<BitVec>,
     pulses: Vec<(usize, SpadEvent)>,
@@ -72,12 +73,7 @@ impl LaneSimulation {
 
     /// Where load and exposure lie in simulation time.
     pub(crate) fn schedule(&self) -> Schedule {
-        self.shared.schedule()
-    }
-
-    /// The kernel, for what it counted.
-    pub fn kernel(&self) -> &LaneKernel {
-        &self.kernel
+        self.shared.schedule
     }
 
     /// Simulates load and exposure to the end.

@@ -23,13 +23,11 @@ mod histograms;
 mod lanes;
 mod late_cycle;
 pub mod load;
-mod own_clk;
 pub mod readout;
 mod timed;
 mod traits;
 pub mod waveform;
 mod window;
-mod work;
 
 pub use cancelling::{Cancelling, cancelled};
 pub use cohort::{Cohort, CohortOptions, variance_left_out};
@@ -41,8 +39,7 @@ pub use histograms::Histograms;
 pub use lanes::LaneSimulation;
 pub use late_cycle::late_cycle;
 pub use timed::{ClosedFormCoverage, Doubt, Runner, Timed};
-pub use traits::{Engine, Expose, Exposed, LitPixel, PulsedPixel, Replay};
+pub use traits::{Engine, Expose, Exposed, LitPixel, PulsedPixel, Replay, Work};
 pub use window::Window;
-pub use work::Work;
 
 use error::{follows, has_a_line_a_spad};

@@ -1,11 +1,14 @@
 //! What an engine is: the traits that all implement, what they are given and what they give.
 
 use std::borrow::Cow;
+use std::ops::AddAssign;
 
-use super::own_clk::by_own_clk;
-use super::{EngineError, Histograms, Work};
+use serde::Serialize;
+
+use super::{EngineError, Histograms};
 use crate::chip::{Sensor, WindowLaw};
 use crate::photon::{PhotonStream, PixelLight, SpadEvent};
+use crate::units::Time;
 
 /// What every engine tells of itself. What it runs is in [`Replay`] and [`Expose`].
 pub trait Engine: Sync {
@@ -13,7 +16,9 @@ pub trait Engine: Sync {
     fn law(&self) -> WindowLaw;
 
     /// Bins of a macropixel.
-    fn bins(&self) -> usize;
+    fn bins(&self) -> usize {
+        self.law().sensor().bins
+    }
 
     /// How many macropixels are best given to this engine at once.
     fn batch(&self) -> usize {
@@ -129,4 +134,66 @@ pub trait Expose: Engine {
     /// # Errors
     /// When this engine cannot tell what the circuit does in this light.
     fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError>;
+}
+
+// A macropixel's pulses by its own CLK.
+//
+// ```text
+//   CLK of column 0  ▔▔▁▁▔▔▁▁▔▔▁▁        what a macropixel does is the same at another time: the engines run all of them by
+//   CLK of column c  ▔▔▔▁▁▔▔▁▁▔▔▁        column 0's CLK, and pulses come earlier instead
+//                      └ Sensor::clk_skew(c)
+// ```
+
+/// The pulses of macropixel `number` as one sees them to whose column CLK comes as to the first.
+pub(super) fn by_own_clk<'p>(
+    sensor: &Sensor,
+    number: u32,
+    pulses: &'p [SpadEvent],
+) -> Cow<'p, [SpadEvent]> {
+    let skew = sensor.clk_skew(number as usize % sensor.cols);
+    if skew == Time::ZERO {
+        return Cow::Borrowed(pulses);
+    }
+    let earlier = pulses.iter().map(|pulse| SpadEvent {
+        time: pulse.time - skew,
+        ..*pulse
+    });
+    earlier.collect()
+}
+
+/// What an engine did, and what it had no need to do. Sums over macropixels.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Work {
+    /// Macropixels asked for.
+    pub macropixels: u64,
+    /// Those not simulated because their SPADs are switched off.
+    pub skipped_dark: u64,
+    /// Those not simulated because their window never opens.
+    pub skipped_closed: u64,
+    /// Photons and dark counts of the exposure that were drawn; those that several windows look back on, for each of them.
+    pub photons_drawn: u64,
+    /// SPAD pulses that the engine looked at.
+    pub pulses: u64,
+    /// Drawn photons that would have been such pulses, had they not met a blind SPAD.
+    pub lost_to_dead_time: u64,
+    /// Those pulses in time windows that cancel in their SPAD's flip-flop, two at a time ([`Cancelling`](super::Cancelling)).
+    pub cancelled: u64,
+    /// CLK periods of the exposure, over all macropixels.
+    pub clk_periods: u64,
+    /// Those that were simulated, one by one or because a photon fell into them.
+    pub clk_periods_visited: u64,
+}
+
+impl AddAssign for Work {
+    fn add_assign(&mut self, other: Self) {
+        self.macropixels += other.macropixels;
+        self.skipped_dark += other.skipped_dark;
+        self.skipped_closed += other.skipped_closed;
+        self.photons_drawn += other.photons_drawn;
+        self.pulses += other.pulses;
+        self.lost_to_dead_time += other.lost_to_dead_time;
+        self.cancelled += other.cancelled;
+        self.clk_periods += other.clk_periods;
+        self.clk_periods_visited += other.clk_periods_visited;
+    }
 }

@@ -70,7 +70,8 @@ pub struct UnequalBins;
 /// Finds echoes in the histograms of one sensor and exposure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EchoFinder {
-    bin_s: f64,
+    /// Length of a bin, s.
+    pub bin_s: f64,
     peak: PeakOptions,
     ln_false_alarm: f64,
     scan: Scan,
@@ -123,17 +124,12 @@ impl EchoFinder {
             bin_s,
             peak: options.peak,
             ln_false_alarm: options.false_alarm_rate.ln(),
-            scan: Scan::matched(response.pulse_sigma_bins(), config.bins, laser_cycles),
+            scan: Scan::matched(response.pulse_sigma_bins, config.bins, laser_cycles),
             full: (config.overflow == Overflow::Saturate && capacity < laser_cycles)
                 .then_some(capacity),
             walk: options.correct_walk.then_some(walk),
             uncounted_of: complement.map(|_| laser_cycles),
         })
-    }
-
-    /// Length of a bin, s.
-    pub fn bin_s(&self) -> f64 {
-        self.bin_s
     }
 
     /// The echo in `counts`, one entry per bin, earliest first; `None` if no bin stands out at all.
@@ -193,7 +189,7 @@ impl EchoFinder {
         let Some(Ok(walk)) = self.walk else {
             return false;
         };
-        corrected.light.signal > walk.response.counting().spads as f64
+        corrected.light.signal > walk.response.counting.spads as f64
             && corrected.bound_bins > MOST_BOUND_BINS
     }
 }

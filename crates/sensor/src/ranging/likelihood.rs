@@ -241,7 +241,7 @@ impl Likelihood<'_> {
         }
         let mut step = solved(matrix, wanted)?;
         // No farther than the slopes can be trusted: half a bin or pulse, and factors of e.
-        let most = [0.5 + 0.5 * self.response.pulse_sigma_bins(), 1.0, 1.5, 0.5];
+        let most = [0.5 + 0.5 * self.response.pulse_sigma_bins, 1.0, 1.5, 0.5];
         let scale = step
             .iter()
             .zip(most)
@@ -254,8 +254,8 @@ impl Likelihood<'_> {
     /// `light` after a step, within what light can be.
     fn moved(&self, light: &EchoLight, step: [f64; PARAMETERS]) -> EchoLight {
         let reach = BESIDE * light.sigma_bins;
-        let last = self.response.bins() as f64 - 1.0;
-        let pulse = self.response.pulse_sigma_bins();
+        let last = self.response.bins as f64 - 1.0;
+        let pulse = self.response.pulse_sigma_bins;
         let least = 1e-3 / (self.cycles * last.max(1.0));
         EchoLight {
             position_bins: (light.position_bins + step[0]).clamp(-reach, last + reach),

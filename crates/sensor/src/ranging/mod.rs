@@ -3,7 +3,6 @@
 mod arrival;
 mod calibration;
 mod counting;
-mod edge;
 mod expected;
 mod finder;
 mod likelihood;

@@ -162,7 +162,7 @@ fn the_mean_histogram_is_that_of_simulated_light() {
                 position_bins: 6.7,
                 signal,
                 background_per_bin: background_hz * bin_s,
-                sigma_bins: response.pulse_sigma_bins(),
+                sigma_bins: response.pulse_sigma_bins,
             });
             let trials = f64::from(cycles * number);
             for (bin, chance) in chances.into_iter().enumerate() {
@@ -361,7 +361,7 @@ proptest! {
             position_bins,
             signal: ln_signal.exp(),
             background_per_bin: 0.02,
-            sigma_bins: response.pulse_sigma_bins(),
+            sigma_bins: response.pulse_sigma_bins,
         };
         let cycles = 100_000;
         let counts: Vec<f64> = response.chances(&light).iter().map(|p| p * f64::from(cycles)).collect();
@@ -383,7 +383,7 @@ proptest! {
 fn echoes_that_are_no_pulse_are_wide_or_told() {
     let config = SensorConfig::default();
     let finder = finder(&config, 520);
-    let response = Response::new(&config, finder.bin_s(), PULSE_SIGMA);
+    let response = Response::new(&config, finder.bin_s, PULSE_SIGMA);
     let of = |light: EchoLight| -> Vec<u32> {
         response
             .chances(&light)
@@ -391,7 +391,7 @@ fn echoes_that_are_no_pulse_are_wide_or_told() {
             .map(|p| (1000.0 * p).round() as u32)
             .collect()
     };
-    let sigma_bins = response.pulse_sigma_bins();
+    let sigma_bins = response.pulse_sigma_bins;
     let echo = EchoLight {
         position_bins: 6.3,
         signal: 2.0,

@@ -16,8 +16,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::edge::share_before;
-use super::expected::{EchoLight, Response};
+use super::expected::{EchoLight, Response, share_before};
 use super::likelihood::{BESIDE, ECHO, Fit, Free, IN_REGION, Likelihood, WIDE_ECHO};
 use super::peak::Peak;
 use crate::chip::EventType;
@@ -129,7 +128,7 @@ impl WalkCorrection {
         // The glow after an echo that came before the window may look like a weaker one.
         let begins_unseen = best.light.position_bins < 2.0 * best.light.sigma_bins;
         // So may the few bins in which enough SPADs fire, before all are blind.
-        let counting = self.response.counting();
+        let counting = self.response.counting;
         let is_edge = counting.threshold > 0 && best.light.signal > counting.spads as f64;
         let begins_unseen = begins_unseen || is_edge;
         if linear.is_some() && begins_unseen {
@@ -151,7 +150,7 @@ impl WalkCorrection {
         if of_wide.explains() && of_wide.light.sigma_bins < self.widest() {
             return Ok(of_wide.into());
         }
-        let half = (4.0 * self.response.pulse_sigma_bins()).ceil().max(2.0) as usize;
+        let half = (4.0 * self.response.pulse_sigma_bins).ceil().max(2.0) as usize;
         let first = peak.peak_bin.saturating_sub(half);
         let of_region = Likelihood {
             bins: first..(peak.peak_bin + half + 1).min(counts.len()),
@@ -174,11 +173,11 @@ impl WalkCorrection {
         cycles: f64,
         (peak, background_per_bin): (&Peak, f64),
     ) -> Option<EchoLight> {
-        let counting = self.response.counting();
+        let counting = self.response.counting;
         if counting.event_type != EventType::Greater {
             return None;
         }
-        let half = (2.0 * self.response.pulse_sigma_bins()).ceil().max(1.0) as usize;
+        let half = (2.0 * self.response.pulse_sigma_bins).ceil().max(1.0) as usize;
         let (mut signal, mut moment) = (0.0, 0.0);
         for (bin, &counts) in counts.iter().enumerate() {
             if counts > 0.98 * cycles {
@@ -194,7 +193,7 @@ impl WalkCorrection {
             position_bins: moment / signal,
             signal,
             background_per_bin,
-            sigma_bins: self.response.pulse_sigma_bins(),
+            sigma_bins: self.response.pulse_sigma_bins,
         })
     }
 
@@ -204,15 +203,15 @@ impl WalkCorrection {
         likelihood: &Likelihood<'_>,
         (peak, background_per_bin): (&Peak, f64),
     ) -> Result<Fit, WalkLeft> {
-        let sigma_bins = self.response.pulse_sigma_bins();
+        let sigma_bins = self.response.pulse_sigma_bins;
         let edge = self.rising_edge(likelihood, background_per_bin);
-        let has_threshold = self.response.counting().threshold > 0;
+        let has_threshold = self.response.counting.threshold > 0;
         let edge_is_seen = |bin: usize| bin as f64 > 1.0 + sigma_bins;
         let mut starts: Vec<(f64, EchoLight)> = Vec::new();
         // Where light makes bins count less, too, each light has its own places.
         let (step, fits) = match edge {
             // With a THRESHOLD few bins count, and several lights may explain them.
-            Some((bin, _)) if edge_is_seen(bin) && self.response.counting().threshold == 0 => {
+            Some((bin, _)) if edge_is_seen(bin) && self.response.counting.threshold == 0 => {
                 (0.4, 2)
             }
             Some(_) => (0.2, 24),
@@ -282,7 +281,7 @@ impl WalkCorrection {
     /// The best of a fit and of those with less background. Under a THRESHOLD bins without an echo say next to nothing of the background, and
     /// fits stay where it is too much.
     fn darker(&self, likelihood: &Likelihood<'_>, best: Fit) -> Fit {
-        if self.response.counting().threshold == 0 {
+        if self.response.counting.threshold == 0 {
             return best;
         }
         let held = Likelihood {
@@ -303,13 +302,13 @@ impl WalkCorrection {
 
     /// The widest echo, whose ends are to be seen either side of it.
     fn widest(&self) -> f64 {
-        let of_bins = self.response.bins() as f64 / 8.0;
-        of_bins.max(1.5 * self.response.pulse_sigma_bins())
+        let of_bins = self.response.bins as f64 / 8.0;
+        of_bins.max(1.5 * self.response.pulse_sigma_bins)
     }
 
     /// The light of a bin that counts with `chance`, if SPADs are ready for it and more light makes it count more.
     fn light(&self, chance: f64) -> f64 {
-        let counting = self.response.counting();
+        let counting = self.response.counting;
         let fired = counting.fired_for(chance.min(0.999));
         -(counting.spads as f64) * (-fired).ln_1p()
     }
@@ -317,7 +316,7 @@ impl WalkCorrection {
     /// The background to begin with, and the most that it may be: from the third of the bins with the fewest counts, because the
     /// median is too much where an echo is wide. Where SPADs are blind they say too little, which the fit finds out.
     fn background(&self, counts: &[f64], cycles: f64) -> [f64; 2] {
-        if self.response.counting().event_type != EventType::Greater {
+        if self.response.counting.event_type != EventType::Greater {
             return [0.03, 1.0];
         }
         let mut sorted = counts.to_vec();
@@ -334,7 +333,7 @@ impl WalkCorrection {
 
     /// The first bin of an echo's rising edge, and the photons of the echo until its end.
     fn rising_edge(&self, likelihood: &Likelihood<'_>, background: f64) -> Option<(usize, f64)> {
-        let counting = self.response.counting();
+        let counting = self.response.counting;
         if counting.event_type != EventType::Greater {
             return None;
         }

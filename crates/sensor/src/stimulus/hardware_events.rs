@@ -138,7 +138,8 @@ pub struct HardwareEvents {
     roles: Vec<Vec<(u32, Role)>>,
     pixels: Vec<Macropixel>,
     not_before: Time,
-    report: HardwareEventReport,
+    /// What was seen so far.
+    pub report: HardwareEventReport,
     /// By kind, those that were not kept among them.
     counts: [u64; HardwareEventKind::ALL.len()],
 }
@@ -201,11 +202,6 @@ impl HardwareEvents {
             report: HardwareEventReport::default(),
             counts: [0; HardwareEventKind::ALL.len()],
         }
-    }
-
-    /// What was seen so far.
-    pub fn report(&self) -> &HardwareEventReport {
-        &self.report
     }
 
     /// How often one kind was seen so far, kept or not.

@@ -13,4 +13,4 @@ mod verilog;
 pub use hardware_events::{HardwareEvent, HardwareEventKind, HardwareEventReport, HardwareEvents};
 pub use plan::{Schedule, Skip, StimulusPlan};
 pub(crate) use plan::{load_stimulus, read_stimulus, reload_stimulus};
-pub use verilog::{Export, export_annotated_verilog, export_netlist, export_verilog};
+pub use verilog::{Export, export_verilog};

@@ -151,9 +151,11 @@ pub struct StimulusPlan {
     exposure: Exposure,
     stream: bitvec::vec::BitVec,
     pulses: Vec<(usize, SpadEvent)>,
-    schedule: Schedule,
+    /// Where load and exposure lie in simulation time.
+    pub schedule: Schedule,
     skip: Option<Skip>,
-    order: ReadoutOrder,
+    /// In which order counts leave the pins.
+    pub(crate) order: ReadoutOrder,
     is_read: bool,
 }
 
@@ -233,19 +235,9 @@ impl StimulusPlan {
         self
     }
 
-    /// In which order counts leave the pins.
-    pub(crate) fn order(&self) -> ReadoutOrder {
-        self.order
-    }
-
     /// In which order counts leave the pins, if they are read.
     pub fn readout(&self) -> Option<ReadoutOrder> {
         self.is_read.then_some(self.order)
-    }
-
-    /// Where load and exposure lie in simulation time.
-    pub fn schedule(&self) -> Schedule {
-        self.schedule
     }
 
     /// All drives in time order.

@@ -39,7 +39,7 @@ pub(crate) fn parse_starts(
 fn starts_of<R: BufRead>(lines: Lines<R>, config: &SensorConfig) -> Result<Vec<u16>, InputError> {
     let mut starts = vec![None; config.pixels()];
     let mut first_line = HashMap::new();
-    let source = &lines.source().to_owned();
+    let source = &lines.source.to_owned();
     for row in rows(lines, ["row", "col", "init"])? {
         let (line, [r, c, init]) = row?;
         let pixel = pixel_index(source, line, r, c, config)?;
@@ -156,7 +156,7 @@ fn events_of<R: BufRead>(
     config: &SensorConfig,
     exposure: &Exposure,
 ) -> Result<Recording, InputError> {
-    let source = &lines.source().to_owned();
+    let source = &lines.source.to_owned();
     let mut recording = Recording::empty(config);
     for row in rows(lines, ["time_fs", "row", "col", "spad"])? {
         let (line, [time_fs, r, c, spad]) = row?;
@@ -174,10 +174,7 @@ fn events_of<R: BufRead>(
             );
             return Err(InputError::at(source, line, message));
         }
-        let event = SpadEvent {
-            time: Time::from_fs(time_fs),
-            spad: spad as u8,
-        };
+        let event = SpadEvent::new(Time::from_fs(time_fs), spad as u8);
         recording.push(pixel, event, exposure);
     }
     recording.settle(config);
@@ -212,7 +209,7 @@ fn rows<R: BufRead, const N: usize>(
     header: [&'static str; N],
 ) -> Result<impl Iterator<Item = Result<(usize, [i64; N]), InputError>>, InputError> {
     let expected = header.join(",");
-    let source = lines.source().to_owned();
+    let source = lines.source.to_owned();
     match lines.next_used()? {
         Some((_, found)) if found.split(',').map(str::trim).eq(header) => {}
         Some((line, found)) => {

@@ -84,39 +84,17 @@ impl Export<'_> {
     }
 }
 
-/// [`Export::write`] of cells and netlist alone.
+/// Writes the chip of a sensor into `folder`: see [`Export`], whose top module has the chip's own name.
 ///
 /// # Errors
-/// As [`Export::write`].
-pub fn export_netlist(folder: &Path, config: &SensorConfig) -> Result<(), InputError> {
-    let (top, plan, timing) = (array::NAME, None, None);
-    Export { top, plan, timing }.write(folder, config)
-}
-
-/// [`Export::write`] with stimulus and testbench.
-///
-/// # Errors
-/// As [`Export::write`].
+/// Output that cannot be written.
 pub fn export_verilog(
     folder: &Path,
     config: &SensorConfig,
-    plan: &StimulusPlan,
+    plan: Option<&StimulusPlan>,
+    timing: Option<&Timing>,
 ) -> Result<(), InputError> {
-    let (top, plan, timing) = (array::NAME, Some(plan), None);
-    Export { top, plan, timing }.write(folder, config)
-}
-
-/// [`Export::write`] with stimulus, testbench and other delays than the library's.
-///
-/// # Errors
-/// As [`Export::write`].
-pub fn export_annotated_verilog(
-    folder: &Path,
-    config: &SensorConfig,
-    plan: &StimulusPlan,
-    timing: &Timing,
-) -> Result<(), InputError> {
-    let (top, plan, timing) = (array::NAME, Some(plan), Some(timing));
+    let top = array::NAME;
     Export { top, plan, timing }.write(folder, config)
 }
 
@@ -144,7 +122,7 @@ fn write_testbench(
     } else {
         ""
     };
-    let schedule = plan.schedule();
+    let schedule = plan.schedule;
     let name = top.name();
     let mut pins = 0;
     let (mut ports, mut outputs) = (Vec::new(), Vec::new());

@@ -3,9 +3,8 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::echo::Echo;
+use super::echo::{Echo, PulseTrain};
 use super::profile::Profile;
-use super::train::PulseTrain;
 
 /// A part of light that is drawn by itself: constant background and an echo in some laser cycles, of which only some
 /// photons are kept.

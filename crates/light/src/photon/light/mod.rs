@@ -17,21 +17,19 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::units::Time;
-pub use echo::Echo;
+pub(super) use echo::MOST_PER_PULSE;
+pub use echo::{Echo, OtherLaser, PulseTrain};
 pub use error::LightError;
 use error::is_amount;
 pub(super) use layer::Layer;
 pub use profile::Profile;
 pub use spad_spread::SpadSpread;
-pub(super) use train::MOST_PER_PULSE;
-pub use train::{OtherLaser, PulseTrain};
 
 mod echo;
 mod error;
 mod layer;
 mod profile;
 mod spad_spread;
-mod train;
 
 /// The light of some successive laser cycles.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,7 +63,7 @@ impl Segment {
         };
         let profile = self.profile.as_ref().map(|profile| Layer {
             profile: Some(profile),
-            ..Layer::constant(profile.greatest_hz())
+            ..Layer::constant(profile.greatest_hz)
         });
         let further = self.further.iter().map(Layer::of_echo);
         let trains = self.trains.iter().map(Layer::of_train);
@@ -298,7 +296,7 @@ impl PixelLight {
     pub fn background_hz(&self) -> f64 {
         let rate_hz = |segment: &Segment| {
             let profile = segment.profile.as_ref();
-            segment.background_hz + profile.map_or(0.0, |profile| profile.greatest_hz())
+            segment.background_hz + profile.map_or(0.0, |profile| profile.greatest_hz)
         };
         let rates_hz = self.segments().map(rate_hz);
         let dark_hz = self

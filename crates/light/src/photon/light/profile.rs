@@ -7,9 +7,10 @@ use crate::units::Time;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
     /// Femtoseconds after the start of the laser cycle.
-    edges_fs: Vec<i64>,
+    pub edges_fs: Vec<i64>,
     rates_hz: Vec<f64>,
-    greatest_hz: f64,
+    /// The greatest rate, photons per second.
+    pub greatest_hz: f64,
 }
 
 impl Profile {
@@ -48,11 +49,6 @@ impl Profile {
         rate.copied().unwrap_or(0.0)
     }
 
-    /// The greatest rate, photons per second.
-    pub fn greatest_hz(&self) -> f64 {
-        self.greatest_hz
-    }
-
     /// Mean number of photons from one time until another one, femtoseconds after the start of the laser cycle.
     pub fn photons(&self, from_fs: f64, until_fs: f64) -> f64 {
         let pieces = self.edges_fs.windows(2).zip(&self.rates_hz);
@@ -62,10 +58,5 @@ impl Profile {
                 rate_hz * 1e-15 * lit_fs.max(0.0)
             })
             .sum()
-    }
-
-    /// When the rate changes, femtoseconds after the start of the laser cycle.
-    pub fn edges_fs(&self) -> &[i64] {
-        &self.edges_fs
     }
 }

@@ -30,8 +30,7 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::kind::Kind;
-use super::part::PixelStream;
+use super::part::{Kind, PixelStream};
 use crate::numerics::branchless;
 use crate::photon::philox::{LANES, blocks_from};
 use crate::photon::spad::Photon;
@@ -142,11 +141,6 @@ fn add_gaps(
 const FARTHEST: f64 = (1u64 << 50) as f64;
 
 impl<'a> PixelStream<'a> {
-    /// Whether the light is drawn by laser cycle.
-    pub fn is_bright(&self) -> bool {
-        self.is_bright
-    }
-
     /// Mean number of background photons of a SPAD in a dead time.
     pub fn per_dead_time(&self) -> f64 {
         self.stream.config.spads.dead_time.as_fs() as f64
@@ -176,19 +170,19 @@ impl<'a> PixelStream<'a> {
         let ends_fs = self.stream.ends_fs();
         let slots = self.stream.slots;
         let slot = slots.at(time_fs.clamp(ends_fs.start, ends_fs.end - 1));
-        slot.min(slots.count() - 1) / BLOCK_SLOTS
+        slot.min(slots.count - 1) / BLOCK_SLOTS
     }
 
     /// Blocks of a laser cycle.
     pub fn blocks(&self) -> u32 {
-        self.stream.slots.count().div_ceil(BLOCK_SLOTS)
+        self.stream.slots.count.div_ceil(BLOCK_SLOTS)
     }
 
     /// When a block begins and ends, fs after the start of its cycle.
     pub fn block_fs(&self, block: u32) -> Range<i64> {
         let slots = self.stream.slots;
         let end = (block + 1) * BLOCK_SLOTS;
-        let end_fs = match end >= slots.count() {
+        let end_fs = match end >= slots.count {
             true => self.stream.ends_fs().end,
             false => slots.start_fs(end),
         };
@@ -244,11 +238,7 @@ impl<'a> PixelStream<'a> {
                     self.keeps_background(cycle, spad, time_fs, words)
                 };
                 if time >= Time::ZERO && is_kept {
-                    photons.push(Photon {
-                        time,
-                        spad,
-                        breeds: self.kind == Kind::Breeding,
-                    });
+                    photons.push(Photon::new(time, spad, self.kind == Kind::Breeding));
                 }
             }
         }

@@ -44,12 +44,14 @@ pub struct Draw {
     pub(super) counts: Blocks,
     pub(super) background: Blocks,
     pub(super) echo: Blocks,
-    pub(super) runs: Vec<Run>,
+    /// Background photons by slot.
+    pub runs: Vec<Run>,
     /// Photons of the whole echo.
     pub(super) echo_photons: usize,
     /// What the drawn slots are, fs after the start of the cycle.
     pub(super) within_fs: Range<i64>,
-    pub(super) group: Group,
+    /// The group.
+    pub group: Group,
     pub(super) photons: usize,
     /// Photons of the exposure.
     of_exposure: usize,
@@ -120,16 +122,6 @@ impl Draw {
         let kept = self.kept.iter();
         let kept = kept.filter(|&&(place, _)| self.group.split(place).0 < cycles);
         self.of_exposure = background.chain(echo).sum::<usize>() + kept.count();
-    }
-
-    /// The group.
-    pub fn group(&self) -> Group {
-        self.group
-    }
-
-    /// Background photons by slot.
-    pub fn runs(&self) -> &[Run] {
-        &self.runs
     }
 
     /// Blocks of random words of background photons.

@@ -208,7 +208,7 @@ impl PixelStream<'_> {
                 continue;
             }
             // As far from the ends of its slot as background photons.
-            let slot = slots.at(time_fs).min(slots.count() - 1);
+            let slot = slots.at(time_fs).min(slots.count - 1);
             let (start_fs, margin_fs) = (slots.start_fs(slot), slots.margin_fs());
             let last_fs = start_fs + slots.length_fs() - margin_fs - 1;
             let time_fs = time_fs.clamp(start_fs + margin_fs, last_fs);

@@ -51,11 +51,11 @@ impl ListedEchoes {
         if let Some(foreign) = &light.foreign {
             self.photons.iter_mut().for_each(Vec::clear);
             light.strays_in(foreign, first_cycle..first_cycle + TILE as u32, |stray| {
-                self.photons[(stray.cycle - first_cycle) as usize].push(Photon {
-                    time: stream.cycle_start(stray.cycle) + Time::from_fs(stray.time_fs),
-                    spad: stray.spad,
-                    breeds: light.breeds(),
-                });
+                self.photons[(stray.cycle - first_cycle) as usize].push(Photon::new(
+                    stream.cycle_start(stray.cycle) + Time::from_fs(stray.time_fs),
+                    stray.spad,
+                    light.breeds(),
+                ));
             });
             return;
         }
@@ -97,11 +97,7 @@ impl ListedEchoes {
                 let spad = (u64::from(high) >> spad_shift) as u8;
                 if (Time::ZERO..end).contains(&time) && light.keeps_signal(cycle, spad, [low, high])
                 {
-                    self.photons[lane].push(Photon {
-                        time,
-                        spad,
-                        breeds: light.breeds(),
-                    });
+                    self.photons[lane].push(Photon::new(time, spad, light.breeds()));
                 }
             }
         }
@@ -144,11 +140,7 @@ mod tests {
             let spad = (u64::from(high) >> (u32::BITS - config.spads.grid.bits())) as u8;
             let is_one =
                 time >= Time::ZERO && time < end && light.keeps_signal(cycle, spad, [low, high]);
-            is_one.then(|| Photon {
-                time,
-                spad,
-                breeds: light.breeds(),
-            })
+            is_one.then(|| Photon::new(time, spad, light.breeds()))
         };
         (0..number.sum::<u32>()).filter_map(photon).collect()
     }

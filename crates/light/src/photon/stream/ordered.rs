@@ -71,7 +71,7 @@ impl<'a> PixelStream<'a> {
 
     /// The intensity of the echo on a SPAD until `time_fs` after the start of its cycle, photons.
     fn passed_until(&self, time_fs: i64) -> f64 {
-        let (after_fs, sigma_fs) = ((time_fs - self.arrival_fs) as f64, self.gaussian.sigma());
+        let (after_fs, sigma_fs) = ((time_fs - self.arrival_fs) as f64, self.gaussian.sigma);
         if sigma_fs == 0.0 {
             return if after_fs >= 0.0 {
                 self.signal_per_spad
@@ -133,7 +133,8 @@ pub struct OrderedEchoes<'a> {
     echoes: SmallVec<[OrderedEcho; 1]>,
     /// The next photon of all of them.
     next: Option<Photon>,
-    drawn: u64,
+    /// Photons that made avalanches so far.
+    pub drawn: u64,
 }
 
 /// The echo of one laser cycle.
@@ -184,11 +185,6 @@ impl OrderedEchoes<'_> {
             .retain(|echo| echo.start + Time::from_fs(last_fs) >= time);
     }
 
-    /// Photons that made avalanches so far.
-    pub fn drawn(&self) -> u64 {
-        self.drawn
-    }
-
     /// The next photon of all echoes and SPADs that is within the exposure.
     #[inline]
     pub(in crate::photon) fn next(&self) -> Option<Photon> {
@@ -198,11 +194,7 @@ impl OrderedEchoes<'_> {
     fn earliest(&self) -> Option<Photon> {
         let times = self.echoes.iter().flat_map(|echo| (0u8..).zip(&echo.next));
         let (&time, spad) = times.map(|(spad, time)| (time, spad)).min()?;
-        let photon = Photon {
-            time,
-            spad,
-            breeds: false,
-        };
+        let photon = Photon::new(time, spad, false);
         (time < self.end).then_some(photon)
     }
 

@@ -12,14 +12,13 @@ use smallvec::SmallVec;
 use super::exposure::{FAR_FS, PhotonStream, sampler};
 use super::foreign::Foreign;
 use super::group::{FIRST, Group, PLACE_BITS};
-use super::kind::Kind;
 use super::limits::Limits;
 use super::numbers::Numbers;
 use super::slot::Slots;
 use crate::photon::light::{Layer, PixelLight};
 use crate::photon::pulse::PulseSampler;
 use crate::photon::quantile::{NORMAL_BITS, NormalSampler};
-use crate::photon::random::layer_key;
+use crate::photon::random::{Purpose, layer_key};
 use crate::photon::spad::{Photon, SpadEvent};
 use crate::units::Time;
 
@@ -45,9 +44,9 @@ pub struct PixelStream<'a> {
     pub(in crate::photon) pixel: u32,
     pub(super) kind: Kind,
     /// All parts of a macropixel's light are, or none is.
-    pub(super) is_bright: bool,
+    pub is_bright: bool,
     /// Whether the light has one layer, all photons of which are kept.
-    pub(super) is_alone: bool,
+    pub is_alone: bool,
     /// Which photons are kept, if not all.
     pub(super) limits: Option<Limits>,
     pub(super) gaussian: NormalSampler,
@@ -164,12 +163,12 @@ impl PhotonStream {
                 arrival_fs + first_fs.floor() as i64,
                 arrival_fs + last_fs.ceil() as i64,
             ),
-            background: Numbers::new(background_hz * self.slots.length_s()),
+            background: Numbers::new(background_hz * self.slots.length_s),
             signal: Numbers::new(drawn.unwrap_or(photons)),
             gap_fs: 1e15 / background_hz,
             signal_per_spad: per_spad,
             has_long_groups: kind == Kind::Breeding
-                && background_hz * self.slots.length_s() * f64::from(FIRST) < RARE,
+                && background_hz * self.slots.length_s * f64::from(FIRST) < RARE,
             late_fs: 0,
         };
         if part.foreign.is_some() {
@@ -191,11 +190,6 @@ impl PixelStream<'_> {
         }
     }
 
-    /// Whether the light has no other layer, and all that is drawn is kept: only then random words tell all of it.
-    pub fn is_alone(&self) -> bool {
-        self.is_alone
-    }
-
     /// Whether these are the photons whose avalanches trigger others.
     pub fn breeds(&self) -> bool {
         self.kind == Kind::Breeding
@@ -203,10 +197,7 @@ impl PixelStream<'_> {
 
     /// The avalanches that a photon of the triggering kind causes, if it makes one itself.
     pub fn children(&self, photon: Photon) -> impl Iterator<Item = SpadEvent> {
-        let parent = SpadEvent {
-            time: photon.time,
-            spad: photon.spad,
-        };
+        let parent = SpadEvent::new(photon.time, photon.spad);
         let spads = &self.stream.config.spads;
         spads.children(self.stream.key, self.pixel, parent)
     }
@@ -285,4 +276,127 @@ pub fn signal_rank(low: u32, high: u32) -> i16 {
 #[inline]
 pub(super) fn nearest(value: f64) -> i64 {
     ((value + ROUNDER).to_bits() as i64) - ROUNDER.to_bits() as i64
+}
+
+// Photons whose avalanches trigger others (afterpulses, crosstalk), and the rest: separate streams with their own
+// random numbers.
+
+/// Which photons of a macropixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Those whose avalanches cause no others.
+    Plain,
+    /// Those whose avalanches do.
+    Breeding,
+}
+
+impl Kind {
+    pub(super) fn counts(self) -> Purpose {
+        match self {
+            Kind::Plain => Purpose::PhotonCounts,
+            Kind::Breeding => Purpose::BreedingCounts,
+        }
+    }
+
+    pub(super) fn background(self) -> Purpose {
+        match self {
+            Kind::Plain => Purpose::Photons,
+            Kind::Breeding => Purpose::BreedingPhotons,
+        }
+    }
+
+    pub(super) fn echo(self) -> Purpose {
+        match self {
+            Kind::Plain => Purpose::Signal,
+            Kind::Breeding => Purpose::BreedingSignal,
+        }
+    }
+
+    pub(super) fn bright_background(self) -> u32 {
+        match self {
+            Kind::Plain => Purpose::BrightPhotons as u32,
+            Kind::Breeding => Purpose::BrightBreedingPhotons as u32,
+        }
+    }
+
+    pub(super) fn bright_echo(self) -> u32 {
+        match self {
+            Kind::Plain => Purpose::BrightSignal as u32,
+            Kind::Breeding => Purpose::BrightBreedingSignal as u32,
+        }
+    }
+}
+
+// Which photons of a part are kept: those within its [`Limits`](super::limits::Limits), by random words of their own.
+//
+// ```text
+//   drawn     ↓ ↓  ↓   ↓ ↓  ↓ ↓ ↓    ↓  ↓↓     at the greatest rate
+//   profile   ▇▇▇▇▇▅▅▅▅▅▃▃▃▃▃▁▁▁▁▁             a photon is kept with the rate at its time, relative to the greatest
+//   kept      ↓ ↓  ↓     ↓    ↓                by a random word of its own
+// ```
+
+impl PixelStream<'_> {
+    /// Whether the slots of a laser cycle may have photons that are kept.
+    pub(super) fn draws_background_in(&self, cycle: u32) -> bool {
+        let limits = self.limits.as_ref();
+        limits.is_none_or(|limits| limits.drawn().contains(&cycle))
+    }
+
+    /// Whether photons of the echo of a laser cycle may be kept.
+    pub(super) fn sends_echo_in(&self, cycle: u32) -> bool {
+        let limits = self.limits.as_ref();
+        limits.is_none_or(|limits| limits.cycles.contains(&cycle))
+    }
+
+    /// Whether a background photon is kept that comes `time_fs` after the start of its laser cycle. `words` are random ones
+    /// that no other photon has, unless it comes at the same time on the same SPAD.
+    #[inline(never)]
+    pub(super) fn keeps_background(
+        &self,
+        cycle: u32,
+        spad: u8,
+        time_fs: i64,
+        words: [u32; 2],
+    ) -> bool {
+        let Some(limits) = &self.limits else {
+            return true;
+        };
+        let time = self.stream.cycle_start(cycle) + Time::from_fs(time_fs);
+        if !limits.lit.contains(&time) {
+            return false;
+        }
+        let mut chance = limits.chance(spad);
+        if let Some(profile) = &limits.profile {
+            let since_fs = match cycle.checked_sub(1) {
+                Some(before) if time_fs < 0 => (time - self.stream.cycle_start(before)).as_fs(),
+                _ => time_fs,
+            };
+            chance *= profile.rate_hz(since_fs) / profile.greatest_hz;
+        }
+        self.is_kept(chance, words)
+    }
+
+    /// Whether a photon of a laser cycle's echo is kept, with random words that no other photon has.
+    #[inline]
+    pub(super) fn keeps_signal(&self, cycle: u32, spad: u8, words: [u32; 2]) -> bool {
+        match &self.limits {
+            None => true,
+            Some(limits) => {
+                limits.cycles.contains(&cycle)
+                    && self.is_kept(
+                        limits.chance(spad) * limits.energy(cycle, self.stream),
+                        words,
+                    )
+            }
+        }
+    }
+
+    fn is_kept(&self, chance: f64, [first, second]: [u32; 2]) -> bool {
+        if chance >= 1.0 {
+            return true;
+        }
+        let counter = [first, second, self.pixel, Purpose::Thinning as u32];
+        let word = rand_philox::philox4x32_10(counter, self.key)[0];
+        f64::from(word) < chance * 2f64.powi(32)
+    }
 }

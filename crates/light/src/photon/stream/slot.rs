@@ -23,13 +23,17 @@ const TIME: u32 = (1 << TIME_BITS) - 1;
 /// The slots of a laser cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slots {
-    count: u32,
-    lead_fs: i64,
-    per_period_bits: u32,
+    /// How many there are.
+    pub count: u32,
+    /// How much before its cycle the first one begins, fs.
+    pub lead_fs: i64,
+    /// k, where a CLK period has 2ᵏ slots.
+    pub per_period_bits: u32,
     whole_fs: u64,
     /// In 2⁻⁶⁴ fs.
     fraction: u64,
-    length_s: f64,
+    /// Length of each, s.
+    pub length_s: f64,
 }
 
 impl Slots {
@@ -50,29 +54,9 @@ impl Slots {
         }
     }
 
-    /// How many there are.
-    pub fn count(&self) -> u32 {
-        self.count
-    }
-
-    /// k, where a CLK period has 2ᵏ slots.
-    pub fn per_period_bits(&self) -> u32 {
-        self.per_period_bits
-    }
-
-    /// Length of each, s.
-    pub fn length_s(&self) -> f64 {
-        self.length_s
-    }
-
     /// Length of each, whole femtoseconds.
     pub fn length_fs(&self) -> i64 {
         self.whole_fs as i64
-    }
-
-    /// How much before its cycle the first one begins, fs.
-    pub fn lead_fs(&self) -> i64 {
-        self.lead_fs
     }
 
     /// Background photons come no closer to the beginning or end of their slot, fs.
@@ -128,12 +112,12 @@ mod tests {
             let lead = Time::from_s(lead / clock.as_hz());
             let slots = Slots::new(clock, periods, lead);
             prop_assert!(slots.length_fs() < LONGEST_FS);
-            prop_assert_eq!(slots.count(), periods << slots.per_period_bits());
-            let slot = slot % slots.count();
+            prop_assert_eq!(slots.count, periods << slots.per_period_bits);
+            let slot = slot % slots.count;
             let (start, end) = (slots.start_fs(slot), slots.start_fs(slot + 1));
             prop_assert!((slots.length_fs()..=slots.length_fs() + 1).contains(&(end - start)));
-            prop_assert!(slots.start_fs(slots.count()) <= clock.whole_fs(i64::from(periods)) - lead.as_fs());
-            if slots.per_period_bits() == 0 {
+            prop_assert!(slots.start_fs(slots.count) <= clock.whole_fs(i64::from(periods)) - lead.as_fs());
+            if slots.per_period_bits == 0 {
                 let edge = clock.whole_fs(i64::from(slot)) - lead.as_fs();
                 prop_assert!((edge - 1..=edge).contains(&start));
             }

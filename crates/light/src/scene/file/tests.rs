@@ -93,7 +93,7 @@ fn curves_are_read_from_files_beside_the_scene_and_kept_in_it() {
     std::fs::write(&path, "[lidar]\npulse = \"laser.csv\"\n").unwrap();
     let scene = Scene::load(&path).unwrap();
     let points = [[0.0, 0.0], [2.0, 1.0], [6.0, 0.0]];
-    assert_eq!(scene.lidar.pulse.curve().unwrap().points(), points);
+    assert_eq!(*scene.lidar.pulse.curve().unwrap().points, points);
     assert_eq!(
         Scene::parse("elsewhere", &scene.commented()).unwrap(),
         scene

@@ -15,7 +15,7 @@ pub(super) fn meet_ground(ray: &Ray, depth_m: f64) -> Option<Meeting> {
 pub(in crate::scene) struct Flat {
     centre_m: DVec3,
     /// Of unit length.
-    normal: DVec3,
+    pub(super) normal: DVec3,
     /// Directions of its edges. The first is horizontal; a plane that lies flat has no preferred one and takes x.
     edges: [DVec3; 2],
     half_m: [f64; 2],
@@ -39,10 +39,6 @@ impl Flat {
             half_m: [width_m / 2.0, height_m / 2.0],
             reach_m2: 1.000_001 * (width_m * width_m + height_m * height_m),
         }
-    }
-
-    pub(super) fn normal(&self) -> DVec3 {
-        self.normal
     }
 
     pub(super) fn meet(&self, ray: &Ray) -> Option<Meeting> {

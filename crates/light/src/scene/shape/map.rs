@@ -47,7 +47,8 @@ pub struct MapFiles {
 /// A depth map, and what is there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthMap {
-    files: MapFiles,
+    /// What was read, and how.
+    pub(crate) files: MapFiles,
     camera: PinholeCamera,
     /// One over the depth along the axis, 1/m; 0 where nothing is.
     inverse_1_m: Vec<f32>,
@@ -141,11 +142,6 @@ impl DepthMap {
             grey: shares(&files.grey)?,
             files,
         })
-    }
-
-    /// What was read, and how.
-    pub(crate) fn files(&self) -> &MapFiles {
-        &self.files
     }
 
     /// One over the depth at a pixel; 0 outside and where nothing is.

@@ -37,7 +37,8 @@ const ROOM: f32 = 1e-6;
 /// A mesh in its own coordinates: x right, y down, z forward, in units of its file.
 #[derive(Clone)]
 pub struct Mesh {
-    path: PathBuf,
+    /// The file it was read from.
+    pub(crate) path: PathBuf,
     /// Corners of each triangle, in the tree's order.
     triangles: Vec<[[f32; 3]; 3]>,
     /// Texture coordinates of those corners; empty where the file has none.
@@ -200,11 +201,6 @@ impl Mesh {
             middle,
             size: most.as_dvec3() - least.as_dvec3(),
         }
-    }
-
-    /// The file it was read from.
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
     }
 
     /// Number of triangles.

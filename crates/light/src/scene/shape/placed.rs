@@ -156,7 +156,7 @@ impl<'a> Placed<'a> {
     pub(in crate::scene) fn normal_at(&self, point: DVec3, part: u32) -> DVec3 {
         match *self {
             Placed::Ground { .. } => DVec3::NEG_Y,
-            Placed::Plane(ref flat) => flat.normal(),
+            Placed::Plane(ref flat) => flat.normal,
             Placed::Box { pose, .. } => pose.outwards(solid::face_normal(part)),
             Placed::Sphere { centre_m, .. } => (point - centre_m).normalize(),
             Placed::Cylinder { centre_m, axis, .. } => {

@@ -3,11 +3,11 @@
 //! In most steps no SPAD is hit, which one random number tells. Otherwise the first one that is hit follows from that
 //! number, and those after it are asked one by one.
 
+use super::Counts;
 use super::blindness::Ages;
 use super::cycles::LikeCycles;
 use super::events::EventTable;
 use super::spad_light::absorbed;
-use super::steps::Counts;
 use super::words::RandomWords;
 use crate::photon::DeadTimeLaw;
 use smallvec::{SmallVec, smallvec};

@@ -13,9 +13,8 @@
 use smallvec::SmallVec;
 
 use super::blindness::{Ages, Blindness};
-use super::options::CohortOptions;
 use super::spad_light::{Extent, SpadLight, absorbed};
-use super::steps::Means;
+use super::{CohortOptions, Means};
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{SensorConfig, WindowLaw};
 use crate::engine::EngineError;

@@ -27,6 +27,7 @@
 
 use smallvec::{SmallVec, smallvec};
 
+use super::FEW_STEPS;
 use super::blindness::{Ages, Blindness};
 use super::cycles::{Before, Class, Scene};
 use super::events::EventTable;
@@ -34,7 +35,6 @@ use super::grid::{CELLS, Grid};
 use super::hits::Hits;
 use super::secondaries::{Acts, Cell, Secondaries};
 use super::spad_light::absorbed;
-use super::steps::FEW_STEPS;
 use crate::engine::EngineError;
 use crate::photon::DeadTimeLaw;
 

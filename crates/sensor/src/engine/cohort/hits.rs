@@ -8,7 +8,8 @@ use super::words::RandomWords;
 /// Probabilities that at least 0, 1, 2, … of some SPADs are hit, and their complements.
 #[derive(Debug, Clone)]
 pub(super) struct Hits {
-    spads: usize,
+    /// How many SPADs there are.
+    pub(super) spads: usize,
     at_least: SmallVec<[f64; FEW_SPADS + 2]>,
     exactly: SmallVec<[f64; FEW_SPADS + 1]>,
 }
@@ -34,11 +35,6 @@ impl Hits {
             at_least,
             exactly,
         }
-    }
-
-    /// How many SPADs there are.
-    pub(super) fn spads(&self) -> usize {
-        self.spads
     }
 
     /// Probability that any is hit.

@@ -16,12 +16,12 @@
 
 use smallvec::SmallVec;
 
+use super::Counts;
 use super::blindness::{Ages, Blindness};
 use super::cycles::LikeCycles;
 use super::draw::binomial;
 use super::events::EventTable;
 use super::hits::Hits;
-use super::steps::Counts;
 use super::words::RandomWords;
 use crate::chip::MOST_SPADS;
 use crate::photon::DeadTimeLaw;
@@ -251,7 +251,7 @@ impl<'a> Tree<'a> {
                 break; // newer ones are as blind
             }
             let same = groups.pop_if(|group| group.avalanche == Some(oldest));
-            let spads = same.map_or(0, |group| self.laws.laws[group.hits].spads()) + 1;
+            let spads = same.map_or(0, |group| self.laws.laws[group.hits].spads) + 1;
             let number = self.laws.number(class, spads, p, q);
             groups.push(Group {
                 avalanche: Some(oldest),
@@ -288,7 +288,7 @@ impl<'a> Tree<'a> {
             return;
         };
         let law = &self.laws.laws[group.hits];
-        let spads = law.spads();
+        let spads = law.spads;
         let hit = match waiting {
             true if rest.is_empty() => cycles,
             true => {

@@ -24,11 +24,11 @@
 
 use multiversion::multiversion;
 
+use super::Counts;
 use super::abreast::{LANES, Lanes, binomials};
 use super::cycles::LikeCycles;
 use super::draw::binomial;
 use super::events::{EventTable, NoEvent};
-use super::steps::Counts;
 use super::weighted::Weighted;
 use super::words::RandomWords;
 
@@ -329,9 +329,9 @@ const ROUNDING: f64 = 1e-13;
 
 #[cfg(test)]
 mod tests {
+    use super::super::Means;
     use super::super::alone;
     use super::super::blindness::{Ages, Blindness};
-    use super::super::steps::Means;
     use super::*;
     use crate::photon::DeadTimeLaw;
 

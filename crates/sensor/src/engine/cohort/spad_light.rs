@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use smallvec::{SmallVec, smallvec};
 
-use super::steps::FEW_STEPS;
+use super::FEW_STEPS;
 use crate::photon::{
     ECHO_REACH, Echo, EchoLaw, PixelLight, Profile, StreamConfig, pulse_share, pulse_shares,
 };
@@ -177,7 +177,7 @@ impl SpadLight {
     pub(super) fn most_background(&self, duration_fs: f64) -> f64 {
         let of = |segment: &SpadSegment| {
             let profile = segment.profile.as_ref();
-            let greatest_hz = profile.map_or(0.0, |profile| profile.greatest_hz());
+            let greatest_hz = profile.map_or(0.0, |profile| profile.greatest_hz);
             segment.background_per_fs + greatest_hz * 1e-15 / self.spads
         };
         self.segments.iter().map(of).fold(0.0, f64::max) * duration_fs
@@ -253,7 +253,7 @@ impl SpadLight {
         let of_cycle = |number: i64| {
             let start_fs = number as f64 * self.cycle_fs;
             let profile = self.segment(extent.cycle + number).profile.as_ref();
-            let edges_fs = profile.map_or(&[][..], |profile| profile.edges_fs());
+            let edges_fs = profile.map_or(&[][..], |profile| &profile.edges_fs);
             let edges_fs = edges_fs.iter().map(|&edge_fs| edge_fs as f64);
             let within = edges_fs.filter(|edge_fs| *edge_fs < self.cycle_fs);
             let bends = std::iter::once(0.0).chain(within);

@@ -16,8 +16,8 @@
 
 use std::collections::HashMap;
 
+use super::levelise::Unlevelled;
 use super::survey::{Class, Survey};
-use super::unlevelled::Unlevelled;
 use crate::netlist::{CellKind, NetId};
 
 /// An expression, `delay` periods late, perhaps inverted.
@@ -139,7 +139,8 @@ impl Node {
 /// Expressions of a netlist's stream part: node 0 is constant, nodes 1 … are its SPADs.
 pub(super) struct Expressions<'s> {
     survey: &'s Survey,
-    nodes: Vec<Node>,
+    /// Every node, inputs before what reads them.
+    pub(super) nodes: Vec<Node>,
     index: HashMap<Node, usize>,
     of_net: HashMap<NetId, Literal>,
     /// What a register held when the exposure started: (node, delay) → value.
@@ -161,11 +162,6 @@ impl<'s> Expressions<'s> {
             of_net: HashMap::new(),
             held: HashMap::new(),
         }
-    }
-
-    /// Every node, inputs before what reads them.
-    pub(super) fn nodes(&self) -> &[Node] {
-        &self.nodes
     }
 
     /// The sequence of a net.

@@ -25,7 +25,6 @@ mod schedule;
 mod stream;
 mod survey;
 mod tape;
-mod unlevelled;
 mod word;
 
 use std::sync::OnceLock;
@@ -42,12 +41,12 @@ use crate::chip::window_law::{Window, WindowLaw};
 use crate::chip::{Exposure, Sensor};
 use crate::photon::{PhotonStream, SpadEvent};
 use levelise::Levelised;
+pub use levelise::Unlevelled;
 use packing::{PERIODS, Packed};
 use schedule::Schedule;
 use stream::Flow;
 use survey::Survey;
 use tape::Block;
-pub use unlevelled::Unlevelled;
 use word::{WORD_LANES, Word, inversion};
 
 /// A netlist that can be run.
@@ -252,10 +251,6 @@ impl Machine {
 impl Engine for Cycle {
     fn law(&self) -> WindowLaw {
         self.law.clone()
-    }
-
-    fn bins(&self) -> usize {
-        self.sensor.bins
     }
 
     fn batch(&self) -> usize {

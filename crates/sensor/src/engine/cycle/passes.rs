@@ -251,7 +251,7 @@ impl Passes<'_, '_> {
     fn replay(&mut self, record: &Record, cycles: i64, schedule: &mut Schedule<'_>) {
         for _ in 0..cycles {
             let first_pass = self.pass;
-            let end = first_pass + schedule.stop_periods();
+            let end = first_pass + schedule.stop_periods;
             let (mut next_effect, mut written, mut woken) = (0, 0, 0);
             loop {
                 let pending = &self.block.pending;

@@ -10,7 +10,8 @@ pub(super) struct Schedule<'a> {
     /// Causes by group, as in [`Levelised`](super::levelise::Levelised).
     groups: &'a [Vec<(i64, u16)>],
     laser_cycles: i64,
-    stop_periods: i64,
+    /// CLK periods of a laser cycle.
+    pub(super) stop_periods: i64,
     /// CLK runs in passes from 0 up to this one.
     pub clocked: i64,
     /// The next cause: its laser cycle and its place in the group.
@@ -76,11 +77,6 @@ impl<'a> Schedule<'a> {
         let (cycle, index) = self.next;
         let is_first = due == pass && index == 0 && cycle >= 1;
         Some(self.laser_cycles - 1 - cycle).filter(|&left| is_first && left > 0)
-    }
-
-    /// CLK periods of a laser cycle.
-    pub(super) fn stop_periods(&self) -> i64 {
-        self.stop_periods
     }
 
     /// Every action that a cause other than CLK starts.

@@ -19,8 +19,8 @@ use std::cell::Cell;
 use multiversion::multiversion;
 
 use super::expression::{Expressions, Literal, Node};
+use super::levelise::Unlevelled;
 use super::packing::{PERIODS, Packed, Pulse};
-use super::unlevelled::Unlevelled;
 use super::word::{Word, inversion};
 use crate::netlist::NetId;
 
@@ -88,7 +88,7 @@ impl StreamTape {
         let roots = roots?;
         let mut layout = Layout::new(expressions, &roots);
         let mut tape = StreamTape::default();
-        for node in 0..expressions.nodes().len() {
+        for node in 0..expressions.nodes.len() {
             layout.place(expressions, node, &mut tape);
         }
         tape.words = layout.end;
@@ -229,7 +229,7 @@ const READ_BACK: usize = 2;
 
 impl Layout {
     fn new(expressions: &Expressions<'_>, roots: &[Literal]) -> Self {
-        let nodes = expressions.nodes();
+        let nodes = &expressions.nodes;
         let mut reach: Vec<Option<usize>> = vec![None; nodes.len()];
         let mut readers = vec![0; nodes.len()];
         let read = |reach: &mut Vec<Option<usize>>, literal: &Literal, back: usize| {
@@ -262,7 +262,7 @@ impl Layout {
     /// Chunks before its own that a read of `roots` can depend on, if that ends.
     fn memory(&self, expressions: &Expressions<'_>, roots: &[Literal]) -> Option<usize> {
         let mut periods: Vec<usize> = Vec::new();
-        for (node, kind) in expressions.nodes().iter().enumerate() {
+        for (node, kind) in expressions.nodes.iter().enumerate() {
             if self.reach[node].is_some() && matches!(kind, Node::Toggle(_)) {
                 return None;
             }
@@ -304,7 +304,7 @@ impl Layout {
     }
 
     fn place(&mut self, expressions: &Expressions<'_>, node: usize, tape: &mut StreamTape) {
-        let nodes = expressions.nodes();
+        let nodes = &expressions.nodes;
         if self.reach[node].is_none() || self.places[node].is_some() {
             return;
         }

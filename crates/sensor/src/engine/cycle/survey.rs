@@ -16,7 +16,7 @@
 
 use std::collections::HashMap;
 
-use super::unlevelled::Unlevelled;
+use super::levelise::Unlevelled;
 use crate::chip::{Exposure, Probes, SensorConfig, SensorPins, Silicon, array};
 use crate::engine::{GateSimulation, LaneSimulation};
 use crate::kernel::{LANES, Recorder};
@@ -342,7 +342,7 @@ fn initial_values(
             }
         };
         let nets = (0..netlist.net_count()).map(|net| {
-            let value = lanes.kernel().value(NetId::new(net));
+            let value = lanes.kernel.value(NetId::new(net));
             (fill(value.one), fill(value.zero))
         });
         nets.collect()

@@ -23,7 +23,7 @@ use rayon::prelude::*;
 pub use self::doubt::Doubt;
 use self::orders::{Delays, Orders, Part, Setting};
 use super::error::{follows, has_no_delay_lines};
-use super::own_clk::by_own_clk;
+use super::traits::by_own_clk;
 use super::{
     Cycle, Engine, EngineError, Expose, Exposed, Gate, Histograms, LaneSimulation, LitPixel,
     PulsedPixel, Replay, Window, full_stream,
@@ -96,7 +96,7 @@ impl Timed {
             setting: Setting {
                 exposure: *exposure,
                 nominal: *sensor.timing(),
-                schedule: StimulusPlan::new(&sensor, exposure, 1, &[0], &[&[]]).schedule(),
+                schedule: StimulusPlan::new(&sensor, exposure, 1, &[0], &[&[]]).schedule,
                 sensor: sensor.clone(),
             },
             silicon,
@@ -307,10 +307,6 @@ impl Engine for Timed {
     /// With the library's delays.
     fn law(&self) -> WindowLaw {
         self.common.clone()
-    }
-
-    fn bins(&self) -> usize {
-        self.setting.sensor.bins
     }
 
     fn batch(&self) -> usize {

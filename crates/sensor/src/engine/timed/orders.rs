@@ -175,9 +175,11 @@ impl Orders {
     /// `pulses` as a macropixel must see them whose front end is that of `law`, to take them at the same CLK edges.
     pub(super) fn shifted(&self, law: &WindowLaw, pulses: &[SpadEvent]) -> Vec<SpadEvent> {
         let common = law.timing().spad_to_sampled;
-        let shift = |pulse: &SpadEvent| SpadEvent {
-            time: pulse.time + self.latency[usize::from(pulse.spad)] - common,
-            spad: pulse.spad,
+        let shift = |pulse: &SpadEvent| {
+            SpadEvent::new(
+                pulse.time + self.latency[usize::from(pulse.spad)] - common,
+                pulse.spad,
+            )
         };
         let mut shifted: Vec<SpadEvent> = pulses.iter().map(shift).collect();
         shifted.sort_unstable();

@@ -20,7 +20,6 @@ use multiversion::multiversion;
 use super::codes::{Code, Codes, SPAD_BITS, bin_mark, spad_mark};
 use super::echo_rows::{EchoRows, Passed};
 use super::sight::ROUNDING_FS;
-use super::wanted::Wanted;
 use crate::photon::{Draw, PER_BLOCK, PixelStream, Place, Slots, TIME_BITS};
 
 /// Binary places of a position in CLK periods.
@@ -74,15 +73,15 @@ impl Binning {
 
     /// The slot that begins at `origin_fs`, the start of bin 0; `None` if none does, so that bins are not slots.
     pub(super) fn slot_of(&self, origin_fs: i64) -> Option<i32> {
-        let length_fs = self.slots.length_s() * 1e15;
-        let slot = ((origin_fs + self.slots.lead_fs()) as f64 / length_fs).round();
-        let off_fs = (origin_fs + self.slots.lead_fs()) as f64 - slot * length_fs;
+        let length_fs = self.slots.length_s * 1e15;
+        let slot = ((origin_fs + self.slots.lead_fs) as f64 / length_fs).round();
+        let off_fs = (origin_fs + self.slots.lead_fs) as f64 - slot * length_fs;
         (off_fs.abs() <= ALIGNED_FS as f64).then_some(slot as i32)
     }
 
     /// The row of a slot.
     pub(super) fn row_of(&self, wanted: &Wanted, slot: u32) -> usize {
-        let k = self.slots.per_period_bits();
+        let k = self.slots.per_period_bits;
         row_of(slot, wanted.origin_slot, k, self.bins) as usize
     }
 
@@ -97,9 +96,9 @@ impl Binning {
         scratch: &mut Scratch,
         codes: &mut Codes,
     ) {
-        let first = codes.len();
+        let first = codes.len;
         let blocks = draw.slots().len();
-        let shift = draw.group().place_shift();
+        let shift = draw.group.place_shift();
         let (background, marks) = codes.append(PER_BLOCK * blocks);
         if blocks > 0 {
             let Scratch {
@@ -119,7 +118,7 @@ impl Binning {
                 }
             }
         }
-        for run in draw.runs().iter().filter(|run| run.photons > 0) {
+        for run in draw.runs.iter().filter(|run| run.photons > 0) {
             keep_words(blocks, run.last_block(), background, marks);
         }
         for row in 0..PER_BLOCK {
@@ -149,7 +148,7 @@ impl Binning {
                 }
             }
         }
-        if wanted.cycles < draw.group().cycles() {
+        if wanted.cycles < draw.group.cycles() {
             codes.drop_from(first, wanted.place(wanted.cycles << SPAD_BITS));
         }
     }
@@ -212,7 +211,7 @@ fn row_of(slot: u32, origin_slot: i32, k: u32, bins: u32) -> u32 {
 /// The codes and marks of a photon in each slot, but for its place.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 fn encode_slots(binning: &Binning, wanted: &Wanted, slots: &[u32], out: (&mut [Code], &mut [u32])) {
-    let (bins, k) = (binning.bins, binning.slots.per_period_bits());
+    let (bins, k) = (binning.bins, binning.slots.per_period_bits);
     let (origin_slot, later) = (wanted.origin_slot, wanted.place(0));
     for ((&slot, code), mark) in slots.iter().zip(out.0).zip(out.1) {
         let row = row_of(slot, origin_slot, k, bins);
@@ -246,6 +245,27 @@ fn doubt(steps: u32, words: &[u32], codes: &mut [Code]) {
     }
 }
 
+/// Which photons of a draw are wanted, and what for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wanted {
+    /// Those of cycles before this one of the group.
+    pub cycles: u32,
+    /// By how many cycles their windows come after them.
+    pub later: u32,
+    /// When bin 0 begins, counted from the start of their own cycle, fs.
+    pub origin_fs: i64,
+    /// The slot that begins with bin 0. It need not exist.
+    pub origin_slot: i32,
+}
+
+impl Wanted {
+    /// The place of a photon's window.
+    #[inline(always)]
+    pub(super) fn place(&self, place: u32) -> u32 {
+        place + (self.later << SPAD_BITS)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -266,7 +286,7 @@ mod tests {
             energy_spread: 0.0,
             spads: SpadModel::default(),
         };
-        PhotonStream::new(&config).slots()
+        PhotonStream::new(&config).slots
     }
 
     proptest! {
@@ -287,12 +307,12 @@ mod tests {
             let clock = Frequency::from_hz(hz);
             let period_fs = 1e15 / hz as f64;
             let slots = slots(clock, Time::from_fs((lead * period_fs) as i64));
-            let slot = slot % slots.count();
+            let slot = slot % slots.count;
             let binning = Binning::new(bins, hz as f64, slots);
             let word = place << TIME_BITS | steps;
             let time_fs = slots.time_fs(slot, word);
             // Bins begin where slots of the same CLK period do, but for rounding.
-            let in_period = slot % (1 << slots.per_period_bits());
+            let in_period = slot % (1 << slots.per_period_bits);
             let origin_fs = slots.start_fs(slot - in_period) - clock.periods(start).as_fs() - off;
             let origin_slot = binning.slot_of(origin_fs).unwrap();
             let periods = (time_fs - origin_fs) as f64 / period_fs;
@@ -324,7 +344,7 @@ mod tests {
                 prop_assert_eq!(mark >> 16, u32::from(is_in_bin) << (code.row() % 16));
                 if code.is_doubtful() {
                     let resolution_fs = period_fs / 2f64.powi(22);
-                    let is_part = slots.per_period_bits() > 0;
+                    let is_part = slots.per_period_bits > 0;
                     prop_assert!(is_part || off_edge_fs <= 12.0 + resolution_fs || !(1..=bins).contains(&row), "{off_edge_fs}");
                 } else {
                     prop_assert_eq!(code.row(), row);

@@ -113,7 +113,8 @@ pub(super) fn bin_mark(row: u32, bins: u32) -> u32 {
 /// than 16 bins share bits.
 #[derive(Debug, Default)]
 pub(super) struct Codes {
-    len: usize,
+    /// How many there are, those that are no photons among them.
+    pub(super) len: usize,
     /// Longer than needed, so that what was there before need not be cleared.
     codes: Vec<Code>,
     marks: Vec<u32>,
@@ -123,11 +124,6 @@ impl Codes {
     /// Forgets all.
     pub(super) fn clear(&mut self) {
         self.len = 0;
-    }
-
-    /// How many there are, those that are no photons among them.
-    pub(super) fn len(&self) -> usize {
-        self.len
     }
 
     /// The codes.

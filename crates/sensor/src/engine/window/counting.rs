@@ -14,25 +14,23 @@
 //! echoes of other cycles are seen ([`whole`]). Light with several layers, and bins that are not CLK periods, are sorted
 //! ([`sorted`]).
 
-use super::binning::{Binning, Scratch};
+use super::binning::{Binning, Scratch, Wanted};
 use super::codes::{Code, Codes, ROWS, SPADS};
 use super::echo_rows::EchoRows;
 use super::past::PastDraws;
 use super::pulses::Window;
 use super::sight::{ROUNDING_FS, Sight, Spans};
 use super::tables::{MOST_PHOTONS, SIDE_BY_SIDE, Tables};
-use super::wanted::Wanted;
 use crate::engine::Work;
 use crate::photon::{
     Draw, Group, ListedEchoes, PER_BLOCK, Photon, PhotonStream, PixelStream, Place, SpadEvent,
 };
 use crate::units::Time;
-use by_window::ByWindow;
 use spacing::Spacing;
 use tile::Tile;
+use whole::ByWindow;
 
 mod bright;
-mod by_window;
 mod settling;
 mod side_by_side;
 mod sorted;
@@ -121,10 +119,12 @@ impl Drawn {
         cycles: u32,
     ) -> impl Iterator<Item = (u32, Photon)> + 'd {
         let first = group.first_cycle();
-        let photon = move |cycle: u32, spad: u8, time_fs: i64| Photon {
-            time: stream.cycle_start(cycle) + Time::from_fs(time_fs),
-            spad,
-            breeds: light.breeds(),
+        let photon = move |cycle: u32, spad: u8, time_fs: i64| {
+            Photon::new(
+                stream.cycle_start(cycle) + Time::from_fs(time_fs),
+                spad,
+                light.breeds(),
+            )
         };
         let own = self
             .own
@@ -173,7 +173,7 @@ impl<'a> Counting<'a> {
         Counting {
             engine,
             stream,
-            binning: Binning::new(bins, engine.exposure.clock.as_hz(), stream.slots()),
+            binning: Binning::new(bins, engine.exposure.clock.as_hz(), stream.slots),
             spacing: Spacing {
                 bins,
                 far: dead_rows + 2,
@@ -208,8 +208,8 @@ impl<'a> Counting<'a> {
     /// Hits of every bin of a macropixel, and what they took. `parts` are those of its light ([`PhotonStream::parts`]).
     pub(super) fn expose(&mut self, sight: &Sight, parts: &[PixelStream<'_>]) -> (Vec<i64>, Work) {
         let light = &parts[0];
-        let breeding = parts.get(BREEDING).filter(|_| light.is_alone());
-        let origins_fs = [sight.first_fs, sight.first_fs + self.stream.cycle_fs()];
+        let breeding = parts.get(BREEDING).filter(|_| light.is_alone);
+        let origins_fs = [sight.first_fs, sight.first_fs + self.stream.cycle_fs];
         let origin_slots = origins_fs.map(|origin_fs| self.binning.slot_of(origin_fs));
         let has_slots_for_bins = origin_slots.iter().all(Option::is_some);
         let has_marks = self.stream.spads() == SPADS;
@@ -237,11 +237,11 @@ impl<'a> Counting<'a> {
         self.plain.carried.clear();
         self.past.clear();
         self.breeding.clear();
-        if light.is_bright() {
+        if light.is_bright {
             self.count_bright(&mut pixel);
             return (pixel.hits, pixel.work);
         }
-        if !light.is_alone() || !has_clk_bins {
+        if !light.is_alone || !has_clk_bins {
             match self.can_sort(&pixel) {
                 true => self.count_sorted(&mut pixel),
                 false => self.count_layers(&mut pixel),
@@ -295,7 +295,7 @@ impl<'a> Counting<'a> {
             let scratch = &mut self.scratch;
             self.binning
                 .encode(pixel.light, draw, wanted, echo, scratch, &mut self.codes);
-            self.first_code[part] = self.codes.len();
+            self.first_code[part] = self.codes.len;
         }
         let wanted = Wanted {
             cycles: 1,
@@ -306,7 +306,7 @@ impl<'a> Counting<'a> {
             self.binning.push(&wanted, Some(photon), &mut self.codes);
         }
         self.codes.fill_up(SIDE_BY_SIDE);
-        self.codes.len()
+        self.codes.len
     }
 
     fn count_cells(&mut self, pixel: &mut Pixel<'_>, group: Group) {
@@ -315,7 +315,7 @@ impl<'a> Counting<'a> {
         let mut counted = 0;
         if own.cycles == group.cycles() {
             counted = self.plain.own.words()[0].len() * PER_BLOCK;
-            for run in self.plain.own.runs() {
+            for run in &self.plain.own.runs {
                 let row = self.binning.row_of(&own, run.slot);
                 self.tables.add(row, run.photons);
             }

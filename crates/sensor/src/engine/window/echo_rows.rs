@@ -17,9 +17,9 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
+use super::binning::Wanted;
 use super::codes::Code;
 use super::sight::ROUNDING_FS;
-use super::wanted::Wanted;
 use crate::photon::{LANES, PixelStream, RANKS, signal_rank};
 
 /// Edges of rows, as ranks: the first that may be, and the first that is for certain, at the edge or after it.

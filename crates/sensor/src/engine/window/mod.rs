@@ -17,12 +17,11 @@ mod past;
 mod pulses;
 mod sight;
 mod tables;
-mod wanted;
 
 use std::borrow::Cow;
 
 use super::exposing::refuse_other_spads;
-use super::own_clk::by_own_clk;
+use super::traits::by_own_clk;
 use super::{
     Cancelling, Engine, EngineError, Expose, Exposed, Histograms, LitPixel, PulsedPixel, Replay,
     Work,
@@ -95,10 +94,6 @@ impl Window {
 impl Engine for Window {
     fn law(&self) -> WindowLaw {
         self.law.clone()
-    }
-
-    fn bins(&self) -> usize {
-        self.sensor.bins
     }
 
     /// Macropixels in bright light stand together, and take so much longer than others that in larger batches some processors wait.

@@ -41,7 +41,7 @@ impl<'a> Past<'a> {
     /// From when on all photons are known; `None` if that is the whole exposure.
     pub(super) fn known_from(&self) -> Option<Time> {
         let start = || self.stream.cycle_start(self.cycle);
-        let slot_fs = self.stream.slots().start_fs(self.slot);
+        let slot_fs = self.stream.slots.start_fs(self.slot);
         (!self.is_everything()).then(|| start() + Time::from_fs(slot_fs))
     }
 
@@ -64,20 +64,16 @@ impl<'a> Past<'a> {
             self.slot -= 1;
         } else {
             self.cycle -= 1;
-            self.slot = self.stream.slots().count() - 1;
+            self.slot = self.stream.slots.count - 1;
         }
-        let slot_fs = self.stream.slots().start_fs(self.slot);
+        let slot_fs = self.stream.slots.start_fs(self.slot);
         let end_fs = (end - start(self.cycle)).as_fs();
         let light = &parts[part];
         let before = draws.drawn;
         let mut push = |cycle: u32, (_, time_fs, spad): PastPhoton| {
             let time = start(cycle) + Time::from_fs(time_fs);
             if time >= Time::ZERO && spads >> spad & 1 != 0 {
-                photons.push(Photon {
-                    time,
-                    spad,
-                    breeds: light.breeds(),
-                });
+                photons.push(Photon::new(time, spad, light.breeds()));
             }
         };
         for photon in draws.of(light, part, self.cycle, What::Slot(self.slot)) {

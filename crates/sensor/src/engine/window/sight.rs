@@ -37,7 +37,7 @@ impl Spans {
     /// From `from_fs` until `until_fs`, times after the start of the window's cycle; `None` where that does not fit into
     /// the cycle and the one before.
     fn new(stream: &PhotonStream, from_fs: i64, until_fs: i64) -> Option<Self> {
-        let (cycle_fs, all, ends) = (stream.cycle_fs(), stream.slots(), stream.ends_fs());
+        let (cycle_fs, all, ends) = (stream.cycle_fs, stream.slots, stream.ends_fs());
         if from_fs <= ends.start - cycle_fs || until_fs >= ends.end {
             return None;
         }
@@ -48,7 +48,7 @@ impl Spans {
             let background_until_fs = (until_fs - all.margin_fs()).max(ends.start + 1);
             let last = all
                 .at(background_until_fs.min(ends.end) - 1)
-                .min(all.count() - 1);
+                .min(all.count - 1);
             let first = all.at(from_fs.max(ends.start)).min(last);
             first..last + 1
         };
@@ -162,7 +162,7 @@ impl Sight {
         } else if !law.has_clk_bins() {
             return None;
         }
-        if end_fs - first_fs > stream.cycle_fs() {
+        if end_fs - first_fs > stream.cycle_fs {
             // A pulse in two windows would be judged twice.
             return None;
         }

@@ -111,7 +111,7 @@ impl Tables {
     /// [`SIDE_BY_SIDE`]. The first ones have been counted by row ([`Tables::add`]), the rest from `counted` on, a
     /// multiple as well, are counted here.
     pub(super) fn put(&mut self, codes: &Codes, cycles: usize, counted: usize) {
-        debug_assert!(codes.len() <= MOST_PHOTONS && codes.len().is_multiple_of(SIDE_BY_SIDE));
+        debug_assert!(codes.len <= MOST_PHOTONS && codes.len.is_multiple_of(SIDE_BY_SIDE));
         debug_assert!(counted.is_multiple_of(SIDE_BY_SIDE));
         // The cycle of what is no photon need not be empty.
         self.cycles[..cycles].fill(0);

@@ -129,7 +129,7 @@ impl Counting<'_> {
             let seen = Some(&mut echoes).filter(|echoes| !echoes.is_empty());
             let known = avalanches.run(photons, seen, until, wanted_from, events);
             if known.is_ok() {
-                break self.photons.len() as u64 + echoes.drawn();
+                break self.photons.len() as u64 + echoes.drawn;
             }
             back = back * 2;
         };
@@ -151,11 +151,11 @@ impl Counting<'_> {
         self.keys.extend(self.photons.iter().map(key));
         self.keys.sort_unstable();
         for (photon, key) in self.photons.iter_mut().zip(&self.keys) {
-            *photon = Photon {
-                time: from + Time::from_fs((key >> 8) as i64),
-                spad: (key >> 1 & 0x7f) as u8,
-                breeds: key % 2 != 0,
-            };
+            *photon = Photon::new(
+                from + Time::from_fs((key >> 8) as i64),
+                (key >> 1 & 0x7f) as u8,
+                key % 2 != 0,
+            );
         }
     }
 

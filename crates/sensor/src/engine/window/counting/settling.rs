@@ -232,11 +232,7 @@ impl Counting<'_> {
             if code.spad() == spad && self.is_drawn(pixel.light, photon) {
                 let time = window.start + self.time_of(pixel.light, photon, laser_cycle);
                 seen += u64::from(window.row_of(time).is_some());
-                self.photons.push(Photon {
-                    time,
-                    spad,
-                    breeds: false,
-                });
+                self.photons.push(Photon::new(time, spad, false));
             }
         }
         if seen == 0 {

@@ -17,7 +17,7 @@ impl Counting<'_> {
         let (config, light, sight) = (self.stream.config(), pixel.light, pixel.sight);
         let is_paralysable = config.spads.law == DeadTimeLaw::Paralysable;
         let last_cycle = config.laser_cycles.checked_sub(1)?;
-        let is_packed = self.stream.spads() == SPADS && light.is_alone();
+        let is_packed = self.stream.spads() == SPADS && light.is_alone;
         if !is_packed || light.has_listed_echo() {
             return None;
         }
@@ -100,7 +100,7 @@ impl Counting<'_> {
             let mut background = light.background(
                 first_other,
                 block,
-                layout.until_fs - relative * self.stream.cycle_fs() + ROUNDING_FS,
+                layout.until_fs - relative * self.stream.cycle_fs + ROUNDING_FS,
             );
             let end_fs = background.end_fs();
             let moved_fs: [i64; TILE] = std::array::from_fn(|lane| match lane < lanes {

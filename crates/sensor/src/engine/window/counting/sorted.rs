@@ -185,10 +185,12 @@ impl Counting<'_> {
             let times = words_of(pixel);
             let start = self.stream.cycle_start(laser_cycle);
             self.photons.clear();
-            self.photons.extend(words.iter().map(|&word| Photon {
-                time: start + Time::from_fs(times.time_fs(word)),
-                spad: Words::spad(word),
-                breeds: false,
+            self.photons.extend(words.iter().map(|&word| {
+                Photon::new(
+                    start + Time::from_fs(times.time_fs(word)),
+                    Words::spad(word),
+                    false,
+                )
             }));
             self.settle_cycle(pixel, laser_cycle);
         }
