@@ -13,7 +13,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use guided_dtof::chip::{SensorConfig, array, hslidar_delay_line, quantic4x4};
+use guided_dtof::chip::{PCounter, SensorConfig, array, hslidar_delay_line, quantic4x4};
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::netlist::sdf::{Sdf, SdfOptions, annotate, write_library_sdf, write_sdf};
 use guided_dtof::netlist::{
@@ -280,14 +280,11 @@ fn is_silent(folder: &Path, program: &str, arguments: &[&str], known: &str) {
 
 /// The netlists of a macropixel with every P-counter.
 fn with_every_p_counter(mut check: impl FnMut(&Path)) {
-    for (p_counter, tap, after_borrow) in scenario::p_counters() {
+    for p_counter in PCounter::ALL {
         let config = SensorConfig {
-            p_counter,
-            tap,
-            after_borrow,
             rows: 1,
             cols: 1,
-            ..SensorConfig::default()
+            ..p_counter.sensor()
         };
         let folder = tempfile::tempdir().unwrap();
         export_verilog(folder.path(), &config, None, None).unwrap();
