@@ -7,7 +7,7 @@
 //!
 //! A macropixel remembers little of earlier laser cycles. Each STOP edge resets its P-counter and HIT, the shift register
 //! holds the CLK periods of a window, and front ends know a SPAD's earlier pulses by their parity at most. So the end of a laser
-//! cycle, with one pulse for every SPAD that had an odd number of them before, and one whole laser cycle bring all of that
+//! cycle, with one pulse for every SPAD that had an odd number of them before, and a whole laser cycle or two bring all of that
 //! to where it would be. What is left are the counts: the window engine has them, as it equals the gates, and they are set in the
 //! counters' flip-flops while the chip is at rest ([`Kernel::preset`](crate::kernel::Kernel::preset)).
 //!
@@ -20,8 +20,14 @@ use crate::chip::{Exposure, Mode, Sensor};
 use crate::photon::SpadEvent;
 use crate::stimulus::Skip;
 
-/// Whole laser cycles that are simulated before the one that is wanted.
-const WARM_UP: u32 = 1;
+/// Whole laser cycles that are simulated before the one that is wanted. In the conventional mode RUN first rises with a STOP edge, and a Gray
+/// counter whose start value is 0 and which holds at its borrow stands still in the laser cycle that begins so, and counts in all later ones.
+fn warm_up(mode: Mode) -> u32 {
+    match mode {
+        Mode::Guided => 1,
+        Mode::Conventional => 2,
+    }
+}
 
 /// CLK periods from a SPAD's pulse to the last stage of the shift register, besides the stages. The front end takes three.
 const LATENCY: u32 = 8;
@@ -38,7 +44,7 @@ pub fn late_cycle(
 ) -> GateSimulation {
     let sensor = &sensor.into();
     let whole = GateSimulation::new(sensor, exposure, at, (1, 1), &[start], &[pulses]);
-    let Some(first_cycle) = cycle.checked_sub(WARM_UP) else {
+    let Some(first_cycle) = cycle.checked_sub(warm_up(sensor.mode)) else {
         return whole;
     };
     let pixel = PulsedPixel {
