@@ -20,7 +20,8 @@ metadata = json.loads(subprocess.run(["cargo", "metadata", "--format-version=1",
 name_of = {package["id"]: package["name"] for package in metadata["packages"]}
 edges = {node["id"]: [dep["pkg"] for dep in node["deps"] if any(kind["kind"] != "dev" for kind in dep["dep_kinds"])]
          for node in metadata["resolve"]["nodes"]}
-ours = set(metadata["workspace_members"])
+# Without the Python package, which no command of the root builds.
+ours = set(metadata["workspace_default_members"])
 
 
 def reached(without=None):

@@ -274,11 +274,11 @@ struct Report<'a> {
     events: &'a HardwareEventReport,
 }
 
-fn watch<O: Observer>(
+fn watch(
     simulation: &mut GateSimulation,
     stimuli: &Stimuli,
     args: &ReplayArgs,
-    observer: &mut O,
+    observer: &mut dyn Observer,
 ) -> Result<(), InputError> {
     let Some(saif) = &args.saif else {
         return record(simulation, stimuli, args, observer);
@@ -294,11 +294,11 @@ fn watch<O: Observer>(
 }
 
 /// Runs the simulation, with its waveform if one is asked for.
-fn record<O: Observer>(
+fn record(
     simulation: &mut GateSimulation,
     stimuli: &Stimuli,
     args: &ReplayArgs,
-    observer: &mut O,
+    observer: &mut dyn Observer,
 ) -> Result<(), InputError> {
     let Some(waves) = &args.vcd else {
         simulation.run(observer);

@@ -402,11 +402,11 @@ fn of_every_endpoint_of_a_macropixel() {
         let [all_divided, all_plain] = [divided, plain].map(|of| of.iter().sum::<usize>());
         let all = all_divided + all_plain;
         assert!(all > 2500 && counted.len() == 12, "{name}: {counted:?}");
-        // Of plain clocks 97 % agree at least. Behind divided ones 76 % do, how many depends on how many P-counters of the list ripple.
+        // Of plain clocks 97 % agree at least, of divided ones 76 to 80 %: how many depends on how many P-counters of the list ripple.
         // Of all, OpenSTA asks more of 2.3 % at most.
         assert!(
             plain[0] * 100 > all_plain * 96
-                && divided[0] * 2 > all_divided
+                && divided[0] * 10 > all_divided * 7
                 && (divided[2] + plain[2]) * 40 < all,
             "{name}: {counted:?}"
         );

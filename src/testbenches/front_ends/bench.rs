@@ -88,7 +88,7 @@ impl Bench {
     }
 
     /// Runs all front ends until `end`.
-    pub(super) fn simulate(&self, photons_hz: f64, end: Time, observer: &mut impl Observer) {
+    pub(super) fn simulate(&self, photons_hz: f64, end: Time, observer: &mut dyn Observer) {
         let input = |name: &str| self.netlist.net(name).expect("it is an input");
         let (clk, clear) = (input("CLK"), input("PIXEL_CLEAR"));
         let mut drives = self.pulses(photons_hz, end);

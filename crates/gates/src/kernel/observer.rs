@@ -4,8 +4,8 @@ use crate::logic::Logic;
 use crate::netlist::NetId;
 use crate::units::Time;
 
-/// Hears of every net change, in time order. The kernel takes it as `dyn`, so that it stands compiled once, optimised as its own crate is: beside the
-/// 60 ns that a change takes, the call is lost in the noise.
+/// Hears of every net change, in time order. The kernel takes it as `dyn`, so that only its own crate compiles it, as optimised as that is: a
+/// change takes 60 ns, and what the call adds is lost in the noise.
 pub trait Observer {
     /// `net` took `value` at `time`.
     fn change(&mut self, time: Time, net: NetId, value: Logic);
@@ -49,7 +49,7 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
     }
 }
 
-impl<O: Observer> Observer for &mut O {
+impl<O: Observer + ?Sized> Observer for &mut O {
     #[inline]
     fn change(&mut self, time: Time, net: NetId, value: Logic) {
         (**self).change(time, net, value);

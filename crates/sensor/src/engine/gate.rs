@@ -153,12 +153,12 @@ impl GateSimulation {
     }
 
     /// Simulates load and exposure to the end.
-    pub fn run<O: Observer>(&mut self, observer: &mut O) {
+    pub fn run(&mut self, observer: &mut dyn Observer) {
         self.run_until(self.plan.schedule.end, observer);
     }
 
     /// Simulates from power-up to `until`.
-    pub(super) fn run_until<O: Observer>(&mut self, until: Time, observer: &mut O) {
+    pub(super) fn run_until(&mut self, until: Time, observer: &mut dyn Observer) {
         let pins = SensorPins::of(&self.netlist);
         let mut stimulus = self.plan.stimulus(&pins);
         if let Some((rest, states)) = self.preset.take() {
@@ -173,10 +173,10 @@ impl GateSimulation {
     ///
     /// # Errors
     /// When a bit of a count is unknown.
-    pub fn read_out<O: Observer>(
+    pub fn read_out(
         &mut self,
         next: Option<&[u16]>,
-        observer: &mut O,
+        observer: &mut dyn Observer,
     ) -> Result<Histograms, EngineError> {
         let now = self.kernel.now();
         let stream = next.map(|starts| {

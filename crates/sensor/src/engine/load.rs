@@ -19,11 +19,11 @@ pub struct Load {
 
 /// Sends `starts` (row-major, one for every macropixel), as their codes where the P-counter has such, through the serial pin; `observer` sees the netlist
 /// that `netlist` elaborates.
-pub fn load<O: Observer>(
+pub fn load(
     config: &SensorConfig,
     netlist: &Netlist,
     starts: &[u16],
-    observer: &mut O,
+    observer: &mut dyn Observer,
 ) -> Load {
     debug_assert_eq!(starts.len(), config.pixels());
     let codes = config.load_codes(starts);

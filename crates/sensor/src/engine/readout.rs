@@ -115,11 +115,11 @@ fn clocked(rises: &[Time], clock: Frequency) -> Time {
 
 /// Reads `counts` (macropixels row-major, bin 0 first) through the pins of a readout; `observer` sees the netlist that
 /// `netlist` is, one of [`readout_netlist`].
-pub fn read_out<O: Observer>(
+pub fn read_out(
     config: &SensorConfig,
     netlist: &Netlist,
     counts: &[u16],
-    observer: &mut O,
+    observer: &mut dyn Observer,
 ) -> Readout {
     let order = ReadoutOrder::of(config);
     let pins = ReadPins::of(netlist);

@@ -182,12 +182,12 @@ fn stop(exposure: &Exposure, cycle: i64) -> Time {
 ///
 /// # Errors
 /// When a file cannot be written.
-pub fn record<O: Observer>(
+pub fn record(
     simulation: &mut GateSimulation,
     waves: &Path,
     format: WaveFormat,
     view: &View,
-    observer: &mut O,
+    observer: &mut dyn Observer,
 ) -> Result<(), InputError> {
     let schedule = simulation.schedule();
     let origin = schedule.origin;
