@@ -1,4 +1,4 @@
-#![cfg_attr(not(test), warn(unreachable_pub))]
+#![cfg_attr(not(test), warn(unreachable_pub, clippy::disallowed_methods))]
 #![doc = include_str!("tutorial.md")]
 //! # Modules
 //!

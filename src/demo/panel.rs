@@ -119,7 +119,7 @@ impl Panel<'_> {
                 hit.grey * (0.45 + 0.55 * hit.normal.dot(sun).max(0.0))
             });
             // Gamma of a display.
-            [(255.0 * light.clamp(0.0, 1.0).powf(1.0 / 2.2)).round() as u8; 3]
+            [(255.0 * libm::pow(light.clamp(0.0, 1.0), 1.0 / 2.2)).round() as u8; 3]
         };
         let places = (0..rows * high).flat_map(|row| (0..cols * wide).map(move |col| (row, col)));
         places.map(|(row, col)| grey(row, col)).collect()

@@ -112,7 +112,7 @@ pub(crate) fn van(speed_m_s: f64) -> Scene {
 pub(crate) fn fog(visibility_m: f64) -> Scene {
     let mut scene = built_in("fog");
     // Koschmieder: the contrast of black on the sky is 2 % at the visibility.
-    scene.medium.extinction_1_m = (1.0f64 / 0.02).ln() / visibility_m;
+    scene.medium.extinction_1_m = libm::log(1.0f64 / 0.02) / visibility_m;
     scene
 }
 

@@ -245,7 +245,7 @@ fn picture(scene: &Scene, sensor: &SensorConfig) -> Vec<u8> {
     let grey = |radiance: f32| {
         let share = f64::from(radiance) / f64::from(bright).max(1e-12);
         // Eyes and screens see roots of light.
-        (240.0 * share.clamp(0.0, 1.0625).powf(1.0 / 2.2)).min(255.0) as u8
+        (240.0 * libm::pow(share.clamp(0.0, 1.0625), 1.0 / 2.2)).min(255.0) as u8
     };
     seen.into_iter().map(grey).collect()
 }

@@ -113,7 +113,7 @@ impl Seen {
             width: self.width,
             laser_cycles,
         };
-        let ln_false_alarm = DepthOptions::default().false_alarm_rate.ln();
+        let ln_false_alarm = libm::log(DepthOptions::default().false_alarm_rate);
         let powers = self.chances.iter().map(|c| scan.power(c, ln_false_alarm));
         powers.sum::<f64>() / self.chances.len() as f64
     }
@@ -142,7 +142,7 @@ impl Seen {
         // What is missed falls about exponentially with the laser cycles.
         let excess = |n: u32| {
             let miss = (1.0 - self.detection(n)).max(1e-15);
-            (miss / (1.0 - detection)).ln()
+            libm::log(miss / (1.0 - detection))
         };
         let (mut low, mut high) = (from.max(1), from.max(1));
         let (mut at_low, mut at_high) = (excess(low), f64::NAN);

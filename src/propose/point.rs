@@ -69,7 +69,7 @@ impl Point {
 
     /// All costs as one number, each as a ratio: the least is the balanced choice.
     pub(crate) fn ln_cost(&self) -> f64 {
-        self.costs().iter().map(|cost| cost.ln()).sum()
+        self.costs().iter().map(|cost| libm::log(*cost)).sum()
     }
 }
 

@@ -216,12 +216,12 @@ impl Problem {
         let step = self.sensor.step_periods as f64;
         let steps = (needed_m / bin_m / step).ceil() + 1.0;
         let bits = window.counter_bits.unwrap_or(MOST_COUNTER_BITS);
-        let reaches = |bits: &usize| steps <= (*bits as f64).exp2();
+        let reaches = |bits: &usize| steps <= libm::exp2(*bits as f64);
         let found = match window.counter_bits {
             Some(own) => Some(own).filter(reaches),
             None => (2..=MOST_COUNTER_BITS).find(reaches),
         };
-        let short_m = needed_m - (bits as f64).exp2() * step * bin_m;
+        let short_m = needed_m - libm::exp2(bits as f64) * step * bin_m;
         let limit = Limit::Reach { bits, short_m };
         found.map(|bits| ((steps * step) as u32, bits)).ok_or(limit)
     }

@@ -128,7 +128,7 @@ impl Gathered {
 fn energies_uj(problem: &Problem, above: i32) -> Vec<f64> {
     let steps = -above * A_DECADE..=BELOW * A_DECADE;
     let energy =
-        |step| problem.most_energy_uj() * 10f64.powf(-f64::from(step) / f64::from(A_DECADE));
+        |step| problem.most_energy_uj() * libm::pow(10f64, -f64::from(step) / f64::from(A_DECADE));
     steps.map(energy).collect()
 }
 

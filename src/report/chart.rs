@@ -329,7 +329,7 @@ fn short(value: f64) -> String {
         let digits = digits.trim_end_matches('0').trim_end_matches('.');
         format!("{digits}e{exponent}")
     } else {
-        let decimals = (3 - magnitude.log10().floor() as i32).max(0) as usize;
+        let decimals = (3 - libm::log10(magnitude).floor() as i32).max(0) as usize;
         let text = format!("{value:.decimals$}");
         match text.contains('.') {
             true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),

@@ -196,7 +196,7 @@ fn draw_bar(
     }
     let most = (height / (2 * LINE_PX)).clamp(2, 12);
     let interval_m = round_interval((high_m - low_m) / most as f64);
-    let decimals = (-interval_m.log10().floor()).clamp(0.0, 3.0) as usize;
+    let decimals = (-libm::log10(interval_m).floor()).clamp(0.0, 3.0) as usize;
     let first = (low_m / interval_m - 1e-6).ceil();
     for n in 0..=most {
         let depth_m = (first + n as f64) * interval_m;
@@ -218,7 +218,7 @@ fn draw_bar(
 
 /// The smallest of 1, 2, 5, 10, 20, 50, … (and 0.1, 0.2, …) that is not below `at_least`.
 fn round_interval(at_least: f64) -> f64 {
-    let decade = 10f64.powf(at_least.log10().floor());
+    let decade = libm::pow(10f64, libm::log10(at_least).floor());
     [1.0, 2.0, 5.0]
         .into_iter()
         .map(|m| m * decade)

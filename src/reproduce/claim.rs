@@ -19,7 +19,7 @@ pub(super) fn figure(value: f64) -> String {
     } else if !(1e-3..1e6).contains(&magnitude) {
         format!("{value:.3e}")
     } else {
-        let decimals = (3 - magnitude.log10().floor() as i32).max(0) as usize;
+        let decimals = (3 - libm::log10(magnitude).floor() as i32).max(0) as usize;
         format!("{value:.decimals$}")
     }
 }

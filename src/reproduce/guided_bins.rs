@@ -121,7 +121,7 @@ pub(super) fn bin_rows() -> Vec<Row> {
     let by_primary = least_bin_of_sensor_m(100.0, &primary, 0.5 * centred);
     let by_contingency = least_bin_of_sensor_m(100.0, &contingency, centred);
     // Eq. 25 takes 1/3 px; the rig's disparities are rounded to 1/16 px besides.
-    let rig_px = THIRD_PX.hypot(1.0 / 16.0 / 12f64.sqrt());
+    let rig_px = libm::hypot(THIRD_PX, 1.0 / 16.0 / 12f64.sqrt());
     let on_grid = |bins, step| {
         PAIR.least_bin_on_grid_m(100.0, rig_px, bins, step)
             .unwrap_or(f64::INFINITY)

@@ -81,7 +81,7 @@ fn fig_32_light(bins: u32) -> PerCycle {
 
 /// Twenty numbers of laser cycles from 1 to 1000 in equal ratios.
 fn fig_32_cycles() -> [u64; 20] {
-    std::array::from_fn(|i| 1000f64.powf(i as f64 / 19.0).round() as u64)
+    std::array::from_fn(|i| libm::pow(1000f64, i as f64 / 19.0).round() as u64)
 }
 
 /// Share of runs whose peak is the signal bin, ties drawn by lot.
@@ -154,7 +154,7 @@ pub(super) fn detection_rows() -> Vec<Row> {
 pub(super) fn figure_32() -> Chart {
     let mut chart = chart(32);
     for bins in FIG_32_BINS {
-        let line = (0..=60).map(|i| 1000f64.powf(f64::from(i) / 60.0).round() as u64);
+        let line = (0..=60).map(|i| libm::pow(1000f64, f64::from(i) / 60.0).round() as u64);
         let exact = line.map(|n| (n as f64, formula(bins, n, Model::Poisson(Ties::Random))));
         let runs = fig_32_cycles().map(|n| (n as f64, monte_carlo(bins, n)));
         chart = chart

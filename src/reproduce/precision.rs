@@ -15,7 +15,7 @@ const FAINT: f64 = 1e-2;
 
 /// Signal counts of Fig. 33, 100 to 100 000.
 fn signals() -> impl Iterator<Item = f64> {
-    (0..=60).map(|i| 10f64.powf(2.0 + f64::from(i) / 20.0))
+    (0..=60).map(|i| libm::pow(10f64, 2.0 + f64::from(i) / 20.0))
 }
 
 fn bound_ns(signal: f64) -> f64 {

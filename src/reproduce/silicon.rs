@@ -28,7 +28,7 @@ pub(super) fn figure_36() -> Chart {
         let counts = intervals_ns().map(move |ns| (ns, hz * ns * 1e-9 * TABLE_6_CYCLES));
         chart = chart.line(format!("{} Mcounts/s", hz / 1e6), counts);
     }
-    let capacity = |bits: i32| f64::from(bits).exp2() - 1.0;
+    let capacity = |bits: i32| libm::exp2(f64::from(bits)) - 1.0;
     for bits in [8, 12, 14] {
         let level = [(0.5, capacity(bits)), (20.0, capacity(bits))];
         chart = chart.dashed(format!("{bits} bits hold"), level);

@@ -60,7 +60,10 @@ fn rms_error_m(depth_m: f64) -> f64 {
 /// Slope of ln y over ln x, least squares.
 fn exponent(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;
-    let logs: Vec<(f64, f64)> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
+    let logs: Vec<(f64, f64)> = points
+        .iter()
+        .map(|(x, y)| (libm::log(*x), libm::log(*y)))
+        .collect();
     let (mx, my) = logs
         .iter()
         .fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));

@@ -65,7 +65,7 @@ pub(super) fn tracking_rows() -> Vec<Row> {
     let window_m = 8.0 * HSLIDAR_BIN_M;
     let step_m = metres(STEP_S);
     let overlap_m = window_m - step_m;
-    let reach_m = 7f64.exp2() * step_m;
+    let reach_m = libm::exp2(7f64) * step_m;
     let budget = detection_at(75.0, 15.0, 1.0);
     let mut rows = demonstrator::tracking_rows();
     rows.extend([

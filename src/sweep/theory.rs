@@ -211,7 +211,7 @@ impl Wall {
             needed,
             Some(bin_m),
             Some(window_m),
-            Some((rig.counter_bits as f64).exp2() * step_m),
+            Some(libm::exp2(rig.counter_bits as f64) * step_m),
             Some(in_window),
             Some(in_window * detection.probability),
         ]

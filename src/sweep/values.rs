@@ -34,7 +34,7 @@ impl Span {
         let number = match share {
             0.0 => from,
             1.0 => to,
-            _ if self.is_log => from * (share * (to / from).ln()).exp(),
+            _ if self.is_log => from * libm::exp(share * libm::log(to / from)),
             _ => from + share * (to - from),
         };
         match self.is_whole {

@@ -256,7 +256,7 @@ impl<'p> Pointing<'p> {
     /// Forgets what was seen and searched when the guide speaks of another target than before.
     fn heed(&self, memory: &mut Memory, estimate: Option<(f64, f64)>) {
         if let (Some((now_m, now_sigma)), Some((then_m, then_sigma))) = (estimate, memory.estimate)
-            && (now_m - then_m).abs() > self.sigmas * now_sigma.hypot(then_sigma)
+            && (now_m - then_m).abs() > self.sigmas * libm::hypot(now_sigma, then_sigma)
         {
             *memory = Memory::default();
         }

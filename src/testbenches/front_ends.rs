@@ -38,7 +38,8 @@ fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     let bench = Bench::new();
     let laws = Laws::new(&bench);
     // 1 M to 1 G.
-    let rates = (6 * STEPS..=9 * STEPS).map(|step| 10f64.powf(f64::from(step) / f64::from(STEPS)));
+    let rates =
+        (6 * STEPS..=9 * STEPS).map(|step| libm::pow(10f64, f64::from(step) / f64::from(STEPS)));
     let points: Vec<Point> = rates.map(|photons_hz| bench.count(photons_hz)).collect();
     checks.note(table(&points));
     compare(&points, &laws, checks);

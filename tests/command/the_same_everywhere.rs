@@ -57,8 +57,7 @@ fn program() -> String {
     std::env::var("GDTOF_PROGRAM").unwrap_or_else(|_| built.to_owned())
 }
 
-/// What a file holds, but for how long it took, and for the bounds of fits: on processors without FMA the system's exponentials
-/// differ in the last digit, and so do some of these.
+/// What a file holds, but for how long it took.
 fn content(file: &Path) -> Vec<u8> {
     let bytes = std::fs::read(file).unwrap();
     if !file.ends_with("frame.json") {
@@ -68,13 +67,6 @@ fn content(file: &Path) -> Vec<u8> {
     let fields = frame.as_object_mut().unwrap();
     for time in ["run_time_s", "exposure_run_time_s", "run_times"] {
         fields.remove(time).expect("a frame says how long it took");
-    }
-    fields["summary"]
-        .as_object_mut()
-        .unwrap()
-        .remove("rms_bound_m");
-    for macropixel in fields["macropixels"].as_array_mut().unwrap() {
-        macropixel.as_object_mut().unwrap().remove("bound_m");
     }
     frame.to_string().into_bytes()
 }

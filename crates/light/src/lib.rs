@@ -1,4 +1,4 @@
-#![cfg_attr(not(test), warn(unreachable_pub))]
+#![cfg_attr(not(test), warn(unreachable_pub, clippy::disallowed_methods))]
 //! Light: the world that it comes from, the SPADs that see it, and the guides that say where to look.
 //!
 //! | module | what lives there |

@@ -1,4 +1,4 @@
-#![cfg_attr(not(test), warn(unreachable_pub))]
+#![cfg_attr(not(test), warn(unreachable_pub, clippy::disallowed_methods))]
 //! The chip, the ways to run it, and depth from what it counts.
 //!
 //! | module | what lives there |

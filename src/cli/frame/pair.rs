@@ -307,7 +307,5 @@ fn check(calibration: &Calibration, left: Intrinsics, right: Intrinsics) -> Resu
 /// The field of view of an array of square macropixels that just fits into a picture.
 fn fov_deg(focal_px: f64, (width, height): (usize, usize), (rows, cols): (u32, u32)) -> f64 {
     let across = (width as f64 / f64::from(cols)).min(height as f64 / f64::from(rows));
-    2.0 * (0.5 * across * f64::from(cols) / focal_px)
-        .atan()
-        .to_degrees()
+    2.0 * libm::atan(0.5 * across * f64::from(cols) / focal_px).to_degrees()
 }

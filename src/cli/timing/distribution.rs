@@ -77,7 +77,8 @@ pub(super) fn plot(config: &SensorConfig, found: &Spread, path: &Path) -> Result
     let (mean, sigma) = (found.mean_s * 1e12, (found.sigma_s * 1e12).max(1e-9));
     let normal = |x: f64| {
         let deviation = (x - mean) / sigma;
-        ripples.len() as f64 * width / (sigma * TAU.sqrt()) * (-0.5 * deviation * deviation).exp()
+        ripples.len() as f64 * width / (sigma * TAU.sqrt())
+            * libm::exp(-0.5 * deviation * deviation)
     };
     let curve = (0..=4 * BARS).map(|i| least + i as f64 * width / 4.0);
     let title = format!(

@@ -94,7 +94,7 @@ fn sweep(frames: usize) -> Result<(Grid, Chart), EngineError> {
         }
         let (first, last) = (f64::from(cycles[0]), f64::from(cycles[LEVELS.len() - 1]));
         let curve = (0..=40).map(|i| {
-            let cycles = (first * (last / first).powf(f64::from(i) / 40.0)).round();
+            let cycles = (first * libm::pow(last / first, f64::from(i) / 40.0)).round();
             (cycles, by_formula(&light, cycles as u32, EQ_17))
         });
         chart = chart

@@ -153,8 +153,8 @@ fn exactly(value: f64) -> Estimate {
 /// Independent errors add in squares.
 pub(super) fn sum(a: &Estimate, b: &Estimate) -> Estimate {
     let value = a.value + b.value;
-    let down = (a.value - a.low).hypot(b.value - b.low);
-    let up = (a.high - a.value).hypot(b.high - b.value);
+    let down = libm::hypot(a.value - a.low, b.value - b.low);
+    let up = libm::hypot(a.high - a.value, b.high - b.value);
     Estimate {
         value,
         low: value - down,
@@ -165,8 +165,8 @@ pub(super) fn sum(a: &Estimate, b: &Estimate) -> Estimate {
 /// a/b with relative errors in squares.
 pub(super) fn ratio(a: &Estimate, b: &Estimate) -> Estimate {
     let value = a.value / b.value;
-    let down = (1.0 - a.low / a.value).hypot(b.high / b.value - 1.0);
-    let up = (a.high / a.value - 1.0).hypot(1.0 - b.low / b.value);
+    let down = libm::hypot(1.0 - a.low / a.value, b.high / b.value - 1.0);
+    let up = libm::hypot(a.high / a.value - 1.0, 1.0 - b.low / b.value);
     Estimate {
         value,
         low: value * (1.0 - down).max(0.0),

@@ -101,7 +101,7 @@ impl SelfCalibration {
         if !self.is_lost {
             return aimed;
         }
-        let reach_px = self.focal_px * SEARCHED_DEG.to_radians().tan();
+        let reach_px = self.focal_px * libm::tan(SEARCHED_DEG.to_radians());
         let searching = aimed.range_m.iter_mut().enumerate();
         let searching = searching
             .skip(frame as usize % SEARCHING)
@@ -127,7 +127,7 @@ impl SelfCalibration {
             let is_still = before_m.is_some_and(|m| (m - measured_m).abs() < STILL_M);
             let guided_px = self.disparity_px(number, guide_m);
             let offset_px = guided_px - self.disparity_px(number, measured_m);
-            let depth = (measured_m.ln() / ONE_DEPTH.ln()) as i32;
+            let depth = (libm::log(measured_m) / libm::log(ONE_DEPTH)) as i32;
             let is_of_pair = guided_px <= self.most_px && offset_px.is_finite();
             (is_of_pair && (is_still || self.is_lost)).then_some((offset_px, depth))
         };
@@ -144,7 +144,7 @@ impl SelfCalibration {
         let agree = most.len() >= FEWEST && depths.len() >= DEPTHS;
         if agree {
             let offset_px = most.iter().map(|(px, _)| px).sum::<f64>() / most.len() as f64;
-            self.turn_deg += (offset_px / self.focal_px).atan().to_degrees();
+            self.turn_deg += libm::atan(offset_px / self.focal_px).to_degrees();
         }
         let guided = pixels
             .iter()

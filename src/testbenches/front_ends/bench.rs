@@ -70,10 +70,10 @@ impl Bench {
             let mut time = BEGIN - dead * 20;
             for number in 0.. {
                 let word = philox4x32_10(
-                    [number, spad, photons_hz.log2().to_bits() as u32, 0],
+                    [number, spad, libm::log2(photons_hz).to_bits() as u32, 0],
                     [22, 0],
                 )[0];
-                time += Time::from_s(-u32_to_unit_f64(word).ln() / photons_hz);
+                time += Time::from_s(-libm::log(u32_to_unit_f64(word)) / photons_hz);
                 if time >= end {
                     break;
                 }

@@ -65,7 +65,7 @@ impl Laws {
 
     /// Those of them that its shaper sees.
     fn shaped_hz(&self, photons_hz: f64) -> f64 {
-        self.avalanches_hz(photons_hz) * (-photons_hz * self.gap_s).exp()
+        self.avalanches_hz(photons_hz) * libm::exp(-photons_hz * self.gap_s)
     }
 
     /// Counts on a wire of [`WIRES`].
@@ -168,7 +168,7 @@ pub(super) fn compare(points: &[Point], laws: &Laws, checks: &mut Checks) {
 
 /// Where counts are most: measured in steps of the sweep, computed between them.
 pub(super) fn folds(points: &[Point], laws: &Laws, checks: &mut Checks) {
-    let step = 10f64.powf(1.0 / f64::from(STEPS));
+    let step = libm::pow(10f64, 1.0 / f64::from(STEPS));
     let most = |found: &dyn Fn(&Point) -> f64| {
         let best = points.iter().max_by(|a, b| found(a).total_cmp(&found(b)));
         best.expect("a sweep").photons_hz
@@ -192,7 +192,7 @@ pub(super) fn folds(points: &[Point], laws: &Laws, checks: &mut Checks) {
                 format!("{} M photons/s a SPAD", mega(computed)),
                 format!("{} M", mega(found)),
                 // Near its maximum a curve is flat: two steps of the sweep, 1 % of counts.
-                (found / computed).ln().abs() <= 2.1 * step.ln(),
+                libm::log(found / computed).abs() <= 2.1 * libm::log(step),
             ),
             None => checks.that(
                 format!("{} wire does not fold over", kind.name()),
@@ -225,7 +225,7 @@ pub(super) fn charts(waves: &Path, points: &[Point], laws: &Laws) -> Result<(), 
         (x, Axis::log(y))
     };
     let law = |of: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
-        let rates = (0..=180).map(|step| 1e6 * 10f64.powf(f64::from(step) / 60.0));
+        let rates = (0..=180).map(|step| 1e6 * libm::pow(10f64, f64::from(step) / 60.0));
         rates.map(|hz| (hz, of(hz))).collect()
     };
     let measured = |of: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {

@@ -109,7 +109,7 @@ impl Layout {
     fn zoom_level(&self, names_width: usize) -> f64 {
         let span_fs = (self.zoom.1 - self.zoom.0).as_fs().max(1) as f64;
         let pixels = WINDOW.0.saturating_sub(names_width + TREE_WIDTH + BORDERS);
-        -(span_fs * 200.0 / pixels.max(200) as f64).log2()
+        -libm::log2(span_fs * 200.0 / pixels.max(200) as f64)
     }
 
     /// Every scope on the way to a signal, top first, each once.

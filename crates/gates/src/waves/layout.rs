@@ -131,7 +131,7 @@ impl Shape {
         match radix {
             Radix::Binary => self.width,
             Radix::Hex => self.width.div_ceil(4),
-            Radix::Decimal => (self.width as f64 * 2f64.log10()).ceil() as usize,
+            Radix::Decimal => (self.width as f64 * libm::log10(2f64)).ceil() as usize,
         }
     }
 }

@@ -67,7 +67,7 @@ pub(super) fn estimate(samples: &mut [Sample], pitch: Pitch) -> Option<(f64, f64
         let counting2 = 1.0 / brightest.count() + 1.0 / other.count();
         let unknown2 = brightest.log_unknown.powi(2) + other.log_unknown.powi(2);
         let sigma = (LOG_REFLECTIVITY * LOG_REFLECTIVITY + counting2 + unknown2).sqrt();
-        let is_other = normal_above((brightest.light / other.light).ln() / sigma);
+        let is_other = normal_above(libm::log(brightest.light / other.light) / sigma);
         variance_m2 += is_other * (other.range(false).0 - range_m).powi(2);
     }
     Some((range_m, variance_m2.sqrt()))
@@ -147,8 +147,8 @@ impl<'s> Part<'s> {
             tangent2 += of_slope * (slope[axis] * slope[axis] - slope2[axis]).max(0.0);
             unknown2 += of_slope * slope2[axis];
         }
-        let log_unknown = 0.25 * ((1.0 + tangent2 + unknown2) / (1.0 + tangent2)).ln();
-        let light = n * inverse * inverse / (1.0 + tangent2).sqrt() / log_unknown.exp();
+        let log_unknown = 0.25 * libm::log((1.0 + tangent2 + unknown2) / (1.0 + tangent2));
+        let light = n * inverse * inverse / (1.0 + tangent2).sqrt() / libm::exp(log_unknown);
         Some(Part {
             samples,
             first,

@@ -71,7 +71,7 @@ fn fuse(estimates: &[(f64, f64)]) -> Option<(f64, f64)> {
     let n = estimates.len();
     let agree = |i: usize, j: usize| {
         let ((a, sigma_a), (b, sigma_b)) = (estimates[i], estimates[j]);
-        (a - b).abs() <= AGREE_SIGMAS * sigma_a.hypot(sigma_b)
+        (a - b).abs() <= AGREE_SIGMAS * libm::hypot(sigma_a, sigma_b)
     };
     let members = |set: usize| (0..n).filter(move |i| set >> i & 1 == 1);
     let consistent =

@@ -31,7 +31,7 @@ impl Guide for NoisyTruth {
         let truth = GroundTruth::render(input.scene, input.rows, input.cols);
         let estimates = (0..).zip(&truth.range_m).map(|(pixel, range_m)| {
             let true_m = (*range_m)?;
-            let sigma_m = self.sigma_m.hypot(self.sigma_per_m * true_m);
+            let sigma_m = libm::hypot(self.sigma_m, self.sigma_per_m * true_m);
             let mut random = random_stream(input.seed, Purpose::Guide, pixel, DRAWS);
             Some(((true_m + sigma_m * normal(&mut random)).max(0.0), sigma_m))
         });

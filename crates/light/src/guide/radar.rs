@@ -81,8 +81,8 @@ impl Cell {
 impl Radar {
     /// The beam, counted from the one about the axis, that a direction is in: column and row.
     fn beam_of(&self, towards: DVec3) -> (i32, i32) {
-        let azimuth_deg = towards.x.atan2(towards.z).to_degrees();
-        let elevation_deg = towards.y.atan2(towards.x.hypot(towards.z)).to_degrees();
+        let azimuth_deg = libm::atan2(towards.x, towards.z).to_degrees();
+        let elevation_deg = libm::atan2(towards.y, libm::hypot(towards.x, towards.z)).to_degrees();
         (
             (azimuth_deg / self.azimuth_beam_deg).round() as i32,
             (elevation_deg / self.elevation_beam_deg).round() as i32,
@@ -97,11 +97,11 @@ impl Radar {
         };
         let rays = angles(row, self.elevation_beam_deg).flat_map(|elevation| {
             angles(col, self.azimuth_beam_deg).map(move |azimuth| {
-                let across = elevation.cos();
+                let across = libm::cos(elevation);
                 DVec3::new(
-                    across * azimuth.sin(),
-                    elevation.sin(),
-                    across * azimuth.cos(),
+                    across * libm::sin(azimuth),
+                    libm::sin(elevation),
+                    across * libm::cos(azimuth),
                 )
             })
         });

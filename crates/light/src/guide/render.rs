@@ -174,7 +174,7 @@ fn air(stage: &Stage, until_m: f64) -> f64 {
 /// Noise of standard deviation about 1 at a point: clouds of three sizes, each half the one before, of which the smallest is at least `finest_m` and fades
 /// as it comes near to that.
 fn grain_at(point: DVec3, finest_m: f64) -> f64 {
-    let finest = finest_m.max(1e-3).log2();
+    let finest = libm::log2(finest_m.max(1e-3));
     let first = finest.floor() as i32;
     let fade = 1.0 - (finest - f64::from(first));
     let octave = |k: i32| cloud(point * power_of_two(-(first + k)), first + k);

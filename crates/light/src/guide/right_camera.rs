@@ -31,9 +31,7 @@ impl RightCamera {
             origin_m: stereo.position_m + DVec3::new(baseline_m, 0.0, 0.0),
             camera,
             // y points down: a turn about it takes z to x, a turn about x takes z up, one about z takes x down.
-            to_world: DMat3::from_rotation_y(yaw)
-                * DMat3::from_rotation_x(pitch)
-                * DMat3::from_rotation_z(roll),
+            to_world: turn(1, yaw) * turn(0, pitch) * turn(2, roll),
         }
     }
 
@@ -49,6 +47,16 @@ impl RightCamera {
     pub(super) fn ray(&self, at: (f64, f64)) -> Ray {
         Ray::new(self.origin_m, self.to_world * self.camera.at_unit_depth(at))
     }
+}
+
+/// About x, y or z (0, 1, 2). That of `glam` asks the system's library for sines, whose last digits differ among machines.
+fn turn(axis: usize, by_rad: f64) -> DMat3 {
+    let (sine, cosine) = libm::sincos(by_rad);
+    let [next, last] = [1, 2].map(|more| DVec3::AXES[(axis + more) % 3]);
+    let mut columns = DVec3::AXES;
+    columns[(axis + 1) % 3] = cosine * next + sine * last;
+    columns[(axis + 2) % 3] = cosine * last - sine * next;
+    DMat3::from_cols(columns[0], columns[1], columns[2])
 }
 
 #[cfg(test)]

@@ -56,7 +56,7 @@ impl<const K: usize> Dual<K> {
     /// e to the power of this number.
     #[inline]
     pub fn exp(self) -> Self {
-        let exp = self.value.exp();
+        let exp = libm::exp(self.value);
         self.chain(exp, exp)
     }
 
@@ -79,7 +79,7 @@ impl<const K: usize> Dual<K> {
             let slope = -0.5 + x / 3.0 - x * x / 8.0 + x * x * x / 30.0;
             return self.chain(value, slope);
         }
-        let hit = -(-x).exp_m1();
+        let hit = -libm::expm1(-x);
         let value = hit / x;
         self.chain(value, (1.0 - hit - value) / x)
     }

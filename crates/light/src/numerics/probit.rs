@@ -42,7 +42,10 @@ pub fn crossing(points: &[Point], level: f64) -> Option<Estimate> {
         for point in points {
             let u = (point.x - middle) / scale;
             let eta = a + b * u;
-            let (p, q) = (ln_normal_below(eta).exp(), ln_normal_below(-eta).exp());
+            let (p, q) = (
+                libm::exp(ln_normal_below(eta)),
+                libm::exp(ln_normal_below(-eta)),
+            );
             let density = normal_density(eta);
             let weight = point.trials * density * density / (p * q);
             let residual = (point.successes - point.trials * p) * density / (p * q);

@@ -76,8 +76,8 @@ impl Filter {
         let x = 2.0 * (wavelength_nm - self.centre_nm).abs() / self.fwhm_nm;
         match self.shape {
             FilterShape::TopHat => f64::from(u8::from(x <= 1.0)),
-            FilterShape::Gaussian => (-LN_2 * x * x).exp(),
-            FilterShape::Cosine if x < 2.0 => 0.5 + 0.5 * (0.5 * PI * x).cos(),
+            FilterShape::Gaussian => libm::exp(-LN_2 * x * x),
+            FilterShape::Cosine if x < 2.0 => 0.5 + 0.5 * libm::cos(0.5 * PI * x),
             FilterShape::Cosine => 0.0,
             FilterShape::Lorentz => 1.0 / (1.0 + x * x),
         }
@@ -171,15 +171,16 @@ impl Atmosphere {
             v if v > 0.5 => v - 0.5,
             _ => 0.0,
         };
-        let koschmieder = (1.0f64 / 0.02).ln();
+        let koschmieder = libm::log(1.0f64 / 0.02);
         Atmosphere {
-            extinction_per_m: koschmieder / visibility_m * (wavelength_nm / 550.0).powf(-exponent),
+            extinction_per_m: koschmieder / visibility_m
+                * libm::pow(wavelength_nm / 550.0, -exponent),
         }
     }
 
     /// Share of the laser's light that survives the way to a target at `range_m` and back.
     pub fn round_trip(&self, range_m: f64) -> f64 {
-        (-2.0 * self.extinction_per_m * range_m).exp()
+        libm::exp(-2.0 * self.extinction_per_m * range_m)
     }
 }
 

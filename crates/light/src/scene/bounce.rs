@@ -43,7 +43,7 @@ impl Scene {
         let (lidar, cosine) = (&self.lidar, towards.z / towards.length());
         let pitch = [1.0 / camera.focal_px, 1.0 / camera.focal_v_px];
         let pulse_j = lidar.pulse_energy_uj * 1e-6;
-        if let Some(beam) = lidar.beam_at(cosine.acos()) {
+        if let Some(beam) = lidar.beam_at(libm::acos(cosine)) {
             return pulse_j * beam / lidar.beam_total();
         }
         let [x, y] = [
@@ -54,7 +54,7 @@ impl Scene {
             .map(|(n, p)| 0.5 * f64::from(n) * p);
         let is_lit = match lidar.spot {
             Spot::Rectangle => x.abs() <= half_x && y.abs() <= half_y,
-            Spot::Round => x.hypot(y) <= half_x.hypot(half_y),
+            Spot::Round => libm::hypot(x, y) <= libm::hypot(half_x, half_y),
         };
         let share = lidar
             .spot

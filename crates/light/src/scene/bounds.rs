@@ -34,11 +34,11 @@ impl Cone {
     /// About the direction `middle`, so wide that `others` are in it, unit vectors all.
     pub(super) fn about(middle: DVec3, others: impl IntoIterator<Item = DVec3>) -> Self {
         let cosines = others.into_iter().map(|other| other.dot(middle));
-        let half_rad = cosines.fold(1.0, f64::min).acos() + ROOM_RAD;
+        let half_rad = libm::acos(cosines.fold(1.0, f64::min)) + ROOM_RAD;
         Cone {
             middle,
             half_rad,
-            sine_cosine: half_rad.sin_cos(),
+            sine_cosine: libm::sincos(half_rad),
         }
     }
 }
@@ -66,11 +66,11 @@ impl Bounds {
         let disc = |(centre_m, radius_m): (DVec3, f64)| {
             let offset_m = centre_m - place_m;
             let away_m = offset_m.length();
-            let fills_rad = (radius_m / away_m).asin();
+            let fills_rad = libm::asin(radius_m / away_m);
             (away_m > radius_m).then(|| Disc {
                 towards: offset_m / away_m,
                 fills_rad,
-                sine_cosine: fills_rad.sin_cos(),
+                sine_cosine: libm::sincos(fills_rad),
             })
         };
         let objects = scene.objects.iter();

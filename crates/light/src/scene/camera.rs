@@ -38,7 +38,7 @@ impl PinholeCamera {
     /// right edge.
     pub(crate) fn with_horizontal_fov(fov_deg: f64, width: u32, height: u32) -> Self {
         let half_width = f64::from(width) / 2.0;
-        let focal_px = half_width / (fov_deg.to_radians() / 2.0).tan();
+        let focal_px = half_width / libm::tan(fov_deg.to_radians() / 2.0);
         Self::centred(focal_px, width, height)
     }
 

@@ -143,7 +143,7 @@ impl Emission {
         match angle_mrad > POINT_MRAD {
             true => {
                 let lasts_s = t2_s(angle_mrad).min(TIME_BASE_S);
-                7e-4 * self.c4() * angle_mrad / POINT_MRAD * lasts_s.powf(-0.25)
+                7e-4 * self.c4() * angle_mrad / POINT_MRAD * libm::pow(lasts_s, -0.25)
             }
             false => 3.9e-4 * self.c4(),
         }
@@ -151,19 +151,19 @@ impl Emission {
 
     /// The eye's lower absorption in the near infrared.
     fn c4(&self) -> f64 {
-        10f64.powf(0.002 * (self.wavelength_nm - 700.0))
+        libm::pow(10f64, 0.002 * (self.wavelength_nm - 700.0))
     }
 }
 
 /// Time after which an eye's movements spread the light, s.
 fn t2_s(angle_mrad: f64) -> f64 {
-    10.0 * 10f64.powf((angle_mrad - POINT_MRAD) / 98.5)
+    10.0 * libm::pow(10f64, (angle_mrad - POINT_MRAD) / 98.5)
 }
 
 /// What a pulse of a train of `pulses` may have of what it may have alone.
 fn c5(pulses: f64) -> f64 {
     match pulses > 600.0 {
-        true => (5.0 * pulses.powf(-0.25)).clamp(0.4, 1.0),
+        true => (5.0 * libm::pow(pulses, -0.25)).clamp(0.4, 1.0),
         false => 1.0,
     }
 }

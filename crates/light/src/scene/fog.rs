@@ -86,10 +86,10 @@ impl Fog {
             }
             if rate_hz > daylight_hz && rates_hz.is_empty() {
                 // Mean and mean square of z over the cell, where light falls as 1/z².
-                let mean_m = (to_m / from_m).ln() * from_m * to_m / (to_m - from_m);
+                let mean_m = libm::log(to_m / from_m) * from_m * to_m / (to_m - from_m);
                 let variance_m2 = (from_m * to_m - mean_m * mean_m).max(0.0);
                 let fs_per_m = 2e15 / SPEED_OF_LIGHT_M_PER_S;
-                let sigma_fs = (sigma.as_fs() as f64).hypot(variance_m2.sqrt() * fs_per_m);
+                let sigma_fs = libm::hypot(sigma.as_fs() as f64, variance_m2.sqrt() * fs_per_m);
                 let arrival_fs = mean_m * fs_per_m - centre_fs;
                 let echo = Echo::new(photons, Time::from_fs(arrival_fs.round() as i64));
                 light = light.with_echo(echo.with_sigma(Time::from_fs(sigma_fs.round() as i64)));

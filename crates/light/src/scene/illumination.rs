@@ -272,7 +272,7 @@ fn with_crosstalk(falling: &[Falling], spads: &SpadModel, cols: usize) -> Vec<Fa
         for (neighbour, share) in neighbours.into_iter().flatten() {
             let other = &falling[neighbour];
             let photons: f64 = other.glints.iter().map(|glint| glint.photons).sum();
-            let fire = -all * (-photons / all).exp_m1() / photons.max(f64::MIN_POSITIVE);
+            let fire = -all * libm::expm1(-photons / all) / photons.max(f64::MIN_POSITIVE);
             own.glints.extend(other.glints.iter().map(|glint| Glint {
                 photons: glint.photons * fire * share,
                 arrival_fs: glint.arrival_fs + CROSSTALK_DELAY.as_fs() as f64,

@@ -116,17 +116,17 @@ impl Interferer {
 
     /// Energy that a pulse sends towards a point, J/sr.
     fn intensity_j_sr(&self, point: DVec3) -> f64 {
-        let (pitch_sine, pitch_cosine) = self.pitch_deg.to_radians().sin_cos();
-        let (sine, cosine) = self.yaw_deg.to_radians().sin_cos();
+        let (pitch_sine, pitch_cosine) = libm::sincos(self.pitch_deg.to_radians());
+        let (sine, cosine) = libm::sincos(self.yaw_deg.to_radians());
         // As it sees the point: right, down and forward of itself.
         let level = turned(point - self.place_m, (cosine, -sine));
         let forward = level.z * pitch_cosine - level.y * pitch_sine;
         let down = level.y * pitch_cosine + level.z * pitch_sine;
         let half = |full_deg: f64| 0.5 * full_deg.to_radians();
         let (half_width, half_height) = (half(self.beam_width_deg), half(self.beam_height_deg));
-        let is_within =
-            level.x.atan2(forward).abs() <= half_width && down.atan2(forward).abs() <= half_height;
-        let solid_angle_sr = 4.0 * (half_width.sin() * half_height.sin()).asin();
+        let is_within = libm::atan2(level.x, forward).abs() <= half_width
+            && libm::atan2(down, forward).abs() <= half_height;
+        let solid_angle_sr = 4.0 * libm::asin(libm::sin(half_width) * libm::sin(half_height));
         match is_within {
             true => self.pulse_energy_uj * 1e-6 / solid_angle_sr,
             false => 0.0,
@@ -135,7 +135,7 @@ impl Interferer {
 
     /// Where it is, and which way it looks, as seen from a rig at `position_m` that has turned to the right by `yaw_deg`.
     pub(super) fn seen_from(&self, time_s: f64, position_m: DVec3, yaw_deg: f64) -> Self {
-        let (sine, cosine) = yaw_deg.to_radians().sin_cos();
+        let (sine, cosine) = libm::sincos(yaw_deg.to_radians());
         let place_m = self.place_m + self.velocity_m_s * time_s - position_m;
         Interferer {
             place_m: turned(place_m, (cosine, -sine)),

@@ -53,7 +53,7 @@ impl Medium {
     pub(crate) fn total_extinction_1_m(&self) -> f64 {
         // A power is dear, and most air is dry.
         let rain = if self.rain_mm_h > 0.0 {
-            let rain_db_km = 1.076 * self.rain_mm_h.powf(0.67);
+            let rain_db_km = 1.076 * libm::pow(self.rain_mm_h, 0.67);
             let db_km_per_1_m = 1e4 * std::f64::consts::LOG10_E;
             rain_db_km / db_km_per_1_m
         } else {
@@ -69,7 +69,7 @@ impl Medium {
 
     /// Share of light that is left after `range_m`, one way. There and back it is the square.
     pub(crate) fn transmission(&self, range_m: f64) -> f64 {
-        (-self.total_extinction_1_m() * range_m).exp()
+        libm::exp(-self.total_extinction_1_m() * range_m)
     }
 
     /// The early echo of the fog before a surface at `until_m`: what it sends back from each of the cells between

@@ -33,7 +33,7 @@ impl Scene {
                 if object.shape.is_endless() {
                     // Ground has no place that its pattern could move with. Its coordinates are right and backwards.
                     let turn = |(u, v): (f64, f64), deg: f64| {
-                        let (sine, cosine) = deg.to_radians().sin_cos();
+                        let (sine, cosine) = libm::sincos(deg.to_radians());
                         (cosine * u - sine * v, sine * u + cosine * v)
                     };
                     let (u, v) = turn((-shift_m.x, shift_m.z), texture.turn_deg);

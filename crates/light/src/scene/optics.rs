@@ -177,7 +177,9 @@ impl Lidar {
             Measured::Word(BeamWord::Uniform) => None,
             Measured::Word(BeamWord::Gaussian) => {
                 let half_widths = 2.0 * angle_rad.to_degrees() / self.beam_fwhm_deg;
-                Some((-std::f64::consts::LN_2 * half_widths * half_widths).exp())
+                Some(libm::exp(
+                    -std::f64::consts::LN_2 * half_widths * half_widths,
+                ))
             }
             Measured::Curve(curve) => Some(curve.at(angle_rad.to_degrees()).unwrap_or(0.0)),
         }
@@ -194,7 +196,7 @@ impl Lidar {
         }
         breaks.retain(|angle| (0.0..=PI / 2.0).contains(angle));
         breaks.sort_by(f64::total_cmp);
-        let ring = |angle: f64| self.beam_at(angle).unwrap_or(0.0) * 2.0 * PI * angle.sin();
+        let ring = |angle: f64| self.beam_at(angle).unwrap_or(0.0) * 2.0 * PI * libm::sin(angle);
         integrate(ring, &breaks, 1e-10)
     }
 
@@ -207,7 +209,7 @@ impl Lidar {
                 let [[_, middle], ..] = curve.points[..] else {
                     return Some(0.0);
                 };
-                let at = curve.at(cosine.acos().to_degrees()).unwrap_or(0.0);
+                let at = curve.at(libm::acos(cosine).to_degrees()).unwrap_or(0.0);
                 Some(at / middle.max(f64::MIN_POSITIVE))
             }
         }
@@ -258,7 +260,7 @@ impl Scene {
             let cube = cosine.powi(3);
             let beam = total.map_or(1.0, |total| {
                 let solid_angle = cube * pitch[0] * pitch[1];
-                lidar.beam_at(cosine.acos()).unwrap_or(1.0) * solid_angle / total / uniform
+                lidar.beam_at(libm::acos(cosine)).unwrap_or(1.0) * solid_angle / total / uniform
             });
             let lens = lidar.illumination_at(cosine);
             OffAxis {

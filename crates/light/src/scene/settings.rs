@@ -304,8 +304,8 @@ impl Scene {
 
     /// Unit vector towards the sun; `None` where light comes from everywhere.
     pub(crate) fn towards_sun(&self) -> Option<DVec3> {
-        let (sine, cosine) = self.light.sun_elevation_deg?.to_radians().sin_cos();
-        let (right, forward) = self.light.sun_azimuth_deg.to_radians().sin_cos();
+        let (sine, cosine) = libm::sincos(self.light.sun_elevation_deg?.to_radians());
+        let (right, forward) = libm::sincos(self.light.sun_azimuth_deg.to_radians());
         Some(DVec3::new(right * cosine, -sine, forward * cosine))
     }
 

@@ -34,7 +34,7 @@ impl Scene {
             dark_hz.push(if is_hot {
                 lidar.hot_spad_hz * heat
             } else {
-                mean_hz * log.exp()
+                mean_hz * libm::exp(log)
             });
         }
         SpadSpread::new(&factors, &dark_hz).ok()

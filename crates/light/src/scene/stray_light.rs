@@ -37,16 +37,16 @@ impl Halo {
         let aspect = lidar.macropixel_aspect;
         let radius = lidar.stray_radius;
         let strength = |row: f64, col: f64| {
-            let away = (row * aspect).hypot(col);
+            let away = libm::hypot(row * aspect, col);
             match &lidar.stray {
-                Measured::Word(_) => (1.0 + (away / radius).powi(2)).powf(-1.5),
+                Measured::Word(_) => libm::pow(1.0 + (away / radius).powi(2), -1.5),
                 Measured::Curve(curve) => curve.at(away).unwrap_or(0.0),
             }
         };
         let cells = (-SUMMED..=SUMMED)
             .flat_map(|row| (-SUMMED..=SUMMED).map(move |col| (f64::from(row), f64::from(col))));
         let is_near = |(row, col): &(f64, f64)| {
-            (row * aspect).hypot(*col) <= f64::from(SUMMED) * aspect.min(1.0)
+            libm::hypot(row * aspect, *col) <= f64::from(SUMMED) * aspect.min(1.0)
         };
         let near: f64 = cells
             .filter(is_near)
@@ -56,7 +56,7 @@ impl Halo {
         let end = f64::from(SUMMED) * aspect.min(1.0);
         let far = match &lidar.stray {
             Measured::Word(_) => {
-                std::f64::consts::TAU * radius.powi(3) / radius.hypot(end) / aspect
+                std::f64::consts::TAU * radius.powi(3) / libm::hypot(radius, end) / aspect
             }
             Measured::Curve(_) => 0.0,
         };

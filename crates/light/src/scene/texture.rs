@@ -26,7 +26,7 @@ const OCTAVES: usize = 6;
 
 /// How strong the clouds of each size are: fine ones as coarse ones up to a half, because matchers live on them.
 static STRENGTHS: LazyLock<[f64; OCTAVES]> = LazyLock::new(|| {
-    std::array::from_fn(|octave| 0.5f64.powf(octave as f64 / (OCTAVES - 1) as f64))
+    std::array::from_fn(|octave| libm::pow(0.5f64, octave as f64 / (OCTAVES - 1) as f64))
 });
 
 /// A pattern of an object's material and a second one.
@@ -128,7 +128,7 @@ impl Texture {
     pub(crate) fn share_at(&self, (right_m, down_m): (f64, f64)) -> f64 {
         let (sine, cosine) = match self.turn_deg {
             0.0 => (0.0, 1.0),
-            deg => deg.to_radians().sin_cos(),
+            deg => libm::sincos(deg.to_radians()),
         };
         let u = (cosine * right_m - sine * down_m + self.shift_m.0) / self.size_m;
         let v = (sine * right_m + cosine * down_m + self.shift_m.1) / self.size_m;

@@ -48,7 +48,7 @@ impl Counts {
             Counts::Bernoulli {
                 cycles,
                 photons_per_cycle,
-            } => cycles as f64 * -(-photons_per_cycle).exp_m1(),
+            } => cycles as f64 * -libm::expm1(-photons_per_cycle),
         }
     }
 
@@ -58,7 +58,7 @@ impl Counts {
             Counts::Poisson { mean, .. } => mean.sqrt(),
             Counts::Bernoulli {
                 photons_per_cycle, ..
-            } => (self.mean() * (-photons_per_cycle).exp()).sqrt(),
+            } => (self.mean() * libm::exp(-photons_per_cycle)).sqrt(),
         }
     }
 
@@ -70,7 +70,10 @@ impl Counts {
             Counts::Poisson { mean, rest } if k == 0 => -mean - rest,
             Counts::Poisson { mean, rest } => {
                 let shift = rest * (x - mean) / mean;
-                shift - stirling_error(k) - poisson_deviance(x, mean) - 0.5 * (2.0 * PI * x).ln()
+                shift
+                    - stirling_error(k)
+                    - poisson_deviance(x, mean)
+                    - 0.5 * libm::log(2.0 * PI * x)
             }
             Counts::Bernoulli {
                 cycles,
@@ -81,7 +84,7 @@ impl Counts {
 
     /// P(N = k); zero below 10⁻³²³.
     pub(crate) fn probability(&self, k: u64) -> f64 {
-        self.ln_probability(k).exp()
+        libm::exp(self.ln_probability(k))
     }
 
     /// P(N = k + 1) / P(N = k).
@@ -91,7 +94,7 @@ impl Counts {
             Counts::Bernoulli {
                 cycles,
                 photons_per_cycle,
-            } => cycles.saturating_sub(k) as f64 / (k + 1) as f64 * photons_per_cycle.exp_m1(),
+            } => cycles.saturating_sub(k) as f64 / (k + 1) as f64 * libm::expm1(photons_per_cycle),
         }
     }
 
@@ -138,7 +141,7 @@ fn count_leading(n: u64, holds: impl Fn(u64) -> bool) -> u64 {
 }
 
 fn ln_binomial(k: u64, n: u64, photons: f64) -> f64 {
-    let hit = -(-photons).exp_m1();
+    let hit = -libm::expm1(-photons);
     if k > n {
         return f64::NEG_INFINITY;
     }
@@ -146,7 +149,7 @@ fn ln_binomial(k: u64, n: u64, photons: f64) -> f64 {
         return -photons * n as f64;
     }
     if k == n {
-        return n as f64 * hit.ln();
+        return n as f64 * libm::log(hit);
     }
     if hit == 0.0 {
         return f64::NEG_INFINITY;
@@ -156,8 +159,8 @@ fn ln_binomial(k: u64, n: u64, photons: f64) -> f64 {
         - stirling_error(k)
         - stirling_error(n - k)
         - poisson_deviance(x, n_f * hit)
-        - poisson_deviance(y, n_f * (-photons).exp())
-        - 0.5 * (2.0 * PI * x * (y / n_f)).ln()
+        - poisson_deviance(y, n_f * libm::exp(-photons))
+        - 0.5 * libm::log(2.0 * PI * x * (y / n_f))
 }
 
 /// A distribution on the counts `first`, `first + stride`, … up to `last` or just beyond.
@@ -217,9 +220,9 @@ impl Tails {
 /// ln p of a probability known together with its complement.
 fn ln_of(p: f64, complement: f64) -> f64 {
     if complement < 0.5 {
-        (-complement).ln_1p()
+        libm::log1p(-complement)
     } else {
-        p.ln()
+        libm::log(p)
     }
 }
 

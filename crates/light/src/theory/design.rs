@@ -44,7 +44,7 @@ impl Design {
 
     /// z_max: how far the P-counter reaches, m (Eq. 23).
     pub fn max_range_m(&self) -> f64 {
-        f64::from(self.counter_bits).exp2() * self.bin_m()
+        libm::exp2(f64::from(self.counter_bits)) * self.bin_m()
     }
 
     /// z_hist: the range of the window, m (Eq. 24).
@@ -84,7 +84,7 @@ pub fn share_inside(sigma: f64, window: f64, step: f64) -> f64 {
     }
     // Of the inside: ∫ (½ − Q).
     let inside =
-        |t: f64| 0.5 * t * erf(t * FRAC_1_SQRT_2) + normal_density(0.0) * (-0.5 * t * t).exp_m1();
+        |t: f64| 0.5 * t * erf(t * FRAC_1_SQRT_2) + normal_density(0.0) * libm::expm1(-0.5 * t * t);
     2.0 / width * (inside(high) - inside(low))
 }
 
@@ -129,7 +129,7 @@ impl StereoPair {
     /// Depth error at `depth_m` of a point in the middle of the image after the cameras turned by `yaw_deg` away
     /// from each other, m: negative, as depths come out short (Fig. 70).
     pub fn yaw_error_m(&self, depth_m: f64, yaw_deg: f64) -> f64 {
-        let shift_px = self.focal_px * yaw_deg.to_radians().tan();
+        let shift_px = self.focal_px * libm::tan(yaw_deg.to_radians());
         self.depth_m(self.focal_px * self.baseline_m / depth_m + shift_px) - depth_m
     }
 

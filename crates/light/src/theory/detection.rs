@@ -138,8 +138,8 @@ pub(crate) fn compare(signal: &Counts, background: &Counts, bins: u32, ties: Tie
             Ties::Loose => others * tails.ln_at_most(i),
             Ties::Random => ln_win_by_lot(&tails, i, f64::from(bins)),
         };
-        hit += here * ln_win.exp();
-        miss -= here * ln_win.exp_m1();
+        hit += here * libm::exp(ln_win);
+        miss -= here * libm::expm1(ln_win);
     }
     (hit, miss) = (hit * stride as f64, miss * stride as f64);
     if hit < miss {
@@ -153,8 +153,8 @@ pub(crate) fn compare(signal: &Counts, background: &Counts, bins: u32, ties: Tie
 fn ln_win_by_lot(tails: &Tails, i: usize, bins: f64) -> f64 {
     let ln_at_most = tails.ln_at_most(i);
     if tails.below[i] == 0.0 {
-        return (bins - 1.0) * ln_at_most - bins.ln();
+        return (bins - 1.0) * ln_at_most - libm::log(bins);
     }
-    let d = (tails.at[i] / tails.below[i]).ln_1p();
+    let d = libm::log1p(tails.at[i] / tails.below[i]);
     (bins - 1.0) * ln_at_most + ln_exprel_neg(bins * d) - ln_exprel_neg(d)
 }

@@ -51,7 +51,7 @@ impl Expected {
         let touched = self.touched(counts.len(), position_ns);
         let terms = touched.map(|i| {
             let echo = self.echo(i, position_ns);
-            f64::from(counts[i]) * (echo / background).ln_1p() - echo
+            f64::from(counts[i]) * libm::log1p(echo / background) - echo
         });
         terms.sum()
     }
@@ -89,7 +89,7 @@ impl InEdges<'_> {
             let background = (self.background_per_ns * (to - from)).max(NO_BACKGROUND);
             let share = self.pulse.share(from - position_ns, to - position_ns);
             let echo = self.signal * share;
-            f64::from(count) * (echo / background).ln_1p() - echo
+            f64::from(count) * libm::log1p(echo / background) - echo
         });
         terms.sum()
     }

@@ -13,7 +13,7 @@ pub fn non_paralysable_hz(photons_hz: f64, dead_time_s: f64) -> f64 {
 /// Edges of a wire that is prolonged by every pulse, 1/s: Λ exp(−Λ τ), the paralysable law, to which an OR tree of many
 /// SPADs comes.
 pub fn paralysable_hz(pulses_hz: f64, width_s: f64) -> f64 {
-    pulses_hz * (-pulses_hz * width_s).exp()
+    pulses_hz * libm::exp(-pulses_hz * width_s)
 }
 
 /// How far two shaped pulses may be apart and meet, s.
@@ -48,7 +48,7 @@ pub fn fold_hz(spads: u32, together: u32, width_s: f64) -> f64 {
 /// Edges of an XOR tree, 1/s, into which toggles come at random with `toggles_hz`: Λ / (2 exp(Λ δ) − 1). A toggle that is
 /// followed by another within a gate's delay δ takes that with it, and neither is seen.
 pub fn xor_edges_hz(toggles_hz: f64, gate_delay_s: f64) -> f64 {
-    toggles_hz / (2.0 * (toggles_hz * gate_delay_s).exp() - 1.0)
+    toggles_hz / (2.0 * libm::exp(toggles_hz * gate_delay_s) - 1.0)
 }
 
 /// CLK periods, 1/s, in which an odd number of `spads` SPADs fire, which is what a sampled XOR tree tells:
@@ -65,7 +65,7 @@ pub fn any_periods_hz(spads: u32, avalanches_hz: f64, clk_hz: f64) -> f64 {
 /// 1 − (1 − x)ⁿ, with its digits where x is small.
 fn any_of(n: u32, x: f64) -> f64 {
     match x < 0.5 {
-        true => -(f64::from(n) * (-x).ln_1p()).exp_m1(),
+        true => -libm::expm1(f64::from(n) * libm::log1p(-x)),
         false => 1.0 - (1.0 - x).powi(n as i32),
     }
 }

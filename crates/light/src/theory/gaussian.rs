@@ -34,7 +34,7 @@ fn sum(mean_s: f64, sigma_s: f64, mean_b: f64, sigma_b: f64, bins: u32) -> f64 {
             false => 0.0,
         };
         let z = (x - mean_s) / sigma_s;
-        (others * ln_below - 0.5 * z * z).exp() * normal_density(0.0) / sigma_s
+        libm::exp(others * ln_below - 0.5 * z * z) * normal_density(0.0) / sigma_s
     };
     if sigma_s == 0.0 {
         return 1.0; // no light: every bin holds nothing, and the formula lets ties win

@@ -43,7 +43,7 @@ pub fn thompson(bin_ns: f64, sigma_ns: f64, background: f64, signal: f64) -> f64
 /// µ_B is held per bin, as in Fig. 33. Eq. 21's 1.5 belongs to µ_B/µ_S = 0.08. At a fixed background *rate*
 /// narrower bins are always better.
 pub fn thompson_best_ratio(background: f64, signal: f64) -> f64 {
-    (24.0 * std::f64::consts::PI.sqrt() * background / signal).cbrt()
+    libm::cbrt(24.0 * std::f64::consts::PI.sqrt() * background / signal)
 }
 
 /// The Cramér-Rao bound of a Gaussian pulse, ns; arguments as in [`thompson`].

@@ -82,7 +82,7 @@ impl Scan {
         Stretch {
             first,
             counts: fullest,
-            ln_false_alarm: (ln_one + positions.ln()).min(0.0),
+            ln_false_alarm: (ln_one + libm::log(positions)).min(0.0),
         }
     }
 }
@@ -104,7 +104,7 @@ impl Scan {
             Stretch {
                 first,
                 counts,
-                ln_false_alarm: (ln_one + (positions as f64).ln()).min(0.0),
+                ln_false_alarm: (ln_one + libm::log(positions as f64)).min(0.0),
             }
         };
         let by_chance = |a: &Stretch, b: &Stretch| {
@@ -150,7 +150,7 @@ impl Scan {
         let beside = chances.beside.clamp(0.0, 1.0);
         let mean = outside as f64 * beside;
         let sigma = (mean * (1.0 - beside)).sqrt();
-        let ln_one = ln_false_alarm - ((chances.bins - self.width + 1) as f64).ln();
+        let ln_one = ln_false_alarm - libm::log((chances.bins - self.width + 1) as f64);
         let powers = NORMAL_POINTS.map(|(off, weight)| {
             let rest = (mean + off * sigma).clamp(0.0, outside as f64).round() as u64;
             let least = least_significant(inside, outside, rest, ln_one);
@@ -194,7 +194,7 @@ fn at_least(least: u64, cells: u64, chance: f64) -> f64 {
     }
     let counts = Counts::Bernoulli {
         cycles: cells,
-        photons_per_cycle: -(-chance).ln_1p(),
+        photons_per_cycle: -libm::log1p(-chance),
     };
     counts.above(least - 1)
 }
@@ -234,7 +234,7 @@ pub(crate) fn ln_hypergeometric_tail(k: u64, marked: u64, drawn: u64, cells: u64
             break;
         }
     }
-    (ln_hypergeometric(k, marked, drawn, cells) + sum.ln()).min(0.0)
+    (ln_hypergeometric(k, marked, drawn, cells) + libm::log(sum)).min(0.0)
 }
 
 /// ln P(K = k), as three binomials of the same chance (Loader).
@@ -248,15 +248,15 @@ fn ln_binomial(k: u64, n: u64, p: f64) -> f64 {
     let (x, y, n_f) = (k as f64, (n - k) as f64, n as f64);
     match (k, n - k) {
         (0, 0) => 0.0,
-        (0, _) => y * (-p).ln_1p(),
-        (_, 0) => x * p.ln(),
+        (0, _) => y * libm::log1p(-p),
+        (_, 0) => x * libm::log(p),
         _ => {
             stirling_error(n)
                 - stirling_error(k)
                 - stirling_error(n - k)
                 - poisson_deviance(x, n_f * p)
                 - poisson_deviance(y, n_f * (1.0 - p))
-                - 0.5 * (2.0 * PI * x * (y / n_f)).ln()
+                - 0.5 * libm::log(2.0 * PI * x * (y / n_f))
         }
     }
 }

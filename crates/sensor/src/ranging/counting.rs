@@ -36,9 +36,9 @@ impl Counting {
         let of_all = self.spads as f64;
         if (self.event_type, self.threshold) == (EventType::Greater, 0) {
             // A neighbour fires only where something has.
-            let silent = (-clamped).ln_1p();
-            let none = ((of_all - 1.0) * silent).exp();
-            return fired.chain(-(of_all * silent).exp_m1(), of_all * none);
+            let silent = libm::log1p(-clamped);
+            let none = libm::exp((of_all - 1.0) * silent);
+            return fired.chain(-libm::expm1(of_all * silent), of_all * none);
         }
         // Of one SPAD fewer: what P(n) is made of, and its slope.
         let others = self.spads - 1;
@@ -89,7 +89,7 @@ impl Counting {
     pub(super) fn fired_for(&self, chance: f64) -> f64 {
         let of = |fired: f64| self.chance(Dual::<0>::constant(fired), Dual::ZERO).value;
         if (self.event_type, self.threshold) == (EventType::Greater, 0) {
-            return -((-chance.min(1.0 - 1e-12)).ln_1p() / self.spads as f64).exp_m1();
+            return -libm::expm1(libm::log1p(-chance.min(1.0 - 1e-12)) / self.spads as f64);
         }
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..40 {

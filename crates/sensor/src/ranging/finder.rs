@@ -123,7 +123,7 @@ impl EchoFinder {
         Ok(EchoFinder {
             bin_s,
             peak: options.peak,
-            ln_false_alarm: options.false_alarm_rate.ln(),
+            ln_false_alarm: libm::log(options.false_alarm_rate),
             scan: Scan::matched(response.pulse_sigma_bins, config.bins, laser_cycles),
             full: (config.overflow == Overflow::Saturate && capacity < laser_cycles)
                 .then_some(capacity),

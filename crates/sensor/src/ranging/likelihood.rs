@@ -101,7 +101,7 @@ impl Likelihood<'_> {
                 let chance = chance.clamp(LEAST_CHANCE, 1.0 - LEAST_CHANCE);
                 let missed = self.cycles - counts;
                 let share = |part: f64, chance: f64| match part > 0.0 {
-                    true => part * (part / (self.cycles * chance)).ln(),
+                    true => part * libm::log(part / (self.cycles * chance)),
                     false => 0.0,
                 };
                 share(counts, chance) + share(missed, 1.0 - chance)
@@ -259,9 +259,9 @@ impl Likelihood<'_> {
         let least = 1e-3 / (self.cycles * last.max(1.0));
         EchoLight {
             position_bins: (light.position_bins + step[0]).clamp(-reach, last + reach),
-            signal: (light.signal * step[1].exp()).clamp(1e-6, 1e7),
-            background_per_bin: (light.background_per_bin * step[2].exp()).clamp(least, 1e4),
-            sigma_bins: (light.sigma_bins * step[3].exp()).clamp(pulse, pulse + last),
+            signal: (light.signal * libm::exp(step[1])).clamp(1e-6, 1e7),
+            background_per_bin: (light.background_per_bin * libm::exp(step[2])).clamp(least, 1e4),
+            sigma_bins: (light.sigma_bins * libm::exp(step[3])).clamp(pulse, pulse + last),
         }
     }
 

@@ -62,7 +62,7 @@ impl<'r, const K: usize> Spad<'r, K> {
     pub(super) fn steady(law: &'r Dead, background: Dual<K>, h: f64) -> Self {
         let dead = law.time_bins;
         let tau = law.afterpulse_bins;
-        let kept = (-dead / tau).exp();
+        let kept = libm::exp(-dead / tau);
         let (mut fired, mut ready, mut trapped) = (background, Dual::ZERO, Dual::ZERO);
         let mut light = background;
         // Afterpulses and crosstalk are few: each round has the next power of their chance.
@@ -235,7 +235,7 @@ impl<'r, const K: usize> Spad<'r, K> {
     /// Afterpulses of this step, where they come as light.
     fn afterpulses(&mut self) -> Dual<K> {
         let spent = self.h / self.dead.afterpulse_bins;
-        let released = -(-spent).exp_m1();
+        let released = -libm::expm1(-spent);
         let fresh = self.trapping.ending();
         // Fresh ones come evenly over the step.
         let of_fresh = 1.0 - released / spent;

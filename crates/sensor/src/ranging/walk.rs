@@ -218,7 +218,7 @@ impl WalkCorrection {
             None => (0.2, 8),
         };
         for number in (-0.6 / step) as i32..=(4.0 / step) as i32 {
-            let signal = 10f64.powf(step * f64::from(number));
+            let signal = libm::pow(10f64, step * f64::from(number));
             let light = |position_bins: f64| EchoLight {
                 position_bins,
                 signal,
@@ -310,7 +310,7 @@ impl WalkCorrection {
     fn light(&self, chance: f64) -> f64 {
         let counting = self.response.counting;
         let fired = counting.fired_for(chance.min(0.999));
-        -(counting.spads as f64) * (-fired).ln_1p()
+        -(counting.spads as f64) * libm::log1p(-fired)
     }
 
     /// The background to begin with, and the most that it may be: from the third of the bins with the fewest counts, because the
@@ -376,7 +376,7 @@ fn with_rivals(best: Fit, fits: &[Fit], likelihood: &Likelihood<'_>) -> Fit {
 fn add_new(fits: &mut Vec<Fit>, fit: Fit) -> bool {
     let is_same = |other: &Fit| {
         let off = (fit.light.position_bins - other.light.position_bins).abs();
-        let times = (fit.light.signal / other.light.signal).ln().abs();
+        let times = libm::log(fit.light.signal / other.light.signal).abs();
         (fit.deviance - other.deviance).abs() < 0.1 + 1e-3 * fit.deviance
             && off < 0.1 * fit.bound_bins.min(1.0)
             && times < 0.1

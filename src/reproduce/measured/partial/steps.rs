@@ -135,7 +135,7 @@ pub(super) fn detecting(
     let trial = trial.in_coarse_bins(candidates, bin_m);
 
     let light = trial.per_cycle();
-    let most_hits = reckoned * -(-(light.signal + light.background)).exp_m1();
+    let most_hits = reckoned * -libm::expm1(-(light.signal + light.background));
     let chance = 1.0 - system.goal.detection;
     let exposures = [12, 14].map(|bits| (most_hits / largest_mean(bits, chance)).ceil() as u32);
     // The macropixel's own counters.
@@ -226,7 +226,7 @@ fn won(n: f64, [echo, other]: [f64; 2], rivals: usize) -> f64 {
     let at = |k: usize| {
         let x = -8.0 + step * k as f64;
         let beaten = ln_normal_below((ahead + x * sigma(echo)) / sigma(other));
-        normal_density(x) * (rivals as f64 * beaten).exp()
+        normal_density(x) * libm::exp(rivals as f64 * beaten)
     };
     let inner: f64 = (1..STEPS)
         .map(|k| if k % 2 == 1 { 4.0 } else { 2.0 } * at(k))

@@ -113,7 +113,7 @@ impl Shape {
                 width_m,
                 height_m,
                 ..
-            } => (*centre_m, 0.5 * width_m.hypot(*height_m)),
+            } => (*centre_m, 0.5 * libm::hypot(*width_m, *height_m)),
             Shape::Box {
                 centre_m, size_m, ..
             } => (*centre_m, 0.5 * size_m.length()),
@@ -123,7 +123,7 @@ impl Shape {
                 radius_m,
                 height_m,
                 ..
-            } => (*centre_m, radius_m.hypot(0.5 * height_m)),
+            } => (*centre_m, libm::hypot(*radius_m, 0.5 * height_m)),
             Shape::Person {
                 foot_m, height_m, ..
             } => {
@@ -141,7 +141,7 @@ impl Shape {
 
     /// The shape as somebody at the origin sees it who has turned by `by_deg` to the right.
     pub(in crate::scene) fn seen_turned(self, by_deg: f64) -> Self {
-        let (sine, cosine) = by_deg.to_radians().sin_cos();
+        let (sine, cosine) = libm::sincos(by_deg.to_radians());
         let turn = |vector: &mut DVec3| *vector = turned(*vector, (cosine, -sine));
         let mut seen = self;
         match &mut seen {

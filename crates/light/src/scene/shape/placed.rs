@@ -191,7 +191,7 @@ impl<'a> Placed<'a> {
         seen_turned_deg: f64,
     ) -> (f64, f64) {
         let turned_back = |vector: DVec3| {
-            let (sine, cosine) = seen_turned_deg.to_radians().sin_cos();
+            let (sine, cosine) = libm::sincos(seen_turned_deg.to_radians());
             turned(vector, (cosine, sine))
         };
         match *self {

@@ -13,7 +13,7 @@ pub(in crate::scene) struct Pose {
 
 impl Pose {
     pub(super) fn new(centre_m: DVec3, yaw_deg: f64) -> Self {
-        let (sine, cosine) = yaw_deg.to_radians().sin_cos();
+        let (sine, cosine) = libm::sincos(yaw_deg.to_radians());
         Pose {
             centre_m,
             cosine_sine: (cosine, sine),

@@ -24,8 +24,8 @@ pub(super) fn meet_sphere(ray: &Ray, centre_m: DVec3, radius_m: f64) -> Option<M
 
 /// Around the vertical axis at the equator, and down along the meridian.
 pub(super) fn on_sphere(offset: DVec3, radius_m: f64) -> (f64, f64) {
-    let down = (offset.y / radius_m).clamp(-1.0, 1.0).asin();
-    (radius_m * offset.x.atan2(-offset.z), radius_m * down)
+    let down = libm::asin((offset.y / radius_m).clamp(-1.0, 1.0));
+    (radius_m * libm::atan2(offset.x, -offset.z), radius_m * down)
 }
 
 /// Ranges at which a line enters and leaves the endless cylinder of `radius_m` about the axis (of unit length) through
@@ -98,7 +98,7 @@ pub(super) fn on_cylinder(offset: DVec3, axis: DVec3, radius_m: f64, part: u32) 
     let (side, other) = axis.any_orthonormal_pair();
     let (x, y) = (offset.dot(side), offset.dot(other));
     match part {
-        SIDE => (radius_m * y.atan2(x), offset.dot(axis)),
+        SIDE => (radius_m * libm::atan2(y, x), offset.dot(axis)),
         _ => (x, y),
     }
 }

@@ -369,7 +369,7 @@ const OCCUPIED: f64 = 0.9;
 /// States that `cycles` laser cycles are expected to be in, each of whose `spads` are in the state `ages` with these probabilities.
 fn occupied_states(ages: &Ages, spads: usize, cycles: u64) -> f64 {
     let cycles = cycles as f64;
-    let reach = OCCUPIED * (2.0 * cycles.ln()).sqrt();
+    let reach = OCCUPIED * (2.0 * libm::log(cycles)).sqrt();
     let deviation = |share: f64| (spads as f64 * share * (1.0 - share).max(0.0)).sqrt();
     let states: f64 = ages
         .aged

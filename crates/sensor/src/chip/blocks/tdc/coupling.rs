@@ -68,7 +68,7 @@ impl Row {
     fn slopes(&self, own: &[f64], phases: &[f64]) -> Vec<f64> {
         let mut slopes = own.to_vec();
         for (ring, pair) in phases.windows(2).enumerate() {
-            let pull = self.pull_hz * (TAU * (pair[1] - pair[0])).sin();
+            let pull = self.pull_hz * libm::sin(TAU * (pair[1] - pair[0]));
             slopes[ring] += pull;
             slopes[ring + 1] -= pull;
         }
