@@ -17,6 +17,8 @@ mod scenario;
 mod testbench;
 #[path = "../../crates/gates/tests/kernel/tool.rs"]
 mod tool;
+#[path = "../../crates/gates/tests/kernel/traces.rs"]
+mod traces;
 #[path = "../../crates/gates/tests/kernel/icarus.rs"]
 mod verilog;
 #[path = "../shared/wide8x8.rs"]
