@@ -3,6 +3,7 @@
 mod bench;
 #[path = "../shared/command.rs"]
 mod command;
+#[path = "../../crates/gates/tests/kernel/every_edge"]
 mod every_edge {
     pub mod circuit;
     mod placement;
@@ -12,7 +13,14 @@ mod icarus;
 mod library_chips;
 #[path = "../shared/scenario.rs"]
 mod scenario;
+#[path = "../../crates/gates/tests/kernel/testbench.rs"]
+mod testbench;
+#[path = "../../crates/gates/tests/kernel/tool.rs"]
 mod tool;
+#[path = "../../crates/gates/tests/kernel/traces.rs"]
+mod traces;
+#[path = "../../crates/gates/tests/kernel/icarus.rs"]
+mod verilog;
 #[path = "../shared/wide8x8.rs"]
 mod wide8x8;
 #[path = "../shared/yosys.rs"]
@@ -44,9 +52,6 @@ mod static_timing_bounds_the_kernel;
 mod tdcs_agree_with_their_models;
 mod testbenches_pass;
 mod the_sensor_keeps_its_timing_checks;
-mod timing_checks_find_violations;
 mod timing_verdicts_agree_with_gates;
 mod traces_are_deterministic;
-mod violations_are_those_of_the_definitions;
-mod waves_read_back;
 mod yosys_gives_back_what_it_was_given;

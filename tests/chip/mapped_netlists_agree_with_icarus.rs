@@ -14,9 +14,9 @@
 //! simulator knows, are in it). HSLIDAR's reset, which loads the counter, is too short in them.
 
 use crate::every_edge::waves::Waves;
-use crate::every_edge_agrees_with_icarus::testbench;
 use crate::icarus;
 use crate::library_chips::{self, Mapped};
+use crate::testbench::testbench;
 
 use std::collections::BTreeMap;
 use std::fs::File;

@@ -86,14 +86,6 @@ impl Scenario {
     }
 }
 
-/// How many random cases a test takes: as many as usual, or `GDTOF_CASES`.
-#[allow(dead_code)]
-pub fn cases(usual: u32) -> u32 {
-    std::env::var("GDTOF_CASES").map_or(usual, |cases| {
-        cases.parse().expect("GDTOF_CASES is a number of cases")
-    })
-}
-
 /// Every P-counter that a sensor may have.
 pub fn p_counters() -> Vec<(PCounter, Tap, AfterBorrow)> {
     let mut all = Vec::new();

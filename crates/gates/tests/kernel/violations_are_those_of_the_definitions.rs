@@ -2,18 +2,18 @@
 //! the same ones, at the same femtosecond, with the same slack.
 
 use crate::every_edge::circuit::{self, Case};
-use crate::scenario;
 use crate::timing_checks_find_violations::{Script, pair, simulate};
+use crate::tool;
 
 use std::cell::Cell;
 
-use guided_dtof::kernel::{CheckReport, Kernel, Policy, Recorder, TimingChecks, in_order};
-use guided_dtof::logic::Logic;
-use guided_dtof::netlist::{
+use femtogate::kernel::{CheckReport, Kernel, Policy, Recorder, TimingChecks, in_order};
+use femtogate::logic::Logic;
+use femtogate::netlist::{
     CellKind, CheckKind, CheckLimits, Corner, DataLimit, Delay, Edge, Library, NetId, Netlist,
     TimingArc,
 };
-use guided_dtof::units::Time;
+use femtogate::units::Time;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestCaseError, TestRunner};
 
@@ -206,7 +206,7 @@ type Tally = [[u64; 2]; CheckKind::ALL.len()];
 fn random_netlists_give_the_violations_of_the_definitions() {
     let all = Cell::new(Tally::default());
     let config = Config {
-        cases: scenario::cases(300),
+        cases: tool::cases(300),
         source_file: Some(file!()),
         ..Config::default()
     };
@@ -239,7 +239,7 @@ fn random_netlists_give_the_violations_of_the_definitions() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: scenario::cases(300), ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: tool::cases(300), ..ProptestConfig::default() })]
 
     /// Limits and delays of a few femtoseconds and stimuli at every femtosecond: coincidences, boundaries and unknown
     /// values are the rule.

@@ -11,13 +11,13 @@ use std::ops::RangeInclusive;
 use std::process::Command;
 use std::sync::{Arc, Once};
 
-use guided_dtof::kernel::{Drive, Kernel, Recorder, Stimulus};
-use guided_dtof::logic::Logic;
-use guided_dtof::netlist::{
+use femtogate::kernel::{Drive, Kernel, Recorder, Stimulus};
+use femtogate::logic::Logic;
+use femtogate::netlist::{
     CellKind, Corner, Delay, Library, Module, ModuleBuilder, NetId, Netlist, Timing, TimingArc,
 };
-use guided_dtof::units::Time;
-use guided_dtof::waves::{FstWriter, Selection, VcdWriter};
+use femtogate::units::Time;
+use femtogate::waves::{FstWriter, Selection, VcdWriter};
 use proptest::prelude::*;
 
 /// Times (fs) and values of one signal, first the initial one.

@@ -9,13 +9,13 @@ use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use super::placement::{Item, MOST_INPUTS, Recipe, placed};
-use guided_dtof::kernel::Drive;
-use guided_dtof::logic::Logic;
-use guided_dtof::netlist::{
+use femtogate::kernel::Drive;
+use femtogate::logic::Logic;
+use femtogate::netlist::{
     CellArcs, CellKind, Corner, Delay, DelayModel, Library, MAX_INPUTS, Module, Netlist, Timing,
     TimingArc,
 };
-use guided_dtof::units::Time;
+use femtogate::units::Time;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use guided_dtof::netlist::{CellKind, Direction, Module, ModuleBuilder, Net};
+use femtogate::netlist::{CellKind, Direction, Module, ModuleBuilder, Net};
 use rand::{rngs::StdRng, seq::SliceRandom};
 
 /// Most inputs a module has.

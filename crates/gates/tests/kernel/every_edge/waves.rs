@@ -52,6 +52,7 @@ impl Figures {
 
 impl Waves {
     /// Every signal's path and its changes.
+    #[allow(dead_code)]
     pub fn changes(&self) -> impl Iterator<Item = (&str, &[(u64, String)])> {
         self.0
             .iter()

@@ -1,12 +1,12 @@
 //! Timing checks find every violation with its exact slack and nothing else: hand-made ones at the limit's very
 //! femtosecond, random ones are in `violations_are_those_of_the_definitions`.
 
-use guided_dtof::kernel::{CheckReport, Drive, Kernel, Policy, Recorder, TimingChecks, merge};
-use guided_dtof::logic::Logic;
-use guided_dtof::netlist::{
+use femtogate::kernel::{CheckReport, Drive, Kernel, Policy, Recorder, TimingChecks, merge};
+use femtogate::logic::Logic;
+use femtogate::netlist::{
     CellKind, CheckKind, Corner, Edge, Library, ModuleBuilder, NetId, Netlist, Timing,
 };
-use guided_dtof::units::Time;
+use femtogate::units::Time;
 
 /// The clock edge, or whatever a test measures from.
 const EDGE: i64 = 10_000_000;
@@ -19,7 +19,7 @@ pub fn pair(kind: CellKind) -> Netlist {
     let mut m = ModuleBuilder::new("pair");
     let pins: Vec<_> = kind.inputs().iter().map(|pin| m.input(pin)).collect();
     let (q1, q2) = (m.output("Q1"), m.output("Q2"));
-    let unused = guided_dtof::netlist::Net::NONE;
+    let unused = femtogate::netlist::Net::NONE;
     m.cell("first", kind, &pins, &[q1, unused]);
     let mut second = pins;
     second[0] = q1;

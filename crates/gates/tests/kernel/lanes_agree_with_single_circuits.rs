@@ -1,0 +1,67 @@
+//! 64 copies of a circuit in one lane-parallel simulation: every value change of every net of every lane comes at the time, and with
+//! the value, that it has when the circuit is simulated alone.
+
+use std::collections::BTreeMap;
+
+use femtogate::kernel::{Drive, Kernel, LANES, LaneDrive, LaneKernel, Lanes, in_order};
+use femtogate::logic::Logic;
+use femtogate::netlist::{NetId, Netlist};
+use femtogate::units::Time;
+use proptest::prelude::*;
+use rand::{RngExt, SeedableRng, rngs::StdRng};
+
+use crate::every_edge::circuit::{self, Case};
+use crate::traces::{LaneTraces, Trace};
+
+/// Random circuits with inertial and transport delays: in each lane another part of the stimulus is left out.
+fn compare_circuit(case: &Case, seed: u64) -> Result<(), TestCaseError> {
+    let netlist = Netlist::elaborate(&case.circuit());
+    let timing = case.timing(&netlist);
+    // Lanes know no Z, and no input that is driven twice in one instant.
+    let known = |value| if value == Logic::Z { Logic::X } else { value };
+    let drives: BTreeMap<(Time, NetId), Logic> = case
+        .drives(&netlist)
+        .into_iter()
+        .map(|drive| ((drive.time, drive.net), known(drive.value)))
+        .collect();
+    let random = &mut StdRng::seed_from_u64(seed);
+    let drives: Vec<(u64, Drive)> = drives
+        .into_iter()
+        .map(|((time, net), value)| {
+            let mask = random.random::<u64>() | random.random::<u64>();
+            (mask, Drive::new(time, net, value))
+        })
+        .collect();
+    let end = drives.last().map_or(Time::ZERO, |(_, d)| d.time) + Time::from_ns(2);
+
+    let mut traces = LaneTraces(vec![Vec::new(); LANES]);
+    let together = drives.iter().map(|&(mask, drive)| LaneDrive {
+        time: drive.time,
+        net: drive.net,
+        mask,
+        values: Lanes::all(drive.value),
+    });
+    LaneKernel::new(&netlist, &timing).run(&mut together.peekable(), end, &mut traces);
+    for (lane, mut found) in traces.0.into_iter().enumerate() {
+        let mine = drives.iter().filter(|(mask, _)| mask >> lane & 1 == 1);
+        let mut trace = Trace::default();
+        let mut stimulus = in_order(mine.map(|(_, drive)| *drive).collect());
+        Kernel::new(&netlist, &timing).run(&mut stimulus, end, &mut trace);
+        trace.0.sort_by_key(|(time, net, _)| (*time, *net));
+        found.sort_by_key(|(time, net, _)| (*time, *net));
+        prop_assert_eq!(found, trace.0, "lane {}", lane);
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 150, ..ProptestConfig::default() })]
+
+    #[test]
+    fn in_random_circuits(
+        case in prop_oneof![circuit::flat(), circuit::hierarchical()],
+        seed in any::<u64>(),
+    ) {
+        compare_circuit(&case, seed)?;
+    }
+}

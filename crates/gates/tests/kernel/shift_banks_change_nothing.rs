@@ -1,0 +1,80 @@
+//! Long shift registers go through the kernel a word at a time. A kernel that handles instants in a random order takes them
+//! flip-flop by flip-flop: every change of every net must be the same, whatever happens to clock, data and reset.
+
+use std::sync::Arc;
+
+use femtogate::kernel::Drive;
+use femtogate::logic::Logic;
+use femtogate::netlist::{CellKind, Corner, Library, Module, ModuleBuilder, Net, Netlist, Timing};
+use femtogate::units::Time;
+use proptest::prelude::*;
+
+use crate::traces::trace;
+
+/// A shift register of some stages with readers of its outputs by their D; one output may be watched by a gate.
+fn register(stages: usize, watched: Option<usize>) -> Arc<Module> {
+    let mut m = ModuleBuilder::new("register");
+    let (d, ck, r, other) = (m.input("D"), m.input("CK"), m.input("R"), m.input("OTHER"));
+    let q = m.output_bus("Q", stages);
+    let copies = m.output_bus("COPY", stages);
+    for stage in 0..stages {
+        let data = if stage == 0 { d } else { q[stage - 1] };
+        let name = format!("stage_{stage}");
+        m.cell(
+            &name,
+            CellKind::Dffr,
+            &[data, ck, r],
+            &[q[stage], Net::NONE],
+        );
+        let name = format!("copy_{stage}");
+        let pins = [q[stage], other, r];
+        m.cell(&name, CellKind::Dffr, &pins, &[copies[stage], Net::NONE]);
+    }
+    if let Some(stage) = watched {
+        m.gate(CellKind::Inv, &[q[stage]]);
+    }
+    m.finish().unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 150, ..ProptestConfig::default() })]
+
+    /// Gaps from far below the delay to far above it, unknown clocks, data and resets among them.
+    #[test]
+    fn in_a_register_on_its_own(
+        stages in 60usize..200,
+        watched in prop::option::weighted(0.3, 0usize..60),
+        steps in prop::collection::vec((0u8..40, 0u8..20, 5_000i64..200_000), 20..300),
+    ) {
+        let netlist = Netlist::elaborate(&register(stages, watched));
+        let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let nets = ["D", "CK", "R", "OTHER"].map(|name| netlist.net(name).unwrap());
+        let mut drives: Vec<Drive> = nets.map(|n| Drive::new(Time::ZERO, n, false)).into();
+        drives.push(Drive::new(Time::from_ps(1), nets[2], true));
+        drives.push(Drive::new(Time::from_ps(500), nets[2], false));
+        let mut now = Time::from_ns(1);
+        let mut clock = false;
+        for (what, value, gap_fs) in steps {
+            let value = match value {
+                0 => Logic::X,
+                value => Logic::from(value % 2 == 1),
+            };
+            let (net, value) = match what {
+                0 => (nets[2], value),
+                // A reset ends again.
+                1..4 => (nets[2], Logic::Zero),
+                4 => (nets[1], Logic::X),
+                5..8 => (nets[3], value),
+                8..20 => (nets[0], value),
+                _ => {
+                    clock = !clock;
+                    (nets[1], Logic::from(clock))
+                }
+            };
+            drives.push(Drive::new(now, net, value));
+            now += Time::from_fs(gap_fs);
+        }
+        let apart = trace(&netlist, &timing, &drives, true);
+        prop_assert_eq!(trace(&netlist, &timing, &drives, false), apart);
+    }
+}
