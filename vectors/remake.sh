@@ -5,7 +5,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 mkdir -p vectors/traces
 mkdir -p vectors/range vectors/timing
-GDTOF_REMAKE=1 cargo test --release --quiet --test chip -- --exact \
+GDTOF_REMAKE=1 cargo test --release --quiet -p femtogate --test kernel -- --exact \
     traces_are_deterministic::every_build_finds_the_golden_hashes
 GDTOF_REMAKE=1 cargo test --release --quiet --test command -- --exact \
     golden_vectors_hold::in_the_delays_of_every_p_counter

@@ -1,38 +1,10 @@
-//! Energies within a library's cells and of their loads: two inverters by hand, a chain of them by OpenSTA.
+//! Energies within a library's cells and of their loads: a chain of inverters by OpenSTA.
 
 use crate::library_chips;
-use crate::{scenario, tool};
+use crate::tool;
 
 use guided_dtof::netlist::liberty::{Characterised, Environment, Liberty, write_mapped};
 use guided_dtof::netlist::{CellKind, ModuleBuilder, Netlist};
-
-/// The tables of example.lib are straight lines (`vectors/liberty/make.py`), so the numbers are exact.
-#[test]
-fn of_two_inverters_by_hand() {
-    let text = std::fs::read_to_string(scenario::example_library()).unwrap();
-    let library = Liberty::read(&text, &[]).unwrap();
-    let mut m = ModuleBuilder::new("pair");
-    let a = m.input("A");
-    let between = m.gate(CellKind::Inv, &[a]);
-    let z = m.output("Z");
-    m.gate_into(CellKind::Inv, &[between], z);
-    let netlist = Netlist::elaborate(&m.finish().unwrap());
-    let environment = Environment::of(&library);
-    let made = Characterised::of(&netlist, &library, &environment);
-    let [within, loads] = made.energy_j((&netlist, 0), &library, 2.0, |_| 10.0);
-    // ns, pF and pJ.
-    let (slew, load) = (environment.input_slew_fs * 1e-6, 0.0008);
-    let next = 0.006 + 7.5 * load + 0.04 * slew;
-    let by_hand = 2.0 * 0.0006 * 0.7 + 0.01 * load + 0.001 * (slew + next);
-    assert!(
-        (within / (10.0 * by_hand * 1e-12) - 1.0).abs() < 1e-9,
-        "{within}"
-    );
-    assert!(
-        (loads / (10.0 * 0.5 * load * 4.0 * 1e-12) - 1.0).abs() < 1e-9,
-        "{loads}"
-    );
-}
 
 /// OpenSTA 2.0.17 charges both energies, of rise and fall, at every change; we charge one of them, on average.
 #[test]

@@ -1,16 +1,18 @@
 //! The chip and its kernel: blocks, timing, waveforms, other simulators.
 
 mod bench;
+#[path = "../../crates/gates/tests/kernel/cases.rs"]
+mod cases;
 #[path = "../shared/command.rs"]
 mod command;
 #[path = "../../crates/gates/tests/kernel/every_edge"]
 mod every_edge {
-    pub mod circuit;
-    mod placement;
     pub mod waves;
 }
 mod icarus;
 mod library_chips;
+#[path = "../../crates/gates/tests/kernel/saif.rs"]
+mod saif;
 #[path = "../shared/scenario.rs"]
 mod scenario;
 #[path = "../../crates/gates/tests/kernel/testbench.rs"]

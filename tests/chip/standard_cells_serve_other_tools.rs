@@ -2,6 +2,7 @@
 //! a warning, cells do what those of our kernel do, Verilator and Yosys read it all. A tool that is absent is skipped,
 //! loudly, and must be there in CI.
 
+use crate::cases;
 use crate::command::gdtof;
 use crate::icarus;
 use crate::scenario;
@@ -74,7 +75,7 @@ fn macropixels_annotated_in_icarus_agree_with_our_kernel() {
     if icarus::is_here() {
         let random =
             |seed, rows, cols| Scenario::random(&mut StdRng::seed_from_u64(seed), rows, cols);
-        for seed in 0..tool::cases(20).into() {
+        for seed in 0..cases::cases(20).into() {
             compare(&random(seed, 1, 1));
         }
         compare(&random(1000, 2, 3));

@@ -1,7 +1,8 @@
 //! CLK that comes late to a column, in any corner, process, voltage, temperature and mismatch, of every chip: what the whole array
 //! counts at gate level, its wires included (as with a waveform), every engine counts that runs macropixels by themselves.
 
-use crate::scenario::{self, Scenario, cases};
+use crate::cases::cases;
+use crate::scenario::{self, Scenario};
 
 use guided_dtof::chip::{
     Exposure, Mode, Sensor, SensorConfig, Silicon, WindowLaw, hslidar, hslidar_delay_line,

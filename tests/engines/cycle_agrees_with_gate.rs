@@ -5,13 +5,14 @@
 
 use crate::scenario;
 
+use crate::cases::cases;
 use guided_dtof::chip::macropixel::Model;
 use guided_dtof::chip::window_law::{Window, WindowLaw};
 use guided_dtof::chip::{ChipTiming, EventType, Exposure, Mode, PCounter, SensorConfig};
 use guided_dtof::engine::{Cycle, Gate, Histograms, Replay};
 use guided_dtof::netlist::Corner;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
-use scenario::{Scenario, cases};
+use scenario::Scenario;
 
 /// Chips with one kind of P-counter.
 #[derive(Debug, Clone, Copy, Default)]

@@ -11,7 +11,8 @@ use guided_dtof::units::Time;
 use proptest::prelude::*;
 use rand::{SeedableRng, rngs::StdRng};
 
-use crate::scenario::{Scenario, cases};
+use crate::cases::cases;
+use crate::scenario::Scenario;
 
 /// What all nets are at a time, and their changes from then on.
 #[derive(PartialEq)]

@@ -1,5 +1,7 @@
 //! The engines held to each other and to the theory.
 
+#[path = "../../crates/gates/tests/kernel/cases.rs"]
+mod cases;
 #[path = "../shared/scenario.rs"]
 mod scenario;
 #[path = "../shared/wide8x8.rs"]

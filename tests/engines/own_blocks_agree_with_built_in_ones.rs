@@ -7,6 +7,7 @@ use crate::yosys;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::cases::cases;
 use guided_dtof::analysis::{LocalClocks, MacropixelTiming};
 use guided_dtof::chip::own_block::Uneven;
 use guided_dtof::chip::{
@@ -16,7 +17,7 @@ use guided_dtof::chip::{
 use guided_dtof::engine::{self, Cycle, Gate, Histograms, Replay};
 use guided_dtof::netlist::Module;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
-use scenario::{Scenario, cases};
+use scenario::Scenario;
 use serde_json::Value;
 
 /// The same sensor with its P-counter read back from JSON.

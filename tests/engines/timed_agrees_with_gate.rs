@@ -7,13 +7,14 @@ use crate::scenario;
 
 use std::collections::BTreeMap;
 
+use crate::cases::cases;
 use guided_dtof::chip::{
     AfterBorrow, ChipTiming, Mode, PCounter, Sensor, SensorConfig, Silicon, Tap, array,
 };
 use guided_dtof::engine::{Doubt, Gate, Histograms, PulsedPixel, Replay, Runner, Timed};
 use guided_dtof::netlist::{Corner, Mismatch, Netlist, Timing};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
-use scenario::{Scenario, cases};
+use scenario::Scenario;
 
 /// Macropixels that kept time, and those that did not by reason.
 #[derive(Default)]

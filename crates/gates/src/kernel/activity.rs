@@ -173,6 +173,7 @@ mod tests {
         for &(time, value) in changes {
             activity.change(Time::from_fs(time), net, value);
         }
+        assert_eq!(activity.from().as_fs(), from);
         activity.until(Time::from_fs(end))[net.index()]
     }
 

@@ -151,6 +151,17 @@ mod tests {
         assert_eq!(Conditions::default().delay_factor(), Some(1.0));
     }
 
+    /// Overdrive 0.7 V at the reference; 0.2 V less supply at 100 °C, with 40 mV less threshold, in fast silicon.
+    #[test]
+    fn a_factor_by_hand() {
+        let threshold_v: f64 = 0.40 - 0.03 - 0.04;
+        let mobility = ((100.0 + 273.15) / (50.0 + 273.15_f64)).powf(-1.5);
+        let raw = 0.9 / (1.08 * mobility * (0.9 - threshold_v).powf(1.3));
+        let reference = 1.1 / 0.7_f64.powf(1.3);
+        let found = factor(Corner::Fast, 0.9, 100.0);
+        assert!((found / (raw / reference) - 1.0).abs() < 1e-12, "{found}");
+    }
+
     #[test]
     fn low_voltage_heat_and_slow_silicon_are_slow() {
         assert!(factor(Corner::Typ, 1.0, 50.0) > 1.0);

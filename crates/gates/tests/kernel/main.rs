@@ -5,14 +5,19 @@ mod every_edge {
     mod placement;
     pub mod waves;
 }
+mod cases;
 mod icarus;
+mod saif;
 mod testbench;
 mod tool;
 mod traces;
 
+mod activity_agrees_with_waves;
 mod lanes_agree_with_single_circuits;
+mod library_cells_by_hand;
 mod random_circuits_agree_with_icarus;
 mod shift_banks_change_nothing;
 mod timing_checks_find_violations;
+mod traces_are_deterministic;
 mod violations_are_those_of_the_definitions;
 mod waves_read_back;

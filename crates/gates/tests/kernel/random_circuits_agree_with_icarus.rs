@@ -39,7 +39,7 @@ use rand::{SeedableRng, rngs::StdRng, seq::SliceRandom};
 
 use crate::every_edge::circuit::{self, Case};
 use crate::every_edge::waves::{Figures, Waves};
-use crate::{icarus, testbench::testbench, tool};
+use crate::{cases, icarus, testbench::testbench};
 
 /// Whose waves are compared.
 pub const NAMES: [&str; 2] = ["the kernel", "Icarus"];
@@ -171,7 +171,7 @@ fn compare(cases: &[Case]) -> Result<Figures, TestCaseError> {
 
 /// Cases to run in each of the two tests with random netlists.
 fn cases() -> u32 {
-    tool::cases(USUAL).div_ceil(2)
+    cases::cases(USUAL).div_ceil(2)
 }
 
 /// How proptest goes about it. Shrinking is cut short: every step runs Icarus.

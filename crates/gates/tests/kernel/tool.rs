@@ -1,4 +1,4 @@
-//! Tools that are not ours, and how many random cases are given to them.
+//! Tools that are not ours.
 
 use std::io::Write;
 use std::process::Command;
@@ -14,11 +14,4 @@ pub fn is_here(program: &str, so: &str) -> bool {
     let _ = std::io::stderr().write_all(said.as_bytes());
     assert!(std::env::var_os("CI").is_none(), "CI must have {program}");
     false
-}
-
-/// How many random cases a test takes: as many as usual, or `GDTOF_CASES`.
-pub fn cases(usual: u32) -> u32 {
-    std::env::var("GDTOF_CASES").map_or(usual, |cases| {
-        cases.parse().expect("GDTOF_CASES is a number of cases")
-    })
 }

@@ -1,9 +1,9 @@
 //! Every check of every flip-flop in random netlists, against a reference that derives the violations from a full trace:
 //! the same ones, at the same femtosecond, with the same slack.
 
+use crate::cases;
 use crate::every_edge::circuit::{self, Case};
 use crate::timing_checks_find_violations::{Script, pair, simulate};
-use crate::tool;
 
 use std::cell::Cell;
 
@@ -206,7 +206,7 @@ type Tally = [[u64; 2]; CheckKind::ALL.len()];
 fn random_netlists_give_the_violations_of_the_definitions() {
     let all = Cell::new(Tally::default());
     let config = Config {
-        cases: tool::cases(300),
+        cases: cases::cases(300),
         source_file: Some(file!()),
         ..Config::default()
     };
@@ -239,7 +239,7 @@ fn random_netlists_give_the_violations_of_the_definitions() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: tool::cases(300), ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases::cases(300), ..ProptestConfig::default() })]
 
     /// Limits and delays of a few femtoseconds and stimuli at every femtosecond: coincidences, boundaries and unknown
     /// values are the rule.

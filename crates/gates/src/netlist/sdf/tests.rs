@@ -245,6 +245,45 @@ fn what_is_not_modelled_is_counted() {
     );
 }
 
+/// One delay of three is zero (an increment of zero is none), and a cell's arc is given twice.
+#[test]
+fn oddities_are_counted() {
+    let cell = |path: &str, delays: &str| {
+        format!("(CELL (CELLTYPE \"INV\") (INSTANCE {path}) (DELAY {delays}))\n")
+    };
+    let text = file(
+        &[
+            cell("a", "(ABSOLUTE (IOPATH A Y (0) (0)))"),
+            cell("b", "(ABSOLUTE (IOPATH A Y (0) (7)))"),
+            cell("b", "(INCREMENT (IOPATH A Y (0) (0)))"),
+            cell("c", "(ABSOLUTE (IOPATH A Y () ()))"),
+            cell("a", "(ABSOLUTE (IOPATH A Y (5) (6)))"),
+        ]
+        .concat(),
+    );
+    let found = oddities(&Sdf::parse("a.sdf", &text).unwrap(), Corner::Typ);
+    let first = text
+        .lines()
+        .position(|line| line.contains("INSTANCE a"))
+        .unwrap()
+        + 1;
+    let zeros = Oddity::Zeros {
+        zeros: 1,
+        arcs: 3,
+        line: first,
+    };
+    let Oddity::Twice {
+        before,
+        entries,
+        line,
+    } = found[1]
+    else {
+        panic!("{found:?}");
+    };
+    assert_eq!(found[0], zeros);
+    assert_eq!((before, entries, line), (first, 1, first + 4));
+}
+
 #[test]
 fn mistakes_are_named_with_line_and_cure() {
     let cell = |body: &str| file(&inv(body));
