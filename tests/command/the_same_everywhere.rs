@@ -2,7 +2,7 @@
 //! processor has: SHA-256 of waveforms, histograms, depths and a sweep's table beside `vectors/everywhere/hashes.csv`.
 //!
 //! `cargo test --test command the_same_everywhere -- --nocapture` prints them. `GDTOF_PROGRAM=target/release/gdtof` holds
-//! another build to them.
+//! another build to them, `GDTOF_PROGRAM="qemu-aarch64 …/gdtof"` one for another architecture (`.ci/portable`).
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -51,10 +51,16 @@ fn vectors() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("vectors/everywhere")
 }
 
-/// The program that was built with the tests, or another.
-fn program() -> String {
+/// The program that was built with the tests, or another; with what runs it before it.
+fn program() -> Vec<String> {
     let built = env!("CARGO_BIN_EXE_gdtof");
-    std::env::var("GDTOF_PROGRAM").unwrap_or_else(|_| built.to_owned())
+    let given = std::env::var("GDTOF_PROGRAM").unwrap_or_else(|_| built.to_owned());
+    // Runs have a working folder of their own.
+    let place = |word: &str| match Path::new(word).exists() {
+        true => std::path::absolute(word).unwrap().display().to_string(),
+        false => word.to_owned(),
+    };
+    given.split(' ').map(place).collect()
 }
 
 /// What a file holds, but for how long it took.
@@ -112,7 +118,7 @@ fn golden() -> String {
 #[test]
 fn with_any_number_of_threads() {
     let program = program();
-    let command = [program.as_str()];
+    let command: Vec<&str> = program.iter().map(String::as_str).collect();
     let alone = hashes(&command, 1);
     println!("{alone}");
     if std::env::var_os("GDTOF_REMAKE").is_some() {
@@ -143,7 +149,7 @@ fn on_processors_with_other_vector_instructions() {
     }
     for (processor, has_avx2) in [("qemu64", false), ("Haswell", true)] {
         let program = program();
-        let command = [emulator, "-cpu", processor, &program];
+        let command = [emulator, "-cpu", processor, &program[0]];
         let doctor = Command::new(emulator)
             .args(&command[1..])
             .args(["doctor", "--json"])

@@ -95,6 +95,23 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// Chains of other delays or stages are other modules.
+    #[test]
+    fn modules_are_named_after_delay_and_stages() {
+        let chain =
+            |typical_fs| Chain::of(CellKind::Buf, Some(OwnDelay::wire(typical_fs))).unwrap();
+        let (short, long) = (chain(50_000), chain(120_000));
+        assert_eq!(
+            (short.stages, short.module()),
+            (1, "DELAY_50000_1".to_owned())
+        );
+        assert_eq!(
+            (long.stages, long.module()),
+            (3, "DELAY_120000_3".to_owned())
+        );
+        assert_eq!(long.stage_module(), "STAGE_120000_3");
+    }
+
     proptest! {
         #[test]
         fn stages_are_alike_and_add_up(fs: u32, typical_fs in 1u32..10_000_000) {

@@ -140,3 +140,21 @@ impl Edge {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_corner_is_scaled_and_rounded() {
+        let delay = Delay {
+            min_fs: 3,
+            typ_fs: 100,
+            max_fs: 1001,
+        };
+        let scaled = delay.times(1.5);
+        assert_eq!(Corner::ALL.map(|corner| scaled.at(corner)), [5, 150, 1502]);
+        let [min, typ, max] = Corner::ALL.map(|corner| Delay::scaled(1000).at(corner));
+        assert_eq!([min, typ, max], [720, 1000, 1450]);
+    }
+}

@@ -274,6 +274,35 @@ mod tests {
         assert_eq!(need(true, CheckKind::Hold), (1, hold + rise - clock_to_q));
     }
 
+    /// D follows the edge that clocks it, so hold has all of that delay.
+    #[test]
+    fn a_toggle_flip_flop_holds_its_own_data() {
+        let mut m = ModuleBuilder::new("toggle");
+        let (ck, r, q) = (m.input("CK"), m.input("R"), m.output("Q"));
+        let qn = m.wire("QN");
+        m.cell("bit", CellKind::Dffr, &[qn, ck, r], &[q, qn]);
+        let (netlist, library) = (Netlist::elaborate(&m.finish().unwrap()), Library::default());
+        let timing = Timing::nominal(&netlist, &library, Corner::Typ);
+        let analysis = StaticTiming::new(&netlist, &timing);
+        let clock = netlist.net("CK").unwrap();
+        let found =
+            Requirements::of(&netlist, &analysis, clock, &[], &library, Corner::Typ).unwrap();
+        for edge in Edge::BOTH {
+            let is_its = |r: &&Requirement| r.kind == CheckKind::Hold && r.edge == edge;
+            let need = found.all().iter().find(is_its).unwrap().need;
+            let limit = library
+                .checks(CellKind::Dffr)
+                .toward(CheckKind::Hold, edge, Corner::Typ);
+            let arc = library.arcs(CellKind::Dffr)[1][1];
+            let to_qn = arc.delay_fs(Corner::Typ, edge.level());
+            assert_eq!(
+                need.as_fs(),
+                i64::from(limit) - i64::from(to_qn),
+                "{edge:?}"
+            );
+        }
+    }
+
     #[test]
     fn a_period_is_rounded_up_and_a_broken_hold_has_none() {
         let requirement = |halves, fs| Requirement {

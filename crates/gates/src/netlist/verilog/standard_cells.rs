@@ -308,3 +308,21 @@ fn event(pin: &PinEdge<'_>) -> String {
     };
     format!("{edge}{}", pin.pin)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Yosys knows no check of one pin.
+    #[test]
+    fn a_simulator_alone_is_told_widths() {
+        let checks = |reader| {
+            let mut text = Vec::new();
+            write_specify(&mut text, CellKind::Dffr, &Library::default(), reader).unwrap();
+            let text = String::from_utf8(text).unwrap();
+            ["$width", "$setuphold", "$recrem"].map(|check| text.matches(check).count())
+        };
+        assert_eq!(checks(Reader::Simulator), [3, 2, 1]);
+        assert_eq!(checks(Reader::Synthesis), [0, 2, 1]);
+    }
+}
