@@ -186,6 +186,17 @@ mod tests {
     }
 
     #[test]
+    fn a_swallowed_pulse_is_two_edges() {
+        let netlist = one_shot();
+        let net = netlist.net("Z").unwrap();
+        let mut activity = Activity::new(&netlist, Time::from_fs(10));
+        activity.swallowed(Time::from_fs(9), net, 1);
+        activity.swallowed(Time::from_fs(10), net, 3);
+        let found = activity.until(Time::from_fs(20))[net.index()];
+        assert_eq!(found.inertial_glitch_edges, 6);
+    }
+
+    #[test]
     fn x_on_the_way_is_one_toggle_and_x_and_back_a_glitch() {
         let changes = [(0, Zero), (5, X), (6, One), (8, X), (9, One)];
         let found = observed(0, &changes, 10);

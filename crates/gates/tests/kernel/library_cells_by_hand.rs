@@ -86,6 +86,8 @@ fn delays_of_a_gate_of_two_cells() {
         let last = *found.last().unwrap() - Time::from_ns(start_ns);
         assert_near(last.as_fs() as f64, ns * 1e6);
     }
+    let at = [1, 3, 5].map(|ns| seen.value_at(z, Time::from_ns(ns)));
+    assert_eq!(at, [Logic::Zero, Logic::One, Logic::Zero]);
     let (area, leakage_w) = made.silicon(&netlist, &library, 0);
     assert_near(area, 1.0 + 0.7);
     assert_near(leakage_w, (0.5 + 0.35) * 1e-9);

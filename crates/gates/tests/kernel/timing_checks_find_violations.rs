@@ -1,8 +1,11 @@
 //! Timing checks find every violation with its exact slack and nothing else: hand-made ones at the limit's very
 //! femtosecond, random ones are in `violations_are_those_of_the_definitions`.
 
-use femtogate::kernel::{CheckReport, Drive, Kernel, Policy, Recorder, TimingChecks, merge};
+use femtogate::kernel::{
+    CheckReport, Drive, Kernel, Policy, Recorder, TimingChecks, in_order, merge,
+};
 use femtogate::logic::Logic;
+use femtogate::netlist::sdf::{Sdf, annotate};
 use femtogate::netlist::{
     CellKind, CheckKind, Corner, Edge, Library, ModuleBuilder, NetId, Netlist, Timing,
 };
@@ -151,6 +154,32 @@ fn exact(kind: CellKind, check: CheckKind, corner: Corner, varied: (&'static str
             let worst = report.summary(check).worst.clone().unwrap();
             assert_eq!(worst.slack_fs, slack, "{case}");
         }
+    }
+}
+
+/// R and S may have limits of their own, from a delay file.
+#[test]
+fn each_control_is_judged_by_its_own_limit() {
+    let (kind, corner) = (CellKind::Dffsr, Corner::Typ);
+    let (library, netlist) = (Library::default(), pair(kind));
+    let mut timing = Timing::nominal(&netlist, &library, corner);
+    let text = "(DELAYFILE (SDFVERSION \"3.0\") (TIMESCALE 1fs)
+        (CELL (CELLTYPE \"DFFSR\") (INSTANCE first) (TIMINGCHECK
+        (WIDTH (posedge R) (5000)) (WIDTH (posedge S) (9000)))))";
+    let sdf = Sdf::parse("own.sdf", text).unwrap();
+    annotate(&mut timing, &netlist, &sdf, corner).unwrap();
+    for (control, limit) in [("R", 5_000), ("S", 9_000)] {
+        let mut checks = TimingChecks::new(&netlist, &library, corner).limits(&netlist, &timing);
+        let steps = script(kind, CheckKind::ControlHigh, (control, Edge::Rise), 4_000);
+        let drives = steps.into_iter().map(|(fs, pin, value)| {
+            Drive::new(Time::from_fs(fs), netlist.net(pin).unwrap(), value)
+        });
+        let mut drives = in_order(drives.collect());
+        Kernel::new(&netlist, &timing).run(&mut drives, Time::from_fs(2 * EDGE), &mut checks);
+        let report = checks.report(&netlist);
+        let first = report.violations.iter().filter(|v| v.cell == "pair.first");
+        let slacks: Vec<_> = first.map(|v| v.slack_fs).collect();
+        assert_eq!(slacks, [4_000 - limit], "{control}");
     }
 }
 

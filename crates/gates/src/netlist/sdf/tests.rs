@@ -144,6 +144,26 @@ fn a_flip_flop_has_an_arc_to_each_output() {
     );
 }
 
+/// The edge of an input decides which edge of the output its delay is of; of two for one edge the longer counts, and that is said.
+#[test]
+fn delays_by_edge_go_where_the_edge_leads() {
+    let cell = |kind: &str, path: &str| {
+        format!(
+            "(CELL (CELLTYPE \"{kind}\") (INSTANCE u1/{path}) (DELAY (ABSOLUTE
+            (IOPATH (posedge A) Z (1) (2)) (IOPATH (negedge A) Z (3) (4)))))"
+        )
+    };
+    for (kind, path, delays, notes) in [
+        ("INV", "inv", (3_000, 2_000), 0),
+        ("AND2", "and2", (1_000, 4_000), 0),
+        ("XOR2", "xor2", (3_000, 4_000), 1),
+    ] {
+        let body = cell(kind, path);
+        assert_eq!(arc(&body, &format!("u1.{path}"), 0), delays, "{kind}");
+        assert_eq!(annotated(&body).unwrap().2.notes.len(), notes, "{kind}");
+    }
+}
+
 #[test]
 fn stages_of_a_chain_add_up_to_its_cell() {
     let mut m = ModuleBuilder::new("chip");
