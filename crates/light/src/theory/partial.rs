@@ -374,6 +374,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
         #[test]
         fn nothing_is_cheaper_than_a_full_histogram(z_m in 1.0f64..150.0, overlap in 0u32..8, bound: bool) {
             let system = demonstrator(if bound { cramer_rao } else { thompson });
