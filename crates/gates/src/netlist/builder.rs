@@ -404,6 +404,11 @@ mod tests {
             Err(NetlistError::DuplicateName { .. })
         ));
 
+        let mut named_like_a_port = ModuleBuilder::new("A");
+        let a = named_like_a_port.input("A");
+        named_like_a_port.gate(CellKind::Inv, &[a]);
+        assert!(named_like_a_port.finish().is_ok());
+
         let mut m = ModuleBuilder::new("m");
         m.input("A[0]");
         assert!(matches!(m.finish(), Err(NetlistError::BadName { .. })));

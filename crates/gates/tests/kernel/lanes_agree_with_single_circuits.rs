@@ -41,12 +41,17 @@ fn compare_circuit(case: &Case, seed: u64) -> Result<(), TestCaseError> {
         mask,
         values: Lanes::all(drive.value),
     });
-    LaneKernel::new(&netlist, &timing).run(&mut together.peekable(), end, &mut traces);
+    let mut lanes = LaneKernel::new(&netlist, &timing);
+    lanes.run(&mut together.peekable(), end, &mut traces);
+    let bus: Vec<NetId> = (0..netlist.net_count().min(8)).map(NetId::new).collect();
     for (lane, mut found) in traces.0.into_iter().enumerate() {
         let mine = drives.iter().filter(|(mask, _)| mask >> lane & 1 == 1);
         let mut trace = Trace::default();
         let mut stimulus = in_order(mine.map(|(_, drive)| *drive).collect());
-        Kernel::new(&netlist, &timing).run(&mut stimulus, end, &mut trace);
+        let mut kernel = Kernel::new(&netlist, &timing);
+        kernel.run(&mut stimulus, end, &mut trace);
+        prop_assert_eq!(lanes.number(&bus[..1], lane), kernel.number(&bus[..1]));
+        prop_assert_eq!(lanes.number(&bus, lane), kernel.number(&bus));
         trace.0.sort_by_key(|(time, net, _)| (*time, *net));
         found.sort_by_key(|(time, net, _)| (*time, *net));
         prop_assert_eq!(found, trace.0, "lane {}", lane);

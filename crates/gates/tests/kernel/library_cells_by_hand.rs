@@ -60,7 +60,7 @@ fn delays_of_a_gate_of_two_cells() {
         (4, a, Logic::Zero),
     ];
     let drives = drives.map(|(ns, net, value)| Drive::new(Time::from_ns(ns), net, value));
-    let mut seen = Recorder::new([z]);
+    let mut seen = Recorder::new([a, b, z]);
     let mut kernel = Kernel::new(&netlist, &made.timing);
     kernel.run(&mut in_order(drives.to_vec()), Time::from_ns(3), &mut seen);
     assert_eq!(kernel.number(&[a, b, z]), Some(0b111));
@@ -86,6 +86,8 @@ fn delays_of_a_gate_of_two_cells() {
         let last = *found.last().unwrap() - Time::from_ns(start_ns);
         assert_near(last.as_fs() as f64, ns * 1e6);
     }
+    let numbers = [1, 3, 5].map(|ns| seen.number_at(&[a, b, z], Time::from_ns(ns)));
+    assert_eq!(numbers, [0b010, 0b111, 0b010].map(Some));
     let at = [1, 3, 5].map(|ns| seen.value_at(z, Time::from_ns(ns)));
     assert_eq!(at, [Logic::Zero, Logic::One, Logic::Zero]);
     let (area, leakage_w) = made.silicon(&netlist, &library, 0);
@@ -123,6 +125,17 @@ fn limits_of_a_flip_flop() {
     assert!(late_fs > 15_000.0, "the removal that is left is zero");
     assert_eq!(limit(CheckKind::Removal, Edge::Rise), 0);
     assert_eq!(limit(CheckKind::ControlHigh, Edge::Rise), 40_000);
+}
+
+/// What a library says not to use, stands for nothing.
+#[test]
+fn cells_that_are_not_to_be_used() {
+    let inverters = |library: &Liberty| library.map.cells(CellKind::Inv).join(" ");
+    let all = inverters(&library());
+    assert!(all.contains("INV_1"), "{all}");
+    let text = text().replace("cell (INV_1) {", "cell (INV_1) { dont_use : true;");
+    let left = inverters(&Liberty::read(&text, &[]).unwrap());
+    assert!(!left.contains("INV_1") && left.contains("INV_2"), "{left}");
 }
 
 /// Two inverters: what they take within, and what their loads take.

@@ -180,6 +180,8 @@ fn each_control_is_judged_by_its_own_limit() {
         let first = report.violations.iter().filter(|v| v.cell == "pair.first");
         let slacks: Vec<_> = first.map(|v| v.slack_fs).collect();
         assert_eq!(slacks, [4_000 - limit], "{control}");
+        let said = report.to_string();
+        assert!(said.contains(&format!(".{control} at ")), "{said}");
     }
 }
 

@@ -40,5 +40,6 @@ pub fn trace(netlist: &Netlist, timing: &Timing, drives: &[Drive], apart: bool) 
     let mut hash = TraceHash::new(netlist);
     let end = drives.last().unwrap().time + Time::from_ns(5);
     kernel.run(&mut in_order(drives.to_vec()), end, &mut hash);
+    assert_eq!(hash.changes(), kernel.statistics().changes);
     [hash.changes(), kernel.statistics().changes, hash.hash()]
 }
