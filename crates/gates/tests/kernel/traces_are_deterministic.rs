@@ -4,29 +4,24 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use femtogate::kernel::{Kernel, TraceHash, in_order};
 use femtogate::netlist::Netlist;
-use femtogate::units::Time;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 
 use crate::every_edge::circuit::{self, Case};
+use crate::traces::trace;
 
 const CIRCUITS: usize = 60;
 
-/// Number of changes and hash of a random circuit, with instants handled in a random order where there is a seed for it.
 fn random_circuit(case: &Case, shuffle: Option<u64>) -> (u64, u64) {
     let netlist = Netlist::elaborate(&case.circuit());
-    let mut kernel = Kernel::new(&netlist, &case.timing(&netlist));
-    if let Some(seed) = shuffle {
-        kernel = kernel.shuffled(seed);
-    }
-    let drives = case.drives(&netlist);
-    let end = drives.last().map_or(Time::ZERO, |d| d.time) + Time::from_ns(2);
-    let mut hash = TraceHash::new(&netlist);
-    kernel.run(&mut in_order(drives), end, &mut hash);
-    (hash.changes(), hash.hash())
+    trace(
+        &netlist,
+        &case.timing(&netlist),
+        case.drives(&netlist),
+        shuffle,
+    )
 }
 
 /// The same random circuits in every run.
