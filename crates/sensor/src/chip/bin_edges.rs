@@ -338,6 +338,53 @@ mod tests {
             prop_assert_eq!(law.interval_in(&window, cycle), edges.span());
         }
 
+        /// A clock's periods and a law's own sums are rounded to a femtosecond each.
+        #[test]
+        fn the_window_of_every_laser_cycle_comes_a_laser_cycle_later(
+            start in 20u16..300,
+            cycle in 1i64..40,
+            phase in -0.9f64..0.9,
+            tdc in prop::sample::select(vec![Tdc::Clocked, Tdc::DelayLine]),
+            mode in prop::sample::select(vec![Mode::Guided, Mode::Conventional]),
+            taps in prop::option::of(taps(16)),
+        ) {
+            let period_ps = 1e6 / 384.0;
+            let config = SensorConfig { stop_phase_ps: phase * 0.5 * period_ps, tdc, mode, ..SensorConfig::default() };
+            let exposure = Exposure::new(&config, 600, 40);
+            let mut law = WindowLaw::new(&config, &exposure);
+            if let Some(taps) = &taps {
+                law = law.with_taps(std::slice::from_ref(taps));
+            }
+            let Some(window) = law.window(start).open() else {
+                return Ok(());
+            };
+            let (first, later) = (law.edges(&window, 0), law.edges(&window, cycle));
+            prop_assert_eq!(first.width(3), first.bin(3).end - first.bin(3).start);
+            let sum_s: f64 = (0..first.bins()).map(|bin| first.width(bin).as_s()).sum();
+            prop_assert!((first.mean_width_s() * first.bins() as f64 / sum_s - 1.0).abs() < 1e-12);
+            for (first, later) in first.edges().iter().zip(later.edges()) {
+                let off = *later - *first - exposure.stop(cycle);
+                prop_assert!(off.as_fs().abs() <= 2, "{off}");
+            }
+        }
+
+        #[test]
+        fn bins_have_one_length_where_no_two_differ(
+            first_fs in 0i64..3_000_000, width_fs in 1_000i64..4_000_000, longer_fs in 2i64..1000, which in 0usize..16,
+        ) {
+            let line = |extra_fs: i64| -> Vec<Time> {
+                let after = |n: usize| if n > which { extra_fs } else { 0 };
+                (0..=16).map(|n| Time::from_fs(first_fs + n as i64 * width_fs + after(n))).collect()
+            };
+            let config = SensorConfig::default();
+            let law = || WindowLaw::new(&config, &Exposure::new(&config, 520, 1));
+            prop_assert_eq!(law().bin_width_s(), Some(1.0 / config.clk_hz));
+            let width_s = law().with_taps(&[line(0), line(1)]).bin_width_s();
+            prop_assert!(width_s.is_some_and(|s| (s / (width_fs as f64 * 1e-15) - 1.0).abs() < 1e-12));
+            prop_assert_eq!(law().with_taps(&[line(longer_fs)]).bin_width_s(), None);
+            prop_assert_eq!(law().with_taps(&[line(0), line(longer_fs)]).bin_width_s(), None);
+        }
+
         #[test]
         fn the_time_of_a_position_lies_in_its_bin(taps in taps(12), position in -3f64..15.0) {
             // Bins of picoseconds: in one of a femtosecond no time is at its centre.

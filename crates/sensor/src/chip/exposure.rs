@@ -124,6 +124,31 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    #[test]
+    fn what_no_chip_runs_is_refused() {
+        let config = SensorConfig::default();
+        let checked =
+            |stop_periods, laser_cycles| Exposure::checked(&config, stop_periods, laser_cycles);
+        assert!(matches!(
+            checked(1, 5),
+            Err(ExposureError::ShortCycle { stop_periods: 1 })
+        ));
+        assert!(matches!(checked(2, 0), Err(ExposureError::NoCycle)));
+        // At 384 MHz 9 s are 3 456 000 000 CLK periods.
+        assert_eq!(checked(2, 1), Ok(Exposure::new(&config, 2, 1)));
+        assert_eq!(
+            checked(1000, 3_456_000),
+            Ok(Exposure::new(&config, 1000, 3_456_000))
+        );
+        let too_long = checked(1000, 3_456_001);
+        assert!(matches!(too_long, Err(ExposureError::TooLong { seconds, .. }) if seconds > 9.0));
+        let exposure = checked(7, 3).unwrap();
+        let period = config.clock().period().as_s();
+        let periods = [exposure.stop_fall(2), exposure.stop(2), exposure.end()]
+            .map(|t| (t.as_s() / period).round());
+        assert_eq!(periods, [17.0, 14.0, 21.0]);
+    }
+
     proptest! {
         #[test]
         fn rising_until_finds_its_edge(hz in 1e8f64..1e9, phase_ps in -400i64..400, k in -2000i64..2_000_000) {

@@ -36,6 +36,47 @@ fn a_start_value_beyond_the_laser_cycle_never_opens() {
     assert_eq!(short.window(511), Window::Never);
 }
 
+#[test]
+fn a_race_says_what_meets_what_when_and_what_helps() {
+    let ps = Time::from_ps;
+    let slow = Race::too_slow(Conflict::SlowCounter, ps(1300), ps(1250));
+    assert_eq!(
+        slow.to_string(),
+        "the P-counter is slower than a CLK period (it takes 1.300 ns after CLK's edge, and must not take more than \
+         1.250 ns)"
+    );
+    // 1300.004 ps.
+    assert_eq!(slow.cure.to_string(), "give clk_hz of at most 769.2 MHz");
+    let both = Race::strobe_at_shift(ps(2600), 1, (ps(4000), ps(100)), (ps(50), ps(20)), ps(1000));
+    assert_eq!(
+        both.to_string(),
+        "the strobe meets a change of the shift register (it comes 4.000 ns after CLK falls, and must not from 3.980 ns \
+         to 4.050 ns)"
+    );
+    // (4000 - 100 + 20) / 1.5 ps and (4000 - 100 - 50) / 1.5 ps.
+    assert_eq!(
+        both.cure.to_string(),
+        "give clk_hz of at most 382.6 MHz, or of at least 389.7 MHz"
+    );
+    let cures = [
+        (Some(-400), Some(300)),
+        (Some(-400), None),
+        (None, Some(300)),
+        (None, None),
+    ];
+    let cures = cures.map(|(most, least)| {
+        let [at_most, at_least] = [most, least].map(|ps: Option<i64>| ps.map(Time::from_ps));
+        Cure::Phase { at_most, at_least }.to_string()
+    });
+    let expected = [
+        "give stop_phase_ps of at most -400, or of at least 300",
+        "give stop_phase_ps of at most -400",
+        "give stop_phase_ps of at least 300",
+        "give a lower clk_hz",
+    ];
+    assert_eq!(cures, expected);
+}
+
 proptest! {
     #[test]
     fn a_cure_keeps_the_two_signals_apart(
@@ -60,24 +101,34 @@ proptest! {
         };
         if let Window::Race(race) = window(&config) {
             prop_assert!(race.slack() <= ROUNDING, "{race}");
-            let mut cured = Vec::new();
-            let mut push = |change: &dyn Fn(&mut SensorConfig)| {
-                let mut config = config.clone();
-                change(&mut config);
-                cured.push(config);
+            // A cure is no larger than it must be: 40 fs less of it, ten times the rounding of an edge, leaves a race.
+            let less = Time::from_fs(40);
+            let (mut cured, mut not_cured) = (Vec::new(), Vec::new());
+            let mut push = |ends: [Option<(Time, Time)>; 2], change: &dyn Fn(&mut SensorConfig, Time)| {
+                let with = |value: Time| {
+                    let mut config = config.clone();
+                    change(&mut config, value);
+                    config
+                };
+                for (enough, too_little) in ends.into_iter().flatten() {
+                    cured.push(with(enough));
+                    not_cured.push(with(too_little));
+                }
             };
+            let above = |t: Time| (t, t - less);
+            let below = |t: Time| (t, t + less);
             match race.cure {
                 Cure::Period { at_least, at_most } => {
-                    for period in [Some(at_least), at_most].into_iter().flatten() {
-                        push(&|config| config.clk_hz = 1.0 / period.as_s());
-                    }
+                    push([Some(above(at_least)), at_most.map(below)], &|config, t| config.clk_hz = 1.0 / t.as_s());
                 }
                 Cure::Phase { at_most, at_least } => {
-                    for phase in [at_most, at_least].into_iter().flatten() {
-                        push(&|config| config.stop_phase_ps = phase.as_ns() * 1e3);
-                    }
+                    push([at_most.map(below), at_least.map(above)], &|config, t| config.stop_phase_ps = t.as_ns() * 1e3);
                 }
                 Cure::LaserCycle | Cure::Tap => {}
+            }
+            for config in not_cured {
+                let again = window(&config);
+                prop_assert!(matches!(again, Window::Race(_)), "{race}; less than {}: {again:?}", race.cure);
             }
             for config in cured {
                 let again = window(&config);
