@@ -275,6 +275,32 @@ mod tests {
         }
     }
 
+    proptest! {
+        /// Slowly: how far each sample moves the range, by differences.
+        #[test]
+        fn the_claimed_variance_is_what_errors_of_all_samples_add_up_to(
+            places in prop::collection::vec((-0.5f64..0.5, -0.5f64..0.5), 4..12), range_m in 15.0f64..120.0,
+        ) {
+            const SIGMA: f64 = 1e-9;
+            let plain = |&(x, y): &(f64, f64)| Sample { at: [x, y], inverse: 1.0 / range_m, sigma: SIGMA, is_rim: false };
+            let samples: Vec<Sample> = places.iter().map(plain).collect();
+            let part = Part::new(&samples, PITCH).unwrap();
+            let [a, b, d] = part.moments;
+            // Places on one line leave the slope across it unknown.
+            prop_assume!(a * d - b * b > 0.01);
+            let moved_m = |which: usize, by: f64| {
+                let mut samples = samples.clone();
+                samples[which].inverse += by;
+                Part::new(&samples, PITCH).unwrap().range(false).0
+            };
+            let step = 1e-5 / range_m;
+            let per_sample = (0..samples.len()).map(|n| (moved_m(n, step) - moved_m(n, -step)) / (2.0 * step));
+            let expected: f64 = per_sample.map(|slope| (slope * SIGMA).powi(2)).sum();
+            let (_, variance) = part.range(false);
+            prop_assert!((variance / expected - 1.0).abs() < 1e-3, "{variance} {expected}");
+        }
+    }
+
     /// A road at 40 m, which is 2.5 m deep in a macropixel, and a wall: shares within 1, 2 and 3 σ are those of a normal distribution.
     #[test]
     fn what_is_claimed_of_a_plane_holds() {

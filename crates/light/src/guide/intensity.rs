@@ -250,6 +250,66 @@ mod tests {
         }
     }
 
+    /// Within four standard errors of the mean over 1024 pixels.
+    #[test]
+    fn counts_grow_with_time_and_the_laser_s_with_its_pulses() {
+        let mut scene = wall_at(30.0);
+        let mean = |scene: &Scene, pulse_rate_hz: f64, exposure_ms: f64| {
+            let guide = IntensityStereo {
+                finer: 1,
+                pulse_rate_hz,
+                exposure_ms,
+                ..IntensityStereo::default()
+            };
+            let counts = guide.counts(&GuideInput::still(scene, 32, 32, 1), 0.0, DRAWS[0]);
+            counts.iter().sum::<f64>() / 1024.0
+        };
+        let about = |mean: f64, expected: f64| {
+            (mean - expected).abs() < 4.0 * 2.0 * (expected / 1024.0).sqrt()
+        };
+        scene.light.illuminance_klux = 0.0;
+        scene.lidar.dark_count_hz = 0.0;
+        let (once, twice, longer) = (
+            mean(&scene, 4e5, 1.0),
+            mean(&scene, 8e5, 1.0),
+            mean(&scene, 4e5, 2.0),
+        );
+        let truth = GroundTruth::render(&scene, 32, 32);
+        let light = scene.pixel_light(&truth);
+        let signal = light.iter().map(PixelLight::signal_per_cycle).sum::<f64>() / 1024.0;
+        assert!(once > 1.0 && about(once, 400.0 * signal), "{once} {signal}");
+        assert!(
+            about(twice, 2.0 * once) && about(longer, 2.0 * once),
+            "{once} {twice} {longer}"
+        );
+        scene.light.illuminance_klux = 20.0;
+        let (dim, long) = (mean(&scene, 0.0, 1.0), mean(&scene, 0.0, 2.0));
+        assert!(dim > 1.0 && about(long, 2.0 * dim), "{dim} {long}");
+    }
+
+    /// Noise alone is a third of the pattern that is asked for.
+    #[test]
+    fn a_pattern_stands_out_of_noise() {
+        let stream = |pixel| random_stream(7, Purpose::Guide, pixel, 0);
+        let noisy = |mean: &dyn Fn(u32) -> f64| -> f64 {
+            let counts = (0..1024)
+                .map(|pixel| f64::from(Poisson::new(mean(pixel)).draw(&mut stream(pixel))));
+            let found = textured(&counts.collect::<Vec<_>>(), 32);
+            found.iter().filter(|&&is| is).count() as f64 / 1024.0
+        };
+        let even = [noisy(&|_| 20.0), noisy(&|_| 400.0)];
+        assert!(even.iter().all(|share| *share < 0.01), "{even:?}");
+        // Roots of 15 and 25: 4.5 standard deviations of noise to either side.
+        let squares = noisy(&|pixel| {
+            if (pixel + pixel / 32) % 2 == 0 {
+                225.0
+            } else {
+                625.0
+            }
+        });
+        assert_eq!(squares, 1.0);
+    }
+
     #[test]
     fn in_the_dark_there_is_nothing_to_match() {
         let mut scene = Scene::outdoor();

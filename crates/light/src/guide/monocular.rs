@@ -127,6 +127,24 @@ mod tests {
         assert!((0.8..0.95).contains(&correlation), "{correlation}");
     }
 
+    /// Between corners the patch's errors blend; from one corner to the next they share the frame's alone.
+    #[test]
+    fn errors_of_two_corners_of_a_patch_are_each_their_own() {
+        let guide = Monocular::default();
+        let correlation = |[a, b]: [(u32, u32); 2]| {
+            let product = |seed| guide.error(seed, a.0, a.1) * guide.error(seed, b.0, b.1);
+            (0..4000).map(product).sum::<f64>() / 4000.0
+        };
+        let corners = correlation([(8, 16), (8, 24)]);
+        assert!((corners - SHARES[0]).abs() < 0.07, "{corners}");
+        // Half way along an edge each corner's error has a weight of 1/sqrt(2).
+        let half_way = correlation([(8, 16), (8, 20)]);
+        let expected = SHARES[0] + SHARES[1] / 2f64.sqrt();
+        assert!((half_way - expected).abs() < 0.07, "{half_way}");
+        let down = correlation([(8, 16), (12, 16)]);
+        assert!((down - expected).abs() < 0.07, "{down}");
+    }
+
     proptest! {
         #[test]
         fn three_sigma_of_inverse_depth_are_within_three_of_depth(

@@ -171,14 +171,14 @@ fn air(stage: &Stage, until_m: f64) -> f64 {
     stage.scene.medium.airlight(until_m) * SKY_REFLECTIVITY
 }
 
-/// Noise of standard deviation about 1 at a point: clouds of three sizes, each half the one before, of which the smallest is at least `finest_m` and fades
+/// Noise of standard deviation 1.1 to 1.2 at a point: clouds of three sizes, each half the one before, of which the smallest is at least `finest_m` and fades
 /// as it comes near to that.
 fn grain_at(point: DVec3, finest_m: f64) -> f64 {
     let finest = libm::log2(finest_m.max(1e-3));
     let first = finest.floor() as i32;
     let fade = 1.0 - (finest - f64::from(first));
     let octave = |k: i32| cloud(point * power_of_two(-(first + k)), first + k);
-    // Uniform numbers between −1 and 1 blended over eight corners have a standard deviation of about 0.31.
+    // A cloud has a standard deviation of 0.37; it would be 0.31 if corners were blended evenly.
     (fade * octave(1) + octave(2) + octave(3) + (1.0 - fade) * octave(4)) / (0.31 * 3f64.sqrt())
 }
 
@@ -259,6 +259,93 @@ fn expose(
 mod tests {
     use super::*;
     use crate::scene::{Object, Shape};
+
+    #[test]
+    fn a_binned_pixel_lies_in_the_middle_of_its_pixels() {
+        let crop = Crop {
+            binning: 2,
+            left: 3,
+            top: 5,
+            width: 4,
+            height: 4,
+        };
+        assert_eq!(
+            [crop.middle(0, 0), crop.middle(1, 2)],
+            [(7.0, 11.0), (11.0, 13.0)]
+        );
+    }
+
+    /// Photons' noise and what reading adds, in the units of a pixel's number; as full as it gets is white.
+    #[test]
+    fn a_pixel_counts_its_electrons_with_their_noise_until_it_is_full() {
+        const SIDE: u32 = 64;
+        let mut scene = Scene::outdoor();
+        scene.light.illuminance_klux = 10.0;
+        for (binning, share) in [(1, 0.5), (2, 0.02), (1, 0.0), (2, 1.5)] {
+            let crop = Crop {
+                binning,
+                left: 0,
+                top: 0,
+                width: SIDE,
+                height: SIDE,
+            };
+            let exposure_s = 1e-3;
+            let full_of = FULL_WELL_E / (10.0 * ELECTRONS_PER_S_KLUX * exposure_s);
+            let radiances = vec![(share * full_of) as f32; (SIDE * SIDE) as usize];
+            let image = expose(&scene, crop, &radiances, exposure_s, 1, 0);
+            let pixels: Vec<f64> = image.pixels().iter().map(|&p| f64::from(p)).collect();
+            let white = f64::from((1u32 << BITS) - 1);
+            let n = pixels.len() as f64;
+            let mean = pixels.iter().sum::<f64>() / n;
+            if share > 1.0 {
+                assert_eq!(mean, white);
+                continue;
+            }
+            let cells = f64::from(binning * binning);
+            let noise_e =
+                (share * FULL_WELL_E * cells + READ_NOISE_E * READ_NOISE_E * cells).sqrt();
+            // Rounding to whole numbers has a variance of 1/12; in the dark the lower half is cut off.
+            let sigma = (noise_e / (FULL_WELL_E * cells) * white).hypot(1.0 / 12f64.sqrt());
+            if share > 0.0 {
+                let found = (pixels.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / n).sqrt();
+                assert!(
+                    (mean - share * white).abs() < 4.0 * sigma / n.sqrt(),
+                    "{share}: {mean}"
+                );
+                assert!(
+                    (found / sigma - 1.0).abs() < 0.05,
+                    "{share}: {found} {sigma}"
+                );
+            }
+            assert!(mean < share * white + 4.0 * sigma);
+        }
+    }
+
+    #[test]
+    fn clouds_are_smooth_and_as_strong_as_is_said() {
+        let mut squares = [0.0; 3];
+        for number in 0..10_000 {
+            let at = |n: u32| f64::from(n * 7919 % 10_007) * 0.0371 - 150.0;
+            let point = DVec3::new(at(number), at(number + 3), at(number + 7));
+            let here = cloud(point, 5);
+            assert!(here.abs() <= 1.0);
+            for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+                // A blend from -1 to 1 is no steeper than 3.
+                assert!((cloud(point + 1e-3 * axis, 5) - here).abs() < 3.1e-3);
+            }
+            squares[0] += here * here / 10_000.0;
+            squares[1] += grain_at(point, 0.2).powi(2) / 10_000.0;
+            squares[2] += grain_at(point, 0.25).powi(2) / 10_000.0;
+        }
+        // A corner has 1/√3; smooth weights of two corners have squares of 26/35 on average, and there are three axes.
+        let expected = (26.0f64 / 35.0).powi(3).sqrt() / 3f64.sqrt();
+        let [cloud, fading, whole] = squares.map(f64::sqrt);
+        assert!((cloud / expected - 1.0).abs() < 0.03, "{cloud}");
+        assert!(
+            (1.08..1.22).contains(&whole) && (1.0..whole).contains(&fading),
+            "{fading} {whole}"
+        );
+    }
 
     /// A mirror of 0.9 at 45 degrees shows a wall on the right, which the sun shines on from the left, straight but 30 degrees up.
     #[test]

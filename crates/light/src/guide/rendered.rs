@@ -32,7 +32,7 @@ keys! {
         /// lag behind.
         paths: u32 = 4, in Within(3.0, 8.0),
             from "measured: on the street's road the median error is 2.3 times what is claimed with 5 and 0.2 with 8";
-        /// Contrast of the grain that surfaces without a texture have, standard deviation.
+        /// Contrast of the grain that surfaces without a texture have, 0.9 of its standard deviation.
         grain: f64 = 0.1, in Within(0.0, 1.0);
         /// Standard deviation claimed for a disparity whose neighbours all have one, in binned pixels.
         sigma_px: f64 = 0.25, in Within(0.0, 100.0),
