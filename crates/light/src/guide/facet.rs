@@ -301,6 +301,39 @@ mod tests {
         }
     }
 
+    proptest! {
+        /// So uncertain that no slope is believed.
+        #[test]
+        fn of_samples_in_doubt_the_nearest_to_their_middle_is_kept(
+            drawn in prop::collection::vec((-0.5f64..0.5, -0.5f64..0.5, 0.01f64..0.1), 3..12),
+        ) {
+            let sample = |&(x, y, inverse): &(f64, f64, f64)| Sample { at: [x, y], inverse, sigma: 100.0, is_rim: false };
+            let samples: Vec<Sample> = drawn.iter().map(sample).collect();
+            let part = Part::new(&samples, PITCH).unwrap();
+            let off = |s: &Sample| (s.at[0] - part.middle[0]).hypot(s.at[1] - part.middle[1]);
+            let mut sorted: Vec<&Sample> = samples.iter().collect();
+            sorted.sort_by(|a, b| off(a).total_cmp(&off(b)));
+            let nearest = sorted[0];
+            // Either may be kept of two that are as near.
+            prop_assume!(off(sorted[1]) - off(nearest) > 1e-9);
+            let (range_m, _) = part.range(false);
+            prop_assert!((range_m * nearest.inverse - 1.0).abs() < 1e-4, "{range_m} {}", 1.0 / nearest.inverse);
+        }
+    }
+
+    /// Samples lie about a place 0.3 macropixels beside the centre, so the part's middle is claimed, and that the slope may go on as far again.
+    #[test]
+    fn a_part_on_one_side_may_reach_to_the_other() {
+        let (middle, slope) = (0.025, 0.4 * PITCH[0]);
+        let samples = on_plane(middle, [slope, 0.0], [0.3, 0.0], 1e-9, 1);
+        let part = Part::new(&samples, PITCH).unwrap();
+        let [alone, beside] = [true, false].map(|is_alone| part.range(is_alone));
+        assert!((1.0 / alone.0 / (middle + 0.3 * slope) - 1.0).abs() < 1e-3);
+        let expected = (0.3 * slope).powi(2) / 3.0 * alone.0.powi(4);
+        let found = alone.1 - beside.1;
+        assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
+    }
+
     /// A road at 40 m, which is 2.5 m deep in a macropixel, and a wall: shares within 1, 2 and 3 σ are those of a normal distribution.
     #[test]
     fn what_is_claimed_of_a_plane_holds() {

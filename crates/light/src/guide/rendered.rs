@@ -207,6 +207,7 @@ mod tests {
     use super::*;
     use crate::guide::test_scenes::{coarse, depends_on_its_seed_alone, wall_at};
     use crate::scene::{GroundTruth, Object, Shape};
+    use proptest::prelude::*;
 
     const WHOLE: MatchedStereo = MatchedStereo {
         binning: 1,
@@ -255,6 +256,32 @@ mod tests {
         });
         let good = good.count();
         assert!(good > 32 * 32 * 9 / 10, "{good}");
+        // One pixel's claim, a little more for its place and less for what others say of the slope.
+        let focal_baseline_px_m = scene.stereo.camera().focal_px * scene.stereo.baseline_m;
+        let of_pixel_m = 30.0 * 30.0 * WHOLE.sigma_px / focal_baseline_px_m;
+        let typical = middle(map.sigma_m.clone()) / of_pixel_m;
+        assert!((0.8..1.6).contains(&typical), "{typical}");
+    }
+
+    proptest! {
+        #[test]
+        fn the_share_of_answers_is_that_of_the_pixels_about(
+            width in 1usize..12, answers in prop::collection::vec(any::<bool>(), 1..140),
+        ) {
+            let height = answers.len() / width;
+            prop_assume!(height > 0);
+            let px = |&answer: &bool| if answer { 7.0 } else { f32::NAN };
+            let px = answers.iter().take(width * height).map(px).collect();
+            let map = DisparityMap { width, height, px };
+            for (at, found) in answered(&map).into_iter().enumerate() {
+                let is_near = |a: usize, b: usize| a.abs_diff(b) <= AROUND;
+                let about = (0..width * height)
+                    .filter(|other| is_near(other / width, at / width) && is_near(other % width, at % width));
+                let about: Vec<usize> = about.collect();
+                let share = about.iter().filter(|&&other| answers[other]).count() as f64 / about.len() as f64;
+                prop_assert!((found - share).abs() < 1e-12);
+            }
+        }
     }
 
     #[test]

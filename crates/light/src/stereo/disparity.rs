@@ -6,10 +6,10 @@ const STEP_PX: f32 = 1.0;
 /// Disparities of the left image, row by row.
 #[derive(Debug, Clone)]
 pub struct DisparityMap {
-    pub(super) width: usize,
-    pub(super) height: usize,
+    pub(crate) width: usize,
+    pub(crate) height: usize,
     /// NaN where there is none.
-    pub(super) px: Vec<f32>,
+    pub(crate) px: Vec<f32>,
 }
 
 /// Equal to the bit.
