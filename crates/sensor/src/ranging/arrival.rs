@@ -86,6 +86,13 @@ mod tests {
             ),
             (22, 24.0, 10.0)
         );
+        // The 6th of 24 is the 2nd of the 8 of bin 21.
+        let quarter = ArrivalOptions {
+            fraction: 0.25,
+            ..ArrivalOptions::default()
+        };
+        let found = arrival(&counts, &quarter).unwrap();
+        assert!((found.position_bins - 20.75).abs() < 1e-12, "{found:?}");
     }
 
     #[test]
