@@ -37,6 +37,17 @@ fn a_start_value_beyond_the_laser_cycle_never_opens() {
 }
 
 #[test]
+fn only_where_no_start_value_has_a_window_is_aiming_refused() {
+    assert_eq!(law(&SensorConfig::default()).refusal(), None);
+    let fast = SensorConfig {
+        clk_hz: 3e9,
+        ..SensorConfig::default()
+    };
+    let refusal = law(&fast).refusal();
+    assert!(matches!(refusal, Some(NoAim::Race(race)) if race.what == Conflict::SlowCorrelation));
+}
+
+#[test]
 fn a_race_says_what_meets_what_when_and_what_helps() {
     let ps = Time::from_ps;
     let slow = Race::too_slow(Conflict::SlowCounter, ps(1300), ps(1250));
