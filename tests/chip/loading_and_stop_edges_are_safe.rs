@@ -167,11 +167,11 @@ proptest! {
         let found = captured(&config, &exposure, start, None);
         match law {
             Window::Open(window) => {
-                prop_assert_eq!(found.violations, 0);
+                prop_assert_eq!(&found.violations, &[]);
                 prop_assert!(found.is_right(&exposure, window.strobe_cause));
             }
             // The law calls a race what comes within 2 fs of a limit as well.
-            Window::Race(_) => prop_assert!(found.violations > 0 || found.local_stops.len() == 3),
+            Window::Race(_) => prop_assert!(!found.violations.is_empty() || found.local_stops.len() == 3),
             Window::Never | Window::Irregular(_) => {
                 prop_assert!(false, "the laser cycle is long enough, the P-counter the default one");
             }
@@ -203,12 +203,18 @@ proptest! {
         };
         let clk_hz = exposure.clock.as_hz();
         let config = SensorConfig { rows: 1, cols: 1, clk_hz, p_counter, tap, after_borrow, ..SensorConfig::default() };
-        let law = WindowLaw::new(&config, &exposure).window(start);
+        let law = WindowLaw::new(&config, &exposure);
         let mut found = captured(&config, &exposure, start, None);
         // One without memory raises LOCAL_STOP before the exposure, too.
         found.local_stops.retain(|&time| has_memory || time > Time::ZERO);
-        if let Window::Open(window) = law {
-            prop_assert_eq!(found.violations, 0);
+        if let Window::Open(window) = law.window(start) {
+            // As LOCAL_STOP falls in the reset pulse it may cut a pulse of COUNTER_CLK short. That counts nothing, but ends, too
+            // soon for its width, up to that width after the reset.
+            let timing = law.timing();
+            let released = timing.stop_to_reset_release + timing.counter.clock_high;
+            let is_in_reset = |t: &Time| (0..3).any(|cycle| (Time::ZERO..released).contains(&(*t - exposure.stop(cycle))));
+            found.violations.retain(|time| !is_in_reset(time));
+            prop_assert_eq!(&found.violations, &[]);
             prop_assert!(found.is_right(&exposure, window.strobe_cause), "{:?} {:?}", window, found);
         }
     }
@@ -220,7 +226,7 @@ proptest! {
         // Long enough for some start values; the others are interrupted on their way down.
         let exposure = Exposure::new(&config, 40, 4);
         let found = captured(&config, &exposure, start, Some(chain));
-        let is_reported = found.violations > 0 || !found.events.is_empty();
+        let is_reported = !found.violations.is_empty() || !found.events.is_empty();
         let nominal = captured(&config, &exposure, start, None);
         let moved = found.local_stops != nominal.local_stops;
         prop_assert!(!moved || is_reported, "{:?} {:?}", found.local_stops, nominal.local_stops);
@@ -235,8 +241,8 @@ proptest! {
 struct Found {
     local_stops: Vec<Time>,
     events: Vec<HardwareEventKind>,
-    /// Until the exposure ends: later ones spoil no window.
-    violations: usize,
+    /// When, until the exposure ends: later ones spoil no window.
+    violations: Vec<Time>,
 }
 
 impl Found {
@@ -272,7 +278,7 @@ fn captured(config: &SensorConfig, exposure: &Exposure, start: u16, chain: Optio
             .map(|&t| t - origin)
             .collect(),
         events: found.map(|e| e.kind).collect(),
-        violations: during.count(),
+        violations: during.map(|v| Time::from_fs(v.time_fs) - origin).collect(),
     }
 }
 
@@ -308,7 +314,7 @@ fn the_shortest_pulses_leave_a_wrong_count_and_say_so() {
         assert!(is_found, "{start} {chain} {found:?}");
     }
     let nominal = captured(&config, &exposure, 511, Some(1.0));
-    assert_eq!((nominal.events, nominal.violations), (vec![], 0));
+    assert_eq!((nominal.events, nominal.violations), (vec![], vec![]));
 }
 
 #[test]
