@@ -250,7 +250,7 @@ mod tests {
         }
     }
 
-    /// Within four standard errors of the mean over 1024 pixels.
+    /// Twice a mean over 1024 pixels errs as well as what is compared with it: within eight standard errors of one mean.
     #[test]
     fn counts_grow_with_time_and_the_laser_s_with_its_pulses() {
         let mut scene = wall_at(30.0);
@@ -287,7 +287,7 @@ mod tests {
         assert!(dim > 1.0 && about(long, 2.0 * dim), "{dim} {long}");
     }
 
-    /// Noise alone is a third of the pattern that is asked for.
+    /// Noise alone has a fifth of the variance that is asked for.
     #[test]
     fn a_pattern_stands_out_of_noise() {
         let stream = |pixel| random_stream(7, Purpose::Guide, pixel, 0);
@@ -299,7 +299,7 @@ mod tests {
         };
         let even = [noisy(&|_| 20.0), noisy(&|_| 400.0)];
         assert!(even.iter().all(|share| *share < 0.01), "{even:?}");
-        // Roots of 15 and 25: 4.5 standard deviations of noise to either side.
+        // Roots of 15 and 25: ten standard deviations of noise to either side of 20.
         let squares = noisy(&|pixel| {
             if (pixel + pixel / 32) % 2 == 0 {
                 225.0
