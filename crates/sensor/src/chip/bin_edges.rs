@@ -296,6 +296,14 @@ mod tests {
         })
     }
 
+    fn law(config: &SensorConfig, exposure: &Exposure, taps: Option<Vec<Time>>) -> WindowLaw {
+        let law = WindowLaw::new(config, exposure);
+        match taps {
+            Some(taps) => law.with_taps(&[taps]),
+            None => law,
+        }
+    }
+
     proptest! {
         /// Edges are where the bin of a photon changes: the last femtosecond before one belongs to the bin before it.
         #[test]
@@ -312,10 +320,7 @@ mod tests {
                 ..SensorConfig::default()
             };
             let exposure = Exposure::new(&config, 600, 40);
-            let mut law = WindowLaw::new(&config, &exposure);
-            if let Some(taps) = &taps {
-                law = law.with_taps(std::slice::from_ref(taps));
-            }
+            let law = law(&config, &exposure, taps);
             let Some(window) = law.window(start).open() else {
                 return Ok(());
             };
@@ -351,10 +356,7 @@ mod tests {
             let period_ps = 1e6 / 384.0;
             let config = SensorConfig { stop_phase_ps: phase * 0.5 * period_ps, tdc, mode, ..SensorConfig::default() };
             let exposure = Exposure::new(&config, 600, 40);
-            let mut law = WindowLaw::new(&config, &exposure);
-            if let Some(taps) = &taps {
-                law = law.with_taps(std::slice::from_ref(taps));
-            }
+            let law = law(&config, &exposure, taps);
             let Some(window) = law.window(start).open() else {
                 return Ok(());
             };
@@ -377,12 +379,12 @@ mod tests {
                 (0..=16).map(|n| Time::from_fs(first_fs + n as i64 * width_fs + after(n))).collect()
             };
             let config = SensorConfig::default();
-            let law = || WindowLaw::new(&config, &Exposure::new(&config, 520, 1));
-            prop_assert_eq!(law().bin_width_s(), Some(1.0 / config.clk_hz));
-            let width_s = law().with_taps(&[line(0), line(1)]).bin_width_s();
+            let of_clk = || WindowLaw::new(&config, &Exposure::new(&config, 520, 1));
+            prop_assert_eq!(of_clk().bin_width_s(), Some(1.0 / config.clk_hz));
+            let width_s = of_clk().with_taps(&[line(0), line(1)]).bin_width_s();
             prop_assert!(width_s.is_some_and(|s| (s / (width_fs as f64 * 1e-15) - 1.0).abs() < 1e-12));
-            prop_assert_eq!(law().with_taps(&[line(longer_fs)]).bin_width_s(), None);
-            prop_assert_eq!(law().with_taps(&[line(0), line(longer_fs)]).bin_width_s(), None);
+            prop_assert_eq!(of_clk().with_taps(&[line(longer_fs)]).bin_width_s(), None);
+            prop_assert_eq!(of_clk().with_taps(&[line(0), line(longer_fs)]).bin_width_s(), None);
         }
 
         #[test]
