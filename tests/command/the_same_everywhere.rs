@@ -1,5 +1,5 @@
 //! The same request gives the same bytes with any number of threads, in any build, and whatever vector instructions the
-//! processor has: SHA-256 of waveforms, histograms, depths and a sweep's table beside `vectors/everywhere/hashes.csv`.
+//! processor has: SHA-256 of waveforms, histograms, depths, guides' maps and sweeps' tables beside `vectors/everywhere/hashes.csv`.
 //!
 //! `cargo test --test command the_same_everywhere -- --nocapture` prints them. `GDTOF_PROGRAM=target/release/gdtof` holds
 //! another build to them, `GDTOF_PROGRAM="qemu-aarch64 …/gdtof"` one for another architecture (`.ci/portable`).
@@ -12,7 +12,7 @@ use serde_json::Value as Json;
 use sha2::{Digest, Sha256};
 
 /// Name (and folder of results), arguments, and files that are compared.
-const RUNS: [(&str, &str, &[&str]); 6] = [
+const RUNS: [(&str, &str, &[&str]); 10] = [
     (
         "window",
         "frame --rows 8 --cols 8 --probe 2,1",
@@ -38,9 +38,21 @@ const RUNS: [(&str, &str, &[&str]); 6] = [
         "frame --rows 8 --cols 8 --probe none --scene fog",
         &["histograms.npy", "frame.json"],
     ),
-    ("sweep", "sweep study.toml", &["results.csv"]),
+    (
+        "delay_line",
+        "frame --rows 4 --cols 4 --probe none --set=sensor.tdc=delay_line",
+        &["histograms.npy", "frame.json"],
+    ),
+    (
+        "drive",
+        "drive --rows 4 --cols 6 --frames 3 --guide stereo --guide kalman",
+        &["histograms.npy", "guide.npy", "depth.npy"],
+    ),
+    ("engines", "sweep engines.toml", &["results.csv"]),
+    ("guides", "sweep guides.toml", &["results.csv"]),
+    ("sensors", "sweep sensors.toml", &["results.csv"]),
 ];
-/// Those of a frame: the light of a macropixel of the whole array, on fewer of them.
+/// Those of a frame or drive: the light of a macropixel of the whole array, on fewer of them.
 const FRAME: [&str; 3] = [
     "--laser-cycles=300",
     "--set=scene.lidar.fov_deg=2",
@@ -80,16 +92,15 @@ fn content(file: &Path) -> Vec<u8> {
 /// The hashes of all runs by `command`, a program and its first arguments, on this many threads.
 fn hashes(command: &[&str], threads: usize) -> String {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::copy(
-        vectors().join("study.toml"),
-        folder.path().join("study.toml"),
-    )
-    .unwrap();
+    for study in ["engines", "guides", "sensors"] {
+        let name = format!("{study}.toml");
+        std::fs::copy(vectors().join(&name), folder.path().join(&name)).unwrap();
+    }
     let mut found = "run,file,sha256\n".to_owned();
     for (name, arguments, files) in RUNS {
         let mut run = Command::new(command[0]);
         run.args(&command[1..]).args(arguments.split(' '));
-        if arguments.starts_with("frame") {
+        if !arguments.starts_with("sweep") {
             run.args(FRAME);
         }
         run.args(["--out", name]).current_dir(folder.path());
