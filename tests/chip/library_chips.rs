@@ -88,6 +88,8 @@ impl Mapped {
         };
         config.check().unwrap_or_else(|e| panic!("{e}"));
         let of_library = CellLibrary::of(&config).unwrap().from_file().unwrap();
+        // An `input_slew_ps` of 0 leaves the library's own.
+        assert!(of_library.environment.input_slew_fs > 0.0);
         let netlist = Netlist::elaborate(&macropixel::circuit(&config));
         let characterised = of_library.characterised(&netlist);
         let cells = &of_library.liberty;

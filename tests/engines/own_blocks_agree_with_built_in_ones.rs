@@ -138,6 +138,7 @@ fn without_a_line_the_gates_and_the_cycles_count_and_the_law_refuses() {
     config.check().unwrap();
     let law = config.counter_law().unwrap();
     assert_eq!(law.uneven(), Some(Uneven::Same(0, 1)));
+    assert!(!config.may_have_law());
     let exposure = Exposure::new(&config, 60, 5);
     let scenario = Scenario::exposed(&mut StdRng::seed_from_u64(1), config, exposure);
     let (windows, counted) = counted(&scenario.config, &scenario);

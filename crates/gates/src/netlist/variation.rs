@@ -136,6 +136,7 @@ pub fn varied_as(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::netlist::{ModuleBuilder, Net};
 
     fn factor(process: Corner, voltage_v: f64, temperature_c: f64) -> f64 {
         let conditions = Conditions {
@@ -182,6 +183,25 @@ mod tests {
             };
             assert_eq!(conditions.delay_factor(), None);
         }
+    }
+
+    #[test]
+    fn limits_scale_with_delays() {
+        let mut m = ModuleBuilder::new("m");
+        let pins = CellKind::Dffr.inputs().iter().map(|pin| m.input(pin));
+        let pins: Vec<_> = pins.collect();
+        let q = m.output("Q");
+        m.cell("flip_flop", CellKind::Dffr, &pins, &[q, Net::NONE]);
+        let netlist = Netlist::elaborate(&m.finish().unwrap());
+        let library = Library::default();
+        let of = |library: &Library| Timing::nominal(&netlist, library, Corner::Typ);
+        let (slow, derated) = (
+            varied(&netlist, &of(&library), 1.5, None),
+            of(&derated_limits(&library, 1.5)),
+        );
+        let limits = |timing: &Timing| *timing.limits(0, CellKind::Dffr);
+        assert_eq!(limits(&slow), limits(&derated));
+        assert_ne!(limits(&slow), limits(&of(&library)));
     }
 
     #[test]

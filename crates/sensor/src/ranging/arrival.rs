@@ -76,6 +76,8 @@ mod tests {
         counts[20] += 4;
         counts[21] += 8;
         counts[22] += 12;
+        // Six bins after the highest end the region.
+        counts[29] += 5;
         let found = arrival(&counts, &ArrivalOptions::default()).unwrap();
         assert!((found.position_bins - 21.5).abs() < 1e-12, "{found:?}");
         assert_eq!(

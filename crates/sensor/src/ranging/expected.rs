@@ -303,6 +303,22 @@ mod tests {
         }
     }
 
+    /// In the dark bins before an echo never count, and those after it tell nothing of its place.
+    #[test]
+    fn bins_that_never_count_tell_nothing() {
+        let config = SensorConfig::default();
+        let response = Response::new(&config, 1.0 / config.clk_hz, PULSE_SIGMA);
+        let light = EchoLight {
+            position_bins: 7.0,
+            signal: 0.5,
+            background_per_bin: 0.0,
+            sigma_bins: response.pulse_sigma_bins,
+        };
+        let told = response.information(&light);
+        assert_eq!(told[0], (0.0, 0.0));
+        assert!(told.iter().all(|bin| bin.1.is_finite()) && told[7].1 > 0.0);
+    }
+
     #[test]
     fn the_table_is_the_normal_distribution() {
         for i in 0..14_000 {

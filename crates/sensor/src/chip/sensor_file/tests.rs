@@ -10,6 +10,7 @@ use proptest::prelude::*;
 fn the_default_sensor_loads_in_a_few_hundred_microseconds() {
     let config = SensorConfig::default();
     assert_eq!(config.load_bits(), 36_864);
+    assert_eq!(config.histogram_bits(), 4096 * 16 * 14);
     let us = config.load_time().as_s() * 1e6;
     assert!((100.0..400.0).contains(&us), "{us}");
 }
