@@ -258,7 +258,8 @@ mod tests {
         let scene = wall_at(60.0);
         let earlier = frames(6, 2, 0.1, |frame, pixel| match (pixel, frame) {
             (0, 0..5) => Some(60.0),
-            (0, _) => Some(20.0),
+            // Nearer by less than the gate's number of metres.
+            (0, _) => Some(57.0),
             (1, 0) => Some(40.0),
             _ => None,
         });
@@ -271,10 +272,10 @@ mod tests {
             Kalman::default().estimate(&input).unwrap()
         };
         let soon = at(0.6);
-        assert_eq!(soon.range_m, [Some(20.0), Some(40.0)]);
+        assert_eq!(soon.range_m, [Some(57.0), Some(40.0)]);
         // 10 m/s in 0.1 s.
         assert!((soon.sigma_m[0] - 1.0).abs() < 0.02, "{}", soon.sigma_m[0]);
-        assert_eq!(at(1.2).range_m, [Some(20.0), None]);
+        assert_eq!(at(1.2).range_m, [Some(57.0), None]);
         assert_eq!(at(2.0).range_m, [None, None]);
     }
 
