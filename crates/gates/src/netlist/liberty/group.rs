@@ -320,6 +320,7 @@ mod tests {
             ("library (l) {\n a b;\n}", 2),
             ("library (l) { }\n}", 2),
             ("library (l) { a (1 ; }", 1),
+            ("library (l) { /\n}", 2),
             ("", 1),
             // A vertical tab and another alphabet's blank are no blanks here, and end no word.
             ("library (l) { a (\u{b}", 1),
