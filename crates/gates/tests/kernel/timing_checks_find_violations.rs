@@ -343,8 +343,8 @@ fn a_report_round_trips_through_json() {
         policy,
         &steps,
     );
-    // Each flip-flop has its limits and the times of its last edges.
-    assert!((100..10_000).contains(&report.memory_bytes), "{report:?}");
+    // 328 bytes on 64-bit machines, for two flip-flops and their six nets.
+    assert!((200..500).contains(&report.memory_bytes), "{report:?}");
     let text = serde_json::to_string(&report).unwrap();
     assert_eq!(serde_json::from_str::<CheckReport>(&text).unwrap(), report);
 }

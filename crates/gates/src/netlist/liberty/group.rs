@@ -300,7 +300,7 @@ mod tests {
 
     #[test]
     fn groups_attributes_and_continued_lines_are_read() {
-        let text = "/* a\n b */ library (l) {\n  time_unit : \"1ns\";\n  area /* um2 */ : 3.5 ;\n  t (\"1, 2\", \\\n     \"3\");\n  cell (\"X\") { pin(A) { direction : input; } } // end */\n}\n";
+        let text = "/* a\n b */ library (l) {\n  time_unit : \"1ns\";\n  area /* um2 */ : 3.5 ;\n  t (\"1, 2\", \\\n     \"3\");\n  cell (\"X\") { pin(A) { direction : input; } } // end\n}\n";
         let library = read(text).unwrap();
         assert_eq!((library.name(), library.line), ("l", 2));
         assert_eq!(library.value("time_unit"), Some("1ns"));
