@@ -247,6 +247,11 @@ mod tests {
             assert!(share > 0.5, "{depth_m}: {share}");
             let (one, three) = (within(1.0), within(3.0));
             assert!(one > 0.68 && three > 0.95, "{depth_m}: {one} {three}");
+            // Nor does it claim too little: 3.5 to 5.2 times its errors were measured.
+            let sums = errors.iter().fold([0.0; 2], |[error, claim], (e, s)| {
+                [error + e.abs(), claim + s]
+            });
+            assert!(sums[1] < 10.0 * sums[0], "{depth_m}: {sums:?}");
         }
     }
 

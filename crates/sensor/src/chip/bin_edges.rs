@@ -371,6 +371,23 @@ mod tests {
         }
 
         #[test]
+        fn taps_of_a_clk_period_each_divide_a_window_as_clk_does(
+            clk_mhz in 50f64..400.0, start in 0u16..512, cycle in 0i64..40,
+        ) {
+            let config = SensorConfig { clk_hz: clk_mhz * 1e6, ..SensorConfig::default() };
+            let exposure = Exposure::new(&config, 600, 40);
+            let periods = (0..=16).map(|n| config.clock().periods(n));
+            let [of_clk, of_taps] = [None, Some(periods.collect())].map(|taps| law(&config, &exposure, taps));
+            let Some(window) = of_clk.window(start).open() else {
+                return Ok(());
+            };
+            let [of_clk, of_taps] = [of_clk, of_taps].map(|law| law.edges(&window, cycle));
+            for (of_clk, of_taps) in of_clk.edges().iter().zip(of_taps.edges()) {
+                prop_assert!((*of_clk - *of_taps).as_fs().abs() <= 1, "{of_clk} {of_taps}");
+            }
+        }
+
+        #[test]
         fn bins_have_one_length_where_no_two_differ(
             first_fs in 0i64..3_000_000, width_fs in 1_000i64..4_000_000, longer_fs in 2i64..1000, which in 0usize..16,
         ) {

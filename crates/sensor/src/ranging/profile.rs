@@ -149,3 +149,54 @@ impl BinProfile {
         lengths.iter().map(|length| length / mean_s).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two lines whose elements differ.
+    fn profile() -> BinProfile {
+        let line = |first_s: f64, longer_s: f64| {
+            let length_s: Vec<f64> = (0..16).map(|n| 1e-9 + longer_s * f64::from(n)).collect();
+            let begins = length_s.iter().scan(first_s, |at, length| {
+                *at += length;
+                Some(*at - length)
+            });
+            let middle_s = begins
+                .zip(&length_s)
+                .map(|(begins, length)| begins + 0.5 * length);
+            LineProfile {
+                middle_s: middle_s.collect(),
+                length_s,
+            }
+        };
+        BinProfile {
+            sensor: SensorConfig::default(),
+            starts: [20, 31],
+            macropixels: vec![[line(20e-9, 1e-11), line(30e-9, 3e-11)]],
+        }
+    }
+
+    #[test]
+    fn a_window_has_the_bins_of_its_parity_steps_later() {
+        let profile = profile();
+        let step_s = 1.0 / profile.sensor.clk_hz;
+        for start in 0..512 {
+            let parity = usize::from(start % 2);
+            let later_s = (f64::from(start) - [20.0, 31.0][parity]) * step_s;
+            let edges_s = profile.edges_s(0, start);
+            assert_eq!(edges_s.len(), 17);
+            assert!((edges_s[0] - [20e-9, 30e-9][parity] - later_s).abs() < 1e-18);
+            let shares = profile.shares(0, start);
+            let mean_s = 1e-9 + [1e-11, 3e-11][parity] * 7.5;
+            for (n, share) in shares.iter().enumerate() {
+                let length_s = 1e-9 + [1e-11, 3e-11][parity] * n as f64;
+                assert!(
+                    (edges_s[n + 1] - edges_s[n] - length_s).abs() < 1e-18,
+                    "{start} {n}"
+                );
+                assert!((share * mean_s - length_s).abs() < 1e-20, "{start} {n}");
+            }
+        }
+    }
+}

@@ -37,6 +37,46 @@ fn a_start_value_beyond_the_laser_cycle_never_opens() {
 }
 
 #[test]
+fn every_p_counter_opens_windows_in_the_sensor_that_suits_it() {
+    for p_counter in PCounter::ALL {
+        let config = p_counter.sensor();
+        let law = WindowLaw::new(&config, &Exposure::new(&config, 512, 3));
+        for start in [100, 300] {
+            let window = law.window(start);
+            assert!(window.open().is_some(), "{p_counter:?} {start}: {window:?}");
+        }
+    }
+}
+
+/// A counter that no reset holds takes the edge for its first, or does not, where CLK rises from [`ROUNDING`] before
+/// ENABLE to its shortest high time after it.
+#[test]
+fn the_edge_at_enable_may_race_from_a_rounding_before_it() {
+    let config = PCounter::ALL.map(PCounter::sensor);
+    let config = config
+        .iter()
+        .find(|config| !config.p_counter.row().has_memory)
+        .unwrap();
+    let enabled = law(config).timing().stop_to_enabled;
+    let with_edge_at = |time: Time| {
+        let phase = config.clock().half_periods(1) - time;
+        let law = law(&SensorConfig {
+            stop_phase_ps: phase.as_ns() * 1e3,
+            ..config.clone()
+        });
+        assert_eq!(law.exposure().rising(0), time);
+        law.window(100)
+    };
+    let races = |off_fs: i64| {
+        let window = with_edge_at(enabled + Time::from_fs(off_fs));
+        matches!(window, Window::Race(race) if race.what == Conflict::ClkAtEnable)
+    };
+    let found: Vec<bool> = (-5..5).map(races).collect();
+    let expected: Vec<bool> = (-5..5).map(|off_fs| off_fs >= -ROUNDING.as_fs()).collect();
+    assert_eq!(found, expected);
+}
+
+#[test]
 fn only_where_no_start_value_has_a_window_is_aiming_refused() {
     assert_eq!(law(&SensorConfig::default()).refusal(), None);
     let fast = SensorConfig {
@@ -128,11 +168,17 @@ proptest! {
             };
             let above = |t: Time| (t, t - less);
             let below = |t: Time| (t, t + less);
+            // Cures lie on either side of what the sensor has.
+            let brackets = |at_most: Option<Time>, present: Time, at_least: Option<Time>| {
+                at_most.is_none_or(|t| t < present + less) && at_least.is_none_or(|t| present - less < t)
+            };
             match race.cure {
                 Cure::Period { at_least, at_most } => {
+                    prop_assert!(brackets(at_most, config.clock().period(), Some(at_least)), "{race}; {}", race.cure);
                     push([Some(above(at_least)), at_most.map(below)], &|config, t| config.clk_hz = 1.0 / t.as_s());
                 }
                 Cure::Phase { at_most, at_least } => {
+                    prop_assert!(brackets(at_most, config.stop_phase(), at_least), "{race}; {}", race.cure);
                     push([at_most.map(below), at_least.map(above)], &|config, t| config.stop_phase_ps = t.as_ns() * 1e3);
                 }
                 Cure::LaserCycle | Cure::Tap => {}
