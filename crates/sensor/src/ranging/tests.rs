@@ -490,3 +490,42 @@ fn full_bins_are_told_from_peaks() {
     assert!(!saturated(&counts));
     assert_eq!(finder.find(&[0; 16]), None);
 }
+
+/// SPADs that strong light paralyses at the window's first edges count almost as they would under a weaker echo: the fit from
+/// one start ends there and explains nothing.
+#[test]
+fn strong_light_is_sought_in_more_than_one_place() {
+    for (dead_time_ns, position_bins, signal) in [
+        (1.3, -0.1, 600.0),
+        (1.3, -0.01, 600.0),
+        (1.5, -0.1, 413.0),
+        (1.5, -0.2, 600.0),
+    ] {
+        let config = SensorConfig {
+            dead_time_ns,
+            paralysable: true,
+            afterpulse_probability: 0.05,
+            crosstalk_probability: 0.04,
+            ..SensorConfig::default()
+        };
+        let finder = finder(&config, 520);
+        let response = Response::new(&config, finder.bin_s, PULSE_SIGMA);
+        let light = EchoLight {
+            position_bins,
+            signal,
+            background_per_bin: 0.006,
+            sigma_bins: response.pulse_sigma_bins,
+        };
+        let counts: Vec<u32> = response
+            .chances(&light)
+            .iter()
+            .map(|p| (1000.0 * p).round() as u32)
+            .collect();
+        let found = finder.find(&counts).unwrap();
+        let off = (found.position_bins - position_bins).abs();
+        assert!(
+            found.walk_left.is_none() && off < 0.002,
+            "{light:?} {found:?}"
+        );
+    }
+}
