@@ -439,4 +439,6 @@ impl WindowLaw {
 }
 
 #[cfg(test)]
+mod by_edges;
+#[cfg(test)]
 mod tests;

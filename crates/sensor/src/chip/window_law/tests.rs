@@ -96,6 +96,7 @@ fn a_race_says_what_meets_what_when_and_what_helps() {
         "the P-counter is slower than a CLK period (it takes 1.300 ns after CLK's edge, and must not take more than \
          1.250 ns)"
     );
+    assert_eq!(slow.slack(), ps(-50));
     // 1300.004 ps.
     assert_eq!(slow.cure.to_string(), "give clk_hz of at most 769.2 MHz");
     let both = Race::strobe_at_shift(ps(2600), 1, (ps(4000), ps(100)), (ps(50), ps(20)), ps(1000));
@@ -104,6 +105,7 @@ fn a_race_says_what_meets_what_when_and_what_helps() {
         "the strobe meets a change of the shift register (it comes 4.000 ns after CLK falls, and must not from 3.980 ns \
          to 4.050 ns)"
     );
+    assert_eq!(both.slack(), ps(-20));
     // (4000 - 100 + 20) / 1.5 ps and (4000 - 100 - 50) / 1.5 ps.
     assert_eq!(
         both.cure.to_string(),

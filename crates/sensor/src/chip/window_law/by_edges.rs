@@ -1,0 +1,410 @@
+//! The window law edge by edge: what every CLK edge of a laser cycle does, one after the other, against the law's sums. Delays are random
+//! multiples of 100 ps, CLK's too, and a few femtoseconds off: so every two signals meet in some cases, and limits are tried to the
+//! femtosecond.
+
+use super::*;
+use crate::chip::timing::CounterTiming;
+use crate::chip::{AfterBorrow, PCounter, SensorConfig, Tap};
+use proptest::prelude::*;
+
+/// Signals that are closer than this to a limit race.
+const NEAR: Time = Time::from_fs(2);
+
+/// What a start value does. A race has its signal's time, and from when to when it must not come.
+#[derive(Debug, PartialEq)]
+enum Found {
+    Strobe {
+        cause: Time,
+        strobe: Time,
+        counted: i64,
+        is_regular: bool,
+    },
+    Irregular,
+    Never,
+    Race(Conflict, Time, Time, Option<Time>),
+}
+
+/// A macropixel whose edges are gone through.
+struct Edges {
+    config: SensorConfig,
+    exposure: Exposure,
+    timing: ChipTiming,
+}
+
+impl Edges {
+    fn period(&self) -> Time {
+        self.exposure.clock.period()
+    }
+
+    fn end(&self) -> Time {
+        self.exposure.stop(1)
+    }
+
+    /// Some more than a laser cycle's.
+    fn numbers(&self) -> std::ops::Range<i64> {
+        -4..i64::from(self.exposure.stop_periods) + 4
+    }
+
+    fn strobe(&self, edge: i64) -> Time {
+        let timing = &self.timing;
+        let count = self.exposure.falling(edge) + timing.clk_to_counter_clk;
+        count + timing.counter.clk_to_local_stop + timing.local_stop_to_strobe
+    }
+
+    /// The strobe of a P-counter that each STOP resets.
+    fn after_reset(&self, start: u16) -> Found {
+        let (timing, counter) = (&self.timing, &self.timing.counter);
+        if self.period() <= counter.period + NEAR {
+            return Found::Race(
+                Conflict::SlowCounter,
+                counter.period + NEAR,
+                self.period(),
+                None,
+            );
+        }
+        let Some(rises) = Rises::of(&self.config, start) else {
+            return Found::Never;
+        };
+        let no_more = timing.stop_to_reset_release - counter.removal - NEAR;
+        let settled = timing.stop_to_reset + counter.settle;
+        let released = timing.stop_to_reset_release + counter.release + counter.recovery;
+        let surely = settled.max(released) + NEAR;
+        let mut counts = 0;
+        let mut stops = Vec::new();
+        for edge in self.numbers() {
+            let count = self.exposure.falling(edge) + timing.clk_to_counter_clk;
+            if no_more <= count && count <= surely {
+                return Found::Race(Conflict::ClkAtResetEnd, count, no_more, Some(surely));
+            }
+            if surely < count && count < self.end() + timing.stop_to_reset {
+                let since = counts - rises.first;
+                if since == 0 || since > 0 && rises.every.is_some_and(|every| since % every == 0) {
+                    stops.push(edge);
+                }
+                counts += 1;
+            }
+        }
+        let (Some(&first), Some(&last)) = (stops.first(), stops.last()) else {
+            return Found::Never;
+        };
+        let waits = rises.every.is_none();
+        let strobe = self.strobe(last);
+        let latched = self.end() + timing.stop_to_hit_reset - timing.strobe_to_hit;
+        if strobe > latched + NEAR && waits {
+            return Found::Never;
+        }
+        if strobe >= latched - NEAR {
+            let until = waits.then_some(latched + NEAR);
+            return Found::Race(Conflict::StrobeAtNextReset, strobe, latched - NEAR, until);
+        }
+        if !waits && starts_high(&self.config, start) {
+            let rise = timing.stop_to_reset + counter.reset_to_local_stop.unwrap();
+            let strobe = rise + timing.local_stop_to_strobe;
+            let held = timing.stop_to_hit_release - timing.removal - NEAR;
+            if strobe >= held {
+                return Found::Race(Conflict::ResetStrobeAtHitReset, strobe, held, None);
+            }
+        }
+        self.counted(first, stops.len() == 1)
+    }
+
+    fn counted(&self, counted: i64, is_regular: bool) -> Found {
+        let strobe = self.strobe(counted);
+        let cause = strobe - self.timing.local_stop_to_strobe;
+        Found::Strobe {
+            cause,
+            strobe,
+            counted,
+            is_regular,
+        }
+    }
+
+    /// The strobe of a P-counter that runs on from the exposure's first STOP edge.
+    fn running_on(&self, start: u16) -> Found {
+        let (timing, counter) = (&self.timing, &self.timing.counter);
+        let enabled = timing.stop_to_enabled;
+        let until = enabled + timing.clk_to_counter_clk + counter.clock_high + NEAR;
+        for edge in self.numbers() {
+            let rise = self.exposure.rising(edge);
+            if enabled - NEAR <= rise && rise <= until {
+                return Found::Race(Conflict::ClkAtEnable, rise, enabled - NEAR, Some(until));
+            }
+        }
+        let Some(Rises {
+            first,
+            every: Some(every),
+        }) = Rises::of(&self.config, start)
+        else {
+            return Found::Never;
+        };
+        let periods = i64::from(self.exposure.stop_periods);
+        let last = periods * i64::from(self.exposure.laser_cycles);
+        // The low phase in which ENABLE comes is the first count, whether CLK falls before it or after.
+        let counted = self
+            .numbers()
+            .find(|&edge| self.exposure.rising(edge) > enabled)
+            .unwrap();
+        let stops: Vec<i64> = (counted + first..=last).step_by(every as usize).collect();
+        let fall = |edge| self.exposure.falling(edge);
+        if let Some(&edge) = stops
+            .first()
+            .filter(|&&edge| first == 0 && fall(edge) <= enabled + NEAR)
+        {
+            let (comes, race) = (fall(edge), Conflict::LocalStopAtEnable);
+            return Found::Race(race, comes, comes.min(enabled), Some(comes.max(enabled)));
+        }
+        if stops.last() == Some(&last) {
+            let (comes, end) = (fall(last), self.exposure.end() + enabled);
+            return Found::Race(
+                Conflict::LocalStopAtEnable,
+                comes,
+                comes.min(enabled),
+                Some(comes.max(end)),
+            );
+        }
+        let from = timing.stop_to_hit_reset - timing.strobe_to_hit - NEAR;
+        let to = timing.stop_to_hit_release + timing.recovery + NEAR;
+        for &edge in &stops {
+            let strobe = self.strobe(edge.rem_euclid(periods));
+            for strobe in [strobe, strobe - self.end()] {
+                if from <= strobe && strobe <= to {
+                    return Found::Race(Conflict::StrobeAtReset, strobe, from, Some(to));
+                }
+            }
+        }
+        self.counted(counted + first, periods == every)
+    }
+
+    fn strobed(&self, start: u16) -> Found {
+        let timing = &self.timing;
+        let event = timing.clk_to_event + timing.setup + NEAR;
+        let is_clocked = self.config.tdc == Tdc::Clocked;
+        if is_clocked && self.period() <= event {
+            return Found::Race(Conflict::SlowCorrelation, event, self.period(), None);
+        }
+        match self.config.mode {
+            Mode::Conventional => Found::Strobe {
+                cause: self.end(),
+                strobe: self.end() + timing.stop_to_strobe,
+                counted: 0,
+                is_regular: true,
+            },
+            Mode::Guided if self.config.p_counter.row().has_memory => self.after_reset(start),
+            Mode::Guided => self.running_on(start),
+        }
+    }
+
+    /// The window as well: the edge that takes the photons of bin 0, and what the strobe has left.
+    fn window(&self, start: u16) -> (Found, Option<(i64, Time)>) {
+        let found = self.strobed(start);
+        let Found::Strobe {
+            cause,
+            strobe,
+            counted,
+            is_regular,
+        } = found
+        else {
+            return (found, None);
+        };
+        let timing = &self.timing;
+        let is_clocked = self.config.tdc == Tdc::Clocked;
+        let (mut edge, mut last, mut slack) = (-100, None, Time::MAX);
+        while self.exposure.rising(edge) + timing.clk_to_shift <= strobe + self.period() {
+            let shift = self.exposure.rising(edge) + timing.clk_to_shift;
+            let (from, to) = (shift - timing.hold - NEAR, shift + timing.setup + NEAR);
+            if is_clocked && from <= strobe && strobe <= to {
+                let fall = self.exposure.falling(counted);
+                let race = match self.config.mode {
+                    Mode::Guided => Found::Race(
+                        Conflict::StrobeAtShift,
+                        strobe - fall,
+                        from - fall,
+                        Some(to - fall),
+                    ),
+                    Mode::Conventional => {
+                        let strobe = strobe - cause;
+                        let (from, to) =
+                            (strobe - timing.setup - NEAR, strobe + timing.hold + NEAR);
+                        Found::Race(Conflict::ShiftAtStrobe, shift - cause, from, Some(to))
+                    }
+                };
+                return (race, None);
+            }
+            if shift <= strobe {
+                last = Some(edge);
+            }
+            if is_clocked {
+                let (setup, hold) = (strobe - timing.setup - shift, shift - timing.hold - strobe);
+                slack = slack.min(setup.max(hold));
+            }
+            edge += 1;
+        }
+        if !is_regular {
+            return (Found::Irregular, None);
+        }
+        let bins = self.config.bins as i64;
+        (found, last.map(|edge| (edge - bins, slack)))
+    }
+}
+
+fn of_law(law: &WindowLaw, start: u16) -> (Found, Option<(i64, Time)>) {
+    match law.window(start) {
+        Window::Open(window) => {
+            let strobe = match law.sensor.mode {
+                Mode::Guided => window.strobe_cause + law.timing.local_stop_to_strobe,
+                Mode::Conventional => window.strobe_cause + law.timing.stop_to_strobe,
+            };
+            let found = Found::Strobe {
+                cause: window.strobe_cause,
+                strobe,
+                counted: window.count_edge,
+                is_regular: true,
+            };
+            let slack = match law.sensor.tdc {
+                Tdc::Clocked => window.slack,
+                Tdc::DelayLine => Time::MAX,
+            };
+            (found, Some((window.first_edge, slack)))
+        }
+        Window::Never => (Found::Never, None),
+        Window::Irregular(_) => (Found::Irregular, None),
+        Window::Race(race) => (Found::Race(race.what, race.comes, race.from, race.to), None),
+    }
+}
+
+/// Multiples of 100 ps, one in four of them a few femtoseconds off.
+fn delay(steps: std::ops::Range<i64>) -> impl Strategy<Value = Time> {
+    let off = prop_oneof![3 => Just(0i64), 1 => -3i64..4];
+    (steps, off).prop_map(|(steps, off)| Time::from_fs(100_000 * steps + off))
+}
+
+prop_compose! {
+    fn counters()(
+        (clk_to_local_stop, reset_to_local_stop) in (delay(2..20), delay(1..20)),
+        (release, settle, period) in (delay(0..6), delay(0..20), delay(5..26)),
+        (recovery, removal, clock_high) in (delay(0..4), delay(0..4), delay(0..6)),
+    ) -> CounterTiming {
+        let reset_to_local_stop = Some(reset_to_local_stop);
+        CounterTiming { clk_to_local_stop, reset_to_local_stop, release, settle, period, recovery, removal, clock_high }
+    }
+}
+
+prop_compose! {
+    /// Pulses of resets are longer than the way of a CLK edge to COUNTER_CLK, as all netlists have them.
+    fn timings()(
+        (spad_to_sampled, clk_to_counter_clk, counter) in (delay(1..20), delay(1..8), counters()),
+        (local_stop_to_strobe, local_stop_to_sample) in (delay(1..8), delay(1..12)),
+        (stop_to_strobe, stop_to_sample, strobe_to_hit) in (delay(1..20), delay(1..20), delay(0..6)),
+        (clk_to_shift, clk_to_event) in (delay(0..6), delay(5..22)),
+        (stop_to_reset, reset, stop_to_hit_reset, hit_reset) in (delay(1..5), delay(8..20), delay(1..12), delay(4..20)),
+        stop_to_enabled in delay(1..30),
+        (setup, hold, recovery, removal) in (delay(0..4), delay(0..3), delay(0..4), delay(0..4)),
+    ) -> ChipTiming {
+        ChipTiming {
+            spad_to_sampled, clk_to_counter_clk, counter, local_stop_to_strobe, local_stop_to_sample, stop_to_strobe,
+            stop_to_sample, strobe_to_hit, clk_to_shift, clk_to_event, stop_to_reset, stop_to_hit_reset,
+            stop_to_enabled, setup, hold, recovery, removal,
+            stop_to_reset_release: stop_to_reset + reset,
+            stop_to_hit_release: stop_to_hit_reset + hit_reset,
+            ..ChipTiming::of(&SensorConfig::default())
+        }
+    }
+}
+
+prop_compose! {
+    fn sensors()(
+        half_period in 10i64..22,
+        phase in -20i64..20,
+        (counter_bits, step) in (3usize..6, 0u32..2),
+        p_counter in prop::sample::select(PCounter::ALL.to_vec()),
+        tap in prop::sample::select(vec![Tap::Borrow, Tap::Msb]),
+        after_borrow in prop::sample::select(vec![AfterBorrow::Hold, AfterBorrow::Wrap]),
+        mode in prop::sample::select(vec![Mode::Guided, Mode::Guided, Mode::Conventional]),
+        tdc in prop::sample::select(vec![Tdc::Clocked, Tdc::DelayLine]),
+    ) -> SensorConfig {
+        SensorConfig {
+            clk_hz: 1e10 / (2 * half_period) as f64,
+            stop_phase_ps: 100.0 * phase.clamp(-half_period, half_period) as f64,
+            counter_bits,
+            step_periods: 1 << step,
+            p_counter,
+            tap,
+            after_borrow,
+            mode,
+            tdc,
+            ..SensorConfig::default()
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1500))]
+
+    #[test]
+    fn the_law_is_what_the_edges_do(
+        config in sensors(), timing in timings(), stop_periods in 4u32..140, laser_cycles in 1u32..5, cycle in 0i64..5,
+    ) {
+        if config.check().is_err() {
+            return Ok(());
+        }
+        let exposure = Exposure::new(&config, stop_periods, laser_cycles);
+        let mut law = WindowLaw::with_timing(&config, &exposure, timing);
+        let taps: Vec<Time> = (0..=16).map(|n| Time::from_ps(130 * n)).collect();
+        if config.tdc == Tdc::DelayLine {
+            law = law.with_taps(std::slice::from_ref(&taps));
+        }
+        let edges = Edges { config, exposure, timing };
+        for start in 0..=edges.config.largest_start() {
+            let (found, window) = edges.window(start);
+            prop_assert_eq!(of_law(&law, start), (found, window), "{} {:?}", start, edges.config);
+            let Window::Open(window) = law.window(start) else {
+                continue;
+            };
+            // The first pulse that comes too late for the signal that ends each bin.
+            let later = exposure.stop(cycle);
+            let sampled = match edges.config.mode {
+                Mode::Guided => window.strobe_cause + timing.local_stop_to_sample,
+                Mode::Conventional => window.strobe_cause + timing.stop_to_sample,
+            };
+            let ends: Vec<Time> = taps.iter().zip(window.first_edge - 1..).map(|(&tap, edge)| {
+                let end = match edges.config.tdc {
+                    Tdc::Clocked => exposure.rising(edge),
+                    Tdc::DelayLine => sampled + tap,
+                };
+                later + end - timing.spad_to_sampled + Time::from_fs(1)
+            }).collect();
+            let found = law.edges(&window, cycle);
+            prop_assert_eq!(found.edges(), &ends[..]);
+        }
+    }
+
+    /// Where one of the start values opens a window that the law looks at first.
+    #[test]
+    fn the_chosen_start_value_is_the_best_that_opens(
+        config in sensors(), timing in timings(), stop_periods in 4u32..140, laser_cycles in 1u32..5, at in 0f64..1.2,
+    ) {
+        if config.check().is_err() {
+            return Ok(());
+        }
+        let exposure = Exposure::new(&config, stop_periods, laser_cycles);
+        let law = WindowLaw::with_timing(&config, &exposure, timing);
+        let largest = config.largest_start();
+        let opens = |start: u16| law.window(start).open();
+        if ![0, 1, 16.min(largest), largest / 2].into_iter().any(|start| opens(start).is_some()) {
+            return Ok(());
+        }
+        let time = Time::from_s(at * exposure.stop(1).as_s());
+        let distance = |start: u16| {
+            let interval = law.interval(&opens(start)?);
+            let twice = interval.start + interval.end - time - time;
+            interval.contains(&time).then(|| twice.as_fs().abs() / 2)
+        };
+        let least = (0..=largest).filter_map(distance).min();
+        let chosen = law.start_for(time);
+        prop_assert_eq!(chosen.is_some(), least.is_some(), "{:?}", config);
+        if let (Some(chosen), Some(least)) = (chosen, least) {
+            let found = distance(chosen).unwrap();
+            prop_assert!(found <= least + 1, "{chosen} {found} {least} {config:?}");
+        }
+    }
+}
