@@ -5,6 +5,7 @@
 use super::*;
 use crate::chip::timing::CounterTiming;
 use crate::chip::{AfterBorrow, PCounter, SensorConfig, Tap};
+use crate::units::Frequency;
 use proptest::prelude::*;
 
 /// Signals that are closer than this to a limit race.
@@ -357,6 +358,14 @@ proptest! {
         for start in 0..=edges.config.largest_start() {
             let (found, window) = edges.window(start);
             prop_assert_eq!(of_law(&law, start), (found, window), "{} {:?}", start, edges.config);
+            // At the shorter period that a cure offers nothing is too slow.
+            if let Window::Race(Race { what, cure: Cure::Period { at_most: Some(period), .. }, .. }) = law.window(start) {
+                let clock = Frequency::from_hz_f64(1.0 / period.as_s()).unwrap();
+                let cured = WindowLaw::with_timing(&edges.config, &Exposure { clock, ..exposure }, timing);
+                if let Window::Race(race) = cured.window(start) {
+                    prop_assert!(race.what > Conflict::SlowPath && race.what != what, "{race} at {period}");
+                }
+            }
             let Window::Open(window) = law.window(start) else {
                 continue;
             };

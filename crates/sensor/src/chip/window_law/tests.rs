@@ -77,6 +77,43 @@ fn the_edge_at_enable_may_race_from_a_rounding_before_it() {
 }
 
 #[test]
+fn a_macropixel_has_the_clk_of_its_column_and_its_own_delay_lines() {
+    for tdc in [Tdc::Clocked, Tdc::DelayLine] {
+        for clk_skew_ps in [0.0, 7.0] {
+            let config = SensorConfig {
+                tdc,
+                clk_skew_ps,
+                ..SensorConfig::default()
+            };
+            let sensor = Sensor::from(&config);
+            let law = WindowLaw::new(&sensor, &Exposure::new(&config, 520, 1));
+            assert_eq!(**law.sensor(), config);
+            let window = law.window(101).open().unwrap();
+            let of_first = law.edges(&window, 0);
+            for number in [0, 1, 63, 64, 4095] {
+                let found = law.of_macropixel(number).edges(&window, 0);
+                let (number, col) = (number as usize, number as usize % 64);
+                let later = sensor.clk_skew(col);
+                assert_eq!(later == Time::ZERO, col == 0 || clk_skew_ps == 0.0);
+                // The last tap holds what came first.
+                let before_freeze = |number: usize| -> Option<Vec<Time>> {
+                    let lines = sensor.taps(number)?;
+                    Some(lines[101 % lines.len()].iter().rev().copied().collect())
+                };
+                let own = before_freeze(number).zip(before_freeze(0));
+                for (bin, (found, first)) in found.edges().iter().zip(of_first.edges()).enumerate()
+                {
+                    let longer = own
+                        .as_ref()
+                        .map_or(Time::ZERO, |(own, first)| own[bin] - first[bin]);
+                    assert_eq!(*found, *first + later - longer, "{tdc:?} {number} {bin}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn only_where_no_start_value_has_a_window_is_aiming_refused() {
     assert_eq!(law(&SensorConfig::default()).refusal(), None);
     let fast = SensorConfig {
