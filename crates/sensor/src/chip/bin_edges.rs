@@ -312,6 +312,7 @@ mod tests {
             start in 0u16..512,
             cycle in 0i64..42,
             phase in -0.9f64..0.9,
+            within in 0f64..1.0,
             taps in prop::option::of(taps(16)),
         ) {
             let config = SensorConfig {
@@ -329,9 +330,10 @@ mod tests {
             for (number, &edge) in edges.edges().iter().enumerate() {
                 let after = Some(number).filter(|&bin| bin < config.bins);
                 let before = number.checked_sub(1);
-                let middle = before.map_or(edge, |bin| edge - Time::from_fs((edges.width(bin).as_fs() + 1) / 2));
-                let in_middle = if before.is_some() { before } else { after };
-                for (time, bin) in [(edge, after), (edge - Time::from_fs(1), before), (middle, in_middle)] {
+                let earlier = |bin: usize| 1 + ((edges.width(bin).as_fs() - 1) as f64 * within) as i64;
+                let inside = before.map_or(edge, |bin| edge - Time::from_fs(earlier(bin)));
+                let is_in = if before.is_some() { before } else { after };
+                for (time, bin) in [(edge, after), (edge - Time::from_fs(1), before), (inside, is_in)] {
                     prop_assert_eq!(edges.bin_of(time), bin);
                     prop_assert_eq!(law.bin_of(&window, cycle, time), bin);
                     if law.has_clk_bins() {
@@ -347,6 +349,7 @@ mod tests {
                 prop_assert_eq!(law.bin_interval(&window, cycle, bin as i64), edges.bin(bin));
             }
             prop_assert_eq!(law.interval_in(&window, cycle), edges.span());
+            prop_assert_eq!(law.time_of(&window, 2.0), law.edges(&window, 0).time_of(2.0));
         }
 
         /// A clock's periods and a law's own sums are rounded to a femtosecond each.
@@ -404,7 +407,9 @@ mod tests {
             let config = SensorConfig::default();
             let of_clk = || WindowLaw::new(&config, &Exposure::new(&config, 520, 1));
             prop_assert_eq!(of_clk().bin_width_s(), Some(1.0 / config.clk_hz));
-            let width_s = of_clk().with_taps(&[line(0), line(1)]).bin_width_s();
+            let of_taps = of_clk().with_taps(&[line(0), line(1)]);
+            prop_assert_eq!((of_clk().has_clk_bins(), of_taps.has_clk_bins()), (true, false));
+            let width_s = of_taps.bin_width_s();
             prop_assert!(width_s.is_some_and(|s| (s / (width_fs as f64 * 1e-15) - 1.0).abs() < 1e-12));
             prop_assert_eq!(of_clk().with_taps(&[line(longer_fs)]).bin_width_s(), None);
             prop_assert_eq!(of_clk().with_taps(&[line(0), line(longer_fs)]).bin_width_s(), None);
