@@ -35,12 +35,7 @@ pub(super) struct Spad<'r, const K: usize> {
     ready: Dual<K>,
     /// What blinds: avalanches, or where it is paralysable all light.
     blinding: History<K>,
-    /// Avalanches after which carriers are trapped; where it is paralysable, afterpulses to be released.
-    trapping: History<K>,
-    /// That it is ready and carriers are trapped; where it is paralysable, that they are.
-    trapped: Dual<K>,
-    /// The share of carriers that stay trapped for a dead time.
-    kept: f64,
+    traps: Traps<K>,
     /// Avalanches of the bin, and those of them by crosstalk.
     fired: Dual<K>,
     by_crosstalk: Dual<K>,
@@ -49,12 +44,27 @@ pub(super) struct Spad<'r, const K: usize> {
     is_plain: bool,
 }
 
+/// Carriers that avalanches leave behind.
+#[derive(Clone)]
+struct Traps<const K: usize> {
+    /// Avalanches after which carriers are trapped; where the SPAD is paralysable, afterpulses to be released.
+    trapping: History<K>,
+    /// That it is ready and carriers are trapped; where it is paralysable, that they are.
+    trapped: Dual<K>,
+    /// The share of carriers that stay trapped for a dead time.
+    kept: f64,
+    /// The share that would be released in a step, were it even.
+    release: f64,
+}
+
 /// The same states, each with the sign of the SPAD's flip-flop since the bin began.
 #[derive(Clone)]
 struct Parity<const K: usize> {
     ready: Dual<K>,
     blind: Dual<K>,
     blinding: History<K>,
+    /// Where afterpulses turn the flip-flop back.
+    traps: Option<Traps<K>>,
 }
 
 impl<'r, const K: usize> Spad<'r, K> {
@@ -101,14 +111,18 @@ impl<'r, const K: usize> Spad<'r, K> {
             true => light,
         };
         let history = |of: Dual<K>| History::new(dead / h, of * h);
+        let traps = Traps {
+            trapping: history(traps),
+            trapped,
+            kept,
+            release: h / tau,
+        };
+        let has_signed_traps = law.afterpulses > 0.0 && !law.paralysable;
         Spad {
             dead: law,
             h,
             ready,
             blinding: history(blinding),
-            trapping: history(traps),
-            trapped,
-            kept,
             fired: Dual::ZERO,
             by_crosstalk: Dual::ZERO,
             is_plain: dead >= 1.0
@@ -119,7 +133,9 @@ impl<'r, const K: usize> Spad<'r, K> {
                 ready,
                 blind: Dual::constant(1.0) - ready,
                 blinding: history(blinding),
+                traps: has_signed_traps.then(|| traps.clone()),
             }),
+            traps,
         }
     }
 
@@ -129,6 +145,9 @@ impl<'r, const K: usize> Spad<'r, K> {
             parity.ready = self.ready;
             parity.blind = Dual::constant(1.0) - self.ready;
             parity.blinding = self.blinding.clone();
+            if let Some(traps) = &mut parity.traps {
+                *traps = self.traps.clone();
+            }
         }
     }
 
@@ -152,7 +171,7 @@ impl<'r, const K: usize> Spad<'r, K> {
         let has_traps = dead.afterpulses > 0.0;
         let mut light = photons;
         if has_traps && dead.paralysable {
-            light += self.afterpulses();
+            light += self.traps.afterpulses();
         }
         let mut crosstalk = Dual::ZERO;
         if dead.crosstalk > 0.0 {
@@ -164,20 +183,18 @@ impl<'r, const K: usize> Spad<'r, K> {
         // Avalanches of light, without those of afterpulses that came first.
         let mut by_light = fired;
         if has_traps && !dead.paralysable {
-            let (released, lost) = self.released(light, photons, fired);
+            let breeding = photons * positive(light).recip() * dead.afterpulses;
+            let (released, lost) = self.traps.released(light, breeding, fired, 1.0);
             fired += released - lost;
             by_light = fired - released;
         }
         if has_traps && dead.paralysable {
             let bred = fired * photons * positive(light).recip();
-            self.trapping.push(bred * dead.afterpulses);
+            self.traps.trapping.push(bred * dead.afterpulses);
         }
         if let Some(parity) = &mut self.parity {
-            let all = match fired.value > by_light.value {
-                true => light * fired * positive(by_light).recip(),
-                false => light,
-            };
-            parity.step(dead.paralysable, all, self.ready);
+            let breeding = photons * positive(light).recip() * dead.afterpulses;
+            parity.step(dead.paralysable, light, breeding, self.ready);
         }
         match dead.paralysable {
             false => {
@@ -208,42 +225,6 @@ impl<'r, const K: usize> Spad<'r, K> {
         }
     }
 
-    /// Afterpulses of this step, and avalanches of light that they are in place of.
-    fn released(&mut self, light: Dual<K>, photons: Dual<K>, fired: Dual<K>) -> (Dual<K>, Dual<K>) {
-        let dead = self.dead;
-        let release = Dual::constant(self.h / dead.afterpulse_bins);
-        let recovering = self.trapping.ending();
-        let both = light + release;
-        let (missed, missed_of_light) = (both.exprel_neg(), light.exprel_neg());
-        let one = Dual::constant(1.0);
-        // What fires those with trapped carriers, and what would have fired them without.
-        let gone = self.trapped * both * missed + recovering * (one - missed);
-        let of_light =
-            self.trapped * light * missed_of_light + recovering * (one - missed_of_light);
-        let released = gone * release * both.recip();
-        let fired_trapped = gone - released;
-        self.trapped += recovering - gone;
-        // Photons, but not crosstalk, trap carriers anew.
-        let photon_share = photons * positive(light).recip();
-        let fresh = (fired - of_light + fired_trapped) * photon_share * dead.afterpulses;
-        let old = fired_trapped * self.kept;
-        self.trapping
-            .push(fresh + old * (one - photon_share * dead.afterpulses));
-        (released, of_light - fired_trapped)
-    }
-
-    /// Afterpulses of this step, where they come as light.
-    fn afterpulses(&mut self) -> Dual<K> {
-        let spent = self.h / self.dead.afterpulse_bins;
-        let released = -libm::expm1(-spent);
-        let fresh = self.trapping.ending();
-        // Fresh ones come evenly over the step.
-        let of_fresh = 1.0 - released / spent;
-        let now = self.trapped * released + fresh * of_fresh;
-        self.trapped += fresh - now;
-        now
-    }
-
     /// The chance of the bin that has ended to count.
     pub(super) fn chance(&self, counting: &Counting) -> Dual<K> {
         let fired = match &self.parity {
@@ -260,6 +241,46 @@ impl<'r, const K: usize> Spad<'r, K> {
     }
 }
 
+impl<const K: usize> Traps<K> {
+    /// Afterpulses of this step, and avalanches of light that they are in place of, where light would have `fired` so many. A share
+    /// `breeding` of what light fires traps carriers anew. What fires becomes blind with the sign `turn`.
+    fn released(
+        &mut self,
+        light: Dual<K>,
+        breeding: Dual<K>,
+        fired: Dual<K>,
+        turn: f64,
+    ) -> (Dual<K>, Dual<K>) {
+        let release = Dual::constant(self.release);
+        let recovering = self.trapping.ending();
+        let both = light + release;
+        let (missed, missed_of_light) = (both.exprel_neg(), light.exprel_neg());
+        let one = Dual::constant(1.0);
+        // What fires those with trapped carriers, and what would have fired them without.
+        let gone = self.trapped * both * missed + recovering * (one - missed);
+        let of_light =
+            self.trapped * light * missed_of_light + recovering * (one - missed_of_light);
+        let released = gone * release * both.recip();
+        let fired_trapped = gone - released;
+        self.trapped += recovering - gone;
+        let fresh = (fired - of_light + fired_trapped) * breeding;
+        let old = fired_trapped * self.kept;
+        self.trapping.push((fresh + old * (one - breeding)) * turn);
+        (released, of_light - fired_trapped)
+    }
+
+    /// Afterpulses of this step, where they come as light.
+    fn afterpulses(&mut self) -> Dual<K> {
+        let released = -libm::expm1(-self.release);
+        let fresh = self.trapping.ending();
+        // Fresh ones come evenly over the step.
+        let of_fresh = 1.0 - released / self.release;
+        let now = self.trapped * released + fresh * of_fresh;
+        self.trapped += fresh - now;
+        now
+    }
+}
+
 /// The same, above zero, to divide by.
 #[inline]
 fn positive<const K: usize>(mut number: Dual<K>) -> Dual<K> {
@@ -269,14 +290,18 @@ fn positive<const K: usize>(mut number: Dual<K>) -> Dual<K> {
 
 impl<const K: usize> Parity<K> {
     /// A step with so much light on a SPAD that was ready with chance `was_ready`.
-    fn step(&mut self, paralysable: bool, light: Dual<K>, was_ready: Dual<K>) {
+    fn step(&mut self, paralysable: bool, light: Dual<K>, breeding: Dual<K>, was_ready: Dual<K>) {
         let missed = light.exprel_neg();
         let mut recovering = self.blinding.ending();
         if paralysable {
             // Those of them that no photon has blinded anew: as many as there are SPADs that are ready.
             recovering = recovering * was_ready;
         }
-        let fired = self.ready * light * missed + recovering * (Dual::constant(1.0) - missed);
+        let mut fired = self.ready * light * missed + recovering * (Dual::constant(1.0) - missed);
+        if let Some(traps) = &mut self.traps {
+            let (released, lost) = traps.released(light, breeding, fired, -1.0);
+            fired += released - lost;
+        }
         let (ready, blind) = (self.ready, self.blind);
         self.ready += recovering - fired;
         self.blind = blind - recovering - fired;
@@ -332,3 +357,6 @@ impl<const K: usize> History<K> {
         }
     }
 }
+
+#[cfg(test)]
+mod by_states;
