@@ -259,6 +259,22 @@ mod tests {
         moment / light
     }
 
+    /// Six samples at 20 m and three at 40 m, whose logarithm of light is 1 of reflectivity, 1/6 and 1/3 of counting apart, as variances.
+    #[test]
+    fn the_other_surface_counts_as_often_as_it_may_be_the_brighter_one() {
+        let mut samples = on_plane(1.0 / 20.0, [0.0; 2], [0.0; 2], 1e-9, 1);
+        let right = samples.iter_mut().filter(|sample| sample.at[0] > 0.1);
+        right.for_each(|sample| sample.inverse = 1.0 / 40.0);
+        let (range_m, sigma_m) = estimate(&mut samples, PITCH).unwrap();
+        let ratio: f64 = (6.0 / 400.0) / (3.0 / 1600.0);
+        let is_other = normal_above(ratio.ln() / (1.0f64 + 1.0 / 6.0 + 1.0 / 3.0).sqrt());
+        let expected_m = 20.0 * is_other.sqrt();
+        assert!(
+            (range_m - 20.0).abs() < 1e-3 && (sigma_m / expected_m - 1.0).abs() < 1e-3,
+            "{range_m} {sigma_m}"
+        );
+    }
+
     proptest! {
         #[test]
         fn a_plane_is_as_far_as_its_light_says(

@@ -279,6 +279,34 @@ mod tests {
         assert_eq!(at(2.0).range_m, [None, None]);
     }
 
+    /// Seen from a rig that moves sideways, near targets move by more than far ones.
+    #[test]
+    fn of_two_targets_in_a_macropixel_the_nearer_is_expected() {
+        let scene = wall_at(60.0);
+        let focal_px = scene.lidar_camera(1, 9).focal_px;
+        // The near one moves by 0.6 macropixels, the far one by 0.4.
+        for (moved_px, near, far) in [(-0.6, 3, 4), (0.6, 5, 4)] {
+            let earlier = frames(1, 9, 0.1, |_, pixel| match pixel {
+                _ if pixel == near => Some(40.0),
+                _ if pixel == far => Some(60.0),
+                _ => None,
+            });
+            let input = GuideInput {
+                time_s: 0.1,
+                velocity_m_s: DVec3::new(moved_px * 40.0 / focal_px / 0.1, 0.0, 0.0),
+                earlier: &earlier,
+                ..GuideInput::still(&scene, 1, 9, 0)
+            };
+            let map = Kalman::default().estimate(&input).unwrap();
+            assert!(
+                map.range_m[4].is_some_and(|m| (m - 40.0).abs() < 0.5),
+                "{:?}",
+                map.range_m
+            );
+            assert_eq!(map.guided(), 1);
+        }
+    }
+
     #[test]
     fn without_earlier_frames_nothing_is_known() {
         let scene = wall_at(60.0);

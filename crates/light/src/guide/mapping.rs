@@ -255,6 +255,36 @@ mod tests {
         assert_ne!(here, of_rig(&scene, 16, 16, 6));
     }
 
+    /// At the ends of what it measures, pixels of the two cameras are as far apart as its disparities reach.
+    #[test]
+    fn a_rig_says_between_which_ranges_it_measures() {
+        let scene = Scene::outdoor();
+        let (stereo, camera) = (&scene.stereo, scene.stereo.camera());
+        let reach = BehaviouralStereo.reach(&scene).unwrap();
+        let ends_m: Vec<f64> = reach
+            .split_whitespace()
+            .filter_map(|word| word.parse().ok())
+            .collect();
+        assert_eq!(ends_m.len(), 2, "{reach}");
+        for (depth_m, disparity_px) in ends_m
+            .iter()
+            .zip([stereo.max_disparity_px, stereo.min_disparity_px])
+        {
+            let baseline_m = match nearer_pair(stereo) {
+                Some(pair) if disparity_px == stereo.max_disparity_px => pair.baseline_m,
+                _ => stereo.baseline_m,
+            };
+            let columns = [0.0, baseline_m]
+                .map(|x_m| camera.project(DVec3::new(x_m, 0.0, *depth_m)).unwrap().0);
+            // The range is told to 0.1 m.
+            let told = 0.06 / depth_m;
+            assert!(
+                ((columns[1] - columns[0]) / disparity_px - 1.0).abs() < told,
+                "{columns:?} {reach}"
+            );
+        }
+    }
+
     #[test]
     fn an_array_finer_than_the_camera_has_gaps_but_works() {
         let guide = of_rig(&perfect_wall(60.0), 64, 2048, 0);

@@ -246,9 +246,15 @@ mod tests {
 
     #[test]
     fn every_macropixel_before_a_wall_is_guided_to_it() {
+        for binning in [1, 2] {
+            is_guided_to_a_wall(MatchedStereo { binning, ..WHOLE });
+        }
+    }
+
+    fn is_guided_to_a_wall(guide: MatchedStereo) {
         let scene = coarse(wall_at(30.0));
         let input = GuideInput::still(&scene, 32, 32, 3);
-        let map = WHOLE.estimate(&input).unwrap();
+        let map = guide.estimate(&input).unwrap();
         let truth = GroundTruth::render(&scene, 32, 32);
         let pairs = map.range_m.iter().zip(&truth.range_m).zip(&map.sigma_m);
         let good = pairs.filter(|((found, truth), sigma_m)| {
@@ -258,7 +264,8 @@ mod tests {
         assert!(good > 32 * 32 * 9 / 10, "{good}");
         // One pixel's claim, a little more for its place and less for what others say of the slope.
         let focal_baseline_px_m = scene.stereo.camera().focal_px * scene.stereo.baseline_m;
-        let of_pixel_m = 30.0 * 30.0 * WHOLE.sigma_px / focal_baseline_px_m;
+        let sigma_px = guide.sigma_px * f64::from(guide.binning);
+        let of_pixel_m = 30.0 * 30.0 * sigma_px / focal_baseline_px_m;
         let typical = middle(map.sigma_m.clone()) / of_pixel_m;
         assert!((0.8..1.6).contains(&typical), "{typical}");
     }

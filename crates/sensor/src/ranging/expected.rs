@@ -266,6 +266,7 @@ pub(super) fn share_before(z: f64) -> (f64, f64) {
 mod tests {
     use super::*;
     use crate::theory::precision::cramer_rao;
+    use proptest::prelude::*;
 
     const PULSE_SIGMA: Time = Time::from_ps(1_911);
 
@@ -317,6 +318,33 @@ mod tests {
         let told = response.information(&light);
         assert_eq!(told[0], (0.0, 0.0));
         assert!(told.iter().all(|bin| bin.1.is_finite()) && told[7].1 > 0.0);
+    }
+
+    proptest! {
+        /// Bins know no place: what an echo does to one, it does a bin later to the next, also where it comes before all bins.
+        #[test]
+        fn the_mean_histogram_moves_with_its_echo(
+            bins_later in 1usize..12,
+            position_bins in -9f64..9.0,
+            ln_signal in -2f64..7.0,
+            background_per_bin in 1e-3f64..0.3,
+            width in 1f64..2.5,
+            dead_time_ns in prop_oneof![1.0f64..2.6, 2.6f64..40.0],
+            paralysable: bool,
+            afterpulse_probability in 0f64..0.05,
+        ) {
+            let config = SensorConfig { bins: 32, dead_time_ns, paralysable, afterpulse_probability, ..SensorConfig::default() };
+            let response = Response::new(&config, 1.0 / config.clk_hz, PULSE_SIGMA);
+            let sigma_bins = width * response.pulse_sigma_bins;
+            let light = EchoLight { position_bins, signal: ln_signal.exp(), background_per_bin, sigma_bins };
+            let later = EchoLight { position_bins: position_bins + bins_later as f64, ..light };
+            for steps in [Steps::Coarse, Steps::Fine] {
+                let [here, later] = [&light, &later].map(|light| response.chances_in(light, steps));
+                for (bin, (here, later)) in here.iter().zip(&later[bins_later..]).enumerate() {
+                    prop_assert!((here - later).abs() < 1e-7, "{bin} {here} {later}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -199,4 +199,30 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_profile_is_of_sensors_with_the_same_bins() {
+        let (profile, sensor) = (profile(), SensorConfig::default);
+        assert_eq!(profile.check(&sensor()), Ok(()));
+        let free = SensorConfig {
+            dead_time_ns: 3.0,
+            threshold: 2,
+            bin_bits: 12,
+            readout_pins: 4,
+            ..sensor()
+        };
+        assert_eq!(profile.check(&free), Ok(()));
+        let other = profile
+            .check(&SensorConfig {
+                clk_hz: 2e8,
+                ..free
+            })
+            .unwrap_err();
+        let said = (
+            other.key.as_str(),
+            other.calibrated.as_str(),
+            other.present.as_str(),
+        );
+        assert_eq!(said, ("clk_hz", "384000000.0", "200000000.0"));
+    }
 }

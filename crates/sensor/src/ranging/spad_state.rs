@@ -29,8 +29,6 @@ pub(super) struct Dead {
 #[derive(Clone)]
 pub(super) struct Spad<'r, const K: usize> {
     dead: &'r Dead,
-    /// Step, bins.
-    h: f64,
     /// That it is ready, with or without trapped carriers.
     ready: Dual<K>,
     /// What blinds: avalanches, or where it is paralysable all light.
@@ -120,7 +118,6 @@ impl<'r, const K: usize> Spad<'r, K> {
         let has_signed_traps = law.afterpulses > 0.0 && !law.paralysable;
         Spad {
             dead: law,
-            h,
             ready,
             blinding: history(blinding),
             fired: Dual::ZERO,

@@ -434,6 +434,13 @@ fn echoes_that_are_no_pulse_are_wide_or_told() {
         (Some(WalkLeft::NotOneEcho), None)
     );
     assert_eq!(found.position_bins, found.peak.position_bins);
+    // Nor are bins that go up and down.
+    let mut uneven = [20u32; 16];
+    uneven[5..10].copy_from_slice(&[400, 100, 420, 100, 400]);
+    assert_eq!(
+        finder.find(&uneven).unwrap().walk_left,
+        Some(WalkLeft::NotOneEcho)
+    );
     // What is left of a strong echo that came before the window looks like a weak one.
     let before = of(EchoLight {
         position_bins: -1.4,
@@ -471,6 +478,8 @@ fn what_keeps_range_walk_in_is_named() {
     counts[3..5].copy_from_slice(&[300, 200]);
     let found = finder(&sensor, 520).find_in(&counts, &[1.0; 8]).unwrap();
     assert_eq!(found.walk_left, Some(WalkLeft::DelayLine));
+    let names = std::collections::BTreeSet::from(WalkLeft::ALL.map(WalkLeft::name));
+    assert!(names.len() == WalkLeft::ALL.len() && !names.contains(""));
 }
 
 #[test]
