@@ -226,6 +226,20 @@ mod tests {
         }
     }
 
+    #[test]
+    fn of_two_directions_the_longer_limit_is_meant() {
+        for kind in CellKind::ALL {
+            for check in CheckKind::ALL {
+                for corner in Corner::ALL {
+                    let limits = CheckLimits::of(kind);
+                    let either =
+                        [Edge::Rise, Edge::Fall].map(|edge| limits.toward(check, edge, corner));
+                    assert_eq!(Some(&limits.at(check, corner)), either.iter().max());
+                }
+            }
+        }
+    }
+
     /// A flip-flop that drives its own D (a toggle) or its neighbour's (a shift register) holds by construction.
     #[test]
     fn hold_is_shorter_than_clock_to_q_in_every_corner() {

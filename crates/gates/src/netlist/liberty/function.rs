@@ -216,6 +216,14 @@ mod tests {
     }
 
     #[test]
+    fn brackets_stand_64_deep_and_as_often_as_one_likes() {
+        let of_a = |text: &str| truth_table(text, &["A"]);
+        let deep = |depth: usize| format!("{}A{}", "(".repeat(depth), ")".repeat(depth));
+        assert_eq!((of_a(&deep(64)), of_a(&deep(65))), (of_a("A"), None));
+        assert_eq!(of_a(&vec!["(A)"; 200].join("*")), of_a("A"));
+    }
+
+    #[test]
     fn unateness_and_literals_follow() {
         let xor = truth_table("A ^ B", &["A", "B"]).unwrap();
         assert_eq!(xor.unate(0), (true, true));

@@ -330,7 +330,16 @@ mod tests {
         }
         let library = read("library (l) {\n area : wide; }").unwrap();
         assert!(library.number("area").unwrap_err().message.contains("wide"));
-        let deep = format!("library (l) {{ {}", "g () { ".repeat(10_000));
-        assert!(read(&deep).unwrap_err().message.contains("deep"));
+        let deep = |groups: usize| {
+            format!(
+                "library (l) {{ {}{} }}",
+                "g () { ".repeat(groups),
+                "}".repeat(groups)
+            )
+        };
+        assert!(read(&deep(DEEPEST)).is_ok());
+        for groups in [DEEPEST + 1, 10_000] {
+            assert!(read(&deep(groups)).unwrap_err().message.contains("deep"));
+        }
     }
 }
