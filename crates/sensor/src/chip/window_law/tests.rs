@@ -34,6 +34,10 @@ fn a_start_value_beyond_the_laser_cycle_never_opens() {
     assert!(short.window(98).open().is_some());
     assert_eq!(short.window(99), Window::Never);
     assert_eq!(short.window(511), Window::Never);
+    // The last one serves all that it collects, half a window beyond its centre too.
+    let last = short.interval(&short.window(98).open().unwrap());
+    assert_eq!(short.start_for(last.end - Time::from_fs(1)), Some(98));
+    assert_eq!(short.start_for(last.end), None);
 }
 
 #[test]
