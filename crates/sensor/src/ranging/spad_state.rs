@@ -84,8 +84,10 @@ impl<'r, const K: usize> Spad<'r, K> {
             let traps = bred * law.afterpulses;
             match law.paralysable {
                 false => {
-                    // A photon before it is released leaves it trapped for another dead time.
-                    let lost = light * (1.0 - kept) + Dual::constant(1.0 / tau);
+                    // Light before they are released keeps them trapped for another dead time, beside those that it traps anew.
+                    let lost = light * (1.0 - kept)
+                        + background * (law.afterpulses * kept)
+                        + Dual::constant(1.0 / tau);
                     trapped = traps * lost.recip();
                     fired = (light + trapped * (1.0 / tau))
                         * (Dual::constant(1.0) + light * dead).recip();
@@ -101,7 +103,10 @@ impl<'r, const K: usize> Spad<'r, K> {
             ready = Dual::constant(1.0) - fired * dead;
         }
         let traps = match law.paralysable {
-            false => background * ready * law.afterpulses + trapped * light * kept,
+            false => {
+                let still = (light - background * law.afterpulses) * kept;
+                background * ready * law.afterpulses + trapped * still
+            }
             true => background * ready * law.afterpulses,
         };
         let blinding = match law.paralysable {
