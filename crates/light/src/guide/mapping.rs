@@ -258,7 +258,8 @@ mod tests {
     /// At the ends of what it measures, pixels of the two cameras are as far apart as its disparities reach.
     #[test]
     fn a_rig_says_between_which_ranges_it_measures() {
-        let scene = Scene::outdoor();
+        let mut scene = Scene::outdoor();
+        scene.stereo.baseline_m = 0.7;
         let (stereo, camera) = (&scene.stereo, scene.stereo.camera());
         let reach = BehaviouralStereo.reach(&scene).unwrap();
         let ends_m: Vec<f64> = reach

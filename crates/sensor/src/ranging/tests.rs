@@ -498,6 +498,18 @@ fn full_bins_are_told_from_peaks() {
     counts[8] = 30;
     assert!(!saturated(&counts));
     assert_eq!(finder.find(&[0; 16]), None);
+    // Where light makes bins count less, those beside an echo are full.
+    let config = SensorConfig {
+        event_type: EventType::Less,
+        threshold: 1,
+        ..bench.config
+    };
+    let finder = self::finder(&config, 520);
+    let mut counts = [31; 16];
+    counts[7..10].copy_from_slice(&[20, 3, 18]);
+    assert!(finder.find(&counts).unwrap().is_saturated);
+    let counts = counts.map(|n| n.min(30));
+    assert!(!finder.find(&counts).unwrap().is_saturated);
 }
 
 /// SPADs that strong light paralyses at the window's first edges count almost as they would under a weaker echo: the fit from
