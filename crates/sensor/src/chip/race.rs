@@ -320,7 +320,7 @@ mod tests {
             };
             let longer = (period..).find(|&longer| !meets(longer, edges)).unwrap();
             prop_assert!((longer..=longer + 5).contains(&at_least.as_fs()), "{} {at_least:?}", longer);
-            // A run of free periods, next below those that meet this edge.
+            // A run of free periods, next below those that meet this edge. A cure keeps ROUNDING, 4 fs, from either end of it.
             let shorter = (1..period).rev().find(|&shorter| !meets(shorter, edges)).unwrap_or(0);
             let free = (shortest + 1..=shorter).rev().take_while(is_free).count();
             prop_assert!(at_most.is_some() || free < 12, "{free} periods up to {shorter}");

@@ -195,31 +195,4 @@ impl EchoFinder {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::chip::{Exposure, SensorConfig};
-    use crate::ranging::EchoLight;
-    use crate::units::Time;
-
-    #[test]
-    fn an_echo_is_lost_where_it_is_strong_and_its_place_open() {
-        let law = WindowLaw::new(
-            SensorConfig::default(),
-            &Exposure::new(&SensorConfig::default(), 520, 1000),
-        );
-        let finder = EchoFinder::new(&law, Time::from_ps(1_911), &DepthOptions::default()).unwrap();
-        let is_lost = |signal: f64, bound_bins: f64| {
-            let light = EchoLight {
-                position_bins: 7.0,
-                signal,
-                background_per_bin: 0.02,
-                sigma_bins: 0.74,
-            };
-            finder.is_lost(&Corrected { light, bound_bins })
-        };
-        // A photon for every SPAD, and a quarter of a bin.
-        let found = [(15.9, 0.26), (16.1, 0.26), (16.1, 0.24)]
-            .map(|(signal, bound)| is_lost(signal, bound));
-        assert_eq!(found, [false, true, false]);
-    }
-}
+mod tests;

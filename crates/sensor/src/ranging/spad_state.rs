@@ -51,7 +51,7 @@ struct Traps<const K: usize> {
     trapped: Dual<K>,
     /// The share of carriers that stay trapped for a dead time.
     kept: f64,
-    /// The share that would be released in a step, were it even.
+    /// A step over the time constant with which they are released.
     release: f64,
 }
 
@@ -61,7 +61,7 @@ struct Parity<const K: usize> {
     ready: Dual<K>,
     blind: Dual<K>,
     blinding: History<K>,
-    /// Where afterpulses turn the flip-flop back.
+    /// Where afterpulses are not light, but avalanches of their own that turn the flip-flop.
     traps: Option<Traps<K>>,
 }
 
@@ -120,7 +120,6 @@ impl<'r, const K: usize> Spad<'r, K> {
             kept,
             release: h / tau,
         };
-        let has_signed_traps = law.afterpulses > 0.0 && !law.paralysable;
         Spad {
             dead: law,
             ready,
@@ -131,26 +130,20 @@ impl<'r, const K: usize> Spad<'r, K> {
                 && !law.paralysable
                 && law.afterpulses == 0.0
                 && law.crosstalk == 0.0,
-            parity: (dead < 1.0).then(|| Parity {
-                ready,
-                blind: Dual::constant(1.0) - ready,
-                blinding: history(blinding),
-                traps: has_signed_traps.then(|| traps.clone()),
-            }),
+            parity: None,
             traps,
         }
     }
 
     pub(super) fn begin_bin(&mut self) {
         (self.fired, self.by_crosstalk) = (Dual::ZERO, Dual::ZERO);
-        if let Some(parity) = &mut self.parity {
-            parity.ready = self.ready;
-            parity.blind = Dual::constant(1.0) - self.ready;
-            parity.blinding = self.blinding.clone();
-            if let Some(traps) = &mut parity.traps {
-                *traps = self.traps.clone();
-            }
-        }
+        let has_traps = self.dead.afterpulses > 0.0 && !self.dead.paralysable;
+        self.parity = (self.dead.time_bins < 1.0).then(|| Parity {
+            ready: self.ready,
+            blind: Dual::constant(1.0) - self.ready,
+            blinding: self.blinding.clone(),
+            traps: has_traps.then(|| self.traps.clone()),
+        });
     }
 
     /// A step with `photons` photons on the SPAD.
@@ -184,8 +177,10 @@ impl<'r, const K: usize> Spad<'r, K> {
         let mut fired = self.avalanches(light, recovering);
         // Avalanches of light, without those of afterpulses that came first.
         let mut by_light = fired;
+        // The share of what light fires that traps carriers.
+        let mut breeding = Dual::ZERO;
         if has_traps && !dead.paralysable {
-            let breeding = photons * positive(light).recip() * dead.afterpulses;
+            breeding = photons * positive(light).recip() * dead.afterpulses;
             let (released, lost) = self.traps.released(light, breeding, fired, 1.0);
             fired += released - lost;
             by_light = fired - released;
@@ -195,7 +190,6 @@ impl<'r, const K: usize> Spad<'r, K> {
             self.traps.trapping.push(bred * dead.afterpulses);
         }
         if let Some(parity) = &mut self.parity {
-            let breeding = photons * positive(light).recip() * dead.afterpulses;
             parity.step(dead.paralysable, light, breeding, self.ready);
         }
         match dead.paralysable {
@@ -291,7 +285,7 @@ fn positive<const K: usize>(mut number: Dual<K>) -> Dual<K> {
 }
 
 impl<const K: usize> Parity<K> {
-    /// A step with so much light on a SPAD that was ready with chance `was_ready`.
+    /// A step with so much light, a share `breeding` of whose avalanches traps carriers, on a SPAD that was ready with chance `was_ready`.
     fn step(&mut self, paralysable: bool, light: Dual<K>, breeding: Dual<K>, was_ready: Dual<K>) {
         let missed = light.exprel_neg();
         let mut recovering = self.blinding.ending();

@@ -1,12 +1,11 @@
 //! Depths from simulated light: false alarms as often as stated, mean histograms as computed, range walk taken out to the
-//! bound of the counts, and reasons where it is not.
+//! bound of the counts.
 
 use proptest::prelude::*;
 
 use super::*;
-use crate::chip::hslidar_delay_line;
 use crate::chip::window_law::OpenWindow;
-use crate::chip::{EventType, Exposure, FrontEnd, SensorConfig, WindowLaw};
+use crate::chip::{EventType, Exposure, SensorConfig, WindowLaw};
 use crate::engine::{LitPixel, Window, expose, stream_config};
 use crate::photon::{PhotonStream, PixelLight};
 use crate::units::{Time, TimeOfFlight};
@@ -327,12 +326,6 @@ fn range_walk_is_taken_out_whatever_the_spads() {
     assert_right(&noisy, 4000, 3.0, 60);
 }
 
-/// A finder for the default exposure of 1000 laser cycles.
-fn finder(config: &SensorConfig, stop_periods: u32) -> EchoFinder {
-    let law = WindowLaw::new(config, &Exposure::new(config, stop_periods, 1000));
-    EchoFinder::new(&law, PULSE_SIGMA, &DepthOptions::default()).unwrap()
-}
-
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
@@ -376,177 +369,5 @@ proptest! {
             let share = if threshold == 0 { 0.5 } else { 1.0 };
             prop_assert!(off < 1e-3 + share * found.bound_bins, "{light:?} {found:?}");
         }
-    }
-}
-
-#[test]
-fn echoes_that_are_no_pulse_are_wide_or_told() {
-    let config = SensorConfig::default();
-    let finder = finder(&config, 520);
-    let response = Response::new(&config, finder.bin_s, PULSE_SIGMA);
-    let of = |light: EchoLight| -> Vec<u32> {
-        response
-            .chances(&light)
-            .iter()
-            .map(|p| (1000.0 * p).round() as u32)
-            .collect()
-    };
-    let sigma_bins = response.pulse_sigma_bins;
-    let echo = EchoLight {
-        position_bins: 6.3,
-        signal: 2.0,
-        background_per_bin: 0.02,
-        sigma_bins,
-    };
-    let found = finder
-        .find(&of(EchoLight {
-            sigma_bins: 2.0 * sigma_bins,
-            ..echo
-        }))
-        .unwrap();
-    let light = found.light.expect("a wide echo");
-    assert!(
-        (light.sigma_bins / sigma_bins - 2.0).abs() < 0.1,
-        "{light:?}"
-    );
-    assert!((light.position_bins - 6.3).abs() < 0.02, "{light:?}");
-    // Another echo besides is not the first one's.
-    let both: Vec<u32> = of(echo)
-        .iter()
-        .zip(of(EchoLight {
-            position_bins: 12.5,
-            signal: 0.5,
-            ..echo
-        }))
-        .map(|(a, b)| a + b - 20)
-        .collect();
-    let found = finder.find(&both).unwrap();
-    assert!(
-        (found.position_bins - 6.3).abs() < 0.03 && found.bound_bins.is_some(),
-        "{found:?}"
-    );
-    // A road deeper than the window is no echo.
-    let mut deep = [20u32; 16];
-    deep[3..10].fill(400);
-    let found = finder.find(&deep).unwrap();
-    assert_eq!(
-        (found.walk_left, found.bound_bins),
-        (Some(WalkLeft::NotOneEcho), None)
-    );
-    assert_eq!(found.position_bins, found.peak.position_bins);
-    // Nor are bins that go up and down.
-    let mut uneven = [20u32; 16];
-    uneven[5..10].copy_from_slice(&[400, 100, 420, 100, 400]);
-    assert_eq!(
-        finder.find(&uneven).unwrap().walk_left,
-        Some(WalkLeft::NotOneEcho)
-    );
-    // What is left of a strong echo that came before the window looks like a weak one.
-    let before = of(EchoLight {
-        position_bins: -1.4,
-        signal: 100.0,
-        ..echo
-    });
-    let found = finder.find(&before).unwrap();
-    let is_right = (found.position_bins + 1.4).abs() < 4.0 * found.bound_bins.unwrap_or(0.0);
-    assert!(
-        is_right || found.walk_left == Some(WalkLeft::Ambiguous),
-        "{found:?}"
-    );
-}
-
-#[test]
-fn what_keeps_range_walk_in_is_named() {
-    let mut counts = [20u32; 16];
-    counts[6..9].copy_from_slice(&[150, 400, 150]);
-    let default = SensorConfig::default;
-    let joined = SensorConfig {
-        front_end: FrontEnd::OrTree,
-        ..default()
-    };
-    let walk_left = |config: &SensorConfig, stop_periods| {
-        finder(config, stop_periods)
-            .find(&counts)
-            .unwrap()
-            .walk_left
-    };
-    assert_eq!(walk_left(&default(), 520), None);
-    assert_eq!(walk_left(&joined, 520), Some(WalkLeft::JoinedSpads));
-    assert_eq!(walk_left(&default(), 18), Some(WalkLeft::ShortLaserCycle));
-    let sensor = hslidar_delay_line();
-    let mut counts = [20u32; 8];
-    counts[3..5].copy_from_slice(&[300, 200]);
-    let found = finder(&sensor, 520).find_in(&counts, &[1.0; 8]).unwrap();
-    assert_eq!(found.walk_left, Some(WalkLeft::DelayLine));
-    let names = std::collections::BTreeSet::from(WalkLeft::ALL.map(WalkLeft::name));
-    assert!(names.len() == WalkLeft::ALL.len() && !names.contains(""));
-}
-
-#[test]
-fn full_bins_are_told_from_peaks() {
-    let config = SensorConfig {
-        bin_bits: 5,
-        ..SensorConfig::default()
-    };
-    let bench = Bench::new(config, 1000, 60.0);
-    let finder = EchoFinder::new(&bench.law, PULSE_SIGMA, &DepthOptions::default()).unwrap();
-    let saturated = |counts: &[u32]| finder.find(counts).unwrap().is_saturated;
-    assert!(saturated(&[31; 16]));
-    let mut counts = [2; 16];
-    counts[7..10].copy_from_slice(&[20, 31, 18]);
-    assert!(saturated(&counts));
-    counts[8] = 30;
-    assert!(!saturated(&counts));
-    assert_eq!(finder.find(&[0; 16]), None);
-    // Where light makes bins count less, those beside an echo are full.
-    let config = SensorConfig {
-        event_type: EventType::Less,
-        threshold: 1,
-        ..bench.config
-    };
-    let finder = self::finder(&config, 520);
-    let mut counts = [31; 16];
-    counts[7..10].copy_from_slice(&[20, 3, 18]);
-    assert!(finder.find(&counts).unwrap().is_saturated);
-    let counts = counts.map(|n| n.min(30));
-    assert!(!finder.find(&counts).unwrap().is_saturated);
-}
-
-/// SPADs that strong light paralyses at the window's first edges count almost as they would under a weaker echo: the fit from
-/// one start ends there and explains nothing.
-#[test]
-fn strong_light_is_sought_in_more_than_one_place() {
-    for (dead_time_ns, position_bins, signal) in [
-        (1.3, -0.1, 600.0),
-        (1.3, -0.01, 600.0),
-        (1.5, -0.1, 413.0),
-        (1.5, -0.2, 600.0),
-    ] {
-        let config = SensorConfig {
-            dead_time_ns,
-            paralysable: true,
-            afterpulse_probability: 0.05,
-            crosstalk_probability: 0.04,
-            ..SensorConfig::default()
-        };
-        let finder = finder(&config, 520);
-        let response = Response::new(&config, finder.bin_s, PULSE_SIGMA);
-        let light = EchoLight {
-            position_bins,
-            signal,
-            background_per_bin: 0.006,
-            sigma_bins: response.pulse_sigma_bins,
-        };
-        let counts: Vec<u32> = response
-            .chances(&light)
-            .iter()
-            .map(|p| (1000.0 * p).round() as u32)
-            .collect();
-        let found = finder.find(&counts).unwrap();
-        let off = (found.position_bins - position_bins).abs();
-        assert!(
-            found.walk_left.is_none() && off < 0.002,
-            "{light:?} {found:?}"
-        );
     }
 }
