@@ -396,3 +396,6 @@ impl From<Fit> for Corrected {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
