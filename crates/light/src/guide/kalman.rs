@@ -187,6 +187,41 @@ mod tests {
             .collect()
     }
 
+    /// A prediction's covariance is F·P·Fᵀ + q·g·gᵀ with F = [1 dt; 0 1] and g = [dt²/2, dt].
+    #[test]
+    fn covariances_grow_as_a_random_acceleration_makes_them() {
+        let guide = Kalman::default();
+        for (dt_s, [rr, rv, vv]) in [
+            (0.1, [0.3, 0.2, 4.0]),
+            (2.0, [1.0, -0.5, 0.7]),
+            (0.7, [2.0, 1.1, 9.0]),
+        ] {
+            let track = Track {
+                range_m: 40.0,
+                speed_m_s: -3.0,
+                covariance: [rr, rv, vv],
+            };
+            let (predicted, _) = guide.predict(&track, DVec3::Z, DVec3::ZERO, dt_s);
+            let (of_r, of_v) = ([1.0, dt_s], [0.0, 1.0]);
+            let carried = |a: [f64; 2], b: [f64; 2]| {
+                a[0] * b[0] * rr + (a[0] * b[1] + a[1] * b[0]) * rv + a[1] * b[1] * vv
+            };
+            let pushed = |a: f64, b: f64| guide.acceleration_m_s2 * a * guide.acceleration_m_s2 * b;
+            let (g_r, g_v) = (0.5 * dt_s * dt_s, dt_s);
+            let wanted = [
+                carried(of_r, of_r) + pushed(g_r, g_r),
+                carried(of_r, of_v) + pushed(g_r, g_v),
+                carried(of_v, of_v) + pushed(g_v, g_v),
+            ];
+            for (found, wanted) in predicted.covariance.iter().zip(wanted) {
+                assert!(
+                    (found - wanted).abs() < 1e-12 * wanted.abs().max(1.0),
+                    "{dt_s} s: {found} {wanted}"
+                );
+            }
+        }
+    }
+
     /// Targets that accelerate at random, as the filter assumes, measured with its error: predictions are off by what it claims.
     #[test]
     fn predictions_have_the_error_that_the_filter_claims() {

@@ -218,6 +218,110 @@ mod tests {
         }
     }
 
+    /// Pixels that land nowhere at any depth are left out, and no others: against every depth from the nearest on, in small steps.
+    #[test]
+    fn pixels_are_left_out_that_land_nowhere() {
+        let mut scene = perfect_wall(60.0);
+        for position_m in [
+            DVec3::ZERO,
+            DVec3::new(-0.5, 0.1, 0.3),
+            DVec3::new(0.3, -0.4, 0.0),
+        ] {
+            scene.stereo.position_m = position_m;
+            let rig = StereoRig::new(&scene, 0);
+            let lidar = scene.lidar_camera(32, 48);
+            let nearest_m = rig.focal_baseline_px_m() / scene.stereo.max_disparity_px;
+            let (mut in_view, mut beside) = (0, 0);
+            for (row, col) in (5..rig.camera.height)
+                .step_by(29)
+                .flat_map(|row| (3..rig.camera.width).step_by(17).map(move |col| (row, col)))
+            {
+                let direction = rig
+                    .camera
+                    .at_unit_depth((f64::from(col) + 0.5, f64::from(row) + 0.5));
+                let depths_m = (0..=600)
+                    .map(|step| nearest_m * libm::pow(1e9 / nearest_m, f64::from(step) / 600.0));
+                let lands = depths_m.into_iter().any(|depth_m| {
+                    let at = lidar.project(direction * depth_m + position_m);
+                    at.and_then(|at| lidar.pixel_at(at)).is_some()
+                });
+                let may = may_land(&scene, &lidar, &rig, (row, col));
+                assert!(may || !lands, "{row}, {col} lands and is left out");
+                in_view += usize::from(lands);
+                beside += usize::from(may && !lands);
+            }
+            // At the corners, a way may pass by that the ends' box does not.
+            assert!(
+                beside * 100 <= in_view && in_view > 500,
+                "{beside} beside {in_view}"
+            );
+        }
+    }
+
+    #[test]
+    fn three_pixels_are_measured_across_a_macropixel_from_half_a_stride_on() {
+        let scene = perfect_wall(60.0);
+        let rig = StereoRig::new(&scene, 0);
+        for (rows, cols) in [(16, 16), (32, 64), (64, 32), (1000, 1000)] {
+            let lidar = scene.lidar_camera(rows, cols);
+            let across = rig.camera.focal_px / lidar.focal_px.max(lidar.focal_v_px);
+            let wanted = ((across / 3.0) as u32).max(1);
+            assert_eq!(stride(&rig, &lidar), wanted);
+        }
+        assert_eq!(offsets(14, 4).collect::<Vec<_>>(), [2, 6, 10]);
+        assert_eq!(offsets(8, 5).collect::<Vec<_>>(), [2, 7]);
+        assert_eq!(offsets(3, 1).collect::<Vec<_>>(), [0, 1, 2]);
+    }
+
+    /// A point's place in its macropixel, its range, and what a metre along the camera's ray changes of that.
+    #[test]
+    fn a_point_lands_where_it_is_seen() {
+        let mut scene = perfect_wall(60.0);
+        scene.stereo.position_m = DVec3::new(-4.0, 1.0, 2.0);
+        let lidar = scene.lidar_camera(32, 48);
+        let rig = StereoRig::new(&scene, 0);
+        let mut landed = 0;
+        for (row, col) in (100..1000)
+            .step_by(35)
+            .flat_map(|row| (100..1400).step_by(35).map(move |col| (row, col)))
+        {
+            let direction = rig
+                .camera
+                .at_unit_depth((f64::from(col) + 0.5, f64::from(row) + 0.5));
+            let at_depth = |depth_m: f64| StereoPoint {
+                row,
+                col,
+                disparity_px: 1.0,
+                depth_m,
+                point_m: direction * depth_m,
+            };
+            let Some(landing) = land(&scene, &lidar, &at_depth(12.0), 0.2) else {
+                continue;
+            };
+            landed += 1;
+            let range_m = |depth_m: f64| (direction * depth_m + scene.stereo.position_m).length();
+            let (u, v) = lidar
+                .project(direction * 12.0 + scene.stereo.position_m)
+                .expect("in view");
+            assert_eq!(landing.index, v as usize * 48 + u as usize);
+            let Sample {
+                at,
+                inverse,
+                sigma,
+                is_rim,
+            } = landing.sample;
+            assert!(
+                (at[0] - (u.fract() - 0.5)).abs() < 1e-9
+                    && (at[1] - (v.fract() - 0.5)).abs() < 1e-9
+            );
+            assert!((inverse * range_m(12.0) - 1.0).abs() < 1e-12 && !is_rim);
+            let per_m = (range_m(12.001) - range_m(11.999)) / 0.002;
+            let wanted = 0.2 * per_m / range_m(12.0).powi(2);
+            assert!((sigma / wanted - 1.0).abs() < 1e-6, "{sigma} {wanted}");
+        }
+        assert!(landed > 20, "{landed}");
+    }
+
     #[test]
     fn the_street_is_guided_almost_everywhere_but_in_the_sky() {
         let scene = Scene::outdoor();

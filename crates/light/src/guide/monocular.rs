@@ -143,6 +143,28 @@ mod tests {
         assert!((half_way - expected).abs() < 0.07, "{half_way}");
         let down = correlation([(8, 16), (12, 16)]);
         assert!((down - expected).abs() < 0.07, "{down}");
+        // In the middle of a patch all four corners weigh the same, a quarter of it on they do not.
+        let within = |down: f64, right: f64| {
+            let weights = [
+                (1.0 - down) * (1.0 - right),
+                (1.0 - down) * right,
+                down * (1.0 - right),
+                down * right,
+            ];
+            weights.map(|w| w / weights.iter().map(|w| w * w).sum::<f64>().sqrt())
+        };
+        for (row, col) in [(12, 20), (10, 20), (14, 18)] {
+            let [nearest, .., farthest] =
+                within(f64::from(row - 8) / 8.0, f64::from(col - 16) / 8.0);
+            for (corner, weight) in [((8, 16), nearest), ((16, 24), farthest)] {
+                let found = correlation([corner, (row, col)]);
+                let expected = SHARES[0] + SHARES[1] * weight;
+                assert!(
+                    (found - expected).abs() < 0.07,
+                    "{row}, {col}: {found} {expected}"
+                );
+            }
+        }
     }
 
     proptest! {
@@ -163,6 +185,46 @@ mod tests {
             let of_far_m = guide.claim_m(guide.farthest_m, sigma_per_m);
             let linear_m = guide.farthest_m * guide.farthest_m * sigma_per_m;
             prop_assert!((of_far_m - linear_m).abs() < 1e-9 * linear_m);
+        }
+    }
+
+    /// Every macropixel's estimate and claim, by the definition: inverse depth with its own error, and the depth's claim along its ray.
+    #[test]
+    fn estimates_are_the_walls_inverse_depth_with_their_error() {
+        let (scene, guide, depth_m) = (
+            wall_at(40.0),
+            Monocular {
+                times_stereo: 3.0,
+                ..Monocular::default()
+            },
+            40.0,
+        );
+        let (rows, cols) = (24, 40);
+        let map = guide
+            .estimate(&GuideInput::still(&scene, rows, cols, 7))
+            .unwrap();
+        let truth = GroundTruth::render(&scene, rows, cols);
+        let sigma_per_m = 3.0 * StereoRig::new(&scene, 0).depth_sigma_m(1.0);
+        for pixel in 0..(rows * cols) as usize {
+            let (row, col) = (pixel as u32 / cols, pixel as u32 % cols);
+            // The wall is square to the axis, so that a ray is so much longer than the wall is far.
+            let longer = truth.range_m[pixel].expect("a wall") / depth_m;
+            let found_m = 1.0 / (1.0 / depth_m + sigma_per_m * guide.error(7, row, col));
+            let wanted = (
+                found_m * longer,
+                guide.claim_m(found_m, sigma_per_m) * longer,
+            );
+            let (range_m, sigma_m) = map.estimate_of(pixel).expect("an estimate");
+            assert!(
+                (range_m / wanted.0 - 1.0).abs() < 1e-6,
+                "{row}, {col}: {range_m} {}",
+                wanted.0
+            );
+            assert!(
+                (sigma_m / wanted.1 - 1.0).abs() < 1e-5,
+                "{row}, {col}: {sigma_m} {}",
+                wanted.1
+            );
         }
     }
 

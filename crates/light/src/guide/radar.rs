@@ -224,6 +224,79 @@ mod tests {
         assert!((0.85..1.15).contains(&variance), "{variance}");
     }
 
+    /// Rays are spread evenly over their beam, and none is another beam's.
+    #[test]
+    fn rays_fill_their_beam() {
+        let radar = Radar::default();
+        let scene = wall_at(50.0);
+        for beam in [(0, 0), (3, -1), (-2, 2)] {
+            let echoes = radar.echoes(&Stage::of(&scene), beam);
+            assert_eq!(echoes.len() as u32, RAYS_ACROSS * RAYS_ACROSS);
+            // A wall is met at 50 m over the cosine of the angle off the axis; so are all rays of the beam's grid.
+            let angle = |beam: i32, n: u32, width_deg: f64| {
+                ((f64::from(beam) + (f64::from(n) + 0.5) / 16.0 - 0.5) * width_deg).to_radians()
+            };
+            let rays = (0..16).flat_map(|row| (0..16).map(move |col| (row, col)));
+            for (echo, (row, col)) in echoes.iter().zip(rays) {
+                let cosine =
+                    libm::cos(angle(beam.1, row, 4.0)) * libm::cos(angle(beam.0, col, 2.0));
+                assert!((echo.range_m * cosine / 50.0 - 1.0).abs() < 1e-9);
+                assert!((echo.power / (cosine / echo.range_m).powi(2) - 1.0).abs() < 1e-9);
+            }
+        }
+    }
+
+    /// By hand: a car in one cell and a road in two that are one run. Each cell weighs with power·r², a run once more as a plane
+    /// across the beam, whose cells have solid angles that go as 1/r².
+    #[test]
+    fn a_claim_weighs_what_fills_the_beam() {
+        let echo = |range_m: f64, power: f64| Echo { range_m, power };
+        let echoes = [
+            echo(50.2, 1e-5),
+            echo(20.1, 4e-7),
+            echo(20.3, 4e-7),
+            echo(20.7, 2e-7),
+            echo(50.4, 1e-5),
+        ];
+        let (range_m, variance_m2) = Radar::default().strongest(&echoes).expect("an echo");
+        assert!((range_m - 50.3).abs() < 1e-9);
+        let runs: [&[(f64, f64)]; 2] = [&[(20.2, 8e-7), (20.7, 2e-7)], &[(50.3, 2e-5)]];
+        let (mut total, mut spread) = (0.0, 0.0);
+        for run in runs {
+            let all: f64 = run.iter().map(|(r, _)| 1.0 / (r * r)).sum();
+            for (r, power) in run {
+                let weight = power * r * r + 256.0 / (r * r) / all;
+                total += weight;
+                spread += weight * (r - 50.3) * (r - 50.3);
+            }
+        }
+        assert!(
+            (variance_m2 / (spread / total) - 1.0).abs() < 1e-9,
+            "{variance_m2}"
+        );
+        // Cells farther apart than a tenth of their range are runs of their own; the road then counts twice.
+        let apart = |far_m: f64| {
+            Radar::default()
+                .strongest(&[echo(20.1, 1e-6), echo(far_m, 1e-9)])
+                .expect("an echo")
+                .1
+        };
+        let by_hand = |far_m: f64, runs: f64| {
+            let (near, far) = (1.0 / (20.1 * 20.1), 1.0 / (far_m * far_m));
+            let [of_near, of_far] =
+                [near, far].map(|one| 256.0 * if runs == 2.0 { 1.0 } else { one / (near + far) });
+            let weight = 1e-9 * far_m * far_m + of_far;
+            weight * (far_m - 20.1).powi(2) / (weight + 1e-6 * 20.1 * 20.1 + of_near)
+        };
+        for (far_m, runs) in [(22.1, 1.0), (22.3, 2.0)] {
+            assert!(
+                (apart(far_m) / by_hand(far_m, runs) - 1.0).abs() < 1e-9,
+                "{far_m} m"
+            );
+        }
+        assert_eq!(Radar::default().strongest(&[]), None);
+    }
+
     /// Of the road, which radar hardly sees, macropixels are given the range of what stands on it; the claim holds them all the same.
     #[test]
     fn over_the_street_claims_hold_what_faces_it_and_what_it_grazes() {

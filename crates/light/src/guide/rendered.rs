@@ -244,6 +244,89 @@ mod tests {
         }
     }
 
+    /// What the lidar sees at any distance is in the crop with its margin, and the crop ends there.
+    #[test]
+    fn the_crop_is_what_the_lidar_sees_and_its_margin() {
+        let wall = wall_at(30.0);
+        for (binning, position_m) in [
+            (1, DVec3::new(-0.1, 0.0, 0.0)),
+            (2, DVec3::new(0.4, 0.2, -0.5)),
+            (3, DVec3::new(-0.6, -0.3, 0.1)),
+        ] {
+            let mut scene = wall.clone();
+            scene.stereo.position_m = position_m;
+            let guide = MatchedStereo { binning, ..WHOLE };
+            let crop = guide
+                .crop(&GuideInput::still(&scene, 24, 40, 1))
+                .expect("in view");
+            let (camera, lidar) = (scene.stereo.camera(), scene.lidar_camera(24, 40));
+            let nearest_m =
+                camera.focal_px * scene.stereo.baseline_m / scene.stereo.max_disparity_px;
+            let (mut least, mut most) = ([f64::MAX; 2], [f64::MIN; 2]);
+            for corner in [(0.0, 0.0), (40.0, 0.0), (0.0, 24.0), (40.0, 24.0)] {
+                for step in 0..=60 {
+                    let depth_m = nearest_m * libm::pow(1e6 / nearest_m, f64::from(step) / 60.0);
+                    let (u, v) = camera
+                        .project(lidar.at_unit_depth(corner) * depth_m - position_m)
+                        .expect("before it");
+                    for (axis, at) in [u, v].into_iter().enumerate() {
+                        least[axis] = least[axis].min(at / f64::from(binning));
+                        most[axis] = most[axis].max(at / f64::from(binning));
+                    }
+                }
+            }
+            let searched = (scene.stereo.max_disparity_px / f64::from(binning)).ceil();
+            let size = [camera.width, camera.height].map(|px| f64::from(px / binning));
+            let margin = [8.0 + searched, 8.0];
+            let (first, end) = (
+                [crop.left, crop.top],
+                [crop.left + crop.width, crop.top + crop.height],
+            );
+            for axis in 0..2 {
+                let (first, end) = (f64::from(first[axis]), f64::from(end[axis]));
+                let (wanted, last) = (
+                    (least[axis] - margin[axis]).max(0.0),
+                    (most[axis] + 8.0).min(size[axis]),
+                );
+                assert!(
+                    first <= wanted && wanted < first + 1.0,
+                    "{binning}, {axis}: {first}, not {wanted}"
+                );
+                assert!(
+                    last <= end && end < last + 1.0,
+                    "{binning}, {axis}: {end}, not {last}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn disparities_are_searched_from_infinity_to_the_nearest() {
+        let mut scene = wall_at(30.0);
+        scene.stereo.max_disparity_px = 101.0;
+        for (binning, disparities) in [(1, 103), (2, 53), (3, 36)] {
+            let matcher = MatchedStereo { binning, ..WHOLE }.matcher(&scene);
+            assert_eq!(
+                (matcher.min_disparity, matcher.disparities),
+                (0, disparities)
+            );
+        }
+        scene.stereo.max_disparity_px = 400.0;
+        assert_eq!(WHOLE.matcher(&scene).disparities, 256);
+        for (paths, wanted) in [
+            (3, Paths::Three),
+            (4, Paths::Four),
+            (5, Paths::Five),
+            (6, Paths::Eight),
+            (8, Paths::Eight),
+        ] {
+            assert_eq!(
+                MatchedStereo { paths, ..WHOLE }.matcher(&scene).paths,
+                wanted
+            );
+        }
+    }
+
     #[test]
     fn every_macropixel_before_a_wall_is_guided_to_it() {
         for binning in [1, 2] {

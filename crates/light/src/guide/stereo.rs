@@ -172,6 +172,56 @@ mod tests {
         }
     }
 
+    /// Eq. 27 with the steps' error, as numbers: sub-pixel steps of a quarter and of one pixel beside 0.25 px.
+    #[test]
+    fn the_claimed_error_has_that_of_the_steps_in_it() {
+        let mut scene = scene_with(vec![wall(30.0, 1e4)]);
+        scene.stereo.disparity_sigma_px = 0.25;
+        for (steps, sigma_px) in [
+            (4, (0.0625f64 + 1.0 / 192.0).sqrt()),
+            (1, (0.0625f64 + 1.0 / 12.0).sqrt()),
+        ] {
+            scene.stereo.subpixel_steps = steps;
+            let rig = StereoRig::new(&scene, 0);
+            let wanted_m = 50.0 * 50.0 * sigma_px / rig.focal_baseline_px_m();
+            assert!((rig.depth_sigma_m(50.0) / wanted_m - 1.0).abs() < 1e-12);
+        }
+    }
+
+    /// A point lies on the ray through the middle of its pixel, and no two pixels of the image err alike.
+    #[test]
+    fn points_lie_behind_the_middle_of_their_pixels() {
+        let scene = scene_with(vec![wall(30.0, 1e4)]);
+        let rig = StereoRig::new(&scene, 3);
+        let mut errors = Vec::new();
+        for (row, col) in (300..420).flat_map(|row| (700..820).map(move |col| (row, col))) {
+            let point = rig.measure(row, col).expect("a wall");
+            let (u, v) = rig
+                .camera
+                .project(point.point_m)
+                .expect("before the camera");
+            assert!(
+                (u - f64::from(col) - 0.5).abs() < 1e-9 && (v - f64::from(row) - 0.5).abs() < 1e-9
+            );
+            errors.push(point.disparity_px);
+        }
+        let (mean, sigma) = mean_and_sigma(&errors);
+        let n = errors.len() as f64;
+        for apart in [1, 120, 121, 119] {
+            let product = |(a, b): (&f64, &f64)| (a - mean) * (b - mean) / (sigma * sigma);
+            let correlation = errors
+                .iter()
+                .zip(&errors[apart..])
+                .map(product)
+                .sum::<f64>()
+                / n;
+            assert!(
+                correlation.abs() < 5.0 / n.sqrt(),
+                "{apart} apart: {correlation}"
+            );
+        }
+    }
+
     #[test]
     fn without_error_depth_is_exact_to_the_sub_pixel_step() {
         let mut scene = scene_with(vec![wall(30.0, 1e4)]);
