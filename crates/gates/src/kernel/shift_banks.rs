@@ -148,3 +148,78 @@ impl ShiftBank {
         self.arrives_fs = None;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::netlist::{Corner, Library, ModuleBuilder, Net};
+
+    /// What a stage of a shift register may have of its own.
+    #[derive(Clone, Copy, PartialEq)]
+    enum Own {
+        Nothing,
+        Clock,
+        Reset,
+        Inverted,
+        Gate,
+        Wire,
+    }
+
+    /// First stages and lengths of the banks of a register of `stages`, one of which has something of its own.
+    fn banks(stages: usize, (odd, own): (usize, Own)) -> Vec<(usize, usize)> {
+        let mut m = ModuleBuilder::new("register");
+        let (d, ck, r) = (m.input("D"), m.input("CK"), m.input("R"));
+        let (other_ck, other_r) = (m.input("CK2"), m.input("R2"));
+        let q = m.output_bus("Q", stages);
+        let qn = (own == Own::Inverted).then(|| m.output("QN"));
+        for stage in 0..stages {
+            let data = if stage == 0 { d } else { q[stage - 1] };
+            let has = |what: Own| stage == odd && own == what;
+            let clock = if has(Own::Clock) { other_ck } else { ck };
+            let reset = if has(Own::Reset) { other_r } else { r };
+            let inverted = qn.filter(|_| stage == odd).unwrap_or(Net::NONE);
+            let name = format!("stage_{stage}");
+            m.cell(
+                &name,
+                CellKind::Dffr,
+                &[data, clock, reset],
+                &[q[stage], inverted],
+            );
+        }
+        if own == Own::Gate {
+            m.gate(CellKind::Inv, &[q[odd]]);
+        }
+        let netlist = Netlist::elaborate(&m.finish().expect("a register"));
+        let mut timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        if own == Own::Wire {
+            timing.set_model(odd, DelayModel::Transport);
+        }
+        let net = |name: &str| netlist.net(name).expect("a net").index() as u32;
+        let banks = ShiftBank::all(&netlist, &timing).into_iter().map(|bank| {
+            let first = bank.cells[0] as usize;
+            let in_order = |all: &[u32]| all.windows(2).all(|pair| pair[1] == pair[0] + 1);
+            assert!(in_order(&bank.cells) && in_order(&bank.nets));
+            assert_eq!(bank.nets[0], net("Q[0]") + first as u32);
+            assert_eq!(bank.nets.len(), bank.cells.len());
+            let data = if first == 0 {
+                net("D")
+            } else {
+                bank.nets[0] - 1
+            };
+            assert_eq!((bank.clock, bank.data), (net("CK"), data));
+            (first, bank.cells.len())
+        });
+        banks.collect()
+    }
+
+    #[test]
+    fn stages_that_are_alike_are_one_bank_from_65_on() {
+        assert_eq!(banks(64, (0, Own::Nothing)), []);
+        assert_eq!(banks(65, (0, Own::Nothing)), [(0, 65)]);
+        assert_eq!(banks(200, (0, Own::Nothing)), [(0, 200)]);
+        // One that is not alike is in no bank; its output is the data of those after it.
+        for own in [Own::Clock, Own::Reset, Own::Inverted, Own::Gate, Own::Wire] {
+            assert_eq!(banks(200, (70, own)), [(0, 70), (71, 129)]);
+        }
+    }
+}
