@@ -236,6 +236,66 @@ fn the_widest_echo_has_ends_in_the_window() {
     assert_eq!(walk.widest(), 4.5);
 }
 
+/// Mean histograms of 32 lights for each TYPE and THRESHOLD: none is explained by a light elsewhere, and few are left.
+#[test]
+fn many_starts_find_strong_light() {
+    for (event_type, threshold, most_left) in [
+        (EventType::Greater, 0, 0),
+        (EventType::Greater, 1, 0),
+        (EventType::Greater, 3, 3),
+        (EventType::Equal, 1, 4),
+    ] {
+        let mut left = 0;
+        for (dead_time_ns, signal, position_bins) in lights() {
+            let config = SensorConfig {
+                event_type,
+                threshold,
+                dead_time_ns,
+                ..SensorConfig::default()
+            };
+            let response = Response::new(&config, 1.0 / config.clk_hz, Time::from_ps(1_911));
+            let walk = WalkCorrection {
+                response,
+                laser_cycles: CYCLES,
+            };
+            let light = EchoLight {
+                position_bins,
+                signal,
+                sigma_bins: response.pulse_sigma_bins,
+                ..fit().light
+            };
+            let chances = response.chances(&light);
+            let counts: Vec<f64> = chances.iter().map(|p| p * f64::from(CYCLES)).collect();
+            let (peak_bin, &signal_counts) = (counts.iter().enumerate().rev())
+                .max_by(|a, b| a.1.total_cmp(b.1))
+                .expect("bins");
+            let peak = Peak {
+                position_bins: peak_bin as f64,
+                peak_bin,
+                signal_counts,
+                background_per_bin: 0.0,
+            };
+            let Ok(found) = walk.correct(&counts, &peak) else {
+                left += 1;
+                continue;
+            };
+            let off = (found.light.position_bins - position_bins).abs();
+            assert!(off < 0.02 + 0.5 * found.bound_bins, "{light:?} {found:?}");
+        }
+        assert!(left <= most_left, "{event_type:?} {threshold}: {left} left");
+    }
+}
+
+/// Dead times, ns, signals and places.
+fn lights() -> impl Iterator<Item = (f64, f64, f64)> {
+    let signals = [2.0, 12.0, 90.0, 700.0];
+    let places = move |(dead, signal)| [0.7, 3.3, 7.9, 12.6].map(|place| (dead, signal, place));
+    let pairs = [2.0, 8.0]
+        .into_iter()
+        .flat_map(move |dead| signals.map(|signal| (dead, signal)));
+    pairs.flat_map(places)
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
