@@ -322,3 +322,24 @@ impl SensorConfig {
         self.pixels() * self.bins * self.bin_bits
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Half and twice the overdrive of 0.70 V, at the alpha-power law's 2.46.
+    #[test]
+    fn a_delay_element_is_slower_the_less_its_control_voltage() {
+        for (delay_control_v, delay_ps) in [(0.55, 6_402.0), (0.70, 2_600.0), (1.0, 1_055.9)] {
+            let config = SensorConfig {
+                delay_control_v,
+                ..SensorConfig::default()
+            };
+            let found_ps = config.delay_element().as_s() * 1e12;
+            assert!(
+                (found_ps / delay_ps - 1.0).abs() < 1e-4,
+                "{delay_control_v} V: {found_ps}"
+            );
+        }
+    }
+}

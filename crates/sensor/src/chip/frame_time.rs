@@ -28,3 +28,26 @@ impl SensorConfig {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_takes_its_readout_and_the_load_that_nothing_hides() {
+        let mut config = SensorConfig::default();
+        let read_s = ReadoutOrder::of(&config).periods() as f64 / config.read_clock().as_hz();
+        let load_s = (config.load_bits() as f64 + 0.5) / config.load_clock().as_hz();
+        assert!((config.readout_time().as_s() / read_s - 1.0).abs() < 1e-9);
+        assert!((config.load_time().as_s() / load_s - 1.0).abs() < 1e-9);
+        let [short, long] = [Time::from_ns(1_000), Time::from_ns(5_000_000)];
+        assert_eq!(config.frame_time(long), long + config.readout_time());
+        assert_eq!(
+            config.frame_time(short),
+            (short + config.readout_time()).max(config.load_time())
+        );
+        config.reset_to_load = true;
+        let behind = config.readout_time() + config.load_time();
+        assert_eq!(config.frame_time(short), short + behind);
+    }
+}

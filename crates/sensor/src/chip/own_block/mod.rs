@@ -68,8 +68,10 @@ impl SensorConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::PathBuf;
+
     use crate::chip::config::AfterBorrow;
-    use crate::chip::{front_end, metdc, p_counter};
+    use crate::chip::{correlation, front_end, metdc, p_counter};
     use crate::netlist::{CellKind, Direction, Module, ModuleBuilder, Net};
 
     #[test]
@@ -121,6 +123,51 @@ mod tests {
         assert!(
             looping.starts_with("mine.json: module mine has a loop of gates at "),
             "{looping}"
+        );
+    }
+
+    /// Blocks are told apart by their file and what it said; a sensor with one that no law describes has none.
+    #[test]
+    fn blocks_are_told_apart_by_their_file_and_text() {
+        let built_in = front_end::circuit(&SensorConfig::default());
+        let block = |file: &str, text: &str| OwnBlock::of(file, built_in.clone(), text);
+        let same = block("mine.json", "a");
+        assert_eq!(same, block("mine.json", "a"));
+        assert_ne!(same, block("other.json", "a"));
+        assert_ne!(same, block("mine.json", "b"));
+        assert_eq!(PathBuf::from(same.clone()), PathBuf::from("mine.json"));
+        let plain = SensorConfig::default();
+        let own = SensorConfig {
+            front_end_block: Some(same.clone()),
+            ..SensorConfig::default()
+        };
+        assert!(plain.own_hashes().iter().all(Option::is_none) && plain.may_have_law());
+        assert_eq!(own.own_hashes().iter().flatten().count(), 1);
+        assert!(own.own_hashes().contains(&same.hash()) && same.hash().is_some());
+        assert_eq!(
+            (plain.lawless_block(), own.lawless_block()),
+            (None, Some("front_end_block"))
+        );
+        assert!(!own.may_have_law());
+    }
+
+    #[test]
+    fn an_event_comes_from_spads() {
+        let built_in = correlation::circuit(16);
+        let event_of = |bus: usize| {
+            let mut m = ModuleBuilder::new("mine");
+            let timed = m.input_bus("SPAD_TIMED", 16);
+            let event_type = m.input_bus("TYPE", 2);
+            m.input_bus("THRESHOLD", 5);
+            let event = m.output("SPAD_EVENT");
+            m.gate_into(CellKind::Inv, &[[timed, event_type][bus][1]], event);
+            let own = OwnBlock::of("mine.json", m.finish().unwrap(), "");
+            CONTRACTS[1].holds(&own, &built_in)
+        };
+        assert_eq!(event_of(0), Ok(()));
+        assert_eq!(
+            event_of(1).unwrap_err(),
+            "mine.json: module mine has a SPAD_EVENT that no SPAD_TIMED changes; make it of gates behind them"
         );
     }
 
