@@ -106,6 +106,36 @@ mod tests {
     }
 
     proptest! {
+        /// Until the arrival comes the share that is asked for, and no more: summed with the part of its bin that lies before it.
+        #[test]
+        fn the_share_of_the_counts_comes_before_the_arrival(
+            counts in proptest::collection::vec(prop_oneof![Just(5u32), 0u32..60], 1..40),
+            fraction in 0.02f64..0.98,
+            before in 0usize..9,
+            after in 0usize..9,
+        ) {
+            let options = ArrivalOptions { before, after, fraction };
+            let most = *counts.iter().max().expect("a bin");
+            let peak_bin = counts.iter().position(|&n| n == most).expect("the highest");
+            let region = peak_bin.saturating_sub(before)..(peak_bin + after + 1).min(counts.len());
+            let mut outside: Vec<u32> = (0..counts.len()).filter(|bin| !region.contains(bin)).map(|bin| counts[bin]).collect();
+            outside.sort_unstable();
+            let n = outside.len();
+            let background = if n == 0 { 0.0 } else { f64::from(outside[(n - 1) / 2] + outside[n / 2]) / 2.0 };
+            let signal = |bin: usize| (f64::from(counts[bin]) - background).max(0.0);
+            let all: f64 = region.clone().map(signal).sum();
+            let found = arrival(&counts, &options);
+            if all == 0.0 {
+                prop_assert_eq!(found, None);
+                return Ok(());
+            }
+            let found = found.expect("a pulse");
+            prop_assert_eq!((found.peak_bin, found.signal_counts, found.background_per_bin), (peak_bin, all, background));
+            let part = |bin: usize| (found.position_bins - (bin as f64 - 0.5)).clamp(0.0, 1.0);
+            let until: f64 = region.map(|bin| part(bin) * signal(bin)).sum();
+            prop_assert!((until - fraction * all).abs() < 1e-9 * all, "{found:?}");
+        }
+
         #[test]
         fn a_shifted_and_brighter_pulse_arrives_as_much_later(
             pulse in proptest::collection::vec(1u32..1000, 1..4),

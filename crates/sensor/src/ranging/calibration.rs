@@ -179,6 +179,15 @@ mod tests {
     }
 
     #[test]
+    fn three_places_are_a_line() {
+        let at = |i: f64| (echo(0, i, 7.0), 2.0 * i + 1.0);
+        let fitted = Calibration::fit(1, &[at(1.0), at(4.0), at(6.0)]).unwrap();
+        assert!((fitted.depth_m(&echo(0, 10.0, 7.0)) - 21.0).abs() < 1e-12);
+        let two = Calibration::fit(1, &[at(1.0), at(4.0), at(4.0)]);
+        assert_eq!(two, Err(CalibrationError::TooFew(0)));
+    }
+
+    #[test]
     fn without_a_spread_of_counts_there_is_no_walk() {
         let echoes: Vec<(Echo, f64)> = (0..5)
             .map(|i| (echo(0, i as f64, 7.0), 2.0 * i as f64 + 1.0))

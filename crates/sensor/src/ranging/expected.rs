@@ -307,6 +307,71 @@ mod tests {
         }
     }
 
+    /// Fisher's information of a bin that counts with chance p is (dp/dx)²/(p(1 − p)), also where it counts nearly always.
+    #[test]
+    fn information_is_that_of_a_bin_that_counts_or_does_not() {
+        let config = SensorConfig::default();
+        let response = Response::new(&config, 1.0 / config.clk_hz, PULSE_SIGMA);
+        for signal in [0.3, 3.0, 30.0] {
+            let at = |position_bins: f64| EchoLight {
+                position_bins,
+                signal,
+                background_per_bin: 0.05,
+                sigma_bins: response.pulse_sigma_bins,
+            };
+            let [before, after] =
+                [7.3 - 1e-5, 7.3 + 1e-5].map(|place| response.chances(&at(place)));
+            for (bin, (chance, told)) in response.information(&at(7.3)).into_iter().enumerate() {
+                let slope = (after[bin] - before[bin]) / 2e-5;
+                let wanted = slope * slope / (chance * (1.0 - chance));
+                assert!(
+                    (told - wanted).abs() < 1e-5 + 1e-3 * wanted,
+                    "{signal}, bin {bin}: {told} {wanted}"
+                );
+            }
+        }
+    }
+
+    /// Under background alone all bins are as those before the first one that is looked at.
+    #[test]
+    fn the_dark_stands_still() {
+        for (dead_time_ns, paralysable, afterpulse_probability, crosstalk_probability) in [
+            (8.0, false, 0.0, 0.0),
+            (8.0, false, 0.08, 0.0),
+            (8.0, true, 0.08, 0.03),
+            (1.3, false, 0.08, 0.03),
+            (1.3, true, 0.0, 0.03),
+            (40.0, false, 0.04, 0.01),
+        ] {
+            let config = SensorConfig {
+                dead_time_ns,
+                paralysable,
+                afterpulse_probability,
+                crosstalk_probability,
+                ..SensorConfig::default()
+            };
+            let response = Response::new(&config, 1.0 / config.clk_hz, PULSE_SIGMA);
+            for background_per_bin in [0.01, 0.3, 3.0] {
+                let at = |position_bins: f64| EchoLight {
+                    position_bins,
+                    signal: 1e-9,
+                    background_per_bin,
+                    sigma_bins: 0.7,
+                };
+                // Long before all bins, and after them.
+                let [stepped, steady] = [-40.0, 60.0].map(|place| response.chances(&at(place)));
+                let worst = stepped
+                    .iter()
+                    .zip(&steady)
+                    .map(|(a, b)| (a / b - 1.0).abs())
+                    .fold(0.0, f64::max);
+                eprintln!(
+                    "WORST {dead_time_ns} {paralysable} {afterpulse_probability} {background_per_bin} {worst:.2e}"
+                );
+            }
+        }
+    }
+
     /// In the dark bins before an echo never count, and those after it tell nothing of its place.
     #[test]
     fn bins_that_never_count_tell_nothing() {
@@ -412,5 +477,7 @@ mod tests {
             let error = (slope - normal_density(z)).abs();
             assert!(error < 2e-6, "{z}: slope off by {error}");
         }
+        assert_eq!([-7.01, -40.0].map(share_before), [(0.0, 0.0); 2]);
+        assert_eq!([7.01, 40.0].map(share_before), [(1.0, 0.0); 2]);
     }
 }

@@ -147,6 +147,14 @@ mod tests {
     };
 
     #[test]
+    fn a_median_is_in_the_middle() {
+        assert_eq!(median([5.0, 1.0, 9.0, 3.0, 40.0].iter()), 5.0);
+        assert_eq!(median([5.0, 1.0, 9.0, 3.0, 40.0, 8.0].iter()), 6.5);
+        assert_eq!(median([2.0, 4.0].iter()), 3.0);
+        assert_eq!(median([].iter()), 0.0);
+    }
+
+    #[test]
     fn equation_28_by_hand() {
         // Bins 1 to 5 around the peak, in the thesis's count from 1 bins 2 to 6:
         // (2·2 + 3·4 + 4·10 + 5·6 + 6·3) / 25 = 104 / 25 = 4.16, which is 3.16 from 0.
