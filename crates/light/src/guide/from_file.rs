@@ -145,6 +145,20 @@ mod tests {
     }
 
     #[test]
+    fn it_is_called_file() {
+        let map = FileMap {
+            source: "here".into(),
+            rows: 1,
+            cols: 1,
+            estimates: vec![None],
+        };
+        assert_eq!(
+            (map.name(), map.reach(&crate::scene::Scene::outdoor())),
+            ("file", None)
+        );
+    }
+
+    #[test]
     fn a_map_comes_as_it_was_written_and_zero_is_no_estimate() {
         let ranges = written(2, 2, &[10.0, 0.0, 30.0, 40.0]);
         let sigmas = written(2, 2, &[0.125, 0.25, 0.5, 0.75]);

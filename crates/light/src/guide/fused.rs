@@ -182,6 +182,41 @@ mod tests {
         assert_eq!(fuse(&[(7.0, 0.0), (7.5, 1.0)]), Some((7.0, 0.0)));
     }
 
+    /// The first guide errs as it does alone, and each other one as alone with a seed that is 2⁴⁸ more.
+    #[test]
+    fn each_guide_has_a_seed_of_its_own() {
+        let scene = wall_at(40.0);
+        let fused = Fused::new(vec![truth(1.0), truth(2.0), truth(1.5)]);
+        let input = GuideInput::still(&scene, 4, 4, 9);
+        let alone = [(1.0, 9), (2.0, 9 + (1 << 48)), (1.5, 9 + (2 << 48))];
+        let alone = alone.map(|(sigma_m, seed)| {
+            truth(sigma_m)
+                .estimate(&GuideInput { seed, ..input })
+                .unwrap()
+        });
+        let together = fused.estimate(&input).unwrap();
+        for pixel in 0..16 {
+            let estimates: Vec<_> = alone
+                .iter()
+                .filter_map(|map| map.estimate_of(pixel))
+                .collect();
+            assert_eq!(
+                (estimates.len(), together.estimate_of(pixel)),
+                (3, fuse(&estimates))
+            );
+        }
+    }
+
+    /// Where no more than half agree, the claim is the spread about what the nearest claims say: by hand.
+    #[test]
+    fn without_a_majority_all_are_in_the_claim() {
+        let (range_m, sigma_m) =
+            fuse(&[(50.0, 1.0), (50.0, 1.0), (20.0, 0.5), (90.0, 2.0)]).unwrap();
+        assert_eq!(range_m, 50.0);
+        let variance = (2.0 * 0.5 + (0.25 + 900.0) + (4.0 + 1600.0)) / 4.0;
+        assert!((sigma_m - f64::sqrt(variance)).abs() < 1e-9, "{sigma_m}");
+    }
+
     #[test]
     fn fused_errors_are_smaller_than_any_and_what_is_claimed() {
         let scene = wall_at(40.0);

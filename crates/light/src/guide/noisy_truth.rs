@@ -64,6 +64,27 @@ mod tests {
         );
     }
 
+    /// The claim of every macropixel, and its draw.
+    #[test]
+    fn errors_have_a_part_that_grows_with_range() {
+        let scene = wall_at(60.0);
+        let guide = NoisyTruth {
+            sigma_m: 0.4,
+            sigma_per_m: 0.01,
+        };
+        let map = guide
+            .estimate(&GuideInput::still(&scene, 16, 16, 3))
+            .unwrap();
+        let truth = GroundTruth::render(&scene, 16, 16);
+        for pixel in 0..256 {
+            let true_m = truth.range_m[pixel].expect("a wall");
+            let (range_m, sigma_m) = map.estimate_of(pixel).expect("an estimate");
+            assert!((sigma_m / (0.16 + 1e-4 * true_m * true_m).sqrt() - 1.0).abs() < 1e-12);
+            let draw = normal(&mut random_stream(3, Purpose::Guide, pixel as u32, DRAWS));
+            assert!((range_m - true_m - sigma_m * draw).abs() < 1e-9);
+        }
+    }
+
     #[test]
     fn without_error_it_is_the_truth_and_the_sky_has_none() {
         let scene = Scene::outdoor();

@@ -215,6 +215,8 @@ mod tests {
         }
         assert!(parse_all([], "guide").is_err());
         assert!(parse_all(["stereo"; 9], "guide").is_err());
+        assert!(parse_all(["stereo"; 8], "guide").is_ok());
+        assert_eq!(parse_all(["radar"], "guide").unwrap().name(), "radar");
     }
 
     proptest! {

@@ -71,3 +71,41 @@ impl Guide for MatchedPair {
         ))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::guide::test_scenes::wall_at;
+
+    /// Pictures of a wall at 30 m, of cameras whose principal points are 4 px apart: every macropixel is guided to it, with Eq. 27's claim.
+    #[test]
+    fn matched_points_guide_to_their_depth() {
+        let scene = wall_at(30.0);
+        let camera = scene.stereo.camera();
+        let baseline_m = scene.stereo.baseline_m;
+        let (width, height) = (camera.width as usize, camera.height as usize);
+        let disparity_px = camera.focal_px * baseline_m / 30.0;
+        let mut px = vec![(disparity_px - 4.0) as f32; width * height];
+        // No answer, and one that is beyond infinity.
+        (px[0], px[1]) = (f32::NAN, -5.0);
+        let map = DisparityMap { width, height, px };
+        let pair = MatchedPair::new(&map, &camera, baseline_m, 4.0, 0.2);
+        assert_eq!((pair.name(), pair.points()), ("pair", width * height - 2));
+        let guided = pair.estimate(&GuideInput::still(&scene, 8, 8, 1)).unwrap();
+        let lidar = scene.lidar_camera(8, 8);
+        for pixel in 0..64 {
+            let (range_m, sigma_m) = guided.estimate_of(pixel).expect("the wall");
+            let centre = ((pixel % 8) as f64 + 0.5, (pixel / 8) as f64 + 0.5);
+            let wanted_m = 30.0 * lidar.at_unit_depth(centre).length();
+            assert!(
+                (range_m / wanted_m - 1.0).abs() < 1e-3,
+                "{pixel}: {range_m} {wanted_m}"
+            );
+            let of_point_m = 30.0 * 30.0 * 0.2 / (camera.focal_px * baseline_m);
+            assert!(
+                (sigma_m / of_point_m - 1.0).abs() < 0.03,
+                "{pixel}: {sigma_m}"
+            );
+        }
+    }
+}

@@ -334,6 +334,19 @@ mod tests {
     }
 
     #[test]
+    fn it_says_how_far_it_reaches() {
+        let reach = Radar {
+            reach_m: 90.0,
+            ..Radar::default()
+        }
+        .reach(&Scene::outdoor());
+        assert_eq!(
+            reach.as_deref(),
+            Some("the radar finds nothing beyond 90 m")
+        );
+    }
+
+    #[test]
     fn empty_beams_and_what_is_out_of_reach_have_no_estimate() {
         let radar = Radar {
             reach_m: 49.0,

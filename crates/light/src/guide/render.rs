@@ -347,6 +347,71 @@ mod tests {
         );
     }
 
+    /// A wall in fog: weaker by what the fog takes, brighter by its airlight; with grain as bright as that says. With a pane that nobody
+    /// sees, light goes another way through the code.
+    #[test]
+    fn a_wall_in_fog_and_with_grain() {
+        let mut scene = crate::guide::test_scenes::wall_at(30.0);
+        scene.objects[0].texture = None;
+        let pane = Shape::Plane {
+            centre_m: DVec3::new(0.0, 0.0, -50.0),
+            normal: DVec3::Z,
+            width_m: 1.0,
+            height_m: 1.0,
+        };
+        let behind = Object {
+            transmittance: 0.5,
+            ..Object::new("pane", 0.1, pane)
+        };
+        let camera = scene.lidar_camera(4, 6);
+        let whole = Crop {
+            binning: 1,
+            left: 0,
+            top: 0,
+            width: 6,
+            height: 4,
+        };
+        let ray = |at| Ray::new(DVec3::ZERO, camera.at_unit_depth(at));
+        for has_pane in [false, true] {
+            if has_pane {
+                scene.objects.push(behind.clone());
+            }
+            let seen = |scene: &Scene, grain: f64| radiances(scene, whole, &camera, grain, ray);
+            let mut foggy = scene.clone();
+            foggy.medium.extinction_1_m = 0.03;
+            let [clear, grainy] = [0.0, 0.4].map(|grain| seen(&scene, grain));
+            let fog = seen(&foggy, 0.0);
+            for pixel in 0..24 {
+                let ray = ray(whole.middle(pixel / 6, pixel % 6));
+                let hit = scene.hit(&ray).expect("a wall");
+                let transmission = libm::exp(-0.03 * hit.range_m);
+                let clear = f64::from(clear[pixel]);
+                let wanted = clear * transmission + SKY_REFLECTIVITY * (1.0 - transmission);
+                assert!(
+                    (f64::from(fog[pixel]) / wanted - 1.0).abs() < 1e-5,
+                    "{pixel}"
+                );
+                let grain = grain_at(ray.at(hit.range_m), 2.0 / camera.focal_px * hit.range_m);
+                let wanted = clear * (1.0 + 0.4 * grain).max(0.0);
+                assert!(
+                    (f64::from(grainy[pixel]) - wanted).abs() < 1e-5,
+                    "{pixel}: {} {wanted}",
+                    grainy[pixel]
+                );
+            }
+            let pictures = [view(&scene, 4, 6), seen(&scene, GRAIN_OF_VIEWS)];
+            assert_eq!(pictures[0], pictures[1]);
+        }
+    }
+
+    #[test]
+    fn where_nothing_is_the_sky_is_seen() {
+        let mut scene = Scene::outdoor();
+        scene.objects.clear();
+        let sky = [SKY_REFLECTIVITY as f32; 6];
+        assert_eq!(view(&scene, 2, 3), sky);
+    }
+
     /// A mirror of 0.9 at 45 degrees shows a wall on the right, which the sun shines on from the left, straight but 30 degrees up.
     #[test]
     fn a_camera_sees_a_wall_over_a_mirror_in_the_light_it_has_in_its_place() {
