@@ -487,3 +487,28 @@ impl Shuffle {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every one of the 24 orders of four comes, about as often as any other.
+    #[test]
+    fn a_shuffle_gives_every_order() {
+        let mut shuffle = Shuffle {
+            state: 7,
+            events: Vec::new(),
+        };
+        let mut orders = std::collections::BTreeMap::new();
+        for _ in 0..2400 {
+            let mut items = [0, 1, 2, 3];
+            shuffle.permute(&mut items);
+            *orders.entry(items).or_insert(0) += 1;
+        }
+        assert_eq!(orders.len(), 24);
+        assert!(
+            orders.values().all(|&n| (60..140).contains(&n)),
+            "{orders:?}"
+        );
+    }
+}

@@ -44,6 +44,10 @@ fn compare_circuit(case: &Case, seed: u64) -> Result<(), TestCaseError> {
     let mut lanes = LaneKernel::new(&netlist, &timing);
     lanes.run(&mut together.peekable(), end, &mut traces);
     let bus: Vec<NetId> = (0..netlist.net_count().min(8)).map(NetId::new).collect();
+    let of_lanes: usize = traces.0.iter().map(Vec::len).sum();
+    prop_assert_eq!(lanes.lane_changes(), of_lanes as u64);
+    let most = traces.0.iter().map(Vec::len).max().unwrap_or(0) as u64;
+    prop_assert!((most..=of_lanes as u64).contains(&lanes.events()));
     for (lane, mut found) in traces.0.into_iter().enumerate() {
         let mine = drives.iter().filter(|(mask, _)| mask >> lane & 1 == 1);
         let mut trace = Trace::default();

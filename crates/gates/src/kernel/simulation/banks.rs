@@ -144,3 +144,59 @@ impl Kernel {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::stimulus::{Drive, in_order};
+    use crate::netlist::{CellKind, Corner, Library, ModuleBuilder, Net, Netlist, Timing};
+
+    /// A register is a bank from the first edge at which all is known and at rest, until a reset comes.
+    #[test]
+    fn a_register_at_rest_is_a_bank_from_its_next_edge_on() {
+        let mut m = ModuleBuilder::new("register");
+        let [d, ck, r] = ["D", "CK", "R"].map(|name| m.input(name));
+        let q = m.output_bus("Q", 100);
+        for stage in 0..100 {
+            let data = if stage == 0 { d } else { q[stage - 1] };
+            let pins = [data, ck, r];
+            m.cell(
+                &format!("stage_{stage}"),
+                CellKind::Dffr,
+                &pins,
+                &[q[stage], Net::NONE],
+            );
+        }
+        let netlist = Netlist::elaborate(&m.finish().expect("a register"));
+        let timing = Timing::nominal(&netlist, &Library::default(), Corner::Typ);
+        let mut kernel = Kernel::new(&netlist, &timing);
+        let net = |name: &str| netlist.net(name).expect("a net");
+        let mut now = Time::ZERO;
+        // Whether it is a bank after each of these, which come 10 ns apart.
+        for (name, value, is_formed) in [
+            ("D", true, false),
+            ("CK", false, false),
+            ("R", true, false),
+            ("R", false, false),
+            ("CK", true, true),
+            ("CK", false, true),
+            ("D", false, true),
+            ("CK", true, true),
+            ("CK", false, true),
+            ("R", true, false),
+            ("CK", true, false),
+            ("CK", false, false),
+            ("R", false, false),
+            ("CK", true, true),
+        ] {
+            let drive = Drive::new(now, net(name), value);
+            now += Time::from_ns(10);
+            kernel.run(&mut in_order(vec![drive]), now, &mut ());
+            assert_eq!(kernel.banks.len(), 1);
+            assert_eq!(
+                kernel.banks[0].is_formed, is_formed,
+                "{name} {value} before {now:?}"
+            );
+        }
+    }
+}
