@@ -417,6 +417,45 @@ mod tests {
         }
     }
 
+    /// By hand: four steps where a SPAD fires once under the pulse, else twelve to a dead time and eight to the time in which
+    /// light fires it, at most 96; to find where to look, two to a dead time.
+    #[test]
+    fn steps_go_by_dead_time_and_rate() {
+        let steps = |dead_time_ns: f64, signal: f64, sigma_bins: f64, steps: Steps| {
+            let config = SensorConfig {
+                dead_time_ns,
+                ..SensorConfig::default()
+            };
+            // Bins of a nanosecond.
+            let response = Response::new(&config, 1e-9, PULSE_SIGMA);
+            response.steps(
+                &EchoLight {
+                    position_bins: 7.0,
+                    signal,
+                    background_per_bin: 0.01,
+                    sigma_bins,
+                },
+                steps,
+            )
+        };
+        // A pulse of half a bin is over in 6.7 bins.
+        assert_eq!(
+            [6.6, 6.8].map(|dead| steps(dead, 2000.0, 0.5, Steps::Fine)),
+            [96, 4]
+        );
+        // One of a tenth of a bin in 1.34, but within two bins background fires SPADs again.
+        assert_eq!(
+            [1.9, 2.1].map(|dead| steps(dead, 0.1, 0.1, Steps::Fine)),
+            [7, 4]
+        );
+        // Eight times 0.4 · 80/(16 · 0.5) a bin.
+        assert_eq!(steps(6.0, 80.0, 0.5, Steps::Fine), 32);
+        assert_eq!(steps(6.0, 0.8, 0.5, Steps::Fine), 4);
+        assert_eq!(steps(0.5, 0.8, 0.5, Steps::Fine), 24);
+        let coarse = [8.0, 0.5, 0.21, 0.05].map(|dead| steps(dead, 80.0, 0.5, Steps::Coarse));
+        assert_eq!(coarse, [4, 4, 10, 16]);
+    }
+
     proptest! {
         /// A SPAD that is blind for the rest of the laser cycle fires once, on the first photon: a closed form, whatever the
         /// width of the echo and its place, also where it comes before all bins or after them.

@@ -153,6 +153,8 @@ impl BinProfile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chip::Tdc;
+    use crate::units::{Frequency, Time};
 
     /// Two lines whose elements differ.
     fn profile() -> BinProfile {
@@ -177,6 +179,34 @@ mod tests {
         }
     }
 
+    /// Bins of a delay line lie one after the other, each about an element long.
+    #[test]
+    fn ideal_bins_adjoin() {
+        let config = SensorConfig {
+            tdc: Tdc::DelayLine,
+            ..SensorConfig::default()
+        };
+        let exposure = Exposure {
+            clock: Frequency::from_hz_f64(config.clk_hz).expect("a frequency"),
+            stop_phase: Time::ZERO,
+            stop_periods: 520,
+            laser_cycles: 100,
+        };
+        let profile = BinProfile::ideal(&Sensor::from(&config), &exposure);
+        let element_s = config.delay_element().as_s();
+        for line in &profile.macropixels[5] {
+            for bin in 1..config.bins {
+                let apart_s = line.middle_s[bin] - line.middle_s[bin - 1];
+                let wanted_s = (line.length_s[bin] + line.length_s[bin - 1]) / 2.0;
+                assert!(
+                    (apart_s - wanted_s).abs() < 1e-15,
+                    "{bin}: {apart_s} {wanted_s}"
+                );
+                assert!((apart_s / element_s - 1.0).abs() < 0.2);
+            }
+        }
+    }
+
     #[test]
     fn a_window_has_the_bins_of_its_parity_steps_later() {
         let profile = profile();
@@ -188,6 +218,7 @@ mod tests {
             assert_eq!(edges_s.len(), 17);
             assert!((edges_s[0] - [20e-9, 30e-9][parity] - later_s).abs() < 1e-18);
             let shares = profile.shares(0, start);
+            assert_eq!(shares.len(), 16);
             let mean_s = 1e-9 + [1e-11, 3e-11][parity] * 7.5;
             for (n, share) in shares.iter().enumerate() {
                 let length_s = 1e-9 + [1e-11, 3e-11][parity] * n as f64;

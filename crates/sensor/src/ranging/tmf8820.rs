@@ -89,6 +89,10 @@ mod tests {
         let captures = parse("a.json", GOOD).unwrap();
         assert_eq!(captures.len(), 1);
         assert_eq!(captures[0].hists[1], [0, 2, 8]);
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.json");
+        std::fs::write(&path, GOOD).unwrap();
+        assert_eq!(read(&path).unwrap().len(), 1);
     }
 
     #[test]
