@@ -182,6 +182,24 @@ proptest! {
     }
 }
 
+/// A bin that always counts tells nothing, and is never divided by.
+#[test]
+fn bins_that_always_count_are_finite() {
+    let response = response(0);
+    let counts = [CYCLES; 16];
+    let likelihood = likelihood(&response, &counts, 0..16, ECHO);
+    let light = EchoLight {
+        position_bins: 7.0,
+        signal: 1e6,
+        background_per_bin: 0.01,
+        sigma_bins: 0.74,
+    };
+    assert!(response.chances(&light).contains(&1.0));
+    let local = likelihood.at(&light, Steps::Fine);
+    let numbers = local.score.iter().chain(local.information.iter().flatten());
+    assert!(numbers.chain([&local.deviance]).all(|n| n.is_finite()));
+}
+
 #[test]
 fn what_is_not_positive_has_no_solution() {
     let unit = [
