@@ -343,3 +343,31 @@ fn timescale_fs(text: &str) -> Option<u64> {
     };
     Some(factor * unit_fs)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_timescale_of_the_standard_is_known() {
+        let units = ["fs", "ps", "ns", "us", "ms", "s"];
+        for (unit, thousands) in units.into_iter().zip(0u32..) {
+            for (number, factor) in [
+                ("1", 1),
+                ("1.0", 1),
+                ("10", 10),
+                ("10.0", 10),
+                ("100", 100),
+                ("100.0", 100),
+            ] {
+                let wanted = Some(factor * 1000u64.pow(thousands));
+                assert_eq!(
+                    timescale_fs(&format!("{number}{unit}")),
+                    wanted,
+                    "{number}{unit}"
+                );
+            }
+        }
+        assert_eq!(["2ps", "1as", "ps", "100"].map(timescale_fs), [None; 4]);
+    }
+}

@@ -259,3 +259,21 @@ fn triple(triple: Triple, timescale: SdfTimescale) -> String {
         members => format!("({})", members.map(number).join(":")),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn members_of_a_triple_are_written_where_they_differ() {
+        let text = |members: [Option<i64>; 3], timescale| triple(Triple(members), timescale);
+        let (fs, ps) = (SdfTimescale::Fs, SdfTimescale::Ps);
+        assert_eq!(text([Some(1_250); 3], ps), "(1.250)");
+        assert_eq!(text([Some(1), Some(2), Some(2)], fs), "(1:2:2)");
+        assert_eq!(text([Some(1), Some(1), Some(2)], fs), "(1:1:2)");
+        assert_eq!(text([Some(1), Some(2), Some(1)], fs), "(1:2:1)");
+        assert_eq!(text([None, Some(-7), None], ps), "(:-0.007:)");
+        assert_eq!(text([Some(0); 3], ps), "(0.000)");
+        assert_eq!(text([None; 3], fs), "()");
+    }
+}
