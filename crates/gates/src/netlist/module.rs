@@ -233,3 +233,42 @@ impl Module {
                 .sum::<usize>()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::netlist::{CellKind, ModuleBuilder, Net};
+
+    #[test]
+    fn a_module_is_as_large_as_its_cells_and_what_is_below() {
+        let mut m = ModuleBuilder::new("leaf");
+        let (a, z) = (m.input("A"), m.output("Z"));
+        m.gate_into(CellKind::Inv, &[a], z);
+        let q = m.wire("q");
+        m.cell("ff", CellKind::Dffr, &[z, a, a], &[q, Net::NONE]);
+        let leaf = m.finish().expect("a leaf");
+        let of = |area: fn(CellKind) -> u32| {
+            [CellKind::Inv, CellKind::Dffr, CellKind::Xor2].map(|kind| u64::from(area(kind)))
+        };
+        let ([inv, ff, xor], [inv_fets, ff_fets, xor_fets]) =
+            (of(CellKind::area), of(CellKind::transistors));
+        assert_eq!(
+            (leaf.area(), leaf.transistors()),
+            (inv + ff, inv_fets + ff_fets)
+        );
+        let mut m = ModuleBuilder::new("top");
+        let (a, z) = (m.input("A"), m.output("Z"));
+        for name in ["one", "two"] {
+            let below = m.wire(name);
+            m.instance(&format!("u_{name}"), &leaf, &[("A", &[a]), ("Z", &[below])]);
+        }
+        m.gate_into(CellKind::Xor2, &[a, a], z);
+        let top = m.finish().expect("a top");
+        assert_eq!(top.area(), 2 * (inv + ff) + xor);
+        assert_eq!(top.transistors(), 2 * (inv_fets + ff_fets) + xor_fets);
+        let ports: Vec<_> = top
+            .port_signals()
+            .map(|(_, signal)| signal.name.as_str())
+            .collect();
+        assert_eq!((ports, top.ports().len()), (vec!["A", "Z"], 2));
+    }
+}
