@@ -180,3 +180,47 @@ fn wanted_cells_are_taken_and_must_do_what_is_wanted() {
         fault.message
     );
 }
+
+/// Leakage, area and loads, in every unit that a file may have.
+#[test]
+fn units_of_leakage_and_load_are_those_of_the_file() {
+    let inverter = gate_text("INV_1", 4.0, &["A"], "!A")
+        .replacen("area : 4;", "area : 4; cell_leakage_power : 2;", 1)
+        .replacen(
+            "direction : input;",
+            "direction : input; capacitance : 3;",
+            1,
+        );
+    let cells = inverter + &gate_text("NAND_1", 2.0, &["A", "B"], "!(A B)") + &flip_flops();
+    let read = |unit: &str, load: &str| {
+        let unit = format!("leakage_power_unit : \"{unit}\"; capacitive_load_unit {load};");
+        let text = format!("library (few) {{ time_unit : \"1ns\"; {unit}\n{cells}}}");
+        crate::netlist::liberty::Liberty::read(&text, &[]).unwrap()
+    };
+    for (unit, watts) in [
+        ("1pW", 1e-12),
+        ("10pW", 1e-11),
+        ("100pW", 1e-10),
+        ("1nW", 1e-9),
+        ("10nW", 1e-8),
+        ("100nW", 1e-7),
+        ("1uW", 1e-6),
+        ("1mW", 1e-3),
+    ] {
+        let library = read(unit, "(1, pf)");
+        let found = library.map.recipe(CellKind::Inv).stages[0].drives[0].leakage_w;
+        assert!(
+            (found / (2.0 * watts) - 1.0).abs() < 1e-12,
+            "{unit}: {found}"
+        );
+        assert_eq!(
+            [CellKind::Inv, CellKind::Nand2].map(|kind| library.area(kind)),
+            [4.0, 2.0]
+        );
+    }
+    let loads = ["(10, ff)", "(1, pf)"].map(|load| {
+        let library = read("1nW", load);
+        library.map.recipe(CellKind::Inv).stages[0].drives[0].inputs[0].load_ff
+    });
+    assert_eq!(loads, [[30.0; 2], [3000.0; 2]]);
+}
