@@ -210,6 +210,12 @@ mod tests {
         assert_eq!(table("A' + B ^ S A"), of(|a, b, s| !a | (b ^ (s & a))));
         assert_eq!(table("(!(S))"), of(|_, _, s| !s));
         assert_eq!(table("1"), of(|_, _, _| true));
+        assert_eq!(table("0"), of(|_, _, _| false));
+        assert_eq!(table("A 0 + B"), of(|_, b, _| b));
+        // As many inputs as a table has.
+        let names = ["A", "B", "C", "D", "E", "F", "G"];
+        let tables = [6, 7].map(|n| truth_table("A", &names[..n]).is_some());
+        assert_eq!(tables, [true, false]);
         for bad in ["A +", "Q", "(A", "A)", "", "A B +", "*A"] {
             assert_eq!(truth_table(bad, &["A", "B", "S"]), None, "{bad}");
         }
