@@ -137,25 +137,12 @@ mod tests {
         let estimates = vec![Some((10.0, 0.5)), None];
         let map = FileMap::new("mine", (1, 2), estimates);
         let scene = crate::scene::Scene::outdoor();
+        assert_eq!((map.name(), map.reach(&scene)), ("file", None));
         let found = map.estimate(&GuideInput::still(&scene, 1, 2, 0)).unwrap();
         assert_eq!(found.range_m, [Some(10.0), None]);
         assert_eq!(found.sigma_m, [0.5, f64::INFINITY]);
         let refused = map.estimate(&GuideInput::still(&scene, 2, 2, 0));
         assert!(refused.unwrap_err().to_string().starts_with("mine: "));
-    }
-
-    #[test]
-    fn it_is_called_file() {
-        let map = FileMap {
-            source: "here".into(),
-            rows: 1,
-            cols: 1,
-            estimates: vec![None],
-        };
-        assert_eq!(
-            (map.name(), map.reach(&crate::scene::Scene::outdoor())),
-            ("file", None)
-        );
     }
 
     #[test]

@@ -191,14 +191,12 @@ mod tests {
     /// Every macropixel's estimate and claim, by the definition: inverse depth with its own error, and the depth's claim along its ray.
     #[test]
     fn estimates_are_the_walls_inverse_depth_with_their_error() {
-        let (scene, guide, depth_m) = (
-            wall_at(40.0),
-            Monocular {
-                times_stereo: 3.0,
-                ..Monocular::default()
-            },
-            40.0,
-        );
+        let depth_m = 40.0;
+        let scene = wall_at(depth_m);
+        let guide = Monocular {
+            times_stereo: 3.0,
+            ..Monocular::default()
+        };
         let (rows, cols) = (24, 40);
         let map = guide
             .estimate(&GuideInput::still(&scene, rows, cols, 7))

@@ -54,6 +54,17 @@ pub(super) struct Crop {
 }
 
 impl Crop {
+    /// A whole image, unbinned.
+    fn whole(rows: u32, cols: u32) -> Self {
+        Crop {
+            binning: 1,
+            left: 0,
+            top: 0,
+            width: cols,
+            height: rows,
+        }
+    }
+
     /// The camera's coordinates of the middle of a pixel of the crop.
     pub(super) fn middle(&self, row: usize, col: usize) -> (f64, f64) {
         let along =
@@ -65,13 +76,7 @@ impl Crop {
 /// What a camera in the lidar's place sees in its whole view, `rows` × `cols`: a white surface in the scene's daylight would give 1.
 pub fn view(scene: &Scene, rows: u32, cols: u32) -> Vec<f32> {
     let camera = scene.lidar_camera(rows, cols);
-    let whole = Crop {
-        binning: 1,
-        left: 0,
-        top: 0,
-        width: cols,
-        height: rows,
-    };
+    let whole = Crop::whole(rows, cols);
     radiances(scene, whole, &camera, GRAIN_OF_VIEWS, |at| {
         Ray::new(DVec3::ZERO, camera.at_unit_depth(at))
     })
@@ -284,10 +289,7 @@ mod tests {
         for (binning, share) in [(1, 0.5), (2, 0.02), (1, 0.0), (2, 1.5)] {
             let crop = Crop {
                 binning,
-                left: 0,
-                top: 0,
-                width: SIDE,
-                height: SIDE,
+                ..Crop::whole(SIDE, SIDE)
             };
             let exposure_s = 1e-3;
             let full_of = FULL_WELL_E / (10.0 * ELECTRONS_PER_S_KLUX * exposure_s);
@@ -364,13 +366,7 @@ mod tests {
             ..Object::new("pane", 0.1, pane)
         };
         let camera = scene.lidar_camera(4, 6);
-        let whole = Crop {
-            binning: 1,
-            left: 0,
-            top: 0,
-            width: 6,
-            height: 4,
-        };
+        let whole = Crop::whole(4, 6);
         let ray = |at| Ray::new(DVec3::ZERO, camera.at_unit_depth(at));
         for has_pane in [false, true] {
             if has_pane {
@@ -440,13 +436,7 @@ mod tests {
             Object::new("behind", 0.1, behind),
         ];
         let camera = scene.lidar_camera(4, 4);
-        let whole = Crop {
-            binning: 1,
-            left: 0,
-            top: 0,
-            width: 4,
-            height: 4,
-        };
+        let whole = Crop::whole(4, 4);
         let ray = |at| Ray::new(DVec3::ZERO, camera.at_unit_depth(at));
         let daylight = 0.8 * f64::to_radians(30.0).cos() + 0.2 / 2.0;
         for seen in radiances(&scene, whole, &camera, 0.0, ray) {

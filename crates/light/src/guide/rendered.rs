@@ -314,7 +314,7 @@ mod tests {
         scene.stereo.max_disparity_px = 400.0;
         assert_eq!(WHOLE.matcher(&scene).disparities, 256);
         let reach = WHOLE.reach(&scene);
-        assert!(reach.is_some() && reach == super::super::BehaviouralStereo.reach(&scene));
+        assert!(reach.is_some() && reach == crate::guide::BehaviouralStereo.reach(&scene));
         for (paths, wanted) in [
             (3, Paths::Three),
             (4, Paths::Four),

@@ -52,7 +52,7 @@ pub(super) fn export(netlist: &Netlist, corners: [&Timing; 3], options: SdfOptio
     String::from_utf8(out).unwrap()
 }
 
-fn file(body: &str) -> String {
+pub(super) fn file(body: &str) -> String {
     format!("(DELAYFILE (SDFVERSION \"3.0\") (DIVIDER /)\n(TIMESCALE 1ps)\n{body})")
 }
 
@@ -479,39 +479,4 @@ proptest! {
             let _ = annotate(&mut timing, &netlist, &sdf, Corner::Typ);
         }
     }
-}
-
-#[test]
-fn oddities_are_told_with_their_line() {
-    let told = |body: &str| {
-        let text = file(body);
-        let sdf = Sdf::parse("a.sdf", &text).expect("delays");
-        let told = |oddity: &Oddity| (oddity.line(), oddity.to_string());
-        oddities(&sdf, Corner::Typ)
-            .iter()
-            .map(told)
-            .collect::<Vec<_>>()
-    };
-    let of = |instance: &str, delay: &str| {
-        format!(
-            "(CELL (CELLTYPE \"INV\") (INSTANCE {instance}) (DELAY (ABSOLUTE (IOPATH A Z {delay}))))\n"
-        )
-    };
-    let (ten, zero) = ("(10)", "(0)");
-    assert_eq!(told(&of("a", ten)), []);
-    let all = told(&(of("a", zero) + &of("b", zero)));
-    assert_eq!(
-        all,
-        [(
-            3,
-            "every delay is zero, so that gates switch at once".to_owned()
-        )]
-    );
-    let some = told(&(of("a", ten) + &of("b", zero) + &of("c", zero)));
-    assert_eq!(some, [(4, "2 of 3 delays are zero".to_owned())]);
-    let again = "delays of a cell are given again, after line 3, and the last ones count";
-    let twice = of("a", ten) + &of("b", ten) + &of("a", ten);
-    assert_eq!(told(&twice), [(5, again.to_owned())]);
-    let often = told(&(twice + &of("b", ten)));
-    assert_eq!(often, [(5, format!("{again} (2 such entries)"))]);
 }

@@ -1,6 +1,5 @@
 //! Where fits start, which of them are one, and what is left of their bounds, against what each is defined to be.
 
-use super::super::likelihood::IN_REGION;
 use super::*;
 use crate::chip::SensorConfig;
 use crate::units::Time;
@@ -136,7 +135,7 @@ fn the_background_comes_from_the_third_with_the_fewest_counts() {
         let is_close = (found.iter().zip(wanted)).all(|(a, b)| (a / b - 1.0).abs() < 1e-9);
         assert!(is_close, "{found:?} {wanted:?}");
     };
-    // Sorted: 3, 4, 5, 6, 7, 8, 100 ...; of sixteen bins the sixth.
+    // Sorted: 3, 4, 5, 6, 7, 8, 700 …; of sixteen bins the sixth.
     let mut counts = [700.0; 16];
     for (bin, few) in [(12, 8.0), (2, 4.0), (9, 3.0), (15, 7.0), (5, 6.0), (7, 5.0)] {
         counts[bin] = few;
@@ -236,7 +235,7 @@ fn the_widest_echo_has_ends_in_the_window() {
     assert_eq!(walk.widest(), 4.5);
 }
 
-/// Mean histograms of 32 lights for each TYPE and THRESHOLD: none is explained by a light elsewhere, and few are left.
+/// Mean histograms of 32 lights for each TYPE and THRESHOLD: none is explained by a light elsewhere, and no more are left than were when this was written.
 #[test]
 fn many_starts_find_strong_light() {
     for (event_type, threshold, most_left) in [
