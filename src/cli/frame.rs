@@ -8,7 +8,7 @@ use clap::Args;
 
 use self::pair::PairReport;
 use super::asked::{ExposureArgs, WaveFormatOption};
-use super::voice::{notes, progress, say_json, tell};
+use super::voice::{note, notes, progress, say_json, tell};
 use super::{SceneArgs, asked, quality};
 use crate::analysis::{TimingVerdict, VerdictReport};
 use crate::chip::{Mode, SensorConfig, Silicon};
@@ -87,6 +87,9 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     let settings = request.settings_by(sensor, scene, guide, &policy)?;
     let silicon = Silicon::of(&settings.sensor);
     let timing = TimingVerdict::of(&settings.sensor, &silicon, (0, 0)).report();
+    if let Some(warning) = timing.warning() {
+        note(warning);
+    }
     let results = ResultSet::begin(&args.out)?;
     let probe_at = |(row, col)| Probe {
         row,
@@ -138,9 +141,6 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
         }
         if let Some(remark) = &frame.remark {
             tell(format_args!("\n{remark}\n"))?;
-        }
-        if !timing.met {
-            tell(format_args!("\nTiming {}\n", timing.verdict))?;
         }
         for note in &timing.notes {
             tell(format_args!("\nNote on timing: {note}\n"))?;

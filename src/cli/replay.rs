@@ -133,6 +133,9 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         let message = "takes delays and limits from elsewhere; leave out either --sdf or process, voltage, temperature and mismatch";
         return Err(InputError::new("--sdf", message).into());
     }
+    if let Some(verdict) = timing.as_ref().and_then(VerdictReport::warning) {
+        eprintln!("gdtof: {verdict}");
+    }
     let needs_array =
         args.vcd.is_some() || args.saif.is_some() || args.sdf.is_some() || args.checks.is_some();
     let replayed = match silicon {
@@ -182,9 +185,6 @@ impl Summary {
     fn tell(&self, config: &SensorConfig) {
         if let Some(coverage) = &self.time_keeping {
             eprint!("{}", table(coverage));
-        }
-        if let Some(timing) = self.timing.as_ref().filter(|timing| !timing.met) {
-            eprintln!("gdtof: timing {}", timing.verdict);
         }
         let later_windows = |timing: &VerdictReport| timing.later_windows.clone();
         if let Some(text) = self.timing.as_ref().and_then(later_windows) {

@@ -121,8 +121,8 @@ pub(super) fn ripple_rows() -> Vec<Row> {
 pub(super) fn figure_56() -> Chart {
     let delays: Vec<(usize, Time, Time)> = (1..=12)
         .map(|bits| {
-            let (longest, simulated) = ripple(&counter_of(bits), &NOMINAL);
-            (bits, longest, simulated)
+            let found = ripple(&counter_of(bits), &NOMINAL);
+            (bits, found.longest_path, found.latest)
         })
         .collect();
     let points = |pick: fn(&(usize, Time, Time)) -> Time| {
@@ -272,7 +272,8 @@ pub(super) fn area_rows() -> Vec<Row> {
     };
     let macropixel = crate::chip::macropixel::circuit(&config).transistors() as f64;
     let counter = p_counter::circuit(&config).transistors() as f64;
-    let timing = p_counter_timing::circuit(config.after_borrow).transistors() as f64;
+    let timing =
+        p_counter_timing::circuit(config.after_borrow, config.reset_buffers()).transistors() as f64;
     let selection = readout_blocks::bin_select(config.bins, config.bin_bits).transistors() as f64;
     let library = f64::from(CellKind::Dffsr.transistors());
     let mut rows = vec![

@@ -41,7 +41,7 @@ pub fn is_bad_input(error: &FrameError) -> bool {
 fn cure(error: &EngineError, spelling: Spelling) -> Option<String> {
     let engine = |name| spelling.with("engine", name);
     Some(match error {
-        EngineError::Race(race) => {
+        EngineError::Race { race, .. } => {
             let cure = of_race(&race.cure, spelling);
             format!("use {}, or {cure}", engine("gate"))
         }
@@ -89,7 +89,9 @@ fn of_race(cure: &Cure, spelling: Spelling) -> String {
             "give other {}, or start values whose windows end elsewhere in the laser cycle",
             spelling.name("stop_periods")
         ),
-        Cure::Period { .. } | Cure::Phase { .. } | Cure::Tap => cure.to_string(),
+        Cure::Period { .. } | Cure::Phase { .. } | Cure::Tap | Cure::ResetChain | Cure::Cells => {
+            cure.to_string()
+        }
     }
 }
 
@@ -103,6 +105,7 @@ fn of_irregular(why: &Irregular, spelling: Spelling) -> String {
             "give a P-counter that raises LOCAL_STOP once, a step later from each start value on"
                 .to_owned()
         }
+        Irregular::Miscounts { .. } => "give another p_counter or library".to_owned(),
         Irregular::OwnBlock(key) => format!("leave out {key}"),
         Irregular::OwnCodes => "give tdc = \"clocked\"".to_owned(),
         Irregular::OutOfStep { round, .. } => {

@@ -183,7 +183,7 @@ fn circuit(config: &SensorConfig) -> Netlist {
     for wire in ["COUNTER_CLK", "COUNTER_RESET", "MEMORY_RESET"] {
         m.wire(wire);
     }
-    let timing = p_counter_timing::circuit(config.after_borrow);
+    let timing = p_counter_timing::circuit(config.after_borrow, config.reset_buffers());
     m.instance_by_names("p_counter_timing", &timing, &[]);
     m.instance_by_names("p_counter", &p_counter::circuit(config), &[]);
     Netlist::elaborate(&m.finish().expect("the testbench's circuit is whole"))

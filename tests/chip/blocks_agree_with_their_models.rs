@@ -24,7 +24,7 @@ proptest! {
         steps in prop::collection::vec((0usize..5, 800i64..3_000), 1..80),
     ) {
         let after_borrow = if wraps { AfterBorrow::Wrap } else { AfterBorrow::Hold };
-        let mut bench = Bench::new(&p_counter_timing::circuit(after_borrow), corner);
+        let mut bench = Bench::new(&p_counter_timing::circuit(after_borrow, p_counter_timing::SHORTEST_CHAIN), corner);
         let timing = bench.timing();
         let names = ["CLK", "STOP", "RESETB", "ENABLE", "LOCAL_STOP"];
         let mut values = [false; 5];

@@ -5,7 +5,7 @@ use crate::bench;
 
 use bench::{Bench, SETTLING, corners};
 use guided_dtof::chip::{
-    ChipTiming, Exposure, FrontEnd, SensorConfig, WindowLaw, front_end, macropixel,
+    ChipTiming, Exposure, FrontEnd, Sensor, SensorConfig, WindowLaw, front_end, macropixel,
 };
 use guided_dtof::engine::{
     Cohort, CohortOptions, Cycle, EngineError, Expose, Gate, LitPixel, Replay, Window,
@@ -137,14 +137,16 @@ proptest! {
         let pulses = pulses.into_iter().map(|(spad, share)| (at(share), spad));
         let pulses = clear(pulses.collect(), &timing, config.dead_time(), to_next_edge);
         let events: Vec<SpadEvent> = pulses.iter().map(|&(time, spad)| SpadEvent { time, spad }).collect();
-        let by_model = macropixel::Model::new(&config, timing, &exposure).histogram(start, pulses);
+        let sensor = Sensor::from(&config);
+        let delays = (timing, &**sensor.local_stop_delays());
+        let by_model = macropixel::Model::new(&config, delays, &exposure).histogram(start, pulses);
         let by_gates = Gate::new(&config, &exposure).histogram(start, &events);
         prop_assert_eq!(by_gates.as_ref(), Ok(&by_model));
         let refused = Window::new(&config, &exposure).histogram(start, &events);
         prop_assert_eq!(refused, Err(EngineError::Joined(front_end)));
         // The gates run it for the cycle engine, which promises nothing where signals race.
         match Cycle::new(&config, &exposure).histogram(start, &events) {
-            Err(why) => prop_assert!(matches!(why, EngineError::Race(_)), "{}", why),
+            Err(why) => prop_assert!(matches!(why, EngineError::Race { .. }), "{}", why),
             by_cycle => prop_assert_eq!(by_cycle, by_gates),
         }
     }

@@ -5,8 +5,7 @@ use guided_dtof::chip::macropixel::Model;
 use guided_dtof::chip::p_counter::starts_high;
 use guided_dtof::chip::window_law::{Window as LawWindow, WindowLaw};
 use guided_dtof::chip::{
-    AfterBorrow, ChipTiming, EventType, Exposure, Mode, Overflow, PCounter, Probe, SensorConfig,
-    Tap,
+    AfterBorrow, EventType, Exposure, Mode, Overflow, PCounter, Probe, Sensor, SensorConfig, Tap,
 };
 use guided_dtof::engine::{Cycle, EngineError, GateSimulation, Replay, Window};
 use guided_dtof::kernel::Recorder;
@@ -129,7 +128,7 @@ proptest! {
         let window = law.window(*start);
         if let LawWindow::Race(_) = window {
             let refused = Window::new(config, &exposure).histogram(*start, &case.pulses);
-            prop_assert!(matches!(refused, Err(EngineError::Race(_))));
+            prop_assert!(matches!(refused, Err(EngineError::Race { .. })));
             return Ok(());
         }
 
@@ -144,7 +143,9 @@ proptest! {
         let by_cycles = Cycle::new(config, &exposure).histogram(*start, &case.pulses).unwrap();
         prop_assert_eq!(&by_gates, &by_cycles);
         let pulses = case.pulses.iter().map(|p| (p.time, p.spad));
-        let by_model = Model::new(config, ChipTiming::of(config), &exposure).histogram(*start, pulses);
+        let sensor = Sensor::from(config);
+        let delays = (*sensor.timing(), &**sensor.local_stop_delays());
+        let by_model = Model::new(config, delays, &exposure).histogram(*start, pulses);
         prop_assert_eq!(&by_gates, &by_model);
         let by_window = Window::new(config, &exposure).histogram(*start, &case.pulses);
         match window {
@@ -159,7 +160,7 @@ proptest! {
             let rises: Vec<Time> = rises.filter(|&t| t > Time::ZERO).collect();
             let mut expected = Vec::new();
             let pulses = case.pulses.iter().map(|p| (p.time, p.spad));
-            Model::new(config, ChipTiming::of(config), &exposure).run(*start, pulses, |cause, _| expected.push(cause));
+            Model::new(config, delays, &exposure).run(*start, pulses, |cause, _| expected.push(cause));
             // A reset may raise LOCAL_STOP, too, while HIT is in reset.
             let in_reset = |t: &Time| {
                 let mut cycles = 0..=i64::from(case.laser_cycles);

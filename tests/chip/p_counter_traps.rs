@@ -153,7 +153,7 @@ fn timed_counter(config: &SensorConfig) -> Bench {
     for wire in ["LOCAL_STOP", "COUNTER_CLK", "COUNTER_RESET", "MEMORY_RESET"] {
         m.wire(wire);
     }
-    let timing = p_counter_timing::circuit(config.after_borrow);
+    let timing = p_counter_timing::circuit(config.after_borrow, config.reset_buffers());
     m.instance_by_names("p_counter_timing", &timing, &[]);
     m.instance_by_names("p_counter", &p_counter::circuit(config), &[]);
     Bench::new(&m.finish().unwrap(), Corner::Typ)

@@ -8,7 +8,7 @@ use crate::scenario;
 use crate::cases::cases;
 use guided_dtof::chip::macropixel::Model;
 use guided_dtof::chip::window_law::{Window, WindowLaw};
-use guided_dtof::chip::{ChipTiming, EventType, Exposure, Mode, PCounter, SensorConfig};
+use guided_dtof::chip::{EventType, Exposure, Mode, PCounter, Sensor, SensorConfig};
 use guided_dtof::engine::{Cycle, Gate, Histograms, Replay};
 use guided_dtof::netlist::Corner;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
@@ -131,8 +131,9 @@ fn as_the_gates_of_hslidar_count() {
 #[test]
 fn as_the_reference_model_counts_in_larger_numbers() {
     let model = |scenario: &Scenario| {
-        let timing = ChipTiming::of(&scenario.config);
-        let model = Model::new(&scenario.config, timing, &scenario.exposure);
+        let sensor = Sensor::from(&scenario.config);
+        let delays = (*sensor.timing(), &**sensor.local_stop_delays());
+        let model = Model::new(&scenario.config, delays, &scenario.exposure);
         let one = |(&start, pulses): (&u16, &Vec<_>)| {
             model.histogram(
                 start,

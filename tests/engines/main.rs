@@ -2,6 +2,8 @@
 
 #[path = "../../crates/gates/tests/kernel/cases.rs"]
 mod cases;
+#[path = "../shared/random_library.rs"]
+mod random_library;
 #[path = "../shared/scenario.rs"]
 mod scenario;
 #[path = "../shared/wide8x8.rs"]
@@ -22,5 +24,6 @@ mod late_cycle_is_that_of_the_whole_run;
 mod light_is_a_list;
 mod own_blocks_agree_with_built_in_ones;
 mod photons_drawn_are_those_of_the_exposure;
+mod random_libraries_count_alike;
 mod timed_agrees_with_gate;
 mod window_sees_what_the_full_stream_shows;

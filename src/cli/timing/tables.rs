@@ -86,7 +86,10 @@ pub(super) fn windows(subject: &Subject<'_>) -> Section {
 /// The reset pulse and what it must outlast.
 pub(super) fn reset_pulse(subject: &Subject<'_>) -> Section {
     let (pixel, simulated) = (&subject.kept, reset(subject.config, subject.silicon));
-    let title = "Reset pulse, and what it must outlast";
+    let title = format!(
+        "Reset pulse of {} buffers (reset_stages), and what it must outlast",
+        subject.config.reset_buffers()
+    );
     let mut section = Section::new("reset", title, &["", "static", "event-driven"]);
     let need = simulated.to_stage_clock.max(simulated.to_counter_clk);
     let limits = pixel.reset_need() - pixel.reset_to_stage_clock.max(pixel.reset_to_counter_clk);
@@ -322,7 +325,13 @@ pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
 /// Ripple by number of stages.
 pub(super) fn ripples(config: &SensorConfig, silicon: &Silicon) -> Section {
     let title = "Ripple COUNTER_CLK to LOCAL_STOP";
-    let mut section = Section::new("ripples", title, &["stages", "static", "event-driven"]);
+    let headings = &[
+        "stages",
+        "static",
+        "event-driven",
+        "latest from start value",
+    ];
+    let mut section = Section::new("ripples", title, headings);
     // A netlist has the bits that it has.
     let bits = match config.p_counter_block {
         Some(_) => config.counter_bits..=config.counter_bits,
@@ -333,12 +342,22 @@ pub(super) fn ripples(config: &SensorConfig, silicon: &Silicon) -> Section {
             counter_bits,
             ..config.clone()
         };
-        let (paths, gates) = ripple(&config, silicon);
+        let found = ripple(&config, silicon);
         let is_even = config
             .counter_law()
             .is_none_or(|law| law.uneven().is_none());
-        let gates = is_even.then_some(gates);
-        section.push([counter_bits.to_string().into(), paths.into(), gates.into()]);
+        let gates = is_even.then_some(found.latest);
+        let start = if is_even {
+            found.start.to_string()
+        } else {
+            String::new()
+        };
+        section.push([
+            counter_bits.to_string().into(),
+            found.longest_path.into(),
+            gates.into(),
+            start.into(),
+        ]);
     }
     section
 }

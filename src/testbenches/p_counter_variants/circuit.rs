@@ -19,7 +19,7 @@ pub(super) fn place_counter(m: &mut ModuleBuilder, config: &SensorConfig) -> Net
     let counter_reset = m.wire("COUNTER_RESET");
     m.wire("MEMORY_RESET");
     m.wire("STOP_D");
-    let timing = p_counter_timing::circuit(config.after_borrow);
+    let timing = p_counter_timing::circuit(config.after_borrow, config.reset_buffers());
     m.instance_by_names("p_counter_timing", &timing, &[]);
     m.instance_by_names("p_counter", &p_counter::circuit(config), &[]);
     counter_reset

@@ -100,7 +100,7 @@ impl Row {
         let config = sensor(p_counter);
         let blocks = [
             p_counter::circuit(&config),
-            p_counter_timing::circuit(config.after_borrow),
+            p_counter_timing::circuit(config.after_borrow, config.reset_buffers()),
         ];
         let macropixel = macropixel::circuit(&config);
         let transistors: u64 = blocks.iter().map(|b| b.transistors()).sum();
@@ -114,12 +114,13 @@ impl Row {
         let settled = nets.filter_map(|net| arrivals.window(net)).map(|w| w.1);
         let activity = Activity::of(&config, &netlist);
         let by_paths = MacropixelTiming::of(&config, &TYPICAL, Limits::Ignored, (0, 0));
+        let ripple = ripple(&config, &TYPICAL);
         Row {
             stage: p_counter.stage_transistors(),
             transistors,
             share: transistors as f64 / macropixel.transistors() as f64,
             area_share: area as f64 / macropixel.area() as f64,
-            local_stop: ripple(&config, &TYPICAL),
+            local_stop: (ripple.longest_path, ripple.latest),
             settled: (settled.max().unwrap_or(Time::ZERO), activity.settled),
             activity,
             period: (

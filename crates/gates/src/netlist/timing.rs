@@ -4,6 +4,7 @@
 //! back-annotation) gets a set of its own. So does one that delays as a wire does ([`DelayModel`]).
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use super::cell::CellKind;
 use super::corner::Corner;
@@ -132,6 +133,20 @@ impl Timing {
     pub fn scale_limits(&mut self, factor: f64) {
         let all = self.limits.iter_mut().chain(self.own_limits.values_mut());
         all.for_each(|limits| *limits = limits.times(factor));
+    }
+
+    /// The timing of some of the cells, of which the first becomes cell 0 of a netlist of their own.
+    #[must_use]
+    pub fn part(&self, cells: Range<usize>) -> Self {
+        let own_limits = self.own_limits.range(cells.clone());
+        Timing {
+            own_limits: own_limits
+                .map(|(&cell, &limits)| (cell - cells.start, limits))
+                .collect(),
+            of_cell: self.of_cell[cells].to_vec(),
+            is_own: vec![false; self.sets.len()],
+            ..self.clone()
+        }
     }
 
     /// Index of a set that is this cell's alone.

@@ -1,14 +1,9 @@
 //! The event kernel's answers to the questions of static timing.
 
 use crate::chip::p_counter::Rises;
-use crate::chip::timing::macropixel::MacropixelCircuit;
-use crate::chip::{
-    ChipTiming, Exposure, Limits, Probe, Probes, Sensor, SensorConfig, Silicon, WindowLaw,
-    p_counter,
-};
+use crate::chip::{Exposure, Limits, Probe, Sensor, SensorConfig, Silicon, WindowLaw};
 use crate::engine::GateSimulation;
-use crate::kernel::{Drive, Kernel, Policy, Recorder, TimingChecks, in_order};
-use crate::netlist::Netlist;
+use crate::kernel::{Policy, Recorder, TimingChecks};
 use crate::photon::SpadEvent;
 use crate::units::{Frequency, Time};
 
@@ -39,6 +34,13 @@ pub(super) fn checks(silicon: &Silicon, gate: &GateSimulation) -> TimingChecks {
         .asynchronous(gate.netlist(), |cell| samplers.contains(cell))
 }
 
+/// The start value with the latest LOCAL_STOP, or one in the middle of a laser cycle where the window of that is not whole.
+fn slowest_start(config: &SensorConfig, silicon: &Silicon) -> u16 {
+    let sensor = Sensor::from(config).made_of(silicon);
+    let middle = (config.largest_start() / 2).min(2 * config.bins as u16);
+    sensor.local_stop_delays().latest().0.max(middle)
+}
+
 /// Whether a gate-level macropixel counts a pattern of photons into the bins of a slow clock, or as many bins later, and,
 /// if limits are to be kept, breaks none.
 pub fn gate_works(
@@ -51,7 +53,7 @@ pub fn gate_works(
     let Ok(clock) = Frequency::from_period(period) else {
         return false;
     };
-    let start = (config.largest_start() / 2).min(2 * config.bins as u16);
+    let start = slowest_start(config, silicon);
     let every = Rises::of(config, start).and_then(|rises| rises.every);
     let exposure = Exposure {
         clock,
@@ -106,43 +108,27 @@ pub fn gate_works(
     violated == 0 && counted.is_ok_and(|found| found[0] == expected)
 }
 
-/// COUNTER_CLK rises → LOCAL_STOP rises for the P-counter of macropixel (0, 0): longest path, and as simulated from start
-/// value 0.
-pub fn ripple(config: &SensorConfig, silicon: &Silicon) -> (Time, Time) {
-    let netlist = Netlist::elaborate(&p_counter::circuit(config));
-    // Each cell has the mismatch that it has in the macropixel.
-    let macropixel = MacropixelCircuit::new(config, (0, 0)).path();
-    let in_macropixel = |cell| format!("{macropixel}.{}", netlist.cell_path(cell));
-    let timing = silicon.timing_as(&netlist, in_macropixel);
-    let probes = Probes::of_block(&netlist);
-    let (clk, stop) = (probes.net(Probe::CounterClk), probes.net(Probe::LocalStop));
-    let longest = ChipTiming::measure(config, silicon)
-        .counter
-        .clk_to_local_stop;
-    let resets = [Probe::MemoryReset, Probe::CounterReset].map(|probe| probes.net(probe));
-    // One of one's own may have another code for 0, and take more edges.
-    let (code, before) = match config.counter_law() {
-        None => (0, 0),
-        Some(law) => (law.code(0), i64::from(law.offset())),
-    };
-    let ns = Time::from_ns;
-    let edge = ns(200) * (1 + before);
-    let inputs = netlist.inputs().into_iter();
-    let power_up = inputs.map(|n| Drive::new(Time::ZERO, n, resets.contains(&n)));
-    let init = probes.bus(Probe::CounterInit).iter().enumerate();
-    let init = init.map(|(bit, &n)| Drive::new(ns(1), n, code >> bit & 1 == 1));
-    let load = [(80, true), (100, false)];
-    let load = load.map(|(at, high)| Drive::new(ns(at), probes.net(Probe::MemoryLoad), high));
-    let release = [(40, resets[0]), (120, resets[1])].map(|(at, n)| Drive::new(ns(at), n, false));
-    let edges = (0..=before).flat_map(|k| {
-        [(0, true), (100, false)].map(|(at, high)| Drive::new(ns(200 + 200 * k + at), clk, high))
-    });
-    let drives = power_up.chain(init).chain(load).chain(release).chain(edges);
-    let mut recorder = Recorder::new([stop]);
-    let mut stimulus = in_order(drives.collect());
-    Kernel::new(&netlist, &timing).run(&mut stimulus, edge + ns(200), &mut recorder);
-    let rises = recorder.rising_edges(stop);
-    (longest, rises.first().map_or(Time::MAX, |&t| t - edge))
+/// COUNTER_CLK rises → LOCAL_STOP rises for the P-counter of macropixel (0, 0).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RippleTiming {
+    /// The longest path, whatever values are.
+    pub longest_path: Time,
+    /// The latest of all start values, as simulated.
+    pub latest: Time,
+    /// The start value that is the latest.
+    pub start: u16,
+}
+
+/// The ripple of macropixel (0, 0), by paths and by events.
+pub fn ripple(config: &SensorConfig, silicon: &Silicon) -> RippleTiming {
+    let sensor = Sensor::from(config).made_of(silicon);
+    let delays = sensor.local_stop_delays();
+    let (start, latest) = delays.latest();
+    RippleTiming {
+        longest_path: delays.bounds().1,
+        latest,
+        start,
+    }
 }
 
 /// What a simulated reset pulse is, and what it meets.

@@ -107,12 +107,7 @@ impl MacropixelTiming {
         let clk = Requirements::behind(netlist, clk, &library, corner);
         let (rise, fall) = (clk.arrivals(Edge::Rise), clk.arrivals(Edge::Fall));
 
-        let hit_cells = probes.hit_cells(netlist);
-        let is_hit = |r: &Requirement| hit_cells.contains(&r.cell);
-        let samplers: Vec<usize> = probes.samplers(netlist).collect();
-        let of_first_sampler =
-            |r: &Requirement| r.kind.concerns_data() && samplers.contains(&r.cell);
-        let (hits, clk_rest): (Vec<_>, Vec<_>) = clk.all().iter().copied().partition(is_hit);
+        let (hits, clk_rest) = circuit.split(clk.all());
         let limit = |kind: CheckKind| {
             let limits = library.checks(CellKind::Dffr);
             Time::from_fs(limits.at(kind, corner).into())
@@ -143,10 +138,7 @@ impl MacropixelTiming {
             stop_strobe: (config.mode == Mode::Conventional).then_some(delays.stop_strobe),
             counts_at_once: !config.p_counter.row().has_memory,
             hits,
-            clk: clk_rest
-                .into_iter()
-                .filter(|r| !of_first_sampler(r))
-                .collect(),
+            clk: clk_rest,
             recovery: limit(CheckKind::Recovery),
             removal: limit(CheckKind::Removal),
             control_high: limit(CheckKind::ControlHigh),
@@ -268,8 +260,8 @@ impl MacropixelTiming {
         let Some(stop_strobe) = self.stop_strobe else {
             let shortest = self.clk_period().unwrap_or(period);
             let signals = (strobe, shift);
-            let race =
-                Race::strobe_at_shift(period, nearest(strobe), signals, (setup, hold), shortest);
+            let all = (self.strobe, shortest);
+            let race = Race::strobe_at_shift(period, nearest(strobe), signals, (setup, hold), all);
             return Some(race);
         };
         let half = Time::from_fs(period.as_fs() / 2);

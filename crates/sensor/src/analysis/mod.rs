@@ -34,7 +34,7 @@ mod verdict;
 pub use code_density::Linearity;
 pub use corners::{CornerLimit, FactorRange, corner_limits, factor_range};
 pub use correlation::CorrelationTiming;
-pub use gates::{ResetTiming, gate_works, reset, ripple};
+pub use gates::{ResetTiming, RippleTiming, gate_works, reset, ripple};
 pub use load::{LoadTiming, load_works};
 pub use macropixel::{Aim, LocalClocks, MacropixelTiming, longest};
 pub use power::{BlockSilicon, Capacitances, MacropixelPower};

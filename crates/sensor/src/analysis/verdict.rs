@@ -104,6 +104,18 @@ pub struct VerdictReport {
     pub later_windows: Option<String>,
 }
 
+impl VerdictReport {
+    /// What to say before anything is simulated, where timing is not met.
+    pub fn warning(&self) -> Option<String> {
+        (!self.met).then(|| {
+            format!(
+                "timing {}. The gates show what their model makes of a broken limit: their counts cannot be trusted",
+                self.verdict
+            )
+        })
+    }
+}
+
 impl TimingVerdict {
     /// Judges the sensor at its CLK, STOP phase, LOAD_CLK and dead time; where macropixels differ, the one at `position`.
     pub fn of(config: &SensorConfig, silicon: &Silicon, position: (usize, usize)) -> Self {

@@ -150,7 +150,7 @@ impl WindowLaw {
         let sampled = match self.sensor.mode {
             Mode::Guided => {
                 let edge = window.count_edge + cycle * i64::from(exposure.stop_periods);
-                exposure.falling(edge) + timing.ripple() + timing.local_stop_to_sample
+                exposure.falling(edge) + self.ripple(window.start) + timing.local_stop_to_sample
             }
             Mode::Conventional => exposure.stop(cycle + 1) + timing.stop_to_sample,
         };
@@ -248,22 +248,23 @@ impl WindowLaw {
         // Start values count steps of CLK periods, whatever bins are.
         let step_s = self.sensor.step_periods as f64 / self.exposure.clock.as_hz();
         let opens = |start| Some((start, self.window(start).open()?));
-        let (sample, window) = self.samples().into_iter().find_map(opens)?;
+        let (sample, window) = self.samples().find_map(opens)?;
         let centre = self.interval(&window);
         let centre_s = (centre.start.as_s() + centre.end.as_s()) / 2.0;
         let guess = sample as f64 + ((time.as_s() - centre_s) / step_s).round();
         let largest = self.sensor.largest_start();
         let guess = guess.clamp(0.0, largest as f64) as u16;
-        // Windows beside the guess suffice where they open; where some do not, as at the laser cycle's end, any that
-        // contains the time may be the best.
+        // Windows beside the guess suffice where they open, and those by which start values' ripples may differ. Where some do not open,
+        // as at the laser cycle's end, any that contains the time may be the best.
         let within =
             |reach: u16| guess.saturating_sub(reach)..=(guess.saturating_add(reach)).min(largest);
-        let beside = within(1).map(|start| Some((distance(start)?, start)));
+        let near = 1 + self.ripple_spread_periods();
+        let beside = within(near).map(|start| Some((distance(start)?, start)));
         let best = match beside.collect::<Option<Vec<_>>>() {
             Some(beside) => beside.into_iter().min()?.1,
             None => {
                 let half_s = (centre.end - centre.start).as_s() / 2.0;
-                let reach = (half_s / step_s).ceil() as u16 + 1;
+                let reach = (half_s / step_s).ceil() as u16 + near;
                 let opening = within(reach).filter_map(|start| Some((distance(start)?, start)));
                 opening.min()?.1
             }

@@ -121,6 +121,8 @@ keys! {
         after_borrow: AfterBorrow = AfterBorrow::Hold, from "thesis 4.5";
         /// CLK periods from a start value's window to the next one's: 1, 2, 4 or 8; without memory 1.
         step_periods: usize = 1, in Within(1.0, 8.0), from "thesis 4.9.3, Table 10";
+        /// Buffers of the delay chain that sets the width of COUNTER_RESET; 0 takes as many as the cells need, at least 6.
+        reset_stages: usize = 0, in Within(0.0, 1000.0), from "chosen: the pulse outlasts what it resets by a tenth";
         /// What times photons: a shift register, with bins of CLK periods (HSLIDAR's clocked mode has a counter in the thesis), or delay lines, whose
         /// elements are the bins and on which photons of a bin cancel in pairs.
         tdc: Tdc = Tdc::Clocked,

@@ -21,6 +21,9 @@ pub enum Conflict {
     /// Data and CLK of some flip-flop.
     #[error("a path is slower than a CLK period")]
     SlowPath,
+    /// Data and CLK of some flip-flop, at any CLK period.
+    #[error("data of a flip-flop change within its hold time")]
+    BrokenHold,
     /// STROBE after LOCAL_STOP and the shift register.
     #[error("the strobe meets a change of the shift register")]
     StrobeAtShift,
@@ -30,6 +33,12 @@ pub enum Conflict {
     /// COUNTER_CLK and COUNTER_RESET.
     #[error("a CLK edge meets the end of the reset pulse")]
     ClkAtResetEnd,
+    /// COUNTER_RESET falls while what it resets still changes.
+    #[error("the reset pulse is shorter than what it resets needs")]
+    ShortReset,
+    /// BLOCK rises within a pulse of COUNTER_CLK.
+    #[error("LOCAL_STOP cuts a pulse of COUNTER_CLK short")]
+    CutPulse,
     /// STROBE and HIT's reset at the end of its laser cycle.
     #[error("the strobe meets the next laser cycle's reset")]
     StrobeAtNextReset,
@@ -47,6 +56,21 @@ pub enum Conflict {
     LocalStopAtEnable,
 }
 
+impl Conflict {
+    /// Whether it may concern some start values and not others.
+    pub fn depends_on_start(self) -> bool {
+        matches!(
+            self,
+            Conflict::StrobeAtShift
+                | Conflict::CutPulse
+                | Conflict::StrobeAtNextReset
+                | Conflict::StrobeAtReset
+                | Conflict::ResetStrobeAtHitReset
+                | Conflict::LocalStopAtEnable
+        )
+    }
+}
+
 /// The event that the times of a race are counted from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Origin {
@@ -59,6 +83,9 @@ pub enum Origin {
     /// The laser cycle's STOP edge.
     #[error("STOP rises")]
     StopRises,
+    /// The laser cycle's reset.
+    #[error("COUNTER_RESET rises")]
+    ResetRises,
     /// The exposure's first STOP edge.
     #[error("the first STOP edge")]
     FirstStop,
@@ -81,6 +108,14 @@ pub enum Irregular {
         "delay lines take the lowest bit of COUNTER_INIT for that of the start value, and this P-counter has codes of its own"
     )]
     OwnCodes,
+    /// The cells' delays make the P-counter count something else.
+    #[error("{}", miscounts(*.start, *.found))]
+    Miscounts {
+        /// From which start value.
+        start: u16,
+        /// The count that raises LOCAL_STOP, the first one being 0; none where none does.
+        found: Option<u32>,
+    },
     /// Another block of one's own, by its key.
     #[error("no window law describes the netlist of {0}")]
     OwnBlock(&'static str),
@@ -94,6 +129,16 @@ pub enum Irregular {
         /// CLK periods in which the P-counter comes round.
         round: i64,
     },
+}
+
+fn miscounts(start: u16, found: Option<u32>) -> String {
+    let found = match found {
+        Some(count) => format!("LOCAL_STOP rises with count number {count}"),
+        None => "LOCAL_STOP does not rise".to_owned(),
+    };
+    format!(
+        "with the delays of these cells the P-counter does not count down from start value {start}: {found}"
+    )
 }
 
 /// Why windows cannot be aimed.
@@ -145,6 +190,10 @@ pub enum Cure {
     LaserCycle,
     /// The tap `msb`.
     Tap,
+    /// The delay chain that makes the reset pulse.
+    ResetChain,
+    /// The cells: no clock helps.
+    Cells,
 }
 
 impl Race {
@@ -156,31 +205,71 @@ impl Race {
     }
 
     /// The strobe of the HIT flip-flops near a change of the shift register, `edges` rising CLK edges after the first that
-    /// follows the counted fall; all times from CLK's fall. `shift` is CLK's rise to the change, and `shortest` the shortest
-    /// CLK period that everything else allows.
+    /// follows the counted fall; all times from CLK's fall. `strobes` are the earliest and the latest of all start values,
+    /// `shift` is CLK's rise to the change, and `shortest` the shortest CLK period that everything else allows.
     pub(crate) fn strobe_at_shift(
         period: Time,
         edges: i64,
         (strobe, shift): (Time, Time),
         (setup, hold): (Time, Time),
-        shortest: Time,
+        (strobes, shortest): ((Time, Time), Time),
     ) -> Self {
-        let odd = 2 * edges + 1;
-        let change = Time::from_fs(period.as_fs() * odd / 2) + shift;
-        let band = |offset: Time, odd: i64| 2 * offset.as_fs() / odd;
-        let upper = |odd| Time::from_fs(band(strobe - shift + hold, odd)) + ROUNDING;
-        let at_most = Time::from_fs(band(strobe - shift - setup, odd)) - ROUNDING;
-        let is_possible = at_most > shortest && at_most > upper(odd + 2);
+        let change = Time::from_fs(period.as_fs() * (2 * edges + 1) / 2) + shift;
+        let band = (strobes.0 - shift - setup, strobes.1 - shift + hold);
+        let halves = |edge: i64| 2 * edge + 1;
         Race {
             what: Conflict::StrobeAtShift,
             after: Origin::ClkFalls,
             comes: strobe,
             from: change - hold,
             to: Some(change + setup),
-            cure: Cure::Period {
-                at_least: upper(odd),
-                at_most: is_possible.then_some(at_most),
+            cure: clear_periods(period, edges, halves, band, shortest),
+        }
+    }
+
+    /// A block of COUNTER_CLK at `block` after CLK's fall, within pulse number `pulses` after the one that it follows. `blocks` are
+    /// the earliest and the latest of all start values; each is too late from the first time of `within` after CLK's fall on, until
+    /// the second.
+    pub(crate) fn cut_pulse(
+        period: Time,
+        pulses: i64,
+        block: Time,
+        (blocks, within): ((Time, Time), (Time, Time)),
+        shortest: Time,
+    ) -> Self {
+        let pulse = period * pulses;
+        let band = (blocks.0 - within.1, blocks.1 - within.0);
+        Race {
+            what: Conflict::CutPulse,
+            after: Origin::ClkFalls,
+            comes: block,
+            from: pulse + within.0,
+            to: Some(pulse + within.1),
+            cure: if pulses > 0 {
+                clear_periods(period, pulses, |pulse| 2 * pulse, band, shortest)
+            } else {
+                Cure::Cells
             },
+        }
+    }
+
+    /// Data that come too soon by this much.
+    pub(crate) fn broken_hold(need: Time) -> Self {
+        Race {
+            cure: Cure::Cells,
+            ..Race::too_slow(Conflict::BrokenHold, need, Time::ZERO)
+        }
+    }
+
+    /// A reset pulse of this `width` that must outlast `need`.
+    pub(crate) fn short_reset(need: Time, width: Time) -> Self {
+        Race {
+            what: Conflict::ShortReset,
+            after: Origin::ResetRises,
+            comes: need,
+            from: width,
+            to: None,
+            cure: Cure::ResetChain,
         }
     }
 
@@ -219,6 +308,41 @@ impl Race {
                 at_most: None,
             },
         }
+    }
+}
+
+/// The CLK periods next to `period` at which no edge of CLK, `halves(edge)` half periods after its fall, lies within `band`, which is
+/// where edge number `edge` lies now.
+fn clear_periods(
+    period: Time,
+    edge: i64,
+    halves: impl Fn(i64) -> i64,
+    band: (Time, Time),
+    shortest: Time,
+) -> Cure {
+    let share = |time: Time, edge: i64| match halves(edge) {
+        halves if halves > 0 => Time::from_fs(2 * time.as_fs() / halves),
+        // That edge is where CLK falls, at every period.
+        _ => Time::MAX,
+    };
+    let upper = |edge| share(band.1, edge).max(period) + ROUNDING;
+    let lower = |edge| share(band.0, edge).min(period) - ROUNDING;
+    // Bands of edges that come before may overlap with this one's, if start values differ much.
+    let mut before = edge;
+    while before > 0
+        && halves(before - 1) > 0
+        && upper(before) >= share(band.0, before - 1) - ROUNDING
+    {
+        before -= 1;
+    }
+    let mut after = edge;
+    while lower(after) > shortest && lower(after) <= share(band.1, after + 1) + ROUNDING {
+        after += 1;
+    }
+    let at_most = lower(after);
+    Cure::Period {
+        at_least: upper(before),
+        at_most: (at_most > shortest).then_some(at_most),
     }
 }
 
@@ -279,6 +403,11 @@ impl fmt::Display for Cure {
                 "give another length of the laser cycle, or start values whose windows end elsewhere in it"
             ),
             Cure::Tap => write!(f, "give tap = \"borrow\""),
+            Cure::ResetChain => write!(
+                f,
+                "give reset_stages = 0, which makes the delay chain as long as the cells need, or more stages"
+            ),
+            Cure::Cells => write!(f, "give another library; no clk_hz helps"),
         }
     }
 }
@@ -307,7 +436,8 @@ mod tests {
             // From the last change before it that holds to the one after it that is set up.
             let change = period * (2 * edges + 1) / 2 + shift;
             let strobe = change - hold + 1 + ((hold + setup - 2) as f64 * into) as i64;
-            let race = Race::strobe_at_shift(fs(period), edges, (fs(strobe), fs(shift)), (fs(setup), fs(hold)), fs(shortest));
+            let strobes = ((fs(strobe), fs(strobe)), fs(shortest));
+            let race = Race::strobe_at_shift(fs(period), edges, (fs(strobe), fs(shift)), (fs(setup), fs(hold)), strobes);
             prop_assert_eq!((race.comes, race.from, race.to), (fs(strobe), fs(change - hold), Some(fs(change + setup))));
             prop_assert_eq!(-race.slack(), fs(strobe - change + hold).min(fs(change + setup - strobe)));
             let meets = |period: i64, edge: i64| {

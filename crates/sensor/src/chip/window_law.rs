@@ -24,7 +24,8 @@
 //! Where delay lines time photons, LOCAL_STOP freezes the lines as soon as it comes: CLK has no part in the bins, only in where
 //! windows end.
 //!
-//! [`ChipTiming`] has the delays of the paths concerned, measured on the netlist; tests hold the law against it.
+//! [`ChipTiming`] has the delays of the paths concerned, measured on the netlist, and [`LocalStopDelays`] the ripple of each start value;
+//! tests hold the law against it.
 
 use super::bins::Bins;
 use super::config::{Mode, Tdc};
@@ -32,8 +33,10 @@ use super::exposure::Exposure;
 use super::p_counter::{Rises, starts_high};
 use super::race::{Conflict, Cure, Irregular, NoAim, Origin, Race};
 use super::sensors::Sensor;
-use super::timing::ChipTiming;
+use super::timing::macropixel::spread;
+use super::timing::{ChipTiming, LocalStopDelays};
 use crate::units::Time;
+use std::sync::Arc;
 
 /// What the law adds to the flip-flops' limits: one femtosecond of rounding on either edge.
 const ROUNDING: Time = Time::from_fs(2);
@@ -109,6 +112,8 @@ pub struct WindowLaw {
     pub(super) sensor: Sensor,
     pub(super) exposure: Exposure,
     pub(super) timing: ChipTiming,
+    /// The ripple of each start value; `None` where `timing` has one for all.
+    pub(super) local_stop: Option<Arc<LocalStopDelays>>,
     pub(super) bins: i64,
     pub(super) edges: Bins,
     pub(super) period_fs: f64,
@@ -121,7 +126,11 @@ impl WindowLaw {
     pub fn new(sensor: impl Into<Sensor>, exposure: &Exposure) -> Self {
         let sensor = sensor.into();
         let timing = *sensor.timing();
-        Self::with_timing(sensor, exposure, timing)
+        let local_stop = Some(Arc::clone(sensor.local_stop_delays()));
+        WindowLaw {
+            local_stop,
+            ..Self::with_timing(sensor, exposure, timing)
+        }
     }
 
     /// The law for a macropixel with delays of its own. Where they are known between bounds only, `timing` has the
@@ -141,6 +150,7 @@ impl WindowLaw {
             sensor,
             exposure: *exposure,
             timing,
+            local_stop: None,
             edges,
             period_fs: 1e15 / exposure.clock.as_hz(),
             latency: timing.spad_to_sampled,
@@ -175,6 +185,28 @@ impl WindowLaw {
         &self.timing
     }
 
+    /// CLK falling to LOCAL_STOP rising from this start value (thesis 4.6, Fig. 56).
+    pub fn ripple(&self, start: u16) -> Time {
+        let own = self.local_stop.as_ref();
+        let delay = own.map(|delays| delays.of_start(start));
+        self.timing.clk_to_counter_clk + delay.unwrap_or(self.timing.counter.clk_to_local_stop)
+    }
+
+    /// A start value from which these delays count something else.
+    fn miscount(&self, start: u16) -> Option<Irregular> {
+        let found = self.local_stop.as_ref()?.miscount(start)?;
+        Some(Irregular::Miscounts { start, found })
+    }
+
+    /// The earliest and the latest ripple of all start values.
+    fn ripples(&self) -> (Time, Time) {
+        let latest = self.timing.counter.clk_to_local_stop;
+        let own = self.local_stop.as_ref();
+        let (least, most) = own.map_or((latest, latest), |delays| delays.span());
+        let before = self.timing.clk_to_counter_clk;
+        (before + least, before + most)
+    }
+
     /// Where the window of a start value lies.
     pub fn window(&self, start: u16) -> Window {
         let (exposure, timing) = (&self.exposure, &self.timing);
@@ -190,6 +222,13 @@ impl WindowLaw {
             };
             return Window::Race(Race::too_slow(what, to_shift, period));
         }
+        if let Some(need) = timing.broken_hold {
+            return Window::Race(Race::broken_hold(need));
+        }
+        if period < timing.clk_period {
+            let race = Race::too_slow(Conflict::SlowPath, timing.clk_period, period);
+            return Window::Race(race);
+        }
         let (cause, arrival, count_edge, irregular) = match self.sensor.mode {
             // A laser cycle is counted by the STOP edge that ends it.
             Mode::Conventional => (end, end + timing.stop_to_strobe, 0, None),
@@ -200,7 +239,7 @@ impl WindowLaw {
                 } else {
                     self.coming_round(start)
                 };
-                let unknown = self.own_counter();
+                let unknown = self.own_counter().or_else(|| self.miscount(start));
                 match found {
                     Ok(LocalStop {
                         time,
@@ -225,7 +264,7 @@ impl WindowLaw {
             } else {
                 arrival + before
             };
-            return Window::Race(self.strobe_race(cause, arrival, change));
+            return Window::Race(self.strobe_race(start, (cause, arrival), change));
         }
         if let Some(why) = irregular.or(self.sensor.lawless_block().map(Irregular::OwnBlock)) {
             return Window::Irregular(why);
@@ -239,19 +278,23 @@ impl WindowLaw {
         })
     }
 
-    /// A strobe at `arrival`, for this `cause`, too near a `change` of the shift register.
-    fn strobe_race(&self, cause: Time, arrival: Time, change: Time) -> Race {
+    /// The strobe of a start value at `arrival`, for this `cause`, too near a `change` of the shift register.
+    fn strobe_race(&self, start: u16, (cause, arrival): (Time, Time), change: Time) -> Race {
         let (exposure, timing) = (&self.exposure, &self.timing);
         let period = exposure.clock.period();
         let (setup, hold) = (timing.setup + ROUNDING, timing.hold + ROUNDING);
         match self.sensor.mode {
             Mode::Guided => {
-                let strobe = timing.ripple() + timing.local_stop_to_strobe;
+                let strobe = self.ripple(start) + timing.local_stop_to_strobe;
                 let edge = exposure.rising_until(change - timing.clk_to_shift);
                 let fall = exposure.rising_until(arrival - strobe) + 1;
-                let shortest = timing.clk_to_event.max(timing.counter.period) + setup;
+                let ripples = self.ripples();
+                let to_strobe = timing.local_stop_to_strobe;
+                let strobes = (ripples.0 + to_strobe, ripples.1 + to_strobe);
                 let signals = (strobe, timing.clk_to_shift);
-                Race::strobe_at_shift(period, edge - fall, signals, (setup, hold), shortest)
+                let limits = (setup, hold);
+                let all = (strobes, self.shortest_period());
+                Race::strobe_at_shift(period, edge - fall, signals, limits, all)
             }
             // The shift register comes earlier after STOP where STOP comes later.
             Mode::Conventional => {
@@ -261,6 +304,35 @@ impl WindowLaw {
                 Race::with_stop(what, change - cause, forbidden, exposure.stop_phase, period)
             }
         }
+    }
+
+    /// The shortest CLK period that everything but strobe and block allows.
+    fn shortest_period(&self) -> Time {
+        let timing = &self.timing;
+        let paths = timing.clk_to_event.max(timing.counter.period);
+        timing.clk_period.max(paths + timing.setup + ROUNDING)
+    }
+
+    /// LOCAL_STOP that leaves too short a piece of a pulse of COUNTER_CLK.
+    fn cut_pulse(&self, start: u16) -> Option<Race> {
+        let timing = &self.timing;
+        let block = timing.counter.block?;
+        let period = self.exposure.clock.period();
+        let to_block = block.from_local_stop;
+        let blocks = self.ripple(start) + to_block;
+        let counter_clk = timing.clk_to_counter_clk;
+        // From the pulse's rise until so much of it is left that it is a pulse.
+        let within = (
+            counter_clk - ROUNDING,
+            counter_clk + timing.counter.clock_high - block.to_counter_clk + ROUNDING,
+        );
+        let pulses = (blocks - within.0).as_fs().div_euclid(period.as_fs());
+        let is_cut = blocks < period * pulses + within.1;
+        is_cut.then(|| {
+            let ripples = self.ripples();
+            let all = ((ripples.0 + to_block, ripples.1 + to_block), within);
+            Race::cut_pulse(period, pulses, blocks, all, self.shortest_period())
+        })
     }
 
     /// What keeps a P-counter of one's own from having a law, if anything.
@@ -280,6 +352,10 @@ impl WindowLaw {
         if period <= count {
             let what = Conflict::SlowCounter;
             return Err(Window::Race(Race::too_slow(what, count, period)));
+        }
+        if counter.reset_width < counter.reset_need {
+            let race = Race::short_reset(counter.reset_need, counter.reset_width);
+            return Err(Window::Race(race));
         }
         let Some(rises) = Rises::of(&self.sensor, start) else {
             return Err(Window::Never);
@@ -310,7 +386,8 @@ impl WindowLaw {
             return Err(Window::Never);
         };
         let deadline = end + timing.stop_to_hit_reset - timing.strobe_to_hit;
-        let strobe = exposure.falling(last) + timing.ripple() + timing.local_stop_to_strobe;
+        let ripple = self.ripple(start);
+        let strobe = exposure.falling(last) + ripple + timing.local_stop_to_strobe;
         let margin = deadline - strobe;
         if margin < -ROUNDING && rises.every.is_none() {
             return Err(Window::Never);
@@ -340,8 +417,11 @@ impl WindowLaw {
                 }));
             }
         }
+        if let Some(race) = self.cut_pulse(start) {
+            return Err(Window::Race(race));
+        }
         Ok(LocalStop {
-            time: exposure.falling(edge) + timing.ripple(),
+            time: exposure.falling(edge) + ripple,
             edge,
             irregular: (edges.len() > 1)
                 .then_some(Irregular::LocalStopRepeats { rises: edges.len() }),
@@ -398,7 +478,7 @@ impl WindowLaw {
             ..=timing.stop_to_hit_release + timing.recovery + ROUNDING;
         let meets_reset = |edge: i64| {
             let place = exposure.falling(edge.rem_euclid(periods));
-            let arrival = place + timing.ripple() + timing.local_stop_to_strobe;
+            let arrival = place + self.ripple(start) + timing.local_stop_to_strobe;
             [arrival, arrival - end]
                 .into_iter()
                 .find(|t| in_doubt.contains(t))
@@ -415,7 +495,7 @@ impl WindowLaw {
             }));
         }
         Ok(LocalStop {
-            time: exposure.falling(edge) + timing.ripple(),
+            time: exposure.falling(edge) + self.ripple(start),
             edge,
             irregular: (periods != every).then_some(Irregular::OutOfStep {
                 stop_periods: periods,
@@ -427,14 +507,23 @@ impl WindowLaw {
     /// Why no window can be aimed, if so: the reason for which start values do not open one.
     pub fn refusal(&self) -> Option<NoAim> {
         let reason = |start| self.window(start).settled().err();
-        let mut reasons = self.samples().into_iter().map(reason);
-        reasons.try_fold(None, |_, why| why.map(Some))?
+        let mut reasons = self.samples().map(reason);
+        let first = reasons.next()??;
+        reasons.all(|why| why.is_some()).then_some(first)
     }
 
-    /// A few start values, one of which opens a window if most do.
-    pub(super) fn samples(&self) -> [u16; 4] {
+    /// All start values, and before them a few of which one opens a window if most do.
+    pub(super) fn samples(&self) -> impl Iterator<Item = u16> + use<> {
         let largest = self.sensor.largest_start();
-        [0, 1, 16.min(largest), largest / 2]
+        let first = [0, 1, 16.min(largest), largest / 2];
+        first.into_iter().chain(0..=largest)
+    }
+
+    /// CLK periods by which the ripples of two start values may differ, rounded up.
+    pub(super) fn ripple_spread_periods(&self) -> u16 {
+        let own = self.local_stop.as_ref();
+        let spread = own.map_or(Time::ZERO, |delays| spread(delays.bounds()));
+        (spread.as_fs() as f64 / self.period_fs).ceil() as u16
     }
 }
 

@@ -1,18 +1,26 @@
 //! Why an engine has no answer: facts and numbers. What may be done about it depends on who asked; the command line words
 //! its cures itself.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use crate::chip::Irregular;
 use crate::chip::front_end::{DeadTimeTooShort, PulseLimits};
 use crate::chip::race::NoAim;
-use crate::chip::{FrontEnd, Race, Sensor, Tdc};
+use crate::chip::window_law::Window;
+use crate::chip::{FrontEnd, Race, Sensor, Tdc, WindowLaw};
 use crate::units::Time;
 
 /// Why an engine has no answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EngineError {
     /// The window law finds two signals too close to call.
-    #[error("{0}, so only the gate engine can tell what is counted")]
-    Race(Race),
+    #[error("{}{race}, so only the gate engine can tell what is counted", listed(.starts))]
+    Race {
+        /// What meets what, for the first of the start values.
+        race: Race,
+        /// The start values concerned, in ascending order; none where it does not depend on them.
+        starts: Vec<u16>,
+    },
     /// The window law has no single window for this start value.
     #[error("{0}, so the window law cannot tell what is counted")]
     Irregular(Irregular),
@@ -149,10 +157,54 @@ impl EngineError {
 impl From<NoAim> for EngineError {
     fn from(why: NoAim) -> Self {
         match why {
-            NoAim::Race(race) => EngineError::Race(race),
+            NoAim::Race(race) => EngineError::Race {
+                race,
+                starts: Vec::new(),
+            },
             NoAim::Irregular(why) => EngineError::Irregular(why),
         }
     }
+}
+
+/// Start values before the sentence that concerns them: runs of more than two as their ends.
+fn listed(starts: &[u16]) -> String {
+    let runs = starts.chunk_by(|before, after| before + 1 == *after);
+    let runs = runs.flat_map(|run| match run {
+        [first, .., last] if run.len() > 2 => vec![format!("{first} to {last}")],
+        _ => run.iter().map(u16::to_string).collect(),
+    });
+    let runs: Vec<String> = runs.collect();
+    match starts.len() {
+        0 => String::new(),
+        1 => format!("start value {}: ", runs[0]),
+        _ => format!("start values {}: ", runs.join(", ")),
+    }
+}
+
+/// The windows of these start values, where each has one or never opens.
+///
+/// # Errors
+/// What keeps the law from telling, with all of the start values whose signals race if the first one does.
+pub(super) fn refuse_races(
+    law: &WindowLaw,
+    starts: impl Iterator<Item = u16>,
+) -> Result<(), EngineError> {
+    let mut racing: BTreeMap<u16, Race> = BTreeMap::new();
+    let mut known: BTreeSet<u16> = BTreeSet::new();
+    for start in starts.filter(|&start| known.insert(start)) {
+        if let Window::Race(race) = law.window(start) {
+            racing.insert(start, race);
+            if !race.what.depends_on_start() {
+                break;
+            }
+        }
+    }
+    let Some((_, &race)) = racing.first_key_value() else {
+        return Ok(());
+    };
+    let of_start = race.what.depends_on_start();
+    let starts = racing.into_keys().filter(|_| of_start).collect();
+    Err(EngineError::Race { race, starts })
 }
 
 /// Whether one set of delays describes all macropixels of this sensor, and its front end, with these limits, follows the pulses of
@@ -185,8 +237,18 @@ pub(super) fn has_a_line_a_spad(sensor: &Sensor) -> Result<(), EngineError> {
 mod tests {
     use super::*;
     use crate::chip::{Exposure, quantic4x4};
-    use crate::engine::{Cycle, Gate, PulsedPixel, Replay, Runner, Timed, Window};
+    use crate::engine::{Cycle, Gate, PulsedPixel, Replay, Runner, Timed};
     use crate::netlist::Mismatch;
+
+    #[test]
+    fn start_values_are_listed_as_runs() {
+        assert_eq!(listed(&[]), "");
+        assert_eq!(listed(&[40]), "start value 40: ");
+        assert_eq!(
+            listed(&[1, 2, 5, 6, 7, 511]),
+            "start values 1, 2, 5 to 7, 511: "
+        );
+    }
 
     #[test]
     fn engines_with_one_set_of_delays_refuse_mismatch_by_name() {
@@ -208,7 +270,7 @@ mod tests {
         let engines: [&dyn Replay; 3] = [
             &Gate::new(&sensor, &exposure),
             &Cycle::new(&sensor, &exposure),
-            &Window::new(&sensor, &exposure),
+            &crate::engine::Window::new(&sensor, &exposure),
         ];
         for engine in engines {
             assert_eq!(engine.replay(&[pixel]), Err(EngineError::Mismatch));

@@ -30,6 +30,7 @@ use crate::chip::config::{Mode, SensorConfig, Tdc};
 use crate::chip::exposure::Exposure;
 use crate::chip::own_block::block::OwnBlock;
 use crate::chip::timing::chip_timing::ChipTiming;
+use crate::chip::timing::local_stop::LocalStopDelays;
 use crate::netlist::{Module, ModuleBuilder};
 use crate::units::Time;
 
@@ -80,7 +81,7 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     m.wire_bus("HIT", config.bins);
     let counts = m.wire_bus("COUNT", config.bins * config.bin_bits);
 
-    let timing = p_counter_timing::circuit(config.after_borrow);
+    let timing = p_counter_timing::circuit(config.after_borrow, config.reset_buffers());
     m.instance_by_names("p_counter_timing", &timing, &[]);
     m.instance_by_names("p_counter", &p_counter::circuit(config), &[]);
     match config.tdc {
@@ -125,15 +126,21 @@ pub struct Model<'a> {
     config: &'a SensorConfig,
     exposure: &'a Exposure,
     timing: ChipTiming,
+    local_stop: &'a LocalStopDelays,
 }
 
 impl<'a> Model<'a> {
-    /// A macropixel of this sensor, with these delays, in this exposure.
-    pub fn new(config: &'a SensorConfig, timing: ChipTiming, exposure: &'a Exposure) -> Self {
+    /// A macropixel of this sensor, with these delays, and of LOCAL_STOP those of each start value, in this exposure.
+    pub fn new(
+        config: &'a SensorConfig,
+        (timing, local_stop): (ChipTiming, &'a LocalStopDelays),
+        exposure: &'a Exposure,
+    ) -> Self {
         Model {
             config,
             exposure,
             timing,
+            local_stop,
         }
     }
 
@@ -203,7 +210,7 @@ impl<'a> Model<'a> {
                     rise > timing.stop_to_enabled && edge < cycles * periods
                 };
                 if counts && counter.clock() {
-                    let local_stop = counter_clk + timing.counter.clk_to_local_stop;
+                    let local_stop = counter_clk + self.local_stop.of_start(start);
                     // The next reset takes back what still ripples.
                     let deadline = if has_memory {
                         stop + timing.stop_to_hit_reset - timing.strobe_to_hit
@@ -284,6 +291,7 @@ impl<'m> Hit<'m> {
             config,
             exposure,
             timing,
+            ..
         } = self.model;
         if config.mode == Mode::Conventional {
             // NOT STOP has cleared HIT.

@@ -20,7 +20,7 @@
 //!   ([`AfterBorrow`]) goes without that: BLOCK is NOT ENABLE.
 //!
 //! Timing: at a STOP edge the falling LOCAL_STOP unblocks COUNTER_CLK, which rises if CLK is low. That
-//! edge must still meet an active reset, hence the length of the chain.
+//! edge must still meet an active reset, hence the length of the chain ([`reset_chain`](crate::chip::timing::reset_chain)).
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -31,13 +31,15 @@ use crate::chip::timing::chip_timing::ChipTiming;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 use crate::units::Time;
 
-/// Buffers in the delay chain that sets the width of COUNTER_RESET.
-pub const DELAY_CHAIN: usize = 6;
+/// Fewest buffers in the delay chain that sets the width of COUNTER_RESET. A library may need more
+/// ([`SensorConfig::reset_stages`]).
+pub const SHORTEST_CHAIN: usize = 6;
 
 /// The timing block.
 ///
-/// Ports: CLK, STOP, RESETB, ENABLE, LOCAL_STOP → COUNTER_CLK, COUNTER_RESET, MEMORY_RESET, STOP_D.
-pub fn circuit(after_borrow: AfterBorrow) -> Arc<Module> {
+/// Ports: CLK, STOP, RESETB, ENABLE, LOCAL_STOP → COUNTER_CLK, COUNTER_RESET, MEMORY_RESET, STOP_D. The delay chain has
+/// `stages` buffers, one at least.
+pub fn circuit(after_borrow: AfterBorrow, stages: usize) -> Arc<Module> {
     let mut m = ModuleBuilder::new("p_counter_timing");
     let clk = m.input("CLK");
     let stop = m.input("STOP");
@@ -61,7 +63,7 @@ pub fn circuit(after_borrow: AfterBorrow) -> Arc<Module> {
     };
 
     let mut delayed: Net = stop;
-    for _ in 1..DELAY_CHAIN {
+    for _ in 1..stages {
         delayed = m.gate(CellKind::Buf, &[delayed]);
     }
     m.gate_into(CellKind::Buf, &[delayed], stop_d);

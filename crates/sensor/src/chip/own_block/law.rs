@@ -14,26 +14,14 @@ use std::sync::Arc;
 
 use crate::chip::config::AfterBorrow;
 use crate::chip::p_counter::Rises;
+use crate::chip::p_counter::count_down::{CountDown, Counted, Expected};
 use crate::chip::timing::silicon::Silicon;
 use crate::chip::{Probe, Probes};
-use crate::kernel::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
-use crate::netlist::{Corner, Module, NetId, Netlist};
-use crate::units::Time;
+use crate::kernel::LANES;
+use crate::netlist::{Corner, Module, Netlist};
 
-/// Most cells of a block: its law is measured while somebody waits, and [`PAUSE`] lets them settle one after the other.
+/// Most cells of a block: its law is measured while somebody waits.
 pub(super) const MOST_CELLS: usize = 10_000;
-
-/// Half a period of COUNTER_CLK, and every pause: long enough for ten thousand gates one after the other.
-const PAUSE: Time = Time::from_ns(500);
-
-/// What the measured law of a counter depends on besides the netlist.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) struct Expected {
-    /// COUNTER_RESET brings the start value back.
-    pub has_memory: bool,
-    pub after_borrow: AfterBorrow,
-    pub step_periods: usize,
-}
 
 /// Why start values open no windows that a line describes. Codes are values of COUNTER_INIT.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
@@ -68,14 +56,6 @@ pub enum Uneven {
         "LOCAL_STOP comes again after another number of counts from COUNTER_INIT {0} on than from others"
     )]
     Round(u16),
-}
-
-/// What one code does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Counted {
-    starts_high: bool,
-    /// Edges of COUNTER_CLK that raise LOCAL_STOP, the first one being 0: the first two.
-    rises: [Option<u32>; 2],
 }
 
 /// What a P-counter of one's own does.
@@ -136,8 +116,13 @@ impl CounterLaw {
         let bits = probes.bus(Probe::CounterInit).len();
         let codes: Vec<u16> = (0..1u32 << bits).map(|code| code as u16).collect();
         // On this thread: whoever else wants the law waits for it, and may be next in this thread's own queue.
-        let parts = codes.chunks(LANES);
-        let parts = parts.map(|codes| Bench::new((&netlist, probes), codes, expected).measure());
+        let timing = Silicon::nominal(Corner::Typ).timing(&netlist);
+        // A reset must bring the start value back.
+        let times = if expected.has_memory { 2 } else { 1 };
+        let parts = codes.chunks(LANES).map(|codes| {
+            let counter = CountDown::new((&netlist, probes), &timing, codes, expected);
+            counter.measure(times)
+        });
         let parts: Result<Vec<Vec<Counted>>, Uneven> = parts.collect();
         let straight = parts.map(|parts| parts.concat());
         let plain = |counted: Vec<Counted>, uneven| CounterLaw {
@@ -146,12 +131,8 @@ impl CounterLaw {
             offset: 0,
             uneven: Some(uneven),
         };
-        let never = Counted {
-            starts_high: false,
-            rises: [None; 2],
-        };
         match straight {
-            Err(why) => plain(vec![never; codes.len()], why),
+            Err(why) => plain(vec![Counted::NEVER; codes.len()], why),
             Ok(counted) => match line(&counted, expected) {
                 Err(why) => plain(counted, why),
                 Ok((codes, offset)) => CounterLaw {
@@ -204,177 +185,6 @@ fn line(counted: &[Counted], expected: Expected) -> Result<(Vec<u16>, u32), Unev
     Ok((codes.collect(), offset))
 }
 
-/// Up to 64 codes in one counter's lanes.
-struct Bench<'n> {
-    netlist: &'n Netlist,
-    probes: &'n Probes,
-    kernel: LaneKernel,
-    codes: &'n [u16],
-    expected: Expected,
-    local_stop: NetId,
-    now: Time,
-}
-
-/// Changes of LOCAL_STOP since it was looked at last: lanes with one, and with more.
-struct Watch {
-    net: NetId,
-    once: u64,
-    again: u64,
-}
-
-impl LaneObserver for Watch {
-    fn change(&mut self, _: Time, net: NetId, mask: u64, _: Lanes) {
-        if net == self.net {
-            self.again |= self.once & mask;
-            self.once |= mask;
-        }
-    }
-}
-
-impl<'n> Bench<'n> {
-    fn new(
-        (netlist, probes): (&'n Netlist, &'n Probes),
-        codes: &'n [u16],
-        expected: Expected,
-    ) -> Self {
-        let timing = Silicon::nominal(Corner::Typ).timing(netlist);
-        Bench {
-            kernel: LaneKernel::new(netlist, &timing),
-            local_stop: probes.net(Probe::LocalStop),
-            netlist,
-            probes,
-            codes,
-            expected,
-            now: Time::ZERO,
-        }
-    }
-
-    /// Drives inputs in some lanes, waits, and tells what LOCAL_STOP did meanwhile.
-    fn drive(&mut self, drives: &[(NetId, Lanes)], mask: u64) -> Watch {
-        let time = self.now;
-        let drives = drives.iter().map(|&(net, values)| LaneDrive {
-            time,
-            net,
-            mask,
-            values,
-        });
-        let mut watch = Watch {
-            net: self.local_stop,
-            once: 0,
-            again: 0,
-        };
-        self.now += PAUSE;
-        self.kernel
-            .run(&mut drives.peekable(), self.now, &mut watch);
-        watch
-    }
-
-    fn set(&mut self, pin: Probe, value: bool) {
-        let net = self.probes.net(pin);
-        self.drive(&[(net, all(value))], u64::MAX);
-    }
-
-    /// Loads the codes and counts from them, after another reset too where that must bring them back.
-    fn measure(mut self) -> Result<Vec<Counted>, Uneven> {
-        let inputs: Vec<_> = self
-            .netlist
-            .inputs()
-            .iter()
-            .map(|&n| (n, all(false)))
-            .collect();
-        self.drive(&inputs, u64::MAX);
-        for (pin, value) in [
-            (Probe::MemoryReset, true),
-            (Probe::CounterReset, true),
-            (Probe::MemoryReset, false),
-        ] {
-            self.set(pin, value);
-        }
-        let init = self.probes.bus(Probe::CounterInit);
-        let bits = (0..).zip(init).map(|(bit, &net)| {
-            let lanes = (0..).zip(self.codes);
-            let word = lanes.fold(0, |word, (lane, code)| {
-                word | u64::from(code >> bit & 1) << lane
-            });
-            (net, Lanes::known(word))
-        });
-        let bits: Vec<_> = bits.collect();
-        self.drive(&bits, u64::MAX);
-        for (pin, value) in [
-            (Probe::MemoryLoad, true),
-            (Probe::MemoryLoad, false),
-            (Probe::CounterReset, false),
-        ] {
-            self.set(pin, value);
-        }
-        let counted = self.count()?;
-        if self.expected.has_memory {
-            self.set(Probe::CounterReset, true);
-            self.set(Probe::CounterReset, false);
-            let again = self.count()?;
-            let mut lanes = counted.iter().zip(&again).zip(self.codes);
-            if let Some((_, &code)) = lanes.find(|((one, other), _)| one != other) {
-                return Err(Uneven::Forgets(code));
-            }
-        }
-        Ok(counted)
-    }
-
-    /// Clocks the counter until LOCAL_STOP has risen, or come round where it wraps, as the timing block lets it.
-    fn count(&mut self) -> Result<Vec<Counted>, Uneven> {
-        let holds = self.expected.after_borrow == AfterBorrow::Hold;
-        let clk = self.probes.net(Probe::CounterClk);
-        let bits = self.probes.bus(Probe::CounterInit).len();
-        // The tap `borrow` makes the round of a counter twice as long; and twice more for one that takes its time.
-        let most = (self.expected.step_periods as u32) << (bits + 2);
-        let used = u64::MAX >> (LANES - self.codes.len());
-        let code = |lanes: u64| self.codes[lanes.trailing_zeros() as usize];
-        let mut high = self.kernel.value(self.local_stop).one;
-        let starts_high = high;
-        let mut rises = vec![[None; 2]; self.codes.len()];
-        let mut awaited = if holds { used & !high } else { used };
-        for edge in 0..most {
-            if awaited == 0 {
-                break;
-            }
-            let counting = if holds { awaited } else { used };
-            let moved = self.drive(&[(clk, all(true))], counting);
-            let level = self.kernel.value(self.local_stop);
-            let late = self.drive(&[(clk, all(false))], counting);
-            let unknown = !(level.one | level.zero) & used;
-            if unknown != 0 {
-                return Err(Uneven::Unknown(code(unknown)));
-            }
-            let unclean = (moved.again | late.once) & used;
-            if unclean != 0 {
-                return Err(Uneven::Glitch(code(unclean)));
-            }
-            let mut rose = level.one & !high & used;
-            high = level.one;
-            while rose != 0 {
-                let lane = rose.trailing_zeros() as usize;
-                rose &= rose - 1;
-                let place = rises[lane].iter_mut().find(|place| place.is_none());
-                if let Some(place) = place {
-                    *place = Some(edge);
-                }
-                if holds || rises[lane][1].is_some() {
-                    awaited &= !(1 << lane);
-                }
-            }
-        }
-        let counted = rises.into_iter().enumerate().map(|(lane, rises)| Counted {
-            starts_high: starts_high >> lane & 1 == 1,
-            rises,
-        });
-        Ok(counted.collect())
-    }
-}
-
-fn all(value: bool) -> Lanes {
-    Lanes::known(if value { u64::MAX } else { 0 })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -403,11 +213,7 @@ mod tests {
                     if config.check().is_err() {
                         continue;
                     }
-                    let expected = Expected {
-                        has_memory: p_counter.row().has_memory,
-                        after_borrow,
-                        step_periods,
-                    };
+                    let expected = Expected::of_sensor(&config);
                     let law = CounterLaw::measure(&p_counter::circuit(&config), expected);
                     assert_eq!((law.uneven(), law.offset()), (None, 0), "{config:?}");
                     assert!(law.is_plain(), "{config:?}");

@@ -20,10 +20,10 @@ use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 pub use block::OwnBlock;
 pub(crate) use contract::CONTRACTS;
 pub use contract::replaceable;
-use law::Expected;
 pub use law::{CounterLaw, Uneven};
 
 use super::config::SensorConfig;
+use super::p_counter::count_down::Expected;
 
 /// Laws that have been measured, by netlist and what is expected of it.
 type Laws = HashMap<(u64, Expected), Arc<CounterLaw>>;
@@ -34,11 +34,7 @@ impl OwnBlock {
         static LAWS: LazyLock<Mutex<Laws>> = LazyLock::new(Mutex::default);
         let module = self.module().expect("it has been checked");
         let hash = self.hash().expect("it has been checked");
-        let expected = Expected {
-            has_memory: config.p_counter.row().has_memory,
-            after_borrow: config.after_borrow,
-            step_periods: config.step_periods,
-        };
+        let expected = Expected::of_sensor(config);
         let mut laws = LAWS.lock().unwrap_or_else(PoisonError::into_inner);
         let law = laws.entry((hash, expected));
         Arc::clone(law.or_insert_with(|| Arc::new(CounterLaw::measure(module, expected))))

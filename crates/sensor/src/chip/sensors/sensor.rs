@@ -5,10 +5,11 @@ use std::sync::{Arc, OnceLock};
 
 use crate::chip::config::{SensorConfig, Tdc};
 use crate::chip::sensor_file::SensorFault;
-use crate::chip::timing::ChipTiming;
 use crate::chip::timing::clk_skew::clk_skew;
 use crate::chip::timing::delay_lines::{DelayLines, Taps};
+use crate::chip::timing::measure::MeasuredDelays;
 use crate::chip::timing::silicon::Silicon;
+use crate::chip::timing::{ChipTiming, LocalStopDelays};
 use crate::units::Time;
 
 /// A sensor that is possible, and what it is made of. Copies share their contents; the fields of its [`SensorConfig`] are
@@ -20,7 +21,7 @@ pub struct Sensor(Arc<Parts>);
 struct Parts {
     config: SensorConfig,
     silicon: Silicon,
-    timing: OnceLock<ChipTiming>,
+    delays: OnceLock<MeasuredDelays>,
     delay_lines: OnceLock<Arc<DelayLines>>,
     clk_skews: OnceLock<Box<[Time]>>,
     alike: OnceLock<Sensor>,
@@ -48,15 +49,27 @@ impl Sensor {
 
     /// Delays of macropixel (0, 0), measured once. Where cells have mismatch, others have others.
     pub fn timing(&self) -> &ChipTiming {
+        &self.delays().timing
+    }
+
+    /// When LOCAL_STOP of macropixel (0, 0) rises, for each start value.
+    pub fn local_stop_delays(&self) -> &Arc<LocalStopDelays> {
+        &self.delays().local_stop
+    }
+
+    fn delays(&self) -> &MeasuredDelays {
         let Parts {
             config,
             silicon,
-            timing,
+            delays,
             ..
         } = &*self.0;
-        timing.get_or_init(|| match *silicon == Silicon::of(config) {
-            true => ChipTiming::of(config),
-            false => ChipTiming::measure(config, silicon),
+        delays.get_or_init(|| {
+            if *silicon == Silicon::of(config) {
+                MeasuredDelays::known(config)
+            } else {
+                MeasuredDelays::measure(config, silicon)
+            }
         })
     }
 
@@ -128,7 +141,7 @@ impl Sensor {
         Sensor(Arc::new(Parts {
             config,
             silicon,
-            timing: OnceLock::new(),
+            delays: OnceLock::new(),
             delay_lines: OnceLock::new(),
             clk_skews: OnceLock::new(),
             alike: OnceLock::new(),

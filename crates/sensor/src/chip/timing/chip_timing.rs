@@ -27,7 +27,7 @@ pub struct ChipTiming {
     pub stop_to_sample: Time,
     /// Clock of the HIT flip-flops to HIT.
     pub strobe_to_hit: Time,
-    /// CLK rising to a change of the METDC's shift register; nothing where there is none.
+    /// CLK rising to the latest change of the METDC's shift register; nothing where there is none.
     pub clk_to_shift: Time,
     /// STOP rising to COUNTER_RESET rising.
     pub stop_to_reset: Time,
@@ -41,9 +41,14 @@ pub struct ChipTiming {
     pub stop_to_enabled: Time,
     /// CLK rising to SPAD_EVENT settled, longest path; nothing where events are not clocked.
     pub clk_to_event: Time,
+    /// The shortest CLK period that all flip-flops behind CLK allow, those that catch the strobe left out.
+    pub clk_period: Time,
+    /// By how much data come too soon for the hold time of a flip-flop behind CLK, at any CLK period; none if they do not.
+    pub broken_hold: Option<Time>,
     /// How long before its clock a flip-flop's data must be stable.
     pub setup: Time,
-    /// How long after its clock a flip-flop's data must be stable.
+    /// How long after its clock a flip-flop's data must be stable. Of HIT this is counted to the latest change of the shift register, and
+    /// so is longer where its stages change at different times.
     pub hold: Time,
     /// How long before a strobe that counts the reset of HIT must be released.
     pub recovery: Time,
@@ -54,7 +59,8 @@ pub struct ChipTiming {
 /// Delays and limits of a P-counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CounterTiming {
-    /// COUNTER_CLK rising → LOCAL_STOP rising.
+    /// COUNTER_CLK rising → LOCAL_STOP rising, the latest of all start values.
+    /// [`LocalStopDelays`](super::local_stop::LocalStopDelays) has each.
     pub clk_to_local_stop: Time,
     /// COUNTER_RESET rising → LOCAL_STOP rising, where a start value can make it.
     pub reset_to_local_stop: Option<Time>,
@@ -70,10 +76,25 @@ pub struct CounterTiming {
     pub removal: Time,
     /// Their longest minimum high pulse of COUNTER_CLK.
     pub clock_high: Time,
+    /// How LOCAL_STOP blocks COUNTER_CLK, where it does.
+    pub block: Option<BlockTiming>,
+    /// Width of COUNTER_RESET, at its shortest.
+    pub reset_width: Time,
+    /// What COUNTER_RESET must outlast.
+    pub reset_need: Time,
+}
+
+/// Delays of the gate with which LOCAL_STOP blocks COUNTER_CLK.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BlockTiming {
+    /// LOCAL_STOP rises → BLOCK rises.
+    pub from_local_stop: Time,
+    /// BLOCK rises → COUNTER_CLK falls, at the earliest.
+    pub to_counter_clk: Time,
 }
 
 impl ChipTiming {
-    /// CLK falling to LOCAL_STOP rising: what the thesis calls the ripple delay (4.6, Fig. 56).
+    /// CLK falling to LOCAL_STOP rising, the latest of all start values: what the thesis calls the ripple delay (4.6, Fig. 56).
     pub fn ripple(&self) -> Time {
         self.clk_to_counter_clk + self.counter.clk_to_local_stop
     }

@@ -24,7 +24,7 @@ use super::silicon::Silicon;
 use crate::chip::{Probe, Probes, SensorConfig, array};
 use crate::logic::Logic::{One, Zero};
 use crate::netlist::{
-    Arrivals, CellKind, Corner, Edge, FlatCell, NetId, Netlist, StaticTiming, Timing,
+    Arrivals, CellKind, Corner, Edge, FlatCell, NetId, Netlist, Requirement, StaticTiming, Timing,
 };
 use crate::units::Time;
 pub use counter::CounterDelays;
@@ -143,12 +143,6 @@ impl MacropixelCircuit {
         silicon.timing_of(&self.netlist, timing, path)
     }
 
-    /// Dotted path of the macropixel, the top's name first.
-    pub(crate) fn path(&self) -> String {
-        let scope = self.netlist.scope(self.probes.macropixel());
-        self.netlist.scope_path(scope.expect("it has been found"))
-    }
-
     /// Its paths with these delays, which must be of its netlist.
     pub(crate) fn paths<'c>(&'c self, timing: &'c Timing) -> MacropixelPaths<'c> {
         MacropixelPaths {
@@ -168,6 +162,22 @@ impl MacropixelCircuit {
             let clock = self.pin(cell, 1);
             clock == counter_clk || Some(clock) == divided
         })
+    }
+
+    /// Of what flip-flops ask of CLK, that of HIT, which catches the strobe, and the rest. The flip-flops that sample SPADs are left out by
+    /// design: their data come at any time.
+    pub(crate) fn split(&self, asked: &[Requirement]) -> (Vec<Requirement>, Vec<Requirement>) {
+        let samplers: Vec<usize> = self.probes.samplers(&self.netlist).collect();
+        let asked = asked
+            .iter()
+            .filter(|r| !(r.kind.concerns_data() && samplers.contains(&r.cell)));
+        asked.copied().partition(|r| self.hits.contains(&r.cell))
+    }
+
+    /// Kinds of the P-counter's flip-flops, memory excepted.
+    pub(crate) fn counting_kinds(&self) -> impl Iterator<Item = CellKind> + '_ {
+        let counting = self.counting.iter();
+        counting.map(|&cell| self.netlist.cells()[cell].kind)
     }
 
     /// The clock that freezes the window: of the delay lines' samples, or of the HIT flip-flops.

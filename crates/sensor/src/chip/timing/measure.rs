@@ -1,44 +1,110 @@
 //! [`ChipTiming`] of a sensor: measured on the netlist of its macropixel, and remembered.
 
 use std::collections::HashMap;
-use std::sync::{LazyLock, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 use super::cell_library::CellLibrary;
-use super::chip_timing::{ChipTiming, CounterTiming};
-use super::macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays};
+use super::chip_timing::{BlockTiming, ChipTiming, CounterTiming};
+use super::local_stop::LocalStopDelays;
+use super::macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays, hull, spread};
 use super::silicon::{Limits, Silicon};
 use crate::chip::config::{AfterBorrow, FrontEnd, Overflow, PCounter, SensorConfig, Tap, Tdc};
 use crate::chip::front_end::PulseLimits;
 use crate::chip::photon_line;
-use crate::netlist::{CellKind, CheckKind, Corner};
+use crate::netlist::{CellKind, CheckKind, Corner, Edge, Library, Requirement, Requirements};
 use crate::units::Time;
+
+/// What is measured of a sensor's macropixels.
+#[derive(Debug, Clone)]
+pub(in crate::chip) struct MeasuredDelays {
+    /// One number for each path: the latest, where there are several.
+    pub timing: ChipTiming,
+    /// LOCAL_STOP, for each start value.
+    pub local_stop: Arc<LocalStopDelays>,
+}
 
 impl ChipTiming {
     /// The timing of a sensor without mismatch, in its corner at its temperature.
-    ///
-    /// Measured once for every circuit and corner, and remembered: a measurement takes 0.6 ms, four times as long as
-    /// elaborating the macropixel, a look-up 60 ns; and window laws are asked for by the thousand.
     pub fn of(config: &SensorConfig) -> Self {
-        static MEASURED: LazyLock<Mutex<HashMap<Circuit, ChipTiming>>> =
-            LazyLock::new(Mutex::default);
-        let measured = || MEASURED.lock().unwrap_or_else(PoisonError::into_inner);
-        let circuit = Circuit::of(config);
-        if let Some(&known) = measured().get(&circuit) {
-            return known;
-        }
-        let timing = Self::measure(config, &Silicon::of(config));
-        measured().insert(circuit, timing);
-        timing
+        MeasuredDelays::known(config).timing
     }
 
     /// Measures macropixel (0, 0) of a sensor made of this silicon: the latest that each signal comes.
     pub fn measure(config: &SensorConfig, silicon: &Silicon) -> Self {
+        MeasuredDelays::measure(config, silicon).timing
+    }
+}
+
+/// Width of COUNTER_RESET, and what it must outlast.
+pub(super) struct ResetPulse {
+    /// At its shortest.
+    pub width: Time,
+    /// Stage outputs that return to their memory value, the COUNTER_CLK edge that LOCAL_STOP's fall lets through, and the flip-flops' own
+    /// shortest reset.
+    pub need: Time,
+}
+
+impl ResetPulse {
+    /// Measures macropixel (0, 0) of a sensor made of this silicon.
+    pub(super) fn measure(config: &SensorConfig, silicon: &Silicon) -> Self {
+        let circuit = MacropixelCircuit::new(config, (0, 0));
+        let timing = silicon.timing(&circuit.netlist);
+        let paths = circuit.paths(&timing);
+        let delays = MacropixelDelays::of(&paths);
+        let counter = CounterDelays::of(&paths, &delays);
+        let limits = (&silicon.limits(Limits::Kept), silicon.corner);
+        Self::among(&circuit, (&delays, &counter), limits)
+    }
+
+    /// The same of delays that are known.
+    pub(crate) fn among(
+        circuit: &MacropixelCircuit,
+        (delays, counter): (&MacropixelDelays, &CounterDelays),
+        (library, corner): (&Library, Corner),
+    ) -> Self {
+        let limit = |check| {
+            let kinds = circuit.counting_kinds();
+            let limits = kinds.map(|kind| library.checks(kind).at(check, corner));
+            Time::from_fs(limits.max().expect("a P-counter counts").into())
+        };
+        let until = counter.reset_edges() + limit(CheckKind::Removal);
+        ResetPulse {
+            width: delays.release.0 - delays.reset.1,
+            need: until.max(limit(CheckKind::ControlHigh)),
+        }
+    }
+}
+
+impl MeasuredDelays {
+    /// Those of a sensor without mismatch, in its corner at its temperature.
+    ///
+    /// Measured once for every circuit and corner, and remembered: a measurement takes 0.6 ms, four times as long as
+    /// elaborating the macropixel; and window laws are asked for by the thousand.
+    pub(in crate::chip) fn known(config: &SensorConfig) -> Self {
+        static MEASURED: LazyLock<Mutex<HashMap<Circuit, MeasuredDelays>>> =
+            LazyLock::new(Mutex::default);
+        let measured = || MEASURED.lock().unwrap_or_else(PoisonError::into_inner);
+        let circuit = Circuit::of(config).expect("checked");
+        if let Some(known) = measured().get(&circuit) {
+            return known.clone();
+        }
+        let delays = Self::measure(config, &Silicon::of(config));
+        measured().insert(circuit, delays.clone());
+        delays
+    }
+
+    /// Measures macropixel (0, 0) of a sensor made of this silicon.
+    pub(in crate::chip) fn measure(config: &SensorConfig, silicon: &Silicon) -> Self {
         let circuit = MacropixelCircuit::new(config, (0, 0));
         let timing = silicon.timing(&circuit.netlist);
         let paths = circuit.paths(&timing);
         let delays = MacropixelDelays::of(&paths);
         let counter = CounterDelays::of(&paths, &delays);
         let library = silicon.limits(Limits::Kept);
+        let reset = ResetPulse::among(&circuit, (&delays, &counter), (&library, silicon.corner));
+        let clk = Edge::BOTH.map(|edge| paths.after_clk(edge));
+        let clk = Requirements::behind(&circuit.netlist, clk, &library, silicon.corner);
+        let (_, clk) = circuit.split(clk.all());
         let limit_of = |kind, check| {
             let limit = library.checks(kind).at(check, silicon.corner);
             Time::from_fs(limit.into())
@@ -55,9 +121,13 @@ impl ChipTiming {
         let latencies = delays.latency.iter();
         let slowest_toggle = latencies.map(|(rise, fall)| (*rise).max(*fall)).max();
         let toggle = slowest_toggle.expect("a macropixel has SPADs");
-        let shift = delays.shift.iter().map(|span| span.1).max();
+        let shift = delays.shift.iter().copied().reduce(hull);
+        let local_stop = (
+            counter.local_stop.0 - counter.counter_clk.1,
+            counter.local_stop.1 - counter.counter_clk.1,
+        );
         let joining = delays.joining.map_or(Time::ZERO, |span| span.1);
-        ChipTiming {
+        let chip_timing = ChipTiming {
             spad_to_sampled: delays.latency[0].0 + joining,
             photon_line_stage: photon_line::stage(joining, config.spads()),
             pulses: match delays.shaper {
@@ -74,7 +144,7 @@ impl ChipTiming {
             },
             clk_to_counter_clk: counter.counter_clk.1,
             counter: CounterTiming {
-                clk_to_local_stop: counter.local_stop.1 - counter.counter_clk.1,
+                clk_to_local_stop: local_stop.1,
                 reset_to_local_stop: counter.reset_to_local_stop,
                 release: counter.released,
                 settle: counter
@@ -82,32 +152,55 @@ impl ChipTiming {
                     .map_or(Time::ZERO, |settled| settled + of_counter(CheckKind::Setup)),
                 period: counter.settled - counter.counter_clk.1 + of_counter(CheckKind::Setup),
                 recovery: of_counter(CheckKind::Recovery),
-                removal: of_counter(CheckKind::Removal),
+                removal: of_counter(CheckKind::Removal) + spread(delays.release),
                 clock_high: of_counter(CheckKind::ClockHigh),
+                block: counter.block.zip(counter.block_to_counter_clk).map(
+                    |(block, to_counter_clk)| BlockTiming {
+                        from_local_stop: block.1 - counter.local_stop.1,
+                        to_counter_clk,
+                    },
+                ),
+                reset_width: reset.width,
+                reset_need: reset.need,
             },
             local_stop_to_strobe: counter.strobe.1 - counter.local_stop.1,
             local_stop_to_sample: counter.sample.1 - counter.local_stop.1,
             stop_to_strobe: delays.stop_strobe.1,
             stop_to_sample: delays.stop_sample.1,
             strobe_to_hit: delays.strobe_to_hit,
-            clk_to_shift: shift.unwrap_or(Time::ZERO),
+            clk_to_shift: shift.map_or(Time::ZERO, |span| span.1),
             stop_to_reset: delays.reset.1,
             stop_to_reset_release: delays.release.1,
             stop_to_hit_reset: delays.reset.1 + counter.hit_reset.1,
             stop_to_hit_release: delays.release.1 + counter.hit_release.1,
             stop_to_enabled: counter.enable,
             clk_to_event: delays.event,
+            clk_period: clk
+                .iter()
+                .filter_map(Requirement::period)
+                .max()
+                .unwrap_or(Time::ZERO),
+            broken_hold: clk
+                .iter()
+                .filter(|r| r.period().is_none())
+                .map(|r| r.need)
+                .max(),
             setup: limit(CheckKind::Setup),
-            hold: limit(CheckKind::Hold),
+            // From the earliest change of a stage on.
+            hold: limit(CheckKind::Hold) + shift.map_or(Time::ZERO, spread),
             recovery: limit(CheckKind::Recovery),
             removal: limit(CheckKind::Removal),
+        };
+        MeasuredDelays {
+            timing: chip_timing,
+            local_stop: Arc::new(LocalStopDelays::new(config, &circuit, &timing, local_stop)),
         }
     }
 }
 
 /// What a macropixel's circuit and delays depend on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-struct Circuit {
+pub(super) struct Circuit {
     spads: usize,
     front_end: FrontEnd,
     coincident_spads: usize,
@@ -117,6 +210,7 @@ struct Circuit {
     tap: Tap,
     after_borrow: AfterBorrow,
     step_periods: usize,
+    reset_buffers: usize,
     tdc: Tdc,
     bins: usize,
     bin_bits: usize,
@@ -128,8 +222,9 @@ struct Circuit {
 }
 
 impl Circuit {
-    fn of(config: &SensorConfig) -> Self {
-        Circuit {
+    /// Of this sensor; `None` where its corner has no library.
+    pub(super) fn of(config: &SensorConfig) -> Option<Self> {
+        Some(Circuit {
             spads: config.spads(),
             front_end: config.front_end,
             coincident_spads: config.coincident_spads,
@@ -139,13 +234,14 @@ impl Circuit {
             tap: config.tap,
             after_borrow: config.after_borrow,
             step_periods: config.step_periods,
+            reset_buffers: config.reset_buffers(),
             tdc: config.tdc,
             bins: config.bins,
             bin_bits: config.bin_bits,
             overflow: config.overflow,
             corner: config.corner,
             temperature: config.temperature_c.map(f64::to_bits),
-            library: CellLibrary::of(config).expect("checked"),
-        }
+            library: CellLibrary::of(config).ok()?,
+        })
     }
 }

@@ -13,6 +13,8 @@
 //! | [`silicon`] | the cell library, conditions and mismatch |
 //! | `chip_timing` | [`ChipTiming`]: delays as numbers |
 //! | `measure` | what measures them |
+//! | [`local_stop`] | when LOCAL_STOP rises, for each start value |
+//! | `reset_chain` | how many buffers the reset pulse needs |
 //! | `clk_skew` | the wires of CLK to every column |
 //! | `delay_lines` | taps of the delay lines of every macropixel |
 //! | [`macropixel`] | which edges start a path, where it is cut, and what is read off |
@@ -23,8 +25,11 @@ pub mod cell_library;
 pub(crate) mod chip_timing;
 pub(crate) mod clk_skew;
 pub(crate) mod delay_lines;
+pub mod local_stop;
 pub mod macropixel;
-mod measure;
+pub(in crate::chip) mod measure;
+mod reset_chain;
 pub mod silicon;
 
-pub use chip_timing::{ChipTiming, CounterTiming};
+pub use chip_timing::{BlockTiming, ChipTiming, CounterTiming};
+pub use local_stop::LocalStopDelays;

@@ -286,7 +286,10 @@ prop_compose! {
         (recovery, removal, clock_high) in (delay(0..4), delay(0..4), delay(0..6)),
     ) -> CounterTiming {
         let reset_to_local_stop = Some(reset_to_local_stop);
-        CounterTiming { clk_to_local_stop, reset_to_local_stop, release, settle, period, recovery, removal, clock_high }
+        CounterTiming {
+            clk_to_local_stop, reset_to_local_stop, release, settle, period, recovery, removal, clock_high,
+            block: None, reset_width: Time::ZERO, reset_need: Time::ZERO,
+        }
     }
 }
 
@@ -307,6 +310,7 @@ prop_compose! {
             stop_to_enabled, setup, hold, recovery, removal,
             stop_to_reset_release: stop_to_reset + reset,
             stop_to_hit_release: stop_to_hit_reset + hit_reset,
+            clk_period: Time::ZERO,
             ..ChipTiming::of(&SensorConfig::default())
         }
     }

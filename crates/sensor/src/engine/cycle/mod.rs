@@ -31,13 +31,13 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use super::error::has_no_delay_lines;
+use super::error::{has_no_delay_lines, refuse_races};
 use super::{
     Engine, EngineError, Expose, Exposed, Gate, Histograms, LitPixel, PulsedPixel, Replay, follows,
     full_stream,
 };
 use crate::chip::timing::macropixel::MacropixelCircuit;
-use crate::chip::window_law::{Window, WindowLaw};
+use crate::chip::window_law::WindowLaw;
 use crate::chip::{Exposure, Sensor};
 use crate::photon::{PhotonStream, SpadEvent};
 use levelise::Levelised;
@@ -265,11 +265,7 @@ impl Replay for Cycle {
         let starts: Vec<u16> = pixels.iter().map(|pixel| pixel.start).collect();
         let seen = PulsedPixel::all_by_own_clk(pixels, &self.sensor);
         let pulses: Vec<&[SpadEvent]> = seen.iter().map(|pulses| &**pulses).collect();
-        for &start in &starts {
-            if let Window::Race(why) = self.law.window(start) {
-                return Err(EngineError::Race(why));
-            }
-        }
+        refuse_races(&self.law, starts.iter().copied())?;
         if self.unlevelled().is_none()
             && let Ok(histograms) = self.run(&starts, &self.pack(&starts, &pulses))
         {

@@ -155,7 +155,7 @@ impl Timed {
         let window = Window::new(&self.uniform, &self.setting.exposure);
         match window.replay(std::slice::from_ref(pixel)) {
             Ok(counts) => Ok(Judged::Counted(counts.into_counts())),
-            Err(EngineError::Race(race)) => Ok(Judged::InDoubt(Doubt::Race(race.what))),
+            Err(EngineError::Race { race, .. }) => Ok(Judged::InDoubt(Doubt::Race(race.what))),
             Err(EngineError::Irregular(why)) => Ok(Judged::InDoubt(Doubt::Irregular(why))),
             Err(other) => Err(other),
         }

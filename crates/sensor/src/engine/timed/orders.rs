@@ -197,6 +197,9 @@ fn common(setting: &Setting, delays: &Delays) -> ChipTiming {
         spad_to_sampled: delays.latency[0].0,
         clk_to_shift: shift.1,
         clk_to_event: delays.event.max(shift.1),
+        // Limits are not looked at: a flip-flop takes what is there.
+        clk_period: Time::ZERO,
+        broken_hold: None,
         // Until the bin has taken the hit: a cell each for HIT and the gate of its clock, and one more as a margin.
         strobe_to_hit: delays.slowest * 3,
         // The law adds the rounding of clock edges.
@@ -234,6 +237,10 @@ fn guided(setting: &Setting, delays: &Delays, counter: &CounterDelays) -> ChipTi
             period: counter.settled - counter_clk.0 + MARGIN,
             recovery: jitter + MARGIN,
             removal: spread(release) + MARGIN,
+            // Orders of their own, below.
+            block: None,
+            reset_width: Time::ZERO,
+            reset_need: Time::ZERO,
             ..setting.nominal.counter
         },
         local_stop_to_strobe: strobe.1 - local_stop.1,

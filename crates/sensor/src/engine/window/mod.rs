@@ -104,6 +104,7 @@ impl Engine for Window {
 
 impl Replay for Window {
     fn replay(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError> {
+        self.refuse(pixels.iter().map(|pixel| pixel.start))?;
         let mut histograms = Histograms::new(self.sensor.bins);
         for &PulsedPixel {
             number,
@@ -133,6 +134,7 @@ impl Replay for Window {
 impl Expose for Window {
     fn expose(&self, stream: &PhotonStream, pixels: &[LitPixel]) -> Result<Exposed, EngineError> {
         refuse_other_spads(stream, pixels)?;
+        self.refuse(pixels.iter().map(|pixel| pixel.start))?;
         if self.sensor.has_own_laws() && !self.is_of_macropixel {
             let mut exposed = Exposed::new(self.sensor.bins);
             for pixel in pixels {

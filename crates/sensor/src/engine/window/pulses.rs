@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, Sensor, Tdc, WindowLaw, correlation, histogram, photon_line};
 use crate::engine::EngineError;
-use crate::engine::error::{follows, has_a_line_a_spad};
+use crate::engine::error::{follows, has_a_line_a_spad, refuse_races};
 use crate::photon::SpadEvent;
 
 /// Counts through the window law.
@@ -52,9 +52,15 @@ impl Window {
 
     /// The window of a start value, if it opens.
     pub(super) fn window(&self, start: u16) -> Result<Option<OpenWindow>, EngineError> {
+        self.refuse(std::iter::once(start))?;
+        Ok(self.law.window(start).settled()?)
+    }
+
+    /// Refuses a sensor that this engine does not follow, and start values whose signals race.
+    pub(super) fn refuse(&self, starts: impl Iterator<Item = u16>) -> Result<(), EngineError> {
         follows(&self.sensor, &self.law.timing().pulses)?;
         has_a_line_a_spad(&self.sensor)?;
-        Ok(self.law.window(start).settled()?)
+        refuse_races(&self.law, starts)
     }
 
     fn is_event(&self, spads: u64) -> bool {

@@ -16,6 +16,7 @@
 //! blocks COUNTER_CLK; the timing block sees to it. A step divider before the first stage lets windows step by several
 //! CLK periods.
 
+pub(in crate::chip) mod count_down;
 mod pins;
 mod step_divider;
 mod variant;

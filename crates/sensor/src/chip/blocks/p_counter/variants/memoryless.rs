@@ -30,7 +30,7 @@ use crate::chip::blocks::finished;
 use crate::chip::blocks::p_counter::pins::Pins;
 use crate::chip::blocks::p_counter::variant::Variant;
 use crate::chip::config::SensorConfig;
-use crate::chip::p_counter_timing::DELAY_CHAIN;
+use crate::chip::p_counter_timing::SHORTEST_CHAIN;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
 pub(crate) const VARIANT: Variant = Variant {
@@ -48,7 +48,7 @@ fn circuit(config: &SensorConfig) -> Arc<Module> {
     let clear = m.wire("CLEAR");
     let out = m.wire_bus("COUNTER_OUT", bits);
     let mut delayed = pins.load;
-    for _ in 0..DELAY_CHAIN {
+    for _ in 0..SHORTEST_CHAIN {
         delayed = m.gate(CellKind::Buf, &[delayed]);
     }
     let over = m.gate(CellKind::Inv, &[delayed]);

@@ -1,0 +1,85 @@
+//! How long the delay chain of COUNTER_RESET must be for a library's cells.
+//!
+//! ```text
+//!   STOP          ▁▁╱▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔▔
+//!   COUNTER_RESET ▁▁▁╱▔▔▔▔▔▔▔▔▔▔▔▔▔╲▁▁▁▁▁▁   width: one delay of the chain
+//!                     └─► stages, LOCAL_STOP fall ─► last edge at a stage's clock │
+//!                     │◄──────────────── need, with removal time ─────────────►│
+//! ```
+//!
+//! Edges that the reset itself sends into the clocks of the P-counter must meet a reset that still holds. Otherwise the counter counts
+//! once more in every laser cycle but the first. How long they take depends on the cells, so the chain is sized for them: from the
+//! built-in length on it grows, a buffer at a time, until the pulse is a tenth longer than needed in every corner that has a library.
+
+use std::collections::HashMap;
+use std::sync::{LazyLock, Mutex, PoisonError};
+
+use super::measure::{Circuit, ResetPulse};
+use super::silicon::Silicon;
+use crate::chip::SensorConfig;
+use crate::chip::p_counter_timing::SHORTEST_CHAIN;
+use crate::netlist::Corner;
+
+/// Longest chain that is tried: one that is too short still is reported as such.
+const LONGEST_CHAIN: usize = 1000;
+
+impl SensorConfig {
+    /// Buffers of the delay chain that sets the width of COUNTER_RESET: `reset_stages`, or as many as the cells need. The
+    /// configuration must have passed [`SensorConfig::check`], except that libraries may not have been read.
+    pub fn reset_buffers(&self) -> usize {
+        if self.reset_stages > 0 {
+            return self.reset_stages;
+        }
+        // Without a reset in every laser cycle there is nothing to outlast.
+        if !self.p_counter.row().has_memory {
+            return SHORTEST_CHAIN;
+        }
+        static SIZED: LazyLock<Mutex<HashMap<[Option<Circuit>; 3], usize>>> =
+            LazyLock::new(Mutex::default);
+        let sized = || SIZED.lock().unwrap_or_else(PoisonError::into_inner);
+        let corners = Corner::ALL.map(|corner| {
+            let config = SensorConfig {
+                corner,
+                temperature_c: None,
+                reset_stages: SHORTEST_CHAIN,
+                ..self.clone()
+            };
+            Circuit::of(&config).map(|circuit| (circuit, config))
+        });
+        let key = corners
+            .each_ref()
+            .map(|corner| corner.as_ref().map(|(circuit, _)| *circuit));
+        if let Some(&known) = sized().get(&key) {
+            return known;
+        }
+        let corners = corners.iter().flatten();
+        let needs = corners.map(|(_, config)| sufficient_chain(config));
+        let stages = needs.max().unwrap_or(SHORTEST_CHAIN);
+        sized().insert(key, stages);
+        stages
+    }
+}
+
+/// The shortest chain with which the pulse is a tenth longer than needed in this corner.
+fn sufficient_chain(config: &SensorConfig) -> usize {
+    let silicon = Silicon::of(config);
+    let mut stages = SHORTEST_CHAIN;
+    loop {
+        let pulse = ResetPulse::measure(
+            &SensorConfig {
+                reset_stages: stages,
+                ..config.clone()
+            },
+            &silicon,
+        );
+        let needed = pulse.need.as_fs() + pulse.need.as_fs() / 10;
+        let missing = needed - pulse.width.as_fs();
+        if missing <= 0 || stages >= LONGEST_CHAIN {
+            return stages;
+        }
+        // A buffer's share of the pulse tells how many are missing; fewer are tried first, because loads differ.
+        let share = pulse.width.as_fs().max(1) / stages as i64;
+        let more = missing / share.max(1) / 2;
+        stages = (stages + (more as usize).max(1)).min(LONGEST_CHAIN);
+    }
+}

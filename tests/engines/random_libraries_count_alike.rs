@@ -1,0 +1,334 @@
+//! In the cells of any library, the fast engines count what the gates count, or refuse start values whose signals really meet.
+//!
+//! Random libraries, P-counters, start values and photons; clocks and STOP phases lie in and around every band in which two
+//! signals meet, down to the femtosecond. `GDTOF_CASES=10000 cargo test --release --test engines random_libraries` runs more.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::cases::cases;
+use crate::random_library::random_library;
+use crate::scenario::{Scenario, p_counters};
+use guided_dtof::chip::race::{Conflict, Race};
+use guided_dtof::chip::window_law::WindowLaw;
+use guided_dtof::chip::{Exposure, Mode, Probe, Sensor, SensorConfig};
+use guided_dtof::engine::{
+    Cycle, EngineError, Gate, GateSimulation, PulsedPixel, Replay, Runner, Timed, Window,
+};
+use guided_dtof::kernel::Recorder;
+use guided_dtof::photon::{SpadEvent, apply_dead_time};
+use guided_dtof::units::Time;
+use rand::{RngExt, SeedableRng, rngs::StdRng};
+
+/// Chips made of one library.
+const CHIPS_OF_A_LIBRARY: u32 = 10;
+
+/// What became of the cases.
+#[derive(Debug, Default)]
+struct Tally {
+    counted: usize,
+    refused: usize,
+    irregular: usize,
+    unbuildable: usize,
+    conflicts: BTreeMap<Conflict, usize>,
+    /// By engine or conflict: how many failed, and the first that did.
+    failures: BTreeMap<String, (usize, String)>,
+}
+
+impl Tally {
+    fn fail(&mut self, what: String, case: impl FnOnce() -> String) {
+        let failure = self.failures.entry(what);
+        failure.or_insert_with(|| (0, case())).0 += 1;
+    }
+}
+
+#[test]
+fn as_the_gates_count() {
+    let mut tally = Tally::default();
+    let folder = tempfile::tempdir().unwrap();
+    for seed in 0..cases(200) {
+        let library = seed / CHIPS_OF_A_LIBRARY;
+        let file = folder.path().join(format!("{library}.lib"));
+        if seed % CHIPS_OF_A_LIBRARY == 0 {
+            let random = &mut StdRng::seed_from_u64(1_000_000 + u64::from(library));
+            std::fs::write(&file, random_library(random)).unwrap();
+        }
+        compare(seed, &file, &mut tally);
+    }
+    let Tally {
+        counted,
+        refused,
+        unbuildable,
+        ..
+    } = tally;
+    assert!(tally.failures.is_empty(), "{tally:#?}");
+    println!("{tally:?}");
+    assert!(
+        counted > 2 * unbuildable && counted > refused / 2,
+        "{tally:?}"
+    );
+}
+
+/// A chip of this library, at its speed.
+fn sensor_of(random: &mut StdRng, file: &Path) -> SensorConfig {
+    let p_counters = p_counters();
+    let (p_counter, tap, after_borrow) = p_counters[random.random_range(0..p_counters.len())];
+    let has_memory = p_counter.row().has_memory;
+    // Few SPADs leave the correlation time at the clocks at which the strobe meets the shift register.
+    let (spad_rows, spad_cols) = [(1, 1), (1, 2), (2, 2), (4, 4)][random.random_range(0..4)];
+    SensorConfig {
+        rows: 1,
+        cols: 8,
+        spad_rows,
+        spad_cols,
+        p_counter,
+        tap,
+        after_borrow,
+        step_periods: if has_memory {
+            [1, 1, 2][random.random_range(0..3)]
+        } else {
+            1
+        },
+        counter_bits: random.random_range(3..10),
+        bins: random.random_range(2..17),
+        bin_bits: 6,
+        reset_stages: if random.random_bool(0.2) {
+            random.random_range(1..12)
+        } else {
+            0
+        },
+        mode: if random.random_bool(0.1) {
+            Mode::Conventional
+        } else {
+            Mode::Guided
+        },
+        liberty: file.to_owned(),
+        clk_hz: 10e6,
+        dead_time_ns: 400.0,
+        ..SensorConfig::default()
+    }
+}
+
+/// Puts CLK and STOP's phase in or near a band where signals meet.
+fn aim_at_a_band(random: &mut StdRng, config: &mut SensorConfig) {
+    let slow = WindowLaw::new(&*config, &Exposure::new(config, 600, 1));
+    let timing = *slow.timing();
+    let start = random.random_range(0..=config.largest_start());
+    let strobe = slow.ripple(start) + timing.local_stop_to_strobe - timing.clk_to_shift;
+    let odd = [1, 1, 1, 3, 5][random.random_range(0..5)];
+    let limits = [Time::ZERO, timing.setup, Time::ZERO - timing.hold];
+    let near = strobe - limits[random.random_range(0..3)];
+    let off = match random.random_range(0..4) {
+        0 => 0,
+        1 => random.random_range(-4..5),
+        2 => random.random_range(-20_000..20_000),
+        _ => random.random_range(-400_000..400_000),
+    };
+    let in_band = Time::from_fs(2 * (near.as_fs() + off) / odd);
+    let shortest = timing.clk_period.max(timing.clk_to_event + timing.setup);
+    let period = if in_band > shortest || random.random_bool(0.1) {
+        in_band
+    } else {
+        Time::from_s(shortest.as_s() * random.random_range(0.99..3.0))
+    };
+    let period = period.max(Time::from_ps(500)).min(Time::from_ns(900));
+    config.clk_hz = 1.0 / period.as_s();
+    let half_ps = period.as_s() * 1e12 / 2.0;
+    config.stop_phase_ps = match random.random_range(0..3) {
+        0 => 0.0,
+        1 => random.random_range(-half_ps..half_ps),
+        // A COUNTER_CLK edge near the end of the reset pulse.
+        _ => {
+            let meets = timing.clk_to_counter_clk - timing.stop_to_reset_release;
+            let fs = meets.as_fs() + off;
+            let half = period.as_fs() / 2;
+            ((fs + half).rem_euclid(period.as_fs()) - half) as f64 * 1e-3
+        }
+    };
+    config.stop_phase_ps = config
+        .stop_phase_ps
+        .clamp(-0.499 * 2.0 * half_ps, 0.499 * 2.0 * half_ps);
+    config.dead_time_ns = (period.as_s() * 1e9 * 1.3).max(60.0);
+}
+
+/// Some photons anywhere and, of each open window, pairs beside its edges.
+fn add_photons_at_edges(scenario: &mut Scenario, law: &WindowLaw) {
+    let pixels = scenario.starts.iter().zip(&mut scenario.pulses);
+    for (&start, pulses) in pixels {
+        let Some(window) = law.window(start).open() else {
+            continue;
+        };
+        for cycle in 0..i64::from(scenario.exposure.laser_cycles) {
+            let edges = law.edges(&window, cycle);
+            for (place, &edge) in edges.edges().iter().enumerate() {
+                let spad = (place % scenario.config.spads()) as u8;
+                let off = Time::from_fs([-1, 0][(place + cycle as usize) % 2]);
+                let time = edge + off;
+                if (Time::ZERO..scenario.exposure.end()).contains(&time) {
+                    pulses.push(SpadEvent { time, spad });
+                }
+            }
+        }
+        pulses.sort_unstable();
+        apply_dead_time(pulses, scenario.config.dead_time());
+    }
+}
+
+fn compare(seed: u32, file: &Path, tally: &mut Tally) {
+    let random = &mut StdRng::seed_from_u64(seed.into());
+    let mut config = sensor_of(random, file);
+    if config.check().is_err() {
+        tally.unbuildable += 1;
+        return;
+    }
+    aim_at_a_band(random, &mut config);
+    if config.check().is_err() {
+        tally.unbuildable += 1;
+        return;
+    }
+    let mut scenario = Scenario::of(random, config);
+    let law = WindowLaw::new(&scenario.config, &scenario.exposure);
+    add_photons_at_edges(&mut scenario, &law);
+    let Scenario {
+        config,
+        exposure,
+        starts,
+        ..
+    } = &scenario;
+    let all_pulses = scenario.pulses();
+    let gates = Gate::new(config, exposure).histograms(starts, &all_pulses);
+    let silicon = Sensor::from(config);
+    let timed = Timed::new(&silicon, exposure, Runner::Window);
+    for (place, (&start, pulses)) in starts.iter().zip(&all_pulses).enumerate() {
+        let name = || format!("seed {seed}, start {start}, {config:?} {exposure:?}");
+        let counted = gates.as_ref().map(|gates| gates[place].to_vec());
+        match Window::new(config, exposure).histogram(start, pulses) {
+            Ok(window) => {
+                if Ok(&window) != counted.as_ref() {
+                    tally.fail("window".into(), || {
+                        format!("{window:?} {counted:?} {}", name())
+                    });
+                }
+                tally.counted += 1;
+            }
+            Err(EngineError::Race { race, .. }) => {
+                let case = (config, exposure, start);
+                if !really_meet(case, pulses, &law, &race) {
+                    tally.fail(format!("{:?}", race.what), || format!("{race}, {}", name()));
+                }
+                tally.refused += 1;
+                *tally.conflicts.entry(race.what).or_default() += 1;
+            }
+            Err(EngineError::Irregular(_)) => tally.irregular += 1,
+            Err(other) => tally.fail(other.to_string(), name),
+        }
+        if let Ok(cycle) = Cycle::new(config, exposure).histogram(start, pulses) {
+            if Ok(&cycle) != counted.as_ref() {
+                tally.fail("cycle".into(), || {
+                    format!("{cycle:?} {counted:?} {}", name())
+                });
+            }
+        }
+        let pixel = PulsedPixel {
+            number: place as u32,
+            start,
+            pulses,
+        };
+        if let (Ok(timed), Ok(counted)) = (timed.replay(&[pixel]), &counted) {
+            if &timed[0] != counted {
+                tally.fail("timed".into(), || {
+                    format!("{:?} {counted:?} {}", &timed[0], name())
+                });
+            }
+        }
+    }
+}
+
+/// Whether the gates show the signals of a race as close as it says.
+fn really_meet(
+    (config, exposure, start): (&SensorConfig, &Exposure, u16),
+    pulses: &[SpadEvent],
+    law: &WindowLaw,
+    race: &Race,
+) -> bool {
+    let period = exposure.clock.period();
+    let mut gate = GateSimulation::new(config, exposure, (0, 0), (1, 1), &[start], &[pulses]);
+    let probes = gate.probes()[0].clone();
+    let net = |probe| probes.net(probe);
+    let watched = [
+        Probe::CounterReset,
+        Probe::CounterClk,
+        Probe::LocalStop,
+        Probe::Clk,
+        Probe::Strobe,
+    ];
+    let blocks = probes.find(Probe::Block).map(|nets| nets[0]);
+    let mut recorder = Recorder::new(watched.map(net).into_iter().chain(blocks));
+    let origin = gate.schedule().origin;
+    gate.run(&mut recorder);
+    let timing = law.timing();
+    let rises = |probe| {
+        let all = recorder.rising_edges(net(probe)).into_iter();
+        all.map(move |time| time - origin)
+            .filter(|&time| time >= Time::ZERO)
+            .collect::<Vec<_>>()
+    };
+    let falls = |probe| {
+        let all = recorder.falling_edges(net(probe)).into_iter();
+        all.map(move |time| time - origin)
+            .filter(|&time| time >= Time::ZERO)
+            .collect::<Vec<_>>()
+    };
+    let near = Time::from_fs(6);
+    match race.what {
+        Conflict::SlowCorrelation | Conflict::SlowCounter | Conflict::SlowPath => {
+            period <= race.comes
+        }
+        // A strobe within the limits of a change of the shift register.
+        Conflict::StrobeAtShift | Conflict::ShiftAtStrobe => {
+            let changes = rises(Probe::Clk)
+                .into_iter()
+                .map(|clk| clk + timing.clk_to_shift);
+            let changes: Vec<Time> = changes.collect();
+            rises(Probe::Strobe).iter().any(|&strobe| {
+                let mut changes = changes.iter();
+                changes.any(|&change| {
+                    change - timing.hold - near <= strobe && strobe <= change + timing.setup + near
+                })
+            })
+        }
+        Conflict::ClkAtResetEnd => {
+            let counter = &timing.counter;
+            let edges = falls(Probe::Clk)
+                .into_iter()
+                .map(|clk| clk + timing.clk_to_counter_clk);
+            let edges: Vec<Time> = edges.collect();
+            let resets = rises(Probe::CounterReset)
+                .into_iter()
+                .zip(falls(Probe::CounterReset));
+            resets.into_iter().any(|(rise, fall)| {
+                let from = fall - counter.removal - near;
+                let released = fall + counter.release + counter.recovery;
+                let until = released.max(rise + counter.settle) + near;
+                edges.iter().any(|&edge| from <= edge && edge <= until)
+            })
+        }
+        Conflict::ShortReset => {
+            let resets = rises(Probe::CounterReset)
+                .into_iter()
+                .zip(falls(Probe::CounterReset));
+            resets
+                .into_iter()
+                .all(|(rise, fall)| fall - rise < timing.counter.reset_need)
+        }
+        Conflict::CutPulse => {
+            let pulses = rises(Probe::CounterClk)
+                .into_iter()
+                .zip(falls(Probe::CounterClk));
+            pulses
+                .into_iter()
+                .any(|(rise, fall)| fall - rise <= timing.counter.clock_high + near)
+        }
+        _ => true,
+    }
+}
