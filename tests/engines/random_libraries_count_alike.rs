@@ -332,3 +332,69 @@ fn really_meet(
         _ => true,
     }
 }
+
+#[test]
+fn debug_case() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("0.lib");
+    std::fs::write(&file, random_library(&mut StdRng::seed_from_u64(1_000_006))).unwrap();
+    let random = &mut StdRng::seed_from_u64(64);
+    let mut config = sensor_of(random, &file);
+    config.check().unwrap();
+    aim_at_a_band(random, &mut config);
+    let mut scenario = Scenario::of(random, config);
+    let law = WindowLaw::new(&scenario.config, &scenario.exposure);
+    add_photons_at_edges(&mut scenario, &law);
+    let place = scenario.starts.iter().position(|&s| s == 53).unwrap();
+    let pulses = scenario.pulses()[place];
+    println!("{:?} {:?}", law.timing(), law.window(53));
+    println!(
+        "ripple {:?}",
+        (0..16).map(|s| law.ripple(s * 4)).collect::<Vec<_>>()
+    );
+    let (config, exposure) = (&scenario.config, &scenario.exposure);
+    let mut gate = GateSimulation::new(config, exposure, (0, 0), (1, 1), &[53], &[pulses]);
+    let probes = gate.probes()[0].clone();
+    let nets = [
+        Probe::CounterClk,
+        Probe::LocalStop,
+        Probe::Strobe,
+        Probe::CounterReset,
+        Probe::Stop,
+        Probe::Enable,
+        Probe::HitReset,
+    ];
+    let mut recorder = Recorder::new(nets.map(|p| probes.net(p)));
+    let origin = gate.schedule().origin;
+    gate.run(&mut recorder);
+    for p in nets {
+        println!(
+            "{p:?} {:?}",
+            recorder
+                .rising_edges(probes.net(p))
+                .iter()
+                .map(|&t| (t - origin).as_ns())
+                .filter(|t| *t > -20.0)
+                .collect::<Vec<_>>()
+        );
+    }
+    println!(
+        "pulses {:?}",
+        pulses
+            .iter()
+            .map(|p| (p.time.as_ns(), p.spad))
+            .collect::<Vec<_>>()
+    );
+    for c in 0..5 {
+        if let Some(w) = law.window(53).open() {
+            println!(
+                "{:?}",
+                law.edges(&w, c)
+                    .edges()
+                    .iter()
+                    .map(|t| t.as_ns())
+                    .collect::<Vec<_>>()
+            );
+        }
+    }
+}

@@ -10,6 +10,7 @@
 //! design, the sixteen that sample SPADs. The histogram's counters run on HIT, once in a laser cycle.
 
 use crate::chip::timing::macropixel::{CounterDelays, MacropixelCircuit, MacropixelDelays, hull};
+use crate::chip::timing::measure::ResetPulse;
 use crate::chip::{Conflict, Limits, Mode, Probe, Probes, Race, SensorConfig, Silicon};
 use crate::netlist::{
     Bound, CellKind, CheckKind, Edge, NetId, Netlist, Path, Requirement, Requirements,
@@ -57,7 +58,7 @@ pub struct MacropixelTiming {
     counts_at_once: bool,
     recovery: Time,
     removal: Time,
-    control_high: Time,
+    reset_need: Time,
 }
 
 /// Which CLK edges a start value is counted and caught by.
@@ -141,7 +142,7 @@ impl MacropixelTiming {
             clk: clk_rest,
             recovery: limit(CheckKind::Recovery),
             removal: limit(CheckKind::Removal),
-            control_high: limit(CheckKind::ControlHigh),
+            reset_need: ResetPulse::among(&circuit, (&delays, &counter), (&library, corner)).need,
             probes: circuit.probes,
             netlist: circuit.netlist,
         }
@@ -152,11 +153,9 @@ impl MacropixelTiming {
         self.release.0 - self.reset.1
     }
 
-    /// What the reset pulse must outlast: stage outputs that return to their memory value, the COUNTER_CLK edge that
-    /// LOCAL_STOP's fall lets through, and the flip-flops' own shortest reset.
+    /// What the reset pulse must outlast.
     pub fn reset_need(&self) -> Time {
-        let edges = self.reset_to_stage_clock.max(self.reset_to_counter_clk);
-        (edges + self.removal).max(self.control_high)
+        self.reset_need
     }
 
     /// Latest strobe with its hold time, from CLK's fall, less the earliest change of the bit it captures.

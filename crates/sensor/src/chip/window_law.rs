@@ -28,7 +28,7 @@
 //! tests hold the law against it.
 
 use super::bins::Bins;
-use super::config::{Mode, Tdc};
+use super::config::{AfterBorrow, Mode, Tdc};
 use super::exposure::Exposure;
 use super::p_counter::{Rises, starts_high};
 use super::race::{Conflict, Cure, Irregular, NoAim, Origin, Race};
@@ -229,6 +229,9 @@ impl WindowLaw {
             let race = Race::too_slow(Conflict::SlowPath, timing.clk_period, period);
             return Window::Race(race);
         }
+        if let (Mode::Guided, Some(why)) = (self.sensor.mode, self.miscount(start)) {
+            return Window::Irregular(why);
+        }
         let (cause, arrival, count_edge, irregular) = match self.sensor.mode {
             // A laser cycle is counted by the STOP edge that ends it.
             Mode::Conventional => (end, end + timing.stop_to_strobe, 0, None),
@@ -239,7 +242,7 @@ impl WindowLaw {
                 } else {
                     self.coming_round(start)
                 };
-                let unknown = self.own_counter().or_else(|| self.miscount(start));
+                let unknown = self.own_counter();
                 match found {
                     Ok(LocalStop {
                         time,
@@ -313,6 +316,26 @@ impl WindowLaw {
         timing.clk_period.max(paths + timing.setup + ROUNDING)
     }
 
+    /// A strobe that the reset itself makes, where LOCAL_STOP starts high and was low or is cleared before, if the reset of HIT does not hold then.
+    fn reset_strobe(&self, start: u16) -> Option<Race> {
+        let (sensor, timing) = (&self.sensor, &self.timing);
+        let falls = sensor.after_borrow == AfterBorrow::Wrap || sensor.p_counter.row().clears_first;
+        if !falls || !starts_high(sensor, start) {
+            return None;
+        }
+        let delay = timing.counter.reset_to_local_stop.unwrap_or_default();
+        let arrival = timing.stop_to_reset + delay + timing.local_stop_to_strobe;
+        let until = timing.stop_to_hit_release - timing.removal - ROUNDING;
+        (arrival >= until).then_some(Race {
+            what: Conflict::ResetStrobeAtHitReset,
+            after: Origin::StopRises,
+            comes: arrival,
+            from: until,
+            to: None,
+            cure: Cure::Tap,
+        })
+    }
+
     /// LOCAL_STOP that leaves too short a piece of a pulse of COUNTER_CLK.
     fn cut_pulse(&self, start: u16) -> Option<Race> {
         let timing = &self.timing;
@@ -355,6 +378,9 @@ impl WindowLaw {
         }
         if counter.reset_width < counter.reset_need {
             let race = Race::short_reset(counter.reset_need, counter.reset_width);
+            return Err(Window::Race(race));
+        }
+        if let Some(race) = self.reset_strobe(start) {
             return Err(Window::Race(race));
         }
         let Some(rises) = Rises::of(&self.sensor, start) else {
@@ -401,21 +427,6 @@ impl WindowLaw {
                 to: rises.every.is_none().then_some(deadline + ROUNDING),
                 cure: Cure::LaserCycle,
             }));
-        }
-        if rises.every.is_some() && starts_high(&self.sensor, start) {
-            let delay = counter.reset_to_local_stop.unwrap_or_default();
-            let arrival = timing.stop_to_reset + delay + timing.local_stop_to_strobe;
-            let until = timing.stop_to_hit_release - timing.removal - ROUNDING;
-            if arrival >= until {
-                return Err(Window::Race(Race {
-                    what: Conflict::ResetStrobeAtHitReset,
-                    after: Origin::StopRises,
-                    comes: arrival,
-                    from: until,
-                    to: None,
-                    cure: Cure::Tap,
-                }));
-            }
         }
         if let Some(race) = self.cut_pulse(start) {
             return Err(Window::Race(race));

@@ -404,6 +404,10 @@ pub struct MacropixelDelays {
     pub reset: Span,
     /// STOP rises → COUNTER_RESET falls.
     pub release: Span,
+    /// STOP rises → STOP_D rises, behind the delay chain.
+    pub stop_d: Span,
+    /// STOP rises → the pulse that becomes COUNTER_RESET rises, falls.
+    pub pulse: (Span, Span),
     /// STOP rises → RUN changes.
     pub run: Span,
     /// STOP rises → STROBE rises, where STOP makes the strobe: in the conventional mode.
@@ -447,6 +451,11 @@ impl MacropixelDelays {
                 .collect(),
             reset: edge(&stop, net(Probe::CounterReset), Edge::Rise),
             release: edge(&stop, net(Probe::CounterReset), Edge::Fall),
+            stop_d: edge(&stop, net(Probe::StopD), Edge::Rise),
+            pulse: (
+                edge(&stop, net(Probe::ResetPulse), Edge::Rise),
+                edge(&stop, net(Probe::ResetPulse), Edge::Fall),
+            ),
             run: changes(&stop, net(Probe::Enable)),
             stop_strobe: edge(&stop, circuit.hit_pin(1), Edge::Rise),
             stop_sample: edge(&stop, circuit.sampling(), Edge::Rise),

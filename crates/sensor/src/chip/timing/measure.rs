@@ -36,11 +36,11 @@ impl ChipTiming {
 }
 
 /// Width of COUNTER_RESET, and what it must outlast.
-pub(super) struct ResetPulse {
+pub(crate) struct ResetPulse {
     /// At its shortest.
     pub width: Time,
-    /// Stage outputs that return to their memory value, the COUNTER_CLK edge that LOCAL_STOP's fall lets through, and the flip-flops' own
-    /// shortest reset.
+    /// Stage outputs that return to their memory value, the COUNTER_CLK edges that LOCAL_STOP's fall and ENABLE let through, the shortest
+    /// resets of flip-flops, and the gates on the way, which swallow a pulse shorter than their delay.
     pub need: Time,
 }
 
@@ -62,15 +62,27 @@ impl ResetPulse {
         (delays, counter): (&MacropixelDelays, &CounterDelays),
         (library, corner): (&Library, Corner),
     ) -> Self {
+        let limit_of = |kind, check| Time::from_fs(library.checks(kind).at(check, corner).into());
         let limit = |check| {
-            let kinds = circuit.counting_kinds();
-            let limits = kinds.map(|kind| library.checks(kind).at(check, corner));
-            Time::from_fs(limits.max().expect("a P-counter counts").into())
+            let limits = circuit.counting_kinds().map(|kind| limit_of(kind, check));
+            limits.max().expect("a P-counter counts")
         };
-        let until = counter.reset_edges() + limit(CheckKind::Removal);
+        let width = delays.release.0 - delays.reset.1;
+        let to_hit = counter.hit_reset.1;
+        let of_hit = limit_of(CellKind::Dffr, CheckKind::ControlHigh) - counter.hit_release.0;
+        // What is left over of the pulse where gates make it.
+        let made = (delays.stop_d.0 - delays.pulse.0.1).min(delays.pulse.1.0 - delays.reset.1);
+        let needs = [
+            counter.reset_edges() + limit(CheckKind::Removal),
+            counter.enabled.max(counter.clear.1) - delays.reset.0 + limit(CheckKind::Removal),
+            limit(CheckKind::ControlHigh),
+            to_hit + of_hit,
+            to_hit,
+            width - made,
+        ];
         ResetPulse {
-            width: delays.release.0 - delays.reset.1,
-            need: until.max(limit(CheckKind::ControlHigh)),
+            width,
+            need: needs.into_iter().max().expect("there are some"),
         }
     }
 }

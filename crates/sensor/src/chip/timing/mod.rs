@@ -27,7 +27,7 @@ pub(crate) mod clk_skew;
 pub(crate) mod delay_lines;
 pub mod local_stop;
 pub mod macropixel;
-pub(in crate::chip) mod measure;
+pub(crate) mod measure;
 mod reset_chain;
 pub mod silicon;
 

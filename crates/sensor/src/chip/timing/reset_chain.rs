@@ -83,3 +83,57 @@ fn sufficient_chain(config: &SensorConfig) -> usize {
         stages = (stages + (more as usize).max(1)).min(LONGEST_CHAIN);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chip::PCounter;
+    use crate::chip::timing::ChipTiming;
+
+    #[test]
+    fn built_in_cells_need_no_longer_chain() {
+        for p_counter in PCounter::ALL {
+            let config = p_counter.sensor();
+            assert_eq!(config.reset_buffers(), SHORTEST_CHAIN, "{p_counter:?}");
+        }
+    }
+
+    /// In cells whose removal time grows more than a buffer's delay.
+    #[test]
+    fn a_library_gets_the_chain_that_it_needs() {
+        let text = include_str!("../../../../../vectors/liberty/example.lib");
+        let slow = text.replace(
+            "timing_type : removal_rising;\n      rise_constraint (scalar) { values (\"0.015\"); }",
+            "timing_type : removal_rising;\n      rise_constraint (scalar) { values (\"0.315\"); }",
+        );
+        assert_ne!(slow, text);
+        let folder = tempfile::tempdir().unwrap();
+        let liberty = folder.path().join("slow.lib");
+        std::fs::write(&liberty, slow).unwrap();
+        for p_counter in PCounter::ALL {
+            let config = SensorConfig {
+                liberty: liberty.clone(),
+                ..p_counter.sensor()
+            };
+            config.check().unwrap();
+            let counter = |reset_stages| {
+                ChipTiming::of(&SensorConfig {
+                    reset_stages,
+                    ..config.clone()
+                })
+                .counter
+            };
+            let stages = config.reset_buffers();
+            let (sized, shorter) = (counter(0), counter(stages - 1));
+            if p_counter.row().has_memory {
+                assert!(stages > SHORTEST_CHAIN, "{p_counter:?}: {stages}");
+                assert!(sized.reset_width >= sized.reset_need, "{p_counter:?}");
+                let tenth = shorter.reset_need.as_fs() / 10;
+                assert!(
+                    shorter.reset_width.as_fs() < shorter.reset_need.as_fs() + tenth,
+                    "{p_counter:?}"
+                );
+            }
+        }
+    }
+}

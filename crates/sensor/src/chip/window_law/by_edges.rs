@@ -63,6 +63,16 @@ impl Edges {
                 None,
             );
         }
+        let wraps = self.config.after_borrow == AfterBorrow::Wrap;
+        let falls = wraps || self.config.p_counter.row().clears_first;
+        if falls && starts_high(&self.config, start) {
+            let rise = timing.stop_to_reset + counter.reset_to_local_stop.unwrap();
+            let strobe = rise + timing.local_stop_to_strobe;
+            let held = timing.stop_to_hit_release - timing.removal - NEAR;
+            if strobe >= held {
+                return Found::Race(Conflict::ResetStrobeAtHitReset, strobe, held, None);
+            }
+        }
         let Some(rises) = Rises::of(&self.config, start) else {
             return Found::Never;
         };
@@ -97,14 +107,6 @@ impl Edges {
         if strobe >= latched - NEAR {
             let until = waits.then_some(latched + NEAR);
             return Found::Race(Conflict::StrobeAtNextReset, strobe, latched - NEAR, until);
-        }
-        if !waits && starts_high(&self.config, start) {
-            let rise = timing.stop_to_reset + counter.reset_to_local_stop.unwrap();
-            let strobe = rise + timing.local_stop_to_strobe;
-            let held = timing.stop_to_hit_release - timing.removal - NEAR;
-            if strobe >= held {
-                return Found::Race(Conflict::ResetStrobeAtHitReset, strobe, held, None);
-            }
         }
         self.counted(first, stops.len() == 1)
     }
