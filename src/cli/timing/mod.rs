@@ -2,6 +2,7 @@
 //! and by simulation.
 
 mod distribution;
+mod explain;
 mod section;
 mod tables;
 
@@ -28,6 +29,10 @@ pub(super) struct TimingArgs {
     /// Plot the distribution of the ripple over the array (SVG, with its numbers as CSV beside it; needs --mismatch).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
+    /// List the library's cells that stand for each kind, and those that were passed over, with the reason (needs
+    /// --liberty).
+    #[arg(long)]
+    explain: bool,
     /// Print every step of the longest and shortest paths.
     #[arg(long)]
     paths: bool,
@@ -84,6 +89,9 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
         if let Some(path) = &args.plot {
             distribution::plot(&config, found, path)?;
         }
+    }
+    if args.explain {
+        sections.extend(explain::cells(&silicon)?);
     }
     if args.json {
         let mut document = serde_json::Map::new();

@@ -1,7 +1,7 @@
 //! Boolean expressions of Liberty files (`function`, `next_state`, `clear` …) as truth tables.
 //!
 //! `!` and a following `'` invert, `*`, `&` and blanks between operands are AND, `^` is exclusive OR, `+` and `|` are OR; they
-//! bind in this order.
+//! bind in this order. A name that is none elsewhere, such as `1A`, stands between escaped quotation marks.
 
 /// The values of a function of up to six inputs: bit i is that for inputs whose bits make i, the first input the lowest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -139,7 +139,7 @@ impl Parser<'_> {
         loop {
             match self.next() {
                 Some('*' | '&') => self.skip(),
-                Some(c) if c == '!' || c == '(' || is_name(c) => {}
+                Some(c) if "!(\\".contains(c) || is_name(c) => {}
                 _ => return Some(bits),
             }
             bits &= self.inverted()?;
@@ -177,22 +177,29 @@ impl Parser<'_> {
                 bits
             });
         }
+        if let Some(quoted) = self.rest.strip_prefix("\\\"") {
+            let (name, rest) = quoted.split_once("\\\"")?;
+            self.rest = rest;
+            return self.input(name);
+        }
         let end = self.rest.find(|c| !is_name(c)).unwrap_or(self.rest.len());
         let (name, rest) = self.rest.split_at(end);
         self.rest = rest;
         match name {
             "0" => Some(0),
             "1" => Some(u64::MAX),
-            _ => {
-                let input = self.names.iter().position(|known| *known == name)?;
-                Some(TruthTable::of(self.inputs, |i| i >> input & 1 == 1).bits)
-            }
+            name => self.input(name),
         }
+    }
+
+    fn input(&self, name: &str) -> Option<u64> {
+        let input = self.names.iter().position(|known| *known == name)?;
+        Some(TruthTable::of(self.inputs, |i| i >> input & 1 == 1).bits)
     }
 }
 
 fn is_name(c: char) -> bool {
-    c.is_ascii_alphanumeric() || "_[]".contains(c)
+    c.is_ascii_alphanumeric() || "_[].".contains(c)
 }
 
 #[cfg(test)]
@@ -212,11 +219,13 @@ mod tests {
         assert_eq!(table("1"), of(|_, _, _| true));
         assert_eq!(table("0"), of(|_, _, _| false));
         assert_eq!(table("A 0 + B"), of(|_, b, _| b));
+        let quoted = truth_table(r#"\"1\" !\"B 2\" S"#, &["1", "B 2", "S"]);
+        assert_eq!(quoted, Some(of(|a, b, s| a & !b & s)));
         // As many inputs as a table has.
         let names = ["A", "B", "C", "D", "E", "F", "G"];
         let tables = [6, 7].map(|n| truth_table("A", &names[..n]).is_some());
         assert_eq!(tables, [true, false]);
-        for bad in ["A +", "Q", "(A", "A)", "", "A B +", "*A"] {
+        for bad in ["A +", "Q", "(A", "A)", "", "A B +", "*A", "\\\"A", "A \\B"] {
             assert_eq!(truth_table(bad, &["A", "B", "S"]), None, "{bad}");
         }
     }

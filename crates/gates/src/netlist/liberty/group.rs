@@ -8,11 +8,20 @@
 //!   }
 //! ```
 //!
-//! Nothing is copied: names and values are parts of the text. A value is looked at only by who asks for it, so that a library
-//! of 12 MB is read in a tenth of a second, nearly all of whose numbers belong to cells that no chip here has.
+//! Nothing is copied: names and values are parts of the text, so an escaped quotation mark keeps its backslash. A value is looked
+//! at only by who asks for it, so that a library of 12 MB is read in a tenth of a second, nearly all of whose numbers belong to
+//! cells that no chip here has.
 //!
-//! Source: the Liberty user guide, volume 1 (Synopsys, open source). `define` and the attributes of vendors are read as any
-//! others and mean nothing.
+//! | syntax | how it is read |
+//! |---|---|
+//! | comment behind an unquoted value | ends the value |
+//! | no semicolon | the end of the line, a closing brace or the next attribute ends the value |
+//! | `NAME = 1.5;` | a variable, which is passed over: a value that uses it is not a number |
+//! | `include_file (FILE)` | refused |
+//! | strings continued by a backslash | joined before ([`super::text`]) |
+//!
+//! Source: the Liberty user guide, volume 1 (Synopsys, open source), and what OpenSTA reads. `define` and the attributes of
+//! vendors are read as any others and mean nothing.
 
 use super::error::LibertyError;
 
@@ -86,6 +95,12 @@ impl<'t> Group<'t> {
         })
     }
 
+    /// Pins with the group of each; one group may be that of several, as in `pin (A, B)`.
+    pub(super) fn pins(&self) -> impl Iterator<Item = (&'t str, &Group<'t>)> {
+        let pins = self.of_kind("pin");
+        pins.flat_map(|pin| pin.arguments.iter().map(move |&name| (name, pin)))
+    }
+
     /// Groups of a kind.
     pub(super) fn of_kind(&self, kind: &str) -> impl Iterator<Item = &Group<'t>> {
         self.groups.iter().filter(move |group| group.kind == kind)
@@ -111,9 +126,12 @@ pub(super) fn read(text: &str) -> Result<Group<'_>, LibertyError> {
             );
         }
     };
-    match reader.token()? {
-        None => Ok(library),
-        Some(_) => Err(reader.fault("something follows the library's closing brace")),
+    loop {
+        match reader.token()? {
+            None => return Ok(library),
+            Some(Token::Mark(b';')) => {}
+            Some(_) => return Err(reader.fault("something follows the library's closing brace")),
+        }
     }
 }
 
@@ -168,41 +186,76 @@ impl<'t> Reader<'t> {
         Ok(())
     }
 
+    /// A name, a string or a mark of what a group contains.
     fn token(&mut self) -> Result<Option<Token<'t>>, LibertyError> {
         self.blanks()?;
-        let rest = &self.text[self.at..];
-        let Some(&first) = rest.as_bytes().first() else {
+        let Some(&first) = self.text.as_bytes().get(self.at) else {
             return Ok(None);
         };
         if first == b'"' {
-            let Some(end) = rest[1..].find('"') else {
-                return Err(self.fault("a quotation mark has no partner"));
-            };
-            let word = &rest[1..=end];
-            self.line += word.matches('\n').count();
-            self.at += end + 2;
-            return Ok(Some(Token::Word(word)));
+            return Ok(Some(Token::Word(self.string()?)));
         }
-        if b"(){}:;,".contains(&first) {
+        if b"(){}:;,=".contains(&first) {
             self.at += 1;
             return Ok(Some(Token::Mark(first)));
         }
         // What ends a word is passed over by `blanks` or a token itself, so that there is no empty word.
-        let ends = |c: char| c.is_ascii_whitespace() || "(){}:;,\"\\".contains(c);
-        let end = rest.find(ends).unwrap_or(rest.len());
-        self.at += end;
-        Ok(Some(Token::Word(&rest[..end])))
+        Ok(Some(Token::Word(self.word("(){}:;,=\"\\"))))
     }
 
-    /// Arguments up to the closing bracket; the opening one is read.
+    /// What stands before a blank, a comment or one of `marks`.
+    fn word(&mut self, marks: &str) -> &'t str {
+        let rest = &self.text[self.at..];
+        let ends = |c: char| c.is_ascii_whitespace() || marks.contains(c);
+        let word = &rest[..rest.find(ends).unwrap_or(rest.len())];
+        let word = &word[..word.find("/*").unwrap_or(word.len())];
+        self.at += word.len();
+        word
+    }
+
+    /// What stands between quotation marks, of which the first is next. One with a backslash before it is part of the string,
+    /// which then ends in its line: else a path that ends in a backslash would take in what follows.
+    fn string(&mut self) -> Result<&'t str, LibertyError> {
+        let bytes = &self.text.as_bytes()[self.at + 1..];
+        let (mut length, mut lines, mut is_escaped) = (0, 0, false);
+        loop {
+            match bytes.get(length) {
+                Some(b'"') => break,
+                Some(b'\\') => {
+                    is_escaped |= bytes.get(length + 1) == Some(&b'"');
+                    lines += usize::from(bytes.get(length + 1) == Some(&b'\n'));
+                    length += 2;
+                }
+                Some(b'\n') if !is_escaped => {
+                    lines += 1;
+                    length += 1;
+                }
+                None | Some(b'\n') => return Err(self.fault("a quotation mark has no partner")),
+                Some(_) => length += 1,
+            }
+        }
+        let string = &self.text[self.at + 1..][..length];
+        self.line += lines;
+        self.at += length + 2;
+        Ok(string)
+    }
+
+    /// Arguments up to the closing bracket; the opening one is read. Colons and square brackets are parts of names.
     fn arguments(&mut self) -> Result<Vec<&'t str>, LibertyError> {
         let mut arguments = Vec::new();
         loop {
-            match self.token()? {
-                Some(Token::Word(word)) => arguments.push(word),
-                Some(Token::Mark(b',')) => {}
-                Some(Token::Mark(b')')) => return Ok(arguments),
-                _ => return Err(self.fault("a bracket has no partner")),
+            self.blanks()?;
+            match self.text.as_bytes().get(self.at) {
+                Some(b',') => self.at += 1,
+                Some(b')') => {
+                    self.at += 1;
+                    return Ok(arguments);
+                }
+                Some(b'"') => arguments.push(self.string()?),
+                None | Some(b'(' | b'{' | b'}' | b';') => {
+                    return Err(self.fault("a bracket has no partner"));
+                }
+                Some(_) => arguments.push(self.word("(){};,\"\\")),
             }
         }
     }
@@ -269,29 +322,65 @@ impl<'t> Reader<'t> {
                         };
                         let inner = self.contents(inner, depth + 1)?;
                         group.groups.push(inner);
+                    } else if name == "include_file" {
+                        let file = arguments.first().copied().unwrap_or_default();
+                        let message = format!(
+                            "what is in {file:?} is not included; put its text in the place of include_file"
+                        );
+                        return Err(LibertyError { line, message });
                     } else {
                         (self.at, self.line) = (at, before);
                         group.attributes.push((name, arguments));
                     }
+                }
+                Some(Token::Mark(b'=')) => {
+                    self.simple_value()?;
                 }
                 _ => return Err(self.fault(format!("{name} is neither an attribute nor a group"))),
             }
         }
     }
 
-    /// A simple attribute's value: quoted, or what stands before the semicolon or the end of the line.
+    /// A simple attribute's value: quoted, or what stands before its end.
     fn simple_value(&mut self) -> Result<&'t str, LibertyError> {
         self.blanks()?;
-        if self.text.as_bytes().get(self.at) == Some(&b'"')
-            && let Some(Token::Word(value)) = self.token()?
-        {
-            return Ok(value);
+        let bytes = self.text.as_bytes();
+        if bytes.get(self.at) == Some(&b'"') {
+            return self.string();
         }
-        let rest = &self.text[self.at..];
-        let end = rest.find([';', '\n', '}']).unwrap_or(rest.len());
-        self.at += end;
-        Ok(rest[..end].trim())
+        let start = self.at;
+        while let Some(&byte) = bytes.get(self.at) {
+            let next = bytes.get(self.at + 1);
+            let is_comment = byte == b'/'
+                && match next {
+                    Some(b'*') => true,
+                    // Not that of http://.
+                    Some(b'/') => bytes[self.at - 1].is_ascii_whitespace(),
+                    _ => false,
+                };
+            if is_comment || b";\n}\\".contains(&byte) {
+                break;
+            }
+            if byte == b':'
+                && let Some(attribute) = last_name(&self.text[start..self.at])
+            {
+                self.at = start + attribute;
+                break;
+            }
+            self.at += 1;
+        }
+        Ok(self.text[start..self.at].trim())
     }
+}
+
+/// Where the name of an attribute begins behind a value that no semicolon ends.
+fn last_name(text: &str) -> Option<usize> {
+    let text = text.trim_end();
+    let start = text.rfind(|c: char| c.is_ascii_whitespace())? + 1;
+    let mut name = text[start..].chars();
+    let is_name = name.next().is_some_and(|c| c.is_ascii_alphabetic())
+        && name.all(|c| c.is_ascii_alphanumeric() || c == '_');
+    (is_name && !text[..start].trim().is_empty()).then_some(start)
 }
 
 #[cfg(test)]
@@ -312,6 +401,62 @@ mod tests {
     }
 
     #[test]
+    fn what_ends_a_value_is_no_part_of_it() {
+        let text = "library (l) {
+  a : clear /* x */;  b : 3 // y
+  c : rising_edge/* of
+  two lines */;
+  d : 1 e : 2;
+  f /* g */ : /* h */ \"i\" /* ; */ ;
+  j : 4 \\
+  ;
+  k : 12 May 12:30:00;
+  at : http://x;
+  t (1 /* a */, 2/* b */, /* c */3);
+  v = 1.5; w=2;
+  cell (X/* y */) { area : 1 } ;
+};;
+";
+        let library = read(text).unwrap();
+        for (name, value) in [
+            ("a", "clear"),
+            ("b", "3"),
+            ("c", "rising_edge"),
+            ("d", "1"),
+            ("e", "2"),
+            ("f", "i"),
+            ("j", "4"),
+            ("k", "12 May 12:30:00"),
+            ("at", "http://x"),
+        ] {
+            assert_eq!(library.value(name), Some(value), "{name}");
+        }
+        assert_eq!(library.values("t"), Some(&["1", "2", "3"][..]));
+        let cell = library.of_kind("cell").next().unwrap();
+        assert_eq!((cell.name(), cell.line), ("X", 13));
+        assert_eq!(cell.number("area").unwrap(), Some(1.0));
+    }
+
+    #[test]
+    fn names_have_colons_and_brackets_and_one_group_is_of_several_pins() {
+        let text = "library (l) { cell (a:b) {
+  pin (A[3:0]) { x : 1; }
+  pin (B, \"C\" D) { x : 2; }
+  when : \"\\\"1A\\\" & B\";
+} }";
+        let library = read(text).unwrap();
+        let cell = library.of_kind("cell").next().unwrap();
+        assert_eq!(cell.name(), "a:b");
+        assert_eq!(cell.value("when"), Some("\\\"1A\\\" & B"));
+        let pins: Vec<_> = cell
+            .pins()
+            .map(|(name, pin)| (name, pin.value("x")))
+            .collect();
+        let [one, two] = [Some("1"), Some("2")];
+        assert_eq!(pins, [("A[3:0]", one), ("B", two), ("C", two), ("D", two)]);
+    }
+
+    #[test]
     fn what_is_no_liberty_is_told_with_its_line() {
         for (text, line) in [
             ("module x;", 1),
@@ -320,6 +465,12 @@ mod tests {
             ("library (l) {\n a b;\n}", 2),
             ("library (l) { }\n}", 2),
             ("library (l) { a (1 ; }", 1),
+            // A value has no comment within it.
+            ("library (l) {\n a : b /* c */ d;\n}", 2),
+            ("library (l) {\n a : b \\\n d;\n}", 3),
+            // The string of a path that ends in a backslash does not take in the next line.
+            ("library (l) {\n a : \"C:\\\";\n b : \"c\";\n}", 2),
+            ("library (l) {\n\n include_file (\"a.lib\");\n}", 3),
             ("library (l) { /\n}", 2),
             ("", 1),
             // A vertical tab and another alphabet's blank are no blanks here, and end no word.

@@ -14,10 +14,12 @@
 //!
 //! | file | what it has |
 //! |---|---|
+//! | `text` | a file's bytes as text |
 //! | `group` | the syntax |
 //! | `function` | Boolean expressions as truth tables |
 //! | `table` | delays, slews and limits over slew and load |
 //! | `cell` | which cells may be chosen, and their tables |
+//! | `passed_over` | the others, and why |
 //! | `mapping` | what stands for each kind |
 //! | `read` | a file as a whole |
 //! | `characterised` | loads, drives and slews of a netlist, and what follows |
@@ -36,8 +38,10 @@ mod mapped_models;
 mod mapped_timing;
 mod mapped_verilog;
 mod mapping;
+mod passed_over;
 mod read;
 mod table;
+mod text;
 
 pub(in crate::netlist) use cell::{CellFunction, Role};
 pub use characterised::{Characterised, Environment};
@@ -47,4 +51,6 @@ pub use mapped_models::write_mapped_cells;
 pub use mapped_timing::{Clocking, write_constraints, write_mapped_sdf};
 pub use mapped_verilog::write_mapped;
 pub use mapping::CellMap;
+pub use passed_over::PassedOver;
 pub use read::Liberty;
+pub use text::liberty_text;

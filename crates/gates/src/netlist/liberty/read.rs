@@ -6,7 +6,9 @@ use super::cell::{Candidate, CellFunction};
 use super::error::{LibertyError, Units};
 use super::group::{self, Group};
 use super::mapping::{CellMap, Maker};
+use super::passed_over::PassedOver;
 use super::table::Templates;
+use super::text::joined;
 use crate::netlist::CellKind;
 
 /// A library whose cells stand for every [`CellKind`].
@@ -20,6 +22,8 @@ pub struct Liberty {
     pub cells: usize,
     /// What stands for each kind.
     pub map: CellMap,
+    /// Cells that stand for nothing here and cannot, in the order of the file.
+    pub passed_over: Vec<PassedOver>,
     /// Its gates and flip-flops by name.
     functions: HashMap<String, CellFunction>,
 }
@@ -35,7 +39,8 @@ impl Liberty {
     /// # Errors
     /// What is no Liberty, units that are not known, and a library from which the cells here cannot be made.
     pub fn read(text: &str, wanted: &[(CellKind, String)]) -> Result<Self, LibertyError> {
-        let library = group::read(text)?;
+        let text = joined(text);
+        let library = group::read(&text)?;
         let fault = |message: String| LibertyError {
             line: library.line,
             message,
@@ -80,9 +85,20 @@ impl Liberty {
             _ => 1e-9,
         };
         let templates = Templates::of(&library);
-        let mut candidates = Vec::new();
+        let (mut candidates, mut passed_over) = (Vec::new(), Vec::new());
+        let mut lines = HashMap::new();
         for group in library.of_kind("cell") {
-            candidates.extend(Candidate::of(group)?);
+            let before = *lines.entry(group.name()).or_insert(group.line);
+            let candidate = match before == group.line {
+                true => Candidate::of(group)?,
+                false => Err(format!(
+                    "line {before} has a cell of this name, which counts"
+                )),
+            };
+            match candidate {
+                Ok(candidate) => candidates.push(candidate),
+                Err(why) => passed_over.push(PassedOver::new(group, why)),
+            }
         }
         let maker = Maker {
             candidates: &candidates,
@@ -98,7 +114,8 @@ impl Liberty {
                 library.number("nom_temperature")?,
             ],
             cells: library.of_kind("cell").count(),
-            map: maker.make(&library)?,
+            map: (maker.make(&library)).map_err(|fault| fault.with_passed_over(&passed_over))?,
+            passed_over,
             functions: candidates
                 .iter()
                 .map(|c| (c.name().to_owned(), c.function()))

@@ -10,19 +10,14 @@
 
 use std::collections::HashMap;
 use std::hash::{Hash, Hasher};
-use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
-use flate2::read::GzDecoder;
-
+use super::library_file::read_library;
 use crate::chip::SensorConfig;
 use crate::chip::blocks::{front_end, macropixel};
 use crate::netlist::liberty::{Characterised, Environment, Liberty};
 use crate::netlist::{CellKind, Corner, Library, Module, Netlist, Timing};
-
-/// Most bytes of a library: the largest open ones have 60 MB a corner.
-const MOST_BYTES: u64 = 512 << 20;
 
 /// The cells that a chip is made of. Copies are the same; a file is read once a process.
 #[derive(Debug, Clone, Copy)]
@@ -86,8 +81,8 @@ impl CellLibrary {
         }
         let cells =
             wanted_cells(&config.liberty_cells).map_err(|message| ("liberty_cells", message))?;
-        let text =
-            text_of(path).map_err(|message| (key, format!("{}: {message}", path.display())))?;
+        let text = read_library(path)
+            .map_err(|message| (key, format!("{}: {message}", path.display())))?;
         let liberty = Liberty::read(&text, &cells)
             .map_err(|e| (key, format!("{}:{}: {e}", path.display(), e.line)))?;
         let mut environment = Environment::of(&liberty);
@@ -202,29 +197,4 @@ fn wanted_cells(text: &str) -> Result<Vec<(CellKind, String)>, String> {
         })
     };
     pairs.map(pair).collect()
-}
-
-/// The text of a library, packed by gzip or not.
-fn text_of(path: &Path) -> Result<String, String> {
-    let file = std::fs::File::open(path).map_err(|e| format!("cannot be read: {e}"))?;
-    let mut bytes = Vec::new();
-    let mut read = |from: &mut dyn Read| {
-        from.take(MOST_BYTES + 1)
-            .read_to_end(&mut bytes)
-            .map(|_| ())
-    };
-    let is_packed = path.extension().is_some_and(|ending| ending == "gz");
-    let done = match is_packed {
-        true => read(&mut GzDecoder::new(file)),
-        false => read(&mut &file),
-    };
-    done.map_err(|e| format!("cannot be read: {e}"))?;
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(format!(
-            "has more than {} MB; give a library of one corner",
-            MOST_BYTES >> 20
-        ));
-    }
-    String::from_utf8(bytes)
-        .map_err(|_| "is not text; give a Liberty file, .lib or .lib.gz".to_owned())
 }
