@@ -11,10 +11,10 @@ use super::voice::{note, progress, tell};
 use crate::chip::{SensorConfig, Silicon, array};
 use crate::files::{InputError, OutputFile, read_text};
 use crate::netlist::sdf::{
-    Sdf, SdfDivider, SdfOptions, SdfTimescale, Skipped, annotate, oddities, write_library_sdf,
-    write_sdf,
+    Annotation, Sdf, SdfCell, SdfDivider, SdfOptions, SdfTimescale, Skipped, annotate, oddities,
+    write_library_sdf, write_sdf,
 };
-use crate::netlist::{Netlist, Timing};
+use crate::netlist::{Corner, Netlist, Timing};
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Divider {
@@ -135,7 +135,7 @@ fn size(config: &SensorConfig, design: &str, options: SdfOptions) -> std::io::Re
 /// taken over is said on standard error.
 ///
 /// # Errors
-/// Unreadable and malformed files, and files of another design.
+/// Unreadable and malformed files, files of another design, and those of which nothing is used.
 pub(super) fn annotated_timing(
     path: &Path,
     netlist: &Netlist,
@@ -148,6 +148,12 @@ pub(super) fn annotated_timing(
     }
     let mut timing = Silicon::of(config).timing(netlist);
     let result = annotate(&mut timing, netlist, &sdf, config.corner)?;
+    if result.is_empty() {
+        return Err(InputError::new(
+            sdf.source.clone(),
+            why_unused(&sdf, config.corner, &result),
+        ));
+    }
     let at = |skipped: &Skipped| {
         format!(
             "gdtof: {}:{}: left out or approximated {} of: {}",
@@ -163,9 +169,79 @@ pub(super) fn annotated_timing(
             result.longest_wire_to_d_fs
         );
     }
+    let corner = config.corner;
+    let values = sdf.values(corner);
+    let others = Corner::ALL.map(|other| sdf.values(other));
+    if let Some(most) = others.into_iter().max().filter(|&most| most > values) {
+        let missing = most - values;
+        eprintln!(
+            "gdtof: {}: {missing} of {most} entries have no value for {} and leave the library's; the file has {}",
+            sdf.source,
+            corner_name(corner),
+            corners(&sdf),
+        );
+    }
     eprintln!(
         "gdtof: {}: {} arcs, {} wires and {} timing checks annotated",
         sdf.source, result.arcs, result.wires, result.checks
     );
     Ok(timing)
+}
+
+/// Why nothing of a file was taken over, and what to do.
+fn why_unused(sdf: &Sdf<'_>, corner: Corner, result: &Annotation) -> String {
+    let left_out = |skipped: &[Skipped]| {
+        let names: Vec<&str> = skipped.iter().map(|skipped| skipped.what).collect();
+        names.join(", ")
+    };
+    if sdf.cells.is_empty() {
+        return "it has no CELL, so no delay changes; give a file with the delays of this chip"
+            .to_owned();
+    }
+    let is_bare = |cell: &SdfCell<'_>| cell.delays.is_empty() && cell.checks.is_empty();
+    if sdf.cells.iter().all(is_bare) {
+        return match left_out(&sdf.skipped) {
+            none if none.is_empty() => {
+                "its cells have neither delays nor timing checks; give a file with the delays of this chip".to_owned()
+            }
+            kinds => format!(
+                "all that its cells have is left out ({kinds}); give IOPATH, DEVICE, PORT, INTERCONNECT or timing checks without conditions"
+            ),
+        };
+    }
+    if sdf.values(corner) == 0 {
+        let is_there = |&other: &Corner| sdf.values(other) > 0;
+        let Some(other) = Corner::ALL.into_iter().find(is_there) else {
+            return "all of its values are empty; write the file again with numbers".to_owned();
+        };
+        return format!(
+            "it has no value for {}, the sensor's corner, and has {}; write the file with all three, or set sensor.corner={}",
+            corner_name(corner),
+            corners(sdf),
+            other.name()
+        );
+    }
+    match left_out(&result.notes) {
+        none if none.is_empty() => {
+            "its entries are for every instance of cell types that this chip does not have; correct CELLTYPE or INSTANCE".to_owned()
+        }
+        kinds => format!("nothing of it changes a delay or limit of this chip ({kinds}); correct its entries"),
+    }
+}
+
+/// What SDF calls a corner, and what the sensor does.
+fn corner_name(corner: Corner) -> String {
+    let place = ["min", "typ", "max"][corner as usize];
+    match corner {
+        Corner::Typ => place.to_owned(),
+        _ => format!("{place} (corner {})", corner.name()),
+    }
+}
+
+/// The corners that a file has values for, and how many.
+fn corners(sdf: &Sdf<'_>) -> String {
+    let given = Corner::ALL.map(|corner| (corner, sdf.values(corner)));
+    let given = given.iter().filter(|(_, values)| *values > 0);
+    let texts = given.map(|&(corner, values)| format!("{values} for {}", corner_name(corner)));
+    texts.collect::<Vec<_>>().join(", ")
 }

@@ -25,6 +25,13 @@ pub struct Annotation {
     pub longest_wire_to_d_fs: i64,
 }
 
+impl Annotation {
+    /// Whether nothing of the file was taken over.
+    pub fn is_empty(&self) -> bool {
+        self.arcs + self.wires + self.checks == 0
+    }
+}
+
 const LONGEST_ARC: &str = "arcs with several delays, of which the longest is used";
 
 /// Puts delays and limits of `sdf` in one corner into `timing`: first all arcs in file order, then the wires on top of

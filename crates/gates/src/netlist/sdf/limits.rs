@@ -68,7 +68,7 @@ impl Annotator<'_, '_, '_> {
                 self.note(NO_SUCH_CHECK, check.line);
                 continue;
             }
-            self.result.checks += 1;
+            self.result.checks += usize::from(check.has_value(self.corner));
             // Two limits are one for each of two slots; one limit may be for both.
             let of_slot = [0, check.kind.limits() - 1].map(|limit| check.limits[limit]);
             for (slot, limit) in slots.into_iter().zip(of_slot) {

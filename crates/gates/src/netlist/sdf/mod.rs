@@ -131,6 +131,15 @@ pub struct SdfDelay<'a> {
     pub fall: Triple,
 }
 
+impl SdfDelay<'_> {
+    /// Whether it gives a value for a corner.
+    pub fn has_value(&self, corner: Corner) -> bool {
+        [self.rise, self.fall]
+            .iter()
+            .any(|value| value.at(corner).is_some())
+    }
+}
+
 /// Kinds of timing checks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CheckKind {
@@ -197,6 +206,13 @@ pub struct SdfCheck<'a> {
     pub reference: Option<PinEdge<'a>>,
     /// Limits; the second only where [`CheckKind::limits`] is 2. They may be negative there.
     pub limits: [Triple; 2],
+}
+
+impl SdfCheck<'_> {
+    /// Whether it gives a limit for a corner.
+    pub fn has_value(&self, corner: Corner) -> bool {
+        self.limits.iter().any(|limit| limit.at(corner).is_some())
+    }
 }
 
 /// Which instances a CELL entry is about.
@@ -271,4 +287,17 @@ pub struct Sdf<'a> {
     pub cells: Vec<SdfCell<'a>>,
     /// Constructs of the format that are not modelled.
     pub skipped: Vec<Skipped>,
+}
+
+impl Sdf<'_> {
+    /// Delays and timing checks that give a value for a corner.
+    pub fn values(&self, corner: Corner) -> usize {
+        let cells = self.cells.iter();
+        let values = cells.map(|cell| {
+            let delays = cell.delays.iter().filter(|delay| delay.has_value(corner));
+            let checks = cell.checks.iter().filter(|check| check.has_value(corner));
+            delays.count() + checks.count()
+        });
+        values.sum()
+    }
 }

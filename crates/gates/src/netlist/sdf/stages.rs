@@ -45,7 +45,8 @@ impl Annotator<'_, '_, '_> {
                     *member = fs + if delay.increment { *member } else { 0 };
                 }
             }
-            self.result.arcs += 1;
+            let is_given = delay.has_value(self.corner);
+            self.result.arcs += usize::from(is_given);
         }
         Ok(())
     }

@@ -79,6 +79,9 @@ impl Annotator<'_, '_, '_> {
             self.note(WIRE_TO_D, delay.line);
             return;
         }
+        if values == [None; 2] {
+            return;
+        }
         let wire = self.wires.entry((cell, pin)).or_insert(Wire {
             line: delay.line,
             rise_fs: 0,
