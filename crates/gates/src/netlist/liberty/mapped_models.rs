@@ -3,6 +3,10 @@
 //! A gate is a user-defined primitive of its truth table, whose output is unknown where unknown inputs leave it open. Flip-flops have
 //! the state of the standard cells (`verilog/standard_cells`), with inverters at pins that are active low; where a library does not say
 //! which of clear and preset wins, it is the clear. A path without a delay from a file takes 1 ps. Limits are not checked.
+//!
+//! Tools without user-defined primitives (Verilator, Yosys) take the macro `FUNCTIONAL` for granted, as in the standard cells: a gate
+//! is its truth table there, and a flip-flop a process. Without delays the chip makes no reset pulse, so this serves linting, synthesis and
+//! proofs, not simulation.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
@@ -12,7 +16,7 @@ use super::characterised::Characterised;
 use super::function::TruthTable;
 use super::read::Liberty;
 use crate::netlist::Netlist;
-use crate::netlist::verilog::DFFSR_STATE;
+use crate::netlist::verilog::{DFFSR_STATE, HEAD};
 
 /// Writes a module for every library cell and drive in the netlist of [`write_mapped`](super::write_mapped).
 ///
@@ -32,7 +36,7 @@ pub fn write_mapped_cells(
             models.insert(model.name.as_str(), model);
         }
     }
-    writeln!(out, "`timescale 1ps/1fs\n`celldefine\n{DFFSR_STATE}")?;
+    writeln!(out, "{HEAD}{DFFSR_STATE}")?;
     for (name, model) in models {
         if let Role::Gate(function) = model.role {
             write_primitive(out, name, function)?;
@@ -44,11 +48,18 @@ pub fn write_mapped_cells(
             inputs.join(", ")
         )?;
         match &model.role {
-            Role::Gate(_) => writeln!(
-                out,
-                "  {name}_FUNCTION body({outputs}, {});",
-                inputs.join(", ")
-            )?,
+            Role::Gate(function) => {
+                let rows = 1 << function.inputs;
+                let packed: Vec<&str> = inputs.iter().rev().copied().collect();
+                writeln!(
+                    out,
+                    "`ifdef FUNCTIONAL\n  wire [{}:0] inner_rows = {rows}'h{:x};\n  assign {outputs} = inner_rows[{{{}}}];\n`else\n  {name}_FUNCTION inner_body({outputs}, {});\n`endif",
+                    rows - 1,
+                    function.bits,
+                    packed.join(", "),
+                    inputs.join(", ")
+                )?;
+            }
             Role::FlipFlop(roles) => write_flip_flop(out, model, roles)?,
         }
         writeln!(out, "  specify")?;
@@ -75,7 +86,7 @@ fn write_primitive(out: &mut dyn Write, name: &str, function: TruthTable) -> io:
     let pins = pins.join(", ");
     writeln!(
         out,
-        "primitive {name}_FUNCTION(y, {pins});\n  output y;\n  input {pins};\n  table"
+        "`ifndef FUNCTIONAL\nprimitive {name}_FUNCTION(y, {pins});\n  output y;\n  input {pins};\n  table"
     )?;
     for row in 0..3_u32.pow(function.inputs) {
         let level = |pin: u32| row / 3_u32.pow(pin) % 3;
@@ -96,10 +107,10 @@ fn write_primitive(out: &mut dyn Write, name: &str, function: TruthTable) -> io:
             )?;
         }
     }
-    writeln!(out, "  endtable\nendprimitive\n")
+    writeln!(out, "  endtable\nendprimitive\n`endif\n")
 }
 
-/// The primitive's reset wins: where the preset does, the state is kept inverted.
+/// The primitive's reset wins: where the preset does, the state is kept inverted. Names of inner nets are none of a library's pins.
 fn write_flip_flop(out: &mut dyn Write, model: &CellModel, roles: &FlipFlop) -> io::Result<()> {
     let inverts = |inverted: bool| if inverted { "not" } else { "buf" };
     let (strong, weak) = match roles.preset_wins {
@@ -107,30 +118,56 @@ fn write_flip_flop(out: &mut dyn Write, model: &CellModel, roles: &FlipFlop) -> 
         false => (roles.clear, roles.preset),
     };
     let data = (roles.data.0, roles.data.1 != roles.preset_wins);
-    writeln!(out, "  wire state, d, ck, r, s;\n  reg notifier;")?;
     let pins = [
         ("d", Some(data)),
         ("ck", Some(roles.clock)),
         ("r", strong),
         ("s", weak),
     ];
+    let given = pins.iter().filter(|(_, pin)| pin.is_some());
+    let wires: Vec<String> = given.map(|(wire, _)| format!("inner_{wire}")).collect();
+    writeln!(out, "  wire {};", wires.join(", "))?;
     for (wire, pin) in pins {
-        match pin {
-            Some((pin, inverted)) => {
-                writeln!(
-                    out,
-                    "  {} at_{wire}({wire}, {});",
-                    inverts(inverted),
-                    model.inputs[pin].name
-                )?;
-            }
-            None => writeln!(out, "  assign {wire} = 1'b0;")?,
+        if let Some((pin, inverted)) = pin {
+            let pin = &model.inputs[pin].name;
+            writeln!(
+                out,
+                "  {} inner_at_{wire}(inner_{wire}, {pin});",
+                inverts(inverted)
+            )?;
         }
     }
-    writeln!(out, "  DFFSR_STATE memory(state, d, ck, r, s, notifier);")?;
+    writeln!(out, "`ifdef FUNCTIONAL\n  reg inner_state;")?;
+    let mut edges = String::from("posedge inner_ck");
+    let mut next = String::from("inner_state <= inner_d;");
+    if weak.is_some() {
+        // One that is still active when the other ends is seen then.
+        let set = if strong.is_some() {
+            "inner_s & ~inner_r"
+        } else {
+            "inner_s"
+        };
+        writeln!(out, "  wire inner_set = {set};")?;
+        edges += " or posedge inner_set";
+        next = format!("if (inner_set) inner_state <= 1'b1;\n    else {next}");
+    }
+    if strong.is_some() {
+        edges += " or posedge inner_r";
+        next = format!("if (inner_r) inner_state <= 1'b0;\n    else {next}");
+    }
+    let level = |pin: Option<_>, wire| if pin.is_some() { wire } else { "1'b0" };
+    let (reset, set) = (level(strong, "inner_r"), level(weak, "inner_s"));
+    writeln!(
+        out,
+        "  always @({edges})\n    {next}\n`else\n  wire inner_state;\n  reg inner_notifier;\n  DFFSR_STATE inner_memory(inner_state, inner_d, inner_ck, {reset}, {set}, inner_notifier);\n`endif"
+    )?;
     for (index, output) in model.outputs.iter().enumerate() {
         let inverted = (roles.q != Some(index)) != roles.preset_wins;
-        writeln!(out, "  {} to_{output}({output}, state);", inverts(inverted))?;
+        writeln!(
+            out,
+            "  {} inner_to_{output}({output}, inner_state);",
+            inverts(inverted)
+        )?;
     }
     Ok(())
 }

@@ -13,8 +13,8 @@ mod standard_cells;
 
 pub use exact_cells::{write_cells, write_delays, write_parametric_cells};
 pub use modules::write_modules;
-pub(super) use standard_cells::DFFSR_STATE;
 pub use standard_cells::write_standard_cells;
+pub(super) use standard_cells::{DFFSR_STATE, HEAD};
 
 use super::cell::CellKind;
 

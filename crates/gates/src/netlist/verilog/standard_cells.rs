@@ -32,7 +32,8 @@ use crate::netlist::instance_limits::InstanceLimits;
 use crate::netlist::library::Library;
 use crate::netlist::sdf::{CheckKind, Edge, PinEdge, SdfCheck, checks_of};
 
-const HEAD: &str = "\
+/// What a file of cells begins with.
+pub(in crate::netlist) const HEAD: &str = "\
 `timescale 1ps/1fs
 
 // With FUNCTIONAL, flip-flops are processes without notifiers, for tools that have no user-defined primitives.
