@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::io::{self, Write};
 
 use super::characterised::{Characterised, Environment};
+use super::mapped_wires::write_wires;
 use super::mapping::Source;
 use super::read::Liberty;
 use crate::netlist::{Edge, NetId, Netlist, caused};
@@ -77,7 +78,7 @@ pub struct Clocking<'c> {
 }
 
 /// Writes constraints (SDC) for the netlist of [`write_mapped`](super::write_mapped): the clock, a generated clock at each flip-flop that clocks another, when
-/// inputs come, and their slew. Of a ripple's flip-flops one whose output is a port may clock others outside.
+/// inputs come, their slew, and what the wires load. Of a ripple's flip-flops one whose output is a port may clock others outside.
 ///
 /// # Errors
 /// Those of the writer.
@@ -92,6 +93,7 @@ pub fn write_constraints(
     // The library's unit of time is the SDC's: all known here are 1 ns.
     let ns = |fs: f64| fs / 1e6;
     writeln!(out, "set_units -time ns")?;
+    write_wires(out, netlist, library, environment)?;
     writeln!(
         out,
         "set_input_transition {:.9} [all_inputs]",

@@ -97,7 +97,7 @@ pub fn write_mapped(
 }
 
 /// A name for each net: a port's, the path, or a number.
-fn names(netlist: &Netlist) -> Vec<String> {
+pub(super) fn names(netlist: &Netlist) -> Vec<String> {
     let top = &netlist.scopes()[0];
     let mut names: Vec<String> = (0..netlist.net_count())
         .map(|net| match netlist.net_path(NetId::new(net)) {

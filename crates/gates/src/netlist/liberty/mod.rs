@@ -27,6 +27,7 @@
 //! | `mapped_verilog` | the netlist of library cells, for other tools |
 //! | `mapped_models` | what its cells do, for simulators |
 //! | `mapped_timing` | its delays and clocks for them |
+//! | `mapped_wires` | loads of its wires for them |
 
 mod cell;
 mod characterised;
@@ -37,6 +38,7 @@ mod group;
 mod mapped_models;
 mod mapped_timing;
 mod mapped_verilog;
+mod mapped_wires;
 mod mapping;
 mod passed_over;
 mod read;

@@ -24,6 +24,8 @@ pub struct Liberty {
     pub map: CellMap,
     /// Cells that stand for nothing here and cannot, in the order of the file.
     pub passed_over: Vec<PassedOver>,
+    /// Its unit of capacitance, fF.
+    pub(super) load_unit_ff: f64,
     /// Its gates and flip-flops by name.
     functions: HashMap<String, CellFunction>,
 }
@@ -114,6 +116,7 @@ impl Liberty {
                 library.number("nom_temperature")?,
             ],
             cells: library.of_kind("cell").count(),
+            load_unit_ff: load_ff,
             map: (maker.make(&library)).map_err(|fault| fault.with_passed_over(&passed_over))?,
             passed_over,
             functions: candidates
