@@ -143,9 +143,6 @@ pub(super) fn annotated_timing(
 ) -> Result<Timing, InputError> {
     let text = read_text(path)?;
     let sdf = Sdf::parse(&path.display().to_string(), &text)?;
-    for oddity in oddities(&sdf, config.corner) {
-        eprintln!("gdtof: {}:{}: {oddity}", sdf.source, oddity.line());
-    }
     let mut timing = Silicon::of(config).timing(netlist);
     let result = annotate(&mut timing, netlist, &sdf, config.corner)?;
     if result.is_empty() {
@@ -153,6 +150,9 @@ pub(super) fn annotated_timing(
             sdf.source.clone(),
             why_unused(&sdf, config.corner, &result),
         ));
+    }
+    for oddity in oddities(&sdf, config.corner) {
+        eprintln!("gdtof: {}:{}: {oddity}", sdf.source, oddity.line());
     }
     let at = |skipped: &Skipped| {
         format!(

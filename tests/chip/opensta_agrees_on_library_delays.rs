@@ -14,10 +14,10 @@ use crate::tool;
 use std::collections::BTreeMap;
 
 /// Rise and fall delay of each arc (instance, from, to), ps; the later where a file has several.
-type Arcs = BTreeMap<(String, String, String), [Option<f64>; 2]>;
+pub type Arcs = BTreeMap<(String, String, String), [Option<f64>; 2]>;
 
 /// The arcs of an SDF file whose unit is `unit_ps`.
-fn arcs(text: &str, unit_ps: f64) -> Arcs {
+pub fn arcs(text: &str, unit_ps: f64) -> Arcs {
     let (mut found, mut instance) = (Arcs::new(), String::new());
     for line in text.lines().map(str::trim) {
         if let Some((_, rest)) = line.split_once("(INSTANCE") {

@@ -166,3 +166,96 @@ fn bad_delay_files_are_refused_in_one_sentence() {
     assert_eq!(missing.status.code(), Some(2));
     assert!(!here.join("no").exists());
 }
+
+/// One sentence for each way in which a file may be of no use.
+#[test]
+fn files_of_which_nothing_is_used_are_refused() {
+    let folder = folder();
+    let here = folder.path();
+    let flip_flops = |kind: &str, body: &str| {
+        format!("(DELAYFILE (TIMESCALE 1ns)\n(CELL (CELLTYPE \"{kind}\") (INSTANCE *) {body}))")
+    };
+    let delay = |kind: &str, body: &str| flip_flops(kind, &format!("(DELAY (ABSOLUTE {body}))"));
+    let path = |values: &str| delay("DFFR", &format!("(IOPATH CK Q {values})"));
+    let limit = |values: &str| flip_flops("DFFR", &format!("(TIMINGCHECK (SETUP D CK {values}))"));
+    for (text, says) in [
+        ("(DELAYFILE (TIMESCALE 1ns))".to_owned(), "it has no CELL"),
+        (flip_flops("DFFR", ""), "neither delays nor timing checks"),
+        (
+            flip_flops("DFFR", "(DELAY) (TIMINGCHECK)"),
+            "neither delays nor timing checks",
+        ),
+        (
+            path("(0.4::0.6)"),
+            "no value for typ, the sensor's corner, and has 1 for min (corner fast), 1 for max (corner slow)",
+        ),
+        (
+            path("(::0.6) ()"),
+            "and has 1 for max (corner slow); write the file with all three, or set sensor.corner=slow",
+        ),
+        (
+            limit("(0.1::)"),
+            "and has 1 for min (corner fast); write the file with all three, or set sensor.corner=fast",
+        ),
+        (delay("DFFR", "(PORT CK (0.1::))"), "and has 1 for min"),
+        (path("()"), "all of its values are empty"),
+        (path("(::) (::)"), "all of its values are empty"),
+        (
+            delay("DFFR", "(COND R (IOPATH CK Q (0.4)))"),
+            "all that its cells have is left out (COND)",
+        ),
+        (
+            flip_flops(
+                "DFFR",
+                "(TIMINGCHECK (SETUP D (COND R CK) (0.1)) (PERIOD CK (1)))",
+            ),
+            "all that its cells have is left out (COND, PERIOD)",
+        ),
+        (
+            delay("DFFR", "(PORT D (0.1))"),
+            "(wires to D of a flip-flop)",
+        ),
+        (
+            flip_flops("DFFR", "(TIMINGCHECK (SETUP R CK (0.1)))"),
+            "(checks of pins or edges that a flip-flop does not act on)",
+        ),
+        (
+            delay("DFFSR", "(IOPATH CK Q (0.4))"),
+            "cell types that this chip does not have",
+        ),
+    ] {
+        std::fs::write(here.join("d.sdf"), &text).unwrap();
+        let output = replay(here, &["--engine", "gate", "--sdf", "d.sdf"]);
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{text}: {error}");
+        assert!(
+            error.contains("d.sdf: ") && error.contains(says),
+            "{text}: {error}"
+        );
+        assert_eq!(error.trim_end().lines().count(), 1, "{text}: {error}");
+        assert!(output.stdout.is_empty(), "{text}");
+    }
+    // In a corner that it has, the file counts.
+    std::fs::write(here.join("d.sdf"), path("(0.4::0.6)")).unwrap();
+    let slow = [
+        "--engine",
+        "gate",
+        "--sdf",
+        "d.sdf",
+        "--set",
+        "sensor.corner=slow",
+    ];
+    let output = replay(here, &slow);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        output.status.success() && !said.contains("no value for"),
+        "{said}"
+    );
+    // Entries without a value for the corner are counted.
+    let some = delay("DFFR", "(IOPATH CK Q (0.1)) (IOPATH CK QN (0.1::0.1))");
+    std::fs::write(here.join("d.sdf"), some).unwrap();
+    let output = replay(here, &["--engine", "gate", "--sdf", "d.sdf"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    let missing = "1 of 2 entries have no value for typ and leave the library's; the file has 2 for min (corner fast), 1 for typ, 2 for max (corner slow)";
+    assert!(output.status.success() && said.contains(missing), "{said}");
+}

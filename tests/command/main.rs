@@ -18,6 +18,7 @@ mod golden_vectors_hold;
 mod guides_from_the_command_line;
 mod heat_reaches_the_chip;
 mod kept_inputs_are_read;
+mod libraries_in_any_syntax;
 mod libraries_make_the_chip;
 #[cfg(unix)]
 mod long_runs_keep_their_memory;

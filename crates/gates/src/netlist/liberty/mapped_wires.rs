@@ -27,7 +27,11 @@ pub(super) fn write_wires(
             pins[net.index()] += 1;
         }
     }
-    for (name, pins) in names(netlist).iter().zip(pins).filter(|(_, pins)| *pins > 0) {
+    for (name, pins) in names(netlist)
+        .iter()
+        .zip(pins)
+        .filter(|(_, pins)| *pins > 0)
+    {
         let load = f64::from(pins) * environment.wire_ff / library.load_unit_ff;
         let name = name.trim_start_matches('\\').trim_end();
         writeln!(out, "set_load {load:.9} [get_nets {{{name}}}]")?;

@@ -5,6 +5,7 @@
 
 use super::error::LibertyError;
 use super::group::Group;
+use crate::netlist::CellKind;
 
 /// A cell that is not used.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -15,6 +16,7 @@ pub struct PassedOver {
     pub line: usize,
     /// What keeps it from being used.
     pub why: String,
+    is_flip_flop: bool,
 }
 
 impl PassedOver {
@@ -22,6 +24,7 @@ impl PassedOver {
         PassedOver {
             cell: group.name().to_owned(),
             line: group.line,
+            is_flip_flop: group.of_kind("ff").next().is_some(),
             why,
         }
     }
@@ -31,26 +34,29 @@ impl PassedOver {
 const NAMED: usize = 3;
 
 impl LibertyError {
-    /// The same with the cells that were passed over: those that the message names, else the first ones.
+    /// The same with the cells that were passed over and that this may be about: those that it names, or else flip-flops or gates.
     pub(super) fn with_passed_over(mut self, cells: &[PassedOver]) -> Self {
-        let words = |text: &str| {
-            let words = text.split([' ', ',', ';', ':']);
-            words.map(str::to_owned).collect::<Vec<_>>()
-        };
-        let words = words(&self.message);
+        let words: Vec<String> = (self.message.split([' ', ',', ';', ':']))
+            .map(str::to_owned)
+            .collect();
         let is_named = |cell: &&PassedOver| words.contains(&cell.cell);
-        let named: Vec<&PassedOver> = cells.iter().filter(is_named).take(NAMED).collect();
-        let told = if named.is_empty() {
-            cells.iter().take(NAMED).collect()
-        } else {
-            named
-        };
-        for PassedOver { cell, line, why } in &told {
+        let misses_flip_flop = (CellKind::ALL.iter())
+            .any(|kind| kind.is_flip_flop() && words.iter().any(|word| word == kind.name()));
+        let mut told: Vec<&PassedOver> = cells.iter().filter(is_named).collect();
+        if told.is_empty() {
+            let alike = cells
+                .iter()
+                .filter(|cell| cell.is_flip_flop == misses_flip_flop);
+            told = alike.collect();
+        }
+        for PassedOver {
+            cell, line, why, ..
+        } in told.iter().take(NAMED)
+        {
             self.message += &format!("; {cell} in line {line} is passed over: {why}");
         }
-        match cells.len() - told.len() {
-            0 => {}
-            more => self.message += &format!("; and so are {more} more"),
+        if told.len() > NAMED {
+            self.message += &format!("; and so are {} more", told.len() - NAMED);
         }
         self
     }
