@@ -20,7 +20,7 @@ use guided_dtof::units::Time;
 pub const PERIOD_NS: f64 = 2.0;
 
 /// Libraries that are here, name and text: `vectors/liberty/example.lib`, osu018 and osu035 where Debian has put them, and
-/// sky130_fd_sc_hd where `shared/data` beside the checkout has it. Their default wire load is left out, as we leave out wires.
+/// sky130_fd_sc_hd where `shared/data` beside the checkout has it.
 pub fn libraries() -> Vec<(&'static str, String)> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let qflow = |name: &str| format!("/usr/share/qflow/tech/{name}/{name}_stdcells.lib").into();
@@ -46,7 +46,7 @@ fn text_of(path: &Path) -> Option<String> {
             .ok()?,
         false => (&bytes[..]).read_to_string(&mut text).ok()?,
     };
-    Some(text.replace("default_wire_load :", "default_wire_load_left_out :"))
+    Some(text)
 }
 
 /// The QuantIC4x4 with every P-counter, and HSLIDAR in both modes.

@@ -33,7 +33,7 @@ fn of_a_chain_by_opensta() {
             folder.path(),
             "chain",
             &format!(
-                "set_input_transition {slew_ns:.9} [all_inputs]\nset_power_activity -input -activity 1 -duty 0.5\nreport_power -digits 9\n"
+                "set_load 0 [get_nets *]\nset_input_transition {slew_ns:.9} [all_inputs]\nset_power_activity -input -activity 1 -duty 0.5\nreport_power -digits 9\n"
             ),
         );
         let total = report.lines().find_map(|line| line.strip_prefix("Total"));

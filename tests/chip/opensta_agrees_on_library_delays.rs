@@ -62,6 +62,7 @@ fn of_every_arc_of_a_macropixel() {
             let slew_ns = mapped.cells.environment.input_slew_fs / 1e6;
             mapped.opensta(&format!(
                 "set sta_preset_clear_arcs_enabled 1
+set_load 0 [get_nets *]
 set_input_transition {slew_ns:.9} [all_inputs]
 create_clock -name CLK -period 100 [get_ports CLK]
 set_propagated_clock [get_clocks CLK]

@@ -143,10 +143,25 @@ fn bad_delay_files_are_refused_in_one_sentence() {
         "(DELAYFILE\n(CELL (CELLTYPE \"INV\") (INSTANCE nobody)))",
     )
     .unwrap();
+    let of_shift = |divider: &str, path: &str| {
+        format!("(DELAYFILE (DIVIDER {divider})\n(CELL (CELLTYPE \"DFFR\") (INSTANCE {path})))")
+    };
+    let slashes = of_shift(".", "mp_r0_c1/metdc/shift_3");
+    std::fs::write(here.join("slashes.sdf"), slashes).unwrap();
+    let below = of_shift("/", "tb/dut/mp_r0_c1/metdc/shift_3");
+    std::fs::write(here.join("below.sdf"), below).unwrap();
     for (more, says) in [
         (
             &["--engine", "gate", "--sdf", "bad.sdf"][..],
             "bad.sdf:2: the chip has no instance nobody",
+        ),
+        (
+            &["--engine", "gate", "--sdf", "slashes.sdf"],
+            "slashes.sdf:2: the chip has no instance mp_r0_c1/metdc/shift_3, but has mp_r0_c1.metdc.shift_3; give paths below its top and the right DIVIDER",
+        ),
+        (
+            &["--engine", "gate", "--sdf", "below.sdf"],
+            "no instance tb.dut.mp_r0_c1.metdc.shift_3, but has mp_r0_c1.metdc.shift_3;",
         ),
         (
             &["--engine", "gate", "--sdf", "none.sdf"],

@@ -4,6 +4,8 @@
 //!   every cell ─► Candidate: pins and function ─(the few that are chosen)─► CellModel: arcs, limits, capacitances
 //! ```
 
+use std::collections::BTreeSet;
+
 use super::error::{LibertyError, Units};
 use super::function::{TruthTable, truth_table};
 use super::group::Group;
@@ -118,8 +120,9 @@ fn unusable(cell: &Group<'_>, outputs: &[&str]) -> Option<String> {
     if cell.of_kind("pin").any(|pin| pin.arguments.is_empty()) {
         return Some("a pin has no name".to_owned());
     }
-    for (index, (name, pin)) in cell.pins().enumerate() {
-        if cell.pins().take(index).any(|(other, _)| other == name) {
+    let mut names = BTreeSet::new();
+    for (name, pin) in cell.pins() {
+        if !names.insert(name) {
             return Some(format!("pin {name} is given twice"));
         }
         if pin.value("three_state").is_some() {
@@ -160,6 +163,12 @@ fn flip_flop(
     inputs: &[&str],
     outputs: &[&str],
 ) -> Result<FlipFlop, String> {
+    if outputs.len() > MAX_OUTPUTS || inputs.len() > TruthTable::MOST {
+        let (inputs, outputs) = (inputs.len(), outputs.len());
+        return Err(format!(
+            "it is a flip-flop of {inputs} inputs and {outputs} outputs"
+        ));
+    }
     let literal = |name: &str| {
         let text = ff
             .value(name)
@@ -191,9 +200,6 @@ fn flip_flop(
     let pins = 2 + usize::from(clear.is_some()) + usize::from(preset.is_some());
     if inputs.len() != pins {
         return Err("it has inputs besides data, clock, clear and preset".to_owned());
-    }
-    if outputs.len() > MAX_OUTPUTS {
-        return Err(format!("it has {} outputs", outputs.len()));
     }
     match (found.q, found.qn) {
         (None, None) => Err("no output shows its state".to_owned()),

@@ -144,9 +144,14 @@ impl Annotator<'_, '_, '_> {
                 } else {
                     return self.error(
                         entry.line,
-                        format!(
-                            "the chip has no instance {path}; give a path below its top and the right DIVIDER, and an array with as many rows and columns"
-                        ),
+                        match self.elsewhere(path) {
+                            Some(meant) => format!(
+                                "the chip has no instance {path}, but has {meant}; give paths below its top and the right DIVIDER"
+                            ),
+                            None => format!(
+                                "the chip has no instance {path}; give a path below its top and the right DIVIDER, and an array with as many rows and columns"
+                            ),
+                        },
                     );
                 };
                 self.error(
@@ -158,6 +163,22 @@ impl Annotator<'_, '_, '_> {
                 )
             }
         }
+    }
+
+    /// The instance that a path may mean: with the other divider, or below a testbench.
+    fn elsewhere(&self, path: &str) -> Option<String> {
+        let dotted = path.replace("\\.", ".").replace('/', ".");
+        let mut rest = Some(dotted.as_str());
+        let mut below = std::iter::from_fn(|| {
+            let path = rest?;
+            rest = path.split_once('.').map(|(_, below)| below);
+            Some(path)
+        });
+        let is_there = |path: &&str| {
+            let [cell, scope] = [self.netlist.cell(path), self.netlist.scope(path)];
+            !path.is_empty() && (cell.is_some() || scope.is_some())
+        };
+        below.find(is_there).map(str::to_owned)
     }
 
     fn module(&mut self, entry: &SdfCell<'_>, path: &str) -> Result<(), InputError> {
