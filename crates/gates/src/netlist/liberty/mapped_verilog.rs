@@ -10,6 +10,12 @@ use super::mapping::Source;
 use super::read::Liberty;
 use crate::netlist::{Direction, NetId, Netlist};
 
+const HEAD: &str = "\
+// Outputs that nothing reads stay open.
+/* verilator lint_off PINMISSING */
+/* verilator lint_off DECLFILENAME */
+";
+
 /// Writes a netlist in the cells and drives that [`Characterised::of`] chose, as a module of its top's name.
 ///
 /// # Errors
@@ -28,6 +34,7 @@ pub fn write_mapped(
         .iter()
         .map(|(_, signal)| signal.name.as_str())
         .collect();
+    out.write_all(HEAD.as_bytes())?;
     writeln!(out, "module {}({});", top.module.name(), listed.join(", "))?;
     let mut is_port = vec![false; netlist.net_count()];
     for (direction, signal) in &ports {
