@@ -343,6 +343,7 @@ impl<'t> Reader<'t> {
 
     /// A simple attribute's value: quoted, or what stands before its end.
     fn simple_value(&mut self) -> Result<&'t str, LibertyError> {
+        let line = self.line;
         self.blanks()?;
         let bytes = self.text.as_bytes();
         if bytes.get(self.at) == Some(&b'"') {
@@ -361,11 +362,15 @@ impl<'t> Reader<'t> {
             if is_comment || b";\n}\\".contains(&byte) {
                 break;
             }
-            if byte == b':'
-                && let Some(attribute) = last_name(&self.text[start..self.at])
-            {
-                self.at = start + attribute;
-                break;
+            if byte == b':' {
+                let value = self.text[start..self.at].trim();
+                if self.line > line && is_attribute(value) {
+                    return Err(self.fault(format!("the attribute before {value} has no value")));
+                }
+                if let Some(attribute) = last_name(&self.text[start..self.at]) {
+                    self.at = start + attribute;
+                    break;
+                }
             }
             self.at += 1;
         }
@@ -377,10 +382,14 @@ impl<'t> Reader<'t> {
 fn last_name(text: &str) -> Option<usize> {
     let text = text.trim_end();
     let start = text.rfind(|c: char| c.is_ascii_whitespace())? + 1;
-    let mut name = text[start..].chars();
-    let is_name = name.next().is_some_and(|c| c.is_ascii_alphabetic())
-        && name.all(|c| c.is_ascii_alphanumeric() || c == '_');
-    (is_name && !text[..start].trim().is_empty()).then_some(start)
+    (is_attribute(&text[start..]) && !text[..start].trim().is_empty()).then_some(start)
+}
+
+/// Whether this may be the name of an attribute.
+fn is_attribute(name: &str) -> bool {
+    let mut name = name.chars();
+    name.next().is_some_and(|c| c.is_ascii_alphabetic())
+        && name.all(|c| c.is_ascii_alphanumeric() || c == '_')
 }
 
 #[cfg(test)]
@@ -465,6 +474,7 @@ mod tests {
             ("library (l) {\n a b;\n}", 2),
             ("library (l) { }\n}", 2),
             ("library (l) { a (1 ; }", 1),
+            ("library (l) {\n a :\n b : 3;\n}", 3),
             // A value has no comment within it.
             ("library (l) {\n a : b /* c */ d;\n}", 2),
             ("library (l) {\n a : b \\\n d;\n}", 3),
