@@ -49,9 +49,29 @@ fn verilator_reads_them() {
     }
 }
 
-/// How many cells of `mapped_cells.v` Yosys proves equal to those of `cells.lib`, and how many there are: what they show is the same after any inputs, from any
-/// state.
+/// Inputs of a flip-flop that the library wants to be set where both clear and preset are active. Yosys 0.23 always clears it; so each of the two is tied off
+/// in turn there.
+fn ties(library: &str, models: &str, cell: &str) -> Vec<String> {
+    let of_cell = library.split_once(&format!("cell (\"{cell}\")"));
+    let of_cell = of_cell.and_then(|(_, rest)| rest.split("cell (").next());
+    if !of_cell.is_some_and(|text| text.contains("clear_preset_var1 : \"H\"")) {
+        return vec![String::new()];
+    }
+    let (_, model) = models.split_once(&format!("module {cell}(")).unwrap();
+    let model = model.split("endmodule").next().unwrap();
+    let tie = |wire: &str| {
+        let mut lines = model.lines().filter(|line| line.contains(wire));
+        let line = lines.next().unwrap();
+        let pin = line.split(['(', ',', ')']).nth(2).unwrap().trim();
+        format!("-set in_{pin} {}", u8::from(line.contains("not ")))
+    };
+    vec![tie("inner_at_r"), tie("inner_at_s")]
+}
+
+/// How many proofs Yosys finds that cells of `mapped_cells.v` are those of `cells.lib`, and how many there should be: what they show is the same after any
+/// inputs, from any state.
 fn proven(folder: &Path) -> (usize, usize) {
+    let library = std::fs::read_to_string(folder.join("cells.lib")).unwrap();
     let models = std::fs::read_to_string(folder.join("mapped_cells.v")).unwrap();
     let cells = models
         .lines()
@@ -68,6 +88,7 @@ check -assert
 design -stash gate
 ",
     );
+    let mut proofs = 0;
     for cell in &cells {
         script += &format!(
             "design -reset
@@ -76,13 +97,18 @@ design -copy-from gate -as gate {cell}
 clk2fflogic
 miter -equiv -flatten -ignore_gold_x gold gate miter
 hierarchy -top miter
-sat -tempinduct -seq 1 -set-init-undef -set-def-inputs -prove trigger 0 miter
 "
         );
+        for tie in ties(&library, &models, cell) {
+            proofs += 1;
+            script += &format!(
+                "sat -tempinduct -seq 1 -set-init-undef -set-def-inputs {tie} -prove trigger 0 miter\n"
+            );
+        }
     }
     std::fs::write(folder.join("prove.ys"), script).unwrap();
     let said = run(folder, "yosys", &["-s", "prove.ys"]);
-    (said.matches("step proven: SUCCESS!").count(), cells.len())
+    (said.matches("step proven: SUCCESS!").count(), proofs)
 }
 
 #[test]

@@ -26,7 +26,7 @@ fn rewritten(text: &str) -> String {
                 format!("{name} : \"\\\n  {};", &value[1..])
             }
             Some((name, value)) if !value.contains([':', ';', '{']) => {
-                format!("{name} : {value} /* no } part; \"of it */;")
+                format!("{name} : {value} /* no }} part; \"of it */;")
             }
             _ => line.to_owned(),
         };
