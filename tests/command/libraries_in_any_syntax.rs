@@ -23,7 +23,7 @@ fn rewritten(text: &str) -> String {
             .and_then(|line| line.split_once(" : "));
         let line = match value {
             Some((name, value)) if value.starts_with('"') => {
-                format!("{name} : \"\\\n  {};", &value[1..])
+                format!("{name} : \"\\\n{};", &value[1..])
             }
             Some((name, value)) if !value.contains([':', ';', '{']) => {
                 format!("{name} : {value} /* no }} part; \"of it */;")

@@ -53,25 +53,51 @@ pub(super) struct Candidate<'g, 't> {
 }
 
 impl<'g, 't> Candidate<'g, 't> {
-    /// The cell, if it is a gate or flip-flop of the kinds used here and not marked `dont_use`; else why it is not.
+    /// The cell, if it is a gate or flip-flop of the kinds used here and not marked `dont_use`; [`super::passed_over`] says why another is not.
     ///
     /// # Errors
     /// An area that is not a number.
-    pub(super) fn of(group: &'g Group<'t>) -> Result<Result<Self, String>, LibertyError> {
+    pub(super) fn of(group: &'g Group<'t>) -> Result<Option<Self>, LibertyError> {
         let area = group.number("area")?.unwrap_or(0.0);
+        let pins = || group.pins();
         let of_direction = |direction: &str| {
-            let pins = group
-                .pins()
-                .filter(|(_, pin)| pin.value("direction") == Some(direction));
-            pins.map(|(name, _)| name).collect::<Vec<_>>()
+            let of = pins().filter(|(_, pin)| pin.value("direction") == Some(direction));
+            of.map(|(name, _)| name).collect::<Vec<_>>()
         };
         let (inputs, outputs) = (of_direction("input"), of_direction("output"));
-        if let Some(why) = unusable(group, &outputs) {
-            return Ok(Err(why));
+        let shared = pins().any(|(_, pin)| pin.value("three_state").is_some());
+        let names: BTreeSet<&str> = pins().map(|(name, _)| name).collect();
+        let is_named = group.of_kind("pin").all(|pin| !pin.arguments.is_empty());
+        let unclear = !is_named || names.len() < pins().count() || group.of_kind("ff").count() > 1;
+        let kinds = [
+            "latch",
+            "statetable",
+            "ff_bank",
+            "latch_bank",
+            "bus",
+            "bundle",
+        ];
+        let other = group.groups.iter().any(|g| kinds.contains(&g.kind));
+        let whole = inputs.len() + outputs.len() == pins().count();
+        if group.value("dont_use") == Some("true")
+            || shared
+            || unclear
+            || other
+            || !whole
+            || outputs.is_empty()
+        {
+            return Ok(None);
         }
         let role = match group.of_kind("ff").next() {
             Some(ff) => flip_flop(group, ff, &inputs, &outputs).map(Role::FlipFlop),
-            None => gate(group, &inputs, &outputs).map(Role::Gate),
+            None if outputs.len() == 1 && (1..=TruthTable::MOST).contains(&inputs.len()) => {
+                let output = pins().find(|(name, _)| *name == outputs[0]);
+                let function = output.and_then(|(_, pin)| pin.value("function"));
+                function
+                    .and_then(|text| truth_table(text, &inputs))
+                    .map(Role::Gate)
+            }
+            None => None,
         };
         Ok(role.map(|role| Candidate {
             group,
@@ -98,85 +124,17 @@ impl<'g, 't> Candidate<'g, 't> {
     }
 }
 
-/// What keeps a cell from being used, whatever its function.
-fn unusable(cell: &Group<'_>, outputs: &[&str]) -> Option<String> {
-    if cell.value("dont_use") == Some("true") {
-        return Some("it is marked dont_use".to_owned());
-    }
-    let kinds = [
-        "latch",
-        "statetable",
-        "ff_bank",
-        "latch_bank",
-        "bus",
-        "bundle",
-    ];
-    if let Some(group) = cell.groups.iter().find(|group| kinds.contains(&group.kind)) {
-        return Some(format!("it has a {}", group.kind));
-    }
-    if cell.of_kind("ff").count() > 1 {
-        return Some("it has several flip-flops".to_owned());
-    }
-    if cell.of_kind("pin").any(|pin| pin.arguments.is_empty()) {
-        return Some("a pin has no name".to_owned());
-    }
-    let mut names = BTreeSet::new();
-    for (name, pin) in cell.pins() {
-        if !names.insert(name) {
-            return Some(format!("pin {name} is given twice"));
-        }
-        if pin.value("three_state").is_some() {
-            return Some(format!("pin {name} is a three-state output"));
-        }
-        match pin.value("direction") {
-            Some("input" | "output") => {}
-            Some(other) => return Some(format!("pin {name} has the direction {other}")),
-            None => return Some(format!("pin {name} has no direction")),
-        }
-    }
-    outputs.is_empty().then(|| "it has no output".to_owned())
-}
-
-/// The function of a gate; else why it is none.
-fn gate(cell: &Group<'_>, inputs: &[&str], outputs: &[&str]) -> Result<TruthTable, String> {
-    let [output] = outputs else {
-        return Err(format!("it has {} outputs and no flip-flop", outputs.len()));
-    };
-    let most = TruthTable::MOST;
-    if !(1..=most).contains(&inputs.len()) {
-        return Err(format!(
-            "it has {} inputs; gates have 1 to {most}",
-            inputs.len()
-        ));
-    }
-    let pin = cell.pins().find(|(name, _)| name == output);
-    let Some(text) = pin.and_then(|(_, pin)| pin.value("function")) else {
-        return Err(format!("output {output} has no function"));
-    };
-    truth_table(text, inputs)
-        .ok_or_else(|| format!("the function {text:?} of {output} is none of its inputs"))
-}
-
 fn flip_flop(
     cell: &Group<'_>,
     ff: &Group<'_>,
     inputs: &[&str],
     outputs: &[&str],
-) -> Result<FlipFlop, String> {
-    if outputs.len() > MAX_OUTPUTS || inputs.len() > TruthTable::MOST {
-        let (inputs, outputs) = (inputs.len(), outputs.len());
-        return Err(format!(
-            "it is a flip-flop of {inputs} inputs and {outputs} outputs"
-        ));
-    }
-    let literal = |name: &str| {
-        let text = ff
-            .value(name)
-            .ok_or_else(|| format!("its flip-flop has no {name}"))?;
-        let pin = truth_table(text, inputs).and_then(TruthTable::literal);
-        pin.ok_or_else(|| format!("its {name} is {text:?} and not one pin"))
+) -> Option<FlipFlop> {
+    let literal = |name: &str| truth_table(ff.value(name)?, inputs)?.literal();
+    let control = |name: &str| match ff.value(name) {
+        None => Some(None),
+        Some(_) => literal(name).map(Some),
     };
-    let control = |name: &str| ff.value(name).map(|_| literal(name)).transpose();
     let state = ff.arguments.as_slice();
     let shows = |inverted: bool| {
         outputs.iter().position(|output| {
@@ -198,13 +156,8 @@ fn flip_flop(
         preset_wins: ff.value("clear_preset_var1") == Some("H"),
     };
     let pins = 2 + usize::from(clear.is_some()) + usize::from(preset.is_some());
-    if inputs.len() != pins {
-        return Err("it has inputs besides data, clock, clear and preset".to_owned());
-    }
-    match (found.q, found.qn) {
-        (None, None) => Err("no output shows its state".to_owned()),
-        _ => Ok(found),
-    }
+    let fits = inputs.len() == pins && outputs.len() <= MAX_OUTPUTS;
+    (fits && (found.q.is_some() || found.qn.is_some())).then_some(found)
 }
 
 /// An input pin.

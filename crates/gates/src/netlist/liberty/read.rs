@@ -91,15 +91,12 @@ impl Liberty {
         let mut lines = HashMap::new();
         for group in library.of_kind("cell") {
             let before = *lines.entry(group.name()).or_insert(group.line);
-            let candidate = match before == group.line {
-                true => Candidate::of(group)?,
-                false => Err(format!(
-                    "line {before} has a cell of this name, which counts"
-                )),
-            };
-            match candidate {
-                Ok(candidate) => candidates.push(candidate),
-                Err(why) => passed_over.push(PassedOver::new(group, why)),
+            if before != group.line {
+                passed_over.push(PassedOver::again(group, before));
+            } else if let Some(candidate) = Candidate::of(group)? {
+                candidates.push(candidate);
+            } else {
+                passed_over.push(PassedOver::of(group));
             }
         }
         let maker = Maker {

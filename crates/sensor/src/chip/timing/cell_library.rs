@@ -13,7 +13,7 @@ use std::hash::{Hash, Hasher};
 use std::path::PathBuf;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
-use super::library_file::read_library;
+use super::library_text::read_library;
 use crate::chip::SensorConfig;
 use crate::chip::blocks::{front_end, macropixel};
 use crate::netlist::liberty::{Characterised, Environment, Liberty};

@@ -10,7 +10,7 @@
 //! | file | what it has |
 //! |---|---|
 //! | [`cell_library`] | the cells, built in or of a Liberty file |
-//! | `library_file` | the text of a Liberty file, packed or not |
+//! | `library_text` | the text of a Liberty file, packed or not |
 //! | [`silicon`] | the cell library, conditions and mismatch |
 //! | `chip_timing` | [`ChipTiming`]: delays as numbers |
 //! | `measure` | what measures them |
@@ -26,7 +26,7 @@ pub mod cell_library;
 pub(crate) mod chip_timing;
 pub(crate) mod clk_skew;
 pub(crate) mod delay_lines;
-mod library_file;
+mod library_text;
 pub mod local_stop;
 pub mod macropixel;
 pub(crate) mod measure;

@@ -35,7 +35,7 @@ fn map(cells: &str, wanted: &[(CellKind, String)]) -> Result<CellMap, LibertyErr
     let library = read(&text).unwrap();
     let candidates = library
         .of_kind("cell")
-        .filter_map(|cell| Candidate::of(cell).unwrap().ok());
+        .filter_map(|cell| Candidate::of(cell).unwrap());
     let candidates: Vec<_> = candidates.collect();
     let maker = Maker {
         candidates: &candidates,
