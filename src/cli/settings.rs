@@ -6,7 +6,10 @@ use clap::Args;
 
 use super::voice::{note, say};
 use crate::chip::sensors::{CHIPS, HSLIDAR_MOST_HZ};
-use crate::chip::{Sensor, SensorConfig, Silicon, UnknownConditions, array};
+use crate::chip::{
+    CellLibrary, Sensor, SensorConfig, Silicon, UnknownConditions, array, library_files,
+    library_setting,
+};
 use crate::files::InputError;
 use crate::netlist::{Conditions, Corner, Mismatch};
 use crate::request::{Sources, Spelling};
@@ -34,9 +37,9 @@ pub(super) struct SensorArgs {
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Cell library that the chip is made of (Liberty: .lib or .lib.gz), instead of the built-in delays: short for
-    /// --set sensor.liberty=FILE.
+    /// --set sensor.liberty=FILE. May be repeated for a kit of several files.
     #[arg(long, value_name = "FILE")]
-    liberty: Option<PathBuf>,
+    liberty: Vec<PathBuf>,
     /// Cell of the library to take for a kind, for example DFFR=dfrtp_2. May be repeated.
     #[arg(long, value_name = "KIND=NAME", requires = "liberty")]
     cell: Vec<String>,
@@ -59,7 +62,7 @@ impl SensorArgs {
     /// Unreadable files, bad keys and values, and `--set` of anything but the sensor.
     pub(super) fn read(&self) -> Result<Sensor, InputError> {
         let sensor = self.sources(None).read_sensor()?;
-        self.note_clk(&sensor);
+        self.note_oddities(&sensor);
         Ok(sensor)
     }
 
@@ -70,8 +73,12 @@ impl SensorArgs {
         chips.find(|chip| asked.starts_with(chip)).unwrap_or(asked)
     }
 
-    /// Notes if CLK is faster than the thesis's chip takes.
-    fn note_clk(&self, sensor: &SensorConfig) {
+    /// Notes what is odd about the cell library, and if CLK is faster than the thesis's chip takes.
+    fn note_oddities(&self, sensor: &SensorConfig) {
+        let library = CellLibrary::of(sensor).ok();
+        if let Some(library) = library.and_then(CellLibrary::from_file) {
+            library.liberty.map.odd.iter().for_each(note);
+        }
         if self.chip() == "hslidar" && sensor.clk_hz > HSLIDAR_MOST_HZ {
             note(format_args!(
                 "CLK of {} MHz: the thesis's HSLIDAR takes {} MHz at most (6.3.1), and what is modelled here is its logic in a faster library",
@@ -92,10 +99,11 @@ impl SensorArgs {
 
     /// What `--liberty` and `--cell` set.
     fn set_of_cells(&self) -> impl Iterator<Item = String> {
-        let file = self.liberty.as_ref().map(|file| {
-            let file = std::path::absolute(file).unwrap_or_else(|_| file.clone());
-            format!("sensor.liberty={}", file.display())
-        });
+        let files = self.liberty.iter().flat_map(|files| library_files(files));
+        let files = files.map(|file| std::path::absolute(&file).unwrap_or(file));
+        let setting = library_setting(files);
+        let file =
+            (!self.liberty.is_empty()).then(|| format!("sensor.liberty={}", setting.display()));
         let cells = (!self.cell.is_empty())
             .then(|| format!("sensor.liberty_cells={}", self.cell.join(", ")));
         file.into_iter().chain(cells)
@@ -132,7 +140,7 @@ impl SceneArgs {
     /// Unreadable files, bad keys and values.
     pub(super) fn read(&self) -> Result<(Sensor, Scene), InputError> {
         let (sensor, scene) = self.sources().read()?;
-        self.sensor.note_clk(&sensor);
+        self.sensor.note_oddities(&sensor);
         Ok((sensor, scene))
     }
 

@@ -14,7 +14,7 @@ use sha2::{Digest, Sha256};
 
 use super::FrameRequest;
 use crate::analysis::VerdictReport;
-use crate::chip::{Mode, SensorConfig, WindowLaw};
+use crate::chip::{Mode, SensorConfig, WindowLaw, library_files};
 use crate::engine::{Work, variance_left_out};
 use crate::files::{InputError, OutputFile, parse_json};
 use crate::report::{Cell, DepthMap, write_npy_u16};
@@ -115,9 +115,12 @@ pub(crate) fn file_hash(path: &Path) -> Option<String> {
 /// Hashes of the files that a sensor is made of.
 fn hashes(sensor: &SensorConfig) -> BTreeMap<String, String> {
     let libraries = [&sensor.liberty, &sensor.liberty_slow, &sensor.liberty_fast];
-    let libraries = libraries.into_iter().map(PathBuf::as_path);
-    let files = libraries.chain(sensor.own_files().map(|(_, own)| own.path()));
-    let hash = |file: &Path| Some((file.display().to_string(), file_hash(file)?));
+    let libraries = libraries
+        .into_iter()
+        .flat_map(|setting| library_files(setting));
+    let blocks = sensor.own_files().map(|(_, own)| own.path().to_owned());
+    let files = libraries.chain(blocks);
+    let hash = |file: PathBuf| Some((file.display().to_string(), file_hash(&file)?));
     files.filter_map(hash).collect()
 }
 

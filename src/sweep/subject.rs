@@ -13,7 +13,7 @@ use super::error::SweepError;
 use super::row::{Key, Row};
 use super::study::{Kind, Point, Study};
 use super::theory::{self, Last, Rig, Wall};
-use crate::chip::{Sensor, SensorConfig};
+use crate::chip::{Sensor, SensorConfig, library_files};
 use crate::files::{InputError, in_plain_words};
 use crate::request::{
     FrameRequest, Sources, Spelling, eye_safety_of, file_hash, is_bad_input, sentence,
@@ -207,7 +207,12 @@ impl<'a> Subject<'a> {
     /// Adds the hashes of all files that are named anywhere in it.
     fn files_in(&self, json: &Json, content: &mut String) {
         match json {
-            Json::String(text) => *content += &self.hash(Path::new(text)),
+            // A cell library may be several files.
+            Json::String(text) => {
+                for file in library_files(Path::new(text)) {
+                    *content += &self.hash(&file);
+                }
+            }
             Json::Array(items) => items.iter().for_each(|item| self.files_in(item, content)),
             Json::Object(fields) => fields
                 .values()

@@ -124,7 +124,7 @@ fn cells_that_are_passed_over_are_listed_with_the_reason() {
         ),
         (
             "SPARE",
-            "dont_use : true;".to_owned() + &output(""),
+            "dont_use : true;".to_owned() + &pins(&["A"]) + &output("function : \"!A\";"),
             "it is marked dont_use",
         ),
         (
@@ -155,9 +155,23 @@ fn cells_that_are_passed_over_are_listed_with_the_reason() {
         (
             "SEQ",
             pins(&["D", "EN", "CK"])
-                + "ff (IQ, IQN) { next_state : \"D EN\"; clocked_on : \"CK\"; }"
+                + "ff (IQ, IQN) { next_state : \"D ^ EN ^ IQ\"; clocked_on : \"CK\"; }"
                 + &output("function : \"IQ\";"),
-            "its next_state is \"D EN\" and not one pin",
+            "its next_state is \"D ^ EN ^ IQ\" and not one pin, whatever the others are tied to",
+        ),
+        (
+            "GATED",
+            pins(&["D", "EN", "CK"])
+                + "ff (IQ, IQN) { next_state : \"D\"; clocked_on : \"CK EN\"; }"
+                + &output("function : \"IQ\";"),
+            "its clocked_on is \"CK EN\" and not one pin",
+        ),
+        (
+            "HIDDEN",
+            pins(&["D", "CK"])
+                + "ff (IQ, IQN) { next_state : \"D\"; clocked_on : \"CK\"; }"
+                + &output("function : \"D\";"),
+            "no output shows its state",
         ),
         (
             "INV_1",
@@ -181,12 +195,20 @@ fn cells_that_are_passed_over_are_listed_with_the_reason() {
         let text = |key: &str| row[key].as_str().unwrap().to_owned();
         (
             text("cell"),
+            text("file"),
             row["line"].as_f64().unwrap() as usize,
             text("why"),
         )
     });
     let wanted = (first..).zip(&cells);
-    let wanted = wanted.map(|(line, (name, _, why))| (name.to_string(), line, why.to_string()));
+    let wanted = wanted.map(|(line, (name, _, why))| {
+        (
+            name.to_string(),
+            "odd.lib".to_owned(),
+            line,
+            why.to_string(),
+        )
+    });
     assert_eq!(listed.collect::<Vec<_>>(), wanted.collect::<Vec<_>>());
     let kinds = report["library_cells"].as_array().unwrap();
     assert!(
@@ -203,8 +225,8 @@ fn cells_that_are_passed_over_are_listed_with_the_reason() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(
-        said.contains("DFFSRN_1 in line ")
-            && said.contains("its preset is \"!SN & D\" and not one pin"),
+        said.contains("; cut.lib:")
+            && said.contains(": DFFSRN_1 is not used: its preset is \"!SN & D\" and not one pin"),
         "{said}"
     );
 

@@ -38,10 +38,13 @@ pub(super) fn cells(silicon: &Silicon) -> Result<[Section; 2], InputError> {
         liberty.cells,
         liberty.name
     );
-    let mut passed_over = Section::new("passed_over", title, &["cell", "line", "why"]);
+    let columns = ["cell", "file", "line", "why"];
+    let mut passed_over = Section::new("passed_over", title, &columns);
     for cell in &liberty.passed_over {
         let line = Cell::Number(Some(cell.line as f64), 0);
-        passed_over.push([cell.cell.as_str().into(), line, cell.why.as_str().into()]);
+        let [name, file, why] =
+            [&cell.cell, &cell.file, &cell.why].map(|text| text.as_str().into());
+        passed_over.push([name, file, line, why]);
     }
     Ok([used, passed_over])
 }

@@ -15,6 +15,7 @@ mod traces;
 mod activity_agrees_with_waves;
 mod lanes_agree_with_single_circuits;
 mod library_cells_by_hand;
+mod library_files_as_delivered;
 mod random_circuits_agree_with_icarus;
 mod shift_banks_change_nothing;
 mod timing_checks_find_violations;

@@ -203,8 +203,8 @@ keys! {
         #[serde(skip_serializing_if = "Option::is_none")]
         temperature_c: Option<f64> ["C"] = None, in Within(-55.0, 150.0),
             from "chosen: 50 degC, where the built-in cells are characterised";
-        /// Cell library, a Liberty file (.lib or .lib.gz), instead of the built-in delays; without one in the slow and fast corner only
-        /// corner = "typ" is possible.
+        /// Cell library, a Liberty file (.lib or .lib.gz) or the files of one kit separated by commas, instead of the built-in delays;
+        /// without one in the slow and fast corner only corner = "typ" is possible.
         liberty: PathBuf = PathBuf::new(), from "chosen: the built-in cells, which take the thesis's 1.2 ns (4.6)";
         /// The library in the slow corner.
         liberty_slow: PathBuf = PathBuf::new(), from "chosen: none";

@@ -45,5 +45,6 @@ pub use sensor_file::{Lines, NeverMet, SensorFault};
 pub use sensors::{Sensor, hslidar, hslidar_delay_line, quantic4x4};
 pub use timing::ChipTiming;
 pub use timing::cell_library::{CellLibrary, FromFile};
+pub use timing::library_files::{library_files, library_setting};
 pub use timing::silicon::{Limits, Silicon, UnknownConditions};
 pub use window_law::{Window, WindowLaw};

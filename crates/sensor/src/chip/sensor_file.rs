@@ -8,6 +8,7 @@ use super::front_end::DeadTimeTooShort;
 use super::own_block::CONTRACTS;
 use super::timing::ChipTiming;
 use super::timing::cell_library::CellLibrary;
+use super::timing::library_files::{library_files, library_setting};
 use super::timing::silicon::Silicon;
 use crate::files::{InputError, placed};
 use crate::photon::{SIDES, count_bits};
@@ -241,9 +242,8 @@ impl SensorConfig {
             &mut config.liberty_slow,
             &mut config.liberty_fast,
         ] {
-            if !file.as_os_str().is_empty() {
-                *file = placed(&document.folder, file);
-            }
+            let files = library_files(file).into_iter();
+            *file = library_setting(files.map(|file| placed(&document.folder, &file)));
         }
         // A library that cannot be read is complained of below.
         let library = CellLibrary::of(&config).ok();

@@ -6,33 +6,24 @@
 
 use std::collections::BTreeSet;
 
-use super::error::{LibertyError, Units};
+use super::complete::{self, Remark};
+use super::error::LibertyError;
+pub(in crate::netlist) use super::flip_flop::FlipFlop;
 use super::function::{TruthTable, truth_table};
 use super::group::Group;
-use super::table::{Table, Templates};
-use crate::netlist::{CheckKind, Edge, MAX_OUTPUTS};
+use super::kit::LibraryFile;
+use super::leakage::leakage_of;
+use super::table::Table;
+use super::verilog_name::is_possible;
+use crate::netlist::{CheckKind, Edge};
 
 /// What a cell does, told without a look at its tables.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::netlist) enum Role {
     /// One output that is a function of the inputs, in the order of [`Candidate::inputs`].
     Gate(TruthTable),
-    /// A flip-flop whose next state is its data.
+    /// A flip-flop whose next state is its data, once some inputs are tied to a level.
     FlipFlop(FlipFlop),
-}
-
-/// Pins of a flip-flop: indices of inputs, each with whether it is inverted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::netlist) struct FlipFlop {
-    pub data: (usize, bool),
-    pub clock: (usize, bool),
-    pub clear: Option<(usize, bool)>,
-    pub preset: Option<(usize, bool)>,
-    /// Outputs that show the state, and its inverse.
-    pub q: Option<usize>,
-    pub qn: Option<usize>,
-    /// Whether the preset wins where clear and preset are both active.
-    pub preset_wins: bool,
 }
 
 /// What a cell of the library does, for netlists that are mapped to it.
@@ -46,6 +37,10 @@ pub(in crate::netlist) struct CellFunction {
 /// A cell that may be chosen.
 pub(super) struct Candidate<'g, 't> {
     pub group: &'g Group<'t>,
+    /// Which of the library's files it is in.
+    pub file: usize,
+    /// Whether the library says not to use it.
+    pub dont_use: bool,
     pub area: f64,
     pub inputs: Vec<&'t str>,
     pub outputs: Vec<&'t str>,
@@ -53,18 +48,41 @@ pub(super) struct Candidate<'g, 't> {
 }
 
 impl<'g, 't> Candidate<'g, 't> {
-    /// The cell, if it is a gate or flip-flop of the kinds used here and not marked `dont_use`; [`super::passed_over`] says why another is not.
+    /// The cell of a library's file, if it is a gate or flip-flop of the kinds used here; [`super::passed_over`] says why another is not.
     ///
     /// # Errors
-    /// An area that is not a number.
-    pub(super) fn of(group: &'g Group<'t>) -> Result<Option<Self>, LibertyError> {
+    /// An area that is not a number, and words that mean nothing.
+    pub(super) fn of(group: &'g Group<'t>, file: usize) -> Result<Option<Self>, LibertyError> {
         let area = group.number("area")?.unwrap_or(0.0);
         let pins = || group.pins();
         let of_direction = |direction: &str| {
             let of = pins().filter(|(_, pin)| pin.value("direction") == Some(direction));
             of.map(|(name, _)| name).collect::<Vec<_>>()
         };
-        let (inputs, outputs) = (of_direction("input"), of_direction("output"));
+        let (mut inputs, outputs) = (of_direction("input"), of_direction("output"));
+        // In one order in every drive of a family, whatever the file's is.
+        inputs.sort_unstable();
+        for pin in group.of_kind("pin") {
+            let word = pin.value("direction").unwrap_or("internal");
+            if !["input", "output", "inout", "internal"].contains(&word) {
+                return Err(LibertyError {
+                    line: pin.line,
+                    message: format!(
+                        "direction is {word:?}; input, output, inout and internal are known"
+                    ),
+                });
+            }
+        }
+        let dont_use = match group.value("dont_use") {
+            None | Some("false") => false,
+            Some("true") => true,
+            Some(other) => {
+                return Err(LibertyError {
+                    line: group.line,
+                    message: format!("dont_use is {other:?}; true and false are known"),
+                });
+            }
+        };
         let shared = pins().any(|(_, pin)| pin.value("three_state").is_some());
         let names: BTreeSet<&str> = pins().map(|(name, _)| name).collect();
         let is_named = group.of_kind("pin").all(|pin| !pin.arguments.is_empty());
@@ -79,20 +97,14 @@ impl<'g, 't> Candidate<'g, 't> {
         ];
         let other = group.groups.iter().any(|g| kinds.contains(&g.kind));
         let whole = inputs.len() + outputs.len() == pins().count();
-        if group.value("dont_use") == Some("true")
-            || shared
-            || unclear
-            || other
-            || !whole
-            || outputs.is_empty()
-        {
+        if shared || unclear || other || !whole || outputs.is_empty() {
             return Ok(None);
         }
         let role = match group.of_kind("ff").next() {
-            Some(ff) => flip_flop(group, ff, &inputs, &outputs).map(Role::FlipFlop),
+            Some(ff) => FlipFlop::read(group, ff, &inputs, &outputs)?.map(Role::FlipFlop),
             None if outputs.len() == 1 && (1..=TruthTable::MOST).contains(&inputs.len()) => {
-                let output = pins().find(|(name, _)| *name == outputs[0]);
-                let function = output.and_then(|(_, pin)| pin.value("function"));
+                let output = group.pin(outputs[0]);
+                let function = output.and_then(|pin| pin.value("function"));
                 function
                     .and_then(|text| truth_table(text, &inputs))
                     .map(Role::Gate)
@@ -101,6 +113,8 @@ impl<'g, 't> Candidate<'g, 't> {
         };
         Ok(role.map(|role| Candidate {
             group,
+            file,
+            dont_use,
             area,
             inputs,
             outputs,
@@ -111,6 +125,11 @@ impl<'g, 't> Candidate<'g, 't> {
     /// The cell's name.
     pub(super) fn name(&self) -> &'t str {
         self.group.name()
+    }
+
+    /// Its inputs and outputs: drives of one family have the same.
+    pub(super) fn pins(&self) -> (&[&'t str], &[&'t str]) {
+        (&self.inputs, &self.outputs)
     }
 
     /// What it does.
@@ -124,47 +143,19 @@ impl<'g, 't> Candidate<'g, 't> {
     }
 }
 
-fn flip_flop(
-    cell: &Group<'_>,
-    ff: &Group<'_>,
-    inputs: &[&str],
-    outputs: &[&str],
-) -> Option<FlipFlop> {
-    let literal = |name: &str| truth_table(ff.value(name)?, inputs)?.literal();
-    let control = |name: &str| match ff.value(name) {
-        None => Some(None),
-        Some(_) => literal(name).map(Some),
-    };
-    let state = ff.arguments.as_slice();
-    let shows = |inverted: bool| {
-        outputs.iter().position(|output| {
-            let pin = cell.pins().find(|(name, _)| name == output);
-            let function = pin.and_then(|(_, pin)| pin.value("function"));
-            let shown = function.and_then(|text| truth_table(text, state)?.literal());
-            // The second name of an `ff` is its state inverted.
-            shown.is_some_and(|(which, inverts)| inverts ^ (which == 1) == inverted)
-        })
-    };
-    let (clear, preset) = (control("clear")?, control("preset")?);
-    let found = FlipFlop {
-        data: literal("next_state")?,
-        clock: literal("clocked_on")?,
-        clear,
-        preset,
-        q: shows(false),
-        qn: shows(true),
-        preset_wins: ff.value("clear_preset_var1") == Some("H"),
-    };
-    let pins = 2 + usize::from(clear.is_some()) + usize::from(preset.is_some());
-    let fits = inputs.len() == pins && outputs.len() <= MAX_OUTPUTS;
-    (fits && (found.q.is_some() || found.qn.is_some())).then_some(found)
-}
-
 /// An input pin.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct InputPin {
     pub name: String,
     /// Capacitance while it rises and falls, fF.
+    pub load_ff: [f64; 2],
+}
+
+/// An output pin.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct OutputPin {
+    pub name: String,
+    /// Its own capacitance while it rises and falls, which loads it besides its net, fF.
     pub load_ff: [f64; 2],
 }
 
@@ -205,103 +196,172 @@ pub(super) struct CellEnergy {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct CellModel {
     pub name: String,
+    /// Where it stands: the file's name, if there is one, and the line.
+    pub place: String,
     pub role: Role,
     pub area: f64,
     /// Leakage, W.
     pub leakage_w: f64,
     pub inputs: Vec<InputPin>,
-    pub outputs: Vec<String>,
+    pub outputs: Vec<OutputPin>,
     pub arcs: Vec<CellArc>,
     pub checks: Vec<CellCheck>,
     pub energies: Vec<CellEnergy>,
+    /// What it does not state, and what it states that is not used here.
+    pub remarks: Vec<Remark>,
 }
 
 impl CellModel {
     /// Reads a candidate's tables.
     ///
     /// # Errors
-    /// Tables and numbers that are malformed.
+    /// Tables and numbers that are malformed, negative or beyond what delays are kept in, pins without capacitance, edges of a gate
+    /// without an arc, and names that Verilog cannot have.
     pub(super) fn read(
         candidate: &Candidate<'_, '_>,
-        templates: &Templates<'_, '_>,
-        units: Units,
-        leakage_unit_w: f64,
+        file: &LibraryFile<'_, '_>,
     ) -> Result<Self, LibertyError> {
-        let pin = |name: &str| {
-            let mut pins = candidate.group.pins();
-            let found = pins.find(|(own, _)| *own == name);
-            found.expect("a candidate's pin").1
+        let units = file.units;
+        let group = candidate.group;
+        let pin = |name: &str| group.pin(name).expect("a candidate's pin");
+        let fault = |line: usize, message: String| LibertyError { line, message };
+        if candidate.area < 0.0 {
+            return Err(fault(group.line, format!("its area is {}", candidate.area)));
+        }
+        let names = candidate.inputs.iter().chain(&candidate.outputs);
+        for name in [candidate.name()].iter().chain(names) {
+            if !is_possible(name) {
+                let message = format!("Verilog can have no name like {name:?}");
+                return Err(fault(group.line, message));
+            }
+        }
+        let load = |name: &str, missing: Option<f64>| {
+            let pin = pin(name);
+            let either = pin.number("capacitance")?.or(missing);
+            let mut loads = [0.0; 2];
+            for (load, of_edge) in loads
+                .iter_mut()
+                .zip(["rise_capacitance", "fall_capacitance"])
+            {
+                let stated = pin.number(of_edge)?.or(either);
+                let stated = stated
+                    .ok_or_else(|| fault(pin.line, format!("its pin {name} has no capacitance")))?;
+                if stated < 0.0 {
+                    let message = format!("the capacitance of its pin {name} is {stated}");
+                    return Err(fault(pin.line, message));
+                }
+                *load = stated * units.load_ff;
+            }
+            Ok(loads)
         };
+        let leakage = leakage_of(group, file.group)?;
         let mut model = CellModel {
             name: candidate.name().to_owned(),
+            place: file.place(group.line),
             role: candidate.role.clone(),
             area: candidate.area,
-            leakage_w: candidate.group.number("cell_leakage_power")?.unwrap_or(0.0)
-                * leakage_unit_w,
+            leakage_w: leakage.unwrap_or(0.0) * units.leakage_w,
             inputs: Vec::new(),
-            outputs: candidate
-                .outputs
-                .iter()
-                .map(|&name| name.to_owned())
-                .collect(),
+            outputs: Vec::new(),
             arcs: Vec::new(),
             checks: Vec::new(),
             energies: Vec::new(),
+            remarks: Vec::new(),
         };
+        let unstated = [
+            (group.value("area").is_none(), Remark::NoArea),
+            (leakage.is_none(), Remark::NoLeakage),
+        ];
+        let unstated = unstated.into_iter().filter(|(is_missing, _)| *is_missing);
+        model.remarks.extend(unstated.map(|(_, remark)| remark));
+        let (of_inputs, of_outputs) = (
+            file.group.number("default_input_pin_cap")?,
+            file.group.number("default_output_pin_cap")?,
+        );
         for (index, &name) in candidate.inputs.iter().enumerate() {
             let group = pin(name);
-            let either = group.number("capacitance")?.unwrap_or(0.0);
-            let load = |name| Ok(group.number(name)?.unwrap_or(either) * units.load_ff);
-            model.inputs.push(InputPin {
-                name: name.to_owned(),
-                load_ff: [load("rise_capacitance")?, load("fall_capacitance")?],
-            });
+            let load_ff = load(name, of_inputs)?;
+            let name = name.to_owned();
+            model.inputs.push(InputPin { name, load_ff });
+            if group.value("min_period").is_some() {
+                model.remark(Remark::Period);
+            }
             for (attribute, kind, edge) in [
                 ("min_pulse_width_high", PulseWidth::High, Edge::Rise),
                 ("min_pulse_width_low", PulseWidth::Low, Edge::Fall),
             ] {
                 if let Some(width) = group.number(attribute)? {
                     let limit = Table::fixed(width * units.time_fs);
+                    limit.check_range(group.line, attribute)?;
                     model.add_width(candidate, index, kind, edge, limit);
                 }
             }
             for timing in group.of_kind("timing") {
-                model.add_checks(candidate, index, timing, templates, units)?;
+                model.add_checks(candidate, index, timing, file)?;
             }
             for power in group.of_kind("internal_power") {
-                model.add_energy((None, Some(index)), power, templates, units);
+                model.add_energy((None, Some(index)), power, file);
             }
         }
         for (index, &name) in candidate.outputs.iter().enumerate() {
+            let load_ff = load(name, of_outputs.or(Some(0.0)))?;
+            let name_of_pin = name.to_owned();
+            model.outputs.push(OutputPin {
+                name: name_of_pin,
+                load_ff,
+            });
             for timing in pin(name).of_kind("timing") {
-                model.add_arcs(candidate, index, timing, templates, units)?;
+                model.add_arcs(candidate, index, timing, file)?;
             }
             for power in pin(name).of_kind("internal_power") {
                 let related = power.value("related_pin").unwrap_or_default();
                 let from = |name| candidate.inputs.iter().position(|input| *input == name);
                 let from = related.split_whitespace().next().and_then(from);
-                model.add_energy((Some(index), from), power, templates, units);
+                model.add_energy((Some(index), from), power, file);
+            }
+        }
+        if model.energies.is_empty() {
+            model.remark(Remark::NoEnergy);
+        }
+        match model.role {
+            Role::Gate(function) => complete::check_gate(&model, function)
+                .map_err(|message| fault(group.line, message))?,
+            Role::FlipFlop(_) => {
+                let missing = complete::missing_limits(&model);
+                if !missing.is_empty() {
+                    model.remark(Remark::NoLimits(missing));
+                }
             }
         }
         Ok(model)
     }
 
-    /// Tables over anything but slews and loads are passed over.
+    fn remark(&mut self, remark: Remark) {
+        if !self.remarks.contains(&remark) {
+            self.remarks.push(remark);
+        }
+    }
+
+    /// Tables over anything but slews and loads are passed over, with a remark.
     fn add_energy(
         &mut self,
         (to, from): (Option<usize>, Option<usize>),
         power: &Group<'_>,
-        templates: &Templates<'_, '_>,
-        units: Units,
+        file: &LibraryFile<'_, '_>,
     ) {
         let table = |kind: &str| {
             let mut groups = power.of_kind(kind).chain(power.of_kind("power"));
-            let read = |group| templates.table_in(group, units, units.energy_fj);
+            let read = |group| {
+                let unit = file.units.energy_fj;
+                file.templates.table_in(group, file.units, unit)
+            };
             groups.next().map_or(Ok(Table::fixed(0.0)), read)
         };
         if let (Ok(rise), Ok(fall)) = (table("rise_power"), table("fall_power")) {
             let of = [rise, fall];
             self.energies.push(CellEnergy { to, from, of });
+        } else {
+            self.remark(Remark::Energy);
         }
     }
 
@@ -310,16 +370,29 @@ impl CellModel {
         candidate: &Candidate<'_, '_>,
         to: usize,
         timing: &Group<'_>,
-        templates: &Templates<'_, '_>,
-        units: Units,
+        file: &LibraryFile<'_, '_>,
     ) -> Result<(), LibertyError> {
         use Edge::{Fall, Rise};
+        let kind = complete::timing_type(timing)?;
+        let sense = complete::timing_sense(timing)?;
+        let delays = [
+            "combinational",
+            "combinational_rise",
+            "combinational_fall",
+            "rising_edge",
+            "falling_edge",
+            "clear",
+            "preset",
+        ];
+        if !delays.contains(&kind) {
+            return Ok(());
+        }
         let related = timing.value("related_pin").unwrap_or_default();
         for name in related.split_whitespace() {
             let Some(from) = candidate.inputs.iter().position(|input| *input == name) else {
                 continue;
             };
-            let sense = match (timing.value("timing_sense"), &candidate.role) {
+            let sense = match (sense, &candidate.role) {
                 (None, Role::Gate(function)) => match function.unate(from as u32) {
                     (true, false) => Some("positive_unate"),
                     (false, true) => Some("negative_unate"),
@@ -328,22 +401,17 @@ impl CellModel {
                 (sense, _) => sense,
             };
             let causes = |effect: Edge| -> &[Edge] {
-                match (
-                    timing.value("timing_type").unwrap_or("combinational"),
-                    sense,
-                ) {
-                    ("rising_edge", _) => &[Rise],
-                    ("falling_edge", _) => &[Fall],
-                    (
-                        "combinational" | "combinational_rise" | "combinational_fall" | "clear"
-                        | "preset",
-                        sense,
-                    ) => match (sense, effect) {
-                        (Some("positive_unate"), Rise) | (Some("negative_unate"), Fall) => &[Rise],
-                        (Some("positive_unate"), Fall) | (Some("negative_unate"), Rise) => &[Fall],
-                        _ => &Edge::BOTH,
-                    },
-                    _ => &[],
+                match (kind, sense, effect) {
+                    ("rising_edge", ..) => &[Rise],
+                    ("falling_edge", ..) => &[Fall],
+                    ("combinational_rise", _, Fall) | ("combinational_fall", _, Rise) => &[],
+                    (_, Some("positive_unate"), Rise) | (_, Some("negative_unate"), Fall) => {
+                        &[Rise]
+                    }
+                    (_, Some("positive_unate"), Fall) | (_, Some("negative_unate"), Rise) => {
+                        &[Fall]
+                    }
+                    _ => &Edge::BOTH,
                 }
             };
             let tables = [
@@ -361,8 +429,8 @@ impl CellModel {
                         to,
                         cause,
                         effect,
-                        delay: templates.table(delay, units)?,
-                        slew: templates.table(slew, units)?,
+                        delay: file.templates.table(delay, file.units)?,
+                        slew: file.templates.table(slew, file.units)?,
                     });
                 }
             }
@@ -375,10 +443,9 @@ impl CellModel {
         candidate: &Candidate<'_, '_>,
         pin: usize,
         timing: &Group<'_>,
-        templates: &Templates<'_, '_>,
-        units: Units,
+        file: &LibraryFile<'_, '_>,
     ) -> Result<(), LibertyError> {
-        let kind = match timing.value("timing_type").unwrap_or_default() {
+        let kind = match complete::timing_type(timing)? {
             "setup_rising" | "setup_falling" => CheckKind::Setup,
             "hold_rising" | "hold_falling" => CheckKind::Hold,
             "recovery_rising" | "recovery_falling" => CheckKind::Recovery,
@@ -389,10 +456,14 @@ impl CellModel {
                     ("fall_constraint", PulseWidth::Low, Edge::Fall),
                 ] {
                     if let Some(group) = timing.of_kind(table).next() {
-                        let limit = templates.table(group, units)?;
+                        let limit = file.templates.table(group, file.units)?;
                         self.add_width(candidate, pin, kind, edge, limit);
                     }
                 }
+                return Ok(());
+            }
+            "minimum_period" => {
+                self.remark(Remark::Period);
                 return Ok(());
             }
             _ => return Ok(()),
@@ -412,7 +483,7 @@ impl CellModel {
                     kind,
                     pin,
                     edge,
-                    limit: templates.table(group, units)?,
+                    limit: file.templates.table(group, file.units)?,
                 });
             }
         }

@@ -36,19 +36,9 @@ impl Environment {
     /// left out, as before layout.
     pub fn of(library: &Liberty) -> Self {
         let inverter = &library.map.recipe(CellKind::Inv).stages[0].drives[0];
-        let slew_with = |fan_out: f64| {
-            // Its own slew in a chain of such inverters: eight are settled.
-            (0..8).fold(0.0, |slew: f64, _| {
-                let slews = inverter.arcs.iter().map(|arc| {
-                    let load = inverter.inputs[0].load_ff[arc.effect as usize];
-                    arc.slew.at(slew, fan_out * load)
-                });
-                slews.fold(0.0, f64::max)
-            })
-        };
         Environment {
-            input_slew_fs: slew_with(4.0),
-            slowest_slew_fs: slew_with(8.0),
+            input_slew_fs: inverter.settled_slew(4.0),
+            slowest_slew_fs: inverter.settled_slew(8.0),
             wire_ff: 0.0,
         }
     }
@@ -214,6 +204,28 @@ impl Characterised {
         let limits = limits.map(|(index, _)| *self.timing.limits(index, kind));
         let largest = limits.reduce(|a, b| a.larger(&b));
         largest.map(|limits| limits.of_kind())
+    }
+
+    /// The shortest and the longest delay of any instance in `netlist`, fs as its tables give them, each with the library's cells that it is of
+    /// and where they stand. Delays of [`Characterised::timing`] are whole, from 0 to 4.295 us.
+    pub fn extreme_delays(&self, netlist: &Netlist, library: &Liberty) -> [(f64, String); 2] {
+        let mut extremes = [(f64::INFINITY, 0), (f64::NEG_INFINITY, 0)];
+        for (index, cell) in netlist.cells().iter().enumerate() {
+            let (composite, conditions) = self.instance(netlist, &library.map, index);
+            let [shortest, longest] = composite.extreme_delays(cell.kind, &conditions);
+            if shortest < extremes[0].0 {
+                extremes[0] = (shortest, index);
+            }
+            if longest > extremes[1].0 {
+                extremes[1] = (longest, index);
+            }
+        }
+        extremes.map(|(fs, index)| {
+            let (composite, _) = self.instance(netlist, &library.map, index);
+            let cells = composite.used().map(|stage| composite.cell(stage));
+            let cells = cells.map(|cell| format!("{} ({})", cell.name, cell.place));
+            (fs, cells.collect::<Vec<_>>().join(" + "))
+        })
     }
 
     /// The instance at an index, and what the nets at it do to it.

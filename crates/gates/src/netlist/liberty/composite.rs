@@ -39,6 +39,9 @@ const PLACES: usize = MAX_INPUTS + 2 * MOST_STAGES;
 /// Most stages of a recipe: a flip-flop with an inverter at each pin and output.
 pub(super) const MOST_STAGES: usize = 8;
 
+/// Longest times to both edges at all places, fs.
+type Times = [[Option<f64>; 2]; PLACES];
+
 fn place(source: Source) -> Option<usize> {
     match source {
         Source::Input(pin) => Some(pin),
@@ -111,7 +114,7 @@ impl<'m> Composite<'m> {
         load
     }
 
-    /// Load of a stage's output, fF.
+    /// Load of a stage's output, its pin's own capacitance included, fF.
     pub(super) fn output_load(
         &self,
         stage: usize,
@@ -119,7 +122,8 @@ impl<'m> Composite<'m> {
         loads: &[ByEdge; MAX_OUTPUTS],
     ) -> ByEdge {
         let from = Source::Stage(stage, output);
-        let mut load = self.load_at(from);
+        let (mut load, own) = (self.load_at(from), self.cell(stage).outputs[output].load_ff);
+        load = std::array::from_fn(|edge| load[edge] + own[edge]);
         for (net, source) in loads.iter().zip(&self.recipe.outputs) {
             if *source == from {
                 load = std::array::from_fn(|edge| load[edge] + net[edge]);
@@ -186,7 +190,7 @@ impl<'m> Composite<'m> {
         slews: &[Option<ByEdge>; PLACES],
         pin: usize,
         edge: Edge,
-    ) -> [[Option<f64>; 2]; PLACES] {
+    ) -> Times {
         let mut times = [[None; 2]; PLACES];
         times[pin][edge as usize] = Some(0.0);
         for stage in 0..self.recipe.stages.len() {
@@ -306,27 +310,14 @@ impl<'m> Composite<'m> {
     ) -> (CellDelays, InstanceLimits) {
         let slews = self.slews(conditions);
         let mut delays = CellDelays::default();
-        let times: Vec<[[[Option<f64>; 2]; PLACES]; 2]> = (0..kind.inputs().len())
-            .map(|pin| Edge::BOTH.map(|edge| self.times(conditions, &slews, pin, edge)))
-            .collect();
-        for (pin, by_edge) in times
-            .iter()
-            .enumerate()
-            .filter(|(pin, _)| kind.triggers(*pin))
-        {
-            for (output, &source) in self.recipe.outputs.iter().enumerate() {
-                let Some(at) = place(source) else { continue };
-                let latest = |to: usize| {
-                    let times = by_edge.iter().filter_map(|times| times[at][to]);
-                    times.reduce(f64::max).map(whole_fs)
-                };
-                let [rise, fall] = [latest(0), latest(1)];
-                let arc = &mut delays[pin][output];
-                *arc = ArcDelay {
-                    rise_fs: rise.or(fall).unwrap_or(0),
-                    fall_fs: fall.or(rise).unwrap_or(0),
-                };
-            }
+        let times = self.times_of_pins(kind, conditions, &slews);
+        for (pin, output, latest) in self.latest(kind, &times) {
+            let [rise, fall] = latest.map(|fs| fs.map(whole_fs));
+            // Every edge that the kind makes has an arc. A control makes one edge alone, and the other never happens.
+            delays[pin][output] = ArcDelay {
+                rise_fs: rise.or(fall).unwrap_or(0),
+                fall_fs: fall.or(rise).unwrap_or(0),
+            };
         }
         let mut limits = InstanceLimits::none();
         if let Some((stage, roles)) = &self.recipe.flip_flop {
@@ -335,12 +326,63 @@ impl<'m> Composite<'m> {
         (delays, limits)
     }
 
+    /// Times from both edges of each pin to all places.
+    fn times_of_pins(
+        &self,
+        kind: CellKind,
+        conditions: &Conditions,
+        slews: &[Option<ByEdge>; PLACES],
+    ) -> Vec<[Times; 2]> {
+        let pins = 0..kind.inputs().len();
+        pins.map(|pin| Edge::BOTH.map(|edge| self.times(conditions, slews, pin, edge)))
+            .collect()
+    }
+
+    /// Of each pin that makes edges and each output: the latest rise and fall, fs.
+    fn latest(
+        &self,
+        kind: CellKind,
+        times: &[[Times; 2]],
+    ) -> impl Iterator<Item = (usize, usize, [Option<f64>; 2])> {
+        let pins = times
+            .iter()
+            .enumerate()
+            .filter(move |(pin, _)| kind.triggers(*pin));
+        pins.flat_map(move |(pin, by_edge)| {
+            let outputs = self.recipe.outputs.iter().enumerate();
+            outputs.filter_map(move |(output, &source)| {
+                let at = place(source)?;
+                let latest = |to: usize| {
+                    let times = by_edge.iter().filter_map(|times| times[at][to]);
+                    times.reduce(f64::max)
+                };
+                Some((pin, output, [latest(0), latest(1)]))
+            })
+        })
+    }
+
+    /// The shortest and the longest delay between pins of this instance, fs, before they are whole and none is below 0.
+    pub(super) fn extreme_delays(&self, kind: CellKind, conditions: &Conditions) -> [f64; 2] {
+        let times = self.times_of_pins(kind, conditions, &self.slews(conditions));
+        let mut extremes = [f64::INFINITY, f64::NEG_INFINITY];
+        for (_, output, latest) in self.latest(kind, &times) {
+            // An output that leads nowhere has no load, and nobody waits for it.
+            if !self.is_connected[output] {
+                continue;
+            }
+            for fs in latest.into_iter().flatten() {
+                extremes = [extremes[0].min(fs), extremes[1].max(fs)];
+            }
+        }
+        extremes
+    }
+
     /// Limits of the flip-flop among the stages, moved to the pins of the whole by what lies between.
     fn limit(
         &self,
         limits: &mut InstanceLimits,
         (stage, roles): (usize, &FlipFlop),
-        times: &[[[[Option<f64>; 2]; PLACES]; 2]],
+        times: &[[Times; 2]],
         slews: &[Option<ByEdge>; PLACES],
     ) {
         let sources = &self.recipe.stages[stage].sources;

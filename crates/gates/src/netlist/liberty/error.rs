@@ -1,4 +1,4 @@
-//! What is wrong with a Liberty file, and what its numbers are in.
+//! What is wrong with a Liberty file.
 
 /// A fault of a Liberty file, with its line.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -10,11 +10,12 @@ pub struct LibertyError {
     pub message: String,
 }
 
-/// What a file's numbers are in.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Units {
-    pub time_fs: f64,
-    pub load_ff: f64,
-    /// Of internal energy: a load's, at the unit of voltage squared.
-    pub energy_fj: f64,
+/// A fault of one of several Liberty files.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{fault}")]
+pub struct KitError {
+    /// Which file, from 0.
+    pub file: usize,
+    /// What is wrong with it.
+    pub fault: LibertyError,
 }

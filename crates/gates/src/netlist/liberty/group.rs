@@ -101,6 +101,12 @@ impl<'t> Group<'t> {
         pins.flat_map(|pin| pin.arguments.iter().map(move |&name| (name, pin)))
     }
 
+    /// The group of a pin.
+    pub(super) fn pin(&self, name: &str) -> Option<&Group<'t>> {
+        self.pins()
+            .find_map(|(own, pin)| (own == name).then_some(pin))
+    }
+
     /// Groups of a kind.
     pub(super) fn of_kind(&self, kind: &str) -> impl Iterator<Item = &Group<'t>> {
         self.groups.iter().filter(move |group| group.kind == kind)

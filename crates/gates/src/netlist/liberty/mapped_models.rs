@@ -15,6 +15,7 @@ use super::cell::{CellModel, FlipFlop, Role};
 use super::characterised::Characterised;
 use super::function::TruthTable;
 use super::read::Liberty;
+use super::verilog_name::in_verilog;
 use crate::netlist::Netlist;
 use crate::netlist::verilog::{DFFSR_STATE, HEAD};
 
@@ -38,10 +39,18 @@ pub fn write_mapped_cells(
     }
     writeln!(out, "{HEAD}{DFFSR_STATE}")?;
     for (name, model) in models {
+        let primitive = in_verilog(&format!("{name}_FUNCTION"));
         if let Role::Gate(function) = model.role {
-            write_primitive(out, name, function)?;
+            write_primitive(out, &primitive, function)?;
         }
-        let (inputs, outputs) = (input_names(model), model.outputs.join(", "));
+        let inputs: Vec<String> = model
+            .inputs
+            .iter()
+            .map(|pin| in_verilog(&pin.name))
+            .collect();
+        let output_names = model.outputs.iter().map(|pin| in_verilog(&pin.name));
+        let output_names: Vec<String> = output_names.collect();
+        let (name, outputs) = (in_verilog(name), output_names.join(", "));
         writeln!(
             out,
             "module {name}(output {outputs}, input {});",
@@ -50,10 +59,10 @@ pub fn write_mapped_cells(
         match &model.role {
             Role::Gate(function) => {
                 let rows = 1 << function.inputs;
-                let packed: Vec<&str> = inputs.iter().rev().copied().collect();
+                let packed: Vec<&str> = inputs.iter().rev().map(String::as_str).collect();
                 writeln!(
                     out,
-                    "`ifdef FUNCTIONAL\n  wire [{}:0] inner_rows = {rows}'h{:x};\n  assign {outputs} = inner_rows[{{{}}}];\n`else\n  {name}_FUNCTION inner_body({outputs}, {});\n`endif",
+                    "`ifdef FUNCTIONAL\n  wire [{}:0] inner_rows = {rows}'h{:x};\n  assign {outputs} = inner_rows[{{{}}}];\n`else\n  {primitive} inner_body({outputs}, {});\n`endif",
                     rows - 1,
                     function.bits,
                     packed.join(", "),
@@ -68,16 +77,12 @@ pub fn write_mapped_cells(
             writeln!(
                 out,
                 "    ({} => {}) = (1, 1);",
-                inputs[from], model.outputs[to]
+                inputs[from], output_names[to]
             )?;
         }
         writeln!(out, "  endspecify\nendmodule\n")?;
     }
     writeln!(out, "`endcelldefine")
-}
-
-fn input_names(model: &CellModel) -> Vec<&str> {
-    model.inputs.iter().map(|pin| pin.name.as_str()).collect()
 }
 
 /// Rows for all levels of the inputs that leave one value.
@@ -86,7 +91,7 @@ fn write_primitive(out: &mut dyn Write, name: &str, function: TruthTable) -> io:
     let pins = pins.join(", ");
     writeln!(
         out,
-        "`ifndef FUNCTIONAL\nprimitive {name}_FUNCTION(y, {pins});\n  output y;\n  input {pins};\n  table"
+        "`ifndef FUNCTIONAL\nprimitive {name}(y, {pins});\n  output y;\n  input {pins};\n  table"
     )?;
     for row in 0..3_u32.pow(function.inputs) {
         let level = |pin: u32| row / 3_u32.pow(pin) % 3;
@@ -110,7 +115,8 @@ fn write_primitive(out: &mut dyn Write, name: &str, function: TruthTable) -> io:
     writeln!(out, "  endtable\nendprimitive\n`endif\n")
 }
 
-/// The primitive's reset wins: where the preset does, the state is kept inverted. Names of inner nets are none of a library's pins.
+/// Pins that are tied in the netlist do nothing here. The primitive's reset wins: where the preset does, the state is kept inverted. Names
+/// of inner nets are none of a library's pins.
 fn write_flip_flop(out: &mut dyn Write, model: &CellModel, roles: &FlipFlop) -> io::Result<()> {
     let inverts = |inverted: bool| if inverted { "not" } else { "buf" };
     let (strong, weak) = match roles.preset_wins {
@@ -129,11 +135,11 @@ fn write_flip_flop(out: &mut dyn Write, model: &CellModel, roles: &FlipFlop) -> 
     writeln!(out, "  wire {};", wires.join(", "))?;
     for (wire, pin) in pins {
         if let Some((pin, inverted)) = pin {
-            let pin = &model.inputs[pin].name;
             writeln!(
                 out,
-                "  {} inner_at_{wire}(inner_{wire}, {pin});",
-                inverts(inverted)
+                "  {} inner_at_{wire}(inner_{wire}, {});",
+                inverts(inverted),
+                in_verilog(&model.inputs[pin].name)
             )?;
         }
     }
@@ -163,9 +169,10 @@ fn write_flip_flop(out: &mut dyn Write, model: &CellModel, roles: &FlipFlop) -> 
     )?;
     for (index, output) in model.outputs.iter().enumerate() {
         let inverted = (roles.q != Some(index)) != roles.preset_wins;
+        let output = in_verilog(&output.name);
         writeln!(
             out,
-            "  {} inner_to_{output}({output}, inner_state);",
+            "  {} inner_to_{index}({output}, inner_state);",
             inverts(inverted)
         )?;
     }

@@ -7,6 +7,7 @@ use super::characterised::{Characterised, Environment};
 use super::mapped_wires::write_wires;
 use super::mapping::Source;
 use super::read::Liberty;
+use super::verilog_name::in_sdf;
 use crate::netlist::{Edge, NetId, Netlist, caused};
 use crate::units::Time;
 
@@ -25,24 +26,16 @@ pub fn write_mapped_sdf(
         out,
         "(DELAYFILE\n(SDFVERSION \"3.0\")\n(DESIGN \"{top}\")\n(DIVIDER /)\n(TIMESCALE 1ps)"
     )?;
-    let escaped = |name: &str| {
-        let special = |c: char| !(c.is_ascii_alphanumeric() || c == '_');
-        name.chars().fold(String::new(), |mut text, c| {
-            text.extend(special(c).then_some('\\'));
-            text.push(c);
-            text
-        })
-    };
     for index in 0..netlist.cells().len() {
         let (composite, conditions) = characterised.instance(netlist, &library.map, index);
         let path = netlist.cell_path(index);
         for stage in composite.used() {
             let model = composite.cell(stage);
-            let instance = escaped(&composite.instance_name(&path, stage));
+            let instance = in_sdf(&composite.instance_name(&path, stage));
             writeln!(
                 out,
                 "(CELL (CELLTYPE \"{}\") (INSTANCE {instance})\n (DELAY (ABSOLUTE",
-                model.name
+                model.name.replace('"', "\\\"")
             )?;
             let delays = composite.stage_delays(stage, &conditions);
             for from in 0..model.inputs.len() {
@@ -53,7 +46,8 @@ pub fn write_mapped_sdf(
                     };
                     let [rise, fall] = Edge::BOTH.map(text);
                     if rise != "()" || fall != "()" {
-                        let (from, to) = (&model.inputs[from].name, &model.outputs[to]);
+                        let (from, to) = (&model.inputs[from].name, &model.outputs[to].name);
+                        let (from, to) = (in_sdf(from), in_sdf(to));
                         writeln!(out, "  (IOPATH {from} {to} {rise} {fall})")?;
                     }
                 }
@@ -90,23 +84,28 @@ pub fn write_constraints(
     clocking: Clocking<'_>,
 ) -> io::Result<()> {
     let Clocking { port, period, .. } = clocking;
-    // The library's unit of time is the SDC's: all known here are 1 ns.
-    let ns = |fs: f64| fs / 1e6;
-    writeln!(out, "set_units -time ns")?;
+    // Times are in the library's unit, which SDC can name where it is a single one.
+    let in_unit = |fs: f64| fs / library.units.time_fs;
+    let (unit, can_be_named) = library.units.time_word();
+    if can_be_named {
+        writeln!(out, "set_units -time {unit}")?;
+    } else {
+        writeln!(out, "# Times are in the library's unit, {unit}.")?;
+    }
     write_wires(out, netlist, library, environment)?;
     writeln!(
         out,
         "set_input_transition {:.9} [all_inputs]",
-        ns(environment.input_slew_fs)
+        in_unit(environment.input_slew_fs)
     )?;
     writeln!(
         out,
         "create_clock -name {port} -period {:.9} [get_ports {port}]",
-        period.as_ns()
+        in_unit(period.as_fs() as f64)
     )?;
     writeln!(out, "set_propagated_clock [get_clocks {port}]")?;
     for (input, after) in clocking.after_fall {
-        let after = after.as_ns();
+        let after = in_unit(after.as_fs() as f64);
         writeln!(
             out,
             "set_input_delay {after:.9} -rise -clock {port} -clock_fall [get_ports {input}]"
@@ -179,7 +178,7 @@ pub fn write_constraints(
             let at = format!(
                 "{}/{}",
                 composite.instance_name(&path, stage),
-                composite.cell(stage).outputs[pin]
+                composite.cell(stage).outputs[pin].name
             );
             writeln!(
                 out,

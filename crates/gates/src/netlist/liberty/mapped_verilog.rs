@@ -8,6 +8,7 @@ use std::io::{self, Write};
 use super::characterised::Characterised;
 use super::mapping::Source;
 use super::read::Liberty;
+use super::verilog_name::in_verilog;
 use crate::netlist::{Direction, NetId, Netlist};
 
 const HEAD: &str = "\
@@ -79,7 +80,8 @@ pub fn write_mapped(
                     }
                 }
                 pins.push(format!(
-                    ".{pin}({})",
+                    ".{}({})",
+                    in_verilog(&pin.name),
                     net.unwrap_or_else(|| inner(stage, output))
                 ));
             }
@@ -95,9 +97,10 @@ pub fn write_mapped(
                         driven(stage, output).unwrap_or_else(|| inner(stage, output))
                     }
                 };
-                pins.push(format!(".{}({net})", pin.name));
+                pins.push(format!(".{}({net})", in_verilog(&pin.name)));
             }
-            writeln!(out, "  {} {instance}({});", model.name, pins.join(", "))?;
+            let cell = in_verilog(&model.name);
+            writeln!(out, "  {cell} {instance}({});", pins.join(", "))?;
         }
     }
     writeln!(out, "endmodule")

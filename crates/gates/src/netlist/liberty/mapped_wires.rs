@@ -32,7 +32,7 @@ pub(super) fn write_wires(
         .zip(pins)
         .filter(|(_, pins)| *pins > 0)
     {
-        let load = f64::from(pins) * environment.wire_ff / library.load_unit_ff;
+        let load = f64::from(pins) * environment.wire_ff / library.units.load_ff;
         let name = name.trim_start_matches('\\').trim_end();
         writeln!(out, "set_load {load:.9} [get_nets {{{name}}}]")?;
     }

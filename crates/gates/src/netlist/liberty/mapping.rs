@@ -6,16 +6,23 @@
 //!           R ── INV ────────► RESET_B                     reset and no inverse output
 //! ```
 //!
-//! A gate is any cell with its truth table, whatever its name. The one of least area gives the family; others of its name with
-//! another number at the end are its stronger drives. What a library lacks is put together from what it has: an AND from
-//! NAND and INV, a multiplexer or exclusive OR from four NANDs, a flip-flop of the other edge or of active-low controls with inverters.
-//! [`CellMap::notes`] says so.
+//! A gate is any cell with its truth table, whatever its name. The one of least area gives the family, of which others are stronger drives
+//! (`family`). What a library lacks is put together from what it has: an AND from NAND and INV, a multiplexer or exclusive OR from four
+//! NANDs or NORs, a flip-flop of the other edge or of active-low controls with inverters (`flip_flops`). [`CellMap::notes`] says so.
+//! A cell that lacks something is passed over, and [`CellMap::odd`] says why.
+
+mod family;
+mod flip_flops;
+
+use std::cell::RefCell;
+use std::collections::HashMap;
 
 use super::cell::{Candidate, CellModel, FlipFlop, Role};
-use super::error::{LibertyError, Units};
+use super::complete::Remark;
+use super::error::{KitError, LibertyError};
 use super::function::TruthTable;
-use super::group::Group;
-use super::table::Templates;
+use super::kit::LibraryFile;
+use super::passed_over::PassedOver;
 use crate::logic::Logic;
 use crate::netlist::{CellKind, MAX_INPUTS, MAX_OUTPUTS};
 
@@ -52,8 +59,17 @@ pub(super) struct Recipe {
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellMap {
     pub(super) recipes: Vec<Recipe>,
-    /// What was put together, and other things to know, one sentence each.
+    /// What was put together, one sentence each.
     pub notes: Vec<String>,
+    /// What is odd about the library and matters here: cells that were passed over, and what cells that are used leave out.
+    pub odd: Vec<String>,
+}
+
+/// The same while they are found.
+#[derive(Default)]
+struct Notes {
+    made: Vec<String>,
+    odd: Vec<String>,
 }
 
 impl CellMap {
@@ -71,275 +87,222 @@ impl CellMap {
 
 /// What the library has, and what the user wants of it.
 pub(super) struct Maker<'g, 't> {
-    pub candidates: &'g [Candidate<'g, 't>],
-    pub templates: &'g Templates<'g, 't>,
-    pub units: Units,
-    pub leakage_unit_w: f64,
+    files: &'g [LibraryFile<'g, 't>],
+    candidates: &'g [Candidate<'g, 't>],
+    /// Cells that are no candidates, and why, for what is missing.
+    unusable: &'g [PassedOver],
     /// Kinds whose cell is given by name.
-    pub wanted: &'g [(CellKind, String)],
+    wanted: &'g [(CellKind, String)],
+    /// Slowest slew that drives are chosen to keep, fs.
+    slowest_slew_fs: f64,
+    /// Tables that have been read, by the cell's group.
+    models: RefCell<HashMap<*const (), Result<CellModel, LibertyError>>>,
+    /// Cells that are not used though they would fit, one sentence each.
+    passed_over: RefCell<Vec<String>>,
 }
 
 impl<'g, 't> Maker<'g, 't> {
+    pub(super) fn new(
+        files: &'g [LibraryFile<'g, 't>],
+        candidates: &'g [Candidate<'g, 't>],
+        unusable: &'g [PassedOver],
+        wanted: &'g [(CellKind, String)],
+    ) -> Self {
+        let mut maker = Maker {
+            files,
+            candidates,
+            unusable,
+            wanted,
+            slowest_slew_fs: 0.0,
+            models: RefCell::default(),
+            passed_over: RefCell::default(),
+        };
+        maker.slowest_slew_fs = maker.slowest_slew();
+        maker
+    }
+
     /// A recipe for every kind.
     ///
     /// # Errors
-    /// A library without inverter, NAND or flip-flop with reset, and wanted cells that are not there or do something else.
-    pub(super) fn make(&self, library: &Group<'t>) -> Result<CellMap, LibertyError> {
+    /// A kind that nothing can stand for, and wanted cells that are not there, do something else or lack something.
+    pub(super) fn make(&self) -> Result<CellMap, KitError> {
+        let library = self.files[0].group;
+        let fault = |message: String| {
+            let line = library.line;
+            let fault = LibertyError { line, message }.with_passed_over(self.unusable);
+            KitError { file: 0, fault }
+        };
         for (kind, name) in self.wanted {
             let found = self.candidates.iter().find(|c| c.name() == name);
-            let fits = found.is_some_and(|cell| match (&cell.role, kind.is_flip_flop()) {
+            let fits = found.filter(|cell| match (&cell.role, kind.is_flip_flop()) {
                 (Role::Gate(function), false) => order(*function, gate_function(*kind)).is_some(),
                 (Role::FlipFlop(_), true) => true,
                 _ => false,
             });
-            if !fits {
-                return Err(LibertyError {
-                    line: library.line,
-                    message: format!(
-                        "the library {} has no cell {name} that does what {} does",
-                        library.name(),
-                        kind.name()
-                    ),
-                });
-            }
-        }
-        let mut map = CellMap {
-            recipes: Vec::new(),
-            notes: Vec::new(),
-        };
-        for kind in CellKind::ALL {
-            let recipe = match kind.is_flip_flop() {
-                true => self.flip_flop(kind, &mut map.notes)?,
-                false => self.gate(kind)?,
-            };
-            let recipe = recipe.ok_or_else(|| LibertyError {
-                line: library.line,
-                message: format!(
-                    "the library {} has nothing to make a {} from; give one with an inverter, a 2-input NAND or NOR, and a flip-flop with asynchronous reset (and one with set and reset)",
+            let Some(cell) = fits else {
+                return Err(fault(format!(
+                    "the library {} has no cell {name} that does what {} does",
                     library.name(),
                     kind.name()
-                ),
+                )));
+            };
+            let file = cell.file;
+            self.read_model(cell)
+                .map_err(|fault| KitError { file, fault })?;
+        }
+        let (mut recipes, mut notes) = (Vec::new(), Notes::default());
+        for kind in CellKind::ALL {
+            let recipe = if kind.is_flip_flop() {
+                self.flip_flop(kind, &mut notes)
+            } else {
+                self.gate(kind)
+            };
+            let recipe: Recipe = recipe.ok_or_else(|| {
+                let passed_over = self.passed_over.borrow();
+                let reasons = passed_over.iter().map(|reason| format!("; {reason}"));
+                fault(format!(
+                    "the library {} has nothing to make a {} from; {} would be enough{}",
+                    library.name(),
+                    kind.name(),
+                    enough(kind),
+                    reasons.collect::<String>()
+                ))
             })?;
             if recipe.stages.len() > 1 {
-                let cells: Vec<&str> = recipe
-                    .stages
-                    .iter()
-                    .map(|s| s.drives[0].name.as_str())
-                    .collect();
-                map.notes
-                    .push(format!("{} is made of {}", kind.name(), cells.join(" + ")));
+                let stages = recipe.stages.iter();
+                let cells: Vec<&str> = stages.map(|s| s.drives[0].name.as_str()).collect();
+                let cells = cells.join(" + ");
+                notes
+                    .made
+                    .push(format!("{} is made of {cells}", kind.name()));
             }
-            map.recipes.push(recipe);
+            recipes.push(recipe);
         }
-        Ok(map)
+        notes.odd.extend(self.passed_over.take());
+        notes.odd.extend(remarks(&recipes));
+        Ok(CellMap {
+            recipes,
+            notes: notes.made,
+            odd: notes.odd,
+        })
     }
 
-    fn gate(&self, kind: CellKind) -> Result<Option<Recipe>, LibertyError> {
+    fn gate(&self, kind: CellKind) -> Option<Recipe> {
         use CellKind::*;
         use Source::{Input, Stage as Of};
         let inputs: Vec<Source> = (0..kind.inputs().len()).map(Input).collect();
-        if let Some(stage) = self.family(gate_function(kind), Some(kind), &inputs)? {
-            return Ok(chain(vec![Some(stage)]));
+        let function = gate_function(kind);
+        if let Some(stage) = self.family(function, Some(kind), &inputs) {
+            return chain(vec![Some(stage)]);
         }
         // The same with its output inverted, and an inverter.
-        let inverse = gate_function(kind).inverted();
-        if let Some(first) = self.family(inverse, None, &inputs)? {
-            return Ok(chain(vec![Some(first), self.inverter(Of(0, 0))?]));
+        if let Some(first) = self.family(function.inverted(), None, &inputs) {
+            return chain(vec![Some(first), self.inverter(Of(0, 0))]);
         }
-        let nand = |a, b| self.family(gate_function(Nand2), None, &[a, b]);
-        let stages = match kind {
-            // A NOR's inputs and output inverted, and the other way round.
-            Nand2 | And2 => {
-                let nor = self.family(gate_function(Nor2), None, &[Of(0, 0), Of(1, 0)])?;
-                let mut stages = vec![self.inverter(Input(0))?, self.inverter(Input(1))?, nor];
-                if kind == Nand2 {
-                    stages.push(self.inverter(Of(2, 0))?);
-                }
-                stages
+        match kind {
+            Nand2 | Nor2 | And2 | Or2 => {
+                // A NOR's inputs and output inverted, and so on.
+                let inverters = vec![self.inverter(Input(0)), self.inverter(Input(1))];
+                let dual = TruthTable::of(2, |inputs| function.at(!inputs & 0b11));
+                let of_inverses = |function| self.family(function, None, &[Of(0, 0), Of(1, 0)]);
+                let stages = match of_inverses(dual) {
+                    Some(stage) => vec![Some(stage)],
+                    None => vec![of_inverses(dual.inverted()), self.inverter(Of(2, 0))],
+                };
+                chain(inverters.into_iter().chain(stages).collect())
             }
-            Nor2 | Or2 => {
-                let mut stages = vec![
-                    self.inverter(Input(0))?,
-                    self.inverter(Input(1))?,
-                    nand(Of(0, 0), Of(1, 0))?,
-                ];
-                if kind == Nor2 {
-                    stages.push(self.inverter(Of(2, 0))?);
-                }
-                stages
+            Xor2 | Xnor2 | Mux2 => {
+                let two = [Nand2, Nor2].into_iter();
+                two.map(|gate| self.of_four(kind, gate))
+                    .find(Option::is_some)?
             }
-            Xor2 | Xnor2 => {
-                let mut stages = vec![
-                    nand(Input(0), Input(1))?,
-                    nand(Input(0), Of(0, 0))?,
-                    nand(Input(1), Of(0, 0))?,
-                    nand(Of(1, 0), Of(2, 0))?,
-                ];
-                if kind == Xnor2 {
-                    stages.push(self.inverter(Of(3, 0))?);
-                }
-                stages
-            }
-            Mux2 => vec![
-                self.inverter(Input(2))?,
-                nand(Input(0), Of(0, 0))?,
-                nand(Input(1), Input(2))?,
-                nand(Of(1, 0), Of(2, 0))?,
-            ],
-            _ => return Ok(None),
-        };
-        Ok(chain(stages))
+            _ => None,
+        }
     }
 
-    fn inverter(&self, from: Source) -> Result<Option<Stage>, LibertyError> {
+    /// An exclusive OR or a multiplexer of four NANDs, or of four NORs, which make the exclusive NOR, and take select and its inverse the
+    /// other way round.
+    fn of_four(&self, kind: CellKind, gate: CellKind) -> Option<Recipe> {
+        use CellKind::*;
+        use Source::{Input, Stage as Of};
+        let two = |a, b| self.family(gate_function(gate), None, &[a, b]);
+        let stages = match (kind, gate) {
+            (Mux2, _) => {
+                let (select, inverse) = (Input(2), Of(0, 0));
+                let is_nand = gate == Nand2;
+                let [for_a, for_b] = if is_nand {
+                    [inverse, select]
+                } else {
+                    [select, inverse]
+                };
+                vec![
+                    self.inverter(select),
+                    two(Input(0), for_a),
+                    two(Input(1), for_b),
+                    two(Of(1, 0), Of(2, 0)),
+                ]
+            }
+            _ => {
+                let mut stages = vec![
+                    two(Input(0), Input(1)),
+                    two(Input(0), Of(0, 0)),
+                    two(Input(1), Of(0, 0)),
+                    two(Of(1, 0), Of(2, 0)),
+                ];
+                if (kind == Xor2) != (gate == Nand2) {
+                    stages.push(self.inverter(Of(3, 0)));
+                }
+                stages
+            }
+        };
+        chain(stages)
+    }
+
+    fn inverter(&self, from: Source) -> Option<Stage> {
         self.family(gate_function(CellKind::Inv), Some(CellKind::Inv), &[from])
     }
+}
 
-    /// Cells of a function, the weakest first, that take their inputs from `sources`.
-    fn family(
-        &self,
-        function: TruthTable,
-        kind: Option<CellKind>,
-        sources: &[Source],
-    ) -> Result<Option<Stage>, LibertyError> {
-        let gates = self
-            .candidates
-            .iter()
-            .filter_map(|candidate| match candidate.role {
-                Role::Gate(own) => Some((candidate, order(own, function)?)),
-                Role::FlipFlop(_) => None,
-            });
-        let mut gates: Vec<_> = gates.collect();
-        let key = |c: &Candidate<'_, '_>| (c.area, stem(c.name()).len());
-        gates.sort_by(|(a, _), (b, _)| {
-            key(a)
-                .partial_cmp(&key(b))
-                .expect("finite")
-                .then_with(|| a.name().cmp(b.name()))
-        });
-        let wanted = kind.and_then(|kind| self.wanted.iter().find(|(k, _)| *k == kind));
-        if let Some((_, name)) = wanted {
-            gates.retain(|(candidate, _)| candidate.name() == name);
-        }
-        let Some((first, pins)) = gates.first() else {
-            return Ok(None);
-        };
-        let alike = |c: &&(&Candidate<'_, '_>, Vec<usize>)| {
-            stem(c.0.name()) == stem(first.name()) && c.0.inputs == first.inputs
-        };
-        let drives = gates.iter().filter(alike).map(|(c, _)| self.model(c));
-        Ok(Some(Stage {
-            drives: drives.collect::<Result<_, _>>()?,
-            sources: pins.iter().map(|&input| sources[input]).collect(),
-        }))
+/// What a library needs for a kind, beside an inverter.
+fn enough(kind: CellKind) -> &'static str {
+    use CellKind::*;
+    match kind {
+        Inv => "an inverter",
+        Buf => "a buffer or an inverter",
+        Nand2 | Nor2 | And2 | Or2 => "a NAND, NOR, AND or OR of two inputs",
+        Xor2 | Xnor2 => "an exclusive OR or NOR, a NAND or a NOR of two inputs",
+        Mux2 => "a 2:1 multiplexer (inverting or not), or a NAND or a NOR of two inputs",
+        Dffr => "a flip-flop with an asynchronous clear or preset (with a scan chain or not)",
+        Dffsr => "a flip-flop with an asynchronous clear and preset (with a scan chain or not)",
     }
+}
 
-    fn model(&self, candidate: &Candidate<'_, '_>) -> Result<CellModel, LibertyError> {
-        CellModel::read(candidate, self.templates, self.units, self.leakage_unit_w)
-    }
-
-    /// A flip-flop with reset (and set): the one of least area, its inverters counted.
-    fn flip_flop(
-        &self,
-        kind: CellKind,
-        notes: &mut Vec<String>,
-    ) -> Result<Option<Recipe>, LibertyError> {
-        let Some(inverter) = self.inverter(Source::Input(0))? else {
-            return Ok(None);
-        };
-        let with_set = kind == CellKind::Dffsr;
-        let wanted = self.wanted.iter().find(|(k, _)| *k == kind);
-        let flip_flops = self
-            .candidates
-            .iter()
-            .filter_map(|candidate| match &candidate.role {
-                Role::FlipFlop(roles)
-                    if roles.clear.is_some()
-                        && (roles.preset.is_some() || !with_set)
-                        && wanted.is_none_or(|(_, name)| name == candidate.name()) =>
-                {
-                    let inverted = [
-                        Some(roles.data),
-                        Some(roles.clock),
-                        roles.clear,
-                        roles.preset.filter(|_| with_set),
-                    ];
-                    let inverted = inverted.into_iter().flatten().filter(|pin| pin.1).count();
-                    let missing = usize::from(roles.q.is_none()) + usize::from(roles.qn.is_none());
-                    let area =
-                        candidate.area + (inverted + missing) as f64 * inverter.drives[0].area;
-                    Some((area, candidate, *roles))
-                }
-                _ => None,
+/// What the cells of recipes leave out, or have that is not used: a sentence for each, with the cells.
+fn remarks(recipes: &[Recipe]) -> Vec<String> {
+    let mut cells_by_remark: Vec<(&Remark, Vec<&str>)> = Vec::new();
+    let stages = recipes.iter().flat_map(|recipe| &recipe.stages);
+    for model in stages.flat_map(|stage| &stage.drives) {
+        for remark in &model.remarks {
+            let at = cells_by_remark
+                .iter()
+                .position(|(known, _)| *known == remark);
+            let at = at.unwrap_or_else(|| {
+                cells_by_remark.push((remark, Vec::new()));
+                cells_by_remark.len() - 1
             });
-        let least = flip_flops.min_by(|(a, x, _), (b, y, _)| {
-            a.partial_cmp(b)
-                .expect("finite")
-                .then_with(|| x.name().cmp(y.name()))
-        });
-        let Some((_, chosen, roles)) = least else {
-            return Ok(None);
-        };
-        if with_set {
-            let ff = chosen.group.of_kind("ff").next();
-            let winner = ff.and_then(|ff| ff.value("clear_preset_var1"));
-            if winner != Some("L") {
-                notes.push(format!(
-                    "with set and reset both active {} is {}; the model's reset wins",
-                    chosen.name(),
-                    winner.map_or("undefined".to_owned(), |state| format!("{state:?}"))
-                ));
+            let cells = &mut cells_by_remark[at].1;
+            if !cells.contains(&model.name.as_str()) {
+                cells.push(&model.name);
             }
         }
-        let mut stages = Vec::new();
-        // Pins of the kind: D, CK, R, S.
-        let mut sources = vec![Source::Constant(false); chosen.inputs.len()];
-        let given = [
-            Some(roles.data),
-            Some(roles.clock),
-            roles.clear,
-            roles.preset,
-        ];
-        for (pin, role) in given.into_iter().enumerate() {
-            let Some((at, inverted)) = role else { continue };
-            sources[at] = match (pin < kind.inputs().len(), inverted) {
-                (false, active_low) => Source::Constant(active_low),
-                (true, false) => Source::Input(pin),
-                (true, true) => {
-                    let stage = self.inverter(Source::Input(pin))?;
-                    stages.push(stage.expect("there is one"));
-                    Source::Stage(stages.len() - 1, 0)
-                }
-            };
-        }
-        let alike = self.candidates.iter().filter(|c| {
-            let given = wanted.is_none() || c.name() == chosen.name();
-            given
-                && stem(c.name()) == stem(chosen.name())
-                && c.inputs == chosen.inputs
-                && c.role == chosen.role
-        });
-        let mut drives = alike
-            .map(|c| self.model(c))
-            .collect::<Result<Vec<_>, _>>()?;
-        drives.sort_by(|a, b| a.area.total_cmp(&b.area));
-        let flip_flop = stages.len();
-        stages.push(Stage { drives, sources });
-        let mut show = |own: Option<usize>, other: Option<usize>| match (own, other) {
-            (Some(output), _) => Ok(Source::Stage(flip_flop, output)),
-            (None, other) => {
-                let shown = Source::Stage(flip_flop, other.expect("a flip-flop shows its state"));
-                stages.push(self.inverter(shown)?.expect("there is one"));
-                Ok(Source::Stage(stages.len() - 1, 0))
-            }
-        };
-        let outputs = vec![show(roles.q, roles.qn)?, show(roles.qn, roles.q)?];
-        Ok(Some(Recipe {
-            stages,
-            outputs,
-            flip_flop: Some((flip_flop, roles)),
-        }))
     }
+    let sentence = |(remark, cells): (&Remark, Vec<&str>)| match cells.as_slice() {
+        [first, _, _, others @ ..] if !others.is_empty() => {
+            remark.sentence(&format!("{first} and {} more cells", cells.len() - 1))
+        }
+        few => remark.sentence(&few.join(", ")),
+    };
+    cells_by_remark.into_iter().map(sentence).collect()
 }
 
 /// Stages of which the last one drives the output; none where one is missing.
@@ -354,11 +317,6 @@ fn chain(stages: Vec<Option<Stage>>) -> Option<Recipe> {
 }
 
 const _: () = assert!(MAX_OUTPUTS == 2 && MAX_INPUTS == 4);
-
-/// A name without the number of its drive: `nand2_4` and `NAND2X4` are of one family.
-fn stem(name: &str) -> &str {
-    name.trim_end_matches(|c: char| c.is_ascii_digit())
-}
 
 /// The truth table of a gate.
 fn gate_function(kind: CellKind) -> TruthTable {

@@ -18,12 +18,18 @@
 //! | `group` | the syntax |
 //! | `function` | Boolean expressions as truth tables |
 //! | `table` | delays, slews and limits over slew and load |
+//! | `units` | what a file's numbers are in |
 //! | `cell` | which cells may be chosen, and their tables |
 //! | `passed_over` | the others, and why |
+//! | `flip_flop` | what a flip-flop's pins do, and which are tied |
+//! | `leakage` | what a cell leaks |
+//! | `complete` | what a cell must state, and what it leaves out |
 //! | `mapping` | what stands for each kind |
-//! | `read` | a file as a whole |
+//! | `kit` | several files that are one library |
+//! | `read` | a library as a whole |
 //! | `characterised` | loads, drives and slews of a netlist, and what follows |
 //! | `composite` | one instance: from the slews at its pins to its delays and limits |
+//! | `verilog_name` | names of cells and pins for other tools |
 //! | `mapped_verilog` | the netlist of library cells, for other tools |
 //! | `mapped_models` | what its cells do, for simulators |
 //! | `mapped_timing` | its delays and clocks for them |
@@ -31,10 +37,14 @@
 
 mod cell;
 mod characterised;
+mod complete;
 mod composite;
 mod error;
+mod flip_flop;
 mod function;
 mod group;
+mod kit;
+mod leakage;
 mod mapped_models;
 mod mapped_timing;
 mod mapped_verilog;
@@ -44,10 +54,12 @@ mod passed_over;
 mod read;
 mod table;
 mod text;
+mod units;
+mod verilog_name;
 
 pub(in crate::netlist) use cell::{CellFunction, Role};
 pub use characterised::{Characterised, Environment};
-pub use error::LibertyError;
+pub use error::{KitError, LibertyError};
 pub(in crate::netlist) use function::TruthTable;
 pub use mapped_models::write_mapped_cells;
 pub use mapped_timing::{Clocking, write_constraints, write_mapped_sdf};

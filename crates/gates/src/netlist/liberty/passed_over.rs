@@ -5,9 +5,12 @@
 
 use std::collections::BTreeSet;
 
+use super::cell::{Candidate, Role};
 use super::error::LibertyError;
-use super::function::{TruthTable, truth_table};
+use super::flip_flop::{MAX_PINS, control_pin, shown_states};
+use super::function::TruthTable;
 use super::group::Group;
+use super::kit::LibraryFile;
 use crate::netlist::{CellKind, MAX_OUTPUTS};
 
 /// A cell that is not used.
@@ -15,31 +18,47 @@ use crate::netlist::{CellKind, MAX_OUTPUTS};
 pub struct PassedOver {
     /// Its name.
     pub cell: String,
+    /// Name of the file that it is in; empty where there is only text.
+    pub file: String,
     /// Line it begins in, from 1.
     pub line: usize,
     /// What keeps it from being used.
     pub why: String,
+    /// File and line as messages have them.
+    place: String,
     is_flip_flop: bool,
 }
 
 impl PassedOver {
-    /// A cell that is no [`Candidate`](super::cell::Candidate).
-    pub(super) fn of(group: &Group<'_>) -> Self {
-        Self::new(group, why(group))
+    /// A cell that is no candidate, or a gate that the library says not to use and that is not `wanted` by name.
+    pub(super) fn of(
+        file: &LibraryFile<'_, '_>,
+        group: &Group<'_>,
+        candidate: Option<&Candidate<'_, '_>>,
+        wanted: &[(CellKind, String)],
+    ) -> Option<Self> {
+        let is_wanted = || wanted.iter().any(|(_, name)| name == group.name());
+        match candidate {
+            None => Some(Self::new(file, group, why(group))),
+            Some(cell) if cell.dont_use && matches!(cell.role, Role::Gate(_)) && !is_wanted() => {
+                Some(Self::new(file, group, "it is marked dont_use".to_owned()))
+            }
+            Some(_) => None,
+        }
     }
 
-    /// A cell whose name another one in an earlier line has.
-    pub(super) fn again(group: &Group<'_>, line: usize) -> Self {
-        Self::new(
-            group,
-            format!("line {line} has a cell of this name, which counts"),
-        )
+    /// A cell whose name another one in an earlier line of the file has.
+    pub(super) fn again(file: &LibraryFile<'_, '_>, group: &Group<'_>, line: usize) -> Self {
+        let why = format!("line {line} has a cell of this name, which counts");
+        Self::new(file, group, why)
     }
 
-    fn new(group: &Group<'_>, why: String) -> Self {
+    fn new(file: &LibraryFile<'_, '_>, group: &Group<'_>, why: String) -> Self {
         PassedOver {
             cell: group.name().to_owned(),
+            file: file.name.to_owned(),
             line: group.line,
+            place: file.place(group.line),
             is_flip_flop: group.of_kind("ff").next().is_some(),
             why,
         }
@@ -57,7 +76,7 @@ fn why(cell: &Group<'_>) -> String {
     why_unusable(cell)
         .or_else(|| outputs.is_empty().then(|| "it has no output".to_owned()))
         .or_else(|| match cell.of_kind("ff").next() {
-            Some(ff) => why_no_flip_flop(ff, &inputs, &outputs),
+            Some(ff) => why_no_flip_flop(cell, ff, &inputs, &outputs),
             None => why_no_gate(cell, &inputs, &outputs),
         })
         .unwrap_or_else(|| "it is none of the gates and flip-flops that are used".to_owned())
@@ -65,9 +84,6 @@ fn why(cell: &Group<'_>) -> String {
 
 /// What keeps a cell from being used, whatever its function.
 fn why_unusable(cell: &Group<'_>) -> Option<String> {
-    if cell.value("dont_use") == Some("true") {
-        return Some("it is marked dont_use".to_owned());
-    }
     let kinds = [
         "latch",
         "statetable",
@@ -117,36 +133,38 @@ fn why_no_gate(cell: &Group<'_>, inputs: &[&str], outputs: &[&str]) -> Option<St
     })
 }
 
-fn why_no_flip_flop(ff: &Group<'_>, inputs: &[&str], outputs: &[&str]) -> Option<String> {
-    if outputs.len() > MAX_OUTPUTS || inputs.len() > TruthTable::MOST {
+fn why_no_flip_flop(
+    cell: &Group<'_>,
+    ff: &Group<'_>,
+    inputs: &[&str],
+    outputs: &[&str],
+) -> Option<String> {
+    if outputs.len() > MAX_OUTPUTS || inputs.len() > MAX_PINS {
         let (inputs, outputs) = (inputs.len(), outputs.len());
         return Some(format!(
             "it is a flip-flop of {inputs} inputs and {outputs} outputs"
         ));
     }
-    for name in ["clear", "preset", "next_state", "clocked_on"] {
+    for name in ["clear", "preset", "clocked_on"] {
         match ff.value(name) {
-            Some(text)
-                if truth_table(text, inputs)
-                    .and_then(TruthTable::literal)
-                    .is_none() =>
-            {
+            Some(text) if control_pin(text, inputs).is_none() => {
                 return Some(format!("its {name} is {text:?} and not one pin"));
             }
-            None if name == "next_state" || name == "clocked_on" => {
+            None if name == "clocked_on" => {
                 return Some(format!("its flip-flop has no {name}"));
             }
             _ => {}
         }
     }
-    let controls = ["clear", "preset"].map(|name| ff.value(name).is_some());
-    let pins = 2 + controls.into_iter().filter(|&is_there| is_there).count();
-    let why = if inputs.len() == pins {
-        "no output shows its state"
-    } else {
-        "it has inputs besides data, clock, clear and preset"
+    let Some(next_state) = ff.value("next_state") else {
+        return Some("its flip-flop has no next_state".to_owned());
     };
-    Some(why.to_owned())
+    if shown_states(cell, ff, outputs) == [None, None] {
+        return Some("no output shows its state".to_owned());
+    }
+    Some(format!(
+        "its next_state is {next_state:?} and not one pin, whatever the others are tied to"
+    ))
 }
 
 /// Cells that a message names.
@@ -169,10 +187,10 @@ impl LibertyError {
             told = alike.collect();
         }
         for PassedOver {
-            cell, line, why, ..
+            cell, place, why, ..
         } in told.iter().take(NAMED)
         {
-            self.message += &format!("; {cell} in line {line} is passed over: {why}");
+            self.message += &format!("; {place}: {cell} is not used: {why}");
         }
         if told.len() > NAMED {
             self.message += &format!("; and so are {} more", told.len() - NAMED);

@@ -1,31 +1,32 @@
-//! A Liberty file: its units, and what its cells are mapped to.
+//! Liberty files: their units, and what their cells are mapped to.
 
 use std::collections::HashMap;
 
-use super::cell::{Candidate, CellFunction};
-use super::error::{LibertyError, Units};
-use super::group::{self, Group};
+use super::cell::{Candidate, CellFunction, Role};
+use super::error::{KitError, LibertyError};
+use super::group;
+use super::kit::{self, LibraryFile};
 use super::mapping::{CellMap, Maker};
 use super::passed_over::PassedOver;
-use super::table::Templates;
 use super::text::joined;
+use super::units::Units;
 use crate::netlist::CellKind;
 
 /// A library whose cells stand for every [`CellKind`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Liberty {
-    /// Its name.
+    /// Its name; of several files the first one's and their number.
     pub name: String,
     /// Supply and temperature it is characterised at, as the file says: V, °C.
     pub conditions: [Option<f64>; 2],
-    /// Cells in the file, those that are not used here included.
+    /// Cells in the files, those that are not used here included.
     pub cells: usize,
     /// What stands for each kind.
     pub map: CellMap,
-    /// Cells that stand for nothing here and cannot, in the order of the file.
+    /// Cells that stand for nothing here and cannot, in the order of the files: so do gates that the library says not to use, and that nobody wants by name.
     pub passed_over: Vec<PassedOver>,
-    /// Its unit of capacitance, fF.
-    pub(super) load_unit_ff: f64,
+    /// Units of the first file, in which other tools take times and loads.
+    pub(super) units: Units,
     /// Its gates and flip-flops by name.
     functions: HashMap<String, CellFunction>,
 }
@@ -41,106 +42,78 @@ impl Liberty {
     /// # Errors
     /// What is no Liberty, units that are not known, and a library from which the cells here cannot be made.
     pub fn read(text: &str, wanted: &[(CellKind, String)]) -> Result<Self, LibertyError> {
-        let text = joined(text);
-        let library = group::read(&text)?;
-        let fault = |message: String| LibertyError {
-            line: library.line,
-            message,
-        };
-        let model = library.value("delay_model").unwrap_or("table_lookup");
-        if model != "table_lookup" {
-            return Err(fault(format!(
-                "its delay_model is {model}; give a library with table_lookup"
-            )));
+        Self::read_files(&[("", text)], wanted).map_err(|e| e.fault)
+    }
+
+    /// Reads a library of several files, each with the name that messages call it.
+    ///
+    /// # Errors
+    /// Those of [`Liberty::read`], and files that do not belong together: of different corners, or with the same cell.
+    pub fn read_files(
+        files: &[(&str, &str)],
+        wanted: &[(CellKind, String)],
+    ) -> Result<Self, KitError> {
+        let in_file = |file: usize| move |fault: LibertyError| KitError { file, fault };
+        let texts: Vec<_> = files.iter().map(|(_, text)| joined(text)).collect();
+        let mut groups = Vec::new();
+        for (index, text) in texts.iter().enumerate() {
+            groups.push(group::read(text).map_err(in_file(index))?);
         }
-        let load_ff = load_unit(&library)
-            .ok_or_else(|| fault("it has no capacitive_load_unit of ff or pf".to_owned()))?;
-        let volt = match library.value("voltage_unit") {
-            Some("1mV") => 1e-3,
-            Some("10mV") => 1e-2,
-            Some("100mV") => 0.1,
-            _ => 1.0,
-        };
-        let units = Units {
-            time_fs: match library.value("time_unit") {
-                None | Some("1ns") => 1e6,
-                Some("100ps") => 1e5,
-                Some("10ps") => 1e4,
-                Some("1ps") => 1e3,
-                Some(other) => {
-                    return Err(fault(format!(
-                        "its time_unit is {other:?}; 1ns, 100ps, 10ps and 1ps are known"
-                    )));
-                }
-            },
-            load_ff,
-            energy_fj: load_ff * volt * volt,
-        };
-        let leakage_unit_w = match library.value("leakage_power_unit") {
-            Some("1uW") => 1e-6,
-            Some("1pW") => 1e-12,
-            Some("1mW") => 1e-3,
-            Some("100pW") => 1e-10,
-            Some("10pW") => 1e-11,
-            Some("10nW") => 1e-8,
-            Some("100nW") => 1e-7,
-            _ => 1e-9,
-        };
-        let templates = Templates::of(&library);
+        let mut read = Vec::new();
+        for (index, (group, (name, _))) in groups.iter().zip(files).enumerate() {
+            read.push(LibraryFile::new(name, group).map_err(in_file(index))?);
+        }
+        kit::check_files(&read)?;
         let (mut candidates, mut passed_over) = (Vec::new(), Vec::new());
-        let mut lines = HashMap::new();
-        for group in library.of_kind("cell") {
-            let before = *lines.entry(group.name()).or_insert(group.line);
-            if before != group.line {
-                passed_over.push(PassedOver::again(group, before));
-            } else if let Some(candidate) = Candidate::of(group)? {
-                candidates.push(candidate);
-            } else {
-                passed_over.push(PassedOver::of(group));
+        for (index, file) in read.iter().enumerate() {
+            let mut lines = HashMap::new();
+            for cell in file.group.of_kind("cell") {
+                if let Some(&before) = lines.get(cell.name()) {
+                    passed_over.push(PassedOver::again(file, cell, before));
+                    continue;
+                }
+                lines.insert(cell.name(), cell.line);
+                let candidate = Candidate::of(cell, index).map_err(in_file(index))?;
+                passed_over.extend(PassedOver::of(file, cell, candidate.as_ref(), wanted));
+                candidates.extend(candidate);
             }
         }
-        let maker = Maker {
-            candidates: &candidates,
-            templates: &templates,
-            units,
-            leakage_unit_w,
-            wanted,
+        let first = &groups[0];
+        // A library states its conditions itself, or names a group of them.
+        let number = |own: &str, of_group: &str| {
+            let name = first.value("default_operating_conditions");
+            let mut groups = first.of_kind("operating_conditions");
+            let group = groups.find(|group| Some(group.name()) == name);
+            let stated = first.number(own).transpose();
+            let stated = stated.or_else(|| group?.number(of_group).transpose());
+            stated.transpose().map_err(in_file(0))
         };
+        // A cell with tied pins does what it says only where they are tied.
+        let is_plain = |role: &Role| !matches!(role, Role::FlipFlop(roles) if roles.tied != 0);
+        let plain = candidates.iter().filter(|c| is_plain(&c.role));
         Ok(Liberty {
-            name: library.name().to_owned(),
+            name: match groups.len() {
+                1 => first.name().to_owned(),
+                files => format!("{} and {} more files", first.name(), files - 1),
+            },
             conditions: [
-                library.number("nom_voltage")?,
-                library.number("nom_temperature")?,
+                number("nom_voltage", "voltage")?,
+                number("nom_temperature", "temperature")?,
             ],
-            cells: library.of_kind("cell").count(),
-            load_unit_ff: load_ff,
-            map: (maker.make(&library)).map_err(|fault| fault.with_passed_over(&passed_over))?,
-            passed_over,
-            functions: candidates
+            cells: groups
                 .iter()
-                .map(|c| (c.name().to_owned(), c.function()))
-                .collect(),
+                .map(|group| group.of_kind("cell").count())
+                .sum(),
+            map: Maker::new(&read, &candidates, &passed_over, wanted).make()?,
+            passed_over,
+            units: read[0].units,
+            functions: plain.map(|c| (c.name().to_owned(), c.function())).collect(),
         })
     }
-}
 
-impl Liberty {
     /// Area of the weakest cells that stand for a kind, in the library's unit.
     pub fn area(&self, kind: CellKind) -> f64 {
         let stages = self.map.recipe(kind).stages.iter();
         stages.map(|stage| stage.drives[0].area).sum()
     }
-}
-
-/// fF of the file's unit of capacitance.
-fn load_unit(library: &Group<'_>) -> Option<f64> {
-    let [number, unit] = library.values("capacitive_load_unit")? else {
-        return None;
-    };
-    let unit = match unit.to_ascii_lowercase().as_str() {
-        "ff" => 1.0,
-        "pf" => 1e3,
-        _ => return None,
-    };
-    Some(number.parse::<f64>().ok()? * unit)
 }

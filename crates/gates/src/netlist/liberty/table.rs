@@ -3,8 +3,9 @@
 
 use std::collections::HashMap;
 
-use super::error::{LibertyError, Units};
+use super::error::LibertyError;
 use super::group::Group;
+use super::units::Units;
 
 /// What an axis is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,6 +35,22 @@ impl Table {
             other: Vec::new(),
             values: vec![value_fs],
         }
+    }
+
+    /// Checks that times can be kept: delays are whole femtoseconds of 32 bits.
+    ///
+    /// # Errors
+    /// The first one beyond 4.295 us.
+    pub(super) fn check_range(&self, line: usize, what: &str) -> Result<(), LibertyError> {
+        let mut values = self.values.iter();
+        let beyond = values.find(|&&fs| fs > f64::from(u32::MAX));
+        beyond.map_or(Ok(()), |fs| {
+            let us = fs * 1e-9;
+            Err(LibertyError {
+                line,
+                message: format!("its {what} reaches {us:.3} us; times up to 4.295 us are known"),
+            })
+        })
     }
 
     /// The value, fs: `related` is the slew of the input or the clock, fs; `other` the load, fF, or the data's slew, fs.
@@ -83,9 +100,11 @@ impl<'g, 't> Templates<'g, 't> {
     /// Reads one table of times.
     ///
     /// # Errors
-    /// Axes or values that do not fit each other, and axes of something else than slews and loads.
+    /// Axes or values that do not fit each other, axes of something else than slews and loads, and times beyond 4.295 us.
     pub(super) fn table(&self, group: &Group<'t>, units: Units) -> Result<Table, LibertyError> {
-        self.table_in(group, units, units.time_fs)
+        let table = self.table_in(group, units, units.time_fs)?;
+        table.check_range(group.line, group.kind)?;
+        Ok(table)
     }
 
     /// The same of values in a `unit`.
@@ -102,6 +121,19 @@ impl<'g, 't> Templates<'g, 't> {
         let numbers = group.numbers("values")?;
         let mut values = numbers.ok_or_else(|| fault(format!("{} has no values", group.kind)))?;
         let template = self.0.get(group.name());
+        if let Some(third) = template.and_then(|template| template.value("variable_3")) {
+            return Err(fault(format!(
+                "the table {} is over three axes, of which the third is {third}; tables over slews and loads are read",
+                group.name()
+            )));
+        }
+        if template.is_none() && values.len() > 1 {
+            return Err(fault(format!(
+                "{} has the axes of {:?}, a template that the library does not have",
+                group.kind,
+                group.name()
+            )));
+        }
         let mut axes: [(Option<Axis>, Vec<f64>); 2] = Default::default();
         for (index, axis) in axes.iter_mut().enumerate() {
             let variable = template.and_then(|t| t.value(["variable_1", "variable_2"][index]));
@@ -172,14 +204,15 @@ mod tests {
         time_fs: 1e6,
         load_ff: 1e3,
         energy_fj: 1e3,
+        leakage_w: 1e-9,
     };
 
     fn table(text: &str) -> Result<Table, LibertyError> {
         let text = format!(
-            "library (l) {{ lu_table_template (t) {{ variable_1 : total_output_net_capacitance; variable_2 : input_net_transition; index_1 (\"1, 3\"); index_2 (\"0, 10\"); }}\n lu_table_template (c) {{ variable_1 : input_voltage; }}\n {text} }}"
+            "library (l) {{ lu_table_template (t) {{ variable_1 : total_output_net_capacitance; variable_2 : input_net_transition; index_1 (\"1, 3\"); index_2 (\"0, 10\"); }}\n lu_table_template (c) {{ variable_1 : input_voltage; }}\n lu_table_template (d) {{ variable_1 : input_net_transition; variable_3 : related_out_total_output_net_capacitance; }}\n {text} }}"
         );
         let library = read(&text).unwrap();
-        Templates::of(&library).table(&library.groups[2], UNITS)
+        Templates::of(&library).table(&library.groups[3], UNITS)
     }
 
     #[test]
@@ -207,6 +240,18 @@ mod tests {
                 "input_voltage",
             ),
             ("cell_rise (t) { }", "no values"),
+            (
+                "cell_rise (u) { values (\"1, 2\"); }",
+                "\"u\", a template that the library does not have",
+            ),
+            (
+                "cell_rise (d) { values (\"1\"); }",
+                "third is related_out_total_output_net_capacitance",
+            ),
+            (
+                "cell_rise (t) { values (\"1, 2\", \"3, 5000\"); }",
+                "reaches 5.000 us",
+            ),
         ] {
             let message = table(text).unwrap_err().message;
             assert!(message.contains(says), "{message}");

@@ -13,6 +13,7 @@ use std::hash::{Hash, Hasher};
 use std::path::PathBuf;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
+use super::library_files::library_files;
 use super::library_text::read_library;
 use crate::chip::SensorConfig;
 use crate::chip::blocks::{front_end, macropixel};
@@ -81,10 +82,25 @@ impl CellLibrary {
         }
         let cells =
             wanted_cells(&config.liberty_cells).map_err(|message| ("liberty_cells", message))?;
-        let text = read_library(path)
-            .map_err(|message| (key, format!("{}: {message}", path.display())))?;
-        let liberty = Liberty::read(&text, &cells)
-            .map_err(|e| (key, format!("{}:{}: {e}", path.display(), e.line)))?;
+        let files = library_files(path);
+        let mut texts = Vec::new();
+        for file in &files {
+            let text = read_library(file);
+            texts.push(text.map_err(|message| (key, format!("{}: {message}", file.display())))?);
+        }
+        let names = files
+            .iter()
+            .map(|file| file.file_name().unwrap_or_default());
+        let names: Vec<_> = names.map(|name| name.to_string_lossy()).collect();
+        let named: Vec<(&str, &str)> = names
+            .iter()
+            .zip(&texts)
+            .map(|(name, text)| (&**name, &**text))
+            .collect();
+        let mut liberty = Liberty::read_files(&named, &cells).map_err(|e| {
+            let place = format!("{}:{}", files[e.file].display(), e.fault.line);
+            (key, format!("{place}: {e}"))
+        })?;
         let mut environment = Environment::of(&liberty);
         if config.input_slew_ps > 0.0 {
             environment.input_slew_fs = config.input_slew_ps * 1e3;
@@ -94,6 +110,21 @@ impl CellLibrary {
         let mut nominal = liberty.nominal(&environment);
         let pixel = Netlist::elaborate(&macropixel::circuit(&SensorConfig::default()));
         let placed = Characterised::of(&pixel, &liberty, &environment);
+        let [(shortest_fs, of_shortest), (longest_fs, of_longest)] =
+            placed.extreme_delays(&pixel, &liberty);
+        if longest_fs > f64::from(u32::MAX) {
+            let us = longest_fs * 1e-9;
+            let message = format!(
+                "a macropixel's longest delay would be {us:.3} us, of {of_longest}; delays up to 4.295 us are known"
+            );
+            return Err((key, format!("{}: {message}", path.display())));
+        }
+        if shortest_fs < 0.0 {
+            let ps = shortest_fs * 1e-3;
+            liberty.map.odd.push(format!(
+                "delays below zero count as 0: the least in a macropixel is {ps:.3} ps, of {of_shortest}"
+            ));
+        }
         for kind in CellKind::ALL {
             if let Some(limits) = placed.largest_limits(&pixel, kind) {
                 nominal.set_checks(kind, limits);

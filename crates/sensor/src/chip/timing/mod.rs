@@ -10,6 +10,7 @@
 //! | file | what it has |
 //! |---|---|
 //! | [`cell_library`] | the cells, built in or of a Liberty file |
+//! | [`library_files`] | the files of a library in a setting |
 //! | `library_text` | the text of a Liberty file, packed or not |
 //! | [`silicon`] | the cell library, conditions and mismatch |
 //! | `chip_timing` | [`ChipTiming`]: delays as numbers |
@@ -26,6 +27,7 @@ pub mod cell_library;
 pub(crate) mod chip_timing;
 pub(crate) mod clk_skew;
 pub(crate) mod delay_lines;
+pub mod library_files;
 mod library_text;
 pub mod local_stop;
 pub mod macropixel;

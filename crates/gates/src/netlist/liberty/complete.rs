@@ -1,0 +1,188 @@
+//! What a cell must state, so that nothing that is missing counts as zero; and what it leaves out or states in vain, for the user to know.
+
+use super::cell::{CellModel, FlipFlop, Role};
+use super::error::LibertyError;
+use super::function::TruthTable;
+use super::group::Group;
+use crate::netlist::{CheckKind, Edge};
+
+/// Something to know of a cell that is used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Remark {
+    NoArea,
+    NoLeakage,
+    NoEnergy,
+    NoLimits(Vec<CheckKind>),
+    /// Internal power over other axes than slew and load.
+    Energy,
+    /// A shortest period of the clock.
+    Period,
+}
+
+impl Remark {
+    /// A sentence of the cells that it is of.
+    pub(super) fn sentence(&self, cells: &str) -> String {
+        match self {
+            Remark::NoArea => format!("no area is stated for {cells}; it counts as 0"),
+            Remark::NoLeakage => format!("no leakage is stated for {cells}; it counts as 0"),
+            Remark::NoEnergy => {
+                format!("no internal_power is stated for {cells}; it counts as 0")
+            }
+            Remark::NoLimits(kinds) => {
+                let names = kinds.iter().map(|kind| kind.name().replace('_', " "));
+                let names = names.collect::<Vec<_>>().join(", ");
+                format!("no limits of {names} are stated for {cells}; they count as 0")
+            }
+            Remark::Energy => format!(
+                "internal_power over other axes than one slew and one load is not used, in {cells}"
+            ),
+            Remark::Period => format!(
+                "the shortest period of the clock is not used, in {cells}; widths of its pulses are"
+            ),
+        }
+    }
+}
+
+/// Limits that a flip-flop should state and does not.
+pub(super) fn missing_limits(model: &CellModel) -> Vec<CheckKind> {
+    let has_control = match &model.role {
+        Role::FlipFlop(roles) => roles.clear.is_some() || roles.preset.is_some(),
+        Role::Gate(_) => false,
+    };
+    let is_stated = |kind| model.checks.iter().any(|check| check.kind == kind);
+    let kinds = CheckKind::ALL.into_iter().filter(|&kind| {
+        let concerns_control = matches!(
+            kind,
+            CheckKind::Recovery | CheckKind::Removal | CheckKind::ControlHigh
+        );
+        !is_stated(kind) && (has_control || !concerns_control)
+    });
+    kinds.collect()
+}
+
+/// Checks that a gate has an arc for every edge that its function makes.
+///
+/// # Errors
+/// The first edge without one.
+pub(super) fn check_gate(model: &CellModel, function: TruthTable) -> Result<(), String> {
+    for pin in 0..model.inputs.len() {
+        let (same, inverse) = function.unate(pin as u32);
+        for cause in Edge::BOTH {
+            let effects = [(same, cause), (inverse, cause.opposite())];
+            for (_, effect) in effects.into_iter().filter(|(is_made, _)| *is_made) {
+                check_arc(model, (pin, cause), (0, effect))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Checks that a flip-flop of these pins has an arc for every edge that its clock, reset and (if it is used) set make.
+///
+/// # Errors
+/// The first edge without one.
+pub(super) fn check_flip_flop(
+    model: &CellModel,
+    roles: &FlipFlop,
+    with_set: bool,
+) -> Result<(), String> {
+    use Edge::{Fall, Rise};
+    let active = |(pin, inverted): (usize, bool)| (pin, if inverted { Fall } else { Rise });
+    for (output, set) in [(roles.q, Rise), (roles.qn, Fall)] {
+        let Some(output) = output else { continue };
+        for edge in Edge::BOTH {
+            check_arc(model, active(roles.clock), (output, edge))?;
+        }
+        if let Some(clear) = roles.clear {
+            check_arc(model, active(clear), (output, set.opposite()))?;
+        }
+        if let Some(preset) = roles.preset.filter(|_| with_set) {
+            check_arc(model, active(preset), (output, set))?;
+        }
+    }
+    Ok(())
+}
+
+fn check_arc(
+    model: &CellModel,
+    (from, cause): (usize, Edge),
+    (to, effect): (usize, Edge),
+) -> Result<(), String> {
+    let mut arcs = model.arcs.iter();
+    let is_there =
+        arcs.any(|arc| (arc.from, arc.cause, arc.to, arc.effect) == (from, cause, to, effect));
+    if is_there {
+        return Ok(());
+    }
+    let word = |edge| if edge == Edge::Rise { "rise" } else { "fall" };
+    Err(format!(
+        "it has no delay and slew from the {} of {} to the {} of {}",
+        word(cause),
+        model.inputs[from].name,
+        word(effect),
+        model.outputs[to].name
+    ))
+}
+
+/// What a `timing` group is of.
+///
+/// # Errors
+/// A word that is not in the Liberty manual.
+pub(super) fn timing_type<'t>(timing: &Group<'t>) -> Result<&'t str, LibertyError> {
+    let word = timing.value("timing_type").unwrap_or("combinational");
+    let begins = [
+        "combinational",
+        "three_state_disable",
+        "three_state_enable",
+        "setup",
+        "hold",
+        "recovery",
+        "removal",
+        "skew",
+        "non_seq_setup",
+        "non_seq_hold",
+    ];
+    let with_edge = begins.into_iter().any(|begin| {
+        matches!(
+            word.strip_prefix(begin),
+            Some("_rising" | "_falling" | "_rise" | "_fall" | "")
+        )
+    });
+    let others = [
+        "rising_edge",
+        "falling_edge",
+        "clear",
+        "preset",
+        "min_pulse_width",
+        "minimum_period",
+        "max_clock_tree_path",
+        "min_clock_tree_path",
+        "nochange_high_high",
+        "nochange_high_low",
+        "nochange_low_high",
+        "nochange_low_low",
+    ];
+    if with_edge || others.contains(&word) {
+        return Ok(word);
+    }
+    Err(LibertyError {
+        line: timing.line,
+        message: format!("timing_type {word:?} is not known"),
+    })
+}
+
+/// Which edge of the input makes which of the output, where a `timing` group says so.
+///
+/// # Errors
+/// A word that is not in the Liberty manual.
+pub(super) fn timing_sense<'t>(timing: &Group<'t>) -> Result<Option<&'t str>, LibertyError> {
+    match timing.value("timing_sense") {
+        Some(word) if !["positive_unate", "negative_unate", "non_unate"].contains(&word) => {
+            Err(LibertyError {
+                line: timing.line,
+                message: format!("timing_sense {word:?} is not known"),
+            })
+        }
+        sense => Ok(sense),
+    }
+}
