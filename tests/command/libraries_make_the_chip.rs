@@ -143,7 +143,7 @@ fn what_is_no_library_is_refused_in_a_sentence() {
         ),
         (
             &["--liberty", "empty.lib"],
-            "empty.lib:1: the library none has nothing to make a INV from",
+            "empty.lib:1: the library none has nothing to make a INV from; an inverter would be enough",
         ),
         (
             &["--liberty", &library, "--cell", "DFFR=foo"],
@@ -171,4 +171,135 @@ fn what_is_no_library_is_refused_in_a_sentence() {
     let output = gdtof(folder.path(), &["export", "sdc", "--out", "a.sdc"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(!folder.path().join("a.sdc").exists());
+}
+
+/// `example.lib` as a kit: gates in one file, and flip-flops in another.
+fn write_kit(folder: &Path) {
+    let text = std::fs::read_to_string(example()).unwrap();
+    let (head, cells) = text.split_once("  cell (").unwrap();
+    let cells: Vec<&str> = cells
+        .trim_end()
+        .trim_end_matches('}')
+        .split("  cell (")
+        .collect();
+    let file = |is_ours: fn(&str) -> bool| {
+        let ours = cells.iter().filter(|cell| is_ours(cell));
+        let ours = ours.map(|cell| format!("  cell ({cell}"));
+        format!("{head}{}}}", ours.collect::<String>())
+    };
+    std::fs::write(
+        folder.join("gates.lib"),
+        file(|cell| !cell.starts_with("DFF")),
+    )
+    .unwrap();
+    let flip_flops = file(|cell| cell.starts_with("DFF")).replace("example", "more");
+    std::fs::write(folder.join("flip_flops.lib"), flip_flops).unwrap();
+}
+
+#[test]
+fn a_kit_of_several_files_is_one_library() {
+    let folder = tempfile::tempdir().unwrap();
+    write_kit(folder.path());
+    let library = example();
+    std::fs::write(
+        folder.path().join("chip.toml"),
+        "liberty = \"gates.lib, flip_flops.lib\"\nliberty_slow = \"gates.lib,flip_flops.lib\"\n",
+    )
+    .unwrap();
+    let slow = "sensor.corner=slow";
+    let mut written = Vec::new();
+    for arguments in [
+        &["--liberty", &library][..],
+        &["--liberty", "gates.lib", "--liberty", "flip_flops.lib"],
+        &["--liberty", "flip_flops.lib,gates.lib"],
+        &["--sensor", "chip.toml"],
+        &["--sensor", "chip.toml", "--set", slow],
+    ] {
+        let out = ["export", "verilog", "--mapped", "--out", "m"];
+        let output = gdtof(folder.path(), &[&out[..], arguments].concat());
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{arguments:?}: {said}");
+        let read =
+            |name: &str| std::fs::read_to_string(folder.path().join("m").join(name)).unwrap();
+        written.push(["mapped.v", "mapped.sdf", "mapped.sdc"].map(read));
+    }
+    assert!(
+        written.iter().all(|files| *files == written[0]),
+        "not the same"
+    );
+    // One of both is no library, and both together with the whole have cells twice.
+    for (arguments, says) in [
+        (
+            &["--liberty", "gates.lib"][..],
+            "gates.lib:2: the library example has nothing to make a DFFR from; a flip-flop with an asynchronous clear or preset",
+        ),
+        (
+            &["--liberty", "gates.lib", "--liberty", &library],
+            "the cell INV_1 is in gates.lib as well",
+        ),
+        (
+            &["--liberty", "gates.lib", "--liberty", "nothing.lib"],
+            "nothing.lib: cannot be read",
+        ),
+    ] {
+        let output = gdtof(
+            folder.path(),
+            &[&["export", "sdc", "--out", "a.sdc"], arguments].concat(),
+        );
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(said.contains(says), "{arguments:?}: {said}");
+    }
+    // A frame names every file that it depends on.
+    let frame = "frame --sensor chip.toml --rows 1 --cols 1 --laser-cycles 1 --probe none --quiet --out frame";
+    let output = gdtof(folder.path(), &frame.split(' ').collect::<Vec<_>>());
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let written = std::fs::read_to_string(folder.path().join("frame/frame.json")).unwrap();
+    let frame: serde_json::Value = serde_json::from_str(&written).unwrap();
+    let hashes = frame["sha256"]
+        .as_object()
+        .unwrap_or_else(|| panic!("{written}"));
+    let hashed = |name: &str| {
+        hashes
+            .keys()
+            .any(|file| file.ends_with(name) && !file.contains(','))
+    };
+    assert!(
+        hashed("/gates.lib") && hashed("/flip_flops.lib"),
+        "{hashes:?}"
+    );
+}
+
+/// What is odd about a library is said by every command that uses it.
+#[test]
+fn a_librarys_oddities_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(example()).unwrap();
+    let scan = text.replace("next_state : \"D\"", "next_state : \"(SE SI) + (!SE D)\"").replace(
+        "    pin (D) {",
+        "    pin (SE) { direction : input; capacitance : 0.001; } pin (SI) { direction : input; capacitance : 0.001; }\n    pin (D) {",
+    );
+    // The library's smallest inverter has no delay for its output's fall.
+    let (head, inverter) = scan.split_once("cell (INV_1)").unwrap();
+    let odd = format!(
+        "{head}cell (INV_1){}",
+        inverter.replacen("cell_fall", "cell_gone", 1)
+    );
+    std::fs::write(folder.path().join("odd.lib"), odd).unwrap();
+    let output = gdtof(
+        folder.path(),
+        &["export", "sdc", "--out", "a.sdc", "--liberty", "odd.lib"],
+    );
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    for says in [
+        "DFFSR is made of DFFSRN_1 with pins tied (SE = 0, SI = 0)",
+        "odd.lib:32: INV_1 is not used: it has no delay and slew from the rise of A to the fall of Y",
+    ] {
+        assert!(said.contains(says), "{says}: {said}");
+    }
 }

@@ -161,7 +161,7 @@ impl<'g, 't> Maker<'g, 't> {
                 let passed_over = self.passed_over.borrow();
                 let reasons = passed_over.iter().map(|reason| format!("; {reason}"));
                 fault(format!(
-                    "the library {} has nothing to make a {} from; {} would be enough{}",
+                    "the library {} has nothing to make a {} from; {} would be enough (if the kit has more files, give all of them){}",
                     library.name(),
                     kind.name(),
                     enough(kind),

@@ -23,7 +23,8 @@ pub struct Liberty {
     pub cells: usize,
     /// What stands for each kind.
     pub map: CellMap,
-    /// Cells that stand for nothing here and cannot, in the order of the files: so do gates that the library says not to use, and that nobody wants by name.
+    /// Cells that stand for nothing here and cannot, in the order of the files. Gates that the library says not to use are among them, but for
+    /// wanted ones.
     pub passed_over: Vec<PassedOver>,
     /// Units of the first file, in which other tools take times and loads.
     pub(super) units: Units,
@@ -88,6 +89,16 @@ impl Liberty {
             let stated = stated.or_else(|| group?.number(of_group).transpose());
             stated.transpose().map_err(in_file(0))
         };
+        let conditions = [
+            number("nom_voltage", "voltage")?,
+            number("nom_temperature", "temperature")?,
+        ];
+        let mut map = Maker::new(&read, &candidates, &passed_over, wanted).make()?;
+        if conditions[0].is_none() {
+            let told =
+                "no supply (nom_voltage) is stated; energies of loads are those at an assumed one";
+            map.odd.push(told.to_owned());
+        }
         // A cell with tied pins does what it says only where they are tied.
         let is_plain = |role: &Role| !matches!(role, Role::FlipFlop(roles) if roles.tied != 0);
         let plain = candidates.iter().filter(|c| is_plain(&c.role));
@@ -96,15 +107,12 @@ impl Liberty {
                 1 => first.name().to_owned(),
                 files => format!("{} and {} more files", first.name(), files - 1),
             },
-            conditions: [
-                number("nom_voltage", "voltage")?,
-                number("nom_temperature", "temperature")?,
-            ],
+            conditions,
             cells: groups
                 .iter()
                 .map(|group| group.of_kind("cell").count())
                 .sum(),
-            map: Maker::new(&read, &candidates, &passed_over, wanted).make()?,
+            map,
             passed_over,
             units: read[0].units,
             functions: plain.map(|c| (c.name().to_owned(), c.function())).collect(),
