@@ -298,7 +298,7 @@ fn a_librarys_oddities_are_told() {
     assert!(output.status.success(), "{said}");
     for says in [
         "DFFSR is made of DFFSRN_1 with pins tied (SE = 0, SI = 0)",
-        "odd.lib:32: INV_1 is not used: it has no delay and slew from the rise of A to the fall of Y",
+        "odd.lib:31: INV_1 is not used: it has no delay and slew from the rise of A to the fall of Y",
     ] {
         assert!(said.contains(says), "{says}: {said}");
     }

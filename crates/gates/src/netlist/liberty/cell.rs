@@ -14,7 +14,6 @@ use super::group::Group;
 use super::kit::LibraryFile;
 use super::leakage::leakage_of;
 use super::table::Table;
-use super::verilog_name::is_possible;
 use crate::netlist::{CheckKind, Edge};
 
 /// What a cell does, told without a look at its tables.
@@ -63,26 +62,9 @@ impl<'g, 't> Candidate<'g, 't> {
         // In one order in every drive of a family, whatever the file's is.
         inputs.sort_unstable();
         for pin in group.of_kind("pin") {
-            let word = pin.value("direction").unwrap_or("internal");
-            if !["input", "output", "inout", "internal"].contains(&word) {
-                return Err(LibertyError {
-                    line: pin.line,
-                    message: format!(
-                        "direction is {word:?}; input, output, inout and internal are known"
-                    ),
-                });
-            }
+            complete::check_word(pin, "direction", &["input", "output", "inout", "internal"])?;
         }
-        let dont_use = match group.value("dont_use") {
-            None | Some("false") => false,
-            Some("true") => true,
-            Some(other) => {
-                return Err(LibertyError {
-                    line: group.line,
-                    message: format!("dont_use is {other:?}; true and false are known"),
-                });
-            }
-        };
+        complete::check_word(group, "dont_use", &["true", "false"])?;
         let shared = pins().any(|(_, pin)| pin.value("three_state").is_some());
         let names: BTreeSet<&str> = pins().map(|(name, _)| name).collect();
         let is_named = group.of_kind("pin").all(|pin| !pin.arguments.is_empty());
@@ -114,7 +96,7 @@ impl<'g, 't> Candidate<'g, 't> {
         Ok(role.map(|role| Candidate {
             group,
             file,
-            dont_use,
+            dont_use: group.value("dont_use") == Some("true"),
             area,
             inputs,
             outputs,
@@ -225,34 +207,10 @@ impl CellModel {
         let group = candidate.group;
         let pin = |name: &str| group.pin(name).expect("a candidate's pin");
         let fault = |line: usize, message: String| LibertyError { line, message };
-        if candidate.area < 0.0 {
-            return Err(fault(group.line, format!("its area is {}", candidate.area)));
-        }
-        let names = candidate.inputs.iter().chain(&candidate.outputs);
-        for name in [candidate.name()].iter().chain(names) {
-            if !is_possible(name) {
-                let message = format!("Verilog can have no name like {name:?}");
-                return Err(fault(group.line, message));
-            }
-        }
+        complete::check_area_and_names(candidate)?;
         let load = |name: &str, missing: Option<f64>| {
-            let pin = pin(name);
-            let either = pin.number("capacitance")?.or(missing);
-            let mut loads = [0.0; 2];
-            for (load, of_edge) in loads
-                .iter_mut()
-                .zip(["rise_capacitance", "fall_capacitance"])
-            {
-                let stated = pin.number(of_edge)?.or(either);
-                let stated = stated
-                    .ok_or_else(|| fault(pin.line, format!("its pin {name} has no capacitance")))?;
-                if stated < 0.0 {
-                    let message = format!("the capacitance of its pin {name} is {stated}");
-                    return Err(fault(pin.line, message));
-                }
-                *load = stated * units.load_ff;
-            }
-            Ok(loads)
+            let loads = complete::capacitance(name, pin(name), missing)?;
+            Ok(loads.map(|load| load * units.load_ff))
         };
         let leakage = leakage_of(group, file.group)?;
         let mut model = CellModel {
@@ -274,10 +232,10 @@ impl CellModel {
         ];
         let unstated = unstated.into_iter().filter(|(is_missing, _)| *is_missing);
         model.remarks.extend(unstated.map(|(_, remark)| remark));
-        let (of_inputs, of_outputs) = (
-            file.group.number("default_input_pin_cap")?,
-            file.group.number("default_output_pin_cap")?,
-        );
+        // A default of 0, which many files have, states nothing.
+        let default = |name| Ok(file.group.number(name)?.filter(|&default| default > 0.0));
+        let of_inputs = default("default_input_pin_cap")?;
+        let of_outputs = default("default_output_pin_cap")?.or(Some(0.0));
         for (index, &name) in candidate.inputs.iter().enumerate() {
             let group = pin(name);
             let load_ff = load(name, of_inputs)?;
@@ -304,10 +262,10 @@ impl CellModel {
             }
         }
         for (index, &name) in candidate.outputs.iter().enumerate() {
-            let load_ff = load(name, of_outputs.or(Some(0.0)))?;
-            let name_of_pin = name.to_owned();
+            let load_ff = load(name, of_outputs)?;
+            let output = name.to_owned();
             model.outputs.push(OutputPin {
-                name: name_of_pin,
+                name: output,
                 load_ff,
             });
             for timing in pin(name).of_kind("timing") {

@@ -1,9 +1,10 @@
 //! What a cell must state, so that nothing that is missing counts as zero; and what it leaves out or states in vain, for the user to know.
 
-use super::cell::{CellModel, FlipFlop, Role};
+use super::cell::{Candidate, CellModel, FlipFlop, Role};
 use super::error::LibertyError;
 use super::function::TruthTable;
 use super::group::Group;
+use super::verilog_name::is_possible;
 use crate::netlist::{CheckKind, Edge};
 
 /// Something to know of a cell that is used.
@@ -13,7 +14,7 @@ pub(super) enum Remark {
     NoLeakage,
     NoEnergy,
     NoLimits(Vec<CheckKind>),
-    /// Internal power over other axes than slew and load.
+    /// Internal power that is no table over a slew and a load.
     Energy,
     /// A shortest period of the clock.
     Period,
@@ -34,7 +35,7 @@ impl Remark {
                 format!("no limits of {names} are stated for {cells}; they count as 0")
             }
             Remark::Energy => format!(
-                "internal_power over other axes than one slew and one load is not used, in {cells}"
+                "internal_power that is no table over a slew and a load is not used, in {cells}"
             ),
             Remark::Period => format!(
                 "the shortest period of the clock is not used, in {cells}; widths of its pulses are"
@@ -124,6 +125,76 @@ fn check_arc(
     ))
 }
 
+/// Checks that a cell's area is not negative, and that Verilog can have its names.
+///
+/// # Errors
+/// What is not so, with the cell's line.
+pub(super) fn check_area_and_names(cell: &Candidate<'_, '_>) -> Result<(), LibertyError> {
+    let fault = |message: String| LibertyError {
+        line: cell.group.line,
+        message,
+    };
+    if cell.area < 0.0 {
+        return Err(fault(format!("its area is {}", cell.area)));
+    }
+    let pins = cell.inputs.iter().chain(&cell.outputs).copied();
+    let mut names = std::iter::once(cell.name()).chain(pins);
+    match names.find(|name| !is_possible(name)) {
+        None => Ok(()),
+        Some(name) => Err(fault(format!("Verilog can have no name like {name:?}"))),
+    }
+}
+
+/// Capacitance of a pin while it rises and falls, in the file's unit; `missing` where it states none.
+///
+/// # Errors
+/// None where none may be missing, and a negative one.
+pub(super) fn capacitance(
+    name: &str,
+    pin: &Group<'_>,
+    missing: Option<f64>,
+) -> Result<[f64; 2], LibertyError> {
+    let fault = |message: String| LibertyError {
+        line: pin.line,
+        message,
+    };
+    let either = pin.number("capacitance")?.or(missing);
+    let mut loads = [0.0; 2];
+    for (load, attribute) in loads
+        .iter_mut()
+        .zip(["rise_capacitance", "fall_capacitance"])
+    {
+        let stated = pin.number(attribute)?.or(either);
+        *load = stated.ok_or_else(|| fault(format!("its pin {name} has no capacitance")))?;
+        if *load < 0.0 {
+            let message = format!("the capacitance of its pin {name} is {load}");
+            return Err(fault(message));
+        }
+    }
+    Ok(loads)
+}
+
+/// Checks that an attribute, if it is there, is one of these words.
+///
+/// # Errors
+/// Another one.
+pub(super) fn check_word(
+    group: &Group<'_>,
+    attribute: &str,
+    words: &[&str],
+) -> Result<(), LibertyError> {
+    match group.value(attribute) {
+        Some(word) if !words.contains(&word) => Err(LibertyError {
+            line: group.line,
+            message: format!(
+                "{attribute} {word:?} is not known: it is {}",
+                words.join(", ")
+            ),
+        }),
+        _ => Ok(()),
+    }
+}
+
 /// What a `timing` group is of.
 ///
 /// # Errors
@@ -176,13 +247,7 @@ pub(super) fn timing_type<'t>(timing: &Group<'t>) -> Result<&'t str, LibertyErro
 /// # Errors
 /// A word that is not in the Liberty manual.
 pub(super) fn timing_sense<'t>(timing: &Group<'t>) -> Result<Option<&'t str>, LibertyError> {
-    match timing.value("timing_sense") {
-        Some(word) if !["positive_unate", "negative_unate", "non_unate"].contains(&word) => {
-            Err(LibertyError {
-                line: timing.line,
-                message: format!("timing_sense {word:?} is not known"),
-            })
-        }
-        sense => Ok(sense),
-    }
+    let known = ["positive_unate", "negative_unate", "non_unate"];
+    check_word(timing, "timing_sense", &known)?;
+    Ok(timing.value("timing_sense"))
 }

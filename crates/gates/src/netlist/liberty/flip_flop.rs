@@ -8,6 +8,7 @@
 //! A cell whose next state is more than its data stands for a plain flip-flop once its other pins are tied to a level: the enable
 //! of a scan chain, a load enable, a synchronous reset.
 
+use super::complete::check_word;
 use super::error::LibertyError;
 use super::function::{TruthTable, truth_table};
 use super::group::Group;
@@ -57,16 +58,10 @@ impl FlipFlop {
         inputs: &[&str],
         outputs: &[&str],
     ) -> Result<Option<Self>, LibertyError> {
-        let preset_wins = match ff.value("clear_preset_var1") {
-            Some("H") => true,
-            None | Some("L" | "N" | "T" | "X") => false,
-            Some(other) => {
-                return Err(LibertyError {
-                    line: ff.line,
-                    message: format!("clear_preset_var1 is {other:?}; L, H, N, T and X are known"),
-                });
-            }
-        };
+        for attribute in ["clear_preset_var1", "clear_preset_var2"] {
+            check_word(ff, attribute, &["L", "H", "N", "T", "X"])?;
+        }
+        let preset_wins = ff.value("clear_preset_var1") == Some("H");
         Ok(pins(cell, ff, inputs, outputs).map(|pins| FlipFlop {
             preset_wins,
             ..pins

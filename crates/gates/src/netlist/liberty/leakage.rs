@@ -45,7 +45,9 @@ pub(super) fn leakage_of(
         (*sum, *count) = (*sum + value, *count + 1.0);
     }
     if supplies.is_empty() {
-        return library.number("default_cell_leakage_power");
+        // A default of 0, which many files have, states nothing.
+        let default = library.number("default_cell_leakage_power")?;
+        return Ok(default.filter(|&default| default > 0.0));
     }
     let mean = |&[states, always]: &[(f64, f64); 2]| {
         let (sum, count) = if states.1 > 0.0 { states } else { always };
@@ -101,7 +103,10 @@ mod tests {
             of("leakage_power () { when : \"A\"; }").unwrap_err().line,
             2
         );
-        let none = read("library (l) { cell (c) { } }").unwrap();
-        assert_eq!(leakage_of(&none.groups[0], &none), Ok(None));
+        for default in ["", "default_cell_leakage_power : 0;"] {
+            let text = format!("library (l) {{ {default} cell (c) {{ }} }}");
+            let none = read(&text).unwrap();
+            assert_eq!(leakage_of(&none.groups[0], &none), Ok(None));
+        }
     }
 }

@@ -524,7 +524,7 @@ fn what_is_missing_or_not_used_is_told() {
     let told = odd(&format!("{power}{cells}"));
     for says in [
         "no area is stated for INV_1; it counts as 0",
-        "internal_power over other axes than one slew and one load is not used, in INV_1",
+        "internal_power that is no table over a slew and a load is not used, in INV_1",
         "the shortest period of the clock is not used, in DSR_1",
     ] {
         assert!(told.contains(says), "{told}");
