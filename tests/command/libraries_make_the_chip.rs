@@ -227,7 +227,10 @@ fn a_kit_of_several_files_is_one_library() {
         written.iter().all(|files| *files == written[0]),
         "not the same"
     );
-    // One of both is no library, and both together with the whole have cells twice.
+    let flip_flops = std::fs::read_to_string(folder.path().join("flip_flops.lib")).unwrap();
+    let cut = flip_flops.replace("preset : \"!SN\";", "preset : \"!SN & D\";");
+    std::fs::write(folder.path().join("cut.lib"), cut).unwrap();
+    // One of both is no library, both together with the whole have cells twice, and a cell that has no use is told with its file.
     for (arguments, says) in [
         (
             &["--liberty", "gates.lib"][..],
@@ -236,6 +239,10 @@ fn a_kit_of_several_files_is_one_library() {
         (
             &["--liberty", "gates.lib", "--liberty", &library],
             "the cell INV_1 is in gates.lib as well",
+        ),
+        (
+            &["--liberty", "gates.lib", "--liberty", "cut.lib"],
+            "; cut.lib:148: DFFSRN_1 is not used: its preset is \"!SN & D\" and not one pin",
         ),
         (
             &["--liberty", "gates.lib", "--liberty", "nothing.lib"],
