@@ -93,7 +93,7 @@ fn odd_names_of_cells_and_pins_are_escaped() {
     let odd = odd.replace("\"INV\\\\$1\"", "\"INV$1\"");
     let [verilog, models, sdf, _] = files(&odd);
     assert!(verilog.contains("  \\INV$1  \\"), "{verilog}");
-    assert!(verilog.contains("  \\dffsr:1  \\flip_flop"), "{verilog}");
+    assert!(verilog.contains("  \\dffsr:1  \\small"), "{verilog}");
     assert!(verilog.contains(".\\RN[0] ("), "{verilog}");
     assert!(models.contains("module \\INV$1 ("), "{models}");
     assert!(models.contains("primitive \\INV$1_FUNCTION ("), "{models}");

@@ -537,7 +537,7 @@ fn what_is_missing_or_not_used_is_told() {
     let found = map(&stated, &[]).unwrap();
     assert_eq!(
         found.recipe(CellKind::Inv).stages[0].drives[0].leakage_w,
-        3e-9
+        3.0 * 1e-9
     );
     assert!(
         !found.odd.join("\n").contains("leakage is stated for INV_1"),
@@ -554,7 +554,7 @@ fn what_is_missing_or_not_used_is_told() {
     let map = by_default.unwrap().map;
     assert_eq!(
         map.recipe(CellKind::Inv).stages[0].drives[0].leakage_w,
-        4e-9
+        4.0 * 1e-9
     );
     assert!(!map.odd.join("\n").contains("leakage"), "{:?}", map.odd);
 }
