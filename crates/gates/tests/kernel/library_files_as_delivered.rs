@@ -1,6 +1,8 @@
 //! Library files as foundries deliver them, made from `vectors/liberty/example.lib`: units of other sizes, odd names, capacitances of outputs,
 //! delays beyond what can be kept, scan cells. What other tools are given follows.
 
+use crate::tool;
+
 use femtogate::netlist::liberty::{
     Characterised, Clocking, Environment, Liberty, write_constraints, write_mapped,
     write_mapped_cells, write_mapped_sdf,
@@ -99,6 +101,21 @@ fn odd_names_of_cells_and_pins_are_escaped() {
     assert!(models.contains("primitive \\INV$1_FUNCTION ("), "{models}");
     assert!(sdf.contains("(CELLTYPE \"dffsr:1\")"), "{sdf}");
     assert!(sdf.contains("(IOPATH RN\\[0\\] Q () ("), "{sdf}");
+    if tool::is_here("iverilog", "no escaped names were read by Icarus Verilog") {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("mapped.v"), &verilog).unwrap();
+        std::fs::write(folder.path().join("cells.v"), &models).unwrap();
+        let output = std::process::Command::new("iverilog")
+            .args(["-g2005", "-gspecify", "-o", "sim", "cells.v", "mapped.v"])
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+    }
     // A keyword is no plain name.
     let [verilog, ..] = files(&text().replace("cell (INV_1)", "cell (not)"));
     assert!(verilog.contains("  \\not  \\"), "{verilog}");
