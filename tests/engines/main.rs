@@ -2,6 +2,8 @@
 
 #[path = "../../crates/gates/tests/kernel/cases.rs"]
 mod cases;
+#[path = "../shared/counters.rs"]
+mod counters;
 #[path = "../shared/random_library.rs"]
 mod random_library;
 #[path = "../shared/scenario.rs"]
@@ -23,6 +25,7 @@ mod impossible_light_is_refused;
 mod late_cycle_is_that_of_the_whole_run;
 mod light_is_a_list;
 mod own_blocks_agree_with_built_in_ones;
+mod own_counters_remember_nothing;
 mod photons_drawn_are_those_of_the_exposure;
 mod random_libraries_count_alike;
 mod timed_agrees_with_gate;

@@ -132,11 +132,22 @@ impl Contract {
             return Ok(());
         };
         match self.delay_lines {
-            Some(instead) if config.tdc == Tdc::DelayLine => Err(format!(
-                "{} is impossible with tdc = \"delay_line\", which {instead}; leave it out",
-                self.key
-            )),
-            _ => self.holds(own, &(self.built_in)(config)),
+            Some(instead) if config.tdc == Tdc::DelayLine => {
+                return Err(format!(
+                    "{} is impossible with tdc = \"delay_line\", which {instead}; leave it out",
+                    self.key
+                ));
+            }
+            _ => self.holds(own, &(self.built_in)(config))?,
+        }
+        // Where a law is measured once, nothing may change it afterwards.
+        let state = self.has_law.then(|| own.hidden_state(config)).flatten();
+        match (state, own.module()) {
+            (Some(state), Some(module)) => {
+                let file = own.file().display();
+                Err(format!("{file}: module {} {state}", module.name()))
+            }
+            _ => Ok(()),
         }
     }
 

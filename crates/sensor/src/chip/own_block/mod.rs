@@ -2,6 +2,7 @@
 //!
 //! ```text
 //!   p_counter_block = "my.json" ─read─► Module ─► held against its contract ─► in the built-in block's place in the macropixel
+//!                                          ├─► hidden_state: no state of a P-counter outlives a laser cycle, except its memory
 //!                                          └─► CounterLaw: what each COUNTER_INIT does, measured on the gates
 //! ```
 //!
@@ -12,6 +13,7 @@
 
 pub(crate) mod block;
 mod contract;
+mod hidden_state;
 mod law;
 
 use std::collections::HashMap;
@@ -28,7 +30,23 @@ use super::p_counter::count_down::Expected;
 /// Laws that have been measured, by netlist and what is expected of it.
 type Laws = HashMap<(u64, Expected), Arc<CounterLaw>>;
 
+/// What is known of the state of netlists, likewise.
+type HiddenStates = HashMap<(u64, Expected), Option<String>>;
+
 impl OwnBlock {
+    /// The state that it must not have as the P-counter of this sensor, and the cell that holds it; looked for once a process. It must
+    /// have been read.
+    fn hidden_state(&self, config: &SensorConfig) -> Option<String> {
+        static KNOWN: LazyLock<Mutex<HiddenStates>> = LazyLock::new(Mutex::default);
+        let (module, hash) = (self.module()?, self.hash()?);
+        let expected = Expected::of_sensor(config);
+        let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        let state = known.entry((hash, expected));
+        state
+            .or_insert_with(|| hidden_state::hidden_state(module, expected))
+            .clone()
+    }
+
     /// What it does as the P-counter of this sensor; measured once a process.
     fn law(&self, config: &SensorConfig) -> Arc<CounterLaw> {
         static LAWS: LazyLock<Mutex<Laws>> = LazyLock::new(Mutex::default);

@@ -15,8 +15,8 @@ use crate::kernel::{LANES, LaneDrive, LaneKernel, LaneObserver, Lanes};
 use crate::netlist::{NetId, Netlist, Timing};
 use crate::units::Time;
 
-/// Half a period of COUNTER_CLK, and every pause, at the least.
-const SHORTEST_PAUSE: Time = Time::from_ns(500);
+/// Half a period of COUNTER_CLK, and every pause, at the least: long enough for ten thousand of the built-in gates one after the other.
+pub(in crate::chip) const SHORTEST_PAUSE: Time = Time::from_ns(500);
 
 /// What counting down depends on besides the netlist.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
