@@ -106,7 +106,7 @@ pub(super) fn write(folder: &Path, config: &SensorConfig) -> anyhow::Result<()> 
     mapped.write_sdc(&folder.join("mapped.sdc"))?;
     let (area, leakage_w) = characterised.silicon(netlist, &cells.liberty, 0);
     tell(format_args!(
-        "mapped.v, mapped_cells.v, mapped.sdf and mapped.sdc in {}: a macropixel of {} in {}, area {area:.0}, leakage {:.3} nW\n",
+        "mapped.v, mapped_cells.v, mapped.sdf and mapped.sdc in {}: a macropixel of {} in {}, area {area:.0} um2, leakage {:.3} nW\n",
         folder.display(),
         netlist.cells().len(),
         cells.liberty.name,

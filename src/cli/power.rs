@@ -152,7 +152,7 @@ pub(super) fn run(args: &PowerArgs) -> anyhow::Result<()> {
         .and_then(CellLibrary::from_file)
     {
         say(format_args!(
-            "\nArea in the unit of {} (leakage, nW; energy of a laser cycle within cells + in what they drive, pJ)\n{}",
+            "\nArea in the cells of {}, um2 (leakage, nW; energy of a laser cycle within cells + in what they drive, pJ)\n{}",
             library.liberty.name,
             silicon_table(&variants)
         ))?;

@@ -66,6 +66,17 @@ impl SensorArgs {
         Ok(sensor)
     }
 
+    /// The sensor, where anything of it is given.
+    ///
+    /// # Errors
+    /// As [`SensorArgs::read`].
+    pub(super) fn given(&self) -> Result<Option<Sensor>, InputError> {
+        let has_file = self.sensor.is_some() || self.liberty.is_some();
+        let has_size = self.rows.is_some() || self.cols.is_some();
+        let is_given = has_file || has_size || !self.block.is_empty() || !self.set.is_empty();
+        is_given.then(|| self.read()).transpose()
+    }
+
     /// What the top of the exported chip is called: modes of a chip are named after it.
     pub(super) fn chip(&self) -> &'static str {
         let asked = self.sources(None).chip().unwrap_or(array::NAME);

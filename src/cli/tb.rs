@@ -8,12 +8,13 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::SensorArgs;
 use super::asked::WaveFormatOption;
 use super::voice::{say, say_json};
 use crate::chip::SensorConfig;
 use crate::files::{InputError, clean_up_when_interrupted, create_folder};
 use crate::report::{Checks, Grid};
-use crate::request::{Sources, Spelling, sign_files};
+use crate::request::sign_files;
 use crate::testbenches::{TESTBENCHES, Testbench};
 use crate::waves::WaveFormat;
 
@@ -41,11 +42,10 @@ pub(super) struct TbArgs {
     /// Testbenches to run, with or without `tb_` [default: all of them].
     #[arg(value_name = "NAME")]
     names: Vec<String>,
-    /// Netlist (JSON of Yosys) in the place of a block, as p_counter=FILE; the default is then the testbenches that drive it.
-    #[arg(long, value_name = "BLOCK=FILE", conflicts_with = "list")]
-    block: Vec<String>,
+    #[command(flatten)]
+    sensor: SensorArgs,
     /// List the testbenches, and run none.
-    #[arg(long, conflicts_with_all = ["out", "wave_format", "verbose"])]
+    #[arg(long, conflicts_with_all = ["out", "wave_format", "verbose", "block", "sensor", "set", "liberty"])]
     list: bool,
     /// Print every check, not only those that fail.
     #[arg(long, short)]
@@ -82,20 +82,16 @@ struct RunResult {
 /// # Errors
 /// Unknown names and files that cannot be written.
 pub(super) fn run(args: &TbArgs) -> anyhow::Result<ExitCode> {
-    let sources = Sources {
-        block: args.block.clone(),
-        spelling: Spelling::Options,
-        ..Sources::default()
-    };
-    let sensor = sources.read_sensor()?;
-    let testbenches = chosen(&args.names, &sensor)?;
+    let sensor = args.sensor.given()?;
+    let sensor = sensor.as_deref();
+    let testbenches = chosen(&args.names, sensor)?;
     if !args.list {
         create_folder(&args.waves.out)?;
     }
     let entry = |testbench: &Testbench| {
         let result = match args.list {
             true => None,
-            false => Some(run_one(testbench, &sensor, &args.waves.path(testbench))?),
+            false => Some(run_one(testbench, sensor, &args.waves.path(testbench))?),
         };
         Ok(Entry {
             name: testbench.name,
@@ -132,8 +128,9 @@ pub(super) fn run(args: &TbArgs) -> anyhow::Result<ExitCode> {
     })
 }
 
-fn chosen(names: &[String], sensor: &SensorConfig) -> Result<Vec<Testbench>, InputError> {
-    let driving = TESTBENCHES.iter().filter(|tb| tb.drives(sensor));
+fn chosen(names: &[String], sensor: Option<&SensorConfig>) -> Result<Vec<Testbench>, InputError> {
+    let drives = |tb: &Testbench| sensor.is_none_or(|sensor| tb.drives(sensor));
+    let driving = TESTBENCHES.iter().filter(|tb| drives(tb));
     let driving: Vec<Testbench> = driving.copied().collect();
     let any = driving
         .iter()
@@ -153,8 +150,8 @@ fn chosen(names: &[String], sensor: &SensorConfig) -> Result<Vec<Testbench>, Inp
             let all: Vec<&str> = TESTBENCHES.iter().map(|tb| tb.name).collect();
             InputError::new(name, format!("is not a testbench; give {}", all.join(", ")))
         })?;
-        if !testbench.drives(sensor) {
-            let message = format!("does not drive the block of --block; give {any}");
+        if !drives(&testbench) {
+            let message = format!("does not drive a sensor that is given; give {any}");
             return Err(InputError::new(name, message));
         }
         if chosen.iter().all(|other| other.name != testbench.name) {
@@ -166,7 +163,7 @@ fn chosen(names: &[String], sensor: &SensorConfig) -> Result<Vec<Testbench>, Inp
 
 fn run_one(
     testbench: &Testbench,
-    sensor: &SensorConfig,
+    sensor: Option<&SensorConfig>,
     waves: &Path,
 ) -> Result<RunResult, InputError> {
     let begin = Instant::now();
@@ -225,8 +222,7 @@ pub fn testbench(name: &'static str) -> ExitCode {
         eprintln!("{name}: signals cannot be watched ({error})");
     }
     let waves = args.path(&testbench);
-    let result =
-        create_folder(&args.out).and_then(|()| testbench.run(&SensorConfig::default(), &waves));
+    let result = create_folder(&args.out).and_then(|()| testbench.run(None, &waves));
     match result {
         Ok(checks) => {
             let view = waves.with_extension("gtkw");

@@ -34,7 +34,7 @@ pub(super) const TESTBENCH: Testbench = Testbench {
     name: "tb_delay_line",
     about: "HSLIDAR's delay lines: bins edge by edge, photons that cancel, CLK that comes later",
     run,
-    own: None,
+    given: None,
 };
 
 fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {

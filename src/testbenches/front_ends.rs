@@ -31,7 +31,7 @@ pub(super) const TESTBENCH: Testbench = Testbench {
     name: "tb_front_ends",
     about: "Front ends of Fig. 22: counts out against light in, and where each folds over",
     run,
-    own: None,
+    given: None,
 };
 
 fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {

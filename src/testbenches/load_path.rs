@@ -33,7 +33,7 @@ pub(super) const TESTBENCH: Testbench = Testbench {
     name: "tb_load_path",
     about: "Load path: every start value arrives, MEMORY_LOAD row by row, load time",
     run,
-    own: None,
+    given: None,
 };
 
 fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {

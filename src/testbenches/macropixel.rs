@@ -14,18 +14,18 @@ use std::sync::Arc;
 
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{
-    self, EventType, Exposure, Overflow, Probe, SensorConfig, SensorPins, WindowLaw, array,
-    correlation, histogram, probes,
+    self, EventType, Exposure, Mode, Overflow, Probe, SensorConfig, SensorPins, Tdc, WindowLaw,
+    array, correlation, histogram, probes,
 };
 use crate::engine::GateSimulation;
 use crate::engine::waveform::write_waves;
 use crate::files::InputError;
 use crate::kernel::Recorder;
 use crate::netlist::Netlist;
-use crate::photon::SpadEvent;
+use crate::photon::{SpadEvent, apply_dead_time};
 use crate::report::Checks;
 use crate::testbenches::Testbench;
-use crate::testbenches::testbench::OwnBlocks;
+use crate::testbenches::testbench::GivenSensor;
 use crate::units::Time;
 use crate::waves::{Entry, Group, Layout, mark};
 
@@ -40,9 +40,9 @@ pub(super) const TESTBENCH: Testbench = Testbench {
     name: "tb_macropixel",
     about: "Macropixels: Fig. 48's two windows, and which photon is counted where",
     run,
-    own: Some(OwnBlocks {
+    given: Some(GivenSensor {
         blocks: &["correlation", "front_end", "metdc", "histogram"],
-        run: of_own,
+        run: run_on,
     }),
 };
 
@@ -63,15 +63,57 @@ fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
     Ok(())
 }
 
-/// What any block must do, against the law of the built-in ones.
-fn of_own(sensor: &SensorConfig, waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
+/// What any sensor and block must do, against the law of the built-in ones.
+fn run_on(sensor: &SensorConfig, waves: &Path, checks: &mut Checks) -> Result<(), InputError> {
+    // Every photon is an event.
     let sensor = SensorConfig {
         rows: 1,
+        event_type: EventType::Greater,
+        threshold: 0,
         ..sensor.clone()
     };
-    two_windows(waves, &sensor, FIG_48, "Fig. 48", checks)?;
+    let starts = window_starts(&sensor)?;
+    two_windows(waves, &sensor, starts, "Fig. 48", checks)?;
     coincidences(&sensor, checks);
     Ok(())
+}
+
+/// The start values of Fig. 48, or two others, three apart, whose windows and the CLK periods around them lie within a laser cycle.
+fn window_starts(sensor: &SensorConfig) -> Result<[u16; 2], InputError> {
+    let refused = |why: &str| {
+        let message = format!("cannot be driven by tb_macropixel: {why}");
+        Err(InputError::new("the sensor", message))
+    };
+    if sensor.tdc == Tdc::DelayLine {
+        return refused("delay lines time its photons; run tb_delay_line without a sensor");
+    }
+    if sensor.lines() != sensor.spads() {
+        return refused("its SPADs share a wire; run tb_front_ends without a sensor");
+    }
+    if sensor.mode == Mode::Conventional {
+        return refused("its macropixels have one window; give mode = \"guided\"");
+    }
+    let exposure = Exposure::new(sensor, STOP_PERIODS, 1);
+    let fits = |start: u16| {
+        let Some((law, window)) = find_window(sensor, &exposure, start) else {
+            return false;
+        };
+        let [first, last] = [-5, sensor.bins as i64 + 5 + 3 * sensor.step_periods as i64];
+        law.bin_interval(&window, 0, first).start > Time::ZERO
+            && law.bin_interval(&window, 0, last).end < exposure.stop(1)
+    };
+    let pairs = (3..=sensor.largest_start())
+        .rev()
+        .map(|later| [later, later - 3]);
+    match [FIG_48].into_iter().chain(pairs).find(|starts| {
+        starts[0] <= sensor.largest_start() && starts.iter().all(|&start| fits(start))
+    }) {
+        Some(starts) => Ok(starts),
+        None => refused(&format!(
+            "no two start values 3 apart open windows of {} bins within {STOP_PERIODS} CLK periods; give fewer bins or smaller steps",
+            sensor.bins
+        )),
+    }
 }
 
 /// A sensor of one macropixel.
@@ -85,6 +127,15 @@ fn config() -> SensorConfig {
 
 /// The law of an exposure, and the window that it gives a start value.
 fn window(config: &SensorConfig, exposure: &Exposure, start: u16) -> (WindowLaw, OpenWindow) {
+    find_window(config, exposure, start).expect("a start value within the laser cycle")
+}
+
+/// The same; `None` where there is no window.
+fn find_window(
+    config: &SensorConfig,
+    exposure: &Exposure,
+    start: u16,
+) -> Option<(WindowLaw, OpenWindow)> {
     let built_in = SensorConfig {
         correlation_block: None,
         front_end_block: None,
@@ -93,11 +144,8 @@ fn window(config: &SensorConfig, exposure: &Exposure, start: u16) -> (WindowLaw,
         ..config.clone()
     };
     let law = WindowLaw::new(built_in, exposure);
-    let window = law
-        .window(start)
-        .open()
-        .expect("a start value within the laser cycle");
-    (law, window)
+    let window = law.window(start).open()?;
+    Some((law, window))
 }
 
 /// The middle of a bin in one laser cycle.
@@ -168,10 +216,11 @@ fn two_windows(
         .filter(|(cycle, bin)| (cycle + 3) % exposure.laser_cycles <= photons_of(*bin))
         .map(|(cycle, bin)| SpadEvent {
             time: middle(&law, &second, cycle, bin),
-            spad: bin.rem_euclid(16) as u8,
+            spad: bin.rem_euclid(config.spads() as i64) as u8,
         })
         .collect();
     pulses.sort_unstable();
+    apply_dead_time(&mut pulses, config.dead_time());
 
     let lists = [&pulses[..], &pulses[..]];
     let mut gate = GateSimulation::new(&config, &exposure, (0, 0), (1, 2), &starts, &lists);
@@ -381,12 +430,13 @@ fn coincidences(sensor: &SensorConfig, checks: &mut Checks) {
             dead_time_ns: 1.0,
             ..sensor.clone()
         };
-        if config.check().is_err() {
-            // A block of one's own has the bins that it has.
-            continue;
-        }
         let exposure = Exposure::new(&config, 32, 1);
-        let (law, window) = window(&config, &exposure, start);
+        let is_possible = start <= config.largest_start() && config.check().is_ok();
+        // A block of one's own has the bins that it has.
+        let found = is_possible.then(|| find_window(&config, &exposure, start));
+        let Some((law, window)) = found.flatten() else {
+            continue;
+        };
         let spads = |bin: usize| (1u64 << bin) - 1;
         let mut pulses = Vec::new();
         for bin in 0..config.bins {

@@ -36,7 +36,7 @@ pub(super) const TESTBENCH: Testbench = Testbench {
     name: "tb_readout",
     about: "Readout: counts leave through the pins while start values come in; both times, 50 to 400 MHz",
     run,
-    own: None,
+    given: None,
 };
 
 fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {

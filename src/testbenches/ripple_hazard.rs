@@ -49,7 +49,7 @@ pub(super) const TESTBENCH: Testbench = Testbench {
     name: "tb_ripple_hazard",
     about: "The strobe meets the shift register's clock edge: photons lost, doubled, unknown, and moved by one bin",
     run,
-    own: None,
+    given: None,
 };
 
 fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {

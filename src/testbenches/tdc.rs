@@ -33,7 +33,7 @@ pub(super) const TESTBENCH: Testbench = Testbench {
     name: "tb_tdc",
     about: "Clock counter, gated ring oscillator and delay line: DNL and INL by code density; coupled rings",
     run,
-    own: None,
+    given: None,
 };
 
 fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {

@@ -15,37 +15,44 @@ pub struct Testbench {
     pub about: &'static str,
     /// Fills in the checks and writes the waveform to the path it is given, with the views beside it.
     pub(super) run: fn(&Path, &mut Checks) -> Result<(), InputError>,
-    /// How it drives blocks of one's own.
-    pub(super) own: Option<OwnBlocks>,
+    /// How it drives a sensor that it is given.
+    pub(super) given: Option<GivenSensor>,
 }
 
-/// A testbench's way with blocks of one's own.
+/// How a testbench drives a sensor that it is given.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct OwnBlocks {
-    /// Blocks that it drives, as `--block` calls them.
+pub(super) struct GivenSensor {
+    /// Blocks of one's own that it drives, as `--block` calls them.
     pub blocks: &'static [&'static str],
-    /// The same as [`Testbench::run`] with those of this sensor.
+    /// The same as [`Testbench::run`] with this sensor.
     pub run: fn(&SensorConfig, &Path, &mut Checks) -> Result<(), InputError>,
 }
 
 impl Testbench {
-    /// Runs it, on the own blocks of a sensor if it has any. The waveform goes to `waves`, in the format of its name; what belongs to
-    /// it goes beside it.
+    /// Runs it on a sensor, if one is given, or else on those that it is about. The waveform goes to `waves`, in the format of its
+    /// name; what belongs to it goes beside it.
     ///
     /// # Errors
-    /// When a file cannot be written.
-    pub(crate) fn run(&self, sensor: &SensorConfig, waves: &Path) -> Result<Checks, InputError> {
+    /// When a file cannot be written, and for a sensor that it cannot drive.
+    pub(crate) fn run(
+        &self,
+        sensor: Option<&SensorConfig>,
+        waves: &Path,
+    ) -> Result<Checks, InputError> {
         let mut checks = Checks::new();
-        match self.own.filter(|_| sensor.own_files().next().is_some()) {
-            Some(own) => (own.run)(sensor, waves, &mut checks)?,
-            None => (self.run)(waves, &mut checks)?,
+        match (self.given, sensor) {
+            (Some(given), Some(sensor)) => (given.run)(sensor, waves, &mut checks)?,
+            _ => (self.run)(waves, &mut checks)?,
         }
         Ok(checks)
     }
 
-    /// Whether it drives all blocks of its own that a sensor has.
+    /// Whether it drives this sensor with all blocks of its own.
     pub(crate) fn drives(&self, sensor: &SensorConfig) -> bool {
-        let blocks = self.own.map_or(&[][..], |own| own.blocks);
-        sensor.own_files().all(|(name, _)| blocks.contains(&name))
+        let drives = |given: GivenSensor| {
+            let mut own = sensor.own_files();
+            own.all(|(name, _)| given.blocks.contains(&name))
+        };
+        self.given.is_some_and(drives)
     }
 }

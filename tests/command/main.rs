@@ -3,6 +3,8 @@
 #[path = "../shared/command.rs"]
 mod command;
 mod tools;
+#[path = "../shared/yosys.rs"]
+mod yosys;
 
 mod a_page_shows_a_frame;
 mod a_real_pair_is_matched;

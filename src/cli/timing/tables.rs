@@ -6,8 +6,8 @@ use crate::analysis::{
     corner_limits, factor_range, gate_works, load_works, longest, phases, read_works, reset,
     ripple, shortest_period,
 };
-use crate::chip::{Limits, Probe, SensorConfig, Silicon, p_counter};
-use crate::netlist::{CheckKind, Netlist, Path, Requirement};
+use crate::chip::{CellLibrary, Limits, Probe, SensorConfig, Silicon, macropixel, p_counter};
+use crate::netlist::{CheckKind, Module, Netlist, Path, Requirement};
 use crate::units::Time;
 
 /// Longest period that is tried.
@@ -285,11 +285,11 @@ pub(super) fn flip_flops(subject: &Subject<'_>, load: &LoadTiming, read: &ReadTi
 pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
     let block = config.p_counter_block.as_ref()?;
     let law = config.counter_law()?;
-    let built_in = SensorConfig {
+    let built_in_config = SensorConfig {
         p_counter_block: None,
         ..config.clone()
     };
-    let [own, built_in] = [config, &built_in].map(p_counter::circuit);
+    let [own, built_in] = [config, &built_in_config].map(p_counter::circuit);
     let stops = match law.uneven() {
         Some(why) => why.to_string(),
         None => format!("{} x start value + {}", config.step_periods, law.offset()),
@@ -307,7 +307,15 @@ pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
         number(own.transistors()),
         number(built_in.transistors()),
     ]);
-    section.push(["area".into(), number(own.area()), number(built_in.area())]);
+    let area = |config: &SensorConfig, circuit: &Module| match library_area(config) {
+        Some(um2) => Cell::Number(Some(um2), 1),
+        None => number(circuit.area()),
+    };
+    section.push([
+        area_heading(config).into(),
+        area(config, &own),
+        area(&built_in_config, &built_in),
+    ]);
     let edge = "COUNTER_CLK edge of LOCAL_STOP".into();
     section.push([
         edge,
@@ -320,6 +328,26 @@ pub(super) fn own_counter(config: &SensorConfig) -> Option<Section> {
         "the start value".into(),
     ]);
     Some(section)
+}
+
+/// What areas are in: a library's square micrometres, or transistors that are packed as in the custom flip-flop.
+fn area_heading(config: &SensorConfig) -> &'static str {
+    match CellLibrary::of(config)
+        .ok()
+        .and_then(CellLibrary::from_file)
+    {
+        Some(_) => "area, um2",
+        None => "area, packed transistors",
+    }
+}
+
+/// Area of the P-counter in a macropixel, um2, in the cells of the sensor's library, as `gdtof power` has it; `None` without one.
+fn library_area(config: &SensorConfig) -> Option<f64> {
+    let library = CellLibrary::of(config).ok()?.from_file()?;
+    let netlist = Netlist::elaborate(&macropixel::circuit(config));
+    let scope = netlist.scope("p_counter")?;
+    let placed = library.characterised(&netlist);
+    Some(placed.silicon(&netlist, &library.liberty, scope).0)
 }
 
 /// Ripple by number of stages.

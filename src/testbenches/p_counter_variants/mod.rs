@@ -59,7 +59,7 @@ pub(super) const TESTBENCH: Testbench = Testbench {
     name: "tb_p_counter_variants",
     about: "P-counter variants: cost and speed, the tap msb's false capture, the wrapping counter's repeated one",
     run,
-    own: None,
+    given: None,
 };
 
 fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {

@@ -1,9 +1,11 @@
 //! `--block p_counter=FILE` and the key `p_counter_block`.
 
 use super::{folder, gdtof, refused, replay};
+use crate::yosys;
 
 use std::path::Path;
 
+use guided_dtof::chip::{PCounter, SensorConfig, p_counter};
 use sha2::{Digest, Sha256};
 
 const LFSR: &str = include_str!("../../../examples/blocks/lfsr_p_counter.json");
@@ -58,7 +60,7 @@ fn testbenches_drive_blocks_of_ones_own() {
     refused(
         dir,
         &other,
-        "readout: does not drive the block of --block; give tb_p_counter",
+        "readout: does not drive a sensor that is given; give tb_p_counter",
     );
 }
 
@@ -241,4 +243,110 @@ fn a_counter_without_a_law_is_replayed_by_gates_and_cycles_and_aims_nothing() {
     }
     let read = |name| std::fs::read(dir.join(name)).unwrap();
     assert_eq!(read("gate.csv"), read("cycle.csv"));
+}
+
+/// A counter of seven bits is tested with its sensor, and not without.
+#[test]
+fn testbenches_take_the_sensor_of_a_block() {
+    let folder = folder();
+    let dir = folder.path();
+    let seven = SensorConfig {
+        counter_bits: 7,
+        p_counter: PCounter::Comparator,
+        ..SensorConfig::default()
+    };
+    std::fs::write(
+        dir.join("seven.json"),
+        yosys::json(&p_counter::circuit(&seven)),
+    )
+    .unwrap();
+    let with_block = ["tb", "--out", "waves", "--block", "p_counter=seven.json"];
+    let bits = ["--set", "sensor.counter_bits=7"];
+    for arguments in [
+        &[&with_block[..], &bits[..]].concat()[..],
+        &["tb", "--out", "waves", "--sensor", "hslidar"],
+        &[
+            "tb",
+            "p_counter",
+            "--out",
+            "waves",
+            "--set",
+            "sensor.counter_bits=3",
+            "--set",
+            "sensor.p_counter=gray",
+        ],
+        &[
+            "tb",
+            "p_counter",
+            "--out",
+            "waves",
+            "--set",
+            "sensor.after_borrow=wrap",
+            "--set",
+            "sensor.clk_hz=40e6",
+        ],
+    ] {
+        let output = gdtof(dir, arguments);
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success(), "{arguments:?}: {output:?}");
+        assert!(
+            said.contains("tb_p_counter") && !said.contains("tb_readout"),
+            "{said}"
+        );
+    }
+    refused(dir, &with_block, "COUNTER_INIT has 7 bits instead of 9");
+    let memoryless = "sensor.p_counter=memoryless";
+    let arguments = [
+        "tb",
+        "p_counter",
+        "--set",
+        memoryless,
+        "--set",
+        "sensor.tap=msb",
+        "--set",
+        "sensor.after_borrow=wrap",
+    ];
+    refused(dir, &arguments, "has no reset, which tb_p_counter needs");
+    let coarse = ["tb", "macropixel", "--set", "sensor.step_periods=32"];
+    refused(dir, &coarse, "no two start values 3 apart");
+}
+
+/// `timing` and `power` print one area of a block, in um2, where there is a library.
+#[test]
+fn areas_have_their_unit() {
+    let folder = folder();
+    let dir = folder.path();
+    std::fs::write(dir.join("lfsr.json"), LFSR).unwrap();
+    let library = concat!(env!("CARGO_MANIFEST_DIR"), "/vectors/liberty/example.lib");
+    let block = ["--block", "p_counter=lfsr.json", "--liberty", library];
+    let timing = gdtof(dir, &[&["timing"], &block[..]].concat());
+    let timing = String::from_utf8_lossy(&timing.stdout).into_owned();
+    let line = timing.lines().find(|line| line.starts_with("area, um2"));
+    let line = line.unwrap_or_else(|| panic!("{timing}"));
+    let areas: Vec<&str> = line["area, um2".len()..].split_whitespace().collect();
+    let short = [
+        "--stop-periods",
+        "20",
+        "--laser-cycles",
+        "1",
+        "--start",
+        "3",
+    ];
+    let power = gdtof(dir, &[&["power"], &block[..], &short].concat());
+    let power = String::from_utf8_lossy(&power.stdout).into_owned();
+    let (_, silicon) = power
+        .split_once("Area in the cells of example, um2")
+        .unwrap_or_else(|| panic!("{power}"));
+    let line = silicon.lines().find(|line| line.starts_with("p_counter "));
+    let line = line.unwrap_or_else(|| panic!("{silicon}"));
+    // The sensor's own block, and the built-in ripple counter that it is compared with.
+    let own = line.split_whitespace().nth(1).unwrap();
+    assert_eq!(areas.len(), 2, "{areas:?}");
+    assert_eq!(areas[0], own, "{line}");
+    assert!(
+        line.contains(&format!(" {} (", areas[1])),
+        "{areas:?}: {line}"
+    );
+    let built_in = gdtof(dir, &["timing", "--block", "p_counter=lfsr.json"]);
+    assert!(String::from_utf8_lossy(&built_in.stdout).contains("\narea, packed transistors "));
 }

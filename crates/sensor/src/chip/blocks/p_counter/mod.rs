@@ -146,7 +146,7 @@ pub struct Rises {
 impl Rises {
     /// When a sensor's LOCAL_STOP rises from this start value; `None` where it is high from the reset on and blocks
     /// the counter for good.
-    pub(crate) fn of(config: &SensorConfig, start: u16) -> Option<Self> {
+    pub fn of(config: &SensorConfig, start: u16) -> Option<Self> {
         if let Some(law) = config.counter_law() {
             return law.rises(start);
         }
