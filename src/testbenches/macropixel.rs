@@ -78,7 +78,7 @@ fn run_on(sensor: &SensorConfig, waves: &Path, checks: &mut Checks) -> Result<()
     Ok(())
 }
 
-/// The start values of Fig. 48, or two others, three apart, whose windows and the CLK periods around them lie within a laser cycle.
+/// The start values of Fig. 48, or two others, at most three apart, whose windows and the CLK periods around them lie within a laser cycle.
 fn window_starts(sensor: &SensorConfig) -> Result<[u16; 2], InputError> {
     let refused = |why: &str| {
         let message = format!("cannot be driven by tb_macropixel: {why}");
@@ -94,23 +94,36 @@ fn window_starts(sensor: &SensorConfig) -> Result<[u16; 2], InputError> {
         return refused("its macropixels have one window; give mode = \"guided\"");
     }
     let exposure = Exposure::new(sensor, STOP_PERIODS, 1);
-    let fits = |start: u16| {
+    // Windows share bins.
+    let Some(apart) = [3, 2, 1]
+        .into_iter()
+        .find(|&apart| apart * sensor.step_periods < sensor.bins)
+    else {
+        return refused(&format!(
+            "no two of its windows share any of their {} bins; give a smaller step_periods",
+            sensor.bins
+        ));
+    };
+    let fits = |&start: &u16| {
         let Some((law, window)) = find_window(sensor, &exposure, start) else {
             return false;
         };
-        let [first, last] = [-5, sensor.bins as i64 + 5 + 3 * sensor.step_periods as i64];
-        law.bin_interval(&window, 0, first).start > Time::ZERO
+        let last = (sensor.bins + apart * sensor.step_periods) as i64 + 5;
+        law.bin_interval(&window, 0, -5).start > Time::ZERO
             && law.bin_interval(&window, 0, last).end < exposure.stop(1)
     };
-    let pairs = (3..=sensor.largest_start())
-        .rev()
-        .map(|later| [later, later - 3]);
-    match [FIG_48].into_iter().chain(pairs).find(|starts| {
-        starts[0] <= sensor.largest_start() && starts.iter().all(|&start| fits(start))
-    }) {
+    let apart = apart as u16;
+    let pairs = (apart..=sensor.largest_start()).rev();
+    let pairs = pairs.map(|later| [later, later - apart]);
+    let known = (apart == 3 && FIG_48[0] <= sensor.largest_start()).then_some(FIG_48);
+    match known
+        .into_iter()
+        .chain(pairs)
+        .find(|starts| starts.iter().all(fits))
+    {
         Some(starts) => Ok(starts),
         None => refused(&format!(
-            "no two start values 3 apart open windows of {} bins within {STOP_PERIODS} CLK periods; give fewer bins or smaller steps",
+            "no two start values {apart} apart open windows of {} bins within {STOP_PERIODS} CLK periods; give fewer bins",
             sensor.bins
         )),
     }

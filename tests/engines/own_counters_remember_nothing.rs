@@ -30,18 +30,19 @@ fn count_alike(config: SensorConfig, random: &mut StdRng) -> (bool, bool) {
     let gate = Gate::new(config, exposure)
         .histograms(starts, &pulses)
         .unwrap();
-    let cycle = Cycle::new(config, exposure).histograms(starts, &pulses);
-    assert_eq!(gate, cycle.unwrap(), "{config:?}");
+    let tells = gate.iter().flatten().any(|&count| count > 0);
+    match Cycle::new(config, exposure).histograms(starts, &pulses) {
+        Ok(cycle) => assert_eq!(gate, cycle, "{config:?}"),
+        Err(EngineError::Race(_)) => return (tells, false),
+        Err(why) => panic!("{why}: {config:?}"),
+    }
     let window = engine::Window::new(config, exposure).histograms(starts, &pulses);
     match &window {
         Ok(window) => assert_eq!(&gate, window, "{config:?}"),
         Err(EngineError::Irregular(Irregular::LocalStopRepeats { .. })) if wraps => {}
         Err(why) => panic!("{why}: {config:?}"),
     }
-    (
-        gate.iter().flatten().any(|&count| count > 0),
-        window.is_ok(),
-    )
+    (tells, window.is_ok())
 }
 
 #[test]

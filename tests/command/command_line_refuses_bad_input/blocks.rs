@@ -308,7 +308,11 @@ fn testbenches_take_the_sensor_of_a_block() {
     ];
     refused(dir, &arguments, "has no reset, which tb_p_counter needs");
     let coarse = ["tb", "macropixel", "--set", "sensor.step_periods=32"];
-    refused(dir, &coarse, "no two start values 3 apart");
+    refused(
+        dir,
+        &coarse,
+        "no two of its windows share any of their 16 bins",
+    );
 }
 
 /// `timing` and `power` print one area of a block, in um2, where there is a library.
