@@ -58,12 +58,13 @@ impl Problem {
             Err(InputError::new(
                 "the sensor",
                 format!(
-                    "{what}; propose varies guided sensors with a clocked TDC, summation and event_type = \"greater\""
+                    "{what}; propose varies guided sensors with tdc = \"clocked\", summation and event_type = \"greater\""
                 ),
             ))
         };
         match &sensor {
-            s if s.tdc != Tdc::Clocked => return refused("has delay lines"),
+            s if s.tdc == Tdc::DelayLine => return refused("has delay lines"),
+            s if s.tdc == Tdc::Counter => return refused("has a counter TDC"),
             s if s.mode != Mode::Guided => return refused("is not guided"),
             s if s.front_end.joins() => return refused("joins SPADs on one line"),
             s if s.event_type != EventType::Greater => return refused("has another event_type"),

@@ -235,7 +235,7 @@ pub fn read_calibration(path: &Path, sensor: &SensorConfig) -> Result<BinProfile
                     .all(|s| s.is_finite())
         });
     let refused = match profile.check(sensor) {
-        Ok(()) if sensor.tdc == Tdc::Clocked => {
+        Ok(()) if sensor.tdc != Tdc::DelayLine => {
             Some("it is of delay lines, and this sensor's TDC is clocked".to_owned())
         }
         Ok(()) if is_whole => None,

@@ -95,7 +95,7 @@ impl Rig {
             dark_count_hz: scene.lidar.dark_counts_hz(),
             pulse_sigma_ns: scene.pulse_sigma().as_s() * 1e9,
             bin_s: match sensor.tdc {
-                Tdc::Clocked => clk_s,
+                Tdc::Clocked | Tdc::Counter => clk_s,
                 Tdc::DelayLine => sensor.delay_element().as_s(),
             },
             step_s: sensor.step_periods as f64 * clk_s,

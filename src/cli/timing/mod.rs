@@ -48,8 +48,13 @@ pub(super) struct TimingArgs {
 pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
     let config = args.sensor.read()?;
     let silicon = args.silicon.read(&config)?;
-    if config.tdc == Tdc::DelayLine {
-        let message = "the tables are those of a clocked TDC, and this sensor has delay lines; frame states whether its timing is met, and calibrate measures its bins";
+    let other_tdc = match config.tdc {
+        Tdc::Clocked => None,
+        Tdc::Counter => Some("has a counter; frame states whether its timing is met, and --set sensor.tdc=clocked shows the tables of the same chip with a shift register"),
+        Tdc::DelayLine => Some("has delay lines; frame states whether its timing is met, and calibrate measures its bins"),
+    };
+    if let Some(what) = other_tdc {
+        let message = format!("the tables are those of a shift register, and this sensor {what}");
         return Err(InputError::new("--sensor", message).into());
     }
     if let (Some(plot), None) = (&args.plot, silicon.mismatch) {

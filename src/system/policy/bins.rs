@@ -90,7 +90,7 @@ impl WindowPolicy {
         sensor: &Sensor,
         stop_periods: u32,
     ) -> Result<(Sensor, u32), NoBins> {
-        if sensor.tdc != Tdc::Clocked {
+        if sensor.tdc == Tdc::DelayLine {
             return Err(NoBins::DelayLines);
         }
         let own_bin_m = SPEED_OF_LIGHT_M_PER_S / (2.0 * sensor.clk_hz);

@@ -387,7 +387,7 @@ impl LocalClocks {
             found.expect("every loop is cut").all().to_vec()
         };
         // A count's Q only tells whether the bin is full; what else one's own histogram does with it, nobody knows.
-        let hits = probes.bus(Probe::Hit);
+        let hits = probes.find(Probe::Hit).unwrap_or_default();
         let of_hits = hits.iter().zip(probes.bins());
         let of_hits = of_hits.filter(|_| config.histogram_block.is_none());
         let raw = probes.bus(Probe::SpadRaw).iter();

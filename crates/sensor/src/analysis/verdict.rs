@@ -365,7 +365,7 @@ fn later_windows(config: &SensorConfig, pixel: &MacropixelTiming, aim: Aim) -> O
 /// Whether photons can cancel in a front end that CLK samples.
 fn cancelling_photons(config: &SensorConfig) -> Option<String> {
     let (period, dead_time) = (config.clock().period(), config.dead_time());
-    (config.tdc == Tdc::Clocked && dead_time <= period).then(|| {
+    (config.tdc.has_clk_bins() && dead_time <= period).then(|| {
         format!(
             "two photons of a SPAD within a CLK period ({period}) cancel, as the dead time ({dead_time}) lets them"
         )

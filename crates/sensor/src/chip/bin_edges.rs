@@ -136,7 +136,7 @@ impl WindowLaw {
             Bins::Taps(lines) => {
                 let taps = &lines[usize::from(window.start) % lines.len()];
                 let origin = match self.sensor.tdc {
-                    Tdc::Clocked => self.taken_until(first - 1),
+                    Tdc::Clocked | Tdc::Counter => self.taken_until(first - 1),
                     Tdc::DelayLine => self.frozen_until(window, cycle),
                 };
                 origin + taps[number as usize]

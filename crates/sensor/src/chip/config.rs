@@ -79,12 +79,22 @@ words! {
     /// What times photons within a window (thesis 4.9.3, Table 10).
     #[derive(Default)]
     pub enum Tdc {
-        /// A shift register that CLK clocks: bins are CLK periods.
+        /// A shift register that CLK clocks: bins are CLK periods, and count one event in each.
         #[default]
         Clocked = "clocked",
+        /// A counter of CLK periods: bins are CLK periods, and add up the SPADs that fire in each, so that TYPE and THRESHOLD have nothing
+        /// to compare.
+        Counter = "counter",
         /// Delay lines, whose elements are the bins. SPADs come together in a tree of XORs, so that TYPE and THRESHOLD have
         /// nothing to compare.
         DelayLine = "delay_line",
+    }
+}
+
+impl Tdc {
+    /// Whether bins are CLK periods.
+    pub fn has_clk_bins(self) -> bool {
+        self != Tdc::DelayLine
     }
 }
 
@@ -123,10 +133,10 @@ keys! {
         step_periods: usize = 1, in Within(1.0, 8.0), from "thesis 4.9.3, Table 10";
         /// Buffers of the delay chain that sets the width of COUNTER_RESET; 0 takes as many as the cells need, at least 6.
         reset_stages: usize = 0, in Within(0.0, 1000.0), from "chosen: the pulse outlasts what it resets by a tenth";
-        /// What times photons: a shift register, with bins of CLK periods (HSLIDAR's clocked mode has a counter in the thesis), or delay lines, whose
-        /// elements are the bins and on which photons of a bin cancel in pairs.
+        /// What times photons: a shift register, with bins of CLK periods, a counter, whose bins add up all SPADs that fire in a CLK period, or
+        /// delay lines, whose elements are the bins and on which photons of a bin cancel in pairs.
         tdc: Tdc = Tdc::Clocked,
-            from "thesis 4.9.3, Table 10; the shift register and that photons cancel are chosen";
+            from "thesis 4.2 and 4.9.3, Table 10; how a counter adds and that photons cancel are chosen";
         /// Control voltage of the delay lines: 0.7 V makes elements of 2.6 ns.
         ///
         /// [`SensorConfig::delay_element`] is the law.
@@ -146,7 +156,7 @@ keys! {
         bins: usize = 16, in Within(1.0, 64.0), from CHIP;
         /// Bits of each bin.
         bin_bits: usize = 14, in Within(1.0, 16.0), from CHIP;
-        /// CLK frequency; its period is one histogram bin of a clocked TDC.
+        /// CLK frequency; its period is one histogram bin, unless delay lines are.
         clk_hz: f64 ["Hz"] = 384e6, in Within(1e6, 2e9), from "thesis 4.8";
         /// Rise of STOP after the falling edge of CLK; at most half a CLK period either way.
         stop_phase_ps: f64 ["ps"] = 0.0, in Within(-5e5, 5e5);

@@ -30,6 +30,12 @@ pub enum Conflict {
     /// The shift register and STROBE after STOP, in the conventional mode.
     #[error("a change of the shift register meets the strobe")]
     ShiftAtStrobe,
+    /// START of a counter TDC and CLK, after LOCAL_STOP.
+    #[error("START rises as CLK samples it")]
+    StartAtClk,
+    /// START of a counter TDC and CLK, after STOP.
+    #[error("START falls as CLK samples it")]
+    StartFallsAtClk,
     /// COUNTER_CLK and COUNTER_RESET.
     #[error("a CLK edge meets the end of the reset pulse")]
     ClkAtResetEnd,
@@ -100,6 +106,12 @@ pub enum Irregular {
         /// Rising edges of LOCAL_STOP in a laser cycle.
         rises: usize,
     },
+    /// A counter TDC's window is still open when the next laser cycle's reset ends it.
+    #[error("the next laser cycle begins before the counter TDC has come to the last bin")]
+    CutWindow,
+    /// A counter TDC's START rises again before CLK has seen it low.
+    #[error("START of the counter TDC is not low at any CLK edge between two windows")]
+    StartStaysHigh,
     /// A P-counter of one's own that no line describes.
     #[error("{0}: no window law describes this P-counter")]
     OwnCounter(Uneven),

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::RangeInclusive;
 
-use super::config::{AfterBorrow, EventType, FrontEnd, PCounter, SensorConfig, Tap, Tdc};
+use super::config::{AfterBorrow, EventType, FrontEnd, Mode, PCounter, SensorConfig, Tap, Tdc};
 use super::front_end::DeadTimeTooShort;
 use super::own_block::CONTRACTS;
 use super::timing::ChipTiming;
@@ -67,15 +67,17 @@ pub enum SensorFault {
         /// SPADs of a macropixel.
         spads: usize,
     },
-    /// Delay lines have no correlation block.
-    #[error(
-        "{key} = {asked} is impossible with tdc = \"delay_line\", where every pulse is an edge and nothing is compared; give {only}"
-    )]
-    CorrelationOfDelayLine {
+    /// What this TDC has no place for.
+    #[error("{key} = {asked} is impossible with tdc = {:?}, {why}; give {only}", .tdc.name())]
+    NotWithTdc {
         /// The key.
         key: &'static str,
         /// What is asked for.
         asked: String,
+        /// The TDC.
+        tdc: Tdc,
+        /// What it does instead.
+        why: &'static str,
         /// What is possible.
         only: &'static str,
     },
@@ -201,9 +203,7 @@ impl SensorFault {
             SensorFault::StepPeriods(_) | SensorFault::StepsWithoutReset { .. } => "step_periods",
             SensorFault::Threshold { .. } | SensorFault::NeverMet(_) => "threshold",
             SensorFault::FrontEndOfDelayLine(_) => "front_end",
-            SensorFault::CorrelationOfDelayLine { key, .. } | SensorFault::Liberty { key, .. } => {
-                key
-            }
+            SensorFault::NotWithTdc { key, .. } | SensorFault::Liberty { key, .. } => key,
             SensorFault::CoincidentSpads { .. } => "coincident_spads",
             SensorFault::NoMsb { .. } => "tap",
             SensorFault::HoldWithoutMemory(_) => "p_counter",
@@ -312,13 +312,21 @@ impl SensorConfig {
             return Err(SensorFault::FrontEndOfDelayLine(self.front_end));
         }
         let compares = self.event_type != EventType::Greater || self.threshold > 0;
-        if compares && self.tdc == Tdc::DelayLine {
+        let tdc = self.tdc;
+        if compares && tdc != Tdc::Clocked {
             let (key, asked, only) = match self.event_type {
                 EventType::Greater => ("threshold", self.threshold.to_string(), "0"),
                 EventType::Less => ("event_type", "\"less\"".to_owned(), "\"greater\""),
                 EventType::Equal => ("event_type", "\"equal\"".to_owned(), "\"greater\""),
             };
-            return Err(SensorFault::CorrelationOfDelayLine { key, asked, only });
+            let why = match tdc {
+                Tdc::Counter => "which counts all SPADs that fire and compares nothing",
+                _ => "where every pulse is an edge and nothing is compared",
+            };
+            return Err(SensorFault::NotWithTdc { key, asked, tdc, why, only });
+        }
+        if tdc == Tdc::Counter {
+            self.check_counter_tdc()?;
         }
         let asked = self.coincident_spads;
         if self.spads_of_an_event() > self.spads() {
@@ -377,6 +385,33 @@ impl SensorConfig {
             });
         }
         Ok(())
+    }
+
+    /// Whether a counter TDC has a place for the rest.
+    fn check_counter_tdc(&self) -> Result<(), SensorFault> {
+        let tdc = Tdc::Counter;
+        if self.mode == Mode::Conventional {
+            return Err(SensorFault::NotWithTdc {
+                key: "mode",
+                asked: "\"conventional\"".to_owned(),
+                tdc,
+                why: "which remembers nothing of the CLK periods before STOP",
+                only: "\"guided\"",
+            });
+        }
+        let own = [
+            ("correlation_block", &self.correlation_block),
+            ("metdc_block", &self.metdc_block),
+            ("histogram_block", &self.histogram_block),
+        ];
+        let replaced = own.into_iter().find(|(_, own)| own.is_some());
+        replaced.map_or(Ok(()), |(key, _)| {
+            let why = format!(
+                "{key} is impossible with tdc = \"counter\", whose blocks have other ports; leave it out"
+            );
+            let key = key.to_owned();
+            Err(SensorFault::Value { key, why })
+        })
     }
 }
 

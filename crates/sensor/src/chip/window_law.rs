@@ -21,6 +21,9 @@
 //! Which photon times the bins of a window collect stands in [`bin_edges`](super::bin_edges), and what they count without photons in
 //! [`empty_pixel`](super::empty_pixel).
 //!
+//! A counter TDC has no memory: its window begins where the shift register's ends. START rises a strobe and a clk-to-Q after LOCAL_STOP,
+//! and the first rising edge that samples it high takes the photons of bin 0, so that `first_edge` is m + 1.
+//!
 //! Where delay lines time photons, LOCAL_STOP freezes the lines as soon as it comes: CLK has no part in the bins, only in where
 //! windows end.
 //!
@@ -142,7 +145,7 @@ impl WindowLaw {
     ) -> Self {
         let sensor = sensor.into();
         let edges = match sensor.tdc {
-            Tdc::Clocked => Bins::Clk,
+            Tdc::Clocked | Tdc::Counter => Bins::Clk,
             Tdc::DelayLine => Bins::of_delay_lines(&sensor, 0),
         };
         WindowLaw {
@@ -214,9 +217,10 @@ impl WindowLaw {
         let period = exposure.clock.period();
         let is_clocked = self.sensor.tdc == Tdc::Clocked;
         let to_shift = timing.clk_to_event + timing.setup + ROUNDING;
-        if is_clocked && period <= to_shift {
+        if self.sensor.tdc.has_clk_bins() && period <= to_shift {
             let own = &self.sensor;
-            let what = match own.front_end_block.is_some() || own.metdc_block.is_some() {
+            let is_own = own.front_end_block.is_some() || own.metdc_block.is_some();
+            let what = match is_own || !is_clocked {
                 true => Conflict::SlowPath,
                 false => Conflict::SlowCorrelation,
             };
@@ -257,6 +261,9 @@ impl WindowLaw {
                 }
             }
         };
+        if self.sensor.tdc == Tdc::Counter {
+            return self.counted_window(start, (cause, arrival), count_edge, irregular);
+        }
         let last = exposure.rising_until(arrival - timing.clk_to_shift);
         let after = arrival - (exposure.rising(last) + timing.clk_to_shift);
         let before = exposure.rising(last + 1) + timing.clk_to_shift - arrival;
@@ -278,6 +285,68 @@ impl WindowLaw {
             strobe_cause: cause,
             count_edge,
             slack,
+        })
+    }
+
+    /// The window of a counter TDC: `arrival` is that of the strobe which sets START.
+    fn counted_window(
+        &self,
+        start: u16,
+        (cause, arrival): (Time, Time),
+        count_edge: i64,
+        irregular: Option<Irregular>,
+    ) -> Window {
+        let (exposure, timing) = (&self.exposure, &self.timing);
+        let (setup, hold) = (timing.setup + ROUNDING, timing.hold + ROUNDING);
+        let (period, phase) = (exposure.clock.period(), exposure.stop_phase);
+        // What is left of hold after the edge before a change of START, and of setup before the edge after it.
+        let slacks = |change: Time| {
+            let before = exposure.rising_until(change);
+            let [before_s, after_s] = [before, before + 1].map(|edge| exposure.rising(edge));
+            (before, change - before_s - hold, after_s - change - setup)
+        };
+        let falls = timing.stop_to_start_falls;
+        let (edge, held, set_up) = slacks(falls);
+        let low = edge + 1;
+        if held.min(set_up) <= Time::ZERO {
+            let comes = exposure.rising(if held < set_up { edge } else { low });
+            let forbidden = (falls - hold, falls + setup);
+            let what = Conflict::StartFallsAtClk;
+            return Window::Race(Race::with_stop(what, comes, forbidden, phase, period));
+        }
+        let rises = arrival + timing.strobe_to_hit;
+        let (last, held, set_up) = slacks(rises);
+        if held.min(set_up) <= Time::ZERO {
+            let to_start = timing.local_stop_to_strobe + timing.strobe_to_hit;
+            let from_fall = self.ripple(start) + to_start;
+            let fall = exposure.rising_until(rises - from_fall) + 1;
+            let edge = if held < set_up { last } else { last + 1 };
+            let ripples = self.ripples();
+            let starts = (ripples.0 + to_start, ripples.1 + to_start);
+            let signals = (from_fall, Time::ZERO);
+            // START is the data here, and CLK the clock.
+            let limits = (hold, setup);
+            let all = (starts, self.shortest_period());
+            let race = Race::strobe_at_shift(period, edge - fall, signals, limits, all);
+            let what = Conflict::StartAtClk;
+            return Window::Race(Race { what, ..race });
+        }
+        let periods = i64::from(exposure.stop_periods);
+        let of_counter = if last < low {
+            Some(Irregular::StartStaysHigh)
+        } else {
+            (last + 1 + self.bins > periods).then_some(Irregular::CutWindow)
+        };
+        let of_block = self.sensor.lawless_block().map(Irregular::OwnBlock);
+        if let Some(why) = irregular.or(of_block).or(of_counter) {
+            return Window::Irregular(why);
+        }
+        Window::Open(OpenWindow {
+            start,
+            first_edge: last + 1,
+            strobe_cause: cause,
+            count_edge,
+            slack: held.min(set_up) + ROUNDING,
         })
     }
 

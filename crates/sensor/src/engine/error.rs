@@ -142,6 +142,9 @@ pub enum NotModelled {
     /// SPADs with a detection efficiency or dark count rate of their own.
     #[error("SPADs that differ")]
     SpadsThatDiffer,
+    /// Bins that count several photons of a laser cycle.
+    #[error("a counter TDC, whose bins add up all SPADs that fire in a CLK period")]
+    CounterTdc,
     /// Pulses of other lasers, which come at another time of each laser cycle, where no stream tells when.
     #[error("other lidars")]
     OtherLasers,
@@ -221,7 +224,7 @@ pub(super) fn follows(sensor: &Sensor, limits: &PulseLimits) -> Result<(), Engin
 pub(super) fn has_no_delay_lines(sensor: &Sensor) -> Result<(), EngineError> {
     match sensor.tdc {
         Tdc::DelayLine => Err(EngineError::OwnLaws),
-        Tdc::Clocked => Ok(()),
+        Tdc::Clocked | Tdc::Counter => Ok(()),
     }
 }
 

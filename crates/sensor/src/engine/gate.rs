@@ -13,7 +13,7 @@ use super::{
 };
 use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::{
-    Exposure, LoadPins, Probe, Probes, ReadPins, Sensor, SensorPins, Tdc, WindowLaw, array,
+    Exposure, LoadPins, Probe, Probes, ReadPins, Sensor, SensorPins, WindowLaw, array,
     load_path, metdc_delay_line,
 };
 use crate::kernel::{Drive, Kernel, LANES, Observer, Policy, Statistics, TimingChecks, merge};
@@ -335,7 +335,7 @@ impl Engine for Gate {
 
 impl Replay for Gate {
     fn replay(&self, pixels: &[PulsedPixel<'_>]) -> Result<Histograms, EngineError> {
-        if self.sensor.tdc == Tdc::Clocked {
+        if self.sensor.tdc.has_clk_bins() {
             let nominal = self.nominal_timing();
             return self.replay_with(&vec![&nominal; pixels.len()], pixels);
         }

@@ -219,7 +219,7 @@ pub fn record(
     write_views(&layout, waves, &netlist, *span.end())
 }
 
-/// Finds the first HIT of an exposure.
+/// Finds the first HIT of an exposure, or the first count of a counter TDC.
 struct FirstHit {
     /// Macropixel of every net that is a HIT.
     hits: Vec<Option<(usize, usize)>>,
@@ -233,7 +233,9 @@ impl FirstHit {
         let mut hits = vec![None; netlist.net_count()];
         for &(row, col) in pixels {
             let probes = Probes::of_macropixel(netlist, row, col);
-            for net in probes.bus(Probe::Hit) {
+            // A counter TDC has no HIT, but what it adds shows in a bin.
+            let found = probes.find(Probe::Hit).map(<[NetId]>::to_vec);
+            for net in found.unwrap_or_else(|| probes.bins().concat()) {
                 hits[net.index()] = Some((row, col));
             }
         }
@@ -304,6 +306,11 @@ fn groups(netlist: &Netlist, (row, col): (usize, usize)) -> Vec<Group> {
         (Probe::SampleClk, binary(Probe::SampleClk)),
         (Probe::Strobe, binary(Probe::Strobe)),
         (Probe::Hit, binary(Probe::Hit)),
+        (Probe::Start, binary(Probe::Start)),
+        (Probe::Counting, binary(Probe::Counting)),
+        (Probe::Code, decimal(Probe::Code)),
+        (Probe::Events, decimal(Probe::Events)),
+        (Probe::Select, binary(Probe::Select)),
     ];
     let events = events
         .into_iter()

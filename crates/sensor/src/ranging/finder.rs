@@ -102,7 +102,7 @@ impl EchoFinder {
     ) -> Result<Self, UnequalBins> {
         let (config, exposure) = (law.sensor(), law.exposure());
         let bin_s = match config.tdc {
-            Tdc::Clocked => law.bin_width_s().ok_or(UnequalBins)?,
+            Tdc::Clocked | Tdc::Counter => law.bin_width_s().ok_or(UnequalBins)?,
             Tdc::DelayLine => config.delay_element().as_s(),
         };
         let laser_cycles = exposure.laser_cycles;
@@ -112,6 +112,7 @@ impl EchoFinder {
         let complement = response.complement();
         let walk = match config.tdc {
             Tdc::DelayLine => Err(WalkLeft::DelayLine),
+            Tdc::Counter => Err(WalkLeft::CounterTdc),
             Tdc::Clocked if config.front_end.joins() => Err(WalkLeft::JoinedSpads),
             Tdc::Clocked if !recovers => Err(WalkLeft::ShortLaserCycle),
             Tdc::Clocked => Ok(WalkCorrection {

@@ -45,6 +45,8 @@ const FAR: f64 = 30.0;
 pub enum WalkLeft {
     /// On the line that a delay line's SPADs share photons cancel.
     DelayLine,
+    /// A counter TDC adds up SPADs, where the correction takes one event of a CLK period.
+    CounterTdc,
     /// The front end joins SPADs on one line.
     JoinedSpads,
     /// SPADs have not recovered from one echo before the window opens again.
@@ -59,8 +61,9 @@ pub enum WalkLeft {
 
 impl WalkLeft {
     /// Every reason.
-    pub const ALL: [WalkLeft; 6] = [
+    pub const ALL: [WalkLeft; 7] = [
         WalkLeft::DelayLine,
+        WalkLeft::CounterTdc,
         WalkLeft::JoinedSpads,
         WalkLeft::ShortLaserCycle,
         WalkLeft::NotOneEcho,
@@ -72,6 +75,7 @@ impl WalkLeft {
     pub const fn name(self) -> &'static str {
         match self {
             WalkLeft::DelayLine => "photons cancel on a delay line's line",
+            WalkLeft::CounterTdc => "a counter TDC adds up SPADs",
             WalkLeft::JoinedSpads => "the front end joins SPADs",
             WalkLeft::ShortLaserCycle => "SPADs do not recover within a laser cycle",
             WalkLeft::NotOneEcho => "counts are not those of one echo",

@@ -58,7 +58,7 @@ pub fn circuit(spads: usize) -> Arc<Module> {
 }
 
 /// Adds up single bits in carry-save form until one bit of each weight is left.
-fn population_count(m: &mut ModuleBuilder, bits: &[Net], sum: &[Net]) {
+pub(super) fn population_count(m: &mut ModuleBuilder, bits: &[Net], sum: &[Net]) {
     let mut column = bits.to_vec();
     for (weight, &out) in sum.iter().enumerate() {
         let mut carries = Vec::new();

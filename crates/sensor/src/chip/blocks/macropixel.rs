@@ -16,15 +16,22 @@
 //!   SPAD_RAW ─► photon_line ─PHOTONS─► metdc_delay_line ─HIT─► histogram
 //! ```
 //!
-//! [`Model`] is the clocked one circuit in plain Rust, stepped edge by edge through its blocks' models; only
+//! Where a counter times photons, `metdc_counter` is the METDC, and `histogram_sums` adds up how many SPADs fired:
+//!
+//! ```text
+//!   SPAD_RAW ─► front_end ─► adder ─EVENTS─────► histogram_sums
+//!                  LOCAL_STOP ─► metdc_counter ─SELECT─┘
+//! ```
+//!
+//! [`Model`] is those with CLK in plain Rust, stepped edge by edge through its blocks' models; only
 //! the arrival of the strobe, of the reset and of the SPAD pulses is timed ([`ChipTiming`]).
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::{
-    correlation, finished, front_end, histogram, metdc, metdc_delay_line, p_counter,
-    p_counter_timing, photon_line, readout,
+    correlation, finished, front_end, histogram, histogram_sums, metdc, metdc_counter,
+    metdc_delay_line, p_counter, p_counter_timing, photon_line, readout,
 };
 use crate::chip::config::{Mode, SensorConfig, Tdc};
 use crate::chip::exposure::Exposure;
@@ -32,6 +39,7 @@ use crate::chip::own_block::block::OwnBlock;
 use crate::chip::timing::chip_timing::ChipTiming;
 use crate::chip::timing::local_stop::LocalStopDelays;
 use crate::netlist::{Module, ModuleBuilder};
+use crate::photon::count_bits;
 use crate::units::Time;
 
 /// Name of the module.
@@ -70,26 +78,34 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
         Tdc::Clocked => {
             m.wire_bus("SPAD_TIMED", config.lines());
             m.wire("SPAD_EVENT");
+            m.wire_bus("HIT", config.bins);
+        }
+        Tdc::Counter => {
+            m.wire_bus("SPAD_TIMED", config.lines());
+            m.wire_bus("EVENTS", count_bits(config.lines()));
+            m.wire_bus("SELECT", config.bins);
         }
         Tdc::DelayLine => {
             m.wire("PHOTONS");
+            m.wire_bus("HIT", config.bins);
         }
     }
     let placed = |name: &str, own: &Option<OwnBlock>, built_in: &dyn Fn() -> Arc<Module>| {
         OwnBlock::or(own.as_ref(), name, built_in)
     };
-    m.wire_bus("HIT", config.bins);
     let counts = m.wire_bus("COUNT", config.bins * config.bin_bits);
 
     let timing = p_counter_timing::circuit(config.after_borrow, config.reset_buffers());
     m.instance_by_names("p_counter_timing", &timing, &[]);
     m.instance_by_names("p_counter", &p_counter::circuit(config), &[]);
+    if config.tdc.has_clk_bins() {
+        let front_end = placed("front_end", &config.front_end_block, &|| {
+            front_end::circuit(config)
+        });
+        m.instance_by_names("front_end", &front_end, &[]);
+    }
     match config.tdc {
         Tdc::Clocked => {
-            let front_end = placed("front_end", &config.front_end_block, &|| {
-                front_end::circuit(config)
-            });
-            m.instance_by_names("front_end", &front_end, &[]);
             let correlation = placed("correlation", &config.correlation_block, &|| {
                 correlation::circuit(config.lines())
             });
@@ -98,6 +114,10 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
                 metdc::circuit(config.bins)
             });
             m.instance_by_names("metdc", &metdc, &[]);
+        }
+        Tdc::Counter => {
+            m.instance_by_names("adder", &metdc_counter::adder(config.lines()), &[]);
+            m.instance_by_names("metdc", &metdc_counter::circuit(config.bins), &[]);
         }
         Tdc::DelayLine => {
             let front_end = photon_line::circuit(config.spads());
@@ -111,8 +131,12 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
     let of_bins: Vec<_> = of_bins
         .map(|(name, count)| (name.as_str(), count))
         .collect();
-    let histogram = placed("histogram", &config.histogram_block, &|| {
-        histogram::circuit(config.bins, config.bin_bits, config.overflow)
+    let (bins, bits, overflow) = (config.bins, config.bin_bits, config.overflow);
+    let histogram = placed("histogram", &config.histogram_block, &|| match config.tdc {
+        Tdc::Counter => {
+            histogram_sums::circuit(bins, bits, count_bits(config.lines()), overflow)
+        }
+        Tdc::Clocked | Tdc::DelayLine => histogram::circuit(bins, bits, overflow),
     });
     m.instance_by_names("histogram", &histogram, &of_bins);
     let bin_select = readout::bin_select(config.bins, config.bin_bits);
@@ -148,12 +172,54 @@ impl<'a> Model<'a> {
     /// SPAD_RAW as (time, SPAD), sorted by time.
     pub fn histogram(&self, start: u16, pulses: impl IntoIterator<Item = (Time, u8)>) -> Vec<u16> {
         let mut hits = vec![0u64; self.config.bins];
-        self.run(start, pulses, |_, latched| {
-            for (bin, count) in hits.iter_mut().enumerate() {
-                *count += latched >> bin & 1;
-            }
-        });
+        if self.config.tdc == Tdc::Counter {
+            self.add_events(start, pulses, &mut hits);
+        } else {
+            self.run(start, pulses, |_, latched| {
+                for (bin, count) in hits.iter_mut().enumerate() {
+                    *count += latched >> bin & 1;
+                }
+            });
+        }
         histogram::counts(self.config, hits)
+    }
+
+    /// What a counter TDC adds to the bins: START is high from each strobe to the next reset.
+    fn add_events(
+        &self,
+        start: u16,
+        pulses: impl IntoIterator<Item = (Time, u8)>,
+        hits: &mut [u64],
+    ) {
+        let (config, exposure, timing) = (self.config, self.exposure, &self.timing);
+        let mut rises = Vec::new();
+        self.run(start, [], |local_stop, _| {
+            rises.push(local_stop + timing.local_stop_to_strobe + timing.strobe_to_hit);
+        });
+        let cycles = i64::from(exposure.laser_cycles);
+        let falls = (0..=cycles).map(|cycle| exposure.stop(cycle) + timing.stop_to_start_falls);
+        let falls: Vec<Time> = falls.collect();
+        let last = |times: &[Time], now| {
+            times[..times.partition_point(|&time| time <= now)]
+                .last()
+                .copied()
+        };
+        let mut pulses = pulses.into_iter().peekable();
+        let mut front_end = front_end::Model::new(config, timing);
+        let mut metdc = metdc_counter::Model::new(config.bins);
+        for edge in 0..=cycles * i64::from(exposure.stop_periods) + 1 {
+            let rise = exposure.rising(edge);
+            if let Some(bin) = metdc.selected() {
+                hits[bin] += u64::from(front_end.spad_timed().count_ones());
+            }
+            metdc.clock(last(&rises, rise) > last(&falls, rise));
+            while let Some((time, spad)) =
+                pulses.next_if(|(t, _)| *t + timing.spad_to_sampled <= rise)
+            {
+                front_end.pulse(time, spad);
+            }
+            front_end.clock();
+        }
     }
 
     /// Runs the exposure; `strobe` is told the time of every strobe (LOCAL_STOP's rise in the guided

@@ -93,13 +93,23 @@ pub enum Probe {
     Strobe,
     /// Reset of the HIT flip-flops.
     HitReset,
-    /// HIT, one bit a bin.
+    /// HIT, one bit a bin; a counter TDC has none.
     Hit,
+    /// What STROBE sets in a counter TDC; this and the following only there.
+    Start,
+    /// START as CLK samples it.
+    Counting,
+    /// CLK periods of the window so far.
+    Code,
+    /// The bin that events are added to, one bit each.
+    Select,
+    /// SPADs that fired in the last CLK period.
+    Events,
 }
 
 impl Probe {
     /// Every probe, in the order of their declaration.
-    pub const ALL: [Probe; 29] = [
+    pub const ALL: [Probe; 34] = [
         Probe::Clk,
         Probe::Stop,
         Probe::StopD,
@@ -129,6 +139,11 @@ impl Probe {
         Probe::Strobe,
         Probe::HitReset,
         Probe::Hit,
+        Probe::Start,
+        Probe::Counting,
+        Probe::Code,
+        Probe::Select,
+        Probe::Events,
     ];
 
     /// Block of the macropixel whose inner net it is (none: the macropixel's own), and its name there.
@@ -163,6 +178,11 @@ impl Probe {
             Probe::Strobe => (Some(METDC), "STROBE"),
             Probe::HitReset => (Some(METDC), "HIT_RESET"),
             Probe::Hit => (None, "HIT"),
+            Probe::Start => (Some(METDC), "START"),
+            Probe::Counting => (Some(METDC), "COUNTING"),
+            Probe::Code => (Some(METDC), "CODE"),
+            Probe::Select => (None, "SELECT"),
+            Probe::Events => (None, "EVENTS"),
         }
     }
 
@@ -273,6 +293,19 @@ impl Probes {
         self.find(probe).unwrap_or_else(missing)
     }
 
+    /// What STROBE sets: HIT, or START of a counter TDC.
+    pub(crate) fn latched_probe(&self) -> Probe {
+        match self.find(Probe::Start) {
+            Some(_) => Probe::Start,
+            None => Probe::Hit,
+        }
+    }
+
+    /// Its nets.
+    pub(crate) fn latched(&self) -> &[NetId] {
+        self.bus(self.latched_probe())
+    }
+
     /// The net of a probe of one bit, or the first of several.
     ///
     /// # Panics
@@ -373,7 +406,7 @@ impl Probes {
         cells(netlist, (0..self.bus(Probe::Shift).len()).map(cell))
     }
 
-    /// The HIT flip-flop of each bin.
+    /// The HIT flip-flop of each bin, or that of a counter TDC's START.
     ///
     /// # Panics
     /// When something else drives a HIT.
@@ -391,7 +424,7 @@ impl Probes {
                 .clone()
                 .find(|&cell| drives(&netlist.cells()[cell], hit))
         };
-        self.bus(Probe::Hit).iter().map(of_hit).collect()
+        self.latched().iter().map(of_hit).collect()
     }
 
     /// Every cell of the P-counter timing block.

@@ -20,7 +20,7 @@ fn a_macropixel_has_every_probe_but_those_of_other_p_counters_and_tdcs() {
     let clocked = PCounter::ALL.map(|p_counter| (p_counter, Tdc::Clocked));
     for (p_counter, tdc) in clocked
         .into_iter()
-        .chain([(PCounter::SetReset, Tdc::DelayLine)])
+        .chain([Tdc::DelayLine, Tdc::Counter].map(|tdc| (PCounter::SetReset, tdc)))
     {
         let config = SensorConfig {
             tdc,
@@ -32,7 +32,14 @@ fn a_macropixel_has_every_probe_but_those_of_other_p_counters_and_tdcs() {
             let expected = match probe {
                 Probe::Memory => p_counter.row().has_memory,
                 Probe::StepClk | Probe::Shaped | Probe::Wire => false,
-                Probe::SpadTimed | Probe::SpadEvent | Probe::Shift => tdc == Tdc::Clocked,
+                Probe::SpadTimed => tdc.has_clk_bins(),
+                Probe::SpadEvent | Probe::Shift => tdc == Tdc::Clocked,
+                Probe::Hit => tdc != Tdc::Counter,
+                Probe::Start
+                | Probe::Counting
+                | Probe::Code
+                | Probe::Select
+                | Probe::Events => tdc == Tdc::Counter,
                 Probe::Photons | Probe::SampleClk | Probe::EvenTap | Probe::OddTap => {
                     tdc == Tdc::DelayLine
                 }

@@ -6,10 +6,10 @@
 //! | clocked | CLK period | 4 CLK periods, half a window | CLK at its most, 200 MHz (6.3.1) |
 //! | delay line | element, 2.6 ns on average, 0.4 ns σ (Fig. 91) | CLK period | CLK at 80 MHz: 12.5 ns, or 1.875 m (Table 14) |
 //!
-//! Two things are not the thesis's. Its clocked mode times photons with a counter TDC (4.9.3, 2.4.3), of which it says no more than that
-//! a bin is a CLK period; here the QuantIC4x4's shift register does so, because nothing tells what the counter does with a second photon.
-//! And it does not say how SPADs come together on a delay line: that they toggle one line through a tree of XORs, on which two photons in
-//! the same bin cancel, is chosen.
+//! Its clocked mode times photons with a counter TDC (4.9.3, 2.4.3). The thesis says of it that a bin is a CLK period; that all photons of a
+//! bin count is chosen (`metdc_counter`). With `tdc = "clocked"` the chip has the QuantIC4x4's shift register, which counts one of them. Nor
+//! does the thesis say how SPADs come together on a delay line: that they toggle one line through a tree of XORs, on which two
+//! photons in the same bin cancel, is chosen.
 //!
 //! The chip has both modes; each is a sensor of its own here, because nothing of one is used in the other but what they share. The thesis
 //! gives no dead time, no load clock and no scale for the delay that Fig. 90 shows from left to right: dead time and load clock are
@@ -28,6 +28,7 @@ pub fn hslidar() -> Sensor {
         cols: 64,
         counter_bits: 7,
         p_counter: PCounter::SetReset,
+        tdc: Tdc::Counter,
         step_periods: 4,
         reset_to_load: true,
         bins: 8,

@@ -73,7 +73,7 @@ impl Sensor {
         })
     }
 
-    /// Taps of a macropixel's delay lines, by its number in the array, row-major; `None` where the TDC is clocked.
+    /// Taps of a macropixel's delay lines, by its number in the array, row-major; `None` where it has none.
     pub(in crate::chip) fn taps(&self, number: usize) -> Option<Taps> {
         let Parts {
             config,
@@ -92,7 +92,7 @@ impl Sensor {
     pub fn longest_delay_line(&self) -> Time {
         let typical = self.delay_element() * (2 * self.bins as i64);
         match self.tdc {
-            Tdc::Clocked => Time::ZERO,
+            Tdc::Clocked | Tdc::Counter => Time::ZERO,
             Tdc::DelayLine => Time::from_s(typical.as_s() * self.silicon().factor.max(1.0)),
         }
     }

@@ -37,6 +37,8 @@ pub struct ChipTiming {
     pub stop_to_hit_reset: Time,
     /// STOP rising to the release of the HIT flip-flops, guided mode.
     pub stop_to_hit_release: Time,
+    /// STOP rising to HIT's fall in the guided mode, which is START's in a counter TDC.
+    pub stop_to_start_falls: Time,
     /// STOP rising to the inverse of ENABLE, which blocks COUNTER_CLK, falling.
     pub stop_to_enabled: Time,
     /// CLK rising to SPAD_EVENT settled, longest path; nothing where events are not clocked.

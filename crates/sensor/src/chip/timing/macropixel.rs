@@ -21,7 +21,7 @@ use std::sync::OnceLock;
 
 use super::cell_library::CellLibrary;
 use super::silicon::Silicon;
-use crate::chip::{Probe, Probes, SensorConfig, array};
+use crate::chip::{Probe, Probes, SensorConfig, Tdc, array};
 use crate::logic::Logic::{One, Zero};
 use crate::netlist::{
     Arrivals, CellKind, Corner, Edge, FlatCell, NetId, Netlist, Requirement, StaticTiming, Timing,
@@ -86,9 +86,10 @@ impl MacropixelCircuit {
             is_clocked.then_some(cell.inputs[0])
         };
         let has_own = config.front_end_block.is_some() || config.metdc_block.is_some();
+        let adds = config.tdc == Tdc::Counter;
         let event = probes.find(Probe::SpadEvent).unwrap_or_default();
         MacropixelCircuit {
-            clocked: match has_own {
+            clocked: match has_own || adds {
                 true => netlist.cells().iter().filter_map(data).collect(),
                 false => event.to_vec(),
             },
@@ -182,13 +183,11 @@ impl MacropixelCircuit {
 
     /// The clock that freezes the window: of the delay lines' samples, or of the HIT flip-flops.
     fn sampling(&self) -> NetId {
-        match self.is_clocked() {
-            true => self.hit_pin(1),
-            false => self.probes.net(Probe::SampleClk),
-        }
+        let of_lines = self.probes.find(Probe::SampleClk);
+        of_lines.map_or_else(|| self.hit_pin(1), |nets| nets[0])
     }
 
-    /// Whether a shift register, not delay lines, times photons.
+    /// Whether a shift register times photons.
     fn is_clocked(&self) -> bool {
         self.probes.find(Probe::SpadEvent).is_some()
     }
@@ -221,13 +220,14 @@ impl<'c> MacropixelPaths<'c> {
         self.after(
             Probe::Clk,
             &[edge],
-            &[Probe::Hit, Probe::Block, Probe::Enable],
+            &[self.circuit.probes.latched_probe(), Probe::Block, Probe::Enable],
         )
     }
 
     /// What STOP's rise changes, up to the resets that it makes and the strobe of the conventional mode.
     pub(crate) fn after_stop(&self) -> Arrivals<'c> {
-        let cuts = [Probe::Hit, Probe::Enable, Probe::CounterReset];
+        let latched = self.circuit.probes.latched_probe();
+        let cuts = [latched, Probe::Enable, Probe::CounterReset];
         let cuts = cuts
             .iter()
             .flat_map(|&cut| self.circuit.probes.bus(cut))
@@ -242,7 +242,7 @@ impl<'c> MacropixelPaths<'c> {
     /// What an edge of COUNTER_RESET changes. LOCAL_STOP, which falls, may let COUNTER_CLK rise.
     pub(crate) fn after_counter_reset(&self, edge: Edge) -> Arrivals<'c> {
         let reset = (self.circuit.probes.net(Probe::CounterReset), edge);
-        let hit = self.circuit.probes.bus(Probe::Hit).iter().copied();
+        let hit = self.circuit.probes.latched().iter().copied();
         let cuts = hit.chain([self.circuit.hit_pin(1)]);
         let cuts: Vec<NetId> = cuts.chain(self.stage_clocks()).collect();
         let arrivals = self.analysis.arrivals(&[reset], &cuts);
@@ -258,7 +258,7 @@ impl<'c> MacropixelPaths<'c> {
     /// BLOCK rises → COUNTER_CLK falls, earliest.
     fn block_to_counter_clk(&self) -> Option<Time> {
         self.circuit.probes.find(Probe::Block)?;
-        let cuts = [Probe::CounterClk, Probe::Hit];
+        let cuts = [Probe::CounterClk, self.circuit.probes.latched_probe()];
         let blocked = self.after(Probe::Block, &[Edge::Rise], &cuts);
         let counter_clk = self.circuit.probes.net(Probe::CounterClk);
         Some(blocked.edge_window(counter_clk, Edge::Fall)?.0)
@@ -272,7 +272,7 @@ impl<'c> MacropixelPaths<'c> {
             let starts = Edge::BOTH.map(|edge| (toggle, edge));
             let arrivals = self
                 .analysis
-                .arrivals(&starts, &[Probe::Hit].map(|p| probes.bus(p)).concat());
+                .arrivals(&starts, probes.latched());
             arrivals.expect("every loop is cut").window(photons)
         };
         probes.toggles().iter().filter_map(of).reduce(hull)
@@ -355,7 +355,7 @@ impl<'c> MacropixelPaths<'c> {
 
     /// What an edge of one SPAD changes.
     fn after_spad(&self, raw: NetId, edge: Edge) -> Arrivals<'c> {
-        let hit = self.circuit.probes.bus(Probe::Hit);
+        let hit = self.circuit.probes.latched();
         let arrivals = self.analysis.arrivals(&[(raw, edge)], hit);
         arrivals.expect("a front end has no loops")
     }
@@ -435,7 +435,7 @@ impl MacropixelDelays {
         let stop = paths.after_stop();
         let hits = circuit.hits.iter();
         let shift = hits.clone().filter(|_| circuit.is_clocked());
-        let hits = hits.zip(circuit.probes.bus(Probe::Hit));
+        let hits = hits.zip(circuit.probes.latched());
         let hits = hits.map(|(&cell, &hit)| {
             let outputs = &circuit.netlist.cells()[cell].outputs;
             paths.clock_to_q(cell, usize::from(outputs[0] != hit)).0

@@ -185,6 +185,7 @@ impl MeasuredDelays {
             stop_to_reset_release: delays.release.1,
             stop_to_hit_reset: delays.reset.1 + counter.hit_reset.1,
             stop_to_hit_release: delays.release.1 + counter.hit_release.1,
+            stop_to_start_falls: delays.reset.1 + counter.hit_falls,
             stop_to_enabled: counter.enable,
             clk_to_event: delays.event,
             clk_period: clk

@@ -181,9 +181,12 @@ impl Edges {
     fn strobed(&self, start: u16) -> Found {
         let timing = &self.timing;
         let event = timing.clk_to_event + timing.setup + NEAR;
-        let is_clocked = self.config.tdc == Tdc::Clocked;
-        if is_clocked && self.period() <= event {
-            return Found::Race(Conflict::SlowCorrelation, event, self.period(), None);
+        if self.config.tdc.has_clk_bins() && self.period() <= event {
+            let what = match self.config.tdc {
+                Tdc::Counter => Conflict::SlowPath,
+                _ => Conflict::SlowCorrelation,
+            };
+            return Found::Race(what, event, self.period(), None);
         }
         match self.config.mode {
             Mode::Conventional => Found::Strobe {
@@ -210,6 +213,9 @@ impl Edges {
             return (found, None);
         };
         let timing = &self.timing;
+        if self.config.tdc == Tdc::Counter {
+            return self.counted_by_clk(found, strobe + timing.strobe_to_hit, counted);
+        }
         let is_clocked = self.config.tdc == Tdc::Clocked;
         let (mut edge, mut last, mut slack) = (-100, None, Time::MAX);
         while self.exposure.rising(edge) + timing.clk_to_shift <= strobe + self.period() {
@@ -248,6 +254,52 @@ impl Edges {
         let bins = self.config.bins as i64;
         (found, last.map(|edge| (edge - bins, slack)))
     }
+
+    /// The window of a counter TDC whose START rises at `rises`.
+    fn counted_by_clk(
+        &self,
+        found: Found,
+        rises: Time,
+        counted: i64,
+    ) -> (Found, Option<(i64, Time)>) {
+        let (setup, hold) = (self.timing.setup, self.timing.hold);
+        let falls = self.timing.stop_to_start_falls;
+        let edges = || self.numbers().map(|edge| (edge, self.exposure.rising(edge)));
+        for (_, clk) in edges() {
+            let (from, to) = (falls - hold - NEAR, falls + setup + NEAR);
+            if from <= clk && clk <= to {
+                let race = Found::Race(Conflict::StartFallsAtClk, clk, from, Some(to));
+                return (race, None);
+            }
+        }
+        let mut slack = Time::MAX;
+        for (_, clk) in edges() {
+            let (from, to) = (clk - setup - NEAR, clk + hold + NEAR);
+            if from <= rises && rises <= to {
+                let fall = self.exposure.falling(counted);
+                let (from, to) = (from - fall, Some(to - fall));
+                let race = Found::Race(Conflict::StartAtClk, rises - fall, from, to);
+                return (race, None);
+            }
+            slack = slack.min((clk - setup - rises).max(rises - hold - clk));
+        }
+        let first_after = |change: Time| edges().find(|&(_, clk)| clk >= change);
+        let (Some((low, _)), Some((first, _))) = (first_after(falls), first_after(rises)) else {
+            return (Found::Irregular, None);
+        };
+        let is_regular = matches!(
+            found,
+            Found::Strobe {
+                is_regular: true,
+                ..
+            }
+        );
+        let ends = first + self.config.bins as i64;
+        if !is_regular || first <= low || ends > i64::from(self.exposure.stop_periods) {
+            return (Found::Irregular, None);
+        }
+        (found, Some((first, slack)))
+    }
 }
 
 fn of_law(law: &WindowLaw, start: u16) -> (Found, Option<(i64, Time)>) {
@@ -264,7 +316,7 @@ fn of_law(law: &WindowLaw, start: u16) -> (Found, Option<(i64, Time)>) {
                 is_regular: true,
             };
             let slack = match law.sensor.tdc {
-                Tdc::Clocked => window.slack,
+                Tdc::Clocked | Tdc::Counter => window.slack,
                 Tdc::DelayLine => Time::MAX,
             };
             (found, Some((window.first_edge, slack)))
@@ -303,13 +355,13 @@ prop_compose! {
         (stop_to_strobe, stop_to_sample, strobe_to_hit) in (delay(1..20), delay(1..20), delay(0..6)),
         (clk_to_shift, clk_to_event) in (delay(0..14), delay(5..22)),
         (stop_to_reset, reset, stop_to_hit_reset, hit_reset) in (delay(1..5), delay(8..20), delay(1..12), delay(4..20)),
-        stop_to_enabled in delay(1..30),
+        (stop_to_enabled, stop_to_start_falls) in (delay(1..30), delay(2..30)),
         (setup, hold, recovery, removal) in (delay(0..4), delay(0..3), delay(0..4), delay(0..4)),
     ) -> ChipTiming {
         ChipTiming {
             spad_to_sampled, clk_to_counter_clk, counter, local_stop_to_strobe, local_stop_to_sample, stop_to_strobe,
             stop_to_sample, strobe_to_hit, clk_to_shift, clk_to_event, stop_to_reset, stop_to_hit_reset,
-            stop_to_enabled, setup, hold, recovery, removal,
+            stop_to_enabled, stop_to_start_falls, setup, hold, recovery, removal,
             stop_to_reset_release: stop_to_reset + reset,
             stop_to_hit_release: stop_to_hit_reset + hit_reset,
             clk_period: Time::ZERO,
@@ -357,7 +409,7 @@ prop_compose! {
         tap in prop::sample::select(vec![Tap::Borrow, Tap::Msb]),
         after_borrow in prop::sample::select(vec![AfterBorrow::Hold, AfterBorrow::Wrap]),
         mode in prop::sample::select(vec![Mode::Guided, Mode::Guided, Mode::Conventional]),
-        tdc in prop::sample::select(vec![Tdc::Clocked, Tdc::DelayLine]),
+        tdc in prop::sample::select(vec![Tdc::Clocked, Tdc::Counter, Tdc::DelayLine]),
     ) -> SensorConfig {
         SensorConfig {
             clk_hz: 1e10 / (2 * half_period) as f64,
@@ -422,7 +474,7 @@ proptest! {
             };
             let ends: Vec<Time> = taps.iter().zip(window.first_edge - 1..).map(|(&tap, edge)| {
                 let end = match edges.config.tdc {
-                    Tdc::Clocked => exposure.rising(edge),
+                    Tdc::Clocked | Tdc::Counter => exposure.rising(edge),
                     Tdc::DelayLine => sampled + tap,
                 };
                 later + end - timing.spad_to_sampled + Time::from_fs(1)

@@ -16,7 +16,8 @@ impl EventTable {
     pub(super) fn of(sensor: &SensorConfig) -> Self {
         Self::new(sensor.spads(), |fired| match sensor.tdc {
             Tdc::DelayLine => fired % 2 == 1,
-            Tdc::Clocked => {
+            // With a counter TDC nothing is drawn.
+            Tdc::Clocked | Tdc::Counter => {
                 let spads = ((1u128 << fired) - 1) as u64;
                 correlation::model(spads, sensor.event_type, sensor.threshold)
             }

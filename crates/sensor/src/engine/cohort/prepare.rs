@@ -110,6 +110,7 @@ impl Cohort {
             ),
             (light.spads().is_some(), NotModelled::SpadsThatDiffer),
             (light.has_trains(), NotModelled::OtherLasers),
+            (self.sensor.tdc == Tdc::Counter, NotModelled::CounterTdc),
         ];
         let refusal = refusals.into_iter().find(|(refuses, _)| *refuses);
         refusal.map(|(_, what)| what)

@@ -24,6 +24,9 @@ pub enum Doubt {
     /// Delay lines, where cells differ.
     #[error("delay lines among cells that differ are left to the gates")]
     DelayLines,
+    /// Orders of events are known for the shift register.
+    #[error("a counter TDC is left to the gates")]
+    CounterTdc,
     /// Latencies of a SPAD's two edges.
     #[error("a SPAD's flip-flop rises and falls at different speeds")]
     UnevenLatency,

@@ -126,8 +126,10 @@ impl Timed {
 
     /// Counts in closed form where a macropixel's delays decide every order of events.
     fn judge(&self, pixel: &PulsedPixel<'_>) -> Result<Judged, EngineError> {
-        if self.uniform.tdc == Tdc::DelayLine {
-            return self.judge_lines(pixel);
+        match self.uniform.tdc {
+            Tdc::Clocked => {}
+            Tdc::Counter => return Ok(Judged::InDoubt(Doubt::CounterTdc)),
+            Tdc::DelayLine => return self.judge_lines(pixel),
         }
         let pulses = &*by_own_clk(&self.uniform, pixel.number, pixel.pulses);
         let timing = self.timing(pixel.number);
@@ -364,7 +366,7 @@ impl Replay for Timed {
 
     fn as_the_law_sees<'p>(&self, number: u32, pulses: &'p [SpadEvent]) -> Cow<'p, [SpadEvent]> {
         let pulses = by_own_clk(&self.uniform, number, pulses);
-        if self.uniform.tdc == Tdc::DelayLine {
+        if self.uniform.tdc != Tdc::Clocked {
             return pulses;
         }
         let timing = self.timing(number);

@@ -69,10 +69,11 @@ impl Window {
 
     /// What the SPADs that fire in a bin add to its hits, beyond those of an empty macropixel.
     pub(super) fn adds(&self, spads: u64) -> i64 {
-        if self.sensor.tdc == Tdc::DelayLine {
-            return i64::from(spads.count_ones() % 2);
+        match self.sensor.tdc {
+            Tdc::DelayLine => i64::from(spads.count_ones() % 2),
+            Tdc::Counter => i64::from(spads.count_ones()),
+            Tdc::Clocked => i64::from(self.is_event(spads)) - i64::from(self.is_event(0)),
         }
-        i64::from(self.is_event(spads)) - i64::from(self.is_event(0))
     }
 
     /// Counts pulses, sorted by time, of which no bin takes two parts.

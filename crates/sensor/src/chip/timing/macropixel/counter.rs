@@ -68,7 +68,7 @@ impl CounterDelays {
             let leaf = &circuit.netlist.cells()[cell];
             leaf.inputs[2..leaf.kind.inputs().len()].iter()
         });
-        let hits = circuit.probes.bus(Probe::Hit).iter();
+        let hits = circuit.probes.latched().iter();
         let rises_after_reset = |net| reset.edge_window(net, Edge::Rise);
         CounterDelays {
             counter_clk: edge(&fall, counter_clk, Edge::Rise),

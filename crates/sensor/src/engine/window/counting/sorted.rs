@@ -177,7 +177,7 @@ impl Counting<'_> {
             if row > 0 {
                 pixel.hits[row - 1] += self.adds[1];
                 pixel.work.pulses += 1;
-                pixel.work.clk_periods_visited += u64::from(self.engine.sensor.tdc == Tdc::Clocked);
+                pixel.work.clk_periods_visited += u64::from(self.engine.sensor.tdc.has_clk_bins());
             }
             return;
         }
