@@ -20,6 +20,7 @@ mod delay_line;
 mod demonstrator;
 mod design;
 mod guided_bins;
+mod hslidar_modes;
 mod libraries;
 pub mod measured;
 mod page;

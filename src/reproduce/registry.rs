@@ -6,8 +6,8 @@ use std::sync::LazyLock;
 use super::claim::Row;
 use super::thesis::THESIS;
 use super::{
-    chip, delay_line, demonstrator, design, guided_bins, measured, penalty, photon_budget,
-    precision, sensors, silicon, stereo, system,
+    chip, delay_line, demonstrator, design, guided_bins, hslidar_modes, measured, penalty,
+    photon_budget, precision, sensors, silicon, stereo, system,
 };
 use crate::engine::EngineError;
 use crate::report::{Chart, Grid};
@@ -70,7 +70,7 @@ pub static MEASUREMENTS: LazyLock<Vec<Listed<Measure>>> = LazyLock::new(|| {
     listed(titles, &STUDIES)
 });
 
-const CLAIM_ROWS: [(u32, Rows); 28] = [
+const CLAIM_ROWS: [(u32, Rows); 29] = [
     (1, design::table_9_rows),
     (2, chip::ripple_rows),
     (3, chip::fig_54_rows),
@@ -99,11 +99,13 @@ const CLAIM_ROWS: [(u32, Rows); 28] = [
     (26, stereo::motion_rows),
     (27, system::frame_rows),
     (28, sensors::rows),
+    (29, hslidar_modes::rows),
 ];
 
-const TABLE_GRIDS: [(u32, Tabulate); 4] = [
+const TABLE_GRIDS: [(u32, Tabulate); 5] = [
     (7, penalty::charts::table_7),
     (9, design::table_9),
+    (10, hslidar_modes::table_10),
     (16, sensors::table),
     (39, design::table_39),
 ];

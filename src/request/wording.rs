@@ -101,6 +101,9 @@ fn of_irregular(why: &Irregular, spelling: Spelling) -> String {
         Irregular::LocalStopRepeats { .. } => {
             format!("give after_borrow = \"hold\", or other {periods}")
         }
+        Irregular::CutWindow | Irregular::StartStaysHigh => {
+            format!("give more {periods}, or a lower start value")
+        }
         Irregular::OwnCounter(_) => {
             "give a P-counter that raises LOCAL_STOP once, a step later from each start value on"
                 .to_owned()

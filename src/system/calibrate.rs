@@ -3,7 +3,7 @@
 //!
 //! ```text
 //!   laser delay ├┤10 ps
-//!   fullest bin  0 0 0 0 1 1 1 1 1 2 2 …       bin b: from the first step at which it is, for as many steps as it is
+//!   fullest bin  0 0 0 0 1 1 1 1 1 2 2 …       an edge between two bins; the first and the last one: swept_edges
 //! ```
 //!
 //! Every step is an exposure of its own on the window engine, with photons of its own. One even and one odd window are swept: others
@@ -16,6 +16,7 @@ use crate::chip::{Exposure, Sensor, Tdc, WindowLaw};
 use crate::engine::{EngineError, Expose, LitPixel, Window, stream_config};
 use crate::photon::{PhotonStream, PixelLight};
 use crate::ranging::{BinProfile, LineProfile};
+use crate::system::swept_edges::Swept;
 use crate::units::Time;
 
 /// How the laser sweeps.
@@ -187,7 +188,13 @@ impl Sweeping<'_> {
             .expose(&stream, &lit)?
             .histograms;
         let counts: Vec<&[u16]> = counts.iter().collect();
-        Ok(profile(&counts, &delays, sweep.step))
+        let swept = Swept {
+            counts: &counts,
+            first: delays[0],
+            step: sweep.step,
+            pulse_sigma: sweep.pulse_sigma,
+        };
+        Ok(swept.profile())
     }
 }
 
@@ -241,27 +248,4 @@ fn seen(sensor: &Sensor, exposure: &Exposure, parity: u16) -> impl Iterator<Item
             seen.start > half && seen.end < end
         })
     })
-}
-
-/// Middle and length of every bin from the steps at which it is the fullest.
-fn profile(counts: &[&[u16]], delays: &[Time], step: Time) -> LineProfile {
-    let bins = counts[0].len();
-    let mut steps = vec![(0u32, 0.0); bins];
-    for (counts, delay) in counts.iter().zip(delays) {
-        let fullest = (0..bins).rev().max_by_key(|&bin| counts[bin]);
-        if let Some(bin) = fullest.filter(|&bin| counts[bin] > 0) {
-            steps[bin].0 += 1;
-            steps[bin].1 += delay.as_s();
-        }
-    }
-    LineProfile {
-        middle_s: steps
-            .iter()
-            .map(|&(n, sum)| sum / f64::from(n.max(1)))
-            .collect(),
-        length_s: steps
-            .iter()
-            .map(|&(n, _)| f64::from(n) * step.as_s())
-            .collect(),
-    }
 }

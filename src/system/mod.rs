@@ -20,6 +20,7 @@ mod speed;
 mod step_and_lock;
 mod stopwatch;
 mod summary;
+mod swept_edges;
 mod taken;
 mod tolerance;
 mod worlds;

@@ -3,6 +3,7 @@
 //! `gdtof tb` runs them, as do the binaries `tb_*`. A new one is a file here with a `TESTBENCH`, and its line in
 //! [`TESTBENCHES`].
 
+mod counter_tdc;
 mod delay_line;
 mod front_ends;
 mod load_path;
@@ -22,6 +23,7 @@ pub const TESTBENCHES: &[Testbench] = &[
     p_counter_variants::TESTBENCH,
     load_path::TESTBENCH,
     macropixel::TESTBENCH,
+    counter_tdc::TESTBENCH,
     delay_line::TESTBENCH,
     readout::TESTBENCH,
     ripple_hazard::TESTBENCH,

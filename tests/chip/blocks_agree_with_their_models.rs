@@ -6,7 +6,7 @@ use crate::bench;
 use bench::{Bench, SETTLING, corners};
 use guided_dtof::chip::{
     AfterBorrow, ChipTiming, EventType, Overflow, SensorConfig, Tdc, correlation, count_bits,
-    front_end, histogram, metdc, p_counter_timing, photon_line,
+    front_end, histogram, histogram_sums, metdc, metdc_counter, p_counter_timing, photon_line,
 };
 use guided_dtof::kernel::{LaneDrive, LaneKernel, Lanes};
 use guided_dtof::logic::Logic;
@@ -158,6 +158,81 @@ proptest! {
         photon_line::model(&mut pulses, |pulse| *pulse, usize::from(spads), timing.photon_line_stage);
         let expected: Vec<Time> = pulses.iter().map(|(time, _)| *time + timing.spad_to_sampled).collect();
         prop_assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn the_counter_tdc_selects_each_bin_for_a_clk_period(
+        corner in corners(),
+        bins in 1usize..20,
+        period_ps in 2_500i64..4_000,
+        cycles in prop::collection::vec((0i64..20, 0i64..30), 1..8),
+    ) {
+        let mut bench = Bench::new(&metdc_counter::circuit(bins), corner);
+        let timing = bench.timing();
+        let rise = |k: i64| SETTLING * 3 + Time::from_ps(period_ps) * k;
+        // Signals change as CLK falls, far from what samples them.
+        let fall = |k: i64| rise(k) + Time::from_ps(period_ps / 2);
+        bench.pulse(Time::ZERO, SETTLING, "PIXEL_CLEAR");
+        bench.pulse(Time::ZERO, SETTLING * 2, "COUNTER_RESET");
+        // START as each CLK edge finds it: low for one at least before LOCAL_STOP.
+        let mut starts: Vec<bool> = Vec::new();
+        let width = timing.stop_to_reset_release - timing.stop_to_reset;
+        for (low, high) in cycles {
+            let local_stop = starts.len() as i64 + low;
+            bench.drive(fall(local_stop), "LOCAL_STOP", true);
+            starts.resize(local_stop as usize + 1, false);
+            starts.resize((local_stop + high) as usize + 2, true);
+            let reset = fall(starts.len() as i64 - 1);
+            bench.pulse(reset, width, "COUNTER_RESET");
+            bench.drive(reset + Time::from_ps(100), "LOCAL_STOP", false);
+        }
+        starts.push(false);
+        for k in 0..=starts.len() as i64 {
+            bench.pulse(rise(k), Time::from_ps(period_ps / 2), "CLK");
+        }
+        let select = bench.bus("SELECT");
+        let mut run = bench.start(&[]);
+        let mut model = metdc_counter::Model::new(bins);
+        for (k, &start) in (1..).zip(&starts) {
+            model.clock(start);
+            let expected = model.selected().map_or(0, |bin| 1u64 << bin);
+            let found = run.number_at(rise(k) - Time::from_fs(1), &select);
+            prop_assert_eq!(found, Some(expected), "before edge {}", k);
+        }
+    }
+
+    #[test]
+    fn bins_of_a_counter_tdc_add_what_they_are_given(
+        corner in corners(),
+        bins in 1usize..9,
+        bits in 1usize..9,
+        event_bits in 1usize..6,
+        overflow in prop::sample::select(vec![Overflow::Saturate, Overflow::Wrap]),
+        given in prop::collection::vec((0usize..10, any::<u64>()), 1..60),
+    ) {
+        let circuit = histogram_sums::circuit(bins, bits, event_bits, overflow);
+        let mut bench = Bench::new(&circuit, corner);
+        let rise = |k: usize| SETTLING * 2 + Time::from_ns(5) * k as i64;
+        bench.pulse(Time::ZERO, SETTLING, "PIXEL_CLEAR");
+        let mut sums = vec![0u64; bins];
+        for (k, &(bin, events)) in given.iter().enumerate() {
+            let events = events & ((1 << event_bits) - 1);
+            bench.number(rise(k) - Time::from_ns(4), "EVENTS", events);
+            // None of the bins now and then.
+            let select = if bin < bins { 1 << bin } else { 0 };
+            bench.number(rise(k) - Time::from_ns(4), "SELECT", select);
+            bench.pulse(rise(k), Time::from_ns(2), "CLK");
+            if let Some(sum) = sums.get_mut(bin) {
+                *sum += events;
+            }
+        }
+        let counts: Vec<_> = (0..bins).map(|bin| bench.bus(&format!("BIN_{bin}"))).collect();
+        let mut run = bench.start(&[]);
+        run.until(rise(given.len()));
+        for (count, sum) in counts.iter().zip(sums) {
+            let expected = histogram::model(sum, bits as u32, overflow);
+            prop_assert_eq!(run.kernel.number(count), Some(u64::from(expected)));
+        }
     }
 
     #[test]

@@ -115,7 +115,7 @@ fn what_cannot_be_calibrated_is_refused() {
         ),
         (
             "timing --sensor hslidar_delay_line",
-            "--sensor: the tables are those of a clocked TDC",
+            "--sensor: the tables are those of a shift register",
         ),
     ] {
         let refused = gdtof(folder, arguments);

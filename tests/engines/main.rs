@@ -19,6 +19,7 @@ mod chip_against_theory;
 mod clk_comes_late_in_any_silicon;
 mod cohort_agrees_with_window;
 mod cohort_draws_what_it_computes;
+mod counter_tdc_adds_up;
 mod cycle_agrees_with_gate;
 mod delay_lines_time_photons;
 mod impossible_light_is_refused;

@@ -50,8 +50,12 @@ pub(super) fn run(args: &TimingArgs) -> anyhow::Result<()> {
     let silicon = args.silicon.read(&config)?;
     let other_tdc = match config.tdc {
         Tdc::Clocked => None,
-        Tdc::Counter => Some("has a counter; frame states whether its timing is met, and --set sensor.tdc=clocked shows the tables of the same chip with a shift register"),
-        Tdc::DelayLine => Some("has delay lines; frame states whether its timing is met, and calibrate measures its bins"),
+        Tdc::Counter => Some(
+            "has a counter; frame states whether its timing is met, and --set sensor.tdc=clocked shows the tables of the same chip with a shift register",
+        ),
+        Tdc::DelayLine => Some(
+            "has delay lines; frame states whether its timing is met, and calibrate measures its bins",
+        ),
     };
     if let Some(what) = other_tdc {
         let message = format!("the tables are those of a shift register, and this sensor {what}");

@@ -323,7 +323,13 @@ impl SensorConfig {
                 Tdc::Counter => "which counts all SPADs that fire and compares nothing",
                 _ => "where every pulse is an edge and nothing is compared",
             };
-            return Err(SensorFault::NotWithTdc { key, asked, tdc, why, only });
+            return Err(SensorFault::NotWithTdc {
+                key,
+                asked,
+                tdc,
+                why,
+                only,
+            });
         }
         if tdc == Tdc::Counter {
             self.check_counter_tdc()?;

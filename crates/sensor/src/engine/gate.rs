@@ -13,8 +13,8 @@ use super::{
 };
 use crate::chip::timing::macropixel::MacropixelCircuit;
 use crate::chip::{
-    Exposure, LoadPins, Probe, Probes, ReadPins, Sensor, SensorPins, WindowLaw, array,
-    load_path, metdc_delay_line,
+    Exposure, LoadPins, Probe, Probes, ReadPins, Sensor, SensorPins, WindowLaw, array, load_path,
+    metdc_delay_line,
 };
 use crate::kernel::{Drive, Kernel, LANES, Observer, Policy, Statistics, TimingChecks, merge};
 use crate::netlist::{NetId, Netlist, Timing};

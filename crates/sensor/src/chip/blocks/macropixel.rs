@@ -133,9 +133,7 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
         .collect();
     let (bins, bits, overflow) = (config.bins, config.bin_bits, config.overflow);
     let histogram = placed("histogram", &config.histogram_block, &|| match config.tdc {
-        Tdc::Counter => {
-            histogram_sums::circuit(bins, bits, count_bits(config.lines()), overflow)
-        }
+        Tdc::Counter => histogram_sums::circuit(bins, bits, count_bits(config.lines()), overflow),
         Tdc::Clocked | Tdc::DelayLine => histogram::circuit(bins, bits, overflow),
     });
     m.instance_by_names("histogram", &histogram, &of_bins);

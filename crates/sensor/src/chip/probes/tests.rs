@@ -35,11 +35,9 @@ fn a_macropixel_has_every_probe_but_those_of_other_p_counters_and_tdcs() {
                 Probe::SpadTimed => tdc.has_clk_bins(),
                 Probe::SpadEvent | Probe::Shift => tdc == Tdc::Clocked,
                 Probe::Hit => tdc != Tdc::Counter,
-                Probe::Start
-                | Probe::Counting
-                | Probe::Code
-                | Probe::Select
-                | Probe::Events => tdc == Tdc::Counter,
+                Probe::Start | Probe::Counting | Probe::Code | Probe::Select | Probe::Events => {
+                    tdc == Tdc::Counter
+                }
                 Probe::Photons | Probe::SampleClk | Probe::EvenTap | Probe::OddTap => {
                     tdc == Tdc::DelayLine
                 }

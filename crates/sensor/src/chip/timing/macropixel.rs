@@ -220,7 +220,11 @@ impl<'c> MacropixelPaths<'c> {
         self.after(
             Probe::Clk,
             &[edge],
-            &[self.circuit.probes.latched_probe(), Probe::Block, Probe::Enable],
+            &[
+                self.circuit.probes.latched_probe(),
+                Probe::Block,
+                Probe::Enable,
+            ],
         )
     }
 
@@ -270,9 +274,7 @@ impl<'c> MacropixelPaths<'c> {
         let photons = probes.find(Probe::Photons)?[0];
         let of = |&toggle: &NetId| {
             let starts = Edge::BOTH.map(|edge| (toggle, edge));
-            let arrivals = self
-                .analysis
-                .arrivals(&starts, probes.latched());
+            let arrivals = self.analysis.arrivals(&starts, probes.latched());
             arrivals.expect("every loop is cut").window(photons)
         };
         probes.toggles().iter().filter_map(of).reduce(hull)

@@ -264,7 +264,10 @@ impl Edges {
     ) -> (Found, Option<(i64, Time)>) {
         let (setup, hold) = (self.timing.setup, self.timing.hold);
         let falls = self.timing.stop_to_start_falls;
-        let edges = || self.numbers().map(|edge| (edge, self.exposure.rising(edge)));
+        let edges = || {
+            self.numbers()
+                .map(|edge| (edge, self.exposure.rising(edge)))
+        };
         for (_, clk) in edges() {
             let (from, to) = (falls - hold - NEAR, falls + setup + NEAR);
             if from <= clk && clk <= to {
