@@ -143,10 +143,11 @@ mod tests {
 
     /// Off by how much each edge is on average over many sweeps, ps, and the standard error of that.
     fn bias_ps(counting: Counting, step_ps: f64, laser_cycles: u32) -> Vec<(f64, f64)> {
-        const SWEEPS: usize = 300;
+        // As few as tell a bias of some picoseconds: edges scatter less with more laser cycles.
+        let sweeps = (3200 / laser_cycles as usize).max(40);
         let mut random = StdRng::seed_from_u64(u64::from(laser_cycles));
         let mut off = vec![Vec::new(); EDGES_PS.len()];
-        for _ in 0..SWEEPS {
+        for _ in 0..sweeps {
             // Where steps lie between edges is chance.
             let shift_ps = random.random_range(0.0..step_ps);
             let steps = (21_700.0 / step_ps) as usize;
@@ -157,7 +158,11 @@ mod tests {
                         |edge: f64| 0.5 * libm::erfc((delay_ps - edge) / SIGMA_PS / 2f64.sqrt());
                     let share = |bin: usize| below(EDGES_PS[bin + 1]) - below(EDGES_PS[bin]);
                     let mut count = |bin: usize| {
-                        let likely = counting(share(bin));
+                        let share = share(bin);
+                        if share < 1e-9 {
+                            return 0;
+                        }
+                        let likely = counting(share);
                         (0..laser_cycles)
                             .filter(|_| random.random::<f64>() < likely)
                             .count() as u16
@@ -183,12 +188,12 @@ mod tests {
         off.iter()
             .map(|off| {
                 let (mean, sigma) = mean_and_sigma(off);
-                (mean, sigma / (SWEEPS as f64).sqrt())
+                (mean, sigma / (sweeps as f64).sqrt())
             })
             .collect()
     }
 
-    /// The least bias of the rule before this one was 28 ps at the first and last edge, and 81 ps with 200 laser cycles.
+    /// Where the fullest bin decides, the first and the last edge are 28 ps off, and 81 ps with 200 laser cycles.
     #[test]
     fn no_edge_is_off_on_average() {
         let half_a_photon: Counting = |share| -0.5 * libm::expm1(-2.0 * 0.5 * share);

@@ -339,6 +339,10 @@ fn view(
             Entry::binary(Probe::LocalStop.path(&pixel)),
             Entry::binary(Probe::Shift.path(&pixel)),
             Entry::binary(Probe::Hit.path(&pixel)),
+            // Of a counter TDC.
+            Entry::decimal(Probe::Code.path(&pixel)),
+            Entry::decimal(Probe::Events.path(&pixel)),
+            Entry::binary(Probe::Select.path(&pixel)),
         ];
         let bins = match has_room {
             true => (0..config.bins).collect(),

@@ -200,7 +200,7 @@ fn events_that_share_a_bin_all_count() {
     }
 }
 
-/// The window of the same start value, by a window and two CLK periods.
+/// The window of the same start value, by a window and one CLK period.
 #[test]
 fn the_counter_s_window_lies_later_than_the_shift_register_s() {
     for start in [1, 5, 9] {

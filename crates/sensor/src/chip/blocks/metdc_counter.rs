@@ -26,7 +26,7 @@
 //! * EVENTS is the number of SPADs that fired in the CLK period, which is the synchronous summation of Fig. 22d. TYPE and THRESHOLD have
 //!   nothing to compare. Two photons of one SPAD within a CLK period still cancel, in its toggle flip-flop.
 //! * LOCAL_STOP opens the window. A shift register remembers the CLK periods before it; a counter cannot. So windows of the same
-//!   start value lie later than the QuantIC4x4's, by a window and two CLK periods.
+//!   start value lie later than the QuantIC4x4's, by a window and one CLK period.
 //! * The next laser cycle's COUNTER_RESET ends a window that is still open.
 //!
 //! Timing: START must keep setup and hold of COUNTING's CLK edge, and be low for one CLK edge after STOP. Everything else lies between two
