@@ -243,7 +243,7 @@ fn studies_that_cannot_be_are_refused_with_their_lines() {
         ),
         (
             "[vary]\nsensor.tdc = [\"sundial\"]\n",
-            "give clocked, delay_line",
+            "give clocked, counter, delay_line",
         ),
         (
             "[vary]\nscene.light.illuminance_klux = {from=0, to=100, steps=3, scale=\"log\"}\n",

@@ -1,9 +1,9 @@
 //! Histogram of a counter TDC: bins to which several events are added at once (thesis 4.9.3; `metdc_counter`).
 //!
 //! ```text
-//!   BIN_0 … BIN_M-1 ─► AND-OR by SELECT ─► + EVENTS ─► NEXT ─┐
-//!       ▲                                     └─ carry ─► OR ┘ Overflow::Saturate: NEXT is all ones
-//!       └── each bin: mux ◄── SELECT<bin>: NEXT, or what it was ──┘      clocked by CLK
+//!   each bin:  [COUNT] ─► AND ◄─ SELECT<bin> ─► CHOSEN ─► OR of all bins ─► + EVENTS ─► NEXT ─┐
+//!                 ▲                                                 └─ carry ─► OR ┘  Overflow::Saturate: all ones
+//!                 └── mux ◄─ SELECT<bin>: NEXT, or what it was ◄──────────────────────────────┘   clocked by CLK
 //! ```
 //!
 //! A ripple counter, as `histogram` has it, counts one edge at a time. Here one adder serves all bins, because one is selected at a time.
@@ -18,7 +18,10 @@ use super::histogram::bin_name;
 use crate::chip::config::Overflow;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
-/// One bin. Ports: CLK, SELECT, NEXT\<bits\>, PIXEL_CLEAR → COUNT\<bits\>.
+/// Bits for which a buffer of SELECT is strong enough in the cells of libraries.
+const BITS_OF_A_BUFFER: usize = 4;
+
+/// One bin. Ports: CLK, SELECT, NEXT\<bits\>, PIXEL_CLEAR → COUNT\<bits\>, and CHOSEN\<bits\>, which is COUNT while it is selected.
 fn bin_register(bits: usize) -> Arc<Module> {
     let mut m = ModuleBuilder::new("bin_register");
     let clk = m.input("CLK");
@@ -26,8 +29,14 @@ fn bin_register(bits: usize) -> Arc<Module> {
     let next = m.input_bus("NEXT", bits);
     let clear = m.input("PIXEL_CLEAR");
     let count = m.output_bus("COUNT", bits);
+    let chosen = m.output_bus("CHOSEN", bits);
+    let mut enable = select;
     for bit in 0..bits {
-        let data = m.gate(CellKind::Mux2, &[count[bit], next[bit], select]);
+        if bit % BITS_OF_A_BUFFER == 0 {
+            enable = m.gate(CellKind::Buf, &[select]);
+        }
+        m.gate_into(CellKind::And2, &[count[bit], enable], chosen[bit]);
+        let data = m.gate(CellKind::Mux2, &[count[bit], next[bit], enable]);
         m.cell(
             &format!("bit_{bit}"),
             CellKind::Dffr,
@@ -52,15 +61,14 @@ pub fn circuit(bins: usize, bits: usize, event_bits: usize, overflow: Overflow) 
         .map(|bin| m.output_bus(&bin_name(bin), bits))
         .collect();
     let next = m.wire_bus("NEXT", bits);
+    let chosen: Vec<Vec<Net>> = (0..bins)
+        .map(|bin| m.wire_bus(&format!("CHOSEN_{bin}"), bits))
+        .collect();
 
     let mut carry = None;
     let mut sums = Vec::new();
     for bit in 0..bits {
-        let of_bins: Vec<Net> = counts
-            .iter()
-            .zip(&select)
-            .map(|(count, &select)| m.gate(CellKind::And2, &[count[bit], select]))
-            .collect();
+        let of_bins: Vec<Net> = chosen.iter().map(|chosen| chosen[bit]).collect();
         let now = m.tree(CellKind::Or2, &of_bins);
         let addends = events.get(bit).copied().into_iter().chain(carry);
         let addends: Vec<Net> = addends.collect();
@@ -90,7 +98,11 @@ pub fn circuit(bins: usize, bits: usize, event_bits: usize, overflow: Overflow) 
         };
     }
     for (bin, count) in counts.iter().enumerate() {
-        let ports = [("SELECT", &select[bin..=bin]), ("COUNT", &count[..])];
+        let ports = [
+            ("SELECT", &select[bin..=bin]),
+            ("COUNT", &count[..]),
+            ("CHOSEN", &chosen[bin][..]),
+        ];
         m.instance_by_names(&format!("bin_{bin}"), &register, &ports);
     }
     finished(m.finish())

@@ -47,6 +47,8 @@ fn impossible_values_are_refused_with_their_line() {
             "\nevent_type = \"less\"\nthreshold = 3\ntdc = \"delay_line\"",
             2,
         ),
+        ("tdc = \"counter\"\nthreshold = 1", 2),
+        ("tdc = \"counter\"\nmode = \"conventional\"", 2),
         ("clk_skew_ps = -1", 1),
         ("delay_sigma = -0.1", 1),
         ("colour = 1", 1),
