@@ -1,10 +1,11 @@
 //! The counter TDC (thesis 4.9.3): gates, cycle engine, window engine and the model in plain Rust count the same of random sensors and pulses;
 //! where it differs from the shift register and from delay lines; and which engines leave it out, by name.
 
+use guided_dtof::analysis::TimingVerdict;
 use guided_dtof::chip::macropixel::Model;
 use guided_dtof::chip::race::Irregular;
 use guided_dtof::chip::{
-    AfterBorrow, ChipTiming, Exposure, Overflow, PCounter, SensorConfig, Tap, Tdc,
+    AfterBorrow, ChipTiming, Exposure, Overflow, PCounter, SensorConfig, Silicon, Tap, Tdc,
     Window as LawWindow, WindowLaw, hslidar,
 };
 use guided_dtof::engine::{
@@ -285,4 +286,27 @@ fn a_window_that_the_next_laser_cycle_cuts_is_refused() {
     let law = WindowLaw::new(&config, &exposure);
     assert!(law.window(12).open().is_some());
     assert_eq!(law.window(13), LawWindow::Irregular(Irregular::CutWindow));
+}
+
+/// A timing that is met opens windows. START meets a CLK edge at 438 to 457 MHz.
+#[test]
+fn the_verdict_on_the_timing_knows_when_start_races() {
+    for clk_mhz in [200.0, 400.0, 437.0, 447.0, 458.0, 500.0, 600.0] {
+        let config = SensorConfig {
+            clk_hz: clk_mhz * 1e6,
+            ..chip(Tdc::Counter)
+        };
+        let verdict = TimingVerdict::of(&config, &Silicon::of(&config), (0, 0));
+        let law = WindowLaw::new(&config, &Exposure::new(&config, 60, 1));
+        let opens = law.window(3).open().is_some();
+        assert!(opens || !verdict.is_met(), "{clk_mhz} MHz: {verdict}");
+        assert!(
+            verdict.is_met() || clk_mhz > 437.0,
+            "{clk_mhz} MHz: {verdict}"
+        );
+        let races = verdict
+            .to_string()
+            .contains("START rises as CLK samples it");
+        assert_eq!(races, clk_mhz == 447.0, "{clk_mhz} MHz: {verdict}");
+    }
 }

@@ -368,6 +368,14 @@ impl Probes {
         self.clocked_behind(netlist, METDC, Probe::SpadEvent)
     }
 
+    /// The flip-flops of a counter TDC that take START.
+    pub(crate) fn start_samplers<'n>(
+        &self,
+        netlist: &'n Netlist,
+    ) -> impl Iterator<Item = usize> + use<'n> {
+        self.clocked_behind(netlist, METDC, Probe::Start)
+    }
+
     /// Flip-flops of a block that CLK clocks and whose D edges of `from` reach.
     fn clocked_behind<'n>(
         &self,

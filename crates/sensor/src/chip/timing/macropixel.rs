@@ -167,8 +167,15 @@ impl MacropixelCircuit {
 
     /// Of what flip-flops ask of CLK, that of HIT, which catches the strobe, and the rest. The flip-flops that sample SPADs are left out by
     /// design: their data come at any time.
-    pub(crate) fn split(&self, asked: &[Requirement]) -> (Vec<Requirement>, Vec<Requirement>) {
-        let samplers: Vec<usize> = self.probes.samplers(&self.netlist).collect();
+    /// So are those that sample START of a counter TDC, unless `with_start`.
+    pub(crate) fn split(
+        &self,
+        asked: &[Requirement],
+        with_start: bool,
+    ) -> (Vec<Requirement>, Vec<Requirement>) {
+        let of_start = self.probes.start_samplers(&self.netlist);
+        let samplers = self.probes.samplers(&self.netlist);
+        let samplers: Vec<usize> = samplers.chain(of_start.filter(|_| !with_start)).collect();
         let asked = asked
             .iter()
             .filter(|r| !(r.kind.concerns_data() && samplers.contains(&r.cell)));

@@ -116,7 +116,7 @@ impl MeasuredDelays {
         let reset = ResetPulse::among(&circuit, (&delays, &counter), (&library, silicon.corner));
         let clk = Edge::BOTH.map(|edge| paths.after_clk(edge));
         let clk = Requirements::behind(&circuit.netlist, clk, &library, silicon.corner);
-        let (_, clk) = circuit.split(clk.all());
+        let (_, clk) = circuit.split(clk.all(), false);
         let limit_of = |kind, check| {
             let limit = library.checks(kind).at(check, silicon.corner);
             Time::from_fs(limit.into())
