@@ -36,7 +36,7 @@ pub(super) const TESTBENCH: Testbench = Testbench {
     name: "tb_counter_tdc",
     about: "HSLIDAR's counter TDC: several photons in a bin, and its window from LOCAL_STOP on",
     run,
-    own: None,
+    given: None,
 };
 
 fn run(waves: &Path, checks: &mut Checks) -> Result<(), InputError> {

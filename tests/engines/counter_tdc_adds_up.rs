@@ -5,7 +5,7 @@ use guided_dtof::analysis::TimingVerdict;
 use guided_dtof::chip::macropixel::Model;
 use guided_dtof::chip::race::Irregular;
 use guided_dtof::chip::{
-    AfterBorrow, ChipTiming, Exposure, Overflow, PCounter, SensorConfig, Silicon, Tap, Tdc,
+    AfterBorrow, Exposure, Overflow, PCounter, Sensor, SensorConfig, Silicon, Tap, Tdc,
     Window as LawWindow, WindowLaw, hslidar,
 };
 use guided_dtof::engine::{
@@ -123,7 +123,8 @@ proptest! {
         let cycle = Cycle::new(&config, &exposure);
         match law.window(start) {
             LawWindow::Race(_) => {
-                prop_assert!(matches!(cycle.replay(&[pixel]), Err(EngineError::Race(_))));
+                let is_race = matches!(cycle.replay(&[pixel]), Err(EngineError::Race { .. }));
+                prop_assert!(is_race);
                 return Ok(());
             }
             // START as it changes within a laser cycle is the gates' and the cycle engine's to follow.
@@ -139,7 +140,9 @@ proptest! {
         prop_assert_eq!(&gate, &cycle.replay(&[pixel]).unwrap());
         prop_assert_eq!(&gate, &Window::new(&config, &exposure).replay(&[pixel]).unwrap());
         if config.clk_skew_ps == 0.0 || number == 0 {
-            let model = Model::new(&config, ChipTiming::of(&config), &exposure);
+            let sensor = Sensor::from(&config);
+            let delays = (*sensor.timing(), &**sensor.local_stop_delays());
+            let model = Model::new(&config, delays, &exposure);
             let pulses = pulses.iter().map(|pulse| (pulse.time, pulse.spad));
             prop_assert_eq!(&gate[0], &model.histogram(start, pulses)[..]);
         }

@@ -33,7 +33,7 @@ fn count_alike(config: SensorConfig, random: &mut StdRng) -> (bool, bool) {
     let tells = gate.iter().flatten().any(|&count| count > 0);
     match Cycle::new(config, exposure).histograms(starts, &pulses) {
         Ok(cycle) => assert_eq!(gate, cycle, "{config:?}"),
-        Err(EngineError::Race(_)) => return (tells, false),
+        Err(EngineError::Race { .. }) => return (tells, false),
         Err(why) => panic!("{why}: {config:?}"),
     }
     let window = engine::Window::new(config, exposure).histograms(starts, &pulses);

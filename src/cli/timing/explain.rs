@@ -38,8 +38,8 @@ pub(super) fn cells(silicon: &Silicon) -> Result<[Section; 2], InputError> {
         liberty.cells,
         liberty.name
     );
-    let columns = ["cell", "file", "line", "why"];
-    let mut passed_over = Section::new("passed_over", title, &columns);
+    let columns = &["cell", "file", "line", "why"];
+    let mut passed_over = Section::new("passed_over", title, columns);
     for cell in &liberty.passed_over {
         let line = Cell::Number(Some(cell.line as f64), 0);
         let [name, file, why] =

@@ -68,6 +68,7 @@ impl Conflict {
         matches!(
             self,
             Conflict::StrobeAtShift
+                | Conflict::StartAtClk
                 | Conflict::CutPulse
                 | Conflict::StrobeAtNextReset
                 | Conflict::StrobeAtReset

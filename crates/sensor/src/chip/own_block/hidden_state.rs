@@ -26,8 +26,8 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use crate::chip::p_counter::count_down::{Expected, SHORTEST_PAUSE};
 use crate::chip::config::AfterBorrow;
+use crate::chip::p_counter::count_down::{Expected, SHORTEST_PAUSE};
 use crate::chip::timing::silicon::Silicon;
 use crate::chip::{Probe, Probes};
 use crate::kernel::{LANES, LaneDrive, LaneKernel, Lanes};
