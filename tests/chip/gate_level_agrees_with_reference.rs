@@ -128,8 +128,7 @@ proptest! {
         let window = law.window(*start);
         if let LawWindow::Race(_) = window {
             let refused = Window::new(config, &exposure).histogram(*start, &case.pulses);
-            let is_race = matches!(refused, Err(EngineError::Race { .. }));
-            prop_assert!(is_race);
+            prop_assert!(matches!(refused, Err(EngineError::Race { .. })));
             return Ok(());
         }
 
