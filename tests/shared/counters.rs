@@ -483,7 +483,7 @@ impl<'r> Circuit<'r> {
             let mut data = next[bit];
             if hidden == Reset && bit == 0 {
                 data = self.gate(Or2, &[data, self.reset]);
-                self.named = Some("OR2 ");
+                self.named = Some("(OR2)");
             }
             self.load_bit((bit, q[bit]), data, self.init[bit], pulse);
         }

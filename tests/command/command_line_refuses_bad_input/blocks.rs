@@ -307,11 +307,18 @@ fn testbenches_take_the_sensor_of_a_block() {
         "sensor.after_borrow=wrap",
     ];
     refused(dir, &arguments, "has no reset, which tb_p_counter needs");
-    let coarse = ["tb", "macropixel", "--set", "sensor.step_periods=32"];
+    let coarse = [
+        "tb",
+        "macropixel",
+        "--set",
+        "sensor.step_periods=8",
+        "--set",
+        "sensor.bins=8",
+    ];
     refused(
         dir,
         &coarse,
-        "no two of its windows share any of their 16 bins",
+        "no two of its windows share any of their 8 bins",
     );
 }
 
