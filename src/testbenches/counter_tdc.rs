@@ -3,7 +3,7 @@
 //!
 //! ```text
 //!   photons ─► SPAD_RAW ─► SPAD_TIMED ─► EVENTS ─┐
-//!   LOCAL_STOP ─► START ─► COUNTING ─► CODE ─► SELECT ─► bins
+//!   LOCAL_STOP ─► START ─► COUNTING ─► CODE ─► SELECTED ─► bins
 //! ```
 //!
 //! Photons are placed by the window law. What is found is counted by the gates.
@@ -161,7 +161,7 @@ fn window_by_window(
         edges_seen += 1;
     }
     checks.equal(
-        "CLK periods in which SELECT is the model's",
+        "CLK periods in which SELECTED is the model's",
         edges_seen,
         as_modelled,
     );

@@ -190,7 +190,7 @@ proptest! {
         for k in 0..=starts.len() as i64 {
             bench.pulse(rise(k), Time::from_ps(period_ps / 2), "CLK");
         }
-        let select = bench.bus("SELECT");
+        let select = bench.bus("SELECTED");
         let mut run = bench.start(&[]);
         let mut model = metdc_counter::Model::new(bins);
         for (k, &start) in (1..).zip(&starts) {
@@ -220,7 +220,7 @@ proptest! {
             bench.number(rise(k) - Time::from_ns(4), "EVENTS", events);
             // None of the bins now and then.
             let select = if bin < bins { 1 << bin } else { 0 };
-            bench.number(rise(k) - Time::from_ns(4), "SELECT", select);
+            bench.number(rise(k) - Time::from_ns(4), "SELECTED", select);
             bench.pulse(rise(k), Time::from_ns(2), "CLK");
             if let Some(sum) = sums.get_mut(bin) {
                 *sum += events;

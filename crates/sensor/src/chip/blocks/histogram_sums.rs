@@ -1,9 +1,9 @@
 //! Histogram of a counter TDC: bins to which several events are added at once (thesis 4.9.3; `metdc_counter`).
 //!
 //! ```text
-//!   each bin:  [COUNT] ─► AND ◄─ SELECT<bin> ─► CHOSEN ─► OR of all bins ─► + EVENTS ─► NEXT ─┐
+//!   each bin:  [COUNT] ─► AND ◄─ SELECTED<bin> ─► CHOSEN ─► OR of all bins ─► + EVENTS ─► NEXT ─┐
 //!                 ▲                                                 └─ carry ─► OR ┘  Overflow::Saturate: all ones
-//!                 └── mux ◄─ SELECT<bin>: NEXT, or what it was ◄──────────────────────────────┘   clocked by CLK
+//!                 └── mux ◄─ SELECTED<bin>: NEXT, or what it was ◄──────────────────────────────┘   clocked by CLK
 //! ```
 //!
 //! A ripple counter, as `histogram` has it, counts one edge at a time. Here one adder serves all bins, because one is selected at a time.
@@ -18,14 +18,14 @@ use super::histogram::bin_name;
 use crate::chip::config::Overflow;
 use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 
-/// Bits for which a buffer of SELECT is strong enough in the cells of libraries.
+/// Bits for which a buffer of SELECTED is strong enough in the cells of libraries.
 const BITS_OF_A_BUFFER: usize = 4;
 
-/// One bin. Ports: CLK, SELECT, NEXT\<bits\>, PIXEL_CLEAR → COUNT\<bits\>, and CHOSEN\<bits\>, which is COUNT while it is selected.
+/// One bin. Ports: CLK, SELECTED, NEXT\<bits\>, PIXEL_CLEAR → COUNT\<bits\>, and CHOSEN\<bits\>, which is COUNT while it is selected.
 fn bin_register(bits: usize) -> Arc<Module> {
     let mut m = ModuleBuilder::new("bin_register");
     let clk = m.input("CLK");
-    let select = m.input("SELECT");
+    let select = m.input("SELECTED");
     let next = m.input_bus("NEXT", bits);
     let clear = m.input("PIXEL_CLEAR");
     let count = m.output_bus("COUNT", bits);
@@ -49,12 +49,12 @@ fn bin_register(bits: usize) -> Arc<Module> {
 
 /// The histogram of a macropixel.
 ///
-/// Ports: CLK, SELECT\<bins\>, EVENTS\<event bits\>, PIXEL_CLEAR → the counts BIN_0\<bits\>, BIN_1\<bits\>, ….
+/// Ports: CLK, SELECTED\<bins\>, EVENTS\<event bits\>, PIXEL_CLEAR → the counts BIN_0\<bits\>, BIN_1\<bits\>, ….
 pub fn circuit(bins: usize, bits: usize, event_bits: usize, overflow: Overflow) -> Arc<Module> {
     let register = bin_register(bits);
     let mut m = ModuleBuilder::new("histogram");
     m.input("CLK");
-    let select = m.input_bus("SELECT", bins);
+    let select = m.input_bus("SELECTED", bins);
     let events = m.input_bus("EVENTS", event_bits);
     m.input("PIXEL_CLEAR");
     let counts: Vec<Vec<Net>> = (0..bins)
@@ -99,7 +99,7 @@ pub fn circuit(bins: usize, bits: usize, event_bits: usize, overflow: Overflow) 
     }
     for (bin, count) in counts.iter().enumerate() {
         let ports = [
-            ("SELECT", &select[bin..=bin]),
+            ("SELECTED", &select[bin..=bin]),
             ("COUNT", &count[..]),
             ("CHOSEN", &chosen[bin][..]),
         ];

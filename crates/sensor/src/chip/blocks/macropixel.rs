@@ -20,7 +20,7 @@
 //!
 //! ```text
 //!   SPAD_RAW ─► front_end ─► adder ─EVENTS─────► histogram_sums
-//!                  LOCAL_STOP ─► metdc_counter ─SELECT─┘
+//!                  LOCAL_STOP ─► metdc_counter ─SELECTED─┘
 //! ```
 //!
 //! [`Model`] is those with CLK in plain Rust, stepped edge by edge through its blocks' models; only
@@ -83,7 +83,7 @@ pub fn circuit(config: &SensorConfig) -> Arc<Module> {
         Tdc::Counter => {
             m.wire_bus("SPAD_TIMED", config.lines());
             m.wire_bus("EVENTS", count_bits(config.lines()));
-            m.wire_bus("SELECT", config.bins);
+            m.wire_bus("SELECTED", config.bins);
         }
         Tdc::DelayLine => {
             m.wire("PHOTONS");
@@ -190,11 +190,18 @@ impl<'a> Model<'a> {
         hits: &mut [u64],
     ) {
         let (config, exposure, timing) = (self.config, self.exposure, &self.timing);
+        let cycles = i64::from(exposure.laser_cycles);
         let mut rises = Vec::new();
         self.run(start, [], |local_stop, _| {
-            rises.push(local_stop + timing.local_stop_to_strobe + timing.strobe_to_hit);
+            let strobe = local_stop + timing.local_stop_to_strobe;
+            let is_held = (0..=cycles).map(|cycle| exposure.stop(cycle)).any(|stop| {
+                (stop + timing.stop_to_hit_reset..stop + timing.stop_to_hit_release)
+                    .contains(&strobe)
+            });
+            if !is_held {
+                rises.push(strobe + timing.strobe_to_hit);
+            }
         });
-        let cycles = i64::from(exposure.laser_cycles);
         let falls = (0..=cycles).map(|cycle| exposure.stop(cycle) + timing.stop_to_start_falls);
         let falls: Vec<Time> = falls.collect();
         let last = |times: &[Time], now| {

@@ -6,7 +6,7 @@
 //!                                    [COUNTING]    clocked by CLK, as is CODE
 //!                                         │
 //!                     ┌────── + 1 ◄───────┤ CODE is 0 while COUNTING is low, and stops at M
-//!                     └─►[CODE<b>]─► decoder ─► SELECT<0>, SELECT<1>, … SELECT<M-1>
+//!                     └─►[CODE<b>]─► decoder ─► SELECTED<0>, SELECTED<1>, … SELECTED<M-1>
 //!
 //!   SPAD_TIMED<n> ─► population count ─► EVENTS<c>                       (adder)
 //! ```
@@ -45,13 +45,13 @@ const fn code_bits(bins: usize) -> usize {
 
 /// A METDC of `bins` bins.
 ///
-/// Ports: CLK, LOCAL_STOP, STOP, STOP_D, COUNTER_RESET, CONVENTIONAL, PIXEL_CLEAR → SELECT\<bins\> (bin 0 = earliest).
+/// Ports: CLK, LOCAL_STOP, STOP, STOP_D, COUNTER_RESET, CONVENTIONAL, PIXEL_CLEAR → SELECTED\<bins\> (bin 0 = earliest).
 pub fn circuit(bins: usize) -> Arc<Module> {
     let mut m = ModuleBuilder::new("metdc");
     let clk = m.input("CLK");
     let strobe_inputs = metdc::StrobeInputs::of(&mut m);
     let clear = m.input("PIXEL_CLEAR");
-    let select = m.output_bus("SELECT", bins);
+    let select = m.output_bus("SELECTED", bins);
     let strobe = m.wire("STROBE");
     let start = m.wire("START");
     let counting = m.wire("COUNTING");

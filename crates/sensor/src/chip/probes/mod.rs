@@ -181,7 +181,7 @@ impl Probe {
             Probe::Start => (Some(METDC), "START"),
             Probe::Counting => (Some(METDC), "COUNTING"),
             Probe::Code => (Some(METDC), "CODE"),
-            Probe::Select => (None, "SELECT"),
+            Probe::Select => (None, "SELECTED"),
             Probe::Events => (None, "EVENTS"),
         }
     }

@@ -264,10 +264,10 @@ impl Edges {
     ) -> (Found, Option<(i64, Time)>) {
         let (setup, hold) = (self.timing.setup, self.timing.hold);
         let falls = self.timing.stop_to_start_falls;
-        let edges = || {
-            self.numbers()
-                .map(|edge| (edge, self.exposure.rising(edge)))
-        };
+        // Delays that are drawn to meet a limit may put START far outside the laser cycle.
+        let (all, around) = (self.numbers(), self.exposure.rising_until(rises));
+        let all = all.start.min(around - 2)..all.end.max(around + 3);
+        let edges = || all.clone().map(|edge| (edge, self.exposure.rising(edge)));
         for (_, clk) in edges() {
             let (from, to) = (falls - hold - NEAR, falls + setup + NEAR);
             if from <= clk && clk <= to {
