@@ -20,7 +20,7 @@ fn text() -> String {
 
 /// A flip-flop with set and reset, and two inverters behind it.
 fn small() -> Netlist {
-    let mut m = ModuleBuilder::new("small");
+    let mut m = ModuleBuilder::new("behind");
     let inputs = ["D", "CK", "R", "S"].map(|name| m.input(name));
     let (q, z) = (m.wire("Q"), m.output("Z"));
     let unused = m.wire("QN");
@@ -95,7 +95,7 @@ fn odd_names_of_cells_and_pins_are_escaped() {
     let odd = odd.replace("\"INV\\\\$1\"", "\"INV$1\"");
     let [verilog, models, sdf, _] = files(&odd);
     assert!(verilog.contains("  \\INV$1  \\"), "{verilog}");
-    assert!(verilog.contains("  \\dffsr:1  \\small"), "{verilog}");
+    assert!(verilog.contains("  \\dffsr:1  \\behind"), "{verilog}");
     assert!(verilog.contains(".\\RN[0] ("), "{verilog}");
     assert!(models.contains("module \\INV$1 ("), "{models}");
     assert!(models.contains("primitive \\INV$1_FUNCTION ("), "{models}");
