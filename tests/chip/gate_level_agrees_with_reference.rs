@@ -128,7 +128,8 @@ proptest! {
         let window = law.window(*start);
         if let LawWindow::Race(_) = window {
             let refused = Window::new(config, &exposure).histogram(*start, &case.pulses);
-            prop_assert!(matches!(refused, Err(EngineError::Race { .. })));
+            let is_race = matches!(refused, Err(EngineError::Race { .. }));
+            prop_assert!(is_race);
             return Ok(());
         }
 
