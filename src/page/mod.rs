@@ -22,7 +22,7 @@ use std::path::Path;
 
 use self::packed::Packed;
 use self::recording::Recording;
-use crate::files::{InputError, OutputFile, begins_with, set_aside_foreign};
+use crate::files::{InputError, OutputFile};
 
 /// The page of what `gdtof frame` or `gdtof drive` has left in `folder`.
 #[derive(Debug)]
@@ -52,12 +52,11 @@ impl Page {
         self.html.len()
     }
 
-    /// Writes it. A file of that name that is no such page is set aside.
+    /// Writes it.
     ///
     /// # Errors
     /// When it cannot be written.
     pub(crate) fn write(&self, path: &Path) -> Result<(), InputError> {
-        set_aside_foreign(path, begins_with(html::SIGNATURE))?;
         OutputFile::write_with(path, |w| w.write_all(self.html.as_bytes()))
     }
 }

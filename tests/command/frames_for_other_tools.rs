@@ -94,7 +94,7 @@ fn a_folder_without_a_frame_is_refused() {
     done(here, &FRAME);
     refused(
         &["export", "frame", "out", "--out", "out"],
-        "out: holds the results of `gdtof frame`, which `gdtof export frame` does not replace",
+        "is the folder of the frame itself",
     );
     refused(&["export", "frame", "out", "--format", "las"], "las");
     let histograms = here.join("out").join("histograms.npy");
