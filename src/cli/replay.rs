@@ -133,8 +133,10 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         let message = "takes delays and limits from elsewhere; leave out either --sdf or process, voltage, temperature and mismatch";
         return Err(InputError::new("--sdf", message).into());
     }
-    if let Some(verdict) = timing.as_ref().and_then(VerdictReport::warning) {
-        eprintln!("gdtof: {verdict}");
+    let warning = timing.as_ref().and_then(VerdictReport::warning);
+    // The other engines refuse what matters to them; the gates do not.
+    if let (Some(warning), EngineKind::Gate) = (&warning, args.engine) {
+        eprintln!("gdtof: {warning}");
     }
     let needs_array =
         args.vcd.is_some() || args.saif.is_some() || args.sdf.is_some() || args.checks.is_some();
@@ -185,6 +187,10 @@ impl Summary {
     fn tell(&self, config: &SensorConfig) {
         if let Some(coverage) = &self.time_keeping {
             eprint!("{}", table(coverage));
+        }
+        let unmet = self.timing.as_ref().filter(|timing| !timing.met);
+        if let (Some(timing), true) = (unmet, self.engine != EngineKind::Gate) {
+            eprintln!("gdtof: timing {}", timing.verdict);
         }
         let later_windows = |timing: &VerdictReport| timing.later_windows.clone();
         if let Some(text) = self.timing.as_ref().and_then(later_windows) {
