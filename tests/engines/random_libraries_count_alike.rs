@@ -222,24 +222,24 @@ fn compare(seed: u32, file: &Path, tally: &mut Tally) {
             Err(EngineError::Irregular(_)) => tally.irregular += 1,
             Err(other) => tally.fail(other.to_string(), name),
         }
-        if let Ok(cycle) = Cycle::new(config, exposure).histogram(start, pulses) {
-            if Ok(&cycle) != counted.as_ref() {
-                tally.fail("cycle".into(), || {
-                    format!("{cycle:?} {counted:?} {}", name())
-                });
-            }
+        if let Ok(cycle) = Cycle::new(config, exposure).histogram(start, pulses)
+            && Ok(&cycle) != counted.as_ref()
+        {
+            tally.fail("cycle".into(), || {
+                format!("{cycle:?} {counted:?} {}", name())
+            });
         }
         let pixel = PulsedPixel {
             number: place as u32,
             start,
             pulses,
         };
-        if let (Ok(timed), Ok(counted)) = (timed.replay(&[pixel]), &counted) {
-            if &timed[0] != counted {
-                tally.fail("timed".into(), || {
-                    format!("{:?} {counted:?} {}", &timed[0], name())
-                });
-            }
+        if let (Ok(timed), Ok(counted)) = (timed.replay(&[pixel]), &counted)
+            && &timed[0] != counted
+        {
+            tally.fail("timed".into(), || {
+                format!("{:?} {counted:?} {}", &timed[0], name())
+            });
         }
     }
 }

@@ -80,9 +80,9 @@ impl Maker<'_> {
         for input in inputs.chars() {
             self.input(&input.to_string(), "");
         }
-        let _ = write!(
+        let _ = writeln!(
             self.text,
-            "    pin (Y) {{ direction : output; function : \"{function}\";\n"
+            "    pin (Y) {{ direction : output; function : \"{function}\";"
         );
         for input in inputs.chars() {
             self.arc(&input.to_string(), sense, "", delay, &["rise", "fall"]);
@@ -185,9 +185,9 @@ impl Maker<'_> {
         }
         let outputs = if self.has(0.7) { 2 } else { 1 };
         for (pin, function) in [("Q", "IQ"), ("QN", "IQN")].into_iter().take(outputs) {
-            let _ = write!(
+            let _ = writeln!(
                 self.text,
-                "    pin ({pin}) {{ direction : output; function : \"{function}\";\n"
+                "    pin ({pin}) {{ direction : output; function : \"{function}\";"
             );
             self.arc("CK", "non_unate", "rising_edge", 0.055, &both);
             let (cleared, set) = if pin == "Q" {
