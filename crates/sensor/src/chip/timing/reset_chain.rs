@@ -9,7 +9,7 @@
 //!
 //! Edges that the reset itself sends into the clocks of the P-counter must meet a reset that still holds. Otherwise the counter counts
 //! once more in every laser cycle but the first. How long they take depends on the cells, so the chain is sized for them: from the
-//! built-in length on it grows, a buffer at a time, until the pulse is a tenth longer than needed in every corner that has a library.
+//! built-in length on it grows until the pulse is a tenth longer than needed in every corner that has a file.
 
 use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
@@ -60,9 +60,10 @@ impl SensorConfig {
     }
 }
 
-/// The shortest chain with which the pulse is a tenth longer than needed in this corner.
+/// The shortest chain with which the pulse is long enough in this corner: in the cells of a library, a tenth longer than needed.
 fn sufficient_chain(config: &SensorConfig) -> usize {
     let silicon = Silicon::of(config);
+    let is_of_file = silicon.cell_library.from_file().is_some();
     let mut stages = SHORTEST_CHAIN;
     loop {
         let pulse = ResetPulse::measure(
@@ -72,7 +73,13 @@ fn sufficient_chain(config: &SensorConfig) -> usize {
             },
             &silicon,
         );
-        let needed = pulse.need.as_fs() + pulse.need.as_fs() / 10;
+        // The built-in cells have the length that was chosen with them.
+        let spare = if is_of_file {
+            pulse.need.as_fs() / 10
+        } else {
+            0
+        };
+        let needed = pulse.need.as_fs() + spare;
         let missing = needed - pulse.width.as_fs();
         if missing <= 0 || stages >= LONGEST_CHAIN {
             return stages;
