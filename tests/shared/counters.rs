@@ -244,7 +244,7 @@ impl<'r> Circuit<'r> {
             Init | Clocked | Transparent | Late | Adding | Moving
         );
         let has_ranks = is_plain && self.random.random_bool(0.2);
-        let ranks = has_ranks.then(|| self.m.wire_bus("FIRST", bits));
+        let ranks = has_ranks.then(|| self.m.wire_bus("FOREMOST", bits));
         for bit in 0..bits {
             let q = memory[bit];
             match hidden {
@@ -475,7 +475,7 @@ impl<'r> Circuit<'r> {
             late = self.gate(Buf, &[late]);
         }
         let late = self.gate(Inv, &[late]);
-        let pulse = self.m.wire("LOAD_PULSE");
+        let pulse = self.m.wire("PULSE_OF_LOAD");
         self.m.gate_into(And2, &[self.load, late], pulse);
         let q = self.m.wire_bus("COUNT", bits);
         let next = self.next(&q, false);
