@@ -67,7 +67,7 @@ pub fn chips() -> Vec<SensorConfig> {
         ..SensorConfig::clone(&hslidar())
     };
     chips.extend([hslidar, SensorConfig::clone(&hslidar_delay_line())]);
-    // Of one length, so that libraries are told apart by their cells alone.
+    // Chains sized for the library are not compared yet: Icarus has other edges of COUNTER_CLK there, which are not explained.
     for chip in &mut chips {
         chip.reset_stages = SHORTEST_CHAIN;
     }
