@@ -20,7 +20,7 @@
 //!   ([`AfterBorrow`]) goes without that: BLOCK is NOT ENABLE.
 //!
 //! Timing: at a STOP edge the falling LOCAL_STOP unblocks COUNTER_CLK, which rises if CLK is low. That
-//! edge must still meet an active reset, hence the length of the chain ([`reset_chain`](crate::chip::timing::reset_chain)).
+//! edge must still meet an active reset, hence the length of the chain (`timing/reset_chain`).
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ use crate::netlist::{CellKind, Module, ModuleBuilder, Net};
 use crate::units::Time;
 
 /// Fewest buffers in the delay chain that sets the width of COUNTER_RESET. A library may need more
-/// ([`SensorConfig::reset_stages`]).
+/// ([`reset_stages`](crate::chip::config::SensorConfig::reset_stages)).
 pub const SHORTEST_CHAIN: usize = 6;
 
 /// The timing block.
