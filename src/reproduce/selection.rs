@@ -110,7 +110,7 @@ mod tests {
                 "{numbers:?}"
             );
         }
-        assert_eq!(Selection::all().claims, (1..=28).collect::<Vec<_>>());
+        assert_eq!(Selection::all().claims, (1..=29).collect::<Vec<_>>());
     }
 
     #[test]

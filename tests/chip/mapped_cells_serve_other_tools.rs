@@ -96,7 +96,8 @@ fn tied_pins(models: &str, netlist: &str, cell: &str) -> String {
         .unwrap();
     let (_, inputs) = ports.split_once("input ").unwrap();
     let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    let used: Vec<&str> = body.split(|c| !is_name(c)).collect();
+    let lines = body.lines().filter(|line| !line.contains("inner_unused"));
+    let used: Vec<&str> = lines.flat_map(|line| line.split(|c| !is_name(c))).collect();
     let unused = inputs.split(", ").filter(|input| !used.contains(input));
     let instances = netlist.lines();
     let instances = instances.filter(|line| line.trim_start().starts_with(&format!("{cell} ")));

@@ -27,8 +27,8 @@ pub(in crate::netlist) struct FlipFlop {
     /// Outputs that show the state, and its inverse.
     pub q: Option<usize>,
     pub qn: Option<usize>,
-    /// Whether the preset wins where clear and preset are both active.
-    pub preset_wins: bool,
+    /// Levels of the state and of its inverse while clear and preset are both active, where the file gives them.
+    pub both_active: [Option<bool>; 2],
     /// Inputs that are tied, as bits, and the levels that they are tied to.
     pub tied: u32,
     pub tied_levels: u32,
@@ -43,8 +43,27 @@ impl FlipFlop {
             preset: self.clear,
             q: self.qn,
             qn: self.q,
-            preset_wins: !self.preset_wins,
+            both_active: [self.both_active[1], self.both_active[0]],
             ..self
+        }
+    }
+
+    /// The same flip-flop without the output of the inverse state, where that is not the other's inverse while clear and preset are active.
+    pub(super) fn with_outputs_that_agree(self) -> Self {
+        let [state, inverse] = self.both_active;
+        let agree = self.q.is_none() || state == inverse.map(|level| !level);
+        FlipFlop {
+            qn: self.qn.filter(|_| agree),
+            ..self
+        }
+    }
+
+    /// Whether its outputs show that the preset wins while clear and preset are both active; none where the file does not say.
+    pub(super) fn preset_wins(&self) -> Option<bool> {
+        let [state, inverse] = self.both_active;
+        match self.q {
+            Some(_) => state,
+            None => inverse.map(|level| !level),
         }
     }
 
@@ -61,9 +80,22 @@ impl FlipFlop {
         for attribute in ["clear_preset_var1", "clear_preset_var2"] {
             check_word(ff, attribute, &["L", "H", "N", "T", "X"])?;
         }
-        let preset_wins = ff.value("clear_preset_var1") == Some("H");
+        let level = |attribute| match ff.value(attribute)? {
+            "H" => Some(true),
+            "L" => Some(false),
+            // Kept, toggled or unknown.
+            _ => None,
+        };
+        let [state, inverse] = ["clear_preset_var1", "clear_preset_var2"].map(level);
+        let given = |attribute| ff.value(attribute).is_some();
+        // One that is not given is the other's inverse.
+        let both_active = match [given("clear_preset_var1"), given("clear_preset_var2")] {
+            [true, false] => [state, state.map(|level| !level)],
+            [false, true] => [inverse.map(|level| !level), inverse],
+            _ => [state, inverse],
+        };
         Ok(pins(cell, ff, inputs, outputs).map(|pins| FlipFlop {
-            preset_wins,
+            both_active,
             ..pins
         }))
     }
@@ -95,7 +127,7 @@ fn pins(cell: &Group<'_>, ff: &Group<'_>, inputs: &[&str], outputs: &[&str]) -> 
         preset,
         q,
         qn,
-        preset_wins: false,
+        both_active: [None; 2],
         tied,
         tied_levels,
     })

@@ -119,11 +119,13 @@ fn write_primitive(out: &mut dyn Write, name: &str, function: TruthTable) -> io:
 /// of inner nets are none of a library's pins.
 fn write_flip_flop(out: &mut dyn Write, model: &CellModel, roles: &FlipFlop) -> io::Result<()> {
     let inverts = |inverted: bool| if inverted { "not" } else { "buf" };
-    let (strong, weak) = match roles.preset_wins {
-        true => (roles.preset, roles.clear),
-        false => (roles.clear, roles.preset),
+    let preset_wins = roles.with_outputs_that_agree().preset_wins() == Some(true);
+    let (strong, weak) = if preset_wins {
+        (roles.preset, roles.clear)
+    } else {
+        (roles.clear, roles.preset)
     };
-    let data = (roles.data.0, roles.data.1 != roles.preset_wins);
+    let data = (roles.data.0, roles.data.1 != preset_wins);
     let pins = [
         ("d", Some(data)),
         ("ck", Some(roles.clock)),
@@ -142,6 +144,14 @@ fn write_flip_flop(out: &mut dyn Write, model: &CellModel, roles: &FlipFlop) -> 
                 in_verilog(&model.inputs[pin].name)
             )?;
         }
+    }
+    let tied = (0..model.inputs.len()).filter(|pin| roles.tied >> pin & 1 == 1);
+    let tied: Vec<String> = tied
+        .map(|pin| in_verilog(&model.inputs[pin].name))
+        .collect();
+    if !tied.is_empty() {
+        // Lint asks what reads them, but for a wire of this name.
+        writeln!(out, "  wire inner_unused = &{{1'b0, {}}};", tied.join(", "))?;
     }
     writeln!(out, "`ifdef FUNCTIONAL\n  reg inner_state;")?;
     let mut edges = String::from("posedge inner_ck");
@@ -168,7 +178,7 @@ fn write_flip_flop(out: &mut dyn Write, model: &CellModel, roles: &FlipFlop) -> 
         "  always @({edges})\n    {next}\n`else\n  wire inner_state;\n  reg inner_notifier;\n  DFFSR_STATE inner_memory(inner_state, inner_d, inner_ck, {reset}, {set}, inner_notifier);\n`endif"
     )?;
     for (index, output) in model.outputs.iter().enumerate() {
-        let inverted = (roles.q != Some(index)) != roles.preset_wins;
+        let inverted = (roles.q != Some(index)) != preset_wins;
         let output = in_verilog(&output.name);
         writeln!(
             out,

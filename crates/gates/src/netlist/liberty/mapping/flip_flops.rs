@@ -1,8 +1,8 @@
 //! Which flip-flop of a library stands for one with reset (and set), and what is put around it.
 //!
-//! A plain flip-flop comes before one of whose pins some are tied, as a scan chain's are, and both before cells that the library says
+//! One whose file says what set and reset do together comes before one where that is open, a plain flip-flop before one of whose pins some are tied, as a scan chain's are, and both before cells that the library says
 //! not to use. Of equal ones it is that of least area, its inverters counted. A flip-flop may stand for one of the inverse state, with
-//! clear and preset exchanged.
+//! clear and preset exchanged: our reset wins over the set, and in many libraries the preset wins.
 
 use super::super::cell::{Candidate, FlipFlop, Role};
 use super::super::complete::check_flip_flop;
@@ -19,6 +19,13 @@ impl<'g, 't> Maker<'g, 't> {
         let wanted = self.wanted.iter().find(|(k, _)| *k == kind);
         let is_wanted = |c: &Candidate<'_, '_>| wanted.is_none_or(|(_, name)| name == c.name());
         let both = |c: &'g Candidate<'g, 't>| match &c.role {
+            Role::FlipFlop(roles) if with_set => {
+                let roles = roles.with_outputs_that_agree();
+                match roles.preset_wins() {
+                    Some(true) => vec![(c, roles.mirrored())],
+                    _ => vec![(c, roles)],
+                }
+            }
             Role::FlipFlop(roles) => vec![(c, *roles), (c, roles.mirrored())],
             Role::Gate(_) => Vec::new(),
         };
@@ -33,7 +40,8 @@ impl<'g, 't> Maker<'g, 't> {
             .map(|(cell, roles)| {
                 let inverters = inverters(&roles, with_set) as f64;
                 let area = cell.area + inverters * inverter.drives[0].area;
-                ((cell.dont_use, roles.tied != 0), area, cell, roles)
+                let is_open = with_set && roles.preset_wins().is_none();
+                ((is_open, cell.dont_use, roles.tied != 0), area, cell, roles)
             })
             .collect();
         ranked.sort_by(|(a, a_area, x, _), (b, b_area, y, _)| {
@@ -112,23 +120,10 @@ impl<'g, 't> Maker<'g, 't> {
         notes: &mut Notes,
     ) {
         let (name, kind_name) = (chosen.name(), kind.name());
-        let ff = chosen.group.of_kind("ff").next();
-        let word = |attribute| ff.and_then(|ff| ff.value(attribute));
-        if kind == CellKind::Dffsr {
-            // What our Q is then: the cell's state, or where that is the inverse one, the other of its two.
-            let is_mirrored = chosen.role != Role::FlipFlop(*roles);
-            let attribute = if is_mirrored {
-                "clear_preset_var2"
-            } else {
-                "clear_preset_var1"
-            };
-            let winner = word(attribute);
-            if winner != Some("L") {
-                notes.made.push(format!(
-                    "with set and reset both active {name} is {}; the model's reset wins",
-                    winner.map_or("undefined".to_owned(), |state| format!("{state:?}"))
-                ));
-            }
+        if kind == CellKind::Dffsr && roles.preset_wins().is_none() {
+            notes.odd.push(format!(
+                "the library leaves open what {name} does while clear and preset are both active (clear_preset_var1); the clear is taken to win"
+            ));
         }
         let tied = chosen.inputs.iter().enumerate();
         let tied = tied.filter(|(pin, _)| roles.tied >> pin & 1 == 1);

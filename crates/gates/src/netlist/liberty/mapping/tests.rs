@@ -1,5 +1,7 @@
 //! Recipes compute what their kind does, whatever a library has and lacks, and families are what their tables say.
 
+mod flip_flops;
+
 use super::*;
 use crate::netlist::liberty::Liberty;
 
@@ -155,34 +157,6 @@ fn every_gate_is_made_from_few_cells() {
             }
         }
     }
-}
-
-#[test]
-fn flip_flops_of_other_edges_and_levels_get_inverters() {
-    let gates =
-        gate_text("INV_1", 4.0, &["A"], "!A") + &gate_text("NAND_1", 2.0, &["A", "B"], "!(A B)");
-    let smaller_first = flip_flops().replacen("area : 9", "area : 8", 1);
-    let map = map(&(gates + &smaller_first), &[]).unwrap();
-    let dffr = map.recipe(CellKind::Dffr);
-    // DSR_1 is larger and has a preset, but lacks two inverters less.
-    assert_eq!(map.cells(CellKind::Dffr), ["DSR_1", "INV_1"]);
-    assert_eq!(
-        dffr.stages[0].sources,
-        // CK, D, R and SN.
-        [
-            Source::Input(1),
-            Source::Input(0),
-            Source::Input(2),
-            Source::Constant(true)
-        ]
-    );
-    assert_eq!(dffr.outputs, [Source::Stage(1, 0), Source::Stage(0, 0)]);
-    assert_eq!(map.cells(CellKind::Dffsr), ["INV_1", "DSR_1", "INV_1"]);
-    assert!(
-        map.notes.iter().any(|note| note.contains("\"H\"")),
-        "{:?}",
-        map.notes
-    );
 }
 
 #[test]
@@ -393,76 +367,6 @@ fn cells_that_lack_something_are_refused_with_their_line() {
         let message = found.unwrap_err().message;
         assert!(message.contains(says), "{message}");
     }
-}
-
-#[test]
-fn a_scan_flip_flop_is_taken_where_there_is_no_other() {
-    let gates =
-        gate_text("INV_1", 1.0, &["A"], "!A") + &gate_text("NAND_1", 2.0, &["A", "B"], "!(A B)");
-    let plain = flip_flop_text(
-        "DR_1",
-        "next_state : \"D\"; clocked_on : \"CK\"; clear : \"R\";",
-        &["CK", "D", "R"],
-        &[("Q", "IQ"), ("QN", "IQN")],
-    );
-    let scan = flip_flop_text(
-        "SDRS_1",
-        "next_state : \"(SE SI) + (!SE D)\"; clocked_on : \"CK\"; clear : \"R\"; preset : \"S\"; clear_preset_var1 : L;",
-        &["CK", "D", "R", "S", "SE", "SI"],
-        &[("Q", "IQ"), ("QN", "IQN")],
-    );
-    let unused = scan.replace("area : 9;", "area : 9; dont_use : true;");
-    for (set_and_reset, says_not_to_use) in [(&scan, false), (&unused, true)] {
-        let found = map(&(gates.clone() + &plain + set_and_reset), &[]).unwrap();
-        assert_eq!(found.cells(CellKind::Dffr), ["DR_1"]);
-        assert_eq!(found.cells(CellKind::Dffsr), ["SDRS_1"]);
-        let tied = Source::Constant(false);
-        let inputs = [1, 0, 2, 3].map(Source::Input);
-        let sources = [&inputs[..], &[tied, tied]].concat();
-        assert_eq!(found.recipe(CellKind::Dffsr).stages[0].sources, sources);
-        let told = |says: &str| found.odd.iter().any(|sentence| sentence.contains(says));
-        assert!(
-            told("SDRS_1 with pins tied (SE = 0, SI = 0)"),
-            "{:?}",
-            found.odd
-        );
-        assert_eq!(told("says not to use"), says_not_to_use, "{:?}", found.odd);
-    }
-    // A plain one is preferred, even if it is larger.
-    let both = scan
-        .replace("(SE SI) + (!SE D)", "D")
-        .replace("SDRS_1", "DRS_1")
-        .replace("area : 9", "area : 90");
-    let both = both.replace("pin (SE)", "pin (SE1)");
-    let found = map(&(gates.clone() + &plain + &scan + &both), &[]).unwrap();
-    assert_eq!(
-        found.cells(CellKind::Dffsr),
-        ["SDRS_1"],
-        "a pin without use is tied, too"
-    );
-    let plain_both = flip_flop_text(
-        "DRS_1",
-        "next_state : \"D\"; clocked_on : \"CK\"; clear : \"R\"; preset : \"S\"; clear_preset_var1 : L;",
-        &["CK", "D", "R", "S"],
-        &[("Q", "IQ"), ("QN", "IQN")],
-    );
-    let large = plain_both.replace("area : 9", "area : 90");
-    let found = map(&(gates.clone() + &plain + &scan + &large), &[]).unwrap();
-    assert_eq!(found.cells(CellKind::Dffsr), ["DRS_1"]);
-    // The inverse state, as in a flip-flop that stores !D and shows it inverted: no inverters are needed.
-    let inverse = flip_flop_text(
-        "DQN_1",
-        "next_state : \"!D\"; clocked_on : \"CK\"; clear : \"S\"; preset : \"R\"; clear_preset_var1 : L; clear_preset_var2 : L;",
-        &["CK", "D", "R", "S"],
-        &[("Q", "IQN")],
-    );
-    let found = map(&(gates + &inverse), &[]).unwrap();
-    assert_eq!(found.cells(CellKind::Dffsr), ["DQN_1", "INV_1"]);
-    assert!(
-        !found.notes.iter().any(|note| note.contains("both active")),
-        "{:?}",
-        found.notes
-    );
 }
 
 #[test]
