@@ -11,7 +11,7 @@ use crate::random_library::random_library;
 use crate::scenario::{Scenario, p_counters};
 use guided_dtof::chip::race::{Conflict, Race};
 use guided_dtof::chip::window_law::WindowLaw;
-use guided_dtof::chip::{Exposure, Mode, Probe, Sensor, SensorConfig};
+use guided_dtof::chip::{Exposure, Mode, Probe, Sensor, SensorConfig, Tdc};
 use guided_dtof::engine::{
     Cycle, EngineError, Gate, GateSimulation, PulsedPixel, Replay, Runner, Timed, Window,
 };
@@ -92,6 +92,11 @@ fn sensor_of(random: &mut StdRng, file: &Path) -> SensorConfig {
         counter_bits: random.random_range(3..10),
         bins: random.random_range(2..17),
         bin_bits: 6,
+        tdc: if random.random_bool(0.2) {
+            Tdc::Counter
+        } else {
+            Tdc::Clocked
+        },
         reset_stages: if random.random_bool(0.2) {
             random.random_range(1..12)
         } else {
@@ -255,15 +260,22 @@ fn really_meet(
     let mut gate = GateSimulation::new(config, exposure, (0, 0), (1, 1), &[start], &[pulses]);
     let probes = gate.probes()[0].clone();
     let net = |probe| probes.net(probe);
-    let watched = [
+    let always = [
         Probe::CounterReset,
         Probe::CounterClk,
         Probe::LocalStop,
         Probe::Clk,
         Probe::Strobe,
+        Probe::HitReset,
     ];
-    let blocks = probes.find(Probe::Block).map(|nets| nets[0]);
-    let mut recorder = Recorder::new(watched.map(net).into_iter().chain(blocks));
+    let own = [Probe::Block, Probe::Start];
+    let own = own.into_iter().filter_map(|probe| probes.find(probe));
+    let watched: Vec<_> = always
+        .map(net)
+        .into_iter()
+        .chain(own.map(|nets| nets[0]))
+        .collect();
+    let mut recorder = Recorder::new(watched);
     let origin = gate.schedule().origin;
     gate.run(&mut recorder);
     let timing = law.timing();
@@ -280,6 +292,13 @@ fn really_meet(
             .collect::<Vec<_>>()
     };
     let near = Time::from_fs(6);
+    // Whether an edge of one list comes from `before` before one of the other list to `after` after it.
+    let close = |edges: &[Time], others: &[Time], before: Time, after: Time| {
+        others.iter().any(|&other| {
+            let mut edges = edges.iter();
+            edges.any(|&edge| other - before - near <= edge && edge <= other + after + near)
+        })
+    };
     match race.what {
         Conflict::SlowCorrelation | Conflict::SlowCounter | Conflict::SlowPath => {
             period <= race.comes
@@ -329,6 +348,35 @@ fn really_meet(
                 .into_iter()
                 .any(|(rise, fall)| fall - rise <= timing.counter.clock_high + near)
         }
-        _ => true,
+        // START is data of CLK here.
+        Conflict::StartAtClk => {
+            let (starts, clks) = (rises(Probe::Start), rises(Probe::Clk));
+            close(&starts, &clks, timing.setup, timing.hold)
+        }
+        Conflict::StartFallsAtClk => {
+            let (starts, clks) = (falls(Probe::Start), rises(Probe::Clk));
+            close(&starts, &clks, timing.setup, timing.hold)
+        }
+        // A strobe while HIT is in reset, or too soon after.
+        Conflict::StrobeAtNextReset | Conflict::StrobeAtReset | Conflict::ResetStrobeAtHitReset => {
+            let strobes = rises(Probe::Strobe);
+            let resets = rises(Probe::HitReset);
+            let ends = falls(Probe::HitReset);
+            let width = resets.iter().zip(&ends).map(|(&rise, &fall)| fall - rise);
+            let width = width.max().unwrap_or_default();
+            close(
+                &strobes,
+                &resets,
+                timing.strobe_to_hit,
+                width + timing.recovery,
+            )
+        }
+        Conflict::ClkAtEnable => {
+            let pulse = timing.counter.clock_high + timing.clk_to_counter_clk;
+            close(&rises(Probe::Clk), &falls(Probe::Block), pulse, pulse)
+        }
+        // Of the cells alone, or a count too early or late: no two edges show it.
+        Conflict::BrokenHold | Conflict::LocalStopAtEnable => true,
+        other => unreachable!("{other}"),
     }
 }
