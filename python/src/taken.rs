@@ -69,11 +69,11 @@ impl Taken {
         run(py, None, move |watch| {
             let (report, configuration) = &*taken.get().report;
             watch.check()?;
-            let set = ResultSet::begin(&folder)?;
+            let set = ResultSet::begin(&folder, "frame")?;
             write_frame(set.staging(), report, &histograms)?;
             let configuration: serde_json::Value =
                 serde_json::from_str(configuration).map_err(|e| Failure::Input(e.to_string()))?;
-            Ok(set.commit("frame", configuration)?)
+            Ok(set.commit(configuration)?)
         })
     }
 

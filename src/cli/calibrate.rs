@@ -7,7 +7,7 @@ use clap::Args;
 use super::SensorArgs;
 use super::voice::{progress, tell};
 use crate::chip::{Tdc, WindowLaw};
-use crate::files::{InputError, OutputFile};
+use crate::files::{InputError, OutputFile, refuse_input};
 use crate::numerics::intervals::mean_and_sigma;
 use crate::report::Table;
 use crate::request::{self, Spelling};
@@ -49,6 +49,7 @@ pub(super) struct CalibrateArgs {
 /// Bad input, and a file that cannot be written.
 pub(super) fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     let sensor = args.sensor.read()?;
+    refuse_input(&args.out)?;
     if sensor.tdc != Tdc::DelayLine {
         let message = "bins of a clocked TDC are CLK periods, and there is nothing to calibrate; give a sensor with tdc = \"delay_line\", such as hslidar_delay_line";
         return Err(InputError::new("--sensor", message).into());

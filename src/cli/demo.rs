@@ -96,7 +96,7 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
         .out
         .clone()
         .unwrap_or_else(|| PathBuf::from(format!("demo_{}", name.get_name())));
-    let results = ResultSet::begin(&out)?;
+    let results = ResultSet::begin(&out, "demo")?;
     let began = Instant::now();
     let bar = |what: &str, length: u64| {
         let template = format!("{what} {{bar:40}} {{pos}}/{{len}}, {{eta}} left");
@@ -178,7 +178,7 @@ pub(super) fn run(args: &DemoArgs) -> anyhow::Result<()> {
         calibration_step_ps: args.calibration_step_ps,
     };
     let names = file_names(results.staging())?;
-    notes(results.commit("demo", &configuration)?);
+    notes(results.commit(&configuration)?);
     text += &format!(
         "run time {:.1} s\nin {}: {names} {MANIFEST}\n",
         began.elapsed().as_secs_f64(),

@@ -177,7 +177,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
         skip: settings.reuse,
         self_calibrates: settings.self_calibrates,
     };
-    let results = ResultSet::begin(&args.out)?;
+    let results = ResultSet::begin(&args.out, "drive")?;
     let began = Instant::now();
     let mut drive = Drive::new(&settings)?;
     let [load_s, exposure_s, readout_s] = drive.chip_s();
@@ -237,7 +237,7 @@ pub(super) fn run(args: DriveArgs) -> anyhow::Result<()> {
     let unwritable = |e| InputError::unwritable(&args.out, &e);
     std::fs::write(results.staging().join("drive.json"), format!("{json}\n"))
         .map_err(unwritable)?;
-    notes(results.commit("drive", &configuration)?);
+    notes(results.commit(&configuration)?);
     match args.json {
         true => Ok(say(format_args!("{json}\n"))?),
         false => Ok(tell(report.table(&args.out))?),

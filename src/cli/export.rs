@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 
 use super::replay::Stimuli;
-use super::voice::tell;
+use super::voice::{notes, tell};
 use super::{SensorArgs, export_frame, mapped, sdf};
-use crate::chip::array;
+use crate::chip::{SensorConfig, array};
+use crate::files::{InputError, ResultSet};
 use crate::netlist::Netlist;
 use crate::stimulus::{Export, StimulusPlan};
 
@@ -82,7 +83,7 @@ fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
         args.laser_cycles,
     ) else {
         let (plan, timing) = (None, None);
-        Export { top, plan, timing }.write(&args.out, &sensor)?;
+        write(args, Export { top, plan, timing }, &sensor)?;
         tell(format_args!(
             "design.v, cells.v and cells_specify.v in {folder}; for a testbench, add --inits, --events, --stop-periods and --laser-cycles\n"
         ))?;
@@ -106,9 +107,16 @@ fn run_verilog(args: &VerilogArgs) -> anyhow::Result<()> {
     });
     let timing = timing.transpose()?;
     let (plan, timing) = (Some(&plan), timing.as_ref());
-    Export { top, plan, timing }.write(&args.out, &stimuli.sensor)?;
+    write(args, Export { top, plan, timing }, &stimuli.sensor)?;
     tell(format_args!(
         "cd {folder} && iverilog -g2005 -o sim tb.v design.v cells.v && vvp sim\n"
     ))?;
+    Ok(())
+}
+
+fn write(args: &VerilogArgs, export: Export<'_>, sensor: &SensorConfig) -> Result<(), InputError> {
+    let set = ResultSet::begin(&args.out, "export verilog")?;
+    export.write(set.staging(), sensor)?;
+    notes(set.commit(sensor)?);
     Ok(())
 }

@@ -1,11 +1,11 @@
 //! `gdtof export frame`: a frame as point clouds and arrays.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
 use super::voice::{notes, tell};
-use crate::files::{InputError, ResultSet, read_counts};
+use crate::files::{ResultSet, read_counts};
 use crate::report::{CloudPoint, Npz, write_depth_png, write_npy_f32, write_pcd, write_ply};
 use crate::system::{NoDepth, PixelDepth, TakenFrame, above_background};
 
@@ -50,12 +50,6 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
     let (rows, cols, bins) = (sensor.rows, sensor.cols, sensor.bins);
     let shape = [rows, cols, bins];
     let histograms = read_counts(&args.frame.join("histograms.npy"), &shape)?;
-    let is_frame = |folder: &Path| folder.canonicalize().ok() == args.frame.canonicalize().ok();
-    if is_frame(&args.out) {
-        let message =
-            "is the folder of the frame itself, whose files would be replaced; give another one";
-        return Err(InputError::new("--out", message).into());
-    }
 
     let camera = settings.scene.lidar_camera(rows as u32, cols as u32);
     let points: Vec<CloudPoint> = (pixels.iter().zip(histograms.chunks_exact(bins)).enumerate())
@@ -72,7 +66,7 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
         .collect();
     let depths = of(&pixels, |pixel| pixel.measured_m);
 
-    let results = ResultSet::begin(&args.out)?;
+    let results = ResultSet::begin(&args.out, "export frame")?;
     let all = Format::value_variants();
     let formats = if args.format.is_empty() {
         all
@@ -99,7 +93,7 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
         names.push(name);
     }
     let frame = args.frame.display().to_string();
-    notes(results.commit("export frame", serde_json::json!({ "frame": frame }))?);
+    notes(results.commit(serde_json::json!({ "frame": frame }))?);
     tell(format_args!(
         "{} in {}: {} of {} macropixels have a depth\n",
         names.join(", "),

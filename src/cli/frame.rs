@@ -90,7 +90,7 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     if let Some(warning) = timing.warning() {
         note(warning);
     }
-    let results = ResultSet::begin(&args.out)?;
+    let results = ResultSet::begin(&args.out, "frame")?;
     let probe_at = |(row, col)| Probe {
         row,
         col,
@@ -127,7 +127,7 @@ pub(super) fn run(args: &FrameArgs) -> anyhow::Result<()> {
     if let Some(pair) = &pair {
         pair.write(results.staging())?;
     }
-    notes(results.commit("frame", &report.configuration)?);
+    notes(results.commit(&report.configuration)?);
     if args.json {
         say_json(&report)?;
     } else {

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::SensorArgs;
-use super::voice::{note, tell};
+use super::voice::{note, notes, tell};
 use crate::chip::{CellLibrary, FromFile, Probes, SensorConfig, macropixel};
-use crate::files::{InputError, OutputFile, create_folder};
+use crate::files::{InputError, OutputFile, ResultSet};
 use crate::netlist::Netlist;
 use crate::netlist::liberty::{
     Characterised, Clocking, write_constraints, write_mapped, write_mapped_cells, write_mapped_sdf,
@@ -93,17 +93,19 @@ pub(super) fn write(folder: &Path, config: &SensorConfig) -> anyhow::Result<()> 
         characterised,
         ..
     } = &mapped;
-    create_folder(folder)?;
-    OutputFile::write_with(&folder.join("mapped.v"), |out| {
+    let set = ResultSet::begin(folder, "export verilog --mapped")?;
+    let file = |name: &str| set.staging().join(name);
+    OutputFile::write_with(&file("mapped.v"), |out| {
         write_mapped(out, netlist, &cells.liberty, characterised)
     })?;
-    OutputFile::write_with(&folder.join("mapped_cells.v"), |out| {
+    OutputFile::write_with(&file("mapped_cells.v"), |out| {
         write_mapped_cells(out, netlist, &cells.liberty, characterised)
     })?;
-    OutputFile::write_with(&folder.join("mapped.sdf"), |out| {
+    OutputFile::write_with(&file("mapped.sdf"), |out| {
         write_mapped_sdf(out, netlist, &cells.liberty, characterised)
     })?;
-    mapped.write_sdc(&folder.join("mapped.sdc"))?;
+    mapped.write_sdc(&file("mapped.sdc"))?;
+    notes(set.commit(config)?);
     let (area, leakage_w) = characterised.silicon(netlist, &cells.liberty, 0);
     tell(format_args!(
         "mapped.v, mapped_cells.v, mapped.sdf and mapped.sdc in {}: a macropixel of {} in {}, area {area:.0} um2, leakage {:.3} nW\n",

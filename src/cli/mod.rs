@@ -42,7 +42,7 @@ pub use tb::testbench;
 
 use self::settings::{SceneArgs, SensorArgs};
 use crate::engine::EngineError;
-use crate::files::{InputError, clean_up_when_interrupted};
+use crate::files::{InputError, clean_up_when_interrupted, guard_inputs, said_of_kept_files};
 use crate::request::{self, Spelling, sign_files};
 use crate::system::FrameError;
 
@@ -116,6 +116,7 @@ enum Command {
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
     sign_files();
+    guard_inputs();
     if let Err(error) = clean_up_when_interrupted() {
         eprintln!(
             "gdtof: signals cannot be watched ({error}); an interrupted run will leave its files"
@@ -162,6 +163,7 @@ pub fn main() -> ExitCode {
 }
 
 fn finish(result: anyhow::Result<ExitCode>) -> ExitCode {
+    voice::notes(said_of_kept_files());
     match result {
         Ok(status) => status,
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,

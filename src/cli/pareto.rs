@@ -10,8 +10,9 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::SceneArgs;
-use super::voice::{progress, say_json, tell};
-use crate::files::{InputError, OutputFile, create_folder};
+use super::voice::{notes, progress, say_json, tell};
+use crate::chip::SensorConfig;
+use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::report::{Axis, Chart, Grid, aligned, width};
 use crate::request::{self, Spelling};
 use crate::system::pareto::{Done, GATE_CYCLES, Method, ParetoSettings, Point, Summary, summarise};
@@ -51,7 +52,7 @@ pub(super) struct ParetoArgs {
     #[arg(long)]
     no_gate: bool,
     /// Folder for pareto.svg, pareto.csv and pareto_cells.csv; created if missing.
-    #[arg(long, value_name = "DIR", default_value = "out")]
+    #[arg(long, value_name = "DIR", default_value = "pareto")]
     out: PathBuf,
     /// Print JSON instead of the table.
     #[arg(long)]
@@ -77,12 +78,12 @@ pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
         .into_iter()
         .filter(|&method| !(args.no_gate && method == Method::Gate))
         .collect();
-    create_folder(&args.out)?;
     let cells = settings.cell_count();
     if cells == 0 {
         let message = "all are out of the sensor's reach; give nearer ones";
         return Err(InputError::new("--ranges", message).into());
     }
+    let results = ResultSet::begin(&args.out, "pareto")?;
     let progress = Progress::new(settings.run_count(&methods));
     let rows = (!args.json).then(|| Rows::new(&methods));
     if let Some(rows) = &rows {
@@ -103,8 +104,20 @@ pub(super) fn run(args: &ParetoArgs) -> anyhow::Result<()> {
     progress.finish();
     said?;
 
-    write_cells(&args.out.join("pareto_cells.csv"), &points)?;
-    chart(&settings, &summaries).write(&args.out.join("pareto.svg"))?;
+    write_cells(&results.staging().join("pareto_cells.csv"), &points)?;
+    chart(&settings, &summaries).write(&results.staging().join("pareto.svg"))?;
+    notes(results.commit(serde_json::json!({
+        "sensor": SensorConfig::clone(&settings.sensor),
+        "lidar": settings.scene.lidar,
+        "stop_periods": settings.stop_periods,
+        "laser_cycles": settings.laser_cycles,
+        "ranges_m": settings.ranges_m,
+        "illuminances_klux": settings.illuminances_klux,
+        "reflectivity": settings.reflectivity,
+        "macropixels": settings.macropixels,
+        "repeats": settings.repeats,
+        "seed": settings.seed,
+    }))?);
     if args.json {
         let report = Report {
             laser_cycles: settings.laser_cycles,
@@ -222,7 +235,7 @@ fn foot(args: &ParetoArgs, settings: &ParetoSettings) -> String {
          photons any at all would be a fault. Another seed shows what chance makes of two exact engines: {:.3} of mean\n\
          shift, and the depths' own noise. Own draws differ by as much; only what they differ more is their discretisation.\n\
          The worst wall is that of the largest depth RMS: an echo too faint to be found is ranged at random.\n\
-         In {}: pareto.svg pareto.csv pareto_cells.csv\n",
+         In {}: pareto.svg pareto.csv pareto_cells.csv {MANIFEST}\n",
         f64::sqrt(2.0 / settings.macropixels as f64),
         args.out.display(),
     )

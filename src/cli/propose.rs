@@ -53,7 +53,7 @@ pub(super) struct ProposeArgs {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Folder for designs.csv, front.svg, sensor.toml and scene.toml; created if missing.
-    #[arg(long, value_name = "DIR", default_value = "out")]
+    #[arg(long, value_name = "DIR", default_value = "propose")]
     out: PathBuf,
 }
 
@@ -81,7 +81,7 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
     let (sensor, scene) = args.scene.read()?;
     let (goal, space) = asked(args)?;
     let problem = Problem::new(goal, sensor, &scene)?;
-    let results = ResultSet::begin(&args.out)?;
+    let results = ResultSet::begin(&args.out, "propose")?;
     let clocks = space.clk_hz.len() * space.thresholds.len();
     let bar = progress(
         clocks as u64,
@@ -114,7 +114,7 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
         "lidar": target.lidar,
         "seed": args.seed,
     });
-    notes(results.commit("propose", asked)?);
+    notes(results.commit(asked)?);
     tell(format_args!(
         "A target of reflectivity {} at {} m under {} klux, found with probability {} in {} frames a second, to {} m:\n\
          {} designs by theory in {took_s:.1} s, {} of them on the front, whose corners are\n\n{}\n",

@@ -114,9 +114,9 @@ pub const READERS: &[(&str, Reader)] = &[
     ("journal", read_journal),
     ("manifest", |path| {
         beside(path, MANIFEST, |folder| {
-            let set = ResultSet::begin(folder)?;
+            let set = ResultSet::begin(folder, "frame")?;
             fs::write(set.staging().join("result"), "new").expect("a folder of ours");
-            set.commit("fuzz", ())
+            set.commit(())
         })
     }),
 ];

@@ -20,7 +20,7 @@ use crate::engine::{
     ClosedFormCoverage, EngineError, Gate, GateSimulation, Histograms, PulsedPixel, Replay, Runner,
     Timed, cancelled,
 };
-use crate::files::{InputError, OutputFile};
+use crate::files::{InputError, OutputFile, refuse_input};
 use crate::kernel::{Activity, CheckReport, Observer, Policy};
 use crate::report::Table;
 use crate::stimulus::{HardwareEventKind, HardwareEventReport};
@@ -124,6 +124,9 @@ pub(super) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
         return Err(InputError::new(format!("--checks-json {}", json.display()), message).into());
     }
     let stimuli = args.stimuli.read()?;
+    for out in [&args.out, &args.vcd, &args.saif, &args.checks_json] {
+        out.as_deref().map_or(Ok(()), refuse_input)?;
+    }
     let silicon = args.silicon.read(&stimuli.sensor)?;
     // Delays of a file are the gates' to judge, and mismatched macropixels each their own (`gdtof timing --mismatch`).
     let timing = (args.sdf.is_none() && silicon.mismatch.is_none())

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::voice::{progress, say};
-use crate::files::{InputError, OutputFile, create_folder};
+use super::voice::{notes, progress, say};
+use crate::files::{InputError, OutputFile, ResultSet};
 use crate::reproduce::{self, Report, Selection};
 
 /// Arguments of `gdtof reproduce`.
@@ -49,8 +49,10 @@ pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
     if !args.liberty.is_empty() {
         let table = reproduce::libraries(&args.liberty)?;
         if let Some(folder) = &args.out {
-            create_folder(folder)?;
-            OutputFile::write_with(&folder.join("libraries.csv"), |out| table.write_csv(out))?;
+            let set = ResultSet::begin(folder, "reproduce --liberty")?;
+            let path = set.staging().join("libraries.csv");
+            OutputFile::write_with(&path, |out| table.write_csv(out))?;
+            notes(set.commit(&args.liberty)?);
         }
         return Ok(say(table)?);
     }
@@ -72,17 +74,24 @@ pub(super) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
     selection
         .check()
         .map_err(|fault| InputError::new(format!("--{}", fault.part.name()), fault.to_string()))?;
-    if let Some(folder) = &args.out {
-        create_folder(folder)?;
-    }
+    let asked = serde_json::json!({
+        "claim": args.claim,
+        "figure": args.figure,
+        "table": args.table,
+        "measurement": args.measurement,
+        "frames": args.frames,
+    });
+    let begin = |folder: &PathBuf| ResultSet::begin(folder, "reproduce");
+    let set = args.out.as_ref().map(begin).transpose()?;
     let bar = progress(
         selection.parts() as u64,
         "{bar:30} {pos}/{len} claims, tables, figures, measurements",
     );
     let report = reproduce::reproduce(&selection, || bar.inc(1));
     bar.finish_and_clear();
-    if let Some(folder) = &args.out {
-        write(&report, folder)?;
+    if let Some(set) = set {
+        write(&report, set.staging())?;
+        notes(set.commit(asked)?);
     }
     if args.json {
         say(format_args!("{:#}\n", report.json()))?;

@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use clap::{Args, Command, ValueEnum};
 use clap_complete::Shell;
 
-use super::voice::{say, tell};
+use super::voice::{notes, say, tell};
 use crate::chip::SensorConfig;
-use crate::files::{OutputFile, create_folder};
+use crate::files::{OutputFile, ResultSet};
 use crate::scene::Scene;
 use crate::sweep::Study;
 
@@ -62,7 +62,7 @@ pub(super) fn completion(args: &CompletionArgs, mut command: Command) -> anyhow:
 /// # Errors
 /// When they cannot be written.
 pub(super) fn man(args: &ManArgs, command: Command) -> anyhow::Result<()> {
-    create_folder(&args.out)?;
+    let set = ResultSet::begin(&args.out, "man")?;
     let mut pages = Vec::new();
     let mut commands = vec![command.disable_help_subcommand(true)];
     while let Some(mut command) = commands.pop() {
@@ -71,7 +71,7 @@ pub(super) fn man(args: &ManArgs, command: Command) -> anyhow::Result<()> {
             .get_display_name()
             .unwrap_or_else(|| command.get_name())
             .to_owned();
-        let path = args.out.join(format!("{name}.1"));
+        let path = set.staging().join(format!("{name}.1"));
         OutputFile::write_with(&path, |out| {
             clap_mangen::Man::new(command.clone()).render(out)
         })?;
@@ -79,6 +79,7 @@ pub(super) fn man(args: &ManArgs, command: Command) -> anyhow::Result<()> {
         commands.extend(children.filter(|c| c.get_name() != "help").cloned());
         pages.push(name);
     }
+    notes(set.commit(())?);
     let (folder, many) = (args.out.display(), pages.len());
     Ok(tell(format_args!(
         "{many} pages in {folder}: man -l {folder}/gdtof.1\n"

@@ -266,7 +266,7 @@ pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
         threads: rayon::current_num_threads(),
         errors: truth.map(|truth| Errors::of(&map, &truth)),
     };
-    let set = ResultSet::begin(&args.out)?;
+    let set = ResultSet::begin(&args.out, "stereo")?;
     let shape = [map.height(), map.width()];
     write_npy_f32(
         &set.staging().join("disparity.npy"),
@@ -278,7 +278,7 @@ pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
         serde_json::to_writer_pretty(&mut *w, &report)?;
         writeln!(w)
     })?;
-    notes(set.commit("stereo", [&args.left, &args.right])?);
+    notes(set.commit([&args.left, &args.right])?);
     match args.json {
         true => say_json(&report)?,
         false => tell(table(args, &report))?,

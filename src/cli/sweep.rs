@@ -98,14 +98,16 @@ fn run_study(args: &SweepArgs, path: &Path) -> anyhow::Result<()> {
     }
     let mut table = outcome_table(&study, &outcome, seconds);
     if shard == Shard::WHOLE {
-        let missing = write(
-            &study,
-            std::slice::from_ref(&folder),
-            &folder,
-            &plots,
-            Some(outcome),
-        )?;
-        debug_assert_eq!(missing, 0);
+        let folders = std::slice::from_ref(&folder);
+        write(&study, folders, &folder, &plots, Some(outcome), |missing| {
+            anyhow::ensure!(
+                missing == 0,
+                "{missing} of {} rows are no longer in the journal of {}, and no table was written; run the same command once more",
+                study.len(),
+                folder.display()
+            );
+            Ok(())
+        })?;
         table.push("in", folder.display());
         tell(table)?;
     } else {
@@ -132,18 +134,16 @@ fn run_merge(args: &MergeArgs) -> anyhow::Result<()> {
     }
     let plots = plots(&args.results, &study)?;
     let out = args.results.out.as_ref().unwrap_or(&args.folders[0]);
-    if !args.partial {
-        let there = Results::of(&study, &args.folders)?;
-        let missing = there.missing().map_err(plain)?;
-        if missing > 0 {
-            let message = format!(
-                "{missing} of {} points are in none of these folders; run the shards that take them, or give --partial",
-                study.len()
-            );
-            return Err(InputError::new("gdtof sweep merge", message).into());
+    let missing = write(&study, &args.folders, out, &plots, None, |missing| {
+        if missing == 0 || args.partial {
+            return Ok(());
         }
-    }
-    let missing = write(&study, &args.folders, out, &plots, None)?;
+        let message = format!(
+            "{missing} of {} points are in none of these folders; run the shards that take them, or give --partial",
+            study.len()
+        );
+        Err(InputError::new("gdtof sweep merge", message).into())
+    })?;
     let mut table =
         Table::new(format!("Sweep {}", study.name)).row("points", study.len() - missing);
     if missing > 0 {
@@ -170,16 +170,17 @@ fn plots(args: &ResultArgs, study: &Study) -> Result<Vec<Plot>, InputError> {
     args.plots.iter().map(parse).collect()
 }
 
-/// Writes table and charts; returns how many points are missing in them.
+/// Writes table and charts, if `check` allows as many points to be missing in them; returns how many are.
 fn write(
     study: &Study,
     folders: &[PathBuf],
     out: &Path,
     plots: &[Plot],
     outcome: Option<Outcome>,
+    check: impl FnOnce(u64) -> anyhow::Result<()>,
 ) -> anyhow::Result<u64> {
     let columns = columns(study);
-    let set = ResultSet::begin(out)?;
+    let set = ResultSet::begin(out, "sweep")?;
     let drawings = plots
         .iter()
         .map(|plot| Drawing::new(plot, study, &columns, "--plot"));
@@ -189,6 +190,7 @@ fn write(
         drawings.iter_mut().for_each(|drawing| drawing.see(cells));
     });
     let missing = missing.map_err(plain)?;
+    check(missing)?;
     for (drawing, plot) in drawings.into_iter().zip(plots) {
         let chart = drawing.chart(study, "--plot")?;
         chart.write(&set.staging().join(plot.file_name() + ".svg"))?;
@@ -198,7 +200,7 @@ fn write(
         points: study.len() - missing,
         outcome,
     };
-    notes(set.commit("sweep", configuration)?);
+    notes(set.commit(configuration)?);
     Ok(missing)
 }
 

@@ -3,6 +3,8 @@
 use super::packed::Packed;
 
 const TEMPLATE: &str = include_str!("page.html");
+/// What every page begins with.
+pub(super) const SIGNATURE: &str = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"generator\" content=\"gdtof page\">\n";
 const PLOTLY: &str = include_str!("plotly.min.js");
 const STYLE: &str = include_str!("page.css");
 

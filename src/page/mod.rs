@@ -22,7 +22,7 @@ use std::path::Path;
 
 use self::packed::Packed;
 use self::recording::Recording;
-use crate::files::{InputError, OutputFile};
+use crate::files::{InputError, OutputFile, begins_with, set_aside_foreign};
 
 /// The page of what `gdtof frame` or `gdtof drive` has left in `folder`.
 #[derive(Debug)]
@@ -52,11 +52,12 @@ impl Page {
         self.html.len()
     }
 
-    /// Writes it.
+    /// Writes it. A file of that name that is no such page is set aside.
     ///
     /// # Errors
     /// When it cannot be written.
     pub(crate) fn write(&self, path: &Path) -> Result<(), InputError> {
+        set_aside_foreign(path, begins_with(html::SIGNATURE))?;
         OutputFile::write_with(path, |w| w.write_all(self.html.as_bytes()))
     }
 }

@@ -11,9 +11,10 @@ use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 use serde::Deserialize;
 
+use super::grid::quoted;
 use super::legend::{self, looks};
 use super::series::{Series, Style};
-use crate::files::{InputError, OutputFile};
+use crate::files::{InputError, OutputFile, begins_with, set_aside_foreign};
 
 /// How an axis is divided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
@@ -284,37 +285,31 @@ impl Chart {
         area.present()
     }
 
-    /// Writes the picture to `path` and its numbers, `series,x,y` a line, to the same name with `.csv`.
+    /// Writes the picture to `path` and its numbers, `series,x,y` a line, to the same name with `.csv`. A file of that name that has
+    /// other columns is set aside.
     ///
     /// # Errors
     /// When one of the files cannot be written.
     pub(crate) fn write(&self, path: &Path) -> Result<(), InputError> {
         OutputFile::write_with(path, |out| out.write_all(self.svg().as_bytes()))?;
-        OutputFile::write_with(&path.with_extension("csv"), |out| self.write_csv(out))
+        let numbers = path.with_extension("csv");
+        set_aside_foreign(&numbers, begins_with(&self.csv_headings()))?;
+        OutputFile::write_with(&numbers, |out| self.write_csv(out))
+    }
+
+    fn csv_headings(&self) -> String {
+        let [x, y] = [&self.x, &self.y].map(|axis| quoted(&axis.label));
+        format!("series,{x},{y}\n")
     }
 
     fn write_csv(&self, out: &mut dyn Write) -> std::io::Result<()> {
-        writeln!(
-            out,
-            "series,{},{}",
-            quoted(&self.x.label),
-            quoted(&self.y.label)
-        )?;
+        out.write_all(self.csv_headings().as_bytes())?;
         for series in &self.series {
             for (x, y) in &series.points {
                 writeln!(out, "{},{x},{y}", quoted(&series.name))?;
             }
         }
         Ok(())
-    }
-}
-
-/// A CSV field, in quotation marks where it needs them.
-pub(super) fn quoted(field: &str) -> String {
-    if field.contains([',', '"', '\n']) {
-        format!("\"{}\"", field.replace('"', "\"\""))
-    } else {
-        field.to_owned()
     }
 }
 

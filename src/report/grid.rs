@@ -3,8 +3,6 @@
 use std::fmt;
 use std::io::Write;
 
-use super::chart::quoted;
-
 /// Rows of cells under headings. The first column aligns left, all others right.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Grid {
@@ -77,6 +75,16 @@ impl fmt::Display for Grid {
     }
 }
 
+/// A CSV field, in quotation marks where it needs them: also where a spreadsheet would take words for a formula. Numbers have none.
+pub(crate) fn quoted(field: &str) -> String {
+    let is_like_formula = field.starts_with(['=', '+', '-', '@']) && field.parse::<f64>().is_err();
+    if is_like_formula || field.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", field.replace('"', "\"\""))
+    } else {
+        field.to_owned()
+    }
+}
+
 /// What the widest of these cells takes on a terminal.
 pub fn width<'c>(cells: impl Iterator<Item = &'c String>) -> usize {
     cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
@@ -126,5 +134,17 @@ mod tests {
             String::from_utf8(csv).unwrap(),
             "engine,time (ms)\nwindow,142\n\"a|b, c\",7\n"
         );
+    }
+
+    #[test]
+    fn words_that_look_like_a_formula_are_in_quotation_marks_and_numbers_are_not() {
+        for word in ["=1+1", "+a", "-x", "@a", "-", "=", "-1-1"] {
+            assert_eq!(quoted(word), format!("\"{word}\""));
+        }
+        for number in ["-1", "-1.5", "+2", "-3e-7", "-inf", "-0.0"] {
+            assert_eq!(quoted(number), number);
+        }
+        assert_eq!(quoted("a=b"), "a=b");
+        assert_eq!(quoted("=\"a\""), "\"=\"\"a\"\"\"");
     }
 }

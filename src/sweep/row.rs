@@ -79,20 +79,21 @@ impl Row {
         let parts: Vec<Json> = serde_json::from_str(json).ok()?;
         let (run_time_s, rest) = parts.split_first()?;
         let (error, cells) = rest.split_first()?;
+        let (error, wanted) = match error {
+            Json::Null => (None, columns.len()),
+            error => (Some(error.as_str()?.to_owned()), 0),
+        };
+        if cells.len() != wanted {
+            return None;
+        }
         let cells: Option<Vec<Cell>> = (cells.iter().zip(columns))
             .map(|(cell, column)| Cell::from_json(cell, column.holds))
             .collect();
-        let row = Row {
+        Some(Row {
             run_time_s: run_time_s.as_f64()?,
-            error: error.as_str().map(str::to_owned),
+            error,
             cells: cells?,
-        };
-        let wanted = if row.error.is_some() {
-            0
-        } else {
-            columns.len()
-        };
-        (row.cells.len() == wanted).then_some(row)
+        })
     }
 }
 
@@ -111,16 +112,17 @@ pub(super) struct Index {
 const OFFSET_BITS: u32 = 48;
 
 impl Index {
-    /// Reads journals.
+    /// Reads journals. A row that does not fit `columns` is not there.
     ///
     /// # Errors
     /// When one cannot be read.
-    pub(super) fn of(paths: Vec<PathBuf>) -> Result<Self, InputError> {
+    pub(super) fn of(paths: Vec<PathBuf>, columns: &[Column]) -> Result<Self, InputError> {
         let mut index = Index::default();
         for (number, path) in paths.iter().enumerate() {
             let places = &mut index.places;
             index.spoilt += JournalReader::open(path)?.scan(|begin, text| {
-                if let Some(key) = text.split_once(' ').and_then(|(key, _)| Key::parse(key)) {
+                let key = text.split_once(' ').and_then(|(key, _)| Key::parse(key));
+                if let Some(key) = key.filter(|&key| Row::parse(text, key, columns).is_some()) {
                     places.push((key.prefix(), (number as u64) << OFFSET_BITS | begin));
                 }
             })?;
@@ -184,9 +186,11 @@ impl Rows<'_> {
 /// The journals in a folder, in the order of their names.
 pub(super) fn journals_in(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    // Nothing is read through a link, nor from a device, which may not end.
     let is_journal = |path: &PathBuf| {
         let name = path.file_name().and_then(|name| name.to_str());
         name.is_some_and(|name| name.starts_with("journal") && name.ends_with(".log"))
+            && path.symlink_metadata().is_ok_and(|about| about.is_file())
     };
     let mut paths: Vec<PathBuf> = entries
         .map(|entry| entry.path())
@@ -232,7 +236,7 @@ mod tests {
                 journal.append(&row(i).line(key(i))).unwrap();
             }
         }
-        let index = Index::of(journals_in(dir.path())).unwrap();
+        let index = Index::of(journals_in(dir.path()), &columns).unwrap();
         assert_eq!(index.places.len(), 300);
         let mut rows = index.rows(&columns).unwrap();
         for i in (0..300).rev() {
@@ -240,5 +244,40 @@ mod tests {
         }
         assert_eq!(rows.get(key(300)).unwrap(), None);
         assert_ne!(Key::of("x", &columns[..1], "7"), key(7));
+    }
+
+    #[test]
+    fn a_row_of_no_use_is_not_there() {
+        let columns = [Column::new("a", "", Holds::Whole)];
+        let key = |i: usize| Key::of("x", &columns, &i.to_string());
+        let unusable = [
+            "nonsense",
+            "[]",
+            "[0.5,null]",
+            "[0.5,null,1,2]",
+            "[0.5,null,1.5]",
+            "[0.5,3,1]",
+            "[0.5,\"why\",1]",
+        ];
+        let dir = tempfile::tempdir().unwrap();
+        let mut journal = Journal::open(&dir.path().join("journal.log"))
+            .unwrap()
+            .unwrap();
+        for (i, text) in unusable.iter().enumerate() {
+            let line = journal_line(&format!("{:032x} {text}", key(i).0));
+            journal.append(&line).unwrap();
+        }
+        let row = Row {
+            run_time_s: 0.0,
+            error: None,
+            cells: vec![Cell::Whole(7)],
+        };
+        journal.append(&row.line(key(0))).unwrap();
+        let index = Index::of(journals_in(dir.path()), &columns).unwrap();
+        assert_eq!((index.places.len(), index.spoilt), (1, 0));
+        assert_eq!(
+            index.rows(&columns).unwrap().get(key(0)).unwrap(),
+            Some(row)
+        );
     }
 }

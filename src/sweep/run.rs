@@ -11,7 +11,10 @@ use super::row::{Index, journals_in};
 use super::study::{Kind, Study};
 use super::subject::{Scratch, Subject};
 use crate::engine::Answer;
-use crate::files::{InputError, Journal, OutputFile, create_folder, parse_json, read_text};
+use crate::files::{
+    InputError, Journal, OutputFile, ResultSet, create_folder, is_journal, parse_json, read_text,
+    refuse_input, set_aside_foreign,
+};
 
 /// One of `of` parts of a study: the points whose number leaves `part` when divided by `of`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,25 +73,33 @@ const STUDY: &str = "study.json";
 /// called with points as they are done, those that were there included.
 ///
 /// With one thread to a point where there are more points than threads: the frames of a study need no help from each other. `done` may stop
-/// the sweep by its [`Answer`]; points that are being taken are finished.
+/// the sweep by its [`Answer`]; points that are being taken are finished. A journal or a study in `folder` that is none of ours is set
+/// aside.
 ///
 /// # Errors
-/// When another process takes the same, files cannot be written, the program fails, or it is stopped.
+/// When another process takes the same, `folder` holds results of another command, the journal is removed meanwhile, files cannot be
+/// written, the program fails, or it is stopped.
 pub fn run<A: Answer>(
     study: &Study,
     folder: &Path,
     shard: Shard,
     done: impl Fn(u64) -> A + Sync,
 ) -> Result<Outcome, SweepError> {
+    ResultSet::check(folder, "sweep")?;
     create_folder(folder)?;
     let path = folder.join(shard.journal());
+    refuse_input(&path)?;
+    set_aside_foreign(&folder.join(STUDY), |file| {
+        serde_json::from_reader::<_, Kept>(file).is_ok()
+    })?;
+    set_aside_foreign(&path, is_journal)?;
     let Some(journal) = Journal::open(&path)? else {
         let message =
             "another process takes these points; wait for it, or give another folder or shard";
         return Err(InputError::new(path.display(), message).into());
     };
     keep(study, folder)?;
-    let there = Index::of(journals_in(folder))?;
+    let there = Index::of(journals_in(folder), &Subject::columns(study.kind))?;
     let points = shard.share(study.len());
     let workers = (rayon::current_num_threads() as u64).min(points).max(1);
     // A theoretical point takes less than a write.
@@ -128,6 +139,10 @@ pub fn run<A: Answer>(
     if let Some(error) = work.error.into_inner().expect("nobody panicked") {
         return Err(error);
     }
+    work.journal
+        .into_inner()
+        .expect("nobody panicked")
+        .check_place()?;
     let [reused, taken, without_results] = work.counts.map(AtomicU64::into_inner);
     Ok(Outcome {
         points,

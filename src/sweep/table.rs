@@ -51,16 +51,8 @@ impl<'a> Results<'a> {
             .iter()
             .flat_map(|folder| journals_in(folder))
             .collect();
-        let index = Index::of(journals)?;
+        let index = Index::of(journals, &Subject::columns(study.kind))?;
         Ok(Results { study, index })
-    }
-
-    /// How many points have no row.
-    ///
-    /// # Errors
-    /// As those of [`Results::each`].
-    pub(crate) fn missing(&self) -> Result<u64, SweepError> {
-        self.each(|_, _| Ok(()), Path::new(""))
     }
 
     /// Tells `found` of every point's row, in order: the cells of [`columns`], and its run time, s. Returns how many points have no row.

@@ -20,7 +20,7 @@ fn a_proposed_chip_is_taken_by_frame_and_keeps_its_promise() {
         said.contains("The QuantIC4x4 is not on the front"),
         "{said}"
     );
-    let table = std::fs::read_to_string(folder.path().join("out/designs.csv")).unwrap();
+    let table = std::fs::read_to_string(folder.path().join("propose/designs.csv")).unwrap();
     let balanced = table
         .lines()
         .find(|line| line.starts_with("balanced,"))
@@ -36,7 +36,7 @@ fn a_proposed_chip_is_taken_by_frame_and_keeps_its_promise() {
             .unwrap()
     };
     assert!(table.contains("\nthis sensor,"));
-    let svg = std::fs::read_to_string(folder.path().join("out/front.svg")).unwrap();
+    let svg = std::fs::read_to_string(folder.path().join("propose/front.svg")).unwrap();
     assert!(svg.contains("balanced: sensor.toml"));
 
     let frame = said

@@ -94,7 +94,7 @@ fn a_folder_without_a_frame_is_refused() {
     done(here, &FRAME);
     refused(
         &["export", "frame", "out", "--out", "out"],
-        "is the folder of the frame itself",
+        "out: holds the results of `gdtof frame`, which `gdtof export frame` does not replace",
     );
     refused(&["export", "frame", "out", "--format", "las"], "las");
     let histograms = here.join("out").join("histograms.npy");

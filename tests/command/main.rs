@@ -15,6 +15,7 @@ mod delay_lines_are_calibrated;
 mod designs_are_proposed;
 mod drives_are_recorded;
 mod engines_are_chosen_from_the_command_line;
+mod files_of_others_are_kept;
 mod frames_for_other_tools;
 mod golden_vectors_hold;
 mod guides_from_the_command_line;

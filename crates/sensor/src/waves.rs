@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 pub use femtogate::waves::*;
 
-use crate::files::{InputError, OutputFile};
+use crate::files::{InputError, OutputFile, begins_with, set_aside_foreign};
 use crate::kernel::Observer;
 use crate::logic::Logic;
 use crate::netlist::{NetId, Netlist};
@@ -105,7 +105,7 @@ impl Observer for WaveFile {
 }
 
 /// Writes the files that let viewers open the waveform `path`, which ends at `end`, with this layout: beside it, with
-/// the extensions of [`VIEWS`].
+/// the extensions of [`VIEWS`]. A view that somebody else has saved under such a name is set aside.
 ///
 /// # Errors
 /// When a file cannot be written, or `netlist` has not a signal of the layout.
@@ -120,6 +120,8 @@ pub(crate) fn write_views(
         .map(OsStr::to_string_lossy)
         .unwrap_or_default();
     let [gtkw, surfer] = VIEWS.map(|extension| path.with_extension(extension));
+    set_aside_foreign(&gtkw, begins_with(&Layout::gtkw_signature()))?;
+    set_aside_foreign(&surfer, begins_with(Layout::SURFER_SIGNATURE))?;
     OutputFile::write_with(&gtkw, |out| layout.write_gtkw(out, netlist, &name))?;
     OutputFile::write_with(&surfer, |out| layout.write_surfer(out, netlist, &name, end))
 }

@@ -49,12 +49,22 @@ impl Layout {
         out.write_all(&text)
     }
 
+    /// What save files written here begin with. Those that GTKWave writes begin otherwise.
+    pub fn gtkw_signature() -> String {
+        format!("[*] {}", Origin::of_files().vendor)
+    }
+
     fn gtkw(&self, netlist: &Netlist, file: &str) -> io::Result<Vec<u8>> {
         one_line(file)?;
         let names_width = self.names_width(netlist)?;
         let top = &netlist.scopes()[0].name;
         let mut out = Vec::new();
-        writeln!(out, "[*] {}", Origin::of_files().vendor_and_version())?;
+        writeln!(
+            out,
+            "{} {}",
+            Self::gtkw_signature(),
+            Origin::of_files().version
+        )?;
         writeln!(out, "[dumpfile] \"{file}\"")?;
         // GTKWave looks for the dump from its own working folder, unless a name of the save file
         // (any name) tells it that the dump's is relative to where it found the save file.

@@ -41,11 +41,14 @@ impl Layout {
         out.write_all(&text)
     }
 
+    /// What command files written here begin with.
+    pub const SURFER_SIGNATURE: &str = "# surfer --command-file THIS_FILE";
+
     fn surfer(&self, netlist: &Netlist, file: &str, end: Time) -> io::Result<Vec<u8>> {
         one_line(file)?;
         let top = &netlist.scopes()[0].name;
         let mut out = Vec::new();
-        writeln!(out, "# surfer --command-file THIS_FILE {file}")?;
+        writeln!(out, "{} {file}", Self::SURFER_SIGNATURE)?;
         let mut items = 0;
         for group in &self.groups {
             writeln!(out, "divider_add {}", one_word(&group.title))?;

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use femtogate::InputError;
 
+use super::guarded::open_input;
 use super::npy::{Element, NpyHead, Number};
 
 /// Reads an array of this shape, row-major, whose elements are of type `T`.
@@ -63,7 +64,7 @@ fn open(
     shape: &[usize],
     axes: &str,
 ) -> Result<(NpyHead, BufReader<File>), InputError> {
-    let file = File::open(path).map_err(|e| InputError::unreadable(path, &e))?;
+    let file = open_input(path).map_err(|e| InputError::unreadable(path, &e))?;
     let mut reader = BufReader::new(file);
     let head = NpyHead::read(&mut reader).map_err(|e| broken(path, &e))?;
     if head.shape == shape && !head.is_fortran {

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
+use super::guarded::open_input;
 use super::misfit::{Misfit, in_plain_words};
 use femtogate::InputError;
 
@@ -30,7 +31,7 @@ fn open(path: &Path) -> Result<(File, bool), InputError> {
         let message = "is a named pipe, which may never end; write its contents to a file first";
         return Err(InputError::new(path.display(), message));
     }
-    let file = File::open(path).map_err(unreadable)?;
+    let file = open_input(path).map_err(unreadable)?;
     Ok((file, kind.is_file()))
 }
 

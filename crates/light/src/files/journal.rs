@@ -42,6 +42,30 @@ fn text_of(line: &[u8]) -> Option<&str> {
     (said == head(text)).then_some(text)
 }
 
+/// Whether a file is a journal: one with a line that is right in its first mebibyte, an empty one, or one that was killed within its
+/// first line.
+pub fn is_journal(file: impl BufRead) -> bool {
+    let mut file = file.take(1 << 20);
+    let mut line = Vec::new();
+    let mut is_first = true;
+    while file.read_until(b'\n', &mut line).is_ok_and(|read| read > 0) {
+        match line.strip_suffix(b"\n") {
+            Some(whole) if text_of(whole).is_some() => return true,
+            None if is_first => return begins_like_a_line(&line),
+            _ => {}
+        }
+        line.clear();
+        is_first = false;
+    }
+    is_first
+}
+
+fn begins_like_a_line(bytes: &[u8]) -> bool {
+    let (digits, rest) = bytes.split_at(bytes.len().min(HEAD - 1));
+    let is_digit = |b: &u8| matches!(b, b'0'..=b'9' | b'a'..=b'f');
+    digits.iter().all(is_digit) && rest.first().is_none_or(|&b| b == b' ')
+}
+
 /// A journal that this process appends to.
 #[derive(Debug)]
 pub struct Journal {
@@ -59,6 +83,7 @@ impl Journal {
         let unwritable = |e: io::Error| InputError::unwritable(path, &e);
         let mut options = File::options();
         options.read(true).append(true).create(true);
+        follow_no_link(&mut options);
         let mut file = options.open(path).map_err(unwritable)?;
         if lock::is_held_elsewhere(&file) {
             return Ok(None);
@@ -72,12 +97,35 @@ impl Journal {
     /// Appends lines of [`journal_line`].
     ///
     /// # Errors
-    /// When the disk is full.
+    /// When the disk is full, or the journal was removed.
     pub fn append(&mut self, lines: &str) -> Result<(), InputError> {
+        self.check_place()?;
         let written = self.file.write_all(lines.as_bytes());
         written.map_err(|e| InputError::unwritable(&self.path, &e))
     }
+
+    /// Complains if it no longer stands under its name, so that nobody will find its lines.
+    ///
+    /// # Errors
+    /// When it was removed or replaced.
+    pub fn check_place(&self) -> Result<(), InputError> {
+        if lock::is_same(&self.path, &self.file) {
+            return Ok(());
+        }
+        let message = "was removed or replaced while lines were appended to it, which are lost; run the same command once more";
+        Err(InputError::new(self.path.display(), message))
+    }
 }
+
+/// Through a link, lines would go into a file elsewhere, and what that ends with would be cut off.
+#[cfg(unix)]
+fn follow_no_link(options: &mut std::fs::OpenOptions) {
+    use std::os::unix::fs::OpenOptionsExt;
+    options.custom_flags(rustix::fs::OFlags::NOFOLLOW.bits() as i32);
+}
+
+#[cfg(not(unix))]
+fn follow_no_link(_: &mut std::fs::OpenOptions) {}
 
 /// Where what is no whole line begins.
 fn end_of_last_line(file: &mut File) -> io::Result<u64> {
@@ -247,6 +295,56 @@ mod tests {
             assert_eq!(reader.at(*place).unwrap(), Some(line.as_str()));
         }
         assert_eq!(reader.at(3).unwrap(), None);
+    }
+
+    #[test]
+    fn a_journal_is_known_by_its_lines() {
+        let line = journal_line("text");
+        for ours in [
+            "",
+            "0123",
+            "0123abcd",
+            "0123abcd 00ff",
+            &line,
+            &format!("spoilt\n{line}"),
+        ] {
+            assert!(is_journal(ours.as_bytes()), "{ours:?}");
+        }
+        for foreign in [
+            "\n",
+            "my notes",
+            "my notes\n",
+            "0123abcd 00ff\n",
+            "0123abcde",
+            "\u{1}\n",
+        ] {
+            assert!(!is_journal(foreign.as_bytes()), "{foreign:?}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_not_followed() {
+        let dir = tempfile::tempdir().unwrap();
+        let [target, link] = ["target", "x"].map(|name| dir.path().join(name));
+        std::fs::write(&target, "no line").unwrap();
+        std::os::unix::fs::symlink(&target, &link).unwrap();
+        assert!(Journal::open(&link).is_err());
+        assert_eq!(std::fs::read_to_string(&target).unwrap(), "no line");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn nothing_is_appended_to_a_journal_that_was_removed() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("x");
+        let mut journal = Journal::open(&path).unwrap().unwrap();
+        journal.append(&journal_line("first")).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let refused = journal.append(&journal_line("second")).unwrap_err();
+        assert!(refused.to_string().contains("was removed"), "{refused}");
+        std::fs::write(&path, "another").unwrap();
+        assert!(journal.check_place().is_err());
     }
 
     #[cfg(unix)]

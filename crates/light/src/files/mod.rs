@@ -8,12 +8,14 @@
 //! | `misfit.rs` | values of the wrong type, without the names of types |
 //! | `raster.rs` | pictures and maps: PNG, `.npy`, PFM, EXR |
 //! | `output.rs` | output files: beside the target first, then renamed over it |
+//! | `guarded.rs` | inputs of a run, which it does not replace, and files in its way that are not its own |
 //! | `temporary.rs` | what stands there meanwhile, and what killed runs left of it |
 //! | `interruption.rs` | signals that end the program |
 //! | `journal.rs` | lines with checksums that are only appended |
 //! | `result_set.rs` | the results of a run as one set with a manifest |
 
 mod arrays;
+mod guarded;
 mod input;
 mod interruption;
 mod journal;
@@ -26,10 +28,13 @@ mod temporary;
 
 pub use arrays::{read_array, read_counts};
 pub use femtogate::InputError;
+pub use guarded::{
+    begins_with, guard_inputs, open_input, refuse_input, said_of_kept_files, set_aside_foreign,
+};
 pub use input::Lines;
 pub use input::{LineEnds, parse_json, parse_toml, placed, read_text, read_text_within, too_long};
 pub use interruption::clean_up_when_interrupted;
-pub use journal::{Journal, JournalReader, journal_line};
+pub use journal::{Journal, JournalReader, is_journal, journal_line};
 pub use misfit::Misfit;
 pub use misfit::in_plain_words;
 pub(crate) use misfit::is_no_word;

@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use super::guarded::refuse_input;
+use super::result_set::owner_of;
 use super::temporary::Temporary;
 use femtogate::InputError;
 
@@ -18,7 +20,8 @@ impl OutputFile {
     /// Starts a file beside `path`.
     ///
     /// # Errors
-    /// When the folder does not exist or is not writable, or `path` is a folder.
+    /// When the folder does not exist or is not writable, `path` is a folder, a file that this run has read, or one of a
+    /// set of results.
     pub fn create(path: &Path) -> Result<Self, InputError> {
         let unwritable = |e: io::Error| InputError::unwritable(path, &e);
         if path.is_dir() {
@@ -28,6 +31,13 @@ impl OutputFile {
             Some(p) if !p.as_os_str().is_empty() => p,
             _ => Path::new("."),
         };
+        refuse_input(path)?;
+        if let Some(command) = owner_of(folder, path) {
+            let message = format!(
+                "is one of the results of `gdtof {command}`; give another name for the output"
+            );
+            return Err(InputError::new(path.display(), message));
+        }
         let (temporary, file) = Temporary::file_in(folder).map_err(unwritable)?;
         Ok(OutputFile {
             path: path.to_owned(),
@@ -39,8 +49,9 @@ impl OutputFile {
     /// Flushes and moves the file to its final name.
     ///
     /// # Errors
-    /// When the disk is full or the target cannot be replaced; the target is then untouched.
+    /// When the disk is full, the target cannot be replaced or has been read meanwhile; the target is then untouched.
     pub fn commit(mut self) -> Result<(), InputError> {
+        refuse_input(&self.path)?;
         let unwritable = |e: io::Error| InputError::unwritable(&self.path, &e);
         self.writer.flush().map_err(unwritable)?;
         self.temporary.rename(&self.path).map_err(unwritable)

@@ -8,6 +8,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::Path;
 
+use super::guarded::open_input;
 use super::npy::{NpyHead, Number};
 use femtogate::InputError;
 
@@ -44,7 +45,7 @@ impl Raster {
                 "is not a file; give a PNG, .npy, PFM or EXR".into(),
             ));
         }
-        let file = File::open(path).map_err(unreadable)?;
+        let file = open_input(path).map_err(unreadable)?;
         let length = file.metadata().map_err(unreadable)?.len();
         let mut reader = BufReader::new(file);
         let first = reader.fill_buf().map_err(unreadable)?;

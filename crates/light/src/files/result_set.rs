@@ -9,6 +9,8 @@
 //! still are what was written. A file that has changed since, or that no manifest lists, is the user's: it is kept,
 //! under another name if its own is needed.
 //!
+//! A set replaces one of the same command alone, and no file that the run has read: else nothing is touched.
+//!
 //! The switch is a few renames under a lock of the folder. While it lasts, the manifest says `"complete": false` and
 //! lists both sets, so that a run killed in it neither passes for whole nor loses track of its files.
 
@@ -20,6 +22,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::guarded::{free_name, refuse_input, set_aside_sentence};
 use super::output::create_folder;
 use super::temporary::{Registry, Temporary, lock};
 use femtogate::InputError;
@@ -31,6 +34,7 @@ pub const MANIFEST: &str = "manifest.json";
 #[derive(Debug)]
 pub struct ResultSet {
     folder: PathBuf,
+    command: String,
     staging: Temporary,
     /// Dropped after what is staged in it.
     _made: Option<MadeFolder>,
@@ -100,7 +104,12 @@ struct Manifest {
 impl Manifest {
     /// The manifest of a folder, if it has one that is ours.
     fn read(folder: &Path) -> Option<Self> {
-        let text = fs::read_to_string(folder.join(MANIFEST)).ok()?;
+        let path = folder.join(MANIFEST);
+        // A pipe would not end.
+        if !fs::symlink_metadata(&path).ok()?.is_file() {
+            return None;
+        }
+        let text = fs::read_to_string(path).ok()?;
         let manifest: Manifest = serde_json::from_str(&text).ok()?;
         let files = || manifest.files.iter().chain(&manifest.previous_files);
         // Names that lead elsewhere are none of ours.
@@ -117,6 +126,36 @@ impl Manifest {
 
 const PROGRAM: &str = "gdtof";
 
+/// The command whose results the file `path` in `folder` is one of.
+pub(super) fn owner_of(folder: &Path, path: &Path) -> Option<String> {
+    fs::symlink_metadata(path).ok()?;
+    let manifest = Manifest::read(folder)?;
+    let is_its = |file: &ManifestFile| path.file_name() == Some(file.name.as_ref());
+    let mut files = manifest.files.iter().chain(&manifest.previous_files);
+    files.any(is_its).then_some(manifest.command)
+}
+
+/// The set in `folder`, which one of `command` may replace.
+///
+/// # Errors
+/// A set of another command, or one with a file that this run has read.
+fn replaceable(folder: &Path, command: &str) -> Result<Option<Manifest>, InputError> {
+    let Some(manifest) = Manifest::read(folder) else {
+        return Ok(None);
+    };
+    let other = &manifest.command;
+    if other != command {
+        let message = format!(
+            "holds the results of `gdtof {other}`, which `gdtof {command}` does not replace; give another folder with --out, or delete this one"
+        );
+        return Err(InputError::new(folder.display(), message));
+    }
+    for file in manifest.files.iter().chain(&manifest.previous_files) {
+        refuse_input(&folder.join(&file.name))?;
+    }
+    Ok(Some(manifest))
+}
+
 /// What becomes of the files in a folder when a set is put there.
 #[derive(Debug, Default)]
 struct Switch {
@@ -129,11 +168,20 @@ struct Switch {
 }
 
 impl ResultSet {
-    /// Begins a set of results for `folder`, which is created if missing.
+    /// Complains if `folder` holds what results of `command` may not replace.
     ///
     /// # Errors
-    /// When the folder cannot be written.
-    pub fn begin(folder: &Path) -> Result<Self, InputError> {
+    /// A set of another command, or one with a file that this run has read.
+    pub fn check(folder: &Path, command: &str) -> Result<(), InputError> {
+        replaceable(folder, command).map(drop)
+    }
+
+    /// Begins a set of results of `command` for `folder`, which is created if missing.
+    ///
+    /// # Errors
+    /// As [`ResultSet::check`], and when the folder cannot be written.
+    pub fn begin(folder: &Path, command: &str) -> Result<Self, InputError> {
+        Self::check(folder, command)?;
         let was_there = folder.exists();
         create_folder(folder)?;
         let made = (!was_there).then(|| MadeFolder(folder.to_owned()));
@@ -141,6 +189,7 @@ impl ResultSet {
         let staging = staging.map_err(|e| InputError::unwritable(folder, &e))?;
         Ok(ResultSet {
             folder: folder.to_owned(),
+            command: command.to_owned(),
             staging,
             _made: made,
         })
@@ -151,25 +200,32 @@ impl ResultSet {
         &self.staging.path
     }
 
-    /// Puts everything in the staging folder into the place of the set before. `command` and `configuration` say in
-    /// the manifest what was run. Returns a sentence about each file of the user's that was in the way.
+    /// Puts everything in the staging folder into the place of the set before. `configuration` says in the manifest what
+    /// was asked for. Returns a sentence about each file of the user's that was in the way.
     ///
     /// # Errors
-    /// When a file cannot be replaced: the set before is then whole, or the manifest says that it is not.
-    pub fn commit(
-        self,
-        command: &str,
-        configuration: impl Serialize,
-    ) -> Result<Vec<String>, InputError> {
+    /// As [`ResultSet::check`], and when a file cannot be replaced: the set before is then whole, or the manifest says that
+    /// it is not.
+    pub fn commit(self, configuration: impl Serialize) -> Result<Vec<String>, InputError> {
         let failed = |e: io::Error| InputError::unwritable(&self.folder, &e);
-        self.switch(
-            command,
-            serde_json::to_value(configuration).map_err(|e| failed(e.into()))?,
-        )
-        .map_err(failed)
+        let configuration = serde_json::to_value(configuration).map_err(|e| failed(e.into()))?;
+        let files = self.staged().map_err(failed)?;
+        // Two runs that end together put their sets there one after the other.
+        let folder_lock = File::open(&self.folder).map_err(failed)?;
+        lock::wait_for(&folder_lock);
+        let before = replaceable(&self.folder, &self.command)?;
+        let previous_files = before.map_or(Vec::new(), |m| [m.files, m.previous_files].concat());
+        let switch = Switch::plan(&self.folder, &files, &previous_files).map_err(failed)?;
+        for file in &files {
+            refuse_input(&self.folder.join(&file.name))?;
+        }
+        self.put(&switch, files, previous_files, configuration)
+            .map_err(failed)?;
+        Ok(switch.sentences(&self.folder))
     }
 
-    fn switch(&self, command: &str, configuration: serde_json::Value) -> io::Result<Vec<String>> {
+    /// What is in the staging folder.
+    fn staged(&self) -> io::Result<Vec<ManifestFile>> {
         let staging = &self.staging.path;
         let mut names = Vec::new();
         for entry in fs::read_dir(staging)? {
@@ -178,19 +234,21 @@ impl ResultSet {
         }
         names.sort();
         let describe = |name: &String| ManifestFile::of(staging, name);
-        let files = names.iter().map(describe).collect::<io::Result<_>>()?;
+        names.iter().map(describe).collect()
+    }
 
-        // Two runs that end together put their sets there one after the other.
-        let folder_lock = File::open(&self.folder)?;
-        lock::wait_for(&folder_lock);
-        let before = Manifest::read(&self.folder);
-        let previous_files = before.map_or(Vec::new(), |m| [m.files, m.previous_files].concat());
-        let switch = Switch::plan(&self.folder, &names, &previous_files)?;
-
+    fn put(
+        &self,
+        switch: &Switch,
+        files: Vec<ManifestFile>,
+        previous_files: Vec<ManifestFile>,
+        configuration: serde_json::Value,
+    ) -> io::Result<()> {
+        let staging = &self.staging.path;
         let mut manifest = Manifest {
             program: PROGRAM.into(),
             version: env!("CARGO_PKG_VERSION").into(),
-            command: command.into(),
+            command: self.command.clone(),
             complete: false,
             files,
             previous_files,
@@ -209,19 +267,18 @@ impl ResultSet {
             fs::rename(at(name), at(other))?;
         }
         fs::rename(&during, at(MANIFEST))?;
-        for name in &names {
+        for ManifestFile { name, .. } in &manifest.files {
             fs::rename(staging.join(name), at(name))?;
         }
         for name in &switch.remove {
             fs::remove_file(at(name))?;
         }
-        fs::rename(&after, at(MANIFEST))?;
-        Ok(switch.sentences(&self.folder))
+        fs::rename(&after, at(MANIFEST))
     }
 }
 
 impl Switch {
-    fn plan(folder: &Path, names: &[String], previous: &[ManifestFile]) -> io::Result<Self> {
+    fn plan(folder: &Path, files: &[ManifestFile], previous: &[ManifestFile]) -> io::Result<Self> {
         let mut ours: BTreeMap<&str, Vec<&ManifestFile>> = BTreeMap::new();
         for file in previous {
             ours.entry(&file.name).or_default().push(file);
@@ -237,7 +294,8 @@ impl Switch {
         };
         let exists = |name: &str| fs::symlink_metadata(folder.join(name)).is_ok();
         let mut switch = Switch::default();
-        for name in names.iter().filter(|name| exists(name)) {
+        let names = || files.iter().map(|file| &file.name);
+        for name in names().filter(|name| exists(name)) {
             if folder.join(name).is_dir() {
                 return Err(io::Error::other(format!("{name} is a folder there")));
             }
@@ -250,7 +308,7 @@ impl Switch {
             let other = free_name(MANIFEST, exists);
             switch.set_aside.push((MANIFEST.into(), other));
         }
-        let needed: BTreeSet<&str> = names.iter().map(String::as_str).collect();
+        let needed: BTreeSet<&str> = names().map(String::as_str).collect();
         for &name in ours.keys().filter(|name| !needed.contains(*name)) {
             match exists(name) {
                 true if is_ours(name)? => switch.remove.push(name.into()),
@@ -263,10 +321,8 @@ impl Switch {
 
     fn sentences(&self, folder: &Path) -> Vec<String> {
         let at = |name: &String| folder.join(name).display().to_string();
-        let set_aside = self.set_aside.iter().map(|(name, other)| {
-            let (name, other) = (at(name), at(other));
-            format!("{name} was not as an earlier run left it, and is now {other}")
-        });
+        let set_aside = (self.set_aside.iter())
+            .map(|(name, other)| set_aside_sentence(&folder.join(name), &folder.join(other)));
         let kept = self.kept.iter().map(|name| {
             format!(
                 "{} has been changed since an earlier run wrote it, and was kept; it is none of these results",
@@ -277,29 +333,16 @@ impl Switch {
     }
 }
 
-/// `depth.png` becomes `depth.kept.png`, or `depth.kept-2.png` where that is taken.
-fn free_name(name: &str, exists: impl Fn(&str) -> bool) -> String {
-    let (stem, extension) = match name.rsplit_once('.') {
-        Some((stem, extension)) => (stem, format!(".{extension}")),
-        None => (name, String::new()),
-    };
-    let numbered = (2..).map(|n| format!("{stem}.kept-{n}{extension}"));
-    std::iter::once(format!("{stem}.kept{extension}"))
-        .chain(numbered)
-        .find(|name| !exists(name))
-        .expect("numbers do not end")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn put(folder: &Path, files: &[(&str, &str)]) -> Vec<String> {
-        let set = ResultSet::begin(folder).unwrap();
+        let set = ResultSet::begin(folder, "test").unwrap();
         for (name, text) in files {
             fs::write(set.staging().join(name), text).unwrap();
         }
-        set.commit("test", serde_json::json!({"files": files.len()}))
+        set.commit(serde_json::json!({"files": files.len()}))
             .unwrap()
     }
 
@@ -330,7 +373,7 @@ mod tests {
         let (new, old) = (dir.path().join("new"), dir.path().join("old"));
         fs::create_dir(&old).unwrap();
         for out in [&new, &old] {
-            let set = ResultSet::begin(out).unwrap();
+            let set = ResultSet::begin(out, "test").unwrap();
             fs::write(set.staging().join("a"), "half").unwrap();
         }
         assert!(!new.exists() && old.exists());
@@ -400,22 +443,52 @@ mod tests {
     }
 
     #[test]
+    fn a_set_of_another_command_is_refused_and_untouched() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path();
+        put(out, &[("a", "1")]);
+        let before = fs::read_dir(out).unwrap().count();
+        let refused = ResultSet::begin(out, "other").unwrap_err().to_string();
+        assert!(refused.contains("results of `gdtof test`"), "{refused}");
+        assert_eq!(fs::read_dir(out).unwrap().count(), before);
+
+        // Begun before that set was there.
+        let new = out.join("new");
+        let set = ResultSet::begin(&new, "other").unwrap();
+        fs::write(set.staging().join("a"), "2").unwrap();
+        put(&new, &[("a", "1")]);
+        assert!(set.commit(()).is_err());
+        assert_eq!(listing(&new), owned(&[("a", "1")]));
+
+        // Nor does a single file take the place of one of its files.
+        let refused = super::super::OutputFile::create(&new.join("a"))
+            .err()
+            .unwrap()
+            .to_string();
+        assert!(
+            refused.contains("one of the results of `gdtof test`"),
+            "{refused}"
+        );
+        assert!(super::super::OutputFile::create(&new.join("b")).is_ok());
+    }
+
+    #[test]
     fn a_set_that_is_not_committed_leaves_the_old_one() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path();
         put(out, &[("a", "1")]);
-        let set = ResultSet::begin(out).unwrap();
+        let set = ResultSet::begin(out, "test").unwrap();
         fs::write(set.staging().join("a"), "2").unwrap();
         drop(set);
         assert_eq!(listing(out), owned(&[("a", "1")]));
 
         // A name that is a folder cannot be replaced, and nothing else is then.
         fs::create_dir(out.join("b")).unwrap();
-        let set = ResultSet::begin(out).unwrap();
+        let set = ResultSet::begin(out, "test").unwrap();
         for name in ["a", "b"] {
             fs::write(set.staging().join(name), "3").unwrap();
         }
-        let error = set.commit("test", ()).unwrap_err().to_string();
+        let error = set.commit(()).unwrap_err().to_string();
         assert!(error.contains("b is a folder"), "{error}");
         fs::remove_dir(out.join("b")).unwrap();
         assert_eq!(listing(out), owned(&[("a", "1")]));

@@ -10,7 +10,6 @@
 //!
 //! An OBJ has x to the right, y up and z backwards; a model whose front looks along z there faces the lidar.
 
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
@@ -20,7 +19,7 @@ use obvhs::aabb::Aabb;
 use self::tree::{Bounds, Tree};
 use super::meeting::{Meeting, NEAREST_M};
 use super::solid;
-use crate::files::InputError;
+use crate::files::{InputError, open_input};
 use crate::scene::vector::Ray;
 
 mod tree;
@@ -128,7 +127,7 @@ impl Mesh {
             return Err(complain(message));
         }
         let mut reader = Counted {
-            inner: BufReader::new(File::open(path).map_err(unreadable)?),
+            inner: BufReader::new(open_input(path).map_err(unreadable)?),
             lines: 0,
         };
         let options = tobj::LoadOptions {

@@ -2,12 +2,12 @@
 //!
 //! Whether a file is packed is told by its first bytes, not by its name.
 
-use std::fs::File;
 use std::io::{Cursor, Read};
 use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
 
+use crate::files::open_input;
 use crate::netlist::liberty::liberty_text;
 
 /// Most bytes of a library: the largest open ones have 60 MB a corner.
@@ -22,7 +22,7 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// A file that cannot be read, is too large or no text.
 pub(super) fn read_library(path: &Path) -> Result<String, String> {
     let said = |error: std::io::Error| format!("cannot be read: {error}");
-    let mut file = File::open(path).map_err(said)?;
+    let mut file = open_input(path).map_err(said)?;
     let mut head = Vec::new();
     (&mut file).take(2).read_to_end(&mut head).map_err(said)?;
     let is_packed = head == GZIP;
