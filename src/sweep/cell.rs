@@ -2,6 +2,8 @@
 
 use toml::Value;
 
+use crate::report::quoted;
+
 /// What a column holds. Any cell may be empty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Holds {
@@ -93,11 +95,7 @@ impl Cell {
             Cell::Truth(b) => b.to_string(),
             Cell::Word(word) => {
                 // Ends of lines in a field are allowed, but many readers take them for a row's.
-                let word = word.replace(['\n', '\r'], " ");
-                match word.contains([',', '"']) {
-                    true => format!("\"{}\"", word.replace('"', "\"\"")),
-                    false => word,
-                }
+                quoted(&word.replace(['\n', '\r'], " "))
             }
         }
     }
@@ -168,6 +166,8 @@ mod tests {
         fn fields_are_one_line_with_no_comma_of_their_own((cell, _) in any_cell()) {
             let field = cell.csv();
             prop_assert!(!field.contains(['\n', '\r']));
+            prop_assert!(!field.starts_with(['=', '@']));
+            prop_assert!(!field.starts_with(['+', '-']) || field.parse::<f64>().is_ok());
             prop_assert!(!field.contains(',') || (field.starts_with('"') && field.ends_with('"')));
         }
     }

@@ -199,6 +199,15 @@ impl Study {
             true => name.to_owned(),
             false => head.name,
         };
+        // A folder is called by it.
+        if name.contains(['/', '\\', '\0']) {
+            let message = format!(
+                "name = {name:?} is impossible; give a name without / and \\, and say where results go with out"
+            );
+            let mut error = InputError::new(source, message);
+            error.line = document.line("study.name");
+            return Err(error);
+        }
         let study = Study {
             out: match head.out.as_os_str().is_empty() {
                 true => format!("sweep-{name}").into(),
