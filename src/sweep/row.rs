@@ -189,7 +189,9 @@ pub(super) fn journals_in(folder: &Path) -> Vec<PathBuf> {
     // Nothing is read through a link, nor from a device, which may not end.
     let is_journal = |path: &PathBuf| {
         let name = path.file_name().and_then(|name| name.to_str());
-        name.is_some_and(|name| name.starts_with("journal") && name.ends_with(".log"))
+        let name = name.and_then(|name| name.strip_prefix("journal")?.strip_suffix(".log"));
+        // Not one that was set aside: `journal.kept.log`.
+        name.is_some_and(|part| part.is_empty() || part.starts_with('-') && !part.contains('.'))
             && path.symlink_metadata().is_ok_and(|about| about.is_file())
     };
     let mut paths: Vec<PathBuf> = entries

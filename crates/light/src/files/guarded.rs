@@ -12,6 +12,7 @@ use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use super::result_set::owner_of;
 use super::temporary::Registry;
 use femtogate::InputError;
 
@@ -85,6 +86,20 @@ pub fn refuse_input(path: &Path) -> Result<(), InputError> {
     Err(InputError::new(path.display(), message))
 }
 
+/// Complains if a single file at `path` would replace one that this run has read, or one of a set of results.
+///
+/// # Errors
+/// When it would.
+pub(super) fn refuse_to_replace(path: &Path) -> Result<(), InputError> {
+    refuse_input(path)?;
+    let Some(command) = owner_of(path) else {
+        return Ok(());
+    };
+    let message =
+        format!("is one of the results of `gdtof {command}`; give another name for the output");
+    Err(InputError::new(path.display(), message))
+}
+
 /// The file behind a name, through links.
 #[cfg(unix)]
 fn id_of(path: &Path) -> Option<FileId> {
@@ -101,7 +116,7 @@ fn id_of(path: &Path) -> Option<FileId> {
 /// never followed.
 ///
 /// # Errors
-/// A folder, a file that this run reads, and one that cannot be renamed.
+/// A folder, a file that this run reads, one of a set of results, and one that cannot be renamed.
 pub fn set_aside_foreign(
     path: &Path,
     is_ours: impl FnOnce(BufReader<File>) -> bool,
@@ -116,7 +131,7 @@ pub fn set_aside_foreign(
     if about.is_file() && is_ours(BufReader::new(File::open(path).map_err(unwritable)?)) {
         return Ok(());
     }
-    refuse_input(path)?;
+    refuse_to_replace(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let other = path.with_file_name(free_name(&name, |name| {
         fs::symlink_metadata(path.with_file_name(name)).is_ok()

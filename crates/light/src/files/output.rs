@@ -4,8 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use super::guarded::refuse_input;
-use super::result_set::owner_of;
+use super::guarded::{refuse_input, refuse_to_replace};
 use super::temporary::Temporary;
 use femtogate::InputError;
 
@@ -31,13 +30,7 @@ impl OutputFile {
             Some(p) if !p.as_os_str().is_empty() => p,
             _ => Path::new("."),
         };
-        refuse_input(path)?;
-        if let Some(command) = owner_of(folder, path) {
-            let message = format!(
-                "is one of the results of `gdtof {command}`; give another name for the output"
-            );
-            return Err(InputError::new(path.display(), message));
-        }
+        refuse_to_replace(path)?;
         let (temporary, file) = Temporary::file_in(folder).map_err(unwritable)?;
         Ok(OutputFile {
             path: path.to_owned(),

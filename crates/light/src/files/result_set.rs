@@ -126,10 +126,10 @@ impl Manifest {
 
 const PROGRAM: &str = "gdtof";
 
-/// The command whose results the file `path` in `folder` is one of.
-pub(super) fn owner_of(folder: &Path, path: &Path) -> Option<String> {
+/// The command whose results the file `path` is one of.
+pub(super) fn owner_of(path: &Path) -> Option<String> {
     fs::symlink_metadata(path).ok()?;
-    let manifest = Manifest::read(folder)?;
+    let manifest = Manifest::read(path.parent()?)?;
     let is_its = |file: &ManifestFile| path.file_name() == Some(file.name.as_ref());
     let mut files = manifest.files.iter().chain(&manifest.previous_files);
     files.any(is_its).then_some(manifest.command)
