@@ -179,8 +179,8 @@ fn start_values_load_right_down_to_the_shortest_load_clk_period() {
         let by_paths = LoadTiming::of(&config, &silicon, Limits::Kept)
             .period()
             .unwrap();
-        let works = |period| load_works(&config, &silicon, Limits::Kept, period);
-        let by_gates = shortest_period(Time::from_ns(5), works).unwrap();
+        let works = load_works(&config, &silicon, Limits::Kept);
+        let by_gates = shortest_period(Time::from_ns(5), &works).unwrap();
         assert!(
             by_gates <= by_paths + Time::from_ps(1),
             "{by_gates} {by_paths}"
@@ -205,8 +205,8 @@ fn histograms_are_read_right_down_to_the_shortest_read_clk_period() {
         for silicon in [TYPICAL, mismatched(3)] {
             let by_paths = ReadTiming::of(&config, &silicon, Limits::Kept).period();
             let by_paths = by_paths.unwrap();
-            let works = |period| read_works(&config, &silicon, Limits::Kept, period);
-            let by_gates = shortest_period(Time::from_ns(5), works).unwrap();
+            let works = read_works(&config, &silicon, Limits::Kept);
+            let by_gates = shortest_period(Time::from_ns(5), &works).unwrap();
             assert!(
                 by_gates <= by_paths + Time::from_ps(1),
                 "{by_gates} {by_paths}"

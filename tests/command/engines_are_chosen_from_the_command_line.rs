@@ -204,11 +204,11 @@ fn run_time_against_error_comes_as_table_csv_and_picture() {
         "pareto --no-gate --ranges 20 --klux 1 --macropixels 8 --laser-cycles 40 --repeats 1";
     let said = gdtof(here.path(), &small.split(' ').collect::<Vec<_>>());
     assert!(said.contains("window, no skipping"), "{said}");
-    let csv = std::fs::read_to_string(here.path().join("out/pareto.csv")).unwrap();
+    let csv = std::fs::read_to_string(here.path().join("pareto/pareto.csv")).unwrap();
     assert!(csv.lines().count() > 5, "{csv}");
-    let picture = std::fs::read_to_string(here.path().join("out/pareto.svg")).unwrap();
+    let picture = std::fs::read_to_string(here.path().join("pareto/pareto.svg")).unwrap();
     assert!(picture.starts_with("<svg"), "{picture}");
-    assert!(here.path().join("out/pareto_cells.csv").exists());
+    assert!(here.path().join("pareto/pareto_cells.csv").exists());
 }
 
 /// Recorded pulses of a sensor with one macropixel on one engine: its output.

@@ -185,7 +185,17 @@ fn cells_that_are_passed_over_are_listed_with_the_reason() {
         library += &format!("cell ({name}) {{ {contents} }}\n");
     }
     fs::write(folder.path().join("odd.lib"), library + "}\n").unwrap();
-    let explain = ["timing", "--explain", "--json", "--liberty", "odd.lib"];
+    let explain = [
+        "timing",
+        "--explain",
+        "--json",
+        "--rows",
+        "1",
+        "--cols",
+        "1",
+        "--liberty",
+        "odd.lib",
+    ];
     let output = gdtof(folder.path(), &explain);
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");

@@ -267,6 +267,7 @@ fn really_meet(
         Probe::Clk,
         Probe::Strobe,
         Probe::HitReset,
+        Probe::Stop,
     ];
     let own = [Probe::Block, Probe::Start];
     let own = own.into_iter().filter_map(|probe| probes.find(probe));
@@ -358,7 +359,7 @@ fn really_meet(
             close(&starts, &clks, timing.setup, timing.hold)
         }
         // A strobe while HIT is in reset, or too soon after.
-        Conflict::StrobeAtNextReset | Conflict::StrobeAtReset | Conflict::ResetStrobeAtHitReset => {
+        Conflict::StrobeAtReset => {
             let strobes = rises(Probe::Strobe);
             let resets = rises(Probe::HitReset);
             let ends = falls(Probe::HitReset);
@@ -375,8 +376,20 @@ fn really_meet(
             let pulse = timing.counter.clock_high + timing.clk_to_counter_clk;
             close(&rises(Probe::Clk), &falls(Probe::Block), pulse, pulse)
         }
-        // Of the cells alone, or a count too early or late: no two edges show it.
-        Conflict::BrokenHold | Conflict::LocalStopAtEnable => true,
+        Conflict::ResetStrobeAtHitReset => {
+            let (strobes, stops) = (rises(Probe::Strobe), rises(Probe::Stop));
+            // The law does not ask whether a counter that wraps has LOCAL_STOP high already, so that nothing rises.
+            let next = |edges: &[Time], stop: Time| edges.iter().copied().find(|&t| t >= stop);
+            let (ls_rises, ls_falls) = (rises(Probe::LocalStop), falls(Probe::LocalStop));
+            let was_high = |&stop: &Time| match (next(&ls_falls, stop), next(&ls_rises, stop)) {
+                (Some(fall), Some(rise)) => fall < rise,
+                (fall, _) => fall.is_some(),
+            };
+            close(&strobes, &stops, Time::ZERO - race.comes, race.comes)
+                || stops.iter().any(was_high)
+        }
+        // Of the cells alone, swallowed by the reset, or a count too early or late: no two edges show it.
+        Conflict::BrokenHold | Conflict::StrobeAtNextReset | Conflict::LocalStopAtEnable => true,
         other => unreachable!("{other}"),
     }
 }

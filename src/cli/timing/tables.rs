@@ -177,8 +177,8 @@ pub(super) fn load_clk(subject: &Subject<'_>, load: &LoadTiming) -> Section {
     let (config, silicon) = (subject.config, subject.silicon);
     let ignored = LoadTiming::of(config, silicon, Limits::Ignored).period();
     let names = ["load_clk", "Shortest LOAD_CLK period", "what is loaded"];
-    serial_clk(names, [ignored, load.period()], |limits, period| {
-        load_works(config, silicon, limits, period)
+    serial_clk(names, [ignored, load.period()], |limits| {
+        load_works(config, silicon, limits)
     })
 }
 
@@ -187,16 +187,16 @@ pub(super) fn read_clk(subject: &Subject<'_>, read: &ReadTiming) -> Section {
     let (config, silicon) = (subject.config, subject.silicon);
     let ignored = ReadTiming::of(config, silicon, Limits::Ignored).period();
     let names = ["read_clk", "Shortest READ_CLK period", "what is read"];
-    serial_clk(names, [ignored, read.period()], |limits, period| {
-        read_works(config, silicon, limits, period)
+    serial_clk(names, [ignored, read.period()], |limits| {
+        read_works(config, silicon, limits)
     })
 }
 
 /// A clock's shortest periods, limits ignored and kept: static ones, and those at which the gates work.
-fn serial_clk(
+fn serial_clk<W: Fn(Time) -> bool>(
     [key, title, what]: [&'static str; 3],
     paths: [Option<Time>; 2],
-    works: impl Fn(Limits, Time) -> bool,
+    works: impl Fn(Limits) -> W,
 ) -> Section {
     let mut section = Section::new(key, title, PERIODS);
     let names = [
@@ -204,7 +204,7 @@ fn serial_clk(
         ("setup, hold, widths", Limits::Kept),
     ];
     for ((name, limits), paths) in names.into_iter().zip(paths) {
-        let gates = shortest_period(SLOW, |period| works(limits, period));
+        let gates = shortest_period(SLOW, works(limits));
         section.push(period_row(name, paths, gates));
     }
     section

@@ -330,7 +330,8 @@ fn areas_have_their_unit() {
     std::fs::write(dir.join("lfsr.json"), LFSR).unwrap();
     let library = concat!(env!("CARGO_MANIFEST_DIR"), "/vectors/liberty/example.lib");
     let block = ["--block", "p_counter=lfsr.json", "--liberty", library];
-    let timing = gdtof(dir, &[&["timing"], &block[..]].concat());
+    let one = ["timing", "--rows", "1", "--cols", "1"];
+    let timing = gdtof(dir, &[&one[..], &block].concat());
     let timing = String::from_utf8_lossy(&timing.stdout).into_owned();
     let line = timing.lines().find(|line| line.starts_with("area, um2"));
     let line = line.unwrap_or_else(|| panic!("{timing}"));
@@ -358,6 +359,9 @@ fn areas_have_their_unit() {
         line.contains(&format!(" {} (", areas[1])),
         "{areas:?}: {line}"
     );
-    let built_in = gdtof(dir, &["timing", "--block", "p_counter=lfsr.json"]);
+    let built_in = gdtof(
+        dir,
+        &[&one[..], &["--block", "p_counter=lfsr.json"]].concat(),
+    );
     assert!(String::from_utf8_lossy(&built_in.stdout).contains("\narea, packed transistors "));
 }

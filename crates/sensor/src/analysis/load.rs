@@ -86,13 +86,14 @@ impl LoadTiming {
     }
 }
 
-/// Whether the event kernel loads three rows of arbitrary start values right at this LOAD_CLK and, if limits are to
+/// Whether the event kernel loads three rows of arbitrary start values right at a LOAD_CLK period and, if limits are to
 /// be kept, breaks none. Rows differ only in their token.
-pub fn load_works(config: &SensorConfig, silicon: &Silicon, limits: Limits, period: Time) -> bool {
+pub fn load_works(
+    config: &SensorConfig,
+    silicon: &Silicon,
+    limits: Limits,
+) -> impl Fn(Time) -> bool {
     const ROWS: usize = 3;
-    let Ok(clock) = Frequency::from_period(period) else {
-        return false;
-    };
     let (cols, bits) = (config.cols, config.counter_bits);
     let netlist = Netlist::elaborate(&load_path::with_memories(ROWS, cols, bits));
     let timing = silicon.timing(&netlist);
@@ -101,19 +102,23 @@ pub fn load_works(config: &SensorConfig, silicon: &Silicon, limits: Limits, peri
         .map(|i| (i as u16).wrapping_mul(0x9e37).rotate_left(7) & config.largest_start())
         .collect();
     let stream = load_path::stream(&starts, cols, bits);
-    let (end, mut stimulus) = load_stimulus(LoadPins::of(&netlist), clock, &stream);
-    let library = silicon.limits(limits);
-    let mut checks =
-        TimingChecks::new(&netlist, &library, silicon.corner).not_before(gates::RESET_RELEASED);
-    let mut kernel = Kernel::new(&netlist, &timing);
-    let settled = end + Time::from_ns(5);
-    match limits {
-        Limits::Kept => kernel.run(&mut stimulus, settled, &mut checks),
-        Limits::Ignored => kernel.run(&mut stimulus, settled, &mut ()),
+    let (library, corner) = (silicon.limits(limits), silicon.corner);
+    let memories = probes::memories(&netlist, ROWS, cols);
+    move |period| {
+        let Ok(clock) = Frequency::from_period(period) else {
+            return false;
+        };
+        let (end, mut stimulus) = load_stimulus(LoadPins::of(&netlist), clock, &stream);
+        let mut checks =
+            TimingChecks::new(&netlist, &library, corner).not_before(gates::RESET_RELEASED);
+        let mut kernel = Kernel::new(&netlist, &timing);
+        let settled = end + Time::from_ns(5);
+        match limits {
+            Limits::Kept => kernel.run(&mut stimulus, settled, &mut checks),
+            Limits::Ignored => kernel.run(&mut stimulus, settled, &mut ()),
+        }
+        let mut memories = memories.iter().zip(&starts);
+        let is_right = memories.all(|(nets, &start)| kernel.number(nets) == Some(start.into()));
+        is_right && (limits == Limits::Ignored || checks.report(&netlist).violated() == 0)
     }
-    let mut memories = probes::memories(&netlist, ROWS, cols)
-        .into_iter()
-        .zip(&starts);
-    let is_right = memories.all(|(nets, &start)| kernel.number(&nets) == Some(start.into()));
-    is_right && (limits == Limits::Ignored || checks.report(&netlist).violated() == 0)
 }

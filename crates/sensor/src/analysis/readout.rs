@@ -103,13 +103,14 @@ impl ReadTiming {
     }
 }
 
-/// Whether the event kernel reads arbitrary counts of two rows right at this READ_CLK and, if limits are to be kept, breaks
+/// Whether the event kernel reads arbitrary counts of two rows right at a READ_CLK period and, if limits are to be kept, breaks
 /// none. More rows only take longer to settle, and words have time.
-pub fn read_works(config: &SensorConfig, silicon: &Silicon, limits: Limits, period: Time) -> bool {
+pub fn read_works(
+    config: &SensorConfig,
+    silicon: &Silicon,
+    limits: Limits,
+) -> impl Fn(Time) -> bool {
     const ROWS: usize = 2;
-    let Ok(clock) = Frequency::from_period(period) else {
-        return false;
-    };
     let order = ReadoutOrder::of(&one_pin(config, ROWS));
     let netlist = Netlist::elaborate(&with_counts(order));
     let pins = ReadPins::of(&netlist);
@@ -117,23 +118,29 @@ pub fn read_works(config: &SensorConfig, silicon: &Silicon, limits: Limits, peri
     let counts: Vec<u16> = (0..ROWS * order.cols * order.bins)
         .map(|i| (i as u16).wrapping_mul(0x9e37).rotate_left(7) & most)
         .collect();
-    let mut sampler = PinSampler::new(&netlist, |_| Logic::X);
-    let library = silicon.limits(limits);
-    let mut checks =
-        TimingChecks::new(&netlist, &library, silicon.corner).not_before(gates::RESET_RELEASED);
-    let mut kernel = Kernel::new(&netlist, &silicon.timing(&netlist));
-    let (end, mut read) = read_stimulus(&pins, clock, READ_ENABLED, order.periods());
-    let mut power_up = in_order(power_up(&netlist, &order, &counts));
-    kernel.run(
-        &mut power_up,
-        READ_ENABLED,
-        &mut (&mut sampler, &mut checks),
-    );
-    match limits {
-        Limits::Kept => kernel.run(&mut read, end, &mut (&mut sampler, &mut checks)),
-        Limits::Ignored => kernel.run(&mut read, end, &mut sampler),
+    let timing = silicon.timing(&netlist);
+    let (library, corner) = (silicon.limits(limits), silicon.corner);
+    move |period| {
+        let Ok(clock) = Frequency::from_period(period) else {
+            return false;
+        };
+        let mut sampler = PinSampler::new(&netlist, |_| Logic::X);
+        let mut checks =
+            TimingChecks::new(&netlist, &library, corner).not_before(gates::RESET_RELEASED);
+        let mut kernel = Kernel::new(&netlist, &timing);
+        let (end, mut read) = read_stimulus(&pins, clock, READ_ENABLED, order.periods());
+        let mut power_up = in_order(power_up(&netlist, &order, &counts));
+        kernel.run(
+            &mut power_up,
+            READ_ENABLED,
+            &mut (&mut sampler, &mut checks),
+        );
+        match limits {
+            Limits::Kept => kernel.run(&mut read, end, &mut (&mut sampler, &mut checks)),
+            Limits::Ignored => kernel.run(&mut read, end, &mut sampler),
+        }
+        let found = sampler.counts(&order);
+        let is_right = found.iter().zip(&counts).all(|(a, b)| *a == Some(*b));
+        is_right && (limits == Limits::Ignored || checks.report(&netlist).violated() == 0)
     }
-    let found = sampler.counts(&order);
-    let is_right = found.iter().zip(&counts).all(|(a, b)| *a == Some(*b));
-    is_right && (limits == Limits::Ignored || checks.report(&netlist).violated() == 0)
 }

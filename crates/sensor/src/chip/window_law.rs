@@ -385,7 +385,7 @@ impl WindowLaw {
         timing.clk_period.max(paths + timing.setup + ROUNDING)
     }
 
-    /// A strobe that the reset itself makes, where LOCAL_STOP starts high and was low or is cleared before, if the reset of HIT does not hold then.
+    /// A strobe that the reset itself makes, where LOCAL_STOP starts high and may have been low or is cleared before, if the reset of HIT does not hold then.
     fn reset_strobe(&self, start: u16) -> Option<Race> {
         let (sensor, timing) = (&self.sensor, &self.timing);
         let falls = sensor.after_borrow == AfterBorrow::Wrap || sensor.p_counter.row().clears_first;
