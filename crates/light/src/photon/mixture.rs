@@ -6,12 +6,14 @@
 //!   echoes                     one               one           Gaussians of the same photons, mean and variance
 //! ```
 //!
-//! A group of points is one echo if a Gaussian is close enough to their sum: if the photons that come before any
-//! instant differ by at most [`MERGED_ERROR`] of the macropixel's. Otherwise its brightest surface is parted from it, or it is
-//! parted where that leaves least variance within, and so on.
+//! Surfaces are one echo if a Gaussian is close enough to their sum. The photons that come before any instant may differ by
+//! [`NEGLIGIBLE`] photons a pulse, or by [`MERGED_ERROR`] of the faintest of these surfaces. Otherwise the brightest surface is parted from
+//! the others, or the group is parted where that leaves least variance within, and so on. No limit depends on how bright other light is: a
+//! wall keeps its photons beside a retroreflector of any strength.
 //!
 //! Within one surface it is the depth that decides ([`DEEP`]). The light of a slanted surface is a box, and its peak may be anywhere on the
-//! flat top; that of a Gaussian is in the middle. So a deep surface becomes slices, short enough that their sum has a flat top.
+//! flat top; that of a Gaussian is in the middle. So a deep surface becomes slices, short enough that their sum has a flat top. An object
+//! whose points leave a gap is two surfaces.
 
 #![allow(
     unsafe_code,
@@ -25,9 +27,12 @@ use super::light::Echo;
 use crate::numerics::branchless;
 use crate::units::Time;
 
-/// Share of a macropixel's signal photons that points of several surfaces may put on the wrong side of an instant as one echo: two
-/// even pulses do up to a distance of two standard deviations, from which on their sum has two peaks.
-pub const MERGED_ERROR: f64 = 0.02;
+/// Share of the faintest surface's photons that surfaces merged into one echo may put on the wrong side of an instant: two even pulses
+/// do up to a distance of two standard deviations, from which on their sum has two peaks.
+pub const MERGED_ERROR: f64 = 0.04;
+
+/// Photons a pulse that may be on the wrong side of an instant, whatever they are of: 1.6 counts of 16 000 laser cycles.
+pub const NEGLIGIBLE: f64 = 1e-4;
 
 /// A surface deeper than that, in standard deviations of the pulse, is no single echo; it is as deep as an even box of its variance. 4.0
 /// are 1.15 m with a pulse of 4.5 ns. RMS error of the depth from 16 bins of 0.39 m with 20 background counts each, anywhere
@@ -61,9 +66,11 @@ const SLICE: f64 = 2.0;
 /// Slices are of whole rays, so one that is longer by no more than this part is not cut again.
 const ROUNDED: f64 = 0.15;
 
-/// What sends back no more than this share of a macropixel's photons is cut no further, so that there are some 20 echoes at most: 14
-/// slices are 8 m deep with a pulse of 4.5 ns, more than most windows.
-const SMALLEST: f64 = 1.0 / 16.0;
+/// Slices of a surface at most: 16 are 9 m deep with a pulse of 4.5 ns, more than most windows.
+const MOST_SLICES: f64 = 16.0;
+
+/// Points of one object that leave a gap of this many standard deviations of the pulse are two surfaces.
+const GAP: f64 = 2.0;
 
 /// A surface that sends back more than this share of a group's photons is parted from the others whole.
 const DOMINANT: f64 = 0.25;
@@ -73,8 +80,9 @@ const DOMINANT: f64 = 0.25;
 const INSTANTS: i32 = 13;
 const REACH: f64 = 2.4;
 
-/// A spread of so little of the pulse's variance is no question: two even points are then 0.0001 off.
-const LITTLE: f64 = 0.05;
+/// Points within so little of the pulse's standard deviation are no question: two even ones are then 0.0001 off, and an uneven one
+/// puts less than [`MERGED_ERROR`] of its photons on the wrong side.
+const LITTLE: f64 = 0.45;
 
 /// Light that a small piece of a surface sends back.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,17 +97,22 @@ pub struct Glint {
     pub surface: usize,
 }
 
+impl Glint {
+    /// Half the depth of an even box of its variance, fs.
+    fn half_fs(&self) -> f64 {
+        (3.0 * self.variance_fs2).sqrt()
+    }
+}
+
 /// The echoes of `glints`, brightest first: the same number of photons with the same mean and variance of their times.
 /// `pulse_sigma` is the standard deviation of the Gaussian part of the pulse, which becomes part of each echo's;
 /// `resolution` that of the whole pulse, which decides what is merged.
 pub fn merged(glints: &mut [Glint], pulse_sigma: Time, resolution: Time) -> SmallVec<[Echo; 1]> {
     glints.sort_by(|a, b| a.arrival_fs.total_cmp(&b.arrival_fs));
-    let all: f64 = glints.iter().map(|glint| glint.photons).sum();
+    let resolution_fs = resolution.as_fs() as f64;
+    part_at_gaps(glints, GAP * resolution_fs);
     let mut groups = SmallVec::<[Group; 1]>::new();
-    if all > 0.0 {
-        let resolution_fs2 = (resolution.as_fs() as f64).powi(2);
-        part(glints, all, resolution_fs2, &mut groups);
-    }
+    part(glints, resolution_fs, &mut groups);
     groups.sort_by(|a, b| b.photons.total_cmp(&a.photons));
     let sigma_fs2 = (pulse_sigma.as_fs() as f64).powi(2);
     let echo = |group: &Group| {
@@ -110,72 +123,117 @@ pub fn merged(glints: &mut [Glint], pulse_sigma: Time, resolution: Time) -> Smal
     groups.iter().map(echo).collect()
 }
 
+/// Numbers the surfaces of `glints`, which are in order of time: what is of one object before and after a gap are two.
+fn part_at_gaps(glints: &mut [Glint], gap_fs: f64) {
+    struct Reached {
+        object: usize,
+        until_fs: f64,
+        surface: usize,
+    }
+    let mut reached = SmallVec::<[Reached; 4]>::new();
+    let mut surfaces = 0;
+    for glint in glints {
+        let half_fs = glint.half_fs();
+        let (from_fs, until_fs) = (glint.arrival_fs - half_fs, glint.arrival_fs + half_fs);
+        let last = match reached.iter_mut().find(|last| last.object == glint.surface) {
+            Some(last) => {
+                if from_fs - last.until_fs > gap_fs {
+                    last.surface = surfaces;
+                    surfaces += 1;
+                }
+                last.until_fs = last.until_fs.max(until_fs);
+                last
+            }
+            None => {
+                reached.push(Reached {
+                    object: glint.surface,
+                    until_fs,
+                    surface: surfaces,
+                });
+                surfaces += 1;
+                reached.last_mut().expect("just added")
+            }
+        };
+        glint.surface = last.surface;
+    }
+}
+
 /// Adds the groups of `glints`, which are in order of time, to `groups`.
-fn part(glints: &[Glint], all: f64, resolution_fs2: f64, groups: &mut SmallVec<[Group; 1]>) {
+fn part(glints: &[Glint], resolution_fs: f64, groups: &mut SmallVec<[Group; 1]>) {
     let group = Group::of(glints);
     if group.photons == 0.0 {
         return;
     }
-    let share = group.photons / all;
-    let (brightest, its_photons) = brightest_surface(glints);
-    let is_one_surface = its_photons >= group.photons;
-    if is_one_surface {
+    let surfaces = surfaces(glints);
+    let resolution_fs2 = resolution_fs * resolution_fs;
+    if let [_] = surfaces[..] {
         // As deep as an even box of the same variance.
         let is_deep = 12.0 * group.variance_fs2 > DEEP * DEEP * resolution_fs2;
-        match is_deep && share > SMALLEST {
-            true => slice(glints, all, resolution_fs2, groups),
-            false => groups.push(group),
+        if is_deep {
+            let slice_fs = (SLICE * resolution_fs).max(depth_fs(glints) / MOST_SLICES);
+            slice(glints, slice_fs, groups);
+        } else {
+            groups.push(group);
         }
         return;
     }
-    let is_off = share > MERGED_ERROR
-        && group.variance_fs2 > LITTLE * resolution_fs2
-        && share * group.distance(glints, resolution_fs2) > MERGED_ERROR;
+    let faintest = surfaces
+        .iter()
+        .fold(f64::INFINITY, |least, s| least.min(s.1));
+    let most_off = NEGLIGIBLE.max(MERGED_ERROR * faintest);
+    let is_off = group.photons > most_off
+        && depth_fs(glints) > LITTLE * resolution_fs
+        && group.photons * group.distance(glints, resolution_fs2) > most_off;
+    let brighter = |a: (usize, f64), b: &(usize, f64)| if b.1 > a.1 { *b } else { a };
+    let (brightest, its_photons) = surfaces.iter().fold((0, 0.0), brighter);
     if is_off && its_photons > DOMINANT * group.photons {
         let is_own = |glint: &Glint| glint.surface == brightest;
         let (own, others): (Vec<Glint>, Vec<Glint>) = glints.iter().copied().partition(is_own);
-        part(&own, all, resolution_fs2, groups);
-        part(&others, all, resolution_fs2, groups);
+        part(&own, resolution_fs, groups);
+        part(&others, resolution_fs, groups);
         return;
     }
     match is_off.then(|| best_cut(glints)).flatten() {
         None => groups.push(group),
         Some(cut) => {
             let (earlier, later) = glints.split_at(cut);
-            part(earlier, all, resolution_fs2, groups);
-            part(later, all, resolution_fs2, groups);
+            part(earlier, resolution_fs, groups);
+            part(later, resolution_fs, groups);
         }
     }
 }
 
-/// Adds slices of one deep surface, equally deep.
-fn slice(glints: &[Glint], all: f64, resolution_fs2: f64, groups: &mut SmallVec<[Group; 1]>) {
+/// From end to end, as if glints were even, fs.
+fn depth_fs(glints: &[Glint]) -> f64 {
+    let (first, last) = (&glints[0], &glints[glints.len() - 1]);
+    last.arrival_fs + last.half_fs() - (first.arrival_fs - first.half_fs())
+}
+
+/// Adds slices of one deep surface, equally deep, of `slice_fs` at most.
+fn slice(glints: &[Glint], slice_fs: f64, groups: &mut SmallVec<[Group; 1]>) {
     let group = Group::of(glints);
     if group.photons == 0.0 {
         return;
     }
-    // From end to end, as if glints were even. A pulse without width resolves everything.
-    let half_fs = |glint: &Glint| (3.0 * glint.variance_fs2).sqrt();
-    let (first, last) = (&glints[0], &glints[glints.len() - 1]);
-    let from_fs = first.arrival_fs - half_fs(first);
-    let depth_fs = last.arrival_fs + half_fs(last) - from_fs;
-    let slices = (depth_fs / resolution_fs2.sqrt() / SLICE - ROUNDED).ceil();
-    let slices = slices.min(1.0 / SMALLEST);
+    // A pulse without width resolves everything.
+    let depth_fs = depth_fs(glints);
+    let slices = (depth_fs / slice_fs - ROUNDED).ceil().min(MOST_SLICES);
+    let from_fs = glints[0].arrival_fs - glints[0].half_fs();
     let middle_fs = from_fs + depth_fs * (slices / 2.0).floor() / slices;
     let cut = glints.partition_point(|glint| glint.arrival_fs < middle_fs);
-    if slices > 1.0 && group.photons > SMALLEST * all && (1..glints.len()).contains(&cut) {
+    if slices > 1.0 && group.photons > NEGLIGIBLE && (1..glints.len()).contains(&cut) {
         let (earlier, later) = glints.split_at(cut);
-        slice(earlier, all, resolution_fs2, groups);
-        slice(later, all, resolution_fs2, groups);
+        slice(earlier, slice_fs, groups);
+        slice(later, slice_fs, groups);
     } else {
         groups.push(group);
     }
 }
 
-/// The surface that sends back most photons, and how many.
-fn brightest_surface(glints: &[Glint]) -> (usize, f64) {
+/// The surfaces that send back any photons, and how many.
+fn surfaces(glints: &[Glint]) -> SmallVec<[(usize, f64); 4]> {
     let mut surfaces = SmallVec::<[(usize, f64); 4]>::new();
-    for glint in glints {
+    for glint in glints.iter().filter(|glint| glint.photons > 0.0) {
         match surfaces
             .iter_mut()
             .find(|(surface, _)| *surface == glint.surface)
@@ -184,11 +242,7 @@ fn brightest_surface(glints: &[Glint]) -> (usize, f64) {
             None => surfaces.push((glint.surface, glint.photons)),
         }
     }
-    let brighter = |a: (usize, f64), b: (usize, f64)| if b.1 > a.1 { b } else { a };
-    match surfaces.len() {
-        1 => (surfaces[0].0, f64::INFINITY),
-        _ => surfaces.into_iter().fold((0, 0.0), brighter),
-    }
+    surfaces
 }
 
 /// Where two groups have least variance within; `None` where all come at the same time.
@@ -345,6 +399,7 @@ mod tests {
     fn slanted(sigmas: f64) -> Vec<Glint> {
         let row = (0..64).map(|i| Glint {
             surface: 7,
+            variance_fs2: (sigmas * SIGMA_FS / 64.0).powi(2) / 12.0,
             ..glint(1.0, sigmas * (f64::from(i) + 0.5) / 64.0)
         });
         row.collect()
@@ -407,13 +462,33 @@ mod tests {
             assert_eq!(echoes[0].photons, 80.0, "{sigmas} sigma");
             assert_eq!(echoes.len() > 2, merge(&row).len() > 1, "{sigmas} sigma");
         }
-        // One that is faint beside it is not cut.
+        // One that is faint beside it has as many slices as alone.
         let mut both = slanted(30.0);
         for glint in &mut both {
             glint.photons = 1e-3;
         }
-        both.push(glint(2.0, -40.0));
-        assert_eq!(merge(&both).len(), 2);
+        let alone = merge(&both).len();
+        both.push(glint(2000.0, -40.0));
+        assert_eq!(merge(&both).len(), alone + 1);
+    }
+
+    #[test]
+    fn an_echo_keeps_its_photons_and_its_place_beside_one_of_any_strength() {
+        for brighter in [1.0, 1e2, 1e3, 1e4, 1e6] {
+            for sigmas in [2.5, 4.0, 10.0, 100.0] {
+                let found = merge(&[glint(5.0 * brighter, 0.0), glint(5.0, sigmas)]);
+                let faint = found.iter().min_by(|a, b| a.photons.total_cmp(&b.photons));
+                let faint = faint.unwrap();
+                assert_eq!(found.len(), 2, "{brighter} times at {sigmas} sigma");
+                assert_eq!(faint.photons, 5.0);
+                // Of one object, too, where nothing of it lies between.
+                let one = [glint(5.0 * brighter, 0.0), glint(5.0, sigmas)].map(|glint| Glint {
+                    surface: 0,
+                    ..glint
+                });
+                assert_eq!(merge(&one), found, "{brighter} times at {sigmas} sigma");
+            }
+        }
     }
 
     #[test]
@@ -426,8 +501,8 @@ mod tests {
     }
 
     proptest! {
-        /// Photons, mean and variance are those of the sum of all pulses. Each echo puts at most [`MERGED_ERROR`] of the photons on the wrong
-        /// side of an instant; where several overlap, these add up: 3.5 % is the worst found.
+        /// Photons, mean and variance are those of the sum of all pulses. Each echo puts at most [`MERGED_ERROR`] of its faintest surface's
+        /// photons on the wrong side of an instant; where several overlap, these add up.
         #[test]
         fn merged_echoes_are_close_to_the_sum_of_all_pulses(
             mut glints in prop::collection::vec((0.0f64..1.0, 0.0f64..30.0), 1..40),
@@ -437,7 +512,7 @@ mod tests {
             let glints: Vec<Glint> = glints.iter().map(|&(n, z)| glint(n + 1e-3, scale * z)).collect();
             let echoes = merge(&glints);
             let worst = off(&glints, &echoes);
-            prop_assert!(worst < 2.0 * MERGED_ERROR, "{worst} with {} echoes", echoes.len());
+            prop_assert!(worst < MERGED_ERROR, "{worst} with {} echoes", echoes.len());
             let photons: f64 = echoes.iter().map(|echo| echo.photons).sum();
             let sent: f64 = glints.iter().map(|glint| glint.photons).sum();
             prop_assert!((photons / sent - 1.0).abs() < 1e-12);

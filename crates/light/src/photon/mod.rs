@@ -25,7 +25,7 @@ pub use gaussian::{pulse_share, pulse_shares};
 pub use light::{
     Echo, LightError, OtherLaser, PixelLight, Profile, PulseTrain, Segment, SpadSpread,
 };
-pub use mixture::{DEEP, Glint, MERGED_ERROR, merged};
+pub use mixture::{DEEP, Glint, MERGED_ERROR, NEGLIGIBLE, merged};
 pub use optics::{Atmosphere, Filter, FilterShape, LaserDrift, Lens};
 pub use philox::LANES;
 pub use pulse::{PulseError, PulseShape};

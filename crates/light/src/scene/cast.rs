@@ -71,8 +71,8 @@ pub(crate) struct Returns {
     pub sky_share: f64,
 }
 
-/// What is weaker than this share of its light, both ways, is not followed: of 10⁴ signal photons a pulse, more than
-/// are modelled, one is left.
+/// What is weaker than this share of its light, both ways, is not followed, where a Lambertian surface may send it back: of 10⁴ signal
+/// photons a pulse one is left. Where retroreflectors send back more, weaker light is followed by as much.
 const LEAST_SHARE: f64 = 1e-4;
 
 /// Most mirrors that a ray is followed over.
@@ -106,6 +106,8 @@ pub struct Stage<'a> {
     balls: Vec<Option<(DVec3, f64)>>,
     /// Towards the sun.
     pub(super) sun: Option<DVec3>,
+    /// What is weaker than this share of its light, both ways, is not followed.
+    least_share: f64,
 }
 
 /// How far light has come along a ray.
@@ -136,11 +138,13 @@ pub(super) type First = Option<(Meeting, usize)>;
 impl<'a> Stage<'a> {
     pub fn of(scene: &'a Scene) -> Self {
         let shapes = || scene.objects.iter().map(|object| &object.shape);
+        let retro = scene.objects.iter().map(|object| object.retro);
         Stage {
             scene,
             placed: shapes().map(Shape::placed).collect(),
             balls: shapes().map(Shape::ball_around).collect(),
             sun: scene.towards_sun(),
+            least_share: LEAST_SHARE / retro.fold(1.0, f64::max),
         }
     }
 
@@ -238,7 +242,8 @@ impl<'a> Stage<'a> {
             });
         }
         let so_far_m = hit.range_m;
-        let onwards = |part: f64| Some(share * part).filter(|share| share * share >= LEAST_SHARE);
+        let onwards =
+            |part: f64| Some(share * part).filter(|share| share * share >= self.least_share);
         let passed = onwards(object.transmittance);
         let thrown = onwards(object.mirror).filter(|_| way.mirrors < MOST_MIRRORS);
         let [passed_on, thrown_on] = [passed, thrown].map(|share| share.unwrap_or(0.0));

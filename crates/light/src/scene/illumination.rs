@@ -12,7 +12,7 @@ use super::stray_light::with_stray_light;
 use super::truth::{Before, GroundTruth};
 use super::view::{Glimpse, View};
 use crate::photon::{
-    CROSSTALK_DELAY, Glint, PhotonBudget, PixelLight, PulseTrain, SpadModel, merged,
+    CROSSTALK_DELAY, Echo, Glint, PhotonBudget, PixelLight, PulseTrain, SpadModel, merged,
 };
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 use crate::units::TimeOfFlight;
@@ -20,9 +20,12 @@ use crate::units::TimeOfFlight;
 #[cfg(test)]
 mod tests;
 
-/// Most signal photons per cycle that are modelled. Sixteen SPADs saturate long before, and a
+/// Most photons of an echo per cycle that are modelled. Sixteen SPADs saturate long before, and a
 /// surface right before the lens would ask for 10¹⁰.
-const MOST_SIGNAL_PER_CYCLE: f64 = 1e4;
+const MOST_PER_ECHO: f64 = 1e4;
+
+/// Most photons per cycle of a ray, so that sums stay finite.
+const MOST_PER_RAY: f64 = 1e12;
 
 /// Highest background rate that is modelled, far beyond saturation.
 const MOST_BACKGROUND_HZ: f64 = 1e11;
@@ -45,8 +48,8 @@ impl Scene {
     /// Background is sunlight from the surfaces (Eq. 16) and from the sky, plus dark counts. Signal is Eq. 15 times the
     /// cosine of the angle at which the laser meets a surface, which the thesis leaves out, summed over the rays of the macropixel;
     /// rays that the pulse does not resolve make one echo ([`merged`]). The laser fires with the STOP edge, so an echo
-    /// arrives after its time of flight. Light far beyond saturation is cut at 10⁴ photons per
-    /// pulse and 10¹¹ per second.
+    /// arrives after its time of flight. Light far beyond saturation is cut: each echo at 10⁴ photons per
+    /// pulse, whatever the others have, and background at 10¹¹ per second.
     pub fn pixel_light(&self, truth: &GroundTruth) -> Vec<PixelLight> {
         self.light_on(truth, &SpadModel::default(), None)
     }
@@ -159,7 +162,7 @@ impl Scene {
             });
             let (mut all, cols): (Vec<_>, _) = (all.collect(), cols as usize);
             if has_stray_light {
-                all = with_stray_light(&self.lidar, &all, cols, self.dark_hz());
+                all = with_stray_light(self, &all, cols);
             }
             if has_crosstalk {
                 all = with_crosstalk(&all, spads, cols);
@@ -175,7 +178,11 @@ impl Scene {
             };
             let echoes = merged(&mut falling.glints, sigma, resolution);
             let background = PixelLight::background(falling.background_hz);
-            let light = echoes.into_iter().fold(background, PixelLight::with_echo);
+            let echoes = echoes.into_iter().map(|echo| Echo {
+                photons: echo.photons.min(MOST_PER_ECHO),
+                ..echo
+            });
+            let light = echoes.fold(background, PixelLight::with_echo);
             let light = match &fog {
                 Some(fog) => fog.onto(light, &view.ends_m, off_axis.signal, sigma, centre_fs),
                 None => light,
@@ -212,13 +219,13 @@ impl Scene {
             arrival_fs: 0.5 * bounce.way_m * FLIGHT_FS_PER_M - centre_fs,
             variance_fs2: 0.0,
         });
-        let mut glints: Vec<Glint> = view.glimpses.iter().map(glint).chain(bounced).collect();
-        let all: f64 = glints.iter().map(|glint| glint.photons).sum();
-        for glint in &mut glints {
-            glint.photons *= (MOST_SIGNAL_PER_CYCLE / all).min(1.0);
-        }
+        let glints = view.glimpses.iter().map(glint).chain(bounced);
+        let finite = |glint: Glint| Glint {
+            photons: glint.photons.min(MOST_PER_RAY),
+            ..glint
+        };
         Falling {
-            glints,
+            glints: glints.map(finite).collect(),
             background_hz: (sun_hz + self.dark_hz()).min(MOST_BACKGROUND_HZ),
             trains: (view.others.iter())
                 .filter_map(|other| other.train(self, budget, off_axis.background))
@@ -227,7 +234,7 @@ impl Scene {
     }
 
     /// Dark counts of a macropixel, unless its SPADs have their own, per second.
-    fn dark_hz(&self) -> f64 {
+    pub(super) fn dark_hz(&self) -> f64 {
         match self.lidar.has_spread() {
             true => 0.0,
             false => self.lidar.dark_counts_hz(),
@@ -252,14 +259,36 @@ pub(super) struct Falling {
     pub trains: Vec<PulseTrain>,
 }
 
+impl Falling {
+    /// The avalanches of its echoes, in order of time. A SPAD has one of what comes within a dead time at most, and is ready for the next
+    /// echo however strong this one was.
+    fn avalanches(&self, spads: f64, dead_fs: f64) -> Vec<Glint> {
+        let mut glints = self.glints.clone();
+        glints.sort_by(|a, b| a.arrival_fs.total_cmp(&b.arrival_fs));
+        let mut rest = &mut glints[..];
+        while let [first, ..] = rest {
+            let until_fs = first.arrival_fs + dead_fs;
+            let together = rest.partition_point(|glint| glint.arrival_fs <= until_fs);
+            let (blinding, later) = rest.split_at_mut(together);
+            let photons: f64 = blinding.iter().map(|glint| glint.photons).sum();
+            let fire = -spads * libm::expm1(-photons / spads) / photons.max(f64::MIN_POSITIVE);
+            blinding.iter_mut().for_each(|glint| glint.photons *= fire);
+            rest = later;
+        }
+        glints
+    }
+}
+
 /// The same with what crosses over from the neighbours. Of the avalanches of a SPAD at a side, a fourth of those with crosstalk
-/// fire across it; a SPAD has one avalanche of an echo at most.
+/// fire across it.
 fn with_crosstalk(falling: &[Falling], spads: &SpadModel, cols: usize) -> Vec<Falling> {
     let (grid, all) = (spads.grid, spads.grid.spads() as f64);
-    let dead_s = spads.dead_time.as_s();
+    let (dead_s, dead_fs) = (spads.dead_time.as_s(), spads.dead_time.as_fs() as f64);
     let each = spads.crosstalk_probability / 4.0 / all;
     let (of_side, of_end) = (each * grid.rows() as f64, each * grid.cols() as f64);
     let rows = falling.len() / cols;
+    let avalanches = falling.par_iter().map(|own| own.avalanches(all, dead_fs));
+    let avalanches: Vec<Vec<Glint>> = avalanches.collect();
     let of = |pixel: usize| {
         let (row, col) = (pixel / cols, pixel % cols);
         let mut own = falling[pixel].clone();
@@ -270,16 +299,15 @@ fn with_crosstalk(falling: &[Falling], spads: &SpadModel, cols: usize) -> Vec<Fa
             (row + 1 < rows).then(|| (pixel + cols, of_end)),
         ];
         for (neighbour, share) in neighbours.into_iter().flatten() {
-            let other = &falling[neighbour];
-            let photons: f64 = other.glints.iter().map(|glint| glint.photons).sum();
-            let fire = -all * libm::expm1(-photons / all) / photons.max(f64::MIN_POSITIVE);
-            own.glints.extend(other.glints.iter().map(|glint| Glint {
-                photons: glint.photons * fire * share,
-                arrival_fs: glint.arrival_fs + CROSSTALK_DELAY.as_fs() as f64,
-                ..*glint
-            }));
-            let ready = 1.0 / (1.0 + other.background_hz * dead_s / all);
-            own.background_hz += other.background_hz * ready * share;
+            own.glints
+                .extend(avalanches[neighbour].iter().map(|glint| Glint {
+                    photons: glint.photons * share,
+                    arrival_fs: glint.arrival_fs + CROSSTALK_DELAY.as_fs() as f64,
+                    ..*glint
+                }));
+            let other_hz = falling[neighbour].background_hz;
+            let ready = 1.0 / (1.0 + other_hz * dead_s / all);
+            own.background_hz += other_hz * ready * share;
         }
         own
     };

@@ -9,15 +9,24 @@
 //! 3); a measured one may be given as a curve. It has all that comes through the lens: echoes, sunlight, pulses of other lidars. Light
 //! from outside the field of view throws none in. Six macropixels beside a retroreflector of 1000 photons a pulse, a halo of
 //! one per cent is another echo of 0.01: what *blooming* is called where it hides what stands there.
+//!
+//! A macropixel gets light from all others, of most of them very little. It is summed up in cells of time, by its photons, mean and
+//! variance, so that none is lost however many sources it has.
+
+use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
 use super::curve::Measured;
 use super::illumination::Falling;
-use super::settings::Lidar;
-use crate::photon::Glint;
+use super::settings::{Lidar, Scene};
+use crate::photon::{Glint, PulseTrain, merged};
+use crate::units::Time;
 
-/// What a macropixel gets less of than that a pulse from another one is left out: of 16 000 laser cycles a sixth of a photon.
+/// Length of a cell, in standard deviations of the laser pulse.
+const CELL: f64 = 0.5;
+
+/// If the halo has no more than that a pulse of another lidar, its pulses are left out: of 16 000 laser cycles a sixth of a photon.
 const LEAST_PHOTONS: f64 = 1e-5;
 
 /// How far the sum of a halo is taken macropixel by macropixel.
@@ -82,16 +91,92 @@ impl Halo {
     }
 }
 
-/// Light on all macropixels with what the lens scatters, of which `dark_hz` on each does not come through it.
-pub(super) fn with_stray_light(
-    lidar: &Lidar,
-    falling: &[Falling],
-    cols: usize,
-    dark_hz: f64,
-) -> Vec<Falling> {
-    let halo = Halo::of(lidar, falling.len() / cols, cols);
-    // One echo of each surface is enough for others.
-    let sources: Vec<Falling> = falling.iter().map(Falling::by_surface).collect();
+/// Whose light it is: our own, or that of another lidar by its number.
+type Laser = Option<u32>;
+
+/// Photons a pulse of one laser that come within one cell of time, and the sums of their times after its start and of the squares.
+type Moments = [f64; 3];
+
+/// The light of all macropixels by cells of time.
+struct Cells {
+    length_fs: f64,
+    /// Those that have light of any macropixel: the laser and the number of the cell.
+    used: Vec<(Laser, i64)>,
+    /// What each macropixel has of them, by their place.
+    by_pixel: Vec<Vec<(usize, Moments)>>,
+}
+
+impl Cells {
+    fn of(falling: &[Falling], length_fs: f64) -> Self {
+        let by_number = |light: &Falling| {
+            let mut sums = BTreeMap::<(Laser, i64), Moments>::new();
+            let mut add = |laser, photons: f64, time_fs: f64, variance_fs2: f64| {
+                let cell = (time_fs / length_fs).floor();
+                let late_fs = time_fs - cell * length_fs;
+                let sum = sums.entry((laser, cell as i64)).or_default();
+                let moments = [1.0, late_fs, late_fs * late_fs + variance_fs2];
+                sum.iter_mut()
+                    .zip(moments)
+                    .for_each(|(sum, moment)| *sum += photons * moment);
+            };
+            for glint in light.glints.iter().filter(|glint| glint.photons > 0.0) {
+                add(None, glint.photons, glint.arrival_fs, glint.variance_fs2);
+            }
+            for train in &light.trains {
+                let [delay_fs, sigma_fs] = [train.delay, train.sigma].map(|t| t.as_fs() as f64);
+                let variance_fs2 = sigma_fs * sigma_fs;
+                add(
+                    Some(train.laser.number),
+                    train.photons,
+                    delay_fs,
+                    variance_fs2,
+                );
+            }
+            sums
+        };
+        let sums: Vec<_> = falling.par_iter().map(by_number).collect();
+        let mut used: Vec<(Laser, i64)> =
+            sums.iter().flat_map(|sums| sums.keys()).copied().collect();
+        used.sort_unstable();
+        used.dedup();
+        let place = |key: &(Laser, i64)| used.binary_search(key).expect("it is one of them");
+        let by_place = |sums: &BTreeMap<(Laser, i64), Moments>| {
+            sums.iter().map(|(key, sum)| (place(key), *sum)).collect()
+        };
+        let by_pixel = sums.par_iter().map(by_place).collect();
+        Cells {
+            length_fs,
+            used,
+            by_pixel,
+        }
+    }
+
+    /// The glints of some sums over all cells, of surfaces from `first_surface` on.
+    fn glints(&self, sums: &[Moments], first_surface: usize) -> Vec<(Laser, Glint)> {
+        let glint = |(place, &[photons, late, square]): (usize, &Moments)| {
+            let (laser, cell) = self.used[place];
+            let (late_fs, square_fs2) = (late / photons, square / photons);
+            let glint = Glint {
+                photons,
+                arrival_fs: cell as f64 * self.length_fs + late_fs,
+                variance_fs2: (square_fs2 - late_fs * late_fs).max(0.0),
+                surface: first_surface + place,
+            };
+            (photons > 0.0).then_some((laser, glint))
+        };
+        sums.iter().enumerate().filter_map(glint).collect()
+    }
+}
+
+/// Light on all macropixels of a scene with what the lens scatters; dark counts do not come through it.
+pub(super) fn with_stray_light(scene: &Scene, falling: &[Falling], cols: usize) -> Vec<Falling> {
+    let dark_hz = scene.dark_hz();
+    let halo = Halo::of(&scene.lidar, falling.len() / cols, cols);
+    let cell_fs = CELL * scene.pulse_resolution().as_fs() as f64;
+    let cells = Cells::of(falling, cell_fs.max(1.0));
+    // Beyond surfaces that are seen, and those that throw light on them.
+    let first_surface = 2 * scene.objects.len();
+    let trains: Vec<&PulseTrain> = falling.iter().flat_map(|light| &light.trains).collect();
     let of = |to: usize| {
         let mut own = Falling {
             background_hz: dark_hz,
@@ -99,55 +184,43 @@ pub(super) fn with_stray_light(
         };
         own.glints.iter_mut().for_each(|g| g.photons *= halo.own);
         own.trains.iter_mut().for_each(|t| t.photons *= halo.own);
-        for (from, source) in sources.iter().enumerate() {
+        let mut sums = vec![Moments::default(); cells.used.len()];
+        for (from, source) in falling.iter().enumerate() {
             let share = halo.share(from, to);
             own.background_hz += share * (source.background_hz - dark_hz);
             if from == to {
                 continue;
             }
-            let is_seen = |photons: f64| photons * share >= LEAST_PHOTONS;
-            let glints = source.glints.iter().filter(|g| is_seen(g.photons));
-            own.glints.extend(glints.map(|glint| Glint {
-                photons: glint.photons * share,
-                ..*glint
-            }));
-            for train in source.trains.iter().filter(|t| is_seen(t.photons)) {
-                let mut train = *train;
-                train.photons *= share;
-                own.trains.push(train);
+            for (place, moments) in &cells.by_pixel[from] {
+                let sum = sums[*place].iter_mut().zip(moments);
+                sum.for_each(|(sum, moment)| *sum += share * moment);
             }
+        }
+        let mut of_others = BTreeMap::<u32, Vec<Glint>>::new();
+        for (laser, glint) in cells.glints(&sums, first_surface) {
+            match laser {
+                None => own.glints.push(glint),
+                Some(number) => of_others.entry(number).or_default().push(glint),
+            }
+        }
+        for (number, mut glints) in of_others {
+            let of_laser = trains.iter().find(|train| train.laser.number == number);
+            let laser = of_laser.expect("its cells are those of trains").laser;
+            if glints.iter().map(|glint| glint.photons).sum::<f64>() < LEAST_PHOTONS {
+                continue;
+            }
+            // Their variances are those of whole pulses.
+            let echoes = merged(&mut glints, Time::ZERO, Time::ZERO);
+            own.trains.extend(echoes.into_iter().map(|echo| PulseTrain {
+                laser,
+                photons: echo.photons,
+                delay: echo.arrival,
+                sigma: echo.sigma.unwrap_or(Time::ZERO),
+            }));
         }
         own
     };
     (0..falling.len()).into_par_iter().map(of).collect()
-}
-
-impl Falling {
-    /// The same with one glint for each surface, as wide as all of them.
-    fn by_surface(&self) -> Self {
-        let mut glints: Vec<Glint> = Vec::new();
-        for glint in &self.glints {
-            let Some(all) = glints.iter_mut().find(|all| all.surface == glint.surface) else {
-                glints.push(*glint);
-                continue;
-            };
-            let photons = all.photons + glint.photons;
-            let share = if photons > 0.0 {
-                glint.photons / photons
-            } else {
-                0.0
-            };
-            let apart_fs = glint.arrival_fs - all.arrival_fs;
-            all.variance_fs2 += share * (glint.variance_fs2 - all.variance_fs2)
-                + share * (1.0 - share) * apart_fs * apart_fs;
-            all.arrival_fs += share * apart_fs;
-            all.photons = photons;
-        }
-        Falling {
-            glints,
-            ..self.clone()
-        }
-    }
 }
 
 #[cfg(test)]
@@ -203,6 +276,37 @@ mod tests {
         // What misses the array: about 2 w / side of the halo.
         let total: f64 = spread.iter().sum::<f64>() / all;
         assert!((0.992..0.996).contains(&total), "{total}");
+    }
+
+    /// Of a wall that fills the view each macropixel throws too little on any other to be worth an echo, and all of them together a
+    /// hundredth of its light.
+    #[test]
+    fn a_weak_halo_keeps_all_its_light() {
+        let wall = |lidar: &str, energy: f64| {
+            let mut scene = sign(lidar, 1.0);
+            scene.lidar.pulse_energy_uj *= energy;
+            if let Shape::Plane {
+                width_m, height_m, ..
+            } = &mut scene.objects[0].shape
+            {
+                (*width_m, *height_m) = (100.0, 100.0);
+            }
+            scene
+        };
+        let share = |energy: f64| {
+            let [plain, halo] = ["", "stray_share = 0.05\nstray_radius = 8"]
+                .map(|lidar| signals(&wall(lidar, energy)).iter().sum::<f64>());
+            halo / plain
+        };
+        let strong = share(1.0);
+        assert!(strong > 0.95 && strong < 1.0, "{strong}");
+        for energy in [1e-2, 1e-4] {
+            let weak = share(energy);
+            assert!(
+                (weak / strong - 1.0).abs() < 1e-9,
+                "{energy}: {weak} {strong}"
+            );
+        }
     }
 
     #[test]

@@ -54,8 +54,9 @@ impl Echo {
 // Two lasers of one rate meet at the same time of every laser cycle and make an echo that is none. *Dither*, a random wait before each
 // pulse of either laser, spreads that echo over the time in which the other's pulse may come.
 
-/// Mean photons of a pulse that are drawn, at most, where SPADs are ready again within it.
-pub(in crate::photon) const MOST_PER_PULSE: f64 = 1e4;
+/// Mean photons of a pulse that are drawn, at most, where SPADs are ready again within it: as many as an oncoming lidar sends straight
+/// into the lens.
+pub(in crate::photon) const MOST_PER_PULSE: f64 = 1e5;
 
 /// When another laser sends its pulses, beside our own.
 #[derive(Debug, Clone, Copy, PartialEq)]

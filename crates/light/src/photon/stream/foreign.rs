@@ -221,3 +221,48 @@ impl PixelStream<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::photon::{OtherLaser, SpadModel, StreamConfig};
+    use crate::units::Frequency;
+
+    /// As many photons as an oncoming lidar sends straight into the lens, in a pulse in which SPADs are ready again.
+    #[test]
+    fn all_photons_of_an_oncoming_laser_are_drawn() {
+        const PULSES: f64 = 20.0;
+        let stream = PhotonStream::new(&StreamConfig {
+            seed: 5,
+            clock: Frequency::from_hz(80_000_000),
+            stop_periods: 1000,
+            laser_cycles: PULSES as u32,
+            lead: Time::ZERO,
+            pulse_sigma: Time::from_ns(1),
+            pulse_shape: None,
+            energy_spread: 0.0,
+            spads: SpadModel::with_dead_time(Time::from_ns(8)),
+        });
+        let drawn = |photons: f64| {
+            let train = PulseTrain {
+                laser: OtherLaser {
+                    number: 0,
+                    period_s: 12.5e-6,
+                    phase: Some(0.3),
+                    dither_s: 0.0,
+                    own_dither_s: 0.0,
+                },
+                photons,
+                delay: Time::from_ns(100),
+                sigma: Time::from_ps(1_900),
+            };
+            let light = PixelLight::dark().with_train(train);
+            stream.pixel_events(0, &light).drawn as f64 / PULSES
+        };
+        for photons in [1e3, 1e4, 3e4, 9e4] {
+            let found = drawn(photons);
+            let noise = 5.0 * (photons / PULSES).sqrt();
+            assert!((found - photons).abs() < noise, "{found} of {photons}");
+        }
+    }
+}

@@ -34,10 +34,40 @@ fn a_blinding_surface_is_cut_off_beyond_saturation() {
     scene.lidar.lens_diameter_mm = 1e200;
     scene.lidar.pulse_energy_uj = 1e300;
     let truth = GroundTruth::render(&scene, 4, 4);
-    for light in scene.pixel_light(&truth) {
-        assert!(light.signal_per_cycle() <= 1.000_001 * MOST_SIGNAL_PER_CYCLE);
+    let lights = scene.pixel_light(&truth);
+    let echoes = lights.iter().flat_map(PixelLight::segments);
+    let echoes = echoes.flat_map(|segment| segment.echoes());
+    let brightest = echoes.map(|echo| echo.photons).fold(0.0, f64::max);
+    assert_eq!(brightest, MOST_PER_ECHO);
+    for light in &lights {
         assert!(light.background_hz() <= MOST_BACKGROUND_HZ);
     }
+}
+
+/// A sign before a wall in one macropixel, both so bright that their sum is beyond what is modelled of an echo.
+#[test]
+fn an_echo_that_is_cut_off_leaves_the_others_their_light() {
+    let echoes = |retro: f64| -> Vec<f64> {
+        let mut scene = tilted(0.0, 100.0);
+        let mut sign = tilted(0.0, 0.1).objects.remove(0);
+        sign.shape = sign.shape.shifted(DVec3::new(0.0, 0.0, -20.0));
+        sign.retro = retro;
+        scene.objects.push(sign);
+        scene.lidar.pulse_energy_uj = 10.0;
+        let light = light(&scene);
+        let echoes = light.segments().flat_map(|segment| segment.echoes());
+        echoes.map(|echo| echo.photons).collect()
+    };
+    let (faint, bright) = (echoes(1.0), echoes(1e4));
+    assert_eq!(bright[0], MOST_PER_ECHO);
+    assert!(faint[0] < MOST_PER_ECHO && faint.iter().sum::<f64>() > 10.0);
+    let wall = |echoes: &[f64]| echoes[1..].iter().sum::<f64>();
+    let before: f64 = echoes(2.0).iter().sum::<f64>() - faint.iter().sum::<f64>();
+    let of_wall = faint.iter().sum::<f64>() - before;
+    assert!(
+        (wall(&bright) / of_wall - 1.0).abs() < 1e-9,
+        "{bright:?} {faint:?}"
+    );
 }
 
 #[test]
@@ -203,6 +233,37 @@ fn crosstalk_into_a_neighbour_is_that_of_the_avalanches_at_its_side() {
             crossed.glints[0].arrival_fs,
             3e8 + CROSSTALK_DELAY.as_fs() as f64
         );
+    }
+}
+
+/// SPADs that a strong echo has fired are ready again for the next one, whose avalanches cross over as if it were alone.
+#[test]
+fn crosstalk_of_an_echo_does_not_depend_on_one_before_it() {
+    let glint = |photons: f64, at_ns: f64| Glint {
+        photons,
+        arrival_fs: 1e6 * at_ns,
+        variance_fs2: 0.0,
+        surface: at_ns as usize,
+    };
+    let avalanches = |before: f64| -> Vec<f64> {
+        let falling = Falling {
+            glints: vec![
+                glint(5.0, 320.0),
+                glint(before, 300.0),
+                glint(before, 302.0),
+            ],
+            background_hz: 0.0,
+            trains: Vec::new(),
+        };
+        let glints = falling.avalanches(16.0, 8e6);
+        glints.iter().map(|glint| glint.photons).collect()
+    };
+    let alone = 16.0 * -libm::expm1(-5.0 / 16.0);
+    for before in [0.0, 1.0, 1000.0] {
+        let found = avalanches(before);
+        assert!((found[2] - alone).abs() < 1e-9, "{found:?}");
+        let both = 16.0 * -libm::expm1(-2.0 * before / 16.0);
+        assert!((found[0] + found[1] - both).abs() < 1e-9, "{found:?}");
     }
 }
 
