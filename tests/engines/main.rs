@@ -22,6 +22,7 @@ mod cohort_draws_what_it_computes;
 mod counter_tdc_adds_up;
 mod cycle_agrees_with_gate;
 mod delay_lines_time_photons;
+mod echoes_do_not_vanish;
 mod impossible_light_is_refused;
 mod late_cycle_is_that_of_the_whole_run;
 mod light_is_a_list;

@@ -113,6 +113,7 @@ pub fn merged(glints: &mut [Glint], pulse_sigma: Time, resolution: Time) -> Smal
     part_at_gaps(glints, GAP * resolution_fs);
     let mut groups = SmallVec::<[Group; 1]>::new();
     part(glints, resolution_fs, &mut groups);
+    let mut groups = without_negligible(groups);
     groups.sort_by(|a, b| b.photons.total_cmp(&a.photons));
     let sigma_fs2 = (pulse_sigma.as_fs() as f64).powi(2);
     let echo = |group: &Group| {
@@ -121,6 +122,38 @@ pub fn merged(glints: &mut [Glint], pulse_sigma: Time, resolution: Time) -> Smal
         Echo::new(group.photons, arrival).with_sigma(Time::from_fs(sigma_fs))
     };
     groups.iter().map(echo).collect()
+}
+
+/// The same light where no echo has less than [`NEGLIGIBLE`] photons: fainter ones are joined in order of time until they have as many, and
+/// what is left goes to the brightest.
+fn without_negligible(mut groups: SmallVec<[Group; 1]>) -> SmallVec<[Group; 1]> {
+    if groups.len() < 2 {
+        return groups;
+    }
+    groups.sort_by(|a, b| a.mean_fs.total_cmp(&b.mean_fs));
+    let (mut kept, mut faint) = (SmallVec::<[Group; 1]>::new(), None::<Group>);
+    for group in groups {
+        let group = match faint.take() {
+            Some(before) if group.photons <= NEGLIGIBLE => before.joined(&group),
+            before => {
+                faint = before;
+                group
+            }
+        };
+        if group.photons > NEGLIGIBLE {
+            kept.push(group);
+        } else {
+            faint = Some(group);
+        }
+    }
+    let brightest = kept
+        .iter_mut()
+        .max_by(|a, b| a.photons.total_cmp(&b.photons));
+    match (faint, brightest) {
+        (Some(faint), Some(brightest)) => brightest.photons += faint.photons,
+        (faint, _) => kept.extend(faint),
+    }
+    kept
 }
 
 /// Numbers the surfaces of `glints`, which are in order of time: what is of one object before and after a gap are two.
@@ -292,6 +325,20 @@ impl Group {
             photons,
             mean_fs,
             variance_fs2: glints.iter().map(square).sum::<f64>() / photons,
+        }
+    }
+
+    /// Both as one.
+    fn joined(&self, other: &Self) -> Self {
+        let photons = self.photons + other.photons;
+        let share = other.photons / photons;
+        let apart_fs = other.mean_fs - self.mean_fs;
+        Group {
+            photons,
+            mean_fs: self.mean_fs + share * apart_fs,
+            variance_fs2: self.variance_fs2
+                + share * (other.variance_fs2 - self.variance_fs2)
+                + share * (1.0 - share) * apart_fs * apart_fs,
         }
     }
 
@@ -489,6 +536,23 @@ mod tests {
                 assert_eq!(merge(&one), found, "{brighter} times at {sigmas} sigma");
             }
         }
+        // What no histogram shows goes to the others, in order of time until it shows.
+        let faint = |share: f64, sigmas: f64| glint(share * NEGLIGIBLE, sigmas);
+        let found = merge(&[glint(5.0, 0.0), faint(0.5, 100.0)]);
+        let brightest = glint(5.0 + 0.5 * NEGLIGIBLE, 0.0);
+        assert_eq!(found, merge(&[brightest]));
+        assert_eq!(merge(&[glint(5.0, 0.0), faint(2.0, 10.0)]).len(), 2);
+        let many = [
+            glint(5.0, 0.0),
+            faint(0.6, 20.0),
+            faint(0.6, 40.0),
+            faint(0.6, 400.0),
+        ];
+        let found = merge(&many);
+        assert_eq!(found.len(), 2);
+        assert_eq!(found[1].arrival, Time::from_fs(430_000_000));
+        let photons: f64 = found.iter().map(|echo| echo.photons).sum();
+        assert!((photons - 5.0 - 1.8 * NEGLIGIBLE).abs() < 1e-12);
     }
 
     #[test]
