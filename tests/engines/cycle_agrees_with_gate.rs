@@ -145,7 +145,7 @@ fn as_the_reference_model_counts_in_larger_numbers() {
         let macropixels = scenario.starts.iter().zip(&scenario.pulses);
         Histograms::from_rows(scenario.config.bins, macropixels.map(one))
     };
-    compare(1_000_000, cases(60), 1_200, model);
+    compare(1_000_000, cases(120), 1_200, model);
 }
 
 /// SPAD_EVENT is a constant, and STOP rises so long before CLK falls that HIT samples after the rising CLK edge.

@@ -34,7 +34,7 @@ fn sign_before_a_wall(retro: f64, wall_m: f64) -> Scene {
     Scene::parse("sign before a wall", &text).unwrap()
 }
 
-/// Counts of a window that begins so long before the wall, with `window` and `cohort`.
+/// Counts of the bins from 8 ns before the wall on, of a window that begins so long before it, with `window` and `cohort`.
 fn counts(retro: f64, wall_m: f64, before_ns: i64) -> [Vec<f64>; 2] {
     let scene = sign_before_a_wall(retro, wall_m);
     let config = SensorConfig::default();
@@ -43,14 +43,20 @@ fn counts(retro: f64, wall_m: f64, before_ns: i64) -> [Vec<f64>; 2] {
     let stream = PhotonStream::new(&stream_config(&config, &exposure, 1, scene.pulse_sigma()));
     let number = 32 * 64 + 32;
     let opens = Time::of_flight(wall_m) - Time::from_ns(before_ns);
+    let law = WindowLaw::new(&config, &exposure);
+    let start = law.start_for(opens).unwrap();
+    let edges = law.edges(&law.window(start).open().unwrap(), 0);
+    let from = Time::of_flight(wall_m) - Time::from_ns(8);
+    let bins = (0..config.bins).filter(|&bin| edges.bin(bin).start >= from);
+    let first = bins.min().unwrap();
     let pixel = LitPixel {
         number,
-        start: WindowLaw::new(&config, &exposure).start_for(opens).unwrap(),
+        start,
         light: Some(light[number as usize].clone()),
     };
     let of_engine = |engine: &dyn Expose| -> Vec<f64> {
         let exposed = expose(engine, &stream, std::slice::from_ref(&pixel), |_| ()).unwrap();
-        exposed.histograms[0]
+        exposed.histograms[0][first..]
             .iter()
             .map(|&n| f64::from(n))
             .collect()

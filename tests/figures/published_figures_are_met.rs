@@ -309,6 +309,7 @@ fn tables_and_figures_come_out_as_files_and_json() {
         [
             "fig_071.csv",
             "fig_071.svg",
+            "manifest.json",
             "report.html",
             "report.json",
             "report.md",
