@@ -44,6 +44,7 @@ pub(crate) fn range_counts<'py>(
         correct_walk,
         ..DepthOptions::default()
     };
+    system::check_counts("histograms", (&sensor, &exposure), &counts).map_err(Failure::from)?;
     let readings = run(py, None, move |_| {
         let profile = calibration
             .map(|path| read_calibration(&path, &sensor))

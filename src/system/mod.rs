@@ -35,7 +35,7 @@ pub(crate) use pixel::above_background;
 pub use pixel::{NoDepth, PixelDepth};
 pub use policy::{NoBins, Pointing, Unguided, Why, WindowPolicy};
 pub(crate) use ranger::{Known, Ranger};
-pub use ranger::{Reading, range_counts};
+pub use ranger::{Reading, check_counts, range_counts};
 pub use reranged::Ranged;
 pub use result::{Frame, PhaseTimes};
 pub use settings::{EngineKind, FrameSettings, Probe};

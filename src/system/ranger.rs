@@ -7,7 +7,8 @@ use rayon::prelude::*;
 use super::aim::{Aims, Place, own_law};
 use super::pixel::{NoDepth, PixelDepth};
 use crate::chip::window_law::OpenWindow;
-use crate::chip::{Exposure, Sensor, WindowLaw};
+use crate::chip::{Exposure, Sensor, Tdc, WindowLaw};
+use crate::files::InputError;
 use crate::ranging::{BinProfile, DepthOptions, EchoFinder, Peak, Sighting, UnequalBins, WalkLeft};
 use crate::scene::Scene;
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time, TimeOfFlight};
@@ -133,9 +134,13 @@ impl<'a> Ranger<'a> {
             Some(sighting) if sighting.is_saturated => Some(NoDepth::Saturated),
             _ => Some(NoDepth::NoSignificantPeak),
         };
+        let measured_m = found.and_then(|s| range_m(s.position_bins, s.peak.peak_bin));
+        // Nothing is behind the lidar; a fit that says so is off by as much at least.
+        let behind_m = measured_m.map_or(0.0, |measured_m| (-measured_m).max(0.0));
+        let bound_m = found.and_then(|s| Some((s.bound_bins? * self.bin_m()).max(behind_m)));
         let reading = Reading {
-            measured_m: found.and_then(|s| range_m(s.position_bins, s.peak.peak_bin)),
-            bound_m: found.and_then(|s| Some(s.bound_bins? * self.bin_m())),
+            measured_m: measured_m.map(|measured_m| measured_m.max(0.0)),
+            bound_m,
             walk_left: found.and_then(|s| s.walk_left),
             no_depth,
             peak_m: sighting.and_then(|s| range_m(s.peak.position_bins, s.peak.peak_bin)),
@@ -226,6 +231,33 @@ pub struct Reading {
     pub peak_m: Option<f64>,
     /// −log₁₀ of the chance that light without an echo makes such a peak; `None` where there is no peak.
     pub confidence: Option<f64>,
+}
+
+/// Checks that a chip may have counted so much in this exposure; `name` is that of the counts.
+///
+/// # Errors
+/// The first bin with more counts than are possible.
+pub fn check_counts(
+    name: impl std::fmt::Display,
+    (sensor, exposure): (&Sensor, &Exposure),
+    counts: &[u16],
+) -> Result<(), InputError> {
+    let of_a_cycle = match sensor.tdc {
+        Tdc::Clocked | Tdc::DelayLine => 1,
+        Tdc::Counter => sensor.spads() as u64,
+    };
+    let full = (1 << sensor.bin_bits) - 1;
+    let most = full.min(of_a_cycle * u64::from(exposure.laser_cycles));
+    let Some(at) = counts.iter().position(|&count| u64::from(count) > most) else {
+        return Ok(());
+    };
+    let (pixel, bin) = (at / sensor.bins, at % sensor.bins);
+    let (row, col) = (pixel / sensor.cols, pixel % sensor.cols);
+    let message = format!(
+        "has {} counts in bin {bin} of macropixel ({row}, {col}), and a bin of {} bits counts at most {most} in {} laser cycles; give counts of this sensor and exposure",
+        counts[at], sensor.bin_bits, exposure.laser_cycles
+    );
+    Err(InputError::new(name, message))
 }
 
 /// Depths from histograms of whatever origin: `counts` are those of the array, rows × cols × bins, counted in the windows of `starts`,

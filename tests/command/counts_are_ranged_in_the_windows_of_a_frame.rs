@@ -54,8 +54,15 @@ fn other_counts_in_the_same_windows_give_other_depths() {
     assert_eq!(dark["summary"]["depths"], 0);
 
     write(&folder.join("small.npy"), &[2, 8, 16], &[0; 256]);
+    let mut many = [0; 1024];
+    many[8 * 16 + 5] = 401;
+    write(&folder.join("many.npy"), &[8, 8, 16], &many);
     for (arguments, says) in [
         (format!("{range} small.npy"), "give one of [8, 8, 16]"),
+        (
+            format!("{range} many.npy"),
+            "401 counts in bin 5 of macropixel (1, 0), and a bin of 14 bits counts at most 400 in 400 laser cycles",
+        ),
         (
             format!("{range} dark.npy --fit even"),
             "--fit: is not for --format frame",

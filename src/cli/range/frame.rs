@@ -11,7 +11,7 @@ use crate::files::{OutputFile, read_counts};
 use crate::ranging::DepthOptions;
 use crate::report::Table;
 use crate::request::{Spelling, check_false_alarm_rate, read_calibration};
-use crate::system::{PixelDepth, Ranged, Summary, TakenFrame};
+use crate::system::{PixelDepth, Ranged, Summary, TakenFrame, check_counts};
 
 /// What is printed with `--json`.
 #[derive(Serialize)]
@@ -43,6 +43,8 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     };
     let shape = [sensor.rows, sensor.cols, sensor.bins];
     let counts = read_counts(&args.histograms, &shape)?;
+    let of = (sensor, &taken.settings.exposure);
+    check_counts(args.histograms.display(), of, &counts)?;
     let ranged = taken.range(&counts, &options, calibration.as_ref())?;
     if let Some(path) = &args.out {
         write_csv(path, sensor.cols, &ranged)?;

@@ -86,6 +86,9 @@ pub struct EchoFinder {
 /// the error no longer follows the bound (measured at 10² to 10⁴ photons).
 const MOST_BOUND_BINS: f64 = 0.25;
 
+/// Standard deviation of a pulse most of which lies within a bin, bins.
+const SHORT: f64 = 0.4;
+
 impl EchoFinder {
     /// For the bins of `law` and Gaussian pulses of standard deviation `pulse_sigma`.
     ///
@@ -176,13 +179,27 @@ impl EchoFinder {
         Some(Sighting {
             position_bins: corrected.map_or(peak.position_bins, |c| c.light.position_bins),
             light: corrected.map(|c| c.light),
-            bound_bins: corrected.map(|c| c.bound_bins),
+            bound_bins: corrected.map(|c| c.bound_bins.min(self.most_bound_bins(&c))),
             walk_left: fitted.and_then(Result::err),
             peak,
             confidence: -stretch.ln_false_alarm / std::f64::consts::LN_10,
             is_significant,
             is_saturated: is_saturated || corrected.is_some_and(|c| self.is_lost(&c)),
         })
+    }
+
+    /// What the bound of a significant peak is at most: its bin is known if a pulse is shorter than that, and the window otherwise.
+    /// Under a THRESHOLD other lights may explain the counts from anywhere.
+    fn most_bound_bins(&self, corrected: &Corrected) -> f64 {
+        let Some(Ok(WalkCorrection { response, .. })) = self.walk else {
+            return f64::INFINITY;
+        };
+        let is_in_a_bin = corrected.light.sigma_bins < SHORT && response.counting.threshold == 0;
+        if is_in_a_bin {
+            1.0
+        } else {
+            response.bins as f64
+        }
     }
 
     /// Whether an echo is so strong that its counts do not tell its place.

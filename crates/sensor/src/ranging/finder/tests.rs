@@ -197,3 +197,19 @@ fn an_echo_is_lost_where_it_is_strong_and_its_place_open() {
         [(15.9, 0.26), (16.1, 0.26), (16.1, 0.24)].map(|(signal, bound)| is_lost(signal, bound));
     assert_eq!(found, [false, true, false]);
 }
+
+/// A pulse much shorter than its bin says nothing of the place within it, and a bound without end says less than is known.
+#[test]
+fn an_echo_within_a_bin_is_known_to_that_bin() {
+    let config = SensorConfig::default();
+    let law = WindowLaw::new(&config, &Exposure::new(&config, 520, 1000));
+    let finder = EchoFinder::new(&law, Time::ZERO, &DepthOptions::default()).unwrap();
+    for position_bins in [3.6, 4.0, 4.4] {
+        let mut counts = vec![20; config.bins];
+        counts[4] = 400;
+        let found = finder.find(&counts).unwrap();
+        let bound_bins = found.bound_bins.unwrap_or(1.0);
+        let off = (found.position_bins - position_bins).abs();
+        assert!(bound_bins <= 1.0 && off <= 1.0, "{found:?}");
+    }
+}
