@@ -348,7 +348,7 @@ fn without_a_stimulus_the_netlist_comes_alone() {
     assert_eq!(files(here), [""; 0]);
     let exported = gdtof(here, &["export", "verilog", "--out", "v"]);
     assert!(exported.status.success(), "{exported:?}");
-    let names = ["cells.v", "cells_specify.v", "design.v"];
+    let names = ["cells.v", "cells_specify.v", "design.v", "manifest.json"];
     assert_eq!(files(&here.join("v")), names);
 }
 
