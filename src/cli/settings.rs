@@ -62,7 +62,7 @@ impl SensorArgs {
     /// Unreadable files, bad keys and values, and `--set` of anything but the sensor.
     pub(super) fn read(&self) -> Result<Sensor, InputError> {
         let sensor = self.sources(None).read_sensor()?;
-        self.note_oddities(&sensor);
+        self.warn_of_unusual(&sensor);
         Ok(sensor)
     }
 
@@ -85,7 +85,7 @@ impl SensorArgs {
     }
 
     /// Notes what is odd about the cell library, and if CLK is faster than the thesis's chip takes.
-    fn note_oddities(&self, sensor: &SensorConfig) {
+    fn warn_of_unusual(&self, sensor: &SensorConfig) {
         let library = CellLibrary::of(sensor).ok();
         if let Some(library) = library.and_then(CellLibrary::from_file) {
             library.liberty.map.odd.iter().for_each(note);
@@ -151,7 +151,7 @@ impl SceneArgs {
     /// Unreadable files, bad keys and values.
     pub(super) fn read(&self) -> Result<(Sensor, Scene), InputError> {
         let (sensor, scene) = self.sources().read()?;
-        self.sensor.note_oddities(&sensor);
+        self.sensor.warn_of_unusual(&sensor);
         Ok((sensor, scene))
     }
 

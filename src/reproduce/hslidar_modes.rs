@@ -52,9 +52,10 @@ fn bin_interval(config: &SensorConfig) -> Time {
         let (mut before, mut after) = (middle(bin - 1), middle(bin));
         while (after - before).as_fs() > 1 {
             let time = Time::from_fs((before + after).as_fs() / 2);
-            match bin_of(config, &exposure, time) == Some(bin) {
-                true => after = time,
-                false => before = time,
+            if bin_of(config, &exposure, time) == Some(bin) {
+                after = time
+            } else {
+                before = time
             }
         }
         after

@@ -77,9 +77,10 @@ impl Swept<'_> {
         };
         let whole: Vec<usize> = inside.clone().filter(is_apart).collect();
         // Where no step is apart from all edges, all of the window tells what a step counts.
-        let of_whole = match whole.is_empty() {
-            true => mean(lit.clone().map(|step| sums[step])),
-            false => mean(whole.into_iter().map(|step| sums[step])),
+        let of_whole = if whole.is_empty() {
+            mean(lit.clone().map(|step| sums[step]))
+        } else {
+            mean(whole.into_iter().map(|step| sums[step]))
         };
         let in_steps = |steps: Range<usize>| steps.map(|step| sums[step] / of_whole).sum::<f64>();
         // Steps too many at one side of an edge.

@@ -66,7 +66,7 @@ fn window(config: &SensorConfig, exposure: &Exposure) -> (WindowLaw, OpenWindow)
     (law, window)
 }
 
-/// So many photons in each bin of every laser cycle, a SPAD each, evenly over the bin.
+/// The given number of photons in each bin of every laser cycle, a SPAD each, evenly over the bin.
 fn photons(config: &SensorConfig, exposure: &Exposure, of_bins: &[u8]) -> Vec<SpadEvent> {
     let (law, window) = window(config, exposure);
     let mut pulses = Vec::new();

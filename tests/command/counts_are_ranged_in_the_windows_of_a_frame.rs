@@ -41,6 +41,26 @@ fn a_frame_ranged_once_more_is_the_same_and_a_table_of_it_has_every_macropixel()
     assert_eq!(Some(with_depth as u64), frame["summary"]["depths"].as_u64());
 }
 
+/// The echo of a plane just before the lens is in the first bin, where a fit may end behind the lidar.
+#[test]
+fn no_depth_is_behind_the_lidar() {
+    let folder = tempfile::tempdir().unwrap();
+    let near = "[[object]]\nname = \"wall\"\nkind = \"plane\"\ncentre_m = [0, 0, 0.3]\nwidth_m = 20\nheight_m = 20\nreflectivity = 0.02\n";
+    std::fs::write(folder.path().join("near.toml"), near).unwrap();
+    let frame = gdtof_words(
+        folder.path(),
+        "frame --rows 8 --cols 8 --scene near.toml --guide truth --laser-cycles 200 --probe none --json",
+    );
+    assert!(frame.status.success(), "{frame:?}");
+    let frame: serde_json::Value = serde_json::from_slice(&frame.stdout).unwrap();
+    let macropixels = frame["macropixels"].as_array().unwrap().iter();
+    let depths: Vec<f64> = macropixels
+        .filter_map(|m| m["measured_m"].as_f64())
+        .collect();
+    assert!(depths.iter().all(|&m| m >= 0.0), "{depths:?}");
+    assert!(depths.contains(&0.0), "{depths:?}");
+}
+
 /// Counts of a chip of one's own: one that saw nothing anywhere has no depths.
 #[test]
 fn other_counts_in_the_same_windows_give_other_depths() {

@@ -283,7 +283,7 @@ fn a_kit_of_several_files_is_one_library() {
 
 /// What is odd about a library is said by every command that uses it.
 #[test]
-fn a_librarys_oddities_are_told() {
+fn what_a_library_leaves_out_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let text = std::fs::read_to_string(example()).unwrap();
     let scan = text.replace("next_state : \"D\"", "next_state : \"(SE SI) + (!SE D)\"").replace(

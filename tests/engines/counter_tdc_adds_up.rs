@@ -160,7 +160,7 @@ fn chip(tdc: Tdc) -> SensorConfig {
     }
 }
 
-/// Counts of the bins by the gates and the window engine, where SPADs fire in bin 3, so many at once, in each of 5 laser cycles.
+/// Counts of the bins by the gates and the window engine, where the given number of SPADs fires at once in bin 3, in each of 5 laser cycles.
 fn counted(tdc: Tdc, spads: u8) -> Vec<u16> {
     let (config, start) = (chip(tdc), 3);
     let exposure = Exposure::new(&config, 60, 5);

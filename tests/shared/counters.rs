@@ -315,9 +315,10 @@ impl<'r> Circuit<'r> {
                     reset = self.gate(And2, &[self.reset, q[1]]);
                 } else {
                     let kept = self.gate(Inv, &[self.reset]);
-                    data = match value {
-                        true => self.gate(Or2, &[next, self.reset]),
-                        false => self.gate(And2, &[next, kept]),
+                    data = if value {
+                        self.gate(Or2, &[next, self.reset])
+                    } else {
+                        self.gate(And2, &[next, kept])
                     };
                     reset = self.memory_reset;
                 }

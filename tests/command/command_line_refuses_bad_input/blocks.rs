@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 
 const LFSR: &str = include_str!("../../../examples/blocks/lfsr_p_counter.json");
 
-/// The counter with so many more cells.
+/// The counter with the given number of cells more.
 fn with_inverters(number: usize) -> String {
     let cell = |n| format!(r#""{n}":{{"type":"$_NOT_","connections":{{"A":[2],"Y":[{n}]}}}},"#);
     let cells: String = (1000..1000 + number).map(cell).collect();

@@ -10,8 +10,8 @@
 //! from outside the field of view throws none in. Six macropixels beside a retroreflector of 1000 photons a pulse, a halo of
 //! one per cent is another echo of 0.01: what *blooming* is called where it hides what stands there.
 //!
-//! A macropixel gets light from all others, of most of them very little. It is summed up in cells of time, by its photons, mean and
-//! variance, so that none is lost however many sources it has.
+//! A macropixel gets light from all others, of most of them very little. The light of each surface is summed up in cells of time, by its
+//! photons, mean and variance, so that none is lost however many macropixels it comes from.
 
 use std::collections::BTreeMap;
 
@@ -94,14 +94,17 @@ impl Halo {
 /// Whose light it is: our own, or that of another lidar by its number.
 type Laser = Option<u32>;
 
-/// Photons a pulse of one laser that come within one cell of time, and the sums of their times after its start and of the squares.
+/// A cell: whose light, from which surface, and its number in time.
+type Cell = (Laser, usize, i64);
+
+/// Photons a pulse that come within one cell, and the sums of their times after its start and of the squares.
 type Moments = [f64; 3];
 
 /// The light of all macropixels by cells of time.
 struct Cells {
     length_fs: f64,
-    /// Those that have light of any macropixel: the laser and the number of the cell.
-    used: Vec<(Laser, i64)>,
+    /// Those that have light of any macropixel.
+    used: Vec<Cell>,
     /// What each macropixel has of them, by their place.
     by_pixel: Vec<Vec<(usize, Moments)>>,
 }
@@ -109,24 +112,29 @@ struct Cells {
 impl Cells {
     fn of(falling: &[Falling], length_fs: f64) -> Self {
         let by_number = |light: &Falling| {
-            let mut sums = BTreeMap::<(Laser, i64), Moments>::new();
-            let mut add = |laser, photons: f64, time_fs: f64, variance_fs2: f64| {
+            let mut sums = BTreeMap::<Cell, Moments>::new();
+            let mut add = |(laser, surface), photons: f64, time_fs: f64, variance_fs2: f64| {
                 let cell = (time_fs / length_fs).floor();
                 let late_fs = time_fs - cell * length_fs;
-                let sum = sums.entry((laser, cell as i64)).or_default();
+                let sum = sums.entry((laser, surface, cell as i64)).or_default();
                 let moments = [1.0, late_fs, late_fs * late_fs + variance_fs2];
                 sum.iter_mut()
                     .zip(moments)
                     .for_each(|(sum, moment)| *sum += photons * moment);
             };
             for glint in light.glints.iter().filter(|glint| glint.photons > 0.0) {
-                add(None, glint.photons, glint.arrival_fs, glint.variance_fs2);
+                add(
+                    (None, glint.surface),
+                    glint.photons,
+                    glint.arrival_fs,
+                    glint.variance_fs2,
+                );
             }
             for train in &light.trains {
                 let [delay_fs, sigma_fs] = [train.delay, train.sigma].map(|t| t.as_fs() as f64);
                 let variance_fs2 = sigma_fs * sigma_fs;
                 add(
-                    Some(train.laser.number),
+                    (Some(train.laser.number), 0),
                     train.photons,
                     delay_fs,
                     variance_fs2,
@@ -135,12 +143,11 @@ impl Cells {
             sums
         };
         let sums: Vec<_> = falling.par_iter().map(by_number).collect();
-        let mut used: Vec<(Laser, i64)> =
-            sums.iter().flat_map(|sums| sums.keys()).copied().collect();
+        let mut used: Vec<Cell> = sums.iter().flat_map(|sums| sums.keys()).copied().collect();
         used.sort_unstable();
         used.dedup();
-        let place = |key: &(Laser, i64)| used.binary_search(key).expect("it is one of them");
-        let by_place = |sums: &BTreeMap<(Laser, i64), Moments>| {
+        let place = |key: &Cell| used.binary_search(key).expect("it is one of them");
+        let by_place = |sums: &BTreeMap<Cell, Moments>| {
             sums.iter().map(|(key, sum)| (place(key), *sum)).collect()
         };
         let by_pixel = sums.par_iter().map(by_place).collect();
@@ -154,13 +161,13 @@ impl Cells {
     /// The glints of some sums over all cells, of surfaces from `first_surface` on.
     fn glints(&self, sums: &[Moments], first_surface: usize) -> Vec<(Laser, Glint)> {
         let glint = |(place, &[photons, late, square]): (usize, &Moments)| {
-            let (laser, cell) = self.used[place];
+            let (laser, surface, cell) = self.used[place];
             let (late_fs, square_fs2) = (late / photons, square / photons);
             let glint = Glint {
                 photons,
                 arrival_fs: cell as f64 * self.length_fs + late_fs,
                 variance_fs2: (square_fs2 - late_fs * late_fs).max(0.0),
-                surface: first_surface + place,
+                surface: first_surface + surface,
             };
             (photons > 0.0).then_some((laser, glint))
         };

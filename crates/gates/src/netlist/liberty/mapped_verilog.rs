@@ -43,9 +43,10 @@ pub fn write_mapped(
             Direction::Input => "input",
             Direction::Output => "output",
         };
-        let range = match signal.is_bus {
-            true => format!("[{}:0] ", signal.width() - 1),
-            false => String::new(),
+        let range = if signal.is_bus {
+            format!("[{}:0] ", signal.width() - 1)
+        } else {
+            String::new()
         };
         writeln!(out, "  {keyword} {range}{};", signal.name)?;
         for net in netlist.signal_nets(top, signal) {
@@ -117,9 +118,10 @@ pub(super) fn names(netlist: &Netlist) -> Vec<String> {
         .collect();
     for (_, signal) in top.module.port_signals() {
         for (bit, net) in netlist.signal_nets(top, signal).enumerate() {
-            names[net.index()] = match signal.is_bus {
-                true => format!("{}[{bit}]", signal.name),
-                false => signal.name.clone(),
+            names[net.index()] = if signal.is_bus {
+                format!("{}[{bit}]", signal.name)
+            } else {
+                signal.name.clone()
             };
         }
     }

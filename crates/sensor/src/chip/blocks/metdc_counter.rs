@@ -132,9 +132,10 @@ impl Model {
 
     /// A rising edge of CLK that finds START like this.
     pub fn clock(&mut self, start: bool) {
-        self.code = match self.counting {
-            true => (self.code + 1).min(self.bins),
-            false => 0,
+        self.code = if self.counting {
+            (self.code + 1).min(self.bins)
+        } else {
+            0
         };
         self.counting = start;
     }

@@ -228,9 +228,10 @@ impl<'n> Counter<'n> {
                 .netlist
                 .signal_nets(top, signal)
                 .position(|other| other == net)?;
-            Some(match signal.is_bus {
-                true => format!("{}[{bit}]", signal.name),
-                false => signal.name.clone(),
+            Some(if signal.is_bus {
+                format!("{}[{bit}]", signal.name)
+            } else {
+                signal.name.clone()
             })
         })
     }
@@ -488,9 +489,10 @@ impl<'c> Load<'c> {
     fn ones(&self, cell: usize) -> u64 {
         let [q, qn] = self.counter.netlist.cells()[cell].outputs;
         self.used()
-            & match q.is_some() {
-                true => self.kernel.value(q).one,
-                false => self.kernel.value(qn).zero,
+            & if q.is_some() {
+                self.kernel.value(q).one
+            } else {
+                self.kernel.value(qn).zero
             }
     }
 

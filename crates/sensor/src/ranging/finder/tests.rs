@@ -204,12 +204,10 @@ fn an_echo_within_a_bin_is_known_to_that_bin() {
     let config = SensorConfig::default();
     let law = WindowLaw::new(&config, &Exposure::new(&config, 520, 1000));
     let finder = EchoFinder::new(&law, Time::ZERO, &DepthOptions::default()).unwrap();
-    for position_bins in [3.6, 4.0, 4.4] {
-        let mut counts = vec![20; config.bins];
-        counts[4] = 400;
-        let found = finder.find(&counts).unwrap();
-        let bound_bins = found.bound_bins.unwrap_or(1.0);
-        let off = (found.position_bins - position_bins).abs();
-        assert!(bound_bins <= 1.0 && off <= 1.0, "{found:?}");
-    }
+    let mut counts = vec![20; config.bins];
+    counts[4] = 400;
+    let found = finder.find(&counts).unwrap();
+    // Within the bin it may be anywhere.
+    let off = (found.position_bins - 4.0).abs();
+    assert!(off <= 0.5 && found.bound_bins == Some(1.0), "{found:?}");
 }

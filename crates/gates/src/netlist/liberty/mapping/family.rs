@@ -113,7 +113,7 @@ impl CellModel {
         slews.fold(0.0, f64::max)
     }
 
-    /// Slew in a chain of such cells of one input, each of which drives so many of its kind, fs.
+    /// Slew in a chain of such cells of one input, each of which drives the given number of its kind, fs.
     pub(in super::super) fn settled_slew(&self, fan_out: f64) -> f64 {
         // Eight stages are settled.
         (0..8).fold(0.0, |slew: f64, _| {

@@ -1,8 +1,14 @@
 //! Which flip-flop of a library stands for one with reset (and set), and what is put around it.
 //!
-//! One whose file says what set and reset do together comes before one where that is open, a plain flip-flop before one of whose pins some are tied, as a scan chain's are, and both before cells that the library says
-//! not to use. Of equal ones it is that of least area, its inverters counted. A flip-flop may stand for one of the inverse state, with
-//! clear and preset exchanged: our reset wins over the set, and in many libraries the preset wins.
+//! Candidates are ordered by these questions; the next one decides between equals:
+//!
+//! 1. With set: does the file say which of clear and preset wins?
+//! 2. May the cell be used (`dont_use`)?
+//! 3. Is it a plain flip-flop, without pins to be tied, as a scan chain's are?
+//! 4. Which has the least area, its inverters counted?
+//!
+//! A flip-flop may stand for one of the inverse state, with clear and preset exchanged. Our reset wins over the set; so a cell whose
+//! preset wins stands for the inverse state.
 
 use super::super::cell::{Candidate, FlipFlop, Role};
 use super::super::complete::check_flip_flop;
