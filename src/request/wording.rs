@@ -89,9 +89,12 @@ fn of_race(cure: &Cure, spelling: Spelling) -> String {
             "give other {}, or start values whose windows end elsewhere in the laser cycle",
             spelling.name("stop_periods")
         ),
-        Cure::Period { .. } | Cure::Phase { .. } | Cure::Tap | Cure::ResetChain | Cure::Cells => {
-            cure.to_string()
-        }
+        Cure::Period { .. }
+        | Cure::Phase { .. }
+        | Cure::LoadPeriod(_)
+        | Cure::Tap
+        | Cure::ResetChain
+        | Cure::Cells => cure.to_string(),
     }
 }
 

@@ -45,10 +45,13 @@ pub enum Conflict {
     /// BLOCK rises within a pulse of COUNTER_CLK.
     #[error("LOCAL_STOP cuts a pulse of COUNTER_CLK short")]
     CutPulse,
+    /// COUNTER_INIT and the pulse that loads a P-counter without memory.
+    #[error("the pulse that loads start values is not over when COUNTER_INIT changes")]
+    InitAtLoadPulse,
     /// STROBE and HIT's reset at the end of its laser cycle.
     #[error("the strobe meets the next laser cycle's reset")]
     StrobeAtNextReset,
-    /// STROBE of a P-counter that nothing resets, and HIT's reset.
+    /// STROBE of a P-counter that nothing resets, or of STOP in the conventional mode, and HIT's reset.
     #[error("the strobe meets a laser cycle's reset")]
     StrobeAtReset,
     /// STROBE where COUNTER_RESET raises LOCAL_STOP, and HIT's reset.
@@ -93,6 +96,9 @@ pub enum Origin {
     /// The laser cycle's reset.
     #[error("COUNTER_RESET rises")]
     ResetRises,
+    /// LOAD_CLK's edge that writes a row of start values.
+    #[error("LOAD_CLK falls")]
+    LoadClkFalls,
     /// The exposure's first STOP edge.
     #[error("the first STOP edge")]
     FirstStop,
@@ -199,6 +205,8 @@ pub enum Cure {
         /// Late enough from here on.
         at_least: Option<Time>,
     },
+    /// The period of LOAD_CLK: at least this.
+    LoadPeriod(Time),
     /// The length of a laser cycle against the start value.
     LaserCycle,
     /// The tap `msb`.
@@ -283,6 +291,18 @@ impl Race {
             from: width,
             to: None,
             cure: Cure::ResetChain,
+        }
+    }
+
+    /// A pulse that loads start values for this long, where LOAD_CLK allows half a `period`.
+    pub(crate) fn long_load(pulse: Time, period: Time) -> Self {
+        Race {
+            what: Conflict::InitAtLoadPulse,
+            after: Origin::LoadClkFalls,
+            comes: pulse,
+            from: Time::from_fs(period.as_fs() / 2),
+            to: None,
+            cure: Cure::LoadPeriod(pulse * 2 + ROUNDING * 2),
         }
     }
 
@@ -411,6 +431,13 @@ impl fmt::Display for Cure {
                 (None, Some(least)) => write!(f, "give stop_phase_ps of at least {}", ceil(least)),
                 (None, None) => write!(f, "give a lower clk_hz"),
             },
+            Cure::LoadPeriod(at_least) => {
+                write!(
+                    f,
+                    "give load_clk_hz of at most {:.1} MHz",
+                    mhz_below(at_least)
+                )
+            }
             Cure::LaserCycle => write!(
                 f,
                 "give another length of the laser cycle, or start values whose windows end elsewhere in it"

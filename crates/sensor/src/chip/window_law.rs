@@ -30,6 +30,8 @@
 //! [`ChipTiming`] has the delays of the paths concerned, measured on the netlist, and [`LocalStopDelays`] the ripple of each start value;
 //! tests hold the law against it.
 
+mod local_stop;
+
 use super::bins::Bins;
 use super::config::{AfterBorrow, Mode, Tdc};
 use super::exposure::Exposure;
@@ -39,6 +41,7 @@ use super::sensors::Sensor;
 use super::timing::macropixel::spread;
 use super::timing::{ChipTiming, LocalStopDelays};
 use crate::units::Time;
+use local_stop::LocalStop;
 use std::sync::Arc;
 
 /// What the law adds to the flip-flops' limits: one femtosecond of rounding on either edge.
@@ -97,16 +100,6 @@ pub struct OpenWindow {
     /// whichever is smaller: the margin that a shorter CLK period or a slower ripple eats up. Means nothing where delay lines
     /// time photons.
     pub slack: Time,
-}
-
-/// Where LOCAL_STOP rises first.
-struct LocalStop {
-    /// After its laser cycle's STOP edge.
-    time: Time,
-    /// The falling CLK edge that makes it.
-    edge: i64,
-    /// What keeps it from rising once in every laser cycle at this place, if anything.
-    irregular: Option<Irregular>,
 }
 
 /// The law for one sensor and exposure.
@@ -238,7 +231,12 @@ impl WindowLaw {
         }
         let (cause, arrival, count_edge, irregular) = match self.sensor.mode {
             // A laser cycle is counted by the STOP edge that ends it.
-            Mode::Conventional => (end, end + timing.stop_to_strobe, 0, None),
+            Mode::Conventional => {
+                if let Some(race) = self.strobe_of_stop() {
+                    return Window::Race(race);
+                }
+                (end, end + timing.stop_to_strobe, 0, None)
+            }
             Mode::Guided => {
                 let is_reset = self.sensor.p_counter.row().has_memory;
                 let found = if is_reset {
@@ -385,203 +383,12 @@ impl WindowLaw {
         timing.clk_period.max(paths + timing.setup + ROUNDING)
     }
 
-    /// A strobe that the reset itself makes, where LOCAL_STOP starts high and may have been low or is cleared before, if the reset of HIT does not hold then.
-    fn reset_strobe(&self, start: u16) -> Option<Race> {
-        let (sensor, timing) = (&self.sensor, &self.timing);
-        let falls = sensor.after_borrow == AfterBorrow::Wrap || sensor.p_counter.row().clears_first;
-        if !falls || !starts_high(sensor, start) {
-            return None;
-        }
-        let delay = timing.counter.reset_to_local_stop.unwrap_or_default();
-        let arrival = timing.stop_to_reset + delay + timing.local_stop_to_strobe;
-        let until = timing.stop_to_hit_release - timing.removal - ROUNDING;
-        (arrival >= until).then_some(Race {
-            what: Conflict::ResetStrobeAtHitReset,
-            after: Origin::StopRises,
-            comes: arrival,
-            from: until,
-            to: None,
-            cure: Cure::Tap,
-        })
-    }
-
-    /// LOCAL_STOP that leaves too short a piece of a pulse of COUNTER_CLK.
-    fn cut_pulse(&self, start: u16) -> Option<Race> {
-        let timing = &self.timing;
-        let block = timing.counter.block?;
-        let period = self.exposure.clock.period();
-        let to_block = block.from_local_stop;
-        let blocks = self.ripple(start) + to_block;
-        let counter_clk = timing.clk_to_counter_clk;
-        // From the pulse's rise until so much of it is left that it is a pulse.
-        let within = (
-            counter_clk - ROUNDING,
-            counter_clk + timing.counter.clock_high - block.to_counter_clk + ROUNDING,
-        );
-        let pulses = (blocks - within.0).as_fs().div_euclid(period.as_fs());
-        let is_cut = blocks < period * pulses + within.1;
-        is_cut.then(|| {
-            let ripples = self.ripples();
-            let all = ((ripples.0 + to_block, ripples.1 + to_block), within);
-            Race::cut_pulse(period, pulses, blocks, all, self.shortest_period())
-        })
-    }
-
     /// What keeps a P-counter of one's own from having a law, if anything.
     fn own_counter(&self) -> Option<Irregular> {
         let law = self.sensor.counter_law()?;
         let is_coded = self.sensor.tdc == Tdc::DelayLine && !law.is_plain();
         let uneven = law.uneven().map(Irregular::OwnCounter);
         uneven.or(is_coded.then_some(Irregular::OwnCodes))
-    }
-
-    /// LOCAL_STOP of a counter that each STOP resets.
-    fn with_reset(&self, start: u16) -> Result<LocalStop, Window> {
-        let (exposure, timing) = (&self.exposure, &self.timing);
-        let counter = &timing.counter;
-        let (period, phase) = (exposure.clock.period(), exposure.stop_phase);
-        let count = counter.period + ROUNDING;
-        if period <= count {
-            let what = Conflict::SlowCounter;
-            return Err(Window::Race(Race::too_slow(what, count, period)));
-        }
-        if counter.reset_width < counter.reset_need {
-            let race = Race::short_reset(counter.reset_need, counter.reset_width);
-            return Err(Window::Race(race));
-        }
-        if let Some(race) = self.reset_strobe(start) {
-            return Err(Window::Race(race));
-        }
-        let Some(rises) = Rises::of(&self.sensor, start) else {
-            return Err(Window::Never);
-        };
-        let released = timing.stop_to_reset_release + counter.release + counter.recovery;
-        let in_doubt = timing.stop_to_reset_release - counter.removal - ROUNDING
-            ..=released.max(timing.stop_to_reset + counter.settle) + ROUNDING;
-        let counter_clk = |edge| exposure.falling(edge) + timing.clk_to_counter_clk;
-        let mut first = 0;
-        while counter_clk(first) <= *in_doubt.end() {
-            first += 1;
-        }
-        let edge = counter_clk(first - 1);
-        if in_doubt.contains(&edge) {
-            let what = Conflict::ClkAtResetEnd;
-            let race = Race::with_stop(what, edge, in_doubt.into_inner(), phase, period);
-            return Err(Window::Race(race));
-        }
-
-        // Later than the counts that the next reset forestalls.
-        let end = exposure.clock.periods(exposure.stop_periods as i64);
-        let edges = (0..).map(|n| first + rises.first + n * rises.every.unwrap_or(i64::MAX / 2));
-        let edges = edges.take_while(|&edge| counter_clk(edge) < end + timing.stop_to_reset);
-        let edges: Vec<i64> = edges
-            .take(if rises.every.is_some() { usize::MAX } else { 1 })
-            .collect();
-        let (Some(&edge), Some(&last)) = (edges.first(), edges.last()) else {
-            return Err(Window::Never);
-        };
-        let deadline = end + timing.stop_to_hit_reset - timing.strobe_to_hit;
-        let ripple = self.ripple(start);
-        let strobe = exposure.falling(last) + ripple + timing.local_stop_to_strobe;
-        let margin = deadline - strobe;
-        if margin < -ROUNDING && rises.every.is_none() {
-            return Err(Window::Never);
-        }
-        if margin <= ROUNDING {
-            return Err(Window::Race(Race {
-                what: Conflict::StrobeAtNextReset,
-                after: Origin::StopRises,
-                comes: strobe,
-                from: deadline - ROUNDING,
-                to: rises.every.is_none().then_some(deadline + ROUNDING),
-                cure: Cure::LaserCycle,
-            }));
-        }
-        if let Some(race) = self.cut_pulse(start) {
-            return Err(Window::Race(race));
-        }
-        Ok(LocalStop {
-            time: exposure.falling(edge) + ripple,
-            edge,
-            irregular: (edges.len() > 1)
-                .then_some(Irregular::LocalStopRepeats { rises: edges.len() }),
-        })
-    }
-
-    /// LOCAL_STOP of a counter that nothing resets.
-    fn coming_round(&self, start: u16) -> Result<LocalStop, Window> {
-        let (exposure, timing) = (&self.exposure, &self.timing);
-        let counter = &timing.counter;
-        let enabled = timing.stop_to_enabled;
-        let first = exposure.rising_until(enabled) + 1;
-        let shortest = counter.clock_high + timing.clk_to_counter_clk + ROUNDING;
-        let in_doubt = (enabled - ROUNDING, enabled + shortest);
-        let meets = [first, first - 1].map(|edge| exposure.rising(edge));
-        let meets = meets
-            .into_iter()
-            .find(|t| (in_doubt.0..=in_doubt.1).contains(t));
-        if let Some(edge) = meets {
-            let what = Conflict::ClkAtEnable;
-            let (phase, period) = (exposure.stop_phase, exposure.clock.period());
-            let race = Race::with_stop(what, edge, in_doubt, phase, period);
-            return Err(Window::Race(race));
-        }
-        // A built-in counter without memory wraps.
-        let Some(rises) = Rises::of(&self.sensor, start) else {
-            return Err(Window::Never);
-        };
-        let Some(every) = rises.every else {
-            return Err(Window::Never);
-        };
-        let periods = exposure.stop_periods as i64;
-        let last = periods * exposure.laser_cycles as i64;
-        let edge = first + rises.first;
-        let is_first_count = rises.first == 0 && exposure.falling(first) <= enabled + ROUNDING;
-        if is_first_count || (last >= edge && (last - edge) % every == 0) {
-            let comes = exposure.falling(if is_first_count { first } else { last });
-            return Err(Window::Race(Race {
-                what: Conflict::LocalStopAtEnable,
-                after: Origin::FirstStop,
-                comes,
-                from: comes.min(enabled),
-                to: Some(comes.max(if is_first_count {
-                    enabled
-                } else {
-                    exposure.end() + enabled
-                })),
-                cure: Cure::LaserCycle,
-            }));
-        }
-        // STOP also resets HIT.
-        let end = exposure.clock.periods(periods);
-        let in_doubt = timing.stop_to_hit_reset - timing.strobe_to_hit - ROUNDING
-            ..=timing.stop_to_hit_release + timing.recovery + ROUNDING;
-        let meets_reset = |edge: i64| {
-            let place = exposure.falling(edge.rem_euclid(periods));
-            let arrival = place + self.ripple(start) + timing.local_stop_to_strobe;
-            [arrival, arrival - end]
-                .into_iter()
-                .find(|t| in_doubt.contains(t))
-        };
-        let mut edges = (edge..last).step_by(every as usize).take(periods as usize);
-        if let Some(strobe) = edges.find_map(meets_reset) {
-            return Err(Window::Race(Race {
-                what: Conflict::StrobeAtReset,
-                after: Origin::StopRises,
-                comes: strobe,
-                from: *in_doubt.start(),
-                to: Some(*in_doubt.end()),
-                cure: Cure::LaserCycle,
-            }));
-        }
-        Ok(LocalStop {
-            time: exposure.falling(edge) + self.ripple(start),
-            edge,
-            irregular: (periods != every).then_some(Irregular::OutOfStep {
-                stop_periods: periods,
-                round: every,
-            }),
-        })
     }
 
     /// Why no window can be aimed, if so: the reason for which start values do not open one.

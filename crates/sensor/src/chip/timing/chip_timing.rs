@@ -27,6 +27,8 @@ pub struct ChipTiming {
     pub stop_to_sample: Time,
     /// Clock of the HIT flip-flops to HIT.
     pub strobe_to_hit: Time,
+    /// How long HIT must be high for its bin to count.
+    pub hit_high: Time,
     /// CLK rising to the latest change of the METDC's shift register; nothing where there is none.
     pub clk_to_shift: Time,
     /// STOP rising to COUNTER_RESET rising.
@@ -37,6 +39,8 @@ pub struct ChipTiming {
     pub stop_to_hit_reset: Time,
     /// STOP rising to the release of the HIT flip-flops, guided mode.
     pub stop_to_hit_release: Time,
+    /// STOP rising to where a strobe counts, conventional mode: the reset of the HIT flip-flops is released and has recovered.
+    pub stop_to_hit_ready: Time,
     /// STOP rising to HIT's fall in the guided mode, which is START's in a counter TDC.
     pub stop_to_start_falls: Time,
     /// STOP rising to the inverse of ENABLE, which blocks COUNTER_CLK, falling.
@@ -80,6 +84,9 @@ pub struct CounterTiming {
     pub clock_high: Time,
     /// How LOCAL_STOP blocks COUNTER_CLK, where it does.
     pub block: Option<BlockTiming>,
+    /// LOAD_CLK falls → the pulse that loads start values is over, latest, less LOAD_CLK rises → COUNTER_INIT changes, earliest. It must
+    /// be less than half a LOAD_CLK period. None where a memory takes the start values.
+    pub load_pulse: Option<Time>,
     /// Width of COUNTER_RESET, at its shortest.
     pub reset_width: Time,
     /// What COUNTER_RESET must outlast.

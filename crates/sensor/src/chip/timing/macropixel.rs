@@ -21,7 +21,7 @@ use std::sync::OnceLock;
 
 use super::cell_library::CellLibrary;
 use super::silicon::Silicon;
-use crate::chip::{Probe, Probes, SensorConfig, Tdc, array};
+use crate::chip::{LoadProbe, Probe, Probes, SensorConfig, Tdc, array};
 use crate::logic::Logic::{One, Zero};
 use crate::netlist::{
     Arrivals, CellKind, Corner, Edge, FlatCell, NetId, Netlist, Requirement, StaticTiming, Timing,
@@ -250,6 +250,14 @@ impl<'c> MacropixelPaths<'c> {
         arrivals.expect("every loop is cut")
     }
 
+    /// What an edge of LOAD_CLK changes, LOCAL_STOP left out: it does not belong to the load.
+    fn after_load_clk(&self, edge: Edge) -> Arrivals<'c> {
+        let clk = (LoadProbe::Clk.net(&self.circuit.netlist), edge);
+        let cuts = [self.circuit.probes.net(Probe::LocalStop)];
+        let arrivals = self.analysis.arrivals(&[clk], &cuts);
+        arrivals.expect("every loop is cut")
+    }
+
     /// What an edge of COUNTER_RESET changes. LOCAL_STOP, which falls, may let COUNTER_CLK rise.
     pub(crate) fn after_counter_reset(&self, edge: Edge) -> Arrivals<'c> {
         let reset = (self.circuit.probes.net(Probe::CounterReset), edge);
@@ -264,6 +272,26 @@ impl<'c> MacropixelPaths<'c> {
     pub(crate) fn after_enable(&self) -> Arrivals<'c> {
         let cuts = [Probe::CounterReset, Probe::CounterClk];
         self.after(Probe::Enable, &Edge::BOTH, &cuts)
+    }
+
+    /// The flip-flop of a bin's lowest bit, and HIT's rise (latest) and fall (earliest) → its clock. None where HIT does not clock it.
+    fn hit_to_count(&self) -> Option<(CellKind, Time, Time)> {
+        let probes = &self.circuit.probes;
+        let hit = probes.find(Probe::Hit)?[0];
+        let count = probes.bin(0)[0];
+        let mut cells = self.circuit.netlist.cells().iter();
+        let flip_flop =
+            cells.find(|cell| cell.kind.is_flip_flop() && cell.outputs.contains(&count))?;
+        let clock = flip_flop.inputs[1];
+        if clock == hit {
+            return Some((flip_flop.kind, Time::ZERO, Time::ZERO));
+        }
+        let [rise, fall] = Edge::BOTH.map(|edge| {
+            let arrivals = self.analysis.arrivals(&[(hit, edge)], &[clock]);
+            let arrivals = arrivals.expect("every loop is cut");
+            arrivals.edge_window(clock, edge)
+        });
+        Some((flip_flop.kind, rise?.1, fall?.0))
     }
 
     /// BLOCK rises → COUNTER_CLK falls, earliest.
@@ -419,6 +447,8 @@ pub struct MacropixelDelays {
     pub pulse: (Span, Span),
     /// STOP rises → RUN changes.
     pub run: Span,
+    /// STOP rises → RUN rises.
+    pub run_rise: Span,
     /// STOP rises → STROBE rises, where STOP makes the strobe: in the conventional mode.
     pub stop_strobe: Span,
     /// STOP rises → what freezes the window rises, conventional mode: STROBE, or SAMPLE_CLK before it.
@@ -427,6 +457,8 @@ pub struct MacropixelDelays {
     pub stop_hit_release: Span,
     /// STROBE rises → HIT rises, latest.
     pub strobe_to_hit: Time,
+    /// The flip-flop of a bin's lowest bit, and HIT's rise (latest) and fall (earliest) → its clock, where HIT clocks it.
+    pub hit_to_count: Option<(CellKind, Time, Time)>,
     /// The slowest arc of any cell.
     pub slowest: Time,
     /// The slowest arc of an AND.
@@ -466,10 +498,12 @@ impl MacropixelDelays {
                 edge(&stop, net(Probe::ResetPulse), Edge::Fall),
             ),
             run: changes(&stop, net(Probe::Enable)),
+            run_rise: edge(&stop, net(Probe::Enable), Edge::Rise),
             stop_strobe: edge(&stop, circuit.hit_pin(1), Edge::Rise),
             stop_sample: edge(&stop, circuit.sampling(), Edge::Rise),
             stop_hit_release: edge(&stop, circuit.hit_pin(2), Edge::Fall),
             strobe_to_hit: hits.max().expect("a METDC has bins"),
+            hit_to_count: paths.hit_to_count(),
             slowest: latest(paths.arcs(|_| true)).unwrap_or(Time::ZERO),
             slowest_and: latest(paths.arcs(|kind| kind == CellKind::And2)).unwrap_or(Time::ZERO),
             fastest_flip_flop: earliest(paths.arcs(CellKind::is_flip_flop)).unwrap_or(Time::ZERO),

@@ -35,6 +35,9 @@ impl ChipTiming {
     }
 }
 
+/// By how much one event comes after another, at the least, so that their order is certain.
+const EDGE: Time = Time::from_fs(1);
+
 /// Width of COUNTER_RESET, and what it must outlast.
 pub(crate) struct ResetPulse {
     /// At its shortest.
@@ -42,6 +45,8 @@ pub(crate) struct ResetPulse {
     /// Stage outputs that return to their memory value, the COUNTER_CLK edges that LOCAL_STOP's fall and ENABLE let through, the shortest
     /// resets of flip-flops, and the gates on the way, which swallow a pulse shorter than their delay.
     pub need: Time,
+    /// By how much HIT is ready before the same chain makes the strobe of the conventional mode, at the least.
+    pub strobe_lead: Time,
 }
 
 impl ResetPulse {
@@ -72,17 +77,22 @@ impl ResetPulse {
         let of_hit = limit_of(CellKind::Dffr, CheckKind::ControlHigh) - counter.hit_release.0;
         // What is left over of the pulse where gates make it.
         let made = (delays.stop_d.0 - delays.pulse.0.1).min(delays.pulse.1.0 - delays.reset.1);
-        let needs = [
+        let of_counter = [
             counter.reset_edges() + limit(CheckKind::Removal),
-            counter.enabled.max(counter.clear.1) - delays.reset.0 + limit(CheckKind::Removal),
+            counter.enabled - delays.reset.0 + limit(CheckKind::Removal),
             limit(CheckKind::ControlHigh),
-            to_hit + of_hit,
-            to_hit,
-            width - made,
+            // The pulse is there when the first laser cycle's other cause of COUNTER_RESET goes.
+            width - (delays.pulse.1.0 - counter.clear_falls) + EDGE,
         ];
+        let is_reset = counter.reset_settled.is_some();
+        let of_counter = of_counter.into_iter().filter(|_| is_reset);
+        let needs = of_counter.chain([to_hit + of_hit, to_hit, width - made]);
         ResetPulse {
             width,
-            need: needs.into_iter().max().expect("there are some"),
+            need: needs.max().expect("there are some"),
+            strobe_lead: delays.stop_strobe.0
+                - delays.stop_hit_release.1
+                - limit_of(CellKind::Dffr, CheckKind::Recovery),
         }
     }
 }
@@ -134,6 +144,9 @@ impl MeasuredDelays {
         let slowest_toggle = latencies.map(|(rise, fall)| (*rise).max(*fall)).max();
         let toggle = slowest_toggle.expect("a macropixel has SPADs");
         let shift = delays.shift.iter().copied().reduce(hull);
+        let hit_high = |(kind, rise, fall): (CellKind, Time, Time)| {
+            rise.max(rise - fall + limit_of(kind, CheckKind::ClockHigh))
+        };
         let local_stop = (
             counter.local_stop.0 - counter.counter_clk.1,
             counter.local_stop.1 - counter.counter_clk.1,
@@ -172,6 +185,7 @@ impl MeasuredDelays {
                         to_counter_clk,
                     },
                 ),
+                load_pulse: counter.load_pulse,
                 reset_width: reset.width,
                 reset_need: reset.need,
             },
@@ -180,11 +194,13 @@ impl MeasuredDelays {
             stop_to_strobe: delays.stop_strobe.1,
             stop_to_sample: delays.stop_sample.1,
             strobe_to_hit: delays.strobe_to_hit,
+            hit_high: delays.hit_to_count.map_or(Time::ZERO, hit_high),
             clk_to_shift: shift.map_or(Time::ZERO, |span| span.1),
             stop_to_reset: delays.reset.1,
             stop_to_reset_release: delays.release.1,
             stop_to_hit_reset: delays.reset.1 + counter.hit_reset.1,
             stop_to_hit_release: delays.release.1 + counter.hit_release.1,
+            stop_to_hit_ready: delays.stop_hit_release.1 + limit(CheckKind::Recovery),
             stop_to_start_falls: delays.reset.1 + counter.hit_falls,
             stop_to_enabled: counter.enable,
             clk_to_event: delays.event,

@@ -9,7 +9,8 @@
 //!
 //! Edges that the reset itself sends into the clocks of the P-counter must meet a reset that still holds. Otherwise the counter counts
 //! once more in every laser cycle but the first. How long they take depends on the cells, so the chain is sized for them: from the
-//! built-in length on it grows until the pulse is a tenth longer than needed in every corner that has a file.
+//! built-in length on it grows until the pulse is a tenth longer than needed in every corner that has a file. The end of the same
+//! chain makes the strobe of the conventional mode, which must come after HIT's reset.
 
 use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
@@ -19,6 +20,10 @@ use super::silicon::Silicon;
 use crate::chip::SensorConfig;
 use crate::chip::p_counter_timing::SHORTEST_CHAIN;
 use crate::netlist::Corner;
+use crate::units::Time;
+
+/// What the window law adds to limits.
+const ROUNDING: Time = Time::from_fs(3);
 
 /// Longest chain that is tried: one that is too short still is reported as such.
 const LONGEST_CHAIN: usize = 1000;
@@ -29,10 +34,6 @@ impl SensorConfig {
     pub fn reset_buffers(&self) -> usize {
         if self.reset_stages > 0 {
             return self.reset_stages;
-        }
-        // Without a reset in every laser cycle there is nothing to outlast.
-        if !self.p_counter.row().has_memory {
-            return SHORTEST_CHAIN;
         }
         static SIZED: LazyLock<Mutex<HashMap<[Option<Circuit>; 3], usize>>> =
             LazyLock::new(Mutex::default);
@@ -81,6 +82,7 @@ fn sufficient_chain(config: &SensorConfig) -> usize {
         };
         let needed = pulse.need.as_fs() + spare;
         let missing = needed - pulse.width.as_fs();
+        let missing = missing.max(ROUNDING.as_fs() - pulse.strobe_lead.as_fs());
         if missing <= 0 || stages >= LONGEST_CHAIN {
             return stages;
         }

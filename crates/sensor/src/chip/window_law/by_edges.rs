@@ -52,6 +52,13 @@ impl Edges {
         count + timing.counter.clk_to_local_stop + timing.local_stop_to_strobe
     }
 
+    /// The first strobe after STOP that HIT's reset may keep from being counted.
+    fn surely_counts(&self) -> Time {
+        let timing = &self.timing;
+        let hit_falls = timing.stop_to_start_falls - timing.hit_high;
+        timing.stop_to_hit_reset.min(hit_falls) - timing.strobe_to_hit - NEAR
+    }
+
     /// The strobe of a P-counter that each STOP resets.
     fn after_reset(&self, start: u16) -> Found {
         let (timing, counter) = (&self.timing, &self.timing.counter);
@@ -104,9 +111,20 @@ impl Edges {
         if strobe > latched + NEAR && waits {
             return Found::Never;
         }
-        if strobe >= latched - NEAR {
+        let surely = self.end() + self.surely_counts();
+        if strobe >= surely {
             let until = waits.then_some(latched + NEAR);
-            return Found::Race(Conflict::StrobeAtNextReset, strobe, latched - NEAR, until);
+            return Found::Race(Conflict::StrobeAtNextReset, strobe, surely, until);
+        }
+        let ready = timing.stop_to_hit_release + timing.recovery + NEAR;
+        let strobe = self.strobe(first);
+        if strobe >= self.surely_counts() && strobe <= ready {
+            return Found::Race(
+                Conflict::StrobeAtReset,
+                strobe,
+                self.surely_counts(),
+                Some(ready),
+            );
         }
         self.counted(first, stops.len() == 1)
     }
@@ -165,7 +183,10 @@ impl Edges {
                 Some(comes.max(end)),
             );
         }
-        let from = timing.stop_to_hit_reset - timing.strobe_to_hit - NEAR;
+        if counted + first > last {
+            return Found::Never;
+        }
+        let from = self.surely_counts();
         let to = timing.stop_to_hit_release + timing.recovery + NEAR;
         for &edge in &stops {
             let strobe = self.strobe(edge.rem_euclid(periods));
@@ -189,6 +210,14 @@ impl Edges {
             return Found::Race(what, event, self.period(), None);
         }
         match self.config.mode {
+            Mode::Conventional if timing.stop_to_strobe <= timing.stop_to_hit_ready + NEAR => {
+                Found::Race(
+                    Conflict::StrobeAtReset,
+                    timing.stop_to_strobe,
+                    Time::ZERO,
+                    Some(timing.stop_to_hit_ready + NEAR),
+                )
+            }
             Mode::Conventional => Found::Strobe {
                 cause: self.end(),
                 strobe: self.end() + timing.stop_to_strobe,
@@ -345,7 +374,7 @@ prop_compose! {
         let reset_to_local_stop = Some(reset_to_local_stop);
         CounterTiming {
             clk_to_local_stop, reset_to_local_stop, release, settle, period, recovery, removal, clock_high,
-            block: None, reset_width: Time::ZERO, reset_need: Time::ZERO,
+            block: None, load_pulse: None, reset_width: Time::ZERO, reset_need: Time::ZERO,
         }
     }
 }
@@ -356,6 +385,7 @@ prop_compose! {
         (spad_to_sampled, clk_to_counter_clk, counter) in (delay(1..20), delay(1..8), counters()),
         (local_stop_to_strobe, local_stop_to_sample) in (delay(1..8), delay(1..12)),
         (stop_to_strobe, stop_to_sample, strobe_to_hit) in (delay(1..20), delay(1..20), delay(0..6)),
+        (hit_high, stop_to_hit_ready) in (delay(0..6), delay(0..12)),
         (clk_to_shift, clk_to_event) in (delay(0..14), delay(5..22)),
         (stop_to_reset, reset, stop_to_hit_reset, hit_reset) in (delay(1..5), delay(8..20), delay(1..12), delay(4..20)),
         (stop_to_enabled, stop_to_start_falls) in (delay(1..30), delay(2..30)),
@@ -363,7 +393,7 @@ prop_compose! {
     ) -> ChipTiming {
         ChipTiming {
             spad_to_sampled, clk_to_counter_clk, counter, local_stop_to_strobe, local_stop_to_sample, stop_to_strobe,
-            stop_to_sample, strobe_to_hit, clk_to_shift, clk_to_event, stop_to_reset, stop_to_hit_reset,
+            stop_to_sample, strobe_to_hit, hit_high, stop_to_hit_ready, clk_to_shift, clk_to_event, stop_to_reset, stop_to_hit_reset,
             stop_to_enabled, stop_to_start_falls, setup, hold, recovery, removal,
             stop_to_reset_release: stop_to_reset + reset,
             stop_to_hit_release: stop_to_hit_reset + hit_reset,

@@ -225,6 +225,9 @@ proptest! {
                     prop_assert!(brackets(at_most, config.stop_phase(), at_least), "{race}; {}", race.cure);
                     push([at_most.map(below), at_least.map(above)], &|config, t| config.stop_phase_ps = t.as_ns() * 1e3);
                 }
+                Cure::LoadPeriod(at_least) => {
+                    push([Some(above(at_least)), None], &|config, t| config.load_clk_hz = 1.0 / t.as_s());
+                }
                 Cure::LaserCycle | Cure::Tap | Cure::ResetChain | Cure::Cells => {}
             }
             for config in not_cured {
@@ -236,6 +239,31 @@ proptest! {
                 let is_same = matches!(again, Window::Race(r) if r.what == race.what);
                 prop_assert!(!is_same, "{race}; {}: {again:?}", race.cure);
             }
+        }
+    }
+
+    /// A P-counter without memory whose load pulse is as long as COUNTER_INIT stays.
+    #[test]
+    fn start_values_load_before_counter_init_changes(load_mhz in 50f64..1500.0, start in 0u16..512) {
+        let config = |load_clk_hz| SensorConfig {
+            p_counter: PCounter::Memoryless,
+            after_borrow: AfterBorrow::Wrap,
+            clk_hz: 100e6,
+            load_clk_hz,
+            ..SensorConfig::default()
+        };
+        let window = |config: &SensorConfig| WindowLaw::new(config, &Exposure::new(config, 512, 1)).window(start);
+        let fast = config(load_mhz * 1e6);
+        let pulse = ChipTiming::of(&fast).counter.load_pulse;
+        let is_over = pulse.is_some_and(|pulse| pulse * 2 < fast.load_clock().period());
+        match window(&fast) {
+            Window::Race(Race { what: Conflict::InitAtLoadPulse, cure: Cure::LoadPeriod(at_least), .. }) => {
+                prop_assert!(!is_over);
+                let cured = window(&config(1.0 / at_least.as_s()));
+                let is_same = matches!(cured, Window::Race(Race { what: Conflict::InitAtLoadPulse, .. }));
+                prop_assert!(!is_same);
+            }
+            _ => prop_assert!(is_over),
         }
     }
 

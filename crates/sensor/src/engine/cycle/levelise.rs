@@ -34,7 +34,10 @@ use crate::units::Time;
 
 mod actions;
 mod arrivals;
+mod early_data;
 mod holds;
+
+use early_data::SharedEdges;
 
 /// A net and the direction of its change.
 type Node = (NetId, Edge);
@@ -117,6 +120,7 @@ struct Leveliser<'s> {
     /// Relevant, triggering pins (cell, pin) of live cells, by net.
     loads: HashMap<NetId, Vec<(usize, usize)>>,
     shared: BTreeSet<NetId>,
+    shared_edges: SharedEdges,
     sampled: Vec<NetId>,
     places: HashMap<NetId, u16>,
     initial: Vec<(u16, NetId, bool)>,
@@ -144,6 +148,7 @@ impl Levelised {
             releases_fs: HashMap::new(),
             loads: HashMap::new(),
             shared: BTreeSet::new(),
+            shared_edges: SharedEdges::default(),
             sampled: Vec::new(),
             places: HashMap::new(),
             initial: Vec::new(),
@@ -206,10 +211,12 @@ impl Levelised {
             let times = group.iter().map(move |e| exposure.stop(cycle) + e.time);
             times.zip(causes.iter().map(|&(_, cause)| cause))
         });
-        leveliser.find_holds(&edges.collect::<Vec<_>>());
+        let edges: Vec<(Time, Cause)> = edges.collect();
+        leveliser.find_holds(&edges);
         let reaches: Result<Vec<Reach>, _> = all.iter().map(|&c| leveliser.reach(c)).collect();
         let reaches = reaches?;
         leveliser.find_releases(&reaches)?;
+        leveliser.shared_edges = SharedEdges::new(&edges, &reaches);
         for reach in &reaches {
             first_action.insert(reach.cause, leveliser.follow(reach)?);
         }

@@ -202,6 +202,7 @@ fn common(setting: &Setting, delays: &Delays) -> ChipTiming {
         broken_hold: None,
         // Until the bin has taken the hit: a cell each for HIT and the gate of its clock, and one more as a margin.
         strobe_to_hit: delays.slowest * 3,
+        hit_high: Time::ZERO,
         // The law adds the rounding of clock edges.
         setup: spread(strobe),
         hold: spread(shift),
@@ -214,6 +215,8 @@ fn common(setting: &Setting, delays: &Delays) -> ChipTiming {
 fn conventional(setting: &Setting, delays: &Delays) -> ChipTiming {
     ChipTiming {
         stop_to_strobe: delays.strobe().1,
+        // An order of its own, below.
+        stop_to_hit_ready: Time::ZERO,
         ..common(setting, delays)
     }
 }
@@ -241,6 +244,7 @@ fn guided(setting: &Setting, delays: &Delays, counter: &CounterDelays) -> ChipTi
             block: None,
             reset_width: Time::ZERO,
             reset_need: Time::ZERO,
+            load_pulse: None,
             ..setting.nominal.counter
         },
         local_stop_to_strobe: strobe.1 - local_stop.1,

@@ -1,6 +1,6 @@
 //! Delays of a P-counter with its timing block.
 
-use super::{MacropixelDelays, MacropixelPaths, Span, changes, edge, latest};
+use super::{MacropixelDelays, MacropixelPaths, Span, changes, earliest, edge, latest};
 use crate::chip::Probe;
 use crate::netlist::Edge;
 use crate::units::Time;
@@ -32,6 +32,9 @@ pub struct CounterDelays {
     pub reset_settled: Option<Time>,
     /// COUNTER_RESET rises → LOCAL_STOP rises, latest, where a start value can make it.
     pub reset_to_local_stop: Option<Time>,
+    /// LOAD_CLK falls → the pulse that loads the flip-flops is over, latest, less LOAD_CLK rises → COUNTER_INIT changes there, earliest;
+    /// none where a memory takes the start value.
+    pub load_pulse: Option<Time>,
     /// COUNTER_RESET rises → HIT's reset begins.
     pub hit_reset: Span,
     /// COUNTER_RESET falls → HIT's reset ends.
@@ -40,6 +43,8 @@ pub struct CounterDelays {
     pub hit_falls: Time,
     /// STOP rises → RUN changes → COUNTER_RESET's other cause changes.
     pub clear: Span,
+    /// STOP rises → RUN rises → that cause falls, latest.
+    pub clear_falls: Time,
     /// STOP rises → RUN changes → COUNTER_CLK changes, latest.
     pub enabled: Time,
     /// STOP rises → RUN rises → the inverse of ENABLE falls, latest.
@@ -69,6 +74,22 @@ impl CounterDelays {
             leaf.inputs[2..leaf.kind.inputs().len()].iter()
         });
         let hits = circuit.probes.latched().iter();
+        let reset_settled = latest(all_data.map(|data| reset.window(data)));
+        let load_pulse = || {
+            let [fall, rise] = [Edge::Fall, Edge::Rise].map(|edge| paths.after_load_clk(edge));
+            let over = latest(
+                controls
+                    .clone()
+                    .map(|&net| fall.edge_window(net, Edge::Fall)),
+            );
+            let changes = earliest(controls.clone().map(|&net| rise.window(net)));
+            Some(over? - changes?)
+        };
+        let load_pulse = if reset_settled.is_none() {
+            load_pulse()
+        } else {
+            None
+        };
         let rises_after_reset = |net| reset.edge_window(net, Edge::Rise);
         CounterDelays {
             counter_clk: edge(&fall, counter_clk, Edge::Rise),
@@ -78,11 +99,16 @@ impl CounterDelays {
             block: fall.edge_window(net(Probe::Block), Edge::Rise),
             block_to_counter_clk: paths.block_to_counter_clk(),
             settled: latest(data).expect("a P-counter counts"),
-            released: latest(controls.map(|&net| release.edge_window(net, Edge::Fall)))
-                .unwrap_or(Time::ZERO),
+            released: latest(
+                controls
+                    .clone()
+                    .map(|&net| release.edge_window(net, Edge::Fall)),
+            )
+            .unwrap_or(Time::ZERO),
             reset_to_stage_clock: latest(later_stages.map(rises_after_reset)),
             reset_to_counter_clk: latest([rises_after_reset(counter_clk)].into_iter()),
-            reset_settled: latest(all_data.map(|data| reset.window(data))),
+            reset_settled,
+            load_pulse,
             reset_to_local_stop: latest([rises_after_reset(net(Probe::LocalStop))].into_iter()),
             hit_reset: edge(&reset, circuit.hit_pin(2), Edge::Rise),
             hit_release: edge(&release, circuit.hit_pin(2), Edge::Fall),
@@ -90,7 +116,8 @@ impl CounterDelays {
                 .expect("COUNTER_RESET resets HIT"),
             clear: after_run(circuit.clear),
             enabled: after_run(counter_clk).1,
-            enable: run.1 + edge(&enable, circuit.disabled, Edge::Fall).1,
+            enable: delays.run_rise.1 + edge(&enable, circuit.disabled, Edge::Fall).1,
+            clear_falls: delays.run_rise.1 + edge(&enable, circuit.clear, Edge::Fall).1,
         }
     }
 

@@ -204,7 +204,7 @@ impl Leveliser<'_> {
             None
         };
         if mask.is_some() {
-            self.refuse_early_data(reach, arc.cell, late + delay)?;
+            self.refuse_early_data(reach, arc.cell, (early, late + delay))?;
         }
         let draft = self.flip_flop(reach.cause, arc.cell, mask, late + delay)?;
         let action = &mut self.drafts[draft].action;
@@ -213,27 +213,5 @@ impl Leveliser<'_> {
         let own = caused(cell.kind, arc.pin, node.1, 0);
         action.directions = Edge::BOTH.map(|edge| inversion(own.contains(&edge)));
         Ok(draft)
-    }
-
-    /// A flip-flop takes its place on the tape where its output changes, and reads its data there. That is what its clock edge found only
-    /// if the same cause does not change them before.
-    fn refuse_early_data(
-        &self,
-        reach: &Reach,
-        cell: usize,
-        output_fs: i64,
-    ) -> Result<(), Unlevelled> {
-        let leaf = &self.survey.netlist.cells()[cell];
-        let data = leaf.inputs[0];
-        let is_own = leaf.outputs.contains(&data);
-        let changes = Edge::BOTH.into_iter();
-        let changes = changes.filter_map(|edge| reach.arrival.get(&(data, edge)));
-        let earliest = changes.map(|window| window.0).min();
-        match earliest {
-            Some(earliest) if earliest < output_fs && !is_own => {
-                Err(self.ambiguous(data, (earliest, output_fs)))
-            }
-            _ => Ok(()),
-        }
     }
 }

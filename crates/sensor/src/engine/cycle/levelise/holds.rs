@@ -78,7 +78,7 @@ impl Leveliser<'_> {
     }
 
     /// How long shared nets hold a flip-flop after a cause, at least.
-    fn hold_fs(&self, cause: Cause, cell: usize) -> i64 {
+    pub(super) fn hold_fs(&self, cause: Cause, cell: usize) -> i64 {
         let nets = Self::controls_of(&self.survey.netlist.cells()[cell]);
         let holds = nets.filter_map(|net| self.holds_fs.get(&(cause, net)).copied());
         holds.max().unwrap_or(0)
