@@ -335,6 +335,26 @@ impl<'c> MacropixelPaths<'c> {
         counting.map(|&cell| self.circuit.pin(cell, 1))
     }
 
+    /// A stage's clock rises → the clock of a stage behind it rises, latest; stages are what CLK's fall, `fall`, reaches.
+    fn stage_to_stage_clock(&self, fall: &Arrivals<'_>) -> Option<Time> {
+        let counter_clk = self.circuit.probes.net(Probe::CounterClk);
+        let is_stage = |clock: &NetId| fall.window(*clock).is_some();
+        let mut clocks: Vec<NetId> = self.stage_clocks().filter(is_stage).collect();
+        clocks.sort_unstable();
+        clocks.dedup();
+        let behind = |clock: NetId| {
+            let others = clocks.iter().copied().filter(move |&other| other != clock);
+            let others: Vec<NetId> = others.collect();
+            let cuts = [&others[..], &[counter_clk], self.circuit.probes.latched()].concat();
+            let cuts: Vec<NetId> = cuts.into_iter().filter(|&net| net != clock).collect();
+            let arrivals = self.analysis.arrivals(&[(clock, Edge::Rise)], &cuts);
+            let arrivals = arrivals.expect("every loop is cut");
+            let later = others.into_iter().filter(|&other| other != counter_clk);
+            latest(later.map(|other| arrivals.edge_window(other, Edge::Rise)))
+        };
+        clocks.iter().filter_map(|&clock| behind(clock)).max()
+    }
+
     /// Clock → an output rises, falls, of one flip-flop.
     fn clock_to_q(&self, cell: usize, output: usize) -> (Time, Time) {
         let clock = self.timing.of(cell)[1][output];

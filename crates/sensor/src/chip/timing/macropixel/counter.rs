@@ -26,6 +26,8 @@ pub struct CounterDelays {
     pub released: Time,
     /// COUNTER_RESET rises → the last edge at the clock of a stage behind another, latest.
     pub reset_to_stage_clock: Option<Time>,
+    /// A stage counts → the clock of a stage behind it rises, latest: a count may be on its way when the reset comes.
+    pub stage_to_stage_clock: Option<Time>,
     /// COUNTER_RESET rises → LOCAL_STOP falls → COUNTER_CLK rises, latest; none where LOCAL_STOP does not block.
     pub reset_to_counter_clk: Option<Time>,
     /// COUNTER_RESET rises → data of the counting flip-flops settled, latest; none where nothing resets them.
@@ -105,6 +107,7 @@ impl CounterDelays {
                     .map(|&net| release.edge_window(net, Edge::Fall)),
             )
             .unwrap_or(Time::ZERO),
+            stage_to_stage_clock: paths.stage_to_stage_clock(&fall),
             reset_to_stage_clock: latest(later_stages.map(rises_after_reset)),
             reset_to_counter_clk: latest([rises_after_reset(counter_clk)].into_iter()),
             reset_settled,
@@ -121,9 +124,10 @@ impl CounterDelays {
         }
     }
 
-    /// COUNTER_RESET rises → the last edge at the clock of any stage, latest.
+    /// COUNTER_RESET rises → the last edge at the clock of any stage, latest, that of a count on its way included.
     pub(crate) fn reset_edges(&self) -> Time {
-        let edges = self.reset_to_stage_clock.max(self.reset_to_counter_clk);
+        let of_reset = self.reset_to_stage_clock.max(self.reset_to_counter_clk);
+        let edges = of_reset.max(self.stage_to_stage_clock);
         edges.unwrap_or(Time::ZERO)
     }
 }

@@ -104,13 +104,19 @@ impl Leveliser<'_> {
     ) -> Result<(Code, bool), Unlevelled> {
         let survey = self.survey;
         let data = cell.inputs[0];
-        let (register, _) = survey.driver[data.index()].expect("a stream net has a driver");
+        let (register, output) = survey.driver[data.index()].expect("a stream net has a driver");
         if !survey.netlist.cells()[register].kind.is_flip_flop() {
             return Err(Unlevelled::Structure(survey.name(data)));
         }
-        let clock_to_q = |cell: usize| i64::from(survey.timing.of(cell)[1][0].rise_fs);
+        // Where the flip-flop's clock comes is told by the delay with which it was given its place.
+        let to_output = self.longest_delay(index, CLOCK);
+        let of_register = &survey.timing.of(register)[CLOCK][output];
+        let (rise, fall) = (
+            i64::from(of_register.rise_fs),
+            i64::from(of_register.fall_fs),
+        );
         let due = (cause.position_fs + arrival_fs).rem_euclid(self.period_fs);
-        let after_change = due - clock_to_q(index) - self.period_fs / 2 - clock_to_q(register);
+        let after_change = due - to_output - self.period_fs / 2 - rise.max(fall);
         let edges = after_change.div_euclid(self.period_fs);
         let after = after_change.rem_euclid(self.period_fs);
         let limits = self.cell_library.checks(cell.kind);
@@ -121,7 +127,8 @@ impl Leveliser<'_> {
                 .max(limit.fall.at(self.config.corner));
             i64::from(longest) + ROUNDING_FS
         };
-        let is_race = after <= limit(limits.setup) || self.period_fs - after <= limit(limits.hold);
+        let before = self.period_fs - after - (rise - fall).abs();
+        let is_race = after <= limit(limits.setup) || before <= limit(limits.hold);
         let tap = self
             .sampled
             .iter()

@@ -73,9 +73,9 @@ impl Leveliser<'_> {
     }
 
     /// The longest delay to any output: a draft of a flip-flop stands for what both of them do.
-    fn longest_delay(&self, arc: &Arc) -> i64 {
-        let leaf = &self.survey.netlist.cells()[arc.cell];
-        let arcs = &self.survey.timing.of(arc.cell)[arc.pin];
+    pub(super) fn longest_delay(&self, cell: usize, pin: usize) -> i64 {
+        let leaf = &self.survey.netlist.cells()[cell];
+        let arcs = &self.survey.timing.of(cell)[pin];
         let connected = arcs
             .iter()
             .zip(leaf.outputs)
@@ -181,7 +181,7 @@ impl Leveliser<'_> {
     ) -> Result<usize, Unlevelled> {
         let cell = self.survey.netlist.cells()[arc.cell];
         let (early, late) = reach.arrival[&node];
-        let delay = self.longest_delay(arc);
+        let delay = self.longest_delay(arc.cell, arc.pin);
         let is_released = self.may_be_released(reach.cause, &cell, late, delay);
         let mask = if arc.pin == CLOCK {
             let all = *clock.all.get_or_insert_with(|| self.new_place());
