@@ -115,6 +115,8 @@ mod tests {
             in_window,
             measured_m,
             bound_m: None,
+            spread_m: None,
+            returns: Default::default(),
             walk_left: None,
             no_depth: measured_m.is_none().then_some(NoDepth::OutsideWindow),
             peak_m: measured_m,

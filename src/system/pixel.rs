@@ -59,6 +59,62 @@ impl NoDepth {
     }
 }
 
+/// One echo of a macropixel's window. Distances are radial, in metres.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Return {
+    /// From the counts, with range walk taken out where there is a bound.
+    pub depth_m: f64,
+    /// Cramér-Rao bound of that depth.
+    pub bound_m: Option<f64>,
+    /// Standard deviation of the depths that the macropixel sees there: of what widens the laser's pulse to this echo.
+    pub spread_m: Option<f64>,
+    /// Photons that the SPADs would detect in a laser cycle without dead time; without a bound the echo's counts over the laser cycles.
+    pub photons: f64,
+    /// −log₁₀ of the chance that light without this echo makes such counts.
+    pub confidence: f64,
+}
+
+/// Up to four returns, strongest first. In files they are a list.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Vec<Return>", into = "Vec<Return>")]
+pub struct Returns([Option<Return>; 4]);
+
+impl Returns {
+    /// The returns, strongest first.
+    pub fn iter(&self) -> impl Iterator<Item = &Return> {
+        self.0.iter().flatten()
+    }
+
+    /// The `n`-th of them, from 0 on.
+    pub fn get(&self, n: usize) -> Option<&Return> {
+        self.iter().nth(n)
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.get(0).is_none()
+    }
+}
+
+impl FromIterator<Return> for Returns {
+    fn from_iter<I: IntoIterator<Item = Return>>(returns: I) -> Self {
+        let mut all = returns.into_iter();
+        Returns(std::array::from_fn(|_| all.next()))
+    }
+}
+
+impl From<Vec<Return>> for Returns {
+    fn from(returns: Vec<Return>) -> Self {
+        returns.into_iter().collect()
+    }
+}
+
+impl From<Returns> for Vec<Return> {
+    fn from(returns: Returns) -> Self {
+        returns.iter().copied().collect()
+    }
+}
+
 /// One macropixel of a frame. Distances are radial, in metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PixelDepth {
@@ -75,6 +131,12 @@ pub struct PixelDepth {
     /// Cramér-Rao bound of that depth: the least standard deviation that its counts allow. `None` where range walk is not taken out.
     #[serde(default)]
     pub bound_m: Option<f64>,
+    /// Standard deviation of the depths within the macropixel, from the width of its echo; `None` where there is no bound.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spread_m: Option<f64>,
+    /// All echoes of the window, the one of the depth first.
+    #[serde(default, skip_serializing_if = "Returns::is_empty")]
+    pub returns: Returns,
     /// Why range walk is left in that depth; `None` where it is taken out, or was not asked to be.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub walk_left: Option<WalkLeft>,

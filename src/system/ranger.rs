@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 
 use super::aim::{Aims, Place, own_law};
-use super::pixel::{NoDepth, PixelDepth};
+use super::pixel::{NoDepth, PixelDepth, Return, Returns};
 use crate::chip::window_law::OpenWindow;
 use crate::chip::{Exposure, Sensor, Tdc, WindowLaw};
 use crate::files::InputError;
@@ -138,9 +138,40 @@ impl<'a> Ranger<'a> {
         // Nothing is behind the lidar; a fit that says so is off by as much at least.
         let behind_m = measured_m.map_or(0.0, |measured_m| (-measured_m).max(0.0));
         let bound_m = found.and_then(|s| Some((s.bound_bins? * self.bin_m()).max(behind_m)));
-        let reading = Reading {
-            measured_m: measured_m.map(|measured_m| measured_m.max(0.0)),
+        let measured_m = measured_m.map(|measured_m| measured_m.max(0.0));
+        let to_m = |bins: f64| bins * self.bin_m();
+        let spread_m = found.filter(|s| s.bound_bins.is_some()).and_then(|s| {
+            let spread_bins = self.finder.spread_bins(&s.light?)?;
+            Some(to_m(spread_bins))
+        });
+        let first = found.zip(measured_m).map(|(s, depth_m)| Return {
+            depth_m,
             bound_m,
+            spread_m,
+            photons: s.light.map_or_else(
+                || s.peak.signal_counts / f64::from(self.law.exposure().laser_cycles),
+                |light| light.signal,
+            ),
+            confidence: s.confidence,
+        });
+        let others = found.into_iter().flat_map(|s| s.others).flatten();
+        let others = others.filter_map(|other| {
+            let at = other.position_bins.round().max(0.0) as usize;
+            let depth_m = range_m(other.position_bins, at.min(counts.len() - 1))?;
+            Some(Return {
+                depth_m: depth_m.max(0.0),
+                bound_m: other.bound_bins.map(to_m),
+                spread_m: other.spread_bins.map(to_m),
+                photons: other.photons,
+                confidence: other.confidence,
+            })
+        });
+        let returns: Returns = first.into_iter().chain(others).collect();
+        let reading = Reading {
+            measured_m,
+            bound_m,
+            spread_m,
+            returns,
             walk_left: found.and_then(|s| s.walk_left),
             no_depth,
             peak_m: sighting.and_then(|s| range_m(s.peak.position_bins, s.peak.peak_bin)),
@@ -185,6 +216,8 @@ impl<'a> Ranger<'a> {
             in_window,
             measured_m: sight.reading.measured_m,
             bound_m: sight.reading.bound_m,
+            spread_m: sight.reading.spread_m,
+            returns: sight.reading.returns,
             walk_left: sight.reading.walk_left,
             no_depth,
             peak_m: sight.reading.peak_m,
@@ -223,6 +256,10 @@ pub struct Reading {
     pub measured_m: Option<f64>,
     /// Cramér-Rao bound of it, where range walk is taken out, m.
     pub bound_m: Option<f64>,
+    /// Standard deviation of the depths within the macropixel, where there is a bound, m.
+    pub spread_m: Option<f64>,
+    /// All echoes of the window, that of the distance first.
+    pub returns: Returns,
     /// Why range walk is left in it.
     pub walk_left: Option<WalkLeft>,
     /// Why there is none: no guide (SPADs are off), saturated, or no significant peak.

@@ -149,6 +149,8 @@ mod tests {
             in_window: sees,
             measured_m,
             bound_m: None,
+            spread_m: None,
+            returns: Default::default(),
             walk_left: None,
             no_depth: match (measured_m, sees) {
                 (Some(_), _) => None,

@@ -3,6 +3,7 @@
 #[path = "../shared/command.rs"]
 mod command;
 
+mod depths_keep_their_bounds;
 mod detection_probability_meets_references;
 mod functions_keep_their_promises;
 mod guides_keep_their_claims;

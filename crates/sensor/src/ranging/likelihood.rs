@@ -39,6 +39,8 @@ pub(super) const ECHO: Free = [true, true, true, false];
 pub(super) const WIDE_ECHO: Free = [true, true, true, true];
 /// What bins of the peak alone can tell, where the background is known from others.
 pub(super) const IN_REGION: Free = [true, true, false, false];
+/// Width besides.
+pub(super) const WIDE_IN_REGION: Free = [true, true, false, true];
 
 /// A histogram, and what may have made it.
 #[derive(Debug, Clone)]
@@ -117,7 +119,9 @@ impl Likelihood<'_> {
 
     fn at(&self, light: &EchoLight, steps: Steps) -> Local {
         match self.free {
-            WIDE_ECHO => self.local(light, self.response.chances_of::<4>(light, steps)),
+            WIDE_ECHO | WIDE_IN_REGION => {
+                self.local(light, self.response.chances_of::<4>(light, steps))
+            }
             _ => self.local(light, self.response.chances_of::<3>(light, steps)),
         }
     }

@@ -8,6 +8,7 @@ mod finder;
 mod likelihood;
 mod peak;
 mod profile;
+mod returns;
 mod spad_state;
 pub mod tmf8820;
 mod walk;
@@ -18,6 +19,7 @@ pub use expected::{EchoLight, Response};
 pub use finder::{DepthOptions, EchoFinder, Sighting, UnequalBins};
 pub use peak::{Background, CentreOfMass, Peak, PeakOptions, centre_of_mass, interpolate};
 pub use profile::{BinProfile, LineProfile, OtherSensor};
+pub use returns::{Others, Return};
 pub use walk::{Corrected, WalkCorrection, WalkLeft};
 
 #[cfg(test)]

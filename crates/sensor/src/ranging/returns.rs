@@ -72,6 +72,32 @@ impl Search<'_> {
         first..last + 1
     }
 
+    /// Whether counts on both sides of some bins are down to what is expected, so that the echo is seen whole.
+    pub(super) fn is_apart(&self, bins: &Range<usize>) -> bool {
+        let beside = [bins.start.checked_sub(1), Some(bins.end)];
+        let mut beside = beside
+            .into_iter()
+            .flatten()
+            .filter(|&bin| bin < self.counts.len());
+        beside.all(|bin| {
+            let expected = self.expected[bin];
+            self.counts[bin] <= expected + 3.0 * (expected + 1.0).sqrt()
+        })
+    }
+
+    /// Whether the counts of all other bins scatter about what is expected as they should, to four standard deviations.
+    pub(super) fn is_explained(&self) -> bool {
+        let bins = (0..self.counts.len()).filter(|&bin| !self.taken[bin]);
+        let (freedom, squares) = bins.fold((0.0, 0.0), |(freedom, squares), bin| {
+            let off = self.counts[bin] - self.expected[bin];
+            (
+                freedom + 1.0,
+                squares + off * off / self.expected[bin].max(1.0),
+            )
+        });
+        freedom > 2.0 && squares <= freedom + 4.0 * f64::sqrt(2.0 * freedom)
+    }
+
     /// Marks bins as those of a known echo.
     pub(super) fn take(&mut self, bins: Range<usize>) {
         let end = bins.end.min(self.taken.len());

@@ -5,19 +5,23 @@
 //! it is. The mean histogram of an echo is known ([`Response`]), so its place is fitted ([`likelihood`](super::likelihood)):
 //!
 //! ```text
-//!   centre of mass, light of its bins ─► fit over all bins ──────── explains the counts? ─► position, bound
-//!   strong light: best of many ────────────┘        no │ wider than the pulse?  ─► fit with the width
-//!                                                   no │ other echoes besides?  ─► fit of the peak's bins alone
-//!                                                   no ╰─► the reason, and the centre of mass as it is
+//!   centre of mass, light of its bins ─► fit over all bins ─► explains the counts? ─► with its own width ─► position, bound
+//!   strong light: best of many ────────────┘             no │ with a width of its own? ─► position, bound
+//!                                                        no │ other echoes besides?  ─► fit of the peak's bins alone
+//!                                                        no ╰─► the reason, and the centre of mass as it is
 //! ```
 //!
 //! Nothing is called corrected that does not explain its counts. The thesis assumes pile-up away (3.2.2); the correction
 //! is ours.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 use super::expected::{EchoLight, Response, share_before};
-use super::likelihood::{BESIDE, ECHO, Fit, Free, IN_REGION, Likelihood, WIDE_ECHO};
+use super::likelihood::{
+    BESIDE, ECHO, Fit, Free, IN_REGION, Likelihood, WIDE_ECHO, WIDE_IN_REGION,
+};
 use super::peak::Peak;
 use crate::chip::EventType;
 
@@ -29,6 +33,14 @@ const ELSEWHERE: f64 = 4.0;
 /// Shares of the most background with which the best fit under a THRESHOLD is tried again: chosen. Of 495 random lights under a
 /// THRESHOLD six were fitted more than half a bound beside without, and one is with it.
 const DARKER: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
+
+/// Deviance that a width of its own must save (Akaike).
+const OF_A_WIDTH: f64 = 2.0;
+
+/// Standard deviation with which a deep echo is sought, bins, and the bound below which an echo that is not as its counts say explains
+/// none: no other width is sought then.
+const DEEP_BINS: f64 = 2.5;
+const WELL_KNOWN: f64 = 0.05;
 
 /// Deviance by which another light may be less likely and still be within a standard deviation.
 const RIVAL: f64 = 1.0;
@@ -53,6 +65,8 @@ pub enum WalkLeft {
     ShortLaserCycle,
     /// The counts are not those of one echo of the laser pulse.
     NotOneEcho,
+    /// The echo's centre lies outside the window, and what is within does not tell its width.
+    CutEcho,
     /// Two different lights give such counts.
     Ambiguous,
     /// No most likely light was found.
@@ -61,12 +75,13 @@ pub enum WalkLeft {
 
 impl WalkLeft {
     /// Every reason.
-    pub const ALL: [WalkLeft; 7] = [
+    pub const ALL: [WalkLeft; 8] = [
         WalkLeft::DelayLine,
         WalkLeft::CounterTdc,
         WalkLeft::JoinedSpads,
         WalkLeft::ShortLaserCycle,
         WalkLeft::NotOneEcho,
+        WalkLeft::CutEcho,
         WalkLeft::Ambiguous,
         WalkLeft::NotConverged,
     ];
@@ -79,6 +94,7 @@ impl WalkLeft {
             WalkLeft::JoinedSpads => "the front end joins SPADs",
             WalkLeft::ShortLaserCycle => "SPADs do not recover within a laser cycle",
             WalkLeft::NotOneEcho => "counts are not those of one echo",
+            WalkLeft::CutEcho => "the window cuts the echo off",
             WalkLeft::Ambiguous => "two lights give such counts",
             WalkLeft::NotConverged => "no light was found",
         }
@@ -140,34 +156,132 @@ impl WalkCorrection {
         }
         best = self.darker(&of_all, best);
         if best.explains() {
-            return Ok(best.into());
+            return self.widened(&wide, best).map(Corrected::from);
         }
         // Few photons are an echo in one place only.
         let is_weak = best.has_converged && counts.iter().all(|&n| n < 0.9 * cycles);
         if linear.is_some() && !is_weak && !begins_unseen {
             best = self.darker(&of_all, self.of_many(&of_all, (peak, background))?);
             if best.explains() {
-                return Ok(best.into());
+                return self.widened(&wide, best).map(Corrected::from);
             }
         }
         let of_wide = wide.maximise(&best.light);
         if of_wide.explains() && of_wide.light.sigma_bins < self.widest() {
             return Ok(of_wide.into());
         }
-        let half = (4.0 * self.response.pulse_sigma_bins).ceil().max(2.0) as usize;
-        let first = peak.peak_bin.saturating_sub(half);
-        let of_region = Likelihood {
-            bins: first..(peak.peak_bin + half + 1).min(counts.len()),
-            ..likelihood(IN_REGION)
-        };
-        let in_region = of_region.maximise(&linear.unwrap_or(best.light));
-        if in_region.explains() {
-            return Ok(in_region.into());
-        }
         match best.is_close() {
             false => Err(WalkLeft::NotOneEcho),
             true => Err(WalkLeft::NotConverged),
         }
+    }
+
+    /// The same echo with its own width, where its counts ask for one. Of a deep surface with few counts a bin, the pulse alone finds the
+    /// fullest place; so the bound reaches to other lights that explain the counts as well.
+    ///
+    /// # Errors
+    /// An echo wider than the window can show.
+    fn widened(&self, wide: &Likelihood<'_>, best: Fit) -> Result<Fit, WalkLeft> {
+        if self.response.counting.threshold > 0 {
+            return Ok(best);
+        }
+        let mut fits = vec![best, wide.maximise(&best.light)];
+        if best.bound_bins > WELL_KNOWN {
+            fits.push(wide.maximise(&self.deep_start(wide)));
+        }
+        fits.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
+        if fits[0].light.sigma_bins >= self.widest() {
+            return Err(WalkLeft::NotOneEcho);
+        }
+        let first = *fits.iter().find(|fit| fit.has_converged).unwrap_or(&best);
+        // A width that hardly explains more would only pull the place after it.
+        let is_worth_it = first.deviance + OF_A_WIDTH < best.deviance;
+        let first = if is_worth_it { first } else { best };
+        // Other lights are as many standard deviations away as the root of what their deviance is more.
+        let place = |fit: &Fit| {
+            let off = (fit.light.position_bins - first.light.position_bins).abs();
+            off / (fit.deviance - first.deviance).abs().max(1.0).sqrt()
+        };
+        let bound_bins = fits.iter().map(place).fold(first.bound_bins, f64::max);
+        Ok(Fit {
+            bound_bins,
+            ..first
+        })
+    }
+
+    /// The most likely of some deep echoes. The fit of a narrow one takes what is left of a deep one for background.
+    fn deep_start(&self, likelihood: &Likelihood<'_>) -> EchoLight {
+        let [background_per_bin, _] = self.background(likelihood.counts, likelihood.cycles);
+        let light = |bin: usize| {
+            let chance = likelihood.counts[bin] / likelihood.cycles;
+            (self.light(chance) - background_per_bin).max(0.0)
+        };
+        let bins = likelihood.bins.clone();
+        let signal: f64 = bins.clone().map(light).sum();
+        let of_bin = |bin: usize| EchoLight {
+            position_bins: bin as f64,
+            signal: signal.max(1e-3),
+            background_per_bin,
+            sigma_bins: self.response.pulse_sigma_bins.max(DEEP_BINS),
+        };
+        let lights = bins.step_by(2).map(of_bin);
+        let judged = lights.map(|light| (likelihood.deviance(&light), light));
+        let best = judged.min_by(|a, b| a.0.total_cmp(&b.0));
+        best.expect("a window has bins").1
+    }
+
+    /// The light of one echo of several, from its own `bins`. Elsewhere there is light of `background_per_bin`.
+    ///
+    /// # Errors
+    /// Counts that are not those of an echo of this pulse.
+    pub(crate) fn correct_in(
+        &self,
+        counts: &[f64],
+        bins: Range<usize>,
+        peak: &Peak,
+        background_per_bin: f64,
+    ) -> Result<Corrected, WalkLeft> {
+        if self.response.counting.event_type != EventType::Greater {
+            return Err(WalkLeft::NotOneEcho);
+        }
+        let cycles = counts
+            .iter()
+            .copied()
+            .fold(f64::from(self.laser_cycles), f64::max);
+        let (signal, moment) = bins.clone().fold((0.0, 0.0), |(signal, moment), bin| {
+            let of_bin = (self.light(counts[bin] / cycles) - background_per_bin).max(0.0);
+            (signal + of_bin, moment + of_bin * bin as f64)
+        });
+        if signal <= 0.0 {
+            return Err(WalkLeft::NotOneEcho);
+        }
+        let start = EchoLight {
+            position_bins: moment / signal,
+            signal,
+            background_per_bin: background_per_bin.max(1e-3 / cycles),
+            sigma_bins: self.response.pulse_sigma_bins,
+        };
+        let likelihood = |free| Likelihood {
+            response: &self.response,
+            counts,
+            cycles,
+            bins: bins.clone(),
+            free,
+            most_background: background_per_bin,
+        };
+        let narrow = likelihood(IN_REGION).maximise(&start);
+        let fit = self.widened(&likelihood(WIDE_IN_REGION), narrow)?;
+        let off = (fit.light.position_bins - peak.peak_bin as f64).abs();
+        if fit.explains() && off < 2.0 + fit.light.sigma_bins {
+            Ok(fit.into())
+        } else {
+            Err(WalkLeft::NotOneEcho)
+        }
+    }
+
+    /// The background that makes so many counts a bin, photons.
+    pub(crate) fn background_of(&self, counts_per_bin: f64) -> f64 {
+        self.light((counts_per_bin / f64::from(self.laser_cycles)).max(0.0))
     }
 
     /// A start from the light that each bin of the peak had, if it was alone; `None` where bins do not tell.
@@ -306,7 +420,7 @@ impl WalkCorrection {
 
     /// The widest echo, whose ends are to be seen either side of it.
     fn widest(&self) -> f64 {
-        let of_bins = self.response.bins as f64 / 8.0;
+        let of_bins = self.response.bins as f64 / 4.0;
         of_bins.max(1.5 * self.response.pulse_sigma_bins)
     }
 

@@ -230,7 +230,7 @@ fn a_linear_start_is_the_light_of_the_peaks_bins_and_its_centre() {
 #[test]
 fn the_widest_echo_has_ends_in_the_window() {
     let mut walk = walk(0);
-    assert_eq!(walk.widest(), 2.0);
+    assert_eq!(walk.widest(), 4.0);
     walk.response.pulse_sigma_bins = 3.0;
     assert_eq!(walk.widest(), 4.5);
 }

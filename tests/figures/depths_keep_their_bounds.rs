@@ -1,0 +1,113 @@
+//! Depths lie within five bounds of a surface that is really there, in five scenes, three lights of the sun and three of the laser.
+//!
+//! The truth is the light that the macropixel gets: its echoes, those closer together than a pulse being one surface, with their mean by
+//! light. A third of the 45 frames is taken; `GDTOF_CASES=45 cargo test --release --test figures depths_keep` takes all of them, and
+//! prints every case.
+
+use guided_dtof::chip::{Exposure, Sensor, SensorConfig};
+use guided_dtof::photon::{Echo, PixelLight};
+use guided_dtof::scene::{GroundTruth, Scene};
+use guided_dtof::system::{EngineKind, Frame, FrameSettings, take_frame};
+use guided_dtof::units::TimeOfFlight;
+
+const SCENES: [&str; 5] = ["street", "van", "fog", "glass", "night"];
+
+const SIZE: usize = 64;
+
+/// A frame, and the light that made it.
+fn frame(scene: &str, klux: f64, energy_uj: f64) -> (Frame, GroundTruth, Vec<PixelLight>, f64) {
+    let mut scene = Scene::named(scene).unwrap();
+    scene.light.illuminance_klux = klux;
+    scene.lidar.pulse_energy_uj = energy_uj;
+    let sensor = Sensor::from(SensorConfig {
+        rows: SIZE,
+        cols: SIZE,
+        ..SensorConfig::default()
+    });
+    let exposure = Exposure::new(&sensor, 520, 1000);
+    let truth = GroundTruth::render(&scene, SIZE as u32, SIZE as u32);
+    let light = scene.pixel_light(&truth);
+    let apart_m = scene.pulse_resolution().as_range_m() * 2.355;
+    let settings = FrameSettings {
+        engine: EngineKind::Cohort,
+        ..FrameSettings::new(sensor, scene, exposure)
+    };
+    let frame = take_frame(&settings, |_| Vec::new(), |_| ()).unwrap();
+    (frame, truth, light, apart_m)
+}
+
+/// How far a depth is from what the macropixel gets light from: surfaces, and fog, whose echoes are wider than pulses.
+fn off_m(depth_m: f64, light: &PixelLight, apart_m: f64) -> f64 {
+    let echoes = || light.segments().flat_map(|segment| segment.echoes());
+    let in_fog = echoes().filter_map(|echo| {
+        let half_m = echo.sigma?.as_range_m();
+        let off_m = (echo.arrival.as_range_m() - depth_m).abs() - half_m;
+        (half_m > apart_m).then_some(off_m.max(0.0))
+    });
+    let offs = surfaces_m(echoes(), apart_m).into_iter();
+    let offs = offs
+        .map(|surface_m| (depth_m - surface_m).abs())
+        .chain(in_fog);
+    offs.fold(f64::INFINITY, f64::min)
+}
+
+/// Mean distances of the surfaces that echoes come from.
+fn surfaces_m<'a>(echoes: impl Iterator<Item = &'a Echo>, apart_m: f64) -> Vec<f64> {
+    let mut echoes: Vec<(f64, f64)> = echoes
+        .map(|echo| (echo.arrival.as_range_m(), echo.photons))
+        .collect();
+    echoes.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let groups = echoes.chunk_by(|a, b| b.0 - a.0 < apart_m);
+    let mean = |group: &[(f64, f64)]| {
+        let photons: f64 = group.iter().map(|echo| echo.1).sum();
+        group.iter().map(|echo| echo.0 * echo.1).sum::<f64>() / photons
+    };
+    groups.map(mean).collect()
+}
+
+#[test]
+fn of_surfaces_that_are_there() {
+    let takes_all = std::env::var("GDTOF_CASES").is_ok();
+    let (mut bounded, mut beyond, mut all) = (0, 0, 0);
+    let mut worst: Vec<String> = Vec::new();
+    for (n, scene) in SCENES.into_iter().enumerate() {
+        for (sun, klux) in [0.0, 50.0, 100.0].into_iter().enumerate() {
+            for (laser, energy_uj) in [2.0, 20.0, 200.0].into_iter().enumerate() {
+                // Each sun with each laser in some scene.
+                if !takes_all && (n + sun + laser) % 3 != 0 {
+                    continue;
+                }
+                let (frame, truth, light, apart_m) = frame(scene, klux, energy_uj);
+                let (mut here, mut wrong) = (0, 0);
+                for (number, (pixel, light)) in frame.pixels.iter().zip(&light).enumerate() {
+                    all += usize::from(pixel.measured_m.is_some());
+                    let Some((depth_m, bound_m)) = pixel.measured_m.zip(pixel.bound_m) else {
+                        continue;
+                    };
+                    here += 1;
+                    let own = truth.surfaces[number]
+                        .iter()
+                        .map(|surface| (surface.range_m - depth_m).abs());
+                    let off_m = own.fold(off_m(depth_m, light, apart_m), f64::min);
+                    if off_m > 5.0 * bound_m {
+                        wrong += 1;
+                        let bins = &frame.histograms[number * frame.bins..][..frame.bins];
+                        worst.push(format!(
+                            "{scene} {klux} klux {energy_uj} uJ: {number} {depth_m:.3} m is {off_m:.3} m off, bound {bound_m:.4} m, spread {:?}, {bins:?}",
+                            pixel.spread_m
+                        ));
+                    }
+                }
+                if takes_all {
+                    println!("{scene} {klux} klux {energy_uj} uJ: {wrong} of {here}");
+                }
+                (bounded, beyond) = (bounded + here, beyond + wrong);
+            }
+        }
+    }
+    println!("{beyond} of {bounded} depths with a bound, of {all}, are beyond five bounds");
+    assert!(
+        1000 * beyond <= bounded && 10 * bounded > 8 * all,
+        "{beyond} of {bounded} of {all}: {worst:#?}"
+    );
+}
