@@ -67,6 +67,8 @@ pub enum WalkLeft {
     NotOneEcho,
     /// The echo's centre lies outside the window, and what is within does not tell its width.
     CutEcho,
+    /// Bins are full, or light is so strong that its counts tell only the bin that it came in.
+    ToABin,
     /// Two different lights give such counts.
     Ambiguous,
     /// No most likely light was found.
@@ -75,13 +77,14 @@ pub enum WalkLeft {
 
 impl WalkLeft {
     /// Every reason.
-    pub const ALL: [WalkLeft; 8] = [
+    pub const ALL: [WalkLeft; 9] = [
         WalkLeft::DelayLine,
         WalkLeft::CounterTdc,
         WalkLeft::JoinedSpads,
         WalkLeft::ShortLaserCycle,
         WalkLeft::NotOneEcho,
         WalkLeft::CutEcho,
+        WalkLeft::ToABin,
         WalkLeft::Ambiguous,
         WalkLeft::NotConverged,
     ];
@@ -95,6 +98,7 @@ impl WalkLeft {
             WalkLeft::ShortLaserCycle => "SPADs do not recover within a laser cycle",
             WalkLeft::NotOneEcho => "counts are not those of one echo",
             WalkLeft::CutEcho => "the window cuts the echo off",
+            WalkLeft::ToABin => "saturated, and known to a bin",
             WalkLeft::Ambiguous => "two lights give such counts",
             WalkLeft::NotConverged => "no light was found",
         }

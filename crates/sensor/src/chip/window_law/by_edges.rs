@@ -41,9 +41,10 @@ impl Edges {
         self.exposure.stop(1)
     }
 
-    /// Some more than a laser cycle's.
+    /// Some more than those of the exposure: a counter that nothing resets may count longer than a laser cycle.
     fn numbers(&self) -> std::ops::Range<i64> {
-        -4..i64::from(self.exposure.stop_periods) + 4
+        let all = self.exposure.stop_periods * self.exposure.laser_cycles;
+        -4..i64::from(all) + 4
     }
 
     fn strobe(&self, edge: i64) -> Time {
