@@ -1,8 +1,10 @@
 //! Arrays that come and go. What goes owns the vector that the library made: nothing is copied.
 
+use guided_dtof::system::{RETURNS, Return, Returns};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{Element, IntoPyArray, PyArray2, PyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::failure::Failure;
 
@@ -24,6 +26,29 @@ pub(crate) fn cube<T: Element>(
 ) -> Bound<'_, PyArray3<T>> {
     let array = Array3::from_shape_vec((rows, cols, depth), values);
     array.expect("as many of each macropixel").into_pyarray(py)
+}
+
+/// Sets the arrays of an array's returns: rows × columns × as many as are told, not a number where there are fewer.
+pub(crate) fn set_returns<'r, I: Iterator<Item = &'r Returns>>(
+    dict: &Bound<'_, PyDict>,
+    (rows, cols): (usize, usize),
+    of_pixels: impl Fn() -> I,
+) -> PyResult<()> {
+    for (name, number) in [
+        (
+            "returns",
+            (|r| Some(r.depth_m)) as fn(&Return) -> Option<f64>,
+        ),
+        ("returns_bound", |r| r.bound_m),
+        ("returns_photons", |r| Some(r.photons)),
+    ] {
+        let of_pixel = |returns: &Returns| -> [f64; RETURNS] {
+            std::array::from_fn(|n| returns.get(n).and_then(number).unwrap_or(f64::NAN))
+        };
+        let all = of_pixels().flat_map(of_pixel).collect();
+        dict.set_item(name, cube(dict.py(), (rows, cols, RETURNS), all))?;
+    }
+    Ok(())
 }
 
 /// The values of an array that must have this shape, row-major.

@@ -9,7 +9,7 @@ use numpy::PyReadonlyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{map, starts as start_values, values};
+use crate::arrays::{map, set_returns, starts as start_values, values};
 use crate::background::run;
 use crate::failure::Failure;
 use crate::scene::Scene;
@@ -69,6 +69,8 @@ pub(crate) fn range_counts<'py>(
     };
     dict.set_item("depth", metres(|r| r.measured_m))?;
     dict.set_item("bound", metres(|r| r.bound_m))?;
+    dict.set_item("spread", metres(|r| r.spread_m))?;
+    set_returns(&dict, shape, || readings.iter().map(|r| &r.returns))?;
     dict.set_item("peak", metres(|r| r.peak_m))?;
     dict.set_item("confidence", metres(|r| r.confidence))?;
     let reasons = readings

@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
 
-use crate::arrays::{cube, map, of_start, starts as start_values};
+use crate::arrays::{cube, map, of_start, set_returns, starts as start_values};
 use crate::background::run;
 use crate::failure::Failure;
 use crate::guide::Guide;
@@ -94,6 +94,8 @@ impl Common {
         dict.set_item("bin_edges_ns", cube(py, (rows, cols, bins + 1), edges_ns))?;
         dict.set_item("depth", metres(|p| p.measured_m))?;
         dict.set_item("bound", metres(|p| p.bound_m))?;
+        dict.set_item("spread", metres(|p| p.spread_m))?;
+        set_returns(&dict, shape, || pixels.iter().map(|p| &p.returns))?;
         dict.set_item("guide", metres(|p| p.guide_m))?;
         dict.set_item("truth", metres(|p| p.true_m))?;
         dict.set_item("peak", metres(|p| p.peak_m))?;

@@ -45,7 +45,10 @@ def depths_of(exported: Path) -> NDArray[np.float32]:
 
 def test_numpy_reads_a_frame(exported: Path) -> None:
     frame = np.load(exported / "export" / "frame.npz")
-    names = "bound_m confidence depth_m guide_m histograms in_window no_depth peak_m start truth_m"
+    names = (
+        "bound_m confidence depth_m guide_m histograms in_window no_depth peak_m"
+        " returns_bound_m returns_m returns_photons spread_m start truth_m"
+    )
     assert sorted(frame.files) == names.split()
     assert frame["histograms"].shape == (12, 20, 16)
     assert (frame["histograms"] == np.load(exported / "frame" / "histograms.npy")).all()

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use super::voice::{notes, tell};
 use crate::files::{ResultSet, read_counts};
 use crate::report::{CloudPoint, Npz, write_depth_png, write_npy_f32, write_pcd, write_ply};
-use crate::system::{NoDepth, PixelDepth, TakenFrame, above_background};
+use crate::system::{NoDepth, PixelDepth, RETURNS, Return, TakenFrame, above_background};
 
 /// Arguments of `gdtof export frame`.
 #[derive(Args)]
@@ -32,7 +32,7 @@ enum Format {
     Pcd,
     /// depth.npy: depths along the rays, rows x cols, m, float32; NaN where there is none.
     Npy,
-    /// frame.npz: everything: histograms, depths, guide, truth, peaks, confidence, start values, reasons.
+    /// frame.npz: everything: histograms, depths, their bounds and spreads, all returns, guide, truth, peaks, confidence, start values, reasons.
     Npz,
     /// depth16.png: depths as a 16-bit picture, in steps of 1/256 m; 0 where there is none (as in KITTI).
     Png16,
@@ -120,12 +120,32 @@ fn whole(pixels: &[PixelDepth], histograms: &[u16], [rows, cols, bins]: [usize; 
             (|m| m.measured_m) as fn(&PixelDepth) -> Option<f64>,
         ),
         ("bound_m", |m| m.bound_m),
+        ("spread_m", |m| m.spread_m),
         ("guide_m", |m| m.guide_m),
         ("truth_m", |m| m.true_m),
         ("peak_m", |m| m.peak_m),
         ("confidence", |m| m.confidence),
     ] {
         arrays.add(name, &shape, &of(pixels, number));
+    }
+    for (name, number) in [
+        (
+            "returns_m",
+            (|r| Some(r.depth_m)) as fn(&Return) -> Option<f64>,
+        ),
+        ("returns_bound_m", |r| r.bound_m),
+        ("returns_photons", |r| Some(r.photons)),
+    ] {
+        let of_pixel = |m: &PixelDepth| -> [f32; RETURNS] {
+            std::array::from_fn(|n| {
+                m.returns
+                    .get(n)
+                    .and_then(number)
+                    .map_or(f32::NAN, |x| x as f32)
+            })
+        };
+        let all: Vec<f32> = pixels.iter().flat_map(of_pixel).collect();
+        arrays.add(name, &[rows, cols, RETURNS], &all);
     }
     let start = |m: &PixelDepth| m.start.map_or(-1, i32::from);
     arrays.add(

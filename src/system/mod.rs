@@ -32,7 +32,7 @@ pub use error::FrameError;
 pub use frame::{take_frame, take_frame_by, take_guided_frame};
 pub use light::photon_stream;
 pub(crate) use pixel::above_background;
-pub use pixel::{NoDepth, PixelDepth, Return, Returns};
+pub use pixel::{NoDepth, PixelDepth, RETURNS, Return, Returns};
 pub use policy::{NoBins, Pointing, Unguided, Why, WindowPolicy};
 pub(crate) use ranger::{Known, Ranger};
 pub use ranger::{Reading, check_counts, range_counts};

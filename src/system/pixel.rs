@@ -74,10 +74,13 @@ pub struct Return {
     pub confidence: f64,
 }
 
+/// Returns of a macropixel that are told, at most.
+pub const RETURNS: usize = 4;
+
 /// Up to four returns, strongest first. In files they are a list.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Vec<Return>", into = "Vec<Return>")]
-pub struct Returns([Option<Return>; 4]);
+pub struct Returns([Option<Return>; RETURNS]);
 
 impl Returns {
     /// The returns, strongest first.

@@ -55,6 +55,14 @@ class FrameArrays:
     """Measured distance, m, where a peak is significant and not saturated."""
     bound: NDArray[np.float64]
     """Cramér-Rao bound of the depth, m: the least standard deviation that its counts allow; NaN where range walk is left in it."""
+    spread: NDArray[np.float64]
+    """Standard deviation of the depths within the macropixel, from the width of the echo, m; NaN where there is no bound."""
+    returns: NDArray[np.float64]
+    """Depths of up to four echoes of the window, m, strongest first, shape (rows, cols, 4); NaN where there are fewer."""
+    returns_bound: NDArray[np.float64]
+    """Their bounds, m; NaN where there is none."""
+    returns_photons: NDArray[np.float64]
+    """Photons of each that the SPADs would detect in a laser cycle without dead time."""
     guide: NDArray[np.float64]
     """The guide's estimate, m."""
     truth: NDArray[np.float64]

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 MAPS = {
     "depth": ("measured distance along the ray", "m"),
     "bound": ("Cramer-Rao bound of the measured distance", "m"),
+    "spread": ("standard deviation of the depths within the macropixel", "m"),
     "guide": ("the guide's estimate", "m"),
     "truth": ("true distance", "m"),
     "peak": ("distance of the histogram's peak with its range walk", "m"),

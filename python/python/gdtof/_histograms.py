@@ -50,6 +50,14 @@ class Ranged:
     """Distance, m, where a peak is significant and not saturated; NaN elsewhere."""
     bound: NDArray[np.float64]
     """Cramér-Rao bound of the depth, m: the least standard deviation that its counts allow; NaN where range walk is left in it."""
+    spread: NDArray[np.float64]
+    """Standard deviation of the depths within the macropixel, from the width of the echo, m; NaN where there is no bound."""
+    returns: NDArray[np.float64]
+    """Depths of up to four echoes of the window, m, strongest first, shape (rows, cols, 4); NaN where there are fewer."""
+    returns_bound: NDArray[np.float64]
+    """Their bounds, m; NaN where there is none."""
+    returns_photons: NDArray[np.float64]
+    """Photons of each that the SPADs would detect in a laser cycle without dead time."""
     peak: NDArray[np.float64]
     """Distance of the histogram's peak with its range walk, m, significant or not."""
     confidence: NDArray[np.float64]

@@ -11,7 +11,7 @@ use crate::files::{OutputFile, read_counts};
 use crate::ranging::DepthOptions;
 use crate::report::Table;
 use crate::request::{Spelling, check_false_alarm_rate, read_calibration};
-use crate::system::{PixelDepth, Ranged, Summary, TakenFrame, check_counts};
+use crate::system::{PixelDepth, RETURNS, Ranged, Summary, TakenFrame, check_counts};
 
 /// What is printed with `--json`.
 #[derive(Serialize)]
@@ -66,17 +66,31 @@ pub(super) fn run(args: &RangeArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Columns of the returns after the first.
+const FURTHER: [&str; 3 * (RETURNS - 1)] = [
+    "depth_2_m",
+    "bound_2_m",
+    "photons_2",
+    "depth_3_m",
+    "bound_3_m",
+    "photons_3",
+    "depth_4_m",
+    "bound_4_m",
+    "photons_4",
+];
+
 fn write_csv(path: &Path, cols: usize, ranged: &Ranged) -> anyhow::Result<()> {
     let shown = |value: Option<f64>| value.map_or(String::new(), |v| format!("{v:.6}"));
     OutputFile::write_with(path, |out| {
         writeln!(
             out,
-            "row,col,start,true_m,guide_m,depth_m,bound_m,confidence,no_depth"
+            "row,col,start,true_m,guide_m,depth_m,bound_m,spread_m,photons,confidence,no_depth,{}",
+            FURTHER.join(",")
         )?;
         for (at, pixel) in ranged.pixels.iter().enumerate() {
-            writeln!(
+            write!(
                 out,
-                "{},{},{},{},{},{},{},{},{}",
+                "{},{},{},{},{},{},{},{},{},{},{}",
                 at / cols,
                 at % cols,
                 pixel.start.map_or(String::new(), |s| s.to_string()),
@@ -84,9 +98,22 @@ fn write_csv(path: &Path, cols: usize, ranged: &Ranged) -> anyhow::Result<()> {
                 shown(pixel.guide_m),
                 shown(pixel.measured_m),
                 shown(pixel.bound_m),
+                shown(pixel.spread_m),
+                shown(pixel.returns.get(0).map(|first| first.photons)),
                 shown(pixel.confidence),
                 pixel.no_depth.map_or("", |why| why.name()),
             )?;
+            for n in 1..RETURNS {
+                let further = pixel.returns.get(n);
+                write!(
+                    out,
+                    ",{},{},{}",
+                    shown(further.map(|further| further.depth_m)),
+                    shown(further.and_then(|further| further.bound_m)),
+                    shown(further.map(|further| further.photons)),
+                )?;
+            }
+            writeln!(out)?;
         }
         Ok(())
     })?;
