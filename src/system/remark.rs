@@ -8,6 +8,9 @@ use crate::ranging::{EchoLight, Response};
 use crate::scene::Scene;
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time, TimeOfFlight};
 
+/// Share of laser cycles in which background alone may fill a bin before less of it is advised.
+const FULL_OF_BACKGROUND: f64 = 0.2;
+
 /// A frame's circumstances.
 pub(super) struct Circumstances<'a> {
     /// The chip.
@@ -161,32 +164,54 @@ impl Circumstances<'_> {
             };
         }
         let brightest = self.brightest(NoDepth::NoSignificantPeak);
-        let (signal, background) = brightest.map_or((0.0, 0.0), |light| {
-            (light.signal_per_cycle(), light.background_hz() * self.bin_s)
+        let (signal, background) = brightest.map_or((0.0, 0.0), |(signal, light)| {
+            (signal, light.background_hz() * self.bin_s)
         });
+        let counted = -libm::expm1(-background);
+        let advice = if counted > FULL_OF_BACKGROUND {
+            format!(
+                ". Background alone fills a bin in {:.0} % of them; give less of it (a narrower filter, fewer dark counts, shorter bins), or a threshold",
+                100.0 * counted
+            )
+        } else {
+            "; give more of them, or more light".to_owned()
+        };
         format!(
-            "the brightest of these echoes brings {signal:.2e} photons a laser cycle to a background of {background:.2e} a bin, for {cycles} laser cycles; give more of them, or more light"
+            "the brightest of these echoes brings {signal:.2e} photons a laser cycle into its window, to a background of {background:.2e} a bin, for {cycles} laser cycles{advice}"
         )
     }
 
-    /// The light of the brightest echo without a depth for this reason.
-    fn brightest(&self, reason: NoDepth) -> Option<&PixelLight> {
+    /// The light of the brightest echo without a depth for this reason, and its photons in a laser cycle: of what arrives in the window,
+    /// where there is one.
+    fn brightest(&self, reason: NoDepth) -> Option<(f64, &PixelLight)> {
+        let law = WindowLaw::new(self.sensor, self.exposure);
+        let in_window = |pixel: &PixelDepth, light: &PixelLight| {
+            let window = pixel.start.and_then(|start| law.window(start).open());
+            let seen = window.map(|window| law.interval(&window));
+            let echoes = light.segments().flat_map(|segment| segment.echoes());
+            let seen = echoes.filter(|echo| {
+                seen.as_ref()
+                    .is_none_or(|seen| seen.contains(&echo.arrival))
+            });
+            let photons: f64 = seen.map(|echo| echo.photons).sum();
+            photons / light.segments().count() as f64
+        };
         let with_reason = self.pixels.iter().zip(self.light);
         with_reason
             .filter(|(pixel, _)| pixel.no_depth == Some(reason) && pixel.true_m.is_some())
-            .map(|(_, light)| light)
-            .max_by(|a, b| a.signal_per_cycle().total_cmp(&b.signal_per_cycle()))
+            .map(|(pixel, light)| (in_window(pixel, light), light))
+            .max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
     /// The chance that the fullest bin of that echo counts in a laser cycle.
     fn greatest_chance(&self, reason: NoDepth) -> f64 {
-        let Some(light) = self.brightest(reason) else {
+        let Some((signal, light)) = self.brightest(reason) else {
             return 0.0;
         };
         let response = Response::new(self.sensor, self.bin_s, self.scene.pulse_resolution());
         let chances = response.chances(&EchoLight {
             position_bins: (self.sensor.bins / 2) as f64,
-            signal: light.signal_per_cycle(),
+            signal,
             background_per_bin: light.background_hz() * self.bin_s,
             sigma_bins: response.pulse_sigma_bins,
         });
@@ -258,6 +283,26 @@ mod tests {
                 "{sensor}"
             );
         }
+    }
+
+    /// An echo before the window is no light in it, and more light is no help where bins are full of the sun's.
+    #[test]
+    fn what_helps_a_lost_peak_is_advised() {
+        let dim = frame("", |scene| {
+            scene.lidar.pulse_energy_uj = 1e-3;
+            scene.light.illuminance_klux = 0.0;
+        });
+        let remark = dim.remark.unwrap();
+        assert!(remark.contains("or more light"), "{remark}");
+        let bright = frame("", |scene| {
+            scene.lidar.pulse_energy_uj = 0.1;
+            scene.light.illuminance_klux = 100.0;
+        });
+        let remark = bright.remark.unwrap();
+        assert!(
+            remark.contains("a narrower filter") && !remark.contains("more light"),
+            "{remark}"
+        );
     }
 
     #[test]

@@ -21,7 +21,7 @@ use femtogate::InputError;
 const MEBIBYTE: usize = 1 << 20;
 
 /// What a byte order mark is in UTF-8.
-const MARK: &[u8] = "\u{feff}".as_bytes();
+pub(crate) const MARK: &[u8] = "\u{feff}".as_bytes();
 
 /// An opened file, and whether its end is known.
 fn open(path: &Path) -> Result<(File, bool), InputError> {

@@ -32,6 +32,7 @@ pub use guarded::{
     begins_with, guard_inputs, open_input, refuse_input, said_of_kept_files, set_aside_foreign,
 };
 pub use input::Lines;
+pub(crate) use input::MARK;
 pub use input::{LineEnds, parse_json, parse_toml, placed, read_text, read_text_within, too_long};
 pub use interruption::clean_up_when_interrupted;
 pub use journal::{Journal, JournalReader, is_journal, journal_line};

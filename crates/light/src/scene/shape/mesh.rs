@@ -19,7 +19,7 @@ use obvhs::aabb::Aabb;
 use self::tree::{Bounds, Tree};
 use super::meeting::{Meeting, NEAREST_M};
 use super::solid;
-use crate::files::{InputError, open_input};
+use crate::files::{InputError, MARK, open_input};
 use crate::scene::vector::Ray;
 
 mod tree;
@@ -103,10 +103,10 @@ impl<R: BufRead> BufRead for Counted<R> {
 }
 
 impl Mesh {
-    /// Reads an OBJ file. Faces with more corners are cut into triangles; materials, lines and points are passed over.
+    /// Reads an OBJ file. Convex faces with more corners are cut into triangles; materials, lines and points are passed over.
     ///
     /// # Errors
-    /// When it cannot be read, is broken, has no triangles or more than four million, or a corner that is no number.
+    /// When it cannot be read, is broken, has no triangles or more than four million, a concave face, or a corner that is no number.
     pub fn read(path: &Path) -> Result<Self, InputError> {
         let complain = |message: String| InputError::new(path.display(), message);
         let unreadable = |e: std::io::Error| {
@@ -130,8 +130,11 @@ impl Mesh {
             inner: BufReader::new(open_input(path).map_err(unreadable)?),
             lines: 0,
         };
+        if reader.fill_buf().map_err(unreadable)?.starts_with(MARK) {
+            reader.consume(MARK.len());
+        }
         let options = tobj::LoadOptions {
-            triangulate: true,
+            triangulate: false,
             ignore_points: true,
             ignore_lines: true,
             ..tobj::LoadOptions::default()
@@ -143,7 +146,12 @@ impl Mesh {
             let message = format!("is a broken OBJ here ({e}); save it again, with its triangles");
             InputError::at(path.display(), lines.max(1), message)
         })?;
-        let listed = Listed::of_models(models);
+        let listed = Listed::of_models(models).map_err(|ConcaveFace(at)| {
+            let message = format!(
+                "has a concave face with a corner at {at:?}, which triangles from its first corner would fill; cut its faces into triangles"
+            );
+            complain(message)
+        })?;
         if listed.triangles.is_empty() {
             let message = "has no triangles; give an OBJ file with faces";
             return Err(complain(message.into()));
@@ -299,31 +307,72 @@ impl Mesh {
     }
 }
 
+/// A face that triangles from its first corner do not cover, by a corner of it as the file has it.
+#[derive(Debug)]
+struct ConcaveFace([f32; 3]);
+
 impl Listed {
-    fn of_models(models: Vec<tobj::Model>) -> Self {
+    fn of_models(models: Vec<tobj::Model>) -> Result<Self, ConcaveFace> {
         let mut all = Listed::default();
         let is_textured = (models.iter())
             .all(|model| model.mesh.texcoord_indices.len() == model.mesh.indices.len());
         for tobj::Model { mesh: read, .. } in models {
             let first = all.corners.len() as u32;
-            let corners = read.positions.as_chunks::<3>().0.iter();
-            all.corners.extend(corners.map(|[x, y, z]| [*x, -y, -z]));
-            let triangles = read.indices.as_chunks::<3>().0.iter();
-            all.triangles
-                .extend(triangles.map(|t| t.map(|corner| corner + first)));
-            if is_textured {
-                let place = |index: &u32| {
-                    let at = 2 * *index as usize;
-                    // OBJ counts v upwards.
-                    [read.texcoords[at], 1.0 - read.texcoords[at + 1]]
-                };
-                let places = read.texcoord_indices.as_chunks::<3>().0.iter();
-                all.on_texture
-                    .extend(places.map(|[a, b, c]| [place(a), place(b), place(c)]));
+            let corners = read.positions.as_chunks::<3>().0;
+            all.corners
+                .extend(corners.iter().map(|[x, y, z]| [*x, -y, -z]));
+            let place = |index: u32| {
+                let at = 2 * index as usize;
+                // OBJ counts v upwards.
+                [read.texcoords[at], 1.0 - read.texcoords[at + 1]]
+            };
+            // Without a list of them all faces are triangles.
+            let triangles = read.indices.len() / 3;
+            let listed = read.face_arities.iter().map(|&n| n as usize);
+            let triangular = std::iter::repeat_n(3, triangles);
+            let is_listed = !read.face_arities.is_empty();
+            let mut begins = 0;
+            for corners_of_face in listed.chain(triangular.filter(|_| !is_listed)) {
+                let face = begins..begins + corners_of_face;
+                begins = face.end;
+                let indices = &read.indices[face.clone()];
+                let at = |index: u32| corners[index as usize];
+                if is_concave(indices.iter().map(|&index| at(index))) {
+                    return Err(ConcaveFace(at(indices[0])));
+                }
+                for third in 2..corners_of_face {
+                    let triangle = [0, third - 1, third];
+                    all.triangles.push(triangle.map(|n| indices[n] + first));
+                    if is_textured {
+                        let on_texture = &read.texcoord_indices[face.clone()];
+                        all.on_texture.push(triangle.map(|n| place(on_texture[n])));
+                    }
+                }
             }
         }
-        all
+        Ok(all)
     }
+}
+
+/// Whether a polygon turns the other way at some corner. Its normal is Newell's.
+fn is_concave(corners: impl ExactSizeIterator<Item = [f32; 3]>) -> bool {
+    if corners.len() < 4 {
+        return false;
+    }
+    let corners: Vec<DVec3> = corners
+        .map(|corner| DVec3::from_array(corner.map(f64::from)))
+        .collect();
+    let from_first = |n: usize| corners[n % corners.len()] - corners[0];
+    let normal: DVec3 = (1..corners.len())
+        .map(|n| from_first(n).cross(from_first(n + 1)))
+        .sum();
+    let turn = |n: usize| {
+        let [a, b, c] = [n, n + 1, n + 2].map(from_first);
+        (b - a).cross(c - b).dot(normal)
+    };
+    // Corners are rounded to single precision.
+    let room = 1e-5 * normal.length_squared();
+    (0..corners.len()).any(|n| turn(n) < -room)
 }
 
 #[cfg(test)]

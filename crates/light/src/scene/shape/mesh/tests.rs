@@ -50,6 +50,41 @@ fn ball(rings: usize, radius: f64) -> String {
     obj_of(&corners, faces)
 }
 
+/// A ray through the notch of a U would meet triangles from the first corner of its face.
+#[test]
+fn concave_faces_are_refused_and_convex_ones_cut() {
+    let u = [
+        [0, 0],
+        [3, 0],
+        [3, 3],
+        [2, 3],
+        [2, 1],
+        [1, 1],
+        [1, 3],
+        [0, 3],
+    ];
+    let hexagon = [[1, 0], [2, 0], [3, 1], [2, 2], [1, 2], [0, 1]];
+    let of = |outline: &[[i32; 2]]| {
+        let corners: Vec<[f64; 3]> = outline
+            .iter()
+            .map(|&[x, y]| [f64::from(x), f64::from(y), -5.0])
+            .collect();
+        obj_of(&corners, [(0..corners.len()).collect()])
+    };
+    let error = read(&of(&u)).unwrap_err().to_string();
+    assert!(error.contains("concave face"), "{error}");
+    assert_eq!(read(&of(&hexagon)).unwrap().triangles(), 4);
+    let mut backwards = hexagon;
+    backwards.reverse();
+    assert_eq!(read(&of(&backwards)).unwrap().triangles(), 4);
+}
+
+#[test]
+fn a_byte_order_mark_hides_no_line() {
+    let text = "v 0 0 -5\nv 1 0 -5\nv 0 1 -5\nf 1 2 3\n";
+    assert_eq!(read(&format!("\u{feff}{text}")).unwrap().triangles(), 1);
+}
+
 #[test]
 fn a_cube_of_quadrangles_is_a_box() {
     let signs = [-1.0, 1.0];
