@@ -42,10 +42,7 @@ pub(crate) fn set_returns<'r, I: Iterator<Item = &'r Returns>>(
         ("returns_bound", |r| r.bound_m),
         ("returns_photons", |r| Some(r.photons)),
     ] {
-        let of_pixel = |returns: &Returns| -> [f64; RETURNS] {
-            std::array::from_fn(|n| returns.get(n).and_then(number).unwrap_or(f64::NAN))
-        };
-        let all = of_pixels().flat_map(of_pixel).collect();
+        let all = of_pixels().flat_map(|of| of.numbers(number)).collect();
         dict.set_item(name, cube(dict.py(), (rows, cols, RETURNS), all))?;
     }
     Ok(())

@@ -136,15 +136,8 @@ fn whole(pixels: &[PixelDepth], histograms: &[u16], [rows, cols, bins]: [usize; 
         ("returns_bound_m", |r| r.bound_m),
         ("returns_photons", |r| Some(r.photons)),
     ] {
-        let of_pixel = |m: &PixelDepth| -> [f32; RETURNS] {
-            std::array::from_fn(|n| {
-                m.returns
-                    .get(n)
-                    .and_then(number)
-                    .map_or(f32::NAN, |x| x as f32)
-            })
-        };
-        let all: Vec<f32> = pixels.iter().flat_map(of_pixel).collect();
+        let numbers = pixels.iter().flat_map(|m| m.returns.numbers(number));
+        let all: Vec<f32> = numbers.map(|x| x as f32).collect();
         arrays.add(name, &[rows, cols, RETURNS], &all);
     }
     let start = |m: &PixelDepth| m.start.map_or(-1, i32::from);

@@ -64,7 +64,7 @@ impl NoDepth {
 pub struct Return {
     /// From the counts, with range walk taken out where there is a bound.
     pub depth_m: f64,
-    /// Cramér-Rao bound of that depth.
+    /// As [`PixelDepth::bound_m`].
     pub bound_m: Option<f64>,
     /// Standard deviation of the depths that the macropixel sees there: of what widens the laser's pulse to this echo.
     pub spread_m: Option<f64>,
@@ -86,6 +86,12 @@ impl Returns {
     /// The returns, strongest first.
     pub fn iter(&self) -> impl Iterator<Item = &Return> {
         self.0.iter().flatten()
+    }
+
+    /// A number of each; not a number where there are fewer, or it has none.
+    pub fn numbers(&self, number: impl Fn(&Return) -> Option<f64>) -> [f64; RETURNS] {
+        self.0
+            .map(|of| of.and_then(|of| number(&of)).unwrap_or(f64::NAN))
     }
 
     /// The `n`-th of them, from 0 on.
@@ -131,7 +137,8 @@ pub struct PixelDepth {
     pub in_window: bool,
     /// Depth from the histogram, where its peak is significant and not saturated.
     pub measured_m: Option<f64>,
-    /// Cramér-Rao bound of that depth: the least standard deviation that its counts allow. `None` where range walk is not taken out.
+    /// Standard deviation of that depth: the least that its counts allow (Cramér-Rao), with what its spread and other lights add; a bin where
+    /// the echo is saturated. `None` where range walk is not taken out, or the window cuts the echo off.
     #[serde(default)]
     pub bound_m: Option<f64>,
     /// Standard deviation of the depths within the macropixel, from the width of its echo; `None` where there is no bound.

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 MAPS = {
     "depth": ("measured distance along the ray", "m"),
-    "bound": ("Cramer-Rao bound of the measured distance", "m"),
+    "bound": ("standard deviation of the measured distance by its counts", "m"),
     "spread": ("standard deviation of the depths within the macropixel", "m"),
     "guide": ("the guide's estimate", "m"),
     "truth": ("true distance", "m"),

@@ -49,7 +49,8 @@ class Ranged:
     depth: NDArray[np.float64]
     """Distance, m, where a peak is significant and not saturated; NaN elsewhere."""
     bound: NDArray[np.float64]
-    """Cramér-Rao bound of the depth, m: the least standard deviation that its counts allow; NaN where range walk is left in it."""
+    """Standard deviation of the depth, m: the least that its counts allow (Cramér-Rao), with what the spread adds; a bin where the echo is
+    saturated. NaN where range walk is left in the depth or the window cuts its echo off."""
     spread: NDArray[np.float64]
     """Standard deviation of the depths within the macropixel, from the width of the echo, m; NaN where there is no bound."""
     returns: NDArray[np.float64]

@@ -52,7 +52,8 @@ pub struct Sighting {
     pub position_bins: f64,
     /// The light that explains the peak, if range walk is taken out.
     pub light: Option<EchoLight>,
-    /// Cramér-Rao bound of the position under this light, bins.
+    /// Standard deviation of the position, bins: its Cramér-Rao bound under this light, or the distance to other lights that explain the
+    /// counts as well, and a fifth of the echo's spread; a bin where the counts tell no more ([`WalkLeft::ToABin`]).
     pub bound_bins: Option<f64>,
     /// Why range walk is not taken out of a significant peak, where that was asked for.
     pub walk_left: Option<WalkLeft>,
@@ -155,10 +156,10 @@ impl EchoFinder {
     /// The echo in `counts`, one entry per bin, earliest first; `None` if no bin stands out at all.
     pub fn find(&self, counts: &[u32]) -> Option<Sighting> {
         let Some(cycles) = self.uncounted_of else {
-            return self.judge(counts, self.scan.fullest(counts), &|_| 1.0);
+            return self.sighting(counts, self.scan.fullest(counts), &|_| 1.0);
         };
         let uncounted: Vec<u32> = counts.iter().map(|&n| cycles.saturating_sub(n)).collect();
-        let sighting = self.judge(&uncounted, self.scan.fullest(&uncounted), &|_| 1.0)?;
+        let sighting = self.sighting(&uncounted, self.scan.fullest(&uncounted), &|_| 1.0)?;
         // A full bin may have counted more often than it says.
         let is_full = counts.iter().any(|&n| Some(n) == self.full);
         Some(Sighting {
@@ -169,12 +170,13 @@ impl EchoFinder {
 
     /// The same where bins differ in length: `shares` are their lengths over the mean length.
     pub fn find_in(&self, counts: &[u32], shares: &[f64]) -> Option<Sighting> {
-        self.judge(counts, self.scan.least_likely(counts, shares), &|bin| {
+        self.sighting(counts, self.scan.least_likely(counts, shares), &|bin| {
             shares[bin]
         })
     }
 
-    fn judge(
+    /// What `counts` say whose fullest stretch is `stretch`; `share` is that of each bin in light that comes at any time alike.
+    fn sighting(
         &self,
         counts: &[u32],
         stretch: Stretch,

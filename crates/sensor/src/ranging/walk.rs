@@ -37,9 +37,10 @@ const DARKER: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
 /// Deviance that a width of its own must save (Akaike).
 const OF_A_WIDTH: f64 = 2.0;
 
-/// Standard deviation with which a deep echo is sought, bins, and the bound below which an echo that is not as its counts say explains
-/// none: no other width is sought then.
+/// Standard deviation with which a deep echo is sought, bins: chosen.
 const DEEP_BINS: f64 = 2.5;
+
+/// A bound, bins, up to which no deep echo is sought: photons of such an echo are many, and a wrong width explains no counts.
 const WELL_KNOWN: f64 = 0.05;
 
 /// Deviance by which another light may be less likely and still be within a standard deviation.
@@ -130,10 +131,7 @@ impl WalkCorrection {
     /// # Errors
     /// Why that is not known.
     pub(crate) fn correct(&self, counts: &[f64], peak: &Peak) -> Result<Corrected, WalkLeft> {
-        let cycles = counts
-            .iter()
-            .copied()
-            .fold(f64::from(self.laser_cycles), f64::max);
+        let cycles = self.cycles(counts);
         let [background, most_background] = self.background(counts, cycles);
         let likelihood = |free: Free| Likelihood {
             response: &self.response,
@@ -189,49 +187,57 @@ impl WalkCorrection {
         if self.response.counting.threshold > 0 {
             return Ok(best);
         }
-        let mut fits = vec![best, wide.maximise(&best.light)];
+        let mut fits = vec![wide.maximise(&best.light)];
         if best.bound_bins > WELL_KNOWN {
-            fits.push(wide.maximise(&self.deep_start(wide)));
+            let deep = self.deep_start(wide, &best.light);
+            fits.extend(deep.map(|deep| wide.maximise(&deep)));
         }
         fits.sort_by(|a, b| a.deviance.total_cmp(&b.deviance));
-        if fits[0].light.sigma_bins >= self.widest() {
+        // A width that hardly explains more would only pull the place after it.
+        let is_worth_it = |fit: &&Fit| fit.deviance + OF_A_WIDTH < best.deviance;
+        let widest = self.widest();
+        if fits
+            .iter()
+            .find(is_worth_it)
+            .is_some_and(|fit| fit.light.sigma_bins >= widest)
+        {
             return Err(WalkLeft::NotOneEcho);
         }
-        let first = *fits.iter().find(|fit| fit.has_converged).unwrap_or(&best);
-        // A width that hardly explains more would only pull the place after it.
-        let is_worth_it = first.deviance + OF_A_WIDTH < best.deviance;
-        let first = if is_worth_it { first } else { best };
+        let is_better = |fit: &&Fit| is_worth_it(fit) && fit.has_converged;
+        let first = fits.iter().find(is_better).copied().unwrap_or(best);
         // Other lights are as many standard deviations away as the root of what their deviance is more.
         let place = |fit: &Fit| {
             let off = (fit.light.position_bins - first.light.position_bins).abs();
             off / (fit.deviance - first.deviance).abs().max(1.0).sqrt()
         };
-        let bound_bins = fits.iter().map(place).fold(first.bound_bins, f64::max);
+        let others = fits.iter().chain([&best]);
+        let bound_bins = others.map(place).fold(first.bound_bins, f64::max);
         Ok(Fit {
             bound_bins,
             ..first
         })
     }
 
-    /// The most likely of some deep echoes. The fit of a narrow one takes what is left of a deep one for background.
-    fn deep_start(&self, likelihood: &Likelihood<'_>) -> EchoLight {
-        let [background_per_bin, _] = self.background(likelihood.counts, likelihood.cycles);
-        let light = |bin: usize| {
-            let chance = likelihood.counts[bin] / likelihood.cycles;
-            (self.light(chance) - background_per_bin).max(0.0)
+    /// The most likely of some deep echoes, `None` where no bin has light beyond the background. The fit `narrow` of a narrow echo takes what
+    /// is left of a deep one for background, if that is free.
+    fn deep_start(&self, likelihood: &Likelihood<'_>, narrow: &EchoLight) -> Option<EchoLight> {
+        let (counts, cycles) = (likelihood.counts, likelihood.cycles);
+        let [_, _, background_is_free, _] = likelihood.free;
+        let background_per_bin = if background_is_free {
+            self.background(counts, cycles)[0]
+        } else {
+            narrow.background_per_bin
         };
         let bins = likelihood.bins.clone();
-        let signal: f64 = bins.clone().map(light).sum();
-        let of_bin = |bin: usize| EchoLight {
+        let all = self.echo_in(bins.clone(), counts, cycles, background_per_bin)?;
+        let lights = bins.step_by(2).map(|bin| EchoLight {
             position_bins: bin as f64,
-            signal: signal.max(1e-3),
-            background_per_bin,
             sigma_bins: self.response.pulse_sigma_bins.max(DEEP_BINS),
-        };
-        let lights = bins.step_by(2).map(of_bin);
+            ..all
+        });
         let judged = lights.map(|light| (likelihood.deviance(&light), light));
         let best = judged.min_by(|a, b| a.0.total_cmp(&b.0));
-        best.expect("a window has bins").1
+        best.map(|(_, light)| light)
     }
 
     /// The light of one echo of several, from its own `bins`. Elsewhere there is light of `background_per_bin`.
@@ -248,23 +254,10 @@ impl WalkCorrection {
         if self.response.counting.event_type != EventType::Greater {
             return Err(WalkLeft::NotOneEcho);
         }
-        let cycles = counts
-            .iter()
-            .copied()
-            .fold(f64::from(self.laser_cycles), f64::max);
-        let (signal, moment) = bins.clone().fold((0.0, 0.0), |(signal, moment), bin| {
-            let of_bin = (self.light(counts[bin] / cycles) - background_per_bin).max(0.0);
-            (signal + of_bin, moment + of_bin * bin as f64)
-        });
-        if signal <= 0.0 {
-            return Err(WalkLeft::NotOneEcho);
-        }
-        let start = EchoLight {
-            position_bins: moment / signal,
-            signal,
-            background_per_bin: background_per_bin.max(1e-3 / cycles),
-            sigma_bins: self.response.pulse_sigma_bins,
-        };
+        let cycles = self.cycles(counts);
+        let background_per_bin = background_per_bin.max(1e-3 / cycles);
+        let start = self.echo_in(bins.clone(), counts, cycles, background_per_bin);
+        let start = start.ok_or(WalkLeft::NotOneEcho)?;
         let likelihood = |free| Likelihood {
             response: &self.response,
             counts,
@@ -283,7 +276,33 @@ impl WalkCorrection {
         }
     }
 
-    /// The background that makes so many counts a bin, photons.
+    /// Laser cycles, and no fewer than a bin has counts.
+    fn cycles(&self, counts: &[f64]) -> f64 {
+        let most = counts.iter().copied();
+        most.fold(f64::from(self.laser_cycles), f64::max)
+    }
+
+    /// The echo of the light that each of some bins had beyond the background, if it was alone; `None` where that is none.
+    fn echo_in(
+        &self,
+        bins: Range<usize>,
+        counts: &[f64],
+        cycles: f64,
+        background_per_bin: f64,
+    ) -> Option<EchoLight> {
+        let (signal, moment) = bins.fold((0.0, 0.0), |(signal, moment), bin| {
+            let of_bin = (self.light(counts[bin] / cycles) - background_per_bin).max(0.0);
+            (signal + of_bin, moment + of_bin * bin as f64)
+        });
+        (signal > 0.0).then(|| EchoLight {
+            position_bins: moment / signal,
+            signal,
+            background_per_bin,
+            sigma_bins: self.response.pulse_sigma_bins,
+        })
+    }
+
+    /// The background of bins with this mean count, photons a bin.
     pub(crate) fn background_of(&self, counts_per_bin: f64) -> f64 {
         self.light((counts_per_bin / f64::from(self.laser_cycles)).max(0.0))
     }
@@ -300,23 +319,12 @@ impl WalkCorrection {
             return None;
         }
         let half = (2.0 * self.response.pulse_sigma_bins).ceil().max(1.0) as usize;
-        let (mut signal, mut moment) = (0.0, 0.0);
-        for (bin, &counts) in counts.iter().enumerate() {
-            if counts > 0.98 * cycles {
-                return None;
-            }
-            if bin.abs_diff(peak.peak_bin) <= half {
-                let of_bin = (self.light(counts / cycles) - background_per_bin).max(0.0);
-                signal += of_bin;
-                moment += of_bin * bin as f64;
-            }
+        if counts.iter().any(|&counts| counts > 0.98 * cycles) {
+            return None;
         }
-        (signal > 0.0).then(|| EchoLight {
-            position_bins: moment / signal,
-            signal,
-            background_per_bin,
-            sigma_bins: self.response.pulse_sigma_bins,
-        })
+        let end = (peak.peak_bin + half + 1).min(counts.len());
+        let bins = peak.peak_bin.saturating_sub(half)..end;
+        self.echo_in(bins, counts, cycles, background_per_bin)
     }
 
     /// The best of fits from many starts: for each of many signals the best place.

@@ -3,6 +3,7 @@
 use super::*;
 use crate::chip::{EventType, Exposure, FrontEnd, SensorConfig, hslidar_delay_line};
 use crate::ranging::{EchoLight, Response};
+use rand::{RngExt, SeedableRng, rngs::StdRng};
 
 const PULSE_SIGMA: Time = Time::from_ps(1_911);
 
@@ -58,6 +59,11 @@ fn echoes_that_are_no_pulse_are_wide_or_told() {
         (found.position_bins - 6.3).abs() < 0.03 && found.bound_bins.is_some(),
         "{found:?}"
     );
+    // It is a return of its own.
+    let other = found.others[0].expect("another echo");
+    assert!((other.position_bins - 12.5).abs() < 0.05, "{other:?}");
+    assert!((other.photons / 0.5 - 1.0).abs() < 0.1, "{other:?}");
+    assert!(other.bound_bins.unwrap() < 0.2 && found.others[1..] == [None; 2]);
     // A road deeper than the window is no echo.
     let mut deep = [20u32; 16];
     deep[3..10].fill(400);
@@ -223,4 +229,30 @@ fn an_echo_within_a_bin_is_known_to_that_bin() {
     // Within the bin it may be anywhere.
     let off = (found.position_bins - 4.0).abs();
     assert!(off <= 0.5 && found.bound_bins == Some(1.0), "{found:?}");
+}
+
+/// Of 1000 macropixels that see one echo, dim or bright, few have a return that is not there: the false-alarm rate is one of them.
+#[test]
+fn one_echo_is_one_return() {
+    let config = SensorConfig::default();
+    let finder = finder(&config, 520);
+    let response = Response::new(&config, finder.bin_s, PULSE_SIGMA);
+    let mut random = StdRng::seed_from_u64(1);
+    for (signal, background_per_bin) in [(0.3, 0.02), (3.0, 0.02), (3.0, 0.3), (30.0, 0.1)] {
+        let mut wrong = 0;
+        for _ in 0..1000 {
+            let chances = response.chances(&EchoLight {
+                position_bins: random.random_range(3.0..12.0),
+                signal,
+                background_per_bin,
+                sigma_bins: response.pulse_sigma_bins,
+            });
+            let mut count =
+                |chance: &f64| (0..1000).filter(|_| random.random_bool(*chance)).count() as u32;
+            let counts: Vec<u32> = chances.iter().map(&mut count).collect();
+            let found = finder.find(&counts).unwrap();
+            wrong += usize::from(found.others[0].is_some());
+        }
+        assert!(wrong <= 5, "{signal} {background_per_bin}: {wrong}");
+    }
 }
