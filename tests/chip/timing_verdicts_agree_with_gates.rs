@@ -2,8 +2,10 @@
 //! verdict of static timing, window law and the timing checks of the gates.
 
 use guided_dtof::analysis::{TimingVerdict, corner_limits, factor_range, gate_works};
+use guided_dtof::chip::race::Conflict;
 use guided_dtof::chip::{
-    Exposure, Limits, Mode, PCounter, SensorConfig, Silicon, Window, WindowLaw, hslidar_delay_line,
+    AfterBorrow, Exposure, Limits, Mode, PCounter, SensorConfig, Silicon, Window, WindowLaw,
+    hslidar_delay_line,
 };
 use guided_dtof::engine::GateSimulation;
 use guided_dtof::kernel::{CheckReport, Policy};
@@ -236,5 +238,42 @@ fn delay_lines_keep_their_limits_in_either_mode() {
             assert_eq!(found.violated(), 0, "{mode:?}, {mhz} MHz: {found}");
             assert!(verdict.is_met(), "{mode:?}, {mhz} MHz: {verdict}");
         }
+    }
+}
+
+/// What the window law refuses whatever CLK does, the verdict names.
+#[test]
+fn a_verdict_fails_where_a_load_pulse_or_the_strobe_of_stop_does() {
+    let names = |config: &SensorConfig, check: &str| {
+        let verdict = TimingVerdict::of(config, &TYPICAL, (0, 0));
+        let margins = verdict.margins.iter();
+        let slack = margins
+            .filter(|margin| margin.check.contains(check))
+            .map(|margin| margin.slack < Time::ZERO);
+        slack.collect::<Vec<bool>>()
+    };
+    let refused = |config: &SensorConfig, what: Conflict| {
+        let law = WindowLaw::new(config, &Exposure::new(config, 512, 1));
+        matches!(law.window(40), Window::Race(race) if race.what == what)
+    };
+    for (load_mhz, fails) in [(200.0, false), (1500.0, true)] {
+        let config = SensorConfig {
+            p_counter: PCounter::Memoryless,
+            after_borrow: AfterBorrow::Wrap,
+            load_clk_hz: load_mhz * 1e6,
+            ..at_mhz(100.0)
+        };
+        assert_eq!(names(&config, "load pulse"), [fails], "{load_mhz} MHz");
+        assert_eq!(refused(&config, Conflict::InitAtLoadPulse), fails);
+    }
+    assert!(names(&at_mhz(100.0), "load pulse").is_empty());
+    for reset_stages in [1, 6] {
+        let config = SensorConfig {
+            mode: Mode::Conventional,
+            reset_stages,
+            ..at_mhz(100.0)
+        };
+        let fails = refused(&config, Conflict::StrobeAtReset);
+        assert_eq!(names(&config, "STOP's strobe"), [fails], "{reset_stages}");
     }
 }

@@ -59,6 +59,10 @@ pub struct MacropixelTiming {
     recovery: Time,
     removal: Time,
     reset_need: Time,
+    /// By how much HIT is ready before STOP's strobe, at the least: in the conventional mode.
+    pub strobe_lead: Option<Time>,
+    /// What half a LOAD_CLK period leaves of the pulse that loads start values, where there is no memory.
+    pub load_pulse_slack: Option<Time>,
 }
 
 /// Which CLK edges a start value is counted and caught by.
@@ -103,6 +107,8 @@ impl MacropixelTiming {
         let paths = circuit.paths(&timing);
         let delays = MacropixelDelays::of(&paths);
         let counter = CounterDelays::of(&paths, &delays);
+        let reset = ResetPulse::among(&circuit, (&delays, &counter), (&library, corner));
+        let half_load_period = Time::from_fs(config.load_clock().period().as_fs() / 2);
         let (netlist, probes) = (&circuit.netlist, &circuit.probes);
         let clk = Edge::BOTH.map(|edge| paths.after_clk(edge));
         let clk = Requirements::behind(netlist, clk, &library, corner);
@@ -144,7 +150,9 @@ impl MacropixelTiming {
             clk: clk_rest,
             recovery: limit(CheckKind::Recovery),
             removal: limit(CheckKind::Removal),
-            reset_need: ResetPulse::among(&circuit, (&delays, &counter), (&library, corner)).need,
+            reset_need: reset.need,
+            strobe_lead: (config.mode == Mode::Conventional).then_some(reset.strobe_lead),
+            load_pulse_slack: counter.load_pulse.map(|pulse| half_load_period - pulse),
             probes: circuit.probes,
             netlist: circuit.netlist,
         }

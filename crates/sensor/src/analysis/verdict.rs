@@ -276,6 +276,18 @@ fn pixel_margins(pixel: &MacropixelTiming, period: Time, phase: Time, aim: Aim) 
         slack: pixel.reset_width() - pixel.reset_need(),
         fault: None,
     });
+    margins.extend(pixel.strobe_lead.map(|slack| Margin {
+        check: "STOP's strobe, recovery of HIT".to_owned(),
+        path: format!("STOP rise to {}", pixel.probes.path(Probe::Strobe)),
+        slack,
+        fault: None,
+    }));
+    margins.extend(pixel.load_pulse_slack.map(|slack| Margin {
+        check: "load pulse, before COUNTER_INIT changes".to_owned(),
+        path: "LOAD_CLK fall to the P-counter's flip-flops".to_owned(),
+        slack,
+        fault: None,
+    }));
     margins
 }
 

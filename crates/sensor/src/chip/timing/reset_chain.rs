@@ -22,7 +22,7 @@ use crate::chip::p_counter_timing::SHORTEST_CHAIN;
 use crate::netlist::Corner;
 use crate::units::Time;
 
-/// What the window law adds to limits.
+/// The least lead of the strobe that the window law takes: more than its rounding of 2 fs.
 const ROUNDING: Time = Time::from_fs(3);
 
 /// Longest chain that is tried: one that is too short still is reported as such.
