@@ -8,7 +8,7 @@ use crate::ranging::{EchoLight, Response};
 use crate::scene::Scene;
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time, TimeOfFlight};
 
-/// Share of laser cycles in which background alone may fill a bin before less of it is advised.
+/// Share of laser cycles in which background alone counts in a bin, from which on less of it is advised instead of more light: chosen.
 const FULL_OF_BACKGROUND: f64 = 0.2;
 
 /// A frame's circumstances.
@@ -170,7 +170,7 @@ impl Circumstances<'_> {
         let counted = -libm::expm1(-background);
         let advice = if counted > FULL_OF_BACKGROUND {
             format!(
-                ". Background alone fills a bin in {:.0} % of them; give less of it (a narrower filter, fewer dark counts, shorter bins), or a threshold",
+                ". Background alone counts in a bin in {:.0} % of them; give less of it (a narrower filter, fewer dark counts, shorter bins), or a threshold",
                 100.0 * counted
             )
         } else {
@@ -188,13 +188,12 @@ impl Circumstances<'_> {
         let in_window = |pixel: &PixelDepth, light: &PixelLight| {
             let window = pixel.start.and_then(|start| law.window(start).open());
             let seen = window.map(|window| law.interval(&window));
-            let echoes = light.segments().flat_map(|segment| segment.echoes());
-            let seen = echoes.filter(|echo| {
-                seen.as_ref()
-                    .is_none_or(|seen| seen.contains(&echo.arrival))
+            let is_seen = |time: Time| seen.as_ref().is_none_or(|seen| seen.contains(&time));
+            let of_segments = light.segments().map(|segment| {
+                let echoes = segment.echoes().filter(|echo| is_seen(echo.arrival));
+                echoes.map(|echo| echo.photons).sum()
             });
-            let photons: f64 = seen.map(|echo| echo.photons).sum();
-            photons / light.segments().count() as f64
+            of_segments.fold(0.0, f64::max)
         };
         let with_reason = self.pixels.iter().zip(self.light);
         with_reason
