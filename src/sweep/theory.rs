@@ -1,8 +1,8 @@
 //! What chapter 3 of the thesis says about one macropixel: [`theory`](crate::theory) at a point of a study.
 //!
-//! Light and clocks are those of sensor and scene; the target is a wall at a range of its own. Assumptions are the formulas' own: the whole
-//! echo in one bin for detection, a Gaussian pulse for precision, a Gaussian error of the guide, a window centred on its estimate as
-//! nearly as start values allow.
+//! Light and clocks are those of sensor and scene; the target is a wall at a range of its own. Assumptions are the formulas' own: a Gaussian
+//! pulse, a Gaussian error of the guide, a window centred on its estimate as nearly as start values allow. The pulse fills bins as it falls
+//! on them ([`SpreadEcho`]); the Gaussian models put the share of its fullest bin into one.
 
 use super::cell::{Cell, Column, Holds};
 use crate::chip::{SensorConfig, Tdc};
@@ -12,8 +12,9 @@ use crate::settings::Range::{Above, Within};
 use crate::settings::{keys, words};
 use crate::theory::cycles::laser_cycles_for;
 use crate::theory::design::share_inside;
-use crate::theory::detection::{Detection, Model, PerCycle, Ties, probability};
+use crate::theory::detection::{Detection, Model, PerCycle, probability};
 use crate::theory::precision::{cramer_rao, range_m, thompson};
+use crate::theory::spread_echo::{Hits, SpreadEcho};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 words! {
@@ -123,7 +124,7 @@ pub(super) struct Wall {
     reflectivity: f64,
     laser_cycles: u64,
     guide_sigma_m: f64,
-    model: Model,
+    model: Counts,
     goal_detection: Option<f64>,
 }
 
@@ -136,12 +137,7 @@ impl Wall {
             reflectivity: asked.reflectivity,
             laser_cycles: asked.laser_cycles,
             guide_sigma_m: asked.guide_sigma_m,
-            model: match asked.model {
-                Counts::Bernoulli => Model::Bernoulli(Ties::Random),
-                Counts::Poisson => Model::Poisson(Ties::Random),
-                Counts::Gaussian => Model::Gaussian,
-                Counts::GaussianAsPrinted => Model::GaussianAsPrinted,
-            },
+            model: asked.model,
             goal_detection: asked.goal_detection,
         }
     }
@@ -164,20 +160,14 @@ impl Wall {
         let (detection, needed) = match last.detection {
             Some((known, found, needed)) if known == wall => (found, needed),
             _ => {
-                let found = probability(&light, self.laser_cycles, self.model);
-                let needed = self.goal_detection.map(|goal| match light.signal > 0.0 {
-                    // Nobody finds what sends nothing back, and the search would go on for long.
-                    false => f64::INFINITY,
-                    true => laser_cycles_for(goal, &light, self.model)
-                        .map_or(f64::INFINITY, |cycles| cycles as f64),
-                });
+                let (found, needed) = self.detection(&light);
                 last.detection = Some((wall, found, needed));
                 (found, needed)
             }
         };
         let wall = Wall {
             laser_cycles: 1,
-            model: Model::Gaussian,
+            model: Counts::Gaussian,
             goal_detection: None,
             ..wall
         };
@@ -196,11 +186,15 @@ impl Wall {
         };
         let (background, signal) = (cycles * light.background, cycles * light.signal);
         let thompson_ns = thompson(bin_s * 1e9, rig.pulse_sigma_ns, background, signal);
-        // No light, no precision.
-        let precision = |m: f64| (light.signal > 0.0).then_some(m);
         let [bin_m, step_m] = [bin_s, rig.step_s].map(|s| 0.5 * s * SPEED_OF_LIGHT_M_PER_S);
         let window_m = rig.bins as f64 * bin_m;
-        let in_window = share_inside(self.guide_sigma_m, window_m, step_m);
+        let reach_m = libm::exp2(rig.counter_bits as f64) * step_m;
+        // Too little light says less than the window does.
+        let precision = |m: f64| (light.signal > 0.0 && m < window_m).then_some(m);
+        let in_window = match self.range_m <= reach_m {
+            true => share_inside(self.guide_sigma_m, window_m, step_m),
+            false => 0.0,
+        };
         [
             Some(light.signal),
             Some(light.background),
@@ -211,12 +205,47 @@ impl Wall {
             needed,
             Some(bin_m),
             Some(window_m),
-            Some(libm::exp2(rig.counter_bits as f64) * step_m),
+            Some(reach_m),
             Some(in_window),
             Some(in_window * detection.probability),
         ]
         .map(Cell::maybe)
         .into()
+    }
+
+    /// How likely the peak is right, and the laser cycles that the goal takes, if there is one: infinite where light never suffices.
+    fn detection(&self, light: &PerCycle) -> (Detection, Option<f64>) {
+        let bin_ns = self.rig.bin_s * 1e9;
+        let echo = SpreadEcho {
+            signal: light.signal,
+            background: light.background,
+            bins: light.bins,
+            sigma_bins: self.rig.pulse_sigma_ns / bin_ns,
+        };
+        let spread = |hits| {
+            let found = echo.detection(self.laser_cycles, hits);
+            let needed = |goal| echo.laser_cycles_for(goal, hits);
+            (found, self.goal_detection.map(needed))
+        };
+        let in_one_bin = |model| {
+            let fullest = PerCycle {
+                signal: light.signal * echo.fullest_share(),
+                ..*light
+            };
+            let found = probability(&fullest, self.laser_cycles, model);
+            let needed = |goal| laser_cycles_for(goal, &fullest, model);
+            // Nobody finds what sends nothing back, and the search would go on for long.
+            let needed = |goal| (fullest.signal > 0.0).then(|| needed(goal)).flatten();
+            (found, self.goal_detection.map(needed))
+        };
+        let (found, needed) = match self.model {
+            Counts::Bernoulli => spread(Hits::OneACycle),
+            Counts::Poisson => spread(Hits::All),
+            Counts::Gaussian => in_one_bin(Model::Gaussian),
+            Counts::GaussianAsPrinted => in_one_bin(Model::GaussianAsPrinted),
+        };
+        let cycles = |cycles: Option<u64>| cycles.map_or(f64::INFINITY, |cycles| cycles as f64);
+        (found, needed.map(cycles))
     }
 }
 
@@ -327,6 +356,35 @@ mod tests {
         let wall = Wall::new(rig, &asked);
         let results = wall.results(&mut Last::default());
         assert_eq!(results[4], Cell::Empty);
-        assert!((results[2].number().unwrap() - 1.0 / 16.0).abs() < 1e-9);
+        // The echo's bin and its neighbour.
+        assert!((results[2].number().unwrap() - 2.0 / 16.0).abs() < 1e-9);
+    }
+
+    /// Pulses of 1, 2 and 4.5 ns gave the same; beyond the reach windows held the wall.
+    #[test]
+    fn longer_pulses_are_found_less_often_and_walls_beyond_the_reach_never() {
+        let of = |fwhm_ns: f64, range_m: f64, name: &str| {
+            let mut scene = Scene::outdoor();
+            scene.lidar.pulse_fwhm_ns = fwhm_ns;
+            let asked = Asked {
+                range_m,
+                reflectivity: 0.1,
+                illuminance_klux: Some(100.0),
+                laser_cycles: 200,
+                ..Asked::default()
+            };
+            let wall = Wall::new(Rig::new(&SensorConfig::default(), &scene), &asked);
+            let at = columns().iter().position(|c| c.name == name).unwrap();
+            wall.results(&mut Last::default())[at].number()
+        };
+        let [short, usual, long] = [1.0, 2.0, 4.5].map(|fwhm_ns| of(fwhm_ns, 90.0, "p_detection"));
+        assert!(
+            short > usual && usual > long,
+            "{short:?} {usual:?} {long:?}"
+        );
+        let reach_m = of(2.0, 1.0, "reach_m").unwrap();
+        assert_eq!(of(2.0, 1.01 * reach_m, "p_right"), Some(0.0));
+        // Too far away for a precision: empty, not 1.7e199.
+        assert_eq!(of(2.0, 1e5, "precision_bound_m"), None);
     }
 }

@@ -94,7 +94,11 @@ impl Counts {
             Counts::Bernoulli {
                 cycles,
                 photons_per_cycle,
-            } => cycles.saturating_sub(k) as f64 / (k + 1) as f64 * libm::expm1(photons_per_cycle),
+            } if k < cycles => {
+                (cycles - k) as f64 / (k + 1) as f64 * libm::expm1(photons_per_cycle)
+            }
+            // Not zero times infinity, where the light is very bright.
+            Counts::Bernoulli { .. } => 0.0,
         }
     }
 
@@ -105,7 +109,12 @@ impl Counts {
 
     /// Smallest and largest count whose probability `f64` can hold.
     pub(crate) fn support(&self) -> (u64, u64) {
-        let possible = |k: u64| self.ln_probability(k) > LN_TINY;
+        self.likely(LN_TINY)
+    }
+
+    /// Smallest and largest count whose probability is above e^`ln_least`.
+    pub(crate) fn likely(&self, ln_least: f64) -> (u64, u64) {
+        let possible = |k: u64| self.ln_probability(k) > ln_least;
         let most = match *self {
             Counts::Poisson { .. } => u64::MAX >> 2,
             Counts::Bernoulli { cycles, .. } => cycles,

@@ -20,12 +20,12 @@ pub fn laser_cycles_for(target: f64, light: &PerCycle, model: Model) -> Option<u
         Model::Bernoulli(_) => Model::Bernoulli(Ties::Random),
         _ => Model::Poisson(Ties::Random),
     };
-    let (below, enough) = double(1, light, |n| reaches(target, light, fair, n))?;
-    let fair_cycles = bisect(below, enough, |n| reaches(target, light, fair, n));
+    let photons = light.signal + light.background;
+    let fair_cycles = search(photons, |n| reaches(target, light, fair, n))?;
     if model == fair {
         return Some(fair_cycles);
     }
-    let (_, mut enough) = double(fair_cycles, light, |n| reaches(target, light, model, n))?;
+    let (_, mut enough) = double(fair_cycles, photons, |n| reaches(target, light, model, n))?;
     while enough > 1 {
         let fewer = enough - (enough / 16).max(1);
         if !reaches(target, light, model, fewer) {
@@ -40,14 +40,16 @@ fn reaches(target: f64, light: &PerCycle, model: Model, cycles: u64) -> bool {
     probability(light, cycles, model).probability >= target
 }
 
+/// The smallest number of laser cycles that `is_enough`, if more of them stay enough; `None` beyond 10¹⁰ counts, at `photons` a laser cycle.
+pub(super) fn search(photons: f64, is_enough: impl Fn(u64) -> bool) -> Option<u64> {
+    let (failed, enough) = double(1, photons, &is_enough)?;
+    Some(bisect(failed, enough, is_enough))
+}
+
 /// Doubles `cycles` until it `is_enough`: (the last failure or 0, the first success).
-fn double(
-    mut cycles: u64,
-    light: &PerCycle,
-    is_enough: impl Fn(u64) -> bool,
-) -> Option<(u64, u64)> {
+fn double(mut cycles: u64, photons: f64, is_enough: impl Fn(u64) -> bool) -> Option<(u64, u64)> {
     let mut failed = 0;
-    let most = (MOST_COUNTS / (light.signal + light.background)).min(1e18);
+    let most = (MOST_COUNTS / photons).min(1e18);
     while !is_enough(cycles) {
         if cycles as f64 > most {
             return None;

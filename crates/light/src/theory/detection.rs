@@ -67,7 +67,7 @@ pub struct Detection {
 
 impl Detection {
     /// From the two sums; the smaller says what the larger is.
-    fn new(hit: f64, miss: f64) -> Self {
+    pub(super) fn new(hit: f64, miss: f64) -> Self {
         if hit < miss {
             Detection {
                 probability: hit,

@@ -13,6 +13,7 @@ pub mod partial;
 pub mod precision;
 mod pulse;
 pub mod significance;
+pub mod spread_echo;
 
 pub use counts::{Counts, Tails};
 pub use pulse::{LnBin, MeasuredPulse, Pulse, PulseError};
