@@ -191,9 +191,10 @@ impl Wall {
         let reach_m = libm::exp2(rig.counter_bits as f64) * step_m;
         // Too little light says less than the window does.
         let precision = |m: f64| (light.signal > 0.0 && m < window_m).then_some(m);
-        let in_window = match self.range_m <= reach_m {
-            true => share_inside(self.guide_sigma_m, window_m, step_m),
-            false => 0.0,
+        let in_window = if self.range_m <= reach_m {
+            share_inside(self.guide_sigma_m, window_m, step_m)
+        } else {
+            0.0
         };
         [
             Some(light.signal),
