@@ -81,7 +81,9 @@ def test_the_command_reads_what_is_saved(command: Command, tmp_path: Path, of: s
     ply = (tmp_path / "export" / "frame.ply").read_bytes()
     body = ply[ply.index(b"end_header\n") + len(b"end_header\n") :]
     fields = [(name, "<f4") for name in ("x", "y", "z", "intensity", "confidence")]
-    cloud = np.frombuffer(body, np.dtype([*fields, ("row", "<u2"), ("col", "<u2")]))
+    cloud = np.frombuffer(body, np.dtype([*fields, ("row", "<u2"), ("col", "<u2"), ("return", "<u2")]))
+    assert len(cloud) == np.count_nonzero(np.isfinite(frame.returns))
+    cloud = cloud[cloud["return"] == 1]
     points = np.stack([cloud["x"], cloud["y"], cloud["z"]], axis=1)
     assert len(points) > 0 and np.array_equal(points, frame.points.astype(np.float32))
     assert np.array_equal(np.stack([cloud["row"], cloud["col"]], axis=1), np.argwhere(np.isfinite(frame.depth)))

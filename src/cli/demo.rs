@@ -8,11 +8,11 @@ use serde::Serialize;
 
 use super::voice::{notes, progress, tell};
 use crate::demo::disturbed::{Disturbance, Outcome};
-use crate::demo::show::{Show, Shown, write_ply};
+use crate::demo::show::{Show, Shown};
 use crate::demo::{Demonstrator, limit, shows, sweep};
 use crate::files::{InputError, MANIFEST, ResultSet};
 use crate::guide::{BehaviouralStereo, Guide, options};
-use crate::report::Grid;
+use crate::report::{Grid, write_ply};
 use crate::units::Time;
 
 /// The experiments.

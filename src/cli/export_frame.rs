@@ -6,8 +6,8 @@ use clap::{Args, ValueEnum};
 
 use super::voice::{notes, tell};
 use crate::files::{ResultSet, read_counts};
-use crate::report::{CloudPoint, Npz, write_depth_png, write_npy_f32, write_pcd, write_ply};
-use crate::system::{NoDepth, PixelDepth, RETURNS, Return, TakenFrame, above_background};
+use crate::report::{Npz, write_depth_png, write_npy_f32, write_pcd, write_ply};
+use crate::system::{NoDepth, PixelDepth, RETURNS, Return, TakenFrame, cloud};
 
 /// Arguments of `gdtof export frame`.
 #[derive(Args)]
@@ -26,7 +26,7 @@ pub(super) struct FrameExportArgs {
 /// What a frame is written as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Format {
-    /// frame.ply: point cloud, binary PLY: x right, y down, z forward, intensity, confidence, row, col.
+    /// frame.ply: point cloud, binary PLY: x right, y down, z forward, intensity, confidence, row, col, return.
     Ply,
     /// frame.pcd: point cloud, binary PCD 0.7, with the same fields.
     Pcd,
@@ -52,18 +52,7 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
     let histograms = read_counts(&args.frame.join("histograms.npy"), &shape)?;
 
     let camera = settings.scene.lidar_camera(rows as u32, cols as u32);
-    let points: Vec<CloudPoint> = (pixels.iter().zip(histograms.chunks_exact(bins)).enumerate())
-        .filter_map(|(at, (pixel, counts))| {
-            let (row, col) = (at / cols, at % cols);
-            let at_m = camera.towards((row, col)) * pixel.measured_m?;
-            Some(CloudPoint {
-                at_m: at_m.to_array().map(|x| x as f32),
-                intensity: above_background(counts),
-                confidence: pixel.confidence.unwrap_or(0.0) as f32,
-                pixel: [row as u16, col as u16],
-            })
-        })
-        .collect();
+    let points = cloud(&camera, cols, &pixels);
     let depths = of(&pixels, |pixel| pixel.measured_m);
 
     let results = ResultSet::begin(&args.out, "export frame")?;
@@ -94,11 +83,11 @@ pub(super) fn run(args: &FrameExportArgs) -> anyhow::Result<()> {
     }
     let frame = args.frame.display().to_string();
     notes(results.commit(serde_json::json!({ "frame": frame }))?);
+    let found = depths.iter().filter(|depth| depth.is_finite()).count();
     tell(format_args!(
-        "{} in {}: {} of {} macropixels have a depth\n",
+        "{} in {}: {found} of {} macropixels have a depth\n",
         names.join(", "),
         args.out.display(),
-        points.len(),
         pixels.len()
     ))?;
     Ok(())

@@ -5,9 +5,9 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use crate::files::{InputError, OutputFile};
-use crate::report::{Channel, CloudPoint, Mcap};
-use crate::scene::DVec3;
-use crate::system::{DriveFrame, DriveSettings, above_background};
+use crate::report::{Channel, CloudPoint, FLOATS, Mcap, SHORTS};
+use crate::scene::{DVec3, PinholeCamera};
+use crate::system::{DriveFrame, DriveSettings, cloud};
 
 const TRANSFORM: usize = 0;
 const POINTS: usize = 1;
@@ -45,9 +45,8 @@ const UINT16: u8 = 3;
 /// A recording of a drive.
 pub(super) struct Foxglove {
     mcap: Mcap<OutputFile>,
-    rays: Vec<DVec3>,
+    camera: PinholeCamera,
     cols: usize,
-    bins: usize,
     begin_s: f64,
 }
 
@@ -60,13 +59,11 @@ impl Foxglove {
         let sensor = &settings.frame.sensor;
         let (rows, cols) = (sensor.rows, sensor.cols);
         let camera = settings.frame.scene.lidar_camera(rows as u32, cols as u32);
-        let ray = |pixel: usize| camera.towards((pixel / cols, pixel % cols));
         let mcap = Mcap::begin(OutputFile::create(path)?, &CHANNELS);
         Ok(Foxglove {
             mcap: mcap.map_err(|e| InputError::unwritable(path, &e))?,
-            rays: (0..rows * cols).map(ray).collect(),
+            camera,
             cols,
-            bins: sensor.bins,
             begin_s: settings.start_s,
         })
     }
@@ -88,18 +85,18 @@ impl Foxglove {
             "translation": xyz(DVec3::ZERO),
             "rotation": {"x": -0.5, "y": 0.5, "z": -0.5, "w": 0.5},
         });
-        let fields = ["x", "y", "z", "intensity", "confidence"]
-            .iter()
-            .enumerate();
+        let fields = FLOATS.iter().enumerate();
         let fields = fields
             .map(|(number, name)| json!({"name": name, "offset": 4 * number, "type": FLOAT32}));
-        let pixel = ["row", "col"].iter().enumerate();
-        let pixel = pixel
-            .map(|(number, name)| json!({"name": name, "offset": 20 + 2 * number, "type": UINT16}));
-        let points: Vec<u8> = self.points(frame).flat_map(|point| point.bytes()).collect();
+        let shorts = SHORTS.iter().enumerate();
+        let shorts = shorts.map(|(number, name)| {
+            json!({"name": name, "offset": 4 * FLOATS.len() + 2 * number, "type": UINT16})
+        });
+        let points = cloud(&self.camera, self.cols, &frame.pixels);
+        let points: Vec<u8> = points.iter().flat_map(CloudPoint::bytes).collect();
         let points = json!({
             "timestamp": time, "frame_id": "lidar", "pose": pose(),
-            "point_stride": CloudPoint::BYTES, "fields": fields.chain(pixel).collect::<Vec<_>>(),
+            "point_stride": CloudPoint::BYTES, "fields": fields.chain(shorts).collect::<Vec<_>>(),
             "data": base64(&points),
         });
         let depths = frame
@@ -123,21 +120,6 @@ impl Foxglove {
         self.mcap.moment(time_ns, &messages)
     }
 
-    fn points<'a>(&'a self, frame: &'a DriveFrame) -> impl Iterator<Item = CloudPoint> + 'a {
-        let histograms = frame.histograms.counts().chunks_exact(self.bins);
-        let pixels = frame.pixels.iter().zip(histograms).enumerate();
-        pixels.filter_map(|(number, (pixel, counts))| {
-            Some(CloudPoint {
-                at_m: (self.rays[number] * pixel.measured_m?)
-                    .to_array()
-                    .map(|x| x as f32),
-                intensity: above_background(counts),
-                confidence: pixel.confidence.unwrap_or(0.0) as f32,
-                pixel: [(number / self.cols) as u16, (number % self.cols) as u16],
-            })
-        })
-    }
-
     /// A stroke along the ray from where a window opens to where it closes.
     fn windows(&self, frame: &DriveFrame, time: &Value) -> Value {
         let shown = |pixel: &usize| {
@@ -148,7 +130,8 @@ impl Foxglove {
             .filter(shown)
             .filter_map(|pixel| {
                 let (from_m, to_m) = frame.windows_m[pixel]?;
-                Some([from_m, to_m].map(|m| xyz(self.rays[pixel] * m)))
+                let ray = self.camera.towards((pixel / self.cols, pixel % self.cols));
+                Some([from_m, to_m].map(|m| xyz(ray * m)))
             });
         let none = json!([]);
         json!({"deletions": none, "entities": [{

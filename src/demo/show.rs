@@ -1,15 +1,13 @@
 //! A scene shown as in Fig. 99 to 102: a drive through it, what became of its targets in every frame, and some frames as pictures.
 
-use std::path::Path;
-
 use super::Demonstrator;
 use super::found::Found;
 use super::panel::Panel;
 use super::schemes::{self, Outcome};
-use crate::files::{InputError, OutputFile};
+use crate::report::CloudPoint;
 use crate::report::picture::Picture;
 use crate::scene::{GroundTruth, Scene};
-use crate::system::{Drive, DriveFrame, DriveSettings, FrameError, FrameTimes, PhaseTimes};
+use crate::system::{Drive, DriveFrame, DriveSettings, FrameError, FrameTimes, PhaseTimes, cloud};
 
 /// Something that is to be found: all objects whose name begins so.
 #[derive(Debug, Clone)]
@@ -94,8 +92,8 @@ pub(crate) struct Shown {
     pub(crate) frames: Vec<ShownFrame>,
     /// Frames as pictures, with their numbers.
     pub(crate) pictures: Vec<(u32, Picture)>,
-    /// Point clouds of the same frames: x right, y down, z forward, m.
-    pub(crate) clouds: Vec<(u32, Vec<[f64; 3]>)>,
+    /// Point clouds of the same frames.
+    pub(crate) clouds: Vec<(u32, Vec<CloudPoint>)>,
     /// From one frame to the next, s.
     pub(crate) period_s: f64,
     /// What load, exposure and readout take, s.
@@ -130,9 +128,10 @@ impl Show {
             let frame = drive.frame(|_| {})?;
             if self.pictures.contains(&number) {
                 shown.pictures.push((number, self.picture(&frame)));
-                shown
-                    .clouds
-                    .push((number, points(&self.settings.frame.scene, &frame)));
+                let (rows, cols) = (frame.truth.rows, frame.truth.cols);
+                let camera = self.settings.frame.scene.lidar_camera(rows, cols);
+                let points = cloud(&camera, cols as usize, &frame.pixels);
+                shown.clouds.push((number, points));
             }
             if self.compares && number + 1 == self.frames {
                 shown.schemes = self.schemes(demonstrator, &frame)?;
@@ -188,40 +187,4 @@ impl Show {
         }
         .draw()
     }
-}
-
-/// Every depth as a point before the lidar, m.
-fn points(scene: &Scene, frame: &DriveFrame) -> Vec<[f64; 3]> {
-    let (rows, cols) = (frame.truth.rows, frame.truth.cols);
-    let camera = scene.lidar_camera(rows, cols);
-    let depths = frame.pixels.iter().enumerate();
-    depths
-        .filter_map(|(pixel, depth)| {
-            let (row, col) = (pixel / cols as usize, pixel % cols as usize);
-            let ray = camera.at_unit_depth((col as f64 + 0.5, row as f64 + 0.5));
-            Some((ray.normalize() * depth.measured_m?).to_array())
-        })
-        .collect()
-}
-
-/// Writes points as PLY, ASCII, x right, y down, z forward, m.
-///
-/// # Errors
-/// When the file cannot be written.
-pub(crate) fn write_ply(path: &Path, points: &[[f64; 3]]) -> Result<(), InputError> {
-    OutputFile::write_with(path, |out| {
-        writeln!(
-            out,
-            "ply\nformat ascii 1.0\nelement vertex {}",
-            points.len()
-        )?;
-        writeln!(
-            out,
-            "property float x\nproperty float y\nproperty float z\nend_header"
-        )?;
-        for [x, y, z] in points {
-            writeln!(out, "{x:.4} {y:.4} {z:.4}")?;
-        }
-        std::io::Result::Ok(())
-    })
 }

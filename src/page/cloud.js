@@ -1,7 +1,7 @@
-// Measured points in space: x to the right, y forward, z up. It turns.
+// Measured points in space, one for each return: x to the right, y forward, z up. It turns.
 
 const COLOURS = [
-  { name: "depth", of: (f) => f.depth, scale: VIRIDIS, range: depths, by: Math.log, unit: "m" },
+  { name: "depth", of: (f) => f.depth, scale: VIRIDIS, range: depths, by: Math.log, unit: "m", ofReturn: Math.log },
   { name: "error", of: (f) => f.error, scale: DIVERGING, range: errors, unit: "m" },
   { name: "confidence", of: (f) => f.confidence, scale: INFERNO, range: confidences, by: Math.log1p, unit: "" },
 ];
@@ -16,16 +16,22 @@ function pointOf(pixel, range) {
   return [(x * range) / length, range / length, (-y * range) / length];
 }
 
-function cloudOf(f, values) {
+function cloudOf(f, chosen) {
+  const scaled = chosen.by ?? ((value) => value);
+  const values = chosen.of(f).map(scaled);
   const cloud = { x: [], y: [], z: [], c: [], pixel: [] };
   for (let pixel = 0; pixel < pixels; pixel++) {
-    if (!Number.isFinite(f.depth[pixel])) continue;
-    const [x, y, z] = pointOf(pixel, f.depth[pixel]);
-    cloud.x.push(x);
-    cloud.y.push(y);
-    cloud.z.push(z);
-    cloud.c.push(Number.isFinite(values[pixel]) ? values[pixel] : null);
-    cloud.pixel.push(pixel);
+    for (const [n, range] of [f.depth[pixel], ...further(f, pixel).map((n) => f.returns[n][pixel])].entries()) {
+      if (!Number.isFinite(range)) continue;
+      const [x, y, z] = pointOf(pixel, range);
+      cloud.x.push(x);
+      cloud.y.push(y);
+      cloud.z.push(z);
+      // Error and confidence are of the depth alone.
+      const value = n === 0 ? values[pixel] : chosen.ofReturn?.(range);
+      cloud.c.push(Number.isFinite(value) ? value : null);
+      cloud.pixel.push(pixel);
+    }
   }
   return cloud;
 }
@@ -49,7 +55,7 @@ async function drawCloud(f, pixel, by, onPoint) {
   if (!hasCloud) return;
   const chosen = COLOURS[by];
   const scaled = chosen.by ?? ((value) => value);
-  const cloud = cloudOf(f, chosen.of(f).map(scaled));
+  const cloud = cloudOf(f, chosen);
   const [least, most] = chosen.range(f);
   const ticks = chosen.by ? [...new Set([1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000].filter((n) => n >= least && n <= most))] : null;
   const space = (title) => ({ title: { text: title }, gridcolor: colour("line"), color: colour("soft"), backgroundcolor: "rgba(0,0,0,0)", showspikes: false });

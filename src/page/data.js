@@ -20,8 +20,11 @@ function unpacked(buffer) {
     return array;
   };
   const frame = {};
-  for (const name of ["truth", "guide", "depth", "bound", "peak", "confidence", "signal", "background"]) {
+  for (const name of ["truth", "guide", "depth", "bound", "spread", "peak", "confidence", "signal", "background"]) {
     frame[name] = take(Float32Array, pixels);
+  }
+  for (const name of ["returns", "returnBounds", "returnPhotons"]) {
+    frame[name] = Array.from({ length: meta.returns }, () => take(Float32Array, pixels));
   }
   frame.edges = take(Uint32Array, pixels);
   frame.start = take(Int16Array, pixels);
@@ -44,6 +47,9 @@ async function frameAt(number) {
   }
   return cached.get(number);
 }
+
+// Numbers of a macropixel's returns after its depth's.
+const further = (f, pixel) => f.returns.map((_, n) => n).filter((n) => n > 0 && Number.isFinite(f.returns[n][pixel]));
 
 // The value below which a share of those that exist lie.
 function quantile(values, share) {

@@ -1,4 +1,4 @@
-// The histogram under the pointer over distance, with its window, truth, guide, depth, and the fit.
+// The histogram under the pointer over distance, with its window, truth, guide, depth, further returns, and the fit.
 
 // The normal distribution's share below z (Abramowitz and Stegun 7.1.26, to 1e-7).
 function below(z) {
@@ -47,7 +47,7 @@ function drawHistogram(f, pixel) {
   }
   const most = Math.max(1, ...counts, ...(fit ?? [0])) * 1.08;
   const shapes = [{ type: "rect", xref: "x", yref: "paper", x0: first, x1: last, y0: 0, y1: 1, fillcolor: colour("bars"), opacity: 0.08, line: { width: 0 } }];
-  for (const [name, value, tint, dash] of [["truth", f.truth[pixel], "truth", "solid"], ["guide", f.guide[pixel], "guide", "dash"], ["depth", f.depth[pixel], "accent", "solid"]]) {
+  for (const [name, value, tint, dash] of [["truth", f.truth[pixel], "truth", "solid"], ["guide", f.guide[pixel], "guide", "dash"], ["depth", f.depth[pixel], "accent", "solid"], ...further(f, pixel).map((n) => ["return " + (n + 1), f.returns[n][pixel], "accent", "dot"])]) {
     if (!Number.isFinite(value)) {
       note("no " + name);
       continue;

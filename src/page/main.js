@@ -40,6 +40,8 @@ function showPixel() {
     ["start value", f.start[pixel] < 0 ? "none, SPADs off" : f.start[pixel]],
     ["depth", shown(f.depth[pixel], 3, "m")],
     ["bound of the counts", shown(1e3 * f.bound[pixel], 1, "mm")],
+    ["spread of depths within", shown(1e3 * f.spread[pixel], 1, "mm")],
+    ["further returns", further(f, pixel).map((n) => returnOf(f, pixel, n)).join("; ") || "–"],
     ["error", shown(1e3 * f.error[pixel], 1, "mm")],
     ["result", reasonOf(f, pixel)],
     ["confidence, −log₁₀ of a false alarm", shown(f.confidence[pixel], 1)],
@@ -54,6 +56,8 @@ function showPixel() {
   showCommand(row, col);
   history.replaceState(null, "", "#r" + row + "c" + col + "f" + state.frame);
 }
+
+const returnOf = (f, pixel, n) => shown(f.returns[n][pixel], 3, "m") + " (bound " + shown(1e3 * f.returnBounds[n][pixel], 1, "mm") + ", " + f.returnPhotons[n][pixel].toPrecision(2) + " photons a laser cycle)";
 
 function showCommand(row, col) {
   const folder = meta.folder.replace(/\/$/, "");

@@ -3,7 +3,8 @@
 //! Arrays of a frame, one after the other, little endian; n macropixels in rows:
 //!
 //! ```text
-//!   truth, guide, depth, bound, peak, confidence, signal, background   n × f32 each; NaN where there is none
+//!   truth, guide, depth, bound, spread, peak, confidence, signal, background   n × f32 each; NaN where there is none
+//!   returns, returns' bounds, returns' photons                  4 × n × f32 each; NaN where there are fewer
 //!   edges                                                       n × u32: which of `edges_m`, from 1; 0 where no window opens
 //!   start                                                       n × i16: −1 where SPADs are off
 //!   object                                                      n × u16: which of `objects`, from 1; 0 for the sky
@@ -28,7 +29,7 @@ use crate::chip::SensorConfig;
 use crate::files::InputError;
 use crate::guide::view;
 use crate::scene::{DVec3, Ray, Scene, Stage};
-use crate::system::{NoDepth, Ranger, TakenSettings};
+use crate::system::{NoDepth, RETURNS, Ranger, Return, TakenSettings};
 use crate::units::TimeOfFlight;
 
 /// Pixels of the camera view across a macropixel.
@@ -60,6 +61,7 @@ pub(super) struct Meta {
     rows: usize,
     cols: usize,
     bins: usize,
+    returns: usize,
     across: u32,
     /// Height of a macropixel over its width.
     aspect: f64,
@@ -152,6 +154,7 @@ impl Packed {
             rows: sensor.rows,
             cols: sensor.cols,
             bins: sensor.bins,
+            returns: RETURNS,
             across: ACROSS,
             aspect: scene.lidar.macropixel_aspect,
             laser_cycles: exposure.laser_cycles,
@@ -195,10 +198,20 @@ fn arrays(
     floats(&|p| found[p].0.guide_m);
     floats(&|p| found[p].0.measured_m);
     floats(&|p| found[p].0.bound_m);
+    floats(&|p| found[p].0.spread_m);
     floats(&|p| found[p].0.peak_m);
     floats(&|p| found[p].0.confidence);
     floats(&|p| Some(found[p].1?.signal_counts));
     floats(&|p| Some(found[p].1?.background_per_bin));
+    for of in [
+        (|found| Some(found.depth_m)) as fn(&Return) -> Option<f64>,
+        |found| found.bound_m,
+        |found| Some(found.photons),
+    ] {
+        for number in 0..RETURNS {
+            floats(&|p| of(found[p].0.returns.get(number)?));
+        }
+    }
     for known in &frame.known {
         let number = known
             .start

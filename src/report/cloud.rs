@@ -1,7 +1,7 @@
 //! Point clouds for CloudCompare, MeshLab, Open3D, PCL and Foxglove: PLY and PCD, binary, little endian.
 //!
-//! Both have the same fields: x right, y down, z forward (m, from the lidar), intensity (photons of the peak), confidence (−log₁₀ of the chance
-//! that light without an echo makes such a peak), row and column of the macropixel.
+//! Both have the same fields: x right, y down, z forward (m, from the lidar), intensity (photons a laser cycle), confidence (−log₁₀ of the chance
+//! that light without this echo makes such counts), row and column of the macropixel, and which of its returns the point is, from 1.
 
 use std::path::Path;
 
@@ -12,20 +12,23 @@ use crate::files::{InputError, OutputFile};
 pub(crate) struct CloudPoint {
     /// x right, y down, z forward, m.
     pub(crate) at_m: [f32; 3],
-    /// Photons counted in its peak, those of the background taken off.
+    /// Photons of its echo that the SPADs would detect in a laser cycle without dead time.
     pub(crate) intensity: f32,
     /// −log₁₀ of the chance that it is none.
     pub(crate) confidence: f32,
     /// Row and column of its macropixel.
     pub(crate) pixel: [u16; 2],
+    /// Which return of its macropixel it is, from 1: the depth's.
+    pub(crate) number: u16,
 }
 
-/// Names of the fields; the last two are of two bytes, the others of four.
-const FIELDS: [&str; 7] = ["x", "y", "z", "intensity", "confidence", "row", "col"];
+/// Names of the fields of four bytes, then of those of two.
+pub(crate) const FLOATS: [&str; 5] = ["x", "y", "z", "intensity", "confidence"];
+pub(crate) const SHORTS: [&str; 3] = ["row", "col", "return"];
 
 impl CloudPoint {
     /// Bytes of a point.
-    pub(crate) const BYTES: usize = 24;
+    pub(crate) const BYTES: usize = 4 * FLOATS.len() + 2 * SHORTS.len();
 
     /// Its fields one after the other, little endian.
     pub(crate) fn bytes(&self) -> [u8; Self::BYTES] {
@@ -40,7 +43,8 @@ impl CloudPoint {
             place.copy_from_slice(&number.to_le_bytes());
         }
         bytes[20..22].copy_from_slice(&row.to_le_bytes());
-        bytes[22..].copy_from_slice(&col.to_le_bytes());
+        bytes[22..24].copy_from_slice(&col.to_le_bytes());
+        bytes[24..].copy_from_slice(&self.number.to_le_bytes());
         bytes
     }
 }
@@ -54,9 +58,10 @@ pub(crate) fn write_ply(path: &Path, points: &[CloudPoint]) -> Result<(), InputE
         writeln!(out, "ply\nformat binary_little_endian 1.0")?;
         writeln!(out, "comment x right, y down, z forward, m, from the lidar")?;
         writeln!(out, "element vertex {}", points.len())?;
-        for (number, name) in FIELDS.iter().enumerate() {
-            let kind = if number < 5 { "float" } else { "ushort" };
-            writeln!(out, "property {kind} {name}")?;
+        for (kind, names) in [("float", &FLOATS[..]), ("ushort", &SHORTS)] {
+            for name in names {
+                writeln!(out, "property {kind} {name}")?;
+            }
         }
         writeln!(out, "end_header")?;
         points
@@ -76,10 +81,10 @@ pub(crate) fn write_pcd(path: &Path, points: &[CloudPoint]) -> Result<(), InputE
             out,
             "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7"
         )?;
-        writeln!(out, "FIELDS {}", FIELDS.join(" "))?;
+        writeln!(out, "FIELDS {} {}", FLOATS.join(" "), SHORTS.join(" "))?;
         writeln!(
             out,
-            "SIZE 4 4 4 4 4 2 2\nTYPE F F F F F U U\nCOUNT 1 1 1 1 1 1 1"
+            "SIZE 4 4 4 4 4 2 2 2\nTYPE F F F F F U U U\nCOUNT 1 1 1 1 1 1 1 1"
         )?;
         writeln!(out, "WIDTH {count}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0")?;
         writeln!(out, "POINTS {count}\nDATA binary")?;
@@ -100,6 +105,7 @@ mod tests {
             intensity: 17.0,
             confidence: 4.5,
             pixel: [3, 300],
+            number: 2,
         };
         let dir = tempfile::tempdir().unwrap();
         for (name, write, end) in [
@@ -125,6 +131,6 @@ mod tests {
             }
         }
         assert_eq!(point.bytes()[8..12], 30.5f32.to_le_bytes());
-        assert_eq!(point.bytes()[22..], [44, 1]);
+        assert_eq!(point.bytes()[22..], [44, 1, 2, 0]);
     }
 }

@@ -18,7 +18,7 @@ mod verdicts;
 pub(crate) use array::write_depth_png;
 pub(crate) use array::{NpyStack, write_npy_f32, write_npy_u16};
 pub use chart::{Axis, Chart, Scale};
-pub(crate) use cloud::{CloudPoint, write_pcd, write_ply};
+pub(crate) use cloud::{CloudPoint, FLOATS, SHORTS, write_pcd, write_ply};
 pub use grid::{Grid, width};
 pub(crate) use grid::{aligned, quoted};
 pub use image::{Cell, DepthMap};

@@ -31,7 +31,7 @@ pub use drive::{Drive, DriveFrame, DriveSettings, FrameClock, FrameTimes, Noise,
 pub use error::FrameError;
 pub use frame::{take_frame, take_frame_by, take_guided_frame};
 pub use light::photon_stream;
-pub(crate) use pixel::above_background;
+pub(crate) use pixel::cloud;
 pub use pixel::{NoDepth, PixelDepth, RETURNS, Return, Returns};
 pub use policy::{NoBins, Pointing, Unguided, Why, WindowPolicy};
 pub(crate) use ranger::{Known, Ranger};

@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::ranging::WalkLeft;
+use crate::report::CloudPoint;
+use crate::scene::PinholeCamera;
 
 /// Why a macropixel has no depth: the first of these that holds, in this order.
 ///
@@ -158,13 +160,21 @@ pub struct PixelDepth {
     pub confidence: Option<f64>,
 }
 
-/// Photons of an echo in a histogram: the counts beyond those of its middle bin, which is background where an echo has few bins.
-pub(crate) fn above_background(counts: &[u16]) -> f32 {
-    let mut sorted = counts.to_vec();
-    sorted.sort_unstable();
-    let background = sorted.get(sorted.len() / 2).copied().unwrap_or(0);
-    let above = counts.iter().map(|&n| n.saturating_sub(background));
-    above.map(f32::from).sum()
+/// A point for each return of the array's `pixels`, row by row.
+pub(crate) fn cloud(camera: &PinholeCamera, cols: usize, pixels: &[PixelDepth]) -> Vec<CloudPoint> {
+    let points = pixels.iter().enumerate().flat_map(|(pixel, of)| {
+        let (row, col) = (pixel / cols, pixel % cols);
+        let towards = camera.towards((row, col));
+        let point = move |(number, found): (u16, &Return)| CloudPoint {
+            at_m: (towards * found.depth_m).to_array().map(|x| x as f32),
+            intensity: found.photons as f32,
+            confidence: found.confidence as f32,
+            pixel: [row as u16, col as u16],
+            number,
+        };
+        (1..).zip(of.returns.iter()).map(point)
+    });
+    points.collect()
 }
 
 impl PixelDepth {

@@ -57,24 +57,25 @@ fn a_frame_is_read_elsewhere() {
     );
     assert_eq!(fs::read_dir(here.join("some")).unwrap().count(), 3);
 
-    // Every depth is a point, at its distance.
+    // Every return is a point, at its distance.
     python(
         here,
         "\
 import json, math, struct, zipfile
 pixels = json.load(open('out/frame.json'))['macropixels']
-wanted = {(i // 20, i % 20): m for i, m in enumerate(pixels) if m['measured_m'] is not None}
-assert len(wanted) > 20
+wanted = {(i // 20, i % 20, 1 + n): r for i, m in enumerate(pixels) for n, r in enumerate(m.get('returns', []))}
+assert len(wanted) > 20 and any(n == 2 for _, _, n in wanted)
+assert all(r['depth_m'] == pixels[i * 20 + k]['measured_m'] for (i, k, n), r in wanted.items() if n == 1)
 for name, end in (('frame.ply', b'end_header\\n'), ('frame.pcd', b'DATA binary\\n')):
     data = open('export/' + name, 'rb').read()
     data = data[data.index(end) + len(end):]
-    points = list(struct.iter_unpack('<5f2H', data))
+    points = list(struct.iter_unpack('<5f3H', data))
     assert len(points) == len(wanted), name
-    for x, y, z, intensity, confidence, row, col in points:
-        m = wanted[row, col]
-        assert abs(math.hypot(x, y, z) - m['measured_m']) < 1e-4 * m['measured_m']
+    for x, y, z, intensity, confidence, row, col, number in points:
+        m = wanted[row, col, number]
+        assert abs(math.hypot(x, y, z) - m['depth_m']) < 1e-4 * m['depth_m']
         assert (x > 0) == (col >= 10) and (y > 0) == (row >= 6) and z > 0
-        assert intensity > 0 and abs(confidence - m['confidence']) < 1e-3
+        assert abs(intensity - m['photons']) < 1e-4 * m['photons'] and abs(confidence - m['confidence']) < 1e-3
 assert zipfile.ZipFile('export/frame.npz').testzip() is None
 ",
     );

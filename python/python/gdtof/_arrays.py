@@ -79,8 +79,8 @@ class FrameArrays:
     in_window: NDArray[np.bool_]
     """Whether the echo's centre lies in the time window."""
     points: NDArray[np.float64]
-    """Where macropixels with a depth see their surface, m from the lidar: x right, y down, z forward, shape (depths, 3), row by row. The points
-    of `gdtof export frame`, whose files have them in float32; ``np.isfinite(depth)`` says whose they are."""
+    """Where macropixels with a depth see their surface, m from the lidar: x right, y down, z forward, shape (depths, 3), row by row. In the files
+    of `gdtof export frame` they are the points whose `return` is 1, in float32; ``np.isfinite(depth)`` says whose they are."""
     bin_m: float
     """Light's way there and back in one bin, as a distance, m."""
     summary: dict[str, Any]
