@@ -362,6 +362,7 @@ fn eye_safety(settings: &FrameSettings, laser_cycles: u32, frame: &Frame) -> Str
         Some(EyeSafety {
             times_class_1,
             rule,
+            within_s,
             ..
         }) => {
             let is_above = if times_class_1 > 1.0 {
@@ -370,7 +371,7 @@ fn eye_safety(settings: &FrameSettings, laser_cycles: u32, frame: &Frame) -> Str
                 "within"
             };
             format!(
-                "{is_above}, {times_class_1:.2} of the limit ({})",
+                "{is_above}, {times_class_1:.2} of the limit ({}; within {within_s:.2e} s)",
                 rule.name()
             )
         }

@@ -10,7 +10,9 @@ use super::voice::{notes, progress, tell};
 use crate::chip::{CellLibrary, Sensor, SensorConfig};
 use crate::files::{InputError, MANIFEST, OutputFile, ResultSet};
 use crate::numerics::intervals::Estimate;
-use crate::propose::{Check, Found, Goal, Own, Point, Problem, Space, check, gates_agree, search};
+use crate::propose::{
+    Check, Confirmed, Found, Goal, NotFound, Own, Point, Problem, Space, Step, gates_agree, search,
+};
 use crate::report::{Axis, Chart, Grid};
 
 /// Arguments of `gdtof propose`.
@@ -85,14 +87,24 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
     let clocks = space.clk_hz.len() * space.thresholds.len();
     let bar = progress(
         clocks as u64,
-        "judging {bar:40} {pos}/{len} clocks, {eta} left",
+        "judging {bar:40} {pos}/{len} clocks and checks",
     );
     let begin = Instant::now();
-    let found = search(&problem, &space, || bar.inc(1))
-        .map_err(|limit| InputError::new("no chip does it", limit.to_string()))?;
+    let told = |step| match step {
+        Step::Clock => bar.inc(1),
+        Step::Check => {
+            // How many there will be shows only as they are checked.
+            bar.inc_length(1);
+            bar.inc(1);
+        }
+    };
+    let found = search(&problem, &space, args.seed, told).map_err(|why| match why {
+        NotFound::Limit(limit) => InputError::new("no chip does it", limit.to_string()).into(),
+        NotFound::Engine(why) => anyhow::Error::from(why),
+    })?;
     let took_s = begin.elapsed().as_secs_f64();
     bar.finish_and_clear();
-    let corners = corners(&problem, &found, args.seed)?;
+    let corners = corners(&found);
     let proposed = &corners[0].point;
     let (agree, cycles) = gates_agree(&problem, proposed, args.seed)?;
     anyhow::ensure!(
@@ -117,7 +129,7 @@ pub(super) fn run(args: &ProposeArgs) -> anyhow::Result<()> {
     notes(results.commit(asked)?);
     tell(format_args!(
         "A target of reflectivity {} at {} m under {} klux, found with probability {} in {} frames a second, to {} m:\n\
-         {} designs by theory in {took_s:.1} s, {} of them on the front, whose corners are\n\n{}\n",
+         {} designs by theory, {} of them on the front and confirmed on cohort, in {took_s:.1} s; its corners are\n\n{}\n",
         goal.reflectivity,
         goal.range_m,
         goal.illuminance_klux,
@@ -179,39 +191,28 @@ fn area_unit(sensor: &SensorConfig) -> &'static str {
     }
 }
 
-/// The balanced design, then those with the least of something, each once, on `cohort`.
-fn corners(problem: &Problem, found: &Found, seed: u64) -> anyhow::Result<Vec<Corner>> {
-    let least = |cost: &dyn Fn(&Point) -> f64| -> Point {
-        let mut points = found.front.iter();
-        let first = points.next().expect("a front has a point");
-        let order = |p: &Point| (cost(p), p.ln_cost());
-        *points.fold(first, |best, next| {
-            if order(next) < order(best) {
+/// The balanced design, then those with the least of something, each once.
+fn corners(found: &Found) -> Vec<Corner> {
+    let least = |cost: &dyn Fn(&Point) -> f64| -> Confirmed {
+        let order = |one: &Confirmed| (cost(&one.point), one.point.ln_cost());
+        let least = found.front.iter().copied().reduce(|best, next| {
+            if order(&next) < order(&best) {
                 next
             } else {
                 best
             }
-        })
+        });
+        least.expect("a front has a point")
     };
-    let mut chosen = vec![("balanced", least(&Point::ln_cost))];
+    let named = |name, Confirmed { point, check }| Corner { name, point, check };
+    let mut chosen = vec![named("balanced", least(&Point::ln_cost))];
     for (at, name) in CORNERS.into_iter().enumerate() {
-        let point = least(&|point| point.costs()[at]);
-        if !chosen.iter().any(|(_, known)| *known == point) {
-            chosen.push((name, point));
+        let corner = named(name, least(&|point| point.costs()[at]));
+        if !chosen.iter().any(|known| known.point == corner.point) {
+            chosen.push(corner);
         }
     }
-    let bar = progress(
-        chosen.len() as u64,
-        "checking {bar:40} {pos}/{len} designs on cohort",
-    );
-    let check = |(name, point): (&'static str, Point)| {
-        let check = check(problem, &point, seed)?;
-        bar.inc(1);
-        Ok(Corner { name, point, check })
-    };
-    let corners = chosen.into_iter().map(check).collect();
-    bar.finish_and_clear();
-    corners
+    chosen
 }
 
 /// Columns of costs and design that the table and the CSV share.
@@ -338,28 +339,29 @@ fn sentences(problem: &Problem, found: &Found, corners: &[Corner]) -> String {
     }
 }
 
-/// All of the front and the sensor itself by their numbers, with what was measured of the corners.
+/// All of the front and the sensor itself by their numbers, with what was measured of the front.
 fn write_designs(path: &Path, found: &Found, corners: &[Corner]) -> anyhow::Result<()> {
     let numbers = |point: &Point| toml::Table::try_from(point);
-    let keys = numbers(&found.front[0])?;
+    let keys = numbers(&found.front[0].point)?;
     let measured = "cohort_detection | cohort_detection_low | cohort_detection_high | cohort_precision_m | cohort_precision_low_m | cohort_precision_high_m";
     let headings = ["corner"]
         .into_iter()
         .chain(keys.keys().map(String::as_str));
     let mut grid = Grid::new(headings.chain(measured.split(" | ")));
-    let own = found.own.point().map(|point| ("this sensor", point));
-    for (name, point) in found.front.iter().map(|point| ("", point)).chain(own) {
-        let corner = corners
-            .iter()
-            .find(|corner| corner.point == *point && name.is_empty());
-        let name = corner.map_or(name, |corner| corner.name).to_owned();
+    let mut push = |name: &str, point: &Point, measured: [String; 6]| -> anyhow::Result<()> {
         let numbers = numbers(point)?;
-        let measured = corner.map_or([const { String::new() }; 6], |corner| {
-            let [a, b] = [corner.check.detection, corner.check.precision_m];
-            [a.value, a.low, a.high, b.value, b.low, b.high].map(|value| value.to_string())
-        });
         let numbers = numbers.values().map(ToString::to_string);
-        grid.push([name].into_iter().chain(numbers).chain(measured));
+        grid.push([name.to_owned()].into_iter().chain(numbers).chain(measured));
+        Ok(())
+    };
+    for Confirmed { point, check } in &found.front {
+        let corner = corners.iter().find(|corner| corner.point == *point);
+        let [a, b] = [check.detection, check.precision_m];
+        let measured = [a.value, a.low, a.high, b.value, b.low, b.high].map(|x| x.to_string());
+        push(corner.map_or("", |corner| corner.name), point, measured)?;
+    }
+    if let Some(own) = found.own.point() {
+        push("this sensor", own, [const { String::new() }; 6])?;
     }
     Ok(OutputFile::write_with(path, |out| grid.write_csv(out))?)
 }
@@ -372,7 +374,8 @@ fn chart(problem: &Problem, found: &Found, proposed: &Point, area: &str) -> Char
         goal.reflectivity, goal.range_m, goal.illuminance_klux, goal.fps
     );
     let at = |point: &Point| (point.area, 1e3 * point.power_w);
-    let powers = found.front.iter().map(|point| point.power_w);
+    let front = || found.front.iter().map(|one| &one.point);
+    let powers = front().map(|point| point.power_w);
     let [least, most] = [f64::min, f64::max].map(|of| powers.clone().reduce(of).unwrap_or(1.0));
     let power = match most > 10.0 * least {
         true => Axis::log("mean laser power (mW)"),
@@ -384,7 +387,7 @@ fn chart(problem: &Problem, found: &Found, proposed: &Point, area: &str) -> Char
     for pair in ends.windows(2) {
         let [from, to] = [pair[0] * goal.fps, pair[1] * goal.fps];
         let within = |point: &&Point| (from..to).contains(&point.fps.max(goal.fps));
-        let points: Vec<(f64, f64)> = found.front.iter().filter(within).map(at).collect();
+        let points: Vec<(f64, f64)> = front().filter(within).map(at).collect();
         let name = match to.is_finite() {
             true => format!("{from:.0} to {to:.0} frames/s"),
             false => format!("{from:.0} frames/s and more"),

@@ -1,5 +1,6 @@
 //! Designs on engines: what theory says of them beside `cohort`, and one macropixel at the gates.
 
+use super::goal::Goal;
 use super::point::Point;
 use super::problem::Problem;
 use crate::chip::{Exposure, Sensor, WindowLaw};
@@ -14,7 +15,7 @@ use crate::system::{FrameError, photon_stream, range_counts};
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time, TimeOfFlight};
 
 /// Rows and columns of the array that is checked, at most.
-const CHECKED: (usize, usize) = (16, 64);
+const CHECKED: (usize, usize) = (8, 64);
 
 /// Laser cycles of the macropixel at the gates.
 const GATE_CYCLES: u32 = 50;
@@ -29,6 +30,19 @@ pub struct Check {
 }
 
 impl Check {
+    /// Whether both intervals reach what `goal` asks for.
+    pub fn reaches(&self, goal: &Goal) -> bool {
+        self.detection.high >= goal.detection && self.precision_m.low <= goal.precision_m
+    }
+
+    /// How many times the laser cycles it takes, about: variances and the chance to miss fall with them.
+    pub(super) fn short_of(&self, goal: &Goal) -> f64 {
+        let missed = |detection: f64| libm::log((1.0 - detection).clamp(1e-9, 1.0));
+        let of_detection = missed(goal.detection) / missed(self.detection.value).min(-1e-3);
+        let of_precision = (self.precision_m.value / goal.precision_m).powi(2);
+        of_precision.max(of_detection)
+    }
+
     /// Whether what theory says of this point lies in both intervals.
     pub fn agrees(&self, point: &Point) -> bool {
         self.detection.contains(point.detection) && self.precision_m.contains(point.precision_m)
@@ -85,11 +99,11 @@ impl Bench {
     }
 }
 
-/// A point on `cohort`, in up to 1024 macropixels, or on `window` where `cohort` refuses.
+/// A point on `cohort`, in up to 512 macropixels, or on `window` where `cohort` refuses.
 ///
 /// # Errors
 /// What an engine refuses.
-pub fn check(problem: &Problem, point: &Point, seed: u64) -> Result<Check, FrameError> {
+pub(super) fn check(problem: &Problem, point: &Point, seed: u64) -> Result<Check, FrameError> {
     let bench = Bench::new(problem, point, u32::MAX, seed)?;
     let pixels = 0..bench.sensor.pixels() as u32;
     let (ranges_m, pixels): (Vec<f64>, Vec<LitPixel>) = pixels

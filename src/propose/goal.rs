@@ -3,6 +3,7 @@
 use serde::Serialize;
 use toml::Table;
 
+use super::point::Point;
 use crate::settings::Range::{Above, Within};
 use crate::settings::{Settings, keys};
 
@@ -65,6 +66,22 @@ impl Goal {
 }
 
 impl Choice {
+    /// The choices of a design, with `times` its energy; its bits too, if they are to stay.
+    pub(super) fn of(point: &Point, times: f64, keeps_bits: bool) -> Self {
+        let design = &point.design;
+        Choice {
+            bins: design.bins,
+            bin_bits: keeps_bits.then_some(design.bin_bits),
+            counter_bits: keeps_bits.then_some(design.counter_bits),
+            clk_hz: design.clk_hz,
+            threshold: design.threshold,
+            pulse_energy_uj: times * design.pulse_energy_uj,
+            // Within the last of its periods.
+            rate_hz: design.clk_hz / (f64::from(design.stop_periods) - 0.5),
+            guide_sigma_m: design.guide_sigma_m,
+        }
+    }
+
     /// The first value that is impossible, in a sentence.
     pub fn fault(&self) -> Option<String> {
         fault(self)

@@ -1,9 +1,9 @@
 //! Which chip to build: designs of chip, laser and guide that find and measure a target, and the best of them (`gdtof propose`).
 //!
 //! ```text
-//!   Goal ──► Problem ──┬─► every design of a Space, by theory ──► front ──► static timing ──► front
-//!   sensor, scene ─────┘        │                                                               ├─► corners on `cohort`, one at the gates
-//!                               └─► the sensor itself, on the front or beaten by a point of it ─┘
+//!   Goal ──► Problem ──┬─► every design of a Space, by theory ──► front ──► static timing ──► `cohort` ──► front
+//!   sensor, scene ─────┘        │                                                                            ├─► one at the gates
+//!                               └─► the sensor itself, on the front or beaten by a point of it ──────────────┘
 //! ```
 //!
 //! | file | what |
@@ -15,12 +15,14 @@
 //! | `front.rs` | which of many nothing beats |
 //! | `search.rs` | all designs, and what is wrong where none will do |
 //! | `check.rs` | designs on `cohort`, and at the gates |
+//! | `confirm.rs` | the front of those that the check confirms |
 //!
 //! Theory here is what depths are found by: the mean histogram of an echo with its dead time and THRESHOLD
 //! ([`Response`](crate::ranging::Response)), the power of the test that a depth has to pass ([`Scan::power`](crate::theory::significance::Scan::power)), Fisher's
 //! information of its place, and the share of guided windows that hold it ([`share_inside`](crate::theory::design::share_inside)).
 
 mod check;
+mod confirm;
 mod echo;
 mod front;
 mod goal;
@@ -30,9 +32,10 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-pub use check::{Check, check, gates_agree};
+pub use check::{Check, gates_agree};
+pub use confirm::Confirmed;
 pub use front::{dominates, front};
 pub use goal::{Choice, Goal, Space};
 pub use point::{Candidate, Costs, Design, Limit, Point};
 pub use problem::Problem;
-pub use search::{Found, Own, search};
+pub use search::{Found, NotFound, Own, Step, search};

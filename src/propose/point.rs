@@ -156,6 +156,17 @@ pub enum Limit {
         "time: a frame is {times:.1} times too short for {laser_cycles} laser cycles and the readout"
     )]
     Time { times: f64, laser_cycles: u32 },
+    /// Theory has designs, and engines see less.
+    #[error(
+        "the check on cohort: the nearest design is found in {:.2} % of frames to {precision_m:.4} m, where {:.2} % and {precision_goal_m} m are asked for",
+        100.0 * detection, 100.0 * detection_goal
+    )]
+    Unconfirmed {
+        detection: f64,
+        detection_goal: f64,
+        precision_m: f64,
+        precision_goal_m: f64,
+    },
     /// Bins overflow.
     #[error("bins: the fullest has {times:.1} times the counts that {bits} bits hold")]
     Counts { times: f64, bits: usize },

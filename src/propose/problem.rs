@@ -10,7 +10,7 @@ use crate::analysis::TimingVerdict;
 use crate::chip::{CellLibrary, EventType, Mode, Sensor, SensorConfig, Silicon, Tdc, macropixel};
 use crate::files::InputError;
 use crate::netlist::Netlist;
-use crate::scene::{Emission, EyeRule, Object, Scene, Shape};
+use crate::scene::{Emission, EyeRule, Object, Scene, Shape, Train};
 use crate::theory::design::share_inside;
 use crate::theory::partial::largest_mean;
 use crate::units::{SPEED_OF_LIGHT_M_PER_S, Time};
@@ -31,6 +31,13 @@ const MOST_PHOTONS_A_SPAD: f64 = 0.25;
 
 /// Share of the frames missed that full bins may be.
 const OVERFLOW_SHARE: f64 = 0.1;
+
+/// A pulse, and none for as long as anybody looks.
+const ONE_PULSE: Train = Train {
+    rate_hz: 1.0,
+    pulses: 1.0,
+    frame_s: 1e9,
+};
 
 /// A goal, and what stays the same in all designs: the sensor but for bins, bits, clock and THRESHOLD, optics and laser but for energy and rate.
 #[derive(Debug)]
@@ -85,11 +92,12 @@ impl Problem {
         };
         scene.objects = vec![Object::new("target", goal.reflectivity, around)];
         let (rows, cols) = (sensor.rows as u32, sensor.cols as u32);
-        let emission = scene.emission(rows, cols, goal.fps, goal.fps);
+        let emission = scene.emission(rows, cols, ONE_PULSE);
         if emission.beside_class_1().is_none() {
             let message = format!(
-                "{} nm is not judged for the safety of eyes; give 700 to 1050 nm",
-                scene.lidar.wavelength_nm
+                "{} nm is not judged for the safety of eyes; give {}",
+                scene.lidar.wavelength_nm,
+                Emission::JUDGED
             );
             return Err(InputError::new("scene.lidar.wavelength_nm", message));
         }
@@ -146,11 +154,8 @@ impl Problem {
 
     /// The most energy that a single pulse may have, uJ.
     pub(super) fn most_energy_uj(&self) -> f64 {
-        let alone = self.emission.with(1.0, 1e-9, 1e-9);
-        1.0 / alone
-            .beside_class_1()
-            .expect("a judged wavelength")
-            .times_class_1
+        let judged = self.emission.beside_class_1();
+        1.0 / judged.expect("a judged wavelength").times_class_1
     }
 
     /// Whether a chip meets its timing.
@@ -311,11 +316,12 @@ impl Problem {
             let frame_s = config.frame_time(Time::from_s(exposed_s)).as_s();
             let pulse_hz = window.clk_hz / f64::from(before);
             let eye = |frames_hz: f64| -> (f64, EyeRule) {
-                let emission = self.emission.with(
-                    window.pulse_energy_uj,
-                    pulse_hz,
-                    (pulses * frames_hz).min(pulse_hz),
-                );
+                let train = Train {
+                    rate_hz: pulse_hz,
+                    pulses,
+                    frame_s: (1.0 / frames_hz).max(pulses / pulse_hz),
+                };
+                let emission = self.emission.with(window.pulse_energy_uj, train);
                 let judged = emission.beside_class_1().expect("a judged wavelength");
                 (judged.times_class_1, judged.rule)
             };
@@ -326,7 +332,7 @@ impl Problem {
             if eye(fastest).0 <= 1.0 {
                 allowed = fastest;
             } else {
-                for _ in 0..40 {
+                for _ in 0..24 {
                     let middle = 0.5 * (allowed + forbidden);
                     let end = if eye(middle).0 <= 1.0 {
                         &mut allowed
@@ -361,8 +367,13 @@ impl Problem {
     /// # Errors
     /// What makes it impossible whatever the laser cycles.
     pub fn judge(&self, choice: &Choice) -> Result<Candidate, Limit> {
+        self.judge_from(choice, 1)
+    }
+
+    /// The same with `least` laser cycles or more.
+    pub(super) fn judge_from(&self, choice: &Choice, least: u32) -> Result<Candidate, Limit> {
         let echo = self.echo(choice.clk_hz, choice.threshold, choice.pulse_energy_uj);
-        let (seen, cycles) = (echo.through(choice.bins), (1, MOST_CYCLES));
+        let (seen, cycles) = (echo.through(choice.bins), (least, MOST_CYCLES));
         let mut found = None;
         self.designs(choice, &seen, cycles, &[choice.rate_hz], |one| {
             found = Some(one)

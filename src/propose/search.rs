@@ -2,16 +2,17 @@
 //!
 //! For each CLK, THRESHOLD and energy the echo is computed once, and seen through windows of any number of bins. Left out is what
 //! cannot be on the front: bins of more bits than the counts need, and energies below one that needs more laser cycles than a frame has.
-
-use std::collections::HashSet;
+//! Energies come in steps; those of the designs on the front are then solved for.
 
 use rayon::prelude::*;
 
+use super::confirm::{Confirmed, confirmed};
 use super::front::{dominates, front};
 use super::goal::{Choice, Space};
 use super::point::{Candidate, Limit, Point};
 use super::problem::{MOST_CYCLES, Problem};
 use crate::chip::SensorConfig;
+use crate::system::FrameError;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Pulses a second that are tried below the most that the range allows, 1/s: of 200 kHz and its multiples fewer pulses
@@ -41,12 +42,32 @@ const ABOVE: i32 = 3;
 /// The best designs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
-    /// What nothing beats, the least laser power first.
-    pub front: Vec<Point>,
+    /// What nothing beats.
+    pub front: Vec<Confirmed>,
     /// Designs that were judged.
     pub tried: u64,
     /// The sensor that all were made from.
     pub own: Own,
+}
+
+/// A step of a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Step {
+    /// All designs of a CLK and a THRESHOLD are judged.
+    Clock,
+    /// A design is checked.
+    Check,
+}
+
+/// Why nothing is found.
+#[derive(Debug, thiserror::Error)]
+pub enum NotFound {
+    /// No design will do.
+    #[error(transparent)]
+    Limit(#[from] Limit),
+    /// An engine refuses a design.
+    #[error(transparent)]
+    Engine(#[from] FrameError),
 }
 
 /// What becomes of the sensor as it is, with the laser and guide that suit it best.
@@ -218,6 +239,43 @@ fn gather(
     all.into_iter().fold(Gathered::default(), Gathered::and)
 }
 
+/// Designs of the front with as much energy as costs nothing else, and as much as is allowed.
+fn solved(problem: &Problem, own: bool, points: &[Point]) -> Vec<Point> {
+    let step = libm::pow(10f64, 1.0 / f64::from(A_DECADE));
+    let solve = |point: &Point| -> Vec<Point> {
+        let with = |times: f64| -> Option<Point> {
+            // More light takes fewer laser cycles, by the square at most.
+            let least = f64::from(point.design.laser_cycles) / (2.0 * times * times);
+            let choice = Choice::of(point, times, own);
+            let candidate = problem.judge_from(&choice, 1 + least as u32).ok()?;
+            candidate.limit().is_none().then_some(candidate.point)
+        };
+        let costs = point.costs();
+        let is_no_worse = |p: &Point| p.costs().iter().zip(&costs).all(|(p, own)| p <= own);
+        let free = most_times(step, |times| with(times).filter(is_no_worse));
+        let allowed = most_times(step, with);
+        free.into_iter().chain(allowed).collect()
+    };
+    let best = front(points.to_vec(), Point::costs);
+    best.par_iter().flat_map_iter(solve).collect()
+}
+
+/// What `of` makes of the greatest number from 1 to `step` of which it makes something, to a thousandth; nothing if that is 1 or `step`.
+fn most_times<T>(step: f64, of: impl Fn(f64) -> Option<T>) -> Option<T> {
+    if of(step).is_some() {
+        return None;
+    }
+    let (mut low, mut high, mut found) = (1.0, step, None);
+    while high - low > 1e-3 {
+        let middle = 0.5 * (low + high);
+        match of(middle) {
+            Some(one) => (low, found) = (middle, Some(one)),
+            None => high = middle,
+        }
+    }
+    found
+}
+
 /// What makes all designs of a space impossible, the guide being as good as any that is tried.
 fn limit_of(problem: &Problem, space: &Space, own: bool) -> Limit {
     let space = Space {
@@ -232,11 +290,17 @@ fn limit_of(problem: &Problem, space: &Space, own: bool) -> Limit {
         .unwrap_or(Limit::Light { most: MOST_CYCLES })
 }
 
-/// The best of a space, by theory and with their timing met. `done` is told of each pair of CLK and THRESHOLD.
+/// The best of a space, with their timing met, and confirmed by `cohort` with the photons of `seed`. `done` is told of each pair of CLK and THRESHOLD,
+/// and of each design that is checked.
 ///
 /// # Errors
-/// What makes all of them impossible.
-pub fn search(problem: &Problem, space: &Space, done: impl Fn() + Sync) -> Result<Found, Limit> {
+/// What makes all of them impossible, and what an engine refuses.
+pub fn search(
+    problem: &Problem,
+    space: &Space,
+    seed: u64,
+    done: impl Fn(Step) + Sync,
+) -> Result<Found, NotFound> {
     let mut space = space.clone();
     for values in [&mut space.clk_hz, &mut space.guide_sigma_m] {
         values.sort_by(f64::total_cmp);
@@ -256,9 +320,9 @@ pub fn search(problem: &Problem, space: &Space, done: impl Fn() + Sync) -> Resul
         is_met
     });
     if let (true, Some(limit)) = (space.clk_hz.is_empty(), too_fast) {
-        return Err(limit);
+        return Err(limit.into());
     }
-    let gathered = gather(problem, &space, false, 0, &done);
+    let gathered = gather(problem, &space, false, 0, &|| done(Step::Clock));
     let own_space = Space {
         bins: vec![sensor.bins],
         clk_hz: vec![sensor.clk_hz],
@@ -266,20 +330,23 @@ pub fn search(problem: &Problem, space: &Space, done: impl Fn() + Sync) -> Resul
         ..space.clone()
     };
     let of_own = gather(problem, &own_space, true, 0, &|| ());
-    let front = met(problem, gathered.points);
-    if front.is_empty() {
-        return Err(limit_of(problem, &space, false));
-    }
+    let solved_for = solved(problem, false, &gathered.points);
+    let tried = gathered.tried + of_own.tried + solved_for.len() as u64;
+    let points = [gathered.points, solved_for].concat();
+    let front = match confirmed(problem, points, seed, || done(Step::Check))? {
+        Ok(front) => front,
+        Err(Some(unconfirmed)) => return Err(unconfirmed.into()),
+        Err(None) => return Err(limit_of(problem, &space, false).into()),
+    };
     let own = match timed(problem, sensor) {
         Err(limit) => Own::Impossible(limit),
         Ok(()) if of_own.points.is_empty() => Own::Impossible(limit_of(problem, &own_space, true)),
-        Ok(()) => beside(&front, of_own.points),
+        Ok(()) => {
+            let solved_for = solved(problem, true, &of_own.points);
+            beside(&front, [of_own.points, solved_for].concat())
+        }
     };
-    Ok(Found {
-        tried: gathered.tried + of_own.tried,
-        front,
-        own,
-    })
+    Ok(Found { tried, front, own })
 }
 
 /// A chip's timing as a limit.
@@ -290,46 +357,13 @@ fn timed(problem: &Problem, config: &SensorConfig) -> Result<(), Limit> {
         .map_err(|why| Limit::Timing { mhz, why })
 }
 
-/// The front of those whose chips meet their timing.
-fn met(problem: &Problem, mut points: Vec<Point>) -> Vec<Point> {
-    let key = |point: &Point| {
-        let design = &point.design;
-        (
-            design.bins,
-            design.bin_bits,
-            design.counter_bits,
-            design.clk_hz.to_bits(),
-        )
-    };
-    let mut known = HashSet::new();
-    loop {
-        let best = front(points.iter().collect(), |point| point.costs());
-        let mut chips = best.clone();
-        chips.retain(|point| !known.contains(&key(point)));
-        chips.sort_by_key(|point| key(point));
-        chips.dedup_by_key(|point| key(point));
-        let failed: HashSet<_> = (chips.par_iter())
-            .filter(|p| problem.timing(&problem.config_of(&p.design)).is_err())
-            .map(|p| key(p))
-            .collect();
-        known.extend(chips.iter().map(|p| key(p)));
-        if failed.is_empty() {
-            return best.into_iter().copied().collect();
-        }
-        points.retain(|point| !failed.contains(&key(point)));
-    }
-}
-
 /// The sensor's own designs beside the front.
-fn beside(best: &[Point], mut own: Vec<Point>) -> Own {
+fn beside(best: &[Confirmed], mut own: Vec<Point>) -> Own {
     own.sort_by(|a, b| a.ln_cost().total_cmp(&b.ln_cost()));
     let beats = |point: &Point| {
         let own = point.costs();
-        let mut better: Vec<Point> = best
-            .iter()
-            .filter(|p| dominates(&p.costs(), &own))
-            .copied()
-            .collect();
+        let best = best.iter().map(|one| one.point);
+        let mut better: Vec<Point> = best.filter(|p| dominates(&p.costs(), &own)).collect();
         better.sort_by(|a, b| a.ln_cost().total_cmp(&b.ln_cost()));
         better
     };

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::chip::{Sensor, SensorConfig};
-use crate::scene::{Lidar, Scene};
+use crate::scene::{Lidar, Scene, Train};
 use crate::theory::precision::{cramer_rao, cramer_rao_laser_cycles, range_m, thompson, time_ns};
 
 /// A dark wall not far away.
@@ -56,9 +56,9 @@ fn a_macropixel_grows_with_its_bins_and_their_bits() {
 #[test]
 fn the_front_keeps_its_promises() {
     let problem = problem(NEAR);
-    let found = search(&problem, &small(), || ()).unwrap();
+    let found = search(&problem, &small(), 3, |_| ()).unwrap();
     assert!(found.front.len() > 1);
-    for point in &found.front {
+    for Confirmed { point, check } in &found.front {
         let design = &point.design;
         let config = problem.config_of(design);
         config.check().unwrap();
@@ -74,38 +74,38 @@ fn the_front_keeps_its_promises() {
         assert!(point.precision_m <= NEAR.precision_m && point.detection >= NEAR.detection);
 
         let laser_cycle_s = f64::from(design.stop_periods) / design.clk_hz;
-        let pulses_hz = (1.0 / laser_cycle_s, cycles * NEAR.fps);
-        let emission = scene.emission(64, 64, pulses_hz.0, pulses_hz.1);
+        let train = Train {
+            rate_hz: 1.0 / laser_cycle_s,
+            pulses: cycles,
+            frame_s: 1.0 / NEAR.fps,
+        };
+        let emission = scene.emission(64, 64, train);
         let judged = emission.beside_class_1().unwrap().times_class_1;
         assert!(judged <= 1.0 && (judged / point.times_class_1 - 1.0).abs() < 1e-9);
         let frame_s = cycles * laser_cycle_s + config.readout_time().as_s();
         assert!(frame_s <= 1.0 / NEAR.fps && point.fps <= 1.0 / frame_s * (1.0 + 1e-9));
         assert!(point.fps >= NEAR.fps);
-        let power_w = scene.lidar.pulse_energy_uj * 1e-6 * pulses_hz.1;
+        let power_w = scene.lidar.pulse_energy_uj * 1e-6 * cycles * NEAR.fps;
         assert!((power_w / point.power_w - 1.0).abs() < 1e-9);
         assert_eq!(problem.timing(&config), Ok(()));
         assert!(
             !found
                 .front
                 .iter()
-                .any(|other| dominates(&other.costs(), &point.costs()))
+                .any(|other| dominates(&other.point.costs(), &point.costs()))
         );
-    }
-    for point in [found.front[0], found.front[found.front.len() - 1]] {
-        let check = check(&problem, &point, 3).unwrap();
-        assert!(
-            check.detection.high >= point.detection,
-            "{check:?} {point:?}"
-        );
+        assert!(check.reaches(&NEAR), "{check:?} {point:?}");
         let ratio = check.precision_m.value / point.precision_m;
         assert!((0.9..1.2).contains(&ratio), "{check:?} {point:?}");
-        assert_eq!(gates_agree(&problem, &point, 3).unwrap(), (true, 50));
+    }
+    for one in [found.front[0], found.front[found.front.len() - 1]] {
+        assert_eq!(gates_agree(&problem, &one.point, 3).unwrap(), (true, 50));
     }
 }
 
 #[test]
 fn the_quantic4x4_needs_fewer_bits_before_a_wall_not_far_away() {
-    let found = search(&problem(NEAR), &small(), || ()).unwrap();
+    let found = search(&problem(NEAR), &small(), 3, |_| ()).unwrap();
     let Own::Beaten(own, better) = &found.own else {
         panic!("{:?}", found.own);
     };
@@ -180,7 +180,13 @@ fn the_demonstrators_precision_is_that_of_the_thesis() {
 /// What stands in the way is named, with figures that hold.
 #[test]
 fn what_makes_a_goal_impossible_is_named() {
-    let limit = |goal: Goal, space: Space| search(&problem(goal), &space, || ()).unwrap_err();
+    let limit = |goal: Goal, space: Space| {
+        let found = search(&problem(goal), &space, 3, |_| ());
+        match found.unwrap_err() {
+            NotFound::Limit(limit) => limit,
+            other => panic!("{other}"),
+        }
+    };
     let far = Goal {
         range_m: 190.0,
         illuminance_klux: 100.0,
@@ -234,19 +240,10 @@ fn what_makes_a_goal_impossible_is_named() {
 #[test]
 fn a_design_by_itself_is_judged_as_among_others() {
     let problem = problem(NEAR);
-    let found = search(&problem, &small(), || ()).unwrap();
-    let point = found.front[0];
+    let found = search(&problem, &small(), 3, |_| ()).unwrap();
+    let point = found.front[0].point;
     let design = &point.design;
-    let choice = Choice {
-        bins: design.bins,
-        bin_bits: None,
-        counter_bits: None,
-        clk_hz: design.clk_hz,
-        threshold: design.threshold,
-        pulse_energy_uj: design.pulse_energy_uj,
-        rate_hz: design.clk_hz / (f64::from(design.stop_periods) - 0.5),
-        guide_sigma_m: design.guide_sigma_m,
-    };
+    let choice = Choice::of(&point, 1.0, false);
     let candidate = problem.judge(&choice).unwrap();
     assert!(candidate.limit().is_none());
     let own = candidate.point.design;
@@ -301,4 +298,43 @@ fn values_are_held_to_their_ranges() {
         ..Space::default()
     };
     assert!(space.fault().unwrap().starts_with("bins = 65 "));
+}
+
+/// Designs of the same space at random, of any energy and rate: none that its check confirms beats the front by more than its search's steps.
+#[test]
+fn no_random_design_beats_the_front() {
+    use rand::{RngExt, SeedableRng, rngs::StdRng};
+    let problem = problem(NEAR);
+    let space = small();
+    let found = search(&problem, &space, 3, |_| ()).unwrap();
+    let mut random = StdRng::seed_from_u64(5);
+    let (mut possible, most_uj) = (0, problem.most_energy_uj());
+    while possible < 20 {
+        let mut one = |values: &[f64]| values[random.random_range(0..values.len())];
+        let choice = Choice {
+            bins: one(&[8.0, 16.0]) as usize,
+            clk_hz: one(&space.clk_hz),
+            guide_sigma_m: one(&space.guide_sigma_m),
+            pulse_energy_uj: most_uj * libm::pow(10.0, random.random_range(-2.0..0.0)),
+            rate_hz: libm::pow(10.0, random.random_range(4.0..6.0)),
+            ..Choice::default()
+        };
+        let Ok(candidate) = problem.judge(&choice) else {
+            continue;
+        };
+        if candidate.limit().is_some() {
+            continue;
+        }
+        possible += 1;
+        let point = candidate.point;
+        let dearer = point.costs().map(|cost| 1.01 * cost);
+        let beaten = found
+            .front
+            .iter()
+            .find(|one| dominates(&dearer, &one.point.costs()));
+        if let Some(beaten) = beaten {
+            let check = super::check::check(&problem, &point, 3).unwrap();
+            assert!(!check.reaches(&NEAR), "{point:?} beats {:?}", beaten.point);
+        }
+    }
 }

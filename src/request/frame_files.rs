@@ -18,7 +18,7 @@ use crate::chip::{Mode, SensorConfig, WindowLaw, library_files};
 use crate::engine::{Work, variance_left_out};
 use crate::files::{InputError, OutputFile, parse_json};
 use crate::report::{Cell, DepthMap, write_npy_u16};
-use crate::scene::{EyeSafety, Scene};
+use crate::scene::{EyeSafety, Scene, Train};
 use crate::system::{
     DistanceLaw, EngineKind, Frame, FrameSettings, Kept, NoDepth, PhaseTimes, PixelDepth, Summary,
 };
@@ -142,9 +142,12 @@ pub(crate) fn eye_safety_of(
     frame: &Frame,
 ) -> Option<EyeSafety> {
     let pulses = f64::from(laser_cycles);
-    let rate_hz = pulses / frame.exposure_time.as_s();
-    let mean_rate_hz = pulses / sensor.frame_time(frame.exposure_time).as_s();
-    let emission = scene.emission(frame.rows as u32, frame.cols as u32, rate_hz, mean_rate_hz);
+    let train = Train {
+        rate_hz: pulses / frame.exposure_time.as_s(),
+        pulses,
+        frame_s: sensor.frame_time(frame.exposure_time).as_s(),
+    };
+    let emission = scene.emission(frame.rows as u32, frame.cols as u32, train);
     emission.beside_class_1()
 }
 

@@ -42,7 +42,7 @@ pub(crate) use bounds::Bounds;
 pub use camera::PinholeCamera;
 pub use cast::{Hit, Stage};
 pub use curve::{Curve, CurveError, Measured};
-pub use eye_safety::{Emission, EyeRule, EyeSafety};
+pub use eye_safety::{Emission, EyeRule, EyeSafety, Train};
 pub use interferer::Interferer;
 pub use medium::{DROPLET_LIDAR_RATIO_SR, Medium};
 pub use object::Object;
