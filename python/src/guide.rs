@@ -93,7 +93,7 @@ impl Map {
     fn guide(&self) -> Result<Arc<dyn Estimates>, Failure> {
         let pairs = self.range_m.iter().zip(&self.sigma_m);
         let estimate = |(at, (&range_m, &sigma_m)): (usize, (&f64, &f64))| {
-            if range_m.is_nan() || range_m == 0.0 {
+            if range_m == 0.0 || !range_m.is_finite() || !sigma_m.is_finite() {
                 return Ok(None);
             }
             let wrong = |name: &str, value: f64| {
@@ -102,10 +102,7 @@ impl Map {
                     format!("{value} in row {row}, column {col} is no length; give metres");
                 Err(Failure::argument(name, message))
             };
-            match (
-                range_m.is_finite() && range_m > 0.0,
-                sigma_m.is_finite() && sigma_m >= 0.0,
-            ) {
+            match (range_m > 0.0, sigma_m >= 0.0) {
                 (true, true) => Ok(Some((range_m, sigma_m))),
                 (false, _) => wrong("range_m", range_m),
                 (_, false) => wrong("sigma_m", sigma_m),
@@ -131,7 +128,7 @@ impl Guide {
         Ok(Guide::of(parts)?)
     }
 
-    /// A map of one's own: distances along the ray, m, shape (rows, cols), NaN (or 0) where there is no estimate; `sigma_m` is the
+    /// A map of one's own: distances along the ray, m, shape (rows, cols), NaN, infinite, 0 or masked where there is no estimate; `sigma_m` is the
     /// standard deviation that it claims for itself, m, a number or an array of the same shape.
     #[staticmethod]
     #[pyo3(signature = (range_m, sigma_m=None))]
@@ -141,7 +138,12 @@ impl Guide {
         sigma_m: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Self> {
         let numpy = py.import("numpy")?;
-        let real = |values: Bound<'py, PyAny>| numpy.call_method1("asarray", (values, "float64"));
+        // What is masked has no value.
+        let masked = numpy.getattr("ma")?;
+        let real = |values: Bound<'py, PyAny>| {
+            let values = masked.call_method1("asarray", (values, "float64"))?;
+            values.call_method1("filled", (f64::NAN,))
+        };
         let range_m = real(range_m)?.extract::<PyReadonlyArrayDyn<'_, f64>>()?;
         let &[rows, cols] = range_m.shape() else {
             let message = format!(

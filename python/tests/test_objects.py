@@ -116,6 +116,21 @@ def test_guides_that_say_the_same_are_equal() -> None:
     assert gdtof.Guide() != "stereo"
 
 
+def test_what_has_no_value_is_no_data() -> None:
+    metres = np.ma.masked_array([[10.0, 20.0], [np.nan, np.inf]], mask=[[False, True], [False, False]])
+    found, _ = gdtof.Guide.from_map(metres).estimate(rows=2, cols=2)
+    assert np.array_equal(found, [[10.0, np.nan], [np.nan, np.nan]], equal_nan=True)
+    starts = gdtof.starts_for(metres)
+    assert starts[0, 0] >= 0 and starts[0, 1] == -1
+    sensor = gdtof.Sensor(rows=2, cols=2)
+    masked = np.ma.masked_equal(np.array([[60, 61], [62, 63]]), 61)
+    with pytest.raises(gdtof.InputError, match="starts: is masked in places"):
+        gdtof.frame(sensor, starts=masked, laser_cycles=5)
+    counts = np.ma.masked_equal(np.ones((2, 2, 16), np.uint16), 1)
+    with pytest.raises(gdtof.InputError, match="histograms: is masked in places"):
+        gdtof.range(counts, starts=60, sensor=sensor, laser_cycles=5)
+
+
 def test_copies_travel() -> None:
     guide = gdtof.Guide("radar", gdtof.Guide.from_map([[1.0, np.nan]], sigma_m=[[0.5, 1.0]]))
     alone = gdtof.Guide.from_map([[1.0, np.nan]], sigma_m=[[0.5, 1.0]])

@@ -21,9 +21,8 @@ pub(super) struct StereoArgs {
     right: PathBuf,
     #[command(flatten)]
     matching: MatchingArgs,
-    /// True disparities of the left picture to compare with (.npy, rows x columns; NaN or infinite where unknown).
-    #[arg(long, value_name = "FILE")]
-    truth: Option<PathBuf>,
+    #[command(flatten)]
+    truth: TruthArgs,
     /// Folder for the results; created if missing.
     #[arg(long, short, value_name = "FOLDER", default_value = "stereo")]
     out: PathBuf,
@@ -33,6 +32,17 @@ pub(super) struct StereoArgs {
     /// Print JSON instead of the table.
     #[arg(long)]
     json: bool,
+}
+
+/// What the disparities really are.
+#[derive(Args)]
+pub(super) struct TruthArgs {
+    /// True disparities of the left picture (.npy, PFM, EXR or PNG, px; 0, NaN or infinite where unknown).
+    #[arg(long, value_name = "FILE", requires = "left")]
+    pub(super) truth: Option<PathBuf>,
+    /// What its numbers count, px; a PNG needs it (KITTI: 0.00390625).
+    #[arg(long, value_name = "PX", requires = "truth")]
+    truth_unit: Option<f64>,
 }
 
 /// How to match.
@@ -241,8 +251,7 @@ struct Report {
 pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
     let matcher = args.matching.matcher()?;
     let (left, right) = (read_image(&args.left)?, read_image(&args.right)?);
-    let truth = args.truth.as_ref().map(|path| read_truth(path, &left));
-    let truth = truth.transpose()?;
+    let truth = args.truth.read(&left)?;
     let mut workspace = Workspace::default();
     let mut times_s = Vec::new();
     let mut matched = || {
@@ -286,19 +295,33 @@ pub(super) fn run(args: &StereoArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-pub(super) fn read_truth(path: &Path, left: &GreyImage) -> Result<Vec<f32>, InputError> {
-    let truth = Raster::read(path)?;
-    if (truth.width, truth.height) == (left.width(), left.height()) {
-        return Ok(truth.values);
+impl TruthArgs {
+    /// The disparities, px, as many as `left` has pixels; NaN where unknown.
+    ///
+    /// # Errors
+    /// As [`Raster::read_map`], a unit that is none, and another shape.
+    pub(super) fn read(&self, left: &GreyImage) -> Result<Option<Vec<f32>>, InputError> {
+        let Some(path) = &self.truth else {
+            return Ok(None);
+        };
+        if let Some(unit) = self.truth_unit.filter(|unit| !(1e-6..=1e6).contains(unit)) {
+            let message = format!("{unit} is impossible; give 1e-6 to 1e6 px");
+            return Err(InputError::new("--truth-unit", message));
+        }
+        let truth = Raster::read_map(path, self.truth_unit, "--truth-unit (0.00390625 for KITTI)")?;
+        if (truth.width, truth.height) == (left.width(), left.height()) {
+            let known = |px: &f32| if *px > 0.0 { *px } else { f32::NAN };
+            return Ok(Some(truth.values.iter().map(known).collect()));
+        }
+        let message = format!(
+            "has {} x {} values and the pictures {} x {} pixels; give the truth of these pictures",
+            truth.width,
+            truth.height,
+            left.width(),
+            left.height()
+        );
+        Err(InputError::new(path.display(), message))
     }
-    let message = format!(
-        "has {} x {} values and the pictures {} x {} pixels; give the truth of these pictures",
-        truth.width,
-        truth.height,
-        left.width(),
-        left.height()
-    );
-    Err(InputError::new(path.display(), message))
 }
 
 /// Draws disparities; near is yellow as in pictures of depth.

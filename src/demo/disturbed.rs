@@ -29,6 +29,8 @@ use crate::system::FrameError;
 const LOOKED_AT: usize = 12;
 /// Crystals keep their rate to that, ppm; those of vehicles are spread evenly over it.
 const CRYSTAL_PPM: f64 = 20.0;
+/// Full histograms in the memory of the guided chip: those of as many macropixels less; the others have no depth.
+const EQUAL_SILICON: &str = "full, equal silicon";
 /// Dither, ns.
 const DITHER_NS: f64 = 1000.0;
 
@@ -210,7 +212,21 @@ impl Disturbance {
             lost: ends(sums.lost),
             mean_error_m: super::found::mean(sums.errors_m.into_iter()),
         };
-        Ok(by_scheme.into_iter().map(outcome).collect())
+        let mut outcomes: Vec<Outcome> = by_scheme.into_iter().map(outcome).collect();
+        let of = |scheme| outcomes.iter().find(|outcome| outcome.scheme == scheme);
+        let of_equal_silicon = of("guided").zip(of("full")).map(|(guided, full)| {
+            let with_histogram = 1.0 / full.bins.div_ceil(guided.bins) as f64;
+            let of_draws = |share: f64| ends(share * self.draws as f64);
+            Outcome {
+                scheme: EQUAL_SILICON,
+                bins: guided.bins,
+                wrong: of_draws(full.wrong[0] * with_histogram),
+                lost: of_draws(1.0 - (1.0 - full.lost[0]) * with_histogram),
+                ..full.clone()
+            }
+        });
+        outcomes.extend(of_equal_silicon);
+        Ok(outcomes)
     }
 }
 
@@ -247,5 +263,17 @@ mod tests {
             assert!(wrong("we wait", scheme) < 0.05, "{scheme}");
         }
         assert!(wrong("still", "guided") < 0.05);
+        // A bin of the guided chip's memory for 27 of a full histogram.
+        let lost = |scheme: &str| {
+            let of = outcomes
+                .iter()
+                .find(|o| o.case == "we wait" && o.scheme == scheme);
+            of.unwrap().lost[0]
+        };
+        let with_depth = [1.0 - lost("full"), 1.0 - lost(EQUAL_SILICON)];
+        assert!(
+            (with_depth[0] / with_depth[1] / 27.0 - 1.0).abs() < 1e-9,
+            "{with_depth:?}"
+        );
     }
 }

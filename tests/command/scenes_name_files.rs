@@ -84,6 +84,23 @@ fn files_that_cannot_be_used_are_refused_with_line_and_cure() {
         "fine.pfm",
         &[b"Pf\n1 1\n-1\n".as_slice(), &5f32.to_le_bytes()].concat(),
     );
+    put(
+        "behind.pfm",
+        &[b"Pf\n1 1\n-1\n".as_slice(), &(-1f32).to_le_bytes()].concat(),
+    );
+    for (name, colour) in [
+        ("grey.png", png::ColorType::Grayscale),
+        ("colour.png", png::ColorType::Rgb),
+    ] {
+        let file = fs::File::create(folder.path().join(name)).unwrap();
+        let mut encoder = png::Encoder::new(file, 1, 1);
+        encoder.set_color(colour);
+        encoder.set_depth(png::BitDepth::Sixteen);
+        let mut writer = encoder.write_header().unwrap();
+        writer
+            .write_image_data(&vec![1; 2 * colour.samples()])
+            .unwrap();
+    }
     put("wide.pfm", &[b"Pf\n2 1\n-1\n".as_slice(), &[0; 8]].concat());
     let map = |more: &str| format!("kind = \"map\"\nfocal_px = 50\n{more}");
     for (keys, says) in [
@@ -106,7 +123,19 @@ fn files_that_cannot_be_used_are_refused_with_line_and_cure() {
         ),
         (
             map("depth_file = \"nan.pfm\""),
-            "nan.pfm: has a depth of NaN at row 0, column 0; write 0 where nothing is",
+            "nan.pfm: has no surface in it",
+        ),
+        (
+            map("depth_file = \"behind.pfm\""),
+            "behind.pfm: has -1 at row 0, column 0; write 0 where there is no value",
+        ),
+        (
+            map("depth_file = \"grey.png\""),
+            "grey.png: is a PNG, whose whole numbers have no unit; give depth_unit_m (0.001 for millimetres",
+        ),
+        (
+            map("depth_file = \"colour.png\"\ndepth_unit_m = 0.001"),
+            "colour.png: is a picture in colour and no map",
         ),
         (
             map("depth_file = \"wide.pfm\""),

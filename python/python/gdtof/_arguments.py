@@ -49,6 +49,8 @@ def policy_of(windows: Policy) -> str:
 
 def whole(name: str, values: ArrayLike) -> NDArray[np.int64]:
     """Whole numbers, without rounding any."""
+    if np.ma.is_masked(values):
+        raise InputError(f"{name}: is masked in places; fill them with what they are")
     array = np.asarray(values)
     if array.dtype.kind == "f" and array.size and np.all(array == np.trunc(array)):
         array = array.astype(np.int64)
@@ -67,8 +69,14 @@ def starts_of(starts: ArrayLike, sensor: Sensor) -> NDArray[np.int64]:
     return array
 
 
+def numbers(values: ArrayLike) -> NDArray[np.float64]:
+    """Numbers in their shape; NaN where they are masked."""
+    filled: NDArray[np.float64] = np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
+    return filled
+
+
 def real(values: ArrayLike, shape: tuple[int, ...] | None = None) -> NDArray[np.float64]:
-    array = np.asarray(values, dtype=np.float64)
+    array = numbers(values)
     if shape is not None and array.ndim < len(shape):
         array = np.broadcast_to(array, shape)
     return np.ascontiguousarray(array)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _gdtof
-from ._arguments import SceneLike, SensorLike, real, scene_of, sensor_of, starts_of, whole
+from ._arguments import SceneLike, SensorLike, numbers, real, scene_of, sensor_of, starts_of, whole
 from ._frame import Engine, _path
 from .errors import InputError
 
@@ -117,8 +117,8 @@ def expose(
     chip = sensor_of(sensor)
     rows, cols, _ = chip.shape
     shape = (rows, cols)
-    photons, arrivals = np.asarray(signal, np.float64), np.asarray(arrival_ns, np.float64)
-    sigmas = None if sigma_ns is None else np.asarray(sigma_ns, np.float64)
+    photons, arrivals = numbers(signal), numbers(arrival_ns)
+    sigmas = None if sigma_ns is None else numbers(sigma_ns)
     several = [a.shape[2] for a in (photons, arrivals, sigmas) if a is not None and a.ndim == 3]
     of_echoes = (rows, cols, several[0] if several else 1)
 
@@ -245,8 +245,8 @@ def range(
     """
     chip = sensor_of(sensor)
     counts = np.asarray(histograms)
-    if counts.dtype != np.uint16:
-        wide = whole("histograms", counts)
+    if counts.dtype != np.uint16 or np.ma.is_masked(histograms):
+        wide = whole("histograms", histograms)
         if wide.size and (wide.min() < 0 or wide.max() > np.iinfo(np.uint16).max):
             raise InputError("histograms: counts are from 0 to 65535; give such")
         counts = wide.astype(np.uint16)

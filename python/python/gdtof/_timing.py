@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _gdtof
-from ._arguments import SensorLike, real, sensor_of, starts_of
+from ._arguments import SensorLike, numbers, real, sensor_of, starts_of
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def starts_for(
 ) -> NDArray[np.int32]:
     """Start values whose windows hold distances nearest to their middle, in the shape of `range_m` (m); -1 where none does, and
     for NaN."""
-    metres = np.asarray(range_m, np.float64)
+    metres = numbers(range_m)
     flat = _gdtof.starts_for(sensor_of(sensor), real(metres.ravel()), stop_periods)
     return flat.reshape(metres.shape)
 

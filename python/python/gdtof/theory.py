@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _gdtof
-from ._arguments import whole
+from ._arguments import numbers, whole
 from .errors import InputError
 
 __all__ = [
@@ -58,7 +58,7 @@ def _apply(
     columns: dict[str, ArrayLike],
     least: dict[str, float] | None = None,
 ) -> Numbers:
-    arrays = {key: np.asarray(value, np.float64) for key, value in columns.items()}
+    arrays = {key: numbers(value) for key, value in columns.items()}
     for key, bound in (least or {}).items():
         wrong = ~(np.isfinite(arrays[key]) & (arrays[key] >= bound))
         if wrong.any():

@@ -15,7 +15,7 @@ use glam::DMat3;
 use serde::Serialize;
 
 use crate::chip::SensorConfig;
-use crate::cli::stereo::{Errors, cannot_match, disparity_picture, read_image, read_truth};
+use crate::cli::stereo::{Errors, TruthArgs, cannot_match, disparity_picture, read_image};
 use crate::files::{InputError, Raster, parse_toml, read_text};
 use crate::guide::{Guide, GuideInput, MatchedPair};
 use crate::report::{Table, write_npy_f32};
@@ -41,10 +41,9 @@ pub(super) struct PairArgs {
     /// min_disparity, lidar_position_m (from the left camera) and lidar_fov_deg.
     #[arg(long, value_name = "FILE", requires = "left")]
     calib: Option<PathBuf>,
-    /// True disparities of the left picture (.npy, px), from which the light is computed. Without them it is computed
-    /// from the pair's own depths.
-    #[arg(long, value_name = "FILE", requires = "left")]
-    truth: Option<PathBuf>,
+    /// The light is computed from the truth; without one from the pair's own depths.
+    #[command(flatten)]
+    truth: TruthArgs,
 }
 
 /// What a calibration file holds.
@@ -123,8 +122,7 @@ impl PairArgs {
         };
         let map = (matcher.match_pair(&left, &right))
             .map_err(|error| cannot_match(left_path, right_path, &error))?;
-        let truth = self.truth.as_ref().map(|path| read_truth(path, &left));
-        let truth = truth.transpose()?;
+        let truth = self.truth.read(&left)?;
 
         let mut camera =
             PinholeCamera::centred(own.focal_px, left.width() as u32, left.height() as u32);
@@ -133,7 +131,6 @@ impl PairArgs {
         let baseline_m = calibration.baseline_m;
         let depth_m = |&disparity_px: &f32| {
             let depth_m = own.focal_px * baseline_m / (f64::from(disparity_px) + offset_px);
-            // Infinite disparities are what Middlebury writes for unknown ones.
             if disparity_px.is_finite() && depth_m > 0.0 && depth_m.is_finite() {
                 depth_m as f32
             } else {
@@ -143,7 +140,7 @@ impl PairArgs {
         let light = truth.as_deref().unwrap_or(map.values_px());
         let depths_m: Vec<f32> = light.iter().map(depth_m).collect();
         if depths_m.iter().all(|&z| z == 0.0) {
-            let place = self.truth.as_ref().unwrap_or(left_path);
+            let place = self.truth.truth.as_ref().unwrap_or(left_path);
             let message = "no pixel has a depth by this calibration; check disparities, baseline_m and principal points";
             return Err(InputError::new(place.display(), message));
         }

@@ -38,6 +38,41 @@ impl Raster {
     /// # Errors
     /// When it cannot be read, is none of the kinds, is broken, or has more than 2²⁶ pixels.
     pub fn read(path: &Path) -> Result<Self, InputError> {
+        Ok(Self::read_any(path)?.0)
+    }
+
+    /// Reads a map of lengths or disparities; `unit` is what its numbers count, 1 if left out. There is no value where it has 0, NaN or infinity:
+    /// these become 0.
+    ///
+    /// # Errors
+    /// As [`Raster::read`]; a picture in colour; a PNG without `unit`, which `unit_key` names; a negative number.
+    pub fn read_map(path: &Path, unit: Option<f64>, unit_key: &str) -> Result<Self, InputError> {
+        let complain = |message: String| Err(InputError::new(path.display(), message));
+        let (mut raster, is_colour) = Self::read_any(path)?;
+        if is_colour {
+            return complain("is a picture in colour and no map; save it with one channel".into());
+        }
+        if raster.white > 1.0 && unit.is_none() {
+            return complain(format!(
+                "is a PNG, whose whole numbers have no unit; give {unit_key}, or save it as .npy, PFM or EXR"
+            ));
+        }
+        raster.white = 1.0;
+        for at in 0..raster.values.len() {
+            let value = f64::from(raster.values[at]) * unit.unwrap_or(1.0);
+            if value < 0.0 && value.is_finite() {
+                let (row, col) = (at / raster.width, at % raster.width);
+                return complain(format!(
+                    "has {value} at row {row}, column {col}; write 0 where there is no value"
+                ));
+            }
+            raster.values[at] = if value.is_finite() { value as f32 } else { 0.0 };
+        }
+        Ok(raster)
+    }
+
+    /// What [`Raster::read`] does, and whether it is a picture in colour.
+    fn read_any(path: &Path) -> Result<(Self, bool), InputError> {
         let complain = |message: String| InputError::new(path.display(), message);
         let unreadable = |e| InputError::unreadable(path, &e);
         if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
@@ -51,9 +86,9 @@ impl Raster {
         let first = reader.fill_buf().map_err(unreadable)?;
         let read = match first {
             [0x89, b'P', b'N', b'G', ..] => read_png(reader, length),
-            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => read_npy(reader),
-            [b'P', b'f' | b'F', ..] => read_pfm(reader),
-            [0x76, 0x2f, 0x31, 0x01, ..] => read_exr(reader, length),
+            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => read_npy(reader).map(without_colour),
+            [b'P', b'f' | b'F', ..] => read_pfm(reader).map(without_colour),
+            [0x76, 0x2f, 0x31, 0x01, ..] => read_exr(reader, length).map(without_colour),
             _ => Err("is not a PNG, .npy, PFM or EXR; convert it to one of them".into()),
         };
         read.map_err(complain)
@@ -63,6 +98,10 @@ impl Raster {
     pub(crate) fn at(&self, row: usize, col: usize) -> f32 {
         self.values[row * self.width + col]
     }
+}
+
+fn without_colour(raster: Raster) -> (Raster, bool) {
+    (raster, false)
 }
 
 /// Refuses what is too large to unpack.
@@ -92,7 +131,8 @@ fn broken(what: &str, error: impl std::fmt::Display) -> String {
     )
 }
 
-fn read_png(reader: BufReader<File>, length: u64) -> Result<Raster, String> {
+/// And whether it is in colour.
+fn read_png(reader: BufReader<File>, length: u64) -> Result<(Raster, bool), String> {
     let broken = |e: png::DecodingError| broken("PNG", e);
     let mut decoder = png::Decoder::new_with_limits(reader, png::Limits { bytes: 1 << 30 });
     decoder.set_ignore_text_chunk(true);
@@ -119,12 +159,13 @@ fn read_png(reader: BufReader<File>, length: u64) -> Result<Raster, String> {
         _ => sample(pixel, 0),
     };
     let pixel_bytes = channels * if wide { 2 } else { 1 };
-    Ok(Raster {
+    let raster = Raster {
         width: width as usize,
         height: height as usize,
         values: bytes.chunks_exact(pixel_bytes).map(grey).collect(),
         white: if wide { 65_535.0 } else { 255.0 },
-    })
+    };
+    Ok((raster, channels >= 3))
 }
 
 fn read_npy(mut reader: BufReader<File>) -> Result<Raster, String> {
@@ -199,7 +240,7 @@ fn read_pfm(mut reader: BufReader<File>) -> Result<Raster, String> {
     })
 }
 
-/// The first layer's channel Z, or else V, Y or its only one.
+/// The first layer's channel Z, or else V, Y or its only one, in the picture's display window: 0 where the layer has no pixels.
 fn read_exr(mut reader: BufReader<File>, length: u64) -> Result<Raster, String> {
     use exr::prelude::{MetaData, ReadChannels, ReadLayers, read};
     let told = |e: exr::error::Error| broken("EXR", e);
@@ -244,11 +285,27 @@ fn read_exr(mut reader: BufReader<File>, length: u64) -> Result<Raster, String> 
     if channel.sampling.0 != 1 || channel.sampling.1 != 1 {
         return Err("has a channel of fewer pixels than the picture; save it in full".into());
     }
-    let size = image.layer_data.size;
+    let display = image.attributes.display_window;
+    let (width, height) = (display.size.width(), display.size.height());
+    check_size(width as u64, height as u64)?;
+    let layer = &image.layer_data;
+    let from = layer.attributes.layer_position - display.position;
+    let mut values = vec![0.0; width * height];
+    for (at, value) in channel.sample_data.values_as_f32().enumerate() {
+        let place = |from: i32, at: usize, end: usize| {
+            let place = usize::try_from(i64::from(from) + at as i64);
+            place.ok().filter(|place| *place < end)
+        };
+        let col = place(from.x(), at % layer.size.width(), width);
+        let row = place(from.y(), at / layer.size.width(), height);
+        if let Some((row, col)) = row.zip(col) {
+            values[row * width + col] = value;
+        }
+    }
     Ok(Raster {
-        width: size.width(),
-        height: size.height(),
-        values: channel.sample_data.values_as_f32().collect(),
+        width,
+        height,
+        values,
         white: 1.0,
     })
 }
@@ -351,6 +408,55 @@ mod tests {
         let colours = png_of(1, 1, ColorType::Rgb, BitDepth::Eight, &[200, 100, 50]);
         let grey = read(&colours).unwrap();
         assert!((grey.values[0] - 124.2).abs() < 0.1 && grey.white == 255.0);
+    }
+
+    /// A layer of 2 x 2 pixels that begins left of the picture's 3 x 3 and above its lowest row.
+    #[test]
+    fn an_exr_of_a_part_stands_where_it_belongs_in_the_picture() {
+        use exr::prelude::*;
+        let values = FlatSamples::F32(vec![1.0, 2.0, 3.0, 4.0]);
+        let channels = AnyChannels::sort([AnyChannel::new("Z", values)].into_iter().collect());
+        let place = LayerAttributes::default().with_position(Vec2(9, 21));
+        let layer = Layer::new((2, 2), place, Encoding::UNCOMPRESSED, channels);
+        let window = IntegerBounds::new((10, 20), (3, 3));
+        let image = Image::empty(ImageAttributes::new(window)).with_layer(layer);
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        image
+            .write()
+            .non_parallel()
+            .to_buffered(&mut bytes)
+            .unwrap();
+        let raster = super::tests::read(&bytes.into_inner()).unwrap();
+        assert_eq!((raster.width, raster.height), (3, 3));
+        assert_eq!(raster.values, [0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 4.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn numbers_of_a_map_have_a_unit_and_a_sign() {
+        use png::{BitDepth, ColorType};
+        let map = |bytes: &[u8], unit| {
+            let file = tempfile::NamedTempFile::new().unwrap();
+            std::fs::write(file.path(), bytes).unwrap();
+            let map = Raster::read_map(file.path(), unit, "the_unit (0.001 for millimetres)");
+            map.map_err(|error| error.to_string())
+        };
+        let wide = png_of(2, 1, ColorType::Grayscale, BitDepth::Sixteen, &[1, 0, 0, 0]);
+        assert_eq!(map(&wide, Some(1.0 / 256.0)).unwrap().values, [1.0, 0.0]);
+        assert!(
+            map(&wide, None)
+                .unwrap_err()
+                .contains("no unit; give the_unit")
+        );
+        let colours = png_of(1, 1, ColorType::Rgb, BitDepth::Eight, &[200, 100, 50]);
+        assert!(map(&colours, Some(1.0)).unwrap_err().contains("in colour"));
+        let none = npy_of(&[1, 4], &[f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 5.0]);
+        assert_eq!(map(&none, None).unwrap().values, [0.0, 0.0, 0.0, 5.0]);
+        let below = npy_of(&[2, 2], &[1.0f32, 2.0, 3.0, -1.0]);
+        assert!(
+            map(&below, None)
+                .unwrap_err()
+                .contains("has -1 at row 1, column 1")
+        );
     }
 
     #[test]

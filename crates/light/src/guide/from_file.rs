@@ -43,59 +43,47 @@ impl FileMap {
         }
     }
 
-    /// Reads a `.npy` (or PFM) file of distances from the lidar along the ray, rows × cols, m.
+    /// Reads a file of distances from the lidar along the ray, rows × cols, m (`.npy`, PFM or EXR). There is no estimate where it or the map of standard
+    /// deviations has no value ([`Raster::read_map`]).
     ///
     /// # Errors
-    /// When a file cannot be read or is no such array, when a number is none, negative or infinite, and when there is no standard deviation
-    /// for a range.
+    /// When a file cannot be read or is no such array, and when a number is negative.
     pub(crate) fn read(path: &Path, sigma: FileSigma<'_>) -> Result<Self, InputError> {
-        let ranges = read_lengths(path)?;
+        let ranges = Raster::read_map(path, None, "metres")?;
         let (rows, cols) = (ranges.height, ranges.width);
         let sigmas = match sigma {
             FileSigma::Same(sigma_m) => vec![sigma_m; rows * cols],
             FileSigma::Map(sigma_path) => {
-                let sigmas = read_lengths(sigma_path)?;
+                // A standard deviation of 0 is one.
+                let sigmas = Raster::read(sigma_path)?;
+                let complain = |message| Err(InputError::new(sigma_path.display(), message));
                 if (sigmas.height, sigmas.width) != (rows, cols) {
-                    let message = format!(
+                    return complain(format!(
                         "is {}x{}, and the ranges in {} are {rows}x{cols}; give arrays of one shape",
                         sigmas.height,
                         sigmas.width,
                         path.display()
-                    );
-                    return Err(InputError::new(sigma_path.display(), message));
+                    ));
                 }
-                lengths(&sigmas).collect()
+                if let Some(at) = sigmas.values.iter().position(|&sigma_m| sigma_m < 0.0) {
+                    let (row, col) = (at / cols, at % cols);
+                    return complain(format!(
+                        "has {} at row {row}, column {col}; give standard deviations in metres",
+                        sigmas.values[at]
+                    ));
+                }
+                sigmas.values.iter().map(|&m| m.into()).collect()
             }
         };
-        let pairs = lengths(&ranges).zip(sigmas);
+        let ranges_m = ranges.values.iter().map(|&m| f64::from(m));
+        let is_known = |&(range_m, sigma_m): &(f64, f64)| range_m > 0.0 && sigma_m.is_finite();
+        let pairs = ranges_m.zip(sigmas);
         Ok(FileMap {
             source: path.display().to_string(),
             rows,
             cols,
-            estimates: pairs.map(|pair| (pair.0 > 0.0).then_some(pair)).collect(),
+            estimates: pairs.map(|pair| is_known(&pair).then_some(pair)).collect(),
         })
-    }
-}
-
-fn lengths(raster: &Raster) -> impl Iterator<Item = f64> {
-    raster.values.iter().map(|&m| m.into())
-}
-
-/// A raster of lengths, m.
-fn read_lengths(path: &Path) -> Result<Raster, InputError> {
-    let raster = Raster::read(path)?;
-    let is_length = |x: &f32| x.is_finite() && *x >= 0.0;
-    match raster.values.iter().position(|x| !is_length(x)) {
-        None => Ok(raster),
-        Some(at) => {
-            let message = format!(
-                "has {} in row {}, column {} (counted from 0); give metres, and 0 where there is no estimate",
-                raster.values[at],
-                at / raster.width,
-                at % raster.width
-            );
-            Err(InputError::new(path.display(), message))
-        }
     }
 }
 
@@ -166,10 +154,23 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_are_no_lengths_are_refused_with_their_place() {
-        for bad in [f64::NAN, f64::INFINITY, -1.0] {
-            let file = written(2, 3, &[1.0, 2.0, 3.0, 4.0, bad, 6.0]);
-            let refused = FileMap::read(file.path(), FileSigma::Same(1.0)).unwrap_err();
+    fn where_a_map_has_no_value_there_is_no_estimate() {
+        let none = [f64::NAN, f64::INFINITY, 0.0, 7.0, 8.0];
+        let ranges = written(1, 5, &none);
+        let sigmas = written(1, 5, &[1.0, 1.0, 1.0, f64::NAN, 0.0]);
+        let map = FileMap::read(ranges.path(), FileSigma::Map(sigmas.path())).unwrap();
+        assert_eq!(map.estimates, [None, None, None, None, Some((8.0, 0.0))]);
+    }
+
+    #[test]
+    fn negative_numbers_are_refused_with_their_place() {
+        let file = written(2, 3, &[1.0, 2.0, 3.0, 4.0, -1.0, 6.0]);
+        let good = written(2, 3, &[1.0; 6]);
+        for (ranges, sigma) in [
+            (&file, FileSigma::Same(1.0)),
+            (&good, FileSigma::Map(file.path())),
+        ] {
+            let refused = FileMap::read(ranges.path(), sigma).unwrap_err();
             assert!(refused.to_string().contains("row 1, column 1"), "{refused}");
         }
         let (ranges, sigmas) = (written(1, 2, &[1.0; 2]), written(2, 1, &[1.0; 2]));

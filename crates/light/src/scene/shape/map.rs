@@ -44,6 +44,9 @@ pub struct MapFiles {
     pub principal_px: Option<(f64, f64)>,
 }
 
+/// Where a map's unit is given, and what it is for files that many have.
+const DEPTH_UNIT: &str = "depth_unit_m (0.001 for millimetres, 0.00390625 for KITTI's 1/256 m)";
+
 /// A depth map, and what is there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthMap {
@@ -59,17 +62,16 @@ pub struct DepthMap {
 }
 
 impl DepthMap {
-    /// Reads the files of a map. Depths of 0 and infinite ones are where nothing is.
+    /// Reads the files of a map.
     ///
     /// # Errors
-    /// As [`Raster::read`]; depths that are NaN or negative; a map without any surface; maps of different shape;
-    /// reflectivities that are no shares.
+    /// As [`Raster::read_map`]; a map without any surface; maps of different shape; reflectivities that are no shares.
     pub(crate) fn read(files: MapFiles) -> Result<Self, InputError> {
-        let depth = Raster::read(&files.depth)?;
+        let depth = Raster::read_map(&files.depth, files.unit_m, DEPTH_UNIT)?;
         Self::of(files, depth)
     }
 
-    /// A map whose depths are at hand; `files` says where they will stand, and which others are to be read.
+    /// A map whose depths, m, are at hand, 0 where nothing is; `files` says where they will stand, and which others are to be read.
     ///
     /// # Errors
     /// As `DepthMap::read`.
@@ -78,19 +80,10 @@ impl DepthMap {
         let complaint = |path: &Path, message: String| InputError::new(path.display(), message);
         let complain = |message: String| Err(complaint(&files.depth, message));
         let place = |at: usize| format!("row {}, column {}", at / width, at % width);
-        if let Some(at) = depth.values.iter().position(|z| z.is_nan() || *z < 0.0) {
-            return complain(format!(
-                "has a depth of {} at {}; write 0 where nothing is",
-                depth.values[at],
-                place(at)
-            ));
-        }
         let mut camera = PinholeCamera::centred(files.focal_px, width as u32, height as u32);
         if let Some(principal) = files.principal_px {
             camera.centre = principal;
         }
-        let usual_m = if depth.white > 1.0 { 1e-3 } else { 1.0 };
-        let unit_m = files.unit_m.unwrap_or(usual_m);
         let inverse = |(at, &depth): (usize, &f32)| {
             let pixel = ((at % width) as f64 + 0.5, (at / width) as f64 + 0.5);
             let slant = if files.is_range {
@@ -98,7 +91,7 @@ impl DepthMap {
             } else {
                 1.0
             };
-            match f64::from(depth) * unit_m / slant {
+            match f64::from(depth) / slant {
                 z if z > 0.0 && z < 1e6 => (1.0 / z) as f32,
                 _ => 0.0,
             }
@@ -372,9 +365,10 @@ mod tests {
             depth[45] = value;
             read(&depth, None, false)
         };
-        assert!(with(0.0).is_ok() && with(f32::INFINITY).is_ok());
+        for none in [0.0, f32::INFINITY, f32::NAN] {
+            assert_eq!(with(none).unwrap().inverse(1, 5), 0.0);
+        }
         for (read, says) in [
-            (with(f32::NAN), "NaN at row 1, column 5; write 0"),
             (with(-1.0), "-1 at row 1, column 5"),
             (read(&[0.0; 1200], None, false), "no surface"),
             (
