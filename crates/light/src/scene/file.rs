@@ -4,7 +4,7 @@ use std::path::Path;
 
 use toml::{Table, Value};
 
-use super::curve::read_file;
+use super::curve::{Measured, read_file};
 use super::entry::ObjectEntry;
 use super::interferer::Interferer;
 use super::medium::Medium;
@@ -12,6 +12,7 @@ use super::object::Object;
 use super::rig::Rig;
 use super::rules::{check_object, check_rig, check_stereo};
 use super::settings::{Lidar, Light, Scene, Stereo};
+use super::words::FilterWord;
 use crate::files::InputError;
 use crate::settings::{Document, Fault, Key, Range, Section, Settings, commented, schema};
 
@@ -98,6 +99,7 @@ impl Scene {
             faults.extend(check_stereo(&scene.stereo));
         }
         faults.extend(check_rig(&scene.rig));
+        faults.extend(check_wavelengths(&scene));
         for fault in &mut faults {
             fault.message = place(document, &fault.path) + &fault.message;
         }
@@ -225,6 +227,20 @@ fn interferer(
     };
     faults.push(Fault::new(path, complaint));
     None
+}
+
+/// What other lidars' wavelengths ask of the filter.
+fn check_wavelengths(scene: &Scene) -> Option<Fault> {
+    if scene.lidar.filter != Measured::Word(FilterWord::Irradiance) {
+        return None;
+    }
+    let index = scene
+        .interferers
+        .iter()
+        .position(|other| other.wavelength_nm.is_some())?;
+    let path = format!("interferer.{index}.wavelength_nm");
+    let message = "wavelength_nm means nothing where lidar.filter is irradiance, which says no wavelengths; give the filter's shape or curve";
+    Some(Fault::new(path, message))
 }
 
 /// Where a fault is, as the beginning of a sentence.

@@ -83,7 +83,12 @@ impl Lidar {
 
     /// Share of the laser's light that passes the filter, at its temperature.
     pub fn laser_transmission(&self) -> f64 {
-        let (nm, fwhm_nm) = (self.warm_wavelength_nm(), self.laser_fwhm_nm);
+        self.line_transmission(self.warm_wavelength_nm())
+    }
+
+    /// Share of the light that passes the filter of a line at `nm` that is as wide as the laser's.
+    fn line_transmission(&self, nm: f64) -> f64 {
+        let fwhm_nm = self.laser_fwhm_nm;
         if fwhm_nm == 0.0 {
             return self.filter_at(nm).unwrap_or(1.0);
         }
@@ -110,6 +115,13 @@ impl Lidar {
 
     /// Share of a Gaussian line that passes the filter, by its integral; `breaks` are where the filter has kinks.
     fn through(&self, mut breaks: Vec<f64>, line: Filter) -> f64 {
+    /// Detected photons of a joule of light at `nm`, relative to those of the laser's own light: by the filter, the detection efficiency
+    /// and the energy of a photon.
+    pub(super) fn detected_beside_own(&self, nm: f64) -> f64 {
+        let filter = self.line_transmission(nm) / self.laser_transmission();
+        filter * self.relative_pde(nm) * nm / self.warm_wavelength_nm()
+    }
+
         breaks.extend((-12..=12).map(|k| line.centre_nm + f64::from(k) * 0.25 * line.fwhm_nm));
         let reach_nm = 3.0 * line.fwhm_nm;
         breaks.retain(|nm| (nm - line.centre_nm).abs() <= reach_nm);

@@ -8,7 +8,8 @@
 //!
 //! It sends the same energy into every direction within its beam, a pyramid, and nothing beyond: E/Ω joules a steradian with
 //! Ω = 4 asin(sin(w/2) sin(h/2)) for a beam of w by h. A surface that it lights at a distance d gets E/Ω · cos θ / d², and the lens as
-//! much over its aperture. Its wavelength is taken to be ours, so that no filter helps: the worst case. Mirrors and retroreflectors do
+//! much over its aperture. Its wavelength is ours unless given, so that no filter helps: the worst case. Another one goes through our filter
+//! and meets the detection efficiency that SPADs have there. Mirrors and retroreflectors do
 //! not send its light to us, panes between stop it, and neighbouring macropixels' crosstalk of it is left out; stray light
 //! ([`stray_light`](super::stray_light)) is not.
 //!
@@ -62,6 +63,9 @@ keys! {
             from "chosen: as the street's lidar";
         /// Full width at half maximum of its Gaussian pulse.
         pulse_fwhm_ns: f64 ["ns"] = 4.5, in Within(0.0, 1e6), from "thesis 6.4.2";
+        /// Wavelength of its laser, whose spectrum is as wide as ours; ours if left out. Needs a filter other than irradiance.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        wavelength_nm: Option<f64> ["nm"] = None, in Within(100.0, 1e4), from "chosen: ours, the worst case";
         /// Velocity in the world, [right, down, forward].
         velocity_m_s: DVec3 ["m/s"] = DVec3::ZERO, in SPEED, from "at rest";
     }
@@ -231,10 +235,12 @@ impl OtherLight {
         lens: f64,
     ) -> Option<PulseTrain> {
         let other = &scene.interferers[self.interferer as usize];
-        let photons = match self.object {
-            Some(_) => budget.photons_of_exposure(self.exposure_j_m2) * lens,
-            None => budget.photons_through_lens(self.exposure_j_m2),
-        };
+        let detected = (other.wavelength_nm).map_or(1.0, |nm| scene.lidar.detected_beside_own(nm));
+        let photons = detected
+            * match self.object {
+                Some(_) => budget.photons_of_exposure(self.exposure_j_m2) * lens,
+                None => budget.photons_through_lens(self.exposure_j_m2),
+            };
         let [way_m, square_m2] = self.way_m;
         let of_way_s2 = (square_m2 - way_m * way_m).max(0.0) / SPEED_OF_LIGHT_M_PER_S.powi(2);
         let pulse_s = other.pulse_fwhm_ns * 1e-9 / (8.0 * std::f64::consts::LN_2).sqrt();
@@ -367,6 +373,59 @@ mod tests {
     }
 
     /// Arrivals in the laser cycle of a laser of our rate, of one whose clock is fast, and where either laser dithers.
+    /// Another wavelength gets through our filter as much as the filter says, and meets the efficiency that SPADs have there.
+    #[test]
+    fn another_wavelength_meets_our_filter() {
+        let photons = |lidar: &str, keys: &str| -> f64 {
+            let text = format!(
+                "[lidar]\n{lidar}\n[[interferer]]\nname = \"car\"\nplace_m = [1.0, 0.5, 30]\n{keys}\n"
+            );
+            let mut scene = Scene::parse("test", &text).unwrap();
+            let interferers = std::mem::take(&mut scene.interferers);
+            let street = before_a_wall(0.3, "place_m = [1.0, 0.5, 30]");
+            let scene = Scene {
+                interferers,
+                lidar: scene.lidar,
+                ..street
+            };
+            others(&scene, 16)
+                .iter()
+                .flatten()
+                .map(|train| train.photons)
+                .sum()
+        };
+        let gaussian = "filter = \"gaussian\"\nfilter_fwhm_nm = 20";
+        let own = photons(gaussian, "");
+        assert_eq!(photons(gaussian, "wavelength_nm = 940"), own);
+        // 35 nm are 1.75 widths off the centre; a photon of 905 nm has more energy.
+        let expected = 0.5f64.powf(3.5 * 3.5) * 905.0 / 940.0;
+        let found = photons(gaussian, "wavelength_nm = 905") / own;
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+        assert_eq!(photons("filter = \"top_hat\"", "wavelength_nm = 905"), 0.0);
+        let curves = "filter = [[890, 0.1], [950, 0.1], [960, 1.0]]\npde_curve = [[900, 0.4], [905, 0.4], [940, 0.1], [960, 0.1]]";
+        let found = photons(curves, "wavelength_nm = 905") / photons(curves, "");
+        assert!(
+            (found / (4.0 * 905.0 / 940.0) - 1.0).abs() < 1e-9,
+            "{found}"
+        );
+        // Our laser drifts with the temperature, theirs is where it is.
+        let warm = photons(
+            &format!("{gaussian}\ntemperature_c = 105"),
+            "wavelength_nm = 946.4",
+        );
+        assert_eq!(
+            warm,
+            photons(&format!("{gaussian}\ntemperature_c = 105"), "")
+        );
+        let keys = "[[interferer]]\nname = \"car\"\nplace_m = [0, 0, 9]\nwavelength_nm = 905\n";
+        let fault = Scene::parse("test", keys).unwrap_err().to_string();
+        assert!(
+            fault.contains("in [[interferer]] number 1 (car)")
+                && fault.contains("lidar.filter is irradiance"),
+            "{fault}"
+        );
+    }
+
     #[test]
     fn a_laser_of_our_rate_stands_still_until_a_clock_drifts_or_a_laser_dithers() {
         const CYCLES: u32 = 4000;

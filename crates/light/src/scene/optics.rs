@@ -59,7 +59,7 @@ impl Lidar {
     }
 
     /// Detection efficiency at a wavelength, relative to that at the laser's.
-    fn relative_pde(&self, wavelength_nm: f64) -> f64 {
+    pub(super) fn relative_pde(&self, wavelength_nm: f64) -> f64 {
         match &self.pde_curve {
             Measured::Word(PdeWord::Flat) => 1.0,
             Measured::Curve(curve) => {

@@ -214,6 +214,7 @@ reflectivity = 0.5
 waypoints = [[0, 0, 0, 0], [2, 1, 0, 0]]
 
 [[interferer]]
+wavelength_nm = 905
 name = "oncoming"
 place_m = [-3, 0, 40]
 phase = 0.5
@@ -225,7 +226,9 @@ fn the_commented_scene_reads_back_and_has_every_key() {
         "further",
         &format!(
             "{}{FURTHER}",
-            OUTDOOR.replace("[light]", "[light]\nsun_elevation_deg = 30")
+            OUTDOOR
+                .replace("[light]", "[light]\nsun_elevation_deg = 30")
+                .replace("[lidar]", "[lidar]\nfilter = \"gaussian\"")
         ),
     )
     .unwrap();
